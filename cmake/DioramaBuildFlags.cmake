@@ -1,0 +1,14 @@
+# Flags of our own targets. Kept out of the installed SDK: a third party brings its own.
+add_library(diorama_build_flags INTERFACE)
+# No contraction to FMA: the same numbers on every x86-64 machine.
+target_compile_options(diorama_build_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow
+                                                     -ffp-contract=off)
+if(DIORAMA_WARNINGS_AS_ERRORS)
+  target_compile_options(diorama_build_flags INTERFACE -Werror)
+endif()
+if(DIORAMA_SANITIZE)
+  target_compile_options(diorama_build_flags INTERFACE -fsanitize=${DIORAMA_SANITIZE}
+                                                       -fno-omit-frame-pointer
+                                                       -fno-sanitize-recover=all)
+  target_link_options(diorama_build_flags INTERFACE -fsanitize=${DIORAMA_SANITIZE})
+endif()

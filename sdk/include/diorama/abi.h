@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+/// Number of the plugin interface. It moves whenever a public header changes in a way that a
+/// compiled plugin could notice (sdk/docs/abi_policy.md); the host loads exact matches only.
+#define DIORAMA_SDK_ABI 1
+
+#define DIORAMA_SDK_API __attribute__((visibility("default")))
+
+#define DIORAMA_DETAIL_TEXT2(x) #x
+#define DIORAMA_DETAIL_TEXT(x) DIORAMA_DETAIL_TEXT2(x)
+
+#if defined(__SANITIZE_ADDRESS__)
+#define DIORAMA_DETAIL_SANITIZER "address"
+#elif defined(__SANITIZE_THREAD__)
+#define DIORAMA_DETAIL_SANITIZER "thread"
+#else
+#define DIORAMA_DETAIL_SANITIZER "none"
+#endif
+
+#if defined(_GLIBCXX_DEBUG)
+#define DIORAMA_DETAIL_STL "debug"
+#elif defined(_GLIBCXX_USE_CXX11_ABI) && _GLIBCXX_USE_CXX11_ABI == 0
+#define DIORAMA_DETAIL_STL "old"
+#else
+#define DIORAMA_DETAIL_STL "cxx11"
+#endif

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "diorama/camera.h"
+#include "diorama/error.h"
+#include "diorama/image.h"
+#include "diorama/scene.h"
+
+namespace diorama {
+
+using NameSet = std::set<std::string, std::less<>>;
+
+/// Name and pixel type of a per-pixel output. Third parties add channels by adding a constant.
+template <class Pixel>
+struct Channel {
+  std::string_view name;
+};
+
+// Geometry and id channels come from the one ray through the pixel centre and are never filtered.
+// What that ray meets: the first surface of a visible node that is not cut out by its opacity.
+
+/// View-transformed, sRGB encoded, straight alpha 255.
+inline constexpr Channel<Rgba8> kColor{"color"};
+/// Linear radiance before exposure and view transform.
+inline constexpr Channel<Vec3f> kColorHdr{"color_hdr"};
+/// Metres from the camera centre to the surface; +infinity where nothing was hit.
+inline constexpr Channel<float> kDistanceToCamera{"distance_to_camera"};
+/// Metres along the viewing axis (minus camera-space z); +infinity where nothing was hit.
+inline constexpr Channel<float> kDistanceToImagePlane{"distance_to_image_plane"};
+/// Unit shading normal in world space, facing the camera; zero where nothing was hit.
+inline constexpr Channel<Vec3f> kNormals{"normals"};
+/// NodeId::index of the node hit; 0 where nothing was hit.
+inline constexpr Channel<std::uint32_t> kLeafId{"leaf_id"};
+/// NodeId::index of the nearest labelled node at or above the node hit; 0 for no hit and for
+/// unlabelled surfaces. Derived from kLeafId by the host.
+inline constexpr Channel<std::uint32_t> kInstanceId{"instance_id"};
+/// World position of the surface point, metres; zero where nothing was hit.
+inline constexpr Channel<Vec3f> kPosition{"position"};
+/// Mesh uv; zero where nothing was hit or the mesh has none.
+inline constexpr Channel<Vec2f> kUv{"uv"};
+/// Linear base colour, textured; zero where nothing was hit.
+inline constexpr Channel<Vec3f> kAlbedo{"albedo"};
+/// Position inside the labelled instance's box in its own space, scaled to [0, 1]^3 (NOCS); zero for
+/// unlabelled pixels. Derived by the host.
+inline constexpr Channel<Vec3f> kObjectCoordinates{"object_coordinates"};
+/// Pixels that the surface point moved since the previous time step, image x right, y down; zero
+/// where nothing was hit.
+inline constexpr Channel<Vec2f> kMotion{"motion"};
+
+/// The pixels that an object covers when nothing else is in the scene, by the same pixel-centre
+/// rays. The box may reach beyond the image by up to one image size to each side, so that the part
+/// outside can be counted; what lies further out is not counted.
+struct DIORAMA_SDK_API CoverageMask {
+  PixelBox box;
+  std::vector<std::uint8_t> bits;  ///< One byte (0 or 1) per pixel of the box, row by row.
+
+  bool covers(int x, int y) const;  ///< Image coordinates.
+};
+
+/// How much of an instance one camera sees.
+struct Visibility {
+  std::int64_t visible_pixels = 0;      ///< Its pixels in kInstanceId.
+  std::int64_t amodal_pixels = 0;       ///< Covered without occluders, inside the image.
+  std::int64_t outside_pixels = 0;      ///< Covered without occluders, outside the image.
+  std::optional<PixelBox> amodal_box;   ///< Clipped to the image; absent when nothing is inside.
+  CoverageMask amodal_mask;             ///< Filled only when "amodal_mask" was demanded.
+
+  /// 1 - visible / amodal, in [0, 1]; nothing when no pixel is inside the image.
+  std::optional<double> occlusion() const {
+    if (amodal_pixels == 0) return std::nullopt;
+    return 1.0 - double(visible_pixels) / double(amodal_pixels);
+  }
+  /// Share of the covered pixels that lies outside the image, in [0, 1].
+  double truncation() const {
+    const double all = double(amodal_pixels + outside_pixels);
+    return all == 0 ? 1.0 : double(outside_pixels) / all;
+  }
+};
+
+/// A labelled node as one camera sees it.
+struct Instance {
+  std::uint32_t id = 0;  ///< Value in kInstanceId.
+  std::string node_path;
+  Labels labels;  ///< Effective labels.
+  Affine world_from_node = Affine::Identity();
+  Aabb bounds_node;  ///< Of its visible meshes, in its own space, before world_from_node.
+  /// Extent of its pixels in kInstanceId; absent when none is visible.
+  std::optional<PixelBox> tight_box;
+  std::optional<Visibility> visibility;  ///< Filled when "visibility" was demanded.
+};
+
+/// One camera's data in one capture.
+class DIORAMA_SDK_API Frame {
+ public:
+  Frame();
+  ~Frame();
+  Frame(Frame&&) noexcept;
+  Frame& operator=(Frame&&) noexcept;
+
+  std::string camera_name;  ///< Name of the camera's node, "cam_0".
+  std::string camera_path;
+  Camera camera;
+  Affine world_from_camera = Affine::Identity();
+  /// Every labelled instance of the scene in creation order, seen or not.
+  std::vector<Instance> instances;
+  /// Path of every leaf id that occurs in kLeafId.
+  std::map<std::uint32_t, std::string> leaf_paths;
+  double exposure = 1.0;  ///< Factor from kColorHdr to the view transform's input.
+
+  template <class Pixel>
+  void set(Channel<Pixel> channel, Image<Pixel> image) {
+    set_image(channel.name, AnyImage(std::move(image)));
+  }
+  /// Throws Error when the channel is not there or has another pixel type.
+  template <class Pixel>
+  const Image<Pixel>& get(Channel<Pixel> channel) const {
+    if (const auto* image = std::get_if<Image<Pixel>>(&image_named(channel.name))) return *image;
+    throw Error(ErrorKind::Internal, camera_path + ": channel '" + std::string(channel.name) +
+                                         "' has another pixel type");
+  }
+  bool has(std::string_view channel) const;
+  NameSet channels() const;
+
+ private:
+  void set_image(std::string_view channel, AnyImage image);
+  const AnyImage& image_named(std::string_view channel) const;
+  std::map<std::string, AnyImage, std::less<>> images_;
+};
+
+/// One moment of the scene seen by all cameras.
+struct Capture {
+  int index = 0;         ///< 0-based in the whole job, the same in every shard.
+  int visit = 0;         ///< Which pass through an environment.
+  std::string phase;     ///< Name of the capture series: "floating", "dropped".
+  std::string environment;
+  std::vector<Frame> frames;  ///< One per camera, in camera order.
+};
+
+}  // namespace diorama

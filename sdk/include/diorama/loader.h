@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "diorama/component.h"
+#include "diorama/scene.h"
+
+namespace diorama {
+
+/// Puts environments and assets into a scene. An asset is named by a file path or by
+/// "scheme:rest" ("dining_room:7", "shape:cube"). Called on the main thread.
+class DIORAMA_SDK_API Loader : public Component {
+ public:
+  static constexpr ComponentKind kKind = ComponentKind::Loader;
+
+  /// What it loads: endings in lower case with dot (".usd"), schemes with colon ("dining_room:").
+  virtual std::vector<std::string> claims() const = 0;
+
+  /// The assets that its parameters name when it stands in a job's `environments` or `objects`
+  /// list, in order: file paths or "scheme:rest". Loaders that only serve files return none.
+  virtual std::vector<std::string> assets() const;
+
+  /// Fills the empty node `root` (pose, mesh, children ...) in metres, Z up. `asset` is a path that
+  /// exists or one of its own schemes. Throws Error(Asset) that begins with the asset's name; what it
+  /// added so far is then erased by the host. Same asset and parameters, same result.
+  virtual void load(std::string_view asset, Scene& scene, NodeId root) = 0;
+};
+
+}  // namespace diorama

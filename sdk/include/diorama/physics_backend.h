@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "diorama/component.h"
+#include "diorama/scene.h"
+
+namespace diorama {
+
+/// State of the moving bodies, for the job's summary and for tests.
+struct PhysicsReport {
+  int moving_bodies = 0;
+  int sleeping_bodies = 0;
+  double max_speed = 0.0;          ///< m/s, over bodies with gravity.
+  double max_penetration_m = 0.0;  ///< Deepest contact between a moving body and anything.
+  std::string deepest_body;        ///< Path of the node in that contact.
+};
+
+/// Rigid bodies. The scene is the truth between calls; the engine holds velocities and contacts.
+/// Called on the main thread. Same scene, same calls: same bits.
+class DIORAMA_SDK_API PhysicsBackend : public Component {
+ public:
+  static constexpr ComponentKind kKind = ComponentKind::Physics;
+
+  /// Builds the engine's world anew from every node with a collider, hidden ones too; all velocities
+  /// are zero afterwards.
+  void reset(const Scene& scene);
+  /// Takes `steps` fixed steps (0 or more), then writes poses and velocities of moving bodies. Throws
+  /// Error naming the node when a pose is not finite.
+  void advance(Scene& scene, int steps);
+  virtual double step_seconds() const = 0;
+  virtual PhysicsReport report() const = 0;
+
+ private:
+  virtual void do_reset(const Scene& scene) = 0;
+  virtual void do_advance(int steps) = 0;  // steps > 0
+  virtual void do_write_poses(Scene& scene) const = 0;
+};
+
+}  // namespace diorama

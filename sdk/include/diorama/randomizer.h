@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "diorama/component.h"
+#include "diorama/rng.h"
+#include "diorama/scene.h"
+
+namespace diorama {
+
+struct RandomizeContext {
+  /// "environment" once per visit, before physics; or the name of a capture series ("floating").
+  std::string moment;
+  int capture = -1;  ///< Capture::index; -1 at the moment "environment".
+  Vec3 working_area_world = Vec3::Zero();
+};
+
+/// Changes poses, lights, materials, cameras. Called on the main thread.
+class DIORAMA_SDK_API Randomizer : public Component {
+ public:
+  static constexpr ComponentKind kKind = ComponentKind::Randomizer;
+
+  /// All chance comes from `rng`, which is keyed by visit, capture and this randomizer's name. Fork
+  /// it per node path, so that one more node leaves the draws of the others as they were.
+  virtual void randomize(Scene& scene, const RandomizeContext& context, const Rng& rng) = 0;
+};
+
+}  // namespace diorama

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "diorama/component.h"
+#include "diorama/frame.h"
+#include "diorama/scene.h"
+
+namespace diorama {
+
+struct RenderRequest {
+  NodeId camera;
+  NameSet channels;
+  std::uint64_t seed = 0;  ///< Noise pattern; same seed, same bytes, whatever the thread count.
+};
+
+/// Turns a scene into channels. Called on the main thread; may use Host::parallel_for inside.
+class DIORAMA_SDK_API Renderer : public Component {
+ public:
+  static constexpr ComponentKind kKind = ComponentKind::Renderer;
+
+  /// The channels that it can fill.
+  virtual NameSet provides() const = 0;
+
+  /// Takes in the scene as it is now. Call after every change and before render(); the scene must
+  /// stay as it is and alive until the last render() of this preparation.
+  void prepare(const Scene& scene);
+
+  /// Checks the request, renders, and checks that every channel is there in the right size. Fills
+  /// the camera fields, leaf_paths and channels of the frame; instances are the host's.
+  Frame render(const RenderRequest& request);
+
+  /// Per instance, the pixels that it covers for this camera with nothing else in the scene.
+  std::vector<CoverageMask> cover(NodeId camera, std::span<const LabelledInstance> instances);
+
+ private:
+  virtual void do_prepare(const Scene& scene) = 0;
+  virtual Frame do_render(const Scene& scene, const RenderRequest& request) = 0;
+  virtual std::vector<CoverageMask> do_cover(const Scene& scene, NodeId camera,
+                                             std::span<const LabelledInstance> instances) = 0;
+  const Scene* scene_ = nullptr;
+};
+
+}  // namespace diorama

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "diorama/camera.h"
+#include "diorama/geometry.h"
+#include "diorama/light.h"
+#include "diorama/material.h"
+#include "diorama/math.h"
+#include "diorama/physics_properties.h"
+
+namespace diorama {
+
+/// Names a node of one scene. Ids are given in creation order and never reused, so equal scripts
+/// give equal ids. `index` of a node with a mesh is what the leaf id channel holds (frame.h): 0 is
+/// the root, which never has a mesh, and so also "nothing".
+struct NodeId {
+  std::uint32_t index = kNone;
+  static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
+  explicit operator bool() const { return index != kNone; }
+  friend bool operator==(const NodeId&, const NodeId&) = default;
+  friend auto operator<=>(const NodeId&, const NodeId&) = default;
+};
+
+/// Taxonomy to label: {"class": "banana"}.
+using Labels = std::map<std::string, std::string, std::less<>>;
+
+struct Node {
+  std::string name;
+  NodeId parent;
+  std::vector<NodeId> children;
+  Affine parent_from_node = Affine::Identity();
+  bool is_visible = true;  ///< False hides the whole subtree (from cameras, not from physics).
+  Labels labels;
+  std::shared_ptr<const Mesh> mesh;
+  /// One per material slot of the mesh; a missing slot renders with a default Material.
+  std::vector<std::shared_ptr<const Material>> materials;
+  std::optional<Light> light;
+  std::optional<Camera> camera;
+  std::optional<Collider> collider;
+  std::optional<RigidBody> rigid_body;
+};
+
+/// Everything that can be seen and simulated: a tree of named nodes. A concrete class on purpose:
+/// there will be one implementation. Not thread safe for writing; reading from many threads is fine.
+class DIORAMA_SDK_API Scene {
+ public:
+  Scene();
+  ~Scene();
+  Scene(Scene&&) noexcept;
+  Scene& operator=(Scene&&) noexcept;
+
+  NodeId root() const;
+  /// Adds a child. A taken name gets a number: "banana", "banana_01", "banana_02" ... A name may
+  /// not be empty nor hold '/'.
+  NodeId create(NodeId parent, std::string_view stem);
+  /// Erases the node and all below it; its ids throw from now on.
+  void erase(NodeId subtree);
+  bool contains(NodeId node) const;
+
+  /// By absolute path "/Assets/banana"; a null id when absent.
+  NodeId find(std::string_view path) const;
+  /// The same; throws Error naming the nearest existing ancestor when absent.
+  NodeId require(std::string_view path) const;
+  /// All nodes whose path fits the pattern, in creation order. '*' stands for any text without '/',
+  /// "**" for any text: "/Assets/*", "/Environment/**/TableDining*".
+  std::vector<NodeId> match(std::string_view pattern) const;
+  std::string path(NodeId node) const;
+  /// The node and all below it, parents before children, children in order.
+  std::vector<NodeId> subtree(NodeId node) const;
+
+  const Node& operator[](NodeId node) const;
+  Affine world_from_node(NodeId node) const;
+  /// False when the node or one of its ancestors is hidden.
+  bool is_visible(NodeId node) const;
+  /// Labels of the node and, per taxonomy, of its nearest labelled ancestor.
+  Labels effective_labels(NodeId node) const;
+  /// World box of all meshes at and below the node, visible or not; empty when there are none.
+  Aabb world_bounds(NodeId node) const;
+
+  /// Counts as a pose change. Throws when a number is not finite.
+  void set_pose(NodeId node, const Affine& parent_from_node);
+  void set_pose(NodeId node, const Transform& parent_from_node);
+  /// Anything but the pose, the name and the tree. Counts as a shape change. The reference is valid
+  /// until the next create() or erase().
+  Node& edit(NodeId node);
+
+  std::uint64_t pose_revision() const;   ///< A renderer updates transforms when this moved ...
+  std::uint64_t shape_revision() const;  ///< ... and looks at every node when this did.
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// A labelled thing: the nodes with visible meshes whose nearest labelled node (itself or an
+/// ancestor) is `node`.
+struct LabelledInstance {
+  NodeId node;
+  std::vector<NodeId> leaves;  ///< Never empty; in creation order.
+};
+
+/// In creation order of the labelled nodes. Hidden meshes do not count.
+DIORAMA_SDK_API std::vector<LabelledInstance> labelled_instances(const Scene& scene);
+
+/// Box, in the space of `node`, of all meshes below it (visible ones only); empty without any.
+DIORAMA_SDK_API Aabb node_bounds(const Scene& scene, NodeId node);
+
+}  // namespace diorama

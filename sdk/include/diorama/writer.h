@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "diorama/component.h"
+#include "diorama/frame.h"
+
+namespace diorama {
+
+/// What a writer knows of the whole dataset before the first capture. Equal in every shard.
+struct DatasetInfo {
+  std::uint64_t seed = 0;
+  int capture_count = 0;  ///< In the whole job.
+  std::vector<std::string> camera_names;
+  /// Every distinct label set that the job's objects carry, sorted; environments may add more.
+  std::vector<Labels> labels;
+  std::string resolved_job;  ///< YAML text; running it gives the same dataset.
+  std::string program_version;
+  std::vector<std::pair<std::string, std::string>> plugin_versions;
+};
+
+/// Where a writer's files go. The host owns the disk: a capture's files appear all together or not
+/// at all, by atomic rename, and a full disk ends the run with the dataset resumable. Paths are
+/// relative, '/' separated, below the writer's own output folder; ".." and absolute paths throw.
+class DIORAMA_SDK_API DatasetFiles {
+ public:
+  virtual ~DatasetFiles();
+  virtual void add(std::string_view path, std::vector<std::byte> bytes) = 0;
+  void add_text(std::string_view path, std::string_view text);
+};
+
+/// The files of one capture, and one record: text (without line breaks, JSON by habit) that the host
+/// keeps and hands to finish() in capture order, over resumed runs and merged shards.
+class DIORAMA_SDK_API CaptureFiles : public DatasetFiles {
+ public:
+  virtual void record(std::string_view line) = 0;
+};
+
+/// The records of all captures in capture order; captures without a record are left out.
+using RecordVisitor = std::function<void(int capture, std::string_view line)>;
+using RecordReader = std::function<void(const RecordVisitor&)>;
+
+/// Turns captures into files. begin() and finish() run on the main thread.
+class DIORAMA_SDK_API Writer : public Component {
+ public:
+  static constexpr ComponentKind kKind = ComponentKind::Writer;
+
+  /// Channels and annotations ("visibility", "amodal_mask") that write() reads.
+  virtual NameSet needs() const = 0;
+  /// Files that do not depend on captures: class lists, metadata. Called once per run.
+  virtual void begin(const DatasetInfo& dataset, DatasetFiles& files);
+  /// Called from several threads at once and in any order; names must follow from capture.index.
+  virtual void write(const Capture& capture, CaptureFiles& files) const = 0;
+  /// Called once all captures of the job are there.
+  virtual void finish(const RecordReader& records, DatasetFiles& files);
+};
+
+}  // namespace diorama
