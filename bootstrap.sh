@@ -1,0 +1,81 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# From a bare Debian 12 to pictures in one command:
+#   ./bootstrap.sh demo     install what is needed, build, make the sample pack, run the default job
+#   ./bootstrap.sh test     install what is needed, build, run every test
+#   ./bootstrap.sh build    install what is needed, build
+# Options: --preset NAME   a preset of CMakePresets.json (default: release)
+set -euo pipefail
+cd "$(dirname "$0")"
+
+build_packages=(
+  g++ cmake ninja-build pkg-config git ccache
+  libboost-dev libboost-filesystem-dev libbullet-dev libembree-dev libeigen3-dev libassimp-dev
+  libyaml-cpp-dev libcli11-dev libspdlog-dev libfmt-dev nlohmann-json3-dev
+  liblz4-dev libdeflate-dev libpng-dev libjpeg-dev libopenexr-dev libtbb-dev
+)
+test_packages=(catch2 python3-minimal python3-numpy python3-opencv python3-jsonschema binutils clang libclang-rt-14-dev)
+
+usage() { sed -n '3,7s/^# \{0,1\}//p' "$0"; }
+
+# Installs the packages that dpkg does not list as installed; says which. sudo only when not root.
+install_packages() {
+  local missing=() package
+  for package in "$@"; do
+    if ! dpkg-query -W -f '${Status}' "$package" 2>/dev/null | grep -q 'install ok installed'; then
+      missing+=("$package")
+    fi
+  done
+  if ((${#missing[@]} == 0)); then return; fi
+  if ! command -v apt-get >/dev/null; then
+    echo "bootstrap: apt-get not found; install by hand: ${missing[*]}" >&2
+    exit 1
+  fi
+  local as_root=()
+  if ((EUID != 0)); then as_root=(sudo); fi
+  echo "bootstrap: installing ${missing[*]}"
+  "${as_root[@]}" apt-get update -qq
+  DEBIAN_FRONTEND=noninteractive "${as_root[@]}" apt-get install -y -qq --no-install-recommends \
+    "${missing[@]}" >/dev/null
+}
+
+build() {
+  local launcher=()
+  if command -v ccache >/dev/null; then launcher=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache); fi
+  cmake --preset "$preset" "${launcher[@]}" >"build-$preset.log" 2>&1 || {
+    cat "build-$preset.log" >&2
+    rm -f "build-$preset.log"
+    exit 1
+  }
+  rm -f "build-$preset.log"
+  cmake --build --preset "$preset"
+}
+
+command=${1:-help}
+shift || true
+preset=release
+while (($#)); do
+  case $1 in
+    --preset) preset=${2:?bootstrap: --preset needs a name}; shift 2 ;;
+    *) echo "bootstrap: unknown option '$1'" >&2; usage >&2; exit 2 ;;
+  esac
+done
+
+case $command in
+  build)
+    install_packages "${build_packages[@]}"
+    build
+    ;;
+  demo)
+    install_packages "${build_packages[@]}"
+    build
+    "build/$preset/bin/diorama" run configs/dining_room.yaml
+    ;;
+  test)
+    install_packages "${build_packages[@]}" "${test_packages[@]}"
+    build
+    ctest --preset "$preset" -j "$(nproc)"
+    ;;
+  help | -h | --help) usage ;;
+  *) echo "bootstrap: unknown command '$command'" >&2; usage >&2; exit 2 ;;
+esac
