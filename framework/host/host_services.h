@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "diorama/host.h"
+#include "diorama/loader.h"
+#include "framework/host/asset_cache.h"
+#include "framework/host/asset_paths.h"
+#include "framework/host/log.h"
+#include "framework/host/thread_pool.h"
+#include "framework/plugins/registry.h"
+
+namespace diorama {
+
+struct HostOptions {
+  std::optional<std::filesystem::path> assets_root;
+  int threads = 1;
+  std::size_t asset_cache_bytes = std::size_t(1) << 30;
+};
+
+/// The services that plugins get. Loaders are made on first use, with default parameters.
+class HostServices final : public Host {
+ public:
+  /// The registry must outlive the host services.
+  HostServices(Registry& registry, HostOptions options, Log log);
+  ~HostServices() override;
+
+  void log(LogLevel level, std::string_view message) override;
+  std::filesystem::path resolve(std::string_view asset) const override;
+  std::vector<std::filesystem::path> list_assets(std::string_view folder,
+                                                 std::span<const std::string> skip) const override;
+  NodeId load_asset(std::string_view asset, Scene& scene, NodeId parent) override;
+  std::shared_ptr<const Texture> decode_texture(std::span<const std::byte> bytes,
+                                                std::string_view name) const override;
+  std::shared_ptr<const Texture> read_texture(const std::filesystem::path& file) const override;
+  std::vector<std::byte> encode_image(const ImageView& image, ImageFormat format) const override;
+  void parallel_for(std::size_t count, const std::function<void(std::size_t)>& body) override;
+  int thread_count() const override;
+
+ private:
+  struct Source;
+  Source find_source(std::string_view asset) const;
+  Loader& loader(const std::string& type);
+  void load_into(const Source& source, Scene& scene);
+
+  Registry& registry_;
+  AssetPaths paths_;
+  Log log_;
+  ThreadPool pool_;
+  AssetCache cache_;
+  std::map<std::string, std::unique_ptr<Loader>> loaders_;
+};
+
+}  // namespace diorama

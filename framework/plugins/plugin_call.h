@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <exception>
+#include <new>
+#include <string>
+#include <utility>
+
+#include "diorama/error.h"
+
+namespace diorama {
+
+/// Calls into a component and puts `who` ("renderer 'embree'") in front of what it throws. An Error
+/// keeps its kind; memory shortage passes unchanged; any other exception becomes Error(Plugin).
+template <class Call>
+decltype(auto) call_component(const std::string& who, Call&& call) {
+  try {
+    return std::forward<Call>(call)();
+  } catch (const Error& error) {
+    throw Error(error.kind(), who + ": " + error.what());
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception& error) {
+    throw Error(ErrorKind::Plugin, who + ": unexpected error: " + error.what());
+  } catch (...) {
+    throw Error(ErrorKind::Plugin, who + ": threw something that is no std::exception");
+  }
+}
+
+}  // namespace diorama
