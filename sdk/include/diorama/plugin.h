@@ -73,6 +73,27 @@ struct DioramaPluginDescriptor {
   char build[96];          // compiler, for messages only
 };
 
+/// One component as the library file lists it, in the ELF section ".diorama_components": the host
+/// lists components and finds loaders without loading the library and all that it links.
+struct DioramaComponentEntry {
+  std::uint32_t kind;
+  std::uint32_t reserved;
+  char type[56];
+  char help[256];
+  char claims[256];  // loaders: endings and schemes, separated by blanks
+};
+static_assert(sizeof(DioramaComponentEntry) % 64 == 0, "entries follow each other without gaps");
+
+/// Registers T and lists it in the library file. Goes into the body of DIORAMA_PLUGIN.
+#define DIORAMA_ADD(T, TYPE, HELP) DIORAMA_ADD_LOADER(T, TYPE, HELP, "")
+/// The same for a loader; CLAIMS is what its claims() returns, separated by blanks: ".obj .ply".
+#define DIORAMA_ADD_LOADER(T, TYPE, HELP, CLAIMS)                                               \
+  do {                                                                                          \
+    __attribute__((section(".diorama_components"), used)) static const DioramaComponentEntry    \
+        diorama_entry{std::uint32_t(T::kKind), 0, TYPE, HELP, CLAIMS};                          \
+    diorama::add<T>(registrar, TYPE, HELP);                                                     \
+  } while (false)
+
 /// What the entry function returns.
 struct DioramaPlugin {
   const DioramaPluginDescriptor* descriptor;
@@ -82,7 +103,7 @@ struct DioramaPlugin {
 /// Makes a library a plugin; followed by the body of the registration function:
 ///
 ///     DIORAMA_PLUGIN("randomizers_core", "1.0.0", "Apache-2.0") {
-///       diorama::add<ScatterPoses>(registrar, "scatter_poses", "Places nodes at random.");
+///       DIORAMA_ADD(ScatterPoses, "scatter_poses", "Places nodes at random.");
 ///     }
 #define DIORAMA_PLUGIN(NAME, VERSION, LICENCE)                                                  \
   __attribute__((section(".diorama_plugin"), used)) static const DioramaPluginDescriptor        \
