@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/annotators/instances.h"
+
+#include <algorithm>
+#include <limits>
+#include <map>
+#include <vector>
+
+namespace diorama {
+namespace {
+
+constexpr PixelBox kNothing{std::numeric_limits<int>::max(), std::numeric_limits<int>::max(), 0, 0};
+
+/// Position in `instances` by id, for ids below the size of the table.
+std::vector<int> position_of_id(const std::vector<Instance>& instances) {
+  std::uint32_t largest = 0;
+  for (const Instance& instance : instances) largest = std::max(largest, instance.id);
+  std::vector<int> table(std::size_t(largest) + 1, -1);
+  for (std::size_t i = 0; i < instances.size(); ++i) table[instances[i].id] = int(i);
+  return table;
+}
+
+void measure_tight_boxes(const Image<std::uint32_t>& ids, std::vector<Instance>& instances) {
+  const std::vector<int> position = position_of_id(instances);
+  std::vector<PixelBox> boxes(instances.size(), kNothing);
+  for (int y = 0; y < ids.height(); ++y) {
+    const auto row = ids.row(y);
+    for (int x = 0; x < ids.width(); ++x) {
+      const std::uint32_t id = row[std::size_t(x)];
+      if (id == 0 || id >= position.size() || position[id] < 0) continue;
+      PixelBox& box = boxes[std::size_t(position[id])];
+      box.x_min = std::min(box.x_min, x);
+      box.y_min = std::min(box.y_min, y);
+      box.x_max = std::max(box.x_max, x + 1);
+      box.y_max = std::max(box.y_max, y + 1);
+    }
+  }
+  for (std::size_t i = 0; i < boxes.size(); ++i) {
+    if (!boxes[i].is_empty()) instances[i].tight_box = boxes[i];
+  }
+}
+
+/// Box of the instance's own leaves. A labelled node below another one is an instance of its own
+/// and does not widen the outer one.
+Aabb instance_bounds(const Scene& scene, const LabelledInstance& instance) {
+  const Affine node_from_world = scene.world_from_node(instance.node).inverse();
+  Aabb box;
+  for (const NodeId leaf : instance.leaves) {
+    const Mesh& mesh = *scene[leaf].mesh;
+    if (leaf == instance.node) {
+      box.add(mesh.bounds());
+      continue;
+    }
+    const Affine node_from_leaf = node_from_world * scene.world_from_node(leaf);
+    for (const Vec3f& p : mesh.positions) box.add(node_from_leaf * p.cast<double>());
+  }
+  return box;
+}
+
+}  // namespace
+
+NameSet Instances::needs() const { return {std::string(kInstanceId.name)}; }
+NameSet Instances::provides() const { return {"instances"}; }
+
+void Instances::annotate(const Scene& scene, Frame& frame) const {
+  frame.instances.clear();
+  for (const LabelledInstance& labelled : labelled_instances(scene)) {
+    Instance instance;
+    instance.id = labelled.node.index;
+    instance.node_path = scene.path(labelled.node);
+    instance.labels = scene.effective_labels(labelled.node);
+    instance.world_from_node = scene.world_from_node(labelled.node);
+    instance.bounds_node = instance_bounds(scene, labelled);
+    frame.instances.push_back(std::move(instance));
+  }
+  measure_tight_boxes(frame.get(kInstanceId), frame.instances);
+}
+
+}  // namespace diorama

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/annotators/visibility.h"
+
+#include <algorithm>
+#include <limits>
+#include <map>
+
+namespace diorama {
+namespace {
+
+std::map<std::uint32_t, std::int64_t> count_pixels(const Image<std::uint32_t>& ids) {
+  std::map<std::uint32_t, std::int64_t> counts;
+  // Neighbours are mostly equal: look up once per run.
+  std::uint32_t run_id = 0;
+  std::int64_t run_length = 0;
+  for (const std::uint32_t id : ids.pixels()) {
+    if (id != run_id) {
+      if (run_length > 0) counts[run_id] += run_length;
+      run_id = id;
+      run_length = 0;
+    }
+    ++run_length;
+  }
+  if (run_length > 0) counts[run_id] += run_length;
+  return counts;
+}
+
+std::size_t offset_in(const PixelBox& box, int x, int y) {
+  return std::size_t(y - box.y_min) * std::size_t(box.width()) + std::size_t(x - box.x_min);
+}
+
+/// Counts inside and outside, and the box of what lies inside.
+Visibility measure(const CoverageMask& mask, int image_width, int image_height) {
+  Visibility visibility;
+  constexpr int kFar = std::numeric_limits<int>::max();
+  PixelBox inside{kFar, kFar, 0, 0};
+  for (int y = mask.box.y_min; y < mask.box.y_max; ++y) {
+    const bool row_inside = y >= 0 && y < image_height;
+    for (int x = mask.box.x_min; x < mask.box.x_max; ++x) {
+      if (mask.bits[offset_in(mask.box, x, y)] == 0) continue;
+      if (!row_inside || x < 0 || x >= image_width) {
+        ++visibility.outside_pixels;
+        continue;
+      }
+      ++visibility.amodal_pixels;
+      inside.x_min = std::min(inside.x_min, x);
+      inside.y_min = std::min(inside.y_min, y);
+      inside.x_max = std::max(inside.x_max, x + 1);
+      inside.y_max = std::max(inside.y_max, y + 1);
+    }
+  }
+  if (visibility.amodal_pixels > 0) visibility.amodal_box = inside;
+  return visibility;
+}
+
+CoverageMask cropped(const CoverageMask& mask, const PixelBox& box) {
+  CoverageMask part;
+  part.box = box;
+  part.bits.reserve(std::size_t(box.width()) * std::size_t(box.height()));
+  for (int y = box.y_min; y < box.y_max; ++y) {
+    const auto first = mask.bits.begin() + std::ptrdiff_t(offset_in(mask.box, box.x_min, y));
+    part.bits.insert(part.bits.end(), first, first + box.width());
+  }
+  return part;
+}
+
+void check(std::span<const CoverageMask> coverage, const Frame& frame) {
+  if (coverage.size() != frame.instances.size()) {
+    throw Error(ErrorKind::Internal, frame.camera_path + ": " + std::to_string(coverage.size()) +
+                                         " coverage masks for " +
+                                         std::to_string(frame.instances.size()) + " instances");
+  }
+  for (std::size_t i = 0; i < coverage.size(); ++i) {
+    const PixelBox& box = coverage[i].box;
+    const std::size_t size =
+        box.is_empty() ? 0 : std::size_t(box.width()) * std::size_t(box.height());
+    if (coverage[i].bits.size() == size) continue;
+    throw Error(ErrorKind::Internal, frame.camera_path + ": the coverage mask of " +
+                                         frame.instances[i].node_path + " holds " +
+                                         std::to_string(coverage[i].bits.size()) +
+                                         " values, its box has room for " + std::to_string(size));
+  }
+}
+
+}  // namespace
+
+void measure_visibility(std::span<const CoverageMask> coverage, bool keep_masks, Frame& frame) {
+  check(coverage, frame);
+  const auto& ids = frame.get(kInstanceId);
+  const std::map<std::uint32_t, std::int64_t> visible_pixels = count_pixels(ids);
+  for (std::size_t i = 0; i < coverage.size(); ++i) {
+    Instance& instance = frame.instances[i];
+    Visibility visibility = measure(coverage[i], ids.width(), ids.height());
+    const auto count = visible_pixels.find(instance.id);
+    if (count != visible_pixels.end()) visibility.visible_pixels = count->second;
+    if (keep_masks && visibility.amodal_box) {
+      visibility.amodal_mask = cropped(coverage[i], *visibility.amodal_box);
+    }
+    instance.visibility = std::move(visibility);
+  }
+}
+
+}  // namespace diorama
