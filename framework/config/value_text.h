@@ -13,8 +13,8 @@ namespace diorama {
 /// Lists of scalars and small mappings inside lists stay on one line.
 std::string to_yaml(const Value& value);
 
-/// `indent` spaces per level; 0: one line. Plain scalars that JSON knows (numbers, true, false) stay
-/// what they are, all others become strings.
+/// `indent` spaces per level; 0: one line. Plain scalars that JSON knows (numbers, true, false)
+/// stay what they are, all others become strings.
 std::string to_json(const Value& value, int indent);
 
 /// The text as a JSON string literal with quotes. Bytes that are not UTF-8 become U+FFFD.

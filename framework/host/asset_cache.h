@@ -13,16 +13,15 @@
 
 namespace diorama {
 
-/// Assets that were loaded before, each in a scene of its own, up to a number of bytes; the longest
-/// unused go first. An asset that alone exceeds the budget is not kept. Main thread only.
+/// Assets that were loaded before, each below the root of a scene of its own, up to a number of
+/// bytes; the longest unused go first. An asset that alone exceeds the budget is not kept. Main
+/// thread only.
 class AssetCache {
  public:
   explicit AssetCache(std::size_t budget_bytes);
 
-  /// The private scene of an asset; `load` fills it on a miss. What is copied out of it shares
-  /// meshes, materials and textures.
-  std::shared_ptr<const Scene> get(const std::string& key,
-                                   const std::function<void(Scene&)>& load);
+  /// The private scene of an asset; `load` fills it on a miss.
+  std::shared_ptr<const Scene> get(const std::string& key, const std::function<void(Scene&)>& load);
 
   std::size_t bytes() const { return bytes_; }
   std::size_t budget_bytes() const { return budget_bytes_; }
@@ -41,11 +40,11 @@ class AssetCache {
   std::list<std::string> by_age_;  // longest unused first
 };
 
-/// Memory that meshes, materials and textures of a scene hold, shared ones counted once.
+/// Memory that a scene holds: nodes, meshes, materials and textures, shared ones counted once.
 std::size_t scene_bytes(const Scene& scene);
 
-/// Copies everything below `from`'s root to below `parent`, which gets one new child named `stem`
-/// carrying what the root of `from`'s only child carries. Returns the new child.
+/// Copies `source` of `from` and all below it to a new child of `parent` called `stem`. Meshes,
+/// materials and textures are shared, not copied. Returns the child.
 NodeId instantiate(const Scene& from, NodeId source, Scene& to, NodeId parent,
                    std::string_view stem);
 

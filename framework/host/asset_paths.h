@@ -10,8 +10,8 @@
 
 namespace diorama {
 
-/// How names of assets in jobs become files: an existing local path and file:// are used as they are,
-/// everything else is looked up below the assets root, a leading '/' or not.
+/// How names of assets in jobs become files: an existing local path and file:// are used as they
+/// are, everything else is looked up below the assets root, a leading '/' or not.
 class AssetPaths {
  public:
   /// Without a root only local paths resolve.
@@ -22,9 +22,9 @@ class AssetPaths {
   std::filesystem::path resolve(std::string_view asset) const;
 
   /// Regular files at any depth below the folder whose name ends (any case) with one of `endings`,
-  /// sorted by path. Names that contain one of `skip` (any case) are left out, folders with all that
-  /// is in them. Symbolic links are followed, loops are cut. Throws like resolve(), and when the
-  /// folder is none.
+  /// sorted by path. Names that contain one of `skip` (any case) are left out, folders with all
+  /// that is in them. Symbolic links are followed, loops are cut. Throws like resolve(), and when
+  /// the folder is none.
   std::vector<std::filesystem::path> list(std::string_view folder,
                                           std::span<const std::string> endings,
                                           std::span<const std::string> skip) const;
@@ -35,9 +35,9 @@ class AssetPaths {
   std::optional<std::filesystem::path> root_;
 };
 
-/// The first that is given of: command line, DIORAMA_ASSETS_ROOT (`environment`), the job, the sample
-/// pack that belongs to the program (if it is there). Throws Error(Asset) when a given one is no
-/// folder.
+/// The first that is given of: command line, DIORAMA_ASSETS_ROOT (`environment`), the job, the
+/// sample pack that belongs to the program (if it is there). Throws Error(Asset) when a given one
+/// is no folder.
 std::optional<std::filesystem::path> choose_assets_root(
     const std::optional<std::filesystem::path>& command_line, const char* environment,
     const std::optional<std::filesystem::path>& job,

@@ -10,8 +10,8 @@
 
 namespace diorama {
 
-/// Messages on stderr, one line each, with an optional status line below them on terminals. Safe from
-/// any thread.
+/// Messages on stderr, one line each, with an optional status line below them on terminals. Safe
+/// from any thread.
 class ConsoleLog {
  public:
   explicit ConsoleLog(LogLevel least);

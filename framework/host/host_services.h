@@ -25,7 +25,8 @@ struct HostOptions {
   std::size_t asset_cache_bytes = std::size_t(1) << 30;
 };
 
-/// The services that plugins get. Loaders are made on first use, with default parameters.
+/// The services that plugins get. Loaders are made on first use, with default parameters. When two
+/// loaders claim the same ending, the first by name takes it.
 class HostServices final : public Host {
  public:
   /// The registry must outlive the host services.
@@ -45,10 +46,22 @@ class HostServices final : public Host {
   int thread_count() const override;
 
  private:
-  struct Source;
-  Source find_source(std::string_view asset) const;
+  /// An asset with the loader that takes it.
+  struct Source {
+    std::string asset;  ///< A path that exists, or "scheme:rest".
+    std::string key;    ///< The same for one file under two names.
+    std::string loader;
+    std::string stem;  ///< For the node's name.
+  };
+  struct Claim {
+    std::string text;  ///< ".usd" or "dining_room:".
+    std::string loader;
+  };
+  Source find_source(std::string_view asset);
+  const Claim* claim_of(std::string_view asset, bool is_scheme) const;
+  void learn_claims();
+  void take_claims(const ComponentEntry& entry, const std::vector<std::string>& claims);
   Loader& loader(const std::string& type);
-  void load_into(const Source& source, Scene& scene);
 
   Registry& registry_;
   AssetPaths paths_;
@@ -56,6 +69,7 @@ class HostServices final : public Host {
   ThreadPool pool_;
   AssetCache cache_;
   std::map<std::string, std::unique_ptr<Loader>> loaders_;
+  std::vector<Claim> claims_;  // earlier ones win
 };
 
 }  // namespace diorama

@@ -31,9 +31,9 @@ struct PluginFile {
   std::optional<std::vector<ListedComponent>> components;
 };
 
-/// Reads the file and checks that it was built for this host: magic, descriptor size, ABI number, ABI
-/// tag, layout digest, texts. Throws Error(Plugin): file, what was found, what is required, what to
-/// do.
+/// Reads the file and checks that it was built for this host: magic, descriptor size, ABI number,
+/// ABI tag, layout digest, texts. Throws Error(Plugin): file, what was found, what is required,
+/// what to do.
 PluginFile read_plugin_file(const std::filesystem::path& file);
 
 }  // namespace diorama

@@ -16,8 +16,8 @@ class PluginLibrary {
  public:
   /// Loads with all symbols resolved and none exported to others. The file must have passed
   /// read_plugin_file(). Throws Error(Plugin): missing libraries or symbols, no entry function, a
-  /// descriptor in memory that differs from the one in the file, errors while registering, component
-  /// names that are not allowed or differ from the listed ones.
+  /// descriptor in memory that differs from the one in the file, errors while registering,
+  /// component names that are not allowed or differ from the listed ones.
   explicit PluginLibrary(const PluginFile& file);
   ~PluginLibrary();
   PluginLibrary(PluginLibrary&&) noexcept;

@@ -39,12 +39,12 @@ using Environment = std::function<const char*(const char* name)>;
 
 /// The levels in the order of the design: command line, DIORAMA_PLUGIN_PATH,
 /// $XDG_DATA_HOME/diorama/plugins-<abi> (else below ~/.local/share), the bundled plugins.
-std::vector<SearchLevel> plugin_search_levels(const std::vector<std::filesystem::path>& command_line,
-                                              const Environment& environment,
-                                              const std::filesystem::path& bundled);
+std::vector<SearchLevel> plugin_search_levels(
+    const std::vector<std::filesystem::path>& command_line, const Environment& environment,
+    const std::filesystem::path& bundled);
 
-/// Looks through the folders for *.so files. Throws nothing for bad plugins: they are rejected with a
-/// reason and the rest goes on. Folders that everybody may write to are refused unless
+/// Looks through the folders for *.so files. Throws nothing for bad plugins: they are rejected with
+/// a reason and the rest goes on. Folders that everybody may write to are refused unless
 /// `allow_unsafe_folders`, as anybody could put code there.
 PluginSearch search_plugins(std::vector<SearchLevel> levels, bool allow_unsafe_folders);
 

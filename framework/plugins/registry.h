@@ -21,8 +21,9 @@ struct ComponentEntry {
   ComponentKind kind;
   std::string type;
   std::string help;
-  std::vector<std::string> claims;  ///< Loaders: endings and schemes.
-  std::string plugin;               ///< Name of the plugin; "diorama" for built-in components.
+  std::vector<std::string> claims;  ///< Loaders: endings and schemes, when listed in the file.
+  bool claims_are_listed = false;
+  std::string plugin;  ///< Name of the plugin; "diorama" for built-in components.
   std::string version;
   std::filesystem::path file;  ///< Empty for built-in components.
 };
@@ -32,15 +33,14 @@ struct ComponentEntry {
 class Registry {
  public:
   /// Takes what the search found. A type that an earlier level already provides is passed over with
-  /// an info message. A type that comes twice on one level is refused in both files: a warning names
-  /// them, and making it is an error. Rejected files are reported once, as warnings.
+  /// an info message. A type that comes twice on one level is refused in both files: a warning
+  /// names them, and making it is an error. Rejected files are reported once, as warnings.
   Registry(PluginSearch search, Log log);
   ~Registry();
   Registry(const Registry&) = delete;
   Registry& operator=(const Registry&) = delete;
 
-  /// Components of the program itself; they rank below all plugins. `claims` of loaders are asked
-  /// for like those of plugins that do not list them.
+  /// Components of the program itself; they rank below all plugins.
   void add_builtin(void (*register_components)(Registrar&), const std::string& version);
 
   /// Sorted by kind, then type.
@@ -60,9 +60,9 @@ class Registry {
 
   /// Makes the component that `map` names with its key `type`; the other keys are parameters, those
   /// in `also_known` the caller's. `path` is where `map` stands in the job ("renderer",
-  /// "writers[1]"). Bad parameters, a missing and an unknown type are added to `complaints`, and the
-  /// result is null. Throws Error(Plugin) when the plugin is broken: it cannot be loaded, throws,
-  /// returns null or something of another kind.
+  /// "writers[1]"). Bad parameters, a missing and an unknown type are added to `complaints`, and
+  /// the result is null. Throws Error(Plugin) when the plugin is broken: it cannot be loaded,
+  /// throws, returns null or something of another kind.
   template <class T>
   std::unique_ptr<T> make(const Value& map, const std::string& path,
                           std::span<const std::string_view> also_known, Complaints& complaints,

@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/host/host_services.h"
+
+#include <algorithm>
+#include <fstream>
+#include <set>
+#include <system_error>
+#include <utility>
+
+#include "framework/images/image_codecs.h"
+#include "framework/plugins/plugin_call.h"
+
+namespace diorama {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::uintmax_t kMaxImageBytes = std::uintmax_t(1) << 30;
+
+std::string lower(std::string_view text) {
+  std::string out(text);
+  std::transform(out.begin(), out.end(), out.begin(),
+                 [](char c) { return c >= 'A' && c <= 'Z' ? char(c + 32) : c; });
+  return out;
+}
+
+/// A node name: no '/', never empty.
+std::string node_name(std::string text) {
+  std::replace(text.begin(), text.end(), '/', '_');
+  std::replace(text.begin(), text.end(), ':', '_');
+  return text.empty() ? "asset" : text;
+}
+
+std::vector<std::byte> read_bytes(const fs::path& file) {
+  std::error_code failed;
+  const std::uintmax_t size = fs::file_size(file, failed);
+  std::ifstream stream(file, std::ios::binary);
+  if (failed || !stream) {
+    throw Error(ErrorKind::Asset, file.string() + ": the image cannot be read" +
+                                      (failed ? ": " + failed.message() : std::string()));
+  }
+  if (size > kMaxImageBytes) {
+    throw Error(ErrorKind::Asset, file.string() + ": has " + std::to_string(size) +
+                                      " bytes; images of up to 1 GiB are read");
+  }
+  std::vector<std::byte> bytes(size);
+  stream.read(reinterpret_cast<char*>(bytes.data()), std::streamsize(size));
+  if (std::uintmax_t(stream.gcount()) != size) {
+    throw Error(ErrorKind::Asset, file.string() + ": the image cannot be read to its end");
+  }
+  return bytes;
+}
+
+}  // namespace
+
+HostServices::HostServices(Registry& registry, HostOptions options, Log log)
+    : registry_(registry),
+      paths_(std::move(options.assets_root)),
+      log_(std::move(log)),
+      pool_(options.threads),
+      cache_(options.asset_cache_bytes) {
+  learn_claims();
+}
+
+HostServices::~HostServices() = default;
+
+void HostServices::log(LogLevel level, std::string_view message) { log_(level, message); }
+
+fs::path HostServices::resolve(std::string_view asset) const { return paths_.resolve(asset); }
+
+std::vector<fs::path> HostServices::list_assets(std::string_view folder,
+                                                std::span<const std::string> skip) const {
+  std::vector<std::string> endings;
+  for (const Claim& claim : claims_) {
+    if (claim.text.starts_with('.')) endings.push_back(claim.text);
+  }
+  return paths_.list(folder, endings, skip);
+}
+
+void HostServices::learn_claims() {
+  for (const ComponentEntry& entry : registry_.components()) {
+    if (entry.kind != ComponentKind::Loader) continue;
+    if (entry.claims_are_listed) {
+      take_claims(entry, entry.claims);
+      continue;
+    }
+    // A plugin that does not list its claims must be asked; a broken one must not stop the others.
+    try {
+      Loader& made = loader(entry.type);
+      take_claims(entry,
+                  call_component("loader '" + entry.type + "'", [&] { return made.claims(); }));
+    } catch (const Error& error) {
+      log_(LogLevel::Warning, error.what());
+    }
+  }
+}
+
+void HostServices::take_claims(const ComponentEntry& entry,
+                               const std::vector<std::string>& claims) {
+  for (const std::string& claim : claims) {
+    const auto same = std::find_if(claims_.begin(), claims_.end(),
+                                   [&](const Claim& known) { return known.text == claim; });
+    if (same == claims_.end()) {
+      claims_.push_back({claim, entry.type});
+    } else {
+      log_(LogLevel::Debug,
+           "'" + claim + "' is read by loader '" + same->loader + "', not by '" + entry.type + "'");
+    }
+  }
+}
+
+const HostServices::Claim* HostServices::claim_of(std::string_view asset, bool is_scheme) const {
+  const std::string name = lower(asset);
+  const Claim* best = nullptr;
+  for (const Claim& claim : claims_) {
+    const bool fits = is_scheme ? claim.text.ends_with(':') && name.starts_with(claim.text)
+                                : claim.text.starts_with('.') && name.ends_with(claim.text);
+    if (fits && (!best || claim.text.size() > best->text.size())) best = &claim;
+  }
+  return best;
+}
+
+HostServices::Source HostServices::find_source(std::string_view asset) {
+  if (has_scheme(asset)) {
+    if (const Claim* claim = claim_of(asset, true)) {
+      return {std::string(asset), std::string(asset), claim->loader, node_name(std::string(asset))};
+    }
+  }
+  const fs::path file = paths_.resolve(asset);
+  const Claim* claim = claim_of(file.filename().string(), false);
+  if (!claim) {
+    std::set<std::string> endings;
+    for (const Claim& known : claims_) {
+      if (known.text.starts_with('.')) endings.insert(known.text);
+    }
+    std::string list;
+    for (const std::string& ending : endings) list += (list.empty() ? "" : " ") + ending;
+    throw Error(ErrorKind::Asset,
+                file.string() + ": no loader reads '" + file.extension().string() +
+                    "' files; there are loaders for: " + (list.empty() ? "nothing" : list));
+  }
+  std::string name = file.filename().string();
+  name.resize(name.size() - claim->text.size());
+  return {file.string(), fs::canonical(file).string(), claim->loader, node_name(name)};
+}
+
+Loader& HostServices::loader(const std::string& type) {
+  std::unique_ptr<Loader>& made = loaders_[type];
+  if (!made) {
+    Value defaults = Value::make_map();
+    defaults.set("type", Value::text(type));
+    Complaints complaints;
+    made = registry_.make<Loader>(defaults, "loader", {}, complaints, *this);
+    complaints.raise();
+  }
+  return *made;
+}
+
+NodeId HostServices::load_asset(std::string_view asset, Scene& scene, NodeId parent) {
+  const Source source = find_source(asset);
+  Loader& with = loader(source.loader);
+  const std::string key = source.loader + " " + source.key;
+  const auto loaded = cache_.get(key, [&](Scene& own) {
+    const NodeId root = own.create(own.root(), source.stem);
+    call_component("loader '" + source.loader + "'", [&] { with.load(source.asset, own, root); });
+  });
+  const NodeId root = (*loaded)[loaded->root()].children.front();
+  return instantiate(*loaded, root, scene, parent, source.stem);
+}
+
+std::shared_ptr<const Texture> HostServices::decode_texture(std::span<const std::byte> bytes,
+                                                            std::string_view name) const {
+  return decode_image(bytes, name);
+}
+
+std::shared_ptr<const Texture> HostServices::read_texture(const fs::path& file) const {
+  return decode_image(read_bytes(file), file.string());
+}
+
+std::vector<std::byte> HostServices::encode_image(const ImageView& image,
+                                                  ImageFormat format) const {
+  return diorama::encode_image(image, format);
+}
+
+void HostServices::parallel_for(std::size_t count, const std::function<void(std::size_t)>& body) {
+  pool_.parallel_for(count, body);
+}
+
+int HostServices::thread_count() const { return pool_.thread_count(); }
+
+}  // namespace diorama
