@@ -1,0 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "diorama/plugin.h"
+#include "writer_pose/pose_writer.h"
+
+DIORAMA_PLUGIN("writer_pose", "1.0.0", "Apache-2.0") {
+  diorama::add<diorama::PoseWriter>(registrar, "PoseWriter",
+                                    "Writes object poses and cuboid keypoints as Replicator's "
+                                    "PoseWriter does; DOPE, CenterPose.");
+}
