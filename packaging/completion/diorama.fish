@@ -1,0 +1,15 @@
+# SPDX-License-Identifier: Apache-2.0
+set -l commands run config plugins inspect render export lint schema doctor docs new-plugin
+complete -c diorama -n "not __fish_seen_subcommand_from $commands" -f -a "$commands"
+complete -c diorama -l plugin-dir -r -d "Look for plugins here first"
+complete -c diorama -l assets-root -r -d "Folder below which asset paths are looked up"
+complete -c diorama -l log-level -x -a "debug info warning error" -d "Least important message to show"
+complete -c diorama -n "__fish_seen_subcommand_from run config" -l set -x -d "Override a key: key=value"
+complete -c diorama -n "__fish_seen_subcommand_from run config" -l seed -x -d "Seed of all chance"
+complete -c diorama -n "__fish_seen_subcommand_from run" -l threads -x -d "Number of threads"
+complete -c diorama -n "__fish_seen_subcommand_from run" -l output -r -d "Folder of the dataset"
+complete -c diorama -n "__fish_seen_subcommand_from run" -l resume -d "Go on with an interrupted dataset"
+complete -c diorama -n "__fish_seen_subcommand_from run" -l shard -x -d "Only part i of n: i/n"
+complete -c diorama -n "__fish_seen_subcommand_from run" -l dry-run -d "Print the plan, write nothing"
+complete -c diorama -n "__fish_seen_subcommand_from plugins inspect lint" -l json -d "For programs"
+complete -c diorama -n "__fish_seen_subcommand_from new-plugin" -x -a "loader physics randomizer renderer annotator writer"
