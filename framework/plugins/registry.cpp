@@ -155,9 +155,6 @@ Registry::Registry(PluginSearch search, Log log) : state_(std::make_unique<State
   state_->search = std::move(search);
   state_->log = std::move(log);
   state_->take_plugins();
-  for (const RejectedPlugin& rejected : state_->search.rejected) {
-    state_->log(LogLevel::Warning, "plugin refused: " + rejected.reason);
-  }
 }
 
 Registry::~Registry() = default;

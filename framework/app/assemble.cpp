@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/app/assemble.h"
+
+#include <cstdlib>
+
+#include "framework/annotators/builtin_annotators.h"
+#include "framework/pipeline/builtin_loaders.h"
+
+namespace diorama {
+
+std::string program_version() { return DIORAMA_VERSION; }
+
+std::unique_ptr<Registry> make_registry(const GlobalOptions& options, const Log& log) {
+  const Environment environment = [](const char* name) -> const char* {
+    return secure_getenv(name);
+  };
+  PluginSearch search = search_plugins(plugin_search_levels(options.plugin_dirs, environment,
+                                                            bundled_plugin_folder(options.program)),
+                                       options.allow_unsafe_plugin_dir);
+  auto registry = std::make_unique<Registry>(std::move(search), log);
+  registry->add_builtin(register_builtin_loaders, program_version());
+  registry->add_builtin(register_builtin_annotators, program_version());
+  return registry;
+}
+
+void warn_of_rejected(const Registry& registry, const Log& log) {
+  for (const RejectedPlugin& rejected : registry.rejected()) {
+    log(LogLevel::Warning, "plugin refused: " + rejected.reason);
+  }
+}
+
+std::unique_ptr<HostServices> make_host(Registry& registry, const GlobalOptions& options,
+                                        const std::optional<std::string>& job_assets_root,
+                                        const Log& log) {
+  HostOptions host;
+  host.assets_root = choose_assets_root(options.assets_root, std::getenv("DIORAMA_ASSETS_ROOT"),
+                                        job_assets_root, sample_pack_folder(options.program));
+  host.threads = options.threads > 0 ? options.threads : ThreadPool::available_threads();
+  return std::make_unique<HostServices>(registry, host, log);
+}
+
+}  // namespace diorama

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "framework/app/options.h"
+#include "framework/host/host_services.h"
+#include "framework/plugins/registry.h"
+
+/// The only place that says what the program is made of.
+namespace diorama {
+
+/// The program's version: "0.1.0".
+std::string program_version();
+
+/// Searches for plugins as the options and the environment say and adds the built-in components.
+std::unique_ptr<Registry> make_registry(const GlobalOptions& options, const Log& log);
+
+/// One warning for each plugin that was refused.
+void warn_of_rejected(const Registry& registry, const Log& log);
+
+/// Host services for a job; `job_assets_root` is what the job says, if it says something. Throws
+/// Error(Asset) when the assets root is no folder.
+std::unique_ptr<HostServices> make_host(Registry& registry, const GlobalOptions& options,
+                                        const std::optional<std::string>& job_assets_root,
+                                        const Log& log);
+
+}  // namespace diorama

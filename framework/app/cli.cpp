@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/app/cli.h"
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <functional>
+#include <iostream>
+#include <new>
+#include <string>
+
+#include "framework/app/assemble.h"
+#include "framework/app/command_config.h"
+#include "framework/app/command_plugins.h"
+#include "framework/app/command_run.h"
+#include "framework/app/options.h"
+#include "framework/host/console_log.h"
+#include "framework/plugins/plugin_search.h"
+
+namespace diorama {
+namespace {
+
+/// Everything that the command line can say. Options of one command do not share fields with those
+/// of others, so what was not given keeps its default.
+struct CommandLine {
+  GlobalOptions global;
+  std::string log_level = "info";
+  std::string assets_root;
+  RunCommandOptions run;
+  std::string shard;
+  bool close_on_completion = false;
+  JobOptions config;
+  bool config_json = false;
+  bool plugins_json = false;
+  bool describe_json = false;
+  std::string describe_type;
+  /// The command that was chosen.
+  std::function<int(ConsoleLog&)> command;
+};
+
+void add_global_options(CLI::App& app, CommandLine& line) {
+  app.set_version_flag("--version", "diorama " + program_version() + " (plugin ABI " +
+                                        DIORAMA_DETAIL_TEXT(DIORAMA_SDK_ABI) + ")");
+  app.add_option("--log-level", line.log_level, "Least level shown: debug, info, warning, error")
+      ->type_name("LEVEL")
+      ->capture_default_str();
+  app.add_option("--threads", line.global.threads, "Threads to work with; 0: all of the machine")
+      ->type_name("N")
+      ->check(CLI::Range(0, 1024));
+  app.add_option("--plugin-dir", line.global.plugin_dirs,
+                 "Folder with plugins, before all others (repeatable)")
+      ->type_name("DIR")
+      ->allow_extra_args(false);
+  app.add_flag("--allow-unsafe-plugin-dir", line.global.allow_unsafe_plugin_dir,
+               "Also load plugins from folders that everybody may write to");
+  app.add_option("--assets-root", line.assets_root, "Folder below which asset paths are looked up")
+      ->type_name("DIR");
+}
+
+/// The job file may be given by its place or as --config FILE.
+void add_job_options(CLI::App& command, JobOptions& job) {
+  auto* place = command.add_option("job,--config", job.job, "Job file, YAML or JSON");
+  place->required()->type_name("JOB");
+  command
+      .add_option("--set", job.sets,
+                  "Change one value of the job, for instance renderer.samples=64 (repeatable)")
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false);
+  command.add_option("--seed", job.seed, "Start of all random streams, instead of the job's")
+      ->type_name("N");
+  command.add_option("--output", job.output, "Output folder, instead of the job's")
+      ->type_name("DIR");
+}
+
+/// "2/5": the second of five parts.
+void read_shard(const std::string& text, RunCommandOptions& run) {
+  if (text.empty()) return;
+  int shard = 0;
+  int used = 0;
+  if (std::sscanf(text.c_str(), "%8d/%8d%n", &shard, &run.shards, &used) != 2 ||
+      std::size_t(used) != text.size() || shard < 1 || shard > run.shards) {
+    throw Error(ErrorKind::Usage,
+                "--shard: expected i/n with 1 <= i <= n, for instance 2/5, found '" + text + "'");
+  }
+  run.shard = shard - 1;
+}
+
+void add_run(CLI::App& app, CommandLine& line) {
+  CLI::App* command = app.add_subcommand("run", "Make the dataset that a job describes");
+  add_job_options(*command, line.run.job);
+  command->add_flag("--resume", line.run.resume, "Go on with the dataset in the output folder");
+  command->add_flag("--overwrite", line.run.overwrite,
+                    "Remove the dataset in the output folder first");
+  command->add_option("--shard", line.shard, "Make one part of the dataset, 1/N to N/N")
+      ->type_name("I/N");
+  command->add_flag("--dry-run", line.run.dry_run, "Check and plan the job, write nothing");
+  command->add_flag("--close-on-completion", line.close_on_completion,
+                    "Accepted for scripts made for Isaac Sim; the program always ends");
+  command->callback([&line] {
+    line.command = [&line](ConsoleLog& log) {
+      read_shard(line.shard, line.run);
+      return command_run(line.global, line.run, log);
+    };
+  });
+}
+
+void add_config(CLI::App& app, CommandLine& line) {
+  CLI::App* command =
+      app.add_subcommand("config", "Print the job that a file means, with every default");
+  add_job_options(*command, line.config);
+  command->add_flag("--json", line.config_json, "As JSON instead of YAML");
+  command->callback([&line] {
+    line.command = [&line](ConsoleLog& log) {
+      return command_config(line.global, line.config, line.config_json, log);
+    };
+  });
+}
+
+void add_plugins(CLI::App& app, CommandLine& line) {
+  CLI::App* command = app.add_subcommand("plugins", "List plugins, describe and check them");
+  command->require_subcommand(0, 1);
+  command->add_flag("--json", line.plugins_json, "As JSON");
+  command->callback([&line] {
+    if (line.command) return;
+    line.command = [&line](ConsoleLog& log) {
+      return command_plugins_list(line.global, line.plugins_json, log);
+    };
+  });
+  CLI::App* describe =
+      command->add_subcommand("describe", "Parameters of a component: types, defaults, ranges");
+  describe->add_option("type", line.describe_type, "Component, 'type' or 'kind/type'")
+      ->required()
+      ->type_name("TYPE");
+  describe->add_flag("--json", line.describe_json, "As JSON");
+  describe->callback([&line] {
+    line.command = [&line](ConsoleLog& log) {
+      return command_plugins_describe(line.global, line.describe_type,
+                                      line.describe_json || line.plugins_json, log);
+    };
+  });
+}
+
+void add_all(CLI::App& app, CommandLine& line) {
+  app.require_subcommand(1);
+  app.fallthrough();
+  app.get_formatter()->column_width(34);
+  add_global_options(app, line);
+  add_run(app, line);
+  add_config(app, line);
+  add_plugins(app, line);
+}
+
+int run_command(CommandLine& line) {
+  const LogLevel level = log_level_from(line.log_level);
+  line.global.program = program_file();
+  if (!line.assets_root.empty()) line.global.assets_root = line.assets_root;
+  ConsoleLog log(level);
+  line.global.log_level = level;
+  return line.command(log);
+}
+
+int report(const std::string& message, int code) {
+  std::cout.flush();
+  std::fprintf(stderr, "error: %s\n", message.c_str());
+  return code;
+}
+
+}  // namespace
+
+int exit_code(ErrorKind kind) { return int(kind) + 1; }
+
+int run_program(int argc, const char* const* argv) {
+  CommandLine line;
+  CLI::App app(
+      "Diorama fills 3-D rooms with labelled objects and writes image datasets with exact "
+      "labels.",
+      "diorama");
+  try {
+    add_all(app, line);
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    // Help and version are no errors, they go to stdout.
+    if (error.get_exit_code() == 0) return app.exit(error);
+    return report(std::string(error.what()) + " (try --help)", exit_code(ErrorKind::Usage));
+  }
+  try {
+    const int code = run_command(line);
+    std::cout.flush();
+    if (!std::cout)
+      return report("standard output cannot be written", exit_code(ErrorKind::Output));
+    return code;
+  } catch (const Error& error) {
+    return report(error.what(), exit_code(error.kind()));
+  } catch (const std::bad_alloc&) {
+    return report("out of memory", exit_code(ErrorKind::Internal));
+  } catch (const std::exception& error) {
+    return report(std::string("unexpected: ") + error.what(), exit_code(ErrorKind::Internal));
+  }
+}
+
+}  // namespace diorama

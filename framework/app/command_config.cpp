@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/app/command_config.h"
+
+#include <iostream>
+
+#include "framework/app/assemble.h"
+#include "framework/app/job_file.h"
+#include "framework/config/value_text.h"
+#include "framework/pipeline/job.h"
+
+namespace diorama {
+
+int command_config(const GlobalOptions& global, const JobOptions& options, bool as_json,
+                   ConsoleLog& log) {
+  const Value job = load_job(options, log.sink());
+  Complaints complaints;
+  read_job(job, complaints);
+  complaints.raise();
+  const std::unique_ptr<Registry> registry = make_registry(global, log.sink());
+  warn_of_rejected(*registry, log.sink());
+  const auto describe = [&](ComponentKind kind,
+                            std::string_view type) -> std::optional<std::vector<ParamSpec>> {
+    if (!registry->has(kind, type)) return std::nullopt;
+    return registry->describe(kind, type);
+  };
+  const Value resolved = resolved_job(job, describe);
+  std::cout << (as_json ? to_json(resolved, 2) + "\n" : to_yaml(resolved));
+  return 0;
+}
+
+}  // namespace diorama

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/app/command_plugins.h"
+
+#include <algorithm>
+#include <array>
+#include <iostream>
+
+#include "framework/app/assemble.h"
+#include "framework/app/param_text.h"
+#include "framework/config/value_text.h"
+
+namespace diorama {
+namespace {
+
+constexpr std::array kKinds{ComponentKind::Loader,     ComponentKind::Physics,
+                            ComponentKind::Randomizer, ComponentKind::Renderer,
+                            ComponentKind::Annotator,  ComponentKind::Writer};
+
+std::string padded(std::string text, std::size_t width) {
+  if (text.size() < width) text.resize(width, ' ');
+  return text;
+}
+
+Value text_list(const std::vector<std::string>& words) {
+  Value list = Value::make_list();
+  for (const std::string& word : words) list.list.push_back(Value::text(word));
+  return list;
+}
+
+Value entry_value(const ComponentEntry& entry) {
+  Value value = Value::make_map();
+  value.set("kind", Value::text(kind_name(entry.kind)));
+  value.set("type", Value::text(entry.type));
+  value.set("help", Value::text(entry.help));
+  if (!entry.claims.empty()) value.set("claims", text_list(entry.claims));
+  value.set("plugin", Value::text(entry.plugin));
+  value.set("version", Value::text(entry.version));
+  value.set("file", entry.file.empty() ? Value() : Value::text(entry.file.string()));
+  return value;
+}
+
+void print_list_json(const Registry& registry) {
+  Value document = Value::make_map();
+  document.set("program", Value::text(program_version()));
+  document.set("abi", Value::integer(DIORAMA_SDK_ABI));
+  document.set("abi_tag", Value::text(DIORAMA_ABI_TAG));
+  Value components = Value::make_list();
+  for (const ComponentEntry& entry : registry.components()) {
+    components.list.push_back(entry_value(entry));
+  }
+  document.set("components", std::move(components));
+  Value rejected = Value::make_list();
+  for (const RejectedPlugin& refusal : registry.rejected()) {
+    Value value = Value::make_map();
+    value.set("file", Value::text(refusal.file.string()));
+    value.set("reason", Value::text(refusal.reason));
+    rejected.list.push_back(std::move(value));
+  }
+  document.set("rejected", std::move(rejected));
+  Value folders = Value::make_list();
+  for (const SearchLevel& level : registry.levels()) {
+    for (const auto& folder : level.folders) folders.list.push_back(Value::text(folder.string()));
+  }
+  document.set("searched", std::move(folders));
+  std::cout << to_json(document, 2) << "\n";
+}
+
+void print_list(const Registry& registry) {
+  const std::vector<ComponentEntry> entries = registry.components();
+  std::size_t type_width = 0;
+  for (const ComponentEntry& entry : entries) {
+    type_width = std::max(type_width, entry.type.size());
+  }
+  for (const ComponentKind kind : kKinds) {
+    bool is_first = true;
+    for (const ComponentEntry& entry : entries) {
+      if (entry.kind != kind) continue;
+      if (is_first) std::cout << kind_name(kind) << "\n";
+      is_first = false;
+      std::cout << "  " << padded(entry.type, type_width) << "  " << entry.help << "  ["
+                << entry.plugin << " " << entry.version << "]\n";
+    }
+  }
+  std::cout << (entries.empty() ? "no components\n" : "") << "searched\n";
+  for (const SearchLevel& level : registry.levels()) {
+    for (const auto& folder : level.folders) {
+      std::cout << "  " << folder.string() << " (" << level.name << ")\n";
+    }
+  }
+  if (!registry.rejected().empty()) std::cout << "refused\n";
+  for (const RejectedPlugin& rejected : registry.rejected()) {
+    std::cout << "  " << rejected.reason << "\n";
+  }
+}
+
+/// The entries that "type" or "kind/type" means.
+std::vector<ComponentEntry> entries_called(const Registry& registry, const std::string& name) {
+  std::vector<ComponentEntry> found;
+  std::vector<std::string> names;
+  for (const ComponentEntry& entry : registry.components()) {
+    names.push_back(entry.type);
+    const std::string full = std::string(kind_name(entry.kind)) + "/" + entry.type;
+    if (name == entry.type || name == full) found.push_back(entry);
+  }
+  if (!found.empty()) return found;
+  const std::string near = nearest_name(name, names);
+  throw Error(ErrorKind::Plugin, "no component is called '" + name + "'" +
+                                     (near.empty() ? "" : ", did you mean '" + near + "'?") +
+                                     " 'diorama plugins' lists them all");
+}
+
+void print_description(const ComponentEntry& entry, const std::vector<ParamSpec>& specs) {
+  std::cout << kind_name(entry.kind) << " " << entry.type << ": " << entry.help << "\n";
+  std::cout << "plugin " << entry.plugin << " " << entry.version;
+  if (!entry.file.empty()) std::cout << ", " << entry.file.string();
+  std::cout << "\n";
+  for (const std::string& claim : entry.claims) std::cout << "reads " << claim << "\n";
+  if (specs.empty()) std::cout << "no parameters\n";
+  for (const ParamRow& row : param_rows(specs)) {
+    std::cout << "\n" << row.key << ": " << row.type;
+    if (!row.default_value.empty()) std::cout << ", default " << row.default_value;
+    if (!row.unit.empty()) std::cout << " " << row.unit;
+    if (!row.range.empty()) std::cout << ", " << row.range;
+    std::cout << "\n    " << row.help << "\n";
+  }
+}
+
+}  // namespace
+
+int command_plugins_list(const GlobalOptions& global, bool as_json, ConsoleLog& log) {
+  const std::unique_ptr<Registry> registry = make_registry(global, log.sink());
+  if (as_json) {
+    print_list_json(*registry);
+  } else {
+    print_list(*registry);
+  }
+  return 0;
+}
+
+int command_plugins_describe(const GlobalOptions& global, const std::string& type, bool as_json,
+                             ConsoleLog& log) {
+  const std::unique_ptr<Registry> registry = make_registry(global, log.sink());
+  warn_of_rejected(*registry, log.sink());
+  Value list = Value::make_list();
+  bool is_first = true;
+  for (const ComponentEntry& entry : entries_called(*registry, type)) {
+    const std::vector<ParamSpec> specs = registry->describe(entry.kind, entry.type);
+    Value value = entry_value(entry);
+    value.set("parameters", param_values(specs));
+    list.list.push_back(std::move(value));
+    if (as_json) continue;
+    if (!is_first) std::cout << "\n";
+    is_first = false;
+    print_description(entry, specs);
+  }
+  if (as_json) std::cout << to_json(list, 2) << "\n";
+  return 0;
+}
+
+}  // namespace diorama

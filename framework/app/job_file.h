@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "diorama/config.h"
+#include "framework/app/options.h"
+#include "framework/host/log.h"
+
+namespace diorama {
+
+/// The native job that a file and the command line mean together: the file, then --set in order,
+/// then
+/// --seed and --output. Throws Error(Config) or Error(Usage).
+Value load_job(const JobOptions& options, const Log& log);
+
+}  // namespace diorama

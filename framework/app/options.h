@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "diorama/host.h"
+
+namespace diorama {
+
+/// What the command line says for every command.
+struct GlobalOptions {
+  std::filesystem::path program;  ///< The running executable, links resolved.
+  LogLevel log_level = LogLevel::Info;
+  int threads = 0;  ///< 0: as many as the machine offers.
+  std::vector<std::filesystem::path> plugin_dirs;
+  bool allow_unsafe_plugin_dir = false;
+  std::optional<std::filesystem::path> assets_root;
+};
+
+/// What it says of the job, for commands that take one.
+struct JobOptions {
+  std::filesystem::path job;
+  std::vector<std::string> sets;  ///< "key=value", in order.
+  std::optional<std::uint64_t> seed;
+  std::optional<std::string> output;  ///< Output folder.
+};
+
+/// What it says of the run.
+struct RunCommandOptions {
+  JobOptions job;
+  int shard = 0;  ///< 0-based here; --shard counts from 1.
+  int shards = 1;
+  bool resume = false;
+  bool overwrite = false;
+  bool dry_run = false;  ///< Checks the job, plans it, writes nothing.
+};
+
+}  // namespace diorama
