@@ -10,6 +10,7 @@
 
 #include "framework/app/assemble.h"
 #include "framework/app/command_config.h"
+#include "framework/app/command_inspect.h"
 #include "framework/app/command_plugins.h"
 #include "framework/app/command_run.h"
 #include "framework/app/options.h"
@@ -30,6 +31,7 @@ struct CommandLine {
   bool close_on_completion = false;
   JobOptions config;
   bool config_json = false;
+  InspectOptions inspect;
   bool plugins_json = false;
   bool describe_json = false;
   std::string describe_type;
@@ -139,6 +141,21 @@ void add_plugins(CLI::App& app, CommandLine& line) {
   });
 }
 
+void add_inspect(CLI::App& app, CommandLine& line) {
+  CLI::App* command = app.add_subcommand("inspect", "Say what a scene or model file holds");
+  command->add_option("file", line.inspect.asset, "File, or scheme:rest such as dining_room:7")
+      ->required()
+      ->type_name("FILE");
+  command->add_option("--depth", line.inspect.depth, "Levels of the tree to print; default: all")
+      ->type_name("N");
+  command->add_flag("--json", line.inspect.as_json, "As JSON");
+  command->callback([&line] {
+    line.command = [&line](ConsoleLog& log) {
+      return command_inspect(line.global, line.inspect, log);
+    };
+  });
+}
+
 void add_all(CLI::App& app, CommandLine& line) {
   app.require_subcommand(1);
   app.fallthrough();
@@ -147,6 +164,7 @@ void add_all(CLI::App& app, CommandLine& line) {
   add_run(app, line);
   add_config(app, line);
   add_plugins(app, line);
+  add_inspect(app, line);
 }
 
 int run_command(CommandLine& line) {
