@@ -46,7 +46,12 @@ std::size_t depth_of(const Value& value) {
 /// the depth of a document cannot exhaust ours.
 class TreeBuilder final : public YAML::EventHandler {
  public:
-  explicit TreeBuilder(std::string file) : file_(std::move(file)) {}
+  TreeBuilder(std::string_view text, std::string file) : text_(text), file_(std::move(file)) {
+    line_starts_.push_back(0);
+    for (std::size_t i = 0; i < text.size(); ++i) {
+      if (text[i] == '\n') line_starts_.push_back(i + 1);
+    }
+  }
   Value take() { return std::move(root_); }
 
   void OnDocumentStart(const YAML::Mark&) override {}
@@ -73,6 +78,7 @@ class TreeBuilder final : public YAML::EventHandler {
   void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
                 const std::string& text) override {
     check_tag(tag, place(mark), {"str", "int", "float", "bool", "null"});
+    check_quotes(mark);
     Value value;
     value.kind = Value::Kind::Scalar;
     value.place = place(mark);
@@ -108,7 +114,7 @@ class TreeBuilder final : public YAML::EventHandler {
     bool has_key = false;
     std::string key;
     Place key_place;
-    std::set<std::string, std::less<>> keys;  // written in this map, not merged in
+    std::set<std::string, std::less<>> keys;
     std::vector<Value> merged;                // values of "<<"
   };
 
@@ -121,6 +127,23 @@ class TreeBuilder final : public YAML::EventHandler {
       if (tag == std::string(kCoreTag) + name) return;
     }
     refuse(where, "tag '" + tag + "' is not known here; only YAML's own (!!str, !!int ...) are");
+  }
+
+  /// yaml-cpp takes the end of the file for the end of a quoted text.
+  void check_quotes(const YAML::Mark& mark) const {
+    if (std::size_t(mark.line) >= line_starts_.size()) return;
+    std::size_t at = line_starts_[std::size_t(mark.line)] + std::size_t(mark.column);
+    if (at >= text_.size() || (text_[at] != '"' && text_[at] != '\'')) return;
+    const char quote = text_[at];
+    while (++at < text_.size()) {
+      if (quote == '"' && text_[at] == '\\') {
+        ++at;
+      } else if (text_[at] == quote) {
+        if (quote == '"' || at + 1 >= text_.size() || text_[at + 1] != '\'') return;
+        ++at;
+      }
+    }
+    refuse(place(mark), "YAML syntax error: the quotes that open here are never closed");
   }
 
   void count(std::size_t values, const Place& where) {
@@ -167,7 +190,7 @@ class TreeBuilder final : public YAML::EventHandler {
       refuse(source.place, "'<<' merges mappings, found " + source.describe());
     }
     for (const auto& [key, value] : source.map) {
-      if (!level.value.find(key)) level.value.map.emplace_back(key, value);
+      if (level.keys.insert(key).second) level.value.map.emplace_back(key, value);
     }
   }
 
@@ -213,7 +236,9 @@ class TreeBuilder final : public YAML::EventHandler {
     level.value.map.emplace_back(level.key, std::move(value));
   }
 
+  std::string_view text_;
   std::string file_;
+  std::vector<std::size_t> line_starts_;
   Value root_;
   std::vector<Level> levels_;
   std::map<YAML::anchor_t, Value> anchors_;
@@ -278,9 +303,9 @@ Value parse_yaml(std::string_view text, std::string file) {
   try {
     std::istringstream stream{std::string(text)};
     YAML::Parser parser(stream);
-    TreeBuilder builder(file);
+    TreeBuilder builder(text, file);
     if (!parser.HandleNextDocument(builder)) return {};
-    TreeBuilder second(file);
+    TreeBuilder second(text, file);
     if (parser.HandleNextDocument(second)) {
       refuse(second.take().place, "a second document begins here; a job is one document");
     }
