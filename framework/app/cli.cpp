@@ -60,8 +60,10 @@ void add_global_options(CLI::App& app, CommandLine& line) {
 
 /// The job file may be given by its place or as --config FILE.
 void add_job_options(CLI::App& command, JobOptions& job) {
-  auto* place = command.add_option("job,--config", job.job, "Job file, YAML or JSON");
-  place->required()->type_name("JOB");
+  command
+      .add_option("job,--config", job.job,
+                  "Job file, YAML or JSON; without one, the defaults of the Infinigen tutorial")
+      ->type_name("JOB");
   command
       .add_option("--set", job.sets,
                   "Change one value of the job, for instance renderer.samples=64 (repeatable)")

@@ -3,6 +3,7 @@
 
 #include "framework/config/job_overrides.h"
 #include "framework/config/yaml_config.h"
+#include "framework/replicator/dialect.h"
 
 namespace diorama {
 namespace {
@@ -12,11 +13,39 @@ Value from_command_line(Value value, const char* option) {
   return value;
 }
 
+/// Keys of the Replicator dialect are set before the translation, all others after it.
+bool is_replicator_key(const std::string& assignment) {
+  const std::string section = assignment.substr(0, assignment.find_first_of(".="));
+  return section == "capture" || section == "labeled_assets" || section == "distractors" ||
+         section == "debug_mode";
+}
+
+Value translated(const Value& job, const Log& log) {
+  Complaints complaints;
+  ReplicatorTranslation translation = translate_replicator_job(job, complaints);
+  complaints.raise();
+  std::string keys;
+  for (const std::string& key : translation.without_effect) {
+    keys += (keys.empty() ? "" : ", ") + key;
+  }
+  if (!keys.empty()) log(LogLevel::Info, "accepted, but without effect here: " + keys);
+  return std::move(translation.job);
+}
+
 }  // namespace
 
-Value load_job(const JobOptions& options, const Log&) {
-  Value job = read_job_file(options.job);
-  for (const std::string& assignment : options.sets) apply_set(job, assignment);
+Value load_job(const JobOptions& options, const Log& log) {
+  Value job = options.job.empty()
+                  ? parse_yaml(builtin_replicator_job(), "built-in infinigen_default.yaml")
+                  : read_job_file(options.job);
+  const bool is_replicator = is_replicator_job(job);
+  for (const std::string& assignment : options.sets) {
+    if (is_replicator && is_replicator_key(assignment)) apply_set(job, assignment);
+  }
+  if (is_replicator) job = translated(job, log);
+  for (const std::string& assignment : options.sets) {
+    if (!is_replicator || !is_replicator_key(assignment)) apply_set(job, assignment);
+  }
   if (options.seed) {
     Value seed;
     seed.kind = Value::Kind::Scalar;

@@ -7,9 +7,9 @@
 
 namespace diorama {
 
-/// The native job that a file and the command line mean together: the file, then --set in order,
-/// then
-/// --seed and --output. Throws Error(Config) or Error(Usage).
+/// The native job that a file and the command line mean together: the file (without one, the
+/// tutorial's built-in defaults), translated when it is of the Replicator dialect, then --set in
+/// order, then --seed and --output. Throws Error(Config) or Error(Usage).
 Value load_job(const JobOptions& options, const Log& log);
 
 }  // namespace diorama

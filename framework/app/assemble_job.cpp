@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/app/assemble_job.h"
+
+#include <algorithm>
+#include <map>
+
+#include "framework/config/value_text.h"
+#include "framework/pipeline/dataset_description.h"
+#include "framework/plugins/plugin_call.h"
+
+namespace diorama {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Makes components and remembers which plugins they came from.
+class Assembler {
+ public:
+  Assembler(Registry& registry, Host& host) : registry_(registry), host_(host) {}
+
+  template <class T>
+  std::unique_ptr<T> make(const ComponentConfig& config, std::string_view section) {
+    if (config.type.empty()) return nullptr;
+    const auto keys = host_keys(T::kKind, section);
+    auto made = registry_.make<T>(config.map, config.path, keys, complaints_, host_);
+    if (made) note_plugin(registry_.entry(T::kKind, config.type));
+    return made;
+  }
+
+  /// The loader that reads this asset, as far as the registry knows.
+  void note_loader_of(const std::string& asset) {
+    for (const ComponentEntry& entry : registry_.components()) {
+      if (entry.kind != ComponentKind::Loader) continue;
+      const bool fits = std::any_of(entry.claims.begin(), entry.claims.end(), [&](auto& claim) {
+        return claim.starts_with('.') ? asset.ends_with(claim) : asset.starts_with(claim);
+      });
+      if (fits) note_plugin(entry);
+    }
+  }
+
+  Complaints& complaints() { return complaints_; }
+  std::vector<std::pair<std::string, std::string>> plugins() const {
+    return {plugins_.begin(), plugins_.end()};
+  }
+
+ private:
+  void note_plugin(const ComponentEntry& entry) { plugins_[entry.plugin] = entry.version; }
+
+  Registry& registry_;
+  Host& host_;
+  Complaints complaints_;
+  std::map<std::string, std::string> plugins_;
+};
+
+std::vector<std::string> assets_of(const Loader& loader, const ComponentConfig& config) {
+  return call_component(config.map.place.text() + ": " + config.path + " (" + config.type + ")",
+                        [&] { return loader.assets(); });
+}
+
+void make_components(Assembler& assembler, JobAssembly& assembly,
+                     std::vector<std::unique_ptr<Loader>>& object_loaders) {
+  const Job& job = assembly.job;
+  JobComponents& parts = assembly.components;
+  for (const ComponentConfig& config : job.environments) {
+    parts.environments.push_back(assembler.make<Loader>(config, "environments"));
+  }
+  for (const ObjectGroup& group : job.objects) {
+    object_loaders.push_back(assembler.make<Loader>(group.loader, "objects"));
+  }
+  for (const RandomizerEntry& entry : job.randomizers) {
+    parts.randomizers.push_back(assembler.make<Randomizer>(entry.component, "randomizers"));
+  }
+  if (job.physics.type != "none") {
+    parts.physics.push_back(assembler.make<PhysicsBackend>(job.physics, "physics"));
+  }
+  parts.renderer = assembler.make<Renderer>(job.renderer, "renderer");
+  for (const WriterEntry& entry : job.writers) {
+    parts.writers.push_back(assembler.make<Writer>(entry.component, "writers"));
+  }
+  assembler.complaints().raise();
+}
+
+CapturePlan plan_from_assets(const JobAssembly& assembly,
+                             const std::vector<std::unique_ptr<Loader>>& object_loaders) {
+  const Job& job = assembly.job;
+  std::vector<EnvironmentChoice> environments;
+  for (std::size_t i = 0; i < job.environments.size(); ++i) {
+    const Loader& loader = *assembly.components.environments[i];
+    for (std::string& asset : assets_of(loader, job.environments[i])) {
+      environments.push_back({std::move(asset), i});
+    }
+  }
+  if (environments.empty()) {
+    throw Error(ErrorKind::Asset, job.environments.front().map.place.text() +
+                                      ": environments: the entries name no environment; give "
+                                      "folders that hold scenes, or files");
+  }
+  std::vector<std::vector<std::string>> object_assets;
+  for (std::size_t i = 0; i < job.objects.size(); ++i) {
+    object_assets.push_back(job.objects[i].count == 0
+                                ? std::vector<std::string>()
+                                : assets_of(*object_loaders[i], job.objects[i].loader));
+  }
+  return plan_captures(job, std::move(environments), object_assets);
+}
+
+std::vector<Need> needs_of(const JobAssembly& assembly) {
+  std::vector<Need> needs;
+  for (std::size_t i = 0; i < assembly.components.writers.size(); ++i) {
+    const std::string who = "writer '" + assembly.job.writers[i].name + "'";
+    const Writer& writer = *assembly.components.writers[i];
+    needs.push_back({who, call_component(who, [&] { return writer.needs(); })});
+  }
+  return needs;
+}
+
+void resolve_needs(Registry& registry, Host& host, JobAssembly& assembly) {
+  std::vector<std::unique_ptr<Annotator>> annotators;
+  std::vector<AnnotatorOffer> offers;
+  for (const std::string& type : registry.types(ComponentKind::Annotator)) {
+    Complaints complaints;
+    Value map = Value::make_map();
+    map.set("type", Value::text(type));
+    const auto keys = host_keys(ComponentKind::Annotator, "annotators");
+    auto made = registry.make<Annotator>(map, "annotator", keys, complaints, host);
+    complaints.raise();
+    offers.push_back({type, made->needs(), made->provides()});
+    annotators.push_back(std::move(made));
+  }
+  JobComponents& parts = assembly.components;
+  parts.demand = resolve_demand(needs_of(assembly), parts.renderer->provides(),
+                                "renderer '" + assembly.job.renderer.type + "'", offers);
+  for (const std::size_t index : parts.demand.annotators) {
+    parts.annotators.push_back(std::move(annotators[index]));
+  }
+}
+
+/// A dataset does not change when it is written to another folder.
+std::string portable_job(Value resolved) {
+  if (Value* output = resolved.find("output")) output->erase("folder");
+  return to_yaml(resolved);
+}
+
+}  // namespace
+
+DescribeComponent describe_from(Registry& registry) {
+  return [&registry](ComponentKind kind,
+                     std::string_view type) -> std::optional<std::vector<ParamSpec>> {
+    if (!registry.has(kind, type)) return std::nullopt;
+    return registry.describe(kind, type);
+  };
+}
+
+OutputFolders output_folders(const Job& job) {
+  const fs::path folder = job.output.folder;
+  OutputFolders folders;
+  folders.records = (folder / job.output.records).lexically_normal();
+  for (const WriterEntry& writer : job.writers) {
+    const fs::path place = folder / writer.output_dir.value_or(writer.name);
+    folders.writers.push_back({writer.name, place.lexically_normal()});
+  }
+  return folders;
+}
+
+JobAssembly assemble_job(const Value& value, Registry& registry, Host& host,
+                         const std::optional<fs::path>& assets_root,
+                         const std::string& program_version) {
+  JobAssembly assembly;
+  Assembler assembler(registry, host);
+  assembly.job = read_job(value, assembler.complaints());
+  std::vector<std::unique_ptr<Loader>> object_loaders;
+  make_components(assembler, assembly, object_loaders);
+  assembly.resolved = resolved_job(value, describe_from(registry));
+  assembly.plan = plan_from_assets(assembly, object_loaders);
+  resolve_needs(registry, host, assembly);
+  for (const EnvironmentChoice& choice : assembly.plan.environments) {
+    assembler.note_loader_of(choice.asset);
+  }
+  for (const PlannedObject& object : assembly.plan.objects) {
+    assembler.note_loader_of(object.asset);
+  }
+  if (assembly.job.writers.empty()) {
+    host.log(LogLevel::Warning, "writers: there are none, so the run leaves no pictures");
+  }
+  assembly.dataset = describe_dataset(assembly.job, assembly.plan, portable_job(assembly.resolved),
+                                      program_version, assembler.plugins());
+  assembly.dataset_json =
+      dataset_json(assembly.dataset, assembly.job, assembly.plan, assets_root);
+  return assembly;
+}
+
+}  // namespace diorama

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "diorama/host.h"
+#include "diorama/writer.h"
+#include "framework/pipeline/capture_plan.h"
+#include "framework/pipeline/job.h"
+#include "framework/pipeline/pipeline.h"
+#include "framework/plugins/registry.h"
+
+namespace diorama {
+
+/// A job ready to run. Components must not outlive the registry and the host.
+struct JobAssembly {
+  Job job;
+  Value resolved;  ///< See resolved_job().
+  JobComponents components;
+  CapturePlan plan;
+  DatasetInfo dataset;
+  std::string dataset_json;
+};
+
+/// Gives the parameters of the registry's components to resolved_job().
+DescribeComponent describe_from(Registry& registry);
+
+/// Reads the job, makes its components, lists its assets, plans its captures and resolves what its
+/// writers need. Nothing is loaded or written. All complaints about the file come in one Error
+/// (Config); then Error(Plugin), Error(Asset) as found.
+JobAssembly assemble_job(const Value& job, Registry& registry, Host& host,
+                         const std::optional<std::filesystem::path>& assets_root,
+                         const std::string& program_version);
+
+/// Where the dataset goes.
+OutputFolders output_folders(const Job& job);
+
+}  // namespace diorama

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/pipeline/capture_plan.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <map>
+#include <regex>
+#include <set>
+
+#include "diorama/error.h"
+
+namespace diorama {
+namespace {
+
+Labels labels_of(const ObjectGroup& group, const std::string& stem) {
+  if (group.label) return {{group.taxonomy, *group.label}};
+  if (!group.label_pattern) return {};
+  const std::regex pattern(*group.label_pattern, std::regex::ECMAScript);
+  return {{group.taxonomy, std::regex_replace(stem, pattern, group.label_replacement)}};
+}
+
+/// Numbered like Scene::create() does it.
+std::string free_name(const std::string& stem, std::set<std::string>& taken) {
+  std::string name = stem;
+  for (int number = 1; !taken.insert(name).second; ++number) {
+    char digits[16];
+    std::snprintf(digits, sizeof digits, "_%02d", number);
+    name = stem + digits;
+  }
+  return name;
+}
+
+void plan_group(const Job& job, std::size_t index, const std::vector<std::string>& assets,
+                std::map<std::string, std::set<std::string>>& taken_below, CapturePlan& plan) {
+  const ObjectGroup& group = job.objects[index];
+  if (group.count == 0) return;
+  if (assets.empty()) {
+    throw Error(ErrorKind::Config, group.loader.map.place.text() + ": " + group.loader.path +
+                                       ": names no assets, but " + std::to_string(group.count) +
+                                       " objects are wanted");
+  }
+  const JobStreams streams(job.seed);
+  for (int number = 0; number < group.count; ++number) {
+    Rng rng = streams.object(group.name, number);
+    PlannedObject object;
+    object.group = index;
+    object.asset = assets[rng.index(assets.size())];
+    object.floats = rng.chance(group.gravity_disabled_chance);
+    const std::string stem = asset_stem(object.asset);
+    object.labels = labels_of(group, stem);
+    const std::string& word = object.labels.empty() ? stem : object.labels.begin()->second;
+    object.name = free_name((object.floats ? "floating_" : "falling_") + node_name(word),
+                            taken_below[group.under]);
+    object.path = group.under + "/" + object.name;
+    plan.objects.push_back(std::move(object));
+  }
+}
+
+PlannedVisit plan_visit(const Job& job, int visit, int first_capture) {
+  PlannedVisit planned;
+  planned.index = visit;
+  std::map<std::string, int> taken_of_series;
+  for (const TimelineStep& step : job.timeline) {
+    for (int i = 0; i < step.count; ++i) {
+      const int index = first_capture + int(planned.captures.size());
+      if (index >= job.total_captures) return planned;
+      planned.captures.push_back({index, step.name, taken_of_series[step.name]++});
+    }
+  }
+  return planned;
+}
+
+}  // namespace
+
+int CapturePlan::capture_count() const {
+  int count = 0;
+  for (const PlannedVisit& visit : visits) count += int(visit.captures.size());
+  return count;
+}
+
+CapturePlan plan_captures(const Job& job, std::vector<EnvironmentChoice> environments,
+                          const std::vector<std::vector<std::string>>& object_assets) {
+  CapturePlan plan;
+  plan.environments = std::move(environments);
+  std::map<std::string, std::set<std::string>> taken_below;
+  for (std::size_t i = 0; i < job.objects.size(); ++i) {
+    plan_group(job, i, object_assets[i], taken_below, plan);
+  }
+  int captures = 0;
+  while (captures < job.total_captures) {
+    PlannedVisit visit = plan_visit(job, int(plan.visits.size()), captures);
+    if (visit.captures.empty()) {
+      throw Error(ErrorKind::Config, "timeline: no captures, so total_captures is never reached");
+    }
+    visit.environment = plan.visits.size() % plan.environments.size();
+    captures += int(visit.captures.size());
+    plan.visits.push_back(std::move(visit));
+  }
+  return plan;
+}
+
+std::vector<PlannedVisit> shard_of(const CapturePlan& plan, int shard, int shards) {
+  std::vector<PlannedVisit> visits;
+  for (const PlannedVisit& visit : plan.visits) {
+    if (visit.index % shards == shard) visits.push_back(visit);
+  }
+  return visits;
+}
+
+std::string asset_stem(std::string_view asset) {
+  const std::size_t start = asset.find_last_of("/:");
+  std::string_view name = start == std::string_view::npos ? asset : asset.substr(start + 1);
+  const std::size_t dot = name.find_last_of('.');
+  if (dot != std::string_view::npos && dot > 0) name = name.substr(0, dot);
+  return std::string(name);
+}
+
+Rng JobStreams::object(std::string_view group, int number) const {
+  return root_.fork("objects").fork(group).fork(std::uint64_t(number));
+}
+
+Rng JobStreams::randomizer(std::string_view name, int visit, std::string_view moment,
+                           int occurrence) const {
+  return root_.fork("randomizers")
+      .fork(name)
+      .fork(std::uint64_t(visit))
+      .fork(moment)
+      .fork(std::uint64_t(std::int64_t(occurrence)));
+}
+
+std::uint64_t JobStreams::render_seed(int capture, std::string_view camera) const {
+  return root_.fork("render").fork(std::uint64_t(capture)).fork(camera).bits();
+}
+
+}  // namespace diorama

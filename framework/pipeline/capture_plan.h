@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "diorama/rng.h"
+#include "diorama/scene.h"
+#include "framework/pipeline/job.h"
+
+namespace diorama {
+
+/// What a job will do, known in full before anything is loaded, so that every capture can be made
+/// alone: by a shard, or by a run that goes on after an interruption.
+
+/// An environment and the entry of the job's list that names it.
+struct EnvironmentChoice {
+  std::string asset;
+  std::size_t entry = 0;
+};
+
+/// An object that every visit spawns.
+struct PlannedObject {
+  std::size_t group = 0;  ///< Index into Job::objects.
+  std::string asset;
+  std::string name;  ///< Of its node; unique below ObjectGroup::under.
+  std::string path;
+  Labels labels;
+  bool floats = false;  ///< Without gravity.
+};
+
+struct PlannedCapture {
+  int index = 0;  ///< Capture::index.
+  std::string phase;
+  int number = 0;  ///< From 0 within its series and visit.
+};
+
+struct PlannedVisit {
+  int index = 0;
+  std::size_t environment = 0;  ///< Index into CapturePlan::environments.
+  std::vector<PlannedCapture> captures;
+};
+
+struct CapturePlan {
+  std::vector<EnvironmentChoice> environments;
+  std::vector<PlannedObject> objects;
+  std::vector<PlannedVisit> visits;
+
+  int capture_count() const;
+};
+
+/// `environments` is not empty. `object_assets` holds, per group of the job, what to pick from. Throws
+/// Error(Config) when a group wants objects and has nothing to pick from.
+CapturePlan plan_captures(const Job& job, std::vector<EnvironmentChoice> environments,
+                          const std::vector<std::vector<std::string>>& object_assets);
+
+/// The visits of one shard: those whose index leaves remainder `shard` when divided by `shards`.
+std::vector<PlannedVisit> shard_of(const CapturePlan& plan, int shard, int shards);
+
+/// "banana" of "/a/011_banana.usd" and of "sample:banana".
+std::string asset_stem(std::string_view asset);
+
+/// The random streams of a job. Each depends on the seed and on what it is for, and on nothing else.
+class JobStreams {
+ public:
+  explicit JobStreams(std::uint64_t seed) : root_(seed) {}
+
+  Rng object(std::string_view group, int number) const;
+  /// `occurrence` tells calls at the same moment of one visit apart: the capture's index, or a running
+  /// number for events.
+  Rng randomizer(std::string_view name, int visit, std::string_view moment, int occurrence) const;
+  std::uint64_t render_seed(int capture, std::string_view camera) const;
+
+ private:
+  Rng root_;
+};
+
+}  // namespace diorama

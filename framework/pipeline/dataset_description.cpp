@@ -1,0 +1,266 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/pipeline/dataset_description.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "diorama/error.h"
+#include "framework/config/value_text.h"
+
+namespace diorama {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+/// FNV-1a, 64 bit, as 16 hex digits.
+std::string file_hash(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::vector<char> block(std::size_t(1) << 16);
+  std::uint64_t hash = 14695981039346656037ull;
+  while (stream.read(block.data(), std::streamsize(block.size())) || stream.gcount() > 0) {
+    for (std::streamsize i = 0; i < stream.gcount(); ++i) {
+      hash = (hash ^ std::uint8_t(block[std::size_t(i)])) * 1099511628211ull;
+    }
+  }
+  if (stream.bad() || !stream.eof()) {
+    throw Error(ErrorKind::Asset, file.string() + ": cannot be read");
+  }
+  char digits[17];
+  std::snprintf(digits, sizeof digits, "%016llx", static_cast<unsigned long long>(hash));
+  return digits;
+}
+
+Json conventions() {
+  return {{"length_unit", "m"},
+          {"world_axes", "right-handed, z up"},
+          {"camera_axes", "x right, y up, looking along -z"},
+          {"matrices", "in writers' own conventions; see the writer's page"},
+          {"quaternion_order", "w, x, y, z unless the writer's page says otherwise"},
+          {"pixel_origin", "(0, 0) is the top left corner, its pixel's centre is (0.5, 0.5)"},
+          {"distance_to_image_plane", "m along the viewing axis, +infinity for no hit"},
+          {"distance_to_camera", "m from the camera's centre, +infinity for no hit"},
+          {"labels", "from the ray through the pixel's centre, never filtered"}};
+}
+
+std::set<std::string> used_assets(const CapturePlan& plan) {
+  std::set<std::string> assets;
+  for (const PlannedVisit& visit : plan.visits) {
+    assets.insert(plan.environments[visit.environment].asset);
+  }
+  for (const PlannedObject& object : plan.objects) assets.insert(object.asset);
+  return assets;
+}
+
+std::string labels_text(const Labels& labels) {
+  if (labels.empty()) return "-";
+  std::string text;
+  for (const auto& [taxonomy, label] : labels) {
+    text += (text.empty() ? "" : ", ") + taxonomy + ": " + label;
+  }
+  return text;
+}
+
+std::string series_text(const PlannedVisit& visit) {
+  std::string text;
+  std::size_t i = 0;
+  while (i < visit.captures.size()) {
+    std::size_t end = i;
+    while (end < visit.captures.size() && visit.captures[end].phase == visit.captures[i].phase) {
+      ++end;
+    }
+    text += (text.empty() ? "" : ", ") + visit.captures[i].phase + " " + std::to_string(end - i);
+    i = end;
+  }
+  return text;
+}
+
+std::string captures_text(const PlannedVisit& visit) {
+  const int first = visit.captures.front().index;
+  const int last = visit.captures.back().index;
+  if (first == last) return "capture " + std::to_string(first);
+  return "captures " + std::to_string(first) + "-" + std::to_string(last);
+}
+
+std::string timeline_text(const Job& job) {
+  std::string text;
+  for (const TimelineStep& step : job.timeline) {
+    text += text.empty() ? "" : " -> ";
+    switch (step.kind) {
+      case TimelineStep::Kind::Simulate: text += "simulate " + std::to_string(step.steps); break;
+      case TimelineStep::Kind::Capture:
+        text += "capture " + step.name + " x " + std::to_string(step.count);
+        break;
+      case TimelineStep::Kind::Event: text += "event " + step.name; break;
+    }
+  }
+  return text;
+}
+
+/// The keys of an entry that are its component's own, in one line.
+std::string parameters_text(const Value& entry, std::initializer_list<std::string_view> without) {
+  Value rest = Value::make_map();
+  for (const auto& [key, value] : entry.map) {
+    if (std::find(without.begin(), without.end(), key) == without.end()) rest.set(key, value);
+  }
+  return to_json(rest, 0);
+}
+
+void add_visits(std::string& text, const CapturePlan& plan,
+                const std::optional<fs::path>& assets_root) {
+  text += "visits (" + std::to_string(plan.visits.size()) + ")\n";
+  for (const PlannedVisit& visit : plan.visits) {
+    text += "  " + std::to_string(visit.index) + "  " +
+            asset_name(plan.environments[visit.environment].asset, assets_root) + "  " +
+            captures_text(visit) + ": " + series_text(visit) + "\n";
+  }
+}
+
+void add_objects(std::string& text, const CapturePlan& plan, const Job& job,
+                 const std::optional<fs::path>& assets_root) {
+  text += "objects (" + std::to_string(plan.objects.size()) + ")\n";
+  for (std::size_t group = 0; group < job.objects.size(); ++group) {
+    const auto floating = std::count_if(plan.objects.begin(), plan.objects.end(), [&](auto& o) {
+      return o.group == group && o.floats;
+    });
+    text += "  " + job.objects[group].name + ": " + std::to_string(job.objects[group].count) +
+            " below " + job.objects[group].under + ", " + std::to_string(floating) + " floating\n";
+    for (const PlannedObject& object : plan.objects) {
+      if (object.group != group) continue;
+      text += "    " + object.path + "  " + labels_text(object.labels) + "  " +
+              (object.floats ? "floats" : "falls") + "  " + asset_name(object.asset, assets_root) +
+              "\n";
+    }
+  }
+}
+
+void add_cameras(std::string& text, const Job& job) {
+  text += "cameras (" + std::to_string(job.camera_names().size()) + ")\n";
+  for (const CameraGroup& group : job.cameras) {
+    char line[256];
+    std::snprintf(line, sizeof line,
+                  "  %s x %d: %s %dx%d, focal length %g mm, aperture %g mm, sees %g to %g m\n",
+                  group.name.c_str(), group.count, group.type.c_str(), group.width, group.height,
+                  group.focal_length_mm, group.horizontal_aperture_mm, group.near_m, group.far_m);
+    text += line;
+  }
+}
+
+void add_lights(std::string& text, const Job& job) {
+  text += "lights\n";
+  for (const LightGroup& group : job.lights) {
+    text += "  " + group.name + " x " + std::to_string(group.count) + ": " + group.type + "\n";
+  }
+}
+
+void add_randomizers(std::string& text, const Job& job, const Value& resolved) {
+  const Value* entries = resolved.find("randomizers");
+  text += "randomizers\n";
+  for (std::size_t i = 0; i < job.randomizers.size(); ++i) {
+    const RandomizerEntry& entry = job.randomizers[i];
+    text += "  " + entry.name + " (" + entry.type + ") on ";
+    for (std::size_t k = 0; k < entry.on.size(); ++k) text += (k > 0 ? ", " : "") + entry.on[k];
+    if (entry.every > 1) text += ", every " + std::to_string(entry.every);
+    text += ": " + parameters_text(entries->list[i], {"type", "name", "on", "every"}) + "\n";
+  }
+}
+
+void add_writers(std::string& text, const Job& job) {
+  text += "writers (" + std::to_string(job.writers.size()) + ")\n";
+  for (const WriterEntry& entry : job.writers) {
+    text += "  " + entry.name + " (" + entry.type + ") to " +
+            entry.output_dir.value_or(entry.name) + ": " +
+            parameters_text(entry.component.map, {"type", "name", "output_dir"}) + "\n";
+  }
+}
+
+}  // namespace
+
+DatasetInfo describe_dataset(const Job& job, const CapturePlan& plan, std::string resolved,
+                             std::string program_version,
+                             std::vector<std::pair<std::string, std::string>> plugin_versions) {
+  DatasetInfo info;
+  info.seed = job.seed;
+  info.capture_count = plan.capture_count();
+  info.camera_names = job.camera_names();
+  std::set<Labels> labels;
+  for (const PlannedObject& object : plan.objects) {
+    if (!object.labels.empty()) labels.insert(object.labels);
+  }
+  info.labels.assign(labels.begin(), labels.end());
+  info.resolved_job = std::move(resolved);
+  info.program_version = std::move(program_version);
+  info.plugin_versions = std::move(plugin_versions);
+  return info;
+}
+
+std::string dataset_json(const DatasetInfo& info, const Job& job, const CapturePlan& plan,
+                         const std::optional<fs::path>& assets_root) {
+  Json json;
+  json["format"] = "diorama dataset 1";
+  json["diorama"] = info.program_version;
+  json["plugins"] = Json::object();
+  for (const auto& [name, version] : info.plugin_versions) json["plugins"][name] = version;
+  json["seed"] = info.seed;
+  json["captures"] = info.capture_count;
+  json["cameras"] = info.camera_names;
+  json["labels"] = Json::array();
+  for (const Labels& labels : info.labels) {
+    Json entry = Json::object();
+    for (const auto& [taxonomy, label] : labels) entry[taxonomy] = label;
+    json["labels"].push_back(entry);
+  }
+  json["writers"] = Json::array();
+  for (const WriterEntry& writer : job.writers) {
+    json["writers"].push_back({{"name", writer.name},
+                               {"type", writer.type},
+                               {"folder", writer.output_dir.value_or(writer.name)}});
+  }
+  json["conventions"] = conventions();
+  json["assets"] = Json::array();
+  for (const std::string& asset : used_assets(plan)) {
+    Json entry{{"asset", asset_name(asset, assets_root)}};
+    if (fs::is_regular_file(asset)) entry["fnv1a64"] = file_hash(asset);
+    json["assets"].push_back(entry);
+  }
+  json["job"] = info.resolved_job;
+  return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+std::string asset_name(std::string_view asset, const std::optional<fs::path>& assets_root) {
+  const fs::path path(asset);
+  if (!assets_root || !path.is_absolute()) return std::string(asset);
+  const fs::path below = path.lexically_relative(*assets_root);
+  if (below.empty() || *below.begin() == "..") return std::string(asset);
+  return "/" + below.generic_string();
+}
+
+std::string plan_text(const CapturePlan& plan, const Job& job, const Value& resolved,
+                      const std::optional<fs::path>& assets_root) {
+  const std::size_t cameras = job.camera_names().size();
+  std::string text = std::to_string(plan.capture_count()) + " captures x " +
+                     std::to_string(cameras) + " cameras = " +
+                     std::to_string(std::size_t(plan.capture_count()) * cameras) + " frames, seed " +
+                     std::to_string(job.seed) + (job.debug ? ", debug" : "") + "\n";
+  text += "timeline: " + timeline_text(job) + "\n";
+  text += "environments (" + std::to_string(plan.environments.size()) + ")\n";
+  for (const EnvironmentChoice& choice : plan.environments) {
+    text += "  " + asset_name(choice.asset, assets_root) + "\n";
+  }
+  add_visits(text, plan, assets_root);
+  add_objects(text, plan, job, assets_root);
+  add_lights(text, job);
+  add_cameras(text, job);
+  add_randomizers(text, job, resolved);
+  const Value* renderer = resolved.find("renderer");
+  text += "renderer " + job.renderer.type + ": " + parameters_text(*renderer, {"type"}) + "\n";
+  text += "physics " + job.physics.type + "\n";
+  add_writers(text, job);
+  return text;
+}
+
+}  // namespace diorama

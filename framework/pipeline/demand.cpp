@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/pipeline/demand.h"
+
+#include <algorithm>
+
+#include "diorama/config.h"
+#include "diorama/error.h"
+
+namespace diorama {
+namespace {
+
+class Resolution {
+ public:
+  Resolution(const NameSet& renderer_provides, const std::string& renderer,
+             std::span<const AnnotatorOffer> offers)
+      : renderer_provides_(renderer_provides), renderer_(renderer), offers_(offers) {}
+
+  void want(const std::string& who, const std::string& name) {
+    if (name == kVisibility || name == kAmodalMask) {
+      want(who, std::string(kInstanceId.name));
+      want(who, std::string(kInstances));
+      demand_.visibility = true;
+      if (name == kAmodalMask) demand_.amodal_mask = true;
+      return;
+    }
+    if (renderer_provides_.contains(name)) {
+      demand_.channels.insert(name);
+      return;
+    }
+    const auto offer = std::find_if(offers_.begin(), offers_.end(), [&](const auto& candidate) {
+      return candidate.provides.contains(name);
+    });
+    if (offer == offers_.end()) refuse(who, name);
+    use(who, std::size_t(offer - offers_.begin()));
+  }
+
+  Demand take() { return std::move(demand_); }
+
+ private:
+  void use(const std::string& who, std::size_t index) {
+    const bool is_used = std::find(demand_.annotators.begin(), demand_.annotators.end(), index) !=
+                         demand_.annotators.end();
+    if (is_used) return;
+    const AnnotatorOffer& offer = offers_[index];
+    if (std::find(open_.begin(), open_.end(), index) != open_.end()) {
+      throw Error(ErrorKind::Plugin, "annotator '" + offer.type + "': needs its own output");
+    }
+    open_.push_back(index);
+    for (const std::string& name : offer.needs) {
+      want(who + " (through annotator '" + offer.type + "')", name);
+    }
+    open_.pop_back();
+    demand_.annotators.push_back(index);
+  }
+
+  [[noreturn]] void refuse(const std::string& who, const std::string& name) const {
+    std::vector<std::string> known(renderer_provides_.begin(), renderer_provides_.end());
+    for (const AnnotatorOffer& offer : offers_) {
+      known.insert(known.end(), offer.provides.begin(), offer.provides.end());
+    }
+    known.emplace_back(kVisibility);
+    known.emplace_back(kAmodalMask);
+    std::sort(known.begin(), known.end());
+    std::string list;
+    for (const std::string& word : known) list += (list.empty() ? "" : ", ") + word;
+    throw Error(ErrorKind::Config, who + ": needs \"" + name + "\", which neither " + renderer_ +
+                                       " nor an annotator provides (there are: " + list + ")");
+  }
+
+  const NameSet& renderer_provides_;
+  const std::string& renderer_;
+  std::span<const AnnotatorOffer> offers_;
+  std::vector<std::size_t> open_;
+  Demand demand_;
+};
+
+}  // namespace
+
+Demand resolve_demand(std::span<const Need> needs, const NameSet& renderer_provides,
+                      const std::string& renderer, std::span<const AnnotatorOffer> offers) {
+  Resolution resolution(renderer_provides, renderer, offers);
+  for (const Need& need : needs) {
+    for (const std::string& name : need.names) resolution.want(need.who, name);
+  }
+  // Frames promise their instances to every writer.
+  for (const Need& need : needs) resolution.want(need.who, std::string(kInstances));
+  return resolution.take();
+}
+
+}  // namespace diorama

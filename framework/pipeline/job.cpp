@@ -1,0 +1,555 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/pipeline/job.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <regex>
+#include <set>
+
+#include "framework/pipeline/job_keys.h"
+
+namespace diorama {
+namespace {
+
+using detail::EngineHead;
+using detail::EntryHead;
+using detail::JobHead;
+using detail::StepKeys;
+
+constexpr const char* kColliderWords[] = {"none",         "triangle_mesh",   "convex_hull",
+                                          "bounding_box", "bounding_sphere"};
+constexpr const char* kEnvironmentColliderWords[] = {"none", "triangle_mesh", "convex_hull",
+                                                     "bounding_box"};
+constexpr const char* kLightWords[] = {"sphere", "rect", "disk", "distant", "dome"};
+constexpr const char* kCameraWords[] = {"pinhole", "opencv_pinhole", "fisheye_polynomial"};
+
+const std::vector<std::string> kSections{
+    "seed",    "assets_root", "debug",       "total_captures", "environments",
+    "environment", "objects", "lights",      "cameras",        "randomizers",
+    "physics", "renderer",    "timeline",    "writers",        "output"};
+
+std::string item_path(std::string_view section, std::size_t index) {
+  return std::string(section) + "[" + std::to_string(index) + "]";
+}
+
+/// `type: null` is what people write for the null renderer; YAML reads it as nothing.
+Value with_type_as_text(const Value& map) {
+  Value copy = map;
+  if (Value* type = copy.find("type"); type && type->kind == Value::Kind::Null) {
+    const Place place = type->place;
+    const Place key_place = type->key_place;
+    *type = Value::text("null");
+    type->place = place;
+    type->key_place = key_place;
+  }
+  return copy;
+}
+
+template <class Keys>
+void read_keys(const Value& map, const std::string& path, Keys& keys, Complaints& complaints) {
+  ParamReader reader(map, path, complaints);
+  keys.visit(reader);
+}
+
+template <class Keys>
+void read_all_keys(const Value& map, const std::string& path, Keys& keys, Complaints& complaints) {
+  ParamReader reader(map, path, complaints);
+  keys.visit(reader);
+  reader.finish();
+}
+
+/// The maps of a list section; complains about other things and leaves them out.
+std::vector<std::pair<std::string, Value>> entries(const Value& job, std::string_view section,
+                                                   Complaints& complaints) {
+  std::vector<std::pair<std::string, Value>> result;
+  const Value* list = job.find(section);
+  if (!list || list->kind == Value::Kind::Null) return result;
+  if (list->kind != Value::Kind::List) {
+    complaints.add(list->place, std::string(section) + ": expected a list of mappings, found " +
+                                    list->describe());
+    return result;
+  }
+  for (std::size_t i = 0; i < list->list.size(); ++i) {
+    const Value& item = list->list[i];
+    const std::string path = item_path(section, i);
+    if (item.kind == Value::Kind::Map) {
+      result.emplace_back(path, with_type_as_text(item));
+    } else {
+      complaints.add(item.place, path + ": expected a mapping, found " + item.describe());
+    }
+  }
+  return result;
+}
+
+const Place& place_of(const Value& map, std::string_view key) {
+  const Value* value = map.find(key);
+  return value ? value->place : map.place;
+}
+
+void require_type(const ComponentConfig& entry, Complaints& complaints) {
+  if (entry.type.empty() && !entry.map.find("type")) {
+    complaints.add(entry.map.place, entry.path + ": `type` is missing");
+  }
+}
+
+/// Names key random streams, node paths and folders, so they must differ.
+template <class Entry, class NameOf, class MapOf>
+void require_unique(const std::vector<Entry>& list, std::string_view section, NameOf name_of,
+                    MapOf map_of, Complaints& complaints) {
+  std::set<std::string, std::less<>> seen;
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    const std::string& name = name_of(list[i]);
+    if (name.empty() || seen.insert(name).second) continue;
+    complaints.add(place_of(map_of(list[i]), "name"),
+                   item_path(section, i) + ": another entry is called \"" + name +
+                       "\"; give this one a `name` of its own");
+  }
+}
+
+void check_node_name(const std::string& name, const Value& map, const std::string& path,
+                     Complaints& complaints) {
+  if (name.find('/') == std::string::npos) return;
+  complaints.add(place_of(map, "name"),
+                 path + ".name: expected a name without '/', found \"" + name + "\"");
+}
+
+template <class Group>
+void name_after_type(Group& group) {
+  if (group.name.empty()) group.name = group.type;
+}
+
+ComponentConfig read_entry(const std::string& path, Value map, Complaints& complaints) {
+  EntryHead head;
+  read_keys(map, path, head, complaints);
+  if (head.name.empty()) head.name = head.type;
+  ComponentConfig entry{head.type, head.name, std::move(map), path};
+  require_type(entry, complaints);
+  return entry;
+}
+
+void read_environments(const Value& value, Job& job, Complaints& complaints) {
+  const std::size_t before = complaints.messages().size();
+  for (auto& [path, map] : entries(value, "environments", complaints)) {
+    job.environments.push_back(read_entry(path, std::move(map), complaints));
+  }
+  const Value* list = value.find("environments");
+  if (job.environments.empty() && complaints.messages().size() == before) {
+    complaints.add(list ? list->place : value.place,
+                   "environments: the list is empty; name at least one, for example "
+                   "`- {type: files, folders: [...]}`");
+  }
+}
+
+void check_pattern(const ObjectGroup& group, const Value& map, const std::string& path,
+                   Complaints& complaints) {
+  if (!group.label_pattern) return;
+  try {
+    const std::regex pattern(*group.label_pattern, std::regex::ECMAScript);
+  } catch (const std::regex_error& error) {
+    complaints.add(place_of(map, "label_pattern"),
+                   path + ".label_pattern: not a regular expression: " + error.what());
+  }
+}
+
+void read_objects(const Value& value, Job& job, Complaints& complaints) {
+  for (auto& [path, map] : entries(value, "objects", complaints)) {
+    ObjectGroup group;
+    read_keys(map, path, group, complaints);
+    name_after_type(group);
+    check_pattern(group, map, path, complaints);
+    check_node_name(group.name, map, path, complaints);
+    if (group.under.size() < 2 || group.under.front() != '/' || group.under.back() == '/') {
+      complaints.add(place_of(map, "under"),
+                     path + ".under: expected a path like /Assets, found \"" + group.under + "\"");
+    }
+    group.loader = {group.type, group.name, std::move(map), path};
+    require_type(group.loader, complaints);
+    job.objects.push_back(std::move(group));
+  }
+  require_unique(
+      job.objects, "objects", [](const ObjectGroup& g) -> const std::string& { return g.name; },
+      [](const ObjectGroup& g) -> const Value& { return g.loader.map; }, complaints);
+}
+
+void read_lights(const Value& value, Job& job, Complaints& complaints) {
+  std::set<std::string> names;
+  for (auto& [path, map] : entries(value, "lights", complaints)) {
+    LightGroup group;
+    read_all_keys(map, path, group, complaints);
+    name_after_type(group);
+    check_node_name(group.name, map, path, complaints);
+    if (!names.insert(group.name).second) {
+      complaints.add(place_of(map, "name"), path + ": another light is called \"" + group.name +
+                                                "\"; give this one a `name` of its own");
+    }
+    job.lights.push_back(std::move(group));
+  }
+}
+
+void check_camera(const CameraGroup& group, const Value& map, const std::string& path,
+                  Complaints& complaints) {
+  if (group.far_m <= group.near_m) {
+    complaints.add(place_of(map, "far_m"), path + ".far_m: must be greater than near_m");
+  }
+  if (group.distortion.size() > 8) {
+    complaints.add(place_of(map, "distortion"),
+                   path + ".distortion: expected at most 8 numbers (k1 k2 p1 p2 k3 k4 k5 k6)");
+  }
+  const std::size_t terms = group.fisheye_polynomial.size();
+  if (terms > 6 || (group.type == "fisheye_polynomial" && terms < 2)) {
+    complaints.add(place_of(map, "fisheye_polynomial"),
+                   path + ".fisheye_polynomial: expected 2 to 6 numbers (theta = a + b r + ...)");
+  }
+  for (const auto& [key, focal] : {std::pair{"fx_px", group.fx_px}, {"fy_px", group.fy_px}}) {
+    if (!focal || *focal > 0.0) continue;
+    complaints.add(place_of(map, key), path + "." + key + ": must be greater than 0");
+  }
+}
+
+void read_cameras(const Value& value, Job& job, Complaints& complaints) {
+  std::set<std::string> names;
+  for (auto& [path, map] : entries(value, "cameras", complaints)) {
+    CameraGroup group;
+    group.name = "cam";
+    read_all_keys(map, path, group, complaints);
+    check_node_name(group.name, map, path, complaints);
+    check_camera(group, map, path, complaints);
+    if (!names.insert(group.name).second) {
+      complaints.add(place_of(map, "name"), path + ": another camera is called \"" + group.name +
+                                                "\"; give this one a `name` of its own");
+    }
+    job.cameras.push_back(std::move(group));
+  }
+}
+
+std::string quoted_list(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+void check_moments(const RandomizerEntry& entry, const std::vector<std::string>& moments,
+                   const Value& map, const std::string& path, Complaints& complaints) {
+  if (entry.on.empty()) {
+    complaints.add(place_of(map, "on"),
+                   path + ".on: no moment named, so it would never act; one of: " +
+                       quoted_list(moments));
+  }
+  for (const std::string& moment : entry.on) {
+    if (std::find(moments.begin(), moments.end(), moment) != moments.end()) continue;
+    const std::string near = nearest_name(moment, moments);
+    complaints.add(place_of(map, "on"), path + ".on: unknown moment \"" + moment + "\"" +
+                                            (near.empty() ? "" : "; did you mean \"" + near + "\"?") +
+                                            " (known: " + quoted_list(moments) + ")");
+  }
+}
+
+void read_randomizers(const Value& value, Job& job, Complaints& complaints) {
+  std::vector<std::string> moments{"environment"};
+  for (const TimelineStep& step : job.timeline) {
+    const bool is_moment = step.kind != TimelineStep::Kind::Simulate;
+    if (is_moment && std::find(moments.begin(), moments.end(), step.name) == moments.end()) {
+      moments.push_back(step.name);
+    }
+  }
+  for (auto& [path, map] : entries(value, "randomizers", complaints)) {
+    RandomizerEntry entry;
+    read_keys(map, path, entry, complaints);
+    name_after_type(entry);
+    check_moments(entry, moments, map, path, complaints);
+    entry.component = {entry.type, entry.name, std::move(map), path};
+    require_type(entry.component, complaints);
+    job.randomizers.push_back(std::move(entry));
+  }
+  require_unique(
+      job.randomizers, "randomizers",
+      [](const RandomizerEntry& e) -> const std::string& { return e.name; },
+      [](const RandomizerEntry& e) -> const Value& { return e.component.map; }, complaints);
+}
+
+void read_writers(const Value& value, Job& job, Complaints& complaints) {
+  for (auto& [path, map] : entries(value, "writers", complaints)) {
+    WriterEntry entry;
+    read_keys(map, path, entry, complaints);
+    name_after_type(entry);
+    entry.component = {entry.type, entry.name, std::move(map), path};
+    require_type(entry.component, complaints);
+    job.writers.push_back(std::move(entry));
+  }
+  require_unique(
+      job.writers, "writers", [](const WriterEntry& e) -> const std::string& { return e.name; },
+      [](const WriterEntry& e) -> const Value& { return e.component.map; }, complaints);
+}
+
+ComponentConfig read_engine(const Value& value, std::string_view section, const char* default_type,
+                           Complaints& complaints) {
+  ComponentConfig entry{default_type, std::string(section), Value::make_map(), std::string(section)};
+  entry.map.set("type", Value::text(default_type));
+  const Value* map = value.find(section);
+  if (!map || map->kind == Value::Kind::Null) return entry;
+  if (map->kind != Value::Kind::Map) {
+    complaints.add(map->place,
+                   std::string(section) + ": expected a mapping, found " + map->describe());
+    return entry;
+  }
+  entry.map = with_type_as_text(*map);
+  EngineHead head{default_type};
+  read_keys(entry.map, entry.path, head, complaints);
+  entry.type = head.type;
+  entry.map.set("type", Value::text(head.type));
+  return entry;
+}
+
+std::optional<TimelineStep> read_step(const Value& map, const std::string& path,
+                                      Complaints& complaints) {
+  StepKeys keys;
+  const std::size_t before = complaints.messages().size();
+  read_all_keys(map, path, keys, complaints);
+  if (complaints.messages().size() != before) return std::nullopt;
+  if (int(keys.simulate.has_value()) + int(keys.capture.has_value()) +
+          int(keys.event.has_value()) != 1) {
+    complaints.add(map.place, path + ": expected one of `simulate: STEPS`, `capture: NAME` (with "
+                                     "`count`) and `event: NAME`");
+    return std::nullopt;
+  }
+  if (keys.simulate && *keys.simulate != std::floor(*keys.simulate)) {
+    complaints.add(place_of(map, "simulate"), path + ".simulate: expected a whole number");
+    return std::nullopt;
+  }
+  if (keys.simulate) return TimelineStep{TimelineStep::Kind::Simulate, int(*keys.simulate), "", 0};
+  const std::string& name = keys.capture ? *keys.capture : *keys.event;
+  if (name.empty() || name == "environment") {
+    complaints.add(map.place, path + ": a moment needs a name of its own, found \"" + name + "\"");
+    return std::nullopt;
+  }
+  if (keys.capture) return TimelineStep{TimelineStep::Kind::Capture, 0, name, keys.count};
+  return TimelineStep{TimelineStep::Kind::Event, 0, name, 0};
+}
+
+void read_timeline(const Value& value, Job& job, Complaints& complaints) {
+  const Value* list = value.find("timeline");
+  if (!list || list->kind == Value::Kind::Null) {
+    job.timeline = default_timeline();
+    return;
+  }
+  const std::size_t before = complaints.messages().size();
+  for (const auto& [path, map] : entries(value, "timeline", complaints)) {
+    if (auto step = read_step(map, path, complaints)) job.timeline.push_back(*step);
+  }
+  if (complaints.messages().size() != before) return;
+  int captures_per_visit = 0;
+  for (const TimelineStep& step : job.timeline) captures_per_visit += step.count;
+  if (captures_per_visit == 0 && job.total_captures > 0) {
+    complaints.add(list->place, "timeline: the capture series have no captures in all, so "
+                                "total_captures: " + std::to_string(job.total_captures) +
+                                    " can never be reached; give a series a `count` above 0");
+  }
+}
+
+template <class Section>
+void read_section(const Value& job, const char* name, Section& section, Complaints& complaints) {
+  const Value* map = job.find(name);
+  if (!map || map->kind == Value::Kind::Null) return;
+  if (map->kind != Value::Kind::Map) {
+    complaints.add(map->place,
+                   std::string(name) + ": expected a mapping, found " + map->describe());
+    return;
+  }
+  read_all_keys(*map, name, section, complaints);
+}
+
+void complain_about_unknown_sections(const Value& job, Complaints& complaints) {
+  for (const auto& [key, value] : job.map) {
+    if (std::find(kSections.begin(), kSections.end(), key) != kSections.end()) continue;
+    const std::string near = nearest_name(key, kSections);
+    complaints.add(value.key_place, "unknown key `" + key + "`" +
+                                        (near.empty() ? "" : "; did you mean `" + near + "`?"));
+  }
+}
+
+Value head_of(const Value& job) {
+  Value head = Value::make_map();
+  head.place = job.place;
+  for (const auto& [key, value] : job.map) {
+    if (key == "seed" || key == "assets_root" || key == "debug" || key == "total_captures") {
+      head.map.emplace_back(key, value);
+    }
+  }
+  return head;
+}
+
+}  // namespace
+
+void EnvironmentRules::visit(ParamVisitor& v) {
+  v.param("hide", hide, {"Hides nodes whose path holds one of these texts."});
+  v.param("hide_in_debug", hide_in_debug, {"The same, in debug mode only."});
+  v.choice("colliders", colliders, kEnvironmentColliderWords,
+           {"Collider of every mesh of the environment."});
+  v.param("box_colliders", box_colliders,
+          {"The first node whose path holds the text gets bounding box colliders instead."});
+  v.param("working_area", working_area,
+          {"The first node whose path holds this text is the centre of the working area; null: the "
+           "origin."});
+}
+
+void ObjectGroup::visit(ParamVisitor& v) {
+  v.param("type", type, {"Loader whose assets are picked from."});
+  v.param("name", name, {"Name of the group; keys its random choices. Default: the type."});
+  v.param("under", under, {"Path of the parent node."});
+  v.param("count", count, {"Objects, each picked at random from the loader's assets.", "", 0, 1e5});
+  v.param("label", label, {"Label of every object of the group; null: none."});
+  v.param("label_pattern", label_pattern,
+          {"Regular expression; the label is the file's stem with every match replaced."});
+  v.param("label_replacement", label_replacement, {"What a match of label_pattern becomes."});
+  v.param("taxonomy", taxonomy, {"Taxonomy of the label."});
+  v.param("gravity_disabled_chance", gravity_disabled_chance,
+          {"Share of the objects that float.", "", 0, 1});
+  v.choice("collider", collider, kColliderWords, {"Collider of every mesh of the object."});
+  v.param("mass_kg", mass_kg, {"Mass where the asset says nothing.", "kg", 1e-6, 1e6});
+}
+
+void LightGroup::visit(ParamVisitor& v) {
+  v.choice("type", type, kLightWords, {"Kind of light."});
+  v.param("name", name, {"Nodes are /Lights/NAME_0 and so on. Default: the type."});
+  v.param("count", count, {"How many lights.", "", 0, 1e4});
+  v.param("color", color, {"Linear RGB.", "", 0});
+  v.param("intensity", intensity,
+          {"Factor of the colour: radiance, or irradiance of a distant light.", "", 0});
+  v.param("radius_m", radius_m, {"Radius of sphere and disk.", "m", 0});
+  v.param("width_m", width_m, {"Size of a rect along its x axis.", "m", 0});
+  v.param("height_m", height_m, {"Size of a rect along its y axis.", "m", 0});
+  v.param("angle_deg", angle_deg, {"Angular diameter of a distant light.", "deg", 0, 180});
+  v.param("cone_angle_deg", cone_angle_deg,
+          {"Half angle beyond which there is no light; 180: no cone.", "deg", 0, 180});
+  v.param("cone_softness", cone_softness, {"Share of the cone over which it fades.", "", 0, 1});
+  v.param("texture", texture, {"Equirectangular picture of a dome."});
+  v.param("visible_to_camera", visible_to_camera, {"Whether cameras see the light itself."});
+  v.param("position", position, {"World position.", "m"});
+  v.param("rotation_deg", rotation_deg, {"Turns about x, then y, then z.", "deg"});
+}
+
+void CameraGroup::visit(ParamVisitor& v) {
+  v.choice("type", type, kCameraWords, {"Lens model."});
+  v.param("name", name, {"Nodes are /Cameras/NAME_0 and so on. Default: cam."});
+  v.param("count", count, {"How many cameras.", "", 0, 1e4});
+  v.param("width", width, {"Image width.", "px", 1, 16384});
+  v.param("height", height, {"Image height.", "px", 1, 16384});
+  v.param("focal_length_mm", focal_length_mm, {"Focal length.", "mm", 0.01});
+  v.param("horizontal_aperture_mm", horizontal_aperture_mm, {"Width of the sensor.", "mm", 0.01});
+  v.param("fx_px", fx_px, {"Focal length in pixels along x; null: from the lens.", "px", 0});
+  v.param("fy_px", fy_px, {"Focal length in pixels along y; null: as fx_px.", "px", 0});
+  v.param("cx_px", cx_px, {"Principal point from the left edge; null: the centre.", "px"});
+  v.param("cy_px", cy_px, {"Principal point from the upper edge; null: the centre.", "px"});
+  v.param("distortion", distortion, {"OpenCV's k1 k2 p1 p2 k3 k4 k5 k6."});
+  v.param("fisheye_polynomial", fisheye_polynomial,
+          {"Coefficients of theta = a + b r + c r^2 + ..., r in pixels."});
+  v.param("fisheye_max_angle_deg", fisheye_max_angle_deg,
+          {"Largest angle off the axis that is imaged.", "deg", 0, 180});
+  v.param("near_m", near_m, {"Nothing nearer along the axis is seen.", "m", 1e-6});
+  v.param("far_m", far_m, {"Nothing farther along the axis is seen.", "m", 0});
+  v.param("f_stop", f_stop, {"Aperture; 0: everything is in focus.", "", 0});
+  v.param("focus_distance_m", focus_distance_m, {"Distance of the plane in focus.", "m", 0});
+  v.param("position", position, {"World position until a randomizer moves it.", "m"});
+  v.param("look_at", look_at, {"World point that it looks at.", "m"});
+}
+
+void RandomizerEntry::visit(ParamVisitor& v) {
+  v.param("type", type, {"Type of the component."});
+  v.param("name", name, {"Keys its random numbers. Default: the type."});
+  v.param("on", on, {"Moments at which it acts: environment, capture series, events."});
+  v.param("every", every, {"Acts at every so many captures of a series only.", "", 1, 1e6});
+}
+
+void WriterEntry::visit(ParamVisitor& v) {
+  v.param("type", type, {"Type of the component."});
+  v.param("name", name, {"Name of the writer. Default: the type."});
+  v.param("output_dir", output_dir,
+          {"Its folder, below output.folder unless absolute; null: the name."});
+}
+
+void OutputSection::visit(ParamVisitor& v) {
+  v.param("folder", folder, {"Folder of the dataset; relative to the current one."});
+  v.param("records", records,
+          {"Folder of dataset.json and the journal of finished captures, below `folder`."});
+}
+
+std::vector<std::string> Job::series() const {
+  std::vector<std::string> names;
+  for (const TimelineStep& step : timeline) {
+    if (step.kind != TimelineStep::Kind::Capture) continue;
+    if (std::find(names.begin(), names.end(), step.name) == names.end()) names.push_back(step.name);
+  }
+  return names;
+}
+
+std::vector<std::string> Job::camera_names() const {
+  std::vector<std::string> names;
+  for (const CameraGroup& group : cameras) {
+    for (int i = 0; i < group.count; ++i) names.push_back(group.name + "_" + std::to_string(i));
+  }
+  return names;
+}
+
+std::vector<TimelineStep> default_timeline() {
+  using Kind = TimelineStep::Kind;
+  return {{Kind::Simulate, 4, "", 0},
+          {Kind::Capture, 0, "floating", 2},
+          {Kind::Simulate, 200, "", 0},
+          {Kind::Capture, 0, "dropped", 2}};
+}
+
+Job read_job(const Value& value, Complaints& complaints) {
+  Job job;
+  if (value.kind != Value::Kind::Map) {
+    complaints.add(value.place, "a job is a mapping of sections, found " + value.describe());
+    return job;
+  }
+  complain_about_unknown_sections(value, complaints);
+  JobHead head;
+  read_all_keys(head_of(value), "", head, complaints);
+  job.seed = head.seed;
+  job.assets_root = head.assets_root;
+  job.debug = head.debug;
+  job.total_captures = head.total_captures;
+  read_environments(value, job, complaints);
+  read_section(value, "environment", job.environment, complaints);
+  read_objects(value, job, complaints);
+  read_lights(value, job, complaints);
+  read_cameras(value, job, complaints);
+  read_timeline(value, job, complaints);
+  read_randomizers(value, job, complaints);
+  job.physics = read_engine(value, "physics", kDefaultPhysics, complaints);
+  job.renderer = read_engine(value, "renderer", kDefaultRenderer, complaints);
+  read_writers(value, job, complaints);
+  read_section(value, "output", job.output, complaints);
+  if (job.camera_names().empty() && job.total_captures > 0) {
+    const Value* cameras = value.find("cameras");
+    complaints.add(cameras ? cameras->place : value.place,
+                   "cameras: there are none, so a capture would hold no picture; add "
+                   "`- {type: pinhole, count: 1}`");
+  }
+  return job;
+}
+
+std::string node_name(std::string_view text) {
+  std::string name(text);
+  std::replace(name.begin(), name.end(), '/', '_');
+  return name.empty() ? "object" : name;
+}
+
+std::vector<std::string_view> host_keys(ComponentKind kind, std::string_view section) {
+  if (section == "objects") {
+    return {"type",     "name",    "under",   "count", "label", "label_pattern", "label_replacement",
+            "taxonomy", "gravity_disabled_chance", "collider", "mass_kg"};
+  }
+  switch (kind) {
+    case ComponentKind::Loader: return {"type", "name"};
+    case ComponentKind::Randomizer: return {"type", "name", "on", "every"};
+    case ComponentKind::Writer: return {"type", "name", "output_dir"};
+    default: return {"type"};
+  }
+}
+
+}  // namespace diorama

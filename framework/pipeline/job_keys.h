@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "diorama/params.h"
+
+/// Keys of a job file that have no struct of their own in job.h. For job.cpp and job_defaults.cpp.
+namespace diorama::detail {
+
+/// What every entry that names a component has.
+struct EntryHead {
+  std::string type;
+  std::string name;
+  void visit(ParamVisitor& v) {
+    v.param("type", type, {"Type of the component."});
+    v.param("name", name, {"Name of the entry, for messages."});
+  }
+};
+
+struct EngineHead {
+  std::string type;
+  void visit(ParamVisitor& v) { v.param("type", type, {"Type of the component."}); }
+};
+
+/// The keys of the job that are no lists.
+struct JobHead {
+  std::uint64_t seed = 0;
+  std::optional<std::string> assets_root;
+  bool debug = false;
+  int total_captures = 1;
+  void visit(ParamVisitor& v) {
+    v.param("seed", seed, {"Start of all random streams."});
+    v.param("assets_root", assets_root,
+            {"Folder below which asset paths are looked up; null: --assets-root, "
+             "DIORAMA_ASSETS_ROOT, then the installed sample pack."});
+    v.param("debug", debug,
+            {"Also hides environment.hide_in_debug and writes one overview picture per "
+             "environment."});
+    v.param("total_captures", total_captures,
+            {"Captures in the whole job; environments are cycled until that many exist.", "", 0,
+             1e8});
+  }
+};
+
+/// All forms of a timeline step, for reading and for the reference.
+struct StepKeys {
+  std::optional<double> simulate;
+  std::optional<std::string> capture;
+  int count = 1;
+  std::optional<std::string> event;
+  void visit(ParamVisitor& v) {
+    v.param("simulate", simulate, {"Fixed physics steps to take.", "", 0, 1e7});
+    v.param("capture", capture, {"Name of a capture series, whose captures are taken here."});
+    v.param("count", count, {"Captures of the series per visit.", "", 0, 1e6});
+    v.param("event", event, {"Calls the randomizers that name this moment."});
+  }
+};
+
+}  // namespace diorama::detail

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "diorama/annotator.h"
+#include "diorama/host.h"
+#include "diorama/loader.h"
+#include "diorama/physics_backend.h"
+#include "diorama/randomizer.h"
+#include "diorama/renderer.h"
+#include "diorama/writer.h"
+#include "framework/pipeline/capture_plan.h"
+#include "framework/pipeline/demand.h"
+#include "framework/pipeline/job.h"
+#include "framework/pipeline/output_store.h"
+#include "framework/pipeline/writer_queue.h"
+
+namespace diorama {
+
+/// Everything that a job's entries turned into, in the order of the job.
+struct JobComponents {
+  std::vector<std::unique_ptr<Loader>> environments;
+  std::vector<std::unique_ptr<PhysicsBackend>> physics;  ///< Empty or one.
+  std::unique_ptr<Renderer> renderer;
+  std::vector<std::unique_ptr<Randomizer>> randomizers;
+  std::vector<std::unique_ptr<Writer>> writers;
+  /// Those that the writers' needs ask for, in working order.
+  std::vector<std::unique_ptr<Annotator>> annotators;
+  Demand demand;
+};
+
+struct RunOptions {
+  int shard = 0;
+  int shards = 1;
+  OutputStore::Existing existing = OutputStore::Existing::Refuse;
+  std::size_t queue_bytes = std::size_t(256) << 20;
+  const std::atomic<bool>* stop = nullptr;  ///< True asks the run to end soon.
+  /// Called on the main thread after each capture.
+  std::function<void(int done, int total, int resumed)> progress;
+};
+
+/// How the objects of one visit ended.
+struct VisitReport {
+  int visit = 0;
+  int falling_objects = 0;
+  double max_speed = 0.0;          ///< m/s, at the end of the visit.
+  double max_penetration_m = 0.0;  ///< At the end of the visit.
+  std::string deepest_body;
+  std::vector<std::string> left_room;  ///< Paths of objects outside the environment's box.
+};
+
+struct RunSummary {
+  int captures = 0;  ///< Made by this run.
+  int resumed = 0;   ///< Were there before.
+  int cameras = 0;
+  bool is_complete = false;  ///< All captures of the job exist.
+  std::uint64_t bytes_written = 0;
+  std::map<std::string, double> seconds;  ///< Phase to wall time.
+  std::vector<VisitReport> visits;
+};
+
+std::string summary_text(const RunSummary& summary);
+
+/// The run was asked to stop; what is on disk can be resumed.
+class Interrupted final : public std::exception {
+ public:
+  ~Interrupted() override;
+  const char* what() const noexcept override { return "interrupted"; }
+};
+
+/// Runs a planned job. The source reads in the order in which things happen.
+class Pipeline {
+ public:
+  /// All references must outlive the pipeline.
+  Pipeline(const Job& job, const CapturePlan& plan, JobComponents& components, Host& host,
+           OutputStore& store, RunOptions options);
+  ~Pipeline();
+
+  /// `dataset_json` is the text of dataset.json. Throws Error, and Interrupted when asked to stop.
+  RunSummary run(const DatasetInfo& dataset, const std::string& dataset_json);
+
+ private:
+  struct Visit;
+  class Clock;
+  void run_visit(const PlannedVisit& planned);
+  Visit set_up(const PlannedVisit& planned);
+  void randomize(Visit& visit, const std::string& moment, int number, int capture);
+  void simulate(Visit& visit, int steps);
+  void take_captures(Visit& visit, const TimelineStep& step);
+  void take(Visit& visit, const PlannedCapture& planned);
+  Frame make_frame(Visit& visit, std::size_t camera, int capture);
+  Image<Rgba8> make_overview(Visit& visit, int capture);
+  VisitReport report_on(const Visit& visit) const;
+  bool is_needed(const PlannedVisit& planned) const;
+  void begin_output();
+  void write(const PendingCapture& pending);
+  void finish_output(const DatasetInfo& dataset);
+  void stop_if_asked() const;
+
+  const Job& job_;
+  const CapturePlan& plan_;
+  JobComponents& components_;
+  Host& host_;
+  OutputStore& store_;
+  RunOptions options_;
+  JobStreams streams_;
+  std::vector<PlannedVisit> visits_;  // of this shard
+  const DatasetInfo* dataset_ = nullptr;
+  const std::string* dataset_json_ = nullptr;
+  bool has_begun_ = false;
+  int total_ = 0;
+  RunSummary summary_;
+  std::unique_ptr<WriterQueue> queue_;
+};
+
+}  // namespace diorama

@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/pipeline/scene_setup.h"
+
+#include <algorithm>
+#include <string_view>
+
+#include "diorama/error.h"
+#include "framework/plugins/plugin_call.h"
+
+namespace diorama {
+namespace {
+
+bool holds_any(std::string_view path, const std::vector<std::string>& texts) {
+  return std::any_of(texts.begin(), texts.end(), [&](const std::string& text) {
+    return path.find(text) != std::string_view::npos;
+  });
+}
+
+std::optional<ColliderShape> collider_shape(std::string_view word) {
+  if (word == "triangle_mesh") return ColliderShape::TriangleMesh;
+  if (word == "convex_hull") return ColliderShape::ConvexHull;
+  if (word == "bounding_box") return ColliderShape::BoundingBox;
+  if (word == "bounding_sphere") return ColliderShape::BoundingSphere;
+  return std::nullopt;
+}
+
+/// Keeps friction and restitution of a collider that the asset brought along.
+void set_collider(Scene& scene, NodeId node, ColliderShape shape) {
+  Node& edited = scene.edit(node);
+  if (!edited.collider) edited.collider.emplace();
+  edited.collider->shape = shape;
+}
+
+bool claims_scheme(const Loader& loader, std::string_view asset) {
+  const std::size_t colon = asset.find(':');
+  if (colon == std::string_view::npos) return false;
+  const std::string scheme(asset.substr(0, colon + 1));
+  const std::vector<std::string> claims = loader.claims();
+  return std::find(claims.begin(), claims.end(), scheme) != claims.end();
+}
+
+/// Parts of paths below one node, in traversal order.
+class PathsBelow {
+ public:
+  PathsBelow(const Scene& scene, NodeId top) {
+    const std::size_t prefix = scene.path(top).size();
+    for (const NodeId node : scene.subtree(top)) {
+      if (node != top) paths_.emplace_back(node, scene.path(node).substr(prefix));
+    }
+  }
+  const std::vector<std::pair<NodeId, std::string>>& all() const { return paths_; }
+  NodeId first_with(std::string_view text) const {
+    for (const auto& [node, path] : paths_) {
+      if (path.find(text) != std::string::npos) return node;
+    }
+    return {};
+  }
+
+ private:
+  std::vector<std::pair<NodeId, std::string>> paths_;
+};
+
+NodeId node_at(Scene& scene, std::string_view path) {
+  NodeId node = scene.root();
+  std::size_t start = 1;
+  while (start <= path.size()) {
+    const std::size_t end = std::min(path.find('/', start), path.size());
+    const NodeId known = scene.find(path.substr(0, end));
+    node = known ? known : scene.create(node, path.substr(start, end - start));
+    start = end + 1;
+  }
+  return node;
+}
+
+/// The object moves as one: bodies inside an asset become part of it. Returns their mass, if any.
+std::optional<double> take_over_bodies(Scene& scene, const std::vector<NodeId>& nodes) {
+  std::optional<double> mass_kg;
+  for (const NodeId node : nodes) {
+    if (!scene[node].rigid_body) continue;
+    mass_kg = mass_kg.value_or(0.0) + scene[node].rigid_body->mass_kg;
+    scene.edit(node).rigid_body.reset();
+  }
+  return mass_kg && *mass_kg > 0.0 ? mass_kg : std::nullopt;
+}
+
+void make_physical(Scene& scene, NodeId object, const ObjectGroup& group, bool floats) {
+  const std::vector<NodeId> nodes = scene.subtree(object);
+  const std::optional<double> mass_kg = take_over_bodies(scene, nodes);
+  const std::optional<ColliderShape> shape = collider_shape(group.collider);
+  for (const NodeId node : nodes) {
+    if (!scene[node].mesh) continue;
+    if (!shape) {
+      scene.edit(node).collider.reset();
+      continue;
+    }
+    const auto& collider = scene[node].collider;
+    const bool is_exact = collider && collider->primitive != PrimitiveShape::None;
+    if (!is_exact) set_collider(scene, node, *shape);
+  }
+  RigidBody body;
+  body.mass_kg = mass_kg.value_or(group.mass_kg);
+  body.has_gravity = !floats;
+  scene.edit(object).rigid_body = body;
+}
+
+NodeId spawn(const PlannedObject& planned, const ObjectGroup& group, Scene& scene, Host& host) {
+  const NodeId object = scene.create(node_at(scene, group.under), planned.name);
+  if (scene.path(object) != planned.path) {
+    throw Error(ErrorKind::Internal, "object " + planned.path + " became " + scene.path(object));
+  }
+  host.load_asset(planned.asset, scene, object);
+  for (const NodeId node : scene.subtree(object)) {
+    if (!scene[node].labels.empty()) scene.edit(node).labels.clear();
+  }
+  scene.edit(object).labels = planned.labels;
+  make_physical(scene, object, group, planned.floats);
+  return object;
+}
+
+LightKind light_kind(std::string_view word) {
+  if (word == "rect") return LightKind::Rect;
+  if (word == "disk") return LightKind::Disk;
+  if (word == "distant") return LightKind::Distant;
+  if (word == "dome") return LightKind::Dome;
+  return LightKind::Sphere;
+}
+
+double radians(double degrees) { return degrees * kPi / 180.0; }
+
+Light light_of(const LightGroup& group, Host& host) {
+  Light light;
+  light.kind = light_kind(group.type);
+  light.color = (group.color * group.intensity).cast<float>();
+  light.radius_m = group.radius_m;
+  light.width_m = group.width_m;
+  light.height_m = group.height_m;
+  light.angle_rad = radians(group.angle_deg);
+  light.cone_angle_rad = radians(group.cone_angle_deg);
+  light.cone_softness = group.cone_softness;
+  light.is_visible_to_camera = group.visible_to_camera;
+  if (group.texture) light.texture = host.read_texture(host.resolve(*group.texture));
+  return light;
+}
+
+Quat rotation_xyz(const Vec3& degrees) {
+  return Quat(Eigen::AngleAxisd(radians(degrees.z()), Vec3::UnitZ()) *
+              Eigen::AngleAxisd(radians(degrees.y()), Vec3::UnitY()) *
+              Eigen::AngleAxisd(radians(degrees.x()), Vec3::UnitX()));
+}
+
+}  // namespace
+
+NodeId load_environment(const std::string& asset, const ComponentConfig& entry, Loader& loader,
+                        Scene& scene, Host& host) {
+  const NodeId parent = node_at(scene, "/Environment");
+  if (!claims_scheme(loader, asset)) return host.load_asset(asset, scene, parent);
+  const NodeId environment = scene.create(parent, node_name(asset_stem(asset)));
+  call_component("loader '" + entry.type + "'", [&] { loader.load(asset, scene, environment); });
+  return environment;
+}
+
+Vec3 apply_environment_rules(const EnvironmentRules& rules, bool debug, NodeId environment,
+                             Scene& scene, Host& host) {
+  const PathsBelow paths(scene, environment);
+  for (const auto& [node, path] : paths.all()) {
+    if (holds_any(path, rules.hide) || (debug && holds_any(path, rules.hide_in_debug))) {
+      scene.edit(node).is_visible = false;
+    }
+  }
+  if (const auto shape = collider_shape(rules.colliders)) {
+    for (const NodeId node : scene.subtree(environment)) {
+      if (scene[node].mesh) set_collider(scene, node, *shape);
+    }
+  }
+  for (const std::string& text : rules.box_colliders) {
+    const NodeId match = paths.first_with(text);
+    if (!match) {
+      host.log(LogLevel::Warning, scene.path(environment) + ": no node's path holds \"" + text +
+                                      "\", so nothing gets a bounding box collider");
+      continue;
+    }
+    for (const NodeId node : scene.subtree(match)) {
+      if (scene[node].mesh) set_collider(scene, node, ColliderShape::BoundingBox);
+    }
+  }
+  if (!rules.working_area) return Vec3::Zero();
+  const NodeId match = paths.first_with(*rules.working_area);
+  if (match) return scene.world_from_node(match).translation();
+  host.log(LogLevel::Warning, scene.path(environment) + ": no node's path holds \"" +
+                                  *rules.working_area +
+                                  "\", so the working area is centred on the origin");
+  return Vec3::Zero();
+}
+
+std::vector<NodeId> spawn_objects(const CapturePlan& plan, const Job& job, Scene& scene,
+                                  Host& host) {
+  for (const ObjectGroup& group : job.objects) node_at(scene, group.under);
+  std::vector<NodeId> nodes;
+  nodes.reserve(plan.objects.size());
+  for (const PlannedObject& object : plan.objects) {
+    nodes.push_back(spawn(object, job.objects[object.group], scene, host));
+  }
+  return nodes;
+}
+
+void create_lights(const std::vector<LightGroup>& groups, Scene& scene, Host& host) {
+  const NodeId parent = node_at(scene, "/Lights");
+  for (const LightGroup& group : groups) {
+    if (group.count == 0) continue;
+    const Light light = light_of(group, host);
+    for (int i = 0; i < group.count; ++i) {
+      const NodeId node = scene.create(parent, group.name + "_" + std::to_string(i));
+      scene.edit(node).light = light;
+      scene.set_pose(node, Transform{group.position, rotation_xyz(group.rotation_deg)});
+    }
+  }
+}
+
+Camera camera_of(const CameraGroup& group) {
+  Camera camera = Camera::from_lens(group.width, group.height, group.focal_length_mm,
+                                    group.horizontal_aperture_mm);
+  if (group.type == "opencv_pinhole") camera.lens = LensModel::OpencvPinhole;
+  if (group.type == "fisheye_polynomial") camera.lens = LensModel::FisheyePolynomial;
+  camera.fx = group.fx_px.value_or(camera.fx);
+  camera.fy = group.fy_px.value_or(camera.fx);
+  camera.cx = group.cx_px.value_or(camera.cx);
+  camera.cy = group.cy_px.value_or(camera.cy);
+  std::copy(group.distortion.begin(), group.distortion.end(), camera.distortion.begin());
+  std::copy(group.fisheye_polynomial.begin(), group.fisheye_polynomial.end(),
+            camera.fisheye_polynomial.begin());
+  camera.fisheye_max_angle_rad = radians(group.fisheye_max_angle_deg);
+  camera.near_m = group.near_m;
+  camera.far_m = group.far_m;
+  camera.f_stop = group.f_stop;
+  camera.focus_distance_m = group.focus_distance_m;
+  return camera;
+}
+
+std::vector<NodeId> create_cameras(const std::vector<CameraGroup>& groups, Scene& scene) {
+  const NodeId parent = node_at(scene, "/Cameras");
+  std::vector<NodeId> nodes;
+  for (const CameraGroup& group : groups) {
+    const Camera camera = camera_of(group);
+    const Quat rotation = look_rotation(group.look_at - group.position);
+    for (int i = 0; i < group.count; ++i) {
+      const NodeId node = scene.create(parent, group.name + "_" + std::to_string(i));
+      scene.edit(node).camera = camera;
+      scene.set_pose(node, Transform{group.position, rotation});
+      nodes.push_back(node);
+    }
+  }
+  return nodes;
+}
+
+NodeId create_overview_camera(const Vec3& working_area_world, Scene& scene) {
+  constexpr double kHeightM = 10.0;
+  constexpr int kPixels = 768;
+  const NodeId node = scene.create(scene.root(), "OverviewCamera");
+  scene.edit(node).camera = Camera::from_lens(kPixels, kPixels, 24.0, 20.955);
+  scene.set_pose(node, Transform{working_area_world + kHeightM * Vec3::UnitZ(),
+                                 look_rotation(-Vec3::UnitZ())});
+  return node;
+}
+
+}  // namespace diorama

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "diorama/host.h"
+#include "diorama/loader.h"
+#include "diorama/scene.h"
+#include "framework/pipeline/capture_plan.h"
+#include "framework/pipeline/job.h"
+
+/// The steps that turn an empty scene into the start of a visit. Main thread only.
+namespace diorama {
+
+/// Loads an environment below /Environment. Assets of `loader`'s own schemes are loaded by it with the
+/// job's parameters, files by whoever claims them. Returns the node that stands for the environment.
+NodeId load_environment(const std::string& asset, const ComponentConfig& entry, Loader& loader,
+                        Scene& scene, Host& host);
+
+/// Hides, adds colliders and finds the working area. A rule whose text matches nothing gives a warning
+/// where the result would surprise (working area, box colliders). Returns the centre of the working
+/// area in the world; the origin when there is none.
+Vec3 apply_environment_rules(const EnvironmentRules& rules, bool debug, NodeId environment,
+                             Scene& scene, Host& host);
+
+/// Spawns the planned objects at the origin, with labels, colliders and rigid bodies. What an asset
+/// itself says about labels is dropped; its mass is kept. Returns their nodes in plan order.
+std::vector<NodeId> spawn_objects(const CapturePlan& plan, const Job& job, Scene& scene,
+                                  Host& host);
+
+void create_lights(const std::vector<LightGroup>& groups, Scene& scene, Host& host);
+
+/// Returns the cameras in job order.
+std::vector<NodeId> create_cameras(const std::vector<CameraGroup>& groups, Scene& scene);
+
+/// A camera straight above the working area, looking down, +y of the world up in the picture.
+NodeId create_overview_camera(const Vec3& working_area_world, Scene& scene);
+
+/// The described lens in pixels.
+Camera camera_of(const CameraGroup& group);
+
+}  // namespace diorama

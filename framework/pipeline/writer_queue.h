@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+
+#include "diorama/frame.h"
+
+namespace diorama {
+
+/// A capture on its way to the writers.
+struct PendingCapture {
+  Capture capture;
+  Image<Rgba8> overview;  ///< Empty unless this capture carries the visit's overview picture.
+};
+
+/// Memory that a capture's pictures hold, from above.
+std::size_t capture_bytes(const PendingCapture& pending);
+
+/// Hands captures to threads that encode and write them while the next one is rendered. push() waits
+/// while more than a number of bytes is under way, so memory stays bounded whatever the speed of the
+/// disk. One thread pushes.
+class WriterQueue {
+ public:
+  using Work = std::function<void(const PendingCapture&)>;
+
+  /// `work` is called from several threads at once; it must outlive nothing but the queue.
+  WriterQueue(int threads, std::size_t max_bytes, Work work);
+  /// Waits for the captures under way, drops the waiting ones.
+  ~WriterQueue();
+  WriterQueue(const WriterQueue&) = delete;
+  WriterQueue& operator=(const WriterQueue&) = delete;
+
+  /// Rethrows what a worker threw, that of the lowest capture first; afterwards the queue takes no
+  /// more.
+  void push(PendingCapture pending);
+  /// Returns when all that was pushed is written; rethrows like push().
+  void drain();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace diorama
