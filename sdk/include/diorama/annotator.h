@@ -12,6 +12,8 @@ class DIORAMA_SDK_API Annotator : public Component {
  public:
   static constexpr ComponentKind kKind = ComponentKind::Annotator;
 
+  ~Annotator() override;
+
   virtual NameSet needs() const = 0;     ///< Channels and annotations that must be there before.
   virtual NameSet provides() const = 0;  ///< Channels and annotations that writers may demand.
   virtual void annotate(const Scene& scene, Frame& frame) const = 0;

@@ -128,10 +128,11 @@ class DIORAMA_SDK_API Frame {
   }
   bool has(std::string_view channel) const;
   NameSet channels() const;
+  /// For code that treats all pixel types alike. Throws Error when the channel is not there.
+  const AnyImage& image_named(std::string_view channel) const;
 
  private:
   void set_image(std::string_view channel, AnyImage image);
-  const AnyImage& image_named(std::string_view channel) const;
   std::map<std::string, AnyImage, std::less<>> images_;
 };
 

@@ -17,6 +17,8 @@ class DIORAMA_SDK_API Loader : public Component {
  public:
   static constexpr ComponentKind kKind = ComponentKind::Loader;
 
+  ~Loader() override;
+
   /// What it loads: endings in lower case with dot (".usd"), schemes with colon ("dining_room:").
   virtual std::vector<std::string> claims() const = 0;
 

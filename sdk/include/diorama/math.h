@@ -56,7 +56,7 @@ struct Aabb {
 
 /// The rotation that turns camera space so that -z points along `forward` and x stays level
 /// (perpendicular to `up`). `forward` need not be unit length; when it is parallel to `up`, +y of
-/// the world serves as up.
+/// the world serves as up (+z when it is parallel to that, too). Throws Error when it is zero.
 DIORAMA_SDK_API Quat look_rotation(const Vec3& forward, const Vec3& up = Vec3::UnitZ());
 
 }  // namespace diorama

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <memory>
@@ -67,9 +68,9 @@ class DIORAMA_SDK_API ParamVisitor {
   /// A list of mappings.
   template <class G>
   void list(const char* key, std::vector<G>& field, const ParamDoc& doc) {
-    const std::size_t count = begin_list(key, field.size(), doc);
-    field.resize(count);
-    for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t given = begin_list(key, field.size(), doc);
+    if (given != kKeepItems) field = std::vector<G>(given);
+    for (std::size_t i = 0; i < field.size(); ++i) {
       begin_item(i);
       field[i].visit(*this);
       end_item();
@@ -86,7 +87,8 @@ class DIORAMA_SDK_API ParamVisitor {
  protected:
   virtual void begin_group(const char* key, const ParamDoc& doc) = 0;
   virtual void end_group() = 0;
-  /// Returns how many items the list has from now on.
+  static constexpr std::size_t kKeepItems = std::size_t(-1);
+  /// Returns how many fresh items replace those of the list, or kKeepItems.
   virtual std::size_t begin_list(const char* key, std::size_t count, const ParamDoc& doc) = 0;
   virtual void begin_item(std::size_t index) = 0;
   virtual void end_item() = 0;

@@ -23,6 +23,8 @@ class DIORAMA_SDK_API PhysicsBackend : public Component {
  public:
   static constexpr ComponentKind kKind = ComponentKind::Physics;
 
+  ~PhysicsBackend() override;
+
   /// Builds the engine's world anew from every node with a collider, hidden ones too; all velocities
   /// are zero afterwards.
   void reset(const Scene& scene);

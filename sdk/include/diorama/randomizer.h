@@ -21,6 +21,8 @@ class DIORAMA_SDK_API Randomizer : public Component {
  public:
   static constexpr ComponentKind kKind = ComponentKind::Randomizer;
 
+  ~Randomizer() override;
+
   /// All chance comes from `rng`, which is keyed by visit, capture and this randomizer's name. Fork
   /// it per node path, so that one more node leaves the draws of the others as they were.
   virtual void randomize(Scene& scene, const RandomizeContext& context, const Rng& rng) = 0;

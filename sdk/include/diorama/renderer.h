@@ -22,6 +22,8 @@ class DIORAMA_SDK_API Renderer : public Component {
  public:
   static constexpr ComponentKind kKind = ComponentKind::Renderer;
 
+  ~Renderer() override;
+
   /// The channels that it can fill.
   virtual NameSet provides() const = 0;
 

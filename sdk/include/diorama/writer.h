@@ -39,6 +39,7 @@ class DIORAMA_SDK_API DatasetFiles {
 /// keeps and hands to finish() in capture order, over resumed runs and merged shards.
 class DIORAMA_SDK_API CaptureFiles : public DatasetFiles {
  public:
+  ~CaptureFiles() override;
   virtual void record(std::string_view line) = 0;
 };
 
@@ -50,6 +51,8 @@ using RecordReader = std::function<void(const RecordVisitor&)>;
 class DIORAMA_SDK_API Writer : public Component {
  public:
   static constexpr ComponentKind kKind = ComponentKind::Writer;
+
+  ~Writer() override;
 
   /// Channels and annotations ("visibility", "amodal_mask") that write() reads.
   virtual NameSet needs() const = 0;
