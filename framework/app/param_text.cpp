@@ -34,9 +34,9 @@ std::string type_text(const ParamSpec& spec) {
       return "number";
     case ParamType::Text:
       return "text";
-    case ParamType::Range:
+    case ParamType::Interval:
       return "[lo, hi] or number";
-    case ParamType::Vec3:
+    case ParamType::Vector:
       return "[x, y, z]";
     case ParamType::TextList:
       return "list of texts";

@@ -440,12 +440,12 @@ void ParamLister::param(const char* key, std::string& field, const ParamDoc& doc
 
 void ParamLister::param(const char* key, Range& field, const ParamDoc& doc) {
   const double ends[] = {field.lo, field.hi};
-  state_->add(spec_of(key, ParamType::Range, doc, list_of(ends, Value::number)));
+  state_->add(spec_of(key, ParamType::Interval, doc, list_of(ends, Value::number)));
 }
 
 void ParamLister::param(const char* key, Vec3& field, const ParamDoc& doc) {
   const double numbers[] = {field.x(), field.y(), field.z()};
-  state_->add(spec_of(key, ParamType::Vec3, doc, list_of(numbers, Value::number)));
+  state_->add(spec_of(key, ParamType::Vector, doc, list_of(numbers, Value::number)));
 }
 
 void ParamLister::param(const char* key, std::vector<std::string>& field, const ParamDoc& doc) {

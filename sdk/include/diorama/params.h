@@ -102,8 +102,8 @@ enum class ParamType : std::uint8_t {
   Int,
   Number,
   Text,
-  Range,
-  Vec3,
+  Interval,  ///< Range.
+  Vector,    ///< Vec3.
   TextList,
   NumberList,
   OptionalNumber,
