@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "asset_library.h"
+
+#include <filesystem>
+
+#include "crate_reader.h"
+#include "error.h"
+#include "text_reader.h"
+
+namespace diorama::usd {
+namespace {
+
+constexpr int kMaxPackageNesting = 16;
+
+// `/a.usdz[b.usdz[c.usd]]` is {`/a.usdz`, `b.usdz[c.usd]`}; the second is empty for plain files.
+std::pair<std::string, std::string> split_outer(const std::string& identifier) {
+  const std::size_t open = identifier.find('[');
+  if (open == std::string::npos || identifier.back() != ']') return {identifier, {}};
+  return {identifier.substr(0, open), identifier.substr(open + 1, identifier.size() - open - 2)};
+}
+
+// The same is {`/a.usdz[b.usdz]`, `c.usd`}.
+std::pair<std::string, std::string> split_inner(const std::string& identifier) {
+  if (identifier.empty() || identifier.back() != ']') return {identifier, {}};
+  const std::size_t open = identifier.rfind('[');
+  if (open == std::string::npos) return {identifier, {}};
+  const std::size_t close = identifier.find(']', open);
+  return {identifier.substr(0, open) + identifier.substr(close + 1),
+          identifier.substr(open + 1, close - open - 1)};
+}
+
+// Puts `member` inside of the innermost package of `identifier`.
+std::string join_package(const std::string& identifier, const std::string& member) {
+  std::size_t closing = identifier.size();
+  while (closing > 0 && identifier[closing - 1] == ']') --closing;
+  return identifier.substr(0, closing) + "[" + member + "]" + identifier.substr(closing);
+}
+
+std::string normalize(const std::filesystem::path& path) {
+  return path.lexically_normal().generic_string();
+}
+
+bool is_file_relative(std::string_view asset) {
+  return asset.starts_with("./") || asset.starts_with("../");
+}
+
+}  // namespace
+
+std::string AssetLibrary::anchor(std::string_view asset, const std::string& anchor_layer) const {
+  asset = asset.substr(0, asset.find(":SDF_FORMAT_ARGS:"));
+  if (asset.empty()) return {};
+  const std::string text(asset);
+  if (asset.find("://") != std::string_view::npos) return text;
+  const auto [outer, inside] = split_outer(text);
+  if (!inside.empty()) return join_package(anchor(outer, anchor_layer), inside);
+
+  const std::filesystem::path path(text);
+  const auto [package, member] = split_inner(anchor_layer);
+  if (member.empty() || path.is_absolute()) {
+    return normalize(std::filesystem::path(anchor_layer).parent_path() / path);
+  }
+  const std::string beside = normalize(std::filesystem::path(member).parent_path() / path);
+  const std::string anchored = join_package(package, beside);
+  if (is_file_relative(asset) || exists(anchored)) return anchored;
+  // A bare path is looked for at the top of the package as well.
+  const std::string at_top = join_package(package, normalize(path));
+  return exists(at_top) ? at_top : anchored;
+}
+
+std::shared_ptr<const Package> AssetLibrary::package(const std::string& identifier) const {
+  if (const auto known = packages_.find(identifier); known != packages_.end()) {
+    return known->second;
+  }
+  auto opened = std::make_shared<const Package>(identifier, read(identifier));
+  packages_.emplace(identifier, opened);
+  return opened;
+}
+
+bool AssetLibrary::exists(const std::string& identifier) const {
+  const auto [package_name, member] = split_inner(identifier);
+  if (member.empty()) {
+    std::error_code error;
+    return std::filesystem::is_regular_file(identifier, error);
+  }
+  try {
+    return exists(package_name) && package(package_name)->contains(member);
+  } catch (const FormatError&) {
+    return false;
+  }
+}
+
+ByteView AssetLibrary::read(const std::string& identifier) const {
+  const auto [package_name, member] = split_inner(identifier);
+  return member.empty() ? map_file(identifier) : package(package_name)->read(member);
+}
+
+std::shared_ptr<const Layer> AssetLibrary::read_layer(const std::string& identifier) const {
+  std::string name = identifier;
+  ByteView bytes = read(name);
+  for (int nesting = 0; is_package(bytes.bytes); ++nesting) {
+    if (nesting == kMaxPackageNesting) throw FormatError(name + ": packages are nested too deeply");
+    const std::string& first = package(name)->first();
+    name = join_package(name, first);
+    bytes = read(name);
+  }
+  return usd::read_layer(name, std::move(bytes));
+}
+
+std::shared_ptr<const Layer> AssetLibrary::open(const std::string& identifier) {
+  auto [entry, is_new] = layers_.try_emplace(identifier);
+  if (is_new) {
+    try {
+      entry->second.layer = read_layer(identifier);
+    } catch (const FormatError& error) {
+      entry->second.error = error.what();
+    }
+  }
+  if (!entry->second.layer) throw FormatError(entry->second.error);
+  return entry->second.layer;
+}
+
+std::shared_ptr<Layer> read_layer(const std::string& identifier, ByteView bytes) {
+  if (is_crate(bytes.bytes)) return read_crate(identifier, std::move(bytes));
+  const std::string_view text(reinterpret_cast<const char*>(bytes.bytes.data()),
+                              bytes.bytes.size());
+  if (is_text_layer(text)) return read_text_layer(identifier, text);
+  throw format_error_at(identifier, "this is neither a crate, nor a package, nor a text layer",
+                        std::uint64_t{0});
+}
+
+}  // namespace diorama::usd

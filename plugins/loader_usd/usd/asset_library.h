@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "layer.h"
+#include "mapped_file.h"
+#include "package.h"
+
+namespace diorama::usd {
+
+/// Finds and opens assets: files, and members of packages (`/a/b.usdz[c/d.png]`, also nested).
+/// Layers are opened once. Not thread safe.
+class AssetLibrary {
+ public:
+  /// The identifier that `asset` has for the layer `anchor`, whether it exists or not: paths are
+  /// relative to that layer; inside of a package they stay in it.
+  std::string anchor(std::string_view asset, const std::string& anchor_layer) const;
+
+  bool exists(const std::string& identifier) const;
+
+  /// The bytes of a file or package member. Throws FormatError.
+  ByteView read(const std::string& identifier) const;
+
+  /// Opens a layer, or the root layer of a package. Throws FormatError, the same again when asked
+  /// again.
+  std::shared_ptr<const Layer> open(const std::string& identifier);
+
+ private:
+  std::shared_ptr<const Layer> read_layer(const std::string& identifier) const;
+  std::shared_ptr<const Package> package(const std::string& identifier) const;
+
+  struct Opened {
+    std::shared_ptr<const Layer> layer;
+    std::string error;
+  };
+  std::map<std::string, Opened> layers_;
+  mutable std::map<std::string, std::shared_ptr<const Package>> packages_;
+};
+
+/// Reads a layer from bytes in memory: text or crate, whatever they are. Throws FormatError.
+std::shared_ptr<Layer> read_layer(const std::string& identifier, ByteView bytes);
+
+}  // namespace diorama::usd

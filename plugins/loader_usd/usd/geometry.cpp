@@ -1,0 +1,315 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "geometry.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "path.h"
+
+namespace diorama::usd {
+namespace {
+
+constexpr std::string_view kResetStack = "!resetXformStack!";
+constexpr std::string_view kInvert = "!invert!";
+constexpr int kMaxCollectionNesting = 16;
+
+// The axes of `rotateXYZ` in the order in which they are applied.
+std::optional<std::array<int, 3>> rotation_axes(std::string_view kind) {
+  if (kind.size() != 9 || !kind.starts_with("rotate")) return std::nullopt;
+  std::array<int, 3> axes{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const char c = kind[6 + i];
+    if (c < 'X' || c > 'Z') return std::nullopt;
+    axes[i] = c - 'X';
+  }
+  return axes;
+}
+
+Matrix op_matrix(std::string_view kind, const Value& value) {
+  Vector3 v{};
+  if (kind == "transform") {
+    Matrix matrix;
+    return value.read(matrix.m) ? matrix : Matrix();
+  }
+  if (kind == "orient") {
+    std::array<double, 4> quaternion{};
+    return value.read(quaternion) ? rotation(quaternion) : Matrix();
+  }
+  if (kind == "translate") return value.read(v) ? translation(v) : Matrix();
+  if (kind == "scale") return value.read(v) ? scaling(v) : Matrix();
+  if (kind.size() == 10 && kind.starts_with("translate")) {
+    const auto number = value.as_number();
+    if (!number) return {};
+    v[static_cast<std::size_t>(kind[9] - 'X') % 3] = *number;
+    return translation(v);
+  }
+  if (kind.size() == 6 && kind.starts_with("scale")) {
+    const auto number = value.as_number();
+    if (!number) return {};
+    v = {1, 1, 1};
+    v[static_cast<std::size_t>(kind[5] - 'X') % 3] = *number;
+    return scaling(v);
+  }
+  if (kind.size() == 7 && kind.starts_with("rotate")) {
+    const auto degrees = value.as_number();
+    return degrees ? rotation((kind[6] - 'X') % 3, *degrees) : Matrix();
+  }
+  const auto axes = rotation_axes(kind);
+  if (!axes || !value.read(v)) return {};
+  Matrix result;
+  for (const int axis : *axes) {
+    result = result * rotation(axis, v[static_cast<std::size_t>(axis)]);
+  }
+  return result;
+}
+
+Box around_axis(const std::string& axis, double radius, double half_height) {
+  Vector3 half{radius, radius, radius};
+  half[axis == "X" ? 0 : axis == "Y" ? 1 : 2] = half_height;
+  Box box;
+  box.min = {-half[0], -half[1], -half[2]};
+  box.max = half;
+  return box;
+}
+
+std::optional<Box> points_extent(const Stage& stage, const Prim& prim) {
+  const auto points = numbers<float>(stage.value(prim, "points"), 3);
+  if (!points) return std::nullopt;
+  double half_width = 0.0;
+  if (const auto widths = numbers<float>(stage.value(prim, "widths"), 1);
+      widths && prim.type_name != "Mesh") {
+    for (const float width : widths->span) half_width = std::max(half_width, width / 2.0);
+  }
+  Box box;
+  for (std::size_t i = 0; i + 2 < points->span.size(); i += 3) {
+    box.add(Vector3{points->span[i], points->span[i + 1], points->span[i + 2]});
+  }
+  if (box.is_empty()) return std::nullopt;
+  for (std::size_t i = 0; i < 3; ++i) {
+    box.min[i] -= half_width;
+    box.max[i] += half_width;
+  }
+  return box;
+}
+
+}  // namespace
+
+double number_or(const Stage& stage, const Prim& prim, std::string_view name, double fallback) {
+  return stage.value(prim, name).as_number().value_or(fallback);
+}
+
+std::string token_or(const Stage& stage, const Prim& prim, std::string_view name,
+                     std::string_view fallback) {
+  const Value value = stage.value(prim, name);
+  return value.as_text() ? *value.as_text() : std::string(fallback);
+}
+
+bool bool_or(const Stage& stage, const Prim& prim, std::string_view name, bool fallback) {
+  return stage.value(prim, name).as_bool().value_or(fallback);
+}
+
+std::optional<Vector3> vector3(const Stage& stage, const Prim& prim, std::string_view name) {
+  Vector3 result{};
+  if (!stage.value(prim, name).read(result)) return std::nullopt;
+  return result;
+}
+
+LocalTransform local_transform(const Stage& stage, const Prim& prim) {
+  LocalTransform result;
+  if (!prim.traits.is_xformable) return result;
+  const Value order = stage.value(prim, "xformOpOrder");
+  if (!order.as_strings()) return result;
+  const Strings& ops = *order.as_strings();
+  auto first = ops.begin();
+  for (auto op = ops.begin(); op != ops.end(); ++op) {
+    if (*op != kResetStack) continue;
+    result.resets_stack = true;
+    first = op + 1;
+  }
+  for (auto op = ops.end(); op != first;) {
+    std::string_view name = *--op;
+    const bool is_inverse = name.starts_with(kInvert);
+    if (is_inverse) name.remove_prefix(kInvert.size());
+    // An op and its inverse side by side cancel, even where no number can show it.
+    const bool cancels = op != first && (is_inverse ? *(op - 1) == name
+                                                    : *(op - 1) == std::string(kInvert) + *op);
+    if (cancels) {
+      --op;
+      continue;
+    }
+    if (!name.starts_with("xformOp:")) continue;
+    std::string_view kind = name.substr(8);
+    kind = kind.substr(0, kind.find(':'));
+    const Value value = stage.value(prim, name);
+    if (value.is_empty()) continue;
+    const Matrix matrix = op_matrix(kind, value);
+    result.matrix = result.matrix * (is_inverse ? inverse(matrix) : matrix);
+  }
+  return result;
+}
+
+const Matrix& Geometry::world_from_prim(const Prim& prim) {
+  if (const auto known = worlds_.find(&prim); known != worlds_.end()) return known->second;
+  Matrix world;
+  const LocalTransform local = local_transform(stage_, prim);
+  if (prim.parent && !local.resets_stack) {
+    world = local.matrix * world_from_prim(*prim.parent);
+  } else {
+    world = local.matrix;
+  }
+  return worlds_.emplace(&prim, world).first->second;
+}
+
+bool Geometry::is_visible(const Prim& prim) {
+  for (const Prim* at = &prim; at; at = at->parent) {
+    if (!at->traits.is_imageable) continue;
+    if (token_or(stage_, *at, "visibility", "inherited") == "invisible") return false;
+  }
+  return true;
+}
+
+std::string Geometry::purpose(const Prim& prim) {
+  for (const Prim* at = &prim; at; at = at->parent) {
+    if (!at->traits.is_imageable) continue;
+    const std::string purpose = token_or(stage_, *at, "purpose", "");
+    if (!purpose.empty()) return purpose;
+  }
+  return "default";
+}
+
+bool Geometry::collection_includes(const std::string& collection, const std::string& path,
+                                   int nesting) {
+  const std::string_view prefix = "collection:";
+  const std::string_view property = path::property_part(collection);
+  const Prim* owner = stage_.find(path::prim_part(collection));
+  if (!owner || !property.starts_with(prefix) || nesting > kMaxCollectionNesting) return false;
+  const std::string base(property);
+  const std::string rule = token_or(stage_, *owner, base + ":expansionRule", "expandPrims");
+  const auto nearest = [&](const Strings& paths) {
+    std::size_t best = 0;
+    for (const std::string& each : paths) {
+      const bool hits = rule == "explicitOnly" ? each == path : path::has_prefix(path, each);
+      if (hits) best = std::max(best, each.size());
+    }
+    return best;
+  };
+  Strings includes;
+  for (std::string& target : stage_.targets(*owner, base + ":includes")) {
+    if (path::property_part(target).starts_with(prefix)) {
+      if (collection_includes(target, path, nesting + 1)) return true;
+    } else {
+      includes.push_back(std::move(target));
+    }
+  }
+  if (bool_or(stage_, *owner, base + ":includeRoot", false)) includes.push_back("/");
+  return nearest(includes) > nearest(stage_.targets(*owner, base + ":excludes"));
+}
+
+std::string Geometry::material(const Prim& prim) {
+  std::string bound;
+  const auto consider = [&](const Prim& owner, const std::string& relationship,
+                            const std::string& target, bool replaces_same_prim) {
+    const Value strength = stage_.property_metadata(owner, relationship, "bindMaterialAs");
+    const bool is_strong = strength.as_text() && *strength.as_text() == "strongerThanDescendants";
+    if (bound.empty() || is_strong || replaces_same_prim) bound = target;
+  };
+  for (const Prim* at = &prim; at; at = at->parent) {
+    const std::string before = bound;
+    const Strings direct = stage_.targets(*at, "material:binding");
+    if (!direct.empty()) consider(*at, "material:binding", direct.front(), false);
+    const bool is_bound_here = bound != before;
+    constexpr std::string_view kCollection = "material:binding:collection:";
+    for (const std::string& name : stage_.property_names(*at)) {
+      // `material:binding:collection:NAME`; one more part would name a purpose.
+      const bool is_plain = name.starts_with(kCollection) &&
+                            name.find(':', kCollection.size()) == std::string::npos;
+      if (!is_plain) continue;
+      const Strings pair = stage_.targets(*at, name);
+      if (pair.size() != 2) continue;
+      const bool first_is_collection = !path::property_part(pair[0]).empty();
+      const std::string& collection = pair[first_is_collection ? 0 : 1];
+      if (!collection_includes(collection, prim.path, 0)) continue;
+      consider(*at, name, pair[first_is_collection ? 1 : 0], is_bound_here);
+      break;
+    }
+  }
+  const Prim* material = bound.empty() ? nullptr : stage_.find(bound);
+  return material && material->type_name == "Material" ? bound : std::string();
+}
+
+std::vector<Primvar> Geometry::primvars(const Prim& prim) {
+  constexpr std::string_view kPrefix = "primvars:";
+  std::map<std::string, Primvar> found;
+  for (const Prim* at = &prim; at; at = at->parent) {
+    for (const std::string& property : stage_.property_names(*at)) {
+      if (!property.starts_with(kPrefix) || property.ends_with(":indices")) continue;
+      Primvar primvar;
+      primvar.name = property.substr(kPrefix.size());
+      primvar.owner = at;
+      primvar.type = stage_.attribute_type(*at, property);
+      const Value interpolation = stage_.property_metadata(*at, property, "interpolation");
+      primvar.interpolation = interpolation.as_text() ? *interpolation.as_text() : "constant";
+      primvar.is_indexed = !stage_.value(*at, property + ":indices").is_empty();
+      const bool is_inherited = at == &prim || (primvar.interpolation == "constant" &&
+                                                !stage_.value(*at, property).is_empty());
+      if (is_inherited && !primvar.type.empty()) found.emplace(primvar.name, std::move(primvar));
+    }
+  }
+  std::vector<Primvar> result;
+  for (auto& [name, primvar] : found) result.push_back(std::move(primvar));
+  return result;
+}
+
+std::optional<Box> local_extent(const Stage& stage, const Prim& prim) {
+  if (const auto extent = numbers<float>(stage.value(prim, "extent"), 3);
+      extent && extent->span.size() == 6) {
+    Box box;
+    box.min = {extent->span[0], extent->span[1], extent->span[2]};
+    box.max = {extent->span[3], extent->span[4], extent->span[5]};
+    return box;
+  }
+  const std::string& type = prim.type_name;
+  const std::string axis = token_or(stage, prim, "axis", "Z");
+  const auto number = [&](const char* name, double fallback) {
+    return number_or(stage, prim, name, fallback);
+  };
+  if (type == "Cube") {
+    const double half = number("size", 2.0) / 2.0;
+    return around_axis(axis, half, half);
+  }
+  if (type == "Sphere") {
+    const double radius = number("radius", 1.0);
+    return around_axis(axis, radius, radius);
+  }
+  if (type == "Cylinder" || type == "Cone") {
+    return around_axis(axis, number("radius", 1.0), number("height", 2.0) / 2.0);
+  }
+  if (type == "Cylinder_1") {
+    const double radius = std::max(number("radiusTop", 1.0), number("radiusBottom", 1.0));
+    return around_axis(axis, radius, number("height", 2.0) / 2.0);
+  }
+  if (type == "Capsule") {
+    const double radius = number("radius", 0.5);
+    return around_axis(axis, radius, number("height", 1.0) / 2.0 + radius);
+  }
+  if (type == "Capsule_1") {
+    const double radius = std::max(number("radiusTop", 0.5), number("radiusBottom", 0.5));
+    return around_axis(axis, radius, number("height", 1.0) / 2.0 + radius);
+  }
+  if (type == "Plane") {
+    const double width = number("width", 2.0) / 2.0;
+    const double length = number("length", 2.0) / 2.0;
+    Vector3 half{width, length, 0.0};
+    if (axis == "X") half = {0.0, length, width};
+    if (axis == "Y") half = {width, 0.0, length};
+    Box box;
+    box.min = {-half[0], -half[1], -half[2]};
+    box.max = half;
+    return box;
+  }
+  if (prim.traits.is_point_based) return points_extent(stage, prim);
+  return std::nullopt;
+}
+
+}  // namespace diorama::usd

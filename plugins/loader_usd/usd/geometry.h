@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <vector>
+
+#include "matrix.h"
+#include "stage.h"
+
+namespace diorama::usd {
+
+/// The prim's own transform.
+struct LocalTransform {
+  Matrix matrix;
+  bool resets_stack = false;  ///< The parents' transforms do not count.
+};
+
+LocalTransform local_transform(const Stage& stage, const Prim& prim);
+
+/// A primvar as a prim sees it, authored on it or inherited.
+struct Primvar {
+  std::string name;            ///< Without `primvars:`.
+  const Prim* owner = nullptr;
+  std::string type;            ///< `color3f[]`.
+  std::string interpolation;   ///< constant where nothing is authored.
+  bool is_indexed = false;
+};
+
+/// Answers what depends on ancestors, each once per prim. Belongs to one stage.
+class Geometry {
+ public:
+  explicit Geometry(Stage& stage) : stage_(stage) {}
+
+  const Matrix& world_from_prim(const Prim& prim);
+  /// False when the prim or an ancestor is invisible.
+  bool is_visible(const Prim& prim);
+  /// default, render, proxy or guide: authored on the prim or its nearest ancestor.
+  std::string purpose(const Prim& prim);
+  /// The material that the prim is drawn with; empty when there is none.
+  std::string material(const Prim& prim);
+  /// All primvars, by name: its own, and constant ones of its ancestors.
+  std::vector<Primvar> primvars(const Prim& prim);
+
+ private:
+  bool collection_includes(const std::string& collection, const std::string& path, int nesting);
+
+  Stage& stage_;
+  std::unordered_map<const Prim*, Matrix> worlds_;
+};
+
+/// The authored extent of a boundable prim, or what follows from the attributes of a shape.
+std::optional<Box> local_extent(const Stage& stage, const Prim& prim);
+
+/// A number of a schema: authored or, if not, the schema's fallback.
+double number_or(const Stage& stage, const Prim& prim, std::string_view name, double fallback);
+std::string token_or(const Stage& stage, const Prim& prim, std::string_view name,
+                     std::string_view fallback);
+bool bool_or(const Stage& stage, const Prim& prim, std::string_view name, bool fallback);
+std::optional<Vector3> vector3(const Stage& stage, const Prim& prim, std::string_view name);
+
+}  // namespace diorama::usd

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <vector>
+
+#include "types.h"
+#include "value.h"
+
+namespace diorama::usd {
+
+struct StringHash {
+  using is_transparent = void;
+  std::size_t operator()(std::string_view text) const {
+    return std::hash<std::string_view>{}(text);
+  }
+};
+
+/// The fields of one spec: a run in the layer's list of field indices.
+struct FieldSet {
+  std::uint32_t begin = 0;
+  std::uint32_t count = 0;
+};
+
+/// An attribute or a relationship as one layer has it.
+struct PropertySpec {
+  std::string_view name;  ///< In the layer's memory.
+  SpecType type = SpecType::Unknown;
+  FieldSet fields;
+};
+
+/// A prim, a variant, a variant set or the layer itself (`/`) as one layer has it.
+struct PrimSpec {
+  SpecType type = SpecType::Unknown;
+  FieldSet fields;
+  std::vector<PropertySpec> properties;  ///< In the order of the file.
+
+  const PropertySpec* property(std::string_view name) const;
+};
+
+/// One layer in memory: specs by path, each with named fields. Values of crate layers are read from
+/// the file when they are asked for. Immutable after reading; safe to use from many threads.
+class Layer {
+ public:
+  explicit Layer(std::string identifier) : identifier_(std::move(identifier)) {}
+
+  /// The resolved file, `/rooms/a.usdc`, or a member of a package, `/rooms/a.usdz[b.usda]`.
+  const std::string& identifier() const { return identifier_; }
+
+  const PrimSpec* prim(std::string_view path) const;
+  const PrimSpec& root() const;
+  std::size_t prim_count() const { return prims_.size(); }
+
+  bool has(const FieldSet& fields, std::string_view name) const;
+  /// Empty when the field is absent. Throws FormatError when a crate lies about it.
+  Value get(const FieldSet& fields, std::string_view name) const;
+  Value get(const PrimSpec& spec, std::string_view name) const { return get(spec.fields, name); }
+
+  /// Reads every value once. Throws FormatError as `get` does.
+  void read_everything() const;
+
+  /// Called by the readers.
+  struct Field {
+    std::string_view name;
+    Value value;
+    std::uint64_t representation = 0;  ///< Of a crate value; 0: `value` holds it.
+  };
+  std::uint32_t add_field(Field field);
+  std::string_view intern(std::string_view text);
+  std::vector<std::uint32_t>& field_indices() { return field_indices_; }
+  std::unordered_map<std::string, PrimSpec, StringHash, std::equal_to<>>& prims() {
+    return prims_;
+  }
+  void set_source(std::shared_ptr<const ValueSource> source) { source_ = std::move(source); }
+
+ private:
+  const Field* find(const FieldSet& fields, std::string_view name) const;
+  void read_all(const FieldSet& fields) const;
+
+  std::string identifier_;
+  std::shared_ptr<const ValueSource> source_;
+  std::deque<std::string> strings_;
+  std::vector<Field> fields_;
+  std::vector<std::uint32_t> field_indices_;
+  std::unordered_map<std::string, PrimSpec, StringHash, std::equal_to<>> prims_;
+};
+
+}  // namespace diorama::usd

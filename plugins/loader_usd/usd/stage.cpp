@@ -1,0 +1,275 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "stage.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <set>
+
+#include "error.h"
+#include "path.h"
+
+namespace diorama::usd {
+
+Stage::Stage(const std::string& file)
+    : stacks_(assets_, diagnostics_),
+      root_stack_(&stacks_.open(
+          std::filesystem::absolute(file).lexically_normal().generic_string(), {})),
+      indexer_(stacks_, *root_stack_) {
+  auto root = std::make_unique<Prim>();
+  root->path = "/";
+  root->index = indexer_.root_index();
+  root->order = {0};
+  root->is_defined = true;
+  root_ = root.get();
+  prims_.emplace("/", std::move(root));
+}
+
+Stage::~Stage() = default;
+
+bool Stage::is_z_up() const {
+  const Value axis = root_layer().get(root_layer().root(), "upAxis");
+  return axis.as_text() && *axis.as_text() == "Z";
+}
+
+double Stage::meters_per_unit() const {
+  const Value unit = root_layer().get(root_layer().root(), "metersPerUnit");
+  // OpenUSD asks for a double and takes its fallback for a value of another type.
+  if (unit.type() != Type::Double) return 0.01;
+  return *unit.as_number();
+}
+
+std::string Stage::default_prim() {
+  const Value name = root_layer().get(root_layer().root(), "defaultPrim");
+  if (!name.as_text() || name.as_text()->empty()) return {};
+  const std::string path = name.as_text()->starts_with('/') ? *name.as_text()
+                                                            : "/" + *name.as_text();
+  return find(path) ? path : std::string();
+}
+
+const Prim* Stage::find(std::string_view path) {
+  if (path == "/") return root_;
+  if (!path.starts_with('/') || !path::property_part(path).empty()) return nullptr;
+  if (const auto known = prims_.find(path); known != prims_.end()) return known->second.get();
+  const Prim* parent = find(path::parent(path));
+  if (!parent) return nullptr;
+  const std::string_view name = path::name(path);
+  const Strings names = child_names(parent->index);
+  const bool exists = parent->is_active && std::find(names.begin(), names.end(), name) != names.end();
+  return exists ? compose(*parent, name) : nullptr;
+}
+
+std::vector<const Prim*> Stage::children(const Prim& prim) {
+  std::vector<const Prim*> result;
+  if (!prim.is_active) return result;
+  for (const std::string& name : child_names(prim.index)) result.push_back(compose(prim, name));
+  return result;
+}
+
+std::vector<const Prim*> Stage::visible_children(const Prim& prim) {
+  std::vector<const Prim*> result = children(prim);
+  result.erase(std::remove_if(result.begin(), result.end(),
+                              [](const Prim* child) {
+                                return !child->is_active || !child->is_defined ||
+                                       child->is_abstract;
+                              }),
+               result.end());
+  return result;
+}
+
+const Prim* Stage::compose(const Prim& parent, std::string_view name) {
+  std::string path = path::append_child(parent.path, name);
+  if (const auto known = prims_.find(path); known != prims_.end()) return known->second.get();
+  auto prim = std::make_unique<Prim>();
+  prim->path = path;
+  prim->parent = &parent;
+  prim->index = indexer_.child_index(parent.index, name);
+  prim->order = prim->index.strength_order();
+  prim->is_instance = prim->index.is_instance;
+  prim->is_instance_proxy = parent.is_instance || parent.is_instance_proxy;
+  prim->is_active = metadata(*prim, "active").as_bool().value_or(true);
+  bool is_defining = false;
+  const Specifier specifier = compose_specifier(*prim, is_defining);
+  prim->is_defined = parent.is_defined && is_defining;
+  prim->is_abstract = parent.is_abstract || specifier == Specifier::Class;
+  for_each_spec(*prim, [&](const IndexNode&, const LayerStack::Entry& entry, const PrimSpec& spec) {
+    const Value type = entry.layer->get(spec, "typeName");
+    const bool is_type = type.as_text() && !type.as_text()->empty() &&
+                         *type.as_text() != "__AnyType__";
+    if (is_type) prim->type_name = *type.as_text();
+    return !is_type;
+  });
+  prim->traits = type_traits(prim->type_name);
+  return prims_.emplace(std::move(path), std::move(prim)).first->second.get();
+}
+
+void Stage::for_each_spec(const Prim& prim, const Visit& visit) const {
+  for (const int i : prim.order) {
+    const IndexNode& node = prim.index.nodes[static_cast<std::size_t>(i)];
+    for (const LayerStack::Entry& entry : node.stack->layers) {
+      const PrimSpec* spec = entry.layer->prim(node.path);
+      if (spec && !visit(node, entry, *spec)) return;
+    }
+  }
+}
+
+// The strongest `def` or `class`; a class that the prim merely inherits is weaker than any other.
+Specifier Stage::compose_specifier(const Prim& prim, bool& is_defining) const {
+  Specifier result = Specifier::Over;
+  for_each_spec(prim, [&](const IndexNode& node, const LayerStack::Entry& entry,
+                          const PrimSpec& spec) {
+    const int number = entry.layer->get(spec, "specifier").as_enumerator().value_or(
+        static_cast<int>(Specifier::Over));
+    const auto specifier = static_cast<Specifier>(number);
+    if (specifier == Specifier::Over) return true;
+    bool is_inherited = false;
+    for (const IndexNode* at = &node; at->parent != IndexNode::kNone;
+         at = &prim.index.nodes[static_cast<std::size_t>(at->parent)]) {
+      const bool is_class_arc = at->arc == Arc::Inherit || at->arc == Arc::Specialize;
+      is_inherited |= is_class_arc && !at->is_due_to_ancestor();
+    }
+    const bool is_weak = specifier == Specifier::Class && is_inherited;
+    if (is_weak && is_defining) return true;
+    result = specifier;
+    is_defining = true;
+    return is_weak;
+  });
+  return result;
+}
+
+Value Stage::metadata(const Prim& prim, std::string_view field) const {
+  Value result;
+  for_each_spec(prim, [&](const IndexNode&, const LayerStack::Entry& entry, const PrimSpec& spec) {
+    result = entry.layer->get(spec, field);
+    return result.is_empty();
+  });
+  return result;
+}
+
+Strings Stage::metadata_list(const Prim& prim, std::string_view field) const {
+  std::vector<Value> opinions;
+  for_each_spec(prim, [&](const IndexNode&, const LayerStack::Entry& entry, const PrimSpec& spec) {
+    Value value = entry.layer->get(spec, field);
+    if (value.as_string_list_op()) opinions.push_back(std::move(value));
+    return true;
+  });
+  Strings result;
+  for (auto it = opinions.rbegin(); it != opinions.rend(); ++it) {
+    it->as_string_list_op()->apply(result);
+  }
+  return result;
+}
+
+bool Stage::has_property(const Prim& prim, std::string_view name) const {
+  bool found = false;
+  for_each_spec(prim, [&](const IndexNode&, const LayerStack::Entry&, const PrimSpec& spec) {
+    found = spec.property(name) != nullptr;
+    return !found;
+  });
+  return found;
+}
+
+Strings Stage::property_names(const Prim& prim) const {
+  std::set<std::string_view> names;
+  for_each_spec(prim, [&](const IndexNode&, const LayerStack::Entry&, const PrimSpec& spec) {
+    for (const PropertySpec& property : spec.properties) names.insert(property.name);
+    return true;
+  });
+  return Strings(names.begin(), names.end());
+}
+
+Value Stage::property_metadata(const Prim& prim, std::string_view name,
+                               std::string_view field) const {
+  Value result;
+  for_each_spec(prim, [&](const IndexNode&, const LayerStack::Entry& entry, const PrimSpec& spec) {
+    if (const PropertySpec* property = spec.property(name)) {
+      result = entry.layer->get(property->fields, field);
+    }
+    return result.is_empty();
+  });
+  return result;
+}
+
+std::string Stage::attribute_type(const Prim& prim, std::string_view name) const {
+  const Value type = property_metadata(prim, name, "typeName");
+  if (!type.as_text()) return {};
+  return parse_value_type(*type.as_text()).canonical;
+}
+
+Value Stage::default_value(const Prim& prim, std::string_view name) const {
+  const Value result = property_metadata(prim, name, "default");
+  return result.is_block() ? Value() : result;
+}
+
+FoundValue Stage::find_value(const Prim& prim, std::string_view name) const {
+  FoundValue first_default;
+  FoundValue first_sample;
+  for_each_spec(prim, [&](const IndexNode& node, const LayerStack::Entry& entry,
+                          const PrimSpec& spec) {
+    const PropertySpec* property = spec.property(name);
+    if (!property) return true;
+    const auto found = [&](Value value) {
+      return FoundValue{std::move(value), entry.layer.get(), node.stack};
+    };
+    first_default = found(entry.layer->get(property->fields, "default"));
+    if (first_default) return false;
+    if (!first_sample) {
+      const Value samples = entry.layer->get(property->fields, "timeSamples");
+      const TimeSamples* list = samples.as_time_samples();
+      if (list && !list->times.empty()) {
+        // Arcs may run time backwards; then the last sample comes first.
+        const bool is_reversed = node.map_to_root->offset().scale * entry.offset.scale < 0.0;
+        first_sample = found(list->value(is_reversed ? list->times.size() - 1 : 0));
+      }
+    }
+    return true;
+  });
+  FoundValue result = first_default ? first_default : first_sample;
+  return result.value.is_block() ? FoundValue() : result;
+}
+
+Strings Stage::compose_paths(const Prim& prim, std::string_view name,
+                             std::string_view field) const {
+  std::vector<ListOp<std::string>> opinions;
+  for_each_spec(prim, [&](const IndexNode& node, const LayerStack::Entry& entry,
+                          const PrimSpec& spec) {
+    const PropertySpec* property = spec.property(name);
+    if (!property) return true;
+    const Value value = entry.layer->get(property->fields, field);
+    if (!value.as_string_list_op()) return true;
+    ListOp<std::string> op = *value.as_string_list_op();
+    const auto map_all = [&](Strings& items) {
+      Strings mapped;
+      for (const std::string& item : items) {
+        // Paths that the arc does not carry out of its asset are lost.
+        if (auto path = node.map_to_root->to_target(item)) mapped.push_back(std::move(*path));
+      }
+      items = std::move(mapped);
+    };
+    for (Strings* items : {&op.explicit_items, &op.added, &op.prepended, &op.appended, &op.deleted,
+                           &op.ordered}) {
+      map_all(*items);
+    }
+    const bool is_final = op.is_explicit;
+    opinions.push_back(std::move(op));
+    return !is_final;
+  });
+  Strings result;
+  for (auto it = opinions.rbegin(); it != opinions.rend(); ++it) it->apply(result);
+  return result;
+}
+
+Strings Stage::targets(const Prim& prim, std::string_view name) const {
+  return compose_paths(prim, name, "targetPaths");
+}
+
+Strings Stage::connections(const Prim& prim, std::string_view name) const {
+  return compose_paths(prim, name, "connectionPaths");
+}
+
+std::string Stage::anchor(const FoundValue& value) const {
+  const std::string* asset = value.value.as_text();
+  if (!asset || !value.layer) return {};
+  return stacks_.anchor(*asset, *value.layer, value.stack->expression_variables);
+}
+
+}  // namespace diorama::usd

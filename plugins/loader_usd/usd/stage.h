@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <vector>
+
+#include "asset_library.h"
+#include "layer_stack.h"
+#include "prim_index.h"
+#include "schema.h"
+
+namespace diorama::usd {
+
+/// A composed prim. Belongs to its stage.
+struct Prim {
+  std::string path;
+  const Prim* parent = nullptr;  ///< Null for the pseudo-root.
+  PrimIndex index;
+  std::vector<int> order;  ///< Nodes of the index with opinions, strongest first.
+  std::string type_name;
+  TypeTraits traits;
+  bool is_active = true;
+  bool is_defined = false;   ///< `def` or `class`, and so are its ancestors.
+  bool is_abstract = false;  ///< A class or below one.
+  bool is_instance = false;
+  bool is_instance_proxy = false;  ///< Below an instance.
+};
+
+/// A value with the layer that it was found in, which asset paths are relative to.
+struct FoundValue {
+  Value value;
+  const Layer* layer = nullptr;
+  const LayerStack* stack = nullptr;
+  explicit operator bool() const { return !value.is_empty(); }
+};
+
+/// A composed scene: what all layers together say, with all payloads loaded, default variants and
+/// at the default time. Prims are composed when they are asked for. Not thread safe.
+class Stage {
+ public:
+  /// Throws FormatError when the layer cannot be read. What its arcs cannot reach becomes warnings.
+  explicit Stage(const std::string& file);
+  ~Stage();
+
+  const Layer& root_layer() const { return root_stack_->root(); }
+  const std::vector<std::string>& warnings() const { return diagnostics_.warnings(); }
+  Diagnostics& diagnostics() { return diagnostics_; }
+  const AssetLibrary& assets() const { return assets_; }
+
+  bool is_z_up() const;
+  /// 0.01 where nothing is authored.
+  double meters_per_unit() const;
+  /// Path of the default prim if there is such a prim; empty otherwise.
+  std::string default_prim();
+
+  const Prim& root() const { return *root_; }
+  /// Null if there is no such prim. Also finds prims that a traversal leaves out.
+  const Prim* find(std::string_view path);
+  /// All children that have opinions, in composed order.
+  std::vector<const Prim*> children(const Prim& prim);
+  /// The children that a renderer sees: active, defined and not abstract.
+  std::vector<const Prim*> visible_children(const Prim& prim);
+
+  /// The strongest opinion about a metadata field.
+  Value metadata(const Prim& prim, std::string_view field) const;
+  /// A composed list of tokens: apiSchemas.
+  Strings metadata_list(const Prim& prim, std::string_view field) const;
+
+  bool has_property(const Prim& prim, std::string_view name) const;
+  /// Names of all authored properties, sorted.
+  Strings property_names(const Prim& prim) const;
+  Value property_metadata(const Prim& prim, std::string_view name, std::string_view field) const;
+  /// The authored type, `float3[]`; empty if there is no such attribute.
+  std::string attribute_type(const Prim& prim, std::string_view name) const;
+  /// The value at the default time; the first time sample where no layer has a default. Empty when
+  /// there is none or it is blocked.
+  FoundValue find_value(const Prim& prim, std::string_view name) const;
+  Value value(const Prim& prim, std::string_view name) const {
+    return find_value(prim, name).value;
+  }
+  /// The value at the default time alone.
+  Value default_value(const Prim& prim, std::string_view name) const;
+  bool has_value(const Prim& prim, std::string_view name) const {
+    return !default_value(prim, name).is_empty();
+  }
+  /// Composed paths that a relationship leads to, or an attribute is connected to.
+  Strings targets(const Prim& prim, std::string_view name) const;
+  Strings connections(const Prim& prim, std::string_view name) const;
+
+  /// The identifier of an asset-valued attribute: relative to the layer that says it.
+  std::string anchor(const FoundValue& value) const;
+
+ private:
+  using Visit = std::function<bool(const IndexNode&, const LayerStack::Entry&, const PrimSpec&)>;
+  void for_each_spec(const Prim& prim, const Visit& visit) const;
+  const Prim* compose(const Prim& parent, std::string_view name);
+  Specifier compose_specifier(const Prim& prim, bool& is_defining) const;
+  Strings compose_paths(const Prim& prim, std::string_view name, std::string_view field) const;
+
+  AssetLibrary assets_;
+  Diagnostics diagnostics_;
+  LayerStacks stacks_;
+  const LayerStack* root_stack_;
+  PrimIndexer indexer_;
+  std::unordered_map<std::string, std::unique_ptr<Prim>, StringHash, std::equal_to<>> prims_;
+  const Prim* root_ = nullptr;
+};
+
+}  // namespace diorama::usd
