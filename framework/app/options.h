@@ -23,7 +23,7 @@ struct GlobalOptions {
 
 /// What it says of the job, for commands that take one.
 struct JobOptions {
-  std::filesystem::path job;
+  std::filesystem::path job;      ///< Empty: the built-in one.
   std::vector<std::string> sets;  ///< "key=value", in order.
   std::optional<std::uint64_t> seed;
   std::optional<std::string> output;  ///< Output folder.
