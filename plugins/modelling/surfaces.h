@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <string_view>
+
+#include "modelling/textures.h"
+
+/// Materials with names and sensible constants.
+namespace diorama::modelling {
+
+using MaterialPtr = std::shared_ptr<const Material>;
+
+MaterialPtr make_plain(std::string_view name, const Color& color, double roughness,
+                       double metallic = 0.0);
+/// The textures' repeat is left to the mesh's uvs (Surface::repeats_per_m = 1 / size_m).
+MaterialPtr make_textured(std::string_view name, const TextureSet& textures, double roughness,
+                          double clearcoat = 0.0);
+/// A picture with uvs 0..1, clamped.
+MaterialPtr make_picture_material(std::string_view name, std::shared_ptr<const Texture> picture,
+                                  double roughness);
+/// Solid glass; `tint` is what it lets through.
+MaterialPtr make_glass(std::string_view name, const Color& tint);
+/// Panes: no refraction.
+MaterialPtr make_pane(std::string_view name);
+
+}  // namespace diorama::modelling
