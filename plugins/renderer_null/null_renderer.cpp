@@ -166,10 +166,6 @@ Frame NullRenderer::do_render(const Scene& scene, const RenderRequest& request) 
   });
 
   Frame frame;
-  frame.camera = view.camera;
-  frame.camera_path = scene.path(request.camera);
-  frame.camera_name = scene[request.camera].name;
-  frame.world_from_camera = view.world_from_camera;
   const NameSet& wanted = request.channels;
   constexpr float kFar = std::numeric_limits<float>::infinity();
   const Vec3f none = Vec3f::Zero();
@@ -188,11 +184,6 @@ Frame NullRenderer::do_render(const Scene& scene, const RenderRequest& request) 
   all.put(frame, wanted, kAlbedo, none, [](const auto& p) { return p.albedo; });
   all.put(frame, wanted, kMotion, Vec2f(Vec2f::Zero()),
           [&](const auto& p) { return motion(view, scene, p); });
-  for (const SurfacePoint& p : all.points) {
-    if (p.node && !frame.leaf_paths.contains(p.node.index)) {
-      frame.leaf_paths[p.node.index] = scene.path(p.node);
-    }
-  }
   return frame;
 }
 

@@ -1,0 +1,227 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "channels.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "path_tracer.h"
+
+namespace diorama {
+namespace {
+
+constexpr double kTimeStep = 1.0 / 60.0;  // seconds between two motion states
+
+/// What one pixel's ray met.
+struct CentreHit {
+  CameraRay ray;
+  RayHit hit;
+};
+
+/// Velocity field of the body that moves a mesh.
+struct Motion {
+  bool is_moving = false;
+  Vec3 centre = Vec3::Zero();
+  Vec3 linear = Vec3::Zero();
+  Vec3 angular = Vec3::Zero();
+};
+
+Motion motion_of(const Scene& scene, NodeId node) {
+  while (node && !scene[node].rigid_body) node = scene[node].parent;
+  if (!node) return {};
+  const RigidBody& body = *scene[node].rigid_body;
+  return {true, scene.world_from_node(node).translation(), body.linear_velocity,
+          body.angular_velocity};
+}
+
+Vec2f image_motion(const View& view, const Motion& motion, const Vec3& position) {
+  if (!motion.is_moving) return Vec2f::Zero();
+  const Vec3 velocity = motion.linear + motion.angular.cross(position - motion.centre);
+  const auto now = project(view.camera(), view.camera_from_world() * position);
+  const auto before =
+      project(view.camera(), view.camera_from_world() * (position - kTimeStep * velocity));
+  if (!now || !before) return Vec2f::Zero();
+  return (*now - *before).cast<float>();
+}
+
+/// Makes one channel: `value` of every pixel that met something.
+class ChannelFiller {
+ public:
+  ChannelFiller(Frame& frame, const NameSet& wanted, const View& view,
+                const std::vector<CentreHit>& hits, Host& host)
+      : frame_(frame), wanted_(wanted), view_(view), hits_(hits), host_(host) {}
+
+  template <class Pixel, class Value>
+  void fill(Channel<Pixel> channel, const Pixel& miss, Value&& value) {
+    if (!wanted_.contains(channel.name)) return;
+    const int width = view_.camera().width;
+    Image<Pixel> image(width, view_.camera().height, miss);
+    host_.parallel_for(std::size_t(image.height()), [&](std::size_t y) {
+      auto row = image.row(int(y));
+      const CentreHit* hits = &hits_[y * std::size_t(width)];
+      for (std::size_t x = 0; x < row.size(); ++x) {
+        if (!hits[x].hit) continue;
+        row[x] = value(hits[x], RenderScene::surface_at(hits[x].hit, hits[x].ray.direction));
+      }
+    });
+    frame_.set(channel, std::move(image));
+  }
+
+ private:
+  Frame& frame_;
+  const NameSet& wanted_;
+  const View& view_;
+  const std::vector<CentreHit>& hits_;
+  Host& host_;
+};
+
+/// Pixels that may see something of a box, at most one image size beyond the image.
+PixelBox possible_pixels(const View& view, const Aabb& bounds) {
+  const Camera& camera = view.camera();
+  const int w = camera.width;
+  const int h = camera.height;
+  const PixelBox all{-w, -h, 2 * w, 2 * h};
+  if (bounds.is_empty()) return {};
+  // Straight edges stay straight under a pinhole only, and only in front of the camera.
+  if (camera.lens != LensModel::Pinhole) return all;
+  Vec2 lo = Vec2::Constant(kInfinity);
+  Vec2 hi = Vec2::Constant(-kInfinity);
+  int in_front = 0;
+  for (int i = 0; i < 8; ++i) {
+    const Vec3 corner = view.camera_from_world() * bounds.corner(i);
+    if (corner.z() > -1e-6) continue;
+    const auto pixel = project(camera, corner);
+    if (!pixel) continue;
+    ++in_front;
+    lo = lo.cwiseMin(*pixel);
+    hi = hi.cwiseMax(*pixel);
+  }
+  if (in_front == 0) return {};
+  if (in_front < 8) return all;
+  const auto bound = [](double value, int from, int to) {
+    return int(std::clamp(value, double(from), double(to)));
+  };
+  return {bound(std::floor(lo.x()) - 1.0, -w, 2 * w), bound(std::floor(lo.y()) - 1.0, -h, 2 * h),
+          bound(std::ceil(hi.x()) + 1.0, -w, 2 * w), bound(std::ceil(hi.y()) + 1.0, -h, 2 * h)};
+}
+
+CoverageMask cropped(const PixelBox& box, const std::vector<std::uint8_t>& bits) {
+  PixelBox extent{box.x_max, box.y_max, box.x_min, box.y_min};
+  const auto row = [&](int y) {
+    return bits.begin() + std::ptrdiff_t(y - box.y_min) * std::ptrdiff_t(box.width());
+  };
+  for (int y = box.y_min; y < box.y_max; ++y) {
+    for (int x = box.x_min; x < box.x_max; ++x) {
+      if (!row(y)[x - box.x_min]) continue;
+      extent = {std::min(extent.x_min, x), std::min(extent.y_min, y), std::max(extent.x_max, x + 1),
+                std::max(extent.y_max, y + 1)};
+    }
+  }
+  CoverageMask mask;
+  if (extent.is_empty()) return mask;
+  mask.box = extent;
+  for (int y = extent.y_min; y < extent.y_max; ++y) {
+    mask.bits.insert(mask.bits.end(), row(y) + (extent.x_min - box.x_min),
+                     row(y) + (extent.x_max - box.x_min));
+  }
+  return mask;
+}
+
+CoverageMask coverage_of(const RenderScene& meshes, const View& view,
+                         const LabelledInstance& instance) {
+  std::vector<std::uint32_t> own;
+  Aabb bounds;
+  for (std::uint32_t i = 0; i < meshes.instances().size(); ++i) {
+    const MeshInstance& mesh = *meshes.instances()[i];
+    if (std::find(instance.leaves.begin(), instance.leaves.end(), mesh.node) ==
+        instance.leaves.end()) {
+      continue;
+    }
+    own.push_back(i);
+    bounds.add(mesh.bounds);
+  }
+  const PixelBox box = possible_pixels(view, bounds);
+  if (box.is_empty()) return {};
+  const RenderScene::Part part(meshes, own);
+  std::vector<std::uint8_t> bits;
+  bits.reserve(std::size_t(box.width()) * std::size_t(box.height()));
+  for (int y = box.y_min; y < box.y_max; ++y) {
+    for (int x = box.x_min; x < box.x_max; ++x) {
+      const auto ray = view.ray(Vec2(x + 0.5, y + 0.5));
+      bits.push_back(ray && part.is_met(ray->origin, ray->direction, ray->t_min, ray->t_max));
+    }
+  }
+  return cropped(box, bits);
+}
+
+}  // namespace
+
+NameSet geometry_channels() {
+  NameSet names;
+  for (std::string_view name :
+       {kDistanceToCamera.name, kDistanceToImagePlane.name, kNormals.name, kLeafId.name,
+        kPosition.name, kUv.name, kAlbedo.name, kMotion.name}) {
+    names.emplace(name);
+  }
+  return names;
+}
+
+void fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshes, const View& view,
+                   const Scene& scene, Host& host) {
+  const NameSet known = geometry_channels();
+  if (std::none_of(known.begin(), known.end(), [&](const auto& n) { return wanted.contains(n); })) {
+    return;
+  }
+  const int width = view.camera().width;
+  const int height = view.camera().height;
+  std::vector<CentreHit> hits(std::size_t(width) * std::size_t(height));
+  host.parallel_for(std::size_t(height), [&](std::size_t y) {
+    for (int x = 0; x < width; ++x) {
+      const auto ray = view.ray(Vec2(x + 0.5, double(y) + 0.5));
+      if (!ray) continue;
+      CentreHit& hit = hits[y * std::size_t(width) + std::size_t(x)];
+      hit.ray = *ray;
+      hit.hit = meshes.intersect(ray->origin, ray->direction, ray->t_min, ray->t_max);
+    }
+  });
+
+  std::vector<Motion> motions;
+  if (wanted.contains(kMotion.name)) {
+    for (const auto& instance : meshes.instances())
+      motions.push_back(motion_of(scene, instance->node));
+  }
+  constexpr float kFar = std::numeric_limits<float>::infinity();
+  const Vec3f none = Vec3f::Zero();
+  const Vec2f no_vector = Vec2f::Zero();
+  ChannelFiller filler(frame, wanted, view, hits, host);
+  filler.fill(kDistanceToCamera, kFar, [](const CentreHit& h, const SurfaceGeometry& s) {
+    return (s.position - h.ray.origin).norm();
+  });
+  filler.fill(kDistanceToImagePlane, kFar, [&](const CentreHit&, const SurfaceGeometry& s) {
+    return float(-(view.camera_from_world() * s.position.cast<double>()).z());
+  });
+  filler.fill(kNormals, none, [](const CentreHit&, const SurfaceGeometry& s) { return s.normal; });
+  filler.fill(kLeafId, 0u, [](const CentreHit& h, const SurfaceGeometry&) {
+    return h.hit.instance->node.index;
+  });
+  filler.fill(kPosition, none,
+              [](const CentreHit&, const SurfaceGeometry& s) { return s.position; });
+  filler.fill(kUv, no_vector, [](const CentreHit&, const SurfaceGeometry& s) { return s.uv; });
+  filler.fill(kAlbedo, none, [&](const CentreHit& h, const SurfaceGeometry& s) {
+    const float width_m = view.pixel_angle() * h.hit.distance;
+    return base_color_at(h.hit, s, width_m * s.uv_per_metre);
+  });
+  filler.fill(kMotion, no_vector, [&](const CentreHit& h, const SurfaceGeometry& s) {
+    return image_motion(view, motions[h.hit.geometry], s.position.cast<double>());
+  });
+}
+
+std::vector<CoverageMask> coverage(const RenderScene& meshes, const View& view,
+                                   std::span<const LabelledInstance> instances, Host& host) {
+  std::vector<CoverageMask> masks(instances.size());
+  host.parallel_for(instances.size(),
+                    [&](std::size_t i) { masks[i] = coverage_of(meshes, view, instances[i]); });
+  return masks;
+}
+
+}  // namespace diorama

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "diorama/frame.h"
+#include "diorama/host.h"
+#include "render_scene.h"
+#include "view.h"
+
+namespace diorama {
+
+/// Names of the channels that fill_channels() knows.
+NameSet geometry_channels();
+
+/// Fills the wanted ones among the id and geometry channels, all from one ray per pixel centre.
+void fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshes, const View& view,
+                   const Scene& scene, Host& host);
+
+/// See Renderer::cover.
+std::vector<CoverageMask> coverage(const RenderScene& meshes, const View& view,
+                                   std::span<const LabelledInstance> instances, Host& host);
+
+}  // namespace diorama

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// Embree 3 (Debian 12) and 4 (Debian 13) behind one include: the ray query calls differ.
+#if __has_include(<embree4/rtcore.h>) && !__has_include(<embree3/rtcore.h>)
+#include <embree4/rtcore.h>
+#define DIORAMA_EMBREE_4 1
+#else
+#include <embree3/rtcore.h>
+#endif
+
+namespace diorama::embree {
+
+#ifdef DIORAMA_EMBREE_4
+using Context = RTCRayQueryContext;
+inline void init(Context& context) { rtcInitRayQueryContext(&context); }
+inline void intersect(RTCScene scene, Context& context, RTCRayHit& ray) {
+  RTCIntersectArguments arguments;
+  rtcInitIntersectArguments(&arguments);
+  arguments.context = &context;
+  rtcIntersect1(scene, &ray, &arguments);
+}
+inline void occluded(RTCScene scene, Context& context, RTCRay& ray) {
+  RTCOccludedArguments arguments;
+  rtcInitOccludedArguments(&arguments);
+  arguments.context = &context;
+  rtcOccluded1(scene, &ray, &arguments);
+}
+#else
+using Context = RTCIntersectContext;
+inline void init(Context& context) { rtcInitIntersectContext(&context); }
+inline void intersect(RTCScene scene, Context& context, RTCRayHit& ray) {
+  rtcIntersect1(scene, &context, &ray);
+}
+inline void occluded(RTCScene scene, Context& context, RTCRay& ray) {
+  rtcOccluded1(scene, &context, &ray);
+}
+#endif
+
+}  // namespace diorama::embree

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "denoiser.h"
+#include "diorama/host.h"
+#include "diorama/params.h"
+#include "diorama/renderer.h"
+#include "path_tracer.h"
+#include "render_scene.h"
+#include "sobol.h"
+
+namespace diorama {
+
+/// The project's own path tracer; see README.md beside this file.
+class EmbreeRenderer final : public Renderer {
+ public:
+  struct Params {
+    std::string mode = "path_traced";
+    int samples = 32;
+    int max_bounces = 6;
+    bool denoise = true;
+    bool caustics = false;
+    double clamp = 0.0;
+    std::string exposure = "auto";
+    double exposure_ev = 0.0;
+    std::string view_transform = "filmic";
+    std::string isa = "auto";
+
+    void visit(ParamVisitor& v);
+  };
+
+  EmbreeRenderer(Params params, Host& host);
+  NameSet provides() const override;
+
+  /// What the last render() did; for benchmarks.
+  struct Counts {
+    std::uint64_t paths = 0;
+    std::uint64_t rays = 0;
+    std::uint64_t shadow_rays = 0;
+    double trace_s = 0.0;  ///< Wall time.
+    double denoise_s = 0.0;
+    double channels_s = 0.0;
+  };
+  const Counts& last_counts() const { return counts_; }
+
+ private:
+  void do_prepare(const Scene& scene) override;
+  Frame do_render(const Scene& scene, const RenderRequest& request) override;
+  std::vector<CoverageMask> do_cover(const Scene& scene, NodeId camera,
+                                     std::span<const LabelledInstance> instances) override;
+  Film trace(const View& view, std::uint64_t seed);
+  void put_colors(Frame& frame, const RenderRequest& request, const View& view);
+
+  Params params_;
+  Host& host_;
+  SobolTable table_;
+  RenderScene meshes_;
+  Counts counts_;
+};
+
+}  // namespace diorama

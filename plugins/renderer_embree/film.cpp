@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "film.h"
+
+#include <algorithm>
+
+#include "sampling.h"
+
+namespace diorama {
+
+void PixelSum::add(const PathSample& sample) {
+  ++count_;
+  sum_.seen += sample.seen;
+  sum_.scattered += sample.scattered;
+  const double l = double(luminance(sample.scattered));
+  luminance_ += l;
+  luminance2_ += l * l;
+  if (!sample.has_surface) return;
+  ++surfaces_;
+  sum_.albedo += sample.albedo;
+  sum_.normal += sample.normal;
+  sum_.position += sample.position;
+}
+
+FilmPixel PixelSum::mean() const {
+  FilmPixel pixel;
+  if (count_ == 0) return pixel;
+  const float scale = 1.0f / float(count_);
+  pixel.seen = sum_.seen * scale;
+  pixel.scattered = sum_.scattered * scale;
+  pixel.surface_share = float(surfaces_) * scale;
+  if (surfaces_ > 0) {
+    const float per_surface = 1.0f / float(surfaces_);
+    // Spread over all samples: an edge pixel reflects only where it has a surface.
+    pixel.albedo = sum_.albedo * scale;
+    pixel.normal = sum_.normal * per_surface;
+    pixel.position = sum_.position * per_surface;
+  }
+  const double mean = luminance_ / count_;
+  const double spread = std::max(0.0, luminance2_ / count_ - mean * mean);
+  // One sample says nothing of its spread: take the value itself.
+  pixel.variance = float(count_ > 1 ? spread / (count_ - 1) : mean * mean);
+  return pixel;
+}
+
+}  // namespace diorama

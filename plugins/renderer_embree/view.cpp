@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "view.h"
+
+#include <algorithm>
+
+#include "sampling.h"
+
+namespace diorama {
+
+View::View(const Scene& scene, NodeId node)
+    : camera_(*scene[node].camera), world_from_camera_(scene.world_from_node(node)) {
+  world_from_camera_.linear() = Mat3(world_from_camera_.rotation());
+  camera_from_world_ = world_from_camera_.inverse();
+  pixel_angle_ = float(1.0 / std::max(1.0, 0.5 * (camera_.fx + camera_.fy)));
+  const bool has_blur = camera_.f_stop > 0.0 && camera_.focus_distance_m > 0.0;
+  aperture_radius_ = has_blur ? 0.5e-3 * camera_.focal_length_mm / camera_.f_stop : 0.0;
+}
+
+std::optional<Vec3> View::direction(const Vec2& pixel) const {
+  if (camera_.lens != LensModel::Pinhole) return ray_direction(camera_, pixel);
+  return Vec3((pixel.x() - camera_.cx) / camera_.fx, (camera_.cy - pixel.y()) / camera_.fy, -1.0)
+      .normalized();
+}
+
+CameraRay View::limited(const Vec3& origin, const Vec3& d) const {
+  // Near and far are planes; rays that never cross them (wide fisheyes) have spheres.
+  const double along_axis = -d.z();
+  const double slant = along_axis > 1e-6 ? along_axis : 1.0;
+  CameraRay ray;
+  ray.origin = (world_from_camera_ * origin).cast<float>();
+  ray.direction = Vec3(world_from_camera_.linear() * d).cast<float>().normalized();
+  ray.t_min = float(camera_.near_m / slant);
+  ray.t_max = float(camera_.far_m / slant);
+  return ray;
+}
+
+std::optional<CameraRay> View::ray(const Vec2& pixel) const {
+  const auto d = direction(pixel);
+  if (!d) return std::nullopt;
+  return limited(Vec3::Zero(), *d);
+}
+
+std::optional<CameraRay> View::ray(const Vec2& pixel, const Vec2f& aperture) const {
+  if (aperture_radius_ <= 0.0) return ray(pixel);
+  const auto d = direction(pixel);
+  if (!d || -d->z() < 1e-6) return ray(pixel);
+  const Vec3 focus = *d * (camera_.focus_distance_m / -d->z());
+  const Vec2f point = disk_from_square(aperture);
+  const Vec3 origin(aperture_radius_ * double(point.x()), aperture_radius_ * double(point.y()),
+                    0.0);
+  return limited(origin, (focus - origin).normalized());
+}
+
+}  // namespace diorama

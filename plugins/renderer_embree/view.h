@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+
+#include "diorama/scene.h"
+
+namespace diorama {
+
+struct CameraRay {
+  Vec3f origin = Vec3f::Zero();
+  Vec3f direction = -Vec3f::UnitZ();  ///< Unit.
+  float t_min = 0.0f;                 ///< Near and far plane along this ray.
+  float t_max = 0.0f;
+};
+
+/// One camera at its place. Rays are in world space; scale of the camera's node is left out.
+class View {
+ public:
+  View(const Scene& scene, NodeId camera);
+
+  const Camera& camera() const { return camera_; }
+  const Affine& camera_from_world() const { return camera_from_world_; }
+  Vec3f position() const { return world_from_camera_.translation().cast<float>(); }
+  /// Angle between the rays of neighbouring pixels at the image centre, radians.
+  float pixel_angle() const { return pixel_angle_; }
+
+  /// Nothing where the lens images nothing.
+  std::optional<CameraRay> ray(const Vec2& pixel) const;
+  /// The same through a point of the aperture, for cameras with depth of field.
+  std::optional<CameraRay> ray(const Vec2& pixel, const Vec2f& aperture) const;
+
+ private:
+  std::optional<Vec3> direction(const Vec2& pixel) const;
+  CameraRay limited(const Vec3& origin, const Vec3& direction_camera) const;
+
+  Camera camera_;
+  Affine world_from_camera_;
+  Affine camera_from_world_;
+  float pixel_angle_;
+  double aperture_radius_;  ///< Metres; 0: no depth of field.
+};
+
+}  // namespace diorama

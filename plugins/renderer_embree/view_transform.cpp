@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "view_transform.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "sampling.h"
+
+namespace diorama {
+namespace {
+
+/// Narkowicz, "ACES filmic tone mapping curve", 2015.
+float filmic(float x) {
+  return std::clamp(x * (2.51f * x + 0.03f) / (x * (2.43f * x + 0.59f) + 0.14f), 0.0f, 1.0f);
+}
+
+/// sRGB bytes of linear values, by table: the encoding's steps are finer than a 4096th only near
+/// black, where the square root below spreads them.
+class ByteTable {
+ public:
+  ByteTable() {
+    for (std::size_t i = 0; i < bytes_.size(); ++i) {
+      const float root = float(i) / float(bytes_.size() - 1);
+      bytes_[i] = std::uint8_t(srgb_from_linear(root * root) * 255.0f + 0.5f);
+    }
+  }
+  std::uint8_t operator()(float linear) const {
+    return bytes_[std::size_t(std::sqrt(std::clamp(linear, 0.0f, 1.0f)) * float(bytes_.size() - 1) +
+                              0.5f)];
+  }
+
+ private:
+  std::array<std::uint8_t, 8192> bytes_;
+};
+
+}  // namespace
+
+double automatic_exposure(const Image<Vec3f>& hdr) {
+  constexpr double kMiddleGrey = 0.18;
+  std::vector<float> lit;
+  for (const Vec3f& pixel : hdr.pixels()) {
+    const float l = luminance(pixel);
+    if (l > 0.0f && std::isfinite(l)) lit.push_back(l);
+  }
+  if (lit.empty()) return 1.0;
+  std::sort(lit.begin(), lit.end());
+  const std::size_t from = lit.size() / 10;
+  const std::size_t to = std::max(from + 1, lit.size() - lit.size() / 10);
+  double sum = 0.0;
+  for (std::size_t i = from; i < to; ++i) sum += std::log(double(lit[i]));
+  return std::clamp(kMiddleGrey / std::exp(sum / double(to - from)), 1e-8, 1e8);
+}
+
+Image<Rgba8> displayed(const Image<Vec3f>& hdr, double exposure, ViewTransform transform) {
+  const ByteTable bytes;
+  Image<Rgba8> image(hdr.width(), hdr.height(), Rgba8{0, 0, 0, 255});
+  for (std::size_t i = 0; i < hdr.pixels().size(); ++i) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const float value = hdr.pixels()[i][Eigen::Index(k)] * float(exposure);
+      image.pixels()[i][k] = bytes(transform == ViewTransform::Filmic ? filmic(value) : value);
+    }
+  }
+  return image;
+}
+
+}  // namespace diorama

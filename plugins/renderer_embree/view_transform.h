@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "diorama/image.h"
+
+namespace diorama {
+
+/// The factor that brings a picture's middle tones to a pleasant grey, whatever the scale of its
+/// light. The darkest and the brightest tenth do not count, so that a lamp or a window in view does
+/// not darken a room. 1 for a picture without light.
+double automatic_exposure(const Image<Vec3f>& hdr);
+
+enum class ViewTransform { Standard, Filmic };
+
+/// Exposes, maps to [0, 1] and encodes as sRGB. Standard clips at 1; Filmic rolls highlights off.
+Image<Rgba8> displayed(const Image<Vec3f>& hdr, double exposure, ViewTransform transform);
+
+}  // namespace diorama
