@@ -64,7 +64,11 @@ std::string AssetLibrary::anchor(std::string_view asset, const std::string& anch
   if (is_file_relative(asset) || exists(anchored)) return anchored;
   // A bare path is looked for at the top of the package as well.
   const std::string at_top = join_package(package, normalize(path));
-  return exists(at_top) ? at_top : anchored;
+  if (exists(at_top)) return at_top;
+  // And at last beside the package.
+  const std::string outside =
+      normalize(std::filesystem::path(split_outer(anchor_layer).first).parent_path() / path);
+  return exists(outside) ? outside : anchored;
 }
 
 std::shared_ptr<const Package> AssetLibrary::package(const std::string& identifier) const {

@@ -217,7 +217,7 @@ std::string Geometry::material(const Prim& prim) {
   for (const Prim* at = &prim; at; at = at->parent) {
     const std::string before = bound;
     const Strings direct = stage_.targets(*at, "material:binding");
-    if (!direct.empty()) consider(*at, "material:binding", direct.front(), false);
+    if (direct.size() == 1) consider(*at, "material:binding", direct.front(), false);
     const bool is_bound_here = bound != before;
     constexpr std::string_view kCollection = "material:binding:collection:";
     for (const std::string& name : stage_.property_names(*at)) {
@@ -252,7 +252,7 @@ std::vector<Primvar> Geometry::primvars(const Prim& prim) {
       primvar.interpolation = interpolation.as_text() ? *interpolation.as_text() : "constant";
       primvar.is_indexed = !stage_.value(*at, property + ":indices").is_empty();
       const bool is_inherited = at == &prim || (primvar.interpolation == "constant" &&
-                                                !stage_.value(*at, property).is_empty());
+                                                stage_.has_authored_value(*at, property));
       if (is_inherited && !primvar.type.empty()) found.emplace(primvar.name, std::move(primvar));
     }
   }

@@ -922,45 +922,65 @@ PrimIndex PrimIndexer::child_index(const PrimIndex& parent, std::string_view nam
   return builder.take();
 }
 
+namespace {
+
+// Children that the node's layer stack relocates: away, to another name in place, or here.
+void apply_relocates(const IndexNode& node, Strings& names,
+                     std::set<std::string, std::less<>>& known) {
+  std::set<std::string, std::less<>> arrivals;
+  for (const auto& [source, target] : node.stack->relocate_targets) {
+    const bool leaves = path::parent(source) == node.path;
+    const bool arrives = !target.empty() && path::parent(target) == node.path;
+    const std::string from(path::name(source));
+    const std::string to(path::name(target));
+    const auto at = leaves ? std::find(names.begin(), names.end(), from) : names.end();
+    if (at != names.end()) {
+      known.erase(from);
+      if (arrives && known.insert(to).second) {
+        *at = to;
+        continue;
+      }
+      names.erase(at);
+    }
+    if (arrives) arrivals.insert(to);
+  }
+  for (const std::string& name : arrivals) {
+    if (known.insert(name).second) names.push_back(name);
+  }
+}
+
+void add_child_names(const IndexNode& node, Strings& names,
+                     std::set<std::string, std::less<>>& known) {
+  for (auto entry = node.stack->layers.rbegin(); entry != node.stack->layers.rend(); ++entry) {
+    const PrimSpec* prim = entry->layer->prim(node.path);
+    if (!prim) continue;
+    const Value children = entry->layer->get(*prim, "primChildren");
+    if (children.as_strings()) {
+      for (const std::string& name : *children.as_strings()) {
+        const bool is_gone =
+            node.stack->relocate_targets.contains(path::append_child(node.path, name));
+        if (!is_gone && known.insert(name).second) names.push_back(name);
+      }
+    }
+    const Value wanted = entry->layer->get(*prim, "primOrder");
+    if (wanted.as_strings()) reorder(names, *wanted.as_strings());
+  }
+}
+
+}  // namespace
+
 Strings child_names(const PrimIndex& index) {
   Strings names;
   std::set<std::string, std::less<>> known;
-  std::set<std::string, std::less<>> removed;
-  const std::vector<int> order = index.strength_order();
+  std::vector<int> order = StrengthOrder(index).list();
   for (auto it = order.rbegin(); it != order.rend(); ++it) {
     const IndexNode& node = index.nodes[static_cast<std::size_t>(*it)];
-    const bool is_hidden = index.is_instance && !index.is_in_direct_arc(*it);
+    const bool is_hidden =
+        node.is_inert || (index.is_instance && !index.is_in_direct_arc(*it));
     if (is_hidden) continue;
-    for (auto entry = node.stack->layers.rbegin(); entry != node.stack->layers.rend(); ++entry) {
-      const PrimSpec* prim = entry->layer->prim(node.path);
-      if (!prim) continue;
-      const Value children = entry->layer->get(*prim, "primChildren");
-      if (children.as_strings()) {
-        for (const std::string& name : *children.as_strings()) {
-          if (known.insert(name).second) names.push_back(name);
-        }
-      }
-      const Value wanted = entry->layer->get(*prim, "primOrder");
-      if (wanted.as_strings()) reorder(names, *wanted.as_strings());
-    }
+    if (!node.stack->relocate_targets.empty()) apply_relocates(node, names, known);
+    if (node.has_specs) add_child_names(node, names, known);
   }
-  // Relocates take children away and bring others.
-  for (const IndexNode& node : index.nodes) {
-    if (node.is_inert) continue;
-    for (const auto& [source, target] : node.stack->relocate_targets) {
-      if (path::parent(source) == node.path) removed.emplace(path::name(source));
-      if (!target.empty() && path::parent(target) == node.path &&
-          known.emplace(path::name(target)).second) {
-        names.emplace_back(path::name(target));
-      }
-    }
-    for (const auto& [target, source] : node.stack->relocate_sources) {
-      if (path::parent(target) == node.path) removed.erase(std::string(path::name(target)));
-    }
-  }
-  names.erase(std::remove_if(names.begin(), names.end(),
-                             [&](const std::string& name) { return removed.contains(name); }),
-              names.end());
   return names;
 }
 

@@ -137,6 +137,13 @@ TypeTraits type_traits(std::string_view type_name) {
   return traits;
 }
 
+std::string_view schema_attribute_type(const TypeTraits& traits, std::string_view attribute) {
+  if (!traits.is_gprim) return {};
+  if (attribute == "primvars:displayColor") return "color3f[]";
+  if (attribute == "primvars:displayOpacity") return "float[]";
+  return {};
+}
+
 Strings api_schemas(std::string_view type_name, const Strings& applied) {
   Strings schemas;
   for (const std::string& name : built_in_schemas(type_name)) add_schema(schemas, name);

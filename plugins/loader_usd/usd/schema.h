@@ -22,6 +22,9 @@ struct TypeTraits {
 
 TypeTraits type_traits(std::string_view type_name);
 
+/// The type that the schema of a prim gives to a primvar; empty when it defines none of this name.
+std::string_view schema_attribute_type(const TypeTraits& traits, std::string_view attribute);
+
 /// The API schemas that a prim has: those of its type, then the applied ones with what they bring
 /// along. Schemas that USD itself does not define are left out.
 Strings api_schemas(std::string_view type_name, const Strings& applied);

@@ -10,8 +10,9 @@
 
 namespace diorama::usd {
 
-Stage::Stage(const std::string& file)
-    : stacks_(assets_, diagnostics_),
+Stage::Stage(const std::string& file, Sampling sampling)
+    : sampling_(sampling),
+      stacks_(assets_, diagnostics_),
       root_stack_(&stacks_.open(
           std::filesystem::absolute(file).lexically_normal().generic_string(), {})),
       indexer_(stacks_, *root_stack_) {
@@ -192,12 +193,38 @@ Value Stage::property_metadata(const Prim& prim, std::string_view name,
 std::string Stage::attribute_type(const Prim& prim, std::string_view name) const {
   const Value type = property_metadata(prim, name, "typeName");
   if (!type.as_text()) return {};
+  const std::string_view known = schema_attribute_type(prim.traits, name);
+  if (!known.empty()) return std::string(known);
   return parse_value_type(*type.as_text()).canonical;
 }
 
-Value Stage::default_value(const Prim& prim, std::string_view name) const {
-  const Value result = property_metadata(prim, name, "default");
-  return result.is_block() ? Value() : result;
+bool Stage::has_authored_value(const Prim& prim, std::string_view name) const {
+  bool result = false;
+  for_each_spec(prim, [&](const IndexNode&, const LayerStack::Entry& entry, const PrimSpec& spec) {
+    const PropertySpec* property = spec.property(name);
+    if (!property) return true;
+    result = entry.layer->has(property->fields, "timeSamples");
+    if (result) return false;
+    const Value value = entry.layer->get(property->fields, "default");
+    result = !value.is_empty() && !value.is_block();
+    return value.is_empty();
+  });
+  return result;
+}
+
+std::vector<std::int64_t> Stage::metadata_integers(const Prim& prim,
+                                                   std::string_view field) const {
+  std::vector<Value> opinions;
+  for_each_spec(prim, [&](const IndexNode&, const LayerStack::Entry& entry, const PrimSpec& spec) {
+    Value value = entry.layer->get(spec, field);
+    if (value.as_integer_list_op()) opinions.push_back(std::move(value));
+    return true;
+  });
+  std::vector<std::int64_t> result;
+  for (auto it = opinions.rbegin(); it != opinions.rend(); ++it) {
+    it->as_integer_list_op()->apply(result);
+  }
+  return result;
 }
 
 FoundValue Stage::find_value(const Prim& prim, std::string_view name) const {
@@ -212,7 +239,7 @@ FoundValue Stage::find_value(const Prim& prim, std::string_view name) const {
     };
     first_default = found(entry.layer->get(property->fields, "default"));
     if (first_default) return false;
-    if (!first_sample) {
+    if (!first_sample && sampling_ == Sampling::OrFirstSample) {
       const Value samples = entry.layer->get(property->fields, "timeSamples");
       const TimeSamples* list = samples.as_time_samples();
       if (list && !list->times.empty()) {

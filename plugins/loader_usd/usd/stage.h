@@ -39,12 +39,18 @@ struct FoundValue {
   explicit operator bool() const { return !value.is_empty(); }
 };
 
+/// Which time a value is taken at.
+enum class Sampling {
+  DefaultTime,    ///< The default alone: an attribute with time samples only has no value.
+  OrFirstSample,  ///< The first time sample where no layer has a default.
+};
+
 /// A composed scene: what all layers together say, with all payloads loaded, default variants and
 /// at the default time. Prims are composed when they are asked for. Not thread safe.
 class Stage {
  public:
   /// Throws FormatError when the layer cannot be read. What its arcs cannot reach becomes warnings.
-  explicit Stage(const std::string& file);
+  explicit Stage(const std::string& file, Sampling sampling = Sampling::DefaultTime);
   ~Stage();
 
   const Layer& root_layer() const { return root_stack_->root(); }
@@ -75,19 +81,18 @@ class Stage {
   /// Names of all authored properties, sorted.
   Strings property_names(const Prim& prim) const;
   Value property_metadata(const Prim& prim, std::string_view name, std::string_view field) const;
-  /// The authored type, `float3[]`; empty if there is no such attribute.
+  /// The type, `float3[]`: the schema's for attributes that it defines, else the authored one; empty
+  /// if there is no such attribute.
   std::string attribute_type(const Prim& prim, std::string_view name) const;
-  /// The value at the default time; the first time sample where no layer has a default. Empty when
-  /// there is none or it is blocked.
+  /// The strongest value by the stage's sampling. Empty when there is none or it is blocked.
   FoundValue find_value(const Prim& prim, std::string_view name) const;
   Value value(const Prim& prim, std::string_view name) const {
     return find_value(prim, name).value;
   }
-  /// The value at the default time alone.
-  Value default_value(const Prim& prim, std::string_view name) const;
-  bool has_value(const Prim& prim, std::string_view name) const {
-    return !default_value(prim, name).is_empty();
-  }
+  /// Whether any layer has a default or time samples that are not blocked.
+  bool has_authored_value(const Prim& prim, std::string_view name) const;
+  /// A composed list of integers: inactiveIds.
+  std::vector<std::int64_t> metadata_integers(const Prim& prim, std::string_view field) const;
   /// Composed paths that a relationship leads to, or an attribute is connected to.
   Strings targets(const Prim& prim, std::string_view name) const;
   Strings connections(const Prim& prim, std::string_view name) const;
@@ -102,6 +107,7 @@ class Stage {
   Specifier compose_specifier(const Prim& prim, bool& is_defining) const;
   Strings compose_paths(const Prim& prim, std::string_view name, std::string_view field) const;
 
+  Sampling sampling_;
   AssetLibrary assets_;
   Diagnostics diagnostics_;
   LayerStacks stacks_;

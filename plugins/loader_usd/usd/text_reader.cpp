@@ -36,7 +36,7 @@ struct PrimBuilder {
 
 enum class Edit { Explicit, Add, Prepend, Append, Delete, Reorder };
 
-enum class FieldKind { Value, Dictionary, TokenList, StringList, Free };
+enum class FieldKind { Value, Dictionary, TokenList, StringList, IntegerList, Free };
 
 struct FieldType {
   std::string_view name;
@@ -69,6 +69,7 @@ constexpr std::array kFieldTypes = {
     FieldType{"framesPerSecond", FieldKind::Value, "double"},
     FieldType{"hasOwnedSubLayers", FieldKind::Value, "bool"},
     FieldType{"hidden", FieldKind::Value, "bool"},
+    FieldType{"inactiveIds", FieldKind::IntegerList, {}},
     FieldType{"instanceable", FieldKind::Value, "bool"},
     FieldType{"interpolation", FieldKind::Value, "token"},
     FieldType{"kilogramsPerUnit", FieldKind::Value, "double"},
@@ -155,6 +156,7 @@ class TextReader {
   bool read_shared_metadata(Fields& fields);
   void read_field(Fields& fields, const std::string& key);
   void read_list_field(Fields& fields, Edit edit);
+  void read_integer_list(Fields& fields, std::string_view name, Edit edit);
   void read_substitutions();
   Strings read_name_list();
   LayerOffset read_layer_offset(bool allow_custom_data);
@@ -371,6 +373,7 @@ void TextReader::read_field(Fields& fields, const std::string& key) {
       edit_list(fields, type.name, Type::TokenListOp, Edit::Explicit, *items.as_strings());
       return;
     }
+    case FieldKind::IntegerList: return read_integer_list(fields, type.name, Edit::Explicit);
     case FieldKind::Free: break;
   }
   if (scanner_.peek() == '{') {
@@ -388,6 +391,7 @@ void TextReader::read_list_field(Fields& fields, Edit edit) {
   const FieldType type = field_type(key);
   if (scanner_.accept_word("None")) return;
   if (scanner_.peek() != '[') scanner_.fail("expected a list in [ ]");
+  if (type.kind == FieldKind::IntegerList) return read_integer_list(fields, type.name, edit);
   if (type.kind != FieldKind::TokenList && type.kind != FieldKind::StringList) {
     skip_text_value(scanner_);
     return;
@@ -395,6 +399,17 @@ void TextReader::read_list_field(Fields& fields, Edit edit) {
   const Value items = read_text_value(scanner_, parse_value_type("token[]"));
   require_distinct(*items.as_strings(), type.name.data());
   edit_list(fields, type.name, Type::TokenListOp, edit, *items.as_strings());
+}
+
+void TextReader::read_integer_list(Fields& fields, std::string_view name, Edit edit) {
+  const Value items = read_text_value(scanner_, parse_value_type("int64[]"));
+  std::vector<std::int64_t> list(items.size());
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    list[i] = static_cast<std::int64_t>(items.component(i));
+  }
+  const Value* old = find_field(fields, name);
+  edit_list(fields, name, Type::Int64ListOp, edit, std::move(list),
+            old ? old->as_integer_list_op() : nullptr);
 }
 
 void TextReader::read_prim_metadata(PrimBuilder& prim) {
@@ -918,6 +933,7 @@ void TextReader::read_attribute_value(PropertyBuilder& attribute, const ValueTyp
 }
 
 void TextReader::read_time_samples(PropertyBuilder& attribute, const ValueTypeName& type) {
+  if (type.type == Type::Invalid) scanner_.fail("time samples of a type that is not known");
   scanner_.expect_assignment();
   scanner_.expect('{', "before time samples");
   scanner_.skip_lines();
@@ -1024,13 +1040,7 @@ void TextReader::store(PrimBuilder& prim, SpecType type) {
 }  // namespace
 
 bool is_text_layer(std::string_view text) {
-  for (const std::string_view cookie : {"#usda ", "#sdf "}) {
-    if (text.starts_with(cookie)) {
-      const std::string_view version = text.substr(cookie.size());
-      return version.starts_with("1.");
-    }
-  }
-  return false;
+  return text.starts_with("#usda 1.") || text.starts_with("#sdf 1.4.32");
 }
 
 std::shared_ptr<Layer> read_text_layer(const std::string& identifier, std::string_view text) {

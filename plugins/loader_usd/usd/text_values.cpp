@@ -12,14 +12,6 @@ namespace {
 
 constexpr int kMaxNesting = 64;
 
-// How a tuple type nests: vectors one level, matrices two.
-int tuple_levels(Type type) {
-  const bool is_matrix =
-      type == Type::Matrix2d || type == Type::Matrix3d || type == Type::Matrix4d;
-  if (is_matrix) return 2;
-  return numeric_layout(type).count > 1 ? 1 : 0;
-}
-
 bool is_quaternion(Type type) {
   return type == Type::Quatd || type == Type::Quatf || type == Type::Quath;
 }
@@ -36,7 +28,7 @@ class ValueReader {
  private:
   void read_list(int nesting);
   void read_element();
-  void read_tuple(int levels);
+  void read_tuple(int nesting);
   void read_atom();
   template <class Number>
   void append(Number number);
@@ -99,19 +91,19 @@ void ValueReader::read_list(int nesting) {
 void ValueReader::read_element() {
   ++elements_;
   if (scanner_.peek() == '(') {
-    read_tuple(tuple_levels(type_.type));
+    read_tuple(0);
   } else {
     read_atom();
   }
 }
 
-void ValueReader::read_tuple(int levels) {
-  if (levels == 0) scanner_.fail("found a tuple that is nested too deeply for " + type_.canonical);
+void ValueReader::read_tuple(int nesting) {
+  if (nesting > kMaxNesting) scanner_.fail("tuples are nested too deeply");
   scanner_.expect('(', "before a tuple");
   scanner_.skip_lines();
   for (;;) {
     if (scanner_.peek() == '(') {
-      read_tuple(levels - 1);
+      read_tuple(nesting + 1);
     } else {
       read_atom();
     }
@@ -130,8 +122,10 @@ void ValueReader::read_tuple(int levels) {
 
 void ValueReader::read_atom() {
   if (type_.type == Type::AssetPath) {
-    if (scanner_.peek() != '@') scanner_.fail("expected an asset between @ signs");
-    texts_.push_back(scanner_.read_asset());
+    if (scanner_.peek() != '@' && !scanner_.at_string()) {
+      scanner_.fail("expected an asset between @ signs");
+    }
+    texts_.push_back(scanner_.at_string() ? scanner_.read_string() : scanner_.read_asset());
     return;
   }
   if (is_text(type_.type)) {

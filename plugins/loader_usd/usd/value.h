@@ -138,6 +138,7 @@ class Value {
   const Strings* as_strings() const { return shared<Strings>(); }
   const Dictionary* as_dictionary() const { return shared<Dictionary>(); }
   const ListOp<std::string>* as_string_list_op() const { return shared<ListOp<std::string>>(); }
+  const ListOp<std::int64_t>* as_integer_list_op() const { return shared<ListOp<std::int64_t>>(); }
   const ListOp<Reference>* as_reference_list_op() const { return shared<ListOp<Reference>>(); }
   const Reference* as_reference() const { return shared<Reference>(); }
   const StringPairs* as_string_pairs() const { return shared<StringPairs>(); }

@@ -88,7 +88,7 @@ class StageDump {
       out["localToWorld"] = geometry_.world_from_prim(prim).m;
     }
     if (prim.type_name == "Mesh") dump_mesh(prim, out);
-    if (prim.traits.is_boundable && prim.type_name != "Mesh") dump_extent(prim, out);
+    if (prim.traits.is_boundable && !prim.traits.is_light && prim.type_name != "Mesh") dump_extent(prim, out);
     if (prim.type_name == "PointInstancer") dump_instancer(prim, out);
     if (prim.type_name == "GeomSubset") out["indices"] = count(prim, "indices");
     if (prim.traits.is_gprim) dump_primvars(prim, out);
@@ -104,7 +104,7 @@ class StageDump {
   }
 
   std::size_t count(const Prim& prim, const char* name) const {
-    const Value value = stage_.default_value(prim, name);
+    const Value value = stage_.value(prim, name);
     return value.is_array() ? value.size() : 0;
   }
 
@@ -119,13 +119,13 @@ class StageDump {
     const std::string orientation = token_or(stage_, prim, "orientation", "rightHanded");
     if (orientation != "rightHanded") out["orientation"] = orientation;
     if (bool_or(stage_, prim, "doubleSided", false)) out["doubleSided"] = true;
-    if (stage_.has_value(prim, "normals")) {
+    if (stage_.value(prim, "normals").is_array()) {
       const Value interpolation = stage_.property_metadata(prim, "normals", "interpolation");
       out["normals"] = {interpolation.as_text() ? *interpolation.as_text() : "vertex",
                         count(prim, "normals")};
     }
     Box box;
-    if (const auto list = numbers<float>(stage_.default_value(prim, "points"), 3)) {
+    if (const auto list = numbers<float>(stage_.value(prim, "points"), 3)) {
       const Matrix& world = geometry_.world_from_prim(prim);
       for (std::size_t i = 0; i + 2 < list->span.size(); i += 3) {
         box.add(transform(world,
@@ -152,7 +152,7 @@ class StageDump {
   void dump_instancer(const Prim& prim, json& out) {
     const auto list = [&](const char* name) {
       std::vector<double> result;
-      const Value value = stage_.default_value(prim, name);
+      const Value value = stage_.value(prim, name);
       if (const auto items = numbers<double>(value, 1)) {
         result.assign(items->span.begin(), items->span.end());
       }
@@ -166,8 +166,9 @@ class StageDump {
     }
     std::set<double> masked;
     for (const double id : list("invisibleIds")) masked.insert(id);
-    const Value inactive = stage_.metadata(prim, "inactiveIds");
-    (void)inactive;
+    for (const std::int64_t id : stage_.metadata_integers(prim, "inactiveIds")) {
+      masked.insert(static_cast<double>(id));
+    }
     const auto instances = static_cast<std::size_t>(
         std::count_if(ids.begin(), ids.end(), [&](double id) { return !masked.contains(id); }));
     out["instances"] = instances;
@@ -177,8 +178,9 @@ class StageDump {
   void dump_primvars(const Prim& prim, json& out) {
     json result = json::object();
     for (const Primvar& primvar : geometry_.primvars(prim)) {
-      const Value value = stage_.default_value(*primvar.owner, "primvars:" + primvar.name);
-      if (value.is_empty()) continue;
+      const std::string name = "primvars:" + primvar.name;
+      if (!stage_.has_authored_value(*primvar.owner, name)) continue;
+      const Value value = stage_.value(*primvar.owner, name);
       json entry = {primvar.interpolation, primvar.type, value.size()};
       if (primvar.is_indexed) entry.push_back("indexed");
       result[primvar.name] = std::move(entry);
@@ -187,15 +189,12 @@ class StageDump {
   }
 
   void dump_light(const Prim& prim, json& out) {
-    const auto name = [&](const std::string& plain) {
-      return stage_.has_property(prim, "inputs:" + plain) ? "inputs:" + plain : "inputs:" + plain;
-    };
     json light;
-    light["intensity"] = number_or(stage_, prim, name("intensity"),
+    light["intensity"] = number_or(stage_, prim, "inputs:intensity",
                                    prim.type_name == "DistantLight" ? 50000.0 : 1.0);
-    light["exposure"] = number_or(stage_, prim, name("exposure"), 0.0);
-    light["color"] = vector3(stage_, prim, name("color")).value_or(Vector3{1, 1, 1});
-    light["normalize"] = bool_or(stage_, prim, name("normalize"), false);
+    light["exposure"] = number_or(stage_, prim, "inputs:exposure", 0.0);
+    light["color"] = vector3(stage_, prim, "inputs:color").value_or(Vector3{1, 1, 1});
+    light["normalize"] = bool_or(stage_, prim, "inputs:normalize", false);
     const bool has_radius = prim.type_name == "SphereLight" || prim.type_name == "DiskLight" ||
                             prim.type_name == "CylinderLight";
     if (has_radius || stage_.has_property(prim, "inputs:radius")) {
@@ -207,13 +206,13 @@ class StageDump {
   void dump_physics(const Prim& prim, json& out) {
     json physics = json::object();
     for (const char* name : {"physics:mass"}) {
-      if (const auto value = stage_.default_value(prim, name).as_number()) physics[name] = *value;
+      if (const auto value = stage_.value(prim, name).as_number()) physics[name] = *value;
     }
     for (const char* name :
          {"physics:rigidBodyEnabled", "physics:kinematicEnabled", "physics:collisionEnabled"}) {
-      if (const auto value = stage_.default_value(prim, name).as_bool()) physics[name] = *value;
+      if (const auto value = stage_.value(prim, name).as_bool()) physics[name] = *value;
     }
-    const Value approximation = stage_.default_value(prim, "physics:approximation");
+    const Value approximation = stage_.value(prim, "physics:approximation");
     if (approximation.as_text()) physics["physics:approximation"] = *approximation.as_text();
     if (!physics.empty()) out["physics"] = std::move(physics);
   }
