@@ -41,6 +41,14 @@ std::optional<Integer> read_integer(const Value& value) {
   return number;
 }
 
+/// A whole number, perhaps too large for any type.
+bool is_digits(const Value& value) {
+  if (value.kind != Value::Kind::Scalar || value.is_quoted || value.scalar.empty()) return false;
+  const std::size_t first = value.scalar.find_first_of("+-") == 0 ? 1 : 0;
+  return value.scalar.size() > first &&
+         value.scalar.find_first_not_of("0123456789", first) == std::string::npos;
+}
+
 /// YAML's numbers without its hexadecimal and octal ones; not-a-number is none.
 std::optional<double> read_number(const Value& value) {
   if (value.kind != Value::Kind::Scalar || value.is_quoted) return std::nullopt;
@@ -148,16 +156,11 @@ struct ParamReader::State {
       field = *number;
       return;
     }
-    // A whole number that does not fit is told the limits of the type.
-    const std::optional<double> wide = read_number(*value);
-    const bool is_whole = !number && wide && *wide == std::floor(*wide) &&
-                          value->scalar.find_first_of(".eEi") == std::string::npos;
     using Limits = std::numeric_limits<Integer>;
-    const double lowest = std::is_unsigned_v<Integer> ? 0.0 : double(Limits::min());
-    std::string expected = expected_number("an integer", std::max(doc.min, lowest), doc.max);
-    if (!is_whole && doc.min < lowest) expected = expected_number("an integer", doc.min, doc.max);
-    if (is_whole && doc.max > double(Limits::max())) {
-      expected = "an integer in [" + Value::number(std::max(doc.min, lowest)).scalar + ", " +
+    const double min = Limits::is_signed ? doc.min : std::max(doc.min, 0.0);
+    std::string expected = expected_number("an integer", min, doc.max);
+    if (!number && is_digits(*value) && !std::isfinite(doc.max)) {
+      expected = "an integer in [" + shown(std::max(min, double(Limits::min()))) + ", " +
                  std::to_string(Limits::max()) + "]";
     }
     complain(*value, full_name(key), expected);
