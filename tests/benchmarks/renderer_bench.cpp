@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+// Renders the bench scene and prints speed and error; see run_renderer.sh beside this file.
+#include <sys/resource.h>
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "bench_scene.h"
+#include "embree_renderer.h"
+#include "support/render_host/render_host.h"
+
+namespace {
+
+using namespace diorama;
+
+double cpu_seconds() {
+  rusage usage;
+  getrusage(RUSAGE_SELF, &usage);
+  const auto seconds = [](const timeval& t) { return double(t.tv_sec) + 1e-6 * double(t.tv_usec); };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+struct Error3 {
+  double relative_mse = 0.0;
+  double bias = 0.0;  ///< Of the mean, relative.
+};
+
+/// relMSE = mean of d^2 / (ref^2 + 0.01) without the worst thousandth of the pixels.
+Error3 compare(const Image<Vec3f>& image, const Texture& reference) {
+  std::vector<double> errors;
+  double sum = 0.0;
+  double expected = 0.0;
+  for (std::size_t i = 0; i < image.pixels().size(); ++i) {
+    double error = 0.0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double r = double(reference.floats[i * std::size_t(reference.channels) + k]);
+      const double v = double(image.pixels()[i][Eigen::Index(k)]);
+      error += (v - r) * (v - r) / (r * r + 0.01) / 3.0;
+      sum += v;
+      expected += r;
+    }
+    errors.push_back(error);
+  }
+  std::sort(errors.begin(), errors.end());
+  errors.resize(errors.size() * 999 / 1000);
+  double total = 0.0;
+  for (double e : errors) total += e;
+  return {total / double(errors.size()), sum / expected - 1.0};
+}
+
+struct Options {
+  std::string folder;
+  std::string reference;
+  std::string png;
+  std::string materials = "diffuse";
+  int width = 320;
+  int height = 240;
+  int threads = 2;
+  int repetitions = 1;
+  std::uint64_t seed = 1;
+  EmbreeRenderer::Params params;
+};
+
+void run(const Options& options) {
+  test::RenderHost host(options.threads);
+  double start = cpu_seconds();
+  Scene scene = bench::load_bench_scene(options.folder, host, options.materials == "diffuse");
+  const NodeId camera =
+      bench::add_bench_camera(options.folder, scene, options.width, options.height);
+  const double load = cpu_seconds() - start;
+  start = cpu_seconds();
+  EmbreeRenderer renderer(options.params, host);
+  const double make = cpu_seconds() - start;
+  start = cpu_seconds();
+  renderer.prepare(scene);
+  const double prepare = cpu_seconds() - start;
+  std::shared_ptr<const Texture> reference;
+  if (!options.reference.empty()) reference = host.read_texture(options.reference);
+  for (int i = 0; i < options.repetitions; ++i) {
+    start = cpu_seconds();
+    const Frame frame = renderer.render({camera,
+                                         {std::string(kColorHdr.name), std::string(kColor.name)},
+                                         options.seed + unsigned(i)});
+    const double cpu = cpu_seconds() - start;
+    const auto& counts = renderer.last_counts();
+    nlohmann::ordered_json line;
+    line["materials"] = options.materials;
+    line["size"] = std::to_string(options.width) + "x" + std::to_string(options.height);
+    line["samples"] = options.params.samples;
+    line["denoise"] = options.params.denoise;
+    line["load_cpu_s"] = load;
+    line["make_cpu_s"] = make;
+    line["prepare_cpu_s"] = prepare;
+    line["frame_cpu_s"] = cpu;
+    line["trace_wall_s"] = counts.trace_s;
+    line["denoise_wall_s"] = counts.denoise_s;
+    line["paths_per_cpu_s"] = double(counts.paths) / cpu;
+    line["rays_per_path"] = double(counts.rays) / double(counts.paths);
+    line["shadow_rays_per_path"] = double(counts.shadow_rays) / double(counts.paths);
+    line["mrays_per_cpu_s"] = 1e-6 * double(counts.rays + counts.shadow_rays) / cpu;
+    if (reference) {
+      const Error3 error = compare(frame.get(kColorHdr), *reference);
+      line["rel_mse"] = error.relative_mse;
+      line["bias"] = error.bias;
+    }
+    std::printf("%s\n", line.dump().c_str());
+    if (!options.png.empty()) test::write_png(host, frame.get(kColor), options.png);
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options options;
+  options.params.max_bounces = 4;
+  options.params.caustics = true;
+  options.params.denoise = false;
+  options.params.samples = 64;
+  CLI::App app{"Renders the bench scene; prints one JSON line per picture"};
+  app.add_option("folder", options.folder, "Holds scene.glb, scene.json, sky.hdr")->required();
+  app.add_option("--reference", options.reference, "EXR of the same size to compare with");
+  app.add_option("--png", options.png, "Where to put the picture");
+  app.add_option("--materials", options.materials)->check(CLI::IsMember({"diffuse", "pbr"}));
+  app.add_option("--width", options.width);
+  app.add_option("--height", options.height);
+  app.add_option("--samples", options.params.samples);
+  app.add_option("--bounces", options.params.max_bounces);
+  app.add_option("--threads", options.threads);
+  app.add_option("--repetitions", options.repetitions);
+  app.add_option("--seed", options.seed);
+  app.add_option("--isa", options.params.isa);
+  app.add_flag("--denoise,!--no-denoise", options.params.denoise);
+  app.add_flag("--caustics,!--no-caustics", options.params.caustics);
+  CLI11_PARSE(app, argc, argv);
+  try {
+    run(options);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 1;
+  }
+}
