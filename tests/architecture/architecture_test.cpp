@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: Apache-2.0
+// Dependencies point one way. What CONTRIBUTING asks for is read off the sources here.
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <regex>
+#include <set>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "support/catch.h"
+
+namespace fs = std::filesystem;
+
+namespace {
+
+struct Include {
+  std::string file;
+  bool is_quoted = false;
+};
+
+struct Source {
+  fs::path path;  ///< Below the repository.
+  std::string text;
+  std::string code;  ///< Without comments.
+  std::vector<Include> includes;
+
+  bool is_below(const std::string& folder) const {
+    return path.generic_string().starts_with(folder + "/");
+  }
+};
+
+const std::vector<std::string> kFolders = {"sdk", "framework", "plugins"};
+
+std::string without_comments(const std::string& text) {
+  // Raw and ordinary literals come first, so that a "//" inside stays.
+  static const std::regex kTokens(
+      R"re(("(?:\\.|[^"\\\n])*")|('(?:\\.|[^'\\\n])')|(//[^\n]*)|(/\*[\s\S]*?\*/))re");
+  std::string code;
+  auto from = text.cbegin();
+  for (std::sregex_iterator it(text.begin(), text.end(), kTokens), end; it != end; ++it) {
+    code.append(from, (*it)[0].first);
+    if ((*it)[1].matched || (*it)[2].matched) code += it->str();
+    from = (*it)[0].second;
+  }
+  return code.append(from, text.cend());
+}
+
+Source read_source(const fs::path& root, const fs::path& file) {
+  Source source;
+  source.path = fs::relative(file, root);
+  std::ostringstream text;
+  text << std::ifstream(file).rdbuf();
+  source.text = text.str();
+  source.code = without_comments(source.text);
+  std::istringstream lines(source.code);
+  static const std::regex kInclude(R"re(^\s*#\s*include\s*([<"])([^>"]+)[>"])re");
+  for (std::string line; std::getline(lines, line);) {
+    std::smatch found;
+    if (std::regex_search(line, found, kInclude))
+      source.includes.push_back({found[2], found[1] == "\""});
+  }
+  return source;
+}
+
+std::vector<Source> read_sources() {
+  std::vector<Source> sources;
+  const fs::path root = DIORAMA_SOURCE_DIR;
+  for (const std::string& folder : kFolders) {
+    if (!fs::is_directory(root / folder)) continue;
+    for (const auto& entry : fs::recursive_directory_iterator(root / folder)) {
+      const std::string ending = entry.path().extension().string();
+      if (entry.is_regular_file() && (ending == ".h" || ending == ".cpp")) {
+        sources.push_back(read_source(root, entry.path()));
+      }
+    }
+  }
+  std::sort(sources.begin(), sources.end(),
+            [](const Source& a, const Source& b) { return a.path < b.path; });
+  return sources;
+}
+
+const std::vector<Source>& sources() {
+  static const std::vector<Source> all = read_sources();
+  return all;
+}
+
+/// "path: include" of every include for which the rule says no.
+template <class Rule>
+std::vector<std::string> offending_includes(const std::string& folder, Rule&& is_allowed) {
+  std::vector<std::string> offences;
+  for (const Source& source : sources()) {
+    if (!source.is_below(folder)) continue;
+    for (const Include& include : source.includes) {
+      if (!is_allowed(source, include)) {
+        offences.push_back(source.path.generic_string() + ": " + include.file);
+      }
+    }
+  }
+  return offences;
+}
+
+std::vector<std::string> files_including(const std::string& prefix) {
+  std::vector<std::string> files;
+  for (const Source& source : sources()) {
+    const bool found = std::any_of(source.includes.begin(), source.includes.end(),
+                                   [&](const Include& i) { return i.file.starts_with(prefix); });
+    if (found) files.push_back(source.path.generic_string());
+  }
+  return files;
+}
+
+template <class Where>
+std::vector<std::string> files_with_code(const std::string& pattern, Where&& where) {
+  const std::regex regex(pattern);
+  std::vector<std::string> files;
+  for (const Source& source : sources()) {
+    if (where(source) && std::regex_search(source.code, regex)) {
+      files.push_back(source.path.generic_string());
+    }
+  }
+  return files;
+}
+
+bool is_standard_header(const std::string& file) {
+  return file.find('/') == std::string::npos && file.find('.') == std::string::npos;
+}
+
+/// "renderer_embree" of plugins/renderer_embree/a/b.cpp.
+std::string folder_below_plugins(const Source& source) { return *std::next(source.path.begin()); }
+
+/// Folders that make a plugin; the others below plugins/ are libraries that plugins share.
+std::set<std::string> plugin_folders() {
+  std::set<std::string> folders;
+  for (const Source& source : sources()) {
+    if (source.is_below("plugins") && source.code.find("DIORAMA_PLUGIN(") != std::string::npos) {
+      folders.insert(folder_below_plugins(source));
+    }
+  }
+  return folders;
+}
+
+bool stands_in(const Source& source, const std::string& include, const fs::path& top) {
+  const fs::path root = DIORAMA_SOURCE_DIR;
+  const auto is_inside = [&](const fs::path& file) {
+    const fs::path plain = file.lexically_normal();
+    const auto [end, mismatch] = std::mismatch(top.begin(), top.end(), plain.begin(), plain.end());
+    return end == top.end() && fs::exists(root / plain);
+  };
+  return is_inside(source.path.parent_path() / include) || is_inside(top / include);
+}
+
+using None = std::vector<std::string>;
+
+}  // namespace
+
+TEST_CASE("The checks see the sources", "[architecture]") {
+  CHECK(sources().size() > 40);
+  CHECK(without_comments("a // x\n\"//\" /* \n */ '\"' b // \"") == "a \n\"//\"  '\"' b ");
+  CHECK_FALSE(files_including("diorama/scene.h").empty());
+}
+
+TEST_CASE("The SDK includes the standard library, Eigen and itself", "[architecture]") {
+  const auto is_allowed = [](const Source&, const Include& include) {
+    return is_standard_header(include.file) || include.file.starts_with("Eigen/") ||
+           include.file.starts_with("diorama/");
+  };
+  CHECK(offending_includes("sdk/include", is_allowed) == None{});
+  CHECK(offending_includes("sdk/src", is_allowed) == None{});
+}
+
+TEST_CASE("The framework includes the SDK and itself, no plugin", "[architecture]") {
+  const auto is_allowed = [](const Source& source, const Include& include) {
+    if (!include.is_quoted) return true;
+    return include.file.starts_with("diorama/") || stands_in(source, include.file, "framework") ||
+           (include.file.starts_with("framework/") &&
+            fs::exists(fs::path(DIORAMA_SOURCE_DIR) / include.file));
+  };
+  CHECK(offending_includes("framework", is_allowed) == None{});
+}
+
+TEST_CASE("A plugin includes the SDK, its engine, itself and shared libraries", "[architecture]") {
+  const std::set<std::string> plugins = plugin_folders();
+  CHECK(plugins.contains("renderer_embree"));
+  const auto is_allowed = [&](const Source& source, const Include& include) {
+    const std::string& file = include.file;
+    if (file.starts_with("framework/") || file.starts_with("plugins/")) return false;
+    if (!include.is_quoted || file.starts_with("diorama/")) return true;
+    const std::string own = folder_below_plugins(source);
+    if (stands_in(source, file, fs::path("plugins") / own)) return true;
+    const std::string named = file.substr(0, file.find('/'));
+    return (named == own || !plugins.contains(named)) &&
+           fs::exists(fs::path(DIORAMA_SOURCE_DIR) / "plugins" / file);
+  };
+  CHECK(offending_includes("plugins", is_allowed) == None{});
+}
+
+TEST_CASE("One file knows yaml-cpp and one knows Boost.DLL", "[architecture]") {
+  CHECK(files_including("yaml-cpp/").size() == 1);
+  CHECK(files_including("boost/dll").size() == 1);
+}
+
+TEST_CASE("Nothing but the program writes to the standard streams", "[architecture]") {
+  const auto is_elsewhere = [](const Source& s) { return !s.is_below("framework/app"); };
+  CHECK(files_with_code(R"(\bstd::c(out|err|log)\b|\b(std::)?printf\s*\()", is_elsewhere) ==
+        None{});
+}
+
+TEST_CASE("No namespace is opened to all of std", "[architecture]") {
+  CHECK(files_with_code(R"(using\s+namespace\s+std\b)", [](const Source&) { return true; }) ==
+        None{});
+}
+
+TEST_CASE("Chance comes from diorama::Rng alone", "[architecture]") {
+  // Distributions and shuffles of the standard library differ between its versions.
+  const auto is_code = [](const Source&) { return true; };
+  CHECK(
+      files_with_code(
+          R"(_distribution\s*<|\bstd::(shuffle|sample|random_device|mt19937|default_random_engine)\b)",
+          is_code) == None{});
+  CHECK(files_with_code(R"((\bstd::|[^\w:.>])s?rand\s*\()", is_code) == None{});
+}
+
+TEST_CASE("Every source says its licence first", "[architecture]") {
+  None missing;
+  for (const Source& source : sources()) {
+    if (!source.text.starts_with("// SPDX-License-Identifier: Apache-2.0\n")) {
+      missing.push_back(source.path.generic_string());
+    }
+  }
+  CHECK(missing == None{});
+}
