@@ -3,6 +3,6 @@
 #include "null_renderer.h"
 
 DIORAMA_PLUGIN("renderer_null", "0.1.0", "Apache-2.0") {
-  diorama::add<diorama::NullRenderer>(
-      registrar, "null", "Exact labels and flat colours without light, for tests and dry runs.");
+  DIORAMA_ADD(diorama::NullRenderer, "null",
+              "Exact labels and flat colours without light, for tests and dry runs.");
 }

@@ -3,7 +3,6 @@
 #include "writer_data_visualization/data_visualization_writer.h"
 
 DIORAMA_PLUGIN("writer_data_visualization", "1.0.0", "Apache-2.0") {
-  diorama::add<diorama::DataVisualizationWriter>(
-      registrar, "DataVisualizationWriter",
-      "Draws boxes over the pictures, as Replicator's DataVisualizationWriter does.");
+  DIORAMA_ADD(diorama::DataVisualizationWriter, "DataVisualizationWriter",
+              "Draws boxes over the pictures, as Replicator's DataVisualizationWriter does.");
 }

@@ -3,7 +3,7 @@
 #include "writer_pose/pose_writer.h"
 
 DIORAMA_PLUGIN("writer_pose", "1.0.0", "Apache-2.0") {
-  diorama::add<diorama::PoseWriter>(registrar, "PoseWriter",
-                                    "Writes object poses and cuboid keypoints as Replicator's "
-                                    "PoseWriter does; DOPE, CenterPose.");
+  DIORAMA_ADD(diorama::PoseWriter, "PoseWriter",
+              "Writes object poses and cuboid keypoints as Replicator's "
+              "PoseWriter does; DOPE, CenterPose.");
 }
