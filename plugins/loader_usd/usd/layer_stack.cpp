@@ -41,6 +41,12 @@ void Diagnostics::warn(const std::string& text) {
   if (known_.insert(text).second) warnings_.push_back(text);
 }
 
+void Diagnostics::missing(const std::string& text) {
+  if (!known_.insert(text).second) return;
+  warnings_.push_back(text);
+  missing_.push_back(text);
+}
+
 bool LayerStack::has_prim(std::string_view path) const {
   return std::any_of(layers.begin(), layers.end(),
                      [&](const Entry& entry) { return entry.layer->prim(path) != nullptr; });
@@ -108,14 +114,14 @@ void LayerStacks::add_layer(LayerStack& stack, std::shared_ptr<const Layer> laye
     std::shared_ptr<const Layer> sublayer;
     try {
       if (!assets_.exists(identifier)) {
-        diagnostics_.warn(layer->identifier() + ": sublayer @" + assets[i] +
-                          "@ could not be found");
+        diagnostics_.missing(layer->identifier() + ": sublayer @" + assets[i] +
+                             "@ could not be found");
         continue;
       }
       sublayer = assets_.open(identifier);
     } catch (const FormatError& error) {
-      diagnostics_.warn(layer->identifier() + ": sublayer @" + assets[i] +
-                        "@ could not be read: " + error.what());
+      diagnostics_.missing(layer->identifier() + ": sublayer @" + assets[i] +
+                           "@ could not be read: " + error.what());
       continue;
     }
     if (std::find(chain.begin(), chain.end(), sublayer->identifier()) != chain.end()) {

@@ -17,10 +17,15 @@ namespace diorama::usd {
 class Diagnostics {
  public:
   void warn(const std::string& text);
+  /// The same for an asset that cannot be found or read.
+  void missing(const std::string& text);
   const std::vector<std::string>& warnings() const { return warnings_; }
+  /// The warnings that are about missing assets.
+  const std::vector<std::string>& missing_assets() const { return missing_; }
 
  private:
   std::vector<std::string> warnings_;
+  std::vector<std::string> missing_;
   std::set<std::string> known_;
 };
 

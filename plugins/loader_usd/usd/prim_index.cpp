@@ -593,12 +593,12 @@ void PrimIndexer::Builder::eval_references(int i, Arc arc) {
       if (reference.asset.empty()) continue;
       try {
         if (!stacks_.assets().exists(reference.asset)) {
-          stacks_.diagnostics().warn(where + " could not be found");
+          stacks_.diagnostics().missing(where + " could not be found");
           continue;
         }
         target_stack = &stacks_.open(reference.asset, stack.expression_variables);
       } catch (const FormatError& error) {
-        stacks_.diagnostics().warn(where + " could not be read: " + error.what());
+        stacks_.diagnostics().missing(where + " could not be read: " + error.what());
         continue;
       }
       offset.scale *= time_codes_per_second(*source) / target_stack->time_codes_per_second;

@@ -235,7 +235,7 @@ FoundValue Stage::find_value(const Prim& prim, std::string_view name) const {
     const PropertySpec* property = spec.property(name);
     if (!property) return true;
     const auto found = [&](Value value) {
-      return FoundValue{std::move(value), entry.layer.get(), node.stack};
+      return FoundValue{std::move(value), entry.layer.get(), node.stack, property};
     };
     first_default = found(entry.layer->get(property->fields, "default"));
     if (first_default) return false;
@@ -252,6 +252,22 @@ FoundValue Stage::find_value(const Prim& prim, std::string_view name) const {
   });
   FoundValue result = first_default ? first_default : first_sample;
   return result.value.is_block() ? FoundValue() : result;
+}
+
+const PropertySpec* Stage::value_spec(const Prim& prim, std::string_view name) const {
+  const PropertySpec* with_default = nullptr;
+  const PropertySpec* with_samples = nullptr;
+  for_each_spec(prim, [&](const IndexNode&, const LayerStack::Entry& entry, const PrimSpec& spec) {
+    const PropertySpec* property = spec.property(name);
+    if (!property) return true;
+    if (entry.layer->has(property->fields, "default")) with_default = property;
+    if (!with_samples && entry.layer->has(property->fields, "timeSamples")) {
+      with_samples = property;
+    }
+    return with_default == nullptr;
+  });
+  if (with_default || sampling_ == Sampling::DefaultTime) return with_default;
+  return with_samples;
 }
 
 Strings Stage::compose_paths(const Prim& prim, std::string_view name,

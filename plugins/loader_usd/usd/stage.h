@@ -36,6 +36,8 @@ struct FoundValue {
   Value value;
   const Layer* layer = nullptr;
   const LayerStack* stack = nullptr;
+  /// The spec that says it: the same spec is the same value.
+  const PropertySpec* spec = nullptr;
   explicit operator bool() const { return !value.is_empty(); }
 };
 
@@ -96,6 +98,9 @@ class Stage {
   /// Composed paths that a relationship leads to, or an attribute is connected to.
   Strings targets(const Prim& prim, std::string_view name) const;
   Strings connections(const Prim& prim, std::string_view name) const;
+
+  /// The spec that `find_value` would read, without reading it; null where there is no value.
+  const PropertySpec* value_spec(const Prim& prim, std::string_view name) const;
 
   /// The identifier of an asset-valued attribute: relative to the layer that says it.
   std::string anchor(const FoundValue& value) const;

@@ -1,0 +1,394 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "loader_usd/mesh_translator.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <optional>
+#include <span>
+
+#include "diorama/error.h"
+#include "loader_usd/polygon.h"
+
+namespace diorama::loader_usd {
+namespace {
+
+using usd::Prim;
+using usd::Stage;
+
+enum class Interpolation { Constant, Uniform, Vertex, FaceVarying };
+
+std::optional<Interpolation> interpolation_of(const std::string& name) {
+  if (name == "constant") return Interpolation::Constant;
+  if (name == "uniform") return Interpolation::Uniform;
+  if (name == "vertex" || name == "varying") return Interpolation::Vertex;
+  if (name == "faceVarying") return Interpolation::FaceVarying;
+  return std::nullopt;
+}
+
+// One attribute of the corners of a mesh: `width` floats each.
+struct CornerData {
+  usd::Numbers<float> values;
+  std::optional<usd::Numbers<std::int32_t>> indices;
+  Interpolation interpolation = Interpolation::Constant;
+  std::size_t width = 0;
+
+  std::size_t count() const {
+    return indices ? indices->span.size() : values.span.size() / width;
+  }
+  // The values of a corner; null when the data are too short for it.
+  const float* at(std::size_t face, std::size_t point, std::size_t corner) const {
+    std::size_t i = 0;
+    if (interpolation == Interpolation::Uniform) i = face;
+    if (interpolation == Interpolation::Vertex) i = point;
+    if (interpolation == Interpolation::FaceVarying) i = corner;
+    if (indices) {
+      if (i >= indices->span.size() || indices->span[i] < 0) return nullptr;
+      i = static_cast<std::size_t>(indices->span[i]);
+    }
+    return (i + 1) * width <= values.span.size() ? values.span.data() + i * width : nullptr;
+  }
+};
+
+struct Sources {
+  usd::Numbers<float> points;
+  usd::Numbers<std::int32_t> counts;
+  usd::Numbers<std::int32_t> indices;
+  std::optional<usd::Numbers<std::int32_t>> holes;
+  std::optional<CornerData> normals;
+  std::optional<CornerData> uvs;
+  std::optional<CornerData> colors;
+  bool is_left_handed = false;
+};
+
+std::optional<CornerData> read_corner_data(const Stage& stage, const Prim& prim,
+                                           const std::string& name, std::size_t width,
+                                           const std::string& fallback) {
+  auto values = usd::numbers<float>(stage.value(prim, name), width);
+  if (!values || values->span.empty()) return std::nullopt;
+  const usd::Value word = stage.property_metadata(prim, name, "interpolation");
+  const auto interpolation = interpolation_of(word.as_text() ? *word.as_text() : fallback);
+  if (!interpolation) return std::nullopt;
+  CornerData data;
+  data.values = std::move(*values);
+  data.interpolation = *interpolation;
+  data.width = width;
+  data.indices = usd::numbers<std::int32_t>(stage.value(prim, name + ":indices"), 1);
+  return data;
+}
+
+// Builds the triangles. Corners with the same point and the same attributes share a vertex: each
+// point keeps a chain of the vertices that were made of it.
+class MeshAssembly {
+ public:
+  MeshAssembly(const Sources& sources, std::span<const std::uint16_t> slot_of_face)
+      : sources_(sources), slot_of_face_(slot_of_face),
+        first_(sources.points.span.size() / 3, kNone) {}
+
+  Mesh build();
+
+ private:
+  static constexpr std::uint32_t kNone = 0xFFFFFFFF;
+
+  std::uint32_t vertex(std::size_t face, std::size_t point, std::size_t corner);
+  bool is_same(std::uint32_t vertex, const float* normal, const float* uv,
+               const float* color) const;
+  void add_face(std::size_t face, std::size_t corner, std::size_t count);
+
+  const Sources& sources_;
+  std::span<const std::uint16_t> slot_of_face_;
+  Mesh mesh_;
+  std::vector<std::uint32_t> first_;
+  std::vector<std::uint32_t> next_;
+  std::vector<std::uint32_t> ring_;
+  std::vector<Vec3f> ring_points_;
+  std::vector<std::array<std::uint32_t, 3>> split_;
+};
+
+bool MeshAssembly::is_same(std::uint32_t vertex, const float* normal, const float* uv,
+                           const float* color) const {
+  const auto differs = [](const float* a, const float* b, int count) {
+    return a && !std::equal(a, a + count, b);
+  };
+  return !(sources_.normals && differs(normal, mesh_.normals[vertex].data(), 3)) &&
+         !(sources_.uvs && differs(uv, mesh_.uvs[vertex].data(), 2)) &&
+         !(sources_.colors && differs(color, mesh_.colors[vertex].data(), 3));
+}
+
+std::uint32_t MeshAssembly::vertex(std::size_t face, std::size_t point, std::size_t corner) {
+  const auto value = [&](const std::optional<CornerData>& data) {
+    return data ? data->at(face, point, corner) : nullptr;
+  };
+  const float* normal = value(sources_.normals);
+  const float* uv = value(sources_.uvs);
+  const float* color = value(sources_.colors);
+  for (std::uint32_t v = first_[point]; v != kNone; v = next_[v]) {
+    if (is_same(v, normal, uv, color)) return v;
+  }
+  const auto added = static_cast<std::uint32_t>(mesh_.positions.size());
+  const float* p = sources_.points.span.data() + point * 3;
+  mesh_.positions.emplace_back(p[0], p[1], p[2]);
+  if (sources_.normals) {
+    mesh_.normals.push_back(normal ? Vec3f(normal[0], normal[1], normal[2]) : Vec3f::UnitZ());
+  }
+  if (sources_.uvs) mesh_.uvs.push_back(uv ? Vec2f(uv[0], uv[1]) : Vec2f::Zero());
+  if (sources_.colors) {
+    mesh_.colors.push_back(color ? Vec3f(color[0], color[1], color[2]) : Vec3f::Ones());
+  }
+  next_.push_back(first_[point]);
+  first_[point] = added;
+  return added;
+}
+
+void MeshAssembly::add_face(std::size_t face, std::size_t corner, std::size_t count) {
+  const std::size_t points = first_.size();
+  ring_.clear();
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::int32_t index = sources_.indices.span[corner + i];
+    // A face that refers to points that do not exist is left out.
+    if (index < 0 || static_cast<std::size_t>(index) >= points) return;
+    const float* p = sources_.points.span.data() + static_cast<std::size_t>(index) * 3;
+    if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2])) return;
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto point = static_cast<std::size_t>(sources_.indices.span[corner + i]);
+    ring_.push_back(vertex(face, point, corner + i));
+  }
+  split_.clear();
+  if (count == 3) {
+    split_.push_back({0, 1, 2});
+  } else {
+    ring_points_.clear();
+    for (const std::uint32_t v : ring_) ring_points_.push_back(mesh_.positions[v]);
+    triangulate(ring_points_, split_);
+  }
+  for (const auto& [a, b, c] : split_) {
+    if (sources_.is_left_handed) {
+      mesh_.triangles.push_back({ring_[a], ring_[c], ring_[b]});
+    } else {
+      mesh_.triangles.push_back({ring_[a], ring_[b], ring_[c]});
+    }
+    if (!slot_of_face_.empty()) mesh_.material_slots.push_back(slot_of_face_[face]);
+  }
+}
+
+Mesh MeshAssembly::build() {
+  const auto counts = sources_.counts.span;
+  const std::size_t corners = sources_.indices.span.size();
+  std::vector<char> is_hole;
+  if (sources_.holes) {
+    is_hole.resize(counts.size());
+    for (const std::int32_t hole : sources_.holes->span) {
+      if (hole >= 0 && static_cast<std::size_t>(hole) < counts.size()) {
+        is_hole[static_cast<std::size_t>(hole)] = 1;
+      }
+    }
+  }
+  mesh_.triangles.reserve(counts.size());
+  mesh_.positions.reserve(first_.size());
+  std::size_t corner = 0;
+  for (std::size_t face = 0; face < counts.size(); ++face) {
+    if (counts[face] < 0) break;
+    const auto count = static_cast<std::size_t>(counts[face]);
+    if (count > corners - corner) break;
+    if (count >= 3 && (is_hole.empty() || !is_hole[face])) add_face(face, corner, count);
+    corner += count;
+  }
+  for (Vec3f& normal : mesh_.normals) {
+    const float length = normal.norm();
+    normal = length > 0.0f && std::isfinite(length) ? Vec3f(normal / length) : Vec3f::UnitZ();
+  }
+  for (Vec2f& uv : mesh_.uvs) {
+    if (!uv.allFinite()) uv.setZero();
+  }
+  for (Vec3f& color : mesh_.colors) {
+    if (!color.allFinite()) color.setOnes();
+  }
+  mesh_.positions.shrink_to_fit();
+  return std::move(mesh_);
+}
+
+// Turns a shape made along z so that it lies along another axis.
+void turn_axis(Mesh& mesh, const std::string& axis) {
+  if (axis != "X" && axis != "Y") return;
+  const auto turn = [&](Vec3f& v) {
+    v = axis == "X" ? Vec3f(v.z(), v.x(), v.y()) : Vec3f(v.y(), v.z(), v.x());
+  };
+  for (Vec3f& position : mesh.positions) turn(position);
+  for (Vec3f& normal : mesh.normals) turn(normal);
+}
+
+}  // namespace
+
+std::string MeshTranslator::find_uv(const std::vector<usd::Primvar>& primvars,
+                                    const std::vector<std::string>& uv_names) const {
+  const auto has = [&](const std::string& name) {
+    return std::any_of(primvars.begin(), primvars.end(),
+                       [&](const usd::Primvar& primvar) { return primvar.name == name; });
+  };
+  for (const std::string& name : uv_names) {
+    if (has(name)) return name;
+  }
+  for (const char* name : {"st", "UVMap"}) {
+    if (has(name)) return name;
+  }
+  for (const usd::Primvar& primvar : primvars) {
+    if (primvar.type.starts_with("texCoord2")) return primvar.name;
+  }
+  for (const usd::Primvar& primvar : primvars) {
+    if (primvar.type == "float2[]") return primvar.name;
+  }
+  return {};
+}
+
+void MeshTranslator::read_display_color(const Prim& prim, TranslatedMesh& result) {
+  for (const usd::Primvar& primvar : geometry_.primvars(prim)) {
+    const std::string name = "primvars:" + primvar.name;
+    if (primvar.name == "displayColor") {
+      const auto color = usd::numbers<float>(stage_.value(*primvar.owner, name), 3);
+      if (color && color->span.size() == 3) {
+        result.display_color = Vec3f(color->span[0], color->span[1], color->span[2]);
+      }
+    }
+    if (primvar.name == "displayOpacity") {
+      const auto opacity = usd::numbers<float>(stage_.value(*primvar.owner, name), 1);
+      if (opacity && opacity->span.size() == 1) result.display_opacity = opacity->span[0];
+    }
+  }
+}
+
+TranslatedMesh MeshTranslator::translate(const Prim& prim,
+                                         const std::vector<std::string>& uv_names) {
+  TranslatedMesh result =
+      prim.type_name == "Mesh" ? translate_mesh(prim, uv_names) : translate_shape(prim);
+  read_display_color(prim, result);
+  return result;
+}
+
+TranslatedMesh MeshTranslator::translate_mesh(const Prim& prim,
+                                              const std::vector<std::string>& uv_names) {
+  TranslatedMesh result;
+  const auto primvars = geometry_.primvars(prim);
+  const std::string uv_name = find_uv(primvars, uv_names);
+  const auto owner = [&](const std::string& name) -> const Prim* {
+    for (const usd::Primvar& primvar : primvars) {
+      if (primvar.name == name) return primvar.owner;
+    }
+    return nullptr;
+  };
+  const Prim* uv_owner = uv_name.empty() ? nullptr : owner(uv_name);
+  const Prim* color_owner = owner("displayColor");
+  const bool has_primvar_normals = owner("normals") != nullptr;
+  const std::string normals = has_primvar_normals ? "primvars:normals" : "normals";
+  const std::string uv = "primvars:" + uv_name;
+
+  Key key;
+  for (const std::string& name :
+       {std::string("points"), std::string("faceVertexCounts"), std::string("faceVertexIndices"),
+        std::string("holeIndices"), std::string("orientation"), std::string("subdivisionScheme"),
+        std::string("doubleSided"), normals, normals + ":indices"}) {
+    key.push_back(stage_.value_spec(prim, name));
+  }
+  for (const auto& [who, name] : {std::pair(uv_owner, uv),
+                                  std::pair(color_owner, std::string("primvars:displayColor"))}) {
+    key.push_back(who ? stage_.value_spec(*who, name) : nullptr);
+    key.push_back(who ? stage_.value_spec(*who, name + ":indices") : nullptr);
+  }
+  for (const Prim* child : stage_.visible_children(prim)) {
+    if (child->type_name != "GeomSubset") continue;
+    const bool binds = usd::token_or(stage_, *child, "elementType", "face") == "face" &&
+                       !geometry_.material(*child).empty();
+    if (!binds) continue;
+    result.subsets.push_back(child);
+    key.push_back(stage_.value_spec(*child, "indices"));
+  }
+  std::shared_ptr<const Mesh>& known = meshes_[{key, uv_name}];
+  if (known) {
+    result.mesh = known;
+    return result;
+  }
+
+  auto points = usd::numbers<float>(stage_.value(prim, "points"), 3);
+  auto counts = usd::numbers<std::int32_t>(stage_.value(prim, "faceVertexCounts"), 1);
+  auto indices = usd::numbers<std::int32_t>(stage_.value(prim, "faceVertexIndices"), 1);
+  if (!points || !counts || !indices) return result;
+  Sources sources;
+  sources.points = std::move(*points);
+  sources.counts = std::move(*counts);
+  sources.indices = std::move(*indices);
+  sources.holes = usd::numbers<std::int32_t>(stage_.value(prim, "holeIndices"), 1);
+  sources.normals = read_corner_data(stage_, prim, normals, 3,
+                                     has_primvar_normals ? "constant" : "vertex");
+  if (uv_owner) sources.uvs = read_corner_data(stage_, *uv_owner, uv, 2, "constant");
+  if (color_owner) {
+    sources.colors =
+        read_corner_data(stage_, *color_owner, "primvars:displayColor", 3, "constant");
+    // A single colour goes to the material.
+    if (sources.colors && sources.colors->count() <= 1) sources.colors.reset();
+  }
+  sources.is_left_handed =
+      usd::token_or(stage_, prim, "orientation", "rightHanded") == "leftHanded";
+  std::vector<std::uint16_t> slots;
+  if (!result.subsets.empty()) {
+    slots.resize(sources.counts.span.size());
+    for (std::size_t i = 0; i < result.subsets.size(); ++i) {
+      const auto faces =
+          usd::numbers<std::int32_t>(stage_.value(*result.subsets[i], "indices"), 1);
+      if (!faces) continue;
+      for (const std::int32_t face : faces->span) {
+        if (face >= 0 && static_cast<std::size_t>(face) < slots.size()) {
+          slots[static_cast<std::size_t>(face)] = static_cast<std::uint16_t>(i + 1);
+        }
+      }
+    }
+  }
+  Mesh mesh = MeshAssembly(sources, slots).build();
+  if (mesh.triangles.empty()) return result;
+  mesh.is_double_sided = usd::bool_or(stage_, prim, "doubleSided", false);
+  const bool is_smooth =
+      usd::token_or(stage_, prim, "subdivisionScheme", "catmullClark") != "none";
+  if (mesh.normals.empty() && is_smooth) mesh.normals = smooth_normals(mesh);
+  mesh.validate(prim.path);
+  known = std::make_shared<const Mesh>(std::move(mesh));
+  result.mesh = known;
+  return result;
+}
+
+TranslatedMesh MeshTranslator::translate_shape(const Prim& prim) {
+  TranslatedMesh result;
+  const std::string& type = prim.type_name;
+  const auto number = [&](const char* name, double fallback) {
+    return usd::number_or(stage_, prim, name, fallback);
+  };
+  Key key;
+  for (const char* name : {"size", "radius", "height", "axis", "width", "length"}) {
+    key.push_back(stage_.value_spec(prim, name));
+  }
+  std::shared_ptr<const Mesh>& known = meshes_[{key, type}];
+  if (!known) {
+    Mesh mesh;
+    if (type == "Cube") {
+      mesh = make_box(Vec3::Constant(std::abs(number("size", 2.0))));
+    } else if (type == "Sphere") {
+      mesh = make_sphere(std::abs(number("radius", 1.0)));
+    } else if (type == "Cylinder") {
+      mesh = make_cylinder(std::abs(number("radius", 1.0)), std::abs(number("height", 2.0)));
+    } else if (type == "Cone") {
+      mesh = make_cone(std::abs(number("radius", 1.0)), std::abs(number("height", 2.0)));
+    } else if (type == "Capsule") {
+      mesh = make_capsule(std::abs(number("radius", 0.5)), std::abs(number("height", 1.0)));
+    } else if (type == "Plane") {
+      mesh = make_plane(std::abs(number("width", 2.0)), std::abs(number("length", 2.0)));
+    } else {
+      return result;
+    }
+    if (type != "Cube" && type != "Sphere") {
+      turn_axis(mesh, usd::token_or(stage_, prim, "axis", "Z"));
+    }
+    known = std::make_shared<const Mesh>(std::move(mesh));
+  }
+  result.mesh = known;
+  return result;
+}
+
+}  // namespace diorama::loader_usd

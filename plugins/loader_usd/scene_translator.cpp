@@ -1,0 +1,386 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "loader_usd/scene_translator.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "diorama/error.h"
+#include "loader_usd/conversion.h"
+#include "loader_usd/light_translator.h"
+#include "loader_usd/usd/path.h"
+
+namespace diorama::loader_usd {
+namespace {
+
+using usd::Prim;
+using usd::Stage;
+
+constexpr int kMaxInstancerNesting = 8;
+constexpr int kCameraWidth = 1280;
+
+// What a layer says about its units and axis, if it does.
+struct Metrics {
+  std::optional<double> meters_per_unit;
+  std::optional<bool> is_z_up;
+};
+
+Metrics metrics_of(const usd::Layer& layer) {
+  Metrics metrics;
+  metrics.meters_per_unit = layer.get(layer.root(), "metersPerUnit").as_number();
+  const usd::Value axis = layer.get(layer.root(), "upAxis");
+  if (axis.as_text()) metrics.is_z_up = *axis.as_text() == "Z";
+  return metrics;
+}
+
+bool has_schema(const Stage& stage, const Prim& prim, std::string_view name) {
+  const usd::Strings schemas = stage.metadata_list(prim, "apiSchemas");
+  return std::find(schemas.begin(), schemas.end(), name) != schemas.end();
+}
+
+Affine affine_or_identity(const Affine& affine) {
+  return affine.matrix().allFinite() ? affine : Affine::Identity();
+}
+
+// The rotation and translation of a map.
+Affine without_scale(const Affine& affine) {
+  Affine rigid = Affine::Identity();
+  const Transform parts = Transform::from_affine(affine);
+  rigid.linear() = parts.rotation.toRotationMatrix();
+  rigid.translation() = affine.translation();
+  return rigid;
+}
+
+std::vector<double> read_list(const Stage& stage, const Prim& prim, std::string_view name,
+                              std::size_t width) {
+  const auto list = usd::numbers<double>(stage.value(prim, name), width);
+  return list ? std::vector<double>(list->span.begin(), list->span.end()) : std::vector<double>();
+}
+
+PrimitiveShape primitive_of(const std::string& type) {
+  if (type == "Cube") return PrimitiveShape::Box;
+  if (type == "Sphere") return PrimitiveShape::Sphere;
+  if (type == "Cylinder") return PrimitiveShape::Cylinder;
+  if (type == "Cone") return PrimitiveShape::Cone;
+  if (type == "Capsule") return PrimitiveShape::Capsule;
+  return PrimitiveShape::None;
+}
+
+ColliderShape collider_shape(const std::string& approximation) {
+  if (approximation == "boundingCube") return ColliderShape::BoundingBox;
+  if (approximation == "boundingSphere") return ColliderShape::BoundingSphere;
+  if (approximation == "convexHull" || approximation == "convexDecomposition" ||
+      approximation == "sphereFill") {
+    return ColliderShape::ConvexHull;
+  }
+  return ColliderShape::TriangleMesh;
+}
+
+}  // namespace
+
+SceneTranslator::SceneTranslator(Stage& stage, Host& host, Scene& scene)
+    : stage_(stage),
+      host_(host),
+      scene_(scene),
+      geometry_(stage),
+      meshes_(stage, geometry_),
+      materials_(stage, host),
+      meters_per_unit_(stage.meters_per_unit()),
+      root_from_stage_(stage.is_z_up() ? Affine::Identity() : z_up_from_y_up()) {
+  if (!(meters_per_unit_ > 0.0) || !std::isfinite(meters_per_unit_)) meters_per_unit_ = 0.01;
+  root_from_stage_.linear() *= meters_per_unit_;
+}
+
+void SceneTranslator::translate(NodeId root) {
+  const Place place{root, Affine::Identity()};
+  for (const Prim* prim : stage_.visible_children(stage_.root())) {
+    if (is_drawn(*prim)) translate_prim(*prim, place, root_from_stage_ * local_pose(*prim, place));
+  }
+}
+
+void SceneTranslator::translate_children(const Prim& prim, const Place& place) {
+  for (const Prim* child : stage_.visible_children(prim)) {
+    if (is_drawn(*child)) translate_prim(*child, place, local_pose(*child, place));
+  }
+}
+
+// Whether the prim or something below it becomes a node.
+bool SceneTranslator::is_drawn(const Prim& prim) {
+  const auto known = drawn_.find(&prim);
+  if (known != drawn_.end()) return known->second;
+  const bool is_group = prim.type_name.empty() || prim.type_name == "Scope" ||
+                        !prim.traits.is_known;
+  bool result = prim.traits.is_xformable;
+  // Skeletons move points, which the reader does not do; their prims draw nothing.
+  if (prim.type_name == "Skeleton") result = false;
+  if (is_group) {
+    for (const Prim* child : stage_.visible_children(prim)) result |= is_drawn(*child);
+  }
+  drawn_[&prim] = result;
+  return result;
+}
+
+// A prim that refers to an asset with other units or another axis is scaled and turned to fit, as
+// Omniverse's metrics assembler does it. Only what both sides say counts.
+Affine SceneTranslator::unit_correction(const Prim& prim) const {
+  Affine result = Affine::Identity();
+  if (stage_.has_property(prim, "xformOp:scale:unitsResolve")) return result;
+  const auto& nodes = prim.index.nodes;
+  // The outermost arc that was authored on this prim, and what the layer around it says.
+  for (const usd::IndexNode& node : nodes) {
+    const bool is_file_arc = node.arc == usd::Arc::Reference || node.arc == usd::Arc::Payload;
+    if (!is_file_arc || node.is_due_to_ancestor() || !node.contributes()) continue;
+    const usd::LayerStack* outer = nodes[static_cast<std::size_t>(node.parent)].stack;
+    if (outer == node.stack) continue;
+    const Metrics inside = metrics_of(node.stack->root());
+    const Metrics outside = metrics_of(outer->root());
+    if (inside.meters_per_unit && outside.meters_per_unit && *inside.meters_per_unit > 0.0 &&
+        *outside.meters_per_unit > 0.0) {
+      result.linear() *= *inside.meters_per_unit / *outside.meters_per_unit;
+    }
+    if (inside.is_z_up && outside.is_z_up && *inside.is_z_up != *outside.is_z_up) {
+      const Affine turn = z_up_from_y_up();
+      result = result * (*outside.is_z_up ? turn : turn.inverse());
+    }
+    break;
+  }
+  return result;
+}
+
+Affine SceneTranslator::local_pose(const Prim& prim, const Place& parent) {
+  const usd::LocalTransform local = usd::local_transform(stage_, prim);
+  Affine pose = affine_or_identity(to_affine(local.matrix)) * unit_correction(prim);
+  if (local.resets_stack && prim.parent && prim.parent->parent) {
+    pose = parent.root_from_node.inverse() * root_from_stage_ * pose;
+  }
+  return affine_or_identity(pose);
+}
+
+void SceneTranslator::translate_prim(const Prim& prim, const Place& parent, const Affine& pose) {
+  Place place;
+  place.node = scene_.create(parent.node, usd::path::name(prim.path));
+  place.root_from_node = parent.root_from_node * pose;
+  scene_.set_pose(place.node, pose);
+  const bool is_hidden =
+      prim.traits.is_imageable &&
+      usd::token_or(stage_, prim, "visibility", "inherited") == "invisible";
+  if (is_hidden) scene_.edit(place.node).is_visible = false;
+  if (prim.traits.is_gprim) add_shape(prim, place.node);
+  if (prim.type_name == "Camera") add_camera(prim, place);
+  if (prim.traits.is_light) add_light(prim, place);
+  add_physics(prim, place.node);
+  add_labels(prim, place.node);
+  if (prim.type_name == "PointInstancer") {
+    add_instances(prim, place);
+  } else {
+    translate_children(prim, place);
+  }
+}
+
+// --- Shapes -----------------------------------------------------------------------------------
+
+std::shared_ptr<const Material> SceneTranslator::plain_material(const TranslatedMesh& mesh) {
+  const bool has_colors = mesh.mesh && !mesh.mesh->colors.empty();
+  const Vec3f color = mesh.display_color.value_or(Vec3f::Constant(has_colors ? 1.0f : 0.5f));
+  std::shared_ptr<const Material>& known =
+      plain_materials_[{color.x(), color.y(), color.z(), mesh.display_opacity}];
+  if (!known) {
+    Material material;
+    material.name = "displayColor";
+    material.base_color = color.allFinite() ? Vec3f(color.cwiseMax(0.0f)) : Vec3f::Constant(0.5f);
+    material.opacity = std::clamp(mesh.display_opacity, 0.0f, 1.0f);
+    known = std::make_shared<const Material>(std::move(material));
+  }
+  return known;
+}
+
+void SceneTranslator::add_shape(const Prim& prim, NodeId node) {
+  std::vector<std::string> paths{geometry_.material(prim)};
+  std::vector<std::string> uv_names;
+  if (prim.type_name == "Mesh") {
+    for (const Prim* child : stage_.visible_children(prim)) {
+      if (child->type_name == "GeomSubset") paths.push_back(geometry_.material(*child));
+    }
+  }
+  for (const std::string& path : paths) {
+    const auto& names = materials_.translate(path).uv_names;
+    uv_names.insert(uv_names.end(), names.begin(), names.end());
+  }
+  const TranslatedMesh mesh = meshes_.translate(prim, uv_names);
+  if (!mesh.mesh) return;
+  std::vector<std::shared_ptr<const Material>> materials;
+  const auto add = [&](const std::string& path) {
+    const auto& material = materials_.translate(path).material;
+    materials.push_back(material ? material : plain_material(mesh));
+  };
+  add(paths.front());
+  for (const Prim* subset : mesh.subsets) add(geometry_.material(*subset));
+  const std::string purpose = geometry_.purpose(prim);
+  Node& content = scene_.edit(node);
+  content.mesh = mesh.mesh;
+  content.materials = std::move(materials);
+  if (purpose == "guide" || purpose == "proxy") content.is_visible = false;
+}
+
+// --- Cameras and lights -----------------------------------------------------------------------
+
+void SceneTranslator::add_camera(const Prim& prim, Place& place) {
+  const auto number = [&](const char* name, double fallback) {
+    const double value = usd::number_or(stage_, prim, name, fallback);
+    return std::isfinite(value) && value > 0.0 ? value : fallback;
+  };
+  const double aperture = number("horizontalAperture", 20.955);
+  const double height = number("verticalAperture", 15.2908);
+  const int rows = std::clamp(static_cast<int>(std::lround(kCameraWidth * height / aperture)), 1,
+                              8 * kCameraWidth);
+  Camera camera = Camera::from_lens(kCameraWidth, rows, number("focalLength", 50.0), aperture);
+  std::array<double, 2> range{1.0, 1000000.0};
+  stage_.value(prim, "clippingRange").read(range);
+  camera.near_m = std::max(range[0] * meters_per_unit_, 1e-4);
+  camera.far_m = std::max(range[1] * meters_per_unit_, camera.near_m * 2.0);
+  camera.f_stop = usd::number_or(stage_, prim, "fStop", 0.0);
+  camera.focus_distance_m = usd::number_or(stage_, prim, "focusDistance", 0.0) * meters_per_unit_;
+  // A camera has no size: the units must not stand in its pose.
+  const Affine root_from_camera = without_scale(place.root_from_node);
+  const Affine root_from_parent =
+      place.root_from_node * scene_[place.node].parent_from_node.inverse();
+  scene_.set_pose(place.node, affine_or_identity(root_from_parent.inverse() * root_from_camera));
+  place.root_from_node = root_from_camera;
+  scene_.edit(place.node).camera = camera;
+}
+
+void SceneTranslator::add_light(const Prim& prim, Place& place) {
+  const double volume = std::abs(place.root_from_node.linear().determinant());
+  const double world_scale = std::cbrt(volume) / meters_per_unit_;
+  auto light = translate_light(stage_, prim, world_scale, materials_.textures());
+  if (!light) return;
+  Affine turned = scene_[place.node].parent_from_node * light->prim_from_light;
+  if (light->light.kind == LightKind::Dome && stage_.is_z_up()) {
+    // By the letter the pole of a dome is +y on every stage. People who light a stage that has z up
+    // mean its sky, so a dome is taken as if it stood on a stage that has y up.
+    turned = scene_[place.node].parent_from_node * z_up_from_y_up() * light->prim_from_light;
+  }
+  scene_.set_pose(place.node, turned);
+  scene_.edit(place.node).light = std::move(light->light);
+}
+
+// --- Physics and labels -----------------------------------------------------------------------
+
+void SceneTranslator::add_physics(const Prim& prim, NodeId node) {
+  const usd::Strings schemas = stage_.metadata_list(prim, "apiSchemas");
+  const auto has = [&](const char* name) {
+    return std::find(schemas.begin(), schemas.end(), name) != schemas.end();
+  };
+  const bool is_body = has("PhysicsRigidBodyAPI") &&
+                       usd::bool_or(stage_, prim, "physics:rigidBodyEnabled", true) &&
+                       !usd::bool_or(stage_, prim, "physics:kinematicEnabled", false);
+  if (is_body) {
+    RigidBody body;
+    const double mass = usd::number_or(stage_, prim, "physics:mass", 0.0);
+    if (mass > 0.0 && std::isfinite(mass)) body.mass_kg = mass;
+    body.has_gravity = !usd::bool_or(stage_, prim, "physxRigidBody:disableGravity", false);
+    scene_.edit(node).rigid_body = body;
+  }
+  if (has("PhysicsCollisionAPI") && scene_[node].mesh &&
+      usd::bool_or(stage_, prim, "physics:collisionEnabled", true)) {
+    add_collider(prim, node);
+  }
+}
+
+void SceneTranslator::add_collider(const Prim& prim, NodeId node) {
+  Collider collider;
+  const PrimitiveShape primitive = primitive_of(prim.type_name);
+  const bool is_upright = usd::token_or(stage_, prim, "axis", "Z") == "Z";
+  if (prim.type_name == "Mesh") {
+    collider.shape = collider_shape(usd::token_or(stage_, prim, "physics:approximation", "none"));
+  } else if (primitive != PrimitiveShape::None && is_upright) {
+    collider.shape = ColliderShape::Primitive;
+    collider.primitive = primitive;
+    collider.primitive_size = scene_[node].mesh->bounds().size();
+  }
+  // Friction and bounce come from a physics material, bound for physics or for all purposes.
+  for (const Prim* at = &prim; at; at = at->parent) {
+    usd::Strings bound = stage_.targets(*at, "material:binding:physics");
+    if (bound.empty()) bound = stage_.targets(*at, "material:binding");
+    const Prim* material = bound.size() == 1 ? stage_.find(bound.front()) : nullptr;
+    if (!material || !has_schema(stage_, *material, "PhysicsMaterialAPI")) continue;
+    collider.friction = usd::number_or(stage_, *material, "physics:dynamicFriction", 0.5);
+    collider.restitution = usd::number_or(stage_, *material, "physics:restitution", 0.0);
+    break;
+  }
+  scene_.edit(node).collider = collider;
+}
+
+// Labels of UsdSemantics, and of the SemanticsAPI that was used before.
+void SceneTranslator::add_labels(const Prim& prim, NodeId node) {
+  constexpr std::string_view kNew = "semantics:labels:";
+  constexpr std::string_view kOld = "semantic:";
+  constexpr std::string_view kOldType = ":params:semanticType";
+  Labels labels;
+  for (const std::string& name : stage_.property_names(prim)) {
+    if (name.starts_with(kNew)) {
+      const usd::Value value = stage_.value(prim, name);
+      if (value.as_strings() && !value.as_strings()->empty()) {
+        labels[name.substr(kNew.size())] = value.as_strings()->front();
+      }
+    } else if (name.starts_with(kOld) && name.ends_with(kOldType)) {
+      const std::string data =
+          name.substr(0, name.size() - kOldType.size()) + ":params:semanticData";
+      const std::string type = usd::token_or(stage_, prim, name, "");
+      const std::string label = usd::token_or(stage_, prim, data, "");
+      if (!type.empty() && !label.empty()) labels[type] = label;
+    }
+  }
+  if (!labels.empty()) scene_.edit(node).labels = std::move(labels);
+}
+
+// --- PointInstancer ---------------------------------------------------------------------------
+
+void SceneTranslator::add_instances(const Prim& prim, const Place& place) {
+  if (instancer_depth_ >= kMaxInstancerNesting) {
+    stage_.diagnostics().warn(stage_.root_layer().identifier() + ": <" + prim.path +
+                              "> is an instancer within too many instancers");
+    return;
+  }
+  const std::vector<double> which = read_list(stage_, prim, "protoIndices", 1);
+  const std::vector<double> positions = read_list(stage_, prim, "positions", 3);
+  const std::vector<double> scales = read_list(stage_, prim, "scales", 3);
+  std::vector<double> turns = read_list(stage_, prim, "orientationsf", 4);
+  if (turns.empty()) turns = read_list(stage_, prim, "orientations", 4);
+  std::vector<double> ids = read_list(stage_, prim, "ids", 1);
+  if (ids.size() != which.size()) {
+    ids.resize(which.size());
+    for (std::size_t i = 0; i < ids.size(); ++i) ids[i] = static_cast<double>(i);
+  }
+  std::set<double> masked;
+  for (const double id : read_list(stage_, prim, "invisibleIds", 1)) masked.insert(id);
+  for (const std::int64_t id : stage_.metadata_integers(prim, "inactiveIds")) {
+    masked.insert(static_cast<double>(id));
+  }
+  std::vector<const Prim*> prototypes;
+  for (const std::string& path : stage_.targets(prim, "prototypes")) {
+    prototypes.push_back(stage_.find(path));
+  }
+  ++instancer_depth_;
+  for (std::size_t i = 0; i < which.size() && i * 3 + 2 < positions.size(); ++i) {
+    const bool is_known = which[i] >= 0.0 && which[i] < static_cast<double>(prototypes.size());
+    const Prim* prototype =
+        is_known ? prototypes[static_cast<std::size_t>(which[i])] : nullptr;
+    if (!prototype || masked.contains(ids[i])) continue;
+    Affine pose = Affine::Identity();
+    pose.translation() = Vec3(positions[i * 3], positions[i * 3 + 1], positions[i * 3 + 2]);
+    if (i * 4 + 3 < turns.size()) {
+      const Quat turn(turns[i * 4 + 3], turns[i * 4], turns[i * 4 + 1], turns[i * 4 + 2]);
+      if (turn.norm() > 0.0) pose.rotate(turn.normalized());
+    }
+    if (i * 3 + 2 < scales.size()) {
+      pose.scale(Vec3(scales[i * 3], scales[i * 3 + 1], scales[i * 3 + 2]));
+    }
+    pose = affine_or_identity(pose * to_affine(usd::local_transform(stage_, *prototype).matrix) *
+                              unit_correction(*prototype));
+    translate_prim(*prototype, place, pose);
+  }
+  --instancer_depth_;
+}
+
+}  // namespace diorama::loader_usd

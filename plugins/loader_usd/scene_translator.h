@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "diorama/host.h"
+#include "diorama/scene.h"
+#include "loader_usd/material_translator.h"
+#include "loader_usd/mesh_translator.h"
+#include "loader_usd/usd/geometry.h"
+#include "loader_usd/usd/stage.h"
+
+namespace diorama::loader_usd {
+
+/// Turns a composed stage into nodes, in metres and Z up. One node per prim that can be placed or
+/// holds something that is drawn; what is not drawn (materials, skeletons, joints) gets none.
+class SceneTranslator {
+ public:
+  SceneTranslator(usd::Stage& stage, Host& host, Scene& scene);
+
+  /// Adds the stage's root prims below `root`.
+  void translate(NodeId root);
+
+ private:
+  struct Place {
+    NodeId node;
+    Affine root_from_node = Affine::Identity();
+  };
+
+  void translate_children(const usd::Prim& prim, const Place& place);
+  void translate_prim(const usd::Prim& prim, const Place& parent,
+                      const Affine& parent_from_placed);
+  bool is_drawn(const usd::Prim& prim);
+  Affine local_pose(const usd::Prim& prim, const Place& parent);
+  Affine unit_correction(const usd::Prim& prim) const;
+
+  void add_shape(const usd::Prim& prim, NodeId node);
+  void add_camera(const usd::Prim& prim, Place& place);
+  void add_light(const usd::Prim& prim, Place& place);
+  void add_physics(const usd::Prim& prim, NodeId node);
+  void add_collider(const usd::Prim& prim, NodeId node);
+  void add_labels(const usd::Prim& prim, NodeId node);
+  void add_instances(const usd::Prim& prim, const Place& place);
+  std::shared_ptr<const Material> plain_material(const TranslatedMesh& mesh);
+
+  usd::Stage& stage_;
+  Host& host_;
+  Scene& scene_;
+  usd::Geometry geometry_;
+  MeshTranslator meshes_;
+  MaterialTranslator materials_;
+  double meters_per_unit_;
+  Affine root_from_stage_;
+  std::map<const usd::Prim*, bool> drawn_;
+  std::map<std::vector<float>, std::shared_ptr<const Material>> plain_materials_;
+  int instancer_depth_ = 0;
+};
+
+}  // namespace diorama::loader_usd

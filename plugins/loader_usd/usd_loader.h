@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "diorama/host.h"
+#include "diorama/loader.h"
+#include "diorama/params.h"
+
+namespace diorama::loader_usd {
+
+/// Loads USD scenes: text, crate and packages, composed with all payloads and default variants, at
+/// the default time or, where an attribute has time samples only, at the first one.
+class UsdLoader final : public Loader {
+ public:
+  struct Params {
+    bool missing_assets_are_errors = false;
+    void visit(ParamVisitor& v) {
+      v.param("missing_assets_are_errors", missing_assets_are_errors,
+              {"Whether a missing layer or texture ends the job instead of being warned about."});
+    }
+  };
+
+  UsdLoader(Params params, Host& host) : params_(params), host_(host) {}
+
+  std::vector<std::string> claims() const override;
+  void load(std::string_view asset, Scene& scene, NodeId root) override;
+
+ private:
+  Params params_;
+  Host& host_;
+};
+
+}  // namespace diorama::loader_usd
