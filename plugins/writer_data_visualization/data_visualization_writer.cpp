@@ -10,6 +10,7 @@
 #include "writer_support/image_files.h"
 #include "writer_support/label_sets.h"
 #include "writer_support/replicator.h"
+#include "writer_support/value_place.h"
 
 namespace diorama {
 namespace {
@@ -23,25 +24,24 @@ int read_width(const Value& value, const std::string& key) {
   const char* end = value.scalar.data() + value.scalar.size();
   const auto result = std::from_chars(value.scalar.data(), end, width);
   if (result.ec == std::errc() && result.ptr == end && width >= 0 && width <= 1000) return width;
-  throw Error(ErrorKind::Config, value.place.text() + ": " + key +
-                                     ": expected an integer in [0, 1000], found " +
-                                     value.describe());
+  throw Error(ErrorKind::Config, complaint_about(value, key) +
+                                     "expected an integer in [0, 1000], found " + value.describe());
 }
 
 Look::Background read_background(const Value& value, const std::string& key) {
   if (value.kind == Value::Kind::Null) return Look::Background::None;
   if (value.scalar == "rgb") return Look::Background::Rgb;
   if (value.scalar == "normals") return Look::Background::Normals;
-  throw Error(ErrorKind::Config, value.place.text() + ": " + key +
-                                     ": expected rgb, normals or null, found " + value.describe());
+  throw Error(ErrorKind::Config, complaint_about(value, key) +
+                                     "expected rgb, normals or null, found " + value.describe());
 }
 
 /// `look` holds the defaults.
 Look read_look(const Value& params, const std::string& name, Look look, Host& host) {
   if (params.kind == Value::Kind::Null) return look;
   if (params.kind != Value::Kind::Map) {
-    throw Error(ErrorKind::Config, params.place.text() + ": " + name +
-                                       ": expected a mapping, found " + params.describe());
+    throw Error(ErrorKind::Config,
+                complaint_about(params, name) + "expected a mapping, found " + params.describe());
   }
   for (const auto& [key, value] : params.map) {
     const std::string full_key = name + "." + key;

@@ -10,36 +10,18 @@
 namespace diorama {
 namespace {
 
-constexpr std::array<Keypoint, kKeypointCount> kCentreFirst{{{"Center", {0, 0, 0}},
-                                                             {"LDB", {-1, -1, -1}},
-                                                             {"LDF", {-1, -1, 1}},
-                                                             {"LUB", {-1, 1, -1}},
-                                                             {"LUF", {-1, 1, 1}},
-                                                             {"RDB", {1, -1, -1}},
-                                                             {"RDF", {1, -1, 1}},
-                                                             {"RUB", {1, 1, -1}},
-                                                             {"RUF", {1, 1, 1}}}};
-constexpr std::array<Keypoint, kKeypointCount> kDope{{{"LUF", {-1, 1, 1}},
-                                                      {"RUF", {1, 1, 1}},
-                                                      {"RDF", {1, -1, 1}},
-                                                      {"LDF", {-1, -1, 1}},
-                                                      {"LUB", {-1, 1, -1}},
-                                                      {"RUB", {1, 1, -1}},
-                                                      {"RDB", {1, -1, -1}},
-                                                      {"LDB", {-1, -1, -1}},
-                                                      {"Center", {0, 0, 0}}}};
+constexpr KeypointOrder kDope{{{"LUF", {-1, 1, 1}},
+                               {"RUF", {1, 1, 1}},
+                               {"RDF", {1, -1, 1}},
+                               {"LDF", {-1, -1, 1}},
+                               {"LUB", {-1, 1, -1}},
+                               {"RUB", {1, 1, -1}},
+                               {"RDB", {1, -1, -1}},
+                               {"LDB", {-1, -1, -1}},
+                               {"Center", {0, 0, 0}}}};
 
 Vec3 mapped(const Mat4& row_vector_matrix, const Vec3& point) {
   return (point.homogeneous().transpose() * row_vector_matrix).head<3>().transpose();
-}
-
-Vec3 keypoint_local(const Aabb& box, const Keypoint& keypoint) {
-  Vec3 point = box.centre();
-  for (int axis = 0; axis < 3; ++axis) {
-    if (keypoint.side[std::size_t(axis)] < 0) point[axis] = box.min[axis];
-    if (keypoint.side[std::size_t(axis)] > 0) point[axis] = box.max[axis];
-  }
-  return point;
 }
 
 /// Points that the lens cannot image get the reference's formula, which mirrors them.
@@ -77,7 +59,7 @@ ObjectPose pose_of(const Frame& frame, const Instance& instance, const PoseForma
   const auto& order = keypoint_order(format.layout);
   for (std::size_t i = 0; i < order.size(); ++i) {
     pose.world_points[i] =
-        mapped(pose.world_from_local, keypoint_local(instance.bounds_node, order[i]));
+        mapped(pose.world_from_local, keypoint_in_box(instance.bounds_node, order[i]));
     pose.camera_points[i] = mapped(view, pose.world_points[i]);
     pose.pixels[i] = pixel_of(frame.camera, pose.camera_points[i], format.is_replicator);
   }
@@ -87,8 +69,8 @@ ObjectPose pose_of(const Frame& frame, const Instance& instance, const PoseForma
 
 }  // namespace
 
-const std::array<Keypoint, kKeypointCount>& keypoint_order(PoseLayout layout) {
-  return layout == PoseLayout::Dope ? kDope : kCentreFirst;
+const KeypointOrder& keypoint_order(PoseLayout layout) {
+  return layout == PoseLayout::Dope ? kDope : kCuboidKeypoints;
 }
 
 std::vector<ObjectPose> object_poses(const Frame& frame, const SemanticFilter& filter,

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "diorama/frame.h"
+#include "writer_support/cuboid.h"
 #include "writer_support/label_sets.h"
 
 namespace diorama {
@@ -19,15 +20,7 @@ struct PoseFormat {
   bool is_replicator = false;  ///< Repeat the reference's known errors.
 };
 
-/// A name of three letters: L/R is min/max x, D/U min/max y, B/F min/max z in node space; or
-/// "Center".
-struct Keypoint {
-  const char* name;
-  std::array<int, 3> side;  ///< -1 min, 0 middle, 1 max.
-};
-
-inline constexpr int kKeypointCount = 9;
-const std::array<Keypoint, kKeypointCount>& keypoint_order(PoseLayout layout);
+const KeypointOrder& keypoint_order(PoseLayout layout);
 
 /// What is known of one object. Matrices are row-vector matrices, metres; the camera frame looks
 /// along -z, y up.

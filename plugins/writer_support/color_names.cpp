@@ -6,6 +6,8 @@
 #include <charconv>
 #include <cstdint>
 
+#include "writer_support/value_place.h"
+
 namespace diorama {
 namespace {
 
@@ -218,8 +220,8 @@ std::optional<Rgba8> color_from_value(const Value& value, const std::string& key
     if (is_good) return color;
   }
   throw Error(ErrorKind::Config,
-              value.place.text() + ": " + key +
-                  ": expected a colour name, \"#rrggbb\" or a list of 3 or 4 integers in [0, 255], "
+              complaint_about(value, key) +
+                  "expected a colour name, \"#rrggbb\" or a list of 3 or 4 integers in [0, 255], "
                   "found " +
                   value.describe());
 }

@@ -8,6 +8,16 @@
 #include "diorama/error.h"
 
 namespace diorama {
+namespace {
+
+std::vector<std::uint8_t> without_alpha(const Image<Rgba8>& image) {
+  std::vector<std::uint8_t> rgb;
+  rgb.reserve(image.pixels().size() * 3);
+  for (const Rgba8& pixel : image.pixels()) rgb.insert(rgb.end(), pixel.begin(), pixel.begin() + 3);
+  return rgb;
+}
+
+}  // namespace
 
 std::vector<std::byte> png_file(const Host& host, const Image<Rgba8>& image) {
   return host.encode_image({image.pixels().data(), image.width(), image.height(), 4, 8},
@@ -33,10 +43,13 @@ std::vector<std::byte> png_file(const Host& host, const Image<std::uint32_t>& im
   return host.encode_image({gray.data(), image.width(), image.height(), 1, 16}, ImageFormat::Png);
 }
 
+std::vector<std::byte> rgb_png_file(const Host& host, const Image<Rgba8>& image) {
+  const std::vector<std::uint8_t> rgb = without_alpha(image);
+  return host.encode_image({rgb.data(), image.width(), image.height(), 3, 8}, ImageFormat::Png);
+}
+
 std::vector<std::byte> jpeg_file(const Host& host, const Image<Rgba8>& image) {
-  std::vector<std::uint8_t> rgb;
-  rgb.reserve(image.pixels().size() * 3);
-  for (const Rgba8& pixel : image.pixels()) rgb.insert(rgb.end(), pixel.begin(), pixel.begin() + 3);
+  const std::vector<std::uint8_t> rgb = without_alpha(image);
   return host.encode_image({rgb.data(), image.width(), image.height(), 3, 8}, ImageFormat::Jpeg);
 }
 

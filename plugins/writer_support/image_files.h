@@ -16,6 +16,8 @@ namespace diorama {
 inline constexpr const char* kImageEndings[] = {"png", "jpeg", "jpg", "exr"};
 
 std::vector<std::byte> png_file(const Host& host, const Image<Rgba8>& image);
+/// Without alpha.
+std::vector<std::byte> rgb_png_file(const Host& host, const Image<Rgba8>& image);
 /// Eight bits of gray.
 std::vector<std::byte> png_file(const Host& host, int width, int height,
                                 std::span<const std::uint8_t> gray);

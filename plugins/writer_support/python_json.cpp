@@ -13,7 +13,7 @@ namespace diorama {
 namespace {
 
 void append_escape(std::string& out, unsigned unit) {
-  std::array<char, 7> text{};
+  std::array<char, 12> text{};
   std::snprintf(text.data(), text.size(), "\\u%04x", unit);
   out += text.data();
 }

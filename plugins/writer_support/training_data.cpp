@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "writer_support/training_data.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "diorama/rng.h"
+#include "writer_support/image_files.h"
+#include "writer_support/replicator.h"
+
+namespace diorama {
+namespace {
+
+/// Exactly the asked share, as far as whole captures allow; both sides get one at least.
+std::vector<bool> choose_validation(int count, double share, std::uint64_t seed) {
+  std::vector<bool> is_val(std::size_t(std::max(count, 0)), false);
+  if (share <= 0.0 || count < 2) return is_val;
+  const auto wanted = std::clamp(std::lround(share * count), 1L, long(count) - 1);
+  const Rng stream = Rng(seed).fork("training and validation");
+  std::vector<std::pair<std::uint64_t, std::size_t>> order;
+  for (std::size_t i = 0; i < is_val.size(); ++i) {
+    order.emplace_back(stream.fork(std::uint64_t(i)).bits(), i);
+  }
+  std::ranges::sort(order);
+  for (long i = 0; i < wanted; ++i) is_val[order[std::size_t(i)].second] = true;
+  return is_val;
+}
+
+std::map<std::uint32_t, std::int64_t> count_visible(const Image<std::uint32_t>& ids) {
+  std::map<std::uint32_t, std::int64_t> counts;
+  std::uint32_t run_id = 0;
+  std::int64_t run = 0;
+  for (const std::uint32_t id : ids.pixels()) {
+    if (id != run_id) {
+      counts[run_id] += run;
+      run_id = id;
+      run = 0;
+    }
+    ++run;
+  }
+  counts[run_id] += run;
+  return counts;
+}
+
+}  // namespace
+
+void TrainingParams::visit(ParamVisitor& v) {
+  v.param("val_share", val_share,
+          {"Share of the captures that is kept for validation.", "", 0.0, 1.0});
+  v.param("classes", classes,
+          {"Class list in order; empty: every label of the job's objects, sorted."});
+  v.param("taxonomy", taxonomy, {"Which of an object's labels is its class."});
+  v.param("min_visible_px", min_visible_px,
+          {"Objects with fewer visible pixels are left out.", "px", 1.0});
+  v.choice("image_format", image_format, kTrainingImageFormats, {"Format of the pictures."});
+}
+
+void TrainingData::begin(const DatasetInfo& dataset) {
+  classes_ = params_.classes;
+  if (classes_.empty()) {
+    std::set<std::string> names;
+    for (const Labels& labels : dataset.labels) {
+      const auto label = labels.find(params_.taxonomy);
+      if (label != labels.end()) names.insert(label->second);
+    }
+    classes_.assign(names.begin(), names.end());
+  }
+  is_val_ = choose_validation(dataset.capture_count, params_.val_share, dataset.seed);
+  padding_ = grown_padding(6, dataset.capture_count);
+  camera_count_ = int(dataset.camera_names.size());
+}
+
+std::vector<std::string> TrainingData::splits() const {
+  std::vector<std::string> names{"train"};
+  if (std::ranges::find(is_val_, true) != is_val_.end()) names.emplace_back("val");
+  return names;
+}
+
+std::string TrainingData::image_stem(const Capture& capture, const Frame& frame) const {
+  return padded(capture.index, padding_) + "_" + frame.camera_name;
+}
+
+std::vector<std::byte> TrainingData::image_file(const Host& host, const Frame& frame) const {
+  const auto& color = frame.get(kColor);
+  return params_.image_format == "jpg" ? jpeg_file(host, color) : rgb_png_file(host, color);
+}
+
+std::vector<TrainingObject> TrainingData::objects(const Frame& frame) const {
+  const auto counts = count_visible(frame.get(kInstanceId));
+  std::vector<TrainingObject> result;
+  for (const Instance& instance : frame.instances) {
+    const auto label = instance.labels.find(params_.taxonomy);
+    const auto count = counts.find(instance.id);
+    if (label == instance.labels.end() || count == counts.end()) continue;
+    if (count->second < params_.min_visible_px || !instance.tight_box) continue;
+    const auto found = std::ranges::find(classes_, label->second);
+    if (found == classes_.end()) continue;
+    result.push_back({&instance, int(found - classes_.begin()), count->second});
+  }
+  return result;
+}
+
+void TrainingData::add_dataset_page(const std::string& format, Json more,
+                                    const DatasetInfo& dataset, DatasetFiles& files) const {
+  Json page = Json::object();
+  page["format"] = format;
+  page["program"] = "diorama " + dataset.program_version;
+  page["seed"] = dataset.seed;
+  page["captures"] = dataset.capture_count;
+  page["cameras"] = dataset.camera_names;
+  page["classes"] = classes_;
+  Json split = Json::object();
+  for (const std::string& name : splits()) split[name] = Json::array();
+  for (int i = 0; i < capture_count(); ++i) split[this->split(i)].push_back(i);
+  page["split"] = std::move(split);
+  page["conventions"] = {
+      {"units", "metres, radians"},
+      {"world_axes", "right-handed, z up"},
+      {"camera_axes", "x right, y up, looking along -z"},
+      {"pixels", "(0, 0) is the top left corner, the first pixel's centre is (0.5, 0.5)"},
+      {"boxes", "x_max and y_max are one past the last pixel"}};
+  for (auto& [key, value] : more.items()) page["conventions"][key] = value;
+  page["plugins"] = Json::object();
+  for (const auto& [name, version] : dataset.plugin_versions) page["plugins"][name] = version;
+  page["job"] = dataset.resolved_job;
+  files.add_text("dataset.json", python_json(page, 2) + "\n");
+}
+
+}  // namespace diorama

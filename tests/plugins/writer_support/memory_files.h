@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "diorama/writer.h"
+
+namespace diorama::test {
+
+/// Keeps files and records in memory. Adding a path twice throws.
+class MemoryFiles final : public CaptureFiles {
+ public:
+  void add(std::string_view path, std::vector<std::byte> bytes) override;
+  void record(std::string_view line) override;
+
+  std::set<std::string> paths() const;
+  /// Throws when it is not there.
+  const std::vector<std::byte>& bytes(const std::string& path) const;
+  std::string text(const std::string& path) const;
+
+  std::map<std::string, std::vector<std::byte>> files;
+  std::vector<std::pair<int, std::string>> records;  ///< With `capture`, see below.
+  int capture = 0;                                   ///< What the next record belongs to.
+};
+
+/// Runs begin(), write() for each capture and finish().
+MemoryFiles write_dataset(Writer& writer, const DatasetInfo& dataset,
+                          const std::vector<const Capture*>& captures);
+
+}  // namespace diorama::test
