@@ -41,7 +41,8 @@ struct Camera {
 
 /// The one projection that renderer, annotators and writers share.
 /// Pixel coordinates of a point in camera space; may lie outside the image. Nothing for points on or
-/// behind the camera plane (pinhole models) or beyond the lens's angle (fisheye).
+/// behind the camera plane (pinhole models), beyond the lens's angle (fisheye), or where the
+/// distortion folds the picture over.
 DIORAMA_SDK_API std::optional<Vec2> project(const Camera& camera, const Vec3& point_camera);
 
 /// Unit direction in camera space of the ray through a pixel coordinate; inverse of project().

@@ -109,7 +109,8 @@ class DIORAMA_SDK_API Frame {
   std::string camera_path;
   Camera camera;
   Affine world_from_camera = Affine::Identity();
-  /// Every labelled instance of the scene in creation order, seen or not.
+  /// Every labelled instance of the scene in creation order, seen or not. Filled when "instances" was
+  /// demanded.
   std::vector<Instance> instances;
   /// Path of every leaf id that occurs in kLeafId.
   std::map<std::uint32_t, std::string> leaf_paths;

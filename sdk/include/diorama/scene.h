@@ -70,7 +70,7 @@ class DIORAMA_SDK_API Scene {
   /// The same; throws Error naming the nearest existing ancestor when absent.
   NodeId require(std::string_view path) const;
   /// All nodes whose path fits the pattern, in creation order. '*' stands for any text without '/',
-  /// "**" for any text: "/Assets/*", "/Environment/**/TableDining*".
+  /// "**" for any text, "/**/" also for one '/': "/Assets/*", "/Environment/**/TableDining*".
   std::vector<NodeId> match(std::string_view pattern) const;
   std::string path(NodeId node) const;
   /// The node and all below it, parents before children, children in order.
@@ -101,7 +101,7 @@ class DIORAMA_SDK_API Scene {
 };
 
 /// A labelled thing: the nodes with visible meshes whose nearest labelled node (itself or an
-/// ancestor) is `node`.
+/// ancestor) is `node`. Meshes without triangles do not count.
 struct LabelledInstance {
   NodeId node;
   std::vector<NodeId> leaves;  ///< Never empty; in creation order.
