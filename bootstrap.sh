@@ -12,7 +12,7 @@ build_packages=(
   g++ cmake ninja-build pkg-config git ccache
   libboost-dev libboost-filesystem-dev libbullet-dev libembree-dev libeigen3-dev libassimp-dev
   libyaml-cpp-dev libcli11-dev libspdlog-dev libfmt-dev nlohmann-json3-dev
-  liblz4-dev libdeflate-dev libpng-dev libjpeg-dev libopenexr-dev libtbb-dev
+  libhdf5-dev liblz4-dev libdeflate-dev libpng-dev libjpeg-dev libopenexr-dev libtbb-dev
 )
 test_packages=(catch2 python3-minimal python3-numpy python3-opencv python3-jsonschema binutils clang libclang-rt-14-dev)
 
