@@ -1,0 +1,139 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Other people's codecs, to compare ours with.
+
+reference_images.py make FOLDER    writes pictures that our encoders cannot make, each with NAME.raw,
+                                   the expected channels, and NAME.txt, "width height channels floats".
+reference_images.py decode FOLDER  decodes every picture in the folder to NAME.raw, RGB(A) order.
+"""
+import os
+import struct
+import sys
+import zlib
+
+os.environ["OPENCV_IO_ENABLE_OPENEXR"] = "1"
+import cv2
+import numpy as np
+
+
+def expect(folder, name, pixels):
+    height, width = pixels.shape[:2]
+    channels = 1 if pixels.ndim == 2 else pixels.shape[2]
+    is_float = pixels.dtype == np.float32
+    with open(f"{folder}/{name}.txt", "w", encoding="ascii") as out:
+        out.write(f"{width} {height} {channels} {int(is_float)}\n")
+    pixels.tofile(f"{folder}/{name}.raw")
+
+
+def chunk(kind, data):
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+
+def png(width, height, depth, color, rows, extra=b"", interlace=0):
+    head = struct.pack(">IIBBBBB", width, height, depth, color, 0, 0, interlace)
+    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + extra
+            + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
+
+
+def write(folder, name, data):
+    with open(f"{folder}/{name}", "wb") as out:
+        out.write(data)
+
+
+def make_pngs(folder, rng):
+    width, height = 11, 6
+    palette = rng.integers(0, 256, (16, 3), dtype=np.uint8)
+    index = rng.integers(0, 16, (height, width), dtype=np.uint8)
+    packed = b"".join(
+        b"\0" + bytes((row[i] << 4) | (row[i + 1] if i + 1 < width else 0) for i in range(0, width, 2))
+        for row in index.tolist())
+    write(folder, "palette.png", png(width, height, 4, 3, packed, chunk(b"PLTE", palette.tobytes())))
+    expect(folder, "palette.png", palette[index])
+
+    alpha = rng.integers(0, 256, 16, dtype=np.uint8)
+    write(folder, "palette_alpha.png",
+          png(width, height, 4, 3, packed,
+              chunk(b"PLTE", palette.tobytes()) + chunk(b"tRNS", alpha.tobytes())))
+    expect(folder, "palette_alpha.png", np.dstack([palette[index], alpha[index]]))
+
+    bits = rng.integers(0, 2, (height, width), dtype=np.uint8)
+    write(folder, "bits.png", png(width, height, 1, 0, b"".join(
+        b"\0" + np.packbits(row).tobytes() for row in bits)))
+    expect(folder, "bits.png", bits * np.uint8(255))
+
+    deep = rng.integers(0, 65536, (height, width, 3), dtype=np.uint16)
+    write(folder, "rgb16.png", png(width, height, 16, 2, b"".join(
+        b"\0" + row.astype(">u2").tobytes() for row in deep)))
+    expect(folder, "rgb16.png", (deep / np.float32(65535)).astype(np.float32))
+
+    grey_alpha = rng.integers(0, 256, (height, width, 2), dtype=np.uint8)
+    adam7 = [(0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2),
+             (0, 1, 1, 2)]
+    rows = b"".join(b"\0" + row.tobytes() for x, y, dx, dy in adam7
+                    if grey_alpha[y::dy, x::dx].size for row in grey_alpha[y::dy, x::dx])
+    write(folder, "interlaced.png", png(width, height, 8, 4, rows, interlace=1))
+    expect(folder, "interlaced.png", grey_alpha)
+
+
+def make_tgas(folder, rng):
+    width, height = 9, 5
+    rgba = rng.integers(0, 256, (height, width, 4), dtype=np.uint8)
+    bgra = rgba[..., [2, 1, 0, 3]]
+    head = lambda kind, bits, flags: struct.pack("<BBBHHBHHHHBB", 3, 0, kind, 0, 0, 0, 0, 0, width,
+                                                 height, bits, flags) + b"id!"
+    write(folder, "plain.tga", head(2, 32, 0x28) + bgra.tobytes())
+    expect(folder, "plain.tga", rgba)
+    write(folder, "upward.tga", head(2, 24, 0) + bgra[::-1, :, :3].tobytes())
+    expect(folder, "upward.tga", np.ascontiguousarray(rgba[..., :3]))
+    rows = b""
+    for row in bgra[::-1, :, :3]:
+        rows += bytes([0x80 | 3]) + row[0].tobytes() + bytes([width - 5]) + row[4:].tobytes()
+    runs = rgba[..., :3].copy()
+    runs[:, :4] = runs[:, :1]
+    write(folder, "runs.tga", head(10, 24, 0) + rows)
+    expect(folder, "runs.tga", runs)
+    grey = rgba[..., 0].copy()
+    write(folder, "grey.tga", head(3, 8, 0x20) + grey.tobytes())
+    expect(folder, "grey.tga", grey)
+
+
+def make_others(folder, rng):
+    smooth = cv2.GaussianBlur(rng.integers(0, 256, (21, 34, 3), dtype=np.uint8), (9, 9), 3)
+    for name in ("picture.bmp", "picture.jpg"):
+        cv2.imwrite(f"{folder}/{name}", smooth)
+        expect(folder, name, np.ascontiguousarray(cv2.imread(f"{folder}/{name}")[..., ::-1]))
+    for name in ("grey.bmp", "grey.jpg"):
+        cv2.imwrite(f"{folder}/{name}", smooth[..., 0])
+    expect(folder, "grey.bmp", np.dstack([smooth[..., 0]] * 3))
+    expect(folder, "grey.jpg", cv2.imread(f"{folder}/grey.jpg", cv2.IMREAD_GRAYSCALE))
+    light = np.exp(rng.normal(0, 3, (13, 21, 3))).astype(np.float32)
+    for name in ("light.hdr", "light.exr"):
+        cv2.imwrite(f"{folder}/{name}", light)
+        read = cv2.imread(f"{folder}/{name}", cv2.IMREAD_UNCHANGED)
+        expect(folder, name, np.ascontiguousarray(read[..., ::-1]))
+
+
+def decode_all(folder):
+    for name in sorted(os.listdir(folder)):
+        if not name.endswith((".png", ".jpg", ".hdr", ".exr")):
+            continue
+        pixels = cv2.imread(f"{folder}/{name}", cv2.IMREAD_UNCHANGED)
+        if pixels is None:
+            sys.exit(f"{name}: OpenCV cannot read it")
+        if pixels.ndim == 3:
+            pixels = pixels[..., [2, 1, 0, 3][:pixels.shape[2]]]
+        np.ascontiguousarray(pixels).tofile(f"{folder}/{name}.raw")
+
+
+def main():
+    command, folder = sys.argv[1:]
+    if command == "decode":
+        decode_all(folder)
+        return
+    rng = np.random.default_rng(7)
+    make_pngs(folder, rng)
+    make_tgas(folder, rng)
+    make_others(folder, rng)
+
+
+main()
