@@ -107,6 +107,7 @@ void add_static(const Scene& scene, NodeId id, const BulletBackend::Params& para
   made.object = std::make_unique<btCollisionObject>();
   made.object->setCollisionShape(made.shapes.shape());
   made.object->setWorldTransform(to_bullet(place));
+  made.object->setUserPointer(const_cast<StaticMesh*>(made.shapes.mesh.get()));
   set_surface(*made.object, *node.collider);
   statics.push_back(std::move(made));
 }

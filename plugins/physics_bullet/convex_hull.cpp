@@ -92,9 +92,9 @@ ConvexHull convex_hull(std::span<const Vec3> points) {
   if (points.size() < 4) return hull;
   btConvexHullComputer computer;
   computer.compute(points.data()->data(), int(sizeof(Vec3)), int(points.size()), 0.0, 0.0);
-  for (int i = 0; i < computer.vertices.size(); ++i) {
-    const btVector3& vertex = computer.vertices[i];
-    hull.points.emplace_back(vertex.x(), vertex.y(), vertex.z());
+  // The computer's own vertices are rounded to a grid.
+  for (int i = 0; i < computer.original_vertex_index.size(); ++i) {
+    hull.points.push_back(points[std::size_t(computer.original_vertex_index[i])]);
   }
   for (int i = 0; i < computer.faces.size(); ++i) {
     const auto* first = &computer.edges[computer.faces[i]];

@@ -5,8 +5,17 @@
 
 namespace diorama {
 
-/// A Bullet world that pushes overlapping bodies apart slowly: whatever the depth, the correction
-/// is that of the depth which the given speed undoes, and it leaves no velocity behind.
+/// A Bullet world that treats overlap with care:
+/// - Overlapping bodies are pushed apart slowly: whatever the depth, the correction is that of the
+///   depth which the given speed undoes, and it leaves no velocity behind.
+/// - A triangle pushes a body out to the side on which its centre of mass is, and sideways only
+/// across
+///   edges where the surface ends or falls away. Bullet looks for the shortest way out of each
+///   triangle alone, which for a body that straddles a thin, finely meshed floor is down or into
+///   the next one.
+/// - Continuous detection works for compound bodies as well; Bullet leaves them out.
+///
+/// Static objects of triangles must carry their StaticMesh as user pointer, all others none.
 class GentleWorld final : public btDiscreteDynamicsWorld {
  public:
   GentleWorld(btDispatcher* dispatcher, btBroadphaseInterface* broadphase,
@@ -15,9 +24,14 @@ class GentleWorld final : public btDiscreteDynamicsWorld {
 
  protected:
   void solveConstraints(btContactSolverInfo& info) override;
+  void createPredictiveContacts(btScalar seconds) override;
+  void integrateTransforms(btScalar seconds) override;
 
  private:
+  void mend_contacts(btPersistentManifold& manifold, double lowest_distance);
+
   double max_depenetration_speed_;
+  btSphereShape stand_in_{0.01};
 };
 
 }  // namespace diorama

@@ -47,6 +47,7 @@ StaticMesh::StaticMesh(const Mesh& mesh, const Mat3& stretch, double margin_m) {
     if (has_area(positions, triangle)) triangles.push_back(triangle);
   }
   if (triangles.empty()) return;
+  inner_edges = find_inner_edges(positions, triangles);
   btIndexedMesh indexed;
   indexed.m_numTriangles = int(triangles.size());
   indexed.m_triangleIndexBase = reinterpret_cast<const unsigned char*>(triangles.data());

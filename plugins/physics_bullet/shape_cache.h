@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "diorama/geometry.h"
+#include "triangle_edges.h"
 
 namespace diorama {
 
@@ -22,6 +23,7 @@ struct StaticMesh {
 
   std::vector<Vec3f> positions;
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< Without degenerate ones.
+  std::vector<InnerEdges> inner_edges;                  ///< Per triangle.
   std::unique_ptr<btTriangleIndexVertexArray> arrays;
   std::unique_ptr<btBvhTriangleMeshShape> shape;  ///< Null when no triangle is left.
 };
