@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "diorama/host.h"
+#include "diorama/params.h"
+#include "diorama/writer.h"
+#include "writer_support/training_data.h"
+
+namespace diorama {
+
+/// The BOP format (bop.felk.cvut.cz, BOP-Webcam "bop_toolkit" docs/bop_datasets_format.md):
+///
+///     dataset.json camera.json objects.json models/models_info.json test_targets_bop19.json
+///     {train_pbr,test}/000000/rgb/000012.png  depth/  mask/000012_000000.png  mask_visib/
+///     {train_pbr,test}/000000/scene_camera.json  scene_gt.json  scene_gt_info.json
+///
+/// A scene is one camera, an image id one capture; validation captures form the split "test".
+/// Millimetres; camera axes x right, y down, z forward; rotations row by row. Poses map the model's
+/// own space; where an object is scaled, `scale` holds the factors, to be applied first. Depth is
+/// 16 bit in units of depth_scale millimetres, 0: nothing or out of range. obj_id counts classes
+/// from 1.
+class BopWriter final : public Writer {
+ public:
+  struct Params {
+    TrainingParams training;
+    double depth_scale = 0.1;
+
+    void visit(ParamVisitor& v);
+  };
+
+  BopWriter(Params params, Host& host);
+
+  NameSet needs() const override;
+  void begin(const DatasetInfo& dataset, DatasetFiles& files) override;
+  void write(const Capture& capture, CaptureFiles& files) const override;
+  void finish(const RecordReader& records, DatasetFiles& files) override;
+
+ private:
+  const char* split_folder(int capture) const;
+  Json write_frame(const Capture& capture, std::size_t camera, CaptureFiles& files) const;
+  void add_masks(const Frame& frame, const Instance& instance, const std::string& scene,
+                 const std::string& name, CaptureFiles& files) const;
+
+  Params params_;
+  Host& host_;
+  TrainingData training_;
+};
+
+}  // namespace diorama

@@ -1,0 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "diorama/plugin.h"
+#include "writer_coco/coco_writer.h"
+
+DIORAMA_PLUGIN("writer_coco", "1.0.0", "Apache-2.0") {
+  DIORAMA_ADD(diorama::CocoWriter, "CocoWriter",
+              "Writes COCO detection, segmentation, keypoint and panoptic annotations.");
+}

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "writer_kitti/kitti_writer.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include "writer_support/image_files.h"
+#include "writer_support/replicator.h"
+
+namespace diorama {
+namespace {
+
+/// KITTI's camera axes from ours: y and z change sign.
+Vec3 kitti_from_camera(const Vec3& p) { return {p.x(), -p.y(), -p.z()}; }
+
+struct UprightBox {
+  Vec3 size;      ///< Length along the heading, height, width.
+  Vec3 location;  ///< Middle of the bottom face.
+  double rotation_y = 0.0;
+};
+
+/// Turns about y by `angle`: the heading (cos, 0, -sin) becomes x.
+Vec3 unturned(const Vec3& p, double angle) {
+  const double c = std::cos(angle);
+  const double s = std::sin(angle);
+  return {c * p.x() - s * p.z(), p.y(), s * p.x() + c * p.z()};
+}
+
+UprightBox upright_box(const Frame& frame, const Instance& instance) {
+  const Affine camera_from_node = frame.world_from_camera.inverse() * instance.world_from_node;
+  const Vec3 heading = kitti_from_camera(camera_from_node.linear().col(0));
+  UprightBox box;
+  box.rotation_y = std::atan2(-heading.z(), heading.x());
+  Aabb extent;
+  for (int i = 0; i < 8; ++i) {
+    const Vec3 corner = kitti_from_camera(camera_from_node * instance.bounds_node.corner(i));
+    extent.add(unturned(corner, box.rotation_y));
+  }
+  box.size = extent.size();
+  Vec3 bottom = extent.centre();
+  bottom.y() = extent.max.y();
+  box.location = unturned(bottom, -box.rotation_y);
+  return box;
+}
+
+/// 0 fully visible, 1 partly hidden, 2 largely hidden; the limits are those of Replicator's writer.
+int occlusion_level(const Instance& instance) {
+  const double visible =
+      instance.visibility ? 1.0 - instance.visibility->occlusion().value_or(0.0) : 1.0;
+  return visible >= 0.95 ? 0 : visible >= 0.5 ? 1 : 2;
+}
+
+std::string label_line(const Frame& frame, const TrainingObject& object, const std::string& name) {
+  const Instance& instance = *object.instance;
+  const UprightBox box = upright_box(frame, instance);
+  const double bearing = std::atan2(box.location.x(), box.location.z());
+  const double alpha = std::remainder(box.rotation_y - bearing, 2.0 * kPi);
+  const PixelBox& pixels = *instance.tight_box;
+  std::array<char, 512> text{};
+  std::snprintf(text.data(), text.size(),
+                " %.2f %d %.2f %d.00 %d.00 %d.00 %d.00 %.4f %.4f %.4f %.4f %.4f %.4f %.4f\n",
+                instance.visibility ? instance.visibility->truncation() : 0.0,
+                occlusion_level(instance), alpha, pixels.x_min, pixels.y_min, pixels.x_max,
+                pixels.y_max, box.size.y(), box.size.z(), box.size.x(), box.location.x(),
+                box.location.y(), box.location.z(), box.rotation_y);
+  // Fields are separated by spaces.
+  std::string word = name;
+  std::ranges::replace(word, ' ', '_');
+  return word + text.data();
+}
+
+std::string calibration(const Camera& camera) {
+  std::array<char, 256> p{};
+  std::snprintf(p.data(), p.size(), "%.12e 0 %.12e 0 0 %.12e %.12e 0 0 0 1 0\n", camera.fx,
+                camera.cx, camera.fy, camera.cy);
+  std::string text;
+  for (int i = 0; i < 4; ++i) text += "P" + std::to_string(i) + ": " + p.data();
+  return text +
+         "R0_rect: 1 0 0 0 1 0 0 0 1\n"
+         "Tr_velo_to_cam: 1 0 0 0 0 1 0 0 0 0 1 0\n"
+         "Tr_imu_to_velo: 1 0 0 0 0 1 0 0 0 0 1 0\n";
+}
+
+Image<std::uint32_t> depth_picture(const Image<float>& depth) {
+  Image<std::uint32_t> picture(depth.width(), depth.height(), 0);
+  for (std::size_t i = 0; i < depth.pixels().size(); ++i) {
+    const double value = std::round(256.0 * double(depth.pixels()[i]));
+    if (value <= 65535.0) picture.pixels()[i] = std::uint32_t(value);
+  }
+  return picture;
+}
+
+}  // namespace
+
+void KittiWriter::Params::visit(ParamVisitor& v) {
+  training.visit(v);
+  v.param("depth", depth, {"Depth pictures, 16 bit, metres x 256."});
+}
+
+KittiWriter::KittiWriter(Params params, Host& host)
+    : params_(std::move(params)), host_(host), training_(params_.training) {}
+
+NameSet KittiWriter::needs() const {
+  NameSet names{std::string(kColor.name), std::string(kInstanceId.name), "instances", "visibility"};
+  if (params_.depth) names.emplace(kDistanceToImagePlane.name);
+  return names;
+}
+
+std::string KittiWriter::stem(int capture, int camera) const {
+  return padded(capture * training_.camera_count() + camera, padding_);
+}
+
+void KittiWriter::begin(const DatasetInfo& dataset, DatasetFiles& files) {
+  training_.begin(dataset);
+  padding_ = grown_padding(6, dataset.capture_count * training_.camera_count());
+  std::string train, val, both;
+  for (int capture = 0; capture < dataset.capture_count; ++capture) {
+    for (int camera = 0; camera < training_.camera_count(); ++camera) {
+      const std::string line = stem(capture, camera) + "\n";
+      (std::string_view(training_.split(capture)) == "val" ? val : train) += line;
+      both += line;
+    }
+  }
+  files.add_text("ImageSets/train.txt", train);
+  files.add_text("ImageSets/val.txt", val);
+  files.add_text("ImageSets/trainval.txt", both);
+  training_.add_dataset_page(
+      "KITTI",
+      {{"camera_axes", "x right, y down, z forward"},
+       {"dimensions", "height, width, length in metres; length along the object's x axis"},
+       {"location", "middle of the bottom face in the camera's space"},
+       {"number", "capture x cameras + camera"},
+       {"depth", "along the viewing axis, metres x 256 in 16 bit, 0: nothing"}},
+      dataset, files);
+}
+
+void KittiWriter::write(const Capture& capture, CaptureFiles& files) const {
+  for (std::size_t camera = 0; camera < capture.frames.size(); ++camera) {
+    const Frame& frame = capture.frames[camera];
+    const std::string name = stem(capture.index, int(camera));
+    files.add("training/image_2/" + name + "." + training_.image_format(),
+              training_.image_file(host_, frame));
+    std::string labels;
+    for (const TrainingObject& object : training_.objects(frame)) {
+      labels += label_line(frame, object, training_.classes()[std::size_t(object.class_index)]);
+    }
+    files.add_text("training/label_2/" + name + ".txt", labels);
+    files.add_text("training/calib/" + name + ".txt", calibration(frame.camera));
+    if (params_.depth) {
+      const std::string path = "training/depth_2/" + name + ".png";
+      files.add(path, png_file(host_, depth_picture(frame.get(kDistanceToImagePlane)), path));
+    }
+  }
+}
+
+}  // namespace diorama

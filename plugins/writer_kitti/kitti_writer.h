@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "diorama/host.h"
+#include "diorama/params.h"
+#include "diorama/writer.h"
+#include "writer_support/training_data.h"
+
+namespace diorama {
+
+/// The KITTI object benchmark (Geiger et al., CVPR 2012):
+///
+///     dataset.json ImageSets/{train,val,trainval}.txt
+///     training/image_2/000024.png  label_2/000024.txt  calib/000024.txt  depth_2/000024.png
+///
+/// Cameras take turns: number = capture x cameras + camera. Boxes are upright in the camera's own
+/// space (x right, y down, z forward): turned about y by the object's heading and wide enough to
+/// hold its box; `location` is the middle of the bottom face. Depth is 16 bit, metres x 256, 0
+/// where nothing is or beyond 255.99 m.
+class KittiWriter final : public Writer {
+ public:
+  struct Params {
+    TrainingParams training;
+    bool depth = true;
+
+    void visit(ParamVisitor& v);
+  };
+
+  KittiWriter(Params params, Host& host);
+
+  NameSet needs() const override;
+  void begin(const DatasetInfo& dataset, DatasetFiles& files) override;
+  void write(const Capture& capture, CaptureFiles& files) const override;
+
+ private:
+  std::string stem(int capture, int camera) const;
+
+  Params params_;
+  Host& host_;
+  TrainingData training_;
+  int padding_ = 6;
+};
+
+}  // namespace diorama

@@ -1,0 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "diorama/plugin.h"
+#include "writer_voc/voc_writer.h"
+
+DIORAMA_PLUGIN("writer_voc", "1.0.0", "Apache-2.0") {
+  DIORAMA_ADD(diorama::VocWriter, "VocWriter",
+              "Writes Pascal VOC annotations and segmentation pictures.");
+}

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "writer_yolo/yolo_writer.h"
+
+#include <array>
+#include <cstdio>
+
+#include "writer_support/cuboid.h"
+#include "writer_yolo/contours.h"
+
+namespace diorama {
+namespace {
+
+constexpr const char* kTasks[] = {"detect", "segment", "pose", "obb"};
+
+void append_number(std::string& line, double value) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), " %.6f", value);
+  line += text.data();
+}
+
+void append_point(std::string& line, const Frame& frame, const Vec2& point) {
+  append_number(line, point.x() / frame.camera.width);
+  append_number(line, point.y() / frame.camera.height);
+}
+
+void append_box(std::string& line, const Frame& frame, const PixelBox& box) {
+  append_point(line, frame, {0.5 * (box.x_min + box.x_max), 0.5 * (box.y_min + box.y_max)});
+  append_point(line, frame, {double(box.width()), double(box.height())});
+}
+
+void append_keypoints(std::string& line, const Frame& frame, const Instance& instance) {
+  for (const Keypoint& keypoint : kCuboidKeypoints) {
+    const ImagePoint point = image_point(
+        frame, instance.world_from_node * keypoint_in_box(instance.bounds_node, keypoint));
+    append_point(line, frame, point.pixel);
+    line += " " + std::to_string(int(point.state));
+  }
+}
+
+}  // namespace
+
+void YoloWriter::Params::visit(ParamVisitor& v) {
+  training.visit(v);
+  v.choice("task", task, kTasks, {"What the label lines hold."});
+}
+
+YoloWriter::YoloWriter(Params params, Host& host)
+    : params_(std::move(params)), host_(host), training_(params_.training) {}
+
+NameSet YoloWriter::needs() const {
+  NameSet names{std::string(kColor.name), std::string(kInstanceId.name), "instances"};
+  if (params_.task == "pose") names.emplace(kDistanceToCamera.name);
+  return names;
+}
+
+void YoloWriter::begin(const DatasetInfo& dataset, DatasetFiles& files) {
+  training_.begin(dataset);
+  // Trainers insist on a validation folder.
+  const std::string val = training_.splits().back();
+  std::string yaml = "path: .\ntrain: images/train\nval: images/" + val + "\n";
+  if (params_.task == "pose") {
+    yaml += "kpt_shape: [" + std::to_string(kKeypointCount) + ", 3]\n";
+  }
+  yaml += "names:\n";
+  for (std::size_t i = 0; i < training_.classes().size(); ++i) {
+    yaml += "  " + std::to_string(i) + ": " + python_json(Json(training_.classes()[i])) + "\n";
+  }
+  files.add_text("data.yaml", yaml);
+  Json more{{"task", params_.task}, {"labels", "shares of the image's width and height"}};
+  if (params_.task == "pose") {
+    for (const Keypoint& point : kCuboidKeypoints) more["keypoints"].push_back(point.name);
+    more["keypoint_visibility"] = "0 outside the image, 1 hidden, 2 visible";
+  }
+  training_.add_dataset_page("YOLO", std::move(more), dataset, files);
+}
+
+std::string YoloWriter::line(const Frame& frame, const TrainingObject& object) const {
+  const Instance& instance = *object.instance;
+  std::string text = std::to_string(object.class_index);
+  if (params_.task == "detect" || params_.task == "pose") {
+    append_box(text, frame, *instance.tight_box);
+    if (params_.task == "pose") append_keypoints(text, frame, instance);
+    return text;
+  }
+  const auto parts = outlines(frame.get(kInstanceId), instance.id, *instance.tight_box);
+  if (params_.task == "segment") {
+    for (const Vec2& point : joined(parts)) append_point(text, frame, point);
+  } else {
+    for (const Vec2& point : least_rectangle(parts)) append_point(text, frame, point);
+  }
+  return text;
+}
+
+void YoloWriter::write(const Capture& capture, CaptureFiles& files) const {
+  const std::string split = training_.split(capture.index);
+  for (const Frame& frame : capture.frames) {
+    const std::string stem = training_.image_stem(capture, frame);
+    files.add("images/" + split + "/" + stem + "." + training_.image_format(),
+              training_.image_file(host_, frame));
+    std::string labels;
+    for (const TrainingObject& object : training_.objects(frame)) {
+      labels += line(frame, object) + "\n";
+    }
+    files.add_text("labels/" + split + "/" + stem + ".txt", labels);
+  }
+}
+
+}  // namespace diorama
