@@ -10,7 +10,9 @@
 
 #include "framework/app/assemble.h"
 #include "framework/app/command_config.h"
+#include "framework/app/command_export.h"
 #include "framework/app/command_inspect.h"
+#include "framework/app/command_new_plugin.h"
 #include "framework/app/command_plugins.h"
 #include "framework/app/command_run.h"
 #include "framework/app/options.h"
@@ -32,6 +34,8 @@ struct CommandLine {
   JobOptions config;
   bool config_json = false;
   InspectOptions inspect;
+  ExportCommandOptions export_;
+  NewPluginOptions new_plugin;
   bool plugins_json = false;
   bool describe_json = false;
   std::string describe_type;
@@ -158,6 +162,45 @@ void add_inspect(CLI::App& app, CommandLine& line) {
   });
 }
 
+void add_new_plugin(CLI::App& app, CommandLine& line) {
+  CLI::App* command = app.add_subcommand("new-plugin", "Write a plugin project to start from");
+  command
+      ->add_option("kind", line.new_plugin.kind,
+                   "loader, physics, randomizer, renderer, annotator or writer")
+      ->required()
+      ->type_name("KIND");
+  command->add_option("name", line.new_plugin.name, "Name of plugin and component, such as my_boxes")
+      ->required()
+      ->type_name("NAME");
+  command->add_option("--dir", line.new_plugin.dir, "Folder of the project; default: the name")
+      ->type_name("DIR");
+  command->add_option("--licence", line.new_plugin.licence, "Apache-2.0, BSD-3-Clause or MIT")
+      ->type_name("LICENCE")
+      ->capture_default_str();
+  command->callback([&line] {
+    line.command = [&line](ConsoleLog&) {
+      return command_new_plugin(line.global, line.new_plugin);
+    };
+  });
+}
+
+void add_export(CLI::App& app, CommandLine& line) {
+  CLI::App* command = app.add_subcommand("export", "Write a scene or model as USD, a sky as .hdr");
+  command->add_option("asset", line.export_.asset, "File, or scheme:rest such as dining_room:7")
+      ->required()
+      ->type_name("ASSET");
+  command->add_option("file", line.export_.file, "Ends in .usda (text), .usdc, .usd or .hdr")
+      ->required()
+      ->type_name("FILE");
+  command->add_flag("--without-physics", line.export_.without_physics,
+                    "Leave out masses, rigid bodies and colliders");
+  command->callback([&line] {
+    line.command = [&line](ConsoleLog& log) {
+      return command_export(line.global, line.export_, log);
+    };
+  });
+}
+
 void add_all(CLI::App& app, CommandLine& line) {
   app.require_subcommand(1);
   app.fallthrough();
@@ -167,6 +210,7 @@ void add_all(CLI::App& app, CommandLine& line) {
   add_config(app, line);
   add_plugins(app, line);
   add_inspect(app, line);
+  add_new_plugin(app, line);
 }
 
 int run_command(CommandLine& line) {
