@@ -189,7 +189,8 @@ void put_chunk(std::vector<std::byte>& file, const char* type, std::span<const s
   put_u32(head.data(), std::uint32_t(data.size()));
   std::memcpy(head.data() + 4, type, 4);
   std::uint32_t crc = libdeflate_crc32(0, head.data() + 4, 4);
-  crc = libdeflate_crc32(crc, data.data(), data.size());
+  // With a null pointer libdeflate starts anew.
+  if (!data.empty()) crc = libdeflate_crc32(crc, data.data(), data.size());
   std::array<std::uint8_t, 4> tail;
   put_u32(tail.data(), crc);
   const auto append = [&file](const std::uint8_t* bytes, std::size_t size) {

@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "framework/images/image_codecs.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <string>
 
+#include "diorama/error.h"
 #include "diorama/rng.h"
 #include "support/catch.h"
 
