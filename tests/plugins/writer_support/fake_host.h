@@ -25,7 +25,7 @@ struct RawImage {
 
 /// Encodes pictures as they are, so that tests see every sample. Keeps log lines; nothing else
 /// works.
-class FakeHost final : public Host {
+class FakeHost : public Host {
  public:
   void log(LogLevel level, std::string_view message) override;
   std::filesystem::path resolve(std::string_view asset) const override;
