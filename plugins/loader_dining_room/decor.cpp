@@ -64,14 +64,13 @@ void add_leaf(MeshBuilder& builder, const Vec3& root, double angle, double lengt
   const Vec3 out(std::cos(angle), std::sin(angle), 0);
   const Vec3 side(-std::sin(angle), std::cos(angle), 0);
   const auto surface = [&](double u, double v) {
-    const double shape =
-        std::max(0.02, std::pow(std::sin(kPi * std::min(1.0, 0.04 + 0.96 * v)), 0.8));
+    const double shape = std::max(0.15, std::pow(std::sin(kPi * (0.05 + 0.92 * v)), 0.8));
     const double x = (2 * u - 1) * width / 2 * shape;
-    const double fold = 0.25 * std::abs(x);
+    const double fold = 0.5 * x * x / width;
     return Vec3(root + out * length * v * (1 - 0.25 * v) +
                 Vec3(0, 0, length * (rise * v - droop * v * v)) + side * x + Vec3(0, 0, fold));
   };
-  add_sheet(builder, 4, 10, 0.0012, surface, Vec2(width, length));
+  add_sheet(builder, 4, 10, 0.0008, surface, Vec2(width, length));
 }
 
 }  // namespace

@@ -316,8 +316,9 @@ void add_shell_chair(MeshBuilder& builder, Joiner& wood, const ChairStyle& style
     const double half =
         0.23 * std::pow(std::max(1e-3, 1 - std::pow(std::abs(2 * v - 1), 5.0) * 0.72), 0.5);
     const double lift = 0.05 * x * x * std::sin(kPi * std::min(1.0, v * 1.1));
-    return Vec3(-x * half, mid.y() + (v > 0.55 ? 0.7 * lift : 0.0),
-                mid.z() + (v > 0.55 ? 0.0 : 0.7 * lift));
+    const double t = std::clamp((v - 0.45) / 0.25, 0.0, 1.0);
+    const double at_back = t * t * (3 - 2 * t);
+    return Vec3(-x * half, mid.y() + 0.7 * lift * at_back, mid.z() + 0.7 * lift * (1 - at_back));
   };
   add_sheet(
       builder, 20, 40, 0.009, [&](double u, double v) { return surface(1 - u, v); },
@@ -361,10 +362,10 @@ void add_pull(MeshBuilder& builder, const Vec3& place, bool is_knob, bool is_lev
     return;
   }
   builder.begin(at(place) * (is_level ? Affine::Identity() : turned_y(kPi / 2)), {1, 1.0});
-  const std::array<Vec3, 6> bow{Vec3(-0.06, 0, 0),       Vec3(-0.06, -0.02, 0),
-                                Vec3(-0.052, -0.028, 0), Vec3(0.052, -0.028, 0),
-                                Vec3(0.06, -0.02, 0),    Vec3(0.06, 0, 0)};
-  add_tube(builder, smooth_path(bow, 4), 0.005, 12);
+  const std::array<Vec3, 7> bow{
+      Vec3(-0.060, 0, 0),     Vec3(-0.055, -0.016, 0), Vec3(-0.038, -0.027, 0), Vec3(0, -0.031, 0),
+      Vec3(0.038, -0.027, 0), Vec3(0.055, -0.016, 0),  Vec3(0.060, 0, 0)};
+  add_tube(builder, smooth_path(bow, 5), 0.0045, 12);
 }
 
 }  // namespace

@@ -98,14 +98,16 @@ void choose_textiles(RoomMaterials& m, Rng rng, Host& host) {
   m.seat_fabric =
       rng.chance(0.25)
           ? textured("shader_leather", make_leather(host, cloth * 0.7f, rng.bits(), 256), 0.45)
-          : textured("shader_fabric",
-                     make_fabric(host, cloth, blend(cloth, color(0xf0ece4), 0.25), rng.bits(), 256),
-                     0.9);
+          : textured(
+                "shader_fabric",
+                make_fabric(host, cloth, blend(cloth, color(0xf0ece4), 0.25), 0.7, rng.bits(), 256),
+                0.9);
   const Color drape = rng.chance(0.5) ? blend(cloth, color(0xe9e2d5), 0.6) : color(0xded7ca);
-  m.curtain =
-      textured("shader_curtain", make_fabric(host, drape, drape * 0.93f, rng.bits(), 256), 0.95);
-  m.lampshade = textured("shader_lampshade",
-                         make_fabric(host, color(0xe8dfcf), color(0xdcd0ba), rng.bits(), 256), 0.9);
+  m.curtain = textured("shader_curtain",
+                       make_fabric(host, drape, drape * 0.97f, 0.3, rng.bits(), 256), 0.95);
+  m.lampshade =
+      textured("shader_lampshade",
+               make_fabric(host, color(0xe8dfcf), color(0xe3d9c7), 0.3, rng.bits(), 256), 0.9);
   m.shell = plain("shader_shell", pick(rng, kShells), 0.35);
 }
 
@@ -129,9 +131,9 @@ RoomMaterials choose_materials(Rng rng, Host& host) {
                         pick(small, std::array<std::uint32_t, 6>{0xa65f3e, 0x39566b, 0x6d7a5a,
                                                                  0xd6c8b0, 0x2f3336, 0x8a3f3a}),
                         0.4);
-  m.glass = {make_glass("shader_glass", color(0xf6faf8)), 1.0};
+  m.glass = {make_pane("shader_glass"), 1.0};
   m.pane = {make_pane("shader_glass_pane"), 1.0};
-  m.frosted = {make_glass("shader_lamp_bulb", color(0xfffaf0)), 1.0};
+  m.frosted = {make_pane("shader_lamp_bulb"), 1.0};
   m.paper = plain("shader_paper", color(0xefe8d8), 0.9);
   m.soil = plain("shader_soil", color(0x3a2b20), 1.0);
   m.leaf = plain("shader_leaf", blend(color(0x2f5a2d), color(0x6b8f4a), small.uniform()), 0.4);

@@ -45,15 +45,6 @@ MaterialPtr make_picture_material(std::string_view name, std::shared_ptr<const T
   return std::make_shared<const Material>(std::move(material));
 }
 
-MaterialPtr make_glass(std::string_view name, const Color& tint) {
-  Material material;
-  material.name = std::string(name);
-  material.base_color = linear(tint);
-  material.roughness = 0.0f;
-  material.transmission = 1.0f;
-  return std::make_shared<const Material>(std::move(material));
-}
-
 MaterialPtr make_pane(std::string_view name) {
   Material material;
   material.name = std::string(name);

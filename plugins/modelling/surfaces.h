@@ -19,9 +19,7 @@ MaterialPtr make_textured(std::string_view name, const TextureSet& textures, dou
 /// A picture with uvs 0..1, clamped.
 MaterialPtr make_picture_material(std::string_view name, std::shared_ptr<const Texture> picture,
                                   double roughness);
-/// Solid glass; `tint` is what it lets through.
-MaterialPtr make_glass(std::string_view name, const Color& tint);
-/// Panes: no refraction.
+/// Glass that light passes straight: panes, and thin vessels, whose refraction one hardly sees.
 MaterialPtr make_pane(std::string_view name);
 
 }  // namespace diorama::modelling

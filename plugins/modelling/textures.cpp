@@ -225,7 +225,7 @@ TextureSet make_plaster(Host& host, const Color& paint, double roughness, std::u
     const double broad = fractal_noise(seed, u * 5, v * 5, 5, 5, 4);
     const double grain = fractal_noise(seed + 3, u * 60, v * 60, 60, 60, 3);
     return Texel{scaled_color(paint, 1 + 0.018 * broad + 0.008 * grain),
-                 roughness * (0.0016 * broad + 0.0007 * grain)};
+                 roughness * (0.0012 * broad + 0.0002 * grain)};
   });
 }
 
@@ -253,10 +253,10 @@ TextureSet make_wallpaper(Host& host, const Color& ground, const Color& figure, 
   });
 }
 
-TextureSet make_fabric(Host& host, const Color& warp, const Color& weft, std::uint64_t seed,
-                       int pixels) {
+TextureSet make_fabric(Host& host, const Color& warp, const Color& weft, double relief,
+                       std::uint64_t seed, int pixels) {
   constexpr int kThreads = 48;
-  return make_texture_set(host, "fabric", pixels, 0.16, true, [&](double u, double v) {
+  const auto pattern = [&](double u, double v) {
     const double wobble = 0.12 * fractal_noise(seed, u * 12, v * 12, 12, 12, 2);
     const double x = u * kThreads + wobble, y = v * kThreads - wobble;
     const int ix = int(std::floor(x)), iy = int(std::floor(y));
@@ -265,11 +265,13 @@ TextureSet make_fabric(Host& host, const Color& warp, const Color& weft, std::ui
     const double along = is_warp ? fraction(y) : fraction(x);
     const double round = std::sin(kPi * across) * (0.55 + 0.45 * std::sin(kPi * along));
     const int thread = is_warp ? (ix + kThreads) % kThreads : (iy + kThreads) % kThreads + 1000;
-    const double tone = 0.88 + 0.24 * lattice_value(seed, thread, 0);
-    const double fuzz = 1 + 0.10 * fractal_noise(seed + 7, u * 96, v * 96, 96, 96, 2);
+    const double tone = 1 + relief * 0.22 * (lattice_value(seed, thread, 0) - 0.5);
+    const double fuzz = 1 + relief * 0.10 * fractal_noise(seed + 7, u * 96, v * 96, 96, 96, 2);
     const Color& yarn = is_warp ? warp : weft;
-    return Texel{scaled_color(yarn, tone * fuzz * (0.62 + 0.42 * round)), 0.0006 * round};
-  });
+    const double shade = 1 - relief * (0.36 - 0.42 * round);
+    return Texel{scaled_color(yarn, tone * fuzz * shade), 0.0004 * relief * round};
+  };
+  return make_texture_set(host, "fabric", pixels, 0.16, relief >= 0.5, pattern);
 }
 
 TextureSet make_leather(Host& host, const Color& color, std::uint64_t seed, int pixels) {
@@ -527,7 +529,7 @@ std::shared_ptr<const Texture> make_book_spines(Rng rng, int count, int width, i
   for (int i = 0; i < count; ++i) {
     Rng own = rng.fork(std::uint64_t(i));
     const double x = i * spine;
-    const Color cloth = random_hue(own, own.uniform(0.2, 0.75), own.uniform(0.2, 0.85));
+    const Color cloth = random_hue(own, own.uniform(0.15, 0.55), own.uniform(0.2, 0.62));
     const Color ink = cloth.sum() > 1.6f ? color(0x2a2622) : color(0xe9dfc4);
     canvas.rectangle(x, 0, spine, height, cloth);
     const double band = own.uniform(0.06, 0.14) * height;

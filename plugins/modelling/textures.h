@@ -56,8 +56,9 @@ TextureSet make_plaster(Host& host, const Color& paint, double roughness, std::u
 /// Painted stripes or small ornaments on paper.
 TextureSet make_wallpaper(Host& host, const Color& ground, const Color& figure, bool is_striped,
                           std::uint64_t seed, int pixels);
-TextureSet make_fabric(Host& host, const Color& warp, const Color& weft, std::uint64_t seed,
-                       int pixels);
+/// `relief` 0..1: how much the threads stand out; below a half without normal map.
+TextureSet make_fabric(Host& host, const Color& warp, const Color& weft, double relief,
+                       std::uint64_t seed, int pixels);
 TextureSet make_leather(Host& host, const Color& color, std::uint64_t seed, int pixels);
 TextureSet make_wicker(Host& host, const Color& color, std::uint64_t seed, int pixels);
 TextureSet make_cardboard(Host& host, std::uint64_t seed, int pixels);
