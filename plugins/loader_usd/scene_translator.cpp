@@ -3,11 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 
 #include "diorama/error.h"
 #include "loader_usd/conversion.h"
 #include "loader_usd/light_translator.h"
+#include "loader_usd/usd/extent.h"
 #include "loader_usd/usd/path.h"
 
 namespace diorama::loader_usd {
@@ -49,12 +49,6 @@ Affine without_scale(const Affine& affine) {
   rigid.linear() = parts.rotation.toRotationMatrix();
   rigid.translation() = affine.translation();
   return rigid;
-}
-
-std::vector<double> read_list(const Stage& stage, const Prim& prim, std::string_view name,
-                              std::size_t width) {
-  const auto list = usd::numbers<double>(stage.value(prim, name), width);
-  return list ? std::vector<double>(list->span.begin(), list->span.end()) : std::vector<double>();
 }
 
 PrimitiveShape primitive_of(const std::string& type) {
@@ -342,43 +336,11 @@ void SceneTranslator::add_instances(const Prim& prim, const Place& place) {
                               "> is an instancer within too many instancers");
     return;
   }
-  const std::vector<double> which = read_list(stage_, prim, "protoIndices", 1);
-  const std::vector<double> positions = read_list(stage_, prim, "positions", 3);
-  const std::vector<double> scales = read_list(stage_, prim, "scales", 3);
-  std::vector<double> turns = read_list(stage_, prim, "orientationsf", 4);
-  if (turns.empty()) turns = read_list(stage_, prim, "orientations", 4);
-  std::vector<double> ids = read_list(stage_, prim, "ids", 1);
-  if (ids.size() != which.size()) {
-    ids.resize(which.size());
-    for (std::size_t i = 0; i < ids.size(); ++i) ids[i] = static_cast<double>(i);
-  }
-  std::set<double> masked;
-  for (const double id : read_list(stage_, prim, "invisibleIds", 1)) masked.insert(id);
-  for (const std::int64_t id : stage_.metadata_integers(prim, "inactiveIds")) {
-    masked.insert(static_cast<double>(id));
-  }
-  std::vector<const Prim*> prototypes;
-  for (const std::string& path : stage_.targets(prim, "prototypes")) {
-    prototypes.push_back(stage_.find(path));
-  }
   ++instancer_depth_;
-  for (std::size_t i = 0; i < which.size() && i * 3 + 2 < positions.size(); ++i) {
-    const bool is_known = which[i] >= 0.0 && which[i] < static_cast<double>(prototypes.size());
-    const Prim* prototype =
-        is_known ? prototypes[static_cast<std::size_t>(which[i])] : nullptr;
-    if (!prototype || masked.contains(ids[i])) continue;
-    Affine pose = Affine::Identity();
-    pose.translation() = Vec3(positions[i * 3], positions[i * 3 + 1], positions[i * 3 + 2]);
-    if (i * 4 + 3 < turns.size()) {
-      const Quat turn(turns[i * 4 + 3], turns[i * 4], turns[i * 4 + 1], turns[i * 4 + 2]);
-      if (turn.norm() > 0.0) pose.rotate(turn.normalized());
-    }
-    if (i * 3 + 2 < scales.size()) {
-      pose.scale(Vec3(scales[i * 3], scales[i * 3 + 1], scales[i * 3 + 2]));
-    }
-    pose = affine_or_identity(pose * to_affine(usd::local_transform(stage_, *prototype).matrix) *
-                              unit_correction(*prototype));
-    translate_prim(*prototype, place, pose);
+  for (const usd::PointInstance& instance : usd::point_instances(stage_, prim)) {
+    const Affine pose = to_affine(instance.instancer_from_prototype) *
+                        unit_correction(*instance.prototype);
+    translate_prim(*instance.prototype, place, affine_or_identity(pose));
   }
   --instancer_depth_;
 }

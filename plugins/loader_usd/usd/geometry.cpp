@@ -64,35 +64,6 @@ Matrix op_matrix(std::string_view kind, const Value& value) {
   return result;
 }
 
-Box around_axis(const std::string& axis, double radius, double half_height) {
-  Vector3 half{radius, radius, radius};
-  half[axis == "X" ? 0 : axis == "Y" ? 1 : 2] = half_height;
-  Box box;
-  box.min = {-half[0], -half[1], -half[2]};
-  box.max = half;
-  return box;
-}
-
-std::optional<Box> points_extent(const Stage& stage, const Prim& prim) {
-  const auto points = numbers<float>(stage.value(prim, "points"), 3);
-  if (!points) return std::nullopt;
-  double half_width = 0.0;
-  if (const auto widths = numbers<float>(stage.value(prim, "widths"), 1);
-      widths && prim.type_name != "Mesh") {
-    for (const float width : widths->span) half_width = std::max(half_width, width / 2.0);
-  }
-  Box box;
-  for (std::size_t i = 0; i + 2 < points->span.size(); i += 3) {
-    box.add(Vector3{points->span[i], points->span[i + 1], points->span[i + 2]});
-  }
-  if (box.is_empty()) return std::nullopt;
-  for (std::size_t i = 0; i < 3; ++i) {
-    box.min[i] -= half_width;
-    box.max[i] += half_width;
-  }
-  return box;
-}
-
 }  // namespace
 
 double number_or(const Stage& stage, const Prim& prim, std::string_view name, double fallback) {
@@ -259,57 +230,6 @@ std::vector<Primvar> Geometry::primvars(const Prim& prim) {
   std::vector<Primvar> result;
   for (auto& [name, primvar] : found) result.push_back(std::move(primvar));
   return result;
-}
-
-std::optional<Box> local_extent(const Stage& stage, const Prim& prim) {
-  if (const auto extent = numbers<float>(stage.value(prim, "extent"), 3);
-      extent && extent->span.size() == 6) {
-    Box box;
-    box.min = {extent->span[0], extent->span[1], extent->span[2]};
-    box.max = {extent->span[3], extent->span[4], extent->span[5]};
-    return box;
-  }
-  const std::string& type = prim.type_name;
-  const std::string axis = token_or(stage, prim, "axis", "Z");
-  const auto number = [&](const char* name, double fallback) {
-    return number_or(stage, prim, name, fallback);
-  };
-  if (type == "Cube") {
-    const double half = number("size", 2.0) / 2.0;
-    return around_axis(axis, half, half);
-  }
-  if (type == "Sphere") {
-    const double radius = number("radius", 1.0);
-    return around_axis(axis, radius, radius);
-  }
-  if (type == "Cylinder" || type == "Cone") {
-    return around_axis(axis, number("radius", 1.0), number("height", 2.0) / 2.0);
-  }
-  if (type == "Cylinder_1") {
-    const double radius = std::max(number("radiusTop", 1.0), number("radiusBottom", 1.0));
-    return around_axis(axis, radius, number("height", 2.0) / 2.0);
-  }
-  if (type == "Capsule") {
-    const double radius = number("radius", 0.5);
-    return around_axis(axis, radius, number("height", 1.0) / 2.0 + radius);
-  }
-  if (type == "Capsule_1") {
-    const double radius = std::max(number("radiusTop", 0.5), number("radiusBottom", 0.5));
-    return around_axis(axis, radius, number("height", 1.0) / 2.0 + radius);
-  }
-  if (type == "Plane") {
-    const double width = number("width", 2.0) / 2.0;
-    const double length = number("length", 2.0) / 2.0;
-    Vector3 half{width, length, 0.0};
-    if (axis == "X") half = {0.0, length, width};
-    if (axis == "Y") half = {width, 0.0, length};
-    Box box;
-    box.min = {-half[0], -half[1], -half[2]};
-    box.max = half;
-    return box;
-  }
-  if (prim.traits.is_point_based) return points_extent(stage, prim);
-  return std::nullopt;
 }
 
 }  // namespace diorama::usd

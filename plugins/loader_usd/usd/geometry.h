@@ -51,9 +51,6 @@ class Geometry {
   std::unordered_map<const Prim*, Matrix> worlds_;
 };
 
-/// The authored extent of a boundable prim, or what follows from the attributes of a shape.
-std::optional<Box> local_extent(const Stage& stage, const Prim& prim);
-
 /// A number of a schema: authored or, if not, the schema's fallback.
 double number_or(const Stage& stage, const Prim& prim, std::string_view name, double fallback);
 std::string token_or(const Stage& stage, const Prim& prim, std::string_view name,

@@ -43,7 +43,7 @@ std::string Stage::default_prim() {
   const Value name = root_layer().get(root_layer().root(), "defaultPrim");
   if (!name.as_text() || name.as_text()->empty()) return {};
   const std::string path = name.as_text()->starts_with('/') ? *name.as_text()
-                                                            : "/" + *name.as_text();
+                                                            : std::string("/").append(*name.as_text());
   return find(path) ? path : std::string();
 }
 

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "usd/error.h"
+#include "usd/extent.h"
 #include "usd/geometry.h"
 #include "usd/stage.h"
 
