@@ -1,0 +1,5 @@
+include(${CMAKE_CURRENT_LIST_DIR}/steps.cmake)
+set(build ${WORK}/${EXAMPLE})
+file(REMOVE_RECURSE ${build})
+build_and_list(${REPOSITORY}/examples/${EXAMPLE} ${build} ${TYPE})
+run(${DIORAMA} --plugin-dir ${build}/plugins config ${REPOSITORY}/examples/${EXAMPLE}/job.yaml)

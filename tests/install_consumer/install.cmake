@@ -1,0 +1,28 @@
+include(${CMAKE_CURRENT_LIST_DIR}/steps.cmake)
+file(REMOVE_RECURSE ${WORK})
+# Everything inside must be found relative to the prefix: it is moved after the installation.
+run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${WORK}/installed)
+file(RENAME ${WORK}/installed ${PREFIX})
+
+foreach(file IN ITEMS
+    include/diorama/scene.h ${LIBDIR}/libdiorama_sdk.so ${LIBDIR}/libdiorama_sdk.so.${ABI}
+    ${LIBDIR}/libdiorama_sdk.so.${VERSION} ${LIBDIR}/cmake/diorama_sdk/diorama_sdk-config.cmake
+    ${LIBDIR}/pkgconfig/diorama_sdk.pc share/diorama/templates/common/CMakeLists.txt)
+  if(NOT EXISTS ${PREFIX}/${file})
+    message(FATAL_ERROR "${file} was not installed")
+  endif()
+endforeach()
+
+# No installed text file may know where it was built or installed.
+file(GLOB_RECURSE texts ${PREFIX}/*.cmake ${PREFIX}/*.pc ${PREFIX}/*.h)
+foreach(file IN LISTS texts)
+  file(READ ${file} text)
+  foreach(place ${WORK} ${BUILD} ${REPOSITORY})
+    string(FIND "${text}" "${place}" at)
+    if(NOT at EQUAL -1)
+      message(FATAL_ERROR "${file} names ${place}")
+    endif()
+  endforeach()
+endforeach()
+run(${DIORAMA} --version)
+expect_text("diorama ${VERSION} (plugin ABI ${ABI})")

@@ -1,0 +1,53 @@
+# What the scripts share. The installation that they use lies at ${PREFIX}.
+set(PREFIX ${WORK}/moved)
+set(DIORAMA ${PREFIX}/${BINDIR}/diorama)
+
+# run(command...): fails with all output unless the command succeeds; output in OUT.
+function(run)
+  execute_process(COMMAND ${ARGV} RESULT_VARIABLE result OUTPUT_VARIABLE out ERROR_VARIABLE err)
+  if(NOT result EQUAL 0)
+    list(JOIN ARGV " " command)
+    message(FATAL_ERROR "${command}\nended with ${result}\n${out}${err}")
+  endif()
+  set(OUT "${out}${err}" PARENT_SCOPE)
+endfunction()
+
+# run_refused(text command...): fails unless the command fails and says the text.
+function(run_refused text)
+  execute_process(COMMAND ${ARGN} RESULT_VARIABLE result OUTPUT_VARIABLE out ERROR_VARIABLE err)
+  string(REGEX REPLACE "[ \n]+" " " said "${out}${err}")
+  string(FIND "${said}" "${text}" at)
+  if(result EQUAL 0 OR at EQUAL -1)
+    list(JOIN ARGN " " command)
+    message(FATAL_ERROR "${command}\nended with ${result}; expected a failure that says\n${text}\n"
+                        "found\n${out}${err}")
+  endif()
+endfunction()
+
+function(expect_text text)
+  string(FIND "${OUT}" "${text}" at)
+  if(at EQUAL -1)
+    message(FATAL_ERROR "expected the output to hold\n${text}\nfound\n${OUT}")
+  endif()
+endfunction()
+
+# configure_command(variable source build option...): unoptimised, as only building is tested.
+function(configure_command variable source build)
+  set(${variable}
+      ${CMAKE_COMMAND} -S ${source} -B ${build} -G ${GENERATOR} -DCMAKE_CXX_COMPILER=${CXX}
+      -DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER} -DCMAKE_BUILD_TYPE=Debug
+      "-DCMAKE_CXX_FLAGS=-g0 -Wall -Wextra -Wpedantic -Werror" -DCMAKE_PREFIX_PATH=${PREFIX} ${ARGN}
+      PARENT_SCOPE)
+endfunction()
+
+# Configures, builds, tests and installs a plugin project; its plugin must then be listed.
+function(build_and_list source build type)
+  configure_command(configure ${source} ${build} -DCMAKE_INSTALL_PREFIX=${build}/installed)
+  run(${configure})
+  run(${CMAKE_COMMAND} --build ${build})
+  run(${CMAKE_CTEST_COMMAND} --test-dir ${build} --output-on-failure --no-tests=error)
+  run(${CMAKE_COMMAND} --install ${build})
+  set(plugins ${build}/installed/${LIBDIR}/diorama/plugins-${ABI})
+  run(${DIORAMA} --plugin-dir ${plugins} plugins describe ${type})
+  expect_text("${plugins}")
+endfunction()
