@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "diorama/host.h"
+#include "diorama/params.h"
+#include "diorama/randomizer.h"
+
+namespace diorama {
+
+class Obstacles;
+
+/// Places each camera on a sphere round a random target (the centre of its box) and turns it to a
+/// point beside that centre. Distance and polar angle are those seen from the target itself, not
+/// from the point looked at. Without targets the working area takes their place.
+///
+/// A camera behind a wall sees nothing. With `avoid_obstacles` a view is drawn again, target
+/// included, while something stands between camera and target or close to the camera. When no draw
+/// within `max_tries` is free, one with a free line of sight is taken, else the first.
+class OrbitCameras final : public Randomizer {
+ public:
+  struct Params {
+    std::string nodes = "/Cameras/*";
+    std::string targets = "/Assets/*";
+    Range distance{1.05, 1.25};
+    Range polar_angle_deg{0.0, 75.0};
+    Range azimuth_deg{0.0, 360.0};
+    double look_at_jitter = 0.1;
+    std::string roll = "level";
+    bool avoid_obstacles = true;
+    std::string obstacles = "/Environment/**";
+    double clearance_m = 0.15;
+    int max_tries = 64;
+
+    void visit(ParamVisitor& v);
+  };
+
+  OrbitCameras(Params params, Host& host);
+  void randomize(Scene& scene, const RandomizeContext& context, const Rng& rng) override;
+
+ private:
+  struct View {
+    Vec3 target;
+    Vec3 position;
+    Vec3 look_at;
+  };
+  View draw_view(const std::vector<Vec3>& targets, Rng rng) const;
+  View draw_free_view(const std::vector<Vec3>& targets, const Obstacles& obstacles,
+                      const Rng& rng) const;
+  Affine pose_of(const View& view) const;
+
+  Params params_;
+};
+
+}  // namespace diorama
