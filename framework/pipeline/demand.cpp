@@ -82,8 +82,6 @@ Demand resolve_demand(std::span<const Need> needs, const NameSet& renderer_provi
   for (const Need& need : needs) {
     for (const std::string& name : need.names) resolution.want(need.who, name);
   }
-  // Frames promise their instances to every writer.
-  for (const Need& need : needs) resolution.want(need.who, std::string(kInstances));
   return resolution.take();
 }
 

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cstdlib>
+
+#include "program.h"
+#include "support/catch.h"
+
+using namespace diorama::test;
+using Catch::Matchers::Contains;
+
+namespace {
+
+/// An assets root with the names that the tutorial's jobs use; a dry run opens none of them.
+void make_assets_root(const fs::path& root) {
+  for (int room = 1; room <= 3; ++room) {
+    write_file(root / "Isaac/Samples/Replicator/Infinigen/dining_rooms" /
+                   ("dining_room_" + std::to_string(room)) / "export_scene.usdc",
+               "");
+  }
+  for (const char* name : {"002_master_chef_can", "011_banana", "024_bowl", "036_wood_block",
+                           "008_pudding_box"}) {
+    write_file(root / "Isaac/Props/YCB/Axis_Aligned" / (std::string(name) + ".usd"), "");
+  }
+  write_file(root / "Isaac/Props/YCB/Axis_Aligned/Materials/skipped.usd", "");
+  write_file(root / "Isaac/Props/YCB/Axis_Aligned_Physics/006_mustard_bottle.usd", "");
+  for (const char* name : {"SM_CardBoxD_04_1847", "SM_CardBoxA_01_414", "S_TrafficCone",
+                           "S_WetFloorSign"}) {
+    write_file(root / "Isaac/Environments/Simple_Warehouse/Props" / (std::string(name) + ".usd"), "");
+  }
+  write_file(root / "Isaac/Environments/Office/Props/SM_Vase_01.usd", "");
+  for (const char* name : {"SM_MedicalBag_01a", "SM_MedicalBox_01g"}) {
+    write_file(root / "Isaac/Environments/Hospital/Props" / (std::string(name) + ".usd"), "");
+  }
+}
+
+std::string dry_run(const std::vector<std::string>& job) {
+  const TemporaryFolder folder;
+  make_assets_root(folder / "root");
+  std::vector<std::string> arguments{"--assets-root", (folder / "root").string(), "run",
+                                     "--dry-run"};
+  arguments.insert(arguments.end(), job.begin(), job.end());
+  const Outcome outcome = run(arguments, folder.path());
+  INFO(outcome.errors);
+  REQUIRE(outcome.exit_code == 0);
+  fs::remove_all(folder / "root");
+  CHECK(tree(folder.path()).empty());
+  return outcome.output;
+}
+
+/// Compares with a stored text; DIORAMA_UPDATE_GOLDEN=1 stores it anew.
+void check_golden(const std::string& name, const std::string& text) {
+  const fs::path file = fs::path(DIORAMA_SOURCE_DIR "/tests/end_to_end/golden") / name;
+  if (std::getenv("DIORAMA_UPDATE_GOLDEN")) write_file(file, text);
+  CHECK(read_file(file) == text);
+}
+
+}  // namespace
+
+TEST_CASE("The plan of the tutorial's defaults is what the tutorial prescribes", "[plan]") {
+  const std::string text = dry_run({});
+  CHECK_THAT(text, Contains("9 captures x 2 cameras = 18 frames, seed 12, debug"));
+  CHECK_THAT(text, Contains("timeline: simulate 4 -> capture floating x 2 -> simulate 200 -> "
+                            "capture dropped x 2"));
+  CHECK_THAT(text, Contains("environments (3)"));
+  // 9 captures, 4 per visit: the third visit is cut short.
+  CHECK_THAT(text, Contains("captures 8") || Contains("capture 8: floating 1"));
+  CHECK_THAT(text, Contains("objects (38)"));
+  CHECK_THAT(text, Contains("auto_label: 6 below /Assets"));
+  CHECK_THAT(text, Contains("manual_label: 2 below /Assets"));
+  CHECK_THAT(text, Contains("manual_label_2: 2 below /Assets"));
+  CHECK_THAT(text, Contains("shape_distractors: 20 below"));
+  CHECK_THAT(text, Contains("mesh_distractors: 8 below"));
+  CHECK_THAT(text, Contains("cam x 2: pinhole 720x480") && Contains("sees 0.25 to 1000 m"));
+  CHECK_THAT(text, Contains("SphereLight_scene x 3: sphere"));
+  CHECK_THAT(text, Contains("\"polar_angle_deg\": [0, 75]") && Contains("\"polar_angle_deg\": [0, 45]"));
+  CHECK_THAT(text, Contains("\"distance\": [1.15, 1.45]"));
+  CHECK_THAT(text, !Contains("skipped"));
+  check_golden("infinigen_default.txt", text);
+  // The file is the built-in job.
+  CHECK(dry_run({config_file("infinigen_default.yaml")}) == text);
+  CHECK(dry_run({"--config", config_file("infinigen_default.yaml"), "--close-on-completion"}) ==
+        text);
+}
+
+TEST_CASE("The plan of the tutorial's multi-writer job is what the tutorial prescribes", "[plan]") {
+  const std::string text = dry_run({config_file("infinigen_multi_writers_pt.yaml")});
+  CHECK_THAT(text, Contains("12 captures x 2 cameras = 24 frames, seed 12, debug"));
+  CHECK_THAT(text, Contains("capture floating x 2 -> simulate 200 -> capture dropped x 3"));
+  CHECK_THAT(text, Contains("objects (49)"));
+  CHECK_THAT(text, Contains("auto_label: 5 below /Assets"));
+  CHECK_THAT(text, Contains("shape_distractors: 30 below"));
+  CHECK_THAT(text, Contains("mesh_distractors: 10 below"));
+  CHECK_THAT(text, Contains("cam x 2: pinhole 640x480"));
+  CHECK_THAT(text, Contains("SphereLight_scene x 4: sphere"));
+  CHECK_THAT(text, Contains("BasicWriter (BasicWriter) to _out_infinigen_basicwriter_pt"));
+  CHECK_THAT(text, Contains("to _out_infinigen_dataviswriter_pt"));
+  CHECK_THAT(text, Contains("\"mode\": \"path_traced\""));
+  check_golden("infinigen_multi_writers_pt.txt", text);
+}

@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <csignal>
+
+#include "program.h"
+#include "support/catch.h"
+
+using namespace diorama::test;
+using Catch::Matchers::Contains;
+
+namespace {
+
+std::vector<std::string> smoke(const std::string& output, std::vector<std::string> more = {}) {
+  std::vector<std::string> arguments{"run", config_file("smoke.yaml"), "--output", output};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return arguments;
+}
+
+std::map<std::string, std::string> dataset(const TemporaryFolder& folder,
+                                           std::vector<std::string> more = {}) {
+  const Outcome outcome = run(smoke("out", std::move(more)), folder.path());
+  INFO(outcome.errors);
+  REQUIRE(outcome.exit_code == 0);
+  return tree(folder / "out");
+}
+
+std::size_t journal_entries(const fs::path& output) {
+  std::size_t count = 0;
+  std::error_code gone;
+  for (const auto& entry : fs::directory_iterator(output / ".diorama" / "journal", gone)) {
+    const std::string name = entry.path().filename().string();
+    if (name.size() == 11 && name.ends_with(".json")) ++count;
+  }
+  return count;
+}
+
+/// Waits until the dataset has so many captures; false when the process has ended before.
+bool wait_for_captures(const fs::path& output, std::size_t count) {
+  for (int i = 0; i < 60000; ++i) {
+    if (journal_entries(output) >= count) return true;
+    ::usleep(1000);
+  }
+  return false;
+}
+
+}  // namespace
+
+TEST_CASE("A run leaves a whole dataset, no warnings, and a summary", "[run]") {
+  const TemporaryFolder folder;
+  const Outcome outcome = run(smoke("out"), folder.path());
+  INFO(outcome.errors);
+  REQUIRE(outcome.exit_code == 0);
+  CHECK_THAT(outcome.errors, !Contains("warning"));
+  CHECK_THAT(outcome.errors, Contains("Finished, captured 8 frames (4 captures x 2 cameras)"));
+  CHECK_THAT(outcome.errors, Contains("residual speed"));
+  const auto files = tree(folder / "out");
+  CHECK(files.contains("dataset.json"));
+  CHECK(files.size() > 4 * 2 * 5);
+  for (const auto& [name, text] : files) CHECK_THAT(name, !Contains("stage"));
+}
+
+TEST_CASE("Two runs, and any number of threads, give the same bytes", "[run]") {
+  const TemporaryFolder first;
+  const auto expected = dataset(first, {"--threads", "1"});
+  for (const char* threads : {"1", "2", "7"}) {
+    const TemporaryFolder other;
+    const auto files = dataset(other, {"--threads", threads});
+    CHECK(difference(expected, files) == "");
+  }
+}
+
+TEST_CASE("Another seed gives other data", "[run]") {
+  const TemporaryFolder first;
+  const TemporaryFolder second;
+  CHECK(dataset(first) != dataset(second, {"--seed", "99"}));
+}
+
+TEST_CASE("Shards into one folder make the dataset of one run", "[run]") {
+  const std::vector<std::string> longer{"--set", "total_captures=7"};
+  const TemporaryFolder whole;
+  const auto expected = dataset(whole, longer);
+  const TemporaryFolder folder;
+  for (const char* shard : {"2/3", "3/3", "1/3"}) {
+    const Outcome outcome =
+        run(smoke("out", {"--set", "total_captures=7", "--shard", shard}), folder.path());
+    INFO(outcome.errors);
+    CHECK(outcome.exit_code == 0);
+  }
+  CHECK(difference(expected, tree(folder / "out")) == "");
+}
+
+TEST_CASE("After kill -9 a resumed run gives the same bytes", "[run]") {
+  const std::vector<std::string> longer{"--set", "total_captures=40"};
+  const TemporaryFolder whole;
+  const auto expected = dataset(whole, longer);
+  const TemporaryFolder folder;
+  std::vector<std::string> arguments = smoke("out", {"--set", "total_captures=40", "--resume"});
+  for (const std::size_t captures : {1, 9, 22}) {
+    Process process(arguments, folder.path());
+    REQUIRE(wait_for_captures(folder / "out", captures));
+    process.signal(SIGKILL);
+    CHECK(process.wait().exit_code == 128 + SIGKILL);
+  }
+  CHECK(journal_entries(folder / "out") < 40);
+  const Outcome outcome = run(arguments, folder.path());
+  INFO(outcome.errors);
+  CHECK(outcome.exit_code == 0);
+  CHECK(difference(expected, tree(folder / "out")) == "");
+}
+
+TEST_CASE("Ctrl-C ends a run with 130 and leaves it resumable", "[run]") {
+  const std::vector<std::string> longer{"--set", "total_captures=40"};
+  const TemporaryFolder whole;
+  const auto expected = dataset(whole, longer);
+  const TemporaryFolder folder;
+  Process process(smoke("out", longer), folder.path());
+  REQUIRE(wait_for_captures(folder / "out", 2));
+  process.signal(SIGINT);
+  const Outcome outcome = process.wait();
+  CHECK(outcome.exit_code == 130);
+  CHECK_THAT(outcome.errors, Contains("interrupted; `--resume` goes on"));
+  for (const auto& [name, text] : tree(folder / "out")) CHECK_THAT(name, !Contains("stage"));
+  CHECK(run(smoke("out", {"--set", "total_captures=40", "--resume"}), folder.path()).exit_code == 0);
+  CHECK(difference(expected, tree(folder / "out")) == "");
+}
+
+TEST_CASE("An existing dataset is neither mixed up nor lost by accident", "[run]") {
+  const TemporaryFolder folder;
+  const auto expected = dataset(folder);
+  const Outcome again = run(smoke("out"), folder.path());
+  CHECK(again.exit_code == 6);
+  CHECK_THAT(again.errors, Contains("already holds a dataset with 4 captures"));
+  const Outcome other = run(smoke("out", {"--resume", "--seed", "8"}), folder.path());
+  CHECK(other.exit_code == 6);
+  CHECK_THAT(other.errors, Contains("differs in: seed"));
+  CHECK(difference(expected, tree(folder / "out")) == "");
+  CHECK(run(smoke("out", {"--resume"}), folder.path()).exit_code == 0);
+  CHECK(difference(expected, tree(folder / "out")) == "");
+  CHECK(run(smoke("out", {"--overwrite"}), folder.path()).exit_code == 0);
+  CHECK(difference(expected, tree(folder / "out")) == "");
+}
+
+TEST_CASE("One more randomizer leaves the draws of the others as they were", "[run]") {
+  const TemporaryFolder folder;
+  const auto before = dataset(folder);
+  std::string job = read_file(config_file("smoke.yaml"));
+  const std::string list = "randomizers:\n";
+  job.insert(job.find(list) + list.size(),
+             "  - {type: random_colors, name: first, on: [environment, dropped], nodes: "
+             "\"/Assets/**\"}\n");
+  write_file(folder / "more.yaml", job);
+  const Outcome outcome = run({"run", "more.yaml", "--output", "more"}, folder.path());
+  INFO(outcome.errors);
+  REQUIRE(outcome.exit_code == 0);
+  int compared = 0;
+  for (const auto& [name, text] : tree(folder / "more")) {
+    // Colours change, what follows from poses does not.
+    const bool is_geometry = name.find("camera_params") != std::string::npos ||
+                             name.find("distance_to_image_plane") != std::string::npos;
+    if (!is_geometry) continue;
+    ++compared;
+    CHECK(before.at(name) == text);
+  }
+  CHECK(compared >= 16);
+}
+
+TEST_CASE("The resolved job gives the dataset of the job", "[run]") {
+  const TemporaryFolder folder;
+  const auto expected = dataset(folder);
+  const Outcome config = run({"config", config_file("smoke.yaml")}, folder.path());
+  REQUIRE(config.exit_code == 0);
+  write_file(folder / "resolved.yaml", config.output);
+  const Outcome outcome = run({"run", "resolved.yaml", "--output", "again"}, folder.path());
+  INFO(outcome.errors);
+  REQUIRE(outcome.exit_code == 0);
+  CHECK(difference(expected, tree(folder / "again")) == "");
+}
+
+TEST_CASE("Memory does not grow with the number of visits", "[run][slow]") {
+  const TemporaryFolder folder;
+  const auto peak_of = [&](const char* captures, const char* output) {
+    const Outcome outcome =
+        run(smoke(output, {"--set", std::string("total_captures=") + captures}), folder.path());
+    REQUIRE(outcome.exit_code == 0);
+    return outcome.max_rss_kb;
+  };
+  const long after_6 = peak_of("12", "a");
+  const long after_40 = peak_of("80", "b");
+  CHECK(after_40 < after_6 * 1.05 + 3000);
+}

@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/pipeline/capture_plan.h"
+
+#include <set>
+
+#include "diorama/error.h"
+#include "jobs.h"
+#include "support/catch.h"
+
+using namespace diorama;
+using namespace diorama::test;
+using Catch::Matchers::Contains;
+
+namespace {
+
+const std::vector<std::string> kFood{"/ycb/011_banana.usd", "/ycb/003_cracker_box.usd",
+                                     "/ycb/024_bowl.usd", "/ycb/025_mug.usd"};
+
+CapturePlan plan_of(const Job& job) {
+  std::vector<std::vector<std::string>> assets(job.objects.size(), kFood);
+  return plan_captures(job, {{"/rooms/a.usd", 0}, {"/rooms/b.usd", 0}}, assets);
+}
+
+std::vector<std::string> choices(const CapturePlan& plan, std::size_t group) {
+  std::vector<std::string> result;
+  for (const PlannedObject& object : plan.objects) {
+    if (object.group == group) result.push_back(object.asset + (object.floats ? " up" : " down"));
+  }
+  return result;
+}
+
+}  // namespace
+
+TEST_CASE("Environments are cycled until all captures are planned", "[plan]") {
+  const CapturePlan plan = plan_of(job_from(good_job()));
+  REQUIRE(plan.visits.size() == 3);
+  CHECK(plan.capture_count() == 7);
+  CHECK(plan.visits[0].environment == 0);
+  CHECK(plan.visits[1].environment == 1);
+  CHECK(plan.visits[2].environment == 0);
+
+  // 3 captures per visit; the last visit is cut short.
+  CHECK(plan.visits[1].captures.size() == 3);
+  CHECK(plan.visits[1].captures[0].index == 3);
+  CHECK(plan.visits[1].captures[1].phase == "floating");
+  CHECK(plan.visits[1].captures[1].number == 1);
+  CHECK(plan.visits[1].captures[2].phase == "dropped");
+  CHECK(plan.visits[1].captures[2].number == 0);
+  REQUIRE(plan.visits[2].captures.size() == 1);
+  CHECK(plan.visits[2].captures[0].index == 6);
+}
+
+TEST_CASE("No captures wanted, no visits planned", "[plan]") {
+  const CapturePlan plan =
+      plan_of(job_from(with(good_job(), "total_captures: 7", "total_captures: 0")));
+  CHECK(plan.visits.empty());
+}
+
+TEST_CASE("Shards are disjoint and together make the whole", "[plan]") {
+  const CapturePlan plan =
+      plan_of(job_from(with(good_job(), "total_captures: 7", "total_captures: 100")));
+  for (const int shards : {1, 2, 3, 7, 50}) {
+    std::multiset<int> indices;
+    for (int shard = 0; shard < shards; ++shard) {
+      for (const PlannedVisit& visit : shard_of(plan, shard, shards)) {
+        for (const PlannedCapture& capture : visit.captures) indices.insert(capture.index);
+      }
+    }
+    CHECK(indices.size() == 100);
+    CHECK(*indices.begin() == 0);
+    CHECK(*indices.rbegin() == 99);
+    CHECK(std::set<int>(indices.begin(), indices.end()).size() == 100);
+  }
+}
+
+TEST_CASE("Objects get labels by pattern, names by label and gravity by chance", "[plan]") {
+  const CapturePlan plan = plan_of(job_from(good_job()));
+  REQUIRE(plan.objects.size() == 28);
+  std::set<std::string> paths;
+  for (const PlannedObject& object : plan.objects) {
+    CHECK(paths.insert(object.path).second);
+    const std::string prefix = object.floats ? "floating_" : "falling_";
+    CHECK(object.name.starts_with(prefix));
+    if (object.group == 1) {
+      CHECK(object.labels.empty());
+      CHECK(object.name.starts_with(prefix + asset_stem(object.asset)));
+      CHECK(object.path == "/Distractors/" + object.name);
+      continue;
+    }
+    const std::string label = asset_stem(object.asset).substr(4);
+    CHECK(object.labels == Labels{{"class", label}});
+    CHECK(object.name.starts_with(prefix + label));
+    CHECK(object.path == "/Assets/" + object.name);
+  }
+}
+
+TEST_CASE("A repeated name is numbered like the scene does it", "[plan]") {
+  std::string yaml = with(good_job(), "count: 20", "count: 3");
+  yaml = with(yaml, "gravity_disabled_chance: 0.25", "gravity_disabled_chance: 0, label: mug");
+  const CapturePlan plan = plan_of(job_from(yaml));
+  Scene scene;
+  const NodeId assets = scene.create(scene.root(), "Assets");
+  for (int i = 0; i < 3; ++i) {
+    const NodeId node = scene.create(assets, "falling_mug");
+    CHECK(scene.path(node) == plan.objects[std::size_t(i)].path);
+  }
+}
+
+TEST_CASE("What is chosen for one group does not depend on other groups", "[plan]") {
+  const CapturePlan plan = plan_of(job_from(good_job()));
+  const CapturePlan longer = plan_of(job_from(with(
+      good_job(), "objects:\n", "objects:\n  - {type: files, name: first, under: /Assets, count: 3}\n")));
+  CHECK(choices(plan, 0) == choices(longer, 1));
+  CHECK(choices(plan, 1) == choices(longer, 2));
+  // More objects in a group leave the first ones as they were.
+  const CapturePlan more = plan_of(job_from(with(good_job(), "count: 20", "count: 21")));
+  auto first = choices(more, 0);
+  first.pop_back();
+  CHECK(choices(plan, 0) == first);
+  const CapturePlan other_seed = plan_of(job_from(with(good_job(), "seed: 5", "seed: 6")));
+  CHECK(choices(plan, 0) != choices(other_seed, 0));
+}
+
+TEST_CASE("Over many seeds picks are uniform and gravity keeps its chance", "[plan]") {
+  constexpr int kSeeds = 500;
+  constexpr int kObjects = 20;
+  std::map<std::string, int> picks;
+  int floating = 0;
+  for (int seed = 1; seed <= kSeeds; ++seed) {
+    Job job = job_from(good_job());
+    job.seed = std::uint64_t(seed);
+    const CapturePlan plan = plan_of(job);
+    for (const PlannedObject& object : plan.objects) {
+      if (object.group != 0) continue;
+      ++picks[object.asset];
+      floating += object.floats ? 1 : 0;
+    }
+  }
+  const double all = kSeeds * kObjects;
+  double chi_square = 0.0;
+  for (const std::string& asset : kFood) {
+    const double expected = all / 4.0;
+    chi_square += (picks[asset] - expected) * (picks[asset] - expected) / expected;
+  }
+  CHECK(chi_square < 16.27);  // 3 degrees of freedom, level 0.001
+  const double deviation = std::sqrt(all * 0.25 * 0.75);
+  CHECK(std::abs(floating - all * 0.25) < 3.29 * deviation);  // level 0.001
+}
+
+TEST_CASE("A group without assets is an error that names the place", "[plan]") {
+  const Job job = job_from(good_job());
+  CHECK_THROWS_WITH(plan_captures(job, {{"a", 0}}, {{}, kFood}),
+                    Contains("job.yaml:5:5: objects[0]: names no assets, but 20 objects are wanted"));
+}
+
+TEST_CASE("Random streams depend on what they are for and on nothing else", "[plan]") {
+  const JobStreams streams(9);
+  const auto draw = [](Rng rng) { return rng.bits(); };
+  std::set<std::uint64_t> draws;
+  for (const std::string name : {"a", "b"}) {
+    for (int visit = 0; visit < 3; ++visit) {
+      for (const std::string moment : {"environment", "floating"}) {
+        for (int occurrence = 0; occurrence < 3; ++occurrence) {
+          draws.insert(draw(streams.randomizer(name, visit, moment, occurrence)));
+        }
+      }
+    }
+  }
+  CHECK(draws.size() == 2 * 3 * 2 * 3);
+  CHECK(draw(streams.randomizer("a", 1, "floating", 2)) ==
+        draw(JobStreams(9).randomizer("a", 1, "floating", 2)));
+  CHECK(streams.render_seed(1, "cam_0") != streams.render_seed(1, "cam_1"));
+  CHECK(streams.render_seed(1, "cam_0") != streams.render_seed(2, "cam_0"));
+}
+
+TEST_CASE("The stem of an asset is its name without folders, scheme and ending", "[plan]") {
+  CHECK(asset_stem("/a.b/011_banana.usd") == "011_banana");
+  CHECK(asset_stem("sample:banana") == "banana");
+  CHECK(asset_stem("shape:cube") == "cube");
+  CHECK(asset_stem("dining_room:7") == "7");
+  CHECK(asset_stem(".hidden") == ".hidden");
+}

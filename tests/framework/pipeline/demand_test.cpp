@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/pipeline/demand.h"
+
+#include "diorama/error.h"
+#include "support/catch.h"
+
+using namespace diorama;
+using Catch::Matchers::Contains;
+
+namespace {
+
+const NameSet kRendered{"color", "leaf_id", "position"};
+const std::vector<AnnotatorOffer> kOffers{
+    {"boxes", {"instances", "position"}, {"boxes"}},
+    {"instances", {"instance_id"}, {"instances"}},
+    {"instance_ids", {"leaf_id"}, {"instance_id"}},
+    {"loop_a", {"b"}, {"a"}},
+    {"loop_b", {"a"}, {"b"}},
+};
+
+Demand demand_for(NameSet names) {
+  const std::vector<Need> needs{{"writer 'w'", std::move(names)}};
+  return resolve_demand(needs, kRendered, "renderer 'r'", kOffers);
+}
+
+}  // namespace
+
+TEST_CASE("Needs become channels and annotators in an order that works", "[demand]") {
+  const Demand demand = demand_for({"boxes", "color"});
+  CHECK(demand.channels == NameSet{"color", "leaf_id", "position"});
+  CHECK(demand.annotators == std::vector<std::size_t>{2, 1, 0});
+  CHECK_FALSE(demand.visibility);
+}
+
+TEST_CASE("Only what is asked for is made", "[demand]") {
+  const Demand demand = demand_for({"color"});
+  CHECK(demand.channels == NameSet{"color"});
+  CHECK(demand.annotators.empty());
+}
+
+TEST_CASE("Without writers nothing is made", "[demand]") {
+  const Demand demand = resolve_demand({}, kRendered, "renderer 'r'", kOffers);
+  CHECK(demand.channels.empty());
+  CHECK(demand.annotators.empty());
+}
+
+TEST_CASE("Visibility brings instances and their ids along", "[demand]") {
+  const Demand plain = demand_for({"visibility"});
+  CHECK(plain.visibility);
+  CHECK_FALSE(plain.amodal_mask);
+  CHECK(plain.channels == NameSet{"leaf_id"});
+  CHECK(demand_for({"amodal_mask"}).amodal_mask);
+}
+
+TEST_CASE("A need that nothing provides names the writer, the need and what there is", "[demand]") {
+  CHECK_THROWS_WITH(demand_for({"heat"}),
+                    Contains("writer 'w': needs \"heat\", which neither renderer 'r' nor an "
+                             "annotator provides") &&
+                        Contains("color") && Contains("visibility"));
+  const std::vector<Need> needs{{"writer 'w'", {"boxes"}}};
+  CHECK_THROWS_WITH(resolve_demand(needs, {"color", "leaf_id"}, "renderer 'r'", kOffers),
+                    Contains("writer 'w' (through annotator 'boxes'): needs \"position\""));
+}
+
+TEST_CASE("Annotators that wait for each other are refused", "[demand]") {
+  CHECK_THROWS_WITH(demand_for({"a"}), Contains("needs its own output"));
+}

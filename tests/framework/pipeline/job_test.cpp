@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/pipeline/job.h"
+
+#include "framework/config/value_text.h"
+#include "jobs.h"
+#include "support/catch.h"
+
+using namespace diorama;
+using namespace diorama::test;
+using Catch::Matchers::Contains;
+
+TEST_CASE("A right job is read without complaints", "[job]") {
+  const Job job = job_from(good_job());
+  CHECK(job.seed == 5);
+  CHECK(job.total_captures == 7);
+  CHECK(job.objects[0].label_pattern == "^\\d+_");
+  CHECK(job.objects[1].label_pattern == std::nullopt);
+  CHECK(job.camera_names() == std::vector<std::string>{"cam_0", "cam_1"});
+  CHECK(job.series() == std::vector<std::string>{"floating", "dropped"});
+  CHECK(job.physics.type == "bullet");
+  CHECK(job.renderer.type == "embree");
+  CHECK(job.writers[0].output_dir == std::nullopt);
+}
+
+TEST_CASE("Without a timeline a visit does what the tutorial does", "[job]") {
+  const Job job = job_from(with(good_job(), "timeline: [{simulate: 4}, {capture: floating, count: "
+                                            "2}, {simulate: 200}, {capture: dropped, count: 1}]\n",
+                                ""));
+  REQUIRE(job.timeline.size() == 4);
+  CHECK(job.timeline[0].steps == 4);
+  CHECK(job.timeline[1].name == "floating");
+  CHECK(job.timeline[1].count == 2);
+  CHECK(job.timeline[2].steps == 200);
+  CHECK(job.timeline[3].name == "dropped");
+}
+
+TEST_CASE("All complaints about a job come in one go, with places and near names", "[job]") {
+  std::string yaml = with(good_job(), "total_captures: 7", "total_captures: -7");
+  yaml = with(yaml, "timeline:", "timelime:");
+  yaml = with(yaml, "width: 64", "widht: 64");
+  yaml = with(yaml, "count: 20", "count: lots");
+  const std::string text = complaints_about(yaml);
+  CHECK_THAT(text, Contains("job.yaml:2:17") && Contains("total_captures") && Contains("-7"));
+  CHECK_THAT(text, Contains("unknown key `timelime`; did you mean `timeline`?"));
+  CHECK_THAT(text, Contains("widht") && Contains("width"));
+  CHECK_THAT(text, Contains("objects[0].count") && Contains("lots"));
+}
+
+TEST_CASE("Mistakes that make a job pointless are named", "[job]") {
+  const std::string good = good_job();
+  CHECK_THAT(complaints_about(with(good, "[{type: files, files: [a.usd, b.usd]}]", "[]")),
+             Contains("environments: the list is empty"));
+  CHECK_THAT(complaints_about(with(with(good, "floating, count: 2", "floating, count: 0"),
+                                   "dropped, count: 1", "dropped, count: 0")),
+             Contains("job.yaml:11:11: timeline: the capture series have no captures in all, so "
+                      "total_captures: 7 can never be reached"));
+  CHECK_THAT(complaints_about(with(good, "name: cam, count: 2", "name: cam, count: 0")),
+             Contains("cameras: there are none"));
+  CHECK_THAT(complaints_about(with(good, "on: [floating, dropped]", "on: [floting]")),
+             Contains("randomizers[1].on: unknown moment \"floting\"; did you mean \"floating\"?"));
+  CHECK_THAT(complaints_about(with(good, "name: clutter", "name: targets")),
+             Contains("objects[1]: another entry is called \"targets\""));
+  CHECK_THAT(complaints_about(with(good, "name: orbit", "name: poses")),
+             Contains("randomizers[1]: another entry is called \"poses\""));
+  CHECK_THAT(complaints_about(with(good, "{type: shapes, name: clutter", "{name: clutter")),
+             Contains("objects[1]: `type` is missing"));
+  CHECK_THAT(complaints_about(with(good, "{simulate: 4}", "{simulate: 4, capture: x}")),
+             Contains("timeline[0]: expected one of"));
+  CHECK_THAT(complaints_about(with(good, "\"^\\\\d+_\"", "\"(\"")),
+             Contains("objects[0].label_pattern: not a regular expression"));
+  CHECK_THAT(complaints_about(with(good, "under: /Assets", "under: Assets")),
+             Contains("objects[0].under: expected a path like /Assets, found \"Assets\""));
+  CHECK_THAT(complaints_about("[1, 2]"), Contains("a job is a mapping of sections"));
+}
+
+TEST_CASE("The null renderer may be written without quotes", "[job]") {
+  CHECK(job_from(good_job() + "renderer: {type: null}\n").renderer.type == "null");
+  CHECK(job_from(good_job() + "renderer: {type: \"null\"}\n").renderer.type == "null");
+}
+
+TEST_CASE("The resolved job has every default and means the same", "[job]") {
+  const DescribeComponent describe = [](ComponentKind kind, std::string_view type) {
+    std::optional<std::vector<ParamSpec>> specs;
+    if (kind == ComponentKind::Writer && type == "BasicWriter") {
+      ParamSpec spec;
+      spec.key = "depth";
+      spec.type = ParamType::Bool;
+      spec.default_value = Value::boolean(false);
+      specs.emplace().push_back(spec);
+    }
+    return specs;
+  };
+  const Value resolved = resolved_job(job_value(good_job() + "renderer: {type: null}\n"), describe);
+  const std::string text = to_yaml(resolved);
+  CHECK_THAT(text, Contains("depth: false"));
+  CHECK_THAT(text, Contains("near_m: 0.25"));
+  CHECK_THAT(text, Contains("mass_kg: 1"));
+
+  const Job again = job_from(text);
+  const Job first = job_from(good_job());
+  CHECK(again.renderer.type == "null");
+  CHECK(again.objects.size() == first.objects.size());
+  CHECK(again.objects[0].label_pattern == first.objects[0].label_pattern);
+  CHECK(again.objects[1].label == std::nullopt);
+  CHECK(again.cameras[0].fx_px == std::nullopt);
+  CHECK(again.writers[0].output_dir == "basic");
+  CHECK(again.total_captures == first.total_captures);
+  CHECK(to_yaml(resolved_job(job_value(text), describe)) == text);
+}

@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/pipeline/scene_setup.h"
+
+#include "fake_host.h"
+#include "jobs.h"
+#include "support/catch.h"
+
+using namespace diorama;
+using namespace diorama::test;
+using Catch::Matchers::Contains;
+
+namespace {
+
+NodeId add_mesh(Scene& scene, NodeId parent, const char* name, const Vec3& position) {
+  const NodeId node = scene.create(parent, name);
+  scene.edit(node).mesh = std::make_shared<const Mesh>(make_box(Vec3(0.4, 0.6, 0.8)));
+  scene.set_pose(node, Transform{position, Quat::Identity(), Vec3::Ones()});
+  return node;
+}
+
+/// Two nodes match "TableDining"; the first one in traversal order has its meshes below it.
+void build_room(Scene& scene, NodeId root) {
+  scene.set_pose(root, Transform{Vec3(10.0, 20.0, 0.0), Quat::Identity(), Vec3::Ones()});
+  add_mesh(scene, root, "dining_room_exterior", Vec3::Zero());
+  add_mesh(scene, root, "dining_room_ceiling", Vec3(0, 0, 3));
+  const NodeId lamp = scene.create(root, "CeilingLight_001_SPLIT_GLA");
+  add_mesh(scene, lamp, "glass", Vec3::Zero());
+  const NodeId table = scene.create(root, "TableDiningFactory_1_spawn");
+  scene.set_pose(table, Transform{Vec3(1.0, 2.0, 0.5), Quat::Identity(), Vec3::Ones()});
+  add_mesh(scene, table, "top", Vec3(0, 0, 0.7));
+  add_mesh(scene, root, "TableDiningFactory_2_spawn", Vec3(5, 5, 0));
+}
+
+EnvironmentRules infinigen_rules() {
+  EnvironmentRules rules;
+  rules.hide = {"001_SPLIT_GLA"};
+  rules.hide_in_debug = {"_exterior", "_ceiling"};
+  rules.box_colliders = {"TableDining"};
+  rules.working_area = "TableDining";
+  return rules;
+}
+
+struct Room {
+  FakeHost host;
+  Scene scene;
+  NodeId environment;
+  Room() {
+    host.assets["room"] = build_room;
+    environment = host.load_asset("room", scene, scene.create(scene.root(), "Environment"));
+  }
+  const Node& at(const std::string& path) {
+    return scene[scene.require("/Environment/loaded/" + path)];
+  }
+};
+
+}  // namespace
+
+TEST_CASE("Rules hide by part of the path and find the working area in the world", "[environment]") {
+  Room room;
+  const Vec3 area =
+      apply_environment_rules(infinigen_rules(), false, room.environment, room.scene, room.host);
+  CHECK((area - Vec3(11.0, 22.0, 0.5)).norm() < 1e-12);
+  CHECK_FALSE(room.at("CeilingLight_001_SPLIT_GLA").is_visible);
+  CHECK(room.at("dining_room_exterior").is_visible);
+  CHECK(room.host.warnings.empty());
+}
+
+TEST_CASE("Debug mode also hides walls and ceiling", "[environment]") {
+  Room room;
+  apply_environment_rules(infinigen_rules(), true, room.environment, room.scene, room.host);
+  CHECK_FALSE(room.at("dining_room_exterior").is_visible);
+  CHECK_FALSE(room.at("dining_room_ceiling").is_visible);
+  CHECK(room.at("TableDiningFactory_1_spawn").is_visible);
+}
+
+TEST_CASE("Every mesh collides, hidden ones too; the first table as boxes", "[environment]") {
+  Room room;
+  apply_environment_rules(infinigen_rules(), true, room.environment, room.scene, room.host);
+  CHECK(room.at("dining_room_ceiling").collider->shape == ColliderShape::TriangleMesh);
+  CHECK(room.at("CeilingLight_001_SPLIT_GLA/glass").collider->shape == ColliderShape::TriangleMesh);
+  CHECK(room.at("TableDiningFactory_1_spawn/top").collider->shape == ColliderShape::BoundingBox);
+  CHECK(room.at("TableDiningFactory_2_spawn").collider->shape == ColliderShape::TriangleMesh);
+  CHECK_FALSE(room.at("TableDiningFactory_1_spawn").collider);
+}
+
+TEST_CASE("A room without a table gets a warning and the origin", "[environment]") {
+  Room room;
+  EnvironmentRules rules = infinigen_rules();
+  rules.working_area = "TablePingPong";
+  const Vec3 area = apply_environment_rules(rules, false, room.environment, room.scene, room.host);
+  CHECK(area == Vec3::Zero());
+  REQUIRE(room.host.warnings.size() == 1);
+  CHECK_THAT(room.host.warnings[0],
+             Contains("/Environment/loaded: no node's path holds \"TablePingPong\""));
+}
+
+TEST_CASE("The environment's own name matches no rule", "[environment]") {
+  Room room;
+  EnvironmentRules rules;
+  rules.hide = {"loaded", "Environment"};
+  apply_environment_rules(rules, false, room.environment, room.scene, room.host);
+  for (const NodeId node : room.scene.subtree(room.environment)) {
+    CHECK(room.scene[node].is_visible);
+  }
+}
+
+TEST_CASE("Objects get labels, colliders and one body, and lose the asset's own", "[spawn]") {
+  FakeHost host;
+  host.assets["mug"] = [](Scene& scene, NodeId root) {
+    scene.edit(root).labels = {{"class", "wrong"}};
+    const NodeId part = add_mesh(scene, root, "part", Vec3::Zero());
+    scene.edit(part).labels = {{"class", "worse"}};
+    scene.edit(part).rigid_body = RigidBody{0.25};
+    const NodeId round = add_mesh(scene, root, "round", Vec3::Zero());
+    Collider exact;
+    exact.shape = ColliderShape::Primitive;
+    exact.primitive = PrimitiveShape::Sphere;
+    scene.edit(round).collider = exact;
+  };
+  const Job job = job_from(R"(
+environments: [{type: files}]
+cameras: [{type: pinhole}]
+objects:
+  - {type: files, name: a, under: /Assets/Deep, count: 2, label: mug, taxonomy: kind}
+  - {type: files, name: b, under: /Distractors, count: 1, gravity_disabled_chance: 1, mass_kg: 3}
+)");
+  host.assets["box"] = [](Scene& scene, NodeId root) { add_mesh(scene, root, "m", Vec3::Zero()); };
+  const CapturePlan plan = plan_captures(job, {{"room", 0}}, {{"mug"}, {"box"}});
+  Scene scene;
+  const std::vector<NodeId> objects = spawn_objects(plan, job, scene, host);
+  REQUIRE(objects.size() == 3);
+  CHECK(scene.path(objects[0]) == "/Assets/Deep/falling_mug");
+  CHECK(scene.path(objects[1]) == "/Assets/Deep/falling_mug_01");
+  CHECK(scene.path(objects[2]) == "/Distractors/floating_box");
+
+  const Node& mug = scene[objects[0]];
+  CHECK(mug.labels == Labels{{"kind", "mug"}});
+  CHECK(mug.rigid_body->mass_kg == 0.25);
+  CHECK(mug.rigid_body->has_gravity);
+  const Node& part = scene[scene.require("/Assets/Deep/falling_mug/loaded/part")];
+  CHECK(part.labels.empty());
+  CHECK_FALSE(part.rigid_body);
+  CHECK(part.collider->shape == ColliderShape::ConvexHull);
+  const Node& round = scene[scene.require("/Assets/Deep/falling_mug/loaded/round")];
+  CHECK(round.collider->shape == ColliderShape::Primitive);
+
+  const Node& box = scene[objects[2]];
+  CHECK(box.labels.empty());
+  CHECK(box.rigid_body->mass_kg == 3.0);
+  CHECK_FALSE(box.rigid_body->has_gravity);
+}
+
+TEST_CASE("Lights and cameras stand where the job says", "[spawn]") {
+  FakeHost host;
+  const Job job = job_from(R"(
+environments: [{type: files}]
+lights:
+  - {type: sphere, name: lamp, count: 2, color: [1, 0.5, 0.25], intensity: 8, position: [1, 2, 3]}
+  - {type: dome, name: sky, texture: sky.hdr}
+  - {type: distant, name: sun, angle_deg: 90, rotation_deg: [0, 90, 0]}
+cameras:
+  - {type: pinhole, name: left, width: 300, height: 200, position: [0, 0, 2], look_at: [0, 5, 2]}
+  - {type: opencv_pinhole, name: right, count: 2, width: 300, height: 200, fx_px: 250, fy_px: 240,
+     cx_px: 140, cy_px: 90, distortion: [0.1, 0.2]}
+)");
+  Scene scene;
+  create_lights(job.lights, scene, host);
+  const Node& lamp = scene[scene.require("/Lights/lamp_1")];
+  CHECK(lamp.light->color == Vec3f(8, 4, 2));
+  CHECK(lamp.parent_from_node.translation() == Vec3(1, 2, 3));
+  CHECK(scene[scene.require("/Lights/sky_0")].light->texture->name == "sky.hdr");
+  const Node& sun = scene[scene.require("/Lights/sun_0")];
+  CHECK(sun.light->angle_rad == Approx(kPi / 2));
+  CHECK((sun.parent_from_node.linear() * Vec3(0, 0, -1) - Vec3(-1, 0, 0)).norm() < 1e-12);
+
+  const std::vector<NodeId> cameras = create_cameras(job.cameras, scene);
+  REQUIRE(cameras.size() == 3);
+  CHECK(scene.path(cameras[0]) == "/Cameras/left_0");
+  CHECK(scene.path(cameras[2]) == "/Cameras/right_1");
+  const Affine& left = scene[cameras[0]].parent_from_node;
+  CHECK((left.linear() * Vec3(0, 0, -1) - Vec3(0, 1, 0)).norm() < 1e-12);
+  CHECK((left.linear() * Vec3(0, 1, 0) - Vec3(0, 0, 1)).norm() < 1e-12);
+  CHECK(scene[cameras[0]].camera->fx == Approx(300 * 24.0 / 20.955));
+  const Camera& right = *scene[cameras[1]].camera;
+  CHECK(right.lens == LensModel::OpencvPinhole);
+  CHECK(right.fx == 250);
+  CHECK(right.fy == 240);
+  CHECK(right.cx == 140);
+  CHECK(right.cy == 90);
+  CHECK(right.distortion[1] == 0.2);
+  CHECK(right.near_m == 0.25);
+}
+
+TEST_CASE("The overview camera looks straight down at the working area", "[spawn]") {
+  Scene scene;
+  const Vec3 area(3.0, -2.0, 0.75);
+  const NodeId camera = create_overview_camera(area, scene);
+  const Affine world_from_camera = scene.world_from_node(camera);
+  const auto pixel =
+      project(*scene[camera].camera, world_from_camera.inverse() * Vec3(3.0, -2.0, 0.75));
+  REQUIRE(pixel);
+  CHECK((*pixel - Vec2(384, 384)).norm() < 1e-9);
+  // +y of the world is up in the picture, +x to the right.
+  const auto up = project(*scene[camera].camera, world_from_camera.inverse() * Vec3(3.0, -1.0, 0.75));
+  CHECK(up->y() < 383);
+  const auto right =
+      project(*scene[camera].camera, world_from_camera.inverse() * Vec3(4.0, -2.0, 0.75));
+  CHECK(right->x() > 385);
+}
