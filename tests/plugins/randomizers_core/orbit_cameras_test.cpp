@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "orbit_cameras.h"
+
+#include "framework/pipeline/fake_host.h"
+#include "obstacles.h"
+#include "statistics.h"
+#include "support/catch.h"
+
+using namespace diorama;
+using namespace diorama::test;
+
+namespace {
+
+/// Two targets whose box centres are not their nodes' origins, one camera.
+struct Set {
+  Set() {
+    Mesh mesh = make_box(Vec3(0.1, 0.2, 0.3));
+    for (Vec3f& position : mesh.positions) position.z() += 0.5f;
+    const auto shared_mesh = std::make_shared<const Mesh>(mesh);
+    const NodeId assets = scene.create(scene.root(), "Assets");
+    for (const Vec3& centre : centres) {
+      const NodeId node = scene.create(assets, "mug");
+      scene.edit(node).mesh = shared_mesh;
+      scene.set_pose(node, Affine(Eigen::Translation3d(centre - Vec3(0, 0, 0.5))));
+    }
+    camera = scene.create(scene.create(scene.root(), "Cameras"), "cam_0");
+    scene.edit(camera).camera = Camera{};
+  }
+  NodeId add_wall(const std::string& name, const Mesh& mesh, const Vec3& place) {
+    const NodeId environment = scene.find("/Environment")
+                                   ? scene.find("/Environment")
+                                   : scene.create(scene.root(), "Environment");
+    const NodeId node = scene.create(environment, name);
+    scene.edit(node).mesh = std::make_shared<const Mesh>(mesh);
+    scene.set_pose(node, Affine(Eigen::Translation3d(place)));
+    return node;
+  }
+  Affine pose() const { return scene.world_from_node(camera); }
+  /// Index of the nearer target.
+  std::size_t target() const {
+    const Vec3 position = pose().translation();
+    return (position - centres[0]).norm() < (position - centres[1]).norm() ? 0 : 1;
+  }
+
+  std::vector<Vec3> centres{Vec3(1, 2, 0.9), Vec3(-7, 3, 1.2)};
+  FakeHost host;
+  Scene scene;
+  NodeId camera;
+};
+
+OrbitCameras::Params orbit_params() {
+  OrbitCameras::Params params;
+  params.polar_angle_deg = {5.0, 75.0};
+  return params;
+}
+
+}  // namespace
+
+TEST_CASE("cameras keep distance and polar angle from the target itself", "[randomizers]") {
+  Set set;
+  OrbitCameras orbit(orbit_params(), set.host);
+  std::vector<double> distance, polar, azimuth, jitter;
+  int first = 0;
+  for (int seed = 0; seed < kSeeds; ++seed) {
+    orbit.randomize(set.scene, {}, Rng(std::uint64_t(seed)));
+    const std::size_t index = set.target();
+    first += index == 0 ? 1 : 0;
+    const Vec3 away = set.pose().translation() - set.centres[index];
+    distance.push_back(away.norm());
+    polar.push_back(std::acos(away.z() / away.norm()) * 180.0 / kPi);
+    azimuth.push_back(std::atan2(away.y(), away.x()));
+    // The axis of view passes the centre at no more than the jitter's corner distance.
+    const Vec3 forward = -set.pose().linear().col(2);
+    jitter.push_back(forward.cross(-away).norm());
+    CHECK(forward.dot(-away) > 0.0);
+    // A level horizon: the camera's x axis is horizontal.
+    CHECK(std::abs(set.pose().linear()(2, 0)) < 1e-9);
+    CHECK(set.pose().linear().determinant() == Approx(1.0));
+  }
+  CHECK(fills(distance, 1.05, 1.25));
+  CHECK(fills(polar, 5.0, 75.0));
+  CHECK(fills(azimuth, -kPi, kPi));
+  CHECK(extent_of(jitter).hi <= 0.1 * std::sqrt(3.0) * 1.25 / 1.05);
+  CHECK(extent_of(jitter).hi > 0.1);
+  CHECK(std::abs(first - 250) < 45);  // binomial, four standard deviations
+}
+
+TEST_CASE("an arc roll is the shortest turn from looking down", "[randomizers]") {
+  Set set;
+  OrbitCameras::Params params = orbit_params();
+  params.roll = "arc";
+  params.look_at_jitter = 0.0;
+  OrbitCameras(params, set.host).randomize(set.scene, {}, Rng(4));
+  const Mat3 rotation = set.pose().linear();
+  const Vec3 forward = -rotation.col(2);
+  const double angle = std::acos(-forward.z());
+  CHECK(Eigen::AngleAxisd(rotation).angle() == Approx(angle));
+  CHECK((forward - (set.centres[set.target()] - set.pose().translation()).normalized()).norm() <
+        1e-7);
+}
+
+TEST_CASE("without targets cameras look at the working area", "[randomizers]") {
+  Set set;
+  OrbitCameras::Params params = orbit_params();
+  params.targets = "/Nothing/*";
+  params.look_at_jitter = 0.0;
+  RandomizeContext context;
+  context.working_area_world = Vec3(4, 5, 6);
+  OrbitCameras(params, set.host).randomize(set.scene, context, Rng(4));
+  const Vec3 away = set.pose().translation() - Vec3(4, 5, 6);
+  CHECK(away.norm() >= 1.05);
+  CHECK(away.norm() <= 1.25);
+}
+
+TEST_CASE("cameras stay on the target's side of a wall and off its surface", "[randomizers]") {
+  Set set;
+  // Walls 0.4 m beside both targets: about a third of all views would be taken from behind.
+  for (const Vec3& centre : set.centres) {
+    set.add_wall("wall", make_box(Vec3(0.1, 8, 8)), centre + Vec3(0.4, 0, 0));
+  }
+  OrbitCameras::Params params = orbit_params();
+  OrbitCameras orbit(params, set.host);
+  params.avoid_obstacles = false;
+  OrbitCameras blind(params, set.host);
+  int behind = 0;
+  for (int seed = 0; seed < 200; ++seed) {
+    orbit.randomize(set.scene, {}, Rng(std::uint64_t(seed)));
+    const Vec3 away = set.pose().translation() - set.centres[set.target()];
+    CHECK(away.x() <= 0.35 - 0.15 + 1e-9);
+    CHECK(away.norm() >= 1.05 - 1e-9);
+    CHECK(away.norm() <= 1.25 + 1e-9);
+    blind.randomize(set.scene, {}, Rng(std::uint64_t(seed)));
+    behind += (set.pose().translation() - set.centres[set.target()]).x() > 0.4 ? 1 : 0;
+  }
+  CHECK(behind > 20);
+}
+
+TEST_CASE("a target that nothing can see still gets a view, the one without avoidance",
+          "[randomizers]") {
+  Set set;
+  for (const Vec3& centre : set.centres) {
+    set.add_wall("box", make_box(Vec3(0.7, 0.7, 0.7)), centre);
+  }
+  OrbitCameras::Params params = orbit_params();
+  params.max_tries = 5;
+  OrbitCameras(params, set.host).randomize(set.scene, {}, Rng(11));
+  const Affine with = set.pose();
+  params.avoid_obstacles = false;
+  OrbitCameras(params, set.host).randomize(set.scene, {}, Rng(11));
+  CHECK(with.matrix() == set.pose().matrix());
+}
+
+TEST_CASE("hidden obstacles block no view, distances to triangles are exact", "[randomizers]") {
+  Set set;
+  const NodeId wall = set.add_wall("wall", make_plane(2, 4), Vec3(10, 0, 1));
+  const Obstacles obstacles(set.scene, "/Environment/**");
+  CHECK(obstacles.is_between(Vec3(10.9, 1.9, 0), Vec3(10.9, 1.9, 2)));
+  CHECK_FALSE(obstacles.is_between(Vec3(10.9, 1.9, 1.1), Vec3(10.9, 1.9, 2)));
+  CHECK_FALSE(obstacles.is_between(Vec3(11.1, 0, 0), Vec3(11.1, 0, 2)));
+  CHECK_FALSE(obstacles.is_between(Vec3(10.9, 2.1, 0), Vec3(10.9, 2.1, 2)));
+  CHECK(obstacles.is_near(Vec3(10.3, 0.7, 1.2), 0.201));
+  CHECK_FALSE(obstacles.is_near(Vec3(10.3, 0.7, 1.2), 0.199));
+  // Beside the corner (11, 2, 1), at a distance of 0.3 * sqrt(3).
+  CHECK(obstacles.is_near(Vec3(11.3, 2.3, 1.3), 0.52));
+  CHECK_FALSE(obstacles.is_near(Vec3(11.3, 2.3, 1.3), 0.519));
+  set.scene.edit(wall).is_visible = false;
+  CHECK_FALSE(
+      Obstacles(set.scene, "/Environment/**").is_between(Vec3(10.9, 1.9, 0), Vec3(10.9, 1.9, 2)));
+}

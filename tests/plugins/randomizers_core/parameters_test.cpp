@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <functional>
+
+#include "diorama/error.h"
+#include "framework/pipeline/fake_host.h"
+#include "orbit_cameras.h"
+#include "random_colors.h"
+#include "scatter_lights.h"
+#include "scatter_poses.h"
+#include "support/catch.h"
+
+using namespace diorama;
+using namespace diorama::test;
+
+namespace {
+
+std::string text_of(const std::function<void()>& body) {
+  try {
+    body();
+  } catch (const Error& error) {
+    CHECK(error.kind() == ErrorKind::Config);
+    return error.what();
+  }
+  return "";
+}
+
+/// What a job file that holds one scalar parameter would be told.
+template <class Params>
+std::string complaint_about(const std::string& key, Value value) {
+  Value map = Value::make_map();
+  map.set(key, std::move(value));
+  Complaints complaints;
+  ParamReader reader(map, "randomizers[0]", complaints);
+  Params params;
+  params.visit(reader);
+  reader.finish();
+  return complaints.is_empty() ? "" : complaints.messages().front();
+}
+
+Value scalar(const std::string& text) {
+  Value value = Value::text(text);
+  value.is_quoted = false;
+  return value;
+}
+
+}  // namespace
+
+TEST_CASE("reversed boxes and colours are refused in words", "[randomizers]") {
+  FakeHost host;
+  ScatterPoses::Params poses;
+  poses.offset_min = Vec3(0.75, 0, 0);
+  CHECK(text_of([&] { ScatterPoses(poses, host); }) ==
+        "offset_min must not exceed offset_max: found [0.75, 0, 0] and [0.5, 0.5, 1.5]");
+  ScatterLights::Params lights;
+  lights.color_max = Vec3(1, 0.05, 1);
+  CHECK(text_of([&] { ScatterLights(lights, host); }) ==
+        "color_min must not exceed color_max: found [0.1, 0.1, 0.1] and [1, 0.05, 1]");
+  RandomColors::Params colors;
+  colors.color_min = Vec3(0, 0, 1);
+  colors.color_max = Vec3(1, 1, 0.5);
+  CHECK(text_of([&] { RandomColors(colors, host); }).find("color_min must not exceed") == 0);
+}
+
+TEST_CASE("parameters out of range or unknown are named", "[randomizers]") {
+  CHECK(complaint_about<OrbitCameras::Params>("distanse", Value::number(1.0)).find("distance") !=
+        std::string::npos);
+  CHECK(complaint_about<OrbitCameras::Params>("roll", scalar("free")).find("level") !=
+        std::string::npos);
+  CHECK(complaint_about<OrbitCameras::Params>("max_tries", Value::integer(0)).find("max_tries") !=
+        std::string::npos);
+  CHECK(complaint_about<ScatterPoses::Params>("scale", Value::number(-1.0)).find("scale") !=
+        std::string::npos);
+  CHECK(complaint_about<ScatterPoses::Params>("scale", Value::number(0.5)).empty());
+}
