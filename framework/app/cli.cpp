@@ -210,6 +210,7 @@ void add_all(CLI::App& app, CommandLine& line) {
   add_config(app, line);
   add_plugins(app, line);
   add_inspect(app, line);
+  add_export(app, line);
   add_new_plugin(app, line);
 }
 
