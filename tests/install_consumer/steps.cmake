@@ -1,4 +1,5 @@
 # What the scripts share. The installation that they use lies at ${PREFIX}.
+cmake_minimum_required(VERSION 3.25)
 set(PREFIX ${WORK}/moved)
 set(DIORAMA ${PREFIX}/${BINDIR}/diorama)
 

@@ -2,6 +2,7 @@
 #   cmake -DINCLUDE_DIR=sdk/include/diorama -DLOCK=tests/sdk/abi_lock.txt [-DLAYOUT=program]
 #         [-DACCEPT=ON] -P abi_guard.cmake
 # Compiled plugins are only as good as these headers: see sdk/docs/abi_policy.md.
+cmake_minimum_required(VERSION 3.25)
 file(GLOB headers RELATIVE ${INCLUDE_DIR} ${INCLUDE_DIR}/*.h)
 list(SORT headers)
 
