@@ -294,10 +294,11 @@ VisitReport Pipeline::report_on(const Visit& visit) const {
   }
   Aabb room = visit.scene.world_bounds(visit.environment);
   if (room.is_empty()) return report;
-  // Things lie on the outer face of the floor's slab at worst.
+  // Things lie on the outer face of the floor's slab at worst; a scene without a roof is open above.
   constexpr double kMarginM = 0.01;
   room.min.array() -= kMarginM;
   room.max.array() += kMarginM;
+  room.max.z() = kInfinity;
   for (const NodeId object : visit.objects) {
     const Vec3 place = visit.scene.world_from_node(object).translation();
     const bool is_inside = (place.array() >= room.min.array()).all() &&

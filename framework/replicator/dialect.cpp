@@ -197,10 +197,9 @@ class Translator {
     add_renderer(capture);
     add_timeline(capture);
     add_writers();
-    if (const Value* flag = section("capture").find("disable_render_products")) {
-      result_.without_effect.push_back(flag->place.text() +
-                                       ": capture.disable_render_products (nothing is rendered "
-                                       "between captures in any case)");
+    if (section("capture").find("disable_render_products")) {
+      result_.without_effect.push_back(
+          "capture.disable_render_products (nothing is rendered between captures in any case)");
     }
     return std::move(result_);
   }
