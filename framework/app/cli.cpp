@@ -12,6 +12,7 @@
 #include "framework/app/command_config.h"
 #include "framework/app/command_export.h"
 #include "framework/app/command_inspect.h"
+#include "framework/app/command_lint.h"
 #include "framework/app/command_new_plugin.h"
 #include "framework/app/command_plugins.h"
 #include "framework/app/command_run.h"
@@ -34,6 +35,7 @@ struct CommandLine {
   JobOptions config;
   bool config_json = false;
   InspectOptions inspect;
+  LintOptions lint;
   ExportCommandOptions export_;
   NewPluginOptions new_plugin;
   bool plugins_json = false;
@@ -162,6 +164,18 @@ void add_inspect(CLI::App& app, CommandLine& line) {
   });
 }
 
+void add_lint(CLI::App& app, CommandLine& line) {
+  CLI::App* command =
+      app.add_subcommand("lint", "Read a dataset back and check that its files agree");
+  command->add_option("dataset", line.lint.dataset, "A writer's folder, or the output of a run")
+      ->required()
+      ->type_name("FOLDER");
+  command->add_flag("--json", line.lint.as_json, "All findings as JSON");
+  command->callback([&line] {
+    line.command = [&line](ConsoleLog&) { return command_lint(line.lint); };
+  });
+}
+
 void add_new_plugin(CLI::App& app, CommandLine& line) {
   CLI::App* command = app.add_subcommand("new-plugin", "Write a plugin project to start from");
   command
@@ -211,6 +225,7 @@ void add_all(CLI::App& app, CommandLine& line) {
   add_plugins(app, line);
   add_inspect(app, line);
   add_export(app, line);
+  add_lint(app, line);
   add_new_plugin(app, line);
 }
 

@@ -111,6 +111,10 @@ Hit trace(const PixelRay& ray, const std::vector<WorldMesh>& meshes) {
   return hit;
 }
 
+Vec3f color_of(const Mesh& mesh) {
+  return mesh.colors.empty() ? Vec3f(Vec3f::Ones()) : mesh.colors[0];
+}
+
 CoverageMask cover(const Frame& frame, const std::vector<WorldMesh>& all,
                    const LabelledInstance& instance) {
   std::vector<WorldMesh> own;
@@ -207,7 +211,7 @@ Frame ray_cast(const Scene& scene, NodeId camera_node) {
       normals.at(x, y) = normal.cast<float>();
       positions.at(x, y) = (ray.origin + hit.t * ray.direction).cast<float>();
       motion.at(x, y) = Vec2f(0.25f * float(x), -0.5f * float(y));
-      hdr.at(x, y) = hit.mesh->mesh->colors[0] * float(0.25 - 0.75 * normal.dot(ray.direction));
+      hdr.at(x, y) = color_of(*hit.mesh->mesh) * float(0.25 - 0.75 * normal.dot(ray.direction));
       for (std::size_t c = 0; c < 3; ++c) {
         color.at(x, y)[c] =
             std::uint8_t(255.0f * srgb_from_linear(std::min(hdr.at(x, y)[Eigen::Index(c)], 1.0f)));

@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/lint/dataset_files.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <sstream>
+
+#include "diorama/error.h"
+#include "framework/images/image_codecs.h"
+
+namespace diorama::lint {
+namespace {
+
+/// Size in bytes of "'<f4'" or of the sum of "[('a', '<u4'), ('m', '<f4', (4, 4))]".
+std::size_t item_size_of(const std::string& descr) {
+  std::size_t total = 0;
+  for (std::size_t at = descr.find_first_of("<|"); at != std::string::npos;
+       at = descr.find_first_of("<|", at + 1)) {
+    std::size_t size = 0;
+    const char* begin = descr.data() + at + 2;
+    const char* end = descr.data() + descr.size();
+    const char* rest = std::from_chars(begin, end, size).ptr;
+    if (std::string_view(rest, std::size_t(end - rest)).starts_with("', (4, 4)")) size *= 16;
+    total += size;
+  }
+  return total;
+}
+
+/// What stands between `before` and `after`.
+std::string between(const std::string& text, const std::string& before, const std::string& after) {
+  const std::size_t begin = text.find(before);
+  const std::size_t end =
+      begin == std::string::npos ? begin : text.find(after, begin + before.size());
+  if (end == std::string::npos) throw std::runtime_error("npy header without " + before);
+  return text.substr(begin + before.size(), end - begin - before.size());
+}
+
+}  // namespace
+
+std::uint32_t Picture::packed(int x, int y) const {
+  std::uint32_t value = 0;
+  for (int c = channels - 1; c >= 0; --c) value = (value << (channels == 1 ? 16 : 8)) | at(x, y, c);
+  return value;
+}
+
+std::size_t NpyArray::count() const {
+  std::size_t product = 1;
+  for (const std::size_t extent : shape) product *= extent;
+  return product;
+}
+
+NpyArray parse_npy(const std::string& bytes) {
+  if (bytes.size() < 10 || bytes.compare(0, 8, std::string("\x93NUMPY\x01\x00", 8)) != 0) {
+    throw std::runtime_error("not an npy file of version 1.0");
+  }
+  const std::size_t length =
+      static_cast<unsigned char>(bytes[8]) + 256u * static_cast<unsigned char>(bytes[9]);
+  if (bytes.size() < 10 + length) throw std::runtime_error("ends within its header");
+  const std::string header = bytes.substr(10, length);
+  NpyArray array;
+  array.descr = between(header, "'descr': ", ", 'fortran_order'");
+  std::istringstream shape(between(header, "'shape': (", ")"));
+  for (std::string extent; std::getline(shape, extent, ',');) {
+    if (extent.find_first_not_of(' ') != std::string::npos) {
+      array.shape.push_back(std::stoull(extent));
+    }
+  }
+  array.item_size = item_size_of(array.descr);
+  const std::size_t expected = array.count() * array.item_size;
+  if (bytes.size() - 10 - length != expected) {
+    throw std::runtime_error("holds " + std::to_string(bytes.size() - 10 - length) +
+                             " bytes of data, its header says " + std::to_string(expected));
+  }
+  array.data.resize(expected);
+  std::memcpy(array.data.data(), bytes.data() + 10 + length, expected);
+  return array;
+}
+
+Picture parse_picture(const std::string& bytes, const std::string& name) {
+  const auto texture = decode_image(std::as_bytes(std::span(bytes.data(), bytes.size())), name);
+  Picture picture{texture->width, texture->height, texture->channels, {}};
+  if (texture->floats.empty()) {
+    picture.samples.assign(texture->bytes.begin(), texture->bytes.end());
+  } else {
+    picture.samples.reserve(texture->floats.size());
+    for (const float value : texture->floats) {
+      picture.samples.push_back(std::uint32_t(std::lround(double(value) * 65535.0)));
+    }
+  }
+  return picture;
+}
+
+Dataset::Dataset(std::filesystem::path root, LintReport& report)
+    : root_(std::move(root)), report_(report) {
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(root_)) {
+    if (!entry.is_regular_file()) continue;
+    std::string path = entry.path().lexically_relative(root_).generic_string();
+    if (path.find(".diorama") == std::string::npos) files_.push_back(std::move(path));
+  }
+  std::ranges::sort(files_);
+}
+
+bool Dataset::has(const std::string& file) const {
+  return std::ranges::binary_search(files_, file);
+}
+
+void Dataset::check(bool holds, const char* rule, const std::string& file,
+                    const std::string& message) {
+  ++report_.checks;
+  if (!holds) find(rule, file, message);
+}
+
+void Dataset::find(const char* rule, const std::string& file, const std::string& message) {
+  report_.findings.push_back({rule, file, message});
+}
+
+std::optional<std::string> Dataset::text(const std::string& file) {
+  std::ifstream in(root_ / file, std::ios::binary);
+  if (!in) {
+    find("nothing is missing", file, "the file is not there");
+    return std::nullopt;
+  }
+  std::ostringstream content;
+  content << in.rdbuf();
+  ++report_.files;
+  return std::move(content).str();
+}
+
+std::optional<Json> Dataset::json(const std::string& file) {
+  const auto content = text(file);
+  if (!content) return std::nullopt;
+  try {
+    return Json::parse(*content);
+  } catch (const Json::exception& error) {
+    find("every file can be read", file, error.what());
+    return std::nullopt;
+  }
+}
+
+std::optional<Picture> Dataset::picture(const std::string& file) {
+  const auto content = text(file);
+  if (!content) return std::nullopt;
+  try {
+    return parse_picture(*content, file);
+  } catch (const std::exception& error) {
+    find("every file can be read", file, error.what());
+    return std::nullopt;
+  }
+}
+
+std::optional<NpyArray> Dataset::npy(const std::string& file) {
+  const auto content = text(file);
+  if (!content) return std::nullopt;
+  try {
+    return parse_npy(*content);
+  } catch (const std::exception& error) {
+    find("every file can be read", file, error.what());
+    return std::nullopt;
+  }
+}
+
+void Dataset::reading(const std::string& file, const std::function<void()>& body) {
+  try {
+    body();
+  } catch (const std::exception& error) {
+    find("every file can be read", file, error.what());
+  }
+}
+
+void Extent::add(int x, int y) {
+  box.x_min = std::min(box.x_min, x);
+  box.y_min = std::min(box.y_min, y);
+  box.x_max = std::max(box.x_max, x + 1);
+  box.y_max = std::max(box.y_max, y + 1);
+  ++count;
+}
+
+std::map<std::uint32_t, Extent> extents(const Picture& picture) {
+  std::map<std::uint32_t, Extent> result;
+  for (int y = 0; y < picture.height; ++y) {
+    Extent* last = nullptr;
+    std::uint32_t last_value = 0;
+    for (int x = 0; x < picture.width; ++x) {
+      const std::uint32_t value = picture.packed(x, y);
+      if (last == nullptr || value != last_value) {
+        last = &result[value];
+        last_value = value;
+      }
+      last->add(x, y);
+    }
+  }
+  return result;
+}
+
+std::string box_text(const PixelBox& box) {
+  return "[" + std::to_string(box.x_min) + ", " + std::to_string(box.y_min) + ", " +
+         std::to_string(box.x_max) + ", " + std::to_string(box.y_max) + ")";
+}
+
+}  // namespace diorama::lint

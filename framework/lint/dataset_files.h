@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "diorama/image.h"
+#include "diorama/math.h"
+#include "framework/lint/lint_report.h"
+
+/// How lint reads: every reader reports what it cannot read as a finding and returns nothing.
+namespace diorama::lint {
+
+using Json = nlohmann::json;
+
+/// Decoded samples of a picture.
+struct Picture {
+  int width = 0;
+  int height = 0;
+  int channels = 0;
+  std::vector<std::uint32_t> samples;  ///< 8 or 16 bit, interleaved.
+
+  std::uint32_t at(int x, int y, int c = 0) const {
+    return samples[(std::size_t(y) * std::size_t(width) + std::size_t(x)) * std::size_t(channels) +
+                   std::size_t(c)];
+  }
+  /// All channels of a pixel in one number, the first in the lowest eight (or sixteen) bits.
+  std::uint32_t packed(int x, int y) const;
+};
+
+/// One column of a structured array, or a plain one.
+struct NpyArray {
+  std::string descr;
+  std::vector<std::size_t> shape;
+  std::size_t item_size = 0;
+  std::vector<std::byte> data;
+
+  std::size_t count() const;  ///< Elements.
+  template <class T>
+  T value(std::size_t offset) const {
+    T result{};
+    std::memcpy(&result, data.data() + offset, sizeof result);
+    return result;
+  }
+};
+
+class Dataset {
+ public:
+  Dataset(std::filesystem::path root, LintReport& report);
+
+  const std::filesystem::path& root() const { return root_; }
+  /// Relative paths of all files, sorted; those of the host's own bookkeeping are left out.
+  const std::vector<std::string>& files() const { return files_; }
+  bool has(const std::string& file) const;
+  /// Counts a comparison; when `holds` is false the message becomes a finding.
+  void check(bool holds, const char* rule, const std::string& file, const std::string& message);
+  void find(const char* rule, const std::string& file, const std::string& message);
+
+  std::optional<std::string> text(const std::string& file);
+  std::optional<Json> json(const std::string& file);
+  std::optional<Picture> picture(const std::string& file);
+  std::optional<NpyArray> npy(const std::string& file);
+  /// Runs `body`; a JSON access or number that fails inside becomes a finding about `file`.
+  void reading(const std::string& file, const std::function<void()>& body);
+
+ private:
+  std::filesystem::path root_;
+  LintReport& report_;
+  std::vector<std::string> files_;
+};
+
+/// Throws std::runtime_error that says what is wrong.
+NpyArray parse_npy(const std::string& bytes);
+Picture parse_picture(const std::string& bytes, const std::string& name);
+
+/// Half-open extent of a set of pixels.
+struct Extent {
+  PixelBox box{1 << 30, 1 << 30, 0, 0};
+  std::int64_t count = 0;
+
+  void add(int x, int y);
+};
+/// Extents by value of Picture::packed().
+std::map<std::uint32_t, Extent> extents(const Picture& picture);
+
+std::string box_text(const PixelBox& box);  ///< "[3, 5, 10, 12)".
+
+}  // namespace diorama::lint

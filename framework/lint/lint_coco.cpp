@@ -1,0 +1,241 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+
+#include "framework/lint/lint_formats.h"
+
+namespace diorama::lint {
+namespace {
+
+constexpr const char* kBox = "box = extent of mask";
+constexpr const char* kArea = "area = count";
+constexpr const char* kPartition = "pixels partition into instances";
+
+/// Pixels of a run-length mask, row by row. Throws when the runs do not fill the size.
+std::vector<bool> decode_mask(const Json& rle) {
+  const auto height = rle.at("size").at(0).get<std::size_t>();
+  const auto width = rle.at("size").at(1).get<std::size_t>();
+  std::vector<long> runs;
+  if (rle.at("counts").is_array()) {
+    runs = rle.at("counts").get<std::vector<long>>();
+  } else {
+    const std::string text = rle.at("counts").get<std::string>();
+    for (std::size_t at = 0; at < text.size();) {
+      long value = 0;
+      int shift = 0;
+      int group = 0x20;
+      while ((group & 0x20) != 0) {
+        if (at >= text.size() || shift > 50) throw std::runtime_error("run lengths are cut short");
+        group = text[at++] - 48;
+        value |= long(group & 0x1F) << shift;
+        shift += 5;
+      }
+      if ((group & 0x10) != 0) value |= -1L << shift;
+      if (runs.size() > 2) value += runs[runs.size() - 2];
+      runs.push_back(value);
+    }
+  }
+  std::vector<bool> mask(width * height, false);
+  std::size_t at = 0;
+  bool is_set = false;
+  for (const long run : runs) {
+    if (run < 0 || at + std::size_t(run) > mask.size()) {
+      throw std::runtime_error("run lengths exceed the image");
+    }
+    for (long i = 0; i < run; ++i, ++at) mask[at % height * width + at / height] = is_set;
+    is_set = !is_set;
+  }
+  if (at != mask.size()) throw std::runtime_error("run lengths do not fill the image");
+  return mask;
+}
+
+Extent extent_of(const std::vector<bool>& mask, std::size_t width) {
+  Extent extent;
+  for (std::size_t i = 0; i < mask.size(); ++i) {
+    if (mask[i]) extent.add(int(i % width), int(i / width));
+  }
+  return extent;
+}
+
+PixelBox box_of(const Json& bbox) {
+  const int x = bbox.at(0).get<int>();
+  const int y = bbox.at(1).get<int>();
+  return {x, y, x + bbox.at(2).get<int>(), y + bbox.at(3).get<int>()};
+}
+
+struct CocoImage {
+  std::string file;
+  std::size_t width = 0;
+  std::size_t height = 0;
+  std::vector<bool> taken;  ///< By the masks so far.
+};
+
+class CocoPart {
+ public:
+  CocoPart(Dataset& dataset, std::string file, std::string split)
+      : dataset_(dataset), file_(std::move(file)), split_(std::move(split)) {}
+
+  void instances() {
+    const auto json = dataset_.json(file_);
+    if (!json) return;
+    dataset_.reading(file_, [&] {
+      read_images(*json);
+      for (const Json& annotation : json->at("annotations")) check_annotation(annotation);
+    });
+  }
+
+  void panoptic() {
+    const auto json = dataset_.json(file_);
+    if (!json) return;
+    dataset_.reading(file_, [&] {
+      for (const Json& category : json->at("categories")) {
+        categories_.insert(category.at("id").get<int>());
+      }
+      for (const Json& annotation : json->at("annotations")) check_panoptic(annotation);
+    });
+  }
+
+ private:
+  void read_images(const Json& json) {
+    for (const Json& category : json.at("categories")) {
+      categories_.insert(category.at("id").get<int>());
+    }
+    for (const Json& entry : json.at("images")) {
+      CocoImage image;
+      image.file = "images/" + split_ + "/" + entry.at("file_name").get<std::string>();
+      image.width = entry.at("width").get<std::size_t>();
+      image.height = entry.at("height").get<std::size_t>();
+      image.taken.assign(image.width * image.height, false);
+      if (const auto picture = dataset_.picture(image.file)) {
+        dataset_.check(std::size_t(picture->width) == image.width &&
+                           std::size_t(picture->height) == image.height,
+                       "counts agree between files", image.file,
+                       "has another size than " + file_ + " says");
+      }
+      const bool is_new = images_.emplace(entry.at("id").get<int>(), std::move(image)).second;
+      dataset_.check(is_new, "counts agree between files", file_, "an image id occurs twice");
+    }
+  }
+
+  void check_annotation(const Json& annotation) {
+    const std::string who = "annotation " + annotation.at("id").dump();
+    dataset_.check(ids_.insert(annotation.at("id").get<int>()).second, "counts agree between files",
+                   file_, who + " occurs twice");
+    dataset_.check(categories_.contains(annotation.at("category_id").get<int>()),
+                   "ids within the label map", file_, who + " has an unknown category");
+    const auto image = images_.find(annotation.at("image_id").get<int>());
+    dataset_.check(image != images_.end(), "counts agree between files", file_,
+                   who + " is about an unknown image");
+    if (image == images_.end()) return;
+    const auto mask = decode_mask(annotation.at("segmentation"));
+    if (mask.size() != image->second.taken.size()) {
+      dataset_.find("counts agree between files", file_, who + ": mask and image differ in size");
+      return;
+    }
+    check_mask(annotation, who, mask, image->second.width);
+    std::size_t shared = 0;
+    for (std::size_t i = 0; i < mask.size(); ++i) {
+      if (mask[i] && image->second.taken[i]) ++shared;
+      if (mask[i]) image->second.taken[i] = true;
+    }
+    dataset_.check(shared == 0, kPartition, file_,
+                   who + " shares " + std::to_string(shared) + " pixels with others");
+    check_amodal(annotation, who, mask);
+    check_keypoints(annotation, who, image->second);
+  }
+
+  void check_mask(const Json& annotation, const std::string& who, const std::vector<bool>& mask,
+                  std::size_t width) {
+    const Extent extent = extent_of(mask, width);
+    const PixelBox box = box_of(annotation.at("bbox"));
+    dataset_.check(
+        box == extent.box, kBox, file_,
+        who + ": bbox " + box_text(box) + ", its mask extends over " + box_text(extent.box));
+    dataset_.check(annotation.at("area").get<double>() == double(extent.count), kArea, file_,
+                   who + ": area " + annotation.at("area").dump() + ", its mask has " +
+                       std::to_string(extent.count) + " pixels");
+  }
+
+  void check_amodal(const Json& annotation, const std::string& who,
+                    const std::vector<bool>& visible) {
+    if (!annotation.contains("amodal")) return;
+    const auto whole = decode_mask(annotation.at("amodal").at("segmentation"));
+    std::size_t beyond = 0;
+    for (std::size_t i = 0; i < visible.size() && i < whole.size(); ++i) {
+      if (visible[i] && !whole[i]) ++beyond;
+    }
+    dataset_.check(
+        beyond == 0 && whole.size() == visible.size(), "visible <= amodal", file_,
+        who + ": " + std::to_string(beyond) + " visible pixels lie outside its amodal mask");
+  }
+
+  void check_keypoints(const Json& annotation, const std::string& who, const CocoImage& image) {
+    if (!annotation.contains("keypoints")) return;
+    const auto numbers = annotation.at("keypoints").get<std::vector<double>>();
+    int count = 0;
+    for (std::size_t i = 0; i + 2 < numbers.size(); i += 3) {
+      if (numbers[i + 2] == 0.0) continue;
+      ++count;
+      const bool is_inside = numbers[i] >= 0.0 && numbers[i + 1] >= 0.0 &&
+                             numbers[i] <= double(image.width) &&
+                             numbers[i + 1] <= double(image.height);
+      dataset_.check(is_inside, "keypoints project onto their pixels", file_,
+                     who + ": a keypoint in sight lies outside the image");
+    }
+    dataset_.check(annotation.at("num_keypoints").get<int>() == count, "area = count", file_,
+                   who + ": num_keypoints is not the number of keypoints in the image");
+  }
+
+  void check_panoptic(const Json& annotation) {
+    const std::string file =
+        "panoptic/" + split_ + "/" + annotation.at("file_name").get<std::string>();
+    const auto picture = dataset_.picture(file);
+    if (!picture) return;
+    std::map<std::uint32_t, Extent> masks;
+    for (const auto& [value, extent] : extents(*picture)) {
+      if ((value & 0xFFFFFF) != 0) masks[value & 0xFFFFFF] = extent;
+    }
+    for (const Json& segment : annotation.at("segments_info")) {
+      const auto mask = masks.find(segment.at("id").get<std::uint32_t>());
+      const std::string who = "segment " + segment.at("id").dump();
+      dataset_.check(mask != masks.end(), "ids within the label map", file, who + " has no pixel");
+      dataset_.check(categories_.contains(segment.at("category_id").get<int>()),
+                     "ids within the label map", file_, who + " has an unknown category");
+      if (mask == masks.end()) continue;
+      dataset_.check(segment.at("area").get<std::int64_t>() == mask->second.count, kArea, file,
+                     who + ": area " + segment.at("area").dump() + ", but " +
+                         std::to_string(mask->second.count) + " pixels");
+      dataset_.check(box_of(segment.at("bbox")) == mask->second.box, kBox, file,
+                     who + ": its pixels extend over " + box_text(mask->second.box));
+      masks.erase(mask);
+    }
+    dataset_.check(masks.empty(), "ids within the label map", file,
+                   std::to_string(masks.size()) + " values have no entry in segments_info");
+  }
+
+  Dataset& dataset_;
+  std::string file_;
+  std::string split_;
+  std::set<int> categories_;
+  std::set<int> ids_;
+  std::map<int, CocoImage> images_;
+};
+
+}  // namespace
+
+void lint_coco(Dataset& dataset) {
+  bool is_any = false;
+  for (const std::string& file : dataset.files()) {
+    const std::string name = std::filesystem::path(file).stem().string();
+    if (!file.starts_with("annotations/")) continue;
+    if (name.starts_with("instances_")) {
+      is_any = true;
+      CocoPart(dataset, file, name.substr(10)).instances();
+    } else if (name.starts_with("panoptic_")) {
+      CocoPart(dataset, file, name.substr(9)).panoptic();
+    }
+  }
+  dataset.check(is_any, "nothing is missing", "annotations",
+                "no instances_*.json: was the run finished?");
+}
+
+}  // namespace diorama::lint

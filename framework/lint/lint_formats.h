@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "framework/lint/dataset_files.h"
+
+/// One function per format; each reads the whole dataset and adds findings.
+namespace diorama::lint {
+
+void lint_basic(Dataset& dataset);
+void lint_pose(Dataset& dataset);
+void lint_visualization(Dataset& dataset);
+void lint_coco(Dataset& dataset);
+void lint_yolo(Dataset& dataset);
+void lint_kitti(Dataset& dataset);
+void lint_voc(Dataset& dataset);
+void lint_bop(Dataset& dataset);
+void lint_webdataset(Dataset& dataset);
+void lint_hdf5(Dataset& dataset);
+
+}  // namespace diorama::lint

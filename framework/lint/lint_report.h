@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace diorama {
+
+/// Something in a dataset that cannot be right.
+struct LintFinding {
+  std::string check;    ///< "box = extent of mask", the rule that is broken.
+  std::string file;     ///< Relative to the dataset.
+  std::string message;  ///< What was found and what would be right.
+};
+
+/// What `diorama lint` says of one dataset (one writer's folder).
+struct LintReport {
+  std::string dataset;     ///< The folder.
+  std::string format;      ///< "BasicWriter", "COCO" ...
+  std::size_t files = 0;   ///< Read.
+  std::size_t checks = 0;  ///< Comparisons made.
+  std::vector<LintFinding> findings;
+};
+
+/// For people, one line per finding, at most `most` of them per check.
+std::string lint_text(const LintReport& report, std::size_t most = 5);
+/// A JSON list with everything.
+std::string lint_json(const std::vector<LintReport>& reports);
+
+}  // namespace diorama

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "writer_kitti/kitti_writer.h"
+
+#include <sstream>
+
+#include "plugins/writer_support/sample_dataset.h"
+#include "support/catch.h"
+
+using namespace diorama;
+using test::MemoryFiles;
+
+namespace {
+
+struct Line {
+  std::string type;
+  std::vector<double> values;  ///< truncated occluded alpha box dimensions location rotation
+};
+
+std::vector<Line> lines_of(const std::string& text) {
+  std::vector<Line> lines;
+  std::istringstream in(text);
+  for (std::string row; std::getline(in, row);) {
+    std::istringstream words(row);
+    Line line;
+    words >> line.type;
+    for (double value = 0.0; words >> value;) line.values.push_back(value);
+    lines.push_back(line);
+  }
+  return lines;
+}
+
+}  // namespace
+
+TEST_CASE("cameras take turns and every picture has its files", "[writers]") {
+  test::FakeHost host;
+  const MemoryFiles files = test::write_sample<KittiWriter>({}, host);
+  for (const char* number : {"000000", "000001", "000005"}) {
+    for (const char* path :
+         {"image_2/%s.png", "label_2/%s.txt", "calib/%s.txt", "depth_2/%s.png"}) {
+      std::string name = std::string("training/") + path;
+      name.replace(name.find("%s"), 2, number);
+      CHECK(files.paths().contains(name));
+    }
+  }
+  CHECK(files.text("ImageSets/trainval.txt") == "000000\n000001\n000002\n000003\n000004\n000005\n");
+  CHECK(files.text("ImageSets/train.txt").size() + files.text("ImageSets/val.txt").size() ==
+        files.text("ImageSets/trainval.txt").size());
+}
+
+TEST_CASE("an upright object keeps its own size, place and heading", "[writers]") {
+  // A level camera looking along world +x; a box turned by 30 degrees about the vertical.
+  Scene scene;
+  const NodeId box = scene.create(scene.root(), "box");
+  scene.edit(box).labels = {{"class", "delivery van"}};
+  scene.edit(box).mesh = std::make_shared<const Mesh>(make_box({0.8, 0.4, 0.3}));
+  Transform pose;
+  pose.translation = {4.0, -0.5, 1.2};
+  pose.rotation = Quat(Eigen::AngleAxisd(kPi / 6.0, Vec3::UnitZ()));
+  scene.set_pose(box, pose);
+  const NodeId camera = scene.create(scene.root(), "cam_0");
+  scene.edit(camera).camera = Camera::from_lens(64, 40, 24.0, 20.955);
+  Transform view;
+  view.translation = {0.0, 0.0, 1.5};
+  view.rotation = look_rotation(Vec3::UnitX());
+  scene.set_pose(camera, view);
+  Capture capture;
+  capture.frames.push_back(test::ray_cast(scene, camera));
+
+  test::FakeHost host;
+  KittiWriter writer({}, host);
+  DatasetInfo dataset;
+  dataset.capture_count = 1;
+  dataset.camera_names = {"cam_0"};
+  dataset.labels = {{{"class", "delivery van"}}};
+  const MemoryFiles files = test::write_dataset(writer, dataset, {&capture});
+  const auto lines = lines_of(files.text("training/label_2/000000.txt"));
+  REQUIRE(lines.size() == 1);
+  CHECK(lines[0].type == "delivery_van");
+  const auto& v = lines[0].values;
+  REQUIRE(v.size() == 14);
+  CHECK(v[1] == 0);
+  CHECK(v[7] == Approx(0.3).margin(1e-3));          // height
+  CHECK(v[8] == Approx(0.4).margin(1e-3));          // width
+  CHECK(v[9] == Approx(0.8).margin(1e-3));          // length
+  CHECK(v[10] == Approx(0.5).margin(1e-3));         // right of the camera: world -y
+  CHECK(v[11] == Approx(0.3 + 0.15).margin(1e-3));  // bottom face below the camera
+  CHECK(v[12] == Approx(4.0).margin(1e-3));
+  // The heading points 30 degrees left of the viewing direction (+z); rotation_y 0 is +x and grows
+  // towards -z.
+  CHECK(v[13] == Approx(-kPi / 2.0 - kPi / 6.0).margin(1e-3));
+  CHECK(v[2] == Approx(v[13] - std::atan2(0.5, 4.0) + (v[2] > 0 ? 2.0 * kPi : 0.0)).margin(0.01));
+  const PixelBox& pixels = *capture.frames[0].instances[0].tight_box;
+  CHECK(v[3] == pixels.x_min);
+  CHECK(v[6] == pixels.y_max);
+}
+
+TEST_CASE("depth is metres times 256, zero where nothing is", "[writers]") {
+  test::FakeHost host;
+  const MemoryFiles files = test::write_sample<KittiWriter>({}, host);
+  const test::RawImage picture = test::raw_image(files.bytes("training/depth_2/000003.png"));
+  const auto& depth = test::sample_captures()[1].frames[1].get(kDistanceToImagePlane);
+  bool saw_nothing = false;
+  for (int y = 0; y < depth.height(); ++y) {
+    for (int x = 0; x < depth.width(); ++x) {
+      if (std::isinf(depth.at(x, y))) {
+        saw_nothing = true;
+        CHECK(picture.at(x, y, 0) == 0);
+      } else {
+        CHECK(std::abs(picture.at(x, y, 0) / 256.0 - depth.at(x, y)) <= 0.5 / 256.0 + 1e-6);
+      }
+    }
+  }
+  CHECK(saw_nothing);
+}
