@@ -171,9 +171,8 @@ void add_lint(CLI::App& app, CommandLine& line) {
       ->required()
       ->type_name("FOLDER");
   command->add_flag("--json", line.lint.as_json, "All findings as JSON");
-  command->callback([&line] {
-    line.command = [&line](ConsoleLog&) { return command_lint(line.lint); };
-  });
+  command->callback(
+      [&line] { line.command = [&line](ConsoleLog&) { return command_lint(line.lint); }; });
 }
 
 void add_new_plugin(CLI::App& app, CommandLine& line) {

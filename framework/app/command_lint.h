@@ -14,8 +14,8 @@ struct LintOptions {
 };
 
 /// `diorama lint DATASET`: reads a dataset back and says where its files contradict each other.
-/// Returns 0 when nothing was found and kLintFoundFaults otherwise; throws Error(Usage) when there is
-/// no dataset.
+/// Returns 0 when nothing was found and kLintFoundFaults otherwise; throws Error(Usage) when there
+/// is no dataset.
 int command_lint(const LintOptions& options);
 
 }  // namespace diorama

@@ -2,6 +2,8 @@
 // Writes real datasets to disk, lints them, then breaks them in one way each and lints again.
 #include "framework/lint/lint_dataset.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <cstring>
 #include <filesystem>
@@ -31,7 +33,8 @@ class DatasetOnDisk {
  public:
   explicit DatasetOnDisk(const test::MemoryFiles& files)
       : folder_(std::filesystem::temp_directory_path() /
-                ("diorama_lint_" + std::to_string(reinterpret_cast<std::uintptr_t>(this)))) {
+                ("diorama_lint_" + std::to_string(getpid()) + "_" +
+                 std::to_string(reinterpret_cast<std::uintptr_t>(this)))) {
     for (const auto& [path, bytes] : files.files) {
       std::filesystem::create_directories((folder_ / path).parent_path());
       write(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
@@ -289,7 +292,7 @@ TEST_CASE("ids without an entry and overlapping masks are found", "[lint]") {
 
 TEST_CASE("a folder of several datasets is linted in one go, others are refused", "[lint]") {
   const auto pose = dataset_of<PoseWriter>();
-  const auto outer = pose.folder().parent_path() / "diorama_lint_outer";
+  const std::filesystem::path outer = pose.folder().string() + "_outer";
   std::filesystem::create_directories(outer / "not_a_dataset");
   std::filesystem::copy(pose.folder(), outer / "poses", std::filesystem::copy_options::recursive);
   const auto reports = lint_datasets(outer);
