@@ -110,7 +110,7 @@ int command_run(const GlobalOptions& global, const RunCommandOptions& options, C
                          sample_pack_folder(global.program));
   JobAssembly assembly = assemble_job(job, *registry, *host, assets_root, program_version());
   if (options.dry_run) {
-    std::cout << plan_text(assembly.plan, assembly.job, assembly.resolved, assets_root);
+    std::cout << plan_text(assembly.plan, assembly.job, assets_root);
     return 0;
   }
   try {

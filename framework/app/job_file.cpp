@@ -41,12 +41,10 @@ Value load_job(const JobOptions& options, const Log& log) {
   const bool is_replicator = is_replicator_job(job);
   for (const std::string& assignment : options.sets) {
     if (is_replicator && is_replicator_key(assignment)) apply_set(job, assignment);
-    if (is_replicator_job(job)) job = translated(job, log);
   }
   if (is_replicator) job = translated(job, log);
   for (const std::string& assignment : options.sets) {
     if (!is_replicator || !is_replicator_key(assignment)) apply_set(job, assignment);
-    if (is_replicator_job(job)) job = translated(job, log);
   }
   if (options.seed) {
     Value seed;

@@ -157,15 +157,13 @@ void add_lights(std::string& text, const Job& job) {
   }
 }
 
-void add_randomizers(std::string& text, const Job& job, const Value& resolved) {
-  const Value* entries = resolved.find("randomizers");
+void add_randomizers(std::string& text, const Job& job) {
   text += "randomizers\n";
-  for (std::size_t i = 0; i < job.randomizers.size(); ++i) {
-    const RandomizerEntry& entry = job.randomizers[i];
+  for (const RandomizerEntry& entry : job.randomizers) {
     text += "  " + entry.name + " (" + entry.type + ") on ";
     for (std::size_t k = 0; k < entry.on.size(); ++k) text += (k > 0 ? ", " : "") + entry.on[k];
     if (entry.every > 1) text += ", every " + std::to_string(entry.every);
-    text += ": " + parameters_text(entries->list[i], {"type", "name", "on", "every"}) + "\n";
+    text += ": " + parameters_text(entry.component.map, {"type", "name", "on", "every"}) + "\n";
   }
 }
 
@@ -239,7 +237,7 @@ std::string asset_name(std::string_view asset, const std::optional<fs::path>& as
   return "/" + below.generic_string();
 }
 
-std::string plan_text(const CapturePlan& plan, const Job& job, const Value& resolved,
+std::string plan_text(const CapturePlan& plan, const Job& job,
                       const std::optional<fs::path>& assets_root) {
   const std::size_t cameras = job.camera_names().size();
   std::string text = std::to_string(plan.capture_count()) + " captures x " +
@@ -255,10 +253,10 @@ std::string plan_text(const CapturePlan& plan, const Job& job, const Value& reso
   add_objects(text, plan, job, assets_root);
   add_lights(text, job);
   add_cameras(text, job);
-  add_randomizers(text, job, resolved);
-  const Value* renderer = resolved.find("renderer");
-  text += "renderer " + job.renderer.type + ": " + parameters_text(*renderer, {"type"}) + "\n";
-  text += "physics " + job.physics.type + "\n";
+  add_randomizers(text, job);
+  text += "renderer " + job.renderer.type + ": " + parameters_text(job.renderer.map, {"type"}) +
+          "\n";
+  text += "physics " + job.physics.type + ": " + parameters_text(job.physics.map, {"type"}) + "\n";
   add_writers(text, job);
   return text;
 }

@@ -30,9 +30,9 @@ std::string asset_name(std::string_view asset,
                        const std::optional<std::filesystem::path>& assets_root);
 
 /// The plan for people: captures, environments, spawned objects with labels and gravity, randomizers
-/// with their ranges, cameras, writers. Stable, so that tests can pin it. `resolved` is the resolved
-/// job.
-std::string plan_text(const CapturePlan& plan, const Job& job, const Value& resolved,
+/// with their ranges, cameras, writers, parameters as the job gives them. Stable, so that tests can
+/// pin it.
+std::string plan_text(const CapturePlan& plan, const Job& job,
                       const std::optional<std::filesystem::path>& assets_root);
 
 }  // namespace diorama
