@@ -8,6 +8,7 @@
 #include "writer_basic/segmentation_files.h"
 #include "writer_support/image_files.h"
 #include "writer_support/npy.h"
+#include "writer_support/value_place.h"
 
 namespace diorama {
 namespace {
@@ -119,7 +120,8 @@ void BasicWriter::Params::visit(ParamVisitor& v) {
   v.param("frame_padding", frame_padding,
           {"Least digits of the frame number; more where the job needs them.", "", 0, 20});
   v.param("semantic_types", semantic_types,
-          {"Taxonomies whose labels count; empty: class. Excludes semantic_filter_predicate."});
+          {"List of taxonomies whose labels count; null or empty: class. Excludes "
+           "semantic_filter_predicate."});
   v.param("semantic_filter_predicate", semantic_filter_predicate,
           {"Which labels count, such as 'class: car & !broken; shape: *'."});
   v.param("use_common_output_dir", use_common_output_dir,
@@ -132,8 +134,8 @@ void BasicWriter::Params::visit(ParamVisitor& v) {
 BasicWriter::BasicWriter(Params params, Host& host)
     : params_(std::move(params)),
       host_(host),
-      filter_(
-          SemanticFilter::from_params(params_.semantic_types, params_.semantic_filter_predicate)),
+      filter_(SemanticFilter::from_params(texts_or_null(params_.semantic_types, "semantic_types"),
+                                          params_.semantic_filter_predicate)),
       frame_padding_(params_.frame_padding) {
   params_.remote.check();
 }

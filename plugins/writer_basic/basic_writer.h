@@ -39,7 +39,7 @@ class BasicWriter final : public Writer {
     bool colorize_instance_segmentation = true;
     bool colorize_depth = false;
     int frame_padding = 4;
-    std::vector<std::string> semantic_types;
+    Value semantic_types;  ///< A list of texts or null.
     std::optional<std::string> semantic_filter_predicate;
     bool use_common_output_dir = false;
     std::string no_instance_text = "INVALID";

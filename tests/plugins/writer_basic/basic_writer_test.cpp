@@ -447,3 +447,18 @@ TEST_CASE("S3 output is refused with a message", "[writers]") {
   params.remote.s3_bucket = "pictures";
   CHECK_THROWS_WITH(BasicWriter(params, host), ContainsSubstring("s3_bucket: found \"pictures\""));
 }
+
+TEST_CASE("semantic_types may be null, must be texts, and replaces the class filter", "[writers]") {
+  FakeHost host;
+  BasicWriter::Params params = everything();
+  params.semantic_types = Value::make_list();
+  params.semantic_types.list.push_back(Value::text("shape"));
+  const Capture& capture = capture_of(1);
+  const MemoryFiles files = write(params, capture);
+  CHECK(files.text("bounding_box_2d_tight_labels_0000.json") == R"({"0": {"shape": "cuboid"}})");
+  params.semantic_types = Value();
+  CHECK_NOTHROW(BasicWriter(params, host));
+  params.semantic_types = Value::text("class");
+  CHECK_THROWS_WITH(BasicWriter(params, host),
+                    ContainsSubstring("semantic_types: expected a list of texts or null"));
+}
