@@ -1,7 +1,8 @@
 # What the scripts share. The installation that they use lies at ${PREFIX}.
 cmake_minimum_required(VERSION 3.25)
 set(PREFIX ${WORK}/moved)
-set(DIORAMA ${PREFIX}/${BINDIR}/diorama)
+# In a prefix that the dynamic linker does not know by itself.
+set(DIORAMA ${CMAKE_COMMAND} -E env LD_LIBRARY_PATH=${PREFIX}/${LIBDIR} ${PREFIX}/${BINDIR}/diorama)
 
 # run(command...): fails with all output unless the command succeeds; output in OUT.
 function(run)

@@ -52,12 +52,12 @@ endforeach()
 
 if(abi STREQUAL locked_abi)
   set(advice
-      "The plugin interface changed, its number did not. If a compiled plugin could notice (a new or\n"
-      "moved field, virtual function, enumerator, default or inline code), raise DIORAMA_SDK_ABI in\n"
-      "sdk/include/diorama/abi.h. sdk/docs/abi_policy.md lists the few changes that need no new number.")
+      "The plugin interface changed, its number did not. If a compiled plugin could notice (a new or"
+      "moved field, virtual function, enumerator, default or inline code), raise DIORAMA_SDK_ABI in"
+      "sdk/include/diorama/abi.h. sdk/docs/abi_policy.md lists the changes that need no new number.")
 else()
   set(advice "DIORAMA_SDK_ABI went from ${locked_abi} to ${abi}: lock the new interface.")
 endif()
-list(JOIN advice "" advice)
+list(JOIN advice " " advice)
 message(FATAL_ERROR "changed:${changed}\n${advice}\n"
                     "Then accept the new state: ninja accept_abi, and commit tests/sdk/abi_lock.txt.")
