@@ -204,9 +204,7 @@ std::optional<std::vector<Vector3>> joint_pivots(Stage& stage, const Prim& skele
   const Prim* animation =
       at_rest ? nullptr : inherited_target(stage, skeleton, "skel:animationSource");
   if (animation && animation->type_name == "SkelAnimation") {
-    auto posed = animated_joints(stage, *animation, joints, std::move(local));
-    if (!posed) return std::nullopt;
-    local = std::move(*posed);
+    if (auto posed = animated_joints(stage, *animation, joints, local)) local = std::move(*posed);
   }
   if (local.size() != joints.size()) return std::nullopt;
   std::vector<Vector3> pivots;

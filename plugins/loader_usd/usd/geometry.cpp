@@ -221,7 +221,7 @@ std::vector<Primvar> Geometry::primvars(const Prim& prim) {
       primvar.type = stage_.attribute_type(*at, property);
       const Value interpolation = stage_.property_metadata(*at, property, "interpolation");
       primvar.interpolation = interpolation.as_text() ? *interpolation.as_text() : "constant";
-      primvar.is_indexed = !stage_.value(*at, property + ":indices").is_empty();
+      primvar.is_indexed = stage_.has_authored_value(*at, property + ":indices");
       const bool is_inherited = at == &prim || (primvar.interpolation == "constant" &&
                                                 stage_.has_authored_value(*at, property));
       if (is_inherited && !primvar.type.empty()) found.emplace(primvar.name, std::move(primvar));
