@@ -45,10 +45,14 @@ float hemispherical_mean(Albedo&& albedo) {
   return sum / float(kSteps);
 }
 
-constexpr int kGrid = 20;  // samples per axis of the numeric integrals
+constexpr int kPoints = 1024;  // of the numeric integrals
 
-Vec2f grid_point(int i) {
-  return {(float(i % kGrid) + 0.5f) / float(kGrid), (float(i / kGrid) + 0.5f) / float(kGrid)};
+/// An additive recurrence of two dimensions (Roberts 2018): fine along every radius of the disk,
+/// which a square grid is not.
+Vec2f spread_point(int i) {
+  const double x = 0.5 + double(i) * 0.75487766624669276;
+  const double y = 0.5 + double(i) * 0.56984029099805327;
+  return {float(x - std::floor(x)), float(y - std::floor(y))};
 }
 
 Vec3f direction_at(float cos_theta) {
@@ -74,8 +78,8 @@ float transmitted_shadowing(float cos_i, float alpha) {
 AlbedoTables::Split conductor_albedo(float cos_theta, float alpha) {
   const Vec3f wo = direction_at(cos_theta);
   AlbedoTables::Split sum;
-  for (int i = 0; i < kGrid * kGrid; ++i) {
-    const Vec3f h = ggx_visible_normal(wo, alpha, grid_point(i));
+  for (int i = 0; i < kPoints; ++i) {
+    const Vec3f h = ggx_visible_normal(wo, alpha, spread_point(i));
     const Vec3f wi = reflected(wo, h);
     if (wi.z() <= 0.0f) continue;
     const float rest = shadowing(wo.z(), wi.z(), alpha);
@@ -83,21 +87,21 @@ AlbedoTables::Split conductor_albedo(float cos_theta, float alpha) {
     sum.a += rest * (1.0f - weight);
     sum.b += rest * weight;
   }
-  return {sum.a / float(kGrid * kGrid), sum.b / float(kGrid * kGrid)};
+  return {sum.a / float(kPoints), sum.b / float(kPoints)};
 }
 
 float glass_albedo(float cos_theta, float alpha, float eta) {
   const Vec3f wo = direction_at(cos_theta);
   float sum = 0.0f;
-  for (int i = 0; i < kGrid * kGrid; ++i) {
-    const Vec3f h = ggx_visible_normal(wo, alpha, grid_point(i));
+  for (int i = 0; i < kPoints; ++i) {
+    const Vec3f h = ggx_visible_normal(wo, alpha, spread_point(i));
     const float f = fresnel_dielectric(wo.dot(h), eta);
     const Vec3f mirrored = reflected(wo, h);
     if (mirrored.z() > 0.0f) sum += f * shadowing(wo.z(), mirrored.z(), alpha);
     const Vec3f bent = refracted(wo, h, eta);
     if (bent.z() < 0.0f) sum += (1.0f - f) * transmitted_shadowing(bent.z(), alpha);
   }
-  return std::min(sum / float(kGrid * kGrid), 0.9999f);
+  return std::min(sum / float(kPoints), 0.9999f);
 }
 
 }  // namespace
@@ -178,7 +182,9 @@ Bsdf::Bsdf(const SurfaceBsdf& surface, const AlbedoTables& tables, const Vec3f& 
   const float dielectric = plastic_ * s_.specular;
   specular_f0_ = s_.metallic * s_.base + Vec3f::Constant(dielectric * s_.f0);
   specular_f90_ = s_.metallic + dielectric;
-  single_o_ = tables_.at(wo_.z(), s_.alpha).total();
+  has_specular_ = specular_f90_ > 0.0f;
+  split_o_ = specular_split(wo_.z());
+  single_o_ = split_o_.total();
   single_mean_ = tables_.mean(s_.alpha).total();
   const auto multiple = [&](float f0) {
     const float mean = f0 + (1.0f - f0) * kMeanSchlickWeight;
@@ -194,7 +200,7 @@ Bsdf::Bsdf(const SurfaceBsdf& surface, const AlbedoTables& tables, const Vec3f& 
     coat_mean_ = s_.coat * (kCoatF0 * mean.a + mean.b);
   }
   if (plastic_ > 0.0f) {
-    above_o_ = albedo_above_diffuse(wo_.z());
+    above_o_ = albedo_above_diffuse(wo_.z(), split_o_);
     const AlbedoTables::Split mean = tables_.mean(s_.alpha);
     above_mean_ =
         s_.specular * (s_.f0 * mean.a + mean.b + plastic_multiple_ * (1.0f - single_mean_));
@@ -204,7 +210,8 @@ Bsdf::Bsdf(const SurfaceBsdf& surface, const AlbedoTables& tables, const Vec3f& 
       constexpr std::array<float, 4> kWeights{0.1739274f, 0.3260726f, 0.3260726f, 0.1739274f};
       above_mean_ = 0.0f;
       for (std::size_t i = 0; i < kNodes.size(); ++i) {
-        above_mean_ += kWeights[i] * albedo_above_diffuse(std::sqrt(kNodes[i]));
+        const float cosine = std::sqrt(kNodes[i]);
+        above_mean_ += kWeights[i] * albedo_above_diffuse(cosine, specular_split(cosine));
       }
     }
   }
@@ -216,13 +223,17 @@ float Bsdf::coat_albedo(float cos_theta) const {
   return s_.coat * (kCoatF0 * e.a + e.b);
 }
 
-float Bsdf::plastic_albedo(float cos_theta) const {
-  const AlbedoTables::Split e = tables_.at(cos_theta, s_.alpha);
+AlbedoTables::Split Bsdf::specular_split(float cos_theta) const {
+  if (!has_specular_) return {0.0f, 1.0f};
+  return tables_.at(cos_theta, s_.alpha);
+}
+
+float Bsdf::plastic_albedo(const AlbedoTables::Split& e) const {
   return s_.specular * (s_.f0 * e.a + e.b + plastic_multiple_ * (1.0f - e.total()));
 }
 
-float Bsdf::albedo_above_diffuse(float cos_theta) const {
-  const float specular = plastic_albedo(cos_theta);
+float Bsdf::albedo_above_diffuse(float cos_theta, const AlbedoTables::Split& e) const {
+  const float specular = plastic_albedo(e);
   if (s_.coat <= 0.0f) return specular;
   const float coat = coat_albedo(cos_theta);
   return coat + (1.0f - coat) * specular;
@@ -239,7 +250,7 @@ float Bsdf::past_coat(float cos_i) const {
 }
 
 void Bsdf::choose_probabilities() {
-  const AlbedoTables::Split e = tables_.at(wo_.z(), s_.alpha);
+  const AlbedoTables::Split& e = split_o_;
   const float past = 1.0f - coat_o_;
   p_coat_ = coat_o_;
   p_specular_ = past * (luminance(specular_f0_) * e.a + specular_f90_ * e.b);
@@ -257,7 +268,7 @@ void Bsdf::choose_probabilities() {
 }
 
 Vec3f Bsdf::albedo() const {
-  const AlbedoTables::Split e = tables_.at(wo_.z(), s_.alpha);
+  const AlbedoTables::Split& e = split_o_;
   const Vec3f specular =
       specular_f0_ * e.a + Vec3f::Constant(specular_f90_ * e.b) + multiple_ * (1.0f - single_o_);
   const Vec3f diffuse = plastic_ * (1.0f - above_o_) * s_.base;
@@ -282,7 +293,7 @@ BsdfValue Bsdf::evaluate(const Vec3f& wi) const {
   const auto density = [&](float alpha) {
     return ggx_visible_normal_density(wo_, h, alpha) / std::max(4.0f * h_dot, 1e-12f);
   };
-  if (specular_f90_ > 0.0f) {
+  if (has_specular_) {
     const Vec3f f = specular_f0_ + (Vec3f::Constant(specular_f90_) - specular_f0_) * schlick;
     value.f_cos += past * microfacet(s_.alpha) * f;
     value.density += p_specular_ * density(s_.alpha);
@@ -293,13 +304,13 @@ BsdfValue Bsdf::evaluate(const Vec3f& wi) const {
     value.density += p_coat_ * density(s_.coat_alpha);
   }
   const float cos_over_pi = wi.z() / kPiF;
-  const float single_i = tables_.at(wi.z(), s_.alpha).total();
+  const AlbedoTables::Split e = specular_split(wi.z());
   const float between =
-      (1.0f - single_o_) * (1.0f - single_i) / std::max(1e-6f, 1.0f - single_mean_);
+      (1.0f - single_o_) * (1.0f - e.total()) / std::max(1e-6f, 1.0f - single_mean_);
   value.f_cos += past * between * cos_over_pi * multiple_;
   if (plastic_ > 0.0f) {
     const float through =
-        (1.0f - above_o_) * (1.0f - albedo_above_diffuse(wi.z())) / (1.0f - above_mean_);
+        (1.0f - above_o_) * (1.0f - albedo_above_diffuse(wi.z(), e)) / (1.0f - above_mean_);
     value.f_cos += plastic_ * through * cos_over_pi * s_.base;
   }
   value.density += p_diffuse_ * cos_over_pi;
@@ -407,7 +418,9 @@ BsdfSample Bsdf::sample(float lobe, const Vec2f& u) const {
     sample.spread = 0.5f;
   }
   sample.is_transmitted = sample.wi.z() < 0.0f;
-  if (sample.wi.isZero() || (sample.is_transmitted && glass_ <= 0.0f)) return {};
+  // A facet that sends a reflection below the horizon loses it.
+  const bool may_transmit = lobe < p_glass_;
+  if (sample.wi.isZero() || (sample.is_transmitted && !may_transmit)) return {};
   const BsdfValue value = evaluate(sample.wi);
   if (!(value.density > 1e-12f)) return {};
   sample.density = value.density;

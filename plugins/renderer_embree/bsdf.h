@@ -99,8 +99,10 @@ class Bsdf {
  private:
   float coat_albedo(float cos_theta) const;
   /// Albedo of the opaque dielectric's specular lobe, scattering between facets included.
-  float plastic_albedo(float cos_theta) const;
-  float albedo_above_diffuse(float cos_theta) const;
+  float plastic_albedo(const AlbedoTables::Split& e) const;
+  float albedo_above_diffuse(float cos_theta, const AlbedoTables::Split& e) const;
+  /// Of the specular lobe's alpha; without such a lobe nothing is lost.
+  AlbedoTables::Split specular_split(float cos_theta) const;
   /// Share of the light that passes the coat on its way in and out.
   float past_coat(float cos_i) const;
   BsdfValue evaluate_glass(const Vec3f& wi) const;
@@ -119,7 +121,8 @@ class Bsdf {
   float specular_f90_ = 0.0f;
   float plastic_multiple_ = 0.0f;
   Vec3f multiple_ = Vec3f::Zero();  ///< Colour of the light scattered between facets.
-  float single_o_ = 1.0f;           ///< E(wo) under F = 1.
+  AlbedoTables::Split split_o_;
+  float single_o_ = 1.0f;  ///< E(wo) under F = 1.
   float single_mean_ = 1.0f;
   float coat_o_ = 0.0f;
   float coat_mean_ = 0.0f;
@@ -129,6 +132,7 @@ class Bsdf {
   float p_specular_ = 0.0f;
   float p_diffuse_ = 0.0f;
   float p_glass_ = 0.0f;
+  bool has_specular_ = false;
   bool is_smooth_glass_ = false;
   bool has_smooth_part_ = true;
 };

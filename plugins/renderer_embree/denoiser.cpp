@@ -16,7 +16,7 @@ constexpr std::array<float, 5> kKernel{1 / 16.0f, 4 / 16.0f, 6 / 16.0f, 4 / 16.0
 constexpr float kLuminanceSlack = 3.5f;  // standard deviations
 constexpr float kNormalSharpness = 40.0f;
 constexpr float kPlaneSlack = 0.008f;  // of the distance from the camera
-constexpr float kAlbedoSlack = 0.25f;
+constexpr float kAlbedoSlack = 0.6f;
 constexpr float kMinAlbedo = 0.02f;
 
 /// What steers the filter; constant over the rounds.
@@ -61,8 +61,8 @@ float guide_distance(const Guide& p, const Guide& q) {
 
 /// Samples that are far brighter than everything around them are chance finds; the brightest
 /// believable value is the third brightest neighbour's.
-void tame_outliers(const Grid& grid, const std::vector<Guide>& guides, std::vector<Incoming>& lights,
-                   Host& host) {
+void tame_outliers(const Grid& grid, const std::vector<Guide>& guides,
+                   std::vector<Incoming>& lights, Host& host) {
   const std::vector<Incoming> before = lights;
   host.parallel_for(std::size_t(grid.height), [&](std::size_t row) {
     const int y = int(row);
@@ -109,8 +109,8 @@ float smoothed_variance(const Grid& grid, const std::vector<Incoming>& lights, i
   return sum / weights;
 }
 
-Incoming filtered(const Grid& grid, const std::vector<Guide>& guides, const std::vector<Incoming>& lights,
-               int x, int y, int step) {
+Incoming filtered(const Grid& grid, const std::vector<Guide>& guides,
+                  const std::vector<Incoming>& lights, int x, int y, int step) {
   const std::size_t i = grid.at(x, y);
   const Guide& p = guides[i];
   const Incoming& own = lights[i];

@@ -81,42 +81,48 @@ float SquareDistribution::density(const Vec2f& point) const {
 }
 
 DomeTexture::DomeTexture(std::shared_ptr<const Texture> source) : image_(std::move(source)) {
-  // Cells of the level that is at most 1024 wide; larger skies gain nothing from finer cells.
-  int level = 0;
-  while ((image_.width() >> level) > 1024) ++level;
-  const int width = std::max(1, image_.width() >> level);
-  const int height = std::max(1, image_.height() >> level);
-  std::vector<float> lightness(std::size_t(width) * std::size_t(height));
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  double solid_angle = 0.0;
+  // A grid of cells over the image, whole cells per patch, no finer than 1024 x 512.
+  const int per_patch_x = std::clamp(image_.width() / kColumns, 2, 64);
+  const int per_patch_y = std::clamp(image_.height() / kRows, 2, 64);
+  const int width = per_patch_x * kColumns;
+  const int height = per_patch_y * kRows;
+  const float footprint = 1.0f / float(width);
+  std::vector<float> lightness;
   for (int y = 0; y < height; ++y) {
-    const float sine = std::sin((float(y) + 0.5f) / float(height) * kPiF);
     for (int x = 0; x < width; ++x) {
-      const Vec3f texel = image_.texel(level, x, y).head<3>().matrix().cwiseMax(0.0f);
-      lightness[std::size_t(y) * std::size_t(width) + std::size_t(x)] = luminance(texel);
-      sum += texel.cast<double>() * double(sine);
-      solid_angle += double(sine);
+      const Vec2f uv((float(x) + 0.5f) / float(width), 1.0f - (float(y) + 0.5f) / float(height));
+      const Rgba texel = image_.lookup(uv, footprint, Wrap::Repeat, Wrap::Clamp);
+      lightness.push_back(luminance(texel.head<3>().matrix().cwiseMax(0.0f)));
     }
   }
-  mean_ = (sum / std::max(solid_angle, 1e-12)).cast<float>();
   // Lookups are bilinear, so a cell also shines with a part of its neighbours.
-  std::vector<float> weights(lightness.size());
-  for (int y = 0; y < height; ++y) {
-    const float sine = std::sin((float(y) + 0.5f) / float(height) * kPiF);
-    for (int x = 0; x < width; ++x) {
-      float blurred = 0.0f;
-      for (int dy = -1; dy <= 1; ++dy) {
-        const int row = std::clamp(y + dy, 0, height - 1);
-        for (int dx = -1; dx <= 1; ++dx) {
-          const int column = (x + dx + width) % width;
-          const float share = (dx == 0 ? 0.5f : 0.25f) * (dy == 0 ? 0.5f : 0.25f);
-          blurred += share * lightness[std::size_t(row) * std::size_t(width) + std::size_t(column)];
-        }
+  const auto blurred = [&](int x, int y) {
+    float sum = 0.0f;
+    for (int dy = -1; dy <= 1; ++dy) {
+      const int row = std::clamp(y + dy, 0, height - 1);
+      for (int dx = -1; dx <= 1; ++dx) {
+        const int column = (x + dx + width) % width;
+        const float share = (dx == 0 ? 0.5f : 0.25f) * (dy == 0 ? 0.5f : 0.25f);
+        sum += share * lightness[std::size_t(row) * std::size_t(width) + std::size_t(column)];
       }
-      weights[std::size_t(y) * std::size_t(width) + std::size_t(x)] = blurred * sine;
     }
+    return sum * std::sin((float(y) + 0.5f) / float(height) * kPiF);
+  };
+  const float cell = 2.0f * kPiF * kPiF / float(width * height);
+  for (int patch = 0; patch < kPatches; ++patch) {
+    const int x_begin = patch % kColumns * per_patch_x;
+    const int y_begin = patch / kColumns * per_patch_y;
+    std::vector<float> weights;
+    float power = 0.0f;
+    for (int y = y_begin; y < y_begin + per_patch_y; ++y) {
+      for (int x = x_begin; x < x_begin + per_patch_x; ++x) {
+        weights.push_back(blurred(x, y));
+        power += weights.back() * cell;
+      }
+    }
+    patches_.emplace_back(weights, per_patch_x, per_patch_y);
+    patch_power_.push_back(power);
   }
-  distribution_ = SquareDistribution(weights, width, height);
 }
 
 Vec3f DomeTexture::radiance(const Vec3f& direction) const {
@@ -125,18 +131,27 @@ Vec3f DomeTexture::radiance(const Vec3f& direction) const {
   return value.head<3>().matrix().cwiseMax(0.0f);
 }
 
-DomeTexture::Draw DomeTexture::sample(const Vec2f& u) const {
-  const SquareDistribution::Draw draw = distribution_.sample(u);
-  const float theta = draw.point.y() * kPiF;
-  const float phi = (0.5f - draw.point.x()) * 2.0f * kPiF;
+DomeTexture::Draw DomeTexture::sample(int patch, const Vec2f& u) const {
+  const SquareDistribution::Draw draw = patches_[std::size_t(patch)].sample(u);
+  const Vec2f p((float(patch % kColumns) + draw.point.x()) / float(kColumns),
+                (float(patch / kColumns) + draw.point.y()) / float(kRows));
+  const float theta = p.y() * kPiF;
+  const float phi = (0.5f - p.x()) * 2.0f * kPiF;
   const float sine = std::sin(theta);
+  const Rgba value = image_.lookup({p.x(), 1.0f - p.y()}, 0.0f, Wrap::Repeat, Wrap::Clamp);
   return {{sine * std::cos(phi), sine * std::sin(phi), std::cos(theta)},
-          draw.density / (2.0f * kPiF * kPiF * sine_of_row(draw.point.y()))};
+          value.head<3>().matrix().cwiseMax(0.0f),
+          draw.density * float(kPatches) / (2.0f * kPiF * kPiF * sine_of_row(p.y()))};
 }
 
-float DomeTexture::density(const Vec3f& direction) const {
+DomeTexture::Place DomeTexture::place(const Vec3f& direction) const {
   const Vec2f p = square_from_direction(direction);
-  return distribution_.density(p) / (2.0f * kPiF * kPiF * sine_of_row(p.y()));
+  const int column = cell_of(p.x(), kColumns);
+  const int row = cell_of(p.y(), kRows);
+  const int patch = row * kColumns + column;
+  const Vec2f within(p.x() * float(kColumns) - float(column), p.y() * float(kRows) - float(row));
+  return {patch, patches_[std::size_t(patch)].density(within) * float(kPatches) /
+                     (2.0f * kPiF * kPiF * sine_of_row(p.y()))};
 }
 
 }  // namespace diorama

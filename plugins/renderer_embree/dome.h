@@ -32,26 +32,38 @@ class SquareDistribution {
   std::vector<float> within_row_;  ///< Cumulative, (width + 1) per row.
 };
 
-/// What depends only on a dome's texture: kept between captures.
+/// What depends only on a dome's texture: kept between captures. The sky is cut into patches (equal
+/// rectangles of the image), so that light samples can be kept to those that a place can see.
 class DomeTexture {
  public:
+  static constexpr int kColumns = 16;
+  static constexpr int kRows = 8;
+  static constexpr int kPatches = kColumns * kRows;
+
   explicit DomeTexture(std::shared_ptr<const Texture> source);
 
   /// In the dome's space, unit direction.
   Vec3f radiance(const Vec3f& direction) const;
-  Vec3f mean_radiance() const { return mean_; }  ///< Over the sphere.
+  /// Luminance times solid angle of a patch.
+  float patch_power(int patch) const { return patch_power_[std::size_t(patch)]; }
 
   struct Draw {
     Vec3f direction;
-    float density = 0.0f;  ///< Per solid angle.
+    Vec3f radiance;
+    float density = 0.0f;  ///< Per solid angle, given the patch.
   };
-  Draw sample(const Vec2f& u) const;
-  float density(const Vec3f& direction) const;
+  Draw sample(int patch, const Vec2f& u) const;
+
+  struct Place {
+    int patch = 0;
+    float density = 0.0f;  ///< As in Draw.
+  };
+  Place place(const Vec3f& direction) const;
 
  private:
   MipTexture image_;
-  SquareDistribution distribution_;
-  Vec3f mean_ = Vec3f::Zero();
+  std::vector<SquareDistribution> patches_;
+  std::vector<float> patch_power_;
 };
 
 }  // namespace diorama

@@ -81,14 +81,24 @@ void Lights::add(const Light& light, const Affine& world_from_node,
       r.shape = Shape::Dome;
       r.dome_from_world = world_from_node.rotation().transpose().cast<float>();
       r.texture = std::move(texture);
-      r.power =
-          kPiF * luminance(r.texture ? Vec3f(r.radiance.cwiseProduct(r.texture->mean_radiance()))
-                                     : r.radiance);
+      r.sky = std::make_shared<const SkyGrid>(*r.texture);
+      r.power = luminance(r.radiance);
       break;
   }
   const bool is_body = r.shape == Shape::Sphere || r.shape == Shape::Rect || r.shape == Shape::Disk;
   if (is_body) r.power = luminance(r.radiance) * r.area;
   if (r.power > 0.0f && std::isfinite(r.power)) add_record(std::move(r));
+}
+
+void Lights::learn_sky(const Aabb& bounds, const SkyGrid::Sees& sees, Host& host) {
+  if (bounds.is_empty()) return;
+  for (std::uint32_t index : surroundings_) {
+    Record& light = lights_[index];
+    if (light.shape != Shape::Dome) continue;
+    const Eigen::Matrix3f world_from_dome = light.dome_from_world.transpose();
+    light.sky =
+        std::make_shared<const SkyGrid>(*light.texture, world_from_dome, bounds, sees, host);
+  }
 }
 
 std::uint32_t Lights::add(EmittingTriangles source) {
@@ -135,7 +145,9 @@ float Lights::score(const Record& light, const Receiver& receiver) const {
     if (receiver.is_two_sided) cosine = std::abs(cosine);
     return cosine <= 0.0f ? 0.0f : std::max(kFloor, std::min(1.0f, cosine));
   };
-  if (light.shape == Shape::Dome) return light.power;
+  if (light.shape == Shape::Dome) {
+    return light.power * light.sky->power(light.sky->cell(receiver.position));
+  }
   if (light.shape == Shape::Distant) {
     const float reach = std::sqrt(light.one_minus_cos * (2.0f - light.one_minus_cos)) + 1e-3f;
     return light.power * receiver_cosine(reach - receiver.normal.dot(light.direction));
@@ -197,7 +209,7 @@ LightSample Lights::sample(std::uint32_t index, const Vec3f& from, const Vec2f& 
     case Shape::Distant:
       return sample_distant(light, u);
     case Shape::Dome:
-      return sample_dome(light, u);
+      return sample_dome(light, from, u);
     case Shape::Triangles:
       break;
   }
@@ -252,24 +264,15 @@ LightSample Lights::sample_distant(const Record& light, const Vec2f& u) {
   return s;
 }
 
-Vec3f Lights::dome_radiance(const Record& light, const Vec3f& direction) {
-  if (!light.texture) return light.radiance;
-  return light.radiance.cwiseProduct(light.texture->radiance(light.dome_from_world * direction));
-}
-
-LightSample Lights::sample_dome(const Record& light, const Vec2f& u) {
+LightSample Lights::sample_dome(const Record& light, const Vec3f& from, const Vec2f& u) {
+  const SkyGrid::Choice choice = light.sky->choose(light.sky->cell(from), u.x());
+  if (choice.probability <= 0.0f) return {};
+  const DomeTexture::Draw draw = light.texture->sample(choice.patch, {choice.rest, u.y()});
   LightSample s;
   s.distance = kFar;
-  if (!light.texture) {
-    s.direction = uniform_sphere(u);
-    s.density = 1.0f / (4.0f * kPiF);
-    s.radiance = light.radiance;
-    return s;
-  }
-  const DomeTexture::Draw draw = light.texture->sample(u);
   s.direction = (light.dome_from_world.transpose() * draw.direction).normalized();
-  s.density = draw.density;
-  s.radiance = light.radiance.cwiseProduct(light.texture->radiance(draw.direction));
+  s.density = draw.density * choice.probability;
+  s.radiance = light.radiance.cwiseProduct(draw.radiance);
   return s;
 }
 
@@ -305,11 +308,11 @@ float Lights::density_of_surface(std::uint32_t light, float distance, float cos_
   return distance * distance / (std::max(1e-6f, std::abs(cos_at_light)) * lights_[light].area);
 }
 
-float Lights::meet(const Record& light, const Vec3f& origin, const Vec3f& direction, float t_max,
+float Lights::meet(const Record& light, const Vec3f& from, const Vec3f& direction, float t_max,
                    Vec3f& radiance) {
   switch (light.shape) {
     case Shape::Sphere: {
-      const Vec3f to_centre = light.position - origin;
+      const Vec3f to_centre = light.position - from;
       const float distance2 = to_centre.squaredNorm();
       const float radius2 = light.radius * light.radius;
       if (distance2 <= radius2) return 0.0f;  // it shines outwards only
@@ -324,9 +327,9 @@ float Lights::meet(const Record& light, const Vec3f& origin, const Vec3f& direct
     case Shape::Disk: {
       const float cosine = -direction.dot(light.direction);
       if (cosine <= 1e-6f) return 0.0f;
-      const float t = (origin - light.position).dot(light.direction) / cosine;
+      const float t = (from - light.position).dot(light.direction) / cosine;
       if (t <= 0.0f || t >= t_max) return 0.0f;
-      const Vec3f p = origin + t * direction - light.position;
+      const Vec3f p = from + t * direction - light.position;
       // Coordinates along the (possibly skew) axes.
       const Vec3f normal = light.axis_x.cross(light.axis_y);
       const float scale = 1.0f / normal.squaredNorm();
@@ -346,10 +349,12 @@ float Lights::meet(const Record& light, const Vec3f& origin, const Vec3f& direct
       radiance = light.radiance;
       return 1.0f / (2.0f * kPiF * light.one_minus_cos);
     }
-    case Shape::Dome:
-      radiance = dome_radiance(light, direction);
-      return light.texture ? light.texture->density(light.dome_from_world * direction)
-                           : 1.0f / (4.0f * kPiF);
+    case Shape::Dome: {
+      const Vec3f local = light.dome_from_world * direction;
+      const DomeTexture::Place place = light.texture->place(local);
+      radiance = light.radiance.cwiseProduct(light.texture->radiance(local));
+      return place.density * light.sky->probability(light.sky->cell(from), place.patch);
+    }
     case Shape::Triangles:
       break;
   }

@@ -9,6 +9,7 @@
 #include "diorama/light.h"
 #include "dome.h"
 #include "sampling.h"
+#include "sky_grid.h"
 
 namespace diorama {
 
@@ -51,11 +52,14 @@ struct LightSample {
 /// that one shadow ray per vertex goes where it matters.
 class Lights {
  public:
-  /// `texture` is the dome's or null.
+  /// `texture`: of a dome; one without an image has a white one.
   void add(const Light& light, const Affine& world_from_node,
            std::shared_ptr<const DomeTexture> texture);
   /// Returns the light's number; triangles without area are dropped.
   std::uint32_t add(EmittingTriangles triangles);
+
+  /// Finds out which parts of the domes can be seen from where in the scene.
+  void learn_sky(const Aabb& bounds, const SkyGrid::Sees& sees, Host& host);
 
   bool is_empty() const { return lights_.empty(); }
   std::size_t count() const { return lights_.size(); }
@@ -75,15 +79,16 @@ class Lights {
   float density_of_surface(std::uint32_t light, float distance, float cos_at_light) const;
 
   /// What a ray meets of lights without a mesh, up to t_max, and of dome and distant lights when
-  /// t_max is infinite. Calls found(light, radiance, density) for each.
+  /// t_max is infinite. Calls found(light, radiance, density) for each; the density is that of
+  /// sample() from `from`, the start of the ray.
   template <class Found>
-  void along_ray(const Vec3f& origin, const Vec3f& direction, float t_max, bool is_camera_ray,
+  void along_ray(const Vec3f& from, const Vec3f& direction, float t_max, bool is_camera_ray,
                  Found&& found) const {
     const auto report = [&](std::uint32_t index) {
       const Record& light = lights_[index];
       if (is_camera_ray && !light.is_visible_to_camera) return;
       Vec3f radiance;
-      const float density = meet(light, origin, direction, t_max, radiance);
+      const float density = meet(light, from, direction, t_max, radiance);
       if (density > 0.0f) found(index, radiance, density);
     };
     for (std::uint32_t index : bodies_) report(index);
@@ -112,6 +117,7 @@ class Lights {
     bool is_visible_to_camera = true;
     Eigen::Matrix3f dome_from_world = Eigen::Matrix3f::Identity();
     std::shared_ptr<const DomeTexture> texture;
+    std::shared_ptr<const SkyGrid> sky;
     std::uint32_t geometry = 0;
     std::vector<EmittingTriangles::Triangle> triangles;
     std::vector<float> cumulative_area;
@@ -119,13 +125,12 @@ class Lights {
 
   float score(const Record& light, const Receiver& receiver) const;
   static float cone_factor(const Record& light, const Vec3f& from_light);
-  static float meet(const Record& light, const Vec3f& origin, const Vec3f& direction, float t_max,
+  static float meet(const Record& light, const Vec3f& from, const Vec3f& direction, float t_max,
                     Vec3f& radiance);
-  static Vec3f dome_radiance(const Record& light, const Vec3f& direction);
   static LightSample sample_sphere(const Record& light, const Vec3f& from, const Vec2f& u);
   static LightSample sample_flat(const Record& light, const Vec3f& from, const Vec2f& u);
   static LightSample sample_distant(const Record& light, const Vec2f& u);
-  static LightSample sample_dome(const Record& light, const Vec2f& u);
+  static LightSample sample_dome(const Record& light, const Vec3f& from, const Vec2f& u);
   static LightSample sample_triangles(const Record& light, const Vec3f& from, const Vec2f& u);
   void add_record(Record record);
 

@@ -26,6 +26,15 @@ std::string device_options(const std::string& isa, int threads) {
   return __builtin_cpu_supports("avx2") ? options + ",isa=avx2" : options;
 }
 
+std::shared_ptr<const Texture> make_white_sky() {
+  auto texture = std::make_shared<Texture>();
+  texture->width = 64;
+  texture->height = 32;
+  texture->channels = 1;
+  texture->floats.assign(64 * 32, 1.0f);
+  return texture;
+}
+
 /// Carried by shadow rays; the filter below weakens it.
 struct ShadowContext {
   embree::Context context;
@@ -130,7 +139,8 @@ Vec2f MeshInstance::uv(std::uint32_t triangle, float u, float v) const {
 RenderScene::RenderScene(Host& host, const std::string& isa)
     : host_(host),
       device_(rtcNewDevice(device_options(isa, host.thread_count()).c_str())),
-      default_material_(std::make_shared<Material>()) {
+      default_material_(std::make_shared<Material>()),
+      white_sky_(make_white_sky()) {
   if (!device_) throw Error(ErrorKind::Plugin, "Embree cannot start on this machine");
 }
 
@@ -175,6 +185,10 @@ void RenderScene::take(const Scene& scene) {
   lights_ = Lights();
   add_lights(scene);
   add_emitters();
+  const auto sees = [this](const Vec3f& origin, const Vec3f& direction) {
+    return transmittance(origin, direction, kInfinite, true).maxCoeff() > 0.0f;
+  };
+  lights_.learn_sky(bounds_, sees, host_);
 }
 
 void RenderScene::collect(const Scene& scene, NodeId id, const Affine& world_from_parent) {
@@ -345,10 +359,11 @@ void RenderScene::add_lights(const Scene& scene) {
   for (NodeId id : light_nodes_) {
     const Light& light = *scene[id].light;
     std::shared_ptr<const DomeTexture> dome;
-    if (light.kind == LightKind::Dome && light.texture) {
-      CachedDome& cached = domes_[light.texture.get()];
-      if (cached.owner.lock() != light.texture) {
-        cached = {light.texture, std::make_shared<const DomeTexture>(light.texture)};
+    if (light.kind == LightKind::Dome) {
+      const auto& image = light.texture ? light.texture : white_sky_;
+      CachedDome& cached = domes_[image.get()];
+      if (cached.owner.lock() != image) {
+        cached = {image, std::make_shared<const DomeTexture>(image)};
       }
       dome = cached.dome;
     }

@@ -152,6 +152,7 @@ class RenderScene {
   std::map<const Texture*, CachedTexture> textures_;
   std::map<const Texture*, CachedDome> domes_;
   std::shared_ptr<const Material> default_material_;
+  std::shared_ptr<const Texture> white_sky_;  ///< Of domes without an image.
   std::map<const Material*, std::uint32_t> material_indices_;
   std::vector<ShadingMaterial> materials_;
   std::vector<std::unique_ptr<MeshInstance>> instances_;

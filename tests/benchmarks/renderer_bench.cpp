@@ -55,6 +55,7 @@ struct Options {
   std::string folder;
   std::string reference;
   std::string png;
+  std::string raw;
   std::string materials = "diffuse";
   int width = 320;
   int height = 240;
@@ -107,6 +108,12 @@ void run(const Options& options) {
       line["bias"] = error.bias;
     }
     std::printf("%s\n", line.dump().c_str());
+    if (!options.raw.empty()) {
+      const auto pixels = frame.get(kColorHdr).pixels();
+      std::ofstream(options.raw, std::ios::binary)
+          .write(reinterpret_cast<const char*>(pixels.data()),
+                 std::streamsize(pixels.size_bytes()));
+    }
     if (!options.png.empty()) test::write_png(host, frame.get(kColor), options.png);
   }
 }
@@ -123,6 +130,7 @@ int main(int argc, char** argv) {
   app.add_option("folder", options.folder, "Holds scene.glb, scene.json, sky.hdr")->required();
   app.add_option("--reference", options.reference, "EXR of the same size to compare with");
   app.add_option("--png", options.png, "Where to put the picture");
+  app.add_option("--raw", options.raw, "Where to put the radiance: floats, RGB, rows from the top");
   app.add_option("--materials", options.materials)->check(CLI::IsMember({"diffuse", "pbr"}));
   app.add_option("--width", options.width);
   app.add_option("--height", options.height);

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "denoiser.h"
+
+#include <cmath>
+
+#include "diorama/rng.h"
+#include "support/catch.h"
+#include "support/render_host/render_host.h"
+#include "view_transform.h"
+
+namespace diorama {
+namespace {
+
+/// Two walls meeting in the middle column, lit 1 and 3, with a fine stripe pattern as colour and
+/// noise of relative size `noise`.
+Film noisy_corner(double noise) {
+  Film film(65, 40, FilmPixel{});
+  Rng rng(21);
+  for (int y = 0; y < film.height(); ++y) {
+    for (int x = 0; x < film.width(); ++x) {
+      FilmPixel& p = film.at(x, y);
+      const bool is_left = x < 32;
+      const float light = is_left ? 1.0f : 3.0f;
+      p.albedo = Vec3f::Constant((x / 2) % 2 ? 0.8f : 0.2f);
+      p.normal = is_left ? Vec3f::UnitX() : Vec3f::UnitY();
+      p.position = is_left ? Vec3f(0, float(32 - x), float(y)) : Vec3f(float(x - 32), 0, float(y));
+      const float spread = float(noise) * light;
+      p.scattered = p.albedo * std::max(0.0f, light + spread * float(rng.normal()));
+      p.variance = std::pow(spread * p.albedo.x(), 2.0f);
+      p.surface_share = 1.0f;
+    }
+  }
+  return film;
+}
+
+double error(const Image<Vec3f>& image, const Image<Vec3f>& truth) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < image.pixels().size(); ++i) {
+    sum += double((image.pixels()[i] - truth.pixels()[i]).squaredNorm());
+  }
+  return sum / double(image.pixels().size());
+}
+
+}  // namespace
+
+TEST_CASE("noise goes, pattern and corner stay", "[denoiser]") {
+  test::RenderHost host(2);
+  const Image<Vec3f> truth = undenoised(noisy_corner(0.0));
+  const Film film = noisy_corner(0.3);
+  const double before = error(undenoised(film), truth);
+  const double after = error(denoised(film, Vec3f(30, 30, 20), host), truth);
+  CHECK(after < 0.08 * before);
+}
+
+TEST_CASE("a picture without noise stays as it is", "[denoiser]") {
+  test::RenderHost host(1);
+  const Film film = noisy_corner(0.0);
+  CHECK(error(denoised(film, Vec3f(30, 30, 20), host), undenoised(film)) < 1e-6);
+}
+
+TEST_CASE("one chance find among quiet neighbours is tamed", "[denoiser]") {
+  test::RenderHost host(1);
+  Film film = noisy_corner(0.05);
+  film.at(20, 20).scattered *= 500.0f;
+  film.at(20, 20).variance *= 250000.0f;
+  const Image<Vec3f> clean = denoised(film, Vec3f(30, 30, 20), host);
+  for (int y = 12; y < 28; ++y) {
+    for (int x = 12; x < 28; ++x) CHECK(clean.at(x, y).x() < 1.5f);
+  }
+}
+
+TEST_CASE("sources seen directly pass untouched", "[denoiser]") {
+  test::RenderHost host(1);
+  Film film = noisy_corner(0.2);
+  film.at(5, 6) = FilmPixel{};
+  film.at(5, 6).seen = Vec3f(70.0f, 60.0f, 50.0f);
+  CHECK((denoised(film, Vec3f(30, 30, 20), host).at(5, 6) - Vec3f(70, 60, 50)).norm() < 1e-4f);
+}
+
+TEST_CASE("exposure does not depend on the scale of the light", "[exposure]") {
+  Image<Vec3f> picture(40, 30, Vec3f::Zero());
+  Rng rng(2);
+  for (Vec3f& p : picture.pixels()) p = Vec3f::Constant(float(rng.uniform(0.05, 0.4)));
+  const double plain = automatic_exposure(picture);
+  CHECK(plain > 0.3);
+  CHECK(plain < 3.0);
+  Image<Vec3f> grossly_lit = picture;
+  for (Vec3f& p : grossly_lit.pixels()) p *= 20000.0f;
+  CHECK(automatic_exposure(grossly_lit) == Approx(plain / 20000.0));
+  // A lamp in a twentieth of the picture changes little.
+  for (int i = 0; i < 60; ++i) picture.pixels()[std::size_t(i)] = Vec3f::Constant(1e6f);
+  CHECK(automatic_exposure(picture) == Approx(plain).epsilon(0.15));
+  CHECK(automatic_exposure(Image<Vec3f>(4, 3, Vec3f::Zero())) == 1.0);
+}
+
+TEST_CASE("the standard view is sRGB, the filmic one never clips abruptly", "[exposure]") {
+  Image<Vec3f> ramp(256, 1, Vec3f::Zero());
+  for (int i = 0; i < 256; ++i)
+    ramp.at(i, 0) = Vec3f::Constant(linear_from_srgb(float(i) / 255.0f));
+  const Image<Rgba8> standard = displayed(ramp, 1.0, ViewTransform::Standard);
+  for (int i = 0; i < 256; ++i) {
+    CHECK(int(standard.at(i, 0)[0]) == i);
+    CHECK(int(standard.at(i, 0)[3]) == 255);
+  }
+  CHECK(int(displayed(ramp, 8.0, ViewTransform::Standard).at(255, 0)[1]) == 255);
+  const Image<Rgba8> filmic = displayed(ramp, 2.0, ViewTransform::Filmic);
+  for (int i = 1; i < 256; ++i) CHECK(filmic.at(i, 0)[0] >= filmic.at(i - 1, 0)[0]);
+  CHECK(int(filmic.at(255, 0)[0]) < 255);
+}
+
+}  // namespace diorama

@@ -1,0 +1,360 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+#include <functional>
+
+#include "embree_renderer.h"
+#include "support/catch.h"
+#include "support/render_host/render_host.h"
+#include "test_world.h"
+
+namespace diorama {
+namespace {
+
+using test::at;
+using test::dome;
+using test::matte;
+using test::RenderHost;
+using test::TestWorld;
+
+EmbreeRenderer::Params reference(int samples, int bounces = 6) {
+  EmbreeRenderer::Params params;
+  params.samples = samples;
+  params.max_bounces = bounces;
+  params.denoise = false;
+  params.caustics = true;
+  params.exposure = "fixed";
+  params.view_transform = "standard";
+  return params;
+}
+
+Image<Vec3f> render(TestWorld& world, NodeId camera, const EmbreeRenderer::Params& params,
+                    int threads = 2, std::uint64_t seed = 3) {
+  RenderHost host(threads);
+  EmbreeRenderer renderer(params, host);
+  renderer.prepare(world.scene);
+  return renderer.render({camera, {std::string(kColorHdr.name)}, seed}).get(kColorHdr);
+}
+
+struct Statistics {
+  double mean = 0.0;
+  double error = 0.0;  ///< Standard error of the mean.
+};
+
+Statistics statistics(const Image<Vec3f>& image) {
+  double sum = 0.0;
+  double sum2 = 0.0;
+  const double n = double(image.pixels().size());
+  for (const Vec3f& p : image.pixels()) {
+    const double v = double(p.mean());
+    sum += v;
+    sum2 += v * v;
+  }
+  const double mean = sum / n;
+  return {mean, std::sqrt(std::max(0.0, sum2 / n - mean * mean) / n)};
+}
+
+/// A room with shiny, rough, clear and glowing things under lights of every kind.
+TestWorld busy_room() {
+  TestWorld world;
+  Mesh room = make_box(Vec3(5, 4, 3));
+  for (Vec3f& n : room.normals) n = -n;
+  for (auto& t : room.triangles) std::swap(t[1], t[2]);
+  world.add("room", room, matte(0.6f));
+  Material metal;
+  metal.base_color = Vec3f(0.9f, 0.7f, 0.3f);
+  metal.metallic = 1.0f;
+  metal.roughness = 0.3f;
+  world.add("ball", make_sphere(0.5), metal, at(0.8, 0.5, -0.9));
+  Material coated;
+  coated.base_color = Vec3f(0.7f, 0.1f, 0.1f);
+  coated.clearcoat = 1.0f;
+  coated.clearcoat_roughness = 0.2f;
+  world.add("box", make_box(Vec3(0.7, 0.6, 0.9)), coated, at(-0.9, 0.7, -1.0));
+  Material glow;
+  glow.base_color = Vec3f::Constant(0.2f);
+  glow.emission = Vec3f(2.0f, 4.0f, 6.0f);
+  world.add("glow", make_cylinder(0.2, 0.5), glow, at(0.0, 1.2, -1.1));
+  Light lamp;
+  lamp.radius_m = 0.15;
+  lamp.color = Vec3f(30.0f, 25.0f, 20.0f);
+  world.add(lamp, at(-1.2, -0.8, 1.0));
+  Light panel;
+  panel.kind = LightKind::Rect;
+  panel.width_m = 1.2;
+  panel.height_m = 0.7;
+  panel.color = Vec3f(4.0f, 4.0f, 5.0f);
+  world.add(panel, at(1.0, 0.3, 1.3));
+  return world;
+}
+
+}  // namespace
+
+TEST_CASE("nothing is seen of any object in a white furnace", "[renderer][furnace]") {
+  const std::vector<std::pair<const char*, std::function<void(Material&)>>> materials{
+      {"matte", [](Material& m) { m.specular = 0.0f; }},
+      {"plastic", [](Material& m) { m.roughness = 0.3f; }},
+      {"metal", [](Material& m) { m.metallic = 1.0f, m.roughness = 0.8f; }},
+      {"coated", [](Material& m) { m.clearcoat = 1.0f; }},
+      {"glass", [](Material& m) { m.transmission = 1.0f, m.roughness = 0.0f; }},
+      {"frosted", [](Material& m) { m.transmission = 1.0f, m.roughness = 0.6f; }},
+      {"pane", [](Material& m) { m.transmission = 1.0f, m.is_thin_walled = true; }},
+      {"veil", [](Material& m) { m.opacity = 0.4f; }},
+  };
+  for (const auto& [name, change] : materials) {
+    TestWorld world;
+    Material material;
+    material.base_color.setOnes();
+    change(material);
+    world.add("ball", make_sphere(1.0, 96), material, at(0.1, 0.2, -0.1));
+    world.add(dome(1.0f));
+    const NodeId camera = world.add_camera(24, 20, 20.0, Vec3(3, -2, 1), Vec3(0.1, 0.2, -0.1));
+    const Statistics s = statistics(render(world, camera, reference(128, 64)));
+    CAPTURE(name);
+    CHECK(s.mean > 0.99);
+    CHECK(s.mean < 1.003);
+  }
+}
+
+TEST_CASE("a lamp over a floor lights it by the closed form", "[renderer]") {
+  TestWorld world;
+  world.add("floor", make_plane(4, 5), matte(0.5f));
+  Light lamp;
+  lamp.radius_m = 0.3;
+  lamp.color = Vec3f(20.0f, 10.0f, 5.0f);
+  lamp.is_visible_to_camera = false;
+  world.add(lamp, at(0.4, -0.2, 1.5));
+  // A narrow view of the point (0.1, 0.3, 0).
+  const NodeId camera = world.add_camera(16, 12, 4000.0, Vec3(-2, 1, 2), Vec3(0.1, 0.3, 0));
+  const Image<Vec3f> image = render(world, camera, reference(64));
+  Vec3 mean = Vec3::Zero();
+  for (const Vec3f& p : image.pixels()) mean += p.cast<double>() / double(image.pixels().size());
+  const double d2 = 0.3 * 0.3 + 0.5 * 0.5 + 1.5 * 1.5;
+  const double per_radiance = 0.5 * 0.3 * 0.3 / d2 * 1.5 / std::sqrt(d2);
+  CHECK(mean.x() == Approx(20.0 * per_radiance).epsilon(0.005));
+  CHECK(mean.y() == Approx(10.0 * per_radiance).epsilon(0.005));
+  CHECK(mean.z() == Approx(5.0 * per_radiance).epsilon(0.005));
+}
+
+TEST_CASE("light between two parallel bounces follows the geometric series", "[renderer]") {
+  // Inside a closed sphere of albedo a with its own glow 1, radiance is 1 / (1 - a) everywhere.
+  TestWorld world;
+  Material wall = matte(0.5f);
+  wall.emission.setOnes();
+  world.add("shell", make_sphere(2.0, 96), wall);
+  const NodeId camera = world.add_camera(16, 12, 10.0, Vec3(0.3, 0.2, 0.1), Vec3(1, 1, 0));
+  CHECK(statistics(render(world, camera, reference(64, 40))).mean == Approx(2.0).epsilon(0.01));
+}
+
+TEST_CASE("light samples, BSDF samples and both together agree", "[renderer][mis]") {
+  TestWorld world = busy_room();
+  const NodeId camera = world.add_camera(40, 30, 22.0, Vec3(-1.8, -1.5, 0.6), Vec3(0.3, 0.6, -0.9));
+  RenderHost host(2);
+  RenderScene scene(host, "auto");
+  scene.take(world.scene);
+  const View view(world.scene, camera);
+  const SobolTable table;
+  const auto measure = [&](bool lights, bool bsdf, int samples) {
+    TraceSettings settings;
+    settings.max_bounces = 3;
+    settings.has_caustics = true;
+    settings.samples_lights = lights;
+    settings.samples_bsdf = bsdf;
+    const PathTracer tracer(scene, view, table, settings);
+    // Independent repetitions give the error of the mean.
+    constexpr int kRuns = 12;
+    std::vector<double> runs(kRuns, 0.0);
+    host.parallel_for(kRuns, [&](std::size_t run) {
+      for (int y = 0; y < 30; ++y) {
+        for (int x = 0; x < 40; ++x) {
+          for (int i = 0; i < samples; ++i) {
+            const PathSample s = tracer.trace(x, y, std::uint32_t(i), 1000 + run);
+            runs[run] += double(s.scattered.mean()) / (1200.0 * samples);
+          }
+        }
+      }
+    });
+    double mean = 0.0;
+    for (double r : runs) mean += r / kRuns;
+    double variance = 0.0;
+    for (double r : runs) variance += (r - mean) * (r - mean) / (kRuns - 1);
+    return Statistics{mean, std::sqrt(variance / kRuns)};
+  };
+  const Statistics both = measure(true, true, 6);
+  const Statistics lights = measure(true, false, 12);
+  const Statistics bsdf = measure(false, true, 48);
+  CAPTURE(both.mean, both.error, lights.mean, lights.error, bsdf.mean, bsdf.error);
+  REQUIRE(both.error < 0.01 * both.mean);
+  REQUIRE(lights.error < 0.02 * lights.mean);
+  REQUIRE(bsdf.error < 0.03 * bsdf.mean);
+  CHECK(std::abs(both.mean - lights.mean) < 4.0 * std::hypot(both.error, lights.error));
+  CHECK(std::abs(both.mean - bsdf.mean) < 4.0 * std::hypot(both.error, bsdf.error));
+}
+
+TEST_CASE("the same bytes come out for every number of threads", "[renderer][determinism]") {
+  TestWorld world = busy_room();
+  const NodeId camera = world.add_camera(50, 35, 30.0, Vec3(-1.8, -1.5, 0.6), Vec3(0.3, 0.6, -0.9));
+  EmbreeRenderer::Params params;
+  params.samples = 5;
+  const Image<Vec3f> one = render(world, camera, params, 1);
+  for (const int threads : {2, 7}) CHECK(render(world, camera, params, threads) == one);
+  CHECK(render(world, camera, params, 2, 4) != one);  // another seed, other noise
+}
+
+TEST_CASE("radiance is finite and never negative", "[renderer]") {
+  TestWorld world = busy_room();
+  Material glass;
+  glass.base_color.setOnes();
+  glass.transmission = 1.0f;
+  glass.roughness = 0.15f;
+  world.add("glass", make_sphere(0.4), glass, at(-0.2, -0.4, -0.6));
+  Mesh broken = make_box(Vec3(0.3, 0.3, 0.3));
+  broken.triangles.push_back({0, 0, 1});
+  broken.normals.assign(broken.normals.size(), Vec3f::Zero());
+  world.add("broken", broken, Material(), at(0.4, -0.8, -1.2));
+  Light inside;
+  inside.radius_m = 0.2;
+  inside.color = Vec3f::Constant(50.0f);
+  world.add(inside, at(0.8, 0.5, -0.9));  // within the metal ball
+  const NodeId camera = world.add_camera(48, 36, 30.0, Vec3(-1.8, -1.5, 0.6), Vec3(0.3, 0.6, -0.9));
+  for (const bool denoise : {false, true}) {
+    EmbreeRenderer::Params params = reference(24);
+    params.denoise = denoise;
+    params.caustics = !denoise;
+    for (const Vec3f& p : render(world, camera, params).pixels()) {
+      REQUIRE(p.allFinite());
+      REQUIRE(p.minCoeff() >= 0.0f);
+    }
+  }
+}
+
+TEST_CASE("a moved object, a new material and a hidden one show in the next picture",
+          "[renderer]") {
+  TestWorld world;
+  world.add(dome(1.0f));
+  const NodeId ball = world.add("ball", make_sphere(0.3), matte(0.0f));
+  const NodeId other = world.add("other", make_box(Vec3(0.1, 0.1, 0.1)), matte(0.3f), at(3, 3, 3));
+  const NodeId camera = world.add_camera(32, 24, 30.0, Vec3(0, -3, 0), Vec3(0, 0, 0));
+  RenderHost host(2);
+  EmbreeRenderer renderer(reference(4), host);
+  const auto leaf_at = [&](const Vec3& point) {
+    renderer.prepare(world.scene);
+    const Frame frame = renderer.render({camera, {std::string(kLeafId.name)}, 1});
+    const Vec3 world_point = world.scene.world_from_node(world.base) * point;
+    const Vec3 seen = world.scene.world_from_node(camera).inverse() * world_point;
+    const Vec2 pixel = *project(*world.scene[camera].camera, seen);
+    return frame.get(kLeafId).at(int(pixel.x()), int(pixel.y()));
+  };
+  CHECK(leaf_at(Vec3::Zero()) == ball.index);
+  world.scene.set_pose(ball, at(0.7, 0.2, -0.3));
+  CHECK(leaf_at(Vec3::Zero()) == 0);
+  CHECK(leaf_at(Vec3(0.7, 0.2, -0.3)) == ball.index);
+  world.scene.edit(ball).is_visible = false;
+  CHECK(leaf_at(Vec3(0.7, 0.2, -0.3)) == 0);
+  world.scene.edit(ball).is_visible = true;
+  world.scene.erase(other);
+  CHECK(leaf_at(Vec3(0.7, 0.2, -0.3)) == ball.index);
+
+  const auto brightness = [&] {
+    renderer.prepare(world.scene);
+    const std::string hdr(kColorHdr.name);
+    return statistics(renderer.render({camera, {hdr}, 1}).get(kColorHdr)).mean;
+  };
+  const double dark = brightness();
+  world.scene.edit(ball).materials = {std::make_shared<const Material>(matte(1.0f))};
+  CHECK(brightness() == Approx(1.0).margin(0.01));
+  CHECK(dark < 0.99);
+}
+
+TEST_CASE("an updated scene renders the same bytes as a fresh renderer",
+          "[renderer][determinism]") {
+  TestWorld world = busy_room();
+  const NodeId camera = world.add_camera(40, 30, 22.0, Vec3(-1.8, -1.5, 0.6), Vec3(0.3, 0.6, -0.9));
+  const NodeId ball = world.scene.find("/base/ball");
+  RenderHost host(2);
+  EmbreeRenderer renderer(reference(3), host);
+  const std::string hdr(kColorHdr.name);
+  renderer.prepare(world.scene);
+  const Image<Vec3f> before = renderer.render({camera, {hdr}, 9}).get(kColorHdr);
+  world.scene.set_pose(ball, at(0.2, 0.1, -0.4));
+  renderer.prepare(world.scene);
+  const Image<Vec3f> updated = renderer.render({camera, {hdr}, 9}).get(kColorHdr);
+  CHECK(updated != before);
+  CHECK(updated == render(world, camera, reference(3), 2, 9));
+}
+
+TEST_CASE("glass lets the light of a lamp into a closed room", "[renderer]") {
+  // A lamp behind a pane, a solid slab or nothing, over a floor.
+  const auto lit = [](const Material* screen, double thickness) {
+    TestWorld world;
+    world.add("floor", make_plane(6, 6), matte(0.8f));
+    if (screen) world.add("screen", make_box(Vec3(6, 6, thickness)), *screen, at(0, 0, 0.8));
+    Light lamp;
+    lamp.radius_m = 0.2;
+    lamp.color = Vec3f::Constant(20.0f);
+    world.add(lamp, at(0.2, 0.1, 1.5));
+    const NodeId camera = world.add_camera(12, 10, 40.0, Vec3(1, -1, 0.5), Vec3(0.1, 0.2, 0));
+    EmbreeRenderer::Params params = reference(64, 4);
+    params.caustics = false;
+    return statistics(render(world, camera, params)).mean;
+  };
+  const double bare = lit(nullptr, 0.0);
+  Material glass;
+  glass.base_color.setOnes();
+  glass.transmission = 1.0f;
+  glass.roughness = 0.0f;
+  const double slab = lit(&glass, 0.02);
+  CHECK(slab > 0.85 * bare);
+  CHECK(slab < 1.05 * bare);
+  glass.base_color = Vec3f::Constant(0.5f);
+  const double tinted = lit(&glass, 0.02);
+  CHECK(tinted < 0.7 * bare);
+  CHECK(tinted > 0.3 * bare);
+  const Material wall = matte(0.5f);
+  CHECK(lit(&wall, 0.02) < 1e-6);
+}
+
+TEST_CASE("modes and exposure do what they say", "[renderer]") {
+  TestWorld world = busy_room();
+  const NodeId camera = world.add_camera(48, 32, 26.0, Vec3(-1.8, -1.5, 0.6), Vec3(0.3, 0.6, -0.9));
+  RenderHost host(2);
+  const auto frame_of = [&](const char* mode, double ev) {
+    EmbreeRenderer::Params params;
+    params.mode = mode;
+    params.samples = 4;
+    params.exposure_ev = ev;
+    EmbreeRenderer renderer(params, host);
+    renderer.prepare(world.scene);
+    return renderer.render({camera, {std::string(kColor.name), std::string(kColorHdr.name)}, 2});
+  };
+  const auto level = [](const Frame& frame) {
+    double sum = 0.0;
+    for (const Rgba8& p : frame.get(kColor).pixels()) sum += p[0] + p[1] + p[2];
+    return sum / double(frame.get(kColor).pixels().size()) / 3.0;
+  };
+  for (const char* mode : {"path_traced", "real_time", "preview"}) {
+    CAPTURE(mode);
+    const Frame frame = frame_of(mode, 0.0);
+    CHECK(level(frame) > 60.0);
+    CHECK(level(frame) < 200.0);
+    CHECK(frame.exposure > 0.0);
+  }
+  CHECK(level(frame_of("path_traced", 1.0)) > level(frame_of("path_traced", 0.0)) + 10.0);
+  CHECK(statistics(frame_of("preview", 0).get(kColorHdr)).mean <
+        statistics(frame_of("path_traced", 0).get(kColorHdr)).mean);
+}
+
+TEST_CASE("a scene without light says so, and a scene without anything renders", "[renderer]") {
+  TestWorld world;
+  const NodeId camera = world.add_camera(8, 6, 6.0, Vec3(0, -3, 0), Vec3(0, 0, 0));
+  RenderHost host(1);
+  EmbreeRenderer renderer({}, host);
+  renderer.prepare(world.scene);
+  REQUIRE(host.messages.size() == 1);
+  CHECK(host.messages[0] == "the scene has no light: pictures will be black");
+  const Frame frame =
+      renderer.render({camera, {std::string(kColor.name), std::string(kLeafId.name)}, 1});
+  CHECK(int(frame.get(kColor).at(3, 3)[0]) == 0);
+  CHECK(frame.get(kLeafId).at(3, 3) == 0);
+}
+
+}  // namespace diorama

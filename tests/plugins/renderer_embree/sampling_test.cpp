@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sampling.h"
+
+#include <functional>
+#include <vector>
+
+#include "diorama/rng.h"
+#include "dome.h"
+#include "sky_grid.h"
+#include "sobol.h"
+#include "support/catch.h"
+#include "support/render_host/render_host.h"
+
+namespace diorama {
+namespace {
+
+/// Compares how many samples fall into cells of the sphere with the integral of their density.
+/// Returns Pearson's chi-square over its degrees of freedom: about 1 when they agree.
+double chi_square(const std::function<Vec3f(const Vec2f&)>& sample,
+                  const std::function<float(const Vec3f&)>& density) {
+  constexpr int kRows = 16;
+  constexpr int kColumns = 24;
+  constexpr int kSamples = 200000;
+  constexpr int kSub = 24;  // integration points per cell and axis
+  std::vector<double> counts(kRows * kColumns, 0.0);
+  Rng rng(77);
+  for (int i = 0; i < kSamples; ++i) {
+    const Vec3f d = sample({float(rng.uniform()), float(rng.uniform())});
+    REQUIRE(d.norm() == Approx(1.0f).margin(1e-4));
+    const double phi = std::atan2(double(d.y()), double(d.x())) + kPi;
+    const int row = std::clamp(int((1.0 - double(d.z())) / 2.0 * kRows), 0, kRows - 1);
+    const int column = std::clamp(int(phi / (2.0 * kPi) * kColumns), 0, kColumns - 1);
+    counts[std::size_t(row * kColumns + column)] += 1.0;
+  }
+  double sum = 0.0;
+  int cells = 0;
+  for (int row = 0; row < kRows; ++row) {
+    for (int column = 0; column < kColumns; ++column) {
+      double expected = 0.0;
+      for (int i = 0; i < kSub * kSub; ++i) {
+        const double z = 1.0 - 2.0 * (row + (i % kSub + 0.5) / kSub) / kRows;
+        const double phi = (column + (i / kSub + 0.5) / kSub) / kColumns * 2.0 * kPi - kPi;
+        const double r = std::sqrt(std::max(0.0, 1.0 - z * z));
+        const Vec3f d(float(r * std::cos(phi)), float(r * std::sin(phi)), float(z));
+        expected += double(density(d)) / (kSub * kSub) * 4.0 * kPi / (kRows * kColumns);
+      }
+      expected *= kSamples;
+      const double found = counts[std::size_t(row * kColumns + column)];
+      if (expected < 20.0) {
+        CHECK(found <= expected + 30.0);
+        continue;
+      }
+      sum += (found - expected) * (found - expected) / expected;
+      ++cells;
+    }
+  }
+  REQUIRE(cells > 3);
+  return sum / cells;
+}
+
+}  // namespace
+
+TEST_CASE("cosine-weighted directions follow their density", "[sampling]") {
+  CHECK(chi_square(&cosine_hemisphere,
+                   [](const Vec3f& d) { return std::max(0.0f, d.z()) / kPiF; }) < 1.4);
+}
+
+TEST_CASE("directions in a cone follow their density", "[sampling]") {
+  const float one_minus_cos = 0.35f;
+  CHECK(chi_square([&](const Vec2f& u) { return uniform_cone(u, one_minus_cos); },
+                   [&](const Vec3f& d) {
+                     return 1.0f - d.z() <= one_minus_cos ? 1.0f / (2.0f * kPiF * one_minus_cos)
+                                                          : 0.0f;
+                   }) < 4.0);  // the rim cuts a row of cells, which the grid integrates coarsely
+}
+
+TEST_CASE("visible normals of GGX follow their density", "[sampling]") {
+  for (const float alpha : {0.3f, 0.9f}) {
+    for (const Vec3f& raw : {Vec3f(0.3f, -0.2f, 0.9f), Vec3f(-0.9f, 0.3f, 0.25f)}) {
+      const Vec3f w = raw.normalized();
+      CAPTURE(alpha, w.transpose());
+      CHECK(chi_square([&](const Vec2f& u) { return ggx_visible_normal(w, alpha, u); },
+                       [&](const Vec3f& h) {
+                         return h.z() > 0.0f ? ggx_visible_normal_density(w, h, alpha) : 0.0f;
+                       }) < 1.5);
+    }
+  }
+}
+
+TEST_CASE("a dome is sampled as bright as it is", "[sampling]") {
+  auto texture = std::make_shared<Texture>();
+  texture->width = 48;
+  texture->height = 24;
+  texture->channels = 3;
+  Rng rng(5);
+  for (int i = 0; i < 48 * 24 * 3; ++i) texture->floats.push_back(float(rng.uniform(0.1, 1.0)));
+  for (int k = 0; k < 3; ++k) texture->floats[std::size_t((7 * 48 + 17) * 3 + k)] = 40.0f;
+  const DomeTexture dome(texture);
+  // One half of the world sees nothing of the sky but a part.
+  test::RenderHost host(2);
+  const SkyGrid everything(dome);
+  const Aabb bounds{Vec3(-2, -1, -3), Vec3(2, 4, 3)};
+  const SkyGrid part(
+      dome, Eigen::Matrix3f::Identity(), bounds,
+      [](const Vec3f& p, const Vec3f& d) { return p.x() > 0.0f || d.y() > 0.6f; }, host);
+  CHECK(part.power(part.cell(Vec3f(-1, 0, 0))) < 0.4f * part.power(part.cell(Vec3f(1, 0, 0))));
+  for (const SkyGrid* grid : {&everything, &part}) {
+    const std::uint32_t cell = grid->cell(Vec3f(-1.0f, 0.5f, 1.0f));
+    const auto draw = [&](const Vec2f& u) {
+      const SkyGrid::Choice choice = grid->choose(cell, u.x());
+      const DomeTexture::Draw d = dome.sample(choice.patch, {choice.rest, u.y()});
+      return std::pair(d, d.density * choice.probability);
+    };
+    const auto density = [&](const Vec3f& d) {
+      const DomeTexture::Place place = dome.place(d);
+      return place.density * grid->probability(cell, place.patch);
+    };
+    CHECK(chi_square([&](const Vec2f& u) { return draw(u).first.direction; }, density) < 3.0);
+    // Sampling and density agree direction by direction, and radiance / density stays bounded.
+    int differing = 0;
+    for (int i = 0; i < 2000; ++i) {
+      const auto [d, p] = draw({float(rng.uniform()), float(rng.uniform())});
+      differing += std::abs(density(d.direction) / p - 1.0f) > 0.02f;  // on a cell's rim
+      CHECK((dome.radiance(d.direction) - d.radiance).norm() < 0.02f * (1.0f + d.radiance.norm()));
+      if (grid == &everything) CHECK(luminance(d.radiance) / p < 60.0f);
+    }
+    CHECK(differing < 10);
+  }
+}
+
+TEST_CASE("points of a triangle are spread evenly", "[sampling]") {
+  Rng rng(3);
+  int in_corner = 0;
+  constexpr int kSamples = 100000;
+  Vec2 sum = Vec2::Zero();
+  for (int i = 0; i < kSamples; ++i) {
+    const Vec2f b = triangle_from_square({float(rng.uniform()), float(rng.uniform())});
+    REQUIRE(b.minCoeff() >= 0.0f);
+    REQUIRE(b.sum() <= 1.0f);
+    in_corner += b.x() > 0.5f;
+    sum += b.cast<double>();
+  }
+  CHECK(in_corner / double(kSamples) == Approx(0.25).margin(0.005));
+  CHECK(sum.x() / kSamples == Approx(1.0 / 3.0).margin(0.003));
+  CHECK(sum.y() / kSamples == Approx(1.0 / 3.0).margin(0.003));
+}
+
+TEST_CASE("a basis is right-handed and orthonormal, also at the poles", "[sampling]") {
+  Rng rng(9);
+  for (int i = 0; i < 1000; ++i) {
+    Vec3f n = rng.unit_vector().cast<float>();
+    if (i == 0) n = -Vec3f::UnitZ();
+    if (i == 1) n = Vec3f::UnitZ();
+    const Basis basis = basis_around(n);
+    CHECK((basis.x.cross(basis.y) - basis.z).norm() < 1e-5f);
+    CHECK((basis.to_world(basis.to_local(Vec3f(1, 2, 3))) - Vec3f(1, 2, 3)).norm() < 1e-5f);
+  }
+}
+
+TEST_CASE("the samples of one pixel are better spread than chance", "[sampling]") {
+  const SobolTable table;
+  // Every power of two of samples puts exactly one point into each slice of either axis.
+  for (const std::uint32_t count : {16u, 64u, 256u}) {
+    for (int dimension = 0; dimension < 3; ++dimension) {
+      std::vector<int> columns(count, 0);
+      std::vector<int> rows(count, 0);
+      for (std::uint32_t i = 0; i < count; ++i) {
+        PathSampler sampler(table, 42, 13, 7, i);
+        Vec2f p = sampler.next();
+        for (int d = 0; d < dimension; ++d) p = sampler.next();
+        ++columns[std::size_t(p.x() * float(count))];
+        ++rows[std::size_t(p.y() * float(count))];
+      }
+      CHECK(std::count(columns.begin(), columns.end(), 1) == std::ptrdiff_t(count));
+      CHECK(std::count(rows.begin(), rows.end(), 1) == std::ptrdiff_t(count));
+    }
+  }
+}
+
+TEST_CASE("samplers of different pixels, dimensions and seeds are unrelated", "[sampling]") {
+  const SobolTable table;
+  double product = 0.0;
+  double across = 0.0;
+  constexpr int kPixels = 20000;
+  for (int i = 0; i < kPixels; ++i) {
+    PathSampler a(table, 1, i, 5, 3);
+    PathSampler b(table, 1, i + 1, 5, 3);
+    const Vec2f p = a.next();
+    const Vec2f q = a.next();
+    product += (double(p.x()) - 0.5) * (double(q.x()) - 0.5) +
+               (double(p.x()) - 0.5) * (double(p.y()) - 0.5);
+    across += (double(p.x()) - 0.5) * (double(b.next().x()) - 0.5);
+  }
+  CHECK(std::abs(product / kPixels) < 0.003);
+  CHECK(std::abs(across / kPixels) < 0.003);
+}
+
+TEST_CASE("a dielectric reflects as Fresnel says", "[sampling]") {
+  CHECK(fresnel_dielectric(1.0f, 1.5f) == Approx(0.04f));
+  CHECK(fresnel_dielectric(1.0f, 1.0f / 1.5f) == Approx(0.04f));
+  CHECK(fresnel_dielectric(0.2f, 1.0f / 1.5f) == 1.0f);  // beyond the critical angle
+  // Brewster's angle: only perpendicular light is reflected.
+  const float cosine = std::cos(std::atan(1.5f));
+  CHECK(fresnel_dielectric(cosine, 1.5f) == Approx(0.0739645f).epsilon(1e-3));
+}
+
+}  // namespace diorama

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "diorama/scene.h"
+
+namespace diorama::test {
+
+/// A scene built in a few lines. Everything hangs below one node that is turned and shifted, so
+/// that no test works only for identity poses; positions given here are in that node's space.
+struct TestWorld {
+  Scene scene;
+  NodeId base;
+
+  TestWorld() {
+    base = scene.create(scene.root(), "base");
+    Transform pose;
+    pose.translation = Vec3(0.7, -1.3, 0.4);
+    pose.rotation = Quat(Eigen::AngleAxisd(0.8, Vec3(0.3, -0.5, 0.9).normalized()));
+    scene.set_pose(base, pose);
+  }
+
+  NodeId add(const std::string& name, Mesh mesh, Material material,
+             const Affine& pose = Affine::Identity()) {
+    const NodeId node = scene.create(base, name);
+    scene.edit(node).mesh = std::make_shared<const Mesh>(std::move(mesh));
+    scene.edit(node).materials = {std::make_shared<const Material>(std::move(material))};
+    scene.set_pose(node, pose);
+    return node;
+  }
+  NodeId add(Light light, const Affine& pose = Affine::Identity()) {
+    const NodeId node = scene.create(base, "light");
+    scene.edit(node).light = std::move(light);
+    scene.set_pose(node, pose);
+    return node;
+  }
+  /// Looks from one point to another; `fx` in pixels.
+  NodeId add_camera(int width, int height, double fx, const Vec3& from, const Vec3& to) {
+    Camera camera;
+    camera.width = width;
+    camera.height = height;
+    camera.fx = fx;
+    camera.fy = 1.1 * fx;
+    camera.cx = 0.45 * width;
+    camera.cy = 0.55 * height;
+    camera.near_m = 0.01;
+    const NodeId node = scene.create(base, "camera");
+    scene.edit(node).camera = camera;
+    Transform pose;
+    pose.translation = from;
+    pose.rotation = look_rotation(to - from);
+    scene.set_pose(node, pose);
+    return node;
+  }
+};
+
+inline Affine at(double x, double y, double z) { return Affine(Eigen::Translation3d(x, y, z)); }
+
+inline Material matte(float grey) {
+  Material material;
+  material.base_color = Vec3f::Constant(grey);
+  material.specular = 0.0f;
+  material.roughness = 1.0f;
+  return material;
+}
+
+inline Light dome(float radiance) {
+  Light light;
+  light.kind = LightKind::Dome;
+  light.color = Vec3f::Constant(radiance);
+  return light;
+}
+
+}  // namespace diorama::test
