@@ -146,7 +146,10 @@ std::optional<Picture> Dataset::picture(const std::string& file) {
   try {
     return parse_picture(*content, file);
   } catch (const std::exception& error) {
-    find("every file can be read", file, error.what());
+    // The codecs put the name in front, findings have it anyway.
+    const std::string text = error.what();
+    const bool is_named = text.starts_with(file + ": ");
+    find("every file can be read", file, is_named ? text.substr(file.size() + 2) : text);
     return std::nullopt;
   }
 }

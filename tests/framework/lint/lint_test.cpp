@@ -178,7 +178,7 @@ TEST_CASE("a swapped, shifted or mirrored axis of a pose is found", "[lint]") {
   const auto bop = dataset_of<BopWriter>();
   const std::string gt = "train_pbr/000000/scene_gt.json";
   std::string json = bop.read(gt);
-  const std::size_t begin = json.find_first_of("-0123456789", json.find("\"cam_t_m2c\""));
+  const std::size_t begin = json.find_first_of("-0123456789", json.find("\"cam_t_m2c\": [") + 13);
   const std::size_t end = json.find(',', begin);
   const double x_mm = std::stod(json.substr(begin, end - begin));
   bop.write(gt, json.replace(begin, end - begin, std::to_string(x_mm + 300.0)));
