@@ -9,7 +9,7 @@ set -euo pipefail
 cd "$(dirname "$0")"
 
 build_packages=(
-  g++ cmake ninja-build pkg-config git ccache
+  g++ cmake ninja-build pkg-config git
   libboost-dev libboost-filesystem-dev libbullet-dev libembree-dev libeigen3-dev libassimp-dev
   libyaml-cpp-dev libcli11-dev libspdlog-dev libfmt-dev nlohmann-json3-dev
   libhdf5-dev liblz4-dev libdeflate-dev libpng-dev libjpeg-dev libopenexr-dev libtbb-dev
@@ -40,9 +40,7 @@ install_packages() {
 }
 
 build() {
-  local launcher=()
-  if command -v ccache >/dev/null; then launcher=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache); fi
-  cmake --preset "$preset" "${launcher[@]}" >"build-$preset.log" 2>&1 || {
+  cmake --preset "$preset" >"build-$preset.log" 2>&1 || {
     cat "build-$preset.log" >&2
     rm -f "build-$preset.log"
     exit 1
