@@ -7,15 +7,19 @@
 #include <iostream>
 #include <new>
 #include <string>
+#include <vector>
 
 #include "framework/app/assemble.h"
 #include "framework/app/command_config.h"
+#include "framework/app/command_docs.h"
+#include "framework/app/command_doctor.h"
 #include "framework/app/command_export.h"
 #include "framework/app/command_inspect.h"
 #include "framework/app/command_lint.h"
 #include "framework/app/command_new_plugin.h"
 #include "framework/app/command_plugins.h"
 #include "framework/app/command_run.h"
+#include "framework/app/command_schema.h"
 #include "framework/app/options.h"
 #include "framework/host/console_log.h"
 #include "framework/plugins/plugin_search.h"
@@ -41,6 +45,7 @@ struct CommandLine {
   bool plugins_json = false;
   bool describe_json = false;
   std::string describe_type;
+  std::filesystem::path docs_folder = "diorama_reference";
   /// The command that was chosen.
   std::function<int(ConsoleLog&)> command;
 };
@@ -182,7 +187,8 @@ void add_new_plugin(CLI::App& app, CommandLine& line) {
                    "loader, physics, randomizer, renderer, annotator or writer")
       ->required()
       ->type_name("KIND");
-  command->add_option("name", line.new_plugin.name, "Name of plugin and component, such as my_boxes")
+  command
+      ->add_option("name", line.new_plugin.name, "Name of plugin and component, such as my_boxes")
       ->required()
       ->type_name("NAME");
   command->add_option("--dir", line.new_plugin.dir, "Folder of the project; default: the name")
@@ -214,6 +220,55 @@ void add_export(CLI::App& app, CommandLine& line) {
   });
 }
 
+void add_schema(CLI::App& app, CommandLine& line) {
+  CLI::App* command =
+      app.add_subcommand("schema", "Print the JSON Schema of native jobs, for editors");
+  command->callback([&line] {
+    line.command = [&line](ConsoleLog& log) { return command_schema(line.global, log); };
+  });
+}
+
+void add_doctor(CLI::App& app, CommandLine& line) {
+  CLI::App* command =
+      app.add_subcommand("doctor", "Say what is here, what is missing and how to get it");
+  command->callback([&line] {
+    line.command = [&line](ConsoleLog& log) { return command_doctor(line.global, log); };
+  });
+}
+
+/// Visible options in the order of the help.
+std::vector<OptionPage> option_pages(const CLI::App& command) {
+  std::vector<OptionPage> pages;
+  for (const CLI::Option* option : command.get_options()) {
+    if (option->get_group().empty()) continue;
+    std::string name = option->get_name(false, true);
+    if (option->get_items_expected_max() > 0) name += " " + option->get_type_name();
+    pages.push_back({name, option->get_description()});
+  }
+  return pages;
+}
+
+void add_pages(const CLI::App& command, const std::string& name, std::vector<CommandPage>& pages) {
+  pages.push_back({name, command.get_description(), option_pages(command)});
+  for (const CLI::App* below : command.get_subcommands([](const CLI::App*) { return true; })) {
+    add_pages(*below, name + " " + below->get_name(), pages);
+  }
+}
+
+void add_docs(CLI::App& app, CommandLine& line) {
+  CLI::App* command = app.add_subcommand("docs", "Write the reference as Markdown and man pages");
+  command->add_option("--dir", line.docs_folder, "Output folder")
+      ->type_name("DIR")
+      ->capture_default_str();
+  command->callback([&app, &line] {
+    line.command = [&app, &line](ConsoleLog& log) {
+      std::vector<CommandPage> pages;
+      add_pages(app, "diorama", pages);
+      return command_docs(line.global, pages, line.docs_folder, log);
+    };
+  });
+}
+
 void add_all(CLI::App& app, CommandLine& line) {
   app.require_subcommand(1);
   app.fallthrough();
@@ -226,6 +281,9 @@ void add_all(CLI::App& app, CommandLine& line) {
   add_export(app, line);
   add_lint(app, line);
   add_new_plugin(app, line);
+  add_schema(app, line);
+  add_docs(app, line);
+  add_doctor(app, line);
 }
 
 int run_command(CommandLine& line) {

@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/app/job_schema.h"
+
+#include <cmath>
+#include <optional>
+#include <string_view>
+
+#include "framework/pipeline/job.h"
+
+namespace diorama {
+namespace {
+
+Value words(const std::vector<std::string>& texts) {
+  Value list = Value::make_list();
+  for (const std::string& text : texts) list.list.push_back(Value::text(text));
+  return list;
+}
+
+Value typed(const std::vector<std::string>& types) {
+  Value schema = Value::make_map();
+  schema.set("type", types.size() == 1 ? Value::text(types.front()) : words(types));
+  return schema;
+}
+
+/// Any scalar reads as text.
+Value text_schema() { return typed({"string", "number", "boolean"}); }
+
+Value number_schema(const char* type, const ParamSpec& spec) {
+  Value schema = typed({type});
+  if (std::isfinite(spec.min)) schema.set("minimum", Value::number(spec.min));
+  if (std::isfinite(spec.max)) schema.set("maximum", Value::number(spec.max));
+  return schema;
+}
+
+Value list_schema(Value items, std::optional<int> count) {
+  Value schema = typed({"array"});
+  schema.set("items", std::move(items));
+  if (count) {
+    schema.set("minItems", Value::integer(*count));
+    schema.set("maxItems", Value::integer(*count));
+  }
+  return schema;
+}
+
+Value any_of(std::vector<Value> choices) {
+  Value list = Value::make_list();
+  list.list = std::move(choices);
+  Value schema = Value::make_map();
+  schema.set("anyOf", std::move(list));
+  return schema;
+}
+
+Value properties_of(const std::vector<ParamSpec>& specs);
+
+Value mapping_schema(const std::vector<ParamSpec>& specs) {
+  Value schema = typed({"object"});
+  schema.set("properties", properties_of(specs));
+  schema.set("additionalProperties", Value::boolean(false));
+  return schema;
+}
+
+Value bare_schema(const ParamSpec& spec) {
+  switch (spec.type) {
+    case ParamType::Bool:
+      return typed({"boolean"});
+    case ParamType::Int:
+      return number_schema("integer", spec);
+    case ParamType::Number:
+      return number_schema("number", spec);
+    case ParamType::Text:
+      return text_schema();
+    case ParamType::Interval:
+      return any_of({number_schema("number", spec), list_schema(number_schema("number", spec), 2)});
+    case ParamType::Vector:
+      return list_schema(number_schema("number", spec), 3);
+    case ParamType::TextList:
+      return list_schema(text_schema(), std::nullopt);
+    case ParamType::NumberList:
+      return list_schema(number_schema("number", spec), std::nullopt);
+    case ParamType::OptionalNumber:
+      return any_of({number_schema("number", spec), typed({"null"})});
+    case ParamType::OptionalText:
+      return typed({"string", "number", "boolean", "null"});
+    case ParamType::Any:
+      return Value::make_map();
+    case ParamType::Group:
+      return mapping_schema(spec.children);
+    case ParamType::List:
+      return list_schema(mapping_schema(spec.children), std::nullopt);
+    case ParamType::Choice:
+      break;
+  }
+  Value schema = Value::make_map();
+  schema.set("enum", words(spec.choices));
+  return schema;
+}
+
+Value schema_of(const ParamSpec& spec) {
+  Value schema = bare_schema(spec);
+  schema.set("description",
+             Value::text(spec.unit.empty() ? spec.help : spec.help + " [" + spec.unit + "]"));
+  if (spec.type != ParamType::Group && spec.type != ParamType::List) {
+    schema.set("default", spec.default_value);
+  }
+  return schema;
+}
+
+Value properties_of(const std::vector<ParamSpec>& specs) {
+  Value properties = Value::make_map();
+  for (const ParamSpec& spec : specs) properties.set(spec.key, schema_of(spec));
+  return properties;
+}
+
+/// A section of the job whose entries name components.
+struct ComponentSection {
+  std::string_view key;
+  ComponentKind kind;
+  const char* default_type;  // null: the key `type` must be there
+};
+
+constexpr ComponentSection kSections[] = {
+    {"environments", ComponentKind::Loader, nullptr},
+    {"objects", ComponentKind::Loader, nullptr},
+    {"randomizers", ComponentKind::Randomizer, nullptr},
+    {"physics", ComponentKind::Physics, kDefaultPhysics},
+    {"renderer", ComponentKind::Renderer, kDefaultRenderer},
+    {"writers", ComponentKind::Writer, nullptr},
+};
+
+const ComponentSection* section_called(std::string_view key) {
+  for (const ComponentSection& section : kSections) {
+    if (section.key == key) return &section;
+  }
+  return nullptr;
+}
+
+/// `type: null` is what people write for the renderer called "null".
+Value type_is(const std::string& type) {
+  Value schema = Value::make_map();
+  if (type != "null") {
+    schema.set("const", Value::text(type));
+    return schema;
+  }
+  Value both = Value::make_list();
+  both.list = {Value::text("null"), Value()};
+  schema.set("enum", std::move(both));
+  return schema;
+}
+
+Value required(const char* key) {
+  Value list = Value::make_list();
+  list.list.push_back(Value::text(key));
+  return list;
+}
+
+/// If the entry has this type, then it has these keys and no others.
+Value rule_for(const ComponentSection& section, const std::vector<ParamSpec>& host,
+               const DescribedComponent& component) {
+  Value types = Value::make_map();
+  types.set("type", type_is(component.type));
+  Value condition = Value::make_map();
+  condition.set("properties", std::move(types));
+  const bool is_default = section.default_type && component.type == section.default_type;
+  if (!is_default) condition.set("required", required("type"));
+
+  Value properties = properties_of(component.params);
+  for (const ParamSpec& spec : host) properties.set(spec.key, schema_of(spec));
+  properties.set("type", type_is(component.type));
+  Value keys = Value::make_map();
+  keys.set("description", Value::text(component.help));
+  keys.set("properties", std::move(properties));
+  keys.set("additionalProperties", Value::boolean(false));
+
+  Value rule = Value::make_map();
+  rule.set("if", std::move(condition));
+  rule.set("then", std::move(keys));
+  return rule;
+}
+
+Value entry_schema(const ComponentSection& section, const std::vector<ParamSpec>& host,
+                   const std::vector<DescribedComponent>& components) {
+  Value rules = Value::make_list();
+  Value types = Value::make_list();
+  const auto allow = [&](const DescribedComponent& component) {
+    types.list.push_back(Value::text(component.type));
+    if (component.type == "null") types.list.emplace_back();
+    rules.list.push_back(rule_for(section, host, component));
+  };
+  for (const DescribedComponent& component : components) {
+    if (component.kind == section.kind) allow(component);
+  }
+  if (section.kind == ComponentKind::Physics) {
+    allow({section.kind, "none", "Nothing moves by itself.", {}});
+  }
+  Value type = Value::make_map();
+  type.set("description", Value::text("Type of the component."));
+  type.set("enum", std::move(types));
+  Value properties = Value::make_map();
+  properties.set("type", std::move(type));
+
+  Value schema = typed({"object"});
+  schema.set("properties", std::move(properties));
+  if (!section.default_type) schema.set("required", required("type"));
+  if (!rules.list.empty()) schema.set("allOf", std::move(rules));
+  return schema;
+}
+
+/// Sections may be left empty.
+Value or_null(Value schema) {
+  Value types = Value::make_list();
+  types.list = {*schema.find("type"), Value::text("null")};
+  schema.set("type", std::move(types));
+  return schema;
+}
+
+}  // namespace
+
+Value job_schema(const std::vector<ParamSpec>& job,
+                 const std::vector<DescribedComponent>& components) {
+  Value properties = Value::make_map();
+  for (const ParamSpec& spec : job) {
+    const ComponentSection* section = section_called(spec.key);
+    Value schema;
+    if (section) {
+      schema = entry_schema(*section, spec.children, components);
+      if (spec.type == ParamType::List) schema = list_schema(std::move(schema), std::nullopt);
+      schema.set("description", Value::text(spec.help));
+    } else {
+      schema = schema_of(spec);
+    }
+    const bool is_section = spec.type == ParamType::List || spec.type == ParamType::Group;
+    properties.set(spec.key, is_section ? or_null(std::move(schema)) : std::move(schema));
+  }
+  // There must be something to visit.
+  Value& environments = *properties.find("environments");
+  environments.set("type", Value::text("array"));
+  environments.set("minItems", Value::integer(1));
+
+  Value schema = Value::make_map();
+  schema.set("$schema", Value::text("https://json-schema.org/draft/2020-12/schema"));
+  schema.set("title", Value::text("Diorama job"));
+  schema.set("type", Value::text("object"));
+  schema.set("properties", std::move(properties));
+  schema.set("required", required("environments"));
+  schema.set("additionalProperties", Value::boolean(false));
+  return schema;
+}
+
+}  // namespace diorama
