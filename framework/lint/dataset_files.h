@@ -32,6 +32,9 @@ struct Picture {
     return samples[(std::size_t(y) * std::size_t(width) + std::size_t(x)) * std::size_t(channels) +
                    std::size_t(c)];
   }
+  bool has_size_of(const Picture& other) const {
+    return width == other.width && height == other.height;
+  }
   /// All channels of a pixel in one number, the first in the lowest eight (or sixteen) bits.
   std::uint32_t packed(int x, int y) const;
 };

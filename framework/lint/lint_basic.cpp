@@ -351,6 +351,11 @@ class BasicLint {
                           bool is_along_ray) {
     if (!data.instances) return;
     const ReplicatorCamera& camera = *data.camera;
+    if (data.instances->width != camera.width || data.instances->height != camera.height) {
+      dataset_.find("counts agree between files", data.instances_file,
+                    "has another size than the camera");
+      return;
+    }
     const Mat4 world_from_camera = camera.view.inverse();
     std::map<std::uint32_t, std::string> path_of_id;
     for (const auto& [path, id] : data.id_of_path) path_of_id.emplace(id, path);

@@ -68,6 +68,10 @@ class BopScene {
     const auto visible = dataset_.picture(file);
     const auto whole = dataset_.picture(folder_ + "/mask/" + name);
     if (!visible || !whole) return;
+    if (!visible->has_size_of(*whole) || (depth_ && !depth_->has_size_of(*whole))) {
+      dataset_.find("counts agree between files", file, "masks and depth differ in size");
+      return;
+    }
     std::size_t beyond = 0;
     Extent inner, outer;
     for (int y = 0; y < visible->height; ++y) {

@@ -214,6 +214,10 @@ void lint_kitti_image(Dataset& dataset, const std::string& stem) {
   dataset.reading(calib, [&] { image.camera = read_kitti_camera(*calib_text); });
   if (const std::string depth = "training/depth_2/" + stem + ".png"; dataset.has(depth)) {
     image.depth = dataset.picture(depth);
+    if (image.depth && !image.depth->has_size_of(image.picture)) {
+      dataset.find("counts agree between files", depth, "has another size than the picture");
+      image.depth.reset();
+    }
   }
   dataset.reading(labels, [&] {
     for (const std::string& line : lines_of(*label_text)) {

@@ -290,6 +290,24 @@ TEST_CASE("ids without an entry and overlapping masks are found", "[lint]") {
   CHECK_FALSE(coco.lint().findings.empty());
 }
 
+TEST_CASE("pictures of a foreign size are found, not read beyond their end", "[lint]") {
+  const auto basic = basic_dataset();
+  // cam_1 has fewer columns.
+  basic.write("rp_cam_0/instance_segmentation/instance_segmentation_0000.png",
+              basic.read("rp_cam_1/instance_segmentation/instance_segmentation_0000.png"));
+  CHECK(finds(basic.lint(), "counts agree between files", "instance_segmentation_0000.png"));
+  const auto kitti = dataset_of<KittiWriter>();
+  kitti.write("training/depth_2/000000.png", kitti.read("training/depth_2/000001.png"));
+  CHECK(finds(kitti.lint(), "counts agree between files", "depth_2/000000.png"));
+  const auto bop = dataset_of<BopWriter>();
+  for (const char* split : {"train_pbr", "test"}) {
+    const std::string scenes = std::string(split) + "/";
+    if (!std::filesystem::exists(bop.folder() / (scenes + "000000/depth/000000.png"))) continue;
+    bop.write(scenes + "000000/depth/000000.png", bop.read(scenes + "000001/depth/000000.png"));
+  }
+  CHECK(finds(bop.lint(), "counts agree between files", "mask_visib"));
+}
+
 TEST_CASE("a folder of several datasets is linted in one go, others are refused", "[lint]") {
   const auto pose = dataset_of<PoseWriter>();
   const std::filesystem::path outer = pose.folder().string() + "_outer";
