@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/app/job_schema.h"
+
+#include <cstdlib>
+#include <vector>
+
+#include "framework/app/cli.h"
+#include "framework/config/value_text.h"
+#include "framework/config/yaml_config.h"
+#include "framework/pipeline/job.h"
+#include "program_run.h"
+#include "support/catch.h"
+
+using namespace diorama;
+
+namespace {
+
+bool has_validator() {
+  if (std::system("/usr/bin/python3 -c 'import jsonschema' 2>/dev/null") == 0) return true;
+  WARN("/usr/bin/python3 with jsonschema is not there; check skipped");
+  return false;
+}
+
+ParamSpec parameter(const char* key, ParamType type, Value default_value) {
+  ParamSpec spec;
+  spec.key = key;
+  spec.type = type;
+  spec.default_value = std::move(default_value);
+  spec.help = "Help.";
+  return spec;
+}
+
+/// A few components that are always there.
+std::vector<DescribedComponent> components() {
+  ParamSpec samples = parameter("samples", ParamType::Int, Value::integer(8));
+  samples.min = 1;
+  samples.max = 64;
+  ParamSpec nested = parameter("noise", ParamType::Group, Value::make_map());
+  nested.children = {parameter("on", ParamType::Bool, Value::boolean(true))};
+  return {{ComponentKind::Loader,
+           "shapes",
+           "Shapes.",
+           {parameter("shapes", ParamType::TextList, Value::make_list())}},
+          {ComponentKind::Renderer, "embree", "Light.", {samples, nested}},
+          {ComponentKind::Renderer, "null", "No light.", {}},
+          {ComponentKind::Writer,
+           "boxes",
+           "Boxes.",
+           {parameter("height", ParamType::Interval, Value::number(1))}}};
+}
+
+std::string verdict(const std::string& job) {
+  const test::WorkFolder folder;
+  const auto schema =
+      folder.write("schema.json", to_json(job_schema(job_specs(), components()), 1));
+  const auto file = folder.write("job.json", to_json(parse_yaml(job, "job"), 1));
+  const auto run = test::run_shell("/usr/bin/python3 " DIORAMA_SOURCE_DIR
+                                   "/tests/framework/app/check_schema.py " +
+                                   schema.string() + " " + file.string());
+  CHECK(run.err.empty());
+  return run.out;
+}
+
+}  // namespace
+
+TEST_CASE("the schema accepts what the reader accepts", "[schema]") {
+  if (!has_validator()) return;
+  for (
+      const char* job :
+      {"environments: [{type: shapes}]",
+       "environments: [{type: shapes, name: 7, shapes: [cube]}]\nrenderer: {samples: 3}\nlights:\n",
+       "environments: [{type: shapes}]\nrenderer: {type: null}\nphysics: {type: none}",
+       "environments: [{type: shapes}]\nwriters: [{type: boxes, height: [1, 2], output_dir: null}]",
+       "environments: [{type: shapes}]\nobjects: [{type: shapes, count: 3, label: x}]\n"
+       "timeline: [{simulate: 4}, {capture: floating, count: 2}]\n"
+       "cameras: [{type: pinhole, width: 64, position: [1, 2, 3]}]\nassets_root: null"}) {
+    INFO(job);
+    CHECK(verdict(job) == "ok\n");
+  }
+}
+
+TEST_CASE("the schema refuses what the reader refuses, at the same place", "[schema]") {
+  if (!has_validator()) return;
+  const std::string room = "environments: [{type: shapes}]\n";
+  const std::vector<std::pair<std::string, std::string>> broken{
+      {"seed: 3", ""},
+      {"environments: []", "environments"},
+      {"environments: [{shapes: [cube]}]", "environments/0"},
+      {"environments: [{type: shape}]", "environments/0/type"},
+      {room + "sead: 3", ""},
+      {room + "seed: lots", "seed"},
+      {room + "total_captures: -1", "total_captures"},
+      {room + "debug: 1", "debug"},
+      {room + "renderer: {samples: 65}", "renderer/samples"},
+      {room + "renderer: {type: embree, noise: {on: 3}}", "renderer/noise/on"},
+      {room + "renderer: {type: 'null', samples: 3}", "renderer"},
+      {room + "physics: {type: magic}", "physics/type"},
+      {room + "writers: [{type: boxes, height: [1, 2, 3]}]", "writers/0/height"},
+      {room + "writers: [{type: boxes, hight: 1}]", "writers/0"},
+      {room + "cameras: {type: pinhole}", "cameras"},
+      {room + "cameras: [{type: pinhole, position: [1, 2]}]", "cameras/0/position"},
+      {room + "lights: [{type: candle}]", "lights/0/type"}};
+  for (const auto& [job, place] : broken) {
+    INFO(job);
+    CHECK(verdict(job) == "refused: " + place + "\n");
+  }
+}
+
+TEST_CASE("the schema of the program accepts all jobs of the project", "[schema]") {
+  if (!has_validator()) return;
+  const test::WorkFolder folder;
+  const auto schema = test::run_program("--log-level error schema");
+  REQUIRE(schema.code == 0);
+  const std::string file = folder.write("schema.json", schema.out).string();
+  int count = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(DIORAMA_SOURCE_DIR "/configs")) {
+    if (entry.path().extension() != ".yaml") continue;
+    const auto native = test::run_program("--log-level error config --json " + entry.path().string());
+    if (native.code == exit_code(ErrorKind::Plugin)) {
+      WARN(entry.path().string() << ": some of its plugins are not built; skipped");
+      continue;
+    }
+    REQUIRE(native.code == 0);
+    const std::string job = folder.write("job.json", native.out).string();
+    const auto run = test::run_shell("/usr/bin/python3 " DIORAMA_SOURCE_DIR
+                                     "/tests/framework/app/check_schema.py " +
+                                     file + " " + job);
+    INFO(entry.path().string() << "\n" << run.err);
+    CHECK(run.out == "ok\n");
+    ++count;
+  }
+  CHECK(count >= 1);
+}
