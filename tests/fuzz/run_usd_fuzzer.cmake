@@ -1,0 +1,27 @@
+# cmake -D CLANGXX=... -D SOURCE=... -D BUILD=... -D SECONDS=... -P run_usd_fuzzer.cmake
+# Builds the fuzzer and runs it for a while. Seeds are the small shared files, where they are there.
+function(run)
+  execute_process(COMMAND ${ARGN} RESULT_VARIABLE result)
+  if(NOT result EQUAL 0)
+    message(FATAL_ERROR "failed: ${ARGN}")
+  endif()
+endfunction()
+
+run(${CMAKE_COMMAND} -S ${SOURCE}/tests/fuzz/usd -B ${BUILD} -DCMAKE_CXX_COMPILER=${CLANGXX})
+run(${CMAKE_COMMAND} --build ${BUILD})
+file(MAKE_DIRECTORY ${BUILD}/corpus ${BUILD}/seeds)
+if(EXISTS ${SOURCE}/../shared/data/usd)
+  file(GLOB_RECURSE files ${SOURCE}/../shared/data/usd/*.usd ${SOURCE}/../shared/data/usd/*.usda
+       ${SOURCE}/../shared/data/usd/*.usdc ${SOURCE}/../shared/data/usd/*.usdz)
+  foreach(file ${files})
+    file(SIZE ${file} size)
+    if(size LESS 20000)
+      string(MD5 name ${file})
+      configure_file(${file} ${BUILD}/seeds/${name} COPYONLY)
+    endif()
+  endforeach()
+else()
+  file(WRITE ${BUILD}/seeds/text "#usda 1.0\ndef Cube \"C\"\n{\n    double size = 2\n}\n")
+endif()
+run(${BUILD}/usd_fuzzer -max_total_time=${SECONDS} -rss_limit_mb=2048 -timeout=10 -max_len=65536
+    -artifact_prefix=${BUILD}/ ${BUILD}/corpus ${BUILD}/seeds)

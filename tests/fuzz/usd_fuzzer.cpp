@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// One input is one file of any kind: text, crate or package. Everything that it holds is read and, if
+// it is a layer, composed and measured. Refusing is fine; crashing, hanging and running out of memory
+// are findings.
+#include <stdlib.h>
+#include <unistd.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <memory>
+#include <string>
+
+#include "usd/asset_library.h"
+#include "usd/crate_reader.h"
+#include "usd/error.h"
+#include "usd/extent.h"
+#include "usd/geometry.h"
+#include "usd/package.h"
+#include "usd/stage.h"
+
+namespace {
+
+namespace usd = diorama::usd;
+
+constexpr std::size_t kMostPrims = 2000;
+
+// Stages are opened by name, so the input is written to one file over and over.
+class InputFile {
+ public:
+  InputFile() {
+    std::string name = "/tmp/usd_fuzzer_XXXXXX.usd";
+    const int descriptor = ::mkstemps(name.data(), 4);
+    if (descriptor >= 0) ::close(descriptor);
+    path_ = name;
+  }
+  ~InputFile() { ::unlink(path_.c_str()); }
+  const std::string& write(const std::uint8_t* data, std::size_t size) const {
+    if (std::FILE* file = std::fopen(path_.c_str(), "wb")) {
+      std::fwrite(data, 1, size, file);
+      std::fclose(file);
+    }
+    return path_;
+  }
+
+ private:
+  std::string path_;
+};
+
+void visit(usd::Stage& stage, usd::Geometry& geometry, const usd::Prim& prim, std::size_t& budget) {
+  for (const usd::Prim* child : stage.visible_children(prim)) {
+    if (budget == 0) return;
+    --budget;
+    geometry.world_from_prim(*child);
+    geometry.is_visible(*child);
+    geometry.material(*child);
+    geometry.primvars(*child);
+    usd::local_extent(stage, *child);
+    for (const std::string& name : stage.property_names(*child)) {
+      stage.value(*child, name);
+      stage.targets(*child, name);
+    }
+    visit(stage, geometry, *child, budget);
+  }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const std::span<const std::byte> bytes(reinterpret_cast<const std::byte*>(data), size);
+  try {
+    if (!usd::is_package(bytes)) usd::read_layer("input", usd::copy_bytes(bytes))->read_everything();
+  } catch (const usd::FormatError&) {
+    return 0;
+  }
+  static const InputFile file;
+  try {
+    usd::Stage stage(file.write(data, size), usd::Sampling::OrFirstSample);
+    usd::Geometry geometry(stage);
+    std::size_t budget = kMostPrims;
+    visit(stage, geometry, stage.root(), budget);
+  } catch (const usd::FormatError&) {
+    return 0;
+  }
+  return 0;
+}

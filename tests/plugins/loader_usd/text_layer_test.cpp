@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+#include <string>
+
+#include "loader_usd/usd/error.h"
+#include "loader_usd/usd/layer.h"
+#include "loader_usd/usd/path.h"
+#include "loader_usd/usd/text_reader.h"
+#include "support/catch.h"
+
+namespace diorama::usd {
+namespace {
+
+std::shared_ptr<Layer> read(const std::string& body) {
+  return read_text_layer("test.usda", "#usda 1.0\n" + body);
+}
+
+std::string error_of(const std::string& body) {
+  try {
+    read(body);
+  } catch (const FormatError& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+Value attribute(const Layer& layer, const char* prim, const char* name,
+                const char* field = "default") {
+  const PropertySpec* spec = layer.prim(prim)->property(name);
+  return spec ? layer.get(spec->fields, field) : Value();
+}
+
+}  // namespace
+
+TEST_CASE("a text layer holds the values that it says", "[usda]") {
+  const auto layer = read(R"(
+(
+    metersPerUnit = 0.01
+    upAxis = "Z"
+    defaultPrim = "Room"
+)
+def Xform "Room" (
+    kind = "assembly"
+    prepend apiSchemas = ["PhysicsCollisionAPI"]
+)
+{
+    uniform token[] xformOpOrder = ["xformOp:orient"]
+    quatf xformOp:orient = (0.5, 0.1, 0.2, 0.3)
+    custom float size = .5 (
+        doc = """two
+lines"""
+    )
+    point3f[] points = [(1, 2, 3), (-4.5, 5e-1, inf),]
+    int64 big = -9223372036854775808
+    uchar small = 255
+    asset file = @a b.png@
+    string text = "tab\t\"quoted\" \x41"
+    matrix4d m = ( (1, 2, 3, 4), (5, 6, 7, 8), (9, 10, 11, 12), (13, 14, 15, 16) )
+    half h = 0.333333
+    float moving.timeSamples = { 2: 20, 1: 10, 3: None, }
+    rel target = [</Room/A>, <../Other>]
+}
+)");
+  CHECK(layer->get(layer->root(), "metersPerUnit").as_number() == 0.01);
+  CHECK(*layer->get(layer->root(), "upAxis").as_text() == "Z");
+  const PrimSpec& room = *layer->prim("/Room");
+  CHECK(*layer->get(room, "kind").as_text() == "assembly");
+  CHECK(layer->get(room, "apiSchemas").as_string_list_op()->prepended ==
+        Strings{"PhysicsCollisionAPI"});
+
+  // The real part comes first in text and last in memory.
+  const Value orient = attribute(*layer, "/Room", "xformOp:orient");
+  CHECK(orient.component(3) == Approx(0.5));
+  CHECK(orient.component(0) == Approx(0.1));
+  CHECK(attribute(*layer, "/Room", "size").as_number() == 0.5);
+  CHECK(*attribute(*layer, "/Room", "size", "documentation").as_text() == "two\nlines");
+  const auto points = numbers<float>(attribute(*layer, "/Room", "points"), 3);
+  REQUIRE(points);
+  REQUIRE(points->span.size() == 6);
+  CHECK(points->span[3] == -4.5f);
+  CHECK(std::isinf(points->span[5]));
+  CHECK(attribute(*layer, "/Room", "big").component(0) == -9223372036854775808.0);
+  CHECK(attribute(*layer, "/Room", "small").as_number() == 255.0);
+  CHECK(*attribute(*layer, "/Room", "file").as_text() == "a b.png");
+  CHECK(*attribute(*layer, "/Room", "text").as_text() == "tab\t\"quoted\" A");
+  CHECK(attribute(*layer, "/Room", "m").component(7) == 8.0);
+  CHECK(*attribute(*layer, "/Room", "h").as_number() == Approx(1365.0 / 4096.0));
+  const Value moving = attribute(*layer, "/Room", "moving", "timeSamples");
+  REQUIRE(moving.as_time_samples());
+  CHECK(moving.as_time_samples()->times == std::vector<double>{1, 2, 3});
+  CHECK(moving.as_time_samples()->value(0).as_number() == 10.0);
+  CHECK(moving.as_time_samples()->value(2).is_block());
+  CHECK(attribute(*layer, "/Room", "target", "targetPaths").as_string_list_op()->explicit_items ==
+        Strings{"/Room/A", "/Other"});
+}
+
+TEST_CASE("variants are specs of their own", "[usda]") {
+  const auto layer = read(R"(
+def "Chair" (
+    variants = { string color = "red" }
+    prepend variantSets = "color"
+)
+{
+    variantSet "color" = {
+        "red" {
+            def "Leg" { }
+            int price = 7
+        }
+    }
+}
+)");
+  CHECK(layer->prim("/Chair{color=}")->type == SpecType::VariantSet);
+  CHECK(layer->prim("/Chair{color=red}")->type == SpecType::Variant);
+  CHECK(layer->prim("/Chair{color=red}Leg")->type == SpecType::Prim);
+  CHECK(attribute(*layer, "/Chair{color=red}", "price").as_number() == 7.0);
+}
+
+TEST_CASE("a text error says file, line and column", "[usda]") {
+  CHECK(error_of("def \"A\"\n{\n    float x = one\n}\n") ==
+        "test.usda:4:15: expected a number for float");
+  CHECK(error_of("def \"A\" { }\ndef \"A\" { }\n") ==
+        "test.usda:3:8: there is a prim \"A\" already");
+  CHECK(error_of("def \"A\" { float x = 1 }\n") ==
+        "test.usda:2:23: expected the end of the line");
+  CHECK(error_of("def \"A\"\n{\n    string s = \"open\n}\n") ==
+        "test.usda:4:16: the string is not closed");
+  CHECK(error_of("def \"A\"\n{\n    uchar x = 256\n}\n") ==
+        "test.usda:4:18: 256 is not in the range of uchar");
+  CHECK(error_of("def \"A\"\n{\n    rel r = <a/../b>\n}\n") ==
+        "test.usda:4:13: <a/../b> is not a path");
+  CHECK_THROWS_WITH(read_text_layer("x.usda", "#usda1.0\n"),
+                    ContainsSubstring("x.usda:1:1: the first line of a layer must be"));
+}
+
+TEST_CASE("nesting without end is refused", "[usda]") {
+  std::string prims;
+  for (int i = 0; i < 100000; ++i) prims += "def \"A\"\n{\n";
+  CHECK(error_of(prims).find("nested too deeply") != std::string::npos);
+  CHECK(error_of("def \"A\"\n{\nint[] a = " + std::string(100000, '[') + "\n}\n")
+            .find("nested too deeply") != std::string::npos);
+  CHECK(error_of("(\ncustomLayerData = { dictionary a = " + std::string(10, ' ') + "\n")
+            .find("expected") != std::string::npos);
+}
+
+TEST_CASE("paths are taken apart and put together", "[path]") {
+  CHECK(path::parent("/A/B") == "/A");
+  CHECK(path::parent("/A") == "/");
+  CHECK(path::parent("/A.x") == "/A");
+  CHECK(path::parent("/A{v=a}B") == "/A{v=a}");
+  CHECK(path::parent("/A{v=a}") == "/A");
+  CHECK(path::name("/A{v=a}B") == "B");
+  CHECK(path::append_child("/A{v=a}", "B") == "/A{v=a}B");
+  CHECK(path::strip_variants("/A{v=a}B/C{w=}.x") == "/A/B/C.x");
+  CHECK(path::replace_prefix("/A/B", "/A", "/") == "/B");
+  CHECK(path::replace_prefix("/A/B", "/A", "/X{v=a}") == "/X{v=a}B");
+  CHECK(path::replace_prefix("/B", "/", "/X") == "/X/B");
+  CHECK(path::has_prefix("/AB", "/A") == false);
+  CHECK(path::make_absolute("../C.x", "/A/B") == "/A/C.x");
+  CHECK(path::make_absolute("../../../C", "/A/B").empty());
+  CHECK(path::property_part("/A{v=.a}.x:y") == "x:y");
+  CHECK(path::is_valid("/A{v=a}B.c[/D.e].f"));
+  CHECK_FALSE(path::is_valid("/A//B"));
+  CHECK_FALSE(path::is_valid("./A"));
+  CHECK(path::is_identifier("größe_2"));
+  CHECK_FALSE(path::is_identifier("2a"));
+}
+
+}  // namespace diorama::usd
