@@ -8,9 +8,11 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <iostream>
 #include <iterator>
 #include <sstream>
 
+#include "framework/app/command_lint.h"
 #include "framework/lint/encoding_host.h"
 #include "plugins/writer_support/sample_dataset.h"
 #include "support/catch.h"
@@ -321,4 +323,18 @@ TEST_CASE("a folder of several datasets is linted in one go, others are refused"
   CHECK_THROWS_WITH(lint_datasets(outer), ContainsSubstring("holds no dataset"));
   CHECK_THROWS_WITH(lint_datasets(outer / "absent"), ContainsSubstring("not a folder"));
   std::filesystem::remove_all(outer);
+}
+
+TEST_CASE("the command's exit code tells clean from faulty", "[lint]") {
+  const auto pose = dataset_of<PoseWriter>();
+  std::ostringstream text;
+  std::streambuf* const before = std::cout.rdbuf(text.rdbuf());
+  const int clean = command_lint({pose.folder().string(), false});
+  pose.remove("000000.png");
+  const int faulty = command_lint({pose.folder().string(), true});
+  std::cout.rdbuf(before);
+  CHECK(clean == 0);
+  CHECK(faulty == 7);
+  CHECK(text.str().find("nothing found") != std::string::npos);
+  CHECK(text.str().find("\"check\": \"nothing is missing\"") != std::string::npos);
 }
