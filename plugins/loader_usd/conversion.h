@@ -19,8 +19,6 @@ inline Affine to_affine(const usd::Matrix& matrix) {
 }
 
 /// Turns a scene with y up into one with z up.
-inline Affine z_up_from_y_up() {
-  return Affine(Eigen::AngleAxisd(0.5 * kPi, Vec3::UnitX()));
-}
+inline Affine z_up_from_y_up() { return Affine(Eigen::AngleAxisd(0.5 * kPi, Vec3::UnitX())); }
 
 }  // namespace diorama::loader_usd

@@ -44,13 +44,13 @@ class Inputs {
 };
 
 // Colour of a black body in linear Rec. 709, scaled to a luminance of one: CIE 1931 chromaticity of
-// the Planckian locus after Kim et al., "Design of Advanced Color Temperature Control System" (2002).
+// the Planckian locus after Kim et al., "Design of Advanced Color Temperature Control System"
+// (2002).
 Vec3f black_body(double kelvin) {
   const double t = std::clamp(kelvin, 1667.0, 25000.0);
   const double x =
-      t <= 4000.0
-          ? -0.2661239e9 / (t * t * t) - 0.2343589e6 / (t * t) + 0.8776956e3 / t + 0.179910
-          : -3.0258469e9 / (t * t * t) + 2.1070379e6 / (t * t) + 0.2226347e3 / t + 0.240390;
+      t <= 4000.0 ? -0.2661239e9 / (t * t * t) - 0.2343589e6 / (t * t) + 0.8776956e3 / t + 0.179910
+                  : -3.0258469e9 / (t * t * t) + 2.1070379e6 / (t * t) + 0.2226347e3 / t + 0.240390;
   double y = 0.0;
   if (t <= 2222.0) {
     y = -1.1063814 * x * x * x - 1.34811020 * x * x + 2.18555832 * x - 0.20219683;
@@ -143,8 +143,8 @@ std::optional<TranslatedLight> translate_light(const Stage& stage, const Prim& p
   light.color = emission(inputs, 1.0);
   if (type == "DomeLight" || type == "DomeLight_1") {
     light.kind = LightKind::Dome;
-    light.texture = textures.read(stage.find_value(prim, inputs.name("texture:file")),
-                                  TextureSpace::Auto);
+    light.texture =
+        textures.read(stage.find_value(prim, inputs.name("texture:file")), TextureSpace::Auto);
     result.prim_from_light = prim_from_dome();
     return result;
   }

@@ -17,8 +17,8 @@ struct TranslatedLight {
 };
 
 /// Makes a light out of a UsdLux prim. `world_scale`: mean factor by which the prim's transforms
-/// enlarge, in stage units, for lights that are normalised by their area. Nothing for prims that are
-/// no lights. Cylinder lights become spheres of the same area.
+/// enlarge, in stage units, for lights that are normalised by their area. Nothing for prims that
+/// are no lights. Cylinder lights become spheres of the same area.
 std::optional<TranslatedLight> translate_light(const usd::Stage& stage, const usd::Prim& prim,
                                                double world_scale, TextureLibrary& textures);
 

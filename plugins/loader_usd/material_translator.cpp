@@ -129,8 +129,7 @@ float MaterialTranslator::number(const Prim& shader, const std::string& name,
                                                                : fallback;
 }
 
-bool MaterialTranslator::boolean(const Prim& shader, const std::string& name,
-                                 bool fallback) const {
+bool MaterialTranslator::boolean(const Prim& shader, const std::string& name, bool fallback) const {
   return input(shader, name).value.as_bool().value_or(fallback);
 }
 
@@ -159,9 +158,9 @@ void MaterialTranslator::read_layout(const Prim& texture, TextureInput& input,
                    : fallback;
       };
       Eigen::Matrix3f step = Eigen::Matrix3f::Identity();
-      step.topRows<2>() = uv_map(pair("scale", Vec2f::Ones()),
-                                 number(*source.prim, "rotation", 0.0f),
-                                 pair("translation", Vec2f::Zero()));
+      step.topRows<2>() =
+          uv_map(pair("scale", Vec2f::Ones()), number(*source.prim, "rotation", 0.0f),
+                 pair("translation", Vec2f::Zero()));
       map = map * step;
       at = source.prim;
       name = "inputs:in";
@@ -187,7 +186,7 @@ TextureInput MaterialTranslator::texture(const Prim& shader, const std::string& 
   const usd::FoundValue file = this->input(node, "file");
   const usd::FoundValue word = this->input(node, "sourceColorSpace");
   const std::string space_name = word.value.as_text() ? *word.value.as_text() : "auto";
-  const TextureSpace space = space_name == "sRGB"              ? TextureSpace::Srgb
+  const TextureSpace space = space_name == "sRGB"             ? TextureSpace::Srgb
                              : space_name == "raw" || is_data ? TextureSpace::Raw
                                                               : TextureSpace::Auto;
   input.texture = textures_.read(file, space);
@@ -237,16 +236,16 @@ void MaterialTranslator::translate_preview_surface(const Prim& shader, Material&
   material.opacity = number(shader, "opacity", 1.0f);
   material.opacity_threshold = number(shader, "opacityThreshold", 0.0f);
   material.emission_texture = texture(shader, "emissiveColor", false, result);
-  material.emission = material.emission_texture ? Vec3f::Ones()
-                                                : color(shader, "emissiveColor", Vec3f::Zero());
+  material.emission =
+      material.emission_texture ? Vec3f::Ones() : color(shader, "emissiveColor", Vec3f::Zero());
   if (is_specular) {
     // Dielectrics reflect (ior - 1)^2 / (ior + 1)^2; 0.04 of it is a specular weight of one.
     const float strength = color(shader, "specularColor", Vec3f::Zero()).mean() / 0.04f;
     material.specular = std::clamp(strength, 0.0f, 1.0f);
   }
   // An even opacity below one is glass: it still reflects, and what passes goes straight on.
-  const bool is_glass = !material.opacity_texture && material.opacity < 1.0f &&
-                        material.opacity_threshold <= 0.0f;
+  const bool is_glass =
+      !material.opacity_texture && material.opacity < 1.0f && material.opacity_threshold <= 0.0f;
   if (is_glass) {
     material.transmission = 1.0f - std::max(material.opacity, 0.0f);
     material.opacity = 1.0f;
@@ -271,8 +270,8 @@ TextureInput MaterialTranslator::mdl_texture(const Prim& shader,
     for (const std::string& property : properties) {
       if (!property.starts_with(kInputs)) continue;
       const std::string name = property.substr(kInputs.size());
-      const bool fits = name == wanted || (wanted[0] == '*' &&
-                                           lower(name).find(wanted + 1) != std::string::npos);
+      const bool fits =
+          name == wanted || (wanted[0] == '*' && lower(name).find(wanted + 1) != std::string::npos);
       if (!fits) continue;
       const usd::FoundValue value = input(shader, name);
       if (value.value.type() != usd::Type::AssetPath || value.value.is_array()) continue;
@@ -291,12 +290,12 @@ void MaterialTranslator::translate_mdl(const Prim& shader, Material& material) {
   }
   const std::string kind = lower(module);
   const bool is_glass = kind.find("glass") != std::string::npos;
-  material.base_color_texture =
-      mdl_texture(shader, {"diffuse_texture", "BaseColor_Tex", "*basecolor", "*base_color",
-                           "*albedo", "*diffuse"},
-                  TextureSpace::Auto);
-  const Vec3f tint = color(shader, "diffuse_tint", Vec3f::Ones()) *
-                     number(shader, "albedo_brightness", 1.0f);
+  material.base_color_texture = mdl_texture(
+      shader,
+      {"diffuse_texture", "BaseColor_Tex", "*basecolor", "*base_color", "*albedo", "*diffuse"},
+      TextureSpace::Auto);
+  const Vec3f tint =
+      color(shader, "diffuse_tint", Vec3f::Ones()) * number(shader, "albedo_brightness", 1.0f);
   material.base_color =
       material.base_color_texture
           ? tint
@@ -331,8 +330,7 @@ void MaterialTranslator::translate_mdl(const Prim& shader, Material& material) {
   if (boolean(shader, "enable_emission", false)) {
     material.emission = color(shader, "emissive_color", Vec3f::Ones()) *
                         number(shader, "emissive_intensity", 40.0f);
-    material.emission_texture =
-        mdl_texture(shader, {"emissive_mask_texture"}, TextureSpace::Auto);
+    material.emission_texture = mdl_texture(shader, {"emissive_mask_texture"}, TextureSpace::Auto);
   }
   if (is_glass) {
     material.transmission = 1.0f;

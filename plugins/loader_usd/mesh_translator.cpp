@@ -33,9 +33,7 @@ struct CornerData {
   Interpolation interpolation = Interpolation::Constant;
   std::size_t width = 0;
 
-  std::size_t count() const {
-    return indices ? indices->span.size() : values.span.size() / width;
-  }
+  std::size_t count() const { return indices ? indices->span.size() : values.span.size() / width; }
   // The values of a corner; null when the data are too short for it.
   const float* at(std::size_t face, std::size_t point, std::size_t corner) const {
     std::size_t i = 0;
@@ -82,7 +80,8 @@ std::optional<CornerData> read_corner_data(const Stage& stage, const Prim& prim,
 class MeshAssembly {
  public:
   MeshAssembly(const Sources& sources, std::span<const std::uint16_t> slot_of_face)
-      : sources_(sources), slot_of_face_(slot_of_face),
+      : sources_(sources),
+        slot_of_face_(slot_of_face),
         first_(sources.points.span.size() / 3, kNone) {}
 
   Mesh build();
@@ -289,8 +288,8 @@ TranslatedMesh MeshTranslator::translate_mesh(const Prim& prim,
         std::string("doubleSided"), normals, normals + ":indices"}) {
     key.push_back(stage_.value_spec(prim, name));
   }
-  for (const auto& [who, name] : {std::pair(uv_owner, uv),
-                                  std::pair(color_owner, std::string("primvars:displayColor"))}) {
+  for (const auto& [who, name] :
+       {std::pair(uv_owner, uv), std::pair(color_owner, std::string("primvars:displayColor"))}) {
     key.push_back(who ? stage_.value_spec(*who, name) : nullptr);
     key.push_back(who ? stage_.value_spec(*who, name + ":indices") : nullptr);
   }
@@ -317,12 +316,11 @@ TranslatedMesh MeshTranslator::translate_mesh(const Prim& prim,
   sources.counts = std::move(*counts);
   sources.indices = std::move(*indices);
   sources.holes = usd::numbers<std::int32_t>(stage_.value(prim, "holeIndices"), 1);
-  sources.normals = read_corner_data(stage_, prim, normals, 3,
-                                     has_primvar_normals ? "constant" : "vertex");
+  sources.normals =
+      read_corner_data(stage_, prim, normals, 3, has_primvar_normals ? "constant" : "vertex");
   if (uv_owner) sources.uvs = read_corner_data(stage_, *uv_owner, uv, 2, "constant");
   if (color_owner) {
-    sources.colors =
-        read_corner_data(stage_, *color_owner, "primvars:displayColor", 3, "constant");
+    sources.colors = read_corner_data(stage_, *color_owner, "primvars:displayColor", 3, "constant");
     // A single colour goes to the material.
     if (sources.colors && sources.colors->count() <= 1) sources.colors.reset();
   }
@@ -332,8 +330,7 @@ TranslatedMesh MeshTranslator::translate_mesh(const Prim& prim,
   if (!result.subsets.empty()) {
     slots.resize(sources.counts.span.size());
     for (std::size_t i = 0; i < result.subsets.size(); ++i) {
-      const auto faces =
-          usd::numbers<std::int32_t>(stage_.value(*result.subsets[i], "indices"), 1);
+      const auto faces = usd::numbers<std::int32_t>(stage_.value(*result.subsets[i], "indices"), 1);
       if (!faces) continue;
       for (const std::int32_t face : faces->span) {
         if (face >= 0 && static_cast<std::size_t>(face) < slots.size()) {
@@ -345,8 +342,7 @@ TranslatedMesh MeshTranslator::translate_mesh(const Prim& prim,
   Mesh mesh = MeshAssembly(sources, slots).build();
   if (mesh.triangles.empty()) return result;
   mesh.is_double_sided = usd::bool_or(stage_, prim, "doubleSided", false);
-  const bool is_smooth =
-      usd::token_or(stage_, prim, "subdivisionScheme", "catmullClark") != "none";
+  const bool is_smooth = usd::token_or(stage_, prim, "subdivisionScheme", "catmullClark") != "none";
   if (mesh.normals.empty() && is_smooth) mesh.normals = smooth_normals(mesh);
   mesh.validate(prim.path);
   known = std::make_shared<const Mesh>(std::move(mesh));

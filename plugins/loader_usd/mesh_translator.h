@@ -14,19 +14,18 @@ namespace diorama::loader_usd {
 
 /// A mesh with the GeomSubsets that its material slots stand for.
 struct TranslatedMesh {
-  std::shared_ptr<const Mesh> mesh;        ///< Null when nothing is left to draw.
-  std::vector<const usd::Prim*> subsets;   ///< Slot 1 + i; slot 0 is the rest of the mesh.
-  std::optional<Vec3f> display_color;      ///< One colour for all, linear.
+  std::shared_ptr<const Mesh> mesh;       ///< Null when nothing is left to draw.
+  std::vector<const usd::Prim*> subsets;  ///< Slot 1 + i; slot 0 is the rest of the mesh.
+  std::optional<Vec3f> display_color;     ///< One colour for all, linear.
   float display_opacity = 1.0f;
 };
 
 /// Makes meshes out of Mesh prims and of the shapes. The same data, seen through instances or
-/// several references, give the same mesh. Subdivision surfaces are drawn as their cage, with smooth
-/// normals.
+/// several references, give the same mesh. Subdivision surfaces are drawn as their cage, with
+/// smooth normals.
 class MeshTranslator {
  public:
-  MeshTranslator(usd::Stage& stage, usd::Geometry& geometry)
-      : stage_(stage), geometry_(geometry) {}
+  MeshTranslator(usd::Stage& stage, usd::Geometry& geometry) : stage_(stage), geometry_(geometry) {}
 
   /// `uv_names`: primvars that the materials read, the first one that the prim has is taken.
   TranslatedMesh translate(const usd::Prim& prim, const std::vector<std::string>& uv_names);

@@ -86,8 +86,8 @@ void triangulate(std::span<const Vec3f> corners,
       continue;
     }
     const std::size_t k = at % ring.size();
-    triangles.push_back({ring[(k + ring.size() - 1) % ring.size()], ring[k],
-                         ring[(k + 1) % ring.size()]});
+    triangles.push_back(
+        {ring[(k + ring.size() - 1) % ring.size()], ring[k], ring[(k + 1) % ring.size()]});
     ring.erase(ring.begin() + static_cast<std::ptrdiff_t>(k));
     tries = 0;
     at = k;

@@ -102,8 +102,8 @@ void SceneTranslator::translate_children(const Prim& prim, const Place& place) {
 bool SceneTranslator::is_drawn(const Prim& prim) {
   const auto known = drawn_.find(&prim);
   if (known != drawn_.end()) return known->second;
-  const bool is_group = prim.type_name.empty() || prim.type_name == "Scope" ||
-                        !prim.traits.is_known;
+  const bool is_group =
+      prim.type_name.empty() || prim.type_name == "Scope" || !prim.traits.is_known;
   bool result = prim.traits.is_xformable;
   // Skeletons move points, which the reader does not do; their prims draw nothing.
   if (prim.type_name == "Skeleton") result = false;
@@ -155,9 +155,8 @@ void SceneTranslator::translate_prim(const Prim& prim, const Place& parent, cons
   place.node = scene_.create(parent.node, usd::path::name(prim.path));
   place.root_from_node = parent.root_from_node * pose;
   scene_.set_pose(place.node, pose);
-  const bool is_hidden =
-      prim.traits.is_imageable &&
-      usd::token_or(stage_, prim, "visibility", "inherited") == "invisible";
+  const bool is_hidden = prim.traits.is_imageable &&
+                         usd::token_or(stage_, prim, "visibility", "inherited") == "invisible";
   if (is_hidden) scene_.edit(place.node).is_visible = false;
   if (prim.traits.is_gprim) add_shape(prim, place.node);
   if (prim.type_name == "Camera") add_camera(prim, place);
@@ -338,8 +337,8 @@ void SceneTranslator::add_instances(const Prim& prim, const Place& place) {
   }
   ++instancer_depth_;
   for (const usd::PointInstance& instance : usd::point_instances(stage_, prim)) {
-    const Affine pose = to_affine(instance.instancer_from_prototype) *
-                        unit_correction(*instance.prototype);
+    const Affine pose =
+        to_affine(instance.instancer_from_prototype) * unit_correction(*instance.prototype);
     translate_prim(*instance.prototype, place, affine_or_identity(pose));
   }
   --instancer_depth_;

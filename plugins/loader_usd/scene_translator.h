@@ -31,8 +31,7 @@ class SceneTranslator {
   };
 
   void translate_children(const usd::Prim& prim, const Place& place);
-  void translate_prim(const usd::Prim& prim, const Place& parent,
-                      const Affine& parent_from_placed);
+  void translate_prim(const usd::Prim& prim, const Place& parent, const Affine& parent_from_placed);
   bool is_drawn(const usd::Prim& prim);
   Affine local_pose(const usd::Prim& prim, const Place& parent);
   Affine unit_correction(const usd::Prim& prim) const;

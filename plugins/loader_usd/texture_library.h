@@ -15,8 +15,8 @@ namespace diorama::loader_usd {
 /// How the colours of a texture file are to be read.
 enum class TextureSpace { Auto, Raw, Srgb };
 
-/// Reads each texture once, from files and from packages. What cannot be read is reported once, with
-/// the layer that names it.
+/// Reads each texture once, from files and from packages. What cannot be read is reported once,
+/// with the layer that names it.
 class TextureLibrary {
  public:
   TextureLibrary(usd::Stage& stage, Host& host) : stage_(stage), host_(host) {}

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// One input is one file of any kind: text, crate or package. Everything that it holds is read and, if
-// it is a layer, composed and measured. Refusing is fine; crashing, hanging and running out of memory
-// are findings.
+// One input is one file of any kind: text, crate or package. Everything that it holds is read and,
+// if it is a layer, composed and measured. Refusing is fine; crashing, hanging and running out of
+// memory are findings.
 #include <stdlib.h>
 #include <unistd.h>
 
@@ -70,7 +70,8 @@ void visit(usd::Stage& stage, usd::Geometry& geometry, const usd::Prim& prim, st
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::span<const std::byte> bytes(reinterpret_cast<const std::byte*>(data), size);
   try {
-    if (!usd::is_package(bytes)) usd::read_layer("input", usd::copy_bytes(bytes))->read_everything();
+    if (!usd::is_package(bytes))
+      usd::read_layer("input", usd::copy_bytes(bytes))->read_everything();
   } catch (const usd::FormatError&) {
     return 0;
   }

@@ -35,9 +35,8 @@ std::uint64_t CrateCursor::read_count(std::uint64_t item_size, const char* what)
 }
 
 CrateCursor CrateCursor::relative(std::int64_t offset) const {
-  const bool is_inside = offset >= 0
-                             ? static_cast<std::uint64_t>(offset) <= remaining()
-                             : offset >= -static_cast<std::int64_t>(position_);
+  const bool is_inside = offset >= 0 ? static_cast<std::uint64_t>(offset) <= remaining()
+                                     : offset >= -static_cast<std::int64_t>(position_);
   if (!is_inside) fail("a relative offset points outside of the file");
   return CrateCursor(*file_, bytes_, position_ + static_cast<std::uint64_t>(offset));
 }
@@ -55,8 +54,8 @@ std::vector<std::byte> CrateCursor::read_compressed(std::uint64_t compressed_siz
   std::vector<std::byte> result(std::min(limit, compressed_size * kMaxExpansion + 64));
   std::uint64_t filled = 0;
   for (int i = 0; i < std::max(chunks, 1); ++i) {
-    const std::int64_t size = chunks == 0 ? static_cast<std::int64_t>(block.size() - 1)
-                                          : chunk.read<std::int32_t>(what);
+    const std::int64_t size =
+        chunks == 0 ? static_cast<std::int64_t>(block.size() - 1) : chunk.read<std::int32_t>(what);
     if (size < 0 || size > std::numeric_limits<int>::max()) {
       fail_at(std::string(what) + ": a compressed chunk has an impossible size", start);
     }
@@ -104,17 +103,24 @@ std::vector<Integer> CrateCursor::read_integers(std::uint64_t count, const char*
   std::vector<Integer> result(count);
   Unsigned sum = 0;
   for (std::uint64_t i = 0; i < count; ++i) {
-    const int code =
-        (std::to_integer<int>(coded[sizeof(Integer) + i / 4]) >> (2 * (i % 4))) & 3;
+    const int code = (std::to_integer<int>(coded[sizeof(Integer) + i / 4]) >> (2 * (i % 4))) & 3;
     constexpr std::uint8_t kSizes[] = {0, sizeof(Small), sizeof(Medium), sizeof(Signed)};
     if (at + kSizes[code] > coded.size()) {
       fail_at(std::string(what) + ": the coded integers are cut off", start);
     }
     switch (code) {
-      case 0: sum += common; break;
-      case 1: sum += static_cast<Unsigned>(read_signed<Small>(coded, at)); break;
-      case 2: sum += static_cast<Unsigned>(read_signed<Medium>(coded, at)); break;
-      default: sum += static_cast<Unsigned>(read_signed<Signed>(coded, at)); break;
+      case 0:
+        sum += common;
+        break;
+      case 1:
+        sum += static_cast<Unsigned>(read_signed<Small>(coded, at));
+        break;
+      case 2:
+        sum += static_cast<Unsigned>(read_signed<Medium>(coded, at));
+        break;
+      default:
+        sum += static_cast<Unsigned>(read_signed<Signed>(coded, at));
+        break;
     }
     at += kSizes[code];
     result[i] = static_cast<Integer>(sum);

@@ -151,16 +151,15 @@ void CrateReader::read_tokens() {
   }
   const auto& text = crate_->token_text_;
   if (text.size() != raw_size || count > raw_size) {
-    cursor.fail_at(std::to_string(count) + " tokens do not fit into " +
-                       std::to_string(text.size()) + " bytes",
-                   start);
+    cursor.fail_at(
+        std::to_string(count) + " tokens do not fit into " + std::to_string(text.size()) + " bytes",
+        start);
   }
   crate_->tokens_.reserve(count);
   const auto* at = reinterpret_cast<const char*>(text.data());
   const char* end = at + text.size();
   for (std::uint64_t i = 0; i < count; ++i) {
-    const auto* stop = at == end ? nullptr
-                                 : static_cast<const char*>(std::memchr(at, 0, end - at));
+    const auto* stop = at == end ? nullptr : static_cast<const char*>(std::memchr(at, 0, end - at));
     if (!stop) cursor.fail_at("the tokens end before token " + std::to_string(i), start);
     crate_->tokens_.emplace_back(at, static_cast<std::size_t>(stop - at));
     at = stop + 1;
@@ -253,8 +252,8 @@ void CrateReader::set_path(std::uint32_t index, std::uint32_t parent, std::int64
   entry.parent = parent;
   entry.is_property = is_property;
   if (parent == Entry::kRoot) return;
-  const std::string_view element = crate_->token(static_cast<std::uint64_t>(token),
-                                                 cursor.position());
+  const std::string_view element =
+      crate_->token(static_cast<std::uint64_t>(token), cursor.position());
   const bool is_plain = element.find_first_of("{[.") != 0;
   const bool is_sound = is_property ? path::is_namespaced_identifier(element)
                                     : !is_plain || path::is_identifier(element);
@@ -390,8 +389,7 @@ std::vector<SpecRecord> CrateReader::read_specs() {
     if (spec.path >= crate_->paths_.size() || spec.field_set >= field_set_ends_.size() ||
         spec.type == 0 || spec.type > 11) {
       cursor.fail_at("a spec has path " + std::to_string(spec.path) + ", field set " +
-                         std::to_string(spec.field_set) + " and type " +
-                         std::to_string(spec.type),
+                         std::to_string(spec.field_set) + " and type " + std::to_string(spec.type),
                      start);
     }
   }
@@ -428,8 +426,7 @@ void CrateReader::add_properties(const std::vector<SpecRecord>& specs) {
     if (entry.parent >= prim_of_path_.size() || !entry.is_property) continue;
     PrimSpec* prim = prim_of_path_[entry.parent];
     if (!prim) continue;
-    prim->properties.push_back(
-        {crate_->tokens_[entry.token], type, field_set(record.field_set)});
+    prim->properties.push_back({crate_->tokens_[entry.token], type, field_set(record.field_set)});
   }
 }
 

@@ -46,7 +46,9 @@ void store_component(Type component, double value, std::byte* at) {
       std::memcpy(at, &number, 4);
       return;
     }
-    case Type::Double: std::memcpy(at, &value, 8); return;
+    case Type::Double:
+      std::memcpy(at, &value, 8);
+      return;
     default: {
       const auto number = static_cast<std::int32_t>(value);
       std::memcpy(at, &number, 4);
@@ -103,24 +105,30 @@ class CrateValues::Decoder {
 
 std::string_view CrateValues::token(std::uint64_t index, std::uint64_t offset) const {
   if (index >= tokens_.size()) {
-    throw format_error_at(file_, "token index " + std::to_string(index) + " is not below " +
-                                     std::to_string(tokens_.size()), offset);
+    throw format_error_at(
+        file_,
+        "token index " + std::to_string(index) + " is not below " + std::to_string(tokens_.size()),
+        offset);
   }
   return tokens_[index];
 }
 
 std::string_view CrateValues::string(std::uint64_t index, std::uint64_t offset) const {
   if (index >= strings_.size()) {
-    throw format_error_at(file_, "string index " + std::to_string(index) + " is not below " +
-                                     std::to_string(strings_.size()), offset);
+    throw format_error_at(file_,
+                          "string index " + std::to_string(index) + " is not below " +
+                              std::to_string(strings_.size()),
+                          offset);
   }
   return token(strings_[index], offset);
 }
 
 std::string CrateValues::path(std::uint64_t index, std::uint64_t offset) const {
   if (index >= paths_.size()) {
-    throw format_error_at(file_, "path index " + std::to_string(index) + " is not below " +
-                                     std::to_string(paths_.size()), offset);
+    throw format_error_at(
+        file_,
+        "path index " + std::to_string(index) + " is not below " + std::to_string(paths_.size()),
+        offset);
   }
   std::vector<const PathEntry*> chain;
   const PathEntry* entry = &paths_[index];
@@ -132,8 +140,8 @@ std::string CrateValues::path(std::uint64_t index, std::uint64_t offset) const {
   std::string text;
   for (auto it = chain.rbegin(); it != chain.rend(); ++it) {
     const std::string_view element = tokens_[(*it)->token];
-    const bool is_bare = element.starts_with('{') || element.starts_with('[') ||
-                         element.starts_with('.');
+    const bool is_bare =
+        element.starts_with('{') || element.starts_with('[') || element.starts_with('.');
     if ((*it)->is_property) {
       text += '.';
     } else if (!is_bare && !text.ends_with('}')) {
@@ -177,11 +185,15 @@ Value CrateValues::Decoder::decode_inlined(Representation rep) const {
       return Value::text(type, std::string(crate_.token(bits, rep.payload())));
     case Type::Specifier:
     case Type::Permission:
-    case Type::Variability: return Value::enumerator(type, static_cast<int>(bits & 0xFF));
+    case Type::Variability:
+      return Value::enumerator(type, static_cast<int>(bits & 0xFF));
     case Type::ValueBlock:
-    case Type::AnimationBlock: return Value(type, {});
-    case Type::Dictionary: return Value(type, std::make_shared<const Dictionary>());
-    default: break;
+    case Type::AnimationBlock:
+      return Value(type, {});
+    case Type::Dictionary:
+      return Value(type, std::make_shared<const Dictionary>());
+    default:
+      break;
   }
   const NumericLayout layout = numeric_layout(type);
   if (layout.count == 0) {
@@ -201,15 +213,13 @@ Value CrateValues::Decoder::decode_inlined(Representation rep) const {
       const double exact = number;
       std::memcpy(bytes.data(), &exact, 8);
     } else {
-      const std::int64_t number = type == Type::Int64
-                                      ? std::int64_t{static_cast<std::int32_t>(bits)}
-                                      : std::int64_t{bits};
+      const std::int64_t number =
+          type == Type::Int64 ? std::int64_t{static_cast<std::int32_t>(bits)} : std::int64_t{bits};
       std::memcpy(bytes.data(), &number, 8);
     }
     return Value::scalar(type, bytes.data());
   }
-  const bool is_matrix =
-      type == Type::Matrix2d || type == Type::Matrix3d || type == Type::Matrix4d;
+  const bool is_matrix = type == Type::Matrix2d || type == Type::Matrix3d || type == Type::Matrix4d;
   const int rows = type == Type::Matrix2d ? 2 : type == Type::Matrix3d ? 3 : 4;
   const int stored = is_matrix ? rows : layout.count;
   for (int i = 0; i < stored; ++i) {
@@ -266,10 +276,14 @@ Value CrateValues::Decoder::decode_compressed_array(Type type, std::uint64_t cou
       return Value::array(type, own(cursor.read_integers<std::int64_t>(count, "integers")));
     case Type::UInt64:
       return Value::array(type, own(cursor.read_integers<std::uint64_t>(count, "integers")));
-    case Type::Half: return decode_compressed_floats<std::uint16_t>(type, count, cursor);
-    case Type::Float: return decode_compressed_floats<float>(type, count, cursor);
-    case Type::Double: return decode_compressed_floats<double>(type, count, cursor);
-    default: cursor.fail("arrays of this type are never compressed");
+    case Type::Half:
+      return decode_compressed_floats<std::uint16_t>(type, count, cursor);
+    case Type::Float:
+      return decode_compressed_floats<float>(type, count, cursor);
+    case Type::Double:
+      return decode_compressed_floats<double>(type, count, cursor);
+    default:
+      cursor.fail("arrays of this type are never compressed");
   }
 }
 
@@ -405,10 +419,13 @@ Value CrateValues::Decoder::decode_at(Type type, CrateCursor cursor) {
   };
   switch (type) {
     case Type::String:
-    case Type::PathExpression: return Value::text(type, read_string(cursor));
+    case Type::PathExpression:
+      return Value::text(type, read_string(cursor));
     case Type::Token:
-    case Type::AssetPath: return Value::text(type, read_token(cursor));
-    case Type::Dictionary: return Value(type, read_dictionary(cursor));
+    case Type::AssetPath:
+      return Value::text(type, read_token(cursor));
+    case Type::Dictionary:
+      return Value(type, read_dictionary(cursor));
     case Type::TokenListOp:
       return read_list_op<std::string>(type, cursor, 4, [&] { return read_token(cursor); });
     case Type::StringListOp:
@@ -419,35 +436,35 @@ Value CrateValues::Decoder::decode_at(Type type, CrateCursor cursor) {
       return read_list_op<Reference>(type, cursor, 32,
                                      [&] { return read_reference(cursor, false); });
     case Type::PayloadListOp:
-      return read_list_op<Reference>(type, cursor, 8,
-                                     [&] { return read_reference(cursor, true); });
+      return read_list_op<Reference>(type, cursor, 8, [&] { return read_reference(cursor, true); });
     case Type::IntListOp:
-      return read_list_op<std::int64_t>(type, cursor, 4, [&] {
-        return std::int64_t{cursor.read<std::int32_t>("an integer")};
-      });
+      return read_list_op<std::int64_t>(
+          type, cursor, 4, [&] { return std::int64_t{cursor.read<std::int32_t>("an integer")}; });
     case Type::UIntListOp:
-      return read_list_op<std::int64_t>(type, cursor, 4, [&] {
-        return std::int64_t{cursor.read<std::uint32_t>("an integer")};
-      });
+      return read_list_op<std::int64_t>(
+          type, cursor, 4, [&] { return std::int64_t{cursor.read<std::uint32_t>("an integer")}; });
     case Type::Int64ListOp:
     case Type::UInt64ListOp:
-      return read_list_op<std::int64_t>(type, cursor, 8, [&] {
-        return cursor.read<std::int64_t>("an integer");
-      });
-    case Type::TokenVector: return strings([&] { return read_token(cursor); });
-    case Type::StringVector: return strings([&] { return read_string(cursor); });
-    case Type::PathVector: return strings([&] { return read_path(cursor); });
+      return read_list_op<std::int64_t>(type, cursor, 8,
+                                        [&] { return cursor.read<std::int64_t>("an integer"); });
+    case Type::TokenVector:
+      return strings([&] { return read_token(cursor); });
+    case Type::StringVector:
+      return strings([&] { return read_string(cursor); });
+    case Type::PathVector:
+      return strings([&] { return read_path(cursor); });
     case Type::VariantSelectionMap:
     case Type::Relocates:
       return Value(type, std::make_shared<const StringPairs>(
                              read_string_pairs(cursor, type == Type::Relocates)));
-    case Type::TimeSamples: return read_time_samples(cursor);
+    case Type::TimeSamples:
+      return read_time_samples(cursor);
     case Type::Payload:
       return Value(type, std::make_shared<const Reference>(read_reference(cursor, true)));
     case Type::DoubleVector:
-      return Value::array(Type::Double, own(read_items<double>(cursor, 8, [&] {
-                            return cursor.read<double>("a number");
-                          })));
+      return Value::array(
+          Type::Double,
+          own(read_items<double>(cursor, 8, [&] { return cursor.read<double>("a number"); })));
     case Type::LayerOffsetVector: {
       auto offsets = read_items<LayerOffset>(cursor, 16, [&] {
         LayerOffset offset;
@@ -458,12 +475,14 @@ Value CrateValues::Decoder::decode_at(Type type, CrateCursor cursor) {
       return Value(type, std::make_shared<const std::vector<LayerOffset>>(std::move(offsets)));
     }
     case Type::Value:
-    case Type::UnregisteredValue: return read_nested(cursor);
+    case Type::UnregisteredValue:
+      return read_nested(cursor);
     // Nothing here asks for their contents, so they are known by their type only.
     case Type::Spline:
     case Type::UnregisteredValueListOp:
     case Type::ValueBlock:
-    case Type::AnimationBlock: return Value(type, {});
+    case Type::AnimationBlock:
+      return Value(type, {});
     default:
       cursor.fail("a value of the unknown type " + std::to_string(static_cast<int>(type)));
   }

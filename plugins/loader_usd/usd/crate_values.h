@@ -30,9 +30,7 @@ class CrateValues : public ValueSource, public std::enable_shared_from_this<Crat
   Value decode(std::uint64_t representation) const override;
 
   const std::string& file() const { return file_; }
-  CrateCursor cursor(std::uint64_t offset) const {
-    return CrateCursor(file_, view_.bytes, offset);
-  }
+  CrateCursor cursor(std::uint64_t offset) const { return CrateCursor(file_, view_.bytes, offset); }
   bool at_least(int minor) const { return version_minor_ >= minor; }
   /// Throws when the index is out of range; so do the next two.
   std::string_view token(std::uint64_t index, std::uint64_t offset) const;

@@ -105,7 +105,6 @@ std::optional<Box> shape_extent(const Stage& stage, const Prim& prim) {
   return std::nullopt;
 }
 
-
 // --- Instancers -----------------------------------------------------------------------------
 
 std::vector<double> read_list(const Stage& stage, const Prim& prim, std::string_view name,
@@ -123,8 +122,8 @@ Box subtree_bounds(Stage& stage, const Prim& prim, int nesting) {
     if (const auto extent = extent_at(stage, prim, nesting)) return *extent;
   }
   for (const Prim* child : stage.visible_children(prim)) {
-    result.add(transform(local_transform(stage, *child).matrix,
-                         subtree_bounds(stage, *child, nesting)));
+    result.add(
+        transform(local_transform(stage, *child).matrix, subtree_bounds(stage, *child, nesting)));
   }
   return result;
 }
@@ -351,8 +350,7 @@ std::vector<PointInstance> point_instances(Stage& stage, const Prim& instancer) 
                                                        turns[i * 4 + 2], turns[i * 4 + 3]});
     }
     instance.instancer_from_prototype =
-        matrix *
-        translation({positions[i * 3], positions[i * 3 + 1], positions[i * 3 + 2]});
+        matrix * translation({positions[i * 3], positions[i * 3 + 1], positions[i * 3 + 2]});
     result.push_back(instance);
   }
   return result;

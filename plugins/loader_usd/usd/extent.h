@@ -14,8 +14,8 @@ namespace diorama::usd {
 /// for prims that have neither.
 std::optional<Box> local_extent(Stage& stage, const Prim& prim);
 
-/// Instance transforms of a PointInstancer, prototype transform included, with the prototype's prim.
-/// Masked instances and those without a prototype are left out.
+/// Instance transforms of a PointInstancer, prototype transform included, with the prototype's
+/// prim. Masked instances and those without a prototype are left out.
 struct PointInstance {
   const Prim* prototype = nullptr;
   Matrix instancer_from_prototype;

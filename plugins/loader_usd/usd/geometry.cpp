@@ -103,8 +103,8 @@ LocalTransform local_transform(const Stage& stage, const Prim& prim) {
     const bool is_inverse = name.starts_with(kInvert);
     if (is_inverse) name.remove_prefix(kInvert.size());
     // An op and its inverse side by side cancel, even where no number can show it.
-    const bool cancels = op != first && (is_inverse ? *(op - 1) == name
-                                                    : *(op - 1) == std::string(kInvert) + *op);
+    const bool cancels =
+        op != first && (is_inverse ? *(op - 1) == name : *(op - 1) == std::string(kInvert) + *op);
     if (cancels) {
       --op;
       continue;
@@ -193,8 +193,8 @@ std::string Geometry::material(const Prim& prim) {
     constexpr std::string_view kCollection = "material:binding:collection:";
     for (const std::string& name : stage_.property_names(*at)) {
       // `material:binding:collection:NAME`; one more part would name a purpose.
-      const bool is_plain = name.starts_with(kCollection) &&
-                            name.find(':', kCollection.size()) == std::string::npos;
+      const bool is_plain =
+          name.starts_with(kCollection) && name.find(':', kCollection.size()) == std::string::npos;
       if (!is_plain) continue;
       const Strings pair = stage_.targets(*at, name);
       if (pair.size() != 2) continue;

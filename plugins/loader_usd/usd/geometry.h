@@ -22,10 +22,10 @@ LocalTransform local_transform(const Stage& stage, const Prim& prim);
 
 /// A primvar as a prim sees it, authored on it or inherited.
 struct Primvar {
-  std::string name;            ///< Without `primvars:`.
+  std::string name;  ///< Without `primvars:`.
   const Prim* owner = nullptr;
-  std::string type;            ///< `color3f[]`.
-  std::string interpolation;   ///< constant where nothing is authored.
+  std::string type;           ///< `color3f[]`.
+  std::string interpolation;  ///< constant where nothing is authored.
   bool is_indexed = false;
 };
 

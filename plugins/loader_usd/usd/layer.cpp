@@ -62,8 +62,6 @@ std::uint32_t Layer::add_field(Field field) {
   return static_cast<std::uint32_t>(fields_.size() - 1);
 }
 
-std::string_view Layer::intern(std::string_view text) {
-  return strings_.emplace_back(text);
-}
+std::string_view Layer::intern(std::string_view text) { return strings_.emplace_back(text); }
 
 }  // namespace diorama::usd

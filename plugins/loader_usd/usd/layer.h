@@ -73,9 +73,7 @@ class Layer {
   std::uint32_t add_field(Field field);
   std::string_view intern(std::string_view text);
   std::vector<std::uint32_t>& field_indices() { return field_indices_; }
-  std::unordered_map<std::string, PrimSpec, StringHash, std::equal_to<>>& prims() {
-    return prims_;
-  }
+  std::unordered_map<std::string, PrimSpec, StringHash, std::equal_to<>>& prims() { return prims_; }
   void set_source(std::shared_ptr<const ValueSource> source) { source_ = std::move(source); }
 
  private:

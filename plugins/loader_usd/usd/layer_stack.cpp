@@ -78,8 +78,7 @@ std::string LayerStacks::anchor(const std::string& asset, const Layer& layer,
 
 const LayerStack& LayerStacks::open(const std::string& identifier,
                                     const Dictionary& outer_variables) {
-  auto [entry, is_new] =
-      stacks_.try_emplace(identifier + variables_key(outer_variables), nullptr);
+  auto [entry, is_new] = stacks_.try_emplace(identifier + variables_key(outer_variables), nullptr);
   if (entry->second) return *entry->second;
   auto stack = std::make_unique<LayerStack>();
   try {
@@ -193,8 +192,8 @@ std::vector<ComposedReference> compose_references(const LayerStacks& stacks,
         origins.push_back(std::move(origin));
       }
     };
-    for (auto* items : {&op.explicit_items, &op.added, &op.prepended, &op.appended, &op.deleted,
-                        &op.ordered}) {
+    for (auto* items :
+         {&op.explicit_items, &op.added, &op.prepended, &op.appended, &op.deleted, &op.ordered}) {
       anchor_all(*items);
     }
     op.apply(composed);

@@ -48,8 +48,8 @@ struct LayerStack {
 
 /// Where an arc of a composed list came from.
 struct ComposedReference {
-  Reference reference;     ///< The asset is anchored, the offset includes the sublayer's.
-  std::string authored;    ///< The asset as written.
+  Reference reference;   ///< The asset is anchored, the offset includes the sublayer's.
+  std::string authored;  ///< The asset as written.
   const Layer* source = nullptr;
 };
 

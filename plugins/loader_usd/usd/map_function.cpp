@@ -49,8 +49,8 @@ MapFunction MapFunction::between(std::string source, std::string target, LayerOf
 
 MapFunction MapFunction::with_root_identity() const {
   MapFunction result = *this;
-  const bool has_root = std::any_of(pairs_.begin(), pairs_.end(),
-                                    [](const auto& pair) { return pair.first == "/"; });
+  const bool has_root =
+      std::any_of(pairs_.begin(), pairs_.end(), [](const auto& pair) { return pair.first == "/"; });
   if (!has_root) result.pairs_.emplace_back("/", "/");
   result.simplify();
   return result;

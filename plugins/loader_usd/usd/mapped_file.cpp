@@ -45,8 +45,8 @@ ByteView map_file(const std::string& path) {
   if (address == MAP_FAILED) {
     throw FormatError(path + ": cannot be mapped: " + std::strerror(errno));
   }
-  std::shared_ptr<const void> owner(address,
-                                    [size](const void* at) { ::munmap(const_cast<void*>(at), size); });
+  std::shared_ptr<const void> owner(
+      address, [size](const void* at) { ::munmap(const_cast<void*>(at), size); });
   return {std::move(owner), {static_cast<const std::byte*>(address), size}};
 }
 

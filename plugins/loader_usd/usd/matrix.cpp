@@ -64,10 +64,22 @@ Matrix rotation(const std::array<double, 4>& quaternion) {
   const double z = quaternion[2] / length;
   const double w = quaternion[3] / length;
   Matrix result;
-  result.m = {1 - 2 * (y * y + z * z), 2 * (x * y + z * w),     2 * (z * x - y * w),     0,
-              2 * (x * y - z * w),     1 - 2 * (z * z + x * x), 2 * (y * z + x * w),     0,
-              2 * (z * x + y * w),     2 * (y * z - x * w),     1 - 2 * (y * y + x * x), 0,
-              0,                       0,                       0,                       1};
+  result.m = {1 - 2 * (y * y + z * z),
+              2 * (x * y + z * w),
+              2 * (z * x - y * w),
+              0,
+              2 * (x * y - z * w),
+              1 - 2 * (z * z + x * x),
+              2 * (y * z + x * w),
+              0,
+              2 * (z * x + y * w),
+              2 * (y * z - x * w),
+              1 - 2 * (y * y + x * x),
+              0,
+              0,
+              0,
+              0,
+              1};
   return result;
 }
 
@@ -123,9 +135,9 @@ Box transform(const Matrix& matrix, const Box& box) {
   Box result;
   if (box.is_empty()) return result;
   for (int corner = 0; corner < 8; ++corner) {
-    result.add(transform(matrix, Vector3{corner & 1 ? box.max[0] : box.min[0],
-                                  corner & 2 ? box.max[1] : box.min[1],
-                                  corner & 4 ? box.max[2] : box.min[2]}));
+    result.add(transform(
+        matrix, Vector3{corner & 1 ? box.max[0] : box.min[0], corner & 2 ? box.max[1] : box.min[1],
+                        corner & 4 ? box.max[2] : box.min[2]}));
   }
   return result;
 }

@@ -44,8 +44,8 @@ class ZipBytes {
   }
   void check(std::uint64_t offset, std::uint64_t size) const {
     if (offset > bytes_.size() || size > bytes_.size() - offset) {
-      throw format_error_at(file_, "the package ends within a record of " + std::to_string(size) +
-                                       " bytes", offset);
+      throw format_error_at(
+          file_, "the package ends within a record of " + std::to_string(size) + " bytes", offset);
     }
   }
   std::uint64_t size() const { return bytes_.size(); }
@@ -116,24 +116,25 @@ ByteView Package::read(const std::string& name) const {
     throw format_error_at(file_, "member " + name + " is encrypted", at);
   }
   // The directory may pad differently, so only the member's own header knows where its data begin.
-  const std::uint64_t data = at + kLocalHeaderSize + zip.at<std::uint16_t>(at + 26) +
-                             zip.at<std::uint16_t>(at + 28);
+  const std::uint64_t data =
+      at + kLocalHeaderSize + zip.at<std::uint16_t>(at + 26) + zip.at<std::uint16_t>(at + 28);
   zip.check(data, member->compressed_size);
   if (member->method == kStored) return view_.part(data, member->compressed_size);
   if (member->method != kDeflated) {
-    throw format_error_at(file_, "member " + name + " uses compression method " +
-                                     std::to_string(member->method), at);
+    throw format_error_at(
+        file_, "member " + name + " uses compression method " + std::to_string(member->method), at);
   }
   if (member->size > member->compressed_size * kMaxExpansion + 64) {
-    throw format_error_at(file_, "member " + name + " claims to unpack to " +
-                                     std::to_string(member->size) + " bytes", at);
+    throw format_error_at(
+        file_, "member " + name + " claims to unpack to " + std::to_string(member->size) + " bytes",
+        at);
   }
   auto unpacked = std::make_shared<std::vector<std::byte>>(member->size);
   const std::unique_ptr<libdeflate_decompressor, void (*)(libdeflate_decompressor*)> inflater(
       libdeflate_alloc_decompressor(), &libdeflate_free_decompressor);
-  const auto result = libdeflate_deflate_decompress(
-      inflater.get(), view_.bytes.data() + data, member->compressed_size, unpacked->data(),
-      unpacked->size(), nullptr);
+  const auto result = libdeflate_deflate_decompress(inflater.get(), view_.bytes.data() + data,
+                                                    member->compressed_size, unpacked->data(),
+                                                    unpacked->size(), nullptr);
   if (result != LIBDEFLATE_SUCCESS) {
     throw format_error_at(file_, "member " + name + " cannot be unpacked", data);
   }

@@ -231,8 +231,8 @@ std::string replace_prefix(std::string_view path, std::string_view from, std::st
   std::string_view rest = path.substr(from.size());
   if (rest.empty()) return std::string(to);
   if (from == "/" && path == "/") return std::string(to);
-  const bool is_child = rest.front() == '/' || (rest.front() != '.' && rest.front() != '{' &&
-                                                rest.front() != '[');
+  const bool is_child =
+      rest.front() == '/' || (rest.front() != '.' && rest.front() != '{' && rest.front() != '[');
   if (!is_child) return std::string(to == "/" ? std::string_view("/") : to).append(rest);
   if (rest.front() == '/') rest.remove_prefix(1);
   return append_child(to, rest);
@@ -249,8 +249,8 @@ std::string strip_variants(std::string_view path) {
       continue;
     }
     i = std::min(path.find('}', i), path.size() - 1);
-    const bool is_child_next = i + 1 < path.size() && path[i + 1] != '{' && path[i + 1] != '.' &&
-                               path[i + 1] != '/';
+    const bool is_child_next =
+        i + 1 < path.size() && path[i + 1] != '{' && path[i + 1] != '.' && path[i + 1] != '/';
     if (is_child_next) result += '/';
   }
   return result;

@@ -23,9 +23,7 @@ std::shared_ptr<const MapFunction> share(MapFunction function) {
   return std::make_shared<const MapFunction>(std::move(function));
 }
 
-std::shared_ptr<const MapFunction> identity_map() {
-  return share(MapFunction::identity());
-}
+std::shared_ptr<const MapFunction> identity_map() { return share(MapFunction::identity()); }
 
 bool has_field(const LayerStack& stack, std::string_view path, std::string_view field) {
   return std::any_of(stack.layers.begin(), stack.layers.end(), [&](const auto& entry) {
@@ -130,9 +128,10 @@ struct ArcOptions {
 
 std::vector<int> PrimIndex::strength_order() const {
   std::vector<int> order = StrengthOrder(*this).list();
-  order.erase(std::remove_if(order.begin(), order.end(),
-                             [&](int i) { return !nodes[static_cast<std::size_t>(i)].contributes(); }),
-              order.end());
+  order.erase(
+      std::remove_if(order.begin(), order.end(),
+                     [&](int i) { return !nodes[static_cast<std::size_t>(i)].contributes(); }),
+      order.end());
   return order;
 }
 
@@ -205,8 +204,8 @@ class PrimIndexer::Builder {
 
   void eval_variant_sets(int node);
   void eval_variant(const Task& task);
-  std::optional<std::string> prior_selection(int node, const std::string& path_in_root,
-                                             int levels, const std::string& set) const;
+  std::optional<std::string> prior_selection(int node, const std::string& path_in_root, int levels,
+                                             const std::string& set) const;
   std::optional<std::string> find_selection(int node, const std::string& set) const;
   std::optional<std::string> search_selection(
       int node, const std::string& path, const std::string& set,
@@ -275,10 +274,11 @@ void PrimIndexer::Builder::copy_subtree(const PrimIndex& source, std::string_vie
     IndexNode& each = moved.nodes[i];
     const bool is_root_class = each.arc == Arc::Inherit && each.stack == &indexer_.root_ &&
                                path::depth(each.path) > each.levels_below_arc + 1;
-    const bool is_held = i == 0 || each.contributes() || each.arc == Arc::Specialize ||
-                         is_root_class || is_kept[i];
+    const bool is_held =
+        i == 0 || each.contributes() || each.arc == Arc::Specialize || is_root_class || is_kept[i];
     if (!is_held) continue;
-    for (int k = static_cast<int>(i); k != IndexNode::kNone && !is_kept[static_cast<std::size_t>(k)];
+    for (int k = static_cast<int>(i);
+         k != IndexNode::kNone && !is_kept[static_cast<std::size_t>(k)];
          k = moved.nodes[static_cast<std::size_t>(k)].parent) {
       is_kept[static_cast<std::size_t>(k)] = 1;
     }
@@ -356,11 +356,10 @@ bool PrimIndexer::Builder::compose_instanceable() const {
 // --- Tasks ----------------------------------------------------------------------------------
 
 void PrimIndexer::Builder::add_task(Task task) {
-  const bool is_known =
-      task.kind == TaskKind::ImpliedClasses &&
-      std::any_of(tasks_.begin(), tasks_.end(), [&](const Task& other) {
-        return other.kind == task.kind && other.node == task.node;
-      });
+  const bool is_known = task.kind == TaskKind::ImpliedClasses &&
+                        std::any_of(tasks_.begin(), tasks_.end(), [&](const Task& other) {
+                          return other.kind == task.kind && other.node == task.node;
+                        });
   if (!is_known) tasks_.push_back(std::move(task));
 }
 
@@ -398,12 +397,11 @@ Task PrimIndexer::Builder::pop_task() {
   // Variants by strength of their nodes, everything else as it came.
   const auto key = [&](const Task& task) {
     const bool is_variant = task.kind >= TaskKind::VariantSets;
-    return std::tuple(task.kind,
-                      is_variant ? ranks[static_cast<std::size_t>(task.node)] : 0, task.sibling);
+    return std::tuple(task.kind, is_variant ? ranks[static_cast<std::size_t>(task.node)] : 0,
+                      task.sibling);
   };
-  const auto first = std::min_element(tasks_.begin(), tasks_.end(), [&](const Task& a, const Task& b) {
-    return key(a) < key(b);
-  });
+  const auto first = std::min_element(
+      tasks_.begin(), tasks_.end(), [&](const Task& a, const Task& b) { return key(a) < key(b); });
   Task task = std::move(*first);
   tasks_.erase(first);
   return task;
@@ -423,15 +421,24 @@ void PrimIndexer::Builder::run(bool with_variants) {
 
 void PrimIndexer::Builder::run_task(const Task& task) {
   switch (task.kind) {
-    case TaskKind::Relocations: return eval_relocations(task.node);
-    case TaskKind::References: return eval_references(task.node, Arc::Reference);
-    case TaskKind::Payloads: return eval_references(task.node, Arc::Payload);
-    case TaskKind::Inherits: return eval_classes(task.node, Arc::Inherit);
-    case TaskKind::ImpliedClasses: return eval_implied_classes(task.node);
-    case TaskKind::Specializes: return eval_classes(task.node, Arc::Specialize);
-    case TaskKind::VariantSets: return eval_variant_sets(task.node);
-    case TaskKind::Variant: return eval_variant(task);
-    case TaskKind::VariantWithoutSelection: return;
+    case TaskKind::Relocations:
+      return eval_relocations(task.node);
+    case TaskKind::References:
+      return eval_references(task.node, Arc::Reference);
+    case TaskKind::Payloads:
+      return eval_references(task.node, Arc::Payload);
+    case TaskKind::Inherits:
+      return eval_classes(task.node, Arc::Inherit);
+    case TaskKind::ImpliedClasses:
+      return eval_implied_classes(task.node);
+    case TaskKind::Specializes:
+      return eval_classes(task.node, Arc::Specialize);
+    case TaskKind::VariantSets:
+      return eval_variant_sets(task.node);
+    case TaskKind::Variant:
+      return eval_variant(task);
+    case TaskKind::VariantWithoutSelection:
+      return;
   }
 }
 
@@ -474,8 +481,7 @@ int PrimIndexer::Builder::append(PrimIndex subtree, int parent, IndexNode arc_no
     }
     index_.nodes.push_back(std::move(each));
     IndexNode& added = index_.nodes.back();
-    added.map_to_root =
-        share(node(added.parent).map_to_root->compose(*added.map_to_parent));
+    added.map_to_root = share(node(added.parent).map_to_root->compose(*added.map_to_parent));
   }
   insert_child(parent, base);
   return base;
@@ -492,8 +498,8 @@ bool PrimIndexer::Builder::is_cycle(Arc arc, int parent, int, const LayerStack& 
       const IndexNode& site = builder->node(i);
       // Relocated prims stand below their own source.
       if (site.arc == Arc::Relocate) return false;
-      if (site.stack == &stack && (path::has_prefix(site.path, child_path) ||
-                                   path::has_prefix(child_path, site.path))) {
+      if (site.stack == &stack &&
+          (path::has_prefix(site.path, child_path) || path::has_prefix(child_path, site.path))) {
         return true;
       }
     }
@@ -531,19 +537,18 @@ bool PrimIndexer::Builder::is_duplicate(int parent, const LayerStack& stack,
 }
 
 int PrimIndexer::Builder::add_arc(Arc arc, int parent, int origin, const LayerStack& stack,
-                                  const std::string& path,
-                                  std::shared_ptr<const MapFunction> map, int sibling,
-                                  ArcOptions options) {
+                                  const std::string& path, std::shared_ptr<const MapFunction> map,
+                                  int sibling, ArcOptions options) {
   if (is_cycle(arc, parent, origin, stack, path)) {
-    stacks_.diagnostics().warn(node(parent).stack->root().identifier() + ": <" +
-                               node(parent).path + "> leads back to itself through <" + path +
-                               "> of " + stack.root().identifier());
+    stacks_.diagnostics().warn(node(parent).stack->root().identifier() + ": <" + node(parent).path +
+                               "> leads back to itself through <" + path + "> of " +
+                               stack.root().identifier());
     return IndexNode::kNone;
   }
   const int depth = frame_ ? frame_->depth : 0;
   if (index_.nodes.size() > kMaxNodes || depth > kMaxRecursion) {
-    stacks_.diagnostics().warn(node(parent).stack->root().identifier() + ": <" +
-                               node(parent).path + "> is composed of too many parts");
+    stacks_.diagnostics().warn(node(parent).stack->root().identifier() + ": <" + node(parent).path +
+                               "> is composed of too many parts");
     return IndexNode::kNone;
   }
   options.skip_duplicates |= frame_ && frame_->skip_duplicates;
@@ -561,7 +566,8 @@ int PrimIndexer::Builder::add_arc(Arc arc, int parent, int origin, const LayerSt
   arc_node.namespace_depth = path::depth(node(parent).path);
   arc_node.sibling = sibling;
 
-  const Frame frame{this, parent, map, arc, path, &stack, options.skip_duplicates, frame_, depth + 1};
+  const Frame frame{this,   parent,   map, arc, path, &stack, options.skip_duplicates,
+                    frame_, depth + 1};
   Builder subtree(indexer_, &frame, levels_above_);
   if (options.with_ancestors) {
     subtree.build_with_ancestors(stack, path, options.contributes);
@@ -612,8 +618,8 @@ void PrimIndexer::Builder::eval_references(int i, Arc arc) {
       if (name && path::is_prim_path(*name) && name->starts_with('/')) path = *name;
     }
     if (!path::is_prim_path(path) || !path.starts_with('/')) {
-      stacks_.diagnostics().warn(where + " names no prim and " +
-                                 target_stack->root().identifier() + " has no default prim");
+      stacks_.diagnostics().warn(where + " names no prim and " + target_stack->root().identifier() +
+                                 " has no default prim");
       continue;
     }
     MapFunction map = MapFunction::between(path, path::strip_variants(site), offset);
@@ -622,10 +628,9 @@ void PrimIndexer::Builder::eval_references(int i, Arc arc) {
     options.with_ancestors = !path::is_root_prim(path);
     const int added = add_arc(arc, i, i, *target_stack, path, share(std::move(map)),
                               static_cast<int>(number), options);
-    const bool is_found =
-        added == IndexNode::kNone ||
-        std::any_of(index_.nodes.begin() + added, index_.nodes.end(),
-                    [](const IndexNode& each) { return each.has_specs; });
+    const bool is_found = added == IndexNode::kNone ||
+                          std::any_of(index_.nodes.begin() + added, index_.nodes.end(),
+                                      [](const IndexNode& each) { return each.has_specs; });
     if (!is_found) {
       stacks_.diagnostics().warn(where + ": there is no prim <" + path + "> in " +
                                  target_stack->root().identifier());
@@ -638,8 +643,8 @@ void PrimIndexer::Builder::eval_references(int i, Arc arc) {
 void PrimIndexer::Builder::eval_classes(int i, Arc arc) {
   if (!node(i).contributes()) return;
   const std::string site = node(i).path;
-  const Strings classes = compose_strings(*node(i).stack, site,
-                                          arc == Arc::Inherit ? "inheritPaths" : "specializes");
+  const Strings classes =
+      compose_strings(*node(i).stack, site, arc == Arc::Inherit ? "inheritPaths" : "specializes");
   for (std::size_t number = 0; number < classes.size(); ++number) {
     const std::string& path = classes[number];
     if (!path.starts_with('/') || !path::is_prim_path(path)) {
@@ -647,8 +652,7 @@ void PrimIndexer::Builder::eval_classes(int i, Arc arc) {
                                  "> inherits from <" + path + ">, which is not a prim");
       continue;
     }
-    auto map = share(
-        MapFunction::between(path, path::strip_variants(site)).with_root_identity());
+    auto map = share(MapFunction::between(path, path::strip_variants(site)).with_root_identity());
     add_class_arc(arc, i, i, std::move(map), static_cast<int>(number), nullptr, {});
   }
 }
@@ -683,8 +687,7 @@ int PrimIndexer::Builder::add_class_arc(Arc arc, int parent, int origin,
     }
   }
   ArcOptions options;
-  options.contributes =
-      *path != parent_path && !(ignored_stack == &stack && ignored_path == *path);
+  options.contributes = *path != parent_path && !(ignored_stack == &stack && ignored_path == *path);
   options.skip_duplicates = options.contributes;
   options.with_ancestors = options.contributes && !path::is_root_prim(*path);
   return add_arc(arc, parent, origin, stack, *path, std::move(map), sibling, options);
@@ -727,10 +730,10 @@ void PrimIndexer::Builder::eval_implied_class_tree(int destination, int source,
                                  node(source).levels_below_arc == node(child).levels_below_arc;
     if (continues_chain) continue;
     const MapFunction own = *node(child).map_to_parent;
-    auto implied = share(transfer.is_identity()
-                             ? own
-                             : transfer.compose(own.compose(transfer.inverse()))
-                                   .with_root_identity());
+    auto implied =
+        share(transfer.is_identity()
+                  ? own
+                  : transfer.compose(own.compose(transfer.inverse())).with_root_identity());
     int added = IndexNode::kNone;
     for (const int known : node(destination).children) {
       if (node(known).origin == child && *node(known).map_to_parent == *implied) added = known;
@@ -775,10 +778,9 @@ void PrimIndexer::Builder::eval_relocations(int i) {
   ArcOptions options;
   options.contributes = false;
   options.with_ancestors = true;
-  const int added =
-      add_arc(Arc::Relocate, i, i, stack, found->second,
-              share(MapFunction::between(found->second, found->first).with_root_identity()), 0,
-              options);
+  const int added = add_arc(
+      Arc::Relocate, i, i, stack, found->second,
+      share(MapFunction::between(found->second, found->first).with_root_identity()), 0, options);
   if (added != IndexNode::kNone) elide_relocated(added);
 }
 
@@ -975,8 +977,7 @@ Strings child_names(const PrimIndex& index) {
   std::vector<int> order = StrengthOrder(index).list();
   for (auto it = order.rbegin(); it != order.rend(); ++it) {
     const IndexNode& node = index.nodes[static_cast<std::size_t>(*it)];
-    const bool is_hidden =
-        node.is_inert || (index.is_instance && !index.is_in_direct_arc(*it));
+    const bool is_hidden = node.is_inert || (index.is_instance && !index.is_in_direct_arc(*it));
     if (is_hidden) continue;
     if (!node.stack->relocate_targets.empty()) apply_relocates(node, names, known);
     if (node.has_specs) add_child_names(node, names, known);

@@ -26,10 +26,10 @@ struct IndexNode {
   std::string path;  ///< With variants selected on the way.
   std::shared_ptr<const MapFunction> map_to_parent;
   std::shared_ptr<const MapFunction> map_to_root;
-  int namespace_depth = 0;  ///< Depth of the prim that the arc was found on.
-  int sibling = 0;          ///< Place of the arc in its list.
-  int levels_below_arc = 0; ///< How far below the prim with the arc the index now stands.
-  bool is_inert = false;    ///< Kept for its arcs only; it has no opinions.
+  int namespace_depth = 0;   ///< Depth of the prim that the arc was found on.
+  int sibling = 0;           ///< Place of the arc in its list.
+  int levels_below_arc = 0;  ///< How far below the prim with the arc the index now stands.
+  bool is_inert = false;     ///< Kept for its arcs only; it has no opinions.
   bool has_specs = false;
   std::vector<int> children;  ///< Strongest first.
 

@@ -76,14 +76,35 @@ constexpr std::array kTypes = {
     TypeEntry{"Backdrop", kTyped},
 };
 
-constexpr std::array<std::string_view, 29> kSingleSchemas = {
-    "AssetPreviewsAPI", "GeomModelAPI", "HydraGenerativeProceduralAPI", "LightAPI",
-    "LightListAPI", "ListAPI", "MaterialBindingAPI", "MaterialXConfigAPI", "MeshLightAPI",
-    "MotionAPI", "NodeDefAPI", "NodeGraphNodeAPI", "PhysicsArticulationRootAPI",
-    "PhysicsCollisionAPI", "PhysicsFilteredPairsAPI", "PhysicsMassAPI", "PhysicsMaterialAPI",
-    "PhysicsMeshCollisionAPI", "PhysicsRigidBodyAPI", "RiMaterialAPI", "RiRenderPassAPI",
-    "RiSplineAPI", "SceneGraphPrimAPI", "ShadowAPI", "ShapingAPI", "SkelBindingAPI",
-    "StatementsAPI", "VisibilityAPI", "VolumeLightAPI"};
+constexpr std::array<std::string_view, 29> kSingleSchemas = {"AssetPreviewsAPI",
+                                                             "GeomModelAPI",
+                                                             "HydraGenerativeProceduralAPI",
+                                                             "LightAPI",
+                                                             "LightListAPI",
+                                                             "ListAPI",
+                                                             "MaterialBindingAPI",
+                                                             "MaterialXConfigAPI",
+                                                             "MeshLightAPI",
+                                                             "MotionAPI",
+                                                             "NodeDefAPI",
+                                                             "NodeGraphNodeAPI",
+                                                             "PhysicsArticulationRootAPI",
+                                                             "PhysicsCollisionAPI",
+                                                             "PhysicsFilteredPairsAPI",
+                                                             "PhysicsMassAPI",
+                                                             "PhysicsMaterialAPI",
+                                                             "PhysicsMeshCollisionAPI",
+                                                             "PhysicsRigidBodyAPI",
+                                                             "RiMaterialAPI",
+                                                             "RiRenderPassAPI",
+                                                             "RiSplineAPI",
+                                                             "SceneGraphPrimAPI",
+                                                             "ShadowAPI",
+                                                             "ShapingAPI",
+                                                             "SkelBindingAPI",
+                                                             "StatementsAPI",
+                                                             "VisibilityAPI",
+                                                             "VolumeLightAPI"};
 
 constexpr std::array<std::string_view, 5> kMultipleSchemas = {
     "CollectionAPI", "CoordSysAPI", "PhysicsDriveAPI", "PhysicsLimitAPI", "SemanticsLabelsAPI"};

@@ -12,10 +12,10 @@ namespace diorama::usd {
 /// What USD's schemas say about a prim type.
 struct TypeTraits {
   bool is_known = false;
-  bool is_imageable = false;   ///< Has visibility and purpose.
-  bool is_xformable = false;   ///< Has transforms.
-  bool is_boundable = false;   ///< Has an extent.
-  bool is_gprim = false;       ///< A drawn shape.
+  bool is_imageable = false;  ///< Has visibility and purpose.
+  bool is_xformable = false;  ///< Has transforms.
+  bool is_boundable = false;  ///< Has an extent.
+  bool is_gprim = false;      ///< A drawn shape.
   bool is_point_based = false;
   bool is_light = false;
 };

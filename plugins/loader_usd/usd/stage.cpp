@@ -13,8 +13,8 @@ namespace diorama::usd {
 Stage::Stage(const std::string& file, Sampling sampling)
     : sampling_(sampling),
       stacks_(assets_, diagnostics_),
-      root_stack_(&stacks_.open(
-          std::filesystem::absolute(file).lexically_normal().generic_string(), {})),
+      root_stack_(
+          &stacks_.open(std::filesystem::absolute(file).lexically_normal().generic_string(), {})),
       indexer_(stacks_, *root_stack_) {
   auto root = std::make_unique<Prim>();
   root->path = "/";
@@ -42,8 +42,8 @@ double Stage::meters_per_unit() const {
 std::string Stage::default_prim() {
   const Value name = root_layer().get(root_layer().root(), "defaultPrim");
   if (!name.as_text() || name.as_text()->empty()) return {};
-  const std::string path = name.as_text()->starts_with('/') ? *name.as_text()
-                                                            : std::string("/").append(*name.as_text());
+  const std::string path =
+      name.as_text()->starts_with('/') ? *name.as_text() : std::string("/").append(*name.as_text());
   return find(path) ? path : std::string();
 }
 
@@ -55,7 +55,8 @@ const Prim* Stage::find(std::string_view path) {
   if (!parent) return nullptr;
   const std::string_view name = path::name(path);
   const Strings names = child_names(parent->index);
-  const bool exists = parent->is_active && std::find(names.begin(), names.end(), name) != names.end();
+  const bool exists =
+      parent->is_active && std::find(names.begin(), names.end(), name) != names.end();
   return exists ? compose(*parent, name) : nullptr;
 }
 
@@ -94,8 +95,8 @@ const Prim* Stage::compose(const Prim& parent, std::string_view name) {
   prim->is_abstract = parent.is_abstract || specifier == Specifier::Class;
   for_each_spec(*prim, [&](const IndexNode&, const LayerStack::Entry& entry, const PrimSpec& spec) {
     const Value type = entry.layer->get(spec, "typeName");
-    const bool is_type = type.as_text() && !type.as_text()->empty() &&
-                         *type.as_text() != "__AnyType__";
+    const bool is_type =
+        type.as_text() && !type.as_text()->empty() && *type.as_text() != "__AnyType__";
     if (is_type) prim->type_name = *type.as_text();
     return !is_type;
   });
@@ -116,24 +117,25 @@ void Stage::for_each_spec(const Prim& prim, const Visit& visit) const {
 // The strongest `def` or `class`; a class that the prim merely inherits is weaker than any other.
 Specifier Stage::compose_specifier(const Prim& prim, bool& is_defining) const {
   Specifier result = Specifier::Over;
-  for_each_spec(prim, [&](const IndexNode& node, const LayerStack::Entry& entry,
-                          const PrimSpec& spec) {
-    const int number = entry.layer->get(spec, "specifier").as_enumerator().value_or(
-        static_cast<int>(Specifier::Over));
-    const auto specifier = static_cast<Specifier>(number);
-    if (specifier == Specifier::Over) return true;
-    bool is_inherited = false;
-    for (const IndexNode* at = &node; at->parent != IndexNode::kNone;
-         at = &prim.index.nodes[static_cast<std::size_t>(at->parent)]) {
-      const bool is_class_arc = at->arc == Arc::Inherit || at->arc == Arc::Specialize;
-      is_inherited |= is_class_arc && !at->is_due_to_ancestor();
-    }
-    const bool is_weak = specifier == Specifier::Class && is_inherited;
-    if (is_weak && is_defining) return true;
-    result = specifier;
-    is_defining = true;
-    return is_weak;
-  });
+  for_each_spec(prim,
+                [&](const IndexNode& node, const LayerStack::Entry& entry, const PrimSpec& spec) {
+                  const int number = entry.layer->get(spec, "specifier")
+                                         .as_enumerator()
+                                         .value_or(static_cast<int>(Specifier::Over));
+                  const auto specifier = static_cast<Specifier>(number);
+                  if (specifier == Specifier::Over) return true;
+                  bool is_inherited = false;
+                  for (const IndexNode* at = &node; at->parent != IndexNode::kNone;
+                       at = &prim.index.nodes[static_cast<std::size_t>(at->parent)]) {
+                    const bool is_class_arc = at->arc == Arc::Inherit || at->arc == Arc::Specialize;
+                    is_inherited |= is_class_arc && !at->is_due_to_ancestor();
+                  }
+                  const bool is_weak = specifier == Specifier::Class && is_inherited;
+                  if (is_weak && is_defining) return true;
+                  result = specifier;
+                  is_defining = true;
+                  return is_weak;
+                });
   return result;
 }
 
@@ -212,8 +214,7 @@ bool Stage::has_authored_value(const Prim& prim, std::string_view name) const {
   return result;
 }
 
-std::vector<std::int64_t> Stage::metadata_integers(const Prim& prim,
-                                                   std::string_view field) const {
+std::vector<std::int64_t> Stage::metadata_integers(const Prim& prim, std::string_view field) const {
   std::vector<Value> opinions;
   for_each_spec(prim, [&](const IndexNode&, const LayerStack::Entry& entry, const PrimSpec& spec) {
     Value value = entry.layer->get(spec, field);
@@ -230,26 +231,26 @@ std::vector<std::int64_t> Stage::metadata_integers(const Prim& prim,
 FoundValue Stage::find_value(const Prim& prim, std::string_view name) const {
   FoundValue first_default;
   FoundValue first_sample;
-  for_each_spec(prim, [&](const IndexNode& node, const LayerStack::Entry& entry,
-                          const PrimSpec& spec) {
-    const PropertySpec* property = spec.property(name);
-    if (!property) return true;
-    const auto found = [&](Value value) {
-      return FoundValue{std::move(value), entry.layer.get(), node.stack, property};
-    };
-    first_default = found(entry.layer->get(property->fields, "default"));
-    if (first_default) return false;
-    if (!first_sample && sampling_ == Sampling::OrFirstSample) {
-      const Value samples = entry.layer->get(property->fields, "timeSamples");
-      const TimeSamples* list = samples.as_time_samples();
-      if (list && !list->times.empty()) {
-        // Arcs may run time backwards; then the last sample comes first.
-        const bool is_reversed = node.map_to_root->offset().scale * entry.offset.scale < 0.0;
-        first_sample = found(list->value(is_reversed ? list->times.size() - 1 : 0));
-      }
-    }
-    return true;
-  });
+  for_each_spec(
+      prim, [&](const IndexNode& node, const LayerStack::Entry& entry, const PrimSpec& spec) {
+        const PropertySpec* property = spec.property(name);
+        if (!property) return true;
+        const auto found = [&](Value value) {
+          return FoundValue{std::move(value), entry.layer.get(), node.stack, property};
+        };
+        first_default = found(entry.layer->get(property->fields, "default"));
+        if (first_default) return false;
+        if (!first_sample && sampling_ == Sampling::OrFirstSample) {
+          const Value samples = entry.layer->get(property->fields, "timeSamples");
+          const TimeSamples* list = samples.as_time_samples();
+          if (list && !list->times.empty()) {
+            // Arcs may run time backwards; then the last sample comes first.
+            const bool is_reversed = node.map_to_root->offset().scale * entry.offset.scale < 0.0;
+            first_sample = found(list->value(is_reversed ? list->times.size() - 1 : 0));
+          }
+        }
+        return true;
+      });
   FoundValue result = first_default ? first_default : first_sample;
   return result.value.is_block() ? FoundValue() : result;
 }
@@ -273,29 +274,30 @@ const PropertySpec* Stage::value_spec(const Prim& prim, std::string_view name) c
 Strings Stage::compose_paths(const Prim& prim, std::string_view name,
                              std::string_view field) const {
   std::vector<ListOp<std::string>> opinions;
-  for_each_spec(prim, [&](const IndexNode& node, const LayerStack::Entry& entry,
-                          const PrimSpec& spec) {
-    const PropertySpec* property = spec.property(name);
-    if (!property) return true;
-    const Value value = entry.layer->get(property->fields, field);
-    if (!value.as_string_list_op()) return true;
-    ListOp<std::string> op = *value.as_string_list_op();
-    const auto map_all = [&](Strings& items) {
-      Strings mapped;
-      for (const std::string& item : items) {
-        // Paths that the arc does not carry out of its asset are lost.
-        if (auto path = node.map_to_root->to_target(item)) mapped.push_back(std::move(*path));
-      }
-      items = std::move(mapped);
-    };
-    for (Strings* items : {&op.explicit_items, &op.added, &op.prepended, &op.appended, &op.deleted,
-                           &op.ordered}) {
-      map_all(*items);
-    }
-    const bool is_final = op.is_explicit;
-    opinions.push_back(std::move(op));
-    return !is_final;
-  });
+  for_each_spec(prim,
+                [&](const IndexNode& node, const LayerStack::Entry& entry, const PrimSpec& spec) {
+                  const PropertySpec* property = spec.property(name);
+                  if (!property) return true;
+                  const Value value = entry.layer->get(property->fields, field);
+                  if (!value.as_string_list_op()) return true;
+                  ListOp<std::string> op = *value.as_string_list_op();
+                  const auto map_all = [&](Strings& items) {
+                    Strings mapped;
+                    for (const std::string& item : items) {
+                      // Paths that the arc does not carry out of its asset are lost.
+                      if (auto path = node.map_to_root->to_target(item))
+                        mapped.push_back(std::move(*path));
+                    }
+                    items = std::move(mapped);
+                  };
+                  for (Strings* items : {&op.explicit_items, &op.added, &op.prepended, &op.appended,
+                                         &op.deleted, &op.ordered}) {
+                    map_all(*items);
+                  }
+                  const bool is_final = op.is_explicit;
+                  opinions.push_back(std::move(op));
+                  return !is_final;
+                });
   Strings result;
   for (auto it = opinions.rbegin(); it != opinions.rend(); ++it) it->apply(result);
   return result;

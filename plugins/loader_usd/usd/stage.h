@@ -83,8 +83,8 @@ class Stage {
   /// Names of all authored properties, sorted.
   Strings property_names(const Prim& prim) const;
   Value property_metadata(const Prim& prim, std::string_view name, std::string_view field) const;
-  /// The type, `float3[]`: the schema's for attributes that it defines, else the authored one; empty
-  /// if there is no such attribute.
+  /// The type, `float3[]`: the schema's for attributes that it defines, else the authored one;
+  /// empty if there is no such attribute.
   std::string attribute_type(const Prim& prim, std::string_view name) const;
   /// The strongest value by the stage's sampling. Empty when there is none or it is blocked.
   FoundValue find_value(const Prim& prim, std::string_view name) const;

@@ -93,7 +93,6 @@ FieldType field_type(std::string_view name) {
   return found == kFieldTypes.end() ? FieldType{name, FieldKind::Free, {}} : *found;
 }
 
-
 const Value* find_field(const Fields& fields, std::string_view name) {
   for (const auto& [key, value] : fields) {
     if (key == name) return &value;
@@ -113,8 +112,8 @@ void set_field(Fields& fields, std::string_view name, Value value) {
 
 // Sets the part of a list edit that `edit` names and keeps its other parts.
 template <class Item>
-void edit_list(Fields& fields, std::string_view name, Type type, Edit edit,
-               std::vector<Item> items, const ListOp<Item>* old) {
+void edit_list(Fields& fields, std::string_view name, Type type, Edit edit, std::vector<Item> items,
+               const ListOp<Item>* old) {
   auto op = std::make_shared<ListOp<Item>>();
   if (old) *op = *old;
   switch (edit) {
@@ -122,19 +121,28 @@ void edit_list(Fields& fields, std::string_view name, Type type, Edit edit,
       op->is_explicit = true;
       op->explicit_items = std::move(items);
       break;
-    case Edit::Add: op->added = std::move(items); break;
-    case Edit::Prepend: op->prepended = std::move(items); break;
-    case Edit::Append: op->appended = std::move(items); break;
-    case Edit::Delete: op->deleted = std::move(items); break;
-    case Edit::Reorder: op->ordered = std::move(items); break;
+    case Edit::Add:
+      op->added = std::move(items);
+      break;
+    case Edit::Prepend:
+      op->prepended = std::move(items);
+      break;
+    case Edit::Append:
+      op->appended = std::move(items);
+      break;
+    case Edit::Delete:
+      op->deleted = std::move(items);
+      break;
+    case Edit::Reorder:
+      op->ordered = std::move(items);
+      break;
   }
   set_field(fields, name, Value(type, std::shared_ptr<const ListOp<Item>>(std::move(op))));
 }
 
 void edit_list(Fields& fields, std::string_view name, Type type, Edit edit, Strings items) {
   const Value* old = find_field(fields, name);
-  edit_list(fields, name, type, edit, std::move(items),
-            old ? old->as_string_list_op() : nullptr);
+  edit_list(fields, name, type, edit, std::move(items), old ? old->as_string_list_op() : nullptr);
 }
 
 class TextReader {
@@ -342,8 +350,8 @@ bool TextReader::read_shared_metadata(Fields& fields) {
     return true;
   }
   const std::string key(scanner_.peek_word());
-  const bool is_name = !key.empty() && (!is_keyword(key) || key == "customData" ||
-                                        key == "symmetryArguments");
+  const bool is_name =
+      !key.empty() && (!is_keyword(key) || key == "customData" || key == "symmetryArguments");
   if (!is_name) return false;
   scanner_.advance(key.size());
   read_field(fields, key);
@@ -373,8 +381,10 @@ void TextReader::read_field(Fields& fields, const std::string& key) {
       edit_list(fields, type.name, Type::TokenListOp, Edit::Explicit, *items.as_strings());
       return;
     }
-    case FieldKind::IntegerList: return read_integer_list(fields, type.name, Edit::Explicit);
-    case FieldKind::Free: break;
+    case FieldKind::IntegerList:
+      return read_integer_list(fields, type.name, Edit::Explicit);
+    case FieldKind::Free:
+      break;
   }
   if (scanner_.peek() == '{') {
     read_text_dictionary(scanner_);
@@ -413,8 +423,8 @@ void TextReader::read_integer_list(Fields& fields, std::string_view name, Edit e
 }
 
 void TextReader::read_prim_metadata(PrimBuilder& prim) {
-  static constexpr std::array<std::string_view, 5> kListKeys = {
-      "references", "payload", "inherits", "specializes", "variantSets"};
+  static constexpr std::array<std::string_view, 5> kListKeys = {"references", "payload", "inherits",
+                                                                "specializes", "variantSets"};
   read_block('(', ')', [&] {
     const auto edit = accept_edit();
     for (const std::string_view key : kListKeys) {
@@ -550,8 +560,8 @@ void TextReader::read_references(PrimBuilder& prim, std::string_view field, bool
   if (scanner_.accept_word("None")) {
     if (edit != Edit::Explicit) scanner_.fail("None cannot be added to a list or removed from it");
   } else if (scanner_.peek() == '[') {
-    items = read_items<Reference>([&] { return read_reference(is_payload); },
-                                  edit == Edit::Explicit);
+    items =
+        read_items<Reference>([&] { return read_reference(is_payload); }, edit == Edit::Explicit);
   } else {
     items.push_back(read_reference(is_payload));
   }
@@ -622,9 +632,9 @@ void TextReader::read_variant_selections(PrimBuilder& prim) {
     }
     pairs.emplace_back(set, *variant);
   }
-  set_field(prim.fields, "variantSelection",
-            Value(Type::VariantSelectionMap,
-                  std::make_shared<const StringPairs>(std::move(pairs))));
+  set_field(
+      prim.fields, "variantSelection",
+      Value(Type::VariantSelectionMap, std::make_shared<const StringPairs>(std::move(pairs))));
 }
 
 bool TextReader::at_prim() const {
@@ -780,8 +790,7 @@ void TextReader::read_property(PrimBuilder& prim) {
 }
 
 PropertyBuilder& TextReader::property(PrimBuilder& prim, const std::string& name, SpecType type) {
-  const auto [entry, is_new] =
-      prim.property_of_name.try_emplace(name, prim.properties.size());
+  const auto [entry, is_new] = prim.property_of_name.try_emplace(name, prim.properties.size());
   if (is_new) prim.properties.push_back({name, type, {}});
   PropertyBuilder& result = prim.properties[entry->second];
   if (result.type != type) {
@@ -823,8 +832,7 @@ Strings TextReader::read_target_paths(const PrimBuilder& prim, bool is_edit, boo
 }
 
 void TextReader::read_relationship(PrimBuilder& prim, Edit edit, bool is_edit, bool is_custom) {
-  PropertyBuilder& relationship =
-      property(prim, read_property_name(), SpecType::Relationship);
+  PropertyBuilder& relationship = property(prim, read_property_name(), SpecType::Relationship);
   if (is_custom) set_field(relationship.fields, "custom", Value::boolean(true));
   const std::size_t after = scanner_.position();
   scanner_.skip_inline();
@@ -892,7 +900,8 @@ void TextReader::read_attribute(PrimBuilder& prim, Edit edit, bool is_edit, bool
   }
   set_field(attribute.fields, "typeName", Value::text(Type::Token, stored_type));
   if (is_custom) set_field(attribute.fields, "custom", Value::boolean(true));
-  if (is_uniform) set_field(attribute.fields, "variability", Value::enumerator(Type::Variability, 1));
+  if (is_uniform)
+    set_field(attribute.fields, "variability", Value::enumerator(Type::Variability, 1));
 
   const std::size_t after = scanner_.position();
   scanner_.skip_inline();
@@ -973,8 +982,7 @@ void TextReader::read_connections(const PrimBuilder& prim, PropertyBuilder& attr
 // Splines hold animation; the reader takes defaults and samples only.
 void TextReader::skip_spline(const ValueTypeName& type) {
   const bool is_number = !type.is_array && (type.type == Type::Double || type.type == Type::Float ||
-                                            type.type == Type::Half ||
-                                            type.type == Type::TimeCode);
+                                            type.type == Type::Half || type.type == Type::TimeCode);
   if (!is_number) scanner_.fail("an attribute of type " + type.canonical + " cannot be a spline");
   scanner_.expect_assignment();
   scanner_.expect('{', "before a spline");

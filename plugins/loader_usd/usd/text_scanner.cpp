@@ -25,13 +25,20 @@ int hex_digit(char c) {
 char read_escape(std::string_view text, std::size_t& at) {
   const char c = text[at++];
   switch (c) {
-    case 'n': return '\n';
-    case 't': return '\t';
-    case 'r': return '\r';
-    case 'a': return '\a';
-    case 'b': return '\b';
-    case 'f': return '\f';
-    case 'v': return '\v';
+    case 'n':
+      return '\n';
+    case 't':
+      return '\t';
+    case 'r':
+      return '\r';
+    case 'a':
+      return '\a';
+    case 'b':
+      return '\b';
+    case 'f':
+      return '\f';
+    case 'v':
+      return '\v';
     case 'x': {
       int value = 0;
       for (int i = 0; i < 2 && at < text.size() && hex_digit(text[at]) >= 0; ++i) {
@@ -39,7 +46,8 @@ char read_escape(std::string_view text, std::size_t& at) {
       }
       return static_cast<char>(value);
     }
-    default: break;
+    default:
+      break;
   }
   if (c < '0' || c > '7') return c;
   int value = c - '0';
@@ -66,15 +74,61 @@ std::string unescape(std::string_view text) {
 }  // namespace
 
 bool is_keyword(std::string_view word) {
-  static constexpr std::array<std::string_view, 55> kKeywords = {
-      "AnimationBlock", "None", "add", "append", "bezier", "class", "config", "connect", "curve",
-      "custom", "customData", "def", "default", "delete", "dictionary", "displayUnit", "doc",
-      "held", "hermite", "inherits", "kind", "linear", "loop", "nameChildren", "none", "offset",
-      "oscillate", "over", "payload", "permission", "post", "pre", "prefixSubstitutions",
-      "prepend", "properties", "references", "rel", "relocates", "reorder", "repeat", "reset",
-      "rootPrims", "scale", "sloped", "specializes", "spline", "subLayers",
-      "suffixSubstitutions", "symmetryArguments", "symmetryFunction", "timeSamples", "uniform",
-      "variantSet", "variantSets", "variants"};
+  static constexpr std::array<std::string_view, 55> kKeywords = {"AnimationBlock",
+                                                                 "None",
+                                                                 "add",
+                                                                 "append",
+                                                                 "bezier",
+                                                                 "class",
+                                                                 "config",
+                                                                 "connect",
+                                                                 "curve",
+                                                                 "custom",
+                                                                 "customData",
+                                                                 "def",
+                                                                 "default",
+                                                                 "delete",
+                                                                 "dictionary",
+                                                                 "displayUnit",
+                                                                 "doc",
+                                                                 "held",
+                                                                 "hermite",
+                                                                 "inherits",
+                                                                 "kind",
+                                                                 "linear",
+                                                                 "loop",
+                                                                 "nameChildren",
+                                                                 "none",
+                                                                 "offset",
+                                                                 "oscillate",
+                                                                 "over",
+                                                                 "payload",
+                                                                 "permission",
+                                                                 "post",
+                                                                 "pre",
+                                                                 "prefixSubstitutions",
+                                                                 "prepend",
+                                                                 "properties",
+                                                                 "references",
+                                                                 "rel",
+                                                                 "relocates",
+                                                                 "reorder",
+                                                                 "repeat",
+                                                                 "reset",
+                                                                 "rootPrims",
+                                                                 "scale",
+                                                                 "sloped",
+                                                                 "specializes",
+                                                                 "spline",
+                                                                 "subLayers",
+                                                                 "suffixSubstitutions",
+                                                                 "symmetryArguments",
+                                                                 "symmetryFunction",
+                                                                 "timeSamples",
+                                                                 "uniform",
+                                                                 "variantSet",
+                                                                 "variantSets",
+                                                                 "variants"};
   return word == "varying" || std::binary_search(kKeywords.begin(), kKeywords.end(), word);
 }
 

@@ -55,7 +55,8 @@ Value ValueReader::read() {
     if (scanner_.peek() != '[') scanner_.fail("expected a list in [ ] for " + type_.canonical);
     read_list(0);
   } else {
-    if (scanner_.peek() == '[') scanner_.fail("found a list where " + type_.canonical + " is one value");
+    if (scanner_.peek() == '[')
+      scanner_.fail("found a list where " + type_.canonical + " is one value");
     read_element();
   }
   return finish();
@@ -171,15 +172,24 @@ void ValueReader::append_integer(std::string_view digits) {
 
 void ValueReader::append_number(std::string_view digits) {
   switch (layout_.component) {
-    case Type::Bool: return append<std::uint8_t>(parse_number(digits) != 0.0 ? 1 : 0);
-    case Type::UChar: return append_integer<std::uint8_t>(digits);
-    case Type::Int: return append_integer<std::int32_t>(digits);
-    case Type::UInt: return append_integer<std::uint32_t>(digits);
-    case Type::Int64: return append_integer<std::int64_t>(digits);
-    case Type::UInt64: return append_integer<std::uint64_t>(digits);
-    case Type::Half: return append(float_to_half(static_cast<float>(parse_number(digits))));
-    case Type::Float: return append(static_cast<float>(parse_number(digits)));
-    default: return append(parse_number(digits));
+    case Type::Bool:
+      return append<std::uint8_t>(parse_number(digits) != 0.0 ? 1 : 0);
+    case Type::UChar:
+      return append_integer<std::uint8_t>(digits);
+    case Type::Int:
+      return append_integer<std::int32_t>(digits);
+    case Type::UInt:
+      return append_integer<std::uint32_t>(digits);
+    case Type::Int64:
+      return append_integer<std::int64_t>(digits);
+    case Type::UInt64:
+      return append_integer<std::uint64_t>(digits);
+    case Type::Half:
+      return append(float_to_half(static_cast<float>(parse_number(digits))));
+    case Type::Float:
+      return append(static_cast<float>(parse_number(digits)));
+    default:
+      return append(parse_number(digits));
   }
 }
 
@@ -280,8 +290,8 @@ void read_dictionary_item(TextScanner& scanner, Dictionary& dictionary, int nest
     scanner.require_space("dictionary");
     std::string key = read_dictionary_key(scanner);
     scanner.expect_assignment();
-    dictionary.insert_or_assign(
-        std::move(key), Value(Type::Dictionary, read_dictionary(scanner, nesting + 1)));
+    dictionary.insert_or_assign(std::move(key),
+                                Value(Type::Dictionary, read_dictionary(scanner, nesting + 1)));
     return;
   }
   std::string type_name(scanner.peek_word());
@@ -313,8 +323,7 @@ std::shared_ptr<const Dictionary> read_dictionary(TextScanner& scanner, int nest
     read_dictionary_item(scanner, *dictionary, nesting);
     const std::size_t after = scanner.position();
     scanner.skip_to_line_end();
-    const bool is_separated =
-        scanner.accept(';') || scanner.accept('\n') || scanner.accept('\r');
+    const bool is_separated = scanner.accept(';') || scanner.accept('\n') || scanner.accept('\r');
     if (!is_separated) scanner.rewind(after);
     scanner.skip_lines();
     if (!is_separated && scanner.peek() != '}') {
@@ -344,8 +353,8 @@ double parse_number(std::string_view digits) {
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
   if (error == std::errc::result_out_of_range) {
     // Too big becomes infinite, too small becomes zero.
-    const bool is_small = digits.find("e-") != std::string_view::npos ||
-                          digits.find("E-") != std::string_view::npos;
+    const bool is_small =
+        digits.find("e-") != std::string_view::npos || digits.find("E-") != std::string_view::npos;
     const double size = is_small ? 0.0 : std::numeric_limits<double>::infinity();
     return digits.starts_with('-') ? -size : size;
   }

@@ -110,35 +110,60 @@ constexpr std::array kTypeNames = {
 
 NumericLayout numeric_layout(Type type) {
   switch (type) {
-    case Type::Bool: return {Type::Bool, 1, 1};
-    case Type::UChar: return {Type::UChar, 1, 1};
-    case Type::Int: return {Type::Int, 4, 1};
-    case Type::UInt: return {Type::UInt, 4, 1};
-    case Type::Int64: return {Type::Int64, 8, 1};
-    case Type::UInt64: return {Type::UInt64, 8, 1};
-    case Type::Half: return {Type::Half, 2, 1};
-    case Type::Float: return {Type::Float, 4, 1};
+    case Type::Bool:
+      return {Type::Bool, 1, 1};
+    case Type::UChar:
+      return {Type::UChar, 1, 1};
+    case Type::Int:
+      return {Type::Int, 4, 1};
+    case Type::UInt:
+      return {Type::UInt, 4, 1};
+    case Type::Int64:
+      return {Type::Int64, 8, 1};
+    case Type::UInt64:
+      return {Type::UInt64, 8, 1};
+    case Type::Half:
+      return {Type::Half, 2, 1};
+    case Type::Float:
+      return {Type::Float, 4, 1};
     case Type::Double:
-    case Type::TimeCode: return {Type::Double, 8, 1};
-    case Type::Matrix2d: return {Type::Double, 8, 4};
-    case Type::Matrix3d: return {Type::Double, 8, 9};
-    case Type::Matrix4d: return {Type::Double, 8, 16};
+    case Type::TimeCode:
+      return {Type::Double, 8, 1};
+    case Type::Matrix2d:
+      return {Type::Double, 8, 4};
+    case Type::Matrix3d:
+      return {Type::Double, 8, 9};
+    case Type::Matrix4d:
+      return {Type::Double, 8, 16};
     case Type::Quatd:
-    case Type::Vec4d: return {Type::Double, 8, 4};
+    case Type::Vec4d:
+      return {Type::Double, 8, 4};
     case Type::Quatf:
-    case Type::Vec4f: return {Type::Float, 4, 4};
+    case Type::Vec4f:
+      return {Type::Float, 4, 4};
     case Type::Quath:
-    case Type::Vec4h: return {Type::Half, 2, 4};
-    case Type::Vec2d: return {Type::Double, 8, 2};
-    case Type::Vec2f: return {Type::Float, 4, 2};
-    case Type::Vec2h: return {Type::Half, 2, 2};
-    case Type::Vec2i: return {Type::Int, 4, 2};
-    case Type::Vec3d: return {Type::Double, 8, 3};
-    case Type::Vec3f: return {Type::Float, 4, 3};
-    case Type::Vec3h: return {Type::Half, 2, 3};
-    case Type::Vec3i: return {Type::Int, 4, 3};
-    case Type::Vec4i: return {Type::Int, 4, 4};
-    default: return {};
+    case Type::Vec4h:
+      return {Type::Half, 2, 4};
+    case Type::Vec2d:
+      return {Type::Double, 8, 2};
+    case Type::Vec2f:
+      return {Type::Float, 4, 2};
+    case Type::Vec2h:
+      return {Type::Half, 2, 2};
+    case Type::Vec2i:
+      return {Type::Int, 4, 2};
+    case Type::Vec3d:
+      return {Type::Double, 8, 3};
+    case Type::Vec3f:
+      return {Type::Float, 4, 3};
+    case Type::Vec3h:
+      return {Type::Half, 2, 3};
+    case Type::Vec3i:
+      return {Type::Int, 4, 3};
+    case Type::Vec4i:
+      return {Type::Int, 4, 4};
+    default:
+      return {};
   }
 }
 

@@ -17,16 +17,26 @@ T load(const std::byte* at) {
 
 double component_at(Type component, const std::byte* at) {
   switch (component) {
-    case Type::Bool: return load<std::uint8_t>(at) != 0 ? 1.0 : 0.0;
-    case Type::UChar: return load<std::uint8_t>(at);
-    case Type::Int: return load<std::int32_t>(at);
-    case Type::UInt: return load<std::uint32_t>(at);
-    case Type::Int64: return static_cast<double>(load<std::int64_t>(at));
-    case Type::UInt64: return static_cast<double>(load<std::uint64_t>(at));
-    case Type::Half: return half_to_float(load<std::uint16_t>(at));
-    case Type::Float: return load<float>(at);
-    case Type::Double: return load<double>(at);
-    default: return 0.0;
+    case Type::Bool:
+      return load<std::uint8_t>(at) != 0 ? 1.0 : 0.0;
+    case Type::UChar:
+      return load<std::uint8_t>(at);
+    case Type::Int:
+      return load<std::int32_t>(at);
+    case Type::UInt:
+      return load<std::uint32_t>(at);
+    case Type::Int64:
+      return static_cast<double>(load<std::int64_t>(at));
+    case Type::UInt64:
+      return static_cast<double>(load<std::uint64_t>(at));
+    case Type::Half:
+      return half_to_float(load<std::uint16_t>(at));
+    case Type::Float:
+      return load<float>(at);
+    case Type::Double:
+      return load<double>(at);
+    default:
+      return 0.0;
   }
 }
 

@@ -96,15 +96,13 @@ struct Buffer {
 /// What a field of a layer holds. Cheap to copy: big values are shared and immutable.
 class Value {
  public:
-  using Payload =
-      std::variant<std::monostate, std::array<std::byte, 32>, Buffer, std::string,
-                   std::shared_ptr<const Strings>, std::shared_ptr<const Dictionary>,
-                   std::shared_ptr<const ListOp<std::string>>,
-                   std::shared_ptr<const ListOp<std::int64_t>>,
-                   std::shared_ptr<const ListOp<Reference>>, std::shared_ptr<const StringPairs>,
-                   std::shared_ptr<const TimeSamples>, std::shared_ptr<const Reference>,
-                   std::shared_ptr<const std::vector<double>>,
-                   std::shared_ptr<const std::vector<LayerOffset>>>;
+  using Payload = std::variant<
+      std::monostate, std::array<std::byte, 32>, Buffer, std::string,
+      std::shared_ptr<const Strings>, std::shared_ptr<const Dictionary>,
+      std::shared_ptr<const ListOp<std::string>>, std::shared_ptr<const ListOp<std::int64_t>>,
+      std::shared_ptr<const ListOp<Reference>>, std::shared_ptr<const StringPairs>,
+      std::shared_ptr<const TimeSamples>, std::shared_ptr<const Reference>,
+      std::shared_ptr<const std::vector<double>>, std::shared_ptr<const std::vector<LayerOffset>>>;
 
   Value() = default;
   Value(Type type, Payload payload) : type_(type), payload_(std::move(payload)) {}

@@ -136,8 +136,7 @@ Term Evaluator::term() {
     --nesting_;
     return {number};
   }
-  const std::string_view word =
-      text_.substr(at_, path::identifier_length(text_.substr(at_)));
+  const std::string_view word = text_.substr(at_, path::identifier_length(text_.substr(at_)));
   if (word.empty()) throw Failure{};
   at_ += word.size();
   Term result;
@@ -250,11 +249,9 @@ bool is_expression(std::string_view text) {
   return text.size() >= 2 && text.front() == '`' && text.back() == '`';
 }
 
-std::optional<std::string> evaluate_expression(std::string_view text,
-                                               const Dictionary& variables) {
+std::optional<std::string> evaluate_expression(std::string_view text, const Dictionary& variables) {
   try {
-    const Term result =
-        Evaluator(text.substr(1, text.size() - 2), variables, 0).evaluate();
+    const Term result = Evaluator(text.substr(1, text.size() - 2), variables, 0).evaluate();
     if (std::holds_alternative<std::monostate>(result.value)) return std::string();
     if (const auto* value = std::get_if<std::string>(&result.value)) return *value;
   } catch (const Failure&) {

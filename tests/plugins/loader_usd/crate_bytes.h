@@ -8,8 +8,8 @@
 
 namespace diorama::usd::test {
 
-/// Bytes of a small crate file of version 0.1.0, whose sections are not compressed: a layer with the
-/// prim /Box of type Mesh and its attribute `points` of two points.
+/// Bytes of a small crate file of version 0.1.0, whose sections are not compressed: a layer with
+/// the prim /Box of type Mesh and its attribute `points` of two points.
 class CrateBytes {
  public:
   template <class T>
@@ -68,9 +68,9 @@ class CrateBytes {
     };
     const std::uint64_t inlined = std::uint64_t{1} << 62;
     places.first_field = crate.size();
-    field(0, inlined | (std::uint64_t{42} << 48));                        // specifier: def
-    field(1, inlined | (std::uint64_t{11} << 48) | 2);                    // typeName: Mesh
-    field(1, inlined | (std::uint64_t{11} << 48) | 4);                    // typeName: point3f[]
+    field(0, inlined | (std::uint64_t{42} << 48));                            // specifier: def
+    field(1, inlined | (std::uint64_t{11} << 48) | 2);                        // typeName: Mesh
+    field(1, inlined | (std::uint64_t{11} << 48) | 4);                        // typeName: point3f[]
     field(3, (std::uint64_t{1} << 63) | (std::uint64_t{24} << 48) | points);  // default
     begin("FIELDSETS");
     crate.add<std::uint64_t>(7);

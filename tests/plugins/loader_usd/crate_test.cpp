@@ -52,8 +52,10 @@ TEST_CASE("a crate that lies about its sizes is refused at the place of the lie"
 
   CrateBytes crate = sound;
   crate.patch<std::uint64_t>(places.token_count, 0xFFFFFFFFFFFFull);
-  CHECK(error_of(crate) == "test.usdc: 281474976710655 tokens do not fit into 53 bytes at byte "
-                           "offset " + std::to_string(places.token_count));
+  CHECK(error_of(crate) ==
+        "test.usdc: 281474976710655 tokens do not fit into 53 bytes at byte "
+        "offset " +
+            std::to_string(places.token_count));
   crate = sound;
   crate.patch<std::uint32_t>(places.point_count, 0xFFFFFFFFu);
   CHECK(error_of(crate).starts_with(

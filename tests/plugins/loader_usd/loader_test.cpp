@@ -30,9 +30,7 @@ struct Loaded {
     root = scene.create(scene.root(), "asset");
     UsdLoader(params, host).load(file, scene, root);
   }
-  const Node& node(const std::string& path) {
-    return scene[scene.require("/asset/" + path)];
-  }
+  const Node& node(const std::string& path) { return scene[scene.require("/asset/" + path)]; }
 };
 
 }  // namespace
@@ -152,8 +150,8 @@ def Material "Blue"
   // The point (1, 0, 0) has two places in the texture, (1, 1, 0) too.
   CHECK(mesh.positions.size() == 8);
   for (const auto& [a, b, c] : mesh.triangles) {
-    const Vec3f normal = (mesh.positions[b] - mesh.positions[a])
-                             .cross(mesh.positions[c] - mesh.positions[a]);
+    const Vec3f normal =
+        (mesh.positions[b] - mesh.positions[a]).cross(mesh.positions[c] - mesh.positions[a]);
     CHECK(normal.z() < 0.0f);
   }
   REQUIRE(node.materials.size() == 2);
@@ -336,12 +334,14 @@ TEST_CASE("a broken file is an asset error that begins with its name", "[loader_
   const TemporaryFolder folder;
   const std::string file = folder.write("a.usda", "#usda 1.0\ndef \"A\" {\n");
   CHECK_THROWS_AS(Loaded(file), Error);
-  CHECK_THROWS_WITH(Loaded(file), file + ":3:1: expected \"}\" after the contents of a prim, "
-                                         "found the end of the file");
+  CHECK_THROWS_WITH(Loaded(file), file +
+                                      ":3:1: expected \"}\" after the contents of a prim, "
+                                      "found the end of the file");
   const std::string empty = folder.write("b.usdc", "");
   CHECK_THROWS_WITH(Loaded(empty),
-                    empty + ": this is neither a crate, nor a package, nor a text layer at byte "
-                            "offset 0");
+                    empty +
+                        ": this is neither a crate, nor a package, nor a text layer at byte "
+                        "offset 0");
 }
 
 }  // namespace diorama::loader_usd

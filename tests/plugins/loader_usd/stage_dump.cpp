@@ -74,8 +74,7 @@ class StageDump {
     if (!prim.type_name.empty()) out["type"] = prim.type_name;
     const Value kind = stage_.metadata(prim, "kind");
     if (kind.as_text() && !kind.as_text()->empty()) out["kind"] = *kind.as_text();
-    const Strings schemas =
-        api_schemas(prim.type_name, stage_.metadata_list(prim, "apiSchemas"));
+    const Strings schemas = api_schemas(prim.type_name, stage_.metadata_list(prim, "apiSchemas"));
     if (!schemas.empty()) out["apiSchemas"] = schemas;
     if (prim.is_instance) out["instance"] = true;
     if (prim.is_instance_proxy) out["instanceProxy"] = true;
@@ -89,7 +88,8 @@ class StageDump {
       out["localToWorld"] = geometry_.world_from_prim(prim).m;
     }
     if (prim.type_name == "Mesh") dump_mesh(prim, out);
-    if (prim.traits.is_boundable && !prim.traits.is_light && prim.type_name != "Mesh") dump_extent(prim, out);
+    if (prim.traits.is_boundable && !prim.traits.is_light && prim.type_name != "Mesh")
+      dump_extent(prim, out);
     if (prim.type_name == "PointInstancer") dump_instancer(prim, out);
     if (prim.type_name == "GeomSubset") out["indices"] = count(prim, "indices", Type::Int);
     if (prim.traits.is_gprim) dump_primvars(prim, out);
@@ -131,8 +131,7 @@ class StageDump {
     if (const auto list = numbers<float>(stage_.value(prim, "points"), 3); list && points > 0) {
       const Matrix& world = geometry_.world_from_prim(prim);
       for (std::size_t i = 0; i + 2 < list->span.size(); i += 3) {
-        box.add(transform(world,
-                          Vector3{list->span[i], list->span[i + 1], list->span[i + 2]}));
+        box.add(transform(world, Vector3{list->span[i], list->span[i + 1], list->span[i + 2]}));
       }
     }
     if (!box.is_empty()) out["worldBounds"] = to_json(box);
@@ -149,10 +148,11 @@ class StageDump {
 
   void dump_extent(const Prim& prim, json& out) {
     const std::string purpose = geometry_.purpose(prim);
-    const bool is_bounded = purpose == "default" || purpose == "render" || purpose == "proxy" ||
-                            purpose == "guide";
+    const bool is_bounded =
+        purpose == "default" || purpose == "render" || purpose == "proxy" || purpose == "guide";
     const auto extent = local_extent(stage_, prim);
-    if (extent && is_bounded) out["worldBounds"] = to_json(transform(geometry_.world_from_prim(prim), *extent));
+    if (extent && is_bounded)
+      out["worldBounds"] = to_json(transform(geometry_.world_from_prim(prim), *extent));
   }
 
   void dump_instancer(const Prim& prim, json& out) {

@@ -7,8 +7,8 @@
 
 namespace diorama::usd::test {
 
-/// What our reader says about a stage, in the form of the shared expected values. A file that cannot
-/// be opened gives {"opens": false, "error": ...}.
+/// What our reader says about a stage, in the form of the shared expected values. A file that
+/// cannot be opened gives {"opens": false, "error": ...}.
 nlohmann::json dump_stage(const std::string& file);
 
 /// Differences between our dump and the expected one, the first few of them; empty when equal.

@@ -120,8 +120,7 @@ TEST_CASE("a text error says file, line and column", "[usda]") {
         "test.usda:4:15: expected a number for float");
   CHECK(error_of("def \"A\" { }\ndef \"A\" { }\n") ==
         "test.usda:3:8: there is a prim \"A\" already");
-  CHECK(error_of("def \"A\" { float x = 1 }\n") ==
-        "test.usda:2:23: expected the end of the line");
+  CHECK(error_of("def \"A\" { float x = 1 }\n") == "test.usda:2:23: expected the end of the line");
   CHECK(error_of("def \"A\"\n{\n    string s = \"open\n}\n") ==
         "test.usda:4:16: the string is not closed");
   CHECK(error_of("def \"A\"\n{\n    uchar x = 256\n}\n") ==

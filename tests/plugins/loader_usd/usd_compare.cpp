@@ -18,8 +18,7 @@ int main(int count, char** arguments) {
     return 0;
   }
   std::ifstream file(arguments[2]);
-  const auto differences =
-      diorama::usd::test::compare_dumps(ours, nlohmann::json::parse(file));
+  const auto differences = diorama::usd::test::compare_dumps(ours, nlohmann::json::parse(file));
   for (const std::string& difference : differences) std::cout << difference << '\n';
   return differences.empty() ? 0 : 1;
 }
