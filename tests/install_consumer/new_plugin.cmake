@@ -13,8 +13,8 @@ foreach(file CMakeLists.txt README.md LICENSE .gitignore job.yaml src/my_${KIND}
 endforeach()
 build_and_list(${project} ${project}_build my_${KIND})
 
-# The job checks: its keys and the plugin's parameters are right.
-run(${DIORAMA} --plugin-dir ${project}_build/plugins config ${project}/job.yaml)
+# The job is a good one: its keys, and those of the plugin.
+run(${DIORAMA} --plugin-dir ${project}_build/plugins run --dry-run ${project}/job.yaml)
 
 run_refused("expected a new or empty folder" ${DIORAMA} new-plugin ${KIND} again --dir ${project})
 run_refused("there is no kind '${KIND}x', did you mean '${KIND}'?" ${DIORAMA} new-plugin ${KIND}x a)
