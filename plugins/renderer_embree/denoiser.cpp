@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "sampling.h"
@@ -33,7 +34,11 @@ struct Incoming {
   Vec3f irradiance = Vec3f::Zero();
   float luminance = 0.0f;
   float variance = 0.0f;
+  float support = 1.0f;  ///< Share of the neighbours that agreed in the first round.
 };
+
+/// Below this share of agreeing neighbours a pixel was hardly averaged: edges, thin things.
+constexpr float kLonely = 0.25f;
 
 struct Grid {
   int width;
@@ -120,6 +125,7 @@ Incoming filtered(const Grid& grid, const std::vector<Guide>& guides,
   Vec3f sum = Vec3f::Zero();
   float variance = 0.0f;
   float weights = 0.0f;
+  float others = 0.0f;
   for (int dy = -2; dy <= 2; ++dy) {
     const int v = y + dy * step;
     if (v < 0 || v >= grid.height) continue;
@@ -135,13 +141,43 @@ Incoming filtered(const Grid& grid, const std::vector<Guide>& guides,
       sum += w * lights[j].irradiance;
       variance += w * w * lights[j].variance;
       weights += w;
+      if (j != i) others += w;
     }
   }
   Incoming result;
+  constexpr float kAllOthers = 1.0f - kKernel[2] * kKernel[2];
+  result.support = step == 1 ? others / kAllOthers : own.support;
   result.irradiance = sum / weights;
   result.luminance = luminance(result.irradiance);
   result.variance = variance / (weights * weights);
   return result;
+}
+
+/// Pixels that agree with none of their neighbours, mostly mixtures at edges, keep their noise;
+/// they may at least be no darker and no brighter than what surrounds them.
+void calm_lonely_pixels(const Grid& grid, const std::vector<Guide>& guides,
+                        std::vector<Incoming>& lights, Host& host) {
+  const std::vector<Incoming> before = lights;
+  host.parallel_for(std::size_t(grid.height), [&](std::size_t row) {
+    const int y = int(row);
+    for (int x = 0; x < grid.width; ++x) {
+      const std::size_t i = grid.at(x, y);
+      if (!guides[i].has_surface || before[i].support >= kLonely) continue;
+      float low = std::numeric_limits<float>::infinity();
+      float high = 0.0f;
+      for (int v = std::max(0, y - 2); v <= std::min(grid.height - 1, y + 2); ++v) {
+        for (int u = std::max(0, x - 2); u <= std::min(grid.width - 1, x + 2); ++u) {
+          const Incoming& other = before[grid.at(u, v)];
+          if (!guides[grid.at(u, v)].has_surface || other.support < kLonely) continue;
+          low = std::min(low, other.luminance);
+          high = std::max(high, other.luminance);
+        }
+      }
+      if (low > high || !(before[i].luminance > 0.0f)) continue;
+      const float calm = std::clamp(before[i].luminance, low, high);
+      lights[i].irradiance = before[i].irradiance * (calm / before[i].luminance);
+    }
+  });
 }
 
 }  // namespace
@@ -187,6 +223,7 @@ Image<Vec3f> denoised(const Film& film, const Vec3f& view_position, Host& host) 
     });
     std::swap(lights, next);
   }
+  calm_lonely_pixels(grid, guides, lights, host);
   Image<Vec3f> image(film.width(), film.height(), Vec3f::Zero());
   for (std::size_t i = 0; i < count; ++i) {
     image.pixels()[i] = film.pixels()[i].seen + lights[i].irradiance.cwiseProduct(colors[i]);

@@ -203,10 +203,16 @@ bool PathTracer::pass_or_reflect(Path& path, const SurfaceGeometry& surface,
   }
   const float cosine = std::max(1e-4f, -surface.normal.dot(path.direction));
   const float once = fresnel_dielectric(cosine, std::max(1.0001f, m.ior));
-  if (u.y() >= 2.0f * once / (1.0f + once)) {
-    path.throughput = path.throughput.cwiseProduct(bsdf.base);
+  const float reflected = 2.0f * once / (1.0f + once);
+  // Seen directly, both ways get a fair number of samples: a reflection on a dark pane is faint
+  // but plain to see.
+  const float chance = path.has_scattered ? reflected : std::clamp(reflected, 0.3f, 0.7f);
+  if (u.y() >= chance) {
+    path.throughput =
+        path.throughput.cwiseProduct(bsdf.base) * ((1.0f - reflected) / (1.0f - chance));
     return pass();
   }
+  path.throughput *= reflected / chance;
   const Vec3f mirrored = path.direction + 2.0f * cosine * surface.normal;
   path.is_over = surface.flat_normal.dot(mirrored) <= 0.0f;
   path.go(leave(surface, mirrored), mirrored.normalized());

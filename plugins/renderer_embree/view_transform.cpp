@@ -11,6 +11,9 @@
 namespace diorama {
 namespace {
 
+/// A curve per channel pulls colours apart; this much of the grey goes back in before.
+constexpr float kFilmicGrey = 0.15f;
+
 /// Narkowicz, "ACES filmic tone mapping curve", 2015.
 float filmic(float x) {
   return std::clamp(x * (2.51f * x + 0.03f) / (x * (2.43f * x + 0.59f) + 0.14f), 0.0f, 1.0f);
@@ -57,9 +60,12 @@ Image<Rgba8> displayed(const Image<Vec3f>& hdr, double exposure, ViewTransform t
   const ByteTable bytes;
   Image<Rgba8> image(hdr.width(), hdr.height(), Rgba8{0, 0, 0, 255});
   for (std::size_t i = 0; i < hdr.pixels().size(); ++i) {
+    const Vec3f exposed = hdr.pixels()[i] * float(exposure);
+    const float grey = kFilmicGrey * luminance(exposed);
     for (std::size_t k = 0; k < 3; ++k) {
-      const float value = hdr.pixels()[i][Eigen::Index(k)] * float(exposure);
-      image.pixels()[i][k] = bytes(transform == ViewTransform::Filmic ? filmic(value) : value);
+      const float value = exposed[Eigen::Index(k)];
+      const bool is_filmic = transform == ViewTransform::Filmic;
+      image.pixels()[i][k] = bytes(is_filmic ? filmic(grey + (1.0f - kFilmicGrey) * value) : value);
     }
   }
   return image;
