@@ -152,12 +152,15 @@ DescribeComponent describe_from(Registry& registry) {
 }
 
 OutputFolders output_folders(const Job& job) {
-  const fs::path folder = job.output.folder;
+  const auto below = [&](const std::string& name) {
+    // "out/." would end in a slash.
+    fs::path place = (fs::path(job.output.folder) / name).lexically_normal();
+    return place.has_filename() ? place : place.parent_path();
+  };
   OutputFolders folders;
-  folders.records = (folder / job.output.records).lexically_normal();
+  folders.records = below(job.output.records);
   for (const WriterEntry& writer : job.writers) {
-    const fs::path place = folder / writer.output_dir.value_or(writer.name);
-    folders.writers.push_back({writer.name, place.lexically_normal()});
+    folders.writers.push_back({writer.name, below(writer.output_dir.value_or(writer.name))});
   }
   return folders;
 }
@@ -184,8 +187,7 @@ JobAssembly assemble_job(const Value& value, Registry& registry, Host& host,
   }
   assembly.dataset = describe_dataset(assembly.job, assembly.plan, portable_job(assembly.resolved),
                                       program_version, assembler.plugins());
-  assembly.dataset_json =
-      dataset_json(assembly.dataset, assembly.job, assembly.plan, assets_root);
+  assembly.dataset_json = dataset_json(assembly.dataset, assembly.job, assembly.plan, assets_root);
   return assembly;
 }
 

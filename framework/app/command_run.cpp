@@ -25,7 +25,8 @@ constexpr int kInterrupted = 130;
 std::atomic<bool> stop_requested = false;
 static_assert(std::atomic<bool>::is_always_lock_free);
 
-/// While it lives, the first Ctrl-C (or SIGTERM) asks the run to end, the second one ends the program.
+/// While it lives, the first Ctrl-C (or SIGTERM) asks the run to end, the second one ends the
+/// program.
 class StopOnSignal {
  public:
   StopOnSignal() {

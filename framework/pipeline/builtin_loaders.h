@@ -29,8 +29,8 @@ class FilesLoader final : public Loader {
   Host& host_;
 };
 
-/// Makes "shape:cube" and its like: primitives of USD's default sizes (a cube of edge 2 m, a sphere of
-/// radius 1 m), meant to be scaled, with exact colliders.
+/// Makes "shape:cube" and its like: primitives of USD's default sizes (a cube of edge 2 m, a sphere
+/// of radius 1 m), meant to be scaled, with exact colliders.
 class ShapesLoader final : public Loader {
  public:
   struct Params {

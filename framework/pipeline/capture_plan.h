@@ -52,8 +52,8 @@ struct CapturePlan {
   int capture_count() const;
 };
 
-/// `environments` is not empty. `object_assets` holds, per group of the job, what to pick from. Throws
-/// Error(Config) when a group wants objects and has nothing to pick from.
+/// `environments` is not empty. `object_assets` holds, per group of the job, what to pick from.
+/// Throws Error(Config) when a group wants objects and has nothing to pick from.
 CapturePlan plan_captures(const Job& job, std::vector<EnvironmentChoice> environments,
                           const std::vector<std::vector<std::string>>& object_assets);
 
@@ -63,14 +63,15 @@ std::vector<PlannedVisit> shard_of(const CapturePlan& plan, int shard, int shard
 /// "banana" of "/a/011_banana.usd" and of "sample:banana".
 std::string asset_stem(std::string_view asset);
 
-/// The random streams of a job. Each depends on the seed and on what it is for, and on nothing else.
+/// The random streams of a job. Each depends on the seed and on what it is for, and on nothing
+/// else.
 class JobStreams {
  public:
   explicit JobStreams(std::uint64_t seed) : root_(seed) {}
 
   Rng object(std::string_view group, int number) const;
-  /// `occurrence` tells calls at the same moment of one visit apart: the capture's index, or a running
-  /// number for events.
+  /// `occurrence` tells calls at the same moment of one visit apart: the capture's index, or a
+  /// running number for events.
   Rng randomizer(std::string_view name, int visit, std::string_view moment, int occurrence) const;
   std::uint64_t render_seed(int capture, std::string_view camera) const;
 

@@ -91,11 +91,15 @@ std::string timeline_text(const Job& job) {
   for (const TimelineStep& step : job.timeline) {
     text += text.empty() ? "" : " -> ";
     switch (step.kind) {
-      case TimelineStep::Kind::Simulate: text += "simulate " + std::to_string(step.steps); break;
+      case TimelineStep::Kind::Simulate:
+        text += "simulate " + std::to_string(step.steps);
+        break;
       case TimelineStep::Kind::Capture:
         text += "capture " + step.name + " x " + std::to_string(step.count);
         break;
-      case TimelineStep::Kind::Event: text += "event " + step.name; break;
+      case TimelineStep::Kind::Event:
+        text += "event " + step.name;
+        break;
     }
   }
   return text;
@@ -124,9 +128,8 @@ void add_objects(std::string& text, const CapturePlan& plan, const Job& job,
                  const std::optional<fs::path>& assets_root) {
   text += "objects (" + std::to_string(plan.objects.size()) + ")\n";
   for (std::size_t group = 0; group < job.objects.size(); ++group) {
-    const auto floating = std::count_if(plan.objects.begin(), plan.objects.end(), [&](auto& o) {
-      return o.group == group && o.floats;
-    });
+    const auto floating = std::count_if(plan.objects.begin(), plan.objects.end(),
+                                        [&](auto& o) { return o.group == group && o.floats; });
     text += "  " + job.objects[group].name + ": " + std::to_string(job.objects[group].count) +
             " below " + job.objects[group].under + ", " + std::to_string(floating) + " floating\n";
     for (const PlannedObject& object : plan.objects) {
@@ -240,10 +243,10 @@ std::string asset_name(std::string_view asset, const std::optional<fs::path>& as
 std::string plan_text(const CapturePlan& plan, const Job& job,
                       const std::optional<fs::path>& assets_root) {
   const std::size_t cameras = job.camera_names().size();
-  std::string text = std::to_string(plan.capture_count()) + " captures x " +
-                     std::to_string(cameras) + " cameras = " +
-                     std::to_string(std::size_t(plan.capture_count()) * cameras) + " frames, seed " +
-                     std::to_string(job.seed) + (job.debug ? ", debug" : "") + "\n";
+  std::string text =
+      std::to_string(plan.capture_count()) + " captures x " + std::to_string(cameras) +
+      " cameras = " + std::to_string(std::size_t(plan.capture_count()) * cameras) +
+      " frames, seed " + std::to_string(job.seed) + (job.debug ? ", debug" : "") + "\n";
   text += "timeline: " + timeline_text(job) + "\n";
   text += "environments (" + std::to_string(plan.environments.size()) + ")\n";
   for (const EnvironmentChoice& choice : plan.environments) {
@@ -254,8 +257,8 @@ std::string plan_text(const CapturePlan& plan, const Job& job,
   add_lights(text, job);
   add_cameras(text, job);
   add_randomizers(text, job);
-  text += "renderer " + job.renderer.type + ": " + parameters_text(job.renderer.map, {"type"}) +
-          "\n";
+  text +=
+      "renderer " + job.renderer.type + ": " + parameters_text(job.renderer.map, {"type"}) + "\n";
   text += "physics " + job.physics.type + ": " + parameters_text(job.physics.map, {"type"}) + "\n";
   add_writers(text, job);
   return text;

@@ -19,9 +19,9 @@ DatasetInfo describe_dataset(const Job& job, const CapturePlan& plan, std::strin
                              std::string program_version,
                              std::vector<std::pair<std::string, std::string>> plugin_versions);
 
-/// The text of dataset.json: conventions, seed, resolved job, plugin versions, and a hash of the file
-/// of every asset that the job uses. Holds nothing that depends on the machine or the time: same job,
-/// same text. Throws Error(Asset) when an asset cannot be read.
+/// The text of dataset.json: conventions, seed, resolved job, plugin versions, and a hash of the
+/// file of every asset that the job uses. Holds nothing that depends on the machine or the time:
+/// same job, same text. Throws Error(Asset) when an asset cannot be read.
 std::string dataset_json(const DatasetInfo& info, const Job& job, const CapturePlan& plan,
                          const std::optional<std::filesystem::path>& assets_root);
 
@@ -29,9 +29,9 @@ std::string dataset_json(const DatasetInfo& info, const Job& job, const CaptureP
 std::string asset_name(std::string_view asset,
                        const std::optional<std::filesystem::path>& assets_root);
 
-/// The plan for people: captures, environments, spawned objects with labels and gravity, randomizers
-/// with their ranges, cameras, writers, parameters as the job gives them. Stable, so that tests can
-/// pin it.
+/// The plan for people: captures, environments, spawned objects with labels and gravity,
+/// randomizers with their ranges, cameras, writers, parameters as the job gives them. Stable, so
+/// that tests can pin it.
 std::string plan_text(const CapturePlan& plan, const Job& job,
                       const std::optional<std::filesystem::path>& assets_root);
 

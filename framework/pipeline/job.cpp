@@ -18,17 +18,17 @@ using detail::EntryHead;
 using detail::JobHead;
 using detail::StepKeys;
 
-constexpr const char* kColliderWords[] = {"none",         "triangle_mesh",   "convex_hull",
-                                          "bounding_box", "bounding_sphere"};
+constexpr const char* kColliderWords[] = {"none", "triangle_mesh", "convex_hull", "bounding_box",
+                                          "bounding_sphere"};
 constexpr const char* kEnvironmentColliderWords[] = {"none", "triangle_mesh", "convex_hull",
                                                      "bounding_box"};
 constexpr const char* kLightWords[] = {"sphere", "rect", "disk", "distant", "dome"};
 constexpr const char* kCameraWords[] = {"pinhole", "opencv_pinhole", "fisheye_polynomial"};
 
-const std::vector<std::string> kSections{
-    "seed",    "assets_root", "debug",       "total_captures", "environments",
-    "environment", "objects", "lights",      "cameras",        "randomizers",
-    "physics", "renderer",    "timeline",    "writers",        "output"};
+const std::vector<std::string> kSections{"seed",         "assets_root", "debug",   "total_captures",
+                                         "environments", "environment", "objects", "lights",
+                                         "cameras",      "randomizers", "physics", "renderer",
+                                         "timeline",     "writers",     "output"};
 
 std::string item_path(std::string_view section, std::size_t index) {
   return std::string(section) + "[" + std::to_string(index) + "]";
@@ -102,9 +102,9 @@ void require_unique(const std::vector<Entry>& list, std::string_view section, Na
   for (std::size_t i = 0; i < list.size(); ++i) {
     const std::string& name = name_of(list[i]);
     if (name.empty() || seen.insert(name).second) continue;
-    complaints.add(place_of(map_of(list[i]), "name"),
-                   item_path(section, i) + ": another entry is called \"" + name +
-                       "\"; give this one a `name` of its own");
+    complaints.add(place_of(map_of(list[i]), "name"), item_path(section, i) +
+                                                          ": another entry is called \"" + name +
+                                                          "\"; give this one a `name` of its own");
   }
 }
 
@@ -233,16 +233,17 @@ std::string quoted_list(const std::vector<std::string>& names) {
 void check_moments(const RandomizerEntry& entry, const std::vector<std::string>& moments,
                    const Value& map, const std::string& path, Complaints& complaints) {
   if (entry.on.empty()) {
-    complaints.add(place_of(map, "on"),
-                   path + ".on: no moment named, so it would never act; one of: " +
-                       quoted_list(moments));
+    complaints.add(
+        place_of(map, "on"),
+        path + ".on: no moment named, so it would never act; one of: " + quoted_list(moments));
   }
   for (const std::string& moment : entry.on) {
     if (std::find(moments.begin(), moments.end(), moment) != moments.end()) continue;
     const std::string near = nearest_name(moment, moments);
-    complaints.add(place_of(map, "on"), path + ".on: unknown moment \"" + moment + "\"" +
-                                            (near.empty() ? "" : "; did you mean \"" + near + "\"?") +
-                                            " (known: " + quoted_list(moments) + ")");
+    complaints.add(place_of(map, "on"),
+                   path + ".on: unknown moment \"" + moment + "\"" +
+                       (near.empty() ? "" : "; did you mean \"" + near + "\"?") +
+                       " (known: " + quoted_list(moments) + ")");
   }
 }
 
@@ -284,8 +285,9 @@ void read_writers(const Value& value, Job& job, Complaints& complaints) {
 }
 
 ComponentConfig read_engine(const Value& value, std::string_view section, const char* default_type,
-                           Complaints& complaints) {
-  ComponentConfig entry{default_type, std::string(section), Value::make_map(), std::string(section)};
+                            Complaints& complaints) {
+  ComponentConfig entry{default_type, std::string(section), Value::make_map(),
+                        std::string(section)};
   entry.map.set("type", Value::text(default_type));
   const Value* map = value.find(section);
   if (!map || map->kind == Value::Kind::Null) return entry;
@@ -309,9 +311,11 @@ std::optional<TimelineStep> read_step(const Value& map, const std::string& path,
   read_all_keys(map, path, keys, complaints);
   if (complaints.messages().size() != before) return std::nullopt;
   if (int(keys.simulate.has_value()) + int(keys.capture.has_value()) +
-          int(keys.event.has_value()) != 1) {
-    complaints.add(map.place, path + ": expected one of `simulate: STEPS`, `capture: NAME` (with "
-                                     "`count`) and `event: NAME`");
+          int(keys.event.has_value()) !=
+      1) {
+    complaints.add(map.place, path +
+                                  ": expected one of `simulate: STEPS`, `capture: NAME` (with "
+                                  "`count`) and `event: NAME`");
     return std::nullopt;
   }
   if (keys.simulate && *keys.simulate != std::floor(*keys.simulate)) {
@@ -342,9 +346,11 @@ void read_timeline(const Value& value, Job& job, Complaints& complaints) {
   int captures_per_visit = 0;
   for (const TimelineStep& step : job.timeline) captures_per_visit += step.count;
   if (captures_per_visit == 0 && job.total_captures > 0) {
-    complaints.add(list->place, "timeline: the capture series have no captures in all, so "
-                                "total_captures: " + std::to_string(job.total_captures) +
-                                    " can never be reached; give a series a `count` above 0");
+    complaints.add(list->place,
+                   "timeline: the capture series have no captures in all, so "
+                   "total_captures: " +
+                       std::to_string(job.total_captures) +
+                       " can never be reached; give a series a `count` above 0");
   }
 }
 
@@ -541,14 +547,27 @@ std::string node_name(std::string_view text) {
 
 std::vector<std::string_view> host_keys(ComponentKind kind, std::string_view section) {
   if (section == "objects") {
-    return {"type",     "name",    "under",   "count", "label", "label_pattern", "label_replacement",
-            "taxonomy", "gravity_disabled_chance", "collider", "mass_kg"};
+    return {"type",
+            "name",
+            "under",
+            "count",
+            "label",
+            "label_pattern",
+            "label_replacement",
+            "taxonomy",
+            "gravity_disabled_chance",
+            "collider",
+            "mass_kg"};
   }
   switch (kind) {
-    case ComponentKind::Loader: return {"type", "name"};
-    case ComponentKind::Randomizer: return {"type", "name", "on", "every"};
-    case ComponentKind::Writer: return {"type", "name", "output_dir"};
-    default: return {"type"};
+    case ComponentKind::Loader:
+      return {"type", "name"};
+    case ComponentKind::Randomizer:
+      return {"type", "name", "on", "every"};
+    case ComponentKind::Writer:
+      return {"type", "name", "output_dir"};
+    default:
+      return {"type"};
   }
 }
 

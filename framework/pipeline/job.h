@@ -156,8 +156,8 @@ struct Job {
 inline constexpr const char* kDefaultPhysics = "bullet";
 inline constexpr const char* kDefaultRenderer = "embree";
 
-/// What a visit does when the job says nothing: 4 steps that resolve overlaps, floating captures, 200
-/// steps to fall, dropped captures.
+/// What a visit does when the job says nothing: 4 steps that resolve overlaps, floating captures,
+/// 200 steps to fall, dropped captures.
 std::vector<TimelineStep> default_timeline();
 
 /// Reads a native job. All complaints are collected; the result is of use only when there are none.
@@ -170,8 +170,8 @@ std::string node_name(std::string_view text);
 using DescribeComponent =
     std::function<std::optional<std::vector<ParamSpec>>(ComponentKind kind, std::string_view type)>;
 
-/// The job with every default written out, in the order of the reference: reading it again gives the
-/// same job.
+/// The job with every default written out, in the order of the reference: reading it again gives
+/// the same job.
 Value resolved_job(const Value& job, const DescribeComponent& describe);
 
 /// Keys that the host reads from an entry of a list ("type", "name" ...), by the kind of component

@@ -140,8 +140,8 @@ Value resolved_job(const Value& job, const DescribeComponent& describe) {
   using Kind = ComponentKind;
   const auto heads = specs_of<detail::EntryHead>();
   result.set("environments", components(job, "environments", Kind::Loader, heads, describe));
-  result.set("environment", with_defaults(section_or_empty(job, "environment"),
-                                          specs_of<EnvironmentRules>()));
+  result.set("environment",
+             with_defaults(section_or_empty(job, "environment"), specs_of<EnvironmentRules>()));
   result.set("objects",
              components(job, "objects", Kind::Loader, specs_of<ObjectGroup>(), describe));
   result.set("lights", groups<LightGroup>(job, "lights", nullptr));
@@ -156,8 +156,7 @@ Value resolved_job(const Value& job, const DescribeComponent& describe) {
   result.set("timeline", timeline(job));
   result.set("writers",
              components(job, "writers", Kind::Writer, specs_of<WriterEntry>(), describe));
-  result.set("output",
-             with_defaults(section_or_empty(job, "output"), specs_of<OutputSection>()));
+  result.set("output", with_defaults(section_or_empty(job, "output"), specs_of<OutputSection>()));
   return result;
 }
 
@@ -165,8 +164,8 @@ std::vector<ParamSpec> job_specs() {
   std::vector<ParamSpec> specs = specs_of<detail::JobHead>();
   const auto head = specs_of<detail::EntryHead>();
   const auto engine = specs_of<detail::EngineHead>();
-  specs.push_back(section("environments", ParamType::List,
-                          "Loaders whose assets are visited in turn.", head));
+  specs.push_back(
+      section("environments", ParamType::List, "Loaders whose assets are visited in turn.", head));
   specs.push_back(section("environment", ParamType::Group, "Rules for what was loaded.",
                           specs_of<EnvironmentRules>()));
   specs.push_back(section("objects", ParamType::List, "What is spawned in every visit.",
@@ -179,10 +178,9 @@ std::vector<ParamSpec> job_specs() {
   specs.push_back(section("renderer", ParamType::Group, "The renderer.", engine));
   specs.push_back(section("timeline", ParamType::List, "What happens in a visit, in order.",
                           specs_of<detail::StepKeys>()));
+  specs.push_back(section("writers", ParamType::List, "What is written.", specs_of<WriterEntry>()));
   specs.push_back(
-      section("writers", ParamType::List, "What is written.", specs_of<WriterEntry>()));
-  specs.push_back(section("output", ParamType::Group, "Where it is written.",
-                          specs_of<OutputSection>()));
+      section("output", ParamType::Group, "Where it is written.", specs_of<OutputSection>()));
   return specs;
 }
 

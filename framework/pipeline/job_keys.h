@@ -39,9 +39,9 @@ struct JobHead {
     v.param("debug", debug,
             {"Also hides environment.hide_in_debug and writes one overview picture per "
              "environment."});
-    v.param("total_captures", total_captures,
-            {"Captures in the whole job; environments are cycled until that many exist.", "", 0,
-             1e8});
+    v.param(
+        "total_captures", total_captures,
+        {"Captures in the whole job; environments are cycled until that many exist.", "", 0, 1e8});
   }
 };
 

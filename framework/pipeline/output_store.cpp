@@ -55,7 +55,8 @@ CollectedFiles::CollectedFiles(Transaction& transaction, std::size_t folder, std
 
 void CollectedFiles::add(std::string_view path, std::vector<std::byte> bytes) {
   if (!is_plain_relative(path)) {
-    throw Error(ErrorKind::Plugin, "writer '" + writer_ + "': expected a relative path without `..`, found \"" +
+    throw Error(ErrorKind::Plugin, "writer '" + writer_ +
+                                       "': expected a relative path without `..`, found \"" +
                                        std::string(path) + "\"");
   }
   transaction_.files.push_back({folder_, std::string(path), std::move(bytes)});
@@ -113,7 +114,8 @@ void OutputStore::check_same_dataset(const std::string& dataset_json) const {
   if (!file_system_.exists(file)) return;
   const std::string before = file_system_.read(file);
   if (before == dataset_json) return;
-  throw Error(ErrorKind::Output, file.string() + ": belongs to another job or version (differs in: " +
+  throw Error(ErrorKind::Output, file.string() +
+                                     ": belongs to another job or version (differs in: " +
                                      keys_that_differ(before, dataset_json) +
                                      "); resume with the same job, choose another --output or use "
                                      "--overwrite");
@@ -149,8 +151,9 @@ std::vector<std::pair<std::size_t, std::string>> OutputStore::journalled_files(
   std::vector<std::pair<std::size_t, std::string>> files;
   const Json json = Json::parse(file_system_.read(journal_file(entry)), nullptr, false);
   if (!json.is_object() || !json.contains("files")) {
-    throw Error(ErrorKind::Output, journal_file(entry).string() +
-                                       ": damaged journal entry; remove it to make the capture anew");
+    throw Error(ErrorKind::Output,
+                journal_file(entry).string() +
+                    ": damaged journal entry; remove it to make the capture anew");
   }
   for (const Json& file : json["files"]) {
     const std::string writer = file.at(0);
@@ -307,8 +310,8 @@ void OutputStore::read_records(std::size_t writer, const RecordVisitor& visit) c
     const fs::path file = journal_file(capture_entry(capture));
     const Json json = Json::parse(file_system_.read(file), nullptr, false);
     if (!json.is_object() || !json.contains("records")) {
-      throw Error(ErrorKind::Output, file.string() +
-                                         ": damaged journal entry; remove it to make the capture anew");
+      throw Error(ErrorKind::Output,
+                  file.string() + ": damaged journal entry; remove it to make the capture anew");
     }
     const auto record = json["records"].find(name);
     if (record != json["records"].end()) visit(capture, record->get_ref<const std::string&>());

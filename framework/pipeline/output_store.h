@@ -55,9 +55,9 @@ class CollectedFiles final : public CaptureFiles {
 };
 
 /// A dataset on disk. Each capture is a transaction: its files are written to a stage folder beside
-/// their place, then one journal entry makes them count (atomic rename), then they are moved to their
-/// names. What was cut short before the entry leaves no trace but the stage folder; what was cut short
-/// after it is completed by the next open(). So a killed run leaves whole captures only.
+/// their place, then one journal entry makes them count (atomic rename), then they are moved to
+/// their names. What was cut short before the entry leaves no trace but the stage folder; what was
+/// cut short after it is completed by the next open(). So a killed run leaves whole captures only.
 ///
 /// Layout: `<records>/dataset.json`, `<records>/.diorama/journal/000012.json`, and
 /// `<folder>/.diorama-stage` while a run goes on.
@@ -68,9 +68,9 @@ class OutputStore {
 
   enum class Existing : std::uint8_t { Refuse, Resume, Overwrite };
 
-  /// Throws Error(Output) when the folders cannot be written; leaves nothing behind. Also throws when
-  /// the folder holds a dataset that `existing` does not allow: for Refuse any, for Resume one whose
-  /// dataset.json differs from `dataset_json`. Reads the journal.
+  /// Throws Error(Output) when the folders cannot be written; leaves nothing behind. Also throws
+  /// when the folder holds a dataset that `existing` does not allow: for Refuse any, for Resume one
+  /// whose dataset.json differs from `dataset_json`. Reads the journal.
   void check(const std::string& dataset_json, Existing existing);
   /// Starts writing: removes the old dataset (Overwrite), completes what a killed run began, and
   /// clears stages of the captures in `own`. After check().

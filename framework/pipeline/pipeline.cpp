@@ -93,9 +93,8 @@ RunSummary Pipeline::run(const DatasetInfo& dataset, const std::string& dataset_
     }
   }
   const int writing_threads = std::clamp(host_.thread_count(), 1, 4);
-  queue_ = std::make_unique<WriterQueue>(
-      writing_threads, options_.queue_bytes,
-      [this](const PendingCapture& pending) { write(pending); });
+  queue_ = std::make_unique<WriterQueue>(writing_threads, options_.queue_bytes,
+                                         [this](const PendingCapture& pending) { write(pending); });
   try {
     for (const PlannedVisit& visit : visits_) {
       if (is_needed(visit)) run_visit(visit);
@@ -137,8 +136,12 @@ void Pipeline::run_visit(const PlannedVisit& planned) {
       continue;
     }
     switch (step.kind) {
-      case TimelineStep::Kind::Simulate: simulate(visit, step.steps); break;
-      case TimelineStep::Kind::Capture: take_captures(visit, step); break;
+      case TimelineStep::Kind::Simulate:
+        simulate(visit, step.steps);
+        break;
+      case TimelineStep::Kind::Capture:
+        take_captures(visit, step);
+        break;
       case TimelineStep::Kind::Event:
         randomize(visit, step.name, visit.events[step.name]++, -1);
         break;
@@ -157,8 +160,8 @@ Pipeline::Visit Pipeline::set_up(const PlannedVisit& planned) {
   visit.planned = &planned;
   visit.environment = load_environment(choice.asset, job_.environments[choice.entry],
                                        *components_.environments[choice.entry], visit.scene, host_);
-  visit.working_area_world = apply_environment_rules(job_.environment, job_.debug,
-                                                     visit.environment, visit.scene, host_);
+  visit.working_area_world =
+      apply_environment_rules(job_.environment, job_.debug, visit.environment, visit.scene, host_);
   visit.objects = spawn_objects(plan_, job_, visit.scene, host_);
   create_lights(job_.lights, visit.scene, host_);
   visit.cameras = create_cameras(job_.cameras, visit.scene);
@@ -181,9 +184,8 @@ void Pipeline::randomize(Visit& visit, const std::string& moment, int number, in
     if (!acts_at(entry, moment, number)) continue;
     const Rng rng = streams_.randomizer(entry.name, visit.planned->index, moment,
                                         capture >= 0 ? capture : number);
-    call_component("randomizer '" + entry.name + "'", [&] {
-      components_.randomizers[i]->randomize(visit.scene, context, rng);
-    });
+    call_component("randomizer '" + entry.name + "'",
+                   [&] { components_.randomizers[i]->randomize(visit.scene, context, rng); });
   }
   // The engine holds the bodies where it left them; where they were moved, it starts anew.
   if (moment == "environment" || body_poses(visit.scene, visit.objects) == before) return;
@@ -197,9 +199,8 @@ void Pipeline::simulate(Visit& visit, int steps) {
   for (int done = 0; done < steps; done += kStepsAtOnce) {
     stop_if_asked();
     for (auto& physics : components_.physics) {
-      call_component("physics '" + job_.physics.type + "'", [&] {
-        physics->advance(visit.scene, std::min(kStepsAtOnce, steps - done));
-      });
+      call_component("physics '" + job_.physics.type + "'",
+                     [&] { physics->advance(visit.scene, std::min(kStepsAtOnce, steps - done)); });
     }
   }
 }
@@ -209,8 +210,8 @@ void Pipeline::take_captures(Visit& visit, const TimelineStep& step) {
     if (visit.next_capture == visit.planned->captures.size()) return;
     const PlannedCapture& planned = visit.planned->captures[visit.next_capture++];
     randomize(visit, planned.phase, planned.number, planned.index);
-    const bool is_done = options_.existing == OutputStore::Existing::Resume &&
-                         store_.is_done(planned.index);
+    const bool is_done =
+        options_.existing == OutputStore::Existing::Resume && store_.is_done(planned.index);
     if (!is_done) take(visit, planned);
   }
 }
@@ -278,9 +279,8 @@ Image<Rgba8> Pipeline::make_overview(Visit& visit, int capture) {
   request.camera = visit.overview;
   request.channels = {std::string(kColor.name)};
   request.seed = streams_.render_seed(capture, "overview");
-  return call_component("renderer '" + job_.renderer.type + "'", [&] {
-    return components_.renderer->render(request).get(kColor);
-  });
+  return call_component("renderer '" + job_.renderer.type + "'",
+                        [&] { return components_.renderer->render(request).get(kColor); });
 }
 
 VisitReport Pipeline::report_on(const Visit& visit) const {
@@ -294,15 +294,16 @@ VisitReport Pipeline::report_on(const Visit& visit) const {
   }
   Aabb room = visit.scene.world_bounds(visit.environment);
   if (room.is_empty()) return report;
-  // Things lie on the outer face of the floor's slab at worst; a scene without a roof is open above.
+  // Things lie on the outer face of the floor's slab at worst; a scene without a roof is open
+  // above.
   constexpr double kMarginM = 0.01;
   room.min.array() -= kMarginM;
   room.max.array() += kMarginM;
   room.max.z() = kInfinity;
   for (const NodeId object : visit.objects) {
     const Vec3 place = visit.scene.world_from_node(object).translation();
-    const bool is_inside = (place.array() >= room.min.array()).all() &&
-                           (place.array() <= room.max.array()).all();
+    const bool is_inside =
+        (place.array() >= room.min.array()).all() && (place.array() <= room.max.array()).all();
     if (!is_inside) report.left_room.push_back(visit.scene.path(object));
     const auto& body = visit.scene[object].rigid_body;
     if (body && body->has_gravity) ++report.falling_objects;

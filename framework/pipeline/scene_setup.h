@@ -14,14 +14,15 @@
 /// The steps that turn an empty scene into the start of a visit. Main thread only.
 namespace diorama {
 
-/// Loads an environment below /Environment. Assets of `loader`'s own schemes are loaded by it with the
-/// job's parameters, files by whoever claims them. Returns the node that stands for the environment.
+/// Loads an environment below /Environment. Assets of `loader`'s own schemes are loaded by it with
+/// the job's parameters, files by whoever claims them. Returns the node that stands for the
+/// environment.
 NodeId load_environment(const std::string& asset, const ComponentConfig& entry, Loader& loader,
                         Scene& scene, Host& host);
 
-/// Hides, adds colliders and finds the working area. A rule whose text matches nothing gives a warning
-/// where the result would surprise (working area, box colliders). Returns the centre of the working
-/// area in the world; the origin when there is none.
+/// Hides, adds colliders and finds the working area. A rule whose text matches nothing gives a
+/// warning where the result would surprise (working area, box colliders). Returns the centre of the
+/// working area in the world; the origin when there is none.
 Vec3 apply_environment_rules(const EnvironmentRules& rules, bool debug, NodeId environment,
                              Scene& scene, Host& host);
 

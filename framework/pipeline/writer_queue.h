@@ -18,9 +18,9 @@ struct PendingCapture {
 /// Memory that a capture's pictures hold, from above.
 std::size_t capture_bytes(const PendingCapture& pending);
 
-/// Hands captures to threads that encode and write them while the next one is rendered. push() waits
-/// while more than a number of bytes is under way, so memory stays bounded whatever the speed of the
-/// disk. One thread pushes.
+/// Hands captures to threads that encode and write them while the next one is rendered. push()
+/// waits while more than a number of bytes is under way, so memory stays bounded whatever the speed
+/// of the disk. One thread pushes.
 class WriterQueue {
  public:
   using Work = std::function<void(const PendingCapture&)>;

@@ -13,8 +13,8 @@
 namespace diorama {
 namespace {
 
-// Each struct holds a block of the file with the fallbacks that the reference's program uses when the
-// block lacks a key.
+// Each struct holds a block of the file with the fallbacks that the reference's program uses when
+// the block lacks a key.
 
 struct EnvironmentsBlock {
   std::vector<std::string> folders;
@@ -46,7 +46,8 @@ struct CaptureBlock {
     v.param("disable_render_products", disable_render_products, {"No effect here."});
     v.param("rt_subframes", rt_subframes, {"Quality of a capture.", "", 1, 1e5});
     v.param("path_tracing", path_tracing, {"High quality."});
-    v.param("camera_look_at_target_offset", look_at_offset, {"Jitter of the look-at point.", "m", 0});
+    v.param("camera_look_at_target_offset", look_at_offset,
+            {"Jitter of the look-at point.", "m", 0});
     v.param("camera_distance_to_target_range", distance, {"Distance of the cameras.", "m", 0});
     v.param("num_scene_lights", num_scene_lights, {"Sphere lights.", "", 0, 1e4});
   }
@@ -125,16 +126,15 @@ const std::vector<std::string> kSections{"environments", "capture", "writers",  
                                          "distractors",  "physics", "debug_mode"};
 
 /// The reference's sky list, by path below the assets root.
-constexpr const char* kSkies[] = {
-    "/NVIDIA/Assets/Skies/Cloudy/champagne_castle_1_4k.hdr",
-    "/NVIDIA/Assets/Skies/Cloudy/kloofendal_48d_partly_cloudy_4k.hdr",
-    "/NVIDIA/Assets/Skies/Clear/evening_road_01_4k.hdr",
-    "/NVIDIA/Assets/Skies/Clear/mealie_road_4k.hdr",
-    "/NVIDIA/Assets/Skies/Clear/qwantani_4k.hdr",
-    "/NVIDIA/Assets/Skies/Clear/noon_grass_4k.hdr",
-    "/NVIDIA/Assets/Skies/Evening/evening_road_01_4k.hdr",
-    "/NVIDIA/Assets/Skies/Night/kloppenheim_02_4k.hdr",
-    "/NVIDIA/Assets/Skies/Night/moonlit_golf_4k.hdr"};
+constexpr const char* kSkies[] = {"/NVIDIA/Assets/Skies/Cloudy/champagne_castle_1_4k.hdr",
+                                  "/NVIDIA/Assets/Skies/Cloudy/kloofendal_48d_partly_cloudy_4k.hdr",
+                                  "/NVIDIA/Assets/Skies/Clear/evening_road_01_4k.hdr",
+                                  "/NVIDIA/Assets/Skies/Clear/mealie_road_4k.hdr",
+                                  "/NVIDIA/Assets/Skies/Clear/qwantani_4k.hdr",
+                                  "/NVIDIA/Assets/Skies/Clear/noon_grass_4k.hdr",
+                                  "/NVIDIA/Assets/Skies/Evening/evening_road_01_4k.hdr",
+                                  "/NVIDIA/Assets/Skies/Night/kloppenheim_02_4k.hdr",
+                                  "/NVIDIA/Assets/Skies/Night/moonlit_golf_4k.hdr"};
 
 constexpr std::int64_t kReferenceSeed = 12;
 
@@ -247,12 +247,13 @@ class Translator {
     if (map.kind == Value::Kind::Null) return nullptr;
     if (map.kind != Value::Kind::Map) {
       if (key == *known.begin()) {
-        complaints_.add(map.place, std::string(section_name) + ": expected a mapping, found " +
-                                       map.describe());
+        complaints_.add(
+            map.place, std::string(section_name) + ": expected a mapping, found " + map.describe());
       }
       return nullptr;
     }
-    if (key == *known.begin()) complain_about_unknown(map, section_name, {known.begin(), known.end()});
+    if (key == *known.begin())
+      complain_about_unknown(map, section_name, {known.begin(), known.end()});
     return map.find(key);
   }
 
@@ -312,9 +313,9 @@ class Translator {
 
   void add_auto_labelled(Value& objects) {
     int number = 0;
-    for (const auto& [path, map] : items(sub_block("labeled_assets", "auto_label",
-                                                   {"auto_label", "manual_label"}),
-                                         "labeled_assets.auto_label")) {
+    for (const auto& [path, map] :
+         items(sub_block("labeled_assets", "auto_label", {"auto_label", "manual_label"}),
+               "labeled_assets.auto_label")) {
       const auto keys = block<AutoLabelBlock>(*map, path);
       Value entry = object_entry(*map, "files", "auto_label" + numbered(number++), "/Assets",
                                  keys.num, keys.gravity_disabled_chance);
@@ -328,9 +329,9 @@ class Translator {
 
   void add_manually_labelled(Value& objects) {
     int number = 0;
-    for (const auto& [path, map] : items(sub_block("labeled_assets", "manual_label",
-                                                   {"auto_label", "manual_label"}),
-                                         "labeled_assets.manual_label")) {
+    for (const auto& [path, map] :
+         items(sub_block("labeled_assets", "manual_label", {"auto_label", "manual_label"}),
+               "labeled_assets.manual_label")) {
       const auto keys = block<ManualLabelBlock>(*map, path);
       if (keys.url.empty() && map->kind == Value::Kind::Map) {
         complaints_.add(map->place, path + ": `url` is missing");
@@ -344,8 +345,8 @@ class Translator {
   }
 
   void add_shapes(Value& objects) {
-    const Value* map = sub_block("distractors", "shape_distractors",
-                                 {"shape_distractors", "mesh_distractors"});
+    const Value* map =
+        sub_block("distractors", "shape_distractors", {"shape_distractors", "mesh_distractors"});
     if (!map) return;
     const auto keys = block<ShapeBlock>(*map, "distractors.shape_distractors");
     Value entry = object_entry(*map, "shapes", "shape_distractors", "/Distractors/Shapes", keys.num,
@@ -357,8 +358,8 @@ class Translator {
   }
 
   void add_meshes(Value& objects) {
-    const Value* map = sub_block("distractors", "mesh_distractors",
-                                 {"shape_distractors", "mesh_distractors"});
+    const Value* map =
+        sub_block("distractors", "mesh_distractors", {"shape_distractors", "mesh_distractors"});
     if (!map) return;
     const auto keys = block<MeshBlock>(*map, "distractors.mesh_distractors");
     Value entry = object_entry(*map, "files", "mesh_distractors", "/Distractors/Meshes", keys.num,
@@ -424,7 +425,8 @@ class Translator {
        targets: "/Assets/*", polar_angle_deg: [0, 45]}])");
     for (Value& entry : list.list) {
       const std::string& type = entry.find("type")->scalar;
-      if (type == "dome_light") entry.set("textures", texts({std::begin(kSkies), std::end(kSkies)}));
+      if (type == "dome_light")
+        entry.set("textures", texts({std::begin(kSkies), std::end(kSkies)}));
       if (type != "orbit_cameras") continue;
       entry.set("distance", numbers(capture.distance.lo, capture.distance.hi));
       entry.set("look_at_jitter", Value::number(capture.look_at_offset));
@@ -444,18 +446,18 @@ class Translator {
   void add_renderer(const CaptureBlock& capture) {
     Value renderer = native("{type: embree}");
     renderer.set("mode", Value::text(capture.path_tracing ? "path_traced" : "real_time"));
-    // A subframe of the reference's path tracer is several samples of ours, one of the real-time mode
-    // is one.
+    // A subframe of the reference's path tracer is several samples of ours, one of the real-time
+    // mode is one.
     constexpr int kSamplesPerPathTracedSubframe = 8;
-    renderer.set("samples", Value::integer(capture.rt_subframes *
-                                           (capture.path_tracing ? kSamplesPerPathTracedSubframe
-                                                                 : 1)));
+    renderer.set("samples",
+                 Value::integer(capture.rt_subframes *
+                                (capture.path_tracing ? kSamplesPerPathTracedSubframe : 1)));
     set("renderer", std::move(renderer));
   }
 
   void add_timeline(const CaptureBlock& capture) {
-    Value list = native(
-        "[{simulate: 4}, {capture: floating}, {simulate: 200}, {capture: dropped}]");
+    Value list =
+        native("[{simulate: 4}, {capture: floating}, {simulate: 200}, {capture: dropped}]");
     list.place = section("capture").place;
     list.list[1].set("count", Value::integer(capture.floating));
     list.list[3].set("count", Value::integer(capture.dropped));
@@ -534,9 +536,8 @@ bool has_kwargs(const Value* writers) {
 }
 
 bool has_gpu_key(const Value* physics) {
-  return physics && std::any_of(physics->map.begin(), physics->map.end(), [](const auto& entry) {
-           return entry.first.starts_with("gpu_");
-         });
+  return physics && std::any_of(physics->map.begin(), physics->map.end(),
+                                [](const auto& entry) { return entry.first.starts_with("gpu_"); });
 }
 
 }  // namespace

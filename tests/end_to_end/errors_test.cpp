@@ -81,14 +81,17 @@ TEST_CASE("Captures wanted, but none per environment", "[errors]") {
 }
 
 TEST_CASE("An empty list of environments", "[errors]") {
-  expect_error(job_with("environments:\n  - {type: shapes, shapes: [cube, sphere]}", "environments: []"),
-               3, "environments: the list is empty");
+  expect_error(
+      job_with("environments:\n  - {type: shapes, shapes: [cube, sphere]}", "environments: []"), 3,
+      "environments: the list is empty");
 }
 
 TEST_CASE("A missing asset folder and a missing asset", "[errors]") {
-  expect_error(job_with("{type: shapes, shapes: [cube, sphere]}", "{type: files, folders: [/no/rooms]}"),
-               5, "/no/rooms");
-  expect_error(job_with("{type: shapes, name: targets,", "{type: files, files: [/no/mug.usd], name: targets,"),
+  expect_error(
+      job_with("{type: shapes, shapes: [cube, sphere]}", "{type: files, folders: [/no/rooms]}"), 5,
+      "/no/rooms");
+  expect_error(job_with("{type: shapes, name: targets,",
+                        "{type: files, files: [/no/mug.usd], name: targets,"),
                5, "/no/mug.usd");
 }
 

@@ -16,15 +16,16 @@ void make_assets_root(const fs::path& root) {
                    ("dining_room_" + std::to_string(room)) / "export_scene.usdc",
                "");
   }
-  for (const char* name : {"002_master_chef_can", "011_banana", "024_bowl", "036_wood_block",
-                           "008_pudding_box"}) {
+  for (const char* name :
+       {"002_master_chef_can", "011_banana", "024_bowl", "036_wood_block", "008_pudding_box"}) {
     write_file(root / "Isaac/Props/YCB/Axis_Aligned" / (std::string(name) + ".usd"), "");
   }
   write_file(root / "Isaac/Props/YCB/Axis_Aligned/Materials/skipped.usd", "");
   write_file(root / "Isaac/Props/YCB/Axis_Aligned_Physics/006_mustard_bottle.usd", "");
-  for (const char* name : {"SM_CardBoxD_04_1847", "SM_CardBoxA_01_414", "S_TrafficCone",
-                           "S_WetFloorSign"}) {
-    write_file(root / "Isaac/Environments/Simple_Warehouse/Props" / (std::string(name) + ".usd"), "");
+  for (const char* name :
+       {"SM_CardBoxD_04_1847", "SM_CardBoxA_01_414", "S_TrafficCone", "S_WetFloorSign"}) {
+    write_file(root / "Isaac/Environments/Simple_Warehouse/Props" / (std::string(name) + ".usd"),
+               "");
   }
   write_file(root / "Isaac/Environments/Office/Props/SM_Vase_01.usd", "");
   for (const char* name : {"SM_MedicalBag_01a", "SM_MedicalBox_01g"}) {
@@ -71,7 +72,8 @@ TEST_CASE("The plan of the tutorial's defaults is what the tutorial prescribes",
   CHECK_THAT(text, Contains("mesh_distractors: 8 below"));
   CHECK_THAT(text, Contains("cam x 2: pinhole 720x480") && Contains("sees 0.25 to 1000 m"));
   CHECK_THAT(text, Contains("SphereLight_scene x 3: sphere"));
-  CHECK_THAT(text, Contains("\"polar_angle_deg\": [0, 75]") && Contains("\"polar_angle_deg\": [0, 45]"));
+  CHECK_THAT(text,
+             Contains("\"polar_angle_deg\": [0, 75]") && Contains("\"polar_angle_deg\": [0, 45]"));
   CHECK_THAT(text, Contains("\"distance\": [1.15, 1.45]"));
   CHECK_THAT(text, !Contains("skipped"));
   check_golden("infinigen_default.txt", text);

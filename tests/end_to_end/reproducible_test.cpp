@@ -119,7 +119,8 @@ TEST_CASE("Ctrl-C ends a run with 130 and leaves it resumable", "[run]") {
   CHECK(outcome.exit_code == 130);
   CHECK_THAT(outcome.errors, Contains("interrupted; `--resume` goes on"));
   for (const auto& [name, text] : tree(folder / "out")) CHECK_THAT(name, !Contains("stage"));
-  CHECK(run(smoke("out", {"--set", "total_captures=40", "--resume"}), folder.path()).exit_code == 0);
+  CHECK(run(smoke("out", {"--set", "total_captures=40", "--resume"}), folder.path()).exit_code ==
+        0);
   CHECK(difference(expected, tree(folder / "out")) == "");
 }
 

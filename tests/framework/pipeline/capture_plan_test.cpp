@@ -108,8 +108,9 @@ TEST_CASE("A repeated name is numbered like the scene does it", "[plan]") {
 
 TEST_CASE("What is chosen for one group does not depend on other groups", "[plan]") {
   const CapturePlan plan = plan_of(job_from(good_job()));
-  const CapturePlan longer = plan_of(job_from(with(
-      good_job(), "objects:\n", "objects:\n  - {type: files, name: first, under: /Assets, count: 3}\n")));
+  const CapturePlan longer = plan_of(
+      job_from(with(good_job(), "objects:\n",
+                    "objects:\n  - {type: files, name: first, under: /Assets, count: 3}\n")));
   CHECK(choices(plan, 0) == choices(longer, 1));
   CHECK(choices(plan, 1) == choices(longer, 2));
   // More objects in a group leave the first ones as they were.
@@ -149,8 +150,9 @@ TEST_CASE("Over many seeds picks are uniform and gravity keeps its chance", "[pl
 
 TEST_CASE("A group without assets is an error that names the place", "[plan]") {
   const Job job = job_from(good_job());
-  CHECK_THROWS_WITH(plan_captures(job, {{"a", 0}}, {{}, kFood}),
-                    Contains("job.yaml:5:5: objects[0]: names no assets, but 20 objects are wanted"));
+  CHECK_THROWS_WITH(
+      plan_captures(job, {{"a", 0}}, {{}, kFood}),
+      Contains("job.yaml:5:5: objects[0]: names no assets, but 20 objects are wanted"));
 }
 
 TEST_CASE("Random streams depend on what they are for and on nothing else", "[plan]") {

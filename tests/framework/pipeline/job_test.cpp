@@ -23,8 +23,9 @@ TEST_CASE("A right job is read without complaints", "[job]") {
 }
 
 TEST_CASE("Without a timeline a visit does what the tutorial does", "[job]") {
-  const Job job = job_from(with(good_job(), "timeline: [{simulate: 4}, {capture: floating, count: "
-                                            "2}, {simulate: 200}, {capture: dropped, count: 1}]\n",
+  const Job job = job_from(with(good_job(),
+                                "timeline: [{simulate: 4}, {capture: floating, count: "
+                                "2}, {simulate: 200}, {capture: dropped, count: 1}]\n",
                                 ""));
   REQUIRE(job.timeline.size() == 4);
   CHECK(job.timeline[0].steps == 4);

@@ -29,8 +29,8 @@ class TemporaryFolder {
   fs::path path_;
 };
 
-/// Fails at one change of the disk: that one only, or that and everything after it, as if the process
-/// had been killed there.
+/// Fails at one change of the disk: that one only, or that and everything after it, as if the
+/// process had been killed there.
 class FaultyFileSystem final : public FileSystem {
  public:
   enum class Fault { One, AllFromThere };
@@ -87,7 +87,8 @@ Transaction capture_files(int capture) {
   Transaction transaction;
   CollectedFiles first(transaction, 0, "one");
   first.add_text("rgb_" + std::to_string(capture) + ".png", "colour " + std::to_string(capture));
-  first.add_text("depth/" + std::to_string(capture) + ".npy", std::string(3000, char('a' + capture)));
+  first.add_text("depth/" + std::to_string(capture) + ".npy",
+                 std::string(3000, char('a' + capture)));
   first.record("line " + std::to_string(capture));
   CollectedFiles second(transaction, 1, "two");
   second.add_text("boxes/deep/" + std::to_string(capture) + ".json", "{}");
@@ -260,9 +261,8 @@ TEST_CASE("An existing dataset is refused, and a different one is not resumed", 
   CHECK_THROWS_WITH(store.check(kDataset, OutputStore::Existing::Refuse),
                     Contains("already holds a dataset with 3 captures") && Contains("--resume") &&
                         Contains("--overwrite"));
-  CHECK_THROWS_WITH(
-      store.check(R"({"seed": 5, "job": "a"})", OutputStore::Existing::Resume),
-      Contains("dataset.json: belongs to another job or version (differs in: seed)"));
+  CHECK_THROWS_WITH(store.check(R"({"seed": 5, "job": "a"})", OutputStore::Existing::Resume),
+                    Contains("dataset.json: belongs to another job or version (differs in: seed)"));
   CHECK(tree(folder.path()) == before);
 }
 

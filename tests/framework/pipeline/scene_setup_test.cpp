@@ -55,7 +55,8 @@ struct Room {
 
 }  // namespace
 
-TEST_CASE("Rules hide by part of the path and find the working area in the world", "[environment]") {
+TEST_CASE("Rules hide by part of the path and find the working area in the world",
+          "[environment]") {
   Room room;
   const Vec3 area =
       apply_environment_rules(infinigen_rules(), false, room.environment, room.scene, room.host);
@@ -201,7 +202,8 @@ TEST_CASE("The overview camera looks straight down at the working area", "[spawn
   REQUIRE(pixel);
   CHECK((*pixel - Vec2(384, 384)).norm() < 1e-9);
   // +y of the world is up in the picture, +x to the right.
-  const auto up = project(*scene[camera].camera, world_from_camera.inverse() * Vec3(3.0, -1.0, 0.75));
+  const auto up =
+      project(*scene[camera].camera, world_from_camera.inverse() * Vec3(3.0, -1.0, 0.75));
   CHECK(up->y() < 383);
   const auto right =
       project(*scene[camera].camera, world_from_camera.inverse() * Vec3(4.0, -2.0, 0.75));

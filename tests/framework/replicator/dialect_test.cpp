@@ -107,14 +107,13 @@ debug_mode: false
 
 TEST_CASE("Keys that the reference drops work", "[replicator]") {
   Complaints complaints;
-  const auto translation = translate_replicator_job(
-      parse_yaml(R"(
+  const auto translation = translate_replicator_job(parse_yaml(R"(
 capture: {total_captures: 1, num_floating_captures_per_env: 1, num_cameras: 1,
           camera_look_at_target_offset: 0.3, camera_distance_to_target_range: [0.75, 2]}
 distractors: {shape_distractors: {num: 4, types: [cone]}}
 )",
-                 "job.yaml"),
-      complaints);
+                                                               "job.yaml"),
+                                                    complaints);
   REQUIRE(complaints.is_empty());
   CHECK_THAT(text_of(translation.job), Contains(R"("shapes": ["cone"])"));
   CHECK_THAT(text_of(translation.job), Contains(R"("look_at_jitter": 0.3)"));
@@ -153,25 +152,25 @@ writers:
 
 TEST_CASE("Keys without effect are named", "[replicator]") {
   Complaints complaints;
-  const auto translation = translate_replicator_job(
-      parse_yaml(R"(
+  const auto translation = translate_replicator_job(parse_yaml(R"(
 capture: {disable_render_products: true}
 physics: {gpu_collision_stack_size: 314572800, gpu_found_lost_pairs_capacity: 1,
   gpu_found_lost_aggregate_pairs_capacity: 2, gpu_total_aggregate_pairs_capacity: 3,
   gpu_max_rigid_contact_count: 4, gpu_max_rigid_patch_count: 5, gpu_heap_capacity: 6,
   gpu_temp_buffer_capacity: 7}
 )",
-                 "job.yaml"),
-      complaints);
+                                                               "job.yaml"),
+                                                    complaints);
   CHECK(complaints.is_empty());
   CHECK(translation.without_effect.size() == 9);
 }
 
 TEST_CASE("Python's replacement syntax is understood", "[replicator]") {
   const auto replacement = [](const char* python) {
-    const Job job = native_job(std::string("labeled_assets: {auto_label: {num: 1, files: [a.usd], "
-                                           "regex_replace_pattern: '(\\d+)_', regex_replace_repl: '") +
-                               python + "'}}");
+    const Job job =
+        native_job(std::string("labeled_assets: {auto_label: {num: 1, files: [a.usd], "
+                               "regex_replace_pattern: '(\\d+)_', regex_replace_repl: '") +
+                   python + "'}}");
     return job.objects[0].label_replacement;
   };
   CHECK(replacement("") == "");
