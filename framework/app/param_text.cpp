@@ -8,12 +8,19 @@
 namespace diorama {
 namespace {
 
+/// On one line, as it could stand in a job.
+std::string default_text(const Value& value) {
+  if (value.kind == Value::Kind::List || value.kind == Value::Kind::Map) return to_json(value, 0);
+  std::string text = to_yaml(value);
+  text.pop_back();
+  return text;
+}
+
 void add_rows(const std::vector<ParamSpec>& specs, const std::string& front,
               std::vector<ParamRow>& rows) {
   for (const ParamSpec& spec : specs) {
     const bool has_children = spec.type == ParamType::Group || spec.type == ParamType::List;
-    std::string text = has_children ? std::string() : to_yaml(spec.default_value);
-    while (!text.empty() && text.back() == '\n') text.pop_back();
+    const std::string text = has_children ? std::string() : default_text(spec.default_value);
     const std::string key = front + spec.key;
     rows.push_back({key, type_text(spec), text, range_text(spec), spec.unit, spec.help});
     add_rows(spec.children, key + (spec.type == ParamType::List ? "[]." : "."), rows);
