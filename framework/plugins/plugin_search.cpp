@@ -138,9 +138,7 @@ fs::path bundled_plugin_folder(const fs::path& program) {
 }
 
 fs::path sample_pack_folder(const fs::path& program) {
-  const fs::path prefix = program.parent_path().parent_path();
-  if (is_build_tree(program)) return prefix / "samples";
-  return prefix / "share/diorama/samples";
+  return program.parent_path().parent_path() / "share/diorama/assets";
 }
 
 fs::path program_file() {

@@ -135,5 +135,5 @@ TEST_CASE("the bundled plugins are found from the program's place", "[plugins]")
   const fs::path installed = bundled_plugin_folder("/opt/tool/bin/diorama");
   CHECK(installed.string().starts_with("/opt/tool/lib"));
   CHECK(installed.string().ends_with("/diorama/" + kAbi));
-  CHECK(sample_pack_folder("/opt/tool/bin/diorama") == "/opt/tool/share/diorama/samples");
+  CHECK(sample_pack_folder("/opt/tool/bin/diorama") == "/opt/tool/share/diorama/assets");
 }
