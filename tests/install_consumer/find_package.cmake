@@ -24,7 +24,7 @@ file(REMOVE_RECURSE ${build}_wrong)
 configure_command(configure ${SOURCE}/find_package ${build}_wrong)
 run_refused("compatible with requested version \"9.0\"" ${configure} -DWANTED_VERSION=9.0)
 run_refused("diorama_sdk has no component 'nonsense'; there are: library, plugin" ${configure}
-            -DWANTED_VERSION=0.1 -DWANTED_COMPONENTS=library$<SEMICOLON>nonsense)
+            -DWANTED_VERSION=0.1 -DWANTED_COMPONENTS=nonsense)
 run(${configure} -DWANTED_VERSION=0.1 -DWANTED_COMPONENTS=plugin)
 run_refused("nothing_defines_this" ${CMAKE_COMMAND} --build ${build}_wrong --target undefined_plugin)
 run_refused("diorama_plugin" ${CMAKE_COMMAND} --build ${build}_wrong --target empty_plugin)
