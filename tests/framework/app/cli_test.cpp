@@ -78,7 +78,7 @@ TEST_CASE("mistakes in job files end with code 3 and all of them are named", "[c
   CHECK(all.code == 3);
   CHECK(has(all.err, wrong.string() + ":1:1: unknown key `sead`; did you mean `seed`?"));
   CHECK(has(all.err, wrong.string() + ":2:17: total_captures: expected an integer"));
-  CHECK(has(all.err, wrong.string() + ":4:35: cameras[0].width: expected an integer"));
+  CHECK(has(all.err, wrong.string() + ":4:34: cameras[0].width: expected an integer"));
   check_error(run_program("config " DIORAMA_SOURCE_DIR "/configs/smoke.yaml --set seed"), 2,
               "--set seed: expected key=value, for instance renderer.samples=64");
 }
