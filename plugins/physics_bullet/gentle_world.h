@@ -3,6 +3,8 @@
 
 #include <btBulletDynamicsCommon.h>
 
+#include <vector>
+
 namespace diorama {
 
 /// A Bullet world that treats overlap with care:
@@ -32,6 +34,7 @@ class GentleWorld final : public btDiscreteDynamicsWorld {
 
   double max_depenetration_speed_;
   btSphereShape stand_in_{0.01};
+  std::vector<btManifoldPoint> rebuilt_;  ///< Scratch of mend_contacts.
 };
 
 }  // namespace diorama
