@@ -36,10 +36,11 @@ void add_pose(Prim& prim, const Affine& pose) {
   prim.set_uniform("xformOpOrder", "token[]", std::vector<Token>{{"xformOp:transform"}});
 }
 
-/// USD's dome has its pole at +y and the middle of the image at +z; ours at +z and +x.
+/// A DomeLight_1 whose pole is the stage's up axis, here z, has the middle of the image at -y; ours
+/// is at +x.
 Affine light_from_usd_dome() {
   Affine turn = Affine::Identity();
-  turn.linear() << 0, 0, 1, 1, 0, 0, 0, 1, 0;
+  turn.linear() << 0, -1, 0, 1, 0, 0, 0, 0, 1;
   return turn;
 }
 
@@ -95,7 +96,7 @@ const char* light_type(LightKind kind) {
     case LightKind::Distant:
       return "DistantLight";
     case LightKind::Dome:
-      return "DomeLight";
+      return "DomeLight_1";
     case LightKind::Sphere:
       break;
   }

@@ -461,7 +461,7 @@ CeilingLight build_ceiling_light(const RoomMaterials& m, Rng rng) {
   CeilingLight light;
   MeshBuilder body, glass;
   body.begin(Affine::Identity(), {1, 1.0});
-  light.kelvin = rng.uniform(2700, 4200);
+  light.kelvin = rng.uniform(3500, 6000);
   light.lumens = rng.uniform(1000, 2200);
   const int kind = int(rng.index(3));
   if (kind == 0) {  // a flush dish with a glass bowl
@@ -593,7 +593,7 @@ CeilingLight build_table_lamp(const RoomMaterials& m, Rng rng) {
   light.bulb = Vec3(0, 0, neck + 0.045);
   light.bulb_radius = 0.02;
   light.lumens = rng.uniform(350, 600);
-  light.kelvin = rng.uniform(2600, 3000);
+  light.kelvin = rng.uniform(3000, 3600);
   return light;
 }
 

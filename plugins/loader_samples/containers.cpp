@@ -66,8 +66,8 @@ Model coffee_can(Host&, Rng) {
   for (const double x : {256.0, 768.0}) {
     c.ellipse(x, 180, 190, 135, white);
     c.ellipse(x, 180, 178, 124, blue);
-    c.centred_text(x, 165, 62, "ROASTER", white, 0.18);
-    c.centred_text(x, 225, 34, "GROUND COFFEE", gold, 0.16);
+    c.centred_text(x, 168, 46, "ROASTER", white, 0.2);
+    c.centred_text(x, 220, 22, "GROUND COFFEE", gold, 0.18);
     for (int i = 0; i < 7; ++i) {
       const double bx = x - 130 + 43 * i, by = 350 + 12 * std::sin(1.7 * i);
       c.ellipse(bx, by, 24, 17, color(0x5b3420));
@@ -89,7 +89,7 @@ Model soup_can(Host&, Rng) {
   Canvas c(1024, 500, red);
   c.rectangle(0, 250, 1024, 250, white);
   for (const double x : {256.0, 768.0}) {
-    c.centred_text(x, 150, 84, "ROSSO", white, 0.2);
+    c.centred_text(x, 150, 62, "ROSSO", white, 0.22);
     c.centred_text(x, 210, 28, "SINCE 1887", color(0xf0c9a0));
     c.ellipse(x, 250, 62, 62, color(0xd8a93c));
     c.ellipse(x, 250, 50, 50, color(0xc93a2b));
@@ -242,8 +242,9 @@ Model mustard_bottle(Host&, Rng) {
     c.ellipse(x, 392, 120, 4, red);
     if (x == 0.0 || x == 1024.0) c.small_print(x - 110, 365, 220, 40, 4, color(0x444444), 7);
   }
-  return finish(builder, {make_picture_material("plastic_label", c.texture("label"), 0.3),
-                          make_plain("cap", yellow, 0.35)});
+  return finish(builder,
+                {make_picture_material("plastic_label", c.texture("label"), 0.3, Wrap::Repeat),
+                 make_plain("cap", yellow, 0.35)});
 }
 
 Model bleach_bottle(Host&, Rng) {
@@ -286,8 +287,9 @@ Model bleach_bottle(Host&, Rng) {
     c.ellipse(x, 595, 20, 20, color(0xf2d94a));
   }
   c.small_print(250, 400, 40, 250, 20, color(0x4a4d52), 12);
-  return finish(builder, {make_picture_material("plastic_label", c.texture("label"), 0.35),
-                          make_plain("cap", blue, 0.4)});
+  return finish(builder,
+                {make_picture_material("plastic_label", c.texture("label"), 0.35, Wrap::Repeat),
+                 make_plain("cap", blue, 0.4)});
 }
 
 Model meat_can(Host&, Rng) {
@@ -328,7 +330,8 @@ Model meat_can(Host&, Rng) {
     c.ellipse(x - 20, 226, 60, 18, color(0xf0aea4));
   }
   c.bar_code(215, 170, 80, 90, 13);
-  return finish(builder, {make_picture_material("label", c.texture("label"), 0.32), tin()});
+  return finish(builder,
+                {make_picture_material("label", c.texture("label"), 0.32, Wrap::Repeat), tin()});
 }
 
 Model bowl(Host&, Rng) {

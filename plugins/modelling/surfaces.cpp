@@ -34,12 +34,12 @@ MaterialPtr make_textured(std::string_view name, const TextureSet& textures, dou
 }
 
 MaterialPtr make_picture_material(std::string_view name, std::shared_ptr<const Texture> picture,
-                                  double roughness) {
+                                  double roughness, Wrap around) {
   Material material;
   material.name = std::string(name);
   material.base_color = Vec3f::Ones();
   material.base_color_texture.texture = std::move(picture);
-  material.base_color_texture.wrap_u = Wrap::Clamp;
+  material.base_color_texture.wrap_u = around;
   material.base_color_texture.wrap_v = Wrap::Clamp;
   material.roughness = float(roughness);
   return std::make_shared<const Material>(std::move(material));

@@ -24,9 +24,9 @@ Color scaled_color(const Color& c, double factor) { return c * float(factor); }
 
 /// Colour of a board at u (along the grain) and v; both count in repeats of a tiling texture.
 Color wood_color(const WoodLook& look, std::uint64_t seed, double u, double v) {
-  const double warp = fractal_noise(seed, u * 2, v * 3, 2, 3, 3);
+  const double warp = fractal_noise(seed, u * 1, v * 3, 1, 3, 3);
   const double drift = fractal_noise(seed + 11, u * 1, v * 4, 1, 4, 2);
-  const double rings = fraction(v * 9 + 1.3 * warp);
+  const double rings = fraction(v * 9 + 1.0 * warp);
   // Early wood fades slowly into a narrow band of late wood.
   const double late = smooth_step(0.35, 0.93, rings) * (1 - smooth_step(0.94, 1.0, rings));
   const double fibre = fractal_noise(seed + 23, u * 6, v * 160, 6, 160, 2);
