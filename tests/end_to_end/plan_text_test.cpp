@@ -31,6 +31,12 @@ void make_assets_root(const fs::path& root) {
   for (const char* name : {"SM_MedicalBag_01a", "SM_MedicalBox_01g"}) {
     write_file(root / "Isaac/Environments/Hospital/Props" / (std::string(name) + ".usd"), "");
   }
+  for (const char* name :
+       {"Cloudy/champagne_castle_1", "Cloudy/kloofendal_48d_partly_cloudy", "Clear/evening_road_01",
+        "Clear/mealie_road", "Clear/qwantani", "Clear/noon_grass", "Evening/evening_road_01",
+        "Night/kloppenheim_02", "Night/moonlit_golf"}) {
+    write_file(root / "NVIDIA/Assets/Skies" / (std::string(name) + "_4k.hdr"), "");
+  }
 }
 
 std::string dry_run(const std::vector<std::string>& job) {
@@ -63,7 +69,7 @@ TEST_CASE("The plan of the tutorial's defaults is what the tutorial prescribes",
                             "capture dropped x 2"));
   CHECK_THAT(text, Contains("environments (3)"));
   // 9 captures, 4 per visit: the third visit is cut short.
-  CHECK_THAT(text, Contains("captures 8") || Contains("capture 8: floating 1"));
+  CHECK_THAT(text, Contains("capture 8: floating 1"));
   CHECK_THAT(text, Contains("objects (38)"));
   CHECK_THAT(text, Contains("auto_label: 6 below /Assets"));
   CHECK_THAT(text, Contains("manual_label: 2 below /Assets"));
