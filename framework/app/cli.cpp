@@ -45,6 +45,8 @@ struct CommandLine {
   bool plugins_json = false;
   bool describe_json = false;
   std::string describe_type;
+  std::filesystem::path check_file;
+  bool check_json = false;
   std::filesystem::path docs_folder = "diorama_reference";
   /// The command that was chosen.
   std::function<int(ConsoleLog&)> command;
@@ -150,6 +152,18 @@ void add_plugins(CLI::App& app, CommandLine& line) {
     line.command = [&line](ConsoleLog& log) {
       return command_plugins_describe(line.global, line.describe_type,
                                       line.describe_json || line.plugins_json, log);
+    };
+  });
+}
+
+void add_plugins_check(CLI::App& app, CommandLine& line) {
+  CLI::App* check = app.get_subcommand("plugins")->add_subcommand(
+      "check", "Try what every plugin must hold, for one plugin file");
+  check->add_option("file", line.check_file, "Plugin file")->required()->type_name("FILE");
+  check->add_flag("--json", line.check_json, "As JSON");
+  check->callback([&line] {
+    line.command = [&line](ConsoleLog& log) {
+      return command_plugins_check(line.check_file, line.check_json || line.plugins_json, log);
     };
   });
 }
@@ -277,6 +291,7 @@ void add_all(CLI::App& app, CommandLine& line) {
   add_run(app, line);
   add_config(app, line);
   add_plugins(app, line);
+  add_plugins_check(app, line);
   add_inspect(app, line);
   add_export(app, line);
   add_lint(app, line);

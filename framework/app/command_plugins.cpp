@@ -6,8 +6,10 @@
 #include <iostream>
 
 #include "framework/app/assemble.h"
+#include "framework/app/cli.h"
 #include "framework/app/param_text.h"
 #include "framework/config/value_text.h"
+#include "framework/plugins/conformance.h"
 
 namespace diorama {
 namespace {
@@ -155,6 +157,34 @@ int command_plugins_describe(const GlobalOptions& global, const std::string& typ
   }
   if (as_json) std::cout << to_json(list, 2) << "\n";
   return 0;
+}
+
+int command_plugins_check(const std::filesystem::path& file, bool as_json, ConsoleLog& log) {
+  const Log only_errors = [&log](LogLevel level, std::string_view text) {
+    log.write(level == LogLevel::Error ? level : LogLevel::Debug, text);
+  };
+  const std::vector<CheckResult> results = check_plugin(file, only_errors);
+  Value list = Value::make_list();
+  int failures = 0;
+  for (const CheckResult& result : results) {
+    const bool has_passed = result.failure.empty();
+    failures += has_passed ? 0 : 1;
+    Value value = Value::make_map();
+    value.set("subject", Value::text(result.subject));
+    value.set("check", Value::text(result.check));
+    value.set("passed", Value::boolean(has_passed));
+    if (!has_passed) value.set("failure", Value::text(result.failure));
+    list.list.push_back(std::move(value));
+    if (as_json) continue;
+    std::cout << (has_passed ? "ok    " : "FAIL  ") << result.subject << ": " << result.check
+              << (has_passed ? "" : ": " + result.failure) << "\n";
+  }
+  if (as_json) {
+    std::cout << to_json(list, 2) << "\n";
+  } else {
+    std::cout << results.size() << " checks, " << failures << " failed\n";
+  }
+  return failures == 0 ? 0 : exit_code(ErrorKind::Plugin);
 }
 
 }  // namespace diorama

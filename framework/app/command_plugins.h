@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <filesystem>
 #include <string>
 
 #include "framework/app/options.h"
@@ -16,5 +17,10 @@ int command_plugins_list(const GlobalOptions& global, bool as_json, ConsoleLog& 
 /// be "kind/type" where kinds share a name. Throws Error(Plugin).
 int command_plugins_describe(const GlobalOptions& global, const std::string& type, bool as_json,
                              ConsoleLog& log);
+
+/// `diorama plugins check FILE`: tries what every plugin must hold
+/// (framework/plugins/conformance.h). Returns 0 when all passed, else the exit code of
+/// ErrorKind::Plugin.
+int command_plugins_check(const std::filesystem::path& file, bool as_json, ConsoleLog& log);
 
 }  // namespace diorama
