@@ -39,6 +39,8 @@ struct Incoming {
 
 /// Below this share of agreeing neighbours a pixel was hardly averaged: edges, thin things.
 constexpr float kLonely = 0.25f;
+constexpr int kWitnesses = 10;   // averaged pixels near a lonely one that make it suspect
+constexpr float kLeeway = 2.0f;  // by which it may leave their range
 
 struct Grid {
   int width;
@@ -165,16 +167,18 @@ void calm_lonely_pixels(const Grid& grid, const std::vector<Guide>& guides,
       if (!guides[i].has_surface || before[i].support >= kLonely) continue;
       float low = std::numeric_limits<float>::infinity();
       float high = 0.0f;
+      int witnesses = 0;
       for (int v = std::max(0, y - 2); v <= std::min(grid.height - 1, y + 2); ++v) {
         for (int u = std::max(0, x - 2); u <= std::min(grid.width - 1, x + 2); ++u) {
           const Incoming& other = before[grid.at(u, v)];
           if (!guides[grid.at(u, v)].has_surface || other.support < kLonely) continue;
           low = std::min(low, other.luminance);
           high = std::max(high, other.luminance);
+          ++witnesses;
         }
       }
-      if (low > high || !(before[i].luminance > 0.0f)) continue;
-      const float calm = std::clamp(before[i].luminance, low, high);
+      if (witnesses < kWitnesses || !(before[i].luminance > 0.0f)) continue;
+      const float calm = std::clamp(before[i].luminance, low / kLeeway, high * kLeeway);
       lights[i].irradiance = before[i].irradiance * (calm / before[i].luminance);
     }
   });
