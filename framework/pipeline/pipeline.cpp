@@ -288,7 +288,6 @@ VisitReport Pipeline::report_on(const Visit& visit) const {
   report.visit = visit.planned->index;
   for (const auto& physics : components_.physics) {
     const PhysicsReport state = physics->report();
-    report.max_speed = state.max_speed;
     report.max_penetration_m = state.max_penetration_m;
     report.deepest_body = state.deepest_body;
   }
@@ -304,9 +303,14 @@ VisitReport Pipeline::report_on(const Visit& visit) const {
     const Vec3 place = visit.scene.world_from_node(object).translation();
     const bool is_inside =
         (place.array() >= room.min.array()).all() && (place.array() <= room.max.array()).all();
-    if (!is_inside) report.left_room.push_back(visit.scene.path(object));
     const auto& body = visit.scene[object].rigid_body;
-    if (body && body->has_gravity) ++report.falling_objects;
+    const bool falls = body && body->has_gravity;
+    if (falls) ++report.falling_objects;
+    // What has left falls for ever and says nothing about the rest.
+    if (!is_inside) report.left_room.push_back(visit.scene.path(object));
+    if (is_inside && falls) {
+      report.max_speed = std::max(report.max_speed, body->linear_velocity.norm());
+    }
   }
   return report;
 }

@@ -52,7 +52,7 @@ struct RunOptions {
 struct VisitReport {
   int visit = 0;
   int falling_objects = 0;
-  double max_speed = 0.0;          ///< m/s, at the end of the visit.
+  double max_speed = 0.0;          ///< m/s, of falling objects in the room, at the end.
   double max_penetration_m = 0.0;  ///< At the end of the visit.
   std::string deepest_body;
   std::vector<std::string> left_room;  ///< Paths of objects outside the environment's box.
