@@ -42,9 +42,15 @@ class Joiner {
 };
 
 /// A straight leg from `foot` to `head`, rectangular or round section, thinner at the foot.
-void add_leg(Joiner& joiner, const Vec3& foot, const Vec3& head, double at_foot, double at_head,
-             bool is_round) {
+void add_leg(Joiner& joiner, const Vec3& foot_centre, const Vec3& head, double at_foot,
+             double at_head, bool is_round) {
   joiner.start(Affine::Identity());
+  // A leg that leans stands on the edge of its foot.
+  constexpr double kRounding = 0.003;
+  const Vec3 lean = (head - foot_centre).normalized();
+  const bool is_on_floor = foot_centre.z() == 0;
+  const double dip = is_on_floor ? (at_foot / 2 - kRounding) * lean.head<2>().norm() : 0.0;
+  const Vec3 foot = foot_centre + Vec3(0, 0, dip);
   std::vector<PathPoint> path;
   for (int i = 0; i <= 4; ++i) {
     const double t = i / 4.0;
@@ -53,8 +59,8 @@ void add_leg(Joiner& joiner, const Vec3& foot, const Vec3& head, double at_foot,
   }
   // The ends are rounded a little.
   path.insert(path.begin() + 1, path.front());
-  path[1].place += (head - foot).normalized() * 0.003;
-  path[0].radius_x = path[0].radius_y = path[0].radius_x - 0.003;
+  path[1].place += (head - foot).normalized() * kRounding;
+  path[0].radius_x = path[0].radius_y = path[0].radius_x - kRounding;
   add_sweep(joiner.builder(), path, is_round ? 20 : 28, Vec3::UnitY(), is_round ? 2.0 : 9.0);
 }
 
