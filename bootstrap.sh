@@ -67,7 +67,8 @@ case $command in
   demo)
     install_packages "${build_packages[@]}"
     build
-    "build/$preset/bin/diorama" run configs/dining_room.yaml
+    # A finished dataset is left as it is, an interrupted one is completed.
+    "build/$preset/bin/diorama" run configs/dining_room.yaml --resume
     ;;
   test)
     install_packages "${build_packages[@]}" "${test_packages[@]}"
