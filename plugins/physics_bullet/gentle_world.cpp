@@ -28,74 +28,89 @@ class ConvexDisguise {
   btCollisionShape* shape_;
 };
 
-/// A contact between a moving body and a triangle, seen from the body.
-struct TriangleContact {
+/// A contact between a moving body and a fixed thing, seen from the body.
+struct FixedContact {
   const btCollisionObject* body = nullptr;
   const btCollisionObject* fixed = nullptr;
-  const StaticMesh* mesh = nullptr;  ///< Null for contacts of other kinds.
-  int triangle = -1;
   bool is_fixed_second = true;
   int part = -1;      ///< Which child of a compound body touches.
+  int triangle = -1;  ///< Which triangle of a mesh is touched.
   btVector3 push;     ///< Direction in which the contact pushes the body.
-  btVector3 touched;  ///< Point of the triangle, world.
+  btVector3 on_body;  ///< Point of the body, world.
+  btVector3 touched;  ///< Point of the fixed thing, world.
+
+  const StaticMesh* mesh() const { return static_cast<const StaticMesh*>(fixed->getUserPointer()); }
+  const btBoxShape* box() const {
+    const btCollisionShape* shape = fixed->getCollisionShape();
+    const bool is_box = shape->getShapeType() == BOX_SHAPE_PROXYTYPE;
+    return is_box ? static_cast<const btBoxShape*>(shape) : nullptr;
+  }
+  double margin() const { return mesh() ? mesh()->shape->getMargin() : box()->getMargin(); }
 };
 
-TriangleContact triangle_contact(const btPersistentManifold& manifold,
-                                 const btManifoldPoint& contact) {
+/// Nothing unless one of the two is fixed and made of triangles or a box.
+std::optional<FixedContact> fixed_contact(const btPersistentManifold& manifold,
+                                          const btManifoldPoint& contact) {
   const btCollisionObject* a = manifold.getBody0();
   const btCollisionObject* b = manifold.getBody1();
-  const auto* mesh_a = static_cast<const StaticMesh*>(a->getUserPointer());
-  const auto* mesh_b = static_cast<const StaticMesh*>(b->getUserPointer());
-  if (mesh_b && contact.m_index1 >= 0) {
-    return {a,
+  FixedContact seen;
+  if (b->isStaticObject()) {
+    seen = {a,
             b,
-            mesh_b,
-            contact.m_index1,
             true,
             contact.m_index0,
+            contact.m_index1,
             contact.m_normalWorldOnB,
+            contact.m_positionWorldOnA,
             contact.m_positionWorldOnB};
-  }
-  if (mesh_a && contact.m_index0 >= 0) {
-    return {b,
+  } else if (a->isStaticObject()) {
+    seen = {b,
             a,
-            mesh_a,
-            contact.m_index0,
             false,
             contact.m_index1,
+            contact.m_index0,
             -contact.m_normalWorldOnB,
+            contact.m_positionWorldOnB,
             contact.m_positionWorldOnA};
+  } else {
+    return std::nullopt;
   }
-  return {};
+  if (seen.mesh() ? seen.triangle < 0 : !seen.box()) return std::nullopt;
+  return seen;
 }
 
-struct WorldTriangle {
-  btVector3 corners[3];
-  btVector3 normal;
+/// A flat piece of a fixed thing, world. The corners run round it in one sense.
+struct Facet {
+  std::vector<btVector3> corners;
+  btVector3 normal;   ///< Of the corners' sense.
+  btVector3 outward;  ///< Along or against the normal.
 };
 
-WorldTriangle world_triangle(const TriangleContact& contact) {
-  WorldTriangle triangle;
-  const auto& indices = contact.mesh->triangles[std::size_t(contact.triangle)];
-  for (std::size_t i = 0; i < 3; ++i) {
-    const Vec3f& p = contact.mesh->positions[indices[i]];
-    triangle.corners[i] = contact.fixed->getWorldTransform() * btVector3(p.x(), p.y(), p.z());
+/// The touched triangle, outward to the side where the body's centre of mass is.
+Facet triangle_facet(const FixedContact& seen) {
+  Facet facet;
+  const StaticMesh& mesh = *seen.mesh();
+  for (const std::uint32_t corner : mesh.triangles[std::size_t(seen.triangle)]) {
+    const Vec3f& p = mesh.positions[corner];
+    facet.corners.push_back(seen.fixed->getWorldTransform() * btVector3(p.x(), p.y(), p.z()));
   }
-  const btVector3 along = triangle.corners[1] - triangle.corners[0];
-  triangle.normal = along.cross(triangle.corners[2] - triangle.corners[0]).normalized();
-  return triangle;
+  const btVector3 along = facet.corners[1] - facet.corners[0];
+  facet.normal = along.cross(facet.corners[2] - facet.corners[0]).normalized();
+  const btVector3 to_centre = seen.body->getWorldTransform().getOrigin() - facet.corners[0];
+  facet.outward = facet.normal.dot(to_centre) >= 0.0 ? facet.normal : -facet.normal;
+  return facet;
 }
 
 /// Whether the touched point lies at an edge where a body may leave the triangle sideways.
-bool is_at_open_edge(const TriangleContact& contact, const WorldTriangle& triangle,
-                     bool from_front) {
+bool is_at_open_edge(const FixedContact& contact, const Facet& triangle) {
   constexpr double kNear = 1e-3;  // metres, and share of the triangle's height over the edge
-  const InnerEdges edges = contact.mesh->inner_edges[std::size_t(contact.triangle)];
+  const bool from_front = triangle.outward.dot(triangle.normal) > 0.0;
+  const InnerEdges edges = contact.mesh()->inner_edges[std::size_t(contact.triangle)];
   for (int i = 0; i < 3; ++i) {
-    const btVector3& start = triangle.corners[i];
-    const btVector3 along = (triangle.corners[(i + 1) % 3] - start).normalized();
+    const btVector3& start = triangle.corners[std::size_t(i)];
+    const btVector3 along = (triangle.corners[std::size_t(i + 1) % 3] - start).normalized();
     const btVector3 inward = triangle.normal.cross(along);
-    const double height = inward.dot(triangle.corners[(i + 2) % 3] - start);
+    const double height = inward.dot(triangle.corners[std::size_t(i + 2) % 3] - start);
     const double inside = inward.dot(contact.touched - start);
     if (inside < std::max(kNear * height, std::min(kNear, 0.1 * height)) &&
         !edges.is_inner(i, from_front)) {
@@ -105,50 +120,81 @@ bool is_at_open_edge(const TriangleContact& contact, const WorldTriangle& triang
   return false;
 }
 
-/// Away from the triangle, to the side where the body's centre of mass is.
-btVector3 outward_of(const TriangleContact& seen, const WorldTriangle& triangle) {
-  const btVector3 to_centre = seen.body->getWorldTransform().getOrigin() - triangle.corners[0];
-  return triangle.normal.dot(to_centre) >= 0.0 ? triangle.normal : -triangle.normal;
-}
-
-/// The farthest point of the touching convex shape, world; nothing for an unknown part.
-std::optional<btVector3> support_point(const TriangleContact& seen, const btVector3& direction) {
-  const btCollisionShape* shape = seen.body->getCollisionShape();
-  btTransform place = seen.body->getWorldTransform();
-  if (shape->isCompound()) {
-    const auto& compound = static_cast<const btCompoundShape&>(*shape);
-    if (seen.part < 0 || seen.part >= compound.getNumChildShapes()) return std::nullopt;
-    place = place * compound.getChildTransform(seen.part);
-    shape = compound.getChildShape(seen.part);
-  }
-  const auto& convex = static_cast<const btConvexShape&>(*shape);
+btVector3 farthest_point(const btCollisionShape& shape, const btTransform& place,
+                         const btVector3& direction) {
+  const auto& convex = static_cast<const btConvexShape&>(shape);
   return place * convex.localGetSupportingVertex(place.getBasis().transpose() * direction);
 }
 
-bool projects_inside(const WorldTriangle& triangle, const btVector3& point) {
-  for (int i = 0; i < 3; ++i) {
-    const btVector3 along = triangle.corners[(i + 1) % 3] - triangle.corners[i];
-    if (triangle.normal.cross(along).dot(point - triangle.corners[i]) < 0.0) return false;
+/// The farthest point of one part of a body, world; of the whole body for a part of -1.
+btVector3 support_point(const btCollisionObject& body, int part, const btVector3& direction) {
+  const btTransform& place = body.getWorldTransform();
+  const btCollisionShape& shape = *body.getCollisionShape();
+  if (!shape.isCompound()) return farthest_point(shape, place, direction);
+  const auto& compound = static_cast<const btCompoundShape&>(shape);
+  const auto of_child = [&](int child) {
+    return farthest_point(*compound.getChildShape(child), place * compound.getChildTransform(child),
+                          direction);
+  };
+  if (part >= 0) return of_child(part);
+  btVector3 farthest = of_child(0);
+  for (int child = 1; child < compound.getNumChildShapes(); ++child) {
+    const btVector3 point = of_child(child);
+    if (direction.dot(point) > direction.dot(farthest)) farthest = point;
+  }
+  return farthest;
+}
+
+/// The face of the box that the whole body clears by the shortest way.
+Facet exit_facet(const FixedContact& seen) {
+  const btVector3 half = seen.box()->getHalfExtentsWithMargin();
+  const btTransform& place = seen.fixed->getWorldTransform();
+  Facet facet;
+  int axis = 0;
+  double shortest = kInfinity;
+  for (int i = 0; i < 6; ++i) {
+    const btVector3 outward = place.getBasis().getColumn(i / 2) * (i % 2 == 0 ? 1.0 : -1.0);
+    const btVector3 deepest = support_point(*seen.body, -1, -outward);
+    const double way = half[i / 2] - outward.dot(deepest - place.getOrigin());
+    if (way >= shortest) continue;
+    shortest = way;
+    axis = i / 2;
+    facet.outward = outward;
+  }
+  facet.normal = facet.outward;
+  const btVector3 middle = place.getOrigin() + facet.outward * half[axis];
+  const btVector3 along = place.getBasis().getColumn((axis + 1) % 3) * half[(axis + 1) % 3];
+  const btVector3 turn = facet.normal.cross(along.normalized());
+  const btVector3 across = turn * half[(axis + 2) % 3];
+  facet.corners = {middle - along - across, middle + along - across, middle + along + across,
+                   middle - along + across};
+  return facet;
+}
+
+bool projects_inside(const Facet& facet, const btVector3& point) {
+  for (std::size_t i = 0; i < facet.corners.size(); ++i) {
+    const btVector3 along = facet.corners[(i + 1) % facet.corners.size()] - facet.corners[i];
+    if (facet.normal.cross(along).dot(point - facet.corners[i]) < 0.0) return false;
   }
   return true;
 }
 
 /// Writes the contact anew.
-void set_contact(const TriangleContact& seen, const btVector3& on_body, const btVector3& push,
+void set_contact(const FixedContact& seen, const btVector3& on_body, const btVector3& push,
                  double distance, btManifoldPoint& contact) {
-  const btVector3 on_triangle = on_body - push * distance;
+  const btVector3 on_fixed = on_body - push * distance;
   const btVector3 body_local = seen.body->getWorldTransform().invXform(on_body);
-  const btVector3 fixed_local = seen.fixed->getWorldTransform().invXform(on_triangle);
+  const btVector3 fixed_local = seen.fixed->getWorldTransform().invXform(on_fixed);
   contact.setDistance(distance);
   if (seen.is_fixed_second) {
     contact.m_normalWorldOnB = push;
     contact.m_positionWorldOnA = on_body;
-    contact.m_positionWorldOnB = on_triangle;
+    contact.m_positionWorldOnB = on_fixed;
     contact.m_localPointA = body_local;
     contact.m_localPointB = fixed_local;
   } else {
     contact.m_normalWorldOnB = -push;
-    contact.m_positionWorldOnA = on_triangle;
+    contact.m_positionWorldOnA = on_fixed;
     contact.m_positionWorldOnB = on_body;
     contact.m_localPointA = fixed_local;
     contact.m_localPointB = body_local;
@@ -157,64 +203,89 @@ void set_contact(const TriangleContact& seen, const btVector3& on_body, const bt
 
 enum class Verdict { Keep, Remove, Rebuild };
 
+Facet facet_of(const FixedContact& seen) {
+  return seen.mesh() ? triangle_facet(seen) : exit_facet(seen);
+}
+
+bool is_capsule(const FixedContact& seen) {
+  return seen.body->getCollisionShape()->getShapeType() == CAPSULE_SHAPE_PROXYTYPE;
+}
+
+// Where only the skins overlap, Bullet's contact is exact.
+bool is_deep(const FixedContact& seen, const btManifoldPoint& contact) {
+  return contact.getDistance() < -2.0 * seen.margin();
+}
+
 /// What to do with a contact; turns it to the right side where that is enough.
-Verdict mend_direction(const TriangleContact& seen, btManifoldPoint& contact) {
-  const WorldTriangle triangle = world_triangle(seen);
-  const btVector3 outward = outward_of(seen, triangle);
-  const double agreement = outward.dot(seen.push);
-  // Where only the skins overlap, Bullet's contact is exact.
-  const bool is_deep = contact.getDistance() < -2.0 * seen.mesh->shape->getMargin();
-  if (agreement > 0.99 && !is_deep) return Verdict::Keep;
-  const bool from_front = outward.dot(triangle.normal) > 0.0;
-  if (is_at_open_edge(seen, triangle, from_front)) {
-    return agreement > -0.1 ? Verdict::Keep : Verdict::Remove;
-  }
-  if (is_deep) return Verdict::Rebuild;
-  const btVector3 on_body =
-      seen.is_fixed_second ? contact.m_positionWorldOnA : contact.m_positionWorldOnB;
-  set_contact(seen, on_body, outward, contact.getDistance(), contact);
+Verdict mend_direction(const FixedContact& seen, btManifoldPoint& contact) {
+  const bool deep = is_deep(seen, contact);
+  if (!deep && !seen.mesh() && !is_capsule(seen)) return Verdict::Keep;
+  const Facet facet = facet_of(seen);
+  const double agreement = facet.outward.dot(seen.push);
+  const bool agrees = agreement > 0.99;
+  if (!deep && agrees) return is_capsule(seen) ? Verdict::Rebuild : Verdict::Keep;
+  if (!seen.mesh()) return deep ? Verdict::Rebuild : Verdict::Keep;
+  if (is_at_open_edge(seen, facet)) return agreement > -0.1 ? Verdict::Keep : Verdict::Remove;
+  if (deep) return Verdict::Rebuild;
+  set_contact(seen, seen.on_body, facet.outward, contact.getDistance(), contact);
   return Verdict::Keep;
 }
 
-/// Up to four points of the body under the triangle, the deepest one and those found in directions
-/// that lean to three sides: a foot to stand on, where the search for the way out finds one point
-/// and often a poor one.
-int rebuild_contacts(const btManifoldPoint& poor, btPersistentManifold& manifold) {
+/// Points of the body that a facet below it may touch. The lowest one and those found in directions
+/// that lean to three sides, where the search for the way out finds one point and often a poor one;
+/// of a capsule both ends, where Bullet finds one point at a time, on which it would rock.
+std::vector<btVector3> foot_points(const FixedContact& seen, const btVector3& outward) {
   constexpr double kLean = 0.4;
-  const TriangleContact seen = triangle_contact(manifold, poor);
-  const WorldTriangle triangle = world_triangle(seen);
-  const btVector3 outward = outward_of(seen, triangle);
+  std::vector<btVector3> points;
+  if (is_capsule(seen)) {
+    const auto& capsule = static_cast<const btCapsuleShape&>(*seen.body->getCollisionShape());
+    const btTransform& place = seen.body->getWorldTransform();
+    const btVector3 end = place.getBasis().getColumn(capsule.getUpAxis()) * capsule.getHalfHeight();
+    const btVector3 middle = place.getOrigin() - outward * capsule.getRadius();
+    return {middle - end, middle + end};
+  }
   btVector3 side, unused;
   btPlaneSpace1(outward, side, unused);
-  int added = 0;
-  for (int i = 0; i < 4 && manifold.getNumContacts() < MANIFOLD_CACHE_SIZE; ++i) {
-    const btVector3 lean =
-        i == 0 ? btVector3(0, 0, 0) : side.rotate(outward, btScalar(2.0 * SIMD_PI / 3.0 * i));
-    const auto point = support_point(seen, kLean * lean - outward);
-    if (!point || !projects_inside(triangle, *point)) continue;
-    const double depth = outward.dot(*point - triangle.corners[0]) - seen.mesh->shape->getMargin();
-    if (depth > 0.0) continue;
+  points.push_back(support_point(*seen.body, seen.part, -outward));
+  for (int i = 0; i < 3; ++i) {
+    const btVector3 lean = side.rotate(outward, btScalar(2.0 * SIMD_PI / 3.0 * i));
+    points.push_back(support_point(*seen.body, seen.part, kLean * lean - outward));
+  }
+  return points;
+}
+
+/// Contacts of the body's foot with the facet. Returns how many were added.
+int rebuild_contacts(const FixedContact& seen, const btManifoldPoint& poor,
+                     btPersistentManifold& manifold) {
+  const Facet facet = facet_of(seen);
+  // Bullet's boxes hold their margin inside, its triangles carry it outside.
+  const double skin = seen.mesh() ? seen.margin() : 0.0;
+  const bool deep = is_deep(seen, poor);
+  const double reach = deep ? 0.0 : manifold.getContactBreakingThreshold();
+  const int before = manifold.getNumContacts();
+  for (const btVector3& point : foot_points(seen, facet.outward)) {
+    if (manifold.getNumContacts() == MANIFOLD_CACHE_SIZE) break;
+    const double depth = facet.outward.dot(point - facet.corners[0]) - skin;
+    if (depth > reach || !projects_inside(facet, point)) continue;
     btManifoldPoint contact = poor;
     contact.m_appliedImpulse = contact.m_appliedImpulseLateral1 = 0.0;
     contact.m_appliedImpulseLateral2 = contact.m_prevRHS = 0.0;
-    set_contact(seen, *point, outward, depth, contact);
+    set_contact(seen, point, facet.outward, depth, contact);
     manifold.addManifoldPoint(contact);
-    ++added;
   }
-  return added;
+  // It may hold up a capsule whose end hangs over an edge.
+  if (!deep && manifold.getNumContacts() < MANIFOLD_CACHE_SIZE) manifold.addManifoldPoint(poor);
+  return manifold.getNumContacts() - before;
 }
 
-/// The contact turned to the right side, not deeper than the body reaches under the triangle.
-void turn_deep_contact(btManifoldPoint contact, btPersistentManifold& manifold) {
-  const TriangleContact seen = triangle_contact(manifold, contact);
-  const WorldTriangle triangle = world_triangle(seen);
-  const btVector3 outward = outward_of(seen, triangle);
-  const auto deepest = support_point(seen, -outward);
-  double depth = contact.getDistance();
-  if (deepest) depth = std::max(depth, double(outward.dot(*deepest - triangle.corners[0])));
-  const btVector3 on_body =
-      seen.is_fixed_second ? contact.m_positionWorldOnA : contact.m_positionWorldOnB;
-  set_contact(seen, on_body, outward, depth, contact);
+/// The contact turned to the right side, not deeper than the body reaches under the facet.
+void turn_deep_contact(const FixedContact& seen, btManifoldPoint contact,
+                       btPersistentManifold& manifold) {
+  const Facet facet = facet_of(seen);
+  const btVector3 deepest = support_point(*seen.body, seen.part, -facet.outward);
+  const double depth = std::max(double(contact.getDistance()),
+                                double(facet.outward.dot(deepest - facet.corners[0])));
+  set_contact(seen, seen.on_body, facet.outward, depth, contact);
   manifold.addManifoldPoint(contact);
 }
 
@@ -230,9 +301,9 @@ void GentleWorld::mend_contacts(btPersistentManifold& manifold, double lowest_di
   rebuilt_.clear();
   for (int i = manifold.getNumContacts() - 1; i >= 0; --i) {
     btManifoldPoint& contact = manifold.getContactPoint(i);
-    const TriangleContact seen = triangle_contact(manifold, contact);
-    if (!seen.mesh) continue;
-    const Verdict verdict = mend_direction(seen, contact);
+    const auto seen = fixed_contact(manifold, contact);
+    if (!seen) continue;
+    const Verdict verdict = mend_direction(*seen, contact);
     if (verdict == Verdict::Keep) continue;
     const bool is_known = std::any_of(rebuilt_.begin(), rebuilt_.end(), [&](const auto& other) {
       return other.m_index0 == contact.m_index0 && other.m_index1 == contact.m_index1;
@@ -241,8 +312,12 @@ void GentleWorld::mend_contacts(btPersistentManifold& manifold, double lowest_di
     manifold.removeContactPoint(i);
   }
   int added = 0;
-  for (const btManifoldPoint& poor : rebuilt_) added += rebuild_contacts(poor, manifold);
-  if (added == 0 && !rebuilt_.empty()) turn_deep_contact(rebuilt_.front(), manifold);
+  for (const btManifoldPoint& poor : rebuilt_) {
+    added += rebuild_contacts(*fixed_contact(manifold, poor), poor, manifold);
+  }
+  if (added == 0 && !rebuilt_.empty()) {
+    turn_deep_contact(*fixed_contact(manifold, rebuilt_.front()), rebuilt_.front(), manifold);
+  }
   for (int i = 0; i < manifold.getNumContacts(); ++i) {
     btManifoldPoint& contact = manifold.getContactPoint(i);
     contact.setDistance(std::max(contact.getDistance(), lowest_distance));
