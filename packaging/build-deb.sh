@@ -1,10 +1,17 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Builds the Debian packages into build/deb: packaging/build-deb.sh [--with-tests]
+# Builds the Debian packages into build/deb and checks them with lintian.
+#   packaging/build-deb.sh                all binary packages
+#   packaging/build-deb.sh --with-tests   the same; every test must pass first
+#   packaging/build-deb.sh --source       the source package alone, for building it elsewhere
+# A compiler cache may be given as CMake has it: CMAKE_CXX_COMPILER_LAUNCHER=ccache (with CCACHE_DIR,
+# as package builds have no home).
 set -euo pipefail
 cd "$(dirname "$0")/.."
-options=nocheck
-if [[ ${1:-} == --with-tests ]]; then options=; fi
+usage() { sed -n '3,8s/^# \{0,1\}//p' "$0" >&2; exit 2; }
+mode=${1:-}
+if (($# > 1)); then usage; fi
+
 version=$(sed -n '1s/.*(\(.*\)-.*/\1/p' packaging/debian/changelog)
 out=$PWD/build/deb
 source=$out/diorama-$version
@@ -14,8 +21,16 @@ git ls-files -z | xargs -0 cp --parents -t "$source"
 tar -C "$out" --sort=name --mtime=@0 --owner=0 --group=0 -czf "$out/diorama_$version.orig.tar.gz" \
   "diorama-$version"
 cp -r packaging/debian "$source/debian"
+
 cd "$source"
-DEB_BUILD_OPTIONS="$options parallel=$(nproc)" dpkg-buildpackage -us -uc
+export DEB_BUILD_OPTIONS="parallel=$(nproc)"
+case $mode in
+  --source) exec dpkg-buildpackage --no-sign --no-check-builddeps --build=source ;;
+  --with-tests) ;;
+  '') export DEB_BUILD_OPTIONS="$DEB_BUILD_OPTIONS nocheck" DEB_BUILD_PROFILES=nocheck ;;
+  *) usage ;;
+esac
+dpkg-buildpackage --no-sign
 cd "$out"
-lintian --info --display-info --fail-on error,warning ./*.changes
+lintian --info --fail-on error,warning ./*.changes
 ls -l ./*.deb

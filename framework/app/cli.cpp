@@ -255,9 +255,12 @@ std::vector<OptionPage> option_pages(const CLI::App& command) {
   std::vector<OptionPage> pages;
   for (const CLI::Option* option : command.get_options()) {
     if (option->get_group().empty()) continue;
-    std::string name = option->get_name(false, true);
-    if (option->get_items_expected_max() > 0) name += " " + option->get_type_name();
-    pages.push_back({name, option->get_description()});
+    OptionPage page{option->get_name(false, true), option->get_description()};
+    for (const std::string& flag : option->get_lnames()) page.flags.push_back("--" + flag);
+    if (option->get_items_expected_max() > 0) page.value = option->get_type_name();
+    if (!page.value.empty()) page.name += " " + page.value;
+    page.is_argument = option->get_positional();
+    pages.push_back(std::move(page));
   }
   return pages;
 }
@@ -270,7 +273,8 @@ void add_pages(const CLI::App& command, const std::string& name, std::vector<Com
 }
 
 void add_docs(CLI::App& app, CommandLine& line) {
-  CLI::App* command = app.add_subcommand("docs", "Write the reference as Markdown and man pages");
+  CLI::App* command = app.add_subcommand(
+      "docs", "Write the reference as Markdown and man pages, and completion for shells");
   command->add_option("--dir", line.docs_folder, "Output folder")
       ->type_name("DIR")
       ->capture_default_str();

@@ -7,6 +7,7 @@
 
 #include "framework/app/assemble.h"
 #include "framework/app/command_schema.h"
+#include "framework/app/completion_scripts.h"
 #include "framework/pipeline/job.h"
 
 namespace diorama {
@@ -15,8 +16,9 @@ int command_docs(const GlobalOptions& global, const std::vector<CommandPage>& co
                  const std::filesystem::path& folder, ConsoleLog& log) {
   const std::unique_ptr<Registry> registry = make_registry(global, log.sink());
   warn_of_rejected(*registry, log.sink());
-  const std::vector<PageFile> pages = reference_pages(
+  std::vector<PageFile> pages = reference_pages(
       commands, job_specs(), describe_all(*registry, log.sink()), program_version());
+  for (PageFile& script : completion_scripts(commands)) pages.push_back(std::move(script));
   for (const PageFile& page : pages) {
     const std::filesystem::path file = folder / page.path;
     std::error_code failed;
@@ -30,7 +32,7 @@ int command_docs(const GlobalOptions& global, const std::vector<CommandPage>& co
                       (failed ? ": " + failed.message() : "; check the rights of the folder"));
     }
   }
-  std::cout << pages.size() << " pages in " << folder.string() << "\n";
+  std::cout << pages.size() << " files in " << folder.string() << "\n";
   return 0;
 }
 

@@ -11,7 +11,7 @@
 namespace diorama {
 
 /// `diorama docs --dir DIR`: writes the reference pages of the program and the plugins that are
-/// there. Throws Error(Output).
+/// there, and completion for shells. Throws Error(Output).
 int command_docs(const GlobalOptions& global, const std::vector<CommandPage>& commands,
                  const std::filesystem::path& folder, ConsoleLog& log);
 

@@ -9,10 +9,13 @@
 #include "framework/app/cli.h"
 #include "framework/app/param_text.h"
 #include "framework/config/value_text.h"
-#include "framework/plugins/conformance.h"
+#include "framework/conformance/conformance.h"
 
 namespace diorama {
 namespace {
+
+using conformance::CheckResult;
+using conformance::Outcome;
 
 constexpr std::array kKinds{ComponentKind::Loader,     ComponentKind::Physics,
                             ComponentKind::Randomizer, ComponentKind::Renderer,
@@ -127,6 +130,32 @@ void print_description(const ComponentEntry& entry, const std::vector<ParamSpec>
   }
 }
 
+std::ptrdiff_t count(const std::vector<CheckResult>& results, Outcome outcome) {
+  return std::ranges::count(results, outcome, &CheckResult::outcome);
+}
+
+void print_checks(const std::vector<CheckResult>& results) {
+  for (const CheckResult& result : results) {
+    std::cout << padded(outcome_name(result.outcome), 8) << result.subject << ": " << result.check
+              << (result.message.empty() ? "" : ": " + result.message) << "\n";
+  }
+  std::cout << results.size() << " checks, " << count(results, Outcome::Failed) << " failed, "
+            << count(results, Outcome::Skipped) << " skipped\n";
+}
+
+void print_checks_json(const std::vector<CheckResult>& results) {
+  Value list = Value::make_list();
+  for (const CheckResult& result : results) {
+    Value value = Value::make_map();
+    value.set("subject", Value::text(result.subject));
+    value.set("check", Value::text(result.check));
+    value.set("outcome", Value::text(outcome_name(result.outcome)));
+    if (!result.message.empty()) value.set("message", Value::text(result.message));
+    list.list.push_back(std::move(value));
+  }
+  std::cout << to_json(list, 2) << "\n";
+}
+
 }  // namespace
 
 int command_plugins_list(const GlobalOptions& global, bool as_json, ConsoleLog& log) {
@@ -164,27 +193,12 @@ int command_plugins_check(const std::filesystem::path& file, bool as_json, Conso
     log.write(level == LogLevel::Error ? level : LogLevel::Debug, text);
   };
   const std::vector<CheckResult> results = check_plugin(file, only_errors);
-  Value list = Value::make_list();
-  int failures = 0;
-  for (const CheckResult& result : results) {
-    const bool has_passed = result.failure.empty();
-    failures += has_passed ? 0 : 1;
-    Value value = Value::make_map();
-    value.set("subject", Value::text(result.subject));
-    value.set("check", Value::text(result.check));
-    value.set("passed", Value::boolean(has_passed));
-    if (!has_passed) value.set("failure", Value::text(result.failure));
-    list.list.push_back(std::move(value));
-    if (as_json) continue;
-    std::cout << (has_passed ? "ok    " : "FAIL  ") << result.subject << ": " << result.check
-              << (has_passed ? "" : ": " + result.failure) << "\n";
-  }
   if (as_json) {
-    std::cout << to_json(list, 2) << "\n";
+    print_checks_json(results);
   } else {
-    std::cout << results.size() << " checks, " << failures << " failed\n";
+    print_checks(results);
   }
-  return failures == 0 ? 0 : exit_code(ErrorKind::Plugin);
+  return count(results, Outcome::Failed) == 0 ? 0 : exit_code(ErrorKind::Plugin);
 }
 
 }  // namespace diorama

@@ -13,6 +13,9 @@ namespace diorama {
 struct OptionPage {
   std::string name;  ///< "--seed N", "JOB".
   std::string help;
+  std::vector<std::string> flags{};  ///< "--seed".
+  std::string value{};               ///< "N"; empty when none follows.
+  bool is_argument = false;          ///< May stand without a flag.
 };
 
 struct CommandPage {

@@ -7,7 +7,9 @@ file(RENAME ${WORK}/installed ${PREFIX})
 foreach(file IN ITEMS
     include/diorama/scene.h ${LIBDIR}/libdiorama_sdk.so ${LIBDIR}/libdiorama_sdk.so.${ABI}
     ${LIBDIR}/libdiorama_sdk.so.${VERSION} ${LIBDIR}/cmake/diorama_sdk/diorama_sdk-config.cmake
-    ${LIBDIR}/pkgconfig/diorama_sdk.pc share/diorama/templates/common/CMakeLists.txt)
+    ${LIBDIR}/pkgconfig/diorama_sdk.pc share/diorama/templates/common/CMakeLists.txt
+    share/man/man1/diorama.1 share/man/man5/diorama-job.5 share/bash-completion/completions/diorama
+    share/zsh/vendor-completions/_diorama share/fish/vendor_completions.d/diorama.fish)
   if(NOT EXISTS ${PREFIX}/${file})
     message(FATAL_ERROR "${file} was not installed")
   endif()
@@ -26,3 +28,15 @@ foreach(file IN LISTS texts)
 endforeach()
 run(${DIORAMA} --version)
 expect_text("diorama ${VERSION} (plugin ABI ${ABI})")
+
+# Completion knows every option that the help shows.
+run(bash -c "source ${PREFIX}/share/bash-completion/completions/diorama; COMP_WORDS=(diorama run --); \
+             COMP_CWORD=2; _diorama; echo \${COMPREPLY[*]}")
+set(offered "${OUT}")
+run(${DIORAMA} run --help)
+string(REGEX MATCHALL "--[a-z-]+" options "${OUT}")
+foreach(option IN LISTS options)
+  if(NOT offered MATCHES "${option}( |\n)")
+    message(FATAL_ERROR "completion lacks ${option}; it offers ${offered}")
+  endif()
+endforeach()

@@ -69,6 +69,6 @@ class CameraShake final : public diorama::Randomizer {
 
 //! [plugin]
 DIORAMA_PLUGIN("camera_shake", "1.0.0", "Apache-2.0") {
-  diorama::add<CameraShake>(registrar, "camera_shake", "Shakes cameras like a hand.");
+  DIORAMA_ADD(CameraShake, "camera_shake", "Shakes cameras like a hand.");
 }
 //! [plugin]

@@ -123,5 +123,5 @@ class CsvBoxes final : public diorama::Writer {
 }  // namespace
 
 DIORAMA_PLUGIN("csv_boxes", "1.0.0", "Apache-2.0") {
-  diorama::add<CsvBoxes>(registrar, "csv_boxes", "Writes one CSV table of all boxes.");
+  DIORAMA_ADD(CsvBoxes, "csv_boxes", "Writes one CSV table of all boxes.");
 }

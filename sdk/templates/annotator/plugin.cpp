@@ -55,5 +55,5 @@ class @CLASS@ final : public diorama::Annotator {
 }  // namespace
 
 DIORAMA_PLUGIN("@NAME@", "0.1.0", "@LICENCE@") {
-  diorama::add<@CLASS@>(registrar, "@NAME@", "Marks jumps of the distance between pixels.");
+  DIORAMA_ADD(@CLASS@, "@NAME@", "Marks jumps of the distance between pixels.");
 }

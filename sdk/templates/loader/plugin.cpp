@@ -93,5 +93,5 @@ class @CLASS@ final : public diorama::Loader {
 }  // namespace
 
 DIORAMA_PLUGIN("@NAME@", "0.1.0", "@LICENCE@") {
-  diorama::add<@CLASS@>(registrar, "@NAME@", "Makes shelves of boards.");
+  DIORAMA_ADD_LOADER(@CLASS@, "@NAME@", "Makes shelves of boards.", "@NAME@:");
 }

@@ -93,5 +93,5 @@ class @CLASS@ final : public diorama::PhysicsBackend {
 }  // namespace
 
 DIORAMA_PLUGIN("@NAME@", "0.1.0", "@LICENCE@") {
-  diorama::add<@CLASS@>(registrar, "@NAME@", "Lets bodies fall straight onto a level ground.");
+  DIORAMA_ADD(@CLASS@, "@NAME@", "Lets bodies fall straight onto a level ground.");
 }

@@ -45,5 +45,5 @@ class @CLASS@ final : public diorama::Randomizer {
 }  // namespace
 
 DIORAMA_PLUGIN("@NAME@", "0.1.0", "@LICENCE@") {
-  diorama::add<@CLASS@>(registrar, "@NAME@", "Turns and scales nodes at random.");
+  DIORAMA_ADD(@CLASS@, "@NAME@", "Turns and scales nodes at random.");
 }

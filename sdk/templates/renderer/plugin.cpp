@@ -204,5 +204,5 @@ class @CLASS@ final : public diorama::Renderer {
 }  // namespace
 
 DIORAMA_PLUGIN("@NAME@", "0.1.0", "@LICENCE@") {
-  diorama::add<@CLASS@>(registrar, "@NAME@", "Casts one ray per pixel, with a lamp at the camera.");
+  DIORAMA_ADD(@CLASS@, "@NAME@", "Casts one ray per pixel, with a lamp at the camera.");
 }

@@ -63,5 +63,5 @@ class @CLASS@ final : public diorama::Writer {
 }  // namespace
 
 DIORAMA_PLUGIN("@NAME@", "0.1.0", "@LICENCE@") {
-  diorama::add<@CLASS@>(registrar, "@NAME@", "Writes the boxes of each picture as CSV.");
+  DIORAMA_ADD(@CLASS@, "@NAME@", "Writes the boxes of each picture as CSV.");
 }

@@ -14,5 +14,5 @@ struct Stranger final : diorama::Randomizer {
 };
 
 DIORAMA_PLUGIN("stranger_plugin", "1.2.3", "MIT") {
-  diorama::add<Stranger>(registrar, "stranger", "Does nothing.");
+  DIORAMA_ADD(Stranger, "stranger", "Does nothing.");
 }

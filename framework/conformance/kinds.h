@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "framework/conformance/check_run.h"
+#include "framework/host/host_services.h"
+#include "framework/plugins/registry.h"
+
+/// What components of each kind must hold, beyond their parameters.
+namespace diorama::conformance {
+
+/// Makes components of one type. Hosts with one and with two threads, as nothing may depend on the
+/// number.
+struct Subject {
+  const ComponentEntry& entry;
+  Registry& registry;
+  HostServices& host;
+  HostServices& single_threaded_host;
+
+  /// With defaults, or with the keys of `params`. Throws Error(Config) for bad parameters.
+  template <class T>
+  std::unique_ptr<T> make(Host& on, Value params = Value::make_map()) const {
+    params.set("type", Value::text(entry.type));
+    Complaints complaints;
+    std::unique_ptr<T> made = registry.make<T>(params, "check", {}, complaints, on);
+    complaints.raise();
+    return made;
+  }
+  template <class T>
+  std::unique_ptr<T> make() const {
+    return make<T>(host);
+  }
+};
+
+/// Documented; defaults valid; unknown keys, wrong types, unknown words and values out of range
+/// refused. False when no component can be made with the defaults.
+bool check_parameters(const CheckRun& run, const Subject& subject);
+
+void check_loader(const CheckRun& run, const Subject& subject);
+void check_physics(const CheckRun& run, const Subject& subject);
+void check_randomizer(const CheckRun& run, const Subject& subject);
+void check_renderer(const CheckRun& run, const Subject& subject);
+void check_annotator(const CheckRun& run, const Subject& subject);
+void check_writer(const CheckRun& run, const Subject& subject);
+
+}  // namespace diorama::conformance

@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "diorama/writer.h"
+
+#include <algorithm>
+#include <exception>
+#include <map>
+#include <thread>
+
+#include "framework/conformance/fingerprint.h"
+#include "framework/conformance/kinds.h"
+#include "framework/conformance/sample_scene.h"
+
+namespace diorama::conformance {
+namespace {
+
+constexpr int kCaptures = 4;
+
+/// Files in memory; complains about names that lead elsewhere and about names that come twice.
+class MemoryFiles final : public CaptureFiles {
+ public:
+  std::map<std::string, std::vector<std::byte>> files;
+  std::vector<std::string> records;
+
+  void add(std::string_view path, std::vector<std::byte> bytes) override {
+    const std::filesystem::path relative(path);
+    const bool leaves = std::find(relative.begin(), relative.end(), "..") != relative.end();
+    require(!path.empty() && relative.is_relative() && !leaves,
+            "writes '" + std::string(path) + "', which lies outside of its folder");
+    require(files.emplace(path, std::move(bytes)).second,
+            "writes '" + std::string(path) + "' twice");
+  }
+  void record(std::string_view line) override {
+    require(line.find('\n') == line.npos, "a record holds a line break");
+    records.emplace_back(line);
+  }
+  friend bool operator==(const MemoryFiles& a, const MemoryFiles& b) {
+    return a.files == b.files && a.records == b.records;
+  }
+};
+
+/// All of a dataset; which capture has written a file counts.
+struct Dataset {
+  std::vector<MemoryFiles> captures;
+  MemoryFiles whole;  ///< Of begin() and finish().
+  friend bool operator==(const Dataset&, const Dataset&) = default;
+};
+
+void finish(Writer& writer, Dataset& dataset) {
+  const RecordReader records = [&dataset](const RecordVisitor& visit) {
+    for (std::size_t i = 0; i < dataset.captures.size(); ++i) {
+      for (const std::string& line : dataset.captures[i].records) visit(int(i), line);
+    }
+  };
+  writer.finish(records, dataset.whole);
+  MemoryFiles folder = dataset.whole;
+  for (const MemoryFiles& capture : dataset.captures) {
+    for (const auto& [path, bytes] : capture.files) folder.add(path, bytes);
+  }
+}
+
+Dataset begun(Writer& writer, const std::vector<Capture>& captures) {
+  Dataset dataset;
+  dataset.captures.resize(captures.size());
+  writer.begin(sample_dataset(int(captures.size())), dataset.whole);
+  return dataset;
+}
+
+Dataset write_in_order(Writer& writer, const std::vector<Capture>& captures) {
+  Dataset dataset = begun(writer, captures);
+  for (std::size_t i = 0; i < captures.size(); ++i) {
+    writer.write(captures[i], dataset.captures[i]);
+  }
+  finish(writer, dataset);
+  return dataset;
+}
+
+/// Two threads, the last captures first.
+Dataset write_on_two_threads(Writer& writer, const std::vector<Capture>& captures) {
+  Dataset dataset = begun(writer, captures);
+  std::exception_ptr failures[2];
+  const auto write_half = [&](std::size_t half) {
+    try {
+      for (std::size_t i = captures.size(); i-- > 0;) {
+        if (i % 2 == half) writer.write(captures[i], dataset.captures[i]);
+      }
+    } catch (...) {
+      failures[half] = std::current_exception();
+    }
+  };
+  std::thread other(write_half, 1);
+  write_half(0);
+  other.join();
+  for (const std::exception_ptr& failure : failures) {
+    if (failure) std::rethrow_exception(failure);
+  }
+  finish(writer, dataset);
+  return dataset;
+}
+
+/// The first name it needs that no frame of the checks has: a channel of another plugin.
+std::string foreign_need(const Writer& writer, const Frame& frame) {
+  const NameSet annotations{"instances", "visibility", "amodal_mask"};
+  for (const std::string& name : writer.needs()) {
+    if (!frame.has(name) && !annotations.contains(name)) return name;
+  }
+  return {};
+}
+
+/// Every switch on, so that as much as possible is written.
+Value with_all_switches(const Subject& subject) {
+  Value params = Value::make_map();
+  for (const ParamSpec& spec : subject.registry.describe(subject.entry.kind, subject.entry.type)) {
+    if (spec.type == ParamType::Bool) params.set(spec.key, Value::boolean(true));
+  }
+  return params;
+}
+
+void check_dataset(const CheckRun& run, const Subject& subject, const std::string& which,
+                   const Value& params) {
+  const std::vector<Capture> captures = sample_captures(kCaptures, subject.host);
+  const std::string foreign =
+      foreign_need(*subject.make<Writer>(subject.host, params), captures.front().frames.front());
+  if (!foreign.empty()) {
+    run.skip("captures are written" + which, "needs '" + foreign + "', which another plugin makes");
+    return;
+  }
+  const auto fresh = [&](Host& host) { return subject.make<Writer>(host, params); };
+  Dataset dataset;
+  run.check("captures are written and left as they were" + which, [&] {
+    const auto fingerprints = [&captures] {
+      std::string all;
+      for (const Capture& capture : captures) all += fingerprint(capture);
+      return all;
+    };
+    const std::string before = fingerprints();
+    dataset = write_in_order(*fresh(subject.host), captures);
+    require(before == fingerprints(), "changes the captures");
+  });
+  run.check("the same captures give the same bytes" + which, [&] {
+    require(dataset == write_in_order(*fresh(subject.host), captures), "differs the second time");
+    require(dataset == write_in_order(*fresh(subject.single_threaded_host), captures),
+            "differs with one thread");
+  });
+  run.check("captures may come in any order, on two threads" + which, [&] {
+    require(dataset == write_on_two_threads(*fresh(subject.host), captures),
+            "differs from captures in order");
+  });
+}
+
+Capture capture_that_shows_nothing(Host& host) {
+  Scene scene;
+  const NodeId camera = scene.create(scene.root(), "cam_0");
+  scene.edit(camera).camera = Camera::from_lens(3, 2, 24.0, 20.955);
+  Capture capture;
+  capture.frames.push_back(painted_frame(scene, camera, host));
+  return capture;
+}
+
+/// Nothing when its switches exclude each other, which a component may say.
+std::optional<Value> usable_switches(const Subject& subject) {
+  const Value params = with_all_switches(subject);
+  if (params.map.empty()) return std::nullopt;
+  try {
+    subject.make<Writer>(subject.host, params);
+  } catch (const Error&) {
+    return std::nullopt;
+  }
+  return params;
+}
+
+}  // namespace
+
+void check_writer(const CheckRun& run, const Subject& subject) {
+  run.check("a dataset without captures is survived",
+            [&] { write_in_order(*subject.make<Writer>(), {}); });
+  run.check("a capture without frames is survived", [&] {
+    std::vector<Capture> captures(1);
+    write_in_order(*subject.make<Writer>(), captures);
+  });
+  run.check("a frame that shows nothing is survived", [&] {
+    const auto writer = subject.make<Writer>();
+    std::vector<Capture> captures;
+    captures.push_back(capture_that_shows_nothing(subject.host));
+    if (foreign_need(*writer, captures.front().frames.front()).empty()) {
+      write_in_order(*writer, captures);
+    }
+  });
+  check_dataset(run, subject, "", Value::make_map());
+  if (const auto params = usable_switches(subject)) {
+    check_dataset(run, subject, ", every switch on", *params);
+  }
+}
+
+}  // namespace diorama::conformance

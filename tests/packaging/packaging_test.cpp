@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+// The Debian packages name the ABI, the version and the plugins that the sources have.
+#include <filesystem>
+#include <fstream>
+#include <regex>
+#include <set>
+#include <sstream>
+#include <string>
+
+#include "diorama/abi.h"
+#include "support/catch.h"
+
+namespace fs = std::filesystem;
+
+namespace {
+
+const fs::path kRoot = DIORAMA_SOURCE_DIR;
+const std::string kAbi = DIORAMA_DETAIL_TEXT(DIORAMA_SDK_ABI);
+
+std::string read_text(const fs::path& file) {
+  std::ostringstream text;
+  text << std::ifstream(file).rdbuf();
+  return text.str();
+}
+
+std::string debian(const std::string& name) { return read_text(kRoot / "packaging/debian" / name); }
+
+/// What the first group of the expression matches, each once.
+std::set<std::string> all(const std::string& text, const std::string& expression) {
+  const std::regex regex(expression);
+  std::set<std::string> found;
+  for (std::sregex_iterator it(text.begin(), text.end(), regex), end; it != end; ++it) {
+    found.insert((*it)[1]);
+  }
+  return found;
+}
+
+/// "writer_*.so" names writer_coco.
+bool names(const std::string& pattern, const std::string& plugin) {
+  const std::size_t star = pattern.find('*');
+  return star == pattern.npos ? pattern == plugin : plugin.starts_with(pattern.substr(0, star));
+}
+
+}  // namespace
+
+TEST_CASE("packages carry the number of the plugin interface", "[packaging]") {
+  const std::string control = debian("control");
+  CHECK(all(control, "libdiorama-sdk(\\d+)") == std::set<std::string>{kAbi});
+  CHECK(all(control, "diorama-plugin-abi-(\\d+)") == std::set<std::string>{kAbi});
+  CHECK(all(debian("rules"), "libdiorama-sdk(\\d+)") == std::set<std::string>{kAbi});
+  CHECK(fs::exists(kRoot / "packaging/debian" / ("libdiorama-sdk" + kAbi + ".install")));
+}
+
+TEST_CASE("packages carry the version of the project", "[packaging]") {
+  CHECK(debian("changelog").starts_with("diorama (" DIORAMA_VERSION "-"));
+}
+
+TEST_CASE("every package is installed from somewhere", "[packaging]") {
+  for (const std::string& package : all(debian("control"), "\nPackage: (\\S+)")) {
+    INFO(package);
+    CHECK(fs::exists(kRoot / "packaging/debian" / (package + ".install")));
+  }
+}
+
+TEST_CASE("every plugin is in one package", "[packaging]") {
+  const std::string list = read_text(kRoot / "plugins/CMakeLists.txt");
+  std::set<std::string> plugins = all(list, "\n  ([a-z]+_[a-z_0-9]+)(?=\n|\\))");
+  plugins.erase("writer_support");
+  CHECK(plugins.size() > 15);
+  for (const std::string& plugin : plugins) {
+    int packages = 0;
+    for (const auto& entry : fs::directory_iterator(kRoot / "packaging/debian")) {
+      if (entry.path().extension() != ".install") continue;
+      for (const std::string& pattern : all(read_text(entry.path()), "plugins-\\*/(\\S+)\\.so")) {
+        packages += names(pattern, plugin) ? 1 : 0;
+      }
+    }
+    INFO(plugin);
+    CHECK(packages == 1);
+  }
+}
