@@ -118,15 +118,13 @@ std::vector<Vec3> reduced_hull_points(std::span<const Vec3> points, std::size_t 
   while (chosen.size() < max_points) {
     const std::vector<Outlier> found = outliers(full, convex_hull(picked(full, chosen)), tolerance);
     if (found.empty()) break;
-    const std::size_t room = max_points - chosen.size();
-    std::size_t wanted = std::max<std::size_t>(1, room / 4);
-    for (const Outlier& outlier : found) {
-      if (wanted == 0) break;
-      if (std::find(chosen.begin(), chosen.end(), outlier.point) != chosen.end()) continue;
-      chosen.push_back(outlier.point);
-      --wanted;
-    }
-    if (room == max_points - chosen.size()) break;  // rounding: all outliers are chosen already
+    // One at a time: faces side by side share an outlier's neighbourhood, and points spent twice
+    // there leave a flat elsewhere.
+    const auto next = std::find_if(found.begin(), found.end(), [&](const Outlier& outlier) {
+      return std::find(chosen.begin(), chosen.end(), outlier.point) == chosen.end();
+    });
+    if (next == found.end()) break;  // rounding: all outliers are chosen already
+    chosen.push_back(next->point);
   }
   return convex_hull(picked(full, chosen)).points;
 }

@@ -38,6 +38,7 @@ struct FixedContact {
   btVector3 push;     ///< Direction in which the contact pushes the body.
   btVector3 on_body;  ///< Point of the body, world.
   btVector3 touched;  ///< Point of the fixed thing, world.
+  btVector3 origin;   ///< Where the body's centre of mass was when nothing was deep in it, world.
 
   const StaticMesh* mesh() const { return static_cast<const StaticMesh*>(fixed->getUserPointer()); }
   const btBoxShape* box() const {
@@ -50,10 +51,11 @@ struct FixedContact {
 
 /// Nothing unless one of the two is fixed and made of triangles or a box.
 std::optional<FixedContact> fixed_contact(const btPersistentManifold& manifold,
-                                          const btManifoldPoint& contact) {
+                                          const btManifoldPoint& contact,
+                                          const std::vector<btVector3>& clear_centres) {
   const btCollisionObject* a = manifold.getBody0();
   const btCollisionObject* b = manifold.getBody1();
-  FixedContact seen;
+  FixedContact seen{};
   if (b->isStaticObject()) {
     seen = {a,
             b,
@@ -76,6 +78,7 @@ std::optional<FixedContact> fixed_contact(const btPersistentManifold& manifold,
     return std::nullopt;
   }
   if (seen.mesh() ? seen.triangle < 0 : !seen.box()) return std::nullopt;
+  seen.origin = clear_centres[std::size_t(seen.body->getUserIndex())];
   return seen;
 }
 
@@ -86,7 +89,7 @@ struct Facet {
   btVector3 outward;  ///< Along or against the normal.
 };
 
-/// The touched triangle, outward to the side where the body's centre of mass is.
+/// The touched triangle, outward to the side from which the body came.
 Facet triangle_facet(const FixedContact& seen) {
   Facet facet;
   const StaticMesh& mesh = *seen.mesh();
@@ -96,7 +99,7 @@ Facet triangle_facet(const FixedContact& seen) {
   }
   const btVector3 along = facet.corners[1] - facet.corners[0];
   facet.normal = along.cross(facet.corners[2] - facet.corners[0]).normalized();
-  const btVector3 to_centre = seen.body->getWorldTransform().getOrigin() - facet.corners[0];
+  const btVector3 to_centre = seen.origin - facet.corners[0];
   facet.outward = facet.normal.dot(to_centre) >= 0.0 ? facet.normal : -facet.normal;
   return facet;
 }
@@ -120,26 +123,33 @@ bool is_at_open_edge(const FixedContact& contact, const Facet& triangle) {
   return false;
 }
 
-btVector3 farthest_point(const btCollisionShape& shape, const btTransform& place,
-                         const btVector3& direction) {
-  const auto& convex = static_cast<const btConvexShape&>(shape);
-  return place * convex.localGetSupportingVertex(place.getBasis().transpose() * direction);
+/// A convex shape of a body and its place in the world.
+struct PlacedPart {
+  const btConvexShape* shape;
+  btTransform place;
+
+  btVector3 farthest(const btVector3& direction) const {
+    return place * shape->localGetSupportingVertex(place.getBasis().transpose() * direction);
+  }
+};
+
+PlacedPart part_of(const btCollisionObject& body, int part) {
+  const btTransform& place = body.getWorldTransform();
+  const btCollisionShape* shape = body.getCollisionShape();
+  if (!shape->isCompound()) return {static_cast<const btConvexShape*>(shape), place};
+  const auto& compound = static_cast<const btCompoundShape&>(*shape);
+  return {static_cast<const btConvexShape*>(compound.getChildShape(part)),
+          place * compound.getChildTransform(part)};
 }
 
-/// The farthest point of one part of a body, world; of the whole body for a part of -1.
-btVector3 support_point(const btCollisionObject& body, int part, const btVector3& direction) {
-  const btTransform& place = body.getWorldTransform();
+/// The farthest point of a whole body, world.
+btVector3 support_point(const btCollisionObject& body, const btVector3& direction) {
   const btCollisionShape& shape = *body.getCollisionShape();
-  if (!shape.isCompound()) return farthest_point(shape, place, direction);
-  const auto& compound = static_cast<const btCompoundShape&>(shape);
-  const auto of_child = [&](int child) {
-    return farthest_point(*compound.getChildShape(child), place * compound.getChildTransform(child),
-                          direction);
-  };
-  if (part >= 0) return of_child(part);
-  btVector3 farthest = of_child(0);
-  for (int child = 1; child < compound.getNumChildShapes(); ++child) {
-    const btVector3 point = of_child(child);
+  const int count =
+      shape.isCompound() ? static_cast<const btCompoundShape&>(shape).getNumChildShapes() : 1;
+  btVector3 farthest = part_of(body, 0).farthest(direction);
+  for (int part = 1; part < count; ++part) {
+    const btVector3 point = part_of(body, part).farthest(direction);
     if (direction.dot(point) > direction.dot(farthest)) farthest = point;
   }
   return farthest;
@@ -154,7 +164,7 @@ Facet exit_facet(const FixedContact& seen) {
   double shortest = kInfinity;
   for (int i = 0; i < 6; ++i) {
     const btVector3 outward = place.getBasis().getColumn(i / 2) * (i % 2 == 0 ? 1.0 : -1.0);
-    const btVector3 deepest = support_point(*seen.body, -1, -outward);
+    const btVector3 deepest = support_point(*seen.body, -outward);
     const double way = half[i / 2] - outward.dot(deepest - place.getOrigin());
     if (way >= shortest) continue;
     shortest = way;
@@ -231,58 +241,90 @@ Verdict mend_direction(const FixedContact& seen, btManifoldPoint& contact) {
   return Verdict::Keep;
 }
 
-/// Points of the body that a facet below it may touch. The lowest one and those found in directions
-/// that lean to three sides, where the search for the way out finds one point and often a poor one;
-/// of a capsule both ends, where Bullet finds one point at a time, on which it would rock.
+/// Points of the touching part that a facet below it may touch: the corners of a hull or a box, the
+/// two ends of a capsule, of other round shapes the lowest point and those found in directions that
+/// lean to three sides. Bullet finds one point at a time, on which a body rocks, and deep in the
+/// other thing often a poor one.
 std::vector<btVector3> foot_points(const FixedContact& seen, const btVector3& outward) {
-  constexpr double kLean = 0.4;
+  const auto [shape, place] = part_of(*seen.body, seen.part);
   std::vector<btVector3> points;
   if (is_capsule(seen)) {
-    const auto& capsule = static_cast<const btCapsuleShape&>(*seen.body->getCollisionShape());
-    const btTransform& place = seen.body->getWorldTransform();
+    const auto& capsule = static_cast<const btCapsuleShape&>(*shape);
     const btVector3 end = place.getBasis().getColumn(capsule.getUpAxis()) * capsule.getHalfHeight();
     const btVector3 middle = place.getOrigin() - outward * capsule.getRadius();
     return {middle - end, middle + end};
   }
+  if (shape->isPolyhedral()) {
+    const auto& polyhedron = static_cast<const btPolyhedralConvexShape&>(*shape);
+    // A hull carries its margin outside of its corners, a box inside.
+    const bool is_hull = shape->getShapeType() == CONVEX_HULL_SHAPE_PROXYTYPE;
+    const btVector3 margin = outward * (is_hull ? shape->getMargin() : 0.0);
+    for (int i = 0; i < polyhedron.getNumVertices(); ++i) {
+      btVector3 corner;
+      polyhedron.getVertex(i, corner);
+      points.push_back(place * corner - margin);
+    }
+    return points;
+  }
+  constexpr double kLean = 0.4;
   btVector3 side, unused;
   btPlaneSpace1(outward, side, unused);
-  points.push_back(support_point(*seen.body, seen.part, -outward));
+  points.push_back(PlacedPart{shape, place}.farthest(-outward));
   for (int i = 0; i < 3; ++i) {
     const btVector3 lean = side.rotate(outward, btScalar(2.0 * SIMD_PI / 3.0 * i));
-    points.push_back(support_point(*seen.body, seen.part, kLean * lean - outward));
+    points.push_back(PlacedPart{shape, place}.farthest(kLean * lean - outward));
   }
   return points;
 }
 
-/// Contacts of the body's foot with the facet. Returns how many were added.
-int rebuild_contacts(const FixedContact& seen, const btManifoldPoint& poor,
-                     btPersistentManifold& manifold) {
+/// The candidate to add next: touching before near, far from those that are there. Null when only
+/// repetitions are left.
+const btManifoldPoint* next_contact(const std::vector<btManifoldPoint>& candidates,
+                                    const btPersistentManifold& manifold) {
+  constexpr double kApart = 1e-3;  // metres
+  const btManifoldPoint* best = nullptr;
+  double best_gap = 0.0;
+  for (const btManifoldPoint& candidate : candidates) {
+    double gap = kInfinity;
+    for (int i = 0; i < manifold.getNumContacts(); ++i) {
+      const btVector3& other = manifold.getContactPoint(i).m_localPointA;
+      gap = std::min(gap, double(candidate.m_localPointA.distance(other)));
+    }
+    if (gap < kApart) continue;
+    const bool touches = candidate.getDistance() < 0.0;
+    const bool best_touches = best && best->getDistance() < 0.0;
+    const bool is_better = !best || (touches != best_touches ? touches : gap > best_gap);
+    if (!is_better) continue;
+    best = &candidate;
+    best_gap = gap;
+  }
+  return best;
+}
+
+/// Appends the contacts of the body's foot with the facet.
+void rebuild_contacts(const FixedContact& seen, const btManifoldPoint& poor, double reach,
+                      std::vector<btManifoldPoint>& contacts) {
   const Facet facet = facet_of(seen);
   // Bullet's boxes hold their margin inside, its triangles carry it outside.
   const double skin = seen.mesh() ? seen.margin() : 0.0;
-  const bool deep = is_deep(seen, poor);
-  const double reach = deep ? 0.0 : manifold.getContactBreakingThreshold();
-  const int before = manifold.getNumContacts();
   for (const btVector3& point : foot_points(seen, facet.outward)) {
-    if (manifold.getNumContacts() == MANIFOLD_CACHE_SIZE) break;
-    const double depth = facet.outward.dot(point - facet.corners[0]) - skin;
-    if (depth > reach || !projects_inside(facet, point)) continue;
+    const double distance = facet.outward.dot(point - facet.corners[0]) - skin;
+    if (distance > reach || !projects_inside(facet, point)) continue;
     btManifoldPoint contact = poor;
     contact.m_appliedImpulse = contact.m_appliedImpulseLateral1 = 0.0;
     contact.m_appliedImpulseLateral2 = contact.m_prevRHS = 0.0;
-    set_contact(seen, point, facet.outward, depth, contact);
-    manifold.addManifoldPoint(contact);
+    set_contact(seen, point, facet.outward, distance, contact);
+    contacts.push_back(contact);
   }
   // It may hold up a capsule whose end hangs over an edge.
-  if (!deep && manifold.getNumContacts() < MANIFOLD_CACHE_SIZE) manifold.addManifoldPoint(poor);
-  return manifold.getNumContacts() - before;
+  if (!is_deep(seen, poor)) contacts.push_back(poor);
 }
 
 /// The contact turned to the right side, not deeper than the body reaches under the facet.
 void turn_deep_contact(const FixedContact& seen, btManifoldPoint contact,
                        btPersistentManifold& manifold) {
   const Facet facet = facet_of(seen);
-  const btVector3 deepest = support_point(*seen.body, seen.part, -facet.outward);
+  const btVector3 deepest = part_of(*seen.body, seen.part).farthest(-facet.outward);
   const double depth = std::max(double(contact.getDistance()),
                                 double(facet.outward.dot(deepest - facet.corners[0])));
   set_contact(seen, seen.on_body, facet.outward, depth, contact);
@@ -298,11 +340,15 @@ GentleWorld::GentleWorld(btDispatcher* dispatcher, btBroadphaseInterface* broadp
       max_depenetration_speed_(max_depenetration_speed) {}
 
 void GentleWorld::mend_contacts(btPersistentManifold& manifold, double lowest_distance) {
+  const auto fixed = [&](const btManifoldPoint& contact) {
+    return fixed_contact(manifold, contact, clear_centres_);
+  };
   rebuilt_.clear();
   for (int i = manifold.getNumContacts() - 1; i >= 0; --i) {
     btManifoldPoint& contact = manifold.getContactPoint(i);
-    const auto seen = fixed_contact(manifold, contact);
+    const auto seen = fixed(contact);
     if (!seen) continue;
+    if (is_deep(*seen, contact)) is_clear_[std::size_t(seen->body->getUserIndex())] = false;
     const Verdict verdict = mend_direction(*seen, contact);
     if (verdict == Verdict::Keep) continue;
     const bool is_known = std::any_of(rebuilt_.begin(), rebuilt_.end(), [&](const auto& other) {
@@ -311,12 +357,20 @@ void GentleWorld::mend_contacts(btPersistentManifold& manifold, double lowest_di
     if (verdict == Verdict::Rebuild && !is_known) rebuilt_.push_back(contact);
     manifold.removeContactPoint(i);
   }
-  int added = 0;
+  candidates_.clear();
   for (const btManifoldPoint& poor : rebuilt_) {
-    added += rebuild_contacts(*fixed_contact(manifold, poor), poor, manifold);
+    rebuild_contacts(*fixed(poor), poor, manifold.getContactBreakingThreshold(), candidates_);
   }
-  if (added == 0 && !rebuilt_.empty()) {
-    turn_deep_contact(*fixed_contact(manifold, rebuilt_.front()), rebuilt_.front(), manifold);
+  std::stable_sort(candidates_.begin(), candidates_.end(),
+                   [](const auto& a, const auto& b) { return a.getDistance() < b.getDistance(); });
+  while (manifold.getNumContacts() < MANIFOLD_CACHE_SIZE) {
+    const btManifoldPoint* next = next_contact(candidates_, manifold);
+    if (!next) break;
+    manifold.addManifoldPoint(*next);
+  }
+  const bool touches = !candidates_.empty() && candidates_.front().getDistance() < 0.0;
+  if (!touches && !rebuilt_.empty() && is_deep(*fixed(rebuilt_.front()), rebuilt_.front())) {
+    turn_deep_contact(*fixed(rebuilt_.front()), rebuilt_.front(), manifold);
   }
   for (int i = 0; i < manifold.getNumContacts(); ++i) {
     btManifoldPoint& contact = manifold.getContactPoint(i);
@@ -328,9 +382,17 @@ void GentleWorld::solveConstraints(btContactSolverInfo& info) {
   // The solver undoes the share erp2 of a depth per step. Contact detection writes the distances
   // anew before the next step.
   const double lowest = -max_depenetration_speed_ * info.m_timeStep / info.m_erp2;
+  for (std::size_t i = clear_centres_.size(); i < std::size_t(m_nonStaticRigidBodies.size()); ++i) {
+    clear_centres_.push_back(m_nonStaticRigidBodies[int(i)]->getWorldTransform().getOrigin());
+  }
+  is_clear_.assign(clear_centres_.size(), true);
   btDispatcher& dispatcher = *getDispatcher();
   for (int i = 0; i < dispatcher.getNumManifolds(); ++i) {
     mend_contacts(*dispatcher.getManifoldByIndexInternal(i), lowest);
+  }
+  for (std::size_t i = 0; i < clear_centres_.size(); ++i) {
+    if (!is_clear_[i]) continue;
+    clear_centres_[i] = m_nonStaticRigidBodies[int(i)]->getWorldTransform().getOrigin();
   }
   btDiscreteDynamicsWorld::solveConstraints(info);
 }

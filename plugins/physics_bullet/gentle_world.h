@@ -10,14 +10,17 @@ namespace diorama {
 /// A Bullet world that treats overlap with care:
 /// - Overlapping bodies are pushed apart slowly: whatever the depth, the correction is that of the
 ///   depth which the given speed undoes, and it leaves no velocity behind.
-/// - A triangle pushes a body out to the side on which its centre of mass is, and sideways only
-/// across
-///   edges where the surface ends or falls away. Bullet looks for the shortest way out of each
-///   triangle alone, which for a body that straddles a thin, finely meshed floor is down or into
-///   the next one.
+/// - A triangle pushes a body out to the side from which its centre of mass came, and sideways only
+///   across edges where the surface ends or falls away. Bullet looks for the shortest way out of
+///   each triangle alone, which for a body that straddles a thin, finely meshed floor is down or
+///   into the next one.
+/// - A body deep in a box leaves it by the face that it clears soonest. Bullet's search often fails
+///   for small hulls in large boxes.
+/// - A lying capsule stands on both ends.
 /// - Continuous detection works for compound bodies as well; Bullet leaves them out.
 ///
-/// Static objects of triangles must carry their StaticMesh as user pointer, all others none.
+/// Static objects of triangles must carry their StaticMesh as user pointer, all others none. The
+/// user index of a moving body is its place in the order of addition.
 class GentleWorld final : public btDiscreteDynamicsWorld {
  public:
   GentleWorld(btDispatcher* dispatcher, btBroadphaseInterface* broadphase,
@@ -34,7 +37,12 @@ class GentleWorld final : public btDiscreteDynamicsWorld {
 
   double max_depenetration_speed_;
   btSphereShape stand_in_{0.01};
-  std::vector<btManifoldPoint> rebuilt_;  ///< Scratch of mend_contacts.
+  /// Of each moving body, its centre of mass when it was last not deep in anything fixed.
+  std::vector<btVector3> clear_centres_;
+  std::vector<bool> is_clear_;  ///< Of each moving body in this step.
+  // Scratch of mend_contacts.
+  std::vector<btManifoldPoint> rebuilt_;
+  std::vector<btManifoldPoint> candidates_;
 };
 
 }  // namespace diorama

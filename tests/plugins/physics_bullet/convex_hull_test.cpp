@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "convex_hull.h"
 
+#include <algorithm>
+#include "diorama/geometry.h"
+
 #include "diorama/geometry.h"
 #include "diorama/rng.h"
 #include "mass_properties.h"
@@ -62,4 +65,16 @@ TEST_CASE("sheets, wires and single points get a body", "[physics]") {
         Approx(1e-6 * wire[1].norm()).epsilon(0.01));
   CHECK(mass_of_hull(convex_hull(thickened(point, 1e-3))).volume == Approx(1e-9).epsilon(0.01));
   CHECK(thickened(ellipsoid_points(50, Vec3(1, 2, 3)), 1e-3).size() == 50);
+}
+
+TEST_CASE("the reduced hull of a ball stays close to it everywhere", "[physics]") {
+  std::vector<Vec3> points;
+  for (const Vec3f& position : make_sphere(1.0, 32).positions) {
+    points.push_back(position.cast<double>());
+  }
+  CHECK(inner_distance(convex_hull(points), Vec3::Zero()) > 0.97);
+  for (int order = 0; order < 4; ++order) {
+    std::rotate(points.begin(), points.begin() + 97, points.end());
+    CHECK(inner_distance(convex_hull(reduced_hull_points(points, 64)), Vec3::Zero()) > 0.92);
+  }
 }

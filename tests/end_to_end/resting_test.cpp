@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "diorama/rng.h"
+#include "framework/pipeline/scene_setup.h"
+#include "loader_dining_room/dining_room.h"
+#include "loader_samples/samples_loader.h"
+#include "physics_bullet/bullet_backend.h"
+#include "support/catch.h"
+#include "support/exact_bounds.h"
+#include "support/plain_host.h"
+
+/// The rooms and objects of the sample pack with the physics of the default job, many objects each.
+using namespace diorama;
+
+namespace {
+
+/// Each asset once, as scenes share what they load.
+class Shelf {
+ public:
+  explicit Shelf(Host& host) {
+    for (const char* set : {"objects", "props"}) {
+      samples::SamplesLoader loader({.set = set}, host);
+      for (const std::string& asset : loader.assets()) {
+        Scene scene;
+        const NodeId root = scene.create(scene.root(), "asset");
+        loader.load(asset, scene, root);
+        for (const NodeId id : scene.subtree(root)) {
+          if (scene[id].mesh) meshes_.push_back(scene[id].mesh);
+        }
+      }
+    }
+  }
+  const std::shared_ptr<const Mesh>& pick(Rng& rng) const {
+    return meshes_[rng.index(meshes_.size())];
+  }
+
+ private:
+  std::vector<std::shared_ptr<const Mesh>> meshes_;
+};
+
+struct Room {
+  Room(std::uint64_t seed, test::PlainHost& host) {
+    environment = scene.create(scene.root(), "Environment");
+    dining_room::build_dining_room(seed, host, scene, environment);
+    EnvironmentRules rules;
+    rules.hide = {"001_SPLIT_GLA"};
+    rules.box_colliders = {"TableDining"};
+    rules.working_area = "TableDining";
+    working_area = apply_environment_rules(rules, false, environment, scene, host);
+    for (const NodeId id : scene.subtree(environment)) {
+      const auto& collider = scene[id].collider;
+      if (!collider || collider->shape != ColliderShape::BoundingBox) continue;
+      table.add(scene.world_bounds(id));
+    }
+  }
+
+  void drop(const Shelf& shelf, int count, Rng rng) {
+    const Aabb above{Vec3(-0.9, -0.9, 1.0), Vec3(0.9, 0.9, 1.6)};
+    for (int i = 0; i < count; ++i) {
+      const NodeId id = scene.create(scene.root(), "thing_" + std::to_string(i));
+      scene.edit(id).mesh = shelf.pick(rng);
+      scene.edit(id).collider = Collider{};
+      scene.edit(id).collider->shape = ColliderShape::ConvexHull;
+      scene.edit(id).rigid_body = RigidBody{};
+      Transform pose;
+      pose.translation = working_area + rng.uniform_in(above);
+      pose.rotation = rng.uniform_rotation();
+      pose.scale = Vec3::Constant(rng.uniform(0.3, 1.15));
+      scene.set_pose(id, pose.affine());
+      things.push_back(id);
+    }
+  }
+
+  Scene scene;
+  NodeId environment;
+  Vec3 working_area = Vec3::Zero();
+  Aabb table;
+  std::vector<NodeId> things;
+};
+
+/// The tops of the tables are flat: what is above one and has its middle below the top fell in.
+bool is_in_table(const Room& room, const Vec3& middle) {
+  return (middle.array() > room.table.min.array() + 0.003).all() &&
+         (middle.array() < room.table.max.array() - 0.003).all();
+}
+
+}  // namespace
+
+TEST_CASE("In each of the ten sample rooms forty things come to rest, none through floor or table",
+          "[run][slow]") {
+  test::PlainHost host;
+  const Shelf shelf(host);
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    Room room(seed, host);
+    REQUIRE_FALSE(room.table.is_empty());
+    room.drop(shelf, 40, Rng(seed));
+    BulletBackend physics({}, host);
+    physics.reset(room.scene);
+    physics.advance(room.scene, 204);
+    const PhysicsReport report = physics.report();
+    CAPTURE(seed, report.max_speed, report.max_penetration_m, report.deepest_body);
+    CHECK(report.moving_bodies == 40);
+    CHECK(report.max_penetration_m < 0.015);  // on finely meshed, rounded furniture
+    int slow = 0;
+    for (const NodeId thing : room.things) {
+      const Aabb box = test::exact_bounds(room.scene, thing);
+      const Vec3 middle = box.centre();
+      INFO(room.scene.path(thing) << " at " << middle.transpose());
+      CHECK(box.min.z() > -0.01);  // the floor is at 0
+      CHECK_FALSE(is_in_table(room, middle));
+      const double speed = room.scene[thing].rigid_body->linear_velocity.norm();
+      slow += speed < 0.1 ? 1 : 0;
+    }
+    CHECK(slow >= 36);  // one may just be rolling off a chair
+  }
+}
