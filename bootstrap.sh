@@ -39,8 +39,9 @@ install_packages() {
     "${missing[@]}" >/dev/null
 }
 
+# build ON builds the tests as well, build OFF leaves them out: they need more packages and as much time again.
 build() {
-  cmake --preset "$preset" >"build-$preset.log" 2>&1 || {
+  cmake --preset "$preset" -D DIORAMA_BUILD_TESTS="$1" >"build-$preset.log" 2>&1 || {
     cat "build-$preset.log" >&2
     rm -f "build-$preset.log"
     exit 1
@@ -62,17 +63,17 @@ done
 case $command in
   build)
     install_packages "${build_packages[@]}"
-    build
+    build OFF
     ;;
   demo)
     install_packages "${build_packages[@]}"
-    build
+    build OFF
     # A finished dataset is left as it is, an interrupted one is completed.
     "build/$preset/bin/diorama" run configs/dining_room.yaml --resume
     ;;
   test)
     install_packages "${build_packages[@]}" "${test_packages[@]}"
-    build
+    build ON
     ctest --preset "$preset" -j "$(nproc)"
     ;;
   help | -h | --help) usage ;;

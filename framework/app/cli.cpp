@@ -104,6 +104,11 @@ void read_shard(const std::string& text, RunCommandOptions& run) {
 void add_run(CLI::App& app, CommandLine& line) {
   CLI::App* command = app.add_subcommand("run", "Make the dataset that a job describes");
   add_job_options(*command, line.run.job);
+  command
+      ->add_option("--queue-mib", line.run.queue_mib,
+                   "Memory for captures that wait to be written; a full queue holds up rendering")
+      ->check(CLI::Range(1, 1 << 20))
+      ->capture_default_str();
   command->add_flag("--resume", line.run.resume, "Go on with the dataset in the output folder");
   command->add_flag("--overwrite", line.run.overwrite,
                     "Remove the dataset in the output folder first");

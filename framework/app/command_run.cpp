@@ -79,6 +79,7 @@ RunSummary run_job(JobAssembly& assembly, Host& host, const RunCommandOptions& o
   run.shard = options.shard;
   run.shards = options.shards;
   run.existing = existing_policy(options);
+  run.queue_bytes = std::size_t(options.queue_mib) << 20;
   run.stop = &stop_requested;
   run.progress = [&](int done, int total, int resumed) {
     if (!bar) bar.emplace(log, "captures", total);

@@ -35,6 +35,7 @@ struct RunCommandOptions {
   int shard = 0;  ///< 0-based here; --shard counts from 1.
   int shards = 1;
   bool resume = false;
+  int queue_mib = 256;
   bool overwrite = false;
   bool dry_run = false;  ///< Checks the job, plans it, writes nothing.
 };

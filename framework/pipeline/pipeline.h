@@ -42,7 +42,7 @@ struct RunOptions {
   int shard = 0;
   int shards = 1;
   OutputStore::Existing existing = OutputStore::Existing::Refuse;
-  std::size_t queue_bytes = std::size_t(256) << 20;
+  std::size_t queue_bytes = std::size_t(256) << 20;  ///< Of captures that wait to be written.
   const std::atomic<bool>* stop = nullptr;  ///< True asks the run to end soon.
   /// Called on the main thread after each capture.
   std::function<void(int done, int total, int resumed)> progress;

@@ -180,7 +180,8 @@ TEST_CASE("Memory does not grow with the number of visits", "[run][slow]") {
   const TemporaryFolder folder;
   const auto peak_of = [&](const char* captures, const char* output) {
     const Outcome outcome =
-        run(smoke(output, {"--set", std::string("total_captures=") + captures}), folder.path());
+        run(smoke(output, {"--queue-mib", "1", "--set", std::string("total_captures=") + captures}),
+            folder.path());
     REQUIRE(outcome.exit_code == 0);
     return outcome.max_rss_kb;
   };
