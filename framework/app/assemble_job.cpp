@@ -165,6 +165,15 @@ OutputFolders output_folders(const Job& job) {
   return folders;
 }
 
+Value check_job(const Value& value, Registry& registry, Host& host) {
+  JobAssembly assembly;
+  Assembler assembler(registry, host);
+  assembly.job = read_job(value, assembler.complaints());
+  std::vector<std::unique_ptr<Loader>> object_loaders;
+  make_components(assembler, assembly, object_loaders);
+  return resolved_job(value, describe_from(registry));
+}
+
 JobAssembly assemble_job(const Value& value, Registry& registry, Host& host,
                          const std::optional<fs::path>& assets_root,
                          const std::string& program_version) {

@@ -27,6 +27,10 @@ struct JobAssembly {
 /// Gives the parameters of the registry's components to resolved_job().
 DescribeComponent describe_from(Registry& registry);
 
+/// Reads the job, makes its components to check their parameters and returns it with every default.
+/// Assets need not be there. All complaints come in one Error(Config).
+Value check_job(const Value& job, Registry& registry, Host& host);
+
 /// Reads the job, makes its components, lists its assets, plans its captures and resolves what its
 /// writers need. Nothing is loaded or written. All complaints about the file come in one Error
 /// (Config); then Error(Plugin), Error(Asset) as found.

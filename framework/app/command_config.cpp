@@ -4,6 +4,7 @@
 #include <iostream>
 
 #include "framework/app/assemble.h"
+#include "framework/app/assemble_job.h"
 #include "framework/app/job_file.h"
 #include "framework/config/value_text.h"
 #include "framework/pipeline/job.h"
@@ -13,17 +14,10 @@ namespace diorama {
 int command_config(const GlobalOptions& global, const JobOptions& options, bool as_json,
                    ConsoleLog& log) {
   const Value job = load_job(options, log.sink());
-  Complaints complaints;
-  read_job(job, complaints);
-  complaints.raise();
   const std::unique_ptr<Registry> registry = make_registry(global, log.sink());
   warn_of_rejected(*registry, log.sink());
-  const auto describe = [&](ComponentKind kind,
-                            std::string_view type) -> std::optional<std::vector<ParamSpec>> {
-    if (!registry->has(kind, type)) return std::nullopt;
-    return registry->describe(kind, type);
-  };
-  const Value resolved = resolved_job(job, describe);
+  HostServices host(*registry, HostOptions{}, log.sink());
+  const Value resolved = check_job(job, *registry, host);
   std::cout << (as_json ? to_json(resolved, 2) + "\n" : to_yaml(resolved));
   return 0;
 }

@@ -42,6 +42,20 @@ void expect_error(const std::string& job, int exit_code, const std::string& mess
 
 }  // namespace
 
+TEST_CASE("config checks what run checks, but for the assets", "[errors]") {
+  const TemporaryFolder folder;
+  write_file(folder / "job.yaml", job_with("camera_params: true", "camera_parms: true"));
+  const Outcome wrong = run({"config", "job.yaml"}, folder.path());
+  CHECK(wrong.exit_code == 3);
+  CHECK(wrong.output.empty());
+  CHECK_THAT(wrong.errors, Contains("unknown key 'camera_parms', did you mean 'camera_params'?"));
+  write_file(folder / "job.yaml", job_with("{type: shapes, shapes: [cube, sphere]}",
+                                           "{type: files, folders: [/no/such/folder]}"));
+  const Outcome absent = run({"config", "job.yaml"}, folder.path());
+  INFO(absent.errors);
+  CHECK(absent.exit_code == 0);
+}
+
 TEST_CASE("A missing job file", "[errors]") {
   const TemporaryFolder folder;
   const Outcome outcome = run({"run", "nowhere.yaml"}, folder.path());

@@ -68,6 +68,19 @@ TEST_CASE("Two runs, and any number of threads, give the same bytes", "[run]") {
   }
 }
 
+TEST_CASE("Path-traced datasets are the same bytes for any number of threads", "[run]") {
+  const auto with_threads = [](const char* threads) {
+    return std::vector<std::string>{"--set", "renderer={type: embree, samples: 4}", "--threads",
+                                    threads};
+  };
+  const TemporaryFolder first;
+  const auto expected = dataset(first, with_threads("1"));
+  for (const char* threads : {"2", "7"}) {
+    const TemporaryFolder other;
+    CHECK(difference(expected, dataset(other, with_threads(threads))) == "");
+  }
+}
+
 TEST_CASE("Another seed gives other data", "[run]") {
   const TemporaryFolder first;
   const TemporaryFolder second;
