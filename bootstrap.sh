@@ -4,6 +4,7 @@
 #   ./bootstrap.sh demo     install what is needed, build, make the sample pack, run the default job
 #   ./bootstrap.sh test     install what is needed, build, run every test
 #   ./bootstrap.sh build    install what is needed, build
+#   ./bootstrap.sh sanitize install what is needed, build the core tests with sanitizers, run them
 # Options: --preset NAME   a preset of CMakePresets.json (default: release)
 set -euo pipefail
 cd "$(dirname "$0")"
@@ -16,7 +17,7 @@ build_packages=(
 )
 test_packages=(catch2 python3-minimal python3-numpy python3-opencv python3-jsonschema binutils clang libclang-rt-14-dev)
 
-usage() { sed -n '3,7s/^# \{0,1\}//p' "$0"; }
+usage() { sed -n '3,8s/^# \{0,1\}//p' "$0"; }
 
 # Installs the packages that dpkg does not list as installed; says which. sudo only when not root.
 install_packages() {
@@ -39,15 +40,26 @@ install_packages() {
     "${missing[@]}" >/dev/null
 }
 
-# build ON builds the tests as well, build OFF leaves them out: they need more packages and as much time again.
-build() {
+# configure ON includes the tests, configure OFF leaves them out: they need more packages and as
+# much time again.
+configure() {
   cmake --preset "$preset" -D DIORAMA_BUILD_TESTS="$1" >"build-$preset.log" 2>&1 || {
     cat "build-$preset.log" >&2
     rm -f "build-$preset.log"
     exit 1
   }
   rm -f "build-$preset.log"
-  cmake --build --preset "$preset"
+}
+
+# sanitize PRESET TEST...: builds and runs some tests only; all of them would take an hour.
+sanitize() {
+  preset=$1
+  shift
+  configure ON
+  cmake --build --preset "$preset" --target "$@"
+  local names
+  names=$(IFS='|'; echo "$*")
+  ctest --preset "$preset" -j "$(nproc)" -R "^($names)\$"
 }
 
 command=${1:-help}
@@ -63,18 +75,28 @@ done
 case $command in
   build)
     install_packages "${build_packages[@]}"
-    build OFF
+    configure OFF
+    cmake --build --preset "$preset"
     ;;
   demo)
     install_packages "${build_packages[@]}"
-    build OFF
+    configure OFF
+    cmake --build --preset "$preset"
     # A finished dataset is left as it is, an interrupted one is completed.
     "build/$preset/bin/diorama" run configs/dining_room.yaml --resume
     ;;
   test)
     install_packages "${build_packages[@]}" "${test_packages[@]}"
-    build ON
+    configure ON
+    cmake --build --preset "$preset"
     ctest --preset "$preset" -j "$(nproc)"
+    ;;
+  sanitize)
+    install_packages "${build_packages[@]}" "${test_packages[@]}"
+    # What reads files of others, what is shared between threads.
+    sanitize asan sdk_test config_test host_test images_test pipeline_test loader_usd_test \
+      loader_assimp_test physics_bullet_test writer_support_test
+    sanitize tsan host_test pipeline_test
     ;;
   help | -h | --help) usage ;;
   *) echo "bootstrap: unknown command '$command'" >&2; usage >&2; exit 2 ;;

@@ -18,6 +18,7 @@
 #include "framework/app/command_lint.h"
 #include "framework/app/command_new_plugin.h"
 #include "framework/app/command_plugins.h"
+#include "framework/app/command_render.h"
 #include "framework/app/command_run.h"
 #include "framework/app/command_schema.h"
 #include "framework/app/options.h"
@@ -39,6 +40,7 @@ struct CommandLine {
   JobOptions config;
   bool config_json = false;
   InspectOptions inspect;
+  RenderOptions render;
   LintOptions lint;
   ExportCommandOptions export_;
   NewPluginOptions new_plugin;
@@ -108,6 +110,7 @@ void add_run(CLI::App& app, CommandLine& line) {
       ->add_option("--queue-mib", line.run.queue_mib,
                    "Memory for captures that wait to be written; a full queue holds up rendering")
       ->check(CLI::Range(1, 1 << 20))
+      ->type_name("N")
       ->capture_default_str();
   command->add_flag("--resume", line.run.resume, "Go on with the dataset in the output folder");
   command->add_flag("--overwrite", line.run.overwrite,
@@ -184,6 +187,49 @@ void add_inspect(CLI::App& app, CommandLine& line) {
   command->callback([&line] {
     line.command = [&line](ConsoleLog& log) {
       return command_inspect(line.global, line.inspect, log);
+    };
+  });
+}
+
+void add_render(CLI::App& app, CommandLine& line) {
+  RenderOptions& options = line.render;
+  CLI::App* command = app.add_subcommand("render", "Render one picture of a scene or model file");
+  command->add_option("file", options.asset, "File, or scheme:rest such as dining_room:7")
+      ->required()
+      ->type_name("FILE");
+  command
+      ->add_option("-o,--picture", options.output,
+                   "Picture to write; .png and .jpg as seen, .exr and .hdr in linear light")
+      ->type_name("FILE")
+      ->capture_default_str();
+  command
+      ->add_option("--camera", options.camera,
+                   "Camera of the scene, by name; default: the first, else a view of all")
+      ->type_name("NAME");
+  command->add_option("--eye", options.eye, "Where a new camera stands, m")
+      ->expected(3)
+      ->type_name("N");
+  command->add_option("--target", options.target, "What a new camera looks at, m")
+      ->expected(3)
+      ->type_name("N");
+  command->add_option("--width", options.width, "Pixels; default: the camera's")
+      ->check(CLI::Range(1, 16384))
+      ->type_name("N");
+  command->add_option("--height", options.height, "Pixels; default: by the camera's shape")
+      ->check(CLI::Range(1, 16384))
+      ->type_name("N");
+  command->add_option("--renderer", options.renderer, "Renderer to use")
+      ->type_name("TYPE")
+      ->capture_default_str();
+  command
+      ->add_option("--set", options.sets,
+                   "Set a parameter of the renderer, for instance samples=256 (repeatable)")
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false);
+  command->add_option("--seed", options.seed, "Pattern of the noise")->type_name("N");
+  command->callback([&line] {
+    line.command = [&line](ConsoleLog& log) {
+      return command_render(line.global, line.render, log);
     };
   });
 }
@@ -302,6 +348,7 @@ void add_all(CLI::App& app, CommandLine& line) {
   add_plugins(app, line);
   add_plugins_check(app, line);
   add_inspect(app, line);
+  add_render(app, line);
   add_export(app, line);
   add_lint(app, line);
   add_new_plugin(app, line);
