@@ -95,7 +95,7 @@ case $command in
     install_packages "${build_packages[@]}" "${test_packages[@]}"
     # What reads files of others, what is shared between threads.
     sanitize asan sdk_test config_test host_test images_test pipeline_test loader_usd_test \
-      loader_assimp_test physics_bullet_test writer_support_test
+      physics_bullet_test writer_support_test
     sanitize tsan host_test pipeline_test
     ;;
   help | -h | --help) usage ;;
