@@ -18,6 +18,8 @@ using usd::Stage;
 
 constexpr int kMaxInstancerNesting = 8;
 constexpr int kCameraWidth = 1280;
+// Small files may ask for any number of nodes by references to references and nested instancers.
+constexpr std::size_t kMaxNodes = 1'000'000;
 
 // What a layer says about its units and axis, if it does.
 struct Metrics {
@@ -33,9 +35,11 @@ Metrics metrics_of(const usd::Layer& layer) {
   return metrics;
 }
 
-bool has_schema(const Stage& stage, const Prim& prim, std::string_view name) {
-  const usd::Strings schemas = stage.metadata_list(prim, "apiSchemas");
-  return std::find(schemas.begin(), schemas.end(), name) != schemas.end();
+// Shapes without triangles of their own.
+bool is_left_out(const std::string& type) {
+  constexpr std::string_view kTypes[] = {
+      "Points", "BasisCurves", "NurbsCurves", "HermiteCurves", "NurbsPatch", "TetMesh", "Volume"};
+  return std::find(std::begin(kTypes), std::end(kTypes), type) != std::end(kTypes);
 }
 
 Affine affine_or_identity(const Affine& affine) {
@@ -51,25 +55,6 @@ Affine without_scale(const Affine& affine) {
   return rigid;
 }
 
-PrimitiveShape primitive_of(const std::string& type) {
-  if (type == "Cube") return PrimitiveShape::Box;
-  if (type == "Sphere") return PrimitiveShape::Sphere;
-  if (type == "Cylinder") return PrimitiveShape::Cylinder;
-  if (type == "Cone") return PrimitiveShape::Cone;
-  if (type == "Capsule") return PrimitiveShape::Capsule;
-  return PrimitiveShape::None;
-}
-
-ColliderShape collider_shape(const std::string& approximation) {
-  if (approximation == "boundingCube") return ColliderShape::BoundingBox;
-  if (approximation == "boundingSphere") return ColliderShape::BoundingSphere;
-  if (approximation == "convexHull" || approximation == "convexDecomposition" ||
-      approximation == "sphereFill") {
-    return ColliderShape::ConvexHull;
-  }
-  return ColliderShape::TriangleMesh;
-}
-
 }  // namespace
 
 SceneTranslator::SceneTranslator(Stage& stage, Host& host, Scene& scene)
@@ -79,6 +64,7 @@ SceneTranslator::SceneTranslator(Stage& stage, Host& host, Scene& scene)
       geometry_(stage),
       meshes_(stage, geometry_),
       materials_(stage, host),
+      physics_(stage, scene),
       meters_per_unit_(stage.meters_per_unit()),
       root_from_stage_(stage.is_z_up() ? Affine::Identity() : z_up_from_y_up()) {
   if (!(meters_per_unit_ > 0.0) || !std::isfinite(meters_per_unit_)) meters_per_unit_ = 0.01;
@@ -89,6 +75,11 @@ void SceneTranslator::translate(NodeId root) {
   const Place place{root, Affine::Identity()};
   for (const Prim* prim : stage_.visible_children(stage_.root())) {
     if (is_drawn(*prim)) translate_prim(*prim, place, root_from_stage_ * local_pose(*prim, place));
+  }
+  materials_.read_textures();
+  for (const auto& [type, count] : left_out_) {
+    host_.log(LogLevel::Info, stage_.root_layer().identifier() + ": " + std::to_string(count) +
+                                  " prims of type " + type + " are not drawn");
   }
 }
 
@@ -151,6 +142,10 @@ Affine SceneTranslator::local_pose(const Prim& prim, const Place& parent) {
 }
 
 void SceneTranslator::translate_prim(const Prim& prim, const Place& parent, const Affine& pose) {
+  if (++node_count_ > kMaxNodes) {
+    throw Error(ErrorKind::Asset, stage_.root_layer().identifier() + ": more than " +
+                                      std::to_string(kMaxNodes) + " nodes, at <" + prim.path + ">");
+  }
   Place place;
   place.node = scene_.create(parent.node, usd::path::name(prim.path));
   place.root_from_node = parent.root_from_node * pose;
@@ -158,16 +153,17 @@ void SceneTranslator::translate_prim(const Prim& prim, const Place& parent, cons
   const bool is_hidden = prim.traits.is_imageable &&
                          usd::token_or(stage_, prim, "visibility", "inherited") == "invisible";
   if (is_hidden) scene_.edit(place.node).is_visible = false;
+  if (is_left_out(prim.type_name)) ++left_out_[prim.type_name];
   if (prim.traits.is_gprim) add_shape(prim, place.node);
   if (prim.type_name == "Camera") add_camera(prim, place);
   if (prim.traits.is_light) add_light(prim, place);
-  add_physics(prim, place.node);
   add_labels(prim, place.node);
   if (prim.type_name == "PointInstancer") {
     add_instances(prim, place);
   } else {
     translate_children(prim, place);
   }
+  physics_.translate(prim, place.node);
 }
 
 // --- Shapes -----------------------------------------------------------------------------------
@@ -257,52 +253,7 @@ void SceneTranslator::add_light(const Prim& prim, Place& place) {
   scene_.edit(place.node).light = std::move(light->light);
 }
 
-// --- Physics and labels -----------------------------------------------------------------------
-
-void SceneTranslator::add_physics(const Prim& prim, NodeId node) {
-  const usd::Strings schemas = stage_.metadata_list(prim, "apiSchemas");
-  const auto has = [&](const char* name) {
-    return std::find(schemas.begin(), schemas.end(), name) != schemas.end();
-  };
-  const bool is_body = has("PhysicsRigidBodyAPI") &&
-                       usd::bool_or(stage_, prim, "physics:rigidBodyEnabled", true) &&
-                       !usd::bool_or(stage_, prim, "physics:kinematicEnabled", false);
-  if (is_body) {
-    RigidBody body;
-    const double mass = usd::number_or(stage_, prim, "physics:mass", 0.0);
-    if (mass > 0.0 && std::isfinite(mass)) body.mass_kg = mass;
-    body.has_gravity = !usd::bool_or(stage_, prim, "physxRigidBody:disableGravity", false);
-    scene_.edit(node).rigid_body = body;
-  }
-  if (has("PhysicsCollisionAPI") && scene_[node].mesh &&
-      usd::bool_or(stage_, prim, "physics:collisionEnabled", true)) {
-    add_collider(prim, node);
-  }
-}
-
-void SceneTranslator::add_collider(const Prim& prim, NodeId node) {
-  Collider collider;
-  const PrimitiveShape primitive = primitive_of(prim.type_name);
-  const bool is_upright = usd::token_or(stage_, prim, "axis", "Z") == "Z";
-  if (prim.type_name == "Mesh") {
-    collider.shape = collider_shape(usd::token_or(stage_, prim, "physics:approximation", "none"));
-  } else if (primitive != PrimitiveShape::None && is_upright) {
-    collider.shape = ColliderShape::Primitive;
-    collider.primitive = primitive;
-    collider.primitive_size = scene_[node].mesh->bounds().size();
-  }
-  // Friction and bounce come from a physics material, bound for physics or for all purposes.
-  for (const Prim* at = &prim; at; at = at->parent) {
-    usd::Strings bound = stage_.targets(*at, "material:binding:physics");
-    if (bound.empty()) bound = stage_.targets(*at, "material:binding");
-    const Prim* material = bound.size() == 1 ? stage_.find(bound.front()) : nullptr;
-    if (!material || !has_schema(stage_, *material, "PhysicsMaterialAPI")) continue;
-    collider.friction = usd::number_or(stage_, *material, "physics:dynamicFriction", 0.5);
-    collider.restitution = usd::number_or(stage_, *material, "physics:restitution", 0.0);
-    break;
-  }
-  scene_.edit(node).collider = collider;
-}
+// --- Labels --------------------------------------------------------------------------------------
 
 // Labels of UsdSemantics, and of the SemanticsAPI that was used before.
 void SceneTranslator::add_labels(const Prim& prim, NodeId node) {

@@ -10,6 +10,7 @@
 #include "diorama/scene.h"
 #include "loader_usd/material_translator.h"
 #include "loader_usd/mesh_translator.h"
+#include "loader_usd/physics_translator.h"
 #include "loader_usd/usd/geometry.h"
 #include "loader_usd/usd/stage.h"
 
@@ -39,8 +40,6 @@ class SceneTranslator {
   void add_shape(const usd::Prim& prim, NodeId node);
   void add_camera(const usd::Prim& prim, Place& place);
   void add_light(const usd::Prim& prim, Place& place);
-  void add_physics(const usd::Prim& prim, NodeId node);
-  void add_collider(const usd::Prim& prim, NodeId node);
   void add_labels(const usd::Prim& prim, NodeId node);
   void add_instances(const usd::Prim& prim, const Place& place);
   std::shared_ptr<const Material> plain_material(const TranslatedMesh& mesh);
@@ -51,11 +50,14 @@ class SceneTranslator {
   usd::Geometry geometry_;
   MeshTranslator meshes_;
   MaterialTranslator materials_;
+  PhysicsTranslator physics_;
   double meters_per_unit_;
   Affine root_from_stage_;
   std::map<const usd::Prim*, bool> drawn_;
   std::map<std::vector<float>, std::shared_ptr<const Material>> plain_materials_;
+  std::map<std::string, std::size_t> left_out_;  ///< Types that are not drawn, and how often.
   int instancer_depth_ = 0;
+  std::size_t node_count_ = 0;
 };
 
 }  // namespace diorama::loader_usd

@@ -8,53 +8,86 @@ namespace diorama::loader_usd {
 namespace {
 
 constexpr std::string_view kTileMark = "<UDIM>";
-constexpr std::string_view kFirstTile = "1001";
+constexpr int kFirstTile = 1001;
+constexpr int kTileColumns = 10;
+constexpr int kTiles = 100;
+
+std::optional<ColorSpace> to_color_space(TextureSpace space) {
+  if (space == TextureSpace::Raw) return ColorSpace::Linear;
+  if (space == TextureSpace::Srgb) return ColorSpace::Srgb;
+  return std::nullopt;
+}
 
 }  // namespace
 
-std::shared_ptr<const Texture> TextureLibrary::decode(const std::string& identifier) {
-  auto [entry, is_new] = decoded_.try_emplace(identifier);
-  if (is_new) {
-    const usd::ByteView bytes = stage_.assets().read(identifier);
-    entry->second = host_.decode_texture(bytes.bytes, identifier);
+void TextureLibrary::missing(const usd::FoundValue& asset, const std::string& why) {
+  stage_.diagnostics().missing(asset.layer->identifier() + ": texture @" + *asset.value.as_text() +
+                               "@ " + why);
+}
+
+std::optional<TextureLibrary::Picture> TextureLibrary::find_tiles(const std::string& identifier,
+                                                                  std::size_t mark) {
+  struct File {
+    UdimTile tile;
+    std::string identifier;
+    usd::ByteView bytes;
+  };
+  std::vector<File> files;
+  std::vector<UdimTile> tiles;
+  for (int i = 0; i < kTiles; ++i) {
+    std::string name = identifier;
+    name.replace(mark, kTileMark.size(), std::to_string(kFirstTile + i));
+    if (!stage_.assets().exists(name)) continue;
+    tiles.push_back({i % kTileColumns, i / kTileColumns, nullptr});
+    files.push_back({tiles.back(), name, stage_.assets().read(name)});
+  }
+  if (files.empty()) return std::nullopt;
+  decoder_.announce(identifier, [this, identifier, files] {
+    std::vector<UdimTile> decoded;
+    for (const File& file : files) {
+      decoded.push_back(file.tile);
+      decoded.back().texture = host_.decode_texture(file.bytes.bytes, file.identifier);
+    }
+    return make_udim_atlas(identifier, decoded);
+  });
+  return Picture{identifier, UdimRange::of(tiles)};
+}
+
+std::optional<TextureLibrary::Picture> TextureLibrary::find(const usd::FoundValue& asset) {
+  const std::string identifier = stage_.anchor(asset);
+  if (identifier.empty()) return std::nullopt;
+  const auto [entry, is_new] = found_.try_emplace(identifier);
+  if (!is_new) return entry->second;
+  try {
+    if (const std::size_t mark = identifier.find(kTileMark); mark != std::string::npos) {
+      entry->second = find_tiles(identifier, mark);
+    } else if (stage_.assets().exists(identifier)) {
+      // Bytes are found here, because that is for one thread; decoding them is for all.
+      decoder_.announce(identifier, [this, identifier, bytes = stage_.assets().read(identifier)] {
+        return host_.decode_texture(bytes.bytes, identifier);
+      });
+      entry->second = Picture{identifier, std::nullopt};
+    }
+    if (!entry->second) missing(asset, "could not be found");
+  } catch (const usd::FormatError& error) {
+    missing(asset, std::string("could not be read: ") + error.what());
   }
   return entry->second;
 }
 
-std::shared_ptr<const Texture> TextureLibrary::read(const usd::FoundValue& asset,
-                                                    TextureSpace space) {
-  std::string identifier = stage_.anchor(asset);
-  if (identifier.empty()) return nullptr;
-  if (const std::size_t mark = identifier.find(kTileMark); mark != std::string::npos) {
-    identifier.replace(mark, kTileMark.size(), kFirstTile);
-  }
-  const auto missing = [&](const std::string& why) {
-    stage_.diagnostics().missing(asset.layer->identifier() + ": texture @" +
-                                 *asset.value.as_text() + "@ " + why);
-    return nullptr;
-  };
-  const bool is_raw = space == TextureSpace::Raw;
-  const ColorSpace wanted = is_raw ? ColorSpace::Linear : ColorSpace::Srgb;
-  if (const auto known = converted_.find({identifier, wanted});
-      space != TextureSpace::Auto && known != converted_.end()) {
-    return known->second;
-  }
-  std::shared_ptr<const Texture> texture;
+bool TextureLibrary::announce(const usd::FoundValue& asset) { return find(asset).has_value(); }
+
+FoundTexture TextureLibrary::read(const usd::FoundValue& asset, TextureSpace space) {
+  FoundTexture result;
+  const std::optional<Picture> picture = find(asset);
+  if (!picture) return result;
   try {
-    if (!stage_.assets().exists(identifier)) return missing("could not be found");
-    texture = decode(identifier);
+    result.texture = decoder_.get(picture->identifier, to_color_space(space));
+    if (picture->udim) result.texture_from_uv = picture->udim->atlas_from_uv();
   } catch (const Error& error) {
-    return missing(std::string("could not be read: ") + error.what());
-  } catch (const usd::FormatError& error) {
-    return missing(std::string("could not be read: ") + error.what());
+    missing(asset, std::string("could not be read: ") + error.what());
   }
-  if (!texture || space == TextureSpace::Auto || !texture->floats.empty()) return texture;
-  if (texture->color_space == wanted) return texture;
-  auto copy = std::make_shared<Texture>(*texture);
-  copy->color_space = wanted;
-  // Most files are used in one way only: then the first reading need not stay.
-  decoded_.erase(identifier);
-  return converted_.emplace(std::pair(identifier, wanted), std::move(copy)).first->second;
+  return result;
 }
 
 }  // namespace diorama::loader_usd

@@ -3,11 +3,14 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
-#include <utility>
+#include <vector>
 
 #include "diorama/host.h"
 #include "diorama/material.h"
+#include "loader_support/texture_decoder.h"
+#include "loader_usd/udim_atlas.h"
 #include "loader_usd/usd/stage.h"
 
 namespace diorama::loader_usd {
@@ -15,23 +18,39 @@ namespace diorama::loader_usd {
 /// How the colours of a texture file are to be read.
 enum class TextureSpace { Auto, Raw, Srgb };
 
-/// Reads each texture once, from files and from packages. What cannot be read is reported once,
-/// with the layer that names it.
+struct FoundTexture {
+  std::shared_ptr<const Texture> texture;
+  /// From mesh uv to that of the texture: other than the identity for sets of UDIM tiles.
+  Eigen::Matrix<float, 2, 3> texture_from_uv = Eigen::Matrix<float, 2, 3>::Identity();
+};
+
+/// Reads each texture once, from files and from packages, several at a time. What cannot be read is
+/// reported once, with the layer that names it.
 class TextureLibrary {
  public:
-  TextureLibrary(usd::Stage& stage, Host& host) : stage_(stage), host_(host) {}
+  TextureLibrary(usd::Stage& stage, Host& host) : stage_(stage), host_(host), decoder_(host) {}
 
-  /// Null when the attribute has no asset or the asset cannot be read. Of a set of UDIM tiles the
-  /// first one is taken.
-  std::shared_ptr<const Texture> read(const usd::FoundValue& asset, TextureSpace space);
+  /// Whether the attribute names a picture that exists; it is then read by read_announced().
+  bool announce(const usd::FoundValue& asset);
+  void read_announced() { decoder_.decode_announced(); }
+
+  /// A null texture when the attribute names none or it cannot be read.
+  FoundTexture read(const usd::FoundValue& asset, TextureSpace space);
 
  private:
-  std::shared_ptr<const Texture> decode(const std::string& identifier);
+  /// A picture, or the tiles of a set of pictures.
+  struct Picture {
+    std::string identifier;
+    std::optional<UdimRange> udim;
+  };
+  std::optional<Picture> find(const usd::FoundValue& asset);
+  std::optional<Picture> find_tiles(const std::string& identifier, std::size_t mark);
+  void missing(const usd::FoundValue& asset, const std::string& why);
 
   usd::Stage& stage_;
   Host& host_;
-  std::map<std::string, std::shared_ptr<const Texture>> decoded_;
-  std::map<std::pair<std::string, ColorSpace>, std::shared_ptr<const Texture>> converted_;
+  loader_support::TextureDecoder decoder_;
+  std::map<std::string, std::optional<Picture>> found_;
 };
 
 }  // namespace diorama::loader_usd

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // One input is one file of any kind: text, crate or package. Everything that it holds is read and,
-// if it is a layer, composed and measured. Refusing is fine; crashing, hanging and running out of
-// memory are findings.
+// if it is a layer, composed, measured and put into a scene. Refusing is fine; crashing, hanging
+// and running out of memory are findings.
 #include <stdlib.h>
 #include <unistd.h>
 
@@ -12,13 +12,16 @@
 #include <memory>
 #include <string>
 
-#include "usd/asset_library.h"
-#include "usd/crate_reader.h"
-#include "usd/error.h"
-#include "usd/extent.h"
-#include "usd/geometry.h"
-#include "usd/package.h"
-#include "usd/stage.h"
+#include "diorama/error.h"
+#include "loader_usd/scene_translator.h"
+#include "loader_usd/usd/asset_library.h"
+#include "loader_usd/usd/crate_reader.h"
+#include "loader_usd/usd/error.h"
+#include "loader_usd/usd/extent.h"
+#include "loader_usd/usd/geometry.h"
+#include "loader_usd/usd/package.h"
+#include "loader_usd/usd/stage.h"
+#include "support/texture_host.h"
 
 namespace {
 
@@ -65,13 +68,25 @@ void visit(usd::Stage& stage, usd::Geometry& geometry, const usd::Prim& prim, st
   }
 }
 
+void translate(usd::Stage& stage) {
+  diorama::test::TextureHost host;
+  diorama::Scene scene;
+  const diorama::NodeId root = scene.create(scene.root(), "asset");
+  diorama::loader_usd::SceneTranslator(stage, host, scene).translate(root);
+}
+
 }  // namespace
+
+// Stands in a source of the SDK that this clang cannot read.
+diorama::Host::~Host() = default;
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::span<const std::byte> bytes(reinterpret_cast<const std::byte*>(data), size);
   try {
-    if (!usd::is_package(bytes))
-      usd::read_layer("input", usd::copy_bytes(bytes))->read_everything();
+    if (!usd::is_package(bytes)) {
+      const auto layer = usd::read_layer("input", usd::copy_bytes(bytes));
+      layer->for_each_value([](const usd::Value&) {});
+    }
   } catch (const usd::FormatError&) {
     return 0;
   }
@@ -81,7 +96,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     usd::Geometry geometry(stage);
     std::size_t budget = kMostPrims;
     visit(stage, geometry, stage.root(), budget);
+    if (budget > 0) translate(stage);
   } catch (const usd::FormatError&) {
+    return 0;
+  } catch (const diorama::Error&) {
     return 0;
   }
   return 0;

@@ -40,20 +40,24 @@ Value Layer::get(const FieldSet& fields, std::string_view name) const {
   return field->representation ? source_->decode(field->representation) : field->value;
 }
 
-void Layer::read_all(const FieldSet& fields) const {
+void Layer::visit_fields(const FieldSet& fields,
+                         const std::function<void(const Value&)>& visit) const {
   for (std::uint32_t i = 0; i < fields.count; ++i) {
     const Field& field = fields_[field_indices_[fields.begin + i]];
     const Value value = field.representation ? source_->decode(field.representation) : field.value;
-    if (const TimeSamples* samples = value.as_time_samples()) {
-      for (std::size_t k = 0; k < samples->times.size(); ++k) samples->value(k);
+    const TimeSamples* samples = value.as_time_samples();
+    if (!samples) {
+      visit(value);
+      continue;
     }
+    for (std::size_t k = 0; k < samples->times.size(); ++k) visit(samples->value(k));
   }
 }
 
-void Layer::read_everything() const {
+void Layer::for_each_value(const std::function<void(const Value&)>& visit) const {
   for (const auto& [path, spec] : prims_) {
-    read_all(spec.fields);
-    for (const PropertySpec& property : spec.properties) read_all(property.fields);
+    visit_fields(spec.fields, visit);
+    for (const PropertySpec& property : spec.properties) visit_fields(property.fields, visit);
   }
 }
 

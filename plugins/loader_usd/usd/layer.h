@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -61,8 +62,8 @@ class Layer {
   Value get(const FieldSet& fields, std::string_view name) const;
   Value get(const PrimSpec& spec, std::string_view name) const { return get(spec.fields, name); }
 
-  /// Reads every value once. Throws FormatError as `get` does.
-  void read_everything() const;
+  /// Reads every value once, time samples included. Throws FormatError as `get` does.
+  void for_each_value(const std::function<void(const Value&)>& visit) const;
 
   /// Called by the readers.
   struct Field {
@@ -78,7 +79,7 @@ class Layer {
 
  private:
   const Field* find(const FieldSet& fields, std::string_view name) const;
-  void read_all(const FieldSet& fields) const;
+  void visit_fields(const FieldSet& fields, const std::function<void(const Value&)>& visit) const;
 
   std::string identifier_;
   std::shared_ptr<const ValueSource> source_;

@@ -27,6 +27,7 @@ class ValueReader {
 
  private:
   void read_list(int nesting);
+  bool next_item(char closing);
   void read_element();
   void read_tuple(int nesting);
   void read_atom();
@@ -70,23 +71,27 @@ void ValueReader::read_list(int nesting) {
   if (scanner_.accept(']')) return;
   scanner_.rewind(start);
   scanner_.skip_lines();
-  for (;;) {
+  do {
     if (scanner_.peek() == '[') {
       read_list(nesting + 1);
     } else {
       read_element();
     }
-    const std::size_t after = scanner_.position();
-    scanner_.skip_inline();
-    if (!scanner_.accept(',')) {
-      scanner_.rewind(after);
-      break;
-    }
-    scanner_.skip_lines();
-    if (scanner_.peek() == ']') break;
-  }
+  } while (next_item(']'));
   scanner_.skip_lines();
   scanner_.expect(']', "after a list");
+}
+
+// Steps over the comma to the next item, if there is one before `closing`.
+bool ValueReader::next_item(char closing) {
+  const std::size_t after = scanner_.position();
+  scanner_.skip_inline();
+  if (!scanner_.accept(',')) {
+    scanner_.rewind(after);
+    return false;
+  }
+  scanner_.skip_lines();
+  return scanner_.peek() != closing;
 }
 
 void ValueReader::read_element() {
@@ -102,21 +107,13 @@ void ValueReader::read_tuple(int nesting) {
   if (nesting > kMaxNesting) scanner_.fail("tuples are nested too deeply");
   scanner_.expect('(', "before a tuple");
   scanner_.skip_lines();
-  for (;;) {
+  do {
     if (scanner_.peek() == '(') {
       read_tuple(nesting + 1);
     } else {
       read_atom();
     }
-    const std::size_t after = scanner_.position();
-    scanner_.skip_inline();
-    if (!scanner_.accept(',')) {
-      scanner_.rewind(after);
-      break;
-    }
-    scanner_.skip_lines();
-    if (scanner_.peek() == ')') break;
-  }
+  } while (next_item(')'));
   scanner_.skip_lines();
   scanner_.expect(')', "after a tuple");
 }

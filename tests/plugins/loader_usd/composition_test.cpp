@@ -6,8 +6,8 @@
 #include "loader_usd/usd/geometry.h"
 #include "loader_usd/usd/map_function.h"
 #include "loader_usd/usd/stage.h"
-#include "plugins/loader_usd/temporary_folder.h"
 #include "support/catch.h"
+#include "support/temporary_folder.h"
 
 namespace diorama::usd {
 namespace {

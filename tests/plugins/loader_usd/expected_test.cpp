@@ -10,9 +10,9 @@
 #include "loader_usd/usd/error.h"
 #include "loader_usd/usd/text_reader.h"
 #include "plugins/loader_usd/stage_dump.h"
-#include "plugins/loader_usd/temporary_folder.h"
 #include "support/catch.h"
 #include "support/shared_data.h"
+#include "support/temporary_folder.h"
 
 namespace fs = std::filesystem;
 

@@ -2,17 +2,15 @@
 #include <string>
 
 #include "diorama/error.h"
-#include "diorama/scene.h"
-#include "loader_usd/usd_loader.h"
-#include "plugins/loader_usd/temporary_folder.h"
-#include "plugins/loader_usd/texture_host.h"
+#include "plugins/loader_usd/loaded_stage.h"
 #include "support/catch.h"
+#include "support/temporary_folder.h"
 
 namespace diorama::loader_usd {
 namespace {
 
 using diorama::test::TemporaryFolder;
-using diorama::test::TextureHost;
+using Loaded = diorama::test::LoadedStage;
 
 const std::string kTriangle = R"(
         point3f[] points = [(0, 0, 0), (2, 0, 0), (0, 0, -4)]
@@ -20,18 +18,6 @@ const std::string kTriangle = R"(
         int[] faceVertexIndices = [0, 1, 2]
         uniform token subdivisionScheme = "none"
 )";
-
-struct Loaded {
-  Scene scene;
-  NodeId root;
-  TextureHost host;
-
-  explicit Loaded(const std::string& file, UsdLoader::Params params = {}) {
-    root = scene.create(scene.root(), "asset");
-    UsdLoader(params, host).load(file, scene, root);
-  }
-  const Node& node(const std::string& path) { return scene[scene.require("/asset/" + path)]; }
-};
 
 }  // namespace
 

@@ -16,7 +16,7 @@ namespace diorama::test {
 class TemporaryFolder {
  public:
   TemporaryFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "loader_usd_XXXXXX").string();
+    std::string name = (std::filesystem::temp_directory_path() / "diorama_test_XXXXXX").string();
     path_ = ::mkdtemp(name.data());
   }
   ~TemporaryFolder() {

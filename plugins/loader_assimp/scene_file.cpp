@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "loader_assimp/scene_file.h"
+
+#include <assimp/config.h>
+#include <assimp/postprocess.h>
+
+#include <algorithm>
+#include <assimp/DefaultLogger.hpp>
+#include <assimp/LogStream.hpp>
+#include <cctype>
+#include <filesystem>
+
+#include "diorama/error.h"
+#include "loader_assimp/child_process.h"
+
+namespace diorama::loader_assimp {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Enough for every honest file seen so far, tens of times over.
+constexpr int kLeastSeconds = 10;
+constexpr std::uint64_t kBytesPerSecond = 250'000;
+constexpr std::uint64_t kLeastMemory = std::uint64_t(4) << 30;
+constexpr std::uint64_t kMemoryPerByte = 200;
+constexpr std::size_t kMostComplaints = 8;
+// Edges that are sharper than this stay edges when normals are made up.
+constexpr float kSmoothingAngle = 45.0f;
+
+Format format_of(const std::string& file) {
+  std::string ending = fs::path(file).extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (ending == ".gltf" || ending == ".glb") return Format::Gltf;
+  if (ending == ".fbx") return Format::Fbx;
+  if (ending == ".dae" || ending == ".zae") return Format::Collada;
+  if (ending == ".3mf") return Format::ThreeMf;
+  if (ending == ".obj" || ending == ".ply" || ending == ".stl" || ending == ".off") {
+    return Format::Plain;
+  }
+  return Format::Other;
+}
+
+unsigned steps_for(Format format) {
+  unsigned steps = aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_RemoveComponent;
+  // glTF says that what has no normals is flat, and its vertices are shared already.
+  if (format != Format::Gltf) steps |= aiProcess_GenSmoothNormals | aiProcess_JoinIdenticalVertices;
+  return steps;
+}
+
+// Empty when the file was read.
+std::string read(Assimp::Importer& importer, const std::string& file, Format format) {
+  importer.SetPropertyBool(AI_CONFIG_IMPORT_FBX_PRESERVE_PIVOTS, false);
+  importer.SetPropertyFloat(AI_CONFIG_PP_GSN_MAX_SMOOTHING_ANGLE, kSmoothingAngle);
+  importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE,
+                              aiPrimitiveType_POINT | aiPrimitiveType_LINE);
+  importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS,
+                              aiComponent_ANIMATIONS | aiComponent_TANGENTS_AND_BITANGENTS);
+  const aiScene* scene = importer.ReadFile(file, steps_for(format));
+  if (scene && scene->mRootNode) return {};
+  const std::string why = importer.GetErrorString();
+  return why.empty() ? "it holds no scene" : why;
+}
+
+ChildLimits limits_for(const std::string& file) {
+  std::error_code error;
+  const std::uintmax_t size = fs::file_size(file, error);
+  ChildLimits limits;
+  limits.cpu_seconds = kLeastSeconds;
+  limits.added_bytes = kLeastMemory;
+  if (!error) {
+    limits.cpu_seconds += static_cast<int>(std::min<std::uintmax_t>(size / kBytesPerSecond, 3600));
+    limits.added_bytes += size * kMemoryPerByte;
+  }
+  return limits;
+}
+
+// Collects what assimp reports as an error and goes on after.
+class Complaints final : public Assimp::LogStream {
+ public:
+  explicit Complaints(std::vector<std::string>& lines) : lines_(lines) {}
+  void write(const char* message) override {
+    std::string line = message;
+    while (!line.empty() && std::isspace(static_cast<unsigned char>(line.back()))) line.pop_back();
+    // "Error, T1: OBJ: ...": the thread tells a reader nothing.
+    if (const std::size_t colon = line.find(": "); colon != std::string::npos) {
+      line.erase(0, colon + 2);
+    }
+    const bool is_known = std::find(lines_.begin(), lines_.end(), line) != lines_.end();
+    if (!is_known && lines_.size() < kMostComplaints) lines_.push_back(line);
+  }
+
+ private:
+  std::vector<std::string>& lines_;
+};
+
+// assimp's log is one for the process; it is ours while this lives.
+class AssimpLog {
+ public:
+  explicit AssimpLog(std::vector<std::string>& complaints) {
+    Assimp::Logger* log = Assimp::DefaultLogger::create(nullptr, Assimp::Logger::NORMAL, 0);
+    log->attachStream(new Complaints(complaints), Assimp::Logger::Err);
+  }
+  ~AssimpLog() { Assimp::DefaultLogger::kill(); }
+  AssimpLog(const AssimpLog&) = delete;
+  AssimpLog& operator=(const AssimpLog&) = delete;
+};
+
+}  // namespace
+
+SceneFile::SceneFile(const std::string& file, Host& host) : name_(file), format_(format_of(file)) {
+  const auto fail = [&](const std::string& why) {
+    throw Error(ErrorKind::Asset, file + ": assimp cannot read it: " + why);
+  };
+  const std::string trial = run_in_child(limits_for(file), [&] {
+    Assimp::Importer importer;
+    return read(importer, file, format_);
+  });
+  if (!trial.empty()) fail(trial);
+  std::vector<std::string> complaints;
+  {
+    const AssimpLog log(complaints);
+    const std::string why = read(importer_, file, format_);
+    if (!why.empty()) fail(why);
+  }
+  for (const std::string& line : complaints) {
+    host.log(LogLevel::Warning, file + ": assimp: " + line);
+  }
+}
+
+}  // namespace diorama::loader_assimp

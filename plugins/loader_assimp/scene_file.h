@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <assimp/scene.h>
+
+#include <assimp/Importer.hpp>
+#include <string>
+
+#include "diorama/host.h"
+
+namespace diorama::loader_assimp {
+
+enum class Format {
+  Gltf,
+  Fbx,
+  Collada,
+  ThreeMf,
+  Plain,  ///< OBJ, PLY, STL, OFF: neither units nor axes are stated.
+  Other,
+};
+
+/// A file as assimp reads it: triangles only, without animations.
+class SceneFile {
+ public:
+  /// Some files make assimp crash, hang or take all memory. So the file is read in a child process
+  /// first, whose time and memory are limited, and here only when that went well. Throws
+  /// Error(Asset) that begins with the file's name. What assimp complains about and survives
+  /// becomes a warning.
+  SceneFile(const std::string& file, Host& host);
+
+  const std::string& name() const { return name_; }
+  Format format() const { return format_; }
+  const aiScene& scene() const { return *importer_.GetScene(); }
+
+ private:
+  std::string name_;
+  Format format_;
+  Assimp::Importer importer_;
+};
+
+}  // namespace diorama::loader_assimp

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "loader_usd/materialx_surface.h"
+
+#include <algorithm>
+
+namespace diorama::loader_usd {
+namespace {
+
+using usd::Prim;
+
+constexpr int kMaxNodes = 32;
+
+// What the surfaces call the same things; null: there is no such input.
+struct Model {
+  const char* id;
+  const char* base_color;
+  const char* base_weight;
+  const char* metallic;
+  const char* roughness;
+  float default_roughness;
+  const char* specular;
+  const char* ior;
+  const char* transmission;
+  const char* clearcoat;
+  const char* clearcoat_roughness;
+  const char* emission_color;
+  const char* emission_weight;
+  float default_emission_weight;
+  const char* opacity;
+  const char* normal;
+};
+
+constexpr Model kModels[] = {
+    {"ND_standard_surface_surfaceshader", "base_color", "base", "metalness", "specular_roughness",
+     0.2f, "specular", "specular_IOR", "transmission", "coat", "coat_roughness", "emission_color",
+     "emission", 0.0f, "opacity", "normal"},
+    {"ND_open_pbr_surface_surfaceshader", "base_color", "base_weight", "base_metalness",
+     "specular_roughness", 0.3f, "specular_weight", "specular_ior", "transmission_weight",
+     "coat_weight", "coat_roughness", "emission_color", "emission_luminance", 0.0f,
+     "geometry_opacity", "geometry_normal"},
+    {"ND_gltf_pbr_surfaceshader", "base_color", nullptr, "metallic", "roughness", 1.0f, "specular",
+     "ior", "transmission", "clearcoat", "clearcoat_roughness", "emissive", "emissive_strength",
+     1.0f, "alpha", "normal"},
+};
+
+const Model* find_model(const std::string& id) {
+  const auto model = std::find_if(std::begin(kModels), std::end(kModels),
+                                  [&](const Model& known) { return id.starts_with(known.id); });
+  return model == std::end(kModels) ? nullptr : model;
+}
+
+Wrap to_wrap(const std::string& word) {
+  if (word == "clamp") return Wrap::Clamp;
+  if (word == "mirror") return Wrap::Mirror;
+  if (word == "constant") return Wrap::Black;
+  return Wrap::Repeat;
+}
+
+int to_channel(const std::string& output) {
+  if (output.ends_with("g") || output.ends_with("y")) return 1;
+  if (output.ends_with("b") || output.ends_with("z")) return 2;
+  if (output == "a" || output == "outa" || output == "outw") return 3;
+  return 0;
+}
+
+// A picture upstream of an input, and which of its channels the nodes between pick.
+struct Picture {
+  const Prim* node = nullptr;
+  int channel = 0;
+};
+
+Picture find_picture(const ShaderNetwork& network, const Prim& shader, const std::string& input,
+                     int& budget) {
+  const ShaderNetwork::Source source = network.source(shader, input);
+  if (!source.is_shader() || --budget < 0) return {};
+  const std::string id = network.id(*source.prim);
+  if (id.starts_with("ND_image_") || id.starts_with("ND_tiledimage_") ||
+      id.starts_with("ND_gltf_colorimage") || id.starts_with("ND_gltf_image")) {
+    return {source.prim, to_channel(source.output == "out" ? "" : source.output)};
+  }
+  for (const char* next : {"in", "in1", "in2", "fg", "bg", "mixcolor"}) {
+    Picture found = find_picture(network, *source.prim, next, budget);
+    if (!found.node) continue;
+    if (id.starts_with("ND_separate")) found.channel = to_channel(source.output);
+    if (id.starts_with("ND_extract")) {
+      found.channel =
+          static_cast<int>(std::clamp(network.number(*source.prim, "index", 0.0f), 0.0f, 3.0f));
+    }
+    return found;
+  }
+  return {};
+}
+
+// MaterialX says the space of a picture's colours as metadata of its file.
+TextureSpace space_of(const ShaderNetwork& network, const Prim& node, bool is_data) {
+  const usd::Value word = network.stage().property_metadata(node, "inputs:file", "colorSpace");
+  const std::string name = word.as_text() ? *word.as_text() : "";
+  if (name.find("srgb") != std::string::npos) return TextureSpace::Srgb;
+  if (is_data || name == "raw" || name.starts_with("lin")) return TextureSpace::Raw;
+  return TextureSpace::Auto;
+}
+
+bool connect(const Prim& shader, const char* name, TextureInput Material::*target, bool is_data,
+             MaterialDraft& draft) {
+  if (!name) return false;
+  const ShaderNetwork& network = draft.network();
+  int budget = kMaxNodes;
+  const Picture picture = find_picture(network, shader, name, budget);
+  if (!picture.node) return false;
+  const Prim& node = *picture.node;
+  const usd::FoundValue file = network.input(node, "file");
+  if (!draft.connect(target, file, space_of(network, node, is_data))) return false;
+  TextureInput& input = draft.material().*target;
+  input.channel = picture.channel;
+  input.wrap_u = to_wrap(network.text(node, "uaddressmode", "periodic"));
+  input.wrap_v = to_wrap(network.text(node, "vaddressmode", "periodic"));
+  const Vec2f tiling = network.pair(node, "uvtiling", Vec2f::Ones());
+  const Vec2f offset = network.pair(node, "uvoffset", Vec2f::Zero());
+  input.uv_from_mesh_uv = uv_map(tiling, 0.0f, offset);
+  const ShaderNetwork::Source layout = network.source(node, "texcoord");
+  if (layout.is_shader()) {
+    const std::string primvar = network.text(*layout.prim, "geomprop", "");
+    if (!primvar.empty()) draft.uv_names.push_back(primvar);
+  }
+  return true;
+}
+
+}  // namespace
+
+bool is_materialx_surface(const std::string& id) { return find_model(id) != nullptr; }
+
+void draft_materialx_surface(const Prim& shader, MaterialDraft& draft) {
+  const ShaderNetwork& network = draft.network();
+  const Model& model = *find_model(network.id(shader));
+  Material& material = draft.material();
+  const auto number = [&](const char* name, float fallback) {
+    return name ? network.number(shader, name, fallback) : fallback;
+  };
+  const bool has_picture =
+      connect(shader, model.base_color, &Material::base_color_texture, false, draft);
+  const Vec3f base = has_picture ? Vec3f(Vec3f::Ones())
+                                 : network.color(shader, model.base_color, Vec3f::Constant(0.8f));
+  material.base_color = base * number(model.base_weight, 1.0f);
+  connect(shader, model.metallic, &Material::metallic_texture, true, draft);
+  material.metallic = number(model.metallic, 0.0f);
+  connect(shader, model.roughness, &Material::roughness_texture, true, draft);
+  material.roughness = number(model.roughness, model.default_roughness);
+  material.specular = std::clamp(number(model.specular, 1.0f), 0.0f, 1.0f);
+  material.ior = number(model.ior, 1.5f);
+  material.transmission = number(model.transmission, 0.0f);
+  material.is_thin_walled = network.boolean(shader, "thin_walled", false);
+  material.clearcoat = number(model.clearcoat, 0.0f);
+  material.clearcoat_roughness = number(model.clearcoat_roughness, 0.1f);
+  const bool glows =
+      connect(shader, model.emission_color, &Material::emission_texture, false, draft);
+  const Vec3f glow =
+      glows ? Vec3f(Vec3f::Ones()) : network.color(shader, model.emission_color, Vec3f::Zero());
+  material.emission = glow * number(model.emission_weight, model.default_emission_weight);
+  connect(shader, model.opacity, &Material::opacity_texture, true, draft);
+  material.opacity = network.color(shader, model.opacity, Vec3f::Ones()).mean();
+  connect(shader, model.normal, &Material::normal_texture, true, draft);
+  unpack_normals(material.normal_texture);
+}
+
+}  // namespace diorama::loader_usd

@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: Apache-2.0
+// How fast and in how much memory the USD loader opens a crate file, beside merely reading the
+// file's arrays: one line of JSON. Without a file it makes a room of a million triangles first.
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "framework/export/scene_export.h"
+#include "loader_usd/usd/asset_library.h"
+#include "loader_usd/usd/layer.h"
+#include "loader_usd/usd_loader.h"
+#include "support/render_host/render_host.h"
+#include "support/temporary_folder.h"
+
+namespace {
+
+using namespace diorama;
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+/// A bumpy sheet with normals and uvs.
+Mesh make_sheet(int cells, double phase) {
+  Mesh mesh;
+  const auto width = static_cast<std::uint32_t>(cells + 1);
+  for (int y = 0; y <= cells; ++y) {
+    for (int x = 0; x <= cells; ++x) {
+      const double u = double(x) / cells;
+      const double v = double(y) / cells;
+      const double height = 0.05 * std::sin(20.0 * u + phase) * std::cos(17.0 * v - phase);
+      mesh.positions.emplace_back(Vec3(u, v, height).cast<float>());
+      mesh.uvs.emplace_back(Vec2(u, v).cast<float>());
+    }
+  }
+  for (std::uint32_t y = 0; y + 1 < width; ++y) {
+    for (std::uint32_t x = 0; x + 1 < width; ++x) {
+      const std::uint32_t a = y * width + x;
+      mesh.triangles.push_back({a, a + 1, a + width + 1});
+      mesh.triangles.push_back({a, a + width + 1, a + width});
+    }
+  }
+  mesh.normals = smooth_normals(mesh);
+  return mesh;
+}
+
+void write_room(const std::filesystem::path& file, const Host& host, int things, int cells) {
+  Scene scene;
+  const NodeId room = scene.create(scene.root(), "room");
+  for (int i = 0; i < things; ++i) {
+    const NodeId node = scene.create(room, "thing");
+    scene.edit(node).mesh = std::make_shared<const Mesh>(make_sheet(cells, 0.3 * i));
+    scene.edit(node).materials = {std::make_shared<const Material>()};
+  }
+  export_scene(scene, room, file, {}, host);
+}
+
+/// Reads and decompresses every array of a layer and touches all of its memory.
+double read_arrays(const std::string& file) {
+  const auto start = Clock::now();
+  usd::AssetLibrary library;
+  const auto layer = library.open(file);
+  std::uint64_t sum = 0;
+  layer->for_each_value([&](const usd::Value& value) {
+    const auto bytes = value.bytes();
+    for (std::size_t i = 0; i < bytes.size(); i += 64) sum += std::to_integer<unsigned>(bytes[i]);
+  });
+  volatile std::uint64_t keep = sum;
+  (void)keep;
+  return seconds_since(start);
+}
+
+struct Load {
+  double seconds = 0.0;
+  std::size_t triangles = 0;
+  std::size_t scene_bytes = 0;
+};
+
+template <class T>
+std::size_t bytes_of(const std::vector<T>& list) {
+  return list.size() * sizeof(T);
+}
+
+Load load(const std::string& file, Host& host) {
+  Scene scene;
+  const NodeId root = scene.create(scene.root(), "asset");
+  const auto start = Clock::now();
+  loader_usd::UsdLoader({}, host).load(file, scene, root);
+  Load result;
+  result.seconds = seconds_since(start);
+  std::set<const void*> seen;
+  for (const NodeId id : scene.subtree(root)) {
+    const Node& node = scene[id];
+    result.scene_bytes += sizeof node;
+    if (!node.mesh) continue;
+    const Mesh& mesh = *node.mesh;
+    result.triangles += mesh.triangles.size();
+    if (!seen.insert(&mesh).second) continue;
+    result.scene_bytes += bytes_of(mesh.positions) + bytes_of(mesh.triangles) +
+                          bytes_of(mesh.normals) + bytes_of(mesh.uvs) + bytes_of(mesh.colors) +
+                          bytes_of(mesh.material_slots);
+    for (const auto& material : node.materials) {
+      for (const TextureInput* input : {&material->base_color_texture, &material->metallic_texture,
+                                        &material->roughness_texture, &material->normal_texture,
+                                        &material->opacity_texture, &material->emission_texture}) {
+        if (*input && seen.insert(input->texture.get()).second) {
+          result.scene_bytes += bytes_of(input->texture->bytes) + bytes_of(input->texture->floats);
+        }
+      }
+    }
+  }
+  return result;
+}
+
+/// A line of /proc/self/status, in bytes.
+std::size_t process_bytes(const std::string& key) {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);) {
+    if (line.starts_with(key + ":")) return std::stoull(line.substr(key.size() + 1)) * 1024;
+  }
+  return 0;
+}
+
+/// Loads in a process of its own, so that the peak is this file's alone.
+std::size_t peak_bytes(const std::string& file) {
+  int ends[2];
+  if (pipe(ends) != 0) return 0;
+  const pid_t child = fork();
+  if (child == 0) {
+    test::RenderHost host{1};
+    const std::size_t before = process_bytes("VmHWM");
+    load(file, host);
+    const std::size_t grown = process_bytes("VmHWM") - before;
+    const bool is_told = write(ends[1], &grown, sizeof grown) == sizeof grown;
+    _exit(is_told ? 0 : 1);
+  }
+  std::size_t grown = 0;
+  const bool is_told = read(ends[0], &grown, sizeof grown) == sizeof grown;
+  waitpid(child, nullptr, 0);
+  close(ends[0]);
+  close(ends[1]);
+  return is_told ? grown : 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::string file;
+  int repetitions = 5;
+  int things = 20;
+  int cells = 158;
+  int threads = 1;
+  CLI::App app{"Times the USD loader against reading the file's arrays"};
+  app.add_option("file", file, "A crate file; without one a room is made");
+  app.add_option("--repetitions", repetitions);
+  app.add_option("--things", things, "Meshes of the room");
+  app.add_option("--cells", cells, "Cells along an edge of each mesh");
+  app.add_option("--threads", threads);
+  CLI11_PARSE(app, argc, argv);
+
+  const test::TemporaryFolder folder;
+  if (file.empty()) {
+    file = folder.path("room.usdc");
+    // The child that loads must begin without the room that was made here.
+    const pid_t child = fork();
+    if (child == 0) {
+      test::RenderHost host{1};
+      write_room(file, host, things, cells);
+      _exit(0);
+    }
+    waitpid(child, nullptr, 0);
+  }
+  const std::size_t peak = peak_bytes(file);
+  test::RenderHost host{threads};
+  double arrays = 1e9;
+  Load best{1e9};
+  for (int i = 0; i < repetitions; ++i) {
+    arrays = std::min(arrays, read_arrays(file));
+    const Load one = load(file, host);
+    if (one.seconds < best.seconds) best = one;
+  }
+  const nlohmann::ordered_json line{
+      {"triangles", best.triangles},
+      {"file_mib", double(std::filesystem::file_size(file)) / (1 << 20)},
+      {"arrays_s", arrays},
+      {"load_s", best.seconds},
+      {"ratio", best.seconds / arrays},
+      {"scene_mib", double(best.scene_bytes) / (1 << 20)},
+      {"peak_mib", double(peak) / (1 << 20)},
+      {"peak_over_scene", double(peak) / double(best.scene_bytes)}};
+  std::printf("%s\n", line.dump().c_str());
+}

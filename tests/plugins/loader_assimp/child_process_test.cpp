@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "loader_assimp/child_process.h"
+
+#include <csignal>
+#include <stdexcept>
+#include <vector>
+
+#include "support/catch.h"
+
+namespace diorama::loader_assimp {
+
+TEST_CASE("a child process says what it returned, threw or died of", "[loader_assimp]") {
+  constexpr ChildLimits kPlenty{60, std::uint64_t(1) << 32};
+  CHECK(run_in_child(kPlenty, [] { return std::string(); }).empty());
+  // More than a pipe holds at once.
+  const std::string long_text(200'000, 'x');
+  CHECK(run_in_child(kPlenty, [&] { return long_text; }) == long_text);
+  CHECK(run_in_child(kPlenty, []() -> std::string { throw std::runtime_error("why"); }) == "why");
+  CHECK(run_in_child(kPlenty, [] {
+          raise(SIGSEGV);
+          return std::string();
+        }).starts_with("crashes"));
+}
+
+TEST_CASE("a child process that does not end is ended", "[loader_assimp]") {
+  const std::string why = run_in_child({1, std::uint64_t(1) << 32}, [] {
+    for (volatile int i = 0;; i = i + 1) {
+    }
+    return std::string();
+  });
+  CHECK(why == "takes more than 1 s of processor time");
+}
+
+#ifndef __SANITIZE_ADDRESS__
+TEST_CASE("a child process gets no more memory than it may", "[loader_assimp]") {
+  const std::string why = run_in_child({60, 64u << 20}, [] {
+    const std::vector<char> much(std::size_t(1) << 30, 'x');
+    return std::string(much.data(), 1);
+  });
+  CHECK(why == "std::bad_alloc");
+}
+#endif
+
+}  // namespace diorama::loader_assimp

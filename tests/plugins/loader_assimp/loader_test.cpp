@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <assimp/Importer.hpp>
+
+#include "diorama/error.h"
+#include "plugins/loader_assimp/loaded_file.h"
+#include "support/catch.h"
+#include "support/temporary_folder.h"
+
+namespace diorama::loader_assimp {
+
+using test::LoadedFile;
+using test::TemporaryFolder;
+
+namespace {
+
+const std::string kTriangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n";
+
+}  // namespace
+
+TEST_CASE("every ending that is claimed is one that assimp knows", "[loader_assimp]") {
+  test::RenderHost host{1};
+  const Assimp::Importer importer;
+  const auto claims = AssimpLoader({}, host).claims();
+  CHECK(claims.size() > 30);
+  for (const std::string& claim : claims) {
+    INFO(claim);
+    CHECK(importer.IsExtensionSupported(claim.c_str()));
+  }
+}
+
+TEST_CASE("a missing texture is one warning that names file and texture", "[loader_assimp]") {
+  const TemporaryFolder folder;
+  folder.write("a.mtl",
+               "newmtl A\nmap_Kd pictures\\wood.png\nnewmtl B\nmap_Kd pictures\\wood.png\n");
+  const std::string file =
+      folder.write("a.obj", "mtllib a.mtl\n" + kTriangle +
+                                "o A\nusemtl A\nf 1/1 2/2 3/3\no B\nusemtl B\nf 1/1 2/2 3/3\n");
+  const LoadedFile loaded(file);
+  const std::string line = file + ": texture @pictures/wood.png@ could not be found";
+  CHECK(loaded.host.messages == std::vector<std::string>{line});
+  CHECK_FALSE(loaded.node("A").materials.at(0)->base_color_texture);
+
+  AssimpLoader::Params strict;
+  strict.missing_assets_are_errors = true;
+  CHECK_THROWS_WITH(LoadedFile(file, strict), line);
+}
+
+TEST_CASE("a texture that is no picture is reported with the reason", "[loader_assimp]") {
+  const TemporaryFolder folder;
+  folder.write("wood.png", "no picture");
+  folder.write("a.mtl", "newmtl A\nmap_Kd wood.png\n");
+  const std::string file =
+      folder.write("a.obj", "mtllib a.mtl\n" + kTriangle + "usemtl A\nf 1/1 2/2 3/3\n");
+  const LoadedFile loaded(file);
+  REQUIRE(loaded.host.messages.size() == 1);
+  CHECK(loaded.host.messages[0].starts_with(file + ": texture @wood.png@ could not be read: "));
+}
+
+TEST_CASE("what assimp misses and survives is a warning", "[loader_assimp]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("a.obj", "mtllib gone.mtl\n" + kTriangle + "f 1 2 3\n");
+  const LoadedFile loaded(file);
+  REQUIRE_FALSE(loaded.host.messages.empty());
+  CHECK(loaded.host.messages[0].starts_with(file + ": assimp: "));
+  CHECK(loaded.host.messages[0].find("gone.mtl") != std::string::npos);
+}
+
+TEST_CASE("a broken file is an asset error that begins with its name", "[loader_assimp]") {
+  const TemporaryFolder folder;
+  const auto check = [&](const std::string& name, const std::string& content) {
+    const std::string file = folder.write(name, content);
+    INFO(name);
+    try {
+      LoadedFile{file};
+      FAIL("it was read");
+    } catch (const Error& error) {
+      CHECK(error.kind() == ErrorKind::Asset);
+      CHECK(std::string(error.what()).starts_with(file + ": assimp cannot read it: "));
+    }
+  };
+  check("empty.glb", "");
+  check("empty.obj", "");
+  check("noise.fbx", std::string(3000, 'x'));
+  check("cut.gltf", R"({"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [)");
+  check("cut.dae", "<?xml version=\"1.0\"?><COLLADA version=\"1.4.1\"><asset>");
+  check("cut.glb", std::string("glTF\2\0\0\0\xff\xff\xff\x7f", 12));
+}
+
+}  // namespace diorama::loader_assimp

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plugins/loader_usd/loaded_stage.h"
+#include "support/catch.h"
+#include "support/temporary_folder.h"
+
+namespace diorama::loader_usd {
+
+using test::LoadedStage;
+using test::TemporaryFolder;
+
+namespace {
+
+std::string stage(const std::string& units, const std::string& body) {
+  return "#usda 1.0\n(\n" + units + "    upAxis = \"Z\"\n)\n" + body;
+}
+
+const std::string kWoodenCube = R"(
+def Xform "Body" (
+    prepend apiSchemas = ["PhysicsRigidBodyAPI", "PhysicsMassAPI"]
+)
+{
+    float physics:density = 500
+    def Cube "Shape" (
+        prepend apiSchemas = ["PhysicsCollisionAPI"]
+    )
+    {
+        double size = 2
+        double3 xformOp:scale = (1, 1, 0.5)
+        uniform token[] xformOpOrder = ["xformOp:scale"]
+    }
+}
+)";
+
+}  // namespace
+
+TEST_CASE("density and volume make a mass in kilograms", "[loader_usd]") {
+  const TemporaryFolder folder;
+  LoadedStage metres(folder.write("a.usda", stage("    metersPerUnit = 1\n", kWoodenCube)));
+  CHECK(metres.node("Body").rigid_body->mass_kg == Approx(500.0 * 4.0));
+  // The same numbers in centimetres: as much per cubic centimetre.
+  LoadedStage centimetres(folder.write("b.usda", stage("    metersPerUnit = 0.01\n", kWoodenCube)));
+  CHECK(centimetres.node("Body").rigid_body->mass_kg == Approx(500.0 * 4.0));
+  LoadedStage grams(folder.write(
+      "c.usda", stage("    metersPerUnit = 0.01\n    kilogramsPerUnit = 0.001\n", kWoodenCube)));
+  CHECK(grams.node("Body").rigid_body->mass_kg == Approx(2.0));
+}
+
+TEST_CASE("the density may stand in the physics material", "[loader_usd]") {
+  const TemporaryFolder folder;
+  LoadedStage loaded(folder.write("a.usda", stage("    metersPerUnit = 1\n", R"(
+def Cube "Body" (
+    prepend apiSchemas = ["PhysicsRigidBodyAPI", "PhysicsCollisionAPI"]
+)
+{
+    double size = 1
+    rel material:binding:physics = </Stone>
+}
+def Material "Stone" (
+    prepend apiSchemas = ["PhysicsMaterialAPI"]
+)
+{
+    float physics:density = 2500
+    float physics:dynamicFriction = 0.8
+}
+)")));
+  CHECK(loaded.node("Body").rigid_body->mass_kg == Approx(2500.0));
+  CHECK(loaded.node("Body").collider->friction == Approx(0.8));
+}
+
+}  // namespace diorama::loader_usd
