@@ -57,15 +57,24 @@ std::vector<std::string> assets_of(const Loader& loader, const ComponentConfig& 
                         [&] { return loader.assets(); });
 }
 
-void make_components(Assembler& assembler, JobAssembly& assembly,
-                     std::vector<std::unique_ptr<Loader>>& object_loaders) {
+/// Loaders that the run itself does not use.
+struct JobLoaders {
+  std::map<std::string, std::unique_ptr<Loader>> of_files;  ///< By type, for the host.
+  std::vector<std::unique_ptr<Loader>> of_objects;          ///< Name the assets, group by group.
+};
+
+JobLoaders make_components(Assembler& assembler, JobAssembly& assembly) {
+  JobLoaders loaders;
   const Job& job = assembly.job;
   JobComponents& parts = assembly.components;
+  for (const ComponentConfig& config : job.loaders) {
+    loaders.of_files[config.type] = assembler.make<Loader>(config, "loaders");
+  }
   for (const ComponentConfig& config : job.environments) {
     parts.environments.push_back(assembler.make<Loader>(config, "environments"));
   }
   for (const ObjectGroup& group : job.objects) {
-    object_loaders.push_back(assembler.make<Loader>(group.loader, "objects"));
+    loaders.of_objects.push_back(assembler.make<Loader>(group.loader, "objects"));
   }
   for (const RandomizerEntry& entry : job.randomizers) {
     parts.randomizers.push_back(assembler.make<Randomizer>(entry.component, "randomizers"));
@@ -78,6 +87,7 @@ void make_components(Assembler& assembler, JobAssembly& assembly,
     parts.writers.push_back(assembler.make<Writer>(entry.component, "writers"));
   }
   assembler.complaints().raise();
+  return loaders;
 }
 
 CapturePlan plan_from_assets(const JobAssembly& assembly,
@@ -169,21 +179,20 @@ Value check_job(const Value& value, Registry& registry, Host& host) {
   JobAssembly assembly;
   Assembler assembler(registry, host);
   assembly.job = read_job(value, assembler.complaints());
-  std::vector<std::unique_ptr<Loader>> object_loaders;
-  make_components(assembler, assembly, object_loaders);
+  make_components(assembler, assembly);
   return resolved_job(value, describe_from(registry));
 }
 
-JobAssembly assemble_job(const Value& value, Registry& registry, Host& host,
+JobAssembly assemble_job(const Value& value, Registry& registry, HostServices& host,
                          const std::optional<fs::path>& assets_root,
                          const std::string& program_version) {
   JobAssembly assembly;
   Assembler assembler(registry, host);
   assembly.job = read_job(value, assembler.complaints());
-  std::vector<std::unique_ptr<Loader>> object_loaders;
-  make_components(assembler, assembly, object_loaders);
+  JobLoaders loaders = make_components(assembler, assembly);
+  for (auto& [type, loader] : loaders.of_files) host.use_loader(type, std::move(loader));
   assembly.resolved = resolved_job(value, describe_from(registry));
-  assembly.plan = plan_from_assets(assembly, object_loaders);
+  assembly.plan = plan_from_assets(assembly, loaders.of_objects);
   resolve_needs(registry, host, assembly);
   for (const EnvironmentChoice& choice : assembly.plan.environments) {
     assembler.note_loader_of(choice.asset);

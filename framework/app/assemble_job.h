@@ -7,6 +7,7 @@
 
 #include "diorama/host.h"
 #include "diorama/writer.h"
+#include "framework/host/host_services.h"
 #include "framework/pipeline/capture_plan.h"
 #include "framework/pipeline/job.h"
 #include "framework/pipeline/pipeline.h"
@@ -32,9 +33,9 @@ DescribeComponent describe_from(Registry& registry);
 Value check_job(const Value& job, Registry& registry, Host& host);
 
 /// Reads the job, makes its components, lists its assets, plans its captures and resolves what its
-/// writers need. Nothing is loaded or written. All complaints about the file come in one Error
-/// (Config); then Error(Plugin), Error(Asset) as found.
-JobAssembly assemble_job(const Value& job, Registry& registry, Host& host,
+/// writers need. The host gets the job's loaders. Nothing is loaded or written. All complaints
+/// about the file come in one Error (Config); then Error(Plugin), Error(Asset) as found.
+JobAssembly assemble_job(const Value& job, Registry& registry, HostServices& host,
                          const std::optional<std::filesystem::path>& assets_root,
                          const std::string& program_version);
 

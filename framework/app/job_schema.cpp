@@ -119,6 +119,7 @@ struct ComponentSection {
 };
 
 constexpr ComponentSection kSections[] = {
+    {"loaders", ComponentKind::Loader, nullptr},
     {"environments", ComponentKind::Loader, nullptr},
     {"objects", ComponentKind::Loader, nullptr},
     {"randomizers", ComponentKind::Randomizer, nullptr},

@@ -64,6 +64,10 @@ HostServices::HostServices(Registry& registry, HostOptions options, Log log)
 
 HostServices::~HostServices() = default;
 
+void HostServices::use_loader(const std::string& type, std::unique_ptr<Loader> loader) {
+  loaders_[type] = std::move(loader);
+}
+
 void HostServices::log(LogLevel level, std::string_view message) { log_(level, message); }
 
 fs::path HostServices::resolve(std::string_view asset) const { return paths_.resolve(asset); }

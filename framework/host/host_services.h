@@ -25,13 +25,17 @@ struct HostOptions {
   std::size_t asset_cache_bytes = std::size_t(1) << 30;
 };
 
-/// The services that plugins get. Loaders are made on first use, with default parameters. When two
-/// loaders claim the same ending, the first by name takes it.
+/// The services that plugins get. Loaders are made on first use, with default parameters unless a
+/// job says other ones. When two loaders claim the same ending, the first by name takes it.
 class HostServices final : public Host {
  public:
   /// The registry must outlive the host services.
   HostServices(Registry& registry, HostOptions options, Log log);
   ~HostServices() override;
+
+  /// Reads with this loader what its type claims, instead of with one that has default parameters.
+  /// Call before anything is loaded.
+  void use_loader(const std::string& type, std::unique_ptr<Loader> loader);
 
   void log(LogLevel level, std::string_view message) override;
   std::filesystem::path resolve(std::string_view asset) const override;

@@ -31,7 +31,10 @@ Texture decode_any(const images::Source& source) {
   }
   if (begins_with(source.bytes, "\x76\x2f\x31\x01")) return images::decode_exr(source);
   if (begins_with(source.bytes, "BM")) return images::decode_bmp(source);
-  if (ends_with_any_case(source.name, ".tga")) return images::decode_tga(source);
+  // TGA has no mark of its own; a member of a package is called "a.usdz[b.tga]".
+  const bool is_tga =
+      ends_with_any_case(source.name, ".tga") || ends_with_any_case(source.name, ".tga]");
+  if (is_tga) return images::decode_tga(source);
   source.refuse(
       "is no image of a known format; PNG, JPEG, Radiance HDR, OpenEXR, BMP and TGA are "
       "read");

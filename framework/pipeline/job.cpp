@@ -25,10 +25,10 @@ constexpr const char* kEnvironmentColliderWords[] = {"none", "triangle_mesh", "c
 constexpr const char* kLightWords[] = {"sphere", "rect", "disk", "distant", "dome"};
 constexpr const char* kCameraWords[] = {"pinhole", "opencv_pinhole", "fisheye_polynomial"};
 
-const std::vector<std::string> kSections{"seed",         "assets_root", "debug",   "total_captures",
-                                         "environments", "environment", "objects", "lights",
-                                         "cameras",      "randomizers", "physics", "renderer",
-                                         "timeline",     "writers",     "output"};
+const std::vector<std::string> kSections{
+    "seed",        "assets_root", "debug",   "total_captures", "loaders",     "environments",
+    "environment", "objects",     "lights",  "cameras",        "randomizers", "physics",
+    "renderer",    "timeline",    "writers", "output"};
 
 std::string item_path(std::string_view section, std::size_t index) {
   return std::string(section) + "[" + std::to_string(index) + "]";
@@ -127,6 +127,20 @@ ComponentConfig read_entry(const std::string& path, Value map, Complaints& compl
   ComponentConfig entry{head.type, head.name, std::move(map), path};
   require_type(entry, complaints);
   return entry;
+}
+
+void read_loaders(const Value& value, Job& job, Complaints& complaints) {
+  for (auto& [path, map] : entries(value, "loaders", complaints)) {
+    ComponentConfig entry = read_entry(path, std::move(map), complaints);
+    const auto is_same = [&](const ComponentConfig& known) { return known.type == entry.type; };
+    if (std::any_of(job.loaders.begin(), job.loaders.end(), is_same)) {
+      complaints.add(place_of(entry.map, "type"), path + ": another entry is of type \"" +
+                                                      entry.type +
+                                                      "\"; each loader reads "
+                                                      "its files in one way");
+    }
+    job.loaders.push_back(std::move(entry));
+  }
 }
 
 void read_environments(const Value& value, Job& job, Complaints& complaints) {
@@ -519,6 +533,7 @@ Job read_job(const Value& value, Complaints& complaints) {
   job.assets_root = head.assets_root;
   job.debug = head.debug;
   job.total_captures = head.total_captures;
+  read_loaders(value, job, complaints);
   read_environments(value, job, complaints);
   read_section(value, "environment", job.environment, complaints);
   read_objects(value, job, complaints);

@@ -135,6 +135,7 @@ struct Job {
   std::optional<std::string> assets_root;
   bool debug = false;
   int total_captures = 1;
+  std::vector<ComponentConfig> loaders;  ///< Parameters of the loaders of files; types are unique.
   std::vector<ComponentConfig> environments;
   EnvironmentRules environment;
   std::vector<ObjectGroup> objects;

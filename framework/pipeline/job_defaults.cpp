@@ -139,6 +139,8 @@ Value resolved_job(const Value& job, const DescribeComponent& describe) {
   }
   using Kind = ComponentKind;
   const auto heads = specs_of<detail::EntryHead>();
+  const Value loaders = components(job, "loaders", Kind::Loader, heads, describe);
+  if (!loaders.list.empty()) result.set("loaders", loaders);
   result.set("environments", components(job, "environments", Kind::Loader, heads, describe));
   result.set("environment",
              with_defaults(section_or_empty(job, "environment"), specs_of<EnvironmentRules>()));
@@ -164,6 +166,8 @@ std::vector<ParamSpec> job_specs() {
   std::vector<ParamSpec> specs = specs_of<detail::JobHead>();
   const auto head = specs_of<detail::EntryHead>();
   const auto engine = specs_of<detail::EngineHead>();
+  specs.push_back(section("loaders", ParamType::List,
+                          "Parameters of the loaders that read the job's files.", head));
   specs.push_back(
       section("environments", ParamType::List, "Loaders whose assets are visited in turn.", head));
   specs.push_back(section("environment", ParamType::Group, "Rules for what was loaded.",

@@ -88,6 +88,8 @@ class MeshAssembly {
 
  private:
   static constexpr std::uint32_t kNone = 0xFFFFFFFF;
+  // A point that all faces share must not cost the square of their number.
+  static constexpr int kMaxTries = 64;
 
   std::uint32_t vertex(std::size_t face, std::size_t point, std::size_t corner);
   bool is_same(std::uint32_t vertex, const float* normal, const float* uv,
@@ -121,7 +123,8 @@ std::uint32_t MeshAssembly::vertex(std::size_t face, std::size_t point, std::siz
   const float* normal = value(sources_.normals);
   const float* uv = value(sources_.uvs);
   const float* color = value(sources_.colors);
-  for (std::uint32_t v = first_[point]; v != kNone; v = next_[v]) {
+  int tries = 0;
+  for (std::uint32_t v = first_[point]; v != kNone && tries < kMaxTries; v = next_[v], ++tries) {
     if (is_same(v, normal, uv, color)) return v;
   }
   const auto added = static_cast<std::uint32_t>(mesh_.positions.size());
@@ -185,6 +188,9 @@ Mesh MeshAssembly::build() {
   }
   mesh_.triangles.reserve(counts.size());
   mesh_.positions.reserve(first_.size());
+  if (sources_.normals) mesh_.normals.reserve(first_.size());
+  if (sources_.uvs) mesh_.uvs.reserve(first_.size());
+  next_.reserve(first_.size());
   std::size_t corner = 0;
   for (std::size_t face = 0; face < counts.size(); ++face) {
     if (counts[face] < 0) break;
@@ -203,7 +209,13 @@ Mesh MeshAssembly::build() {
   for (Vec3f& color : mesh_.colors) {
     if (!color.allFinite()) color.setOnes();
   }
+  // The mesh stays, so it should not keep room that it does not need.
   mesh_.positions.shrink_to_fit();
+  mesh_.normals.shrink_to_fit();
+  mesh_.uvs.shrink_to_fit();
+  mesh_.colors.shrink_to_fit();
+  mesh_.triangles.shrink_to_fit();
+  mesh_.material_slots.shrink_to_fit();
   return std::move(mesh_);
 }
 
@@ -217,10 +229,9 @@ void turn_axis(Mesh& mesh, const std::string& axis) {
   for (Vec3f& normal : mesh.normals) turn(normal);
 }
 
-}  // namespace
-
-std::string MeshTranslator::find_uv(const std::vector<usd::Primvar>& primvars,
-                                    const std::vector<std::string>& uv_names) const {
+// The primvar that textures are laid out by; empty when there is none.
+std::string find_uv(const std::vector<usd::Primvar>& primvars,
+                    const std::vector<std::string>& uv_names) {
   const auto has = [&](const std::string& name) {
     return std::any_of(primvars.begin(), primvars.end(),
                        [&](const usd::Primvar& primvar) { return primvar.name == name; });
@@ -240,8 +251,28 @@ std::string MeshTranslator::find_uv(const std::vector<usd::Primvar>& primvars,
   return {};
 }
 
-void MeshTranslator::read_display_color(const Prim& prim, TranslatedMesh& result) {
-  for (const usd::Primvar& primvar : geometry_.primvars(prim)) {
+// The slot of each face; empty when all faces are of slot 0.
+std::vector<std::uint16_t> slots_of_faces(const Stage& stage, const MeshTranslator::Prims& subsets,
+                                          std::size_t faces) {
+  std::vector<std::uint16_t> slots;
+  if (subsets.empty()) return slots;
+  slots.resize(faces);
+  for (std::size_t i = 0; i < subsets.size(); ++i) {
+    const auto indices = usd::numbers<std::int32_t>(stage.value(*subsets[i], "indices"), 1);
+    if (!indices) continue;
+    for (const std::int32_t face : indices->span) {
+      if (face >= 0 && static_cast<std::size_t>(face) < slots.size()) {
+        slots[static_cast<std::size_t>(face)] = static_cast<std::uint16_t>(i + 1);
+      }
+    }
+  }
+  return slots;
+}
+
+}  // namespace
+
+void MeshTranslator::read_display_color(const Primvars& primvars, TranslatedMesh& result) const {
+  for (const usd::Primvar& primvar : primvars) {
     const std::string name = "primvars:" + primvar.name;
     if (primvar.name == "displayColor") {
       const auto color = usd::numbers<float>(stage_.value(*primvar.owner, name), 3);
@@ -256,18 +287,20 @@ void MeshTranslator::read_display_color(const Prim& prim, TranslatedMesh& result
   }
 }
 
-TranslatedMesh MeshTranslator::translate(const Prim& prim,
+TranslatedMesh MeshTranslator::translate(const Prim& prim, const Prims& subsets,
                                          const std::vector<std::string>& uv_names) {
-  TranslatedMesh result =
-      prim.type_name == "Mesh" ? translate_mesh(prim, uv_names) : translate_shape(prim);
-  read_display_color(prim, result);
+  const Primvars primvars = geometry_.primvars(prim);
+  TranslatedMesh result = prim.type_name == "Mesh"
+                              ? translate_mesh(prim, primvars, subsets, uv_names)
+                              : translate_shape(prim);
+  read_display_color(primvars, result);
   return result;
 }
 
-TranslatedMesh MeshTranslator::translate_mesh(const Prim& prim,
+TranslatedMesh MeshTranslator::translate_mesh(const Prim& prim, const Primvars& primvars,
+                                              const Prims& subsets,
                                               const std::vector<std::string>& uv_names) {
   TranslatedMesh result;
-  const auto primvars = geometry_.primvars(prim);
   const std::string uv_name = find_uv(primvars, uv_names);
   const auto owner = [&](const std::string& name) -> const Prim* {
     for (const usd::Primvar& primvar : primvars) {
@@ -293,14 +326,7 @@ TranslatedMesh MeshTranslator::translate_mesh(const Prim& prim,
     key.push_back(who ? stage_.value_spec(*who, name) : nullptr);
     key.push_back(who ? stage_.value_spec(*who, name + ":indices") : nullptr);
   }
-  for (const Prim* child : stage_.visible_children(prim)) {
-    if (child->type_name != "GeomSubset") continue;
-    const bool binds = usd::token_or(stage_, *child, "elementType", "face") == "face" &&
-                       !geometry_.material(*child).empty();
-    if (!binds) continue;
-    result.subsets.push_back(child);
-    key.push_back(stage_.value_spec(*child, "indices"));
-  }
+  for (const Prim* subset : subsets) key.push_back(stage_.value_spec(*subset, "indices"));
   std::shared_ptr<const Mesh>& known = meshes_[{key, uv_name}];
   if (known) {
     result.mesh = known;
@@ -326,19 +352,7 @@ TranslatedMesh MeshTranslator::translate_mesh(const Prim& prim,
   }
   sources.is_left_handed =
       usd::token_or(stage_, prim, "orientation", "rightHanded") == "leftHanded";
-  std::vector<std::uint16_t> slots;
-  if (!result.subsets.empty()) {
-    slots.resize(sources.counts.span.size());
-    for (std::size_t i = 0; i < result.subsets.size(); ++i) {
-      const auto faces = usd::numbers<std::int32_t>(stage_.value(*result.subsets[i], "indices"), 1);
-      if (!faces) continue;
-      for (const std::int32_t face : faces->span) {
-        if (face >= 0 && static_cast<std::size_t>(face) < slots.size()) {
-          slots[static_cast<std::size_t>(face)] = static_cast<std::uint16_t>(i + 1);
-        }
-      }
-    }
-  }
+  const auto slots = slots_of_faces(stage_, subsets, sources.counts.span.size());
   Mesh mesh = MeshAssembly(sources, slots).build();
   if (mesh.triangles.empty()) return result;
   mesh.is_double_sided = usd::bool_or(stage_, prim, "doubleSided", false);

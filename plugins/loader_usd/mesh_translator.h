@@ -3,6 +3,7 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,11 +13,9 @@
 
 namespace diorama::loader_usd {
 
-/// A mesh with the GeomSubsets that its material slots stand for.
 struct TranslatedMesh {
-  std::shared_ptr<const Mesh> mesh;       ///< Null when nothing is left to draw.
-  std::vector<const usd::Prim*> subsets;  ///< Slot 1 + i; slot 0 is the rest of the mesh.
-  std::optional<Vec3f> display_color;     ///< One colour for all, linear.
+  std::shared_ptr<const Mesh> mesh;    ///< Null when nothing is left to draw.
+  std::optional<Vec3f> display_color;  ///< One colour for all, linear.
   float display_opacity = 1.0f;
 };
 
@@ -27,17 +26,21 @@ class MeshTranslator {
  public:
   MeshTranslator(usd::Stage& stage, usd::Geometry& geometry) : stage_(stage), geometry_(geometry) {}
 
+  using Prims = std::vector<const usd::Prim*>;
+
+  /// `subsets`: GeomSubsets that get material slots of their own, 1 + i; slot 0 is the rest.
   /// `uv_names`: primvars that the materials read, the first one that the prim has is taken.
-  TranslatedMesh translate(const usd::Prim& prim, const std::vector<std::string>& uv_names);
+  TranslatedMesh translate(const usd::Prim& prim, const Prims& subsets,
+                           const std::vector<std::string>& uv_names);
 
  private:
   using Key = std::vector<const void*>;
+  using Primvars = std::vector<usd::Primvar>;
 
-  TranslatedMesh translate_mesh(const usd::Prim& prim, const std::vector<std::string>& uv_names);
+  TranslatedMesh translate_mesh(const usd::Prim& prim, const Primvars& primvars,
+                                const Prims& subsets, const std::vector<std::string>& uv_names);
   TranslatedMesh translate_shape(const usd::Prim& prim);
-  std::string find_uv(const std::vector<usd::Primvar>& primvars,
-                      const std::vector<std::string>& uv_names) const;
-  void read_display_color(const usd::Prim& prim, TranslatedMesh& result);
+  void read_display_color(const Primvars& primvars, TranslatedMesh& result) const;
 
   usd::Stage& stage_;
   usd::Geometry& geometry_;

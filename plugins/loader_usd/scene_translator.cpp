@@ -19,7 +19,7 @@ using usd::Stage;
 constexpr int kMaxInstancerNesting = 8;
 constexpr int kCameraWidth = 1280;
 // Small files may ask for any number of nodes by references to references and nested instancers.
-constexpr std::size_t kMaxNodes = 1'000'000;
+constexpr std::size_t kMaxNodes = 500'000;
 
 // What a layer says about its units and axis, if it does.
 struct Metrics {
@@ -33,6 +33,19 @@ Metrics metrics_of(const usd::Layer& layer) {
   const usd::Value axis = layer.get(layer.root(), "upAxis");
   if (axis.as_text()) metrics.is_z_up = *axis.as_text() == "Z";
   return metrics;
+}
+
+// How many units of the outer layer one of the inner layer is, as far as both say so.
+double unit_ratio(const Metrics& inside, const Metrics& outside) {
+  const bool is_said =
+      inside.meters_per_unit.value_or(0.0) > 0.0 && outside.meters_per_unit.value_or(0.0) > 0.0;
+  return is_said ? *inside.meters_per_unit / *outside.meters_per_unit : 1.0;
+}
+
+// Whether the author took care of the units by hand: a scale of about that much.
+bool is_scaled_by(const usd::LocalTransform& local, double ratio) {
+  const double volume = std::abs(to_affine(local.matrix).linear().determinant());
+  return ratio != 1.0 && std::abs(std::cbrt(volume) / ratio - 1.0) < 0.05;
 }
 
 // Shapes without triangles of their own.
@@ -119,10 +132,8 @@ Affine SceneTranslator::unit_correction(const Prim& prim) const {
     if (outer == node.stack) continue;
     const Metrics inside = metrics_of(node.stack->root());
     const Metrics outside = metrics_of(outer->root());
-    if (inside.meters_per_unit && outside.meters_per_unit && *inside.meters_per_unit > 0.0 &&
-        *outside.meters_per_unit > 0.0) {
-      result.linear() *= *inside.meters_per_unit / *outside.meters_per_unit;
-    }
+    const double ratio = unit_ratio(inside, outside);
+    if (!is_scaled_by(usd::local_transform(stage_, prim), ratio)) result.linear() *= ratio;
     if (inside.is_z_up && outside.is_z_up && *inside.is_z_up != *outside.is_z_up) {
       const Affine turn = z_up_from_y_up();
       result = result * (*outside.is_z_up ? turn : turn.inverse());
@@ -183,27 +194,37 @@ std::shared_ptr<const Material> SceneTranslator::plain_material(const Translated
   return known;
 }
 
+// What the prim is drawn with in full; a material for previews alone is better than none.
+std::string SceneTranslator::drawn_material(const Prim& prim) {
+  std::string path = geometry_.material(prim, "full");
+  return path.empty() ? geometry_.material(prim, "preview") : path;
+}
+
 void SceneTranslator::add_shape(const Prim& prim, NodeId node) {
-  std::vector<std::string> paths{geometry_.material(prim)};
-  std::vector<std::string> uv_names;
+  std::vector<std::string> paths{drawn_material(prim)};
+  std::vector<const Prim*> subsets;
   if (prim.type_name == "Mesh") {
     for (const Prim* child : stage_.visible_children(prim)) {
-      if (child->type_name == "GeomSubset") paths.push_back(geometry_.material(*child));
+      if (child->type_name != "GeomSubset") continue;
+      if (usd::token_or(stage_, *child, "elementType", "face") != "face") continue;
+      std::string path = drawn_material(*child);
+      if (path.empty()) continue;
+      subsets.push_back(child);
+      paths.push_back(std::move(path));
     }
   }
+  std::vector<std::string> uv_names;
   for (const std::string& path : paths) {
     const auto& names = materials_.translate(path).uv_names;
     uv_names.insert(uv_names.end(), names.begin(), names.end());
   }
-  const TranslatedMesh mesh = meshes_.translate(prim, uv_names);
+  const TranslatedMesh mesh = meshes_.translate(prim, subsets, uv_names);
   if (!mesh.mesh) return;
   std::vector<std::shared_ptr<const Material>> materials;
-  const auto add = [&](const std::string& path) {
+  for (const std::string& path : paths) {
     const auto& material = materials_.translate(path).material;
     materials.push_back(material ? material : plain_material(mesh));
-  };
-  add(paths.front());
-  for (const Prim* subset : mesh.subsets) add(geometry_.material(*subset));
+  }
   const std::string purpose = geometry_.purpose(prim);
   Node& content = scene_.edit(node);
   content.mesh = mesh.mesh;

@@ -37,6 +37,7 @@ class SceneTranslator {
   Affine local_pose(const usd::Prim& prim, const Place& parent);
   Affine unit_correction(const usd::Prim& prim) const;
 
+  std::string drawn_material(const usd::Prim& prim);
   void add_shape(const usd::Prim& prim, NodeId node);
   void add_camera(const usd::Prim& prim, Place& place);
   void add_light(const usd::Prim& prim, Place& place);

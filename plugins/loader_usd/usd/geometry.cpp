@@ -177,7 +177,9 @@ bool Geometry::collection_includes(const std::string& collection, const std::str
   return nearest(includes) > nearest(stage_.targets(*owner, base + ":excludes"));
 }
 
-std::string Geometry::material(const Prim& prim) {
+std::string Geometry::material(const Prim& prim, std::string_view purpose) {
+  const std::string for_all = "material:binding";
+  const std::string for_purpose = for_all + ":" + std::string(purpose);
   std::string bound;
   const auto consider = [&](const Prim& owner, const std::string& relationship,
                             const std::string& target, bool replaces_same_prim) {
@@ -187,8 +189,10 @@ std::string Geometry::material(const Prim& prim) {
   };
   for (const Prim* at = &prim; at; at = at->parent) {
     const std::string before = bound;
-    const Strings direct = stage_.targets(*at, "material:binding");
-    if (direct.size() == 1) consider(*at, "material:binding", direct.front(), false);
+    const bool is_special = !purpose.empty() && stage_.has_property(*at, for_purpose);
+    const std::string& relationship = is_special ? for_purpose : for_all;
+    const Strings direct = stage_.targets(*at, relationship);
+    if (direct.size() == 1) consider(*at, relationship, direct.front(), false);
     const bool is_bound_here = bound != before;
     constexpr std::string_view kCollection = "material:binding:collection:";
     for (const std::string& name : stage_.property_names(*at)) {

@@ -39,8 +39,9 @@ class Geometry {
   bool is_visible(const Prim& prim);
   /// default, render, proxy or guide: authored on the prim or its nearest ancestor.
   std::string purpose(const Prim& prim);
-  /// The material that the prim is drawn with; empty when there is none.
-  std::string material(const Prim& prim);
+  /// The material that is bound to the prim; empty when there is none. A binding for `purpose`
+  /// ("full", "preview") beats one for all purposes on the same prim.
+  std::string material(const Prim& prim, std::string_view purpose = {});
   /// All primvars, by name: its own, and constant ones of its ancestors.
   std::vector<Primvar> primvars(const Prim& prim);
 

@@ -391,13 +391,18 @@ void PrimIndexer::Builder::add_tasks(int i, bool skip_expressed) {
 }
 
 Task PrimIndexer::Builder::pop_task() {
-  std::vector<int> ranks(index_.nodes.size());
-  int next = 0;
-  rank_preorder(index_, 0, ranks, next);
+  const auto by_kind = [](const Task& a, const Task& b) { return a.kind < b.kind; };
+  const TaskKind kind = std::min_element(tasks_.begin(), tasks_.end(), by_kind)->kind;
   // Variants by strength of their nodes, everything else as it came.
+  std::vector<int> ranks;
+  if (kind >= TaskKind::VariantSets) {
+    ranks.resize(index_.nodes.size());
+    int next = 0;
+    rank_preorder(index_, 0, ranks, next);
+  }
   const auto key = [&](const Task& task) {
-    const bool is_variant = task.kind >= TaskKind::VariantSets;
-    return std::tuple(task.kind, is_variant ? ranks[static_cast<std::size_t>(task.node)] : 0,
+    const bool is_ranked = !ranks.empty() && task.kind == kind;
+    return std::tuple(task.kind, is_ranked ? ranks[static_cast<std::size_t>(task.node)] : 0,
                       task.sibling);
   };
   const auto first = std::min_element(

@@ -18,9 +18,10 @@ void ignore(LogLevel, std::string_view) {}
 class PartLoader final : public Loader {
  public:
   struct Params {
-    void visit(ParamVisitor&) {}
+    double weight = 7.0;
+    void visit(ParamVisitor& v) { v.param("weight", weight, {"Of a lid.", "kg"}); }
   };
-  PartLoader(const Params&, Host& host) : host_(host) {}
+  PartLoader(const Params& params, Host& host) : params_(params), host_(host) {}
   std::vector<std::string> claims() const override { return {".part", ".big.part", "part:"}; }
 
   void load(std::string_view asset, Scene& scene, NodeId root) override {
@@ -39,11 +40,12 @@ class PartLoader final : public Loader {
     node.mesh = mesh;
     node.materials = {material, material};
     node.is_visible = false;
-    node.rigid_body = RigidBody{.mass_kg = 7};
+    node.rigid_body = RigidBody{.mass_kg = params_.weight};
     scene.create(lid, "knob");
   }
 
  private:
+  Params params_;
   Host& host_;
 };
 
@@ -98,6 +100,13 @@ TEST_CASE("a loaded asset is copied with all that it carries, and shared", "[hos
   CHECK(node.parent_from_node.linear()(2, 2) == 2);
   CHECK(shop.scene.find("/a_01/lid/knob"));
   CHECK(shop.scene[second].labels.at("class") == "part");
+}
+
+TEST_CASE("a job's loader takes the place of the default one", "[host]") {
+  Workshop shop;
+  shop.host->use_loader("parts", std::make_unique<PartLoader>(PartLoader::Params{3.0}, *shop.host));
+  shop.host->load_asset("a.part", shop.scene, shop.scene.root());
+  CHECK(shop.scene[shop.scene.require("/a/lid")].rigid_body->mass_kg == 3.0);
 }
 
 TEST_CASE("the longest claim takes the asset, in any case; schemes give names", "[host]") {

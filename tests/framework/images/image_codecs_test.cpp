@@ -295,6 +295,15 @@ TEST_CASE("damaged images never crash", "[images]") {
   }
 }
 
+TEST_CASE("TGA is known by its name, also inside of a package", "[images]") {
+  // One pixel, plain, blue first.
+  const std::uint8_t tga[] = {0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 0, 24, 0, 30, 20, 10};
+  for (const char* name : {"a.tga", "A.TGA", "a.usdz[b/c.tga]"}) {
+    const auto texture = decode_image(std::as_bytes(std::span(tga)), name);
+    CHECK(texture->bytes == std::vector<std::uint8_t>{10, 20, 30});
+  }
+}
+
 TEST_CASE("hostile headers of BMP and TGA files are refused", "[images]") {
   const TemporaryFolder folder;
   if (!run_reference("make", folder.path)) return;

@@ -74,6 +74,16 @@ TEST_CASE("Mistakes that make a job pointless are named", "[job]") {
   CHECK_THAT(complaints_about("[1, 2]"), Contains("a job is a mapping of sections"));
 }
 
+TEST_CASE("A job may say how loaders read its files", "[job]") {
+  const std::string loaders = "loaders: [{type: usd, missing_assets_are_errors: true}]\n";
+  const Job job = job_from(good_job() + loaders);
+  REQUIRE(job.loaders.size() == 1);
+  CHECK(job.loaders[0].type == "usd");
+  CHECK(job.loaders[0].map.find("missing_assets_are_errors"));
+  CHECK_THAT(complaints_about(good_job() + "loaders: [{type: usd}, {name: b, type: usd}]\n"),
+             Contains("loaders[1]: another entry is of type \"usd\""));
+}
+
 TEST_CASE("The null renderer may be written without quotes", "[job]") {
   CHECK(job_from(good_job() + "renderer: {type: null}\n").renderer.type == "null");
   CHECK(job_from(good_job() + "renderer: {type: \"null\"}\n").renderer.type == "null");

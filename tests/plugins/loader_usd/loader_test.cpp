@@ -74,6 +74,21 @@ def Xform "Chair" (
   const Aabb bounds = loaded.scene.world_bounds(loaded.root);
   CHECK(bounds.min.isApprox(Vec3(5.0, 0.0, -0.04), 1e-6));
   CHECK(bounds.max.isApprox(Vec3(5.02, 0.0, 0.0), 1e-6));
+
+  Loaded by_hand(folder.write("by_hand.usda", R"(#usda 1.0
+(
+    metersPerUnit = 1
+    upAxis = "Z"
+)
+def Xform "Chair" (
+    references = @part.usda@
+)
+{
+    double3 xformOp:scale = (0.01, 0.01, 0.01)
+    uniform token[] xformOpOrder = ["xformOp:scale"]
+}
+)"));
+  CHECK(by_hand.scene.world_bounds(by_hand.root).size().isApprox(Vec3(0.02, 0.0, 0.04), 1e-6));
 }
 
 TEST_CASE("faces are triangulated, split by corners, oriented and assigned to subsets",
