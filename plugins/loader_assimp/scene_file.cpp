@@ -51,15 +51,20 @@ unsigned steps_for(Format format) {
 // Empty when the file was read.
 std::string read(Assimp::Importer& importer, const std::string& file, Format format) {
   importer.SetPropertyBool(AI_CONFIG_IMPORT_FBX_PRESERVE_PIVOTS, false);
+  importer.SetPropertyBool(AI_CONFIG_IMPORT_NO_SKELETON_MESHES, true);
   importer.SetPropertyFloat(AI_CONFIG_PP_GSN_MAX_SMOOTHING_ANGLE, kSmoothingAngle);
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE,
                               aiPrimitiveType_POINT | aiPrimitiveType_LINE);
   importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS,
                               aiComponent_ANIMATIONS | aiComponent_TANGENTS_AND_BITANGENTS);
   const aiScene* scene = importer.ReadFile(file, steps_for(format));
-  if (scene && scene->mRootNode) return {};
-  const std::string why = importer.GetErrorString();
-  return why.empty() ? "it holds no scene" : why;
+  if (!scene || !scene->mRootNode) {
+    const std::string why = importer.GetErrorString();
+    return why.empty() ? "it holds no scene" : why;
+  }
+  // Some text formats read anything, and find nothing in it.
+  const bool is_empty = !scene->HasMeshes() && !scene->HasLights() && !scene->HasCameras();
+  return is_empty ? "it holds neither meshes nor lights nor cameras" : "";
 }
 
 ChildLimits limits_for(const std::string& file) {

@@ -75,6 +75,21 @@ std::optional<CornerData> read_corner_data(const Stage& stage, const Prim& prim,
   return data;
 }
 
+bool all_finite(std::span<const float> numbers) {
+  constexpr std::uint32_t kExponent = 0x7F800000;
+  bool result = true;
+  // Without a branch the loop takes many at once.
+  for (const float number : numbers) {
+    result &= (std::bit_cast<std::uint32_t>(number) & kExponent) != kExponent;
+  }
+  return result;
+}
+
+bool is_per_point(const std::optional<CornerData>& data) {
+  return !data || data->interpolation == Interpolation::Vertex ||
+         data->interpolation == Interpolation::Constant;
+}
+
 // Builds the triangles. Corners with the same point and the same attributes share a vertex: each
 // point keeps a chain of the vertices that were made of it.
 class MeshAssembly {
@@ -82,6 +97,9 @@ class MeshAssembly {
   MeshAssembly(const Sources& sources, std::span<const std::uint16_t> slot_of_face)
       : sources_(sources),
         slot_of_face_(slot_of_face),
+        are_points_finite_(all_finite(sources.points.span)),
+        has_one_vertex_per_point_(is_per_point(sources.normals) && is_per_point(sources.uvs) &&
+                                  is_per_point(sources.colors)),
         first_(sources.points.span.size() / 3, kNone) {}
 
   Mesh build();
@@ -91,13 +109,23 @@ class MeshAssembly {
   // A point that all faces share must not cost the square of their number.
   static constexpr int kMaxTries = 64;
 
+  // Values of one corner; null where the mesh has none or they are too few.
+  struct Corner {
+    const float* normal = nullptr;
+    const float* uv = nullptr;
+    const float* color = nullptr;
+  };
   std::uint32_t vertex(std::size_t face, std::size_t point, std::size_t corner);
-  bool is_same(std::uint32_t vertex, const float* normal, const float* uv,
-               const float* color) const;
+  std::uint32_t add_vertex(std::size_t point, const Corner& values);
+  bool is_same(std::uint32_t vertex, const Corner& values) const;
+  bool has_usable_points(std::span<const std::int32_t> indices) const;
   void add_face(std::size_t face, std::size_t corner, std::size_t count);
+  void add_triangle(std::size_t face, std::uint32_t a, std::uint32_t b, std::uint32_t c);
 
   const Sources& sources_;
   std::span<const std::uint16_t> slot_of_face_;
+  bool are_points_finite_;
+  bool has_one_vertex_per_point_;
   Mesh mesh_;
   std::vector<std::uint32_t> first_;
   std::vector<std::uint32_t> next_;
@@ -106,72 +134,92 @@ class MeshAssembly {
   std::vector<std::array<std::uint32_t, 3>> split_;
 };
 
-bool MeshAssembly::is_same(std::uint32_t vertex, const float* normal, const float* uv,
-                           const float* color) const {
-  const auto differs = [](const float* a, const float* b, int count) {
-    return a && !std::equal(a, a + count, b);
+bool MeshAssembly::is_same(std::uint32_t vertex, const Corner& values) const {
+  const auto fits = [&](const float* wanted, const auto& list, int width) {
+    if (!wanted) return true;
+    const float* made = list[vertex].data();
+    for (int i = 0; i < width; ++i) {
+      if (made[i] != wanted[i]) return false;
+    }
+    return true;
   };
-  return !(sources_.normals && differs(normal, mesh_.normals[vertex].data(), 3)) &&
-         !(sources_.uvs && differs(uv, mesh_.uvs[vertex].data(), 2)) &&
-         !(sources_.colors && differs(color, mesh_.colors[vertex].data(), 3));
+  return fits(values.normal, mesh_.normals, 3) && fits(values.uv, mesh_.uvs, 2) &&
+         fits(values.color, mesh_.colors, 3);
 }
 
-std::uint32_t MeshAssembly::vertex(std::size_t face, std::size_t point, std::size_t corner) {
-  const auto value = [&](const std::optional<CornerData>& data) {
-    return data ? data->at(face, point, corner) : nullptr;
-  };
-  const float* normal = value(sources_.normals);
-  const float* uv = value(sources_.uvs);
-  const float* color = value(sources_.colors);
-  int tries = 0;
-  for (std::uint32_t v = first_[point]; v != kNone && tries < kMaxTries; v = next_[v], ++tries) {
-    if (is_same(v, normal, uv, color)) return v;
-  }
+std::uint32_t MeshAssembly::add_vertex(std::size_t point, const Corner& values) {
   const auto added = static_cast<std::uint32_t>(mesh_.positions.size());
   const float* p = sources_.points.span.data() + point * 3;
   mesh_.positions.emplace_back(p[0], p[1], p[2]);
   if (sources_.normals) {
-    mesh_.normals.push_back(normal ? Vec3f(normal[0], normal[1], normal[2]) : Vec3f::UnitZ());
+    const float* n = values.normal;
+    mesh_.normals.push_back(n ? Vec3f(n[0], n[1], n[2]) : Vec3f::UnitZ());
   }
-  if (sources_.uvs) mesh_.uvs.push_back(uv ? Vec2f(uv[0], uv[1]) : Vec2f::Zero());
+  if (sources_.uvs) {
+    mesh_.uvs.push_back(values.uv ? Vec2f(values.uv[0], values.uv[1]) : Vec2f::Zero());
+  }
   if (sources_.colors) {
-    mesh_.colors.push_back(color ? Vec3f(color[0], color[1], color[2]) : Vec3f::Ones());
+    const float* c = values.color;
+    mesh_.colors.push_back(c ? Vec3f(c[0], c[1], c[2]) : Vec3f::Ones());
   }
   next_.push_back(first_[point]);
   first_[point] = added;
   return added;
 }
 
-void MeshAssembly::add_face(std::size_t face, std::size_t corner, std::size_t count) {
-  const std::size_t points = first_.size();
-  ring_.clear();
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::int32_t index = sources_.indices.span[corner + i];
-    // A face that refers to points that do not exist is left out.
-    if (index < 0 || static_cast<std::size_t>(index) >= points) return;
-    const float* p = sources_.points.span.data() + static_cast<std::size_t>(index) * 3;
-    if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2])) return;
+std::uint32_t MeshAssembly::vertex(std::size_t face, std::size_t point, std::size_t corner) {
+  if (has_one_vertex_per_point_ && first_[point] != kNone) return first_[point];
+  Corner values;
+  if (sources_.normals) values.normal = sources_.normals->at(face, point, corner);
+  if (sources_.uvs) values.uv = sources_.uvs->at(face, point, corner);
+  if (sources_.colors) values.color = sources_.colors->at(face, point, corner);
+  int tries = 0;
+  for (std::uint32_t v = first_[point]; v != kNone && tries < kMaxTries; v = next_[v], ++tries) {
+    if (is_same(v, values)) return v;
   }
+  return add_vertex(point, values);
+}
+
+bool MeshAssembly::has_usable_points(std::span<const std::int32_t> indices) const {
+  for (const std::int32_t index : indices) {
+    if (index < 0 || static_cast<std::size_t>(index) >= first_.size()) return false;
+  }
+  if (are_points_finite_) return true;
+  for (const std::int32_t index : indices) {
+    const float* p = sources_.points.span.data() + static_cast<std::size_t>(index) * 3;
+    if (!all_finite({p, 3})) return false;
+  }
+  return true;
+}
+
+void MeshAssembly::add_triangle(std::size_t face, std::uint32_t a, std::uint32_t b,
+                                std::uint32_t c) {
+  if (sources_.is_left_handed) std::swap(b, c);
+  mesh_.triangles.push_back({a, b, c});
+  if (!slot_of_face_.empty()) mesh_.material_slots.push_back(slot_of_face_[face]);
+}
+
+// A face that refers to points that do not exist is left out.
+void MeshAssembly::add_face(std::size_t face, std::size_t corner, std::size_t count) {
+  const auto indices = sources_.indices.span.subspan(corner, count);
+  if (!has_usable_points(indices)) return;
+  const auto made = [&](std::size_t i) {
+    return vertex(face, static_cast<std::size_t>(indices[i]), corner + i);
+  };
+  if (count == 3) {
+    const std::uint32_t a = made(0);
+    const std::uint32_t b = made(1);
+    return add_triangle(face, a, b, made(2));
+  }
+  ring_.clear();
+  ring_points_.clear();
   for (std::size_t i = 0; i < count; ++i) {
-    const auto point = static_cast<std::size_t>(sources_.indices.span[corner + i]);
-    ring_.push_back(vertex(face, point, corner + i));
+    ring_.push_back(made(i));
+    ring_points_.push_back(mesh_.positions[ring_.back()]);
   }
   split_.clear();
-  if (count == 3) {
-    split_.push_back({0, 1, 2});
-  } else {
-    ring_points_.clear();
-    for (const std::uint32_t v : ring_) ring_points_.push_back(mesh_.positions[v]);
-    triangulate(ring_points_, split_);
-  }
-  for (const auto& [a, b, c] : split_) {
-    if (sources_.is_left_handed) {
-      mesh_.triangles.push_back({ring_[a], ring_[c], ring_[b]});
-    } else {
-      mesh_.triangles.push_back({ring_[a], ring_[b], ring_[c]});
-    }
-    if (!slot_of_face_.empty()) mesh_.material_slots.push_back(slot_of_face_[face]);
-  }
+  triangulate(ring_points_, split_);
+  for (const auto& [a, b, c] : split_) add_triangle(face, ring_[a], ring_[b], ring_[c]);
 }
 
 Mesh MeshAssembly::build() {

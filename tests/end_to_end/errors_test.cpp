@@ -56,6 +56,23 @@ TEST_CASE("config checks what run checks, but for the assets", "[errors]") {
   CHECK(absent.exit_code == 0);
 }
 
+TEST_CASE("a job may make missing textures errors", "[errors]") {
+  const TemporaryFolder assets;
+  write_file(assets / "a.usda",
+             "#usda 1.0\ndef Cube \"C\"\n{\n    rel material:binding = </M>\n}\n"
+             "def Material \"M\"\n{\n    token outputs:surface.connect = </M/S.outputs:out>\n"
+             "    def Shader \"S\"\n    {\n        uniform token info:id = \"UsdPreviewSurface\"\n"
+             "        color3f inputs:diffuseColor.connect = </M/T.outputs:rgb>\n    }\n"
+             "    def Shader \"T\"\n    {\n        uniform token info:id = \"UsdUVTexture\"\n"
+             "        asset inputs:file = @gone.png@\n    }\n}\n");
+  const std::string job = job_with("{type: shapes, shapes: [cube, sphere]}",
+                                   "{type: files, files: [" + (assets / "a.usda").string() + "]}");
+  expect_error(job + "loaders: [{type: usd, missing_assets_are_errors: true}]\n", 5,
+               "texture @gone.png@ could not be found");
+  expect_error(job + "loaders: [{type: usd, missing_assets: true}]\n", 3,
+               "unknown key 'missing_assets'");
+}
+
 TEST_CASE("A missing job file", "[errors]") {
   const TemporaryFolder folder;
   const Outcome outcome = run({"run", "nowhere.yaml"}, folder.path());

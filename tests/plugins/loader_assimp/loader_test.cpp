@@ -78,6 +78,7 @@ TEST_CASE("a broken file is an asset error that begins with its name", "[loader_
       CHECK(std::string(error.what()).starts_with(file + ": assimp cannot read it: "));
     }
   };
+  check("noise.obj", "this is not what the ending says\n");
   check("empty.glb", "");
   check("empty.obj", "");
   check("noise.fbx", std::string(3000, 'x'));
