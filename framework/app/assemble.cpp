@@ -29,6 +29,12 @@ void warn_of_rejected(const Registry& registry, const Log& log) {
   }
 }
 
+std::optional<std::string> assets_root_of(const Value& job) {
+  const Value* root = job.find("assets_root");
+  if (!root || root->kind != Value::Kind::Scalar) return std::nullopt;
+  return root->scalar;
+}
+
 std::unique_ptr<HostServices> make_host(Registry& registry, const GlobalOptions& options,
                                         const std::optional<std::string>& job_assets_root,
                                         const Log& log) {

@@ -21,6 +21,9 @@ std::unique_ptr<Registry> make_registry(const GlobalOptions& options, const Log&
 /// One warning for each plugin that was refused.
 void warn_of_rejected(const Registry& registry, const Log& log);
 
+/// The assets root that a native job names, if it names one.
+std::optional<std::string> assets_root_of(const Value& job);
+
 /// Host services for a job; `job_assets_root` is what the job says, if it says something. Throws
 /// Error(Asset) when the assets root is no folder.
 std::unique_ptr<HostServices> make_host(Registry& registry, const GlobalOptions& options,

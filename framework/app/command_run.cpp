@@ -48,12 +48,6 @@ class StopOnSignal {
   }
 };
 
-std::optional<std::string> assets_root_of(const Value& job) {
-  const Value* root = job.find("assets_root");
-  if (!root || root->kind != Value::Kind::Scalar) return std::nullopt;
-  return root->scalar;
-}
-
 OutputStore::Existing existing_policy(const RunCommandOptions& options) {
   if (options.resume && options.overwrite) {
     throw Error(ErrorKind::Usage, "--resume and --overwrite exclude each other");
