@@ -14,8 +14,9 @@ namespace {
 /// A curve per channel pulls colours apart; this much of the grey goes back in before.
 constexpr float kFilmicGrey = 0.15f;
 
-/// Narkowicz, "ACES filmic tone mapping curve", 2015.
+/// Narkowicz, "ACES filmic tone mapping curve", 2015. White long before the squares overflow.
 float filmic(float x) {
+  x = std::min(x, 1e6f);
   return std::clamp(x * (2.51f * x + 0.03f) / (x * (2.43f * x + 0.59f) + 0.14f), 0.0f, 1.0f);
 }
 
@@ -30,8 +31,8 @@ class ByteTable {
     }
   }
   std::uint8_t operator()(float linear) const {
-    return bytes_[std::size_t(std::sqrt(std::clamp(linear, 0.0f, 1.0f)) * float(bytes_.size() - 1) +
-                              0.5f)];
+    const float shown = linear > 0.0f ? std::min(linear, 1.0f) : 0.0f;  // no number is black
+    return bytes_[std::size_t(std::sqrt(shown) * float(bytes_.size() - 1) + 0.5f)];
   }
 
  private:

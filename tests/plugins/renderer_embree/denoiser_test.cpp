@@ -2,6 +2,7 @@
 #include "denoiser.h"
 
 #include <cmath>
+#include <limits>
 
 #include "diorama/rng.h"
 #include "support/catch.h"
@@ -106,6 +107,19 @@ TEST_CASE("the standard view is sRGB, the filmic one never clips abruptly", "[ex
   const Image<Rgba8> filmic = displayed(ramp, 2.0, ViewTransform::Filmic);
   for (int i = 1; i < 256; ++i) CHECK(filmic.at(i, 0)[0] >= filmic.at(i - 1, 0)[0]);
   CHECK(int(filmic.at(255, 0)[0]) < 255);
+}
+
+TEST_CASE("any radiance can be shown, even what is no number", "[exposure]") {
+  constexpr float kInf = std::numeric_limits<float>::infinity();
+  Image<Vec3f> odd(3, 1, Vec3f::Constant(kInf));
+  odd.at(1, 0) = Vec3f::Constant(1e30f);
+  odd.at(2, 0) = Vec3f::Constant(std::numeric_limits<float>::quiet_NaN());
+  for (const ViewTransform transform : {ViewTransform::Standard, ViewTransform::Filmic}) {
+    const Image<Rgba8> shown = displayed(odd, 1.0, transform);
+    CHECK(shown.at(0, 0) == Rgba8{255, 255, 255, 255});
+    CHECK(shown.at(1, 0) == Rgba8{255, 255, 255, 255});
+    CHECK(shown.at(2, 0) == Rgba8{0, 0, 0, 255});
+  }
 }
 
 }  // namespace diorama
