@@ -30,8 +30,13 @@ run(${DIORAMA} --version)
 expect_text("diorama ${VERSION} (plugin ABI ${ABI})")
 
 # Completion knows every option that the help shows.
-run(bash -c "source ${PREFIX}/share/bash-completion/completions/diorama; COMP_WORDS=(diorama run --); \
-             COMP_CWORD=2; _diorama; echo \${COMPREPLY[*]}")
+file(WRITE ${WORK}/offer.sh
+     "source ${PREFIX}/share/bash-completion/completions/diorama
+COMP_WORDS=(diorama run --)
+COMP_CWORD=2
+_diorama
+echo \"\${COMPREPLY[*]}\"\n")
+run(bash ${WORK}/offer.sh)
 set(offered "${OUT}")
 run(${DIORAMA} run --help)
 string(REGEX MATCHALL "--[a-z-]+" options "${OUT}")
