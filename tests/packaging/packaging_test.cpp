@@ -65,7 +65,7 @@ TEST_CASE("every package is installed from somewhere", "[packaging]") {
 TEST_CASE("every plugin is in one package", "[packaging]") {
   const std::string list = read_text(kRoot / "plugins/CMakeLists.txt");
   std::set<std::string> plugins = all(list, "\n  ([a-z]+_[a-z_0-9]+)(?=\n|\\))");
-  plugins.erase("writer_support");
+  std::erase_if(plugins, [](const std::string& name) { return name.ends_with("_support"); });
   CHECK(plugins.size() > 15);
   for (const std::string& plugin : plugins) {
     int packages = 0;
