@@ -115,10 +115,14 @@ class MeshAssembly {
     const float* uv = nullptr;
     const float* color = nullptr;
   };
+  Corner values_of(std::size_t face, std::size_t point, std::size_t corner) const;
   std::uint32_t vertex(std::size_t face, std::size_t point, std::size_t corner);
   std::uint32_t add_vertex(std::size_t point, const Corner& values);
   bool is_same(std::uint32_t vertex, const Corner& values) const;
   bool has_usable_points(std::span<const std::int32_t> indices) const;
+  bool is_plain() const;
+  void add_plain_faces();
+  void add_faces();
   void add_face(std::size_t face, std::size_t corner, std::size_t count);
   void add_triangle(std::size_t face, std::uint32_t a, std::uint32_t b, std::uint32_t c);
 
@@ -167,12 +171,18 @@ std::uint32_t MeshAssembly::add_vertex(std::size_t point, const Corner& values) 
   return added;
 }
 
-std::uint32_t MeshAssembly::vertex(std::size_t face, std::size_t point, std::size_t corner) {
-  if (has_one_vertex_per_point_ && first_[point] != kNone) return first_[point];
+MeshAssembly::Corner MeshAssembly::values_of(std::size_t face, std::size_t point,
+                                             std::size_t corner) const {
   Corner values;
   if (sources_.normals) values.normal = sources_.normals->at(face, point, corner);
   if (sources_.uvs) values.uv = sources_.uvs->at(face, point, corner);
   if (sources_.colors) values.color = sources_.colors->at(face, point, corner);
+  return values;
+}
+
+std::uint32_t MeshAssembly::vertex(std::size_t face, std::size_t point, std::size_t corner) {
+  if (has_one_vertex_per_point_ && first_[point] != kNone) return first_[point];
+  const Corner values = values_of(face, point, corner);
   int tries = 0;
   for (std::uint32_t v = first_[point]; v != kNone && tries < kMaxTries; v = next_[v], ++tries) {
     if (is_same(v, values)) return v;
@@ -222,23 +232,49 @@ void MeshAssembly::add_face(std::size_t face, std::size_t corner, std::size_t co
   for (const auto& [a, b, c] : split_) add_triangle(face, ring_[a], ring_[b], ring_[c]);
 }
 
-Mesh MeshAssembly::build() {
+// The most usual mesh: triangles of sound points, and nothing that differs between the corners that
+// meet at a point.
+bool MeshAssembly::is_plain() const {
+  const auto counts = sources_.counts.span;
+  const auto indices = sources_.indices.span;
+  if (!has_one_vertex_per_point_ || !are_points_finite_ || sources_.holes) return false;
+  bool result = counts.size() <= indices.size() / 3;
+  for (const std::int32_t count : counts) result &= count == 3;
+  if (!result) return false;
+  const auto points = static_cast<std::uint32_t>(first_.size());
+  for (const std::int32_t index : indices.first(counts.size() * 3)) {
+    result &= static_cast<std::uint32_t>(index) < points;
+  }
+  return result;
+}
+
+void MeshAssembly::add_plain_faces() {
+  const auto indices = sources_.indices.span;
+  mesh_.triangles.resize(sources_.counts.span.size());
+  std::size_t corner = 0;
+  for (auto& triangle : mesh_.triangles) {
+    for (std::uint32_t& made : triangle) {
+      const auto point = static_cast<std::size_t>(indices[corner]);
+      made = first_[point];
+      if (made == kNone) made = add_vertex(point, values_of(corner / 3, point, corner));
+      ++corner;
+    }
+    if (sources_.is_left_handed) std::swap(triangle[1], triangle[2]);
+  }
+  mesh_.material_slots.assign(slot_of_face_.begin(), slot_of_face_.end());
+}
+
+void MeshAssembly::add_faces() {
   const auto counts = sources_.counts.span;
   const std::size_t corners = sources_.indices.span.size();
-  std::vector<char> is_hole;
-  if (sources_.holes) {
-    is_hole.resize(counts.size());
-    for (const std::int32_t hole : sources_.holes->span) {
-      if (hole >= 0 && static_cast<std::size_t>(hole) < counts.size()) {
-        is_hole[static_cast<std::size_t>(hole)] = 1;
-      }
+  std::vector<char> is_hole(sources_.holes ? counts.size() : 0);
+  for (std::size_t i = 0; sources_.holes && i < sources_.holes->span.size(); ++i) {
+    const std::int32_t hole = sources_.holes->span[i];
+    if (hole >= 0 && static_cast<std::size_t>(hole) < counts.size()) {
+      is_hole[static_cast<std::size_t>(hole)] = 1;
     }
   }
   mesh_.triangles.reserve(counts.size());
-  mesh_.positions.reserve(first_.size());
-  if (sources_.normals) mesh_.normals.reserve(first_.size());
-  if (sources_.uvs) mesh_.uvs.reserve(first_.size());
-  next_.reserve(first_.size());
   std::size_t corner = 0;
   for (std::size_t face = 0; face < counts.size(); ++face) {
     if (counts[face] < 0) break;
@@ -246,6 +282,18 @@ Mesh MeshAssembly::build() {
     if (count > corners - corner) break;
     if (count >= 3 && (is_hole.empty() || !is_hole[face])) add_face(face, corner, count);
     corner += count;
+  }
+}
+
+Mesh MeshAssembly::build() {
+  mesh_.positions.reserve(first_.size());
+  if (sources_.normals) mesh_.normals.reserve(first_.size());
+  if (sources_.uvs) mesh_.uvs.reserve(first_.size());
+  next_.reserve(first_.size());
+  if (is_plain()) {
+    add_plain_faces();
+  } else {
+    add_faces();
   }
   for (Vec3f& normal : mesh_.normals) {
     const float length = normal.norm();

@@ -2,10 +2,10 @@
 // How fast and in how much memory the USD loader opens a crate file, beside merely reading the
 // file's arrays: one line of JSON. Without a file it makes a room of a million triangles first.
 #include <sys/wait.h>
+#include <time.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -23,10 +23,11 @@
 namespace {
 
 using namespace diorama;
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
+/// Of the processor: other programs on the machine do not count.
+double seconds() {
+  timespec now{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return double(now.tv_sec) + 1e-9 * double(now.tv_nsec);
 }
 
 /// A bumpy sheet with normals and uvs.
@@ -64,19 +65,29 @@ void write_room(const std::filesystem::path& file, const Host& host, int things,
   export_scene(scene, room, file, {}, host);
 }
 
-/// Reads and decompresses every array of a layer and touches all of its memory.
+bool is_compressible(usd::Type type) {
+  return type == usd::Type::Int || type == usd::Type::UInt || type == usd::Type::Int64 ||
+         type == usd::Type::UInt64 || type == usd::Type::Half || type == usd::Type::Float ||
+         type == usd::Type::Double;
+}
+
+/// Reads every array of a layer into memory: decompressed, or copied out of the file.
 double read_arrays(const std::string& file) {
-  const auto start = Clock::now();
+  const double start = seconds();
   usd::AssetLibrary library;
   const auto layer = library.open(file);
-  std::uint64_t sum = 0;
+  std::vector<usd::Value> decompressed;
+  std::vector<std::vector<std::byte>> copied;
   layer->for_each_value([&](const usd::Value& value) {
+    if (!value.is_array()) return;
     const auto bytes = value.bytes();
-    for (std::size_t i = 0; i < bytes.size(); i += 64) sum += std::to_integer<unsigned>(bytes[i]);
+    if (is_compressible(value.type())) {
+      decompressed.push_back(value);
+    } else {
+      copied.emplace_back(bytes.begin(), bytes.end());
+    }
   });
-  volatile std::uint64_t keep = sum;
-  (void)keep;
-  return seconds_since(start);
+  return seconds() - start;
 }
 
 struct Load {
@@ -93,10 +104,10 @@ std::size_t bytes_of(const std::vector<T>& list) {
 Load load(const std::string& file, Host& host) {
   Scene scene;
   const NodeId root = scene.create(scene.root(), "asset");
-  const auto start = Clock::now();
+  const double start = seconds();
   loader_usd::UsdLoader({}, host).load(file, scene, root);
   Load result;
-  result.seconds = seconds_since(start);
+  result.seconds = seconds() - start;
   std::set<const void*> seen;
   for (const NodeId id : scene.subtree(root)) {
     const Node& node = scene[id];
