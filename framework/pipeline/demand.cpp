@@ -27,6 +27,12 @@ class Resolution {
       demand_.channels.insert(name);
       return;
     }
+    if (name == kMotion.name) {
+      want(who, std::string(kLeafId.name));
+      want(who, std::string(kPosition.name));
+      demand_.motion = true;
+      return;
+    }
     const auto offer = std::find_if(offers_.begin(), offers_.end(), [&](const auto& candidate) {
       return candidate.provides.contains(name);
     });
@@ -60,6 +66,7 @@ class Resolution {
     }
     known.emplace_back(kVisibility);
     known.emplace_back(kAmodalMask);
+    known.emplace_back(kMotion.name);
     std::sort(known.begin(), known.end());
     std::string list;
     for (const std::string& word : known) list += (list.empty() ? "" : ", ") + word;

@@ -29,6 +29,7 @@ struct Demand {
   std::vector<std::size_t> annotators;  ///< Indices into the offers, in an order that works.
   bool visibility = false;              ///< Instance::visibility ...
   bool amodal_mask = false;             ///< ... with masks.
+  bool motion = false;                  ///< kMotion, when the renderer does not provide it.
 };
 
 /// Annotations that the pipeline itself makes, with Renderer::cover().

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "diorama/error.h"
+#include "framework/annotators/motion.h"
 #include "framework/annotators/visibility.h"
 #include "framework/pipeline/scene_setup.h"
 #include "framework/plugins/plugin_call.h"
@@ -38,14 +39,15 @@ struct Pipeline::Visit {
   Vec3 working_area_world = Vec3::Zero();
   std::vector<NodeId> objects;
   std::vector<NodeId> cameras;
-  NodeId overview;  ///< Null unless this visit makes an overview picture.
+  BodyPoses before_last_step;  ///< Empty when nothing moved by itself since it was placed.
+  NodeId overview;             ///< Null unless this visit makes an overview picture.
   std::size_t next_capture = 0;
   std::map<std::string, int> events;
 };
 
 namespace {
 
-std::vector<Mat4> body_poses(const Scene& scene, const std::vector<NodeId>& objects) {
+std::vector<Mat4> object_poses(const Scene& scene, const std::vector<NodeId>& objects) {
   std::vector<Mat4> poses;
   poses.reserve(objects.size());
   for (const NodeId object : objects) poses.push_back(scene.world_from_node(object).matrix());
@@ -174,7 +176,7 @@ Pipeline::Visit Pipeline::set_up(const PlannedVisit& planned) {
 
 void Pipeline::randomize(Visit& visit, const std::string& moment, int number, int capture) {
   const Clock clock(summary_, "randomizing");
-  const std::vector<Mat4> before = body_poses(visit.scene, visit.objects);
+  const std::vector<Mat4> before = object_poses(visit.scene, visit.objects);
   RandomizeContext context;
   context.moment = moment;
   context.capture = capture;
@@ -188,7 +190,8 @@ void Pipeline::randomize(Visit& visit, const std::string& moment, int number, in
                    [&] { components_.randomizers[i]->randomize(visit.scene, context, rng); });
   }
   // The engine holds the bodies where it left them; where they were moved, it starts anew.
-  if (moment == "environment" || body_poses(visit.scene, visit.objects) == before) return;
+  if (moment == "environment" || object_poses(visit.scene, visit.objects) == before) return;
+  visit.before_last_step.clear();
   for (auto& physics : components_.physics) physics->reset(visit.scene);
 }
 
@@ -196,12 +199,16 @@ void Pipeline::simulate(Visit& visit, int steps) {
   const Clock clock(summary_, "simulating");
   // Short enough that Ctrl-C is felt.
   constexpr int kStepsAtOnce = 20;
-  for (int done = 0; done < steps; done += kStepsAtOnce) {
+  for (int left = steps; left > 0;) {
     stop_if_asked();
+    // The last step goes by itself: what it moves is the motion that captures show.
+    const int now = left == 1 ? 1 : std::min(kStepsAtOnce, left - 1);
+    if (left == 1 && components_.demand.motion) visit.before_last_step = body_poses(visit.scene);
     for (auto& physics : components_.physics) {
       call_component("physics '" + job_.physics.type + "'",
-                     [&] { physics->advance(visit.scene, std::min(kStepsAtOnce, steps - done)); });
+                     [&] { physics->advance(visit.scene, now); });
     }
+    left -= now;
   }
 }
 
@@ -269,6 +276,7 @@ Frame Pipeline::make_frame(Visit& visit, std::size_t camera, int capture) {
         call_component(who, [&] { return components_.renderer->cover(node, instances); });
     measure_visibility(coverage, components_.demand.amodal_mask, frame);
   }
+  if (components_.demand.motion) measure_motion(visit.scene, visit.before_last_step, frame);
   return frame;
 }
 

@@ -10,39 +10,11 @@
 namespace diorama {
 namespace {
 
-constexpr double kTimeStep = 1.0 / 60.0;  // seconds between two motion states
-
 /// What one pixel's ray met.
 struct CentreHit {
   CameraRay ray;
   RayHit hit;
 };
-
-/// Velocity field of the body that moves a mesh.
-struct Motion {
-  bool is_moving = false;
-  Vec3 centre = Vec3::Zero();
-  Vec3 linear = Vec3::Zero();
-  Vec3 angular = Vec3::Zero();
-};
-
-Motion motion_of(const Scene& scene, NodeId node) {
-  while (node && !scene[node].rigid_body) node = scene[node].parent;
-  if (!node) return {};
-  const RigidBody& body = *scene[node].rigid_body;
-  return {true, scene.world_from_node(node).translation(), body.linear_velocity,
-          body.angular_velocity};
-}
-
-Vec2f image_motion(const View& view, const Motion& motion, const Vec3& position) {
-  if (!motion.is_moving) return Vec2f::Zero();
-  const Vec3 velocity = motion.linear + motion.angular.cross(position - motion.centre);
-  const auto now = project(view.camera(), view.camera_from_world() * position);
-  const auto before =
-      project(view.camera(), view.camera_from_world() * (position - kTimeStep * velocity));
-  if (!now || !before) return Vec2f::Zero();
-  return (*now - *before).cast<float>();
-}
 
 /// Makes one channel: `value` of every pixel that met something.
 class ChannelFiller {
@@ -158,16 +130,15 @@ CoverageMask coverage_of(const RenderScene& meshes, const View& view,
 
 NameSet geometry_channels() {
   NameSet names;
-  for (std::string_view name :
-       {kDistanceToCamera.name, kDistanceToImagePlane.name, kNormals.name, kLeafId.name,
-        kPosition.name, kUv.name, kAlbedo.name, kMotion.name}) {
+  for (std::string_view name : {kDistanceToCamera.name, kDistanceToImagePlane.name, kNormals.name,
+                                kLeafId.name, kPosition.name, kUv.name, kAlbedo.name}) {
     names.emplace(name);
   }
   return names;
 }
 
 void fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshes, const View& view,
-                   const Scene& scene, Host& host) {
+                   Host& host) {
   const NameSet known = geometry_channels();
   if (std::none_of(known.begin(), known.end(), [&](const auto& n) { return wanted.contains(n); })) {
     return;
@@ -185,11 +156,6 @@ void fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshe
     }
   });
 
-  std::vector<Motion> motions;
-  if (wanted.contains(kMotion.name)) {
-    for (const auto& instance : meshes.instances())
-      motions.push_back(motion_of(scene, instance->node));
-  }
   constexpr float kFar = std::numeric_limits<float>::infinity();
   const Vec3f none = Vec3f::Zero();
   const Vec2f no_vector = Vec2f::Zero();
@@ -210,9 +176,6 @@ void fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshe
   filler.fill(kAlbedo, none, [&](const CentreHit& h, const SurfaceGeometry& s) {
     const float width_m = view.pixel_angle() * h.hit.distance;
     return base_color_at(h.hit, s, width_m * s.uv_per_metre);
-  });
-  filler.fill(kMotion, no_vector, [&](const CentreHit& h, const SurfaceGeometry& s) {
-    return image_motion(view, motions[h.hit.geometry], s.position.cast<double>());
   });
 }
 

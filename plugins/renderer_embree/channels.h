@@ -13,7 +13,7 @@ NameSet geometry_channels();
 
 /// Fills the wanted ones among the id and geometry channels, all from one ray per pixel centre.
 void fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshes, const View& view,
-                   const Scene& scene, Host& host);
+                   Host& host);
 
 /// See Renderer::cover.
 std::vector<CoverageMask> coverage(const RenderScene& meshes, const View& view,

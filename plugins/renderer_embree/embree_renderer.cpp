@@ -159,7 +159,7 @@ Frame EmbreeRenderer::do_render(const Scene& scene, const RenderRequest& request
   counts_ = {};
   {
     const Stopwatch watch(counts_.channels_s);
-    fill_channels(frame, request.channels, meshes_, view, scene, host_);
+    fill_channels(frame, request.channels, meshes_, view, host_);
   }
   const bool wants_color =
       request.channels.contains(kColor.name) || request.channels.contains(kColorHdr.name);

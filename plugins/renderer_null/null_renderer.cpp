@@ -11,8 +11,6 @@
 namespace diorama {
 namespace {
 
-constexpr double kTimeStep = 1.0 / 60.0;  // seconds between two motion states
-
 struct View {
   Camera camera;
   Affine world_from_camera;
@@ -90,21 +88,6 @@ Vec3f palette(std::uint32_t id) {
   return u.cast<float>();
 }
 
-/// How far a surface point moved in the image during the last time step, from its body's velocity.
-Vec2f motion(const View& view, const Scene& scene, const SurfacePoint& point) {
-  NodeId body = point.node;
-  while (body && !scene[body].rigid_body) body = scene[body].parent;
-  if (!body) return Vec2f::Zero();
-  const RigidBody& rigid = *scene[body].rigid_body;
-  const Vec3 arm = point.position - scene.world_from_node(body).translation();
-  const Vec3 velocity = rigid.linear_velocity + rigid.angular_velocity.cross(arm);
-  const auto now = project(view.camera, view.camera_from_world * point.position);
-  const auto before =
-      project(view.camera, view.camera_from_world * (point.position - kTimeStep * velocity));
-  if (!now || !before) return Vec2f::Zero();
-  return (*now - *before).cast<float>();
-}
-
 /// The points of one camera, row by row, and how to make channels of them.
 struct Points {
   const View& view;
@@ -144,7 +127,7 @@ NameSet NullRenderer::provides() const {
   NameSet names;
   for (std::string_view name :
        {kColor.name, kColorHdr.name, kDistanceToCamera.name, kDistanceToImagePlane.name,
-        kNormals.name, kLeafId.name, kPosition.name, kUv.name, kAlbedo.name, kMotion.name}) {
+        kNormals.name, kLeafId.name, kPosition.name, kUv.name, kAlbedo.name}) {
     names.emplace(name);
   }
   return names;
@@ -182,8 +165,6 @@ Frame NullRenderer::do_render(const Scene& scene, const RenderRequest& request) 
           [](const auto& p) { return Vec3f(p.position.template cast<float>()); });
   all.put(frame, wanted, kUv, Vec2f(Vec2f::Zero()), [](const auto& p) { return p.uv; });
   all.put(frame, wanted, kAlbedo, none, [](const auto& p) { return p.albedo; });
-  all.put(frame, wanted, kMotion, Vec2f(Vec2f::Zero()),
-          [&](const auto& p) { return motion(view, scene, p); });
   return frame;
 }
 

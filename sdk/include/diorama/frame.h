@@ -52,7 +52,7 @@ inline constexpr Channel<Vec3f> kAlbedo{"albedo"};
 /// unlabelled pixels. Derived by the host.
 inline constexpr Channel<Vec3f> kObjectCoordinates{"object_coordinates"};
 /// Pixels that the surface point moved since the previous time step, image x right, y down; zero
-/// where nothing was hit.
+/// where nothing was hit. Derived by the host.
 inline constexpr Channel<Vec2f> kMotion{"motion"};
 
 /// The pixels that an object covers when nothing else is in the scene, by the same pixel-centre

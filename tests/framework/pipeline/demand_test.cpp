@@ -52,6 +52,16 @@ TEST_CASE("Visibility brings instances and their ids along", "[demand]") {
   CHECK(demand_for({"amodal_mask"}).amodal_mask);
 }
 
+TEST_CASE("Motion is made from ids and positions unless the renderer provides it", "[demand]") {
+  const Demand made = demand_for({"motion"});
+  CHECK(made.motion);
+  CHECK(made.channels == NameSet{"leaf_id", "position"});
+  const std::vector<Need> needs{{"writer 'w'", {"motion"}}};
+  const Demand rendered = resolve_demand(needs, {"motion"}, "renderer 'r'", kOffers);
+  CHECK_FALSE(rendered.motion);
+  CHECK(rendered.channels == NameSet{"motion"});
+}
+
 TEST_CASE("A need that nothing provides names the writer, the need and what there is", "[demand]") {
   CHECK_THROWS_WITH(demand_for({"heat"}),
                     Contains("writer 'w': needs \"heat\", which neither renderer 'r' nor an "
