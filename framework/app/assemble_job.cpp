@@ -29,13 +29,19 @@ class Assembler {
 
   /// The loader that reads this asset, as far as the registry knows.
   void note_loader_of(const std::string& asset) {
-    for (const ComponentEntry& entry : registry_.components()) {
-      if (entry.kind != ComponentKind::Loader) continue;
-      const bool fits = std::any_of(entry.claims.begin(), entry.claims.end(), [&](auto& claim) {
-        return claim.starts_with('.') ? asset.ends_with(claim) : asset.starts_with(claim);
-      });
-      if (fits) note_plugin(entry);
+    if (const ComponentEntry* entry = loader_of(asset)) note_plugin(*entry);
+  }
+  std::vector<fs::path> files_of(const std::string& asset) {
+    const ComponentEntry* entry = loader_of(asset);
+    if (!entry) return {};
+    std::unique_ptr<Loader>& loader = loaders_[entry->type];
+    if (!loader) {
+      Value defaults = Value::make_map();
+      defaults.set("type", Value::text(entry->type));
+      loader = registry_.make<Loader>(defaults, "loader", {}, complaints_, host_);
+      complaints_.raise();
     }
+    return call_component("loader '" + entry->type + "'", [&] { return loader->files(asset); });
   }
 
   Complaints& complaints() { return complaints_; }
@@ -44,12 +50,23 @@ class Assembler {
   }
 
  private:
+  const ComponentEntry* loader_of(const std::string& asset) const {
+    for (const ComponentEntry& entry : registry_.components()) {
+      if (entry.kind != ComponentKind::Loader) continue;
+      const bool fits = std::any_of(entry.claims.begin(), entry.claims.end(), [&](auto& claim) {
+        return claim.starts_with('.') ? asset.ends_with(claim) : asset.starts_with(claim);
+      });
+      if (fits) return &entry;
+    }
+    return nullptr;
+  }
   void note_plugin(const ComponentEntry& entry) { plugins_[entry.plugin] = entry.version; }
 
   Registry& registry_;
   Host& host_;
   Complaints complaints_;
   std::map<std::string, std::string> plugins_;
+  std::map<std::string, std::unique_ptr<Loader>> loaders_;
 };
 
 std::vector<std::string> assets_of(const Loader& loader, const ComponentConfig& config) {
@@ -203,9 +220,11 @@ JobAssembly assemble_job(const Value& value, Registry& registry, HostServices& h
   if (assembly.job.writers.empty()) {
     host.log(LogLevel::Warning, "writers: there are none, so the run leaves no pictures");
   }
-  assembly.dataset = describe_dataset(assembly.job, assembly.plan, portable_job(assembly.resolved),
-                                      program_version, assembler.plugins());
-  assembly.dataset_json = dataset_json(assembly.dataset, assembly.job, assembly.plan, assets_root);
+  assembly.dataset = describe_dataset(
+      assembly.job, assembly.plan, portable_job(assembly.resolved), program_version,
+      assembler.plugins(), [&](const std::string& asset) { return assembler.files_of(asset); },
+      assets_root);
+  assembly.dataset_json = dataset_json(assembly.dataset, assembly.job);
   return assembly;
 }
 

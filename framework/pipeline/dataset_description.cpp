@@ -2,38 +2,20 @@
 #include "framework/pipeline/dataset_description.h"
 
 #include <algorithm>
-#include <array>
 #include <cstdio>
-#include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 
 #include "diorama/error.h"
 #include "framework/config/value_text.h"
+#include "framework/pipeline/sha256.h"
 
 namespace diorama {
 namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
-
-/// FNV-1a, 64 bit, as 16 hex digits.
-std::string file_hash(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  std::vector<char> block(std::size_t(1) << 16);
-  std::uint64_t hash = 14695981039346656037ull;
-  while (stream.read(block.data(), std::streamsize(block.size())) || stream.gcount() > 0) {
-    for (std::streamsize i = 0; i < stream.gcount(); ++i) {
-      hash = (hash ^ std::uint8_t(block[std::size_t(i)])) * 1099511628211ull;
-    }
-  }
-  if (stream.bad() || !stream.eof()) {
-    throw Error(ErrorKind::Asset, file.string() + ": cannot be read");
-  }
-  char digits[17];
-  std::snprintf(digits, sizeof digits, "%016llx", static_cast<unsigned long long>(hash));
-  return digits;
-}
 
 Json conventions() {
   return {{"length_unit", "m"},
@@ -53,6 +35,25 @@ std::set<std::string> used_assets(const CapturePlan& plan) {
     assets.insert(plan.environments[visit.environment].asset);
   }
   for (const PlannedObject& object : plan.objects) assets.insert(object.asset);
+  return assets;
+}
+
+/// Files that several assets share are read once.
+std::vector<DatasetAsset> hashed_assets(const CapturePlan& plan, const AssetFiles& files_of,
+                                        const std::optional<fs::path>& assets_root) {
+  std::map<fs::path, std::string> hashes;
+  std::vector<DatasetAsset> assets;
+  for (const std::string& name : used_assets(plan)) {
+    DatasetAsset asset{asset_name(name, assets_root), {}};
+    for (const fs::path& file : files_of(name)) {
+      std::string& hash = hashes[file];
+      if (hash.empty()) hash = file_sha256(file);
+      asset.files.emplace_back(asset_name(file.string(), assets_root), hash);
+    }
+    assets.push_back(std::move(asset));
+  }
+  std::sort(assets.begin(), assets.end(),
+            [](const auto& a, const auto& b) { return a.asset < b.asset; });
   return assets;
 }
 
@@ -183,7 +184,9 @@ void add_writers(std::string& text, const Job& job) {
 
 DatasetInfo describe_dataset(const Job& job, const CapturePlan& plan, std::string resolved,
                              std::string program_version,
-                             std::vector<std::pair<std::string, std::string>> plugin_versions) {
+                             std::vector<std::pair<std::string, std::string>> plugin_versions,
+                             const AssetFiles& files_of,
+                             const std::optional<fs::path>& assets_root) {
   DatasetInfo info;
   info.seed = job.seed;
   info.capture_count = plan.capture_count();
@@ -196,11 +199,11 @@ DatasetInfo describe_dataset(const Job& job, const CapturePlan& plan, std::strin
   info.resolved_job = std::move(resolved);
   info.program_version = std::move(program_version);
   info.plugin_versions = std::move(plugin_versions);
+  info.assets = hashed_assets(plan, files_of, assets_root);
   return info;
 }
 
-std::string dataset_json(const DatasetInfo& info, const Job& job, const CapturePlan& plan,
-                         const std::optional<fs::path>& assets_root) {
+std::string dataset_json(const DatasetInfo& info, const Job& job) {
   Json json;
   json["format"] = "diorama dataset 1";
   json["diorama"] = info.program_version;
@@ -223,10 +226,12 @@ std::string dataset_json(const DatasetInfo& info, const Job& job, const CaptureP
   }
   json["conventions"] = conventions();
   json["assets"] = Json::array();
-  for (const std::string& asset : used_assets(plan)) {
-    Json entry{{"asset", asset_name(asset, assets_root)}};
-    if (fs::is_regular_file(asset)) entry["fnv1a64"] = file_hash(asset);
-    json["assets"].push_back(entry);
+  for (const DatasetAsset& asset : info.assets) {
+    Json files = Json::array();
+    for (const auto& [name, hash] : asset.files) {
+      files.push_back({{"file", name}, {"sha256", hash}});
+    }
+    json["assets"].push_back({{"asset", asset.asset}, {"files", std::move(files)}});
   }
   json["job"] = info.resolved_job;
   return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";

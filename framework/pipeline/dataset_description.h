@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -14,16 +15,21 @@
 
 namespace diorama {
 
+/// The files that an asset consists of, see Loader::files().
+using AssetFiles = std::function<std::vector<std::filesystem::path>(const std::string& asset)>;
+
 /// What writers are told before the first capture. `resolved` is the text of the resolved job.
+/// Throws Error(Asset) when a file of an asset cannot be read.
 DatasetInfo describe_dataset(const Job& job, const CapturePlan& plan, std::string resolved,
                              std::string program_version,
-                             std::vector<std::pair<std::string, std::string>> plugin_versions);
+                             std::vector<std::pair<std::string, std::string>> plugin_versions,
+                             const AssetFiles& files_of,
+                             const std::optional<std::filesystem::path>& assets_root);
 
-/// The text of dataset.json: conventions, seed, resolved job, plugin versions, and a hash of the
-/// file of every asset that the job uses. Holds nothing that depends on the machine or the time:
-/// same job, same text. Throws Error(Asset) when an asset cannot be read.
-std::string dataset_json(const DatasetInfo& info, const Job& job, const CapturePlan& plan,
-                         const std::optional<std::filesystem::path>& assets_root);
+/// The text of dataset.json: conventions, seed, resolved job, plugin versions, and the hashes of
+/// all files of the assets that the job uses. Holds nothing that depends on the machine or the
+/// time: same job, same text.
+std::string dataset_json(const DatasetInfo& info, const Job& job);
 
 /// The asset as a job would name it: files below the assets root without the root.
 std::string asset_name(std::string_view asset,

@@ -20,13 +20,23 @@ std::optional<ColorSpace> to_color_space(TextureSpace space) {
 
 }  // namespace
 
+std::vector<std::string> tile_names(const std::string& identifier) {
+  const std::size_t mark = identifier.find(kTileMark);
+  if (mark == std::string::npos) return {identifier};
+  std::vector<std::string> names;
+  for (int i = 0; i < kTiles; ++i) {
+    names.push_back(identifier);
+    names.back().replace(mark, kTileMark.size(), std::to_string(kFirstTile + i));
+  }
+  return names;
+}
+
 void TextureLibrary::missing(const usd::FoundValue& asset, const std::string& why) {
   stage_.diagnostics().missing(asset.layer->identifier() + ": texture @" + *asset.value.as_text() +
                                "@ " + why);
 }
 
-std::optional<TextureLibrary::Picture> TextureLibrary::find_tiles(const std::string& identifier,
-                                                                  std::size_t mark) {
+std::optional<TextureLibrary::Picture> TextureLibrary::find_tiles(const std::string& identifier) {
   struct File {
     UdimTile tile;
     std::string identifier;
@@ -34,9 +44,9 @@ std::optional<TextureLibrary::Picture> TextureLibrary::find_tiles(const std::str
   };
   std::vector<File> files;
   std::vector<UdimTile> tiles;
+  const std::vector<std::string> names = tile_names(identifier);
   for (int i = 0; i < kTiles; ++i) {
-    std::string name = identifier;
-    name.replace(mark, kTileMark.size(), std::to_string(kFirstTile + i));
+    const std::string& name = names[std::size_t(i)];
     if (!stage_.assets().exists(name)) continue;
     tiles.push_back({i % kTileColumns, i / kTileColumns, nullptr});
     files.push_back({tiles.back(), name, stage_.assets().read(name)});
@@ -59,8 +69,8 @@ std::optional<TextureLibrary::Picture> TextureLibrary::find(const usd::FoundValu
   const auto [entry, is_new] = found_.try_emplace(identifier);
   if (!is_new) return entry->second;
   try {
-    if (const std::size_t mark = identifier.find(kTileMark); mark != std::string::npos) {
-      entry->second = find_tiles(identifier, mark);
+    if (identifier.find(kTileMark) != std::string::npos) {
+      entry->second = find_tiles(identifier);
     } else if (stage_.assets().exists(identifier)) {
       // Bytes are found here, because that is for one thread; decoding them is for all.
       decoder_.announce(identifier, [this, identifier, bytes = stage_.assets().read(identifier)] {

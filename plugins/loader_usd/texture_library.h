@@ -18,6 +18,9 @@ namespace diorama::loader_usd {
 /// How the colours of a texture file are to be read.
 enum class TextureSpace { Auto, Raw, Srgb };
 
+/// What a set of UDIM tiles, "wood.<UDIM>.png", can have as files; other names stand by themselves.
+std::vector<std::string> tile_names(const std::string& identifier);
+
 struct FoundTexture {
   std::shared_ptr<const Texture> texture;
   /// From mesh uv to that of the texture: other than the identity for sets of UDIM tiles.
@@ -44,7 +47,7 @@ class TextureLibrary {
     std::optional<UdimRange> udim;
   };
   std::optional<Picture> find(const usd::FoundValue& asset);
-  std::optional<Picture> find_tiles(const std::string& identifier, std::size_t mark);
+  std::optional<Picture> find_tiles(const std::string& identifier);
   void missing(const usd::FoundValue& asset, const std::string& why);
 
   usd::Stage& stage_;

@@ -26,6 +26,8 @@ class UsdLoader final : public Loader {
   UsdLoader(Params params, Host& host) : params_(params), host_(host) {}
 
   std::vector<std::string> claims() const override;
+  /// Layers of all arcs, those of variants too, and what asset-valued attributes name.
+  std::vector<std::filesystem::path> files(std::string_view asset) const override;
   void load(std::string_view asset, Scene& scene, NodeId root) override;
 
  private:

@@ -44,6 +44,18 @@ std::map<std::uint32_t, std::int64_t> count_visible(const Image<std::uint32_t>& 
   return counts;
 }
 
+Json assets_json(const DatasetInfo& dataset) {
+  Json list = Json::array();
+  for (const DatasetAsset& asset : dataset.assets) {
+    Json files = Json::array();
+    for (const auto& [name, hash] : asset.files) {
+      files.push_back({{"file", name}, {"sha256", hash}});
+    }
+    list.push_back({{"asset", asset.asset}, {"files", std::move(files)}});
+  }
+  return list;
+}
+
 }  // namespace
 
 void TrainingParams::visit(ParamVisitor& v) {
@@ -120,10 +132,13 @@ void TrainingData::add_dataset_page(const std::string& format, Json more,
       {"world_axes", "right-handed, z up"},
       {"camera_axes", "x right, y up, looking along -z"},
       {"pixels", "(0, 0) is the top left corner, the first pixel's centre is (0.5, 0.5)"},
-      {"boxes", "x_max and y_max are one past the last pixel"}};
+      {"boxes", "x_max and y_max are one past the last pixel"},
+      {"rotations", "matrices; there are no quaternions"},
+      {"depth", "none"}};
   for (auto& [key, value] : more.items()) page["conventions"][key] = value;
   page["plugins"] = Json::object();
   for (const auto& [name, version] : dataset.plugin_versions) page["plugins"][name] = version;
+  page["assets"] = assets_json(dataset);
   page["job"] = dataset.resolved_job;
   files.add_text("dataset.json", python_json(page, 2) + "\n");
 }

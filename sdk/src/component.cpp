@@ -36,5 +36,9 @@ Randomizer::~Randomizer() = default;
 Registrar::~Registrar() = default;
 
 std::vector<std::string> Loader::assets() const { return {}; }
+std::vector<std::filesystem::path> Loader::files(std::string_view asset) const {
+  if (!std::filesystem::is_regular_file(asset)) return {};
+  return {asset};
+}
 
 }  // namespace diorama

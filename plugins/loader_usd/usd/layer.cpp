@@ -4,6 +4,27 @@
 #include <algorithm>
 
 namespace diorama::usd {
+namespace {
+
+void collect_texts(const Value& value, std::set<std::string>& texts) {
+  if (const std::string* text = value.as_text()) texts.insert(*text);
+  if (const Strings* list = value.as_strings()) texts.insert(list->begin(), list->end());
+  if (const TimeSamples* samples = value.as_time_samples()) {
+    for (std::size_t i = 0; i < samples->times.size(); ++i) collect_texts(samples->value(i), texts);
+  }
+}
+
+void collect_assets(const Value& arcs, std::set<std::string>& assets) {
+  if (const Reference* reference = arcs.as_reference()) assets.insert(reference->asset);
+  const ListOp<Reference>* list = arcs.as_reference_list_op();
+  if (!list) return;
+  for (const auto* items :
+       {&list->explicit_items, &list->added, &list->prepended, &list->appended}) {
+    for (const Reference& reference : *items) assets.insert(reference.asset);
+  }
+}
+
+}  // namespace
 
 const PropertySpec* PrimSpec::property(std::string_view name) const {
   const auto found = std::find_if(properties.begin(), properties.end(),
@@ -52,6 +73,21 @@ void Layer::visit_fields(const FieldSet& fields,
     }
     for (std::size_t k = 0; k < samples->times.size(); ++k) visit(samples->value(k));
   }
+}
+
+Layer::NamedAssets Layer::named_assets() const {
+  NamedAssets named;
+  collect_texts(get(root(), "subLayers"), named.layers);
+  for (const auto& [path, spec] : prims_) {
+    for (const char* arc : {"references", "payload"}) collect_assets(get(spec, arc), named.layers);
+    for (const PropertySpec& property : spec.properties) {
+      const Value type = get(property.fields, "typeName");
+      if (!type.as_text() || !type.as_text()->starts_with("asset")) continue;
+      collect_texts(get(property.fields, "default"), named.values);
+      collect_texts(get(property.fields, "timeSamples"), named.values);
+    }
+  }
+  return named;
 }
 
 void Layer::for_each_value(const std::function<void(const Value&)>& visit) const {

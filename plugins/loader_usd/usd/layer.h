@@ -5,6 +5,7 @@
 #include <deque>
 #include <functional>
 #include <memory>
+#include <set>
 #include <string>
 #include <string_view>
 #include <unordered_map>
@@ -61,6 +62,13 @@ class Layer {
   /// Empty when the field is absent. Throws FormatError when a crate lies about it.
   Value get(const FieldSet& fields, std::string_view name) const;
   Value get(const PrimSpec& spec, std::string_view name) const { return get(spec.fields, name); }
+
+  /// What the layer names, as it is written.
+  struct NamedAssets {
+    std::set<std::string> layers;  ///< Sublayers, references and payloads, those of variants too.
+    std::set<std::string> values;  ///< Of asset-valued attributes: textures.
+  };
+  NamedAssets named_assets() const;
 
   /// Reads every value once, time samples included. Throws FormatError as `get` does.
   void for_each_value(const std::function<void(const Value&)>& visit) const;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -25,6 +26,11 @@ class DIORAMA_SDK_API Loader : public Component {
   /// The assets that its parameters name when it stands in a job's `environments` or `objects`
   /// list, in order: file paths or "scheme:rest". Loaders that only serve files return none.
   virtual std::vector<std::string> assets() const;
+
+  /// The files that `asset` consists of as far as they are there, itself first: layers, textures,
+  /// material libraries. As long as a loader does not say otherwise it is the file alone, or nothing
+  /// for a scheme. Throws Error(Asset) when the asset cannot be read.
+  virtual std::vector<std::filesystem::path> files(std::string_view asset) const;
 
   /// Fills the empty node `root` (pose, mesh, children ...) in metres, Z up. `asset` is a path that
   /// exists or one of its own schemes. Throws Error(Asset) that begins with the asset's name; what it

@@ -13,6 +13,13 @@
 
 namespace diorama {
 
+/// An environment or object of the job, and what it is made of.
+struct DatasetAsset {
+  std::string asset;  ///< As a job would name it; files below the assets root without the root.
+  /// Name and SHA-256 (hex) of every file that it consists of; empty for "scheme:rest".
+  std::vector<std::pair<std::string, std::string>> files;
+};
+
 /// What a writer knows of the whole dataset before the first capture. Equal in every shard.
 struct DatasetInfo {
   std::uint64_t seed = 0;
@@ -23,6 +30,7 @@ struct DatasetInfo {
   std::string resolved_job;  ///< YAML text; running it gives the same dataset.
   std::string program_version;
   std::vector<std::pair<std::string, std::string>> plugin_versions;
+  std::vector<DatasetAsset> assets;  ///< Sorted by name.
 };
 
 /// Where a writer's files go. The host owns the disk: a capture's files appear all together or not

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <string>
 
 #include "diorama/error.h"
@@ -41,6 +42,46 @@ def Xform "A"
   // y up (x, y, z) is z up (x, -z, y).
   CHECK(bounds.min.isApprox(Vec3(1.0, -3.0, 2.0), 1e-6));
   CHECK(bounds.max.isApprox(Vec3(1.02, -2.96, 2.0), 1e-6));
+}
+
+TEST_CASE("an asset's files are its layers and what their attributes name", "[loader_usd]") {
+  const TemporaryFolder folder;
+  folder.write("parts/handle.usda", "#usda 1.0\n(\n    subLayers = [@../look.usda@]\n)\n");
+  folder.write("look.usda", R"(#usda 1.0
+def Shader "S"
+{
+    asset inputs:file = @tiles.<UDIM>.png@
+    asset inputs:missing = @missing.png@
+}
+)");
+  folder.write("tiles.1001.png", "a");
+  folder.write("tiles.1013.png", "a");
+  folder.write("unused.png", "b");
+  folder.write("red.usda", "#usda 1.0\n");
+  const std::string file = folder.write("mug.usda", R"(#usda 1.0
+def Xform "Mug" (
+    payload = @./parts/handle.usda@
+    variantSets = "color"
+    variants = { string color = "blue" }
+)
+{
+    variantSet "color" = {
+        "blue" { }
+        "red" (
+            prepend references = @red.usda@
+        ) { }
+    }
+}
+)");
+  TextureHost host;
+  std::vector<std::string> names;
+  for (const auto& path : UsdLoader({}, host).files(file)) names.push_back(path.filename());
+  CHECK(names.front() == "mug.usda");
+  std::sort(names.begin(), names.end());
+  CHECK(names == std::vector<std::string>{"handle.usda", "look.usda", "mug.usda", "red.usda",
+                                          "tiles.1001.png", "tiles.1013.png"});
+  CHECK_THROWS_WITH(UsdLoader({}, host).files(folder.write("bad.usd", "x")),
+                    ContainsSubstring("bad.usd"));
 }
 
 TEST_CASE("a referenced asset with other units is scaled to fit", "[loader_usd]") {
