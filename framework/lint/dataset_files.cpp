@@ -198,6 +198,24 @@ std::map<std::uint32_t, Extent> extents(const Picture& picture) {
   return result;
 }
 
+void check_lines(Dataset& dataset, const std::string& file, const std::vector<std::string>& lines) {
+  const auto text = dataset.text(file);
+  if (!text) return;
+  std::string expected;
+  for (const std::string& line : lines) expected += line + "\n";
+  dataset.check(
+      *text == expected, "counts agree between files", file,
+      "does not hold the " + std::to_string(lines.size()) + " lines that follow from dataset.json");
+}
+
+void check_all_or_none(Dataset& dataset, const std::vector<std::string>& files) {
+  const auto is_there = [&](const std::string& file) { return dataset.has(file); };
+  if (std::ranges::none_of(files, is_there)) return;
+  for (const std::string& file : files) {
+    dataset.check(is_there(file), "nothing is missing", file, "other pictures have such a file");
+  }
+}
+
 std::string box_text(const PixelBox& box) {
   return "[" + std::to_string(box.x_min) + ", " + std::to_string(box.y_min) + ", " +
          std::to_string(box.x_max) + ", " + std::to_string(box.y_max) + ")";

@@ -94,6 +94,12 @@ struct Extent {
 /// Extents by value of Picture::packed().
 std::map<std::uint32_t, Extent> extents(const Picture& picture);
 
+/// Checks that a text file holds exactly these lines.
+void check_lines(Dataset& dataset, const std::string& file, const std::vector<std::string>& lines);
+
+/// Files that all pictures have or none: reports those that some lack.
+void check_all_or_none(Dataset& dataset, const std::vector<std::string>& files);
+
 std::string box_text(const PixelBox& box);  ///< "[3, 5, 10, 12)".
 
 }  // namespace diorama::lint

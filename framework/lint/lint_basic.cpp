@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "framework/lint/lint_formats.h"
+#include "framework/lint/object_checks.h"
 #include "framework/lint/replicator_files.h"
 
 namespace diorama::lint {
@@ -16,12 +17,10 @@ constexpr const char* kIds = "ids within the label map";
 constexpr const char* kPartition = "pixels partition into instances";
 constexpr const char* kBox = "box = extent of mask";
 constexpr const char* kAmodal = "visible <= amodal";
-constexpr const char* kReproject = "pose and camera reproject onto the mask";
-constexpr const char* kDepth = "depth back-projects";
 
 struct Box3d {
   Aabb local;
-  Mat4 world_from_local;  ///< Row vectors.
+  Affine world_from_local;
 };
 
 /// All that one camera wrote of one capture, as far as it is there.
@@ -83,7 +82,8 @@ class BasicLint {
         dataset_.reading(file, [&] { data.camera = camera_of(*json); });
       }
     }
-    for (const char* kind : {"rgb.png", "rgb.jpg", "rgb.jpeg", "rgb.exr", "normals.png"}) {
+    for (const char* kind : {"rgb.png", "rgb.jpg", "rgb.jpeg", "rgb.exr", "normals.png",
+                             "distance_to_camera.png", "distance_to_image_plane.png"}) {
       if (const auto file = path(kind); !file.empty()) check_size(data, file);
     }
     read_instances(data, path("instance_segmentation.png"),
@@ -101,8 +101,8 @@ class BasicLint {
     read_boxes_3d(data, path("bounding_box_3d_prim_paths.json"),
                   path("bounding_box_3d_labels.json"));
     check_boxes(data, path("bounding_box_2d_tight.npy"), path("bounding_box_2d_loose.npy"));
-    check_reprojection(data);
-    check_depth(data, path("distance_to_camera.npy"), path("distance_to_image_plane.npy"));
+    check_cuboids(data);
+    check_distances(data, path("distance_to_camera.npy"), path("distance_to_image_plane.npy"));
     check_rows(path("occlusion.npy"), 12, 8);
     check_points(path("pointcloud.npy"), product, number);
     if (const auto file = path("motion_vectors.npy"); !file.empty()) dataset_.npy(file);
@@ -111,12 +111,12 @@ class BasicLint {
   void check_size(const FrameData& data, const std::string& file) {
     const auto picture = dataset_.picture(file);
     if (!picture || !data.camera) return;
-    dataset_.check(picture->width == data.camera->width && picture->height == data.camera->height,
-                   "counts agree between files", file,
-                   "is " + std::to_string(picture->width) + " x " +
-                       std::to_string(picture->height) + ", camera_params say " +
-                       std::to_string(data.camera->width) + " x " +
-                       std::to_string(data.camera->height));
+    dataset_.check(
+        picture->width == data.camera->lens.width && picture->height == data.camera->lens.height,
+        "counts agree between files", file,
+        "is " + std::to_string(picture->width) + " x " + std::to_string(picture->height) +
+            ", camera_params say " + std::to_string(data.camera->lens.width) + " x " +
+            std::to_string(data.camera->lens.height));
   }
 
   /// Every value of the picture must have a key.
@@ -249,7 +249,8 @@ class BasicLint {
       Box3d box;
       box.local.min = Vec3(number(0), number(1), number(2));
       box.local.max = Vec3(number(3), number(4), number(5));
-      for (int i = 0; i < 16; ++i) box.world_from_local(i / 4, i % 4) = number(6 + i);
+      // For row vectors in the file.
+      for (int i = 0; i < 16; ++i) box.world_from_local.matrix()(i % 4, i / 4) = number(6 + i);
       data.cuboids[names[row]] = box;
     }
   }
@@ -283,35 +284,36 @@ class BasicLint {
     }
   }
 
-  void check_reprojection(const FrameData& data) {
-    if (!data.camera || !data.camera->is_pinhole) return;
+  SeenObject seen_object(const FrameData& data, const std::string& path,
+                         const Box3d& cuboid) const {
+    SeenObject seen;
+    seen.who = path;
+    seen.file = data.cuboids_file;
+    seen.camera_from_local = data.camera->camera_from_world * cuboid.world_from_local;
+    seen.bounds = cuboid.local;
+    return seen;
+  }
+
+  void check_cuboids(const FrameData& data) {
+    if (!data.camera) return;
     for (const auto& [path, cuboid] : data.cuboids) {
-      const auto projected = projected_box(*data.camera, cuboid.world_from_local, cuboid.local);
-      if (!projected) continue;
+      SeenObject seen = seen_object(data, path, cuboid);
       for (const auto* boxes : {&data.tight, &data.loose}) {
         const auto box = boxes->find(path);
         if (box == boxes->end()) continue;
-        // Pixel centres of the object lie inside the projection of its box.
-        const Vec2 lo = projected->min().array() - 0.6;
-        const Vec2 hi = projected->max().array() + 0.6;
-        const PixelBox& b = box->second;
-        const bool holds = b.x_min + 0.5 >= lo.x() && b.y_min + 0.5 >= lo.y() &&
-                           b.x_max - 0.5 <= hi.x() && b.y_max - 0.5 <= hi.y();
-        dataset_.check(holds, kReproject, data.cuboids_file,
-                       path + ": the 3-D box projects to x " + std::to_string(lo.x()) + " to " +
-                           std::to_string(hi.x()) + ", y " + std::to_string(lo.y()) + " to " +
-                           std::to_string(hi.y()) + "; the pixels extend over " + box_text(b));
+        seen.box = box->second;
+        check_reprojection(dataset_, data.camera->lens, seen);
       }
     }
   }
 
-  void check_depth(const FrameData& data, const std::string& ray_file,
-                   const std::string& plane_file) {
+  void check_distances(const FrameData& data, const std::string& ray_file,
+                       const std::string& plane_file) {
     const auto ray = ray_file.empty() ? std::nullopt : dataset_.npy(ray_file);
     const auto plane = plane_file.empty() ? std::nullopt : dataset_.npy(plane_file);
-    if (!data.camera || !data.camera->is_pinhole) return;
-    const std::vector<std::size_t> shape{std::size_t(data.camera->height),
-                                         std::size_t(data.camera->width)};
+    if (!data.camera) return;
+    const std::vector<std::size_t> shape{std::size_t(data.camera->lens.height),
+                                         std::size_t(data.camera->lens.width)};
     for (const auto& [array, file] : {std::pair(&ray, &ray_file), std::pair(&plane, &plane_file)}) {
       if (!*array) continue;
       if ((*array)->shape != shape || (*array)->item_size != 4) {
@@ -319,74 +321,56 @@ class BasicLint {
         return;
       }
     }
-    if (ray && plane) check_depth_kinds(*data.camera, *ray, *plane, ray_file);
-    if (ray) check_depth_inside(data, *ray, ray_file, true);
-    if (plane) check_depth_inside(data, *plane, plane_file, false);
+    if (ray && plane) check_distance_kinds(data.camera->lens, *ray, *plane, ray_file);
+    if (ray) check_surfaces(data, *ray, ray_file, true);
+    if (plane) check_surfaces(data, *plane, plane_file, false);
   }
 
   /// The two kinds differ by the angle of the ray.
-  void check_depth_kinds(const ReplicatorCamera& camera, const NpyArray& ray, const NpyArray& plane,
-                         const std::string& file) {
+  void check_distance_kinds(const Lens& lens, const NpyArray& ray, const NpyArray& plane,
+                            const std::string& file) {
     std::size_t wrong = 0;
-    for (int y = 0; y < camera.height; ++y) {
-      for (int x = 0; x < camera.width; ++x) {
-        const std::size_t at = 4 * std::size_t(y * camera.width + x);
+    for (int y = 0; y < lens.height; ++y) {
+      for (int x = 0; x < lens.width; ++x) {
+        const std::size_t at = 4 * std::size_t(y * lens.width + x);
         const double d = ray.value<float>(at);
         const double z = plane.value<float>(at);
+        const auto direction = lens.direction(Vec2(x + 0.5, y + 0.5));
         if (std::isfinite(d) != std::isfinite(z)) {
           ++wrong;
-        } else if (std::isfinite(d) &&
-                   std::abs(d - z * camera.direction(x, y).norm()) > 1e-4 + 1e-4 * d) {
+        } else if (std::isfinite(d) && direction &&
+                   std::abs(z - d * direction->normalized().z()) > 1e-4 + 1e-4 * d) {
           ++wrong;
         }
       }
     }
-    dataset_.check(wrong == 0, kDepth, file,
+    dataset_.check(wrong == 0, kBackProject, file,
                    std::to_string(wrong) +
                        " pixels do not agree with distance_to_image_plane and the camera's rays");
   }
 
   /// Surface points of an instance lie in its 3-D box.
-  void check_depth_inside(const FrameData& data, const NpyArray& array, const std::string& file,
-                          bool is_along_ray) {
+  void check_surfaces(const FrameData& data, const NpyArray& array, const std::string& file,
+                      bool is_along_ray) {
     if (!data.instances) return;
-    const ReplicatorCamera& camera = *data.camera;
-    if (data.instances->width != camera.width || data.instances->height != camera.height) {
+    const Lens& lens = data.camera->lens;
+    if (data.instances->width != lens.width || data.instances->height != lens.height) {
       dataset_.find("counts agree between files", data.instances_file,
                     "has another size than the camera");
       return;
     }
-    const Mat4 world_from_camera = camera.view.inverse();
-    std::map<std::uint32_t, std::string> path_of_id;
-    for (const auto& [path, id] : data.id_of_path) path_of_id.emplace(id, path);
-    std::map<std::string, std::pair<std::size_t, std::size_t>> outside;  // wrong, all
-    for (int y = 0; y < camera.height; ++y) {
-      for (int x = 0; x < camera.width; ++x) {
-        const auto path = path_of_id.find(data.instances->packed(x, y));
-        if (path == path_of_id.end()) continue;
-        const auto cuboid = data.cuboids.find(path->second);
-        if (cuboid == data.cuboids.end()) continue;
-        Vec3 ray = camera.direction(x, y);
-        if (is_along_ray) ray.normalize();
-        const Vec3 point = ray * double(array.value<float>(4 * std::size_t(y * camera.width + x)));
-        const Mat4 local_from_camera =
-            world_from_camera * cuboid->second.world_from_local.inverse();
-        const Vec3 local =
-            (point.homogeneous().transpose() * local_from_camera).head<3>().transpose();
-        const Aabb& box = cuboid->second.local;
-        const Vec3 slack = 0.002 * box.size() + Vec3::Constant(1e-3);
-        auto& [wrong, all] = outside[path->second];
-        ++all;
-        if (!((local - box.min + slack).array() >= 0.0).all() ||
-            !((box.max + slack - local).array() >= 0.0).all()) {
-          ++wrong;
-        }
-      }
-    }
-    for (const auto& [path, counts] : outside) {
-      dataset_.check(counts.first == 0, kDepth, file,
-                     path + ": " + std::to_string(counts.first) + " of " +
-                         std::to_string(counts.second) + " surface points lie outside its 3-D box");
+    const auto masks = extents(*data.instances);
+    const DepthMap depth{file, is_along_ray, 0.0, [&](int x, int y) {
+                           return double(array.value<float>(4 * std::size_t(y * lens.width + x)));
+                         }};
+    for (const auto& [path, cuboid] : data.cuboids) {
+      const auto id = data.id_of_path.find(path);
+      const auto mask = id == data.id_of_path.end() ? masks.end() : masks.find(id->second);
+      if (mask == masks.end()) continue;
+      SeenObject seen = seen_object(data, path, cuboid);
+      seen.box = mask->second.box;
+      seen.has = [&](int x, int y) { return data.instances->packed(x, y) == id->second; };
+      check_depth(dataset_, lens, seen, depth);
     }
   }
 

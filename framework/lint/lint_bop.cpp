@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <cmath>
+#include <array>
 
 #include "framework/lint/lint_formats.h"
+#include "framework/lint/lint_page.h"
+#include "framework/lint/object_checks.h"
 
 namespace diorama::lint {
 namespace {
-
-constexpr const char* kReproject = "pose and camera reproject onto the mask";
 
 PixelBox box_of(const Json& bbox) {
   const int x = bbox.at(0).get<int>();
@@ -20,18 +20,29 @@ Mat3 matrix_of(const Json& list) {
   return matrix;
 }
 
-Vec3 vec3_of(const Json& list) {
-  return {list.at(0).get<double>(), list.at(1).get<double>(), list.at(2).get<double>()};
-}
-
 std::string padded_id(const std::string& id) {
   return id.size() < 6 ? std::string(6 - id.size(), '0') + id : id;
 }
 
+/// Objects of the scenes to test on, by scene, image and object.
+using TargetCounts = std::map<std::array<int, 3>, int>;
+
+void check_targets(Dataset& dataset, const Json& targets, const TargetCounts& expected) {
+  TargetCounts found;
+  for (const Json& target : targets) {
+    const std::array key{target.at("scene_id").get<int>(), target.at("im_id").get<int>(),
+                         target.at("obj_id").get<int>()};
+    found[key] += target.at("inst_count").get<int>();
+  }
+  dataset.check(found == expected, "counts agree between files", "test_targets_bop19.json",
+                "its targets are not the objects of test/*/scene_gt.json");
+}
+
 class BopScene {
  public:
-  BopScene(Dataset& dataset, std::string folder, const Json& models)
-      : dataset_(dataset), folder_(std::move(folder)), models_(models) {}
+  /// Adds the scene's objects to `targets` when it is one to test on.
+  BopScene(Dataset& dataset, std::string folder, const Json& models, TargetCounts& targets)
+      : dataset_(dataset), folder_(std::move(folder)), models_(models), targets_(targets) {}
 
   void run() {
     const auto cameras = dataset_.json(folder_ + "/scene_camera.json");
@@ -41,6 +52,10 @@ class BopScene {
     dataset_.reading(folder_ + "/scene_gt.json", [&] {
       for (const auto& [id, list] : poses->items()) {
         lint_image(padded_id(id), cameras->at(id), list, infos->at(id));
+        if (!folder_.starts_with("test/")) continue;
+        for (const Json& pose : list) {
+          ++targets_[{std::stoi(folder_.substr(5)), std::stoi(id), pose.at("obj_id").get<int>()}];
+        }
       }
     });
   }
@@ -55,7 +70,8 @@ class BopScene {
     depth_file_ = folder_ + "/depth/" + stem + ".png";
     depth_ = dataset_.picture(depth_file_);
     depth_scale_ = camera.at("depth_scale").get<double>();
-    camera_ = matrix_of(camera.at("cam_K"));
+    if (!depth_) return;
+    lens_ = lens_of(camera, depth_->width, depth_->height, matrix_of(camera.at("cam_K")));
     dataset_.check(poses.size() == infos.size(), "counts agree between files",
                    folder_ + "/scene_gt_info.json", "image " + stem + ": not one entry per object");
     for (std::size_t i = 0; i < poses.size() && i < infos.size(); ++i) {
@@ -68,7 +84,7 @@ class BopScene {
     const auto visible = dataset_.picture(file);
     const auto whole = dataset_.picture(folder_ + "/mask/" + name);
     if (!visible || !whole) return;
-    if (!visible->has_size_of(*whole) || (depth_ && !depth_->has_size_of(*whole))) {
+    if (!visible->has_size_of(*whole) || !depth_->has_size_of(*whole)) {
       dataset_.find("counts agree between files", file, "masks and depth differ in size");
       return;
     }
@@ -85,7 +101,7 @@ class BopScene {
                    std::to_string(beyond) + " pixels lie outside the whole object's mask");
     check_extent("bbox_visib", "px_count_visib", info, inner, file);
     check_extent("bbox_obj", "px_count_all", info, outer, folder_ + "/mask/" + name);
-    check_pose(file, pose, outer.box, *visible);
+    check_pose(file, pose, outer.box, inner.box, *visible);
   }
 
   void check_extent(const char* box_key, const char* count_key, const Json& info,
@@ -99,89 +115,84 @@ class BopScene {
                        std::to_string(mask.count) + " pixels");
   }
 
-  void check_pose(const std::string& file, const Json& pose, const PixelBox& mask,
-                  const Picture& visible) {
+  void check_pose(const std::string& file, const Json& pose, const PixelBox& whole_box,
+                  const PixelBox& visible_box, const Picture& visible) {
     const std::string id = pose.at("obj_id").dump();
     dataset_.check(models_.contains(id), "ids within the label map", file,
                    "obj_id " + id + " is not in models_info.json");
-    if (!models_.contains(id)) return;
-    const Json& model = models_.at(id);
-    Aabb box;
-    box.min = {model.at("min_x").get<double>(), model.at("min_y").get<double>(),
-               model.at("min_z").get<double>()};
-    box.max = box.min + Vec3(model.at("size_x").get<double>(), model.at("size_y").get<double>(),
-                             model.at("size_z").get<double>());
-    Affine camera_from_model = Affine::Identity();
+    SeenObject seen;
+    seen.who = pose.at("node").get<std::string>();
+    seen.file = file;
     const Mat3 rotation = matrix_of(pose.at("cam_R_m2c"));
     dataset_.check((rotation * rotation.transpose() - Mat3::Identity()).norm() < 1e-4 &&
                        rotation.determinant() > 0.0,
                    "pose agrees with the keypoints", file, "cam_R_m2c is not a rotation");
-    camera_from_model.linear() = rotation * vec3_of(pose.at("scale")).asDiagonal();
-    camera_from_model.translation() = vec3_of(pose.at("cam_t_m2c"));
-    check_projection(file, camera_from_model, box, mask);
-    check_depth(camera_from_model.inverse(), box, visible);
+    seen.camera_from_local.linear() = rotation * vec3_of(pose.at("scale")).asDiagonal();
+    seen.camera_from_local.translation() = vec3_of(pose.at("cam_t_m2c"));
+    seen.bounds = {vec3_of(pose.at("bounds_min")), vec3_of(pose.at("bounds_max"))};
+    seen.box = whole_box;
+    check_reprojection(dataset_, lens_, seen);
+    seen.box = visible_box;
+    seen.has = [&](int x, int y) { return visible.at(x, y) != 0; };
+    const auto depth = [this](int x, int y) {
+      const std::uint32_t value = depth_->at(x, y);
+      return value == 0 ? kInfinity : depth_scale_ * value;
+    };
+    check_depth(dataset_, lens_, seen, {depth_file_, false, 0.5 * depth_scale_, depth});
+    if (models_.contains(id)) check_model(models_.at(id), seen);
   }
 
-  void check_projection(const std::string& file, const Affine& camera_from_model, const Aabb& box,
-                        const PixelBox& mask) {
-    Eigen::AlignedBox2d projected;
-    for (int i = 0; i < 8; ++i) {
-      const Vec3 corner = camera_from_model * box.corner(i);
-      if (corner.z() <= 1.0) return;
-      projected.extend((camera_ * corner).hnormalized());
-    }
-    const bool holds =
-        projected.min().x() <= mask.x_min + 1.1 && projected.min().y() <= mask.y_min + 1.1 &&
-        projected.max().x() >= mask.x_max - 1.1 && projected.max().y() >= mask.y_max - 1.1;
-    dataset_.check(holds, kReproject, file,
-                   "the model's box does not project onto the mask " + box_text(mask));
-  }
-
-  void check_depth(const Affine& model_from_camera, const Aabb& box, const Picture& visible) {
-    if (!depth_) return;
-    const Mat3 inverse = camera_.inverse();
-    // Half a unit of the depth picture, and the model's box of another instance of the class.
-    const Vec3 slack = 0.01 * box.size() + Vec3::Constant(depth_scale_ + 1.0);
-    std::size_t wrong = 0;
-    std::size_t all = 0;
-    for (int y = 0; y < visible.height; ++y) {
-      for (int x = 0; x < visible.width; ++x) {
-        if (visible.at(x, y) == 0 || depth_->at(x, y) == 0) continue;
-        const Vec3 ray = inverse * Vec3(x + 0.5, y + 0.5, 1.0);
-        const Vec3 point = model_from_camera * (ray * (depth_scale_ * depth_->at(x, y)));
-        ++all;
-        if (!((point - box.min + slack).array() >= 0.0).all() ||
-            !((box.max + slack - point).array() >= 0.0).all()) {
-          ++wrong;
-        }
-      }
-    }
-    dataset_.check(wrong == 0, "depth back-projects", depth_file_,
-                   std::to_string(wrong) + " of " + std::to_string(all) +
-                       " points of an object lie outside its model's box");
+  /// The model's box holds that of every instance.
+  void check_model(const Json& model, const SeenObject& seen) {
+    const Vec3 lo(model.at("min_x").get<double>(), model.at("min_y").get<double>(),
+                  model.at("min_z").get<double>());
+    const Vec3 size(model.at("size_x").get<double>(), model.at("size_y").get<double>(),
+                    model.at("size_z").get<double>());
+    const double slack = 1e-6 * size.norm();
+    const bool holds = ((seen.bounds.min - lo).array() >= -slack).all() &&
+                       ((lo + size - seen.bounds.max).array() >= -slack).all();
+    dataset_.check(holds, "counts agree between files", "models/models_info.json",
+                   seen.who + ": its bounds are not inside those of its model");
   }
 
   Dataset& dataset_;
   std::string folder_;
   const Json& models_;
+  TargetCounts& targets_;
   std::string depth_file_;
   std::optional<Picture> depth_;
   double depth_scale_ = 1.0;
-  Mat3 camera_ = Mat3::Identity();
+  Lens lens_;
 };
 
 }  // namespace
 
 void lint_bop(Dataset& dataset) {
-  const auto models = dataset.json("models/models_info.json");
-  if (!models) return;
-  bool is_any = false;
-  for (const std::string& file : dataset.files()) {
-    if (!file.ends_with("/scene_gt.json")) continue;
-    is_any = true;
-    BopScene(dataset, std::filesystem::path(file).parent_path().generic_string(), *models).run();
+  const DatasetPage page = lint_page(dataset);
+  std::set<std::string> scenes;
+  for (const PlannedPicture& picture : page.pictures) {
+    const std::string scene = (picture.split == "val" ? "test/" : "train_pbr/") +
+                              padded_id(std::to_string(picture.camera));
+    scenes.insert(scene);
+    const std::string stem = scene + "/rgb/" + picture.stem.substr(0, picture.stem.find('_'));
+    dataset.check(dataset.has(stem + ".png") || dataset.has(stem + ".jpg"), "nothing is missing",
+                  stem, "the picture is missing");
   }
-  dataset.check(is_any, "nothing is missing", ".", "no scene_gt.json: was the run finished?");
+  Json objects = Json::object();
+  for (const std::string& name : page.classes) {
+    objects[std::to_string(objects.size() + 1)] = name;
+  }
+  if (const auto found = dataset.json("objects.json")) {
+    dataset.check(*found == objects, "ids within the label map", "objects.json",
+                  "its objects are not the classes of dataset.json");
+  }
+  dataset.json("camera.json");
+  const auto models = dataset.json("models/models_info.json");
+  const auto targets = dataset.json("test_targets_bop19.json");
+  if (!models || !targets) return;
+  TargetCounts counts;
+  for (const std::string& scene : scenes) BopScene(dataset, scene, *models, counts).run();
+  dataset.reading("test_targets_bop19.json", [&] { check_targets(dataset, *targets, counts); });
 }
 
 }  // namespace diorama::lint

@@ -2,6 +2,8 @@
 #include <cmath>
 
 #include "framework/lint/lint_formats.h"
+#include "framework/lint/lint_page.h"
+#include "framework/lint/object_checks.h"
 
 namespace diorama::lint {
 namespace {
@@ -74,19 +76,27 @@ class CocoPart {
   CocoPart(Dataset& dataset, std::string file, std::string split)
       : dataset_(dataset), file_(std::move(file)), split_(std::move(split)) {}
 
-  void instances() {
+  /// `pictures` are those that dataset.json plans.
+  void instances(const Json& categories, std::size_t pictures) {
     const auto json = dataset_.json(file_);
     if (!json) return;
     dataset_.reading(file_, [&] {
+      dataset_.check(json->at("categories") == categories, "ids within the label map", file_,
+                     "its categories are not those of categories.json");
+      dataset_.check(json->at("images").size() == pictures, "counts agree between files", file_,
+                     "lists " + std::to_string(json->at("images").size()) + " images of " +
+                         std::to_string(pictures));
       read_images(*json);
       for (const Json& annotation : json->at("annotations")) check_annotation(annotation);
     });
   }
 
-  void panoptic() {
+  void panoptic(std::size_t pictures) {
     const auto json = dataset_.json(file_);
     if (!json) return;
     dataset_.reading(file_, [&] {
+      dataset_.check(json->at("annotations").size() == pictures, "counts agree between files",
+                     file_, "has not one annotation per picture");
       for (const Json& category : json->at("categories")) {
         categories_.insert(category.at("id").get<int>());
       }
@@ -171,18 +181,25 @@ class CocoPart {
   void check_keypoints(const Json& annotation, const std::string& who, const CocoImage& image) {
     if (!annotation.contains("keypoints")) return;
     const auto numbers = annotation.at("keypoints").get<std::vector<double>>();
-    int count = 0;
+    std::size_t count = 0;
+    Eigen::AlignedBox2d extent;
     for (std::size_t i = 0; i + 2 < numbers.size(); i += 3) {
       if (numbers[i + 2] == 0.0) continue;
       ++count;
+      extent.extend(Vec2(numbers[i], numbers[i + 1]));
       const bool is_inside = numbers[i] >= 0.0 && numbers[i + 1] >= 0.0 &&
                              numbers[i] <= double(image.width) &&
                              numbers[i + 1] <= double(image.height);
       dataset_.check(is_inside, "keypoints project onto their pixels", file_,
                      who + ": a keypoint in sight lies outside the image");
     }
-    dataset_.check(annotation.at("num_keypoints").get<int>() == count, "area = count", file_,
-                   who + ": num_keypoints is not the number of keypoints in the image");
+    dataset_.check(annotation.at("num_keypoints").get<std::size_t>() == count, "area = count",
+                   file_, who + ": num_keypoints is not the number of keypoints in the image");
+    if (count * 3 != numbers.size()) return;
+    const PixelBox box = box_of(annotation.at("bbox"));
+    check_surrounded(dataset_, file_, who,
+                     Vec2(0.5 * (box.x_min + box.x_max), 0.5 * (box.y_min + box.y_max)),
+                     Vec2(box.width(), box.height()), extent);
   }
 
   void check_panoptic(const Json& annotation) {
@@ -223,19 +240,27 @@ class CocoPart {
 }  // namespace
 
 void lint_coco(Dataset& dataset) {
-  bool is_any = false;
-  for (const std::string& file : dataset.files()) {
-    const std::string name = std::filesystem::path(file).stem().string();
-    if (!file.starts_with("annotations/")) continue;
-    if (name.starts_with("instances_")) {
-      is_any = true;
-      CocoPart(dataset, file, name.substr(10)).instances();
-    } else if (name.starts_with("panoptic_")) {
-      CocoPart(dataset, file, name.substr(9)).panoptic();
-    }
+  const DatasetPage page = lint_page(dataset);
+  std::map<std::string, std::size_t> pictures;
+  std::vector<std::string> panoptic;
+  for (const PlannedPicture& picture : page.pictures) {
+    ++pictures[picture.split];
+    const std::string stem = "images/" + picture.split + "/" + picture.stem;
+    dataset.check(dataset.has(stem + ".png") || dataset.has(stem + ".jpg"), "nothing is missing",
+                  stem, "the picture is missing");
+    panoptic.push_back("panoptic/" + picture.split + "/" + picture.stem + ".png");
   }
-  dataset.check(is_any, "nothing is missing", "annotations",
-                "no instances_*.json: was the run finished?");
+  for (const auto& [split, count] : pictures) {
+    panoptic.push_back("annotations/panoptic_" + split + ".json");
+  }
+  check_all_or_none(dataset, panoptic);
+  const auto categories = dataset.json("categories.json");
+  for (const auto& [split, count] : pictures) {
+    CocoPart(dataset, "annotations/instances_" + split + ".json", split)
+        .instances(categories.value_or(Json()), count);
+    const std::string file = "annotations/panoptic_" + split + ".json";
+    if (dataset.has(file)) CocoPart(dataset, file, split).panoptic(count);
+  }
 }
 
 }  // namespace diorama::lint

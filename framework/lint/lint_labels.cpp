@@ -1,12 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // Formats with one small label file per picture: YOLO, KITTI, Pascal VOC.
+#include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
+#include <cstring>
 #include <iterator>
 #include <regex>
 #include <sstream>
 
 #include "framework/lint/lint_formats.h"
+#include "framework/lint/lint_page.h"
+#include "framework/lint/object_checks.h"
 
 namespace diorama::lint {
 namespace {
@@ -20,6 +25,12 @@ std::vector<std::string> lines_of(const std::string& text) {
   std::istringstream in(text);
   for (std::string line; std::getline(in, line);) lines.push_back(line);
   return lines;
+}
+
+/// Of a file whose every line ends; throws when the last one does not.
+std::vector<std::string> whole_lines_of(const std::string& text) {
+  if (!text.empty() && text.back() != '\n') throw std::runtime_error("its last line is cut short");
+  return lines_of(text);
 }
 
 /// Throws when a word is no number.
@@ -50,31 +61,57 @@ std::string picture_file(const Dataset& dataset, const std::string& stem) {
   return {};
 }
 
-std::string stem_of(const std::string& file) { return std::filesystem::path(file).stem().string(); }
-
 struct YoloTask {
   std::string name;
-  int classes = 0;
+  std::size_t classes = 0;
 };
 
-YoloTask read_yolo_task(Dataset& dataset) {
-  YoloTask task;
-  if (const auto page = dataset.json("dataset.json")) {
-    dataset.reading("dataset.json", [&] {
-      task.name = page->at("conventions").at("task").get<std::string>();
-      task.classes = int(page->at("classes").size());
-    });
+/// data.yaml has a line per class, in order.
+void check_yolo_names(Dataset& dataset, const std::vector<std::string>& classes) {
+  const auto yaml = dataset.text("data.yaml");
+  if (!yaml) return;
+  std::string names = "names:\n";
+  for (std::size_t i = 0; i < classes.size(); ++i) {
+    names += "  " + std::to_string(i) + ": " +
+             Json(classes[i]).dump(-1, ' ', true, Json::error_handler_t::replace) + "\n";
   }
-  return task;
+  dataset.check(yaml->ends_with(names), "ids within the label map", "data.yaml",
+                "its names are not the classes of dataset.json");
+}
+
+/// The edges of a box lie between pixels.
+void check_whole_pixels(Dataset& dataset, const std::string& file,
+                        const std::vector<double>& numbers, const Picture& picture) {
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    const double size = axis == 0 ? picture.width : picture.height;
+    const double low = size * (numbers.at(axis + 1) - 0.5 * numbers.at(axis + 3));
+    const double slack = 2e-6 * size;
+    dataset.check(std::abs(low - std::round(low)) <= slack, "box = extent of mask", file,
+                  "an edge of a box is at " + std::to_string(low) + " px, not between two pixels");
+  }
+}
+
+/// Where all corners of the 3-D box are in the image, they surround the 2-D box.
+void check_yolo_keypoints(Dataset& dataset, const std::string& file,
+                          const std::vector<double>& numbers, const Picture& picture) {
+  Eigen::AlignedBox2d corners;
+  for (std::size_t i = 5; i + 2 < numbers.size(); i += 3) {
+    if (numbers[i + 2] == 0.0) return;
+    corners.extend(Vec2(numbers[i] * picture.width, numbers[i + 1] * picture.height));
+  }
+  check_surrounded(dataset, file, "a line's box",
+                   Vec2(numbers[1] * picture.width, numbers[2] * picture.height),
+                   Vec2(numbers[3] * picture.width, numbers[4] * picture.height), corners);
 }
 
 void check_yolo_line(Dataset& dataset, const std::string& file, const std::string& line,
-                     const YoloTask& task) {
+                     const YoloTask& task, const Picture& picture) {
   const auto numbers = numbers_of(words_of(line), 0);
   if (numbers.empty()) throw std::runtime_error("an empty line");
-  dataset.check(numbers[0] >= 0 && numbers[0] < task.classes && numbers[0] == int(numbers[0]),
-                "ids within the label map", file,
-                "class " + std::to_string(numbers[0]) + " of " + std::to_string(task.classes));
+  dataset.check(
+      numbers[0] >= 0 && numbers[0] < double(task.classes) && numbers[0] == std::floor(numbers[0]),
+      "ids within the label map", file,
+      "class " + std::to_string(numbers[0]) + " of " + std::to_string(task.classes));
   const std::size_t fields = numbers.size() - 1;
   const bool has_right_count = task.name == "detect"    ? fields == 4
                                : task.name == "obb"     ? fields == 8
@@ -96,23 +133,27 @@ void check_yolo_line(Dataset& dataset, const std::string& file, const std::strin
     dataset.check(half > 0.0 && numbers[axis] - half >= -2e-6 && numbers[axis] + half <= 1 + 2e-6,
                   kRange, file, "a box reaches beyond the image");
   }
+  check_whole_pixels(dataset, file, numbers, picture);
+  if (task.name == "pose") check_yolo_keypoints(dataset, file, numbers, picture);
 }
 
 struct KittiImage {
   Picture picture;
-  Mat3 camera = Mat3::Identity();
+  Lens lens;
   std::optional<Picture> depth;
 };
 
-Mat3 read_kitti_camera(const std::string& text) {
+Lens read_kitti_lens(const std::string& text, const Picture& picture) {
+  std::optional<Mat3> camera;
+  Json holder = Json::object();
   for (const std::string& line : lines_of(text)) {
+    if (line.starts_with("lens_2: ")) holder["lens"] = Json::parse(line.substr(8));
     if (!line.starts_with("P2: ")) continue;
     const auto p = numbers_of(words_of(line), 1);
-    Mat3 camera;
-    for (int i = 0; i < 9; ++i) camera(i / 3, i % 3) = p.at(std::size_t(4 * (i / 3) + i % 3));
-    return camera;
+    camera = intrinsics_matrix(p.at(0), p.at(5), p.at(2), p.at(6));
   }
-  throw std::runtime_error("has no line P2");
+  if (!camera) throw std::runtime_error("has no line P2");
+  return lens_of(holder, picture.width, picture.height, *camera);
 }
 
 /// The fifteen fields of a label line but the first.
@@ -133,40 +174,54 @@ KittiLabel read_kitti_label(const std::vector<std::string>& words) {
           v[13]};
 }
 
-/// Corners of the upright box, in the camera's space.
-std::vector<Vec3> kitti_corners(const KittiLabel& label) {
-  const double c = std::cos(label.rotation_y);
-  const double s = std::sin(label.rotation_y);
-  std::vector<Vec3> corners;
-  for (int i = 0; i < 8; ++i) {
-    const Vec3 share((i & 1) != 0 ? 0.5 : -0.5, (i & 2) != 0 ? -1.0 : 0.0,
-                     (i & 4) != 0 ? 0.5 : -0.5);
-    const Vec3 local = share.cwiseProduct(label.size);
-    corners.push_back(label.location + Vec3(c * local.x() + s * local.z(), local.y(),
-                                            c * local.z() - s * local.x()));
-  }
-  return corners;
+/// From the upright box's own space (length, height, width; the origin in the middle of the bottom
+/// face) to the camera's.
+Affine kitti_pose(const KittiLabel& label) {
+  Affine pose = Affine::Identity();
+  pose.linear() = Eigen::AngleAxisd(label.rotation_y, Vec3::UnitY()).toRotationMatrix();
+  pose.translation() = label.location;
+  return pose;
 }
 
-void check_kitti_depth(Dataset& dataset, const std::string& file, const std::string& who,
-                       const PixelBox& box, const std::vector<Vec3>& corners,
-                       const Picture& depth) {
-  double near = kInfinity;
-  double far = 0.0;
-  for (const Vec3& corner : corners) {
-    near = std::min(near, corner.z());
-    far = std::max(far, corner.z());
+SeenObject kitti_object(const std::string& file, const std::string& who, const KittiLabel& label) {
+  SeenObject seen;
+  seen.who = who;
+  seen.file = file;
+  seen.camera_from_local = kitti_pose(label);
+  const Vec3 half = 0.5 * label.size;
+  seen.bounds = {Vec3(-half.x(), -label.size.y(), -half.z()), Vec3(half.x(), 0.0, half.z())};
+  seen.box = label.box;
+  seen.slack_px = 1.0;
+  return seen;
+}
+
+/// Each side of the 2-D box touches the object: some pixel of its outermost row or column lies in
+/// the 3-D box.
+void check_kitti_sides(Dataset& dataset, const SeenObject& seen, const KittiImage& image) {
+  const Affine local_from_camera = seen.camera_from_local.inverse();
+  const Vec3 slack = Vec3::Constant(0.01) + 0.01 * seen.bounds.size();
+  const auto is_met = [&](int x, int y) {
+    const auto ray = image.lens.direction(Vec2(x + 0.5, y + 0.5));
+    if (!ray || image.depth->at(x, y) == 0) return false;
+    const double z = image.depth->at(x, y) / 256.0;
+    const Vec3 p = local_from_camera * (*ray * (z / ray->z()));
+    return ((p - seen.bounds.min + slack).array() >= 0.0).all() &&
+           ((seen.bounds.max + slack - p).array() >= 0.0).all();
+  };
+  const PixelBox& b = seen.box;
+  std::array<bool, 4> touches{};
+  for (int x = b.x_min; x < b.x_max; ++x) {
+    touches[0] |= is_met(x, b.y_min);
+    touches[1] |= is_met(x, b.y_max - 1);
   }
-  std::size_t inside = 0;
-  for (int y = box.y_min; y < box.y_max; ++y) {
-    for (int x = box.x_min; x < box.x_max; ++x) {
-      const double z = depth.at(x, y) / 256.0;
-      if (z >= near - 0.01 && z <= far + 0.01) ++inside;
-    }
+  for (int y = b.y_min; y < b.y_max; ++y) {
+    touches[2] |= is_met(b.x_min, y);
+    touches[3] |= is_met(b.x_max - 1, y);
   }
-  dataset.check(inside > 0, "depth back-projects", file,
-                who + ": no depth in its box lies between " + std::to_string(near) + " and " +
-                    std::to_string(far) + " m");
+  const bool holds = touches[0] && touches[1] && touches[2] && touches[3];
+  dataset.check(holds, kBackProject, seen.file,
+                seen.who + ": by the depth, a side of its 2-D box " + box_text(b) +
+                    " does not touch its 3-D box");
 }
 
 void check_kitti_line(Dataset& dataset, const std::string& file, const std::string& line,
@@ -175,28 +230,16 @@ void check_kitti_line(Dataset& dataset, const std::string& file, const std::stri
   if (words.size() != 15) {
     throw std::runtime_error("a line of " + std::to_string(words.size()) + " fields, not 15");
   }
-  const std::string& who = words[0];
   const KittiLabel label = read_kitti_label(words);
   const PixelBox& box = label.box;
   const bool is_inside =
       !box.is_empty() && box == box.clipped(image.picture.width, image.picture.height);
-  dataset.check(is_inside, kRange, file, who + ": its box reaches beyond the image");
+  dataset.check(is_inside, kRange, file, words[0] + ": its box reaches beyond the image");
   dataset.check(label.truncation >= 0.0 && label.truncation <= 1.0, "visible <= amodal", file,
-                who + ": truncation " + words[1]);
-  const auto corners = kitti_corners(label);
-  Eigen::AlignedBox2d projected;
-  for (const Vec3& corner : corners) {
-    if (corner.z() <= 0.01) return;
-    projected.extend((image.camera * corner).hnormalized());
-  }
-  const bool holds =
-      projected.min().x() <= box.x_min + 1.1 && projected.min().y() <= box.y_min + 1.1 &&
-      projected.max().x() >= box.x_max - 1.1 && projected.max().y() >= box.y_max - 1.1;
-  dataset.check(holds, "pose and camera reproject onto the mask", file,
-                who + ": the projection of its 3-D box does not hold its 2-D box");
-  if (image.depth && is_inside) {
-    check_kitti_depth(dataset, file, who, box, corners, *image.depth);
-  }
+                words[0] + ": truncation " + words[1]);
+  const SeenObject seen = kitti_object(file, words[0], label);
+  check_reprojection(dataset, image.lens, seen);
+  if (image.depth && is_inside) check_kitti_sides(dataset, seen, image);
 }
 
 void lint_kitti_image(Dataset& dataset, const std::string& stem) {
@@ -211,7 +254,7 @@ void lint_kitti_image(Dataset& dataset, const std::string& stem) {
   const auto label_text = dataset.text(labels);
   if (!decoded || !calib_text || !label_text) return;
   image.picture = *decoded;
-  dataset.reading(calib, [&] { image.camera = read_kitti_camera(*calib_text); });
+  dataset.reading(calib, [&] { image.lens = read_kitti_lens(*calib_text, image.picture); });
   if (const std::string depth = "training/depth_2/" + stem + ".png"; dataset.has(depth)) {
     image.depth = dataset.picture(depth);
     if (image.depth && !image.depth->has_size_of(image.picture)) {
@@ -220,10 +263,20 @@ void lint_kitti_image(Dataset& dataset, const std::string& stem) {
     }
   }
   dataset.reading(labels, [&] {
-    for (const std::string& line : lines_of(*label_text)) {
+    for (const std::string& line : whole_lines_of(*label_text)) {
       check_kitti_line(dataset, labels, line, image);
     }
   });
+}
+
+std::string unescaped(std::string text) {
+  for (const auto& [entity, c] : {std::pair{"&lt;", "<"}, {"&gt;", ">"}, {"&amp;", "&"}}) {
+    for (std::size_t at = text.find(entity); at != std::string::npos;
+         at = text.find(entity, at + 1)) {
+      text.replace(at, std::strlen(entity), c);
+    }
+  }
+  return text;
 }
 
 std::string xml_text(const std::string& xml, const char* name) {
@@ -235,7 +288,20 @@ std::string xml_text(const std::string& xml, const char* name) {
   return found[1];
 }
 
-void lint_voc_image(Dataset& dataset, const std::string& stem) {
+/// Pixels of two pictures of one size that have `first` in one: the values of the other.
+std::set<std::uint32_t> values_below(const Picture& objects, std::uint32_t first,
+                                     const Picture& classes) {
+  std::set<std::uint32_t> values;
+  for (int y = 0; y < objects.height; ++y) {
+    for (int x = 0; x < objects.width; ++x) {
+      if (objects.packed(x, y) == first) values.insert(classes.packed(x, y));
+    }
+  }
+  return values;
+}
+
+void lint_voc_image(Dataset& dataset, const std::string& stem,
+                    const std::vector<std::string>& classes) {
   const std::string file = "Annotations/" + stem + ".xml";
   const auto xml = dataset.text(file);
   if (!xml) return;
@@ -249,11 +315,17 @@ void lint_voc_image(Dataset& dataset, const std::string& stem) {
                   "counts agree between files", picture_name, "size differs from " + file);
     const std::string masks_file = "SegmentationObject/" + stem + ".png";
     std::map<std::uint32_t, Extent> masks;
-    const bool has_masks = xml_text(*xml, "segmented") == "1";
-    if (has_masks) {
-      if (const auto masks_picture = dataset.picture(masks_file)) masks = extents(*masks_picture);
-      dataset.picture("SegmentationClass/" + stem + ".png");
+    std::optional<Picture> objects, class_ids;
+    if (xml_text(*xml, "segmented") == "1") {
+      objects = dataset.picture(masks_file);
+      class_ids = dataset.picture("SegmentationClass/" + stem + ".png");
     }
+    const bool has_masks = objects && class_ids && picture && objects->has_size_of(*class_ids) &&
+                           objects->has_size_of(*picture);
+    dataset.check(has_masks || !objects, "counts agree between files", masks_file,
+                  "picture, objects and classes differ in size");
+    if (has_masks) masks = extents(*objects);
+    masks.erase(0);
     std::uint32_t place = 0;
     for (std::size_t at = xml->find("<object>"); at != std::string::npos;
          at = xml->find("<object>", at + 1)) {
@@ -269,46 +341,78 @@ void lint_voc_image(Dataset& dataset, const std::string& stem) {
                     "object " + std::to_string(place) + ": box " + box_text(box) +
                         ", its pixels extend over " +
                         (masks.contains(place) ? box_text(masks.at(place).box) : "nothing"));
+      masks.erase(place);
+      const auto name = std::ranges::find(classes, unescaped(xml_text(object, "name")));
+      const auto index = std::uint32_t(name - classes.begin()) + 1;
+      dataset.check(values_below(*objects, place, *class_ids) == std::set{index},
+                    "pixels partition into instances", file,
+                    "object " + std::to_string(place) +
+                        ": SegmentationClass shows another class on its pixels");
     }
+    dataset.check(masks.empty(), "ids within the label map", masks_file,
+                  std::to_string(masks.size()) + " values have no object in " + file);
   });
 }
 
 }  // namespace
 
 void lint_yolo(Dataset& dataset) {
-  const YoloTask task = read_yolo_task(dataset);
-  std::size_t count = 0;
-  for (const std::string& file : dataset.files()) {
-    const auto folder = std::filesystem::path(file).parent_path().filename().string();
-    if (file.starts_with("images/")) {
-      dataset.picture(file);
-      const std::string label = "labels/" + folder + "/" + stem_of(file) + ".txt";
-      dataset.check(dataset.has(label), kMissing, label, "the labels of " + file + " are missing");
-    } else if (file.starts_with("labels/")) {
-      ++count;
-      const std::string stem = "images/" + folder + "/" + stem_of(file);
-      dataset.check(!picture_file(dataset, stem).empty(), kMissing, stem,
-                    "the picture of " + file + " is missing");
-      const auto text = dataset.text(file);
-      if (!text) continue;
-      dataset.reading(file, [&] {
-        for (const std::string& line : lines_of(*text)) check_yolo_line(dataset, file, line, task);
-      });
-    }
+  const DatasetPage page = lint_page(dataset);
+  check_yolo_names(dataset, page.classes);
+  const YoloTask task{page.conventions.value("task", ""), page.classes.size()};
+  for (const PlannedPicture& planned : page.pictures) {
+    const std::string stem = planned.split + "/" + planned.stem;
+    const std::string picture = picture_file(dataset, "images/" + stem);
+    dataset.check(!picture.empty(), kMissing, "images/" + stem, "the picture is missing");
+    const auto decoded = picture.empty() ? std::nullopt : dataset.picture(picture);
+    const std::string labels = "labels/" + stem + ".txt";
+    const auto text = dataset.text(labels);
+    if (!text || !decoded) continue;
+    dataset.reading(labels, [&] {
+      for (const std::string& line : whole_lines_of(*text)) {
+        check_yolo_line(dataset, labels, line, task, *decoded);
+      }
+    });
   }
-  dataset.check(count > 0, kMissing, "labels", "there are no labels");
 }
 
 void lint_kitti(Dataset& dataset) {
-  const auto list = dataset.text("ImageSets/trainval.txt");
-  if (!list) return;
-  for (const std::string& stem : lines_of(*list)) lint_kitti_image(dataset, stem);
+  const DatasetPage page = lint_page(dataset);
+  std::vector<std::string> stems, depths;
+  std::map<std::string, std::vector<std::string>> split;
+  for (const PlannedPicture& picture : page.pictures) {
+    const std::string number = std::to_string(picture.capture * page.cameras + picture.camera);
+    const std::size_t digits =
+        std::max<std::size_t>(6, std::to_string(page.pictures.size() - 1).size());
+    stems.push_back(std::string(digits - number.size(), '0') + number);
+    split[picture.split].push_back(stems.back());
+    depths.push_back("training/depth_2/" + stems.back() + ".png");
+  }
+  check_lines(dataset, "ImageSets/train.txt", split["train"]);
+  check_lines(dataset, "ImageSets/val.txt", split["val"]);
+  check_lines(dataset, "ImageSets/trainval.txt", stems);
+  check_all_or_none(dataset, depths);
+  for (const std::string& stem : stems) lint_kitti_image(dataset, stem);
 }
 
 void lint_voc(Dataset& dataset) {
-  const auto list = dataset.text("ImageSets/Main/trainval.txt");
-  if (!list) return;
-  for (const std::string& stem : lines_of(*list)) lint_voc_image(dataset, stem);
+  const DatasetPage page = lint_page(dataset);
+  std::vector<std::string> stems;
+  std::map<std::string, std::vector<std::string>> split;
+  for (const PlannedPicture& picture : page.pictures) {
+    stems.push_back(picture.stem);
+    split[picture.split].push_back(picture.stem);
+  }
+  check_lines(dataset, "labels.txt", page.classes);
+  for (const std::string kind : {"Main", "Segmentation"}) {
+    const std::string folder = "ImageSets/" + kind + "/";
+    check_all_or_none(dataset, {folder + "train.txt", folder + "val.txt", folder + "trainval.txt"});
+    if (kind == "Segmentation" && !dataset.has(folder + "trainval.txt")) continue;
+    check_lines(dataset, folder + "train.txt", split["train"]);
+    check_lines(dataset, folder + "val.txt", split["val"]);
+    check_lines(dataset, folder + "trainval.txt", stems);
+  }
+  for (const std::string& stem : stems) lint_voc_image(dataset, stem, page.classes);
 }
 
 }  // namespace diorama::lint

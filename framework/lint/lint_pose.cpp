@@ -1,26 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <Eigen/SVD>
 #include <cmath>
 
 #include "framework/lint/lint_formats.h"
-#include "framework/lint/replicator_files.h"
+#include "framework/lint/object_checks.h"
 
 namespace diorama::lint {
 namespace {
 
 constexpr const char* kProject = "keypoints project onto their pixels";
 constexpr const char* kPose = "pose agrees with the keypoints";
-
-Mat4 matrix_of(const Json& rows) {
-  Mat4 matrix;
-  for (int i = 0; i < 16; ++i) {
-    matrix(i / 4, i % 4) = rows.at(std::size_t(i / 4)).at(std::size_t(i % 4)).get<double>();
-  }
-  return matrix;
-}
-
-Vec3 vec3_of(const Json& list) {
-  return {list.at(0).get<double>(), list.at(1).get<double>(), list.at(2).get<double>()};
-}
 
 /// Which side of the box a keypoint's name means; zero for the centre.
 Vec3 side_of(const std::string& name) {
@@ -31,15 +20,20 @@ Vec3 side_of(const std::string& name) {
 
 class PoseFile {
  public:
-  PoseFile(Dataset& dataset, const std::string& file, const Json& json)
-      : dataset_(dataset), file_(file), json_(json) {}
+  /// `origins` holds what earlier files say of where an object's origin lies in its box.
+  PoseFile(Dataset& dataset, const std::string& file, const Json& json,
+           std::map<std::string, Vec3>& origins)
+      : dataset_(dataset), file_(file), json_(json), origins_(origins) {}
 
   void run() {
     const Json& data = json_.at("camera_data");
     const Json& intrinsics = data.at("intrinsics");
-    view_ = matrix_of(data.at("camera_view_matrix"));
-    focal_ = {intrinsics.at("fx").get<double>(), intrinsics.at("fy").get<double>()};
-    centre_ = {intrinsics.at("cx").get<double>(), intrinsics.at("cy").get<double>()};
+    view_ = matrix4_of(data.at("camera_view_matrix"));
+    const Mat3 camera =
+        intrinsics_matrix(intrinsics.at("fx").get<double>(), intrinsics.at("fy").get<double>(),
+                          intrinsics.at("cx").get<double>(), intrinsics.at("cy").get<double>());
+    // The picture's size is not in every format; bounds on pixels need none.
+    lens_ = lens_of(data, 4096, 4096, camera);
     for (const Json& name : json_.at("keypoint_order")) {
       sides_.push_back(side_of(name.get<std::string>()));
     }
@@ -66,10 +60,11 @@ class PoseFile {
       const auto points = points_of(object.at("keypoints_3d"));
       check_pixels(points, object.at("projected_cuboid"));
       const Json& q = object.at("quaternion_xyzw");
-      check_pose(points, vec3_of(object.at("location")),
-                 Quat(q.at(3).get<double>(), q.at(0).get<double>(), q.at(1).get<double>(),
-                      q.at(2).get<double>()),
+      check_pose(points, vec3_of(object.at("location")), quaternion_xyzw(q),
                  vec3_of(object.at("scale")));
+    } else {
+      check_box_fits(object.at("projected_cuboid"), vec3_of(object.at("location")),
+                     quaternion_xyzw(object.at("quaternion_xyzw")));
     }
   }
 
@@ -80,20 +75,55 @@ class PoseFile {
     return points;
   }
 
+  static Quat quaternion_xyzw(const Json& q) {
+    return Quat(q.at(3).get<double>(), q.at(0).get<double>(), q.at(1).get<double>(),
+                q.at(2).get<double>());
+  }
+
   void check_pixels(const std::vector<Vec3>& points, const Json& pixels) {
-    // With another lens than a pinhole the centre fits and the corners do not.
-    if (!json_.at("camera_data").contains("camera_projection_matrix")) return;
     for (std::size_t i = 0; i < points.size(); ++i) {
-      if (points[i].z() > -1e-6) continue;
-      const Vec2 flat(points[i].x() / -points[i].z(), points[i].y() / points[i].z());
-      const Vec2 expected = focal_.cwiseProduct(flat) + centre_;
+      const auto expected = lens_.pixel(flipped_axes() * points[i]);
+      if (!expected) continue;
       const Vec2 found(pixels.at(i).at(0).get<double>(), pixels.at(i).at(1).get<double>());
-      dataset_.check((expected - found).cwiseAbs().maxCoeff() <= 0.51, kProject, file_,
+      dataset_.check((*expected - found).cwiseAbs().maxCoeff() <= 0.51, kProject, file_,
                      path_ + ": keypoint " + std::to_string(i) + " is at " +
                          std::to_string(found.x()) + ", " + std::to_string(found.y()) +
-                         ", its camera-space point projects to " + std::to_string(expected.x()) +
-                         ", " + std::to_string(expected.y()));
+                         ", its camera-space point projects to " + std::to_string(expected->x()) +
+                         ", " + std::to_string(expected->y()));
     }
+  }
+
+  /// DOPE's files say neither size nor keypoints in space. Pixels and rotation must leave room for
+  /// some box: its middle c and half size h solve, for every keypoint, d x (c + R (side h)) = 0
+  /// with d the direction of the pixel. Both are found but for a common factor.
+  void check_box_fits(const Json& pixels, const Vec3& location, const Quat& rotation) {
+    check_length(rotation);
+    const Mat3 turn = flipped_axes().linear() * rotation.toRotationMatrix();
+    Eigen::MatrixXd equations(3 * Eigen::Index(sides_.size()), 6);
+    for (std::size_t i = 0; i < sides_.size(); ++i) {
+      const Vec2 pixel(pixels.at(i).at(0).get<double>(), pixels.at(i).at(1).get<double>());
+      const auto direction = lens_.direction(pixel);
+      if (!direction) return;
+      const Vec3 d = direction->normalized();
+      Mat3 cross;
+      cross << 0.0, -d.z(), d.y(), d.z(), 0.0, -d.x(), -d.y(), d.x(), 0.0;
+      equations.block<3, 3>(3 * Eigen::Index(i), 0) = cross;
+      equations.block<3, 3>(3 * Eigen::Index(i), 3) = cross * turn * sides_[i].asDiagonal();
+    }
+    const Eigen::JacobiSVD<Eigen::MatrixXd> svd(equations, Eigen::ComputeThinV);
+    Eigen::VectorXd box = svd.matrixV().col(5);
+    box /= box.head<3>().norm();
+    if (box.tail<3>().sum() < 0.0) box = -box;
+    // A pixel is known to a half.
+    const double slack = 1.5 / lens_.focal.minCoeff();
+    const double miss = (equations * box).cwiseAbs().maxCoeff();
+    dataset_.check(miss <= slack && (box.tail<3>().array() > -slack).all(), kPose, file_,
+                   path_ +
+                       ": no box with this rotation has these corners; the best misses them by " +
+                       std::to_string(miss) + " rad (quaternion order?)");
+    const Vec3 seen = (flipped_axes() * location).normalized();
+    dataset_.check((seen - box.head<3>()).norm() <= 3.0 * box.tail<3>().norm() + slack, kPose,
+                   file_, path_ + ": its location is not where its corners are");
   }
 
   void check_world(const std::vector<Vec3>& points, const Json& world) {
@@ -110,8 +140,7 @@ class PoseFile {
   /// Turning the box's half diagonal by the quaternion leads from the centre to each corner.
   void check_pose(const std::vector<Vec3>& points, const Vec3& location, const Quat& rotation,
                   const Vec3& size) {
-    dataset_.check(std::abs(rotation.norm() - 1.0) < 1e-4, kPose, file_,
-                   path_ + ": the quaternion has length " + std::to_string(rotation.norm()));
+    check_length(rotation);
     Vec3 centre = Vec3::Zero();
     for (std::size_t i = 0; i < points.size(); ++i) {
       if (sides_[i].isZero()) centre = points[i];
@@ -125,9 +154,25 @@ class PoseFile {
     dataset_.check(worst <= slack, kPose, file_,
                    path_ + ": the camera-frame rotation puts a corner " + std::to_string(worst) +
                        " m beside its keypoint (swapped product or quaternion order?)");
-    dataset_.check((location - centre).norm() <= 10.0 * size.norm() + slack, kPose, file_,
-                   path_ + ": the camera-frame location is " +
-                       std::to_string((location - centre).norm()) + " m from the box");
+    check_origin_in_box(rotation.inverse() * (location - centre), size);
+  }
+
+  /// Where the origin lies in the box is the same in all files. Comparing needs a box with volume.
+  void check_origin_in_box(const Vec3& origin, const Vec3& size) {
+    if (!(size.minCoeff() > 1e-6)) return;
+    const Vec3 share = origin.cwiseQuotient(size);
+    const auto [known, is_new] = origins_.emplace(path_, share);
+    const Vec3 slack = Vec3::Constant(1e-3 + 0.01 * size.norm()).cwiseQuotient(size);
+    dataset_.check(((share - known->second).cwiseAbs().array() <= slack.array()).all(), kPose,
+                   file_,
+                   path_ +
+                       ": its camera-frame location lies elsewhere in its box than in other "
+                       "files");
+  }
+
+  void check_length(const Quat& rotation) {
+    dataset_.check(std::abs(rotation.norm() - 1.0) < 1e-4, kPose, file_,
+                   path_ + ": the quaternion has length " + std::to_string(rotation.norm()));
   }
 
   void check_origin(const Json& object) {
@@ -144,10 +189,10 @@ class PoseFile {
   Dataset& dataset_;
   const std::string& file_;
   const Json& json_;
+  std::map<std::string, Vec3>& origins_;
   std::string path_;
   Mat4 view_ = Mat4::Identity();
-  Vec2 focal_ = Vec2::Ones();
-  Vec2 centre_ = Vec2::Zero();
+  Lens lens_;
   std::vector<Vec3> sides_;
 };
 
@@ -159,7 +204,8 @@ bool is_picture(const std::string& file) {
 }  // namespace
 
 void lint_pose(Dataset& dataset) {
-  std::set<std::string> stems;
+  std::vector<std::string> overlays;
+  std::map<std::string, Vec3> origins;
   for (const std::string& file : dataset.files()) {
     const std::string stem = file.substr(0, file.rfind('.'));
     if (is_picture(file)) {
@@ -167,31 +213,38 @@ void lint_pose(Dataset& dataset) {
       if (stem.ends_with("_overlay")) continue;
       dataset.check(dataset.has(stem + ".json"), "nothing is missing", stem + ".json",
                     "the poses of " + file + " are not there");
+      overlays.push_back(stem + "_overlay" +
+                         (file.ends_with(".exr") ? ".png" : file.substr(stem.size())));
     } else if (file.ends_with(".json")) {
       const auto json = dataset.json(file);
       if (!json || !json->contains("keypoint_order")) continue;
-      dataset.reading(file, [&] { PoseFile(dataset, file, *json).run(); });
+      dataset.reading(file, [&] { PoseFile(dataset, file, *json, origins).run(); });
       const bool has_picture = dataset.has(stem + ".png") || dataset.has(stem + ".jpg") ||
                                dataset.has(stem + ".jpeg") || dataset.has(stem + ".exr");
       dataset.check(has_picture, "nothing is missing", file, "its picture is not there");
     }
   }
+  check_all_or_none(dataset, overlays);
 }
 
 void lint_visualization(Dataset& dataset) {
-  std::map<std::string, std::set<std::string>> numbers;  // by name without number
-  std::set<std::string> all;
+  std::set<std::string> folders, kinds, numbers;
   for (const std::string& file : dataset.files()) {
     if (!file.ends_with(".png")) continue;
     dataset.picture(file);
+    const std::size_t slash = file.rfind('/') + 1;  // 0 without a folder
     const std::size_t cut = file.rfind('_');
-    numbers[file.substr(0, cut)].insert(file.substr(cut));
-    all.insert(file.substr(cut));
+    folders.insert(file.substr(0, slash));
+    kinds.insert(file.substr(slash, cut - slash));
+    numbers.insert(file.substr(cut));
   }
-  for (const auto& [name, found] : numbers) {
-    for (const std::string& number : all) {
-      dataset.check(found.contains(number), "nothing is missing", name + number,
-                    "other pictures of this frame are there");
+  for (const std::string& folder : folders) {
+    for (const std::string& kind : kinds) {
+      for (const std::string& number : numbers) {
+        const std::string file = folder + kind + number;
+        dataset.check(dataset.has(file), "nothing is missing", file,
+                      "other pictures of this frame are there");
+      }
     }
   }
 }

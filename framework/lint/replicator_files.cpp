@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 
+#include "framework/lint/object_checks.h"
+
 namespace diorama::lint {
 namespace {
 
@@ -73,49 +75,50 @@ std::string ReplicatorFiles::path(const std::string& product, const std::string&
   return found == paths_.end() ? std::string() : found->second;
 }
 
-Vec3 ReplicatorCamera::in_camera(const Vec3& world) const {
-  return (world.homogeneous().transpose() * view).head<3>().transpose();
+namespace {
+
+/// Sixteen numbers for row vectors, as a matrix for column vectors.
+Mat4 column_matrix(const Json& list) {
+  Mat4 matrix;
+  for (int i = 0; i < 16; ++i) matrix(i % 4, i / 4) = list.at(std::size_t(i)).get<double>();
+  return matrix;
 }
 
-std::optional<Vec2> ReplicatorCamera::pixel(const Vec3& world) const {
-  const Eigen::RowVector4d clip = world.homogeneous().transpose() * view * projection;
-  if (clip[3] <= 1e-9) return std::nullopt;
-  return Vec2((clip[0] / clip[3] + 1.0) * 0.5 * width, (1.0 - clip[1] / clip[3]) * 0.5 * height);
+void read_distortion(const Json& params, Lens& lens) {
+  const std::string model = params.at("cameraModel").get<std::string>();
+  const auto polynomial = params.at("cameraFisheyePolynomial").get<std::vector<double>>();
+  if (model == "pinholeOpenCV") {
+    const auto tangential = params.at("cameraFisheyeLensP").get<std::vector<double>>();
+    lens.model = Lens::Model::Opencv;
+    lens.distortion = {polynomial.at(0), polynomial.at(1), tangential.at(0), tangential.at(1),
+                       polynomial.at(2), polynomial.at(3), polynomial.at(4), polynomial.at(5)};
+  } else if (model == "fisheyePolynomial") {
+    lens.model = Lens::Model::Fisheye;
+    std::copy_n(polynomial.begin(), std::min(polynomial.size(), lens.polynomial.size()),
+                lens.polynomial.begin());
+    lens.max_angle = params.at("cameraFisheyeMaxFOV").get<double>() * kPi / 360.0;
+  } else if (model != "pinhole") {
+    throw std::runtime_error("unknown cameraModel '" + model + "'");
+  }
 }
 
-Vec3 ReplicatorCamera::direction(int x, int y) const {
-  const double ndc_x = (x + 0.5) / (0.5 * width) - 1.0;
-  const double ndc_y = 1.0 - (y + 0.5) / (0.5 * height);
-  // clip.x = p00 x + p20 z with z = -w.
-  return {(ndc_x + projection(2, 0)) / projection(0, 0),
-          (ndc_y + projection(2, 1)) / projection(1, 1), -1.0};
-}
+}  // namespace
 
-ReplicatorCamera camera_of(const Json& camera_params) {
+ReplicatorCamera camera_of(const Json& params) {
   ReplicatorCamera camera;
-  for (int i = 0; i < 16; ++i) {
-    const auto k = std::size_t(i);
-    camera.view(i / 4, i % 4) = camera_params.at("cameraViewTransform").at(k).get<double>();
-    camera.projection(i / 4, i % 4) = camera_params.at("cameraProjection").at(k).get<double>();
-  }
-  camera.width = camera_params.at("renderProductResolution").at(0).get<int>();
-  camera.height = camera_params.at("renderProductResolution").at(1).get<int>();
-  camera.is_pinhole = camera_params.at("cameraModel").get<std::string>() == "pinhole";
+  Affine camera_from_world;
+  camera_from_world.matrix() = column_matrix(params.at("cameraViewTransform"));
+  camera.camera_from_world = flipped_axes() * camera_from_world;
+  const Mat4 clip_from_camera = column_matrix(params.at("cameraProjection"));
+  Lens& lens = camera.lens;
+  lens.width = params.at("renderProductResolution").at(0).get<int>();
+  lens.height = params.at("renderProductResolution").at(1).get<int>();
+  const Vec2 half(0.5 * lens.width, 0.5 * lens.height);
+  lens.focal = {half.x() * clip_from_camera(0, 0), half.y() * clip_from_camera(1, 1)};
+  lens.centre = {half.x() * (1.0 - clip_from_camera(0, 2)),
+                 half.y() * (1.0 + clip_from_camera(1, 2))};
+  read_distortion(params, lens);
   return camera;
-}
-
-std::optional<Eigen::AlignedBox2d> projected_box(const ReplicatorCamera& camera,
-                                                 const Mat4& world_from_local_row,
-                                                 const Aabb& box) {
-  Eigen::AlignedBox2d result;
-  for (int i = 0; i < 8; ++i) {
-    const Vec3 world =
-        (box.corner(i).homogeneous().transpose() * world_from_local_row).head<3>().transpose();
-    const auto pixel = camera.pixel(world);
-    if (!pixel) return std::nullopt;
-    result.extend(*pixel);
-  }
-  return result;
 }
 
 }  // namespace diorama::lint

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "framework/lint/dataset_files.h"
+#include "framework/lint/lens.h"
 
 namespace diorama::lint {
 
@@ -30,26 +31,13 @@ class ReplicatorFiles {
   std::map<std::string, std::string> paths_;
 };
 
-/// A camera as camera_params_NNNN.json and PoseWriter files describe it.
+/// A camera as camera_params_NNNN.json describes it.
 struct ReplicatorCamera {
-  Mat4 view = Mat4::Identity();  ///< Row vectors.
-  Mat4 projection = Mat4::Identity();
-  int width = 0;
-  int height = 0;
-  bool is_pinhole = true;  ///< Else the matrices do not tell the pixel.
-
-  Vec3 in_camera(const Vec3& world) const;
-  /// Nothing for points behind the camera.
-  std::optional<Vec2> pixel(const Vec3& world) const;
-  /// Camera-space direction of a pixel centre with z = -1.
-  Vec3 direction(int x, int y) const;
+  Affine camera_from_world = Affine::Identity();  ///< In the axes of lens.h.
+  Lens lens;
 };
 
 /// Throws when keys are missing.
 ReplicatorCamera camera_of(const Json& camera_params);
-
-/// Box of the projected corners; nothing when one of them lies behind the camera.
-std::optional<Eigen::AlignedBox2d> projected_box(const ReplicatorCamera& camera,
-                                                 const Mat4& world_from_local_row, const Aabb& box);
 
 }  // namespace diorama::lint

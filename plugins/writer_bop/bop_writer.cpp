@@ -6,6 +6,7 @@
 #include <set>
 
 #include "writer_support/image_files.h"
+#include "writer_support/lens_json.h"
 #include "writer_support/replicator.h"
 
 namespace diorama {
@@ -26,20 +27,25 @@ Json intrinsics_json(const Camera& camera) {
 
 Json camera_json(const Frame& frame, double depth_scale) {
   const Affine camera_from_world = bop_from_camera() * frame.world_from_camera.inverse();
-  return {{"cam_K", intrinsics_json(frame.camera)},
-          {"depth_scale", depth_scale},
-          {"cam_R_w2c", flat_list(camera_from_world.linear())},
-          {"cam_t_w2c", flat_list((kMillimetres * camera_from_world.translation()).transpose())}};
+  Json json{{"cam_K", intrinsics_json(frame.camera)},
+            {"depth_scale", depth_scale},
+            {"cam_R_w2c", flat_list(camera_from_world.linear())},
+            {"cam_t_w2c", flat_list((kMillimetres * camera_from_world.translation()).transpose())}};
+  if (frame.camera.lens != LensModel::Pinhole) json["lens"] = lens_json(frame.camera);
+  return json;
 }
 
 Json pose_json(const Frame& frame, const TrainingObject& object) {
   const Affine camera_from_model =
       bop_from_camera() * frame.world_from_camera.inverse() * object.instance->world_from_node;
   const Transform parts = Transform::from_affine(camera_from_model);
+  const Aabb& bounds = object.instance->bounds_node;
   return {{"cam_R_m2c", flat_list(parts.rotation.toRotationMatrix())},
           {"cam_t_m2c", flat_list((kMillimetres * parts.translation).transpose())},
           {"obj_id", object.class_index + 1},
           {"scale", flat_list(parts.scale.transpose())},
+          {"bounds_min", flat_list((kMillimetres * bounds.min).transpose())},
+          {"bounds_max", flat_list((kMillimetres * bounds.max).transpose())},
           {"node", object.instance->node_path}};
 }
 
@@ -56,10 +62,14 @@ Json info_json(const TrainingObject& object, std::int64_t valid_pixels) {
 }
 
 Json model_json(const Aabb& box) {
-  const Vec3 lo = kMillimetres * box.min;
-  const Vec3 size = kMillimetres * box.size();
+  const Vec3 lo = box.min;
+  const Vec3 size = box.size();
   return {{"diameter", size.norm()}, {"min_x", lo.x()},    {"min_y", lo.y()},   {"min_z", lo.z()},
           {"size_x", size.x()},      {"size_y", size.y()}, {"size_z", size.z()}};
+}
+
+Vec3 vec3_of(const Json& list) {
+  return {list.at(0).get<double>(), list.at(1).get<double>(), list.at(2).get<double>()};
 }
 
 Image<std::uint32_t> depth_picture(const Image<float>& depth, double scale) {
@@ -140,7 +150,6 @@ Json BopWriter::write_frame(const Capture& capture, std::size_t camera, CaptureF
 
   Json poses = Json::array();
   Json infos = Json::array();
-  Json models = Json::object();
   for (const TrainingObject& object : training_.objects(frame)) {
     const Instance& instance = *object.instance;
     if (!instance.visibility || !instance.visibility->amodal_box) continue;
@@ -154,15 +163,13 @@ Json BopWriter::write_frame(const Capture& capture, std::size_t camera, CaptureF
     add_masks(frame, instance, scene, stem + "_" + padded(int(poses.size()), 6) + ".png", files);
     poses.push_back(pose_json(frame, object));
     infos.push_back(info_json(object, valid));
-    models[std::to_string(object.class_index + 1)] = model_json(instance.bounds_node);
   }
   return {{"scene", scene},
           {"width", frame.camera.width},
           {"height", frame.camera.height},
           {"camera", camera_json(frame, params_.depth_scale)},
           {"gt", std::move(poses)},
-          {"info", std::move(infos)},
-          {"models", std::move(models)}};
+          {"info", std::move(infos)}};
 }
 
 void BopWriter::write(const Capture& capture, CaptureFiles& files) const {
@@ -175,7 +182,7 @@ void BopWriter::write(const Capture& capture, CaptureFiles& files) const {
 
 void BopWriter::finish(const RecordReader& records, DatasetFiles& files) {
   std::map<std::string, std::map<std::string, Json>> scene_files;  // scene -> file -> content
-  std::map<int, Json> models;
+  std::map<int, Aabb> models;
   Json targets = Json::array();
   Json first_camera;
   records([&](int capture, std::string_view line) {
@@ -186,8 +193,10 @@ void BopWriter::finish(const RecordReader& records, DatasetFiles& files) {
       content["scene_camera"][id] = frame.at("camera");
       content["scene_gt"][id] = frame.at("gt");
       content["scene_gt_info"][id] = frame.at("info");
-      for (const auto& [object, model] : frame.at("models").items()) {
-        models.emplace(std::stoi(object), model);
+      for (const Json& pose : frame.at("gt")) {
+        for (const char* bound : {"bounds_min", "bounds_max"}) {
+          models[pose.at("obj_id")].add(vec3_of(pose.at(bound)));
+        }
       }
       if (first_camera.is_null()) first_camera = frame;
       if (!scene.starts_with("test/")) continue;
@@ -207,7 +216,7 @@ void BopWriter::finish(const RecordReader& records, DatasetFiles& files) {
     }
   }
   Json infos = Json::object();
-  for (auto& [object, model] : models) infos[std::to_string(object)] = std::move(model);
+  for (const auto& [object, box] : models) infos[std::to_string(object)] = model_json(box);
   files.add_text("models/models_info.json", python_json(infos, 2) + "\n");
   files.add_text("test_targets_bop19.json", python_json(targets, 2) + "\n");
   if (first_camera.is_null()) return;

@@ -20,7 +20,9 @@ namespace diorama {
 /// Millimetres; camera axes x right, y down, z forward; rotations row by row. Poses map the model's
 /// own space; where an object is scaled, `scale` holds the factors, to be applied first. Depth is
 /// 16 bit in units of depth_scale millimetres, 0: nothing or out of range. obj_id counts classes
-/// from 1.
+/// from 1; a class's entry in models_info holds the boxes of all its instances, whose own ones are
+/// `bounds_min` and `bounds_max` in scene_gt. Lenses other than pinholes stand under `lens` in
+/// scene_camera.
 class BopWriter final : public Writer {
  public:
   struct Params {

@@ -5,6 +5,7 @@
 
 #include "writer_support/cuboid.h"
 #include "writer_support/image_files.h"
+#include "writer_support/lens_json.h"
 #include "writer_support/run_length.h"
 
 namespace diorama {
@@ -47,6 +48,7 @@ Json image_json(const Capture& capture, const Frame& frame, int id, const std::s
           {"capture", capture.index},
           {"camera", frame.camera_name},
           {"intrinsics", {camera.fx, camera.fy, camera.cx, camera.cy}},
+          {"lens", lens_json(camera)},
           {"world_from_camera", nested_list(frame.world_from_camera.matrix())}};
 }
 

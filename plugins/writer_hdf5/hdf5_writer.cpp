@@ -6,6 +6,7 @@
 #include <mutex>
 
 #include "writer_hdf5/hdf5_file.h"
+#include "writer_support/lens_json.h"
 
 namespace diorama {
 namespace {
@@ -61,7 +62,9 @@ Json attributes_json(const std::vector<TrainingObject>& objects,
                     {"name", instance.node_path},
                     {"category_id", objects[i].class_index + 1},
                     {"class", classes[std::size_t(objects[i].class_index)]},
-                    {"world_from_node", nested_list(instance.world_from_node.matrix())}});
+                    {"world_from_node", nested_list(instance.world_from_node.matrix())},
+                    {"bounds_min", flat_list(instance.bounds_node.min.transpose())},
+                    {"bounds_max", flat_list(instance.bounds_node.max.transpose())}});
   }
   return list;
 }
@@ -119,6 +122,7 @@ std::vector<std::byte> Hdf5Writer::frame_file(const Frame& frame) const {
   file.add("category_id_segmaps", std::array{h, w}, segmentation.categories.data());
   file.add("cam_K", std::array{std::size_t(3), std::size_t(3)}, intrinsics.data());
   file.add("world_from_camera", std::array{std::size_t(4), std::size_t(4)}, rows.data());
+  file.add_text("lens", python_json(lens_json(camera)));
   file.add_text("instance_attribute_maps",
                 python_json(attributes_json(objects, training_.classes())));
   return file.bytes();

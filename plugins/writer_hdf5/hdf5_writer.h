@@ -15,8 +15,8 @@ namespace diorama {
 /// colors (h, w, 3) uint8; depth (h, w) float32, metres along the viewing axis, infinity: nothing;
 /// normals (h, w, 3) float32, world space, (n + 1) / 2; instance_segmaps (h, w) uint16, the
 /// object's place in instance_attribute_maps (JSON text) + 1; category_id_segmaps (h, w) uint16,
-/// class index
-/// + 1; cam_K (3, 3), world_from_camera (4, 4) float64. 0 is background in both segmentations.
+/// class index + 1; cam_K (3, 3), world_from_camera (4, 4) float64; lens: JSON text, see
+/// lens_json(). 0 is background in both segmentations.
 class Hdf5Writer final : public Writer {
  public:
   struct Params {

@@ -7,6 +7,7 @@
 #include <cstdio>
 
 #include "writer_support/image_files.h"
+#include "writer_support/lens_json.h"
 #include "writer_support/replicator.h"
 
 namespace diorama {
@@ -77,6 +78,9 @@ std::string calibration(const Camera& camera) {
                 camera.cx, camera.fy, camera.cy);
   std::string text;
   for (int i = 0; i < 4; ++i) text += "P" + std::to_string(i) + ": " + p.data();
+  if (camera.lens != LensModel::Pinhole) {
+    text += "lens_2: " + python_json(lens_json(camera)) + "\n";
+  }
   return text +
          "R0_rect: 1 0 0 0 1 0 0 0 1\n"
          "Tr_velo_to_cam: 1 0 0 0 0 1 0 0 0 0 1 0\n"
@@ -129,6 +133,7 @@ void KittiWriter::begin(const DatasetInfo& dataset, DatasetFiles& files) {
   training_.add_dataset_page(
       "KITTI",
       {{"camera_axes", "x right, y down, z forward"},
+       {"rotations", "rotation_y about the camera's y axis, radians; there are no quaternions"},
        {"dimensions", "height, width, length in metres; length along the object's x axis"},
        {"location", "middle of the bottom face in the camera's space"},
        {"number", "capture x cameras + camera"},

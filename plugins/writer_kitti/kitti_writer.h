@@ -18,7 +18,8 @@ namespace diorama {
 /// Cameras take turns: number = capture x cameras + camera. Boxes are upright in the camera's own
 /// space (x right, y down, z forward): turned about y by the object's heading and wide enough to
 /// hold its box; `location` is the middle of the bottom face. Depth is 16 bit, metres x 256, 0
-/// where nothing is or beyond 255.99 m.
+/// where nothing is or beyond 255.99 m. KITTI's pictures are rectified: for another lens than a
+/// pinhole the calibration has a line of ours, `lens_2`, with JSON text.
 class KittiWriter final : public Writer {
  public:
   struct Params {

@@ -2,6 +2,7 @@
 #include "writer_pose/pose_json.h"
 
 #include "writer_support/camera_matrices.h"
+#include "writer_support/lens_json.h"
 
 namespace diorama {
 namespace {
@@ -46,6 +47,9 @@ Json camera_json(const Frame& frame, const PoseFormat& format) {
   json["intrinsics"] = intrinsics_json(camera, format.is_replicator);
   json["camera_view_matrix"] = rounded_rows(view_matrix(frame));
   json["camera_projection_matrix"] = rounded_rows(projection_matrix(camera));
+  if (camera.lens != LensModel::Pinhole && !format.is_replicator) {
+    json["lens"] = lens_json(camera);
+  }
   if (format.layout == PoseLayout::CenterPose) {
     json["width"] = camera.width;
     json["height"] = camera.height;

@@ -4,6 +4,7 @@
 #include <map>
 
 #include "writer_support/image_files.h"
+#include "writer_support/lens_json.h"
 #include "writer_support/npy.h"
 #include "writer_support/replicator.h"
 #include "writer_webdataset/tar_archive.h"
@@ -90,6 +91,7 @@ Json WebDatasetWriter::sample_json(const Capture& capture, const Frame& frame,
             {"width", camera.width},
             {"height", camera.height},
             {"intrinsics", {camera.fx, camera.fy, camera.cx, camera.cy}},
+            {"lens", lens_json(camera)},
             {"world_from_camera", nested_list(frame.world_from_camera.matrix())},
             {"objects", Json::array()}};
   for (const TrainingObject& object : objects) {

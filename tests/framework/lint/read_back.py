@@ -19,6 +19,10 @@ try:
     import yaml
 except ImportError:
     yaml = None
+try:
+    import h5py
+except ImportError:
+    h5py = None
 
 BOX_2D = np.dtype([("semanticId", "<u4"), ("x_min", "<i4"), ("y_min", "<i4"), ("x_max", "<i4"),
                    ("y_max", "<i4"), ("occlusionRatio", "<f4")])
@@ -88,13 +92,23 @@ def read_basic(folder, product, number, name, is_raw):
     equal(image.shape, (h, w, 4), "rgb")
     equal(str(image.dtype), "uint8", "rgb")
     assert (image[:, :, 3] == 255).all()
-    equal(rgba(path("normals", "normals", "png")).shape, (h, w, 4), "normals")
     ray = load_npy(path("distance_to_camera", "distance_to_camera", "npy"), "<f4", (h, w))
     plane = load_npy(path("distance_to_image_plane", "distance_to_image_plane", "npy"), "<f4",
                      (h, w))
-    equal(picture(path("distance_to_camera", "distance_to_camera", "png")).shape, (h, w), "gray")
     assert (ray >= plane).all() and np.isinf(ray).any() and np.isfinite(ray).any()
-    load_npy(path("motion_vectors", "motion_vectors", "npy"), "<f4", (h, w, 4))
+    motion = load_npy(path("motion_vectors", "motion_vectors", "npy"), "<f4", (h, w, 4))
+    # The sample moves (x / 4, -y / 2) pixels to the right and down; the format counts left and up.
+    hit = np.isfinite(ray)
+    ys, xs = np.nonzero(hit)
+    equal(motion[hit][:, :2], np.stack([-0.25 * xs, 0.5 * ys], axis=1), "motion")
+    assert not motion[~hit].any() and not motion[:, :, 2:].any()
+    gray = picture(path("distance_to_camera", "distance_to_camera", "png"))
+    equal(str(gray.dtype), "uint8", "gray")
+    assert (gray[~hit] == 0).all() and gray[hit].max() >= 253
+    normals = rgba(path("normals", "normals", "png"))
+    equal(normals[:, :, 3], np.where(hit, 255, 127), "alpha of normals")
+    lengths = np.linalg.norm((normals[hit][:, :3] + 0.5) / 127.5 - 1.0, axis=1)
+    assert (abs(lengths - 1.0) < 0.02).all(), lengths
 
     read = picture if is_raw else rgba
     instances = read(path("instance_segmentation", "instance_segmentation", "png"))
@@ -112,6 +126,23 @@ def read_basic(folder, product, number, name, is_raw):
             if (masks[node] & mask_of_key(semantic, other)).any():
                 equal(label, semantics[key], f"label of {node}")
 
+    leaves = read(path("instance_id_segmentation", "instance_id_segmentation", "png"))
+    leaf_paths = load_json(
+        path("instance_id_segmentation", "instance_id_segmentation_mapping", "json"))
+    # An instance's pixels are those of the meshes at or below its node.
+    for node, mask in masks.items():
+        if not node.startswith("/") or not mask.any():
+            continue
+        below = np.zeros((h, w), bool)
+        for key, leaf in leaf_paths.items():
+            if leaf == node or leaf.startswith(node + "/"):
+                below |= mask_of_key(leaves, key)
+        equal(below, mask, f"leaves below {node}")
+
+    loose = load_npy(path("bounding_box_2d_loose", "bounding_box_2d_loose", "npy"), BOX_2D)
+    loose_paths = load_json(
+        path("bounding_box_2d_loose", "bounding_box_2d_loose_prim_paths", "json"))
+    loose_of = dict(zip(loose_paths, loose))
     tight = load_npy(path("bounding_box_2d_tight", "bounding_box_2d_tight", "npy"), BOX_2D)
     paths = load_json(path("bounding_box_2d_tight", "bounding_box_2d_tight_prim_paths", "json"))
     names = load_json(path("bounding_box_2d_tight", "bounding_box_2d_tight_labels", "json"))
@@ -121,6 +152,10 @@ def read_basic(folder, product, number, name, is_raw):
         equal(box, extent(masks[node]), f"box of {node}")
         assert str(row["semanticId"]) in names
         assert 0.0 <= row["occlusionRatio"] <= 1.0
+        outer = loose_of[node]
+        assert outer["x_min"] <= row["x_min"] and outer["y_min"] <= row["y_min"]
+        assert outer["x_max"] >= row["x_max"] and outer["y_max"] >= row["y_max"]
+        equal(outer["occlusionRatio"], row["occlusionRatio"], f"occlusion of {node}")
     cuboids = load_npy(path("bounding_box_3d", "bounding_box_3d", "npy"), BOX_3D)
     camera = load_json(path("camera_params", "camera_params", "json"))
     equal(camera["renderProductResolution"], [w, h], "resolution")
@@ -139,13 +174,28 @@ def read_basic(folder, product, number, name, is_raw):
         x0, y0, x1, y1 = extent(masks[node])
         assert xs.min() <= x0 + 0.6 and xs.max() >= x1 - 0.6, f"{node}: {xs} {x0} {x1}"
         assert ys.min() <= y0 + 0.6 and ys.max() >= y1 - 0.6, f"{node}: {ys} {y0} {y1}"
-    load_npy(path("occlusion", "occlusion", "npy"), OCCLUSION)
+    occlusion = load_npy(path("occlusion", "occlusion", "npy"), OCCLUSION)
+    ratios = occlusion["occlusionRatio"]
+    assert (((ratios >= 0.0) & (ratios <= 1.0)) | (ratios == -1.0)).all(), ratios
+    for ratio in tight["occlusionRatio"]:
+        assert np.isclose(ratios, ratio).any(), f"{ratio} is not in {ratios}"
     points = load_npy(path("pointcloud", "pointcloud", "npy"), "<f4")
     count = len(points)
+    equal(points.shape, (count, 3), "points")
     load_npy(path("pointcloud", "pointcloud_rgb", "npy"), "|u1", (count, 4))
-    load_npy(path("pointcloud", "pointcloud_normals", "npy"), "<f4", (count, 4))
+    normals = load_npy(path("pointcloud", "pointcloud_normals", "npy"), "<f4", (count, 4))
+    assert np.allclose(np.linalg.norm(normals[:, :3], axis=1), 1.0, atol=1e-5)
     load_npy(path("pointcloud", "pointcloud_semantic", "npy"), "<u4", (count,))
     load_npy(path("pointcloud", "pointcloud_instance", "npy"), "<u4", (count,))
+    # Points are the labelled pixels at their distance.
+    camera_points = np.c_[points, np.ones(count)] @ np.array(
+        camera["cameraViewTransform"]).reshape(4, 4)
+    labelled = np.zeros((h, w), bool)
+    for node, mask in masks.items():
+        labelled |= mask if node.startswith("/") else False
+    equal(count, int(labelled.sum()), "points and labelled pixels")
+    distances = np.sort(np.linalg.norm(camera_points[:, :3], axis=1))
+    assert np.allclose(distances, np.sort(ray[labelled]), atol=1e-5)
 
 
 def check_basic(root):
@@ -158,14 +208,58 @@ def check_basic(root):
                 read_basic(f"{root}/{folder}", product, number, common, raw)
 
 
+def rotation_of(x, y, z, w):
+    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                     [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                     [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
+
+
+def check_corners(names, centre, rotation, size, corners):
+    """The names say the sides: L/R, D/U, B/F are min/max of x, y, z."""
+    for name, corner in zip(names, corners):
+        side = [0, 0, 0] if name == "Center" else [1 if a == b else -1 for a, b in zip(name, "RUF")]
+        expected = centre + rotation @ (np.array(side) * size / 2)
+        assert np.allclose(expected, corner, atol=0.02 * np.linalg.norm(size)), (name, corner)
+
+
 def check_pose(root):
-    files = sorted(glob.glob(f"{root}/pose/rp_*/*.json"))
-    equal(len(files), 6, "pose files")
+    for folder in ("pose", "pose_dope", "pose_centerpose"):
+        files = sorted(glob.glob(f"{root}/{folder}/rp_*/*.json"))
+        equal(len(files), 6, "pose files")
+        for path in files:
+            data = load_json(path, indent=2)
+            assert data["objects"], path
+            names = data["keypoint_order"]
+            equal(len(names), 9, path)
+            shape = picture(path[:-5] + ".png").shape
+            equal(picture(path[:-5] + "_overlay.png").shape, shape, path)
+            for item in data["objects"]:
+                assert 0.0 < item["visibility"] <= 1.0
+                pixels = item.get("projected_cuboid") or item["cuboid_keypoints_projected"]
+                assert all(isinstance(v, int) for pixel in pixels for v in pixel), path
+                if folder == "pose_dope":
+                    quaternion = item["quaternion_xyzw"]
+                elif folder == "pose_centerpose":
+                    quaternion = item["quaternion_xyzw"]
+                    points = np.array(item["keypoints_3d"])
+                    check_corners(names, points[0], rotation_of(*quaternion),
+                                  np.array(item["scale"]), points)
+                else:
+                    w, x, y, z = item["quat_wxyz_camera_frame"]
+                    quaternion = x, y, z, w
+                    points = np.array(item["cuboid_keypoints_camera_frame"])
+                    check_corners(names, points[0], rotation_of(x, y, z, w),
+                                  np.array(item["size"]), points)
+                assert abs(np.linalg.norm(quaternion) - 1.0) < 1e-6
+
+
+def check_boxes(root):
+    files = glob.glob(f"{root}/boxes/rp_*/*.png")
+    equal(len(files), 18, "three kinds of pictures of six frames")
     for path in files:
-        data = load_json(path, indent=2)
-        assert data["objects"], path
-        for suffix in (".png", "_overlay.png"):
-            picture(path[:-5] + suffix)
+        image = picture(path)
+        camera = "cam_0" if "rp_cam_0" in path else "cam_1"
+        equal(image.shape, SIZES[camera] + (4,), path)
 
 
 def decode(rle):
@@ -289,6 +383,91 @@ def check_bop(root):
                 equal(int((mask == 255).sum()), info["px_count_visib"], "visible pixels")
 
 
+def check_page(root):
+    for folder in ("coco", "yolo_detect", "kitti", "voc", "bop", "webdataset", "hdf5"):
+        page = load_json(f"{root}/{folder}/dataset.json", indent=2, newline="\n")
+        equal(page["seed"], 12, folder)
+        equal(page["job"], "seed: 12\n", folder)
+        equal(page["classes"], ["ball", "crate", "mug"], folder)
+        equal(sorted(sum(page["split"].values(), [])), [0, 1, 2], folder)
+        assert page["split"]["val"], folder
+        equal(page["plugins"], {"writer_basic": "1.0.0"}, folder)
+        equal(page["assets"][0]["files"][1], {"file": "/props/textures/mug.png", "sha256": "b" * 64},
+              folder)
+        for key in ("units", "world_axes", "camera_axes", "pixels", "boxes", "rotations", "depth"):
+            assert isinstance(page["conventions"][key], str), (folder, key)
+
+
+def check_hdf5(root):
+    files = glob.glob(f"{root}/hdf5/*/*.hdf5")
+    equal(len(files), 6, "files")
+    if not h5py:
+        print("python3-h5py is absent: contents of HDF5 files are left to the C++ tests")
+        return
+    for path in files:
+        h, w = SIZES[path[-10:-5]]
+        with h5py.File(path, "r") as file:
+            for name, shape, dtype in (("colors", (h, w, 3), "uint8"), ("depth", (h, w), "float32"),
+                                       ("normals", (h, w, 3), "float32"),
+                                       ("instance_segmaps", (h, w), "uint16"),
+                                       ("category_id_segmaps", (h, w), "uint16"),
+                                       ("cam_K", (3, 3), "float64"),
+                                       ("world_from_camera", (4, 4), "float64")):
+                equal(file[name].shape, shape, f"{path}: {name}")
+                equal(str(file[name].dtype), dtype, f"{path}: {name}")
+            objects = json.loads(file["instance_attribute_maps"][()])
+            equal(set(np.unique(file["instance_segmaps"])) - {0}, {o["idx"] for o in objects}, path)
+
+
+def check_across(root):
+    """The same frames in all formats: pictures, depth and boxes are the same."""
+    classes = ["ball", "crate", "mug"]
+    for capture in range(3):
+        for camera, (h, w) in SIZES.items():
+            stem = f"{capture:06d}_{camera}"
+            number = f"{2 * capture + int(camera[-1]):06d}"
+            basic = f"{root}/basic/rp_{camera}"
+            rgb = picture(f"{basic}/rgb/rgb_{capture:04d}.png")[:, :, :3]
+            depth = np.load(f"{basic}/distance_to_image_plane/"
+                            f"distance_to_image_plane_{capture:04d}.npy")
+            bop = glob.glob(f"{root}/bop/*/{int(camera[-1]):06d}/rgb/{capture:06d}.png")[0]
+            for path in (f"{root}/kitti/training/image_2/{number}.png", bop,
+                         glob.glob(f"{root}/coco/images/*/{stem}.png")[0],
+                         glob.glob(f"{root}/yolo_obb/images/*/{stem}.png")[0]):
+                equal(picture(path), rgb, path)
+            known = np.isfinite(depth)
+            for path, unit in ((bop.replace("/rgb/", "/depth/"), 1e-4),
+                               (f"{root}/kitti/training/depth_2/{number}.png", 1.0 / 256.0)):
+                found = picture(path) * unit
+                equal(found > 0, known, path)
+                assert (abs(found - depth)[known] <= 0.51 * unit).all(), path
+            with tarfile.open(f"{root}/webdataset/shards/{capture:06d}.tar") as archive:
+                equal(np.load(io.BytesIO(archive.extractfile(f"{stem}.depth.npy").read())), depth,
+                      stem)
+                sample = json.load(archive.extractfile(f"{stem}.json"))
+            boxes = sorted((o["class"], o["box"]) for o in sample["objects"])
+            assert boxes, stem
+
+            def yolo_box(line):
+                index, x, y, width, height = (float(word) for word in line.split())
+                corners = np.array([x - width / 2, y - height / 2, x + width / 2, y + height / 2])
+                return classes[int(index)], np.rint(corners * [w, h, w, h]).astype(int).tolist()
+
+            with open(glob.glob(f"{root}/yolo_detect/labels/*/{stem}.txt")[0],
+                      encoding="utf-8") as file:
+                found = sorted(map(yolo_box, file))
+            assert [list(f) for f in found] == [list(b) for b in boxes], (found, boxes)
+            with open(f"{root}/kitti/training/label_2/{number}.txt", encoding="utf-8") as file:
+                words = [line.split() for line in file]
+            found = sorted((v[0], [int(float(x)) for x in v[4:8]]) for v in words)
+            assert found == boxes, (found, boxes)
+            tree = ElementTree.parse(f"{root}/voc/Annotations/{stem}.xml").getroot()
+            voc = [(e.findtext("name"), [int(e.find("bndbox").findtext(k)) - (k[1:] == "min")
+                                         for k in ("xmin", "ymin", "xmax", "ymax")])
+                   for e in tree.iter("object")]
+            assert sorted(voc) == boxes, (voc, boxes)
+
+
 def check_webdataset(root):
     shards = glob.glob(f"{root}/webdataset/shards/*.tar")
     equal(len(shards), 3, "shards")
@@ -314,12 +493,11 @@ def main():
         if len(sys.argv) > 2:
             root = sys.argv[2]
         subprocess.run([sys.argv[1], root], check=True)
-        for check in (check_basic, check_pose, check_coco, check_yolo, check_kitti, check_voc,
-                      check_bop, check_webdataset):
+        for check in (check_basic, check_pose, check_boxes, check_page, check_coco, check_yolo,
+                      check_kitti, check_voc, check_bop, check_webdataset, check_hdf5,
+                      check_across):
             check(root)
             print(check.__name__, "ok")
-        for path in glob.glob(f"{root}/boxes/rp_*/*.png"):
-            assert picture(path).shape[2] == 4
 
 
 if __name__ == "__main__":

@@ -74,6 +74,8 @@ Capture capture_of(const Json& golden, LensModel lens) {
   frame.camera = Camera::from_lens(data.at("resolution").at(0), data.at("resolution").at(1),
                                    data.at("focal_length"), data.at("aperture").at(0));
   frame.camera.lens = lens;
+  // The file does not say it; it is the default of the reference's fisheye cameras.
+  frame.camera.fisheye_polynomial = {0.0, 0.00245, 0.0, 0.0, 0.0, 0.0};
   frame.world_from_camera = camera_pose(data.at("camera_view_matrix"));
   frame.set(kColor, Image<Rgba8>(frame.camera.width, frame.camera.height, Rgba8{}));
   for (const Json& object : golden.at("objects")) frame.instances.push_back(instance_of(object));
@@ -123,11 +125,13 @@ void compare_quaternion(const Json& actual, const Json& expected) {
 }  // namespace
 
 TEST_CASE("compat: replicator repeats the reference's files", "[writers][golden]") {
+  const auto [name, lens] = GENERATE(table<std::string, LensModel>(
+      {{"pinhole", LensModel::Pinhole}, {"fisheyePolynomial", LensModel::FisheyePolynomial}}));
   for (const std::string camera : {"rp1", "rp2"}) {
-    const auto golden = golden_json("pinhole", camera);
+    const auto golden = golden_json(name, camera);
     if (!golden) return;
     Json expected = *golden;
-    Json actual = written_json(capture_of(expected, LensModel::Pinhole), "replicator");
+    Json actual = written_json(capture_of(expected, lens), "replicator");
     // Not carried by our cameras, which have square pixels: the vertical aperture.
     actual["camera_data"]["aperture"][1] = expected["camera_data"]["aperture"][1];
     // Near and far planes of the reference differ per camera and show in these only.
@@ -139,14 +143,16 @@ TEST_CASE("compat: replicator repeats the reference's files", "[writers][golden]
         actual["objects"][i][key] = expected["objects"][i][key];
       }
     }
-    compare(actual, expected, camera);
+    compare(actual, expected, name + " " + camera);
   }
 }
 
 TEST_CASE("camera poses are right by default", "[writers][golden]") {
-  const auto golden = golden_json("pinhole", "rp1");
+  const auto [name, lens] = GENERATE(table<std::string, LensModel>(
+      {{"pinhole", LensModel::Pinhole}, {"fisheyePolynomial", LensModel::FisheyePolynomial}}));
+  const auto golden = golden_json(name, "rp1");
   if (!golden) return;
-  const Capture capture = capture_of(*golden, LensModel::Pinhole);
+  const Capture capture = capture_of(*golden, lens);
   const Json actual = written_json(capture, "none");
   const Json wrong = written_json(capture, "replicator");
   for (std::size_t i = 0; i < actual["objects"].size(); ++i) {

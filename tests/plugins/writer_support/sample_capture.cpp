@@ -90,10 +90,13 @@ struct PixelRay {
   double t_min;
 };
 
-PixelRay pixel_ray(const Frame& frame, int x, int y) {
-  const Vec3 direction = ray_direction(frame.camera, Vec2(x + 0.5, y + 0.5)).value();
-  return {frame.world_from_camera.translation(), frame.world_from_camera.linear() * direction,
-          frame.camera.near_m / -direction.z()};
+/// Nothing where the lens images nothing.
+std::optional<PixelRay> pixel_ray(const Frame& frame, int x, int y) {
+  const auto direction = ray_direction(frame.camera, Vec2(x + 0.5, y + 0.5));
+  if (!direction || direction->z() >= 0.0) return std::nullopt;
+  return PixelRay{frame.world_from_camera.translation(),
+                  frame.world_from_camera.linear() * *direction,
+                  frame.camera.near_m / -direction->z()};
 }
 
 /// False only when the ray passes well clear of the box.
@@ -126,7 +129,8 @@ CoverageMask cover(const Frame& frame, const std::vector<WorldMesh>& all,
   mask.box = {-camera.width / 2, -camera.height / 2, camera.width * 3 / 2, camera.height * 3 / 2};
   for (int y = mask.box.y_min; y < mask.box.y_max; ++y) {
     for (int x = mask.box.x_min; x < mask.box.x_max; ++x) {
-      mask.bits.push_back(trace(pixel_ray(frame, x, y), own).mesh != nullptr);
+      const auto ray = pixel_ray(frame, x, y);
+      mask.bits.push_back(ray && trace(*ray, own).mesh != nullptr);
     }
   }
   return mask;
@@ -200,9 +204,10 @@ Frame ray_cast(const Scene& scene, NodeId camera_node) {
   const std::vector<WorldMesh> meshes = world_meshes(scene);
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
-      const PixelRay ray = pixel_ray(frame, x, y);
-      const Hit hit = trace(ray, meshes);
+      const auto pixel = pixel_ray(frame, x, y);
+      const Hit hit = pixel ? trace(*pixel, meshes) : Hit();
       if (hit.mesh == nullptr) continue;
+      const PixelRay& ray = *pixel;
       const Vec3 normal = hit.normal.dot(ray.direction) > 0.0 ? Vec3(-hit.normal) : hit.normal;
       const Vec3 axis = -frame.world_from_camera.linear().col(2);
       leaves.at(x, y) = hit.mesh->node.index;
@@ -262,6 +267,10 @@ DatasetInfo sample_dataset(const SampleScene& sample) {
   dataset.resolved_job = "seed: 12\n";
   dataset.program_version = "0.1.0";
   dataset.plugin_versions = {{"writer_basic", "1.0.0"}};
+  dataset.assets = {{"/props/mug.usd",
+                     {{"/props/mug.usd", std::string(64, 'a')},
+                      {"/props/textures/mug.png", std::string(64, 'b')}}},
+                    {"shape:cube", {}}};
   return dataset;
 }
 

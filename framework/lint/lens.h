@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+
+#include "framework/lint/dataset_files.h"
+
+namespace diorama::lint {
+
+/// A camera's lens as datasets describe it, by formulas of lint's own. Camera axes here and in
+/// object_checks.h: x right, y down, z forward.
+struct Lens {
+  enum class Model { Pinhole, Opencv, Fisheye };
+
+  Model model = Model::Pinhole;
+  int width = 0;
+  int height = 0;
+  Vec2 focal = Vec2::Ones();           ///< Pixels.
+  Vec2 centre = Vec2::Zero();          ///< Pixels.
+  std::array<double, 8> distortion{};  ///< k1 k2 p1 p2 k3 k4 k5 k6.
+  std::array<double, 6> polynomial{};  ///< Angle by radius in pixels.
+  double max_angle = kPi;
+
+  /// Nothing for points that the lens does not image.
+  std::optional<Vec2> pixel(const Vec3& point_camera) const;
+  /// Direction of a pixel coordinate; z is 1 but for fisheyes, whose directions have length 1.
+  std::optional<Vec3> direction(const Vec2& pixel) const;
+};
+
+/// Reads the "lens" entry that our writers put beside intrinsics; a missing one is a pinhole.
+/// Throws when it is damaged.
+Lens lens_of(const Json& holder, int width, int height, const Mat3& intrinsics);
+
+/// fx, fy, cx, cy in a matrix.
+Mat3 intrinsics_matrix(double fx, double fy, double cx, double cy);
+
+}  // namespace diorama::lint

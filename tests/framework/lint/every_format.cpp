@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/lint/every_format.h"
+
+#include "writer_bop/bop_writer.h"
+#include "writer_coco/coco_writer.h"
+#include "writer_data_visualization/data_visualization_writer.h"
+#include "writer_hdf5/hdf5_writer.h"
+#include "writer_kitti/kitti_writer.h"
+#include "writer_pose/pose_writer.h"
+#include "writer_voc/voc_writer.h"
+#include "writer_webdataset/webdataset_writer.h"
+#include "writer_yolo/yolo_writer.h"
+
+namespace diorama::test {
+namespace {
+
+template <class W>
+SampleFormat format(std::string name, typename W::Params params = {}) {
+  const auto write = [params](Host& host, const DatasetInfo& dataset,
+                              const std::vector<const Capture*>& captures) {
+    W writer(params, host);
+    return write_dataset(writer, dataset, captures);
+  };
+  return {std::move(name), write};
+}
+
+Value look_of(const char* background, const char* color) {
+  Value look = Value::make_map();
+  look.set("background", Value::text(background));
+  look.set("fill", Value::text(color));
+  look.set("width", Value::integer(1));
+  return look;
+}
+
+BasicWriter::Params raw_ids() {
+  BasicWriter::Params params = everything();
+  params.use_common_output_dir = true;
+  params.colorize_semantic_segmentation = params.colorize_instance_segmentation = false;
+  params.colorize_instance_id_segmentation = false;
+  return params;
+}
+
+PoseWriter::Params pose(const char* layout) {
+  PoseWriter::Params params;
+  params.write_debug_images = params.use_subfolders = true;
+  params.format = layout;
+  return params;
+}
+
+DataVisualizationWriter::Params boxes() {
+  DataVisualizationWriter::Params params;
+  params.bounding_box_2d_tight = params.bounding_box_2d_loose = params.bounding_box_3d = true;
+  params.bounding_box_2d_tight_params = look_of("rgb", "#00ff0040");
+  params.bounding_box_3d_params = look_of("rgb", "red");
+  return params;
+}
+
+YoloWriter::Params yolo(const char* task) {
+  YoloWriter::Params params;
+  params.task = task;
+  return params;
+}
+
+}  // namespace
+
+BasicWriter::Params everything() {
+  BasicWriter::Params p;
+  p.rgb = p.bounding_box_2d_tight = p.bounding_box_2d_loose = p.semantic_segmentation = true;
+  p.instance_id_segmentation = p.instance_segmentation = p.distance_to_camera = true;
+  p.distance_to_image_plane = p.bounding_box_3d = p.occlusion = p.normals = true;
+  p.motion_vectors = p.camera_params = p.pointcloud = p.colorize_depth = true;
+  return p;
+}
+
+std::vector<SampleFormat> every_format() {
+  return {format<BasicWriter>("basic", everything()),
+          format<BasicWriter>("basic_raw", raw_ids()),
+          format<PoseWriter>("pose", pose("none")),
+          format<PoseWriter>("pose_dope", pose("dope")),
+          format<PoseWriter>("pose_centerpose", pose("centerpose")),
+          format<DataVisualizationWriter>("boxes", boxes()),
+          format<CocoWriter>("coco"),
+          format<YoloWriter>("yolo_detect", yolo("detect")),
+          format<YoloWriter>("yolo_segment", yolo("segment")),
+          format<YoloWriter>("yolo_pose", yolo("pose")),
+          format<YoloWriter>("yolo_obb", yolo("obb")),
+          format<KittiWriter>("kitti"),
+          format<VocWriter>("voc"),
+          format<BopWriter>("bop"),
+          format<WebDatasetWriter>("webdataset"),
+          format<Hdf5Writer>("hdf5")};
+}
+
+}  // namespace diorama::test

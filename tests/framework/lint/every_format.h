@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "plugins/writer_support/memory_files.h"
+#include "writer_basic/basic_writer.h"
+
+namespace diorama::test {
+
+/// BasicWriter with every annotator on.
+BasicWriter::Params everything();
+
+/// One way to write a dataset.
+struct SampleFormat {
+  std::string name;  ///< Of a folder.
+  std::function<MemoryFiles(Host&, const DatasetInfo&, const std::vector<const Capture*>&)> write;
+};
+
+/// Every writer, with the parameters that change what is in its files.
+std::vector<SampleFormat> every_format();
+
+}  // namespace diorama::test

@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: Apache-2.0
+// Seeded faults, each in every format to which it applies.
+#include <algorithm>
+#include <functional>
+#include <nlohmann/json.hpp>
+
+#include "diorama/error.h"
+#include "framework/lint/dataset_on_disk.h"
+#include "framework/lint/encoding_host.h"
+#include "framework/lint/every_format.h"
+#include "plugins/writer_support/sample_dataset.h"
+#include "support/catch.h"
+
+using namespace diorama;
+using test::DatasetOnDisk;
+using Json = nlohmann::ordered_json;
+
+namespace {
+
+Frame copy_of(const Frame& frame) {
+  Frame copy;
+  copy.camera_name = frame.camera_name;
+  copy.camera_path = frame.camera_path;
+  copy.camera = frame.camera;
+  copy.world_from_camera = frame.world_from_camera;
+  copy.instances = frame.instances;
+  copy.leaf_paths = frame.leaf_paths;
+  for (const std::string& name : frame.channels()) {
+    std::visit(
+        [&]<class Pixel>(const Image<Pixel>& image) { copy.set(Channel<Pixel>{name}, image); },
+        frame.image_named(name));
+  }
+  return copy;
+}
+
+Capture copy_of(const Capture& capture) {
+  Capture copy;
+  copy.index = capture.index;
+  copy.phase = capture.phase;
+  copy.environment = capture.environment;
+  for (const Frame& frame : capture.frames) copy.frames.push_back(copy_of(frame));
+  return copy;
+}
+
+/// One capture of the sample by its two cameras.
+const Capture& capture_through(LensModel lens) {
+  static std::map<LensModel, Capture> known;
+  if (const auto found = known.find(lens); found != known.end()) return found->second;
+  test::SampleScene sample(72, 48, 2);
+  for (const NodeId node : sample.cameras) {
+    Camera& camera = *sample.scene.edit(node).camera;
+    camera.lens = lens;
+    camera.distortion = {-0.1, 0.02, 0.001, -0.002, 0.01, 0.02, -0.01, 0.003};
+    camera.fisheye_polynomial = {0.0, 0.95 / camera.fx, 1e-5, 0.0, 0.0, 0.0};
+    camera.fisheye_max_angle_rad = 1.3;
+  }
+  return known.emplace(lens, test::ray_cast_capture(sample, 0)).first->second;
+}
+
+DatasetOnDisk write(const test::SampleFormat& format, const Capture& capture) {
+  test::EncodingHost host;
+  DatasetInfo dataset = test::sample_dataset(test::SampleScene(8, 6));
+  dataset.capture_count = 1;
+  return DatasetOnDisk(format.write(host, dataset, {&capture}));
+}
+
+test::SampleFormat format_named(const std::string& name) {
+  const auto formats = test::every_format();
+  return *std::ranges::find(formats, name, &test::SampleFormat::name);
+}
+
+/// A folder whose own page is damaged is no dataset any more, which is an error.
+bool is_found(const DatasetOnDisk& dataset) {
+  try {
+    return !dataset.lint().findings.empty();
+  } catch (const Error&) {
+    return true;
+  }
+}
+
+/// Writes the capture with one label changed, in one format after the other.
+void expect_found(const std::vector<std::string>& formats, const std::string& check,
+                  const std::function<void(Frame&)>& spoil) {
+  Capture spoilt = copy_of(capture_through(LensModel::Pinhole));
+  for (Frame& frame : spoilt.frames) spoil(frame);
+  for (const std::string& name : formats) {
+    INFO(name);
+    const LintReport report = write(format_named(name), spoilt).lint();
+    INFO(lint_text(report));
+    CHECK(std::ranges::count(report.findings, check, &LintFinding::check) > 0);
+  }
+}
+
+Instance& seen(Frame& frame, const std::string& path) {
+  return *std::ranges::find(frame.instances, path, &Instance::node_path);
+}
+
+/// Changes the first object of the first pose file.
+LintReport lint_with_pose(const std::string& format, const std::function<void(Json&)>& spoil) {
+  const auto dataset = write(format_named(format), capture_through(LensModel::Pinhole));
+  const std::string file = "rp_cam_0/000000.json";
+  Json json = Json::parse(dataset.read(file));
+  spoil(json.at("objects").at(0));
+  dataset.write(file, json.dump(2));
+  return dataset.lint();
+}
+
+bool has_finding(const LintReport& report, const std::string& check) {
+  return std::ranges::count(report.findings, check, &LintFinding::check) > 0;
+}
+
+}  // namespace
+
+TEST_CASE("what is seen through any lens is found good in every format", "[lint]") {
+  const LensModel lens =
+      GENERATE(LensModel::Pinhole, LensModel::OpencvPinhole, LensModel::FisheyePolynomial);
+  for (const test::SampleFormat& format : test::every_format()) {
+    const LintReport report = write(format, capture_through(lens)).lint();
+    INFO(int(lens) << " " << lint_text(report, 20));
+    CHECK(report.findings.empty());
+    CHECK(report.checks > (format.name == "boxes" ? 5 : 20));
+  }
+}
+
+TEST_CASE("any file that is missing or cut short is found", "[lint]") {
+  for (const test::SampleFormat& format : test::every_format()) {
+    const auto dataset = write(format, capture_through(LensModel::Pinhole));
+    std::vector<std::string> files;
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(dataset.folder())) {
+      if (entry.is_regular_file()) {
+        files.push_back(entry.path().lexically_relative(dataset.folder()).string());
+      }
+    }
+    for (const std::string& file : files) {
+      INFO(format.name << ": " << file);
+      const std::string content = dataset.read(file);
+      dataset.remove(file);
+      CHECK(is_found(dataset));
+      dataset.write(file, content.substr(0, content.size() / 2));
+      if (content.size() > 1) CHECK(is_found(dataset));
+      dataset.write(file, content);
+    }
+    CHECK_FALSE(is_found(dataset));
+  }
+}
+
+TEST_CASE("a box that is one pixel off its mask is found", "[lint]") {
+  expect_found({"basic", "basic_raw", "coco", "voc", "bop", "webdataset"}, "box = extent of mask",
+               [](Frame& frame) { seen(frame, "/Assets/crate").tight_box->x_min += 1; });
+}
+
+TEST_CASE("a box off its object is found where there are no masks", "[lint]") {
+  expect_found({"kitti", "yolo_pose", "coco"}, "pose and camera reproject onto the mask",
+               [](Frame& frame) {
+                 PixelBox& box = *seen(frame, "/Assets/crate").tight_box;
+                 box = {0, 0, box.width(), box.height()};
+               });
+  expect_found({"kitti"}, "depth back-projects", [](Frame& frame) {
+    PixelBox& box = *seen(frame, "/Assets/mug").tight_box;
+    box.x_min -= 3;
+  });
+  const auto yolo = write(format_named("yolo_detect"), capture_through(LensModel::Pinhole));
+  const std::string file = "labels/train/000000_cam_0.txt";
+  std::istringstream words(yolo.read(file));
+  std::string id, x, rest;
+  words >> id >> x;
+  std::getline(words, rest, '\0');
+  yolo.write(file, id + " " + std::to_string(std::stod(x) + 0.3 / 72.0) + rest);
+  CHECK(has_finding(yolo.lint(), "box = extent of mask"));
+}
+
+TEST_CASE("keypoints off their corners are found", "[lint]") {
+  for (const char* format : {"pose", "pose_centerpose"}) {
+    const LintReport report = lint_with_pose(format, [](Json& object) {
+      Json& pixels = object.contains("projected_cuboid") ? object["projected_cuboid"]
+                                                         : object["cuboid_keypoints_projected"];
+      pixels[3][0] = pixels[3][0].get<int>() + 2;
+    });
+    CHECK(has_finding(report, "keypoints project onto their pixels"));
+  }
+}
+
+TEST_CASE("swapped axes of a place are found", "[lint]") {
+  expect_found({"basic", "basic_raw", "bop", "kitti", "webdataset", "hdf5"},
+               "pose and camera reproject onto the mask", [](Frame& frame) {
+                 Affine& pose = seen(frame, "/Assets/ball").world_from_node;
+                 std::swap(pose.translation().x(), pose.translation().y());
+               });
+  expect_found({"basic", "basic_raw", "bop", "webdataset", "hdf5"}, "depth back-projects",
+               [](Frame& frame) {
+                 Affine& pose = seen(frame, "/Assets/crate").world_from_node;
+                 pose.linear().col(0).swap(pose.linear().col(1));
+               });
+  for (const char* format : {"pose", "pose_centerpose", "pose_dope"}) {
+    INFO(format);
+    const LintReport report = lint_with_pose(format, [](Json& object) {
+      const char* full[] = {"location_camera_frame", "location"};
+      Json& place = object.contains(full[0]) ? object[full[0]] : object[full[1]];
+      std::swap(place[1], place[2]);
+    });
+    CHECK(has_finding(report, "pose agrees with the keypoints"));
+  }
+}
+
+TEST_CASE("the wrong kind of depth is found in every format that has depth", "[lint]") {
+  expect_found({"basic", "basic_raw", "bop", "webdataset", "hdf5"}, "depth back-projects",
+               [](Frame& frame) {
+                 frame.set(kDistanceToImagePlane, Image<float>(frame.get(kDistanceToCamera)));
+               });
+}
+
+TEST_CASE("the wrong order of a quaternion is found in every format that has one", "[lint]") {
+  for (const char* format : {"pose", "pose_centerpose", "pose_dope"}) {
+    INFO(format);
+    const LintReport report = lint_with_pose(format, [](Json& object) {
+      Json& q = object.contains("quaternion_xyzw") ? object["quaternion_xyzw"]
+                                                   : object["quat_wxyz_camera_frame"];
+      q = Json{q[3], q[0], q[1], q[2]};
+    });
+    CHECK(has_finding(report, "pose agrees with the keypoints"));
+  }
+}
+
+TEST_CASE("bytes damaged anywhere in a container give findings or nothing, never a crash",
+          "[lint]") {
+  for (const std::string name : {"hdf5", "webdataset"}) {
+    const auto dataset = write(format_named(name), capture_through(LensModel::Pinhole));
+    const std::string file = name == "hdf5" ? "train/000000_cam_0.hdf5" : "shards/000000.tar";
+    const std::string content = dataset.read(file);
+    int found = 0;
+    // Headers and trees lie at the front.
+    for (std::size_t at = 0; at < content.size(); at += at < 3000 ? 7 : 211) {
+      std::string damaged = content;
+      damaged[at] = char(damaged[at] ^ 0xA5);
+      dataset.write(file, damaged);
+      if (!dataset.lint().findings.empty()) ++found;
+    }
+    CHECK(found > 50);
+  }
+}
