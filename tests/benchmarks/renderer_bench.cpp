@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Renders the bench scene and prints speed and error; see run_renderer.sh beside this file.
-#include <sys/resource.h>
-
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdio>
@@ -9,19 +7,14 @@
 #include <nlohmann/json.hpp>
 
 #include "bench_scene.h"
+#include "cpu_time.h"
 #include "embree_renderer.h"
 #include "support/render_host/render_host.h"
 
 namespace {
 
 using namespace diorama;
-
-double cpu_seconds() {
-  rusage usage;
-  getrusage(RUSAGE_SELF, &usage);
-  const auto seconds = [](const timeval& t) { return double(t.tv_sec) + 1e-6 * double(t.tv_usec); };
-  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
-}
+using bench::cpu_seconds;
 
 struct Error3 {
   double relative_mse = 0.0;

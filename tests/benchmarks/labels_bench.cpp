@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+// What labels and files cost beside a path-traced frame of the bench scene, in CPU seconds of one
+// run: the renderer's geometry channels, every annotator and coverage against the colour alone
+// (labels_per_color), and BasicWriter with every annotator in its encoding (files_per_color).
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "bench_scene.h"
+#include "cpu_time.h"
+#include "embree_renderer.h"
+#include "framework/annotators/instance_ids.h"
+#include "framework/annotators/instances.h"
+#include "framework/annotators/motion.h"
+#include "framework/annotators/object_coordinates.h"
+#include "framework/annotators/visibility.h"
+#include "support/render_host/render_host.h"
+#include "writer_basic/basic_writer.h"
+
+namespace {
+
+using namespace diorama;
+using bench::cpu_seconds;
+
+/// Median CPU seconds of each step.
+class Times {
+ public:
+  template <class Step>
+  auto measure(const std::string& name, Step&& step) {
+    const double start = cpu_seconds();
+    auto result = step();
+    times_[name].push_back(cpu_seconds() - start);
+    return result;
+  }
+  double median(const std::string& name) {
+    auto& list = times_.at(name);
+    std::sort(list.begin(), list.end());
+    return list[list.size() / 2];
+  }
+  nlohmann::ordered_json medians() {
+    nlohmann::ordered_json json;
+    for (const auto& [name, list] : times_) json[name + "_cpu_s"] = median(name);
+    return json;
+  }
+
+ private:
+  std::map<std::string, std::vector<double>> times_;
+};
+
+/// Counts bytes and forgets them.
+class ForgottenFiles final : public CaptureFiles {
+ public:
+  void add(std::string_view, std::vector<std::byte> bytes) override { size += bytes.size(); }
+  void record(std::string_view) override {}
+  std::size_t size = 0;
+};
+
+BasicWriter::Params all_annotators() {
+  BasicWriter::Params p;
+  p.rgb = p.bounding_box_2d_tight = p.bounding_box_2d_loose = p.semantic_segmentation = true;
+  p.instance_id_segmentation = p.instance_segmentation = p.distance_to_camera = true;
+  p.distance_to_image_plane = p.bounding_box_3d = p.occlusion = p.normals = true;
+  p.motion_vectors = p.camera_params = p.pointcloud = true;
+  return p;
+}
+
+/// Every mesh is an object of its own; every second one moves.
+BodyPoses label_everything(Scene& scene) {
+  int number = 0;
+  for (const NodeId node : scene.subtree(scene.root())) {
+    if (!scene[node].mesh) continue;
+    scene.edit(node).labels = {{"class", "object_" + std::to_string(number)}};
+    if (++number % 2 == 0) scene.edit(node).rigid_body = RigidBody{};
+  }
+  BodyPoses before = body_poses(scene);
+  for (auto& [node, pose] : before) pose.translation().z() += 0.01;
+  return before;
+}
+
+struct Options {
+  std::string folder;
+  int width = 640;
+  int height = 480;
+  int threads = 2;
+  int repetitions = 3;
+  EmbreeRenderer::Params params;
+};
+
+void annotate(const Scene& scene, const BodyPoses& before, EmbreeRenderer& renderer, NodeId camera,
+              Host& host, Frame& frame, Times& times) {
+  times.measure("instances", [&] {
+    InstanceIds({}, host).annotate(scene, frame);
+    Instances({}, host).annotate(scene, frame);
+    return 0;
+  });
+  const auto masks =
+      times.measure("cover", [&] { return renderer.cover(camera, labelled_instances(scene)); });
+  times.measure("other_annotators", [&] {
+    measure_visibility(masks, true, frame);
+    measure_motion(scene, before, frame);
+    ObjectCoordinates({}, host).annotate(scene, frame);
+    return 0;
+  });
+}
+
+void run(const Options& options) {
+  test::RenderHost host(options.threads);
+  Scene scene = bench::load_bench_scene(options.folder, host, false);
+  const NodeId camera =
+      bench::add_bench_camera(options.folder, scene, options.width, options.height);
+  const BodyPoses before = label_everything(scene);
+  EmbreeRenderer renderer(options.params, host);
+  renderer.prepare(scene);
+  const NameSet color{std::string(kColor.name), std::string(kColorHdr.name)};
+  NameSet geometry = renderer.provides();
+  for (const std::string& name : color) geometry.erase(name);
+
+  BasicWriter writer(all_annotators(), host);
+  DatasetInfo dataset;
+  dataset.capture_count = options.repetitions;
+  dataset.camera_names = {"camera"};
+  ForgottenFiles files;
+  writer.begin(dataset, files);
+  Times times;
+  for (int i = 0; i < options.repetitions; ++i) {
+    Frame picture = times.measure("color", [&] {
+      return renderer.render({camera, color, std::uint64_t(i)});
+    });
+    Capture capture;
+    capture.index = i;
+    capture.frames.push_back(times.measure("channels", [&] {
+      return renderer.render({camera, geometry, std::uint64_t(i)});
+    }));
+    Frame& frame = capture.frames.back();
+    annotate(scene, before, renderer, camera, host, frame, times);
+    frame.set(kColor, Image<Rgba8>(picture.get(kColor)));
+    frame.set(kColorHdr, Image<Vec3f>(picture.get(kColorHdr)));
+    times.measure("files", [&] {
+      writer.write(capture, files);
+      return 0;
+    });
+  }
+  nlohmann::ordered_json line = times.medians();
+  double labels = 0.0;
+  for (const char* part : {"channels", "instances", "cover", "other_annotators"}) {
+    labels += times.median(part);
+  }
+  line["size"] = std::to_string(options.width) + "x" + std::to_string(options.height);
+  line["samples"] = options.params.samples;
+  line["instances"] = labelled_instances(scene).size();
+  line["labels_per_color"] = labels / times.median("color");
+  line["files_per_color"] = times.median("files") / times.median("color");
+  line["mb_per_frame"] = 1e-6 * double(files.size) / options.repetitions;
+  std::printf("%s\n", line.dump(2).c_str());
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options options;
+  options.params.samples = 64;
+  options.params.max_bounces = 4;
+  options.params.denoise = false;
+  CLI::App app{"Prints what labels and files cost as shares of a path-traced frame's CPU time"};
+  app.add_option("folder", options.folder, "Holds scene.glb, scene.json, sky.hdr")->required();
+  app.add_option("--width", options.width);
+  app.add_option("--height", options.height);
+  app.add_option("--samples", options.params.samples);
+  app.add_option("--threads", options.threads);
+  app.add_option("--repetitions", options.repetitions);
+  CLI11_PARSE(app, argc, argv);
+  try {
+    run(options);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 1;
+  }
+}
