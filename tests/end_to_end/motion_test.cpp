@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <nlohmann/json.hpp>
+
+#include "framework/lint/dataset_files.h"
+#include "framework/lint/replicator_files.h"
+#include "program.h"
+#include "support/catch.h"
+
+using namespace diorama;
+using namespace diorama::test;
+using lint::Json;
+using lint::NpyArray;
+
+namespace {
+
+/// Everything in the air: turning, falling, and what floats.
+std::string job(int steps) {
+  return R"(
+seed: 11
+total_captures: 1
+environments: [{type: shapes, shapes: [cube]}]
+environment: {colliders: triangle_mesh}
+objects:
+  - {type: shapes, name: things, under: /Assets, count: 6, label_pattern: "^", gravity_disabled_chance: 0.3}
+lights: [{type: dome, name: sky}]
+cameras: [{type: pinhole, name: cam, count: 1, width: 96, height: 72}]
+randomizers:
+  - {type: scatter_poses, name: poses, on: [environment], nodes: "/Assets/*",
+     offset_min: [-0.6, -0.6, 1.0], offset_max: [0.6, 0.6, 1.6], scale: [0.1, 0.2]}
+  - {type: orbit_cameras, name: cameras, on: [environment], nodes: "/Cameras/*",
+     targets: "/Environment", distance: [3.0, 3.0], polar_angle_deg: [40, 40]}
+renderer: {type: "null"}
+timeline: [{simulate: )" +
+         std::to_string(steps) + R"(}, {capture: falling, count: 1}]
+writers:
+  - {type: BasicWriter, name: basic, instance_segmentation: true, colorize_instance_segmentation: false,
+     bounding_box_3d: true, camera_params: true, pointcloud: true, motion_vectors: true}
+output: {folder: out}
+)";
+}
+
+class Output {
+ public:
+  explicit Output(int steps) {
+    write_file(folder_ / "job.yaml", job(steps));
+    const Outcome outcome = run({"run", "job.yaml"}, folder_.path());
+    INFO(outcome.errors);
+    REQUIRE(outcome.exit_code == 0);
+  }
+  std::string file(const std::string& name) const {
+    return read_file(folder_ / "out/basic" / name);
+  }
+  NpyArray array(const std::string& name) const { return lint::parse_npy(file(name)); }
+  /// World from local, by path.
+  std::map<std::string, Affine> poses() const {
+    const NpyArray boxes = array("bounding_box_3d_0000.npy");
+    const Json paths = Json::parse(file("bounding_box_3d_prim_paths_0000.json"));
+    std::map<std::string, Affine> poses;
+    for (std::size_t row = 0; row < paths.size(); ++row) {
+      Affine pose;
+      for (std::size_t i = 0; i < 16; ++i) {
+        pose.matrix()(Eigen::Index(i % 4), Eigen::Index(i / 4)) =
+            boxes.value<float>(96 * row + 28 + 4 * i);
+      }
+      poses.emplace(paths[row].get<std::string>(), pose);
+    }
+    return poses;
+  }
+
+ private:
+  TemporaryFolder folder_;
+};
+
+}  // namespace
+
+TEST_CASE("motion vectors are what the last step moved", "[run]") {
+  const Output before(39);
+  const Output now(40);
+  const auto earlier_poses = before.poses();
+  const auto poses = now.poses();
+  const auto camera = lint::camera_of(Json::parse(now.file("camera_params_0000.json")));
+  const auto ids =
+      lint::parse_picture(now.file("instance_segmentation_0000.png"), "instance_segmentation");
+  const Json paths = Json::parse(now.file("instance_segmentation_mapping_0000.json"));
+  const NpyArray motion = now.array("motion_vectors_0000.npy");
+  const NpyArray points = now.array("pointcloud_0000.npy");
+  std::size_t point = 0;
+  int moving = 0;
+  double worst = 0.0;
+  for (int y = 0; y < ids.height; ++y) {
+    for (int x = 0; x < ids.width; ++x) {
+      const std::size_t at = 16 * std::size_t(y * ids.width + x);
+      const Vec2 found(-motion.value<float>(at), -motion.value<float>(at + 4));
+      const std::string path = paths.value(std::to_string(ids.at(x, y)), "");
+      if (!poses.contains(path)) {
+        worst = std::max(worst, found.norm());
+        continue;
+      }
+      Vec3 place;
+      for (std::size_t k = 0; k < 3; ++k) {
+        place[Eigen::Index(k)] = points.value<float>(12 * point + 4 * k);
+      }
+      ++point;
+      const Vec3 earlier = earlier_poses.at(path) * (poses.at(path).inverse() * place);
+      const Vec2 expected = *camera.lens.pixel(camera.camera_from_world * place) -
+                            *camera.lens.pixel(camera.camera_from_world * earlier);
+      if (expected.norm() > 0.5) ++moving;
+      worst = std::max(worst, (found - expected).norm());
+    }
+  }
+  CHECK(point == points.shape[0]);
+  CHECK(moving > 50);
+  CHECK(worst < 0.01);
+}
