@@ -11,7 +11,7 @@ cd "$(dirname "$0")"
 
 build_packages=(
   g++ cmake ninja-build pkg-config git
-  libboost-dev libboost-filesystem-dev libbullet-dev libembree-dev libeigen3-dev libassimp-dev
+  libboost-dev libboost-filesystem-dev libbullet-dev libfcl-dev libembree-dev libeigen3-dev libassimp-dev
   libyaml-cpp-dev libcli11-dev libspdlog-dev libfmt-dev nlohmann-json3-dev
   libhdf5-dev liblz4-dev libdeflate-dev libpng-dev libjpeg-dev libopenexr-dev libtbb-dev
 )

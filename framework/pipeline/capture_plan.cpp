@@ -56,6 +56,16 @@ void plan_group(const Job& job, std::size_t index, const std::vector<std::string
   }
 }
 
+/// Captures or events of that name in a visit that is not cut short.
+int moments_per_visit(const Job& job, const std::string& moment) {
+  int count = 0;
+  for (const TimelineStep& step : job.timeline) {
+    if (step.name != moment) continue;
+    count += step.kind == TimelineStep::Kind::Capture ? step.count : 1;
+  }
+  return count;
+}
+
 PlannedVisit plan_visit(const Job& job, int visit, int first_capture) {
   PlannedVisit planned;
   planned.index = visit;
@@ -105,6 +115,17 @@ std::vector<PlannedVisit> shard_of(const CapturePlan& plan, int shard, int shard
     if (visit.index % shards == shard) visits.push_back(visit);
   }
   return visits;
+}
+
+std::optional<RandomizerCall> randomizer_call(const Job& job, const RandomizerEntry& entry,
+                                              const std::string& moment, int visit, int number) {
+  if (std::find(entry.on.begin(), entry.on.end(), moment) == entry.on.end()) return std::nullopt;
+  if (moment == "environment") {
+    return RandomizerCall{visit - visit % entry.every, visit / entry.every};
+  }
+  if (number % entry.every != 0) return std::nullopt;
+  const int calls_per_visit = (moments_per_visit(job, moment) + entry.every - 1) / entry.every;
+  return RandomizerCall{visit, visit * calls_per_visit + number / entry.every};
 }
 
 std::string asset_stem(std::string_view asset) {

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -59,6 +60,19 @@ CapturePlan plan_captures(const Job& job, std::vector<EnvironmentChoice> environ
 
 /// The visits of one shard: those whose index leaves remainder `shard` when divided by `shards`.
 std::vector<PlannedVisit> shard_of(const CapturePlan& plan, int shard, int shards);
+
+/// How a randomizer is called at one moment.
+struct RandomizerCall {
+  int visit = 0;       ///< The visit whose random stream it draws from.
+  int occurrence = 0;  ///< RandomizeContext::occurrence.
+};
+
+/// Whether and how `entry` acts at the `number`th moment called `moment` (from 0) of a visit. Of
+/// captures and events it acts at every RandomizerEntry::every'th; what it did stays until then. A
+/// visit starts with a fresh scene, so at the moment "environment" it acts always, and repeats what
+/// it drew in the last visit that was its turn.
+std::optional<RandomizerCall> randomizer_call(const Job& job, const RandomizerEntry& entry,
+                                              const std::string& moment, int visit, int number);
 
 /// "banana" of "/a/011_banana.usd" and of "sample:banana".
 std::string asset_stem(std::string_view asset);

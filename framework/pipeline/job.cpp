@@ -22,13 +22,14 @@ constexpr const char* kColliderWords[] = {"none", "triangle_mesh", "convex_hull"
                                           "bounding_sphere"};
 constexpr const char* kEnvironmentColliderWords[] = {"none", "triangle_mesh", "convex_hull",
                                                      "bounding_box"};
+constexpr const char* kSettlePolicies[] = {"keep", "respawn", "drop"};
 constexpr const char* kLightWords[] = {"sphere", "rect", "disk", "distant", "dome"};
 constexpr const char* kCameraWords[] = {"pinhole", "opencv_pinhole", "fisheye_polynomial"};
 
 const std::vector<std::string> kSections{
-    "seed",        "assets_root", "debug",   "total_captures", "loaders",     "environments",
-    "environment", "objects",     "lights",  "cameras",        "randomizers", "physics",
-    "renderer",    "timeline",    "writers", "output"};
+    "seed",        "assets_root", "debug",    "total_captures", "loaders",     "environments",
+    "environment", "objects",     "lights",   "cameras",        "randomizers", "physics",
+    "renderer",    "timeline",    "settle",   "writers",        "output"};
 
 std::string item_path(std::string_view section, std::size_t index) {
   return std::string(section) + "[" + std::to_string(index) + "]";
@@ -434,9 +435,10 @@ void LightGroup::visit(ParamVisitor& v) {
   v.choice("type", type, kLightWords, {"Kind of light."});
   v.param("name", name, {"Nodes are /Lights/NAME_0 and so on. Default: the type."});
   v.param("count", count, {"How many lights.", "", 0, 1e4});
-  v.param("color", color, {"Linear RGB.", "", 0});
+  v.param("color", color, {"Linear red, green and blue.", "", 0});
   v.param("intensity", intensity,
-          {"Factor of the colour: radiance, or irradiance of a distant light.", "", 0});
+          {"Factor of the colour: luminance in nits, of a distant light illuminance in lux.", "",
+           0});
   v.param("radius_m", radius_m, {"Radius of sphere and disk.", "m", 0});
   v.param("width_m", width_m, {"Size of a rect along its x axis.", "m", 0});
   v.param("height_m", height_m, {"Size of a rect along its y axis.", "m", 0});
@@ -479,7 +481,10 @@ void RandomizerEntry::visit(ParamVisitor& v) {
   v.param("type", type, {"Type of the component."});
   v.param("name", name, {"Keys its random numbers. Default: the type."});
   v.param("on", on, {"Moments at which it acts: environment, capture series, events."});
-  v.param("every", every, {"Acts at every so many captures of a series only.", "", 1, 1e6});
+  v.param("every", every,
+          {"Draws anew at every so many visits, captures or events only; what it did stays until "
+           "then.",
+           "", 1, 1e6});
 }
 
 void WriterEntry::visit(ParamVisitor& v) {
@@ -487,6 +492,16 @@ void WriterEntry::visit(ParamVisitor& v) {
   v.param("name", name, {"Name of the writer. Default: the type."});
   v.param("output_dir", output_dir,
           {"Its folder, below output.folder unless absolute; null: the name."});
+}
+
+void SettleSection::visit(ParamVisitor& v) {
+  v.choice("policy", policy, kSettlePolicies,
+           {"What becomes of objects that are outside the room after a simulation. keep: they stay "
+            "there; respawn: the randomizers of the moment environment place them anew, and the "
+            "simulation is repeated; drop: they are taken out of the visit."});
+  v.param("max_respawns", max_respawns,
+          {"Repeats per simulation at most; what is outside then stays.", "", 1, 1000});
+  v.param("rest_speed", rest_speed, {"Slower than this is at rest.", "m/s", 0, 1e3});
 }
 
 void OutputSection::visit(ParamVisitor& v) {
@@ -543,6 +558,7 @@ Job read_job(const Value& value, Complaints& complaints) {
   read_randomizers(value, job, complaints);
   job.physics = read_engine(value, "physics", kDefaultPhysics, complaints);
   job.renderer = read_engine(value, "renderer", kDefaultRenderer, complaints);
+  read_section(value, "settle", job.settle, complaints);
   read_writers(value, job, complaints);
   read_section(value, "output", job.output, complaints);
   if (job.camera_names().empty() && job.total_captures > 0) {

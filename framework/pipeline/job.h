@@ -59,7 +59,7 @@ struct LightGroup {
   std::string name;
   int count = 1;
   Vec3 color{1.0, 1.0, 1.0};
-  double intensity = 1.0;
+  double intensity = 1000.0;
   double radius_m = 0.1;
   double width_m = 1.0;
   double height_m = 1.0;
@@ -102,7 +102,7 @@ struct RandomizerEntry {
   std::string type;
   std::string name;
   std::vector<std::string> on;  ///< "environment", capture series, events.
-  int every = 1;
+  int every = 1;  ///< See randomizer_call().
   void visit(ParamVisitor& v);
 };
 
@@ -122,6 +122,14 @@ struct TimelineStep {
   int steps = 0;     ///< Simulate.
   std::string name;  ///< Capture: the series. Event: the moment that randomizers are called at.
   int count = 0;     ///< Capture: captures of the series per visit.
+};
+
+/// What becomes of objects that are outside the environment's box after a simulation.
+struct SettleSection {
+  std::string policy = "keep";
+  int max_respawns = 3;
+  double rest_speed = 0.05;
+  void visit(ParamVisitor& v);
 };
 
 struct OutputSection {
@@ -145,6 +153,7 @@ struct Job {
   ComponentConfig physics;  ///< Type "none": nothing moves by itself.
   ComponentConfig renderer;
   std::vector<TimelineStep> timeline;
+  SettleSection settle;
   std::vector<WriterEntry> writers;
   OutputSection output;
 

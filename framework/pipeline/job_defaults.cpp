@@ -156,6 +156,7 @@ Value resolved_job(const Value& job, const DescribeComponent& describe) {
   result.set("renderer", component(section_or_empty(job, "renderer"), Kind::Renderer, engine,
                                    kDefaultRenderer, describe));
   result.set("timeline", timeline(job));
+  result.set("settle", with_defaults(section_or_empty(job, "settle"), specs_of<SettleSection>()));
   result.set("writers",
              components(job, "writers", Kind::Writer, specs_of<WriterEntry>(), describe));
   result.set("output", with_defaults(section_or_empty(job, "output"), specs_of<OutputSection>()));
@@ -182,6 +183,8 @@ std::vector<ParamSpec> job_specs() {
   specs.push_back(section("renderer", ParamType::Group, "The renderer.", engine));
   specs.push_back(section("timeline", ParamType::List, "What happens in a visit, in order.",
                           specs_of<detail::StepKeys>()));
+  specs.push_back(section("settle", ParamType::Group, "How objects come to rest.",
+                          specs_of<SettleSection>()));
   specs.push_back(section("writers", ParamType::List, "What is written.", specs_of<WriterEntry>()));
   specs.push_back(
       section("output", ParamType::Group, "Where it is written.", specs_of<OutputSection>()));

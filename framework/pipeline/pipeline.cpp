@@ -43,6 +43,10 @@ struct Pipeline::Visit {
   NodeId overview;             ///< Null unless this visit makes an overview picture.
   std::size_t next_capture = 0;
   std::map<std::string, int> events;
+  int simulations_to_come = 0;  ///< Steps of the timeline that let things move.
+  double simulated_s = 0.0;
+  double moving_until_s = 0.0;  ///< When something in the room was last seen moving.
+  VisitReport report;
 };
 
 namespace {
@@ -52,11 +56,6 @@ std::vector<Mat4> object_poses(const Scene& scene, const std::vector<NodeId>& ob
   poses.reserve(objects.size());
   for (const NodeId object : objects) poses.push_back(scene.world_from_node(object).matrix());
   return poses;
-}
-
-bool acts_at(const RandomizerEntry& entry, const std::string& moment, int number) {
-  return number % entry.every == 0 &&
-         std::find(entry.on.begin(), entry.on.end(), moment) != entry.on.end();
 }
 
 std::string duration_text(double seconds) {
@@ -130,15 +129,12 @@ void Pipeline::stop_if_asked() const {
 void Pipeline::run_visit(const PlannedVisit& planned) {
   Visit visit = set_up(planned);
   randomize(visit, "environment", 0, -1);
-  for (auto& physics : components_.physics) physics->reset(visit.scene);
+  reset_physics(visit);
   for (const TimelineStep& step : job_.timeline) {
-    if (visit.next_capture == planned.captures.size()) {
-      // What comes after the last capture is left out; then the objects may still be in the air.
-      if (step.kind == TimelineStep::Kind::Simulate) return;
-      continue;
-    }
+    if (visit.next_capture == planned.captures.size()) return;
     switch (step.kind) {
       case TimelineStep::Kind::Simulate:
+        --visit.simulations_to_come;
         simulate(visit, step.steps);
         break;
       case TimelineStep::Kind::Capture:
@@ -149,7 +145,6 @@ void Pipeline::run_visit(const PlannedVisit& planned) {
         break;
     }
   }
-  summary_.visits.push_back(report_on(visit));
 }
 
 Pipeline::Visit Pipeline::set_up(const PlannedVisit& planned) {
@@ -167,6 +162,10 @@ Pipeline::Visit Pipeline::set_up(const PlannedVisit& planned) {
   visit.objects = spawn_objects(plan_, job_, visit.scene, host_);
   create_lights(job_.lights, visit.scene, host_);
   visit.cameras = create_cameras(job_.cameras, visit.scene);
+  visit.simulations_to_come =
+      int(std::count_if(job_.timeline.begin(), job_.timeline.end(), [](const TimelineStep& step) {
+        return step.kind == TimelineStep::Kind::Simulate;
+      }));
   // The first visit of each environment shows it from above.
   if (job_.debug && std::size_t(planned.index) == planned.environment) {
     visit.overview = create_overview_camera(visit.working_area_world, visit.scene);
@@ -177,28 +176,62 @@ Pipeline::Visit Pipeline::set_up(const PlannedVisit& planned) {
 void Pipeline::randomize(Visit& visit, const std::string& moment, int number, int capture) {
   const Clock clock(summary_, "randomizing");
   const std::vector<Mat4> before = object_poses(visit.scene, visit.objects);
+  call_randomizers(visit, moment, number, capture, 0);
+  // The engine holds the bodies where it left them; where they were moved, it starts anew.
+  if (moment == "environment" || object_poses(visit.scene, visit.objects) == before) return;
+  reset_physics(visit);
+}
+
+/// `respawn`: 0 for the first draw, then another stream for each.
+void Pipeline::call_randomizers(Visit& visit, const std::string& moment, int number, int capture,
+                                int respawn) {
   RandomizeContext context;
   context.moment = moment;
   context.capture = capture;
   context.working_area_world = visit.working_area_world;
   for (std::size_t i = 0; i < job_.randomizers.size(); ++i) {
     const RandomizerEntry& entry = job_.randomizers[i];
-    if (!acts_at(entry, moment, number)) continue;
-    const Rng rng = streams_.randomizer(entry.name, visit.planned->index, moment,
-                                        capture >= 0 ? capture : number);
+    const auto call = randomizer_call(job_, entry, moment, visit.planned->index, number);
+    if (!call) continue;
+    context.occurrence = call->occurrence;
+    Rng rng = streams_.randomizer(entry.name, call->visit, moment, capture >= 0 ? capture : number);
+    if (respawn > 0) rng = rng.fork("respawn").fork(std::uint64_t(respawn));
     call_component("randomizer '" + entry.name + "'",
                    [&] { components_.randomizers[i]->randomize(visit.scene, context, rng); });
   }
-  // The engine holds the bodies where it left them; where they were moved, it starts anew.
-  if (moment == "environment" || object_poses(visit.scene, visit.objects) == before) return;
-  visit.before_last_step.clear();
-  for (auto& physics : components_.physics) physics->reset(visit.scene);
 }
 
+void Pipeline::reset_physics(Visit& visit) {
+  visit.before_last_step.clear();
+  for (auto& physics : components_.physics) {
+    call_component("physics '" + job_.physics.type + "'", [&] { physics->reset(visit.scene); });
+  }
+}
+
+/// Takes the steps, and deals with what is outside the room afterwards.
 void Pipeline::simulate(Visit& visit, int steps) {
+  advance(visit, steps);
+  if (job_.settle.policy == "keep") return;
+  const Room room(visit.scene, visit.environment);
+  const auto lost_objects = [&] {
+    std::vector<NodeId> lost = visit.objects;
+    std::erase_if(lost, [&](NodeId object) { return room.holds(visit.scene, object); });
+    return lost;
+  };
+  std::vector<NodeId> lost = lost_objects();
+  if (job_.settle.policy == "drop") return drop(visit, lost);
+  for (int i = 0; i < job_.settle.max_respawns && !lost.empty(); ++i) {
+    respawn(visit, lost, int(visit.report.respawned.size()) + 1);
+    advance(visit, steps);
+    lost = lost_objects();
+  }
+}
+
+void Pipeline::advance(Visit& visit, int steps) {
   const Clock clock(summary_, "simulating");
-  // Short enough that Ctrl-C is felt.
-  constexpr int kStepsAtOnce = 20;
+  const Room room(visit.scene, visit.environment);
+  // Short enough that Ctrl-C is felt, and that the time to rest is known well.
+  constexpr int kStepsAtOnce = 5;
   for (int left = steps; left > 0;) {
     stop_if_asked();
     // The last step goes by itself: what it moves is the motion that captures show.
@@ -207,9 +240,33 @@ void Pipeline::simulate(Visit& visit, int steps) {
     for (auto& physics : components_.physics) {
       call_component("physics '" + job_.physics.type + "'",
                      [&] { physics->advance(visit.scene, now); });
+      visit.simulated_s += now * physics->step_seconds();
+    }
+    if (fastest_falling(visit.scene, room, visit.objects) > job_.settle.rest_speed) {
+      visit.moving_until_s = visit.simulated_s;
     }
     left -= now;
   }
+}
+
+/// Places the lost objects as the moment "environment" may place them; all else stays as it is.
+void Pipeline::respawn(Visit& visit, const std::vector<NodeId>& lost, int number) {
+  const Clock clock(summary_, "randomizing");
+  for (const NodeId object : lost) visit.report.respawned.push_back(visit.scene.path(object));
+  const SavedNodes others(visit.scene, lost);
+  call_randomizers(visit, "environment", 0, -1, number);
+  others.restore(visit.scene);
+  reset_physics(visit);
+}
+
+void Pipeline::drop(Visit& visit, const std::vector<NodeId>& lost) {
+  if (lost.empty()) return;
+  for (const NodeId object : lost) {
+    visit.report.dropped.push_back(visit.scene.path(object));
+    visit.scene.erase(object);
+    std::erase(visit.objects, object);
+  }
+  reset_physics(visit);
 }
 
 void Pipeline::take_captures(Visit& visit, const TimelineStep& step) {
@@ -243,6 +300,12 @@ void Pipeline::take(Visit& visit, const PlannedCapture& planned) {
   }
   if (visit.overview && visit.next_capture == 1) {
     pending.overview = make_overview(visit, planned.index);
+  }
+  // A visit that is cut short ends with its objects in the air, which says nothing.
+  const bool is_last = visit.next_capture == visit.planned->captures.size();
+  if (is_last && visit.simulations_to_come == 0) {
+    summary_.visits.push_back(report_on(visit));
+    pending.settle_json = settle_json(summary_.visits.back());
   }
   {
     const Clock clock(summary_, "waiting for writers");
@@ -292,33 +355,24 @@ Image<Rgba8> Pipeline::make_overview(Visit& visit, int capture) {
 }
 
 VisitReport Pipeline::report_on(const Visit& visit) const {
-  VisitReport report;
+  VisitReport report = visit.report;
   report.visit = visit.planned->index;
+  report.environment = plan_.environments[visit.planned->environment].asset;
+  report.simulated_s = visit.simulated_s;
+  if (visit.moving_until_s < visit.simulated_s || visit.simulated_s == 0.0) {
+    report.rest_after_s = visit.moving_until_s;
+  }
   for (const auto& physics : components_.physics) {
     const PhysicsReport state = physics->report();
     report.max_penetration_m = state.max_penetration_m;
     report.deepest_body = state.deepest_body;
   }
-  Aabb room = visit.scene.world_bounds(visit.environment);
-  if (room.is_empty()) return report;
-  // Things lie on the outer face of the floor's slab at worst; a scene without a roof is open
-  // above.
-  constexpr double kMarginM = 0.01;
-  room.min.array() -= kMarginM;
-  room.max.array() += kMarginM;
-  room.max.z() = kInfinity;
+  const Room room(visit.scene, visit.environment);
+  report.max_speed = fastest_falling(visit.scene, room, visit.objects);
   for (const NodeId object : visit.objects) {
-    const Vec3 place = visit.scene.world_from_node(object).translation();
-    const bool is_inside =
-        (place.array() >= room.min.array()).all() && (place.array() <= room.max.array()).all();
     const auto& body = visit.scene[object].rigid_body;
-    const bool falls = body && body->has_gravity;
-    if (falls) ++report.falling_objects;
-    // What has left falls for ever and says nothing about the rest.
-    if (!is_inside) report.left_room.push_back(visit.scene.path(object));
-    if (is_inside && falls) {
-      report.max_speed = std::max(report.max_speed, body->linear_velocity.norm());
-    }
+    if (body && body->has_gravity) ++report.falling_objects;
+    if (!room.holds(visit.scene, object)) report.left_room.push_back(visit.scene.path(object));
   }
   return report;
 }
@@ -351,11 +405,16 @@ void Pipeline::write(const PendingCapture& pending) {
     call_component("writer '" + name + "'",
                    [&] { components_.writers[i]->write(pending.capture, files); });
   }
+  const std::string visit_name = std::to_string(pending.capture.visit) + "_" +
+                                 node_name(asset_stem(pending.capture.environment));
+  if (!pending.settle_json.empty()) {
+    const auto text = std::as_bytes(std::span(pending.settle_json));
+    transaction.files.push_back(
+        {kRecordsFolder, "settle/" + visit_name + ".json", {text.begin(), text.end()}});
+  }
   if (const auto& overview = pending.overview; overview.width() > 0) {
     const ImageView view{overview.pixels().data(), overview.width(), overview.height(), 4, 8};
-    transaction.files.push_back({kRecordsFolder,
-                                 "overview/" + std::to_string(pending.capture.visit) + "_" +
-                                     node_name(asset_stem(pending.capture.environment)) + ".png",
+    transaction.files.push_back({kRecordsFolder, "overview/" + visit_name + ".png",
                                  host_.encode_image(view, ImageFormat::Png)});
   }
   store_.commit_capture(pending.capture.index, transaction);
@@ -388,31 +447,8 @@ std::string summary_text(const RunSummary& summary) {
     text += (text.empty() ? "time: " : ", ") + phase + " " + duration_text(seconds);
   }
   if (!text.empty()) text += "\n";
-  int falling = 0;
-  int outside = 0;
-  const VisitReport* fastest = nullptr;
-  const VisitReport* deepest = nullptr;
-  for (const VisitReport& visit : summary.visits) {
-    falling += visit.falling_objects;
-    outside += int(visit.left_room.size());
-    if (!fastest || visit.max_speed > fastest->max_speed) fastest = &visit;
-    if (!deepest || visit.max_penetration_m > deepest->max_penetration_m) deepest = &visit;
-  }
-  char line[256];
-  if (fastest) {
-    std::snprintf(line, sizeof line,
-                  "objects: %d falling over all visits, %d left the room; residual speed at most "
-                  "%.4f m/s (visit %d), deepest penetration %.2f mm (visit %d",
-                  falling, outside, fastest->max_speed, fastest->visit + 1,
-                  deepest->max_penetration_m * 1000.0, deepest->visit + 1);
-    text += line;
-    text += (deepest->deepest_body.empty() ? "" : ", " + deepest->deepest_body) + ")\n";
-  }
-  for (const VisitReport& visit : summary.visits) {
-    for (const std::string& path : visit.left_room) {
-      text += "visit " + std::to_string(visit.visit + 1) + ": " + path + " left the room\n";
-    }
-  }
+  text += settle_text(summary.visits);
+  char line[64];
   std::snprintf(line, sizeof line, "%.1f MB written", double(summary.bytes_written) * 1e-6);
   text += line;
   text += " in " + duration_text(all) + "\n";

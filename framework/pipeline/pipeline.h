@@ -22,6 +22,7 @@
 #include "framework/pipeline/demand.h"
 #include "framework/pipeline/job.h"
 #include "framework/pipeline/output_store.h"
+#include "framework/pipeline/settling.h"
 #include "framework/pipeline/writer_queue.h"
 
 namespace diorama {
@@ -46,16 +47,6 @@ struct RunOptions {
   const std::atomic<bool>* stop = nullptr;  ///< True asks the run to end soon.
   /// Called on the main thread after each capture.
   std::function<void(int done, int total, int resumed)> progress;
-};
-
-/// How the objects of one visit ended.
-struct VisitReport {
-  int visit = 0;
-  int falling_objects = 0;
-  double max_speed = 0.0;          ///< m/s, of falling objects in the room, at the end.
-  double max_penetration_m = 0.0;  ///< At the end of the visit.
-  std::string deepest_body;
-  std::vector<std::string> left_room;  ///< Paths of objects outside the environment's box.
 };
 
 struct RunSummary {
@@ -94,7 +85,13 @@ class Pipeline {
   void run_visit(const PlannedVisit& planned);
   Visit set_up(const PlannedVisit& planned);
   void randomize(Visit& visit, const std::string& moment, int number, int capture);
+  void call_randomizers(Visit& visit, const std::string& moment, int number, int capture,
+                        int respawn);
   void simulate(Visit& visit, int steps);
+  void advance(Visit& visit, int steps);
+  void respawn(Visit& visit, const std::vector<NodeId>& lost, int number);
+  void drop(Visit& visit, const std::vector<NodeId>& lost);
+  void reset_physics(Visit& visit);
   void take_captures(Visit& visit, const TimelineStep& step);
   void take(Visit& visit, const PlannedCapture& planned);
   Frame make_frame(Visit& visit, std::size_t camera, int capture);

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <string>
 
 #include "diorama/frame.h"
 
@@ -13,6 +14,7 @@ namespace diorama {
 struct PendingCapture {
   Capture capture;
   Image<Rgba8> overview;  ///< Empty unless this capture carries the visit's overview picture.
+  std::string settle_json;  ///< Empty unless this capture is the visit's last.
 };
 
 /// Memory that a capture's pictures hold, from above.

@@ -404,17 +404,17 @@ class Translator {
   void add_randomizers(const CaptureBlock& capture) {
     Value list = native(R"([
       {type: scatter_poses, name: target_poses, on: [environment], nodes: "/Assets/*",
-       offset_min: [-0.5, -0.5, 1.0], offset_max: [0.5, 0.5, 1.5], scale: [0.95, 1.15]},
+       offset: [[-0.5, 0.5], [-0.5, 0.5], [1.0, 1.5]], scale: [0.95, 1.15]},
       {type: scatter_poses, name: mesh_distractor_poses, on: [environment],
        nodes: "/Distractors/Meshes/*",
-       offset_min: [-1.0, -1.0, 1.0], offset_max: [1.0, 1.0, 2.0], scale: [0.3, 1.0]},
+       offset: [[-1.0, 1.0], [-1.0, 1.0], [1.0, 2.0]], scale: [0.3, 1.0]},
       {type: scatter_poses, name: shape_distractor_poses, on: [environment],
        nodes: "/Distractors/Shapes/*",
-       offset_min: [-1.5, -1.5, 1.0], offset_max: [1.5, 1.5, 2.0], scale: [0.01, 0.1]},
+       offset: [[-1.5, 1.5], [-1.5, 1.5], [1.0, 2.0]], scale: [0.01, 0.1]},
       {type: scatter_lights, name: scene_lights, on: [environment],
        nodes: "/Lights/SphereLight_scene_*",
-       offset_min: [-2.0, -2.0, 1.0], offset_max: [2.0, 2.0, 3.0], intensity: [500, 2500],
-       color_min: [0.1, 0.1, 0.1], color_max: [0.9, 0.9, 0.9]},
+       offset: [[-2.0, 2.0], [-2.0, 2.0], [1.0, 3.0]], intensity: [500, 2500],
+       color: [[0.1, 0.9], [0.1, 0.9], [0.1, 0.9]]},
       {type: dome_light, name: dome_light, on: [environment], nodes: "/Lights/DomeLight_*",
        intensity: 1000},
       {type: random_colors, name: shape_distractor_colors, on: [environment],
@@ -429,7 +429,7 @@ class Translator {
         entry.set("textures", texts({std::begin(kSkies), std::end(kSkies)}));
       if (type != "orbit_cameras") continue;
       entry.set("distance", numbers(capture.distance.lo, capture.distance.hi));
-      entry.set("look_at_jitter", Value::number(capture.look_at_offset));
+      entry.set("look_at_offset", numbers(-capture.look_at_offset, capture.look_at_offset));
     }
     set("randomizers", std::move(list));
   }

@@ -4,17 +4,18 @@
 #include <string>
 #include <vector>
 
+#include "diorama/distribution.h"
 #include "diorama/host.h"
-#include "diorama/params.h"
 #include "diorama/randomizer.h"
 
 namespace diorama {
 
 class Obstacles;
+struct NodeDraws;
 
-/// Places each camera on a sphere round a random target (the centre of its box) and turns it to a
-/// point beside that centre. Distance and polar angle are those seen from the target itself, not
-/// from the point looked at. Without targets the working area takes their place.
+/// Places each camera (or light) on a sphere round a random target (the centre of its box) and turns
+/// it to a point beside that centre. Distance and polar angle are those seen from the target itself,
+/// not from the point looked at. Without targets the working area takes their place.
 ///
 /// A camera behind a wall sees nothing. With `avoid_obstacles` a view is drawn again, target
 /// included, while something stands between camera and target or close to the camera. When no draw
@@ -24,10 +25,10 @@ class OrbitCameras final : public Randomizer {
   struct Params {
     std::string nodes = "/Cameras/*";
     std::string targets = "/Assets/*";
-    Range distance{1.05, 1.25};
-    Range polar_angle_deg{0.0, 75.0};
-    Range azimuth_deg{0.0, 360.0};
-    double look_at_jitter = 0.1;
+    Distribution distance = Range{1.05, 1.25};
+    Distribution polar_angle_deg = Range{0.0, 75.0};
+    Distribution azimuth_deg = Range{0.0, 360.0};
+    Distribution look_at_offset = Range{-0.1, 0.1};
     std::string roll = "level";
     bool avoid_obstacles = true;
     std::string obstacles = "/Environment/**";
@@ -46,9 +47,9 @@ class OrbitCameras final : public Randomizer {
     Vec3 position;
     Vec3 look_at;
   };
-  View draw_view(const std::vector<Vec3>& targets, Rng rng) const;
+  View draw_view(const std::vector<Vec3>& targets, NodeDraws draws) const;
   View draw_free_view(const std::vector<Vec3>& targets, const Obstacles& obstacles,
-                      const Rng& rng) const;
+                      const NodeDraws& draws) const;
   Affine pose_of(const View& view) const;
 
   Params params_;

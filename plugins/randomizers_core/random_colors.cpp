@@ -22,23 +22,19 @@ std::shared_ptr<const Material> painted(const Node& node, const Vec3& color) {
 
 void RandomColors::Params::visit(ParamVisitor& v) {
   v.param("nodes", nodes, {"Nodes to paint; those without a mesh are passed over."});
-  v.param("color_min", color_min, {"Least red, green and blue, linear.", "", 0, 1});
-  v.param("color_max", color_max, {"Greatest red, green and blue, linear.", "", 0, 1});
+  declare(v, "color", color, {"Red, green and blue, linear.", "", 0, 1}, 3);
 }
 
-RandomColors::RandomColors(Params params, Host&) : params_(std::move(params)) {
-  check_corners(params_.color_min, params_.color_max, "color_min", "color_max");
-}
+RandomColors::RandomColors(Params params, Host&) : params_(std::move(params)) {}
 
-void RandomColors::randomize(Scene& scene, const RandomizeContext&, const Rng& rng) {
-  for (const NodeId id : scene.match(params_.nodes)) {
-    if (!scene[id].mesh) continue;
-    Rng draws = rng.fork(scene.path(id));
-    const Vec3 color = draw_between(params_.color_min, params_.color_max, draws);
-    const auto material = painted(scene[id], color);
-    auto& slots = scene.edit(id).materials;
+void RandomColors::randomize(Scene& scene, const RandomizeContext& context, const Rng& rng) {
+  const auto paint = [&](NodeId node, NodeDraws& draws) {
+    const auto material = painted(scene[node], draws.vector(params_.color));
+    auto& slots = scene.edit(node).materials;
     slots.assign(std::max<std::size_t>(1, slots.size()), material);
-  }
+  };
+  const auto has_mesh = [](const Node& node) { return node.mesh != nullptr; };
+  draw_for_each(scene, match_if(scene, params_.nodes, has_mesh), context, rng, paint);
 }
 
 }  // namespace diorama

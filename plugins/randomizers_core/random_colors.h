@@ -3,8 +3,8 @@
 
 #include <string>
 
+#include "diorama/distribution.h"
 #include "diorama/host.h"
-#include "diorama/params.h"
 #include "diorama/randomizer.h"
 
 namespace diorama {
@@ -15,8 +15,7 @@ class RandomColors final : public Randomizer {
  public:
   struct Params {
     std::string nodes = "/Distractors/**";
-    Vec3 color_min{0.0, 0.0, 0.0};
-    Vec3 color_max{1.0, 1.0, 1.0};
+    Distribution color = Distribution::between(Vec3::Zero(), Vec3::Ones());
 
     void visit(ParamVisitor& v);
   };

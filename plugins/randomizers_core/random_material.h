@@ -1,22 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <memory>
+#include <optional>
 #include <string>
+#include <vector>
 
+#include "diorama/distribution.h"
 #include "diorama/host.h"
-#include "diorama/params.h"
 #include "diorama/randomizer.h"
 
 namespace diorama {
 
-/// Draws roughness and metalness anew for every material of every mesh among the nodes; colours and
-/// other inputs stay, textures of the two go.
+/// Draws the materials of every mesh among the nodes anew: first, if `assets` are given, the whole
+/// material is one of theirs, then roughness and metalness are set where they are given. Other
+/// inputs stay; a texture of what was drawn goes.
 class RandomMaterial final : public Randomizer {
  public:
   struct Params {
     std::string nodes = "/Distractors/**";
-    Range roughness{0.1, 0.9};
-    Range metallic{0.0, 0.0};
+    TextDistribution assets;
+    std::optional<Distribution> roughness = Range{0.1, 0.9};
+    std::optional<Distribution> metallic;
 
     void visit(ParamVisitor& v);
   };
@@ -25,7 +30,11 @@ class RandomMaterial final : public Randomizer {
   void randomize(Scene& scene, const RandomizeContext& context, const Rng& rng) override;
 
  private:
+  std::shared_ptr<const Material> material_of(std::size_t asset);
+
   Params params_;
+  Host& host_;
+  std::vector<std::shared_ptr<const Material>> materials_;  ///< One per asset; null: not yet read.
 };
 
 }  // namespace diorama

@@ -3,8 +3,8 @@
 
 #include <string>
 
+#include "diorama/distribution.h"
 #include "diorama/host.h"
-#include "diorama/params.h"
 #include "diorama/randomizer.h"
 
 namespace diorama {
@@ -14,7 +14,7 @@ class RandomVisibility final : public Randomizer {
  public:
   struct Params {
     std::string nodes = "/Distractors/*/*";
-    double visible_chance = 0.5;
+    Distribution visible_chance = 0.5;
 
     void visit(ParamVisitor& v);
   };

@@ -1,23 +1,34 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "camera_lens.h"
+#include "camera_relative_pose.h"
 #include "diorama/plugin.h"
 #include "dome_light.h"
+#include "look_at.h"
 #include "orbit_cameras.h"
 #include "random_colors.h"
+#include "random_labels.h"
 #include "random_material.h"
+#include "random_texture.h"
 #include "random_visibility.h"
 #include "scatter_lights.h"
 #include "scatter_poses.h"
 
 DIORAMA_PLUGIN("randomizers_core", "0.1.0", "Apache-2.0") {
   DIORAMA_ADD(diorama::ScatterPoses, "scatter_poses",
-              "Places nodes at random in a box at the working area.");
+              "Places, turns and scales nodes at random near the working area.");
   DIORAMA_ADD(diorama::ScatterLights, "scatter_lights",
-              "Places lights at random in a box at the working area, in random colours.");
+              "Places lights at random near the working area, in random colours.");
   DIORAMA_ADD(diorama::DomeLight, "dome_light", "Picks and turns the sky of dome lights.");
   DIORAMA_ADD(diorama::RandomColors, "random_colors", "Gives every mesh a plain random colour.");
   DIORAMA_ADD(diorama::RandomMaterial, "random_material",
-              "Draws roughness and metalness of every mesh's materials.");
+              "Draws the materials of every mesh, or their roughness and metalness.");
+  DIORAMA_ADD(diorama::RandomTexture, "random_texture", "Puts a random picture on every mesh.");
+  DIORAMA_ADD(diorama::RandomLabels, "random_labels", "Draws, adds or clears the labels of nodes.");
   DIORAMA_ADD(diorama::RandomVisibility, "random_visibility", "Shows or hides nodes by chance.");
   DIORAMA_ADD(diorama::OrbitCameras, "orbit_cameras",
               "Places cameras round random targets and looks at them.");
+  DIORAMA_ADD(diorama::LookAt, "look_at", "Turns nodes towards random targets.");
+  DIORAMA_ADD(diorama::CameraRelativePose, "camera_relative_pose",
+              "Places nodes in a camera's picture, at a distance from it.");
+  DIORAMA_ADD(diorama::CameraLens, "camera_lens", "Draws focal length and focus of cameras.");
 }

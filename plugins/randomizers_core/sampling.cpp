@@ -1,32 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sampling.h"
 
-#include <sstream>
-
-#include "diorama/error.h"
-
 namespace diorama {
 
-Vec3 draw_between(const Vec3& min, const Vec3& max, Rng& rng) {
-  Vec3 value;
-  for (int axis = 0; axis < 3; ++axis) value[axis] = rng.uniform(min[axis], max[axis]);
-  return value;
-}
-
-double draw_in(const Range& range, Rng& rng) { return rng.uniform(range.lo, range.hi); }
-
-void check_corners(const Vec3& min, const Vec3& max, std::string_view min_key,
-                   std::string_view max_key) {
-  if ((min.array() <= max.array()).all()) return;
-  std::ostringstream text;
-  text << min_key << " must not exceed " << max_key << ": found [" << min.x() << ", " << min.y()
-       << ", " << min.z() << "] and [" << max.x() << ", " << max.y() << ", " << max.z() << "]";
-  throw Error(ErrorKind::Config, text.str());
+NodeDraws draws_for(const Scene& scene, NodeId node, std::size_t position, std::size_t count,
+                    const RandomizeContext& context, const Rng& rng) {
+  return {rng.fork(scene.path(node)),
+          std::uint64_t(context.occurrence) * std::uint64_t(count) + std::uint64_t(position)};
 }
 
 void set_world_pose(Scene& scene, NodeId node, const Affine& world_from_node) {
   const Affine world_from_parent = scene.world_from_node(scene[node].parent);
   scene.set_pose(node, world_from_parent.inverse() * world_from_node);
+}
+
+std::vector<Vec3> target_centres(const Scene& scene, const std::string& pattern,
+                                 const Vec3& fallback) {
+  std::vector<Vec3> centres;
+  for (const NodeId node : scene.match(pattern)) {
+    const Aabb box = scene.world_bounds(node);
+    centres.push_back(box.is_empty() ? Vec3(scene.world_from_node(node).translation())
+                                     : box.centre());
+  }
+  if (centres.empty()) centres.push_back(fallback);
+  return centres;
 }
 
 }  // namespace diorama

@@ -6,46 +6,36 @@
 namespace diorama {
 namespace {
 
-bool is_placeable(const std::optional<Light>& light) {
-  return light && light->kind != LightKind::Dome && light->kind != LightKind::Distant;
+bool is_placeable(const Node& node) {
+  return node.light && node.light->kind != LightKind::Dome &&
+         node.light->kind != LightKind::Distant;
 }
 
 }  // namespace
 
 void ScatterLights::Params::visit(ParamVisitor& v) {
   v.param("nodes", nodes, {"Lights to place."});
-  v.param("offset_min", offset_min, {"Lower corner of the box, from the working area.", "m"});
-  v.param("offset_max", offset_max, {"Upper corner of the box, from the working area.", "m"});
-  v.param("color_min", color_min, {"Least red, green and blue, linear.", "", 0, 1});
-  v.param("color_max", color_max, {"Greatest red, green and blue, linear.", "", 0, 1});
-  v.param("intensity", intensity,
-          {"Radiance of the light's surface for white; Replicator's number, in nits, divided by "
-           "1000.",
-           "W/(m^2 sr)", 0, 1e9});
-  v.param("radius_m", radius_m,
-          {"Radius of sphere and disk lights; [0, 0] keeps what they have.", "m", 0, 1000});
+  declare(v, "offset", offset, {"Place, from the working area along the world's axes.", "m"}, 3);
+  declare(v, "color", color, {"Red, green and blue, linear.", "", 0, 1}, 3);
+  declare(v, "intensity", intensity,
+          {"Luminance of the light's surface for white, as in Replicator.", "nit", 0, 1e9});
+  declare(v, "radius_m", radius_m,
+          {"Radius of sphere and disk lights; null keeps what they have.", "m", 0, 1000});
 }
 
-ScatterLights::ScatterLights(Params params, Host&) : params_(std::move(params)) {
-  check_corners(params_.offset_min, params_.offset_max, "offset_min", "offset_max");
-  check_corners(params_.color_min, params_.color_max, "color_min", "color_max");
-}
+ScatterLights::ScatterLights(Params params, Host&) : params_(std::move(params)) {}
 
 void ScatterLights::randomize(Scene& scene, const RandomizeContext& context, const Rng& rng) {
-  for (const NodeId node : scene.match(params_.nodes)) {
-    if (!is_placeable(scene[node].light)) continue;
-    Rng draws = rng.fork(scene.path(node));
+  const auto change = [&](NodeId node, NodeDraws& draws) {
     Affine pose = scene.world_from_node(node);
-    pose.translation() =
-        context.working_area_world + draw_between(params_.offset_min, params_.offset_max, draws);
+    pose.translation() = context.working_area_world + draws.vector(params_.offset);
     set_world_pose(scene, node, pose);
-    const Vec3 color = draw_between(params_.color_min, params_.color_max, draws);
-    const double intensity = draw_in(params_.intensity, draws);
-    const double radius_m = draw_in(params_.radius_m, draws);
     Light& light = *scene.edit(node).light;
-    light.color = (intensity * color).cast<float>();
-    if (params_.radius_m.hi > 0.0) light.radius_m = radius_m;
-  }
+    const Vec3 color = draws.vector(params_.color);
+    light.color = (draws.number(params_.intensity) * color).cast<float>();
+    if (params_.radius_m) light.radius_m = draws.number(*params_.radius_m);
+  };
+  draw_for_each(scene, match_if(scene, params_.nodes, is_placeable), context, rng, change);
 }
 
 }  // namespace diorama

@@ -189,7 +189,7 @@ TEST_CASE("The resolved job gives the dataset of the job", "[run]") {
   CHECK(difference(expected, tree(folder / "again")) == "");
 }
 
-TEST_CASE("Memory does not grow with the number of visits", "[run][slow]") {
+TEST_CASE("Memory does not grow from the third visit on", "[run][slow]") {
   const TemporaryFolder folder;
   const auto peak_of = [&](const char* captures, const char* output) {
     const Outcome outcome =
@@ -198,7 +198,11 @@ TEST_CASE("Memory does not grow with the number of visits", "[run][slow]") {
     REQUIRE(outcome.exit_code == 0);
     return outcome.max_rss_kb;
   };
-  const long after_6 = peak_of("12", "a");
+  // Two captures per visit.
+  const long after_3 = peak_of("6", "a");
   const long after_40 = peak_of("80", "b");
-  CHECK(after_40 < after_6 * 1.05 + 3000);
+  INFO("peak after 3 visits " << after_3 << " kB, after 40 visits " << after_40 << " kB");
+  // 37 visits that each kept as little as their pictures (64 x 48 pixels in two cameras, with ids,
+  // distances and colour, some 100 kB) would add 3.7 MB. Half of that is left to the allocator.
+  CHECK(after_40 < after_3 + 1850);
 }

@@ -17,8 +17,8 @@ enum class LightKind : std::uint8_t { Sphere, Rect, Disk, Distant, Dome };
 /// +x, with the image's right half towards -y (seen from inside, as photographed).
 struct Light {
   LightKind kind = LightKind::Sphere;
-  /// Sphere, rect, disk: emitted radiance, W/(m^2 sr) by convention. Dome: factor of the texture, or
-  /// the radiance without one. Distant: irradiance on a surface facing it, W/m^2.
+  /// Sphere, rect, disk: luminance of the surface in nits (cd/m^2). Dome: nits of a texel of value 1,
+  /// or of the whole dome without a texture. Distant: illuminance of a surface facing it, in lux.
   Vec3f color = Vec3f::Ones();
   double radius_m = 0.1;  ///< Sphere, disk.
   double width_m = 1.0;   ///< Rect, along x.

@@ -14,6 +14,9 @@ struct RandomizeContext {
   std::string moment;
   int capture = -1;  ///< Capture::index; -1 at the moment "environment".
   Vec3 working_area_world = Vec3::Zero();
+  /// How many times this randomizer acted at this moment before, in all earlier visits and in this
+  /// one, whether or not this run made them. What a `sequence` goes by.
+  int occurrence = 0;
 };
 
 /// Changes poses, lights, materials, cameras. Called on the main thread.

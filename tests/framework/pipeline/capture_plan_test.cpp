@@ -175,6 +175,38 @@ TEST_CASE("Random streams depend on what they are for and on nothing else", "[pl
   CHECK(streams.render_seed(1, "cam_0") != streams.render_seed(2, "cam_0"));
 }
 
+TEST_CASE("A randomizer acts at its moments, at every so many of them", "[plan]") {
+  const Job job = job_from(with(good_job(), "{capture: floating, count: 2}, {simulate: 200}",
+                                "{capture: floating, count: 5}, {event: shuffle}"));
+  RandomizerEntry entry;
+  entry.on = {"floating", "environment", "shuffle"};
+  entry.every = 2;
+  CHECK_FALSE(randomizer_call(job, entry, "dropped", 0, 0));
+  // Captures 0, 2 and 4 of a visit: three calls per visit.
+  CHECK(randomizer_call(job, entry, "floating", 0, 0)->occurrence == 0);
+  CHECK_FALSE(randomizer_call(job, entry, "floating", 0, 1));
+  CHECK(randomizer_call(job, entry, "floating", 0, 2)->occurrence == 1);
+  CHECK(randomizer_call(job, entry, "floating", 2, 4)->occurrence == 8);
+  CHECK(randomizer_call(job, entry, "floating", 2, 4)->visit == 2);
+  CHECK(randomizer_call(job, entry, "shuffle", 7, 0)->occurrence == 7);
+}
+
+TEST_CASE("Between its turns a randomizer repeats what it drew for the visit", "[plan]") {
+  const Job job = job_from(good_job());
+  RandomizerEntry entry;
+  entry.on = {"environment"};
+  entry.every = 3;
+  std::vector<int> visits, occurrences;
+  for (int visit = 0; visit < 7; ++visit) {
+    const auto call = randomizer_call(job, entry, "environment", visit, 0);
+    REQUIRE(call);
+    visits.push_back(call->visit);
+    occurrences.push_back(call->occurrence);
+  }
+  CHECK(visits == std::vector<int>{0, 0, 0, 3, 3, 3, 6});
+  CHECK(occurrences == std::vector<int>{0, 0, 0, 1, 1, 1, 2});
+}
+
 TEST_CASE("The stem of an asset is its name without folders, scheme and ending", "[plan]") {
   CHECK(asset_stem("/a.b/011_banana.usd") == "011_banana");
   CHECK(asset_stem("sample:banana") == "banana");

@@ -116,7 +116,7 @@ distractors: {shape_distractors: {num: 4, types: [cone]}}
                                                     complaints);
   REQUIRE(complaints.is_empty());
   CHECK_THAT(text_of(translation.job), Contains(R"("shapes": ["cone"])"));
-  CHECK_THAT(text_of(translation.job), Contains(R"("look_at_jitter": 0.3)"));
+  CHECK_THAT(text_of(translation.job), Contains(R"("look_at_offset": [-0.3, 0.3])"));
   CHECK_THAT(text_of(translation.job), Contains(R"("distance": [0.75, 2])"));
 }
 

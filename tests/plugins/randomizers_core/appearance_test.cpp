@@ -4,9 +4,11 @@
 #include "dome_light.h"
 #include "framework/pipeline/fake_host.h"
 #include "random_colors.h"
+#include "random_labels.h"
 #include "random_material.h"
+#include "random_texture.h"
 #include "random_visibility.h"
-#include "statistics.h"
+#include "support/statistics.h"
 #include "support/catch.h"
 
 using namespace diorama;
@@ -41,8 +43,7 @@ TEST_CASE("random colours fill the cube of colours and paint each node for itsel
           "[randomizers]") {
   Props props;
   RandomColors::Params params;
-  params.color_min = Vec3(0.0, 0.2, 0.5);
-  params.color_max = Vec3(1.0, 0.4, 0.6);
+  params.color = Distribution::between({0.0, 0.2, 0.5}, {1.0, 0.4, 0.6});
   RandomColors colors(params, props.host);
   std::vector<double> red, green, blue;
   for (int seed = 0; seed < kSeeds; ++seed) {
@@ -69,8 +70,8 @@ TEST_CASE("random colours fill the cube of colours and paint each node for itsel
 TEST_CASE("random materials change roughness and metalness alone", "[randomizers]") {
   Props props;
   RandomMaterial::Params params;
-  params.roughness = {0.2, 0.9};
-  params.metallic = {0.0, 1.0};
+  params.roughness = Range{0.2, 0.9};
+  params.metallic = Range{0.0, 1.0};
   RandomMaterial materials(params, props.host);
   std::vector<double> roughness, metallic;
   for (int seed = 0; seed < kSeeds; ++seed) {
@@ -83,6 +84,98 @@ TEST_CASE("random materials change roughness and metalness alone", "[randomizers
   }
   CHECK(fills(roughness, 0.2 - 1e-6, 0.9 + 1e-6));
   CHECK(fills(metallic, 0.0, 1.0));
+}
+
+TEST_CASE("whole materials come from assets, read once", "[randomizers]") {
+  Props props;
+  int loads = 0;
+  for (const char* name : {"oak.usd", "steel.usd"}) {
+    props.host.assets[name] = [&loads, name](Scene& scene, NodeId root) {
+      ++loads;
+      auto material = std::make_shared<Material>();
+      material->name = name;
+      scene.edit(root).materials = {nullptr, material};
+    };
+  }
+  RandomMaterial::Params params;
+  params.assets = TextDistribution({"oak.usd", "steel.usd"});
+  params.roughness = 0.25;
+  RandomMaterial materials(params, props.host);
+  std::map<std::string, int> count;
+  for (int seed = 0; seed < kSeeds; ++seed) {
+    materials.randomize(props.scene, {}, Rng(std::uint64_t(seed)));
+    const Material& material = *props.scene[props.nodes[0]].materials[0];
+    ++count[material.name];
+    CHECK(material.roughness == 0.25f);
+  }
+  CHECK(loads == 2);
+  CHECK(std::abs(count["oak.usd"] - 250) < 45);  // binomial, four standard deviations
+  CHECK(count["oak.usd"] + count["steel.usd"] == kSeeds);
+  props.host.assets["bare.usd"] = [](Scene&, NodeId) {};
+  params.assets = TextDistribution({"bare.usd"});
+  RandomMaterial bare(params, props.host);
+  CHECK_THROWS_WITH(bare.randomize(props.scene, {}, Rng(1)), "bare.usd: has no material");
+}
+
+TEST_CASE("random textures cover the mesh, repeated and turned", "[randomizers]") {
+  Props props;
+  RandomTexture::Params params;
+  params.textures = TextDistribution({"wood.png", "cloth.png"});
+  params.repeat = 3.0;
+  params.rotation_deg = 90.0;
+  RandomTexture textures(params, props.host);
+  std::map<std::string, int> count;
+  for (int seed = 0; seed < kSeeds; ++seed) {
+    textures.randomize(props.scene, {}, Rng(std::uint64_t(seed)));
+    ++count[props.scene[props.nodes[0]].materials[1]->base_color_texture.texture->name];
+  }
+  CHECK(std::abs(count["wood.png"] - 250) < 45);
+  CHECK(count["wood.png"] + count["cloth.png"] == kSeeds);
+  const Material& material = *props.scene[props.nodes[1]].materials[0];
+  CHECK(material.base_color == Vec3f(1, 1, 1));
+  CHECK(material.roughness == 0.33f);
+  const Eigen::Vector3f uv(0.5f, 0.25f, 1.0f);
+  CHECK((material.base_color_texture.uv_from_mesh_uv * uv - Vec2f(-0.75f, 1.5f)).norm() < 1e-5f);
+}
+
+TEST_CASE("labels are replaced, added and cleared", "[randomizers]") {
+  Props props;
+  props.scene.edit(props.nodes[0]).labels = {{"class", "cube"}, {"size", "small"}};
+  RandomLabels::Params params;
+  params.nodes = "/Distractors/cube";
+  params.labels = TextDistribution({"box"});
+  const Labels& labels = props.scene[props.nodes[0]].labels;
+  params.mode = "add";
+  RandomLabels(params, props.host).randomize(props.scene, {}, Rng(1));
+  CHECK(labels == Labels{{"class", "box"}, {"size", "small"}});
+  params.mode = "replace";
+  params.taxonomy = "shape";
+  RandomLabels(params, props.host).randomize(props.scene, {}, Rng(1));
+  CHECK(labels == Labels{{"shape", "box"}});
+  params.mode = "clear";
+  RandomLabels(params, props.host).randomize(props.scene, {}, Rng(1));
+  CHECK(labels.empty());
+}
+
+TEST_CASE("sequences go from node to node and from call to call", "[randomizers]") {
+  Props props;
+  RandomMaterial::Params params;
+  Value items = Value::make_list();
+  for (const double item : {0.1, 0.2, 0.3}) items.list.push_back(Value::number(item));
+  Value sequence = Value::make_map();
+  sequence.set("sequence", Value::make_map()).set("items", items);
+  params.roughness = Distribution::parse(sequence, "roughness", {"Roughness."}, 1);
+  RandomMaterial materials(params, props.host);
+  std::vector<float> seen;
+  for (int call = 0; call < 3; ++call) {
+    RandomizeContext context;
+    context.occurrence = call;
+    materials.randomize(props.scene, context, Rng(std::uint64_t(call)));
+    for (const NodeId node : props.nodes) {
+      seen.push_back(props.scene[node].materials[0]->roughness);
+    }
+  }
+  CHECK(seen == std::vector<float>{0.1f, 0.2f, 0.3f, 0.1f, 0.2f, 0.3f});
 }
 
 TEST_CASE("visibility follows its chance", "[randomizers]") {
@@ -111,8 +204,8 @@ TEST_CASE("dome lights get every sky about equally often, turned about the verti
   props.scene.edit(sky).light = Light{};
   props.scene.edit(sky).light->kind = LightKind::Dome;
   DomeLight::Params params;
-  params.textures = {"dawn.hdr", "noon.hdr", "dusk.hdr", "night.hdr"};
-  params.intensity = {0.5, 2.0};
+  params.textures = TextDistribution({"dawn.hdr", "noon.hdr", "dusk.hdr", "night.hdr"});
+  params.intensity = Range{0.5, 2.0};
   DomeLight dome(params, props.host);
   std::map<std::string, int> count;
   std::vector<double> angles, strengths;

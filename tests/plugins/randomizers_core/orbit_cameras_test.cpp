@@ -3,7 +3,7 @@
 
 #include "framework/pipeline/fake_host.h"
 #include "obstacles.h"
-#include "statistics.h"
+#include "support/statistics.h"
 #include "support/catch.h"
 
 using namespace diorama;
@@ -50,7 +50,7 @@ struct Set {
 
 OrbitCameras::Params orbit_params() {
   OrbitCameras::Params params;
-  params.polar_angle_deg = {5.0, 75.0};
+  params.polar_angle_deg = Range{5.0, 75.0};
   return params;
 }
 
@@ -89,7 +89,7 @@ TEST_CASE("an arc roll is the shortest turn from looking down", "[randomizers]")
   Set set;
   OrbitCameras::Params params = orbit_params();
   params.roll = "arc";
-  params.look_at_jitter = 0.0;
+  params.look_at_offset = 0.0;
   OrbitCameras(params, set.host).randomize(set.scene, {}, Rng(4));
   const Mat3 rotation = set.pose().linear();
   const Vec3 forward = -rotation.col(2);
@@ -103,7 +103,7 @@ TEST_CASE("without targets cameras look at the working area", "[randomizers]") {
   Set set;
   OrbitCameras::Params params = orbit_params();
   params.targets = "/Nothing/*";
-  params.look_at_jitter = 0.0;
+  params.look_at_offset = 0.0;
   RandomizeContext context;
   context.working_area_world = Vec3(4, 5, 6);
   OrbitCameras(params, set.host).randomize(set.scene, context, Rng(4));

@@ -4,8 +4,7 @@
 #include "diorama/error.h"
 #include "framework/pipeline/fake_host.h"
 #include "orbit_cameras.h"
-#include "random_colors.h"
-#include "scatter_lights.h"
+#include "random_labels.h"
 #include "scatter_poses.h"
 #include "support/catch.h"
 
@@ -45,20 +44,11 @@ Value scalar(const std::string& text) {
 
 }  // namespace
 
-TEST_CASE("reversed boxes and colours are refused in words", "[randomizers]") {
+TEST_CASE("labels to choose from must be there", "[randomizers]") {
   FakeHost host;
-  ScatterPoses::Params poses;
-  poses.offset_min = Vec3(0.75, 0, 0);
-  CHECK(text_of([&] { ScatterPoses(poses, host); }) ==
-        "offset_min must not exceed offset_max: found [0.75, 0, 0] and [0.5, 0.5, 1.5]");
-  ScatterLights::Params lights;
-  lights.color_max = Vec3(1, 0.05, 1);
-  CHECK(text_of([&] { ScatterLights(lights, host); }) ==
-        "color_min must not exceed color_max: found [0.1, 0.1, 0.1] and [1, 0.05, 1]");
-  RandomColors::Params colors;
-  colors.color_min = Vec3(0, 0, 1);
-  colors.color_max = Vec3(1, 1, 0.5);
-  CHECK(text_of([&] { RandomColors(colors, host); }).find("color_min must not exceed") == 0);
+  RandomLabels::Params none;
+  none.labels = {};
+  CHECK(text_of([&] { RandomLabels(none, host); }) == "`labels`: expected at least one");
 }
 
 TEST_CASE("parameters out of range or unknown are named", "[randomizers]") {
@@ -68,7 +58,8 @@ TEST_CASE("parameters out of range or unknown are named", "[randomizers]") {
         std::string::npos);
   CHECK(complaint_about<OrbitCameras::Params>("max_tries", Value::integer(0)).find("max_tries") !=
         std::string::npos);
-  CHECK(complaint_about<ScatterPoses::Params>("scale", Value::number(-1.0)).find("scale") !=
-        std::string::npos);
+  CHECK(text_of([] {
+          complaint_about<ScatterPoses::Params>("scale", Value::number(-1.0));
+        }).find("scale: expected a number in [1e-04, 10000], found") != std::string::npos);
   CHECK(complaint_about<ScatterPoses::Params>("scale", Value::number(0.5)).empty());
 }

@@ -2,7 +2,7 @@
 #include "framework/pipeline/fake_host.h"
 #include "scatter_lights.h"
 #include "scatter_poses.h"
-#include "statistics.h"
+#include "support/statistics.h"
 #include "support/catch.h"
 
 using namespace diorama;
@@ -26,9 +26,8 @@ TEST_CASE("scattered poses fill their box, their scales and all rotations evenly
   Stage stage;
   const NodeId asset = stage.scene.create(stage.group("Assets"), "falling_mug");
   ScatterPoses::Params params;
-  params.offset_min = Vec3(-0.5, -0.25, 1.0);
-  params.offset_max = Vec3(0.5, 0.75, 1.5);
-  params.scale = {0.95, 1.15};
+  params.offset = Distribution::between({-0.5, -0.25, 1.0}, {0.5, 0.75, 1.5});
+  params.scale = Range{0.95, 1.15};
   ScatterPoses scatter(params, stage.host);
   std::vector<double> x, y, z, scale, heading, tilt;
   for (int seed = 0; seed < kSeeds; ++seed) {
@@ -62,8 +61,8 @@ TEST_CASE("offsets are the world's even below a moved parent", "[randomizers]") 
   stage.scene.set_pose(parent, pose);
   const NodeId asset = stage.scene.create(parent, "mug");
   ScatterPoses::Params params;
-  params.offset_min = params.offset_max = Vec3(1, 2, 3);
-  params.scale = {2.0, 2.0};
+  params.offset = Vec3(1, 2, 3);
+  params.scale = Range{2.0, 2.0};
   ScatterPoses(params, stage.host).randomize(stage.scene, stage.context, Rng(1));
   const Affine world = stage.scene.world_from_node(asset);
   CHECK((world.translation() - Vec3(4, 0, 3.5)).norm() < 1e-9);
@@ -91,7 +90,7 @@ TEST_CASE("upright and euler rotations keep to their angles", "[randomizers]") {
   const NodeId asset = stage.scene.create(stage.group("Assets"), "chair");
   ScatterPoses::Params params;
   params.rotation = "upright";
-  params.rotation_deg = {10.0, 80.0};
+  params.rotation_deg = Range{10.0, 80.0};
   ScatterPoses upright(params, stage.host);
   std::vector<double> angles;
   for (int seed = 0; seed < kSeeds; ++seed) {
@@ -105,7 +104,7 @@ TEST_CASE("upright and euler rotations keep to their angles", "[randomizers]") {
   ScatterPoses(params, stage.host).randomize(stage.scene, stage.context, Rng(3));
   CHECK(stage.scene.world_from_node(asset).linear() == Mat3::Identity());
   params.rotation = "euler";
-  params.rotation_deg = {90.0, 90.0};
+  params.rotation_deg = Range{90.0, 90.0};
   ScatterPoses(params, stage.host).randomize(stage.scene, stage.context, Rng(3));
   // About x, then y, then z, all by a quarter: x -> -z, y -> y, z -> x.
   Mat3 expected;
@@ -123,10 +122,9 @@ TEST_CASE("scattered lights fill box, colour and intensity, and spare other ligh
   stage.scene.edit(dome).light = Light{};
   stage.scene.edit(dome).light->kind = LightKind::Dome;
   ScatterLights::Params params;
-  params.intensity = {500, 2500};
-  params.color_min = params.color_max = Vec3(1.0, 0.5, 0.25);
-  params.color_min.x() = 0.4;
-  params.radius_m = {0.1, 0.3};
+  params.intensity = Range{500, 2500};
+  params.color = Distribution::between({0.4, 0.5, 0.25}, {1.0, 0.5, 0.25});
+  params.radius_m = Range{0.1, 0.3};
   ScatterLights scatter(params, stage.host);
   std::vector<double> z, red, intensity, radius;
   for (int seed = 0; seed < kSeeds; ++seed) {
@@ -145,7 +143,7 @@ TEST_CASE("scattered lights fill box, colour and intensity, and spare other ligh
   CHECK(fills(radius, 0.1, 0.3));
   CHECK(stage.scene.world_from_node(dome).matrix() == Mat4::Identity());
   CHECK(stage.scene[dome].light->color == Light{}.color);
-  params.radius_m = {0.0, 0.0};
+  params.radius_m.reset();
   stage.scene.edit(lamp).light->radius_m = 0.77;
   ScatterLights(params, stage.host).randomize(stage.scene, stage.context, Rng(1));
   CHECK(stage.scene[lamp].light->radius_m == 0.77);

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/pipeline/settling.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <set>
+
+namespace diorama {
+namespace {
+
+std::string number_text(const char* format, double number) {
+  char text[64];
+  std::snprintf(text, sizeof text, format, number);
+  return text;
+}
+
+std::string visit_text(const VisitReport& visit) {
+  return "visit " + std::to_string(visit.visit + 1);
+}
+
+/// The visit with the largest value; the first of equal ones. `visits` is not empty.
+template <class ValueOf>
+const VisitReport& worst(const std::vector<VisitReport>& visits, const ValueOf& value_of) {
+  return *std::max_element(visits.begin(), visits.end(),
+                           [&](auto& a, auto& b) { return value_of(a) < value_of(b); });
+}
+
+std::string objects_text(const VisitReport& visit, const std::vector<std::string>& paths,
+                         const char* what) {
+  std::string text;
+  for (const std::string& path : paths) {
+    text += visit_text(visit) + ": " + path + " " + what + "\n";
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string settle_text(const std::vector<VisitReport>& visits) {
+  if (visits.empty()) return {};
+  std::size_t falling = 0;
+  std::size_t outside = 0;
+  for (const VisitReport& visit : visits) {
+    falling += std::size_t(visit.falling_objects);
+    outside += visit.left_room.size();
+  }
+  const auto rest_after = [](const VisitReport& v) { return v.rest_after_s.value_or(-1.0); };
+  const VisitReport& slowest = worst(visits, rest_after);
+  const VisitReport& fastest = worst(visits, [](const VisitReport& v) { return v.max_speed; });
+  const VisitReport& deepest =
+      worst(visits, [](const VisitReport& v) { return v.max_penetration_m; });
+  std::string text = "objects: " + std::to_string(falling) + " falling over all visits, " +
+                     std::to_string(outside) + " left the room";
+  if (slowest.rest_after_s) {
+    text += number_text("; at rest after at most %.2f s (", *slowest.rest_after_s) +
+            visit_text(slowest) + ")";
+  }
+  text += number_text("; residual speed at most %.4f m/s (", fastest.max_speed) +
+          visit_text(fastest) + ")";
+  text += number_text(", deepest penetration %.2f mm (", deepest.max_penetration_m * 1000.0) +
+          visit_text(deepest) +
+          (deepest.deepest_body.empty() ? "" : ", " + deepest.deepest_body) + ")\n";
+  for (const VisitReport& visit : visits) {
+    if (!visit.rest_after_s) {
+      text += visit_text(visit) + number_text(": not at rest after %.2f s\n", visit.simulated_s);
+    }
+    text += objects_text(visit, visit.respawned, "had left the room and was placed anew");
+    text += objects_text(visit, visit.dropped, "had left the room and was taken out");
+    text += objects_text(visit, visit.left_room, "left the room");
+  }
+  return text;
+}
+
+std::string settle_json(const VisitReport& report) {
+  nlohmann::ordered_json json;
+  json["visit"] = report.visit;
+  json["environment"] = report.environment;
+  json["falling_objects"] = report.falling_objects;
+  json["simulated_s"] = report.simulated_s;
+  json["rest_after_s"] = nullptr;
+  if (report.rest_after_s) json["rest_after_s"] = *report.rest_after_s;
+  json["max_speed_m_per_s"] = report.max_speed;
+  json["max_penetration_m"] = report.max_penetration_m;
+  json["deepest_body"] = report.deepest_body;
+  json["left_room"] = report.left_room;
+  json["respawned"] = report.respawned;
+  json["dropped"] = report.dropped;
+  return json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+}
+
+Room::Room(const Scene& scene, NodeId environment) : box_(scene.world_bounds(environment)) {
+  // Things lie on the outer face of the floor's slab at worst.
+  constexpr double kMarginM = 0.01;
+  box_.min.array() -= kMarginM;
+  box_.max.array() += kMarginM;
+  box_.max.z() = kInfinity;
+}
+
+bool Room::holds(const Scene& scene, NodeId node) const {
+  if (!(box_.min.head<2>().array() <= box_.max.head<2>().array()).all()) return true;
+  const Vec3 place = scene.world_from_node(node).translation();
+  return (place.array() >= box_.min.array()).all() && (place.array() <= box_.max.array()).all();
+}
+
+double fastest_falling(const Scene& scene, const Room& room, const std::vector<NodeId>& objects) {
+  double fastest = 0.0;
+  for (const NodeId object : objects) {
+    const auto& body = scene[object].rigid_body;
+    // What has left the room falls for ever and says nothing about the rest.
+    if (!body || !body->has_gravity || !room.holds(scene, object)) continue;
+    fastest = std::max(fastest, body->linear_velocity.norm());
+  }
+  return fastest;
+}
+
+SavedNodes::SavedNodes(const Scene& scene, const std::vector<NodeId>& without) {
+  std::set<NodeId> left_out;
+  for (const NodeId top : without) {
+    for (const NodeId node : scene.subtree(top)) left_out.insert(node);
+  }
+  for (const NodeId node : scene.subtree(scene.root())) {
+    if (node != scene.root() && !left_out.contains(node)) nodes_.emplace_back(node, scene[node]);
+  }
+}
+
+void SavedNodes::restore(Scene& scene) const {
+  for (const auto& [node, saved] : nodes_) {
+    scene.set_pose(node, saved.parent_from_node);
+    Node& now = scene.edit(node);
+    now.is_visible = saved.is_visible;
+    now.labels = saved.labels;
+    now.mesh = saved.mesh;
+    now.materials = saved.materials;
+    now.light = saved.light;
+    now.camera = saved.camera;
+    now.collider = saved.collider;
+    now.rigid_body = saved.rigid_body;
+  }
+}
+
+}  // namespace diorama

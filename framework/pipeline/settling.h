@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "diorama/scene.h"
+
+/// How the objects of a visit come to rest, and what becomes of those that do not stay in the room.
+namespace diorama {
+
+/// How the objects of one visit ended.
+struct VisitReport {
+  int visit = 0;
+  std::string environment;
+  int falling_objects = 0;
+  double simulated_s = 0.0;
+  /// Simulated time after which no falling object in the room moved faster than the job's
+  /// `settle.rest_speed`; nothing: one still did.
+  std::optional<double> rest_after_s;
+  double max_speed = 0.0;          ///< m/s, of falling objects in the room, at the end.
+  double max_penetration_m = 0.0;  ///< At the end of the visit.
+  std::string deepest_body;
+  std::vector<std::string> left_room;  ///< Paths of objects outside the environment's box.
+  std::vector<std::string> respawned;  ///< Paths, once per time.
+  std::vector<std::string> dropped;    ///< Paths of objects that were taken out.
+};
+
+/// As JSON text with a newline at its end.
+std::string settle_json(const VisitReport& report);
+
+/// For the end of a run: the worst of all visits, and what did not stay where it should. Lines that end
+/// with a newline; nothing without visits.
+std::string settle_text(const std::vector<VisitReport>& visits);
+
+/// The space that an environment takes. It is open above, as rooms may have no roof.
+class Room {
+ public:
+  Room(const Scene& scene, NodeId environment);
+  /// Whether the node's place lies in the room; always true when the environment has no meshes.
+  bool holds(const Scene& scene, NodeId node) const;
+
+ private:
+  Aabb box_;
+};
+
+/// Highest speed, in m/s, of those objects in the room that gravity acts on; 0 without any.
+double fastest_falling(const Scene& scene, const Room& room, const std::vector<NodeId>& objects);
+
+/// What every node but some was like at one moment.
+class SavedNodes {
+ public:
+  /// Saves all nodes outside the subtrees of `without`.
+  SavedNodes(const Scene& scene, const std::vector<NodeId>& without);
+  void restore(Scene& scene) const;
+
+ private:
+  std::vector<std::pair<NodeId, Node>> nodes_;
+};
+
+}  // namespace diorama

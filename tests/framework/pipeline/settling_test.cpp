@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/pipeline/settling.h"
+
+#include <nlohmann/json.hpp>
+
+#include "support/catch.h"
+
+using namespace diorama;
+using Catch::Matchers::Contains;
+
+namespace {
+
+/// A room of 4 x 2 x 3 m whose floor is at z = 0, with objects at the given places.
+struct Stage {
+  explicit Stage(const std::vector<Vec3>& places) {
+    environment = scene.create(scene.create(scene.root(), "Environment"), "room");
+    scene.edit(environment).mesh = std::make_shared<const Mesh>(make_box(Vec3(4, 2, 3)));
+    scene.set_pose(environment, Affine(Eigen::Translation3d(0, 0, 1.5)));
+    const NodeId assets = scene.create(scene.root(), "Assets");
+    for (const Vec3& place : places) {
+      const NodeId object = scene.create(assets, "mug");
+      scene.set_pose(object, Affine(Eigen::Translation3d(place)));
+      scene.edit(object).rigid_body = RigidBody{};
+      objects.push_back(object);
+    }
+  }
+  Scene scene;
+  NodeId environment;
+  std::vector<NodeId> objects;
+};
+
+}  // namespace
+
+TEST_CASE("A room holds what is within its walls and above its floor, however high", "[settle]") {
+  const Stage stage({{1.9, 0.9, 0.1}, {2.1, 0, 1}, {0, -1.1, 1}, {0, 0, -0.5}, {0, 0, 50}});
+  const Room room(stage.scene, stage.environment);
+  std::vector<bool> held;
+  for (const NodeId object : stage.objects) held.push_back(room.holds(stage.scene, object));
+  CHECK(held == std::vector<bool>{true, false, false, false, true});
+}
+
+TEST_CASE("An environment without meshes has no outside", "[settle]") {
+  Stage stage({{100, 100, -100}});
+  stage.scene.edit(stage.environment).mesh.reset();
+  CHECK(Room(stage.scene, stage.environment).holds(stage.scene, stage.objects[0]));
+}
+
+TEST_CASE("The fastest object is one that falls, in the room", "[settle]") {
+  Stage stage({{0, 0, 1}, {1, 0, 1}, {9, 0, 1}, {-1, 0, 1}});
+  const auto set_speed = [&](std::size_t object, double speed, bool has_gravity) {
+    RigidBody& body = *stage.scene.edit(stage.objects[object]).rigid_body;
+    body.linear_velocity = Vec3(0, speed, 0);
+    body.has_gravity = has_gravity;
+  };
+  set_speed(0, 0.2, true);
+  set_speed(1, 7.0, false);
+  set_speed(2, 9.0, true);  // outside
+  const Room room(stage.scene, stage.environment);
+  CHECK(fastest_falling(stage.scene, room, stage.objects) == 0.2);
+}
+
+TEST_CASE("Saved nodes come back as they were, all others stay as they are", "[settle]") {
+  Stage stage({{0, 0, 1}, {1, 0, 1}});
+  Scene& scene = stage.scene;
+  const NodeId lamp = scene.create(scene.root(), "lamp");
+  scene.edit(lamp).light = Light{};
+  const SavedNodes saved(scene, {stage.objects[1]});
+  const Affine moved(Eigen::Translation3d(0.5, 0.25, 2));
+  for (const NodeId object : stage.objects) {
+    scene.set_pose(object, moved);
+    scene.edit(object).labels["class"] = "cup";
+  }
+  scene.edit(lamp).light->radius_m = 5.0;
+  scene.edit(stage.environment).is_visible = false;
+  saved.restore(scene);
+  CHECK(scene.world_from_node(stage.objects[0]).translation() == Vec3(0, 0, 1));
+  CHECK(scene[stage.objects[0]].labels.empty());
+  CHECK(scene[lamp].light->radius_m == Light{}.radius_m);
+  CHECK(scene[stage.environment].is_visible);
+  CHECK(scene.world_from_node(stage.objects[1]).matrix() == moved.matrix());
+  CHECK(scene[stage.objects[1]].labels.at("class") == "cup");
+}
+
+TEST_CASE("The report names the worst visits and every object that left", "[settle]") {
+  VisitReport quiet;
+  quiet.falling_objects = 5;
+  quiet.simulated_s = 3.4;
+  quiet.rest_after_s = 1.25;
+  quiet.max_penetration_m = 0.002;
+  quiet.deepest_body = "/Assets/bowl";
+  VisitReport wild;
+  wild.visit = 1;
+  wild.environment = "room.usdc";
+  wild.falling_objects = 6;
+  wild.simulated_s = 3.4;
+  wild.max_speed = 0.5;
+  wild.left_room = {"/Assets/mug"};
+  wild.respawned = {"/Assets/can", "/Assets/can"};
+  CHECK(settle_text({}).empty());
+  const std::string text = settle_text({quiet, wild});
+  CHECK_THAT(text, Contains("11 falling over all visits, 1 left the room"));
+  CHECK_THAT(text, Contains("at rest after at most 1.25 s (visit 1)"));
+  CHECK_THAT(text, Contains("residual speed at most 0.5000 m/s (visit 2)"));
+  CHECK_THAT(text, Contains("deepest penetration 2.00 mm (visit 1, /Assets/bowl)"));
+  CHECK_THAT(text, Contains("visit 2: not at rest after 3.40 s"));
+  CHECK_THAT(text, Contains("visit 2: /Assets/mug left the room"));
+  CHECK_THAT(text, Contains("visit 2: /Assets/can had left the room and was placed anew"));
+  const auto json = nlohmann::json::parse(settle_json(wild));
+  CHECK(json["rest_after_s"].is_null());
+  CHECK(json["environment"] == "room.usdc");
+  CHECK(json["respawned"].size() == 2);
+  CHECK(nlohmann::json::parse(settle_json(quiet))["rest_after_s"] == 1.25);
+}
