@@ -436,9 +436,9 @@ void LightGroup::visit(ParamVisitor& v) {
   v.param("name", name, {"Nodes are /Lights/NAME_0 and so on. Default: the type."});
   v.param("count", count, {"How many lights.", "", 0, 1e4});
   v.param("color", color, {"Linear red, green and blue.", "", 0});
-  v.param("intensity", intensity,
-          {"Factor of the colour: luminance in nits, of a distant light illuminance in lux.", "",
-           0});
+  v.param(
+      "intensity", intensity,
+      {"Factor of the colour: luminance in nits, of a distant light illuminance in lux.", "", 0});
   v.param("radius_m", radius_m, {"Radius of sphere and disk.", "m", 0});
   v.param("width_m", width_m, {"Size of a rect along its x axis.", "m", 0});
   v.param("height_m", height_m, {"Size of a rect along its y axis.", "m", 0});

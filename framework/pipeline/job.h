@@ -102,7 +102,7 @@ struct RandomizerEntry {
   std::string type;
   std::string name;
   std::vector<std::string> on;  ///< "environment", capture series, events.
-  int every = 1;  ///< See randomizer_call().
+  int every = 1;                ///< See randomizer_call().
   void visit(ParamVisitor& v);
 };
 

@@ -183,8 +183,8 @@ std::vector<ParamSpec> job_specs() {
   specs.push_back(section("renderer", ParamType::Group, "The renderer.", engine));
   specs.push_back(section("timeline", ParamType::List, "What happens in a visit, in order.",
                           specs_of<detail::StepKeys>()));
-  specs.push_back(section("settle", ParamType::Group, "How objects come to rest.",
-                          specs_of<SettleSection>()));
+  specs.push_back(
+      section("settle", ParamType::Group, "How objects come to rest.", specs_of<SettleSection>()));
   specs.push_back(section("writers", ParamType::List, "What is written.", specs_of<WriterEntry>()));
   specs.push_back(
       section("output", ParamType::Group, "Where it is written.", specs_of<OutputSection>()));

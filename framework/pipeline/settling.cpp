@@ -59,8 +59,8 @@ std::string settle_text(const std::vector<VisitReport>& visits) {
   text += number_text("; residual speed at most %.4f m/s (", fastest.max_speed) +
           visit_text(fastest) + ")";
   text += number_text(", deepest penetration %.2f mm (", deepest.max_penetration_m * 1000.0) +
-          visit_text(deepest) +
-          (deepest.deepest_body.empty() ? "" : ", " + deepest.deepest_body) + ")\n";
+          visit_text(deepest) + (deepest.deepest_body.empty() ? "" : ", " + deepest.deepest_body) +
+          ")\n";
   for (const VisitReport& visit : visits) {
     if (!visit.rest_after_s) {
       text += visit_text(visit) + number_text(": not at rest after %.2f s\n", visit.simulated_s);

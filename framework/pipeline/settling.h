@@ -30,8 +30,8 @@ struct VisitReport {
 /// As JSON text with a newline at its end.
 std::string settle_json(const VisitReport& report);
 
-/// For the end of a run: the worst of all visits, and what did not stay where it should. Lines that end
-/// with a newline; nothing without visits.
+/// For the end of a run: the worst of all visits, and what did not stay where it should. Lines that
+/// end with a newline; nothing without visits.
 std::string settle_text(const std::vector<VisitReport>& visits);
 
 /// The space that an environment takes. It is open above, as rooms may have no roof.

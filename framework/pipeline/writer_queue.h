@@ -13,7 +13,7 @@ namespace diorama {
 /// A capture on its way to the writers.
 struct PendingCapture {
   Capture capture;
-  Image<Rgba8> overview;  ///< Empty unless this capture carries the visit's overview picture.
+  Image<Rgba8> overview;    ///< Empty unless this capture carries the visit's overview picture.
   std::string settle_json;  ///< Empty unless this capture is the visit's last.
 };
 

@@ -142,8 +142,10 @@ bool CollisionWorld::is_free(const CollisionBody& body, const Vec3& shift) const
         const Vec3 point = inner.corners_world.front() + inner_shift - outer_shift;
         return std::abs(winding_number(outer.corners_world, point)) > 0.5;
       };
-      if (holds(other, box) && is_inside(standing->part, standing->shift, part, shift)) return false;
-      if (holds(box, other) && is_inside(part, shift, standing->part, standing->shift)) return false;
+      if (holds(other, box) && is_inside(standing->part, standing->shift, part, shift))
+        return false;
+      if (holds(box, other) && is_inside(part, shift, standing->part, standing->shift))
+        return false;
     }
   }
   return true;

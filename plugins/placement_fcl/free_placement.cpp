@@ -29,7 +29,8 @@ void add_obstacles(const PlacementParams& params, const std::vector<NodeId>& mov
 
 void move(Scene& scene, NodeId node, const Vec3& shift) {
   const Affine parent_from_world = scene.world_from_node(scene[node].parent).inverse();
-  scene.set_pose(node, parent_from_world * Eigen::Translation3d(shift) * scene.world_from_node(node));
+  scene.set_pose(node,
+                 parent_from_world * Eigen::Translation3d(shift) * scene.world_from_node(node));
 }
 
 Aabb box_of(const Scene& scene, NodeId node, const CollisionBody& body) {

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "diorama/host.h"
-#include "diorama/randomizer.h"
 #include "diorama/params.h"
+#include "diorama/randomizer.h"
 
 namespace diorama {
 
@@ -25,8 +25,8 @@ struct PlacementParams {
 using DrawShift = std::function<Vec3(const Aabb& box_world, Rng& rng)>;
 
 /// Moves the nodes, one after the other, to places that `draw` gives and where they meet neither
-/// obstacles nor each other. When none of params.max_tries places is free, the last one stands and a
-/// warning names the node.
+/// obstacles nor each other. When none of params.max_tries places is free, the last one stands and
+/// a warning names the node.
 void place_freely(const PlacementParams& params, const DrawShift& draw, const Rng& rng,
                   Scene& scene, Host& host);
 

@@ -9,8 +9,8 @@
 namespace diorama {
 
 /// Sets nodes onto the upward faces of other nodes, evenly by area: the middle of the underside of
-/// the node's box comes to the drawn point. Rotation and scale stay. Without such faces a warning is
-/// given, and nothing moves.
+/// the node's box comes to the drawn point. Rotation and scale stay. Without such faces a warning
+/// is given, and nothing moves.
 class Scatter2d final : public Randomizer {
  public:
   struct Params {

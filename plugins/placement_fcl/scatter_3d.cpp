@@ -39,8 +39,8 @@ std::vector<Volume> volumes_of(const Scene& scene, const std::string& pattern) {
   for (const NodeId node : scene.match(pattern)) {
     Volume volume{bounds_in_node(scene, node), scene.world_from_node(node)};
     if (volume.box_node.is_empty()) continue;
-    volume.cubic_metres = volume.box_node.size().prod() *
-                          std::abs(volume.world_from_node.linear().determinant());
+    volume.cubic_metres =
+        volume.box_node.size().prod() * std::abs(volume.world_from_node.linear().determinant());
     volumes.push_back(volume);
   }
   return volumes;

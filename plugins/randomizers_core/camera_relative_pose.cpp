@@ -38,8 +38,7 @@ void CameraRelativePose::randomize(Scene& scene, const RandomizeContext& context
     const NodeId camera = cameras[draws.rng.index(cameras.size())];
     const double distance = draws.number(params_.distance_m);
     const double horizontal = draws.number(params_.horizontal);
-    const Vec2 pixel =
-        pixel_at(*scene[camera].camera, horizontal, draws.number(params_.vertical));
+    const Vec2 pixel = pixel_at(*scene[camera].camera, horizontal, draws.number(params_.vertical));
     const auto direction = ray_direction(*scene[camera].camera, pixel);
     if (!direction) return;  // a fisheye lens images nothing there
     const Affine world_from_camera(Transform::from_affine(scene.world_from_node(camera)).rotation);

@@ -38,11 +38,9 @@ void LookAt::randomize(Scene& scene, const RandomizeContext& context, const Rng&
     Transform pose = Transform::from_affine(scene.world_from_node(node));
     const Vec3 target = targets[draws.rng.index(targets.size())];
     const Vec3 point = target + draws.vector(params_.offset);
-    const Quat roll(
-        Eigen::AngleAxisd(radians(draws.number(params_.roll_deg)), Vec3::UnitZ()));
+    const Quat roll(Eigen::AngleAxisd(radians(draws.number(params_.roll_deg)), Vec3::UnitZ()));
     if ((point - pose.translation).norm() < 1e-9) return;
-    pose.rotation =
-        look_rotation(point - pose.translation) * roll * view_from_axis(params_.axis);
+    pose.rotation = look_rotation(point - pose.translation) * roll * view_from_axis(params_.axis);
     set_world_pose(scene, node, pose.affine());
   };
   draw_for_each(scene, scene.match(params_.nodes), context, rng, turn);

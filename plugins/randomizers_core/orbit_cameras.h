@@ -13,9 +13,9 @@ namespace diorama {
 class Obstacles;
 struct NodeDraws;
 
-/// Places each camera (or light) on a sphere round a random target (the centre of its box) and turns
-/// it to a point beside that centre. Distance and polar angle are those seen from the target itself,
-/// not from the point looked at. Without targets the working area takes their place.
+/// Places each camera (or light) on a sphere round a random target (the centre of its box) and
+/// turns it to a point beside that centre. Distance and polar angle are those seen from the target
+/// itself, not from the point looked at. Without targets the working area takes their place.
 ///
 /// A camera behind a wall sees nothing. With `avoid_obstacles` a view is drawn again, target
 /// included, while something stands between camera and target or close to the camera. When no draw

@@ -9,7 +9,8 @@ namespace diorama {
 
 void RandomTexture::Params::visit(ParamVisitor& v) {
   v.param("nodes", nodes, {"Nodes to change; those without a mesh are passed over."});
-  declare(v, "textures", textures, {"Image files to choose from; none: the mesh keeps what it has."});
+  declare(v, "textures", textures,
+          {"Image files to choose from; none: the mesh keeps what it has."});
   declare(v, "repeat", repeat, {"How often the picture fits along the mesh's uv.", "", 1e-3, 1e3});
   declare(v, "rotation_deg", rotation_deg, {"Turn of the picture.", "deg", -360, 360});
 }

@@ -156,8 +156,8 @@ struct Distribution::Reader {
       made.kind_ = Kind::Combine;
       read_axes(body, full, made);
     } else {
-      const std::string near = nearest_name(
-          word, {"uniform", "normal", "log_uniform", "choice", "sequence", "combine"});
+      const std::string near =
+          nearest_name(word, {"uniform", "normal", "log_uniform", "choice", "sequence", "combine"});
       complaints.add(body.key_place, name + ": unknown distribution '" + std::string(word) + "'" +
                                          (near.empty() ? "" : ", did you mean '" + near + "'?"));
     }
@@ -195,8 +195,8 @@ struct Distribution::Reader {
     ItemKeys keys(body, made.kind_ == Kind::Sequence, name, complaints);
     if (complaints.messages().size() != before) return;
     for (std::size_t i = 0; i < keys.items.list.size(); ++i) {
-      made.parts_.push_back(read(keys.items.list[i], name + "." + keys.list_key + "[" +
-                                                         std::to_string(i) + "]"));
+      made.parts_.push_back(
+          read(keys.items.list[i], name + "." + keys.list_key + "[" + std::to_string(i) + "]"));
       made.width_ = std::max(made.width_, made.parts_.back().width_);
     }
     made.weights_ = std::move(keys.weights);
@@ -288,8 +288,8 @@ Vec3 Distribution::draw_vector(Rng& rng, std::uint64_t index) const {
     return parts_[index % parts_.size()].draw_vector(rng, index / parts_.size());
   }
   for (int axis = 0; axis < 3; ++axis) {
-    vector[axis] = kind_ == Kind::Combine ? parts_[std::size_t(axis)].draw(rng, index)
-                                          : draw_axis(axis, rng);
+    vector[axis] =
+        kind_ == Kind::Combine ? parts_[std::size_t(axis)].draw(rng, index) : draw_axis(axis, rng);
   }
   return vector;
 }
@@ -317,8 +317,10 @@ TextDistribution TextDistribution::parse(const Value& value, const std::string& 
       check_weights(made.weights_, items.list.size(), entry->second, name + ".choice", complaints);
     }
   } else if (value.kind != Value::Kind::List && value.kind != Value::Kind::Null) {
-    complaints.add(value.place, name + ": expected a text, a list of texts, `choice` or "
-                                       "`sequence`, found " + value.describe());
+    complaints.add(value.place, name +
+                                    ": expected a text, a list of texts, `choice` or "
+                                    "`sequence`, found " +
+                                    value.describe());
   }
   complaints.raise();
   if (items.kind == Value::Kind::List) {

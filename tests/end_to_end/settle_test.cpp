@@ -72,8 +72,7 @@ TEST_CASE("Respawned objects are placed again within their range until they stay
         kept.files.at("basic/rp_cam_0/rgb/rgb_0000.png"));
 }
 
-TEST_CASE("Retries are the same for any number of threads and split into shards",
-          "[run][settle]") {
+TEST_CASE("Retries are the same for any number of threads and split into shards", "[run][settle]") {
   const Run one = run_with_policy("respawn", {"--threads", "1"});
   CHECK(difference(one.files, run_with_policy("respawn", {"--threads", "7"}).files) == "");
   const TemporaryFolder folder;

@@ -85,8 +85,8 @@ class DIORAMA_SDK_API TextDistribution {
 };
 
 /// Declares a parameter inside Params::visit(): `declare(v, "scale", scale, {"Scale."})`. A mistake
-/// in the job is thrown as Error(Config) at once. Vectors (`width` 3) may be given as a distribution
-/// of numbers, too.
+/// in the job is thrown as Error(Config) at once. Vectors (`width` 3) may be given as a
+/// distribution of numbers, too.
 DIORAMA_SDK_API void declare(ParamVisitor& v, const char* key, Distribution& field,
                              const ParamDoc& doc, int width = 1);
 /// Null or absent: no value, which means that the quantity stays as it is.

@@ -150,6 +150,19 @@ writers:
   CHECK(job.writers[0].component.map.find("kwargs") == nullptr);
 }
 
+TEST_CASE("JSON jobs mean the same, tabs and escapes included", "[replicator]") {
+  const Job job = native_job(
+      "{\n\t\"capture\": {\n\t\t\"total_captures\": 3, \"num_floating_captures_per_env\": 1,\n"
+      "\t\t\"num_cameras\": 1, \"path_tracing\": true, \"resolution\": [64, 48]\n\t},\n"
+      "\t\"writers\": [{\"type\": \"BasicWriter\", \"kwargs\": {\"output_dir\": \"out\\/a\"}}],\n"
+      "\t\"labeled_assets\": {\"auto_label\": {\"num\": 1, \"files\": [\"a.usd\"],\n"
+      "\t\t\"regex_replace_pattern\": \"^\\\\d+_\"}}\n}\n");
+  CHECK(job.total_captures == 3);
+  CHECK(job.cameras[0].width == 64);
+  CHECK(job.writers[0].output_dir == "out/a");
+  CHECK(job.objects[0].label_pattern == "^\\d+_");
+}
+
 TEST_CASE("Keys without effect are named", "[replicator]") {
   Complaints complaints;
   const auto translation = translate_replicator_job(parse_yaml(R"(

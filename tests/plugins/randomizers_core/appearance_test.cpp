@@ -8,8 +8,8 @@
 #include "random_material.h"
 #include "random_texture.h"
 #include "random_visibility.h"
-#include "support/statistics.h"
 #include "support/catch.h"
+#include "support/statistics.h"
 
 using namespace diorama;
 using namespace diorama::test;

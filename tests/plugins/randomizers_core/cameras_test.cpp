@@ -22,8 +22,8 @@ struct Set {
     Mesh mesh = make_box(Vec3(0.1, 0.2, 0.3));
     for (Vec3f& position : mesh.positions) position.z() += 0.5f;
     scene.edit(mug).mesh = std::make_shared<const Mesh>(mesh);
-    scene.set_pose(mug, Transform{Vec3(-3, 4, 1), Quat(Eigen::AngleAxisd(0.7, Vec3::UnitX())),
-                                  Vec3(1, 2, 1)});
+    scene.set_pose(
+        mug, Transform{Vec3(-3, 4, 1), Quat(Eigen::AngleAxisd(0.7, Vec3::UnitX())), Vec3(1, 2, 1)});
   }
   Vec3 centre() const { return scene.world_bounds(mug).centre(); }
   Vec3 axis(NodeId node, int column) const {

@@ -3,8 +3,8 @@
 
 #include "framework/pipeline/fake_host.h"
 #include "obstacles.h"
-#include "support/statistics.h"
 #include "support/catch.h"
+#include "support/statistics.h"
 
 using namespace diorama;
 using namespace diorama::test;

@@ -2,8 +2,8 @@
 #include "framework/pipeline/fake_host.h"
 #include "scatter_lights.h"
 #include "scatter_poses.h"
-#include "support/statistics.h"
 #include "support/catch.h"
+#include "support/statistics.h"
 
 using namespace diorama;
 using namespace diorama::test;
