@@ -17,7 +17,7 @@ enum class LightKind : std::uint8_t { Sphere, Rect, Disk, Distant, Dome };
 /// +x, with the image's right half towards -y (seen from inside, as photographed).
 struct Light {
   LightKind kind = LightKind::Sphere;
-  /// Sphere, rect, disk: luminance of the surface in nits (cd/m^2). Dome: nits of a texel of value 1,
+  /// Sphere, rect, disk: luminance of the surface, nits (cd/m^2). Dome: nits of a texel of value 1,
   /// or of the whole dome without a texture. Distant: illuminance of a surface facing it, in lux.
   Vec3f color = Vec3f::Ones();
   double radius_m = 0.1;  ///< Sphere, disk.
