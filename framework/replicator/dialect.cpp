@@ -446,9 +446,10 @@ class Translator {
   void add_renderer(const CaptureBlock& capture) {
     Value renderer = native("{type: embree}");
     renderer.set("mode", Value::text(capture.path_tracing ? "path_traced" : "real_time"));
-    // A subframe of the reference's path tracer is several samples of ours, one of the real-time
-    // mode is one.
-    constexpr int kSamplesPerPathTracedSubframe = 8;
+    // A subframe of the reference's path tracer is several samples of ours, as many as let its
+    // multi-writer job end within a quarter of an hour on two cores; one of the real-time mode is
+    // one.
+    constexpr int kSamplesPerPathTracedSubframe = 3;
     renderer.set("samples",
                  Value::integer(capture.rt_subframes *
                                 (capture.path_tracing ? kSamplesPerPathTracedSubframe : 1)));

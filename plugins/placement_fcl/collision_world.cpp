@@ -52,6 +52,10 @@ bool holds(const Aabb& outer, const Aabb& inner) {
 
 Aabb shifted(const Aabb& box, const Vec3& shift) { return {box.min + shift, box.max + shift}; }
 
+/// Winding number from which on a point counts as enclosed: from the bottom of an open box it is
+/// still far below.
+constexpr double kClosed = 0.999;
+
 /// Signed solid angle of the mesh seen from the point, over a whole turn: 1 (or -1) inside a closed
 /// mesh, 0 outside. Van Oosterom and Strackee 1983.
 double winding_number(const std::vector<Vec3>& corners, const Vec3& point) {
@@ -140,7 +144,7 @@ bool CollisionWorld::is_free(const CollisionBody& body, const Vec3& shift) const
       const auto is_inside = [](const Part& outer, const Vec3& outer_shift, const Part& inner,
                                 const Vec3& inner_shift) {
         const Vec3 point = inner.corners_world.front() + inner_shift - outer_shift;
-        return std::abs(winding_number(outer.corners_world, point)) > 0.5;
+        return std::abs(winding_number(outer.corners_world, point)) > kClosed;
       };
       if (holds(other, box) && is_inside(standing->part, standing->shift, part, shift))
         return false;
