@@ -16,15 +16,24 @@ namespace fs = std::filesystem;
 /// Makes components and remembers which plugins they came from.
 class Assembler {
  public:
-  Assembler(Registry& registry, Host& host) : registry_(registry), host_(host) {}
+  enum class MissingAssets { Throw, Warn };
+
+  Assembler(Registry& registry, Host& host, MissingAssets missing = MissingAssets::Throw)
+      : registry_(registry), host_(host), missing_(missing) {}
 
   template <class T>
   std::unique_ptr<T> make(const ComponentConfig& config, std::string_view section) {
     if (config.type.empty()) return nullptr;
     const auto keys = host_keys(T::kKind, section);
-    auto made = registry_.make<T>(config.map, config.path, keys, complaints_, host_);
-    if (made) note_plugin(registry_.entry(T::kKind, config.type));
-    return made;
+    try {
+      auto made = registry_.make<T>(config.map, config.path, keys, complaints_, host_);
+      if (made) note_plugin(registry_.entry(T::kKind, config.type));
+      return made;
+    } catch (const Error& error) {
+      if (missing_ == MissingAssets::Throw || error.kind() != ErrorKind::Asset) throw;
+      host_.log(LogLevel::Warning, error.what());
+      return nullptr;
+    }
   }
 
   /// The loader that reads this asset, as far as the registry knows.
@@ -64,6 +73,7 @@ class Assembler {
 
   Registry& registry_;
   Host& host_;
+  MissingAssets missing_;
   Complaints complaints_;
   std::map<std::string, std::string> plugins_;
   std::map<std::string, std::unique_ptr<Loader>> loaders_;

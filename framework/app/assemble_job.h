@@ -29,7 +29,8 @@ struct JobAssembly {
 DescribeComponent describe_from(Registry& registry);
 
 /// Reads the job, makes its components to check their parameters and returns it with every default.
-/// Assets need not be there. All complaints come in one Error(Config).
+/// Assets need not be there: what a component misses becomes a warning. All complaints come in one
+/// Error(Config).
 Value check_job(const Value& job, Registry& registry, Host& host);
 
 /// Reads the job, makes its components, lists its assets, plans its captures and resolves what its
