@@ -13,7 +13,7 @@ import tempfile
 import time
 import unittest
 
-SCRIPT, DIORAMA, PLUGIN_DIR = sys.argv[1:4]
+SCRIPT, DIORAMA, PLUGIN_DIR = (os.path.abspath(name) for name in sys.argv[1:4])
 FAKE = pathlib.Path(__file__).parent / "fake_infinigen"
 
 JOB = """
@@ -153,7 +153,9 @@ class MakeRooms(unittest.TestCase):
 
     def test_stopping_the_script_stops_infinigen_and_it_can_go_on(self):
         process = self.start("--count", "2", "--jobs", "2", FAKE_INFINIGEN_SECONDS="30")
+        deadline = time.monotonic() + 60
         while self.calls("generate", 1) + self.calls("generate", 2) < 2:
+            self.assertLess(time.monotonic(), deadline, "the rooms were never begun")
             time.sleep(0.05)
         process.send_signal(signal.SIGTERM)
         # The pipes close only when Infinigen, which holds them, has ended, too.
