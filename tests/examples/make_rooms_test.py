@@ -25,6 +25,20 @@ distractors: {shape_distractors: {num: 2}}
 """
 
 
+SKIES = """Cloudy/champagne_castle_1 Cloudy/kloofendal_48d_partly_cloudy Clear/evening_road_01
+Clear/mealie_road Clear/qwantani Clear/noon_grass Evening/evening_road_01 Night/kloppenheim_02
+Night/moonlit_golf""".split()
+
+
+def write_skies(root):
+    """The tutorial's skies, each a flat grey of 4 x 2 pixels."""
+    for name in SKIES:
+        file = root / "NVIDIA/Assets/Skies" / (name + "_4k.hdr")
+        file.parent.mkdir(parents=True, exist_ok=True)
+        header = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n"
+        file.write_bytes(header + bytes([128, 128, 128, 129]) * 8)
+
+
 class MakeRooms(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -168,8 +182,9 @@ class MakeRooms(unittest.TestCase):
 
     def test_the_job_runs_on_the_folder_as_it_is(self):
         (self.place / "job.yaml").write_text(JOB)
-        code, output, errors = self.make(
-            "--count", "2", "--run", "job.yaml"
+        write_skies(self.place / "root")
+        code, _, errors = self.make(
+            "--count", "2", "--run", "job.yaml", DIORAMA_ASSETS_ROOT=str(self.place / "root")
         )
         self.assertEqual(code, 0, errors)
         self.assertEqual(len(list((self.place / "pictures").rglob("rgb_*.png"))), 2)
