@@ -17,9 +17,9 @@ int command_inspect(const GlobalOptions& global, const InspectOptions& options, 
   // What the loader says belongs into the report; the host's own messages came before.
   bool is_loading = false;
   const Log collect = [&](LogLevel level, std::string_view message) {
-    if (!is_loading || level == LogLevel::Debug) return console(level, message);
+    if (!is_loading) return console(level, message);
     const std::lock_guard lock(mutex);
-    (level == LogLevel::Info ? notes : warnings).emplace_back(message);
+    (level <= LogLevel::Info ? notes : warnings).emplace_back(message);
   };
 
   const std::unique_ptr<Registry> registry = make_registry(global, console);

@@ -29,6 +29,7 @@ std::vector<std::string> AssimpLoader::claims() const {
 void AssimpLoader::load(std::string_view asset, Scene& scene, NodeId root) {
   const std::string name(asset);
   const SceneFile file(name, host_);
+  host_.log(LogLevel::Debug, describe_units(file, params_.unstated));
   SceneTranslator translator(file, params_.unstated, host_, scene);
   translator.translate(root);
   const std::vector<std::string>& missing = translator.missing();

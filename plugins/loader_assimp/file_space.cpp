@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
+#include <sstream>
 
 namespace diorama::loader_assimp {
 namespace {
@@ -95,6 +96,18 @@ Affine metres_from_file(const SceneFile& file, const UnstatedSpace& unstated) {
   }
   // Everything else comes in metres and Y up; assimp turns and scales COLLADA itself.
   return z_up_from('y') * root;
+}
+
+std::string describe_units(const SceneFile& file, const UnstatedSpace& unstated) {
+  // Root nodes of these formats may have poses of their own, which are no units.
+  const bool is_fixed = file.format() == Format::Gltf || file.format() == Format::Other;
+  const Affine metres = is_fixed ? z_up_from('y') : metres_from_file(file, unstated);
+  Vec3::Index axis = 0;
+  metres.linear().row(2).cwiseAbs().maxCoeff(&axis);
+  std::ostringstream text;
+  text << "units: " << std::cbrt(std::abs(metres.linear().determinant())) << " m, "
+       << (metres.linear()(2, axis) < 0.0 ? "-" : "") << "xyz"[axis] << " up";
+  return text.str();
 }
 
 }  // namespace diorama::loader_assimp

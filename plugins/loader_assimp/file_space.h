@@ -22,4 +22,7 @@ Affine to_affine(const aiMatrix4x4& matrix);
 /// included. A file that says nonsense about its axes counts as Y up.
 Affine metres_from_file(const SceneFile& file, const UnstatedSpace& unstated);
 
+/// "units: 0.01 m, y up", as the file or its format says.
+std::string describe_units(const SceneFile& file, const UnstatedSpace& unstated);
+
 }  // namespace diorama::loader_assimp

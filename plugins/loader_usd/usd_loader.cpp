@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <set>
+#include <sstream>
 
 #include "diorama/error.h"
 #include "loader_usd/scene_translator.h"
@@ -51,6 +52,11 @@ class FileCollector {
   std::set<std::string> known_;
   std::vector<std::filesystem::path> files_;
 };
+std::string describe_units(const usd::Stage& stage) {
+  std::ostringstream text;
+  text << "units: " << stage.meters_per_unit() << " m, " << (stage.is_z_up() ? "z" : "y") << " up";
+  return text.str();
+}
 
 }  // namespace
 
@@ -69,6 +75,7 @@ std::vector<std::filesystem::path> UsdLoader::files(std::string_view asset) cons
 void UsdLoader::load(std::string_view asset, Scene& scene, NodeId root) {
   try {
     usd::Stage stage(std::string(asset), usd::Sampling::OrFirstSample);
+    host_.log(LogLevel::Debug, describe_units(stage));
     SceneTranslator(stage, host_, scene).translate(root);
     const auto& missing = stage.diagnostics().missing_assets();
     if (params_.missing_assets_are_errors && !missing.empty()) {

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <string>
 
+#include "loader_assimp/file_space.h"
 #include "plugins/loader_assimp/loaded_file.h"
 #include "support/catch.h"
 #include "support/temporary_folder.h"
@@ -256,6 +257,20 @@ TEST_CASE("FBX is scaled by its unit and turned by its axes", "[loader_assimp]")
   const LoadedFile bad(
       folder.write("bad.fbx", fbx(fbx_axes(0, 1, 0, 1) + fbx_double("UnitScaleFactor", 100.0))));
   check_box(bad.bounds(), {1, -3, 0}, {3, 0, 0});
+}
+
+TEST_CASE("units and axes can be told", "[loader_assimp]") {
+  const TemporaryFolder folder;
+  test::RenderHost host{1};
+  const auto told = [&](const std::string& name, const std::string& text) {
+    return describe_units(SceneFile(folder.write(name, text), host), {});
+  };
+  CHECK(told("a.fbx", fbx(fbx_axes(2, 1, 1, -1) + fbx_double("UnitScaleFactor", 2.54))) ==
+        "units: 0.0254 m, z up");
+  CHECK(told("b.fbx", fbx(fbx_axes(1, -1, 2, -1) + fbx_double("UnitScaleFactor", 100.0))) ==
+        "units: 1 m, -y up");
+  CHECK(told("c.dae", collada("0.01", "Y_UP")) == "units: 0.01 m, y up");
+  CHECK(told("d.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n") == "units: 1 m, z up");
 }
 
 }  // namespace diorama::loader_assimp

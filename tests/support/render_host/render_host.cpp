@@ -9,7 +9,9 @@
 
 namespace diorama::test {
 
-void RenderHost::log(LogLevel, std::string_view message) { messages.emplace_back(message); }
+void RenderHost::log(LogLevel level, std::string_view message) {
+  if (level != LogLevel::Debug) messages.emplace_back(message);
+}
 
 std::filesystem::path RenderHost::resolve(std::string_view asset) const { return asset; }
 

@@ -10,7 +10,7 @@
 namespace diorama::test {
 
 /// The host services that a renderer uses, without plugins and assets: threads, image codecs and a
-/// log that is kept.
+/// log that is kept, but for what is of use in debugging only.
 class RenderHost final : public Host {
  public:
   explicit RenderHost(int threads) : pool_(threads) {}
