@@ -73,7 +73,7 @@ def Xform "Mug" (
     }
 }
 )");
-  TextureHost host;
+  test::TextureHost host;
   std::vector<std::string> names;
   for (const auto& path : UsdLoader({}, host).files(file)) names.push_back(path.filename());
   CHECK(names.front() == "mug.usda");
