@@ -33,7 +33,8 @@ class ChannelFiller {
       const CentreHit* hits = &hits_[y * std::size_t(width)];
       for (std::size_t x = 0; x < row.size(); ++x) {
         if (!hits[x].hit) continue;
-        row[x] = value(hits[x], RenderScene::surface_at(hits[x].hit, hits[x].ray.direction));
+        row[x] = value(hits[x], RenderScene::surface_at(hits[x].hit, hits[x].ray.origin,
+                                                        hits[x].ray.direction));
       }
     });
     frame_.set(channel, std::move(image));

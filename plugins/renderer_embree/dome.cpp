@@ -4,33 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "sampling.h"
-
 namespace diorama {
-namespace {
-
-constexpr float kMinSine = 1e-4f;  // keeps densities finite at the poles
-
-/// (0, 0) is the top left of the image.
-Vec2f square_from_direction(const Vec3f& d) {
-  const float u = 0.5f - std::atan2(d.y(), d.x()) / (2.0f * kPiF);
-  const float v = std::acos(std::clamp(d.z(), -1.0f, 1.0f)) / kPiF;
-  return {std::clamp(u, 0.0f, 1.0f), std::clamp(v, 0.0f, 1.0f)};
-}
-
-float sine_of_row(float v) { return std::max(kMinSine, std::sin(v * kPiF)); }
-
-int cell_of(float x, int count) { return std::clamp(int(x * float(count)), 0, count - 1); }
-
-/// Index of the interval of a cumulative table that holds u.
-int interval(const float* cumulative, int count, float u) {
-  const float* end = cumulative + count;
-  const float* it = std::upper_bound(cumulative + 1, end, u);
-  return int(it - cumulative) - 1;
-}
-
-}  // namespace
-
 SquareDistribution::SquareDistribution(const std::vector<float>& weights, int width, int height)
     : width_(width), height_(height), weights_(weights) {
   double sum = 0.0;
@@ -60,25 +34,35 @@ SquareDistribution::SquareDistribution(const std::vector<float>& weights, int wi
   row_sums_.back() = 1.0f;
 }
 
-SquareDistribution::Draw SquareDistribution::sample(const Vec2f& u) const {
-  const auto place = [](const float* cumulative, int cell, float value) {
-    const float size = cumulative[cell + 1] - cumulative[cell];
-    const float rest = size > 0.0f ? (value - cumulative[cell]) / size : 0.5f;
-    return float(cell) + std::clamp(rest, 0.0f, 0.99999f);
-  };
-  const int y = interval(row_sums_.data(), height_, u.y());
-  const float* row = &within_row_[std::size_t(y) * std::size_t(width_ + 1)];
-  const int x = interval(row, width_, u.x());
-  return {
-      {place(row, x, u.x()) / float(width_), place(row_sums_.data(), y, u.y()) / float(height_)},
-      weights_[std::size_t(y) * std::size_t(width_) + std::size_t(x)]};
+namespace {
+
+/// The table merged into cells twice as large as long as that costs little: large tables do not fit
+/// into the processor's caches, and most of a sky is smooth.
+SquareDistribution smallest_table(std::vector<float> weights, int width, int height) {
+  constexpr float kMaxLoss = 1.1f;  // growth of the weights' second moment
+  double fine = 0.0;
+  for (const float w : weights) fine += double(w) * double(w);
+  fine /= double(weights.size());
+  while (width % 2 == 0 && height % 2 == 0) {
+    std::vector<float> merged;
+    double second = 0.0;
+    for (int y = 0; y < height; y += 2) {
+      for (int x = 0; x < width; x += 2) {
+        const float* p = &weights[std::size_t(y * width + x)];
+        const float* q = p + width;
+        merged.push_back(0.25f * (p[0] + p[1] + q[0] + q[1]));
+        second += double(merged.back()) * double(merged.back());
+      }
+    }
+    if (fine > kMaxLoss * second / double(merged.size())) break;
+    weights = std::move(merged);
+    width /= 2;
+    height /= 2;
+  }
+  return SquareDistribution(weights, width, height);
 }
 
-float SquareDistribution::density(const Vec2f& point) const {
-  const int x = cell_of(point.x(), width_);
-  const int y = cell_of(point.y(), height_);
-  return weights_[std::size_t(y) * std::size_t(width_) + std::size_t(x)];
-}
+}  // namespace
 
 DomeTexture::DomeTexture(std::shared_ptr<const Texture> source) : image_(std::move(source)) {
   // A grid of cells over the image, whole cells per patch, no finer than 1024 x 512.
@@ -120,38 +104,9 @@ DomeTexture::DomeTexture(std::shared_ptr<const Texture> source) : image_(std::mo
         power += weights.back() * cell;
       }
     }
-    patches_.emplace_back(weights, per_patch_x, per_patch_y);
+    patches_.push_back(smallest_table(std::move(weights), per_patch_x, per_patch_y));
     patch_power_.push_back(power);
   }
-}
-
-Vec3f DomeTexture::radiance(const Vec3f& direction) const {
-  const Vec2f p = square_from_direction(direction);
-  const Rgba value = image_.lookup({p.x(), 1.0f - p.y()}, 0.0f, Wrap::Repeat, Wrap::Clamp);
-  return value.head<3>().matrix().cwiseMax(0.0f);
-}
-
-DomeTexture::Draw DomeTexture::sample(int patch, const Vec2f& u) const {
-  const SquareDistribution::Draw draw = patches_[std::size_t(patch)].sample(u);
-  const Vec2f p((float(patch % kColumns) + draw.point.x()) / float(kColumns),
-                (float(patch / kColumns) + draw.point.y()) / float(kRows));
-  const float theta = p.y() * kPiF;
-  const float phi = (0.5f - p.x()) * 2.0f * kPiF;
-  const float sine = std::sin(theta);
-  const Rgba value = image_.lookup({p.x(), 1.0f - p.y()}, 0.0f, Wrap::Repeat, Wrap::Clamp);
-  return {{sine * std::cos(phi), sine * std::sin(phi), std::cos(theta)},
-          value.head<3>().matrix().cwiseMax(0.0f),
-          draw.density * float(kPatches) / (2.0f * kPiF * kPiF * sine_of_row(p.y()))};
-}
-
-DomeTexture::Place DomeTexture::place(const Vec3f& direction) const {
-  const Vec2f p = square_from_direction(direction);
-  const int column = cell_of(p.x(), kColumns);
-  const int row = cell_of(p.y(), kRows);
-  const int patch = row * kColumns + column;
-  const Vec2f within(p.x() * float(kColumns) - float(column), p.y() * float(kRows) - float(row));
-  return {patch, patches_[std::size_t(patch)].density(within) * float(kPatches) /
-                     (2.0f * kPiF * kPiF * sine_of_row(p.y()))};
 }
 
 }  // namespace diorama

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <memory>
 #include <vector>
 
 #include "diorama/light.h"
 #include "mip_texture.h"
+#include "sampling.h"
 
 namespace diorama {
 
@@ -22,9 +25,22 @@ class SquareDistribution {
     float density = 0.0f;
   };
   Draw sample(const Vec2f& u) const;
-  float density(const Vec2f& point) const;
+  float density(const Vec2f& point) const {
+    const int x = cell_of(point.x(), width_);
+    const int y = cell_of(point.y(), height_);
+    return weights_[std::size_t(y) * std::size_t(width_) + std::size_t(x)];
+  }
+  static int cell_of(float x, int count) { return std::clamp(int(x * float(count)), 0, count - 1); }
 
  private:
+  /// Place of u among the intervals of a cumulative table, as index plus share.
+  static float inverse(const float* cumulative, int count, float u) {
+    const float* it = std::upper_bound(cumulative + 1, cumulative + count, u) - 1;
+    const float size = it[1] - it[0];
+    const float rest = size > 0.0f ? (u - it[0]) / size : 0.5f;
+    return float(it - cumulative) + std::clamp(rest, 0.0f, 0.99999f);
+  }
+
   int width_ = 0;
   int height_ = 0;
   std::vector<float> weights_;     ///< Scaled to a mean of 1.
@@ -42,14 +58,12 @@ class DomeTexture {
 
   explicit DomeTexture(std::shared_ptr<const Texture> source);
 
-  /// In the dome's space, unit direction.
-  Vec3f radiance(const Vec3f& direction) const;
   /// Luminance times solid angle of a patch.
   float patch_power(int patch) const { return patch_power_[std::size_t(patch)]; }
 
   struct Draw {
     Vec3f direction;
-    Vec3f radiance;
+    Vec2f place;           ///< In the image.
     float density = 0.0f;  ///< Per solid angle, given the patch.
   };
   Draw sample(int patch, const Vec2f& u) const;
@@ -57,13 +71,58 @@ class DomeTexture {
   struct Place {
     int patch = 0;
     float density = 0.0f;  ///< As in Draw.
+    Vec3f radiance = Vec3f::Zero();
   };
   Place place(const Vec3f& direction) const;
 
+  /// (0, 0) is the top left of the image.
+  Vec3f radiance_at(const Vec2f& p) const {
+    const Rgba value = image_.lookup({p.x(), 1.0f - p.y()}, 0.0f, Wrap::Repeat, Wrap::Clamp);
+    return value.head<3>().matrix().cwiseMax(0.0f);
+  }
+
  private:
+  /// Per solid angle, of a density over the patch's square; finite at the poles.
+  static float per_solid_angle(float density, float sine) {
+    return density * float(kPatches) / (2.0f * kPiF * kPiF * std::max(1e-4f, sine));
+  }
+
   MipTexture image_;
   std::vector<SquareDistribution> patches_;
   std::vector<float> patch_power_;
 };
+
+inline SquareDistribution::Draw SquareDistribution::sample(const Vec2f& u) const {
+  const float y = inverse(row_sums_.data(), height_, u.y());
+  const auto row = std::size_t(y);
+  const float x = inverse(&within_row_[row * std::size_t(width_ + 1)], width_, u.x());
+  return {{x / float(width_), y / float(height_)},
+          weights_[row * std::size_t(width_) + std::size_t(x)]};
+}
+
+inline DomeTexture::Draw DomeTexture::sample(int patch, const Vec2f& u) const {
+  const SquareDistribution::Draw draw = patches_[std::size_t(patch)].sample(u);
+  const Vec2f p((float(patch % kColumns) + draw.point.x()) / float(kColumns),
+                (float(patch / kColumns) + draw.point.y()) / float(kRows));
+  const Vec2f height = unit_circle(0.5f * p.y());
+  const Vec2f around = unit_circle(p.x());
+  const float sine = height.y();
+  // The image's centre column lies at +x, its right half towards -y.
+  return {
+      {-sine * around.x(), sine * around.y(), height.x()}, p, per_solid_angle(draw.density, sine)};
+}
+
+inline DomeTexture::Place DomeTexture::place(const Vec3f& d) const {
+  const float u = 0.5f - std::atan2(d.y(), d.x()) / (2.0f * kPiF);
+  const float v = std::acos(std::clamp(d.z(), -1.0f, 1.0f)) / kPiF;
+  const Vec2f p(std::clamp(u, 0.0f, 1.0f), std::clamp(v, 0.0f, 1.0f));
+  const int column = SquareDistribution::cell_of(p.x(), kColumns);
+  const int row = SquareDistribution::cell_of(p.y(), kRows);
+  const int patch = row * kColumns + column;
+  const Vec2f within(p.x() * float(kColumns) - float(column), p.y() * float(kRows) - float(row));
+  const float sine = std::sqrt(std::max(0.0f, 1.0f - d.z() * d.z()));
+  return {patch, per_solid_angle(patches_[std::size_t(patch)].density(within), sine),
+          radiance_at(p)};
+}
 
 }  // namespace diorama

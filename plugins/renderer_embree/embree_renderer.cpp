@@ -19,7 +19,8 @@ namespace {
 constexpr std::array kModes{"path_traced", "real_time", "preview"};
 constexpr std::array kExposures{"auto", "fixed"};
 constexpr std::array kViewTransforms{"standard", "filmic"};
-constexpr std::array kIsas{"auto", "sse2", "sse4.2", "avx", "avx2", "avx512"};
+constexpr std::array kSphereLights{"sphere", "disk"};
+constexpr std::array kIsas{"auto", kIsaNames[0], kIsaNames[1], kIsaNames[2], kIsaNames[3]};
 
 constexpr int kTile = 16;  // pixels
 
@@ -71,11 +72,18 @@ void EmbreeRenderer::Params::visit(ParamVisitor& v) {
           {"Stops added to the exposure; with fixed, 0 leaves radiance as it is.", "EV", -40, 40});
   v.choice("view_transform", view_transform, kViewTransforms,
            {"From exposed light to the picture: standard clips, filmic rolls highlights off."});
-  v.choice("isa", isa, kIsas, {"Instruction set of the ray tracing kernels."});
+  v.choice("sphere_lights", sphere_lights, kSphereLights,
+           {"sphere: as the scene says; disk: like disks that turn to every point they light, as "
+            "Blender's point lights do."});
+  v.choice("isa", isa, kIsas,
+           {"Instruction set of the kernels; pictures are the same bytes within one."});
 }
 
 EmbreeRenderer::EmbreeRenderer(Params params, Host& host)
-    : params_(std::move(params)), host_(host), meshes_(host, params_.isa) {
+    : params_(std::move(params)),
+      host_(host),
+      isa_(isa_by_name(params_.isa)),
+      meshes_(host, {kIsaNames[std::size_t(isa_)], params_.sphere_lights == "disk"}) {
   if (params_.mode == "path_traced") return;
   params_.denoise = true;
   params_.max_bounces = std::min(params_.max_bounces, params_.mode == "real_time" ? 1 : 0);
@@ -97,35 +105,31 @@ void EmbreeRenderer::do_prepare(const Scene& scene) {
 
 Film EmbreeRenderer::trace(const View& view, std::uint64_t seed) {
   const TraceSettings settings{params_.max_bounces, float(params_.clamp), params_.caustics};
-  const PathTracer tracer(meshes_, view, table_, settings);
+  const PathTracer tracer(meshes_, view, table_, settings, isa_);
   const int width = view.camera().width;
   const int height = view.camera().height;
-  Film film(width, height, FilmPixel{});
+  Image<PixelSum> sums(width, height, PixelSum{});
   const int columns = (width + kTile - 1) / kTile;
   const int rows = (height + kTile - 1) / kTile;
   std::atomic<std::uint64_t> rays{0};
   std::atomic<std::uint64_t> shadow_rays{0};
   host_.parallel_for(std::size_t(columns * rows), [&](std::size_t tile) {
     const FlushDenormals flush;
-    std::uint64_t tile_rays = 0;
-    std::uint64_t tile_shadow_rays = 0;
-    const int x_begin = int(tile) % columns * kTile;
-    const int y_begin = int(tile) / columns * kTile;
-    for (int y = y_begin; y < std::min(height, y_begin + kTile); ++y) {
-      for (int x = x_begin; x < std::min(width, x_begin + kTile); ++x) {
-        PixelSum sum;
-        for (int s = 0; s < params_.samples; ++s) {
-          const PathSample sample = tracer.trace(x, y, std::uint32_t(s), seed);
-          tile_rays += sample.rays;
-          tile_shadow_rays += sample.shadow_rays;
-          sum.add(sample);
-        }
-        film.at(x, y) = sum.mean();
-      }
-    }
-    rays += tile_rays;
-    shadow_rays += tile_shadow_rays;
+    TraceJob job;
+    job.x_begin = int(tile) % columns * kTile;
+    job.y_begin = int(tile) / columns * kTile;
+    job.x_end = std::min(width, job.x_begin + kTile);
+    job.y_end = std::min(height, job.y_begin + kTile);
+    job.sample_end = std::uint32_t(params_.samples);
+    job.seed = seed;
+    const RayCounts counts = tracer.trace(job, sums.pixels().data(), std::size_t(width));
+    rays += counts.rays;
+    shadow_rays += counts.shadow_rays;
   });
+  Film film(width, height, FilmPixel{});
+  for (std::size_t i = 0; i < film.pixels().size(); ++i) {
+    film.pixels()[i] = sums.pixels()[i].mean();
+  }
   counts_.rays = rays;
   counts_.shadow_rays = shadow_rays;
   counts_.paths = film.pixels().size() * std::uint64_t(params_.samples);

@@ -28,6 +28,7 @@ class EmbreeRenderer final : public Renderer {
     std::string exposure = "auto";
     double exposure_ev = 0.0;
     std::string view_transform = "filmic";
+    std::string sphere_lights = "sphere";
     std::string isa = "auto";
 
     void visit(ParamVisitor& v);
@@ -57,6 +58,7 @@ class EmbreeRenderer final : public Renderer {
 
   Params params_;
   Host& host_;
+  Isa isa_;
   SobolTable table_;
   RenderScene meshes_;
   Counts counts_;

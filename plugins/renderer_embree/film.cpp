@@ -1,25 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "film.h"
 
-#include <algorithm>
-
-#include "sampling.h"
-
 namespace diorama {
-
-void PixelSum::add(const PathSample& sample) {
-  ++count_;
-  sum_.seen += sample.seen;
-  sum_.scattered += sample.scattered;
-  const double l = double(luminance(sample.scattered));
-  luminance_ += l;
-  luminance2_ += l * l;
-  if (!sample.has_surface) return;
-  ++surfaces_;
-  sum_.albedo += sample.albedo;
-  sum_.normal += sample.normal;
-  sum_.position += sample.position;
-}
 
 FilmPixel PixelSum::mean() const {
   FilmPixel pixel;

@@ -2,12 +2,14 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <vector>
 
 #include "diorama/light.h"
 #include "dome.h"
+#include "light_tree.h"
 #include "sampling.h"
 #include "sky_grid.h"
 
@@ -26,40 +28,42 @@ struct EmittingTriangles {
   Vec3f mean_radiance = Vec3f::Zero();
 };
 
-/// Where light is wanted.
-struct Receiver {
-  Vec3f position = Vec3f::Zero();
-  Vec3f normal = Vec3f::UnitZ();
-  bool is_two_sided = false;  ///< Light from behind counts as well.
-  float total_score = 0.0f;   ///< Written by Lights::choose.
-};
-
 struct LightSample {
   Vec3f direction = Vec3f::Zero();  ///< Unit, from the receiver.
   float distance = 0.0f;            ///< Infinite for dome and distant lights.
-  /// Radiance arriving; for emitting triangles to be read off the surface (`triangle`, `u`, `v`).
+  /// Radiance arriving. Of a dome: see radiance_of(); of emitting triangles: to be read off the
+  /// surface (`triangle`, `barycentric`).
   Vec3f radiance = Vec3f::Zero();
   /// Per solid angle, without the choice of the light. Infinite: `radiance` is an irradiance, and
   /// no other technique can find the light.
   float density = 0.0f;
   std::uint32_t geometry = 0;
   std::uint32_t triangle = 0;
-  Vec2f barycentric = Vec2f::Zero();
+  Vec2f barycentric = Vec2f::Zero();  ///< Or the place in a dome's image.
   bool is_surface = false;
 };
 
 /// All that emits. A light is chosen in proportion to its unshadowed contribution (estimated), so
-/// that one shadow ray per vertex goes where it matters.
+/// that one shadow ray per vertex goes where it matters. Filled by add(), made ready by finish().
+/// What render kernels call is inline: it is compiled into each of them.
 class Lights {
  public:
+  /// `has_disk_lamps`: spheres shine like disks that turn to every point they light, as in Cycles;
+  /// points closer than a few radii get less light from them than from a sphere.
+  explicit Lights(bool has_disk_lamps = false) : has_disk_lamps_(has_disk_lamps) {}
+
   /// `texture`: of a dome; one without an image has a white one.
   void add(const Light& light, const Affine& world_from_node,
            std::shared_ptr<const DomeTexture> texture);
   /// Returns the light's number; triangles without area are dropped.
   std::uint32_t add(EmittingTriangles triangles);
 
-  /// Finds out which parts of the domes can be seen from where in the scene.
-  void learn_sky(const Aabb& bounds, const SkyGrid::Sees& sees, Host& host);
+  /// Builds the tables for choosing; call after the last add().
+  void finish();
+  /// Which parts of a dome can be seen from where; null: all from everywhere.
+  using GridOf = std::function<std::shared_ptr<const SkyGrid>(
+      const std::shared_ptr<const DomeTexture>&, const Eigen::Matrix3f& world_from_dome)>;
+  void learn_sky(const GridOf& grid_of);
 
   bool is_empty() const { return lights_.empty(); }
   std::size_t count() const { return lights_.size(); }
@@ -75,6 +79,13 @@ class Lights {
 
   /// Density zero: nothing arrives from this light.
   LightSample sample(std::uint32_t light, const Vec3f& from, const Vec2f& u) const;
+  /// The radiance of a sample. Apart from sample() because a dome's image is large: it is read only
+  /// when the sample turns out to be lit.
+  Vec3f radiance_of(std::uint32_t light, const LightSample& sample) const {
+    const Record& record = lights_[light];
+    if (record.shape != Shape::Dome) return sample.radiance;
+    return record.radiance.cwiseProduct(record.texture->radiance_at(sample.barycentric));
+  }
   /// Density per solid angle of an emitting triangle's point, seen from `from`.
   float density_of_surface(std::uint32_t light, float distance, float cos_at_light) const;
 
@@ -83,22 +94,10 @@ class Lights {
   /// sample() from `from`, the start of the ray.
   template <class Found>
   void along_ray(const Vec3f& from, const Vec3f& direction, float t_max, bool is_camera_ray,
-                 Found&& found) const {
-    const auto report = [&](std::uint32_t index) {
-      const Record& light = lights_[index];
-      if (is_camera_ray && !light.is_visible_to_camera) return;
-      Vec3f radiance;
-      const float density = meet(light, from, direction, t_max, radiance);
-      if (density > 0.0f) found(index, radiance, density);
-    };
-    for (std::uint32_t index : bodies_) report(index);
-    if (t_max == std::numeric_limits<float>::infinity()) {
-      for (std::uint32_t index : surroundings_) report(index);
-    }
-  }
+                 Found&& found) const;
 
  private:
-  enum class Shape : std::uint8_t { Sphere, Rect, Disk, Distant, Dome, Triangles };
+  enum class Shape : std::uint8_t { Sphere, TurningDisk, Rect, Disk, Distant, Dome, Triangles };
   struct Record {
     Shape shape = Shape::Sphere;
     Vec3f position = Vec3f::Zero();
@@ -123,20 +122,325 @@ class Lights {
     std::vector<float> cumulative_area;
   };
 
-  float score(const Record& light, const Receiver& receiver) const;
+  static bool is_body(const Record& light) {
+    return light.shape != Shape::Distant && light.shape != Shape::Dome;
+  }
+  static float score_of_surroundings(const Record& light, const Receiver& receiver);
   static float cone_factor(const Record& light, const Vec3f& from_light);
+  /// Returns the density; zero: not met.
   static float meet(const Record& light, const Vec3f& from, const Vec3f& direction, float t_max,
                     Vec3f& radiance);
+  static float meet_sphere(const Record& light, const Vec3f& from, const Vec3f& direction,
+                           float t_max, Vec3f& radiance);
+  static float meet_turning_disk(const Record& light, const Vec3f& from, const Vec3f& direction,
+                                 float t_max, Vec3f& radiance);
+  static float meet_flat(const Record& light, const Vec3f& from, const Vec3f& direction,
+                         float t_max, Vec3f& radiance);
   static LightSample sample_sphere(const Record& light, const Vec3f& from, const Vec2f& u);
+  static LightSample sample_turning_disk(const Record& light, const Vec3f& from, const Vec2f& u);
   static LightSample sample_flat(const Record& light, const Vec3f& from, const Vec2f& u);
   static LightSample sample_distant(const Record& light, const Vec2f& u);
   static LightSample sample_dome(const Record& light, const Vec3f& from, const Vec2f& u);
   static LightSample sample_triangles(const Record& light, const Vec3f& from, const Vec2f& u);
-  void add_record(Record record);
 
+  bool has_disk_lamps_;
   std::vector<Record> lights_;
-  std::vector<std::uint32_t> bodies_;        ///< Sphere, rect, disk.
+  std::vector<std::uint32_t> shapes_;        ///< Sphere, rect, disk: rays meet them here.
+  std::vector<std::uint32_t> bodies_;        ///< All with a place, in the order of the tree.
   std::vector<std::uint32_t> surroundings_;  ///< Distant, dome.
+  std::vector<std::uint32_t> order_;         ///< Per light: its number in bodies_.
+  LightTree tree_;
 };
+
+// One minus the cosine of the half angle under which a sphere of this squared sine is seen, without
+// cancellation.
+inline float one_minus_cos_of(float sin2) {
+  return sin2 / (1.0f + std::sqrt(std::max(0.0f, 1.0f - sin2)));
+}
+
+template <class Found>
+void Lights::along_ray(const Vec3f& from, const Vec3f& direction, float t_max, bool is_camera_ray,
+                       Found&& found) const {
+  const auto report = [&](std::uint32_t index) {
+    const Record& light = lights_[index];
+    if (is_camera_ray && !light.is_visible_to_camera) return;
+    Vec3f radiance = Vec3f::Zero();
+    const float density = meet(light, from, direction, t_max, radiance);
+    if (density > 0.0f) found(index, radiance, density);
+  };
+  for (const std::uint32_t index : shapes_) {
+    const Record& light = lights_[index];
+    const Vec3f to = light.position - from;
+    const float along = to.dot(direction);
+    const float off2 = (to - along * direction).squaredNorm();
+    if (off2 < light.radius * light.radius && along + light.radius > 0.0f) report(index);
+  }
+  if (t_max == std::numeric_limits<float>::infinity()) {
+    for (const std::uint32_t index : surroundings_) report(index);
+  }
+}
+
+inline float Lights::score_of_surroundings(const Record& light, const Receiver& receiver) {
+  constexpr float kFloor = 0.1f;
+  if (light.shape == Shape::Dome) {
+    return light.power * light.sky->power(light.sky->cell(receiver.position));
+  }
+  const float reach = std::sqrt(light.one_minus_cos * (2.0f - light.one_minus_cos)) + 1e-3f;
+  const float facing = -receiver.normal.dot(light.direction);
+  const float cosine = reach + (receiver.is_two_sided ? std::abs(facing) : facing);
+  return cosine <= 0.0f ? 0.0f : light.power * std::max(kFloor, std::min(1.0f, cosine));
+}
+
+inline Lights::Choice Lights::choose(Receiver& receiver, float u) const {
+  const LightTree::Scores root = tree_.root_scores(receiver);
+  float total = root.sum;
+  for (const std::uint32_t index : surroundings_) {
+    total += score_of_surroundings(lights_[index], receiver);
+  }
+  receiver.total_score = total;
+  if (!(total > 0.0f)) return {};
+  float target = u * total;
+  if (target < root.sum) {
+    const LightTree::Choice body =
+        tree_.choose(receiver, root, std::min(target / root.sum, 0.9999999f));
+    return {bodies_[body.light], body.probability * (root.sum / total)};
+  }
+  target -= root.sum;
+  Choice choice;
+  for (const std::uint32_t index : surroundings_) {
+    const float score = score_of_surroundings(lights_[index], receiver);
+    if (!(score > 0.0f)) continue;
+    choice = {index, score / total};
+    if (target < score) break;
+    target -= score;
+  }
+  return choice;
+}
+
+inline float Lights::probability(std::uint32_t light, const Receiver& receiver) const {
+  const float total = receiver.total_score;
+  if (!(total > 0.0f)) return 0.0f;
+  const Record& record = lights_[light];
+  if (!is_body(record)) return score_of_surroundings(record, receiver) / total;
+  float tree_score = 0.0f;
+  const float within = tree_.probability(order_[light], receiver, tree_score);
+  return within * (tree_score / total);
+}
+
+inline float Lights::cone_factor(const Record& light, const Vec3f& from_light) {
+  if (light.cos_outer < -1.0f) return 1.0f;
+  const float c = from_light.dot(light.direction);
+  const float t =
+      std::clamp((c - light.cos_outer) / (light.cos_inner - light.cos_outer), 0.0f, 1.0f);
+  return t * t * (3.0f - 2.0f * t);
+}
+
+inline LightSample Lights::sample(std::uint32_t index, const Vec3f& from, const Vec2f& u) const {
+  const Record& light = lights_[index];
+  switch (light.shape) {
+    case Shape::Sphere:
+      return sample_sphere(light, from, u);
+    case Shape::TurningDisk:
+      return sample_turning_disk(light, from, u);
+    case Shape::Rect:
+    case Shape::Disk:
+      return sample_flat(light, from, u);
+    case Shape::Distant:
+      return sample_distant(light, u);
+    case Shape::Dome:
+      return sample_dome(light, from, u);
+    case Shape::Triangles:
+      break;
+  }
+  return sample_triangles(light, from, u);
+}
+
+inline LightSample Lights::sample_sphere(const Record& light, const Vec3f& from, const Vec2f& u) {
+  const Vec3f to_centre = light.position - from;
+  const float distance2 = to_centre.squaredNorm();
+  const float sin2 = light.radius * light.radius / distance2;
+  if (!(sin2 < 1.0f)) return {};
+  const float distance = std::sqrt(distance2);
+  const float one_minus_cos = one_minus_cos_of(sin2);
+  const Vec3f local = uniform_cone(u, one_minus_cos);
+  LightSample s;
+  s.direction = unit(basis_around(to_centre * (1.0f / distance)).to_world(local));
+  const float sine2 = std::max(0.0f, 1.0f - local.z() * local.z());
+  s.distance = distance * local.z() -
+               std::sqrt(std::max(0.0f, light.radius * light.radius - distance2 * sine2));
+  s.radiance = light.radiance * cone_factor(light, -s.direction);
+  s.density = 1.0f / (2.0f * kPiF * one_minus_cos);
+  return s;
+}
+
+inline LightSample Lights::sample_turning_disk(const Record& light, const Vec3f& from,
+                                               const Vec2f& u) {
+  const Vec3f to_centre = light.position - from;
+  const float height2 = to_centre.squaredNorm();
+  if (!(height2 > light.radius * light.radius)) return {};
+  const Basis basis = basis_around(unit(to_centre));
+  const Vec2f p = disk_from_square(u) * light.radius;
+  const Vec3f to_light = to_centre + p.x() * basis.x + p.y() * basis.y;
+  LightSample s;
+  const float distance2 = to_light.squaredNorm();
+  s.distance = std::sqrt(distance2);
+  s.direction = to_light * (1.0f / s.distance);
+  s.density = distance2 * s.distance / (std::sqrt(height2) * light.area);
+  s.radiance = light.radiance * cone_factor(light, -s.direction);
+  return s;
+}
+
+inline LightSample Lights::sample_flat(const Record& light, const Vec3f& from, const Vec2f& u) {
+  const Vec2f p = light.shape == Shape::Disk ? disk_from_square(u)
+                                             : Vec2f(2.0f * u.x() - 1.0f, 2.0f * u.y() - 1.0f);
+  const Vec3f to_light = light.position + p.x() * light.axis_x + p.y() * light.axis_y - from;
+  const float distance2 = to_light.squaredNorm();
+  LightSample s;
+  s.distance = std::sqrt(distance2);
+  s.direction = to_light * (1.0f / s.distance);
+  const float cosine = -s.direction.dot(light.direction);
+  if (!(cosine > 1e-6f)) return {};
+  s.density = distance2 / (cosine * light.area);
+  s.radiance = light.radiance * cone_factor(light, -s.direction);
+  return s;
+}
+
+inline LightSample Lights::sample_distant(const Record& light, const Vec2f& u) {
+  LightSample s;
+  s.distance = std::numeric_limits<float>::infinity();
+  s.radiance = light.radiance;
+  if (light.one_minus_cos <= 0.0f) {
+    s.direction = -light.direction;
+    s.density = std::numeric_limits<float>::infinity();
+    return s;
+  }
+  const Vec3f local = uniform_cone(u, light.one_minus_cos);
+  s.direction = unit(basis_around(-light.direction).to_world(local));
+  s.density = 1.0f / (2.0f * kPiF * light.one_minus_cos);
+  return s;
+}
+
+[[gnu::noinline]] inline LightSample Lights::sample_dome(const Record& light, const Vec3f& from,
+                                                         const Vec2f& u) {
+  const SkyGrid::Choice choice = light.sky->choose(light.sky->cell(from), u.x());
+  if (choice.probability <= 0.0f) return {};
+  const DomeTexture::Draw draw = light.texture->sample(choice.patch, {choice.rest, u.y()});
+  LightSample s;
+  s.distance = std::numeric_limits<float>::infinity();
+  s.direction = unit(light.dome_from_world.transpose() * draw.direction);
+  s.density = draw.density * choice.probability;
+  s.barycentric = draw.place;
+  return s;
+}
+
+[[gnu::noinline]] inline LightSample Lights::sample_triangles(const Record& light,
+                                                              const Vec3f& from, const Vec2f& u) {
+  if (light.triangles.empty()) return {};
+  const float target = u.x() * light.area;
+  const auto it =
+      std::upper_bound(light.cumulative_area.begin(), light.cumulative_area.end() - 1, target);
+  const auto index = std::size_t(it - light.cumulative_area.begin());
+  const float before = index == 0 ? 0.0f : light.cumulative_area[index - 1];
+  const float size = light.cumulative_area[index] - before;
+  const float again = size > 0.0f ? std::clamp((target - before) / size, 0.0f, 0.999999f) : 0.5f;
+  const EmittingTriangles::Triangle& t = light.triangles[index];
+  LightSample s;
+  s.barycentric = triangle_from_square({again, u.y()});
+  const Vec3f to_light = t.a + s.barycentric.x() * t.ab + s.barycentric.y() * t.ac - from;
+  const float distance2 = to_light.squaredNorm();
+  s.distance = std::sqrt(distance2);
+  s.direction = to_light / s.distance;
+  const float cosine = -s.direction.dot(t.ab.cross(t.ac).normalized());
+  if (!(std::abs(cosine) > 1e-6f) ||
+      ((cosine < 0.0f) != light.is_mirrored && !light.is_double_sided))
+    return {};
+  s.density = distance2 / (std::abs(cosine) * light.area);
+  s.radiance = light.radiance;
+  s.geometry = light.geometry;
+  s.triangle = t.index;
+  s.is_surface = true;
+  return s;
+}
+
+inline float Lights::density_of_surface(std::uint32_t light, float distance,
+                                        float cos_at_light) const {
+  return distance * distance / (std::max(1e-6f, std::abs(cos_at_light)) * lights_[light].area);
+}
+
+[[gnu::noinline]] inline float Lights::meet(const Record& light, const Vec3f& from,
+                                            const Vec3f& direction, float t_max, Vec3f& radiance) {
+  switch (light.shape) {
+    case Shape::Sphere:
+      return meet_sphere(light, from, direction, t_max, radiance);
+    case Shape::TurningDisk:
+      return meet_turning_disk(light, from, direction, t_max, radiance);
+    case Shape::Rect:
+    case Shape::Disk:
+      return meet_flat(light, from, direction, t_max, radiance);
+    case Shape::Distant: {
+      if (light.one_minus_cos <= 0.0f) return 0.0f;
+      // 1 - cos from the difference of the directions keeps narrow suns exact.
+      const float off = 0.5f * (direction + light.direction).squaredNorm();
+      if (off > light.one_minus_cos) return 0.0f;
+      radiance = light.radiance;
+      return 1.0f / (2.0f * kPiF * light.one_minus_cos);
+    }
+    case Shape::Dome: {
+      const DomeTexture::Place place = light.texture->place(light.dome_from_world * direction);
+      radiance = light.radiance.cwiseProduct(place.radiance);
+      return place.density * light.sky->probability(light.sky->cell(from), place.patch);
+    }
+    case Shape::Triangles:
+      break;
+  }
+  return 0.0f;
+}
+
+inline float Lights::meet_sphere(const Record& light, const Vec3f& from, const Vec3f& direction,
+                                 float t_max, Vec3f& radiance) {
+  const Vec3f to_centre = light.position - from;
+  const float distance2 = to_centre.squaredNorm();
+  const float radius2 = light.radius * light.radius;
+  if (distance2 <= radius2) return 0.0f;  // it shines outwards only
+  const float along = to_centre.dot(direction);
+  const float off2 = (to_centre - along * direction).squaredNorm();
+  if (along <= 0.0f || off2 >= radius2) return 0.0f;
+  if (along - std::sqrt(radius2 - off2) >= t_max) return 0.0f;
+  radiance = light.radiance * cone_factor(light, -direction);
+  return 1.0f / (2.0f * kPiF * one_minus_cos_of(radius2 / distance2));
+}
+
+inline float Lights::meet_turning_disk(const Record& light, const Vec3f& from,
+                                       const Vec3f& direction, float t_max, Vec3f& radiance) {
+  const Vec3f to_centre = light.position - from;
+  const float height2 = to_centre.squaredNorm();
+  const float along = to_centre.dot(direction);
+  if (along <= 0.0f || height2 <= light.radius * light.radius) return 0.0f;
+  const float t = height2 / along;
+  const float off2 = (t * direction - to_centre).squaredNorm();
+  if (t >= t_max || off2 >= light.radius * light.radius) return 0.0f;
+  radiance = light.radiance * cone_factor(light, -direction);
+  return t * t * t / (std::sqrt(height2) * light.area);
+}
+
+[[gnu::noinline]] inline float Lights::meet_flat(const Record& light, const Vec3f& from,
+                                                 const Vec3f& direction, float t_max,
+                                                 Vec3f& radiance) {
+  const float cosine = -direction.dot(light.direction);
+  if (cosine <= 1e-6f) return 0.0f;
+  const float t = (from - light.position).dot(light.direction) / cosine;
+  if (t <= 0.0f || t >= t_max) return 0.0f;
+  const Vec3f p = from + t * direction - light.position;
+  // Coordinates along the (possibly skew) axes.
+  const Vec3f normal = light.axis_x.cross(light.axis_y);
+  const float scale = 1.0f / normal.squaredNorm();
+  const float x = p.cross(light.axis_y).dot(normal) * scale;
+  const float y = light.axis_x.cross(p).dot(normal) * scale;
+  const bool is_inside =
+      light.shape == Shape::Disk ? x * x + y * y < 1.0f : std::abs(x) < 1.0f && std::abs(y) < 1.0f;
+  if (!is_inside) return 0.0f;
+  radiance = light.radiance * cone_factor(light, -direction);
+  return t * t / (cosine * light.area);
+}
 
 }  // namespace diorama

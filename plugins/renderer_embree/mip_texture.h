@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <vector>
 
+#include "diorama/image.h"
 #include "diorama/material.h"
 
 namespace diorama {
@@ -38,6 +41,8 @@ class MipTexture {
   };
 
   Rgba bilinear(int level, const Vec2f& uv, Wrap wrap_u, Wrap wrap_v) const;
+  /// -1: outside a texture that is black outside.
+  static int wrapped(int i, int size, Wrap wrap);
   void add_level();
 
   std::shared_ptr<const Texture> source_;
@@ -57,5 +62,86 @@ struct TextureSlot {
     return at(mesh_uv, uv_footprint)[input->channel];
   }
 };
+
+inline int MipTexture::wrapped(int i, int size, Wrap wrap) {
+  if (unsigned(i) < unsigned(size)) return i;
+  switch (wrap) {
+    case Wrap::Black:
+      return -1;
+    case Wrap::Clamp:
+      return std::clamp(i, 0, size - 1);
+    case Wrap::Mirror: {
+      const int k = ((i % (2 * size)) + 2 * size) % (2 * size);
+      return k < size ? k : 2 * size - 1 - k;
+    }
+    case Wrap::Repeat:
+      break;
+  }
+  return ((i % size) + size) % size;
+}
+
+inline Rgba MipTexture::texel(int index, int x, int y) const {
+  const Level& level = levels_[std::size_t(index)];
+  const int channels = source_->channels;
+  const std::size_t at =
+      (std::size_t(y) * std::size_t(level.width) + std::size_t(x)) * std::size_t(channels);
+  if (!source_->bytes.empty()) {
+    const std::uint8_t* p = (index == 0 ? source_->bytes.data() : level.bytes.data()) + at;
+    const float red = linear_from_byte_[p[0]];
+    if (channels < 3) return {red, red, red, channels == 2 ? float(p[1]) / 255.0f : 1.0f};
+    return {red, linear_from_byte_[p[1]], linear_from_byte_[p[2]],
+            channels == 4 ? float(p[3]) / 255.0f : 1.0f};
+  }
+  const float* p = (index == 0 ? source_->floats.data() : level.floats.data()) + at;
+  const bool decode = index == 0 && source_->color_space == ColorSpace::Srgb;
+  const auto linear = [&](float v) { return decode ? linear_from_srgb(v) : v; };
+  const float red = linear(p[0]);
+  if (channels < 3) return {red, red, red, channels == 2 ? p[1] : 1.0f};
+  return {red, linear(p[1]), linear(p[2]), channels == 4 ? p[3] : 1.0f};
+}
+
+[[gnu::noinline]] inline Rgba MipTexture::bilinear(int index, const Vec2f& uv, Wrap wrap_u,
+                                                   Wrap wrap_v) const {
+  const Level& level = levels_[std::size_t(index)];
+  constexpr float kLimit = 1e8f;  // far outside any sane coordinate, inside int
+  const float x = std::clamp(uv.x() * float(level.width) - 0.5f, -kLimit, kLimit);
+  const float y = std::clamp((1.0f - uv.y()) * float(level.height) - 0.5f, -kLimit, kLimit);
+  // Rounds down without the library's floor, which is a call on old processors.
+  const int left = int(x) - int(x < 0.0f);
+  const int above = int(y) - int(y < 0.0f);
+  const float fx = x - float(left);
+  const float fy = y - float(above);
+  const int x0 = wrapped(left, level.width, wrap_u);
+  const int x1 = wrapped(left + 1, level.width, wrap_u);
+  const int y0 = wrapped(above, level.height, wrap_v);
+  const int y1 = wrapped(above + 1, level.height, wrap_v);
+  const auto get = [&](int u, int v) -> Rgba {
+    if (u < 0 || v < 0) return Rgba::Zero();
+    return texel(index, u, v);
+  };
+  const Rgba top = get(x0, y0) * (1.0f - fx) + get(x1, y0) * fx;
+  const Rgba bottom = get(x0, y1) * (1.0f - fx) + get(x1, y1) * fx;
+  return top * (1.0f - fy) + bottom * fy;
+}
+
+inline Rgba MipTexture::lookup(const Vec2f& uv, float footprint, Wrap wrap_u, Wrap wrap_v) const {
+  const float texels = footprint * float(std::max(width(), height()));
+  if (!(texels > 1.0f)) return bilinear(0, uv, wrap_u, wrap_v);
+  const float level = std::min(std::log2(texels), float(level_count() - 1));
+  const int low = int(level);
+  const float rest = level - float(low);
+  const Rgba fine = bilinear(low, uv, wrap_u, wrap_v);
+  if (rest == 0.0f) return fine;
+  return fine * (1.0f - rest) + bilinear(low + 1, uv, wrap_u, wrap_v) * rest;
+}
+
+inline Rgba TextureSlot::at(const Vec2f& mesh_uv, float uv_footprint) const {
+  const auto& map = input->uv_from_mesh_uv;
+  const Vec2f uv = map.leftCols<2>() * mesh_uv + map.col(2);
+  const float scale = std::sqrt(std::abs(map(0, 0) * map(1, 1) - map(0, 1) * map(1, 0)));
+  const Rgba value = texture->lookup(uv, uv_footprint * scale, input->wrap_u, input->wrap_v);
+  return value * Rgba(input->scale[0], input->scale[1], input->scale[2], input->scale[3]) +
+         Rgba(input->bias[0], input->bias[1], input->bias[2], input->bias[3]);
+}
 
 }  // namespace diorama

@@ -8,29 +8,24 @@ namespace diorama {
 namespace {
 
 constexpr float kInfinite = std::numeric_limits<float>::infinity();
-constexpr int kMaxPassages = 64;         // straight through cut-outs and panes
-constexpr float kSoftenedAlpha = 0.15f;  // floor after a diffuse bounce, without caustics
+constexpr int kMaxPassages = 64;  // straight through cut-outs and panes
 constexpr float kMirrorSpread = 0.05f;
 
-float roughness_to_alpha(float roughness) {
-  const float r = std::clamp(roughness, 0.0f, 1.0f);
-  return std::max(Bsdf::kMinAlpha, r * r);
-}
-
 /// Far enough from the surface that the next ray does not meet it again.
-Vec3f leave(const SurfaceGeometry& s, const Vec3f& direction) {
+inline Vec3f leave(const SurfaceGeometry& s, const Vec3f& direction) {
   const float distance = 2e-5f * (1.0f + s.position.cwiseAbs().maxCoeff());
   return s.position + (direction.dot(s.flat_normal) < 0.0f ? -distance : distance) * s.flat_normal;
 }
 
-Vec3f mapped_normal(const RayHit& hit, const SurfaceGeometry& s, const TextureSlot& map,
-                    float uv_footprint, const Vec3f& to_viewer) {
+[[gnu::noinline]] Vec3f mapped_normal(const RayHit& hit, const SurfaceGeometry& s,
+                                      const TextureSlot& map, float uv_footprint,
+                                      const Vec3f& to_viewer) {
   const MeshInstance& instance = *hit.instance;
-  const Mesh& mesh = *instance.mesh;
-  if (mesh.uvs.empty()) return s.normal;
-  const auto& corners = mesh.triangles[hit.triangle];
-  const Vec2f e = mesh.uvs[corners[1]] - mesh.uvs[corners[0]];
-  const Vec2f f = mesh.uvs[corners[2]] - mesh.uvs[corners[0]];
+  if (!instance.shading->has_uvs()) return s.normal;
+  const auto& corners = instance.mesh->triangles[hit.triangle];
+  const auto& uvs = instance.shading->uvs(hit.triangle);
+  const Vec2f e = uvs[1] - uvs[0];
+  const Vec2f f = uvs[2] - uvs[0];
   const float det = e.x() * f.y() - e.y() * f.x();
   if (det == 0.0f) return s.normal;
   const Vec3f a = instance.vertex(corners[0]);
@@ -75,11 +70,13 @@ struct PathTracer::Path {
 
   PathSampler sampler;
   PathSample result;
+  RayCounts counts;
   Vec3f origin;
   Vec3f direction;
   float t_min = 0.0f;
   float t_max = kInfinite;
   Vec3f throughput = Vec3f::Ones();
+  float left_by_first = 1.0f;  ///< Largest throughput behind the first scattering surface.
   int bounce = 0;
   int passages = 0;
   bool is_camera_ray = true;
@@ -101,38 +98,84 @@ struct PathTracer::Path {
 };
 
 PathTracer::PathTracer(const RenderScene& scene, const View& view, const SobolTable& table,
-                       const TraceSettings& settings)
-    : scene_(scene), view_(view), table_(table), settings_(settings) {}
+                       const TraceSettings& settings, Isa isa)
+    : scene_(scene), view_(view), table_(table), settings_(settings), isa_(isa) {}
 
-PathSample PathTracer::trace(int x, int y, std::uint32_t index, std::uint64_t seed) const {
-  Path path(PathSampler(table_, seed, x, y, index));
-  const Vec2f in_pixel = path.sampler.next();
-  const Vec2f aperture = path.sampler.next();
-  const Vec2 pixel(double(x) + double(in_pixel.x()), double(y) + double(in_pixel.y()));
-  const auto ray = view_.ray(pixel, aperture);
-  if (!ray) return path.result;
-  path.go(ray->origin, ray->direction);
-  path.t_min = ray->t_min;
-  path.t_max = ray->t_max;
-  path.spread = view_.pixel_angle();
+RayCounts PathTracer::trace(const TraceJob& job, PixelSum* sums, std::size_t stride) const {
+  switch (isa_) {
+    case Isa::Sse2:
+      break;
+    case Isa::Sse42:
+      return trace_sse42(job, sums, stride);
+    case Isa::Avx2:
+      return trace_avx2(job, sums, stride);
+    case Isa::Avx512:
+      return trace_avx512(job, sums, stride);
+  }
+  return trace_all(job, sums, stride);
+}
 
+// One kernel per instruction set: all that it calls is compiled into it, but for what is rarely
+// needed (noinline).
+#define DIORAMA_KERNEL(NAME, ARCH)                                        \
+  [[gnu::target("arch=" ARCH), gnu::flatten]] RayCounts PathTracer::NAME( \
+      const TraceJob& job, PixelSum* sums, std::size_t stride) const {    \
+    return trace_all(job, sums, stride);                                  \
+  }
+DIORAMA_KERNEL(trace_sse42, "x86-64-v2")
+DIORAMA_KERNEL(trace_avx2, "x86-64-v3")
+DIORAMA_KERNEL(trace_avx512, "x86-64-v4")
+#undef DIORAMA_KERNEL
+
+inline RayCounts PathTracer::trace_all(const TraceJob& job, PixelSum* sums,
+                                       std::size_t stride) const {
+  RayCounts counts;
+  for (int y = job.y_begin; y < job.y_end; ++y) {
+    for (int x = job.x_begin; x < job.x_end; ++x) {
+      PixelSum& sum = sums[std::size_t(y) * stride + std::size_t(x)];
+      for (std::uint32_t s = job.sample_begin; s < job.sample_end; ++s) {
+        Path path(PathSampler(table_, PathSampler::pixel_key(job.seed, x, y, s), s));
+        const auto u = path.sampler.next_pairs<2>();
+        const auto ray = view_.sample_ray({float(x) + u[0].x(), float(y) + u[0].y()}, u[1]);
+        if (ray.t_max > 0.0f) {
+          path.go(ray.origin, ray.direction);
+          path.t_min = ray.t_min;
+          path.t_max = ray.t_max;
+          path.spread = view_.pixel_angle();
+          trace_path(path);
+        }
+        sum.add(path.result);
+        counts.rays += path.counts.rays;
+        counts.shadow_rays += path.counts.shadow_rays;
+      }
+    }
+  }
+  return counts;
+}
+
+inline void PathTracer::trace_path(Path& path) const {
   while (!path.is_over) {
     const RayHit hit = scene_.intersect(path.origin, path.direction, path.t_min, path.t_max);
-    ++path.result.rays;
+    ++path.counts.rays;
+    if (settings_.ray_log) [[unlikely]] {
+      settings_.ray_log->push_back({path.origin, path.direction, path.t_min, path.t_max, false});
+    }
     collect_lights(path, hit ? hit.distance : kInfinite);
     if (!hit) break;
     path.since_last += hit.distance;
     path.width += path.spread * hit.distance;
-    const SurfaceGeometry surface = RenderScene::surface_at(hit, path.direction);
+    const SurfaceGeometry surface = RenderScene::surface_at(hit, path.origin, path.direction);
     const ShadingMaterial& material = hit.instance->material(hit.triangle);
     if (material.emits) collect_emission(path, hit, surface, material);
     if (path.bounce > settings_.max_bounces) break;
     scatter(path, hit, surface, material);
   }
-  return path.result;
 }
 
-void PathTracer::add(Path& path, const Vec3f& radiance) const {
+inline void PathTracer::add(Path& path, const Vec3f& radiance) const {
+  // Extreme densities may round to a value beyond all numbers, which would spoil its pixel.
+  constexpr float kMost = 1e20f;
+  if (!(radiance.maxCoeff() < kMost)) return;
   Vec3f value = radiance;
   if (!path.has_scattered) {
     path.result.seen += value;
@@ -145,7 +188,7 @@ void PathTracer::add(Path& path, const Vec3f& radiance) const {
   path.result.scattered += value;
 }
 
-void PathTracer::collect_lights(Path& path, float t_max) const {
+inline void PathTracer::collect_lights(Path& path, float t_max) const {
   const bool is_first = std::isinf(path.last_density);
   if (path.hides_lights || (!is_first && !settings_.samples_bsdf)) return;
   scene_.lights().along_ray(
@@ -159,8 +202,9 @@ void PathTracer::collect_lights(Path& path, float t_max) const {
       });
 }
 
-void PathTracer::collect_emission(Path& path, const RayHit& hit, const SurfaceGeometry& surface,
-                                  const ShadingMaterial& material) const {
+[[gnu::noinline]] void PathTracer::collect_emission(Path& path, const RayHit& hit,
+                                                    const SurfaceGeometry& surface,
+                                                    const ShadingMaterial& material) const {
   const bool is_first = std::isinf(path.last_density);
   if (path.hides_lights || (!is_first && !settings_.samples_bsdf)) return;
   if (surface.is_back && !hit.instance->mesh->is_double_sided) return;
@@ -176,12 +220,10 @@ void PathTracer::collect_emission(Path& path, const RayHit& hit, const SurfaceGe
   add(path, path.throughput.cwiseProduct(radiance) * weight);
 }
 
-bool PathTracer::pass_or_reflect(Path& path, const SurfaceGeometry& surface,
-                                 const ShadingMaterial& material, SurfaceBsdf& bsdf) const {
+[[gnu::noinline]] bool PathTracer::pass_or_reflect(Path& path, const SurfaceGeometry& surface,
+                                                   const ShadingMaterial& material,
+                                                   SurfaceBsdf& bsdf) const {
   const Material& m = *material.source;
-  const bool is_pane = m.is_thin_walled && bsdf.transmission > 0.0f;
-  const bool is_veil = material.is_cut_out && m.opacity_threshold <= 0.0f;
-  if (!is_pane && !is_veil) return false;
   const Vec2f u = path.sampler.next();
   const auto pass = [&] {
     path.is_over = ++path.passages > kMaxPassages;
@@ -189,12 +231,12 @@ bool PathTracer::pass_or_reflect(Path& path, const SurfaceGeometry& surface,
     return true;
   };
   float rest = u.x();
-  if (is_veil) {
+  if (material.is_veil) {
     const float veil = 1.0f - std::clamp(material.opacity_at(surface.uv, 0.0f), 0.0f, 1.0f);
     if (rest < veil) return pass();
     rest = (rest - veil) / (1.0f - veil);
   }
-  if (!is_pane) return false;
+  if (!material.is_pane) return false;
   const float share = (1.0f - bsdf.metallic) * bsdf.transmission;
   if (rest >= share) {
     bsdf.metallic = share < 1.0f ? bsdf.metallic / (1.0f - share) : 0.0f;
@@ -213,9 +255,9 @@ bool PathTracer::pass_or_reflect(Path& path, const SurfaceGeometry& surface,
     return pass();
   }
   path.throughput *= reflected / chance;
-  const Vec3f mirrored = path.direction + 2.0f * cosine * surface.normal;
-  path.is_over = surface.flat_normal.dot(mirrored) <= 0.0f;
-  path.go(leave(surface, mirrored), mirrored.normalized());
+  const Vec3f reflection = path.direction + 2.0f * cosine * surface.normal;
+  path.is_over = surface.flat_normal.dot(reflection) <= 0.0f;
+  path.go(leave(surface, reflection), unit(reflection));
   path.last_density = kInfinite;
   path.hides_lights = path.has_scattered && !settings_.has_caustics;
   path.since_last = 0.0f;
@@ -224,10 +266,9 @@ bool PathTracer::pass_or_reflect(Path& path, const SurfaceGeometry& surface,
   return true;
 }
 
-void PathTracer::sample_light(Path& path, const SurfaceGeometry& surface, const Bsdf& bsdf,
-                              const Basis& basis) const {
-  const Vec2f choice_u = path.sampler.next();
-  const Vec2f place_u = path.sampler.next();
+inline void PathTracer::sample_light(Path& path, const SurfaceGeometry& surface, const Bsdf& bsdf,
+                                     const Basis& basis, const Vec2f& choice_u,
+                                     const Vec2f& place_u) const {
   const Lights& lights = scene_.lights();
   const Lights::Choice choice = lights.choose(path.last, choice_u.x());
   if (!settings_.samples_lights || choice.probability <= 0.0f) return;
@@ -241,62 +282,67 @@ void PathTracer::sample_light(Path& path, const SurfaceGeometry& surface, const 
   const BsdfValue value = bsdf.evaluate(wi);
   if (value.f_cos.maxCoeff() <= 0.0f) return;
 
-  Vec3f radiance = s.radiance;
-  if (s.is_surface) {
-    const MeshInstance& emitter = *scene_.instances()[s.geometry];
-    const Vec2f uv = emitter.uv(s.triangle, s.barycentric.x(), s.barycentric.y());
-    radiance = emitter.material(s.triangle).emission_at(uv, 0.0f);
-  }
   const bool is_point = std::isinf(s.density);
   const float density = (is_point ? 1.0f : s.density) * choice.probability;
   const bool has_rival = !is_point && settings_.samples_bsdf;
   const float weight = has_rival ? mis_weight(density, value.density) : 1.0f;
-  const Vec3f contribution =
-      path.throughput.cwiseProduct(value.f_cos).cwiseProduct(radiance) * (weight / density);
-  if (contribution.maxCoeff() <= 0.0f) return;
   const float t_max = std::isinf(s.distance) ? kInfinite : s.distance * 0.9998f - 1e-4f;
   if (t_max <= 0.0f) return;
-  ++path.result.shadow_rays;
-  const Vec3f kept = scene_.transmittance(leave(surface, s.direction), s.direction, t_max,
-                                          !settings_.has_caustics);
-  if (kept.maxCoeff() > 0.0f) add(path, contribution.cwiseProduct(kept));
+  ++path.counts.shadow_rays;
+  const Vec3f from = leave(surface, s.direction);
+  if (settings_.ray_log) [[unlikely]] {
+    settings_.ray_log->push_back({from, s.direction, 0.0f, t_max, true});
+  }
+  const Vec3f kept = scene_.transmittance(from, s.direction, t_max, !settings_.has_caustics);
+  if (kept.maxCoeff() <= 0.0f) return;
+  Vec3f radiance;
+  if (s.is_surface) {
+    const MeshInstance& emitter = *scene_.instances()[s.geometry];
+    const Vec2f uv = emitter.uv(s.triangle, s.barycentric.x(), s.barycentric.y());
+    radiance = emitter.material(s.triangle).emission_at(uv, 0.0f);
+  } else {
+    radiance = lights.radiance_of(choice.light, s);
+  }
+  const Vec3f share = path.throughput.cwiseProduct(value.f_cos).cwiseProduct(kept);
+  add(path, share.cwiseProduct(radiance) * (weight / density));
 }
 
-void PathTracer::scatter(Path& path, const RayHit& hit, const SurfaceGeometry& surface,
-                         const ShadingMaterial& material) const {
-  const Material& m = *material.source;
+[[gnu::noinline]] SurfaceBsdf PathTracer::read_textures(const Path& path, const RayHit& hit,
+                                                        const SurfaceGeometry& surface,
+                                                        const ShadingMaterial& material,
+                                                        bool is_soft, Vec3f& normal) const {
   const float cosine = std::max(0.1f, -surface.normal.dot(path.direction));
   const float footprint = path.width * surface.uv_per_metre / std::sqrt(cosine);
-  SurfaceBsdf s;
+  SurfaceBsdf s = is_soft ? material.soft : material.sharp;
   s.base = base_color_at(hit, surface, footprint).cwiseMin(1.0f);
-  s.metallic = std::clamp(
-      material.metallic ? material.metallic.scalar(surface.uv, footprint) : m.metallic, 0.0f, 1.0f);
-  s.transmission = std::clamp(m.transmission, 0.0f, 1.0f);
-  if (pass_or_reflect(path, surface, material, s)) return;
-
-  s.alpha = roughness_to_alpha(material.roughness ? material.roughness.scalar(surface.uv, footprint)
-                                                  : m.roughness);
-  s.coat_alpha = roughness_to_alpha(m.clearcoat_roughness);
-  const bool is_softened = path.has_scattered && !settings_.has_caustics;
-  if (is_softened) {
-    s.alpha = material.glass ? s.alpha : std::max(s.alpha, kSoftenedAlpha);
-    s.coat_alpha = std::max(s.coat_alpha, kSoftenedAlpha);
+  if (material.metallic) {
+    s.metallic = std::clamp(material.metallic.scalar(surface.uv, footprint), 0.0f, 1.0f);
   }
-  const float ratio = (m.ior - 1.0f) / (m.ior + 1.0f);
-  s.f0 = ratio * ratio;
-  s.specular = std::clamp(m.specular, 0.0f, 1.0f);
-  s.coat = std::clamp(m.clearcoat, 0.0f, 1.0f);
-  s.glass = material.glass;
+  if (material.roughness) {
+    const float roughness = material.roughness.scalar(surface.uv, footprint);
+    s.alpha = ShadingMaterial::alpha_of(roughness, is_soft && !s.glass);
+  }
+  if (material.normal) {
+    normal = mapped_normal(hit, surface, material.normal, footprint, -path.direction);
+  }
+  return s;
+}
+
+inline void PathTracer::scatter(Path& path, const RayHit& hit, const SurfaceGeometry& surface,
+                                const ShadingMaterial& material) const {
+  const bool is_soft = path.has_scattered && !settings_.has_caustics;
+  Vec3f normal = surface.normal;
+  SurfaceBsdf s = is_soft ? material.soft : material.sharp;
+  if (material.is_textured || !hit.instance->mesh->colors.empty()) {
+    s = read_textures(path, hit, surface, material, is_soft, normal);
+  }
+  if ((material.is_pane || material.is_veil) && pass_or_reflect(path, surface, material, s)) return;
   s.is_inside = surface.is_back;
 
-  const Vec3f to_viewer = -path.direction;
-  const Vec3f normal = material.normal
-                           ? mapped_normal(hit, surface, material.normal, footprint, to_viewer)
-                           : surface.normal;
   const Basis basis = basis_around(normal);
-  Vec3f wo = basis.to_local(to_viewer);
+  Vec3f wo = basis.to_local(-path.direction);
   wo.z() = std::max(wo.z(), 1e-4f);
-  const Bsdf bsdf(s, scene_.albedo_tables(), wo.normalized());
+  const Bsdf bsdf(s, unit(wo));
 
   const bool is_mirror = s.metallic > 0.9f && s.alpha < kMirrorSpread * kMirrorSpread;
   if (!path.result.has_surface && bsdf.has_smooth_part() && !is_mirror) {
@@ -306,31 +352,34 @@ void PathTracer::scatter(Path& path, const RayHit& hit, const SurfaceGeometry& s
     path.result.position = surface.position;
   }
   path.is_camera_ray = false;
+  const auto u = path.sampler.next_pairs<4>();
   if (bsdf.has_smooth_part()) {
     path.has_scattered = true;
-    path.last = {surface.position, normal, bsdf.transmits() && !is_softened, 0.0f};
-    sample_light(path, surface, bsdf, basis);
+    path.last = {surface.position, normal, bsdf.transmits() && !is_soft, 0.0f};
+    sample_light(path, surface, bsdf, basis, u[0], u[1]);
   }
 
-  const Vec2f lobe_u = path.sampler.next();
-  const Vec2f place_u = path.sampler.next();
-  const BsdfSample next = bsdf.sample(lobe_u.x(), place_u);
+  const BsdfSample next = bsdf.sample(u[2].x(), u[3]);
   path.is_over = true;
   if (!(next.weight.maxCoeff() > 0.0f)) return;
-  const Vec3f direction = basis.to_world(next.wi).normalized();
+  const Vec3f direction = unit(basis.to_world(next.wi));
   if ((surface.flat_normal.dot(direction) <= 0.0f) != next.is_transmitted) return;
   path.throughput = path.throughput.cwiseProduct(next.weight);
-  if (path.bounce >= 3) {
-    const float survival = std::min(0.95f, 1.5f * path.throughput.maxCoeff());
-    if (lobe_u.y() >= survival) return;
-    path.throughput /= survival;
+  // Russian roulette, by what is left of the light since the first surface: errors count in
+  // proportion to what is seen, so a dark surface's paths are as good as a bright one's.
+  const float left = path.throughput.maxCoeff();
+  if (path.bounce == 0) path.left_by_first = left;
+  if (path.bounce > 0) {
+    const float survival = std::min(0.95f, left / path.left_by_first);
+    if (u[0].y() >= survival) return;
+    path.throughput *= 1.0f / survival;
   }
   path.is_over = false;
   ++path.bounce;
   path.last_density = next.density;
   path.since_last = 0.0f;
   path.hides_lights = path.has_scattered && !settings_.has_caustics &&
-                      (std::isinf(next.density) || (next.is_transmitted && is_softened));
+                      (std::isinf(next.density) || (next.is_transmitted && is_soft));
   path.spread = std::max(path.spread, next.spread);
   path.go(leave(surface, direction), direction);
 }

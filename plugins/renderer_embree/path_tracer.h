@@ -2,12 +2,24 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
+#include "film.h"
+#include "isa.h"
 #include "render_scene.h"
 #include "sobol.h"
 #include "view.h"
 
 namespace diorama {
+
+/// A ray that was traced.
+struct LoggedRay {
+  Vec3f origin;
+  Vec3f direction;
+  float t_min = 0.0f;
+  float t_max = 0.0f;
+  bool is_shadow = false;
+};
 
 struct TraceSettings {
   int max_bounces = 6;  ///< Surfaces after the first that may scatter light.
@@ -19,19 +31,24 @@ struct TraceSettings {
   /// For tests of the estimators: which of the two techniques that find light are used.
   bool samples_lights = true;
   bool samples_bsdf = true;
+  /// For benchmarks: gets every ray, from one thread only.
+  std::vector<LoggedRay>* ray_log = nullptr;
 };
 
-/// One light path of a pixel.
-struct PathSample {
-  Vec3f seen = Vec3f::Zero();       ///< Light sources seen directly or in mirrors: free of noise.
-  Vec3f scattered = Vec3f::Zero();  ///< All other radiance.
-  // The first surface that scatters; zero when there was none.
-  Vec3f albedo = Vec3f::Zero();  ///< Share of uniform light that it returns.
-  Vec3f normal = Vec3f::Zero();
-  Vec3f position = Vec3f::Zero();
-  bool has_surface = false;
-  std::uint32_t rays = 0;
-  std::uint32_t shadow_rays = 0;
+/// A rectangle of pixels and the samples wanted of each.
+struct TraceJob {
+  int x_begin = 0;
+  int y_begin = 0;
+  int x_end = 0;
+  int y_end = 0;
+  std::uint32_t sample_begin = 0;
+  std::uint32_t sample_end = 1;
+  std::uint64_t seed = 0;
+};
+
+struct RayCounts {
+  std::uint64_t rays = 0;
+  std::uint64_t shadow_rays = 0;
 };
 
 /// Unidirectional path tracing with one light sample per vertex, weighted against what the BSDF
@@ -39,14 +56,20 @@ struct PathSample {
 class PathTracer {
  public:
   PathTracer(const RenderScene& scene, const View& view, const SobolTable& table,
-             const TraceSettings& settings);
+             const TraceSettings& settings, Isa isa);
 
-  /// Sample `index` of a pixel; equal arguments give equal results.
-  PathSample trace(int x, int y, std::uint32_t index, std::uint64_t seed) const;
+  /// Adds samples to the sums of all pixels, `sums` row by row with `stride` per row. Equal jobs
+  /// give equal sums. Uses the kernel compiled for the instruction set.
+  RayCounts trace(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
 
  private:
   struct Path;
 
+  RayCounts trace_all(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
+  RayCounts trace_sse42(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
+  RayCounts trace_avx2(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
+  RayCounts trace_avx512(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
+  void trace_path(Path& path) const;
   void collect_lights(Path& path, float t_max) const;
   void collect_emission(Path& path, const RayHit& hit, const SurfaceGeometry& surface,
                         const ShadingMaterial& material) const;
@@ -54,7 +77,9 @@ class PathTracer {
   bool pass_or_reflect(Path& path, const SurfaceGeometry& surface, const ShadingMaterial& material,
                        SurfaceBsdf& bsdf) const;
   void sample_light(Path& path, const SurfaceGeometry& surface, const Bsdf& bsdf,
-                    const Basis& basis) const;
+                    const Basis& basis, const Vec2f& choice, const Vec2f& place) const;
+  SurfaceBsdf read_textures(const Path& path, const RayHit& hit, const SurfaceGeometry& surface,
+                            const ShadingMaterial& material, bool is_soft, Vec3f& normal) const;
   void scatter(Path& path, const RayHit& hit, const SurfaceGeometry& surface,
                const ShadingMaterial& material) const;
   void add(Path& path, const Vec3f& radiance) const;
@@ -63,6 +88,7 @@ class PathTracer {
   const View& view_;
   const SobolTable& table_;
   TraceSettings settings_;
+  Isa isa_;
 };
 
 /// Base colour of a surface point with textures and vertex colours, linear.

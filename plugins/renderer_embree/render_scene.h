@@ -4,61 +4,50 @@
 #include <cstdint>
 #include <map>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "bsdf.h"
 #include "diorama/host.h"
 #include "diorama/scene.h"
 #include "embree.h"
+#include "isa.h"
 #include "lights.h"
-#include "mip_texture.h"
+#include "shading_material.h"
+#include "shading_mesh.h"
 
 namespace diorama {
-
-/// A material with its textures found and its tables made. Textured scalars replace constants.
-struct ShadingMaterial {
-  std::shared_ptr<const Material> source;
-  TextureSlot base_color;
-  TextureSlot metallic;
-  TextureSlot roughness;
-  TextureSlot normal;
-  TextureSlot opacity;
-  TextureSlot emission;
-  const GlassTables* glass = nullptr;  ///< Solid glass only.
-  bool is_cut_out = false;             ///< Rays may pass where the opacity says so.
-  bool dims_shadows = false;           ///< Shadow rays may pass, weakened.
-  bool emits = false;
-
-  float opacity_at(const Vec2f& uv, float footprint) const;
-  Vec3f emission_at(const Vec2f& uv, float footprint) const;
-};
 
 /// One visible mesh node, in world space.
 struct MeshInstance {
   static constexpr std::uint32_t kNoLight = 0xFFFFFFFFu;
 
+  std::shared_ptr<const ShadingMesh> shading;
+  bool is_movable = false;  ///< Follows a rigid body.
+  Eigen::Matrix3f normal_from_node = Eigen::Matrix3f::Identity();
+  bool is_mirrored = false;                       ///< The pose turns front sides into back sides.
+  std::vector<const ShadingMaterial*> materials;  ///< Per slot.
+  std::vector<std::uint32_t> slot_lights;         ///< Per slot: number of its light or kNoLight.
   NodeId node;
   std::shared_ptr<const Mesh> mesh;
   Affine world_from_node = Affine::Identity();
-  Eigen::Matrix3f normal_from_node = Eigen::Matrix3f::Identity();
-  bool is_mirrored = false;                ///< The pose turns front sides into back sides.
-  std::vector<float> world_positions;      ///< x, y, z per vertex and one float of padding.
-  std::vector<std::uint32_t> materials;    ///< Per slot: index of a ShadingMaterial.
-  std::vector<std::uint32_t> slot_lights;  ///< Per slot: number of its light or kNoLight.
+  std::vector<float> world_positions;  ///< x, y, z per vertex and one float of padding.
   Aabb bounds;
   RTCGeometry geometry = nullptr;  ///< Owned by the RTCScene.
-  const std::vector<ShadingMaterial>* all_materials = nullptr;
 
-  std::size_t slot(std::uint32_t triangle) const;
+  std::size_t slot(std::uint32_t triangle) const {
+    return std::min(shading->slot(triangle), materials.size() - 1);
+  }
   const ShadingMaterial& material(std::uint32_t triangle) const {
-    return (*all_materials)[materials[slot(triangle)]];
+    return materials.size() == 1 ? *materials[0] : *materials[slot(triangle)];
   }
   Vec3f vertex(std::uint32_t index) const {
     return Eigen::Map<const Vec3f>(&world_positions[3 * std::size_t(index)]);
   }
-  Vec2f uv(std::uint32_t triangle, float u, float v) const;
+  Vec2f uv(std::uint32_t triangle, float u, float v) const {
+    if (!shading->has_uvs()) return Vec2f::Zero();
+    const auto& corners = shading->uvs(triangle);
+    return corners[0] * (1.0f - u - v) + corners[1] * u + corners[2] * v;
+  }
 };
 
 /// Where a ray met a mesh.
@@ -69,12 +58,13 @@ struct RayHit {
   float u = 0.0f;
   float v = 0.0f;
   float distance = std::numeric_limits<float>::infinity();
+  Vec3f normal = Vec3f::Zero();  ///< Of the triangle, as long as twice its area.
   explicit operator bool() const { return instance != nullptr; }
 };
 
 /// The surface at a hit, without its material. World space.
 struct SurfaceGeometry {
-  Vec3f position;     ///< Exact on the triangle.
+  Vec3f position;
   Vec3f flat_normal;  ///< Unit, of the triangle, on the side of the ray's origin.
   Vec3f normal;       ///< Unit, interpolated, facing the ray's origin.
   Vec2f uv;
@@ -84,10 +74,14 @@ struct SurfaceGeometry {
 
 /// A scene uploaded for ray queries. take() is called for every change and reuses what it can:
 /// textures, meshes and their trees, shading tables. Queries come from any thread; take() may not
-/// run beside them.
+/// run beside them. What render kernels call is inline: it is compiled into each of them.
 class RenderScene {
  public:
-  RenderScene(Host& host, const std::string& isa);
+  struct Options {
+    std::string isa = "sse2";     ///< Of Embree's kernels; one of kIsaNames.
+    bool has_disk_lamps = false;  ///< See Lights.
+  };
+  RenderScene(Host& host, const Options& options);
   ~RenderScene();
   RenderScene(const RenderScene&) = delete;
   RenderScene& operator=(const RenderScene&) = delete;
@@ -96,16 +90,15 @@ class RenderScene {
 
   const std::vector<std::unique_ptr<MeshInstance>>& instances() const { return instances_; }
   const Lights& lights() const { return lights_; }
-  const AlbedoTables& albedo_tables() const { return albedo_tables_; }
-  /// Of all meshes; empty without any.
-  const Aabb& bounds() const { return bounds_; }
 
   /// The first surface not cut out. The direction is unit length.
   RayHit intersect(const Vec3f& origin, const Vec3f& direction, float t_min, float t_max) const;
   /// The light left between two points: 0 behind anything opaque, tinted behind glass and what is
   /// partly transparent. Solid glass counts as opaque unless `passes_glass`.
   Vec3f transmittance(const Vec3f& origin, const Vec3f& direction, float t_max,
-                      bool passes_glass) const;
+                      bool passes_glass) const {
+    return transmittance(origin, direction, t_max, passes_glass, ~0u);
+  }
   /// Some instances of the scene with nothing else; valid until the next take().
   class Part {
    public:
@@ -119,46 +112,158 @@ class RenderScene {
     RTCScene scene_ = nullptr;
   };
 
-  static SurfaceGeometry surface_at(const RayHit& hit, const Vec3f& direction);
+  /// Of a hit of the ray from `origin`.
+  static SurfaceGeometry surface_at(const RayHit& hit, const Vec3f& origin, const Vec3f& direction);
 
  private:
-  struct CachedTexture {
-    std::weak_ptr<const Texture> owner;
-    std::shared_ptr<const MipTexture> mips;
-  };
   struct CachedDome {
     std::weak_ptr<const Texture> owner;
     std::shared_ptr<const DomeTexture> dome;
   };
+  using Instances = std::vector<std::unique_ptr<MeshInstance>>;
+  /// What decides which parts of the sky can be seen: all that does not follow a rigid body.
+  struct Surroundings {
+    std::vector<std::shared_ptr<const Mesh>> meshes;
+    std::vector<Eigen::Matrix4d> poses;
+    std::vector<std::shared_ptr<const Material>> clear_materials;  ///< That let light pass.
+    Aabb bounds;
+    bool operator==(const Surroundings& other) const {
+      return meshes == other.meshes && poses == other.poses &&
+             clear_materials == other.clear_materials;
+    }
+  };
+  struct CachedGrid {
+    std::shared_ptr<const DomeTexture> dome;
+    Eigen::Matrix3f world_from_dome;
+    std::shared_ptr<const SkyGrid> grid;
+  };
+  /// Ray masks of meshes; light sees all of them.
+  static constexpr std::uint32_t kStaticMask = 1;
+  static constexpr std::uint32_t kMovableMask = 2;
 
-  void collect(const Scene& scene, NodeId node, const Affine& world_from_parent);
-  void load_textures(const Scene& scene);
-  std::uint32_t material_index(const std::shared_ptr<const Material>& material);
-  ShadingMaterial make_material(std::shared_ptr<const Material> source);
-  TextureSlot slot(const TextureInput& input) const;
-  void upload(const std::vector<std::unique_ptr<MeshInstance>>& previous);
-  bool can_keep(const std::vector<std::unique_ptr<MeshInstance>>& previous) const;
+  /// Carried by shadow rays; the filter of the surfaces on their way weakens it.
+  struct ShadowContext {
+    embree::Context context;
+    Vec3f transmittance = Vec3f::Ones();
+    bool passes_glass = true;
+  };
+
+  static RTCRayHit make_ray(const Vec3f& origin, const Vec3f& direction, float t_min, float t_max);
+  Vec3f transmittance(const Vec3f& origin, const Vec3f& direction, float t_max, bool passes_glass,
+                      std::uint32_t mask) const;
+  static void weaken_shadow_ray(const RTCFilterFunctionNArguments* args);
+  void collect(const Scene& scene, NodeId node, const Affine& world_from_parent, bool is_movable);
+  void assign_materials(const Scene& scene);
+  void assign_shading_meshes();
+  void upload(const Instances& previous);
+  bool can_keep(const Instances& previous) const;
+  void build_all();
+  void set_filters(const MeshInstance& instance) const;
   RTCGeometry make_geometry(MeshInstance& instance) const;
-  void place(MeshInstance& instance) const;
+  static void place(MeshInstance& instance, const Affine& pose);
+  Surroundings surroundings() const;
+  void learn_sky();
   void add_lights(const Scene& scene);
   void add_emitters();
   void check_device(const char* action) const;
 
   Host& host_;
+  Options options_;
   RTCDevice device_ = nullptr;
   RTCScene scene_ = nullptr;
-  AlbedoTables albedo_tables_;
-  std::map<float, std::unique_ptr<GlassTables>> glass_tables_;
-  std::map<const Texture*, CachedTexture> textures_;
+  MaterialLibrary materials_;
+  std::map<const Mesh*, std::shared_ptr<const ShadingMesh>> shading_meshes_;
   std::map<const Texture*, CachedDome> domes_;
   std::shared_ptr<const Material> default_material_;
   std::shared_ptr<const Texture> white_sky_;  ///< Of domes without an image.
-  std::map<const Material*, std::uint32_t> material_indices_;
-  std::vector<ShadingMaterial> materials_;
-  std::vector<std::unique_ptr<MeshInstance>> instances_;
+  Instances instances_;
   std::vector<NodeId> light_nodes_;
   Lights lights_;
-  Aabb bounds_;
+  Surroundings surroundings_;
+  std::vector<CachedGrid> sky_grids_;  ///< Valid for surroundings_.
 };
+
+inline RTCRayHit RenderScene::make_ray(const Vec3f& origin, const Vec3f& direction, float t_min,
+                                       float t_max) {
+  RTCRayHit ray;
+  ray.ray.org_x = origin.x();
+  ray.ray.org_y = origin.y();
+  ray.ray.org_z = origin.z();
+  ray.ray.dir_x = direction.x();
+  ray.ray.dir_y = direction.y();
+  ray.ray.dir_z = direction.z();
+  ray.ray.tnear = t_min;
+  ray.ray.tfar = t_max;
+  ray.ray.time = 0.0f;
+  ray.ray.mask = ~0u;
+  ray.ray.id = 0;
+  ray.ray.flags = 0;
+  ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  return ray;
+}
+
+inline RayHit RenderScene::intersect(const Vec3f& origin, const Vec3f& direction, float t_min,
+                                     float t_max) const {
+  RTCRayHit ray = make_ray(origin, direction, t_min, t_max);
+  embree::Context context;
+  embree::init(context);
+  embree::intersect(scene_, context, ray);
+  if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
+  instances_[ray.hit.geomID]->shading->prefetch(ray.hit.primID);
+  return {instances_[ray.hit.geomID].get(),
+          ray.hit.geomID,
+          ray.hit.primID,
+          ray.hit.u,
+          ray.hit.v,
+          ray.ray.tfar,
+          {ray.hit.Ng_x, ray.hit.Ng_y, ray.hit.Ng_z}};
+}
+
+inline Vec3f RenderScene::transmittance(const Vec3f& origin, const Vec3f& direction, float t_max,
+                                        bool passes_glass, std::uint32_t mask) const {
+  RTCRayHit ray = make_ray(origin, direction, 0.0f, t_max);
+  ray.ray.mask = mask;
+  ShadowContext shadow;
+  shadow.passes_glass = passes_glass;
+  embree::init(shadow.context);
+  embree::occluded(scene_, shadow.context, ray.ray);
+  const bool is_hidden = ray.ray.tfar == -std::numeric_limits<float>::infinity();
+  return is_hidden ? Vec3f(Vec3f::Zero()) : shadow.transmittance;
+}
+
+inline SurfaceGeometry RenderScene::surface_at(const RayHit& hit, const Vec3f& origin,
+                                               const Vec3f& direction) {
+  const MeshInstance& instance = *hit.instance;
+  const ShadingMesh& mesh = *instance.shading;
+  SurfaceGeometry s;
+  s.position = origin + hit.distance * direction;
+  const float twice_area = hit.normal.norm();
+  s.flat_normal = twice_area > 0.0f ? Vec3f(hit.normal * (1.0f / twice_area)) : Vec3f(-direction);
+  const float facing = s.flat_normal.dot(direction);
+  s.is_back = (facing > 0.0f) != instance.is_mirrored;
+  if (facing > 0.0f) s.flat_normal = -s.flat_normal;
+
+  s.normal = s.flat_normal;
+  if (mesh.has_normals()) {
+    const Vec3f n = instance.normal_from_node * mesh.normal(hit.triangle, hit.u, hit.v);
+    const float length2 = n.squaredNorm();
+    if (length2 > 0.0f) s.normal = n * ((s.is_back ? -1.0f : 1.0f) / std::sqrt(length2));
+    // Seen from the visible side, a normal that points away is bent back to the horizon.
+    const float away = s.normal.dot(direction);
+    if (away > -1e-4f) s.normal = unit(s.normal - (away + 1e-4f) * direction);
+  }
+  if (mesh.has_uvs()) {
+    const auto& uvs = mesh.uvs(hit.triangle);
+    const Vec2f e = uvs[1] - uvs[0];
+    const Vec2f f = uvs[2] - uvs[0];
+    s.uv = uvs[0] + hit.u * e + hit.v * f;
+    const float uv_area = std::abs(e.x() * f.y() - e.y() * f.x());
+    s.uv_per_metre = twice_area > 0.0f ? std::sqrt(uv_area / twice_area) : 0.0f;
+  } else {
+    s.uv = Vec2f::Zero();
+  }
+  return s;
+}
 
 }  // namespace diorama

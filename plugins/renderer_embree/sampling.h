@@ -17,6 +17,9 @@ inline float luminance(const Vec3f& rgb) {
   return 0.2126f * rgb.x() + 0.7152f * rgb.y() + 0.0722f * rgb.z();
 }
 
+/// v at unit length; v is not zero. One division instead of three.
+inline Vec3f unit(const Vec3f& v) { return v * (1.0f / std::sqrt(v.squaredNorm())); }
+
 /// Right-handed orthonormal axes with z = n.
 struct Basis {
   Vec3f x;
@@ -37,15 +40,34 @@ inline Basis basis_around(const Vec3f& n) {
           n};
 }
 
+/// Sine and cosine of an angle within a quarter turn around zero, to 1e-6; the library's functions
+/// cost many times as much.
+inline Vec2f cos_sin_small(float angle) {
+  const float a2 = angle * angle;
+  const float cosine =
+      1.0f + a2 * (-0.5f + a2 * (1.0f / 24.0f + a2 * (-1.0f / 720.0f + a2 * (1.0f / 40320.0f))));
+  const float sine =
+      angle * (1.0f + a2 * (-1.0f / 6.0f + a2 * (1.0f / 120.0f + a2 * (-1.0f / 5040.0f))));
+  return {cosine, sine};
+}
+
+/// The point of the unit circle at `turns` in [0, 1].
+inline Vec2f unit_circle(float turns) {
+  const int quarter = int(turns * 4.0f + 0.5f);
+  const Vec2f p = cos_sin_small((turns - 0.25f * float(quarter)) * (2.0f * kPiF));
+  const Vec2f turned = (quarter & 1) != 0 ? Vec2f(-p.y(), p.x()) : p;
+  return (quarter & 2) != 0 ? Vec2f(-turned) : turned;
+}
+
 /// Uniform on the unit disk, keeping neighbours together (Shirley and Chiu 1997).
 inline Vec2f disk_from_square(const Vec2f& u) {
   const float a = 2.0f * u.x() - 1.0f;
   const float b = 2.0f * u.y() - 1.0f;
-  if (a == 0.0f && b == 0.0f) return Vec2f::Zero();
   const bool is_wide = std::abs(a) > std::abs(b);
   const float r = is_wide ? a : b;
-  const float phi = is_wide ? 0.25f * kPiF * (b / a) : 0.5f * kPiF - 0.25f * kPiF * (a / b);
-  return {r * std::cos(phi), r * std::sin(phi)};
+  if (r == 0.0f) return Vec2f::Zero();
+  const Vec2f p = cos_sin_small(0.25f * kPiF * ((is_wide ? b : a) / r));
+  return is_wide ? Vec2f(r * p.x(), r * p.y()) : Vec2f(r * p.y(), r * p.x());
 }
 
 /// Density cos(theta) / pi.
@@ -59,8 +81,8 @@ inline Vec3f cosine_hemisphere(const Vec2f& u) {
 inline Vec3f uniform_cone(const Vec2f& u, float one_minus_cos) {
   const float h = u.x() * one_minus_cos;  // 1 - cos(theta)
   const float sin_theta = std::sqrt(std::max(0.0f, h * (2.0f - h)));
-  const float phi = 2.0f * kPiF * u.y();
-  return {sin_theta * std::cos(phi), sin_theta * std::sin(phi), 1.0f - h};
+  const Vec2f p = unit_circle(u.y());
+  return {sin_theta * p.x(), sin_theta * p.y(), 1.0f - h};
 }
 
 inline Vec3f uniform_sphere(const Vec2f& u) { return uniform_cone(u, 2.0f); }
@@ -69,64 +91,6 @@ inline Vec3f uniform_sphere(const Vec2f& u) { return uniform_cone(u, 2.0f); }
 inline Vec2f triangle_from_square(const Vec2f& u) {
   const float root = std::sqrt(u.x());
   return {root * (1.0f - u.y()), root * u.y()};
-}
-
-/// GGX distribution of normals (Walter et al. 2007), isotropic; cos_h in (0, 1].
-inline float ggx_distribution(float cos_h, float alpha) {
-  const float a2 = alpha * alpha;
-  const float sin2 = std::max(0.0f, 1.0f - cos_h * cos_h);
-  const float k = sin2 + a2 * cos_h * cos_h;  // cos^2 (a2 - 1) + 1 without cancellation
-  return a2 / (kPiF * k * k);
-}
-
-/// Smith's Lambda of GGX; cos > 0.
-inline float ggx_lambda(float cos_theta, float alpha) {
-  const float c2 = cos_theta * cos_theta;
-  const float tan2 = std::max(0.0f, 1.0f - c2) / std::max(c2, 1e-12f);
-  return 0.5f * (std::sqrt(1.0f + alpha * alpha * tan2) - 1.0f);
-}
-
-/// A visible normal for the local direction w, w.z > 0 (Heitz 2018). Density
-/// D(h) G1(w) max(0, w.h) / w.z.
-inline Vec3f ggx_visible_normal(const Vec3f& w, float alpha, const Vec2f& u) {
-  const Vec3f stretched = Vec3f(alpha * w.x(), alpha * w.y(), w.z()).normalized();
-  const Basis basis = basis_around(stretched);
-  Vec2f t = disk_from_square(u);
-  const float s = 0.5f * (1.0f + stretched.z());
-  // The half of the projected hemisphere that the stretched direction sees; basis.x/.y are any pair
-  // perpendicular to it, so the split must follow the direction that lies level.
-  const float sin_theta = std::hypot(stretched.x(), stretched.y());
-  const Vec3f level = sin_theta > 1e-7f
-                          ? Vec3f(-stretched.y() / sin_theta, stretched.x() / sin_theta, 0.0f)
-                          : basis.x;
-  const Vec3f up = stretched.cross(level);
-  t.y() = (1.0f - s) * std::sqrt(std::max(0.0f, 1.0f - t.x() * t.x())) + s * t.y();
-  const float z = std::sqrt(std::max(0.0f, 1.0f - t.squaredNorm()));
-  const Vec3f h = t.x() * level + t.y() * up + z * stretched;
-  return Vec3f(alpha * h.x(), alpha * h.y(), std::max(1e-6f, h.z())).normalized();
-}
-
-inline float ggx_visible_normal_density(const Vec3f& w, const Vec3f& h, float alpha) {
-  const float w_dot_h = std::max(0.0f, w.dot(h));
-  return ggx_distribution(h.z(), alpha) * w_dot_h / (w.z() * (1.0f + ggx_lambda(w.z(), alpha)));
-}
-
-/// Unpolarised reflectance of a smooth dielectric; cos_i > 0 on the incoming side, eta = index
-/// behind over index in front. Returns 1 under total reflection.
-inline float fresnel_dielectric(float cos_i, float eta) {
-  const float sin2_t = std::max(0.0f, 1.0f - cos_i * cos_i) / (eta * eta);
-  if (sin2_t >= 1.0f) return 1.0f;
-  const float cos_t = std::sqrt(1.0f - sin2_t);
-  const float parallel = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
-  const float perpendicular = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
-  return 0.5f * (parallel * parallel + perpendicular * perpendicular);
-}
-
-/// (1 - cos)^5 of Schlick's approximation.
-inline float schlick_weight(float cos_theta) {
-  const float m = std::clamp(1.0f - cos_theta, 0.0f, 1.0f);
-  const float m2 = m * m;
-  return m2 * m2 * m;
 }
 
 /// Weight of a sample of density `own` against another technique's density (Veach's power

@@ -8,10 +8,14 @@
 namespace diorama {
 namespace {
 
-constexpr int kRaysPerPatch = 2;
-constexpr float kUnseenShare = 0.02f;
+constexpr int kRaysPerCell = 192;  // beside one for every patch
+constexpr int kMostRaysPerPatch = 48;
+// The grid may be wrong: what a cell does not see but its neighbour does gets a good share of the
+// samples, and everything else a small one.
+constexpr float kNeighbourShare = 0.05f;
+constexpr float kUnseenShare = 0.001f;
 
-float unit(std::uint64_t bits) { return float(bits >> 40) * 0x1p-24f; }
+float fraction(std::uint64_t bits) { return float(bits >> 40) * 0x1p-24f; }
 
 }  // namespace
 
@@ -19,6 +23,7 @@ SkyGrid::SkyGrid(const DomeTexture& dome) {
   Shares all;
   all.fill(1.0f);
   cells_.push_back(make_cell(dome, all));
+  powers_.push_back(cells_[0].power);
 }
 
 SkyGrid::SkyGrid(const DomeTexture& dome, const Eigen::Matrix3f& world_from_dome,
@@ -31,26 +36,56 @@ SkyGrid::SkyGrid(const DomeTexture& dome, const Eigen::Matrix3f& world_from_dome
     cells_per_metre_[k] = float(counts_[std::size_t(k)] / size[k]);
   }
   low_ = bounds.min.cast<float>();
-  cells_.resize(std::size_t(counts_[0] * counts_[1] * counts_[2]));
-  host.parallel_for(cells_.size(), [&](std::size_t index) {
-    const Vec3f corner(float(int(index) % counts_[0]), float(int(index) / counts_[0] % counts_[1]),
-                       float(int(index) / counts_[0] / counts_[1]));
-    Shares seen{};
-    for (int patch = 0; patch < DomeTexture::kPatches; ++patch) {
-      if (dome.patch_power(patch) <= 0.0f) continue;
-      for (int i = 0; i < kRaysPerPatch; ++i) {
-        std::uint64_t key = (index * DomeTexture::kPatches + std::uint64_t(patch)) * kRaysPerPatch +
-                            std::uint64_t(i);
-        const auto next = [&] { return unit(key = mix_bits(key + 0x9E3779B97F4A7C15u)); };
-        const Vec3f offset(next(), next(), next());
-        const Vec3f origin = low_ + (corner + offset).cwiseQuotient(cells_per_metre_);
-        const Vec2f u(next(), next());
-        const Vec3f direction = world_from_dome * dome.sample(patch, u).direction;
-        if (sees(origin, direction)) seen[std::size_t(patch)] += 1.0f / kRaysPerPatch;
+  std::vector<Shares> seen(std::size_t(counts_[0] * counts_[1] * counts_[2]));
+  host.parallel_for(seen.size(), [&](std::size_t index) {
+    seen[index] = seen_from(index, dome, world_from_dome, sees);
+  });
+  cells_.resize(seen.size());
+  host.parallel_for(seen.size(), [&](std::size_t index) {
+    cells_[index] = make_cell(dome, with_neighbours(seen, int(index)));
+  });
+  for (const Cell& cell : cells_) powers_.push_back(cell.power);
+}
+
+SkyGrid::Shares SkyGrid::seen_from(std::size_t index, const DomeTexture& dome,
+                                   const Eigen::Matrix3f& world_from_dome, const Sees& sees) const {
+  float total = 0.0f;
+  for (int patch = 0; patch < DomeTexture::kPatches; ++patch) total += dome.patch_power(patch);
+  const Vec3f corner(float(int(index) % counts_[0]), float(int(index) / counts_[0] % counts_[1]),
+                     float(int(index) / counts_[0] / counts_[1]));
+  Shares seen{};
+  for (int patch = 0; patch < DomeTexture::kPatches; ++patch) {
+    const float power = dome.patch_power(patch);
+    if (power <= 0.0f) continue;
+    const int rays = 1 + std::min(int(kRaysPerCell * (power / total)), kMostRaysPerPatch);
+    std::uint64_t key = (index * DomeTexture::kPatches + std::uint64_t(patch)) * 1024;
+    const auto next = [&] { return fraction(mix_bits(++key * 0x9E3779B97F4A7C15u)); };
+    for (int i = 0; i < rays; ++i) {
+      const Vec3f offset(next(), next(), next());
+      const Vec3f origin = low_ + (corner + offset).cwiseQuotient(cells_per_metre_);
+      const Vec2f u(next(), next());
+      const Vec3f direction = world_from_dome * dome.sample(patch, u).direction;
+      if (sees(origin, direction)) seen[std::size_t(patch)] += 1.0f / float(rays);
+    }
+  }
+  return seen;
+}
+
+SkyGrid::Shares SkyGrid::with_neighbours(const std::vector<Shares>& seen, int index) const {
+  Shares shares = seen[std::size_t(index)];
+  int step = 1;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const int place = index / step % counts_[axis];
+    for (const int side : {-1, 1}) {
+      if (place + side < 0 || place + side >= counts_[axis]) continue;
+      const Shares& other = seen[std::size_t(index + side * step)];
+      for (std::size_t patch = 0; patch < shares.size(); ++patch) {
+        shares[patch] = std::max(shares[patch], kNeighbourShare * other[patch]);
       }
     }
-    cells_[index] = make_cell(dome, seen);
-  });
+    step *= counts_[axis];
+  }
+  return shares;
 }
 
 SkyGrid::Cell SkyGrid::make_cell(const DomeTexture& dome, const Shares& seen) {
@@ -65,30 +100,6 @@ SkyGrid::Cell SkyGrid::make_cell(const DomeTexture& dome, const Shares& seen) {
     for (float& c : cell.cumulative) c /= sum;
   }
   return cell;
-}
-
-std::uint32_t SkyGrid::cell(const Vec3f& position) const {
-  int index = 0;
-  for (int k = 2; k >= 0; --k) {
-    const float x = (position[k] - low_[k]) * cells_per_metre_[k];
-    const int last = counts_[std::size_t(k)] - 1;
-    index = index * (last + 1) + int(std::clamp(x, 0.0f, float(last)));
-  }
-  return std::uint32_t(index);
-}
-
-SkyGrid::Choice SkyGrid::choose(std::uint32_t index, float u) const {
-  const auto& cumulative = cells_[index].cumulative;
-  const auto it = std::upper_bound(cumulative.begin() + 1, cumulative.end() - 1, u);
-  const auto patch = std::size_t(it - cumulative.begin()) - 1;
-  const float share = cumulative[patch + 1] - cumulative[patch];
-  if (!(share > 0.0f)) return {};
-  return {int(patch), share, std::clamp((u - cumulative[patch]) / share, 0.0f, 0.9999999f)};
-}
-
-float SkyGrid::probability(std::uint32_t index, int patch) const {
-  const auto& cumulative = cells_[index].cumulative;
-  return cumulative[std::size_t(patch) + 1] - cumulative[std::size_t(patch)];
 }
 
 }  // namespace diorama

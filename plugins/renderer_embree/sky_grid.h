@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <functional>
 #include <vector>
@@ -25,7 +26,7 @@ class SkyGrid {
 
   std::uint32_t cell(const Vec3f& position) const;
   /// Luminance times solid angle of what a cell sees.
-  float power(std::uint32_t cell) const { return cells_[cell].power; }
+  float power(std::uint32_t cell) const { return powers_[cell]; }
 
   struct Choice {
     int patch = 0;
@@ -43,11 +44,39 @@ class SkyGrid {
   };
   using Shares = std::array<float, DomeTexture::kPatches>;
   static Cell make_cell(const DomeTexture& dome, const Shares& seen);
+  Shares seen_from(std::size_t cell, const DomeTexture& dome,
+                   const Eigen::Matrix3f& world_from_dome, const Sees& sees) const;
+  Shares with_neighbours(const std::vector<Shares>& seen, int cell) const;
 
   Vec3f low_ = Vec3f::Zero();
   Vec3f cells_per_metre_ = Vec3f::Zero();
   std::array<int, 3> counts_{1, 1, 1};
   std::vector<Cell> cells_;
+  std::vector<float> powers_;  ///< Of the cells, close together: read at every vertex.
 };
+
+inline std::uint32_t SkyGrid::cell(const Vec3f& position) const {
+  int index = 0;
+  for (int k = 2; k >= 0; --k) {
+    const float x = (position[k] - low_[k]) * cells_per_metre_[k];
+    const int last = counts_[std::size_t(k)] - 1;
+    index = index * (last + 1) + int(std::clamp(x, 0.0f, float(last)));
+  }
+  return std::uint32_t(index);
+}
+
+inline SkyGrid::Choice SkyGrid::choose(std::uint32_t index, float u) const {
+  const auto& cumulative = cells_[index].cumulative;
+  const auto it = std::upper_bound(cumulative.begin() + 1, cumulative.end() - 1, u);
+  const auto patch = std::size_t(it - cumulative.begin()) - 1;
+  const float share = cumulative[patch + 1] - cumulative[patch];
+  if (!(share > 0.0f)) return {};
+  return {int(patch), share, std::clamp((u - cumulative[patch]) / share, 0.0f, 0.9999999f)};
+}
+
+inline float SkyGrid::probability(std::uint32_t index, int patch) const {
+  const auto& cumulative = cells_[index].cumulative;
+  return cumulative[std::size_t(patch) + 1] - cumulative[std::size_t(patch)];
+}
 
 }  // namespace diorama

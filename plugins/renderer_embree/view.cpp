@@ -14,6 +14,15 @@ View::View(const Scene& scene, NodeId node)
   pixel_angle_ = float(1.0 / std::max(1.0, 0.5 * (camera_.fx + camera_.fy)));
   const bool has_blur = camera_.f_stop > 0.0 && camera_.focus_distance_m > 0.0;
   aperture_radius_ = has_blur ? 0.5e-3 * camera_.focal_length_mm / camera_.f_stop : 0.0;
+
+  is_plain_ = camera_.lens == LensModel::Pinhole && aperture_radius_ <= 0.0;
+  const Mat3& axes = world_from_camera_.linear();
+  origin_ = position();
+  towards_ = (axes * Vec3(-camera_.cx / camera_.fx, camera_.cy / camera_.fy, -1.0)).cast<float>();
+  per_column_ = (axes.col(0) / camera_.fx).cast<float>();
+  per_row_ = (-axes.col(1) / camera_.fy).cast<float>();
+  near_ = float(camera_.near_m);
+  far_ = float(camera_.far_m);
 }
 
 std::optional<Vec3> View::direction(const Vec2& pixel) const {
@@ -40,10 +49,10 @@ std::optional<CameraRay> View::ray(const Vec2& pixel) const {
   return limited(Vec3::Zero(), *d);
 }
 
-std::optional<CameraRay> View::ray(const Vec2& pixel, const Vec2f& aperture) const {
-  if (aperture_radius_ <= 0.0) return ray(pixel);
+CameraRay View::bent_ray(const Vec2& pixel, const Vec2f& aperture) const {
   const auto d = direction(pixel);
-  if (!d || -d->z() < 1e-6) return ray(pixel);
+  if (!d) return {};
+  if (aperture_radius_ <= 0.0 || -d->z() < 1e-6) return limited(Vec3::Zero(), *d);
   const Vec3 focus = *d * (camera_.focus_distance_m / -d->z());
   const Vec2f point = disk_from_square(aperture);
   const Vec3 origin(aperture_radius_ * double(point.x()), aperture_radius_ * double(point.y()),

@@ -2,11 +2,11 @@
 #include "view_transform.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <vector>
 
 #include "sampling.h"
+#include "srgb_bytes.h"
 
 namespace diorama {
 namespace {
@@ -19,25 +19,6 @@ float filmic(float x) {
   x = std::min(x, 1e6f);
   return std::clamp(x * (2.51f * x + 0.03f) / (x * (2.43f * x + 0.59f) + 0.14f), 0.0f, 1.0f);
 }
-
-/// sRGB bytes of linear values, by table: the encoding's steps are finer than a 4096th only near
-/// black, where the square root below spreads them.
-class ByteTable {
- public:
-  ByteTable() {
-    for (std::size_t i = 0; i < bytes_.size(); ++i) {
-      const float root = float(i) / float(bytes_.size() - 1);
-      bytes_[i] = std::uint8_t(srgb_from_linear(root * root) * 255.0f + 0.5f);
-    }
-  }
-  std::uint8_t operator()(float linear) const {
-    const float shown = linear > 0.0f ? std::min(linear, 1.0f) : 0.0f;  // no number is black
-    return bytes_[std::size_t(std::sqrt(shown) * float(bytes_.size() - 1) + 0.5f)];
-  }
-
- private:
-  std::array<std::uint8_t, 8192> bytes_;
-};
 
 }  // namespace
 
@@ -58,7 +39,7 @@ double automatic_exposure(const Image<Vec3f>& hdr) {
 }
 
 Image<Rgba8> displayed(const Image<Vec3f>& hdr, double exposure, ViewTransform transform) {
-  const ByteTable bytes;
+  const SrgbBytes bytes;
   Image<Rgba8> image(hdr.width(), hdr.height(), Rgba8{0, 0, 0, 255});
   for (std::size_t i = 0; i < hdr.pixels().size(); ++i) {
     const Vec3f exposed = hdr.pixels()[i] * float(exposure);

@@ -185,7 +185,12 @@ Scene load_bench_scene(const std::filesystem::path& folder, Host& host, bool is_
       }
     }
     for (const auto& [mesh, material] : meshes[index]) {
-      const NodeId id = scene.create(root, node.value("name", "object"));
+      const std::string name = node.value("name", "object");
+      const NodeId id = scene.create(root, name);
+      // The loose things: a renderer may prepare for their moving.
+      if (name.starts_with("obj.") || name.starts_with("chair.")) {
+        scene.edit(id).rigid_body = RigidBody();
+      }
       scene.edit(id).mesh = mesh;
       scene.edit(id).materials = {materials[material]};
       scene.set_pose(id, node_pose(node));

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Renders the bench scene and prints speed and error; see run_renderer.sh beside this file.
+#include <time.h>
+
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
@@ -44,6 +48,73 @@ Error3 compare(const Image<Vec3f>& image, const Texture& reference) {
   return {total / double(errors.size()), sum / expected - 1.0};
 }
 
+double thread_seconds() {
+  timespec now;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return double(now.tv_sec) + 1e-9 * double(now.tv_nsec);
+}
+
+/// Traces the picture's middle, then the very same rays by Embree alone, in turns on one thread;
+/// returns the share of the time that the rays need.
+double share_of_raw_rays(const Scene& scene, NodeId camera, Host& host,
+                         const EmbreeRenderer::Params& params) {
+  const Isa isa = isa_by_name(params.isa);
+  RenderScene meshes(host, {kIsaNames[std::size_t(isa)], params.sphere_lights == "disk"});
+  meshes.take(scene);
+  const View view(scene, camera);
+  const SobolTable table;
+  TraceSettings settings{params.max_bounces, float(params.clamp), params.caustics};
+  const int width = view.camera().width;
+  const int height = view.camera().height;
+  TraceJob job;
+  job.x_begin = width / 4;
+  job.x_end = 3 * width / 4;
+  job.y_begin = height / 4;
+  job.y_end = 3 * height / 4;
+  std::vector<PixelSum> sums(std::size_t(width) * std::size_t(height));
+  std::vector<LoggedRay> rays;
+  settings.ray_log = &rays;
+  PathTracer(meshes, view, table, settings, isa).trace(job, sums.data(), std::size_t(width));
+  settings.ray_log = nullptr;
+  const PathTracer tracer(meshes, view, table, settings, isa);
+  std::vector<double> shares;
+  std::size_t hits = 0;
+  for (int i = 0; i < 5; ++i) {
+    double start = thread_seconds();
+    tracer.trace(job, sums.data(), std::size_t(width));
+    const double paths = thread_seconds() - start;
+    start = thread_seconds();
+    for (const LoggedRay& ray : rays) {
+      hits += ray.is_shadow
+                  ? meshes.transmittance(ray.origin, ray.direction, ray.t_max, false).x() > 0.0f
+                  : bool(meshes.intersect(ray.origin, ray.direction, ray.t_min, ray.t_max));
+    }
+    shares.push_back((thread_seconds() - start) / paths);
+  }
+  std::sort(shares.begin(), shares.end());
+  return hits > 0 ? shares[shares.size() / 2] : 0.0;
+}
+
+/// Wall time from a change of the scene to the first ray: all that has a rigid body has moved.
+double update_seconds(Scene& scene, EmbreeRenderer& renderer) {
+  std::vector<double> times;
+  for (int i = 0; i < 5; ++i) {
+    for (const NodeId node : scene.match("/room/*")) {
+      if (!scene[node].rigid_body) continue;
+      Affine pose = scene[node].parent_from_node;
+      pose.translation().x() += i % 2 == 0 ? 0.01 : -0.01;
+      pose.linear() = Mat3(Eigen::AngleAxisd(0.02, Vec3::UnitY())) * pose.linear();
+      scene.set_pose(node, pose);
+    }
+    const auto start = std::chrono::steady_clock::now();
+    renderer.prepare(scene);
+    times.push_back(
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  }
+  std::sort(times.begin(), times.end());
+  return times[times.size() / 2];
+}
+
 struct Options {
   std::string folder;
   std::string reference;
@@ -54,6 +125,7 @@ struct Options {
   int height = 240;
   int threads = 2;
   int repetitions = 1;
+  bool probes = false;
   std::uint64_t seed = 1;
   EmbreeRenderer::Params params;
 };
@@ -71,6 +143,11 @@ void run(const Options& options) {
   start = cpu_seconds();
   renderer.prepare(scene);
   const double prepare = cpu_seconds() - start;
+  nlohmann::ordered_json facts;
+  if (options.probes) {
+    facts["raw_ray_share"] = share_of_raw_rays(scene, camera, host, options.params);
+    facts["update_wall_s"] = update_seconds(scene, renderer);
+  }
   std::shared_ptr<const Texture> reference;
   if (!options.reference.empty()) reference = host.read_texture(options.reference);
   for (int i = 0; i < options.repetitions; ++i) {
@@ -80,7 +157,7 @@ void run(const Options& options) {
                                          options.seed + unsigned(i)});
     const double cpu = cpu_seconds() - start;
     const auto& counts = renderer.last_counts();
-    nlohmann::ordered_json line;
+    nlohmann::ordered_json line = facts;
     line["materials"] = options.materials;
     line["size"] = std::to_string(options.width) + "x" + std::to_string(options.height);
     line["samples"] = options.params.samples;
@@ -132,7 +209,11 @@ int main(int argc, char** argv) {
   app.add_option("--threads", options.threads);
   app.add_option("--repetitions", options.repetitions);
   app.add_option("--seed", options.seed);
+  app.add_flag("--probes", options.probes,
+               "Also compare with Embree alone and time the update of a scene whose things moved");
+  app.add_option("--mode", options.params.mode);
   app.add_option("--isa", options.params.isa);
+  app.add_option("--sphere-lights", options.params.sphere_lights);
   app.add_flag("--denoise,!--no-denoise", options.params.denoise);
   app.add_flag("--caustics,!--no-caustics", options.params.caustics);
   CLI11_PARSE(app, argc, argv);

@@ -2,10 +2,10 @@
 #include "bsdf.h"
 
 #include <cmath>
+#include <memory>
 #include <vector>
 
 #include "diorama/rng.h"
-#include "sobol.h"
 #include "support/catch.h"
 
 namespace diorama {
@@ -21,34 +21,53 @@ Vec3f direction(float cos_theta, float phi = 0.7f) {
   return {s * std::cos(phi), s * std::sin(phi), cos_theta};
 }
 
+/// A surface with the tables that it needs.
+struct Made {
+  explicit Made(const SurfaceBsdf& source)
+      : surface(source), layers(tables(), source.layers, source.alpha) {
+    surface.table = &layers;
+    if (source.transmission <= 0.0f) return;
+    glass = std::make_unique<GlassTable>(1.5f, source.alpha);
+    surface.glass = glass.get();
+  }
+  SurfaceBsdf surface;
+  LayerTable layers;
+  std::unique_ptr<GlassTable> glass;
+};
+
 /// Share of uniform light that comes back to wo, by the BSDF's own sampling.
 double furnace(const SurfaceBsdf& surface, float cos_theta) {
-  static const SobolTable sobol;
-  const Bsdf bsdf(surface, tables(), direction(cos_theta));
-  constexpr std::uint32_t kSamples = 16384;
+  const Bsdf bsdf(surface, direction(cos_theta));
+  // An additive recurrence of three dimensions (Roberts 2018).
+  constexpr int kSamples = 1 << 18;
   double sum = 0.0;
-  for (std::uint32_t i = 0; i < kSamples; ++i) {
-    PathSampler sampler(sobol, 11, 3, 8, i);
-    const Vec2f lobe = sampler.next();
-    sum += double(bsdf.sample(lobe.x(), sampler.next()).weight.mean());
+  Vec3 u = Vec3::Constant(0.5);
+  for (int i = 0; i < kSamples; ++i) {
+    u += Vec3(0.8191725133961645, 0.6710436067037893, 0.5497004779019703);
+    u -= Vec3(u.array().floor());
+    const Vec3f v = u.cast<float>().cwiseMin(0.999999f);
+    sum += double(bsdf.sample(v.x(), {v.y(), v.z()}).weight.mean());
   }
   return sum / kSamples;
 }
 
-const std::vector<float> kRoughnesses{0.0f, 0.1f, 0.2f, 0.35f, 0.5f, 0.7f, 0.85f, 1.0f};
-const std::vector<float> kCosines{0.05f, 0.2f, 0.5f, 0.8f, 0.99f};
+const std::vector<float> kRoughnesses{0.0f, 0.1f, 0.2f, 0.35f, 0.5f, 0.7f, 1.0f};
+const std::vector<float> kCosines{0.05f, 0.2f, 0.6f, 0.99f};
 
-float alpha_of(float roughness) { return std::max(Bsdf::kMinAlpha, roughness * roughness); }
+float alpha_of(float roughness) { return std::max(kMinAlpha, roughness * roughness); }
 
-/// `least` and `most`: 16384 samples, tables of 32 x 32 (conductors) and 16 x 16 (glass).
-void check_furnace(SurfaceBsdf surface, double least = 0.99, double most = 1.004) {
+/// Between 0.99 and 1 for every roughness and direction, but for the error of the
+/// integration, two thousandths.
+void check_furnace(SurfaceBsdf source) {
   for (const float roughness : kRoughnesses) {
-    surface.alpha = alpha_of(roughness);
+    source.alpha = alpha_of(roughness);
+    const Made made(source);
+    const SurfaceBsdf& surface = made.surface;
     for (const float cosine : kCosines) {
-      CAPTURE(roughness, cosine, surface.metallic, surface.coat, surface.transmission);
+      CAPTURE(roughness, cosine, surface.metallic, surface.layers.coat, surface.transmission);
       const double energy = furnace(surface, cosine);
-      CHECK(energy >= least);
-      CHECK(energy <= most);
+      CHECK(energy >= 0.99);
+      CHECK(energy <= 1.002);
     }
   }
 }
@@ -66,9 +85,9 @@ TEST_CASE("a white dielectric returns all light at every roughness", "[bsdf][fur
   SurfaceBsdf surface;
   surface.base = Vec3f::Ones();
   check_furnace(surface);
-  surface.specular = 0.0f;
+  surface.layers.specular = 0.0f;
   check_furnace(surface);
-  surface.specular = 0.6f;
+  surface.layers.specular = 0.6f;
   surface.metallic = 0.5f;
   check_furnace(surface);
 }
@@ -77,38 +96,39 @@ TEST_CASE("a clear coat takes from what lies below as much as it returns", "[bsd
   SurfaceBsdf surface;
   surface.base = Vec3f::Ones();
   for (const float coat_roughness : {0.1f, 0.6f}) {
-    surface.coat = 1.0f;
-    surface.coat_alpha = alpha_of(coat_roughness);
-    // The layers' common mean comes from four points, and grazing light feels that.
-    check_furnace(surface, 0.975);
+    for (const float metallic : {0.0f, 0.4f, 1.0f}) {
+      surface.layers.coat = 1.0f;
+      surface.layers.coat_alpha = alpha_of(coat_roughness);
+      surface.metallic = metallic;
+      check_furnace(surface);
+    }
   }
 }
 
 TEST_CASE("glass loses no light at every roughness, from both sides", "[bsdf][furnace]") {
-  const GlassTables glass(1.5f);
   SurfaceBsdf surface;
   surface.base = Vec3f::Ones();
   surface.transmission = 1.0f;
-  surface.glass = &glass;
-  check_furnace(surface, 0.985, 1.015);
+  check_furnace(surface);
   surface.is_inside = true;
-  check_furnace(surface, 0.985, 1.015);
+  check_furnace(surface);
 }
 
 TEST_CASE("light takes the same share forwards and backwards", "[bsdf]") {
   Rng rng(4);
-  for (int i = 0; i < 2000; ++i) {
+  for (int i = 0; i < 400; ++i) {
     SurfaceBsdf surface;
     surface.base = rng.uniform_in({Vec3::Zero(), Vec3::Ones()}).cast<float>();
     surface.metallic = float(rng.uniform());
     surface.alpha = alpha_of(float(rng.uniform(0.2, 1.0)));
-    surface.specular = float(rng.uniform());
-    surface.coat = rng.chance(0.5) ? float(rng.uniform()) : 0.0f;
-    surface.coat_alpha = alpha_of(float(rng.uniform(0.2, 1.0)));
+    surface.layers.specular = float(rng.uniform());
+    surface.layers.coat = rng.chance(0.5) ? float(rng.uniform()) : 0.0f;
+    surface.layers.coat_alpha = alpha_of(float(rng.uniform(0.2, 1.0)));
+    const Made made(surface);
     const Vec3f a = direction(float(rng.uniform(0.05, 1.0)), float(rng.uniform(0.0, 6.0)));
     const Vec3f b = direction(float(rng.uniform(0.05, 1.0)), float(rng.uniform(0.0, 6.0)));
-    const Vec3f forwards = Bsdf(surface, tables(), a).evaluate(b).f_cos / b.z();
-    const Vec3f backwards = Bsdf(surface, tables(), b).evaluate(a).f_cos / a.z();
+    const Vec3f forwards = Bsdf(made.surface, a).evaluate(b).f_cos / b.z();
+    const Vec3f backwards = Bsdf(made.surface, b).evaluate(a).f_cos / a.z();
     for (int k = 0; k < 3; ++k)
       CHECK(forwards[k] == Approx(backwards[k]).epsilon(2e-3).margin(1e-5));
     CHECK(forwards.minCoeff() >= 0.0f);
@@ -116,19 +136,18 @@ TEST_CASE("light takes the same share forwards and backwards", "[bsdf]") {
 }
 
 TEST_CASE("samples come with the density that evaluation states", "[bsdf]") {
-  const GlassTables glass(1.45f);
   Rng rng(6);
   for (int i = 0; i < 60; ++i) {
     SurfaceBsdf surface;
     surface.base = Vec3f(0.8f, 0.5f, 0.3f);
     surface.metallic = i % 3 == 0 ? 0.0f : float(rng.uniform(0.0, 0.9));
     surface.alpha = alpha_of(float(rng.uniform(0.4, 1.0)));
-    surface.coat = i % 2 == 0 ? 0.8f : 0.0f;
-    surface.coat_alpha = alpha_of(0.5f);
+    surface.layers.coat = i % 2 == 0 ? 0.8f : 0.0f;
+    surface.layers.coat_alpha = alpha_of(0.5f);
     surface.transmission = i % 4 == 0 ? 0.7f : 0.0f;
-    surface.glass = &glass;
     surface.is_inside = i % 8 == 0;
-    const Bsdf bsdf(surface, tables(), direction(float(rng.uniform(0.2, 0.95))));
+    const Made made(surface);
+    const Bsdf bsdf(made.surface, direction(float(rng.uniform(0.2, 0.95))));
     // The density integrates to the share of samples that are not thrown away, and f cos by
     // uniform sampling equals the mean weight.
     double total = 0.0;
@@ -153,14 +172,13 @@ TEST_CASE("samples come with the density that evaluation states", "[bsdf]") {
 }
 
 TEST_CASE("smooth glass bends light by Snell's law", "[bsdf]") {
-  const GlassTables glass(1.5f);
   SurfaceBsdf surface;
   surface.base = Vec3f::Ones();
   surface.transmission = 1.0f;
-  surface.glass = &glass;
-  surface.alpha = Bsdf::kMinAlpha;
+  surface.alpha = kMinAlpha;
+  const Made made(surface);
   const Vec3f wo = direction(0.6f, 0.4f);
-  const Bsdf bsdf(surface, tables(), wo);
+  const Bsdf bsdf(made.surface, wo);
   CHECK_FALSE(bsdf.has_smooth_part());
   const BsdfSample through = bsdf.sample(0.9f, {0.3f, 0.3f});
   REQUIRE(through.is_transmitted);

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <functional>
 
+#include "diorama/error.h"
 #include "embree_renderer.h"
 #include "support/catch.h"
 #include "support/render_host/render_host.h"
@@ -149,7 +150,7 @@ TEST_CASE("light samples, BSDF samples and both together agree", "[renderer][mis
   TestWorld world = busy_room();
   const NodeId camera = world.add_camera(40, 30, 22.0, Vec3(-1.8, -1.5, 0.6), Vec3(0.3, 0.6, -0.9));
   RenderHost host(2);
-  RenderScene scene(host, "auto");
+  RenderScene scene(host, {});
   scene.take(world.scene);
   const View view(world.scene, camera);
   const SobolTable table;
@@ -159,19 +160,14 @@ TEST_CASE("light samples, BSDF samples and both together agree", "[renderer][mis
     settings.has_caustics = true;
     settings.samples_lights = lights;
     settings.samples_bsdf = bsdf;
-    const PathTracer tracer(scene, view, table, settings);
+    const PathTracer tracer(scene, view, table, settings, Isa::Sse2);
     // Independent repetitions give the error of the mean.
     constexpr int kRuns = 12;
     std::vector<double> runs(kRuns, 0.0);
     host.parallel_for(kRuns, [&](std::size_t run) {
-      for (int y = 0; y < 30; ++y) {
-        for (int x = 0; x < 40; ++x) {
-          for (int i = 0; i < samples; ++i) {
-            const PathSample s = tracer.trace(x, y, std::uint32_t(i), 1000 + run);
-            runs[run] += double(s.scattered.mean()) / (1200.0 * samples);
-          }
-        }
-      }
+      std::vector<PixelSum> sums(1200);
+      tracer.trace({0, 0, 40, 30, 0, std::uint32_t(samples), 1000 + run}, sums.data(), 40);
+      for (const PixelSum& sum : sums) runs[run] += double(sum.mean().scattered.mean()) / 1200.0;
     });
     double mean = 0.0;
     for (double r : runs) mean += r / kRuns;
@@ -280,6 +276,48 @@ TEST_CASE("an updated scene renders the same bytes as a fresh renderer",
   const Image<Vec3f> updated = renderer.render({camera, {hdr}, 9}).get(kColorHdr);
   CHECK(updated != before);
   CHECK(updated == render(world, camera, reference(3), 2, 9));
+}
+
+TEST_CASE("what moves as a rigid body renders the same bytes whatever came before",
+          "[renderer][determinism]") {
+  TestWorld world = busy_room();
+  world.add(dome(0.3f));
+  const NodeId camera = world.add_camera(40, 30, 22.0, Vec3(-1.8, -1.5, 0.6), Vec3(0.3, 0.6, -0.9));
+  const NodeId ball = world.scene.find("/base/ball");
+  const NodeId box = world.scene.find("/base/box");
+  world.scene.edit(ball).rigid_body = RigidBody();
+  world.scene.edit(box).rigid_body = RigidBody();
+  RenderHost host(2);
+  EmbreeRenderer renderer(reference(3), host);
+  const std::string hdr(kColorHdr.name);
+  for (int i = 0; i < 3; ++i) {
+    Affine pose = at(0.2, 0.1 * i, -0.4);
+    pose.rotate(Eigen::AngleAxisd(0.7 * i, Vec3(0.6, 0.0, 0.8)));
+    world.scene.set_pose(box, pose);
+    world.scene.set_pose(ball, at(-0.3 * i, 0.1, -0.9));
+    renderer.prepare(world.scene);
+    CAPTURE(i);
+    CHECK(renderer.render({camera, {hdr}, 9}).get(kColorHdr) ==
+          render(world, camera, reference(3), 2, 9));
+  }
+}
+
+TEST_CASE("every instruction set of this machine renders the same picture", "[renderer]") {
+  TestWorld world = busy_room();
+  const NodeId camera = world.add_camera(40, 30, 22.0, Vec3(-1.8, -1.5, 0.6), Vec3(0.3, 0.6, -0.9));
+  EmbreeRenderer::Params params = reference(16);
+  params.isa = "sse2";
+  const Statistics expected = statistics(render(world, camera, params));
+  for (const char* isa : {"sse4.2", "avx2", "avx512"}) {
+    params.isa = isa;
+    CAPTURE(isa);
+    try {
+      const Statistics found = statistics(render(world, camera, params));
+      CHECK(found.mean == Approx(expected.mean).epsilon(0.002));
+    } catch (const Error& error) {
+      CHECK(std::string(error.what()) == "isa: this processor does not have " + std::string(isa));
+    }
+  }
 }
 
 TEST_CASE("glass lets the light of a lamp into a closed room", "[renderer]") {

@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "albedo_tables.h"
+
+#include <algorithm>
+
+namespace diorama {
+namespace {
+
+constexpr int kPoints = 1024;  // of the numeric integrals
+
+/// Tables are denser where things bend: at grazing angles and low roughness.
+float squared_node(int i, int size) {
+  const float x = float(i) / float(size - 1);
+  return std::max(1e-3f, x * x);
+}
+float node_alpha(int i, int size) { return std::max(kMinAlpha, squared_node(i, size)); }
+
+/// Mean over the hemisphere weighted by the cosine.
+template <class Albedo>
+float hemispherical_mean(Albedo&& albedo) {
+  constexpr int kSteps = 1024;
+  double sum = 0.0;
+  for (int i = 0; i < kSteps; ++i) {
+    sum += double(albedo(std::sqrt((float(i) + 0.5f) / float(kSteps))));
+  }
+  return float(sum / kSteps);
+}
+
+/// An additive recurrence of two dimensions (Roberts 2018): fine along every radius of the disk,
+/// which a square grid is not.
+Vec2f spread_point(int i) {
+  const double x = 0.5 + double(i) * 0.75487766624669276;
+  const double y = 0.5 + double(i) * 0.56984029099805327;
+  return {float(x - std::floor(x)), float(y - std::floor(y))};
+}
+
+Vec3f direction_at(float cos_theta) {
+  return {std::sqrt(std::max(0.0f, 1.0f - cos_theta * cos_theta)), 0.0f, cos_theta};
+}
+
+/// Split albedo of a conductor seen through something that lets pass(cos_i) of it through.
+template <class Pass>
+AlbedoTables::Split conductor_albedo(float cos_theta, float alpha, Pass&& pass) {
+  const Vec3f wo = direction_at(cos_theta);
+  AlbedoTables::Split sum;
+  for (int i = 0; i < kPoints; ++i) {
+    const Vec3f h = ggx_visible_normal(wo, alpha, spread_point(i));
+    const Vec3f wi = mirrored(wo, h);
+    if (wi.z() <= 0.0f) continue;
+    const float share = ggx_shadowing(wo.z(), wi.z(), alpha) * pass(wi.z());
+    const float weight = schlick_weight(wo.dot(h));
+    sum.a += share * (1.0f - weight);
+    sum.b += share * weight;
+  }
+  return {sum.a / float(kPoints), sum.b / float(kPoints)};
+}
+
+float glass_albedo(float cos_theta, float alpha, float eta) {
+  const Vec3f wo = direction_at(cos_theta);
+  float sum = 0.0f;
+  for (int i = 0; i < kPoints; ++i) {
+    const Vec3f h = ggx_visible_normal(wo, alpha, spread_point(i));
+    const float f = fresnel_dielectric(wo.dot(h), eta);
+    const Vec3f back = mirrored(wo, h);
+    if (back.z() > 0.0f) sum += f * ggx_shadowing(wo.z(), back.z(), alpha);
+    const Vec3f bent = refracted(wo, h, eta);
+    if (bent.z() < 0.0f) sum += (1.0f - f) * ggx_transmitted_shadowing(bent.z(), alpha);
+  }
+  return std::min(sum / float(kPoints), 0.9999f);
+}
+
+}  // namespace
+
+AlbedoTables::AlbedoTables() {
+  const auto all = [](float) { return 1.0f; };
+  for (int y = 0; y < kSize; ++y) {
+    for (int x = 0; x < kSize; ++x) {
+      directional_.push_back(conductor_albedo(squared_node(x, kSize), node_alpha(y, kSize), all));
+    }
+  }
+}
+
+AlbedoTables::Split AlbedoTables::at(float cos_theta, float alpha) const {
+  const auto place = [](float value, int& cell) {
+    const float x = std::sqrt(std::clamp(value, 0.0f, 1.0f)) * float(kSize - 1);
+    cell = std::min(int(x), kSize - 2);
+    return x - float(cell);
+  };
+  int x;
+  int y;
+  const float fx = place(cos_theta, x);
+  const float fy = place(alpha, y);
+  const Split* row = &directional_[std::size_t(y * kSize + x)];
+  const Split* next = row + kSize;
+  const auto mix = [](float p, float q, float t) { return p + (q - p) * t; };
+  return {mix(mix(row[0].a, row[1].a, fx), mix(next[0].a, next[1].a, fx), fy),
+          mix(mix(row[0].b, row[1].b, fx), mix(next[0].b, next[1].b, fx), fy)};
+}
+
+LayerTable::LayerTable(const AlbedoTables& tables, const Layers& layers,
+                       std::optional<float> alpha) {
+  if (alpha) {
+    add_row(tables, layers, *alpha);
+    return;
+  }
+  for (int i = 0; i < kRows; ++i) add_row(tables, layers, node_alpha(i, kRows));
+}
+
+void LayerTable::add_row(const AlbedoTables& tables, const Layers& layers, float alpha) {
+  const auto coat_at = [&](float cosine) {
+    if (layers.coat <= 0.0f) return 0.0f;
+    const AlbedoTables::Split e = tables.at(cosine, layers.coat_alpha);
+    return layers.coat * (kCoatF0 * e.a + e.b);
+  };
+  const std::size_t begin = nodes_.size();
+  for (int i = 0; i < kNodes; ++i) {
+    const float cosine = squared_node(i, kNodes);
+    const float coat = coat_at(cosine);
+    // Reciprocal, and exact for smooth layers, whose light leaves at the angle of its arrival.
+    const auto pass = [&](float cos_i) { return 1.0f - std::max(coat, coat_at(cos_i)); };
+    const AlbedoTables::Split e =
+        layers.coat > 0.0f ? conductor_albedo(cosine, alpha, pass) : tables.at(cosine, alpha);
+    nodes_.emplace_back(e.a, e.b, coat, 0.0f);
+  }
+  Row row;
+  row.low_ = row.high_ = &nodes_[begin];
+  Means means;
+  means.missing = hemispherical_mean([&](float c) { return missing(row.at(c)); });
+  const float single = hemispherical_mean([&](float c) { return row.at(c)[0] + row.at(c)[1]; });
+  means.kept = single / (single + means.missing);
+  means.plastic = between_facets(layers.f0, means.kept);
+  for (std::size_t i = begin; i < nodes_.size(); ++i) {
+    Node& n = nodes_[i];
+    n[3] = n[2] + layers.specular * (layers.f0 * n[0] + n[1] + means.plastic * missing(n));
+  }
+  means.above = hemispherical_mean([&](float c) { return row.at(c)[3]; });
+  means_.push_back(means);
+}
+
+GlassTable::GlassTable(float eta, std::optional<float> alpha)
+    : eta_(eta), rows_(alpha ? (*alpha > kSmoothAlpha ? 1 : 0) : kRows) {
+  for (int side = 0; side < 2; ++side) {
+    for (int y = 0; y < rows_; ++y) {
+      const float row_alpha = alpha ? *alpha : node_alpha(y, kRows);
+      for (int x = 0; x < kNodes; ++x) {
+        directional_.push_back(
+            glass_albedo(squared_node(x, kNodes), row_alpha, side == 0 ? eta_ : 1.0f / eta_));
+      }
+    }
+  }
+  for (int side = 0; side < 2; ++side) {
+    for (int y = 0; y < rows_; ++y) {
+      const float row_alpha = alpha ? *alpha : node_alpha(y, kRows);
+      mean_.push_back(hemispherical_mean([&](float c) { return at(side, c, row_alpha); }));
+    }
+  }
+}
+
+std::size_t GlassTable::row_of(int side, float alpha, float& rest) const {
+  rest = 0.0f;
+  if (rows_ == 1) return std::size_t(side);
+  const float x = std::min(std::sqrt(alpha), 1.0f) * float(rows_ - 1);
+  const int i = std::min(int(x), rows_ - 2);
+  rest = x - float(i);
+  return std::size_t(side * rows_ + i);
+}
+
+float GlassTable::at(int side, float cos_theta, float alpha) const {
+  float rest;
+  const float* row = &directional_[row_of(side, alpha, rest) * kNodes];
+  const float x = std::sqrt(std::clamp(cos_theta, 0.0f, 1.0f)) * float(kNodes - 1);
+  const int i = std::min(int(x), kNodes - 2);
+  const float t = x - float(i);
+  const float low = row[i] + (row[i + 1] - row[i]) * t;
+  if (rest == 0.0f) return low;
+  const float* next = row + kNodes;
+  return low + (next[i] + (next[i + 1] - next[i]) * t - low) * rest;
+}
+
+float GlassTable::mean(int side, float alpha) const {
+  float rest;
+  const std::size_t row = row_of(side, alpha, rest);
+  return rest == 0.0f ? mean_[row] : mean_[row] + (mean_[row + 1] - mean_[row]) * rest;
+}
+
+}  // namespace diorama
