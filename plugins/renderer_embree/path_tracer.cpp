@@ -175,7 +175,7 @@ inline void PathTracer::trace_path(Path& path) const {
 inline void PathTracer::add(Path& path, const Vec3f& radiance) const {
   // Extreme densities may round to a value beyond all numbers, which would spoil its pixel.
   constexpr float kMost = 1e20f;
-  if (!(radiance.maxCoeff() < kMost)) return;
+  if (!(radiance.sum() < kMost)) return;
   Vec3f value = radiance;
   if (!path.has_scattered) {
     path.result.seen += value;
