@@ -212,7 +212,7 @@ Value check_job(const Value& value, Registry& registry, Host& host) {
 
 JobAssembly assemble_job(const Value& value, Registry& registry, HostServices& host,
                          const std::optional<fs::path>& assets_root,
-                         const std::string& program_version) {
+                         const std::string& program_version, AssembleFor purpose) {
   JobAssembly assembly;
   Assembler assembler(registry, host);
   assembly.job = read_job(value, assembler.complaints());
@@ -230,6 +230,7 @@ JobAssembly assemble_job(const Value& value, Registry& registry, HostServices& h
   if (assembly.job.writers.empty()) {
     host.log(LogLevel::Warning, "writers: there are none, so the run leaves no pictures");
   }
+  if (purpose == AssembleFor::Plan) return assembly;
   assembly.dataset = describe_dataset(
       assembly.job, assembly.plan, portable_job(assembly.resolved), program_version,
       assembler.plugins(), [&](const std::string& asset) { return assembler.files_of(asset); },

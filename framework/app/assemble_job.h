@@ -33,12 +33,15 @@ DescribeComponent describe_from(Registry& registry);
 /// Error(Config).
 Value check_job(const Value& job, Registry& registry, Host& host);
 
+/// A plan needs no description of the dataset, for which every file of every asset is read.
+enum class AssembleFor { Plan, Run };
+
 /// Reads the job, makes its components, lists its assets, plans its captures and resolves what its
 /// writers need. The host gets the job's loaders. Nothing is loaded or written. All complaints
 /// about the file come in one Error (Config); then Error(Plugin), Error(Asset) as found.
 JobAssembly assemble_job(const Value& job, Registry& registry, HostServices& host,
                          const std::optional<std::filesystem::path>& assets_root,
-                         const std::string& program_version);
+                         const std::string& program_version, AssembleFor purpose);
 
 /// Where the dataset goes.
 OutputFolders output_folders(const Job& job);

@@ -104,7 +104,8 @@ int command_run(const GlobalOptions& global, const RunCommandOptions& options, C
   const std::optional<fs::path> assets_root =
       choose_assets_root(global.assets_root, std::getenv("DIORAMA_ASSETS_ROOT"), job_root,
                          sample_pack_folder(global.program));
-  JobAssembly assembly = assemble_job(job, *registry, *host, assets_root, program_version());
+  JobAssembly assembly = assemble_job(job, *registry, *host, assets_root, program_version(),
+                                      options.dry_run ? AssembleFor::Plan : AssembleFor::Run);
   if (options.dry_run) {
     std::cout << plan_text(assembly.plan, assembly.job, assets_root);
     return 0;

@@ -28,7 +28,8 @@ bool is_below(int handle, std::string_view folder) {
 
 }  // namespace
 
-extern "C" ssize_t write(int handle, const void* data, size_t size) {
+extern "C" __attribute__((visibility("default"))) ssize_t write(int handle, const void* data,
+                                                                size_t size) {
   static const auto real = reinterpret_cast<Write>(::dlsym(RTLD_NEXT, "write"));
   const char* folder = std::getenv("DIORAMA_TEST_FAIL_BELOW");
   if (folder == nullptr || !is_below(handle, folder)) return real(handle, data, size);

@@ -26,7 +26,7 @@ lights: [{type: dome, name: sky}]
 cameras: [{type: pinhole, name: cam, count: 1, width: 96, height: 72}]
 randomizers:
   - {type: scatter_poses, name: poses, on: [environment], nodes: "/Assets/*",
-     offset_min: [-0.6, -0.6, 1.0], offset_max: [0.6, 0.6, 1.6], scale: [0.1, 0.2]}
+     offset: [[-0.6, 0.6], [-0.6, 0.6], [1.0, 1.6]], scale: [0.1, 0.2]}
   - {type: orbit_cameras, name: cameras, on: [environment], nodes: "/Cameras/*",
      targets: "/Environment", distance: [3.0, 3.0], polar_angle_deg: [40, 40]}
 renderer: {type: "null"}
