@@ -43,7 +43,7 @@ ValueOffer offer_for(std::string_view value) {
 }
 
 /// In single quotes, for any of the three shells.
-std::string quoted(std::string_view text) {
+std::string shell_quoted(std::string_view text) {
   std::string out = "'";
   for (const char c : text) out += c == '\'' ? std::string(R"('\'')") : std::string(1, c);
   return out + "'";
@@ -101,7 +101,7 @@ struct ShellDialect {
 std::string known_commands(const std::vector<CommandPage>& commands, const ShellDialect& shell) {
   CaseBranches branches;
   for (std::size_t i = 1; i < commands.size(); ++i) {
-    branches.add("at+=\" $word\"", quoted(commands[i].name));
+    branches.add("at+=\" $word\"", shell_quoted(commands[i].name));
   }
   return branches.text(shell.open_pattern);
 }
@@ -116,8 +116,8 @@ std::string values_of_options(const std::vector<CommandPage>& commands, const Sh
       std::string body = shell.value(offer_for(option.value));
       body += body.empty() ? "return" : "; return";
       for (const std::string& flag : option.flags) {
-        branches.add(body,
-                     is_program ? "*" + quoted(" " + flag) : quoted(command.name + " " + flag));
+        branches.add(body, is_program ? "*" + shell_quoted(" " + flag)
+                                      : shell_quoted(command.name + " " + flag));
       }
     }
   }
@@ -131,7 +131,7 @@ std::string values_of_arguments(const std::vector<CommandPage>& commands,
     for (const OptionPage& option : command.options) {
       if (!option.is_argument) continue;
       const std::string body = shell.value(offer_for(option.value));
-      if (!body.empty()) branches.add(body, quoted(command.name));
+      if (!body.empty()) branches.add(body, shell_quoted(command.name));
     }
   }
   return branches.text(shell.open_pattern);
@@ -152,7 +152,7 @@ std::string bash_value(const ValueOffer& value) {
     case Offer::Types:
       return bash_reply("-W \"$(" + std::string(kListTypes) + ")\"");
     case Offer::Words:
-      return bash_reply("-W " + quoted(value.words));
+      return bash_reply("-W " + shell_quoted(value.words));
   }
   return "";
 }
@@ -174,16 +174,16 @@ std::string bash_script(const std::vector<CommandPage>& commands) {
       below.push_back(last_word(one->name));
     }
     const bool is_program = &command == &commands.front();
-    words += "    " + quoted(command.name) + ")";
-    if (!below.empty()) words += " commands=" + quoted(joined(below, " "));
-    if (!is_program) words += " options+=" + quoted(" " + flags_of(command));
+    words += "    " + shell_quoted(command.name) + ")";
+    if (!below.empty()) words += " commands=" + shell_quoted(joined(below, " "));
+    if (!is_program) words += " options+=" + shell_quoted(" " + flags_of(command));
     words += " ;;\n";
   }
   return "# SPDX-License-Identifier: Apache-2.0\n# Completion for bash." + std::string(kHead) +
          "_diorama() {\n"
          "  local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD - 1]}\n"
          "  local at=diorama word commands= options=" +
-         quoted(flags_of(commands.front())) +
+         shell_quoted(flags_of(commands.front())) +
          "\n  COMPREPLY=()\n"
          "  for word in \"${COMP_WORDS[@]:1:COMP_CWORD-1}\"; do\n"
          "    case \"$at $word\" in\n" +
@@ -218,7 +218,8 @@ std::string zsh_value(const ValueOffer& value) {
 std::string zsh_options(const CommandPage& command) {
   std::vector<std::string> lines;
   for (const OptionPage& option : command.options) {
-    for (const std::string& flag : option.flags) lines.push_back(quoted(flag + ":" + option.help));
+    for (const std::string& flag : option.flags)
+      lines.push_back(shell_quoted(flag + ":" + option.help));
   }
   return joined(lines, " ");
 }
@@ -229,10 +230,10 @@ std::string zsh_script(const std::vector<CommandPage>& commands) {
   for (const CommandPage& command : commands) {
     std::vector<std::string> below;
     for (const CommandPage* one : commands_below(command, commands)) {
-      below.push_back(quoted(last_word(one->name) + ":" + one->help));
+      below.push_back(shell_quoted(last_word(one->name) + ":" + one->help));
     }
     const bool is_program = &command == &commands.front();
-    words += "  (" + quoted(command.name) + ") commands=(" + joined(below, " ") + ")";
+    words += "  (" + shell_quoted(command.name) + ") commands=(" + joined(below, " ") + ")";
     if (!is_program) words += "; options+=(" + zsh_options(command) + ")";
     words += " ;;\n";
   }
@@ -262,9 +263,9 @@ std::string fish_value(const ValueOffer& value) {
     case Offer::Folders:
       return " -x -a '(__fish_complete_directories)'";
     case Offer::Types:
-      return " -x -a " + quoted("(" + std::string(kListTypes) + ")");
+      return " -x -a " + shell_quoted("(" + std::string(kListTypes) + ")");
     case Offer::Words:
-      return " -x -a " + quoted(value.words);
+      return " -x -a " + shell_quoted(value.words);
   }
   return "";
 }
@@ -275,13 +276,13 @@ std::string fish_command(const CommandPage& command, const std::vector<CommandPa
   std::string text;
   for (const CommandPage* below : commands_below(command, commands)) {
     text += "complete -c diorama" + where + " -a " + last_word(below->name) + " -d " +
-            quoted(below->help) + "\n";
+            shell_quoted(below->help) + "\n";
   }
   for (const OptionPage& option : command.options) {
     const std::string value = option.value.empty() ? "" : fish_value(offer_for(option.value));
     for (const std::string& flag : option.flags) {
       text += "complete -c diorama" + (is_program ? "" : where) + " -l " + flag.substr(2) + value +
-              " -d " + quoted(option.help) + "\n";
+              " -d " + shell_quoted(option.help) + "\n";
     }
     if (option.is_argument && offer_for(option.value).offer != Offer::Nothing) {
       text += "complete -c diorama" + where + value + "\n";
@@ -292,7 +293,7 @@ std::string fish_command(const CommandPage& command, const std::vector<CommandPa
 
 std::string fish_script(const std::vector<CommandPage>& commands) {
   std::vector<std::string> names;
-  for (std::size_t i = 1; i < commands.size(); ++i) names.push_back(quoted(commands[i].name));
+  for (std::size_t i = 1; i < commands.size(); ++i) names.push_back(shell_quoted(commands[i].name));
   std::string text = "# SPDX-License-Identifier: Apache-2.0\n# Completion for fish." +
                      std::string(kHead) +
                      "function __diorama_is_at\n"
