@@ -8,7 +8,7 @@
 #include "diorama/renderer.h"
 #include "framework/app/assemble.h"
 #include "framework/config/job_overrides.h"
-#include "framework/pipeline/file_system.h"
+#include "framework/host/replace_file.h"
 #include "framework/plugins/plugin_call.h"
 
 namespace diorama {
@@ -151,11 +151,7 @@ int command_render(const GlobalOptions& global, const RenderOptions& options, Co
   call_component(who, [&] { renderer->prepare(scene); });
   const Frame frame = call_component(who, [&] { return renderer->render(request); });
 
-  // Under another name first: who looks meanwhile sees the old picture or the new one.
-  LocalFileSystem files;
-  const fs::path unfinished = options.output + ".part";
-  files.write(unfinished, encoded(frame, format, *host));
-  files.rename(unfinished, options.output);
+  replace_file(options.output, encoded(frame, format, *host));
   log.write(LogLevel::Info, options.output + ": " + scene.path(camera) + ", " +
                                 std::to_string(width) + "x" + std::to_string(height));
   return 0;

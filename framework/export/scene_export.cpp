@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "framework/export/scene_export.h"
 
-#include <unistd.h>
-
-#include <cerrno>
-#include <fstream>
 #include <span>
 #include <string>
 #include <system_error>
@@ -13,34 +9,20 @@
 #include "framework/export/crate_writer.h"
 #include "framework/export/scene_layer.h"
 #include "framework/export/usda_writer.h"
+#include "framework/host/replace_file.h"
 
 namespace diorama {
 namespace {
 
 namespace fs = std::filesystem;
 
-[[noreturn]] void fail(const fs::path& file, const std::string& why) {
-  throw Error(ErrorKind::Output, file.string() + ": cannot be written: " + why);
-}
-
 void write_file(const fs::path& file, std::span<const std::byte> bytes) {
   std::error_code error;
   if (file.has_parent_path()) fs::create_directories(file.parent_path(), error);
-  if (error) fail(file, error.message());
-  const fs::path part = file.string() + "." + std::to_string(::getpid()) + ".part";
-  std::ofstream out(part, std::ios::binary);
-  out.write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
-  out.close();
-  if (!out) {
-    const std::string why = std::system_category().message(errno);
-    fs::remove(part, error);
-    fail(file, why);
+  if (error) {
+    throw Error(ErrorKind::Output, file.string() + ": cannot be written: " + error.message());
   }
-  fs::rename(part, file, error);
-  if (!error) return;
-  std::error_code ignored;
-  fs::remove(part, ignored);
-  fail(file, error.message());
+  replace_file(file, bytes);
 }
 
 std::vector<std::byte> encode(const Texture& texture, const Host& host) {

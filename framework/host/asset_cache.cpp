@@ -4,6 +4,8 @@
 #include <set>
 #include <utility>
 
+#include "framework/host/node_content.h"
+
 namespace diorama {
 namespace {
 
@@ -47,17 +49,6 @@ class ByteCount {
   std::set<const void*> seen_;
   std::size_t bytes_ = 0;
 };
-
-void copy_content(const Node& from, Node& to) {
-  to.is_visible = from.is_visible;
-  to.labels = from.labels;
-  to.mesh = from.mesh;
-  to.materials = from.materials;
-  to.light = from.light;
-  to.camera = from.camera;
-  to.collider = from.collider;
-  to.rigid_body = from.rigid_body;
-}
 
 }  // namespace
 

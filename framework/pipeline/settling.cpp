@@ -6,6 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "framework/host/node_content.h"
+
 namespace diorama {
 namespace {
 
@@ -127,15 +129,7 @@ SavedNodes::SavedNodes(const Scene& scene, const std::vector<NodeId>& without) {
 void SavedNodes::restore(Scene& scene) const {
   for (const auto& [node, saved] : nodes_) {
     scene.set_pose(node, saved.parent_from_node);
-    Node& now = scene.edit(node);
-    now.is_visible = saved.is_visible;
-    now.labels = saved.labels;
-    now.mesh = saved.mesh;
-    now.materials = saved.materials;
-    now.light = saved.light;
-    now.camera = saved.camera;
-    now.collider = saved.collider;
-    now.rigid_body = saved.rigid_body;
+    copy_content(saved, scene.edit(node));
   }
 }
 

@@ -2,6 +2,7 @@
 #include "gentle_world.h"
 
 #include <algorithm>
+#include <array>
 #include <optional>
 
 #include "shape_cache.h"
@@ -84,9 +85,10 @@ std::optional<FixedContact> fixed_contact(const btPersistentManifold& manifold,
 
 /// A flat piece of a fixed thing, world. The corners run round it in one sense.
 struct Facet {
-  std::vector<btVector3> corners;
-  btVector3 normal;   ///< Of the corners' sense.
-  btVector3 outward;  ///< Along or against the normal.
+  std::array<btVector3, 4> corners;
+  std::size_t corner_count = 0;  ///< 3 or 4.
+  btVector3 normal;              ///< Of the corners' sense.
+  btVector3 outward;             ///< Along or against the normal.
 };
 
 /// The touched triangle, outward to the side from which the body came.
@@ -95,7 +97,8 @@ Facet triangle_facet(const FixedContact& seen) {
   const StaticMesh& mesh = *seen.mesh();
   for (const std::uint32_t corner : mesh.triangles[std::size_t(seen.triangle)]) {
     const Vec3f& p = mesh.positions[corner];
-    facet.corners.push_back(seen.fixed->getWorldTransform() * btVector3(p.x(), p.y(), p.z()));
+    facet.corners[facet.corner_count++] =
+        seen.fixed->getWorldTransform() * btVector3(p.x(), p.y(), p.z());
   }
   const btVector3 along = facet.corners[1] - facet.corners[0];
   facet.normal = along.cross(facet.corners[2] - facet.corners[0]).normalized();
@@ -178,12 +181,13 @@ Facet exit_facet(const FixedContact& seen) {
   const btVector3 across = turn * half[(axis + 2) % 3];
   facet.corners = {middle - along - across, middle + along - across, middle + along + across,
                    middle - along + across};
+  facet.corner_count = 4;
   return facet;
 }
 
 bool projects_inside(const Facet& facet, const btVector3& point) {
-  for (std::size_t i = 0; i < facet.corners.size(); ++i) {
-    const btVector3 along = facet.corners[(i + 1) % facet.corners.size()] - facet.corners[i];
+  for (std::size_t i = 0; i < facet.corner_count; ++i) {
+    const btVector3 along = facet.corners[(i + 1) % facet.corner_count] - facet.corners[i];
     if (facet.normal.cross(along).dot(point - facet.corners[i]) < 0.0) return false;
   }
   return true;
@@ -369,8 +373,9 @@ void GentleWorld::mend_contacts(btPersistentManifold& manifold, double lowest_di
     manifold.addManifoldPoint(*next);
   }
   const bool touches = !candidates_.empty() && candidates_.front().getDistance() < 0.0;
-  if (!touches && !rebuilt_.empty() && is_deep(*fixed(rebuilt_.front()), rebuilt_.front())) {
-    turn_deep_contact(*fixed(rebuilt_.front()), rebuilt_.front(), manifold);
+  if (!touches && !rebuilt_.empty()) {
+    const FixedContact seen = *fixed(rebuilt_.front());
+    if (is_deep(seen, rebuilt_.front())) turn_deep_contact(seen, rebuilt_.front(), manifold);
   }
   for (int i = 0; i < manifold.getNumContacts(); ++i) {
     btManifoldPoint& contact = manifold.getContactPoint(i);

@@ -6,6 +6,7 @@
 #include <mutex>
 
 #include "writer_hdf5/hdf5_file.h"
+#include "writer_support/image_files.h"
 #include "writer_support/lens_json.h"
 
 namespace diorama {
@@ -35,13 +36,6 @@ Segmentation segmentation_of(const Frame& frame, const std::vector<TrainingObjec
     maps.categories[i] = std::uint16_t(objects[found->second].class_index + 1);
   }
   return maps;
-}
-
-std::vector<std::uint8_t> rgb_of(const Image<Rgba8>& image) {
-  std::vector<std::uint8_t> rgb;
-  rgb.reserve(image.pixels().size() * 3);
-  for (const Rgba8& pixel : image.pixels()) rgb.insert(rgb.end(), pixel.begin(), pixel.begin() + 3);
-  return rgb;
 }
 
 std::vector<float> mapped_normals(const Image<Vec3f>& normals) {
@@ -110,7 +104,7 @@ std::vector<std::byte> Hdf5Writer::frame_file(const Frame& frame) const {
 
   const std::lock_guard lock(hdf5_mutex());
   Hdf5File file;
-  file.add("colors", std::array{h, w, std::size_t(3)}, rgb_of(frame.get(kColor)).data());
+  file.add("colors", std::array{h, w, std::size_t(3)}, without_alpha(frame.get(kColor)).data());
   if (params_.depth) {
     file.add("depth", std::array{h, w}, frame.get(kDistanceToImagePlane).pixels().data());
   }

@@ -8,7 +8,6 @@
 #include "diorama/error.h"
 
 namespace diorama {
-namespace {
 
 std::vector<std::uint8_t> without_alpha(const Image<Rgba8>& image) {
   std::vector<std::uint8_t> rgb;
@@ -16,8 +15,6 @@ std::vector<std::uint8_t> without_alpha(const Image<Rgba8>& image) {
   for (const Rgba8& pixel : image.pixels()) rgb.insert(rgb.end(), pixel.begin(), pixel.begin() + 3);
   return rgb;
 }
-
-}  // namespace
 
 std::vector<std::byte> png_file(const Host& host, const Image<Rgba8>& image) {
   return host.encode_image({image.pixels().data(), image.width(), image.height(), 4, 8},

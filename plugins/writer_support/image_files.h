@@ -15,6 +15,9 @@ namespace diorama {
 /// The words that Replicator's image_output_format takes.
 inline constexpr const char* kImageEndings[] = {"png", "jpeg", "jpg", "exr"};
 
+/// Three bytes per pixel.
+std::vector<std::uint8_t> without_alpha(const Image<Rgba8>& image);
+
 std::vector<std::byte> png_file(const Host& host, const Image<Rgba8>& image);
 /// Without alpha.
 std::vector<std::byte> rgb_png_file(const Host& host, const Image<Rgba8>& image);
