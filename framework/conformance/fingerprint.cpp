@@ -85,7 +85,8 @@ class Bytes {
     add_all(camera.width, camera.height, camera.lens, camera.fx, camera.fy, camera.cx, camera.cy,
             camera.distortion, camera.fisheye_polynomial, camera.fisheye_max_angle_rad,
             camera.near_m, camera.far_m, camera.focal_length_mm, camera.horizontal_aperture_mm,
-            camera.focus_distance_m, camera.f_stop);
+            camera.focus_distance_m, camera.f_stop, camera.exposure_time_s, camera.readout_time_s,
+            camera.linear_velocity, camera.angular_velocity);
   }
   void add(const Collider& collider) {
     add_all(collider.shape, collider.primitive, collider.primitive_size, collider.friction,

@@ -149,13 +149,14 @@ void BulletBackend::do_write_poses(Scene& scene) const {
   // parent where it will stay.
   for (const MovingBody& moving : world_->bodies.moving) {
     const btTransform& now = moving.body->getWorldTransform();
+    const Affine world_from_node = Affine(from_bullet(now)) * moving.body_from_node;
     if (moving.is_nested || !(now == moving.start)) {
-      const Affine world_from_node = Affine(from_bullet(now)) * moving.body_from_node;
       const Affine world_from_parent = scene.world_from_node(scene[moving.node].parent);
       scene.set_pose(moving.node, world_from_parent.inverse() * world_from_node);
     }
-    const Vec3 velocity = from_bullet(moving.body->getLinearVelocity());
     const Vec3 spin = from_bullet(moving.body->getAngularVelocity());
+    const Vec3 arm = world_from_node.translation() - from_bullet(now.getOrigin());
+    const Vec3 velocity = from_bullet(moving.body->getLinearVelocity()) + spin.cross(arm);
     const RigidBody& known = *scene[moving.node].rigid_body;
     if (known.linear_velocity == velocity && known.angular_velocity == spin) continue;
     RigidBody& written = *scene.edit(moving.node).rigid_body;

@@ -91,6 +91,7 @@ Frame Renderer::render(const RenderRequest& request) {
   frame.camera_path = scene_->path(request.camera);
   frame.camera = camera;
   frame.world_from_camera = scene_->world_from_node(request.camera);
+  frame.seed = request.seed;
 
   for (const std::string& channel : request.channels) check_size(frame, channel);
   check_types(frame, kColor, kColorHdr, kDistanceToCamera, kDistanceToImagePlane, kNormals, kLeafId,

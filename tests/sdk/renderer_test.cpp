@@ -66,6 +66,7 @@ TEST_CASE("A rendered frame knows its camera and its leaves", "[renderer]") {
   CHECK(frame.camera_path == "/rig/cam_0");
   CHECK(frame.camera.width == 3);
   CHECK(frame.world_from_camera.translation() == Vec3(1, 2, 3));
+  CHECK(frame.seed == 1);
   CHECK(frame.leaf_paths == std::map<std::uint32_t, std::string>{{s.cup.index, "/cup"}});
 }
 

@@ -33,6 +33,12 @@ struct Camera {
   double horizontal_aperture_mm = 20.955;
   double focus_distance_m = 0.0;
   double f_stop = 0.0;  ///< 0: no depth of field.
+  /// The poses of a scene are those of the moment halfway through the exposure of the middle row;
+  /// labels and geometry channels show that moment, whatever the shutter does to the picture.
+  double exposure_time_s = 0.0;  ///< For which a row gathers light; 0: no motion blur.
+  double readout_time_s = 0.0;   ///< From the first row to the last one; 0: all rows at once.
+  Vec3 linear_velocity = Vec3::Zero();   ///< m/s, world; on top of that of a body it rides on.
+  Vec3 angular_velocity = Vec3::Zero();  ///< rad/s, world axes, about the camera's centre.
 
   /// A pinhole camera from lens and sensor, as USD describes it; fy = fx.
   DIORAMA_SDK_API static Camera from_lens(int width, int height, double focal_length_mm,

@@ -115,6 +115,8 @@ class DIORAMA_SDK_API Frame {
   /// Path of every leaf id that occurs in kLeafId.
   std::map<std::uint32_t, std::string> leaf_paths;
   double exposure = 1.0;  ///< Factor from kColorHdr to the view transform's input.
+  /// RenderRequest::seed: start of the streams of annotators that add chance, each by its own name.
+  std::uint64_t seed = 0;
 
   template <class Pixel>
   void set(Channel<Pixel> channel, Image<Pixel> image) {

@@ -32,8 +32,8 @@ struct Collider {
 struct RigidBody {
   double mass_kg = 1.0;
   bool has_gravity = true;
-  Vec3 linear_velocity = Vec3::Zero();   ///< m/s, world; written back by the backend.
-  Vec3 angular_velocity = Vec3::Zero();  ///< rad/s, world.
+  Vec3 linear_velocity = Vec3::Zero();   ///< m/s, world, of the node's origin; written back.
+  Vec3 angular_velocity = Vec3::Zero();  ///< rad/s, world; written back by the backend.
 };
 
 }  // namespace diorama
