@@ -54,6 +54,9 @@ inline constexpr Channel<Vec3f> kObjectCoordinates{"object_coordinates"};
 /// Pixels that the surface point moved since the previous time step, image x right, y down; zero
 /// where nothing was hit. Derived by the host.
 inline constexpr Channel<Vec2f> kMotion{"motion"};
+/// Metres along the viewing axis as a depth camera measures them; 0 where it measures nothing.
+/// Made by annotators, not a label.
+inline constexpr Channel<float> kSensorDepth{"sensor_depth"};
 
 /// The pixels that an object covers when nothing else is in the scene, by the same pixel-centre
 /// rays. The box may reach beyond the image by up to one image size to each side, so that the part
