@@ -42,6 +42,8 @@ class Assembler {
   }
   std::vector<fs::path> files_of(const std::string& asset) {
     const ComponentEntry* entry = loader_of(asset);
+    // A picture needs no loader.
+    if (!entry && fs::is_regular_file(asset)) return {asset};
     if (!entry) return {};
     std::unique_ptr<Loader>& loader = loaders_[entry->type];
     if (!loader) {
@@ -90,22 +92,31 @@ struct JobLoaders {
   std::vector<std::unique_ptr<Loader>> of_objects;          ///< Name the assets, group by group.
 };
 
-JobLoaders make_components(Assembler& assembler, JobAssembly& assembly) {
+JobLoaders make_loaders(Assembler& assembler, JobAssembly& assembly) {
   JobLoaders loaders;
   const Job& job = assembly.job;
-  JobComponents& parts = assembly.components;
   for (const ComponentConfig& config : job.loaders) {
     loaders.of_files[config.type] = assembler.make<Loader>(config, "loaders");
   }
   for (const ComponentConfig& config : job.environments) {
-    parts.environments.push_back(assembler.make<Loader>(config, "environments"));
+    assembly.components.environments.push_back(assembler.make<Loader>(config, "environments"));
   }
   for (const ObjectGroup& group : job.objects) {
     loaders.of_objects.push_back(assembler.make<Loader>(group.loader, "objects"));
   }
-  for (const RandomizerEntry& entry : job.randomizers) {
-    parts.randomizers.push_back(assembler.make<Randomizer>(entry.component, "randomizers"));
+  return loaders;
+}
+
+void make_randomizers(Assembler& assembler, JobAssembly& assembly) {
+  for (const RandomizerEntry& entry : assembly.job.randomizers) {
+    assembly.components.randomizers.push_back(
+        assembler.make<Randomizer>(entry.component, "randomizers"));
   }
+}
+
+void make_engines_and_writers(Assembler& assembler, JobAssembly& assembly) {
+  const Job& job = assembly.job;
+  JobComponents& parts = assembly.components;
   if (job.physics.type != "none") {
     parts.physics.push_back(assembler.make<PhysicsBackend>(job.physics, "physics"));
   }
@@ -113,8 +124,6 @@ JobLoaders make_components(Assembler& assembler, JobAssembly& assembly) {
   for (const WriterEntry& entry : job.writers) {
     parts.writers.push_back(assembler.make<Writer>(entry.component, "writers"));
   }
-  assembler.complaints().raise();
-  return loaders;
 }
 
 CapturePlan plan_from_assets(const JobAssembly& assembly,
@@ -172,6 +181,12 @@ void resolve_needs(Registry& registry, Host& host, JobAssembly& assembly) {
   }
 }
 
+std::vector<std::string> texts_of(const std::vector<fs::path>& paths) {
+  std::vector<std::string> texts;
+  for (const fs::path& path : paths) texts.push_back(path.string());
+  return texts;
+}
+
 /// A dataset does not change when it is written to another folder.
 std::string portable_job(Value resolved) {
   if (Value* output = resolved.find("output")) output->erase("folder");
@@ -206,7 +221,10 @@ Value check_job(const Value& value, Registry& registry, Host& host) {
   JobAssembly assembly;
   Assembler assembler(registry, host);
   assembly.job = read_job(value, assembler.complaints());
-  make_components(assembler, assembly);
+  make_loaders(assembler, assembly);
+  make_randomizers(assembler, assembly);
+  make_engines_and_writers(assembler, assembly);
+  assembler.complaints().raise();
   return resolved_job(value, describe_from(registry));
 }
 
@@ -216,7 +234,12 @@ JobAssembly assemble_job(const Value& value, Registry& registry, HostServices& h
   JobAssembly assembly;
   Assembler assembler(registry, host);
   assembly.job = read_job(value, assembler.complaints());
-  JobLoaders loaders = make_components(assembler, assembly);
+  JobLoaders loaders = make_loaders(assembler, assembly);
+  host.take_resolved();
+  make_randomizers(assembler, assembly);
+  const std::vector<std::string> drawn_assets = texts_of(host.take_resolved());
+  make_engines_and_writers(assembler, assembly);
+  assembler.complaints().raise();
   for (auto& [type, loader] : loaders.of_files) host.use_loader(type, std::move(loader));
   assembly.resolved = resolved_job(value, describe_from(registry));
   assembly.plan = plan_from_assets(assembly, loaders.of_objects);
@@ -227,14 +250,15 @@ JobAssembly assemble_job(const Value& value, Registry& registry, HostServices& h
   for (const PlannedObject& object : assembly.plan.objects) {
     assembler.note_loader_of(object.asset);
   }
+  for (const std::string& asset : drawn_assets) assembler.note_loader_of(asset);
   if (assembly.job.writers.empty()) {
     host.log(LogLevel::Warning, "writers: there are none, so the run leaves no pictures");
   }
   if (purpose == AssembleFor::Plan) return assembly;
   assembly.dataset = describe_dataset(
       assembly.job, assembly.plan, portable_job(assembly.resolved), program_version,
-      assembler.plugins(), [&](const std::string& asset) { return assembler.files_of(asset); },
-      assets_root);
+      assembler.plugins(), drawn_assets,
+      [&](const std::string& asset) { return assembler.files_of(asset); }, assets_root);
   assembly.dataset_json = dataset_json(assembly.dataset, assembly.job);
   return assembly;
 }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <iterator>
 #include <set>
 #include <system_error>
 #include <utility>
@@ -70,7 +71,23 @@ void HostServices::use_loader(const std::string& type, std::unique_ptr<Loader> l
 
 void HostServices::log(LogLevel level, std::string_view message) { log_(level, message); }
 
-fs::path HostServices::resolve(std::string_view asset) const { return paths_.resolve(asset); }
+fs::path HostServices::resolve(std::string_view asset) const {
+  fs::path found = paths_.resolve(asset);
+  const std::lock_guard lock(resolved_mutex_);
+  resolved_.insert(found);
+  return found;
+}
+
+std::vector<fs::path> HostServices::take_resolved() {
+  const std::lock_guard lock(resolved_mutex_);
+  std::vector<fs::path> files;
+  std::copy_if(resolved_.begin(), resolved_.end(), std::back_inserter(files), [](const auto& path) {
+    std::error_code error;
+    return fs::is_regular_file(path, error);
+  });
+  resolved_.clear();
+  return files;
+}
 
 std::vector<fs::path> HostServices::list_assets(std::string_view folder,
                                                 std::span<const std::string> skip) const {

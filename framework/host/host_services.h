@@ -5,7 +5,9 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -36,6 +38,9 @@ class HostServices final : public Host {
   /// Reads with this loader what its type claims, instead of with one that has default parameters.
   /// Call before anything is loaded.
   void use_loader(const std::string& type, std::unique_ptr<Loader> loader);
+
+  /// The files that resolve() has given since the last call, sorted: what components named.
+  std::vector<std::filesystem::path> take_resolved();
 
   void log(LogLevel level, std::string_view message) override;
   std::filesystem::path resolve(std::string_view asset) const override;
@@ -74,6 +79,8 @@ class HostServices final : public Host {
   AssetCache cache_;
   std::map<std::string, std::unique_ptr<Loader>> loaders_;
   std::vector<Claim> claims_;  // earlier ones win
+  mutable std::mutex resolved_mutex_;
+  mutable std::set<std::filesystem::path> resolved_;
 };
 
 }  // namespace diorama

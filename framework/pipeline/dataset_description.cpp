@@ -29,22 +29,29 @@ Json conventions() {
           {"labels", "from the ray through the pixel's centre, never filtered"}};
 }
 
-std::set<std::string> used_assets(const CapturePlan& plan) {
-  std::set<std::string> assets;
+/// Names of assets, each with the labels of the objects that are made of it.
+using UsedAssets = std::map<std::string, std::set<Labels>>;
+
+UsedAssets used_assets(const CapturePlan& plan, const std::vector<std::string>& drawn_assets) {
+  UsedAssets assets;
   for (const PlannedVisit& visit : plan.visits) {
-    assets.insert(plan.environments[visit.environment].asset);
+    assets.try_emplace(plan.environments[visit.environment].asset);
   }
-  for (const PlannedObject& object : plan.objects) assets.insert(object.asset);
+  for (const std::string& asset : drawn_assets) assets.try_emplace(asset);
+  for (const PlannedObject& object : plan.objects) {
+    std::set<Labels>& labels = assets[object.asset];
+    if (!object.labels.empty()) labels.insert(object.labels);
+  }
   return assets;
 }
 
 /// Files that several assets share are read once.
-std::vector<DatasetAsset> hashed_assets(const CapturePlan& plan, const AssetFiles& files_of,
+std::vector<DatasetAsset> hashed_assets(const UsedAssets& used, const AssetFiles& files_of,
                                         const std::optional<fs::path>& assets_root) {
   std::map<fs::path, std::string> hashes;
   std::vector<DatasetAsset> assets;
-  for (const std::string& name : used_assets(plan)) {
-    DatasetAsset asset{asset_name(name, assets_root), {}};
+  for (const auto& [name, labels] : used) {
+    DatasetAsset asset{asset_name(name, assets_root), {labels.begin(), labels.end()}, {}};
     for (const fs::path& file : files_of(name)) {
       std::string& hash = hashes[file];
       if (hash.empty()) hash = file_sha256(file);
@@ -185,6 +192,7 @@ void add_writers(std::string& text, const Job& job) {
 DatasetInfo describe_dataset(const Job& job, const CapturePlan& plan, std::string resolved,
                              std::string program_version,
                              std::vector<std::pair<std::string, std::string>> plugin_versions,
+                             const std::vector<std::string>& drawn_assets,
                              const AssetFiles& files_of,
                              const std::optional<fs::path>& assets_root) {
   DatasetInfo info;
@@ -199,7 +207,7 @@ DatasetInfo describe_dataset(const Job& job, const CapturePlan& plan, std::strin
   info.resolved_job = std::move(resolved);
   info.program_version = std::move(program_version);
   info.plugin_versions = std::move(plugin_versions);
-  info.assets = hashed_assets(plan, files_of, assets_root);
+  info.assets = hashed_assets(used_assets(plan, drawn_assets), files_of, assets_root);
   return info;
 }
 

@@ -18,11 +18,13 @@ namespace diorama {
 /// The files that an asset consists of, see Loader::files().
 using AssetFiles = std::function<std::vector<std::filesystem::path>(const std::string& asset)>;
 
-/// What writers are told before the first capture. `resolved` is the text of the resolved job.
+/// What writers are told before the first capture. `resolved` is the text of the resolved job;
+/// `drawn_assets` are those that randomizers choose from.
 /// Throws Error(Asset) when a file of an asset cannot be read.
 DatasetInfo describe_dataset(const Job& job, const CapturePlan& plan, std::string resolved,
                              std::string program_version,
                              std::vector<std::pair<std::string, std::string>> plugin_versions,
+                             const std::vector<std::string>& drawn_assets,
                              const AssetFiles& files_of,
                              const std::optional<std::filesystem::path>& assets_root);
 

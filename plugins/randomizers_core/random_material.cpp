@@ -29,7 +29,13 @@ void RandomMaterial::Params::visit(ParamVisitor& v) {
 }
 
 RandomMaterial::RandomMaterial(Params params, Host& host)
-    : params_(std::move(params)), host_(host), materials_(params_.assets.texts().size()) {}
+    : params_(std::move(params)), host_(host), materials_(params_.assets.texts().size()) {
+  for (const std::string& name : params_.assets.texts()) {
+    // What a loader makes up, "scheme:rest", is no file.
+    const bool is_file = name.find(':') == std::string::npos || name.starts_with("file:");
+    if (is_file) (void)host_.resolve(name);
+  }
+}
 
 std::shared_ptr<const Material> RandomMaterial::material_of(std::size_t asset) {
   if (materials_[asset]) return materials_[asset];

@@ -13,9 +13,12 @@
 
 namespace diorama {
 
-/// An environment or object of the job, and what it is made of.
+/// An environment, object or texture of the job, and what it is made of.
 struct DatasetAsset {
   std::string asset;  ///< As a job would name it; files below the assets root without the root.
+  /// Every distinct label set of the job's objects that are made of it, sorted; empty for what is
+  /// no object: environments, textures that randomizers choose from.
+  std::vector<Labels> labels;
   /// Name and SHA-256 (hex) of every file that it consists of; empty for "scheme:rest".
   std::vector<std::pair<std::string, std::string>> files;
 };
@@ -43,8 +46,8 @@ class DIORAMA_SDK_API DatasetFiles {
   void add_text(std::string_view path, std::string_view text);
 };
 
-/// The files of one capture, and one record: text (without line breaks, JSON by habit) that the host
-/// keeps and hands to finish() in capture order, over resumed runs and merged shards.
+/// The files of one capture, and one record: text (without line breaks, JSON by habit) that the
+/// host keeps and hands to finish() in capture order, over resumed runs and merged shards.
 class DIORAMA_SDK_API CaptureFiles : public DatasetFiles {
  public:
   ~CaptureFiles() override;

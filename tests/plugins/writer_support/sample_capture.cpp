@@ -267,10 +267,10 @@ DatasetInfo sample_dataset(const SampleScene& sample) {
   dataset.resolved_job = "seed: 12\n";
   dataset.program_version = "0.1.0";
   dataset.plugin_versions = {{"writer_basic", "1.0.0"}};
-  dataset.assets = {{"/props/mug.usd",
+  dataset.assets = {{"/props/mug.usd", {{{"class", "mug"}}},
                      {{"/props/mug.usd", std::string(64, 'a')},
                       {"/props/textures/mug.png", std::string(64, 'b')}}},
-                    {"shape:cube", {}}};
+                    {"shape:cube", {}, {}}};
   return dataset;
 }
 
