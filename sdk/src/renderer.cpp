@@ -73,6 +73,8 @@ void check_mask(const Camera& camera, const CoverageMask& mask, const std::strin
 
 Renderer::~Renderer() = default;
 
+RenderReport Renderer::report() const { return {}; }
+
 void Renderer::prepare(const Scene& scene) {
   scene_ = nullptr;  // stays so when do_prepare throws
   do_prepare(scene);

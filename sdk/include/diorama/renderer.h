@@ -3,6 +3,8 @@
 
 #include <cstdint>
 #include <span>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "diorama/component.h"
@@ -17,6 +19,14 @@ struct RenderRequest {
   std::uint64_t seed = 0;  ///< Noise pattern; same seed, same bytes, whatever the thread count.
 };
 
+/// What the last preparation and picture took.
+struct RenderReport {
+  std::uint64_t paths = 0;  ///< Light paths that began at the camera.
+  std::uint64_t rays = 0;   ///< Of these paths, those to lights included.
+  /// Wall time by phase in working order: "ray tracing structure", "paths", "denoising".
+  std::vector<std::pair<std::string, double>> seconds;
+};
+
 /// Turns a scene into channels. Called on the main thread; may use Host::parallel_for inside.
 class DIORAMA_SDK_API Renderer : public Component {
  public:
@@ -26,6 +36,8 @@ class DIORAMA_SDK_API Renderer : public Component {
 
   /// The channels that it can fill.
   virtual NameSet provides() const = 0;
+  /// For `diorama bench`; empty unless a renderer says more.
+  virtual RenderReport report() const;
 
   /// Takes in the scene as it is now. Call after every change and before render(); the scene must
   /// stay as it is and alive until the last render() of this preparation.
