@@ -36,23 +36,9 @@ class Assembler {
     }
   }
 
-  /// The loader that reads this asset, as far as the registry knows.
-  void note_loader_of(const std::string& asset) {
-    if (const ComponentEntry* entry = loader_of(asset)) note_plugin(*entry);
-  }
-  std::vector<fs::path> files_of(const std::string& asset) {
-    const ComponentEntry* entry = loader_of(asset);
-    // A picture needs no loader.
-    if (!entry && fs::is_regular_file(asset)) return {asset};
-    if (!entry) return {};
-    std::unique_ptr<Loader>& loader = loaders_[entry->type];
-    if (!loader) {
-      Value defaults = Value::make_map();
-      defaults.set("type", Value::text(entry->type));
-      loader = registry_.make<Loader>(defaults, "loader", {}, complaints_, host_);
-      complaints_.raise();
-    }
-    return call_component("loader '" + entry->type + "'", [&] { return loader->files(asset); });
+  /// The loader, if any, that reads an asset of the job through the host.
+  void note_loader(const std::optional<std::string>& type) {
+    if (type) note_plugin(registry_.entry(ComponentKind::Loader, *type));
   }
 
   Complaints& complaints() { return complaints_; }
@@ -61,16 +47,6 @@ class Assembler {
   }
 
  private:
-  const ComponentEntry* loader_of(const std::string& asset) const {
-    for (const ComponentEntry& entry : registry_.components()) {
-      if (entry.kind != ComponentKind::Loader) continue;
-      const bool fits = std::any_of(entry.claims.begin(), entry.claims.end(), [&](auto& claim) {
-        return claim.starts_with('.') ? asset.ends_with(claim) : asset.starts_with(claim);
-      });
-      if (fits) return &entry;
-    }
-    return nullptr;
-  }
   void note_plugin(const ComponentEntry& entry) { plugins_[entry.plugin] = entry.version; }
 
   Registry& registry_;
@@ -78,7 +54,6 @@ class Assembler {
   MissingAssets missing_;
   Complaints complaints_;
   std::map<std::string, std::string> plugins_;
-  std::map<std::string, std::unique_ptr<Loader>> loaders_;
 };
 
 std::vector<std::string> assets_of(const Loader& loader, const ComponentConfig& config) {
@@ -245,12 +220,12 @@ JobAssembly assemble_job(const Value& value, Registry& registry, HostServices& h
   assembly.plan = plan_from_assets(assembly, loaders.of_objects);
   resolve_needs(registry, host, assembly);
   for (const EnvironmentChoice& choice : assembly.plan.environments) {
-    assembler.note_loader_of(choice.asset);
+    assembler.note_loader(host.loader_of(choice.asset));
   }
   for (const PlannedObject& object : assembly.plan.objects) {
-    assembler.note_loader_of(object.asset);
+    assembler.note_loader(host.loader_of(object.asset));
   }
-  for (const std::string& asset : drawn_assets) assembler.note_loader_of(asset);
+  for (const std::string& asset : drawn_assets) assembler.note_loader(host.loader_of(asset));
   if (assembly.job.writers.empty()) {
     host.log(LogLevel::Warning, "writers: there are none, so the run leaves no pictures");
   }
@@ -258,7 +233,7 @@ JobAssembly assemble_job(const Value& value, Registry& registry, HostServices& h
   assembly.dataset = describe_dataset(
       assembly.job, assembly.plan, portable_job(assembly.resolved), program_version,
       assembler.plugins(), drawn_assets,
-      [&](const std::string& asset) { return assembler.files_of(asset); }, assets_root);
+      [&](const std::string& asset) { return host.files_of(asset); }, assets_root);
   assembly.dataset_json = dataset_json(assembly.dataset, assembly.job);
   return assembly;
 }

@@ -141,28 +141,33 @@ const HostServices::Claim* HostServices::claim_of(std::string_view asset, bool i
   return best;
 }
 
-HostServices::Source HostServices::find_source(std::string_view asset) {
+std::optional<HostServices::Source> HostServices::claimed_source(std::string_view asset) const {
   if (has_scheme(asset)) {
     if (const Claim* claim = claim_of(asset, true)) {
-      return {std::string(asset), std::string(asset), claim->loader, node_name(std::string(asset))};
+      return Source{std::string(asset), std::string(asset), claim->loader,
+                    node_name(std::string(asset))};
     }
   }
   const fs::path file = paths_.resolve(asset);
   const Claim* claim = claim_of(file.filename().string(), false);
-  if (!claim) {
-    std::set<std::string> endings;
-    for (const Claim& known : claims_) {
-      if (known.text.starts_with('.')) endings.insert(known.text);
-    }
-    std::string list;
-    for (const std::string& ending : endings) list += (list.empty() ? "" : " ") + ending;
-    throw Error(ErrorKind::Asset,
-                file.string() + ": no loader reads '" + file.extension().string() +
-                    "' files; there are loaders for: " + (list.empty() ? "nothing" : list));
-  }
+  if (!claim) return std::nullopt;
   std::string name = file.filename().string();
   name.resize(name.size() - claim->text.size());
-  return {file.string(), fs::canonical(file).string(), claim->loader, node_name(name)};
+  return Source{file.string(), fs::canonical(file).string(), claim->loader, node_name(name)};
+}
+
+HostServices::Source HostServices::find_source(std::string_view asset) const {
+  if (std::optional<Source> source = claimed_source(asset)) return *source;
+  std::set<std::string> endings;
+  for (const Claim& known : claims_) {
+    if (known.text.starts_with('.')) endings.insert(known.text);
+  }
+  std::string list;
+  for (const std::string& ending : endings) list += (list.empty() ? "" : " ") + ending;
+  const fs::path file = paths_.resolve(asset);
+  throw Error(ErrorKind::Asset,
+              file.string() + ": no loader reads '" + file.extension().string() +
+                  "' files; there are loaders for: " + (list.empty() ? "nothing" : list));
 }
 
 Loader& HostServices::loader(const std::string& type) {
@@ -175,6 +180,19 @@ Loader& HostServices::loader(const std::string& type) {
     complaints.raise();
   }
   return *made;
+}
+
+std::optional<std::string> HostServices::loader_of(std::string_view asset) const {
+  const std::optional<Source> source = claimed_source(asset);
+  return source ? std::optional(source->loader) : std::nullopt;
+}
+
+std::vector<fs::path> HostServices::files_of(std::string_view asset) {
+  const std::optional<Source> source = claimed_source(asset);
+  if (!source) return {paths_.resolve(asset)};
+  Loader& reader = loader(source->loader);
+  return call_component("loader '" + source->loader + "'",
+                        [&] { return reader.files(source->asset); });
 }
 
 NodeId HostServices::load_asset(std::string_view asset, Scene& scene, NodeId parent) {

@@ -38,6 +38,10 @@ class HostServices final : public Host {
   /// Reads with this loader what its type claims, instead of with one that has default parameters.
   /// Call before anything is loaded.
   void use_loader(const std::string& type, std::unique_ptr<Loader> loader);
+  /// The type of the loader that reads this asset; none for pictures and other files.
+  std::optional<std::string> loader_of(std::string_view asset) const;
+  /// The files that this asset consists of, as its loader says; the file itself without a loader.
+  std::vector<std::filesystem::path> files_of(std::string_view asset);
 
   /// The files that resolve() has given since the last call, sorted: what components named.
   std::vector<std::filesystem::path> take_resolved();
@@ -66,7 +70,8 @@ class HostServices final : public Host {
     std::string text;  ///< ".usd" or "dining_room:".
     std::string loader;
   };
-  Source find_source(std::string_view asset);
+  std::optional<Source> claimed_source(std::string_view asset) const;
+  Source find_source(std::string_view asset) const;
   const Claim* claim_of(std::string_view asset, bool is_scheme) const;
   void learn_claims();
   void take_claims(const ComponentEntry& entry, const std::vector<std::string>& claims);

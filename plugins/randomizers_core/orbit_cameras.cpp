@@ -14,6 +14,11 @@ constexpr const char* kRolls[] = {"level", "arc"};
 
 }  // namespace
 
+struct OrbitCameras::Surroundings {
+  Obstacles blocking;  ///< What may not stand between a camera and its target.
+  Obstacles all;       ///< What may not be too near to a camera.
+};
+
 void OrbitCameras::Params::visit(ParamVisitor& v) {
   v.param("nodes", nodes, {"Cameras (or lights) to place."});
   v.param("targets", targets, {"Nodes to look at; each camera picks one."});
@@ -27,10 +32,12 @@ void OrbitCameras::Params::visit(ParamVisitor& v) {
            {"level: the horizon is level; arc: the shortest turn from looking down, as the "
             "reference does."});
   v.param("avoid_obstacles", avoid_obstacles,
-          {"Draw again while the view of the target is blocked or something is too near."});
+          {"Draw again while the view of the target is blocked or anything is too near."});
   v.param("obstacles", obstacles, {"Nodes that may block a view."});
   v.param("clearance_m", clearance_m,
-          {"Nothing of the obstacles is nearer to a camera.", "m", 0, 100});
+          {"Nothing visible is nearer to a camera. More than the cameras' near_m, or their near "
+           "plane cuts things open.",
+           "m", 0, 100});
   v.param("max_tries", max_tries, {"Draws per camera at most.", "", 1, 10000});
 }
 
@@ -51,7 +58,7 @@ OrbitCameras::View OrbitCameras::draw_view(const std::vector<Vec3>& targets,
 }
 
 OrbitCameras::View OrbitCameras::draw_free_view(const std::vector<Vec3>& targets,
-                                                const Obstacles& obstacles,
+                                                const Surroundings& surroundings,
                                                 const NodeDraws& draws) const {
   const auto attempt = [&](int number) {
     return draw_view(targets, {draws.rng.fork(std::uint64_t(number)), draws.index});
@@ -59,8 +66,8 @@ OrbitCameras::View OrbitCameras::draw_free_view(const std::vector<Vec3>& targets
   std::optional<View> unblocked;
   for (int i = 0; i < params_.max_tries; ++i) {
     const View view = attempt(i);
-    if (obstacles.is_between(view.position, view.target)) continue;
-    if (!obstacles.is_near(view.position, params_.clearance_m)) return view;
+    if (surroundings.blocking.is_between(view.position, view.target)) continue;
+    if (!surroundings.all.is_near(view.position, params_.clearance_m)) return view;
     if (!unblocked) unblocked = view;
   }
   return unblocked ? *unblocked : attempt(0);
@@ -79,9 +86,11 @@ void OrbitCameras::randomize(Scene& scene, const RandomizeContext& context, cons
   const std::vector<Vec3> targets =
       target_centres(scene, params_.targets, context.working_area_world);
   // Without obstacles every draw is free, so the first one stands: the same as when switched off.
-  const Obstacles obstacles(scene, params_.avoid_obstacles ? params_.obstacles : std::string());
+  const bool avoid = params_.avoid_obstacles;
+  const Surroundings surroundings{Obstacles(scene, avoid ? params_.obstacles : std::string()),
+                                  Obstacles(scene, avoid ? "/**" : "")};
   const auto place = [&](NodeId node, const NodeDraws& draws) {
-    set_world_pose(scene, node, pose_of(draw_free_view(targets, obstacles, draws)));
+    set_world_pose(scene, node, pose_of(draw_free_view(targets, surroundings, draws)));
   };
   draw_for_each(scene, nodes, context, rng, place);
 }

@@ -10,7 +10,6 @@
 
 namespace diorama {
 
-class Obstacles;
 struct NodeDraws;
 
 /// Places each camera (or light) on a sphere round a random target (the centre of its box) and
@@ -18,7 +17,8 @@ struct NodeDraws;
 /// itself, not from the point looked at. Without targets the working area takes their place.
 ///
 /// A camera behind a wall sees nothing. With `avoid_obstacles` a view is drawn again, target
-/// included, while something stands between camera and target or close to the camera. When no draw
+/// included, while an obstacle stands between camera and target or anything close to the camera,
+/// whose near plane would cut it open. When no draw
 /// within `max_tries` is free, one with a free line of sight is taken, else the first.
 class OrbitCameras final : public Randomizer {
  public:
@@ -32,7 +32,7 @@ class OrbitCameras final : public Randomizer {
     std::string roll = "level";
     bool avoid_obstacles = true;
     std::string obstacles = "/Environment/**";
-    double clearance_m = 0.15;
+    double clearance_m = 0.3;
     int max_tries = 64;
 
     void visit(ParamVisitor& v);
@@ -47,8 +47,9 @@ class OrbitCameras final : public Randomizer {
     Vec3 position;
     Vec3 look_at;
   };
+  struct Surroundings;
   View draw_view(const std::vector<Vec3>& targets, NodeDraws draws) const;
-  View draw_free_view(const std::vector<Vec3>& targets, const Obstacles& obstacles,
+  View draw_free_view(const std::vector<Vec3>& targets, const Surroundings& surroundings,
                       const NodeDraws& draws) const;
   Affine pose_of(const View& view) const;
 

@@ -23,6 +23,9 @@ class PartLoader final : public Loader {
   };
   PartLoader(const Params& params, Host& host) : params_(params), host_(host) {}
   std::vector<std::string> claims() const override { return {".part", ".big.part", "part:"}; }
+  std::vector<fs::path> files(std::string_view asset) const override {
+    return {fs::path(asset), std::to_string(int(params_.weight)) + ".kg"};
+  }
 
   void load(std::string_view asset, Scene& scene, NodeId root) override {
     host_.log(LogLevel::Debug, "load " + std::string(asset));
@@ -107,6 +110,17 @@ TEST_CASE("a job's loader takes the place of the default one", "[host]") {
   shop.host->use_loader("parts", std::make_unique<PartLoader>(PartLoader::Params{3.0}, *shop.host));
   shop.host->load_asset("a.part", shop.scene, shop.scene.root());
   CHECK(shop.scene[shop.scene.require("/a/lid")].rigid_body->mass_kg == 3.0);
+}
+
+TEST_CASE("an asset's files are those that the job's loader names", "[host]") {
+  Workshop shop;
+  CHECK(shop.host->loader_of("b.BIG.PART") == "parts");
+  CHECK(shop.host->files_of("b.BIG.PART") ==
+        std::vector<fs::path>{shop.folder / "b.BIG.PART", "7.kg"});
+  shop.host->use_loader("parts", std::make_unique<PartLoader>(PartLoader::Params{3.0}, *shop.host));
+  CHECK(shop.host->files_of("part:x/7") == std::vector<fs::path>{"part:x/7", "3.kg"});
+  CHECK_FALSE(shop.host->loader_of("c.txt"));
+  CHECK(shop.host->files_of("c.txt") == std::vector<fs::path>{shop.folder / "c.txt"});
 }
 
 TEST_CASE("the longest claim takes the asset, in any case; schemes give names", "[host]") {
