@@ -12,7 +12,7 @@
 namespace diorama {
 
 /// A principled surface at one point. Local space: z along the shading normal, on the side of wo.
-/// Reciprocal; loses no energy.
+/// Reciprocal; loses no energy, unless it `stacks_lobes`.
 struct SurfaceBsdf {
   Vec3f base = Vec3f::Zero();  ///< Base colour.
   float metallic = 0.0f;
@@ -22,6 +22,9 @@ struct SurfaceBsdf {
   const LayerTable* table = nullptr;  ///< Of `layers`; not needed by plain Lambert surfaces.
   const GlassTable* glass = nullptr;
   bool is_inside = false;  ///< wo lies behind the surface: glass is left, not entered.
+  /// As Blender 3.4's Principled BSDF: the specular lobe is added to a whole diffuse base (Burley
+  /// 2012), and light between facets is lost. Returns more light than arrives at grazing angles.
+  bool stacks_lobes = false;
 
   /// Diffuse and nothing else.
   bool is_lambert() const {
@@ -71,6 +74,7 @@ class Bsdf {
     return {d / (1.0f + lambda_o + ggx_lambda(cos_i, alpha)), d / (1.0f + lambda_o)};
   }
   void choose_probabilities(const LayerTable::Node& node);
+  BsdfValue evaluate_stacked(const Vec3f& wi) const;
   BsdfValue evaluate_glass(const Vec3f& wi) const;
   BsdfSample sample_smooth_glass(float choice) const;
   /// Zero when the microfacet sends the light into the surface again.
@@ -163,6 +167,10 @@ inline BsdfValue Bsdf::evaluate(const Vec3f& wi) const {
   }
   const float cos_over_pi = wi.z() * (1.0f / kPiF);
   if (is_lambert_) return {s_.base * cos_over_pi, cos_over_pi};
+  if (s_.stacks_lobes) [[unlikely]] {
+    const BsdfValue stacked = evaluate_stacked(wi);
+    return {value.f_cos + stacked.f_cos, value.density + stacked.density};
+  }
 
   const Vec3f h = unit(wo_ + wi);
   const float schlick = schlick_weight(std::max(0.0f, wo_.dot(h)));
@@ -189,6 +197,44 @@ inline BsdfValue Bsdf::evaluate(const Vec3f& wi) const {
   }
   value.density += p_diffuse_ * cos_over_pi;
   value.f_cos *= kKept;
+  return value;
+}
+
+// The exact dielectric Fresnel term, scaled to run from 0 to 1, blends the colours of the facets.
+[[gnu::noinline]] inline BsdfValue Bsdf::evaluate_stacked(const Vec3f& wi) const {
+  const float cos_over_pi = wi.z() * (1.0f / kPiF);
+  const Vec3f h = unit(wo_ + wi);
+  const float cos_h = std::max(0.0f, wo_.dot(h));
+  BsdfValue value;
+  const auto add_facets = [&](float alpha, float lambda_o, float p, auto&& reflectance) {
+    const float lambda_i = ggx_lambda(wi.z(), alpha);
+    const float d = ggx_distribution(h.z(), alpha) / (4.0f * wo_.z() * (1.0f + lambda_o));
+    value.f_cos += (d / (1.0f + lambda_i)) * reflectance;
+    value.density += p * d;
+  };
+  if (specular_f90_ > 0.0f) {
+    const float f0 = s_.layers.f0;
+    const float root = std::sqrt(f0);
+    const float fresnel = fresnel_dielectric(std::max(1e-4f, cos_h), (1.0f + root) / (1.0f - root));
+    const float white = std::clamp((fresnel - f0) / (1.0f - f0), 0.0f, 1.0f);
+    add_facets(s_.alpha, lambda_o_, p_specular_,
+               Vec3f(specular_f0_ * (1.0f - white) + Vec3f::Constant(specular_f90_ * white)));
+  }
+  if (s_.layers.coat > 0.0f) {
+    constexpr float kCoatWeight = 0.25f;
+    const float f = kCoatF0 + (1.0f - kCoatF0) * schlick_weight(cos_h);
+    add_facets(s_.layers.coat_alpha, coat_lambda_o_, p_coat_,
+               Vec3f(Vec3f::Constant(kCoatWeight * s_.layers.coat * f)));
+  }
+  if (plastic_ > 0.0f) {
+    const float out = schlick_weight(wo_.z());
+    const float in = schlick_weight(wi.z());
+    const float back = 2.0f * std::sqrt(s_.alpha) * cos_h * cos_h;
+    const float grazing =
+        (1.0f - 0.5f * out) * (1.0f - 0.5f * in) + back * (out + in + out * in * (back - 1.0f));
+    value.f_cos += (plastic_ * grazing * cos_over_pi) * s_.base;
+  }
+  value.density += p_diffuse_ * cos_over_pi;
   return value;
 }
 

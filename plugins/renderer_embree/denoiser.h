@@ -3,6 +3,7 @@
 
 #include "diorama/host.h"
 #include "film.h"
+#include "isa.h"
 
 namespace diorama {
 
@@ -11,7 +12,7 @@ namespace diorama {
 /// explains, in rounds of growing reach (Dammertz et al. 2010, with the variance of Schied et al.
 /// 2017). Sources seen directly and the surfaces' colours stay as they are.
 /// `view_position` sets the scale at which surfaces count as one plane.
-Image<Vec3f> denoised(const Film& film, const Vec3f& view_position, Host& host);
+Image<Vec3f> denoised(const Film& film, const Vec3f& view_position, Isa isa, Host& host);
 
 /// The plain means.
 Image<Vec3f> undenoised(const Film& film);

@@ -62,6 +62,38 @@ SquareDistribution smallest_table(std::vector<float> weights, int width, int hei
   return SquareDistribution(weights, width, height);
 }
 
+/// One line with every value mixed half and half with the mean of its neighbours.
+template <class Neighbour>
+void blur(float* line, int count, int step, Neighbour&& neighbour) {
+  std::vector<float> before(static_cast<std::size_t>(count));
+  for (int i = 0; i < count; ++i) before[std::size_t(i)] = line[i * step];
+  for (int i = 0; i < count; ++i) {
+    const float sides =
+        before[std::size_t(neighbour(i - 1))] + before[std::size_t(neighbour(i + 1))];
+    line[i * step] = 0.5f * before[std::size_t(i)] + 0.25f * sides;
+  }
+}
+
+/// Luminance over a grid of cells on the image.
+std::vector<float> lightness(const MipTexture& image, int width, int height) {
+  // Images whose size halves to the grid's have it ready.
+  int level = 0;
+  while (level + 1 < image.level_count() && image.width() >> level > width) ++level;
+  const bool is_ready = image.width() >> level == width && image.height() >> level == height;
+  const float footprint = 1.0f / float(width);
+  std::vector<float> values;
+  values.reserve(std::size_t(width * height));
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const Vec2f uv((float(x) + 0.5f) / float(width), 1.0f - (float(y) + 0.5f) / float(height));
+      const Rgba texel = is_ready ? image.texel(level, x, y)
+                                  : image.lookup(uv, footprint, Wrap::Repeat, Wrap::Clamp);
+      values.push_back(luminance(texel.head<3>().matrix().cwiseMax(0.0f)));
+    }
+  }
+  return values;
+}
+
 }  // namespace
 
 DomeTexture::DomeTexture(std::shared_ptr<const Texture> source) : image_(std::move(source)) {
@@ -70,28 +102,19 @@ DomeTexture::DomeTexture(std::shared_ptr<const Texture> source) : image_(std::mo
   const int per_patch_y = std::clamp(image_.height() / kRows, 2, 64);
   const int width = per_patch_x * kColumns;
   const int height = per_patch_y * kRows;
-  const float footprint = 1.0f / float(width);
-  std::vector<float> lightness;
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      const Vec2f uv((float(x) + 0.5f) / float(width), 1.0f - (float(y) + 0.5f) / float(height));
-      const Rgba texel = image_.lookup(uv, footprint, Wrap::Repeat, Wrap::Clamp);
-      lightness.push_back(luminance(texel.head<3>().matrix().cwiseMax(0.0f)));
-    }
-  }
+  std::vector<float> cells = lightness(image_, width, height);
   // Lookups are bilinear, so a cell also shines with a part of its neighbours.
-  const auto blurred = [&](int x, int y) {
-    float sum = 0.0f;
-    for (int dy = -1; dy <= 1; ++dy) {
-      const int row = std::clamp(y + dy, 0, height - 1);
-      for (int dx = -1; dx <= 1; ++dx) {
-        const int column = (x + dx + width) % width;
-        const float share = (dx == 0 ? 0.5f : 0.25f) * (dy == 0 ? 0.5f : 0.25f);
-        sum += share * lightness[std::size_t(row) * std::size_t(width) + std::size_t(column)];
-      }
-    }
-    return sum * std::sin((float(y) + 0.5f) / float(height) * kPiF);
-  };
+  for (int y = 0; y < height; ++y) {
+    blur(&cells[std::size_t(y * width)], width, 1, [&](int x) { return (x + width) % width; });
+  }
+  for (int x = 0; x < width; ++x) {
+    blur(&cells[std::size_t(x)], height, width,
+         [&](int y) { return std::clamp(y, 0, height - 1); });
+  }
+  for (int y = 0; y < height; ++y) {
+    const float sine = std::sin((float(y) + 0.5f) / float(height) * kPiF);
+    for (int x = 0; x < width; ++x) cells[std::size_t(y * width + x)] *= sine;
+  }
   const float cell = 2.0f * kPiF * kPiF / float(width * height);
   for (int patch = 0; patch < kPatches; ++patch) {
     const int x_begin = patch % kColumns * per_patch_x;
@@ -100,7 +123,7 @@ DomeTexture::DomeTexture(std::shared_ptr<const Texture> source) : image_(std::mo
     float power = 0.0f;
     for (int y = y_begin; y < y_begin + per_patch_y; ++y) {
       for (int x = x_begin; x < x_begin + per_patch_x; ++x) {
-        weights.push_back(blurred(x, y));
+        weights.push_back(cells[std::size_t(y * width + x)]);
         power += weights.back() * cell;
       }
     }

@@ -9,8 +9,10 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <vector>
 
 #include "channels.h"
+#include "sample_plan.h"
 #include "view_transform.h"
 
 namespace diorama {
@@ -20,9 +22,14 @@ constexpr std::array kModes{"path_traced", "real_time", "preview"};
 constexpr std::array kExposures{"auto", "fixed"};
 constexpr std::array kViewTransforms{"standard", "filmic"};
 constexpr std::array kSphereLights{"sphere", "disk"};
+constexpr std::array kPrincipled{"layered", "blender"};
 constexpr std::array kIsas{"auto", kIsaNames[0], kIsaNames[1], kIsaNames[2], kIsaNames[3]};
 
-constexpr int kTile = 16;  // pixels
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
 
 /// Numbers too small to matter count as zero while it lives: they are slow otherwise.
 class FlushDenormals {
@@ -42,12 +49,11 @@ class FlushDenormals {
 class Stopwatch {
  public:
   explicit Stopwatch(double& seconds) : seconds_(seconds), start_(Clock::now()) {}
-  ~Stopwatch() { seconds_ = std::chrono::duration<double>(Clock::now() - start_).count(); }
+  ~Stopwatch() { seconds_ = seconds_since(start_); }
   Stopwatch(const Stopwatch&) = delete;
   Stopwatch& operator=(const Stopwatch&) = delete;
 
  private:
-  using Clock = std::chrono::steady_clock;
   double& seconds_;
   Clock::time_point start_;
 };
@@ -58,7 +64,18 @@ void EmbreeRenderer::Params::visit(ParamVisitor& v) {
   v.choice("mode", mode, kModes,
            {"path_traced: all light paths; real_time: few samples and one bounce, always denoised; "
             "preview: direct light only, denoised."});
-  v.param("samples", samples, {"Light paths per pixel.", "", 1, 1 << 20});
+  v.param(
+      "samples", samples,
+      {"Light paths per pixel; with an error target or a time budget the most.", "", 1, 1 << 20});
+  v.param("error_target", error_target,
+          {"Where a pixel's standard error over its brightness falls below this, sampling ends "
+           "(judged before denoising, for blocks of 8 x 8 pixels); 0: never.",
+           "", 0.0});
+  v.param(
+      "time_budget_s", time_budget_s,
+      {"Wall time for the paths of one picture, after which sampling ends; pictures then differ "
+       "from run to run; 0: no limit.",
+       "s", 0.0});
   v.param("max_bounces", max_bounces,
           {"How often light may be scattered after the first surface.", "", 0, 64});
   v.param("denoise", denoise, {"Remove noise from the colour channels (never from labels)."});
@@ -75,6 +92,9 @@ void EmbreeRenderer::Params::visit(ParamVisitor& v) {
   v.choice("sphere_lights", sphere_lights, kSphereLights,
            {"sphere: as the scene says; disk: like disks that turn to every point they light, as "
             "Blender's point lights do."});
+  v.choice("principled", principled, kPrincipled,
+           {"layered: layers share the light and lose none of it; blender: as Blender 3.4's "
+            "Principled BSDF, which adds reflections to a whole diffuse base."});
   v.choice("isa", isa, kIsas,
            {"Instruction set of the kernels; pictures are the same bytes within one."});
 }
@@ -83,7 +103,8 @@ EmbreeRenderer::EmbreeRenderer(Params params, Host& host)
     : params_(std::move(params)),
       host_(host),
       isa_(isa_by_name(params_.isa)),
-      meshes_(host, {kIsaNames[std::size_t(isa_)], params_.sphere_lights == "disk"}) {
+      meshes_(host, {kIsaNames[std::size_t(isa_)], params_.sphere_lights == "disk",
+                     params_.principled == "blender"}) {
   if (params_.mode == "path_traced") return;
   params_.denoise = true;
   params_.max_bounces = std::min(params_.max_bounces, params_.mode == "real_time" ? 1 : 0);
@@ -105,34 +126,32 @@ void EmbreeRenderer::do_prepare(const Scene& scene) {
 
 Film EmbreeRenderer::trace(const View& view, std::uint64_t seed) {
   const TraceSettings settings{params_.max_bounces, float(params_.clamp), params_.caustics};
-  const PathTracer tracer(meshes_, view, table_, settings, isa_);
+  const PathTracer tracer(meshes_, view, settings, isa_);
   const int width = view.camera().width;
   const int height = view.camera().height;
   Image<PixelSum> sums(width, height, PixelSum{});
-  const int columns = (width + kTile - 1) / kTile;
-  const int rows = (height + kTile - 1) / kTile;
+  SamplePlan plan(width, height, {params_.samples, params_.error_target, params_.time_budget_s},
+                  seed);
   std::atomic<std::uint64_t> rays{0};
   std::atomic<std::uint64_t> shadow_rays{0};
-  host_.parallel_for(std::size_t(columns * rows), [&](std::size_t tile) {
-    const FlushDenormals flush;
-    TraceJob job;
-    job.x_begin = int(tile) % columns * kTile;
-    job.y_begin = int(tile) / columns * kTile;
-    job.x_end = std::min(width, job.x_begin + kTile);
-    job.y_end = std::min(height, job.y_begin + kTile);
-    job.sample_end = std::uint32_t(params_.samples);
-    job.seed = seed;
-    const RayCounts counts = tracer.trace(job, sums.pixels().data(), std::size_t(width));
-    rays += counts.rays;
-    shadow_rays += counts.shadow_rays;
-  });
+  const auto start = Clock::now();
+  while (true) {
+    const std::vector<TraceJob> jobs = plan.next_round(sums, seconds_since(start));
+    if (jobs.empty()) break;
+    host_.parallel_for(jobs.size(), [&](std::size_t i) {
+      const FlushDenormals flush;
+      const RayCounts counts = tracer.trace(jobs[i], sums.pixels().data(), std::size_t(width));
+      rays += counts.rays;
+      shadow_rays += counts.shadow_rays;
+    });
+  }
   Film film(width, height, FilmPixel{});
   for (std::size_t i = 0; i < film.pixels().size(); ++i) {
     film.pixels()[i] = sums.pixels()[i].mean();
+    counts_.paths += std::uint64_t(sums.pixels()[i].count());
   }
   counts_.rays = rays;
   counts_.shadow_rays = shadow_rays;
-  counts_.paths = film.pixels().size() * std::uint64_t(params_.samples);
   return film;
 }
 
@@ -145,7 +164,7 @@ void EmbreeRenderer::put_colors(Frame& frame, const RenderRequest& request, cons
   Image<Vec3f> hdr;
   {
     const Stopwatch watch(counts_.denoise_s);
-    hdr = params_.denoise ? denoised(film, view.position(), host_) : undenoised(film);
+    hdr = params_.denoise ? denoised(film, view.position(), isa_, host_) : undenoised(film);
   }
   const double base = params_.exposure == "auto" ? automatic_exposure(hdr) : 1.0;
   frame.exposure = base * std::exp2(params_.exposure_ev);

@@ -11,7 +11,6 @@
 #include "diorama/renderer.h"
 #include "path_tracer.h"
 #include "render_scene.h"
-#include "sobol.h"
 
 namespace diorama {
 
@@ -21,6 +20,8 @@ class EmbreeRenderer final : public Renderer {
   struct Params {
     std::string mode = "path_traced";
     int samples = 32;
+    double error_target = 0.0;
+    double time_budget_s = 0.0;
     int max_bounces = 6;
     bool denoise = true;
     bool caustics = false;
@@ -29,6 +30,7 @@ class EmbreeRenderer final : public Renderer {
     double exposure_ev = 0.0;
     std::string view_transform = "filmic";
     std::string sphere_lights = "sphere";
+    std::string principled = "layered";
     std::string isa = "auto";
 
     void visit(ParamVisitor& v);
@@ -59,7 +61,6 @@ class EmbreeRenderer final : public Renderer {
   Params params_;
   Host& host_;
   Isa isa_;
-  SobolTable table_;
   RenderScene meshes_;
   Counts counts_;
 };

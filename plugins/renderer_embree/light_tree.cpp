@@ -42,7 +42,7 @@ LightTree::Light LightTree::group(const std::vector<Light>& lights, const Range&
 /// Splits the members into at most eight groups of neighbours, halving the widest at its middle.
 std::uint32_t LightTree::build(const std::vector<Light>& lights, const Range& members) {
   std::vector<Range> groups{members};
-  while (groups.size() < kWidth) {
+  while (groups.size() < kLanes) {
     const auto largest =
         std::max_element(groups.begin(), groups.end(),
                          [](const Range& p, const Range& q) { return p.size() < q.size(); });

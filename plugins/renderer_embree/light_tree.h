@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "lanes.h"
 #include "sampling.h"
 
 namespace diorama {
@@ -31,13 +32,9 @@ class LightTree {
     bool is_one_sided = false;
     float power = 0.0f;  ///< Luminous weight.
   };
-  static constexpr int kWidth = 8;
 
   LightTree() = default;
   explicit LightTree(const std::vector<Light>& lights);
-
-  /// GCC's vector extension: as wide as the instruction set allows, equal results in all.
-  using Lanes [[gnu::vector_size(4 * kWidth), gnu::aligned(16)]] = float;
 
   struct Scores {
     Lanes of{};
@@ -62,7 +59,7 @@ class LightTree {
     Lanes x{}, y{}, z{}, radius{}, power{};
     Lanes direction_x{}, direction_y{}, direction_z{}, one_sided{};
     /// A light, or ~index of a block. Lanes without one have no power.
-    std::array<std::int32_t, kWidth> child{};
+    std::array<std::int32_t, kLanes> child{};
     std::uint32_t count = 0;
     std::uint32_t parent = 0;
     std::uint32_t lane_of_parent = 0;
@@ -94,7 +91,7 @@ inline LightTree::Scores LightTree::scores(const Block& b, const Receiver& recei
   const Lanes radius2 = b.radius * b.radius + 1e-20f;
   const Lanes near2 = distance2 > radius2 ? distance2 : radius2;
   // 1 / sqrt(near2) to 5e-6: a good guess by the bits, then Newton's method twice.
-  using Bits [[gnu::vector_size(4 * kWidth)]] = std::int32_t;
+  using Bits [[gnu::vector_size(4 * kLanes)]] = std::int32_t;
   Lanes scale = Lanes(0x5F3759DF - (Bits(near2) >> 1));
   scale *= 1.5f - 0.5f * near2 * scale * scale;
   scale *= 1.5f - 0.5f * near2 * scale * scale;

@@ -43,7 +43,7 @@ struct TraceJob {
   int y_end = 0;
   std::uint32_t sample_begin = 0;
   std::uint32_t sample_end = 1;
-  std::uint64_t seed = 0;
+  SampleOrder order{0, 1};
 };
 
 struct RayCounts {
@@ -55,8 +55,7 @@ struct RayCounts {
 /// finds (multiple importance sampling). Const and shareable between threads.
 class PathTracer {
  public:
-  PathTracer(const RenderScene& scene, const View& view, const SobolTable& table,
-             const TraceSettings& settings, Isa isa);
+  PathTracer(const RenderScene& scene, const View& view, const TraceSettings& settings, Isa isa);
 
   /// Adds samples to the sums of all pixels, `sums` row by row with `stride` per row. Equal jobs
   /// give equal sums. Uses the kernel compiled for the instruction set.
@@ -64,12 +63,18 @@ class PathTracer {
 
  private:
   struct Path;
+  struct ShadowRay;
+  static constexpr std::size_t kBatch = 64;  // paths
 
   RayCounts trace_all(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
   RayCounts trace_sse42(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
   RayCounts trace_avx2(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
   RayCounts trace_avx512(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
-  void trace_path(Path& path) const;
+  void trace_batch(std::vector<Path>& paths) const;
+  void start_path(Path& path, int x, int y) const;
+  void find_surface(Path& path) const;
+  void shade(Path& path) const;
+  void find_light(Path& path) const;
   void collect_lights(Path& path, float t_max) const;
   void collect_emission(Path& path, const RayHit& hit, const SurfaceGeometry& surface,
                         const ShadingMaterial& material) const;
@@ -82,11 +87,10 @@ class PathTracer {
                             const ShadingMaterial& material, bool is_soft, Vec3f& normal) const;
   void scatter(Path& path, const RayHit& hit, const SurfaceGeometry& surface,
                const ShadingMaterial& material) const;
-  void add(Path& path, const Vec3f& radiance) const;
+  void add(Path& path, int bounce, const Vec3f& radiance) const;
 
   const RenderScene& scene_;
   const View& view_;
-  const SobolTable& table_;
   TraceSettings settings_;
   Isa isa_;
 };

@@ -72,7 +72,7 @@ RenderScene::RenderScene(Host& host, const Options& options)
     : host_(host),
       options_(options),
       device_(rtcNewDevice(device_options(options.isa, host.thread_count()).c_str())),
-      materials_(host),
+      materials_(host, options.stacks_lobes),
       default_material_(std::make_shared<Material>()),
       white_sky_(make_white_sky()) {
   if (!device_) throw Error(ErrorKind::Plugin, "Embree cannot start on this machine");

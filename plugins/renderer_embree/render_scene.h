@@ -80,6 +80,7 @@ class RenderScene {
   struct Options {
     std::string isa = "sse2";     ///< Of Embree's kernels; one of kIsaNames.
     bool has_disk_lamps = false;  ///< See Lights.
+    bool stacks_lobes = false;    ///< See SurfaceBsdf.
   };
   RenderScene(Host& host, const Options& options);
   ~RenderScene();

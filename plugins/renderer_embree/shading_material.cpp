@@ -73,6 +73,7 @@ SurfaceBsdf MaterialLibrary::make_surface(ShadingMaterial& material, bool is_sof
   s.layers = {ratio * ratio, std::clamp(m.specular, 0.0f, 1.0f),
               std::clamp(m.clearcoat, 0.0f, 1.0f),
               ShadingMaterial::alpha_of(m.clearcoat_roughness, is_soft)};
+  s.stacks_lobes = stacks_lobes_;
   if (s.layers.coat <= 0.0f) s.layers.coat_alpha = kMinAlpha;  // fewer different tables
   const bool is_constant = !m.roughness_texture;
   const auto alpha = is_constant ? std::optional<float>(s.alpha) : std::nullopt;

@@ -49,7 +49,8 @@ struct ShadingMaterial {
 /// The shading materials of a scene with their textures and tables, kept between captures.
 class MaterialLibrary {
  public:
-  explicit MaterialLibrary(Host& host) : host_(host) {}
+  /// `stacks_lobes`: see SurfaceBsdf.
+  MaterialLibrary(Host& host, bool stacks_lobes) : host_(host), stacks_lobes_(stacks_lobes) {}
 
   /// Makes what is missing for these materials and forgets what belongs to no other. Pointers from
   /// at() stay valid for materials that are in both the last call and this one.
@@ -72,6 +73,7 @@ class MaterialLibrary {
   TextureSlot slot(const TextureInput& input) const;
 
   Host& host_;
+  bool stacks_lobes_;
   AlbedoTables albedo_tables_;
   std::map<LayerKey, std::weak_ptr<const LayerTable>> layer_tables_;
   std::map<GlassKey, std::weak_ptr<const GlassTable>> glass_tables_;

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 
@@ -16,57 +18,74 @@ inline std::uint64_t mix_bits(std::uint64_t x) {
   return x ^ (x >> 31);
 }
 
-/// The first 4096 points of the two-dimensional Sobol sequence, by the reversed bits of their
-/// index: these are the first coordinate already, so only the second is stored.
-class SobolTable {
+/// How the pixels of a picture share one Sobol sequence: each takes a run of it as long as the
+/// samples wanted (rounded up to a power of two), in the order of a Z-shaped curve. Neighbours then
+/// complete each other: their errors differ and cancel when the picture is blurred, by an eye or by
+/// a denoiser (Ahmed and Wonka 2020).
+class SampleOrder {
  public:
-  static constexpr std::uint32_t kBits = 12;
-  static constexpr std::uint32_t kSize = 1u << kBits;
+  SampleOrder(std::uint64_t seed, std::uint32_t samples)
+      : seed_(seed),
+        bits_(std::min(int(std::bit_width(std::max(samples, 1u) - 1u)), kSampleBits)) {}
 
-  SobolTable();
-  /// The upper 16 bits of the second coordinate of the point whose first is `reversed` / kSize.
-  std::uint32_t second(std::uint32_t reversed) const { return second_[reversed]; }
+  struct Place {
+    std::uint32_t key = 0;    ///< Of the sequence.
+    std::uint32_t index = 0;  ///< In it.
+  };
+  Place place(int x, int y, std::uint32_t sample) const {
+    const auto u = std::uint32_t(x);
+    const auto v = std::uint32_t(y);
+    const std::uint64_t tile = std::uint64_t(u >> kTileBits) << 32 | (v >> kTileBits);
+    const std::uint64_t round = std::uint64_t(sample >> bits_) << 20;
+    const std::uint32_t pixel = spread(u & kTileMask) | spread(v & kTileMask) << 1;
+    return {std::uint32_t(mix_bits(seed_ ^ mix_bits(tile ^ round ^ 0x9E3779B97F4A7C15u))),
+            pixel << bits_ | (sample & ((1u << bits_) - 1u))};
+  }
 
  private:
-  std::array<std::uint16_t, kSize> second_;
+  static constexpr int kTileBits = 10;  // the side of a square of pixels with its own sequence
+  static constexpr std::uint32_t kTileMask = (1u << kTileBits) - 1u;
+  static constexpr int kSampleBits = 32 - 2 * kTileBits;
+
+  /// The lower ten bits with gaps between them.
+  static std::uint32_t spread(std::uint32_t x) {
+    x = (x | x << 8) & 0x00FF00FFu;
+    x = (x | x << 4) & 0x0F0F0F0Fu;
+    x = (x | x << 2) & 0x33333333u;
+    return (x | x << 1) & 0x55555555u;
+  }
+
+  std::uint64_t seed_;
+  int bits_;
 };
 
 /// The random numbers of one light path: pairs of dimensions of an Owen-shuffled Sobol sequence, a
-/// pair for every purpose. Equal (seed, pixel, index) give equal numbers.
+/// pair for every purpose. Equal places give equal numbers.
 class PathSampler {
  public:
-  PathSampler(const SobolTable& table, std::uint64_t seed, int x, int y, std::uint32_t index)
-      : PathSampler(table, pixel_key(seed, x, y, index), index) {}
-  /// With the key of the pixel at hand.
-  PathSampler(const SobolTable& table, std::uint32_t key, std::uint32_t index)
-      : table_(table), key_(key), reversed_(reversed(index)) {}
+  explicit PathSampler(const SampleOrder::Place& place)
+      : key_(place.key), reversed_(reversed(place.index)) {}
 
-  /// The same for SobolTable::kSize indices in a row.
-  static std::uint32_t pixel_key(std::uint64_t seed, int x, int y, std::uint32_t index) {
-    const std::uint64_t pixel = (std::uint64_t(std::uint32_t(x)) << 32) ^ std::uint32_t(y);
-    const std::uint64_t round = std::uint64_t(index >> SobolTable::kBits) << 40;
-    return std::uint32_t(mix_bits(seed ^ mix_bits(pixel ^ 0x9E3779B97F4A7C15u) ^ round));
-  }
-
-  /// Two numbers in [0, 1), well spread over the samples of the pixel.
+  /// Two numbers in [0, 1), well spread over the samples of the pixel and of its neighbours.
   Vec2f next() { return next_pairs<1>()[0]; }
 
   /// Several pairs at once: the loops below become vector code.
   template <std::size_t Count>
   std::array<Vec2f, Count> next_pairs() {
     std::array<std::uint32_t, Count> keys;
-    std::array<std::uint32_t, Count> shuffled;
+    std::array<std::uint32_t, Count> first;
+    std::array<std::uint32_t, Count> second;
     for (std::size_t i = 0; i < Count; ++i) {
       keys[i] = hashed(key_ + (dimension_ + std::uint32_t(i)) * 0x9E3779B9u);
     }
-    for (std::size_t i = 0; i < Count; ++i) shuffled[i] = shuffle(reversed_, keys[i]);
     dimension_ += std::uint32_t(Count);
+    for (std::size_t i = 0; i < Count; ++i) first[i] = shuffled(reversed_, keys[i]);
+    for (std::size_t i = 0; i < Count; ++i) second[i] = second_coordinate(first[i]);
     std::array<Vec2f, Count> pairs;
     for (std::size_t i = 0; i < Count; ++i) {
       const std::uint32_t scramble = keys[i] * 0x9E3779B1u;
-      const std::uint32_t first = shuffled[i] << (32 - SobolTable::kBits);
-      const std::uint32_t second = table_.second(shuffled[i]) << 16;
-      pairs[i] = {fraction(first ^ scramble), fraction(second ^ (scramble >> 16 | scramble << 16))};
+      pairs[i] = {fraction(first[i] ^ scramble),
+                  fraction(second[i] ^ (scramble >> 16 | scramble << 16))};
     }
     return pairs;
   }
@@ -81,25 +100,35 @@ class PathSampler {
     return x ^ (x >> 15);
   }
 
-  static std::uint32_t reversed(std::uint32_t index) {
-    std::uint32_t x = index & (SobolTable::kSize - 1);
-    x = (x & 0x555u) << 1 | (x >> 1 & 0x555u);
-    x = (x & 0x333u) << 2 | (x >> 2 & 0x333u);
-    return (x & 0x00Fu) << 8 | (x & 0x0F0u) | x >> 8;  // groups of four
+  /// The bits in reverse order: the first coordinate of a Sobol point by its index.
+  static std::uint32_t reversed(std::uint32_t x) {
+    x = (x & 0x55555555u) << 1 | (x >> 1 & 0x55555555u);
+    x = (x & 0x33333333u) << 2 | (x >> 2 & 0x33333333u);
+    x = (x & 0x0F0F0F0Fu) << 4 | (x >> 4 & 0x0F0F0F0Fu);
+    return __builtin_bswap32(x);
+  }
+
+  /// The second coordinate by the first. Its generator matrix is Pascal's triangle modulo 2, a
+  /// product of five sparse matrices.
+  static std::uint32_t second_coordinate(std::uint32_t x) {
+    x ^= (x & 0x55555555u) << 1;
+    x ^= (x & 0x33333333u) << 2;
+    x ^= (x & 0x0F0F0F0Fu) << 4;
+    x ^= (x & 0x00FF00FFu) << 8;
+    return x ^ x << 16;
   }
 
   // A nested uniform shuffle: each bit of the index is flipped by a hash of the bits above it. The
   // multiplications of Laine and Karras (2011) carry upwards, hence the reversed index.
-  static std::uint32_t shuffle(std::uint32_t x, std::uint32_t seed) {
+  static std::uint32_t shuffled(std::uint32_t x, std::uint32_t seed) {
     x += seed;
     x ^= x * 0x6C50B47Cu;
     x ^= x * 0xB82F1E52u;
     x ^= x * 0xC7AFE638u;
     x ^= x * 0x8D22F6E6u;
-    return x & (SobolTable::kSize - 1);
+    return x;
   }
 
-  const SobolTable& table_;
   std::uint32_t key_;
   std::uint32_t dimension_ = 1;
   std::uint32_t reversed_;

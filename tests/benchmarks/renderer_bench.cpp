@@ -59,10 +59,10 @@ double thread_seconds() {
 double share_of_raw_rays(const Scene& scene, NodeId camera, Host& host,
                          const EmbreeRenderer::Params& params) {
   const Isa isa = isa_by_name(params.isa);
-  RenderScene meshes(host, {kIsaNames[std::size_t(isa)], params.sphere_lights == "disk"});
+  RenderScene meshes(host, {kIsaNames[std::size_t(isa)], params.sphere_lights == "disk",
+                            params.principled == "blender"});
   meshes.take(scene);
   const View view(scene, camera);
-  const SobolTable table;
   TraceSettings settings{params.max_bounces, float(params.clamp), params.caustics};
   const int width = view.camera().width;
   const int height = view.camera().height;
@@ -74,9 +74,9 @@ double share_of_raw_rays(const Scene& scene, NodeId camera, Host& host,
   std::vector<PixelSum> sums(std::size_t(width) * std::size_t(height));
   std::vector<LoggedRay> rays;
   settings.ray_log = &rays;
-  PathTracer(meshes, view, table, settings, isa).trace(job, sums.data(), std::size_t(width));
+  PathTracer(meshes, view, settings, isa).trace(job, sums.data(), std::size_t(width));
   settings.ray_log = nullptr;
-  const PathTracer tracer(meshes, view, table, settings, isa);
+  const PathTracer tracer(meshes, view, settings, isa);
   std::vector<double> shares;
   std::size_t hits = 0;
   for (int i = 0; i < 5; ++i) {
@@ -143,11 +143,6 @@ void run(const Options& options) {
   start = cpu_seconds();
   renderer.prepare(scene);
   const double prepare = cpu_seconds() - start;
-  nlohmann::ordered_json facts;
-  if (options.probes) {
-    facts["raw_ray_share"] = share_of_raw_rays(scene, camera, host, options.params);
-    facts["update_wall_s"] = update_seconds(scene, renderer);
-  }
   std::shared_ptr<const Texture> reference;
   if (!options.reference.empty()) reference = host.read_texture(options.reference);
   for (int i = 0; i < options.repetitions; ++i) {
@@ -157,7 +152,7 @@ void run(const Options& options) {
                                          options.seed + unsigned(i)});
     const double cpu = cpu_seconds() - start;
     const auto& counts = renderer.last_counts();
-    nlohmann::ordered_json line = facts;
+    nlohmann::ordered_json line;
     line["materials"] = options.materials;
     line["size"] = std::to_string(options.width) + "x" + std::to_string(options.height);
     line["samples"] = options.params.samples;
@@ -185,6 +180,13 @@ void run(const Options& options) {
                  std::streamsize(pixels.size_bytes()));
     }
     if (!options.png.empty()) test::write_png(host, frame.get(kColor), options.png);
+  }
+  if (options.probes) {
+    // Last, because the second moves things.
+    nlohmann::ordered_json line;
+    line["raw_ray_share"] = share_of_raw_rays(scene, camera, host, options.params);
+    line["update_wall_s"] = update_seconds(scene, renderer);
+    std::printf("%s\n", line.dump().c_str());
   }
 }
 
@@ -214,6 +216,7 @@ int main(int argc, char** argv) {
   app.add_option("--mode", options.params.mode);
   app.add_option("--isa", options.params.isa);
   app.add_option("--sphere-lights", options.params.sphere_lights);
+  app.add_option("--principled", options.params.principled);
   app.add_flag("--denoise,!--no-denoise", options.params.denoise);
   app.add_flag("--caustics,!--no-caustics", options.params.caustics);
   CLI11_PARSE(app, argc, argv);

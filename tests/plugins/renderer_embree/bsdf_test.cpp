@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "bsdf.h"
 
+#include <array>
 #include <cmath>
 #include <memory>
 #include <vector>
@@ -101,6 +102,36 @@ TEST_CASE("a clear coat takes from what lies below as much as it returns", "[bsd
       surface.layers.coat_alpha = alpha_of(coat_roughness);
       surface.metallic = metallic;
       check_furnace(surface);
+    }
+  }
+}
+
+TEST_CASE("stacked lobes return as much as Blender's Principled BSDF", "[bsdf][furnace]") {
+  // Radiance of a plane under a uniform white sky, seen from 0, 45, 70 and 80 degrees, rendered
+  // with Blender 3.4 at 32768 samples; specular 0.5 there is an index of refraction of 1.5.
+  struct Row {
+    float base, roughness, metallic;
+    std::array<double, 4> radiance;
+  };
+  const std::vector<Row> rows{{0.8f, 0.25f, 0.0f, {0.8329, 0.8427, 0.9335, 1.0356}},
+                              {0.8f, 0.5f, 0.0f, {0.8420, 0.8501, 0.9079, 0.9571}},
+                              {0.8f, 0.9f, 0.0f, {0.8410, 0.8447, 0.9143, 1.0246}},
+                              {0.0f, 0.25f, 0.0f, {0.0399, 0.0508, 0.1610, 0.3115}},
+                              {0.0f, 0.9f, 0.0f, {0.0173, 0.0216, 0.0337, 0.0442}},
+                              {0.8f, 0.3f, 1.0f, {0.7925, 0.7909, 0.7876, 0.7695}},
+                              {0.8f, 0.7f, 1.0f, {0.5583, 0.5507, 0.5747, 0.6104}}};
+  for (const Row& row : rows) {
+    SurfaceBsdf surface;
+    surface.base = Vec3f::Constant(row.base);
+    surface.metallic = row.metallic;
+    surface.alpha = alpha_of(row.roughness);
+    surface.stacks_lobes = true;
+    const Made made(surface);
+    for (std::size_t i = 0; i < 4; ++i) {
+      const std::array<double, 4> degrees{0.0, 45.0, 70.0, 80.0};
+      const double cosine = std::min(0.9999, std::cos(degrees[i] * kPi / 180.0));
+      CAPTURE(row.base, row.roughness, row.metallic, degrees[i]);
+      CHECK(furnace(made.surface, float(cosine)) == Approx(row.radiance[i]).epsilon(0.01));
     }
   }
 }

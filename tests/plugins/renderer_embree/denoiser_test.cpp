@@ -49,14 +49,14 @@ TEST_CASE("noise goes, pattern and corner stay", "[denoiser]") {
   const Image<Vec3f> truth = undenoised(noisy_corner(0.0));
   const Film film = noisy_corner(0.3);
   const double before = error(undenoised(film), truth);
-  const double after = error(denoised(film, Vec3f(30, 30, 20), host), truth);
+  const double after = error(denoised(film, Vec3f(30, 30, 20), Isa::Sse2, host), truth);
   CHECK(after < 0.08 * before);
 }
 
 TEST_CASE("a picture without noise stays as it is", "[denoiser]") {
   test::RenderHost host(1);
   const Film film = noisy_corner(0.0);
-  CHECK(error(denoised(film, Vec3f(30, 30, 20), host), undenoised(film)) < 1e-6);
+  CHECK(error(denoised(film, Vec3f(30, 30, 20), Isa::Sse2, host), undenoised(film)) < 1e-6);
 }
 
 TEST_CASE("one chance find among quiet neighbours is tamed", "[denoiser]") {
@@ -64,7 +64,7 @@ TEST_CASE("one chance find among quiet neighbours is tamed", "[denoiser]") {
   Film film = noisy_corner(0.05);
   film.at(20, 20).scattered *= 500.0f;
   film.at(20, 20).variance *= 250000.0f;
-  const Image<Vec3f> clean = denoised(film, Vec3f(30, 30, 20), host);
+  const Image<Vec3f> clean = denoised(film, Vec3f(30, 30, 20), Isa::Sse2, host);
   for (int y = 12; y < 28; ++y) {
     for (int x = 12; x < 28; ++x) CHECK(clean.at(x, y).x() < 1.5f);
   }
@@ -75,7 +75,8 @@ TEST_CASE("sources seen directly pass untouched", "[denoiser]") {
   Film film = noisy_corner(0.2);
   film.at(5, 6) = FilmPixel{};
   film.at(5, 6).seen = Vec3f(70.0f, 60.0f, 50.0f);
-  CHECK((denoised(film, Vec3f(30, 30, 20), host).at(5, 6) - Vec3f(70, 60, 50)).norm() < 1e-4f);
+  CHECK((denoised(film, Vec3f(30, 30, 20), Isa::Sse2, host).at(5, 6) - Vec3f(70, 60, 50)).norm() <
+        1e-4f);
 }
 
 TEST_CASE("exposure does not depend on the scale of the light", "[exposure]") {

@@ -153,20 +153,21 @@ TEST_CASE("light samples, BSDF samples and both together agree", "[renderer][mis
   RenderScene scene(host, {});
   scene.take(world.scene);
   const View view(world.scene, camera);
-  const SobolTable table;
   const auto measure = [&](bool lights, bool bsdf, int samples) {
     TraceSettings settings;
     settings.max_bounces = 3;
     settings.has_caustics = true;
     settings.samples_lights = lights;
     settings.samples_bsdf = bsdf;
-    const PathTracer tracer(scene, view, table, settings, Isa::Sse2);
+    const PathTracer tracer(scene, view, settings, Isa::Sse2);
     // Independent repetitions give the error of the mean.
     constexpr int kRuns = 12;
     std::vector<double> runs(kRuns, 0.0);
     host.parallel_for(kRuns, [&](std::size_t run) {
       std::vector<PixelSum> sums(1200);
-      tracer.trace({0, 0, 40, 30, 0, std::uint32_t(samples), 1000 + run}, sums.data(), 40);
+      tracer.trace({0, 0, 40, 30, 0, std::uint32_t(samples),
+                    SampleOrder(1000 + run, std::uint32_t(samples))},
+                   sums.data(), 40);
       for (const PixelSum& sum : sums) runs[run] += double(sum.mean().scattered.mean()) / 1200.0;
     });
     double mean = 0.0;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sampling.h"
 
+#include <algorithm>
+#include <array>
 #include <functional>
 #include <vector>
 
@@ -160,42 +162,77 @@ TEST_CASE("a basis is right-handed and orthonormal, also at the poles", "[sampli
   }
 }
 
+/// The pair of one dimension.
+Vec2f drawn(const SampleOrder& order, int x, int y, std::uint32_t sample, int dimension) {
+  PathSampler sampler(order.place(x, y, sample));
+  for (int d = 0; d < dimension; ++d) sampler.next();
+  return sampler.next();
+}
+
+/// Whether each of as many slices of either axis as there are points holds exactly one.
+bool fills_slices(const std::vector<Vec2f>& points) {
+  std::vector<int> columns(points.size(), 0);
+  std::vector<int> rows(points.size(), 0);
+  for (const Vec2f& p : points) {
+    ++columns[std::size_t(p.x() * float(points.size()))];
+    ++rows[std::size_t(p.y() * float(points.size()))];
+  }
+  const auto count = std::ptrdiff_t(points.size());
+  return std::count(columns.begin(), columns.end(), 1) == count &&
+         std::count(rows.begin(), rows.end(), 1) == count;
+}
+
 TEST_CASE("the samples of one pixel are better spread than chance", "[sampling]") {
-  const SobolTable table;
-  // Every power of two of samples puts exactly one point into each slice of either axis.
+  // Every power of two of samples, planned or only begun.
   for (const std::uint32_t count : {16u, 64u, 256u}) {
-    for (int dimension = 0; dimension < 3; ++dimension) {
-      std::vector<int> columns(count, 0);
-      std::vector<int> rows(count, 0);
-      for (std::uint32_t i = 0; i < count; ++i) {
-        PathSampler sampler(table, 42, 13, 7, i);
-        Vec2f p = sampler.next();
-        for (int d = 0; d < dimension; ++d) p = sampler.next();
-        ++columns[std::size_t(p.x() * float(count))];
-        ++rows[std::size_t(p.y() * float(count))];
+    for (const std::uint32_t planned : {count, 4 * count}) {
+      for (int dimension = 0; dimension < 3; ++dimension) {
+        std::vector<Vec2f> points;
+        for (std::uint32_t i = 0; i < count; ++i) {
+          points.push_back(drawn(SampleOrder(42, planned), 13, 7, i, dimension));
+        }
+        CHECK(fills_slices(points));
       }
-      CHECK(std::count(columns.begin(), columns.end(), 1) == std::ptrdiff_t(count));
-      CHECK(std::count(rows.begin(), rows.end(), 1) == std::ptrdiff_t(count));
     }
   }
 }
 
-TEST_CASE("samplers of different pixels, dimensions and seeds are unrelated", "[sampling]") {
-  const SobolTable table;
-  double product = 0.0;
-  double across = 0.0;
-  constexpr int kPixels = 20000;
-  for (int i = 0; i < kPixels; ++i) {
-    PathSampler a(table, 1, i, 5, 3);
-    PathSampler b(table, 1, i + 1, 5, 3);
-    const Vec2f p = a.next();
-    const Vec2f q = a.next();
-    product += (double(p.x()) - 0.5) * (double(q.x()) - 0.5) +
-               (double(p.x()) - 0.5) * (double(p.y()) - 0.5);
-    across += (double(p.x()) - 0.5) * (double(b.next().x()) - 0.5);
+TEST_CASE("the samples of neighbouring pixels complete each other", "[sampling]") {
+  const SampleOrder order(7, 4);
+  for (const int side : {2, 4, 8}) {
+    for (int dimension = 0; dimension < 4; ++dimension) {
+      std::vector<Vec2f> points;
+      for (int pixel = 0; pixel < side * side; ++pixel) {
+        for (std::uint32_t i = 0; i < 4; ++i) {
+          const int x = 3 * side + pixel % side;
+          const int y = 5 * side + pixel / side;
+          points.push_back(drawn(order, x, y, i, dimension));
+        }
+      }
+      CHECK(fills_slices(points));
+    }
   }
-  CHECK(std::abs(product / kPixels) < 0.003);
-  CHECK(std::abs(across / kPixels) < 0.003);
+}
+
+TEST_CASE("samples of different dimensions, seeds, rounds and tiles are unrelated", "[sampling]") {
+  const SampleOrder order(1, 4);
+  const SampleOrder other(2, 4);
+  constexpr int kPixels = 20000;
+  std::array<double, 6> products{};
+  for (int i = 0; i < kPixels; ++i) {
+    const int x = i % 200;
+    const int y = i / 200;
+    const auto centred = [](float value) { return double(value) - 0.5; };
+    const Vec2f p = drawn(order, x, y, 3, 0);
+    const Vec2f q = drawn(order, x, y, 3, 1);
+    products[0] += centred(p.x()) * centred(q.x());
+    products[1] += centred(p.x()) * centred(q.y());
+    products[2] += centred(p.x()) * centred(p.y());
+    products[3] += centred(p.x()) * centred(drawn(other, x, y, 3, 0).x());
+    products[4] += centred(p.x()) * centred(drawn(order, x, y, 7, 0).x());
+    products[5] += centred(p.x()) * centred(drawn(order, x + 1024, y, 3, 0).x());
+  }
+  for (const double product : products) CHECK(std::abs(product / kPixels) < 0.003);
 }
 
 TEST_CASE("a dielectric reflects as Fresnel says", "[sampling]") {

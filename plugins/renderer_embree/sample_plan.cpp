@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sample_plan.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace diorama {
+namespace {
+
+/// Pixels darker than this share of the picture's typical brightness count as that bright.
+constexpr double kFaint = 0.1;
+
+double brightness(const FilmPixel& pixel) {
+  return double(luminance(pixel.seen) + luminance(pixel.scattered));
+}
+
+/// Typical, not mean: a lamp in the picture hardly counts.
+double typical_brightness(const Image<PixelSum>& sums) {
+  double roots = 0.0;
+  for (const PixelSum& sum : sums.pixels()) {
+    roots += std::sqrt(std::max(0.0, brightness(sum.mean())));
+  }
+  const double mean = roots / double(sums.pixels().size());
+  return mean * mean;
+}
+
+}  // namespace
+
+SamplePlan::SamplePlan(int width, int height, const Limits& limits, std::uint64_t seed)
+    : limits_(limits) {
+  const SampleOrder order(seed, std::uint32_t(limits.samples));
+  for (int y = 0; y < height; y += kBlock) {
+    for (int x = 0; x < width; x += kBlock) {
+      const int x_end = std::min(width, x + kBlock);
+      const int y_end = std::min(height, y + kBlock);
+      blocks_.push_back({{x, y, x_end, y_end, 0, 0, order}, 0});
+    }
+  }
+}
+
+std::vector<TraceJob> SamplePlan::next_round(const Image<PixelSum>& sums, double elapsed_s) {
+  const auto most = std::uint32_t(limits_.samples);
+  if (limits_.error_target > 0.0) {
+    want_by_error(sums);
+  } else {
+    for (Block& block : blocks_) block.wanted = most;
+  }
+  if (limits_.time_budget_s > 0.0) keep_to_time(elapsed_s);
+  std::vector<TraceJob> jobs;
+  for (Block& block : blocks_) {
+    const std::uint32_t wanted = std::min(block.wanted, most);
+    if (wanted <= block.job.sample_end) continue;
+    block.job.sample_begin = block.job.sample_end;
+    block.job.sample_end = wanted;
+    paths_ += double(block.pixels()) * double(wanted - block.job.sample_begin);
+    jobs.push_back(block.job);
+  }
+  return jobs;
+}
+
+void SamplePlan::want_by_error(const Image<PixelSum>& sums) {
+  const double faint = paths_ > 0.0 ? kFaint * typical_brightness(sums) : 0.0;
+  for (Block& block : blocks_) {
+    const std::uint32_t taken = block.job.sample_end;
+    if (taken < kFirstSamples) {
+      block.wanted = kFirstSamples;
+      continue;
+    }
+    const double ratio = error_of(block, sums, faint) / limits_.error_target;
+    // The estimate is rough: a long way is gone in steps.
+    const double factor = ratio > 1.0 ? std::clamp(ratio * ratio, 1.25, 2.0) : 0.0;
+    block.wanted = std::uint32_t(std::ceil(factor * taken));
+  }
+}
+
+// The first samples tell how long a path takes; after that a round may double what was done.
+void SamplePlan::keep_to_time(double elapsed_s) {
+  double pixels = 0.0;
+  double asked = 0.0;
+  for (const Block& block : blocks_) {
+    const std::uint32_t taken = block.job.sample_end;
+    pixels += block.pixels();
+    if (block.wanted > taken) asked += double(block.pixels()) * double(block.wanted - taken);
+  }
+  double affordable = pixels;
+  if (paths_ > 0.0) {
+    const double left = std::max(0.0, limits_.time_budget_s - elapsed_s);
+    affordable = std::min(paths_, paths_ * left / std::max(elapsed_s, 1e-9));
+  }
+  const double share = asked > affordable ? affordable / asked : 1.0;
+  for (Block& block : blocks_) {
+    const std::uint32_t taken = block.job.sample_end;
+    if (block.wanted > taken) {
+      block.wanted = taken + std::uint32_t(share * double(block.wanted - taken) + 1e-6);
+    }
+  }
+}
+
+double SamplePlan::error_of(const Block& block, const Image<PixelSum>& sums, double faint) {
+  double sum = 0.0;
+  for (int y = block.job.y_begin; y < block.job.y_end; ++y) {
+    for (int x = block.job.x_begin; x < block.job.x_end; ++x) {
+      const FilmPixel pixel = sums.at(x, y).mean();
+      const double scale = std::max(brightness(pixel), faint);
+      if (scale > 0.0) sum += double(pixel.variance) / (scale * scale);
+    }
+  }
+  return std::sqrt(sum / double(block.pixels()));
+}
+
+}  // namespace diorama

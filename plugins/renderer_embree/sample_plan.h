@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "film.h"
+#include "path_tracer.h"
+
+namespace diorama {
+
+/// Decides how many light paths the pixels of a picture get, round by round: all the same, or more
+/// where the noise is, until an error target is met or the time is up. Decisions are made for
+/// blocks of pixels between rounds, so they do not depend on threads, and one pixel's own luck
+/// hardly counts: the means stay unbiased.
+class SamplePlan {
+ public:
+  struct Limits {
+    int samples = 1;             ///< Per pixel, at most.
+    double error_target = 0.0;   ///< Wanted standard error of a pixel over its brightness; 0: none.
+    double time_budget_s = 0.0;  ///< Wall time after which no further round begins; 0: none.
+  };
+  SamplePlan(int width, int height, const Limits& limits, std::uint64_t seed);
+
+  /// What to trace next; empty: the picture is done. `sums` hold all earlier rounds, which took
+  /// `elapsed_s` together.
+  std::vector<TraceJob> next_round(const Image<PixelSum>& sums, double elapsed_s);
+
+ private:
+  static constexpr int kBlock = 8;          // pixels
+  static constexpr int kFirstSamples = 16;  // before an error is believed
+
+  struct Block {
+    TraceJob job;  ///< sample_end: samples taken.
+    std::uint32_t wanted = 0;
+    std::uint32_t pixels() const {
+      return std::uint32_t((job.x_end - job.x_begin) * (job.y_end - job.y_begin));
+    }
+  };
+
+  void want_by_error(const Image<PixelSum>& sums);
+  void keep_to_time(double elapsed_s);
+  /// Root mean square of the pixels' standard errors, each relative to its brightness.
+  static double error_of(const Block& block, const Image<PixelSum>& sums, double faint);
+
+  Limits limits_;
+  std::vector<Block> blocks_;
+  double paths_ = 0.0;  ///< Planned so far.
+};
+
+}  // namespace diorama

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sample_plan.h"
+
+#include <cmath>
+#include <vector>
+
+#include "diorama/rng.h"
+#include "support/catch.h"
+
+namespace diorama {
+namespace {
+
+/// A picture whose left half is noisy and whose right half is flat; the mean is 2 everywhere.
+float sample_at(int x, Rng& rng) {
+  const double spread = x < 32 ? 1.0 : 0.05;
+  return float(2.0 + spread * rng.uniform(-1.0, 1.0));
+}
+
+constexpr int kWidth = 64;
+constexpr int kHeight = 40;
+constexpr double kNoisySpread =
+    0.57735;  // standard deviation of the uniform distribution on [-1, 1]
+
+struct Outcome {
+  Image<PixelSum> sums{kWidth, kHeight, PixelSum{}};
+  int rounds = 0;
+};
+
+Outcome carry_out(const SamplePlan::Limits& limits, double seconds_per_round = 0.0) {
+  Outcome outcome;
+  SamplePlan plan(kWidth, kHeight, limits, 5);
+  Rng rng(17);
+  while (true) {
+    const auto jobs = plan.next_round(outcome.sums, outcome.rounds * seconds_per_round);
+    if (jobs.empty()) return outcome;
+    ++outcome.rounds;
+    REQUIRE(outcome.rounds < 100);
+    for (const TraceJob& job : jobs) {
+      for (int y = job.y_begin; y < job.y_end; ++y) {
+        for (int x = job.x_begin; x < job.x_end; ++x) {
+          PixelSum& sum = outcome.sums.at(x, y);
+          REQUIRE(std::uint32_t(sum.count()) == job.sample_begin);
+          for (std::uint32_t s = job.sample_begin; s < job.sample_end; ++s) {
+            PathSample sample;
+            sample.scattered = Vec3f::Constant(sample_at(x, rng));
+            sample.has_surface = true;
+            sum.add(sample);
+          }
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+
+TEST_CASE("without target and budget every pixel gets its samples at once", "[sample_plan]") {
+  const Outcome outcome = carry_out({24, 0.0, 0.0});
+  CHECK(outcome.rounds == 1);
+  for (const PixelSum& sum : outcome.sums.pixels()) CHECK(sum.count() == 24);
+}
+
+TEST_CASE("an error target is met with few samples where the picture is flat", "[sample_plan]") {
+  constexpr double kTarget = 0.02;
+  const Outcome outcome = carry_out({4096, kTarget, 0.0});
+  double squares = 0.0;
+  double mean = 0.0;
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      const PixelSum& sum = outcome.sums.at(x, y);
+      if (x >= 32) {
+        CHECK(sum.count() == 16);
+        continue;
+      }
+      // As many as the law of large numbers asks for, but for the estimate's error and the steps.
+      const double needed = std::pow(kNoisySpread / (2.0 * kTarget), 2);
+      CHECK(sum.count() > 0.75 * needed);
+      CHECK(sum.count() < 1.6 * needed);
+      const double value = double(luminance(sum.mean().scattered));
+      squares += std::pow(value / 2.0 - 1.0, 2) / (32 * kHeight);
+      mean += value / (32 * kHeight);
+    }
+  }
+  CHECK(std::sqrt(squares) < 1.1 * kTarget);
+  // Stopping by the error does not shift the mean: four standard errors of it.
+  CHECK(std::abs(mean - 2.0) < 4.0 * 2.0 * kTarget / std::sqrt(32.0 * kHeight));
+}
+
+TEST_CASE("an error target ends at the most samples", "[sample_plan]") {
+  const Outcome outcome = carry_out({40, 1e-6, 0.0});
+  for (const PixelSum& sum : outcome.sums.pixels()) CHECK(sum.count() == 40);
+}
+
+TEST_CASE("pixels of a black picture are done after the first round", "[sample_plan]") {
+  SamplePlan plan(16, 8, {100, 0.01, 0.0}, 1);
+  Image<PixelSum> sums(16, 8, PixelSum{});
+  REQUIRE(plan.next_round(sums, 0.0).size() == 2);
+  for (PixelSum& sum : sums.pixels()) {
+    for (int i = 0; i < 16; ++i) sum.add({});
+  }
+  CHECK(plan.next_round(sums, 0.0).empty());
+}
+
+TEST_CASE("a time budget ends the sampling, however slow the machine", "[sample_plan]") {
+  // Every round is said to take a second, so the plan shrinks its rounds.
+  const Outcome slow = carry_out({1000, 0.0, 2.5}, 1.0);
+  CHECK(slow.rounds == 2);
+  for (const PixelSum& sum : slow.sums.pixels()) CHECK(sum.count() >= 1);
+  const Outcome late = carry_out({1000, 0.0, 0.5}, 1.0);
+  CHECK(late.rounds == 1);
+  // Time enough: all samples are taken, in rounds that double.
+  const Outcome fast = carry_out({100, 0.0, 1e6}, 1e-3);
+  CHECK(fast.rounds < 12);
+  for (const PixelSum& sum : fast.sums.pixels()) CHECK(sum.count() == 100);
+}
+
+}  // namespace diorama
