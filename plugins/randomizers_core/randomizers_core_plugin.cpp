@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "camera_lens.h"
+#include "camera_motion.h"
 #include "camera_relative_pose.h"
 #include "diorama/plugin.h"
 #include "dome_light.h"
@@ -31,4 +32,6 @@ DIORAMA_PLUGIN("randomizers_core", "0.1.0", "Apache-2.0") {
   DIORAMA_ADD(diorama::CameraRelativePose, "camera_relative_pose",
               "Places nodes in a camera's picture, at a distance from it.");
   DIORAMA_ADD(diorama::CameraLens, "camera_lens", "Draws focal length and focus of cameras.");
+  DIORAMA_ADD(diorama::CameraMotion, "camera_motion",
+              "Draws how cameras move while the shutter is open.");
 }

@@ -13,6 +13,7 @@
 
 #include "channels.h"
 #include "sample_plan.h"
+#include "stopwatch.h"
 #include "view_transform.h"
 
 namespace diorama {
@@ -44,18 +45,6 @@ class FlushDenormals {
 
  private:
   unsigned before_;
-};
-
-class Stopwatch {
- public:
-  explicit Stopwatch(double& seconds) : seconds_(seconds), start_(Clock::now()) {}
-  ~Stopwatch() { seconds_ = seconds_since(start_); }
-  Stopwatch(const Stopwatch&) = delete;
-  Stopwatch& operator=(const Stopwatch&) = delete;
-
- private:
-  double& seconds_;
-  Clock::time_point start_;
 };
 
 }  // namespace
@@ -117,7 +106,24 @@ NameSet EmbreeRenderer::provides() const {
   return names;
 }
 
+RenderReport EmbreeRenderer::report() const {
+  const RenderScene::Times& prepared = meshes_.times();
+  RenderReport report;
+  report.paths = counts_.paths;
+  report.rays = counts_.rays + counts_.shadow_rays;
+  report.seconds = {{"materials and meshes", prepared.shading_s},
+                    {"ray tracing structure", prepared.tree_s},
+                    {"light tables", prepared.lights_s}};
+  if (counts_.paths > 0) {
+    report.seconds = {{"labels and geometry", counts_.channels_s},
+                      {"paths", counts_.trace_s},
+                      {"denoising", counts_.denoise_s}};
+  }
+  return report;
+}
+
 void EmbreeRenderer::do_prepare(const Scene& scene) {
+  counts_ = {};
   meshes_.take(scene);
   if (meshes_.lights().is_empty()) {
     host_.log(LogLevel::Warning, "the scene has no light: pictures will be black");

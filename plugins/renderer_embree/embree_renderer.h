@@ -38,6 +38,8 @@ class EmbreeRenderer final : public Renderer {
 
   EmbreeRenderer(Params params, Host& host);
   NameSet provides() const override;
+  /// Phases of the preparation, and once a picture was rendered those of the picture.
+  RenderReport report() const override;
 
   /// What the last render() did; for benchmarks.
   struct Counts {

@@ -52,6 +52,8 @@ void MipTexture::add_level() {
   Level level{std::max(1, old_width / 2), std::max(1, old_height / 2), {}, {}};
   const int channels = source_->channels;
   const bool is_srgb = source_->color_space == ColorSpace::Srgb;
+  const std::size_t values = std::size_t(level.width) * std::size_t(level.height * channels);
+  source_->bytes.empty() ? level.floats.reserve(values) : level.bytes.reserve(values);
   for (int y = 0; y < level.height; ++y) {
     for (int x = 0; x < level.width; ++x) {
       // Odd sizes: the last pair grows to three so that no texel is lost.

@@ -104,6 +104,7 @@ struct PathTracer::Path {
   float since_last = 0.0f;  ///< Metres travelled from it.
   float width = 0.0f;       ///< Of the ray's footprint, metres.
   float spread = 0.0f;      ///< Its growth per metre.
+  float time = kMoment;     ///< Share of the shutter's window.
 
   void go(const Vec3f& from, const Vec3f& towards) {
     origin = from;
@@ -176,12 +177,20 @@ inline RayCounts PathTracer::trace_all(const TraceJob& job, PixelSum* sums,
 
 inline void PathTracer::start_path(Path& path, int x, int y) const {
   const auto u = path.sampler.next_pairs<2>();
-  const auto ray = view_.sample_ray({float(x) + u[0].x(), float(y) + u[0].y()}, u[1]);
+  auto ray = view_.sample_ray({float(x) + u[0].x(), float(y) + u[0].y()}, u[1]);
+  if (view_.has_shutter()) [[unlikely]]
+    open_shutter(path, y, ray);
   path.is_over = !(ray.t_max > 0.0f);
   path.go(ray.origin, ray.direction);
   path.t_min = ray.t_min;
   path.t_max = ray.t_max;
   path.spread = view_.pixel_angle();
+}
+
+[[gnu::noinline]] void PathTracer::open_shutter(Path& path, int row, CameraRay& ray) const {
+  const double seconds = view_.seconds(row, double(path.sampler.next().x()));
+  path.time = float(double(kMoment) + seconds / scene_.window());
+  ray = view_.moved(ray, seconds);
 }
 
 // Paths advance together, step by step: rays of one kind in a row, then the surfaces that they met.
@@ -207,7 +216,7 @@ inline void PathTracer::trace_batch(std::vector<Path>& paths) const {
 }
 
 inline void PathTracer::find_surface(Path& path) const {
-  path.hit = scene_.intersect(path.origin, path.direction, path.t_min, path.t_max);
+  path.hit = scene_.intersect(path.origin, path.direction, path.t_min, path.t_max, path.time);
   ++path.counts.rays;
   if (settings_.ray_log) [[unlikely]] {
     settings_.ray_log->push_back({path.origin, path.direction, path.t_min, path.t_max, false});
@@ -234,8 +243,8 @@ inline void PathTracer::find_light(Path& path) const {
   if (settings_.ray_log) [[unlikely]] {
     settings_.ray_log->push_back({shadow.origin, s.direction, 0.0f, shadow.t_max, true});
   }
-  const Vec3f kept =
-      scene_.transmittance(shadow.origin, s.direction, shadow.t_max, !settings_.has_caustics);
+  const Vec3f kept = scene_.transmittance(shadow.origin, s.direction, shadow.t_max,
+                                          !settings_.has_caustics, path.time);
   shadow.t_max = 0.0f;
   if (kept.maxCoeff() <= 0.0f) return;
   Vec3f radiance;

@@ -72,6 +72,7 @@ class PathTracer {
   RayCounts trace_avx512(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
   void trace_batch(std::vector<Path>& paths) const;
   void start_path(Path& path, int x, int y) const;
+  void open_shutter(Path& path, int row, CameraRay& ray) const;
   void find_surface(Path& path) const;
   void shade(Path& path) const;
   void find_light(Path& path) const;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "diorama/error.h"
+#include "stopwatch.h"
 
 namespace diorama {
 namespace {
@@ -79,6 +80,7 @@ RenderScene::RenderScene(Host& host, const Options& options)
 }
 
 RenderScene::~RenderScene() {
+  release_moving_scene();
   if (scene_) rtcReleaseScene(scene_);
   rtcReleaseDevice(device_);
 }
@@ -93,13 +95,22 @@ void RenderScene::check_device(const char* action) const {
 
 void RenderScene::take(const Scene& scene) {
   std::erase_if(domes_, [](const auto& entry) { return entry.second.owner.expired(); });
+  release_moving_scene();
   const Instances previous = std::move(instances_);
   instances_.clear();
   light_nodes_.clear();
-  collect(scene, scene.root(), Affine::Identity(), false);
-  assign_shading_meshes();
-  assign_materials(scene);
-  upload(previous);
+  {
+    const Stopwatch watch(times_.shading_s);
+    collect(scene, scene.root(), Affine::Identity(), false);
+    assign_shading_meshes();
+    assign_materials(scene);
+  }
+  {
+    const Stopwatch watch(times_.tree_s);
+    upload(previous);
+    blur(scene);
+  }
+  const Stopwatch watch(times_.lights_s);
   lights_ = Lights(options_.has_disk_lamps);
   add_lights(scene);
   add_emitters();
@@ -113,7 +124,8 @@ void RenderScene::learn_sky() {
   if (!(now == surroundings_)) sky_grids_.clear();
   surroundings_ = std::move(now);
   const auto sees = [this](const Vec3f& origin, const Vec3f& direction) {
-    return transmittance(origin, direction, kInfinite, true, kStaticMask).maxCoeff() > 0.0f;
+    return transmittance(scene_, origin, direction, kInfinite, true, kStaticMask, kMoment)
+               .maxCoeff() > 0.0f;
   };
   std::vector<CachedGrid> used;
   lights_.learn_sky([&](const std::shared_ptr<const DomeTexture>& dome,
@@ -254,12 +266,14 @@ void RenderScene::upload(const Instances& previous) {
     return previous[i]->world_from_node.matrix() != instances_[i]->world_from_node.matrix();
   };
   host_.parallel_for(instances_.size(), [&](std::size_t i) {
-    if (has_moved(i)) place(*instances_[i], instances_[i]->world_from_node);
+    MeshInstance& instance = *instances_[i];
+    if (!has_moved(i)) return;
+    instance.bounds = place(*instance.mesh, instance.world_from_node, instance.world_positions);
   });
   for (std::size_t i = 0; i < instances_.size(); ++i) {
     MeshInstance& instance = *instances_[i];
     rtcSetGeometryUserData(instance.geometry, &instance);
-    set_filters(instance);
+    set_filters(instance, instance.geometry);
     if (!has_moved(i)) continue;
     rtcUpdateGeometryBuffer(instance.geometry, RTC_BUFFER_TYPE_VERTEX, 0);
     rtcCommitGeometry(instance.geometry);
@@ -278,12 +292,13 @@ void RenderScene::build_all() {
   rtcSetSceneBuildQuality(scene_, RTC_BUILD_QUALITY_LOW);
   host_.parallel_for(instances_.size(), [&](std::size_t i) {
     MeshInstance& instance = *instances_[i];
-    place(instance, instance.is_movable ? Affine::Identity() : instance.world_from_node);
+    const Affine pose = instance.is_movable ? Affine::Identity() : instance.world_from_node;
+    instance.bounds = place(*instance.mesh, pose, instance.world_positions);
   });
   for (std::size_t i = 0; i < instances_.size(); ++i) {
     MeshInstance& instance = *instances_[i];
     instance.geometry = make_geometry(instance);
-    set_filters(instance);
+    set_filters(instance, instance.geometry);
     rtcCommitGeometry(instance.geometry);
     rtcAttachGeometryByID(scene_, instance.geometry, unsigned(i));
     rtcReleaseGeometry(instance.geometry);
@@ -291,34 +306,104 @@ void RenderScene::build_all() {
   rtcCommitScene(scene_);
 }
 
-void RenderScene::set_filters(const MeshInstance& instance) const {
+void RenderScene::set_filters(const MeshInstance& instance, RTCGeometry geometry) {
   bool is_cut_out = false;
   bool dims_shadows = false;
   for (const ShadingMaterial* m : instance.materials) {
     is_cut_out |= m->is_cut_out;
     dims_shadows |= m->dims_shadows;
   }
-  rtcSetGeometryIntersectFilterFunction(instance.geometry,
-                                        is_cut_out ? &pass_where_cut_out : nullptr);
-  rtcSetGeometryOccludedFilterFunction(instance.geometry,
-                                       dims_shadows ? &weaken_shadow_ray : nullptr);
+  rtcSetGeometryIntersectFilterFunction(geometry, is_cut_out ? &pass_where_cut_out : nullptr);
+  rtcSetGeometryOccludedFilterFunction(geometry, dims_shadows ? &weaken_shadow_ray : nullptr);
 }
 
-void RenderScene::place(MeshInstance& instance, const Affine& pose) {
-  const auto& positions = instance.mesh->positions;
+/// Puts the mesh's vertices into the world; returns their box.
+Aabb RenderScene::place(const Mesh& mesh, const Affine& pose, std::vector<float>& positions) {
   // One float more: Embree reads vertices in pieces of 16 bytes.
-  instance.world_positions.resize(3 * positions.size() + 1, 0.0f);
+  positions.resize(3 * mesh.positions.size() + 1, 0.0f);
   Vec3 low = Vec3::Constant(kInfinity);
   Vec3 high = -low;
   const Mat3 linear = pose.linear();
   const Vec3 translation = pose.translation();
-  for (std::size_t i = 0; i < positions.size(); ++i) {
-    const Vec3 p = linear * positions[i].cast<double>() + translation;
+  for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+    const Vec3 p = linear * mesh.positions[i].cast<double>() + translation;
     low = low.cwiseMin(p);
     high = high.cwiseMax(p);
-    Eigen::Map<Vec3f>(&instance.world_positions[3 * i]) = p.cast<float>();
+    std::copy_n(p.cast<float>().eval().data(), 3, &positions[3 * i]);
   }
-  instance.bounds = {low, high};
+  return {low, high};
+}
+
+void RenderScene::set_triangles(const Mesh& mesh, RTCGeometry geometry) {
+  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                             mesh.triangles.data(), 0, sizeof(mesh.triangles[0]),
+                             mesh.triangles.size());
+}
+
+Vec3f MeshInstance::turned(const Vec3f& direction, float time) const {
+  const double seconds = double(time - kMoment) * window;
+  return (motion.then_from_now(seconds).linear() * direction.cast<double>()).cast<float>();
+}
+
+// A second scene for the colours: what moves has its vertices at several times, the rest is shared.
+// Labels go on meeting the first one, so that they are the same with and without a shutter.
+void RenderScene::blur(const Scene& scene) {
+  window_ = shutter_window(scene);
+  if (window_ <= 0.0) return;
+  std::vector<std::uint32_t> moving;
+  for (std::uint32_t i = 0; i < instances_.size(); ++i) {
+    MeshInstance& instance = *instances_[i];
+    if (!instance.is_movable) continue;
+    instance.motion = body_motion(scene, instance.node);
+    instance.window = window_;
+    if (instance.motion.moves(instance.bounds, window_)) moving.push_back(i);
+  }
+  if (moving.empty()) return;
+  moving_scene_ = rtcNewScene(device_);
+  for (std::uint32_t i = 0; i < instances_.size(); ++i) {
+    if (std::binary_search(moving.begin(), moving.end(), i)) {
+      add_moving_geometry(i);
+    } else {
+      rtcAttachGeometryByID(moving_scene_, instances_[i]->geometry, i);
+    }
+  }
+  rtcCommitScene(moving_scene_);
+  check_device("build the ray tracing structure of moving things");
+}
+
+void RenderScene::release_moving_scene() {
+  if (moving_scene_) rtcReleaseScene(moving_scene_);
+  moving_scene_ = nullptr;
+}
+
+void RenderScene::add_moving_geometry(std::uint32_t index) {
+  // Vertices run straight from step to step: short enough that a turn stays round. An odd number of
+  // steps has one in the middle.
+  constexpr double kTurnPerStep = 0.1;  // radians
+  constexpr double kMostHalves = RTC_MAX_TIME_STEP_COUNT / 2;
+  MeshInstance& instance = *instances_[index];
+  const double turn = 0.5 * instance.motion.angular.norm() * window_;
+  const int half = int(std::clamp(std::ceil(turn / kTurnPerStep), 1.0, kMostHalves));
+  const unsigned steps = 2 * unsigned(half) + 1;
+  const Mesh& mesh = *instance.mesh;
+  RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
+  rtcSetGeometryMask(geometry, kMovableMask);
+  rtcSetGeometryTimeStepCount(geometry, steps);
+  instance.blurred_positions.resize(steps);
+  for (unsigned step = 0; step < steps; ++step) {
+    const double share = double(step) / (steps - 1) - double(kMoment);
+    const Affine pose = instance.motion.then_from_now(share * window_) * instance.world_from_node;
+    std::vector<float>& positions = instance.blurred_positions[step];
+    place(mesh, pose, positions);
+    rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, step, RTC_FORMAT_FLOAT3,
+                               positions.data(), 0, 3 * sizeof(float), mesh.positions.size());
+  }
+  set_triangles(mesh, geometry);
+  rtcSetGeometryUserData(geometry, &instance);
+  set_filters(instance, geometry);
+  rtcCommitGeometry(geometry);
+  rtcAttachGeometryByID(moving_scene_, geometry, index);
+  rtcReleaseGeometry(geometry);
 }
 
 RTCGeometry RenderScene::make_geometry(MeshInstance& instance) const {
@@ -331,9 +416,7 @@ RTCGeometry RenderScene::make_geometry(MeshInstance& instance) const {
   rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
                              instance.world_positions.data(), 0, 3 * sizeof(float),
                              mesh.positions.size());
-  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                             mesh.triangles.data(), 0, sizeof(mesh.triangles[0]),
-                             mesh.triangles.size());
+  set_triangles(mesh, geometry);
   return geometry;
 }
 
@@ -396,7 +479,7 @@ RenderScene::Part::~Part() { rtcReleaseScene(scene_); }
 
 bool RenderScene::Part::is_met(const Vec3f& origin, const Vec3f& direction, float t_min,
                                float t_max) const {
-  RTCRayHit ray = make_ray(origin, direction, t_min, t_max);
+  RTCRayHit ray = make_ray(origin, direction, t_min, t_max, kMoment);
   embree::Context context;
   embree::init(context);
   embree::intersect(scene_, context, ray);

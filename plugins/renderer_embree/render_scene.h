@@ -12,6 +12,7 @@
 #include "embree.h"
 #include "isa.h"
 #include "lights.h"
+#include "rigid_motion.h"
 #include "shading_material.h"
 #include "shading_mesh.h"
 
@@ -31,9 +32,15 @@ struct MeshInstance {
   std::shared_ptr<const Mesh> mesh;
   Affine world_from_node = Affine::Identity();
   std::vector<float> world_positions;  ///< x, y, z per vertex and one float of padding.
+  /// The same at equal steps through the shutter's window; empty for what does not move in it.
+  std::vector<std::vector<float>> blurred_positions;
+  RigidMotion motion;
+  double window = 0.0;  ///< Seconds.
   Aabb bounds;
   RTCGeometry geometry = nullptr;  ///< Owned by the RTCScene.
 
+  /// A direction at the moment of the poses, as it is at another time of the shutter's window.
+  Vec3f turned(const Vec3f& direction, float time) const;
   std::size_t slot(std::uint32_t triangle) const {
     return std::min(shading->slot(triangle), materials.size() - 1);
   }
@@ -50,6 +57,9 @@ struct MeshInstance {
   }
 };
 
+/// The moment of the scene's poses, which lies in the middle of the shutter's window.
+inline constexpr float kMoment = 0.5f;
+
 /// Where a ray met a mesh.
 struct RayHit {
   const MeshInstance* instance = nullptr;  ///< Null: nothing.
@@ -58,6 +68,7 @@ struct RayHit {
   float u = 0.0f;
   float v = 0.0f;
   float distance = std::numeric_limits<float>::infinity();
+  float time = kMoment;          ///< Share of the shutter's window.
   Vec3f normal = Vec3f::Zero();  ///< Of the triangle, as long as twice its area.
   explicit operator bool() const { return instance != nullptr; }
 };
@@ -89,17 +100,34 @@ class RenderScene {
 
   void take(const Scene& scene);
 
+  /// Wall time of the last take().
+  struct Times {
+    double shading_s = 0.0;  ///< Meshes, materials, textures.
+    double tree_s = 0.0;
+    double lights_s = 0.0;
+  };
+  const Times& times() const { return times_; }
+
   const std::vector<std::unique_ptr<MeshInstance>>& instances() const { return instances_; }
   const Lights& lights() const { return lights_; }
 
   /// The first surface not cut out. The direction is unit length.
-  RayHit intersect(const Vec3f& origin, const Vec3f& direction, float t_min, float t_max) const;
+  RayHit intersect(const Vec3f& origin, const Vec3f& direction, float t_min, float t_max) const {
+    return intersect(scene_, origin, direction, t_min, t_max, kMoment);
+  }
+  /// The same at a time within the shutter's window, in [0, 1].
+  RayHit intersect(const Vec3f& origin, const Vec3f& direction, float t_min, float t_max,
+                   float time) const {
+    return intersect(scene_over_time(), origin, direction, t_min, t_max, time);
+  }
   /// The light left between two points: 0 behind anything opaque, tinted behind glass and what is
   /// partly transparent. Solid glass counts as opaque unless `passes_glass`.
-  Vec3f transmittance(const Vec3f& origin, const Vec3f& direction, float t_max,
-                      bool passes_glass) const {
-    return transmittance(origin, direction, t_max, passes_glass, ~0u);
+  Vec3f transmittance(const Vec3f& origin, const Vec3f& direction, float t_max, bool passes_glass,
+                      float time) const {
+    return transmittance(scene_over_time(), origin, direction, t_max, passes_glass, ~0u, time);
   }
+  /// Seconds around the moment of the poses that `time` runs through; see shutter_window().
+  double window() const { return window_; }
   /// Some instances of the scene with nothing else; valid until the next take().
   class Part {
    public:
@@ -149,9 +177,13 @@ class RenderScene {
     bool passes_glass = true;
   };
 
-  static RTCRayHit make_ray(const Vec3f& origin, const Vec3f& direction, float t_min, float t_max);
-  Vec3f transmittance(const Vec3f& origin, const Vec3f& direction, float t_max, bool passes_glass,
-                      std::uint32_t mask) const;
+  static RTCRayHit make_ray(const Vec3f& origin, const Vec3f& direction, float t_min, float t_max,
+                            float time);
+  RayHit intersect(RTCScene scene, const Vec3f& origin, const Vec3f& direction, float t_min,
+                   float t_max, float time) const;
+  static Vec3f transmittance(RTCScene scene, const Vec3f& origin, const Vec3f& direction,
+                             float t_max, bool passes_glass, std::uint32_t mask, float time);
+  RTCScene scene_over_time() const { return moving_scene_ ? moving_scene_ : scene_; }
   static void weaken_shadow_ray(const RTCFilterFunctionNArguments* args);
   void collect(const Scene& scene, NodeId node, const Affine& world_from_parent, bool is_movable);
   void assign_materials(const Scene& scene);
@@ -159,9 +191,13 @@ class RenderScene {
   void upload(const Instances& previous);
   bool can_keep(const Instances& previous) const;
   void build_all();
-  void set_filters(const MeshInstance& instance) const;
+  static void set_filters(const MeshInstance& instance, RTCGeometry geometry);
   RTCGeometry make_geometry(MeshInstance& instance) const;
-  static void place(MeshInstance& instance, const Affine& pose);
+  static Aabb place(const Mesh& mesh, const Affine& pose, std::vector<float>& positions);
+  static void set_triangles(const Mesh& mesh, RTCGeometry geometry);
+  void blur(const Scene& scene);
+  void release_moving_scene();
+  void add_moving_geometry(std::uint32_t index);
   Surroundings surroundings() const;
   void learn_sky();
   void add_lights(const Scene& scene);
@@ -172,6 +208,9 @@ class RenderScene {
   Options options_;
   RTCDevice device_ = nullptr;
   RTCScene scene_ = nullptr;
+  RTCScene moving_scene_ = nullptr;  ///< scene_ with its motion; null when nothing moves.
+  double window_ = 0.0;
+  Times times_;
   MaterialLibrary materials_;
   std::map<const Mesh*, std::shared_ptr<const ShadingMesh>> shading_meshes_;
   std::map<const Texture*, CachedDome> domes_;
@@ -185,7 +224,7 @@ class RenderScene {
 };
 
 inline RTCRayHit RenderScene::make_ray(const Vec3f& origin, const Vec3f& direction, float t_min,
-                                       float t_max) {
+                                       float t_max, float time) {
   RTCRayHit ray;
   ray.ray.org_x = origin.x();
   ray.ray.org_y = origin.y();
@@ -195,7 +234,7 @@ inline RTCRayHit RenderScene::make_ray(const Vec3f& origin, const Vec3f& directi
   ray.ray.dir_z = direction.z();
   ray.ray.tnear = t_min;
   ray.ray.tfar = t_max;
-  ray.ray.time = 0.0f;
+  ray.ray.time = time;
   ray.ray.mask = ~0u;
   ray.ray.id = 0;
   ray.ray.flags = 0;
@@ -204,12 +243,12 @@ inline RTCRayHit RenderScene::make_ray(const Vec3f& origin, const Vec3f& directi
   return ray;
 }
 
-inline RayHit RenderScene::intersect(const Vec3f& origin, const Vec3f& direction, float t_min,
-                                     float t_max) const {
-  RTCRayHit ray = make_ray(origin, direction, t_min, t_max);
+inline RayHit RenderScene::intersect(RTCScene scene, const Vec3f& origin, const Vec3f& direction,
+                                     float t_min, float t_max, float time) const {
+  RTCRayHit ray = make_ray(origin, direction, t_min, t_max, time);
   embree::Context context;
   embree::init(context);
-  embree::intersect(scene_, context, ray);
+  embree::intersect(scene, context, ray);
   if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
   instances_[ray.hit.geomID]->shading->prefetch(ray.hit.primID);
   return {instances_[ray.hit.geomID].get(),
@@ -218,17 +257,19 @@ inline RayHit RenderScene::intersect(const Vec3f& origin, const Vec3f& direction
           ray.hit.u,
           ray.hit.v,
           ray.ray.tfar,
+          time,
           {ray.hit.Ng_x, ray.hit.Ng_y, ray.hit.Ng_z}};
 }
 
-inline Vec3f RenderScene::transmittance(const Vec3f& origin, const Vec3f& direction, float t_max,
-                                        bool passes_glass, std::uint32_t mask) const {
-  RTCRayHit ray = make_ray(origin, direction, 0.0f, t_max);
+inline Vec3f RenderScene::transmittance(RTCScene scene, const Vec3f& origin, const Vec3f& direction,
+                                        float t_max, bool passes_glass, std::uint32_t mask,
+                                        float time) {
+  RTCRayHit ray = make_ray(origin, direction, 0.0f, t_max, time);
   ray.ray.mask = mask;
   ShadowContext shadow;
   shadow.passes_glass = passes_glass;
   embree::init(shadow.context);
-  embree::occluded(scene_, shadow.context, ray.ray);
+  embree::occluded(scene, shadow.context, ray.ray);
   const bool is_hidden = ray.ray.tfar == -std::numeric_limits<float>::infinity();
   return is_hidden ? Vec3f(Vec3f::Zero()) : shadow.transmittance;
 }
@@ -247,7 +288,9 @@ inline SurfaceGeometry RenderScene::surface_at(const RayHit& hit, const Vec3f& o
 
   s.normal = s.flat_normal;
   if (mesh.has_normals()) {
-    const Vec3f n = instance.normal_from_node * mesh.normal(hit.triangle, hit.u, hit.v);
+    Vec3f n = instance.normal_from_node * mesh.normal(hit.triangle, hit.u, hit.v);
+    if (!instance.blurred_positions.empty()) [[unlikely]]
+      n = instance.turned(n, hit.time);
     const float length2 = n.squaredNorm();
     if (length2 > 0.0f) s.normal = n * ((s.is_back ? -1.0f : 1.0f) / std::sqrt(length2));
     // Seen from the visible side, a normal that points away is bent back to the horizon.

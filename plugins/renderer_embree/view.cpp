@@ -8,7 +8,11 @@
 namespace diorama {
 
 View::View(const Scene& scene, NodeId node)
-    : camera_(*scene[node].camera), world_from_camera_(scene.world_from_node(node)) {
+    : camera_(*scene[node].camera),
+      has_shutter_(camera_.exposure_time_s + camera_.readout_time_s > 0.0),
+      body_motion_(body_motion(scene, node)),
+      world_from_camera_(scene.world_from_node(node)) {
+  motion_ = {world_from_camera_.translation(), camera_.linear_velocity, camera_.angular_velocity};
   world_from_camera_.linear() = Mat3(world_from_camera_.rotation());
   camera_from_world_ = world_from_camera_.inverse();
   pixel_angle_ = float(1.0 / std::max(1.0, 0.5 * (camera_.fx + camera_.fy)));
@@ -47,6 +51,19 @@ std::optional<CameraRay> View::ray(const Vec2& pixel) const {
   const auto d = direction(pixel);
   if (!d) return std::nullopt;
   return limited(Vec3::Zero(), *d);
+}
+
+double View::seconds(int row, double u) const {
+  const double down = (row + 0.5) / camera_.height;
+  return (down - 0.5) * camera_.readout_time_s + (u - 0.5) * camera_.exposure_time_s;
+}
+
+CameraRay View::moved(const CameraRay& ray, double seconds) const {
+  const Affine then_from_now = body_motion_.then_from_now(seconds) * motion_.then_from_now(seconds);
+  CameraRay result = ray;
+  result.origin = (then_from_now * ray.origin.cast<double>()).cast<float>();
+  result.direction = (then_from_now.linear() * ray.direction.cast<double>()).cast<float>();
+  return result;
 }
 
 CameraRay View::bent_ray(const Vec2& pixel, const Vec2f& aperture) const {

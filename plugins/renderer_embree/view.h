@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "diorama/scene.h"
+#include "rigid_motion.h"
 
 namespace diorama {
 
@@ -42,12 +43,23 @@ class View {
     return ray;
   }
 
+  /// Whether rows or samples see different moments.
+  bool has_shutter() const { return has_shutter_; }
+  /// Seconds after the moment of the scene's poses at which a row is seen; `u` in [0, 1) goes
+  /// through its exposure.
+  double seconds(int row, double u) const;
+  /// A ray of the camera as it stands at that time.
+  CameraRay moved(const CameraRay& ray, double seconds) const;
+
  private:
   CameraRay bent_ray(const Vec2& pixel, const Vec2f& aperture) const;
   std::optional<Vec3> direction(const Vec2& pixel) const;
   CameraRay limited(const Vec3& origin, const Vec3& direction_camera) const;
 
   Camera camera_;
+  bool has_shutter_;
+  RigidMotion motion_;       ///< Its own ...
+  RigidMotion body_motion_;  ///< ... on top of what it rides on.
   Affine world_from_camera_;
   Affine camera_from_world_;
   float pixel_angle_;

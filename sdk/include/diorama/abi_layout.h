@@ -45,7 +45,7 @@ inline constexpr std::uint64_t kLayout =
               NodeId, Node, Scene, LabelledInstance, CoverageMask, Visibility, Instance, Frame,
               Capture, Place, Value, Complaints, Range, ParamDoc, ParamSpec, ParamReader,
               ParamLister, Component, Host, ImageView, Loader, PhysicsReport, PhysicsBackend,
-              RandomizeContext, Randomizer, RenderRequest, RenderReport, Renderer, Annotator, DatasetInfo,
-              DatasetFiles, CaptureFiles, Writer, Error>();
+              RandomizeContext, Randomizer, RenderRequest, RenderReport, Renderer, Annotator,
+              DatasetInfo, DatasetFiles, CaptureFiles, Writer, Error>();
 
 }  // namespace diorama::abi

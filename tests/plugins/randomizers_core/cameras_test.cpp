@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "camera_lens.h"
+#include "camera_motion.h"
 #include "camera_relative_pose.h"
 #include "framework/pipeline/fake_host.h"
 #include "look_at.h"
@@ -135,4 +136,27 @@ TEST_CASE("Lenses are drawn, what is not given stays", "[randomizers]") {
   CHECK(fills(focal, 18.0, 50.0));
   CHECK(fills(shift_x, -10.0, 10.0));
   CHECK(fills(shift_y, -4.0, 4.0));
+}
+
+TEST_CASE("Velocities go along the camera's axes and move nothing", "[randomizers]") {
+  Set set;
+  CameraMotion::Params params;
+  params.velocity = Vec3(0, 0, -2.0);
+  params.angular_velocity_deg = Vec3(0, 90.0, 0);
+  params.exposure_time_s = 0.01;
+  const Affine before = set.scene.world_from_node(set.camera);
+  CameraMotion(params, set.host).randomize(set.scene, {}, Rng(1));
+  CHECK(set.scene.world_from_node(set.camera).matrix() == before.matrix());
+  const Camera& camera = *set.scene[set.camera].camera;
+  CHECK((camera.linear_velocity - 2.0 * Vec3(2, 1, -0.5).normalized()).norm() < 1e-9);
+  CHECK((camera.angular_velocity - 0.5 * kPi * set.axis(set.camera, 1)).norm() < 1e-9);
+  CHECK(camera.exposure_time_s == 0.01);
+
+  CameraMotion drawn({}, set.host);
+  drawn.randomize(set.scene, {}, Rng(2));
+  const Vec3 first = camera.linear_velocity;
+  CHECK(first.cwiseAbs().maxCoeff() <= 0.2 * std::sqrt(3.0));
+  CHECK(camera.exposure_time_s == 0.01);  // null keeps it
+  drawn.randomize(set.scene, {}, Rng(3));
+  CHECK(camera.linear_velocity != first);
 }
