@@ -41,6 +41,30 @@ class Assembler {
     if (type) note_plugin(registry_.entry(ComponentKind::Loader, *type));
   }
 
+  std::vector<std::string> annotator_types() const {
+    return registry_.types(ComponentKind::Annotator);
+  }
+  /// Without a word of the job; its plugin is not remembered.
+  std::unique_ptr<Annotator> make_default_annotator(const std::string& type) {
+    Value map = Value::make_map();
+    map.set("type", Value::text(type));
+    const auto keys = host_keys(ComponentKind::Annotator, "annotators");
+    auto made = registry_.make<Annotator>(map, "annotator", keys, complaints_, host_);
+    complaints_.raise();
+    return made;
+  }
+  void note_annotator(const std::string& type) {
+    const ComponentEntry& entry = registry_.entry(ComponentKind::Annotator, type);
+    if (!entry.file.empty()) note_plugin(entry);
+  }
+  void warn_of_idle(const AnnotatorOffer& annotator) {
+    std::string made;
+    for (const std::string& name : annotator.provides) made += (made.empty() ? "" : ", ") + name;
+    host_.log(LogLevel::Warning, "annotators: " + annotator.type +
+                                     " does nothing, as no writer needs what it makes (" + made +
+                                     ")");
+  }
+
   Complaints& complaints() { return complaints_; }
   std::vector<std::pair<std::string, std::string>> plugins() const {
     return {plugins_.begin(), plugins_.end()};
@@ -101,6 +125,17 @@ void make_engines_and_writers(Assembler& assembler, JobAssembly& assembly) {
   }
 }
 
+/// Those that the job lists, by type.
+using ListedAnnotators = std::map<std::string, std::unique_ptr<Annotator>>;
+
+ListedAnnotators make_annotators(Assembler& assembler, const Job& job) {
+  ListedAnnotators listed;
+  for (const ComponentConfig& config : job.annotators) {
+    listed[config.type] = assembler.make<Annotator>(config, "annotators");
+  }
+  return listed;
+}
+
 CapturePlan plan_from_assets(const JobAssembly& assembly,
                              const std::vector<std::unique_ptr<Loader>>& object_loaders) {
   const Job& job = assembly.job;
@@ -135,24 +170,25 @@ std::vector<Need> needs_of(const JobAssembly& assembly) {
   return needs;
 }
 
-void resolve_needs(Registry& registry, Host& host, JobAssembly& assembly) {
+/// Chooses among all annotators, those that the job lists and the others with their defaults.
+void resolve_needs(Assembler& assembler, ListedAnnotators listed, JobAssembly& assembly) {
   std::vector<std::unique_ptr<Annotator>> annotators;
   std::vector<AnnotatorOffer> offers;
-  for (const std::string& type : registry.types(ComponentKind::Annotator)) {
-    Complaints complaints;
-    Value map = Value::make_map();
-    map.set("type", Value::text(type));
-    const auto keys = host_keys(ComponentKind::Annotator, "annotators");
-    auto made = registry.make<Annotator>(map, "annotator", keys, complaints, host);
-    complaints.raise();
-    offers.push_back({type, made->needs(), made->provides()});
-    annotators.push_back(std::move(made));
+  for (const std::string& type : assembler.annotator_types()) {
+    auto& own = listed[type];
+    const bool is_listed = own != nullptr;
+    annotators.push_back(is_listed ? std::move(own) : assembler.make_default_annotator(type));
+    offers.push_back({type, annotators.back()->needs(), annotators.back()->provides(), is_listed});
   }
   JobComponents& parts = assembly.components;
   parts.demand = resolve_demand(needs_of(assembly), parts.renderer->provides(),
                                 "renderer '" + assembly.job.renderer.type + "'", offers);
   for (const std::size_t index : parts.demand.annotators) {
+    assembler.note_annotator(offers[index].type);
     parts.annotators.push_back(std::move(annotators[index]));
+  }
+  for (std::size_t i = 0; i < offers.size(); ++i) {
+    if (offers[i].is_listed && annotators[i]) assembler.warn_of_idle(offers[i]);
   }
 }
 
@@ -199,6 +235,7 @@ Value check_job(const Value& value, Registry& registry, Host& host) {
   make_loaders(assembler, assembly);
   make_randomizers(assembler, assembly);
   make_engines_and_writers(assembler, assembly);
+  make_annotators(assembler, assembly.job);
   assembler.complaints().raise();
   return resolved_job(value, describe_from(registry));
 }
@@ -214,11 +251,12 @@ JobAssembly assemble_job(const Value& value, Registry& registry, HostServices& h
   make_randomizers(assembler, assembly);
   const std::vector<std::string> drawn_assets = texts_of(host.take_resolved());
   make_engines_and_writers(assembler, assembly);
+  ListedAnnotators annotators = make_annotators(assembler, assembly.job);
   assembler.complaints().raise();
   for (auto& [type, loader] : loaders.of_files) host.use_loader(type, std::move(loader));
   assembly.resolved = resolved_job(value, describe_from(registry));
   assembly.plan = plan_from_assets(assembly, loaders.of_objects);
-  resolve_needs(registry, host, assembly);
+  resolve_needs(assembler, std::move(annotators), assembly);
   for (const EnvironmentChoice& choice : assembly.plan.environments) {
     assembler.note_loader(host.loader_of(choice.asset));
   }

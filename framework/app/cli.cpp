@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "framework/app/assemble.h"
+#include "framework/app/command_bench.h"
 #include "framework/app/command_config.h"
 #include "framework/app/command_docs.h"
 #include "framework/app/command_doctor.h"
@@ -21,6 +22,7 @@
 #include "framework/app/command_render.h"
 #include "framework/app/command_run.h"
 #include "framework/app/command_schema.h"
+#include "framework/app/command_sensors.h"
 #include "framework/app/options.h"
 #include "framework/host/console_log.h"
 #include "framework/plugins/plugin_search.h"
@@ -41,6 +43,8 @@ struct CommandLine {
   bool config_json = false;
   InspectOptions inspect;
   RenderOptions render;
+  BenchOptions bench;
+  SensorsOptions sensors;
   LintOptions lint;
   ExportCommandOptions export_;
   NewPluginOptions new_plugin;
@@ -191,10 +195,38 @@ void add_inspect(CLI::App& app, CommandLine& line) {
   });
 }
 
+void add_picture_options(CLI::App& command, PictureOptions& options) {
+  command
+      .add_option("--camera", options.camera,
+                  "Camera of the scene, by name; default: the first, else a view of all")
+      ->type_name("NAME");
+  command.add_option("--eye", options.eye, "Where a new camera stands, m")
+      ->expected(3)
+      ->type_name("N");
+  command.add_option("--target", options.target, "What a new camera looks at, m")
+      ->expected(3)
+      ->type_name("N");
+  command.add_option("--width", options.width, "Pixels; default: the camera's")
+      ->check(CLI::Range(1, 16384))
+      ->type_name("N");
+  command.add_option("--height", options.height, "Pixels; default: by the camera's shape")
+      ->check(CLI::Range(1, 16384))
+      ->type_name("N");
+  command.add_option("--renderer", options.renderer, "Renderer to use")
+      ->type_name("TYPE")
+      ->capture_default_str();
+  command
+      .add_option("--set", options.sets,
+                  "Set a parameter of the renderer, for instance samples=256 (repeatable)")
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false);
+  command.add_option("--seed", options.seed, "Pattern of the noise")->type_name("N");
+}
+
 void add_render(CLI::App& app, CommandLine& line) {
   RenderOptions& options = line.render;
   CLI::App* command = app.add_subcommand("render", "Render one picture of a scene or model file");
-  command->add_option("file", options.asset, "File, or scheme:rest such as dining_room:7")
+  command->add_option("file", options.picture.asset, "File, or scheme:rest such as dining_room:7")
       ->required()
       ->type_name("FILE");
   command
@@ -202,34 +234,69 @@ void add_render(CLI::App& app, CommandLine& line) {
                    "Picture to write; .png and .jpg as seen, .exr and .hdr in linear light")
       ->type_name("FILE")
       ->capture_default_str();
-  command
-      ->add_option("--camera", options.camera,
-                   "Camera of the scene, by name; default: the first, else a view of all")
-      ->type_name("NAME");
-  command->add_option("--eye", options.eye, "Where a new camera stands, m")
-      ->expected(3)
-      ->type_name("N");
-  command->add_option("--target", options.target, "What a new camera looks at, m")
-      ->expected(3)
-      ->type_name("N");
-  command->add_option("--width", options.width, "Pixels; default: the camera's")
-      ->check(CLI::Range(1, 16384))
-      ->type_name("N");
-  command->add_option("--height", options.height, "Pixels; default: by the camera's shape")
-      ->check(CLI::Range(1, 16384))
-      ->type_name("N");
-  command->add_option("--renderer", options.renderer, "Renderer to use")
-      ->type_name("TYPE")
-      ->capture_default_str();
-  command
-      ->add_option("--set", options.sets,
-                   "Set a parameter of the renderer, for instance samples=256 (repeatable)")
-      ->type_name("KEY=VALUE")
-      ->allow_extra_args(false);
-  command->add_option("--seed", options.seed, "Pattern of the noise")->type_name("N");
+  add_picture_options(*command, options.picture);
   command->callback([&line] {
     line.command = [&line](ConsoleLog& log) {
       return command_render(line.global, line.render, log);
+    };
+  });
+}
+
+void add_bench(CLI::App& app, CommandLine& line) {
+  BenchOptions& options = line.bench;
+  options.picture.asset = "dining_room:7";
+  CLI::App* command =
+      app.add_subcommand("bench", "Render a scene; print speed, error and where the time goes");
+  command->add_option("--scene", options.picture.asset, "File, or scheme:rest")
+      ->type_name("FILE")
+      ->capture_default_str();
+  command
+      ->add_option("--lights", options.lights,
+                   "JSON file with lights and camera that replace the scene's")
+      ->type_name("FILE");
+  command->add_flag("--diffuse", options.is_diffuse,
+                    "Make every material a matte surface of its base colour");
+  command
+      ->add_option("--reference", options.reference,
+                   "Converged picture of the same size (.exr, .hdr) to compare with")
+      ->type_name("FILE");
+  command
+      ->add_option("--reference-samples", options.reference_samples,
+                   "Compare with a picture of our own with so many samples, not denoised")
+      ->check(CLI::Range(1, 1 << 20))
+      ->type_name("N");
+  command->add_option("--repetitions", options.repetitions, "Pictures to render; medians count")
+      ->check(CLI::Range(1, 1000))
+      ->type_name("N")
+      ->capture_default_str();
+  command->add_option("-o,--picture", options.picture_file, "Where to put the last picture, .exr")
+      ->type_name("FILE");
+  command->add_flag("--json", options.as_json, "As JSON, with every repetition");
+  add_picture_options(*command, options.picture);
+  command->callback([&line] {
+    line.command = [&line](ConsoleLog& log) { return command_bench(line.global, line.bench, log); };
+  });
+}
+
+void add_sensors(CLI::App& app, CommandLine& line) {
+  CLI::App* command = app.add_subcommand(
+      "sensors", "Make sensors' pictures from a stored dataset without rendering it again");
+  command->add_option("dataset", line.sensors.dataset, "Output folder of a run")
+      ->required()
+      ->type_name("FOLDER");
+  command
+      ->add_option("--effects", line.sensors.effects,
+                   "Job file, or one with the section `annotators` alone")
+      ->required()
+      ->type_name("FILE");
+  command->add_option("-o,--output", line.sensors.output, "Output folder")
+      ->type_name("DIR")
+      ->capture_default_str();
+  command->add_flag("--overwrite", line.sensors.overwrite,
+                    "Remove the dataset in the output folder first");
+  command->callback([&line] {
+    line.command = [&line](ConsoleLog& log) {
+      return command_sensors(line.global, line.sensors, log);
     };
   });
 }
@@ -349,7 +416,9 @@ void add_all(CLI::App& app, CommandLine& line) {
   add_plugins_check(app, line);
   add_inspect(app, line);
   add_render(app, line);
+  add_bench(app, line);
   add_export(app, line);
+  add_sensors(app, line);
   add_lint(app, line);
   add_new_plugin(app, line);
   add_schema(app, line);

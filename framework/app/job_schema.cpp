@@ -125,6 +125,7 @@ constexpr ComponentSection kSections[] = {
     {"randomizers", ComponentKind::Randomizer, nullptr},
     {"physics", ComponentKind::Physics, kDefaultPhysics},
     {"renderer", ComponentKind::Renderer, kDefaultRenderer},
+    {"annotators", ComponentKind::Annotator, nullptr},
     {"writers", ComponentKind::Writer, nullptr},
 };
 

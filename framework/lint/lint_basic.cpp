@@ -82,8 +82,9 @@ class BasicLint {
         dataset_.reading(file, [&] { data.camera = camera_of(*json); });
       }
     }
-    for (const char* kind : {"rgb.png", "rgb.jpg", "rgb.jpeg", "rgb.exr", "normals.png",
-                             "distance_to_camera.png", "distance_to_image_plane.png"}) {
+    for (const char* kind :
+         {"rgb.png", "rgb.jpg", "rgb.jpeg", "rgb.exr", "normals.png", "distance_to_camera.png",
+          "distance_to_image_plane.png", "sensor_depth.png"}) {
       if (const auto file = path(kind); !file.empty()) check_size(data, file);
     }
     read_instances(data, path("instance_segmentation.png"),
@@ -103,6 +104,7 @@ class BasicLint {
     check_boxes(data, path("bounding_box_2d_tight.npy"), path("bounding_box_2d_loose.npy"));
     check_cuboids(data);
     check_distances(data, path("distance_to_camera.npy"), path("distance_to_image_plane.npy"));
+    check_sensor_depth(data, path("sensor_depth.npy"));
     check_rows(path("occlusion.npy"), 12, 8);
     check_points(path("pointcloud.npy"), product, number);
     if (const auto file = path("motion_vectors.npy"); !file.empty()) dataset_.npy(file);
@@ -324,6 +326,24 @@ class BasicLint {
     if (ray && plane) check_distance_kinds(data.camera->lens, *ray, *plane, ray_file);
     if (ray) check_surfaces(data, *ray, ray_file, true);
     if (plane) check_surfaces(data, *plane, plane_file, false);
+  }
+
+  /// A measurement, not a label: only its form can be wrong.
+  void check_sensor_depth(const FrameData& data, const std::string& file) {
+    const auto array = file.empty() ? std::nullopt : dataset_.npy(file);
+    if (!array || array->item_size != 4) return;
+    std::size_t wrong = 0;
+    for (std::size_t i = 0; i < array->count(); ++i) {
+      const float z = array->value<float>(4 * i);
+      if (!(z >= 0.0f && std::isfinite(z))) ++wrong;
+    }
+    dataset_.check(wrong == 0, kRead, file,
+                   std::to_string(wrong) + " values are neither a depth nor 0 for none");
+    if (!data.camera) return;
+    const std::vector<std::size_t> shape{std::size_t(data.camera->lens.height),
+                                         std::size_t(data.camera->lens.width)};
+    dataset_.check(array->shape == shape, "counts agree between files", file,
+                   "has another size than the camera");
   }
 
   /// The two kinds differ by the angle of the ray.

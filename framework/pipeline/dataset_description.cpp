@@ -178,6 +178,12 @@ void add_randomizers(std::string& text, const Job& job) {
   }
 }
 
+void add_annotators(std::string& text, const Job& job) {
+  for (const ComponentConfig& entry : job.annotators) {
+    text += "annotator " + entry.type + ": " + parameters_text(entry.map, {"type", "name"}) + "\n";
+  }
+}
+
 void add_writers(std::string& text, const Job& job) {
   text += "writers (" + std::to_string(job.writers.size()) + ")\n";
   for (const WriterEntry& entry : job.writers) {
@@ -272,6 +278,7 @@ std::string plan_text(const CapturePlan& plan, const Job& job,
   add_randomizers(text, job);
   text +=
       "renderer " + job.renderer.type + ": " + parameters_text(job.renderer.map, {"type"}) + "\n";
+  add_annotators(text, job);
   text += "physics " + job.physics.type + ": " + parameters_text(job.physics.map, {"type"}) + "\n";
   add_writers(text, job);
   return text;

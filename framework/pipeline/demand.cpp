@@ -2,6 +2,7 @@
 #include "framework/pipeline/demand.h"
 
 #include <algorithm>
+#include <optional>
 
 #include "diorama/config.h"
 #include "diorama/error.h"
@@ -23,6 +24,7 @@ class Resolution {
       if (name == kAmodalMask) demand_.amodal_mask = true;
       return;
     }
+    if (const auto listed = offer_of(name, true)) return use(who, *listed);
     if (renderer_provides_.contains(name)) {
       demand_.channels.insert(name);
       return;
@@ -33,16 +35,22 @@ class Resolution {
       demand_.motion = true;
       return;
     }
-    const auto offer = std::find_if(offers_.begin(), offers_.end(), [&](const auto& candidate) {
-      return candidate.provides.contains(name);
-    });
-    if (offer == offers_.end()) refuse(who, name);
-    use(who, std::size_t(offer - offers_.begin()));
+    const auto offer = offer_of(name, false);
+    if (!offer) refuse(who, name);
+    use(who, *offer);
   }
 
   Demand take() { return std::move(demand_); }
 
  private:
+  std::optional<std::size_t> offer_of(const std::string& name, bool is_listed) const {
+    const auto offer = std::find_if(offers_.begin(), offers_.end(), [&](const auto& candidate) {
+      return candidate.is_listed == is_listed && candidate.provides.contains(name);
+    });
+    if (offer == offers_.end()) return std::nullopt;
+    return std::size_t(offer - offers_.begin());
+  }
+
   void use(const std::string& who, std::size_t index) {
     const bool is_used = std::find(demand_.annotators.begin(), demand_.annotators.end(), index) !=
                          demand_.annotators.end();

@@ -21,6 +21,7 @@ struct AnnotatorOffer {
   std::string type;
   NameSet needs;
   NameSet provides;
+  bool is_listed = false;  ///< By the job: its channels come before those of the renderer.
 };
 
 /// What has to be made so that every need is met.

@@ -29,7 +29,7 @@ constexpr const char* kCameraWords[] = {"pinhole", "opencv_pinhole", "fisheye_po
 const std::vector<std::string> kSections{
     "seed",        "assets_root", "debug",    "total_captures", "loaders",     "environments",
     "environment", "objects",     "lights",   "cameras",        "randomizers", "physics",
-    "renderer",    "timeline",    "settle",   "writers",        "output"};
+    "renderer",    "annotators",  "timeline", "settle",         "writers",     "output"};
 
 std::string item_path(std::string_view section, std::size_t index) {
   return std::string(section) + "[" + std::to_string(index) + "]";
@@ -130,18 +130,20 @@ ComponentConfig read_entry(const std::string& path, Value map, Complaints& compl
   return entry;
 }
 
-void read_loaders(const Value& value, Job& job, Complaints& complaints) {
-  for (auto& [path, map] : entries(value, "loaders", complaints)) {
+/// The entries of a list that sets the parameters of components, each type once.
+std::vector<ComponentConfig> read_parameters(const Value& value, std::string_view section,
+                                             const std::string& why_once, Complaints& complaints) {
+  std::vector<ComponentConfig> list;
+  for (auto& [path, map] : entries(value, section, complaints)) {
     ComponentConfig entry = read_entry(path, std::move(map), complaints);
     const auto is_same = [&](const ComponentConfig& known) { return known.type == entry.type; };
-    if (std::any_of(job.loaders.begin(), job.loaders.end(), is_same)) {
-      complaints.add(place_of(entry.map, "type"), path + ": another entry is of type \"" +
-                                                      entry.type +
-                                                      "\"; each loader reads "
-                                                      "its files in one way");
+    if (std::any_of(list.begin(), list.end(), is_same)) {
+      complaints.add(place_of(entry.map, "type"),
+                     path + ": another entry is of type \"" + entry.type + "\"; " + why_once);
     }
-    job.loaders.push_back(std::move(entry));
+    list.push_back(std::move(entry));
   }
+  return list;
 }
 
 void read_environments(const Value& value, Job& job, Complaints& complaints) {
@@ -473,6 +475,10 @@ void CameraGroup::visit(ParamVisitor& v) {
   v.param("far_m", far_m, {"Nothing farther along the axis is seen.", "m", 0});
   v.param("f_stop", f_stop, {"Aperture; 0: everything is in focus.", "", 0});
   v.param("focus_distance_m", focus_distance_m, {"Distance of the plane in focus.", "m", 0});
+  v.param("exposure_time_s", exposure_time_s,
+          {"How long a row gathers light: what moves is blurred. 0: no blur.", "s", 0, 10});
+  v.param("readout_time_s", readout_time_s,
+          {"From the first row to the last of a rolling shutter; 0: all at once.", "s", 0, 10});
   v.param("position", position, {"World position until a randomizer moves it.", "m"});
   v.param("look_at", look_at, {"World point that it looks at.", "m"});
 }
@@ -508,6 +514,10 @@ void OutputSection::visit(ParamVisitor& v) {
   v.param("folder", folder, {"Folder of the dataset; relative to the current one."});
   v.param("records", records,
           {"Folder of dataset.json and the journal of finished captures, below `folder`."});
+}
+
+std::vector<ComponentConfig> read_annotators(const Value& job, Complaints& complaints) {
+  return read_parameters(job, "annotators", "each annotator works once on a frame", complaints);
 }
 
 std::vector<std::string> Job::series() const {
@@ -548,7 +558,8 @@ Job read_job(const Value& value, Complaints& complaints) {
   job.assets_root = head.assets_root;
   job.debug = head.debug;
   job.total_captures = head.total_captures;
-  read_loaders(value, job, complaints);
+  job.loaders =
+      read_parameters(value, "loaders", "each loader reads its files in one way", complaints);
   read_environments(value, job, complaints);
   read_section(value, "environment", job.environment, complaints);
   read_objects(value, job, complaints);
@@ -558,6 +569,7 @@ Job read_job(const Value& value, Complaints& complaints) {
   read_randomizers(value, job, complaints);
   job.physics = read_engine(value, "physics", kDefaultPhysics, complaints);
   job.renderer = read_engine(value, "renderer", kDefaultRenderer, complaints);
+  job.annotators = read_annotators(value, complaints);
   read_section(value, "settle", job.settle, complaints);
   read_writers(value, job, complaints);
   read_section(value, "output", job.output, complaints);
@@ -592,6 +604,7 @@ std::vector<std::string_view> host_keys(ComponentKind kind, std::string_view sec
   }
   switch (kind) {
     case ComponentKind::Loader:
+    case ComponentKind::Annotator:
       return {"type", "name"};
     case ComponentKind::Randomizer:
       return {"type", "name", "on", "every"};

@@ -92,6 +92,8 @@ struct CameraGroup {
   double far_m = 1000.0;
   double f_stop = 0.0;
   double focus_distance_m = 0.0;
+  double exposure_time_s = 0.0;
+  double readout_time_s = 0.0;
   Vec3 position{0.0, 0.0, 0.0};
   Vec3 look_at{1.0, 0.0, 0.0};
   void visit(ParamVisitor& v);
@@ -152,6 +154,8 @@ struct Job {
   std::vector<RandomizerEntry> randomizers;
   ComponentConfig physics;  ///< Type "none": nothing moves by itself.
   ComponentConfig renderer;
+  std::vector<ComponentConfig>
+      annotators;  ///< Come before the renderer's own channels; see Demand.
   std::vector<TimelineStep> timeline;
   SettleSection settle;
   std::vector<WriterEntry> writers;
@@ -172,6 +176,9 @@ std::vector<TimelineStep> default_timeline();
 
 /// Reads a native job. All complaints are collected; the result is of use only when there are none.
 Job read_job(const Value& job, Complaints& complaints);
+
+/// The section `annotators` of a job, which may consist of it alone.
+std::vector<ComponentConfig> read_annotators(const Value& job, Complaints& complaints);
 
 /// The name of a node, made from a file's name or a label: '/' becomes '_', never empty.
 std::string node_name(std::string_view text);

@@ -155,6 +155,8 @@ Value resolved_job(const Value& job, const DescribeComponent& describe) {
                                   kDefaultPhysics, describe));
   result.set("renderer", component(section_or_empty(job, "renderer"), Kind::Renderer, engine,
                                    kDefaultRenderer, describe));
+  const Value annotators = components(job, "annotators", Kind::Annotator, heads, describe);
+  if (!annotators.list.empty()) result.set("annotators", annotators);
   result.set("timeline", timeline(job));
   result.set("settle", with_defaults(section_or_empty(job, "settle"), specs_of<SettleSection>()));
   result.set("writers",
@@ -181,6 +183,10 @@ std::vector<ParamSpec> job_specs() {
                           specs_of<RandomizerEntry>()));
   specs.push_back(section("physics", ParamType::Group, "The physics engine.", engine));
   specs.push_back(section("renderer", ParamType::Group, "The renderer.", engine));
+  specs.push_back(section("annotators", ParamType::List,
+                          "Annotators whose channels replace the renderer's, such as sensors, and "
+                          "parameters of others.",
+                          head));
   specs.push_back(section("timeline", ParamType::List, "What happens in a visit, in order.",
                           specs_of<detail::StepKeys>()));
   specs.push_back(

@@ -233,6 +233,8 @@ Camera camera_of(const CameraGroup& group) {
   camera.far_m = group.far_m;
   camera.f_stop = group.f_stop;
   camera.focus_distance_m = group.focus_distance_m;
+  camera.exposure_time_s = group.exposure_time_s;
+  camera.readout_time_s = group.readout_time_s;
   return camera;
 }
 

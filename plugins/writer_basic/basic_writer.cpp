@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "writer_basic/basic_writer.h"
 
+#include <algorithm>
+#include <limits>
+
 #include "writer_basic/box_files.h"
 #include "writer_basic/camera_params.h"
 #include "writer_basic/frame_output.h"
@@ -25,9 +28,11 @@ void write_rgb(const FrameOutput& output, const std::string& format) {
 }
 
 void write_distance(const FrameOutput& output, const Channel<float>& channel, bool colorize) {
-  const auto& distances = output.frame.get(channel);
+  auto distances = output.frame.get(channel);
   output.files.add(output.path(channel.name, channel.name, ".npy"), npy_file(distances));
   if (!colorize) return;
+  // What a sensor does not measure looks like what no ray met.
+  std::ranges::replace(distances.pixels(), 0.0f, std::numeric_limits<float>::infinity());
   output.files.add(
       output.path(channel.name, channel.name, ".png"),
       png_file(output.host, distances.width(), distances.height(), distance_picture(distances)));
@@ -50,6 +55,7 @@ void write_motion_vectors(const FrameOutput& output) {
 
 void write_unlabelled_files(const BasicWriter::Params& params, const FrameOutput& output) {
   if (params.rgb) write_rgb(output, params.image_output_format);
+  if (params.sensor_depth) write_distance(output, kSensorDepth, params.colorize_depth);
   if (params.normals) {
     output.files.add(output.path("normals", "normals", ".png"),
                      png_file(output.host, normals_picture(output.frame.get(kNormals))));
@@ -108,6 +114,8 @@ void BasicWriter::Params::visit(ParamVisitor& v) {
           {"Accepted; scenes hold no skeletons, so no file is written."});
   v.param("pointcloud_include_unlabelled", pointcloud_include_unlabelled,
           {"Points of unlabelled surfaces too."});
+  v.param("sensor_depth", sensor_depth,
+          {"Depth as the annotator depth_sensor measures it, 0 where it measures nothing."});
   v.choice("image_output_format", image_output_format, kImageEndings,
            {"Format of the rgb files; all other pictures are PNG."});
   v.param("colorize_semantic_segmentation", colorize_semantic_segmentation,
@@ -151,6 +159,7 @@ NameSet BasicWriter::needs() const {
   add(p.instance_id_segmentation, {kLeafId.name});
   add(p.distance_to_camera, {kDistanceToCamera.name});
   add(p.distance_to_image_plane, {kDistanceToImagePlane.name});
+  add(p.sensor_depth, {kSensorDepth.name});
   add(p.normals, {kNormals.name});
   add(p.motion_vectors, {kMotion.name});
   add(p.pointcloud, {kPosition.name, kColor.name, kNormals.name, kLeafId.name, kInstanceId.name});

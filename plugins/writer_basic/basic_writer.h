@@ -33,6 +33,7 @@ class BasicWriter final : public Writer {
     bool pointcloud = false;
     bool skeleton_data = false;
     bool pointcloud_include_unlabelled = false;
+    bool sensor_depth = false;
     std::string image_output_format = "png";
     bool colorize_semantic_segmentation = true;
     bool colorize_instance_id_segmentation = true;

@@ -3,24 +3,17 @@
 
 #include <array>
 #include <cstring>
-#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <span>
 
-#include "diorama/error.h"
+#include "framework/bench/scene_rig.h"
 #include "support/render_host/render_host.h"
 
 namespace diorama::bench {
 namespace {
 
 using Json = nlohmann::json;
-
-Json read_json(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  if (!in) throw Error(ErrorKind::Asset, file.string() + ": cannot be read");
-  return Json::parse(in);
-}
 
 /// A glTF binary: the JSON chunk and the buffer behind it.
 class Glb {
@@ -138,30 +131,6 @@ Affine node_pose(const Json& node) {
   return t.affine();
 }
 
-void add_lights(const std::filesystem::path& folder, const Json& info, Scene& scene, Host& host) {
-  for (const Json& source : info["lights"]) {
-    const NodeId node = scene.create(scene.root(), "lamp");
-    Light light;
-    light.kind = LightKind::Sphere;
-    light.radius_m = source["radius"];
-    const double scale =
-        source["power_watt"].get<double>() / (4.0 * kPi * kPi * light.radius_m * light.radius_m);
-    Vec3 at;
-    for (std::size_t k = 0; k < 3; ++k) {
-      light.color[Eigen::Index(k)] = float(source["color"][k].get<double>() * scale);
-      at[Eigen::Index(k)] = source["position_blender"][k];
-    }
-    light.is_visible_to_camera = false;
-    scene.edit(node).light = light;
-    scene.set_pose(node, Affine(Eigen::Translation3d(at)));
-  }
-  const NodeId sky = scene.create(scene.root(), "sky");
-  Light dome;
-  dome.kind = LightKind::Dome;
-  dome.texture = host.read_texture(folder / info["world"]["file"].get<std::string>());
-  scene.edit(sky).light = dome;
-}
-
 }  // namespace
 
 Scene load_bench_scene(const std::filesystem::path& folder, Host& host, bool is_diffuse) {
@@ -196,30 +165,20 @@ Scene load_bench_scene(const std::filesystem::path& folder, Host& host, bool is_
       scene.set_pose(id, node_pose(node));
     }
   }
-  add_lights(folder, read_json(folder / "scene.json"), scene, host);
+  add_rig_lights(folder / "scene.json", scene, host);
   return scene;
 }
 
 NodeId add_bench_camera(const std::filesystem::path& folder, Scene& scene, int width, int height) {
-  const Json source = read_json(folder / "scene.json")["camera"];
-  const double scale = double(width) / source["width"].get<double>();
-  Camera camera;
+  const NodeId node = add_rig_camera(folder / "scene.json", scene);
+  Camera& camera = *scene.edit(node).camera;
+  const double scale = double(width) / camera.width;
   camera.width = width;
   camera.height = height;
-  camera.fx = source["fx"].get<double>() * scale;
-  camera.fy = source["fy"].get<double>() * scale;
-  camera.cx = source["cx"].get<double>() * scale;
-  camera.cy = source["cy"].get<double>() * scale;
-  camera.near_m = 0.01;
-  Affine pose = Affine::Identity();
-  for (int r = 0; r < 3; ++r) {
-    for (int c = 0; c < 4; ++c) {
-      pose.matrix()(r, c) = source["cam2world_blender"][std::size_t(r)][std::size_t(c)];
-    }
-  }
-  const NodeId node = scene.create(scene.root(), "camera");
-  scene.edit(node).camera = camera;
-  scene.set_pose(node, pose);
+  camera.fx *= scale;
+  camera.fy *= scale;
+  camera.cx *= scale;
+  camera.cy *= scale;
   return node;
 }
 

@@ -8,13 +8,13 @@
 #include <nlohmann/json.hpp>
 
 #include "bench_scene.h"
-#include "cpu_time.h"
 #include "embree_renderer.h"
 #include "framework/annotators/instance_ids.h"
 #include "framework/annotators/instances.h"
 #include "framework/annotators/motion.h"
 #include "framework/annotators/object_coordinates.h"
 #include "framework/annotators/visibility.h"
+#include "framework/bench/cpu_time.h"
 #include "support/render_host/render_host.h"
 #include "writer_basic/basic_writer.h"
 

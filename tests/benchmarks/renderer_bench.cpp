@@ -11,8 +11,9 @@
 #include <nlohmann/json.hpp>
 
 #include "bench_scene.h"
-#include "cpu_time.h"
 #include "embree_renderer.h"
+#include "framework/bench/cpu_time.h"
+#include "framework/bench/picture_error.h"
 #include "support/render_host/render_host.h"
 
 namespace {
@@ -20,32 +21,12 @@ namespace {
 using namespace diorama;
 using bench::cpu_seconds;
 
-struct Error3 {
-  double relative_mse = 0.0;
-  double bias = 0.0;  ///< Of the mean, relative.
-};
-
-/// relMSE = mean of d^2 / (ref^2 + 0.01) without the worst thousandth of the pixels.
-Error3 compare(const Image<Vec3f>& image, const Texture& reference) {
-  std::vector<double> errors;
-  double sum = 0.0;
-  double expected = 0.0;
+Image<Vec3f> as_image(const Texture& texture) {
+  Image<Vec3f> image(texture.width, texture.height, Vec3f::Zero());
   for (std::size_t i = 0; i < image.pixels().size(); ++i) {
-    double error = 0.0;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const double r = double(reference.floats[i * std::size_t(reference.channels) + k]);
-      const double v = double(image.pixels()[i][Eigen::Index(k)]);
-      error += (v - r) * (v - r) / (r * r + 0.01) / 3.0;
-      sum += v;
-      expected += r;
-    }
-    errors.push_back(error);
+    image.pixels()[i] = Eigen::Map<const Vec3f>(&texture.floats[i * std::size_t(texture.channels)]);
   }
-  std::sort(errors.begin(), errors.end());
-  errors.resize(errors.size() * 999 / 1000);
-  double total = 0.0;
-  for (double e : errors) total += e;
-  return {total / double(errors.size()), sum / expected - 1.0};
+  return image;
 }
 
 double thread_seconds() {
@@ -86,7 +67,8 @@ double share_of_raw_rays(const Scene& scene, NodeId camera, Host& host,
     start = thread_seconds();
     for (const LoggedRay& ray : rays) {
       hits += ray.is_shadow
-                  ? meshes.transmittance(ray.origin, ray.direction, ray.t_max, false).x() > 0.0f
+                  ? meshes.transmittance(ray.origin, ray.direction, ray.t_max, false, kMoment).x() >
+                        0.0f
                   : bool(meshes.intersect(ray.origin, ray.direction, ray.t_min, ray.t_max));
     }
     shares.push_back((thread_seconds() - start) / paths);
@@ -168,8 +150,8 @@ void run(const Options& options) {
     line["shadow_rays_per_path"] = double(counts.shadow_rays) / double(counts.paths);
     line["mrays_per_cpu_s"] = 1e-6 * double(counts.rays + counts.shadow_rays) / cpu;
     if (reference) {
-      const Error3 error = compare(frame.get(kColorHdr), *reference);
-      line["rel_mse"] = error.relative_mse;
+      const auto error = bench::picture_error(frame.get(kColorHdr), as_image(*reference));
+      line["rel_mse"] = error.trimmed_mse;
       line["bias"] = error.bias;
     }
     std::printf("%s\n", line.dump().c_str());

@@ -72,6 +72,20 @@ TEST_CASE("A need that nothing provides names the writer, the need and what ther
                     Contains("writer 'w' (through annotator 'boxes'): needs \"position\""));
 }
 
+TEST_CASE("What the job lists comes before the renderer's own", "[demand]") {
+  const std::vector<AnnotatorOffer> offers{{"film", {"light"}, {"color"}, false},
+                                           {"sensor", {"light"}, {"color"}, true}};
+  const std::vector<Need> needs{{"writer 'w'", {"color"}}};
+  const NameSet rendered{"color", "light"};
+  const Demand listed = resolve_demand(needs, rendered, "renderer 'r'", offers);
+  CHECK(listed.annotators == std::vector<std::size_t>{1});
+  CHECK(listed.channels == NameSet{"light"});
+  const Demand unlisted =
+      resolve_demand(needs, rendered, "renderer 'r'", std::span(offers).first(1));
+  CHECK(unlisted.annotators.empty());
+  CHECK(unlisted.channels == NameSet{"color"});
+}
+
 TEST_CASE("Annotators that wait for each other are refused", "[demand]") {
   CHECK_THROWS_WITH(demand_for({"a"}), Contains("needs its own output"));
 }

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#pragma once
+#include "framework/bench/cpu_time.h"
 
 #include <sys/resource.h>
 
 namespace diorama::bench {
 
-/// Of the process so far, all threads.
-inline double cpu_seconds() {
+double cpu_seconds() {
   rusage usage;
   getrusage(RUSAGE_SELF, &usage);
   const auto seconds = [](const timeval& t) { return double(t.tv_sec) + 1e-6 * double(t.tv_usec); };

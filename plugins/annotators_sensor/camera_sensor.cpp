@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "camera_sensor.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "lens_effects.h"
+#include "stored_lens.h"
+
+namespace diorama {
+namespace {
+
+constexpr std::array kExposures{"auto", "manual"};
+constexpr double kMiddleGrey = 0.18;
+
+double luminance(const Vec3f& rgb) {
+  return 0.2126 * double(rgb.x()) + 0.7152 * double(rgb.y()) + 0.0722 * double(rgb.z());
+}
+
+/// Brings the median of what is lit to middle grey; 1 for a picture without light.
+double metered(const Image<Vec3f>& light) {
+  std::vector<double> lit;
+  for (const Vec3f& pixel : light.pixels()) {
+    const double l = luminance(pixel);
+    if (l > 0.0 && std::isfinite(l)) lit.push_back(l);
+  }
+  if (lit.empty()) return 1.0;
+  const auto middle = lit.begin() + std::ptrdiff_t(lit.size() / 2);
+  std::nth_element(lit.begin(), middle, lit.end());
+  return kMiddleGrey / *middle;
+}
+
+/// Photons come by themselves: their count follows the law of Poisson, which from 30 on is all but
+/// normal. `noise` is the spread of what is added when the count is read.
+double counted(double mean, double noise, Rng& rng) {
+  if (mean >= 30.0) return mean + std::sqrt(mean + noise * noise) * rng.normal();
+  const double none = std::exp(-mean);
+  int count = 0;
+  for (double product = rng.uniform(); product > none; product *= rng.uniform()) ++count;
+  return count + noise * rng.normal();
+}
+
+std::vector<std::uint8_t> bytes_by_code(int largest_code) {
+  std::vector<std::uint8_t> bytes(std::size_t(largest_code) + 1);
+  for (std::size_t code = 0; code < bytes.size(); ++code) {
+    const float linear = float(double(code) / largest_code);
+    bytes[code] = std::uint8_t(std::lround(255.0f * srgb_from_linear(linear)));
+  }
+  return bytes;
+}
+
+}  // namespace
+
+int Photosite::code(double fill, Rng& rng) const {
+  // Far above the well nothing changes any more; not a number counts as dark.
+  const double mean = fill > 0.0 ? std::min(fill, 4.0) * full_well : 0.0;
+  const double electrons =
+      has_shot_noise ? counted(mean, read_noise, rng) : mean + read_noise * rng.normal();
+  const double share = std::clamp(electrons / full_well, 0.0, 1.0);
+  return int(std::lround(share * largest_code));
+}
+
+void CameraSensor::Params::visit(ParamVisitor& v) {
+  v.choice(
+      "exposure", exposure, kExposures,
+      {"auto: the median of the picture becomes 18 % grey; manual: by iso, exposure_time_s and "
+       "f_stop."});
+  v.param("exposure_ev", exposure_ev, {"Stops added to the exposure.", "EV", -40, 40});
+  v.param("iso", iso,
+          {"Sensitivity; the well counts as full at full_well_electrons * 100 / iso.", "", 1, 1e7});
+  v.param("exposure_time_s", exposure_time_s,
+          {"Exposure time for manual exposure; blur is the camera's own exposure_time_s.", "s",
+           1e-6, 3600});
+  v.param(
+      "f_stop", f_stop,
+      {"Aperture for manual exposure; depth of field is the camera's own f_stop.", "", 0.1, 1000});
+  v.param("vignetting", vignetting,
+          {"Light falls off as cos(angle off the axis)^(4 vignetting); 1: as in a simple lens.", "",
+           0, 10});
+  v.param("red_shift_px", red_shift_px,
+          {"How much farther out red is imaged half a diagonal from the axis.", "px", -100, 100});
+  v.param("blue_shift_px", blue_shift_px,
+          {"How much farther out blue is imaged half a diagonal from the axis.", "px", -100, 100});
+  v.param("shot_noise", shot_noise, {"Photons are counted one by one."});
+  v.param("full_well_electrons", full_well_electrons,
+          {"Electrons that fill one colour of one pixel at ISO 100.", "", 1, 1e9});
+  v.param("read_noise_electrons", read_noise_electrons,
+          {"Standard deviation of what reading a pixel adds.", "", 0, 1e6});
+  v.param("bits", bits, {"Of the numbers that the sensor gives.", "", 1, 16});
+}
+
+CameraSensor::CameraSensor(Params params, Host& host) : params_(std::move(params)), host_(host) {}
+
+NameSet CameraSensor::needs() const { return {std::string(kColorHdr.name)}; }
+
+NameSet CameraSensor::provides() const { return {std::string(kColor.name)}; }
+
+// ISO 12232, saturation-based speed: the luminance that fills the well is 78 / (q S) N^2 / t, with
+// q = 0.65 for what a lens lets through.
+double CameraSensor::manual_exposure() const {
+  const double brightest =
+      78.0 / (0.65 * params_.iso) * params_.f_stop * params_.f_stop / params_.exposure_time_s;
+  return 1.0 / brightest;
+}
+
+Photosite CameraSensor::photosite() const {
+  return {params_.full_well_electrons * 100.0 / params_.iso, params_.read_noise_electrons,
+          params_.shot_noise, (1 << params_.bits) - 1};
+}
+
+void CameraSensor::annotate(const Scene&, Frame& frame) const {
+  const LensEffects lens{params_.vignetting, params_.red_shift_px, params_.blue_shift_px};
+  const Image<Vec3f> light =
+      through_lens(frame.get(kColorHdr), stored_lens(frame.camera), lens, host_);
+  const double base = params_.exposure == "auto" ? metered(light) : manual_exposure();
+  frame.exposure = base * std::exp2(params_.exposure_ev);
+
+  const Photosite site = photosite();
+  const std::vector<std::uint8_t> bytes = bytes_by_code(site.largest_code);
+  const Rng rng = Rng(frame.seed).fork("camera_sensor");
+  Image<Rgba8> picture(light.width(), light.height(), Rgba8{0, 0, 0, 255});
+  host_.parallel_for(std::size_t(light.height()), [&](std::size_t y) {
+    Rng row_rng = rng.fork(std::uint64_t(y));
+    const auto from = light.row(int(y));
+    const auto to = picture.row(int(y));
+    for (std::size_t x = 0; x < to.size(); ++x) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        const double fill = double(from[x][Eigen::Index(k)]) * frame.exposure;
+        to[x][k] = bytes[std::size_t(site.code(fill, row_rng))];
+      }
+    }
+  });
+  frame.set(kColor, std::move(picture));
+}
+
+}  // namespace diorama

@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+// Sensors during a run and from a stored dataset.
+#include "program.h"
+#include "support/catch.h"
+
+using namespace diorama::test;
+using Catch::Matchers::Contains;
+
+namespace {
+
+constexpr const char* kEffects = R"(
+annotators:
+  - {type: camera_sensor, iso: 3200, red_shift_px: 1.5, blue_shift_px: -1}
+  - {type: depth_sensor, baseline_m: 0.1, min_m: 0.1}
+)";
+
+/// Two captures; `cameras` of them have lenses that are not round numbers.
+std::string job(const std::string& cameras) {
+  return R"(
+seed: 11
+total_captures: 2
+environments: [{type: files, files: [room.usda]}]
+cameras: )" +
+         cameras + R"(
+physics: {type: none}
+renderer: {type: "null"}
+randomizers:
+  - {type: camera_lens, on: [floating], focal_length_mm: [20, 30], principal_point_px: [-9, 9]}
+timeline: [{capture: floating, count: 2}]
+output: {folder: out}
+writers:
+  - {type: BasicWriter, name: stored, rgb: true, image_output_format: exr, camera_params: true,
+     distance_to_image_plane: true}
+  - {type: BasicWriter, name: seen, rgb: true, sensor_depth: true}
+)" + kEffects;
+}
+
+constexpr const char* kRoom = R"(#usda 1.0
+(
+    metersPerUnit = 1
+    upAxis = "Z"
+)
+def Xform "World"
+{
+    def Cube "Near"
+    {
+        double size = 1
+        double3 xformOp:translate = (3, 0, 0)
+        uniform token[] xformOpOrder = ["xformOp:translate"]
+    }
+    def Cube "Far"
+    {
+        double size = 6
+        double3 xformOp:translate = (9, 0, 0)
+        uniform token[] xformOpOrder = ["xformOp:translate"]
+    }
+}
+)";
+
+constexpr const char* kTwoCameras = "[{type: pinhole, count: 2, width: 97, height: 61}]";
+constexpr const char* kOneCamera =
+    "[{type: opencv_pinhole, width: 97, height: 61, distortion: [-0.1, 0.03, 0.001, 0.002]}]";
+
+Outcome run_job(const TemporaryFolder& folder, const std::string& text) {
+  write_file(folder / "room.usda", kRoom);
+  write_file(folder / "job.yaml", text);
+  write_file(folder / "effects.yaml", kEffects);
+  return run({"run", "job.yaml"}, folder.path());
+}
+
+std::string error_of(const TemporaryFolder& folder, std::vector<std::string> arguments, int code) {
+  arguments.insert(arguments.begin(), "sensors");
+  const Outcome outcome = run(arguments, folder.path());
+  INFO(outcome.errors);
+  CHECK(outcome.exit_code == code);
+  return outcome.errors;
+}
+
+}  // namespace
+
+TEST_CASE("sensors give the same bytes in a run and from what it stored", "[sensors]") {
+  for (const char* cameras : {kTwoCameras, kOneCamera}) {
+    const TemporaryFolder folder;
+    const Outcome made = run_job(folder, job(cameras));
+    INFO(made.errors);
+    REQUIRE(made.exit_code == 0);
+    CHECK_THAT(made.errors, !Contains("warning"));
+    const auto seen = tree(folder / "out" / "seen");
+    CHECK(seen.size() == (cameras == kTwoCameras ? 9 : 5));  // metadata.txt, two files per frame
+    for (const char* threads : {"1", "3"}) {
+      const Outcome replay = run({"sensors", "out", "--effects", "effects.yaml", "--overwrite",
+                                  "-o", "replay", "--threads", threads},
+                                 folder.path());
+      INFO(replay.errors);
+      REQUIRE(replay.exit_code == 0);
+      CHECK(difference(seen, tree(folder / "replay" / "stored")) == "");
+    }
+    // The job itself says the effects, too.
+    const Outcome again =
+        run({"sensors", "out", "--effects", "job.yaml", "-o", "again"}, folder.path());
+    CHECK(again.exit_code == 0);
+    CHECK(difference(seen, tree(folder / "again" / "stored")) == "");
+    CHECK(run({"lint", "again"}, folder.path()).exit_code == 0);
+    CHECK(run({"lint", "out"}, folder.path()).exit_code == 0);
+  }
+}
+
+TEST_CASE("sensors change pictures and no label", "[sensors]") {
+  const TemporaryFolder with;
+  const TemporaryFolder without;
+  const std::string labelled = job(kTwoCameras);
+  std::string text = labelled;
+  text.insert(text.find("  - {type: BasicWriter, name: seen"),
+              "  - {type: BasicWriter, name: labels, distance_to_camera: true, normals: true,\n"
+              "     instance_id_segmentation: true}\n");
+  REQUIRE(run_job(with, text).exit_code == 0);
+  std::string bare = text.substr(0, text.find("annotators:"));
+  REQUIRE(run_job(without, bare).exit_code == 0);
+  CHECK(difference(tree(with / "out" / "labels"), tree(without / "out" / "labels")) == "");
+  CHECK(difference(tree(with / "out" / "stored"), tree(without / "out" / "stored")) == "");
+  CHECK_THAT(difference(tree(with / "out" / "seen"), tree(without / "out" / "seen")),
+             Contains("differs: rp_cam_0/rgb/rgb_0000.png"));
+}
+
+TEST_CASE("what sensors cannot use is told", "[sensors]") {
+  const TemporaryFolder folder;
+  std::string text = job(kTwoCameras);
+  text.replace(text.find("camera_params: true"), 19, "camera_params: false");
+  REQUIRE(run_job(folder, text).exit_code == 0);
+  CHECK_THAT(error_of(folder, {"out", "--effects", "effects.yaml"}, 2),
+             Contains("out: no writer stored what the effects need; that takes a BasicWriter with "
+                      "{camera_params: true, rgb: true, image_output_format: exr, "
+                      "distance_to_image_plane: true}"));
+  CHECK_THAT(error_of(folder, {"nowhere", "--effects", "effects.yaml"}, 2),
+             Contains("nowhere: holds no dataset.json; give the output folder of a run"));
+  write_file(folder / "none.yaml", "seed: 1\n");
+  CHECK_THAT(error_of(folder, {"out", "--effects", "none.yaml"}, 3),
+             Contains("none.yaml: the section `annotators` is missing or empty"));
+  write_file(folder / "wrong.yaml", "annotators: [{type: camera_sensor, isso: 100}]\n");
+  CHECK_THAT(error_of(folder, {"out", "--effects", "wrong.yaml"}, 3),
+             Contains("wrong.yaml:1:") && Contains("isso"));
+  write_file(folder / "needy.yaml", "annotators: [{type: instance_ids}]\n");
+  CHECK_THAT(error_of(folder, {"out", "--effects", "needy.yaml"}, 3),
+             Contains("instance_ids needs \"leaf_id\", which stored datasets do not give"));
+}
+
+TEST_CASE("a cut file of the dataset is named", "[sensors]") {
+  const TemporaryFolder folder;
+  REQUIRE(run_job(folder, job(kTwoCameras)).exit_code == 0);
+  const std::string name =
+      "out/stored/rp_cam_1/distance_to_image_plane/"
+      "distance_to_image_plane_0001.npy";
+  write_file(folder / name, read_file(folder / name).substr(0, 1000));
+  CHECK_THAT(error_of(folder, {"out", "--effects", "effects.yaml"}, 5),
+             Contains("distance_to_image_plane_0001.npy: holds"));
+  CHECK_FALSE(fs::exists(folder / "sensors/stored/rp_cam_1/sensor_depth/sensor_depth_0001.npy"));
+}
+
+TEST_CASE("a sensor that no writer asks for is warned of", "[sensors]") {
+  const TemporaryFolder folder;
+  std::string text = job(kTwoCameras);
+  text.erase(text.find(", sensor_depth: true"), 20);
+  const Outcome made = run_job(folder, text);
+  CHECK(made.exit_code == 0);
+  CHECK_THAT(made.errors, Contains("annotators: depth_sensor does nothing, as no writer needs what "
+                                   "it makes (sensor_depth)"));
+}
