@@ -179,6 +179,7 @@ void Pipeline::randomize(Visit& visit, const std::string& moment, int number, in
   call_randomizers(visit, moment, number, capture, 0);
   // The engine holds the bodies where it left them; where they were moved, it starts anew.
   if (moment == "environment" || object_poses(visit.scene, visit.objects) == before) return;
+  visit.before_last_step.clear();
   reset_physics(visit);
 }
 
@@ -202,7 +203,6 @@ void Pipeline::call_randomizers(Visit& visit, const std::string& moment, int num
 }
 
 void Pipeline::reset_physics(Visit& visit) {
-  visit.before_last_step.clear();
   for (auto& physics : components_.physics) {
     call_component("physics '" + job_.physics.type + "'", [&] { physics->reset(visit.scene); });
   }
@@ -256,6 +256,7 @@ void Pipeline::respawn(Visit& visit, const std::vector<NodeId>& lost, int number
   const SavedNodes others(visit.scene, lost);
   call_randomizers(visit, "environment", 0, -1, number);
   others.restore(visit.scene);
+  visit.before_last_step.clear();
   reset_physics(visit);
 }
 
@@ -266,6 +267,7 @@ void Pipeline::drop(Visit& visit, const std::vector<NodeId>& lost) {
     visit.scene.erase(object);
     std::erase(visit.objects, object);
   }
+  // The others stay where their last step took them: captures show its motion.
   reset_physics(visit);
 }
 

@@ -134,7 +134,7 @@ const Registry::State::Known& Registry::State::require(ComponentKind kind,
   }
   const std::string near = nearest_name(type, names);
   throw Error(ErrorKind::Plugin, "unknown " + titled(kind, type) +
-                                     (near.empty() ? "" : ", did you mean '" + near + "'?") +
+                                     (near.empty() ? "." : ", did you mean '" + near + "'?") +
                                      " There is: " + joined(names));
 }
 

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // In the smoke job objects fall beside the room, a cube or a sphere, and go on falling.
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "framework/lint/dataset_files.h"
 #include "program.h"
 #include "support/catch.h"
 
@@ -63,6 +65,18 @@ TEST_CASE("Dropped objects are gone from the visit and its labels", "[run][settl
   CHECK(sum(dropped, "dropped") == sum(kept, "left_room"));
   CHECK(sum(dropped, "left_room") == 0);
   CHECK_THAT(dropped.log, Contains("had left the room and was taken out"));
+}
+
+TEST_CASE("Objects that stay keep their motion when others are dropped", "[run][settle]") {
+  const Run run = run_with_policy(
+      "drop", {"--set", "total_captures=2", "--set",
+               "timeline=[{simulate: 70}, {capture: dropped, count: 1}]", "--set",
+               "randomizers.cameras.on=[dropped]", "--set", "writers.basic.motion_vectors=true"});
+  REQUIRE(run.reports[1]["dropped"].size() > 0);
+  const diorama::lint::NpyArray motion = diorama::lint::parse_npy(
+      run.files.at("basic/rp_cam_0/motion_vectors/motion_vectors_0001.npy"));
+  CHECK(std::any_of(motion.data.begin(), motion.data.end(),
+                    [](std::byte byte) { return byte != std::byte{0}; }));
 }
 
 TEST_CASE("Respawned objects are placed again within their range until they stay",

@@ -114,7 +114,10 @@ TEST_CASE("making components complains about everything that a job got wrong", "
   Value extra = job_entry("ball");
   extra.set("radios", Value::number(2)).key_place = {"job.yaml", 9, 3};
   CHECK_FALSE(make(extra));
-  REQUIRE(complaints.messages().size() == 4);
+  CHECK_FALSE(make(job_entry("submarine")));
+  REQUIRE(complaints.messages().size() == 5);
+  CHECK(complaints.messages()[4] ==
+        "job.yaml:5:9: environments[0]: unknown loader 'submarine'. There is: ball");
   CHECK(complaints.messages()[0] ==
         "job.yaml:5:9: environments[0]: unknown loader 'bal', did you mean 'ball'? There is: ball");
   CHECK(complaints.messages()[1] ==
@@ -127,7 +130,7 @@ TEST_CASE("making components complains about everything that a job got wrong", "
   CHECK(complaints.messages()[3].find("radius") != std::string::npos);
   const Value good = job_entry("ball");
   CHECK(make(good));
-  CHECK(complaints.messages().size() == 4);
+  CHECK(complaints.messages().size() == 5);
 }
 
 TEST_CASE("the bundled plugins are found from the program's place", "[plugins]") {
