@@ -15,14 +15,14 @@ namespace {
 
 constexpr int kRounds = 5;
 constexpr std::array<float, 5> kKernel{1 / 16.0f, 4 / 16.0f, 6 / 16.0f, 4 / 16.0f, 1 / 16.0f};
-constexpr float kLuminanceSlack = 3.5f;  // standard deviations
-constexpr float kNormalSharpness = 40.0f;
-constexpr float kPlaneSlack = 0.008f;  // of the distance from the camera
+constexpr float kLuminanceSlack = 4.0f;  // standard deviations
+constexpr float kNormalSharpness = 10.0f;
+constexpr float kPlaneSlack = 0.016f;  // of the distance from the camera
 constexpr float kAlbedoSlack = 0.6f;
 constexpr float kMinAlbedo = 0.02f;
 // Where the samples of a pixel met surfaces that face many ways (glass, edges), their means say
 // little of how alike two such pixels are.
-constexpr float kMixedTolerance = 20.0f;
+constexpr float kMixedTolerance = 100.0f;
 // Below this share of agreeing neighbours a pixel was hardly averaged: edges, thin things.
 constexpr float kLonely = 0.25f;
 constexpr float kWitnesses = 10.0f;  // averaged pixels near a lonely one that make it suspect
@@ -30,6 +30,8 @@ constexpr float kLeeway = 2.0f;      // by which it may leave their range
 constexpr float kInfinite = std::numeric_limits<float>::infinity();
 
 constexpr int kRowsPerTask = 8;
+constexpr int kBlock = 16;             // pixels of a square whose tamed light is summed up
+constexpr float kMostReturned = 1.3f;  // of the light that is left
 
 /// One number per pixel. Rows start and end with as many zeros as the widest round reaches, so that
 /// whole groups of pixels can be read anywhere near the picture.
@@ -104,13 +106,17 @@ class Denoiser {
         guides_(width_, height_),
         lights_(width_, height_),
         next_(width_, height_),
+        columns_((width_ + kBlock - 1) / kBlock),
+        block_rows_((height_ + kBlock - 1) / kBlock),
+        before_(std::size_t(columns_ * block_rows_)),
+        after_(before_.size()),
         luminance_scale_(width_, height_),
         support_(width_, height_) {}
 
   Image<Vec3f> run();
 
  private:
-  enum class Step : std::uint8_t { Read, Tame, Measure, Filter, Calm, Write };
+  enum class Step : std::uint8_t { Read, Tame, Weigh, Return, Measure, Filter, Calm, Write };
 
   /// Does one step for all rows. Steps read lights_ and leave their result there.
   void all_rows(Step step, int reach = 1);
@@ -120,6 +126,8 @@ class Denoiser {
   void rows_avx512(Step step, int reach, int begin, int end);
   void read(int y);
   void tame(int y);
+  void weigh(int block_row);
+  void give_back(int y);
   void measure(int y);
   void filter(int y, int reach);
   void calm(int y);
@@ -134,6 +142,11 @@ class Denoiser {
   Guides guides_;
   Incoming lights_;
   Incoming next_;
+  // Sums of luminance over blocks of pixels, as sampled and tamed.
+  int columns_;
+  int block_rows_;
+  std::vector<float> before_;
+  std::vector<float> after_;
   Plane luminance_scale_;  ///< 1 / difference of luminance that noise explains.
   Plane support_;          ///< Share of the neighbours that agreed in the first round.
   Image<Vec3f> image_;
@@ -147,6 +160,12 @@ inline void Denoiser::rows(Step step, int reach, int begin, int end) {
         break;
       case Step::Tame:
         tame(y);
+        break;
+      case Step::Weigh:
+        if (y % kBlock == 0) weigh(y / kBlock);
+        break;
+      case Step::Return:
+        give_back(y);
         break;
       case Step::Measure:
         measure(y);
@@ -196,6 +215,8 @@ Image<Vec3f> Denoiser::run() {
   all_rows(Step::Read);
   next_ = lights_;
   all_rows(Step::Tame);
+  all_rows(Step::Weigh);
+  all_rows(Step::Return);
   std::swap(lights_, next_);
   for (int round = 0; round < kRounds; ++round) {
     all_rows(Step::Measure);
@@ -259,16 +280,56 @@ inline void Denoiser::tame(int y) {
     }
     const Lanes own = load_lanes(lights_.luminance.row(y) + x);
     const Lanes is_surface = load_lanes(guides_.is_surface.row(y) + x);
-    const Lanes limit = 1.5f * third;
     const Lanes judged = neighbours >= 8.0f ? is_surface : zero;
-    const Lanes suspect = own > limit ? judged : zero;
-    const Lanes scale = suspect > zero ? limit / larger(own, all_lanes(1e-30f)) : zero + 1.0f;
+    const Lanes suspect = own > third ? judged : zero;
+    const Lanes scale = suspect > zero ? third / larger(own, all_lanes(1e-30f)) : zero + 1.0f;
     for (std::size_t k = 0; k < 3; ++k) {
       store_lanes(load_lanes(lights_.irradiance[k].row(y) + x) * scale,
                   next_.irradiance[k].row(y) + x);
     }
     store_lanes(own * scale, next_.luminance.row(y) + x);
     store_lanes(load_lanes(lights_.variance.row(y) + x) * scale * scale, next_.variance.row(y) + x);
+  }
+}
+
+void Denoiser::weigh(int block_row) {
+  const int y_end = std::min(height_, (block_row + 1) * kBlock);
+  for (int column = 0; column < columns_; ++column) {
+    const int x_end = std::min(width_, (column + 1) * kBlock);
+    float before = 0.0f;
+    float after = 0.0f;
+    for (int y = block_row * kBlock; y < y_end; ++y) {
+      for (int x = column * kBlock; x < x_end; ++x) {
+        before += lights_.luminance.row(y)[x];
+        after += next_.luminance.row(y)[x];
+      }
+    }
+    const auto block = std::size_t(block_row * columns_ + column);
+    before_[block] = before;
+    after_[block] = after;
+  }
+}
+
+/// The light that was cut off comes back, spread over a wide neighbourhood: pictures would be too
+/// dark otherwise.
+void Denoiser::give_back(int y) {
+  for (int x = 0; x < width_; ++x) {
+    const float u = (float(x) + 0.5f) / float(kBlock) - 0.5f;
+    const float v = (float(y) + 0.5f) / float(kBlock) - 0.5f;
+    float before = 0.0f;
+    float after = 1e-12f;
+    for (int row = int(std::ceil(v - 2.0f)); float(row) < v + 2.0f; ++row) {
+      for (int column = int(std::ceil(u - 2.0f)); float(column) < u + 2.0f; ++column) {
+        if (row < 0 || column < 0 || row >= block_rows_ || column >= columns_) continue;
+        const float w = (2.0f - std::abs(float(row) - v)) * (2.0f - std::abs(float(column) - u));
+        before += w * before_[std::size_t(row * columns_ + column)];
+        after += w * after_[std::size_t(row * columns_ + column)];
+      }
+    }
+    const float scale = std::clamp(before / after, 1.0f, kMostReturned);
+    for (Plane& plane : next_.irradiance) plane.row(y)[x] *= scale;
+    next_.luminance.row(y)[x] *= scale;
+    next_.variance.row(y)[x] *= scale * scale;
   }
 }
 
