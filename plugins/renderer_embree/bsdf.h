@@ -59,6 +59,13 @@ class Bsdf {
   /// Whether light through the back of the surface can matter here.
   bool transmits() const { return p_glass_ > 0.0f; }
 
+  /// Whether all lobes are wide, so that light samples alone find light well.
+  bool is_rough() const {
+    constexpr float kRoughAlpha = 0.25f;
+    return is_lambert_ || (p_glass_ <= 0.0f && s_.alpha >= kRoughAlpha &&
+                           (p_coat_ <= 0.0f || s_.layers.coat_alpha >= kRoughAlpha));
+  }
+
   BsdfValue evaluate(const Vec3f& wi) const;
   /// `lobe` in [0, 1) chooses, `u` places.
   BsdfSample sample(float lobe, const Vec2f& u) const;

@@ -33,8 +33,10 @@ class ChannelFiller {
       const CentreHit* hits = &hits_[y * std::size_t(width)];
       for (std::size_t x = 0; x < row.size(); ++x) {
         if (!hits[x].hit) continue;
-        row[x] = value(hits[x], RenderScene::surface_at(hits[x].hit, hits[x].ray.origin,
-                                                        hits[x].ray.direction));
+        SurfaceGeometry surface =
+            RenderScene::surface_at(hits[x].hit, hits[x].ray.origin, hits[x].ray.direction);
+        RenderScene::add_uv(surface, hits[x].hit);
+        row[x] = value(hits[x], surface);
       }
     });
     frame_.set(channel, std::move(image));

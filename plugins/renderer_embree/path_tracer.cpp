@@ -230,8 +230,9 @@ inline void PathTracer::shade(Path& path) const {
   if (!hit) return;
   path.since_last += hit.distance;
   path.width += path.spread * hit.distance;
-  const SurfaceGeometry surface = RenderScene::surface_at(hit, path.origin, path.direction);
+  SurfaceGeometry surface = RenderScene::surface_at(hit, path.origin, path.direction);
   const ShadingMaterial& material = hit.instance->material(hit.triangle);
+  if (material.reads_uv) RenderScene::add_uv(surface, hit);
   if (material.emits) collect_emission(path, hit, surface, material);
   if (path.bounce <= settings_.max_bounces) scatter(path, hit, surface, material);
 }
@@ -355,7 +356,7 @@ inline void PathTracer::collect_lights(Path& path, float t_max) const {
 
 inline void PathTracer::sample_light(Path& path, const SurfaceGeometry& surface, const Bsdf& bsdf,
                                      const Basis& basis, const Vec2f& choice_u,
-                                     const Vec2f& place_u) const {
+                                     const Vec2f& place_u, bool has_rival) const {
   const Lights& lights = scene_.lights();
   const Lights::Choice choice = lights.choose(path.last, choice_u.x());
   if (!settings_.samples_lights || choice.probability <= 0.0f) return;
@@ -371,8 +372,7 @@ inline void PathTracer::sample_light(Path& path, const SurfaceGeometry& surface,
 
   const bool is_point = std::isinf(s.density);
   const float density = (is_point ? 1.0f : s.density) * choice.probability;
-  const bool has_rival = !is_point && settings_.samples_bsdf;
-  const float weight = has_rival ? mis_weight(density, value.density) : 1.0f;
+  const float weight = has_rival && !is_point ? mis_weight(density, value.density) : 1.0f;
   const float t_max = std::isinf(s.distance) ? kInfinite : s.distance * 0.9998f - 1e-4f;
   if (t_max <= 0.0f) return;
   path.shadow.origin = leave(surface, s.direction);
@@ -432,7 +432,11 @@ inline void PathTracer::scatter(Path& path, const RayHit& hit, const SurfaceGeom
   if (bsdf.has_smooth_part()) {
     path.has_scattered = true;
     path.last = {surface.position, normal, bsdf.transmits() && !is_soft, 0.0f};
-    sample_light(path, surface, bsdf, basis, u[0], u[1]);
+    // Where the path ends, light samples alone find all light that a rough surface scatters.
+    const bool ends =
+        path.bounce == settings_.max_bounces && bsdf.is_rough() && settings_.samples_lights;
+    sample_light(path, surface, bsdf, basis, u[0], u[1], settings_.samples_bsdf && !ends);
+    if (ends) return;
   }
 
   const BsdfSample next = bsdf.sample(u[2].x(), u[3]);

@@ -83,7 +83,8 @@ class PathTracer {
   bool pass_or_reflect(Path& path, const SurfaceGeometry& surface, const ShadingMaterial& material,
                        SurfaceBsdf& bsdf) const;
   void sample_light(Path& path, const SurfaceGeometry& surface, const Bsdf& bsdf,
-                    const Basis& basis, const Vec2f& choice, const Vec2f& place) const;
+                    const Basis& basis, const Vec2f& choice, const Vec2f& place,
+                    bool has_rival) const;
   SurfaceBsdf read_textures(const Path& path, const RayHit& hit, const SurfaceGeometry& surface,
                             const ShadingMaterial& material, bool is_soft, Vec3f& normal) const;
   void scatter(Path& path, const RayHit& hit, const SurfaceGeometry& surface,

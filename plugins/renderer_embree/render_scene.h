@@ -76,11 +76,11 @@ struct RayHit {
 /// The surface at a hit, without its material. World space.
 struct SurfaceGeometry {
   Vec3f position;
-  Vec3f flat_normal;  ///< Unit, of the triangle, on the side of the ray's origin.
-  Vec3f normal;       ///< Unit, interpolated, facing the ray's origin.
-  Vec2f uv;
+  Vec3f flat_normal;          ///< Unit, of the triangle, on the side of the ray's origin.
+  Vec3f normal;               ///< Unit, interpolated, facing the ray's origin.
+  Vec2f uv = Vec2f::Zero();   ///< Filled by RenderScene::add_uv(), if the mesh has any.
+  float uv_per_metre = 0.0f;  ///< Its density on the triangle; likewise.
   bool is_back = false;       ///< The ray came from behind.
-  float uv_per_metre = 0.0f;  ///< Density of the mesh's uv on the triangle.
 };
 
 /// A scene uploaded for ray queries. take() is called for every change and reuses what it can:
@@ -141,8 +141,9 @@ class RenderScene {
     RTCScene scene_ = nullptr;
   };
 
-  /// Of a hit of the ray from `origin`.
+  /// Of a hit of the ray from `origin`; without uv, which few surfaces need.
   static SurfaceGeometry surface_at(const RayHit& hit, const Vec3f& origin, const Vec3f& direction);
+  static void add_uv(SurfaceGeometry& surface, const RayHit& hit);
 
  private:
   struct CachedDome {
@@ -297,17 +298,19 @@ inline SurfaceGeometry RenderScene::surface_at(const RayHit& hit, const Vec3f& o
     const float away = s.normal.dot(direction);
     if (away > -1e-4f) s.normal = unit(s.normal - (away + 1e-4f) * direction);
   }
-  if (mesh.has_uvs()) {
-    const auto& uvs = mesh.uvs(hit.triangle);
-    const Vec2f e = uvs[1] - uvs[0];
-    const Vec2f f = uvs[2] - uvs[0];
-    s.uv = uvs[0] + hit.u * e + hit.v * f;
-    const float uv_area = std::abs(e.x() * f.y() - e.y() * f.x());
-    s.uv_per_metre = twice_area > 0.0f ? std::sqrt(uv_area / twice_area) : 0.0f;
-  } else {
-    s.uv = Vec2f::Zero();
-  }
   return s;
+}
+
+inline void RenderScene::add_uv(SurfaceGeometry& s, const RayHit& hit) {
+  const ShadingMesh& mesh = *hit.instance->shading;
+  if (!mesh.has_uvs()) return;
+  const auto& uvs = mesh.uvs(hit.triangle);
+  const Vec2f e = uvs[1] - uvs[0];
+  const Vec2f f = uvs[2] - uvs[0];
+  s.uv = uvs[0] + hit.u * e + hit.v * f;
+  const float uv_area = std::abs(e.x() * f.y() - e.y() * f.x());
+  const float twice_area = hit.normal.norm();
+  s.uv_per_metre = twice_area > 0.0f ? std::sqrt(uv_area / twice_area) : 0.0f;
 }
 
 }  // namespace diorama

@@ -107,6 +107,7 @@ std::unique_ptr<ShadingMaterial> MaterialLibrary::make(std::shared_ptr<const Mat
   material->emission = slot(m.emission_texture);
   material->is_textured =
       material->base_color || material->metallic || material->roughness || material->normal;
+  material->reads_uv = material->is_textured || material->opacity || material->emission;
   material->is_cut_out = material->opacity || m.opacity < 1.0f;
   material->is_veil = material->is_cut_out && m.opacity_threshold <= 0.0f;
   material->is_pane = m.is_thin_walled && m.transmission > 0.0f;
