@@ -4,6 +4,7 @@
 #include <sstream>
 
 #include "diorama/error.h"
+#include "loader_assimp/asset_files.h"
 #include "loader_assimp/scene_file.h"
 #include "loader_assimp/scene_translator.h"
 
@@ -26,13 +27,17 @@ std::vector<std::string> AssimpLoader::claims() const {
   return claims;
 }
 
+std::vector<std::filesystem::path> AssimpLoader::files(std::string_view asset) const {
+  return files_of(std::string(asset));
+}
+
 void AssimpLoader::load(std::string_view asset, Scene& scene, NodeId root) {
   const std::string name(asset);
   const SceneFile file(name, host_);
   host_.log(LogLevel::Debug, describe_units(file, params_.unstated));
   SceneTranslator translator(file, params_.unstated, host_, scene);
   translator.translate(root);
-  const std::vector<std::string>& missing = translator.missing();
+  const std::vector<std::string> missing = translator.missing();
   if (params_.missing_assets_are_errors && !missing.empty()) {
     throw Error(ErrorKind::Asset, missing.front());
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -32,6 +33,8 @@ class AssimpLoader final : public Loader {
   AssimpLoader(Params params, Host& host) : params_(std::move(params)), host_(host) {}
 
   std::vector<std::string> claims() const override;
+  /// Material libraries, buffers and pictures, too.
+  std::vector<std::filesystem::path> files(std::string_view asset) const override;
   void load(std::string_view asset, Scene& scene, NodeId root) override;
 
  private:

@@ -187,7 +187,7 @@ TextureInput MaterialTranslator::texture(const aiMaterial& source,
   TextureInput input;
   const auto slot = find_texture(source, types);
   if (!slot) return input;
-  input.texture = textures_.read(slot->name, space);
+  input.texture = textures_.read(slot->name, space, source.GetName().C_Str());
   input.wrap_u = wrap(source, _AI_MATKEY_MAPPINGMODE_U_BASE, slot->type);
   input.wrap_v = wrap(source, _AI_MATKEY_MAPPINGMODE_V_BASE, slot->type);
   input.uv_from_mesh_uv = uv_map(source, slot->type, is_gltf());

@@ -29,7 +29,7 @@ class MaterialTranslator {
   std::shared_ptr<const Material> translate(unsigned index);
 
   /// One line per missing texture.
-  const std::vector<std::string>& missing() const { return textures_.missing(); }
+  std::vector<std::string> missing() const { return textures_.missing(); }
 
  private:
   TextureInput texture(const aiMaterial& source, std::initializer_list<aiTextureType> types,

@@ -173,7 +173,7 @@ std::shared_ptr<const Mesh> MeshTranslator::translate(const aiNode& node) {
   // One list serves all parts, so where only some have normals, all get smooth ones.
   if (some_lack_normals && !mesh.normals.empty()) mesh.normals = smooth_normals(mesh);
   mesh.validate(file_.name() + ": " + node.mName.C_Str());
-  return entry->second = std::make_shared<const Mesh>(std::move(mesh));
+  return entry->second = pool_.share(std::move(mesh));
 }
 
 }  // namespace diorama::loader_assimp

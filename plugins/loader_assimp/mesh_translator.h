@@ -8,11 +8,12 @@
 
 #include "diorama/geometry.h"
 #include "loader_assimp/scene_file.h"
+#include "loader_support/mesh_pool.h"
 
 namespace diorama::loader_assimp {
 
-/// Makes one mesh with several material slots out of the meshes of a node. Nodes with the same
-/// meshes share the result.
+/// Makes one mesh with several material slots out of the meshes of a node. Nodes with the same or
+/// equal meshes share the result.
 class MeshTranslator {
  public:
   explicit MeshTranslator(const SceneFile& file) : file_(file) {}
@@ -32,6 +33,7 @@ class MeshTranslator {
   using Key = std::pair<std::vector<const aiMesh*>, const aiNode*>;
   const SceneFile& file_;
   std::map<Key, std::shared_ptr<const Mesh>> meshes_;
+  loader_support::MeshPool pool_;
 };
 
 }  // namespace diorama::loader_assimp

@@ -10,7 +10,6 @@
 #include <cctype>
 #include <filesystem>
 
-#include "diorama/error.h"
 #include "loader_assimp/child_process.h"
 
 namespace diorama::loader_assimp {
@@ -19,9 +18,9 @@ namespace {
 namespace fs = std::filesystem;
 
 // Enough for every honest file seen so far, tens of times over.
-constexpr int kLeastSeconds = 10;
+constexpr int kLeastSeconds = 5;
 constexpr std::uint64_t kBytesPerSecond = 250'000;
-constexpr std::uint64_t kLeastMemory = std::uint64_t(4) << 30;
+constexpr std::uint64_t kLeastMemory = std::uint64_t(1) << 30;
 constexpr std::uint64_t kMemoryPerByte = 200;
 constexpr std::size_t kMostComplaints = 8;
 // Edges that are sharper than this stay edges when normals are made up.
@@ -113,20 +112,25 @@ class AssimpLog {
 
 }  // namespace
 
+std::string read_in_child(const std::string& file, const std::function<std::string()>& body) {
+  return run_in_child(limits_for(file), body);
+}
+
+Error unreadable(const std::string& file, const std::string& why) {
+  return Error(ErrorKind::Asset, file + ": assimp cannot read it: " + why);
+}
+
 SceneFile::SceneFile(const std::string& file, Host& host) : name_(file), format_(format_of(file)) {
-  const auto fail = [&](const std::string& why) {
-    throw Error(ErrorKind::Asset, file + ": assimp cannot read it: " + why);
-  };
-  const std::string trial = run_in_child(limits_for(file), [&] {
+  const std::string trial = read_in_child(file, [&] {
     Assimp::Importer importer;
     return read(importer, file, format_);
   });
-  if (!trial.empty()) fail(trial);
+  if (!trial.empty()) throw unreadable(file, trial);
   std::vector<std::string> complaints;
   {
     const AssimpLog log(complaints);
     const std::string why = read(importer_, file, format_);
-    if (!why.empty()) fail(why);
+    if (!why.empty()) throw unreadable(file, why);
   }
   for (const std::string& line : complaints) {
     host.log(LogLevel::Warning, file + ": assimp: " + line);

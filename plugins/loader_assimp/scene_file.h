@@ -4,8 +4,10 @@
 #include <assimp/scene.h>
 
 #include <assimp/Importer.hpp>
+#include <functional>
 #include <string>
 
+#include "diorama/error.h"
 #include "diorama/host.h"
 
 namespace diorama::loader_assimp {
@@ -18,6 +20,13 @@ enum class Format {
   Plain,  ///< OBJ, PLY, STL, OFF: neither units nor axes are stated.
   Other,
 };
+
+/// Runs `body`, which reads `file` with assimp, in a child process whose time and memory are limited
+/// by the file's size. Returns what it returned, or what it died of.
+std::string read_in_child(const std::string& file, const std::function<std::string()>& body);
+
+/// "FILE: assimp cannot read it: WHY".
+Error unreadable(const std::string& file, const std::string& why);
 
 /// A file as assimp reads it: triangles only, without animations.
 class SceneFile {

@@ -25,7 +25,7 @@ class SceneTranslator {
   void translate(NodeId root);
 
   /// One line per missing texture.
-  const std::vector<std::string>& missing() const { return materials_.missing(); }
+  std::vector<std::string> missing() const { return materials_.missing(); }
 
  private:
   struct Place {

@@ -47,23 +47,6 @@ std::string plain_path(std::string name) {
   return first == std::string::npos ? "" : name.substr(first, last - first + 1);
 }
 
-// Exporters write paths of the machine that they ran on: what they mean often lies beside the file.
-std::optional<fs::path> find_file(const fs::path& folder, const std::string& name) {
-  const std::string path = plain_path(name);
-  if (path.empty()) return std::nullopt;
-  for (const std::string& spelling : {path, decode_percent(path)}) {
-    const fs::path base = fs::path(spelling).filename();
-    if (base.empty()) continue;
-    for (const fs::path& place :
-         {folder / spelling, folder / base, folder / "textures" / base, folder / "Textures" / base,
-          folder.parent_path() / "textures" / base}) {
-      std::error_code error;
-      if (fs::is_regular_file(place, error)) return place;
-    }
-  }
-  return std::nullopt;
-}
-
 std::shared_ptr<const Texture> unpack_raw(const aiTexture& source, const std::string& name) {
   if (source.mWidth == 0 || source.mWidth > kMaxRawSize || source.mHeight > kMaxRawSize) {
     throw Error(ErrorKind::Asset, name + ": a picture of " + std::to_string(source.mWidth) + " x " +
@@ -93,6 +76,23 @@ std::shared_ptr<const Texture> decode_embedded(const Host& host, const aiTexture
 
 }  // namespace
 
+// Exporters write paths of the machine that they ran on: what they mean often lies beside the file.
+std::optional<fs::path> find_picture(const fs::path& folder, const std::string& name) {
+  const std::string path = plain_path(name);
+  if (path.empty()) return std::nullopt;
+  for (const std::string& spelling : {path, decode_percent(path)}) {
+    const fs::path base = fs::path(spelling).filename();
+    if (base.empty()) continue;
+    for (const fs::path& place :
+         {folder / spelling, folder / base, folder / "textures" / base, folder / "Textures" / base,
+          folder.parent_path() / "textures" / base}) {
+      std::error_code error;
+      if (fs::is_regular_file(place, error)) return place;
+    }
+  }
+  return std::nullopt;
+}
+
 std::string TextureLibrary::identify(const std::string& name) {
   if (const aiTexture* embedded = file_.scene().GetEmbeddedTexture(name.c_str())) {
     const std::string own = embedded->mFilename.C_Str();
@@ -102,27 +102,28 @@ std::string TextureLibrary::identify(const std::string& name) {
     });
     return identifier;
   }
-  const auto found = find_file(fs::path(file_.name()).parent_path(), name);
+  const auto found = find_picture(fs::path(file_.name()).parent_path(), name);
   if (!found) return {};
   decoder_.announce(found->string(), [this, path = *found] { return host_.read_texture(path); });
   return found->string();
 }
 
-void TextureLibrary::report(const std::string& name, const std::string& why) {
-  if (!reported_.insert(name).second) return;
-  missing_.push_back(file_.name() + ": texture @" + plain_path(name) + "@ " + why);
+void TextureLibrary::report(const std::string& name, const std::string& why,
+                            const std::string& material) {
+  missing_.add(file_.name() + ": texture @" + plain_path(name) + "@ " + why, material);
 }
 
-std::shared_ptr<const Texture> TextureLibrary::read(const std::string& name, ColorSpace space) {
+std::shared_ptr<const Texture> TextureLibrary::read(const std::string& name, ColorSpace space,
+                                                    const std::string& material) {
   const std::string identifier = identify(name);
   if (identifier.empty()) {
-    report(name, "could not be found");
+    report(name, "could not be found", material);
     return nullptr;
   }
   try {
     return decoder_.get(identifier, space);
   } catch (const Error& error) {
-    report(name, std::string("could not be read: ") + error.what());
+    report(name, std::string("could not be read: ") + error.what(), material);
     return nullptr;
   }
 }

@@ -1,17 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <filesystem>
 #include <memory>
-#include <set>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "diorama/host.h"
 #include "diorama/material.h"
 #include "loader_assimp/scene_file.h"
+#include "loader_support/missing_pictures.h"
 #include "loader_support/texture_decoder.h"
 
 namespace diorama::loader_assimp {
+
+/// The picture that a material of a file in `folder` names: where it says, or beside the file.
+std::optional<std::filesystem::path> find_picture(const std::filesystem::path& folder,
+                                                  const std::string& name);
 
 /// The textures of a file: pictures inside of it (packed or raw) and beside it.
 class TextureLibrary {
@@ -24,21 +30,22 @@ class TextureLibrary {
   void decode_announced() { decoder_.decode_announced(); }
 
   /// Null when there is no such picture or it cannot be read; missing() then has a line for it.
-  std::shared_ptr<const Texture> read(const std::string& name, ColorSpace space);
+  /// `material` is the name of the material that wants it.
+  std::shared_ptr<const Texture> read(const std::string& name, ColorSpace space,
+                                      const std::string& material);
 
-  /// One line per missing picture; it names the file and the picture.
-  const std::vector<std::string>& missing() const { return missing_; }
+  /// One line per missing picture; it names the file, the picture and its materials.
+  std::vector<std::string> missing() const { return missing_.lines(); }
 
  private:
   /// The picture's name for the decoder, which knows it then; empty when there is none.
   std::string identify(const std::string& name);
-  void report(const std::string& name, const std::string& why);
+  void report(const std::string& name, const std::string& why, const std::string& material);
 
   const SceneFile& file_;
   Host& host_;
   loader_support::TextureDecoder decoder_;
-  std::set<std::string> reported_;
-  std::vector<std::string> missing_;
+  loader_support::MissingPictures missing_;
 };
 
 }  // namespace diorama::loader_assimp

@@ -144,7 +144,7 @@ std::optional<TranslatedLight> translate_light(const Stage& stage, const Prim& p
   if (type == "DomeLight" || type == "DomeLight_1") {
     light.kind = LightKind::Dome;
     light.texture =
-        textures.read(stage.find_value(prim, inputs.name("texture:file")), TextureSpace::Auto)
+        textures.read(stage.find_value(prim, inputs.name("texture:file")), TextureSpace::Auto, "")
             .texture;
     result.prim_from_light = prim_from_dome();
     return result;

@@ -8,7 +8,7 @@ namespace diorama::loader_usd {
 
 bool MaterialDraft::connect(TextureInput Material::*input, const usd::FoundValue& asset,
                             TextureSpace space) {
-  if (!textures_.announce(asset)) return false;
+  if (!textures_.announce(asset, material_->name)) return false;
   plans_.push_back({input, asset, space});
   return true;
 }
@@ -20,7 +20,7 @@ bool MaterialDraft::is_textured(TextureInput Material::*input) const {
 
 void MaterialDraft::finish() {
   for (const Plan& plan : plans_) {
-    const FoundTexture found = textures_.read(plan.asset, plan.space);
+    const FoundTexture found = textures_.read(plan.asset, plan.space, material_->name);
     TextureInput& input = (*material_).*plan.input;
     input.texture = found.texture;
     input.uv_from_mesh_uv = compose(found.texture_from_uv, input.uv_from_mesh_uv);

@@ -66,6 +66,7 @@ void MaterialTranslator::notice_module(const Prim& shader) {
 void MaterialTranslator::read_textures() {
   textures_.read_announced();
   for (MaterialDraft& draft : drafts_) draft.finish();
+  textures_.report_missing();
 }
 
 }  // namespace diorama::loader_usd

@@ -34,7 +34,8 @@ class MaterialTranslator {
   /// missing until read_textures().
   const TranslatedMaterial& translate(const std::string& path);
 
-  /// Reads the textures of all materials that were translated, several at a time.
+  /// Reads the textures of all materials that were translated, several at a time, and reports those
+  /// that are missing.
   void read_textures();
 
   TextureLibrary& textures() { return textures_; }

@@ -59,6 +59,16 @@ struct Sources {
   bool is_left_handed = false;
 };
 
+std::size_t bytes_of(const Sources& sources) {
+  std::size_t bytes = sources.points.span.size_bytes() + sources.counts.span.size_bytes() +
+                      sources.indices.span.size_bytes();
+  for (const auto* data : {&sources.normals, &sources.uvs, &sources.colors}) {
+    if (*data) bytes += (*data)->values.span.size_bytes();
+    if (*data && (*data)->indices) bytes += (*data)->indices->span.size_bytes();
+  }
+  return bytes;
+}
+
 std::optional<CornerData> read_corner_data(const Stage& stage, const Prim& prim,
                                            const std::string& name, std::size_t width,
                                            const std::string& fallback) {
@@ -367,6 +377,14 @@ std::vector<std::uint16_t> slots_of_faces(const Stage& stage, const MeshTranslat
 
 }  // namespace
 
+void MeshTranslator::note_read(std::size_t bytes) {
+  constexpr std::size_t kMostBytes = std::size_t{8} << 20;
+  bytes_read_ += bytes;
+  if (bytes_read_ < kMostBytes) return;
+  stage_.assets().release_pages();
+  bytes_read_ = 0;
+}
+
 void MeshTranslator::read_display_color(const Primvars& primvars, TranslatedMesh& result) const {
   for (const usd::Primvar& primvar : primvars) {
     const std::string name = "primvars:" + primvar.name;
@@ -450,12 +468,13 @@ TranslatedMesh MeshTranslator::translate_mesh(const Prim& prim, const Primvars& 
       usd::token_or(stage_, prim, "orientation", "rightHanded") == "leftHanded";
   const auto slots = slots_of_faces(stage_, subsets, sources.counts.span.size());
   Mesh mesh = MeshAssembly(sources, slots).build();
+  note_read(bytes_of(sources));
   if (mesh.triangles.empty()) return result;
   mesh.is_double_sided = usd::bool_or(stage_, prim, "doubleSided", false);
   const bool is_smooth = usd::token_or(stage_, prim, "subdivisionScheme", "catmullClark") != "none";
   if (mesh.normals.empty() && is_smooth) mesh.normals = smooth_normals(mesh);
   mesh.validate(prim.path);
-  known = std::make_shared<const Mesh>(std::move(mesh));
+  known = pool_.share(std::move(mesh));
   result.mesh = known;
   return result;
 }
@@ -491,7 +510,7 @@ TranslatedMesh MeshTranslator::translate_shape(const Prim& prim) {
     if (type != "Cube" && type != "Sphere") {
       turn_axis(mesh, usd::token_or(stage_, prim, "axis", "Z"));
     }
-    known = std::make_shared<const Mesh>(std::move(mesh));
+    known = pool_.share(std::move(mesh));
   }
   result.mesh = known;
   return result;

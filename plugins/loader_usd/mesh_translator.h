@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "diorama/geometry.h"
+#include "loader_support/mesh_pool.h"
 #include "loader_usd/usd/geometry.h"
 #include "loader_usd/usd/stage.h"
 
@@ -19,9 +20,9 @@ struct TranslatedMesh {
   float display_opacity = 1.0f;
 };
 
-/// Makes meshes out of Mesh prims and of the shapes. The same data, seen through instances or
-/// several references, give the same mesh. Subdivision surfaces are drawn as their cage, with
-/// smooth normals.
+/// Makes meshes out of Mesh prims and of the shapes. The same data give the same mesh, be they seen
+/// through instances and references or written several times. Subdivision surfaces are drawn as
+/// their cage, with smooth normals.
 class MeshTranslator {
  public:
   MeshTranslator(usd::Stage& stage, usd::Geometry& geometry) : stage_(stage), geometry_(geometry) {}
@@ -40,11 +41,16 @@ class MeshTranslator {
   TranslatedMesh translate_mesh(const usd::Prim& prim, const Primvars& primvars,
                                 const Prims& subsets, const std::vector<std::string>& uv_names);
   TranslatedMesh translate_shape(const usd::Prim& prim);
+  /// Layers stay mapped while they are translated, but need not stay in memory besides the meshes.
+  void note_read(std::size_t bytes);
   void read_display_color(const Primvars& primvars, TranslatedMesh& result) const;
 
   usd::Stage& stage_;
   usd::Geometry& geometry_;
+  /// By the specs that they are made of; what is equal without being the same is found in the pool.
   std::map<std::pair<Key, std::string>, std::shared_ptr<const Mesh>> meshes_;
+  loader_support::MeshPool pool_;
+  std::size_t bytes_read_ = 0;  ///< Since pages were released.
 };
 
 }  // namespace diorama::loader_usd

@@ -72,7 +72,6 @@ Affine without_scale(const Affine& affine) {
 
 SceneTranslator::SceneTranslator(Stage& stage, Host& host, Scene& scene)
     : stage_(stage),
-      host_(host),
       scene_(scene),
       geometry_(stage),
       meshes_(stage, geometry_),
@@ -90,9 +89,13 @@ void SceneTranslator::translate(NodeId root) {
     if (is_drawn(*prim)) translate_prim(*prim, place, root_from_stage_ * local_pose(*prim, place));
   }
   materials_.read_textures();
-  for (const auto& [type, count] : left_out_) {
-    host_.log(LogLevel::Info, stage_.root_layer().identifier() + ": " + std::to_string(count) +
-                                  " prims of type " + type + " are not drawn");
+  for (const auto& [type, left_out] : left_out_) {
+    std::string line = stage_.root_layer().identifier() + ": <" + left_out.first_path +
+                       "> is of type " + type + ", which is not drawn";
+    if (left_out.count > 1) {
+      line += ", like " + std::to_string(left_out.count - 1) + " more of them";
+    }
+    stage_.diagnostics().warn(line);
   }
 }
 
@@ -164,7 +167,7 @@ void SceneTranslator::translate_prim(const Prim& prim, const Place& parent, cons
   const bool is_hidden = prim.traits.is_imageable &&
                          usd::token_or(stage_, prim, "visibility", "inherited") == "invisible";
   if (is_hidden) scene_.edit(place.node).is_visible = false;
-  if (is_left_out(prim.type_name)) ++left_out_[prim.type_name];
+  if (is_left_out(prim.type_name)) note_left_out(prim);
   if (prim.traits.is_gprim) add_shape(prim, place.node);
   if (prim.type_name == "Camera") add_camera(prim, place);
   if (prim.traits.is_light) add_light(prim, place);
@@ -175,6 +178,14 @@ void SceneTranslator::translate_prim(const Prim& prim, const Place& parent, cons
     translate_children(prim, place);
   }
   physics_.translate(prim, place.node);
+}
+
+// Says of what is meant to be seen that it is not.
+void SceneTranslator::note_left_out(const Prim& prim) {
+  const std::string purpose = geometry_.purpose(prim);
+  if (purpose == "guide" || purpose == "proxy" || !geometry_.is_visible(prim)) return;
+  LeftOut& left_out = left_out_[prim.type_name];
+  if (left_out.count++ == 0) left_out.first_path = prim.path;
 }
 
 // --- Shapes -----------------------------------------------------------------------------------
@@ -207,6 +218,9 @@ void SceneTranslator::add_shape(const Prim& prim, NodeId node) {
     for (const Prim* child : stage_.visible_children(prim)) {
       if (child->type_name != "GeomSubset") continue;
       if (usd::token_or(stage_, *child, "elementType", "face") != "face") continue;
+      // Subsets of other families sort faces for other ends.
+      const std::string family = usd::token_or(stage_, *child, "familyName", "materialBind");
+      if (family != "materialBind" && !family.empty()) continue;
       std::string path = drawn_material(*child);
       if (path.empty()) continue;
       subsets.push_back(child);

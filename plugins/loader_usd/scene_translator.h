@@ -43,10 +43,10 @@ class SceneTranslator {
   void add_light(const usd::Prim& prim, Place& place);
   void add_labels(const usd::Prim& prim, NodeId node);
   void add_instances(const usd::Prim& prim, const Place& place);
+  void note_left_out(const usd::Prim& prim);
   std::shared_ptr<const Material> plain_material(const TranslatedMesh& mesh);
 
   usd::Stage& stage_;
-  Host& host_;
   Scene& scene_;
   usd::Geometry geometry_;
   MeshTranslator meshes_;
@@ -56,7 +56,12 @@ class SceneTranslator {
   Affine root_from_stage_;
   std::map<const usd::Prim*, bool> drawn_;
   std::map<std::vector<float>, std::shared_ptr<const Material>> plain_materials_;
-  std::map<std::string, std::size_t> left_out_;  ///< Types that are not drawn, and how often.
+  /// Visible prims of a type that is not drawn.
+  struct LeftOut {
+    std::string first_path;
+    std::size_t count = 0;
+  };
+  std::map<std::string, LeftOut> left_out_;  ///< By type.
   int instancer_depth_ = 0;
   std::size_t node_count_ = 0;
 };

@@ -31,9 +31,14 @@ std::vector<std::string> tile_names(const std::string& identifier) {
   return names;
 }
 
-void TextureLibrary::missing(const usd::FoundValue& asset, const std::string& why) {
-  stage_.diagnostics().missing(asset.layer->identifier() + ": texture @" + *asset.value.as_text() +
-                               "@ " + why);
+void TextureLibrary::missing(const usd::FoundValue& asset, const std::string& why,
+                             const std::string& material) {
+  missing_.add(asset.layer->identifier() + ": texture @" + *asset.value.as_text() + "@ " + why,
+               material);
+}
+
+void TextureLibrary::report_missing() const {
+  for (const std::string& line : missing_.lines()) stage_.diagnostics().missing(line);
 }
 
 std::optional<TextureLibrary::Picture> TextureLibrary::find_tiles(const std::string& identifier) {
@@ -63,39 +68,46 @@ std::optional<TextureLibrary::Picture> TextureLibrary::find_tiles(const std::str
   return Picture{identifier, UdimRange::of(tiles)};
 }
 
-std::optional<TextureLibrary::Picture> TextureLibrary::find(const usd::FoundValue& asset) {
+std::optional<TextureLibrary::Picture> TextureLibrary::find(const usd::FoundValue& asset,
+                                                            const std::string& material) {
   const std::string identifier = stage_.anchor(asset);
   if (identifier.empty()) return std::nullopt;
   const auto [entry, is_new] = found_.try_emplace(identifier);
-  if (!is_new) return entry->second;
-  try {
-    if (identifier.find(kTileMark) != std::string::npos) {
-      entry->second = find_tiles(identifier);
-    } else if (stage_.assets().exists(identifier)) {
-      // Bytes are found here, because that is for one thread; decoding them is for all.
-      decoder_.announce(identifier, [this, identifier, bytes = stage_.assets().read(identifier)] {
-        return host_.decode_texture(bytes.bytes, identifier);
-      });
-      entry->second = Picture{identifier, std::nullopt};
+  Found& found = entry->second;
+  if (is_new) {
+    found.why_not = "could not be found";
+    try {
+      if (identifier.find(kTileMark) != std::string::npos) {
+        found.picture = find_tiles(identifier);
+      } else if (stage_.assets().exists(identifier)) {
+        // Bytes are found here, because that is for one thread; decoding them is for all.
+        decoder_.announce(identifier, [this, identifier, bytes = stage_.assets().read(identifier)] {
+          return host_.decode_texture(bytes.bytes, identifier);
+        });
+        found.picture = Picture{identifier, std::nullopt};
+      }
+    } catch (const usd::FormatError& error) {
+      found.why_not = std::string("could not be read: ") + error.what();
     }
-    if (!entry->second) missing(asset, "could not be found");
-  } catch (const usd::FormatError& error) {
-    missing(asset, std::string("could not be read: ") + error.what());
   }
-  return entry->second;
+  if (!found.picture) missing(asset, found.why_not, material);
+  return found.picture;
 }
 
-bool TextureLibrary::announce(const usd::FoundValue& asset) { return find(asset).has_value(); }
+bool TextureLibrary::announce(const usd::FoundValue& asset, const std::string& material) {
+  return find(asset, material).has_value();
+}
 
-FoundTexture TextureLibrary::read(const usd::FoundValue& asset, TextureSpace space) {
+FoundTexture TextureLibrary::read(const usd::FoundValue& asset, TextureSpace space,
+                                  const std::string& material) {
   FoundTexture result;
-  const std::optional<Picture> picture = find(asset);
+  const std::optional<Picture> picture = find(asset, material);
   if (!picture) return result;
   try {
     result.texture = decoder_.get(picture->identifier, to_color_space(space));
     if (picture->udim) result.texture_from_uv = picture->udim->atlas_from_uv();
   } catch (const Error& error) {
-    missing(asset, std::string("could not be read: ") + error.what());
+    missing(asset, std::string("could not be read: ") + error.what(), material);
   }
   return result;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // How fast and in how much memory the USD loader opens a crate file, beside merely reading the
-// file's arrays: one line of JSON. Without a file it makes a room of a million triangles first.
+// file's arrays: one line of JSON. Without a file it makes a room of a million triangles first,
+// with normals and uvs per point, or per corner of the faces as Blender and Infinigen write them.
 #include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
@@ -10,10 +11,13 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "framework/export/crate_writer.h"
 #include "framework/export/scene_export.h"
+#include "framework/export/usd_layer.h"
 #include "loader_usd/usd/asset_library.h"
 #include "loader_usd/usd/layer.h"
 #include "loader_usd/usd_loader.h"
@@ -63,6 +67,62 @@ void write_room(const std::filesystem::path& file, const Host& host, int things,
     scene.edit(node).materials = {std::make_shared<const Material>()};
   }
   export_scene(scene, room, file, {}, host);
+}
+
+/// Every corner's own normal; uvs in charts, so that few corners of a point differ, with or without
+/// indices.
+usd_export::Prim corner_mesh(const Mesh& sheet, const std::string& name, bool is_indexed) {
+  constexpr int kChart = 16;  // corners of this many faces are one chart
+  std::vector<int> corners;
+  std::vector<Vec3f> normals;
+  std::vector<Vec2f> uvs;
+  std::vector<int> uv_indices;
+  std::map<std::pair<std::uint32_t, std::size_t>, int> known;
+  for (std::size_t face = 0; face < sheet.triangles.size(); ++face) {
+    for (const std::uint32_t point : sheet.triangles[face]) {
+      corners.push_back(int(point));
+      normals.push_back(sheet.normals[point]);
+      const std::size_t chart = face / kChart;
+      const Vec2f uv = sheet.uvs[point] + Vec2f::Constant(float(chart));
+      if (!is_indexed) {
+        uvs.push_back(uv);
+        continue;
+      }
+      const auto [entry, is_new] = known.try_emplace({point, chart}, int(uvs.size()));
+      if (is_new) uvs.push_back(uv);
+      uv_indices.push_back(entry->second);
+    }
+  }
+  usd_export::Prim prim;
+  prim.name = name;
+  prim.type = "Mesh";
+  prim.set("faceVertexCounts", "int[]", std::vector<int>(sheet.triangles.size(), 3));
+  prim.set("faceVertexIndices", "int[]", std::move(corners));
+  prim.set("points", "point3f[]", sheet.positions);
+  const auto add_primvar = [&](const char* primvar, const char* type, usd_export::Value value) {
+    prim.set(primvar, type, std::move(value));
+    prim.properties.back().interpolation = "faceVarying";
+  };
+  add_primvar("normals", "normal3f[]", std::move(normals));
+  add_primvar("primvars:st", "texCoord2f[]", std::move(uvs));
+  if (is_indexed) prim.set("primvars:st:indices", "int[]", std::move(uv_indices));
+  prim.set_uniform("subdivisionScheme", "token", usd_export::Token{"none"});
+  return prim;
+}
+
+void write_corner_room(const std::filesystem::path& file, int things, int cells, bool is_indexed) {
+  usd_export::Prim room;
+  room.name = "room";
+  room.type = "Xform";
+  for (int i = 0; i < things; ++i) {
+    room.children.push_back(
+        corner_mesh(make_sheet(cells, 0.3 * i), "thing_" + std::to_string(i), is_indexed));
+  }
+  usd_export::Layer layer;
+  layer.roots.push_back(std::move(room));
+  const auto bytes = usd_export::write_crate(layer);
+  std::ofstream(file, std::ios::binary)
+      .write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
 }
 
 bool is_compressible(usd::Type type) {
@@ -170,12 +230,15 @@ int main(int argc, char** argv) {
   int things = 20;
   int cells = 158;
   int threads = 1;
+  std::string values = "point";
   CLI::App app{"Times the USD loader against reading the file's arrays"};
   app.add_option("file", file, "A crate file; without one a room is made");
   app.add_option("--repetitions", repetitions);
   app.add_option("--things", things, "Meshes of the room");
   app.add_option("--cells", cells, "Cells along an edge of each mesh");
   app.add_option("--threads", threads);
+  app.add_option("--values", values, "Of the room's meshes: point, corner or indexed_corner")
+      ->check(CLI::IsMember({"point", "corner", "indexed_corner"}));
   CLI11_PARSE(app, argc, argv);
 
   const test::TemporaryFolder folder;
@@ -185,7 +248,11 @@ int main(int argc, char** argv) {
     const pid_t child = fork();
     if (child == 0) {
       test::RenderHost host{1};
-      write_room(file, host, things, cells);
+      if (values == "point") {
+        write_room(file, host, things, cells);
+      } else {
+        write_corner_room(file, things, cells, values == "indexed_corner");
+      }
       _exit(0);
     }
     waitpid(child, nullptr, 0);

@@ -95,7 +95,13 @@ bool AssetLibrary::exists(const std::string& identifier) const {
 
 ByteView AssetLibrary::read(const std::string& identifier) const {
   const auto [package_name, member] = split_inner(identifier);
-  return member.empty() ? map_file(identifier) : package(package_name)->read(member);
+  if (!member.empty()) return package(package_name)->read(member);
+  mapped_files_.push_back(map_file(identifier));
+  return mapped_files_.back();
+}
+
+void AssetLibrary::release_pages() const {
+  for (const ByteView& file : mapped_files_) usd::release_pages(file);
 }
 
 std::shared_ptr<const Layer> AssetLibrary::read_layer(const std::string& identifier) const {

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "layer.h"
 #include "mapped_file.h"
@@ -26,6 +27,10 @@ class AssetLibrary {
   /// The bytes of a file or package member. Throws FormatError.
   ByteView read(const std::string& identifier) const;
 
+  /// Gives back the memory that reading files took so far. Values stay valid: what they hold is
+  /// read again when it is looked at.
+  void release_pages() const;
+
   /// Opens a layer, or the root layer of a package. Throws FormatError, the same again when asked
   /// again.
   std::shared_ptr<const Layer> open(const std::string& identifier);
@@ -40,6 +45,7 @@ class AssetLibrary {
   };
   std::map<std::string, Opened> layers_;
   mutable std::map<std::string, std::shared_ptr<const Package>> packages_;
+  mutable std::vector<ByteView> mapped_files_;
 };
 
 /// Reads a layer from bytes in memory: text or crate, whatever they are. Throws FormatError.

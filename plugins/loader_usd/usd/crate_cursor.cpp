@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
 #include <type_traits>
 
 namespace diorama::usd {
@@ -12,7 +13,46 @@ namespace {
 
 // No LZ4 block decodes to more than this many times its size.
 constexpr std::uint64_t kMaxExpansion = 255;
+// The shortest match that a sequence copies.
+constexpr std::uint64_t kMinMatch = 4;
+// Integers that a list may have for each byte of the file, and whatever its size: far above real
+// files, far below what could exhaust the memory.
+constexpr std::uint64_t kMaxIntegersPerByte = 64;
+constexpr std::uint64_t kFreeIntegers = 1 << 20;
 constexpr std::uint64_t kMaxChunk = 0x7E000000;
+
+// What a block decodes to, by the lengths that its sequences say (lz4_Block_format.md); nothing
+// when it is cut off. Memory is taken for that much only: what a file claims elsewhere may be a
+// lie.
+std::optional<std::uint64_t> decoded_size(std::span<const std::byte> block) {
+  std::uint64_t total = 0;
+  std::size_t at = 0;
+  const auto next = [&]() -> std::uint64_t {
+    return at < block.size() ? std::to_integer<std::uint64_t>(block[at++]) : 0;
+  };
+  const auto length = [&](std::uint64_t nibble) {
+    std::uint64_t result = nibble;
+    if (nibble != 15) return result;
+    std::uint64_t more = 255;
+    while (more == 255 && at < block.size()) {
+      more = next();
+      result += more;
+    }
+    return result;
+  };
+  while (at < block.size()) {
+    const std::uint64_t token = next();
+    const std::uint64_t literals = length(token >> 4);
+    if (literals > block.size() - at) return std::nullopt;
+    at += literals;
+    total += literals;
+    if (at == block.size()) return total;  // the last sequence has literals only
+    if (block.size() - at < 2) return std::nullopt;
+    at += 2;
+    total += length(token & 15) + kMinMatch;
+  }
+  return std::nullopt;
+}
 
 template <class T>
 std::int64_t read_signed(std::span<const std::byte> bytes, std::size_t at) {
@@ -51,8 +91,7 @@ std::vector<std::byte> CrateCursor::read_compressed(std::uint64_t compressed_siz
   }
   CrateCursor chunk(*file_, bytes_.first(position_), start + 1);
   const int chunks = std::to_integer<int>(block[0]);
-  std::vector<std::byte> result(std::min(limit, compressed_size * kMaxExpansion + 64));
-  std::uint64_t filled = 0;
+  std::vector<std::byte> result;
   for (int i = 0; i < std::max(chunks, 1); ++i) {
     const std::int64_t size =
         chunks == 0 ? static_cast<std::int64_t>(block.size() - 1) : chunk.read<std::int32_t>(what);
@@ -60,14 +99,19 @@ std::vector<std::byte> CrateCursor::read_compressed(std::uint64_t compressed_siz
       fail_at(std::string(what) + ": a compressed chunk has an impossible size", start);
     }
     const auto input = chunk.take(static_cast<std::uint64_t>(size), what);
-    const auto room = static_cast<int>(std::min<std::uint64_t>(result.size() - filled, kMaxChunk));
+    const auto decoded = decoded_size(input);
+    const std::uint64_t filled = result.size();
+    if (!decoded || *decoded > std::min(limit - filled, kMaxChunk)) {
+      fail_at(std::string(what) + ": the compressed data is damaged", start);
+    }
+    result.resize(filled + *decoded);
     const int written = LZ4_decompress_safe(reinterpret_cast<const char*>(input.data()),
                                             reinterpret_cast<char*>(result.data() + filled),
-                                            static_cast<int>(size), room);
-    if (written < 0) fail_at(std::string(what) + ": the compressed data is damaged", start);
-    filled += static_cast<std::uint64_t>(written);
+                                            static_cast<int>(size), static_cast<int>(*decoded));
+    if (written < 0 || static_cast<std::uint64_t>(written) != *decoded) {
+      fail_at(std::string(what) + ": the compressed data is damaged", start);
+    }
   }
-  result.resize(filled);
   return result;
 }
 
@@ -84,8 +128,10 @@ std::vector<Integer> CrateCursor::read_integers(std::uint64_t count, const char*
                 " compressed bytes do not fit into the file",
             start);
   }
-  // Each integer takes at least two bits before compression.
-  if (count > compressed_size * kMaxExpansion * 4) {
+  // Each integer takes at least two bits before compression. Equal steps shrink to next to nothing,
+  // but never are all that a file holds.
+  if (count > compressed_size * kMaxExpansion * 4 ||
+      count > bytes_.size() * kMaxIntegersPerByte + kFreeIntegers) {
     fail_at(std::to_string(count) + " " + what + " cannot be stored in " +
                 std::to_string(compressed_size) + " bytes",
             start);

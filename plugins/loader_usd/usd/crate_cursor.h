@@ -50,7 +50,7 @@ class CrateCursor {
   CrateCursor relative(std::int64_t offset) const;
 
   /// Decodes a compressed block of `compressed_size` bytes at the cursor to at most `limit` bytes.
-  /// Allocates no more than the block can decode to.
+  /// Takes memory for what the block decodes to, whatever `limit` claims.
   std::vector<std::byte> read_compressed(std::uint64_t compressed_size, std::uint64_t limit,
                                          const char* what);
 

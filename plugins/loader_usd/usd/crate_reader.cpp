@@ -18,7 +18,7 @@ constexpr std::uint32_t kEndOfFieldSet = 0xFFFFFFFF;
 // Elements on the way to a prim, and bytes that all prim paths may take beyond the file's own size:
 // far above real scenes, far below what a small damaged file could ask for.
 constexpr std::uint32_t kMaxDepth = 2000;
-constexpr std::uint64_t kPathBytes = std::uint64_t{64} << 20;
+constexpr std::uint64_t kPathBytes = std::uint64_t{1} << 20;
 constexpr std::uint64_t kPathBytesPerFileByte = 256;
 
 struct Section {

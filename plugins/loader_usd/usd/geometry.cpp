@@ -179,26 +179,34 @@ bool Geometry::collection_includes(const std::string& collection, const std::str
 
 std::string Geometry::material(const Prim& prim, std::string_view purpose) {
   const std::string for_all = "material:binding";
-  const std::string for_purpose = for_all + ":" + std::string(purpose);
+  const std::string collections_for_all = for_all + ":collection:";
+  if (!purpose.empty()) {
+    const std::string word(purpose);
+    const std::string special =
+        material_by(prim, for_all + ":" + word, collections_for_all + word + ":");
+    if (!special.empty()) return special;
+  }
+  return material_by(prim, for_all, collections_for_all);
+}
+
+std::string Geometry::material_by(const Prim& prim, const std::string& relationship,
+                                  const std::string& collection_prefix) {
   std::string bound;
-  const auto consider = [&](const Prim& owner, const std::string& relationship,
-                            const std::string& target, bool replaces_same_prim) {
-    const Value strength = stage_.property_metadata(owner, relationship, "bindMaterialAs");
+  const auto consider = [&](const Prim& owner, const std::string& name, const std::string& target,
+                            bool replaces_same_prim) {
+    const Value strength = stage_.property_metadata(owner, name, "bindMaterialAs");
     const bool is_strong = strength.as_text() && *strength.as_text() == "strongerThanDescendants";
     if (bound.empty() || is_strong || replaces_same_prim) bound = target;
   };
   for (const Prim* at = &prim; at; at = at->parent) {
     const std::string before = bound;
-    const bool is_special = !purpose.empty() && stage_.has_property(*at, for_purpose);
-    const std::string& relationship = is_special ? for_purpose : for_all;
     const Strings direct = stage_.targets(*at, relationship);
     if (direct.size() == 1) consider(*at, relationship, direct.front(), false);
     const bool is_bound_here = bound != before;
-    constexpr std::string_view kCollection = "material:binding:collection:";
     for (const std::string& name : stage_.property_names(*at)) {
       // `material:binding:collection:NAME`; one more part would name a purpose.
-      const bool is_plain =
-          name.starts_with(kCollection) && name.find(':', kCollection.size()) == std::string::npos;
+      const bool is_plain = name.starts_with(collection_prefix) &&
+                            name.find(':', collection_prefix.size()) == std::string::npos;
       if (!is_plain) continue;
       const Strings pair = stage_.targets(*at, name);
       if (pair.size() != 2) continue;

@@ -40,12 +40,15 @@ class Geometry {
   /// default, render, proxy or guide: authored on the prim or its nearest ancestor.
   std::string purpose(const Prim& prim);
   /// The material that is bound to the prim; empty when there is none. A binding for `purpose`
-  /// ("full", "preview") beats one for all purposes on the same prim.
+  /// ("full", "preview"), be it that of an ancestor, beats one for all purposes.
   std::string material(const Prim& prim, std::string_view purpose = {});
   /// All primvars, by name: its own, and constant ones of its ancestors.
   std::vector<Primvar> primvars(const Prim& prim);
 
  private:
+  /// Bound by this relationship or by one that begins with the prefix and names a collection.
+  std::string material_by(const Prim& prim, const std::string& relationship,
+                          const std::string& collection_prefix);
   bool collection_includes(const std::string& collection, const std::string& path, int nesting);
 
   Stage& stage_;

@@ -50,6 +50,11 @@ ByteView map_file(const std::string& path) {
   return {std::move(owner), {static_cast<const std::byte*>(address), size}};
 }
 
+void release_pages(const ByteView& file) {
+  if (file.bytes.empty()) return;
+  ::madvise(const_cast<std::byte*>(file.bytes.data()), file.bytes.size(), MADV_DONTNEED);
+}
+
 ByteView copy_bytes(std::span<const std::byte> bytes) {
   auto copy = std::make_shared<const std::vector<std::byte>>(bytes.begin(), bytes.end());
   const std::span<const std::byte> view(*copy);

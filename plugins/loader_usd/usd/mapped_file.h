@@ -21,6 +21,10 @@ struct ByteView {
 /// Maps a file for reading. Throws FormatError when it cannot be opened or is not a regular file.
 ByteView map_file(const std::string& path);
 
+/// Gives back the memory that reading a mapped file took; what is read again is fetched again. Only
+/// for whole views of map_file().
+void release_pages(const ByteView& file);
+
 /// Owns a copy of `bytes`.
 ByteView copy_bytes(std::span<const std::byte> bytes);
 

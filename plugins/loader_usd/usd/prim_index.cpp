@@ -142,6 +142,16 @@ bool PrimIndex::is_in_direct_arc(int node) const {
   return false;
 }
 
+namespace {
+
+// Whether the layer stack relocates something to the path or to what is below it.
+bool relocates_to(const LayerStack& stack, const std::string& path) {
+  const auto target = stack.relocate_sources.lower_bound(path);
+  return target != stack.relocate_sources.end() && path::has_prefix(target->first, path);
+}
+
+}  // namespace
+
 // A builder that waits while another one builds the subtree of an arc that it adds.
 struct PrimIndexer::Frame {
   Builder* builder;
@@ -258,7 +268,8 @@ void PrimIndexer::Builder::disable_shadowed_by_instance() {
   }
 }
 
-// Moves every node down to its child `name` and drops subtrees without opinions.
+// Moves every node down to its child `name` and drops subtrees without opinions. What a layer stack
+// relocates to there or below needs no opinion: the relocation brings some.
 void PrimIndexer::Builder::copy_subtree(const PrimIndex& source, std::string_view name) {
   PrimIndex moved = source;
   for (IndexNode& each : moved.nodes) {
@@ -274,8 +285,8 @@ void PrimIndexer::Builder::copy_subtree(const PrimIndex& source, std::string_vie
     IndexNode& each = moved.nodes[i];
     const bool is_root_class = each.arc == Arc::Inherit && each.stack == &indexer_.root_ &&
                                path::depth(each.path) > each.levels_below_arc + 1;
-    const bool is_held =
-        i == 0 || each.contributes() || each.arc == Arc::Specialize || is_root_class || is_kept[i];
+    const bool is_held = i == 0 || each.contributes() || each.arc == Arc::Specialize ||
+                         is_root_class || relocates_to(*each.stack, each.path) || is_kept[i];
     if (!is_held) continue;
     for (int k = static_cast<int>(i);
          k != IndexNode::kNone && !is_kept[static_cast<std::size_t>(k)];

@@ -36,13 +36,52 @@ TEST_CASE("a missing texture is one warning that names file and texture", "[load
       folder.write("a.obj", "mtllib a.mtl\n" + kTriangle +
                                 "o A\nusemtl A\nf 1/1 2/2 3/3\no B\nusemtl B\nf 1/1 2/2 3/3\n");
   const LoadedFile loaded(file);
-  const std::string line = file + ": texture @pictures/wood.png@ could not be found";
+  const std::string line =
+      file + ": texture @pictures/wood.png@ could not be found (materials \"A\", \"B\")";
   CHECK(loaded.host.messages == std::vector<std::string>{line});
   CHECK_FALSE(loaded.node("A").materials.at(0)->base_color_texture);
 
   AssimpLoader::Params strict;
   strict.missing_assets_are_errors = true;
   CHECK_THROWS_WITH(LoadedFile(file, strict), line);
+}
+
+TEST_CASE("a model's files are its material library, buffers and pictures", "[loader_assimp]") {
+  const TemporaryFolder folder;
+  folder.write("textures/wood.png", "x");
+  folder.write("unused.png", "x");
+  folder.write("a.mtl", "newmtl A\nmap_Kd C:\\pictures\\wood.png\nmap_Bump gone.png\n");
+  const std::string obj =
+      folder.write("a.obj", "mtllib a.mtl\n" + kTriangle + "usemtl A\nf 1/1 2/2 3/3\n");
+  test::RenderHost host{1};
+  const auto names = [&](const std::string& file) {
+    std::vector<std::string> result;
+    for (const auto& path : AssimpLoader({}, host).files(file)) result.push_back(path.filename());
+    return result;
+  };
+  CHECK(names(obj) == std::vector<std::string>{"a.obj", "a.mtl", "wood.png"});
+
+  folder.write("points.bin", std::string(36, '\0'));
+  const std::string gltf = folder.write("a.gltf", R"({"asset": {"version": "2.0"}, "scene": 0,
+    "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+    "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": 0}]}],
+    "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
+    "textures": [{"source": 0}], "images": [{"uri": "textures/wood.png"}],
+    "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
+                   "min": [0, 0, 0], "max": [0, 0, 0]}],
+    "bufferViews": [{"buffer": 0, "byteLength": 36}],
+    "buffers": [{"uri": "points.bin", "byteLength": 36}]})");
+  CHECK(names(gltf) == std::vector<std::string>{"a.gltf", "points.bin", "wood.png"});
+  CHECK_THROWS_WITH(AssimpLoader({}, host).files(folder.write("noise.obj", "x\n")),
+                    ContainsSubstring("noise.obj: assimp cannot read it: "));
+}
+
+TEST_CASE("equal meshes are one", "[loader_assimp]") {
+  const TemporaryFolder folder;
+  const LoadedFile loaded(
+      folder.write("a.obj", kTriangle + "o A\nf 1/1 2/2 3/3\nv 0 0 0\nv 1 0 0\nv 0 1 0\no B\n"
+                                        "f 4/1 5/2 6/3\n"));
+  CHECK(loaded.node("A").mesh == loaded.node("B").mesh);
 }
 
 TEST_CASE("a texture that is no picture is reported with the reason", "[loader_assimp]") {

@@ -1,12 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <vector>
 
+#include "diorama/error.h"
+#include "diorama/rng.h"
 #include "plugins/loader_assimp/loaded_file.h"
 #include "support/catch.h"
 #include "support/shared_data.h"
+#include "support/temporary_folder.h"
 
 namespace diorama::loader_assimp {
 
@@ -39,6 +45,23 @@ std::optional<std::filesystem::path> shared_file(const std::string& name) {
   if (folder && std::filesystem::exists(*folder / name)) return *folder / name;
   WARN(name + " is not here");
   return std::nullopt;
+}
+
+std::vector<std::filesystem::path> models_below(const std::filesystem::path& folder) {
+  const std::set<std::string> kModels{".fbx", ".obj", ".ply", ".stl", ".gltf", ".glb", ".dae"};
+  std::vector<std::filesystem::path> models;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+    std::string ending = entry.path().extension().string();
+    for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    if (kModels.contains(ending)) models.push_back(entry.path());
+  }
+  std::sort(models.begin(), models.end());
+  return models;
+}
+
+std::string content_of(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
 }
 
 }  // namespace
@@ -115,19 +138,50 @@ TEST_CASE("furniture in centimetres is as large as furniture", "[loader_assimp]"
 TEST_CASE("all shared models load", "[loader_assimp]") {
   const auto folder = shared_file("data/scenes");
   if (!folder) return;
-  int models = 0;
-  for (const auto& entry : std::filesystem::recursive_directory_iterator(*folder)) {
-    std::string ending = entry.path().extension().string();
-    for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-    const std::set<std::string> kModels{".fbx", ".obj", ".ply", ".stl", ".gltf", ".glb", ".dae"};
-    if (!kModels.contains(ending)) continue;
-    INFO(entry.path().string());
-    const LoadedFile loaded(entry.path().string());
+  const auto models = models_below(*folder);
+  CHECK(models.size() > 20);
+  for (const std::filesystem::path& model : models) {
+    INFO(model.string());
+    const LoadedFile loaded(model.string());
     CHECK(Counts(loaded).triangles > 0);
     CHECK_FALSE(loaded.bounds().is_empty());
-    ++models;
   }
-  CHECK(models > 20);
+}
+
+TEST_CASE("cut and damaged copies of real files are read or refused", "[loader_assimp][slow]") {
+  const auto folder = shared_file("data/scenes");
+  if (!folder) return;
+  const test::TemporaryFolder copies;
+  int refused = 0;
+  int read = 0;
+  for (const std::filesystem::path& model : models_below(*folder)) {
+    if (std::filesystem::file_size(model) > 100'000) continue;
+    const std::string whole = content_of(model);
+    const Rng chance = Rng(7).fork(model.filename().string());
+    for (std::uint64_t i = 0; i < 6; ++i) {
+      Rng rng = chance.fork(i);
+      const auto place = [&] { return std::size_t(rng.uniform() * double(whole.size())); };
+      std::string damaged = whole;
+      if (i < 2) {
+        damaged.resize(place());
+      } else {
+        for (std::uint64_t k = 0; k + 1 < i; ++k) damaged[place()] = char(place() & 255);
+      }
+      const std::string file = copies.write("damaged" + model.extension().string(), damaged);
+      INFO(model.string() << ", copy " << i);
+      try {
+        const LoadedFile loaded(file);
+        CHECK(loaded.scene.subtree(loaded.root).size() > 0);
+        ++read;
+      } catch (const Error& error) {
+        CHECK(error.kind() == ErrorKind::Asset);
+        CHECK(std::string(error.what()).starts_with(file));
+        ++refused;
+      }
+    }
+  }
+  CHECK(refused > 10);
+  CHECK(read > 5);
 }
 
 }  // namespace diorama::loader_assimp

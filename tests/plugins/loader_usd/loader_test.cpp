@@ -264,12 +264,13 @@ def Material "Mat"
   CHECK(mapped.isApprox(Vec2f(2.25f, 3.0f)));
   CHECK_FALSE(material.roughness_texture);
   REQUIRE(loaded.host.warnings.size() == 1);
-  CHECK(loaded.host.warnings[0] == file + ": texture @tex/rough.png@ could not be found");
+  const std::string missing =
+      file + ": texture @tex/rough.png@ could not be found (material \"Mat\")";
+  CHECK(loaded.host.warnings[0] == missing);
 
   UsdLoader::Params strict;
   strict.missing_assets_are_errors = true;
-  CHECK_THROWS_WITH(Loaded(file, strict),
-                    file + ": " + file + ": texture @tex/rough.png@ could not be found");
+  CHECK_THROWS_WITH(Loaded(file, strict), file + ": " + missing);
 }
 
 TEST_CASE("instances and instancers share meshes", "[loader_usd]") {
@@ -318,6 +319,82 @@ def PointInstancer "Many"
   CHECK(loaded.scene[children[0]].mesh == loaded.scene[children[1]].mesh);
   const Affine pose = loaded.scene.world_from_node(children[1]);
   CHECK((pose * Vec3(1, 0, 0)).isApprox(Vec3(0, 9, 0), 1e-3));
+}
+
+TEST_CASE("only subsets of the family of materials get slots", "[loader_usd]") {
+  const TemporaryFolder folder;
+  Loaded loaded(folder.write("a.usda", R"(#usda 1.0
+def Material "Red"
+{
+    token outputs:surface.connect = </Red/S.outputs:surface>
+    def Shader "S"
+    {
+        uniform token info:id = "UsdPreviewSurface"
+        token outputs:surface
+    }
+}
+def Mesh "M"
+{)" + kTriangle + R"(
+    def GeomSubset "Grip"
+    {
+        uniform token familyName = "grasp"
+        int[] indices = [0]
+        rel material:binding = </Red>
+    }
+    def GeomSubset "Bound"
+    {
+        uniform token familyName = "materialBind"
+        int[] indices = [0]
+        rel material:binding = </Red>
+    }
+}
+)"));
+  CHECK(loaded.node("M").materials.size() == 2);
+}
+
+TEST_CASE("meshes that are written twice are one", "[loader_usd]") {
+  const TemporaryFolder folder;
+  const std::string other = R"(
+    int[] faceVertexCounts = [3]
+    int[] faceVertexIndices = [0, 1, 2]
+    point3f[] points = [(0, 0, 0), (1, 0, 0), (0, 1, 0.5)])";
+  Loaded loaded(folder.write("a.usda", "#usda 1.0\ndef Mesh \"A\"\n{" + kTriangle +
+                                           "\n}\ndef Mesh \"B\"\n{" + kTriangle +
+                                           "\n}\ndef Mesh \"C\"\n{" + other + "\n}\n"));
+  CHECK(loaded.node("A").mesh == loaded.node("B").mesh);
+  CHECK(loaded.node("A").mesh != loaded.node("C").mesh);
+}
+
+TEST_CASE("what is not drawn is said once per type, with the first prim", "[loader_usd]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("a.usda", R"(#usda 1.0
+def Xform "Plant"
+{
+    def BasisCurves "Hidden"
+    {
+        token visibility = "invisible"
+    }
+    def BasisCurves "Stem"
+    {
+    }
+    def BasisCurves "Leaf"
+    {
+    }
+    def Points "Guide"
+    {
+        token purpose = "guide"
+    }
+}
+def Points "Pollen"
+{
+}
+)");
+  Loaded loaded(file);
+  CHECK(
+      loaded.host.warnings ==
+      std::vector<std::string>{
+          file + ": </Plant/Stem> is of type BasisCurves, which is not drawn, like 1 more of them",
+          file + ": </Pollen> is of type Points, which is not drawn"});
 }
 
 TEST_CASE("lights, bodies, colliders, labels and visibility arrive", "[loader_usd]") {

@@ -93,7 +93,8 @@ TEST_CASE("a set of UDIM tiles is one texture with its own layout", "[loader_usd
       "b.usda", stage("outputs:surface", shaders.substr(0, shaders.find("wood")) + "gone" +
                                              shaders.substr(shaders.find("wood") + 4))));
   REQUIRE(none.host.warnings.size() == 1);
-  CHECK(none.host.warnings[0].ends_with("texture @gone.<UDIM>.png@ could not be found"));
+  CHECK(none.host.warnings[0].ends_with(
+      "texture @gone.<UDIM>.png@ could not be found (material \"Mat\")"));
 }
 
 TEST_CASE("MaterialX surfaces are read through their nodes", "[loader_usd]") {
