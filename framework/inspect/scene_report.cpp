@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -143,6 +144,16 @@ SceneReport report_scene(const Scene& scene, NodeId root, const std::string& fil
   return report;
 }
 
+std::vector<std::string> warnings_about(const SceneReport& report, const std::string& material) {
+  std::vector<std::string> found;
+  if (material.empty()) return found;
+  const std::string quoted = '"' + material + '"';
+  std::ranges::copy_if(report.warnings, std::back_inserter(found), [&](const std::string& warning) {
+    return warning.find(quoted) != std::string::npos;
+  });
+  return found;
+}
+
 std::string report_text(const SceneReport& report, int tree_depth) {
   std::string text = report.file + "\n";
   text += fmt::format("  {} nodes, {} meshes ({} different), {} triangles ({} stored)\n",
@@ -170,6 +181,9 @@ std::string report_text(const SceneReport& report, int tree_depth) {
     text += fmt::format("  {}  used {}x", line.name, line.users);
     if (!line.textures.empty()) text += fmt::format("  [{}]", fmt::join(line.textures, ", "));
     text += '\n';
+    for (const std::string& warning : warnings_about(report, line.name)) {
+      text += fmt::format("    ! {}\n", warning);
+    }
   }
   if (!report.lights.empty()) text += "lights\n";
   for (const SceneReport::LightLine& line : report.lights) {
@@ -207,7 +221,10 @@ std::string report_json(const SceneReport& report) {
   json["materials"] = nlohmann::json::array();
   for (const SceneReport::MaterialLine& line : report.materials) {
     json["materials"].push_back(
-        {{"name", line.name}, {"users", line.users}, {"textures", line.textures}});
+        {{"name", line.name},
+         {"users", line.users},
+         {"textures", line.textures},
+         {"warnings", warnings_about(report, line.name)}});
   }
   json["lights"] = nlohmann::json::array();
   for (const SceneReport::LightLine& line : report.lights) {

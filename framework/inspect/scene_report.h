@@ -50,6 +50,9 @@ struct SceneReport {
 /// Looks at `root` and all below it.
 SceneReport report_scene(const Scene& scene, NodeId root, const std::string& file);
 
+/// The warnings that name the material in quotes: those of its missing textures among them.
+std::vector<std::string> warnings_about(const SceneReport& report, const std::string& material);
+
 /// `tree_depth` limits the tree that is printed; negative: all of it.
 std::string report_text(const SceneReport& report, int tree_depth);
 std::string report_json(const SceneReport& report);

@@ -73,6 +73,19 @@ TEST_CASE("a scene report prints tree, lights and warnings", "[inspect]") {
   CHECK(report_text(report, 0).find("... 3 deeper nodes") != std::string::npos);
 }
 
+TEST_CASE("a material stands with the warnings that name it", "[inspect]") {
+  const Scene scene = make_scene();
+  SceneReport report = report_scene(scene, scene.find("/room"), "room.usd");
+  const std::string missing = "room.usd: texture @x.png@ could not be found (material \"wood\")";
+  report.warnings = {"room.usd: \"woodwork\" is something else", missing};
+  CHECK(warnings_about(report, "wood") == std::vector<std::string>{missing});
+  CHECK(warnings_about(report, "").empty());
+  CHECK(report_text(report, -1).find("  wood  used 2x  [wood.png]\n    ! " + missing + "\n") !=
+        std::string::npos);
+  CHECK(report_json(report).find("\"warnings\": [\n        \"room.usd: texture") !=
+        std::string::npos);
+}
+
 TEST_CASE("a report of nothing says that there are no bounds", "[inspect]") {
   Scene scene;
   const NodeId empty = scene.create(scene.root(), "empty");
