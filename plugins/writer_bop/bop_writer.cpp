@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "writer_bop/bop_writer.h"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
-#include <set>
 
+#include "writer_bop/bop_model.h"
 #include "writer_support/image_files.h"
 #include "writer_support/lens_json.h"
 #include "writer_support/replicator.h"
@@ -35,14 +36,14 @@ Json camera_json(const Frame& frame, double depth_scale) {
   return json;
 }
 
-Json pose_json(const Frame& frame, const TrainingObject& object) {
+Json pose_json(const Frame& frame, const TrainingObject& object, int object_id) {
   const Affine camera_from_model =
       bop_from_camera() * frame.world_from_camera.inverse() * object.instance->world_from_node;
   const Transform parts = Transform::from_affine(camera_from_model);
   const Aabb& bounds = object.instance->bounds_node;
   return {{"cam_R_m2c", flat_list(parts.rotation.toRotationMatrix())},
           {"cam_t_m2c", flat_list((kMillimetres * parts.translation).transpose())},
-          {"obj_id", object.class_index + 1},
+          {"obj_id", object_id},
           {"scale", flat_list(parts.scale.transpose())},
           {"bounds_min", flat_list((kMillimetres * bounds.min).transpose())},
           {"bounds_max", flat_list((kMillimetres * bounds.max).transpose())},
@@ -61,11 +62,11 @@ Json info_json(const TrainingObject& object, std::int64_t valid_pixels) {
           {"visib_fract", 1.0 - visibility.occlusion().value_or(0.0)}};
 }
 
-Json model_json(const Aabb& box) {
+Json model_json(const Aabb& box, double diameter) {
   const Vec3 lo = box.min;
   const Vec3 size = box.size();
-  return {{"diameter", size.norm()}, {"min_x", lo.x()},    {"min_y", lo.y()},   {"min_z", lo.z()},
-          {"size_x", size.x()},      {"size_y", size.y()}, {"size_z", size.z()}};
+  return {{"diameter", diameter}, {"min_x", lo.x()},    {"min_y", lo.y()},   {"min_z", lo.z()},
+          {"size_x", size.x()},   {"size_y", size.y()}, {"size_z", size.z()}};
 }
 
 Vec3 vec3_of(const Json& list) {
@@ -80,6 +81,8 @@ Image<std::uint32_t> depth_picture(const Image<float>& depth, double scale) {
   }
   return picture;
 }
+
+std::string model_file(int id) { return "models/obj_" + padded(id, 6) + ".ply"; }
 
 std::string scene_name(std::size_t camera) { return padded(int(camera), 6); }
 
@@ -109,18 +112,61 @@ const char* BopWriter::split_folder(int capture) const {
 
 void BopWriter::begin(const DatasetInfo& dataset, DatasetFiles& files) {
   training_.begin(dataset);
-  Json objects = Json::object();
-  for (std::size_t i = 0; i < training_.classes().size(); ++i) {
-    objects[std::to_string(i + 1)] = training_.classes()[i];
+  add_objects(dataset, files);
+  Json names = Json::object();
+  Json objects = Json::array();
+  for (const Object& object : objects_) {
+    const int id = int(objects.size()) + 1;
+    const std::string& name = training_.classes()[std::size_t(object.class_index)];
+    names[std::to_string(id)] = name;
+    objects.push_back({{"obj_id", id}, {"class", name}});
+    if (!object.asset.empty()) objects.back()["model"] = object.asset;
   }
-  files.add_text("objects.json", python_json(objects, 2) + "\n");
+  files.add_text("objects.json", python_json(names, 2) + "\n");
   training_.add_dataset_page("BOP",
                              {{"units", "millimetres"},
                               {"camera_axes", "x right, y down, z forward"},
                               {"pose", "point_camera = R (scale * point_model) + t"},
                               {"depth", "along the viewing axis, 16 bit x depth_scale, 0: nothing"},
-                              {"scene", "one camera; image ids are captures"}},
+                              {"scene", "one camera; image ids are captures"},
+                              {"objects", std::move(objects)}},
                              dataset, files);
+}
+
+void BopWriter::add_objects(const DatasetInfo& dataset, DatasetFiles& files) {
+  objects_.clear();
+  for (int index = 0; index < int(training_.classes().size()); ++index) {
+    const std::size_t before = objects_.size();
+    for (const DatasetAsset& asset : dataset.assets) {
+      if (std::ranges::count(training_.classes_of(asset.labels), index) == 0) continue;
+      Scene scene;
+      const BopModel model = bop_model(scene, host_.load_asset(asset.asset, scene, scene.root()));
+      if (model.is_empty()) continue;
+      const Aabb box = model.bounds();
+      objects_.push_back({index,
+                          asset.asset,
+                          {box.min / kMillimetres, box.max / kMillimetres},
+                          model_json(box, model.diameter())});
+      files.add(model_file(int(objects_.size())), model.ply());
+    }
+    if (objects_.size() == before) objects_.push_back({index, {}, {}, {}});
+  }
+}
+
+/// Of several models of a class, the one as large as the object.
+int BopWriter::object_id(const TrainingObject& object) const {
+  const Aabb& wanted = object.instance->bounds_node;
+  int best = 0;
+  double best_distance = kInfinity;
+  for (std::size_t i = 0; i < objects_.size(); ++i) {
+    if (objects_[i].class_index != object.class_index) continue;
+    const Aabb& box = objects_[i].bounds;
+    const double distance = (box.min - wanted.min).norm() + (box.max - wanted.max).norm();
+    if (best > 0 && !(distance < best_distance)) continue;
+    best = int(i) + 1;
+    best_distance = distance;
+  }
+  return best;
 }
 
 void BopWriter::add_masks(const Frame& frame, const Instance& instance, const std::string& scene,
@@ -161,7 +207,7 @@ Json BopWriter::write_frame(const Capture& capture, std::size_t camera, CaptureF
       }
     }
     add_masks(frame, instance, scene, stem + "_" + padded(int(poses.size()), 6) + ".png", files);
-    poses.push_back(pose_json(frame, object));
+    poses.push_back(pose_json(frame, object, object_id(object)));
     infos.push_back(info_json(object, valid));
   }
   return {{"scene", scene},
@@ -182,7 +228,7 @@ void BopWriter::write(const Capture& capture, CaptureFiles& files) const {
 
 void BopWriter::finish(const RecordReader& records, DatasetFiles& files) {
   std::map<std::string, std::map<std::string, Json>> scene_files;  // scene -> file -> content
-  std::map<int, Aabb> models;
+  std::map<int, Aabb> boxes;
   Json targets = Json::array();
   Json first_camera;
   records([&](int capture, std::string_view line) {
@@ -195,7 +241,7 @@ void BopWriter::finish(const RecordReader& records, DatasetFiles& files) {
       content["scene_gt_info"][id] = frame.at("info");
       for (const Json& pose : frame.at("gt")) {
         for (const char* bound : {"bounds_min", "bounds_max"}) {
-          models[pose.at("obj_id")].add(vec3_of(pose.at(bound)));
+          boxes[pose.at("obj_id")].add(vec3_of(pose.at(bound)));
         }
       }
       if (first_camera.is_null()) first_camera = frame;
@@ -216,7 +262,17 @@ void BopWriter::finish(const RecordReader& records, DatasetFiles& files) {
     }
   }
   Json infos = Json::object();
-  for (const auto& [object, box] : models) infos[std::to_string(object)] = model_json(box);
+  for (std::size_t i = 0; i < objects_.size(); ++i) {
+    const auto box = boxes.find(int(i) + 1);
+    Json& info = infos[std::to_string(i + 1)];
+    if (!objects_[i].info.is_null()) {
+      info = objects_[i].info;
+    } else if (box != boxes.end()) {
+      info = model_json(box->second, box->second.size().norm());
+    } else {
+      infos.erase(std::to_string(i + 1));
+    }
+  }
   files.add_text("models/models_info.json", python_json(infos, 2) + "\n");
   files.add_text("test_targets_bop19.json", python_json(targets, 2) + "\n");
   if (first_camera.is_null()) return;

@@ -1,12 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "writer_coco/coco_writer.h"
 
+#include <algorithm>
+#include <cstdlib>
+#include <iterator>
 #include <map>
 
+#include "diorama/error.h"
 #include "writer_support/cuboid.h"
 #include "writer_support/image_files.h"
 #include "writer_support/lens_json.h"
 #include "writer_support/run_length.h"
+#include "writer_support/value_place.h"
 
 namespace diorama {
 namespace {
@@ -52,12 +57,48 @@ Json image_json(const Capture& capture, const Frame& frame, int id, const std::s
           {"world_from_camera", nested_list(frame.world_from_camera.matrix())}};
 }
 
-Json dataset_json(const char* what, Json images, Json annotations, Json categories) {
+Json dataset_json(const char* what, Json licenses, Json images, Json annotations, Json categories) {
   return {{"info", {{"description", what}, {"version", "1.0"}, {"contributor", "diorama"}}},
-          {"licenses", Json::array()},
+          {"licenses", std::move(licenses)},
           {"images", std::move(images)},
           {"annotations", std::move(annotations)},
           {"categories", std::move(categories)}};
+}
+
+/// Replicator's list of licences: id, name and url each.
+Json licenses_json(const Value& value) {
+  constexpr const char* kKey = "coco_license_info";
+  Json list = Json::array();
+  if (value.kind == Value::Kind::Null) return list;
+  for (const Value& entry : value.list) {
+    Json license = Json::object();
+    for (const auto& [key, field] : entry.map) license[key] = field.scalar;
+    if (license.contains("id")) license["id"] = std::atoi(entry.find("id")->scalar.c_str());
+    list.push_back(std::move(license));
+  }
+  const bool is_good =
+      value.kind == Value::Kind::List && std::ranges::all_of(value.list, [](const Value& entry) {
+        return entry.kind == Value::Kind::Map && entry.find("id") && entry.find("name");
+      });
+  if (is_good) return list;
+  throw Error(ErrorKind::Config, complaint_about(value, kKey) +
+                                     "expected a list of {id, name, url} or null, found " +
+                                     value.describe());
+}
+
+/// Where categories are given, their labels are the classes, in that order.
+TrainingParams with_categories(TrainingParams params, const std::vector<CocoCategory>& categories,
+                               const std::optional<std::string>& image_output_format) {
+  if (!categories.empty()) params.classes.clear();
+  for (const CocoCategory& category : categories) params.classes.push_back(category.label);
+  if (!image_output_format) return params;
+  params.image_format = *image_output_format == "jpeg" ? "jpg" : *image_output_format;
+  const auto& known = kTrainingImageFormats;
+  if (std::ranges::find(known, params.image_format) == std::end(known)) {
+    throw Error(ErrorKind::Config, "image_output_format: expected png, jpg or jpeg, found \"" +
+                                       *image_output_format + "\"");
+  }
+  return params;
 }
 
 void append(Json& list, Json& more) {
@@ -73,10 +114,40 @@ void CocoWriter::Params::visit(ParamVisitor& v) {
   v.param("panoptic", panoptic, {"Panoptic pictures and annotations."});
   v.param("crowd_below_px", crowd_below_px,
           {"Objects with fewer visible pixels are marked iscrowd.", "px", 0.0});
+  v.param(
+      "coco_categories", coco_categories,
+      {"Mapping of labels to {name, id, supercategory, color, isthing}; other labels become the "
+       "category other. Null: classes count from 1."});
+  v.param("coco_license_info", coco_license_info,
+          {"List of {id, name, url} for the annotation files."});
+  v.param("image_output_format", image_output_format, {"The same as image_format."});
+  v.param("dataset_id", dataset_id, {"Accepted; names of files do not carry it."});
+  v.param("frame_padding", frame_padding,
+          {"Accepted; numbers have six digits or more.", "", 0, 20});
+  labels.visit(v);
+  remote.visit(v);
 }
 
 CocoWriter::CocoWriter(Params params, Host& host)
-    : params_(std::move(params)), host_(host), training_(params_.training) {}
+    : params_(std::move(params)),
+      host_(host),
+      categories_(read_coco_categories(params_.coco_categories)),
+      licenses_(licenses_json(params_.coco_license_info)),
+      training_(with_categories(params_.training, categories_, params_.image_output_format),
+                params_.labels.choice(params_.training.taxonomy),
+                categories_.empty() ? "" : kOtherCategory) {
+  params_.remote.check();
+  if (!categories_.empty() && !params_.training.classes.empty()) {
+    throw Error(ErrorKind::Config, "classes and coco_categories exclude each other");
+  }
+  const auto notice = [&](bool is_given, const char* text) {
+    if (is_given) host_.log(LogLevel::Info, std::string("CocoWriter: ") + text);
+  };
+  notice(params_.dataset_id.has_value(),
+         "dataset_id has no effect: names of files do not carry it");
+  notice(params_.frame_padding.has_value(),
+         "frame_padding has no effect: numbers have six digits or more");
+}
 
 NameSet CocoWriter::needs() const {
   NameSet names{std::string(kColor.name), std::string(kInstanceId.name), "instances"};
@@ -85,13 +156,22 @@ NameSet CocoWriter::needs() const {
   return names;
 }
 
+int CocoWriter::category_id(int class_index) const {
+  return categories_.empty() ? class_index + 1 : categories_[std::size_t(class_index)].id;
+}
+
 Json CocoWriter::categories() const {
   Json list = Json::array();
   for (std::size_t i = 0; i < training_.classes().size(); ++i) {
-    Json category{{"id", i + 1},
-                  {"name", training_.classes()[i]},
-                  {"supercategory", "object"},
-                  {"isthing", 1}};
+    CocoCategory own;
+    own.id = int(i) + 1;
+    own.name = training_.classes()[i];
+    if (!categories_.empty()) own = categories_[i];
+    Json category{{"id", own.id},
+                  {"name", own.name},
+                  {"supercategory", own.supercategory},
+                  {"isthing", own.is_thing ? 1 : 0}};
+    if (own.has_color) category["color"] = own.color;
     if (params_.keypoints) {
       for (const Keypoint& point : kCuboidKeypoints) category["keypoints"].push_back(point.name);
       category["skeleton"] = {{2, 3}, {3, 5}, {5, 4}, {4, 2}, {6, 7}, {7, 9},
@@ -116,7 +196,7 @@ void CocoWriter::begin(const DatasetInfo& dataset, DatasetFiles& files) {
 Json CocoWriter::annotation(const Frame& frame, const TrainingObject& object, int image_id) const {
   const Instance& instance = *object.instance;
   Json json{{"image_id", image_id},
-            {"category_id", object.class_index + 1},
+            {"category_id", category_id(object.class_index)},
             {"iscrowd", object.visible_px < params_.crowd_below_px ? 1 : 0},
             {"bbox", box_json(*instance.tight_box)},
             {"area", object.visible_px},
@@ -143,7 +223,7 @@ Json CocoWriter::panoptic_annotation(const Frame& frame, const std::vector<Train
     const auto segment = std::uint32_t(segment_of_id.size() + 1);
     segment_of_id.emplace(object.instance->id, segment);
     segments.push_back({{"id", segment},
-                        {"category_id", object.class_index + 1},
+                        {"category_id", category_id(object.class_index)},
                         {"area", object.visible_px},
                         {"bbox", box_json(*object.instance->tight_box)},
                         {"iscrowd", 0}});
@@ -208,11 +288,11 @@ void CocoWriter::finish(const RecordReader& records, DatasetFiles& files) {
   for (auto& [split, part] : parts) {
     if (params_.panoptic) {
       files.add_text("annotations/panoptic_" + split + ".json",
-                     python_json(dataset_json("Panoptic segmentation", part.images,
+                     python_json(dataset_json("Panoptic segmentation", licenses_, part.images,
                                               std::move(part.panoptic), categories())));
     }
     files.add_text("annotations/instances_" + split + ".json",
-                   python_json(dataset_json("Instances", std::move(part.images),
+                   python_json(dataset_json("Instances", licenses_, std::move(part.images),
                                             std::move(part.annotations), categories())));
   }
 }

@@ -1,9 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
+#include <string>
+#include <vector>
+
 #include "diorama/host.h"
 #include "diorama/params.h"
 #include "diorama/writer.h"
+#include "writer_coco/coco_categories.h"
+#include "writer_support/class_choice.h"
+#include "writer_support/replicator.h"
 #include "writer_support/training_data.h"
 
 namespace diorama {
@@ -19,6 +26,10 @@ namespace diorama {
 /// compressed run lengths of the visible pixels. Annotations with fewer visible pixels than
 /// `crowd_below_px` are marked iscrowd, so that an evaluation ignores them instead of punishing a
 /// detector for either answer.
+///
+/// The keywords of Replicator's writer of the same name are understood: the categories, the choice
+/// of labels, the licences and the format of pictures. What stands for names and places of files
+/// there has no effect and is named in the log.
 class CocoWriter final : public Writer {
  public:
   struct Params {
@@ -27,6 +38,13 @@ class CocoWriter final : public Writer {
     bool amodal = true;
     bool panoptic = true;
     int crowd_below_px = 0;
+    Value coco_categories;    ///< See read_coco_categories().
+    Value coco_license_info;  ///< A list of {id, name, url} or null.
+    std::optional<std::string> image_output_format;
+    std::optional<std::string> dataset_id;
+    std::optional<double> frame_padding;
+    ReplicatorLabels labels;
+    RemoteOutput remote;
 
     void visit(ParamVisitor& v);
   };
@@ -39,6 +57,7 @@ class CocoWriter final : public Writer {
   void finish(const RecordReader& records, DatasetFiles& files) override;
 
  private:
+  int category_id(int class_index) const;
   Json categories() const;
   Json annotation(const Frame& frame, const TrainingObject& object, int image_id) const;
   Json panoptic_annotation(const Frame& frame, const std::vector<TrainingObject>& objects,
@@ -47,6 +66,8 @@ class CocoWriter final : public Writer {
 
   Params params_;
   Host& host_;
+  std::vector<CocoCategory> categories_;  ///< Of coco_categories; empty: classes count from 1.
+  Json licenses_;
   TrainingData training_;
 };
 

@@ -46,14 +46,16 @@ UprightBox upright_box(const Frame& frame, const Instance& instance) {
   return box;
 }
 
-/// 0 fully visible, 1 partly hidden, 2 largely hidden; the limits are those of Replicator's writer.
-int occlusion_level(const Instance& instance) {
+/// 0 fully visible, 1 partly hidden, 2 largely hidden.
+int occlusion_level(const Instance& instance, const KittiWriter::Params& limits) {
   const double visible =
       instance.visibility ? 1.0 - instance.visibility->occlusion().value_or(0.0) : 1.0;
-  return visible >= 0.95 ? 0 : visible >= 0.5 ? 1 : 2;
+  if (visible >= limits.fully_visible_threshold) return 0;
+  return visible >= limits.partly_occluded_threshold ? 1 : 2;
 }
 
-std::string label_line(const Frame& frame, const TrainingObject& object, const std::string& name) {
+std::string label_line(const Frame& frame, const TrainingObject& object, const std::string& name,
+                       const KittiWriter::Params& limits) {
   const Instance& instance = *object.instance;
   const UprightBox box = upright_box(frame, instance);
   const double bearing = std::atan2(box.location.x(), box.location.z());
@@ -63,7 +65,7 @@ std::string label_line(const Frame& frame, const TrainingObject& object, const s
   std::snprintf(text.data(), text.size(),
                 " %.2f %d %.2f %d.00 %d.00 %d.00 %d.00 %.4f %.4f %.4f %.4f %.4f %.4f %.4f\n",
                 instance.visibility ? instance.visibility->truncation() : 0.0,
-                occlusion_level(instance), alpha, pixels.x_min, pixels.y_min, pixels.x_max,
+                occlusion_level(instance, limits), alpha, pixels.x_min, pixels.y_min, pixels.x_max,
                 pixels.y_max, box.size.y(), box.size.z(), box.size.x(), box.location.x(),
                 box.location.y(), box.location.z(), box.rotation_y);
   // Fields are separated by spaces.
@@ -101,10 +103,47 @@ Image<std::uint32_t> depth_picture(const Image<float>& depth) {
 void KittiWriter::Params::visit(ParamVisitor& v) {
   training.visit(v);
   v.param("depth", depth, {"Depth pictures, 16 bit, metres x 256."});
+  v.param("bbox_height_threshold", bbox_height_threshold,
+          {"Objects whose 2-D box is lower are left out.", "px", 0});
+  v.param("fully_visible_threshold", fully_visible_threshold,
+          {"Objects of which at least this share is visible are not occluded.", "", 0, 1});
+  v.param("partly_occluded_threshold", partly_occluded_threshold,
+          {"Objects of which less is visible are largely occluded.", "", 0, 1});
+  v.param("omit_semantic_type", omit_semantic_type, {"Accepted; labels never say their taxonomy."});
+  v.param("use_kitti_dir_names", use_kitti_dir_names,
+          {"Accepted; folders always have the benchmark's names."});
+  v.param("colorize_instance_segmentation", colorize_instance_segmentation,
+          {"Accepted; there are no segmentation pictures."});
+  v.param("mapping_path", mapping_path, {"Accepted; there are no segmentation pictures."});
+  v.param("mapping_dict", mapping_dict, {"Accepted; there are no segmentation pictures."});
+  v.param("renderproduct_idxs", renderproduct_idxs, {"Accepted; every camera is written."});
+  labels.visit(v);
+  remote.visit(v);
 }
 
 KittiWriter::KittiWriter(Params params, Host& host)
-    : params_(std::move(params)), host_(host), training_(params_.training) {}
+    : params_(std::move(params)),
+      host_(host),
+      training_(params_.training, params_.labels.choice(params_.training.taxonomy)) {
+  params_.remote.check();
+  notice_idle_keywords();
+}
+
+void KittiWriter::notice_idle_keywords() const {
+  const auto notice = [&](bool is_asked_for, const char* text) {
+    if (is_asked_for) host_.log(LogLevel::Info, std::string("KittiWriter: ") + text);
+  };
+  const bool has_mapping =
+      params_.mapping_path.has_value() || params_.mapping_dict.kind != Value::Kind::Null;
+  notice(!params_.omit_semantic_type,
+         "omit_semantic_type: false has no effect: labels never say their taxonomy");
+  notice(!params_.use_kitti_dir_names,
+         "use_kitti_dir_names: false has no effect: folders have the benchmark's names");
+  notice(has_mapping || params_.colorize_instance_segmentation,
+         "there are no segmentation pictures whose colours could be chosen");
+  notice(params_.renderproduct_idxs.kind != Value::Kind::Null,
+         "renderproduct_idxs has no effect: every camera is written");
+}
 
 NameSet KittiWriter::needs() const {
   NameSet names{std::string(kColor.name), std::string(kInstanceId.name), "instances", "visibility"};
@@ -149,7 +188,9 @@ void KittiWriter::write(const Capture& capture, CaptureFiles& files) const {
               training_.image_file(host_, frame));
     std::string labels;
     for (const TrainingObject& object : training_.objects(frame)) {
-      labels += label_line(frame, object, training_.classes()[std::size_t(object.class_index)]);
+      if (object.instance->tight_box->height() < params_.bbox_height_threshold) continue;
+      labels +=
+          label_line(frame, object, training_.classes()[std::size_t(object.class_index)], params_);
     }
     files.add_text("training/label_2/" + name + ".txt", labels);
     files.add_text("training/calib/" + name + ".txt", calibration(frame.camera));

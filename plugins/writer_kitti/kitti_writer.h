@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "diorama/host.h"
 #include "diorama/params.h"
 #include "diorama/writer.h"
+#include "writer_support/class_choice.h"
+#include "writer_support/replicator.h"
 #include "writer_support/training_data.h"
 
 namespace diorama {
@@ -20,11 +23,26 @@ namespace diorama {
 /// hold its box; `location` is the middle of the bottom face. Depth is 16 bit, metres x 256, 0
 /// where nothing is or beyond 255.99 m. KITTI's pictures are rectified: for another lens than a
 /// pinhole the calibration has a line of ours, `lens_2`, with JSON text.
+///
+/// The keywords of Replicator's writer of the same name are understood: the choice of labels and
+/// the thresholds. What it says of segmentation pictures and names of folders has no effect and is
+/// named in the log.
 class KittiWriter final : public Writer {
  public:
   struct Params {
     TrainingParams training;
     bool depth = true;
+    int bbox_height_threshold = 0;
+    double fully_visible_threshold = 0.95;
+    double partly_occluded_threshold = 0.5;
+    bool omit_semantic_type = true;
+    bool use_kitti_dir_names = true;
+    bool colorize_instance_segmentation = false;
+    std::optional<std::string> mapping_path;
+    Value mapping_dict;
+    Value renderproduct_idxs;
+    ReplicatorLabels labels;
+    RemoteOutput remote;
 
     void visit(ParamVisitor& v);
   };
@@ -37,6 +55,7 @@ class KittiWriter final : public Writer {
 
  private:
   std::string stem(int capture, int camera) const;
+  void notice_idle_keywords() const;
 
   Params params_;
   Host& host_;

@@ -74,14 +74,29 @@ void TrainingData::begin(const DatasetInfo& dataset) {
   if (classes_.empty()) {
     std::set<std::string> names;
     for (const Labels& labels : dataset.labels) {
-      const auto label = labels.find(params_.taxonomy);
-      if (label != labels.end()) names.insert(label->second);
+      if (const auto label = choice_.of(labels)) names.insert(*label);
     }
     classes_.assign(names.begin(), names.end());
   }
   is_val_ = choose_validation(dataset.capture_count, params_.val_share, dataset.seed);
   padding_ = grown_padding(6, dataset.capture_count);
   camera_count_ = int(dataset.camera_names.size());
+}
+
+int TrainingData::class_of(const Labels& labels) const {
+  const auto label = choice_.of(labels);
+  if (!label) return -1;
+  auto found = std::ranges::find(classes_, *label);
+  if (found == classes_.end() && !other_.empty()) found = std::ranges::find(classes_, other_);
+  return found == classes_.end() ? -1 : int(found - classes_.begin());
+}
+
+std::vector<int> TrainingData::classes_of(const std::vector<Labels>& labels) const {
+  std::set<int> found;
+  for (const Labels& each : labels) {
+    if (const int index = class_of(each); index >= 0) found.insert(index);
+  }
+  return {found.begin(), found.end()};
 }
 
 std::vector<std::string> TrainingData::splits() const {
@@ -103,13 +118,12 @@ std::vector<TrainingObject> TrainingData::objects(const Frame& frame) const {
   const auto counts = count_visible(frame.get(kInstanceId));
   std::vector<TrainingObject> result;
   for (const Instance& instance : frame.instances) {
-    const auto label = instance.labels.find(params_.taxonomy);
     const auto count = counts.find(instance.id);
-    if (label == instance.labels.end() || count == counts.end()) continue;
-    if (count->second < params_.min_visible_px || !instance.tight_box) continue;
-    const auto found = std::ranges::find(classes_, label->second);
-    if (found == classes_.end()) continue;
-    result.push_back({&instance, int(found - classes_.begin()), count->second});
+    if (count == counts.end() || count->second < params_.min_visible_px || !instance.tight_box) {
+      continue;
+    }
+    const int class_index = class_of(instance.labels);
+    if (class_index >= 0) result.push_back({&instance, class_index, count->second});
   }
   return result;
 }

@@ -8,6 +8,7 @@
 #include "diorama/host.h"
 #include "diorama/params.h"
 #include "diorama/writer.h"
+#include "writer_support/class_choice.h"
 #include "writer_support/python_json.h"
 
 /// What the writers of training formats have in common: class list, split into training and
@@ -35,13 +36,20 @@ struct TrainingObject {
 
 class TrainingData {
  public:
-  explicit TrainingData(TrainingParams params) : params_(std::move(params)) {}
+  explicit TrainingData(TrainingParams params)
+      : params_(std::move(params)), choice_(params_.taxonomy) {}
+  /// For writers that choose labels in another way. Objects of classes that are not in the list are
+  /// of the class `other` where that is one, instead of being left out.
+  TrainingData(TrainingParams params, ClassChoice choice, std::string other = {})
+      : params_(std::move(params)), choice_(std::move(choice)), other_(std::move(other)) {}
 
   /// Fixes the class list and the split; both follow from the job alone, so they are equal in every
   /// shard.
   void begin(const DatasetInfo& dataset);
 
   const std::vector<std::string>& classes() const { return classes_; }
+  /// The classes that these label sets say, as places in the list, each once in the list's order.
+  std::vector<int> classes_of(const std::vector<Labels>& labels) const;
   /// "train" or "val".
   const char* split(int capture) const {
     return is_val_.at(std::size_t(capture)) ? "val" : "train";
@@ -68,7 +76,12 @@ class TrainingData {
                         DatasetFiles& files) const;
 
  private:
+  /// The place of an object's class in the list, or -1.
+  int class_of(const Labels& labels) const;
+
   TrainingParams params_;
+  ClassChoice choice_;
+  std::string other_;
   std::vector<std::string> classes_;
   std::vector<bool> is_val_;
   int padding_ = 6;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "writer_bop/bop_writer.h"
 
+#include <cstring>
+
 #include "plugins/writer_support/sample_dataset.h"
 #include "support/catch.h"
 
@@ -91,6 +93,65 @@ TEST_CASE("depth is in units of depth_scale millimetres", "[writers]") {
   const Json camera = Json::parse(files.text("camera.json"));
   CHECK(camera.at("depth_scale") == 0.1);
   CHECK(camera.at("width") == 72);
+}
+
+TEST_CASE("a model is the asset's shape in millimetres", "[writers]") {
+  const MemoryFiles files = write();
+  const Json info = Json::parse(files.text("models/models_info.json")).at("3");
+  const std::string ply = files.text("models/obj_000003.ply");
+  CHECK(ply.starts_with("ply\nformat binary_little_endian 1.0\n"));
+  const std::string end = "end_header\n";
+  const std::size_t data = ply.find(end) + end.size();
+  const auto count = [&](const std::string& element) {
+    return std::stoul(ply.substr(ply.find("element " + element + " ") + element.size() + 9));
+  };
+  REQUIRE(ply.size() == data + 27 * count("vertex") + 13 * count("face"));
+  Aabb box;
+  std::vector<Vec3f> points(count("vertex"));
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    std::memcpy(points[i].data(), &ply[data + 27 * i], 12);
+    box.add(points[i].cast<double>());
+  }
+  const Instance& mug = test::instance_at(test::sample_captures()[0].frames[0], "/Assets/mug");
+  CHECK(box.min.isApprox(1000.0 * mug.bounds_node.min, 1e-5));
+  CHECK(box.max.isApprox(1000.0 * mug.bounds_node.max, 1e-5));
+  CHECK(info.at("size_z").get<double>() == Approx(box.size().z()));
+  double diameter = 0.0;
+  for (const Vec3f& a : points) {
+    for (const Vec3f& b : points) diameter = std::max(diameter, double((a - b).norm()));
+  }
+  CHECK(info.at("diameter").get<double>() == Approx(diameter));
+  CHECK(diameter < box.size().norm());
+  CHECK_FALSE(files.files.contains("models/obj_000002.ply"));
+}
+
+TEST_CASE("several models of one class are objects of their own", "[writers]") {
+  class TwoMugs final : public test::FakeHost {
+   public:
+    NodeId load_asset(std::string_view asset, Scene& scene, NodeId parent) override {
+      if (asset == "/props/mug.usd") return FakeHost::load_asset(asset, scene, parent);
+      const NodeId node = scene.create(parent, "cup");
+      scene.edit(node).mesh = std::make_shared<const Mesh>(make_box({0.05, 0.06, 0.07}));
+      return node;
+    }
+  };
+  TwoMugs host;
+  DatasetInfo dataset = test::sample_dataset(test::SampleScene(8, 6));
+  dataset.assets.insert(dataset.assets.begin(), {"/props/cup.usd", {{{"class", "mug"}}}, {}});
+  BopWriter writer({}, host);
+  std::vector<const Capture*> captures;
+  for (const Capture& capture : test::sample_captures()) captures.push_back(&capture);
+  const MemoryFiles files = test::write_dataset(writer, dataset, captures);
+  const Json names = Json::parse(files.text("objects.json"));
+  CHECK(names == Json{{"1", "ball"}, {"2", "crate"}, {"3", "mug"}, {"4", "mug"}});
+  const Json models = Json::parse(files.text("models/models_info.json"));
+  CHECK(models.at("3").at("size_z").get<double>() == Approx(70.0));
+  CHECK(files.files.contains("models/obj_000003.ply"));
+  CHECK(files.files.contains("models/obj_000004.ply"));
+  for (const Json& pose :
+       Json::parse(files.text(scene_of(files, 0, 0) + "/scene_gt.json")).at("0")) {
+    if (pose.at("node") == "/Assets/mug") CHECK(pose.at("obj_id") == 4);
+  }
 }
 
 TEST_CASE("models and targets name objects by their class numbers", "[writers]") {

@@ -158,3 +158,90 @@ TEST_CASE("small objects become crowd, unlisted classes are left out", "[writers
     CHECK(annotation.at("iscrowd") == 1);
   }
 }
+
+namespace {
+
+Value category(const char* name, int id) {
+  Value entry = Value::make_map();
+  entry.set("name", Value::text(name));
+  entry.set("id", Value::integer(id));
+  return entry;
+}
+
+}  // namespace
+
+TEST_CASE("Replicator's categories are taken with their ids, the rest is other", "[writers]") {
+  CocoWriter::Params params;
+  params.training.val_share = 0.0;
+  params.coco_categories = Value::make_map();
+  Value cup = category("Cup", 47);
+  cup.set("supercategory", Value::text("kitchen"));
+  cup.set("isthing", Value::integer(0));
+  Value color = Value::make_list();
+  for (const int channel : {1, 2, 3}) color.list.push_back(Value::integer(channel));
+  cup.set("color", color);
+  params.coco_categories.set("mug", cup);
+  params.coco_categories.set("ball", category("sports ball", 37));
+  params.coco_license_info = Value::make_list();
+  params.coco_license_info.list.push_back(category("free", 1));
+  params.image_output_format = "jpeg";
+  params.dataset_id = "abc";
+  test::FakeHost host;
+  const MemoryFiles files = test::write_sample<CocoWriter>(params, host);
+  CHECK(host.messages ==
+        std::vector<std::string>{
+            "CocoWriter: dataset_id has no effect: names of files do not carry it"});
+  const Json json = Json::parse(files.text("annotations/instances_train.json"));
+  CHECK(json.at("licenses") == Json::array({{{"name", "free"}, {"id", 1}}}));
+  CHECK(json.at("categories")[0].at("id") == 47);
+  CHECK(json.at("categories")[0].at("name") == "Cup");
+  CHECK(json.at("categories")[0].at("supercategory") == "kitchen");
+  CHECK(json.at("categories")[0].at("isthing") == 0);
+  CHECK(json.at("categories")[0].at("color") == Json{1, 2, 3});
+  CHECK(json.at("categories")[2].at("name") == "other");
+  CHECK(json.at("images")[0].at("file_name") == "000000_cam_0.jpg");
+  for (const Json& annotation : json.at("annotations")) {
+    const std::string node = annotation.at("node");
+    CHECK(annotation.at("category_id") == (node == "/Assets/mug"    ? 47
+                                           : node == "/Assets/ball" ? 37
+                                                                    : 201));
+  }
+}
+
+TEST_CASE("semantic types choose which label is the class, in their order", "[writers]") {
+  CocoWriter::Params params;
+  params.training.classes = {"cuboid", "mug"};
+  params.training.val_share = 0.0;
+  params.labels.semantic_types = Value::make_list();
+  for (const char* type : {"shape", "class"}) {
+    params.labels.semantic_types.list.push_back(Value::text(type));
+  }
+  const Json json = Json::parse(write(params).text("annotations/instances_train.json"));
+  std::set<std::pair<std::string, int>> found;
+  for (const Json& annotation : json.at("annotations")) {
+    found.emplace(annotation.at("node"), annotation.at("category_id"));
+  }
+  CHECK(found == std::set<std::pair<std::string, int>>{{"/Assets/crate", 1}, {"/Assets/mug", 2}});
+}
+
+TEST_CASE("bad categories are refused with what is wrong", "[writers]") {
+  test::FakeHost host;
+  const auto refused = [&](const Value& categories, const std::string& message) {
+    CocoWriter::Params params;
+    params.coco_categories = categories;
+    CHECK_THROWS_WITH(CocoWriter(params, host), message);
+  };
+  refused(Value::text("all"),
+          "coco_categories: expected a mapping of labels to categories, found the text \"all\"");
+  Value map = Value::make_map();
+  map.set("mug", category("Cup", 1));
+  map.find("mug")->erase("id");
+  refused(map, "coco_categories: \"mug\" needs a name and a whole number as its id");
+  map.set("mug", category("Cup", 1));
+  map.set("ball", category("Ball", 1));
+  refused(map, "coco_categories: id 1 is used twice");
+  CocoWriter::Params remote;
+  remote.remote.s3_bucket = "b";
+  CHECK_THROWS_WITH(CocoWriter(remote, host),
+                    "s3_bucket: found \"b\"; files go to the output folder only, remove the key");
+}

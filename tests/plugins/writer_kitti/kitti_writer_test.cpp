@@ -112,3 +112,36 @@ TEST_CASE("depth is metres times 256, zero where nothing is", "[writers]") {
   }
   CHECK(saw_nothing);
 }
+
+TEST_CASE("Replicator's thresholds count, what stands for its folders is named", "[writers]") {
+  test::FakeHost host;
+  const auto labels = [&](const KittiWriter::Params& params) {
+    return lines_of(
+        test::write_sample<KittiWriter>(params, host).text("training/label_2/000000.txt"));
+  };
+  const auto all = labels({});
+  REQUIRE(all.size() >= 3);
+  CHECK(host.messages.empty());
+  double highest = 0.0;
+  for (const auto& line : all) highest = std::max(highest, line.values[6] - line.values[4]);
+  KittiWriter::Params params;
+  params.bbox_height_threshold = int(highest);
+  CHECK(labels(params).size() < all.size());
+  CHECK_FALSE(labels(params).empty());
+  params = {};
+  params.fully_visible_threshold = 0.0;
+  for (const auto& line : labels(params)) CHECK(line.values[1] == 0);
+  params = {};
+  params.labels.semantic_filter_predicate = "class: mug | ball";
+  CHECK(labels(params).size() == 2);
+  CHECK(host.messages.empty());
+  params = {};
+  params.use_kitti_dir_names = false;
+  params.mapping_path = "colors.json";
+  labels(params);
+  CHECK(host.messages ==
+        std::vector<std::string>{
+            "KittiWriter: use_kitti_dir_names: false has no effect: folders have the benchmark's "
+            "names",
+            "KittiWriter: there are no segmentation pictures whose colours could be chosen"});
+}

@@ -4,6 +4,8 @@
 #include <array>
 #include <stdexcept>
 
+#include "plugins/writer_support/sample_capture.h"
+
 namespace diorama::test {
 namespace {
 
@@ -29,7 +31,18 @@ std::vector<std::filesystem::path> FakeHost::list_assets(std::string_view,
                                                          std::span<const std::string>) const {
   unused();
 }
-NodeId FakeHost::load_asset(std::string_view, Scene&, NodeId) { unused(); }
+NodeId FakeHost::load_asset(std::string_view asset, Scene& scene, NodeId parent) {
+  if (asset != "/props/mug.usd") unused();
+  const SampleScene sample(8, 6);
+  const NodeId mug = sample.scene.require("/Assets/mug");
+  const NodeId root = scene.create(parent, "mug");
+  for (const NodeId part : sample.scene[mug].children) {
+    const NodeId node = scene.create(root, sample.scene[part].name);
+    scene.set_pose(node, sample.scene[part].parent_from_node);
+    scene.edit(node).mesh = sample.scene[part].mesh;
+  }
+  return root;
+}
 std::shared_ptr<const Texture> FakeHost::decode_texture(std::span<const std::byte>,
                                                         std::string_view) const {
   unused();

@@ -23,8 +23,8 @@ struct RawImage {
   int at(int x, int y, int c) const;
 };
 
-/// Encodes pictures as they are, so that tests see every sample. Keeps log lines; nothing else
-/// works.
+/// Encodes pictures as they are, so that tests see every sample. Keeps log lines; its one asset is
+/// "/props/mug.usd", the mug of SampleScene. Nothing else works.
 class FakeHost : public Host {
  public:
   void log(LogLevel level, std::string_view message) override;

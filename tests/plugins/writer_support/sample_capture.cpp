@@ -267,7 +267,8 @@ DatasetInfo sample_dataset(const SampleScene& sample) {
   dataset.resolved_job = "seed: 12\n";
   dataset.program_version = "0.1.0";
   dataset.plugin_versions = {{"writer_basic", "1.0.0"}};
-  dataset.assets = {{"/props/mug.usd", {{{"class", "mug"}}},
+  dataset.assets = {{"/props/mug.usd",
+                     {{{"class", "mug"}}},
                      {{"/props/mug.usd", std::string(64, 'a')},
                       {"/props/textures/mug.png", std::string(64, 'b')}}},
                     {"shape:cube", {}, {}}};
