@@ -1,5 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <array>
+#include <cstring>
+#include <stdexcept>
+#include <string_view>
 
 #include "framework/lint/lint_formats.h"
 #include "framework/lint/lint_page.h"
@@ -36,6 +40,71 @@ void check_targets(Dataset& dataset, const Json& targets, const TargetCounts& ex
   }
   dataset.check(found == expected, "counts agree between files", "test_targets_bop19.json",
                 "its targets are not the objects of test/*/scene_gt.json");
+}
+
+std::string model_file(const std::string& id) { return "models/obj_" + padded_id(id) + ".ply"; }
+
+/// The number behind a line "element NAME" of a PLY file's header.
+std::size_t ply_count(const std::string& header, const std::string& element) {
+  const std::string line = "\nelement " + element + " ";
+  const std::size_t at = header.find(line);
+  if (at == std::string::npos) throw std::runtime_error("has no element " + element);
+  return std::stoul(header.substr(at + line.size(), 20));
+}
+
+/// The extent of a model's vertices. They begin with three floats and take 27 bytes each, faces 13.
+Aabb ply_extent(const std::string& file) {
+  constexpr std::string_view kEnd = "\nend_header\n";
+  const std::size_t end = file.find(kEnd);
+  if (!file.starts_with("ply\nformat binary_little_endian 1.0\n") || end == std::string::npos) {
+    throw std::runtime_error("is not a binary PLY file");
+  }
+  const std::string header = file.substr(0, end);
+  const std::size_t data = end + kEnd.size();
+  const std::size_t vertices = ply_count(header, "vertex");
+  if ((file.size() - data) / 27 < vertices ||
+      file.size() - data - 27 * vertices != 13 * ply_count(header, "face")) {
+    throw std::runtime_error("is cut short");
+  }
+  Aabb box;
+  for (std::size_t i = 0; i < vertices; ++i) {
+    Vec3f position;
+    std::memcpy(position.data(), file.data() + data + 27 * i, 12);
+    box.add(position.cast<double>());
+  }
+  return box;
+}
+
+Aabb model_box(const Json& model) {
+  const Vec3 lo(model.at("min_x").get<double>(), model.at("min_y").get<double>(),
+                model.at("min_z").get<double>());
+  const Vec3 size(model.at("size_x").get<double>(), model.at("size_y").get<double>(),
+                  model.at("size_z").get<double>());
+  return {lo, lo + size};
+}
+
+/// Every model is as large as models_info says.
+void check_models(Dataset& dataset, const Json& models) {
+  const std::string page = "models/models_info.json";
+  for (const auto& [id, model] : models.items()) {
+    const Aabb box = model_box(model);
+    const double diameter = model.at("diameter").get<double>();
+    dataset.check(diameter <= box.size().norm() * (1.0 + 1e-5) &&
+                      diameter >= box.size().maxCoeff() * (1.0 - 1e-5),
+                  "counts agree between files", page,
+                  "obj_id " + id + ": diameter and size differ");
+    const std::string file = model_file(id);
+    if (!dataset.has(file)) continue;
+    const auto text = dataset.text(file);
+    if (!text) continue;
+    dataset.reading(file, [&] {
+      const Aabb extent = ply_extent(*text);
+      const double slack = 1e-5 * box.size().norm();
+      dataset.check(
+          (extent.min - box.min).norm() <= slack && (extent.max - box.max).norm() <= slack,
+          "counts agree between files", file, "is not as large as " + page + " says");
+    });
+  }
 }
 
 class BopScene {
@@ -144,13 +213,10 @@ class BopScene {
 
   /// The model's box holds that of every instance.
   void check_model(const Json& model, const SeenObject& seen) {
-    const Vec3 lo(model.at("min_x").get<double>(), model.at("min_y").get<double>(),
-                  model.at("min_z").get<double>());
-    const Vec3 size(model.at("size_x").get<double>(), model.at("size_y").get<double>(),
-                    model.at("size_z").get<double>());
-    const double slack = 1e-6 * size.norm();
-    const bool holds = ((seen.bounds.min - lo).array() >= -slack).all() &&
-                       ((lo + size - seen.bounds.max).array() >= -slack).all();
+    const Aabb box = model_box(model);
+    const double slack = 1e-5 * box.size().norm();
+    const bool holds = ((seen.bounds.min - box.min).array() >= -slack).all() &&
+                       ((box.max - seen.bounds.max).array() >= -slack).all();
     dataset_.check(holds, "counts agree between files", "models/models_info.json",
                    seen.who + ": its bounds are not inside those of its model");
   }
@@ -165,6 +231,29 @@ class BopScene {
   Lens lens_;
 };
 
+/// Names by obj_id as dataset.json has them; their models must be there.
+Json lint_objects(Dataset& dataset, const DatasetPage& page) {
+  Json names = Json::object();
+  dataset.reading("dataset.json", [&] {
+    std::set<std::string> classes(page.classes.begin(), page.classes.end());
+    for (const Json& object : page.conventions.at("objects")) {
+      const std::string id = object.at("obj_id").dump();
+      const std::string name = object.at("class").get<std::string>();
+      names[id] = name;
+      dataset.check(std::ranges::count(page.classes, name) == 1, "ids within the label map",
+                    "dataset.json",
+                    "object " + id + " is of the class " + name + ", which is none");
+      classes.erase(name);
+      const std::string file = model_file(id);
+      dataset.check(dataset.has(file) || !object.contains("model"), "nothing is missing", file,
+                    "the model is missing");
+    }
+    dataset.check(classes.empty(), "ids within the label map", "dataset.json",
+                  std::to_string(classes.size()) + " classes have no object");
+  });
+  return names;
+}
+
 }  // namespace
 
 void lint_bop(Dataset& dataset) {
@@ -178,18 +267,16 @@ void lint_bop(Dataset& dataset) {
     dataset.check(dataset.has(stem + ".png") || dataset.has(stem + ".jpg"), "nothing is missing",
                   stem, "the picture is missing");
   }
-  Json objects = Json::object();
-  for (const std::string& name : page.classes) {
-    objects[std::to_string(objects.size() + 1)] = name;
-  }
+  const Json objects = lint_objects(dataset, page);
   if (const auto found = dataset.json("objects.json")) {
     dataset.check(*found == objects, "ids within the label map", "objects.json",
-                  "its objects are not the classes of dataset.json");
+                  "its objects are not those of dataset.json");
   }
   dataset.json("camera.json");
   const auto models = dataset.json("models/models_info.json");
   const auto targets = dataset.json("test_targets_bop19.json");
   if (!models || !targets) return;
+  dataset.reading("models/models_info.json", [&] { check_models(dataset, *models); });
   TargetCounts counts;
   for (const std::string& scene : scenes) BopScene(dataset, scene, *models, counts).run();
   dataset.reading("test_targets_bop19.json", [&] { check_targets(dataset, *targets, counts); });

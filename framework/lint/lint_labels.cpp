@@ -1,141 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-// Formats with one small label file per picture: YOLO, KITTI, Pascal VOC.
+// KITTI and Pascal VOC: one small label file per picture.
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <cstring>
-#include <iterator>
 #include <regex>
-#include <sstream>
 
+#include "framework/lint/label_lines.h"
 #include "framework/lint/lint_formats.h"
 #include "framework/lint/lint_page.h"
 #include "framework/lint/object_checks.h"
 
 namespace diorama::lint {
 namespace {
-
-constexpr const char* kMissing = "nothing is missing";
-constexpr const char* kRange = "labels lie in the image";
-constexpr const char* kFields = "every file can be read";
-
-std::vector<std::string> lines_of(const std::string& text) {
-  std::vector<std::string> lines;
-  std::istringstream in(text);
-  for (std::string line; std::getline(in, line);) lines.push_back(line);
-  return lines;
-}
-
-/// Of a file whose every line ends; throws when the last one does not.
-std::vector<std::string> whole_lines_of(const std::string& text) {
-  if (!text.empty() && text.back() != '\n') throw std::runtime_error("its last line is cut short");
-  return lines_of(text);
-}
-
-/// Throws when a word is no number.
-std::vector<double> numbers_of(const std::vector<std::string>& words, std::size_t first) {
-  std::vector<double> numbers;
-  for (std::size_t i = first; i < words.size(); ++i) {
-    double value = 0.0;
-    const char* end = words[i].data() + words[i].size();
-    const auto result = std::from_chars(words[i].data(), end, value);
-    if (result.ec != std::errc() || result.ptr != end) {
-      throw std::runtime_error("'" + words[i] + "' is not a number");
-    }
-    numbers.push_back(value);
-  }
-  return numbers;
-}
-
-std::vector<std::string> words_of(const std::string& line) {
-  std::istringstream in(line);
-  return {std::istream_iterator<std::string>(in), {}};
-}
-
-/// The file with one of the picture endings; empty when there is none.
-std::string picture_file(const Dataset& dataset, const std::string& stem) {
-  for (const char* ending : {".png", ".jpg", ".jpeg"}) {
-    if (dataset.has(stem + ending)) return stem + ending;
-  }
-  return {};
-}
-
-struct YoloTask {
-  std::string name;
-  std::size_t classes = 0;
-};
-
-/// data.yaml has a line per class, in order.
-void check_yolo_names(Dataset& dataset, const std::vector<std::string>& classes) {
-  const auto yaml = dataset.text("data.yaml");
-  if (!yaml) return;
-  std::string names = "names:\n";
-  for (std::size_t i = 0; i < classes.size(); ++i) {
-    names += "  " + std::to_string(i) + ": " +
-             Json(classes[i]).dump(-1, ' ', true, Json::error_handler_t::replace) + "\n";
-  }
-  dataset.check(yaml->ends_with(names), "ids within the label map", "data.yaml",
-                "its names are not the classes of dataset.json");
-}
-
-/// The edges of a box lie between pixels.
-void check_whole_pixels(Dataset& dataset, const std::string& file,
-                        const std::vector<double>& numbers, const Picture& picture) {
-  for (std::size_t axis = 0; axis < 2; ++axis) {
-    const double size = axis == 0 ? picture.width : picture.height;
-    const double low = size * (numbers.at(axis + 1) - 0.5 * numbers.at(axis + 3));
-    const double slack = 2e-6 * size;
-    dataset.check(std::abs(low - std::round(low)) <= slack, "box = extent of mask", file,
-                  "an edge of a box is at " + std::to_string(low) + " px, not between two pixels");
-  }
-}
-
-/// Where all corners of the 3-D box are in the image, they surround the 2-D box.
-void check_yolo_keypoints(Dataset& dataset, const std::string& file,
-                          const std::vector<double>& numbers, const Picture& picture) {
-  Eigen::AlignedBox2d corners;
-  for (std::size_t i = 5; i + 2 < numbers.size(); i += 3) {
-    if (numbers[i + 2] == 0.0) return;
-    corners.extend(Vec2(numbers[i] * picture.width, numbers[i + 1] * picture.height));
-  }
-  check_surrounded(dataset, file, "a line's box",
-                   Vec2(numbers[1] * picture.width, numbers[2] * picture.height),
-                   Vec2(numbers[3] * picture.width, numbers[4] * picture.height), corners);
-}
-
-void check_yolo_line(Dataset& dataset, const std::string& file, const std::string& line,
-                     const YoloTask& task, const Picture& picture) {
-  const auto numbers = numbers_of(words_of(line), 0);
-  if (numbers.empty()) throw std::runtime_error("an empty line");
-  dataset.check(
-      numbers[0] >= 0 && numbers[0] < double(task.classes) && numbers[0] == std::floor(numbers[0]),
-      "ids within the label map", file,
-      "class " + std::to_string(numbers[0]) + " of " + std::to_string(task.classes));
-  const std::size_t fields = numbers.size() - 1;
-  const bool has_right_count = task.name == "detect"    ? fields == 4
-                               : task.name == "obb"     ? fields == 8
-                               : task.name == "segment" ? fields >= 6 && fields % 2 == 0
-                                                        : fields == 4 + 27;
-  dataset.check(has_right_count, kFields, file,
-                std::to_string(fields) + " numbers do not fit the task " + task.name);
-  // The corners of a rotated box may lie a little outside.
-  const double slack = task.name == "obb" ? 0.5 : 1e-6;
-  for (std::size_t i = 1; i < numbers.size(); ++i) {
-    const bool is_flag = task.name == "pose" && i > 4 && (i - 5) % 3 == 2;
-    const double high = is_flag ? 2.0 : 1.0 + slack;
-    dataset.check(numbers[i] >= -slack && numbers[i] <= high, kRange, file,
-                  "the value " + std::to_string(numbers[i]) + " lies outside the image");
-  }
-  if (task.name != "detect" && task.name != "pose") return;
-  for (std::size_t axis = 1; axis <= 2; ++axis) {
-    const double half = 0.5 * numbers.at(axis + 2);
-    dataset.check(half > 0.0 && numbers[axis] - half >= -2e-6 && numbers[axis] + half <= 1 + 2e-6,
-                  kRange, file, "a box reaches beyond the image");
-  }
-  check_whole_pixels(dataset, file, numbers, picture);
-  if (task.name == "pose") check_yolo_keypoints(dataset, file, numbers, picture);
-}
 
 struct KittiImage {
   Picture picture;
@@ -355,26 +232,6 @@ void lint_voc_image(Dataset& dataset, const std::string& stem,
 }
 
 }  // namespace
-
-void lint_yolo(Dataset& dataset) {
-  const DatasetPage page = lint_page(dataset);
-  check_yolo_names(dataset, page.classes);
-  const YoloTask task{page.conventions.value("task", ""), page.classes.size()};
-  for (const PlannedPicture& planned : page.pictures) {
-    const std::string stem = planned.split + "/" + planned.stem;
-    const std::string picture = picture_file(dataset, "images/" + stem);
-    dataset.check(!picture.empty(), kMissing, "images/" + stem, "the picture is missing");
-    const auto decoded = picture.empty() ? std::nullopt : dataset.picture(picture);
-    const std::string labels = "labels/" + stem + ".txt";
-    const auto text = dataset.text(labels);
-    if (!text || !decoded) continue;
-    dataset.reading(labels, [&] {
-      for (const std::string& line : whole_lines_of(*text)) {
-        check_yolo_line(dataset, labels, line, task, *decoded);
-      }
-    });
-  }
-}
 
 void lint_kitti(Dataset& dataset) {
   const DatasetPage page = lint_page(dataset);

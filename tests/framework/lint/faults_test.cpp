@@ -2,12 +2,14 @@
 // Seeded faults, each in every format to which it applies.
 #include <algorithm>
 #include <functional>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "diorama/error.h"
 #include "framework/lint/dataset_on_disk.h"
 #include "framework/lint/encoding_host.h"
 #include "framework/lint/every_format.h"
+#include "framework/lint/label_polygons.h"
 #include "plugins/writer_support/sample_dataset.h"
 #include "support/catch.h"
 
@@ -167,6 +169,63 @@ TEST_CASE("a box off its object is found where there are no masks", "[lint]") {
   std::getline(words, rest, '\0');
   yolo.write(file, id + " " + std::to_string(std::stod(x) + 0.3 / 72.0) + rest);
   CHECK(has_finding(yolo.lint(), "box = extent of mask"));
+}
+
+TEST_CASE("polygons, rotated boxes and keypoints that are off are found", "[lint]") {
+  const std::string file = "labels/train/000000_cam_0.txt";
+  const auto findings = [&](const char* format,
+                            const std::function<void(std::vector<double>&)>& spoil) {
+    const auto yolo = write(format_named(format), capture_through(LensModel::Pinhole));
+    std::istringstream lines(yolo.read(file));
+    std::string text;
+    bool is_first = true;
+    for (std::string line; std::getline(lines, line); is_first = false) {
+      std::istringstream words(line);
+      std::vector<double> numbers{std::istream_iterator<double>(words), {}};
+      if (is_first) spoil(numbers);
+      text += std::to_string(int(numbers[0]));
+      for (std::size_t i = 1; i < numbers.size(); ++i) text += " " + std::to_string(numbers[i]);
+      text += "\n";
+    }
+    yolo.write(file, text);
+    return yolo.lint();
+  };
+  const std::string partition = "pixels partition into instances";
+  const auto untouched = [](std::vector<double>&) {};
+  const auto shift_a_corner = [](std::vector<double>& numbers) { numbers[3] += 0.3 / 72.0; };
+  for (const char* format : {"yolo_segment", "yolo_obb"}) {
+    INFO(format);
+    CHECK(findings(format, untouched).findings.empty());
+  }
+  CHECK(has_finding(findings("yolo_segment", shift_a_corner), partition));
+  CHECK(has_finding(findings("yolo_segment",
+                             [](std::vector<double>& numbers) {
+                               numbers.resize(7);
+                               numbers[3] = numbers[5] = numbers[1];
+                             }),
+                    partition));
+  CHECK(has_finding(findings("yolo_obb", shift_a_corner), "every file can be read"));
+  const std::string pose = "pose and camera reproject onto the mask";
+  CHECK(has_finding(
+      findings("yolo_pose",
+               [](std::vector<double>& numbers) { numbers[8] += numbers[8] > 0.5 ? -0.4 : 0.4; }),
+      pose));
+  CHECK(has_finding(findings("yolo_pose", [](std::vector<double>& numbers) { numbers[7] = 0.0; }),
+                    "labels lie in the image"));
+}
+
+TEST_CASE("polygons of one picture share no pixel", "[lint]") {
+  const auto square = [](double x, double y, double size) {
+    return std::vector<Vec2>{{x, y}, {x + size, y}, {x + size, y + size}, {x, y + size}};
+  };
+  lint::PolygonMasks masks(20, 10);
+  CHECK(masks.add(square(1, 1, 6)) == 36);
+  CHECK(masks.add(square(2, 3, 2)) == 4);  // seen through a hole
+  CHECK(masks.contested() == 0);
+  CHECK(masks.add(square(6, 5, 3)) == 9);
+  CHECK(masks.contested() == 2);
+  CHECK(masks.add(square(18, 8, 5)) == 4);
+  CHECK(masks.contested() == 2);
 }
 
 TEST_CASE("keypoints off their corners are found", "[lint]") {
