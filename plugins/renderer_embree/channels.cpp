@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include "path_tracer.h"
+#include "ray_blocks.h"
 
 namespace diorama {
 namespace {
@@ -50,15 +52,19 @@ class ChannelFiller {
   Host& host_;
 };
 
-/// Pixels that may see something of a box, at most one image size beyond the image.
-PixelBox possible_pixels(const View& view, const Aabb& bounds) {
+/// Pixels that may see something of a box, at most one image size beyond the image. `blocks` are
+/// there for other lenses than a pinhole.
+PixelBox possible_pixels(const View& view, const std::optional<RayBlocks>& blocks,
+                         const Aabb& bounds) {
   const Camera& camera = view.camera();
   const int w = camera.width;
   const int h = camera.height;
   const PixelBox all{-w, -h, 2 * w, 2 * h};
   if (bounds.is_empty()) return {};
+  if (blocks) {
+    return blocks->box_of(view.camera_from_world() * bounds.centre(), 0.5 * bounds.size().norm());
+  }
   // Straight edges stay straight under a pinhole only, and only in front of the camera.
-  if (camera.lens != LensModel::Pinhole) return all;
   Vec2 lo = Vec2::Constant(kInfinity);
   Vec2 hi = Vec2::Constant(-kInfinity);
   int in_front = 0;
@@ -103,7 +109,7 @@ CoverageMask cropped(const PixelBox& box, const std::vector<std::uint8_t>& bits)
 }
 
 CoverageMask coverage_of(const RenderScene& meshes, const View& view,
-                         const LabelledInstance& instance) {
+                         const std::optional<RayBlocks>& blocks, const LabelledInstance& instance) {
   std::vector<std::uint32_t> own;
   Aabb bounds;
   for (std::uint32_t i = 0; i < meshes.instances().size(); ++i) {
@@ -115,7 +121,7 @@ CoverageMask coverage_of(const RenderScene& meshes, const View& view,
     own.push_back(i);
     bounds.add(mesh.bounds);
   }
-  const PixelBox box = possible_pixels(view, bounds);
+  const PixelBox box = possible_pixels(view, blocks, bounds);
   if (box.is_empty()) return {};
   const RenderScene::Part part(meshes, own);
   std::vector<std::uint8_t> bits;
@@ -185,8 +191,11 @@ void fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshe
 std::vector<CoverageMask> coverage(const RenderScene& meshes, const View& view,
                                    std::span<const LabelledInstance> instances, Host& host) {
   std::vector<CoverageMask> masks(instances.size());
-  host.parallel_for(instances.size(),
-                    [&](std::size_t i) { masks[i] = coverage_of(meshes, view, instances[i]); });
+  std::optional<RayBlocks> blocks;
+  if (view.camera().lens != LensModel::Pinhole) blocks.emplace(view.camera(), host);
+  host.parallel_for(instances.size(), [&](std::size_t i) {
+    masks[i] = coverage_of(meshes, view, blocks, instances[i]);
+  });
   return masks;
 }
 

@@ -84,8 +84,19 @@ struct Options {
   int height = 480;
   int threads = 2;
   int repetitions = 3;
+  std::string lens = "pinhole";
   EmbreeRenderer::Params params;
 };
+
+void set_lens(Camera& camera, const std::string& lens) {
+  if (lens == "opencv") {
+    camera.lens = LensModel::OpencvPinhole;
+    camera.distortion = {-0.1, 0.02, 0.001, -0.002, 0.0, 0.0, 0.0, 0.0};
+  } else if (lens == "fisheye") {
+    camera.lens = LensModel::FisheyePolynomial;
+    camera.fisheye_polynomial = {0.0, 1.0 / camera.fx, 0.0, 0.0, 0.0, 0.0};
+  }
+}
 
 void annotate(const Scene& scene, const BodyPoses& before, EmbreeRenderer& renderer, NodeId camera,
               Host& host, Frame& frame, Times& times) {
@@ -109,6 +120,7 @@ void run(const Options& options) {
   Scene scene = bench::load_bench_scene(options.folder, host, false);
   const NodeId camera =
       bench::add_bench_camera(options.folder, scene, options.width, options.height);
+  set_lens(*scene.edit(camera).camera, options.lens);
   const BodyPoses before = label_everything(scene);
   EmbreeRenderer renderer(options.params, host);
   renderer.prepare(scene);
@@ -148,6 +160,7 @@ void run(const Options& options) {
   }
   line["size"] = std::to_string(options.width) + "x" + std::to_string(options.height);
   line["samples"] = options.params.samples;
+  line["lens"] = options.lens;
   line["instances"] = labelled_instances(scene).size();
   line["labels_per_color"] = labels / times.median("color");
   line["files_per_color"] = times.median("files") / times.median("color");
@@ -169,6 +182,7 @@ int main(int argc, char** argv) {
   app.add_option("--samples", options.params.samples);
   app.add_option("--threads", options.threads);
   app.add_option("--repetitions", options.repetitions);
+  app.add_option("--lens", options.lens)->check(CLI::IsMember({"pinhole", "opencv", "fisheye"}));
   CLI11_PARSE(app, argc, argv);
   try {
     run(options);
