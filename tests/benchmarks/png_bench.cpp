@@ -21,13 +21,14 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "cpu_time.h"
 #include "diorama/rng.h"
+#include "framework/bench/cpu_time.h"
 #include "framework/images/image_codecs.h"
 
 namespace {
 
 using namespace diorama;
+using bench::cpu_seconds;
 using Bytes = std::vector<std::uint8_t>;
 
 struct Picture {
@@ -211,9 +212,9 @@ void compare(const Picture& picture, int repetitions) {
   std::vector<std::size_t> sizes(list.size());
   for (int i = 0; i < repetitions; ++i) {
     for (std::size_t k = 0; k < list.size(); ++k) {
-      const double start = bench::cpu_seconds();
+      const double start = cpu_seconds();
       sizes[k] = list[k].encode(picture);
-      seconds[k].push_back(bench::cpu_seconds() - start);
+      seconds[k].push_back(cpu_seconds() - start);
     }
   }
   std::vector<double> medians;
