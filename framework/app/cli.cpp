@@ -244,12 +244,12 @@ void add_render(CLI::App& app, CommandLine& line) {
 
 void add_bench(CLI::App& app, CommandLine& line) {
   BenchOptions& options = line.bench;
-  options.picture.asset = "dining_room:7";
   CLI::App* command =
       app.add_subcommand("bench", "Render a scene; print speed, error and where the time goes");
-  command->add_option("--scene", options.picture.asset, "File, or scheme:rest")
-      ->type_name("FILE")
-      ->capture_default_str();
+  command
+      ->add_option("--scene", options.picture.asset,
+                   "File, or scheme:rest; default: a generated room")
+      ->type_name("FILE");
   command
       ->add_option("--lights", options.lights,
                    "JSON file with lights and camera that replace the scene's")

@@ -14,6 +14,7 @@
 #include "framework/bench/picture_error.h"
 #include "framework/bench/scene_rig.h"
 #include "framework/host/replace_file.h"
+#include "framework/images/linear_picture.h"
 #include "framework/plugins/plugin_call.h"
 
 namespace diorama {
@@ -77,6 +78,16 @@ void make_matte(Scene& scene) {
   }
 }
 
+/// A generated room, seen from one of its corners, where nothing is asked for.
+BenchOptions with_scene(BenchOptions options) {
+  PictureOptions& picture = options.picture;
+  if (!picture.asset.empty()) return options;
+  picture.asset = "dining_room:7";
+  if (picture.eye.empty()) picture.eye = {6.4, 6.3, 1.7};
+  if (picture.target.empty()) picture.target = {8.9, 8.1, 0.8};
+  return options;
+}
+
 NodeId load_scene(const BenchOptions& options, Scene& scene, Host& host, const Log& log) {
   if (options.lights.empty()) {
     const NodeId camera = load_picture_scene(options.picture, scene, host, log);
@@ -90,23 +101,6 @@ NodeId load_scene(const BenchOptions& options, Scene& scene, Host& host, const L
   const NodeId camera = bench::add_rig_camera(options.lights, scene);
   resize_camera(options.picture, camera, scene);
   return camera;
-}
-
-Image<Vec3f> read_reference(const std::string& file, const Camera& camera, const Host& host) {
-  const auto texture = host.read_texture(file);
-  const auto channels = std::size_t(texture->channels);
-  if (texture->width != camera.width || texture->height != camera.height || channels < 3 ||
-      texture->floats.empty()) {
-    throw Error(ErrorKind::Usage,
-                file + ": expected linear light in " + std::to_string(camera.width) + " x " +
-                    std::to_string(camera.height) + " pixels, found " +
-                    std::to_string(texture->width) + " x " + std::to_string(texture->height));
-  }
-  Image<Vec3f> image(camera.width, camera.height, Vec3f::Zero());
-  for (std::size_t i = 0; i < image.pixels().size(); ++i) {
-    image.pixels()[i] = Eigen::Map<const Vec3f>(&texture->floats[i * channels]);
-  }
-  return image;
 }
 
 /// The same picture with many samples and another noise pattern, without denoising.
@@ -231,7 +225,8 @@ std::string result_text(const BenchOptions& options, const BenchResult& result) 
 
 }  // namespace
 
-int command_bench(const GlobalOptions& global, const BenchOptions& options, ConsoleLog& log) {
+int command_bench(const GlobalOptions& global, const BenchOptions& given, ConsoleLog& log) {
+  const BenchOptions options = with_scene(given);
   if (!options.reference.empty() && options.reference_samples > 0) {
     throw Error(ErrorKind::Usage, "--reference and --reference-samples exclude each other");
   }
@@ -249,7 +244,7 @@ int command_bench(const GlobalOptions& global, const BenchOptions& options, Cons
   result.height = scene[camera].camera->height;
   std::optional<Image<Vec3f>> reference;
   if (!options.reference.empty()) {
-    reference = read_reference(options.reference, *scene[camera].camera, *host);
+    reference = read_linear_picture(options.reference, result.width, result.height, *host);
   }
   result.prepare = measured([&] { call_component(who, [&] { renderer->prepare(scene); }); });
   result.prepare_phases = renderer->report().seconds;

@@ -11,7 +11,7 @@
 namespace diorama {
 
 struct BenchOptions {
-  PictureOptions picture;
+  PictureOptions picture;        ///< Without an asset: a generated room.
   std::filesystem::path lights;  ///< See scene_rig.h; empty: those of the scene, and its camera.
   bool is_diffuse = false;       ///< Every material is a matte surface of its base colour.
   std::string reference;         ///< EXR or HDR of the same size; empty: none.
@@ -22,7 +22,7 @@ struct BenchOptions {
 };
 
 /// `diorama bench`: renders a scene and prints speed, error and where the time goes. Throws what
-/// `diorama render` throws, and Error(Usage) for a reference of another size.
+/// `diorama render` throws, and Error(Asset) for a reference of another size.
 int command_bench(const GlobalOptions& global, const BenchOptions& options, ConsoleLog& log);
 
 }  // namespace diorama

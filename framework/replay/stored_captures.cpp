@@ -6,6 +6,7 @@
 
 #include "diorama/error.h"
 #include "framework/config/yaml_config.h"
+#include "framework/images/linear_picture.h"
 #include "framework/lint/replicator_files.h"
 #include "framework/pipeline/capture_plan.h"
 #include "framework/pipeline/file_system.h"
@@ -80,21 +81,6 @@ Camera read_camera(const fs::path& file) {
   } catch (const std::exception& error) {
     refuse(file, error.what());
   }
-}
-
-Image<Vec3f> read_colors(const fs::path& file, const Camera& camera, const Host& host) {
-  const auto texture = host.read_texture(file);
-  const auto channels = std::size_t(texture->channels);
-  if (texture->width != camera.width || texture->height != camera.height ||
-      texture->floats.empty() || channels < 3) {
-    refuse(file, "expected a picture of " + std::to_string(camera.width) + " x " +
-                     std::to_string(camera.height) + " pixels in linear colours");
-  }
-  Image<Vec3f> image(camera.width, camera.height, Vec3f::Zero());
-  for (std::size_t i = 0; i < image.pixels().size(); ++i) {
-    image.pixels()[i] = Eigen::Map<const Vec3f>(&texture->floats[i * channels]);
-  }
-  return image;
 }
 
 Image<float> read_distances(const fs::path& file, const Camera& camera) {
@@ -220,7 +206,7 @@ Frame StoredCaptures::read_frame(const std::string& camera, int index, const Fra
   frame.seed = JobStreams(seed_).render_seed(index, camera);
   if (channels_.contains(kColorHdr.name)) {
     const fs::path& file = files.at(storage_of(kColorHdr.name).file);
-    frame.set(kColorHdr, read_colors(file, frame.camera, host));
+    frame.set(kColorHdr, read_linear_picture(file, frame.camera.width, frame.camera.height, host));
   }
   if (channels_.contains(kDistanceToImagePlane.name)) {
     const fs::path& file = files.at(storage_of(kDistanceToImagePlane.name).file);

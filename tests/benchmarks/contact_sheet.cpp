@@ -7,6 +7,8 @@
 #include <filesystem>
 #include <functional>
 
+#include "camera_sensor.h"
+#include "depth_sensor.h"
 #include "embree_renderer.h"
 #include "loader_dining_room/dining_room_loader.h"
 #include "modelling/canvas.h"
@@ -140,7 +142,8 @@ void add_stage(Scene& scene, Host& host) {
 
 // The lights.
 
-Image<Rgba8> lit_stage(Host& host, const std::function<void(Scene&)>& add_lights) {
+Image<Rgba8> lit_stage(Host& host, const std::function<void(Scene&)>& add_lights,
+                       double exposure_ev = 0.0) {
   Scene scene;
   add_stage(scene, host);
   add_mesh(scene, "ball", make_sphere(0.5, 64), plain(Vec3f(0.7f, 0.15f, 0.1f), 0.35f),
@@ -150,7 +153,9 @@ Image<Rgba8> lit_stage(Host& host, const std::function<void(Scene&)>& add_lights
   add_lights(scene);
   const NodeId camera =
       add_camera(scene, kTileWidth, kTileHeight, 24.0, Vec3(0.2, -3.3, 1.7), Vec3(0, 0.3, 0.65));
-  return render(scene, camera, quality(128), host);
+  EmbreeRenderer::Params params = quality(128);
+  params.exposure_ev = exposure_ev;
+  return render(scene, camera, params, host);
 }
 
 std::shared_ptr<const Texture> evening_sky() {
@@ -165,7 +170,7 @@ std::shared_ptr<const Texture> evening_sky() {
       const Vec3f zenith(0.25f, 0.4f, 0.8f), horizon(1.2f, 0.7f, 0.4f), ground(0.15f, 0.12f, 0.1f);
       Vec3f color = up > 0.0f ? Vec3f(horizon + (zenith - horizon) * std::sqrt(up)) : ground;
       const float off = std::hypot(float(x - 200), 1.5f * float(y - 45));
-      if (off < 4.0f) color = Vec3f(900.0f, 600.0f, 300.0f);
+      if (off < 4.0f) color = Vec3f(300.0f, 200.0f, 100.0f);
       sky->floats.insert(sky->floats.end(), {color.x(), color.y(), color.z()});
     }
   }
@@ -207,13 +212,16 @@ void draw_lights(const std::filesystem::path& folder, Host& host) {
               scene.edit(node).light = light;
               scene.set_pose(node, Affine(Eigen::AngleAxisd(2.0, Vec3::UnitZ())));
             }));
-  sheet.add("SPOT", lit_stage(host, [&](Scene& scene) {
-              Light light = light_of(LightKind::Sphere, 2000.0f);
-              light.radius_m = 0.1;
-              light.cone_angle_rad = 0.35;
-              light.cone_softness = 0.3;
-              add_light(scene, light, above, target);
-            }));
+  sheet.add("SPOT", lit_stage(
+                        host,
+                        [&](Scene& scene) {
+                          Light light = light_of(LightKind::Sphere, 2000.0f);
+                          light.radius_m = 0.1;
+                          light.cone_angle_rad = 0.35;
+                          light.cone_softness = 0.3;
+                          add_light(scene, light, above, target);
+                        },
+                        -3.0));
   sheet.add("GLOWING MESH", lit_stage(host, [&](Scene& scene) {
               Material glow = plain(Vec3f::Zero(), 1.0f);
               glow.emission = Vec3f(60.0f, 40.0f, 15.0f);
@@ -299,8 +307,8 @@ const std::vector<Surface>& surfaces() {
        [](Material& m, Host& host) {
          const auto wicker = modelling::make_wicker(host, modelling::color(0xb08850), 5, 512);
          m.base_color.setOnes();
-         m.base_color_texture = textured(wicker.color, 4.0f);
-         m.normal_texture = textured(wicker.normal, 4.0f);
+         m.base_color_texture = textured(wicker.color, 2.0f);
+         m.normal_texture = textured(wicker.normal, 2.0f);
          m.roughness = 0.5f;
        }},
       {"TEXTURE",
@@ -370,7 +378,7 @@ Scene window_room(Host& host) {
   Light light = light_of(LightKind::Dome, 1.0f);
   light.texture = evening_sky();
   scene.edit(sky).light = light;
-  scene.set_pose(sky, Affine(Eigen::AngleAxisd(-2.1, Vec3::UnitZ())));
+  scene.set_pose(sky, Affine(Eigen::AngleAxisd(-1.75, Vec3::UnitZ())));
   return scene;
 }
 
@@ -421,7 +429,7 @@ void draw_rooms(const std::filesystem::path& folder, Host& host) {
   Scene window = window_room(host);
   const NodeId inside =
       add_camera(window, kWidth, kHeight, 17.0, Vec3(1.5, -2.3, 1.5), Vec3(-0.3, 0.7, 0.9));
-  sheet.add("SKY THROUGH A WINDOW", render(window, inside, quality(128), host));
+  sheet.add("SKY THROUGH A WINDOW", render(window, inside, quality(256), host));
   Scene night = dining_room(host, true);
   sheet.add("NIGHT WITH ONE LAMP",
             render(night, add_room_camera(night, kWidth, kHeight), quality(128), host));
@@ -454,18 +462,63 @@ void draw_shutter(const std::filesystem::path& folder, Host& host) {
     change(*scene.edit(camera).camera);
     return render(scene, camera, quality(128), host);
   };
-  sheet.add("DEPTH OF FIELD, F/1", picture([](Camera& camera) {
+  sheet.add("LENS OF 60 MM", picture([](Camera& camera) {
               camera.f_stop = 0.4;
               camera.focus_distance_m = 3.8;
             }));
-  sheet.add("EXPOSURE 1/20 S", picture([](Camera& camera) { camera.exposure_time_s = 0.05; }));
-  sheet.add("ROLLING SHUTTER 1/10 S", picture([](Camera& camera) { camera.readout_time_s = 0.1; }));
+  sheet.add("EXPOSURE OF 1/20 S", picture([](Camera& camera) { camera.exposure_time_s = 0.05; }));
+  sheet.add("ROLLING SHUTTER OF 1/10 S",
+            picture([](Camera& camera) { camera.readout_time_s = 0.1; }));
   sheet.write(host, folder / "shutter.png");
 }
 
+/// Exact light and depth, and what sensors make of them.
+void draw_sensors(const std::filesystem::path& folder, Host& host) {
+  constexpr int kWidth = 320;
+  constexpr int kHeight = 240;
+  Sheet sheet(3, kWidth, kHeight);
+  Scene scene = window_room(host);
+  const NodeId node =
+      add_camera(scene, kWidth, kHeight, 17.0, Vec3(1.5, -1.2, 1.5), Vec3(-0.1, 0.7, 0.85));
+  EmbreeRenderer renderer(quality(64), host);
+  renderer.prepare(scene);
+  Frame frame = renderer.render({node,
+                                 {std::string(kColor.name), std::string(kColorHdr.name),
+                                  std::string(kDistanceToImagePlane.name)},
+                                 1});
+  const auto grey = [](const Image<float>& depth) {
+    Image<Rgba8> image(depth.width(), depth.height(), Rgba8{0, 0, 0, 255});
+    for (std::size_t i = 0; i < depth.pixels().size(); ++i) {
+      const float z = depth.pixels()[i];
+      const bool is_measured = z > 0.0f && std::isfinite(z);
+      const auto value = std::uint8_t(is_measured ? 40.0f + 215.0f / (1.0f + 0.3f * z * z) : 0.0f);
+      image.pixels()[i] = {value, value, value, 255};
+    }
+    return image;
+  };
+  sheet.add("AS RENDERED", frame.get(kColor));
+  for (const double iso : {400.0, 6400.0}) {
+    CameraSensor::Params params;
+    params.iso = iso;
+    params.red_shift_px = 1.0;
+    params.blue_shift_px = -1.0;
+    CameraSensor(params, host).annotate(scene, frame);
+    sheet.add("SENSOR - ISO " + std::to_string(int(iso)), frame.get(kColor));
+  }
+  sheet.add("EXACT DEPTH", grey(frame.get(kDistanceToImagePlane)));
+  for (const double baseline_m : {0.05, 0.15}) {
+    DepthSensor::Params params;
+    params.baseline_m = baseline_m;
+    DepthSensor(params, host).annotate(scene, frame);
+    sheet.add("STEREO OF " + std::to_string(int(100 * baseline_m + 0.5)) + " CM",
+              grey(frame.get(kSensorDepth)));
+  }
+  sheet.write(host, folder / "sensors.png");
+}
+
 void draw_denoising(const std::filesystem::path& folder, Host& host) {
-  constexpr int kWidth = 400;
-  constexpr int kHeight = 300;
+  constexpr int kWidth = 320;
+  constexpr int kHeight = 240;
   Sheet sheet(3, kWidth, kHeight);
   Scene scene = dining_room(host, false);
   const NodeId camera = add_room_camera(scene, kWidth, kHeight);
@@ -489,17 +542,14 @@ int main(int argc, char** argv) {
   CLI::App app{"Renders the contact sheets of the path tracer's page"};
   app.add_option("folder", folder, "Where to put lights.png, surfaces.png ...")->required();
   app.add_option("--only", only)
-      ->check(CLI::IsMember({"lights", "surfaces", "rooms", "shutter", "denoising"}));
+      ->check(CLI::IsMember({"lights", "surfaces", "rooms", "shutter", "sensors", "denoising"}));
   app.add_option("--threads", threads);
   CLI11_PARSE(app, argc, argv);
   try {
     test::RenderHost host(threads);
     const std::vector<std::pair<std::string, void (*)(const std::filesystem::path&, Host&)>> sheets{
-        {"lights", &draw_lights},
-        {"surfaces", &draw_surfaces},
-        {"rooms", &draw_rooms},
-        {"shutter", &draw_shutter},
-        {"denoising", &draw_denoising}};
+        {"lights", &draw_lights},   {"surfaces", &draw_surfaces}, {"rooms", &draw_rooms},
+        {"shutter", &draw_shutter}, {"sensors", &draw_sensors},   {"denoising", &draw_denoising}};
     for (const auto& [name, draw] : sheets) {
       if (only.empty() || only == name) draw(folder, host);
     }

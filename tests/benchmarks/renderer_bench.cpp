@@ -9,25 +9,19 @@
 #include <cstdio>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "bench_scene.h"
 #include "embree_renderer.h"
 #include "framework/bench/cpu_time.h"
 #include "framework/bench/picture_error.h"
+#include "framework/images/linear_picture.h"
 #include "support/render_host/render_host.h"
 
 namespace {
 
 using namespace diorama;
 using bench::cpu_seconds;
-
-Image<Vec3f> as_image(const Texture& texture) {
-  Image<Vec3f> image(texture.width, texture.height, Vec3f::Zero());
-  for (std::size_t i = 0; i < image.pixels().size(); ++i) {
-    image.pixels()[i] = Eigen::Map<const Vec3f>(&texture.floats[i * std::size_t(texture.channels)]);
-  }
-  return image;
-}
 
 double thread_seconds() {
   timespec now;
@@ -125,8 +119,10 @@ void run(const Options& options) {
   start = cpu_seconds();
   renderer.prepare(scene);
   const double prepare = cpu_seconds() - start;
-  std::shared_ptr<const Texture> reference;
-  if (!options.reference.empty()) reference = host.read_texture(options.reference);
+  std::optional<Image<Vec3f>> reference;
+  if (!options.reference.empty()) {
+    reference = read_linear_picture(options.reference, options.width, options.height, host);
+  }
   for (int i = 0; i < options.repetitions; ++i) {
     start = cpu_seconds();
     const Frame frame = renderer.render({camera,
@@ -150,7 +146,7 @@ void run(const Options& options) {
     line["shadow_rays_per_path"] = double(counts.shadow_rays) / double(counts.paths);
     line["mrays_per_cpu_s"] = 1e-6 * double(counts.rays + counts.shadow_rays) / cpu;
     if (reference) {
-      const auto error = bench::picture_error(frame.get(kColorHdr), as_image(*reference));
+      const auto error = bench::picture_error(frame.get(kColorHdr), *reference);
       line["rel_mse"] = error.trimmed_mse;
       line["bias"] = error.bias;
     }

@@ -165,3 +165,30 @@ TEST_CASE("a sensor that no writer asks for is warned of", "[sensors]") {
   CHECK_THAT(made.errors, Contains("annotators: depth_sensor does nothing, as no writer needs what "
                                    "it makes (sensor_depth)"));
 }
+
+TEST_CASE("things that fall are blurred in the picture and sharp in the labels", "[sensors]") {
+  // So short an exposure shows no motion, but draws the same random numbers.
+  const auto with_exposure = [](const TemporaryFolder& folder, const char* seconds) {
+    const Outcome made =
+        run({"run", config_file("smoke.yaml"), "--output", "out", "--set",
+             "renderer={type: embree, samples: 2}", "--set",
+             std::string("cameras=[{type: pinhole, name: cam, count: 2, width: 64, height: 48, "
+                         "exposure_time_s: ") +
+                 seconds + "}]"},
+            folder.path());
+    INFO(made.errors);
+    REQUIRE(made.exit_code == 0);
+    return tree(folder / "out" / "basic");
+  };
+  const TemporaryFolder first;
+  const TemporaryFolder second;
+  const auto sharp = with_exposure(first, "1e-9");
+  const auto blurred = with_exposure(second, "0.1");
+  std::size_t changed = 0;
+  for (const auto& [name, bytes] : sharp) {
+    if (blurred.at(name) == bytes) continue;
+    CHECK_THAT(name, Contains("/rgb/"));
+    ++changed;
+  }
+  CHECK(changed >= 2);
+}
