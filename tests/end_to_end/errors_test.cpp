@@ -3,7 +3,6 @@
 #include "support/catch.h"
 
 using namespace diorama::test;
-using Catch::Matchers::Contains;
 
 namespace {
 
@@ -25,7 +24,7 @@ void expect_error(const std::string& job, int exit_code, const std::string& mess
   const Outcome outcome = run(arguments, folder.path());
   INFO(outcome.errors);
   CHECK(outcome.exit_code == exit_code);
-  CHECK_THAT(outcome.errors, Contains(message));
+  CHECK_THAT(outcome.errors, ContainsSubstring(message));
   const std::size_t errors = [&] {
     std::size_t count = 0;
     for (std::size_t at = outcome.errors.find("error: "); at != std::string::npos;
@@ -48,7 +47,8 @@ TEST_CASE("config checks what run checks, but for the assets", "[errors]") {
   const Outcome wrong = run({"config", "job.yaml"}, folder.path());
   CHECK(wrong.exit_code == 3);
   CHECK(wrong.output.empty());
-  CHECK_THAT(wrong.errors, Contains("unknown key 'camera_parms', did you mean 'camera_params'?"));
+  CHECK_THAT(wrong.errors,
+             ContainsSubstring("unknown key 'camera_parms', did you mean 'camera_params'?"));
   write_file(folder / "job.yaml", job_with("{type: shapes, shapes: [cube, sphere]}",
                                            "{type: files, folders: [/no/such/folder]}"));
   const Outcome absent = run({"config", "job.yaml"}, folder.path());
@@ -77,7 +77,7 @@ TEST_CASE("A missing job file", "[errors]") {
   const TemporaryFolder folder;
   const Outcome outcome = run({"run", "nowhere.yaml"}, folder.path());
   CHECK(outcome.exit_code == 3);
-  CHECK_THAT(outcome.errors, Contains("nowhere.yaml"));
+  CHECK_THAT(outcome.errors, ContainsSubstring("nowhere.yaml"));
 }
 
 TEST_CASE("A YAML syntax error has its place", "[errors]") {
@@ -138,7 +138,7 @@ TEST_CASE("An output that cannot be written is found at start", "[errors]") {
   const Outcome outcome =
       run({"run", config_file("smoke.yaml"), "--output", "file/below"}, folder.path());
   CHECK(outcome.exit_code == 6);
-  CHECK_THAT(outcome.errors, Contains("file/below") || Contains("/file"));
+  CHECK_THAT(outcome.errors, ContainsSubstring("file/below") || ContainsSubstring("/file"));
   CHECK(tree(folder.path()).size() == 1);
 }
 
@@ -151,5 +151,5 @@ TEST_CASE("Flags that exclude each other", "[errors]") {
   const Outcome outcome =
       run({"run", config_file("smoke.yaml"), "--resume", "--overwrite"}, folder.path());
   CHECK(outcome.exit_code == 2);
-  CHECK_THAT(outcome.errors, Contains("exclude each other"));
+  CHECK_THAT(outcome.errors, ContainsSubstring("exclude each other"));
 }

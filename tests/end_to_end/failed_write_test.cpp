@@ -11,7 +11,6 @@
 #include "support/catch.h"
 
 using namespace diorama::test;
-using Catch::Matchers::Contains;
 
 namespace {
 
@@ -79,7 +78,7 @@ std::size_t bytes_of(const std::map<std::string, std::string>& files) {
 void expect_one_message(const Outcome& outcome, const std::string& reason) {
   INFO(outcome.errors);
   CHECK(outcome.exit_code == 6);
-  CHECK_THAT(outcome.errors, Contains(reason));
+  CHECK_THAT(outcome.errors, ContainsSubstring(reason));
   const std::size_t first = outcome.errors.find("error: ");
   REQUIRE(first != std::string::npos);
   CHECK(outcome.errors.find("error: ", first + 1) == std::string::npos);

@@ -3,7 +3,6 @@
 #include "support/catch.h"
 
 using namespace diorama::test;
-using Catch::Matchers::Contains;
 
 namespace {
 
@@ -44,14 +43,14 @@ TEST_CASE("render writes one picture of a file, by its camera or by a new one", 
   const Outcome own = run(picture({"-o", "own.png", "--width", "64"}), folder.path());
   INFO(own.errors);
   REQUIRE(own.exit_code == 0);
-  CHECK_THAT(own.errors, Contains("/World/Above, 64x"));
+  CHECK_THAT(own.errors, ContainsSubstring("/World/Above, 64x"));
   CHECK(read_file(folder / "own.png").substr(1, 3) == "PNG");
   const Outcome placed = run(picture({"-o", "new.jpg", "--eye", "3", "0", "4", "--target", "0", "0",
                                       "0", "--width", "64", "--height", "32"}),
                              folder.path());
   INFO(placed.errors);
   REQUIRE(placed.exit_code == 0);
-  CHECK_THAT(placed.errors, Contains("/RenderCamera, 64x32"));
+  CHECK_THAT(placed.errors, ContainsSubstring("/RenderCamera, 64x32"));
   const auto left = tree(folder.path());
   CHECK(left.size() == 3);
 }
@@ -65,7 +64,7 @@ TEST_CASE("render refuses what cannot be rendered and leaves no picture", "[rend
     INFO(outcome.errors);
     CHECK(outcome.exit_code != 0);
     CHECK(outcome.exit_code < 128);
-    CHECK_THAT(outcome.errors, Contains(message));
+    CHECK_THAT(outcome.errors, ContainsSubstring(message));
     CHECK(tree(folder.path()).size() == 1);
   };
   refused({"-o", "x.tif"}, "expected .png, .jpg, .exr or .hdr");

@@ -11,7 +11,6 @@
 
 using namespace diorama;
 using namespace diorama::test;
-using Catch::Matchers::Contains;
 
 namespace {
 
@@ -132,27 +131,32 @@ TEST_CASE("What a job says of a distribution comes back as its source", "[distri
 
 TEST_CASE("Mistakes in distributions are told with place, finding and what would be right",
           "[distribution]") {
-  CHECK_THAT(complaint("lots"), Contains("job.yaml:1:8: scale: expected a number"));
-  CHECK_THAT(complaint("[2, 1]"), Contains("lo <= hi"));
-  CHECK_THAT(complaint("[1, 2, 3]"), Contains("expected a number, [lo, hi], or one of uniform"));
+  CHECK_THAT(complaint("lots"), ContainsSubstring("job.yaml:1:8: scale: expected a number"));
+  CHECK_THAT(complaint("[2, 1]"), ContainsSubstring("lo <= hi"));
+  CHECK_THAT(complaint("[1, 2, 3]"),
+             ContainsSubstring("expected a number, [lo, hi], or one of uniform"));
   CHECK_THAT(complaint("{unifrom: {lower: 1, upper: 2}}"),
-             Contains("unknown distribution 'unifrom', did you mean 'uniform'?"));
+             ContainsSubstring("unknown distribution 'unifrom', did you mean 'uniform'?"));
   CHECK_THAT(complaint("{uniform: {lower: 2, upper: 1}}"),
-             Contains("scale.uniform: lower must not exceed upper"));
-  CHECK_THAT(complaint("{uniform: {lower: 2}}"), Contains("`upper` is missing"));
-  CHECK_THAT(complaint("{uniform: {lower: 1, uper: 2}}"), Contains("did you mean 'upper'?"));
-  CHECK_THAT(complaint("{log_uniform: {lower: 0, upper: 1}}"), Contains("above 0"));
-  CHECK_THAT(complaint("{normal: {mean: 0, std: -1}}"), Contains("scale.normal.std"));
-  CHECK_THAT(complaint("{choice: {choices: []}}"), Contains("at least one entry"));
+             ContainsSubstring("scale.uniform: lower must not exceed upper"));
+  CHECK_THAT(complaint("{uniform: {lower: 2}}"), ContainsSubstring("`upper` is missing"));
+  CHECK_THAT(complaint("{uniform: {lower: 1, uper: 2}}"),
+             ContainsSubstring("did you mean 'upper'?"));
+  CHECK_THAT(complaint("{log_uniform: {lower: 0, upper: 1}}"), ContainsSubstring("above 0"));
+  CHECK_THAT(complaint("{normal: {mean: 0, std: -1}}"), ContainsSubstring("scale.normal.std"));
+  CHECK_THAT(complaint("{choice: {choices: []}}"), ContainsSubstring("at least one entry"));
   CHECK_THAT(complaint("{choice: {choices: [1, 2], weights: [1]}}"),
-             Contains("expected one per choice (2), found 1"));
-  CHECK_THAT(complaint("{choice: {choices: [1], weights: [0]}}"), Contains("at least one must be"));
-  CHECK_THAT(complaint("{combine: {distributions: [1, 2, 3]}}"), Contains("only a vector"));
-  CHECK_THAT(complaint("{combine: {distributions: [1, 2]}}", 3), Contains("a list of three"));
+             ContainsSubstring("expected one per choice (2), found 1"));
+  CHECK_THAT(complaint("{choice: {choices: [1], weights: [0]}}"),
+             ContainsSubstring("at least one must be"));
+  CHECK_THAT(complaint("{combine: {distributions: [1, 2, 3]}}"),
+             ContainsSubstring("only a vector"));
+  CHECK_THAT(complaint("{combine: {distributions: [1, 2]}}", 3),
+             ContainsSubstring("a list of three"));
   CHECK_THAT(complaint("[0.5, 7]", 1, {"A quantity.", "m", 0.0, 5.0}),
-             Contains("expected a number in [0, 5], found \"7\""));
+             ContainsSubstring("expected a number in [0, 5], found \"7\""));
   CHECK_THAT(complaint("{choice: {choices: [1, 9]}}", 1, {"A quantity.", "m", 0.0, 5.0}),
-             Contains("scale.choice.choices[1]"));
+             ContainsSubstring("scale.choice.choices[1]"));
 }
 
 TEST_CASE("Texts are chosen by weight or in turn", "[distribution]") {
@@ -174,7 +178,7 @@ TEST_CASE("Texts are chosen by weight or in turn", "[distribution]") {
         36);
   CHECK(counts(text_from("{sequence: {items: [a, b]}}"))["a"] == 250);
   CHECK(text_from("[]").texts().empty());
-  CHECK_THAT(error_text([&] { text_from("{shuffle: [a]}"); }), Contains("`choice` or"));
+  CHECK_THAT(error_text([&] { text_from("{shuffle: [a]}"); }), ContainsSubstring("`choice` or"));
   CHECK_THAT(error_text([&] { text_from("{choice: {choices: [a], weights: [-1]}}"); }),
-             Contains("sky.choice.weights[0]"));
+             ContainsSubstring("sky.choice.weights[0]"));
 }

@@ -6,7 +6,6 @@
 #include "support/catch.h"
 
 using namespace diorama;
-using Catch::Matchers::Contains;
 
 namespace {
 
@@ -98,13 +97,13 @@ TEST_CASE("The report names the worst visits and every object that left", "[sett
   wild.respawned = {"/Assets/can", "/Assets/can"};
   CHECK(settle_text({}).empty());
   const std::string text = settle_text({quiet, wild});
-  CHECK_THAT(text, Contains("11 falling over all visits, 1 left the room"));
-  CHECK_THAT(text, Contains("at rest after at most 1.25 s (visit 1)"));
-  CHECK_THAT(text, Contains("residual speed at most 0.5000 m/s (visit 2)"));
-  CHECK_THAT(text, Contains("deepest penetration 2.00 mm (visit 1, /Assets/bowl)"));
-  CHECK_THAT(text, Contains("visit 2: not at rest after 3.40 s"));
-  CHECK_THAT(text, Contains("visit 2: /Assets/mug left the room"));
-  CHECK_THAT(text, Contains("visit 2: /Assets/can had left the room and was placed anew"));
+  CHECK_THAT(text, ContainsSubstring("11 falling over all visits, 1 left the room"));
+  CHECK_THAT(text, ContainsSubstring("at rest after at most 1.25 s (visit 1)"));
+  CHECK_THAT(text, ContainsSubstring("residual speed at most 0.5000 m/s (visit 2)"));
+  CHECK_THAT(text, ContainsSubstring("deepest penetration 2.00 mm (visit 1, /Assets/bowl)"));
+  CHECK_THAT(text, ContainsSubstring("visit 2: not at rest after 3.40 s"));
+  CHECK_THAT(text, ContainsSubstring("visit 2: /Assets/mug left the room"));
+  CHECK_THAT(text, ContainsSubstring("visit 2: /Assets/can had left the room and was placed anew"));
   const auto json = nlohmann::json::parse(settle_json(wild));
   CHECK(json["rest_after_s"].is_null());
   CHECK(json["environment"] == "room.usdc");

@@ -12,7 +12,6 @@
 
 using namespace diorama;
 using namespace diorama::test;
-using Catch::Matchers::Contains;
 
 namespace {
 
@@ -158,7 +157,8 @@ TEST_CASE("Without a free place the node is named, and nothing hangs", "[placeme
   params.placement.max_tries = 5;
   Scatter3d(params, stage.host).randomize(stage.scene, {}, Rng(1));
   REQUIRE(stage.host.warnings.size() == 2);
-  CHECK_THAT(stage.host.warnings[0], Contains("/Assets/cube_01: no free place in 5 tries"));
+  CHECK_THAT(stage.host.warnings[0],
+             ContainsSubstring("/Assets/cube_01: no free place in 5 tries"));
   CHECK(stage.place(2) == Vec3(5, 1, 2));
 }
 
@@ -169,10 +169,10 @@ TEST_CASE("Patterns that lead nowhere are told in words", "[placement]") {
   Scatter2d(on_nothing, stage.host).randomize(stage.scene, {}, Rng(1));
   REQUIRE(stage.host.warnings.size() == 1);
   CHECK_THAT(stage.host.warnings[0],
-             Contains("\"/Environment/sofa/**\" is visible and faces upwards"));
+             ContainsSubstring("\"/Environment/sofa/**\" is visible and faces upwards"));
   CHECK(stage.place(0) == Vec3::Zero());
   Scatter3d::Params in_nothing;
   in_nothing.volumes = "/Marks/*";
   CHECK_THAT(text_of([&] { Scatter3d(in_nothing, stage.host).randomize(stage.scene, {}, Rng(1)); }),
-             Contains("\"/Marks/*\" has a mesh"));
+             ContainsSubstring("\"/Marks/*\" has a mesh"));
 }
