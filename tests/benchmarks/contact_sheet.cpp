@@ -382,36 +382,27 @@ Scene window_room(Host& host) {
   return scene;
 }
 
-/// A generated dining room as it is, or by night: one lamp on the table, no sky.
-Scene dining_room(Host& host, bool is_night) {
+/// A generated dining room at night: one lamp on the table, no sky, nothing else that glows.
+Scene night_room(Host& host) {
   Scene scene;
   const NodeId root = scene.create(scene.root(), "room");
   dining_room::DiningRoomLoader({}, host).load("dining_room:7", scene, root);
-  const auto table = scene.match("/room/**TableDining*");
   for (const NodeId node : scene.match("/room/**")) {
-    if (scene.path(node).find("001_SPLIT_GLA") != std::string::npos) {
-      scene.edit(node).is_visible = false;
-    }
-    if (is_night && scene[node].light) scene.edit(node).light.reset();
-  }
-  const Vec3 centre = table.empty() ? Vec3(0, 0, 0.75) : scene.world_bounds(table[0]).centre();
-  const double top = table.empty() ? 0.75 : scene.world_bounds(table[0]).max.z();
-  if (is_night) {
-    Material glow = plain(Vec3f::Constant(0.8f), 1.0f);
-    glow.emission = Vec3f(300.0f, 170.0f, 70.0f);
-    add_mesh(scene, "lamp", make_sphere(0.07, 48), glow, Vec3(centre.x(), centre.y(), top + 0.3));
-    add_mesh(scene, "stand", make_cylinder(0.02, 0.23), plain(Vec3f::Constant(0.1f), 0.3f),
-             Vec3(centre.x(), centre.y(), top + 0.115));
-    for (const NodeId node : scene.match("/room/**")) {
-      if (!scene[node].mesh) continue;
-      for (auto& material : scene.edit(node).materials) {
-        if (!material || material->emission.isZero(0.0f)) continue;
-        auto dark = std::make_shared<Material>(*material);
-        dark->emission.setZero();
-        material = std::move(dark);
-      }
+    scene.edit(node).light.reset();
+    for (auto& material : scene.edit(node).materials) {
+      if (!material || material->emission.isZero(0.0f)) continue;
+      auto dark = std::make_shared<Material>(*material);
+      dark->emission.setZero();
+      material = std::move(dark);
     }
   }
+  const Aabb table = scene.world_bounds(scene.match("/room/**TableDining*").at(0));
+  const Vec3 top(table.centre().x(), table.centre().y(), table.max.z());
+  Material glow = plain(Vec3f::Constant(0.8f), 1.0f);
+  glow.emission = Vec3f(300.0f, 170.0f, 70.0f);
+  add_mesh(scene, "lamp", make_sphere(0.07, 48), glow, top + Vec3(0, 0, 0.3));
+  add_mesh(scene, "stand", make_cylinder(0.02, 0.23), plain(Vec3f::Constant(0.1f), 0.3f),
+           top + Vec3(0, 0, 0.115));
   return scene;
 }
 
@@ -430,7 +421,7 @@ void draw_rooms(const std::filesystem::path& folder, Host& host) {
   const NodeId inside =
       add_camera(window, kWidth, kHeight, 17.0, Vec3(1.5, -2.3, 1.5), Vec3(-0.3, 0.7, 0.9));
   sheet.add("SKY THROUGH A WINDOW", render(window, inside, quality(256), host));
-  Scene night = dining_room(host, true);
+  Scene night = night_room(host);
   sheet.add("NIGHT WITH ONE LAMP",
             render(night, add_room_camera(night, kWidth, kHeight), quality(128), host));
   sheet.write(host, folder / "rooms.png");
@@ -520,7 +511,7 @@ void draw_denoising(const std::filesystem::path& folder, Host& host) {
   constexpr int kWidth = 320;
   constexpr int kHeight = 240;
   Sheet sheet(3, kWidth, kHeight);
-  Scene scene = dining_room(host, false);
+  Scene scene = night_room(host);
   const NodeId camera = add_room_camera(scene, kWidth, kHeight);
   for (const bool denoise : {false, true}) {
     for (const int samples : {4, 16, 64}) {
