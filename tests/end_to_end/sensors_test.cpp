@@ -157,6 +157,19 @@ TEST_CASE("a cut file of the dataset is named", "[sensors]") {
   CHECK_FALSE(fs::exists(folder / "sensors/stored/rp_cam_1/sensor_depth/sensor_depth_0001.npy"));
 }
 
+TEST_CASE("lint finds measurements that are none", "[sensors]") {
+  const TemporaryFolder folder;
+  REQUIRE(run_job(folder, job(kTwoCameras)).exit_code == 0);
+  const std::string name = "out/seen/rp_cam_0/sensor_depth/sensor_depth_0000.npy";
+  const std::string bytes = read_file(folder / name);
+  for (const char* value : {"\x00\x00\xc0\x7f", "\x00\x00\x80\xbf"}) {  // not a number, -1
+    write_file(folder / name, bytes.substr(0, bytes.size() - 4) + std::string(value, 4));
+    const Outcome found = run({"lint", "out"}, folder.path());
+    CHECK(found.exit_code == 7);
+    CHECK_THAT(found.output, ContainsSubstring("1 values are neither a depth nor 0 for none"));
+  }
+}
+
 TEST_CASE("a sensor that no writer asks for is warned of", "[sensors]") {
   const TemporaryFolder folder;
   std::string text = job(kTwoCameras);
