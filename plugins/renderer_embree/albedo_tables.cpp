@@ -71,34 +71,23 @@ float glass_albedo(float cos_theta, float alpha, float eta) {
 
 }  // namespace
 
-AlbedoTables::AlbedoTables() {
-  const auto all = [](float) { return 1.0f; };
-  for (int y = 0; y < kSize; ++y) {
-    for (int x = 0; x < kSize; ++x) {
-      directional_.push_back(conductor_albedo(squared_node(x, kSize), node_alpha(y, kSize), all));
-    }
+AlbedoTables::Row::Row(float alpha) {
+  for (std::size_t i = 0; i < kSize; ++i) {
+    const float cosine = squared_node(int(i), int(kSize));
+    nodes_[i] = conductor_albedo(cosine, alpha, [](float) { return 1.0f; });
   }
 }
 
-AlbedoTables::Split AlbedoTables::at(float cos_theta, float alpha) const {
-  const auto place = [](float value, int& cell) {
-    const float x = std::sqrt(std::clamp(value, 0.0f, 1.0f)) * float(kSize - 1);
-    cell = std::min(int(x), kSize - 2);
-    return x - float(cell);
-  };
-  int x;
-  int y;
-  const float fx = place(cos_theta, x);
-  const float fy = place(alpha, y);
-  const Split* row = &directional_[std::size_t(y * kSize + x)];
-  const Split* next = row + kSize;
-  const auto mix = [](float p, float q, float t) { return p + (q - p) * t; };
-  return {mix(mix(row[0].a, row[1].a, fx), mix(next[0].a, next[1].a, fx), fy),
-          mix(mix(row[0].b, row[1].b, fx), mix(next[0].b, next[1].b, fx), fy)};
+AlbedoTables::Split AlbedoTables::Row::at(float cos_theta) const {
+  const float x = std::sqrt(std::clamp(cos_theta, 0.0f, 1.0f)) * float(kSize - 1);
+  const std::size_t i = std::min(std::size_t(x), kSize - 2);
+  const float t = x - float(i);
+  const Split& p = nodes_[i];
+  const Split& q = nodes_[i + 1];
+  return {p.a + (q.a - p.a) * t, p.b + (q.b - p.b) * t};
 }
 
-LayerTable::LayerTable(const AlbedoTables& tables, const Layers& layers,
-                       std::optional<float> alpha) {
+LayerTable::LayerTable(AlbedoTables& tables, const Layers& layers, std::optional<float> alpha) {
   if (alpha) {
     add_row(tables, layers, *alpha);
     return;
@@ -106,10 +95,11 @@ LayerTable::LayerTable(const AlbedoTables& tables, const Layers& layers,
   for (int i = 0; i < kRows; ++i) add_row(tables, layers, node_alpha(i, kRows));
 }
 
-void LayerTable::add_row(const AlbedoTables& tables, const Layers& layers, float alpha) {
+void LayerTable::add_row(AlbedoTables& tables, const Layers& layers, float alpha) {
+  const AlbedoTables::Row* coat_row = layers.coat > 0.0f ? &tables.row(layers.coat_alpha) : nullptr;
   const auto coat_at = [&](float cosine) {
-    if (layers.coat <= 0.0f) return 0.0f;
-    const AlbedoTables::Split e = tables.at(cosine, layers.coat_alpha);
+    if (!coat_row) return 0.0f;
+    const AlbedoTables::Split e = coat_row->at(cosine);
     return layers.coat * (kCoatF0 * e.a + e.b);
   };
   const std::size_t begin = nodes_.size();
@@ -119,7 +109,7 @@ void LayerTable::add_row(const AlbedoTables& tables, const Layers& layers, float
     // Reciprocal, and exact for smooth layers, whose light leaves at the angle of its arrival.
     const auto pass = [&](float cos_i) { return 1.0f - std::max(coat, coat_at(cos_i)); };
     const AlbedoTables::Split e =
-        layers.coat > 0.0f ? conductor_albedo(cosine, alpha, pass) : tables.at(cosine, alpha);
+        coat_row ? conductor_albedo(cosine, alpha, pass) : tables.row(alpha).at(cosine);
     nodes_.emplace_back(e.a, e.b, coat, 0.0f);
   }
   Row row;

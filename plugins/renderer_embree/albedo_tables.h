@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <vector>
 
@@ -14,18 +15,25 @@ namespace diorama {
 /// microfacets (GGX). `cos` and alpha in (0, 1]. Schlick's F splits the albedo: E = f0 a + f90 b.
 class AlbedoTables {
  public:
-  AlbedoTables();
-
   struct Split {
     float a = 0.0f;
     float b = 0.0f;
-    float total() const { return a + b; }  ///< Albedo under F = 1.
   };
-  Split at(float cos_theta, float alpha) const;
+  /// One roughness.
+  class Row {
+   public:
+    explicit Row(float alpha);
+    Split at(float cos_theta) const;
+
+   private:
+    static constexpr std::size_t kSize = 32;
+    std::array<Split, kSize> nodes_;  ///< Over the square root of the cosine.
+  };
+  /// Made when it is first asked for; stays where it is.
+  const Row& row(float alpha) { return rows_.try_emplace(alpha, alpha).first->second; }
 
  private:
-  static constexpr int kSize = 32;
-  std::vector<Split> directional_;  ///< [alpha][cos]
+  std::map<float, Row> rows_;
 };
 
 /// What the layers of one material return to a direction, tabulated when the material is made: a
@@ -78,7 +86,7 @@ class LayerTable {
   };
 
   /// For one alpha, or for all of them (textured roughness).
-  LayerTable(const AlbedoTables& tables, const Layers& layers, std::optional<float> alpha);
+  LayerTable(AlbedoTables& tables, const Layers& layers, std::optional<float> alpha);
 
   /// `alpha` does not count in a table for one alpha.
   Row row(float alpha) const {
@@ -105,7 +113,7 @@ class LayerTable {
   static constexpr int kNodes = 32;  ///< Over the square root of the cosine.
   static constexpr int kRows = 32;   ///< Over the square root of alpha.
 
-  void add_row(const AlbedoTables& tables, const Layers& layers, float alpha);
+  void add_row(AlbedoTables& tables, const Layers& layers, float alpha);
 
   std::vector<Node> nodes_;
   std::vector<Means> means_;

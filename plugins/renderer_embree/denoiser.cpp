@@ -18,7 +18,6 @@ constexpr std::array<float, 5> kKernel{1 / 16.0f, 4 / 16.0f, 6 / 16.0f, 4 / 16.0
 constexpr float kLuminanceSlack = 4.0f;  // standard deviations
 constexpr float kNormalSharpness = 10.0f;
 constexpr float kPlaneSlack = 0.016f;  // of the distance from the camera
-constexpr float kAlbedoSlack = 0.6f;
 constexpr float kMinAlbedo = 0.02f;
 // Where the samples of a pixel met surfaces that face many ways (glass, edges), their means say
 // little of how alike two such pixels are.
@@ -69,14 +68,12 @@ struct Guides {
   Guides(int width, int height)
       : normal{Plane(width, height), Plane(width, height), Plane(width, height)},
         position{normal},
-        albedo{normal},
         plane_scale(width, height),
         firmness(width, height),
         is_surface(width, height) {}
 
   std::array<Plane, 3> normal;
   std::array<Plane, 3> position;
-  std::array<Plane, 3> albedo;
   Plane plane_scale;  ///< 1 / tolerated distance from the plane.
   Plane firmness;     ///< In (0, 1]: how much differences from this pixel mean.
   Plane is_surface;   ///< 1, or 0: nothing to filter.
@@ -241,7 +238,6 @@ void Denoiser::read(int y) {
       const auto axis = Eigen::Index(k);
       guides_.normal[k].row(y)[x] = normal[axis];
       guides_.position[k].row(y)[x] = pixel.position[axis];
-      guides_.albedo[k].row(y)[x] = pixel.albedo[axis];
       lights_.irradiance[k].row(y)[x] = irradiance[axis];
     }
     guides_.plane_scale.row(y)[x] =
@@ -359,7 +355,6 @@ inline void Denoiser::filter(int y, int reach) {
   for (int x = 0; x < width_; x += kLanes) {
     const Lanes3 normal = load3(guides_.normal, y, x);
     const Lanes3 position = load3(guides_.position, y, x);
-    const Lanes3 albedo = load3(guides_.albedo, y, x);
     const Lanes plane_scale = load_lanes(guides_.plane_scale.row(y) + x);
     const Lanes firmness = load_lanes(guides_.firmness.row(y) + x);
     const Lanes own = load_lanes(lights_.luminance.row(y) + x);
@@ -374,15 +369,11 @@ inline void Denoiser::filter(int y, int reach) {
         const int u = x + dx * reach;
         const Lanes3 n = load3(guides_.normal, v, u);
         const Lanes3 p = load3(guides_.position, v, u);
-        const Lanes3 a = load3(guides_.albedo, v, u);
         const Lanes cosine = normal.x * n.x + normal.y * n.y + normal.z * n.z;
         const Lanes off_plane = normal.x * (p.x - position.x) + normal.y * (p.y - position.y) +
                                 normal.z * (p.z - position.z);
-        const Lanes tint = larger(magnitude(a.x - albedo.x),
-                                  larger(magnitude(a.y - albedo.y), magnitude(a.z - albedo.z))) *
-                           (1.0f / kAlbedoSlack);
-        const Lanes unlike = kNormalSharpness * larger(Lanes{}, 1.0f - cosine) +
-                             magnitude(off_plane) * plane_scale + tint * tint;
+        const Lanes unlike =
+            kNormalSharpness * larger(Lanes{}, 1.0f - cosine) + magnitude(off_plane) * plane_scale;
         const Lanes counts = larger(firmness, load_lanes(guides_.firmness.row(v) + u));
         const Lanes other = load_lanes(lights_.luminance.row(v) + u);
         const Lanes apart = unlike * counts + magnitude(other - own) * luminance_scale;

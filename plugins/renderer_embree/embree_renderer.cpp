@@ -24,7 +24,6 @@ constexpr std::array kExposures{"auto", "fixed"};
 constexpr std::array kViewTransforms{"standard", "filmic"};
 constexpr std::array kSphereLights{"sphere", "disk"};
 constexpr std::array kPrincipled{"layered", "blender"};
-constexpr std::array kIsas{"auto", kIsaNames[0], kIsaNames[1], kIsaNames[2], kIsaNames[3]};
 
 using Clock = std::chrono::steady_clock;
 
@@ -84,8 +83,10 @@ void EmbreeRenderer::Params::visit(ParamVisitor& v) {
   v.choice("principled", principled, kPrincipled,
            {"layered: layers share the light and lose none of it; blender: as Blender 3.4's "
             "Principled BSDF, which adds reflections to a whole diffuse base."});
-  v.choice("isa", isa, kIsas,
-           {"Instruction set of the kernels; pictures are the same bytes within one."});
+  v.choice(
+      "isa", isa, kIsaNames,
+      {"Instruction set of the kernels, by default the best of this machine up to avx2; pictures "
+       "are the same bytes within one."});
 }
 
 EmbreeRenderer::EmbreeRenderer(Params params, Host& host)
@@ -152,10 +153,17 @@ Film EmbreeRenderer::trace(const View& view, std::uint64_t seed) {
     });
   }
   Film film(width, height, FilmPixel{});
-  for (std::size_t i = 0; i < film.pixels().size(); ++i) {
-    film.pixels()[i] = sums.pixels()[i].mean();
-    counts_.paths += std::uint64_t(sums.pixels()[i].count());
-  }
+  std::atomic<std::uint64_t> paths{0};
+  host_.parallel_for(std::size_t(height), [&](std::size_t row) {
+    std::uint64_t count = 0;
+    for (int x = 0; x < width; ++x) {
+      const PixelSum& sum = sums.at(x, int(row));
+      film.at(x, int(row)) = sum.mean();
+      count += std::uint64_t(sum.count());
+    }
+    paths += count;
+  });
+  counts_.paths = paths;
   counts_.rays = rays;
   counts_.shadow_rays = shadow_rays;
   return film;
@@ -176,8 +184,9 @@ void EmbreeRenderer::put_colors(Frame& frame, const RenderRequest& request, cons
   frame.exposure = base * std::exp2(params_.exposure_ev);
   if (request.channels.contains(kColor.name)) {
     const bool is_filmic = params_.view_transform == "filmic";
-    frame.set(kColor, displayed(hdr, frame.exposure,
-                                is_filmic ? ViewTransform::Filmic : ViewTransform::Standard));
+    frame.set(kColor,
+              displayed(hdr, frame.exposure,
+                        is_filmic ? ViewTransform::Filmic : ViewTransform::Standard, host_));
   }
   if (request.channels.contains(kColorHdr.name)) frame.set(kColorHdr, std::move(hdr));
 }

@@ -31,7 +31,7 @@ class EmbreeRenderer final : public Renderer {
     std::string view_transform = "filmic";
     std::string sphere_lights = "sphere";
     std::string principled = "layered";
-    std::string isa = "auto";
+    std::string isa = best_isa_name();  ///< So that the dataset names it.
 
     void visit(ParamVisitor& v);
   };

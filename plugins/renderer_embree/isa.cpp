@@ -28,19 +28,19 @@ bool is_supported(Isa isa) {
 }  // namespace
 
 Isa isa_by_name(std::string_view name) {
-  if (name == "auto") {
-    // Measured: AVX-512 gains nothing for single rays, and Embree's own kernels lose by it (Zen 4).
-    for (const Isa isa : {Isa::Avx2, Isa::Sse42}) {
-      if (is_supported(isa)) return isa;
-    }
-    return Isa::Sse2;
-  }
   for (std::size_t i = 0; i < kIsaNames.size(); ++i) {
     if (name != kIsaNames[i]) continue;
     if (is_supported(Isa(i))) return Isa(i);
     throw Error(ErrorKind::Config, "isa: this processor does not have " + std::string(name));
   }
   throw Error(ErrorKind::Config, "isa: unknown instruction set " + std::string(name));
+}
+
+const char* best_isa_name() {
+  for (const Isa isa : {Isa::Avx2, Isa::Sse42}) {
+    if (is_supported(isa)) return kIsaNames[std::size_t(isa)];
+  }
+  return kIsaNames[std::size_t(Isa::Sse2)];
 }
 
 }  // namespace diorama

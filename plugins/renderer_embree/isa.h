@@ -13,7 +13,11 @@ enum class Isa : std::uint8_t { Sse2, Sse42, Avx2, Avx512 };
 /// In the order of Isa.
 inline constexpr std::array<const char*, 4> kIsaNames{"sse2", "sse4.2", "avx2", "avx512"};
 
-/// By name; "auto" is the best of this machine. Throws Error(Config) when the machine lacks it.
+/// Throws Error(Config) when the machine lacks it.
 Isa isa_by_name(std::string_view name);
+
+/// The best of this machine, up to AVX2: AVX-512 gains nothing for single rays, and Embree's own
+/// kernels lose by it (measured on Zen 4).
+const char* best_isa_name();
 
 }  // namespace diorama

@@ -78,6 +78,9 @@ SurfaceBsdf MaterialLibrary::make_surface(ShadingMaterial& material, bool is_sof
   const bool is_constant = !m.roughness_texture;
   const auto alpha = is_constant ? std::optional<float>(s.alpha) : std::nullopt;
   const float alpha_key = alpha.value_or(-1.0f);
+  // Plain Lambert surfaces need no tables.
+  const bool is_metallic = m.metallic_texture || s.metallic > 0.0f;
+  if (!is_metallic && !is_solid_glass && s.is_lambert()) return s;
   const auto layers = shared(layer_tables_[{s.layers, alpha_key}], [&] {
     return std::make_shared<const LayerTable>(albedo_tables_, s.layers, alpha);
   });

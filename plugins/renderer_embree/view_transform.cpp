@@ -41,18 +41,22 @@ double automatic_exposure(const Image<Vec3f>& hdr) {
   return std::clamp(kMiddleGrey / std::exp(sum / double(end - begin)), 1e-8, 1e8);
 }
 
-Image<Rgba8> displayed(const Image<Vec3f>& hdr, double exposure, ViewTransform transform) {
+Image<Rgba8> displayed(const Image<Vec3f>& hdr, double exposure, ViewTransform transform,
+                       Host& host) {
   const SrgbBytes bytes;
+  const bool is_filmic = transform == ViewTransform::Filmic;
   Image<Rgba8> image(hdr.width(), hdr.height(), Rgba8{0, 0, 0, 255});
-  for (std::size_t i = 0; i < hdr.pixels().size(); ++i) {
-    const Vec3f exposed = hdr.pixels()[i] * float(exposure);
-    const float grey = kFilmicGrey * luminance(exposed);
-    for (std::size_t k = 0; k < 3; ++k) {
-      const float value = exposed[Eigen::Index(k)];
-      const bool is_filmic = transform == ViewTransform::Filmic;
-      image.pixels()[i][k] = bytes(is_filmic ? filmic(grey + (1.0f - kFilmicGrey) * value) : value);
+  host.parallel_for(std::size_t(hdr.height()), [&](std::size_t row) {
+    for (int x = 0; x < hdr.width(); ++x) {
+      const Vec3f exposed = hdr.at(x, int(row)) * float(exposure);
+      const float grey = kFilmicGrey * luminance(exposed);
+      Rgba8& pixel = image.at(x, int(row));
+      for (std::size_t k = 0; k < 3; ++k) {
+        const float value = exposed[Eigen::Index(k)];
+        pixel[k] = bytes(is_filmic ? filmic(grey + (1.0f - kFilmicGrey) * value) : value);
+      }
     }
-  }
+  });
   return image;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "diorama/host.h"
 #include "diorama/image.h"
 
 namespace diorama {
@@ -13,6 +14,7 @@ double automatic_exposure(const Image<Vec3f>& hdr);
 enum class ViewTransform { Standard, Filmic };
 
 /// Exposes, maps to [0, 1] and encodes as sRGB. Standard clips at 1; Filmic rolls highlights off.
-Image<Rgba8> displayed(const Image<Vec3f>& hdr, double exposure, ViewTransform transform);
+Image<Rgba8> displayed(const Image<Vec3f>& hdr, double exposure, ViewTransform transform,
+                       Host& host);
 
 }  // namespace diorama

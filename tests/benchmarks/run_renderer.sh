@@ -30,9 +30,9 @@ if command -v blender >/dev/null; then
 fi
 [ "$peer" = yes ] || echo "blender is not installed or cannot build the scene here: ours alone" >&2
 
-# Lamps as the peer has them. The size of its pictures does not matter for the time of a path.
+# Lamps and surfaces as the peer has them. The size of its pictures does not matter for the time of a path.
 ours() {
-  "$program" "$bench" --materials "$1" --sphere-lights disk --seed $((i + 1)) \
+  "$program" "$bench" --materials "$1" --sphere-lights disk --principled blender --seed $((i + 1)) \
     --reference "$bench/refs/ref_${1}_320x240_4096spp.exr" --samples "$2" $3
 }
 
@@ -45,6 +45,7 @@ while [ "$i" -lt "$repetitions" ]; do
         grep -i cpu | tail -1)"
     fi
     echo "ours: $(ours "$materials" "$samples" --probes)"
+    echo "ours, denoised at 2: $(ours "$materials" 2 --denoise)"
     echo "ours, denoised at 4: $(ours "$materials" 4 --denoise)"
   done
   i=$((i + 1))

@@ -12,8 +12,8 @@
 namespace diorama {
 namespace {
 
-const AlbedoTables& tables() {
-  static const AlbedoTables made;
+AlbedoTables& tables() {
+  static AlbedoTables made;
   return made;
 }
 

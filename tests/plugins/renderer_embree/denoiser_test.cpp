@@ -96,27 +96,29 @@ TEST_CASE("exposure does not depend on the scale of the light", "[exposure]") {
 }
 
 TEST_CASE("the standard view is sRGB, the filmic one never clips abruptly", "[exposure]") {
+  test::RenderHost host(2);
   Image<Vec3f> ramp(256, 1, Vec3f::Zero());
   for (int i = 0; i < 256; ++i)
     ramp.at(i, 0) = Vec3f::Constant(linear_from_srgb(float(i) / 255.0f));
-  const Image<Rgba8> standard = displayed(ramp, 1.0, ViewTransform::Standard);
+  const Image<Rgba8> standard = displayed(ramp, 1.0, ViewTransform::Standard, host);
   for (int i = 0; i < 256; ++i) {
     CHECK(int(standard.at(i, 0)[0]) == i);
     CHECK(int(standard.at(i, 0)[3]) == 255);
   }
-  CHECK(int(displayed(ramp, 8.0, ViewTransform::Standard).at(255, 0)[1]) == 255);
-  const Image<Rgba8> filmic = displayed(ramp, 2.0, ViewTransform::Filmic);
+  CHECK(int(displayed(ramp, 8.0, ViewTransform::Standard, host).at(255, 0)[1]) == 255);
+  const Image<Rgba8> filmic = displayed(ramp, 2.0, ViewTransform::Filmic, host);
   for (int i = 1; i < 256; ++i) CHECK(filmic.at(i, 0)[0] >= filmic.at(i - 1, 0)[0]);
   CHECK(int(filmic.at(255, 0)[0]) < 255);
 }
 
 TEST_CASE("any radiance can be shown, even what is no number", "[exposure]") {
+  test::RenderHost host(1);
   constexpr float kInf = std::numeric_limits<float>::infinity();
   Image<Vec3f> odd(3, 1, Vec3f::Constant(kInf));
   odd.at(1, 0) = Vec3f::Constant(1e30f);
   odd.at(2, 0) = Vec3f::Constant(std::numeric_limits<float>::quiet_NaN());
   for (const ViewTransform transform : {ViewTransform::Standard, ViewTransform::Filmic}) {
-    const Image<Rgba8> shown = displayed(odd, 1.0, transform);
+    const Image<Rgba8> shown = displayed(odd, 1.0, transform, host);
     CHECK(shown.at(0, 0) == Rgba8{255, 255, 255, 255});
     CHECK(shown.at(1, 0) == Rgba8{255, 255, 255, 255});
     CHECK(shown.at(2, 0) == Rgba8{0, 0, 0, 255});

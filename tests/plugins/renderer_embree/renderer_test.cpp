@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cmath>
 #include <functional>
 
@@ -185,6 +186,77 @@ TEST_CASE("light samples, BSDF samples and both together agree", "[renderer][mis
   REQUIRE(bsdf.error < 0.03 * bsdf.mean);
   CHECK(std::abs(both.mean - lights.mean) < 4.0 * std::hypot(both.error, lights.error));
   CHECK(std::abs(both.mean - bsdf.mean) < 4.0 * std::hypot(both.error, bsdf.error));
+}
+
+TEST_CASE("fireflies are rarer than one in a million samples", "[renderer]") {
+  TestWorld world = busy_room();
+  const NodeId camera = world.add_camera(40, 30, 22.0, Vec3(-1.8, -1.5, 0.6), Vec3(0.3, 0.6, -0.9));
+  RenderHost host(2);
+  RenderScene scene(host, {});
+  scene.take(world.scene);
+  const View view(world.scene, camera);
+  const PathTracer tracer(scene, view, TraceSettings{}, Isa::Sse2);
+  constexpr std::uint32_t kSamples = 1024;
+  const SampleOrder order(5, kSamples);
+  std::vector<PixelSum> sums(1200);
+  tracer.trace({0, 0, 40, 30, 0, kSamples, order}, sums.data(), 40);
+  const auto local_mean = [&](int x, int y) {
+    double sum = 0.0;
+    int count = 0;
+    for (int v = std::max(0, y - 2); v <= std::min(29, y + 2); ++v) {
+      for (int u = std::max(0, x - 2); u <= std::min(39, x + 2); ++u, ++count) {
+        sum += double(luminance(sums[std::size_t(v * 40 + u)].mean().scattered));
+      }
+    }
+    return sum / count;
+  };
+  std::vector<double> means;
+  for (int i = 0; i < 1200; ++i) means.push_back(local_mean(i % 40, i / 40));
+  int fireflies = 0;
+  for (std::uint32_t s = 0; s < kSamples; ++s) {
+    std::vector<PixelSum> one(1200);
+    tracer.trace({0, 0, 40, 30, s, s + 1, order}, one.data(), 40);
+    for (std::size_t i = 0; i < 1200; ++i) {
+      fireflies += double(luminance(one[i].mean().scattered)) > 100.0 * means[i];
+    }
+  }
+  CHECK(fireflies <= 1);
+}
+
+TEST_CASE("an error target gives the same bytes for every number of threads",
+          "[renderer][determinism]") {
+  TestWorld world = busy_room();
+  const NodeId camera = world.add_camera(50, 35, 30.0, Vec3(-1.8, -1.5, 0.6), Vec3(0.3, 0.6, -0.9));
+  EmbreeRenderer::Params params = reference(256, 3);
+  params.error_target = 0.1;
+  const auto picture = [&](int threads, std::uint64_t& paths) {
+    RenderHost host(threads);
+    EmbreeRenderer renderer(params, host);
+    renderer.prepare(world.scene);
+    Frame frame = renderer.render({camera, {std::string(kColorHdr.name)}, 3});
+    paths = renderer.last_counts().paths;
+    return Image<Vec3f>(frame.get(kColorHdr));
+  };
+  std::uint64_t paths = 0;
+  const Image<Vec3f> one = picture(1, paths);
+  for (const int threads : {2, 7}) {
+    std::uint64_t again = 0;
+    CHECK(picture(threads, again) == one);
+    CHECK(again == paths);
+  }
+  // Some blocks needed more than the first round, and some less than all samples.
+  CHECK(paths > 50u * 35u * 17u);
+  CHECK(paths < 50u * 35u * 200u);
+  // The mean is that of a picture with even samples: four standard errors of a tenth per pixel.
+  const double even = statistics(render(world, camera, reference(400, 3), 2, 8)).mean;
+  CHECK(statistics(one).mean == Approx(even).epsilon(4.0 * 0.1 / std::sqrt(50.0 * 35.0)));
+}
+
+TEST_CASE("the instruction set is named, so that a dataset records it", "[renderer]") {
+  const std::string name = EmbreeRenderer::Params().isa;
+  CHECK(std::find(kIsaNames.begin(), kIsaNames.end(), name) != kIsaNames.end());
+  CHECK_NOTHROW(isa_by_name(name));
+  CHECK_THROWS_WITH(isa_by_name("mmx"), "isa: unknown instruction set mmx");
 }
 
 TEST_CASE("the same bytes come out for every number of threads", "[renderer][determinism]") {
