@@ -1,18 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "loader_assimp/child_process.h"
 
+#include <poll.h>
 #include <signal.h>
 #include <string.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <exception>
 #include <fstream>
+#include <optional>
 
 namespace diorama::loader_assimp {
 namespace {
+
+// How long a child may take by the clock for each second of the processor that it may use: far more
+// than on a busy machine, but a child that waits for ever is ended.
+constexpr int kWaitPerProcessorSecond = 24;
 
 void limit(__rlimit_resource resource, std::uint64_t value) {
   rlimit now{};
@@ -35,10 +43,19 @@ void write_all(int pipe, const std::string& text) {
   }
 }
 
-std::string read_all(int pipe) {
+// Everything up to the end of the pipe; nothing when that takes longer than allowed.
+std::optional<std::string> read_all(int pipe, std::chrono::seconds longest) {
+  using Clock = std::chrono::steady_clock;
+  const Clock::time_point end = Clock::now() + longest;
   std::string text;
   char buffer[4096];
   for (;;) {
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(end - Clock::now());
+    pollfd ready{pipe, POLLIN, 0};
+    if (left.count() <= 0) return std::nullopt;
+    const int woken =
+        poll(&ready, 1, static_cast<int>(std::min<std::int64_t>(left.count(), 60'000)));
+    if (woken == 0 || (woken < 0 && errno == EINTR)) continue;
     const ssize_t count = read(pipe, buffer, sizeof buffer);
     if (count < 0 && errno == EINTR) continue;
     if (count <= 0) return text;
@@ -78,17 +95,20 @@ std::string run_in_child(const ChildLimits& limits, const std::function<std::str
     run_and_exit(limits, ends[1], body);
   }
   close(ends[1]);
-  const std::string text = child > 0 ? read_all(ends[0]) : "";
+  const std::chrono::seconds longest(kWaitPerProcessorSecond * limits.cpu_seconds);
+  const auto text = child > 0 ? read_all(ends[0], longest) : std::string();
   close(ends[0]);
+  if (!text) kill(child, SIGKILL);
   int status = 0;
   while (child > 0 && waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
+  if (!text) return "takes more than " + std::to_string(longest.count()) + " s";
   if (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU) {
     return "takes more than " + std::to_string(limits.cpu_seconds) + " s of processor time";
   }
   if (WIFSIGNALED(status)) return std::string("crashes: ") + strsignal(WTERMSIG(status));
   if (WIFEXITED(status) && WEXITSTATUS(status) != 0) return "crashes";
-  return text;
+  return *text;
 }
 
 }  // namespace diorama::loader_assimp

@@ -13,7 +13,7 @@ struct ChildLimits {
 };
 
 /// Runs `body` in a child process and returns what it returned; text that begins with "crashes" or
-/// "takes more than" when it did not get that far. Nothing that the body does to memory is seen
+/// "takes more than" when it did not get that far, be it that it waits for something. Nothing that the body does to memory is seen
 /// here. If no child can be made, the body does not run and the result is empty.
 std::string run_in_child(const ChildLimits& limits, const std::function<std::string()>& body);
 
