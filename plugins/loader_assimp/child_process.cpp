@@ -18,10 +18,6 @@
 namespace diorama::loader_assimp {
 namespace {
 
-// How long a child may take by the clock for each second of the processor that it may use: far more
-// than on a busy machine, but a child that waits for ever is ended.
-constexpr int kWaitPerProcessorSecond = 24;
-
 void limit(__rlimit_resource resource, std::uint64_t value) {
   rlimit now{};
   if (getrlimit(resource, &now) != 0) return;
@@ -95,7 +91,7 @@ std::string run_in_child(const ChildLimits& limits, const std::function<std::str
     run_and_exit(limits, ends[1], body);
   }
   close(ends[1]);
-  const std::chrono::seconds longest(kWaitPerProcessorSecond * limits.cpu_seconds);
+  const std::chrono::seconds longest(limits.clock_seconds);
   const auto text = child > 0 ? read_all(ends[0], longest) : std::string();
   close(ends[0]);
   if (!text) kill(child, SIGKILL);

@@ -19,6 +19,8 @@ namespace fs = std::filesystem;
 
 // Enough for every honest file seen so far, tens of times over.
 constexpr int kLeastSeconds = 5;
+// By the clock for each second of the processor: other programs may be busy.
+constexpr int kClockPerSecond = 24;
 constexpr std::uint64_t kBytesPerSecond = 250'000;
 constexpr std::uint64_t kLeastMemory = std::uint64_t(1) << 30;
 constexpr std::uint64_t kMemoryPerByte = 200;
@@ -76,6 +78,7 @@ ChildLimits limits_for(const std::string& file) {
     limits.cpu_seconds += static_cast<int>(std::min<std::uintmax_t>(size / kBytesPerSecond, 3600));
     limits.added_bytes += size * kMemoryPerByte;
   }
+  limits.clock_seconds = kClockPerSecond * limits.cpu_seconds;
   return limits;
 }
 

@@ -21,8 +21,8 @@ enum class Format {
   Other,
 };
 
-/// Runs `body`, which reads `file` with assimp, in a child process whose time and memory are limited
-/// by the file's size. Returns what it returned, or what it died of.
+/// Runs `body`, which reads `file` with assimp, in a child process whose time and memory are
+/// limited by the file's size. Returns what it returned, or what it died of.
 std::string read_in_child(const std::string& file, const std::function<std::string()>& body);
 
 /// "FILE: assimp cannot read it: WHY".

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "loader_assimp/child_process.h"
 
+#include <unistd.h>
+
 #include <atomic>
 #include <csignal>
 #include <stdexcept>
@@ -31,6 +33,11 @@ TEST_CASE("a child process that does not end is ended", "[loader_assimp]") {
     return std::string();
   });
   CHECK(why == "takes more than 1 s of processor time");
+  const std::string waits = run_in_child({60, std::uint64_t(1) << 32, 1}, [] {
+    for (;;) pause();
+    return std::string();
+  });
+  CHECK(waits == "takes more than 1 s");
 }
 
 #ifndef __SANITIZE_ADDRESS__
