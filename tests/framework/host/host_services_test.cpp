@@ -123,6 +123,17 @@ TEST_CASE("an asset's files are those that the job's loader names", "[host]") {
   CHECK(shop.host->files_of("c.txt") == std::vector<fs::path>{shop.folder / "c.txt"});
 }
 
+TEST_CASE("files that components name are remembered until they are asked for", "[host]") {
+  Workshop shop;
+  for (const char* name : {"/c.txt", "/a.part", "/c.txt", "/"}) (void)shop.host->resolve(name);
+  CHECK(shop.host->take_resolved() ==
+        std::vector<fs::path>{shop.folder / "a.part", shop.folder / "c.txt"});
+  CHECK(shop.host->take_resolved().empty());
+  // A picture needs no loader.
+  CHECK(shop.host->files_of((shop.folder / "c.txt").string()) ==
+        std::vector<fs::path>{shop.folder / "c.txt"});
+}
+
 TEST_CASE("the longest claim takes the asset, in any case; schemes give names", "[host]") {
   Workshop shop;
   CHECK(shop.scene.path(shop.host->load_asset("b.BIG.PART", shop.scene, shop.scene.root())) ==
