@@ -6,7 +6,7 @@
 #
 # usage: run_renderer.sh BENCH_FOLDER [PROGRAM] [REPETITIONS] [SAMPLES]
 #   BENCH_FOLDER  holds scene.glb, scene.json, sky.hdr, refs/ and peer_cycles.py
-#   PROGRAM       renderer_bench; default: the one in build/release
+#   PROGRAM       renderer_bench; default: the one in build/release, as the target `benchmarks` leaves it
 #   REPETITIONS   default 3
 #   SAMPLES       per pixel of the 320x240 pictures; default 64
 set -eu
