@@ -39,7 +39,8 @@ struct FixedContact {
   btVector3 push;     ///< Direction in which the contact pushes the body.
   btVector3 on_body;  ///< Point of the body, world.
   btVector3 touched;  ///< Point of the fixed thing, world.
-  btVector3 origin;   ///< Where the body's centre of mass was when nothing was deep in it, world.
+  /// Where the body's centre of mass was when nothing was deep in it, world.
+  btVector3 origin{0.0, 0.0, 0.0};
 
   const StaticMesh* mesh() const { return static_cast<const StaticMesh*>(fixed->getUserPointer()); }
   const btBoxShape* box() const {
