@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <span>
 #include <stdexcept>
 
 namespace diorama::lint {
@@ -232,8 +233,8 @@ class Hdf5Reader {
       throw std::runtime_error("holds " + std::to_string(plain.size()) + " bytes instead of " +
                                std::to_string(size));
     }
-    set.array.data.resize(plain.size());
-    std::memcpy(set.array.data.data(), plain.data(), plain.size());
+    const auto bytes = std::as_bytes(std::span(plain));
+    set.array.data.assign(bytes.begin(), bytes.end());
   }
 
   std::string only_chunk(const Storage& storage, std::uint64_t size) {
