@@ -25,10 +25,6 @@ std::map<std::uint32_t, std::int64_t> count_pixels(const Image<std::uint32_t>& i
   return counts;
 }
 
-std::size_t offset_in(const PixelBox& box, int x, int y) {
-  return std::size_t(y - box.y_min) * std::size_t(box.width()) + std::size_t(x - box.x_min);
-}
-
 /// Counts inside and outside, and the box of what lies inside.
 Visibility measure(const CoverageMask& mask, int image_width, int image_height) {
   Visibility visibility;
@@ -37,7 +33,7 @@ Visibility measure(const CoverageMask& mask, int image_width, int image_height) 
   for (int y = mask.box.y_min; y < mask.box.y_max; ++y) {
     const bool row_inside = y >= 0 && y < image_height;
     for (int x = mask.box.x_min; x < mask.box.x_max; ++x) {
-      if (mask.bits[offset_in(mask.box, x, y)] == 0) continue;
+      if (mask.bits[mask.index(x, y)] == 0) continue;
       if (!row_inside || x < 0 || x >= image_width) {
         ++visibility.outside_pixels;
         continue;
@@ -51,17 +47,6 @@ Visibility measure(const CoverageMask& mask, int image_width, int image_height) 
   }
   if (visibility.amodal_pixels > 0) visibility.amodal_box = inside;
   return visibility;
-}
-
-CoverageMask cropped(const CoverageMask& mask, const PixelBox& box) {
-  CoverageMask part;
-  part.box = box;
-  part.bits.reserve(std::size_t(box.width()) * std::size_t(box.height()));
-  for (int y = box.y_min; y < box.y_max; ++y) {
-    const auto first = mask.bits.begin() + std::ptrdiff_t(offset_in(mask.box, box.x_min, y));
-    part.bits.insert(part.bits.end(), first, first + box.width());
-  }
-  return part;
 }
 
 void check(std::span<const CoverageMask> coverage, const Frame& frame) {
@@ -94,7 +79,8 @@ void measure_visibility(std::span<const CoverageMask> coverage, bool keep_masks,
     const auto count = visible_pixels.find(instance.id);
     if (count != visible_pixels.end()) visibility.visible_pixels = count->second;
     if (keep_masks && visibility.amodal_box) {
-      visibility.amodal_mask = cropped(coverage[i], *visibility.amodal_box);
+      visibility.amodal_mask = coverage[i].cropped(*visibility.amodal_box);
+      visibility.amodal_mask.distances = {};
     }
     instance.visibility = std::move(visibility);
   }

@@ -8,7 +8,7 @@
 namespace diorama::conformance {
 namespace {
 
-const NameSet kAnnotations{"instances", "visibility", "amodal_mask"};
+const NameSet kAnnotations{"instances", "visibility", "amodal_mask", "occlusion_order"};
 
 std::string annotated(const Subject& subject, const Scene& scene, Host& host) {
   const auto annotator = subject.make<Annotator>(host);

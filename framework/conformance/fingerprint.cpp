@@ -105,6 +105,9 @@ class Bytes {
     add_all(visibility.visible_pixels, visibility.amodal_pixels, visibility.outside_pixels,
             visibility.amodal_box, visibility.amodal_mask.box, visibility.amodal_mask.bits);
   }
+  void add(const Occlusion& occlusion) {
+    add_all(occlusion.front, occlusion.behind, occlusion.pixels);
+  }
   void add(const Instance& instance) {
     add_all(instance.id, instance.node_path, instance.labels, instance.world_from_node,
             instance.bounds_node.min, instance.bounds_node.max, instance.tight_box,
@@ -133,7 +136,7 @@ std::string fingerprint(const Scene& scene) {
 std::string fingerprint(const Frame& frame) {
   Bytes bytes;
   bytes.add_all(frame.camera_name, frame.camera_path, frame.camera, frame.world_from_camera,
-                frame.instances, frame.leaf_paths, frame.exposure);
+                frame.instances, frame.occlusions, frame.leaf_paths, frame.exposure);
   for (const std::string& channel : frame.channels()) {
     bytes.add_all(channel, frame.image_named(channel));
   }

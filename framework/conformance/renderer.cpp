@@ -23,8 +23,10 @@ std::string rendered_scene(const Subject& subject, Host& host) {
   std::string frames;
   for (const NodeId camera : cameras_of(scene)) {
     frames += fingerprint(rendered(*renderer, camera));
-    for (const CoverageMask& mask : renderer->cover(camera, labelled_instances(scene))) {
+    for (const CoverageMask& mask : renderer->cover(camera, labelled_instances(scene), true)) {
       frames.append(mask.bits.begin(), mask.bits.end());
+      frames.append(reinterpret_cast<const char*>(mask.distances.data()),
+                    mask.distances.size() * sizeof(float));
     }
   }
   require_same(sample_scene(), scene, "changes the scene");
@@ -53,18 +55,24 @@ void check_misses(const Frame& frame) {
   check(kMotion, is_zero);
 }
 
-/// The pixels of an instance are among those that it covers alone.
+/// The pixels of an instance are among those that it covers alone, at the distance of the picture.
 void check_coverage(Renderer& renderer, const Scene& scene, const Frame& frame, NodeId camera) {
   const std::vector<LabelledInstance> instances = labelled_instances(scene);
-  const std::vector<CoverageMask> masks = renderer.cover(camera, instances);
+  const std::vector<CoverageMask> masks = renderer.cover(camera, instances, true);
   const Image<std::uint32_t>& leaves = frame.get(kLeafId);
   for (std::size_t i = 0; i < instances.size(); ++i) {
     for (int y = 0; y < leaves.height(); ++y) {
       for (int x = 0; x < leaves.width(); ++x) {
         const auto& own = instances[i].leaves;
         const bool is_own = std::ranges::find(own, NodeId{leaves.at(x, y)}) != own.end();
-        require(!is_own || masks[i].covers(x, y),
-                scene.path(instances[i].node) + " is seen where cover() says it is not");
+        if (!is_own) continue;
+        const std::string path = scene.path(instances[i].node);
+        require(masks[i].covers(x, y), path + " is seen where cover() says it is not");
+        if (!frame.has(kDistanceToCamera.name)) continue;
+        const float seen = frame.get(kDistanceToCamera).at(x, y);
+        const float covered = masks[i].distances[masks[i].index(x, y)];
+        require(std::abs(seen - covered) <= 1e-4f * seen,
+                path + " is seen at another distance than cover() says");
       }
     }
   }

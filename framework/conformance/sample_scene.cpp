@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "framework/annotators/instance_ids.h"
 #include "framework/annotators/instances.h"
 #include "framework/annotators/object_coordinates.h"
+#include "framework/annotators/occlusion_order.h"
 #include "framework/annotators/visibility.h"
 
 namespace diorama::conformance {
@@ -182,12 +184,15 @@ CoverageMask coverage(const LabelledInstance& instance, const std::vector<Rectan
   CoverageMask mask;
   mask.box = {0, 0, camera.width, camera.height};
   mask.bits.assign(std::size_t(camera.width) * std::size_t(camera.height), 0);
+  mask.distances.assign(mask.bits.size(), std::numeric_limits<float>::infinity());
   for (const Rectangle& rectangle : painted) {
     if (std::ranges::find(instance.leaves, rectangle.leaf) == instance.leaves.end()) continue;
     const PixelBox box = rectangle.box.clipped(camera.width, camera.height);
     for (int y = box.y_min; y < box.y_max; ++y) {
       for (int x = box.x_min; x < box.x_max; ++x) {
-        mask.bits[std::size_t(y) * std::size_t(camera.width) + std::size_t(x)] = 1;
+        mask.bits[mask.index(x, y)] = 1;
+        // Painted from far to near.
+        mask.distances[mask.index(x, y)] = float(rectangle.distance);
       }
     }
   }
@@ -203,6 +208,7 @@ void annotate(const Scene& scene, const std::vector<Rectangle>& painted, Host& h
     masks.push_back(coverage(instance, painted, frame.camera));
   }
   measure_visibility(masks, true, frame);
+  order_occlusions(masks, frame);
 }
 
 }  // namespace

@@ -11,6 +11,7 @@ namespace {
 constexpr const char* kBox = "box = extent of mask";
 constexpr const char* kArea = "area = count";
 constexpr const char* kPartition = "pixels partition into instances";
+constexpr const char* kOrder = "occlusion order agrees with masks";
 
 /// Pixels of a run-length mask, row by row. Throws when the runs do not fill the size.
 std::vector<bool> decode_mask(const Json& rle) {
@@ -64,12 +65,29 @@ PixelBox box_of(const Json& bbox) {
   return {x, y, x + bbox.at(2).get<int>(), y + bbox.at(3).get<int>()};
 }
 
+/// What occlusion order is checked against.
+struct WholeObject {
+  std::string who;
+  std::vector<bool> visible;
+  std::vector<bool> whole;
+  std::map<std::string, std::size_t> occluded_by;  ///< Pixels by node.
+};
+
 struct CocoImage {
   std::string file;
   std::size_t width = 0;
   std::size_t height = 0;
-  std::vector<bool> taken;  ///< By the masks so far.
+  std::vector<bool> taken;                      ///< By the masks so far.
+  std::map<std::string, WholeObject> wholes{};  ///< By node.
 };
+
+std::size_t count_shared(const std::vector<bool>& a, const std::vector<bool>& b) {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < a.size() && i < b.size(); ++i) {
+    if (a[i] && b[i]) ++count;
+  }
+  return count;
+}
 
 class CocoPart {
  public:
@@ -87,7 +105,7 @@ class CocoPart {
                      "lists " + std::to_string(json->at("images").size()) + " images of " +
                          std::to_string(pictures));
       read_images(*json);
-      for (const Json& annotation : json->at("annotations")) check_annotation(annotation);
+      check_annotations(json->at("annotations"));
     });
   }
 
@@ -126,6 +144,22 @@ class CocoPart {
     }
   }
 
+  /// Picture by picture, so that the masks of one only are in memory.
+  void check_annotations(const Json& annotations) {
+    std::map<int, std::vector<const Json*>> by_image;
+    for (const Json& annotation : annotations) {
+      by_image[annotation.at("image_id").get<int>()].push_back(&annotation);
+    }
+    for (const auto& [id, own] : by_image) {
+      for (const Json* annotation : own) check_annotation(*annotation);
+      const auto image = images_.find(id);
+      if (image == images_.end()) continue;
+      check_order(image->second);
+      image->second.wholes.clear();
+      image->second.taken = {};
+    }
+  }
+
   void check_annotation(const Json& annotation) {
     const std::string who = "annotation " + annotation.at("id").dump();
     dataset_.check(ids_.insert(annotation.at("id").get<int>()).second, "counts agree between files",
@@ -142,14 +176,13 @@ class CocoPart {
       return;
     }
     check_mask(annotation, who, mask, image->second.width);
-    std::size_t shared = 0;
+    const std::size_t shared = count_shared(mask, image->second.taken);
     for (std::size_t i = 0; i < mask.size(); ++i) {
-      if (mask[i] && image->second.taken[i]) ++shared;
       if (mask[i]) image->second.taken[i] = true;
     }
     dataset_.check(shared == 0, kPartition, file_,
                    who + " shares " + std::to_string(shared) + " pixels with others");
-    check_amodal(annotation, who, mask);
+    check_amodal(annotation, who, mask, image->second);
     check_keypoints(annotation, who, image->second);
   }
 
@@ -166,16 +199,44 @@ class CocoPart {
   }
 
   void check_amodal(const Json& annotation, const std::string& who,
-                    const std::vector<bool>& visible) {
+                    const std::vector<bool>& visible, CocoImage& image) {
     if (!annotation.contains("amodal")) return;
-    const auto whole = decode_mask(annotation.at("amodal").at("segmentation"));
+    const Json& amodal = annotation.at("amodal");
+    WholeObject object{who, visible, decode_mask(amodal.at("segmentation")), {}};
     std::size_t beyond = 0;
-    for (std::size_t i = 0; i < visible.size() && i < whole.size(); ++i) {
-      if (visible[i] && !whole[i]) ++beyond;
+    for (std::size_t i = 0; i < visible.size() && i < object.whole.size(); ++i) {
+      if (visible[i] && !object.whole[i]) ++beyond;
     }
     dataset_.check(
-        beyond == 0 && whole.size() == visible.size(), "visible <= amodal", file_,
+        beyond == 0 && object.whole.size() == visible.size(), "visible <= amodal", file_,
         who + ": " + std::to_string(beyond) + " visible pixels lie outside its amodal mask");
+    for (const Json& front : amodal.at("occluded_by")) {
+      object.occluded_by[front.at("node").get<std::string>()] =
+          front.at("pixels").get<std::size_t>();
+    }
+    image.wholes.insert_or_assign(annotation.at("node").get<std::string>(), std::move(object));
+  }
+
+  /// Where one is seen and the other's whole mask lies it is in front; in no pixel are both.
+  void check_order(const CocoImage& image) {
+    for (const auto& [behind_node, behind] : image.wholes) {
+      for (const auto& [front_node, front] : image.wholes) {
+        if (front_node == behind_node) continue;
+        const auto count = behind.occluded_by.find(front_node);
+        const std::size_t pixels = count == behind.occluded_by.end() ? 0 : count->second;
+        const auto reverse = front.occluded_by.find(behind_node);
+        const std::size_t back = reverse == front.occluded_by.end() ? 0 : reverse->second;
+        const std::size_t seen = count_shared(front.visible, behind.whole);
+        dataset_.check(pixels >= seen, kOrder, file_,
+                       behind.who + ": " + front_node + " is in front of it in " +
+                           std::to_string(seen) + " pixels, \"occluded_by\" says " +
+                           std::to_string(pixels));
+        const std::size_t shared = count_shared(front.whole, behind.whole);
+        dataset_.check(pixels + back <= shared, kOrder, file_,
+                       behind.who + " and " + front.who + " share " + std::to_string(shared) +
+                           " pixels, the order says " + std::to_string(pixels + back));
+      }
+    }
   }
 
   void check_keypoints(const Json& annotation, const std::string& who, const CocoImage& image) {

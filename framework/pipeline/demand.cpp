@@ -17,11 +17,12 @@ class Resolution {
       : renderer_provides_(renderer_provides), renderer_(renderer), offers_(offers) {}
 
   void want(const std::string& who, const std::string& name) {
-    if (name == kVisibility || name == kAmodalMask) {
+    if (name == kVisibility || name == kAmodalMask || name == kOcclusionOrder) {
       want(who, std::string(kInstanceId.name));
       want(who, std::string(kInstances));
       demand_.visibility = true;
       if (name == kAmodalMask) demand_.amodal_mask = true;
+      if (name == kOcclusionOrder) demand_.occlusion_order = true;
       return;
     }
     if (const auto listed = offer_of(name, true)) return use(who, *listed);
@@ -74,6 +75,7 @@ class Resolution {
     }
     known.emplace_back(kVisibility);
     known.emplace_back(kAmodalMask);
+    known.emplace_back(kOcclusionOrder);
     known.emplace_back(kMotion.name);
     std::sort(known.begin(), known.end());
     std::string list;

@@ -30,12 +30,14 @@ struct Demand {
   std::vector<std::size_t> annotators;  ///< Indices into the offers, in an order that works.
   bool visibility = false;              ///< Instance::visibility ...
   bool amodal_mask = false;             ///< ... with masks.
+  bool occlusion_order = false;         ///< Frame::occlusions.
   bool motion = false;                  ///< kMotion, when the renderer does not provide it.
 };
 
 /// Annotations that the pipeline itself makes, with Renderer::cover().
 inline constexpr std::string_view kVisibility = "visibility";
 inline constexpr std::string_view kAmodalMask = "amodal_mask";
+inline constexpr std::string_view kOcclusionOrder = "occlusion_order";
 inline constexpr std::string_view kInstances = "instances";
 
 /// Throws Error(Config) that names the first writer whose need nothing provides, and what would.

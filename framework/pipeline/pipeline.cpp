@@ -9,6 +9,7 @@
 
 #include "diorama/error.h"
 #include "framework/annotators/motion.h"
+#include "framework/annotators/occlusion_order.h"
 #include "framework/annotators/visibility.h"
 #include "framework/pipeline/scene_setup.h"
 #include "framework/plugins/plugin_call.h"
@@ -337,9 +338,11 @@ Frame Pipeline::make_frame(Visit& visit, std::size_t camera, int capture) {
   }
   if (components_.demand.visibility) {
     const auto instances = labelled_instances(visit.scene);
-    const auto coverage =
-        call_component(who, [&] { return components_.renderer->cover(node, instances); });
+    const bool is_ordered = components_.demand.occlusion_order;
+    const auto coverage = call_component(
+        who, [&] { return components_.renderer->cover(node, instances, is_ordered); });
     measure_visibility(coverage, components_.demand.amodal_mask, frame);
+    if (is_ordered) order_occlusions(coverage, frame);
   }
   if (components_.demand.motion) measure_motion(visit.scene, visit.before_last_step, frame);
   return frame;

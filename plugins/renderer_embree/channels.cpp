@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -11,6 +12,9 @@
 
 namespace diorama {
 namespace {
+
+/// Distance where nothing was met.
+constexpr float kMiss = std::numeric_limits<float>::infinity();
 
 /// What one pixel's ray met.
 struct CentreHit {
@@ -86,30 +90,9 @@ PixelBox possible_pixels(const View& view, const std::optional<RayBlocks>& block
           bound(std::ceil(hi.x()) + 1.0, -w, 2 * w), bound(std::ceil(hi.y()) + 1.0, -h, 2 * h)};
 }
 
-CoverageMask cropped(const PixelBox& box, const std::vector<std::uint8_t>& bits) {
-  PixelBox extent{box.x_max, box.y_max, box.x_min, box.y_min};
-  const auto row = [&](int y) {
-    return bits.begin() + std::ptrdiff_t(y - box.y_min) * std::ptrdiff_t(box.width());
-  };
-  for (int y = box.y_min; y < box.y_max; ++y) {
-    for (int x = box.x_min; x < box.x_max; ++x) {
-      if (!row(y)[x - box.x_min]) continue;
-      extent = {std::min(extent.x_min, x), std::min(extent.y_min, y), std::max(extent.x_max, x + 1),
-                std::max(extent.y_max, y + 1)};
-    }
-  }
-  CoverageMask mask;
-  if (extent.is_empty()) return mask;
-  mask.box = extent;
-  for (int y = extent.y_min; y < extent.y_max; ++y) {
-    mask.bits.insert(mask.bits.end(), row(y) + (extent.x_min - box.x_min),
-                     row(y) + (extent.x_max - box.x_min));
-  }
-  return mask;
-}
-
 CoverageMask coverage_of(const RenderScene& meshes, const View& view,
-                         const std::optional<RayBlocks>& blocks, const LabelledInstance& instance) {
+                         const std::optional<RayBlocks>& blocks, const LabelledInstance& instance,
+                         bool with_distances) {
   std::vector<std::uint32_t> own;
   Aabb bounds;
   for (std::uint32_t i = 0; i < meshes.instances().size(); ++i) {
@@ -121,18 +104,20 @@ CoverageMask coverage_of(const RenderScene& meshes, const View& view,
     own.push_back(i);
     bounds.add(mesh.bounds);
   }
-  const PixelBox box = possible_pixels(view, blocks, bounds);
-  if (box.is_empty()) return {};
+  CoverageMask mask;
+  mask.box = possible_pixels(view, blocks, bounds);
+  if (mask.box.is_empty()) return {};
   const RenderScene::Part part(meshes, own);
-  std::vector<std::uint8_t> bits;
-  bits.reserve(std::size_t(box.width()) * std::size_t(box.height()));
-  for (int y = box.y_min; y < box.y_max; ++y) {
-    for (int x = box.x_min; x < box.x_max; ++x) {
+  for (int y = mask.box.y_min; y < mask.box.y_max; ++y) {
+    for (int x = mask.box.x_min; x < mask.box.x_max; ++x) {
       const auto ray = view.ray(Vec2(x + 0.5, y + 0.5));
-      bits.push_back(ray && part.is_met(ray->origin, ray->direction, ray->t_min, ray->t_max));
+      const float distance =
+          ray ? part.distance(ray->origin, ray->direction, ray->t_min, ray->t_max) : kMiss;
+      mask.bits.push_back(distance < kMiss);
+      if (with_distances) mask.distances.push_back(distance);
     }
   }
-  return cropped(box, bits);
+  return mask.cropped(mask.extent());
 }
 
 }  // namespace
@@ -165,14 +150,13 @@ void fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshe
     }
   });
 
-  constexpr float kFar = std::numeric_limits<float>::infinity();
   const Vec3f none = Vec3f::Zero();
   const Vec2f no_vector = Vec2f::Zero();
   ChannelFiller filler(frame, wanted, view, hits, host);
-  filler.fill(kDistanceToCamera, kFar, [](const CentreHit& h, const SurfaceGeometry& s) {
+  filler.fill(kDistanceToCamera, kMiss, [](const CentreHit& h, const SurfaceGeometry& s) {
     return (s.position - h.ray.origin).norm();
   });
-  filler.fill(kDistanceToImagePlane, kFar, [&](const CentreHit&, const SurfaceGeometry& s) {
+  filler.fill(kDistanceToImagePlane, kMiss, [&](const CentreHit&, const SurfaceGeometry& s) {
     return float(-(view.camera_from_world() * s.position.cast<double>()).z());
   });
   filler.fill(kNormals, none, [](const CentreHit&, const SurfaceGeometry& s) { return s.normal; });
@@ -189,12 +173,13 @@ void fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshe
 }
 
 std::vector<CoverageMask> coverage(const RenderScene& meshes, const View& view,
-                                   std::span<const LabelledInstance> instances, Host& host) {
+                                   std::span<const LabelledInstance> instances, bool with_distances,
+                                   Host& host) {
   std::vector<CoverageMask> masks(instances.size());
   std::optional<RayBlocks> blocks;
   if (view.camera().lens != LensModel::Pinhole) blocks.emplace(view.camera(), host);
   host.parallel_for(instances.size(), [&](std::size_t i) {
-    masks[i] = coverage_of(meshes, view, blocks, instances[i]);
+    masks[i] = coverage_of(meshes, view, blocks, instances[i], with_distances);
   });
   return masks;
 }

@@ -17,6 +17,7 @@ void fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshe
 
 /// See Renderer::cover.
 std::vector<CoverageMask> coverage(const RenderScene& meshes, const View& view,
-                                   std::span<const LabelledInstance> instances, Host& host);
+                                   std::span<const LabelledInstance> instances, bool with_distances,
+                                   Host& host);
 
 }  // namespace diorama

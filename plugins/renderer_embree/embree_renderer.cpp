@@ -206,8 +206,9 @@ Frame EmbreeRenderer::do_render(const Scene& scene, const RenderRequest& request
 }
 
 std::vector<CoverageMask> EmbreeRenderer::do_cover(const Scene& scene, NodeId camera,
-                                                   std::span<const LabelledInstance> instances) {
-  return coverage(meshes_, View(scene, camera), instances, host_);
+                                                   std::span<const LabelledInstance> instances,
+                                                   bool with_distances) {
+  return coverage(meshes_, View(scene, camera), instances, with_distances, host_);
 }
 
 }  // namespace diorama

@@ -56,7 +56,8 @@ class EmbreeRenderer final : public Renderer {
   void do_prepare(const Scene& scene) override;
   Frame do_render(const Scene& scene, const RenderRequest& request) override;
   std::vector<CoverageMask> do_cover(const Scene& scene, NodeId camera,
-                                     std::span<const LabelledInstance> instances) override;
+                                     std::span<const LabelledInstance> instances,
+                                     bool with_distances) override;
   Film trace(const View& view, std::uint64_t seed);
   void put_colors(Frame& frame, const RenderRequest& request, const View& view);
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "diorama/error.h"
 #include "stopwatch.h"
@@ -477,13 +478,14 @@ RenderScene::Part::Part(const RenderScene& scene, const std::vector<std::uint32_
 
 RenderScene::Part::~Part() { rtcReleaseScene(scene_); }
 
-bool RenderScene::Part::is_met(const Vec3f& origin, const Vec3f& direction, float t_min,
-                               float t_max) const {
+float RenderScene::Part::distance(const Vec3f& origin, const Vec3f& direction, float t_min,
+                                  float t_max) const {
   RTCRayHit ray = make_ray(origin, direction, t_min, t_max, kMoment);
   embree::Context context;
   embree::init(context);
   embree::intersect(scene_, context, ray);
-  return ray.hit.geomID != RTC_INVALID_GEOMETRY_ID;
+  const bool is_met = ray.hit.geomID != RTC_INVALID_GEOMETRY_ID;
+  return is_met ? ray.ray.tfar : std::numeric_limits<float>::infinity();
 }
 
 }  // namespace diorama

@@ -135,7 +135,8 @@ class RenderScene {
     ~Part();
     Part(const Part&) = delete;
     Part& operator=(const Part&) = delete;
-    bool is_met(const Vec3f& origin, const Vec3f& direction, float t_min, float t_max) const;
+    /// To its first surface; infinity where the ray misses it.
+    float distance(const Vec3f& origin, const Vec3f& direction, float t_min, float t_max) const;
 
    private:
     RTCScene scene_ = nullptr;

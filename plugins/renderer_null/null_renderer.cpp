@@ -62,27 +62,6 @@ PixelBox possible_pixels(const View& view, const Aabb& bounds) {
           bound(hi.x() + 2.0, -w, 2 * w), bound(hi.y() + 2.0, -h, 2 * h)};
 }
 
-CoverageMask cropped(const PixelBox& box, const std::vector<std::uint8_t>& bits) {
-  PixelBox extent{box.x_max, box.y_max, box.x_min, box.y_min};
-  const auto bit = [&](int x, int y) {
-    return bits[std::size_t(y - box.y_min) * std::size_t(box.width()) + std::size_t(x - box.x_min)];
-  };
-  for (int y = box.y_min; y < box.y_max; ++y) {
-    for (int x = box.x_min; x < box.x_max; ++x) {
-      if (!bit(x, y)) continue;
-      extent = {std::min(extent.x_min, x), std::min(extent.y_min, y), std::max(extent.x_max, x + 1),
-                std::max(extent.y_max, y + 1)};
-    }
-  }
-  CoverageMask mask;
-  if (extent.is_empty()) return mask;
-  mask.box = extent;
-  for (int y = extent.y_min; y < extent.y_max; ++y) {
-    for (int x = extent.x_min; x < extent.x_max; ++x) mask.bits.push_back(bit(x, y));
-  }
-  return mask;
-}
-
 Vec3f palette(std::uint32_t id) {
   const Vec3 u = Rng(id).uniform_in(Aabb{Vec3::Constant(0.15), Vec3::Constant(0.95)});
   return u.cast<float>();
@@ -169,22 +148,24 @@ Frame NullRenderer::do_render(const Scene& scene, const RenderRequest& request) 
 }
 
 std::vector<CoverageMask> NullRenderer::do_cover(const Scene& scene, NodeId camera,
-                                                 std::span<const LabelledInstance> instances) {
+                                                 std::span<const LabelledInstance> instances,
+                                                 bool with_distances) {
   const View view(scene, camera);
   std::vector<CoverageMask> masks(instances.size());
   host_.parallel_for(instances.size(), [&](std::size_t i) {
     const NullScene::Part part = meshes_.part(instances[i].leaves);
-    const PixelBox box = possible_pixels(view, part.bounds);
-    if (box.is_empty()) return;
-    std::vector<std::uint8_t> bits;
-    bits.reserve(std::size_t(box.width()) * std::size_t(box.height()));
-    for (int y = box.y_min; y < box.y_max; ++y) {
-      for (int x = box.x_min; x < box.x_max; ++x) {
+    CoverageMask mask;
+    mask.box = possible_pixels(view, part.bounds);
+    if (mask.box.is_empty()) return;
+    for (int y = mask.box.y_min; y < mask.box.y_max; ++y) {
+      for (int x = mask.box.x_min; x < mask.box.x_max; ++x) {
         const auto segment = view.segment(x, y);
-        bits.push_back(segment && meshes_.covers(part, *segment));
+        const double distance = segment ? meshes_.distance(part, *segment) : kInfinity;
+        mask.bits.push_back(distance < kInfinity);
+        if (with_distances) mask.distances.push_back(float(distance));
       }
     }
-    masks[i] = cropped(box, bits);
+    masks[i] = mask.cropped(mask.extent());
   });
   return masks;
 }

@@ -25,7 +25,8 @@ class NullRenderer final : public Renderer {
   void do_prepare(const Scene& scene) override;
   Frame do_render(const Scene& scene, const RenderRequest& request) override;
   std::vector<CoverageMask> do_cover(const Scene& scene, NodeId camera,
-                                     std::span<const LabelledInstance> instances) override;
+                                     std::span<const LabelledInstance> instances,
+                                     bool with_distances) override;
 
   Host& host_;
   NullScene meshes_;

@@ -196,10 +196,12 @@ NullScene::Part NullScene::part(std::span<const NodeId> nodes) const {
   return part;
 }
 
-bool NullScene::covers(const Part& part, const Segment& segment) const {
-  Segment rest = segment;
-  return std::any_of(part.instances.begin(), part.instances.end(),
-                     [&](std::uint32_t i) { return intersect(i, rest).has_value(); });
+double NullScene::distance(const Part& part, Segment segment) const {
+  bool is_met = false;
+  for (const std::uint32_t i : part.instances) {
+    if (intersect(i, segment)) is_met = true;
+  }
+  return is_met ? segment.t_max : kInfinity;
 }
 
 }  // namespace diorama

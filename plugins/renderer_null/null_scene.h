@@ -39,7 +39,8 @@ class NullScene {
     Aabb bounds;
   };
   Part part(std::span<const NodeId> nodes) const;
-  bool covers(const Part& part, const Segment& segment) const;
+  /// To its first surface; infinity where the segment misses it.
+  double distance(const Part& part, Segment segment) const;
 
  private:
   struct Triangles {

@@ -32,15 +32,28 @@ Json keypoints_json(const Frame& frame, const Instance& instance, int& count) {
   return list;
 }
 
+/// Who is in front of it where both lie, and in how many pixels.
+Json occluded_by_json(const Frame& frame, const Instance& instance) {
+  Json list = Json::array();
+  for (const Occlusion& occlusion : frame.occlusions) {
+    if (occlusion.behind != instance.id) continue;
+    const auto front = std::ranges::find(frame.instances, occlusion.front, &Instance::id);
+    list.push_back({{"node", front->node_path}, {"pixels", occlusion.pixels}});
+  }
+  return list;
+}
+
 /// What is known of the whole object, hidden parts included.
-Json amodal_json(const Frame& frame, const Visibility& visibility) {
+Json amodal_json(const Frame& frame, const Instance& instance) {
   const Camera& camera = frame.camera;
+  const Visibility& visibility = *instance.visibility;
   return {
       {"segmentation", coco_rle(run_length(visibility.amodal_mask, camera.width, camera.height))},
       {"bbox", box_json(*visibility.amodal_box)},
       {"area", visibility.amodal_pixels},
       {"occlusion", python_round(visibility.occlusion().value_or(0.0), 6)},
-      {"truncation", python_round(visibility.truncation(), 6)}};
+      {"truncation", python_round(visibility.truncation(), 6)},
+      {"occluded_by", occluded_by_json(frame, instance)}};
 }
 
 Json image_json(const Capture& capture, const Frame& frame, int id, const std::string& file) {
@@ -110,7 +123,8 @@ void append(Json& list, Json& more) {
 void CocoWriter::Params::visit(ParamVisitor& v) {
   training.visit(v);
   v.param("keypoints", keypoints, {"Box centre and corners as keypoints."});
-  v.param("amodal", amodal, {"Mask, box and area of the whole object under \"amodal\"."});
+  v.param("amodal", amodal,
+          {"Mask, box and area of the whole object, and who hides it, under \"amodal\"."});
   v.param("panoptic", panoptic, {"Panoptic pictures and annotations."});
   v.param("crowd_below_px", crowd_below_px,
           {"Objects with fewer visible pixels are marked iscrowd.", "px", 0.0});
@@ -152,7 +166,7 @@ CocoWriter::CocoWriter(Params params, Host& host)
 NameSet CocoWriter::needs() const {
   NameSet names{std::string(kColor.name), std::string(kInstanceId.name), "instances"};
   if (params_.keypoints) names.emplace(kDistanceToCamera.name);
-  if (params_.amodal) names.insert({"visibility", "amodal_mask"});
+  if (params_.amodal) names.insert({"visibility", "amodal_mask", "occlusion_order"});
   return names;
 }
 
@@ -189,6 +203,8 @@ void CocoWriter::begin(const DatasetInfo& dataset, DatasetFiles& files) {
       "COCO",
       {{"bbox", "x, y, width, height in pixels, of the visible pixels"},
        {"segmentation", "compressed run lengths of the visible pixels, column by column"},
+       {"amodal.occluded_by",
+        "objects nearer to the camera in pixels that both cover, seen or not, and how many pixels"},
        {"keypoint_visibility", "0 outside the image, 1 hidden, 2 visible"}},
       dataset, files);
 }
@@ -209,7 +225,7 @@ Json CocoWriter::annotation(const Frame& frame, const TrainingObject& object, in
     json["num_keypoints"] = count;
   }
   if (params_.amodal && instance.visibility && instance.visibility->amodal_box) {
-    json["amodal"] = amodal_json(frame, *instance.visibility);
+    json["amodal"] = amodal_json(frame, instance);
   }
   return json;
 }

@@ -1,12 +1,43 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "diorama/frame.h"
 
+#include <algorithm>
+
 namespace diorama {
 
 bool CoverageMask::covers(int x, int y) const {
   if (x < box.x_min || x >= box.x_max || y < box.y_min || y >= box.y_max) return false;
-  const std::size_t row = std::size_t(y - box.y_min);
-  return bits[row * std::size_t(box.width()) + std::size_t(x - box.x_min)] != 0;
+  return bits[index(x, y)] != 0;
+}
+
+PixelBox CoverageMask::extent() const {
+  PixelBox extent{box.x_max, box.y_max, box.x_min, box.y_min};
+  std::size_t i = 0;
+  for (int y = box.y_min; y < box.y_max; ++y) {
+    for (int x = box.x_min; x < box.x_max; ++x, ++i) {
+      if (bits[i] == 0) continue;
+      extent = {std::min(extent.x_min, x), std::min(extent.y_min, y), std::max(extent.x_max, x + 1),
+                std::max(extent.y_max, y + 1)};
+    }
+  }
+  return extent.is_empty() ? PixelBox() : extent;
+}
+
+CoverageMask CoverageMask::cropped(const PixelBox& part) const {
+  CoverageMask mask;
+  if (part.is_empty()) return mask;
+  mask.box = part;
+  const auto copy = [&](const auto& from, auto& to) {
+    if (from.empty()) return;
+    to.reserve(std::size_t(part.width()) * std::size_t(part.height()));
+    for (int y = part.y_min; y < part.y_max; ++y) {
+      const auto first = from.begin() + std::ptrdiff_t(index(part.x_min, y));
+      to.insert(to.end(), first, first + part.width());
+    }
+  };
+  copy(bits, mask.bits);
+  copy(distances, mask.distances);
+  return mask;
 }
 
 Frame::Frame() = default;

@@ -56,7 +56,8 @@ std::map<std::uint32_t, std::string> paths_of_leaves(const Scene& scene,
   return paths;
 }
 
-void check_mask(const Camera& camera, const CoverageMask& mask, const std::string& path) {
+void check_mask(const Camera& camera, const CoverageMask& mask, bool has_distances,
+                const std::string& path) {
   const PixelBox& box = mask.box;
   if (box.is_empty() && mask.bits.empty()) return;
   const bool is_in_reach = box.x_min >= -camera.width && box.x_max <= 2 * camera.width &&
@@ -66,6 +67,10 @@ void check_mask(const Camera& camera, const CoverageMask& mask, const std::strin
     fail(path + ": its coverage mask has " + std::to_string(mask.bits.size()) +
          " pixels, its box has " + std::to_string(box.width()) + " x " +
          std::to_string(box.height()));
+  }
+  if (mask.distances.size() != (has_distances ? mask.bits.size() : 0)) {
+    fail(path + ": its coverage mask has " + std::to_string(mask.distances.size()) +
+         " distances, expected " + (has_distances ? std::to_string(mask.bits.size()) : "none"));
   }
 }
 
@@ -104,20 +109,21 @@ Frame Renderer::render(const RenderRequest& request) {
 }
 
 std::vector<CoverageMask> Renderer::cover(NodeId camera,
-                                          std::span<const LabelledInstance> instances) {
+                                          std::span<const LabelledInstance> instances,
+                                          bool with_distances) {
   const Camera& lens = checked_camera(scene_, camera);
   for (const LabelledInstance& instance : instances) {
     for (const NodeId leaf : instance.leaves) {
       if (!scene_->contains(leaf)) fail("Renderer: an instance's leaf is not in the scene");
     }
   }
-  std::vector<CoverageMask> masks = do_cover(*scene_, camera, instances);
+  std::vector<CoverageMask> masks = do_cover(*scene_, camera, instances, with_distances);
   if (masks.size() != instances.size()) {
     fail("Renderer: expected " + std::to_string(instances.size()) + " coverage masks, found " +
          std::to_string(masks.size()));
   }
   for (std::size_t i = 0; i < masks.size(); ++i) {
-    check_mask(lens, masks[i], scene_->path(instances[i].node));
+    check_mask(lens, masks[i], with_distances, scene_->path(instances[i].node));
   }
   return masks;
 }

@@ -76,7 +76,7 @@ struct Restless : Renderer {
     return frame;
   }
   std::vector<CoverageMask> do_cover(const Scene&, NodeId,
-                                     std::span<const LabelledInstance> instances) override {
+                                     std::span<const LabelledInstance> instances, bool) override {
     return std::vector<CoverageMask>(instances.size());
   }
 };

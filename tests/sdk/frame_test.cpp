@@ -50,6 +50,24 @@ TEST_CASE("A coverage mask is addressed in image coordinates", "[frame]") {
   CHECK_FALSE(mask.covers(-3, 3));
 }
 
+TEST_CASE("A coverage mask shrinks to what is covered, distances with it", "[frame]") {
+  CoverageMask mask;
+  mask.box = {-2, 3, 2, 6};
+  mask.bits = {0, 0, 0, 0,  //
+               0, 1, 0, 0,  //
+               0, 0, 1, 0};
+  for (int i = 0; i < 12; ++i) mask.distances.push_back(float(i));
+  CHECK(mask.extent() == PixelBox{-1, 4, 1, 6});
+  const CoverageMask small = mask.cropped(mask.extent());
+  CHECK(small.box == mask.extent());
+  CHECK(small.bits == std::vector<std::uint8_t>{1, 0, 0, 1});
+  CHECK(small.distances == std::vector<float>{5, 6, 9, 10});
+
+  mask.bits.assign(12, 0);
+  CHECK(mask.extent() == PixelBox{});
+  CHECK(mask.cropped(mask.extent()).bits.empty());
+}
+
 TEST_CASE("Occlusion and truncation are shares of the covered pixels", "[frame]") {
   Visibility visibility;
   CHECK_FALSE(visibility.occlusion());

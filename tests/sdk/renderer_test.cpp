@@ -20,8 +20,8 @@ class Scripted final : public Renderer {
  private:
   void do_prepare(const Scene&) override {}
   Frame do_render(const Scene&, const RenderRequest&) override { return frame(); }
-  std::vector<CoverageMask> do_cover(const Scene&, NodeId,
-                                     std::span<const LabelledInstance>) override {
+  std::vector<CoverageMask> do_cover(const Scene&, NodeId, std::span<const LabelledInstance>,
+                                     bool) override {
     return masks;
   }
 };
@@ -44,9 +44,9 @@ struct Studio {
   std::string render_error(const NameSet& channels) {
     return test::error_text([&] { renderer.render({camera, channels, 1}); });
   }
-  std::string cover_error() {
+  std::string cover_error(bool with_distances = false) {
     const std::vector<LabelledInstance> instances = {{cup, {cup}}};
-    return test::error_text([&] { renderer.cover(camera, instances); });
+    return test::error_text([&] { renderer.cover(camera, instances, with_distances); });
   }
 };
 
@@ -112,10 +112,15 @@ TEST_CASE("Coverage masks are checked", "[renderer]") {
   CHECK(s.cover_error() == "Renderer: expected 1 coverage masks, found 0");
   s.renderer.masks = {CoverageMask{}};
   CHECK(s.cover_error() == "(no error)");
-  s.renderer.masks = {CoverageMask{{-3, -2, 6, 4}, std::vector<std::uint8_t>(54, 1)}};
+  s.renderer.masks = {CoverageMask{{-3, -2, 6, 4}, std::vector<std::uint8_t>(54, 1), {}}};
   CHECK(s.cover_error() == "(no error)");
-  s.renderer.masks = {CoverageMask{{-4, 0, 0, 1}, std::vector<std::uint8_t>(4, 1)}};
+  s.renderer.masks = {CoverageMask{{-4, 0, 0, 1}, std::vector<std::uint8_t>(4, 1), {}}};
   CHECK(s.cover_error() == "/cup: the box of its coverage mask is out of reach");
-  s.renderer.masks = {CoverageMask{{0, 0, 2, 1}, {1}}};
+  s.renderer.masks = {CoverageMask{{0, 0, 2, 1}, {1}, {}}};
   CHECK(s.cover_error() == "/cup: its coverage mask has 1 pixels, its box has 2 x 1");
+  s.renderer.masks = {CoverageMask{{0, 0, 2, 1}, {1, 0}, {}}};
+  CHECK(s.cover_error(true) == "/cup: its coverage mask has 0 distances, expected 2");
+  s.renderer.masks = {CoverageMask{{0, 0, 2, 1}, {1, 0}, {0.5f, 7.0f}}};
+  CHECK(s.cover_error(true) == "(no error)");
+  CHECK(s.cover_error() == "/cup: its coverage mask has 2 distances, expected none");
 }

@@ -48,8 +48,8 @@ inline constexpr Channel<Vec3f> kPosition{"position"};
 inline constexpr Channel<Vec2f> kUv{"uv"};
 /// Linear base colour, textured; zero where nothing was hit.
 inline constexpr Channel<Vec3f> kAlbedo{"albedo"};
-/// Position inside the labelled instance's box in its own space, scaled to [0, 1]^3 (NOCS); zero for
-/// unlabelled pixels. Derived by the host.
+/// Position inside the labelled instance's box in its own space, scaled to [0, 1]^3 (NOCS); zero
+/// for unlabelled pixels. Derived by the host.
 inline constexpr Channel<Vec3f> kObjectCoordinates{"object_coordinates"};
 /// Pixels that the surface point moved since the previous time step, image x right, y down; zero
 /// where nothing was hit. Derived by the host.
@@ -64,17 +64,28 @@ inline constexpr Channel<float> kSensorDepth{"sensor_depth"};
 struct DIORAMA_SDK_API CoverageMask {
   PixelBox box;
   std::vector<std::uint8_t> bits;  ///< One byte (0 or 1) per pixel of the box, row by row.
+  /// Metres from the camera centre to the object, one per pixel of the box, +infinity where it does
+  /// not cover; empty unless asked for.
+  std::vector<float> distances;
 
   bool covers(int x, int y) const;  ///< Image coordinates.
+  /// Index of a pixel of the box, given in image coordinates.
+  std::size_t index(int x, int y) const {
+    return std::size_t(y - box.y_min) * std::size_t(box.width()) + std::size_t(x - box.x_min);
+  }
+  /// The smallest box with all covered pixels; empty when there is none.
+  PixelBox extent() const;
+  /// What lies in `part`, a box inside this one's.
+  CoverageMask cropped(const PixelBox& part) const;
 };
 
 /// How much of an instance one camera sees.
 struct Visibility {
-  std::int64_t visible_pixels = 0;      ///< Its pixels in kInstanceId.
-  std::int64_t amodal_pixels = 0;       ///< Covered without occluders, inside the image.
-  std::int64_t outside_pixels = 0;      ///< Covered without occluders, outside the image.
-  std::optional<PixelBox> amodal_box;   ///< Clipped to the image; absent when nothing is inside.
-  CoverageMask amodal_mask;             ///< Filled only when "amodal_mask" was demanded.
+  std::int64_t visible_pixels = 0;     ///< Its pixels in kInstanceId.
+  std::int64_t amodal_pixels = 0;      ///< Covered without occluders, inside the image.
+  std::int64_t outside_pixels = 0;     ///< Covered without occluders, outside the image.
+  std::optional<PixelBox> amodal_box;  ///< Clipped to the image; absent when nothing is inside.
+  CoverageMask amodal_mask;            ///< Filled only when "amodal_mask" was demanded.
 
   /// 1 - visible / amodal, in [0, 1]; nothing when no pixel is inside the image.
   std::optional<double> occlusion() const {
@@ -100,6 +111,14 @@ struct Instance {
   std::optional<Visibility> visibility;  ///< Filled when "visibility" was demanded.
 };
 
+/// Two instances that cover some of the same pixels of the image, seen or hidden by a third.
+struct Occlusion {
+  std::uint32_t front = 0;   ///< Instance::id.
+  std::uint32_t behind = 0;  ///< Instance::id.
+  std::int64_t pixels = 0;   ///< Where `front` is the nearer one; at least 1.
+  friend bool operator==(const Occlusion&, const Occlusion&) = default;
+};
+
 /// One camera's data in one capture.
 class DIORAMA_SDK_API Frame {
  public:
@@ -112,9 +131,12 @@ class DIORAMA_SDK_API Frame {
   std::string camera_path;
   Camera camera;
   Affine world_from_camera = Affine::Identity();
-  /// Every labelled instance of the scene in creation order, seen or not. Filled when "instances" was
-  /// demanded.
+  /// Every labelled instance of the scene in creation order, seen or not. Filled when "instances"
+  /// was demanded.
   std::vector<Instance> instances;
+  /// Who is in front of whom, in the order of `instances` by `front`, then by `behind`. Things that
+  /// reach around each other occur both ways. Filled when "occlusion_order" was demanded.
+  std::vector<Occlusion> occlusions;
   /// Path of every leaf id that occurs in kLeafId.
   std::map<std::uint32_t, std::string> leaf_paths;
   double exposure = 1.0;  ///< Factor from kColorHdr to the view transform's input.
@@ -144,9 +166,9 @@ class DIORAMA_SDK_API Frame {
 
 /// One moment of the scene seen by all cameras.
 struct Capture {
-  int index = 0;         ///< 0-based in the whole job, the same in every shard.
-  int visit = 0;         ///< Which pass through an environment.
-  std::string phase;     ///< Name of the capture series: "floating", "dropped".
+  int index = 0;      ///< 0-based in the whole job, the same in every shard.
+  int visit = 0;      ///< Which pass through an environment.
+  std::string phase;  ///< Name of the capture series: "floating", "dropped".
   std::string environment;
   std::vector<Frame> frames;  ///< One per camera, in camera order.
 };

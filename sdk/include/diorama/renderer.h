@@ -47,14 +47,17 @@ class DIORAMA_SDK_API Renderer : public Component {
   /// the camera fields, leaf_paths and channels of the frame; instances are the host's.
   Frame render(const RenderRequest& request);
 
-  /// Per instance, the pixels that it covers for this camera with nothing else in the scene.
-  std::vector<CoverageMask> cover(NodeId camera, std::span<const LabelledInstance> instances);
+  /// Per instance, the pixels that it covers for this camera with nothing else in the scene, and,
+  /// where asked for, at which distance.
+  std::vector<CoverageMask> cover(NodeId camera, std::span<const LabelledInstance> instances,
+                                  bool with_distances = false);
 
  private:
   virtual void do_prepare(const Scene& scene) = 0;
   virtual Frame do_render(const Scene& scene, const RenderRequest& request) = 0;
   virtual std::vector<CoverageMask> do_cover(const Scene& scene, NodeId camera,
-                                             std::span<const LabelledInstance> instances) = 0;
+                                             std::span<const LabelledInstance> instances,
+                                             bool with_distances) = 0;
   const Scene* scene_ = nullptr;
 };
 

@@ -66,7 +66,8 @@ class DIORAMA_SDK_API Writer : public Component {
   ~Writer() override;
 
   /// Channels that write() reads, and annotations: "instances" (Frame::instances and their tight
-  /// boxes), "visibility" (Instance::visibility), "amodal_mask" (the masks therein).
+  /// boxes), "visibility" (Instance::visibility), "amodal_mask" (the masks therein),
+  /// "occlusion_order" (Frame::occlusions).
   virtual NameSet needs() const = 0;
   /// Files that do not depend on captures: class lists, metadata. Called once per run.
   virtual void begin(const DatasetInfo& dataset, DatasetFiles& files);

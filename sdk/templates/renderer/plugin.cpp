@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: @LICENCE@
-// One ray per pixel against every triangle: exact ids and distances, a lamp at the camera for light.
-// To be of use for large scenes it wants a tree over the triangles instead of one box per mesh.
+// One ray per pixel against every triangle: exact ids and distances, a lamp at the camera for
+// light. To be of use for large scenes it wants a tree over the triangles instead of one box per
+// mesh.
 #include <diorama/plugin.h>
 #include <diorama/renderer.h>
 
@@ -58,7 +59,7 @@ bool meets(const diorama::Aabb& box, const Vec3& origin, const Vec3& direction) 
   return from <= to * (1.0 + 1e-12);
 }
 
-class @CLASS@ final : public diorama::Renderer {
+class @CLASS @final : public diorama::Renderer {
  public:
   // Defaults are the field initialisers. visit() is the one list from which the program reads and
   // checks a job, describes the plugin and makes the JSON Schema.
@@ -68,7 +69,8 @@ class @CLASS@ final : public diorama::Renderer {
       v.param("ambient", ambient, {"Light on surfaces seen edge on.", "", 0.0, 1.0});
     }
   };
-  @CLASS@(Params params, diorama::Host& host) : params_(params), host_(host) {}
+  @CLASS @(Params params, diorama::Host & host) : params_(params), host_(host) {
+  }
 
   diorama::NameSet provides() const override {
     return {std::string(diorama::kColor.name), std::string(diorama::kLeafId.name),
@@ -122,9 +124,9 @@ class @CLASS@ final : public diorama::Renderer {
   }
 
   // The same rays, against one instance at a time, in a picture three times as wide and high.
-  std::vector<diorama::CoverageMask> do_cover(
-      const diorama::Scene& scene, NodeId camera_node,
-      std::span<const diorama::LabelledInstance> instances) override {
+  std::vector<diorama::CoverageMask> do_cover(const diorama::Scene& scene, NodeId camera_node,
+                                              std::span<const diorama::LabelledInstance> instances,
+                                              bool with_distances) override {
     const diorama::Camera& camera = *scene[camera_node].camera;
     const diorama::Affine world_from_camera = scene.world_from_node(camera_node);
     const diorama::PixelBox reach{-camera.width, -camera.height, 2 * camera.width,
@@ -139,10 +141,10 @@ class @CLASS@ final : public diorama::Renderer {
           const auto ray = diorama::ray_direction(camera, {x + 0.5, y + 0.5});
           const Vec3 direction =
               ray ? (world_from_camera.linear() * *ray).normalized() : Vec3::Zero();
-          const bool is_covered =
-              ray &&
-              nearest(leaves, world_from_camera.translation(), direction, camera, *ray).leaf;
-          masks[i].bits.push_back(is_covered ? 1 : 0);
+          Hit hit;
+          if (ray) hit = nearest(leaves, world_from_camera.translation(), direction, camera, *ray);
+          masks[i].bits.push_back(hit.leaf ? 1 : 0);
+          if (with_distances) masks[i].distances.push_back(float(hit.distance));
         }
       }
     });
@@ -204,5 +206,5 @@ class @CLASS@ final : public diorama::Renderer {
 }  // namespace
 
 DIORAMA_PLUGIN("@NAME@", "0.1.0", "@LICENCE@") {
-  DIORAMA_ADD(@CLASS@, "@NAME@", "Casts one ray per pixel, with a lamp at the camera.");
+  DIORAMA_ADD(@CLASS @, "@NAME@", "Casts one ray per pixel, with a lamp at the camera.");
 }

@@ -29,7 +29,10 @@ int main(int, char** argv) {
         "the normal faces the camera");
   check(frame.get(diorama::kColor).at(0, 0) == diorama::Rgba8{0, 0, 0, 255}, "nothing is black");
 
-  const auto masks = renderer->cover(camera, diorama::labelled_instances(scene));
+  const auto masks = renderer->cover(camera, diorama::labelled_instances(scene), true);
   check(masks.size() == 1 && masks[0].covers(44, 10) && !masks[0].covers(45, 10),
         "the part outside the picture is covered, too");
+  check(std::abs(masks[0].distances[masks[0].index(37, 10)] -
+                 frame.get(diorama::kDistanceToCamera).at(37, 10)) < 1e-5f,
+        "a mask's distances are those of the picture");
 }

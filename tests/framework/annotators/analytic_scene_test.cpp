@@ -9,6 +9,7 @@
 #include "framework/annotators/instance_ids.h"
 #include "framework/annotators/instances.h"
 #include "framework/annotators/motion.h"
+#include "framework/annotators/occlusion_order.h"
 #include "framework/annotators/visibility.h"
 #include "null_renderer.h"
 #include "plugins/writer_support/fake_host.h"
@@ -268,7 +269,9 @@ Frame render(Renderer& renderer, const World& world, NodeId camera) {
   Frame frame = renderer.render(request);
   InstanceIds({}, host).annotate(world.scene, frame);
   Instances({}, host).annotate(world.scene, frame);
-  measure_visibility(renderer.cover(camera, labelled_instances(world.scene)), false, frame);
+  const auto coverage = renderer.cover(camera, labelled_instances(world.scene), true);
+  measure_visibility(coverage, false, frame);
+  order_occlusions(coverage, frame);
   measure_motion(world.scene, world.before, frame);
   return frame;
 }
@@ -277,6 +280,7 @@ struct Measured {
   PixelBox box{1 << 20, 1 << 20, 0, 0};
   std::int64_t visible = 0;
   std::int64_t alone = 0;
+  std::array<std::int64_t, kShapes> behind{};  ///< By shape, where this one is nearer.
 
   void add(int x, int y) {
     ++visible;
@@ -312,7 +316,12 @@ Wrong compare_pixels(const World& world, const Frame& frame, Measures& measured)
       const Vec2 pixel(x + 0.5, y + 0.5);
       const Truth truth = truth_at(world, frame, pixel);
       for (std::size_t s = 0; s < kShapes; ++s) {
-        if (std::isfinite(truth.distance[s])) ++measured[s].alone;
+        if (!std::isfinite(truth.distance[s])) continue;
+        ++measured[s].alone;
+        for (std::size_t other = 0; other < kShapes; ++other) {
+          const double distance = truth.distance[other];
+          if (std::isfinite(distance) && truth.distance[s] < distance) ++measured[s].behind[other];
+        }
       }
       const auto nearest = std::size_t(truth.nearest);
       const std::uint32_t id = truth.nearest < 0 ? 0 : world.nodes[nearest].index;
@@ -345,6 +354,7 @@ TEST_CASE("labels are those of the closed form, through every lens", "[annotator
   const auto renderer = make_renderer(name, host);
   renderer->prepare(world.scene);
   std::int64_t hidden = 0;
+  std::int64_t ordered = 0;
   for (const NodeId camera : world.cameras) {
     const Frame frame = render(*renderer, world, camera);
     INFO(frame.camera_name);
@@ -364,9 +374,18 @@ TEST_CASE("labels are those of the closed form, through every lens", "[annotator
       CHECK(instance->tight_box == m.box);
       CHECK(instance->visibility->visible_pixels == m.visible);
       CHECK(std::abs(instance->visibility->amodal_pixels - m.alone) <= 1);
+      for (const int other : {kBox, kSphere, kCone}) {
+        const auto order = std::ranges::find_if(frame.occlusions, [&](const Occlusion& o) {
+          return o.front == instance->id && o.behind == world.nodes[std::size_t(other)].index;
+        });
+        const std::int64_t pixels = order == frame.occlusions.end() ? 0 : order->pixels;
+        CHECK(std::abs(pixels - m.behind[std::size_t(other)]) <= 1);
+        ordered += pixels;
+      }
     }
   }
   CHECK(hidden > 100);  // else visibility was not put to the test
+  CHECK(ordered > 100);
 }
 
 TEST_CASE("cuboid keypoints lie within a hundredth of a pixel, through every lens",

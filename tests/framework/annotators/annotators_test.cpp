@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <limits>
 #include <map>
 
 #include "framework/annotators/instance_ids.h"
 #include "framework/annotators/instances.h"
+#include "framework/annotators/occlusion_order.h"
 #include "framework/annotators/visibility.h"
 #include "plugins/writer_support/fake_host.h"
 #include "plugins/writer_support/sample_capture.h"
@@ -103,8 +105,8 @@ TEST_CASE("visibility counts pixels inside and outside the image", "[annotators]
   frame.instances[0].id = 7;
   frame.instances[1].id = 9;
   // Columns -1 to 2 of rows 1 and 2, without one corner.
-  const CoverageMask seven{{-1, 1, 3, 3}, {1, 1, 1, 1, 1, 1, 1, 0}};
-  const CoverageMask nine{{6, -2, 8, -1}, {1, 1}};
+  const CoverageMask seven{{-1, 1, 3, 3}, {1, 1, 1, 1, 1, 1, 1, 0}, {}};
+  const CoverageMask nine{{6, -2, 8, -1}, {1, 1}, {}};
   const std::vector<CoverageMask> masks{seven, nine};
 
   measure_visibility(masks, true, frame);
@@ -126,8 +128,37 @@ TEST_CASE("visibility counts pixels inside and outside the image", "[annotators]
   CHECK(frame.instances[0].visibility->amodal_mask.bits.empty());
   CHECK_THROWS_WITH(measure_visibility(std::span(masks).first(1), false, frame),
                     ContainsSubstring("1 coverage masks for 2 instances"));
-  const std::vector<CoverageMask> torn{seven, {{6, -2, 8, -1}, {1}}};
+  const std::vector<CoverageMask> torn{seven, {{6, -2, 8, -1}, {1}, {}}};
   CHECK_THROWS_WITH(measure_visibility(torn, false, frame), ContainsSubstring("holds 1 values"));
+}
+
+TEST_CASE("occlusion order says in how many pixels one is in front of another", "[annotators]") {
+  constexpr float kFar = std::numeric_limits<float>::infinity();
+  Frame frame = frame_of({});
+  Image<std::uint32_t> ids(4, 1, 0);
+  ids.at(2, 0) = 9;
+  frame.set(kInstanceId, std::move(ids));
+  frame.instances.resize(3);
+  frame.instances[0].id = 7;
+  frame.instances[1].id = 9;
+  frame.instances[2].id = 4;
+  // Column:              -1    0    1    2    3
+  const CoverageMask seven{{-1, 0, 4, 1}, {1, 1, 1, 1, 0}, {1.0f, 2.0f, 5.0f, 3.0f, kFar}};
+  const CoverageMask nine{{-1, 0, 3, 1}, {1, 1, 1, 1}, {2.0f, 3.0f, 4.0f, 3.0f}};
+  // Touches the first at the same distance, behind what hides both or nothing.
+  const CoverageMask four{{1, 0, 4, 1}, {1, 0, 1}, {5.0f, kFar, 6.0f}};
+  std::vector<CoverageMask> masks{seven, nine, four};
+
+  order_occlusions(masks, frame);
+  // Column -1 is outside the image; in column 2 the picture decides between equals, in column 1
+  // between 7 and 4 nothing does.
+  const std::vector<Occlusion> expected{{7, 9, 1}, {9, 7, 2}, {9, 4, 1}};
+  CHECK(frame.occlusions == expected);
+
+  CHECK_THROWS_WITH(order_occlusions(std::span(masks).first(1), frame),
+                    ContainsSubstring("1 coverage masks for 3 instances"));
+  masks[1].distances.clear();
+  CHECK_THROWS_WITH(order_occlusions(masks, frame), ContainsSubstring("has no distances"));
 }
 
 TEST_CASE("labels of a rendered scene agree with each other", "[annotators]") {

@@ -26,6 +26,7 @@ Frame copy_of(const Frame& frame) {
   copy.camera = frame.camera;
   copy.world_from_camera = frame.world_from_camera;
   copy.instances = frame.instances;
+  copy.occlusions = frame.occlusions;
   copy.leaf_paths = frame.leaf_paths;
   for (const std::string& name : frame.channels()) {
     std::visit(
@@ -149,6 +150,17 @@ TEST_CASE("any file that is missing or cut short is found", "[lint]") {
 TEST_CASE("a box that is one pixel off its mask is found", "[lint]") {
   expect_found({"basic", "basic_raw", "coco", "voc", "bop", "webdataset"}, "box = extent of mask",
                [](Frame& frame) { seen(frame, "/Assets/crate").tight_box->x_min += 1; });
+}
+
+TEST_CASE("an occlusion order that the masks contradict is found", "[lint]") {
+  constexpr const char* kOrder = "occlusion order agrees with masks";
+  expect_found({"coco"}, kOrder, [](Frame& frame) {
+    if (!frame.occlusions.empty()) frame.occlusions.front().pixels += 1000;
+  });
+  expect_found({"coco"}, kOrder, [](Frame& frame) {
+    for (Occlusion& occlusion : frame.occlusions) std::swap(occlusion.front, occlusion.behind);
+  });
+  expect_found({"coco"}, kOrder, [](Frame& frame) { frame.occlusions.clear(); });
 }
 
 TEST_CASE("a box off its object is found where there are no masks", "[lint]") {

@@ -283,13 +283,29 @@ def decode(rle):
     return flat.reshape(width, height).T.astype(bool)
 
 
+def check_occlusion_order(wholes):
+    """Where one is seen and the other reaches, the order has it in front."""
+    pairs = 0
+    for (image, node), (_, whole, amodal) in wholes.items():
+        counts = {front["node"]: front["pixels"] for front in amodal["occluded_by"]}
+        for (other_image, other), (seen, _, _) in wholes.items():
+            if other_image != image or other == node:
+                continue
+            shared = int((seen & whole).sum())
+            assert counts.get(other, 0) >= shared, (image, node, other)
+            pairs += shared > 0
+    return pairs
+
+
 def check_coco(root):
     total = 0
+    ordered = 0
     for split in ("train", "val"):
         data = load_json(f"{root}/coco/annotations/instances_{split}.json")
         panoptic = load_json(f"{root}/coco/annotations/panoptic_{split}.json")
         images = {image["id"]: image for image in data["images"]}
         taken = {}
+        wholes = {}
         for image in images.values():
             shape = picture(f"{root}/coco/images/{split}/{image['file_name']}").shape
             equal(shape, (image["height"], image["width"], 3), image["file_name"])
@@ -300,14 +316,18 @@ def check_coco(root):
             equal(int(mask.sum()), annotation["area"], "area")
             x0, y0, x1, y1 = extent(mask)
             equal([x0, y0, x1 - x0, y1 - y0], annotation["bbox"], "bbox")
-            assert (decode(annotation["amodal"]["segmentation"]) | ~mask).all()
+            whole = decode(annotation["amodal"]["segmentation"])
+            assert (whole | ~mask).all()
             taken[annotation["image_id"]] += mask
+            wholes[annotation["image_id"], annotation["node"]] = (mask, whole, annotation["amodal"])
+        ordered += check_occlusion_order(wholes)
         assert all(t.max() <= 1 for t in taken.values())
         for entry in panoptic["annotations"]:
             image = picture(f"{root}/coco/panoptic/{split}/{entry['file_name']}").astype(int)
             ids = image[:, :, 2] + 256 * image[:, :, 1] + 65536 * image[:, :, 0]
             equal((ids != 0), taken[entry["image_id"]] == 1, "panoptic and instances")
     assert total >= 15, total
+    assert ordered > 0
 
 
 def check_yolo(root):

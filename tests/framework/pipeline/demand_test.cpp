@@ -49,6 +49,11 @@ TEST_CASE("Visibility brings instances and their ids along", "[demand]") {
   CHECK_FALSE(plain.amodal_mask);
   CHECK(plain.channels == NameSet{"leaf_id"});
   CHECK(demand_for({"amodal_mask"}).amodal_mask);
+  CHECK_FALSE(plain.occlusion_order);
+  const Demand ordered = demand_for({"occlusion_order"});
+  CHECK(ordered.occlusion_order);
+  CHECK(ordered.visibility);
+  CHECK(ordered.channels == NameSet{"leaf_id"});
 }
 
 TEST_CASE("Motion is made from ids and positions unless the renderer provides it", "[demand]") {

@@ -68,6 +68,7 @@ TEST_CASE("run lengths have the COCO API's text", "[writers]") {
 TEST_CASE("every annotation's mask, box and area are those of its pixels", "[writers]") {
   const MemoryFiles files = write({});
   std::size_t masks = 0;
+  std::size_t orders = 0;
   for (const std::string split : {"train", "val"}) {
     const Json json = Json::parse(files.text("annotations/instances_" + split + ".json"));
     int expected_id = 0;
@@ -86,6 +87,14 @@ TEST_CASE("every annotation's mask, box and area are those of its pixels", "[wri
       const std::string whole = decoded(annotation.at("amodal").at("segmentation"));
       CHECK(std::int64_t(std::count(whole.begin(), whole.end(), '#')) ==
             instance.visibility->amodal_pixels);
+      Json occluded_by = Json::array();
+      for (const Occlusion& occlusion : frame.occlusions) {
+        if (occlusion.behind != instance.id) continue;
+        const auto front = std::ranges::find(frame.instances, occlusion.front, &Instance::id);
+        occluded_by.push_back({{"node", front->node_path}, {"pixels", occlusion.pixels}});
+      }
+      CHECK(annotation.at("amodal").at("occluded_by") == occluded_by);
+      orders += occluded_by.size();
       const int category = annotation.at("category_id");
       CHECK(json.at("categories")[std::size_t(category - 1)].at("name") ==
             instance.labels.at("class"));
@@ -93,6 +102,7 @@ TEST_CASE("every annotation's mask, box and area are those of its pixels", "[wri
     }
   }
   CHECK(masks >= 15);
+  CHECK(orders > 0);
 }
 
 TEST_CASE("captures are split as a whole and pictures lie where the annotations say", "[writers]") {

@@ -8,6 +8,7 @@
 #include "framework/annotators/instance_ids.h"
 #include "framework/annotators/instances.h"
 #include "framework/annotators/object_coordinates.h"
+#include "framework/annotators/occlusion_order.h"
 #include "framework/annotators/visibility.h"
 #include "plugins/writer_support/fake_host.h"
 
@@ -130,7 +131,9 @@ CoverageMask cover(const Frame& frame, const std::vector<WorldMesh>& all,
   for (int y = mask.box.y_min; y < mask.box.y_max; ++y) {
     for (int x = mask.box.x_min; x < mask.box.x_max; ++x) {
       const auto ray = pixel_ray(frame, x, y);
-      mask.bits.push_back(ray && trace(*ray, own).mesh != nullptr);
+      const double distance = ray ? trace(*ray, own).t : kInfinity;
+      mask.bits.push_back(distance < kInfinity);
+      mask.distances.push_back(float(distance));
     }
   }
   return mask;
@@ -241,6 +244,7 @@ Frame ray_cast(const Scene& scene, NodeId camera_node) {
     masks.push_back(cover(frame, meshes, instance));
   }
   measure_visibility(masks, true, frame);
+  order_occlusions(masks, frame);
   ObjectCoordinates({}, host).annotate(scene, frame);
   return frame;
 }
