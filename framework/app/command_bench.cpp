@@ -117,9 +117,6 @@ Image<Vec3f> make_reference(const BenchOptions& options, const Scene& scene, Nod
       .get(kColorHdr);
 }
 
-double wall_of(const StepTime& time) { return time.wall_s; }
-double cpu_of(const StepTime& time) { return time.cpu_s; }
-
 template <class Value>
 double median(const std::vector<BenchRun>& runs, const Value& value) {
   std::vector<double> values;
@@ -189,8 +186,8 @@ std::string result_text(const BenchOptions& options, const BenchResult& result) 
   for (const auto& [phase, seconds] : result.prepare_phases) {
     text += time_line(phase, seconds, std::nullopt);
   }
-  const double wall = median(runs, [](const BenchRun& r) { return wall_of(r.render); });
-  const double cpu = median(runs, [](const BenchRun& r) { return cpu_of(r.render); });
+  const double wall = median(runs, [](const BenchRun& r) { return r.render.wall_s; });
+  const double cpu = median(runs, [](const BenchRun& r) { return r.render.cpu_s; });
   text += time_line("render", wall, cpu);
   const auto& phases = runs.front().report.seconds;
   for (std::size_t i = 0; i < phases.size(); ++i) {
@@ -198,8 +195,8 @@ std::string result_text(const BenchOptions& options, const BenchResult& result) 
                       median(runs, [&](const BenchRun& r) { return r.report.seconds[i].second; }),
                       std::nullopt);
   }
-  text += time_line("encode", median(runs, [](const BenchRun& r) { return wall_of(r.encode); }),
-                    median(runs, [](const BenchRun& r) { return cpu_of(r.encode); }));
+  text += time_line("encode", median(runs, [](const BenchRun& r) { return r.encode.wall_s; }),
+                    median(runs, [](const BenchRun& r) { return r.encode.cpu_s; }));
   char line[160];
   if (const RenderReport& report = runs.front().report; report.paths > 0) {
     std::snprintf(line, sizeof line,

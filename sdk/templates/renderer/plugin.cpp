@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: @LICENCE@
-// One ray per pixel against every triangle: exact ids and distances, a lamp at the camera for
-// light. To be of use for large scenes it wants a tree over the triangles instead of one box per
-// mesh.
+// One ray per pixel against every triangle: exact ids and distances, a lamp at the camera for light.
+// To be of use for large scenes it wants a tree over the triangles instead of one box per mesh.
 #include <diorama/plugin.h>
 #include <diorama/renderer.h>
 
@@ -59,7 +58,7 @@ bool meets(const diorama::Aabb& box, const Vec3& origin, const Vec3& direction) 
   return from <= to * (1.0 + 1e-12);
 }
 
-class @CLASS @final : public diorama::Renderer {
+class @CLASS@ final : public diorama::Renderer {
  public:
   // Defaults are the field initialisers. visit() is the one list from which the program reads and
   // checks a job, describes the plugin and makes the JSON Schema.
@@ -69,8 +68,7 @@ class @CLASS @final : public diorama::Renderer {
       v.param("ambient", ambient, {"Light on surfaces seen edge on.", "", 0.0, 1.0});
     }
   };
-  @CLASS @(Params params, diorama::Host & host) : params_(params), host_(host) {
-  }
+  @CLASS@(Params params, diorama::Host& host) : params_(params), host_(host) {}
 
   diorama::NameSet provides() const override {
     return {std::string(diorama::kColor.name), std::string(diorama::kLeafId.name),
@@ -206,5 +204,5 @@ class @CLASS @final : public diorama::Renderer {
 }  // namespace
 
 DIORAMA_PLUGIN("@NAME@", "0.1.0", "@LICENCE@") {
-  DIORAMA_ADD(@CLASS @, "@NAME@", "Casts one ray per pixel, with a lamp at the camera.");
+  DIORAMA_ADD(@CLASS@, "@NAME@", "Casts one ray per pixel, with a lamp at the camera.");
 }
