@@ -15,7 +15,10 @@ build_packages=(
   libyaml-cpp-dev libcli11-dev libspdlog-dev libfmt-dev nlohmann-json3-dev
   libhdf5-dev liblz4-dev libdeflate-dev libpng-dev libjpeg-dev libopenexr-dev libtbb-dev
 )
-test_packages=(catch2 python3-minimal python3-numpy python3-opencv python3-jsonschema binutils clang libclang-rt-14-dev)
+test_packages=(
+  catch2 binutils clang libclang-rt-14-dev
+  python3-minimal python3-h5py python3-jsonschema python3-numpy python3-opencv
+)
 
 usage() { sed -n '3,8s/^# \{0,1\}//p' "$0"; }
 
