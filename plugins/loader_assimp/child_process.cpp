@@ -6,6 +6,7 @@
 #include <string.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
+#include <time.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -13,10 +14,24 @@
 #include <chrono>
 #include <exception>
 #include <fstream>
-#include <optional>
+#include <string>
+#include <utility>
 
 namespace diorama::loader_assimp {
 namespace {
+
+// A child inherits the locks that other threads held at that moment, and nobody is left in it to
+// release them. malloc and stdio know how to deal with that, address sanitizer's malloc and other
+// code do not. Such a child sleeps for ever; the next one hardly meets the same moment.
+constexpr int kMostTries = 3;
+constexpr std::chrono::milliseconds kStandstill{1000};
+
+enum class Ending { Complete, TookTooLong, StoodStill };
+
+struct Answer {
+  Ending ending = Ending::Complete;
+  std::string text;
+};
 
 void limit(__rlimit_resource resource, std::uint64_t value) {
   rlimit now{};
@@ -25,10 +40,13 @@ void limit(__rlimit_resource resource, std::uint64_t value) {
   setrlimit(resource, &now);
 }
 
-std::uint64_t mapped_bytes() {
+// On top of the memory that the process has already.
+void limit_added_memory([[maybe_unused]] std::uint64_t bytes) {
+#ifndef __SANITIZE_ADDRESS__  // its shadow memory alone takes terabytes of addresses
   std::uint64_t pages = 0;
   std::ifstream("/proc/self/statm") >> pages;
-  return pages * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
+  limit(RLIMIT_AS, pages * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE)) + bytes);
+#endif
 }
 
 void write_all(int pipe, const std::string& text) {
@@ -39,23 +57,41 @@ void write_all(int pipe, const std::string& text) {
   }
 }
 
-// Everything up to the end of the pipe; nothing when that takes longer than allowed.
-std::optional<std::string> read_all(int pipe, std::chrono::seconds longest) {
+// Sleeps without having worked since `worked_before`, which is brought up to date. Waiting for a
+// disk or for a processor is no sleep.
+bool stands_still(pid_t child, std::int64_t& worked_before) {
+  clockid_t clock{};
+  timespec worked{};
+  if (clock_getcpuclockid(child, &clock) != 0 || clock_gettime(clock, &worked) != 0) return false;
+  const std::int64_t now = std::int64_t(worked.tv_sec) * 1'000'000'000 + worked.tv_nsec;
+  const bool has_worked = std::exchange(worked_before, now) != now;
+  std::string line;
+  std::getline(std::ifstream("/proc/" + std::to_string(child) + "/stat"), line);
+  const std::size_t name_end = line.rfind(") ");
+  return !has_worked && name_end != std::string::npos && line.compare(name_end + 2, 1, "S") == 0;
+}
+
+// What comes through the pipe up to its end.
+Answer read_all(int pipe, pid_t child, std::chrono::milliseconds longest, bool may_stand_still) {
   using Clock = std::chrono::steady_clock;
   const Clock::time_point end = Clock::now() + longest;
-  std::string text;
+  std::int64_t worked = -1;
+  Answer answer;
   char buffer[4096];
   for (;;) {
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(end - Clock::now());
+    if (left.count() <= 0) return {Ending::TookTooLong, {}};
     pollfd ready{pipe, POLLIN, 0};
-    if (left.count() <= 0) return std::nullopt;
-    const int woken =
-        poll(&ready, 1, static_cast<int>(std::min<std::int64_t>(left.count(), 60'000)));
-    if (woken == 0 || (woken < 0 && errno == EINTR)) continue;
+    const int woken = poll(&ready, 1, static_cast<int>(std::min(left, kStandstill).count()));
+    if (woken < 0 && errno == EINTR) continue;
+    if (woken == 0) {
+      if (!may_stand_still && stands_still(child, worked)) return {Ending::StoodStill, {}};
+      continue;
+    }
     const ssize_t count = read(pipe, buffer, sizeof buffer);
     if (count < 0 && errno == EINTR) continue;
-    if (count <= 0) return text;
-    text.append(buffer, static_cast<std::size_t>(count));
+    if (count <= 0) return answer;
+    answer.text.append(buffer, static_cast<std::size_t>(count));
   }
 }
 
@@ -63,9 +99,7 @@ std::optional<std::string> read_all(int pipe, std::chrono::seconds longest) {
                                const std::function<std::string()>& body) {
   limit(RLIMIT_CORE, 0);
   limit(RLIMIT_CPU, static_cast<std::uint64_t>(limits.cpu_seconds));
-#ifndef __SANITIZE_ADDRESS__  // its shadow memory alone takes terabytes of addresses
-  limit(RLIMIT_AS, mapped_bytes() + limits.added_bytes);
-#endif
+  limit_added_memory(limits.added_bytes);
   for (const int number : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGXCPU}) {
     signal(number, SIG_DFL);
   }
@@ -80,9 +114,9 @@ std::optional<std::string> read_all(int pipe, std::chrono::seconds longest) {
   _exit(0);
 }
 
-}  // namespace
-
-std::string run_in_child(const ChildLimits& limits, const std::function<std::string()>& body) {
+// What the child said, or what it died of.
+Answer try_in_child(const ChildLimits& limits, bool may_stand_still,
+                    const std::function<std::string()>& body) {
   int ends[2];
   if (pipe(ends) != 0) return {};
   const pid_t child = fork();
@@ -91,20 +125,34 @@ std::string run_in_child(const ChildLimits& limits, const std::function<std::str
     run_and_exit(limits, ends[1], body);
   }
   close(ends[1]);
+  Answer answer;
   const std::chrono::seconds longest(limits.clock_seconds);
-  const auto text = child > 0 ? read_all(ends[0], longest) : std::string();
+  if (child > 0) answer = read_all(ends[0], child, longest, may_stand_still);
   close(ends[0]);
-  if (!text) kill(child, SIGKILL);
+  if (answer.ending != Ending::Complete) kill(child, SIGKILL);
   int status = 0;
   while (child > 0 && waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
-  if (!text) return "takes more than " + std::to_string(longest.count()) + " s";
-  if (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU) {
-    return "takes more than " + std::to_string(limits.cpu_seconds) + " s of processor time";
+  if (answer.ending == Ending::TookTooLong) {
+    answer.text = "takes more than " + std::to_string(longest.count()) + " s";
+  } else if (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU) {
+    answer.text = "takes more than " + std::to_string(limits.cpu_seconds) + " s of processor time";
+  } else if (WIFSIGNALED(status)) {
+    answer.text = std::string("crashes: ") + strsignal(WTERMSIG(status));
+  } else if (WIFEXITED(status) && WEXITSTATUS(status) != 0) {
+    answer.text = "crashes";
   }
-  if (WIFSIGNALED(status)) return std::string("crashes: ") + strsignal(WTERMSIG(status));
-  if (WIFEXITED(status) && WEXITSTATUS(status) != 0) return "crashes";
-  return *text;
+  return answer;
+}
+
+}  // namespace
+
+std::string run_in_child(const ChildLimits& limits, const std::function<std::string()>& body) {
+  for (int tries = 1; tries < kMostTries; ++tries) {
+    Answer answer = try_in_child(limits, false, body);
+    if (answer.ending != Ending::StoodStill) return std::move(answer.text);
+  }
+  return try_in_child(limits, true, body).text;
 }
 
 }  // namespace diorama::loader_assimp

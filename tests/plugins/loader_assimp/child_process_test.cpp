@@ -5,10 +5,13 @@
 
 #include <atomic>
 #include <csignal>
+#include <filesystem>
+#include <fstream>
 #include <stdexcept>
 #include <vector>
 
 #include "support/catch.h"
+#include "support/temporary_folder.h"
 
 namespace diorama::loader_assimp {
 
@@ -38,6 +41,18 @@ TEST_CASE("a child process that does not end is ended", "[loader_assimp]") {
     return std::string();
   });
   CHECK(waits == "takes more than 1 s");
+}
+
+TEST_CASE("a child process that waits in vain is replaced", "[loader_assimp]") {
+  constexpr ChildLimits kPlenty{60, std::uint64_t(1) << 32};
+  const test::TemporaryFolder folder;
+  const std::filesystem::path marker = folder.path("the first one was here");
+  const std::string second = run_in_child(kPlenty, [&]() -> std::string {
+    if (std::filesystem::exists(marker)) return "the second one's answer";
+    std::ofstream(marker) << '.';
+    for (;;) pause();
+  });
+  CHECK(second == "the second one's answer");
 }
 
 #ifndef __SANITIZE_ADDRESS__
