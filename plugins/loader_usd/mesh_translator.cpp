@@ -95,6 +95,16 @@ bool all_finite(std::span<const float> numbers) {
   return result;
 }
 
+// An eighth more than there is may be kept free.
+constexpr std::size_t kSpareShare = 8;
+
+// The mesh stays, so it should not keep much room that it does not need; a little is not worth a
+// copy of the list.
+template <class T>
+void give_back_room(std::vector<T>& list) {
+  if (list.capacity() - list.size() > list.size() / kSpareShare) list.shrink_to_fit();
+}
+
 bool is_per_point(const std::optional<CornerData>& data) {
   return !data || data->interpolation == Interpolation::Vertex ||
          data->interpolation == Interpolation::Constant;
@@ -284,7 +294,8 @@ void MeshAssembly::add_faces() {
       is_hole[static_cast<std::size_t>(hole)] = 1;
     }
   }
-  mesh_.triangles.reserve(counts.size());
+  // A polygon of n corners is n - 2 triangles.
+  mesh_.triangles.reserve(corners - std::min(corners, 2 * counts.size()));
   std::size_t corner = 0;
   for (std::size_t face = 0; face < counts.size(); ++face) {
     if (counts[face] < 0) break;
@@ -296,10 +307,13 @@ void MeshAssembly::add_faces() {
 }
 
 Mesh MeshAssembly::build() {
-  mesh_.positions.reserve(first_.size());
-  if (sources_.normals) mesh_.normals.reserve(first_.size());
-  if (sources_.uvs) mesh_.uvs.reserve(first_.size());
-  next_.reserve(first_.size());
+  // Along seams there are several vertices per point.
+  const std::size_t vertices =
+      has_one_vertex_per_point_ ? first_.size() : first_.size() + first_.size() / kSpareShare;
+  mesh_.positions.reserve(vertices);
+  if (sources_.normals) mesh_.normals.reserve(vertices);
+  if (sources_.uvs) mesh_.uvs.reserve(vertices);
+  next_.reserve(vertices);
   if (is_plain()) {
     add_plain_faces();
   } else {
@@ -315,13 +329,12 @@ Mesh MeshAssembly::build() {
   for (Vec3f& color : mesh_.colors) {
     if (!color.allFinite()) color.setOnes();
   }
-  // The mesh stays, so it should not keep room that it does not need.
-  mesh_.positions.shrink_to_fit();
-  mesh_.normals.shrink_to_fit();
-  mesh_.uvs.shrink_to_fit();
-  mesh_.colors.shrink_to_fit();
-  mesh_.triangles.shrink_to_fit();
-  mesh_.material_slots.shrink_to_fit();
+  give_back_room(mesh_.positions);
+  give_back_room(mesh_.normals);
+  give_back_room(mesh_.uvs);
+  give_back_room(mesh_.colors);
+  give_back_room(mesh_.triangles);
+  give_back_room(mesh_.material_slots);
   return std::move(mesh_);
 }
 

@@ -38,6 +38,19 @@ std::vector<Vec2> project(std::span<const Vec3f> corners, const Vec3& normal) {
   return flat;
 }
 
+// Whether the diagonal from the first to the third corner splits four corners into two triangles
+// that face the same way, as it does in convex quads and so in nearly all.
+bool is_split_by_first_diagonal(std::span<const Vec3f> quad) {
+  const Vec3 origin = quad[0].cast<double>();
+  const Vec3 b = quad[1].cast<double>() - origin;
+  const Vec3 c = quad[2].cast<double>() - origin;
+  const Vec3 d = quad[3].cast<double>() - origin;
+  const Vec3 first = b.cross(c);
+  const Vec3 second = c.cross(d);
+  const Vec3 normal = first + second;
+  return first.dot(normal) > 0.0 && second.dot(normal) > 0.0;
+}
+
 bool is_ear(const std::vector<Vec2>& flat, const std::vector<std::uint32_t>& ring, std::size_t at) {
   const std::size_t n = ring.size();
   const std::uint32_t before = ring[(at + n - 1) % n];
@@ -65,6 +78,10 @@ void triangulate(std::span<const Vec3f> corners,
   if (n < 3) return;
   if (n == 3) {
     triangles.push_back({0, 1, 2});
+    return;
+  }
+  if (n == 4 && is_split_by_first_diagonal(corners)) {
+    triangles.insert(triangles.end(), {{0, 1, 2}, {0, 2, 3}});
     return;
   }
   const Vec3 normal = normal_of(corners);
