@@ -10,12 +10,15 @@ using usd::Prim;
 
 constexpr int kMaxNodes = 32;
 
-// What the surfaces call the same things; null: there is no such input.
+// What the surfaces call the same things, and what they take where nothing is said; null: there is
+// no such input.
 struct Model {
   const char* id;
   const char* base_color;
+  float default_base;
   const char* base_weight;
   const char* metallic;
+  float default_metallic;
   const char* roughness;
   float default_roughness;
   const char* specular;
@@ -23,24 +26,84 @@ struct Model {
   const char* transmission;
   const char* clearcoat;
   const char* clearcoat_roughness;
+  float default_clearcoat_roughness;
   const char* emission_color;
+  float default_emission;
   const char* emission_weight;
   float default_emission_weight;
   const char* opacity;
+  const char* opacity_mode;
+  const char* thin_walled;
   const char* normal;
 };
 
 constexpr Model kModels[] = {
-    {"ND_standard_surface_surfaceshader", "base_color", "base", "metalness", "specular_roughness",
-     0.2f, "specular", "specular_IOR", "transmission", "coat", "coat_roughness", "emission_color",
-     "emission", 0.0f, "opacity", "normal"},
-    {"ND_open_pbr_surface_surfaceshader", "base_color", "base_weight", "base_metalness",
-     "specular_roughness", 0.3f, "specular_weight", "specular_ior", "transmission_weight",
-     "coat_weight", "coat_roughness", "emission_color", "emission_luminance", 0.0f,
-     "geometry_opacity", "geometry_normal"},
-    {"ND_gltf_pbr_surfaceshader", "base_color", nullptr, "metallic", "roughness", 1.0f, "specular",
-     "ior", "transmission", "clearcoat", "clearcoat_roughness", "emissive", "emissive_strength",
-     1.0f, "alpha", "normal"},
+    {"ND_standard_surface_surfaceshader",
+     "base_color",
+     0.8f,
+     "base",
+     "metalness",
+     0.0f,
+     "specular_roughness",
+     0.2f,
+     "specular",
+     "specular_IOR",
+     "transmission",
+     "coat",
+     "coat_roughness",
+     0.1f,
+     "emission_color",
+     1.0f,
+     "emission",
+     0.0f,
+     "opacity",
+     nullptr,
+     "thin_walled",
+     "normal"},
+    {"ND_open_pbr_surface_surfaceshader",
+     "base_color",
+     0.8f,
+     "base_weight",
+     "base_metalness",
+     0.0f,
+     "specular_roughness",
+     0.3f,
+     "specular_weight",
+     "specular_ior",
+     "transmission_weight",
+     "coat_weight",
+     "coat_roughness",
+     0.0f,
+     "emission_color",
+     1.0f,
+     "emission_luminance",
+     0.0f,
+     "geometry_opacity",
+     nullptr,
+     "geometry_thin_walled",
+     "geometry_normal"},
+    {"ND_gltf_pbr_surfaceshader",
+     "base_color",
+     1.0f,
+     nullptr,
+     "metallic",
+     1.0f,
+     "roughness",
+     1.0f,
+     "specular",
+     "ior",
+     "transmission",
+     "clearcoat",
+     "clearcoat_roughness",
+     0.0f,
+     "emissive",
+     0.0f,
+     "emissive_strength",
+     1.0f,
+     "alpha",
+     "alpha_mode",
+     nullptr,
+     "normal"},
 };
 
 const Model* find_model(const std::string& id) {
@@ -125,6 +188,20 @@ bool connect(const Prim& shader, const char* name, TextureInput Material::*targe
   return true;
 }
 
+// glTF's alpha counts only where its mode says so.
+void draft_opacity(const Prim& shader, const Model& model, MaterialDraft& draft) {
+  enum Mode { kOpaque, kMask, kBlend };
+  const ShaderNetwork& network = draft.network();
+  const auto mode = model.opacity_mode
+                        ? static_cast<int>(network.number(shader, model.opacity_mode, kOpaque))
+                        : kBlend;
+  if (mode == kOpaque) return;
+  Material& material = draft.material();
+  connect(shader, model.opacity, &Material::opacity_texture, true, draft);
+  material.opacity = network.color(shader, model.opacity, Vec3f::Ones()).mean();
+  if (mode == kMask) material.opacity_threshold = network.number(shader, "alpha_cutoff", 0.5f);
+}
+
 }  // namespace
 
 bool is_materialx_surface(const std::string& id) { return find_model(id) != nullptr; }
@@ -138,26 +215,28 @@ void draft_materialx_surface(const Prim& shader, MaterialDraft& draft) {
   };
   const bool has_picture =
       connect(shader, model.base_color, &Material::base_color_texture, false, draft);
-  const Vec3f base = has_picture ? Vec3f(Vec3f::Ones())
-                                 : network.color(shader, model.base_color, Vec3f::Constant(0.8f));
+  const Vec3f base =
+      has_picture ? Vec3f(Vec3f::Ones())
+                  : network.color(shader, model.base_color, Vec3f::Constant(model.default_base));
   material.base_color = base * number(model.base_weight, 1.0f);
   connect(shader, model.metallic, &Material::metallic_texture, true, draft);
-  material.metallic = number(model.metallic, 0.0f);
+  material.metallic = number(model.metallic, model.default_metallic);
   connect(shader, model.roughness, &Material::roughness_texture, true, draft);
   material.roughness = number(model.roughness, model.default_roughness);
   material.specular = std::clamp(number(model.specular, 1.0f), 0.0f, 1.0f);
   material.ior = number(model.ior, 1.5f);
   material.transmission = number(model.transmission, 0.0f);
-  material.is_thin_walled = network.boolean(shader, "thin_walled", false);
+  material.is_thin_walled = model.thin_walled && network.boolean(shader, model.thin_walled, false);
   material.clearcoat = number(model.clearcoat, 0.0f);
-  material.clearcoat_roughness = number(model.clearcoat_roughness, 0.1f);
+  material.clearcoat_roughness =
+      number(model.clearcoat_roughness, model.default_clearcoat_roughness);
   const bool glows =
       connect(shader, model.emission_color, &Material::emission_texture, false, draft);
   const Vec3f glow =
-      glows ? Vec3f(Vec3f::Ones()) : network.color(shader, model.emission_color, Vec3f::Zero());
+      glows ? Vec3f(Vec3f::Ones())
+            : network.color(shader, model.emission_color, Vec3f::Constant(model.default_emission));
   material.emission = glow * number(model.emission_weight, model.default_emission_weight);
-  connect(shader, model.opacity, &Material::opacity_texture, true, draft);
-  material.opacity = network.color(shader, model.opacity, Vec3f::Ones()).mean();
+  draft_opacity(shader, model, draft);
   connect(shader, model.normal, &Material::normal_texture, true, draft);
   unpack_normals(material.normal_texture);
 }

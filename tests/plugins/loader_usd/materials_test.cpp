@@ -166,6 +166,45 @@ TEST_CASE("MaterialX surfaces are read through their nodes", "[loader_usd]") {
   CHECK(material.emission.isApprox(Vec3f(3.0f, 1.5f, 0.0f)));
 }
 
+TEST_CASE("MaterialX surfaces have the fallbacks of their definitions", "[loader_usd]") {
+  const TemporaryFolder folder;
+  const auto material = [&](const std::string& id, const std::string& inputs) {
+    LoadedStage loaded(folder.write("a.usda", stage("outputs:mtlx:surface", R"(
+    def Shader "S"
+    {
+        uniform token info:id = ")" + id + R"("
+        token outputs:out
+)" + inputs + "\n    }\n")));
+    return *loaded.node("C").materials.at(0);
+  };
+  const Material standard =
+      material("ND_standard_surface_surfaceshader", "float inputs:emission = 2");
+  CHECK(standard.base_color.isApprox(Vec3f::Constant(0.8f)));
+  CHECK(standard.roughness == 0.2f);
+  CHECK(standard.metallic == 0.0f);
+  CHECK(standard.emission.isApprox(Vec3f::Constant(2.0f)));
+
+  const Material open = material("ND_open_pbr_surface_surfaceshader",
+                                 "float inputs:emission_luminance = 300\n"
+                                 "float inputs:geometry_opacity = 0.5\n"
+                                 "bool inputs:geometry_thin_walled = 1");
+  CHECK(open.roughness == 0.3f);
+  CHECK(open.emission.isApprox(Vec3f::Constant(300.0f)));
+  CHECK(open.opacity == 0.5f);
+  CHECK(open.is_thin_walled);
+
+  const Material gltf = material("ND_gltf_pbr_surfaceshader", "float inputs:alpha = 0.25");
+  CHECK(gltf.base_color.isApprox(Vec3f::Ones()));
+  CHECK(gltf.metallic == 1.0f);
+  CHECK(gltf.roughness == 1.0f);
+  CHECK(gltf.emission.isZero());
+  CHECK(gltf.opacity == 1.0f);
+  const Material masked =
+      material("ND_gltf_pbr_surfaceshader", "float inputs:alpha = 0.25\nint inputs:alpha_mode = 1");
+  CHECK(masked.opacity == 0.25f);
+  CHECK(masked.opacity_threshold == 0.5f);
+}
+
 TEST_CASE("a preview surface in MaterialX's words is one", "[loader_usd]") {
   const TemporaryFolder folder;
   LoadedStage loaded(folder.write("a.usda", stage("outputs:mtlx:surface", R"(
