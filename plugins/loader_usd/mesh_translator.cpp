@@ -8,7 +8,10 @@
 #include <span>
 
 #include "diorama/error.h"
+#include "loader_usd/corner_data.h"
+#include "loader_usd/points_and_curves.h"
 #include "loader_usd/polygon.h"
+#include "loader_usd/shapes.h"
 
 namespace diorama::loader_usd {
 namespace {
@@ -16,37 +19,7 @@ namespace {
 using usd::Prim;
 using usd::Stage;
 
-enum class Interpolation { Constant, Uniform, Vertex, FaceVarying };
-
-std::optional<Interpolation> interpolation_of(const std::string& name) {
-  if (name == "constant") return Interpolation::Constant;
-  if (name == "uniform") return Interpolation::Uniform;
-  if (name == "vertex" || name == "varying") return Interpolation::Vertex;
-  if (name == "faceVarying") return Interpolation::FaceVarying;
-  return std::nullopt;
-}
-
-// One attribute of the corners of a mesh: `width` floats each.
-struct CornerData {
-  usd::Numbers<float> values;
-  std::optional<usd::Numbers<std::int32_t>> indices;
-  Interpolation interpolation = Interpolation::Constant;
-  std::size_t width = 0;
-
-  std::size_t count() const { return indices ? indices->span.size() : values.span.size() / width; }
-  // The values of a corner; null when the data are too short for it.
-  const float* at(std::size_t face, std::size_t point, std::size_t corner) const {
-    std::size_t i = 0;
-    if (interpolation == Interpolation::Uniform) i = face;
-    if (interpolation == Interpolation::Vertex) i = point;
-    if (interpolation == Interpolation::FaceVarying) i = corner;
-    if (indices) {
-      if (i >= indices->span.size() || indices->span[i] < 0) return nullptr;
-      i = static_cast<std::size_t>(indices->span[i]);
-    }
-    return (i + 1) * width <= values.span.size() ? values.span.data() + i * width : nullptr;
-  }
-};
+constexpr const char* kDisplayColor = "primvars:displayColor";
 
 struct Sources {
   usd::Numbers<float> points;
@@ -67,22 +40,6 @@ std::size_t bytes_of(const Sources& sources) {
     if (*data && (*data)->indices) bytes += (*data)->indices->span.size_bytes();
   }
   return bytes;
-}
-
-std::optional<CornerData> read_corner_data(const Stage& stage, const Prim& prim,
-                                           const std::string& name, std::size_t width,
-                                           const std::string& fallback) {
-  auto values = usd::numbers<float>(stage.value(prim, name), width);
-  if (!values || values->span.empty()) return std::nullopt;
-  const usd::Value word = stage.property_metadata(prim, name, "interpolation");
-  const auto interpolation = interpolation_of(word.as_text() ? *word.as_text() : fallback);
-  if (!interpolation) return std::nullopt;
-  CornerData data;
-  data.values = std::move(*values);
-  data.interpolation = *interpolation;
-  data.width = width;
-  data.indices = usd::numbers<std::int32_t>(stage.value(prim, name + ":indices"), 1);
-  return data;
 }
 
 bool all_finite(std::span<const float> numbers) {
@@ -106,7 +63,9 @@ void give_back_room(std::vector<T>& list) {
 }
 
 bool is_per_point(const std::optional<CornerData>& data) {
-  return !data || data->interpolation == Interpolation::Vertex ||
+  if (!data) return true;
+  return data->interpolation == Interpolation::Vertex ||
+         data->interpolation == Interpolation::Varying ||
          data->interpolation == Interpolation::Constant;
 }
 
@@ -338,16 +297,6 @@ Mesh MeshAssembly::build() {
   return std::move(mesh_);
 }
 
-// Turns a shape made along z so that it lies along another axis.
-void turn_axis(Mesh& mesh, const std::string& axis) {
-  if (axis != "X" && axis != "Y") return;
-  const auto turn = [&](Vec3f& v) {
-    v = axis == "X" ? Vec3f(v.z(), v.x(), v.y()) : Vec3f(v.y(), v.z(), v.x());
-  };
-  for (Vec3f& position : mesh.positions) turn(position);
-  for (Vec3f& normal : mesh.normals) turn(normal);
-}
-
 // The primvar that textures are laid out by; empty when there is none.
 std::string find_uv(const std::vector<usd::Primvar>& primvars,
                     const std::vector<std::string>& uv_names) {
@@ -368,6 +317,22 @@ std::string find_uv(const std::vector<usd::Primvar>& primvars,
     if (primvar.type == "float2[]") return primvar.name;
   }
   return {};
+}
+
+// The prim that authored a primvar; null where there is none.
+const Prim* owner_of(const std::vector<usd::Primvar>& primvars, const std::string& name) {
+  for (const usd::Primvar& primvar : primvars) {
+    if (primvar.name == name) return primvar.owner;
+  }
+  return nullptr;
+}
+
+// Colours that differ; a single one goes to the material.
+std::optional<CornerData> read_colors(const Stage& stage, const Prim* owner) {
+  if (!owner) return std::nullopt;
+  auto colors = read_corner_data(stage, *owner, kDisplayColor, 3, "constant");
+  if (colors && colors->count() <= 1) colors.reset();
+  return colors;
 }
 
 // The slot of each face; empty when all faces are of slot 0.
@@ -417,9 +382,15 @@ void MeshTranslator::read_display_color(const Primvars& primvars, TranslatedMesh
 TranslatedMesh MeshTranslator::translate(const Prim& prim, const Prims& subsets,
                                          const std::vector<std::string>& uv_names) {
   const Primvars primvars = geometry_.primvars(prim);
-  TranslatedMesh result = prim.type_name == "Mesh"
-                              ? translate_mesh(prim, primvars, subsets, uv_names)
-                              : translate_shape(prim);
+  const std::string& type = prim.type_name;
+  TranslatedMesh result;
+  if (type == "Mesh") {
+    result = translate_mesh(prim, primvars, subsets, uv_names);
+  } else if (type == "Points" || type == "BasisCurves") {
+    result = translate_thin(prim, primvars);
+  } else {
+    result = translate_shape(prim);
+  }
   read_display_color(primvars, result);
   return result;
 }
@@ -429,15 +400,9 @@ TranslatedMesh MeshTranslator::translate_mesh(const Prim& prim, const Primvars& 
                                               const std::vector<std::string>& uv_names) {
   TranslatedMesh result;
   const std::string uv_name = find_uv(primvars, uv_names);
-  const auto owner = [&](const std::string& name) -> const Prim* {
-    for (const usd::Primvar& primvar : primvars) {
-      if (primvar.name == name) return primvar.owner;
-    }
-    return nullptr;
-  };
-  const Prim* uv_owner = uv_name.empty() ? nullptr : owner(uv_name);
-  const Prim* color_owner = owner("displayColor");
-  const bool has_primvar_normals = owner("normals") != nullptr;
+  const Prim* uv_owner = uv_name.empty() ? nullptr : owner_of(primvars, uv_name);
+  const Prim* color_owner = owner_of(primvars, "displayColor");
+  const bool has_primvar_normals = owner_of(primvars, "normals") != nullptr;
   const std::string normals = has_primvar_normals ? "primvars:normals" : "normals";
   const std::string uv = "primvars:" + uv_name;
 
@@ -449,7 +414,7 @@ TranslatedMesh MeshTranslator::translate_mesh(const Prim& prim, const Primvars& 
     key.push_back(stage_.value_spec(prim, name));
   }
   for (const auto& [who, name] :
-       {std::pair(uv_owner, uv), std::pair(color_owner, std::string("primvars:displayColor"))}) {
+       {std::pair(uv_owner, uv), std::pair(color_owner, std::string(kDisplayColor))}) {
     key.push_back(who ? stage_.value_spec(*who, name) : nullptr);
     key.push_back(who ? stage_.value_spec(*who, name + ":indices") : nullptr);
   }
@@ -472,11 +437,7 @@ TranslatedMesh MeshTranslator::translate_mesh(const Prim& prim, const Primvars& 
   sources.normals =
       read_corner_data(stage_, prim, normals, 3, has_primvar_normals ? "constant" : "vertex");
   if (uv_owner) sources.uvs = read_corner_data(stage_, *uv_owner, uv, 2, "constant");
-  if (color_owner) {
-    sources.colors = read_corner_data(stage_, *color_owner, "primvars:displayColor", 3, "constant");
-    // A single colour goes to the material.
-    if (sources.colors && sources.colors->count() <= 1) sources.colors.reset();
-  }
+  sources.colors = read_colors(stage_, color_owner);
   sources.is_left_handed =
       usd::token_or(stage_, prim, "orientation", "rightHanded") == "leftHanded";
   const auto slots = slots_of_faces(stage_, subsets, sources.counts.span.size());
@@ -493,37 +454,36 @@ TranslatedMesh MeshTranslator::translate_mesh(const Prim& prim, const Primvars& 
 }
 
 TranslatedMesh MeshTranslator::translate_shape(const Prim& prim) {
-  TranslatedMesh result;
-  const std::string& type = prim.type_name;
-  const auto number = [&](const char* name, double fallback) {
-    return usd::number_or(stage_, prim, name, fallback);
-  };
   Key key;
-  for (const char* name : {"size", "radius", "height", "axis", "width", "length"}) {
+  for (const char* name : kShapeAttributes) key.push_back(stage_.value_spec(prim, name));
+  std::shared_ptr<const Mesh>& known = meshes_[{key, prim.type_name}];
+  if (!known) {
+    if (auto mesh = make_shape(stage_, prim)) known = pool_.share(std::move(*mesh));
+  }
+  TranslatedMesh result;
+  result.mesh = known;
+  return result;
+}
+
+TranslatedMesh MeshTranslator::translate_thin(const Prim& prim, const Primvars& primvars) {
+  const Prim* color_owner = owner_of(primvars, "displayColor");
+  Key key;
+  for (const char* name :
+       {"points", "widths", "curveVertexCounts", "type", "basis", "wrap", "doubleSided"}) {
     key.push_back(stage_.value_spec(prim, name));
   }
-  std::shared_ptr<const Mesh>& known = meshes_[{key, type}];
+  key.push_back(color_owner ? stage_.value_spec(*color_owner, kDisplayColor) : nullptr);
+  std::shared_ptr<const Mesh>& known = meshes_[{key, prim.type_name}];
+  TranslatedMesh result;
   if (!known) {
-    Mesh mesh;
-    if (type == "Cube") {
-      mesh = make_box(Vec3::Constant(std::abs(number("size", 2.0))));
-    } else if (type == "Sphere") {
-      mesh = make_sphere(std::abs(number("radius", 1.0)));
-    } else if (type == "Cylinder") {
-      mesh = make_cylinder(std::abs(number("radius", 1.0)), std::abs(number("height", 2.0)));
-    } else if (type == "Cone") {
-      mesh = make_cone(std::abs(number("radius", 1.0)), std::abs(number("height", 2.0)));
-    } else if (type == "Capsule") {
-      mesh = make_capsule(std::abs(number("radius", 0.5)), std::abs(number("height", 1.0)));
-    } else if (type == "Plane") {
-      mesh = make_plane(std::abs(number("width", 2.0)), std::abs(number("length", 2.0)));
-    } else {
-      return result;
-    }
-    if (type != "Cube" && type != "Sphere") {
-      turn_axis(mesh, usd::token_or(stage_, prim, "axis", "Z"));
-    }
-    known = pool_.share(std::move(mesh));
+    const auto colors = read_colors(stage_, color_owner);
+    ThinMesh made = prim.type_name == "Points"
+                        ? mesh_of_points(stage_, prim, colors ? &*colors : nullptr)
+                        : mesh_of_curves(stage_, prim, colors ? &*colors : nullptr);
+    result.lacks = std::move(made.lacks);
+    if (made.mesh.triangles.empty()) return result;
+    made.mesh.validate(prim.path);
+    known = pool_.share(std::move(made.mesh));
   }
   result.mesh = known;
   return result;

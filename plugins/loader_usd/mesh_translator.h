@@ -18,11 +18,12 @@ struct TranslatedMesh {
   std::shared_ptr<const Mesh> mesh;    ///< Null when nothing is left to draw.
   std::optional<Vec3f> display_color;  ///< One colour for all, linear.
   float display_opacity = 1.0f;
+  std::string lacks;  ///< Why there is no mesh, if that is a surprise: "without widths".
 };
 
-/// Makes meshes out of Mesh prims and of the shapes. The same data give the same mesh, be they seen
-/// through instances and references or written several times. Subdivision surfaces are drawn as
-/// their cage, with smooth normals.
+/// Makes meshes out of Mesh prims, shapes, points and curves. The same data give the same mesh, be
+/// they seen through instances and references or written several times. Subdivision surfaces are
+/// drawn as their cage, with smooth normals.
 class MeshTranslator {
  public:
   MeshTranslator(usd::Stage& stage, usd::Geometry& geometry) : stage_(stage), geometry_(geometry) {}
@@ -41,6 +42,7 @@ class MeshTranslator {
   TranslatedMesh translate_mesh(const usd::Prim& prim, const Primvars& primvars,
                                 const Prims& subsets, const std::vector<std::string>& uv_names);
   TranslatedMesh translate_shape(const usd::Prim& prim);
+  TranslatedMesh translate_thin(const usd::Prim& prim, const Primvars& primvars);
   /// Layers stay mapped while they are translated, but need not stay in memory besides the meshes.
   void note_read(std::size_t bytes);
   void read_display_color(const Primvars& primvars, TranslatedMesh& result) const;

@@ -48,10 +48,9 @@ bool is_scaled_by(const usd::LocalTransform& local, double ratio) {
   return ratio != 1.0 && std::abs(std::cbrt(volume) / ratio - 1.0) < 0.05;
 }
 
-// Shapes without triangles of their own.
 bool is_left_out(const std::string& type) {
-  constexpr std::string_view kTypes[] = {
-      "Points", "BasisCurves", "NurbsCurves", "HermiteCurves", "NurbsPatch", "TetMesh", "Volume"};
+  constexpr std::string_view kTypes[] = {"NurbsCurves", "HermiteCurves", "NurbsPatch", "TetMesh",
+                                         "Volume",      "GeometryLight", "PluginLight"};
   return std::find(std::begin(kTypes), std::end(kTypes), type) != std::end(kTypes);
 }
 
@@ -89,9 +88,9 @@ void SceneTranslator::translate(NodeId root) {
     if (is_drawn(*prim)) translate_prim(*prim, place, root_from_stage_ * local_pose(*prim, place));
   }
   materials_.read_textures();
-  for (const auto& [type, left_out] : left_out_) {
+  for (const auto& [what, left_out] : left_out_) {
     std::string line = stage_.root_layer().identifier() + ": <" + left_out.first_path +
-                       "> is of type " + type + ", which is not drawn";
+                       "> is of type " + what + ", which is not drawn";
     if (left_out.count > 1) {
       line += ", like " + std::to_string(left_out.count - 1) + " more of them";
     }
@@ -167,7 +166,7 @@ void SceneTranslator::translate_prim(const Prim& prim, const Place& parent, cons
   const bool is_hidden = prim.traits.is_imageable &&
                          usd::token_or(stage_, prim, "visibility", "inherited") == "invisible";
   if (is_hidden) scene_.edit(place.node).is_visible = false;
-  if (is_left_out(prim.type_name)) note_left_out(prim);
+  if (is_left_out(prim.type_name)) note_left_out(prim, prim.type_name);
   if (prim.traits.is_gprim) add_shape(prim, place.node);
   if (prim.type_name == "Camera") add_camera(prim, place);
   if (prim.traits.is_light) add_light(prim, place);
@@ -181,10 +180,10 @@ void SceneTranslator::translate_prim(const Prim& prim, const Place& parent, cons
 }
 
 // Says of what is meant to be seen that it is not.
-void SceneTranslator::note_left_out(const Prim& prim) {
+void SceneTranslator::note_left_out(const Prim& prim, const std::string& what) {
   const std::string purpose = geometry_.purpose(prim);
   if (purpose == "guide" || purpose == "proxy" || !geometry_.is_visible(prim)) return;
-  LeftOut& left_out = left_out_[prim.type_name];
+  LeftOut& left_out = left_out_[what];
   if (left_out.count++ == 0) left_out.first_path = prim.path;
 }
 
@@ -233,6 +232,7 @@ void SceneTranslator::add_shape(const Prim& prim, NodeId node) {
     uv_names.insert(uv_names.end(), names.begin(), names.end());
   }
   const TranslatedMesh mesh = meshes_.translate(prim, subsets, uv_names);
+  if (!mesh.lacks.empty()) note_left_out(prim, prim.type_name + " " + mesh.lacks);
   if (!mesh.mesh) return;
   std::vector<std::shared_ptr<const Material>> materials;
   for (const std::string& path : paths) {
@@ -260,6 +260,17 @@ void SceneTranslator::add_camera(const Prim& prim, Place& place) {
   Camera camera = Camera::from_lens(kCameraWidth, rows, number("focalLength", 50.0), aperture);
   std::array<double, 2> range{1.0, 1000000.0};
   stage_.value(prim, "clippingRange").read(range);
+  // The film is moved, so the axis meets the picture on the other side of its middle.
+  const auto offset = [&](const char* name) {
+    const double value = usd::number_or(stage_, prim, name, 0.0);
+    return std::isfinite(value) ? value / aperture * kCameraWidth : 0.0;
+  };
+  camera.cx -= offset("horizontalApertureOffset");
+  camera.cy += offset("verticalApertureOffset");
+  if (usd::token_or(stage_, prim, "projection", "perspective") == "orthographic") {
+    stage_.diagnostics().warn(stage_.root_layer().identifier() + ": <" + prim.path +
+                              "> is an orthographic camera, which is taken as a perspective one");
+  }
   camera.near_m = std::max(range[0] * meters_per_unit_, 1e-4);
   camera.far_m = std::max(range[1] * meters_per_unit_, camera.near_m * 2.0);
   camera.f_stop = usd::number_or(stage_, prim, "fStop", 0.0);

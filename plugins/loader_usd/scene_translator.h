@@ -43,7 +43,7 @@ class SceneTranslator {
   void add_light(const usd::Prim& prim, Place& place);
   void add_labels(const usd::Prim& prim, NodeId node);
   void add_instances(const usd::Prim& prim, const Place& place);
-  void note_left_out(const usd::Prim& prim);
+  void note_left_out(const usd::Prim& prim, const std::string& what);
   std::shared_ptr<const Material> plain_material(const TranslatedMesh& mesh);
 
   usd::Stage& stage_;
@@ -56,12 +56,12 @@ class SceneTranslator {
   Affine root_from_stage_;
   std::map<const usd::Prim*, bool> drawn_;
   std::map<std::vector<float>, std::shared_ptr<const Material>> plain_materials_;
-  /// Visible prims of a type that is not drawn.
+  /// Visible prims that are not drawn.
   struct LeftOut {
     std::string first_path;
     std::size_t count = 0;
   };
-  std::map<std::string, LeftOut> left_out_;  ///< By type.
+  std::map<std::string, LeftOut> left_out_;  ///< By type and lack.
   int instancer_depth_ = 0;
   std::size_t node_count_ = 0;
 };

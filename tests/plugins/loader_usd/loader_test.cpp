@@ -370,22 +370,22 @@ TEST_CASE("what is not drawn is said once per type, with the first prim", "[load
   const std::string file = folder.write("a.usda", R"(#usda 1.0
 def Xform "Plant"
 {
-    def BasisCurves "Hidden"
+    def NurbsCurves "Hidden"
     {
         token visibility = "invisible"
     }
-    def BasisCurves "Stem"
+    def NurbsCurves "Stem"
     {
     }
-    def BasisCurves "Leaf"
+    def NurbsCurves "Leaf"
     {
     }
-    def Points "Guide"
+    def TetMesh "Guide"
     {
         token purpose = "guide"
     }
 }
-def Points "Pollen"
+def TetMesh "Pollen"
 {
 }
 )");
@@ -393,8 +393,32 @@ def Points "Pollen"
   CHECK(
       loaded.host.warnings ==
       std::vector<std::string>{
-          file + ": </Plant/Stem> is of type BasisCurves, which is not drawn, like 1 more of them",
-          file + ": </Pollen> is of type Points, which is not drawn"});
+          file + ": </Plant/Stem> is of type NurbsCurves, which is not drawn, like 1 more of them",
+          file + ": </Pollen> is of type TetMesh, which is not drawn"});
+}
+
+TEST_CASE("a camera's film may be moved beside its axis", "[loader_usd]") {
+  const TemporaryFolder folder;
+  Loaded loaded(folder.write("a.usda", R"(#usda 1.0
+def Camera "C"
+{
+    float horizontalAperture = 20
+    float verticalAperture = 10
+    float horizontalApertureOffset = 5
+    float verticalApertureOffset = -2
+}
+def Camera "Flat"
+{
+    token projection = "orthographic"
+}
+)"));
+  const Camera& camera = *loaded.node("C").camera;
+  // The film reaches from -5 to 15 across, and from -7 to 3 upwards.
+  CHECK(camera.cx == Approx(camera.width * 5.0 / 20.0));
+  CHECK(camera.cy == Approx(camera.height * 3.0 / 10.0));
+  REQUIRE(loaded.host.warnings.size() == 1);
+  CHECK(loaded.host.warnings[0].ends_with(
+      "a.usda: </Flat> is an orthographic camera, which is taken as a perspective one"));
 }
 
 TEST_CASE("lights, bodies, colliders, labels and visibility arrive", "[loader_usd]") {

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "diorama/geometry.h"
+#include "loader_usd/corner_data.h"
+
+namespace diorama::loader_usd {
+
+struct ThinMesh {
+  Mesh mesh;          ///< Without triangles when there is nothing to draw.
+  std::string lacks;  ///< Why not, "without widths"; empty when that is no surprise.
+};
+
+/// Points: a ball for each, as wide as its width; coarser the more there are. `colors` may be null.
+ThinMesh mesh_of_points(const usd::Stage& stage, const usd::Prim& prim, const CornerData* colors);
+
+/// BasisCurves, linear and cubic: tubes as wide as the curves' widths, with closed ends; coarser
+/// the more there are. Normals that would make ribbons of them do not count. `colors` may be null.
+ThinMesh mesh_of_curves(const usd::Stage& stage, const usd::Prim& prim, const CornerData* colors);
+
+}  // namespace diorama::loader_usd
