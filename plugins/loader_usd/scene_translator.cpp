@@ -99,14 +99,24 @@ void SceneTranslator::translate(NodeId root) {
 }
 
 void SceneTranslator::translate_children(const Prim& prim, const Place& place) {
-  for (const Prim* child : stage_.visible_children(prim)) {
+  for (const Prim* child : drawn_children(prim)) {
     if (is_drawn(*child)) translate_prim(*child, place, local_pose(*child, place));
   }
 }
 
+// Below prototypes overs count as well: they are how files keep prototypes from being drawn by
+// themselves.
+std::vector<const Prim*> SceneTranslator::drawn_children(const Prim& prim) {
+  if (instancer_depth_ == 0) return stage_.visible_children(prim);
+  std::vector<const Prim*> result = stage_.children(prim);
+  std::erase_if(result, [](const Prim* child) { return !child->is_active || child->is_abstract; });
+  return result;
+}
+
 // Whether the prim or something below it becomes a node.
 bool SceneTranslator::is_drawn(const Prim& prim) {
-  const auto known = drawn_.find(&prim);
+  const std::pair key(&prim, instancer_depth_ > 0);
+  const auto known = drawn_.find(key);
   if (known != drawn_.end()) return known->second;
   const bool is_group =
       prim.type_name.empty() || prim.type_name == "Scope" || !prim.traits.is_known;
@@ -114,9 +124,9 @@ bool SceneTranslator::is_drawn(const Prim& prim) {
   // Skeletons move points, which the reader does not do; their prims draw nothing.
   if (prim.type_name == "Skeleton") result = false;
   if (is_group) {
-    for (const Prim* child : stage_.visible_children(prim)) result |= is_drawn(*child);
+    for (const Prim* child : drawn_children(prim)) result |= is_drawn(*child);
   }
-  drawn_[&prim] = result;
+  drawn_[key] = result;
   return result;
 }
 
@@ -214,7 +224,7 @@ void SceneTranslator::add_shape(const Prim& prim, NodeId node) {
   std::vector<std::string> paths{drawn_material(prim)};
   std::vector<const Prim*> subsets;
   if (prim.type_name == "Mesh") {
-    for (const Prim* child : stage_.visible_children(prim)) {
+    for (const Prim* child : drawn_children(prim)) {
       if (child->type_name != "GeomSubset") continue;
       if (usd::token_or(stage_, *child, "elementType", "face") != "face") continue;
       // Subsets of other families sort faces for other ends.

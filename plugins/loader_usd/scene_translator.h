@@ -4,6 +4,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "diorama/host.h"
@@ -33,6 +34,7 @@ class SceneTranslator {
 
   void translate_children(const usd::Prim& prim, const Place& place);
   void translate_prim(const usd::Prim& prim, const Place& parent, const Affine& parent_from_placed);
+  std::vector<const usd::Prim*> drawn_children(const usd::Prim& prim);
   bool is_drawn(const usd::Prim& prim);
   Affine local_pose(const usd::Prim& prim, const Place& parent);
   Affine unit_correction(const usd::Prim& prim) const;
@@ -54,7 +56,7 @@ class SceneTranslator {
   PhysicsTranslator physics_;
   double meters_per_unit_;
   Affine root_from_stage_;
-  std::map<const usd::Prim*, bool> drawn_;
+  std::map<std::pair<const usd::Prim*, bool>, bool> drawn_;  ///< Second: below a prototype.
   std::map<std::vector<float>, std::shared_ptr<const Material>> plain_materials_;
   /// Visible prims that are not drawn.
   struct LeftOut {

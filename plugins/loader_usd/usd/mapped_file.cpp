@@ -17,8 +17,9 @@ namespace {
 
 class FileDescriptor {
  public:
+  // Without O_NONBLOCK a pipe would be waited for before it can be refused.
   explicit FileDescriptor(const std::string& path)
-      : descriptor_(::open(path.c_str(), O_RDONLY | O_CLOEXEC)) {}
+      : descriptor_(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)) {}
   ~FileDescriptor() {
     if (descriptor_ >= 0) ::close(descriptor_);
   }

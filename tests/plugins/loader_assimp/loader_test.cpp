@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <sys/stat.h>
+
 #include <assimp/Importer.hpp>
 
 #include "diorama/error.h"
@@ -123,6 +125,9 @@ TEST_CASE("a broken file is an asset error that begins with its name", "[loader_
   check("noise.fbx", std::string(3000, 'x'));
   check("cut.gltf", R"({"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [)");
   check("cut.dae", "<?xml version=\"1.0\"?><COLLADA version=\"1.4.1\"><asset>");
+  REQUIRE(mkfifo(folder.path("pipe.obj").c_str(), 0600) == 0);
+  CHECK_THROWS_WITH(LoadedFile{folder.path("pipe.obj")},
+                    ContainsSubstring("pipe.obj: assimp cannot read it: it is not a regular file"));
   check("cut.glb", std::string("glTF\2\0\0\0\xff\xff\xff\x7f", 12));
 }
 

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <sys/stat.h>
+
 #include <algorithm>
 #include <string>
 
@@ -321,6 +323,41 @@ def PointInstancer "Many"
   CHECK((pose * Vec3(1, 0, 0)).isApprox(Vec3(0, 9, 0), 1e-3));
 }
 
+TEST_CASE("prototypes may stand below overs, which are not drawn by themselves", "[loader_usd]") {
+  const TemporaryFolder folder;
+  Loaded loaded(folder.write("a.usda", R"(#usda 1.0
+def PointInstancer "Many"
+{
+    rel prototypes = </Protos/P>
+    int[] protoIndices = [0, 0]
+    point3f[] positions = [(0, 0, 0), (5, 0, 0)]
+}
+over "Protos"
+{
+    def Xform "P"
+    {
+        def Cube "C"
+        {
+        }
+        class "Model"
+        {
+            def Cube "Hidden"
+            {
+            }
+        }
+        def Cube "Off" (
+            active = false
+        )
+        {
+        }
+    }
+}
+)"));
+  CHECK(loaded.node("Many/P/C").mesh);
+  CHECK(loaded.node("Many/P_01/C").mesh == loaded.node("Many/P/C").mesh);
+  CHECK(loaded.scene.subtree(loaded.root).size() == 6);
+}
+
 TEST_CASE("only subsets of the family of materials get slots", "[loader_usd]") {
   const TemporaryFolder folder;
   Loaded loaded(folder.write("a.usda", R"(#usda 1.0
@@ -485,6 +522,9 @@ TEST_CASE("a broken file is an asset error that begins with its name", "[loader_
                     empty +
                         ": this is neither a crate, nor a package, nor a text layer at byte "
                         "offset 0");
+  const std::string pipe = folder.path("pipe.usd");
+  REQUIRE(mkfifo(pipe.c_str(), 0600) == 0);
+  CHECK_THROWS_WITH(Loaded(pipe), pipe + ": is not a regular file");
 }
 
 }  // namespace diorama::loader_usd
