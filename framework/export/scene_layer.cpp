@@ -110,6 +110,12 @@ void fill_camera(Prim& prim, const Camera& camera) {
   prim.set(
       "verticalAperture", "float",
       float(camera.horizontal_aperture_mm * camera.height / camera.width * camera.fx / camera.fy));
+  // Millimetres of film between its middle and the axis; pixels are counted downwards.
+  const double film_per_pixel = camera.horizontal_aperture_mm / camera.width;
+  const double right = (0.5 * camera.width - camera.cx) * film_per_pixel;
+  const double up = (camera.cy - 0.5 * camera.height) * film_per_pixel * camera.fx / camera.fy;
+  if (right != 0.0) prim.set("horizontalApertureOffset", "float", float(right));
+  if (up != 0.0) prim.set("verticalApertureOffset", "float", float(up));
   prim.set("clippingRange", "float2", Vec2f(float(camera.near_m), float(camera.far_m)));
   prim.set("focusDistance", "float", float(camera.focus_distance_m));
   prim.set("fStop", "float", float(camera.f_stop));

@@ -224,6 +224,8 @@ TEST_CASE("lights of every kind, cameras and poses come back", "[export]") {
   add("dome", LightKind::Dome).texture = sky;
   const NodeId eye = scene.create(root, "eye");
   scene.edit(eye).camera = Camera::from_lens(640, 480, 18, 24);
+  scene.edit(eye).camera->cx = 200;
+  scene.edit(eye).camera->cy = 300;
 
   const NodeId back = shop.there_and_back(scene, root, "lights.usda", loaded);
   compare(scene, root, loaded, back);
@@ -234,7 +236,37 @@ TEST_CASE("lights of every kind, cameras and poses come back", "[export]") {
   REQUIRE(loaded[found.at("/dome")].light->texture);
   CHECK(loaded[found.at("/dome")].light->texture->floats == sky->floats);
   REQUIRE(loaded[found.at("/eye")].camera);
-  CHECK(loaded[found.at("/eye")].camera->focal_length_mm == Approx(18));
+  const Camera& camera = *loaded[found.at("/eye")].camera;
+  CHECK(camera.focal_length_mm == Approx(18));
+  CHECK(camera.cx / camera.width == Approx(200.0 / 640));
+  CHECK(camera.cy / camera.height == Approx(300.0 / 480));
+}
+
+TEST_CASE("what several nodes share is in a crate once, and is shared again", "[export]") {
+  Workshop shop;
+  const auto mesh = std::make_shared<const Mesh>(make_sphere(0.5));
+  const auto size_with = [&](int copies, Scene& loaded) {
+    Scene scene;
+    const NodeId root = scene.create(scene.root(), "row");
+    for (int i = 0; i < copies; ++i) {
+      const NodeId id = scene.create(root, "ball");
+      scene.set_pose(id, Transform{{double(i), 0, 0}, Quat::Identity(), {1, 1, 1}});
+      // Equal, or the same.
+      scene.edit(id).mesh = i % 2 == 0 ? mesh : std::make_shared<const Mesh>(*mesh);
+    }
+    const std::string file = std::to_string(copies) + ".usdc";
+    shop.there_and_back(scene, root, file.c_str(), loaded);
+    return fs::file_size(shop.folder / file);
+  };
+  Scene one, many;
+  const auto alone = size_with(1, one);
+  CHECK(size_with(20, many) < alone + alone / 5);
+  std::map<const Mesh*, int> users;
+  for (const NodeId id : many.subtree(many.root())) {
+    if (many[id].mesh) ++users[many[id].mesh.get()];
+  }
+  REQUIRE(users.size() == 1);
+  CHECK(users.begin()->second == 20);
 }
 
 TEST_CASE("a sky is written as a picture, other endings are refused", "[export]") {
