@@ -7,14 +7,17 @@
 #include <limits>
 #include <vector>
 
-#include "lanes.h"
+#include "pixel_layers.h"
 #include "sampling.h"
 
 namespace diorama {
 namespace {
 
+// Few neighbours in many rounds: 25 instead of 9 of them gain nothing (measured) and cost twice.
 constexpr int kRounds = 5;
-constexpr std::array<float, 5> kKernel{1 / 16.0f, 4 / 16.0f, 6 / 16.0f, 4 / 16.0f, 1 / 16.0f};
+constexpr int kMargin = 1 << (kRounds - 1);  // pixels beside the picture that the last round reads
+constexpr float kOwnShare = 6 / 14.0f;       // of the kernel along one axis
+constexpr float kOtherShare = 4 / 14.0f;
 constexpr float kLuminanceSlack = 4.0f;  // standard deviations
 constexpr float kNormalSharpness = 10.0f;
 constexpr float kPlaneSlack = 0.016f;  // of the distance from the camera
@@ -28,68 +31,52 @@ constexpr float kWitnesses = 10.0f;  // averaged pixels near a lonely one that m
 constexpr float kLeeway = 2.0f;      // by which it may leave their range
 constexpr float kInfinite = std::numeric_limits<float>::infinity();
 
-constexpr int kRowsPerTask = 8;
-constexpr int kBlock = 16;             // pixels of a square whose tamed light is summed up
-constexpr float kMostReturned = 1.3f;  // of the light that is left
+constexpr int kBlock = 16;             // pixels of a square whose light is summed up
+constexpr float kMostReturned = 1.5f;  // of the light that is left
 
-/// One number per pixel. Rows start and end with as many zeros as the widest round reaches, so that
-/// whole groups of pixels can be read anywhere near the picture.
-class Plane {
- public:
-  Plane(int width, int height)
-      : stride_(std::size_t((width + kLanes - 1) / kLanes * kLanes + 2 * kMargin)),
-        values_(stride_ * std::size_t(height), 0.0f) {}
-  /// The pixel (0, y).
-  float* row(int y) { return &values_[std::size_t(y) * stride_ + kMargin]; }
-  const float* row(int y) const { return &values_[std::size_t(y) * stride_ + kMargin]; }
+/// What steers the filter; constant over the rounds. Normals are zero where there is no surface;
+/// positions are as seen from the camera.
+enum Guide { kNormal = 0, kPosition = 3, kFirmness = 6, kGuides = 7 };
+/// How much differences from a pixel mean, in (0, 1]; without a surface it differs from all others.
+constexpr float kNoSurface = 1e6f;
 
- private:
-  static constexpr int kMargin = 2 << (kRounds - 1);
-  std::size_t stride_;
-  std::vector<float> values_;
+/// Light that falls on the pixels' surfaces, whatever their colour.
+enum Incoming {
+  kIrradiance = 0,
+  kVariance = 3,   ///< Of the luminance.
+  kCertainty = 4,  ///< 1 / the difference of luminance that noise explains.
+  kIncoming = 5
 };
 
-inline Lanes3 load3(const std::array<Plane, 3>& planes, int y, int x) {
-  return {load_lanes(planes[0].row(y) + x), load_lanes(planes[1].row(y) + x),
-          load_lanes(planes[2].row(y) + x)};
-}
+using Guides = PixelLayers<kGuides>;
+using Lights = PixelLayers<kIncoming>;
 
-/// exp(-x) for x >= 0, to 2 %: one weight out of 25 need not be better.
-inline Lanes fast_exp(const Lanes& x) {
-  const Lanes base = larger(Lanes{}, 1.0f - x * (1.0f / 16.0f));
+/// exp(-16 x) for x >= 0, to 2 %: one weight of many need not be better.
+inline Lanes fast_exp16(const Lanes& x) {
+  const Lanes base = larger(Lanes{}, 1.0f - x);
   const Lanes b2 = base * base;
   const Lanes b4 = b2 * b2;
   const Lanes b8 = b4 * b4;
   return b8 * b8;
 }
 
-/// What steers the filter; constant over the rounds.
-struct Guides {
-  Guides(int width, int height)
-      : normal{Plane(width, height), Plane(width, height), Plane(width, height)},
-        position{normal},
-        plane_scale(width, height),
-        firmness(width, height),
-        is_surface(width, height) {}
+inline Lanes luminances(const Lanes3& rgb) {
+  return 0.2126f * rgb.x + 0.7152f * rgb.y + 0.0722f * rgb.z;
+}
+inline Lanes luminances(const Lights::Row& light, int x) {
+  return luminances(light.lanes3(kIrradiance, x));
+}
 
-  std::array<Plane, 3> normal;
-  std::array<Plane, 3> position;
-  Plane plane_scale;  ///< 1 / tolerated distance from the plane.
-  Plane firmness;     ///< In (0, 1]: how much differences from this pixel mean.
-  Plane is_surface;   ///< 1, or 0: nothing to filter.
-};
+inline void store_lanes3(const Lanes3& rgb, const Lights::Row& light, int x) {
+  store_lanes(rgb.x, light.at(kIrradiance, x));
+  store_lanes(rgb.y, light.at(kIrradiance + 1, x));
+  store_lanes(rgb.z, light.at(kIrradiance + 2, x));
+}
 
-/// Light that falls on the pixels' surfaces, whatever their colour.
-struct Incoming {
-  Incoming(int width, int height)
-      : irradiance{Plane(width, height), Plane(width, height), Plane(width, height)},
-        luminance(width, height),
-        variance(width, height) {}
-
-  std::array<Plane, 3> irradiance;
-  Plane luminance;
-  Plane variance;
-};
+/// 1 for surfaces, 0 elsewhere.
+inline Lanes surfaces(const Guides::Row& guides, int x) {
+  return guides.lanes(kFirmness, x) < kNoSurface ? all_lanes(1.0f) : Lanes{};
+}
 
 class Denoiser {
  public:
@@ -100,34 +87,36 @@ class Denoiser {
         host_(host),
         width_(film.width()),
         height_(film.height()),
-        guides_(width_, height_),
-        lights_(width_, height_),
-        next_(width_, height_),
+        guides_(width_, height_, kMargin, {0, 0, 0, 0, 0, 0, kNoSurface}),
+        lights_(width_, height_, kMargin, {}),
+        next_(width_, height_, kMargin, {}),
+        support_(width_, height_, kMargin, {}),
         columns_((width_ + kBlock - 1) / kBlock),
         block_rows_((height_ + kBlock - 1) / kBlock),
         before_(std::size_t(columns_ * block_rows_)),
         after_(before_.size()),
-        luminance_scale_(width_, height_),
-        support_(width_, height_) {}
+        image_(width_, height_, Vec3f::Zero()) {}
 
   Image<Vec3f> run();
 
  private:
-  enum class Step : std::uint8_t { Read, Tame, Weigh, Return, Measure, Filter, Calm, Write };
+  enum class Step : std::uint8_t { Read, Tame, Measure, Filter, Finish };
 
-  /// Does one step for all rows. Steps read lights_ and leave their result there.
-  void all_rows(Step step, int reach = 1);
-  void rows(Step step, int reach, int begin, int end);
-  void rows_sse42(Step step, int reach, int begin, int end);
-  void rows_avx2(Step step, int reach, int begin, int end);
-  void rows_avx512(Step step, int reach, int begin, int end);
+  /// Does one step for all rows. Steps read lights_ and leave their result in next_, but for Read
+  /// and Measure, which add to lights_.
+  void all_rows(Step step, int round = 0);
+  void rows(Step step, int round, int begin, int end);
+  void rows_sse42(Step step, int round, int begin, int end);
+  void rows_avx2(Step step, int round, int begin, int end);
+  void rows_avx512(Step step, int round, int begin, int end);
   void read(int y);
   void tame(int y);
-  void weigh(int block_row);
-  void give_back(int y);
+  void weigh(const Lights& light, int y_begin, std::vector<float>& sums) const;
   void measure(int y);
-  void filter(int y, int reach);
+  void filter(int y, int round);
   void calm(int y);
+  float lost(int column, int block_row) const;
+  void give_back(int y);
   void write(int y);
 
   const Film& film_;
@@ -137,19 +126,18 @@ class Denoiser {
   int width_;
   int height_;
   Guides guides_;
-  Incoming lights_;
-  Incoming next_;
-  // Sums of luminance over blocks of pixels, as sampled and tamed.
+  Lights lights_;
+  Lights next_;
+  PixelLayers<1> support_;  ///< Share of the neighbours that agreed in the first round.
+  // Sums of luminance over blocks of pixels, as sampled and filtered.
   int columns_;
   int block_rows_;
   std::vector<float> before_;
   std::vector<float> after_;
-  Plane luminance_scale_;  ///< 1 / difference of luminance that noise explains.
-  Plane support_;          ///< Share of the neighbours that agreed in the first round.
   Image<Vec3f> image_;
 };
 
-inline void Denoiser::rows(Step step, int reach, int begin, int end) {
+inline void Denoiser::rows(Step step, int round, int begin, int end) {
   for (int y = begin; y < end; ++y) {
     switch (step) {
       case Step::Read:
@@ -158,95 +146,84 @@ inline void Denoiser::rows(Step step, int reach, int begin, int end) {
       case Step::Tame:
         tame(y);
         break;
-      case Step::Weigh:
-        if (y % kBlock == 0) weigh(y / kBlock);
-        break;
-      case Step::Return:
-        give_back(y);
-        break;
       case Step::Measure:
         measure(y);
         break;
       case Step::Filter:
-        filter(y, reach);
+        filter(y, round);
         break;
-      case Step::Calm:
+      case Step::Finish:
         calm(y);
-        break;
-      case Step::Write:
+        give_back(y);
         write(y);
         break;
     }
   }
+  if (step == Step::Tame) weigh(lights_, begin, before_);
+  if (step == Step::Filter && round == kRounds - 1) weigh(next_, begin, after_);
 }
 
 #define DIORAMA_KERNEL(NAME, ARCH)                                                                 \
-  [[gnu::target("arch=" ARCH), gnu::flatten]] void Denoiser::NAME(Step step, int reach, int begin, \
+  [[gnu::target("arch=" ARCH), gnu::flatten]] void Denoiser::NAME(Step step, int round, int begin, \
                                                                   int end) {                       \
-    rows(step, reach, begin, end);                                                                 \
+    rows(step, round, begin, end);                                                                 \
   }
 DIORAMA_KERNEL(rows_sse42, "x86-64-v2")
 DIORAMA_KERNEL(rows_avx2, "x86-64-v3")
 DIORAMA_KERNEL(rows_avx512, "x86-64-v4")
 #undef DIORAMA_KERNEL
 
-void Denoiser::all_rows(Step step, int reach) {
-  const int tasks = (height_ + kRowsPerTask - 1) / kRowsPerTask;
-  host_.parallel_for(std::size_t(tasks), [&](std::size_t task) {
-    const int begin = int(task) * kRowsPerTask;
-    const int end = std::min(height_, begin + kRowsPerTask);
+void Denoiser::all_rows(Step step, int round) {
+  host_.parallel_for(std::size_t(block_rows_), [&](std::size_t task) {
+    const int begin = int(task) * kBlock;
+    const int end = std::min(height_, begin + kBlock);
     switch (isa_) {
       case Isa::Sse2:
-        return rows(step, reach, begin, end);
+        return rows(step, round, begin, end);
       case Isa::Sse42:
-        return rows_sse42(step, reach, begin, end);
+        return rows_sse42(step, round, begin, end);
       case Isa::Avx2:
-        return rows_avx2(step, reach, begin, end);
+        return rows_avx2(step, round, begin, end);
       case Isa::Avx512:
-        return rows_avx512(step, reach, begin, end);
+        return rows_avx512(step, round, begin, end);
     }
   });
 }
 
 Image<Vec3f> Denoiser::run() {
   all_rows(Step::Read);
-  next_ = lights_;
   all_rows(Step::Tame);
-  all_rows(Step::Weigh);
-  all_rows(Step::Return);
   std::swap(lights_, next_);
   for (int round = 0; round < kRounds; ++round) {
     all_rows(Step::Measure);
-    all_rows(Step::Filter, 1 << round);
+    all_rows(Step::Filter, round);
     std::swap(lights_, next_);
   }
-  all_rows(Step::Calm);
-  image_ = Image<Vec3f>(width_, height_, Vec3f::Zero());
-  all_rows(Step::Write);
+  all_rows(Step::Finish);
   return std::move(image_);
 }
 
 void Denoiser::read(int y) {
+  const auto guides = guides_.row(y);
+  const auto light = lights_.row(y);
   for (int x = 0; x < width_; ++x) {
     const FilmPixel& pixel = film_.at(x, y);
     const bool is_surface = pixel.surface_share > 0.0f;
     const float length = pixel.normal.norm();
-    const Vec3f normal = length > 1e-6f ? Vec3f(pixel.normal / length) : Vec3f(Vec3f::UnitZ());
+    Vec3f normal = length > 1e-6f ? Vec3f(pixel.normal / length) : Vec3f(Vec3f::UnitZ());
+    if (!is_surface) normal.setZero();
+    const Vec3f position = pixel.position - view_position_;
     const Vec3f color = pixel.albedo.cwiseMax(kMinAlbedo);
     const Vec3f irradiance = pixel.scattered.cwiseQuotient(color);
-    for (std::size_t k = 0; k < 3; ++k) {
-      const auto axis = Eigen::Index(k);
-      guides_.normal[k].row(y)[x] = normal[axis];
-      guides_.position[k].row(y)[x] = pixel.position[axis];
-      lights_.irradiance[k].row(y)[x] = irradiance[axis];
+    for (int k = 0; k < 3; ++k) {
+      *guides.at(kNormal + k, x) = normal[k];
+      *guides.at(kPosition + k, x) = position[k];
+      *light.at(kIrradiance + k, x) = irradiance[k];
     }
-    guides_.plane_scale.row(y)[x] =
-        1.0f / (kPlaneSlack * (pixel.position - view_position_).norm() + 1e-6f);
-    guides_.firmness.row(y)[x] = 1.0f / (1.0f + kMixedTolerance * std::max(0.0f, 1.0f - length));
-    guides_.is_surface.row(y)[x] = is_surface ? 1.0f : 0.0f;
-    lights_.luminance.row(y)[x] = luminance(irradiance);
+    *guides.at(kFirmness, x) =
+        is_surface ? 1.0f / (1.0f + kMixedTolerance * std::max(0.0f, 1.0f - length)) : kNoSurface;
     const float own_color = luminance(color);
-    lights_.variance.row(y)[x] = pixel.variance / (own_color * own_color);
+    *light.at(kVariance, x) = pixel.variance / (own_color * own_color);
   }
 }
 
@@ -255,6 +232,8 @@ void Denoiser::read(int y) {
 inline void Denoiser::tame(int y) {
   const int v_begin = std::max(0, y - 2);
   const int v_end = std::min(height_, y + 3);
+  const auto light = lights_.row(y);
+  const auto tamed = next_.row(y);
   for (int x = 0; x < width_; x += kLanes) {
     const Lanes zero{};
     Lanes first{};
@@ -262,11 +241,13 @@ inline void Denoiser::tame(int y) {
     Lanes third{};
     Lanes neighbours = zero - 1.0f;  // does not count itself
     for (int v = v_begin; v < v_end; ++v) {
+      const auto other = lights_.row(v);
+      const auto guides = guides_.row(v);
       for (int dx = -2; dx <= 2; ++dx) {
-        const Lanes is_surface = load_lanes(guides_.is_surface.row(v) + x + dx);
+        const Lanes is_surface = surfaces(guides, x + dx);
         neighbours += is_surface;
         if (v == y && dx == 0) continue;
-        Lanes value = is_surface * load_lanes(lights_.luminance.row(v) + x + dx);
+        const Lanes value = is_surface * luminances(other, x + dx);
         const Lanes below_first = smaller(first, value);
         first = larger(first, value);
         const Lanes below_second = smaller(second, below_first);
@@ -274,130 +255,130 @@ inline void Denoiser::tame(int y) {
         third = larger(third, below_second);
       }
     }
-    const Lanes own = load_lanes(lights_.luminance.row(y) + x);
-    const Lanes is_surface = load_lanes(guides_.is_surface.row(y) + x);
-    const Lanes judged = neighbours >= 8.0f ? is_surface : zero;
+    const Lanes3 irradiance = light.lanes3(kIrradiance, x);
+    const Lanes own = luminances(irradiance);
+    const Lanes judged = neighbours >= 8.0f ? surfaces(guides_.row(y), x) : zero;
     const Lanes suspect = own > third ? judged : zero;
     const Lanes scale = suspect > zero ? third / larger(own, all_lanes(1e-30f)) : zero + 1.0f;
-    for (std::size_t k = 0; k < 3; ++k) {
-      store_lanes(load_lanes(lights_.irradiance[k].row(y) + x) * scale,
-                  next_.irradiance[k].row(y) + x);
-    }
-    store_lanes(own * scale, next_.luminance.row(y) + x);
-    store_lanes(load_lanes(lights_.variance.row(y) + x) * scale * scale, next_.variance.row(y) + x);
+    store_lanes3({irradiance.x * scale, irradiance.y * scale, irradiance.z * scale}, tamed, x);
+    store_lanes(light.lanes(kVariance, x) * scale * scale, tamed.at(kVariance, x));
   }
 }
 
-void Denoiser::weigh(int block_row) {
-  const int y_end = std::min(height_, (block_row + 1) * kBlock);
+void Denoiser::weigh(const Lights& light, int y_begin, std::vector<float>& sums) const {
+  const int y_end = std::min(height_, y_begin + kBlock);
   for (int column = 0; column < columns_; ++column) {
     const int x_end = std::min(width_, (column + 1) * kBlock);
-    float before = 0.0f;
-    float after = 0.0f;
-    for (int y = block_row * kBlock; y < y_end; ++y) {
+    float sum = 0.0f;
+    for (int y = y_begin; y < y_end; ++y) {
+      const auto row = light.row(y);
       for (int x = column * kBlock; x < x_end; ++x) {
-        before += lights_.luminance.row(y)[x];
-        after += next_.luminance.row(y)[x];
+        sum += luminance({*row.at(0, x), *row.at(1, x), *row.at(2, x)});
       }
     }
-    const auto block = std::size_t(block_row * columns_ + column);
-    before_[block] = before;
-    after_[block] = after;
-  }
-}
-
-/// The light that was cut off comes back, spread over a wide neighbourhood: pictures would be too
-/// dark otherwise.
-void Denoiser::give_back(int y) {
-  for (int x = 0; x < width_; ++x) {
-    const float u = (float(x) + 0.5f) / float(kBlock) - 0.5f;
-    const float v = (float(y) + 0.5f) / float(kBlock) - 0.5f;
-    float before = 0.0f;
-    float after = 1e-12f;
-    for (int row = int(std::ceil(v - 2.0f)); float(row) < v + 2.0f; ++row) {
-      for (int column = int(std::ceil(u - 2.0f)); float(column) < u + 2.0f; ++column) {
-        if (row < 0 || column < 0 || row >= block_rows_ || column >= columns_) continue;
-        const float w = (2.0f - std::abs(float(row) - v)) * (2.0f - std::abs(float(column) - u));
-        before += w * before_[std::size_t(row * columns_ + column)];
-        after += w * after_[std::size_t(row * columns_ + column)];
-      }
-    }
-    const float scale = std::clamp(before / after, 1.0f, kMostReturned);
-    for (Plane& plane : next_.irradiance) plane.row(y)[x] *= scale;
-    next_.luminance.row(y)[x] *= scale;
-    next_.variance.row(y)[x] *= scale * scale;
+    sums[std::size_t(y_begin / kBlock * columns_ + column)] = sum;
   }
 }
 
 /// Variances of few samples are noisy themselves: they are smoothed.
 inline void Denoiser::measure(int y) {
+  const auto own = lights_.row(y);
   for (int x = 0; x < width_; x += kLanes) {
     Lanes sum{};
     Lanes weights{};
-    for (int dy = -1; dy <= 1; ++dy) {
-      if (y + dy < 0 || y + dy >= height_) continue;
+    for (int v = std::max(0, y - 1); v < std::min(height_, y + 2); ++v) {
+      const auto light = lights_.row(v);
+      const auto guides = guides_.row(v);
       for (int dx = -1; dx <= 1; ++dx) {
-        const float w = (dx == 0 ? 2.0f : 1.0f) * (dy == 0 ? 2.0f : 1.0f);
-        sum += w * load_lanes(lights_.variance.row(y + dy) + x + dx);
-        weights += w * load_lanes(guides_.is_surface.row(y + dy) + x + dx);
+        const float w = (dx == 0 ? 2.0f : 1.0f) * (v == y ? 2.0f : 1.0f);
+        sum += w * light.lanes(kVariance, x + dx);
+        weights += w * surfaces(guides, x + dx);
       }
     }
     const Lanes variance = sum / larger(weights, all_lanes(1.0f));
-    Lanes deviation;
-    for (int i = 0; i < kLanes; ++i) deviation[i] = std::sqrt(variance[i]);
-    const Lanes own = load_lanes(lights_.luminance.row(y) + x);
-    store_lanes(1.0f / (kLuminanceSlack * deviation + 1e-4f * own + 1e-8f),
-                luminance_scale_.row(y) + x);
+    const Lanes explained =
+        kLuminanceSlack * square_roots(variance) + 1e-4f * luminances(own, x) + 1e-8f;
+    store_lanes(1.0f / explained, own.at(kCertainty, x));
   }
 }
 
-inline void Denoiser::filter(int y, int reach) {
+/// Eight pixels whose neighbours are averaged. Scaled for fast_exp16().
+struct Centre {
+  Lanes3 normal;
+  Lanes3 slope;  ///< The normal over the tolerated distance from the plane.
+  Lanes plane;   ///< Where the plane is along `slope`.
+  Lanes firmness;
+  Lanes luminance;
+  Lanes certainty;
+};
+
+struct FilterSums {
+  Lanes3 irradiance;
+  Lanes variance{};
+  Lanes weights{};
+};
+
+/// Differences of luminance count by the certainty of both pixels: if a dark pixel, which mostly
+/// believes itself certain, had the only say, bright ones would be left out and pictures darken.
+inline void add_neighbours(const Centre& own, const Guides::Row& guides, const Lights::Row& light,
+                           int x, float share, FilterSums& sums) {
+  constexpr float kTurn = kNormalSharpness / 16.0f;
+  const Lanes off_plane = magnitude(dot(own.slope, guides.lanes3(kPosition, x)) - own.plane);
+  const Lanes turned = kTurn - dot(own.normal, guides.lanes3(kNormal, x));
+  const Lanes firmness = larger(own.firmness, guides.lanes(kFirmness, x));
+  const Lanes3 irradiance = light.lanes3(kIrradiance, x);
+  const Lanes brighter = magnitude(luminances(irradiance) - own.luminance);
+  const Lanes certainty = own.certainty + (0.5f / 16.0f) * light.lanes(kCertainty, x);
+  const Lanes w = share * fast_exp16((off_plane + turned) * firmness + brighter * certainty);
+  sums.irradiance.x += w * irradiance.x;
+  sums.irradiance.y += w * irradiance.y;
+  sums.irradiance.z += w * irradiance.z;
+  sums.variance += w * w * light.lanes(kVariance, x);
+  sums.weights += w;
+}
+
+inline Centre centre_of(const Guides::Row& guides, const Lights::Row& light, int x) {
+  constexpr float kTurn = kNormalSharpness / 16.0f;
+  const Lanes3 position = guides.lanes3(kPosition, x);
+  const Lanes3 normal = guides.lanes3(kNormal, x);
+  const Lanes scale =
+      (1.0f / 16.0f) / (kPlaneSlack * square_roots(dot(position, position)) + 1e-6f);
+  Centre centre;
+  centre.normal = {kTurn * normal.x, kTurn * normal.y, kTurn * normal.z};
+  centre.slope = {scale * normal.x, scale * normal.y, scale * normal.z};
+  centre.plane = dot(centre.slope, position);
+  centre.firmness = guides.lanes(kFirmness, x);
+  centre.luminance = luminances(light, x);
+  centre.certainty = (0.5f / 16.0f) * light.lanes(kCertainty, x);
+  return centre;
+}
+
+inline void Denoiser::filter(int y, int round) {
+  const int reach = 1 << round;
+  const auto guides = guides_.row(y);
+  const auto light = lights_.row(y);
+  const auto filtered = next_.row(y);
   for (int x = 0; x < width_; x += kLanes) {
-    const Lanes3 normal = load3(guides_.normal, y, x);
-    const Lanes3 position = load3(guides_.position, y, x);
-    const Lanes plane_scale = load_lanes(guides_.plane_scale.row(y) + x);
-    const Lanes firmness = load_lanes(guides_.firmness.row(y) + x);
-    const Lanes own = load_lanes(lights_.luminance.row(y) + x);
-    const Lanes luminance_scale = load_lanes(luminance_scale_.row(y) + x);
-    Lanes3 sum;
-    Lanes variance{};
-    Lanes weights{};
-    for (int dy = -2; dy <= 2; ++dy) {
-      const int v = y + dy * reach;
+    const Centre own = centre_of(guides, light, x);
+    FilterSums sums;
+    for (int v = y - reach; v <= y + reach; v += reach) {
       if (v < 0 || v >= height_) continue;
-      for (int dx = -2; dx <= 2; ++dx) {
-        const int u = x + dx * reach;
-        const Lanes3 n = load3(guides_.normal, v, u);
-        const Lanes3 p = load3(guides_.position, v, u);
-        const Lanes cosine = normal.x * n.x + normal.y * n.y + normal.z * n.z;
-        const Lanes off_plane = normal.x * (p.x - position.x) + normal.y * (p.y - position.y) +
-                                normal.z * (p.z - position.z);
-        const Lanes unlike =
-            kNormalSharpness * larger(Lanes{}, 1.0f - cosine) + magnitude(off_plane) * plane_scale;
-        const Lanes counts = larger(firmness, load_lanes(guides_.firmness.row(v) + u));
-        const Lanes other = load_lanes(lights_.luminance.row(v) + u);
-        const Lanes apart = unlike * counts + magnitude(other - own) * luminance_scale;
-        const Lanes w = kKernel[std::size_t(dx + 2)] * kKernel[std::size_t(dy + 2)] *
-                        load_lanes(guides_.is_surface.row(v) + u) * fast_exp(apart);
-        const Lanes3 irradiance = load3(lights_.irradiance, v, u);
-        sum.x += w * irradiance.x;
-        sum.y += w * irradiance.y;
-        sum.z += w * irradiance.z;
-        variance += w * w * load_lanes(lights_.variance.row(v) + u);
-        weights += w;
-      }
+      const auto other_guides = guides_.row(v);
+      const auto other_light = lights_.row(v);
+      const float share = v == y ? kOwnShare : kOtherShare;
+      add_neighbours(own, other_guides, other_light, x - reach, share * kOtherShare, sums);
+      add_neighbours(own, other_guides, other_light, x, share * kOwnShare, sums);
+      add_neighbours(own, other_guides, other_light, x + reach, share * kOtherShare, sums);
     }
     // Pixels without a surface have no weight and stay black.
-    constexpr float kOwn = kKernel[2] * kKernel[2];
-    const Lanes is_surface = load_lanes(guides_.is_surface.row(y) + x);
-    const Lanes scale = is_surface / larger(weights, all_lanes(1e-12f));
-    sum = {sum.x * scale, sum.y * scale, sum.z * scale};
-    store_lanes(sum.x, next_.irradiance[0].row(y) + x);
-    store_lanes(sum.y, next_.irradiance[1].row(y) + x);
-    store_lanes(sum.z, next_.irradiance[2].row(y) + x);
-    store_lanes(0.2126f * sum.x + 0.7152f * sum.y + 0.0722f * sum.z, next_.luminance.row(y) + x);
-    store_lanes(variance * scale * scale, next_.variance.row(y) + x);
-    if (reach == 1) store_lanes((weights - kOwn) * (1.0f / (1.0f - kOwn)), support_.row(y) + x);
+    const Lanes scale = surfaces(guides, x) / larger(sums.weights, all_lanes(1e-12f));
+    const Lanes3 mean{sums.irradiance.x * scale, sums.irradiance.y * scale,
+                      sums.irradiance.z * scale};
+    store_lanes3(mean, filtered, x);
+    store_lanes(sums.variance * scale * scale, filtered.at(kVariance, x));
+    if (round > 0) continue;
+    constexpr float kOwn = kOwnShare * kOwnShare;
+    store_lanes((sums.weights - kOwn) * (1.0f / (1.0f - kOwn)), support_.row(y).at(0, x));
   }
 }
 
@@ -406,32 +387,71 @@ inline void Denoiser::filter(int y, int reach) {
 inline void Denoiser::calm(int y) {
   const int v_begin = std::max(0, y - 2);
   const int v_end = std::min(height_, y + 3);
+  const auto light = lights_.row(y);
   for (int x = 0; x < width_; x += kLanes) {
     const Lanes zero{};
     Lanes low = all_lanes(kInfinite);
     Lanes high{};
     Lanes witnesses{};
     for (int v = v_begin; v < v_end; ++v) {
+      const auto guides = guides_.row(v);
+      const auto other = lights_.row(v);
       for (int dx = -2; dx <= 2; ++dx) {
-        const Lanes is_surface = load_lanes(guides_.is_surface.row(v) + x + dx);
-        const Lanes support = load_lanes(support_.row(v) + x + dx);
-        const Lanes counts = support >= kLonely ? is_surface : zero;
-        const Lanes value = load_lanes(lights_.luminance.row(v) + x + dx);
+        const Lanes support = support_.row(v).lanes(0, x + dx);
+        const Lanes counts = support >= kLonely ? surfaces(guides, x + dx) : zero;
+        const Lanes value = luminances(other, x + dx);
         low = counts > zero ? smaller(low, value) : low;
         high = larger(high, counts * value);
         witnesses += counts;
       }
     }
-    const Lanes own = load_lanes(lights_.luminance.row(y) + x);
-    const Lanes support = load_lanes(support_.row(y) + x);
+    const Lanes3 irradiance = light.lanes3(kIrradiance, x);
+    const Lanes own = luminances(irradiance);
+    const Lanes support = support_.row(y).lanes(0, x);
     const Lanes calm = smaller(larger(own, low * (1.0f / kLeeway)), high * kLeeway);
-    const Lanes lonely = support < kLonely ? load_lanes(guides_.is_surface.row(y) + x) : zero;
+    const Lanes lonely = support < kLonely ? surfaces(guides_.row(y), x) : zero;
     const Lanes judged = witnesses >= kWitnesses ? lonely : zero;
     const Lanes changed = own > zero ? judged : zero;
     const Lanes scale = changed > zero ? calm / larger(own, all_lanes(1e-30f)) : zero + 1.0f;
-    for (std::size_t k = 0; k < 3; ++k) {
-      store_lanes(load_lanes(lights_.irradiance[k].row(y) + x) * scale,
-                  next_.irradiance[k].row(y) + x);
+    store_lanes3({irradiance.x * scale, irradiance.y * scale, irradiance.z * scale}, next_.row(y),
+                 x);
+  }
+}
+
+/// By how much the light around the middle of a block was weakened.
+inline float Denoiser::lost(int column, int block_row) const {
+  float before = 0.0f;
+  float after = 1e-12f;
+  for (int v = std::max(0, block_row - 1); v < std::min(block_rows_, block_row + 2); ++v) {
+    for (int u = std::max(0, column - 1); u < std::min(columns_, column + 2); ++u) {
+      const float w = (v == block_row ? 2.0f : 1.0f) * (u == column ? 2.0f : 1.0f);
+      before += w * before_[std::size_t(v * columns_ + u)];
+      after += w * after_[std::size_t(v * columns_ + u)];
+    }
+  }
+  return std::clamp(before / after, 1.0f, kMostReturned);
+}
+
+/// The light that was cut off or left out comes back, spread over a wide neighbourhood: pictures
+/// would be too dark otherwise.
+inline void Denoiser::give_back(int y) {
+  const auto light = next_.row(y);
+  // Between the middles of blocks.
+  const float v = std::max(0.0f, (float(y) + 0.5f) / float(kBlock) - 0.5f);
+  const int upper = int(v);
+  const int lower = std::min(upper + 1, block_rows_ - 1);
+  const float down = v - float(upper);
+  const auto at_column = [&](int column) {
+    const int u = std::clamp(column, 0, columns_ - 1);
+    return (1.0f - down) * lost(u, upper) + down * lost(u, lower);
+  };
+  for (int column = 0; column <= columns_; ++column) {
+    const float left = at_column(column - 1);
+    const float slope = (at_column(column) - left) / float(kBlock);
+    const int middle = column * kBlock - kBlock / 2;
+    for (int x = std::max(0, middle); x < std::min(width_, middle + kBlock); ++x) {
+      const float scale = left + slope * (float(x - middle) + 0.5f);
+      for (int k = 0; k < 3; ++k) *light.at(kIrradiance + k, x) *= scale;
     }
   }
 }
@@ -440,9 +460,8 @@ void Denoiser::write(int y) {
   for (int x = 0; x < width_; ++x) {
     const FilmPixel& pixel = film_.at(x, y);
     Vec3f color = pixel.seen;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const auto axis = Eigen::Index(k);
-      color[axis] += next_.irradiance[k].row(y)[x] * std::max(kMinAlbedo, pixel.albedo[axis]);
+    for (int k = 0; k < 3; ++k) {
+      color[k] += *next_.row(y).at(kIrradiance + k, x) * std::max(kMinAlbedo, pixel.albedo[k]);
     }
     image_.at(x, y) = color;
   }

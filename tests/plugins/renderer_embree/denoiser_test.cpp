@@ -59,6 +59,40 @@ TEST_CASE("a picture without noise stays as it is", "[denoiser]") {
   CHECK(error(denoised(film, Vec3f(30, 30, 20), Isa::Sse2, host), undenoised(film)) < 1e-6);
 }
 
+TEST_CASE("pictures of few paths keep their light, however skewed its noise", "[denoiser]") {
+  test::RenderHost host(2);
+  constexpr int kPaths = 4;
+  Film film(160, 120, FilmPixel{});
+  Rng rng(5);
+  for (int y = 0; y < film.height(); ++y) {
+    for (int x = 0; x < film.width(); ++x) {
+      PixelSum sum;
+      for (int i = 0; i < kPaths; ++i) {
+        PathSample sample;
+        sample.has_surface = true;
+        sample.albedo = Vec3f::Constant(0.5f);
+        sample.normal = Vec3f::UnitZ();
+        sample.position = 0.02f * Vec3f(float(x), float(y), 0.0f);
+        // Mostly in shadow, seldom bright: the mean is 1.
+        const double u = rng.uniform(0.0, 1.0);
+        sample.scattered =
+            Vec3f::Constant(u < 0.6 ? 0.0f : float(-std::log((1.0 - u) / 0.4)) / 0.4f);
+        sum.add(sample);
+      }
+      film.at(x, y) = sum.mean();
+    }
+  }
+  const auto mean = [](const Image<Vec3f>& image) {
+    double total = 0.0;
+    for (const Vec3f& pixel : image.pixels()) total += double(pixel.x());
+    return total / double(image.pixels().size());
+  };
+  const double before = mean(undenoised(film));
+  CHECK(before == Approx(1.0).epsilon(0.02));
+  CHECK(mean(denoised(film, Vec3f(1.6f, 1.2f, 3.0f), Isa::Sse2, host)) ==
+        Approx(before).epsilon(0.005));
+}
+
 TEST_CASE("one chance find among quiet neighbours is tamed", "[denoiser]") {
   test::RenderHost host(1);
   Film film = noisy_corner(0.05);

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <sys/mman.h>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdlib>
+#include <memory>
+#include <new>
+
+#include "lanes.h"
+
+namespace diorama {
+
+/// Several numbers per pixel, each in a layer of its own. The layers of one picture row lie next to
+/// each other, and each starts and ends with a margin, so that groups of kLanes pixels can be read
+/// as far beside the picture as the margin is wide.
+template <int kLayers>
+class PixelLayers {
+ public:
+  using Pixel = std::array<float, kLayers>;
+
+  /// Only the margins have values, those of `outside`; they reach as far as the last whole group.
+  PixelLayers(int width, int height, int margin, const Pixel& outside)
+      : margin_(std::size_t(margin)),
+        stride_(std::size_t((width + kLanes - 1) / kLanes * kLanes) + 2 * margin_),
+        values_(make_room(stride_ * kLayers * std::size_t(height))) {
+    for (int y = 0; y < height; ++y) {
+      const Row own = row(y);
+      for (int layer = 0; layer < kLayers; ++layer) {
+        const float value = outside[std::size_t(layer)];
+        float* begin = own.at(layer, 0);
+        std::fill_n(begin - margin_, margin_, value);
+        std::fill(begin + width, begin - margin_ + stride_, value);
+      }
+    }
+  }
+
+  struct Row {
+    float* first;  ///< Pixel 0 of layer 0.
+    std::size_t stride;
+    float* at(int layer, int x) const {
+      return first + std::ptrdiff_t(std::size_t(layer) * stride) + x;
+    }
+    Lanes lanes(int layer, int x) const { return load_lanes(at(layer, x)); }
+    /// Of three layers in a row.
+    Lanes3 lanes3(int layer, int x) const {
+      return {lanes(layer, x), lanes(layer + 1, x), lanes(layer + 2, x)};
+    }
+  };
+  Row row(int y) const { return {&values_[std::size_t(y) * stride_ * kLayers + margin_], stride_}; }
+
+ private:
+  struct Free {
+    void operator()(float* values) const { std::free(values); }
+  };
+
+  /// In huge pages where the system has some: to map small ones takes as long as a round of
+  /// filtering.
+  static std::unique_ptr<float[], Free> make_room(std::size_t count) {
+    constexpr std::size_t kHugePage = std::size_t(1) << 21;
+    const std::size_t size = (count * sizeof(float) + kHugePage - 1) / kHugePage * kHugePage;
+    std::unique_ptr<float[], Free> room(static_cast<float*>(std::aligned_alloc(kHugePage, size)));
+    if (!room) throw std::bad_alloc();
+    madvise(room.get(), size, MADV_HUGEPAGE);
+    return room;
+  }
+
+  std::size_t margin_;
+  std::size_t stride_;
+  std::unique_ptr<float[], Free> values_;
+};
+
+}  // namespace diorama
