@@ -9,6 +9,7 @@
 
 #include "path_tracer.h"
 #include "ray_blocks.h"
+#include "silhouette.h"
 
 namespace diorama {
 namespace {
@@ -16,44 +17,64 @@ namespace {
 /// Distance where nothing was met.
 constexpr float kMiss = std::numeric_limits<float>::infinity();
 
-/// What one pixel's ray met.
-struct CentreHit {
-  CameraRay ray;
-  RayHit hit;
-};
-
-/// Makes one channel: `value` of every pixel that met something.
-class ChannelFiller {
+/// The wanted channels of one frame, filled pixel by pixel.
+class ChannelImages {
  public:
-  ChannelFiller(Frame& frame, const NameSet& wanted, const View& view,
-                const std::vector<CentreHit>& hits, Host& host)
-      : frame_(frame), wanted_(wanted), view_(view), hits_(hits), host_(host) {}
+  ChannelImages(const NameSet& wanted, const View& view)
+      : view_(view),
+        distance_(image(wanted, kDistanceToCamera, kMiss)),
+        depth_(image(wanted, kDistanceToImagePlane, kMiss)),
+        normals_(image(wanted, kNormals, Vec3f(Vec3f::Zero()))),
+        leaves_(image(wanted, kLeafId, 0u)),
+        positions_(image(wanted, kPosition, Vec3f(Vec3f::Zero()))),
+        uvs_(image(wanted, kUv, Vec2f(Vec2f::Zero()))),
+        albedo_(image(wanted, kAlbedo, Vec3f(Vec3f::Zero()))) {}
 
-  template <class Pixel, class Value>
-  void fill(Channel<Pixel> channel, const Pixel& miss, Value&& value) {
-    if (!wanted_.contains(channel.name)) return;
-    const int width = view_.camera().width;
-    Image<Pixel> image(width, view_.camera().height, miss);
-    host_.parallel_for(std::size_t(image.height()), [&](std::size_t y) {
-      auto row = image.row(int(y));
-      const CentreHit* hits = &hits_[y * std::size_t(width)];
-      for (std::size_t x = 0; x < row.size(); ++x) {
-        if (!hits[x].hit) continue;
-        SurfaceGeometry surface =
-            RenderScene::surface_at(hits[x].hit, hits[x].ray.origin, hits[x].ray.direction);
-        RenderScene::add_uv(surface, hits[x].hit);
-        row[x] = value(hits[x], surface);
-      }
-    });
-    frame_.set(channel, std::move(image));
+  void put(int x, int y, const CameraRay& ray, const RayHit& hit) {
+    if (leaves_) leaves_->at(x, y) = hit.instance->node.index;
+    SurfaceGeometry s = RenderScene::surface_at(hit, ray.origin, ray.direction);
+    if (uvs_ || albedo_) RenderScene::add_uv(s, hit);
+    if (distance_) distance_->at(x, y) = (s.position - ray.origin).norm();
+    if (depth_)
+      depth_->at(x, y) = float(-(view_.camera_from_world() * s.position.cast<double>()).z());
+    if (normals_) normals_->at(x, y) = s.normal;
+    if (positions_) positions_->at(x, y) = s.position;
+    if (uvs_) uvs_->at(x, y) = s.uv;
+    if (!albedo_) return;
+    const float width_m = view_.pixel_angle() * hit.distance;
+    albedo_->at(x, y) = base_color_at(hit, s, width_m * s.uv_per_metre);
+  }
+
+  void move_to(Frame& frame) {
+    move(distance_, kDistanceToCamera, frame);
+    move(depth_, kDistanceToImagePlane, frame);
+    move(normals_, kNormals, frame);
+    move(leaves_, kLeafId, frame);
+    move(positions_, kPosition, frame);
+    move(uvs_, kUv, frame);
+    move(albedo_, kAlbedo, frame);
   }
 
  private:
-  Frame& frame_;
-  const NameSet& wanted_;
+  template <class Pixel>
+  std::optional<Image<Pixel>> image(const NameSet& wanted, Channel<Pixel> channel,
+                                    const Pixel& miss) const {
+    if (!wanted.contains(channel.name)) return std::nullopt;
+    return Image<Pixel>(view_.camera().width, view_.camera().height, miss);
+  }
+  template <class Pixel>
+  static void move(std::optional<Image<Pixel>>& image, Channel<Pixel> channel, Frame& frame) {
+    if (image) frame.set(channel, std::move(*image));
+  }
+
   const View& view_;
-  const std::vector<CentreHit>& hits_;
-  Host& host_;
+  std::optional<Image<float>> distance_;
+  std::optional<Image<float>> depth_;
+  std::optional<Image<Vec3f>> normals_;
+  std::optional<Image<std::uint32_t>> leaves_;
+  std::optional<Image<Vec3f>> positions_;
+  std::optional<Image<Vec2f>> uvs_;
+  std::optional<Image<Vec3f>> albedo_;
 };
 
 /// Pixels that may see something of a box, at most one image size beyond the image. `blocks` are
@@ -90,26 +111,38 @@ PixelBox possible_pixels(const View& view, const std::optional<RayBlocks>& block
           bound(std::ceil(hi.x()) + 1.0, -w, 2 * w), bound(std::ceil(hi.y()) + 1.0, -h, 2 * h)};
 }
 
-CoverageMask coverage_of(const RenderScene& meshes, const View& view,
-                         const std::optional<RayBlocks>& blocks, const LabelledInstance& instance,
-                         bool with_distances) {
-  std::vector<std::uint32_t> own;
+/// The meshes of one labelled instance.
+struct OwnMeshes {
+  std::vector<std::uint32_t> numbers;
+  std::vector<bool> is_own;  ///< By number.
   Aabb bounds;
+  bool has_holes = false;  ///< By texture.
+};
+
+OwnMeshes meshes_of(const LabelledInstance& instance, const RenderScene& meshes) {
+  OwnMeshes own;
+  own.is_own.resize(meshes.instances().size(), false);
   for (std::uint32_t i = 0; i < meshes.instances().size(); ++i) {
     const MeshInstance& mesh = *meshes.instances()[i];
-    if (std::find(instance.leaves.begin(), instance.leaves.end(), mesh.node) ==
-        instance.leaves.end()) {
-      continue;
-    }
-    own.push_back(i);
-    bounds.add(mesh.bounds);
+    const auto& leaves = instance.leaves;
+    if (std::find(leaves.begin(), leaves.end(), mesh.node) == leaves.end()) continue;
+    own.numbers.push_back(i);
+    own.is_own[i] = true;
+    own.bounds.add(mesh.bounds);
+    own.has_holes |= std::any_of(mesh.materials.begin(), mesh.materials.end(),
+                                 [](const ShadingMaterial* m) { return m->is_cut_out; });
   }
+  return own;
+}
+
+/// By a ray through every pixel of the box: for bent lenses and holes.
+CoverageMask traced(const RenderScene& meshes, const View& view, const OwnMeshes& own,
+                    const PixelBox& box, bool with_distances) {
   CoverageMask mask;
-  mask.box = possible_pixels(view, blocks, bounds);
-  if (mask.box.is_empty()) return {};
-  const RenderScene::Part part(meshes, own);
-  for (int y = mask.box.y_min; y < mask.box.y_max; ++y) {
-    for (int x = mask.box.x_min; x < mask.box.x_max; ++x) {
+  mask.box = box;
+  const RenderScene::Part part(meshes, own.numbers);
+  for (int y = box.y_min; y < box.y_max; ++y) {
+    for (int x = box.x_min; x < box.x_max; ++x) {
       const auto ray = view.ray(Vec2(x + 0.5, y + 0.5));
       const float distance =
           ray ? part.distance(ray->origin, ray->direction, ray->t_min, ray->t_max) : kMiss;
@@ -117,6 +150,47 @@ CoverageMask coverage_of(const RenderScene& meshes, const View& view,
       if (with_distances) mask.distances.push_back(distance);
     }
   }
+  return mask;
+}
+
+CoverageMask drawn(const RenderScene& meshes, const View& view, const OwnMeshes& own,
+                   const PixelBox& box, bool with_distances) {
+  Silhouette silhouette(view.camera(), box, with_distances);
+  for (const std::uint32_t number : own.numbers) {
+    const MeshInstance& mesh = *meshes.instances()[number];
+    silhouette.add(mesh.mesh->triangles, mesh.world_positions, mesh.mesh->positions.size(),
+                   view.camera_from_world());
+  }
+  return silhouette.take();
+}
+
+/// A ray along an edge may meet what arithmetic finds a hair beside it. What is seen is covered, at
+/// the distance seen, and nothing is nearer.
+void agree_with(const Image<SeenPixel>& seen, const OwnMeshes& own, CoverageMask& mask) {
+  const PixelBox box = mask.box.clipped(seen.width(), seen.height());
+  for (int y = box.y_min; y < box.y_max; ++y) {
+    for (int x = box.x_min; x < box.x_max; ++x) {
+      const SeenPixel& pixel = seen.at(x, y);
+      if (!pixel.is_hit()) continue;
+      const std::size_t i = mask.index(x, y);
+      const bool is_own = own.is_own[pixel.mesh];
+      if (is_own) mask.bits[i] = 1;
+      if (mask.distances.empty() || mask.bits[i] == 0) continue;
+      mask.distances[i] = is_own ? pixel.distance : std::max(mask.distances[i], pixel.distance);
+    }
+  }
+}
+
+CoverageMask coverage_of(const RenderScene& meshes, const View& view,
+                         const std::optional<RayBlocks>& blocks, const Image<SeenPixel>& seen,
+                         const LabelledInstance& instance, bool with_distances) {
+  const OwnMeshes own = meshes_of(instance, meshes);
+  const PixelBox box = possible_pixels(view, blocks, own.bounds);
+  if (box.is_empty()) return {};
+  const bool needs_rays = blocks || own.has_holes;
+  CoverageMask mask = needs_rays ? traced(meshes, view, own, box, with_distances)
+                                 : drawn(meshes, view, own, box, with_distances);
+  agree_with(seen, own, mask);
   return mask.cropped(mask.extent());
 }
 
@@ -131,55 +205,36 @@ NameSet geometry_channels() {
   return names;
 }
 
-void fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshes, const View& view,
-                   Host& host) {
-  const NameSet known = geometry_channels();
-  if (std::none_of(known.begin(), known.end(), [&](const auto& n) { return wanted.contains(n); })) {
-    return;
-  }
+Image<SeenPixel> fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshes,
+                               const View& view, Host& host) {
   const int width = view.camera().width;
   const int height = view.camera().height;
-  std::vector<CentreHit> hits(std::size_t(width) * std::size_t(height));
-  host.parallel_for(std::size_t(height), [&](std::size_t y) {
+  Image<SeenPixel> seen(width, height, SeenPixel());
+  ChannelImages channels(wanted, view);
+  host.parallel_for(std::size_t(height), [&](std::size_t row) {
+    const int y = int(row);
     for (int x = 0; x < width; ++x) {
-      const auto ray = view.ray(Vec2(x + 0.5, double(y) + 0.5));
+      const auto ray = view.ray(Vec2(x + 0.5, y + 0.5));
       if (!ray) continue;
-      CentreHit& hit = hits[y * std::size_t(width) + std::size_t(x)];
-      hit.ray = *ray;
-      hit.hit = meshes.intersect(ray->origin, ray->direction, ray->t_min, ray->t_max);
+      const RayHit hit = meshes.intersect(ray->origin, ray->direction, ray->t_min, ray->t_max);
+      if (!hit) continue;
+      seen.at(x, y) = {hit.geometry, hit.distance};
+      channels.put(x, y, *ray, hit);
     }
   });
-
-  const Vec3f none = Vec3f::Zero();
-  const Vec2f no_vector = Vec2f::Zero();
-  ChannelFiller filler(frame, wanted, view, hits, host);
-  filler.fill(kDistanceToCamera, kMiss, [](const CentreHit& h, const SurfaceGeometry& s) {
-    return (s.position - h.ray.origin).norm();
-  });
-  filler.fill(kDistanceToImagePlane, kMiss, [&](const CentreHit&, const SurfaceGeometry& s) {
-    return float(-(view.camera_from_world() * s.position.cast<double>()).z());
-  });
-  filler.fill(kNormals, none, [](const CentreHit&, const SurfaceGeometry& s) { return s.normal; });
-  filler.fill(kLeafId, 0u, [](const CentreHit& h, const SurfaceGeometry&) {
-    return h.hit.instance->node.index;
-  });
-  filler.fill(kPosition, none,
-              [](const CentreHit&, const SurfaceGeometry& s) { return s.position; });
-  filler.fill(kUv, no_vector, [](const CentreHit&, const SurfaceGeometry& s) { return s.uv; });
-  filler.fill(kAlbedo, none, [&](const CentreHit& h, const SurfaceGeometry& s) {
-    const float width_m = view.pixel_angle() * h.hit.distance;
-    return base_color_at(h.hit, s, width_m * s.uv_per_metre);
-  });
+  channels.move_to(frame);
+  return seen;
 }
 
 std::vector<CoverageMask> coverage(const RenderScene& meshes, const View& view,
+                                   const Image<SeenPixel>& seen,
                                    std::span<const LabelledInstance> instances, bool with_distances,
                                    Host& host) {
   std::vector<CoverageMask> masks(instances.size());
   std::optional<RayBlocks> blocks;
   if (view.camera().lens != LensModel::Pinhole) blocks.emplace(view.camera(), host);
   host.parallel_for(instances.size(), [&](std::size_t i) {
-    masks[i] = coverage_of(meshes, view, blocks, instances[i], with_distances);
+    masks[i] = coverage_of(meshes, view, blocks, seen, instances[i], with_distances);
   });
   return masks;
 }

@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
 #include "diorama/frame.h"
 #include "diorama/host.h"
 #include "render_scene.h"
@@ -11,12 +16,23 @@ namespace diorama {
 /// Names of the channels that fill_channels() knows.
 NameSet geometry_channels();
 
-/// Fills the wanted ones among the id and geometry channels, all from one ray per pixel centre.
-void fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshes, const View& view,
-                   Host& host);
+/// What the ray through a pixel's centre met first.
+struct SeenPixel {
+  static constexpr std::uint32_t kNothing = 0xFFFFFFFFu;
 
-/// See Renderer::cover.
+  std::uint32_t mesh = kNothing;  ///< Number in RenderScene::instances().
+  float distance = std::numeric_limits<float>::infinity();
+  bool is_hit() const { return mesh != kNothing; }
+};
+
+/// Fills the wanted ones among the id and geometry channels, all from one ray per pixel centre, and
+/// returns what these rays met.
+Image<SeenPixel> fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshes,
+                               const View& view, Host& host);
+
+/// See Renderer::cover. `seen` is that of the same view.
 std::vector<CoverageMask> coverage(const RenderScene& meshes, const View& view,
+                                   const Image<SeenPixel>& seen,
                                    std::span<const LabelledInstance> instances, bool with_distances,
                                    Host& host);
 

@@ -11,7 +11,6 @@
 #include <cmath>
 #include <vector>
 
-#include "channels.h"
 #include "sample_plan.h"
 #include "stopwatch.h"
 #include "view_transform.h"
@@ -125,6 +124,7 @@ RenderReport EmbreeRenderer::report() const {
 
 void EmbreeRenderer::do_prepare(const Scene& scene) {
   counts_ = {};
+  seen_by_ = {};
   meshes_.take(scene);
   if (meshes_.lights().is_empty()) {
     host_.log(LogLevel::Warning, "the scene has no light: pictures will be black");
@@ -195,9 +195,12 @@ Frame EmbreeRenderer::do_render(const Scene& scene, const RenderRequest& request
   const View view(scene, request.camera);
   Frame frame;
   counts_ = {};
-  {
+  const NameSet known = geometry_channels();
+  if (std::any_of(known.begin(), known.end(),
+                  [&](const auto& name) { return request.channels.contains(name); })) {
     const Stopwatch watch(counts_.channels_s);
-    fill_channels(frame, request.channels, meshes_, view, host_);
+    seen_ = fill_channels(frame, request.channels, meshes_, view, host_);
+    seen_by_ = request.camera;
   }
   const bool wants_color =
       request.channels.contains(kColor.name) || request.channels.contains(kColorHdr.name);
@@ -208,7 +211,13 @@ Frame EmbreeRenderer::do_render(const Scene& scene, const RenderRequest& request
 std::vector<CoverageMask> EmbreeRenderer::do_cover(const Scene& scene, NodeId camera,
                                                    std::span<const LabelledInstance> instances,
                                                    bool with_distances) {
-  return coverage(meshes_, View(scene, camera), instances, with_distances, host_);
+  const View view(scene, camera);
+  if (seen_by_ != camera) {
+    Frame frame;
+    seen_ = fill_channels(frame, {}, meshes_, view, host_);
+    seen_by_ = camera;
+  }
+  return coverage(meshes_, view, seen_, instances, with_distances, host_);
 }
 
 }  // namespace diorama

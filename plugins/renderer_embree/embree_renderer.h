@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "channels.h"
 #include "denoiser.h"
 #include "diorama/host.h"
 #include "diorama/params.h"
@@ -66,6 +67,8 @@ class EmbreeRenderer final : public Renderer {
   Isa isa_;
   RenderScene meshes_;
   Counts counts_;
+  NodeId seen_by_;  ///< The camera of `seen_`, if there is any.
+  Image<SeenPixel> seen_;
 };
 
 }  // namespace diorama

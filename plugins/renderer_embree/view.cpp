@@ -48,7 +48,8 @@ CameraRay View::limited(const Vec3& origin, const Vec3& d) const {
 }
 
 std::optional<CameraRay> View::ray(const Vec2& pixel) const {
-  const auto d = direction(pixel);
+  if (camera_.lens == LensModel::Pinhole) return straight_ray(pixel.cast<float>());
+  const auto d = ray_direction(camera_, pixel);
   if (!d) return std::nullopt;
   return limited(Vec3::Zero(), *d);
 }

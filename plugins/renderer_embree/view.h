@@ -32,15 +32,7 @@ class View {
   /// The same through a point of the aperture, for cameras with depth of field; t_max is zero where
   /// the lens images nothing. Inline and in single precision for cameras without either.
   CameraRay sample_ray(const Vec2f& pixel, const Vec2f& aperture) const {
-    if (!is_plain_) return bent_ray(pixel.cast<double>(), aperture);
-    CameraRay ray;
-    const Vec3f d = towards_ + pixel.x() * per_column_ + pixel.y() * per_row_;
-    const float slant = std::sqrt(d.squaredNorm());
-    ray.origin = origin_;
-    ray.direction = d * (1.0f / slant);
-    ray.t_min = near_ * slant;
-    ray.t_max = far_ * slant;
-    return ray;
+    return is_plain_ ? straight_ray(pixel) : bent_ray(pixel.cast<double>(), aperture);
   }
 
   /// Whether rows or samples see different moments.
@@ -52,6 +44,17 @@ class View {
   CameraRay moved(const CameraRay& ray, double seconds) const;
 
  private:
+  /// Through a pinhole.
+  CameraRay straight_ray(const Vec2f& pixel) const {
+    CameraRay ray;
+    const Vec3f d = towards_ + pixel.x() * per_column_ + pixel.y() * per_row_;
+    const float slant = std::sqrt(d.squaredNorm());
+    ray.origin = origin_;
+    ray.direction = d * (1.0f / slant);
+    ray.t_min = near_ * slant;
+    ray.t_max = far_ * slant;
+    return ray;
+  }
   CameraRay bent_ray(const Vec2& pixel, const Vec2f& aperture) const;
   std::optional<Vec3> direction(const Vec2& pixel) const;
   CameraRay limited(const Vec3& origin, const Vec3& direction_camera) const;
@@ -64,8 +67,8 @@ class View {
   Affine camera_from_world_;
   float pixel_angle_;
   double aperture_radius_;  ///< Metres; 0: no depth of field.
-  // A pinhole without depth of field: rays towards_ + x per_column_ + y per_row_, one metre deep.
-  bool is_plain_;
+  bool is_plain_;           ///< A pinhole without depth of field.
+  // Rays of pinholes are towards_ + x per_column_ + y per_row_, one metre deep.
   Vec3f origin_;
   Vec3f towards_;
   Vec3f per_column_;

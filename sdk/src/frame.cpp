@@ -2,6 +2,7 @@
 #include "diorama/frame.h"
 
 #include <algorithm>
+#include <span>
 
 namespace diorama {
 
@@ -11,14 +12,17 @@ bool CoverageMask::covers(int x, int y) const {
 }
 
 PixelBox CoverageMask::extent() const {
+  if (box.is_empty()) return {};
   PixelBox extent{box.x_max, box.y_max, box.x_min, box.y_min};
-  std::size_t i = 0;
   for (int y = box.y_min; y < box.y_max; ++y) {
-    for (int x = box.x_min; x < box.x_max; ++x, ++i) {
-      if (bits[i] == 0) continue;
-      extent = {std::min(extent.x_min, x), std::min(extent.y_min, y), std::max(extent.x_max, x + 1),
-                std::max(extent.y_max, y + 1)};
-    }
+    // Large objects fill their rows: looking from both ends is soon over.
+    const std::span row(&bits[index(box.x_min, y)], std::size_t(box.width()));
+    const auto first = std::find_if(row.begin(), row.end(), [](auto bit) { return bit != 0; });
+    if (first == row.end()) continue;
+    const auto last = std::find_if(row.rbegin(), row.rend(), [](auto bit) { return bit != 0; });
+    extent = {std::min(extent.x_min, box.x_min + int(first - row.begin())),
+              std::min(extent.y_min, y),
+              std::max(extent.x_max, box.x_max - int(last - row.rbegin())), y + 1};
   }
   return extent.is_empty() ? PixelBox() : extent;
 }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "diorama/rng.h"
 #include "embree_renderer.h"
 #include "null_renderer.h"
 #include "support/catch.h"
@@ -216,6 +217,61 @@ TEST_CASE("a coverage mask is what the object covers alone, also beyond the imag
     CHECK(masks[i].box == extent);
   }
   CHECK(masks[0].box.x_min < 0);  // one of the two lies outside on the left
+}
+
+TEST_CASE("coverage by arithmetic is that of rays, all around the camera", "[channels]") {
+  // What is whole is drawn, what may have holes is traced.
+  auto opaque = std::make_shared<Texture>();
+  opaque->width = opaque->height = opaque->channels = 1;
+  opaque->bytes = {255};
+  Material traced = matte(0.5f);
+  traced.opacity_texture.texture = opaque;
+  traced.opacity_threshold = 0.5f;
+  Mesh soup;
+  Rng rng(8);
+  for (std::uint32_t i = 0; i < 400; ++i) {
+    const Vec3f middle(float(rng.uniform(-4, 4)), float(rng.uniform(-4, 4)),
+                       float(rng.uniform(-4, 4)));
+    const float size = i % 40 == 0 ? 5.0f : 0.4f;
+    for (int corner = 0; corner < 3; ++corner) {
+      soup.positions.push_back(
+          middle + size * Vec3f(float(rng.normal()), float(rng.normal()), float(rng.normal())));
+    }
+    soup.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+  }
+  const double near_m = GENERATE(0.001, 1.5);
+  const double far_m = GENERATE(2.5, 1000.0);
+  RenderHost host(2);
+  std::vector<CoverageMask> masks;
+  for (const Material& material : {matte(0.5f), traced}) {
+    TestWorld world;
+    const NodeId node = world.add("soup", Mesh(soup), material, at(0.1, 0, 0));
+    const NodeId camera = world.add_camera(96, 72, 60.0, Vec3(0.3, -0.2, 0.1), Vec3(1, 0.4, 0.3));
+    world.scene.edit(camera).camera->near_m = near_m;
+    world.scene.edit(camera).camera->far_m = far_m;
+    EmbreeRenderer renderer({}, host);
+    renderer.prepare(world.scene);
+    const std::vector<LabelledInstance> instances{{node, {node}}};
+    masks.push_back(renderer.cover(camera, instances, true)[0]);
+  }
+  int covered = 0;
+  int differing = 0;
+  for (int y = -72; y < 144; ++y) {
+    for (int x = -96; x < 192; ++x) {
+      const bool is_met = masks[1].covers(x, y);
+      covered += is_met;
+      if (is_met != masks[0].covers(x, y)) {
+        ++differing;
+      } else if (is_met) {
+        const float a = masks[0].distances[masks[0].index(x, y)];
+        const float b = masks[1].distances[masks[1].index(x, y)];
+        differing += std::abs(a - b) > 1e-4f * b;
+      }
+    }
+  }
+  CAPTURE(near_m, far_m, covered);
+  CHECK(covered > 5000);
+  CHECK(differing <= 12);  // rays along an edge may fall to either side
 }
 
 TEST_CASE("what is cut out does not cover, what is hidden neither", "[channels]") {
