@@ -1,10 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// What labels and files cost beside a path-traced frame of the bench scene, in CPU seconds of one
-// run: the renderer's geometry channels, every annotator and coverage against the colour alone
-// (labels_per_color), and BasicWriter with every annotator in its encoding (files_per_color).
+// What labels and files cost beside a frame of the bench scene, in CPU seconds of one run: the
+// renderer's geometry channels, every annotator and coverage against the colour alone
+// (labels_per_color), and BasicWriter with every annotator in its encoding (files_per_color). Then
+// whole frames as a run makes them, files written beside the next frame: their CPU seconds and how
+// many there are per second of wall time (frame_cpu_s, frames_per_s).
+//
+//   labels_bench BENCH_FOLDER --real-time --repetitions 20
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
+#include <future>
 #include <nlohmann/json.hpp>
 
 #include "bench_scene.h"
@@ -85,6 +91,7 @@ struct Options {
   int threads = 2;
   int repetitions = 3;
   std::string lens = "pinhole";
+  bool is_real_time = false;
   EmbreeRenderer::Params params;
 };
 
@@ -113,6 +120,33 @@ void annotate(const Scene& scene, const BodyPoses& before, EmbreeRenderer& rende
     ObjectCoordinates({}, host).annotate(scene, frame);
     return 0;
   });
+}
+
+/// Whole frames, with files encoded by a thread of their own.
+void measure_frames(const Scene& scene, const BodyPoses& before, EmbreeRenderer& renderer,
+                    NodeId camera, Host& host, BasicWriter& writer, int count,
+                    nlohmann::ordered_json& line) {
+  NameSet channels = renderer.provides();
+  channels.erase(std::string(kColorHdr.name));
+  Times times;
+  ForgottenFiles files;
+  std::future<void> written;
+  const double cpu_start = cpu_seconds();
+  const auto start = std::chrono::steady_clock::now();
+  for (int i = 0; i < count; ++i) {
+    Capture capture;
+    capture.index = i;
+    capture.frames.push_back(renderer.render({camera, channels, std::uint64_t(i)}));
+    annotate(scene, before, renderer, camera, host, capture.frames.back(), times);
+    if (written.valid()) written.get();
+    written = std::async(std::launch::async, [&writer, &files, capture = std::move(capture)] {
+      writer.write(capture, files);
+    });
+  }
+  written.get();
+  const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - start;
+  line["frame_cpu_s"] = (cpu_seconds() - cpu_start) / count;
+  line["frames_per_s"] = count / wall.count();
 }
 
 void run(const Options& options) {
@@ -158,7 +192,9 @@ void run(const Options& options) {
   for (const char* part : {"channels", "instances", "cover", "other_annotators"}) {
     labels += times.median(part);
   }
+  measure_frames(scene, before, renderer, camera, host, writer, options.repetitions, line);
   line["size"] = std::to_string(options.width) + "x" + std::to_string(options.height);
+  line["mode"] = options.params.mode;
   line["samples"] = options.params.samples;
   line["lens"] = options.lens;
   line["instances"] = labelled_instances(scene).size();
@@ -183,7 +219,12 @@ int main(int argc, char** argv) {
   app.add_option("--threads", options.threads);
   app.add_option("--repetitions", options.repetitions);
   app.add_option("--lens", options.lens)->check(CLI::IsMember({"pinhole", "opencv", "fisheye"}));
+  app.add_flag("--real-time", options.is_real_time, "The mode of that name, with one path");
   CLI11_PARSE(app, argc, argv);
+  if (options.is_real_time) {
+    options.params.mode = "real_time";
+    options.params.samples = 1;
+  }
   try {
     run(options);
   } catch (const std::exception& error) {
