@@ -289,7 +289,8 @@ TEST_CASE("radiance is finite and never negative", "[renderer]") {
     EmbreeRenderer::Params params = reference(24);
     params.denoise = denoise;
     params.caustics = !denoise;
-    for (const Vec3f& p : render(world, camera, params).pixels()) {
+    const Image<Vec3f> picture = render(world, camera, params);
+    for (const Vec3f& p : picture.pixels()) {
       REQUIRE(p.allFinite());
       REQUIRE(p.minCoeff() >= 0.0f);
     }
