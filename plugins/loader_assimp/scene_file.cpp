@@ -118,7 +118,9 @@ class AssimpLog {
 std::string read_in_child(const std::string& file, const std::function<std::string()>& body) {
   std::error_code error;
   // A pipe would be waited for.
-  if (!fs::is_regular_file(file, error)) return "it is not a regular file";
+  if (fs::exists(file, error) && !fs::is_regular_file(file, error)) {
+    return "it is not a regular file";
+  }
   return run_in_child(limits_for(file), body);
 }
 

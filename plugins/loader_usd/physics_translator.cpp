@@ -73,7 +73,9 @@ void PhysicsTranslator::add_body(const Prim& prim, NodeId node) {
   RigidBody body;
   body.has_gravity = !usd::bool_or(stage_, prim, "physxRigidBody:disableGravity", false);
   const double stated = usd::number_or(stage_, prim, "physics:mass", 0.0) * kilograms_per_unit_;
-  const double computed = is_positive(stated) ? 0.0 : density(prim) * volume(node);
+  const double dense = is_positive(stated) ? 0.0 : density(prim);
+  // Volumes take time, and few files say a density.
+  const double computed = is_positive(dense) ? dense * volume(node) : 0.0;
   if (is_positive(stated)) {
     body.mass_kg = stated;
   } else if (is_positive(computed)) {
