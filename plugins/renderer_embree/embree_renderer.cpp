@@ -11,6 +11,7 @@
 #include <cmath>
 #include <vector>
 
+#include "oidn_denoiser.h"
 #include "sample_plan.h"
 #include "stopwatch.h"
 #include "view_transform.h"
@@ -19,6 +20,9 @@ namespace diorama {
 namespace {
 
 constexpr std::array kModes{"path_traced", "real_time", "preview"};
+#ifdef DIORAMA_HAS_OIDN
+constexpr std::array kDenoisers{"own", "oidn"};
+#endif
 constexpr std::array kExposures{"auto", "fixed"};
 constexpr std::array kViewTransforms{"standard", "filmic"};
 constexpr std::array kSphereLights{"sphere", "disk"};
@@ -66,6 +70,10 @@ void EmbreeRenderer::Params::visit(ParamVisitor& v) {
   v.param("max_bounces", max_bounces,
           {"How often light may be scattered after the first surface.", "", 0, 64});
   v.param("denoise", denoise, {"Remove noise from the colour channels (never from labels)."});
+#ifdef DIORAMA_HAS_OIDN
+  v.choice("denoiser", denoiser, kDenoisers,
+           {"own: the plugin's; oidn: Open Image Denoise, whose pictures depend on its version."});
+#endif
   v.param(
       "caustics", caustics,
       {"Follow light focused by glass and mirrors; noisy. Off: glass lets light pass straight."});
@@ -169,6 +177,13 @@ Film EmbreeRenderer::trace(const View& view, std::uint64_t seed) {
   return film;
 }
 
+Image<Vec3f> EmbreeRenderer::without_noise(const Film& film, const View& view) {
+#ifdef DIORAMA_HAS_OIDN
+  if (params_.denoiser == "oidn") return oidn_denoised(film, host_);
+#endif
+  return denoised(film, view.position(), isa_, host_);
+}
+
 void EmbreeRenderer::put_colors(Frame& frame, const RenderRequest& request, const View& view) {
   Film film;
   {
@@ -178,7 +193,7 @@ void EmbreeRenderer::put_colors(Frame& frame, const RenderRequest& request, cons
   Image<Vec3f> hdr;
   {
     const Stopwatch watch(counts_.denoise_s);
-    hdr = params_.denoise ? denoised(film, view.position(), isa_, host_) : undenoised(film);
+    hdr = params_.denoise ? without_noise(film, view) : undenoised(film);
   }
   const double base = params_.exposure == "auto" ? automatic_exposure(hdr) : 1.0;
   frame.exposure = base * std::exp2(params_.exposure_ev);

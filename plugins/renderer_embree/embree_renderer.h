@@ -25,6 +25,7 @@ class EmbreeRenderer final : public Renderer {
     double time_budget_s = 0.0;
     int max_bounces = 6;
     bool denoise = true;
+    std::string denoiser = "own";  ///< A parameter only where the build found another one.
     bool caustics = false;
     double clamp = 0.0;
     std::string exposure = "auto";
@@ -60,6 +61,7 @@ class EmbreeRenderer final : public Renderer {
                                      std::span<const LabelledInstance> instances,
                                      bool with_distances) override;
   Film trace(const View& view, std::uint64_t seed);
+  Image<Vec3f> without_noise(const Film& film, const View& view);
   void put_colors(Frame& frame, const RenderRequest& request, const View& view);
 
   Params params_;

@@ -6,9 +6,21 @@
 #include <cmath>
 
 namespace diorama {
+namespace {
+
+// Far below all pixels: conversions to int round towards it, the library's floor() is a call.
+constexpr double kShift = 1 << 20;
+/// The largest whole number not above the value, within [from, to].
+int floor_within(double value, int from, int to) {
+  return int(std::clamp(value, double(from), double(to)) + kShift) - int(kShift);
+}
+int ceil_within(double value, int from, int to) { return -floor_within(-value, -to, -from); }
+
+}  // namespace
 
 Silhouette::Silhouette(const Camera& camera, const PixelBox& box, bool with_distances)
     : camera_(camera),
+      per_focal_length_(1.0 / camera.fx, 1.0 / camera.fy),
       box_(box),
       has_distances_(with_distances),
       bits_(std::size_t(box.width()) * std::size_t(box.height()), 0) {
@@ -38,27 +50,19 @@ PixelBox Silhouette::pixels_around(const Corner& a, const Corner& b, const Corne
   constexpr double kRounding = 1e-6;
   const Vec2 low = a.pixel.cwiseMin(b.pixel).cwiseMin(c.pixel);
   const Vec2 high = a.pixel.cwiseMax(b.pixel).cwiseMax(c.pixel);
-  const auto bound = [](double value, int from, int to) {
-    return int(std::clamp(value, double(from), double(to)));
-  };
-  return {bound(std::ceil(low.x() - 0.5 - kRounding), box_.x_min, box_.x_max),
-          bound(std::ceil(low.y() - 0.5 - kRounding), box_.y_min, box_.y_max),
-          bound(std::floor(high.x() + 0.5 + kRounding), box_.x_min, box_.x_max),
-          bound(std::floor(high.y() + 0.5 + kRounding), box_.y_min, box_.y_max)};
+  return {ceil_within(low.x() - 0.5 - kRounding, box_.x_min, box_.x_max),
+          ceil_within(low.y() - 0.5 - kRounding, box_.y_min, box_.y_max),
+          floor_within(high.x() + 0.5 + kRounding, box_.x_min, box_.x_max),
+          floor_within(high.y() + 0.5 + kRounding, box_.y_min, box_.y_max)};
 }
 
 /// Through the eye: what lies on the side of the plane that `normal` points to.
 Silhouette::Line Silhouette::line_of(const Vec3& normal) const {
   Line line;
-  line.per_column = normal.x() / camera_.fx;
-  line.per_row = -normal.y() / camera_.fy;
-  line.at_origin = normal.x() * ((0.5 - camera_.cx) / camera_.fx) +
-                   normal.y() * ((camera_.cy - 0.5) / camera_.fy) - normal.z();
-  return line;
-}
-
-Silhouette::Line Silhouette::finished(Line line) {
-  line.column_of_zero = -1.0 / line.per_column;
+  line.per_column = normal.x() * per_focal_length_.x();
+  line.per_row = -normal.y() * per_focal_length_.y();
+  line.at_origin =
+      line.per_column * (0.5 - camera_.cx) + line.per_row * (0.5 - camera_.cy) - normal.z();
   return line;
 }
 
@@ -69,11 +73,11 @@ void Silhouette::narrow(const Line& line, int row, Span& span) {
     if (value < 0.0) span.last = span.first - 1;
     return;
   }
-  const double column = std::clamp(value * line.column_of_zero, span.first - 1.0, span.last + 1.0);
+  const double zero = -value / line.per_column;
   if (line.per_column > 0.0) {
-    span.first = std::max(span.first, int(std::ceil(column)));
+    span.first = ceil_within(zero, span.first, span.last + 1);
   } else {
-    span.last = std::min(span.last, int(std::floor(column)));
+    span.last = floor_within(zero, span.first - 1, span.last);
   }
 }
 
@@ -97,17 +101,19 @@ void Silhouette::add_triangle(const Corner& a, const Corner& b, const Corner& c)
     ca = -ca;
     volume = -volume;
   }
-  // 1 / depth, which is straight in the picture.
-  const Line nearness = line_of((ab + bc + ca) / volume);
-  std::array<Line, 5> lines{finished(line_of(ab)), finished(line_of(bc)), finished(line_of(ca))};
+  const bool is_cut_near = nearest < camera_.near_m;
+  const bool is_cut_far = farthest > camera_.far_m;
+  Line nearness;  // 1 / depth, which is straight in the picture
+  if (has_distances_ || is_cut_near || is_cut_far) nearness = line_of((ab + bc + ca) / volume);
+  std::array<Line, 5> lines{line_of(ab), line_of(bc), line_of(ca)};
   std::size_t count = 3;
-  if (nearest < camera_.near_m) {
-    lines[count++] = finished(
-        {-nearness.per_column, -nearness.per_row, 1.0 / camera_.near_m - nearness.at_origin});
+  if (is_cut_near) {
+    lines[count++] = {-nearness.per_column, -nearness.per_row,
+                      1.0 / camera_.near_m - nearness.at_origin};
   }
-  if (farthest > camera_.far_m) {
-    lines[count++] =
-        finished({nearness.per_column, nearness.per_row, nearness.at_origin - 1.0 / camera_.far_m});
+  if (is_cut_far) {
+    lines[count++] = {nearness.per_column, nearness.per_row,
+                      nearness.at_origin - 1.0 / camera_.far_m};
   }
   for (int row = around.y_min; row < around.y_max; ++row) {
     Span span{around.x_min, around.x_max - 1};

@@ -38,7 +38,6 @@ class Silhouette {
     double per_column = 0.0;
     double per_row = 0.0;
     double at_origin = 0.0;
-    double column_of_zero = 0.0;  ///< -1 / per_column.
   };
   /// Pixels of one row, both ends included.
   struct Span {
@@ -49,11 +48,11 @@ class Silhouette {
   void add_triangle(const Corner& a, const Corner& b, const Corner& c);
   PixelBox pixels_around(const Corner& a, const Corner& b, const Corner& c) const;
   Line line_of(const Vec3& normal) const;
-  static Line finished(Line line);
   static void narrow(const Line& line, int row, Span& span);
   void fill(int row, const Span& span, const Line& nearness);
 
   const Camera& camera_;
+  Vec2 per_focal_length_;
   PixelBox box_;
   bool has_distances_;
   std::vector<Corner> corners_;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "writer_support/npy.h"
 
+#include <array>
 #include <bit>
 #include <string>
 
@@ -16,8 +17,11 @@ void PackedBytes::add_u16(std::uint16_t value) {
   for (int shift = 0; shift < 16; shift += 8) bytes.push_back(std::byte((value >> shift) & 0xFF));
 }
 
+// All at once: point clouds are millions of these.
 void PackedBytes::add_u32(std::uint32_t value) {
-  for (int shift = 0; shift < 32; shift += 8) bytes.push_back(std::byte((value >> shift) & 0xFF));
+  std::array<std::byte, 4> four;
+  for (std::size_t i = 0; i < four.size(); ++i) four[i] = std::byte((value >> (8 * i)) & 0xFF);
+  bytes.insert(bytes.end(), four.begin(), four.end());
 }
 
 void PackedBytes::add_i32(std::int32_t value) { add_u32(std::bit_cast<std::uint32_t>(value)); }
