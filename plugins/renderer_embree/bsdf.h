@@ -26,6 +26,8 @@ struct SurfaceBsdf {
   /// 2012), and light between facets is lost. Returns more light than arrives at grazing angles.
   bool stacks_lobes = false;
 
+  /// Weight of the glass.
+  float glass_share() const { return glass ? (1.0f - metallic) * transmission : 0.0f; }
   /// Diffuse and nothing else.
   bool is_lambert() const {
     return metallic <= 0.0f && layers.specular <= 0.0f && layers.coat <= 0.0f && !glass;
@@ -56,9 +58,6 @@ class Bsdf {
   bool has_smooth_part() const { return has_smooth_part_; }
   /// Share of uniform light returned to wo: guides the denoiser.
   Vec3f albedo() const;
-  /// Whether light through the back of the surface can matter here.
-  bool transmits() const { return p_glass_ > 0.0f; }
-
   /// Whether all lobes are wide, so that light samples alone find light well.
   bool is_rough() const {
     constexpr float kRoughAlpha = 0.25f;
@@ -67,8 +66,12 @@ class Bsdf {
   }
 
   BsdfValue evaluate(const Vec3f& wi) const;
-  /// `lobe` in [0, 1) chooses, `u` places.
-  BsdfSample sample(float lobe, const Vec2f& u) const;
+  /// `lobe` in [0, 1) chooses, `u` places; `by_cosine` is cosine_hemisphere(u), which is cheaper
+  /// made for many at once.
+  BsdfSample sample(float lobe, const Vec2f& u, const Vec3f& by_cosine) const;
+  BsdfSample sample(float lobe, const Vec2f& u) const {
+    return sample(lobe, u, cosine_hemisphere(u));
+  }
 
  private:
   /// D G / (4 cos_o cos_i) * cos_i and the density of reflections by visible normals.
@@ -114,7 +117,7 @@ inline Bsdf::Bsdf(const SurfaceBsdf& surface, const Vec3f& wo)
     plastic_ = 1.0f;
     return;
   }
-  glass_ = s_.glass ? (1.0f - s_.metallic) * s_.transmission : 0.0f;
+  glass_ = s_.glass_share();
   plastic_ = (1.0f - s_.metallic) - glass_;
   is_smooth_glass_ = s_.alpha <= kSmoothAlpha;
   lambda_o_ = ggx_lambda(wo_.z(), s_.alpha);
@@ -324,11 +327,11 @@ inline BsdfValue Bsdf::evaluate(const Vec3f& wi) const {
   return is_on_its_side ? wi : Vec3f::Zero();
 }
 
-inline BsdfSample Bsdf::sample(float lobe, const Vec2f& u) const {
+inline BsdfSample Bsdf::sample(float lobe, const Vec2f& u, const Vec3f& by_cosine) const {
   BsdfSample sample;
   sample.spread = 0.5f;
   if (is_lambert_) {
-    sample.wi = cosine_hemisphere(u);
+    sample.wi = by_cosine;
     sample.weight = s_.base;
     sample.density = sample.wi.z() * (1.0f / kPiF);
     return sample;
@@ -344,7 +347,7 @@ inline BsdfSample Bsdf::sample(float lobe, const Vec2f& u) const {
     sample.spread = is_coat ? s_.layers.coat_alpha : s_.alpha;
     sample.wi = mirrored(wo_, ggx_visible_normal(wo_, sample.spread, u));
   } else {
-    sample.wi = cosine_hemisphere(u);
+    sample.wi = by_cosine;
   }
   sample.is_transmitted = sample.wi.z() < 0.0f;
   // A facet that sends a reflection below the horizon loses it.

@@ -35,10 +35,10 @@ class SquareDistribution {
  private:
   /// Place of u among the intervals of a cumulative table, as index plus share.
   static float inverse(const float* cumulative, int count, float u) {
-    const float* it = std::upper_bound(cumulative + 1, cumulative + count, u) - 1;
-    const float size = it[1] - it[0];
-    const float rest = size > 0.0f ? (u - it[0]) / size : 0.5f;
-    return float(it - cumulative) + std::clamp(rest, 0.0f, 0.99999f);
+    const int i = interval_of(cumulative, count, u);
+    const float size = cumulative[i + 1] - cumulative[i];
+    const float rest = size > 0.0f ? (u - cumulative[i]) / size : 0.5f;
+    return float(i) + std::clamp(rest, 0.0f, 0.99999f);
   }
 
   int width_ = 0;

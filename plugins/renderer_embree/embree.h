@@ -26,6 +26,18 @@ inline void occluded(RTCScene scene, Context& context, RTCRay& ray) {
   arguments.context = &context;
   rtcOccluded1(scene, &ray, &arguments);
 }
+inline void intersect(const int* valid, RTCScene scene, Context& context, RTCRayHit8& rays) {
+  RTCIntersectArguments arguments;
+  rtcInitIntersectArguments(&arguments);
+  arguments.context = &context;
+  rtcIntersect8(valid, scene, &rays, &arguments);
+}
+inline void occluded(const int* valid, RTCScene scene, Context& context, RTCRay8& rays) {
+  RTCOccludedArguments arguments;
+  rtcInitOccludedArguments(&arguments);
+  arguments.context = &context;
+  rtcOccluded8(valid, scene, &rays, &arguments);
+}
 #else
 using Context = RTCIntersectContext;
 inline void init(Context& context) { rtcInitIntersectContext(&context); }
@@ -34,6 +46,12 @@ inline void intersect(RTCScene scene, Context& context, RTCRayHit& ray) {
 }
 inline void occluded(RTCScene scene, Context& context, RTCRay& ray) {
   rtcOccluded1(scene, &context, &ray);
+}
+inline void intersect(const int* valid, RTCScene scene, Context& context, RTCRayHit8& rays) {
+  rtcIntersect8(valid, scene, &context, &rays);
+}
+inline void occluded(const int* valid, RTCScene scene, Context& context, RTCRay8& rays) {
+  rtcOccluded8(valid, scene, &context, &rays);
 }
 #endif
 

@@ -12,7 +12,7 @@ LightTree::LightTree(const std::vector<Light>& lights) : places_(lights.size()) 
   build(lights, all);
 }
 
-void LightTree::set_lane(Block& block, int lane, const Light& light, std::int32_t child) {
+void LightTree::set_lane(Block& block, std::uint32_t lane, const Light& light, std::int32_t child) {
   block.x[lane] = light.position.x();
   block.y[lane] = light.position.y();
   block.z[lane] = light.position.z();
@@ -22,7 +22,7 @@ void LightTree::set_lane(Block& block, int lane, const Light& light, std::int32_
   block.direction_y[lane] = light.direction.y();
   block.direction_z[lane] = light.direction.z();
   block.one_sided[lane] = light.is_one_sided ? 1.0f : 0.0f;
-  block.child[std::size_t(lane)] = child;
+  block.child[lane] = child;
 }
 
 LightTree::Light LightTree::group(const std::vector<Light>& lights, const Range& members) {
@@ -71,14 +71,14 @@ std::uint32_t LightTree::build(const std::vector<Light>& lights, const Range& me
   for (std::uint32_t lane = 0; lane < groups.size(); ++lane) {
     const Range& own = groups[lane];
     if (own.size() == 1) {
-      set_lane(blocks_[index], int(lane), lights[own[0]], std::int32_t(own[0]));
+      set_lane(blocks_[index], lane, lights[own[0]], std::int32_t(own[0]));
       places_[own[0]] = {index, lane};
       continue;
     }
     const std::uint32_t child = build(lights, own);
     blocks_[child].parent = index;
     blocks_[child].lane_of_parent = lane;
-    set_lane(blocks_[index], int(lane), group(lights, own), ~std::int32_t(child));
+    set_lane(blocks_[index], lane, group(lights, own), ~std::int32_t(child));
   }
   return index;
 }

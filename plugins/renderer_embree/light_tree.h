@@ -7,7 +7,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "lanes.h"
 #include "sampling.h"
 
 namespace diorama {
@@ -21,8 +20,8 @@ struct Receiver {
 };
 
 /// Chooses among lights with a place in the scene, in proportion to the light that each would send
-/// to a receiver if nothing stood between (estimated). Eight at a time are compared with vector
-/// code; more than eight form a tree whose inner entries stand for groups of neighbours.
+/// to a receiver if nothing stood between (estimated). Up to eight are compared with
+/// one another; more form a tree whose inner entries stand for groups of neighbours.
 class LightTree {
  public:
   struct Light {
@@ -33,30 +32,30 @@ class LightTree {
     float power = 0.0f;  ///< Luminous weight.
   };
 
+  static constexpr std::size_t kLanes = 8;
+
   LightTree() = default;
   explicit LightTree(const std::vector<Light>& lights);
 
-  struct Scores {
-    Lanes of{};
-    float sum = 0.0f;
-  };
-  /// Of the lights or groups at the root.
-  Scores root_scores(const Receiver& receiver) const {
-    return blocks_.empty() ? Scores() : scores(blocks_[0], receiver);
+  /// Lights or groups at the root.
+  std::uint32_t root_count() const { return blocks_.empty() ? 0 : blocks_[0].count; }
+  float root_score(std::uint32_t lane, const Receiver& receiver) const {
+    return score(blocks_[0], lane, receiver);
   }
 
   struct Choice {
     std::uint32_t light = 0;
     float probability = 0.0f;  ///< Zero: none can contribute.
   };
-  /// `root` as root_scores() gives it; u in [0, 1).
-  Choice choose(const Receiver& receiver, const Scores& root, float u) const;
+  /// Among the lights behind one of the root's lanes; u in [0, 1).
+  Choice choose(std::uint32_t root_lane, const Receiver& receiver, float u) const;
   /// With which choose() picks this light; the receiver's score of the whole tree is returned too.
   float probability(std::uint32_t light, const Receiver& receiver, float& tree_score) const;
 
  private:
+  using Lanes = std::array<float, kLanes>;
   struct Block {
-    Lanes x{}, y{}, z{}, radius{}, power{};
+    alignas(32) Lanes x{}, y{}, z{}, radius{}, power{};
     Lanes direction_x{}, direction_y{}, direction_z{}, one_sided{};
     /// A light, or ~index of a block. Lanes without one have no power.
     std::array<std::int32_t, kLanes> child{};
@@ -70,8 +69,13 @@ class LightTree {
   };
   using Range = std::vector<std::uint32_t>;
 
+  struct Scores {
+    Lanes of{};
+    float sum = 0.0f;
+  };
+  static float score(const Block& block, std::uint32_t lane, const Receiver& receiver);
   static Scores scores(const Block& block, const Receiver& receiver);
-  static void set_lane(Block& block, int lane, const Light& light, std::int32_t child);
+  static void set_lane(Block& block, std::uint32_t lane, const Light& light, std::int32_t child);
   static Light group(const std::vector<Light>& lights, const Range& members);
   std::uint32_t build(const std::vector<Light>& lights, const Range& members);
 
@@ -80,53 +84,47 @@ class LightTree {
 };
 
 // Never zero where light may arrive: cosines are those of the light's whole extent, with a floor
-// because a glossy surface weighs directions otherwise than by the cosine.
-inline LightTree::Scores LightTree::scores(const Block& b, const Receiver& receiver) {
-  const Lanes zero{};
-  const Lanes floor = zero + 0.1f;
-  const Lanes dx = b.x - receiver.position.x();
-  const Lanes dy = b.y - receiver.position.y();
-  const Lanes dz = b.z - receiver.position.z();
-  const Lanes distance2 = dx * dx + dy * dy + dz * dz;
-  const Lanes radius2 = b.radius * b.radius + 1e-20f;
-  const Lanes near2 = distance2 > radius2 ? distance2 : radius2;
-  // 1 / sqrt(near2) to 5e-6: a good guess by the bits, then Newton's method twice.
-  using Bits [[gnu::vector_size(4 * kLanes)]] = std::int32_t;
-  Lanes scale = Lanes(0x5F3759DF - (Bits(near2) >> 1));
-  scale *= 1.5f - 0.5f * near2 * scale * scale;
-  scale *= 1.5f - 0.5f * near2 * scale * scale;
-  const Vec3f& n = receiver.normal;
-  const Lanes along = n.x() * dx + n.y() * dy + n.z() * dz;
-  const Lanes positive = along < zero ? -along : along;
-  const Lanes towards = receiver.is_two_sided ? positive : along;
-  const Lanes cosine = (towards + b.radius * 1.001f) * scale;
-  const Lanes at_most_one = cosine < zero + 1.0f ? cosine : zero + 1.0f;
-  const Lanes bounded = at_most_one > floor ? at_most_one : floor;
-  const Lanes at_receiver = cosine > zero ? bounded : zero;
-  const Lanes height = -(dx * b.direction_x + dy * b.direction_y + dz * b.direction_z);
-  const Lanes facing = height * scale > floor ? height * scale : floor;
-  const Lanes at_flat_light = height > zero ? facing : zero;
-  const Lanes at_light = b.one_sided > zero ? at_flat_light : zero + 1.0f;
+// because a glossy surface weighs directions otherwise than by the cosine. Without branches: made
+// for loops over lights and over receivers.
+inline float LightTree::score(const Block& b, std::uint32_t i, const Receiver& receiver) {
+  constexpr float kFloor = 0.1f;
+  const Vec3f to(b.x[i] - receiver.position.x(), b.y[i] - receiver.position.y(),
+                 b.z[i] - receiver.position.z());
+  const float near2 = std::max(to.squaredNorm(), b.radius[i] * b.radius[i] + 1e-20f);
+  const float scale = 1.0f / std::sqrt(near2);
+  const float along = receiver.normal.dot(to);
+  const float towards = receiver.is_two_sided ? std::abs(along) : along;
+  const float cosine = (towards + b.radius[i] * 1.001f) * scale;
+  const float at_receiver = cosine > 0.0f ? std::max(kFloor, std::min(1.0f, cosine)) : 0.0f;
+  const float height =
+      -(to.x() * b.direction_x[i] + to.y() * b.direction_y[i] + to.z() * b.direction_z[i]);
+  const float at_flat_light = height > 0.0f ? std::max(kFloor, height * scale) : 0.0f;
+  const float at_light = b.one_sided[i] > 0.0f ? at_flat_light : 1.0f;
+  return b.power[i] * at_receiver * at_light * scale * scale;
+}
+
+inline LightTree::Scores LightTree::scores(const Block& block, const Receiver& receiver) {
   Scores result;
-  result.of = b.power * at_receiver * at_light * scale * scale;
-  for (std::uint32_t i = 0; i < b.count; ++i) result.sum += result.of[i];
+  for (std::uint32_t i = 0; i < kLanes; ++i) result.of[i] = score(block, i, receiver);
+  for (std::uint32_t i = 0; i < block.count; ++i) result.sum += result.of[i];
   return result;
 }
 
-inline LightTree::Choice LightTree::choose(const Receiver& receiver, const Scores& root,
+inline LightTree::Choice LightTree::choose(std::uint32_t root_lane, const Receiver& receiver,
                                            float u) const {
   Choice choice;
-  if (!(root.sum > 0.0f)) return choice;
-  Scores scored = root;
-  std::uint32_t block = 0;
   choice.probability = 1.0f;
-  while (true) {
+  std::int32_t child = blocks_[0].child[root_lane];
+  while (child < 0) {
+    const Block& block = blocks_[std::uint32_t(~child)];
+    const Scores scored = scores(block, receiver);
+    if (!(scored.sum > 0.0f)) return {};
     const float target = u * scored.sum;
     float before = 0.0f;
     float end = 0.0f;
     std::size_t lane = 0;
     // Rounding may leave the target beyond the last: then the last is taken.
-    for (std::size_t i = 0; i < blocks_[block].count; ++i) {
+    for (std::size_t i = 0; i < block.count; ++i) {
       if (!(scored.of[i] > 0.0f)) continue;
       lane = i;
       before = end;
@@ -134,16 +132,11 @@ inline LightTree::Choice LightTree::choose(const Receiver& receiver, const Score
       if (target < end) break;
     }
     choice.probability *= scored.of[lane] / scored.sum;
-    const std::int32_t child = blocks_[block].child[lane];
-    if (child >= 0) {
-      choice.light = std::uint32_t(child);
-      return choice;
-    }
     u = std::clamp((target - before) / scored.of[lane], 0.0f, 0.9999999f);
-    block = std::uint32_t(~child);
-    scored = scores(blocks_[block], receiver);
-    if (!(scored.sum > 0.0f)) return {};
+    child = block.child[lane];
   }
+  choice.light = std::uint32_t(child);
+  return choice;
 }
 
 inline float LightTree::probability(std::uint32_t light, const Receiver& receiver,

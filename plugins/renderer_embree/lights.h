@@ -7,6 +7,7 @@
 #include <memory>
 #include <vector>
 
+#include "batch.h"
 #include "diorama/light.h"
 #include "dome.h"
 #include "light_tree.h"
@@ -68,12 +69,25 @@ class Lights {
   bool is_empty() const { return lights_.empty(); }
   std::size_t count() const { return lights_.size(); }
 
-  struct Choice {
-    std::uint32_t light = 0;
-    float probability = 0.0f;  ///< Zero: no light can contribute.
+  /// Places of a batch that want a light each, by numbers u in [0, 1).
+  struct Wishes {
+    std::size_t count = 0;
+    BatchVectors position;
+    BatchVectors normal;
+    BatchInts is_two_sided{};
+    BatchFloats u{};
+
+    Receiver receiver(std::size_t i) const {
+      return {position.at(i), normal.at(i), is_two_sided[i] != 0, 0.0f};
+    }
   };
-  /// Fills receiver.total_score.
-  Choice choose(Receiver& receiver, float u) const;
+  struct Choices {
+    BatchInts light{};
+    BatchFloats probability{};        ///< Zero: no light can contribute.
+    BatchFloats total_score{};        ///< For Receiver.
+    std::vector<BatchFloats> scores;  ///< Of the entries that are compared.
+  };
+  void choose(const Wishes& wishes, Choices& choices) const;
   /// Probability with which choose() picks this light for the receiver.
   float probability(std::uint32_t light, const Receiver& receiver) const;
 
@@ -120,6 +134,17 @@ class Lights {
     std::uint32_t geometry = 0;
     std::vector<EmittingTriangles::Triangle> triangles;
     std::vector<float> cumulative_area;
+  };
+
+  /// The entry that each place of a batch has come to among those offered so far.
+  struct Picks {
+    BatchInts entry;  ///< -1: none.
+    BatchFloats score{};
+    BatchFloats before{};  ///< Sum of the scores of the entries before it ...
+    BatchFloats end{};     ///< ... and with its own.
+    Picks() { entry.fill(-1); }
+    void offer(int index, const BatchFloats& scores, const BatchFloats& u, const BatchFloats& total,
+               std::size_t size);
   };
 
   static bool is_body(const Record& light) {
@@ -191,30 +216,57 @@ inline float Lights::score_of_surroundings(const Record& light, const Receiver& 
   return cosine <= 0.0f ? 0.0f : light.power * std::max(kFloor, std::min(1.0f, cosine));
 }
 
-inline Lights::Choice Lights::choose(Receiver& receiver, float u) const {
-  const LightTree::Scores root = tree_.root_scores(receiver);
-  float total = root.sum;
-  for (const std::uint32_t index : surroundings_) {
-    total += score_of_surroundings(lights_[index], receiver);
+// Scores first, then the light in whose share of their sum a place's number falls.
+inline void Lights::choose(const Wishes& wishes, Choices& choices) const {
+  const std::size_t size = whole_steps(wishes.count);
+  const std::uint32_t roots = tree_.root_count();
+  choices.scores.resize(roots + surroundings_.size());
+  choices.total_score.fill(0.0f);
+  for (std::uint32_t entry = 0; entry < choices.scores.size(); ++entry) {
+    BatchFloats& scores = choices.scores[entry];
+    if (entry < roots) {
+      for (std::size_t i = 0; i < size; ++i) {
+        scores[i] = tree_.root_score(entry, wishes.receiver(i));
+      }
+    } else {
+      const Record& light = lights_[surroundings_[entry - roots]];
+      for (std::size_t i = 0; i < wishes.count; ++i) {
+        scores[i] = score_of_surroundings(light, wishes.receiver(i));
+      }
+    }
+    for (std::size_t i = 0; i < size; ++i) choices.total_score[i] += scores[i];
   }
-  receiver.total_score = total;
-  if (!(total > 0.0f)) return {};
-  float target = u * total;
-  if (target < root.sum) {
-    const LightTree::Choice body =
-        tree_.choose(receiver, root, std::min(target / root.sum, 0.9999999f));
-    return {bodies_[body.light], body.probability * (root.sum / total)};
+  Picks picks;
+  for (std::size_t entry = 0; entry < choices.scores.size(); ++entry) {
+    picks.offer(int(entry), choices.scores[entry], wishes.u, choices.total_score, size);
   }
-  target -= root.sum;
-  Choice choice;
-  for (const std::uint32_t index : surroundings_) {
-    const float score = score_of_surroundings(lights_[index], receiver);
-    if (!(score > 0.0f)) continue;
-    choice = {index, score / total};
-    if (target < score) break;
-    target -= score;
+  for (std::size_t i = 0; i < wishes.count; ++i) {
+    const int picked = picks.entry[i];
+    choices.light[i] = 0;
+    choices.probability[i] = picked < 0 ? 0.0f : picks.score[i] / choices.total_score[i];
+    if (picked < 0) continue;
+    if (std::uint32_t(picked) >= roots) {
+      choices.light[i] = std::int32_t(surroundings_[std::uint32_t(picked) - roots]);
+      continue;
+    }
+    const float rest = (wishes.u[i] * choices.total_score[i] - picks.before[i]) / picks.score[i];
+    const LightTree::Choice within =
+        tree_.choose(std::uint32_t(picked), wishes.receiver(i), std::clamp(rest, 0.0f, 0.9999999f));
+    choices.light[i] = std::int32_t(bodies_[within.light]);
+    choices.probability[i] *= within.probability;
   }
-  return choice;
+}
+
+// Rounding may leave a number beyond the last share: then the last is taken.
+inline void Lights::Picks::offer(int index, const BatchFloats& scores, const BatchFloats& u,
+                                 const BatchFloats& total, std::size_t size) {
+  for (std::size_t i = 0; i < size; ++i) {
+    const bool is_open = u[i] * total[i] >= end[i] && scores[i] > 0.0f;
+    entry[i] = is_open ? index : entry[i];
+    score[i] = is_open ? scores[i] : score[i];
+    before[i] = is_open ? end[i] : before[i];
+    end[i] = is_open ? end[i] + scores[i] : end[i];
+  }
 }
 
 inline float Lights::probability(std::uint32_t light, const Receiver& receiver) const {

@@ -77,7 +77,7 @@ inline int MipTexture::wrapped(int i, int size, Wrap wrap) {
     case Wrap::Repeat:
       break;
   }
-  return ((i % size) + size) % size;
+  return i < 0 ? i + size : i - size;  // at most one step outside, see bilinear()
 }
 
 inline Rgba MipTexture::texel(int index, int x, int y) const {
@@ -104,11 +104,17 @@ inline Rgba MipTexture::texel(int index, int x, int y) const {
                                                    Wrap wrap_v) const {
   const Level& level = levels_[std::size_t(index)];
   constexpr float kLimit = 1e8f;  // far outside any sane coordinate, inside int
-  const float x = std::clamp(uv.x() * float(level.width) - 0.5f, -kLimit, kLimit);
-  const float y = std::clamp((1.0f - uv.y()) * float(level.height) - 0.5f, -kLimit, kLimit);
-  // Rounds down without the library's floor, which is a call on old processors.
-  const int left = int(x) - int(x < 0.0f);
-  const int above = int(y) - int(y < 0.0f);
+  // Without the library's floor, which is a call on old processors.
+  const auto rounded_down = [](float v) { return int(v) - int(v < 0.0f); };
+  const auto texels = [&](float v, int size, Wrap wrap) {
+    const float limited = std::clamp(v, -kLimit, kLimit);
+    const float within = wrap == Wrap::Repeat ? limited - float(rounded_down(limited)) : limited;
+    return std::clamp(within * float(size) - 0.5f, -kLimit, kLimit);
+  };
+  const float x = texels(uv.x(), level.width, wrap_u);
+  const float y = texels(1.0f - uv.y(), level.height, wrap_v);
+  const int left = rounded_down(x);
+  const int above = rounded_down(y);
   const float fx = x - float(left);
   const float fy = y - float(above);
   const int x0 = wrapped(left, level.width, wrap_u);

@@ -15,10 +15,17 @@ constexpr float kMirrorSpread = 0.05f;
 // the same (measured); short paths leave more time for denoised pictures' pixels.
 constexpr float kContinuation = 0.7f;
 
-/// Far enough from the surface that the next ray does not meet it again.
+/// A step off the surface, far enough that the next ray does not meet it again.
+inline Vec3f step_off(const Vec3f& position, const Vec3f& flat_normal) {
+  const float x = std::abs(position.x());
+  const float y = std::abs(position.y());
+  const float z = std::abs(position.z());
+  return (2e-5f * (1.0f + std::max(x, std::max(y, z)))) * flat_normal;
+}
+
 inline Vec3f leave(const SurfaceGeometry& s, const Vec3f& direction) {
-  const float distance = 2e-5f * (1.0f + s.position.cwiseAbs().maxCoeff());
-  return s.position + (direction.dot(s.flat_normal) < 0.0f ? -distance : distance) * s.flat_normal;
+  const Vec3f step = step_off(s.position, s.flat_normal);
+  return s.position + (direction.dot(s.flat_normal) < 0.0f ? -step : step);
 }
 
 [[gnu::noinline]] Vec3f mapped_normal(const RayHit& hit, const SurfaceGeometry& s,
@@ -114,6 +121,95 @@ struct PathTracer::Path {
   }
 };
 
+/// What the paths of a batch met: one entry for every path that goes on from a surface, filled step
+/// by step.
+struct PathTracer::Vertices {
+  std::size_t count = 0;
+  std::array<Path*, kBatch> paths{};
+  BatchVectors direction;  ///< That the path came along.
+  BatchVectors triangle_normal;
+  BatchVectors interpolated;  ///< Normal; see RenderScene::interpolated_normal().
+  BatchInts is_mirrored{};
+
+  BatchVectors position;
+  BatchVectors flat_normal;
+  BatchVectors normal;
+  BatchInts is_back{};
+
+  // Of those that scatter.
+  enum Purpose { kLight, kRoulette, kPlaceU, kPlaceV, kLobe, kSpare, kDirectionU, kDirectionV };
+  static constexpr std::uint32_t kPairs = 4;
+  std::array<const SurfaceBsdf*, kBatch> bsdf{};
+  std::array<SurfaceBsdf, kBatch> own_bsdf;  ///< Of materials that are not the same all over.
+  std::array<const ShadingMaterial*, kBatch> material{};
+  BatchVectors basis_x;
+  BatchVectors basis_y;
+  BatchVectors to_viewer;                         ///< Local, unit.
+  BatchVectors step;                              ///< Off the surface, on the viewer's side.
+  BatchVectors by_cosine;                         ///< Local directions for diffuse lobes.
+  std::array<BatchFloats, 2 * kPairs> numbers{};  ///< Random ones, by purpose.
+  Lights::Wishes wishes;
+  Lights::Choices lights;
+
+  SurfaceGeometry surface(std::size_t i) const {
+    SurfaceGeometry s;
+    s.position = position.at(i);
+    s.flat_normal = flat_normal.at(i);
+    s.normal = normal.at(i);
+    s.is_back = is_back[i] != 0;
+    return s;
+  }
+  Vec2f pair(Purpose first, std::size_t i) const {
+    return {numbers[first][i], numbers[std::size_t(first) + 1][i]};
+  }
+  Basis basis(std::size_t i) const { return {basis_x.at(i), basis_y.at(i), normal.at(i)}; }
+  Vec3f leave(std::size_t i, const Vec3f& towards) const {
+    const Vec3f off = step.at(i);
+    return position.at(i) + (towards.dot(flat_normal.at(i)) < 0.0f ? -off : off);
+  }
+  void find_surfaces();
+  void find_bases();
+  /// Keeps only some of the entries, moved to the front.
+  void move(std::size_t from, std::size_t to);
+};
+
+inline void PathTracer::Vertices::find_surfaces() {
+  for (std::size_t i = 0; i < whole_steps(count); ++i) {
+    const SurfaceGeometry s =
+        RenderScene::surface_of(position.at(i), direction.at(i), triangle_normal.at(i),
+                                interpolated.at(i), is_mirrored[i] != 0);
+    flat_normal.set(i, s.flat_normal);
+    normal.set(i, s.normal);
+    is_back[i] = s.is_back;
+  }
+}
+
+inline void PathTracer::Vertices::find_bases() {
+  for (std::size_t i = 0; i < whole_steps(count); ++i) {
+    const Basis basis = basis_around(normal.at(i));
+    Vec3f wo = basis.to_local(-direction.at(i));
+    wo.z() = std::max(wo.z(), 1e-4f);
+    basis_x.set(i, basis.x);
+    basis_y.set(i, basis.y);
+    to_viewer.set(i, unit(wo));
+    step.set(i, step_off(position.at(i), flat_normal.at(i)));
+  }
+}
+
+inline void PathTracer::Vertices::move(std::size_t from, std::size_t to) {
+  if (from == to) return;
+  paths[to] = paths[from];
+  direction.set(to, direction.at(from));
+  position.set(to, position.at(from));
+  flat_normal.set(to, flat_normal.at(from));
+  normal.set(to, normal.at(from));
+  is_back[to] = is_back[from];
+  bsdf[to] = bsdf[from];
+  if (bsdf[from] != &own_bsdf[from]) return;
+  own_bsdf[to] = own_bsdf[from];
+  bsdf[to] = &own_bsdf[to];
+}
+
 PathTracer::PathTracer(const RenderScene& scene, const View& view, const TraceSettings& settings,
                        Isa isa)
     : scene_(scene), view_(view), settings_(settings), isa_(isa) {}
@@ -149,6 +245,7 @@ inline RayCounts PathTracer::trace_all(const TraceJob& job, PixelSum* sums,
   RayCounts counts;
   std::vector<Path> paths;
   paths.reserve(kBatch);
+  Vertices vertices;
   std::array<PixelSum*, kBatch> pixels;
   const int width = job.x_end - job.x_begin;
   const int area = width * (job.y_end - job.y_begin);
@@ -165,7 +262,7 @@ inline RayCounts PathTracer::trace_all(const TraceJob& job, PixelSum* sums,
       next = 0;
       ++sample;
     }
-    trace_batch(paths);
+    trace_batch(paths, vertices);
     for (std::size_t i = 0; i < paths.size(); ++i) {
       pixels[i]->add(paths[i].result);
       counts.rays += paths[i].counts.rays;
@@ -176,8 +273,9 @@ inline RayCounts PathTracer::trace_all(const TraceJob& job, PixelSum* sums,
 }
 
 inline void PathTracer::start_path(Path& path, int x, int y) const {
-  const auto u = path.sampler.next_pairs<2>();
-  auto ray = view_.sample_ray({float(x) + u[0].x(), float(y) + u[0].y()}, u[1]);
+  const Vec2f place = path.sampler.next();
+  const Vec2f aperture = path.sampler.next();
+  auto ray = view_.sample_ray({float(x) + place.x(), float(y) + place.y()}, aperture);
   if (view_.has_shutter()) [[unlikely]]
     open_shutter(path, y, ray);
   path.is_over = !(ray.t_max > 0.0f);
@@ -195,57 +293,81 @@ inline void PathTracer::start_path(Path& path, int x, int y) const {
 
 // Paths advance together, step by step: rays of one kind in a row, then the surfaces that they met.
 // Code and data of each step stay close to the processor, and memory is fetched meanwhile.
-inline void PathTracer::trace_batch(std::vector<Path>& paths) const {
+inline void PathTracer::trace_batch(std::vector<Path>& paths, Vertices& v) const {
   std::array<Path*, kBatch> active;
+  std::array<Path*, kBatch> asking;
   std::size_t count = 0;
   for (Path& path : paths) {
     if (!path.is_over) active[count++] = &path;
   }
   while (count > 0) {
-    for (std::size_t i = 0; i < count; ++i) find_surface(*active[i]);
-    for (std::size_t i = 0; i < count; ++i) shade(*active[i]);
-    for (std::size_t i = 0; i < count; ++i) {
-      if (active[i]->shadow.t_max > 0.0f) find_light(*active[i]);
+    find_surfaces(std::span(active).first(count));
+    meet(std::span(active).first(count), v);
+    v.find_surfaces();
+    std::size_t scattered = 0;
+    for (std::size_t i = 0; i < v.count; ++i) {
+      if (dress(v, i)) v.move(i, scattered++);
     }
+    v.count = scattered;
+    v.find_bases();
+    draw_numbers(v);
+    for (std::size_t i = 0; i < v.count; ++i) scatter(v, i);
+    std::size_t asked = 0;
     std::size_t left = 0;
     for (std::size_t i = 0; i < count; ++i) {
-      if (!active[i]->is_over) active[left++] = active[i];
+      Path* path = active[i];
+      if (path->shadow.t_max > 0.0f) asking[asked++] = path;
+      if (!path->is_over) active[left++] = path;
     }
+    find_lights(std::span(asking).first(asked));
     count = left;
   }
 }
 
-inline void PathTracer::find_surface(Path& path) const {
-  path.hit = scene_.intersect(path.origin, path.direction, path.t_min, path.t_max, path.time);
-  ++path.counts.rays;
-  if (settings_.ray_log) [[unlikely]] {
-    settings_.ray_log->push_back({path.origin, path.direction, path.t_min, path.t_max, false});
+inline void PathTracer::find_surfaces(Paths paths) const {
+  RayBundle rays;
+  std::array<RayHit, RayBundle::kSize> hits;
+  for (std::size_t begin = 0; begin < paths.size(); begin += RayBundle::kSize) {
+    const auto group =
+        paths.subspan(begin, std::min<std::size_t>(RayBundle::kSize, paths.size() - begin));
+    rays.clear();
+    for (Path* path : group) {
+      rays.add(path->origin, path->direction, path->t_min, path->t_max, path->time);
+      ++path->counts.rays;
+      if (settings_.ray_log) [[unlikely]] {
+        settings_.ray_log->push_back(
+            {path->origin, path->direction, path->t_min, path->t_max, false});
+      }
+    }
+    scene_.intersect(rays, hits.data());
+    for (std::size_t i = 0; i < group.size(); ++i) group[i]->hit = hits[i];
   }
 }
 
-inline void PathTracer::shade(Path& path) const {
-  const RayHit& hit = path.hit;
-  collect_lights(path, hit ? hit.distance : kInfinite);
-  path.is_over = true;
-  if (!hit) return;
-  path.since_last += hit.distance;
-  path.width += path.spread * hit.distance;
-  SurfaceGeometry surface = RenderScene::surface_at(hit, path.origin, path.direction);
-  const ShadingMaterial& material = hit.instance->material(hit.triangle);
-  if (material.reads_uv) RenderScene::add_uv(surface, hit);
-  if (material.emits) collect_emission(path, hit, surface, material);
-  if (path.bounce <= settings_.max_bounces) scatter(path, hit, surface, material);
+inline void PathTracer::find_lights(Paths paths) const {
+  RayBundle rays;
+  std::array<Vec3f, RayBundle::kSize> kept;
+  for (std::size_t begin = 0; begin < paths.size(); begin += RayBundle::kSize) {
+    const auto group =
+        paths.subspan(begin, std::min<std::size_t>(RayBundle::kSize, paths.size() - begin));
+    rays.clear();
+    for (Path* path : group) {
+      const ShadowRay& shadow = path->shadow;
+      rays.add(shadow.origin, shadow.sample.direction, 0.0f, shadow.t_max, path->time);
+      ++path->counts.shadow_rays;
+      if (settings_.ray_log) [[unlikely]] {
+        settings_.ray_log->push_back(
+            {shadow.origin, shadow.sample.direction, 0.0f, shadow.t_max, true});
+      }
+    }
+    scene_.transmittance(rays, !settings_.has_caustics, kept.data());
+    for (std::size_t i = 0; i < group.size(); ++i) add_light(*group[i], kept[i]);
+  }
 }
 
-inline void PathTracer::find_light(Path& path) const {
+inline void PathTracer::add_light(Path& path, const Vec3f& kept) const {
   ShadowRay& shadow = path.shadow;
-  ++path.counts.shadow_rays;
   const LightSample& s = shadow.sample;
-  if (settings_.ray_log) [[unlikely]] {
-    settings_.ray_log->push_back({shadow.origin, s.direction, 0.0f, shadow.t_max, true});
-  }
-  const Vec3f kept = scene_.transmittance(shadow.origin, s.direction, shadow.t_max,
-                                          !settings_.has_caustics, path.time);
   shadow.t_max = 0.0f;
   if (kept.maxCoeff() <= 0.0f) return;
   Vec3f radiance;
@@ -257,6 +379,81 @@ inline void PathTracer::find_light(Path& path) const {
     radiance = scene_.lights().radiance_of(shadow.light, s);
   }
   add(path, shadow.bounce, shadow.share.cwiseProduct(kept).cwiseProduct(radiance));
+}
+
+inline void PathTracer::meet(Paths paths, Vertices& v) const {
+  v.count = 0;
+  for (Path* path : paths) {
+    const RayHit& hit = path->hit;
+    collect_lights(*path, hit ? hit.distance : kInfinite);
+    path->is_over = true;
+    if (!hit) continue;
+    path->since_last += hit.distance;
+    path->width += path->spread * hit.distance;
+    const ShadingMaterial& material = hit.instance->material(hit.triangle);
+    if (path->bounce > settings_.max_bounces && !material.emits) continue;
+    const std::size_t i = v.count++;
+    v.paths[i] = path;
+    v.material[i] = &material;
+    v.direction.set(i, path->direction);
+    v.position.set(i, path->origin + hit.distance * path->direction);
+    v.triangle_normal.set(i, hit.normal);
+    v.interpolated.set(i, RenderScene::interpolated_normal(hit));
+    v.is_mirrored[i] = hit.instance->is_mirrored;
+  }
+}
+
+inline bool PathTracer::dress(Vertices& v, std::size_t i) const {
+  Path& path = *v.paths[i];
+  const ShadingMaterial& material = *v.material[i];
+  const bool is_soft = path.has_scattered && !settings_.has_caustics;
+  v.bsdf[i] = is_soft ? &material.soft : &material.sharp;
+  const bool has_colors = !path.hit.instance->mesh->colors.empty();
+  if (!material.is_special && !has_colors) return true;
+  SurfaceGeometry surface = v.surface(i);
+  if (material.reads_uv) RenderScene::add_uv(surface, path.hit);
+  if (material.emits) collect_emission(path, path.hit, surface, material);
+  if (path.bounce > settings_.max_bounces) return false;
+  SurfaceBsdf& bsdf = v.own_bsdf[i];
+  bsdf = *v.bsdf[i];
+  v.bsdf[i] = &bsdf;
+  if (material.is_textured || has_colors) {
+    read_textures(path, surface, material, is_soft, bsdf, surface.normal);
+    v.normal.set(i, surface.normal);
+  }
+  bsdf.is_inside = surface.is_back;
+  return !(material.is_pane || material.is_veil) || !pass_or_reflect(path, surface, material, bsdf);
+}
+
+inline void PathTracer::draw_numbers(Vertices& v) const {
+  Lights::Wishes& wishes = v.wishes;
+  const std::size_t size = whole_steps(v.count);
+  wishes.count = v.count;
+  wishes.position = v.position;
+  wishes.normal = v.normal;
+  BatchInts keys{};
+  BatchInts places{};
+  for (std::size_t i = 0; i < v.count; ++i) {
+    Path& path = *v.paths[i];
+    keys[i] = std::int32_t(path.sampler.take(Vertices::kPairs));
+    places[i] = std::int32_t(path.sampler.place());
+    const bool is_soft = path.has_scattered && !settings_.has_caustics;
+    wishes.is_two_sided[i] = !is_soft && v.bsdf[i]->glass_share() > 0.0f;
+  }
+  for (std::uint32_t k = 0; k < Vertices::kPairs; ++k) {
+    for (std::size_t i = 0; i < size; ++i) {
+      const Vec2f pair = PathSampler::pair(std::uint32_t(keys[i]) + k * PathSampler::kKeyStep,
+                                           std::uint32_t(places[i]));
+      v.numbers[2 * k][i] = pair.x();
+      v.numbers[2 * k + 1][i] = pair.y();
+    }
+  }
+  for (std::size_t i = 0; i < size; ++i) {
+    const Vec2f u(v.numbers[Vertices::kDirectionU][i], v.numbers[Vertices::kDirectionV][i]);
+    v.by_cosine.set(i, cosine_hemisphere(u));
+  }
+  wishes.u = v.numbers[Vertices::kLight];
+  scene_.lights().choose(wishes, v.lights);
 }
 
 inline void PathTracer::add(Path& path, int bounce, const Vec3f& radiance) const {
@@ -354,43 +551,42 @@ inline void PathTracer::collect_lights(Path& path, float t_max) const {
   return true;
 }
 
-inline void PathTracer::sample_light(Path& path, const SurfaceGeometry& surface, const Bsdf& bsdf,
-                                     const Basis& basis, const Vec2f& choice_u,
-                                     const Vec2f& place_u, bool has_rival) const {
-  const Lights& lights = scene_.lights();
-  const Lights::Choice choice = lights.choose(path.last, choice_u.x());
-  if (!settings_.samples_lights || choice.probability <= 0.0f) return;
-  const LightSample s = lights.sample(choice.light, surface.position, place_u);
+inline void PathTracer::sample_light(const Vertices& v, std::size_t i, const Bsdf& bsdf,
+                                     bool has_rival) const {
+  const float probability = v.lights.probability[i];
+  if (!settings_.samples_lights || probability <= 0.0f) return;
+  Path& path = *v.paths[i];
+  const auto light = std::uint32_t(v.lights.light[i]);
+  const LightSample s =
+      scene_.lights().sample(light, path.last.position, v.pair(Vertices::kPlaceU, i));
   if (s.density <= 0.0f) return;
-  const Vec3f wi = basis.to_local(s.direction);
+  const Vec3f wi = v.basis(i).to_local(s.direction);
   const bool is_behind = wi.z() <= 0.0f;
   if (is_behind && !path.last.is_two_sided) return;
   // Light that the interpolated normal would let through the triangle from behind.
-  if ((surface.flat_normal.dot(s.direction) <= 0.0f) != is_behind) return;
+  if ((v.flat_normal.at(i).dot(s.direction) <= 0.0f) != is_behind) return;
   const BsdfValue value = bsdf.evaluate(wi);
   if (value.f_cos.maxCoeff() <= 0.0f) return;
 
   const bool is_point = std::isinf(s.density);
-  const float density = (is_point ? 1.0f : s.density) * choice.probability;
+  const float density = (is_point ? 1.0f : s.density) * probability;
   const float weight = has_rival && !is_point ? mis_weight(density, value.density) : 1.0f;
   const float t_max = std::isinf(s.distance) ? kInfinite : s.distance * 0.9998f - 1e-4f;
   if (t_max <= 0.0f) return;
-  path.shadow.origin = leave(surface, s.direction);
+  path.shadow.origin = v.leave(i, s.direction);
   path.shadow.t_max = t_max;
   path.shadow.share = path.throughput.cwiseProduct(value.f_cos) * (weight / density);
   path.shadow.sample = s;
-  path.shadow.light = choice.light;
+  path.shadow.light = light;
   path.shadow.bounce = path.bounce;
 }
 
-[[gnu::noinline]] SurfaceBsdf PathTracer::read_textures(const Path& path, const RayHit& hit,
-                                                        const SurfaceGeometry& surface,
-                                                        const ShadingMaterial& material,
-                                                        bool is_soft, Vec3f& normal) const {
+[[gnu::noinline]] void PathTracer::read_textures(const Path& path, const SurfaceGeometry& surface,
+                                                 const ShadingMaterial& material, bool is_soft,
+                                                 SurfaceBsdf& s, Vec3f& normal) const {
   const float cosine = std::max(0.1f, -surface.normal.dot(path.direction));
   const float footprint = path.width * surface.uv_per_metre / std::sqrt(cosine);
-  SurfaceBsdf s = is_soft ? material.soft : material.sharp;
-  s.base = base_color_at(hit, surface, footprint).cwiseMin(1.0f);
+  s.base = base_color_at(path.hit, surface, footprint).cwiseMin(1.0f);
   if (material.metallic) {
     s.metallic = std::clamp(material.metallic.scalar(surface.uv, footprint), 0.0f, 1.0f);
   }
@@ -399,50 +595,40 @@ inline void PathTracer::sample_light(Path& path, const SurfaceGeometry& surface,
     s.alpha = ShadingMaterial::alpha_of(roughness, is_soft && !s.glass);
   }
   if (material.normal) {
-    normal = mapped_normal(hit, surface, material.normal, footprint, -path.direction);
+    normal = mapped_normal(path.hit, surface, material.normal, footprint, -path.direction);
   }
-  return s;
 }
 
-inline void PathTracer::scatter(Path& path, const RayHit& hit, const SurfaceGeometry& surface,
-                                const ShadingMaterial& material) const {
+inline void PathTracer::scatter(const Vertices& v, std::size_t i) const {
+  Path& path = *v.paths[i];
   const bool is_soft = path.has_scattered && !settings_.has_caustics;
-  Vec3f normal = surface.normal;
-  SurfaceBsdf s = is_soft ? material.soft : material.sharp;
-  if (material.is_textured || !hit.instance->mesh->colors.empty()) {
-    s = read_textures(path, hit, surface, material, is_soft, normal);
-  }
-  if ((material.is_pane || material.is_veil) && pass_or_reflect(path, surface, material, s)) return;
-  s.is_inside = surface.is_back;
-
-  const Basis basis = basis_around(normal);
-  Vec3f wo = basis.to_local(-path.direction);
-  wo.z() = std::max(wo.z(), 1e-4f);
-  const Bsdf bsdf(s, unit(wo));
+  const SurfaceBsdf& s = *v.bsdf[i];
+  const Bsdf bsdf(s, v.to_viewer.at(i));
 
   const bool is_mirror = s.metallic > 0.9f && s.alpha < kMirrorSpread * kMirrorSpread;
   if (!path.result.has_surface && bsdf.has_smooth_part() && !is_mirror) {
     path.result.has_surface = true;
     path.result.albedo = path.throughput.cwiseProduct(bsdf.albedo());
-    path.result.normal = normal;
-    path.result.position = surface.position;
+    path.result.normal = v.normal.at(i);
+    path.result.position = v.position.at(i);
   }
   path.is_camera_ray = false;
-  const auto u = path.sampler.next_pairs<4>();
   if (bsdf.has_smooth_part()) {
     path.has_scattered = true;
-    path.last = {surface.position, normal, bsdf.transmits() && !is_soft, 0.0f};
+    path.last = v.wishes.receiver(i);
+    path.last.total_score = v.lights.total_score[i];
     // Where the path ends, light samples alone find all light that a rough surface scatters.
     const bool ends =
         path.bounce == settings_.max_bounces && bsdf.is_rough() && settings_.samples_lights;
-    sample_light(path, surface, bsdf, basis, u[0], u[1], settings_.samples_bsdf && !ends);
+    sample_light(v, i, bsdf, settings_.samples_bsdf && !ends);
     if (ends) return;
   }
 
-  const BsdfSample next = bsdf.sample(u[2].x(), u[3]);
+  const BsdfSample next = bsdf.sample(v.numbers[Vertices::kLobe][i],
+                                      v.pair(Vertices::kDirectionU, i), v.by_cosine.at(i));
   if (!(next.weight.maxCoeff() > 0.0f)) return;
-  const Vec3f direction = unit(basis.to_world(next.wi));
-  if ((surface.flat_normal.dot(direction) <= 0.0f) != next.is_transmitted) return;
+  const Vec3f direction = v.basis(i).to_world(next.wi);
+  if ((v.flat_normal.at(i).dot(direction) <= 0.0f) != next.is_transmitted) return;
   path.throughput = path.throughput.cwiseProduct(next.weight);
   // Russian roulette, by what is left of the light since the first surface: errors count in
   // proportion to what is seen, so a dark surface's paths are as good as a bright one's.
@@ -450,7 +636,7 @@ inline void PathTracer::scatter(Path& path, const RayHit& hit, const SurfaceGeom
   if (path.bounce == 0) path.left_by_first = left;
   if (path.bounce > 0) {
     const float survival = std::min(0.95f, kContinuation * left / path.left_by_first);
-    if (u[0].y() >= survival) return;
+    if (v.numbers[Vertices::kRoulette][i] >= survival) return;
     path.throughput *= 1.0f / survival;
   }
   path.is_over = false;
@@ -460,7 +646,7 @@ inline void PathTracer::scatter(Path& path, const RayHit& hit, const SurfaceGeom
   path.hides_lights = path.has_scattered && !settings_.has_caustics &&
                       (std::isinf(next.density) || (next.is_transmitted && is_soft));
   path.spread = std::max(path.spread, next.spread);
-  path.go(leave(surface, direction), direction);
+  path.go(v.leave(i, direction), direction);
 }
 
 }  // namespace diorama

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
+#include "batch.h"
 #include "film.h"
 #include "isa.h"
 #include "render_scene.h"
@@ -64,31 +66,34 @@ class PathTracer {
  private:
   struct Path;
   struct ShadowRay;
-  static constexpr std::size_t kBatch = 64;  // paths
+  struct Vertices;
+  using Paths = std::span<Path* const>;
 
   RayCounts trace_all(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
   RayCounts trace_sse42(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
   RayCounts trace_avx2(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
   RayCounts trace_avx512(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
-  void trace_batch(std::vector<Path>& paths) const;
+  void trace_batch(std::vector<Path>& paths, Vertices& vertices) const;
   void start_path(Path& path, int x, int y) const;
   void open_shutter(Path& path, int row, CameraRay& ray) const;
-  void find_surface(Path& path) const;
-  void shade(Path& path) const;
-  void find_light(Path& path) const;
+  void find_surfaces(Paths paths) const;
+  void meet(Paths paths, Vertices& v) const;
+  /// Adds the light that the surface emits. False: the path is not scattered here.
+  bool dress(Vertices& v, std::size_t i) const;
+  void draw_numbers(Vertices& v) const;
+  void scatter(const Vertices& v, std::size_t i) const;
+  void find_lights(Paths paths) const;
+  void add_light(Path& path, const Vec3f& kept) const;
   void collect_lights(Path& path, float t_max) const;
   void collect_emission(Path& path, const RayHit& hit, const SurfaceGeometry& surface,
                         const ShadingMaterial& material) const;
   /// True: the surface let the path through or ended it.
   bool pass_or_reflect(Path& path, const SurfaceGeometry& surface, const ShadingMaterial& material,
                        SurfaceBsdf& bsdf) const;
-  void sample_light(Path& path, const SurfaceGeometry& surface, const Bsdf& bsdf,
-                    const Basis& basis, const Vec2f& choice, const Vec2f& place,
-                    bool has_rival) const;
-  SurfaceBsdf read_textures(const Path& path, const RayHit& hit, const SurfaceGeometry& surface,
-                            const ShadingMaterial& material, bool is_soft, Vec3f& normal) const;
-  void scatter(Path& path, const RayHit& hit, const SurfaceGeometry& surface,
-               const ShadingMaterial& material) const;
+  void sample_light(const Vertices& v, std::size_t i, const Bsdf& bsdf, bool has_rival) const;
+  void read_textures(const Path& path, const SurfaceGeometry& surface,
+                     const ShadingMaterial& material, bool is_soft, SurfaceBsdf& bsdf,
+                     Vec3f& normal) const;
   void add(Path& path, int bounce, const Vec3f& radiance) const;
 
   const RenderScene& scene_;

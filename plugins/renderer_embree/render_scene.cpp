@@ -28,15 +28,18 @@ std::shared_ptr<const Texture> make_white_sky() {
 
 void pass_where_cut_out(const RTCFilterFunctionNArguments* args) {
   const auto& instance = *static_cast<const MeshInstance*>(args->geometryUserPtr);
-  const std::uint32_t triangle = RTCHitN_primID(args->hit, args->N, 0);
-  const ShadingMaterial& material = instance.material(triangle);
-  if (!material.is_cut_out) return;
-  const float u = RTCHitN_u(args->hit, args->N, 0);
-  const float v = RTCHitN_v(args->hit, args->N, 0);
-  const float opacity = material.opacity_at(instance.uv(triangle, u, v), 0.0f);
-  const float threshold = material.source->opacity_threshold;
-  const bool is_absent = threshold > 0.0f ? opacity < threshold : opacity <= 0.0f;
-  if (is_absent) args->valid[0] = 0;
+  for (unsigned i = 0; i < args->N; ++i) {
+    if (args->valid[i] == 0) continue;
+    const std::uint32_t triangle = RTCHitN_primID(args->hit, args->N, i);
+    const ShadingMaterial& material = instance.material(triangle);
+    if (!material.is_cut_out) continue;
+    const float u = RTCHitN_u(args->hit, args->N, i);
+    const float v = RTCHitN_v(args->hit, args->N, i);
+    const float opacity = material.opacity_at(instance.uv(triangle, u, v), 0.0f);
+    const float threshold = material.source->opacity_threshold;
+    const bool is_absent = threshold > 0.0f ? opacity < threshold : opacity <= 0.0f;
+    if (is_absent) args->valid[i] = 0;
+  }
 }
 
 /// The share of light along a straight line through one surface of this material.
@@ -231,13 +234,18 @@ void RenderScene::assign_materials(const Scene& scene) {
 void RenderScene::weaken_shadow_ray(const RTCFilterFunctionNArguments* args) {
   auto& shadow = *reinterpret_cast<ShadowContext*>(args->context);
   const auto& instance = *static_cast<const MeshInstance*>(args->geometryUserPtr);
-  const Vec3f direction(RTCRayN_dir_x(args->ray, args->N, 0), RTCRayN_dir_y(args->ray, args->N, 0),
-                        RTCRayN_dir_z(args->ray, args->N, 0));
-  const Vec3f share = straight_share(
-      instance, RTCHitN_primID(args->hit, args->N, 0), RTCHitN_u(args->hit, args->N, 0),
-      RTCHitN_v(args->hit, args->N, 0), direction.normalized(), shadow.passes_glass);
-  shadow.transmittance = shadow.transmittance.cwiseProduct(share);
-  if (shadow.transmittance.maxCoeff() > 1e-4f) args->valid[0] = 0;
+  const unsigned count = args->N;
+  for (unsigned i = 0; i < count; ++i) {
+    if (args->valid[i] == 0) continue;
+    const Vec3f direction(RTCRayN_dir_x(args->ray, count, i), RTCRayN_dir_y(args->ray, count, i),
+                          RTCRayN_dir_z(args->ray, count, i));
+    const Vec3f share = straight_share(
+        instance, RTCHitN_primID(args->hit, count, i), RTCHitN_u(args->hit, count, i),
+        RTCHitN_v(args->hit, count, i), direction.normalized(), shadow.passes_glass);
+    Vec3f& kept = shadow.transmittance[RTCRayN_id(args->ray, count, i)];
+    kept = kept.cwiseProduct(share);
+    if (kept.maxCoeff() > 1e-4f) args->valid[i] = 0;
+  }
 }
 
 bool RenderScene::can_keep(const Instances& previous) const {
@@ -322,17 +330,19 @@ void RenderScene::set_filters(const MeshInstance& instance, RTCGeometry geometry
 Aabb RenderScene::place(const Mesh& mesh, const Affine& pose, std::vector<float>& positions) {
   // One float more: Embree reads vertices in pieces of 16 bytes.
   positions.resize(3 * mesh.positions.size() + 1, 0.0f);
-  Vec3 low = Vec3::Constant(kInfinity);
-  Vec3 high = -low;
-  const Mat3 linear = pose.linear();
-  const Vec3 translation = pose.translation();
+  const Eigen::Matrix3f linear = pose.linear().cast<float>();
+  const Vec3f translation = pose.translation().cast<float>();
+  Vec3f low = Vec3f::Constant(kInfinite);
+  Vec3f high = -low;
   for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
-    const Vec3 p = linear * mesh.positions[i].cast<double>() + translation;
+    const Vec3f p = linear * mesh.positions[i] + translation;
     low = low.cwiseMin(p);
     high = high.cwiseMax(p);
-    std::copy_n(p.cast<float>().eval().data(), 3, &positions[3 * i]);
+    positions[3 * i] = p.x();
+    positions[3 * i + 1] = p.y();
+    positions[3 * i + 2] = p.z();
   }
-  return {low, high};
+  return {low.cast<double>(), high.cast<double>()};
 }
 
 void RenderScene::set_triangles(const Mesh& mesh, RTCGeometry geometry) {

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "batch.h"
 #include "diorama/host.h"
 #include "diorama/scene.h"
 #include "embree.h"
@@ -73,6 +75,27 @@ struct RayHit {
   explicit operator bool() const { return instance != nullptr; }
 };
 
+/// Up to eight rays that are traced together, which is faster where they go similar ways.
+class RayBundle {
+ public:
+  static constexpr int kSize = 8;
+
+  void clear() { count_ = 0; }
+  /// The direction is unit length.
+  void add(const Vec3f& origin, const Vec3f& direction, float t_min, float t_max, float time) {
+    put(count_++, origin, direction, t_min, t_max, time);
+  }
+
+ private:
+  friend class RenderScene;
+  void put(int i, const Vec3f& origin, const Vec3f& direction, float t_min, float t_max,
+           float time);
+  void finish();
+  alignas(32) std::array<int, kSize> valid_{};
+  RTCRayHit8 rays_;
+  int count_ = 0;
+};
+
 /// The surface at a hit, without its material. World space.
 struct SurfaceGeometry {
   Vec3f position;
@@ -126,6 +149,10 @@ class RenderScene {
                       float time) const {
     return transmittance(scene_over_time(), origin, direction, t_max, passes_glass, ~0u, time);
   }
+  /// The same for the rays of a bundle, which it spends: `hits` and `kept` have RayBundle::kSize
+  /// entries.
+  void intersect(RayBundle& rays, RayHit* hits) const;
+  void transmittance(RayBundle& rays, bool passes_glass, Vec3f* kept) const;
   /// Seconds around the moment of the poses that `time` runs through; see shutter_window().
   double window() const { return window_; }
   /// Some instances of the scene with nothing else; valid until the next take().
@@ -144,6 +171,12 @@ class RenderScene {
 
   /// Of a hit of the ray from `origin`; without uv, which few surfaces need.
   static SurfaceGeometry surface_at(const RayHit& hit, const Vec3f& origin, const Vec3f& direction);
+  /// The same from its parts, without a branch.
+  static SurfaceGeometry surface_of(const Vec3f& position, const Vec3f& direction,
+                                    const Vec3f& triangle_normal, const Vec3f& interpolated,
+                                    bool is_mirrored);
+  /// World space, not unit length; zero for meshes without normals.
+  static Vec3f interpolated_normal(const RayHit& hit);
   static void add_uv(SurfaceGeometry& surface, const RayHit& hit);
 
  private:
@@ -172,10 +205,10 @@ class RenderScene {
   static constexpr std::uint32_t kStaticMask = 1;
   static constexpr std::uint32_t kMovableMask = 2;
 
-  /// Carried by shadow rays; the filter of the surfaces on their way weakens it.
+  /// Carried by shadow rays; the filter of the surfaces on their way weakens what they carry.
   struct ShadowContext {
     embree::Context context;
-    Vec3f transmittance = Vec3f::Ones();
+    Vec3f* transmittance = nullptr;  ///< By the rays' ids.
     bool passes_glass = true;
   };
 
@@ -268,38 +301,110 @@ inline Vec3f RenderScene::transmittance(RTCScene scene, const Vec3f& origin, con
                                         float time) {
   RTCRayHit ray = make_ray(origin, direction, 0.0f, t_max, time);
   ray.ray.mask = mask;
+  Vec3f kept = Vec3f::Ones();
   ShadowContext shadow;
+  shadow.transmittance = &kept;
   shadow.passes_glass = passes_glass;
   embree::init(shadow.context);
   embree::occluded(scene, shadow.context, ray.ray);
   const bool is_hidden = ray.ray.tfar == -std::numeric_limits<float>::infinity();
-  return is_hidden ? Vec3f(Vec3f::Zero()) : shadow.transmittance;
+  return is_hidden ? Vec3f(Vec3f::Zero()) : kept;
+}
+
+inline void RayBundle::put(int i, const Vec3f& origin, const Vec3f& direction, float t_min,
+                           float t_max, float time) {
+  RTCRay8& r = rays_.ray;
+  r.org_x[i] = origin.x();
+  r.org_y[i] = origin.y();
+  r.org_z[i] = origin.z();
+  r.dir_x[i] = direction.x();
+  r.dir_y[i] = direction.y();
+  r.dir_z[i] = direction.z();
+  r.tnear[i] = t_min;
+  r.tfar[i] = t_max;
+  r.time[i] = time;
+}
+
+/// Fills the rest with rays that go nowhere: not all of Embree's kernels heed which are valid.
+inline void RayBundle::finish() {
+  for (int i = count_; i < kSize; ++i) {
+    put(i, Vec3f::Zero(), Vec3f::UnitZ(), 0.0f, -1.0f, kMoment);
+  }
+  for (int i = 0; i < kSize; ++i) {
+    valid_[std::size_t(i)] = i < count_ ? -1 : 0;
+    rays_.ray.mask[i] = ~0u;
+    rays_.ray.id[i] = unsigned(i);
+    rays_.ray.flags[i] = 0;
+    rays_.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+    rays_.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+  }
+}
+
+inline void RenderScene::intersect(RayBundle& bundle, RayHit* hits) const {
+  bundle.finish();
+  RTCRayHit8& rays = bundle.rays_;
+  embree::Context context;
+  embree::init(context);
+  embree::intersect(bundle.valid_.data(), scene_over_time(), context, rays);
+  for (int i = 0; i < bundle.count_; ++i) {
+    hits[i] = {};
+    const unsigned geometry = rays.hit.geomID[i];
+    if (geometry == RTC_INVALID_GEOMETRY_ID) continue;
+    const MeshInstance* instance = instances_[geometry].get();
+    instance->shading->prefetch(rays.hit.primID[i]);
+    hits[i] = {instance,           geometry,
+               rays.hit.primID[i], rays.hit.u[i],
+               rays.hit.v[i],      rays.ray.tfar[i],
+               rays.ray.time[i],   {rays.hit.Ng_x[i], rays.hit.Ng_y[i], rays.hit.Ng_z[i]}};
+  }
+}
+
+inline void RenderScene::transmittance(RayBundle& bundle, bool passes_glass, Vec3f* kept) const {
+  bundle.finish();
+  for (int i = 0; i < RayBundle::kSize; ++i) kept[i].setOnes();
+  ShadowContext shadow;
+  shadow.transmittance = kept;
+  shadow.passes_glass = passes_glass;
+  embree::init(shadow.context);
+  embree::occluded(bundle.valid_.data(), scene_over_time(), shadow.context, bundle.rays_.ray);
+  for (int i = 0; i < bundle.count_; ++i) {
+    const bool is_hidden = bundle.rays_.ray.tfar[i] == -std::numeric_limits<float>::infinity();
+    if (is_hidden) kept[i].setZero();
+  }
+}
+
+inline Vec3f RenderScene::interpolated_normal(const RayHit& hit) {
+  const MeshInstance& instance = *hit.instance;
+  if (!instance.shading->has_normals()) return Vec3f::Zero();
+  Vec3f n = instance.normal_from_node * instance.shading->normal(hit.triangle, hit.u, hit.v);
+  if (!instance.blurred_positions.empty()) [[unlikely]]
+    n = instance.turned(n, hit.time);
+  return n;
+}
+
+inline SurfaceGeometry RenderScene::surface_of(const Vec3f& position, const Vec3f& direction,
+                                               const Vec3f& triangle_normal,
+                                               const Vec3f& interpolated, bool is_mirrored) {
+  SurfaceGeometry s;
+  s.position = position;
+  const float area2 = triangle_normal.squaredNorm();
+  const Vec3f flat = select(area2 > 0.0f, triangle_normal * (1.0f / std::sqrt(area2)), -direction);
+  const float facing = flat.dot(direction);
+  s.is_back = (facing > 0.0f) != is_mirrored;
+  s.flat_normal = flat * (facing > 0.0f ? -1.0f : 1.0f);
+  const float length2 = interpolated.squaredNorm();
+  const Vec3f turned = interpolated * ((s.is_back ? -1.0f : 1.0f) / std::sqrt(length2));
+  const Vec3f normal = select(length2 > 0.0f, turned, s.flat_normal);
+  // Seen from the visible side, a normal that points away is bent back to the horizon.
+  const float away = std::max(0.0f, normal.dot(direction) + 1e-4f);
+  s.normal = unit(normal - away * direction);
+  return s;
 }
 
 inline SurfaceGeometry RenderScene::surface_at(const RayHit& hit, const Vec3f& origin,
                                                const Vec3f& direction) {
-  const MeshInstance& instance = *hit.instance;
-  const ShadingMesh& mesh = *instance.shading;
-  SurfaceGeometry s;
-  s.position = origin + hit.distance * direction;
-  const float twice_area = hit.normal.norm();
-  s.flat_normal = twice_area > 0.0f ? Vec3f(hit.normal * (1.0f / twice_area)) : Vec3f(-direction);
-  const float facing = s.flat_normal.dot(direction);
-  s.is_back = (facing > 0.0f) != instance.is_mirrored;
-  if (facing > 0.0f) s.flat_normal = -s.flat_normal;
-
-  s.normal = s.flat_normal;
-  if (mesh.has_normals()) {
-    Vec3f n = instance.normal_from_node * mesh.normal(hit.triangle, hit.u, hit.v);
-    if (!instance.blurred_positions.empty()) [[unlikely]]
-      n = instance.turned(n, hit.time);
-    const float length2 = n.squaredNorm();
-    if (length2 > 0.0f) s.normal = n * ((s.is_back ? -1.0f : 1.0f) / std::sqrt(length2));
-    // Seen from the visible side, a normal that points away is bent back to the horizon.
-    const float away = s.normal.dot(direction);
-    if (away > -1e-4f) s.normal = unit(s.normal - (away + 1e-4f) * direction);
-  }
-  return s;
+  return surface_of(origin + hit.distance * direction, direction, hit.normal,
+                    interpolated_normal(hit), hit.instance->is_mirrored);
 }
 
 inline void RenderScene::add_uv(SurfaceGeometry& s, const RayHit& hit) {

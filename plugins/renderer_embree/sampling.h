@@ -65,9 +65,11 @@ inline Vec2f disk_from_square(const Vec2f& u) {
   const float b = 2.0f * u.y() - 1.0f;
   const bool is_wide = std::abs(a) > std::abs(b);
   const float r = is_wide ? a : b;
-  if (r == 0.0f) return Vec2f::Zero();
-  const Vec2f p = cos_sin_small(0.25f * kPiF * ((is_wide ? b : a) / r));
-  return is_wide ? Vec2f(r * p.x(), r * p.y()) : Vec2f(r * p.y(), r * p.x());
+  const float other = is_wide ? b : a;
+  const Vec2f p = cos_sin_small(0.25f * kPiF * (other / (r == 0.0f ? 1.0f : r)));
+  const float along = r * p.x();
+  const float across = r * p.y();
+  return {is_wide ? along : across, is_wide ? across : along};
 }
 
 /// Density cos(theta) / pi.
@@ -86,6 +88,15 @@ inline Vec3f uniform_cone(const Vec2f& u, float one_minus_cos) {
 }
 
 inline Vec3f uniform_sphere(const Vec2f& u) { return uniform_cone(u, 2.0f); }
+
+/// The interval of an ascending table, of `count` + 1 borders from 0 to 1, that u in [0, 1) falls
+/// into. Counts borders, by vector code: a search by halves waits for memory and guesses wrong at
+/// every step, and the tables are short.
+inline int interval_of(const float* borders, int count, float u) {
+  int passed = 0;
+  for (int i = 1; i < count; ++i) passed += borders[i] <= u ? 1 : 0;
+  return passed;
+}
 
 /// Barycentric weights of the second and third corner, uniform over the triangle.
 inline Vec2f triangle_from_square(const Vec2f& u) {

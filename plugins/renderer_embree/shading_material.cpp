@@ -116,6 +116,8 @@ std::unique_ptr<ShadingMaterial> MaterialLibrary::make(std::shared_ptr<const Mat
   material->is_pane = m.is_thin_walled && m.transmission > 0.0f;
   material->dims_shadows = material->is_cut_out || m.transmission > 0.0f;
   material->emits = m.emission.maxCoeff() > 0.0f;
+  material->is_special = material->is_textured || material->is_veil || material->is_pane ||
+                         material->emits || material->sharp.glass;
   return material;
 }
 

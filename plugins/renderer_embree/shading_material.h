@@ -33,6 +33,7 @@ struct ShadingMaterial {
   bool is_cut_out = false;    ///< Rays may pass where the opacity says so.
   bool dims_shadows = false;  ///< Shadow rays may pass, weakened.
   bool emits = false;
+  bool is_special = false;  ///< Any of the above but cut-outs, or solid glass.
 
   /// For roughness read from a texture.
   static float alpha_of(float roughness, bool is_soft);

@@ -67,8 +67,7 @@ inline std::uint32_t SkyGrid::cell(const Vec3f& position) const {
 
 inline SkyGrid::Choice SkyGrid::choose(std::uint32_t index, float u) const {
   const auto& cumulative = cells_[index].cumulative;
-  const auto it = std::upper_bound(cumulative.begin() + 1, cumulative.end() - 1, u);
-  const auto patch = std::size_t(it - cumulative.begin()) - 1;
+  const auto patch = std::size_t(interval_of(cumulative.data(), DomeTexture::kPatches, u));
   const float share = cumulative[patch + 1] - cumulative[patch];
   if (!(share > 0.0f)) return {};
   return {int(patch), share, std::clamp((u - cumulative[patch]) / share, 0.0f, 0.9999999f)};

@@ -67,28 +67,23 @@ class PathSampler {
       : key_(place.key), reversed_(reversed(place.index)) {}
 
   /// Two numbers in [0, 1), well spread over the samples of the pixel and of its neighbours.
-  Vec2f next() { return next_pairs<1>()[0]; }
+  Vec2f next() { return pair(take(1), reversed_); }
 
-  /// Several pairs at once: the loops below become vector code.
-  template <std::size_t Count>
-  std::array<Vec2f, Count> next_pairs() {
-    std::array<std::uint32_t, Count> keys;
-    std::array<std::uint32_t, Count> first;
-    std::array<std::uint32_t, Count> second;
-    for (std::size_t i = 0; i < Count; ++i) {
-      keys[i] = hashed(key_ + (dimension_ + std::uint32_t(i)) * 0x9E3779B9u);
-    }
-    dimension_ += std::uint32_t(Count);
-    for (std::size_t i = 0; i < Count; ++i) first[i] = shuffled(reversed_, keys[i]);
-    for (std::size_t i = 0; i < Count; ++i) second[i] = second_coordinate(first[i]);
-    std::array<Vec2f, Count> pairs;
-    for (std::size_t i = 0; i < Count; ++i) {
-      const std::uint32_t scramble = keys[i] * 0x9E3779B1u;
-      pairs[i] = {fraction(first[i] ^ scramble),
-                  fraction(second[i] ^ (scramble >> 16 | scramble << 16))};
-    }
-    return pairs;
+  /// For loops over many samplers: pair() of both is what next() returns. Takes `pairs` at once.
+  std::uint32_t take(std::uint32_t pairs) {
+    const std::uint32_t first = key_ + dimension_ * kKeyStep;
+    dimension_ += pairs;
+    return first;
   }
+  std::uint32_t place() const { return reversed_; }
+  static Vec2f pair(std::uint32_t key, std::uint32_t place) {
+    const std::uint32_t hash = hashed(key);
+    const std::uint32_t first = shuffled(place, hash);
+    const std::uint32_t scramble = hash * 0x9E3779B1u;
+    return {fraction(first ^ scramble),
+            fraction(second_coordinate(first) ^ (scramble >> 16 | scramble << 16))};
+  }
+  static constexpr std::uint32_t kKeyStep = 0x9E3779B9u;  ///< From a pair's key to the next.
 
  private:
   static float fraction(std::uint32_t bits) { return float(std::int32_t(bits >> 8)) * 0x1p-24f; }

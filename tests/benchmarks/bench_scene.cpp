@@ -49,6 +49,7 @@ class Glb {
   template <class V>
   std::vector<V> vectors(std::size_t accessor) const {
     std::vector<V> values;
+    values.reserve(json["accessors"][accessor]["count"].get<std::size_t>());
     each(accessor, [&](std::size_t, const std::byte* p, std::size_t) {
       V value;
       std::memcpy(value.data(), p, sizeof(value));
@@ -76,15 +77,11 @@ std::shared_ptr<const Mesh> read_mesh(const Glb& glb, const Json& primitive) {
     mesh->uvs = glb.vectors<Vec2f>(attributes["TEXCOORD_0"]);
     for (Vec2f& uv : mesh->uvs) uv.y() = 1.0f - uv.y();
   }
-  std::vector<std::uint32_t> indices;
-  glb.each(primitive["indices"], [&](std::size_t, const std::byte* p, std::size_t size) {
-    std::uint32_t index = 0;
-    std::memcpy(&index, p, size);
-    indices.push_back(index);
+  const std::size_t accessor = primitive["indices"];
+  mesh->triangles.resize(glb.json["accessors"][accessor]["count"].get<std::size_t>() / 3);
+  glb.each(accessor, [&](std::size_t i, const std::byte* p, std::size_t size) {
+    std::memcpy(&mesh->triangles[i / 3][i % 3], p, size);
   });
-  for (std::size_t i = 0; i + 2 < indices.size(); i += 3) {
-    mesh->triangles.push_back({indices[i], indices[i + 1], indices[i + 2]});
-  }
   return mesh;
 }
 

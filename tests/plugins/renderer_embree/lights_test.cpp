@@ -56,8 +56,25 @@ std::vector<Light> every_kind() {
   return lights;
 }
 
-}  // namespace
+/// What one place gets; fills its total_score.
+struct Chosen {
+  std::uint32_t light = 0;
+  float probability = 0.0f;
+};
+Chosen choose(const Lights& lights, Receiver& receiver, float u) {
+  Lights::Wishes wishes;
+  wishes.count = 1;
+  wishes.position.set(0, receiver.position);
+  wishes.normal.set(0, receiver.normal);
+  wishes.is_two_sided[0] = receiver.is_two_sided;
+  wishes.u[0] = u;
+  Lights::Choices choices;
+  lights.choose(wishes, choices);
+  receiver.total_score = choices.total_score[0];
+  return {std::uint32_t(choices.light[0]), choices.probability[0]};
+}
 
+}  // namespace
 TEST_CASE("a ray towards a light sample meets that light with the same density", "[lights]") {
   const Vec3f from(0.1f, 0.2f, 0.3f);
   Rng rng(12);
@@ -112,7 +129,7 @@ TEST_CASE("lights are chosen as often as their probability says", "[lights]") {
   std::vector<double> counts(lights.count(), 0.0);
   constexpr int kSamples = 200000;
   for (int i = 0; i < kSamples; ++i) {
-    const Lights::Choice choice = lights.choose(receiver, (float(i) + 0.5f) / float(kSamples));
+    const Chosen choice = choose(lights, receiver, (float(i) + 0.5f) / float(kSamples));
     CHECK(choice.probability == Approx(lights.probability(choice.light, receiver)).epsilon(1e-4));
     counts[choice.light] += 1.0 / kSamples;
   }
@@ -123,6 +140,34 @@ TEST_CASE("lights are chosen as often as their probability says", "[lights]") {
     total += double(lights.probability(i, receiver));
   }
   CHECK(total == Approx(1.0).epsilon(1e-4));
+}
+
+TEST_CASE("places that ask together get the lights that they get alone", "[lights]") {
+  Lights lights;
+  for (int i = 0; i < 5; ++i) {
+    for (const Light& light : every_kind()) {
+      lights.add(light, Affine(Eigen::Translation3d(i, 0.5 * i, 0.0)) * pose(), white_sky());
+    }
+  }
+  lights.finish();
+  Rng rng(4);
+  Lights::Wishes wishes;
+  wishes.count = 13;
+  for (std::size_t i = 0; i < wishes.count; ++i) {
+    wishes.position.set(i, rng.uniform_in({Vec3(0, 0, 0), Vec3(5, 5, 1)}).cast<float>());
+    wishes.normal.set(i, Vec3(rng.uniform_rotation() * Vec3::UnitZ()).cast<float>());
+    wishes.is_two_sided[i] = i % 3 == 0;
+    wishes.u[i] = float(rng.uniform());
+  }
+  Lights::Choices together;
+  lights.choose(wishes, together);
+  for (std::size_t i = 0; i < wishes.count; ++i) {
+    Receiver alone = wishes.receiver(i);
+    const Chosen chosen = choose(lights, alone, wishes.u[i]);
+    CHECK(std::uint32_t(together.light[i]) == chosen.light);
+    CHECK(together.probability[i] == chosen.probability);
+    CHECK(together.total_score[i] == alone.total_score);
+  }
 }
 
 TEST_CASE("hundreds of lights are chosen as often as their probability says", "[lights]") {
@@ -144,7 +189,7 @@ TEST_CASE("hundreds of lights are chosen as often as their probability says", "[
   int mismatches = 0;
   double missed = 0.0;
   for (int i = 0; i < kSamples; ++i) {
-    const Lights::Choice choice = lights.choose(receiver, (float(i) + 0.5f) / float(kSamples));
+    const Chosen choice = choose(lights, receiver, (float(i) + 0.5f) / float(kSamples));
     if (choice.probability == 0.0f) {  // a group whose lights all turn out to face away
       missed += 1.0 / kSamples;
       continue;
@@ -194,11 +239,11 @@ TEST_CASE("a light below the horizon or turned away is never chosen", "[lights]"
   lights.add(lamp, Affine(Eigen::Translation3d(0, 0, 1)), nullptr);  // shines along -z
   lights.finish();
   Receiver below{Vec3f::Zero(), Vec3f::UnitZ(), false, 0.0f};
-  CHECK(lights.choose(below, 0.5f).probability == 1.0f);
+  CHECK(choose(lights, below, 0.5f).probability == 1.0f);
   Receiver facing_away{Vec3f::Zero(), -Vec3f::UnitZ(), false, 0.0f};
-  CHECK(lights.choose(facing_away, 0.5f).probability == 0.0f);
+  CHECK(choose(lights, facing_away, 0.5f).probability == 0.0f);
   Receiver above{Vec3f(0, 0, 2), -Vec3f::UnitZ(), false, 0.0f};
-  CHECK(lights.choose(above, 0.5f).probability == 0.0f);
+  CHECK(choose(lights, above, 0.5f).probability == 0.0f);
 }
 
 TEST_CASE("the light that falls on a point is that of the closed forms", "[lights]") {

@@ -2,7 +2,7 @@
 #include "support/render_host/render_host.h"
 
 #include <fstream>
-#include <iterator>
+#include <filesystem>
 
 #include "diorama/error.h"
 #include "framework/images/image_codecs.h"
@@ -44,9 +44,9 @@ void RenderHost::parallel_for(std::size_t count, const std::function<void(std::s
 std::vector<std::byte> read_bytes(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   if (!in) throw Error(ErrorKind::Asset, file.string() + ": cannot be read");
-  const std::vector<char> text((std::istreambuf_iterator<char>(in)), {});
-  const auto* data = reinterpret_cast<const std::byte*>(text.data());
-  return {data, data + text.size()};
+  std::vector<std::byte> bytes(std::filesystem::file_size(file));
+  in.read(reinterpret_cast<char*>(bytes.data()), std::streamsize(bytes.size()));
+  return bytes;
 }
 
 void write_png(const Host& host, const Image<Rgba8>& image, const std::filesystem::path& file) {
