@@ -531,9 +531,11 @@ inline void PathTracer::collect_lights(Path& path, float t_max) const {
   const float cosine = std::max(1e-4f, -surface.normal.dot(path.direction));
   const float once = fresnel_dielectric(cosine, std::max(1.0001f, m.ior));
   const float reflected = 2.0f * once / (1.0f + once);
-  // Seen directly, both ways get a fair number of samples: a reflection on a dark pane is faint
-  // but plain to see.
-  const float chance = path.has_scattered ? reflected : std::clamp(reflected, 0.3f, 0.7f);
+  // A reflection on the first pane seen is faint but plain to see: it gets one sample of four,
+  // which stratified samples divide without noise. Panes behind it are left to their own share, or
+  // bright skies behind double windows would have black pixels.
+  const bool is_first_seen = !path.has_scattered && path.passages == 0 && path.bounce == 0;
+  const float chance = is_first_seen ? std::clamp(reflected, 0.25f, 0.75f) : reflected;
   if (u.y() >= chance) {
     path.throughput =
         path.throughput.cwiseProduct(bsdf.base) * ((1.0f - reflected) / (1.0f - chance));
