@@ -28,6 +28,9 @@ constexpr std::array kViewTransforms{"standard", "filmic"};
 constexpr std::array kSphereLights{"sphere", "disk"};
 constexpr std::array kPrincipled{"layered", "blender"};
 
+// A fifth more error for three quarters of the time (measured on six rooms at one path).
+constexpr float kRealTimeIndirectShare = 0.5f;
+
 using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) {
@@ -140,7 +143,8 @@ void EmbreeRenderer::do_prepare(const Scene& scene) {
 }
 
 Film EmbreeRenderer::trace(const View& view, std::uint64_t seed) {
-  const TraceSettings settings{params_.max_bounces, float(params_.clamp), params_.caustics};
+  TraceSettings settings{params_.max_bounces, float(params_.clamp), params_.caustics};
+  if (params_.mode == "real_time") settings.indirect_share = kRealTimeIndirectShare;
   const PathTracer tracer(meshes_, view, settings, isa_);
   const int width = view.camera().width;
   const int height = view.camera().height;

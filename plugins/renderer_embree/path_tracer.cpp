@@ -636,8 +636,11 @@ inline void PathTracer::scatter(const Vertices& v, std::size_t i) const {
   // proportion to what is seen, so a dark surface's paths are as good as a bright one's.
   const float left = path.throughput.maxCoeff();
   if (path.bounce == 0) path.left_by_first = left;
-  if (path.bounce > 0) {
-    const float survival = std::min(0.95f, kContinuation * left / path.left_by_first);
+  // Mirrors seen directly keep all their paths.
+  const float first = path.result.has_surface ? settings_.indirect_share : 1.0f;
+  const float survival =
+      path.bounce == 0 ? first : std::min(0.95f, kContinuation * left / path.left_by_first);
+  if (survival < 1.0f) {
     if (v.numbers[Vertices::kRoulette][i] >= survival) return;
     path.throughput *= 1.0f / survival;
   }

@@ -30,6 +30,9 @@ struct TraceSettings {
   /// False: shadow rays pass glass straight, and lights seen over a diffuse surface through a
   /// mirror or glass are left out: far less noise for a little lost light.
   bool has_caustics = false;
+  /// Share of the paths that go on behind their first scattering surface, with more weight: less
+  /// time for a picture, more noise in its indirect light.
+  float indirect_share = 1.0f;
   /// For tests of the estimators: which of the two techniques that find light are used.
   bool samples_lights = true;
   bool samples_bsdf = true;

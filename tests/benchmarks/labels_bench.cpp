@@ -2,8 +2,9 @@
 // What labels and files cost beside a frame of the bench scene, in CPU seconds of one run: the
 // renderer's geometry channels, every annotator and coverage against the colour alone
 // (labels_per_color), and BasicWriter with every annotator in its encoding (files_per_color). Then
-// whole frames as a run makes them, files written beside the next frame: their CPU seconds and how
-// many there are per second of wall time (frame_cpu_s, frames_per_s).
+// whole frames as a run makes them, with what BasicWriter asks for and files written beside the
+// next frame: their CPU seconds and how many there are per second of wall time (frame_cpu_s,
+// frames_per_s).
 //
 //   labels_bench BENCH_FOLDER --real-time --repetitions 20
 #include <CLI/CLI.hpp>
@@ -105,8 +106,9 @@ void set_lens(Camera& camera, const std::string& lens) {
   }
 }
 
+/// `extras`: what BasicWriter does not ask for.
 void annotate(const Scene& scene, const BodyPoses& before, EmbreeRenderer& renderer, NodeId camera,
-              Host& host, Frame& frame, Times& times) {
+              Host& host, bool extras, Frame& frame, Times& times) {
   times.measure("instances", [&] {
     InstanceIds({}, host).annotate(scene, frame);
     Instances({}, host).annotate(scene, frame);
@@ -115,9 +117,9 @@ void annotate(const Scene& scene, const BodyPoses& before, EmbreeRenderer& rende
   const auto masks =
       times.measure("cover", [&] { return renderer.cover(camera, labelled_instances(scene)); });
   times.measure("other_annotators", [&] {
-    measure_visibility(masks, true, frame);
+    measure_visibility(masks, extras, frame);
     measure_motion(scene, before, frame);
-    ObjectCoordinates({}, host).annotate(scene, frame);
+    if (extras) ObjectCoordinates({}, host).annotate(scene, frame);
     return 0;
   });
 }
@@ -126,8 +128,11 @@ void annotate(const Scene& scene, const BodyPoses& before, EmbreeRenderer& rende
 void measure_frames(const Scene& scene, const BodyPoses& before, EmbreeRenderer& renderer,
                     NodeId camera, Host& host, BasicWriter& writer, int count,
                     nlohmann::ordered_json& line) {
-  NameSet channels = renderer.provides();
-  channels.erase(std::string(kColorHdr.name));
+  NameSet channels{std::string(kLeafId.name)};
+  const NameSet known = renderer.provides();
+  for (const std::string& name : writer.needs()) {
+    if (known.contains(name)) channels.insert(name);
+  }
   Times times;
   ForgottenFiles files;
   std::future<void> written;
@@ -137,7 +142,7 @@ void measure_frames(const Scene& scene, const BodyPoses& before, EmbreeRenderer&
     Capture capture;
     capture.index = i;
     capture.frames.push_back(renderer.render({camera, channels, std::uint64_t(i)}));
-    annotate(scene, before, renderer, camera, host, capture.frames.back(), times);
+    annotate(scene, before, renderer, camera, host, false, capture.frames.back(), times);
     if (written.valid()) written.get();
     written = std::async(std::launch::async, [&writer, &files, capture = std::move(capture)] {
       writer.write(capture, files);
@@ -179,7 +184,7 @@ void run(const Options& options) {
       return renderer.render({camera, geometry, std::uint64_t(i)});
     }));
     Frame& frame = capture.frames.back();
-    annotate(scene, before, renderer, camera, host, frame, times);
+    annotate(scene, before, renderer, camera, host, true, frame, times);
     frame.set(kColor, Image<Rgba8>(picture.get(kColor)));
     frame.set(kColorHdr, Image<Vec3f>(picture.get(kColorHdr)));
     times.measure("files", [&] {

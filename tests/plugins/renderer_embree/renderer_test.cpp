@@ -154,12 +154,13 @@ TEST_CASE("light samples, BSDF samples and both together agree", "[renderer][mis
   RenderScene scene(host, {});
   scene.take(world.scene);
   const View view(world.scene, camera);
-  const auto measure = [&](bool lights, bool bsdf, int samples) {
+  const auto measure = [&](bool lights, bool bsdf, int samples, float indirect_share = 1.0f) {
     TraceSettings settings;
     settings.max_bounces = 3;
     settings.has_caustics = true;
     settings.samples_lights = lights;
     settings.samples_bsdf = bsdf;
+    settings.indirect_share = indirect_share;
     const PathTracer tracer(scene, view, settings, Isa::Sse2);
     // Independent repetitions give the error of the mean.
     constexpr int kRuns = 12;
@@ -180,12 +181,15 @@ TEST_CASE("light samples, BSDF samples and both together agree", "[renderer][mis
   const Statistics both = measure(true, true, 6);
   const Statistics lights = measure(true, false, 12);
   const Statistics bsdf = measure(false, true, 48);
+  const Statistics fewer_bounces = measure(true, true, 12, 0.5f);
   CAPTURE(both.mean, both.error, lights.mean, lights.error, bsdf.mean, bsdf.error);
   REQUIRE(both.error < 0.01 * both.mean);
   REQUIRE(lights.error < 0.02 * lights.mean);
   REQUIRE(bsdf.error < 0.03 * bsdf.mean);
   CHECK(std::abs(both.mean - lights.mean) < 4.0 * std::hypot(both.error, lights.error));
   CHECK(std::abs(both.mean - bsdf.mean) < 4.0 * std::hypot(both.error, bsdf.error));
+  CHECK(std::abs(both.mean - fewer_bounces.mean) <
+        4.0 * std::hypot(both.error, fewer_bounces.error));
 }
 
 TEST_CASE("fireflies are rarer than one in a million samples", "[renderer]") {
