@@ -2,6 +2,7 @@
 #include "channels.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -213,13 +214,27 @@ Image<SeenPixel> fill_channels(Frame& frame, const NameSet& wanted, const Render
   ChannelImages channels(wanted, view);
   host.parallel_for(std::size_t(height), [&](std::size_t row) {
     const int y = int(row);
-    for (int x = 0; x < width; ++x) {
-      const auto ray = view.ray(Vec2(x + 0.5, y + 0.5));
-      if (!ray) continue;
-      const RayHit hit = meshes.intersect(ray->origin, ray->direction, ray->t_min, ray->t_max);
-      if (!hit) continue;
-      seen.at(x, y) = {hit.geometry, hit.distance};
-      channels.put(x, y, *ray, hit);
+    RayBundle bundle;
+    std::array<int, RayBundle::kSize> columns;
+    std::array<CameraRay, RayBundle::kSize> rays;
+    std::array<RayHit, RayBundle::kSize> hits;
+    for (int begin = 0; begin < width; begin += RayBundle::kSize) {
+      bundle.clear();
+      std::size_t count = 0;
+      for (int x = begin; x < std::min(width, begin + RayBundle::kSize); ++x) {
+        const auto ray = view.ray(Vec2(x + 0.5, y + 0.5));
+        if (!ray) continue;
+        bundle.add(ray->origin, ray->direction, ray->t_min, ray->t_max, kMoment);
+        columns[count] = x;
+        rays[count++] = *ray;
+      }
+      if (count == 0) continue;
+      meshes.intersect_now(bundle, hits.data());
+      for (std::size_t i = 0; i < count; ++i) {
+        if (!hits[i]) continue;
+        seen.at(columns[i], y) = {hits[i].geometry, hits[i].distance};
+        channels.put(columns[i], y, rays[i], hits[i]);
+      }
     }
   });
   channels.move_to(frame);

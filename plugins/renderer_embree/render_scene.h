@@ -151,7 +151,9 @@ class RenderScene {
   }
   /// The same for the rays of a bundle, which it spends: `hits` and `kept` have RayBundle::kSize
   /// entries.
-  void intersect(RayBundle& rays, RayHit* hits) const;
+  void intersect(RayBundle& rays, RayHit* hits) const { intersect(scene_over_time(), rays, hits); }
+  /// At the moment of the poses.
+  void intersect_now(RayBundle& rays, RayHit* hits) const { intersect(scene_, rays, hits); }
   void transmittance(RayBundle& rays, bool passes_glass, Vec3f* kept) const;
   /// Seconds around the moment of the poses that `time` runs through; see shutter_window().
   double window() const { return window_; }
@@ -214,6 +216,7 @@ class RenderScene {
 
   static RTCRayHit make_ray(const Vec3f& origin, const Vec3f& direction, float t_min, float t_max,
                             float time);
+  void intersect(RTCScene scene, RayBundle& rays, RayHit* hits) const;
   RayHit intersect(RTCScene scene, const Vec3f& origin, const Vec3f& direction, float t_min,
                    float t_max, float time) const;
   static Vec3f transmittance(RTCScene scene, const Vec3f& origin, const Vec3f& direction,
@@ -340,12 +343,12 @@ inline void RayBundle::finish() {
   }
 }
 
-inline void RenderScene::intersect(RayBundle& bundle, RayHit* hits) const {
+inline void RenderScene::intersect(RTCScene scene, RayBundle& bundle, RayHit* hits) const {
   bundle.finish();
   RTCRayHit8& rays = bundle.rays_;
   embree::Context context;
   embree::init(context);
-  embree::intersect(bundle.valid_.data(), scene_over_time(), context, rays);
+  embree::intersect(bundle.valid_.data(), scene, context, rays);
   for (int i = 0; i < bundle.count_; ++i) {
     hits[i] = {};
     const unsigned geometry = rays.hit.geomID[i];
