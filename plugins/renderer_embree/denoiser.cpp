@@ -26,7 +26,7 @@ constexpr float kMinAlbedo = 0.02f;
 // little of how alike two such pixels are.
 constexpr float kMixedTolerance = 100.0f;
 // Below this share of agreeing neighbours a pixel was hardly averaged: edges, thin things.
-constexpr float kLonely = 0.25f;
+constexpr float kLonely = 0.35f;
 constexpr float kWitnesses = 10.0f;  // averaged pixels near a lonely one that make it suspect
 constexpr float kLeeway = 2.0f;      // by which it may leave their range
 constexpr float kInfinite = std::numeric_limits<float>::infinity();
