@@ -10,7 +10,7 @@ set -euo pipefail
 cd "$(dirname "$0")"
 
 build_packages=(
-  g++ cmake ninja-build pkg-config git
+  g++ cmake ninja-build pkgconf git
   libboost-dev libboost-filesystem-dev libbullet-dev libfcl-dev libembree-dev libeigen3-dev libassimp-dev
   libyaml-cpp-dev libcli11-dev libspdlog-dev libfmt-dev nlohmann-json3-dev
   libhdf5-dev liblz4-dev libdeflate-dev libpng-dev libjpeg-dev libopenexr-dev libtbb-dev

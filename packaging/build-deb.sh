@@ -18,7 +18,9 @@ source=$out/diorama-$version
 rm -rf "$out"
 mkdir -p "$source"
 git ls-files -z | xargs -0 cp --parents -t "$source"
-tar -C "$out" --sort=name --mtime=@0 --owner=0 --group=0 -czf "$out/diorama_$version.orig.tar.gz" \
+# The same bytes for the same sources; files of the packages get this date.
+date=$(dpkg-parsechangelog -l packaging/debian/changelog -S Timestamp)
+tar -C "$out" --sort=name --mtime="@$date" --owner=0 --group=0 -czf "$out/diorama_$version.orig.tar.gz" \
   "diorama-$version"
 cp -r packaging/debian "$source/debian"
 
