@@ -169,7 +169,7 @@ struct PathTracer::Vertices {
   }
   void find_surfaces();
   void find_bases();
-  /// Keeps only some of the entries, moved to the front.
+  /// What is known before find_bases(), to where the entries that scatter stand together.
   void move(std::size_t from, std::size_t to);
 };
 
