@@ -106,12 +106,14 @@ files_inside() {
     -o -path /var/lib/apt -o -path /var/lib/dpkg -o -path /var/log \) -prune -o -printf '%y %p\n' | sort
 }
 
-# Tools that the page and the tests asked for go as well: apt installed them on our behalf.
+# Tools that the page and the tests asked for go as well: apt installed them on our behalf, also where what
+# stays would only like to have them (libc6 of Debian 13 recommends libidn2-0).
 remove_everything() {
   inside sh -c 'apt-mark auto $(apt-mark showmanual) >/dev/null; apt-mark manual $(cat /root/before)' \
     >/dev/null
   inside sh -c 'apt-get purge -qq $(dpkg-query -W -f "\${Package}\n" "*diorama*")' >/dev/null
-  inside apt-get autoremove --purge -qq >/dev/null
+  inside apt-get autoremove --purge -qq -o APT::AutoRemove::RecommendsImportant=false \
+    -o APT::AutoRemove::SuggestsImportant=false >/dev/null
 }
 
 packages=build/deb
