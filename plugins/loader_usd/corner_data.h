@@ -26,7 +26,8 @@ struct CornerData {
       if (i >= indices->span.size() || indices->span[i] < 0) return nullptr;
       i = static_cast<std::size_t>(indices->span[i]);
     }
-    return (i + 1) * width <= values.span.size() ? values.span.data() + i * width : nullptr;
+    const std::size_t begin = i * width;
+    return begin + width <= values.span.size() ? values.span.data() + begin : nullptr;
   }
   /// The values of a mesh's corner; on a mesh, varying is the same as vertex.
   const float* at(std::size_t face, std::size_t point, std::size_t corner) const {

@@ -156,6 +156,11 @@ Value CrateValues::decode(std::uint64_t representation) const {
   return Decoder(*this).decode(Representation{representation});
 }
 
+bool CrateValues::may_hold_array(std::uint64_t representation) const {
+  const Representation rep{representation};
+  return rep.is_array() || rep.type() == Type::TimeSamples;
+}
+
 Value CrateValues::Decoder::decode(Representation rep) {
   if (budget_ == 0 || nesting_ >= kMaxNesting) {
     crate_.cursor(0).fail_at("values are nested without end", rep.payload());

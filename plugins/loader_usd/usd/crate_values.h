@@ -28,6 +28,7 @@ class CrateValues : public ValueSource, public std::enable_shared_from_this<Crat
   CrateValues(std::string file, ByteView view) : file_(std::move(file)), view_(std::move(view)) {}
 
   Value decode(std::uint64_t representation) const override;
+  bool may_hold_array(std::uint64_t representation) const override;
 
   const std::string& file() const { return file_; }
   CrateCursor cursor(std::uint64_t offset) const { return CrateCursor(file_, view_.bytes, offset); }

@@ -24,6 +24,12 @@ void collect_assets(const Value& arcs, std::set<std::string>& assets) {
   }
 }
 
+void visit_samples(const Value& value, const Layer::Visit& visit) {
+  const TimeSamples* samples = value.as_time_samples();
+  if (!samples) return visit(value);
+  for (std::size_t i = 0; i < samples->times.size(); ++i) visit(samples->value(i));
+}
+
 }  // namespace
 
 const PropertySpec* PrimSpec::property(std::string_view name) const {
@@ -55,24 +61,13 @@ bool Layer::has(const FieldSet& fields, std::string_view name) const {
   return find(fields, name) != nullptr;
 }
 
-Value Layer::get(const FieldSet& fields, std::string_view name) const {
-  const Field* field = find(fields, name);
-  if (!field) return {};
-  return field->representation ? source_->decode(field->representation) : field->value;
+Value Layer::value_of(const Field& field) const {
+  return field.representation ? source_->decode(field.representation) : field.value;
 }
 
-void Layer::visit_fields(const FieldSet& fields,
-                         const std::function<void(const Value&)>& visit) const {
-  for (std::uint32_t i = 0; i < fields.count; ++i) {
-    const Field& field = fields_[field_indices_[fields.begin + i]];
-    const Value value = field.representation ? source_->decode(field.representation) : field.value;
-    const TimeSamples* samples = value.as_time_samples();
-    if (!samples) {
-      visit(value);
-      continue;
-    }
-    for (std::size_t k = 0; k < samples->times.size(); ++k) visit(samples->value(k));
-  }
+Value Layer::get(const FieldSet& fields, std::string_view name) const {
+  const Field* field = find(fields, name);
+  return field ? value_of(*field) : Value();
 }
 
 Layer::NamedAssets Layer::named_assets() const {
@@ -90,11 +85,28 @@ Layer::NamedAssets Layer::named_assets() const {
   return named;
 }
 
-void Layer::for_each_value(const std::function<void(const Value&)>& visit) const {
+void Layer::for_each_field(const std::function<void(const Field&)>& visit) const {
+  const auto visit_set = [&](const FieldSet& set) {
+    for (std::uint32_t i = 0; i < set.count; ++i) visit(fields_[field_indices_[set.begin + i]]);
+  };
   for (const auto& [path, spec] : prims_) {
-    visit_fields(spec.fields, visit);
-    for (const PropertySpec& property : spec.properties) visit_fields(property.fields, visit);
+    visit_set(spec.fields);
+    for (const PropertySpec& property : spec.properties) visit_set(property.fields);
   }
+}
+
+void Layer::for_each_value(const Visit& visit) const {
+  for_each_field([&](const Field& field) { visit_samples(value_of(field), visit); });
+}
+
+void Layer::for_each_array(const Visit& visit) const {
+  const auto visit_array = [&](const Value& value) {
+    if (value.is_array()) visit(value);
+  };
+  for_each_field([&](const Field& field) {
+    const bool is_wanted = !field.representation || source_->may_hold_array(field.representation);
+    if (is_wanted) visit_samples(value_of(field), visit_array);
+  });
 }
 
 std::uint32_t Layer::add_field(Field field) {

@@ -71,7 +71,10 @@ class Layer {
   NamedAssets named_assets() const;
 
   /// Reads every value once, time samples included. Throws FormatError as `get` does.
-  void for_each_value(const std::function<void(const Value&)>& visit) const;
+  using Visit = std::function<void(const Value&)>;
+  void for_each_value(const Visit& visit) const;
+  /// The same for arrays alone: other values are not decoded.
+  void for_each_array(const Visit& visit) const;
 
   /// Called by the readers.
   struct Field {
@@ -87,7 +90,8 @@ class Layer {
 
  private:
   const Field* find(const FieldSet& fields, std::string_view name) const;
-  void visit_fields(const FieldSet& fields, const std::function<void(const Value&)>& visit) const;
+  void for_each_field(const std::function<void(const Field&)>& visit) const;
+  Value value_of(const Field& field) const;
 
   std::string identifier_;
   std::shared_ptr<const ValueSource> source_;

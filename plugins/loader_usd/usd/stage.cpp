@@ -9,6 +9,28 @@
 #include "path.h"
 
 namespace diorama::usd {
+namespace {
+
+// `visit` gets the node, the layer and the spec, and says whether to go on.
+template <class Visit>
+void for_each_spec(const Prim& prim, const Visit& visit) {
+  for (const Opinion& opinion : prim.opinions) {
+    if (!visit(*opinion.node, *opinion.entry, *opinion.spec)) return;
+  }
+}
+
+// Found once, because a prim is asked for dozens of values.
+void collect_opinions(Prim& prim) {
+  for (const int i : prim.order) {
+    const IndexNode& node = prim.index.nodes[static_cast<std::size_t>(i)];
+    for (const LayerStack::Entry& entry : node.stack->layers) {
+      const PrimSpec* spec = entry.layer->prim(node.path);
+      if (spec) prim.opinions.push_back({&node, &entry, spec});
+    }
+  }
+}
+
+}  // namespace
 
 Stage::Stage(const std::string& file, Sampling sampling)
     : sampling_(sampling),
@@ -20,6 +42,7 @@ Stage::Stage(const std::string& file, Sampling sampling)
   root->path = "/";
   root->index = indexer_.root_index();
   root->order = {0};
+  collect_opinions(*root);
   root->is_defined = true;
   root_ = root.get();
   prims_.emplace("/", std::move(root));
@@ -53,11 +76,10 @@ const Prim* Stage::find(std::string_view path) {
   if (const auto known = prims_.find(path); known != prims_.end()) return known->second.get();
   const Prim* parent = find(path::parent(path));
   if (!parent) return nullptr;
-  const std::string_view name = path::name(path);
-  const Strings names = child_names(parent->index);
-  const bool exists =
-      parent->is_active && std::find(names.begin(), names.end(), name) != names.end();
-  return exists ? compose(*parent, name) : nullptr;
+  // Asked for one child, people ask for its siblings next; their names are composed together.
+  if (listed_.insert(parent).second) children(*parent);
+  const auto found = prims_.find(path);
+  return found == prims_.end() ? nullptr : found->second.get();
 }
 
 std::vector<const Prim*> Stage::children(const Prim& prim) {
@@ -86,6 +108,7 @@ const Prim* Stage::compose(const Prim& parent, std::string_view name) {
   prim->parent = &parent;
   prim->index = indexer_.child_index(parent.index, name);
   prim->order = prim->index.strength_order();
+  collect_opinions(*prim);
   prim->is_instance = prim->index.is_instance;
   prim->is_instance_proxy = parent.is_instance || parent.is_instance_proxy;
   prim->is_active = metadata(*prim, "active").as_bool().value_or(true);
@@ -102,16 +125,6 @@ const Prim* Stage::compose(const Prim& parent, std::string_view name) {
   });
   prim->traits = type_traits(prim->type_name);
   return prims_.emplace(std::move(path), std::move(prim)).first->second.get();
-}
-
-void Stage::for_each_spec(const Prim& prim, const Visit& visit) const {
-  for (const int i : prim.order) {
-    const IndexNode& node = prim.index.nodes[static_cast<std::size_t>(i)];
-    for (const LayerStack::Entry& entry : node.stack->layers) {
-      const PrimSpec* spec = entry.layer->prim(node.path);
-      if (spec && !visit(node, entry, *spec)) return;
-    }
-  }
 }
 
 // The strongest `def` or `class`; a class that the prim merely inherits is weaker than any other.

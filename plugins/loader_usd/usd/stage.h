@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 #include <unordered_map>
+#include <unordered_set>
 #include <vector>
 
 #include "asset_library.h"
@@ -16,12 +17,20 @@
 
 namespace diorama::usd {
 
+/// What one layer says about a composed prim.
+struct Opinion {
+  const IndexNode* node;
+  const LayerStack::Entry* entry;
+  const PrimSpec* spec;
+};
+
 /// A composed prim. Belongs to its stage.
 struct Prim {
   std::string path;
   const Prim* parent = nullptr;  ///< Null for the pseudo-root.
   PrimIndex index;
   std::vector<int> order;  ///< Nodes of the index with opinions, strongest first.
+  std::vector<Opinion> opinions;  ///< Of the layers of these nodes, strongest first.
   std::string type_name;
   TypeTraits traits;
   bool is_active = true;
@@ -106,8 +115,6 @@ class Stage {
   std::string anchor(const FoundValue& value) const;
 
  private:
-  using Visit = std::function<bool(const IndexNode&, const LayerStack::Entry&, const PrimSpec&)>;
-  void for_each_spec(const Prim& prim, const Visit& visit) const;
   const Prim* compose(const Prim& parent, std::string_view name);
   Specifier compose_specifier(const Prim& prim, bool& is_defining) const;
   Strings compose_paths(const Prim& prim, std::string_view name, std::string_view field) const;
@@ -119,6 +126,7 @@ class Stage {
   const LayerStack* root_stack_;
   PrimIndexer indexer_;
   std::unordered_map<std::string, std::unique_ptr<Prim>, StringHash, std::equal_to<>> prims_;
+  std::unordered_set<const Prim*> listed_;  ///< Prims whose children find() has composed.
   const Prim* root_ = nullptr;
 };
 

@@ -73,6 +73,8 @@ class ValueSource {
   virtual ~ValueSource();
   /// Reads what a value representation stands for. Throws FormatError.
   virtual Value decode(std::uint64_t representation) const = 0;
+  /// Whether it stands for an array, or for time samples, which may be arrays.
+  virtual bool may_hold_array(std::uint64_t representation) const = 0;
 };
 
 /// Times in ascending order and the value of each, read when asked for.
