@@ -38,9 +38,14 @@ void give_back_room(std::vector<T>& list) {
   if (list.capacity() - list.size() > list.size() / 8) list.shrink_to_fit();
 }
 
+bool is_per_point(const CornerData& data) {
+  return data.interpolation == Interpolation::Vertex ||
+         data.interpolation == Interpolation::Varying;
+}
+
 class MeshAssembly {
  public:
-  explicit MeshAssembly(const MeshSources& sources);
+  MeshAssembly(MeshSources sources, const std::function<void()>& rest);
 
   Mesh build();
 
@@ -48,6 +53,7 @@ class MeshAssembly {
   static constexpr std::uint32_t kNone = 0xFFFFFFFF;
   // A point that all faces share must not cost the square of their number.
   static constexpr int kMaxTries = 64;
+  static constexpr std::size_t kCornersBetweenRests = 32768;
 
   // The face of a mesh and its corner.
   struct Corner {
@@ -96,21 +102,24 @@ class MeshAssembly {
   void add_polygon(std::size_t face, std::size_t corner, std::size_t count);
   void add_triangle(std::size_t face, std::uint32_t a, std::uint32_t b, std::uint32_t c);
   void add_normal(const Vec3& normal, std::initializer_list<std::uint32_t> vertices);
-  void join_normals();
   std::vector<char> find_holes() const;
   std::size_t count_triangles() const;
 
   template <class Vector, class Repair>
   std::vector<Vector> gather(const CornerData& data, Repair repair) const;
-  void gather_vertices();
+  void finish_made_normals();
+  void gather_positions();
+  void gather_attributes(bool are_of_points);
 
-  const MeshSources& sources_;
+  MeshSources sources_;
+  const std::function<void()>& rest_;
   std::span<const float> points_;
   std::span<const std::int32_t> counts_;
   std::span<const std::int32_t> indices_;
   bool are_points_finite_;
   bool are_indices_sound_;
   bool makes_normals_;
+  std::size_t corner_count_;
   bool needs_faces_ = false;
   std::vector<Seam> seams_;
   Mesh mesh_;
@@ -126,18 +135,20 @@ class MeshAssembly {
   std::vector<std::array<std::uint32_t, 3>> split_;
 };
 
-MeshAssembly::MeshAssembly(const MeshSources& sources)
-    : sources_(sources),
-      points_(sources.points.span),
-      counts_(sources.counts.span),
-      indices_(sources.indices.span),
+MeshAssembly::MeshAssembly(MeshSources sources, const std::function<void()>& rest)
+    : sources_(std::move(sources)),
+      rest_(rest),
+      points_(sources_.points.span),
+      counts_(sources_.counts.span),
+      indices_(sources_.indices.span),
       are_points_finite_(all_finite(points_)),
       are_indices_sound_(all_below(indices_, points_.size() / 3)),
-      makes_normals_(sources.is_smooth && !sources.normals),
+      makes_normals_(sources_.is_smooth && !sources_.normals),
+      corner_count_(indices_.size()),
       last_(points_.size() / 3, kNone) {
-  add_seam(sources.normals, true);
-  add_seam(sources.uvs, false);
-  add_seam(sources.colors, true);
+  add_seam(sources_.normals, true);
+  add_seam(sources_.uvs, false);
+  add_seam(sources_.colors, true);
 }
 
 void MeshAssembly::add_seam(const std::optional<CornerData>& data, bool has_three) {
@@ -151,7 +162,7 @@ void MeshAssembly::add_seam(const std::optional<CornerData>& data, bool has_thre
 // Where each corner has its own values, one behind the other; null for other data.
 const float* MeshAssembly::values_of_corners(const CornerData& data) const {
   const bool is_plain = data.interpolation == Interpolation::FaceVarying && !data.indices &&
-                        data.count() >= indices_.size();
+                        data.count() >= corner_count_;
   return is_plain ? data.values.span.data() : nullptr;
 }
 
@@ -203,16 +214,6 @@ void MeshAssembly::add_triangle(std::size_t face, std::uint32_t a, std::uint32_t
 void MeshAssembly::add_normal(const Vec3& normal, std::initializer_list<std::uint32_t> vertices) {
   const Vec3f added = normal.cast<float>();
   for (const std::uint32_t v : vertices) mesh_.normals[v] += added;
-}
-
-// Normals belong to points: seams of other attributes must not show in the shading.
-void MeshAssembly::join_normals() {
-  for (const std::uint32_t last : last_) {
-    if (last == kNone || before_[last] == kNone) continue;
-    Vec3f sum = Vec3f::Zero();
-    for (std::uint32_t v = last; v != kNone; v = before_[v]) sum += mesh_.normals[v];
-    for (std::uint32_t v = last; v != kNone; v = before_[v]) mesh_.normals[v] = sum;
-  }
 }
 
 // The diagonal from the first to the third corner splits four corners into two triangles that face
@@ -295,8 +296,13 @@ void MeshAssembly::add_faces() {
   mesh_.triangles.reserve(count_triangles());
   if (!sources_.slot_of_face.empty()) mesh_.material_slots.reserve(mesh_.triangles.capacity());
   std::size_t corner = 0;
+  std::size_t next_rest = kCornersBetweenRests;
   for (std::size_t face = 0; face < counts_.size(); ++face) {
     if (counts_[face] < 0) break;
+    if (corner >= next_rest) {
+      rest_();
+      next_rest = corner + kCornersBetweenRests;
+    }
     const auto count = static_cast<std::size_t>(counts_[face]);
     if (count > corners - corner) break;
     if (count >= 3 && (is_hole.empty() || !is_hole[face])) add_face(face, corner, count);
@@ -316,47 +322,63 @@ std::vector<Vector> MeshAssembly::gather(const CornerData& data, Repair repair) 
   }
   for (std::size_t v = 0; v < result.size(); ++v) {
     const std::size_t corner = corner_of_[v];
-    const float* made = data.at(needs_faces_ ? face_of_[v] : 0, point_of(corner), corner);
-    result[v] = repair(made);
+    const std::size_t point = is_per_point(data) ? point_of(corner) : 0;
+    result[v] = repair(data.at(needs_faces_ ? face_of_[v] : 0, point, corner));
   }
   return result;
 }
 
-void MeshAssembly::gather_vertices() {
-  const auto unit = [](const Vec3f& normal) -> Vec3f {
-    // In doubles even the shortest float has a length and a reciprocal.
-    const Vec3 exact = normal.cast<double>();
-    const double length = exact.norm();
-    if (!(length > 0.0) || !std::isfinite(length)) return Vec3f::UnitZ();
-    return (exact * (1.0 / length)).cast<float>();
-  };
+Vec3f unit(const Vec3f& normal) {
+  // In doubles even the shortest float has a length and a reciprocal.
+  const Vec3 exact = normal.cast<double>();
+  const double length = exact.norm();
+  if (!(length > 0.0) || !std::isfinite(length)) return Vec3f::UnitZ();
+  return (exact * (1.0 / length)).cast<float>();
+}
+
+// Normals belong to points: seams of other attributes must not show in the shading.
+void MeshAssembly::finish_made_normals() {
+  for (const std::uint32_t last : last_) {
+    if (seams_.empty() || last == kNone || before_[last] == kNone) continue;
+    Vec3f sum = Vec3f::Zero();
+    for (std::uint32_t v = last; v != kNone; v = before_[v]) sum += mesh_.normals[v];
+    for (std::uint32_t v = last; v != kNone; v = before_[v]) mesh_.normals[v] = sum;
+  }
+  const float side = sources_.is_left_handed ? -1.0f : 1.0f;
+  for (Vec3f& normal : mesh_.normals) normal = unit(side * normal);
+}
+
+void MeshAssembly::gather_positions() {
   mesh_.positions.resize(corner_of_.size());
   for (std::size_t v = 0; v < corner_of_.size(); ++v) {
     const float* p = points_.data() + point_of(corner_of_[v]) * 3;
     mesh_.positions[v] = Vec3f(p[0], p[1], p[2]);
   }
-  if (makes_normals_) {
-    if (!seams_.empty()) join_normals();
-    const float side = sources_.is_left_handed ? -1.0f : 1.0f;
-    for (Vec3f& normal : mesh_.normals) normal = unit(side * normal);
-  }
-  if (sources_.normals) {
-    mesh_.normals = gather<Vec3f>(*sources_.normals, [&](const float* n) -> Vec3f {
+}
+
+void MeshAssembly::gather_attributes(bool are_of_points) {
+  const auto has = [&](const std::optional<CornerData>& data) {
+    return data && is_per_point(*data) == are_of_points;
+  };
+  if (has(sources_.normals)) {
+    mesh_.normals = gather<Vec3f>(*sources_.normals, [](const float* n) -> Vec3f {
       return n ? unit(Vec3f(n[0], n[1], n[2])) : Vec3f::UnitZ();
     });
   }
-  if (sources_.uvs) {
+  if (has(sources_.uvs)) {
     mesh_.uvs = gather<Vec2f>(*sources_.uvs, [](const float* uv) -> Vec2f {
       return uv && all_finite({uv, 2}) ? Vec2f(uv[0], uv[1]) : Vec2f::Zero();
     });
   }
-  if (sources_.colors) {
+  if (has(sources_.colors)) {
     mesh_.colors = gather<Vec3f>(*sources_.colors, [](const float* c) -> Vec3f {
       return c && all_finite({c, 3}) ? Vec3f(c[0], c[1], c[2]) : Vec3f::Ones();
     });
   }
 }
 
+// Gives back what it read as soon as nothing needs it any more: big meshes decide how much memory
+// a whole scene takes.
 Mesh MeshAssembly::build() {
   // Along seams there are several vertices per point.
   const std::size_t vertices = last_.size() + (seams_.empty() ? 0 : last_.size() / 8);
@@ -365,7 +387,15 @@ Mesh MeshAssembly::build() {
   if (needs_faces_) face_of_.reserve(vertices);
   if (makes_normals_) mesh_.normals.reserve(vertices);
   add_faces();
-  gather_vertices();
+  sources_.counts = {};
+  if (makes_normals_) finish_made_normals();
+  last_ = {};
+  before_ = {};
+  gather_positions();
+  gather_attributes(true);
+  sources_.indices = {};
+  rest_();
+  gather_attributes(false);
   give_back_room(mesh_.triangles);
   give_back_room(mesh_.normals);
   return std::move(mesh_);
@@ -373,16 +403,8 @@ Mesh MeshAssembly::build() {
 
 }  // namespace
 
-std::size_t MeshSources::bytes() const {
-  std::size_t bytes =
-      points.span.size_bytes() + counts.span.size_bytes() + indices.span.size_bytes();
-  for (const auto* data : {&normals, &uvs, &colors}) {
-    if (*data) bytes += (*data)->values.span.size_bytes();
-    if (*data && (*data)->indices) bytes += (*data)->indices->span.size_bytes();
-  }
-  return bytes;
+Mesh assemble_mesh(MeshSources sources, const std::function<void()>& rest) {
+  return MeshAssembly(std::move(sources), rest).build();
 }
-
-Mesh assemble_mesh(const MeshSources& sources) { return MeshAssembly(sources).build(); }
 
 }  // namespace diorama::loader_usd

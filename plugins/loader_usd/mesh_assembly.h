@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -24,13 +24,12 @@ struct MeshSources {
   std::vector<std::uint16_t> slot_of_face;  ///< Empty: slot 0 for all.
   bool is_left_handed = false;
   bool is_smooth = false;  ///< Points get the mean normal of their faces where none are authored.
-
-  std::size_t bytes() const;
 };
 
 /// Makes triangles of the faces. Corners of the same point with the same attributes share a vertex.
 /// Faces with points that do not exist or are not finite are left out; so is what follows a face
-/// count that reaches behind the indices. What comes out passes Mesh::validate().
-Mesh assemble_mesh(const MeshSources& sources);
+/// count that reaches behind the indices. What comes out passes Mesh::validate(). `rest` is called
+/// now and then: pages of the sources that were read so far may be given back.
+Mesh assemble_mesh(MeshSources sources, const std::function<void()>& rest);
 
 }  // namespace diorama::loader_usd

@@ -17,6 +17,8 @@ using usd::Prim;
 using usd::Stage;
 
 constexpr const char* kDisplayColor = "primvars:displayColor";
+// About a megabyte of normals and uvs.
+constexpr std::size_t kCornersBetweenReleases = 50'000;
 
 // The primvar that textures are laid out by; empty when there is none.
 std::string find_uv(const std::vector<usd::Primvar>& primvars,
@@ -75,14 +77,6 @@ std::vector<std::uint16_t> slots_of_faces(const Stage& stage, const MeshTranslat
 }
 
 }  // namespace
-
-void MeshTranslator::note_read(std::size_t bytes) {
-  constexpr std::size_t kMostBytes = std::size_t{8} << 20;
-  bytes_read_ += bytes;
-  if (bytes_read_ < kMostBytes) return;
-  stage_.assets().release_pages();
-  bytes_read_ = 0;
-}
 
 void MeshTranslator::read_display_color(const Primvars& primvars, TranslatedMesh& result) const {
   for (const usd::Primvar& primvar : primvars) {
@@ -164,8 +158,12 @@ TranslatedMesh MeshTranslator::translate_mesh(const Prim& prim, const Primvars& 
   sources.slot_of_face = slots_of_faces(stage_, subsets, sources.counts.span.size());
   sources.is_smooth =
       usd::token_or(stage_, prim, "subdivisionScheme", "catmullClark") != "none";
-  Mesh mesh = assemble_mesh(sources);
-  note_read(sources.bytes());
+  corners_read_ += sources.indices.span.size();
+  if (corners_read_ > kCornersBetweenReleases) {
+    stage_.assets().release_pages();
+    corners_read_ = 0;
+  }
+  Mesh mesh = assemble_mesh(std::move(sources), [this] { stage_.assets().release_pages(); });
   if (mesh.triangles.empty()) return result;
   mesh.is_double_sided = usd::bool_or(stage_, prim, "doubleSided", false);
   known = pool_.share(std::move(mesh));

@@ -43,8 +43,6 @@ class MeshTranslator {
                                 const Prims& subsets, const std::vector<std::string>& uv_names);
   TranslatedMesh translate_shape(const usd::Prim& prim);
   TranslatedMesh translate_thin(const usd::Prim& prim, const Primvars& primvars);
-  /// Layers stay mapped while they are translated, but need not stay in memory besides the meshes.
-  void note_read(std::size_t bytes);
   void read_display_color(const Primvars& primvars, TranslatedMesh& result) const;
 
   usd::Stage& stage_;
@@ -52,7 +50,9 @@ class MeshTranslator {
   /// By the specs that they are made of; what is equal without being the same is found in the pool.
   std::map<std::pair<Key, std::string>, std::shared_ptr<const Mesh>> meshes_;
   loader_support::MeshPool pool_;
-  std::size_t bytes_read_ = 0;  ///< Since pages were released.
+  /// Since pages were given back: layers stay mapped while they are translated, but need not stay
+  /// in memory besides the meshes.
+  std::size_t corners_read_ = 0;
 };
 
 }  // namespace diorama::loader_usd

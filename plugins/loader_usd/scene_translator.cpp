@@ -87,6 +87,7 @@ void SceneTranslator::translate(NodeId root) {
   for (const Prim* prim : stage_.visible_children(stage_.root())) {
     if (is_drawn(*prim)) translate_prim(*prim, place, root_from_stage_ * local_pose(*prim, place));
   }
+  stage_.assets().release_pages();
   materials_.read_textures();
   for (const auto& [what, left_out] : left_out_) {
     std::string line = stage_.root_layer().identifier() + ": <" + left_out.first_path +
