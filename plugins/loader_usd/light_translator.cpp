@@ -2,7 +2,10 @@
 #include "loader_usd/light_translator.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+
+#include "diorama/image.h"
 
 namespace diorama::loader_usd {
 namespace {
@@ -111,6 +114,56 @@ void read_shaping(const Stage& stage, const Prim& prim, const Inputs& inputs, Li
   light.cone_softness = std::clamp(inputs.number("shaping:cone:softness", 0.0), 0.0, 1.0);
 }
 
+// What the light says and the scene cannot hold.
+std::vector<std::string> find_losses(const Stage& stage, const Prim& prim, const Inputs& inputs) {
+  std::vector<std::string> losses;
+  const auto lose = [&](const std::string& name) { losses.push_back(name + " is not taken"); };
+  for (const auto& [name, fallback] :
+       {std::pair("diffuse", 1.0), std::pair("specular", 1.0), std::pair("shaping:focus", 0.0)}) {
+    if (inputs.number(name, fallback) != fallback) lose(inputs.name(name));
+  }
+  const usd::Value profile = stage.value(prim, inputs.name("shaping:ies:file"));
+  if (profile.as_text() && !profile.as_text()->empty()) lose(inputs.name("shaping:ies:file"));
+  if (!inputs.boolean("shadow:enable", true)) lose(inputs.name("shadow:enable"));
+  for (const char* name :
+       {"light:filters", "collection:lightLink:includes", "collection:lightLink:excludes",
+        "collection:shadowLink:includes", "collection:shadowLink:excludes"}) {
+    if (!stage.targets(prim, name).empty()) lose(name);
+  }
+  return losses;
+}
+
+Vec3f mean_color(const Texture& texture) {
+  std::array<double, 256> linear{};
+  for (std::size_t i = 0; i < linear.size(); ++i) {
+    const float value = float(i) / 255.0f;
+    linear[i] = texture.color_space == ColorSpace::Srgb ? linear_from_srgb(value) : value;
+  }
+  const auto channels = static_cast<std::size_t>(texture.channels);
+  const std::size_t pixels = std::max(texture.bytes.size(), texture.floats.size()) / channels;
+  Vec3 sum = Vec3::Zero();
+  for (std::size_t i = 0; i < pixels; ++i) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      const std::size_t at = i * channels + (channels < 3 ? 0 : c);
+      const double value = texture.floats.empty() ? linear[texture.bytes[at]]
+                                                  : static_cast<double>(texture.floats[at]);
+      sum[Eigen::Index(c)] += std::isfinite(value) ? value : 0.0;
+    }
+  }
+  return pixels == 0 ? Vec3f::Ones() : Vec3f((sum / double(pixels)).cast<float>());
+}
+
+// The scene's rectangles have no pictures; its mean colour keeps the light that one gives.
+void read_rect_picture(const Stage& stage, const Prim& prim, const Inputs& inputs,
+                       TextureLibrary& textures, TranslatedLight& result) {
+  const auto file = stage.find_value(prim, inputs.name("texture:file"));
+  if (!file.value.as_text() || file.value.as_text()->empty()) return;
+  const auto texture = textures.read(file, TextureSpace::Auto, "").texture;
+  if (!texture) return;
+  result.light.color = result.light.color.cwiseProduct(mean_color(*texture));
+  result.losses.push_back("picture is taken as its mean color");
+}
+
 // USD's dome has its pole at +y and the middle of the image at +z; ours has them at +z and +x.
 Affine prim_from_dome() {
   Affine turn = Affine::Identity();
@@ -128,6 +181,7 @@ std::optional<TranslatedLight> translate_light(const Stage& stage, const Prim& p
   TranslatedLight result;
   Light& light = result.light;
   const bool is_normalized = inputs.boolean("normalize", false);
+  result.losses = find_losses(stage, prim, inputs);
   if (type == "DistantLight") {
     light.kind = LightKind::Distant;
     const double degrees = std::clamp(inputs.number("angle", kSunAngle), 0.0, 180.0);
@@ -147,6 +201,11 @@ std::optional<TranslatedLight> translate_light(const Stage& stage, const Prim& p
         textures.read(stage.find_value(prim, inputs.name("texture:file")), TextureSpace::Auto, "")
             .texture;
     result.prim_from_light = prim_from_dome();
+    const std::string format =
+        usd::token_or(stage, prim, inputs.name("texture:format"), "automatic");
+    if (light.texture && format != "automatic" && format != "latlong") {
+      result.losses.push_back(inputs.name("texture:format") + " is taken as latlong");
+    }
     return result;
   }
   const bool has_size = type == "SphereLight" || type == "DiskLight" || type == "RectLight" ||
@@ -155,7 +214,45 @@ std::optional<TranslatedLight> translate_light(const Stage& stage, const Prim& p
   const double area = read_size(type, inputs, world_scale, light);
   if (is_normalized && area > 0.0) light.color /= static_cast<float>(area);
   read_shaping(stage, prim, inputs, light);
+  if (type == "RectLight") read_rect_picture(stage, prim, inputs, textures, result);
   return result;
+}
+
+MeshLight translate_mesh_light(const Stage& stage, const Prim& prim, const Mesh& mesh,
+                               double world_scale) {
+  const Inputs inputs(stage, prim);
+  MeshLight light;
+  light.emission = emission(inputs, 1.0);
+  light.sync_mode = usd::token_or(stage, prim, "light:materialSyncMode", "materialGlowTintsLight");
+  light.losses = find_losses(stage, prim, inputs);
+  if (!inputs.boolean("normalize", false)) return light;
+  double area = 0.0;
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const Vec3 origin = mesh.positions[a].cast<double>();
+    area += 0.5 * (mesh.positions[b].cast<double>() - origin)
+                      .cross(mesh.positions[c].cast<double>() - origin)
+                      .norm();
+  }
+  area *= world_scale * world_scale;
+  if (area > 0.0 && std::isfinite(area)) light.emission /= static_cast<float>(area);
+  return light;
+}
+
+Material shining_material(const Material& material, const MeshLight& light) {
+  if (light.sync_mode == "noMaterialResponse") {
+    Material shining;
+    shining.name = material.name;
+    shining.base_color = Vec3f::Zero();
+    shining.specular = 0.0f;
+    shining.emission = light.emission;
+    return shining;
+  }
+  Material shining = material;
+  const bool is_tinted = light.sync_mode != "independent" && !material.emission.isZero();
+  if (!is_tinted) shining.emission_texture = {};
+  shining.emission =
+      is_tinted ? Vec3f(material.emission.cwiseProduct(light.emission)) : light.emission;
+  return shining;
 }
 
 }  // namespace diorama::loader_usd

@@ -39,6 +39,7 @@ TranslatedMaterial MaterialTranslator::translate(const Prim& prim) {
     const std::string id = surface ? network_.id(*surface) : "";
     if (is_preview_surface(id)) {
       draft_preview_surface(*surface, draft);
+      notice_displacement(*surface);
     } else if (is_materialx_surface(id)) {
       draft_materialx_surface(*surface, draft);
     } else {
@@ -54,6 +55,14 @@ TranslatedMaterial MaterialTranslator::translate(const Prim& prim) {
   }
   drafts_.push_back(draft);
   return {draft.shared(), draft.uv_names};
+}
+
+void MaterialTranslator::notice_displacement(const Prim& surface) {
+  const bool is_moved = network_.source(surface, "displacement").is_shader() ||
+                        network_.number(surface, "displacement", 0.0f) != 0.0f;
+  if (!is_moved || std::exchange(has_noticed_displacement_, true)) return;
+  stage_.diagnostics().warn(stage_.root_layer().identifier() + ": <" + surface.path +
+                            "> displaces surfaces, which is not done");
 }
 
 void MaterialTranslator::notice_module(const Prim& shader) {

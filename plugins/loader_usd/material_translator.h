@@ -43,6 +43,7 @@ class MaterialTranslator {
  private:
   TranslatedMaterial translate(const usd::Prim& material);
   void notice_module(const usd::Prim& shader);
+  void notice_displacement(const usd::Prim& surface);
 
   usd::Stage& stage_;
   Host& host_;
@@ -52,6 +53,7 @@ class MaterialTranslator {
   std::map<std::string, TranslatedMaterial> by_path_;
   std::map<std::vector<std::pair<const void*, std::string>>, TranslatedMaterial> by_sites_;
   std::set<std::string> noticed_modules_;
+  bool has_noticed_displacement_ = false;
 };
 
 }  // namespace diorama::loader_usd

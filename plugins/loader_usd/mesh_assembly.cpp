@@ -101,7 +101,7 @@ class MeshAssembly {
   void add_quad(std::size_t face, std::size_t corner);
   void add_polygon(std::size_t face, std::size_t corner, std::size_t count);
   void add_triangle(std::size_t face, std::uint32_t a, std::uint32_t b, std::uint32_t c);
-  void add_normal(const Vec3& normal, std::initializer_list<std::uint32_t> vertices);
+  void add_normal(const Vec3& normal, std::span<const std::uint32_t> vertices);
   std::vector<char> find_holes() const;
   std::size_t count_triangles() const;
 
@@ -211,7 +211,8 @@ void MeshAssembly::add_triangle(std::size_t face, std::uint32_t a, std::uint32_t
   if (!sources_.slot_of_face.empty()) mesh_.material_slots.push_back(sources_.slot_of_face[face]);
 }
 
-void MeshAssembly::add_normal(const Vec3& normal, std::initializer_list<std::uint32_t> vertices) {
+// As long as the face is large, for all its corners: how it is split must not show.
+void MeshAssembly::add_normal(const Vec3& normal, std::span<const std::uint32_t> vertices) {
   const Vec3f added = normal.cast<float>();
   for (const std::uint32_t v : vertices) mesh_.normals[v] += added;
 }
@@ -234,9 +235,7 @@ void MeshAssembly::add_quad(std::size_t face, std::size_t corner) {
   add_triangle(face, a, b, c);
   add_triangle(face, a, c, d);
   if (!makes_normals_) return;
-  add_normal(first, {b});
-  add_normal(second, {d});
-  add_normal(first + second, {a, c});
+  add_normal(first + second, std::array{a, b, c, d});
 }
 
 void MeshAssembly::add_polygon(std::size_t face, std::size_t corner, std::size_t count) {
@@ -248,13 +247,13 @@ void MeshAssembly::add_polygon(std::size_t face, std::size_t corner, std::size_t
   }
   split_.clear();
   triangulate(ring_points_, split_);
+  Vec3 normal = Vec3::Zero();
   for (const auto& [a, b, c] : split_) {
     add_triangle(face, ring_[a], ring_[b], ring_[c]);
-    if (!makes_normals_) continue;
     const Vec3 origin = position(corner + a);
-    add_normal((position(corner + b) - origin).cross(position(corner + c) - origin),
-               {ring_[a], ring_[b], ring_[c]});
+    normal += (position(corner + b) - origin).cross(position(corner + c) - origin);
   }
+  if (makes_normals_) add_normal(normal, ring_);
 }
 
 void MeshAssembly::add_face(std::size_t face, std::size_t corner, std::size_t count) {
@@ -267,7 +266,8 @@ void MeshAssembly::add_face(std::size_t face, std::size_t corner, std::size_t co
   add_triangle(face, a, b, c);
   if (!makes_normals_) return;
   const Vec3 origin = position(corner);
-  add_normal((position(corner + 1) - origin).cross(position(corner + 2) - origin), {a, b, c});
+  add_normal((position(corner + 1) - origin).cross(position(corner + 2) - origin),
+             std::array{a, b, c});
 }
 
 std::vector<char> MeshAssembly::find_holes() const {

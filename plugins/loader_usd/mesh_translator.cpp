@@ -2,6 +2,7 @@
 #include "loader_usd/mesh_translator.h"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <utility>
 
@@ -33,11 +34,10 @@ std::string find_uv(const std::vector<usd::Primvar>& primvars,
   for (const char* name : {"st", "UVMap"}) {
     if (has(name)) return name;
   }
-  for (const usd::Primvar& primvar : primvars) {
-    if (primvar.type.starts_with("texCoord2")) return primvar.name;
-  }
-  for (const usd::Primvar& primvar : primvars) {
-    if (primvar.type == "float2[]") return primvar.name;
+  for (const char* type : {"texCoord2", "texCoord3", "float2", "half2", "double2"}) {
+    for (const usd::Primvar& primvar : primvars) {
+      if (primvar.type.starts_with(type)) return primvar.name;
+    }
   }
   return {};
 }
@@ -50,11 +50,26 @@ const Prim* owner_of(const std::vector<usd::Primvar>& primvars, const std::strin
   return nullptr;
 }
 
-// Colours that differ; a single one goes to the material.
+// The first two numbers of three lay a texture out, too.
+std::optional<CornerData> read_uvs(const Stage& stage, const Prim* owner, const std::string& name) {
+  if (!owner) return std::nullopt;
+  auto uvs = read_corner_data(stage, *owner, name, 2, "constant");
+  return uvs ? std::move(uvs) : read_corner_data(stage, *owner, name, 3, "constant");
+}
+
 std::optional<CornerData> read_colors(const Stage& stage, const Prim* owner) {
   if (!owner) return std::nullopt;
-  auto colors = read_corner_data(stage, *owner, kDisplayColor, 3, "constant");
-  if (colors && colors->count() <= 1) colors.reset();
+  return read_corner_data(stage, *owner, kDisplayColor, 3, "constant");
+}
+
+bool is_one_for_all(const CornerData& data) {
+  return data.interpolation == Interpolation::Constant || data.count() <= 1;
+}
+
+// Colours that differ; a single one goes to the material.
+std::optional<CornerData> read_varied_colors(const Stage& stage, const Prim* owner) {
+  auto colors = read_colors(stage, owner);
+  if (colors && is_one_for_all(*colors)) colors.reset();
   return colors;
 }
 
@@ -79,18 +94,20 @@ std::vector<std::uint16_t> slots_of_faces(const Stage& stage, const MeshTranslat
 }  // namespace
 
 void MeshTranslator::read_display_color(const Primvars& primvars, TranslatedMesh& result) const {
-  for (const usd::Primvar& primvar : primvars) {
-    const std::string name = "primvars:" + primvar.name;
-    if (primvar.name == "displayColor") {
-      const auto color = usd::numbers<float>(stage_.value(*primvar.owner, name), 3);
-      if (color && color->span.size() == 3) {
-        result.display_color = Vec3f(color->span[0], color->span[1], color->span[2]);
-      }
-    }
-    if (primvar.name == "displayOpacity") {
-      const auto opacity = usd::numbers<float>(stage_.value(*primvar.owner, name), 1);
-      if (opacity && opacity->span.size() == 1) result.display_opacity = opacity->span[0];
-    }
+  const auto colors = read_colors(stage_, owner_of(primvars, "displayColor"));
+  const float* color = colors && is_one_for_all(*colors) ? colors->element(0) : nullptr;
+  if (color) result.display_color = Vec3f(color[0], color[1], color[2]);
+  const Prim* owner = owner_of(primvars, "displayOpacity");
+  if (!owner) return;
+  const auto opacity = read_corner_data(stage_, *owner, "primvars:displayOpacity", 1, "constant");
+  const float* share = opacity && is_one_for_all(*opacity) ? opacity->element(0) : nullptr;
+  if (share && std::isfinite(*share)) result.display_opacity = *share;
+}
+
+// The specs that a primvar and its indices are read from.
+void MeshTranslator::add_primvar(Key& key, const Prim* owner, const std::string& name) const {
+  for (const std::string& part : {name, name + ":indices"}) {
+    key.push_back(owner ? stage_.value_spec(*owner, part) : nullptr);
   }
 }
 
@@ -117,22 +134,19 @@ TranslatedMesh MeshTranslator::translate_mesh(const Prim& prim, const Primvars& 
   const std::string uv_name = find_uv(primvars, uv_names);
   const Prim* uv_owner = uv_name.empty() ? nullptr : owner_of(primvars, uv_name);
   const Prim* color_owner = owner_of(primvars, "displayColor");
-  const bool has_primvar_normals = owner_of(primvars, "normals") != nullptr;
-  const std::string normals = has_primvar_normals ? "primvars:normals" : "normals";
+  const Prim* primvar_normals = owner_of(primvars, "normals");
+  const Prim* normal_owner = primvar_normals ? primvar_normals : &prim;
+  const std::string normals = primvar_normals ? "primvars:normals" : "normals";
   const std::string uv = "primvars:" + uv_name;
 
   Key key;
-  for (const std::string& name :
-       {std::string("points"), std::string("faceVertexCounts"), std::string("faceVertexIndices"),
-        std::string("holeIndices"), std::string("orientation"), std::string("subdivisionScheme"),
-        std::string("doubleSided"), normals, normals + ":indices"}) {
+  for (const char* name : {"points", "faceVertexCounts", "faceVertexIndices", "holeIndices",
+                           "orientation", "subdivisionScheme", "doubleSided"}) {
     key.push_back(stage_.value_spec(prim, name));
   }
-  for (const auto& [who, name] :
-       {std::pair(uv_owner, uv), std::pair(color_owner, std::string(kDisplayColor))}) {
-    key.push_back(who ? stage_.value_spec(*who, name) : nullptr);
-    key.push_back(who ? stage_.value_spec(*who, name + ":indices") : nullptr);
-  }
+  add_primvar(key, normal_owner, normals);
+  add_primvar(key, uv_owner, uv);
+  add_primvar(key, color_owner, kDisplayColor);
   for (const Prim* subset : subsets) key.push_back(stage_.value_spec(*subset, "indices"));
   std::shared_ptr<const Mesh>& known = meshes_[{key, uv_name}];
   if (known) {
@@ -150,14 +164,13 @@ TranslatedMesh MeshTranslator::translate_mesh(const Prim& prim, const Primvars& 
   sources.indices = std::move(*indices);
   sources.holes = usd::numbers<std::int32_t>(stage_.value(prim, "holeIndices"), 1);
   sources.normals =
-      read_corner_data(stage_, prim, normals, 3, has_primvar_normals ? "constant" : "vertex");
-  if (uv_owner) sources.uvs = read_corner_data(stage_, *uv_owner, uv, 2, "constant");
-  sources.colors = read_colors(stage_, color_owner);
+      read_corner_data(stage_, *normal_owner, normals, 3, primvar_normals ? "constant" : "vertex");
+  sources.uvs = read_uvs(stage_, uv_owner, uv);
+  sources.colors = read_varied_colors(stage_, color_owner);
   sources.is_left_handed =
       usd::token_or(stage_, prim, "orientation", "rightHanded") == "leftHanded";
   sources.slot_of_face = slots_of_faces(stage_, subsets, sources.counts.span.size());
-  sources.is_smooth =
-      usd::token_or(stage_, prim, "subdivisionScheme", "catmullClark") != "none";
+  sources.is_smooth = usd::token_or(stage_, prim, "subdivisionScheme", "catmullClark") != "none";
   corners_read_ += sources.indices.span.size();
   if (corners_read_ > kCornersBetweenReleases) {
     stage_.assets().release_pages();
@@ -186,18 +199,25 @@ TranslatedMesh MeshTranslator::translate_shape(const Prim& prim) {
 TranslatedMesh MeshTranslator::translate_thin(const Prim& prim, const Primvars& primvars) {
   const Prim* color_owner = owner_of(primvars, "displayColor");
   Key key;
-  for (const char* name :
-       {"points", "widths", "curveVertexCounts", "type", "basis", "wrap", "doubleSided"}) {
+  for (const char* name : {"points", "curveVertexCounts", "type", "basis", "wrap"}) {
     key.push_back(stage_.value_spec(prim, name));
   }
-  key.push_back(color_owner ? stage_.value_spec(*color_owner, kDisplayColor) : nullptr);
+  const Prim* primvar_widths = owner_of(primvars, "widths");
+  const Prim* width_owner = primvar_widths ? primvar_widths : &prim;
+  const std::string width_name = primvar_widths ? "primvars:widths" : "widths";
+  add_primvar(key, width_owner, width_name);
+  add_primvar(key, color_owner, kDisplayColor);
   std::shared_ptr<const Mesh>& known = meshes_[{key, prim.type_name}];
   TranslatedMesh result;
   if (!known) {
-    const auto colors = read_colors(stage_, color_owner);
-    ThinMesh made = prim.type_name == "Points"
-                        ? mesh_of_points(stage_, prim, colors ? &*colors : nullptr)
-                        : mesh_of_curves(stage_, prim, colors ? &*colors : nullptr);
+    const auto widths = read_corner_data(stage_, *width_owner, width_name, 1,
+                                         primvar_widths ? "constant" : "vertex");
+    const auto colors = read_varied_colors(stage_, color_owner);
+    ThinMesh made =
+        prim.type_name == "Points"
+            ? mesh_of_points(stage_, prim, widths ? &*widths : nullptr, colors ? &*colors : nullptr)
+            : mesh_of_curves(stage_, prim, widths ? &*widths : nullptr,
+                             colors ? &*colors : nullptr);
     result.lacks = std::move(made.lacks);
     if (made.mesh.triangles.empty()) return result;
     made.mesh.validate(prim.path);

@@ -43,6 +43,7 @@ class MeshTranslator {
                                 const Prims& subsets, const std::vector<std::string>& uv_names);
   TranslatedMesh translate_shape(const usd::Prim& prim);
   TranslatedMesh translate_thin(const usd::Prim& prim, const Primvars& primvars);
+  void add_primvar(Key& key, const usd::Prim* owner, const std::string& name) const;
   void read_display_color(const Primvars& primvars, TranslatedMesh& result) const;
 
   usd::Stage& stage_;

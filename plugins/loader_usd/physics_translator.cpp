@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "loader_usd/conversion.h"
 #include "loader_usd/usd/geometry.h"
 
 namespace diorama::loader_usd {
@@ -31,11 +32,6 @@ ColliderShape collider_shape(const std::string& approximation) {
   return ColliderShape::TriangleMesh;
 }
 
-bool has_schema(const Stage& stage, const Prim& prim, std::string_view name) {
-  const usd::Strings schemas = stage.metadata_list(prim, "apiSchemas");
-  return std::find(schemas.begin(), schemas.end(), name) != schemas.end();
-}
-
 bool is_positive(double number) { return number > 0.0 && std::isfinite(number); }
 
 double mesh_volume(const Mesh& mesh, const Affine& map) {
@@ -60,45 +56,72 @@ PhysicsTranslator::PhysicsTranslator(Stage& stage, Scene& scene)
 }
 
 void PhysicsTranslator::translate(const Prim& prim, NodeId node) {
-  const bool is_body = has_schema(stage_, prim, "PhysicsRigidBodyAPI") &&
+  prims_[node] = &prim;
+  const bool is_body = usd::has_schema(stage_, prim, "PhysicsRigidBodyAPI") &&
                        usd::bool_or(stage_, prim, "physics:rigidBodyEnabled", true) &&
                        !usd::bool_or(stage_, prim, "physics:kinematicEnabled", false);
   if (is_body) add_body(prim, node);
-  const bool collides = has_schema(stage_, prim, "PhysicsCollisionAPI") && scene_[node].mesh &&
+  const bool collides = usd::has_schema(stage_, prim, "PhysicsCollisionAPI") && scene_[node].mesh &&
                         usd::bool_or(stage_, prim, "physics:collisionEnabled", true);
   if (collides) add_collider(prim, node);
+}
+
+PhysicsTranslator::Statement PhysicsTranslator::statement(NodeId node) const {
+  Statement result;
+  const auto found = prims_.find(node);
+  if (found == prims_.end()) return result;
+  const Prim& prim = *found->second;
+  const auto positive = [&](const Prim& of, const char* name) {
+    const double number = usd::number_or(stage_, of, name, 0.0);
+    return is_positive(number) ? number * kilograms_per_unit_ : 0.0;
+  };
+  const double per_cubic_metre = 1.0 / std::pow(meters_per_unit_, 3.0);
+  result.mass_kg = positive(prim, "physics:mass");
+  result.density = positive(prim, "physics:density") * per_cubic_metre;
+  const Prim* material = scene_[node].mesh ? physics_material(prim) : nullptr;
+  if (material) result.material_density = positive(*material, "physics:density") * per_cubic_metre;
+  return result;
 }
 
 void PhysicsTranslator::add_body(const Prim& prim, NodeId node) {
   RigidBody body;
   body.has_gravity = !usd::bool_or(stage_, prim, "physxRigidBody:disableGravity", false);
-  const double stated = usd::number_or(stage_, prim, "physics:mass", 0.0) * kilograms_per_unit_;
-  const double dense = is_positive(stated) ? 0.0 : density(prim);
-  // Volumes take time, and few files say a density.
-  const double computed = is_positive(dense) ? dense * volume(node) : 0.0;
-  if (is_positive(stated)) {
-    body.mass_kg = stated;
-  } else if (is_positive(computed)) {
-    body.mass_kg = computed;
+  const double mass = mass_below(node, 0.0);
+  if (is_positive(mass)) body.mass_kg = mass;
+  // Velocities are said in the space that the prim stands in; root prims turn and scale the stage.
+  Affine world_from_parent = scene_.world_from_node(scene_[node].parent);
+  if (prim.parent && !prim.parent->parent) {
+    if (!stage_.is_z_up()) world_from_parent = world_from_parent * z_up_from_y_up();
+    world_from_parent.linear() *= meters_per_unit_;
   }
+  if (const auto v = usd::vector3(stage_, prim, "physics:velocity")) {
+    body.linear_velocity = world_from_parent.linear() * Vec3((*v)[0], (*v)[1], (*v)[2]);
+  }
+  if (const auto w = usd::vector3(stage_, prim, "physics:angularVelocity")) {
+    const Vec3 radians = Vec3((*w)[0], (*w)[1], (*w)[2]) * (kPi / 180.0);
+    body.angular_velocity = Transform::from_affine(world_from_parent).rotation * radians;
+  }
+  if (!body.linear_velocity.allFinite()) body.linear_velocity.setZero();
+  if (!body.angular_velocity.allFinite()) body.angular_velocity.setZero();
   scene_.edit(node).rigid_body = body;
 }
 
-double PhysicsTranslator::density(const Prim& prim) const {
-  double stated = usd::number_or(stage_, prim, "physics:density", 0.0);
-  const Prim* material = is_positive(stated) ? nullptr : physics_material(prim);
-  if (material) stated = usd::number_or(stage_, *material, "physics:density", 0.0);
-  if (!is_positive(stated)) return 0.0;
-  return stated * kilograms_per_unit_ / std::pow(meters_per_unit_, 3.0);
-}
-
-double PhysicsTranslator::volume(NodeId node) const {
-  double sum = 0.0;
-  for (const NodeId part : scene_.subtree(node)) {
-    const Node& content = scene_[part];
-    if (content.mesh) sum += mesh_volume(*content.mesh, scene_.world_from_node(part));
+// A mass counts for all that is below it, a density for what says no other one.
+double PhysicsTranslator::mass_below(NodeId node, double density) const {
+  const Statement said = statement(node);
+  if (said.mass_kg > 0.0) return said.mass_kg;
+  if (said.density > 0.0) density = said.density;
+  double mass = 0.0;
+  const Node& content = scene_[node];
+  const double own_density = density > 0.0 ? density : said.material_density;
+  // Volumes take time, and few files say a density.
+  if (content.mesh && own_density > 0.0) {
+    mass += own_density * mesh_volume(*content.mesh, scene_.world_from_node(node));
   }
-  return sum;
+  for (const NodeId child : content.children) {
+    if (!scene_[child].rigid_body) mass += mass_below(child, density);
+  }
+  return mass;
 }
 
 // Bound for physics or for all purposes, to the prim or to what is above it.
@@ -107,7 +130,7 @@ const Prim* PhysicsTranslator::physics_material(const Prim& prim) const {
     usd::Strings bound = stage_.targets(*at, "material:binding:physics");
     if (bound.empty()) bound = stage_.targets(*at, "material:binding");
     const Prim* material = bound.size() == 1 ? stage_.find(bound.front()) : nullptr;
-    if (material && has_schema(stage_, *material, "PhysicsMaterialAPI")) return material;
+    if (material && usd::has_schema(stage_, *material, "PhysicsMaterialAPI")) return material;
   }
   return nullptr;
 }

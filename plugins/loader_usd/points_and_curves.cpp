@@ -349,12 +349,12 @@ std::vector<CurvePart> parts_of(const CurveKind& kind, std::span<const std::int3
 
 }  // namespace
 
-ThinMesh mesh_of_points(const Stage& stage, const Prim& prim, const CornerData* colors) {
+ThinMesh mesh_of_points(const Stage& stage, const Prim& prim, const CornerData* widths,
+                        const CornerData* colors) {
   ThinMesh result;
   const auto points = usd::numbers<float>(stage.value(prim, "points"), 3);
   const std::size_t count = points ? points->span.size() / 3 : 0;
   if (count == 0) return result;
-  const auto widths = read_corner_data(stage, prim, "widths", 1, "vertex");
   const Mesh ball = make_ball(splits_for(count));
   if (!widths) result.lacks = kNoWidths;
   if (count * ball.triangles.size() > kMostTriangles) result.lacks = kTooMany;
@@ -378,12 +378,12 @@ ThinMesh mesh_of_points(const Stage& stage, const Prim& prim, const CornerData* 
   return result;
 }
 
-ThinMesh mesh_of_curves(const Stage& stage, const Prim& prim, const CornerData* colors) {
+ThinMesh mesh_of_curves(const Stage& stage, const Prim& prim, const CornerData* widths,
+                        const CornerData* colors) {
   ThinMesh result;
   const auto points = usd::numbers<float>(stage.value(prim, "points"), 3);
   const auto counts = usd::numbers<std::int32_t>(stage.value(prim, "curveVertexCounts"), 1);
   if (!points || !counts || counts->span.empty()) return result;
-  const auto widths = read_corner_data(stage, prim, "widths", 1, "vertex");
   if (!widths) {
     result.lacks = kNoWidths;
     return result;

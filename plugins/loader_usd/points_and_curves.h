@@ -13,11 +13,15 @@ struct ThinMesh {
   std::string lacks;  ///< Why not, "without widths"; empty when that is no surprise.
 };
 
-/// Points: a ball for each, as wide as its width; coarser the more there are. `colors` may be null.
-ThinMesh mesh_of_points(const usd::Stage& stage, const usd::Prim& prim, const CornerData* colors);
+/// Points: a ball for each, as wide as its width; coarser the more there are. `widths` and `colors`
+/// may be null.
+ThinMesh mesh_of_points(const usd::Stage& stage, const usd::Prim& prim, const CornerData* widths,
+                        const CornerData* colors);
 
 /// BasisCurves, linear and cubic: tubes as wide as the curves' widths, with closed ends; coarser
-/// the more there are. Normals that would make ribbons of them do not count. `colors` may be null.
-ThinMesh mesh_of_curves(const usd::Stage& stage, const usd::Prim& prim, const CornerData* colors);
+/// the more there are. Normals that would make ribbons of them do not count. `widths` and `colors`
+/// may be null.
+ThinMesh mesh_of_curves(const usd::Stage& stage, const usd::Prim& prim, const CornerData* widths,
+                        const CornerData* colors);
 
 }  // namespace diorama::loader_usd

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "diorama/error.h"
 #include "loader_usd/conversion.h"
@@ -89,14 +90,24 @@ void SceneTranslator::translate(NodeId root) {
   }
   stage_.assets().release_pages();
   materials_.read_textures();
-  for (const auto& [what, left_out] : left_out_) {
-    std::string line = stage_.root_layer().identifier() + ": <" + left_out.first_path +
-                       "> is of type " + what + ", which is not drawn";
-    if (left_out.count > 1) {
-      line += ", like " + std::to_string(left_out.count - 1) + " more of them";
+  light_meshes();
+  report_notes();
+}
+
+// Says once per kind what the scene cannot hold.
+void SceneTranslator::report_notes() {
+  for (const auto& [what, noted] : notes_) {
+    std::string line = stage_.root_layer().identifier() + ": <" + noted.first_path + "> " + what;
+    if (noted.count > 1) {
+      line += ", like " + std::to_string(noted.count - 1) + " more of them";
     }
     stage_.diagnostics().warn(line);
   }
+}
+
+void SceneTranslator::note(const Prim& prim, const std::string& what) {
+  Noted& noted = notes_[what];
+  if (noted.count++ == 0) noted.first_path = prim.path;
 }
 
 void SceneTranslator::translate_children(const Prim& prim, const Place& place) {
@@ -177,8 +188,9 @@ void SceneTranslator::translate_prim(const Prim& prim, const Place& parent, cons
   const bool is_hidden = prim.traits.is_imageable &&
                          usd::token_or(stage_, prim, "visibility", "inherited") == "invisible";
   if (is_hidden) scene_.edit(place.node).is_visible = false;
-  if (is_left_out(prim.type_name)) note_left_out(prim, prim.type_name);
-  if (prim.traits.is_gprim) add_shape(prim, place.node);
+  if (is_left_out(prim.type_name)) note_undrawn(prim, prim.type_name);
+  if (!stage_.metadata(prim, "clips").is_empty()) note(prim, "has value clips, which are not read");
+  if (prim.traits.is_gprim) add_shape(prim, place);
   if (prim.type_name == "Camera") add_camera(prim, place);
   if (prim.traits.is_light) add_light(prim, place);
   add_labels(prim, place.node);
@@ -191,11 +203,10 @@ void SceneTranslator::translate_prim(const Prim& prim, const Place& parent, cons
 }
 
 // Says of what is meant to be seen that it is not.
-void SceneTranslator::note_left_out(const Prim& prim, const std::string& what) {
+void SceneTranslator::note_undrawn(const Prim& prim, const std::string& type) {
   const std::string purpose = geometry_.purpose(prim);
   if (purpose == "guide" || purpose == "proxy" || !geometry_.is_visible(prim)) return;
-  LeftOut& left_out = left_out_[what];
-  if (left_out.count++ == 0) left_out.first_path = prim.path;
+  note(prim, "is of type " + type + ", which is not drawn");
 }
 
 // --- Shapes -----------------------------------------------------------------------------------
@@ -221,7 +232,7 @@ std::string SceneTranslator::drawn_material(const Prim& prim) {
   return path.empty() ? geometry_.material(prim, "preview") : path;
 }
 
-void SceneTranslator::add_shape(const Prim& prim, NodeId node) {
+void SceneTranslator::add_shape(const Prim& prim, const Place& place) {
   std::vector<std::string> paths{drawn_material(prim)};
   std::vector<const Prim*> subsets;
   if (prim.type_name == "Mesh") {
@@ -243,7 +254,7 @@ void SceneTranslator::add_shape(const Prim& prim, NodeId node) {
     uv_names.insert(uv_names.end(), names.begin(), names.end());
   }
   const TranslatedMesh mesh = meshes_.translate(prim, subsets, uv_names);
-  if (!mesh.lacks.empty()) note_left_out(prim, prim.type_name + " " + mesh.lacks);
+  if (!mesh.lacks.empty()) note_undrawn(prim, prim.type_name + " " + mesh.lacks);
   if (!mesh.mesh) return;
   std::vector<std::shared_ptr<const Material>> materials;
   for (const std::string& path : paths) {
@@ -251,10 +262,30 @@ void SceneTranslator::add_shape(const Prim& prim, NodeId node) {
     materials.push_back(material ? material : plain_material(mesh));
   }
   const std::string purpose = geometry_.purpose(prim);
-  Node& content = scene_.edit(node);
+  Node& content = scene_.edit(place.node);
   content.mesh = mesh.mesh;
   content.materials = std::move(materials);
   if (purpose == "guide" || purpose == "proxy") content.is_visible = false;
+  if (usd::has_schema(stage_, prim, "MeshLightAPI")) {
+    MeshLight light = translate_mesh_light(stage_, prim, *mesh.mesh, stage_scale(place));
+    for (const std::string& loss : light.losses) note(prim, "is a light whose " + loss);
+    mesh_lights_.emplace_back(place.node, std::move(light));
+  }
+}
+
+// Meshes that are lights have materials of their own that shine. They are made when the others have
+// their textures.
+void SceneTranslator::light_meshes() {
+  using Known = std::tuple<const Material*, std::vector<float>, std::string>;
+  std::map<Known, std::shared_ptr<const Material>> known;
+  for (const auto& [node, light] : mesh_lights_) {
+    const Vec3f& e = light.emission;
+    for (auto& material : scene_.edit(node).materials) {
+      auto& shining = known[{material.get(), {e.x(), e.y(), e.z()}, light.sync_mode}];
+      if (!shining) shining = std::make_shared<const Material>(shining_material(*material, light));
+      material = shining;
+    }
+  }
 }
 
 // --- Cameras and lights -----------------------------------------------------------------------
@@ -279,13 +310,12 @@ void SceneTranslator::add_camera(const Prim& prim, Place& place) {
   camera.cx -= offset("horizontalApertureOffset");
   camera.cy += offset("verticalApertureOffset");
   if (usd::token_or(stage_, prim, "projection", "perspective") == "orthographic") {
-    stage_.diagnostics().warn(stage_.root_layer().identifier() + ": <" + prim.path +
-                              "> is an orthographic camera, which is taken as a perspective one");
+    note(prim, "is an orthographic camera, which is taken as a perspective one");
   }
   camera.near_m = std::max(range[0] * meters_per_unit_, 1e-4);
   camera.far_m = std::max(range[1] * meters_per_unit_, camera.near_m * 2.0);
-  camera.f_stop = usd::number_or(stage_, prim, "fStop", 0.0);
-  camera.focus_distance_m = usd::number_or(stage_, prim, "focusDistance", 0.0) * meters_per_unit_;
+  camera.f_stop = number("fStop", 0.0);
+  camera.focus_distance_m = number("focusDistance", 0.0) * meters_per_unit_;
   // A camera has no size: the units must not stand in its pose.
   const Affine root_from_camera = without_scale(place.root_from_node);
   const Affine root_from_parent =
@@ -295,11 +325,15 @@ void SceneTranslator::add_camera(const Prim& prim, Place& place) {
   scene_.edit(place.node).camera = camera;
 }
 
+// The mean factor by which the prim's transforms enlarge, in stage units.
+double SceneTranslator::stage_scale(const Place& place) const {
+  return std::cbrt(std::abs(place.root_from_node.linear().determinant())) / meters_per_unit_;
+}
+
 void SceneTranslator::add_light(const Prim& prim, Place& place) {
-  const double volume = std::abs(place.root_from_node.linear().determinant());
-  const double world_scale = std::cbrt(volume) / meters_per_unit_;
-  auto light = translate_light(stage_, prim, world_scale, materials_.textures());
+  auto light = translate_light(stage_, prim, stage_scale(place), materials_.textures());
   if (!light) return;
+  for (const std::string& loss : light->losses) note(prim, "is a light whose " + loss);
   Affine turned = scene_[place.node].parent_from_node * light->prim_from_light;
   if (light->light.kind == LightKind::Dome && stage_.is_z_up()) {
     // By the letter the pole of a dome is +y on every stage. People who light a stage that has z up
@@ -339,8 +373,7 @@ void SceneTranslator::add_labels(const Prim& prim, NodeId node) {
 
 void SceneTranslator::add_instances(const Prim& prim, const Place& place) {
   if (instancer_depth_ >= kMaxInstancerNesting) {
-    stage_.diagnostics().warn(stage_.root_layer().identifier() + ": <" + prim.path +
-                              "> is an instancer within too many instancers");
+    note(prim, "is an instancer within too many instancers");
     return;
   }
   ++instancer_depth_;

@@ -9,6 +9,7 @@
 
 #include "diorama/host.h"
 #include "diorama/scene.h"
+#include "loader_usd/light_translator.h"
 #include "loader_usd/material_translator.h"
 #include "loader_usd/mesh_translator.h"
 #include "loader_usd/physics_translator.h"
@@ -40,12 +41,16 @@ class SceneTranslator {
   Affine unit_correction(const usd::Prim& prim) const;
 
   std::string drawn_material(const usd::Prim& prim);
-  void add_shape(const usd::Prim& prim, NodeId node);
+  void add_shape(const usd::Prim& prim, const Place& place);
   void add_camera(const usd::Prim& prim, Place& place);
   void add_light(const usd::Prim& prim, Place& place);
+  double stage_scale(const Place& place) const;
   void add_labels(const usd::Prim& prim, NodeId node);
   void add_instances(const usd::Prim& prim, const Place& place);
-  void note_left_out(const usd::Prim& prim, const std::string& what);
+  void note(const usd::Prim& prim, const std::string& what);
+  void note_undrawn(const usd::Prim& prim, const std::string& type);
+  void report_notes();
+  void light_meshes();
   std::shared_ptr<const Material> plain_material(const TranslatedMesh& mesh);
 
   usd::Stage& stage_;
@@ -58,12 +63,13 @@ class SceneTranslator {
   Affine root_from_stage_;
   std::map<std::pair<const usd::Prim*, bool>, bool> drawn_;  ///< Second: below a prototype.
   std::map<std::vector<float>, std::shared_ptr<const Material>> plain_materials_;
-  /// Visible prims that are not drawn.
-  struct LeftOut {
+  std::vector<std::pair<NodeId, MeshLight>> mesh_lights_;
+  /// Prims with something that the scene cannot hold.
+  struct Noted {
     std::string first_path;
     std::size_t count = 0;
   };
-  std::map<std::string, LeftOut> left_out_;  ///< By type and lack.
+  std::map<std::string, Noted> notes_;  ///< By what is said of them.
   int instancer_depth_ = 0;
   std::size_t node_count_ = 0;
 };

@@ -80,6 +80,11 @@ bool bool_or(const Stage& stage, const Prim& prim, std::string_view name, bool f
   return stage.value(prim, name).as_bool().value_or(fallback);
 }
 
+bool has_schema(const Stage& stage, const Prim& prim, std::string_view name) {
+  const Strings schemas = stage.metadata_list(prim, "apiSchemas");
+  return std::find(schemas.begin(), schemas.end(), name) != schemas.end();
+}
+
 std::optional<Vector3> vector3(const Stage& stage, const Prim& prim, std::string_view name) {
   Vector3 result{};
   if (!stage.value(prim, name).read(result)) return std::nullopt;

@@ -60,6 +60,8 @@ double number_or(const Stage& stage, const Prim& prim, std::string_view name, do
 std::string token_or(const Stage& stage, const Prim& prim, std::string_view name,
                      std::string_view fallback);
 bool bool_or(const Stage& stage, const Prim& prim, std::string_view name, bool fallback);
+/// Whether an API schema is applied: "PhysicsMassAPI".
+bool has_schema(const Stage& stage, const Prim& prim, std::string_view name);
 std::optional<Vector3> vector3(const Stage& stage, const Prim& prim, std::string_view name);
 
 }  // namespace diorama::usd

@@ -252,7 +252,7 @@ FoundValue Stage::find_value(const Prim& prim, std::string_view name) const {
           return FoundValue{std::move(value), entry.layer.get(), node.stack, property};
         };
         first_default = found(entry.layer->get(property->fields, "default"));
-        if (first_default) return false;
+        if (first_default && !first_default.value.is_block()) return false;
         if (!first_sample && sampling_ == Sampling::OrFirstSample) {
           const Value samples = entry.layer->get(property->fields, "timeSamples");
           const TimeSamples* list = samples.as_time_samples();
@@ -262,9 +262,10 @@ FoundValue Stage::find_value(const Prim& prim, std::string_view name) const {
             first_sample = found(list->value(is_reversed ? list->times.size() - 1 : 0));
           }
         }
-        return true;
+        return !first_default;
       });
-  FoundValue result = first_default ? first_default : first_sample;
+  const bool has_default = first_default && !first_default.value.is_block();
+  FoundValue result = has_default ? first_default : first_sample;
   return result.value.is_block() ? FoundValue() : result;
 }
 
@@ -274,14 +275,17 @@ const PropertySpec* Stage::value_spec(const Prim& prim, std::string_view name) c
   for_each_spec(prim, [&](const IndexNode&, const LayerStack::Entry& entry, const PrimSpec& spec) {
     const PropertySpec* property = spec.property(name);
     if (!property) return true;
-    if (entry.layer->has(property->fields, "default")) with_default = property;
-    if (!with_samples && entry.layer->has(property->fields, "timeSamples")) {
+    if (!with_samples && sampling_ == Sampling::OrFirstSample &&
+        entry.layer->has(property->fields, "timeSamples")) {
       with_samples = property;
     }
-    return with_default == nullptr;
+    if (!entry.layer->has(property->fields, "default")) return true;
+    // Only a block yields to samples, and only where there are some the value need be looked at.
+    const bool is_block = with_samples && entry.layer->get(property->fields, "default").is_block();
+    if (!is_block) with_default = property;
+    return false;
   });
-  if (with_default || sampling_ == Sampling::DefaultTime) return with_default;
-  return with_samples;
+  return with_default ? with_default : with_samples;
 }
 
 Strings Stage::compose_paths(const Prim& prim, std::string_view name,

@@ -29,7 +29,7 @@ struct Prim {
   std::string path;
   const Prim* parent = nullptr;  ///< Null for the pseudo-root.
   PrimIndex index;
-  std::vector<int> order;  ///< Nodes of the index with opinions, strongest first.
+  std::vector<int> order;         ///< Nodes of the index with opinions, strongest first.
   std::vector<Opinion> opinions;  ///< Of the layers of these nodes, strongest first.
   std::string type_name;
   TypeTraits traits;
@@ -52,8 +52,10 @@ struct FoundValue {
 
 /// Which time a value is taken at.
 enum class Sampling {
-  DefaultTime,    ///< The default alone: an attribute with time samples only has no value.
-  OrFirstSample,  ///< The first time sample where no layer has a default.
+  DefaultTime,  ///< The default alone: an attribute with time samples only has no value.
+  /// The first time sample where no layer has a default: a blocked default is none, a blocked
+  /// sample is no value.
+  OrFirstSample,
 };
 
 /// A composed scene: what all layers together say, with all payloads loaded, default variants and

@@ -67,4 +67,58 @@ def Material "Stone" (
   CHECK(loaded.node("Body").collider->friction == Approx(0.8));
 }
 
+TEST_CASE("a body weighs what its parts say", "[loader_usd]") {
+  const TemporaryFolder folder;
+  const std::string parts = R"(
+    float physics:density = 100
+    def Cube "Heavy" ( prepend apiSchemas = ["PhysicsCollisionAPI", "PhysicsMassAPI"] )
+    {
+        double size = 1
+        float physics:mass = 7
+    }
+    def Cube "Dense" ( prepend apiSchemas = ["PhysicsCollisionAPI", "PhysicsMassAPI"] )
+    {
+        double size = 1
+        float physics:density = 30
+    }
+    def Cube "Plain" ( prepend apiSchemas = ["PhysicsCollisionAPI"] )
+    {
+        double size = 1
+    }
+    def Cube "Own" ( prepend apiSchemas = ["PhysicsRigidBodyAPI", "PhysicsMassAPI"] )
+    {
+        double size = 1
+        float physics:mass = 1000
+    }
+)";
+  const auto body = [&](const std::string& more) {
+    return stage("    metersPerUnit = 1\n", R"(
+def Xform "Body" ( prepend apiSchemas = ["PhysicsRigidBodyAPI", "PhysicsMassAPI"] )
+{)" + parts + more + "}\n");
+  };
+  // The part with a mass counts by it, the next one by its own density, the third by the body's.
+  LoadedStage summed(folder.write("a.usda", body("")));
+  CHECK(summed.node("Body").rigid_body->mass_kg == Approx(7.0 + 30.0 + 100.0));
+  LoadedStage stated(folder.write("b.usda", body("    float physics:mass = 3\n")));
+  CHECK(stated.node("Body").rigid_body->mass_kg == Approx(3.0));
+}
+
+TEST_CASE("velocities become metres and radians per second of the world", "[loader_usd]") {
+  const TemporaryFolder folder;
+  LoadedStage loaded(folder.write("a.usda", R"(#usda 1.0
+(
+    metersPerUnit = 0.01
+    upAxis = "Y"
+)
+def Cube "Body" ( prepend apiSchemas = ["PhysicsRigidBodyAPI"] )
+{
+    vector3f physics:velocity = (100, 200, 300)
+    vector3f physics:angularVelocity = (0, 180, 0)
+}
+)"));
+  const RigidBody& body = *loaded.node("Body").rigid_body;
+  CHECK(body.linear_velocity.isApprox(Vec3(1.0, -3.0, 2.0), 1e-6));
+  CHECK(body.angular_velocity.isApprox(Vec3(0.0, 0.0, kPi), 1e-6));
+}
+
 }  // namespace diorama::loader_usd
