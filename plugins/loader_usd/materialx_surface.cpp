@@ -14,97 +14,82 @@ constexpr int kMaxNodes = 32;
 // no such input.
 struct Model {
   const char* id;
-  const char* base_color;
-  float default_base;
-  const char* base_weight;
-  const char* metallic;
-  float default_metallic;
-  const char* roughness;
-  float default_roughness;
-  const char* specular;
-  const char* ior;
-  const char* transmission;
-  const char* clearcoat;
-  const char* clearcoat_roughness;
-  float default_clearcoat_roughness;
-  const char* emission_color;
-  float default_emission;
-  const char* emission_weight;
-  float default_emission_weight;
-  const char* opacity;
-  const char* opacity_mode;
-  const char* thin_walled;
-  const char* normal;
+  const char* base_color = "base_color";
+  float default_base = 0.8f;
+  const char* base_weight = nullptr;
+  const char* metallic = nullptr;
+  float default_metallic = 0.0f;
+  const char* roughness = "specular_roughness";
+  float default_roughness = 0.0f;
+  const char* specular = nullptr;
+  const char* ior = nullptr;
+  const char* transmission = nullptr;
+  const char* clearcoat = nullptr;
+  const char* clearcoat_roughness = nullptr;
+  float default_clearcoat_roughness = 0.0f;
+  const char* emission_color = "emission_color";
+  float default_emission = 1.0f;
+  const char* emission_weight = nullptr;
+  float default_emission_weight = 0.0f;
+  const char* opacity = nullptr;
+  const char* opacity_mode = nullptr;
+  const char* thin_walled = nullptr;
+  const char* normal = "normal";
 };
 
-constexpr Model kModels[] = {
-    {"ND_standard_surface_surfaceshader",
-     "base_color",
-     0.8f,
-     "base",
-     "metalness",
-     0.0f,
-     "specular_roughness",
-     0.2f,
-     "specular",
-     "specular_IOR",
-     "transmission",
-     "coat",
-     "coat_roughness",
-     0.1f,
-     "emission_color",
-     1.0f,
-     "emission",
-     0.0f,
-     "opacity",
-     nullptr,
-     "thin_walled",
-     "normal"},
-    {"ND_open_pbr_surface_surfaceshader",
-     "base_color",
-     0.8f,
-     "base_weight",
-     "base_metalness",
-     0.0f,
-     "specular_roughness",
-     0.3f,
-     "specular_weight",
-     "specular_ior",
-     "transmission_weight",
-     "coat_weight",
-     "coat_roughness",
-     0.0f,
-     "emission_color",
-     1.0f,
-     "emission_luminance",
-     0.0f,
-     "geometry_opacity",
-     nullptr,
-     "geometry_thin_walled",
-     "geometry_normal"},
-    {"ND_gltf_pbr_surfaceshader",
-     "base_color",
-     1.0f,
-     nullptr,
-     "metallic",
-     1.0f,
-     "roughness",
-     1.0f,
-     "specular",
-     "ior",
-     "transmission",
-     "clearcoat",
-     "clearcoat_roughness",
-     0.0f,
-     "emissive",
-     0.0f,
-     "emissive_strength",
-     1.0f,
-     "alpha",
-     "alpha_mode",
-     nullptr,
-     "normal"},
+constexpr Model kStandardSurface{
+    .id = "ND_standard_surface_surfaceshader",
+    .base_weight = "base",
+    .metallic = "metalness",
+    .default_roughness = 0.2f,
+    .specular = "specular",
+    .ior = "specular_IOR",
+    .transmission = "transmission",
+    .clearcoat = "coat",
+    .clearcoat_roughness = "coat_roughness",
+    .default_clearcoat_roughness = 0.1f,
+    .emission_weight = "emission",
+    .opacity = "opacity",
+    .thin_walled = "thin_walled",
 };
+
+constexpr Model kOpenPbr{
+    .id = "ND_open_pbr_surface_surfaceshader",
+    .base_weight = "base_weight",
+    .metallic = "base_metalness",
+    .default_roughness = 0.3f,
+    .specular = "specular_weight",
+    .ior = "specular_ior",
+    .transmission = "transmission_weight",
+    .clearcoat = "coat_weight",
+    .clearcoat_roughness = "coat_roughness",
+    .emission_weight = "emission_luminance",
+    .opacity = "geometry_opacity",
+    .thin_walled = "geometry_thin_walled",
+    .normal = "geometry_normal",
+};
+
+constexpr Model kGltf{
+    .id = "ND_gltf_pbr_surfaceshader",
+    .default_base = 1.0f,
+    .metallic = "metallic",
+    .default_metallic = 1.0f,
+    .roughness = "roughness",
+    .default_roughness = 1.0f,
+    .specular = "specular",
+    .ior = "ior",
+    .transmission = "transmission",
+    .clearcoat = "clearcoat",
+    .clearcoat_roughness = "clearcoat_roughness",
+    .emission_color = "emissive",
+    .default_emission = 0.0f,
+    .emission_weight = "emissive_strength",
+    .default_emission_weight = 1.0f,
+    .opacity = "alpha",
+    .opacity_mode = "alpha_mode",
+};
+
+constexpr Model kModels[] = {kStandardSurface, kOpenPbr, kGltf};
 
 const Model* find_model(const std::string& id) {
   const auto model = std::find_if(std::begin(kModels), std::end(kModels),

@@ -43,6 +43,30 @@ Strings children_of(Stage& stage, const char* path) {
   return names;
 }
 
+/// A model `M` of two variants, a and b; a is selected.
+std::string model_of_two(const std::string& a, const std::string& b) {
+  return R"(
+def "M" (
+    variants = {
+        string v = "a"
+    }
+    variantSets = "v"
+)
+{
+    variantSet "v" = {
+        "a" {
+            )" +
+         a + R"(
+        }
+        "b" {
+            )" +
+         b + R"(
+        }
+    }
+}
+)";
+}
+
 }  // namespace
 
 TEST_CASE("a set inside of a variant is selected from outside of the reference",
@@ -142,24 +166,7 @@ def "P" (
 TEST_CASE("an inherited class may select variants, and a weaker selection yields",
           "[specification]") {
   Files files;
-  files.add("asset.usda", R"(
-def "M" (
-    variants = {
-        string v = "a"
-    }
-    variantSets = "v"
-)
-{
-    variantSet "v" = {
-        "a" {
-            int x = 1
-        }
-        "b" {
-            int x = 2
-        }
-    }
-}
-)");
+  files.add("asset.usda", model_of_two("int x = 1", "int x = 2"));
   Stage stage = files.open(R"(
 class "C" (
     variants = {
@@ -391,30 +398,8 @@ def "P" (
 
 TEST_CASE("instances with other selections are other shapes", "[specification]") {
   Files files;
-  files.add("asset.usda", R"(
-def "M" (
-    variants = {
-        string v = "a"
-    }
-    variantSets = "v"
-)
-{
-    variantSet "v" = {
-        "a" {
-            def "Part"
-            {
-                int x = 1
-            }
-        }
-        "b" {
-            def "Part"
-            {
-                int x = 2
-            }
-        }
-    }
-}
-)");
+  files.add("asset.usda",
+            model_of_two("def \"Part\" { int x = 1\n}", "def \"Part\" { int x = 2\n}"));
   Stage stage = files.open(R"(
 def "A" (
     instanceable = true
