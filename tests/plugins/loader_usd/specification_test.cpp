@@ -6,6 +6,7 @@
 #include "loader_usd/usd/extent.h"
 #include "loader_usd/usd/geometry.h"
 #include "loader_usd/usd/stage.h"
+#include "plugins/loader_usd/stage_files.h"
 #include "support/catch.h"
 #include "support/temporary_folder.h"
 
@@ -13,35 +14,6 @@ namespace diorama::usd {
 namespace {
 
 using diorama::test::TemporaryFolder;
-
-/// A stage made of a root layer, with other layers beside it.
-class Files {
- public:
-  void add(const std::string& name, const std::string& text) {
-    folder_.write(name, "#usda 1.0\n" + text);
-  }
-  Stage open(const std::string& text) {
-    return Stage(folder_.write("root.usda", "#usda 1.0\n" + text));
-  }
-
- private:
-  TemporaryFolder folder_;
-};
-
-double x_of(Stage& stage, const char* path, const char* attribute = "x") {
-  const Prim* prim = stage.find(path);
-  INFO(path);
-  REQUIRE(prim);
-  return stage.value(*prim, attribute).as_number().value_or(-1.0);
-}
-
-Strings children_of(Stage& stage, const char* path) {
-  Strings names;
-  for (const Prim* child : stage.visible_children(*stage.find(path))) {
-    names.push_back(child->path.substr(child->path.rfind('/') + 1));
-  }
-  return names;
-}
 
 /// A model `M` of two variants, a and b; a is selected.
 std::string model_of_two(const std::string& a, const std::string& b) {

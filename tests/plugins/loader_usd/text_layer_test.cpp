@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
+#include <limits>
 #include <string>
 
 #include "loader_usd/usd/error.h"
@@ -92,6 +93,61 @@ lines"""
   CHECK(moving.as_time_samples()->value(2).is_block());
   CHECK(attribute(*layer, "/Room", "target", "targetPaths").as_string_list_op()->explicit_items ==
         Strings{"/Room/A", "/Other"});
+}
+
+TEST_CASE("numbers may be infinite, none, or too big", "[usda]") {
+  const auto layer = read(R"(
+def "A"
+{
+    double a = inf
+    double b = -inf
+    double c = nan
+    double d = 1e400
+    float e = 1e39
+    half f = 1e6
+    double g = -.5e-3
+    int h = -2147483648
+    uint i = 4294967295
+    int64 j = -9223372036854775808
+    uint64 k = 18446744073709551615
+    uchar l = 255
+}
+)");
+  const auto number = [&](const char* name) { return *attribute(*layer, "/A", name).as_number(); };
+  CHECK(number("a") == std::numeric_limits<double>::infinity());
+  CHECK(number("b") == -std::numeric_limits<double>::infinity());
+  CHECK(std::isnan(number("c")));
+  CHECK(std::isinf(number("d")));
+  CHECK(std::isinf(number("e")));
+  CHECK(std::isinf(number("f")));
+  CHECK(number("g") == -0.5e-3);
+  CHECK(number("h") == -2147483648.0);
+  CHECK(number("i") == 4294967295.0);
+  CHECK(number("j") == -9223372036854775808.0);
+  CHECK(number("k") == 18446744073709551615.0);
+  CHECK(number("l") == 255.0);
+}
+
+TEST_CASE("texts and assets may hold their own marks", "[usda]") {
+  const auto layer = read(R"x(
+def "A"
+{
+    asset a = @@@foo@bar.usda@@@
+    asset b = @@@a\@@@b@@@
+    string c = """a "quoted"
+line"""
+    string d = 'it\'s \x41\101'
+    string e = """"""
+    string f = '''say "it's"'''
+}
+)x");
+  const auto text = [&](const char* name) { return *attribute(*layer, "/A", name).as_text(); };
+  CHECK(text("a") == "foo@bar.usda");
+  CHECK(text("b") == "a@@@b");
+  CHECK(text("c") == "a \"quoted\"\nline");
+  CHECK(text("d") == "it's AA");
+  CHECK(text("e").empty());
+  CHECK(text("f") == "say \"it's\"");
 }
 
 TEST_CASE("variants are specs of their own", "[usda]") {
