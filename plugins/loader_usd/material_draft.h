@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,8 @@ class MaterialDraft {
 
   /// Primvars that its textures are laid out by.
   std::vector<std::string> uv_names;
+  /// Set where the base colour is the displayColor of the mesh: what stands in for that.
+  std::optional<Vec3f> display_color_fallback;
 
   /// Plans a texture; false when there is no such picture. How it lies on the mesh and which
   /// channel counts is set on the input itself, before or after.

@@ -54,7 +54,7 @@ TranslatedMaterial MaterialTranslator::translate(const Prim& prim) {
     draft_mdl_surface(*named, draft);
   }
   drafts_.push_back(draft);
-  return {draft.shared(), draft.uv_names};
+  return {draft.shared(), draft.uv_names, draft.display_color_fallback};
 }
 
 void MaterialTranslator::notice_displacement(const Prim& surface) {

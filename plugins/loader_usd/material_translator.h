@@ -4,6 +4,7 @@
 #include <deque>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -21,6 +22,9 @@ namespace diorama::loader_usd {
 struct TranslatedMaterial {
   std::shared_ptr<const Material> material;
   std::vector<std::string> uv_names;  ///< Primvars that its textures are laid out by.
+  /// Set where the base colour is the displayColor of the mesh: what stands in for that.
+  std::optional<Vec3f> display_color_fallback;
+  bool reads_display_color() const { return !material || display_color_fallback; }
 };
 
 /// Makes materials out of UsdPreviewSurface networks, MaterialX surfaces and, by the names of their

@@ -112,14 +112,16 @@ void MeshTranslator::add_primvar(Key& key, const Prim* owner, const std::string&
 }
 
 TranslatedMesh MeshTranslator::translate(const Prim& prim, const Prims& subsets,
-                                         const std::vector<std::string>& uv_names) {
+                                         const std::vector<std::string>& uv_names,
+                                         bool with_colors) {
   const Primvars primvars = geometry_.primvars(prim);
+  const Prim* color_owner = with_colors ? owner_of(primvars, "displayColor") : nullptr;
   const std::string& type = prim.type_name;
   TranslatedMesh result;
   if (type == "Mesh") {
-    result = translate_mesh(prim, primvars, subsets, uv_names);
+    result = translate_mesh(prim, primvars, subsets, uv_names, color_owner);
   } else if (type == "Points" || type == "BasisCurves") {
-    result = translate_thin(prim, primvars);
+    result = translate_thin(prim, primvars, color_owner);
   } else {
     result = translate_shape(prim);
   }
@@ -129,11 +131,14 @@ TranslatedMesh MeshTranslator::translate(const Prim& prim, const Prims& subsets,
 
 TranslatedMesh MeshTranslator::translate_mesh(const Prim& prim, const Primvars& primvars,
                                               const Prims& subsets,
-                                              const std::vector<std::string>& uv_names) {
+                                              const std::vector<std::string>& uv_names,
+                                              const Prim* color_owner) {
   TranslatedMesh result;
   const std::string uv_name = find_uv(primvars, uv_names);
+  for (const std::string& name : uv_names) {
+    result.lacks_uvs |= name != uv_name && owner_of(primvars, name);
+  }
   const Prim* uv_owner = uv_name.empty() ? nullptr : owner_of(primvars, uv_name);
-  const Prim* color_owner = owner_of(primvars, "displayColor");
   const Prim* primvar_normals = owner_of(primvars, "normals");
   const Prim* normal_owner = primvar_normals ? primvar_normals : &prim;
   const std::string normals = primvar_normals ? "primvars:normals" : "normals";
@@ -196,8 +201,8 @@ TranslatedMesh MeshTranslator::translate_shape(const Prim& prim) {
   return result;
 }
 
-TranslatedMesh MeshTranslator::translate_thin(const Prim& prim, const Primvars& primvars) {
-  const Prim* color_owner = owner_of(primvars, "displayColor");
+TranslatedMesh MeshTranslator::translate_thin(const Prim& prim, const Primvars& primvars,
+                                              const Prim* color_owner) {
   Key key;
   for (const char* name : {"points", "curveVertexCounts", "type", "basis", "wrap"}) {
     key.push_back(stage_.value_spec(prim, name));

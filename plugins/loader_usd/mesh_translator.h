@@ -18,7 +18,8 @@ struct TranslatedMesh {
   std::shared_ptr<const Mesh> mesh;    ///< Null when nothing is left to draw.
   std::optional<Vec3f> display_color;  ///< One colour for all, linear.
   float display_opacity = 1.0f;
-  std::string lacks;  ///< Why there is no mesh, if that is a surprise: "without widths".
+  std::string lacks;       ///< Why there is no mesh, if that is a surprise: "without widths".
+  bool lacks_uvs = false;  ///< The materials read several primvars; a mesh has the first one.
 };
 
 /// Makes meshes out of Mesh prims, shapes, points and curves. The same data give the same mesh, be
@@ -32,17 +33,20 @@ class MeshTranslator {
 
   /// `subsets`: GeomSubsets that get material slots of their own, 1 + i; slot 0 is the rest.
   /// `uv_names`: primvars that the materials read, the first one that the prim has is taken.
+  /// `with_colors`: whether colours that differ within the mesh are wanted.
   TranslatedMesh translate(const usd::Prim& prim, const Prims& subsets,
-                           const std::vector<std::string>& uv_names);
+                           const std::vector<std::string>& uv_names, bool with_colors);
 
  private:
   using Key = std::vector<const void*>;
   using Primvars = std::vector<usd::Primvar>;
 
   TranslatedMesh translate_mesh(const usd::Prim& prim, const Primvars& primvars,
-                                const Prims& subsets, const std::vector<std::string>& uv_names);
+                                const Prims& subsets, const std::vector<std::string>& uv_names,
+                                const usd::Prim* color_owner);
   TranslatedMesh translate_shape(const usd::Prim& prim);
-  TranslatedMesh translate_thin(const usd::Prim& prim, const Primvars& primvars);
+  TranslatedMesh translate_thin(const usd::Prim& prim, const Primvars& primvars,
+                                const usd::Prim* color_owner);
   void add_primvar(Key& key, const usd::Prim* owner, const std::string& name) const;
   void read_display_color(const Primvars& primvars, TranslatedMesh& result) const;
 

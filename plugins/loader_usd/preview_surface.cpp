@@ -2,6 +2,9 @@
 #include "loader_usd/preview_surface.h"
 
 #include <algorithm>
+#include <array>
+#include <optional>
+#include <utility>
 
 namespace diorama::loader_usd {
 namespace {
@@ -27,6 +30,11 @@ int to_channel(const std::string& output) {
 // MaterialX spells the nodes of USD's preview surface with a prefix and a version behind.
 bool is_node(const std::string& id, const std::string& name) {
   return id == name || id.starts_with("ND_" + name);
+}
+
+// The suffix says the type that is read.
+bool is_primvar_reader(const std::string& id) {
+  return id.starts_with("UsdPrimvarReader") || id.starts_with("ND_UsdPrimvarReader");
 }
 
 bool read4(const ShaderNetwork& network, const Prim& node, const char* name,
@@ -56,7 +64,7 @@ void read_layout(const Prim& texture, MaterialDraft& draft, TextureInput& input)
       name = "in";
       continue;
     }
-    if (is_node(id, "UsdPrimvarReader")) {
+    if (is_primvar_reader(id)) {
       const std::string primvar = network.text(*source.prim, "varname", "");
       if (!primvar.empty()) draft.uv_names.push_back(primvar);
     }
@@ -90,6 +98,44 @@ bool connect(const Prim& shader, const std::string& name, TextureInput Material:
   return true;
 }
 
+// What the node of a picture that cannot be read stands for, if it says so.
+std::optional<std::array<float, 4>> picture_fallback(const ShaderNetwork& network,
+                                                     const Prim& shader, const std::string& name) {
+  const ShaderNetwork::Source source = network.source(shader, name);
+  if (!source.is_shader() || !is_node(network.id(*source.prim), "UsdUVTexture")) return {};
+  std::array<float, 4> fallback{};
+  if (!read4(network, *source.prim, "fallback", fallback)) return {};
+  return fallback;
+}
+
+// A colour that is not textured: a number, a primvar of the mesh, or what stands in for a picture.
+Vec3f plain_color(const Prim& shader, const std::string& name, const Vec3f& otherwise,
+                  const ShaderNetwork& network) {
+  if (const auto fallback = picture_fallback(network, shader, name)) {
+    return Vec3f((*fallback)[0], (*fallback)[1], (*fallback)[2]);
+  }
+  const ShaderNetwork::Source source = network.source(shader, name);
+  if (source.is_shader() && is_primvar_reader(network.id(*source.prim))) {
+    return network.color(*source.prim, "fallback", Vec3f::Zero());
+  }
+  return network.color(shader, name, otherwise);
+}
+
+float plain_number(const Prim& shader, const char* name, float otherwise,
+                   const ShaderNetwork& network) {
+  const auto fallback = picture_fallback(network, shader, name);
+  if (!fallback) return network.number(shader, name, otherwise);
+  const int channel = to_channel(network.source(shader, name).output);
+  return (*fallback)[static_cast<std::size_t>(channel)];
+}
+
+bool reads_display_color(const Prim& shader, const std::string& name,
+                         const ShaderNetwork& network) {
+  const ShaderNetwork::Source source = network.source(shader, name);
+  return source.is_shader() && is_primvar_reader(network.id(*source.prim)) &&
+         network.text(*source.prim, "varname", "") == "displayColor";
+}
+
 }  // namespace
 
 bool is_preview_surface(const std::string& id) { return is_node(id, "UsdPreviewSurface"); }
@@ -98,13 +144,17 @@ void draft_preview_surface(const Prim& shader, MaterialDraft& draft) {
   const ShaderNetwork& network = draft.network();
   Material& material = draft.material();
   const auto number = [&](const char* name, float fallback) {
-    return network.number(shader, name, fallback);
+    return plain_number(shader, name, fallback, network);
   };
   const bool is_specular = number("useSpecularWorkflow", 0.0f) != 0.0f;
   const bool has_picture =
       connect(shader, "diffuseColor", &Material::base_color_texture, false, draft);
-  material.base_color =
-      has_picture ? Vec3f::Ones() : network.color(shader, "diffuseColor", Vec3f::Constant(0.18f));
+  material.base_color = has_picture
+                            ? Vec3f::Ones()
+                            : plain_color(shader, "diffuseColor", Vec3f::Constant(0.18f), network);
+  if (reads_display_color(shader, "diffuseColor", network)) {
+    draft.display_color_fallback = std::exchange(material.base_color, Vec3f::Ones());
+  }
   connect(shader, "roughness", &Material::roughness_texture, true, draft);
   material.roughness = number("roughness", 0.5f);
   if (is_specular) {
@@ -123,9 +173,12 @@ void draft_preview_surface(const Prim& shader, MaterialDraft& draft) {
   material.opacity = number("opacity", 1.0f);
   material.opacity_threshold = number("opacityThreshold", 0.0f);
   const bool glows = connect(shader, "emissiveColor", &Material::emission_texture, false, draft);
-  material.emission = glows ? Vec3f::Ones() : network.color(shader, "emissiveColor", Vec3f::Zero());
-  // An even opacity below one is glass: it still reflects, and what passes goes straight on.
-  if (!has_mask && material.opacity < 1.0f && material.opacity_threshold <= 0.0f) {
+  material.emission =
+      glows ? Vec3f::Ones() : plain_color(shader, "emissiveColor", Vec3f::Zero(), network);
+  // An even opacity below one is glass: it still reflects, and what passes goes straight on; unless
+  // it says how much of the surface there is.
+  const bool is_presence = network.text(shader, "opacityMode", "transparent") == "presence";
+  if (!is_presence && !has_mask && material.opacity < 1.0f && material.opacity_threshold <= 0.0f) {
     material.transmission = 1.0f - std::max(material.opacity, 0.0f);
     material.opacity = 1.0f;
     material.is_thin_walled = true;

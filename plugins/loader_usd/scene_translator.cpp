@@ -90,7 +90,7 @@ void SceneTranslator::translate(NodeId root) {
   }
   stage_.assets().release_pages();
   materials_.read_textures();
-  light_meshes();
+  finish_materials();
   report_notes();
 }
 
@@ -249,17 +249,24 @@ void SceneTranslator::add_shape(const Prim& prim, const Place& place) {
     }
   }
   std::vector<std::string> uv_names;
+  bool with_colors = false;
   for (const std::string& path : paths) {
-    const auto& names = materials_.translate(path).uv_names;
-    uv_names.insert(uv_names.end(), names.begin(), names.end());
+    const TranslatedMaterial& material = materials_.translate(path);
+    uv_names.insert(uv_names.end(), material.uv_names.begin(), material.uv_names.end());
+    with_colors |= material.reads_display_color();
   }
-  const TranslatedMesh mesh = meshes_.translate(prim, subsets, uv_names);
+  const TranslatedMesh mesh = meshes_.translate(prim, subsets, uv_names, with_colors);
   if (!mesh.lacks.empty()) note_undrawn(prim, prim.type_name + " " + mesh.lacks);
+  if (mesh.lacks_uvs) note(prim, "is textured by several primvars, of which the first one counts");
   if (!mesh.mesh) return;
   std::vector<std::shared_ptr<const Material>> materials;
   for (const std::string& path : paths) {
-    const auto& material = materials_.translate(path).material;
-    materials.push_back(material ? material : plain_material(mesh));
+    const TranslatedMaterial& known = materials_.translate(path);
+    materials.push_back(known.material ? known.material : plain_material(mesh));
+    if (known.display_color_fallback && mesh.mesh->colors.empty()) {
+      const Vec3f color = mesh.display_color.value_or(*known.display_color_fallback);
+      tints_.push_back({place.node, materials.size() - 1, color});
+    }
   }
   const std::string purpose = geometry_.purpose(prim);
   Node& content = scene_.edit(place.node);
@@ -273,17 +280,28 @@ void SceneTranslator::add_shape(const Prim& prim, const Place& place) {
   }
 }
 
-// Meshes that are lights have materials of their own that shine. They are made when the others have
-// their textures.
-void SceneTranslator::light_meshes() {
-  using Known = std::tuple<const Material*, std::vector<float>, std::string>;
-  std::map<Known, std::shared_ptr<const Material>> known;
+// Some meshes have materials of their own: those that read the mesh's one colour, and those of
+// meshes that are lights. They are made when the others have their textures.
+void SceneTranslator::finish_materials() {
+  using Original = std::shared_ptr<const Material>;
+  std::map<std::pair<Original, std::vector<float>>, Original> tinted;
+  for (const auto& [node, slot, color] : tints_) {
+    Original& material = scene_.edit(node).materials[slot];
+    Original& known = tinted[{material, {color.x(), color.y(), color.z()}}];
+    if (!known) {
+      Material copy = *material;
+      copy.base_color = color.allFinite() ? Vec3f(color.cwiseMax(0.0f)) : Vec3f::Zero();
+      known = std::make_shared<const Material>(std::move(copy));
+    }
+    material = known;
+  }
+  std::map<std::tuple<Original, std::vector<float>, std::string>, Original> shining;
   for (const auto& [node, light] : mesh_lights_) {
     const Vec3f& e = light.emission;
-    for (auto& material : scene_.edit(node).materials) {
-      auto& shining = known[{material.get(), {e.x(), e.y(), e.z()}, light.sync_mode}];
-      if (!shining) shining = std::make_shared<const Material>(shining_material(*material, light));
-      material = shining;
+    for (Original& material : scene_.edit(node).materials) {
+      Original& known = shining[{material, {e.x(), e.y(), e.z()}, light.sync_mode}];
+      if (!known) known = std::make_shared<const Material>(shining_material(*material, light));
+      material = known;
     }
   }
 }

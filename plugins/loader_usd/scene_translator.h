@@ -50,7 +50,7 @@ class SceneTranslator {
   void note(const usd::Prim& prim, const std::string& what);
   void note_undrawn(const usd::Prim& prim, const std::string& type);
   void report_notes();
-  void light_meshes();
+  void finish_materials();
   std::shared_ptr<const Material> plain_material(const TranslatedMesh& mesh);
 
   usd::Stage& stage_;
@@ -64,6 +64,13 @@ class SceneTranslator {
   std::map<std::pair<const usd::Prim*, bool>, bool> drawn_;  ///< Second: below a prototype.
   std::map<std::vector<float>, std::shared_ptr<const Material>> plain_materials_;
   std::vector<std::pair<NodeId, MeshLight>> mesh_lights_;
+  /// Materials whose base colour is the one displayColor of a mesh.
+  struct Tint {
+    NodeId node;
+    std::size_t slot;
+    Vec3f color;
+  };
+  std::vector<Tint> tints_;
   /// Prims with something that the scene cannot hold.
   struct Noted {
     std::string first_path;

@@ -340,7 +340,7 @@ std::vector<PointInstance> point_instances(Stage& stage, const Prim& instancer) 
     if (!is_known || masked.contains(ids[i])) continue;
     PointInstance instance;
     instance.prototype = prototypes[static_cast<std::size_t>(which[i])];
-    if (!instance.prototype) continue;
+    if (!instance.prototype || !instance.prototype->is_active) continue;
     Matrix matrix = local_transform(stage, *instance.prototype).matrix;
     if (i * 3 + 2 < scales.size()) {
       matrix = matrix * scaling({scales[i * 3], scales[i * 3 + 1], scales[i * 3 + 2]});

@@ -23,7 +23,16 @@ std::optional<std::array<int, 3>> rotation_axes(std::string_view kind) {
     if (c < 'X' || c > 'Z') return std::nullopt;
     axes[i] = c - 'X';
   }
-  return axes;
+  const bool are_different = axes[0] != axes[1] && axes[1] != axes[2] && axes[2] != axes[0];
+  return are_different ? std::optional(axes) : std::nullopt;
+}
+
+// The axis of `rotateX`, `translateY` or `scaleZ`; nothing for other words.
+std::optional<std::size_t> axis_of(std::string_view kind, std::string_view stem) {
+  if (kind.size() != stem.size() + 1 || !kind.starts_with(stem)) return std::nullopt;
+  const char c = kind.back();
+  if (c < 'X' || c > 'Z') return std::nullopt;
+  return static_cast<std::size_t>(c - 'X');
 }
 
 Matrix op_matrix(std::string_view kind, const Value& value) {
@@ -38,22 +47,18 @@ Matrix op_matrix(std::string_view kind, const Value& value) {
   }
   if (kind == "translate") return value.read(v) ? translation(v) : Matrix();
   if (kind == "scale") return value.read(v) ? scaling(v) : Matrix();
-  if (kind.size() == 10 && kind.starts_with("translate")) {
-    const auto number = value.as_number();
-    if (!number) return {};
-    v[static_cast<std::size_t>(kind[9] - 'X') % 3] = *number;
+  const auto number = value.as_number();
+  if (const auto axis = axis_of(kind, "translate"); axis && number) {
+    v[*axis] = *number;
     return translation(v);
   }
-  if (kind.size() == 6 && kind.starts_with("scale")) {
-    const auto number = value.as_number();
-    if (!number) return {};
+  if (const auto axis = axis_of(kind, "scale"); axis && number) {
     v = {1, 1, 1};
-    v[static_cast<std::size_t>(kind[5] - 'X') % 3] = *number;
+    v[*axis] = *number;
     return scaling(v);
   }
-  if (kind.size() == 7 && kind.starts_with("rotate")) {
-    const auto degrees = value.as_number();
-    return degrees ? rotation((kind[6] - 'X') % 3, *degrees) : Matrix();
+  if (const auto axis = axis_of(kind, "rotate"); axis && number) {
+    return rotation(static_cast<int>(*axis), *number);
   }
   const auto axes = rotation_axes(kind);
   if (!axes || !value.read(v)) return {};

@@ -364,6 +364,31 @@ def Xform "A"
   CHECK(scaled == Vector3{2, 3, 4});
 }
 
+TEST_CASE("ops may have any suffix, type and axis; words that are no ops do nothing", "[geometry]") {
+  const TemporaryFolder folder;
+  Stage stage(folder.write("root.usda", kHeader + R"(
+def Xform "A"
+{
+    half3 xformOp:translate:a:b = (1, 2, 3)
+    double xformOp:translateY:c = 10
+    float xformOp:scaleZ = 2
+    half xformOp:rotateX:tilt = 90
+    quath xformOp:orient:turn = (1, 0, 0, 0)
+    double xformOp:rotateA = 45
+    double3 xformOp:rotateXXY = (10, 20, 30)
+    double xformOp:translateZZ = 7
+    double3 xformOp:shear = (1, 1, 1)
+    double3[] xformOp:scale = [(2, 2, 2)]
+    uniform token[] xformOpOrder = ["xformOp:translate:a:b", "xformOp:translateY:c", "xformOp:rotateX:tilt", "xformOp:scaleZ", "xformOp:orient:turn", "xformOp:rotateA", "xformOp:rotateXXY", "xformOp:translateZZ", "xformOp:shear", "xformOp:scale", "xformOp:missing", "nonsense"]
+}
+)"));
+  Geometry geometry(stage);
+  const Vector3 moved = transform(geometry.world_from_prim(*stage.find("/A")), Vector3{1, 0, 1});
+  CHECK(moved[0] == Approx(2.0));
+  CHECK(moved[1] == Approx(12.0 - 2.0));
+  CHECK(moved[2] == Approx(3.0));
+}
+
 TEST_CASE("the nearest material counts unless an ancestor's is stronger", "[geometry]") {
   const TemporaryFolder folder;
   Stage stage(folder.write("root.usda", kHeader + R"(

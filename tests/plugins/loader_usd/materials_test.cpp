@@ -221,4 +221,125 @@ TEST_CASE("a preview surface in MaterialX's words is one", "[loader_usd]") {
   CHECK(material.roughness == 0.125f);
 }
 
+namespace {
+
+const std::string kSquare = R"(
+    point3f[] points = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
+    int[] faceVertexCounts = [4]
+    int[] faceVertexIndices = [0, 1, 2, 3]
+    rel material:binding = </Mat>
+)";
+
+std::string uvs(const std::string& name, const std::string& corner) {
+  return "    texCoord2f[] primvars:" + name + " = [" + corner +
+         "] ( interpolation = \"constant\" )\n";
+}
+
+std::string preview_material(const std::string& inputs, const std::string& shaders) {
+  return R"(#usda 1.0
+def Material "Mat"
+{
+    token outputs:surface.connect = </Mat/S.outputs:surface>
+    def Shader "S"
+    {
+        uniform token info:id = "UsdPreviewSurface"
+)" + inputs +
+         "    }\n" + shaders + "}\n";
+}
+
+std::string texture(const std::string& name, const std::string& varname,
+                    const std::string& more = "") {
+  return R"(
+    def Shader ")" +
+         name + R"("
+    {
+        uniform token info:id = "UsdUVTexture"
+        asset inputs:file = @)" +
+         name + R"(.png@
+        float2 inputs:st.connect = </Mat/Reader)" +
+         name + R"(.outputs:result>
+)" + more +
+         R"(    }
+    def Shader "Reader)" +
+         name + R"("
+    {
+        uniform token info:id = "UsdPrimvarReader_float2"
+        token inputs:varname = ")" +
+         varname + R"("
+    }
+)";
+}
+
+}  // namespace
+
+TEST_CASE("textures lie by the primvar that their reader names", "[loader_usd]") {
+  const TemporaryFolder folder;
+  folder.write("Base.png", "gray");
+  folder.write("Rough.png", "gray");
+  const std::string connected =
+      "        color3f inputs:diffuseColor.connect = </Mat/Base.outputs:rgb>\n";
+  const std::string mesh =
+      "def Mesh \"M\"\n{" + kSquare + uvs("st", "(0, 0)") + uvs("ExportUV", "(0.25, 0.75)") + "}\n";
+  LoadedStage loaded(
+      folder.write("a.usda", preview_material(connected, texture("Base", "ExportUV")) + mesh));
+  CHECK(loaded.node("M").mesh->uvs.at(0) == Vec2f(0.25f, 0.75f));
+  CHECK(loaded.host.warnings.empty());
+  LoadedStage several(folder.write(
+      "b.usda", preview_material(
+                    connected + "        float inputs:roughness.connect = </Mat/Rough.outputs:r>\n",
+                    texture("Base", "ExportUV") + texture("Rough", "st")) +
+                    mesh));
+  REQUIRE(several.host.warnings.size() == 1);
+  CHECK(several.host.warnings[0].ends_with(
+      "</M> is textured by several primvars, of which the first one counts"));
+}
+
+TEST_CASE("a picture that is missing has its node's fallback", "[loader_usd]") {
+  const TemporaryFolder folder;
+  LoadedStage loaded(folder.write(
+      "a.usda", preview_material(
+                    "        color3f inputs:diffuseColor.connect = </Mat/Gone.outputs:rgb>\n"
+                    "        float inputs:roughness.connect = </Mat/Gone.outputs:g>\n",
+                    texture("Gone", "st", "        float4 inputs:fallback = (1, 0.5, 0.25, 1)\n")) +
+                    "def Mesh \"M\"\n{" + kSquare + "}\n"));
+  const Material& material = *loaded.node("M").materials.at(0);
+  CHECK(material.base_color == Vec3f(1, 0.5f, 0.25f));
+  CHECK(material.roughness == 0.5f);
+}
+
+TEST_CASE("colors of meshes count where their material reads them", "[loader_usd]") {
+  const TemporaryFolder folder;
+  const std::string reader = R"(
+    def Shader "Color"
+    {
+        uniform token info:id = "UsdPrimvarReader_float3"
+        string inputs:varname = "displayColor"
+        float3 inputs:fallback = (0, 0, 1)
+    }
+)";
+  const std::string meshes =
+      "def Mesh \"Varied\"\n{" + kSquare +
+      "    color3f[] primvars:displayColor = [(1, 0, 0), (0, 1, 0), (0, 0, 1), "
+      "(1, 1, 1)] ( interpolation = \"vertex\" )\n}\n"
+      "def Mesh \"Even\"\n{" +
+      kSquare +
+      "    color3f[] primvars:displayColor = [(1, 0, 0)]\n}\n"
+      "def Mesh \"Without\"\n{" +
+      kSquare + "}\n";
+  LoadedStage read(folder.write(
+      "a.usda",
+      preview_material(
+          "        color3f inputs:diffuseColor.connect = </Mat/Color.outputs:result>\n", reader) +
+          meshes));
+  CHECK(read.node("Varied").mesh->colors.size() == 4);
+  CHECK(read.node("Varied").materials.at(0)->base_color == Vec3f::Ones());
+  CHECK(read.node("Even").materials.at(0)->base_color == Vec3f::UnitX());
+  CHECK(read.node("Without").materials.at(0)->base_color == Vec3f::UnitZ());
+  LoadedStage unread(folder.write(
+      "b.usda",
+      preview_material("        color3f inputs:diffuseColor = (0.5, 0.5, 0.5)\n", "") + meshes));
+  CHECK(unread.node("Varied").mesh->colors.empty());
+  CHECK(unread.node("Even").materials.at(0)->base_color == Vec3f::Constant(0.5f));
+}
+
 }  // namespace diorama::loader_usd
