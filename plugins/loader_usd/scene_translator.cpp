@@ -320,6 +320,7 @@ void SceneTranslator::add_camera(const Prim& prim, Place& place) {
   Camera camera = Camera::from_lens(kCameraWidth, rows, number("focalLength", 50.0), aperture);
   std::array<double, 2> range{1.0, 1000000.0};
   stage_.value(prim, "clippingRange").read(range);
+  if (!std::isfinite(range[0]) || !std::isfinite(range[1])) range = {1.0, 1000000.0};
   // The film is moved, so the axis meets the picture on the other side of its middle.
   const auto offset = [&](const char* name) {
     const double value = usd::number_or(stage_, prim, name, 0.0);
@@ -364,27 +365,35 @@ void SceneTranslator::add_light(const Prim& prim, Place& place) {
 
 // --- Labels --------------------------------------------------------------------------------------
 
-// Labels of UsdSemantics, and of the SemanticsAPI that was used before.
+// Labels of UsdSemantics, and of the SemanticsAPI that was used before. Several of one type are one
+// text with commas, as Replicator writes them.
 void SceneTranslator::add_labels(const Prim& prim, NodeId node) {
   constexpr std::string_view kNew = "semantics:labels:";
   constexpr std::string_view kOld = "semantic:";
   constexpr std::string_view kOldType = ":params:semanticType";
-  Labels labels;
+  std::map<std::string, usd::Strings> found;
+  const auto add = [&](const std::string& type, const std::string& label) {
+    usd::Strings& labels = found[type];
+    const bool is_known = std::find(labels.begin(), labels.end(), label) != labels.end();
+    if (!label.empty() && !is_known) labels.push_back(label);
+  };
   for (const std::string& name : stage_.property_names(prim)) {
     if (name.starts_with(kNew)) {
       const usd::Value value = stage_.value(prim, name);
-      if (value.as_strings() && !value.as_strings()->empty()) {
-        labels[name.substr(kNew.size())] = value.as_strings()->front();
-      }
+      if (!value.as_strings()) continue;
+      for (const std::string& label : *value.as_strings()) add(name.substr(kNew.size()), label);
     } else if (name.starts_with(kOld) && name.ends_with(kOldType)) {
       const std::string data =
           name.substr(0, name.size() - kOldType.size()) + ":params:semanticData";
       const std::string type = usd::token_or(stage_, prim, name, "");
-      const std::string label = usd::token_or(stage_, prim, data, "");
-      if (!type.empty() && !label.empty()) labels[type] = label;
+      if (!type.empty()) add(type, usd::token_or(stage_, prim, data, ""));
     }
   }
-  if (!labels.empty()) scene_.edit(node).labels = std::move(labels);
+  for (const auto& [type, labels] : found) {
+    std::string joined;
+    for (const std::string& label : labels) joined += (joined.empty() ? "" : ",") + label;
+    if (!joined.empty()) scene_.edit(node).labels[type] = std::move(joined);
+  }
 }
 
 // --- PointInstancer ---------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 #include "diorama/error.h"
@@ -508,6 +509,95 @@ def SphereLight "Lamp"
   CHECK(collider.primitive_size.isApprox(Vec3(0.5, 0.5, 2.0), 1e-3));
   // 100 * 2^1 over the sphere's area.
   CHECK(loaded.node("Lamp").light->color.x() == Approx(200.0 / kPi));
+}
+
+TEST_CASE("several labels of one type are joined by commas", "[loader_usd]") {
+  const TemporaryFolder folder;
+  Loaded loaded(folder.write("a.usda", R"(#usda 1.0
+def Xform "New"
+{
+    token[] semantics:labels:class = ["chair", "", "seat", "chair"]
+    token[] semantics:labels:none = []
+}
+def Xform "Old"
+{
+    string semantic:A:params:semanticType = "class"
+    string semantic:A:params:semanticData = "cup"
+    string semantic:B:params:semanticType = "class"
+    string semantic:B:params:semanticData = "mug"
+}
+)"));
+  CHECK(loaded.node("New").labels == Labels{{"class", "chair,seat"}});
+  CHECK(loaded.node("Old").labels == Labels{{"class", "cup,mug"}});
+}
+
+TEST_CASE("broken numbers, lists and prototypes are left out", "[loader_usd]") {
+  const TemporaryFolder folder;
+  Loaded loaded(folder.write("a.usda", R"(#usda 1.0
+def Mesh "Negative"
+{
+    point3f[] points = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]
+    int[] faceVertexCounts = [3, -1, 3]
+    int[] faceVertexIndices = [0, 1, 2, 0, 1, 2]
+}
+def Mesh "Halves"
+{
+    point3h[] points = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]
+    int[] faceVertexCounts = [3]
+    int[] faceVertexIndices = [0, 1, 2]
+    int[] holeIndices = [5, -1]
+    normal3h[] normals = [(0, 0, 1)] ( interpolation = "banana" )
+    texCoord2f[] primvars:st = [(nan, 0), (inf, 0), (0.5, 1)] ( interpolation = "vertex" )
+}
+def PointInstancer "Instancer"
+{
+    rel prototypes = [</Protos/A>, </Protos/Off>, </Protos/Gone>]
+    int[] protoIndices = [0, 1, 2, 0, 9, -1]
+    point3f[] positions = [(0, 0, 0), (1, 0, 0), (2, 0, 0), (3, 0, 0), (4, 0, 0)]
+    int64[] ids = [10, 11, 12, 13, 14, 15]
+    int64[] invisibleIds = [13]
+    quatf[] orientationsf = [(1, 0, 0, 0)]
+    float3[] scales = []
+}
+def Camera "Camera"
+{
+    float horizontalAperture = 0
+    float verticalAperture = inf
+    float focalLength = -3
+    float2 clippingRange = (nan, -1)
+    float fStop = nan
+}
+def SphereLight "Lamp"
+{
+    float inputs:radius = 0
+    float inputs:intensity = -5
+}
+class "Protos"
+{
+    def Cube "A"
+    {
+    }
+    def Cube "Off" (
+        active = false
+    )
+    {
+    }
+}
+)"));
+  CHECK(loaded.node("Negative").mesh->triangles.size() == 1);
+  const Mesh& halves = *loaded.node("Halves").mesh;
+  halves.validate("halves");
+  CHECK(halves.normals.at(0) == Vec3f::UnitZ());
+  CHECK(halves.uvs.at(0) == Vec2f::Zero());
+  CHECK(halves.uvs.at(2) == Vec2f(0.5f, 1));
+  CHECK(loaded.node("Instancer").children.size() == 1);
+  const Camera& camera = *loaded.node("Camera").camera;
+  CHECK(std::isfinite(camera.fx));
+  CHECK(camera.near_m > 0.0);
+  CHECK(camera.far_m > camera.near_m);
+  CHECK(camera.f_stop == 0.0);
+  CHECK(loaded.node("Lamp").light->color == Vec3f::Zero());
+  CHECK(loaded.node("Lamp").light->radius_m > 0.0);
 }
 
 TEST_CASE("a broken file is an asset error that begins with its name", "[loader_usd]") {
