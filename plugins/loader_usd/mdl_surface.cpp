@@ -79,7 +79,7 @@ void draft_effects(const Prim& shader, MaterialDraft& draft) {
   Material& material = draft.material();
   connect(shader, {"normalmap_texture", "Normal_Tex", "*normal"}, &Material::normal_texture,
           TextureSpace::Raw, draft);
-  unpack_normals(material.normal_texture);
+  unpack_normals(material.normal_texture, network.number(shader, "bump_factor", 1.0f));
   if (network.boolean(shader, "enable_opacity", false)) {
     connect(shader, {"opacity_texture"}, &Material::opacity_texture, TextureSpace::Raw, draft);
     material.opacity = network.number(shader, "opacity_constant", 1.0f);

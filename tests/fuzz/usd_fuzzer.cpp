@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // One input is one file of any kind: text, crate or package. Everything that it holds is read and,
-// if it is a layer, composed, measured and put into a scene. Refusing is fine; crashing, hanging
-// and running out of memory are findings.
+// if it is a layer, composed, measured and put into a scene. Refusing is fine; crashing, hanging,
+// running out of memory, and scenes with numbers that are none are findings.
 #include <stdlib.h>
 #include <unistd.h>
 
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
+#include <cstdlib>
 #include <memory>
 #include <string>
 
@@ -68,11 +69,28 @@ void visit(usd::Stage& stage, usd::Geometry& geometry, const usd::Prim& prim, st
   }
 }
 
+// Aborts where a renderer would have to mistrust the scene.
+void check(const diorama::Scene& scene) {
+  for (const diorama::NodeId id : scene.subtree(scene.root())) {
+    const diorama::Node& node = scene[id];
+    bool is_sound = node.parent_from_node.matrix().allFinite();
+    if (node.camera) is_sound &= node.camera->near_m > 0.0 && node.camera->fx > 0.0;
+    if (node.light) is_sound &= node.light->color.allFinite();
+    try {
+      if (node.mesh) node.mesh->validate(node.name);
+    } catch (const diorama::Error&) {
+      is_sound = false;
+    }
+    if (!is_sound) std::abort();
+  }
+}
+
 void translate(usd::Stage& stage) {
   diorama::test::TextureHost host;
   diorama::Scene scene;
   const diorama::NodeId root = scene.create(scene.root(), "asset");
   diorama::loader_usd::SceneTranslator(stage, host, scene).translate(root);
+  check(scene);
 }
 
 }  // namespace
