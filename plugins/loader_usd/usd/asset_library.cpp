@@ -134,6 +134,9 @@ std::shared_ptr<Layer> read_layer(const std::string& identifier, ByteView bytes)
   const std::string_view text(reinterpret_cast<const char*>(bytes.bytes.data()),
                               bytes.bytes.size());
   if (is_text_layer(text)) return read_text_layer(identifier, text);
+  if (identifier.ends_with(".mtlx")) {
+    throw FormatError(identifier + ": MaterialX documents are not read");
+  }
   throw format_error_at(identifier, "this is neither a crate, nor a package, nor a text layer",
                         std::uint64_t{0});
 }

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstring>
 #include <memory>
+#include <optional>
 
 #include "error.h"
 
@@ -55,15 +56,21 @@ class ZipBytes {
   std::span<const std::byte> bytes_;
 };
 
+// The record may be followed by a comment, in which its mark may stand again: the one whose comment
+// ends with the file comes first.
 std::uint64_t find_end_of_directory(const ZipBytes& zip, const std::string& file) {
+  std::optional<std::uint64_t> found;
   if (zip.size() >= kEndOfDirectorySize) {
     const std::uint64_t last = zip.size() - kEndOfDirectorySize;
     const std::uint64_t first = last > kMaxComment ? last - kMaxComment : 0;
     for (std::uint64_t at = last + 1; at-- > first;) {
-      if (zip.at<std::uint32_t>(at) == kEndOfDirectory) return at;
+      if (zip.at<std::uint32_t>(at) != kEndOfDirectory) continue;
+      if (at + zip.at<std::uint16_t>(at + 20) == last) return at;
+      if (!found) found = at;
     }
   }
-  throw format_error_at(file, "the package has no directory", zip.size());
+  if (!found) throw format_error_at(file, "the package has no directory", zip.size());
+  return *found;
 }
 
 }  // namespace

@@ -364,7 +364,8 @@ def Xform "A"
   CHECK(scaled == Vector3{2, 3, 4});
 }
 
-TEST_CASE("ops may have any suffix, type and axis; words that are no ops do nothing", "[geometry]") {
+TEST_CASE("ops may have any suffix, type and axis; words that are no ops do nothing",
+          "[geometry]") {
   const TemporaryFolder folder;
   Stage stage(folder.write("root.usda", kHeader + R"(
 def Xform "A"
@@ -491,6 +492,19 @@ def "Part"
   Stage stage(file);
   CHECK(number(stage, "/P") == 9.0);
   CHECK(stage.anchor(stage.find_value(*stage.find("/P"), "picture")) == file + "[wood.png]");
+  const auto changed = [&](std::size_t field, char value) {
+    std::string other = zip;
+    other[start + field] = value;
+    return folder.write("changed.usdz", other);
+  };
+  CHECK_THROWS_WITH(Stage(changed(8, 1)), ContainsSubstring("member main.usda is encrypted"));
+  CHECK_THROWS_WITH(Stage(changed(10, 12)),
+                    ContainsSubstring("member main.usda uses compression method 12"));
+  // A comment that holds the mark of the directory's end.
+  std::string commented = zip;
+  commented[zip.size() - 2] = 30;
+  commented += std::string("PK\5\6", 4) + std::string(26, 'x');
+  CHECK(Stage(folder.write("commented.usdz", commented)).find("/P"));
   CHECK_THROWS_WITH(Stage(folder.write("cut.usdz", zip.substr(0, zip.size() - 10))),
                     ContainsSubstring("cut.usdz: the package has no directory at byte offset"));
 }
