@@ -84,7 +84,7 @@ Vec3f emission(const Inputs& inputs, double fallback_intensity) {
 // Emitting area in stage units; also sets the size.
 double read_size(const std::string& type, const Inputs& inputs, double world_scale, Light& light) {
   const double area_scale = world_scale * world_scale;
-  if (type == "RectLight" || type == "PortalLight") {
+  if (type == "RectLight") {
     light.kind = LightKind::Rect;
     light.width_m = std::max(std::abs(inputs.number("width", 1.0)), kLeastRadius);
     light.height_m = std::max(std::abs(inputs.number("height", 1.0)), kLeastRadius);

@@ -380,8 +380,9 @@ void MeshAssembly::gather_attributes(bool are_of_points) {
 // Gives back what it read as soon as nothing needs it any more: big meshes decide how much memory
 // a whole scene takes.
 Mesh MeshAssembly::build() {
-  // Along seams there are several vertices per point.
-  const std::size_t vertices = last_.size() + (seams_.empty() ? 0 : last_.size() / 8);
+  // Along seams there are several vertices per point; points need not be used.
+  const std::size_t used = std::min(last_.size(), indices_.size());
+  const std::size_t vertices = used + (seams_.empty() ? 0 : used / 8);
   corner_of_.reserve(vertices);
   if (!seams_.empty()) before_.reserve(vertices);
   if (needs_faces_) face_of_.reserve(vertices);

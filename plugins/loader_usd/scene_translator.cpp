@@ -349,14 +349,22 @@ double SceneTranslator::stage_scale(const Place& place) const {
   return std::cbrt(std::abs(place.root_from_node.linear().determinant())) / meters_per_unit_;
 }
 
+// By the letter the pole of a DomeLight is +y on every stage. People who light a stage that has z up
+// mean its sky, so a dome is taken as if it stood on a stage that has y up. DomeLight_1 may say.
+bool SceneTranslator::has_z_pole(const Prim& dome) const {
+  if (dome.type_name == "DomeLight_1") {
+    const std::string pole = usd::token_or(stage_, dome, "poleAxis", "scene");
+    if (pole == "Y" || pole == "Z") return pole == "Z";
+  }
+  return stage_.is_z_up();
+}
+
 void SceneTranslator::add_light(const Prim& prim, Place& place) {
   auto light = translate_light(stage_, prim, stage_scale(place), materials_.textures());
   if (!light) return;
   for (const std::string& loss : light->losses) note(prim, "is a light whose " + loss);
   Affine turned = scene_[place.node].parent_from_node * light->prim_from_light;
-  if (light->light.kind == LightKind::Dome && stage_.is_z_up()) {
-    // By the letter the pole of a dome is +y on every stage. People who light a stage that has z up
-    // mean its sky, so a dome is taken as if it stood on a stage that has y up.
+  if (light->light.kind == LightKind::Dome && has_z_pole(prim)) {
     turned = scene_[place.node].parent_from_node * z_up_from_y_up() * light->prim_from_light;
   }
   scene_.set_pose(place.node, turned);

@@ -45,6 +45,7 @@ class SceneTranslator {
   void add_camera(const usd::Prim& prim, Place& place);
   void add_light(const usd::Prim& prim, Place& place);
   double stage_scale(const Place& place) const;
+  bool has_z_pole(const usd::Prim& dome) const;
   void add_labels(const usd::Prim& prim, NodeId node);
   void add_instances(const usd::Prim& prim, const Place& place);
   void note(const usd::Prim& prim, const std::string& what);

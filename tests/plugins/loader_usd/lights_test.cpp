@@ -138,4 +138,32 @@ def Xform "Crowd" (
   CHECK(loaded.host.warnings.size() == 6);
 }
 
+TEST_CASE("the pole of a dome is up, unless it says otherwise", "[loader_usd]") {
+  const TemporaryFolder folder;
+  LoadedStage loaded(folder.write("a.usda", kHeader + R"(
+def DomeLight "Old"
+{
+}
+def DomeLight_1 "Scene"
+{
+}
+def DomeLight_1 "Y"
+{
+    token poleAxis = "Y"
+}
+def DomeLight_1 "Z"
+{
+    token poleAxis = "Z"
+}
+)"));
+  // The top of the picture is the node's +z.
+  const auto pole = [&](const char* name) -> Vec3 {
+    return loaded.node(name).parent_from_node.linear() * Vec3::UnitZ();
+  };
+  CHECK(pole("Old").isApprox(Vec3::UnitZ()));
+  CHECK(pole("Scene").isApprox(Vec3::UnitZ()));
+  CHECK(pole("Y").isApprox(Vec3::UnitY()));
+  CHECK(pole("Z").isApprox(Vec3::UnitZ()));
+}
+
 }  // namespace diorama::loader_usd
