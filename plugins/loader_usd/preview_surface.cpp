@@ -100,33 +100,32 @@ bool connect(const Prim& shader, const std::string& name, TextureInput Material:
 
 // What the node of a picture that cannot be read stands for, if it says so.
 std::optional<std::array<float, 4>> picture_fallback(const ShaderNetwork& network,
-                                                     const Prim& shader, const std::string& name) {
-  const ShaderNetwork::Source source = network.source(shader, name);
-  if (!source.is_shader() || !is_node(network.id(*source.prim), "UsdUVTexture")) return {};
+                                                     const ShaderNetwork::Source& source) {
   std::array<float, 4> fallback{};
-  if (!read4(network, *source.prim, "fallback", fallback)) return {};
-  return fallback;
+  const bool is_said = source.is_shader() && is_node(network.id(*source.prim), "UsdUVTexture") &&
+                       read4(network, *source.prim, "fallback", fallback);
+  return is_said ? std::optional(fallback) : std::nullopt;
 }
 
 // A colour that is not textured: a number, a primvar of the mesh, or what stands in for a picture.
 Vec3f plain_color(const Prim& shader, const std::string& name, const Vec3f& otherwise,
                   const ShaderNetwork& network) {
-  if (const auto fallback = picture_fallback(network, shader, name)) {
+  const ShaderNetwork::Source source = network.source(shader, name);
+  if (const auto fallback = picture_fallback(network, source)) {
     return Vec3f((*fallback)[0], (*fallback)[1], (*fallback)[2]);
   }
-  const ShaderNetwork::Source source = network.source(shader, name);
   if (source.is_shader() && is_primvar_reader(network.id(*source.prim))) {
     return network.color(*source.prim, "fallback", Vec3f::Zero());
   }
-  return network.color(shader, name, otherwise);
+  return network.color(source, otherwise);
 }
 
 float plain_number(const Prim& shader, const char* name, float otherwise,
                    const ShaderNetwork& network) {
-  const auto fallback = picture_fallback(network, shader, name);
-  if (!fallback) return network.number(shader, name, otherwise);
-  const int channel = to_channel(network.source(shader, name).output);
-  return (*fallback)[static_cast<std::size_t>(channel)];
+  const ShaderNetwork::Source source = network.source(shader, name);
+  const auto fallback = picture_fallback(network, source);
+  if (!fallback) return network.number(source, otherwise);
+  return (*fallback)[static_cast<std::size_t>(to_channel(source.output))];
 }
 
 bool reads_display_color(const Prim& shader, const std::string& name,

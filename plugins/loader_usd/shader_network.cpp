@@ -60,9 +60,12 @@ std::string ShaderNetwork::id(const Prim& shader) const {
 }
 
 usd::FoundValue ShaderNetwork::input(const Prim& shader, const std::string& name) const {
-  const Source from = source(shader, name);
-  if (!from.prim || from.is_shader()) return {};
-  return stage_.find_value(*from.prim, from.attribute);
+  return value(source(shader, name));
+}
+
+usd::FoundValue ShaderNetwork::value(const Source& source) const {
+  if (!source.prim || source.is_shader()) return {};
+  return stage_.find_value(*source.prim, source.attribute);
 }
 
 std::string ShaderNetwork::text(const Prim& shader, const std::string& name,
@@ -72,9 +75,13 @@ std::string ShaderNetwork::text(const Prim& shader, const std::string& name,
 }
 
 float ShaderNetwork::number(const Prim& shader, const std::string& name, float fallback) const {
-  const usd::Value value = input(shader, name).value;
-  const auto number = value.as_number();
-  return number && !value.is_array() && std::isfinite(*number) ? static_cast<float>(*number)
+  return number(source(shader, name), fallback);
+}
+
+float ShaderNetwork::number(const Source& source, float fallback) const {
+  const usd::Value found = value(source).value;
+  const auto number = found.as_number();
+  return number && !found.is_array() && std::isfinite(*number) ? static_cast<float>(*number)
                                                                : fallback;
 }
 
@@ -92,7 +99,11 @@ Vec2f ShaderNetwork::pair(const Prim& shader, const std::string& name,
 
 Vec3f ShaderNetwork::color(const Prim& shader, const std::string& name,
                            const Vec3f& fallback) const {
-  const auto color = to_color(input(shader, name).value);
+  return color(source(shader, name), fallback);
+}
+
+Vec3f ShaderNetwork::color(const Source& source, const Vec3f& fallback) const {
+  const auto color = to_color(value(source).value);
   return color && color->allFinite() ? *color : fallback;
 }
 

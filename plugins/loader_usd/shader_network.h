@@ -33,12 +33,16 @@ class ShaderNetwork {
   std::string id(const usd::Prim& shader) const;
 
   usd::FoundValue input(const usd::Prim& shader, const std::string& name) const;
+  /// Nothing when the source is a shader.
+  usd::FoundValue value(const Source& source) const;
   std::string text(const usd::Prim& shader, const std::string& name,
                    const std::string& fallback) const;
   float number(const usd::Prim& shader, const std::string& name, float fallback) const;
+  float number(const Source& source, float fallback) const;
   bool boolean(const usd::Prim& shader, const std::string& name, bool fallback) const;
   Vec2f pair(const usd::Prim& shader, const std::string& name, const Vec2f& fallback) const;
   Vec3f color(const usd::Prim& shader, const std::string& name, const Vec3f& fallback) const;
+  Vec3f color(const Source& source, const Vec3f& fallback) const;
 
  private:
   usd::Stage& stage_;

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "asset_library.h"
 
+#include <algorithm>
 #include <filesystem>
+#include <vector>
 
 #include "crate_reader.h"
 #include "error.h"
@@ -36,8 +38,37 @@ std::string join_package(const std::string& identifier, const std::string& membe
   return identifier.substr(0, closing) + "[" + member + "]" + identifier.substr(closing);
 }
 
-std::string normalize(const std::filesystem::path& path) {
-  return path.lexically_normal().generic_string();
+// Without `.`, without `..` as far as there is something to go back from, and without double
+// slashes.
+std::string normalize(std::string_view path) {
+  const bool is_absolute = path.starts_with('/');
+  std::vector<std::string_view> parts;
+  for (std::size_t begin = 0; begin < path.size();) {
+    const std::size_t end = std::min(path.find('/', begin), path.size());
+    const std::string_view part = path.substr(begin, end - begin);
+    begin = end + 1;
+    if (part.empty() || part == ".") continue;
+    const bool goes_back = part == ".." && !parts.empty() && parts.back() != "..";
+    if (goes_back) {
+      parts.pop_back();
+    } else if (part != ".." || !is_absolute) {
+      parts.push_back(part);
+    }
+  }
+  std::string result;
+  for (const std::string_view part : parts) {
+    if (is_absolute || !result.empty()) result += '/';
+    result += part;
+  }
+  return result;
+}
+
+// `asset` as seen from the folder that `file` is in.
+std::string beside(std::string_view file, std::string_view asset) {
+  if (asset.starts_with('/')) return normalize(asset);
+  const std::size_t slash = file.rfind('/');
+  if (slash == std::string_view::npos) return normalize(asset);
+  return normalize(std::string(file.substr(0, slash + 1)).append(asset));
 }
 
 bool is_file_relative(std::string_view asset) {
@@ -54,20 +85,15 @@ std::string AssetLibrary::anchor(std::string_view asset, const std::string& anch
   const auto [outer, inside] = split_outer(text);
   if (!inside.empty()) return join_package(anchor(outer, anchor_layer), inside);
 
-  const std::filesystem::path path(text);
   const auto [package, member] = split_inner(anchor_layer);
-  if (member.empty() || path.is_absolute()) {
-    return normalize(std::filesystem::path(anchor_layer).parent_path() / path);
-  }
-  const std::string beside = normalize(std::filesystem::path(member).parent_path() / path);
-  const std::string anchored = join_package(package, beside);
+  if (member.empty() || text.starts_with('/')) return beside(anchor_layer, text);
+  const std::string anchored = join_package(package, beside(member, text));
   if (is_file_relative(asset) || exists(anchored)) return anchored;
   // A bare path is looked for at the top of the package as well.
-  const std::string at_top = join_package(package, normalize(path));
+  const std::string at_top = join_package(package, normalize(text));
   if (exists(at_top)) return at_top;
   // And at last beside the package.
-  const std::string outside =
-      normalize(std::filesystem::path(split_outer(anchor_layer).first).parent_path() / path);
+  const std::string outside = beside(split_outer(anchor_layer).first, text);
   return exists(outside) ? outside : anchored;
 }
 

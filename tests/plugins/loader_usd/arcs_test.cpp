@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <string>
 
+#include "loader_usd/usd/asset_library.h"
 #include "loader_usd/usd/stage.h"
 #include "plugins/loader_usd/stage_files.h"
 #include "support/catch.h"
@@ -200,6 +201,21 @@ def "A" (
   CHECK(x_of(stage, "/A/Left/Foot") == 1);
   CHECK(stage.find("/A/Left")->is_instance);
   CHECK(stage.find("/A/Left/Foot")->is_instance_proxy);
+}
+
+TEST_CASE("assets stand where the layer that names them stands", "[specification]") {
+  const AssetLibrary library;
+  const auto anchor = [&](const char* asset) { return library.anchor(asset, "/room/layer.usda"); };
+  CHECK(anchor("b.png") == "/room/b.png");
+  CHECK(anchor("./b.png") == "/room/b.png");
+  CHECK(anchor("../b.png") == "/b.png");
+  CHECK(anchor("../../b.png") == "/b.png");
+  CHECK(anchor("a/./c//../b.png") == "/room/a/b.png");
+  CHECK(anchor("/else/../b.png") == "/b.png");
+  CHECK(anchor("https://a/../b.png") == "https://a/../b.png");
+  CHECK(anchor("p.usdz[t/b.png]") == "/room/p.usdz[t/b.png]");
+  CHECK(anchor("").empty());
+  CHECK(library.anchor("../b.png", "/p.usdz[a/c/l.usda]") == "/p.usdz[a/b.png]");
 }
 
 }  // namespace diorama::usd
