@@ -23,10 +23,9 @@ std::string lower(std::string text) {
 bool connect(const Prim& shader, std::initializer_list<const char*> names,
              TextureInput Material::*target, TextureSpace space, MaterialDraft& draft) {
   const ShaderNetwork& network = draft.network();
-  const usd::Strings properties = network.stage().property_names(shader);
+  const usd::Strings properties = network.stage().property_names(shader, kInputs);
   for (const char* wanted : names) {
     for (const std::string& property : properties) {
-      if (!property.starts_with(kInputs)) continue;
       const std::string name = property.substr(kInputs.size());
       const bool fits =
           name == wanted || (wanted[0] == '*' && lower(name).find(wanted + 1) != std::string::npos);

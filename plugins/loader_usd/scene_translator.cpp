@@ -349,8 +349,8 @@ double SceneTranslator::stage_scale(const Place& place) const {
   return std::cbrt(std::abs(place.root_from_node.linear().determinant())) / meters_per_unit_;
 }
 
-// By the letter the pole of a DomeLight is +y on every stage. People who light a stage that has z up
-// mean its sky, so a dome is taken as if it stood on a stage that has y up. DomeLight_1 may say.
+// By the letter the pole of a DomeLight is +y on every stage. People who light a stage that has z
+// up mean its sky, so a dome is taken as if it stood on a stage that has y up. DomeLight_1 may say.
 bool SceneTranslator::has_z_pole(const Prim& dome) const {
   if (dome.type_name == "DomeLight_1") {
     const std::string pole = usd::token_or(stage_, dome, "poleAxis", "scene");
@@ -385,7 +385,7 @@ void SceneTranslator::add_labels(const Prim& prim, NodeId node) {
     const bool is_known = std::find(labels.begin(), labels.end(), label) != labels.end();
     if (!label.empty() && !is_known) labels.push_back(label);
   };
-  for (const std::string& name : stage_.property_names(prim)) {
+  for (const std::string& name : stage_.property_names(prim, "semantic")) {
     if (name.starts_with(kNew)) {
       const usd::Value value = stage_.value(prim, name);
       if (!value.as_strings()) continue;

@@ -3,7 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <iterator>
+#include <utility>
 
 #include "path.h"
 
@@ -213,11 +214,9 @@ std::string Geometry::material_by(const Prim& prim, const std::string& relations
     const Strings direct = stage_.targets(*at, relationship);
     if (direct.size() == 1) consider(*at, relationship, direct.front(), false);
     const bool is_bound_here = bound != before;
-    for (const std::string& name : stage_.property_names(*at)) {
+    for (const std::string& name : stage_.property_names(*at, collection_prefix)) {
       // `material:binding:collection:NAME`; one more part would name a purpose.
-      const bool is_plain = name.starts_with(collection_prefix) &&
-                            name.find(':', collection_prefix.size()) == std::string::npos;
-      if (!is_plain) continue;
+      if (name.find(':', collection_prefix.size()) != std::string::npos) continue;
       const Strings pair = stage_.targets(*at, name);
       if (pair.size() != 2) continue;
       const bool first_is_collection = !path::property_part(pair[0]).empty();
@@ -231,27 +230,48 @@ std::string Geometry::material_by(const Prim& prim, const std::string& relations
   return material && material->type_name == "Material" ? bound : std::string();
 }
 
-std::vector<Primvar> Geometry::primvars(const Prim& prim) {
+std::vector<Primvar> Geometry::own_primvars(const Prim& prim) const {
   constexpr std::string_view kPrefix = "primvars:";
-  std::map<std::string, Primvar> found;
-  for (const Prim* at = &prim; at; at = at->parent) {
-    for (const std::string& property : stage_.property_names(*at)) {
-      if (!property.starts_with(kPrefix) || property.ends_with(":indices")) continue;
-      Primvar primvar;
-      primvar.name = property.substr(kPrefix.size());
-      primvar.owner = at;
-      primvar.type = stage_.attribute_type(*at, property);
-      const Value interpolation = stage_.property_metadata(*at, property, "interpolation");
-      primvar.interpolation = interpolation.as_text() ? *interpolation.as_text() : "constant";
-      primvar.is_indexed = stage_.has_authored_value(*at, property + ":indices");
-      const bool is_inherited = at == &prim || (primvar.interpolation == "constant" &&
-                                                stage_.has_authored_value(*at, property));
-      if (is_inherited && !primvar.type.empty()) found.emplace(primvar.name, std::move(primvar));
-    }
-  }
   std::vector<Primvar> result;
-  for (auto& [name, primvar] : found) result.push_back(std::move(primvar));
+  for (const std::string& property : stage_.property_names(prim, kPrefix)) {
+    if (property.ends_with(":indices")) continue;
+    Primvar primvar;
+    primvar.name = property.substr(kPrefix.size());
+    primvar.owner = &prim;
+    primvar.type = stage_.attribute_type(prim, property);
+    if (primvar.type.empty()) continue;
+    const Value interpolation = stage_.property_metadata(prim, property, "interpolation");
+    primvar.interpolation = interpolation.as_text() ? *interpolation.as_text() : "constant";
+    primvar.is_indexed = stage_.has_authored_value(prim, property + ":indices");
+    result.push_back(std::move(primvar));
+  }
   return result;
+}
+
+// Both sorted by name; of the same name the first list's is taken.
+std::vector<Primvar> Geometry::merge(std::vector<Primvar> near, const std::vector<Primvar>& far) {
+  const auto is_before = [](const Primvar& a, const Primvar& b) { return a.name < b.name; };
+  std::vector<Primvar> result;
+  std::set_union(std::make_move_iterator(near.begin()), std::make_move_iterator(near.end()),
+                 far.begin(), far.end(), std::back_inserter(result), is_before);
+  return result;
+}
+
+const std::vector<Primvar>& Geometry::inherited_primvars(const Prim* parent) {
+  static const std::vector<Primvar> kNone;
+  if (!parent) return kNone;
+  if (const auto known = inherited_.find(parent); known != inherited_.end()) return known->second;
+  std::vector<Primvar> own = own_primvars(*parent);
+  std::erase_if(own, [&](const Primvar& primvar) {
+    return primvar.interpolation != "constant" ||
+           !stage_.has_authored_value(*parent, "primvars:" + primvar.name);
+  });
+  std::vector<Primvar> all = merge(std::move(own), inherited_primvars(parent->parent));
+  return inherited_.emplace(parent, std::move(all)).first->second;
+}
+
+std::vector<Primvar> Geometry::primvars(const Prim& prim) {
+  return merge(own_primvars(prim), inherited_primvars(prim.parent));
 }
 
 }  // namespace diorama::usd

@@ -50,9 +50,14 @@ class Geometry {
   std::string material_by(const Prim& prim, const std::string& relationship,
                           const std::string& collection_prefix);
   bool collection_includes(const std::string& collection, const std::string& path, int nesting);
+  std::vector<Primvar> own_primvars(const Prim& prim) const;
+  /// What the prims below `parent` inherit from it and from its ancestors.
+  const std::vector<Primvar>& inherited_primvars(const Prim* parent);
+  static std::vector<Primvar> merge(std::vector<Primvar> near, const std::vector<Primvar>& far);
 
   Stage& stage_;
   std::unordered_map<const Prim*, Matrix> worlds_;
+  std::unordered_map<const Prim*, std::vector<Primvar>> inherited_;
 };
 
 /// A number of a schema: authored or, if not, the schema's fallback.

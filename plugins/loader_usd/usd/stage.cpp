@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <set>
 
 #include "error.h"
 #include "path.h"
@@ -184,12 +183,16 @@ bool Stage::has_property(const Prim& prim, std::string_view name) const {
   return found;
 }
 
-Strings Stage::property_names(const Prim& prim) const {
-  std::set<std::string_view> names;
+Strings Stage::property_names(const Prim& prim, std::string_view prefix) const {
+  std::vector<std::string_view> names;
   for_each_spec(prim, [&](const IndexNode&, const LayerStack::Entry&, const PrimSpec& spec) {
-    for (const PropertySpec& property : spec.properties) names.insert(property.name);
+    for (const PropertySpec& property : spec.properties) {
+      if (property.name.starts_with(prefix)) names.push_back(property.name);
+    }
     return true;
   });
+  std::sort(names.begin(), names.end());
+  names.erase(std::unique(names.begin(), names.end()), names.end());
   return Strings(names.begin(), names.end());
 }
 

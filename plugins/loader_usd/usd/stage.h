@@ -91,8 +91,8 @@ class Stage {
   Strings metadata_list(const Prim& prim, std::string_view field) const;
 
   bool has_property(const Prim& prim, std::string_view name) const;
-  /// Names of all authored properties, sorted.
-  Strings property_names(const Prim& prim) const;
+  /// Names of all authored properties that begin with `prefix`, sorted.
+  Strings property_names(const Prim& prim, std::string_view prefix = {}) const;
   Value property_metadata(const Prim& prim, std::string_view name, std::string_view field) const;
   /// The type, `float3[]`: the schema's for attributes that it defines, else the authored one;
   /// empty if there is no such attribute.
