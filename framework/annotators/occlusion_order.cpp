@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "framework/annotators/visibility.h"
+
 namespace diorama {
 namespace {
 
@@ -37,24 +39,19 @@ Order order_of(const CoverageMask& a, std::uint32_t a_id, const CoverageMask& b,
   return order;
 }
 
-void check(std::span<const CoverageMask> coverage, const Frame& frame) {
-  const auto fail = [&](const std::string& text) {
-    throw Error(ErrorKind::Internal, frame.camera_path + ": " + text);
-  };
-  if (coverage.size() != frame.instances.size()) {
-    fail(std::to_string(coverage.size()) + " coverage masks for " +
-         std::to_string(frame.instances.size()) + " instances");
-  }
+void check_distances(std::span<const CoverageMask> coverage, const Frame& frame) {
   for (std::size_t i = 0; i < coverage.size(); ++i) {
     if (coverage[i].distances.size() == coverage[i].bits.size()) continue;
-    fail("the coverage mask of " + frame.instances[i].node_path + " has no distances");
+    throw Error(ErrorKind::Internal, frame.camera_path + ": the coverage mask of " +
+                                         frame.instances[i].node_path + " has no distances");
   }
 }
 
 }  // namespace
 
 void order_occlusions(std::span<const CoverageMask> coverage, Frame& frame) {
-  check(coverage, frame);
+  check_coverage(coverage, frame);
+  check_distances(coverage, frame);
   const Image<std::uint32_t>& ids = frame.get(kInstanceId);
   const std::vector<Instance>& instances = frame.instances;
   std::vector<std::vector<Occlusion>> behind(instances.size());

@@ -49,7 +49,9 @@ Visibility measure(const CoverageMask& mask, int image_width, int image_height) 
   return visibility;
 }
 
-void check(std::span<const CoverageMask> coverage, const Frame& frame) {
+}  // namespace
+
+void check_coverage(std::span<const CoverageMask> coverage, const Frame& frame) {
   if (coverage.size() != frame.instances.size()) {
     throw Error(ErrorKind::Internal, frame.camera_path + ": " + std::to_string(coverage.size()) +
                                          " coverage masks for " +
@@ -67,10 +69,8 @@ void check(std::span<const CoverageMask> coverage, const Frame& frame) {
   }
 }
 
-}  // namespace
-
 void measure_visibility(std::span<const CoverageMask> coverage, bool keep_masks, Frame& frame) {
-  check(coverage, frame);
+  check_coverage(coverage, frame);
   const auto& ids = frame.get(kInstanceId);
   const std::map<std::uint32_t, std::int64_t> visible_pixels = count_pixels(ids);
   for (std::size_t i = 0; i < coverage.size(); ++i) {

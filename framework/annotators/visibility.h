@@ -11,7 +11,10 @@ namespace diorama {
 /// after the annotators `instance_ids` and `instances`. `coverage` is what Renderer::cover() gives
 /// for labelled_instances(), which has the order of Frame::instances. With `keep_masks` the masks
 /// stay in Visibility::amodal_mask, cropped to what lies inside the image.
-/// Throws Error(Internal) when the counts differ or a mask does not fill its box.
+/// Throws what check_coverage() throws.
 void measure_visibility(std::span<const CoverageMask> coverage, bool keep_masks, Frame& frame);
+
+/// Throws Error(Internal) unless there is one mask per instance and each fills its box.
+void check_coverage(std::span<const CoverageMask> coverage, const Frame& frame);
 
 }  // namespace diorama

@@ -8,14 +8,12 @@
 namespace diorama::conformance {
 namespace {
 
-const NameSet kAnnotations{"instances", "visibility", "amodal_mask", "occlusion_order"};
-
 std::string annotated(const Subject& subject, const Scene& scene, Host& host) {
   const auto annotator = subject.make<Annotator>(host);
   Frame frame = painted_frame(scene, cameras_of(scene).front(), host);
   annotator->annotate(scene, frame);
   for (const std::string& name : annotator->provides()) {
-    require(frame.has(name) || kAnnotations.contains(name),
+    require(frame.has(name) || painted_annotations().contains(name),
             "provides '" + name + "', but the channel is not there afterwards");
   }
   return fingerprint(frame);
@@ -26,7 +24,7 @@ std::string foreign_need(const Annotator& annotator, Host& host) {
   const Scene scene = sample_scene();
   const Frame frame = painted_frame(scene, cameras_of(scene).front(), host);
   for (const std::string& name : annotator.needs()) {
-    if (!frame.has(name) && !kAnnotations.contains(name)) return name;
+    if (!frame.has(name) && !painted_annotations().contains(name)) return name;
   }
   return {};
 }

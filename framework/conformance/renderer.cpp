@@ -61,12 +61,12 @@ void check_coverage(Renderer& renderer, const Scene& scene, const Frame& frame, 
   const std::vector<CoverageMask> masks = renderer.cover(camera, instances, true);
   const Image<std::uint32_t>& leaves = frame.get(kLeafId);
   for (std::size_t i = 0; i < instances.size(); ++i) {
+    const std::string path = scene.path(instances[i].node);
     for (int y = 0; y < leaves.height(); ++y) {
       for (int x = 0; x < leaves.width(); ++x) {
         const auto& own = instances[i].leaves;
         const bool is_own = std::ranges::find(own, NodeId{leaves.at(x, y)}) != own.end();
         if (!is_own) continue;
-        const std::string path = scene.path(instances[i].node);
         require(masks[i].covers(x, y), path + " is seen where cover() says it is not");
         if (!frame.has(kDistanceToCamera.name)) continue;
         const float seen = frame.get(kDistanceToCamera).at(x, y);

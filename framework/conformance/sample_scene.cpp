@@ -261,6 +261,11 @@ Frame painted_frame(const Scene& scene, NodeId camera, Host& host) {
   return frame;
 }
 
+const NameSet& painted_annotations() {
+  static const NameSet names{"instances", "visibility", "amodal_mask", "occlusion_order"};
+  return names;
+}
+
 std::vector<Capture> sample_captures(int count, Host& host) {
   std::vector<Capture> captures;
   for (int index = 0; index < count; ++index) {

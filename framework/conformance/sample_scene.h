@@ -26,6 +26,9 @@ std::vector<NodeId> cameras_of(const Scene& scene);
 /// all annotations are filled.
 Frame painted_frame(const Scene& scene, NodeId camera, Host& host);
 
+/// Names of the annotations that painted_frame() fills beside its channels.
+const NameSet& painted_annotations();
+
 /// Painted captures 0 to `count` - 1 of the sample scene, in two visits.
 std::vector<Capture> sample_captures(int count, Host& host);
 

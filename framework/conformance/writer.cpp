@@ -99,9 +99,8 @@ Dataset write_on_two_threads(Writer& writer, const std::vector<Capture>& capture
 
 /// The first name it needs that no frame of the checks has: a channel of another plugin.
 std::string foreign_need(const Writer& writer, const Frame& frame) {
-  const NameSet annotations{"instances", "visibility", "amodal_mask", "occlusion_order"};
   for (const std::string& name : writer.needs()) {
-    if (!frame.has(name) && !annotations.contains(name)) return name;
+    if (!frame.has(name) && !painted_annotations().contains(name)) return name;
   }
   return {};
 }

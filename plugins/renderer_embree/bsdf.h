@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "albedo_tables.h"
 #include "microfacet.h"
@@ -294,7 +293,7 @@ inline BsdfValue Bsdf::evaluate(const Vec3f& wi) const {
   const float eta = s_.is_inside ? 1.0f / s_.glass->eta() : s_.glass->eta();
   const float f = fresnel_dielectric(wo_.z(), eta);
   BsdfSample sample;
-  sample.density = std::numeric_limits<float>::infinity();
+  sample.density = kInfinite;
   const float scale = glass_ / p_glass_;
   if (choice < f) {
     sample.wi = {-wo_.x(), -wo_.y(), wo_.z()};

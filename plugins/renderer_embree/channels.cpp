@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <optional>
 #include <vector>
 
@@ -15,16 +14,13 @@
 namespace diorama {
 namespace {
 
-/// Distance where nothing was met.
-constexpr float kMiss = std::numeric_limits<float>::infinity();
-
 /// The wanted channels of one frame, filled pixel by pixel.
 class ChannelImages {
  public:
   ChannelImages(const NameSet& wanted, const View& view)
       : view_(view),
-        distance_(image(wanted, kDistanceToCamera, kMiss)),
-        depth_(image(wanted, kDistanceToImagePlane, kMiss)),
+        distance_(image(wanted, kDistanceToCamera, kInfinite)),
+        depth_(image(wanted, kDistanceToImagePlane, kInfinite)),
         normals_(image(wanted, kNormals, Vec3f(Vec3f::Zero()))),
         leaves_(image(wanted, kLeafId, 0u)),
         positions_(image(wanted, kPosition, Vec3f(Vec3f::Zero()))),
@@ -146,8 +142,8 @@ CoverageMask traced(const RenderScene& meshes, const View& view, const OwnMeshes
     for (int x = box.x_min; x < box.x_max; ++x) {
       const auto ray = view.ray(Vec2(x + 0.5, y + 0.5));
       const float distance =
-          ray ? part.distance(ray->origin, ray->direction, ray->t_min, ray->t_max) : kMiss;
-      mask.bits.push_back(distance < kMiss);
+          ray ? part.distance(ray->origin, ray->direction, ray->t_min, ray->t_max) : kInfinite;
+      mask.bits.push_back(distance < kInfinite);
       if (with_distances) mask.distances.push_back(distance);
     }
   }

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <limits>
 #include <span>
 #include <vector>
 
@@ -21,7 +20,7 @@ struct SeenPixel {
   static constexpr std::uint32_t kNothing = 0xFFFFFFFFu;
 
   std::uint32_t mesh = kNothing;  ///< Number in RenderScene::instances().
-  float distance = std::numeric_limits<float>::infinity();
+  float distance = kInfinite;
   bool is_hit() const { return mesh != kNothing; }
 };
 

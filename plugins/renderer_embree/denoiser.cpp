@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <vector>
 
 #include "pixel_layers.h"
@@ -29,7 +28,6 @@ constexpr float kMixedTolerance = 100.0f;
 constexpr float kLonely = 0.35f;
 constexpr float kWitnesses = 10.0f;  // averaged pixels near a lonely one that make it suspect
 constexpr float kLeeway = 2.0f;      // by which it may leave their range
-constexpr float kInfinite = std::numeric_limits<float>::infinity();
 
 constexpr int kBlock = 16;             // pixels of a square whose light is summed up
 constexpr float kMostReturned = 1.5f;  // of the light that is left

@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <functional>
-#include <limits>
 #include <memory>
 #include <vector>
 
@@ -200,7 +199,7 @@ void Lights::along_ray(const Vec3f& from, const Vec3f& direction, float t_max, b
     const float off2 = (to - along * direction).squaredNorm();
     if (off2 < light.radius * light.radius && along + light.radius > 0.0f) report(index);
   }
-  if (t_max == std::numeric_limits<float>::infinity()) {
+  if (t_max == kInfinite) {
     for (const std::uint32_t index : surroundings_) report(index);
   }
 }
@@ -359,11 +358,11 @@ inline LightSample Lights::sample_flat(const Record& light, const Vec3f& from, c
 
 inline LightSample Lights::sample_distant(const Record& light, const Vec2f& u) {
   LightSample s;
-  s.distance = std::numeric_limits<float>::infinity();
+  s.distance = kInfinite;
   s.radiance = light.radiance;
   if (light.one_minus_cos <= 0.0f) {
     s.direction = -light.direction;
-    s.density = std::numeric_limits<float>::infinity();
+    s.density = kInfinite;
     return s;
   }
   const Vec3f local = uniform_cone(u, light.one_minus_cos);
@@ -378,7 +377,7 @@ inline LightSample Lights::sample_distant(const Record& light, const Vec2f& u) {
   if (choice.probability <= 0.0f) return {};
   const DomeTexture::Draw draw = light.texture->sample(choice.patch, {choice.rest, u.y()});
   LightSample s;
-  s.distance = std::numeric_limits<float>::infinity();
+  s.distance = kInfinite;
   s.direction = unit(light.dome_from_world.transpose() * draw.direction);
   s.density = draw.density * choice.probability;
   s.barycentric = draw.place;

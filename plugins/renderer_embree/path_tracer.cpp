@@ -8,7 +8,6 @@
 namespace diorama {
 namespace {
 
-constexpr float kInfinite = std::numeric_limits<float>::infinity();
 constexpr int kMaxPassages = 64;  // straight through cut-outs and panes
 constexpr float kMirrorSpread = 0.05f;
 // Of paths as bright as behind their first surface. Between 0.7 and 1.5 the error for equal time is
@@ -113,6 +112,10 @@ struct PathTracer::Path {
   float spread = 0.0f;      ///< Its growth per metre.
   float time = kMoment;     ///< Share of the shutter's window.
 
+  /// Whether what it meets next is softened, as only caustics would show the difference.
+  bool is_soft(const TraceSettings& settings) const {
+    return has_scattered && !settings.has_caustics;
+  }
   void go(const Vec3f& from, const Vec3f& towards) {
     origin = from;
     direction = towards;
@@ -406,7 +409,7 @@ inline void PathTracer::meet(Paths paths, Vertices& v) const {
 inline bool PathTracer::dress(Vertices& v, std::size_t i) const {
   Path& path = *v.paths[i];
   const ShadingMaterial& material = *v.material[i];
-  const bool is_soft = path.has_scattered && !settings_.has_caustics;
+  const bool is_soft = path.is_soft(settings_);
   v.bsdf[i] = is_soft ? &material.soft : &material.sharp;
   const bool has_colors = !path.hit.instance->mesh->colors.empty();
   if (!material.is_special && !has_colors) return true;
@@ -437,7 +440,7 @@ inline void PathTracer::draw_numbers(Vertices& v) const {
     Path& path = *v.paths[i];
     keys[i] = std::int32_t(path.sampler.take(Vertices::kPairs));
     places[i] = std::int32_t(path.sampler.place());
-    const bool is_soft = path.has_scattered && !settings_.has_caustics;
+    const bool is_soft = path.is_soft(settings_);
     wishes.is_two_sided[i] = !is_soft && v.bsdf[i]->glass_share() > 0.0f;
   }
   for (std::uint32_t k = 0; k < Vertices::kPairs; ++k) {
@@ -546,7 +549,7 @@ inline void PathTracer::collect_lights(Path& path, float t_max) const {
   path.is_over = surface.flat_normal.dot(reflection) <= 0.0f;
   path.go(leave(surface, reflection), unit(reflection));
   path.last_density = kInfinite;
-  path.hides_lights = path.has_scattered && !settings_.has_caustics;
+  path.hides_lights = path.is_soft(settings_);
   path.since_last = 0.0f;
   path.is_camera_ray = false;
   ++path.bounce;
@@ -603,7 +606,7 @@ inline void PathTracer::sample_light(const Vertices& v, std::size_t i, const Bsd
 
 inline void PathTracer::scatter(const Vertices& v, std::size_t i) const {
   Path& path = *v.paths[i];
-  const bool is_soft = path.has_scattered && !settings_.has_caustics;
+  const bool is_soft = path.is_soft(settings_);
   const SurfaceBsdf& s = *v.bsdf[i];
   const Bsdf bsdf(s, v.to_viewer.at(i));
 
@@ -648,8 +651,8 @@ inline void PathTracer::scatter(const Vertices& v, std::size_t i) const {
   ++path.bounce;
   path.last_density = next.density;
   path.since_last = 0.0f;
-  path.hides_lights = path.has_scattered && !settings_.has_caustics &&
-                      (std::isinf(next.density) || (next.is_transmitted && is_soft));
+  path.hides_lights =
+      path.is_soft(settings_) && (std::isinf(next.density) || (next.is_transmitted && is_soft));
   path.spread = std::max(path.spread, next.spread);
   path.go(v.leave(i, direction), direction);
 }

@@ -3,15 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "diorama/error.h"
 #include "stopwatch.h"
 
 namespace diorama {
 namespace {
-
-constexpr float kInfinite = std::numeric_limits<float>::infinity();
 
 std::string device_options(const std::string& isa, int threads) {
   return "threads=" + std::to_string(std::max(1, threads)) + ",start_threads=0,isa=" + isa;
@@ -495,7 +492,7 @@ float RenderScene::Part::distance(const Vec3f& origin, const Vec3f& direction, f
   embree::init(context);
   embree::intersect(scene_, context, ray);
   const bool is_met = ray.hit.geomID != RTC_INVALID_GEOMETRY_ID;
-  return is_met ? ray.ray.tfar : std::numeric_limits<float>::infinity();
+  return is_met ? ray.ray.tfar : kInfinite;
 }
 
 }  // namespace diorama

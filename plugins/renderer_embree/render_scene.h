@@ -15,6 +15,7 @@
 #include "isa.h"
 #include "lights.h"
 #include "rigid_motion.h"
+#include "sampling.h"
 #include "shading_material.h"
 #include "shading_mesh.h"
 
@@ -69,7 +70,7 @@ struct RayHit {
   std::uint32_t triangle = 0;
   float u = 0.0f;
   float v = 0.0f;
-  float distance = std::numeric_limits<float>::infinity();
+  float distance = kInfinite;
   float time = kMoment;          ///< Share of the shutter's window.
   Vec3f normal = Vec3f::Zero();  ///< Of the triangle, as long as twice its area.
   explicit operator bool() const { return instance != nullptr; }
@@ -310,7 +311,7 @@ inline Vec3f RenderScene::transmittance(RTCScene scene, const Vec3f& origin, con
   shadow.passes_glass = passes_glass;
   embree::init(shadow.context);
   embree::occluded(scene, shadow.context, ray.ray);
-  const bool is_hidden = ray.ray.tfar == -std::numeric_limits<float>::infinity();
+  const bool is_hidden = ray.ray.tfar == -kInfinite;
   return is_hidden ? Vec3f(Vec3f::Zero()) : kept;
 }
 
@@ -371,7 +372,7 @@ inline void RenderScene::transmittance(RayBundle& bundle, bool passes_glass, Vec
   embree::init(shadow.context);
   embree::occluded(bundle.valid_.data(), scene_over_time(), shadow.context, bundle.rays_.ray);
   for (int i = 0; i < bundle.count_; ++i) {
-    const bool is_hidden = bundle.rays_.ray.tfar[i] == -std::numeric_limits<float>::infinity();
+    const bool is_hidden = bundle.rays_.ray.tfar[i] == -kInfinite;
     if (is_hidden) kept[i].setZero();
   }
 }

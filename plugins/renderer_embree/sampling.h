@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "diorama/math.h"
@@ -12,6 +13,7 @@
 namespace diorama {
 
 inline constexpr float kPiF = std::numbers::pi_v<float>;
+inline constexpr float kInfinite = std::numeric_limits<float>::infinity();
 
 inline float luminance(const Vec3f& rgb) {
   return 0.2126f * rgb.x() + 0.7152f * rgb.y() + 0.0722f * rgb.z();
