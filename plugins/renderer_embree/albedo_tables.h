@@ -66,6 +66,7 @@ class LayerTable {
   /// The table at one roughness.
   class Row {
    public:
+    explicit operator bool() const { return low_ != nullptr; }
     Node at(float cos_theta) const {
       const float x = std::sqrt(std::max(0.0f, cos_theta)) * float(kNodes - 1);
       const int i = std::min(int(x), kNodes - 2);

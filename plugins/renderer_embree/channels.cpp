@@ -225,7 +225,7 @@ Image<SeenPixel> fill_channels(Frame& frame, const NameSet& wanted, const Render
         rays[count++] = *ray;
       }
       if (count == 0) continue;
-      meshes.intersect_now(bundle, hits.data());
+      meshes.intersect_now(bundle, [&](int i) -> RayHit& { return hits[std::size_t(i)]; });
       for (std::size_t i = 0; i < count; ++i) {
         if (!hits[i]) continue;
         seen.at(columns[i], y) = {hits[i].geometry, hits[i].distance};

@@ -62,19 +62,27 @@ class DomeTexture {
   float patch_power(int patch) const { return patch_power_[std::size_t(patch)]; }
 
   struct Draw {
-    Vec3f direction;
     Vec2f place;           ///< In the image.
-    float density = 0.0f;  ///< Per solid angle, given the patch.
+    float density = 0.0f;  ///< Over the patch's square.
   };
   Draw sample(int patch, const Vec2f& u) const;
 
+  struct Towards {
+    Vec3f direction;
+    float per_solid_angle = 0.0f;  ///< Factor of a density over a patch's square.
+  };
+  /// A place of the image, seen from inside.
+  static Towards towards(const Vec2f& place);
+
   struct Place {
     int patch = 0;
-    float density = 0.0f;  ///< As in Draw.
+    float density = 0.0f;  ///< Per solid angle, given the patch.
     Vec3f radiance = Vec3f::Zero();
   };
   Place place(const Vec3f& direction) const;
 
+  /// Starts to fetch what radiance_at() will read.
+  void prefetch(const Vec2f& place) const { image_.prefetch({place.x(), 1.0f - place.y()}); }
   /// (0, 0) is the top left of the image.
   Vec3f radiance_at(const Vec2f& p) const {
     const Rgba value = image_.lookup({p.x(), 1.0f - p.y()}, 0.0f, Wrap::Repeat, Wrap::Clamp);
@@ -82,9 +90,9 @@ class DomeTexture {
   }
 
  private:
-  /// Per solid angle, of a density over the patch's square; finite at the poles.
-  static float per_solid_angle(float density, float sine) {
-    return density * float(kPatches) / (2.0f * kPiF * kPiF * std::max(1e-4f, sine));
+  /// See Towards; finite at the poles.
+  static float per_solid_angle(float sine) {
+    return float(kPatches) / (2.0f * kPiF * kPiF * std::max(1e-4f, sine));
   }
 
   MipTexture image_;
@@ -102,14 +110,17 @@ inline SquareDistribution::Draw SquareDistribution::sample(const Vec2f& u) const
 
 inline DomeTexture::Draw DomeTexture::sample(int patch, const Vec2f& u) const {
   const SquareDistribution::Draw draw = patches_[std::size_t(patch)].sample(u);
-  const Vec2f p((float(patch % kColumns) + draw.point.x()) / float(kColumns),
-                (float(patch / kColumns) + draw.point.y()) / float(kRows));
-  const Vec2f height = unit_circle(0.5f * p.y());
-  const Vec2f around = unit_circle(p.x());
+  return {{(float(patch % kColumns) + draw.point.x()) / float(kColumns),
+           (float(patch / kColumns) + draw.point.y()) / float(kRows)},
+          draw.density};
+}
+
+inline DomeTexture::Towards DomeTexture::towards(const Vec2f& place) {
+  const Vec2f height = unit_circle(0.5f * place.y());
+  const Vec2f around = unit_circle(place.x());
   const float sine = height.y();
   // The image's centre column lies at +x, its right half towards -y.
-  return {
-      {-sine * around.x(), sine * around.y(), height.x()}, p, per_solid_angle(draw.density, sine)};
+  return {{-sine * around.x(), sine * around.y(), height.x()}, per_solid_angle(sine)};
 }
 
 inline DomeTexture::Place DomeTexture::place(const Vec3f& d) const {
@@ -121,7 +132,7 @@ inline DomeTexture::Place DomeTexture::place(const Vec3f& d) const {
   const int patch = row * kColumns + column;
   const Vec2f within(p.x() * float(kColumns) - float(column), p.y() * float(kRows) - float(row));
   const float sine = std::sqrt(std::max(0.0f, 1.0f - d.z() * d.z()));
-  return {patch, per_solid_angle(patches_[std::size_t(patch)].density(within), sine),
+  return {patch, patches_[std::size_t(patch)].density(within) * per_solid_angle(sine),
           radiance_at(p)};
 }
 

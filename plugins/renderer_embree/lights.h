@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -28,25 +29,55 @@ struct EmittingTriangles {
   Vec3f mean_radiance = Vec3f::Zero();
 };
 
-struct LightSample {
-  Vec3f direction = Vec3f::Zero();  ///< Unit, from the receiver.
-  float distance = 0.0f;            ///< Infinite for dome and distant lights.
-  /// Radiance arriving. Of a dome: see radiance_of(); of emitting triangles: to be read off the
-  /// surface (`triangle`, `barycentric`).
-  Vec3f radiance = Vec3f::Zero();
-  /// Per solid angle, without the choice of the light. Infinite: `radiance` is an irradiance, and
-  /// no other technique can find the light.
-  float density = 0.0f;
-  std::uint32_t geometry = 0;
-  std::uint32_t triangle = 0;
-  Vec2f barycentric = Vec2f::Zero();  ///< Or the place in a dome's image.
-  bool is_surface = false;
+/// Where a light, or a texture on it, is sampled.
+struct LightPlace {
+  std::uint32_t light = 0;
+  std::uint32_t triangle = 0;   ///< Of emitting triangles, in their mesh.
+  Vec2f place = Vec2f::Zero();  ///< In a dome's image, or barycentric in the triangle.
 };
 
 /// All that emits. A light is chosen in proportion to its unshadowed contribution (estimated), so
 /// that one shadow ray per vertex goes where it matters. Filled by add(), made ready by finish().
 /// What render kernels call is inline: it is compiled into each of them.
 class Lights {
+  enum class Shape : std::uint8_t { Sphere, TurningDisk, Rect, Disk, Distant, Dome, Triangles };
+  static constexpr std::size_t kShapes = 7;
+  struct Record {
+    Shape shape = Shape::Sphere;
+    Vec3f position = Vec3f::Zero();
+    Vec3f axis_x = Vec3f::UnitX();  ///< Half extents of rect and disk.
+    Vec3f axis_y = Vec3f::UnitY();
+    Vec3f direction = -Vec3f::UnitZ();  ///< Unit, that it shines along.
+    float radius = 0.0f;                ///< Of the sphere, or of a sphere around the body.
+    float area = 0.0f;
+    Vec3f radiance = Vec3f::Zero();  ///< Irradiance for a distant light of zero size.
+    float power = 0.0f;              ///< Luminous weight in scores.
+    float one_minus_cos = 0.0f;      ///< Distant: of its angular radius.
+    float cos_outer = -2.0f;         ///< Cone; below -1: none.
+    float cos_inner = -2.0f;
+    bool is_double_sided = true;
+    bool is_mirrored = false;
+    bool is_visible_to_camera = true;
+    Eigen::Matrix3f dome_from_world = Eigen::Matrix3f::Identity();
+    std::shared_ptr<const DomeTexture> texture;
+    std::shared_ptr<const SkyGrid> sky;
+    std::uint32_t geometry = 0;
+    std::vector<EmittingTriangles::Triangle> triangles;
+    std::vector<float> cumulative_area;
+  };
+
+  /// The places of a batch that ask for lights of one kind.
+  struct Asked {
+    std::size_t count = 0;
+    std::array<std::uint8_t, kBatch> index{};  ///< In the batch.
+    std::array<const Record*, kBatch> light{};
+    BatchVectors from;
+    BatchVectors to_light;  ///< To its position.
+    BatchFloats radius{}, area{}, one_minus_cos{};
+    BatchVectors axis_x, axis_y, shines_along;
+    BatchFloats u{}, v{};
+  };
+
  public:
   /// `has_disk_lamps`: spheres shine like disks that turn to every point they light, as in Cycles;
   /// points closer than a few radii get less light from them than from a sphere.
@@ -90,18 +121,43 @@ class Lights {
   /// Probability with which choose() picks this light for the receiver.
   float probability(std::uint32_t light, const Receiver& receiver) const;
 
-  /// Density zero: nothing arrives from this light.
-  LightSample sample(std::uint32_t light, const Vec3f& from, const Vec2f& u) const;
-  /// The radiance of a sample. Apart from sample() because a dome's image is large: it is read only
-  /// when the sample turns out to be lit.
-  Vec3f radiance_of(std::uint32_t light, const LightSample& sample) const {
-    const Record& record = lights_[light];
-    if (record.shape != Shape::Dome) return sample.radiance;
-    return record.radiance.cwiseProduct(record.texture->radiance_at(sample.barycentric));
+  /// Points of the lights chosen for a batch of places.
+  struct Samples {
+    BatchVectors direction;  ///< Unit, from the place.
+    BatchFloats distance{};  ///< Infinite for dome and distant lights.
+    /// Per solid angle, without the choice of the light. Zero: nothing arrives. Infinite: the
+    /// light's radiance is an irradiance, and no other technique can find it.
+    BatchFloats density{};
+    BatchInts light{};
+    BatchInts triangle{};
+    BatchFloats place_x{}, place_y{};
+
+    LightPlace place(std::size_t i) const {
+      return {std::uint32_t(light[i]), std::uint32_t(triangle[i]), {place_x[i], place_y[i]}};
+    }
+
+   private:
+    friend class Lights;
+    Asked asked_;
+  };
+  /// `u`, `v` in [0, 1) place the samples.
+  void sample(const Wishes& wishes, const Choices& choices, const BatchFloats& u,
+              const BatchFloats& v, Samples& samples) const;
+  /// The radiance of a sample that leaves along `direction` (unit, from the receiver). Apart from
+  /// sample() because a dome's image is large: it is read only when the sample turns out to be lit.
+  Vec3f radiance_of(const LightPlace& place, const Vec3f& direction) const;
+  /// Whether the sample lies on a mesh, whose material knows the radiance.
+  bool is_surface(const LightPlace& place) const {
+    return lights_[place.light].shape == Shape::Triangles;
   }
+  std::uint32_t geometry_of(const LightPlace& place) const { return lights_[place.light].geometry; }
   /// Density per solid angle of an emitting triangle's point, seen from `from`.
   float density_of_surface(std::uint32_t light, float distance, float cos_at_light) const;
 
+  /// Sets `may_meet` for rays that pass through a sphere around a light without a mesh that has a
+  /// place; other rays need not ask along_ray() but for dome and distant lights.
+  void find_near(std::size_t count, const BatchVectors& origin, const BatchVectors& direction,
+                 BatchInts& may_meet) const;
   /// What a ray meets of lights without a mesh, up to t_max, and of dome and distant lights when
   /// t_max is infinite. Calls found(light, radiance, density) for each; the density is that of
   /// sample() from `from`, the start of the ray.
@@ -110,31 +166,6 @@ class Lights {
                  Found&& found) const;
 
  private:
-  enum class Shape : std::uint8_t { Sphere, TurningDisk, Rect, Disk, Distant, Dome, Triangles };
-  struct Record {
-    Shape shape = Shape::Sphere;
-    Vec3f position = Vec3f::Zero();
-    Vec3f axis_x = Vec3f::UnitX();  ///< Half extents of rect and disk.
-    Vec3f axis_y = Vec3f::UnitY();
-    Vec3f direction = -Vec3f::UnitZ();  ///< Unit, that it shines along.
-    float radius = 0.0f;                ///< Of the sphere, or of a sphere around the body.
-    float area = 0.0f;
-    Vec3f radiance = Vec3f::Zero();  ///< Irradiance for a distant light of zero size.
-    float power = 0.0f;              ///< Luminous weight in scores.
-    float one_minus_cos = 0.0f;      ///< Distant: of its angular radius.
-    float cos_outer = -2.0f;         ///< Cone; below -1: none.
-    float cos_inner = -2.0f;
-    bool is_double_sided = true;
-    bool is_mirrored = false;
-    bool is_visible_to_camera = true;
-    Eigen::Matrix3f dome_from_world = Eigen::Matrix3f::Identity();
-    std::shared_ptr<const DomeTexture> texture;
-    std::shared_ptr<const SkyGrid> sky;
-    std::uint32_t geometry = 0;
-    std::vector<EmittingTriangles::Triangle> triangles;
-    std::vector<float> cumulative_area;
-  };
-
   /// The entry that each place of a batch has come to among those offered so far.
   struct Picks {
     BatchInts entry;  ///< -1: none.
@@ -149,6 +180,7 @@ class Lights {
   static bool is_body(const Record& light) {
     return light.shape != Shape::Distant && light.shape != Shape::Dome;
   }
+  static bool is_near(const Record& light, const Vec3f& from, const Vec3f& direction);
   static float score_of_surroundings(const Record& light, const Receiver& receiver);
   static float cone_factor(const Record& light, const Vec3f& from_light);
   /// Returns the density; zero: not met.
@@ -160,12 +192,24 @@ class Lights {
                                  float t_max, Vec3f& radiance);
   static float meet_flat(const Record& light, const Vec3f& from, const Vec3f& direction,
                          float t_max, Vec3f& radiance);
-  static LightSample sample_sphere(const Record& light, const Vec3f& from, const Vec2f& u);
-  static LightSample sample_turning_disk(const Record& light, const Vec3f& from, const Vec2f& u);
-  static LightSample sample_flat(const Record& light, const Vec3f& from, const Vec2f& u);
-  static LightSample sample_distant(const Record& light, const Vec2f& u);
-  static LightSample sample_dome(const Record& light, const Vec3f& from, const Vec2f& u);
-  static LightSample sample_triangles(const Record& light, const Vec3f& from, const Vec2f& u);
+  struct Draw {
+    Vec3f direction;
+    float distance = 0.0f;
+    float density = 0.0f;
+  };
+  const Record& chosen(const Choices& choices, std::size_t i) const {
+    return lights_[std::uint32_t(choices.light[i])];
+  }
+  void collect(Shape shape, const Wishes& wishes, const Choices& choices, Asked& asked) const;
+  static void draw(Shape shape, Samples& samples);
+  template <class DrawOne>
+  static void draw_all(Samples& samples, DrawOne&& draw_one);
+  static Draw draw_sphere(const Asked& asked, std::size_t i);
+  static Draw draw_turning_disk(const Asked& asked, std::size_t i);
+  static Draw draw_flat(const Asked& asked, std::size_t i, bool is_disk);
+  static Draw draw_distant(const Asked& asked, std::size_t i);
+  static void draw_domes(Samples& samples);
+  static void draw_triangles(Samples& samples);
 
   bool has_disk_lamps_;
   std::vector<Record> lights_;
@@ -182,6 +226,24 @@ inline float one_minus_cos_of(float sin2) {
   return sin2 / (1.0f + std::sqrt(std::max(0.0f, 1.0f - sin2)));
 }
 
+inline bool Lights::is_near(const Record& light, const Vec3f& from, const Vec3f& direction) {
+  const Vec3f to = light.position - from;
+  const float along = to.dot(direction);
+  const float off2 = (to - along * direction).squaredNorm();
+  return (off2 < light.radius * light.radius) & (along + light.radius > 0.0f);
+}
+
+inline void Lights::find_near(std::size_t count, const BatchVectors& origin,
+                              const BatchVectors& direction, BatchInts& may_meet) const {
+  may_meet.fill(0);
+  for (const std::uint32_t index : shapes_) {
+    const Record& light = lights_[index];
+    for (std::size_t i = 0; i < whole_steps(count); ++i) {
+      may_meet[i] |= std::int32_t(is_near(light, origin.at(i), direction.at(i)));
+    }
+  }
+}
+
 template <class Found>
 void Lights::along_ray(const Vec3f& from, const Vec3f& direction, float t_max, bool is_camera_ray,
                        Found&& found) const {
@@ -193,11 +255,7 @@ void Lights::along_ray(const Vec3f& from, const Vec3f& direction, float t_max, b
     if (density > 0.0f) found(index, radiance, density);
   };
   for (const std::uint32_t index : shapes_) {
-    const Record& light = lights_[index];
-    const Vec3f to = light.position - from;
-    const float along = to.dot(direction);
-    const float off2 = (to - along * direction).squaredNorm();
-    if (off2 < light.radius * light.radius && along + light.radius > 0.0f) report(index);
+    if (is_near(lights_[index], from, direction)) report(index);
   }
   if (t_max == kInfinite) {
     for (const std::uint32_t index : surroundings_) report(index);
@@ -286,131 +344,205 @@ inline float Lights::cone_factor(const Record& light, const Vec3f& from_light) {
   return t * t * (3.0f - 2.0f * t);
 }
 
-inline LightSample Lights::sample(std::uint32_t index, const Vec3f& from, const Vec2f& u) const {
-  const Record& light = lights_[index];
-  switch (light.shape) {
-    case Shape::Sphere:
-      return sample_sphere(light, from, u);
-    case Shape::TurningDisk:
-      return sample_turning_disk(light, from, u);
-    case Shape::Rect:
-    case Shape::Disk:
-      return sample_flat(light, from, u);
-    case Shape::Distant:
-      return sample_distant(light, u);
-    case Shape::Dome:
-      return sample_dome(light, from, u);
-    case Shape::Triangles:
-      break;
-  }
-  return sample_triangles(light, from, u);
+inline Vec3f Lights::radiance_of(const LightPlace& place, const Vec3f& direction) const {
+  const Record& light = lights_[place.light];
+  if (light.shape != Shape::Dome) return light.radiance * cone_factor(light, -direction);
+  return light.radiance.cwiseProduct(light.texture->radiance_at(place.place));
 }
 
-inline LightSample Lights::sample_sphere(const Record& light, const Vec3f& from, const Vec2f& u) {
-  const Vec3f to_centre = light.position - from;
+inline void Lights::sample(const Wishes& wishes, const Choices& choices, const BatchFloats& u,
+                           const BatchFloats& v, Samples& samples) const {
+  std::array<int, kShapes> counts{};
+  for (std::size_t i = 0; i < wishes.count; ++i) {
+    samples.density[i] = 0.0f;
+    if (choices.probability[i] > 0.0f) ++counts[std::size_t(chosen(choices, i).shape)];
+  }
+  samples.light = choices.light;
+  for (std::size_t k = 0; k < kShapes; ++k) {
+    if (counts[k] == 0) continue;
+    const auto shape = Shape(k);
+    collect(shape, wishes, choices, samples.asked_);
+    for (std::size_t i = 0; i < samples.asked_.count; ++i) {
+      samples.asked_.u[i] = u[samples.asked_.index[i]];
+      samples.asked_.v[i] = v[samples.asked_.index[i]];
+    }
+    draw(shape, samples);
+  }
+}
+
+inline void Lights::collect(Shape shape, const Wishes& wishes, const Choices& choices,
+                            Asked& asked) const {
+  const bool has_axes = shape == Shape::Rect || shape == Shape::Disk || shape == Shape::Distant;
+  asked.count = 0;
+  for (std::size_t i = 0; i < wishes.count; ++i) {
+    const Record& light = chosen(choices, i);
+    if (light.shape != shape || choices.probability[i] <= 0.0f) continue;
+    const std::size_t own = asked.count++;
+    asked.index[own] = std::uint8_t(i);
+    asked.light[own] = &light;
+    asked.from.set(own, wishes.position.at(i));
+    asked.to_light.set(own, light.position - wishes.position.at(i));
+    asked.radius[own] = light.radius;
+    asked.area[own] = light.area;
+    if (!has_axes) continue;
+    asked.one_minus_cos[own] = light.one_minus_cos;
+    asked.axis_x.set(own, light.axis_x);
+    asked.axis_y.set(own, light.axis_y);
+    asked.shines_along.set(own, light.direction);
+  }
+}
+
+inline void Lights::draw(Shape shape, Samples& samples) {
+  switch (shape) {
+    case Shape::Sphere:
+      return draw_all(samples, draw_sphere);
+    case Shape::TurningDisk:
+      return draw_all(samples, draw_turning_disk);
+    case Shape::Rect:
+      return draw_all(samples,
+                      [](const Asked& a, std::size_t i) { return draw_flat(a, i, false); });
+    case Shape::Disk:
+      return draw_all(samples, [](const Asked& a, std::size_t i) { return draw_flat(a, i, true); });
+    case Shape::Distant:
+      return draw_all(samples, draw_distant);
+    case Shape::Dome:
+      return draw_domes(samples);
+    case Shape::Triangles:
+      return draw_triangles(samples);
+  }
+}
+
+template <class DrawOne>
+inline void Lights::draw_all(Samples& samples, DrawOne&& draw_one) {
+  const Asked& asked = samples.asked_;
+  BatchVectors directions;
+  BatchFloats distances;
+  BatchFloats densities;
+  for (std::size_t i = 0; i < whole_steps(asked.count); ++i) {
+    const Draw draw = draw_one(asked, i);
+    directions.set(i, draw.direction);
+    distances[i] = draw.distance;
+    densities[i] = draw.density;
+  }
+  for (std::size_t i = 0; i < asked.count; ++i) {
+    const std::size_t own = asked.index[i];
+    samples.direction.set(own, directions.at(i));
+    samples.distance[own] = distances[i];
+    samples.density[own] = densities[i];
+  }
+}
+
+inline Lights::Draw Lights::draw_sphere(const Asked& asked, std::size_t i) {
+  const Vec3f to_centre = asked.to_light.at(i);
+  const float radius2 = asked.radius[i] * asked.radius[i];
   const float distance2 = to_centre.squaredNorm();
-  const float sin2 = light.radius * light.radius / distance2;
-  if (!(sin2 < 1.0f)) return {};
+  const float sin2 = radius2 / distance2;
   const float distance = std::sqrt(distance2);
   const float one_minus_cos = one_minus_cos_of(sin2);
-  const Vec3f local = uniform_cone(u, one_minus_cos);
-  LightSample s;
-  s.direction = unit(basis_around(to_centre * (1.0f / distance)).to_world(local));
+  const Vec3f local = uniform_cone({asked.u[i], asked.v[i]}, one_minus_cos);
+  const Vec3f direction = unit(basis_around(to_centre * (1.0f / distance)).to_world(local));
   const float sine2 = std::max(0.0f, 1.0f - local.z() * local.z());
-  s.distance = distance * local.z() -
-               std::sqrt(std::max(0.0f, light.radius * light.radius - distance2 * sine2));
-  s.radiance = light.radiance * cone_factor(light, -s.direction);
-  s.density = 1.0f / (2.0f * kPiF * one_minus_cos);
-  return s;
+  const float within = std::sqrt(std::max(0.0f, radius2 - distance2 * sine2));
+  const float density = 1.0f / (2.0f * kPiF * one_minus_cos);
+  return {direction, distance * local.z() - within, sin2 < 1.0f ? density : 0.0f};
 }
 
-inline LightSample Lights::sample_turning_disk(const Record& light, const Vec3f& from,
-                                               const Vec2f& u) {
-  const Vec3f to_centre = light.position - from;
+inline Lights::Draw Lights::draw_turning_disk(const Asked& asked, std::size_t i) {
+  const Vec3f to_centre = asked.to_light.at(i);
   const float height2 = to_centre.squaredNorm();
-  if (!(height2 > light.radius * light.radius)) return {};
   const Basis basis = basis_around(unit(to_centre));
-  const Vec2f p = disk_from_square(u) * light.radius;
+  const Vec2f p = disk_from_square({asked.u[i], asked.v[i]}) * asked.radius[i];
   const Vec3f to_light = to_centre + p.x() * basis.x + p.y() * basis.y;
-  LightSample s;
   const float distance2 = to_light.squaredNorm();
-  s.distance = std::sqrt(distance2);
-  s.direction = to_light * (1.0f / s.distance);
-  s.density = distance2 * s.distance / (std::sqrt(height2) * light.area);
-  s.radiance = light.radiance * cone_factor(light, -s.direction);
-  return s;
+  const float distance = std::sqrt(distance2);
+  const float density = distance2 * distance / (std::sqrt(height2) * asked.area[i]);
+  const bool is_outside = height2 > asked.radius[i] * asked.radius[i];
+  return {to_light * (1.0f / distance), distance, is_outside ? density : 0.0f};
 }
 
-inline LightSample Lights::sample_flat(const Record& light, const Vec3f& from, const Vec2f& u) {
-  const Vec2f p = light.shape == Shape::Disk ? disk_from_square(u)
-                                             : Vec2f(2.0f * u.x() - 1.0f, 2.0f * u.y() - 1.0f);
-  const Vec3f to_light = light.position + p.x() * light.axis_x + p.y() * light.axis_y - from;
+inline Lights::Draw Lights::draw_flat(const Asked& asked, std::size_t i, bool is_disk) {
+  const Vec2f u(asked.u[i], asked.v[i]);
+  const Vec2f p = is_disk ? disk_from_square(u) : Vec2f(2.0f * u.x() - 1.0f, 2.0f * u.y() - 1.0f);
+  const Vec3f to_light =
+      asked.to_light.at(i) + p.x() * asked.axis_x.at(i) + p.y() * asked.axis_y.at(i);
   const float distance2 = to_light.squaredNorm();
-  LightSample s;
-  s.distance = std::sqrt(distance2);
-  s.direction = to_light * (1.0f / s.distance);
-  const float cosine = -s.direction.dot(light.direction);
-  if (!(cosine > 1e-6f)) return {};
-  s.density = distance2 / (cosine * light.area);
-  s.radiance = light.radiance * cone_factor(light, -s.direction);
-  return s;
+  const float distance = std::sqrt(distance2);
+  const Vec3f direction = to_light * (1.0f / distance);
+  const float cosine = -direction.dot(asked.shines_along.at(i));
+  const float density = distance2 / (cosine * asked.area[i]);
+  return {direction, distance, cosine > 1e-6f ? density : 0.0f};
 }
 
-inline LightSample Lights::sample_distant(const Record& light, const Vec2f& u) {
-  LightSample s;
-  s.distance = kInfinite;
-  s.radiance = light.radiance;
-  if (light.one_minus_cos <= 0.0f) {
-    s.direction = -light.direction;
-    s.density = kInfinite;
-    return s;
+inline Lights::Draw Lights::draw_distant(const Asked& asked, std::size_t i) {
+  const Vec3f towards = -asked.shines_along.at(i);
+  const float one_minus_cos = asked.one_minus_cos[i];
+  const Vec3f local = uniform_cone({asked.u[i], asked.v[i]}, one_minus_cos);
+  const Vec3f direction = unit(basis_around(towards).to_world(local));
+  const float density = 1.0f / (2.0f * kPiF * one_minus_cos);
+  const bool has_size = one_minus_cos > 0.0f;
+  return {select(has_size, direction, towards), kInfinite, has_size ? density : kInfinite};
+}
+
+inline void Lights::draw_domes(Samples& samples) {
+  const Asked& asked = samples.asked_;
+  BatchFloats x;
+  BatchFloats y;
+  BatchFloats density;
+  for (std::size_t i = 0; i < asked.count; ++i) {
+    const Record& light = *asked.light[i];
+    const SkyGrid::Choice choice = light.sky->choose(light.sky->cell(asked.from.at(i)), asked.u[i]);
+    const DomeTexture::Draw draw = light.texture->sample(choice.patch, {choice.rest, asked.v[i]});
+    x[i] = draw.place.x();
+    y[i] = draw.place.y();
+    density[i] = draw.density * choice.probability;
+    light.texture->prefetch(draw.place);
   }
-  const Vec3f local = uniform_cone(u, light.one_minus_cos);
-  s.direction = unit(basis_around(-light.direction).to_world(local));
-  s.density = 1.0f / (2.0f * kPiF * light.one_minus_cos);
-  return s;
+  BatchVectors directions;
+  for (std::size_t i = 0; i < whole_steps(asked.count); ++i) {
+    const DomeTexture::Towards towards = DomeTexture::towards({x[i], y[i]});
+    directions.set(i, towards.direction);
+    density[i] *= towards.per_solid_angle;
+  }
+  for (std::size_t i = 0; i < asked.count; ++i) {
+    const std::size_t own = asked.index[i];
+    samples.direction.set(own,
+                          unit(asked.light[i]->dome_from_world.transpose() * directions.at(i)));
+    samples.distance[own] = kInfinite;
+    samples.density[own] = density[i];
+    samples.place_x[own] = x[i];
+    samples.place_y[own] = y[i];
+  }
 }
 
-[[gnu::noinline]] inline LightSample Lights::sample_dome(const Record& light, const Vec3f& from,
-                                                         const Vec2f& u) {
-  const SkyGrid::Choice choice = light.sky->choose(light.sky->cell(from), u.x());
-  if (choice.probability <= 0.0f) return {};
-  const DomeTexture::Draw draw = light.texture->sample(choice.patch, {choice.rest, u.y()});
-  LightSample s;
-  s.distance = kInfinite;
-  s.direction = unit(light.dome_from_world.transpose() * draw.direction);
-  s.density = draw.density * choice.probability;
-  s.barycentric = draw.place;
-  return s;
-}
-
-[[gnu::noinline]] inline LightSample Lights::sample_triangles(const Record& light,
-                                                              const Vec3f& from, const Vec2f& u) {
-  if (light.triangles.empty()) return {};
-  const float target = u.x() * light.area;
-  const auto it =
-      std::upper_bound(light.cumulative_area.begin(), light.cumulative_area.end() - 1, target);
-  const auto index = std::size_t(it - light.cumulative_area.begin());
-  const float before = index == 0 ? 0.0f : light.cumulative_area[index - 1];
-  const float size = light.cumulative_area[index] - before;
-  const float again = size > 0.0f ? std::clamp((target - before) / size, 0.0f, 0.999999f) : 0.5f;
-  const EmittingTriangles::Triangle& t = light.triangles[index];
-  LightSample s;
-  s.barycentric = triangle_from_square({again, u.y()});
-  const Vec3f to_light = t.a + s.barycentric.x() * t.ab + s.barycentric.y() * t.ac - from;
-  const float distance2 = to_light.squaredNorm();
-  s.distance = std::sqrt(distance2);
-  s.direction = to_light / s.distance;
-  const float cosine = -s.direction.dot(t.ab.cross(t.ac).normalized());
-  if (!(std::abs(cosine) > 1e-6f) ||
-      ((cosine < 0.0f) != light.is_mirrored && !light.is_double_sided))
-    return {};
-  s.density = distance2 / (std::abs(cosine) * light.area);
-  s.radiance = light.radiance;
-  s.geometry = light.geometry;
-  s.triangle = t.index;
-  s.is_surface = true;
-  return s;
+[[gnu::noinline]] inline void Lights::draw_triangles(Samples& samples) {
+  const Asked& asked = samples.asked_;
+  for (std::size_t i = 0; i < asked.count; ++i) {
+    const Record& light = *asked.light[i];
+    if (light.triangles.empty()) continue;
+    const float target = asked.u[i] * light.area;
+    const auto it =
+        std::upper_bound(light.cumulative_area.begin(), light.cumulative_area.end() - 1, target);
+    const auto index = std::size_t(it - light.cumulative_area.begin());
+    const float before = index == 0 ? 0.0f : light.cumulative_area[index - 1];
+    const float size = light.cumulative_area[index] - before;
+    const float again = size > 0.0f ? std::clamp((target - before) / size, 0.0f, 0.999999f) : 0.5f;
+    const EmittingTriangles::Triangle& t = light.triangles[index];
+    const Vec2f weights = triangle_from_square({again, asked.v[i]});
+    const Vec3f to_light = t.a + weights.x() * t.ab + weights.y() * t.ac - asked.from.at(i);
+    const float distance2 = to_light.squaredNorm();
+    const float distance = std::sqrt(distance2);
+    const Vec3f direction = to_light / distance;
+    const float cosine = -direction.dot(t.ab.cross(t.ac).normalized());
+    const bool is_front = (cosine < 0.0f) == light.is_mirrored;
+    if (!(std::abs(cosine) > 1e-6f) || !(is_front || light.is_double_sided)) continue;
+    const std::size_t own = asked.index[i];
+    samples.direction.set(own, direction);
+    samples.distance[own] = distance;
+    samples.density[own] = distance2 / (std::abs(cosine) * light.area);
+    samples.triangle[own] = std::int32_t(t.index);
+    samples.place_x[own] = weights.x();
+    samples.place_y[own] = weights.y();
+  }
 }
 
 inline float Lights::density_of_surface(std::uint32_t light, float distance,

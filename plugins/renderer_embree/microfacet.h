@@ -63,11 +63,11 @@ inline float ggx_visible_normal_density(const Vec3f& w, const Vec3f& h, float al
 /// behind over index in front. Returns 1 under total reflection.
 inline float fresnel_dielectric(float cos_i, float eta) {
   const float sin2_t = std::max(0.0f, 1.0f - cos_i * cos_i) / (eta * eta);
-  if (sin2_t >= 1.0f) return 1.0f;
-  const float cos_t = std::sqrt(1.0f - sin2_t);
+  const float cos_t = std::sqrt(std::max(0.0f, 1.0f - sin2_t));
   const float parallel = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
   const float perpendicular = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
-  return 0.5f * (parallel * parallel + perpendicular * perpendicular);
+  const float reflected = 0.5f * (parallel * parallel + perpendicular * perpendicular);
+  return sin2_t < 1.0f ? reflected : 1.0f;
 }
 
 /// (1 - cos)^5 of Schlick's approximation.

@@ -29,6 +29,8 @@ class MipTexture {
   /// levels. `footprint` is the width of the wanted average as a share of the texture's. Missing
   /// channels: grey is repeated, alpha is 1.
   Rgba lookup(const Vec2f& uv, float footprint, Wrap wrap_u, Wrap wrap_v) const;
+  /// Starts to fetch the texels around uv in [0, 1) of the finest level from memory.
+  void prefetch(const Vec2f& uv) const;
   /// One texel of a level, row 0 on top.
   Rgba texel(int level, int x, int y) const;
 
@@ -98,6 +100,20 @@ inline Rgba MipTexture::texel(int index, int x, int y) const {
   const float red = linear(p[0]);
   if (channels < 3) return {red, red, red, channels == 2 ? p[1] : 1.0f};
   return {red, linear(p[1]), linear(p[2]), channels == 4 ? p[3] : 1.0f};
+}
+
+inline void MipTexture::prefetch(const Vec2f& uv) const {
+  const int x = std::clamp(int(uv.x() * float(width()) - 0.5f), 0, width() - 1);
+  const int y = std::clamp(int((1.0f - uv.y()) * float(height()) - 0.5f), 0, height() - 1);
+  const std::size_t row = std::size_t(width()) * std::size_t(source_->channels);
+  const std::size_t at = std::size_t(y) * row + std::size_t(x) * std::size_t(source_->channels);
+  const auto fetch = [&](const auto& values) {
+    if (values.empty()) return;
+    __builtin_prefetch(&values[at]);
+    __builtin_prefetch(&values[std::min(at + row, values.size() - 1)]);
+  };
+  fetch(source_->bytes);
+  fetch(source_->floats);
 }
 
 [[gnu::noinline]] inline Rgba MipTexture::bilinear(int index, const Vec2f& uv, Wrap wrap_u,

@@ -5,22 +5,15 @@
 #include <array>
 #include <cmath>
 
+#include "vertices.h"
+
 namespace diorama {
 namespace {
 
 constexpr int kMaxPassages = 64;  // straight through cut-outs and panes
-constexpr float kMirrorSpread = 0.05f;
 // Of paths as bright as behind their first surface. Between 0.7 and 1.5 the error for equal time is
 // the same (measured); short paths leave more time for denoised pictures' pixels.
 constexpr float kContinuation = 0.7f;
-
-/// A step off the surface, far enough that the next ray does not meet it again.
-inline Vec3f step_off(const Vec3f& position, const Vec3f& flat_normal) {
-  const float x = std::abs(position.x());
-  const float y = std::abs(position.y());
-  const float z = std::abs(position.z());
-  return (2e-5f * (1.0f + std::max(x, std::max(y, z)))) * flat_normal;
-}
 
 inline Vec3f leave(const SurfaceGeometry& s, const Vec3f& direction) {
   const Vec3f step = step_off(s.position, s.flat_normal);
@@ -78,10 +71,10 @@ Vec3f base_color_at(const RayHit& hit, const SurfaceGeometry& surface, float uv_
 /// A light sample whose way is not looked at yet.
 struct PathTracer::ShadowRay {
   Vec3f origin;
+  Vec3f direction;
   float t_max = 0.0f;  ///< 0: there is none.
   Vec3f share;         ///< Of the light's radiance, when nothing is in the way.
-  LightSample sample;
-  std::uint32_t light = 0;
+  LightPlace place;
   int bounce = 0;
 };
 
@@ -124,82 +117,17 @@ struct PathTracer::Path {
   }
 };
 
-/// What the paths of a batch met: one entry for every path that goes on from a surface, filled step
-/// by step.
-struct PathTracer::Vertices {
-  std::size_t count = 0;
+struct PathTracer::Batch : Vertices {
   std::array<Path*, kBatch> paths{};
-  BatchVectors direction;  ///< That the path came along.
-  BatchVectors triangle_normal;
-  BatchVectors interpolated;  ///< Normal; see RenderScene::interpolated_normal().
-  BatchInts is_mirrored{};
+  BatchVectors ray_origin;  ///< Of all paths under way.
+  BatchVectors ray_direction;
+  BatchInts may_meet_light{};
 
-  BatchVectors position;
-  BatchVectors flat_normal;
-  BatchVectors normal;
-  BatchInts is_back{};
-
-  // Of those that scatter.
-  enum Purpose { kLight, kRoulette, kPlaceU, kPlaceV, kLobe, kSpare, kDirectionU, kDirectionV };
-  static constexpr std::uint32_t kPairs = 4;
-  std::array<const SurfaceBsdf*, kBatch> bsdf{};
-  std::array<SurfaceBsdf, kBatch> own_bsdf;  ///< Of materials that are not the same all over.
-  std::array<const ShadingMaterial*, kBatch> material{};
-  BatchVectors basis_x;
-  BatchVectors basis_y;
-  BatchVectors to_viewer;                         ///< Local, unit.
-  BatchVectors step;                              ///< Off the surface, on the viewer's side.
-  BatchVectors by_cosine;                         ///< Local directions for diffuse lobes.
-  std::array<BatchFloats, 2 * kPairs> numbers{};  ///< Random ones, by purpose.
-  Lights::Wishes wishes;
-  Lights::Choices lights;
-
-  SurfaceGeometry surface(std::size_t i) const {
-    SurfaceGeometry s;
-    s.position = position.at(i);
-    s.flat_normal = flat_normal.at(i);
-    s.normal = normal.at(i);
-    s.is_back = is_back[i] != 0;
-    return s;
-  }
-  Vec2f pair(Purpose first, std::size_t i) const {
-    return {numbers[first][i], numbers[std::size_t(first) + 1][i]};
-  }
-  Basis basis(std::size_t i) const { return {basis_x.at(i), basis_y.at(i), normal.at(i)}; }
-  Vec3f leave(std::size_t i, const Vec3f& towards) const {
-    const Vec3f off = step.at(i);
-    return position.at(i) + (towards.dot(flat_normal.at(i)) < 0.0f ? -off : off);
-  }
-  void find_surfaces();
-  void find_bases();
   /// What is known before find_bases(), to where the entries that scatter stand together.
   void move(std::size_t from, std::size_t to);
 };
 
-inline void PathTracer::Vertices::find_surfaces() {
-  for (std::size_t i = 0; i < whole_steps(count); ++i) {
-    const SurfaceGeometry s =
-        RenderScene::surface_of(position.at(i), direction.at(i), triangle_normal.at(i),
-                                interpolated.at(i), is_mirrored[i] != 0);
-    flat_normal.set(i, s.flat_normal);
-    normal.set(i, s.normal);
-    is_back[i] = s.is_back;
-  }
-}
-
-inline void PathTracer::Vertices::find_bases() {
-  for (std::size_t i = 0; i < whole_steps(count); ++i) {
-    const Basis basis = basis_around(normal.at(i));
-    Vec3f wo = basis.to_local(-direction.at(i));
-    wo.z() = std::max(wo.z(), 1e-4f);
-    basis_x.set(i, basis.x);
-    basis_y.set(i, basis.y);
-    to_viewer.set(i, unit(wo));
-    step.set(i, step_off(position.at(i), flat_normal.at(i)));
-  }
-}
-
-inline void PathTracer::Vertices::move(std::size_t from, std::size_t to) {
+inline void PathTracer::Batch::move(std::size_t from, std::size_t to) {
   if (from == to) return;
   paths[to] = paths[from];
   direction.set(to, direction.at(from));
@@ -248,8 +176,10 @@ inline RayCounts PathTracer::trace_all(const TraceJob& job, PixelSum* sums,
   RayCounts counts;
   std::vector<Path> paths;
   paths.reserve(kBatch);
-  Vertices vertices;
+  Batch batch;
   std::array<PixelSum*, kBatch> pixels;
+  BatchFloats columns{};
+  BatchFloats rows{};
   const int width = job.x_end - job.x_begin;
   const int area = width * (job.y_end - job.y_begin);
   int next = 0;
@@ -260,12 +190,15 @@ inline RayCounts PathTracer::trace_all(const TraceJob& job, PixelSum* sums,
       const int x = job.x_begin + next % width;
       const int y = job.y_begin + next / width;
       pixels[paths.size()] = &sums[std::size_t(y) * stride + std::size_t(x)];
-      start_path(paths.emplace_back(PathSampler(job.order.place(x, y, sample))), x, y);
+      paths.emplace_back(PathSampler(job.order.place(x, y, sample)));
+      columns[paths.size() - 1] = float(x);
+      rows[paths.size() - 1] = float(y);
       if (++next < area) continue;
       next = 0;
       ++sample;
     }
-    trace_batch(paths, vertices);
+    start_paths(paths, columns, rows);
+    trace_batch(paths, batch);
     for (std::size_t i = 0; i < paths.size(); ++i) {
       pixels[i]->add(paths[i].result);
       counts.rays += paths[i].counts.rays;
@@ -275,17 +208,36 @@ inline RayCounts PathTracer::trace_all(const TraceJob& job, PixelSum* sums,
   return counts;
 }
 
-inline void PathTracer::start_path(Path& path, int x, int y) const {
-  const Vec2f place = path.sampler.next();
-  const Vec2f aperture = path.sampler.next();
-  auto ray = view_.sample_ray({float(x) + place.x(), float(y) + place.y()}, aperture);
-  if (view_.has_shutter()) [[unlikely]]
-    open_shutter(path, y, ray);
-  path.is_over = !(ray.t_max > 0.0f);
-  path.go(ray.origin, ray.direction);
-  path.t_min = ray.t_min;
-  path.t_max = ray.t_max;
-  path.spread = view_.pixel_angle();
+inline void PathTracer::start_paths(std::vector<Path>& paths, const BatchFloats& columns,
+                                    const BatchFloats& rows) const {
+  BatchInts keys{};
+  BatchInts places{};
+  for (std::size_t i = 0; i < paths.size(); ++i) {
+    keys[i] = std::int32_t(paths[i].sampler.take(2));
+    places[i] = std::int32_t(paths[i].sampler.place());
+  }
+  BatchFloats x;
+  BatchFloats y;
+  for (std::size_t i = 0; i < whole_steps(paths.size()); ++i) {
+    const Vec2f u = PathSampler::pair(std::uint32_t(keys[i]), std::uint32_t(places[i]));
+    x[i] = columns[i] + u.x();
+    y[i] = rows[i] + u.y();
+  }
+  for (std::size_t i = 0; i < paths.size(); ++i) {
+    Path& path = paths[i];
+    const Vec2f aperture = view_.has_aperture()
+                               ? PathSampler::pair(std::uint32_t(keys[i]) + PathSampler::kKeyStep,
+                                                   std::uint32_t(places[i]))
+                               : Vec2f(Vec2f::Zero());
+    CameraRay ray = view_.sample_ray({x[i], y[i]}, aperture);
+    if (view_.has_shutter()) [[unlikely]]
+      open_shutter(path, int(rows[i]), ray);
+    path.is_over = !(ray.t_max > 0.0f);
+    path.go(ray.origin, ray.direction);
+    path.t_min = ray.t_min;
+    path.t_max = ray.t_max;
+    path.spread = view_.pixel_angle();
+  }
 }
 
 [[gnu::noinline]] void PathTracer::open_shutter(Path& path, int row, CameraRay& ray) const {
@@ -294,9 +246,23 @@ inline void PathTracer::start_path(Path& path, int x, int y) const {
   ray = view_.moved(ray, seconds);
 }
 
+/// Rays to the same light side by side: bundles that go similar ways are traced faster.
+inline void PathTracer::arrange_by_light(std::array<Path*, kBatch>& paths, std::size_t count) {
+  constexpr std::uint32_t kKeys = 8;
+  std::array<std::uint8_t, kBatch> keys;
+  std::array<std::uint32_t, kKeys + 1> starts{};
+  for (std::size_t i = 0; i < count; ++i) {
+    keys[i] = std::uint8_t(paths[i]->shadow.place.light % kKeys);
+    ++starts[keys[i] + 1u];
+  }
+  for (std::uint32_t k = 0; k < kKeys; ++k) starts[k + 1] += starts[k];
+  const std::array<Path*, kBatch> before = paths;
+  for (std::size_t i = 0; i < count; ++i) paths[starts[keys[i]]++] = before[i];
+}
+
 // Paths advance together, step by step: rays of one kind in a row, then the surfaces that they met.
 // Code and data of each step stay close to the processor, and memory is fetched meanwhile.
-inline void PathTracer::trace_batch(std::vector<Path>& paths, Vertices& v) const {
+inline void PathTracer::trace_batch(std::vector<Path>& paths, Batch& v) const {
   std::array<Path*, kBatch> active;
   std::array<Path*, kBatch> asking;
   std::size_t count = 0;
@@ -304,7 +270,7 @@ inline void PathTracer::trace_batch(std::vector<Path>& paths, Vertices& v) const
     if (!path.is_over) active[count++] = &path;
   }
   while (count > 0) {
-    find_surfaces(std::span(active).first(count));
+    find_surfaces(std::span(active).first(count), v);
     meet(std::span(active).first(count), v);
     v.find_surfaces();
     std::size_t scattered = 0;
@@ -314,6 +280,12 @@ inline void PathTracer::trace_batch(std::vector<Path>& paths, Vertices& v) const
     v.count = scattered;
     v.find_bases();
     draw_numbers(v);
+    for (std::size_t i = 0; i < v.count; ++i) take_lobes(v, i);
+    if (scene_.stacks_lobes()) {
+      v.weigh_ways<true>();
+    } else {
+      v.weigh_ways<false>();
+    }
     for (std::size_t i = 0; i < v.count; ++i) scatter(v, i);
     std::size_t asked = 0;
     std::size_t left = 0;
@@ -322,73 +294,74 @@ inline void PathTracer::trace_batch(std::vector<Path>& paths, Vertices& v) const
       if (path->shadow.t_max > 0.0f) asking[asked++] = path;
       if (!path->is_over) active[left++] = path;
     }
+    arrange_by_light(asking, asked);
     find_lights(std::span(asking).first(asked));
     count = left;
   }
 }
 
-inline void PathTracer::find_surfaces(Paths paths) const {
+inline void PathTracer::find_surfaces(Paths paths, Batch& v) const {
   RayBundle rays;
-  std::array<RayHit, RayBundle::kSize> hits;
   for (std::size_t begin = 0; begin < paths.size(); begin += RayBundle::kSize) {
-    const auto group =
-        paths.subspan(begin, std::min<std::size_t>(RayBundle::kSize, paths.size() - begin));
+    const std::size_t end = std::min(begin + RayBundle::kSize, paths.size());
     rays.clear();
-    for (Path* path : group) {
-      rays.add(path->origin, path->direction, path->t_min, path->t_max, path->time);
-      ++path->counts.rays;
+    for (std::size_t i = begin; i < end; ++i) {
+      Path& path = *paths[i];
+      v.ray_origin.set(i, path.origin);
+      v.ray_direction.set(i, path.direction);
+      rays.add(path.origin, path.direction, path.t_min, path.t_max, path.time);
+      ++path.counts.rays;
       if (settings_.ray_log) [[unlikely]] {
-        settings_.ray_log->push_back(
-            {path->origin, path->direction, path->t_min, path->t_max, false});
+        settings_.ray_log->push_back({path.origin, path.direction, path.t_min, path.t_max, false});
       }
     }
-    scene_.intersect(rays, hits.data());
-    for (std::size_t i = 0; i < group.size(); ++i) group[i]->hit = hits[i];
+    scene_.intersect(rays, [&](int i) -> RayHit& { return paths[begin + std::size_t(i)]->hit; });
   }
 }
 
 inline void PathTracer::find_lights(Paths paths) const {
   RayBundle rays;
-  std::array<Vec3f, RayBundle::kSize> kept;
   for (std::size_t begin = 0; begin < paths.size(); begin += RayBundle::kSize) {
-    const auto group =
-        paths.subspan(begin, std::min<std::size_t>(RayBundle::kSize, paths.size() - begin));
+    const std::size_t end = std::min(begin + RayBundle::kSize, paths.size());
     rays.clear();
-    for (Path* path : group) {
-      const ShadowRay& shadow = path->shadow;
-      rays.add(shadow.origin, shadow.sample.direction, 0.0f, shadow.t_max, path->time);
-      ++path->counts.shadow_rays;
+    for (std::size_t i = begin; i < end; ++i) {
+      Path& path = *paths[i];
+      ShadowRay& shadow = path.shadow;
+      rays.add(shadow.origin, shadow.direction, 0.0f, shadow.t_max, path.time);
+      ++path.counts.shadow_rays;
       if (settings_.ray_log) [[unlikely]] {
-        settings_.ray_log->push_back(
-            {shadow.origin, shadow.sample.direction, 0.0f, shadow.t_max, true});
+        settings_.ray_log->push_back({shadow.origin, shadow.direction, 0.0f, shadow.t_max, true});
       }
+      shadow.t_max = 0.0f;
     }
-    scene_.transmittance(rays, !settings_.has_caustics, kept.data());
-    for (std::size_t i = 0; i < group.size(); ++i) add_light(*group[i], kept[i]);
+    scene_.transmittance(rays, !settings_.has_caustics, [&](int i, const Vec3f& kept) {
+      add_light(*paths[begin + std::size_t(i)], kept);
+    });
   }
 }
 
 inline void PathTracer::add_light(Path& path, const Vec3f& kept) const {
-  ShadowRay& shadow = path.shadow;
-  const LightSample& s = shadow.sample;
-  shadow.t_max = 0.0f;
-  if (kept.maxCoeff() <= 0.0f) return;
+  const ShadowRay& shadow = path.shadow;
+  const Lights& lights = scene_.lights();
   Vec3f radiance;
-  if (s.is_surface) {
-    const MeshInstance& emitter = *scene_.instances()[s.geometry];
-    const Vec2f uv = emitter.uv(s.triangle, s.barycentric.x(), s.barycentric.y());
-    radiance = emitter.material(s.triangle).emission_at(uv, 0.0f);
+  if (lights.is_surface(shadow.place)) {
+    const MeshInstance& emitter = *scene_.instances()[lights.geometry_of(shadow.place)];
+    const std::uint32_t triangle = shadow.place.triangle;
+    const Vec2f uv = emitter.uv(triangle, shadow.place.place.x(), shadow.place.place.y());
+    radiance = emitter.material(triangle).emission_at(uv, 0.0f);
   } else {
-    radiance = scene_.lights().radiance_of(shadow.light, s);
+    radiance = lights.radiance_of(shadow.place, shadow.direction);
   }
   add(path, shadow.bounce, shadow.share.cwiseProduct(kept).cwiseProduct(radiance));
 }
 
-inline void PathTracer::meet(Paths paths, Vertices& v) const {
+inline void PathTracer::meet(Paths paths, Batch& v) const {
+  scene_.lights().find_near(paths.size(), v.ray_origin, v.ray_direction, v.may_meet_light);
   v.count = 0;
-  for (Path* path : paths) {
+  for (std::size_t k = 0; k < paths.size(); ++k) {
+    Path* path = paths[k];
     const RayHit& hit = path->hit;
-    collect_lights(*path, hit ? hit.distance : kInfinite);
+    if (v.may_meet_light[k] != 0 || !hit) collect_lights(*path, hit.distance);
     path->is_over = true;
     if (!hit) continue;
     path->since_last += hit.distance;
@@ -406,7 +379,7 @@ inline void PathTracer::meet(Paths paths, Vertices& v) const {
   }
 }
 
-inline bool PathTracer::dress(Vertices& v, std::size_t i) const {
+inline bool PathTracer::dress(Batch& v, std::size_t i) const {
   Path& path = *v.paths[i];
   const ShadingMaterial& material = *v.material[i];
   const bool is_soft = path.is_soft(settings_);
@@ -420,15 +393,16 @@ inline bool PathTracer::dress(Vertices& v, std::size_t i) const {
   SurfaceBsdf& bsdf = v.own_bsdf[i];
   bsdf = *v.bsdf[i];
   v.bsdf[i] = &bsdf;
+  bsdf.is_inside = surface.is_back;
   if (material.is_textured || has_colors) {
     read_textures(path, surface, material, is_soft, bsdf, surface.normal);
+    bsdf.finish();
     v.normal.set(i, surface.normal);
   }
-  bsdf.is_inside = surface.is_back;
   return !(material.is_pane || material.is_veil) || !pass_or_reflect(path, surface, material, bsdf);
 }
 
-inline void PathTracer::draw_numbers(Vertices& v) const {
+inline void PathTracer::draw_numbers(Batch& v) const {
   Lights::Wishes& wishes = v.wishes;
   const std::size_t size = whole_steps(v.count);
   wishes.count = v.count;
@@ -440,8 +414,7 @@ inline void PathTracer::draw_numbers(Vertices& v) const {
     Path& path = *v.paths[i];
     keys[i] = std::int32_t(path.sampler.take(Vertices::kPairs));
     places[i] = std::int32_t(path.sampler.place());
-    const bool is_soft = path.is_soft(settings_);
-    wishes.is_two_sided[i] = !is_soft && v.bsdf[i]->glass_share() > 0.0f;
+    wishes.is_two_sided[i] = !path.is_soft(settings_) && v.bsdf[i]->lobes.glass > 0.0f;
   }
   for (std::uint32_t k = 0; k < Vertices::kPairs; ++k) {
     for (std::size_t i = 0; i < size; ++i) {
@@ -451,12 +424,12 @@ inline void PathTracer::draw_numbers(Vertices& v) const {
       v.numbers[2 * k + 1][i] = pair.y();
     }
   }
-  for (std::size_t i = 0; i < size; ++i) {
-    const Vec2f u(v.numbers[Vertices::kDirectionU][i], v.numbers[Vertices::kDirectionV][i]);
-    v.by_cosine.set(i, cosine_hemisphere(u));
-  }
   wishes.u = v.numbers[Vertices::kLight];
-  scene_.lights().choose(wishes, v.lights);
+  scene_.lights().choose(wishes, v.choices);
+  if (settings_.samples_lights) {
+    scene_.lights().sample(wishes, v.choices, v.numbers[Vertices::kPlaceU],
+                           v.numbers[Vertices::kPlaceV], v.lights);
+  }
 }
 
 inline void PathTracer::add(Path& path, int bounce, const Vec3f& radiance) const {
@@ -529,6 +502,7 @@ inline void PathTracer::collect_lights(Path& path, float t_max) const {
   if (rest >= share) {
     bsdf.metallic = share < 1.0f ? bsdf.metallic / (1.0f - share) : 0.0f;
     bsdf.transmission = 0.0f;
+    bsdf.finish();
     return false;
   }
   const float cosine = std::max(1e-4f, -surface.normal.dot(path.direction));
@@ -556,36 +530,6 @@ inline void PathTracer::collect_lights(Path& path, float t_max) const {
   return true;
 }
 
-inline void PathTracer::sample_light(const Vertices& v, std::size_t i, const Bsdf& bsdf,
-                                     bool has_rival) const {
-  const float probability = v.lights.probability[i];
-  if (!settings_.samples_lights || probability <= 0.0f) return;
-  Path& path = *v.paths[i];
-  const auto light = std::uint32_t(v.lights.light[i]);
-  const LightSample s =
-      scene_.lights().sample(light, path.last.position, v.pair(Vertices::kPlaceU, i));
-  if (s.density <= 0.0f) return;
-  const Vec3f wi = v.basis(i).to_local(s.direction);
-  const bool is_behind = wi.z() <= 0.0f;
-  if (is_behind && !path.last.is_two_sided) return;
-  // Light that the interpolated normal would let through the triangle from behind.
-  if ((v.flat_normal.at(i).dot(s.direction) <= 0.0f) != is_behind) return;
-  const BsdfValue value = bsdf.evaluate(wi);
-  if (value.f_cos.maxCoeff() <= 0.0f) return;
-
-  const bool is_point = std::isinf(s.density);
-  const float density = (is_point ? 1.0f : s.density) * probability;
-  const float weight = has_rival && !is_point ? mis_weight(density, value.density) : 1.0f;
-  const float t_max = std::isinf(s.distance) ? kInfinite : s.distance * 0.9998f - 1e-4f;
-  if (t_max <= 0.0f) return;
-  path.shadow.origin = v.leave(i, s.direction);
-  path.shadow.t_max = t_max;
-  path.shadow.share = path.throughput.cwiseProduct(value.f_cos) * (weight / density);
-  path.shadow.sample = s;
-  path.shadow.light = light;
-  path.shadow.bounce = path.bounce;
-}
-
 [[gnu::noinline]] void PathTracer::read_textures(const Path& path, const SurfaceGeometry& surface,
                                                  const ShadingMaterial& material, bool is_soft,
                                                  SurfaceBsdf& s, Vec3f& normal) const {
@@ -604,36 +548,107 @@ inline void PathTracer::sample_light(const Vertices& v, std::size_t i, const Bsd
   }
 }
 
-inline void PathTracer::scatter(const Vertices& v, std::size_t i) const {
+inline void PathTracer::take_lobes(Batch& v, std::size_t i) const {
+  const SurfaceBsdf& s = *v.bsdf[i];
+  v.lobes.set(i, s.lobes);
+  v.albedo.set(i, s.albedo_at(v.to_viewer.z[i]));
+  v.has_rival[i] = settings_.samples_bsdf && !ends_at(*v.paths[i], s);
+}
+
+/// Where the path ends, light samples alone find all light that a rough surface scatters.
+inline bool PathTracer::ends_at(const Path& path, const SurfaceBsdf& s) const {
+  return path.bounce == settings_.max_bounces && settings_.samples_lights && s.is_rough();
+}
+
+inline void PathTracer::scatter(const Batch& v, std::size_t i) const {
   Path& path = *v.paths[i];
-  const bool is_soft = path.is_soft(settings_);
+  const SurfaceBsdf& s = *v.bsdf[i];
+  if (s.lobes.glass > 0.0f) [[unlikely]]
+    return scatter_glass(v, i);
+  if (!path.result.has_surface && !s.is_mirror()) {
+    record_surface(v, i, s.albedo(v.albedo.at(i)));
+  }
+  take_light_samples(v, i);
+  if (settings_.samples_lights) ask_light(v, i, v.light_share.at(i), v.light_reach[i]);
+  path.hides_lights = false;
+  if (ends_at(path, s)) return;
+  BsdfSample next;
+  next.weight = v.next_weight.at(i);
+  next.density = v.next_density[i];
+  next.spread = v.next_spread[i];
+  go_on(v, i, next, v.next.at(i));
+}
+
+[[gnu::noinline]] void PathTracer::scatter_glass(const Batch& v, std::size_t i) const {
+  Path& path = *v.paths[i];
   const SurfaceBsdf& s = *v.bsdf[i];
   const Bsdf bsdf(s, v.to_viewer.at(i));
-
-  const bool is_mirror = s.metallic > 0.9f && s.alpha < kMirrorSpread * kMirrorSpread;
-  if (!path.result.has_surface && bsdf.has_smooth_part() && !is_mirror) {
-    path.result.has_surface = true;
-    path.result.albedo = path.throughput.cwiseProduct(bsdf.albedo());
-    path.result.normal = v.normal.at(i);
-    path.result.position = v.position.at(i);
+  const bool is_soft = path.is_soft(settings_);
+  if (bsdf.has_smooth_part()) {
+    if (!path.result.has_surface) record_surface(v, i, bsdf.albedo());
+    take_light_samples(v, i);
+    if (settings_.samples_lights) light_glass(v, i, bsdf);
   }
   path.is_camera_ray = false;
-  if (bsdf.has_smooth_part()) {
-    path.has_scattered = true;
-    path.last = v.wishes.receiver(i);
-    path.last.total_score = v.lights.total_score[i];
-    // Where the path ends, light samples alone find all light that a rough surface scatters.
-    const bool ends =
-        path.bounce == settings_.max_bounces && bsdf.is_rough() && settings_.samples_lights;
-    sample_light(v, i, bsdf, settings_.samples_bsdf && !ends);
-    if (ends) return;
-  }
-
-  const BsdfSample next = bsdf.sample(v.numbers[Vertices::kLobe][i],
-                                      v.pair(Vertices::kDirectionU, i), v.by_cosine.at(i));
-  if (!(next.weight.maxCoeff() > 0.0f)) return;
+  const BsdfSample next =
+      bsdf.sample(v.numbers[Vertices::kLobe][i], v.pair(Vertices::kDirectionU, i));
   const Vec3f direction = v.basis(i).to_world(next.wi);
   if ((v.flat_normal.at(i).dot(direction) <= 0.0f) != next.is_transmitted) return;
+  path.hides_lights =
+      path.is_soft(settings_) && (std::isinf(next.density) || (next.is_transmitted && is_soft));
+  go_on(v, i, next, direction);
+}
+
+inline void PathTracer::light_glass(const Batch& v, std::size_t i, const Bsdf& bsdf) const {
+  const float found = v.lights.density[i];
+  if (!(found > 0.0f)) return;
+  const Vec3f towards = v.lights.direction.at(i);
+  const Vec3f wi = v.basis(i).to_local(towards);
+  const bool is_behind = wi.z() <= 0.0f;
+  if (is_behind && v.wishes.is_two_sided[i] == 0) return;
+  if ((v.flat_normal.at(i).dot(towards) <= 0.0f) != is_behind) return;
+  const BsdfValue value = bsdf.evaluate(wi);
+  const bool is_point = std::isinf(found);
+  const float density = (is_point ? 1.0f : found) * v.choices.probability[i];
+  const bool is_shared = settings_.samples_bsdf && !is_point;
+  const float weight = is_shared ? mis_weight(density, value.density) : 1.0f;
+  ask_light(v, i, value.f_cos * (weight / density), Vertices::reach(v.lights.distance[i]));
+}
+
+inline void PathTracer::record_surface(const Batch& v, std::size_t i, const Vec3f& albedo) const {
+  Path& path = *v.paths[i];
+  path.result.has_surface = true;
+  path.result.albedo = path.throughput.cwiseProduct(albedo);
+  path.result.normal = v.normal.at(i);
+  path.result.position = v.position.at(i);
+}
+
+inline void PathTracer::take_light_samples(const Batch& v, std::size_t i) const {
+  Path& path = *v.paths[i];
+  path.is_camera_ray = false;
+  path.has_scattered = true;
+  path.last = v.wishes.receiver(i);
+  path.last.total_score = v.choices.total_score[i];
+}
+
+/// For `share` of the light's radiance, if nothing within `reach` is in the way.
+inline void PathTracer::ask_light(const Batch& v, std::size_t i, const Vec3f& share,
+                                  float reach) const {
+  if (!(reach > 0.0f) || share.maxCoeff() <= 0.0f) return;
+  Path& path = *v.paths[i];
+  ShadowRay& shadow = path.shadow;
+  shadow.direction = v.lights.direction.at(i);
+  shadow.origin = v.leave(i, shadow.direction);
+  shadow.t_max = reach;
+  shadow.share = path.throughput.cwiseProduct(share);
+  shadow.place = v.lights.place(i);
+  shadow.bounce = path.bounce;
+}
+
+inline void PathTracer::go_on(const Batch& v, std::size_t i, const BsdfSample& next,
+                              const Vec3f& direction) const {
+  if (!(next.weight.maxCoeff() > 0.0f)) return;
+  Path& path = *v.paths[i];
   path.throughput = path.throughput.cwiseProduct(next.weight);
   // Russian roulette, by what is left of the light since the first surface: errors count in
   // proportion to what is seen, so a dark surface's paths are as good as a bright one's.
@@ -651,8 +666,6 @@ inline void PathTracer::scatter(const Vertices& v, std::size_t i) const {
   ++path.bounce;
   path.last_density = next.density;
   path.since_last = 0.0f;
-  path.hides_lights =
-      path.is_soft(settings_) && (std::isinf(next.density) || (next.is_transmitted && is_soft));
   path.spread = std::max(path.spread, next.spread);
   path.go(v.leave(i, direction), direction);
 }

@@ -69,22 +69,32 @@ class PathTracer {
  private:
   struct Path;
   struct ShadowRay;
-  struct Vertices;
+  struct Batch;
   using Paths = std::span<Path* const>;
 
   RayCounts trace_all(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
   RayCounts trace_sse42(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
   RayCounts trace_avx2(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
   RayCounts trace_avx512(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
-  void trace_batch(std::vector<Path>& paths, Vertices& vertices) const;
-  void start_path(Path& path, int x, int y) const;
+  void trace_batch(std::vector<Path>& paths, Batch& batch) const;
+  static void arrange_by_light(std::array<Path*, kBatch>& paths, std::size_t count);
+  void start_paths(std::vector<Path>& paths, const BatchFloats& columns,
+                   const BatchFloats& rows) const;
   void open_shutter(Path& path, int row, CameraRay& ray) const;
-  void find_surfaces(Paths paths) const;
-  void meet(Paths paths, Vertices& v) const;
+  void find_surfaces(Paths paths, Batch& v) const;
+  void meet(Paths paths, Batch& v) const;
   /// Adds the light that the surface emits. False: the path is not scattered here.
-  bool dress(Vertices& v, std::size_t i) const;
-  void draw_numbers(Vertices& v) const;
-  void scatter(const Vertices& v, std::size_t i) const;
+  bool dress(Batch& v, std::size_t i) const;
+  void draw_numbers(Batch& v) const;
+  void take_lobes(Batch& v, std::size_t i) const;
+  bool ends_at(const Path& path, const SurfaceBsdf& s) const;
+  void scatter(const Batch& v, std::size_t i) const;
+  void scatter_glass(const Batch& v, std::size_t i) const;
+  void light_glass(const Batch& v, std::size_t i, const Bsdf& bsdf) const;
+  void record_surface(const Batch& v, std::size_t i, const Vec3f& albedo) const;
+  void take_light_samples(const Batch& v, std::size_t i) const;
+  void ask_light(const Batch& v, std::size_t i, const Vec3f& share, float reach) const;
+  void go_on(const Batch& v, std::size_t i, const BsdfSample& next, const Vec3f& direction) const;
   void find_lights(Paths paths) const;
   void add_light(Path& path, const Vec3f& kept) const;
   void collect_lights(Path& path, float t_max) const;
@@ -93,7 +103,6 @@ class PathTracer {
   /// True: the surface let the path through or ended it.
   bool pass_or_reflect(Path& path, const SurfaceGeometry& surface, const ShadingMaterial& material,
                        SurfaceBsdf& bsdf) const;
-  void sample_light(const Vertices& v, std::size_t i, const Bsdf& bsdf, bool has_rival) const;
   void read_textures(const Path& path, const SurfaceGeometry& surface,
                      const ShadingMaterial& material, bool is_soft, SurfaceBsdf& bsdf,
                      Vec3f& normal) const;

@@ -239,9 +239,9 @@ void RenderScene::weaken_shadow_ray(const RTCFilterFunctionNArguments* args) {
     const Vec3f share = straight_share(
         instance, RTCHitN_primID(args->hit, count, i), RTCHitN_u(args->hit, count, i),
         RTCHitN_v(args->hit, count, i), direction.normalized(), shadow.passes_glass);
-    Vec3f& kept = shadow.transmittance[RTCRayN_id(args->ray, count, i)];
-    kept = kept.cwiseProduct(share);
-    if (kept.maxCoeff() > 1e-4f) args->valid[i] = 0;
+    const unsigned ray = RTCRayN_id(args->ray, count, i);
+    shadow.weaken(ray, share);
+    if (shadow.kept[ray].maxCoeff() > 1e-4f) args->valid[i] = 0;
   }
 }
 

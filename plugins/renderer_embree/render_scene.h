@@ -134,6 +134,7 @@ class RenderScene {
 
   const std::vector<std::unique_ptr<MeshInstance>>& instances() const { return instances_; }
   const Lights& lights() const { return lights_; }
+  bool stacks_lobes() const { return options_.stacks_lobes; }
 
   /// The first surface not cut out. The direction is unit length.
   RayHit intersect(const Vec3f& origin, const Vec3f& direction, float t_min, float t_max) const {
@@ -150,12 +151,20 @@ class RenderScene {
                       float time) const {
     return transmittance(scene_over_time(), origin, direction, t_max, passes_glass, ~0u, time);
   }
-  /// The same for the rays of a bundle, which it spends: `hits` and `kept` have RayBundle::kSize
-  /// entries.
-  void intersect(RayBundle& rays, RayHit* hits) const { intersect(scene_over_time(), rays, hits); }
+  /// The same for the rays of a bundle, which it spends. hit_of(i) is a reference to where the hit
+  /// of ray i is put.
+  template <class HitOf>
+  void intersect(RayBundle& rays, HitOf&& hit_of) const {
+    intersect(scene_over_time(), rays, hit_of);
+  }
   /// At the moment of the poses.
-  void intersect_now(RayBundle& rays, RayHit* hits) const { intersect(scene_, rays, hits); }
-  void transmittance(RayBundle& rays, bool passes_glass, Vec3f* kept) const;
+  template <class HitOf>
+  void intersect_now(RayBundle& rays, HitOf&& hit_of) const {
+    intersect(scene_, rays, hit_of);
+  }
+  /// Calls lit(i, share) for every ray of which light is left; spends the bundle.
+  template <class Lit>
+  void transmittance(RayBundle& rays, bool passes_glass, Lit&& lit) const;
   /// Seconds around the moment of the poses that `time` runs through; see shutter_window().
   double window() const { return window_; }
   /// Some instances of the scene with nothing else; valid until the next take().
@@ -211,13 +220,20 @@ class RenderScene {
   /// Carried by shadow rays; the filter of the surfaces on their way weakens what they carry.
   struct ShadowContext {
     embree::Context context;
-    Vec3f* transmittance = nullptr;  ///< By the rays' ids.
+    std::array<Vec3f, RayBundle::kSize> kept;  ///< By the rays' ids; set when is_weakened.
+    bool is_weakened = false;
     bool passes_glass = true;
+    void weaken(unsigned ray, const Vec3f& share) {
+      if (!is_weakened) kept.fill(Vec3f::Ones());
+      is_weakened = true;
+      kept[ray] = kept[ray].cwiseProduct(share);
+    }
   };
 
   static RTCRayHit make_ray(const Vec3f& origin, const Vec3f& direction, float t_min, float t_max,
                             float time);
-  void intersect(RTCScene scene, RayBundle& rays, RayHit* hits) const;
+  template <class HitOf>
+  void intersect(RTCScene scene, RayBundle& rays, HitOf&& hit_of) const;
   RayHit intersect(RTCScene scene, const Vec3f& origin, const Vec3f& direction, float t_min,
                    float t_max, float time) const;
   static Vec3f transmittance(RTCScene scene, const Vec3f& origin, const Vec3f& direction,
@@ -305,14 +321,12 @@ inline Vec3f RenderScene::transmittance(RTCScene scene, const Vec3f& origin, con
                                         float time) {
   RTCRayHit ray = make_ray(origin, direction, 0.0f, t_max, time);
   ray.ray.mask = mask;
-  Vec3f kept = Vec3f::Ones();
   ShadowContext shadow;
-  shadow.transmittance = &kept;
   shadow.passes_glass = passes_glass;
   embree::init(shadow.context);
   embree::occluded(scene, shadow.context, ray.ray);
-  const bool is_hidden = ray.ray.tfar == -kInfinite;
-  return is_hidden ? Vec3f(Vec3f::Zero()) : kept;
+  if (ray.ray.tfar == -kInfinite) return Vec3f::Zero();
+  return shadow.is_weakened ? shadow.kept[0] : Vec3f(Vec3f::Ones());
 }
 
 inline void RayBundle::put(int i, const Vec3f& origin, const Vec3f& direction, float t_min,
@@ -344,36 +358,42 @@ inline void RayBundle::finish() {
   }
 }
 
-inline void RenderScene::intersect(RTCScene scene, RayBundle& bundle, RayHit* hits) const {
+template <class HitOf>
+inline void RenderScene::intersect(RTCScene scene, RayBundle& bundle, HitOf&& hit_of) const {
   bundle.finish();
   RTCRayHit8& rays = bundle.rays_;
   embree::Context context;
   embree::init(context);
   embree::intersect(bundle.valid_.data(), scene, context, rays);
   for (int i = 0; i < bundle.count_; ++i) {
-    hits[i] = {};
-    const unsigned geometry = rays.hit.geomID[i];
-    if (geometry == RTC_INVALID_GEOMETRY_ID) continue;
-    const MeshInstance* instance = instances_[geometry].get();
-    instance->shading->prefetch(rays.hit.primID[i]);
-    hits[i] = {instance,           geometry,
-               rays.hit.primID[i], rays.hit.u[i],
-               rays.hit.v[i],      rays.ray.tfar[i],
-               rays.ray.time[i],   {rays.hit.Ng_x[i], rays.hit.Ng_y[i], rays.hit.Ng_z[i]}};
+    RayHit& hit = hit_of(i);
+    hit.geometry = rays.hit.geomID[i];
+    if (hit.geometry == RTC_INVALID_GEOMETRY_ID) {
+      hit.instance = nullptr;
+      hit.distance = kInfinite;
+      continue;
+    }
+    hit.instance = instances_[hit.geometry].get();
+    hit.triangle = rays.hit.primID[i];
+    hit.instance->shading->prefetch(hit.triangle);
+    hit.u = rays.hit.u[i];
+    hit.v = rays.hit.v[i];
+    hit.distance = rays.ray.tfar[i];
+    hit.time = rays.ray.time[i];
+    hit.normal = {rays.hit.Ng_x[i], rays.hit.Ng_y[i], rays.hit.Ng_z[i]};
   }
 }
 
-inline void RenderScene::transmittance(RayBundle& bundle, bool passes_glass, Vec3f* kept) const {
+template <class Lit>
+inline void RenderScene::transmittance(RayBundle& bundle, bool passes_glass, Lit&& lit) const {
   bundle.finish();
-  for (int i = 0; i < RayBundle::kSize; ++i) kept[i].setOnes();
   ShadowContext shadow;
-  shadow.transmittance = kept;
   shadow.passes_glass = passes_glass;
   embree::init(shadow.context);
   embree::occluded(bundle.valid_.data(), scene_over_time(), shadow.context, bundle.rays_.ray);
   for (int i = 0; i < bundle.count_; ++i) {
-    const bool is_hidden = bundle.rays_.ray.tfar[i] == -kInfinite;
-    if (is_hidden) kept[i].setZero();
+    if (bundle.rays_.ray.tfar[i] == -kInfinite) continue;
+    lit(i, shadow.is_weakened ? shadow.kept[std::size_t(i)] : Vec3f(Vec3f::Ones()));
   }
 }
 

@@ -106,10 +106,9 @@ inline Vec2f triangle_from_square(const Vec2f& u) {
   return {root * (1.0f - u.y()), root * u.y()};
 }
 
-/// Weight of a sample of density `own` against another technique's density (Veach's power
+/// Weight of a sample of density `own` against another technique's finite density (Veach's power
 /// heuristic).
 inline float mis_weight(float own, float other) {
-  if (std::isinf(own)) return 1.0f;
   const float ratio = other / own;
   return 1.0f / (1.0f + ratio * ratio);
 }

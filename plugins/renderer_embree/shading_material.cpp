@@ -80,7 +80,10 @@ SurfaceBsdf MaterialLibrary::make_surface(ShadingMaterial& material, bool is_sof
   const float alpha_key = alpha.value_or(-1.0f);
   // Plain Lambert surfaces need no tables.
   const bool is_metallic = m.metallic_texture || s.metallic > 0.0f;
-  if (!is_metallic && !is_solid_glass && s.is_lambert()) return s;
+  if (!is_metallic && !is_solid_glass && s.is_lambert()) {
+    s.finish();
+    return s;
+  }
   const auto layers = shared(layer_tables_[{s.layers, alpha_key}], [&] {
     return std::make_shared<const LayerTable>(albedo_tables_, s.layers, alpha);
   });
@@ -93,6 +96,7 @@ SurfaceBsdf MaterialLibrary::make_surface(ShadingMaterial& material, bool is_sof
     material.tables.push_back(glass);
     s.glass = glass.get();
   }
+  s.finish();
   return s;
 }
 

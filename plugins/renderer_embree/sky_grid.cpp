@@ -64,7 +64,8 @@ SkyGrid::Shares SkyGrid::seen_from(std::size_t index, const DomeTexture& dome,
       const Vec3f offset(next(), next(), next());
       const Vec3f origin = low_ + (corner + offset).cwiseQuotient(cells_per_metre_);
       const Vec2f u(next(), next());
-      const Vec3f direction = world_from_dome * dome.sample(patch, u).direction;
+      const Vec3f direction =
+          world_from_dome * DomeTexture::towards(dome.sample(patch, u).place).direction;
       if (sees(origin, direction)) seen[std::size_t(patch)] += 1.0f / float(rays);
     }
   }

@@ -35,6 +35,8 @@ class View {
     return is_plain_ ? straight_ray(pixel) : bent_ray(pixel.cast<double>(), aperture);
   }
 
+  /// Whether sample_ray() heeds the point of the aperture.
+  bool has_aperture() const { return aperture_radius_ > 0.0; }
   /// Whether rows or samples see different moments.
   bool has_shutter() const { return has_shutter_; }
   /// Seconds after the moment of the scene's poses at which a row is seen; `u` in [0, 1) goes

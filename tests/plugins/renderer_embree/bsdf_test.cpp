@@ -27,9 +27,11 @@ struct Made {
   explicit Made(const SurfaceBsdf& source)
       : surface(source), layers(tables(), source.layers, source.alpha) {
     surface.table = &layers;
-    if (source.transmission <= 0.0f) return;
-    glass = std::make_unique<GlassTable>(1.5f, source.alpha);
-    surface.glass = glass.get();
+    if (source.transmission > 0.0f) {
+      glass = std::make_unique<GlassTable>(1.5f, source.alpha);
+      surface.glass = glass.get();
+    }
+    surface.finish();
   }
   SurfaceBsdf surface;
   LayerTable layers;

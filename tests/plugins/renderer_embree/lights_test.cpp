@@ -74,6 +74,28 @@ Chosen choose(const Lights& lights, Receiver& receiver, float u) {
   return {std::uint32_t(choices.light[0]), choices.probability[0]};
 }
 
+/// A point of one light, as one place gets it.
+struct Sampled {
+  Vec3f direction;
+  float density = 0.0f;
+  Vec3f radiance;
+};
+Sampled sample(const Lights& lights, const Vec3f& from, const Vec2f& u) {
+  Lights::Wishes wishes;
+  wishes.count = 1;
+  wishes.position.set(0, from);
+  Lights::Choices choices;
+  choices.probability[0] = 1.0f;
+  BatchFloats x{};
+  BatchFloats y{};
+  x[0] = u.x();
+  y[0] = u.y();
+  Lights::Samples samples;
+  lights.sample(wishes, choices, x, y, samples);
+  const Vec3f direction = samples.direction.at(0);
+  return {direction, samples.density[0], lights.radiance_of(samples.place(0), direction)};
+}
+
 }  // namespace
 TEST_CASE("a ray towards a light sample meets that light with the same density", "[lights]") {
   const Vec3f from(0.1f, 0.2f, 0.3f);
@@ -83,19 +105,70 @@ TEST_CASE("a ray towards a light sample meets that light with the same density",
     lights.add(light, pose(), white_sky());
     lights.finish();
     for (int i = 0; i < 500; ++i) {
-      const LightSample s = lights.sample(0, from, {float(rng.uniform()), float(rng.uniform())});
+      const Sampled s = sample(lights, from, {float(rng.uniform()), float(rng.uniform())});
       REQUIRE(s.density > 0.0f);
       int met = 0;
       lights.along_ray(from, s.direction, std::numeric_limits<float>::infinity(), false,
                        [&](std::uint32_t, const Vec3f& radiance, float density) {
                          ++met;
                          CHECK(density == Approx(s.density).epsilon(2e-3));
-                         CHECK((radiance - lights.radiance_of(0, s)).norm() < 1e-4f);
+                         CHECK((radiance - s.radiance).norm() < 1e-4f);
                        });
       if (i > 3) CHECK(met <= 1);
       // Samples on the very rim may miss by rounding; none may do so in numbers.
       if (met == 0) CHECK(i % 50 != 0);
     }
+  }
+}
+
+TEST_CASE("a batch of places gets what each would get alone, and its rays meet the same lights",
+          "[lights]") {
+  Lights lights;
+  for (const Light& light : every_kind()) lights.add(light, pose(), white_sky());
+  lights.add(square(0.4, pose()));
+  lights.finish();
+  Rng rng(3);
+  Lights::Wishes wishes;
+  Lights::Choices choices;
+  BatchFloats u{};
+  BatchFloats v{};
+  wishes.count = 61;
+  for (std::size_t i = 0; i < wishes.count; ++i) {
+    wishes.position.set(i, {float(rng.uniform()), float(rng.uniform()), float(rng.uniform())});
+    choices.light[i] = std::int32_t(i % lights.count());
+    choices.probability[i] = i % 5 == 4 ? 0.0f : 0.5f;
+    u[i] = float(rng.uniform());
+    v[i] = float(rng.uniform());
+  }
+  Lights::Samples samples;
+  lights.sample(wishes, choices, u, v, samples);
+  BatchInts may_meet{};
+  lights.find_near(wishes.count, wishes.position, samples.direction, may_meet);
+  for (std::size_t i = 0; i < wishes.count; ++i) {
+    CAPTURE(i);
+    if (choices.probability[i] == 0.0f) {
+      CHECK(samples.density[i] == 0.0f);
+      continue;
+    }
+    Lights::Wishes one;
+    one.count = 1;
+    one.position.set(0, wishes.position.at(i));
+    Lights::Choices chosen;
+    chosen.light[0] = choices.light[i];
+    chosen.probability[0] = 0.5f;
+    BatchFloats own_u{};
+    BatchFloats own_v{};
+    own_u[0] = u[i];
+    own_v[0] = v[i];
+    Lights::Samples alone;
+    lights.sample(one, chosen, own_u, own_v, alone);
+    CHECK(alone.density[0] == samples.density[i]);
+    CHECK(alone.distance[0] == samples.distance[i]);
+    CHECK(alone.direction.at(0) == samples.direction.at(i));
+    int bodies = 0;
+    lights.along_ray(wishes.position.at(i), samples.direction.at(i), 1e6f, false,
+                     [&](std::uint32_t, const Vec3f&, float) { ++bodies; });
+    if (bodies > 0) CHECK(may_meet[i] != 0);
   }
 }
 
@@ -219,8 +292,7 @@ TEST_CASE("a lamp taken as a turning disk gives a near point less light", "[ligh
   double sum = 0.0;
   constexpr int kSamples = 100000;
   for (int i = 0; i < kSamples; ++i) {
-    const LightSample s =
-        lights.sample(0, Vec3f::Zero(), {float(rng.uniform()), float(rng.uniform())});
+    const Sampled s = sample(lights, Vec3f::Zero(), {float(rng.uniform()), float(rng.uniform())});
     REQUIRE(s.density > 0.0f);
     sum += double(s.radiance.x() * s.direction.z() / s.density) / kSamples;
     float met = 0.0f;
@@ -253,11 +325,10 @@ TEST_CASE("the light that falls on a point is that of the closed forms", "[light
     double sum = 0.0;
     constexpr int kSamples = 100000;
     for (int i = 0; i < kSamples; ++i) {
-      const LightSample s =
-          lights.sample(0, Vec3f::Zero(), {float(rng.uniform()), float(rng.uniform())});
+      const Sampled s = sample(lights, Vec3f::Zero(), {float(rng.uniform()), float(rng.uniform())});
       if (s.density <= 0.0f || s.direction.z() <= 0.0f) continue;
       const float density = std::isinf(s.density) ? 1.0f : s.density;
-      sum += double(lights.radiance_of(0, s).x() * s.direction.z() / density) / kSamples;
+      sum += double(s.radiance.x() * s.direction.z() / density) / kSamples;
     }
     return sum;
   };
@@ -322,7 +393,7 @@ TEST_CASE("a cone keeps light to its inside", "[lights]") {
   lights.add(spot, Affine(Eigen::Translation3d(0, 0, 2)), nullptr);
   const auto at_angle = [&](double angle) {
     const Vec3f from(float(2.0 * std::tan(angle)), 0.0f, 0.0f);
-    return lights.sample(0, from, {0.5f, 0.5f}).radiance.x();
+    return sample(lights, from, {0.5f, 0.5f}).radiance.x();
   };
   CHECK(at_angle(0.3) == 1.0f);
   CHECK(at_angle(0.45) > 0.05f);

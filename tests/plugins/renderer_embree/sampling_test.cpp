@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <functional>
+#include <tuple>
 #include <vector>
 
 #include "diorama/rng.h"
@@ -112,20 +113,22 @@ TEST_CASE("a dome is sampled as bright as it is", "[sampling]") {
     const auto draw = [&](const Vec2f& u) {
       const SkyGrid::Choice choice = grid->choose(cell, u.x());
       const DomeTexture::Draw d = dome.sample(choice.patch, {choice.rest, u.y()});
-      return std::pair(d, d.density * choice.probability);
+      const DomeTexture::Towards towards = DomeTexture::towards(d.place);
+      return std::tuple(towards.direction, d.density * towards.per_solid_angle * choice.probability,
+                        d.place);
     };
     const auto density = [&](const Vec3f& d) {
       const DomeTexture::Place place = dome.place(d);
       return place.density * grid->probability(cell, place.patch);
     };
-    CHECK(chi_square([&](const Vec2f& u) { return draw(u).first.direction; }, density) < 3.0);
+    CHECK(chi_square([&](const Vec2f& u) { return std::get<0>(draw(u)); }, density) < 3.0);
     // Sampling and density agree direction by direction, and radiance / density stays bounded.
     int differing = 0;
     for (int i = 0; i < 2000; ++i) {
-      const auto [d, p] = draw({float(rng.uniform()), float(rng.uniform())});
-      differing += std::abs(density(d.direction) / p - 1.0f) > 0.02f;  // on a cell's rim
-      const Vec3f radiance = dome.radiance_at(d.place);
-      const Vec3f again = dome.place(d.direction).radiance;
+      const auto [d, p, at] = draw({float(rng.uniform()), float(rng.uniform())});
+      differing += std::abs(density(d) / p - 1.0f) > 0.02f;  // on a cell's rim
+      const Vec3f radiance = dome.radiance_at(at);
+      const Vec3f again = dome.place(d).radiance;
       CHECK((again - radiance).norm() < 0.02f * (1.0f + radiance.norm()));
       if (grid == &everything) CHECK(luminance(radiance) / p < 60.0f);
     }
