@@ -163,14 +163,14 @@ CoverageMask drawn(const RenderScene& meshes, const View& view, const OwnMeshes&
 
 /// A ray along an edge may meet what arithmetic finds a hair beside it. What is seen is covered, at
 /// the distance seen, and nothing is nearer.
-void agree_with(const Image<SeenPixel>& seen, const OwnMeshes& own, CoverageMask& mask) {
+void agree_with(const Image<RayHit>& seen, const OwnMeshes& own, CoverageMask& mask) {
   const PixelBox box = mask.box.clipped(seen.width(), seen.height());
   for (int y = box.y_min; y < box.y_max; ++y) {
     for (int x = box.x_min; x < box.x_max; ++x) {
-      const SeenPixel& pixel = seen.at(x, y);
-      if (!pixel.is_hit()) continue;
+      const RayHit& pixel = seen.at(x, y);
+      if (!pixel) continue;
       const std::size_t i = mask.index(x, y);
-      const bool is_own = own.is_own[pixel.mesh];
+      const bool is_own = own.is_own[pixel.geometry];
       if (is_own) mask.bits[i] = 1;
       if (mask.distances.empty() || mask.bits[i] == 0) continue;
       mask.distances[i] = is_own ? pixel.distance : std::max(mask.distances[i], pixel.distance);
@@ -179,7 +179,7 @@ void agree_with(const Image<SeenPixel>& seen, const OwnMeshes& own, CoverageMask
 }
 
 CoverageMask coverage_of(const RenderScene& meshes, const View& view,
-                         const std::optional<RayBlocks>& blocks, const Image<SeenPixel>& seen,
+                         const std::optional<RayBlocks>& blocks, const Image<RayHit>& seen,
                          const LabelledInstance& instance, bool with_distances) {
   const OwnMeshes own = meshes_of(instance, meshes);
   const PixelBox box = possible_pixels(view, blocks, own.bounds);
@@ -202,18 +202,17 @@ NameSet geometry_channels() {
   return names;
 }
 
-Image<SeenPixel> fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshes,
-                               const View& view, Host& host) {
+Image<RayHit> fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshes,
+                            const View& view, Host& host) {
   const int width = view.camera().width;
   const int height = view.camera().height;
-  Image<SeenPixel> seen(width, height, SeenPixel());
+  Image<RayHit> seen(width, height, RayHit());
   ChannelImages channels(wanted, view);
   host.parallel_for(std::size_t(height), [&](std::size_t row) {
     const int y = int(row);
     RayBundle bundle;
     std::array<int, RayBundle::kSize> columns;
     std::array<CameraRay, RayBundle::kSize> rays;
-    std::array<RayHit, RayBundle::kSize> hits;
     for (int begin = 0; begin < width; begin += RayBundle::kSize) {
       bundle.clear();
       std::size_t count = 0;
@@ -225,11 +224,12 @@ Image<SeenPixel> fill_channels(Frame& frame, const NameSet& wanted, const Render
         rays[count++] = *ray;
       }
       if (count == 0) continue;
-      meshes.intersect_now(bundle, [&](int i) -> RayHit& { return hits[std::size_t(i)]; });
+      const auto hit_of = [&](int i) -> RayHit& { return seen.at(columns[std::size_t(i)], y); };
+      meshes.intersect_now(bundle, hit_of);
+      if (wanted.empty()) continue;
       for (std::size_t i = 0; i < count; ++i) {
-        if (!hits[i]) continue;
-        seen.at(columns[i], y) = {hits[i].geometry, hits[i].distance};
-        channels.put(columns[i], y, rays[i], hits[i]);
+        const RayHit& hit = hit_of(int(i));
+        if (hit) channels.put(columns[i], y, rays[i], hit);
       }
     }
   });
@@ -238,7 +238,7 @@ Image<SeenPixel> fill_channels(Frame& frame, const NameSet& wanted, const Render
 }
 
 std::vector<CoverageMask> coverage(const RenderScene& meshes, const View& view,
-                                   const Image<SeenPixel>& seen,
+                                   const Image<RayHit>& seen,
                                    std::span<const LabelledInstance> instances, bool with_distances,
                                    Host& host) {
   std::vector<CoverageMask> masks(instances.size());

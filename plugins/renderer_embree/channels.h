@@ -15,23 +15,14 @@ namespace diorama {
 /// Names of the channels that fill_channels() knows.
 NameSet geometry_channels();
 
-/// What the ray through a pixel's centre met first.
-struct SeenPixel {
-  static constexpr std::uint32_t kNothing = 0xFFFFFFFFu;
-
-  std::uint32_t mesh = kNothing;  ///< Number in RenderScene::instances().
-  float distance = kInfinite;
-  bool is_hit() const { return mesh != kNothing; }
-};
-
 /// Fills the wanted ones among the id and geometry channels, all from one ray per pixel centre, and
-/// returns what these rays met.
-Image<SeenPixel> fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshes,
-                               const View& view, Host& host);
+/// returns what these rays met; valid until the scene's next take().
+Image<RayHit> fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshes,
+                            const View& view, Host& host);
 
 /// See Renderer::cover. `seen` is that of the same view.
 std::vector<CoverageMask> coverage(const RenderScene& meshes, const View& view,
-                                   const Image<SeenPixel>& seen,
+                                   const Image<RayHit>& seen,
                                    std::span<const LabelledInstance> instances, bool with_distances,
                                    Host& host);
 

@@ -142,9 +142,24 @@ void EmbreeRenderer::do_prepare(const Scene& scene) {
   }
 }
 
-Film EmbreeRenderer::trace(const View& view, std::uint64_t seed) {
+/// What the view's camera sees at the pixels' centres.
+const Image<RayHit>& EmbreeRenderer::seen(const View& view, NodeId camera) {
+  if (seen_by_ != camera) {
+    Frame frame;
+    seen_ = fill_channels(frame, {}, meshes_, view, host_);
+    seen_by_ = camera;
+  }
+  return seen_;
+}
+
+Film EmbreeRenderer::trace(const View& view, NodeId camera, std::uint64_t seed) {
   TraceSettings settings{params_.max_bounces, float(params_.clamp), params_.caustics};
-  if (params_.mode == "real_time") settings.indirect_share = kRealTimeIndirectShare;
+  const bool is_real_time = params_.mode == "real_time";
+  if (is_real_time) settings.indirect_share = kRealTimeIndirectShare;
+  const bool sees_one_moment = !view.has_shutter() && !view.has_aperture();
+  if (is_real_time && params_.samples == 1 && sees_one_moment) {
+    settings.first_hits = &seen(view, camera);
+  }
   const PathTracer tracer(meshes_, view, settings, isa_);
   const int width = view.camera().width;
   const int height = view.camera().height;
@@ -192,7 +207,7 @@ void EmbreeRenderer::put_colors(Frame& frame, const RenderRequest& request, cons
   Film film;
   {
     const Stopwatch watch(counts_.trace_s);
-    film = trace(view, request.seed);
+    film = trace(view, request.camera, request.seed);
   }
   Image<Vec3f> hdr;
   {
@@ -231,12 +246,7 @@ std::vector<CoverageMask> EmbreeRenderer::do_cover(const Scene& scene, NodeId ca
                                                    std::span<const LabelledInstance> instances,
                                                    bool with_distances) {
   const View view(scene, camera);
-  if (seen_by_ != camera) {
-    Frame frame;
-    seen_ = fill_channels(frame, {}, meshes_, view, host_);
-    seen_by_ = camera;
-  }
-  return coverage(meshes_, view, seen_, instances, with_distances, host_);
+  return coverage(meshes_, view, seen(view, camera), instances, with_distances, host_);
 }
 
 }  // namespace diorama

@@ -60,7 +60,8 @@ class EmbreeRenderer final : public Renderer {
   std::vector<CoverageMask> do_cover(const Scene& scene, NodeId camera,
                                      std::span<const LabelledInstance> instances,
                                      bool with_distances) override;
-  Film trace(const View& view, std::uint64_t seed);
+  const Image<RayHit>& seen(const View& view, NodeId camera);
+  Film trace(const View& view, NodeId camera, std::uint64_t seed);
   Image<Vec3f> without_noise(const Film& film, const View& view);
   void put_colors(Frame& frame, const RenderRequest& request, const View& view);
 
@@ -70,7 +71,7 @@ class EmbreeRenderer final : public Renderer {
   RenderScene meshes_;
   Counts counts_;
   NodeId seen_by_;  ///< The camera of `seen_`, if there is any.
-  Image<SeenPixel> seen_;
+  Image<RayHit> seen_;
 };
 
 }  // namespace diorama

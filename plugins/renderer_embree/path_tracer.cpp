@@ -94,6 +94,7 @@ struct PathTracer::Path {
   float left_by_first = 1.0f;  ///< Largest throughput behind the first scattering surface.
   int bounce = 0;
   int passages = 0;
+  bool is_new = true;  ///< All of a batch or none.
   bool is_camera_ray = true;
   bool has_scattered = false;  ///< Over a surface that is no mirror.
   bool hides_lights = false;   ///< Their light was already counted, or is left out on purpose.
@@ -210,6 +211,7 @@ inline RayCounts PathTracer::trace_all(const TraceJob& job, PixelSum* sums,
 
 inline void PathTracer::start_paths(std::vector<Path>& paths, const BatchFloats& columns,
                                     const BatchFloats& rows) const {
+  const Image<RayHit>* hits = settings_.first_hits;
   BatchInts keys{};
   BatchInts places{};
   for (std::size_t i = 0; i < paths.size(); ++i) {
@@ -220,8 +222,8 @@ inline void PathTracer::start_paths(std::vector<Path>& paths, const BatchFloats&
   BatchFloats y;
   for (std::size_t i = 0; i < whole_steps(paths.size()); ++i) {
     const Vec2f u = PathSampler::pair(std::uint32_t(keys[i]), std::uint32_t(places[i]));
-    x[i] = columns[i] + u.x();
-    y[i] = rows[i] + u.y();
+    x[i] = columns[i] + (hits ? 0.5f : u.x());
+    y[i] = rows[i] + (hits ? 0.5f : u.y());
   }
   for (std::size_t i = 0; i < paths.size(); ++i) {
     Path& path = paths[i];
@@ -237,6 +239,7 @@ inline void PathTracer::start_paths(std::vector<Path>& paths, const BatchFloats&
     path.t_min = ray.t_min;
     path.t_max = ray.t_max;
     path.spread = view_.pixel_angle();
+    if (hits) path.hit = hits->at(int(columns[i]), int(rows[i]));
   }
 }
 
@@ -301,14 +304,22 @@ inline void PathTracer::trace_batch(std::vector<Path>& paths, Batch& v) const {
 }
 
 inline void PathTracer::find_surfaces(Paths paths, Batch& v) const {
+  for (std::size_t i = 0; i < paths.size(); ++i) {
+    v.ray_origin.set(i, paths[i]->origin);
+    v.ray_direction.set(i, paths[i]->direction);
+  }
+  const bool knows_hits = settings_.first_hits && paths[0]->is_new;
+  if (!knows_hits) trace_rays(paths);
+  for (Path* path : paths) path->is_new = false;
+}
+
+inline void PathTracer::trace_rays(Paths paths) const {
   RayBundle rays;
   for (std::size_t begin = 0; begin < paths.size(); begin += RayBundle::kSize) {
     const std::size_t end = std::min(begin + RayBundle::kSize, paths.size());
     rays.clear();
     for (std::size_t i = begin; i < end; ++i) {
       Path& path = *paths[i];
-      v.ray_origin.set(i, path.origin);
-      v.ray_direction.set(i, path.direction);
       rays.add(path.origin, path.direction, path.t_min, path.t_max, path.time);
       ++path.counts.rays;
       if (settings_.ray_log) [[unlikely]] {

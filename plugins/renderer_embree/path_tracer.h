@@ -33,6 +33,9 @@ struct TraceSettings {
   /// Share of the paths that go on behind their first scattering surface, with more weight: less
   /// time for a picture, more noise in its indirect light.
   float indirect_share = 1.0f;
+  /// What the rays through the pixels' centres met, if known: every path then starts there. For
+  /// views without aperture and shutter, and no more than a path per pixel.
+  const Image<RayHit>* first_hits = nullptr;
   /// For tests of the estimators: which of the two techniques that find light are used.
   bool samples_lights = true;
   bool samples_bsdf = true;
@@ -82,6 +85,7 @@ class PathTracer {
                    const BatchFloats& rows) const;
   void open_shutter(Path& path, int row, CameraRay& ray) const;
   void find_surfaces(Paths paths, Batch& v) const;
+  void trace_rays(Paths paths) const;
   void meet(Paths paths, Batch& v) const;
   /// Adds the light that the surface emits. False: the path is not scattered here.
   bool dress(Batch& v, std::size_t i) const;
