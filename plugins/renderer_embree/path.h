@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+
+#include "path_tracer.h"
+#include "vertices.h"
+
+// Inside of PathTracer: what its kernels and special surfaces share.
+namespace diorama {
+
+/// A light sample whose way is not looked at yet.
+struct PathTracer::ShadowRay {
+  Vec3f origin;
+  Vec3f direction;
+  float t_max = 0.0f;  ///< 0: there is none.
+  Vec3f share;         ///< Of the light's radiance, when nothing is in the way.
+  LightPlace place;
+  int bounce = 0;
+};
+
+struct PathTracer::Path {
+  explicit Path(PathSampler source) : sampler(source) {}
+
+  PathSampler sampler;
+  RayHit hit;
+  ShadowRay shadow;
+  PathSample result;
+  RayCounts counts;
+  Vec3f origin;
+  Vec3f direction;
+  float t_min = 0.0f;
+  float t_max = kInfinite;
+  Vec3f throughput = Vec3f::Ones();
+  float left_by_first = 1.0f;  ///< Largest throughput behind the first scattering surface.
+  int bounce = 0;
+  int passages = 0;
+  bool is_new = true;  ///< All of a batch or none.
+  bool is_camera_ray = true;
+  bool has_scattered = false;  ///< Over a surface that is no mirror.
+  bool hides_lights = false;   ///< Their light was already counted, or is left out on purpose.
+  bool is_over = false;
+  Receiver last;  ///< The last vertex that took light samples.
+  float last_density = kInfinite;
+  float since_last = 0.0f;  ///< Metres travelled from it.
+  float width = 0.0f;       ///< Of the ray's footprint, metres.
+  float spread = 0.0f;      ///< Its growth per metre.
+  float time = kMoment;     ///< Share of the shutter's window.
+
+  /// Whether what it meets next is softened, as only caustics would show the difference.
+  bool is_soft(const TraceSettings& settings) const {
+    return has_scattered && !settings.has_caustics;
+  }
+  void go(const Vec3f& from, const Vec3f& towards) {
+    origin = from;
+    direction = towards;
+    t_min = 0.0f;
+    t_max = kInfinite;
+  }
+};
+
+struct PathTracer::Batch : Vertices {
+  std::array<Path*, kBatch> paths{};
+  BatchVectors ray_origin;  ///< Of all paths under way.
+  BatchVectors ray_direction;
+  BatchInts may_meet_light{};
+
+  /// What is known before find_bases(), to where the entries that scatter stand together.
+  void move(std::size_t from, std::size_t to);
+};
+
+inline void PathTracer::Batch::move(std::size_t from, std::size_t to) {
+  if (from == to) return;
+  paths[to] = paths[from];
+  direction.set(to, direction.at(from));
+  position.set(to, position.at(from));
+  flat_normal.set(to, flat_normal.at(from));
+  normal.set(to, normal.at(from));
+  is_back[to] = is_back[from];
+  bsdf[to] = bsdf[from];
+  if (bsdf[from] != &own_bsdf[from]) return;
+  own_bsdf[to] = own_bsdf[from];
+  bsdf[to] = &own_bsdf[to];
+}
+
+inline void PathTracer::add(Path& path, int bounce, const Vec3f& radiance) const {
+  // Extreme densities may round to a value beyond all numbers, which would spoil its pixel.
+  constexpr float kMost = 1e20f;
+  if (!(radiance.sum() < kMost)) return;
+  Vec3f value = radiance;
+  if (!path.has_scattered) {
+    path.result.seen += value;
+    return;
+  }
+  if (settings_.clamp > 0.0f && bounce > 1) {
+    const float l = luminance(value);
+    if (l > settings_.clamp) value *= settings_.clamp / l;
+  }
+  path.result.scattered += value;
+}
+
+}  // namespace diorama
