@@ -213,6 +213,7 @@ Image<RayHit> fill_channels(Frame& frame, const NameSet& wanted, const RenderSce
     RayBundle bundle;
     std::array<int, RayBundle::kSize> columns;
     std::array<CameraRay, RayBundle::kSize> rays;
+    BatchHits hits;
     for (int begin = 0; begin < width; begin += RayBundle::kSize) {
       bundle.clear();
       std::size_t count = 0;
@@ -224,12 +225,12 @@ Image<RayHit> fill_channels(Frame& frame, const NameSet& wanted, const RenderSce
         rays[count++] = *ray;
       }
       if (count == 0) continue;
-      const auto hit_of = [&](int i) -> RayHit& { return seen.at(columns[std::size_t(i)], y); };
-      meshes.intersect_now(bundle, hit_of);
-      if (wanted.empty()) continue;
+      meshes.intersect_now(bundle, 0, hits);
       for (std::size_t i = 0; i < count; ++i) {
-        const RayHit& hit = hit_of(int(i));
-        if (hit) channels.put(columns[i], y, rays[i], hit);
+        if (!hits.instance[i]) continue;
+        RayHit& hit = seen.at(columns[i], y);
+        hit = hits.at(i);
+        if (!wanted.empty()) channels.put(columns[i], y, rays[i], hit);
       }
     }
   });

@@ -23,7 +23,7 @@ struct PathTracer::Path {
   explicit Path(PathSampler source) : sampler(source) {}
 
   PathSampler sampler;
-  RayHit hit;
+  const RayHit* first_hit = nullptr;  ///< Known from the start; see TraceSettings.
   ShadowRay shadow;
   PathSample result;
   RayCounts counts;
@@ -35,7 +35,6 @@ struct PathTracer::Path {
   float left_by_first = 1.0f;  ///< Largest throughput behind the first scattering surface.
   int bounce = 0;
   int passages = 0;
-  bool is_new = true;  ///< All of a batch or none.
   bool is_camera_ray = true;
   bool has_scattered = false;  ///< Over a surface that is no mirror.
   bool hides_lights = false;   ///< Their light was already counted, or is left out on purpose.
@@ -61,8 +60,6 @@ struct PathTracer::Path {
 
 struct PathTracer::Batch : Vertices {
   std::array<Path*, kBatch> paths{};
-  BatchVectors ray_origin;  ///< Of all paths under way.
-  BatchVectors ray_direction;
   BatchInts may_meet_light{};
 
   /// What is known before find_bases(), to where the entries that scatter stand together.

@@ -134,12 +134,12 @@ bool PathTracer::pass_or_reflect(Path& path, const SurfaceGeometry& surface,
   return true;
 }
 
-void PathTracer::read_textures(const Path& path, const SurfaceGeometry& surface,
+void PathTracer::read_textures(const Path& path, const RayHit& hit, const SurfaceGeometry& surface,
                                const ShadingMaterial& material, bool is_soft, SurfaceBsdf& s,
                                Vec3f& normal) const {
   const float cosine = std::max(0.1f, -surface.normal.dot(path.direction));
   const float footprint = path.width * surface.uv_per_metre / std::sqrt(cosine);
-  s.base = base_color_at(path.hit, surface, footprint).cwiseMin(1.0f);
+  s.base = base_color_at(hit, surface, footprint).cwiseMin(1.0f);
   if (material.metallic) {
     s.metallic = std::clamp(material.metallic.scalar(surface.uv, footprint), 0.0f, 1.0f);
   }
@@ -148,7 +148,7 @@ void PathTracer::read_textures(const Path& path, const SurfaceGeometry& surface,
     s.alpha = ShadingMaterial::alpha_of(roughness, is_soft && !s.glass);
   }
   if (material.normal) {
-    normal = mapped_normal(path.hit, surface, material.normal, footprint, -path.direction);
+    normal = mapped_normal(hit, surface, material.normal, footprint, -path.direction);
   }
 }
 

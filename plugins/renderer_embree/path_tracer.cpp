@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "path.h"
 
@@ -113,7 +114,7 @@ inline void PathTracer::start_paths(std::vector<Path>& paths, const BatchFloats&
     path.t_min = ray.t_min;
     path.t_max = ray.t_max;
     path.spread = view_.pixel_angle();
-    if (hits) path.hit = hits->at(int(columns[i]), int(rows[i]));
+    if (hits) path.first_hit = &hits->at(int(columns[i]), int(rows[i]));
   }
 }
 
@@ -142,7 +143,7 @@ inline void PathTracer::trace_batch(std::vector<Path>& paths, Batch& v) const {
   }
   while (count > 0) {
     find_surfaces(std::span(active).first(count), v);
-    meet(std::span(active).first(count), v);
+    meet(v);
     v.find_surfaces();
     std::size_t scattered = 0;
     for (std::size_t i = 0; i < v.count; ++i) {
@@ -172,29 +173,31 @@ inline void PathTracer::trace_batch(std::vector<Path>& paths, Batch& v) const {
 }
 
 inline void PathTracer::find_surfaces(Paths paths, Batch& v) const {
+  v.count = paths.size();
   for (std::size_t i = 0; i < paths.size(); ++i) {
-    v.ray_origin.set(i, paths[i]->origin);
-    v.ray_direction.set(i, paths[i]->direction);
+    v.paths[i] = paths[i];
+    v.origin.set(i, paths[i]->origin);
+    v.direction.set(i, paths[i]->direction);
   }
-  const bool knows_hits = settings_.first_hits && paths[0]->is_new;
-  if (!knows_hits) trace_rays(paths);
-  for (Path* path : paths) path->is_new = false;
+  if (!paths[0]->first_hit) return trace_rays(v);
+  for (std::size_t i = 0; i < paths.size(); ++i) {
+    v.hits.set(i, *std::exchange(paths[i]->first_hit, nullptr));
+  }
 }
 
-inline void PathTracer::trace_rays(Paths paths) const {
+inline void PathTracer::trace_rays(Batch& v) const {
   RayBundle rays;
-  for (std::size_t begin = 0; begin < paths.size(); begin += RayBundle::kSize) {
-    const std::size_t end = std::min(begin + RayBundle::kSize, paths.size());
+  for (std::size_t begin = 0; begin < v.count; begin += RayBundle::kSize) {
     rays.clear();
-    for (std::size_t i = begin; i < end; ++i) {
-      Path& path = *paths[i];
+    for (std::size_t i = begin; i < std::min(begin + RayBundle::kSize, v.count); ++i) {
+      Path& path = *v.paths[i];
       rays.add(path.origin, path.direction, path.t_min, path.t_max, path.time);
       ++path.counts.rays;
       if (settings_.ray_log) [[unlikely]] {
         settings_.ray_log->push_back({path.origin, path.direction, path.t_min, path.t_max, false});
       }
     }
-    scene_.intersect(rays, [&](int i) -> RayHit& { return paths[begin + std::size_t(i)]->hit; });
+    scene_.intersect(rays, begin, v.hits);
   }
 }
 
@@ -234,47 +237,45 @@ inline void PathTracer::add_light(Path& path, const Vec3f& kept) const {
   add(path, shadow.bounce, shadow.share.cwiseProduct(kept).cwiseProduct(radiance));
 }
 
-inline void PathTracer::meet(Paths paths, Batch& v) const {
-  scene_.lights().find_near(paths.size(), v.ray_origin, v.ray_direction, v.may_meet_light);
-  v.count = 0;
-  for (std::size_t k = 0; k < paths.size(); ++k) {
-    Path* path = paths[k];
-    const RayHit& hit = path->hit;
-    if (v.may_meet_light[k] != 0 || !hit) collect_lights(*path, hit.distance);
-    path->is_over = true;
-    if (!hit) continue;
-    path->since_last += hit.distance;
-    path->width += path->spread * hit.distance;
-    const ShadingMaterial& material = hit.instance->material(hit.triangle);
-    if (path->bounce > settings_.max_bounces && !material.emits) continue;
-    const std::size_t i = v.count++;
-    v.paths[i] = path;
+inline void PathTracer::meet(Batch& v) const {
+  scene_.lights().find_near(v.count, v.origin, v.direction, v.may_meet_light);
+  for (std::size_t i = 0; i < v.count; ++i) {
+    Path& path = *v.paths[i];
+    const float distance = v.hits.distance[i];
+    const MeshInstance* instance = v.hits.instance[i];
+    if (v.may_meet_light[i] != 0 || !instance) collect_lights(path, distance);
+    path.is_over = true;
+    v.material[i] = nullptr;
+    if (!instance) continue;
+    path.since_last += distance;
+    path.width += path.spread * distance;
+    const ShadingMaterial& material = instance->material(std::uint32_t(v.hits.triangle[i]));
+    if (path.bounce > settings_.max_bounces && !material.emits) continue;
     v.material[i] = &material;
-    v.direction.set(i, path->direction);
-    v.position.set(i, path->origin + hit.distance * path->direction);
-    v.triangle_normal.set(i, hit.normal);
-    v.interpolated.set(i, RenderScene::interpolated_normal(hit));
-    v.is_mirrored[i] = hit.instance->is_mirrored;
+    v.interpolated.set(i, RenderScene::interpolated_normal(v.hits.at(i)));
+    v.is_mirrored[i] = instance->is_mirrored;
   }
 }
 
 inline bool PathTracer::dress(Batch& v, std::size_t i) const {
+  if (!v.material[i]) return false;
   Path& path = *v.paths[i];
   const ShadingMaterial& material = *v.material[i];
   const bool is_soft = path.is_soft(settings_);
   v.bsdf[i] = is_soft ? &material.soft : &material.sharp;
-  const bool has_colors = !path.hit.instance->mesh->colors.empty();
+  const bool has_colors = !v.hits.instance[i]->mesh->colors.empty();
   if (!material.is_special && !has_colors) return true;
+  const RayHit hit = v.hits.at(i);
   SurfaceGeometry surface = v.surface(i);
-  if (material.reads_uv) RenderScene::add_uv(surface, path.hit);
-  if (material.emits) collect_emission(path, path.hit, surface, material);
+  if (material.reads_uv) RenderScene::add_uv(surface, hit);
+  if (material.emits) collect_emission(path, hit, surface, material);
   if (path.bounce > settings_.max_bounces) return false;
   SurfaceBsdf& bsdf = v.own_bsdf[i];
   bsdf = *v.bsdf[i];
   v.bsdf[i] = &bsdf;
   bsdf.is_inside = surface.is_back;
   if (material.is_textured || has_colors) {
-    read_textures(path, surface, material, is_soft, bsdf, surface.normal);
+    read_textures(path, hit, surface, material, is_soft, bsdf, surface.normal);
     bsdf.finish();
     v.normal.set(i, surface.normal);
   }

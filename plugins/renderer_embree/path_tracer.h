@@ -85,8 +85,8 @@ class PathTracer {
                    const BatchFloats& rows) const;
   void open_shutter(Path& path, int row, CameraRay& ray) const;
   void find_surfaces(Paths paths, Batch& v) const;
-  void trace_rays(Paths paths) const;
-  void meet(Paths paths, Batch& v) const;
+  void trace_rays(Batch& v) const;
+  void meet(Batch& v) const;
   /// Adds the light that the surface emits. False: the path is not scattered here.
   bool dress(Batch& v, std::size_t i) const;
   void draw_numbers(Batch& v) const;
@@ -107,7 +107,7 @@ class PathTracer {
   /// True: the surface let the path through or ended it.
   bool pass_or_reflect(Path& path, const SurfaceGeometry& surface, const ShadingMaterial& material,
                        SurfaceBsdf& bsdf) const;
-  void read_textures(const Path& path, const SurfaceGeometry& surface,
+  void read_textures(const Path& path, const RayHit& hit, const SurfaceGeometry& surface,
                      const ShadingMaterial& material, bool is_soft, SurfaceBsdf& bsdf,
                      Vec3f& normal) const;
   void add(Path& path, int bounce, const Vec3f& radiance) const;

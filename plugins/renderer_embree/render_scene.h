@@ -76,6 +76,39 @@ struct RayHit {
   explicit operator bool() const { return instance != nullptr; }
 };
 
+/// What the rays of a batch met.
+struct BatchHits {
+  std::array<const MeshInstance*, kBatch> instance{};  ///< Null: nothing.
+  BatchInts geometry{};
+  BatchInts triangle{};
+  BatchFloats u{};
+  BatchFloats v{};
+  BatchFloats distance{};
+  BatchFloats time{};
+  BatchVectors normal;
+
+  RayHit at(std::size_t i) const {
+    return {instance[i],
+            std::uint32_t(geometry[i]),
+            std::uint32_t(triangle[i]),
+            u[i],
+            v[i],
+            distance[i],
+            time[i],
+            normal.at(i)};
+  }
+  void set(std::size_t i, const RayHit& hit) {
+    instance[i] = hit.instance;
+    geometry[i] = std::int32_t(hit.geometry);
+    triangle[i] = std::int32_t(hit.triangle);
+    u[i] = hit.u;
+    v[i] = hit.v;
+    distance[i] = hit.distance;
+    time[i] = hit.time;
+    normal.set(i, hit.normal);
+  }
+};
+
 /// Up to eight rays that are traced together, which is faster where they go similar ways.
 class RayBundle {
  public:
@@ -151,16 +184,14 @@ class RenderScene {
                       float time) const {
     return transmittance(scene_over_time(), origin, direction, t_max, passes_glass, ~0u, time);
   }
-  /// The same for the rays of a bundle, which it spends. hit_of(i) is a reference to where the hit
-  /// of ray i is put.
-  template <class HitOf>
-  void intersect(RayBundle& rays, HitOf&& hit_of) const {
-    intersect(scene_over_time(), rays, hit_of);
+  /// The same for the rays of a bundle, which it spends. Their hits are put into eight entries from
+  /// `begin` on, a multiple of eight.
+  void intersect(RayBundle& rays, std::size_t begin, BatchHits& hits) const {
+    intersect(scene_over_time(), rays, begin, hits);
   }
   /// At the moment of the poses.
-  template <class HitOf>
-  void intersect_now(RayBundle& rays, HitOf&& hit_of) const {
-    intersect(scene_, rays, hit_of);
+  void intersect_now(RayBundle& rays, std::size_t begin, BatchHits& hits) const {
+    intersect(scene_, rays, begin, hits);
   }
   /// Calls lit(i, share) for every ray of which light is left; spends the bundle.
   template <class Lit>
@@ -232,8 +263,7 @@ class RenderScene {
 
   static RTCRayHit make_ray(const Vec3f& origin, const Vec3f& direction, float t_min, float t_max,
                             float time);
-  template <class HitOf>
-  void intersect(RTCScene scene, RayBundle& rays, HitOf&& hit_of) const;
+  void intersect(RTCScene scene, RayBundle& rays, std::size_t begin, BatchHits& hits) const;
   RayHit intersect(RTCScene scene, const Vec3f& origin, const Vec3f& direction, float t_min,
                    float t_max, float time) const;
   static Vec3f transmittance(RTCScene scene, const Vec3f& origin, const Vec3f& direction,
@@ -358,29 +388,32 @@ inline void RayBundle::finish() {
   }
 }
 
-template <class HitOf>
-inline void RenderScene::intersect(RTCScene scene, RayBundle& bundle, HitOf&& hit_of) const {
+inline void RenderScene::intersect(RTCScene scene, RayBundle& bundle, std::size_t begin,
+                                   BatchHits& hits) const {
   bundle.finish();
   RTCRayHit8& rays = bundle.rays_;
   embree::Context context;
   embree::init(context);
   embree::intersect(bundle.valid_.data(), scene, context, rays);
+  for (std::size_t i = 0; i < RayBundle::kSize; ++i) {
+    const std::size_t to = begin + i;
+    const bool is_met = rays.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
+    hits.geometry[to] = std::int32_t(rays.hit.geomID[i]);
+    hits.triangle[to] = std::int32_t(rays.hit.primID[i]);
+    hits.u[to] = rays.hit.u[i];
+    hits.v[to] = rays.hit.v[i];
+    hits.distance[to] = is_met ? rays.ray.tfar[i] : kInfinite;
+    hits.time[to] = rays.ray.time[i];
+    hits.normal.x[to] = rays.hit.Ng_x[i];
+    hits.normal.y[to] = rays.hit.Ng_y[i];
+    hits.normal.z[to] = rays.hit.Ng_z[i];
+  }
   for (int i = 0; i < bundle.count_; ++i) {
-    RayHit& hit = hit_of(i);
-    hit.geometry = rays.hit.geomID[i];
-    if (hit.geometry == RTC_INVALID_GEOMETRY_ID) {
-      hit.instance = nullptr;
-      hit.distance = kInfinite;
-      continue;
-    }
-    hit.instance = instances_[hit.geometry].get();
-    hit.triangle = rays.hit.primID[i];
-    hit.instance->shading->prefetch(hit.triangle);
-    hit.u = rays.hit.u[i];
-    hit.v = rays.hit.v[i];
-    hit.distance = rays.ray.tfar[i];
-    hit.time = rays.ray.time[i];
-    hit.normal = {rays.hit.Ng_x[i], rays.hit.Ng_y[i], rays.hit.Ng_z[i]};
+    const MeshInstance*& instance = hits.instance[begin + std::size_t(i)];
+    instance = nullptr;
+    if (rays.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
+    instance = instances_[rays.hit.geomID[i]].get();
+    instance->shading->prefetch(rays.hit.primID[i]);
   }
 }
 

@@ -56,13 +56,14 @@ struct BatchAlbedos {
   }
 };
 
-/// What the paths of a batch met and where they go: one entry for every path that goes on from a
-/// surface, filled step by step. Steps that loop over entries without a branch are vector code.
-/// World space where nothing else is said.
+/// What the paths of a batch met and where they go: one entry for every path under way, then for
+/// every one that is scattered, filled step by step. Steps that loop over entries without a branch
+/// are vector code. World space where nothing else is said.
 struct Vertices {
   std::size_t count = 0;
-  BatchVectors direction;  ///< That the path came along.
-  BatchVectors triangle_normal;
+  BatchVectors origin;  ///< Of the ray that met it.
+  BatchVectors direction;
+  BatchHits hits;
   BatchVectors interpolated;  ///< Normal; see RenderScene::interpolated_normal().
   BatchInts is_mirrored{};
 
@@ -152,8 +153,9 @@ inline SurfaceGeometry Vertices::surface(std::size_t i) const {
 inline void Vertices::find_surfaces() {
   for (std::size_t i = 0; i < whole_steps(count); ++i) {
     const SurfaceGeometry s =
-        RenderScene::surface_of(position.at(i), direction.at(i), triangle_normal.at(i),
-                                interpolated.at(i), is_mirrored[i] != 0);
+        RenderScene::surface_of(origin.at(i) + hits.distance[i] * direction.at(i), direction.at(i),
+                                hits.normal.at(i), interpolated.at(i), is_mirrored[i] != 0);
+    position.set(i, s.position);
     flat_normal.set(i, s.flat_normal);
     normal.set(i, s.normal);
     is_back[i] = s.is_back;
