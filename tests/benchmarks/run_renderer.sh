@@ -1,24 +1,23 @@
 #!/bin/sh
 # SPDX-License-Identifier: Apache-2.0
-# Times our renderer and Blender's Cycles (where `blender` is installed) in turns on the bench scene and
-# prints one line per run. Compare ratios of CPU seconds from one run of this script, never single
-# numbers from two.
+# Times our renderer and Blender's Cycles (where `blender` is installed) in turns on the bench scene:
+# prints one line per run, then the medians and their ratios. Compare ratios of CPU seconds from one
+# run of this script, never single numbers from two.
 #
-# usage: run_renderer.sh BENCH_FOLDER [PROGRAM] [REPETITIONS] [SAMPLES]
+# usage: run_renderer.sh BENCH_FOLDER [PROGRAM] [REPETITIONS]
 #   BENCH_FOLDER  holds scene.glb, scene.json, sky.hdr, refs/ and peer_cycles.py
 #   PROGRAM       renderer_bench; default: the one in build/release, as the target `benchmarks` leaves it
-#   REPETITIONS   default 3
-#   SAMPLES       per pixel of the 320x240 pictures; default 64
+#   REPETITIONS   default 3, of three minutes each
 set -eu
 
 if [ $# -lt 1 ]; then
-  sed -n '3,12p' "$0" | sed 's/^# \{0,1\}//' >&2
+  sed -n '3,11p' "$0" | sed 's/^# \{0,1\}//' >&2
   exit 2
 fi
 bench=$1
-program=${2:-$(dirname "$0")/../../build/release/bin/renderer_bench}
+here=$(dirname "$0")
+program=${2:-$here/../../build/release/bin/renderer_bench}
 repetitions=${3:-3}
-samples=${4:-64}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
@@ -30,23 +29,38 @@ if command -v blender >/dev/null; then
 fi
 [ "$peer" = yes ] || echo "blender is not installed or cannot build the scene here: ours alone" >&2
 
-# Lamps and surfaces as the peer has them. The size of its pictures does not matter for the time of a path.
+# A line: what it is, the materials, the program's own line.
+tell() {
+  printf '%s %s %s\n' "$1" "$2" "$3" | tee -a "$work/lines"
+}
+# cycles NAME MATERIALS SAMPLES WIDTH HEIGHT
+cycles() {
+  [ "$peer" = yes ] || return 0
+  tell "$1" "$2" "$(blender -b "$work/scene.blend" -P "$work/peer_cycles.py" -- time --spp "$3" \
+    --width "$4" --height "$5" --materials "$2" 2>/dev/null | sed -n 's/^TIME //p' | tail -1)"
+}
+# ours NAME MATERIALS ARGUMENTS...: lamps and surfaces as the peer has them.
 ours() {
-  "$program" "$bench" --materials "$1" --sphere-lights disk --principled blender --seed $((i + 1)) \
-    --reference "$bench/refs/ref_${1}_320x240_4096spp.exr" --samples "$2" $3
+  name=$1
+  materials=$2
+  shift 2
+  tell "$name" "$materials" "$("$program" "$bench" --materials "$materials" --sphere-lights disk \
+    --principled blender --seed "$i" "$@" | tr '\n' ' ')"
+}
+reference() {
+  echo "$bench/refs/ref_${1}_320x240_4096spp.exr"
 }
 
-i=0
-while [ "$i" -lt "$repetitions" ]; do
+i=1
+while [ "$i" -le "$repetitions" ]; do
   for materials in diffuse pbr; do
-    if [ "$peer" = yes ]; then
-      echo "Cycles: $(blender -b "$work/scene.blend" -P "$work/peer_cycles.py" -- time \
-        --spp "$samples" --width 320 --height 240 --materials "$materials" 2>/dev/null |
-        grep -i cpu | tail -1)"
-    fi
-    echo "ours: $(ours "$materials" "$samples" --probes)"
-    echo "ours, denoised at 2: $(ours "$materials" 2 --denoise)"
-    echo "ours, denoised at 4: $(ours "$materials" 4 --denoise)"
+    cycles cycles_sync "$materials" 1 8 8
+    cycles cycles_64 "$materials" 64 640 480
+    ours ours_64 "$materials" --samples 64 --width 640 --height 480 --probes
+    cycles cycles_small "$materials" 64 320 240
+    ours ours_equal "$materials" --samples 19 --reference "$(reference "$materials")"
+    ours ours_denoised "$materials" --samples 2 --denoise --reference "$(reference "$materials")"
   done
   i=$((i + 1))
 done
+python3 "$here/summarize_renderer.py" <"$work/lines"
