@@ -395,7 +395,7 @@ Mesh MeshAssembly::build() {
   gather_positions();
   gather_attributes(true);
   sources_.indices = {};
-  rest_();
+  if (corner_count_ >= kCornersBetweenRests) rest_();
   gather_attributes(false);
   give_back_room(mesh_.triangles);
   give_back_room(mesh_.normals);
