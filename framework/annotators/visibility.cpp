@@ -25,25 +25,33 @@ std::map<std::uint32_t, std::int64_t> count_pixels(const Image<std::uint32_t>& i
   return counts;
 }
 
-/// Counts inside and outside, and the box of what lies inside.
+/// Counts inside and outside, and the box of what lies inside. Row by row, because bits are counted
+/// many at once.
 Visibility measure(const CoverageMask& mask, int image_width, int image_height) {
   Visibility visibility;
+  const PixelBox& box = mask.box;
+  const PixelBox in_image = box.clipped(image_width, image_height);
   constexpr int kFar = std::numeric_limits<int>::max();
   PixelBox inside{kFar, kFar, 0, 0};
-  for (int y = mask.box.y_min; y < mask.box.y_max; ++y) {
-    const bool row_inside = y >= 0 && y < image_height;
-    for (int x = mask.box.x_min; x < mask.box.x_max; ++x) {
-      if (mask.bits[mask.index(x, y)] == 0) continue;
-      if (!row_inside || x < 0 || x >= image_width) {
-        ++visibility.outside_pixels;
-        continue;
-      }
-      ++visibility.amodal_pixels;
-      inside.x_min = std::min(inside.x_min, x);
-      inside.y_min = std::min(inside.y_min, y);
-      inside.x_max = std::max(inside.x_max, x + 1);
-      inside.y_max = std::max(inside.y_max, y + 1);
-    }
+  for (int y = box.y_min; y < box.y_max; ++y) {
+    const auto row =
+        std::span(mask.bits).subspan(mask.index(box.x_min, y), std::size_t(box.width()));
+    const auto count = std::int64_t(row.size()) - std::ranges::count(row, 0);
+    visibility.outside_pixels += count;
+    if (y < in_image.y_min || y >= in_image.y_max || in_image.is_empty() || count == 0) continue;
+    const auto seen =
+        row.subspan(std::size_t(in_image.x_min - box.x_min), std::size_t(in_image.width()));
+    const auto seen_count = std::int64_t(seen.size()) - std::ranges::count(seen, 0);
+    if (seen_count == 0) continue;
+    visibility.outside_pixels -= seen_count;
+    visibility.amodal_pixels += seen_count;
+    const auto is_set = [](std::uint8_t bit) { return bit != 0; };
+    const auto first = std::ranges::find_if(seen, is_set) - seen.begin();
+    const auto last = seen.rend() - std::find_if(seen.rbegin(), seen.rend(), is_set);
+    inside.x_min = std::min(inside.x_min, in_image.x_min + int(first));
+    inside.y_min = std::min(inside.y_min, y);
+    inside.x_max = std::max(inside.x_max, in_image.x_min + int(last));
+    inside.y_max = y + 1;
   }
   if (visibility.amodal_pixels > 0) visibility.amodal_box = inside;
   return visibility;
