@@ -58,6 +58,21 @@ struct PathTracer::Path {
   }
 };
 
+/// The next random numbers of the paths of a batch, for loops over them.
+struct BatchNumbers {
+  BatchInts keys{};
+  BatchInts places{};
+
+  void take(std::size_t i, PathSampler& sampler, std::uint32_t pairs) {
+    keys[i] = std::int32_t(sampler.take(pairs));
+    places[i] = std::int32_t(sampler.place());
+  }
+  Vec2f pair(std::size_t i, std::uint32_t number) const {
+    return PathSampler::pair(std::uint32_t(keys[i]) + number * PathSampler::kKeyStep,
+                             std::uint32_t(places[i]));
+  }
+};
+
 struct PathTracer::Batch : Vertices {
   std::array<Path*, kBatch> paths{};
   BatchInts may_meet_light{};

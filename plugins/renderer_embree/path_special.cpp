@@ -11,9 +11,8 @@ namespace {
 
 constexpr int kMaxPassages = 64;  // straight through cut-outs and panes
 
-inline Vec3f leave(const SurfaceGeometry& s, const Vec3f& direction) {
-  const Vec3f step = step_off(s.position, s.flat_normal);
-  return s.position + (direction.dot(s.flat_normal) < 0.0f ? -step : step);
+Vec3f leave(const SurfaceGeometry& s, const Vec3f& towards) {
+  return diorama::leave(s.position, s.flat_normal, step_off(s.position, s.flat_normal), towards);
 }
 
 Vec3f mapped_normal(const RayHit& hit, const SurfaceGeometry& s, const TextureSlot& map,

@@ -87,25 +87,18 @@ inline RayCounts PathTracer::trace_all(const TraceJob& job, PixelSum* sums,
 inline void PathTracer::start_paths(std::vector<Path>& paths, const BatchFloats& columns,
                                     const BatchFloats& rows) const {
   const Image<RayHit>* hits = settings_.first_hits;
-  BatchInts keys{};
-  BatchInts places{};
-  for (std::size_t i = 0; i < paths.size(); ++i) {
-    keys[i] = std::int32_t(paths[i].sampler.take(2));
-    places[i] = std::int32_t(paths[i].sampler.place());
-  }
+  BatchNumbers numbers;
+  for (std::size_t i = 0; i < paths.size(); ++i) numbers.take(i, paths[i].sampler, 2);
   BatchFloats x;
   BatchFloats y;
   for (std::size_t i = 0; i < whole_steps(paths.size()); ++i) {
-    const Vec2f u = PathSampler::pair(std::uint32_t(keys[i]), std::uint32_t(places[i]));
+    const Vec2f u = numbers.pair(i, 0);
     x[i] = columns[i] + (hits ? 0.5f : u.x());
     y[i] = rows[i] + (hits ? 0.5f : u.y());
   }
   for (std::size_t i = 0; i < paths.size(); ++i) {
     Path& path = paths[i];
-    const Vec2f aperture = view_.has_aperture()
-                               ? PathSampler::pair(std::uint32_t(keys[i]) + PathSampler::kKeyStep,
-                                                   std::uint32_t(places[i]))
-                               : Vec2f(Vec2f::Zero());
+    const Vec2f aperture = view_.has_aperture() ? numbers.pair(i, 1) : Vec2f(Vec2f::Zero());
     CameraRay ray = view_.sample_ray({x[i], y[i]}, aperture);
     if (view_.has_shutter()) [[unlikely]]
       open_shutter(path, int(rows[i]), ray);
@@ -185,17 +178,20 @@ inline void PathTracer::find_surfaces(Paths paths, Batch& v) const {
   }
 }
 
+inline void PathTracer::send(const LoggedRay& ray, float time, RayBundle& rays) const {
+  rays.add(ray.origin, ray.direction, ray.t_min, ray.t_max, time);
+  if (settings_.ray_log) [[unlikely]]
+    settings_.ray_log->push_back(ray);
+}
+
 inline void PathTracer::trace_rays(Batch& v) const {
   RayBundle rays;
   for (std::size_t begin = 0; begin < v.count; begin += RayBundle::kSize) {
     rays.clear();
     for (std::size_t i = begin; i < std::min(begin + RayBundle::kSize, v.count); ++i) {
       Path& path = *v.paths[i];
-      rays.add(path.origin, path.direction, path.t_min, path.t_max, path.time);
+      send({path.origin, path.direction, path.t_min, path.t_max, false}, path.time, rays);
       ++path.counts.rays;
-      if (settings_.ray_log) [[unlikely]] {
-        settings_.ray_log->push_back({path.origin, path.direction, path.t_min, path.t_max, false});
-      }
     }
     scene_.intersect(rays, begin, v.hits);
   }
@@ -209,11 +205,8 @@ inline void PathTracer::find_lights(Paths paths) const {
     for (std::size_t i = begin; i < end; ++i) {
       Path& path = *paths[i];
       ShadowRay& shadow = path.shadow;
-      rays.add(shadow.origin, shadow.direction, 0.0f, shadow.t_max, path.time);
+      send({shadow.origin, shadow.direction, 0.0f, shadow.t_max, true}, path.time, rays);
       ++path.counts.shadow_rays;
-      if (settings_.ray_log) [[unlikely]] {
-        settings_.ray_log->push_back({shadow.origin, shadow.direction, 0.0f, shadow.t_max, true});
-      }
       shadow.t_max = 0.0f;
     }
     scene_.transmittance(rays, !settings_.has_caustics, [&](int i, const Vec3f& kept) {
@@ -288,24 +281,22 @@ inline void PathTracer::draw_numbers(Batch& v) const {
   wishes.count = v.count;
   wishes.position = v.position;
   wishes.normal = v.normal;
-  BatchInts keys{};
-  BatchInts places{};
+  BatchNumbers numbers;
   for (std::size_t i = 0; i < v.count; ++i) {
     Path& path = *v.paths[i];
-    keys[i] = std::int32_t(path.sampler.take(Vertices::kPairs));
-    places[i] = std::int32_t(path.sampler.place());
+    numbers.take(i, path.sampler, Vertices::kPairs);
     wishes.is_two_sided[i] = !path.is_soft(settings_) && v.bsdf[i]->lobes.glass > 0.0f;
   }
   for (std::uint32_t k = 0; k < Vertices::kPairs; ++k) {
     for (std::size_t i = 0; i < size; ++i) {
-      const Vec2f pair = PathSampler::pair(std::uint32_t(keys[i]) + k * PathSampler::kKeyStep,
-                                           std::uint32_t(places[i]));
+      const Vec2f pair = numbers.pair(i, k);
       v.numbers[2 * k][i] = pair.x();
       v.numbers[2 * k + 1][i] = pair.y();
     }
   }
   wishes.u = v.numbers[Vertices::kLight];
   scene_.lights().choose(wishes, v.choices);
+  // Else their densities stay zero, and none is asked for.
   if (settings_.samples_lights) {
     scene_.lights().sample(wishes, v.choices, v.numbers[Vertices::kPlaceU],
                            v.numbers[Vertices::kPlaceV], v.lights);
@@ -348,7 +339,7 @@ inline void PathTracer::scatter(const Batch& v, std::size_t i) const {
     record_surface(v, i, s.albedo(v.albedo.at(i)));
   }
   take_light_samples(v, i);
-  if (settings_.samples_lights) ask_light(v, i, v.light_share.at(i), v.light_reach[i]);
+  ask_light(v, i, v.light_share.at(i), v.light_reach[i]);
   path.hides_lights = false;
   if (ends_at(path, s)) return;
   BsdfSample next;
@@ -366,7 +357,7 @@ inline void PathTracer::scatter(const Batch& v, std::size_t i) const {
   if (bsdf.has_smooth_part()) {
     if (!path.result.has_surface) record_surface(v, i, bsdf.albedo());
     take_light_samples(v, i);
-    if (settings_.samples_lights) light_glass(v, i, bsdf);
+    light_glass(v, i, bsdf);
   }
   path.is_camera_ray = false;
   const BsdfSample next =
@@ -379,19 +370,15 @@ inline void PathTracer::scatter(const Batch& v, std::size_t i) const {
 }
 
 inline void PathTracer::light_glass(const Batch& v, std::size_t i, const Bsdf& bsdf) const {
-  const float found = v.lights.density[i];
-  if (!(found > 0.0f)) return;
+  if (!(v.lights.density[i] > 0.0f)) return;
   const Vec3f towards = v.lights.direction.at(i);
   const Vec3f wi = v.basis(i).to_local(towards);
   const bool is_behind = wi.z() <= 0.0f;
   if (is_behind && v.wishes.is_two_sided[i] == 0) return;
   if ((v.flat_normal.at(i).dot(towards) <= 0.0f) != is_behind) return;
   const BsdfValue value = bsdf.evaluate(wi);
-  const bool is_point = std::isinf(found);
-  const float density = (is_point ? 1.0f : found) * v.choices.probability[i];
-  const bool is_shared = settings_.samples_bsdf && !is_point;
-  const float weight = is_shared ? mis_weight(density, value.density) : 1.0f;
-  ask_light(v, i, value.f_cos * (weight / density), Vertices::reach(v.lights.distance[i]));
+  const float weight = v.weight_of_light(i, settings_.samples_bsdf, value.density);
+  ask_light(v, i, value.f_cos * weight, Vertices::reach(v.lights.distance[i]));
 }
 
 inline void PathTracer::record_surface(const Batch& v, std::size_t i, const Vec3f& albedo) const {

@@ -85,6 +85,7 @@ class PathTracer {
                    const BatchFloats& rows) const;
   void open_shutter(Path& path, int row, CameraRay& ray) const;
   void find_surfaces(Paths paths, Batch& v) const;
+  void send(const LoggedRay& ray, float time, RayBundle& rays) const;
   void trace_rays(Batch& v) const;
   void meet(Batch& v) const;
   /// Adds the light that the surface emits. False: the path is not scattered here.

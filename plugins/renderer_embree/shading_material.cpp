@@ -80,10 +80,7 @@ SurfaceBsdf MaterialLibrary::make_surface(ShadingMaterial& material, bool is_sof
   const float alpha_key = alpha.value_or(-1.0f);
   // Plain Lambert surfaces need no tables.
   const bool is_metallic = m.metallic_texture || s.metallic > 0.0f;
-  if (!is_metallic && !is_solid_glass && s.is_lambert()) {
-    s.finish();
-    return s;
-  }
+  if (!is_metallic && !is_solid_glass && s.is_lambert()) return s;
   const auto layers = shared(layer_tables_[{s.layers, alpha_key}], [&] {
     return std::make_shared<const LayerTable>(albedo_tables_, s.layers, alpha);
   });
@@ -96,7 +93,6 @@ SurfaceBsdf MaterialLibrary::make_surface(ShadingMaterial& material, bool is_sof
     material.tables.push_back(glass);
     s.glass = glass.get();
   }
-  s.finish();
   return s;
 }
 
@@ -106,6 +102,8 @@ std::unique_ptr<ShadingMaterial> MaterialLibrary::make(std::shared_ptr<const Mat
   const Material& m = *material->source;
   material->sharp = make_surface(*material, false);
   material->soft = make_surface(*material, true);
+  material->sharp.finish();
+  material->soft.finish();
   material->base_color = slot(m.base_color_texture);
   material->metallic = slot(m.metallic_texture);
   material->roughness = slot(m.roughness_texture);

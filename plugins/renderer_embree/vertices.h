@@ -8,6 +8,20 @@
 
 namespace diorama {
 
+/// A step off the surface, far enough that the next ray does not meet it again.
+inline Vec3f step_off(const Vec3f& position, const Vec3f& flat_normal) {
+  const float x = std::abs(position.x());
+  const float y = std::abs(position.y());
+  const float z = std::abs(position.z());
+  return (2e-5f * (1.0f + std::max(x, std::max(y, z)))) * flat_normal;
+}
+
+/// Where a ray starts that goes off to one side or the other.
+inline Vec3f leave(const Vec3f& position, const Vec3f& flat_normal, const Vec3f& step,
+                   const Vec3f& towards) {
+  return position + (towards.dot(flat_normal) < 0.0f ? -step : step);
+}
+
 /// LobeWeights of a batch, but for glass, whose paths are scattered one by one.
 struct BatchLobes {
   BatchVectors diffuse, f0, multiple;
@@ -108,8 +122,7 @@ struct Vertices {
   Basis basis(std::size_t i) const { return {basis_x.at(i), basis_y.at(i), normal.at(i)}; }
   SurfaceGeometry surface(std::size_t i) const;
   Vec3f leave(std::size_t i, const Vec3f& towards) const {
-    const Vec3f off = step.at(i);
-    return position.at(i) + (towards.dot(flat_normal.at(i)) < 0.0f ? -off : off);
+    return diorama::leave(position.at(i), flat_normal.at(i), step.at(i), towards);
   }
 
   void find_surfaces();
@@ -124,6 +137,15 @@ struct Vertices {
   }
   /// How far to look for what hides a light.
   static float reach(float distance) { return std::max(0.0f, distance * 0.9998f - 1e-4f); }
+  /// What the light sample counts for: its weight against the BSDF's own sample, where that is a
+  /// rival and finds it with this density, over its density.
+  float weight_of_light(std::size_t i, bool is_rival, float rival) const {
+    const float found = lights.density[i];
+    const bool is_point = found == kInfinite;
+    const float density = (is_point ? 1.0f : found) * choices.probability[i];
+    const bool is_shared = is_rival & !is_point;
+    return (is_shared ? mis_weight(density, rival) : 1.0f) / density;
+  }
 
  private:
   template <bool kStacks>
@@ -132,14 +154,6 @@ struct Vertices {
   template <bool kStacks>
   void weigh();
 };
-
-/// A step off the surface, far enough that the next ray does not meet it again.
-inline Vec3f step_off(const Vec3f& position, const Vec3f& flat_normal) {
-  const float x = std::abs(position.x());
-  const float y = std::abs(position.y());
-  const float z = std::abs(position.z());
-  return (2e-5f * (1.0f + std::max(x, std::max(y, z)))) * flat_normal;
-}
 
 inline SurfaceGeometry Vertices::surface(std::size_t i) const {
   SurfaceGeometry s;
@@ -180,7 +194,7 @@ inline void Vertices::aim() {
     const Basis axes = basis(i);
     to_light.set(i, axes.to_local(lights.direction.at(i)));
     const Lobes seen(lobes.at(i), albedo.at(i), to_viewer.at(i), kStacks);
-    const Vec2f u(numbers[kDirectionU][i], numbers[kDirectionV][i]);
+    const Vec2f u = pair(kDirectionU, i);
     const Lobes::Draw draw = seen.sample(numbers[kLobe][i], u, cosine_hemisphere(u));
     to_next.set(i, draw.wi);
     next.set(i, axes.to_world(draw.wi));
@@ -200,16 +214,12 @@ inline void Vertices::weigh() {
   for (std::size_t i = 0; i < whole_steps(count); ++i) {
     const Lobes seen(lobes.at(i), albedo.at(i), to_viewer.at(i), kStacks);
     const BsdfValue lit = seen.evaluate(to_light.at(i), at_light.at(i));
-    const float found = lights.density[i];
-    const bool is_point = found == kInfinite;
-    const float density = (is_point ? 1.0f : found) * choices.probability[i];
-    const bool is_shared = (has_rival[i] != 0) & !is_point;
-    const float weight = is_shared ? mis_weight(density, lit.density) : 1.0f;
+    const float weight = weight_of_light(i, has_rival[i] != 0, lit.density);
     // Not light that the interpolated normal would let through the triangle from behind.
     const float before = flat_normal.at(i).dot(lights.direction.at(i));
-    const bool is_lit = (density > 0.0f) & (to_light.z[i] > 0.0f) & (before > 0.0f);
+    const bool is_lit = (lights.density[i] > 0.0f) & (to_light.z[i] > 0.0f) & (before > 0.0f);
     const float distance = reach(lights.distance[i]);
-    light_share.set(i, select(is_lit, lit.f_cos * (weight / density), Vec3f::Zero()));
+    light_share.set(i, select(is_lit, lit.f_cos * weight, Vec3f::Zero()));
     light_reach[i] = is_lit ? distance : 0.0f;
 
     const BsdfValue value = seen.evaluate(to_next.at(i), at_next.at(i));
