@@ -2,7 +2,10 @@
 #include "writer_basic/basic_writer.h"
 
 #include <algorithm>
+#include <array>
 #include <limits>
+#include <span>
+#include <vector>
 
 #include "writer_basic/box_files.h"
 #include "writer_basic/camera_params.h"
@@ -28,9 +31,10 @@ void write_rgb(const FrameOutput& output, const std::string& format) {
 }
 
 void write_distance(const FrameOutput& output, const Channel<float>& channel, bool colorize) {
-  auto distances = output.frame.get(channel);
-  output.files.add(output.path(channel.name, channel.name, ".npy"), npy_file(distances));
+  output.files.add(output.path(channel.name, channel.name, ".npy"),
+                   npy_file(output.frame.get(channel)));
   if (!colorize) return;
+  auto distances = output.frame.get(channel);
   // What a sensor does not measure looks like what no ray met.
   std::ranges::replace(distances.pixels(), 0.0f, std::numeric_limits<float>::infinity());
   output.files.add(
@@ -40,17 +44,14 @@ void write_distance(const FrameOutput& output, const Channel<float>& channel, bo
 
 void write_motion_vectors(const FrameOutput& output) {
   const auto& motion = output.frame.get(kMotion);
-  PackedBytes array;
-  array.bytes.reserve(motion.pixels().size() * 16);
-  for (const Vec2f& pixels : motion.pixels()) {
-    // The format counts motion to the left and up; 0 - x keeps zero positive.
-    array.add_f32(0.0f - pixels.x());
-    array.add_f32(0.0f - pixels.y());
-    array.add_f32(0.0f);
-    array.add_f32(0.0f);
-  }
-  output.files.add(output.path("motion_vectors", "motion_vectors", ".npy"),
-                   npy_file("'<f4'", {motion.height(), motion.width(), 4}, array.bytes));
+  std::vector<std::array<float, 4>> vectors(motion.pixels().size());
+  // The format counts motion to the left and up; 0 - x keeps zero positive.
+  std::ranges::transform(motion.pixels(), vectors.begin(), [](const Vec2f& pixels) {
+    return std::array{0.0f - pixels.x(), 0.0f - pixels.y(), 0.0f, 0.0f};
+  });
+  output.files.add(
+      output.path("motion_vectors", "motion_vectors", ".npy"),
+      npy_file("'<f4'", {motion.height(), motion.width(), 4}, std::as_bytes(std::span(vectors))));
 }
 
 void write_unlabelled_files(const BasicWriter::Params& params, const FrameOutput& output) {

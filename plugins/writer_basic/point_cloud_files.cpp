@@ -1,41 +1,66 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "writer_basic/point_cloud_files.h"
 
+#include <array>
+#include <span>
+#include <vector>
+
 #include "writer_support/npy.h"
 
 namespace diorama {
+namespace {
+
+/// Numbers of the pixels that are points.
+std::vector<std::uint32_t> point_pixels(const Image<std::uint32_t>& semantic,
+                                        bool include_unlabelled) {
+  std::vector<std::uint32_t> chosen;
+  chosen.reserve(semantic.pixels().size());
+  for (std::uint32_t i = 0; i < semantic.pixels().size(); ++i) {
+    const std::uint32_t id = semantic.pixels()[i];
+    if (id == kBackgroundId || (id == kUnlabelledId && !include_unlabelled)) continue;
+    chosen.push_back(i);
+  }
+  return chosen;
+}
+
+/// value_of(pixel) of all points, one after the other.
+template <class Function>
+auto of_points(const std::vector<std::uint32_t>& pixels, Function&& value_of) {
+  std::vector<decltype(value_of(0u))> values;
+  values.reserve(pixels.size());
+  for (const std::uint32_t pixel : pixels) values.push_back(value_of(pixel));
+  return values;
+}
+
+}  // namespace
 
 void write_point_cloud(const FrameOutput& output, bool include_unlabelled) {
   const Frame& frame = output.frame;
-  const auto& positions = frame.get(kPosition);
-  const auto& colors = frame.get(kColor);
-  const auto& normals = frame.get(kNormals);
+  const auto positions = frame.get(kPosition).pixels();
+  const auto colors = frame.get(kColor).pixels();
+  const auto normals = frame.get(kNormals).pixels();
   const auto semantic = instance_picture(frame, semantic_picture_ids(output));
   const auto instance = instance_picture(frame, instance_picture_ids(output));
-
-  std::int64_t count = 0;
-  PackedBytes points, point_colors, point_normals, point_semantics, point_instances;
-  for (std::size_t i = 0; i < semantic.pixels().size(); ++i) {
-    const std::uint32_t id = semantic.pixels()[i];
-    if (id == kBackgroundId || (id == kUnlabelledId && !include_unlabelled)) continue;
-    ++count;
-    for (int axis = 0; axis < 3; ++axis) points.add_f32(positions.pixels()[i][axis]);
-    for (const std::uint8_t value : colors.pixels()[i]) point_colors.add_u8(value);
-    for (int axis = 0; axis < 3; ++axis) point_normals.add_f32(normals.pixels()[i][axis]);
-    point_normals.add_f32(1.0f);
-    point_semantics.add_u32(id);
-    point_instances.add_u32(instance.pixels()[i]);
-  }
+  const std::vector<std::uint32_t> points = point_pixels(semantic, include_unlabelled);
+  const auto count = std::int64_t(points.size());
 
   constexpr std::string_view kName = "pointcloud";
-  const auto add = [&](std::string_view stem, std::vector<std::byte> file) {
-    output.files.add(output.path(kName, stem, ".npy"), std::move(file));
+  const auto add = [&](std::string_view stem, std::string_view descr,
+                       std::initializer_list<std::int64_t> shape, auto&& value_of) {
+    const auto values = of_points(points, value_of);
+    output.files.add(output.path(kName, stem, ".npy"),
+                     npy_file(descr, shape, std::as_bytes(std::span(values))));
   };
-  add("pointcloud", npy_file("'<f4'", {count, 3}, points.bytes));
-  add("pointcloud_rgb", npy_file("'|u1'", {count, 4}, point_colors.bytes));
-  add("pointcloud_normals", npy_file("'<f4'", {count, 4}, point_normals.bytes));
-  add("pointcloud_semantic", npy_file("'<u4'", {count}, point_semantics.bytes));
-  add("pointcloud_instance", npy_file("'<u4'", {count}, point_instances.bytes));
+  add("pointcloud", "'<f4'", {count, 3}, [&](std::uint32_t i) { return positions[i]; });
+  add("pointcloud_rgb", "'|u1'", {count, 4}, [&](std::uint32_t i) { return colors[i]; });
+  add("pointcloud_normals", "'<f4'", {count, 4}, [&](std::uint32_t i) {
+    const Vec3f& n = normals[i];
+    return std::array{n.x(), n.y(), n.z(), 1.0f};
+  });
+  add("pointcloud_semantic", "'<u4'", {count},
+      [&](std::uint32_t i) { return semantic.pixels()[i]; });
+  add("pointcloud_instance", "'<u4'", {count},
+      [&](std::uint32_t i) { return instance.pixels()[i]; });
 }
 
 }  // namespace diorama

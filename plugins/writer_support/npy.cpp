@@ -9,7 +9,7 @@
 
 namespace diorama {
 
-static_assert(std::endian::native == std::endian::little, "pixel rows are written as they are");
+static_assert(std::endian::native == std::endian::little, "numbers are written as they are");
 
 void PackedBytes::add_u8(std::uint8_t value) { bytes.push_back(std::byte(value)); }
 
