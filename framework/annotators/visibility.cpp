@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <limits>
 #include <map>
+#include <span>
 
 namespace diorama {
 namespace {
@@ -25,6 +26,21 @@ std::map<std::uint32_t, std::int64_t> count_pixels(const Image<std::uint32_t>& i
   return counts;
 }
 
+/// How many of a mask's bytes, which are 0 or 1, are set.
+std::int64_t count_set(std::span<const std::uint8_t> bits) {
+  // Parts whose sums fit into a byte, which compilers make vectors of.
+  constexpr std::size_t kPart = 240;
+  std::int64_t count = 0;
+  std::size_t i = 0;
+  for (; i + kPart <= bits.size(); i += kPart) {
+    std::uint8_t part = 0;
+    for (std::size_t k = 0; k < kPart; ++k) part = std::uint8_t(part + bits[i + k]);
+    count += part;
+  }
+  for (; i < bits.size(); ++i) count += bits[i];
+  return count;
+}
+
 /// Counts inside and outside, and the box of what lies inside. Row by row, because bits are counted
 /// many at once.
 Visibility measure(const CoverageMask& mask, int image_width, int image_height) {
@@ -36,12 +52,12 @@ Visibility measure(const CoverageMask& mask, int image_width, int image_height) 
   for (int y = box.y_min; y < box.y_max; ++y) {
     const auto row =
         std::span(mask.bits).subspan(mask.index(box.x_min, y), std::size_t(box.width()));
-    const auto count = std::int64_t(row.size()) - std::ranges::count(row, 0);
+    const std::int64_t count = count_set(row);
     visibility.outside_pixels += count;
     if (y < in_image.y_min || y >= in_image.y_max || in_image.is_empty() || count == 0) continue;
     const auto seen =
         row.subspan(std::size_t(in_image.x_min - box.x_min), std::size_t(in_image.width()));
-    const auto seen_count = std::int64_t(seen.size()) - std::ranges::count(seen, 0);
+    const std::int64_t seen_count = count_set(seen);
     if (seen_count == 0) continue;
     visibility.outside_pixels -= seen_count;
     visibility.amodal_pixels += seen_count;

@@ -151,8 +151,8 @@ CoverageMask traced(const RenderScene& meshes, const View& view, const OwnMeshes
 }
 
 CoverageMask drawn(const RenderScene& meshes, const View& view, const OwnMeshes& own,
-                   const PixelBox& box, bool with_distances) {
-  Silhouette silhouette(view.camera(), box, with_distances);
+                   const PixelBox& box, bool with_distances, Isa isa) {
+  Silhouette silhouette(view.camera(), box, with_distances, isa);
   for (const std::uint32_t number : own.numbers) {
     const MeshInstance& mesh = *meshes.instances()[number];
     silhouette.add(mesh.mesh->triangles, mesh.world_positions, mesh.mesh->positions.size(),
@@ -161,32 +161,56 @@ CoverageMask drawn(const RenderScene& meshes, const View& view, const OwnMeshes&
   return silhouette.take();
 }
 
+/// What the view's rays meet: its mesh by number, apart from the rest, which is many times as
+/// large.
+struct SeenMeshes {
+  static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
+
+  SeenMeshes(const Image<RayHit>& seen, Host& host)
+      : hits(seen), numbers(seen.width(), seen.height(), kNone) {
+    host.parallel_for(std::size_t(seen.height()), [&](std::size_t y) {
+      std::ranges::transform(seen.row(int(y)), numbers.row(int(y)).begin(),
+                             [](const RayHit& hit) { return hit ? hit.geometry : kNone; });
+    });
+  }
+
+  const Image<RayHit>& hits;
+  Image<std::uint32_t> numbers;
+};
+
 /// A ray along an edge may meet what arithmetic finds a hair beside it. What is seen is covered, at
 /// the distance seen, and nothing is nearer.
-void agree_with(const Image<RayHit>& seen, const OwnMeshes& own, CoverageMask& mask) {
-  const PixelBox box = mask.box.clipped(seen.width(), seen.height());
+void agree_with(const SeenMeshes& seen, const OwnMeshes& own, CoverageMask& mask) {
+  const PixelBox box = mask.box.clipped(seen.numbers.width(), seen.numbers.height());
+  if (box.is_empty()) return;
+  const auto width = std::size_t(box.width());
   for (int y = box.y_min; y < box.y_max; ++y) {
-    for (int x = box.x_min; x < box.x_max; ++x) {
-      const RayHit& pixel = seen.at(x, y);
-      if (!pixel) continue;
-      const std::size_t i = mask.index(x, y);
-      const bool is_own = own.is_own[pixel.geometry];
-      if (is_own) mask.bits[i] = 1;
-      if (mask.distances.empty() || mask.bits[i] == 0) continue;
-      mask.distances[i] = is_own ? pixel.distance : std::max(mask.distances[i], pixel.distance);
+    const std::size_t first = mask.index(box.x_min, y);
+    const auto numbers = seen.numbers.row(y).subspan(std::size_t(box.x_min), width);
+    std::uint8_t* bits = &mask.bits[first];
+    for (const std::uint32_t number : own.numbers) {
+      for (std::size_t i = 0; i < width; ++i) bits[i] |= std::uint8_t(numbers[i] == number);
+    }
+    if (mask.distances.empty()) continue;
+    const auto hits = seen.hits.row(y).subspan(std::size_t(box.x_min), width);
+    for (std::size_t i = 0; i < width; ++i) {
+      if (!hits[i] || bits[i] == 0) continue;
+      float& distance = mask.distances[first + i];
+      const bool is_own = own.is_own[numbers[i]];
+      distance = is_own ? hits[i].distance : std::max(distance, hits[i].distance);
     }
   }
 }
 
 CoverageMask coverage_of(const RenderScene& meshes, const View& view,
-                         const std::optional<RayBlocks>& blocks, const Image<RayHit>& seen,
-                         const LabelledInstance& instance, bool with_distances) {
+                         const std::optional<RayBlocks>& blocks, const SeenMeshes& seen,
+                         const LabelledInstance& instance, bool with_distances, Isa isa) {
   const OwnMeshes own = meshes_of(instance, meshes);
   const PixelBox box = possible_pixels(view, blocks, own.bounds);
   if (box.is_empty()) return {};
   const bool needs_rays = blocks || own.has_holes;
   CoverageMask mask = needs_rays ? traced(meshes, view, own, box, with_distances)
-                                 : drawn(meshes, view, own, box, with_distances);
+                                 : drawn(meshes, view, own, box, with_distances, isa);
   agree_with(seen, own, mask);
   return mask.cropped(mask.extent());
 }
@@ -241,12 +265,13 @@ Image<RayHit> fill_channels(Frame& frame, const NameSet& wanted, const RenderSce
 std::vector<CoverageMask> coverage(const RenderScene& meshes, const View& view,
                                    const Image<RayHit>& seen,
                                    std::span<const LabelledInstance> instances, bool with_distances,
-                                   Host& host) {
+                                   Isa isa, Host& host) {
   std::vector<CoverageMask> masks(instances.size());
   std::optional<RayBlocks> blocks;
   if (view.camera().lens != LensModel::Pinhole) blocks.emplace(view.camera(), host);
+  const SeenMeshes seen_meshes(seen, host);
   host.parallel_for(instances.size(), [&](std::size_t i) {
-    masks[i] = coverage_of(meshes, view, blocks, seen, instances[i], with_distances);
+    masks[i] = coverage_of(meshes, view, blocks, seen_meshes, instances[i], with_distances, isa);
   });
   return masks;
 }

@@ -24,6 +24,6 @@ Image<RayHit> fill_channels(Frame& frame, const NameSet& wanted, const RenderSce
 std::vector<CoverageMask> coverage(const RenderScene& meshes, const View& view,
                                    const Image<RayHit>& seen,
                                    std::span<const LabelledInstance> instances, bool with_distances,
-                                   Host& host);
+                                   Isa isa, Host& host);
 
 }  // namespace diorama

@@ -246,7 +246,7 @@ std::vector<CoverageMask> EmbreeRenderer::do_cover(const Scene& scene, NodeId ca
                                                    std::span<const LabelledInstance> instances,
                                                    bool with_distances) {
   const View view(scene, camera);
-  return coverage(meshes_, view, seen(view, camera), instances, with_distances, host_);
+  return coverage(meshes_, view, seen(view, camera), instances, with_distances, isa_, host_);
 }
 
 }  // namespace diorama

@@ -9,20 +9,30 @@ namespace diorama {
 namespace {
 
 // Far below all pixels: conversions to int round towards it, the library's floor() is a call.
-constexpr double kShift = 1 << 20;
+constexpr int kShift = 1 << 20;
 /// The largest whole number not above the value, within [from, to].
 int floor_within(double value, int from, int to) {
-  return int(std::clamp(value, double(from), double(to)) + kShift) - int(kShift);
+  return int(std::clamp(value, double(from), double(to)) + kShift) - kShift;
 }
 int ceil_within(double value, int from, int to) { return -floor_within(-value, -to, -from); }
 
+template <class Numbers>
+Numbers larger(const Numbers& a, const Numbers& b) {
+  return a > b ? a : b;
+}
+template <class Numbers>
+Numbers smaller(const Numbers& a, const Numbers& b) {
+  return a < b ? a : b;
+}
+
 }  // namespace
 
-Silhouette::Silhouette(const Camera& camera, const PixelBox& box, bool with_distances)
+Silhouette::Silhouette(const Camera& camera, const PixelBox& box, bool with_distances, Isa isa)
     : camera_(camera),
       per_focal_length_(1.0 / camera.fx, 1.0 / camera.fy),
       box_(box),
       has_distances_(with_distances),
+      has_avx2_(isa == Isa::Avx2 || isa == Isa::Avx512),
       bits_(std::size_t(box.width()) * std::size_t(box.height()), 0) {
   if (with_distances) nearness_.assign(bits_.size(), 0.0f);
 }
@@ -30,44 +40,89 @@ Silhouette::Silhouette(const Camera& camera, const PixelBox& box, bool with_dist
 void Silhouette::add(const std::vector<std::array<std::uint32_t, 3>>& triangles,
                      const std::vector<float>& positions, std::size_t vertex_count,
                      const Affine& camera_from_world) {
+  corners_.resize(vertex_count);
+  reaches_.resize(vertex_count);
+  if (has_avx2_) {
+    place_avx2(positions, camera_from_world);
+    add_all_avx2(triangles);
+  } else {
+    place(positions, camera_from_world);
+    add_all(triangles);
+  }
+}
+
+// Without fused multiplications, which would move edges by a hair.
+[[gnu::target("avx2"), gnu::flatten]] void Silhouette::place_avx2(
+    const std::vector<float>& positions, const Affine& camera_from_world) {
+  place(positions, camera_from_world);
+}
+[[gnu::target("avx2"), gnu::flatten]] void Silhouette::add_all_avx2(
+    const std::vector<std::array<std::uint32_t, 3>>& triangles) {
+  add_all(triangles);
+}
+
+inline void Silhouette::place(const std::vector<float>& positions,
+                              const Affine& camera_from_world) {
   const Mat3 linear = camera_from_world.linear();
   const Vec3 translation = camera_from_world.translation();
-  corners_.resize(vertex_count);
-  for (std::size_t i = 0; i < vertex_count; ++i) {
+  for (std::size_t i = 0; i < corners_.size(); ++i) {
     Corner& corner = corners_[i];
     corner.position =
         linear * Eigen::Map<const Vec3f>(&positions[3 * i]).cast<double>() + translation;
-    const double per_depth = 1.0 / corner.depth();
-    corner.pixel = {camera_.cx + camera_.fx * corner.position.x() * per_depth,
-                    camera_.cy - camera_.fy * corner.position.y() * per_depth};
+    reaches_[i] = reach_of(corner);
   }
-  for (const auto& t : triangles) add_triangle(corners_[t[0]], corners_[t[1]], corners_[t[2]]);
 }
 
-/// Those whose centres may lie in the triangle.
-PixelBox Silhouette::pixels_around(const Corner& a, const Corner& b, const Corner& c) const {
-  if (std::min({a.depth(), b.depth(), c.depth()}) <= 0.0) return box_;
+/// Pixels whose centres may lie between this corner and others are between their reaches.
+inline Silhouette::FourInts Silhouette::reach_of(const Corner& corner) const {
+  if (corner.depth() <= 0.0) return FourInts{-box_.x_min, -box_.y_min, box_.x_max, box_.y_max};
   constexpr double kRounding = 1e-6;
-  const Vec2 low = a.pixel.cwiseMin(b.pixel).cwiseMin(c.pixel);
-  const Vec2 high = a.pixel.cwiseMax(b.pixel).cwiseMax(c.pixel);
-  return {ceil_within(low.x() - 0.5 - kRounding, box_.x_min, box_.x_max),
-          ceil_within(low.y() - 0.5 - kRounding, box_.y_min, box_.y_max),
-          floor_within(high.x() + 0.5 + kRounding, box_.x_min, box_.x_max),
-          floor_within(high.y() + 0.5 + kRounding, box_.y_min, box_.y_max)};
+  const double per_depth = 1.0 / corner.depth();
+  const double x = camera_.cx + camera_.fx * corner.position.x() * per_depth;
+  const double y = camera_.cy - camera_.fy * corner.position.y() * per_depth;
+  const Four sides{-(x - 0.5 - kRounding), -(y - 0.5 - kRounding), x + 0.5 + kRounding,
+                   y + 0.5 + kRounding};
+  const Four from{double(-box_.x_max), double(-box_.y_max), double(box_.x_min), double(box_.y_min)};
+  const Four to{double(-box_.x_min), double(-box_.y_min), double(box_.x_max), double(box_.y_max)};
+  const Four inside = larger(from, smaller(sides, to)) + double(kShift);
+  return __builtin_convertvector(inside, FourInts) - kShift;
 }
 
-/// Through the eye: what lies on the side of the plane that `normal` points to.
-Silhouette::Line Silhouette::line_of(const Vec3& normal) const {
-  Line line;
-  line.per_column = normal.x() * per_focal_length_.x();
-  line.per_row = -normal.y() * per_focal_length_.y();
-  line.at_origin =
-      line.per_column * (0.5 - camera_.cx) + line.per_row * (0.5 - camera_.cy) - normal.z();
-  return line;
+inline void Silhouette::add_all(const std::vector<std::array<std::uint32_t, 3>>& triangles) {
+  for (const auto& [a, b, c] : triangles) {
+    const FourInts reach = larger(larger(reaches_[a], reaches_[b]), reaches_[c]);
+    const PixelBox around{-reach[0], -reach[1], reach[2], reach[3]};
+    if (!around.is_empty()) add_triangle(around, corners_[a], corners_[b], corners_[c]);
+  }
 }
 
-/// Keeps the part of the span where the line's value is not negative.
-void Silhouette::narrow(const Line& line, int row, Span& span) {
+/// Through the eye: what lies on the side of a plane that its normal points to.
+template <class Number>
+inline Silhouette::Lines<Number> Silhouette::lines_of(const Number& x, const Number& y,
+                                                      const Number& z) const {
+  Lines<Number> lines;
+  lines.per_column = x * per_focal_length_.x();
+  lines.per_row = -y * per_focal_length_.y();
+  lines.at_origin = lines.per_column * (0.5 - camera_.cx) + lines.per_row * (0.5 - camera_.cy) - z;
+  return lines;
+}
+
+/// Keeps the part of the span where no edge's value is negative.
+inline void Silhouette::narrow(const Lines<Four>& edges, int row, Span& span) {
+  const Four value = edges.per_row * double(row) + edges.at_origin;
+  const Four zero = -value / edges.per_column;
+  const Four none{};
+  const Four from = edges.per_column > none ? zero : none + double(span.first);
+  const Four to = edges.per_column < none ? zero : none + double(span.last);
+  const double first = std::max(std::max(from[0], from[1]), from[2]);
+  const double last = std::min(std::min(to[0], to[1]), to[2]);
+  span = {ceil_within(first, span.first, span.last + 1),
+          floor_within(last, span.first - 1, span.last)};
+  const auto is_outside = (edges.per_column == none) & (value < none);
+  if (is_outside[0] | is_outside[1] | is_outside[2]) span.last = span.first - 1;
+}
+
+inline void Silhouette::narrow(const Line& line, int row, Span& span) {
   const double value = line.per_row * row + line.at_origin;
   if (line.per_column == 0.0) {
     if (value < 0.0) span.last = span.first - 1;
@@ -84,45 +139,56 @@ void Silhouette::narrow(const Line& line, int row, Span& span) {
 // The planes through the eye and two corners bound what the triangle covers, also when some of its
 // corners lie behind the camera. An edge gives its two triangles the same plane with opposite signs
 // to the last bit, so that a centre on it belongs to both.
-void Silhouette::add_triangle(const Corner& a, const Corner& b, const Corner& c) {
+inline void Silhouette::add_triangle(const PixelBox& around, const Corner& a, const Corner& b,
+                                     const Corner& c) {
   const double nearest = std::min({a.depth(), b.depth(), c.depth()});
   const double farthest = std::max({a.depth(), b.depth(), c.depth()});
   if (!(farthest >= camera_.near_m && nearest <= camera_.far_m)) return;
-  const PixelBox around = pixels_around(a, b, c);
-  if (around.is_empty()) return;
-  Vec3 ab = a.position.cross(b.position);
-  Vec3 bc = b.position.cross(c.position);
-  Vec3 ca = c.position.cross(a.position);
-  double volume = ab.dot(c.position);
+  const double volume = a.position.cross(b.position).dot(c.position);
   if (volume == 0.0 || !std::isfinite(volume)) return;  // seen edge-on, or no triangle
-  if (volume < 0.0) {
-    ab = -ab;
-    bc = -bc;
-    ca = -ca;
-    volume = -volume;
-  }
+  // Normals of the planes through ab, bc and ca; the fourth is the first again.
+  const Four x{a.position.x(), b.position.x(), c.position.x(), a.position.x()};
+  const Four y{a.position.y(), b.position.y(), c.position.y(), a.position.y()};
+  const Four z{a.position.z(), b.position.z(), c.position.z(), a.position.z()};
+  using Order [[gnu::vector_size(32)]] = std::int64_t;
+  constexpr Order kNext{1, 2, 0, 1};
+  const Four next_x = __builtin_shuffle(x, kNext);
+  const Four next_y = __builtin_shuffle(y, kNext);
+  const Four next_z = __builtin_shuffle(z, kNext);
+  const double side = volume < 0.0 ? -1.0 : 1.0;
+  const Four normal_x = (y * next_z - z * next_y) * side;
+  const Four normal_y = (z * next_x - x * next_z) * side;
+  const Four normal_z = (x * next_y - y * next_x) * side;
+  const Lines<Four> edges = lines_of(normal_x, normal_y, normal_z);
+
   const bool is_cut_near = nearest < camera_.near_m;
   const bool is_cut_far = farthest > camera_.far_m;
   Line nearness;  // 1 / depth, which is straight in the picture
-  if (has_distances_ || is_cut_near || is_cut_far) nearness = line_of((ab + bc + ca) / volume);
-  std::array<Line, 5> lines{line_of(ab), line_of(bc), line_of(ca)};
-  std::size_t count = 3;
+  if (has_distances_ || is_cut_near || is_cut_far) {
+    const auto sum = [&](const Four& n) { return (n[0] + n[1] + n[2]) / std::abs(volume); };
+    nearness = lines_of(sum(normal_x), sum(normal_y), sum(normal_z));
+  }
+  std::array<Line, 2> cuts;
+  std::size_t cut_count = 0;
   if (is_cut_near) {
-    lines[count++] = {-nearness.per_column, -nearness.per_row,
-                      1.0 / camera_.near_m - nearness.at_origin};
+    cuts[cut_count++] = {-nearness.per_column, -nearness.per_row,
+                         1.0 / camera_.near_m - nearness.at_origin};
   }
   if (is_cut_far) {
-    lines[count++] = {nearness.per_column, nearness.per_row,
-                      nearness.at_origin - 1.0 / camera_.far_m};
+    cuts[cut_count++] = {nearness.per_column, nearness.per_row,
+                         nearness.at_origin - 1.0 / camera_.far_m};
   }
   for (int row = around.y_min; row < around.y_max; ++row) {
     Span span{around.x_min, around.x_max - 1};
-    for (std::size_t i = 0; i < count && span.first <= span.last; ++i) narrow(lines[i], row, span);
+    narrow(edges, row, span);
+    for (std::size_t i = 0; i < cut_count && span.first <= span.last; ++i) {
+      narrow(cuts[i], row, span);
+    }
     if (span.first <= span.last) fill(row, span, nearness);
   }
 }
 
-void Silhouette::fill(int row, const Span& span, const Line& nearness) {
+inline void Silhouette::fill(int row, const Span& span, const Line& nearness) {
   const std::size_t begin = std::size_t(row - box_.y_min) * std::size_t(box_.width()) +
                             std::size_t(span.first - box_.x_min);
   const auto count = std::size_t(span.last - span.first + 1);

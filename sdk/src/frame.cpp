@@ -2,7 +2,8 @@
 #include "diorama/frame.h"
 
 #include <algorithm>
-#include <span>
+#include <cstring>
+#include <iterator>
 
 namespace diorama {
 
@@ -13,16 +14,18 @@ bool CoverageMask::covers(int x, int y) const {
 
 PixelBox CoverageMask::extent() const {
   if (box.is_empty()) return {};
+  const auto width = std::size_t(box.width());
   PixelBox extent{box.x_max, box.y_max, box.x_min, box.y_min};
   for (int y = box.y_min; y < box.y_max; ++y) {
-    // Large objects fill their rows: looking from both ends is soon over.
-    const std::span row(&bits[index(box.x_min, y)], std::size_t(box.width()));
-    const auto first = std::find_if(row.begin(), row.end(), [](auto bit) { return bit != 0; });
-    if (first == row.end()) continue;
-    const auto last = std::find_if(row.rbegin(), row.rend(), [](auto bit) { return bit != 0; });
-    extent = {std::min(extent.x_min, box.x_min + int(first - row.begin())),
-              std::min(extent.y_min, y),
-              std::max(extent.x_max, box.x_max - int(last - row.rbegin())), y + 1};
+    // Looking from both ends is soon over where large objects fill their rows, and the library's
+    // search is quick where nothing does.
+    const std::uint8_t* row = &bits[index(box.x_min, y)];
+    const auto* first = static_cast<const std::uint8_t*>(std::memchr(row, 1, width));
+    if (!first) continue;
+    const std::reverse_iterator end(row + width);
+    const auto behind_last = std::find(end, std::reverse_iterator(first), 1).base();
+    extent = {std::min(extent.x_min, box.x_min + int(first - row)), std::min(extent.y_min, y),
+              std::max(extent.x_max, box.x_min + int(behind_last - row)), y + 1};
   }
   return extent.is_empty() ? PixelBox() : extent;
 }

@@ -30,7 +30,15 @@ void check_finite(const std::string& name, const char* what, const Vectors& vect
 
 Aabb Mesh::bounds() const {
   Aabb box;
-  for (const Vec3f& position : positions) box.add(position.cast<double>());
+  if (positions.empty()) return box;
+  Vec3f low = positions.front();
+  Vec3f high = low;
+  for (const Vec3f& position : positions) {
+    low = low.cwiseMin(position);
+    high = high.cwiseMax(position);
+  }
+  box.add(low.cast<double>());
+  box.add(high.cast<double>());
   return box;
 }
 
