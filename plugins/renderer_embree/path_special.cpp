@@ -19,7 +19,7 @@ Vec3f mapped_normal(const RayHit& hit, const SurfaceGeometry& s, const TextureSl
                     float uv_footprint, const Vec3f& to_viewer) {
   const MeshInstance& instance = *hit.instance;
   if (!instance.shading->has_uvs()) return s.normal;
-  const auto& corners = instance.mesh->triangles[hit.triangle];
+  const auto corners = instance.shading->corners(hit.triangle);
   const auto& uvs = instance.shading->uvs(hit.triangle);
   const Vec2f e = uvs[1] - uvs[0];
   const Vec2f f = uvs[2] - uvs[0];
@@ -55,7 +55,7 @@ Vec3f base_color_at(const RayHit& hit, const SurfaceGeometry& surface, float uv_
     color = color.cwiseProduct(Vec3f(texel.head<3>().matrix()));
   }
   if (!mesh.colors.empty()) {
-    const auto& corners = mesh.triangles[hit.triangle];
+    const auto corners = hit.instance->shading->corners(hit.triangle);
     color = color.cwiseProduct(mesh.colors[corners[0]] * (1.0f - hit.u - hit.v) +
                                mesh.colors[corners[1]] * hit.u + mesh.colors[corners[2]] * hit.v);
   }

@@ -23,16 +23,21 @@ std::shared_ptr<const Texture> make_white_sky() {
   return texture;
 }
 
+ShadingMesh::Point hit_point(const RTCFilterFunctionNArguments* args, unsigned i) {
+  return ShadingMesh::on_triangle(RTCHitN_primID(args->hit, args->N, i),
+                                  RTCHitN_u(args->hit, args->N, i),
+                                  RTCHitN_v(args->hit, args->N, i));
+}
+
 void pass_where_cut_out(const RTCFilterFunctionNArguments* args) {
   const auto& instance = *static_cast<const MeshInstance*>(args->geometryUserPtr);
   for (unsigned i = 0; i < args->N; ++i) {
     if (args->valid[i] == 0) continue;
-    const std::uint32_t triangle = RTCHitN_primID(args->hit, args->N, i);
-    const ShadingMaterial& material = instance.material(triangle);
+    const ShadingMesh::Point point = hit_point(args, i);
+    const ShadingMaterial& material = instance.material(point.triangle);
     if (!material.is_cut_out) continue;
-    const float u = RTCHitN_u(args->hit, args->N, i);
-    const float v = RTCHitN_v(args->hit, args->N, i);
-    const float opacity = material.opacity_at(instance.uv(triangle, u, v), 0.0f);
+    const Vec2f uv = instance.uv(point.triangle, point.u, point.v);
+    const float opacity = material.opacity_at(uv, 0.0f);
     const float threshold = material.source->opacity_threshold;
     const bool is_absent = threshold > 0.0f ? opacity < threshold : opacity <= 0.0f;
     if (is_absent) args->valid[i] = 0;
@@ -40,12 +45,12 @@ void pass_where_cut_out(const RTCFilterFunctionNArguments* args) {
 }
 
 /// The share of light along a straight line through one surface of this material.
-Vec3f straight_share(const MeshInstance& instance, std::uint32_t triangle, float u, float v,
+Vec3f straight_share(const MeshInstance& instance, const ShadingMesh::Point& point,
                      const Vec3f& direction, bool passes_glass) {
-  const ShadingMaterial& material = instance.material(triangle);
+  const ShadingMaterial& material = instance.material(point.triangle);
   if (!material.dims_shadows) return Vec3f::Zero();
   const Material& m = *material.source;
-  const Vec2f uv = instance.uv(triangle, u, v);
+  const Vec2f uv = instance.uv(point.triangle, point.u, point.v);
   const float opacity = material.opacity_at(uv, 0.0f);
   const float present = m.opacity_threshold > 0.0f ? (opacity < m.opacity_threshold ? 0.0f : 1.0f)
                                                    : std::clamp(opacity, 0.0f, 1.0f);
@@ -53,7 +58,7 @@ Vec3f straight_share(const MeshInstance& instance, std::uint32_t triangle, float
   const bool is_clear = m.transmission > 0.0f && (passes_glass || m.is_thin_walled);
   if (present <= 0.0f || !is_clear) return share;
 
-  const auto& corners = instance.mesh->triangles[triangle];
+  const auto corners = instance.shading->corners(point.triangle);
   const Vec3f a = instance.vertex(corners[0]);
   const Vec3f normal = (instance.vertex(corners[1]) - a).cross(instance.vertex(corners[2]) - a);
   const float cosine = std::abs(normal.normalized().dot(direction));
@@ -236,9 +241,8 @@ void RenderScene::weaken_shadow_ray(const RTCFilterFunctionNArguments* args) {
     if (args->valid[i] == 0) continue;
     const Vec3f direction(RTCRayN_dir_x(args->ray, count, i), RTCRayN_dir_y(args->ray, count, i),
                           RTCRayN_dir_z(args->ray, count, i));
-    const Vec3f share = straight_share(
-        instance, RTCHitN_primID(args->hit, count, i), RTCHitN_u(args->hit, count, i),
-        RTCHitN_v(args->hit, count, i), direction.normalized(), shadow.passes_glass);
+    const Vec3f share =
+        straight_share(instance, hit_point(args, i), direction.normalized(), shadow.passes_glass);
     const unsigned ray = RTCRayN_id(args->ray, count, i);
     shadow.weaken(ray, share);
     if (shadow.kept[ray].maxCoeff() > 1e-4f) args->valid[i] = 0;
@@ -342,10 +346,9 @@ Aabb RenderScene::place(const Mesh& mesh, const Affine& pose, std::vector<float>
   return {low.cast<double>(), high.cast<double>()};
 }
 
-void RenderScene::set_triangles(const Mesh& mesh, RTCGeometry geometry) {
-  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                             mesh.triangles.data(), 0, sizeof(mesh.triangles[0]),
-                             mesh.triangles.size());
+void RenderScene::set_quads(const ShadingMesh& mesh, RTCGeometry geometry) {
+  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT4,
+                             mesh.quads().data(), 0, sizeof(mesh.quads()[0]), mesh.quads().size());
 }
 
 Vec3f MeshInstance::turned(const Vec3f& direction, float time) const {
@@ -394,7 +397,7 @@ void RenderScene::add_moving_geometry(std::uint32_t index) {
   const int half = int(std::clamp(std::ceil(turn / kTurnPerStep), 1.0, kMostHalves));
   const unsigned steps = 2 * unsigned(half) + 1;
   const Mesh& mesh = *instance.mesh;
-  RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
+  RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_QUAD);
   rtcSetGeometryMask(geometry, kMovableMask);
   rtcSetGeometryTimeStepCount(geometry, steps);
   instance.blurred_positions.resize(steps);
@@ -406,7 +409,7 @@ void RenderScene::add_moving_geometry(std::uint32_t index) {
     rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, step, RTC_FORMAT_FLOAT3,
                                positions.data(), 0, 3 * sizeof(float), mesh.positions.size());
   }
-  set_triangles(mesh, geometry);
+  set_quads(*instance.shading, geometry);
   rtcSetGeometryUserData(geometry, &instance);
   set_filters(instance, geometry);
   rtcCommitGeometry(geometry);
@@ -416,7 +419,7 @@ void RenderScene::add_moving_geometry(std::uint32_t index) {
 
 RTCGeometry RenderScene::make_geometry(MeshInstance& instance) const {
   const Mesh& mesh = *instance.mesh;
-  RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
+  RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_QUAD);
   // Refit: built once, then fitted.
   rtcSetGeometryBuildQuality(
       geometry, instance.is_movable ? RTC_BUILD_QUALITY_REFIT : RTC_BUILD_QUALITY_MEDIUM);
@@ -424,7 +427,7 @@ RTCGeometry RenderScene::make_geometry(MeshInstance& instance) const {
   rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
                              instance.world_positions.data(), 0, 3 * sizeof(float),
                              mesh.positions.size());
-  set_triangles(mesh, geometry);
+  set_quads(*instance.shading, geometry);
   return geometry;
 }
 
@@ -459,9 +462,9 @@ void RenderScene::add_emitters() {
         emitting.mean_radiance = emitting.mean_radiance.cwiseProduct(
             Vec3f(material.emission.texture->texel(top, 0, 0).head<3>().matrix()));
       }
-      for (std::uint32_t t = 0; t < instance.mesh->triangles.size(); ++t) {
-        if (instance.slot(t) != slot) continue;
-        const auto& corners = instance.mesh->triangles[t];
+      for (std::uint32_t t = 0; t < instance.shading->number_end(); ++t) {
+        if (instance.shading->is_repeated(t) || instance.slot(t) != slot) continue;
+        const auto corners = instance.shading->corners(t);
         const Vec3f a = instance.vertex(corners[0]);
         const Vec3f ab = instance.vertex(corners[1]) - a;
         const Vec3f ac = instance.vertex(corners[2]) - a;

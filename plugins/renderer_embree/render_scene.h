@@ -67,7 +67,7 @@ inline constexpr float kMoment = 0.5f;
 struct RayHit {
   const MeshInstance* instance = nullptr;  ///< Null: nothing.
   std::uint32_t geometry = 0;
-  std::uint32_t triangle = 0;
+  std::uint32_t triangle = 0;  ///< Its number in the instance's ShadingMesh; u and v likewise.
   float u = 0.0f;
   float v = 0.0f;
   float distance = kInfinite;
@@ -279,7 +279,7 @@ class RenderScene {
   static void set_filters(const MeshInstance& instance, RTCGeometry geometry);
   RTCGeometry make_geometry(MeshInstance& instance) const;
   static Aabb place(const Mesh& mesh, const Affine& pose, std::vector<float>& positions);
-  static void set_triangles(const Mesh& mesh, RTCGeometry geometry);
+  static void set_quads(const ShadingMesh& mesh, RTCGeometry geometry);
   void blur(const Scene& scene);
   void release_moving_scene();
   void add_moving_geometry(std::uint32_t index);
@@ -335,12 +335,13 @@ inline RayHit RenderScene::intersect(RTCScene scene, const Vec3f& origin, const 
   embree::init(context);
   embree::intersect(scene, context, ray);
   if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
-  instances_[ray.hit.geomID]->shading->prefetch(ray.hit.primID);
+  const auto point = ShadingMesh::on_triangle(ray.hit.primID, ray.hit.u, ray.hit.v);
+  instances_[ray.hit.geomID]->shading->prefetch(point.triangle);
   return {instances_[ray.hit.geomID].get(),
           ray.hit.geomID,
-          ray.hit.primID,
-          ray.hit.u,
-          ray.hit.v,
+          point.triangle,
+          point.u,
+          point.v,
           ray.ray.tfar,
           time,
           {ray.hit.Ng_x, ray.hit.Ng_y, ray.hit.Ng_z}};
@@ -399,9 +400,10 @@ inline void RenderScene::intersect(RTCScene scene, RayBundle& bundle, std::size_
     const std::size_t to = begin + i;
     const bool is_met = rays.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
     hits.geometry[to] = std::int32_t(rays.hit.geomID[i]);
-    hits.triangle[to] = std::int32_t(rays.hit.primID[i]);
-    hits.u[to] = rays.hit.u[i];
-    hits.v[to] = rays.hit.v[i];
+    const auto point = ShadingMesh::on_triangle(rays.hit.primID[i], rays.hit.u[i], rays.hit.v[i]);
+    hits.triangle[to] = std::int32_t(point.triangle);
+    hits.u[to] = point.u;
+    hits.v[to] = point.v;
     hits.distance[to] = is_met ? rays.ray.tfar[i] : kInfinite;
     hits.time[to] = rays.ray.time[i];
     hits.normal.x[to] = rays.hit.Ng_x[i];
@@ -409,11 +411,11 @@ inline void RenderScene::intersect(RTCScene scene, RayBundle& bundle, std::size_
     hits.normal.z[to] = rays.hit.Ng_z[i];
   }
   for (int i = 0; i < bundle.count_; ++i) {
-    const MeshInstance*& instance = hits.instance[begin + std::size_t(i)];
-    instance = nullptr;
+    const std::size_t to = begin + std::size_t(i);
+    hits.instance[to] = nullptr;
     if (rays.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
-    instance = instances_[rays.hit.geomID[i]].get();
-    instance->shading->prefetch(rays.hit.primID[i]);
+    hits.instance[to] = instances_[rays.hit.geomID[i]].get();
+    hits.instance[to]->shading->prefetch(std::uint32_t(hits.triangle[to]));
   }
 }
 

@@ -7,15 +7,48 @@
 #include <vector>
 
 #include "diorama/geometry.h"
+#include "triangle_pairs.h"
 
 namespace diorama {
 
-/// What shading reads of a mesh, close together per triangle. Shared by its instances.
+/// What tracing and shading read of a mesh, shared by its instances.
+///
+/// Embree gets the triangles two by two, as quads. Triangles are numbered by them: 2 * quad for the
+/// first half, 2 * quad + 1 for the second. A triangle's corners begin with its tip, see
+/// TrianglePair; the weights u and v of a point belong to the second and third.
+///
+/// A triangle without a partner has both numbers, by the second with its last two corners
+/// exchanged: rounding may put a hit on its last edge beyond it, and still finds the same place
+/// there.
 class ShadingMesh {
  public:
   explicit ShadingMesh(std::shared_ptr<const Mesh> mesh);
 
   const Mesh& source() const { return *source_; }
+  /// Vertices of the source.
+  const std::vector<std::array<std::uint32_t, 4>>& quads() const { return quads_; }
+
+  struct Point {
+    std::uint32_t triangle = 0;
+    float u = 0.0f;
+    float v = 0.0f;
+  };
+  /// A hit as Embree tells it, on the triangle that it belongs to. The quad's corners a, b, c, d
+  /// are the triangles a, b, d and c, d, b; u leads from a to b, v from a to d.
+  static Point on_triangle(std::uint32_t quad, float u, float v) {
+    const bool is_second = u + v > 1.0f;
+    return {2 * quad + std::uint32_t(is_second), is_second ? 1.0f - u : u,
+            is_second ? 1.0f - v : v};
+  }
+
+  /// All numbers are below.
+  std::uint32_t number_end() const { return std::uint32_t(tips_.size()); }
+  /// Whether this is the second number of a triangle without a partner.
+  bool is_repeated(std::uint32_t triangle) const {
+    return triangle % 2 == 1 && tips_[triangle] == tips_[triangle - 1];
+  }
+  /// Vertices of the source.
+  std::array<std::uint32_t, 3> corners(std::uint32_t triangle) const;
   std::size_t slot(std::uint32_t triangle) const { return triangles_[triangle].slot; }
   std::size_t highest_slot() const { return highest_slot_; }
   bool has_normals() const { return !source_->normals.empty(); }
@@ -38,10 +71,23 @@ class ShadingMesh {
     std::array<std::int16_t, 9> normals{};  ///< Of the corners, 32767 long.
     std::uint16_t slot = 0;                 ///< Of its material.
   };
+  void fill(std::uint32_t triangle, const std::vector<std::array<std::int16_t, 3>>& normals);
+
+  std::shared_ptr<const Mesh> source_;
+  std::vector<std::uint32_t> tips_;  ///< Of the triangles.
+  std::vector<std::array<std::uint32_t, 4>> quads_;
   std::vector<Triangle> triangles_;
   std::vector<std::array<Vec2f, 3>> uvs_;
   std::size_t highest_slot_ = 0;
-  std::shared_ptr<const Mesh> source_;
 };
+
+inline std::array<std::uint32_t, 3> ShadingMesh::corners(std::uint32_t triangle) const {
+  const auto& vertices = source_->triangles[tips_[triangle] / 3];
+  const std::uint32_t a = tips_[triangle] % 3;
+  const std::uint32_t b = next_corner(a);
+  const std::uint32_t c = next_corner(b);
+  if (is_repeated(triangle)) return {vertices[a], vertices[c], vertices[b]};
+  return {vertices[a], vertices[b], vertices[c]};
+}
 
 }  // namespace diorama

@@ -137,6 +137,46 @@ TEST_CASE("a lamp over a floor lights it by the closed form", "[renderer]") {
   CHECK(mean.z() == Approx(5.0 * per_radiance).epsilon(0.005));
 }
 
+TEST_CASE("a panel with a picture lights a floor by the closed form", "[renderer]") {
+  // Brighter towards one corner: the halves of the panel shine unlike each other.
+  constexpr int kTexels = 8;
+  auto picture = std::make_shared<Texture>();
+  picture->width = picture->height = kTexels;
+  picture->channels = 1;
+  for (int y = 0; y < kTexels; ++y) {
+    for (int x = 0; x < kTexels; ++x) picture->floats.push_back(float(x + 2 * y));
+  }
+  const auto brightness = [](double u, double v) {
+    return std::clamp(kTexels * u - 0.5, 0.0, kTexels - 1.0) +
+           2.0 * std::clamp(kTexels * (1.0 - v) - 0.5, 0.0, kTexels - 1.0);
+  };
+  Material glow = matte(0.0f);
+  glow.emission.setOnes();
+  glow.emission_texture.texture = picture;
+  glow.emission_texture.wrap_u = glow.emission_texture.wrap_v = Wrap::Clamp;
+  TestWorld world;
+  world.add("floor", make_plane(6, 6), matte(0.5f));
+  Affine overhead = at(0.3, -0.2, 0.8);
+  overhead.linear() = Mat3(Eigen::AngleAxisd(kPi, Vec3::UnitX()));
+  world.add("panel", make_plane(1.2, 0.9), glow, overhead);
+
+  const Vec3 place = GENERATE(Vec3(0.8, 0.2, 0.0), Vec3(-0.4, -0.7, 0.0));
+  constexpr int kSteps = 200;
+  double expected = 0.0;
+  for (int i = 0; i < kSteps; ++i) {
+    for (int j = 0; j < kSteps; ++j) {
+      const double u = (i + 0.5) / kSteps;
+      const double v = (j + 0.5) / kSteps;
+      const Vec3 to = overhead * Vec3(1.2 * (u - 0.5), 0.9 * (v - 0.5), 0.0) - place;
+      const double cosines = to.z() * to.z() / to.squaredNorm();
+      expected += brightness(u, v) * cosines / to.squaredNorm();
+    }
+  }
+  expected *= 0.5 / kPi * 1.2 * 0.9 / (kSteps * kSteps);
+  const NodeId camera = world.add_camera(8, 6, 2000.0, place + Vec3(1.4, 0.9, 0.6), place);
+  CHECK(statistics(render(world, camera, reference(512))).mean == Approx(expected).epsilon(0.02));
+}
+
 TEST_CASE("light between two parallel bounces follows the geometric series", "[renderer]") {
   // Inside a closed sphere of albedo a with its own glow 1, radiance is 1 / (1 - a) everywhere.
   TestWorld world;

@@ -1,0 +1,280 @@
+// SPDX-License-Identifier: Apache-2.0
+// Rays meet quads; what they tell is about the triangles of the source.
+#include "render_scene.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "diorama/rng.h"
+#include "support/catch.h"
+#include "support/render_host/render_host.h"
+#include "test_world.h"
+
+namespace diorama {
+namespace {
+
+using test::at;
+using test::matte;
+using test::RenderHost;
+using test::TestWorld;
+
+/// A bumpy field whose triangles share no vertices: each corner has a normal and uv of its own. One
+/// cell has but one triangle, which stays alone.
+Mesh patchwork() {
+  constexpr int kColumns = 5;
+  constexpr int kRows = 4;
+  Rng rng(7);
+  std::array<std::array<Vec3f, kRows + 1>, kColumns + 1> field;
+  for (int x = 0; x <= kColumns; ++x) {
+    for (int y = 0; y <= kRows; ++y) {
+      field[std::size_t(x)][std::size_t(y)] = {0.31f * float(x), 0.22f * float(y),
+                                               float(rng.uniform(0.0, 0.07))};
+    }
+  }
+  Mesh mesh;
+  const auto add = [&](const std::array<std::array<int, 2>, 3>& corners) {
+    const auto first = std::uint32_t(mesh.positions.size());
+    mesh.triangles.push_back({first, first + 1, first + 2});
+    mesh.material_slots.push_back(std::uint16_t(mesh.triangles.size() % 3));
+    for (const auto& [x, y] : corners) {
+      mesh.positions.push_back(field[std::size_t(x)][std::size_t(y)]);
+      const Vec3 lean(rng.uniform(-0.5, 0.5), rng.uniform(-0.5, 0.5), 1.0);
+      mesh.normals.push_back(lean.normalized().cast<float>());
+      mesh.uvs.emplace_back(float(rng.uniform(-1.0, 2.0)), float(rng.uniform(-1.0, 2.0)));
+    }
+  };
+  for (int x = 0; x < kColumns; ++x) {
+    for (int y = 0; y < kRows; ++y) {
+      add({{{x, y}, {x + 1, y}, {x + 1, y + 1}}});
+      // The halves begin at other corners in every cell.
+      if (x + y == 0) continue;
+      if (x % 2 == 0) {
+        add({{{x + 1, y + 1}, {x, y + 1}, {x, y}}});
+      } else {
+        add({{{x, y}, {x + 1, y + 1}, {x, y + 1}}});
+      }
+    }
+  }
+  return mesh;
+}
+
+/// Values that grow evenly to the right and, less, downwards.
+std::shared_ptr<const Texture> ramp() {
+  auto texture = std::make_shared<Texture>();
+  texture->width = texture->height = 16;
+  texture->channels = 1;
+  for (int y = 0; y < 16; ++y) {
+    for (int x = 0; x < 16; ++x) {
+      texture->floats.push_back(0.1f + 0.04f * float(x) + 0.015f * float(y));
+    }
+  }
+  return texture;
+}
+
+/// Of the inner part of the texture, where bilinear lookups continue it.
+float ramp_at(const Vec2& uv) {
+  return float(0.1 + 0.04 * (16.0 * uv.x() - 0.5) + 0.015 * (16.0 * (1.0 - uv.y()) - 0.5));
+}
+
+/// Uploaded, with a plane of 2 x 1 m that faces +z of the base node.
+struct Sheet {
+  TestWorld world;
+  RenderHost host{1};
+  RenderScene scene{host, {}};
+
+  explicit Sheet(const Material& material) {
+    world.add("sheet", make_plane(2.0, 1.0), material);
+    scene.take(world.scene);
+  }
+  /// From above through the point with these uvs; the direction is in the base node's space.
+  struct Ray {
+    Vec3f origin;
+    Vec3f direction;
+  };
+  Ray ray_through(const Vec2& uv, const Vec3& direction) const {
+    const Affine world_from_base = world.scene.world_from_node(world.base);
+    const Vec3 point(2.0 * (uv.x() - 0.5), uv.y() - 0.5, 0.0);
+    return {(world_from_base * (point - direction.normalized())).cast<float>(),
+            (world_from_base.linear() * direction.normalized()).cast<float>()};
+  }
+  /// One by one and in a bundle, which must agree.
+  Vec3f light_through(const Vec2& uv, const Vec3& direction) const {
+    const Ray ray = ray_through(uv, direction);
+    const Vec3f alone = scene.transmittance(ray.origin, ray.direction, 2.0f, true, kMoment);
+    RayBundle bundle;
+    bundle.clear();
+    for (int i = 0; i < 3; ++i) bundle.add(ray.origin, ray.direction, 0.0f, 2.0f, kMoment);
+    scene.transmittance(bundle, true,
+                        [&](int, const Vec3f& share) { CHECK((share - alone).norm() < 1e-5f); });
+    return alone;
+  }
+};
+
+/// In both halves, off the border of the texture.
+const std::vector<Vec2> kPlaces{{0.9, 0.1},  {0.1, 0.9},  {0.7, 0.3}, {0.35, 0.6},
+                                {0.55, 0.5}, {0.45, 0.5}, {0.2, 0.1}, {0.8, 0.93}};
+
+}  // namespace
+
+TEST_CASE("a hit tells of the triangle at its place, in either half of a quad", "[rays]") {
+  const bool is_moving = GENERATE(false, true);
+  CAPTURE(is_moving);
+  TestWorld world;
+  Affine pose = at(0.3, -0.2, 0.5);
+  pose.linear() = Eigen::AngleAxisd(0.7, Vec3(0.2, 1.0, -0.4).normalized()) *
+                  Eigen::Scaling(1.3, -0.8, 1.1).toDenseMatrix();
+  const Mesh mesh = patchwork();
+  const NodeId node = world.add("patchwork", mesh, Material(), pose);
+  for (int i = 0; i < 2; ++i) {
+    world.scene.edit(node).materials.push_back(std::make_shared<const Material>());
+  }
+  if (is_moving) {
+    RigidBody body;
+    body.linear_velocity = Vec3(0.4, -0.3, 0.2);
+    body.angular_velocity = Vec3(0.5, 0.1, -0.3);
+    world.scene.edit(node).rigid_body = body;
+    const NodeId camera = world.add_camera(8, 6, 5.0, Vec3(3, 0, 0), Vec3(0, 0, 0));
+    world.scene.edit(camera).camera->exposure_time_s = 0.02;
+  }
+  RenderHost host(2);
+  RenderScene scene(host, {});
+  scene.take(world.scene);
+  REQUIRE((scene.window() > 0.0) == is_moving);
+  const MeshInstance& instance = *scene.instances()[0];
+  const Affine world_from_node = world.scene.world_from_node(node);
+
+  Rng rng(11);
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const auto& corners = mesh.triangles[t];
+    std::array<Vec3, 3> p;
+    for (std::size_t k = 0; k < 3; ++k) {
+      p[k] = world_from_node * mesh.positions[corners[k]].cast<double>();
+    }
+    const Vec3 normal = (p[1] - p[0]).cross(p[2] - p[0]);
+    RayBundle bundle;
+    bundle.clear();
+    std::vector<RayHit> hits;
+    std::vector<std::array<double, 3>> weights;
+    for (int i = 0; i < RayBundle::kSize; ++i) {
+      const double u = rng.uniform(0.01, 0.98);
+      const double v = rng.uniform(0.01, 0.99 - u);
+      weights.push_back({1.0 - u - v, u, v});
+      const Vec3 place = p[0] * weights.back()[0] + p[1] * u + p[2] * v;
+      // A mirrored pose turns the triangle's front away from its own normal's image.
+      const Vec3 direction = (i % 2 == 0 ? 1.0 : -1.0) * normal.normalized();
+      const Vec3f origin = (place - 0.01 * direction).cast<float>();
+      hits.push_back(scene.intersect(origin, direction.cast<float>(), 0.0f, 0.02f, kMoment));
+      bundle.add(origin, direction.cast<float>(), 0.0f, 0.02f, kMoment);
+    }
+    BatchHits batch;
+    scene.intersect(bundle, 8, batch);
+    for (std::size_t i = 0; i < 2 * RayBundle::kSize; ++i) {
+      const std::size_t ray = i % RayBundle::kSize;
+      const RayHit hit = i < RayBundle::kSize ? hits[ray] : batch.at(8 + ray);
+      CAPTURE(t, i);
+      REQUIRE(hit.instance == &instance);
+      CHECK(hit.distance == Approx(0.01f).margin(1e-4));
+      CHECK(instance.slot(hit.triangle) == mesh.material_slots[t]);
+      Vec2f uv = Vec2f::Zero();
+      Vec3f n = Vec3f::Zero();
+      for (std::size_t k = 0; k < 3; ++k) {
+        uv += float(weights[ray][k]) * mesh.uvs[corners[k]];
+        n += float(weights[ray][k]) * mesh.normals[corners[k]];
+      }
+      CHECK((instance.uv(hit.triangle, hit.u, hit.v) - uv).norm() < 2e-3f);
+      CHECK((instance.shading->normal(hit.triangle, hit.u, hit.v) / 32767.0f - n).norm() < 1e-3f);
+      CHECK((hit.normal.cast<double>() - normal).norm() < 1e-3 * normal.norm());
+      const auto own = instance.shading->corners(hit.triangle);
+      CHECK(std::is_permutation(own.begin(), own.end(), corners.begin()));
+      CHECK(own[(std::find(own.begin(), own.end(), corners[0]) - own.begin() + 1) % 3] ==
+            corners[1]);
+    }
+  }
+}
+
+TEST_CASE("a triangle without a partner is met where it is and nowhere else", "[rays]") {
+  Mesh mesh;
+  mesh.positions = {{0.1f, 0.2f, 0.0f}, {1.1f, 0.4f, 0.0f}, {0.5f, 0.9f, 0.0f}};
+  mesh.triangles = {{0, 1, 2}};
+  mesh.uvs = {{0.3f, 0.8f}, {0.7f, 0.1f}, {-0.4f, 0.2f}};
+  mesh.normals = {Vec3f::UnitX(), Vec3f::UnitY(), Vec3f::UnitZ()};
+  mesh.material_slots = {1};
+  Scene world;
+  const NodeId node = world.create(world.root(), "triangle");
+  world.edit(node).mesh = std::make_shared<const Mesh>(mesh);
+  RenderHost host(1);
+  RenderScene scene(host, {});
+  scene.take(world);
+  const Vec3f direction(0.0f, 0.0f, -1.0f);
+  // Along its edges and far beyond them, where the quad's other half would be.
+  for (int i = -40; i <= 80; ++i) {
+    for (int j = -40; j <= 80; ++j) {
+      const float u = 0.025f * float(i);
+      const float v = 0.025f * float(j);
+      const Vec3f place = mesh.positions[0] + u * (mesh.positions[1] - mesh.positions[0]) +
+                          v * (mesh.positions[2] - mesh.positions[0]);
+      const RayHit hit = scene.intersect(place - direction, direction, 0.0f, 2.0f);
+      const float inside = std::min({u, v, 1.0f - u - v});
+      CAPTURE(u, v);
+      if (std::abs(inside) > 1e-4f) CHECK(bool(hit) == (inside > 0.0f));
+      if (!hit) continue;
+      const Vec2f uv = (1.0f - u - v) * mesh.uvs[0] + u * mesh.uvs[1] + v * mesh.uvs[2];
+      CHECK((hit.instance->uv(hit.triangle, hit.u, hit.v) - uv).norm() < 1e-5f);
+      const Vec3f normal = RenderScene::interpolated_normal(hit) / 32767.0f;
+      CHECK((normal - Vec3f(1.0f - u - v, u, v)).norm() < 1e-4f);
+      CHECK(hit.instance->shading->slot(hit.triangle) == 1);
+      const auto corners = hit.instance->shading->corners(hit.triangle);
+      const Vec3f met = (1.0f - hit.u - hit.v) * mesh.positions[corners[0]] +
+                        hit.u * mesh.positions[corners[1]] + hit.v * mesh.positions[corners[2]];
+      CHECK((met - place).norm() < 1e-5f);
+    }
+  }
+}
+
+TEST_CASE("cut-outs have their holes in both halves of a quad", "[rays]") {
+  Material fence = matte(0.5f);
+  fence.opacity_texture.texture = ramp();
+  fence.opacity_threshold = 0.45f;
+  const Sheet sheet(fence);
+  for (const Vec2& uv : kPlaces) {
+    const Sheet::Ray ray = sheet.ray_through(uv, Vec3(0.1, 0.2, -1.0));
+    const bool is_hole = ramp_at(uv) < 0.45f;
+    CAPTURE(uv.x(), uv.y());
+    CHECK(bool(sheet.scene.intersect(ray.origin, ray.direction, 0.0f, 2.0f)) == !is_hole);
+    CHECK(sheet.light_through(uv, Vec3(0.1, 0.2, -1.0)) == Vec3f::Constant(is_hole ? 1.0f : 0.0f));
+  }
+}
+
+TEST_CASE("veils weaken light by their texture in both halves of a quad", "[rays]") {
+  Material veil = matte(0.5f);
+  veil.opacity_texture.texture = ramp();
+  const Sheet sheet(veil);
+  for (const Vec2& uv : kPlaces) {
+    CAPTURE(uv.x(), uv.y());
+    CHECK(sheet.light_through(uv, Vec3(-0.3, 0.1, -1.0)).x() == Approx(1.0f - ramp_at(uv)));
+  }
+}
+
+TEST_CASE("panes tint light by their texture and angle in both halves of a quad", "[rays]") {
+  Material pane;
+  pane.base_color.setOnes();
+  pane.base_color_texture.texture = ramp();
+  pane.transmission = 1.0f;
+  pane.is_thin_walled = true;
+  const Sheet sheet(pane);
+  const Vec3 direction(0.6, 0.3, -1.0);
+  // Fresnel's equations for n = 1.5, and the light that bounces between both faces.
+  const double cosine = 1.0 / direction.norm();
+  const double inner = std::sqrt(1.0 - (1.0 - cosine * cosine) / 2.25);
+  const double s = (cosine - 1.5 * inner) / (cosine + 1.5 * inner);
+  const double p = (1.5 * cosine - inner) / (1.5 * cosine + inner);
+  const double once = 0.5 * (s * s + p * p);
+  const double passed = 1.0 - 2.0 * once / (1.0 + once);
+  for (const Vec2& uv : kPlaces) {
+    CAPTURE(uv.x(), uv.y());
+    CHECK(double(sheet.light_through(uv, direction).x()) ==
+          Approx(passed * double(ramp_at(uv))).epsilon(1e-4));
+  }
+}
+
+}  // namespace diorama
