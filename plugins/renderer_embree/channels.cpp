@@ -226,11 +226,13 @@ NameSet geometry_channels() {
   return names;
 }
 
-Image<RayHit> fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshes,
-                            const View& view, Host& host) {
+void fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshes, const View& view,
+                   Image<RayHit>& seen, Host& host) {
   const int width = view.camera().width;
   const int height = view.camera().height;
-  Image<RayHit> seen(width, height, RayHit());
+  if (seen.width() != width || seen.height() != height) {
+    seen = Image<RayHit>(width, height, RayHit());
+  }
   ChannelImages channels(wanted, view);
   host.parallel_for(std::size_t(height), [&](std::size_t row) {
     const int y = int(row);
@@ -242,6 +244,7 @@ Image<RayHit> fill_channels(Frame& frame, const NameSet& wanted, const RenderSce
       bundle.clear();
       std::size_t count = 0;
       for (int x = begin; x < std::min(width, begin + RayBundle::kSize); ++x) {
+        seen.at(x, y) = RayHit();
         const auto ray = view.ray(Vec2(x + 0.5, y + 0.5));
         if (!ray) continue;
         bundle.add(ray->origin, ray->direction, ray->t_min, ray->t_max, kMoment);
@@ -259,7 +262,6 @@ Image<RayHit> fill_channels(Frame& frame, const NameSet& wanted, const RenderSce
     }
   });
   channels.move_to(frame);
-  return seen;
 }
 
 std::vector<CoverageMask> coverage(const RenderScene& meshes, const View& view,

@@ -16,9 +16,10 @@ namespace diorama {
 NameSet geometry_channels();
 
 /// Fills the wanted ones among the id and geometry channels, all from one ray per pixel centre, and
-/// returns what these rays met; valid until the scene's next take().
-Image<RayHit> fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshes,
-                            const View& view, Host& host);
+/// `seen` with what these rays met; valid until the scene's next take(). Its memory is used again
+/// where it has the view's size.
+void fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshes, const View& view,
+                   Image<RayHit>& seen, Host& host);
 
 /// See Renderer::cover. `seen` is that of the same view.
 std::vector<CoverageMask> coverage(const RenderScene& meshes, const View& view,

@@ -52,6 +52,23 @@ class FlushDenormals {
   unsigned before_;
 };
 
+/// Rays of jobs that run side by side.
+class RayTotals {
+ public:
+  void add(const RayCounts& counts) {
+    rays_ += counts.rays;
+    shadow_rays_ += counts.shadow_rays;
+  }
+  void put_into(EmbreeRenderer::Counts& counts) const {
+    counts.rays = rays_;
+    counts.shadow_rays = shadow_rays_;
+  }
+
+ private:
+  std::atomic<std::uint64_t> rays_{0};
+  std::atomic<std::uint64_t> shadow_rays_{0};
+};
+
 }  // namespace
 
 void EmbreeRenderer::Params::visit(ParamVisitor& v) {
@@ -146,7 +163,7 @@ void EmbreeRenderer::do_prepare(const Scene& scene) {
 const Image<RayHit>& EmbreeRenderer::seen(const View& view, NodeId camera) {
   if (seen_by_ != camera) {
     Frame frame;
-    seen_ = fill_channels(frame, {}, meshes_, view, host_);
+    fill_channels(frame, {}, meshes_, view, seen_, host_);
     seen_by_ = camera;
   }
   return seen_;
@@ -163,23 +180,49 @@ Film EmbreeRenderer::trace(const View& view, NodeId camera, std::uint64_t seed) 
   const PathTracer tracer(meshes_, view, settings, isa_);
   const int width = view.camera().width;
   const int height = view.camera().height;
-  Image<PixelSum> sums(width, height, PixelSum{});
   SamplePlan plan(width, height, {params_.samples, params_.error_target, params_.time_budget_s},
                   seed);
-  std::atomic<std::uint64_t> rays{0};
-  std::atomic<std::uint64_t> shadow_rays{0};
+  return plan.has_one_round() ? trace_at_once(tracer, plan, width, height)
+                              : trace_in_rounds(tracer, plan, width, height);
+}
+
+/// Without a picture of sums, which are larger than what is left of them.
+Film EmbreeRenderer::trace_at_once(const PathTracer& tracer, SamplePlan& plan, int width,
+                                   int height) {
+  Film film(width, height);
+  RayTotals totals;
+  const std::vector<TraceJob> jobs = plan.next_round({}, 0.0);
+  host_.parallel_for(jobs.size(), [&](std::size_t i) {
+    const FlushDenormals flush;
+    const TraceJob& job = jobs[i];
+    const int columns = job.x_end - job.x_begin;
+    std::vector<PixelSum> sums(std::size_t(columns * (job.y_end - job.y_begin)));
+    totals.add(tracer.trace(job, sums.data(), std::size_t(columns)));
+    const PixelSum* sum = sums.data();
+    for (int y = job.y_begin; y < job.y_end; ++y) {
+      for (int x = job.x_begin; x < job.x_end; ++x) film.at(x, y) = (sum++)->mean();
+    }
+  });
+  counts_.paths = std::uint64_t(params_.samples) * std::uint64_t(width) * std::uint64_t(height);
+  totals.put_into(counts_);
+  return film;
+}
+
+Film EmbreeRenderer::trace_in_rounds(const PathTracer& tracer, SamplePlan& plan, int width,
+                                     int height) {
+  Image<PixelSum> sums(width, height, PixelSum{});
+  RayTotals totals;
   const auto start = Clock::now();
   while (true) {
     const std::vector<TraceJob> jobs = plan.next_round(sums, seconds_since(start));
     if (jobs.empty()) break;
     host_.parallel_for(jobs.size(), [&](std::size_t i) {
       const FlushDenormals flush;
-      const RayCounts counts = tracer.trace(jobs[i], sums.pixels().data(), std::size_t(width));
-      rays += counts.rays;
-      shadow_rays += counts.shadow_rays;
+      const TraceJob& job = jobs[i];
+      totals.add(tracer.trace(job, &sums.at(job.x_begin, job.y_begin), std::size_t(width)));
     });
   }
-  Film film(width, height, FilmPixel{});
+  Film film(width, height);
   std::atomic<std::uint64_t> paths{0};
   host_.parallel_for(std::size_t(height), [&](std::size_t row) {
     std::uint64_t count = 0;
@@ -191,8 +234,7 @@ Film EmbreeRenderer::trace(const View& view, NodeId camera, std::uint64_t seed) 
     paths += count;
   });
   counts_.paths = paths;
-  counts_.rays = rays;
-  counts_.shadow_rays = shadow_rays;
+  totals.put_into(counts_);
   return film;
 }
 
@@ -233,7 +275,7 @@ Frame EmbreeRenderer::do_render(const Scene& scene, const RenderRequest& request
   if (std::any_of(known.begin(), known.end(),
                   [&](const auto& name) { return request.channels.contains(name); })) {
     const Stopwatch watch(counts_.channels_s);
-    seen_ = fill_channels(frame, request.channels, meshes_, view, host_);
+    fill_channels(frame, request.channels, meshes_, view, seen_, host_);
     seen_by_ = request.camera;
   }
   const bool wants_color =

@@ -12,6 +12,7 @@
 #include "diorama/renderer.h"
 #include "path_tracer.h"
 #include "render_scene.h"
+#include "sample_plan.h"
 
 namespace diorama {
 
@@ -62,6 +63,8 @@ class EmbreeRenderer final : public Renderer {
                                      bool with_distances) override;
   const Image<RayHit>& seen(const View& view, NodeId camera);
   Film trace(const View& view, NodeId camera, std::uint64_t seed);
+  Film trace_at_once(const PathTracer& tracer, SamplePlan& plan, int width, int height);
+  Film trace_in_rounds(const PathTracer& tracer, SamplePlan& plan, int width, int height);
   Image<Vec3f> without_noise(const Film& film, const View& view);
   void put_colors(Frame& frame, const RenderRequest& request, const View& view);
 

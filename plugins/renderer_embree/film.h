@@ -2,8 +2,10 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
+#include <span>
 
-#include "diorama/image.h"
+#include "huge_pages.h"
 #include "sampling.h"
 
 namespace diorama {
@@ -30,7 +32,32 @@ struct FilmPixel {
   float surface_share = 0.0f;  ///< Of the samples that met a scattering surface.
 };
 
-using Film = Image<FilmPixel>;
+/// The pixels of a picture, row by row.
+class Film {
+ public:
+  Film() = default;
+  /// Without values as yet: to write them once, in parallel, is a good part of what a film costs.
+  Film(int width, int height)
+      : width_(width), height_(height), pixels_(std::size_t(width) * std::size_t(height)) {}
+  Film(int width, int height, const FilmPixel& fill) : Film(width, height) {
+    std::ranges::fill(pixels(), fill);
+  }
+
+  int width() const { return width_; }
+  int height() const { return height_; }
+  FilmPixel& at(int x, int y) { return pixels()[offset(x, y)]; }
+  const FilmPixel& at(int x, int y) const { return pixels()[offset(x, y)]; }
+  std::span<FilmPixel> pixels() { return {pixels_.data(), pixels_.size()}; }
+  std::span<const FilmPixel> pixels() const { return {pixels_.data(), pixels_.size()}; }
+
+ private:
+  std::size_t offset(int x, int y) const {
+    return std::size_t(y) * std::size_t(width_) + std::size_t(x);
+  }
+  int width_ = 0;
+  int height_ = 0;
+  HugePages<FilmPixel> pixels_;
+};
 
 /// Gathers the samples of one pixel.
 class PixelSum {

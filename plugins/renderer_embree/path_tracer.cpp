@@ -65,7 +65,7 @@ inline RayCounts PathTracer::trace_all(const TraceJob& job, PixelSum* sums,
     while (sample < job.sample_end && paths.size() < kBatch) {
       const int x = job.x_begin + next % width;
       const int y = job.y_begin + next / width;
-      pixels[paths.size()] = &sums[std::size_t(y) * stride + std::size_t(x)];
+      pixels[paths.size()] = &sums[std::size_t(next / width) * stride + std::size_t(next % width)];
       paths.emplace_back(PathSampler(job.order.place(x, y, sample)));
       columns[paths.size() - 1] = float(x);
       rows[paths.size() - 1] = float(y);

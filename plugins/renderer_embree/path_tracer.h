@@ -65,8 +65,8 @@ class PathTracer {
  public:
   PathTracer(const RenderScene& scene, const View& view, const TraceSettings& settings, Isa isa);
 
-  /// Adds samples to the sums of all pixels, `sums` row by row with `stride` per row. Equal jobs
-  /// give equal sums. Uses the kernel compiled for the instruction set.
+  /// Adds samples to the sums of the job's pixels, which lie row by row from its first on, `stride`
+  /// per row. Equal jobs give equal sums. Uses the kernel compiled for the instruction set.
   RayCounts trace(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
 
  private:

@@ -1,15 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <sys/mman.h>
-
 #include <algorithm>
 #include <array>
 #include <cstddef>
-#include <cstdlib>
-#include <memory>
-#include <new>
 
+#include "huge_pages.h"
 #include "lanes.h"
 
 namespace diorama {
@@ -26,7 +22,7 @@ class PixelLayers {
   PixelLayers(int width, int height, int margin, const Pixel& outside)
       : margin_(std::size_t(margin)),
         stride_(std::size_t((width + kLanes - 1) / kLanes * kLanes) + 2 * margin_),
-        values_(make_room(stride_ * kLayers * std::size_t(height))) {
+        values_(stride_ * kLayers * std::size_t(height)) {
     for (int y = 0; y < height; ++y) {
       const Row own = row(y);
       for (int layer = 0; layer < kLayers; ++layer) {
@@ -50,27 +46,14 @@ class PixelLayers {
       return {lanes(layer, x), lanes(layer + 1, x), lanes(layer + 2, x)};
     }
   };
-  Row row(int y) const { return {&values_[std::size_t(y) * stride_ * kLayers + margin_], stride_}; }
-
- private:
-  struct Free {
-    void operator()(float* values) const { std::free(values); }
-  };
-
-  /// In huge pages where the system has some: to map small ones takes as long as a round of
-  /// filtering.
-  static std::unique_ptr<float[], Free> make_room(std::size_t count) {
-    constexpr std::size_t kHugePage = std::size_t(1) << 21;
-    const std::size_t size = (count * sizeof(float) + kHugePage - 1) / kHugePage * kHugePage;
-    std::unique_ptr<float[], Free> room(static_cast<float*>(std::aligned_alloc(kHugePage, size)));
-    if (!room) throw std::bad_alloc();
-    madvise(room.get(), size, MADV_HUGEPAGE);
-    return room;
+  Row row(int y) const {
+    return {values_.data() + std::size_t(y) * stride_ * kLayers + margin_, stride_};
   }
 
+ private:
   std::size_t margin_;
   std::size_t stride_;
-  std::unique_ptr<float[], Free> values_;
+  HugePages<float> values_;
 };
 
 }  // namespace diorama

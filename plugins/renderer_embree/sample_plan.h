@@ -22,6 +22,8 @@ class SamplePlan {
   };
   SamplePlan(int width, int height, const Limits& limits, std::uint64_t seed);
 
+  /// Whether the first round takes all samples.
+  bool has_one_round() const { return limits_.error_target <= 0.0 && limits_.time_budget_s <= 0.0; }
   /// What to trace next; empty: the picture is done. `sums` hold all earlier rounds, which took
   /// `elapsed_s` together.
   std::vector<TraceJob> next_round(const Image<PixelSum>& sums, double elapsed_s);
