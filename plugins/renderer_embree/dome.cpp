@@ -45,6 +45,7 @@ SquareDistribution smallest_table(std::vector<float> weights, int width, int hei
   fine /= double(weights.size());
   while (width % 2 == 0 && height % 2 == 0) {
     std::vector<float> merged;
+    merged.reserve(weights.size() / 4);
     double second = 0.0;
     for (int y = 0; y < height; y += 2) {
       for (int x = 0; x < width; x += 2) {
@@ -62,16 +63,26 @@ SquareDistribution smallest_table(std::vector<float> weights, int width, int hei
   return SquareDistribution(weights, width, height);
 }
 
-/// One line with every value mixed half and half with the mean of its neighbours.
-template <class Neighbour>
-void blur(float* line, int count, int step, Neighbour&& neighbour) {
-  std::vector<float> before(static_cast<std::size_t>(count));
-  for (int i = 0; i < count; ++i) before[std::size_t(i)] = line[i * step];
-  for (int i = 0; i < count; ++i) {
-    const float sides =
-        before[std::size_t(neighbour(i - 1))] + before[std::size_t(neighbour(i + 1))];
-    line[i * step] = 0.5f * before[std::size_t(i)] + 0.25f * sides;
+/// Every cell mixed half and half with the mean of those beside it, which close to a ring, and then
+/// with the mean of those above and below.
+std::vector<float> blurred(std::vector<float> cells, int width, int height) {
+  const auto mix = [](float a, float b, float c) { return 0.5f * b + 0.25f * (a + c); };
+  std::vector<float> across(cells.size());
+  for (int y = 0; y < height; ++y) {
+    const float* from = &cells[std::size_t(y * width)];
+    float* to = &across[std::size_t(y * width)];
+    to[0] = mix(from[width - 1], from[0], from[1]);
+    for (int x = 1; x + 1 < width; ++x) to[x] = mix(from[x - 1], from[x], from[x + 1]);
+    to[width - 1] = mix(from[width - 2], from[width - 1], from[0]);
   }
+  for (int y = 0; y < height; ++y) {
+    const float* from = &across[std::size_t(y * width)];
+    const float* above = y > 0 ? from - width : from;
+    const float* below = y + 1 < height ? from + width : from;
+    float* to = &cells[std::size_t(y * width)];
+    for (int x = 0; x < width; ++x) to[x] = mix(above[x], from[x], below[x]);
+  }
+  return cells;
 }
 
 /// Luminance over a grid of cells on the image.
@@ -102,31 +113,25 @@ DomeTexture::DomeTexture(std::shared_ptr<const Texture> source) : image_(std::mo
   const int per_patch_y = std::clamp(image_.height() / kRows, 2, 64);
   const int width = per_patch_x * kColumns;
   const int height = per_patch_y * kRows;
-  std::vector<float> cells = lightness(image_, width, height);
   // Lookups are bilinear, so a cell also shines with a part of its neighbours.
-  for (int y = 0; y < height; ++y) {
-    blur(&cells[std::size_t(y * width)], width, 1, [&](int x) { return (x + width) % width; });
-  }
-  for (int x = 0; x < width; ++x) {
-    blur(&cells[std::size_t(x)], height, width,
-         [&](int y) { return std::clamp(y, 0, height - 1); });
-  }
+  std::vector<float> cells = blurred(lightness(image_, width, height), width, height);
   for (int y = 0; y < height; ++y) {
     const float sine = std::sin((float(y) + 0.5f) / float(height) * kPiF);
-    for (int x = 0; x < width; ++x) cells[std::size_t(y * width + x)] *= sine;
+    float* row = &cells[std::size_t(y * width)];
+    for (int x = 0; x < width; ++x) row[x] *= sine;
   }
   const float cell = 2.0f * kPiF * kPiF / float(width * height);
   for (int patch = 0; patch < kPatches; ++patch) {
     const int x_begin = patch % kColumns * per_patch_x;
     const int y_begin = patch / kColumns * per_patch_y;
     std::vector<float> weights;
-    float power = 0.0f;
+    weights.reserve(std::size_t(per_patch_x * per_patch_y));
     for (int y = y_begin; y < y_begin + per_patch_y; ++y) {
-      for (int x = x_begin; x < x_begin + per_patch_x; ++x) {
-        weights.push_back(cells[std::size_t(y * width + x)]);
-        power += weights.back() * cell;
-      }
+      const float* row = &cells[std::size_t(y * width + x_begin)];
+      weights.insert(weights.end(), row, row + per_patch_x);
     }
+    float power = 0.0f;
+    for (const float weight : weights) power += weight * cell;
     patches_.push_back(smallest_table(std::move(weights), per_patch_x, per_patch_y));
     patch_power_.push_back(power);
   }

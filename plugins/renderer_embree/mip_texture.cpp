@@ -32,6 +32,45 @@ const SrgbBytes& srgb_bytes() {
   return bytes;
 }
 
+struct Size {
+  int width = 0;
+  int height = 0;
+};
+
+Size half(const Size& size) { return {std::max(1, size.width / 2), std::max(1, size.height / 2)}; }
+
+/// Each value the mean of two by two: of decode(value, channel), then encoded likewise.
+template <class T, class Decode, class Encode>
+std::vector<T> halved(const std::vector<T>& from, const Size& size, int channels,
+                      const Decode& decode, const Encode& encode) {
+  const Size to = half(size);
+  const auto step = std::size_t(channels);
+  const std::size_t row = std::size_t(size.width) * step;
+  std::vector<T> values(std::size_t(to.width) * std::size_t(to.height) * step);
+  T* value = values.data();
+  const auto add_block = [&](const T* first, int rows, int columns) {
+    for (int c = 0; c < channels; ++c) {
+      float sum = 0.0f;
+      for (int v = 0; v < rows; ++v) {
+        const T* texel = first + std::size_t(v) * row + c;
+        for (int u = 0; u < columns; ++u, texel += step) sum += decode(*texel, c);
+      }
+      *value++ = encode(sum / float(rows * columns), c);
+    }
+  };
+  for (int y = 0; y < to.height; ++y) {
+    // Odd sizes: the last pair grows to three so that no texel is lost.
+    const int rows = y + 1 == to.height ? size.height - 2 * y : 2;
+    const T* first = &from[2 * std::size_t(y) * row];
+    for (int x = 0; x < to.width; ++x, first += 2 * step) {
+      const int columns = x + 1 == to.width ? size.width - 2 * x : 2;
+      // Known sizes make short work of nearly all blocks.
+      rows == 2 && columns == 2 ? add_block(first, 2, 2) : add_block(first, rows, columns);
+    }
+  }
+  return values;
+}
+
 }  // namespace
 
 MipTexture::MipTexture(std::shared_ptr<const Texture> source) : source_(std::move(source)) {
@@ -46,36 +85,30 @@ MipTexture::MipTexture(std::shared_ptr<const Texture> source) : source_(std::mov
 }
 
 void MipTexture::add_level() {
-  const int from = level_count() - 1;
-  const int old_width = levels_.back().width;
-  const int old_height = levels_.back().height;
-  Level level{std::max(1, old_width / 2), std::max(1, old_height / 2), {}, {}};
+  const bool is_first = levels_.size() == 1;
+  const Level& old = levels_.back();
+  const Size size{old.width, old.height};
+  Level level{half(size).width, half(size).height, {}, {}};
   const int channels = source_->channels;
   const bool is_srgb = source_->color_space == ColorSpace::Srgb;
-  const std::size_t values = std::size_t(level.width) * std::size_t(level.height * channels);
-  source_->bytes.empty() ? level.floats.reserve(values) : level.bytes.reserve(values);
-  for (int y = 0; y < level.height; ++y) {
-    for (int x = 0; x < level.width; ++x) {
-      // Odd sizes: the last pair grows to three so that no texel is lost.
-      const int x_end = x + 1 == level.width ? old_width : 2 * x + 2;
-      const int y_end = y + 1 == level.height ? old_height : 2 * y + 2;
-      Rgba sum = Rgba::Zero();
-      for (int v = 2 * y; v < y_end; ++v) {
-        for (int u = 2 * x; u < x_end; ++u) sum += texel(from, u, v);
-      }
-      const Rgba mean = sum / float(std::max(1, (x_end - 2 * x) * (y_end - 2 * y)));
-      for (int c = 0; c < channels; ++c) {
-        // Two channels mean grey and alpha.
-        const float value = channels == 2 && c == 1 ? mean[3] : mean[c];
-        if (source_->bytes.empty()) {
-          level.floats.push_back(value);
-          continue;
-        }
-        const bool is_encoded = is_srgb && c < 3 && !(channels == 2 && c == 1);
-        level.bytes.push_back(is_encoded ? srgb_bytes()(value)
-                                         : std::uint8_t(value * 255.0f + 0.5f));
-      }
-    }
+  // Two channels mean grey and alpha.
+  const int alpha = channels == 2 ? 1 : 3;
+  if (source_->bytes.empty()) {
+    const bool decodes = is_first && is_srgb;
+    level.floats = halved(
+        is_first ? source_->floats : old.floats, size, channels,
+        [&](float value, int c) { return decodes && c != alpha ? linear_from_srgb(value) : value; },
+        [](float mean, int) { return mean; });
+  } else {
+    const SrgbBytes& encoded = srgb_bytes();
+    level.bytes = halved(
+        is_first ? source_->bytes : old.bytes, size, channels,
+        [&](std::uint8_t byte, int c) {
+          return c == alpha ? float(byte) / 255.0f : linear_from_byte_[byte];
+        },
+        [&](float mean, int c) {
+          return is_srgb && c != alpha ? encoded(mean) : std::uint8_t(mean * 255.0f + 0.5f);
+        });
   }
   levels_.push_back(std::move(level));
 }
