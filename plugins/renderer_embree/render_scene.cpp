@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "diorama/error.h"
 #include "stopwatch.h"
@@ -129,9 +130,18 @@ void RenderScene::learn_sky() {
   Surroundings now = surroundings();
   if (!(now == surroundings_)) sky_grids_.clear();
   surroundings_ = std::move(now);
-  const auto sees = [this](const Vec3f& origin, const Vec3f& direction) {
-    return transmittance(scene_, origin, direction, kInfinite, true, kStaticMask, kMoment)
-               .maxCoeff() > 0.0f;
+  static_assert(SkyGrid::kMostRays <= RayBundle::kSize);
+  const auto sees = [this](std::span<const SkyGrid::Ray> rays) {
+    RayBundle bundle;
+    bundle.clear();
+    for (const auto& [origin, direction] : rays) {
+      bundle.add(origin, direction, 0.0f, kInfinite, kMoment);
+    }
+    std::uint32_t lit = 0;
+    transmittance(scene_, bundle, true, kStaticMask, [&](int i, const Vec3f& share) {
+      lit |= std::uint32_t(share.maxCoeff() > 0.0f) << i;
+    });
+    return lit;
   };
   std::vector<CachedGrid> used;
   lights_.learn_sky([&](const std::shared_ptr<const DomeTexture>& dome,

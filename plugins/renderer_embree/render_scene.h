@@ -124,7 +124,7 @@ class RayBundle {
   friend class RenderScene;
   void put(int i, const Vec3f& origin, const Vec3f& direction, float t_min, float t_max,
            float time);
-  void finish();
+  void finish(std::uint32_t mask);
   alignas(32) std::array<int, kSize> valid_{};
   RTCRayHit8 rays_;
   int count_ = 0;
@@ -181,9 +181,7 @@ class RenderScene {
   /// The light left between two points: 0 behind anything opaque, tinted behind glass and what is
   /// partly transparent. Solid glass counts as opaque unless `passes_glass`.
   Vec3f transmittance(const Vec3f& origin, const Vec3f& direction, float t_max, bool passes_glass,
-                      float time) const {
-    return transmittance(scene_over_time(), origin, direction, t_max, passes_glass, ~0u, time);
-  }
+                      float time) const;
   /// The same for the rays of a bundle, which it spends. Their hits are put into eight entries from
   /// `begin` on, a multiple of eight.
   void intersect(RayBundle& rays, std::size_t begin, BatchHits& hits) const {
@@ -195,7 +193,9 @@ class RenderScene {
   }
   /// Calls lit(i, share) for every ray of which light is left; spends the bundle.
   template <class Lit>
-  void transmittance(RayBundle& rays, bool passes_glass, Lit&& lit) const;
+  void transmittance(RayBundle& rays, bool passes_glass, Lit&& lit) const {
+    transmittance(scene_over_time(), rays, passes_glass, ~0u, lit);
+  }
   /// Seconds around the moment of the poses that `time` runs through; see shutter_window().
   double window() const { return window_; }
   /// Some instances of the scene with nothing else; valid until the next take().
@@ -266,8 +266,9 @@ class RenderScene {
   void intersect(RTCScene scene, RayBundle& rays, std::size_t begin, BatchHits& hits) const;
   RayHit intersect(RTCScene scene, const Vec3f& origin, const Vec3f& direction, float t_min,
                    float t_max, float time) const;
-  static Vec3f transmittance(RTCScene scene, const Vec3f& origin, const Vec3f& direction,
-                             float t_max, bool passes_glass, std::uint32_t mask, float time);
+  template <class Lit>
+  static void transmittance(RTCScene scene, RayBundle& rays, bool passes_glass, std::uint32_t mask,
+                            Lit&& lit);
   RTCScene scene_over_time() const { return moving_scene_ ? moving_scene_ : scene_; }
   static void weaken_shadow_ray(const RTCFilterFunctionNArguments* args);
   void collect(const Scene& scene, NodeId node, const Affine& world_from_parent, bool is_movable);
@@ -347,15 +348,13 @@ inline RayHit RenderScene::intersect(RTCScene scene, const Vec3f& origin, const 
           {ray.hit.Ng_x, ray.hit.Ng_y, ray.hit.Ng_z}};
 }
 
-inline Vec3f RenderScene::transmittance(RTCScene scene, const Vec3f& origin, const Vec3f& direction,
-                                        float t_max, bool passes_glass, std::uint32_t mask,
-                                        float time) {
+inline Vec3f RenderScene::transmittance(const Vec3f& origin, const Vec3f& direction, float t_max,
+                                        bool passes_glass, float time) const {
   RTCRayHit ray = make_ray(origin, direction, 0.0f, t_max, time);
-  ray.ray.mask = mask;
   ShadowContext shadow;
   shadow.passes_glass = passes_glass;
   embree::init(shadow.context);
-  embree::occluded(scene, shadow.context, ray.ray);
+  embree::occluded(scene_over_time(), shadow.context, ray.ray);
   if (ray.ray.tfar == -kInfinite) return Vec3f::Zero();
   return shadow.is_weakened ? shadow.kept[0] : Vec3f(Vec3f::Ones());
 }
@@ -375,13 +374,13 @@ inline void RayBundle::put(int i, const Vec3f& origin, const Vec3f& direction, f
 }
 
 /// Fills the rest with rays that go nowhere: not all of Embree's kernels heed which are valid.
-inline void RayBundle::finish() {
+inline void RayBundle::finish(std::uint32_t mask) {
   for (int i = count_; i < kSize; ++i) {
     put(i, Vec3f::Zero(), Vec3f::UnitZ(), 0.0f, -1.0f, kMoment);
   }
   for (int i = 0; i < kSize; ++i) {
     valid_[std::size_t(i)] = i < count_ ? -1 : 0;
-    rays_.ray.mask[i] = ~0u;
+    rays_.ray.mask[i] = mask;
     rays_.ray.id[i] = unsigned(i);
     rays_.ray.flags[i] = 0;
     rays_.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
@@ -391,7 +390,7 @@ inline void RayBundle::finish() {
 
 inline void RenderScene::intersect(RTCScene scene, RayBundle& bundle, std::size_t begin,
                                    BatchHits& hits) const {
-  bundle.finish();
+  bundle.finish(~0u);
   RTCRayHit8& rays = bundle.rays_;
   embree::Context context;
   embree::init(context);
@@ -420,12 +419,13 @@ inline void RenderScene::intersect(RTCScene scene, RayBundle& bundle, std::size_
 }
 
 template <class Lit>
-inline void RenderScene::transmittance(RayBundle& bundle, bool passes_glass, Lit&& lit) const {
-  bundle.finish();
+inline void RenderScene::transmittance(RTCScene scene, RayBundle& bundle, bool passes_glass,
+                                       std::uint32_t mask, Lit&& lit) {
+  bundle.finish(mask);
   ShadowContext shadow;
   shadow.passes_glass = passes_glass;
   embree::init(shadow.context);
-  embree::occluded(bundle.valid_.data(), scene_over_time(), shadow.context, bundle.rays_.ray);
+  embree::occluded(bundle.valid_.data(), scene, shadow.context, bundle.rays_.ray);
   for (int i = 0; i < bundle.count_; ++i) {
     if (bundle.rays_.ray.tfar[i] == -kInfinite) continue;
     lit(i, shadow.is_weakened ? shadow.kept[std::size_t(i)] : Vec3f(Vec3f::Ones()));

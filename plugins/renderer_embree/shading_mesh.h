@@ -52,7 +52,7 @@ class ShadingMesh {
   std::size_t slot(std::uint32_t triangle) const { return triangles_[triangle].slot; }
   std::size_t highest_slot() const { return highest_slot_; }
   bool has_normals() const { return !source_->normals.empty(); }
-  bool has_uvs() const { return !uvs_.empty(); }
+  bool has_uvs() const { return !source_->uvs.empty(); }
   /// Interpolated, in node space, not unit length; only with has_normals().
   Vec3f normal(std::uint32_t triangle, float u, float v) const {
     const auto& n = triangles_[triangle].normals;
@@ -71,8 +71,6 @@ class ShadingMesh {
     std::array<std::int16_t, 9> normals{};  ///< Of the corners, 32767 long.
     std::uint16_t slot = 0;                 ///< Of its material.
   };
-  void fill(std::uint32_t triangle, const std::vector<std::array<std::int16_t, 3>>& normals);
-
   std::shared_ptr<const Mesh> source_;
   std::vector<std::uint32_t> tips_;  ///< Of the triangles.
   std::vector<std::array<std::uint32_t, 4>> quads_;

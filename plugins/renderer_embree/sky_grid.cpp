@@ -2,6 +2,7 @@
 #include "sky_grid.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "sobol.h"
 
@@ -54,21 +55,35 @@ SkyGrid::Shares SkyGrid::seen_from(std::size_t index, const DomeTexture& dome,
   const Vec3f corner(float(int(index) % counts_[0]), float(int(index) / counts_[0] % counts_[1]),
                      float(int(index) / counts_[0] / counts_[1]));
   Shares seen{};
+  std::array<Ray, kMostRays> rays;
+  std::array<std::pair<int, float>, kMostRays>
+      gains;  ///< Patch and share that each ray stands for.
+  std::size_t waiting = 0;
+  const auto trace = [&] {
+    const std::uint32_t lit = sees({rays.data(), waiting});
+    for (std::size_t i = 0; i < waiting; ++i) {
+      if (lit >> i & 1u) seen[std::size_t(gains[i].first)] += gains[i].second;
+    }
+    waiting = 0;
+  };
   for (int patch = 0; patch < DomeTexture::kPatches; ++patch) {
     const float power = dome.patch_power(patch);
     if (power <= 0.0f) continue;
-    const int rays = 1 + std::min(int(kRaysPerCell * (power / total)), kMostRaysPerPatch);
+    const int count = 1 + std::min(int(kRaysPerCell * (power / total)), kMostRaysPerPatch);
     std::uint64_t key = (index * DomeTexture::kPatches + std::uint64_t(patch)) * 1024;
     const auto next = [&] { return fraction(mix_bits(++key * 0x9E3779B97F4A7C15u)); };
-    for (int i = 0; i < rays; ++i) {
+    for (int i = 0; i < count; ++i) {
       const Vec3f offset(next(), next(), next());
       const Vec3f origin = low_ + (corner + offset).cwiseQuotient(cells_per_metre_);
       const Vec2f u(next(), next());
       const Vec3f direction =
           world_from_dome * DomeTexture::towards(dome.sample(patch, u).place).direction;
-      if (sees(origin, direction)) seen[std::size_t(patch)] += 1.0f / float(rays);
+      rays[waiting] = {origin, direction};
+      gains[waiting] = {patch, 1.0f / float(count)};
+      if (++waiting == kMostRays) trace();
     }
   }
+  if (waiting > 0) trace();
   return seen;
 }
 

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <functional>
+#include <span>
 #include <vector>
 
 #include "diorama/host.h"
@@ -15,8 +17,14 @@ namespace diorama {
 /// room, the window. Light samples go there; a rest goes everywhere, because the grid may be wrong.
 class SkyGrid {
  public:
-  /// Whether a ray to the sky (world space) leaves the scene.
-  using Sees = std::function<bool(const Vec3f& origin, const Vec3f& direction)>;
+  /// Towards the sky; world space.
+  struct Ray {
+    Vec3f origin;
+    Vec3f direction;
+  };
+  static constexpr std::size_t kMostRays = 8;
+  /// Which of up to kMostRays rays leave the scene: one bit each, the first lowest.
+  using Sees = std::function<std::uint32_t(std::span<const Ray> rays)>;
 
   /// One cell that sees everything.
   explicit SkyGrid(const DomeTexture& dome);

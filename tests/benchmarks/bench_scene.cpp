@@ -1,24 +1,50 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "bench_scene.h"
 
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
 #include <array>
 #include <cstring>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <span>
 
+#include "diorama/error.h"
 #include "framework/bench/scene_rig.h"
-#include "support/render_host/render_host.h"
 
 namespace diorama::bench {
 namespace {
 
 using Json = nlohmann::json;
 
+/// A file's bytes where the system keeps them, without a copy.
+class MappedFile {
+ public:
+  explicit MappedFile(const std::filesystem::path& file) : size_(std::filesystem::file_size(file)) {
+    const int descriptor = open(file.c_str(), O_RDONLY | O_CLOEXEC);
+    if (descriptor >= 0) {
+      bytes_ = mmap(nullptr, size_, PROT_READ, MAP_PRIVATE | MAP_POPULATE, descriptor, 0);
+      close(descriptor);
+    }
+    if (bytes_ == MAP_FAILED) throw Error(ErrorKind::Asset, file.string() + ": cannot be read");
+  }
+  ~MappedFile() { munmap(bytes_, size_); }
+  MappedFile(const MappedFile&) = delete;
+  MappedFile& operator=(const MappedFile&) = delete;
+
+  const std::byte* data() const { return static_cast<const std::byte*>(bytes_); }
+
+ private:
+  std::size_t size_;
+  void* bytes_ = MAP_FAILED;
+};
+
 /// A glTF binary: the JSON chunk and the buffer behind it.
 class Glb {
  public:
-  explicit Glb(const std::filesystem::path& file) : bytes_(test::read_bytes(file)) {
+  explicit Glb(const std::filesystem::path& file) : bytes_(file) {
     const std::uint32_t json_size = word(12);
     const auto* text = reinterpret_cast<const char*>(bytes_.data()) + 20;
     json = Json::parse(text, text + json_size);
@@ -64,7 +90,7 @@ class Glb {
     std::memcpy(&value, bytes_.data() + at, 4);
     return value;
   }
-  std::vector<std::byte> bytes_;
+  MappedFile bytes_;
   std::size_t buffer_;
 };
 
@@ -98,9 +124,7 @@ std::shared_ptr<const Material> read_material(const Glb& glb, const Json& source
     const std::size_t texture = pbr["baseColorTexture"]["index"];
     const std::size_t image = glb.json["textures"][texture]["source"];
     const std::size_t view = glb.json["images"][image]["bufferView"];
-    auto decoded = std::make_shared<Texture>(*host.decode_texture(glb.view(view), "wood.png"));
-    decoded->color_space = ColorSpace::Srgb;
-    material->base_color_texture.texture = decoded;
+    material->base_color_texture.texture = host.decode_texture(glb.view(view), "wood.png");
   }
   material->metallic = pbr.value("metallicFactor", 1.0f);
   material->roughness = pbr.value("roughnessFactor", 1.0f);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <functional>
+#include <span>
 #include <tuple>
 #include <vector>
 
@@ -104,9 +105,14 @@ TEST_CASE("a dome is sampled as bright as it is", "[sampling]") {
   test::RenderHost host(2);
   const SkyGrid everything(dome);
   const Aabb bounds{Vec3(-2, -1, -3), Vec3(2, 4, 3)};
-  const SkyGrid part(
-      dome, Eigen::Matrix3f::Identity(), bounds,
-      [](const Vec3f& p, const Vec3f& d) { return p.x() > 0.0f || d.y() > 0.6f; }, host);
+  const auto sees = [](std::span<const SkyGrid::Ray> rays) {
+    std::uint32_t lit = 0;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      lit |= std::uint32_t(rays[i].origin.x() > 0.0f || rays[i].direction.y() > 0.6f) << i;
+    }
+    return lit;
+  };
+  const SkyGrid part(dome, Eigen::Matrix3f::Identity(), bounds, sees, host);
   CHECK(part.power(part.cell(Vec3f(-1, 0, 0))) < 0.4f * part.power(part.cell(Vec3f(1, 0, 0))));
   for (const SkyGrid* grid : {&everything, &part}) {
     const std::uint32_t cell = grid->cell(Vec3f(-1.0f, 0.5f, 1.0f));
