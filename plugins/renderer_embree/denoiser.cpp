@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <vector>
 
 #include "pixel_layers.h"
@@ -41,17 +42,18 @@ constexpr float kNoSurface = 1e6f;
 /// Light that falls on the pixels' surfaces, whatever their colour.
 enum Incoming {
   kIrradiance = 0,
-  kVariance = 3,   ///< Of the luminance.
-  kCertainty = 4,  ///< 1 / the difference of luminance that noise explains.
-  kIncoming = 5
+  kLuminance = 3,  ///< Of the irradiance.
+  kVariance = 4,   ///< Of the luminance.
+  kCertainty = 5,  ///< See measure().
+  kIncoming = 6
 };
 
 using Guides = PixelLayers<kGuides>;
 using Lights = PixelLayers<kIncoming>;
 
-/// exp(-16 x) for x >= 0, to 2 %: one weight of many need not be better.
-inline Lanes fast_exp16(const Lanes& x) {
-  const Lanes base = larger(Lanes{}, 1.0f - x);
+/// exp(-16 x) for x >= 0, from 1 - x, to 2 %: one weight of many need not be better.
+inline Lanes fast_exp16(const Lanes& one_less) {
+  const Lanes base = larger(Lanes{}, one_less);
   const Lanes b2 = base * base;
   const Lanes b4 = b2 * b2;
   const Lanes b8 = b4 * b4;
@@ -61,14 +63,18 @@ inline Lanes fast_exp16(const Lanes& x) {
 inline Lanes luminances(const Lanes3& rgb) {
   return 0.2126f * rgb.x + 0.7152f * rgb.y + 0.0722f * rgb.z;
 }
-inline Lanes luminances(const Lights::Row& light, int x) {
-  return luminances(light.lanes3(kIrradiance, x));
-}
 
-inline void store_lanes3(const Lanes3& rgb, const Lights::Row& light, int x) {
+inline void store_irradiance(const Lanes3& rgb, const Lights::Row& light, int x) {
   store_lanes(rgb.x, light.at(kIrradiance, x));
   store_lanes(rgb.y, light.at(kIrradiance + 1, x));
   store_lanes(rgb.z, light.at(kIrradiance + 2, x));
+  store_lanes(luminances(rgb), light.at(kLuminance, x));
+}
+
+inline bool has_any(const Lanes& numbers) {
+  using Bits [[gnu::vector_size(4 * kLanes)]] = std::int64_t;
+  const auto bits = Bits(numbers);
+  return (bits[0] | bits[1] | bits[2] | bits[3]) != 0;
 }
 
 /// 1 for surfaces, 0 elsewhere.
@@ -98,7 +104,7 @@ class Denoiser {
   Image<Vec3f> run();
 
  private:
-  enum class Step : std::uint8_t { Read, Tame, Measure, Filter, Finish };
+  enum class Step : std::uint8_t { Read, Tame, Measure, Filter, Weigh, Finish };
 
   /// Does one step for all rows. Steps read lights_ and leave their result in next_, but for Read
   /// and Measure, which add to lights_.
@@ -111,9 +117,11 @@ class Denoiser {
   void tame(int y);
   void weigh(const Lights& light, int y_begin, std::vector<float>& sums) const;
   void measure(int y);
+  int row_by_reach(int index, int reach) const;
   void filter(int y, int round);
   void calm(int y);
-  float lost(int column, int block_row) const;
+  Lanes calming(int x, int y, const Lanes& lonely) const;
+  std::vector<float> lost() const;
   void give_back(int y);
   void write(int y);
 
@@ -132,8 +140,21 @@ class Denoiser {
   int block_rows_;
   std::vector<float> before_;
   std::vector<float> after_;
+  std::vector<float> lost_;  ///< By block.
   Image<Vec3f> image_;
 };
+
+/// The rows in the order 0, reach, 2 reach, ..., 1, 1 + reach, ...: each then needs two of the rows
+/// that the one before it has read, and one more from memory.
+inline int Denoiser::row_by_reach(int index, int reach) const {
+  int first = 0;
+  while (true) {
+    const int count = (height_ - first + reach - 1) / reach;
+    if (index < count) return first + index * reach;
+    index -= count;
+    ++first;
+  }
+}
 
 inline void Denoiser::rows(Step step, int round, int begin, int end) {
   for (int y = begin; y < end; ++y) {
@@ -148,7 +169,9 @@ inline void Denoiser::rows(Step step, int round, int begin, int end) {
         measure(y);
         break;
       case Step::Filter:
-        filter(y, round);
+        filter(row_by_reach(y, 1 << round), round);
+        break;
+      case Step::Weigh:
         break;
       case Step::Finish:
         calm(y);
@@ -158,7 +181,7 @@ inline void Denoiser::rows(Step step, int round, int begin, int end) {
     }
   }
   if (step == Step::Tame) weigh(lights_, begin, before_);
-  if (step == Step::Filter && round == kRounds - 1) weigh(next_, begin, after_);
+  if (step == Step::Weigh) weigh(lights_, begin, after_);
 }
 
 #define DIORAMA_KERNEL(NAME, ARCH)                                                                 \
@@ -197,6 +220,8 @@ Image<Vec3f> Denoiser::run() {
     all_rows(Step::Filter, round);
     std::swap(lights_, next_);
   }
+  all_rows(Step::Weigh);
+  lost_ = lost();
   all_rows(Step::Finish);
   return std::move(image_);
 }
@@ -218,6 +243,7 @@ void Denoiser::read(int y) {
       *guides.at(kPosition + k, x) = position[k];
       *light.at(kIrradiance + k, x) = irradiance[k];
     }
+    *light.at(kLuminance, x) = luminance(irradiance);
     *guides.at(kFirmness, x) =
         is_surface ? 1.0f / (1.0f + kMixedTolerance * std::max(0.0f, 1.0f - length)) : kNoSurface;
     const float own_color = luminance(color);
@@ -245,7 +271,7 @@ inline void Denoiser::tame(int y) {
         const Lanes is_surface = surfaces(guides, x + dx);
         neighbours += is_surface;
         if (v == y && dx == 0) continue;
-        const Lanes value = is_surface * luminances(other, x + dx);
+        const Lanes value = is_surface * other.lanes(kLuminance, x + dx);
         const Lanes below_first = smaller(first, value);
         first = larger(first, value);
         const Lanes below_second = smaller(second, below_first);
@@ -254,11 +280,11 @@ inline void Denoiser::tame(int y) {
       }
     }
     const Lanes3 irradiance = light.lanes3(kIrradiance, x);
-    const Lanes own = luminances(irradiance);
+    const Lanes own = light.lanes(kLuminance, x);
     const Lanes judged = neighbours >= 8.0f ? surfaces(guides_.row(y), x) : zero;
     const Lanes suspect = own > third ? judged : zero;
     const Lanes scale = suspect > zero ? third / larger(own, all_lanes(1e-30f)) : zero + 1.0f;
-    store_lanes3({irradiance.x * scale, irradiance.y * scale, irradiance.z * scale}, tamed, x);
+    store_irradiance({irradiance.x * scale, irradiance.y * scale, irradiance.z * scale}, tamed, x);
     store_lanes(light.lanes(kVariance, x) * scale * scale, tamed.at(kVariance, x));
   }
 }
@@ -270,15 +296,15 @@ void Denoiser::weigh(const Lights& light, int y_begin, std::vector<float>& sums)
     float sum = 0.0f;
     for (int y = y_begin; y < y_end; ++y) {
       const auto row = light.row(y);
-      for (int x = column * kBlock; x < x_end; ++x) {
-        sum += luminance({*row.at(0, x), *row.at(1, x), *row.at(2, x)});
-      }
+      for (int x = column * kBlock; x < x_end; ++x) sum += *row.at(kLuminance, x);
     }
     sums[std::size_t(y_begin / kBlock * columns_ + column)] = sum;
   }
 }
 
-/// Variances of few samples are noisy themselves: they are smoothed.
+/// Certainty is 1 / the difference of luminance that noise explains; half of it, because two pixels
+/// have a say, and scaled for fast_exp16(). Variances of few samples are noisy themselves: they are
+/// smoothed.
 inline void Denoiser::measure(int y) {
   const auto own = lights_.row(y);
   for (int x = 0; x < width_; x += kLanes) {
@@ -295,16 +321,19 @@ inline void Denoiser::measure(int y) {
     }
     const Lanes variance = sum / larger(weights, all_lanes(1.0f));
     const Lanes explained =
-        kLuminanceSlack * square_roots(variance) + 1e-4f * luminances(own, x) + 1e-8f;
-    store_lanes(1.0f / explained, own.at(kCertainty, x));
+        kLuminanceSlack * square_roots(variance) + 1e-4f * own.lanes(kLuminance, x) + 1e-8f;
+    store_lanes((0.5f / 16.0f) / explained, own.at(kCertainty, x));
   }
 }
 
-/// Eight pixels whose neighbours are averaged. Scaled for fast_exp16().
+constexpr float kTurn = kNormalSharpness / 16.0f;
+
+/// Eight pixels whose neighbours are averaged. Scaled for fast_exp16(), and few enough numbers to
+/// stay in registers.
 struct Centre {
-  Lanes3 normal;
-  Lanes3 slope;  ///< The normal over the tolerated distance from the plane.
-  Lanes plane;   ///< Where the plane is along `slope`.
+  Lanes3 normal;  ///< kTurn long.
+  Lanes plane;    ///< Where the plane is along `normal`.
+  Lanes slack;    ///< Weight of a distance from the plane, along `normal`.
   Lanes firmness;
   Lanes luminance;
   Lanes certainty;
@@ -320,14 +349,21 @@ struct FilterSums {
 /// believes itself certain, had the only say, bright ones would be left out and pictures darken.
 inline void add_neighbours(const Centre& own, const Guides::Row& guides, const Lights::Row& light,
                            int x, float share, FilterSums& sums) {
-  constexpr float kTurn = kNormalSharpness / 16.0f;
-  const Lanes off_plane = magnitude(dot(own.slope, guides.lanes3(kPosition, x)) - own.plane);
-  const Lanes turned = kTurn - dot(own.normal, guides.lanes3(kNormal, x));
+  const Lanes3& n = own.normal;
+  const Lanes3 position = guides.lanes3(kPosition, x);
+  const Lanes3 normal = guides.lanes3(kNormal, x);
+  // In this order every step is one multiplication with an addition.
+  const Lanes off_plane = n.z * position.z + (n.y * position.y + (n.x * position.x - own.plane));
+  Lanes unlike = own.slack * magnitude(off_plane) + kTurn;
+  unlike = unlike - n.x * normal.x;
+  unlike = unlike - n.y * normal.y;
+  unlike = unlike - n.z * normal.z;
   const Lanes firmness = larger(own.firmness, guides.lanes(kFirmness, x));
+  const Lanes brighter = magnitude(light.lanes(kLuminance, x) - own.luminance);
+  const Lanes certainty = own.certainty + light.lanes(kCertainty, x);
+  const Lanes alike = (1.0f - unlike * firmness) - brighter * certainty;
+  const Lanes w = share * fast_exp16(alike);
   const Lanes3 irradiance = light.lanes3(kIrradiance, x);
-  const Lanes brighter = magnitude(luminances(irradiance) - own.luminance);
-  const Lanes certainty = own.certainty + (0.5f / 16.0f) * light.lanes(kCertainty, x);
-  const Lanes w = share * fast_exp16((off_plane + turned) * firmness + brighter * certainty);
   sums.irradiance.x += w * irradiance.x;
   sums.irradiance.y += w * irradiance.y;
   sums.irradiance.z += w * irradiance.z;
@@ -336,18 +372,16 @@ inline void add_neighbours(const Centre& own, const Guides::Row& guides, const L
 }
 
 inline Centre centre_of(const Guides::Row& guides, const Lights::Row& light, int x) {
-  constexpr float kTurn = kNormalSharpness / 16.0f;
   const Lanes3 position = guides.lanes3(kPosition, x);
   const Lanes3 normal = guides.lanes3(kNormal, x);
-  const Lanes scale =
-      (1.0f / 16.0f) / (kPlaneSlack * square_roots(dot(position, position)) + 1e-6f);
   Centre centre;
   centre.normal = {kTurn * normal.x, kTurn * normal.y, kTurn * normal.z};
-  centre.slope = {scale * normal.x, scale * normal.y, scale * normal.z};
-  centre.plane = dot(centre.slope, position);
+  centre.plane = dot(centre.normal, position);
+  centre.slack =
+      (1.0f / (16.0f * kTurn)) / (kPlaneSlack * square_roots(dot(position, position)) + 1e-6f);
   centre.firmness = guides.lanes(kFirmness, x);
-  centre.luminance = luminances(light, x);
-  centre.certainty = (0.5f / 16.0f) * light.lanes(kCertainty, x);
+  centre.luminance = light.lanes(kLuminance, x);
+  centre.certainty = light.lanes(kCertainty, x);
   return centre;
 }
 
@@ -356,7 +390,13 @@ inline void Denoiser::filter(int y, int round) {
   const auto guides = guides_.row(y);
   const auto light = lights_.row(y);
   const auto filtered = next_.row(y);
+  // Too many streams for the processor to foresee.
+  const int coming = std::min(y + 2 * reach, height_ - 1);
+  const auto coming_guides = guides_.row(coming);
+  const auto coming_light = lights_.row(coming);
   for (int x = 0; x < width_; x += kLanes) {
+    coming_guides.fetch(x);
+    coming_light.fetch(x);
     const Centre own = centre_of(guides, light, x);
     FilterSums sums;
     for (int v = y - reach; v <= y + reach; v += reach) {
@@ -372,7 +412,7 @@ inline void Denoiser::filter(int y, int round) {
     const Lanes scale = surfaces(guides, x) / larger(sums.weights, all_lanes(1e-12f));
     const Lanes3 mean{sums.irradiance.x * scale, sums.irradiance.y * scale,
                       sums.irradiance.z * scale};
-    store_lanes3(mean, filtered, x);
+    store_irradiance(mean, filtered, x);
     store_lanes(sums.variance * scale * scale, filtered.at(kVariance, x));
     if (round > 0) continue;
     constexpr float kOwn = kOwnShare * kOwnShare;
@@ -383,51 +423,63 @@ inline void Denoiser::filter(int y, int round) {
 /// Pixels that agree with none of their neighbours, mostly mixtures at edges, keep their noise;
 /// they may at least be no darker and no brighter than what surrounds them.
 inline void Denoiser::calm(int y) {
-  const int v_begin = std::max(0, y - 2);
-  const int v_end = std::min(height_, y + 3);
   const auto light = lights_.row(y);
   for (int x = 0; x < width_; x += kLanes) {
-    const Lanes zero{};
-    Lanes low = all_lanes(kInfinite);
-    Lanes high{};
-    Lanes witnesses{};
-    for (int v = v_begin; v < v_end; ++v) {
-      const auto guides = guides_.row(v);
-      const auto other = lights_.row(v);
-      for (int dx = -2; dx <= 2; ++dx) {
-        const Lanes support = support_.row(v).lanes(0, x + dx);
-        const Lanes counts = support >= kLonely ? surfaces(guides, x + dx) : zero;
-        const Lanes value = luminances(other, x + dx);
-        low = counts > zero ? smaller(low, value) : low;
-        high = larger(high, counts * value);
-        witnesses += counts;
-      }
-    }
-    const Lanes3 irradiance = light.lanes3(kIrradiance, x);
-    const Lanes own = luminances(irradiance);
     const Lanes support = support_.row(y).lanes(0, x);
-    const Lanes calm = smaller(larger(own, low * (1.0f / kLeeway)), high * kLeeway);
-    const Lanes lonely = support < kLonely ? surfaces(guides_.row(y), x) : zero;
-    const Lanes judged = witnesses >= kWitnesses ? lonely : zero;
-    const Lanes changed = own > zero ? judged : zero;
-    const Lanes scale = changed > zero ? calm / larger(own, all_lanes(1e-30f)) : zero + 1.0f;
-    store_lanes3({irradiance.x * scale, irradiance.y * scale, irradiance.z * scale}, next_.row(y),
-                 x);
+    const Lanes lonely = support < kLonely ? surfaces(guides_.row(y), x) : Lanes{};
+    Lanes3 irradiance = light.lanes3(kIrradiance, x);
+    if (has_any(lonely)) {
+      const Lanes scale = calming(x, y, lonely);
+      irradiance = {irradiance.x * scale, irradiance.y * scale, irradiance.z * scale};
+    }
+    store_irradiance(irradiance, next_.row(y), x);
   }
 }
 
-/// By how much the light around the middle of a block was weakened.
-inline float Denoiser::lost(int column, int block_row) const {
-  float before = 0.0f;
-  float after = 1e-12f;
-  for (int v = std::max(0, block_row - 1); v < std::min(block_rows_, block_row + 2); ++v) {
-    for (int u = std::max(0, column - 1); u < std::min(columns_, column + 2); ++u) {
-      const float w = (v == block_row ? 2.0f : 1.0f) * (u == column ? 2.0f : 1.0f);
-      before += w * before_[std::size_t(v * columns_ + u)];
-      after += w * after_[std::size_t(v * columns_ + u)];
+/// By how much eight pixels of which some are lonely become brighter or darker.
+inline Lanes Denoiser::calming(int x, int y, const Lanes& lonely) const {
+  const Lanes zero{};
+  Lanes low = all_lanes(kInfinite);
+  Lanes high{};
+  Lanes witnesses{};
+  for (int v = std::max(0, y - 2); v < std::min(height_, y + 3); ++v) {
+    const auto guides = guides_.row(v);
+    const auto other = lights_.row(v);
+    for (int dx = -2; dx <= 2; ++dx) {
+      const Lanes support = support_.row(v).lanes(0, x + dx);
+      const Lanes counts = support >= kLonely ? surfaces(guides, x + dx) : zero;
+      const Lanes value = other.lanes(kLuminance, x + dx);
+      low = counts > zero ? smaller(low, value) : low;
+      high = larger(high, counts * value);
+      witnesses += counts;
     }
   }
-  return std::clamp(before / after, 1.0f, kMostReturned);
+  const Lanes own = lights_.row(y).lanes(kLuminance, x);
+  const Lanes calm = smaller(larger(own, low * (1.0f / kLeeway)), high * kLeeway);
+  const Lanes judged = witnesses >= kWitnesses ? lonely : zero;
+  const Lanes changed = own > zero ? judged : zero;
+  return changed > zero ? calm / larger(own, all_lanes(1e-30f)) : zero + 1.0f;
+}
+
+/// By how much the light around the middles of blocks was weakened.
+std::vector<float> Denoiser::lost() const {
+  std::vector<float> shares;
+  shares.reserve(before_.size());
+  for (int block_row = 0; block_row < block_rows_; ++block_row) {
+    for (int column = 0; column < columns_; ++column) {
+      float before = 0.0f;
+      float after = 1e-12f;
+      for (int v = std::max(0, block_row - 1); v < std::min(block_rows_, block_row + 2); ++v) {
+        for (int u = std::max(0, column - 1); u < std::min(columns_, column + 2); ++u) {
+          const float w = (v == block_row ? 2.0f : 1.0f) * (u == column ? 2.0f : 1.0f);
+          before += w * before_[std::size_t(v * columns_ + u)];
+          after += w * after_[std::size_t(v * columns_ + u)];
+        }
+      }
+      shares.push_back(std::clamp(before / after, 1.0f, kMostReturned));
+    }
+  }
+  return shares;
 }
 
 /// The light that was cut off or left out comes back, spread over a wide neighbourhood: pictures
@@ -441,7 +493,8 @@ inline void Denoiser::give_back(int y) {
   const float down = v - float(upper);
   const auto at_column = [&](int column) {
     const int u = std::clamp(column, 0, columns_ - 1);
-    return (1.0f - down) * lost(u, upper) + down * lost(u, lower);
+    return (1.0f - down) * lost_[std::size_t(upper * columns_ + u)] +
+           down * lost_[std::size_t(lower * columns_ + u)];
   };
   for (int column = 0; column <= columns_; ++column) {
     const float left = at_column(column - 1);
