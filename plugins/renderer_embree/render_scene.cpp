@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <span>
 
 #include "diorama/error.h"
@@ -111,6 +112,7 @@ void RenderScene::take(const Scene& scene) {
     collect(scene, scene.root(), Affine::Identity(), false);
     assign_shading_meshes();
     assign_materials(scene);
+    pack_uvs();
   }
   {
     const Stopwatch watch(times_.tree_s);
@@ -212,10 +214,9 @@ void RenderScene::assign_shading_meshes() {
       missing.push_back(instance->mesh);
     }
   }
-  std::vector<std::shared_ptr<const ShadingMesh>> made(missing.size());
-  host_.parallel_for(missing.size(), [&](std::size_t i) {
-    made[i] = std::make_shared<const ShadingMesh>(missing[i]);
-  });
+  std::vector<std::shared_ptr<ShadingMesh>> made(missing.size());
+  host_.parallel_for(missing.size(),
+                     [&](std::size_t i) { made[i] = std::make_shared<ShadingMesh>(missing[i]); });
   for (std::size_t i = 0; i < made.size(); ++i) shading_meshes_[missing[i].get()] = made[i];
   for (const auto& instance : instances_) {
     instance->shading = shading_meshes_.at(instance->mesh.get());
@@ -241,6 +242,17 @@ void RenderScene::assign_materials(const Scene& scene) {
     }
     instance->slot_lights.assign(instance->materials.size(), MeshInstance::kNoLight);
   }
+}
+
+void RenderScene::pack_uvs() {
+  std::set<ShadingMesh*> textured;
+  for (const auto& instance : instances_) {
+    const auto reads_uv = [](const ShadingMaterial* m) { return m->reads_uv; };
+    if (!std::ranges::any_of(instance->materials, reads_uv)) continue;
+    textured.insert(shading_meshes_.at(instance->mesh.get()).get());
+  }
+  const std::vector<ShadingMesh*> meshes(textured.begin(), textured.end());
+  host_.parallel_for(meshes.size(), [&](std::size_t i) { meshes[i]->pack_uvs(); });
 }
 
 void RenderScene::weaken_shadow_ray(const RTCFilterFunctionNArguments* args) {

@@ -274,6 +274,7 @@ class RenderScene {
   void collect(const Scene& scene, NodeId node, const Affine& world_from_parent, bool is_movable);
   void assign_materials(const Scene& scene);
   void assign_shading_meshes();
+  void pack_uvs();
   void upload(const Instances& previous);
   bool can_keep(const Instances& previous) const;
   void build_all();
@@ -298,7 +299,7 @@ class RenderScene {
   double window_ = 0.0;
   Times times_;
   MaterialLibrary materials_;
-  std::map<const Mesh*, std::shared_ptr<const ShadingMesh>> shading_meshes_;
+  std::map<const Mesh*, std::shared_ptr<ShadingMesh>> shading_meshes_;
   std::map<const Texture*, CachedDome> domes_;
   std::shared_ptr<const Material> default_material_;
   std::shared_ptr<const Texture> white_sky_;  ///< Of domes without an image.

@@ -31,7 +31,6 @@ ShadingMesh::ShadingMesh(std::shared_ptr<const Mesh> mesh) : source_(std::move(m
   tips_.reserve(2 * pairs.size());
   quads_.reserve(pairs.size());
   triangles_.reserve(2 * pairs.size());
-  if (has_uvs()) uvs_.reserve(2 * pairs.size());
   const auto add_triangle = [&](const std::array<std::uint32_t, 3>& corners, std::uint32_t tip) {
     Triangle& triangle = triangles_.emplace_back();
     if (!normals.empty()) {
@@ -39,7 +38,6 @@ ShadingMesh::ShadingMesh(std::shared_ptr<const Mesh> mesh) : source_(std::move(m
     }
     if (!m.material_slots.empty()) triangle.slot = m.material_slots[tip / 3];
     highest_slot_ = std::max<std::size_t>(highest_slot_, triangle.slot);
-    if (has_uvs()) uvs_.push_back({m.uvs[corners[0]], m.uvs[corners[1]], m.uvs[corners[2]]});
   };
   for (const auto& [first, second] : pairs) {
     const bool is_pair = second != TrianglePair::kNone;
@@ -53,6 +51,12 @@ ShadingMesh::ShadingMesh(std::shared_ptr<const Mesh> mesh) : source_(std::move(m
     add_triangle({a, b, d}, tips_[number]);
     add_triangle({c, other_d, other_b}, tips_[number + 1]);
   }
+}
+
+void ShadingMesh::pack_uvs() {
+  if (!has_uvs() || !uvs_.empty()) return;
+  uvs_.reserve(tips_.size());
+  for (std::uint32_t t = 0; t < number_end(); ++t) uvs_.push_back(source_uvs(t));
 }
 
 }  // namespace diorama

@@ -231,6 +231,27 @@ TEST_CASE("a triangle without a partner is met where it is and nowhere else", "[
   }
 }
 
+TEST_CASE("a hit has the same uv before and after its mesh gets a texture", "[rays]") {
+  Sheet sheet(matte(0.5f));
+  const NodeId node = sheet.scene.instances()[0]->node;
+  Material textured = matte(0.5f);
+  textured.base_color_texture.texture = ramp();
+  const auto check_uvs = [&] {
+    for (const Vec2& uv : kPlaces) {
+      const Sheet::Ray ray = sheet.ray_through(uv, Vec3(0.1, 0.2, -1.0));
+      const RayHit hit = sheet.scene.intersect(ray.origin, ray.direction, 0.0f, 2.0f);
+      REQUIRE(hit);
+      CHECK((hit.instance->uv(hit.triangle, hit.u, hit.v) - uv.cast<float>()).norm() < 1e-5f);
+    }
+  };
+  check_uvs();
+  const ShadingMesh* before = sheet.scene.instances()[0]->shading.get();
+  sheet.world.scene.edit(node).materials = {std::make_shared<const Material>(textured)};
+  sheet.scene.take(sheet.world.scene);
+  check_uvs();
+  CHECK(sheet.scene.instances()[0]->shading.get() == before);
+}
+
 TEST_CASE("cut-outs have their holes in both halves of a quad", "[rays]") {
   Material fence = matte(0.5f);
   fence.opacity_texture.texture = ramp();
