@@ -25,13 +25,16 @@ void measure_tight_boxes(const Image<std::uint32_t>& ids, std::vector<Instance>&
   std::vector<PixelBox> boxes(instances.size(), kNothing);
   for (int y = 0; y < ids.height(); ++y) {
     const auto row = ids.row(y);
-    for (int x = 0; x < ids.width(); ++x) {
+    // Neighbours are mostly equal: a box is widened once per run.
+    for (int x = 0, end = 0; x < ids.width(); x = end) {
       const std::uint32_t id = row[std::size_t(x)];
+      end = x + 1;
+      while (end < ids.width() && row[std::size_t(end)] == id) ++end;
       if (id == 0 || id >= position.size() || position[id] < 0) continue;
       PixelBox& box = boxes[std::size_t(position[id])];
       box.x_min = std::min(box.x_min, x);
       box.y_min = std::min(box.y_min, y);
-      box.x_max = std::max(box.x_max, x + 1);
+      box.x_max = std::max(box.x_max, end);
       box.y_max = std::max(box.y_max, y + 1);
     }
   }

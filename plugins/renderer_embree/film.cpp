@@ -6,6 +6,13 @@ namespace diorama {
 FilmPixel PixelSum::mean() const {
   FilmPixel pixel;
   if (count_ == 0) return pixel;
+  if (count_ == 1) {
+    // Its own mean; it says nothing of its spread: take the value itself.
+    pixel = sum_;
+    pixel.variance = float(luminance_ * luminance_);
+    pixel.surface_share = float(surfaces_);
+    return pixel;
+  }
   const float scale = 1.0f / float(count_);
   pixel.seen = sum_.seen * scale;
   pixel.scattered = sum_.scattered * scale;
@@ -19,8 +26,7 @@ FilmPixel PixelSum::mean() const {
   }
   const double mean = luminance_ / count_;
   const double spread = std::max(0.0, luminance2_ / count_ - mean * mean);
-  // One sample says nothing of its spread: take the value itself.
-  pixel.variance = float(count_ > 1 ? spread / (count_ - 1) : mean * mean);
+  pixel.variance = float(spread / (count_ - 1));
   return pixel;
 }
 

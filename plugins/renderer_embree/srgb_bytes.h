@@ -20,13 +20,18 @@ class SrgbBytes {
     }
   }
   /// Values outside [0, 1] are clipped; what is no number is black.
-  std::uint8_t operator()(float linear) const {
+  std::uint8_t operator()(float linear) const { return bytes_[std::size_t(place_of(linear))]; }
+
+  /// The same in two steps, the first of which compilers make vectors of.
+  static std::int32_t place_of(float linear) {
     const float shown = linear > 0.0f ? std::min(linear, 1.0f) : 0.0f;
-    return bytes_[std::size_t(std::sqrt(shown) * float(bytes_.size() - 1) + 0.5f)];
+    return std::int32_t(std::sqrt(shown) * float(kSize - 1) + 0.5f);
   }
+  std::uint8_t operator[](std::int32_t place) const { return bytes_[std::size_t(place)]; }
 
  private:
-  std::array<std::uint8_t, 8192> bytes_;
+  static constexpr std::size_t kSize = 8192;
+  std::array<std::uint8_t, kSize> bytes_;
 };
 
 }  // namespace diorama

@@ -14,6 +14,9 @@ namespace {
 /// A curve per channel pulls colours apart; this much of the grey goes back in before.
 constexpr float kFilmicGrey = 0.15f;
 
+/// At least so many tell the exposure of pictures that have them.
+constexpr double kExposurePixels = 1 << 16;
+
 /// Narkowicz, "ACES filmic tone mapping curve", 2015. White long before the squares overflow.
 float filmic(float x) {
   x = std::min(x, 1e6f);
@@ -24,10 +27,15 @@ float filmic(float x) {
 
 double automatic_exposure(const Image<Vec3f>& hdr) {
   constexpr double kMiddleGrey = 0.18;
+  // Of large pictures every so many pixels will do.
+  const double share = double(hdr.pixels().size()) / kExposurePixels;
+  const int step = std::max(1, int(std::sqrt(share)));
   std::vector<float> lit;
-  for (const Vec3f& pixel : hdr.pixels()) {
-    const float l = luminance(pixel);
-    if (l > 0.0f && std::isfinite(l)) lit.push_back(l);
+  for (int y = 0; y < hdr.height(); y += step) {
+    for (int x = 0; x < hdr.width(); x += step) {
+      const float l = luminance(hdr.at(x, y));
+      if (l > 0.0f && std::isfinite(l)) lit.push_back(l);
+    }
   }
   if (lit.empty()) return 1.0;
   // The middle four fifths. Selection is much cheaper than sorting.
@@ -43,18 +51,27 @@ double automatic_exposure(const Image<Vec3f>& hdr) {
 
 Image<Rgba8> displayed(const Image<Vec3f>& hdr, double exposure, ViewTransform transform,
                        Host& host) {
-  const SrgbBytes bytes;
+  static const SrgbBytes bytes;
   const bool is_filmic = transform == ViewTransform::Filmic;
   Image<Rgba8> image(hdr.width(), hdr.height(), Rgba8{0, 0, 0, 255});
   host.parallel_for(std::size_t(hdr.height()), [&](std::size_t row) {
-    for (int x = 0; x < hdr.width(); ++x) {
-      const Vec3f exposed = hdr.at(x, int(row)) * float(exposure);
-      const float grey = kFilmicGrey * luminance(exposed);
-      Rgba8& pixel = image.at(x, int(row));
-      for (std::size_t k = 0; k < 3; ++k) {
-        const float value = exposed[Eigen::Index(k)];
-        pixel[k] = bytes(is_filmic ? filmic(grey + (1.0f - kFilmicGrey) * value) : value);
-      }
+    // Step by step for the whole row, because compilers make vectors of each step.
+    std::vector<float> values(3 * std::size_t(hdr.width()));
+    float* value = values.data();
+    for (const Vec3f& pixel : hdr.row(int(row))) {
+      const Vec3f exposed = pixel * float(exposure);
+      const float grey = is_filmic ? kFilmicGrey * luminance(exposed) : 0.0f;
+      const float own = is_filmic ? 1.0f - kFilmicGrey : 1.0f;
+      for (int k = 0; k < 3; ++k) *value++ = grey + own * exposed[k];
+    }
+    if (is_filmic) {
+      for (float& v : values) v = filmic(v);
+    }
+    std::vector<std::int32_t> places(values.size());
+    for (std::size_t i = 0; i < values.size(); ++i) places[i] = SrgbBytes::place_of(values[i]);
+    const std::int32_t* place = places.data();
+    for (Rgba8& pixel : image.row(int(row))) {
+      for (std::size_t k = 0; k < 3; ++k) pixel[k] = bytes[*place++];
     }
   });
   return image;

@@ -113,6 +113,21 @@ TEST_CASE("sources seen directly pass untouched", "[denoiser]") {
         1e-4f);
 }
 
+TEST_CASE("a large picture is exposed like a small one of the same", "[exposure]") {
+  const auto shaded = [](int x, int y) {
+    return Vec3f::Constant(float(0.5 + 0.4 * std::sin(0.07 * x) * std::cos(0.05 * y)));
+  };
+  Image<Vec3f> small(200, 150, Vec3f::Zero());
+  Image<Vec3f> large(1400, 1050, Vec3f::Zero());
+  for (int y = 0; y < large.height(); ++y) {
+    for (int x = 0; x < large.width(); ++x) large.at(x, y) = shaded(x / 7, y / 7);
+  }
+  for (int y = 0; y < small.height(); ++y) {
+    for (int x = 0; x < small.width(); ++x) small.at(x, y) = shaded(x, y);
+  }
+  CHECK(automatic_exposure(large) == Approx(automatic_exposure(small)).epsilon(0.002));
+}
+
 TEST_CASE("exposure does not depend on the scale of the light", "[exposure]") {
   Image<Vec3f> picture(40, 30, Vec3f::Zero());
   Rng rng(2);
