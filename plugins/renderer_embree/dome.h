@@ -116,11 +116,11 @@ inline DomeTexture::Draw DomeTexture::sample(int patch, const Vec2f& u) const {
 }
 
 inline DomeTexture::Towards DomeTexture::towards(const Vec2f& place) {
-  const Vec2f height = unit_circle(0.5f * place.y());
-  const Vec2f around = unit_circle(place.x());
-  const float sine = height.y();
+  const CosSin height = unit_circle(0.5f * place.y());
+  const CosSin around = unit_circle(place.x());
+  const float sine = height.sine;
   // The image's centre column lies at +x, its right half towards -y.
-  return {{-sine * around.x(), sine * around.y(), height.x()}, per_solid_angle(sine)};
+  return {{-sine * around.cosine, sine * around.sine, height.cosine}, per_solid_angle(sine)};
 }
 
 inline DomeTexture::Place DomeTexture::place(const Vec3f& d) const {

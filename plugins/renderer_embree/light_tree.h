@@ -43,6 +43,10 @@ class LightTree {
     return score(blocks_[0], lane, receiver);
   }
 
+  /// The light of a root's lane; negative: it is a group.
+  std::int32_t light_of_root(std::uint32_t lane) const { return blocks_[0].child[lane]; }
+  bool has_groups() const { return blocks_.size() > 1; }
+
   struct Choice {
     std::uint32_t light = 0;
     float probability = 0.0f;  ///< Zero: none can contribute.

@@ -22,6 +22,25 @@ void Lights::finish() {
     placed.push_back({r.position, r.radius, r.direction, is_flat, r.power});
   }
   tree_ = LightTree(placed);
+  for (const Record& light : lights_) columns_.add(light);
+  for (std::uint32_t lane = 0; lane < tree_.root_count(); ++lane) {
+    const std::int32_t body = tree_.light_of_root(lane);
+    entry_lights_.push_back(body < 0 ? -1 : std::int32_t(bodies_[std::uint32_t(body)]));
+  }
+  entry_lights_.insert(entry_lights_.end(), surroundings_.begin(), surroundings_.end());
+}
+
+void Lights::Columns::add(const Record& light) {
+  shape.push_back(std::int32_t(light.shape));
+  for (int k = 0; k < 3; ++k) {
+    position[std::size_t(k)].push_back(light.position[k]);
+    axis_x[std::size_t(k)].push_back(light.axis_x[k]);
+    axis_y[std::size_t(k)].push_back(light.axis_y[k]);
+    direction[std::size_t(k)].push_back(light.direction[k]);
+  }
+  radius.push_back(light.radius);
+  area.push_back(light.area);
+  one_minus_cos.push_back(light.one_minus_cos);
 }
 
 void Lights::add(const Light& light, const Affine& world_from_node,

@@ -66,16 +66,20 @@ class Lights {
     std::vector<float> cumulative_area;
   };
 
-  /// The places of a batch that ask for lights of one kind.
+  /// What draws read of the lights, by their numbers: for loops over places, each with its light.
+  struct Columns {
+    using Vectors = std::array<std::vector<float>, 3>;
+    std::vector<std::int32_t> shape;
+    Vectors position, axis_x, axis_y, direction;
+    std::vector<float> radius, area, one_minus_cos;
+    void add(const Record& light);
+  };
+  /// The lights of a batch of places, and where on them; see Record.
   struct Asked {
-    std::size_t count = 0;
-    std::array<std::uint8_t, kBatch> index{};  ///< In the batch.
-    std::array<const Record*, kBatch> light{};
-    BatchVectors from;
     BatchVectors to_light;  ///< To its position.
-    BatchFloats radius{}, area{}, one_minus_cos{};
+    BatchFloats radius, area, one_minus_cos;
     BatchVectors axis_x, axis_y, shines_along;
-    BatchFloats u{}, v{};
+    BatchFloats u, v;
   };
 
  public:
@@ -135,10 +139,6 @@ class Lights {
     LightPlace place(std::size_t i) const {
       return {std::uint32_t(light[i]), std::uint32_t(triangle[i]), {place_x[i], place_y[i]}};
     }
-
-   private:
-    friend class Lights;
-    Asked asked_;
   };
   /// `u`, `v` in [0, 1) place the samples.
   void sample(const Wishes& wishes, const Choices& choices, const BatchFloats& u,
@@ -181,7 +181,9 @@ class Lights {
     return light.shape != Shape::Distant && light.shape != Shape::Dome;
   }
   static bool is_near(const Record& light, const Vec3f& from, const Vec3f& direction);
+  static float score_of_distant(const Record& light, const Vec3f& normal, bool is_two_sided);
   static float score_of_surroundings(const Record& light, const Receiver& receiver);
+  static void score_surroundings(const Record& light, const Wishes& wishes, BatchFloats& scores);
   static float cone_factor(const Record& light, const Vec3f& from_light);
   /// Returns the density; zero: not met.
   static float meet(const Record& light, const Vec3f& from, const Vec3f& direction, float t_max,
@@ -197,19 +199,26 @@ class Lights {
     float distance = 0.0f;
     float density = 0.0f;
   };
-  const Record& chosen(const Choices& choices, std::size_t i) const {
-    return lights_[std::uint32_t(choices.light[i])];
-  }
-  void collect(Shape shape, const Wishes& wishes, const Choices& choices, Asked& asked) const;
-  static void draw(Shape shape, Samples& samples);
+  void descend(const Wishes& wishes, const Picks& picks, Choices& choices) const;
+  void draw(Shape shape, const Wishes& wishes, const BatchFloats& u, const BatchFloats& v,
+            Samples& samples) const;
   template <class DrawOne>
-  static void draw_all(Samples& samples, DrawOne&& draw_one);
+  void draw_all(Shape shape, const Wishes& wishes, const BatchFloats& u, const BatchFloats& v,
+                Samples& samples, DrawOne&& draw_one) const;
+  template <class Column, class Values>
+  static void look_up(const Column& column, const BatchInts& lights, std::size_t size,
+                      Values& values);
+  static void look_up(const Columns::Vectors& columns, const BatchInts& lights, std::size_t size,
+                      BatchVectors& values);
+  void look_up(Shape shape, const BatchInts& lights, std::size_t size, Asked& asked) const;
   static Draw draw_sphere(const Asked& asked, std::size_t i);
   static Draw draw_turning_disk(const Asked& asked, std::size_t i);
   static Draw draw_flat(const Asked& asked, std::size_t i, bool is_disk);
   static Draw draw_distant(const Asked& asked, std::size_t i);
-  static void draw_domes(Samples& samples);
-  static void draw_triangles(Samples& samples);
+  void draw_dome(std::uint32_t number, const Wishes& wishes, const BatchFloats& u,
+                 const BatchFloats& v, Samples& samples) const;
+  void draw_triangles(const Wishes& wishes, const BatchFloats& u, const BatchFloats& v,
+                      Samples& samples) const;
 
   bool has_disk_lamps_;
   std::vector<Record> lights_;
@@ -218,6 +227,9 @@ class Lights {
   std::vector<std::uint32_t> surroundings_;  ///< Distant, dome.
   std::vector<std::uint32_t> order_;         ///< Per light: its number in bodies_.
   LightTree tree_;
+  Columns columns_;
+  /// The light of each entry that choose() compares; -1: a group of the tree.
+  std::vector<std::int32_t> entry_lights_;
 };
 
 // One minus the cosine of the half angle under which a sphere of this squared sine is seen, without
@@ -262,22 +274,43 @@ void Lights::along_ray(const Vec3f& from, const Vec3f& direction, float t_max, b
   }
 }
 
-inline float Lights::score_of_surroundings(const Record& light, const Receiver& receiver) {
+inline float Lights::score_of_distant(const Record& light, const Vec3f& normal, bool is_two_sided) {
   constexpr float kFloor = 0.1f;
-  if (light.shape == Shape::Dome) {
-    return light.power * light.sky->power(light.sky->cell(receiver.position));
-  }
   const float reach = std::sqrt(light.one_minus_cos * (2.0f - light.one_minus_cos)) + 1e-3f;
-  const float facing = -receiver.normal.dot(light.direction);
-  const float cosine = reach + (receiver.is_two_sided ? std::abs(facing) : facing);
-  return cosine <= 0.0f ? 0.0f : light.power * std::max(kFloor, std::min(1.0f, cosine));
+  const float facing = -normal.dot(light.direction);
+  const float cosine = reach + (is_two_sided ? std::abs(facing) : facing);
+  return cosine > 0.0f ? light.power * std::max(kFloor, std::min(1.0f, cosine)) : 0.0f;
+}
+
+inline float Lights::score_of_surroundings(const Record& light, const Receiver& receiver) {
+  if (light.shape == Shape::Distant) {
+    return score_of_distant(light, receiver.normal, receiver.is_two_sided);
+  }
+  return light.power * light.sky->power(light.sky->cell(receiver.position));
+}
+
+/// The same for the places of a batch.
+inline void Lights::score_surroundings(const Record& light, const Wishes& wishes,
+                                       BatchFloats& scores) {
+  const std::size_t size = whole_steps(wishes.count);
+  if (light.shape == Shape::Distant) {
+    for (std::size_t i = 0; i < size; ++i) {
+      scores[i] = score_of_distant(light, wishes.normal.at(i), wishes.is_two_sided[i] != 0);
+    }
+    return;
+  }
+  BatchInts cells;
+  light.sky->find_cells(wishes.position, size, cells);
+  light.sky->find_powers(cells, size, scores);
+  const float power = light.power;
+  for (std::size_t i = 0; i < size; ++i) scores[i] *= power;
 }
 
 // Scores first, then the light in whose share of their sum a place's number falls.
 inline void Lights::choose(const Wishes& wishes, Choices& choices) const {
   const std::size_t size = whole_steps(wishes.count);
   const std::uint32_t roots = tree_.root_count();
-  choices.scores.resize(roots + surroundings_.size());
+  choices.scores.resize(entry_lights_.size());
   choices.total_score.fill(0.0f);
   for (std::uint32_t entry = 0; entry < choices.scores.size(); ++entry) {
     BatchFloats& scores = choices.scores[entry];
@@ -286,10 +319,7 @@ inline void Lights::choose(const Wishes& wishes, Choices& choices) const {
         scores[i] = tree_.root_score(entry, wishes.receiver(i));
       }
     } else {
-      const Record& light = lights_[surroundings_[entry - roots]];
-      for (std::size_t i = 0; i < wishes.count; ++i) {
-        scores[i] = score_of_surroundings(light, wishes.receiver(i));
-      }
+      score_surroundings(lights_[surroundings_[entry - roots]], wishes, scores);
     }
     for (std::size_t i = 0; i < size; ++i) choices.total_score[i] += scores[i];
   }
@@ -297,18 +327,29 @@ inline void Lights::choose(const Wishes& wishes, Choices& choices) const {
   for (std::size_t entry = 0; entry < choices.scores.size(); ++entry) {
     picks.offer(int(entry), choices.scores[entry], wishes.u, choices.total_score, size);
   }
+  choices.light.fill(0);
+  choices.probability.fill(0.0f);
+  if (entry_lights_.empty()) return;
+  const std::int32_t* lights = entry_lights_.data();
+  BatchInts picked;
+  for (std::size_t i = 0; i < size; ++i) picked[i] = lights[std::max(picks.entry[i], 0)];
+  for (std::size_t i = 0; i < size; ++i) {
+    const float share = picks.score[i] / choices.total_score[i];
+    const bool is_none = picks.entry[i] < 0;
+    choices.light[i] = is_none ? 0 : picked[i];
+    choices.probability[i] = is_none ? 0.0f : share;
+  }
+  if (tree_.has_groups()) descend(wishes, picks, choices);
+}
+
+/// Where a group was picked, one of its lights.
+[[gnu::noinline]] inline void Lights::descend(const Wishes& wishes, const Picks& picks,
+                                              Choices& choices) const {
   for (std::size_t i = 0; i < wishes.count; ++i) {
-    const int picked = picks.entry[i];
-    choices.light[i] = 0;
-    choices.probability[i] = picked < 0 ? 0.0f : picks.score[i] / choices.total_score[i];
-    if (picked < 0) continue;
-    if (std::uint32_t(picked) >= roots) {
-      choices.light[i] = std::int32_t(surroundings_[std::uint32_t(picked) - roots]);
-      continue;
-    }
+    if (choices.light[i] >= 0) continue;
     const float rest = (wishes.u[i] * choices.total_score[i] - picks.before[i]) / picks.score[i];
-    const LightTree::Choice within =
-        tree_.choose(std::uint32_t(picked), wishes.receiver(i), std::clamp(rest, 0.0f, 0.9999999f));
+    const LightTree::Choice within = tree_.choose(std::uint32_t(picks.entry[i]), wishes.receiver(i),
+                                                  std::clamp(rest, 0.0f, 0.9999999f));
     choices.light[i] = std::int32_t(bodies_[within.light]);
     choices.probability[i] *= within.probability;
   }
@@ -352,84 +393,106 @@ inline Vec3f Lights::radiance_of(const LightPlace& place, const Vec3f& direction
 
 inline void Lights::sample(const Wishes& wishes, const Choices& choices, const BatchFloats& u,
                            const BatchFloats& v, Samples& samples) const {
-  std::array<int, kShapes> counts{};
-  for (std::size_t i = 0; i < wishes.count; ++i) {
-    samples.density[i] = 0.0f;
-    if (choices.probability[i] > 0.0f) ++counts[std::size_t(chosen(choices, i).shape)];
-  }
+  const std::size_t size = whole_steps(wishes.count);
   samples.light = choices.light;
-  for (std::size_t k = 0; k < kShapes; ++k) {
-    if (counts[k] == 0) continue;
-    const auto shape = Shape(k);
-    collect(shape, wishes, choices, samples.asked_);
-    for (std::size_t i = 0; i < samples.asked_.count; ++i) {
-      samples.asked_.u[i] = u[samples.asked_.index[i]];
-      samples.asked_.v[i] = v[samples.asked_.index[i]];
-    }
-    draw(shape, samples);
-  }
-}
-
-inline void Lights::collect(Shape shape, const Wishes& wishes, const Choices& choices,
-                            Asked& asked) const {
-  const bool has_axes = shape == Shape::Rect || shape == Shape::Disk || shape == Shape::Distant;
-  asked.count = 0;
+  std::fill_n(samples.density.begin(), size, 0.0f);
+  if (lights_.empty()) return;
+  const std::int32_t* shapes = columns_.shape.data();
+  std::uint32_t present = 0;
   for (std::size_t i = 0; i < wishes.count; ++i) {
-    const Record& light = chosen(choices, i);
-    if (light.shape != shape || choices.probability[i] <= 0.0f) continue;
-    const std::size_t own = asked.count++;
-    asked.index[own] = std::uint8_t(i);
-    asked.light[own] = &light;
-    asked.from.set(own, wishes.position.at(i));
-    asked.to_light.set(own, light.position - wishes.position.at(i));
-    asked.radius[own] = light.radius;
-    asked.area[own] = light.area;
-    if (!has_axes) continue;
-    asked.one_minus_cos[own] = light.one_minus_cos;
-    asked.axis_x.set(own, light.axis_x);
-    asked.axis_y.set(own, light.axis_y);
-    asked.shines_along.set(own, light.direction);
+    const std::uint32_t own = 1u << shapes[samples.light[i]];
+    present |= choices.probability[i] > 0.0f ? own : 0u;
+  }
+  for (std::uint32_t shape = 0; shape < kShapes; ++shape) {
+    if ((present >> shape & 1u) != 0) draw(Shape(shape), wishes, u, v, samples);
+  }
+  for (std::size_t i = 0; i < size; ++i) {
+    samples.density[i] = choices.probability[i] > 0.0f ? samples.density[i] : 0.0f;
   }
 }
 
-inline void Lights::draw(Shape shape, Samples& samples) {
+inline void Lights::draw(Shape shape, const Wishes& wishes, const BatchFloats& u,
+                         const BatchFloats& v, Samples& samples) const {
   switch (shape) {
     case Shape::Sphere:
-      return draw_all(samples, draw_sphere);
+      return draw_all(shape, wishes, u, v, samples, draw_sphere);
     case Shape::TurningDisk:
-      return draw_all(samples, draw_turning_disk);
+      return draw_all(shape, wishes, u, v, samples, draw_turning_disk);
     case Shape::Rect:
-      return draw_all(samples,
-                      [](const Asked& a, std::size_t i) { return draw_flat(a, i, false); });
+      return draw_all(shape, wishes, u, v, samples,
+                      [](const Asked& asked, std::size_t i) { return draw_flat(asked, i, false); });
     case Shape::Disk:
-      return draw_all(samples, [](const Asked& a, std::size_t i) { return draw_flat(a, i, true); });
+      return draw_all(shape, wishes, u, v, samples,
+                      [](const Asked& asked, std::size_t i) { return draw_flat(asked, i, true); });
     case Shape::Distant:
-      return draw_all(samples, draw_distant);
+      return draw_all(shape, wishes, u, v, samples, draw_distant);
     case Shape::Dome:
-      return draw_domes(samples);
+      for (const std::uint32_t number : surroundings_) {
+        if (lights_[number].shape == shape) draw_dome(number, wishes, u, v, samples);
+      }
+      return;
     case Shape::Triangles:
-      return draw_triangles(samples);
+      return draw_triangles(wishes, u, v, samples);
   }
 }
 
+/// For all places, as if each had a light of this shape; kept for those that have.
 template <class DrawOne>
-inline void Lights::draw_all(Samples& samples, DrawOne&& draw_one) {
-  const Asked& asked = samples.asked_;
+inline void Lights::draw_all(Shape shape, const Wishes& wishes, const BatchFloats& u,
+                             const BatchFloats& v, Samples& samples, DrawOne&& draw_one) const {
+  const std::size_t size = whole_steps(wishes.count);
+  Asked asked;
+  look_up(shape, samples.light, size, asked);
+  for (std::size_t i = 0; i < size; ++i) {
+    asked.to_light.set(i, asked.to_light.at(i) - wishes.position.at(i));
+    asked.u[i] = u[i];
+    asked.v[i] = v[i];
+  }
   BatchVectors directions;
   BatchFloats distances;
   BatchFloats densities;
-  for (std::size_t i = 0; i < whole_steps(asked.count); ++i) {
+  for (std::size_t i = 0; i < size; ++i) {
     const Draw draw = draw_one(asked, i);
     directions.set(i, draw.direction);
     distances[i] = draw.distance;
     densities[i] = draw.density;
   }
-  for (std::size_t i = 0; i < asked.count; ++i) {
-    const std::size_t own = asked.index[i];
-    samples.direction.set(own, directions.at(i));
-    samples.distance[own] = distances[i];
-    samples.density[own] = densities[i];
+  BatchInts is_meant;
+  look_up(columns_.shape, samples.light, size, is_meant);
+  for (std::size_t i = 0; i < size; ++i) {
+    const std::int32_t mask = is_meant[i] == std::int32_t(shape) ? -1 : 0;
+    samples.direction.set(i, blend(mask, directions.at(i), samples.direction.at(i)));
+    samples.distance[i] = blend(mask, distances[i], samples.distance[i]);
+    samples.density[i] = blend(mask, densities[i], samples.density[i]);
   }
+}
+
+template <class Column, class Values>
+inline void Lights::look_up(const Column& column, const BatchInts& lights, std::size_t size,
+                            Values& values) {
+  const auto* from = column.data();
+  Values found;
+  for (std::size_t i = 0; i < size; ++i) found[i] = from[lights[i]];
+  std::copy_n(found.begin(), size, values.begin());
+}
+
+inline void Lights::look_up(const Columns::Vectors& columns, const BatchInts& lights,
+                            std::size_t size, BatchVectors& values) {
+  look_up(columns[0], lights, size, values.x);
+  look_up(columns[1], lights, size, values.y);
+  look_up(columns[2], lights, size, values.z);
+}
+
+inline void Lights::look_up(Shape shape, const BatchInts& lights, std::size_t size,
+                            Asked& asked) const {
+  look_up(columns_.position, lights, size, asked.to_light);
+  look_up(columns_.radius, lights, size, asked.radius);
+  look_up(columns_.area, lights, size, asked.area);
+  if (shape == Shape::Sphere || shape == Shape::TurningDisk) return;
+  look_up(columns_.one_minus_cos, lights, size, asked.one_minus_cos);
+  look_up(columns_.axis_x, lights, size, asked.axis_x);
+  look_up(columns_.axis_y, lights, size, asked.axis_y);
+  look_up(columns_.direction, lights, size, asked.shines_along);
 }
 
 inline Lights::Draw Lights::draw_sphere(const Asked& asked, std::size_t i) {
@@ -483,43 +546,56 @@ inline Lights::Draw Lights::draw_distant(const Asked& asked, std::size_t i) {
   return {select(has_size, direction, towards), kInfinite, has_size ? density : kInfinite};
 }
 
-inline void Lights::draw_domes(Samples& samples) {
-  const Asked& asked = samples.asked_;
+inline void Lights::draw_dome(std::uint32_t number, const Wishes& wishes, const BatchFloats& u,
+                              const BatchFloats& v, Samples& samples) const {
+  const Record& light = lights_[number];
+  std::array<std::uint8_t, kBatch> index;
+  BatchVectors from;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < wishes.count; ++i) {
+    index[count] = std::uint8_t(i);
+    from.set(count, wishes.position.at(i));
+    count += samples.light[i] == std::int32_t(number) ? 1 : 0;
+  }
+  const std::size_t size = whole_steps(count);
+  BatchInts cells;
+  light.sky->find_cells(from, size, cells);
   BatchFloats x;
   BatchFloats y;
   BatchFloats density;
-  for (std::size_t i = 0; i < asked.count; ++i) {
-    const Record& light = *asked.light[i];
-    const SkyGrid::Choice choice = light.sky->choose(light.sky->cell(asked.from.at(i)), asked.u[i]);
-    const DomeTexture::Draw draw = light.texture->sample(choice.patch, {choice.rest, asked.v[i]});
-    x[i] = draw.place.x();
-    y[i] = draw.place.y();
-    density[i] = draw.density * choice.probability;
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::size_t i = index[k];
+    const SkyGrid::Choice choice = light.sky->choose(std::uint32_t(cells[k]), u[i]);
+    const DomeTexture::Draw draw = light.texture->sample(choice.patch, {choice.rest, v[i]});
+    x[k] = draw.place.x();
+    y[k] = draw.place.y();
+    density[k] = draw.density * choice.probability;
     light.texture->prefetch(draw.place);
   }
+  const Basis axes{light.dome_from_world.row(0), light.dome_from_world.row(1),
+                   light.dome_from_world.row(2)};
   BatchVectors directions;
-  for (std::size_t i = 0; i < whole_steps(asked.count); ++i) {
-    const DomeTexture::Towards towards = DomeTexture::towards({x[i], y[i]});
-    directions.set(i, towards.direction);
-    density[i] *= towards.per_solid_angle;
+  for (std::size_t k = 0; k < size; ++k) {
+    const DomeTexture::Towards towards = DomeTexture::towards({x[k], y[k]});
+    directions.set(k, unit(axes.to_world(towards.direction)));
+    density[k] *= towards.per_solid_angle;
   }
-  for (std::size_t i = 0; i < asked.count; ++i) {
-    const std::size_t own = asked.index[i];
-    samples.direction.set(own,
-                          unit(asked.light[i]->dome_from_world.transpose() * directions.at(i)));
-    samples.distance[own] = kInfinite;
-    samples.density[own] = density[i];
-    samples.place_x[own] = x[i];
-    samples.place_y[own] = y[i];
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::size_t i = index[k];
+    samples.direction.set(i, directions.at(k));
+    samples.distance[i] = kInfinite;
+    samples.density[i] = density[k];
+    samples.place_x[i] = x[k];
+    samples.place_y[i] = y[k];
   }
 }
 
-[[gnu::noinline]] inline void Lights::draw_triangles(Samples& samples) {
-  const Asked& asked = samples.asked_;
-  for (std::size_t i = 0; i < asked.count; ++i) {
-    const Record& light = *asked.light[i];
+[[gnu::noinline]] inline void Lights::draw_triangles(const Wishes& wishes, const BatchFloats& u,
+                                                     const BatchFloats& v, Samples& samples) const {
+  for (std::size_t i = 0; i < wishes.count; ++i) {
+    const Record& light = lights_[std::uint32_t(samples.light[i])];
     if (light.triangles.empty()) continue;
-    const float target = asked.u[i] * light.area;
+    const float target = u[i] * light.area;
     const auto it =
         std::upper_bound(light.cumulative_area.begin(), light.cumulative_area.end() - 1, target);
     const auto index = std::size_t(it - light.cumulative_area.begin());
@@ -527,21 +603,20 @@ inline void Lights::draw_domes(Samples& samples) {
     const float size = light.cumulative_area[index] - before;
     const float again = size > 0.0f ? std::clamp((target - before) / size, 0.0f, 0.999999f) : 0.5f;
     const EmittingTriangles::Triangle& t = light.triangles[index];
-    const Vec2f weights = triangle_from_square({again, asked.v[i]});
-    const Vec3f to_light = t.a + weights.x() * t.ab + weights.y() * t.ac - asked.from.at(i);
+    const Vec2f weights = triangle_from_square({again, v[i]});
+    const Vec3f to_light = t.a + weights.x() * t.ab + weights.y() * t.ac - wishes.position.at(i);
     const float distance2 = to_light.squaredNorm();
     const float distance = std::sqrt(distance2);
     const Vec3f direction = to_light / distance;
     const float cosine = -direction.dot(t.ab.cross(t.ac).normalized());
     const bool is_front = (cosine < 0.0f) == light.is_mirrored;
     if (!(std::abs(cosine) > 1e-6f) || !(is_front || light.is_double_sided)) continue;
-    const std::size_t own = asked.index[i];
-    samples.direction.set(own, direction);
-    samples.distance[own] = distance;
-    samples.density[own] = distance2 / (std::abs(cosine) * light.area);
-    samples.triangle[own] = std::int32_t(t.index);
-    samples.place_x[own] = weights.x();
-    samples.place_y[own] = weights.y();
+    samples.direction.set(i, direction);
+    samples.distance[i] = distance;
+    samples.density[i] = distance2 / (std::abs(cosine) * light.area);
+    samples.triangle[i] = std::int32_t(t.index);
+    samples.place_x[i] = weights.x();
+    samples.place_y[i] = weights.y();
   }
 }
 

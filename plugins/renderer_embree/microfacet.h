@@ -49,8 +49,8 @@ inline Vec3f ggx_visible_normal(const Vec3f& w, float alpha, const Vec2f& u) {
   const Vec3f stretched = unit(Vec3f(alpha * w.x(), alpha * w.y(), w.z()));
   const float z = (1.0f - u.y()) * (1.0f + stretched.z()) - stretched.z();
   const float r = std::sqrt(std::max(0.0f, 1.0f - z * z));
-  const Vec2f p = unit_circle(u.x());
-  const Vec3f h = Vec3f(r * p.x(), r * p.y(), z) + stretched;
+  const CosSin p = unit_circle(u.x());
+  const Vec3f h = Vec3f(r * p.cosine, r * p.sine, z) + stretched;
   return unit(Vec3f(alpha * h.x(), alpha * h.y(), std::max(1e-6f, h.z())));
 }
 

@@ -9,28 +9,12 @@
 // Inside of PathTracer: what its kernels and special surfaces share.
 namespace diorama {
 
-/// A light sample whose way is not looked at yet.
-struct PathTracer::ShadowRay {
-  Vec3f origin;
-  Vec3f direction;
-  float t_max = 0.0f;  ///< 0: there is none.
-  Vec3f share;         ///< Of the light's radiance, when nothing is in the way.
-  LightPlace place;
-  int bounce = 0;
-};
-
 struct PathTracer::Path {
   explicit Path(PathSampler source) : sampler(source) {}
 
   PathSampler sampler;
   const RayHit* first_hit = nullptr;  ///< Known from the start; see TraceSettings.
-  ShadowRay shadow;
   PathSample result;
-  RayCounts counts;
-  Vec3f origin;
-  Vec3f direction;
-  float t_min = 0.0f;
-  float t_max = kInfinite;
   Vec3f throughput = Vec3f::Ones();
   float left_by_first = 1.0f;  ///< Largest throughput behind the first scattering surface.
   int bounce = 0;
@@ -38,8 +22,7 @@ struct PathTracer::Path {
   bool is_camera_ray = true;
   bool has_scattered = false;  ///< Over a surface that is no mirror.
   bool hides_lights = false;   ///< Their light was already counted, or is left out on purpose.
-  bool is_over = false;
-  Receiver last;  ///< The last vertex that took light samples.
+  Receiver last;               ///< The last vertex that took light samples.
   float last_density = kInfinite;
   float since_last = 0.0f;  ///< Metres travelled from it.
   float width = 0.0f;       ///< Of the ray's footprint, metres.
@@ -50,18 +33,12 @@ struct PathTracer::Path {
   bool is_soft(const TraceSettings& settings) const {
     return has_scattered && !settings.has_caustics;
   }
-  void go(const Vec3f& from, const Vec3f& towards) {
-    origin = from;
-    direction = towards;
-    t_min = 0.0f;
-    t_max = kInfinite;
-  }
 };
 
 /// The next random numbers of the paths of a batch, for loops over them.
 struct BatchNumbers {
-  BatchInts keys{};
-  BatchInts places{};
+  BatchInts keys;
+  BatchInts places;
 
   void take(std::size_t i, PathSampler& sampler, std::uint32_t pairs) {
     keys[i] = std::int32_t(sampler.take(pairs));
@@ -73,9 +50,31 @@ struct BatchNumbers {
   }
 };
 
+/// What became of a path at a surface that may let it through or mirror it.
+struct PathTracer::Passage {
+  bool is_scattered = false;  ///< By the surface's own BSDF, from here on.
+  bool goes_on = false;       ///< Along this ray.
+  Vec3f origin = Vec3f::Zero();
+  Vec3f direction = Vec3f::Zero();
+};
+
 struct PathTracer::Batch : Vertices {
-  std::array<Path*, kBatch> paths{};
-  BatchInts may_meet_light{};
+  std::array<Path*, kBatch> paths;  ///< Of `rays`, then of the vertices.
+  BatchInts may_meet_light;
+  BatchInts bounce;  ///< Of the vertices.
+
+  /// The rays to the lights, those to one light side by side: the vertices that they start from.
+  std::array<std::uint8_t, kBatch> asking;
+  std::size_t asking_count = 0;
+
+  BatchRays next_rays;
+  std::array<Path*, kBatch> next_paths;
+  void go_on(Path& path, const Vec3f& from, const Vec3f& towards) {
+    next_paths[next_rays.count] = &path;
+    next_rays.add(from, towards, 0.0f, kInfinite, path.time);
+  }
+
+  RayCounts counts;
 
   /// What is known before find_bases(), to where the entries that scatter stand together.
   void move(std::size_t from, std::size_t to);
@@ -84,15 +83,12 @@ struct PathTracer::Batch : Vertices {
 inline void PathTracer::Batch::move(std::size_t from, std::size_t to) {
   if (from == to) return;
   paths[to] = paths[from];
-  direction.set(to, direction.at(from));
+  rays.direction.set(to, rays.direction.at(from));
   position.set(to, position.at(from));
   flat_normal.set(to, flat_normal.at(from));
   normal.set(to, normal.at(from));
   is_back[to] = is_back[from];
   bsdf[to] = bsdf[from];
-  if (bsdf[from] != &own_bsdf[from]) return;
-  own_bsdf[to] = own_bsdf[from];
-  bsdf[to] = &own_bsdf[to];
 }
 
 inline void PathTracer::add(Path& path, int bounce, const Vec3f& radiance) const {

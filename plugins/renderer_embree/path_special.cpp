@@ -68,7 +68,8 @@ void PathTracer::open_shutter(Path& path, int row, CameraRay& ray) const {
   ray = view_.moved(ray, seconds);
 }
 
-void PathTracer::collect_emission(Path& path, const RayHit& hit, const SurfaceGeometry& surface,
+void PathTracer::collect_emission(Path& path, const Vec3f& direction, const RayHit& hit,
+                                  const SurfaceGeometry& surface,
                                   const ShadingMaterial& material) const {
   const bool is_first = std::isinf(path.last_density);
   if (path.hides_lights || (!is_first && !settings_.samples_bsdf)) return;
@@ -77,7 +78,7 @@ void PathTracer::collect_emission(Path& path, const RayHit& hit, const SurfaceGe
   float weight = 1.0f;
   const std::uint32_t light = hit.instance->slot_lights[hit.instance->slot(hit.triangle)];
   if (!is_first && settings_.samples_lights && light != MeshInstance::kNoLight) {
-    const float cosine = surface.flat_normal.dot(path.direction);
+    const float cosine = surface.flat_normal.dot(direction);
     const float rival = scene_.lights().probability(light, path.last) *
                         scene_.lights().density_of_surface(light, path.since_last, cosine);
     weight = mis_weight(path.last_density, rival);
@@ -85,14 +86,15 @@ void PathTracer::collect_emission(Path& path, const RayHit& hit, const SurfaceGe
   add(path, path.bounce, path.throughput.cwiseProduct(radiance) * weight);
 }
 
-bool PathTracer::pass_or_reflect(Path& path, const SurfaceGeometry& surface,
-                                 const ShadingMaterial& material, SurfaceBsdf& bsdf) const {
+PathTracer::Passage PathTracer::pass_or_reflect(Path& path, const Vec3f& direction,
+                                                const SurfaceGeometry& surface,
+                                                const ShadingMaterial& material,
+                                                SurfaceBsdf& bsdf) const {
   const Material& m = *material.source;
   const Vec2f u = path.sampler.next();
-  const auto pass = [&] {
-    path.is_over = ++path.passages > kMaxPassages;
-    path.go(leave(surface, path.direction), path.direction);
-    return true;
+  const auto pass = [&]() -> Passage {
+    const bool goes_on = ++path.passages <= kMaxPassages;
+    return {false, goes_on, leave(surface, direction), direction};
   };
   float rest = u.x();
   if (material.is_veil) {
@@ -100,15 +102,15 @@ bool PathTracer::pass_or_reflect(Path& path, const SurfaceGeometry& surface,
     if (rest < veil) return pass();
     rest = (rest - veil) / (1.0f - veil);
   }
-  if (!material.is_pane) return false;
+  if (!material.is_pane) return {.is_scattered = true};
   const float share = (1.0f - bsdf.metallic) * bsdf.transmission;
   if (rest >= share) {
     bsdf.metallic = share < 1.0f ? bsdf.metallic / (1.0f - share) : 0.0f;
     bsdf.transmission = 0.0f;
     bsdf.finish();
-    return false;
+    return {.is_scattered = true};
   }
-  const float cosine = std::max(1e-4f, -surface.normal.dot(path.direction));
+  const float cosine = std::max(1e-4f, -surface.normal.dot(direction));
   const float once = fresnel_dielectric(cosine, std::max(1.0001f, m.ior));
   const float reflected = 2.0f * once / (1.0f + once);
   // A reflection on the first pane seen is faint but plain to see: it gets one sample of four,
@@ -122,21 +124,20 @@ bool PathTracer::pass_or_reflect(Path& path, const SurfaceGeometry& surface,
     return pass();
   }
   path.throughput *= reflected / chance;
-  const Vec3f reflection = path.direction + 2.0f * cosine * surface.normal;
-  path.is_over = surface.flat_normal.dot(reflection) <= 0.0f;
-  path.go(leave(surface, reflection), unit(reflection));
+  const Vec3f reflection = direction + 2.0f * cosine * surface.normal;
   path.last_density = kInfinite;
   path.hides_lights = path.is_soft(settings_);
   path.since_last = 0.0f;
   path.is_camera_ray = false;
   ++path.bounce;
-  return true;
+  const bool goes_on = surface.flat_normal.dot(reflection) > 0.0f;
+  return {false, goes_on, leave(surface, reflection), unit(reflection)};
 }
 
-void PathTracer::read_textures(const Path& path, const RayHit& hit, const SurfaceGeometry& surface,
-                               const ShadingMaterial& material, bool is_soft, SurfaceBsdf& s,
-                               Vec3f& normal) const {
-  const float cosine = std::max(0.1f, -surface.normal.dot(path.direction));
+void PathTracer::read_textures(const Path& path, const Vec3f& direction, const RayHit& hit,
+                               const SurfaceGeometry& surface, const ShadingMaterial& material,
+                               bool is_soft, SurfaceBsdf& s, Vec3f& normal) const {
+  const float cosine = std::max(0.1f, -surface.normal.dot(direction));
   const float footprint = path.width * surface.uv_per_metre / std::sqrt(cosine);
   s.base = base_color_at(hit, surface, footprint).cwiseMin(1.0f);
   if (material.metallic) {
@@ -147,7 +148,7 @@ void PathTracer::read_textures(const Path& path, const RayHit& hit, const Surfac
     s.alpha = ShadingMaterial::alpha_of(roughness, is_soft && !s.glass);
   }
   if (material.normal) {
-    normal = mapped_normal(hit, surface, material.normal, footprint, -path.direction);
+    normal = mapped_normal(hit, surface, material.normal, footprint, -direction);
   }
 }
 

@@ -49,10 +49,10 @@ DIORAMA_KERNEL(trace_avx512, "x86-64-v4")
 
 inline RayCounts PathTracer::trace_all(const TraceJob& job, PixelSum* sums,
                                        std::size_t stride) const {
-  RayCounts counts;
   std::vector<Path> paths;
   paths.reserve(kBatch);
   Batch batch;
+  batch.own_bsdfs.reserve(kBatch);
   std::array<PixelSum*, kBatch> pixels;
   BatchFloats columns{};
   BatchFloats rows{};
@@ -73,19 +73,15 @@ inline RayCounts PathTracer::trace_all(const TraceJob& job, PixelSum* sums,
       next = 0;
       ++sample;
     }
-    start_paths(paths, columns, rows);
-    trace_batch(paths, batch);
-    for (std::size_t i = 0; i < paths.size(); ++i) {
-      pixels[i]->add(paths[i].result);
-      counts.rays += paths[i].counts.rays;
-      counts.shadow_rays += paths[i].counts.shadow_rays;
-    }
+    start_paths(paths, columns, rows, batch);
+    trace_batch(batch);
+    for (std::size_t i = 0; i < paths.size(); ++i) pixels[i]->add(paths[i].result);
   }
-  return counts;
+  return batch.counts;
 }
 
 inline void PathTracer::start_paths(std::vector<Path>& paths, const BatchFloats& columns,
-                                    const BatchFloats& rows) const {
+                                    const BatchFloats& rows, Batch& v) const {
   const Image<RayHit>* hits = settings_.first_hits;
   BatchNumbers numbers;
   for (std::size_t i = 0; i < paths.size(); ++i) numbers.take(i, paths[i].sampler, 2);
@@ -96,46 +92,29 @@ inline void PathTracer::start_paths(std::vector<Path>& paths, const BatchFloats&
     x[i] = columns[i] + (hits ? 0.5f : u.x());
     y[i] = rows[i] + (hits ? 0.5f : u.y());
   }
+  v.rays.count = 0;
   for (std::size_t i = 0; i < paths.size(); ++i) {
     Path& path = paths[i];
     const Vec2f aperture = view_.has_aperture() ? numbers.pair(i, 1) : Vec2f(Vec2f::Zero());
     CameraRay ray = view_.sample_ray({x[i], y[i]}, aperture);
     if (view_.has_shutter()) [[unlikely]]
       open_shutter(path, int(rows[i]), ray);
-    path.is_over = !(ray.t_max > 0.0f);
-    path.go(ray.origin, ray.direction);
-    path.t_min = ray.t_min;
-    path.t_max = ray.t_max;
+    if (!(ray.t_max > 0.0f)) continue;
     path.spread = view_.pixel_angle();
     if (hits) path.first_hit = &hits->at(int(columns[i]), int(rows[i]));
+    v.paths[v.rays.count] = &path;
+    v.rays.add(ray.origin, ray.direction, ray.t_min, ray.t_max, path.time);
   }
-}
-
-/// Rays to the same light side by side: bundles that go similar ways are traced faster.
-inline void PathTracer::arrange_by_light(std::array<Path*, kBatch>& paths, std::size_t count) {
-  constexpr std::uint32_t kKeys = 8;
-  std::array<std::uint8_t, kBatch> keys;
-  std::array<std::uint32_t, kKeys + 1> starts{};
-  for (std::size_t i = 0; i < count; ++i) {
-    keys[i] = std::uint8_t(paths[i]->shadow.place.light % kKeys);
-    ++starts[keys[i] + 1u];
-  }
-  for (std::uint32_t k = 0; k < kKeys; ++k) starts[k + 1] += starts[k];
-  const std::array<Path*, kBatch> before = paths;
-  for (std::size_t i = 0; i < count; ++i) paths[starts[keys[i]]++] = before[i];
 }
 
 // Paths advance together, step by step: rays of one kind in a row, then the surfaces that they met.
 // Code and data of each step stay close to the processor, and memory is fetched meanwhile.
-inline void PathTracer::trace_batch(std::vector<Path>& paths, Batch& v) const {
-  std::array<Path*, kBatch> active;
-  std::array<Path*, kBatch> asking;
-  std::size_t count = 0;
-  for (Path& path : paths) {
-    if (!path.is_over) active[count++] = &path;
-  }
-  while (count > 0) {
-    find_surfaces(std::span(active).first(count), v);
+inline void PathTracer::trace_batch(Batch& v) const {
+  while (v.rays.count > 0) {
+    v.next_rays.count = 0;
+    v.asking_count = 0;
+    v.own_bsdfs.clear();
+    find_surfaces(v);
     meet(v);
     v.find_surfaces();
     std::size_t scattered = 0;
@@ -152,92 +131,93 @@ inline void PathTracer::trace_batch(std::vector<Path>& paths, Batch& v) const {
       v.weigh_ways<false>();
     }
     for (std::size_t i = 0; i < v.count; ++i) scatter(v, i);
-    std::size_t asked = 0;
-    std::size_t left = 0;
-    for (std::size_t i = 0; i < count; ++i) {
-      Path* path = active[i];
-      if (path->shadow.t_max > 0.0f) asking[asked++] = path;
-      if (!path->is_over) active[left++] = path;
-    }
-    arrange_by_light(asking, asked);
-    find_lights(std::span(asking).first(asked));
-    count = left;
+    arrange_by_light(v);
+    find_lights(v);
+    v.rays = v.next_rays;
+    v.paths = v.next_paths;
   }
 }
 
-inline void PathTracer::find_surfaces(Paths paths, Batch& v) const {
-  v.count = paths.size();
-  for (std::size_t i = 0; i < paths.size(); ++i) {
-    v.paths[i] = paths[i];
-    v.origin.set(i, paths[i]->origin);
-    v.direction.set(i, paths[i]->direction);
-  }
-  if (!paths[0]->first_hit) return trace_rays(v);
-  for (std::size_t i = 0; i < paths.size(); ++i) {
-    v.hits.set(i, *std::exchange(paths[i]->first_hit, nullptr));
+inline void PathTracer::find_surfaces(Batch& v) const {
+  v.count = v.rays.count;
+  if (!v.paths[0]->first_hit) return trace_rays(v);
+  for (std::size_t i = 0; i < v.count; ++i) {
+    v.hits.set(i, *std::exchange(v.paths[i]->first_hit, nullptr));
   }
 }
 
-inline void PathTracer::send(const LoggedRay& ray, float time, RayBundle& rays) const {
-  rays.add(ray.origin, ray.direction, ray.t_min, ray.t_max, time);
+inline void PathTracer::log(const LoggedRay& ray) const {
   if (settings_.ray_log) [[unlikely]]
     settings_.ray_log->push_back(ray);
 }
 
 inline void PathTracer::trace_rays(Batch& v) const {
-  RayBundle rays;
-  for (std::size_t begin = 0; begin < v.count; begin += RayBundle::kSize) {
-    rays.clear();
-    for (std::size_t i = begin; i < std::min(begin + RayBundle::kSize, v.count); ++i) {
-      Path& path = *v.paths[i];
-      send({path.origin, path.direction, path.t_min, path.t_max, false}, path.time, rays);
-      ++path.counts.rays;
-    }
-    scene_.intersect(rays, begin, v.hits);
+  const BatchRays& rays = v.rays;
+  RayBundle bundle;
+  for (std::size_t begin = 0; begin < rays.count; begin += RayBundle::kSize) {
+    bundle.take(rays, begin);
+    scene_.intersect(bundle, begin, v.hits);
+  }
+  v.counts.rays += rays.count;
+  for (std::size_t i = 0; settings_.ray_log && i < rays.count; ++i) {
+    log({rays.origin.at(i), rays.direction.at(i), rays.t_min[i], rays.t_max[i], false});
   }
 }
 
-inline void PathTracer::find_lights(Paths paths) const {
-  RayBundle rays;
-  for (std::size_t begin = 0; begin < paths.size(); begin += RayBundle::kSize) {
-    const std::size_t end = std::min(begin + RayBundle::kSize, paths.size());
-    rays.clear();
-    for (std::size_t i = begin; i < end; ++i) {
-      Path& path = *paths[i];
-      ShadowRay& shadow = path.shadow;
-      send({shadow.origin, shadow.direction, 0.0f, shadow.t_max, true}, path.time, rays);
-      ++path.counts.shadow_rays;
-      shadow.t_max = 0.0f;
+/// Rays to the same light side by side: bundles that go similar ways are traced faster.
+inline void PathTracer::arrange_by_light(Batch& v) {
+  constexpr std::uint32_t kKeys = 8;
+  std::array<std::uint32_t, kKeys + 1> starts{};
+  for (std::size_t k = 0; k < v.asking_count; ++k) {
+    ++starts[std::uint32_t(v.lights.light[v.asking[k]]) % kKeys + 1];
+  }
+  for (std::uint32_t k = 0; k < kKeys; ++k) starts[k + 1] += starts[k];
+  const std::array<std::uint8_t, kBatch> before = v.asking;
+  for (std::size_t k = 0; k < v.asking_count; ++k) {
+    v.asking[starts[std::uint32_t(v.lights.light[before[k]]) % kKeys]++] = before[k];
+  }
+}
+
+inline void PathTracer::find_lights(Batch& v) const {
+  RayBundle bundle;
+  for (std::size_t begin = 0; begin < v.asking_count; begin += RayBundle::kSize) {
+    const std::size_t end = std::min(begin + RayBundle::kSize, v.asking_count);
+    bundle.clear();
+    for (std::size_t k = begin; k < end; ++k) {
+      const std::size_t i = v.asking[k];
+      const Vec3f origin = v.light_origin.at(i);
+      const Vec3f direction = v.lights.direction.at(i);
+      bundle.add(origin, direction, 0.0f, v.light_reach[i], v.paths[i]->time);
+      log({origin, direction, 0.0f, v.light_reach[i], true});
     }
-    scene_.transmittance(rays, !settings_.has_caustics, [&](int i, const Vec3f& kept) {
-      add_light(*paths[begin + std::size_t(i)], kept);
+    scene_.transmittance(bundle, !settings_.has_caustics, [&](int k, const Vec3f& kept) {
+      add_light(v, v.asking[begin + std::size_t(k)], kept);
     });
   }
+  v.counts.shadow_rays += v.asking_count;
 }
 
-inline void PathTracer::add_light(Path& path, const Vec3f& kept) const {
-  const ShadowRay& shadow = path.shadow;
+inline void PathTracer::add_light(const Batch& v, std::size_t i, const Vec3f& kept) const {
+  const LightPlace place = v.lights.place(i);
   const Lights& lights = scene_.lights();
   Vec3f radiance;
-  if (lights.is_surface(shadow.place)) {
-    const MeshInstance& emitter = *scene_.instances()[lights.geometry_of(shadow.place)];
-    const std::uint32_t triangle = shadow.place.triangle;
-    const Vec2f uv = emitter.uv(triangle, shadow.place.place.x(), shadow.place.place.y());
-    radiance = emitter.material(triangle).emission_at(uv, 0.0f);
+  if (lights.is_surface(place)) {
+    const MeshInstance& emitter = *scene_.instances()[lights.geometry_of(place)];
+    const Vec2f uv = emitter.uv(place.triangle, place.place.x(), place.place.y());
+    radiance = emitter.material(place.triangle).emission_at(uv, 0.0f);
   } else {
-    radiance = lights.radiance_of(shadow.place, shadow.direction);
+    radiance = lights.radiance_of(place, v.lights.direction.at(i));
   }
-  add(path, shadow.bounce, shadow.share.cwiseProduct(kept).cwiseProduct(radiance));
+  add(*v.paths[i], v.bounce[i], v.light_share.at(i).cwiseProduct(kept).cwiseProduct(radiance));
 }
 
 inline void PathTracer::meet(Batch& v) const {
-  scene_.lights().find_near(v.count, v.origin, v.direction, v.may_meet_light);
+  scene_.lights().find_near(v.count, v.rays.origin, v.rays.direction, v.may_meet_light);
   for (std::size_t i = 0; i < v.count; ++i) {
     Path& path = *v.paths[i];
     const float distance = v.hits.distance[i];
     const MeshInstance* instance = v.hits.instance[i];
-    if (v.may_meet_light[i] != 0 || !instance) collect_lights(path, distance);
-    path.is_over = true;
+    if (v.may_meet_light[i] != 0 || !instance) collect_lights(v, i);
     v.material[i] = nullptr;
     if (!instance) continue;
     path.since_last += distance;
@@ -261,18 +241,21 @@ inline bool PathTracer::dress(Batch& v, std::size_t i) const {
   const RayHit hit = v.hits.at(i);
   SurfaceGeometry surface = v.surface(i);
   if (material.reads_uv) RenderScene::add_uv(surface, hit);
-  if (material.emits) collect_emission(path, hit, surface, material);
+  const Vec3f direction = v.rays.direction.at(i);
+  if (material.emits) collect_emission(path, direction, hit, surface, material);
   if (path.bounce > settings_.max_bounces) return false;
-  SurfaceBsdf& bsdf = v.own_bsdf[i];
-  bsdf = *v.bsdf[i];
+  SurfaceBsdf& bsdf = v.own_bsdfs.emplace_back(*v.bsdf[i]);
   v.bsdf[i] = &bsdf;
   bsdf.is_inside = surface.is_back;
   if (material.is_textured || has_colors) {
-    read_textures(path, hit, surface, material, is_soft, bsdf, surface.normal);
+    read_textures(path, direction, hit, surface, material, is_soft, bsdf, surface.normal);
     bsdf.finish();
     v.normal.set(i, surface.normal);
   }
-  return !(material.is_pane || material.is_veil) || !pass_or_reflect(path, surface, material, bsdf);
+  if (!material.is_pane && !material.is_veil) return true;
+  const Passage passage = pass_or_reflect(path, direction, surface, material, bsdf);
+  if (passage.goes_on) v.go_on(path, passage.origin, passage.direction);
+  return passage.is_scattered;
 }
 
 inline void PathTracer::draw_numbers(Batch& v) const {
@@ -303,11 +286,12 @@ inline void PathTracer::draw_numbers(Batch& v) const {
   }
 }
 
-inline void PathTracer::collect_lights(Path& path, float t_max) const {
+inline void PathTracer::collect_lights(const Batch& v, std::size_t i) const {
+  Path& path = *v.paths[i];
   const bool is_first = std::isinf(path.last_density);
   if (path.hides_lights || (!is_first && !settings_.samples_bsdf)) return;
   scene_.lights().along_ray(
-      path.origin, path.direction, t_max, path.is_camera_ray,
+      v.rays.origin.at(i), v.rays.direction.at(i), v.hits.distance[i], path.is_camera_ray,
       [&](std::uint32_t light, const Vec3f& radiance, float density) {
         const bool has_rival = !is_first && settings_.samples_lights;
         const float rival =
@@ -330,26 +314,27 @@ inline bool PathTracer::ends_at(const Path& path, const SurfaceBsdf& s) const {
   return path.bounce == settings_.max_bounces && settings_.samples_lights && s.is_rough();
 }
 
-inline void PathTracer::scatter(const Batch& v, std::size_t i) const {
+inline void PathTracer::scatter(Batch& v, std::size_t i) const {
   Path& path = *v.paths[i];
   const SurfaceBsdf& s = *v.bsdf[i];
+  v.bounce[i] = path.bounce;
   if (s.lobes.glass > 0.0f) [[unlikely]]
     return scatter_glass(v, i);
   if (!path.result.has_surface && !s.is_mirror()) {
     record_surface(v, i, s.albedo(v.albedo.at(i)));
   }
   take_light_samples(v, i);
-  ask_light(v, i, v.light_share.at(i), v.light_reach[i]);
+  ask_light(v, i);
   path.hides_lights = false;
   if (ends_at(path, s)) return;
   BsdfSample next;
   next.weight = v.next_weight.at(i);
   next.density = v.next_density[i];
   next.spread = v.next_spread[i];
-  go_on(v, i, next, v.next.at(i));
+  go_on(v, i, next, v.next_origin.at(i), v.next.at(i));
 }
 
-[[gnu::noinline]] void PathTracer::scatter_glass(const Batch& v, std::size_t i) const {
+[[gnu::noinline]] void PathTracer::scatter_glass(Batch& v, std::size_t i) const {
   Path& path = *v.paths[i];
   const SurfaceBsdf& s = *v.bsdf[i];
   const Bsdf bsdf(s, v.to_viewer.at(i));
@@ -358,6 +343,7 @@ inline void PathTracer::scatter(const Batch& v, std::size_t i) const {
     if (!path.result.has_surface) record_surface(v, i, bsdf.albedo());
     take_light_samples(v, i);
     light_glass(v, i, bsdf);
+    ask_light(v, i);
   }
   path.is_camera_ray = false;
   const BsdfSample next =
@@ -366,10 +352,12 @@ inline void PathTracer::scatter(const Batch& v, std::size_t i) const {
   if ((v.flat_normal.at(i).dot(direction) <= 0.0f) != next.is_transmitted) return;
   path.hides_lights =
       path.is_soft(settings_) && (std::isinf(next.density) || (next.is_transmitted && is_soft));
-  go_on(v, i, next, direction);
+  go_on(v, i, next, v.leave(i, direction), direction);
 }
 
-inline void PathTracer::light_glass(const Batch& v, std::size_t i, const Bsdf& bsdf) const {
+/// What Vertices finds of the way to the light for other surfaces.
+inline void PathTracer::light_glass(Batch& v, std::size_t i, const Bsdf& bsdf) const {
+  v.light_reach[i] = 0.0f;
   if (!(v.lights.density[i] > 0.0f)) return;
   const Vec3f towards = v.lights.direction.at(i);
   const Vec3f wi = v.basis(i).to_local(towards);
@@ -377,8 +365,8 @@ inline void PathTracer::light_glass(const Batch& v, std::size_t i, const Bsdf& b
   if (is_behind && v.wishes.is_two_sided[i] == 0) return;
   if ((v.flat_normal.at(i).dot(towards) <= 0.0f) != is_behind) return;
   const BsdfValue value = bsdf.evaluate(wi);
-  const float weight = v.weight_of_light(i, settings_.samples_bsdf, value.density);
-  ask_light(v, i, value.f_cos * weight, Vertices::reach(v.lights.distance[i]));
+  v.light_share.set(i, value.f_cos * v.weight_of_light(i, settings_.samples_bsdf, value.density));
+  v.light_reach[i] = Vertices::reach(v.lights.distance[i]);
 }
 
 inline void PathTracer::record_surface(const Batch& v, std::size_t i, const Vec3f& albedo) const {
@@ -397,21 +385,15 @@ inline void PathTracer::take_light_samples(const Batch& v, std::size_t i) const 
   path.last.total_score = v.choices.total_score[i];
 }
 
-/// For `share` of the light's radiance, if nothing within `reach` is in the way.
-inline void PathTracer::ask_light(const Batch& v, std::size_t i, const Vec3f& share,
-                                  float reach) const {
-  if (!(reach > 0.0f) || share.maxCoeff() <= 0.0f) return;
-  Path& path = *v.paths[i];
-  ShadowRay& shadow = path.shadow;
-  shadow.direction = v.lights.direction.at(i);
-  shadow.origin = v.leave(i, shadow.direction);
-  shadow.t_max = reach;
-  shadow.share = path.throughput.cwiseProduct(share);
-  shadow.place = v.lights.place(i);
-  shadow.bounce = path.bounce;
+/// What comes of the light's share, if nothing within its reach is in the way.
+inline void PathTracer::ask_light(Batch& v, std::size_t i) const {
+  const Vec3f share = v.light_share.at(i);
+  if (!(v.light_reach[i] > 0.0f) || share.maxCoeff() <= 0.0f) return;
+  v.light_share.set(i, v.paths[i]->throughput.cwiseProduct(share));
+  v.asking[v.asking_count++] = std::uint8_t(i);
 }
 
-inline void PathTracer::go_on(const Batch& v, std::size_t i, const BsdfSample& next,
+inline void PathTracer::go_on(Batch& v, std::size_t i, const BsdfSample& next, const Vec3f& origin,
                               const Vec3f& direction) const {
   if (!(next.weight.maxCoeff() > 0.0f)) return;
   Path& path = *v.paths[i];
@@ -428,12 +410,11 @@ inline void PathTracer::go_on(const Batch& v, std::size_t i, const BsdfSample& n
     if (v.numbers[Vertices::kRoulette][i] >= survival) return;
     path.throughput *= 1.0f / survival;
   }
-  path.is_over = false;
   ++path.bounce;
   path.last_density = next.density;
   path.since_last = 0.0f;
   path.spread = std::max(path.spread, next.spread);
-  path.go(v.leave(i, direction), direction);
+  v.go_on(path, origin, direction);
 }
 
 }  // namespace diorama

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
 #include <vector>
 
 #include "batch.h"
@@ -71,21 +70,19 @@ class PathTracer {
 
  private:
   struct Path;
-  struct ShadowRay;
+  struct Passage;
   struct Batch;
-  using Paths = std::span<Path* const>;
 
   RayCounts trace_all(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
   RayCounts trace_sse42(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
   RayCounts trace_avx2(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
   RayCounts trace_avx512(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
-  void trace_batch(std::vector<Path>& paths, Batch& batch) const;
-  static void arrange_by_light(std::array<Path*, kBatch>& paths, std::size_t count);
-  void start_paths(std::vector<Path>& paths, const BatchFloats& columns,
-                   const BatchFloats& rows) const;
+  void start_paths(std::vector<Path>& paths, const BatchFloats& columns, const BatchFloats& rows,
+                   Batch& v) const;
+  void trace_batch(Batch& v) const;
   void open_shutter(Path& path, int row, CameraRay& ray) const;
-  void find_surfaces(Paths paths, Batch& v) const;
-  void send(const LoggedRay& ray, float time, RayBundle& rays) const;
+  void find_surfaces(Batch& v) const;
+  void log(const LoggedRay& ray) const;
   void trace_rays(Batch& v) const;
   void meet(Batch& v) const;
   /// Adds the light that the surface emits. False: the path is not scattered here.
@@ -93,24 +90,26 @@ class PathTracer {
   void draw_numbers(Batch& v) const;
   void take_lobes(Batch& v, std::size_t i) const;
   bool ends_at(const Path& path, const SurfaceBsdf& s) const;
-  void scatter(const Batch& v, std::size_t i) const;
-  void scatter_glass(const Batch& v, std::size_t i) const;
-  void light_glass(const Batch& v, std::size_t i, const Bsdf& bsdf) const;
+  void scatter(Batch& v, std::size_t i) const;
+  void scatter_glass(Batch& v, std::size_t i) const;
+  void light_glass(Batch& v, std::size_t i, const Bsdf& bsdf) const;
   void record_surface(const Batch& v, std::size_t i, const Vec3f& albedo) const;
   void take_light_samples(const Batch& v, std::size_t i) const;
-  void ask_light(const Batch& v, std::size_t i, const Vec3f& share, float reach) const;
-  void go_on(const Batch& v, std::size_t i, const BsdfSample& next, const Vec3f& direction) const;
-  void find_lights(Paths paths) const;
-  void add_light(Path& path, const Vec3f& kept) const;
-  void collect_lights(Path& path, float t_max) const;
-  void collect_emission(Path& path, const RayHit& hit, const SurfaceGeometry& surface,
-                        const ShadingMaterial& material) const;
-  /// True: the surface let the path through or ended it.
-  bool pass_or_reflect(Path& path, const SurfaceGeometry& surface, const ShadingMaterial& material,
-                       SurfaceBsdf& bsdf) const;
-  void read_textures(const Path& path, const RayHit& hit, const SurfaceGeometry& surface,
-                     const ShadingMaterial& material, bool is_soft, SurfaceBsdf& bsdf,
-                     Vec3f& normal) const;
+  void ask_light(Batch& v, std::size_t i) const;
+  void go_on(Batch& v, std::size_t i, const BsdfSample& next, const Vec3f& origin,
+             const Vec3f& direction) const;
+  static void arrange_by_light(Batch& v);
+  void find_lights(Batch& v) const;
+  void add_light(const Batch& v, std::size_t i, const Vec3f& kept) const;
+  void collect_lights(const Batch& v, std::size_t i) const;
+  // `direction`: of the ray that met the surface.
+  void collect_emission(Path& path, const Vec3f& direction, const RayHit& hit,
+                        const SurfaceGeometry& surface, const ShadingMaterial& material) const;
+  Passage pass_or_reflect(Path& path, const Vec3f& direction, const SurfaceGeometry& surface,
+                          const ShadingMaterial& material, SurfaceBsdf& bsdf) const;
+  void read_textures(const Path& path, const Vec3f& direction, const RayHit& hit,
+                     const SurfaceGeometry& surface, const ShadingMaterial& material, bool is_soft,
+                     SurfaceBsdf& bsdf, Vec3f& normal) const;
   void add(Path& path, int bounce, const Vec3f& radiance) const;
 
   const RenderScene& scene_;

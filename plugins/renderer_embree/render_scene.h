@@ -79,12 +79,12 @@ struct RayHit {
 /// What the rays of a batch met.
 struct BatchHits {
   std::array<const MeshInstance*, kBatch> instance{};  ///< Null: nothing.
-  BatchInts geometry{};
-  BatchInts triangle{};
-  BatchFloats u{};
-  BatchFloats v{};
-  BatchFloats distance{};
-  BatchFloats time{};
+  BatchInts geometry;
+  BatchInts triangle;
+  BatchFloats u;
+  BatchFloats v;
+  BatchFloats distance;
+  BatchFloats time;
   BatchVectors normal;
 
   RayHit at(std::size_t i) const {
@@ -119,6 +119,8 @@ class RayBundle {
   void add(const Vec3f& origin, const Vec3f& direction, float t_min, float t_max, float time) {
     put(count_++, origin, direction, t_min, t_max, time);
   }
+  /// Up to eight rays of a batch, from `begin` on, a multiple of eight; nothing else may be in it.
+  void take(const BatchRays& rays, std::size_t begin);
 
  private:
   friend class RenderScene;
@@ -372,6 +374,20 @@ inline void RayBundle::put(int i, const Vec3f& origin, const Vec3f& direction, f
   r.tnear[i] = t_min;
   r.tfar[i] = t_max;
   r.time[i] = time;
+}
+
+inline void RayBundle::take(const BatchRays& from, std::size_t begin) {
+  RTCRay8& r = rays_.ray;
+  std::copy_n(&from.origin.x[begin], kSize, r.org_x);
+  std::copy_n(&from.origin.y[begin], kSize, r.org_y);
+  std::copy_n(&from.origin.z[begin], kSize, r.org_z);
+  std::copy_n(&from.direction.x[begin], kSize, r.dir_x);
+  std::copy_n(&from.direction.y[begin], kSize, r.dir_y);
+  std::copy_n(&from.direction.z[begin], kSize, r.dir_z);
+  std::copy_n(&from.t_min[begin], kSize, r.tnear);
+  std::copy_n(&from.t_max[begin], kSize, r.tfar);
+  std::copy_n(&from.time[begin], kSize, r.time);
+  count_ = int(std::min(from.count - begin, std::size_t(kSize)));
 }
 
 /// Fills the rest with rays that go nowhere: not all of Embree's kernels heed which are valid.

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <numbers>
 
@@ -17,6 +19,14 @@ inline constexpr float kInfinite = std::numeric_limits<float>::infinity();
 
 inline float luminance(const Vec3f& rgb) {
   return 0.2126f * rgb.x() + 0.7152f * rgb.y() + 0.0722f * rgb.z();
+}
+
+/// `is_first ? a : b`, in a form that compilers never turn into a branch, which would keep loops
+/// around it from becoming vector code.
+inline float choose(bool is_first, float a, float b) {
+  const std::int32_t mask = -std::int32_t(is_first);
+  return std::bit_cast<float>((std::bit_cast<std::int32_t>(a) & mask) |
+                              (std::bit_cast<std::int32_t>(b) & ~mask));
 }
 
 /// v at unit length; v is not zero. One division instead of three.
@@ -42,9 +52,16 @@ inline Basis basis_around(const Vec3f& n) {
           n};
 }
 
-/// Sine and cosine of an angle within a quarter turn around zero, to 1e-6; the library's functions
-/// cost many times as much.
-inline Vec2f cos_sin_small(float angle) {
+/// Two numbers without an address: unlike small vectors, they never keep a loop from becoming
+/// vector code.
+struct CosSin {
+  float cosine = 0.0f;
+  float sine = 0.0f;
+};
+
+/// Of an angle within a quarter turn around zero, to 1e-6; the library's functions cost many times
+/// as much.
+inline CosSin cos_sin_small(float angle) {
   const float a2 = angle * angle;
   const float cosine =
       1.0f + a2 * (-0.5f + a2 * (1.0f / 24.0f + a2 * (-1.0f / 720.0f + a2 * (1.0f / 40320.0f))));
@@ -53,12 +70,19 @@ inline Vec2f cos_sin_small(float angle) {
   return {cosine, sine};
 }
 
-/// The point of the unit circle at `turns` in [0, 1].
-inline Vec2f unit_circle(float turns) {
-  const int quarter = int(turns * 4.0f + 0.5f);
-  const Vec2f p = cos_sin_small((turns - 0.25f * float(quarter)) * (2.0f * kPiF));
-  const Vec2f turned = (quarter & 1) != 0 ? Vec2f(-p.y(), p.x()) : p;
-  return (quarter & 2) != 0 ? Vec2f(-turned) : turned;
+/// Of an angle of `turns` in [0, 1].
+inline CosSin unit_circle(float turns) {
+  // The nearest whole number by what a large one leaves of its fraction: conversions back and forth
+  // keep loops from becoming vector code.
+  constexpr float kRounds = 12582912.0f;  // 1.5 * 2^23
+  const float shifted = turns * 4.0f + kRounds;
+  const auto quarter = std::bit_cast<std::uint32_t>(shifted);
+  const CosSin p = cos_sin_small((turns - 0.25f * (shifted - kRounds)) * (2.0f * kPiF));
+  const bool is_odd = (quarter & 1) != 0;
+  const float cosine = choose(is_odd, -p.sine, p.cosine);
+  const float sine = choose(is_odd, p.cosine, p.sine);
+  const float sign = choose((quarter & 2) != 0, -1.0f, 1.0f);
+  return {sign * cosine, sign * sine};
 }
 
 /// Uniform on the unit disk, keeping neighbours together (Shirley and Chiu 1997).
@@ -66,12 +90,12 @@ inline Vec2f disk_from_square(const Vec2f& u) {
   const float a = 2.0f * u.x() - 1.0f;
   const float b = 2.0f * u.y() - 1.0f;
   const bool is_wide = std::abs(a) > std::abs(b);
-  const float r = is_wide ? a : b;
-  const float other = is_wide ? b : a;
-  const Vec2f p = cos_sin_small(0.25f * kPiF * (other / (r == 0.0f ? 1.0f : r)));
-  const float along = r * p.x();
-  const float across = r * p.y();
-  return {is_wide ? along : across, is_wide ? across : along};
+  const float r = choose(is_wide, a, b);
+  const float other = choose(is_wide, b, a);
+  const CosSin p = cos_sin_small(0.25f * kPiF * (other / choose(r == 0.0f, 1.0f, r)));
+  const float along = r * p.cosine;
+  const float across = r * p.sine;
+  return {choose(is_wide, along, across), choose(is_wide, across, along)};
 }
 
 /// Density cos(theta) / pi.
@@ -85,8 +109,8 @@ inline Vec3f cosine_hemisphere(const Vec2f& u) {
 inline Vec3f uniform_cone(const Vec2f& u, float one_minus_cos) {
   const float h = u.x() * one_minus_cos;  // 1 - cos(theta)
   const float sin_theta = std::sqrt(std::max(0.0f, h * (2.0f - h)));
-  const Vec2f p = unit_circle(u.y());
-  return {sin_theta * p.x(), sin_theta * p.y(), 1.0f - h};
+  const CosSin p = unit_circle(u.y());
+  return {sin_theta * p.cosine, sin_theta * p.sine, 1.0f - h};
 }
 
 inline Vec3f uniform_sphere(const Vec2f& u) { return uniform_cone(u, 2.0f); }

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "batch.h"
 #include "diorama/host.h"
 #include "dome.h"
 
@@ -33,8 +34,18 @@ class SkyGrid {
           const Sees& sees, Host& host);
 
   std::uint32_t cell(const Vec3f& position) const;
+  /// The same for the first `size` entries of a batch.
+  void find_cells(const BatchVectors& positions, std::size_t size, BatchInts& cells) const {
+    for (std::size_t i = 0; i < size; ++i) cells[i] = std::int32_t(cell(positions.at(i)));
+  }
   /// Luminance times solid angle of what a cell sees.
   float power(std::uint32_t cell) const { return powers_[cell]; }
+  void find_powers(const BatchInts& cells, std::size_t size, BatchFloats& powers) const {
+    const float* from = powers_.data();
+    BatchFloats found;
+    for (std::size_t i = 0; i < size; ++i) found[i] = from[cells[i]];
+    std::copy_n(found.begin(), size, powers.begin());
+  }
 
   struct Choice {
     int patch = 0;
@@ -64,13 +75,11 @@ class SkyGrid {
 };
 
 inline std::uint32_t SkyGrid::cell(const Vec3f& position) const {
-  int index = 0;
-  for (int k = 2; k >= 0; --k) {
+  const auto along = [&](int k) {
     const float x = (position[k] - low_[k]) * cells_per_metre_[k];
-    const int last = counts_[std::size_t(k)] - 1;
-    index = index * (last + 1) + int(std::clamp(x, 0.0f, float(last)));
-  }
-  return std::uint32_t(index);
+    return int(std::max(0.0f, std::min(x, float(counts_[std::size_t(k)] - 1))));
+  };
+  return std::uint32_t((along(2) * counts_[1] + along(1)) * counts_[0] + along(0));
 }
 
 inline SkyGrid::Choice SkyGrid::choose(std::uint32_t index, float u) const {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <vector>
 
 #include "bsdf.h"
 #include "render_scene.h"
@@ -25,8 +26,7 @@ inline Vec3f leave(const Vec3f& position, const Vec3f& flat_normal, const Vec3f&
 /// LobeWeights of a batch, but for glass, whose paths are scattered one by one.
 struct BatchLobes {
   BatchVectors diffuse, f0, multiple;
-  BatchFloats f90{}, alpha{}, coat{}, coat_alpha{}, mean_missing{}, mean_above{}, dielectric_f0{},
-      burley{};
+  BatchFloats f90, alpha, coat, coat_alpha, mean_missing, mean_above, dielectric_f0, burley;
 
   LobeWeights at(std::size_t i) const {
     LobeWeights w;
@@ -59,7 +59,7 @@ struct BatchLobes {
 };
 
 struct BatchAlbedos {
-  BatchFloats f0{}, f90{}, coat{}, above{};
+  BatchFloats f0, f90, coat, above;
 
   LayerAlbedo at(std::size_t i) const { return {f0[i], f90[i], coat[i], above[i]}; }
   void set(std::size_t i, const LayerAlbedo& n) {
@@ -75,46 +75,47 @@ struct BatchAlbedos {
 /// are vector code. World space where nothing else is said.
 struct Vertices {
   std::size_t count = 0;
-  BatchVectors origin;  ///< Of the ray that met it.
-  BatchVectors direction;
+  BatchRays rays;  ///< That met them.
   BatchHits hits;
   BatchVectors interpolated;  ///< Normal; see RenderScene::interpolated_normal().
-  BatchInts is_mirrored{};
+  BatchInts is_mirrored;
 
   BatchVectors position;
   BatchVectors flat_normal;
   BatchVectors normal;
-  BatchInts is_back{};
+  BatchInts is_back;
 
   // Of those that scatter.
   enum Purpose { kLight, kRoulette, kPlaceU, kPlaceV, kLobe, kSpare, kDirectionU, kDirectionV };
   static constexpr std::uint32_t kPairs = 4;
-  std::array<const SurfaceBsdf*, kBatch> bsdf{};
-  std::array<SurfaceBsdf, kBatch> own_bsdf;  ///< Of materials that are not the same all over.
-  std::array<const ShadingMaterial*, kBatch> material{};
+  std::array<const SurfaceBsdf*, kBatch> bsdf;
+  std::vector<SurfaceBsdf> own_bsdfs;  ///< Of materials that are not the same all over.
+  std::array<const ShadingMaterial*, kBatch> material;
   BatchVectors basis_x;
   BatchVectors basis_y;
-  BatchVectors to_viewer;                         ///< Local, unit.
-  BatchVectors step;                              ///< Off the surface, on the viewer's side.
-  std::array<BatchFloats, 2 * kPairs> numbers{};  ///< Random ones, by purpose.
+  BatchVectors to_viewer;                       ///< Local, unit.
+  BatchVectors step;                            ///< Off the surface, on the viewer's side.
+  std::array<BatchFloats, 2 * kPairs> numbers;  ///< Random ones, by purpose.
   Lights::Wishes wishes;
   Lights::Choices choices;
   Lights::Samples lights;
 
   BatchLobes lobes;
-  BatchInts has_rival{};  ///< The BSDF's own sample may find the light, too.
+  BatchInts has_rival;    ///< The BSDF's own sample may find the light, too.
   BatchAlbedos albedo;    ///< Towards the viewer ...
   BatchAlbedos at_light;  ///< ... the light ...
   BatchAlbedos at_next;   ///< ... and the next vertex.
   BatchVectors to_light;  ///< Local.
   BatchVectors to_next;   ///< Local.
 
-  BatchFloats light_reach{};  ///< Of the ray to the light; 0: there is none.
+  BatchFloats light_reach;    ///< Of the ray to the light; 0: there is none.
+  BatchVectors light_origin;  ///< Of that ray.
   BatchVectors light_share;   ///< Of the light's radiance that is scattered to the viewer.
-  BatchVectors next;          ///< Direction.
-  BatchVectors next_weight;   ///< Zero: the path ends.
-  BatchFloats next_density{};
-  BatchFloats next_spread{};
+  BatchVectors next_origin;
+  BatchVectors next;         ///< Direction.
+  BatchVectors next_weight;  ///< Zero: the path ends.
+  BatchFloats next_density;
+  BatchFloats next_spread;
 
   Vec2f pair(Purpose first, std::size_t i) const {
     return {numbers[first][i], numbers[std::size_t(first) + 1][i]};
@@ -166,9 +167,10 @@ inline SurfaceGeometry Vertices::surface(std::size_t i) const {
 
 inline void Vertices::find_surfaces() {
   for (std::size_t i = 0; i < whole_steps(count); ++i) {
-    const SurfaceGeometry s =
-        RenderScene::surface_of(origin.at(i) + hits.distance[i] * direction.at(i), direction.at(i),
-                                hits.normal.at(i), interpolated.at(i), is_mirrored[i] != 0);
+    const Vec3f direction = rays.direction.at(i);
+    const Vec3f met = rays.origin.at(i) + hits.distance[i] * direction;
+    const SurfaceGeometry s = RenderScene::surface_of(met, direction, hits.normal.at(i),
+                                                      interpolated.at(i), is_mirrored[i] != 0);
     position.set(i, s.position);
     flat_normal.set(i, s.flat_normal);
     normal.set(i, s.normal);
@@ -179,7 +181,7 @@ inline void Vertices::find_surfaces() {
 inline void Vertices::find_bases() {
   for (std::size_t i = 0; i < whole_steps(count); ++i) {
     const Basis basis = basis_around(normal.at(i));
-    Vec3f wo = basis.to_local(-direction.at(i));
+    Vec3f wo = basis.to_local(-rays.direction.at(i));
     wo.z() = std::max(wo.z(), 1e-4f);
     basis_x.set(i, basis.x);
     basis_y.set(i, basis.y);
@@ -221,11 +223,13 @@ inline void Vertices::weigh() {
     const float distance = reach(lights.distance[i]);
     light_share.set(i, select(is_lit, lit.f_cos * weight, Vec3f::Zero()));
     light_reach[i] = is_lit ? distance : 0.0f;
+    light_origin.set(i, leave(i, lights.direction.at(i)));
 
     const BsdfValue value = seen.evaluate(to_next.at(i), at_next.at(i));
     const float ahead = flat_normal.at(i).dot(next.at(i));
     const bool goes_on = (to_next.z[i] > 0.0f) & (value.density > kLeastDensity) & (ahead > 0.0f);
     next_density[i] = value.density;
+    next_origin.set(i, leave(i, next.at(i)));
     next_weight.set(i, select(goes_on, value.f_cos * (1.0f / value.density), Vec3f::Zero()));
   }
 }
