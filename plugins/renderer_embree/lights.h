@@ -93,7 +93,7 @@ class Lights {
   /// Returns the light's number; triangles without area are dropped.
   std::uint32_t add(EmittingTriangles triangles);
 
-  /// Builds the tables for choosing; call after the last add().
+  /// Builds the tables for choosing and drawing; call after the last add().
   void finish();
   /// Which parts of a dome can be seen from where; null: all from everywhere.
   using GridOf = std::function<std::shared_ptr<const SkyGrid>(

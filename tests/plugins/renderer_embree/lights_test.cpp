@@ -370,6 +370,7 @@ TEST_CASE("the light that falls on a point is that of the closed forms", "[light
 
   Lights emitting;
   emitting.add(square(0.6, Affine(Eigen::Translation3d(0, 0, 1.2))));
+  emitting.finish();
   CHECK(irradiance(emitting) == Approx(kPi * 3.0 * rect_above(1.2, 1.2, 1.2)).epsilon(0.01));
 
   light.kind = LightKind::Distant;
@@ -391,6 +392,7 @@ TEST_CASE("a cone keeps light to its inside", "[lights]") {
   spot.cone_softness = 0.2;
   Lights lights;
   lights.add(spot, Affine(Eigen::Translation3d(0, 0, 2)), nullptr);
+  lights.finish();
   const auto at_angle = [&](double angle) {
     const Vec3f from(float(2.0 * std::tan(angle)), 0.0f, 0.0f);
     return sample(lights, from, {0.5f, 0.5f}).radiance.x();
