@@ -38,6 +38,12 @@ inline void occluded(const int* valid, RTCScene scene, Context& context, RTCRay8
   arguments.context = &context;
   rtcOccluded8(valid, scene, &rays, &arguments);
 }
+inline void occluded(const int* valid, RTCScene scene, Context& context, RTCRay16& rays) {
+  RTCOccludedArguments arguments;
+  rtcInitOccludedArguments(&arguments);
+  arguments.context = &context;
+  rtcOccluded16(valid, scene, &rays, &arguments);
+}
 #else
 using Context = RTCIntersectContext;
 inline void init(Context& context) { rtcInitIntersectContext(&context); }
@@ -52,6 +58,9 @@ inline void intersect(const int* valid, RTCScene scene, Context& context, RTCRay
 }
 inline void occluded(const int* valid, RTCScene scene, Context& context, RTCRay8& rays) {
   rtcOccluded8(valid, scene, &context, &rays);
+}
+inline void occluded(const int* valid, RTCScene scene, Context& context, RTCRay16& rays) {
+  rtcOccluded16(valid, scene, &context, &rays);
 }
 #endif
 

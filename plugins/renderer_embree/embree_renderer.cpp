@@ -110,10 +110,9 @@ void EmbreeRenderer::Params::visit(ParamVisitor& v) {
   v.choice("principled", principled, kPrincipled,
            {"layered: layers share the light and lose none of it; blender: as Blender 3.4's "
             "Principled BSDF, which adds reflections to a whole diffuse base."});
-  v.choice(
-      "isa", isa, kIsaNames,
-      {"Instruction set of the kernels, by default the best of this machine up to avx2; pictures "
-       "are the same bytes within one."});
+  v.choice("isa", isa, kIsaNames,
+           {"Instruction set of the kernels, by default the best of this machine; pictures "
+            "are the same bytes within one."});
 }
 
 EmbreeRenderer::EmbreeRenderer(Params params, Host& host)

@@ -37,7 +37,7 @@ Isa isa_by_name(std::string_view name) {
 }
 
 const char* best_isa_name() {
-  for (const Isa isa : {Isa::Avx2, Isa::Sse42}) {
+  for (const Isa isa : {Isa::Avx512, Isa::Avx2, Isa::Sse42}) {
     if (is_supported(isa)) return kIsaNames[std::size_t(isa)];
   }
   return kIsaNames[std::size_t(Isa::Sse2)];

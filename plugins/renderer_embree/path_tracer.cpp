@@ -32,21 +32,22 @@ RayCounts PathTracer::trace(const TraceJob& job, PixelSum* sums, std::size_t str
     case Isa::Avx512:
       return trace_avx512(job, sums, stride);
   }
-  return trace_all(job, sums, stride);
+  return trace_all<8>(job, sums, stride);
 }
 
 // One kernel per instruction set: all that it calls is compiled into it, but for what is rarely
 // needed (noinline, and path_special.cpp).
-#define DIORAMA_KERNEL(NAME, ARCH)                                        \
+#define DIORAMA_KERNEL(NAME, ARCH, TOGETHER)                              \
   [[gnu::target("arch=" ARCH), gnu::flatten]] RayCounts PathTracer::NAME( \
       const TraceJob& job, PixelSum* sums, std::size_t stride) const {    \
-    return trace_all(job, sums, stride);                                  \
+    return trace_all<TOGETHER>(job, sums, stride);                        \
   }
-DIORAMA_KERNEL(trace_sse42, "x86-64-v2")
-DIORAMA_KERNEL(trace_avx2, "x86-64-v3")
-DIORAMA_KERNEL(trace_avx512, "x86-64-v4")
+DIORAMA_KERNEL(trace_sse42, "x86-64-v2", 8)
+DIORAMA_KERNEL(trace_avx2, "x86-64-v3", 8)
+DIORAMA_KERNEL(trace_avx512, "x86-64-v4", 16)
 #undef DIORAMA_KERNEL
 
+template <int kTogether>
 inline RayCounts PathTracer::trace_all(const TraceJob& job, PixelSum* sums,
                                        std::size_t stride) const {
   std::vector<Path> paths;
@@ -74,7 +75,7 @@ inline RayCounts PathTracer::trace_all(const TraceJob& job, PixelSum* sums,
       ++sample;
     }
     start_paths(paths, columns, rows, batch);
-    trace_batch(batch);
+    trace_batch<kTogether>(batch);
     for (std::size_t i = 0; i < paths.size(); ++i) pixels[i]->add(paths[i].result);
   }
   return batch.counts;
@@ -109,6 +110,7 @@ inline void PathTracer::start_paths(std::vector<Path>& paths, const BatchFloats&
 
 // Paths advance together, step by step: rays of one kind in a row, then the surfaces that they met.
 // Code and data of each step stay close to the processor, and memory is fetched meanwhile.
+template <int kTogether>
 inline void PathTracer::trace_batch(Batch& v) const {
   while (v.rays.count > 0) {
     v.next_rays.count = 0;
@@ -132,7 +134,7 @@ inline void PathTracer::trace_batch(Batch& v) const {
     }
     for (std::size_t i = 0; i < v.count; ++i) scatter(v, i);
     arrange_by_light(v);
-    find_lights(v);
+    find_lights<kTogether>(v);
     v.rays = v.next_rays;
     v.paths = v.next_paths;
   }
@@ -178,10 +180,11 @@ inline void PathTracer::arrange_by_light(Batch& v) {
   }
 }
 
+template <int kTogether>
 inline void PathTracer::find_lights(Batch& v) const {
-  RayBundle bundle;
-  for (std::size_t begin = 0; begin < v.asking_count; begin += RayBundle::kSize) {
-    const std::size_t end = std::min(begin + RayBundle::kSize, v.asking_count);
+  RaysTogether<kTogether> bundle;
+  for (std::size_t begin = 0; begin < v.asking_count; begin += kTogether) {
+    const std::size_t end = std::min(begin + kTogether, v.asking_count);
     bundle.clear();
     for (std::size_t k = begin; k < end; ++k) {
       const std::size_t i = v.asking[k];

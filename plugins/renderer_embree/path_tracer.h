@@ -73,12 +73,15 @@ class PathTracer {
   struct Passage;
   struct Batch;
 
+  // Rays to lights are traced kTogether at a time.
+  template <int kTogether>
   RayCounts trace_all(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
   RayCounts trace_sse42(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
   RayCounts trace_avx2(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
   RayCounts trace_avx512(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
   void start_paths(std::vector<Path>& paths, const BatchFloats& columns, const BatchFloats& rows,
                    Batch& v) const;
+  template <int kTogether>
   void trace_batch(Batch& v) const;
   void open_shutter(Path& path, int row, CameraRay& ray) const;
   void find_surfaces(Batch& v) const;
@@ -99,6 +102,7 @@ class PathTracer {
   void go_on(Batch& v, std::size_t i, const BsdfSample& next, const Vec3f& origin,
              const Vec3f& direction) const;
   static void arrange_by_light(Batch& v);
+  template <int kTogether>
   void find_lights(Batch& v) const;
   void add_light(const Batch& v, std::size_t i, const Vec3f& kept) const;
   void collect_lights(const Batch& v, std::size_t i) const;

@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "batch.h"
@@ -109,17 +110,18 @@ struct BatchHits {
   }
 };
 
-/// Up to eight rays that are traced together, which is faster where they go similar ways.
-class RayBundle {
+/// Up to 8 or 16 rays that are traced together, which is faster where they go similar ways.
+template <int kWidth>
+class RaysTogether {
  public:
-  static constexpr int kSize = 8;
+  static constexpr int kSize = kWidth;
 
   void clear() { count_ = 0; }
   /// The direction is unit length.
   void add(const Vec3f& origin, const Vec3f& direction, float t_min, float t_max, float time) {
     put(count_++, origin, direction, t_min, t_max, time);
   }
-  /// Up to eight rays of a batch, from `begin` on, a multiple of eight; nothing else may be in it.
+  /// Rays of a batch from `begin` on, a multiple of the size; nothing else may be in it.
   void take(const BatchRays& rays, std::size_t begin);
 
  private:
@@ -127,10 +129,11 @@ class RayBundle {
   void put(int i, const Vec3f& origin, const Vec3f& direction, float t_min, float t_max,
            float time);
   void finish(std::uint32_t mask);
-  alignas(32) std::array<int, kSize> valid_{};
-  RTCRayHit8 rays_;
+  alignas(64) std::array<int, kSize> valid_{};
+  std::conditional_t<kSize == 8, RTCRayHit8, RTCRayHit16> rays_;
   int count_ = 0;
 };
+using RayBundle = RaysTogether<8>;
 
 /// The surface at a hit, without its material. World space.
 struct SurfaceGeometry {
@@ -194,8 +197,8 @@ class RenderScene {
     intersect(scene_, rays, begin, hits);
   }
   /// Calls lit(i, share) for every ray of which light is left; spends the bundle.
-  template <class Lit>
-  void transmittance(RayBundle& rays, bool passes_glass, Lit&& lit) const {
+  template <int kWidth, class Lit>
+  void transmittance(RaysTogether<kWidth>& rays, bool passes_glass, Lit&& lit) const {
     transmittance(scene_over_time(), rays, passes_glass, ~0u, lit);
   }
   /// Seconds around the moment of the poses that `time` runs through; see shutter_window().
@@ -253,7 +256,7 @@ class RenderScene {
   /// Carried by shadow rays; the filter of the surfaces on their way weakens what they carry.
   struct ShadowContext {
     embree::Context context;
-    std::array<Vec3f, RayBundle::kSize> kept;  ///< By the rays' ids; set when is_weakened.
+    std::array<Vec3f, 16> kept;  ///< By the rays' ids; set when is_weakened.
     bool is_weakened = false;
     bool passes_glass = true;
     void weaken(unsigned ray, const Vec3f& share) {
@@ -268,9 +271,9 @@ class RenderScene {
   void intersect(RTCScene scene, RayBundle& rays, std::size_t begin, BatchHits& hits) const;
   RayHit intersect(RTCScene scene, const Vec3f& origin, const Vec3f& direction, float t_min,
                    float t_max, float time) const;
-  template <class Lit>
-  static void transmittance(RTCScene scene, RayBundle& rays, bool passes_glass, std::uint32_t mask,
-                            Lit&& lit);
+  template <int kWidth, class Lit>
+  static void transmittance(RTCScene scene, RaysTogether<kWidth>& rays, bool passes_glass,
+                            std::uint32_t mask, Lit&& lit);
   RTCScene scene_over_time() const { return moving_scene_ ? moving_scene_ : scene_; }
   static void weaken_shadow_ray(const RTCFilterFunctionNArguments* args);
   void collect(const Scene& scene, NodeId node, const Affine& world_from_parent, bool is_movable);
@@ -362,9 +365,10 @@ inline Vec3f RenderScene::transmittance(const Vec3f& origin, const Vec3f& direct
   return shadow.is_weakened ? shadow.kept[0] : Vec3f(Vec3f::Ones());
 }
 
-inline void RayBundle::put(int i, const Vec3f& origin, const Vec3f& direction, float t_min,
-                           float t_max, float time) {
-  RTCRay8& r = rays_.ray;
+template <int kWidth>
+inline void RaysTogether<kWidth>::put(int i, const Vec3f& origin, const Vec3f& direction,
+                                      float t_min, float t_max, float time) {
+  auto& r = rays_.ray;
   r.org_x[i] = origin.x();
   r.org_y[i] = origin.y();
   r.org_z[i] = origin.z();
@@ -376,8 +380,9 @@ inline void RayBundle::put(int i, const Vec3f& origin, const Vec3f& direction, f
   r.time[i] = time;
 }
 
-inline void RayBundle::take(const BatchRays& from, std::size_t begin) {
-  RTCRay8& r = rays_.ray;
+template <int kWidth>
+inline void RaysTogether<kWidth>::take(const BatchRays& from, std::size_t begin) {
+  auto& r = rays_.ray;
   std::copy_n(&from.origin.x[begin], kSize, r.org_x);
   std::copy_n(&from.origin.y[begin], kSize, r.org_y);
   std::copy_n(&from.origin.z[begin], kSize, r.org_z);
@@ -391,7 +396,8 @@ inline void RayBundle::take(const BatchRays& from, std::size_t begin) {
 }
 
 /// Fills the rest with rays that go nowhere: not all of Embree's kernels heed which are valid.
-inline void RayBundle::finish(std::uint32_t mask) {
+template <int kWidth>
+inline void RaysTogether<kWidth>::finish(std::uint32_t mask) {
   for (int i = count_; i < kSize; ++i) {
     put(i, Vec3f::Zero(), Vec3f::UnitZ(), 0.0f, -1.0f, kMoment);
   }
@@ -435,9 +441,9 @@ inline void RenderScene::intersect(RTCScene scene, RayBundle& bundle, std::size_
   }
 }
 
-template <class Lit>
-inline void RenderScene::transmittance(RTCScene scene, RayBundle& bundle, bool passes_glass,
-                                       std::uint32_t mask, Lit&& lit) {
+template <int kWidth, class Lit>
+inline void RenderScene::transmittance(RTCScene scene, RaysTogether<kWidth>& bundle,
+                                       bool passes_glass, std::uint32_t mask, Lit&& lit) {
   bundle.finish(mask);
   ShadowContext shadow;
   shadow.passes_glass = passes_glass;
