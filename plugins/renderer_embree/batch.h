@@ -12,7 +12,7 @@
 namespace diorama {
 
 /// Paths that advance together.
-inline constexpr std::size_t kBatch = 64;
+inline constexpr std::size_t kBatch = 128;
 
 /// One number per path of a batch. Loops over whole steps of such arrays become vector code: what
 /// lies behind the last path is computed as well, and ignored.
@@ -50,7 +50,9 @@ struct BatchRays {
 };
 
 /// The next multiple of the widest vector's length.
-inline std::size_t whole_steps(std::size_t count) { return std::min((count + 7) / 8 * 8, kBatch); }
+inline std::size_t whole_steps(std::size_t count) {
+  return std::min((count + 15) / 16 * 16, kBatch);
+}
 
 /// Without a branch, which would keep loops from becoming vector code.
 inline Vec3f select(bool condition, const Vec3f& a, const Vec3f& b) {

@@ -36,16 +36,22 @@ RayCounts PathTracer::trace(const TraceJob& job, PixelSum* sums, std::size_t str
 }
 
 // One kernel per instruction set: all that it calls is compiled into it, but for what is rarely
-// needed (noinline, and path_special.cpp).
-#define DIORAMA_KERNEL(NAME, ARCH, TOGETHER)                              \
-  [[gnu::target("arch=" ARCH), gnu::flatten]] RayCounts PathTracer::NAME( \
-      const TraceJob& job, PixelSum* sums, std::size_t stride) const {    \
-    return trace_all<TOGETHER>(job, sums, stride);                        \
+// needed (noinline, and path_special.cpp). Sanitizers would take many minutes to look through that.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define DIORAMA_FLATTEN
+#else
+#define DIORAMA_FLATTEN gnu::flatten
+#endif
+#define DIORAMA_KERNEL(NAME, ARCH, TOGETHER)                                 \
+  [[gnu::target("arch=" ARCH), DIORAMA_FLATTEN]] RayCounts PathTracer::NAME( \
+      const TraceJob& job, PixelSum* sums, std::size_t stride) const {       \
+    return trace_all<TOGETHER>(job, sums, stride);                           \
   }
 DIORAMA_KERNEL(trace_sse42, "x86-64-v2", 8)
 DIORAMA_KERNEL(trace_avx2, "x86-64-v3", 8)
 DIORAMA_KERNEL(trace_avx512, "x86-64-v4", 16)
 #undef DIORAMA_KERNEL
+#undef DIORAMA_FLATTEN
 
 template <int kTogether>
 inline RayCounts PathTracer::trace_all(const TraceJob& job, PixelSum* sums,
