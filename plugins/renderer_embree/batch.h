@@ -3,9 +3,9 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "diorama/math.h"
 
@@ -54,19 +54,15 @@ inline std::size_t whole_steps(std::size_t count) {
   return std::min((count + 15) / 16 * 16, kBatch);
 }
 
-/// Without a branch, which would keep loops from becoming vector code.
-inline Vec3f select(bool condition, const Vec3f& a, const Vec3f& b) {
-  return {condition ? a.x() : b.x(), condition ? a.y() : b.y(), condition ? a.z() : b.z()};
-}
-
-/// `a` where the mask is -1, `b` where it is 0. For values that are read from memory: compilers
-/// would rather branch than read both.
-inline float blend(std::int32_t mask, float a, float b) {
-  return std::bit_cast<float>((std::bit_cast<std::int32_t>(a) & mask) |
-                              (std::bit_cast<std::int32_t>(b) & ~mask));
-}
-inline Vec3f blend(std::int32_t mask, const Vec3f& a, const Vec3f& b) {
-  return {blend(mask, a.x(), b.x()), blend(mask, a.y(), b.y()), blend(mask, a.z(), b.z())};
+/// For each entry what the table holds at its index. By way of a local array, which compilers know
+/// not to overlap with the table: they then make vector code of it.
+template <class Value, class Values>
+inline void gather(const std::vector<Value>& table, const BatchInts& indices, std::size_t size,
+                   Values& values) {
+  const Value* from = table.data();
+  Values found;
+  for (std::size_t i = 0; i < size; ++i) found[i] = from[indices[i]];
+  std::copy_n(found.begin(), size, values.begin());
 }
 
 }  // namespace diorama

@@ -236,32 +236,27 @@ void fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshe
   ChannelImages channels(wanted, view);
   host.parallel_for(std::size_t(height), [&](std::size_t row) {
     const int y = int(row);
-    RayBundle bundle;
     std::array<int, kBatch> columns;
-    std::array<CameraRay, kBatch> rays;
+    std::array<CameraRay, kBatch> camera_rays;
+    BatchRays rays;
     BatchHits hits;
     // A whole batch is traced before its surfaces are looked at: they are fetched meanwhile.
     for (int begin = 0; begin < width; begin += int(kBatch)) {
-      std::size_t count = 0;
+      rays.count = 0;
       for (int x = begin; x < std::min(width, begin + int(kBatch)); ++x) {
         seen.at(x, y) = RayHit();
         const auto ray = view.ray(Vec2(x + 0.5, y + 0.5));
         if (!ray) continue;
-        columns[count] = x;
-        rays[count++] = *ray;
+        columns[rays.count] = x;
+        camera_rays[rays.count] = *ray;
+        rays.add(ray->origin, ray->direction, ray->t_min, ray->t_max, kMoment);
       }
-      for (std::size_t first = 0; first < count; first += RayBundle::kSize) {
-        bundle.clear();
-        for (std::size_t i = first; i < std::min(count, first + RayBundle::kSize); ++i) {
-          bundle.add(rays[i].origin, rays[i].direction, rays[i].t_min, rays[i].t_max, kMoment);
-        }
-        meshes.intersect_now(bundle, first, hits);
-      }
-      for (std::size_t i = 0; i < count; ++i) {
+      meshes.intersect_now(rays, hits);
+      for (std::size_t i = 0; i < rays.count; ++i) {
         if (!hits.instance[i]) continue;
         RayHit& hit = seen.at(columns[i], y);
         hit = hits.at(i);
-        if (!wanted.empty()) channels.put(columns[i], y, rays[i], hit);
+        if (!wanted.empty()) channels.put(columns[i], y, camera_rays[i], hit);
       }
     }
   });

@@ -205,9 +205,6 @@ class Lights {
   template <class DrawOne>
   void draw_all(Shape shape, const Wishes& wishes, const BatchFloats& u, const BatchFloats& v,
                 Samples& samples, DrawOne&& draw_one) const;
-  template <class Column, class Values>
-  static void look_up(const Column& column, const BatchInts& lights, std::size_t size,
-                      Values& values);
   static void look_up(const Columns::Vectors& columns, const BatchInts& lights, std::size_t size,
                       BatchVectors& values);
   void look_up(Shape shape, const BatchInts& lights, std::size_t size, Asked& asked) const;
@@ -330,9 +327,9 @@ inline void Lights::choose(const Wishes& wishes, Choices& choices) const {
   choices.light.fill(0);
   choices.probability.fill(0.0f);
   if (entry_lights_.empty()) return;
-  const std::int32_t* lights = entry_lights_.data();
   BatchInts picked;
-  for (std::size_t i = 0; i < size; ++i) picked[i] = lights[std::max(picks.entry[i], 0)];
+  for (std::size_t i = 0; i < size; ++i) picked[i] = std::max(picks.entry[i], 0);
+  gather(entry_lights_, picked, size, picked);
   for (std::size_t i = 0; i < size; ++i) {
     const float share = picks.score[i] / choices.total_score[i];
     const bool is_none = picks.entry[i] < 0;
@@ -457,39 +454,30 @@ inline void Lights::draw_all(Shape shape, const Wishes& wishes, const BatchFloat
     distances[i] = draw.distance;
     densities[i] = draw.density;
   }
-  BatchInts is_meant;
-  look_up(columns_.shape, samples.light, size, is_meant);
+  BatchInts shapes;
+  gather(columns_.shape, samples.light, size, shapes);
   for (std::size_t i = 0; i < size; ++i) {
-    const std::int32_t mask = is_meant[i] == std::int32_t(shape) ? -1 : 0;
-    samples.direction.set(i, blend(mask, directions.at(i), samples.direction.at(i)));
-    samples.distance[i] = blend(mask, distances[i], samples.distance[i]);
-    samples.density[i] = blend(mask, densities[i], samples.density[i]);
+    const bool is_own = shapes[i] == std::int32_t(shape);
+    samples.direction.set(i, select(is_own, directions.at(i), samples.direction.at(i)));
+    samples.distance[i] = select(is_own, distances[i], samples.distance[i]);
+    samples.density[i] = select(is_own, densities[i], samples.density[i]);
   }
-}
-
-template <class Column, class Values>
-inline void Lights::look_up(const Column& column, const BatchInts& lights, std::size_t size,
-                            Values& values) {
-  const auto* from = column.data();
-  Values found;
-  for (std::size_t i = 0; i < size; ++i) found[i] = from[lights[i]];
-  std::copy_n(found.begin(), size, values.begin());
 }
 
 inline void Lights::look_up(const Columns::Vectors& columns, const BatchInts& lights,
                             std::size_t size, BatchVectors& values) {
-  look_up(columns[0], lights, size, values.x);
-  look_up(columns[1], lights, size, values.y);
-  look_up(columns[2], lights, size, values.z);
+  gather(columns[0], lights, size, values.x);
+  gather(columns[1], lights, size, values.y);
+  gather(columns[2], lights, size, values.z);
 }
 
 inline void Lights::look_up(Shape shape, const BatchInts& lights, std::size_t size,
                             Asked& asked) const {
   look_up(columns_.position, lights, size, asked.to_light);
-  look_up(columns_.radius, lights, size, asked.radius);
-  look_up(columns_.area, lights, size, asked.area);
+  gather(columns_.radius, lights, size, asked.radius);
+  gather(columns_.area, lights, size, asked.area);
   if (shape == Shape::Sphere || shape == Shape::TurningDisk) return;
-  look_up(columns_.one_minus_cos, lights, size, asked.one_minus_cos);
+  gather(columns_.one_minus_cos, lights, size, asked.one_minus_cos);
   look_up(columns_.axis_x, lights, size, asked.axis_x);
   look_up(columns_.axis_y, lights, size, asked.axis_y);
   look_up(columns_.direction, lights, size, asked.shines_along);

@@ -161,11 +161,7 @@ inline void PathTracer::log(const LoggedRay& ray) const {
 
 inline void PathTracer::trace_rays(Batch& v) const {
   const BatchRays& rays = v.rays;
-  RayBundle bundle;
-  for (std::size_t begin = 0; begin < rays.count; begin += RayBundle::kSize) {
-    bundle.take(rays, begin);
-    scene_.intersect(bundle, begin, v.hits);
-  }
+  scene_.intersect(rays, v.hits);
   v.counts.rays += rays.count;
   for (std::size_t i = 0; settings_.ray_log && i < rays.count; ++i) {
     log({rays.origin.at(i), rays.direction.at(i), rays.t_min[i], rays.t_max[i], false});

@@ -187,14 +187,13 @@ class RenderScene {
   /// partly transparent. Solid glass counts as opaque unless `passes_glass`.
   Vec3f transmittance(const Vec3f& origin, const Vec3f& direction, float t_max, bool passes_glass,
                       float time) const;
-  /// The same for the rays of a bundle, which it spends. Their hits are put into eight entries from
-  /// `begin` on, a multiple of eight.
-  void intersect(RayBundle& rays, std::size_t begin, BatchHits& hits) const {
-    intersect(scene_over_time(), rays, begin, hits);
+  /// The hits of a batch's rays.
+  void intersect(const BatchRays& rays, BatchHits& hits) const {
+    intersect(scene_over_time(), rays, hits);
   }
   /// At the moment of the poses.
-  void intersect_now(RayBundle& rays, std::size_t begin, BatchHits& hits) const {
-    intersect(scene_, rays, begin, hits);
+  void intersect_now(const BatchRays& rays, BatchHits& hits) const {
+    intersect(scene_, rays, hits);
   }
   /// Calls lit(i, share) for every ray of which light is left; spends the bundle.
   template <int kWidth, class Lit>
@@ -268,6 +267,7 @@ class RenderScene {
 
   static RTCRayHit make_ray(const Vec3f& origin, const Vec3f& direction, float t_min, float t_max,
                             float time);
+  void intersect(RTCScene scene, const BatchRays& rays, BatchHits& hits) const;
   void intersect(RTCScene scene, RayBundle& rays, std::size_t begin, BatchHits& hits) const;
   RayHit intersect(RTCScene scene, const Vec3f& origin, const Vec3f& direction, float t_min,
                    float t_max, float time) const;
@@ -438,6 +438,14 @@ inline void RenderScene::intersect(RTCScene scene, RayBundle& bundle, std::size_
     if (rays.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
     hits.instance[to] = instances_[rays.hit.geomID[i]].get();
     hits.instance[to]->shading->prefetch(std::uint32_t(hits.triangle[to]));
+  }
+}
+
+inline void RenderScene::intersect(RTCScene scene, const BatchRays& rays, BatchHits& hits) const {
+  RayBundle bundle;
+  for (std::size_t begin = 0; begin < rays.count; begin += RayBundle::kSize) {
+    bundle.take(rays, begin);
+    intersect(scene, bundle, begin, hits);
   }
 }
 

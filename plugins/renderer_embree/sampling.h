@@ -21,12 +21,17 @@ inline float luminance(const Vec3f& rgb) {
   return 0.2126f * rgb.x() + 0.7152f * rgb.y() + 0.0722f * rgb.z();
 }
 
-/// `is_first ? a : b`, in a form that compilers never turn into a branch, which would keep loops
+/// `condition ? a : b`, in a form that compilers never turn into a branch, which would keep loops
 /// around it from becoming vector code.
-inline float choose(bool is_first, float a, float b) {
-  const std::int32_t mask = -std::int32_t(is_first);
+inline float select(bool condition, float a, float b) {
+  const std::int32_t mask = -std::int32_t(condition);
   return std::bit_cast<float>((std::bit_cast<std::int32_t>(a) & mask) |
                               (std::bit_cast<std::int32_t>(b) & ~mask));
+}
+
+inline Vec3f select(bool condition, const Vec3f& a, const Vec3f& b) {
+  return {select(condition, a.x(), b.x()), select(condition, a.y(), b.y()),
+          select(condition, a.z(), b.z())};
 }
 
 /// v at unit length; v is not zero. One division instead of three.
@@ -79,9 +84,9 @@ inline CosSin unit_circle(float turns) {
   const auto quarter = std::bit_cast<std::uint32_t>(shifted);
   const CosSin p = cos_sin_small((turns - 0.25f * (shifted - kRounds)) * (2.0f * kPiF));
   const bool is_odd = (quarter & 1) != 0;
-  const float cosine = choose(is_odd, -p.sine, p.cosine);
-  const float sine = choose(is_odd, p.cosine, p.sine);
-  const float sign = choose((quarter & 2) != 0, -1.0f, 1.0f);
+  const float cosine = select(is_odd, -p.sine, p.cosine);
+  const float sine = select(is_odd, p.cosine, p.sine);
+  const float sign = select((quarter & 2) != 0, -1.0f, 1.0f);
   return {sign * cosine, sign * sine};
 }
 
@@ -90,12 +95,12 @@ inline Vec2f disk_from_square(const Vec2f& u) {
   const float a = 2.0f * u.x() - 1.0f;
   const float b = 2.0f * u.y() - 1.0f;
   const bool is_wide = std::abs(a) > std::abs(b);
-  const float r = choose(is_wide, a, b);
-  const float other = choose(is_wide, b, a);
-  const CosSin p = cos_sin_small(0.25f * kPiF * (other / choose(r == 0.0f, 1.0f, r)));
+  const float r = select(is_wide, a, b);
+  const float other = select(is_wide, b, a);
+  const CosSin p = cos_sin_small(0.25f * kPiF * (other / select(r == 0.0f, 1.0f, r)));
   const float along = r * p.cosine;
   const float across = r * p.sine;
-  return {choose(is_wide, along, across), choose(is_wide, across, along)};
+  return {select(is_wide, along, across), select(is_wide, across, along)};
 }
 
 /// Density cos(theta) / pi.

@@ -41,10 +41,7 @@ class SkyGrid {
   /// Luminance times solid angle of what a cell sees.
   float power(std::uint32_t cell) const { return powers_[cell]; }
   void find_powers(const BatchInts& cells, std::size_t size, BatchFloats& powers) const {
-    const float* from = powers_.data();
-    BatchFloats found;
-    for (std::size_t i = 0; i < size; ++i) found[i] = from[cells[i]];
-    std::copy_n(found.begin(), size, powers.begin());
+    gather(powers_, cells, size, powers);
   }
 
   struct Choice {

@@ -151,8 +151,7 @@ TEST_CASE("a hit tells of the triangle at its place, in either half of a quad", 
       p[k] = world_from_node * mesh.positions[corners[k]].cast<double>();
     }
     const Vec3 normal = (p[1] - p[0]).cross(p[2] - p[0]);
-    RayBundle bundle;
-    bundle.clear();
+    BatchRays rays;
     std::vector<RayHit> hits;
     std::vector<std::array<double, 3>> weights;
     for (int i = 0; i < RayBundle::kSize; ++i) {
@@ -164,10 +163,14 @@ TEST_CASE("a hit tells of the triangle at its place, in either half of a quad", 
       const Vec3 direction = (i % 2 == 0 ? 1.0 : -1.0) * normal.normalized();
       const Vec3f origin = (place - 0.01 * direction).cast<float>();
       hits.push_back(scene.intersect(origin, direction.cast<float>(), 0.0f, 0.02f, kMoment));
-      bundle.add(origin, direction.cast<float>(), 0.0f, 0.02f, kMoment);
+      rays.add(origin, direction.cast<float>(), 0.0f, 0.02f, kMoment);
+    }
+    // Once more, as the second bundle of the batch.
+    for (std::size_t i = 0; i < RayBundle::kSize; ++i) {
+      rays.add(rays.origin.at(i), rays.direction.at(i), rays.t_min[i], rays.t_max[i], rays.time[i]);
     }
     BatchHits batch;
-    scene.intersect(bundle, 8, batch);
+    scene.intersect(rays, batch);
     for (std::size_t i = 0; i < 2 * RayBundle::kSize; ++i) {
       const std::size_t ray = i % RayBundle::kSize;
       const RayHit hit = i < RayBundle::kSize ? hits[ray] : batch.at(8 + ray);
