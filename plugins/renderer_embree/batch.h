@@ -34,6 +34,7 @@ struct BatchVectors {
 /// Rays of a batch, side by side.
 struct BatchRays {
   std::size_t count = 0;
+  bool is_coherent = false;  ///< Neighbours go nearly the same way.
   BatchVectors origin;
   BatchVectors direction;  ///< Unit.
   BatchFloats t_min, t_max;

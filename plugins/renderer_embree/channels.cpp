@@ -239,6 +239,7 @@ void fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshe
     std::array<int, kBatch> columns;
     std::array<CameraRay, kBatch> camera_rays;
     BatchRays rays;
+    rays.is_coherent = true;
     BatchHits hits;
     // A whole batch is traced before its surfaces are looked at: they are fetched meanwhile.
     for (int begin = 0; begin < width; begin += int(kBatch)) {

@@ -195,7 +195,7 @@ Film EmbreeRenderer::trace_at_once(const PathTracer& tracer, SamplePlan& plan, i
     const FlushDenormals flush;
     const TraceJob& job = jobs[i];
     const int columns = job.x_end - job.x_begin;
-    std::vector<PixelSum> sums(std::size_t(columns * (job.y_end - job.y_begin)));
+    std::vector<PixelSum> sums(job.pixel_count());
     totals.add(tracer.trace(job, sums.data(), std::size_t(columns)));
     const PixelSum* sum = sums.data();
     for (int y = job.y_begin; y < job.y_end; ++y) {

@@ -15,6 +15,9 @@ namespace {
 // the same (measured); short paths leave more time for denoised pictures' pixels.
 constexpr float kContinuation = 0.7f;
 
+// Samples of one pixel that are traced side by side: their first rays go nearly the same way.
+constexpr std::uint32_t kRun = 8;
+
 }  // namespace
 
 PathTracer::PathTracer(const RenderScene& scene, const View& view, const TraceSettings& settings,
@@ -63,26 +66,29 @@ inline RayCounts PathTracer::trace_all(const TraceJob& job, PixelSum* sums,
   std::array<PixelSum*, kBatch> pixels;
   BatchFloats columns{};
   BatchFloats rows{};
-  const int width = job.x_end - job.x_begin;
-  const int area = width * (job.y_end - job.y_begin);
-  int next = 0;
-  std::uint32_t sample = job.sample_begin;
-  while (sample < job.sample_end) {
-    paths.clear();
-    while (sample < job.sample_end && paths.size() < kBatch) {
-      const int x = job.x_begin + next % width;
-      const int y = job.y_begin + next / width;
-      pixels[paths.size()] = &sums[std::size_t(next / width) * stride + std::size_t(next % width)];
-      paths.emplace_back(PathSampler(job.order.place(x, y, sample)));
-      columns[paths.size() - 1] = float(x);
-      rows[paths.size() - 1] = float(y);
-      if (++next < area) continue;
-      next = 0;
-      ++sample;
+  const auto add_path = [&](int x, int y, std::uint32_t sample) {
+    const std::size_t i = paths.size();
+    const auto row = std::size_t(y - job.y_begin);
+    pixels[i] = &sums[row * stride + std::size_t(x - job.x_begin)];
+    paths.emplace_back(PathSampler(job.order.place(x, y, sample)));
+    columns[i] = float(x);
+    rows[i] = float(y);
+  };
+  std::uint64_t left = job.path_count();
+  for (std::uint32_t begin = job.sample_begin; begin < job.sample_end; begin += kRun) {
+    const std::uint32_t end = std::min(begin + kRun, job.sample_end);
+    for (int y = job.y_begin; y < job.y_end; ++y) {
+      for (int x = job.x_begin; x < job.x_end; ++x) {
+        for (std::uint32_t sample = begin; sample < end; ++sample) {
+          add_path(x, y, sample);
+          if (--left > 0 && paths.size() < kBatch) continue;
+          start_paths(paths, columns, rows, batch);
+          trace_batch<kTogether>(batch);
+          for (std::size_t i = 0; i < paths.size(); ++i) pixels[i]->add(paths[i].result);
+          paths.clear();
+        }
+      }
     }
-    start_paths(paths, columns, rows, batch);
-    trace_batch<kTogether>(batch);
-    for (std::size_t i = 0; i < paths.size(); ++i) pixels[i]->add(paths[i].result);
   }
   return batch.counts;
 }
@@ -100,6 +106,7 @@ inline void PathTracer::start_paths(std::vector<Path>& paths, const BatchFloats&
     y[i] = rows[i] + (hits ? 0.5f : u.y());
   }
   v.rays.count = 0;
+  v.rays.is_coherent = !view_.has_aperture() && !view_.has_shutter();
   for (std::size_t i = 0; i < paths.size(); ++i) {
     Path& path = paths[i];
     const Vec2f aperture = view_.has_aperture() ? numbers.pair(i, 1) : Vec2f(Vec2f::Zero());

@@ -51,6 +51,11 @@ struct TraceJob {
   std::uint32_t sample_begin = 0;
   std::uint32_t sample_end = 1;
   SampleOrder order{0, 1};
+
+  std::uint32_t pixel_count() const { return std::uint32_t((x_end - x_begin) * (y_end - y_begin)); }
+  std::uint64_t path_count() const {
+    return std::uint64_t(pixel_count()) * (sample_end - sample_begin);
+  }
 };
 
 struct RayCounts {

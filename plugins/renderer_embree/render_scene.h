@@ -268,7 +268,8 @@ class RenderScene {
   static RTCRayHit make_ray(const Vec3f& origin, const Vec3f& direction, float t_min, float t_max,
                             float time);
   void intersect(RTCScene scene, const BatchRays& rays, BatchHits& hits) const;
-  void intersect(RTCScene scene, RayBundle& rays, std::size_t begin, BatchHits& hits) const;
+  void intersect(RTCScene scene, RayBundle& rays, bool is_coherent, std::size_t begin,
+                 BatchHits& hits) const;
   RayHit intersect(RTCScene scene, const Vec3f& origin, const Vec3f& direction, float t_min,
                    float t_max, float time) const;
   template <int kWidth, class Lit>
@@ -411,13 +412,13 @@ inline void RaysTogether<kWidth>::finish(std::uint32_t mask) {
   }
 }
 
-inline void RenderScene::intersect(RTCScene scene, RayBundle& bundle, std::size_t begin,
-                                   BatchHits& hits) const {
+inline void RenderScene::intersect(RTCScene scene, RayBundle& bundle, bool is_coherent,
+                                   std::size_t begin, BatchHits& hits) const {
   bundle.finish(~0u);
   RTCRayHit8& rays = bundle.rays_;
   embree::Context context;
   embree::init(context);
-  embree::intersect(bundle.valid_.data(), scene, context, rays);
+  embree::intersect(bundle.valid_.data(), scene, context, rays, is_coherent);
   for (std::size_t i = 0; i < RayBundle::kSize; ++i) {
     const std::size_t to = begin + i;
     const bool is_met = rays.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
@@ -445,7 +446,7 @@ inline void RenderScene::intersect(RTCScene scene, const BatchRays& rays, BatchH
   RayBundle bundle;
   for (std::size_t begin = 0; begin < rays.count; begin += RayBundle::kSize) {
     bundle.take(rays, begin);
-    intersect(scene, bundle, begin, hits);
+    intersect(scene, bundle, rays.is_coherent, begin, hits);
   }
 }
 

@@ -35,9 +35,7 @@ class SamplePlan {
   struct Block {
     TraceJob job;  ///< sample_end: samples taken.
     std::uint32_t wanted = 0;
-    std::uint32_t pixels() const {
-      return std::uint32_t((job.x_end - job.x_begin) * (job.y_end - job.y_begin));
-    }
+    std::uint32_t pixels() const { return job.pixel_count(); }
   };
 
   void want_by_error(const Image<PixelSum>& sums);

@@ -16,6 +16,7 @@
 #include "framework/bench/cpu_time.h"
 #include "framework/bench/picture_error.h"
 #include "framework/images/linear_picture.h"
+#include "sample_plan.h"
 #include "support/render_host/render_host.h"
 
 namespace {
@@ -29,8 +30,8 @@ double thread_seconds() {
   return double(now.tv_sec) + 1e-9 * double(now.tv_nsec);
 }
 
-/// Traces the picture's middle, then the very same rays by Embree alone, in turns on one thread;
-/// returns the share of the time that the rays need.
+/// Traces the blocks in the picture's middle as for a picture, then the very same rays by Embree
+/// alone, in turns on one thread; returns the share of the time that the rays need.
 double share_of_raw_rays(const Scene& scene, NodeId camera, Host& host,
                          const EmbreeRenderer::Params& params) {
   const Isa isa = isa_by_name(params.isa);
@@ -41,22 +42,28 @@ double share_of_raw_rays(const Scene& scene, NodeId camera, Host& host,
   TraceSettings settings{params.max_bounces, float(params.clamp), params.caustics};
   const int width = view.camera().width;
   const int height = view.camera().height;
-  TraceJob job;
-  job.x_begin = width / 4;
-  job.x_end = 3 * width / 4;
-  job.y_begin = height / 4;
-  job.y_end = 3 * height / 4;
-  std::vector<PixelSum> sums(std::size_t(width) * std::size_t(height));
+  const int samples = std::min(params.samples, 16);
+  std::vector<TraceJob> jobs = SamplePlan(width, height, {samples}, 1).next_round({}, 0.0);
+  std::erase_if(jobs, [&](const TraceJob& job) {
+    return job.x_begin < width / 4 || job.x_end > 3 * width / 4 || job.y_begin < height / 4 ||
+           job.y_end > 3 * height / 4;
+  });
+  const auto trace = [&](const PathTracer& tracer) {
+    for (const TraceJob& job : jobs) {
+      std::vector<PixelSum> sums(job.pixel_count());
+      tracer.trace(job, sums.data(), std::size_t(job.x_end - job.x_begin));
+    }
+  };
   std::vector<LoggedRay> rays;
   settings.ray_log = &rays;
-  PathTracer(meshes, view, settings, isa).trace(job, sums.data(), std::size_t(width));
+  trace(PathTracer(meshes, view, settings, isa));
   settings.ray_log = nullptr;
   const PathTracer tracer(meshes, view, settings, isa);
   std::vector<double> shares;
   std::size_t hits = 0;
   for (int i = 0; i < 5; ++i) {
     double start = thread_seconds();
-    tracer.trace(job, sums.data(), std::size_t(width));
+    trace(tracer);
     const double paths = thread_seconds() - start;
     start = thread_seconds();
     for (const LoggedRay& ray : rays) {

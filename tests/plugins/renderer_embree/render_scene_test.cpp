@@ -116,6 +116,53 @@ const std::vector<Vec2> kPlaces{{0.9, 0.1},  {0.1, 0.9},  {0.7, 0.3}, {0.35, 0.6
 
 }  // namespace
 
+TEST_CASE("rays traced together meet what each meets alone, said to be coherent or not", "[rays]") {
+  TestWorld world;
+  world.add("patchwork", patchwork(), Material(), at(-0.7, -0.4, 0.0));
+  for (int i = 0; i < 12; ++i) {
+    const double angle = 0.5 * i;
+    world.add("ball" + std::to_string(i), make_sphere(0.12, 16), matte(0.5f),
+              at(std::cos(angle), 0.7 * std::sin(angle), 0.03 * i));
+  }
+  RenderHost host(1);
+  RenderScene scene(host, {});
+  scene.take(world.scene);
+  Rng rng(3);
+  const auto within = [&](double range) { return rng.uniform(-range, range); };
+  int met = 0;
+  for (int fan = 0; fan < 300; ++fan) {
+    const Affine world_from_base = world.scene.world_from_node(world.base);
+    const Vec3 eye(within(2.0), within(2.0), rng.uniform(0.3, 2.0));
+    const Vec3 target(within(0.9), within(0.9), 0.0);
+    // From rays of one pixel to rays that go everywhere.
+    const double spread = std::pow(10.0, rng.uniform(-3.0, 1.0));
+    BatchRays rays;
+    rays.is_coherent = fan % 3 != 0;
+    const int count = 1 + fan % 19;
+    for (int i = 0; i < count; ++i) {
+      const Vec3 direction = target - eye + spread * Vec3(within(1.0), within(1.0), within(1.0));
+      rays.add((world_from_base * eye).cast<float>(),
+               (world_from_base.linear() * direction.normalized()).cast<float>(), 0.0f,
+               i % 7 == 6 ? 0.8f : kInfinite, kMoment);
+    }
+    BatchHits batch;
+    scene.intersect(rays, batch);
+    for (std::size_t i = 0; i < rays.count; ++i) {
+      CAPTURE(fan, i);
+      const RayHit alone = scene.intersect(rays.origin.at(i), rays.direction.at(i), rays.t_min[i],
+                                           rays.t_max[i], kMoment);
+      REQUIRE(batch.instance[i] == alone.instance);
+      if (!alone) continue;
+      ++met;
+      CHECK(batch.distance[i] == Approx(alone.distance));
+      CHECK(batch.triangle[i] == std::int32_t(alone.triangle));
+      CHECK(batch.u[i] == Approx(alone.u).margin(1e-4));
+      CHECK(batch.v[i] == Approx(alone.v).margin(1e-4));
+    }
+  }
+  CHECK(met > 1000);
+}
+
 TEST_CASE("a hit tells of the triangle at its place, in either half of a quad", "[rays]") {
   const bool is_moving = GENERATE(false, true);
   CAPTURE(is_moving);
