@@ -36,6 +36,8 @@ SquareDistribution::SquareDistribution(const std::vector<float>& weights, int wi
 
 namespace {
 
+constexpr int kMostPerPatch = 64;  // cells along each side
+
 /// The table merged into cells twice as large as long as that costs little: large tables do not fit
 /// into the processor's caches, and most of a sky is smooth.
 SquareDistribution smallest_table(std::vector<float> weights, int width, int height) {
@@ -107,10 +109,12 @@ std::vector<float> lightness(const MipTexture& image, int width, int height) {
 
 }  // namespace
 
-DomeTexture::DomeTexture(std::shared_ptr<const Texture> source) : image_(std::move(source)) {
-  // A grid of cells over the image, whole cells per patch, no finer than 1024 x 512.
-  const int per_patch_x = std::clamp(image_.width() / kColumns, 2, 64);
-  const int per_patch_y = std::clamp(image_.height() / kRows, 2, 64);
+// Smaller versions serve lightness() alone.
+DomeTexture::DomeTexture(std::shared_ptr<const Texture> source)
+    : image_(std::move(source), kColumns * kMostPerPatch) {
+  // A grid of cells over the image, whole cells per patch.
+  const int per_patch_x = std::clamp(image_.width() / kColumns, 2, kMostPerPatch);
+  const int per_patch_y = std::clamp(image_.height() / kRows, 2, kMostPerPatch);
   const int width = per_patch_x * kColumns;
   const int height = per_patch_y * kRows;
   // Lookups are bilinear, so a cell also shines with a part of its neighbours.

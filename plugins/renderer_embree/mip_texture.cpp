@@ -73,7 +73,8 @@ std::vector<T> halved(const std::vector<T>& from, const Size& size, int channels
 
 }  // namespace
 
-MipTexture::MipTexture(std::shared_ptr<const Texture> source) : source_(std::move(source)) {
+MipTexture::MipTexture(std::shared_ptr<const Texture> source, int wide_enough)
+    : source_(std::move(source)) {
   check(*source_);
   const bool is_srgb = source_->color_space == ColorSpace::Srgb;
   for (std::size_t i = 0; i < 256; ++i) {
@@ -81,7 +82,10 @@ MipTexture::MipTexture(std::shared_ptr<const Texture> source) : source_(std::mov
     linear_from_byte_[i] = is_srgb ? linear_from_srgb(value) : value;
   }
   levels_.push_back({source_->width, source_->height, {}, {}});
-  while (levels_.back().width > 1 || levels_.back().height > 1) add_level();
+  while (levels_.back().width > wide_enough &&
+         (levels_.back().width > 1 || levels_.back().height > 1)) {
+    add_level();
+  }
 }
 
 void MipTexture::add_level() {

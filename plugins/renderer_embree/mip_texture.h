@@ -19,7 +19,8 @@ using Rgba = Eigen::Array4f;
 /// textures stay 8-bit. Immutable; lookups from any thread.
 class MipTexture {
  public:
-  explicit MipTexture(std::shared_ptr<const Texture> source);
+  /// The first version that is no wider than `wide_enough` is the last.
+  explicit MipTexture(std::shared_ptr<const Texture> source, int wide_enough = 0);
 
   int width() const { return levels_[0].width; }
   int height() const { return levels_[0].height; }
