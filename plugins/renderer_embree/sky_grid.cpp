@@ -14,7 +14,7 @@ constexpr int kMostRaysPerPatch = 48;
 // The grid may be wrong: what a cell does not see but its neighbour does gets a good share of the
 // samples, and everything else a small one.
 constexpr float kNeighbourShare = 0.05f;
-constexpr float kUnseenShare = 0.001f;
+constexpr float kUnseenShare = 0.003f;
 
 float fraction(std::uint64_t bits) { return float(bits >> 40) * 0x1p-24f; }
 
