@@ -14,6 +14,9 @@ namespace diorama::embree {
 // Rays that are coherent, neighbours going nearly the same way, are traced faster when it is said.
 
 #ifdef DIORAMA_EMBREE_4
+// Trees over more than four quads that Embree 4.3 fits to moved vertices find hits where nothing
+// is.
+inline constexpr bool kTakesQuads = false;
 using Context = RTCRayQueryContext;
 inline void init(Context& context) { rtcInitRayQueryContext(&context); }
 inline void intersect(RTCScene scene, Context& context, RTCRayHit& ray) {
@@ -49,6 +52,7 @@ inline void occluded(const int* valid, RTCScene scene, Context& context, RTCRay1
   rtcOccluded16(valid, scene, &rays, &arguments);
 }
 #else
+inline constexpr bool kTakesQuads = true;
 using Context = RTCIntersectContext;
 inline void init(Context& context) { rtcInitIntersectContext(&context); }
 inline void intersect(RTCScene scene, Context& context, RTCRayHit& ray) {

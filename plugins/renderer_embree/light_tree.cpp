@@ -21,7 +21,14 @@ void LightTree::set_lane(Block& block, std::uint32_t lane, const Light& light, s
   block.direction_x[lane] = light.direction.x();
   block.direction_y[lane] = light.direction.y();
   block.direction_z[lane] = light.direction.z();
-  block.one_sided[lane] = light.is_one_sided ? 1.0f : 0.0f;
+  // From 1 in the direction to 0 where the last of its surface turns away: a straight line for flat
+  // lights, bent for wider ones.
+  const bool has_direction = light.spread <= 1.0f;
+  block.spread[lane] = has_direction ? light.spread : 0.0f;
+  block.depth[lane] = light.depth;
+  block.behind[lane] = light.behind;
+  block.slope[lane] = has_direction ? 1.0f / (1.0f + light.spread) : 0.0f;
+  block.base[lane] = has_direction ? light.spread / (1.0f + light.spread) : 1.0f;
   block.child[lane] = child;
 }
 

@@ -27,9 +27,15 @@ class LightTree {
   struct Light {
     Vec3f position = Vec3f::Zero();
     float radius = 0.0f;                ///< Of a sphere around it.
-    Vec3f direction = -Vec3f::UnitZ();  ///< That a one-sided light shines along, unit.
-    bool is_one_sided = false;
-    float power = 0.0f;  ///< Luminous weight.
+    Vec3f direction = -Vec3f::UnitZ();  ///< That it shines along, unit.
+    /// Sine of the widest angle between the direction and a normal of its surface; above 1: it
+    /// shines all around.
+    float spread = 2.0f;
+    /// A place from which none of the surface can be seen from its front lies further than this
+    /// behind the position, plus spread times its distance.
+    float depth = 0.0f;
+    float behind = 0.0f;  ///< Share of its power that such a place is thought to get.
+    float power = 0.0f;   ///< Luminous weight.
   };
 
   static constexpr std::size_t kLanes = 8;
@@ -60,7 +66,9 @@ class LightTree {
   using Lanes = std::array<float, kLanes>;
   struct Block {
     alignas(32) Lanes x{}, y{}, z{}, radius{}, power{};
-    Lanes direction_x{}, direction_y{}, direction_z{}, one_sided{};
+    Lanes direction_x{}, direction_y{}, direction_z{};
+    // What leaves the light, by the cosine of its direction.
+    Lanes depth{}, slope{}, base{}, spread{}, behind{};
     /// A light, or ~index of a block. Lanes without one have no power.
     std::array<std::int32_t, kLanes> child{};
     std::uint32_t count = 0;
@@ -102,8 +110,9 @@ inline float LightTree::score(const Block& b, std::uint32_t i, const Receiver& r
   const float at_receiver = cosine > 0.0f ? std::max(kFloor, std::min(1.0f, cosine)) : 0.0f;
   const float height =
       -(to.x() * b.direction_x[i] + to.y() * b.direction_y[i] + to.z() * b.direction_z[i]);
-  const float at_flat_light = height > 0.0f ? std::max(kFloor, height * scale) : 0.0f;
-  const float at_light = b.one_sided[i] > 0.0f ? at_flat_light : 1.0f;
+  const float facing = std::min(1.0f, b.slope[i] * ((height + b.depth[i]) * scale) + b.base[i]);
+  const float shining = facing * (1.0f + b.spread[i] * (facing - 1.0f));
+  const float at_light = facing > 0.0f ? std::max(kFloor, shining) : b.behind[i];
   return b.power[i] * at_receiver * at_light * scale * scale;
 }
 

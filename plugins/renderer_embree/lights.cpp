@@ -15,11 +15,10 @@ void Lights::finish() {
       surroundings_.push_back(i);
       continue;
     }
-    const bool is_flat = r.shape == Shape::Rect || r.shape == Shape::Disk;
     order_[i] = std::uint32_t(bodies_.size());
     bodies_.push_back(i);
     if (r.shape != Shape::Triangles) shapes_.push_back(i);
-    placed.push_back({r.position, r.radius, r.direction, is_flat, r.power});
+    placed.push_back({r.position, r.radius, r.direction, r.spread, r.depth, r.behind, r.power});
   }
   tree_ = LightTree(placed);
   for (const Record& light : lights_) columns_.add(light);
@@ -71,6 +70,7 @@ void Lights::add(const Light& light, const Affine& world_from_node,
       const Vec3f normal = r.axis_x.cross(r.axis_y);
       r.area = normal.norm() * (is_disk ? kPiF : 4.0f);
       r.radius = std::max(r.axis_x.norm(), r.axis_y.norm()) * (is_disk ? 1.0f : 1.41422f);
+      r.spread = 0.0f;
       // The plane's own normal: a sheared node's -z is not perpendicular to it.
       if (r.area > 0.0f) {
         r.direction = normal.normalized() * (normal.dot(r.direction) < 0.0f ? -1.0f : 1.0f);
@@ -104,6 +104,30 @@ void Lights::learn_sky(const GridOf& grid_of) {
   }
 }
 
+void Lights::find_direction(Record& light) {
+  const auto normal_of = [&](const EmittingTriangles::Triangle& t) -> Vec3f {
+    return t.ab.cross(t.ac) * (light.is_mirrored ? -1.0f : 1.0f);
+  };
+  Vec3f sum = Vec3f::Zero();
+  for (const auto& t : light.triangles) sum += normal_of(t);
+  if (!(sum.norm() > 0.0f)) return;
+  const Vec3f direction = sum.normalized();
+  float cosine = 1.0f;
+  float depth = 0.0f;
+  for (const auto& t : light.triangles) {
+    cosine = std::min(cosine, direction.dot(normal_of(t).normalized()));
+    for (const Vec3f& corner : {t.a, Vec3f(t.a + t.ab), Vec3f(t.a + t.ac)}) {
+      depth = std::max(depth, std::abs(direction.dot(corner - light.position)));
+    }
+  }
+  if (cosine <= 0.0f) return;
+  light.direction = direction;
+  light.spread = std::sqrt(std::max(0.0f, 1.0f - cosine * cosine));
+  light.depth = depth + light.spread * light.radius;
+  light.behind = light.is_double_sided ? 0.02f : 0.0f;
+  light.power *= 2.0f;
+}
+
 std::uint32_t Lights::add(EmittingTriangles source) {
   Record r;
   r.shape = Shape::Triangles;
@@ -128,6 +152,7 @@ std::uint32_t Lights::add(EmittingTriangles source) {
     r.radius = float(0.5 * bounds.size().norm());
   }
   r.power = 0.5f * luminance(r.radiance) * r.area;
+  if (!r.is_double_sided || source.is_closed) find_direction(r);
   lights_.push_back(std::move(r));
   return std::uint32_t(lights_.size() - 1);
 }

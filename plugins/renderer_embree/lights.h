@@ -25,7 +25,9 @@ struct EmittingTriangles {
   std::vector<Triangle> triangles;
   std::uint32_t geometry = 0;
   bool is_double_sided = true;
-  bool is_mirrored = false;  ///< The front is where the corners run clockwise.
+  /// Of a double-sided lamp: its inner side is hardly seen from anywhere.
+  bool is_closed = false;
+  bool is_mirrored = false;  ///< The front, or outside, is where the corners run clockwise.
   Vec3f mean_radiance = Vec3f::Zero();
 };
 
@@ -51,9 +53,12 @@ class Lights {
     float radius = 0.0f;                ///< Of the sphere, or of a sphere around the body.
     float area = 0.0f;
     Vec3f radiance = Vec3f::Zero();  ///< Irradiance for a distant light of zero size.
-    float power = 0.0f;              ///< Luminous weight in scores.
-    float one_minus_cos = 0.0f;      ///< Distant: of its angular radius.
-    float cos_outer = -2.0f;         ///< Cone; below -1: none.
+    float spread = 2.0f;             ///< See LightTree.
+    float depth = 0.0f;
+    float behind = 0.0f;
+    float power = 0.0f;          ///< Luminous weight in scores.
+    float one_minus_cos = 0.0f;  ///< Distant: of its angular radius.
+    float cos_outer = -2.0f;     ///< Cone; below -1: none.
     float cos_inner = -2.0f;
     bool is_double_sided = true;
     bool is_mirrored = false;
@@ -180,6 +185,8 @@ class Lights {
   static bool is_body(const Record& light) {
     return light.shape != Shape::Distant && light.shape != Shape::Dome;
   }
+  /// Of triangles that shine on one side only, or nearly so, and face similar ways.
+  static void find_direction(Record& light);
   static bool is_near(const Record& light, const Vec3f& from, const Vec3f& direction);
   static float score_of_distant(const Record& light, const Vec3f& normal, bool is_two_sided);
   static float score_of_surroundings(const Record& light, const Receiver& receiver);

@@ -76,7 +76,7 @@ void PathTracer::collect_emission(Path& path, const Vec3f& direction, const RayH
   if (surface.is_back && !hit.instance->mesh->is_double_sided) return;
   const Vec3f radiance = material.emission_at(surface.uv, path.width * surface.uv_per_metre);
   float weight = 1.0f;
-  const std::uint32_t light = hit.instance->slot_lights[hit.instance->slot(hit.triangle)];
+  const std::uint32_t light = hit.instance->triangle_lights[hit.triangle];
   if (!is_first && settings_.samples_lights && light != MeshInstance::kNoLight) {
     const float cosine = surface.flat_normal.dot(direction);
     const float rival = scene_.lights().probability(light, path.last) *

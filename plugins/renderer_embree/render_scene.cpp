@@ -240,7 +240,6 @@ void RenderScene::assign_materials(const Scene& scene) {
       const bool is_set = i < assigned.size() && assigned[i];
       instance->materials.push_back(materials_.at(is_set ? assigned[i] : default_material_));
     }
-    instance->slot_lights.assign(instance->materials.size(), MeshInstance::kNoLight);
   }
 }
 
@@ -368,9 +367,27 @@ Aabb RenderScene::place(const Mesh& mesh, const Affine& pose, std::vector<float>
   return {low.cast<double>(), high.cast<double>()};
 }
 
-void RenderScene::set_quads(const ShadingMesh& mesh, RTCGeometry geometry) {
-  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT4,
-                             mesh.quads().data(), 0, sizeof(mesh.quads()[0]), mesh.quads().size());
+/// The mesh's triangles, as yet without vertices.
+RTCGeometry RenderScene::new_geometry(const ShadingMesh& mesh) const {
+  const auto& quads = mesh.quads();
+  if constexpr (embree::kTakesQuads) {
+    RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_QUAD);
+    rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT4, quads.data(),
+                               0, sizeof(quads[0]), quads.size());
+    return geometry;
+  } else {
+    using Corners = std::array<std::uint32_t, 3>;
+    RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
+    void* room = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                         sizeof(Corners), 2 * quads.size());
+    check_device("make a geometry");
+    auto* corners = static_cast<Corners*>(room);
+    for (const auto& [a, b, c, d] : quads) {
+      *corners++ = {a, b, d};
+      *corners++ = {c, d, b};
+    }
+    return geometry;
+  }
 }
 
 Vec3f MeshInstance::turned(const Vec3f& direction, float time) const {
@@ -419,7 +436,7 @@ void RenderScene::add_moving_geometry(std::uint32_t index) {
   const int half = int(std::clamp(std::ceil(turn / kTurnPerStep), 1.0, kMostHalves));
   const unsigned steps = 2 * unsigned(half) + 1;
   const Mesh& mesh = *instance.mesh;
-  RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_QUAD);
+  RTCGeometry geometry = new_geometry(*instance.shading);
   rtcSetGeometryMask(geometry, kMovableMask);
   rtcSetGeometryTimeStepCount(geometry, steps);
   instance.blurred_positions.resize(steps);
@@ -431,7 +448,6 @@ void RenderScene::add_moving_geometry(std::uint32_t index) {
     rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, step, RTC_FORMAT_FLOAT3,
                                positions.data(), 0, 3 * sizeof(float), mesh.positions.size());
   }
-  set_quads(*instance.shading, geometry);
   rtcSetGeometryUserData(geometry, &instance);
   set_filters(instance, geometry);
   rtcCommitGeometry(geometry);
@@ -441,7 +457,7 @@ void RenderScene::add_moving_geometry(std::uint32_t index) {
 
 RTCGeometry RenderScene::make_geometry(MeshInstance& instance) const {
   const Mesh& mesh = *instance.mesh;
-  RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_QUAD);
+  RTCGeometry geometry = new_geometry(*instance.shading);
   // Refit: built once, then fitted.
   rtcSetGeometryBuildQuality(
       geometry, instance.is_movable ? RTC_BUILD_QUALITY_REFIT : RTC_BUILD_QUALITY_MEDIUM);
@@ -449,7 +465,6 @@ RTCGeometry RenderScene::make_geometry(MeshInstance& instance) const {
   rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
                              instance.world_positions.data(), 0, 3 * sizeof(float),
                              mesh.positions.size());
-  set_quads(*instance.shading, geometry);
   return geometry;
 }
 
@@ -469,9 +484,49 @@ void RenderScene::add_lights(const Scene& scene) {
   }
 }
 
+namespace {
+
+/// Says whether the lamp encloses a volume, and which side is outside then.
+void find_outside(EmittingTriangles& lamp) {
+  constexpr double kOpen = 0.01;  // share of the area that a closed surface may lack
+  Vec3 sum = Vec3::Zero();
+  double area = 0.0;
+  double volume = 0.0;
+  const Vec3 inside = lamp.triangles[0].a.cast<double>();
+  for (const auto& [a, ab, ac, index] : lamp.triangles) {
+    const Vec3 normal = ab.cast<double>().cross(ac.cast<double>());
+    sum += normal;
+    area += normal.norm();
+    volume += (a.cast<double>() - inside).dot(normal);
+  }
+  lamp.is_closed = sum.norm() < kOpen * area;
+  if (lamp.is_closed) lamp.is_mirrored = volume < 0.0;
+}
+
+/// Lamps that shine to one side, or outwards, show any place but half of their surface. Triangles
+/// that face similar ways make a light of their own, so that samples go to those that shine on it.
+std::array<std::vector<EmittingTriangles::Triangle>, 8> by_facing(const EmittingTriangles& lamp) {
+  std::array<std::vector<EmittingTriangles::Triangle>, 8> groups;
+  const bool faces_all_ways = lamp.is_double_sided && !lamp.is_closed;
+  for (const EmittingTriangles::Triangle& triangle : lamp.triangles) {
+    const Vec3f normal = triangle.ab.cross(triangle.ac) * (lamp.is_mirrored ? -1.0f : 1.0f);
+    const std::size_t octant = std::size_t(normal.x() > 0.0f) |
+                               std::size_t(normal.y() > 0.0f) << 1 |
+                               std::size_t(normal.z() > 0.0f) << 2;
+    groups[faces_all_ways ? 0 : octant].push_back(triangle);
+  }
+  return groups;
+}
+
+}  // namespace
+
 void RenderScene::add_emitters() {
   for (std::size_t g = 0; g < instances_.size(); ++g) {
     MeshInstance& instance = *instances_[g];
+    const bool emits = std::ranges::any_of(instance.materials,
+                                           [](const auto* material) { return material->emits; });
+    instance.triangle_lights.assign(emits ? instance.shading->number_end() : 0,
+                                    MeshInstance::kNoLight);
     for (std::size_t slot = 0; slot < instance.materials.size(); ++slot) {
       const ShadingMaterial& material = *instance.materials[slot];
       if (!material.emits) continue;
@@ -484,6 +539,7 @@ void RenderScene::add_emitters() {
         emitting.mean_radiance = emitting.mean_radiance.cwiseProduct(
             Vec3f(material.emission.texture->texel(top, 0, 0).head<3>().matrix()));
       }
+      emitting.is_mirrored = instance.is_mirrored;
       for (std::uint32_t t = 0; t < instance.shading->number_end(); ++t) {
         if (instance.shading->is_repeated(t) || instance.slot(t) != slot) continue;
         const auto corners = instance.shading->corners(t);
@@ -492,9 +548,18 @@ void RenderScene::add_emitters() {
         const Vec3f ac = instance.vertex(corners[2]) - a;
         emitting.triangles.push_back({a, ab, ac, t});
       }
-      emitting.is_mirrored = instance.is_mirrored;
-      if (!emitting.triangles.empty())
-        instance.slot_lights[slot] = lights_.add(std::move(emitting));
+      if (emitting.triangles.empty()) continue;
+      if (emitting.is_double_sided) find_outside(emitting);
+      for (const auto& group : by_facing(emitting)) {
+        if (group.empty()) continue;
+        emitting.triangles = group;
+        const std::uint32_t light = lights_.add(emitting);
+        for (const auto& [a, ab, ac, t] : group) {
+          instance.triangle_lights[t] = light;
+          const bool is_alone = t % 2 == 0 && instance.shading->is_repeated(t + 1);
+          if (is_alone) instance.triangle_lights[t + 1] = light;
+        }
+      }
     }
   }
 }

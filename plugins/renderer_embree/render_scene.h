@@ -31,7 +31,8 @@ struct MeshInstance {
   Eigen::Matrix3f normal_from_node = Eigen::Matrix3f::Identity();
   bool is_mirrored = false;                       ///< The pose turns front sides into back sides.
   std::vector<const ShadingMaterial*> materials;  ///< Per slot.
-  std::vector<std::uint32_t> slot_lights;         ///< Per slot: number of its light or kNoLight.
+  /// Per triangle: number of its light or kNoLight. Empty where nothing emits.
+  std::vector<std::uint32_t> triangle_lights;
   NodeId node;
   std::shared_ptr<const Mesh> mesh;
   Affine world_from_node = Affine::Identity();
@@ -287,7 +288,7 @@ class RenderScene {
   static void set_filters(const MeshInstance& instance, RTCGeometry geometry);
   RTCGeometry make_geometry(MeshInstance& instance) const;
   static Aabb place(const Mesh& mesh, const Affine& pose, std::vector<float>& positions);
-  static void set_quads(const ShadingMesh& mesh, RTCGeometry geometry);
+  RTCGeometry new_geometry(const ShadingMesh& mesh) const;
   void blur(const Scene& scene);
   void release_moving_scene();
   void add_moving_geometry(std::uint32_t index);

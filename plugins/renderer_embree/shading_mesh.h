@@ -7,15 +7,17 @@
 #include <vector>
 
 #include "diorama/geometry.h"
+#include "embree.h"
 #include "triangle_pairs.h"
 
 namespace diorama {
 
 /// What tracing and shading read of a mesh, shared by its instances.
 ///
-/// Embree gets the triangles two by two, as quads. Triangles are numbered by them: 2 * quad for the
-/// first half, 2 * quad + 1 for the second. A triangle's corners begin with its tip, see
-/// TrianglePair; the weights u and v of a point belong to the second and third.
+/// Embree gets the triangles two by two, as quads (where it takes them, see embree.h). Triangles
+/// are numbered by them: 2 * quad for the first half, 2 * quad + 1 for the second. A triangle's
+/// corners begin with its tip, see TrianglePair; the weights u and v of a point belong to the
+/// second and third.
 ///
 /// A triangle without a partner has both numbers, by the second with its last two corners
 /// exchanged: rounding may put a hit on its last edge beyond it, and still finds the same place
@@ -38,9 +40,10 @@ class ShadingMesh {
   };
   /// A hit as Embree tells it, on the triangle that it belongs to. The quad's corners a, b, c, d
   /// are the triangles a, b, d and c, d, b; u leads from a to b, v from a to d.
-  static Point on_triangle(std::uint32_t quad, float u, float v) {
+  static Point on_triangle(std::uint32_t primitive, float u, float v) {
+    if constexpr (!embree::kTakesQuads) return {primitive, u, v};
     const bool is_second = u + v > 1.0f;
-    return {2 * quad + std::uint32_t(is_second), is_second ? 1.0f - u : u,
+    return {2 * primitive + std::uint32_t(is_second), is_second ? 1.0f - u : u,
             is_second ? 1.0f - v : v};
   }
 

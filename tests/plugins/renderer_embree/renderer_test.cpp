@@ -137,6 +137,43 @@ TEST_CASE("a lamp over a floor lights it by the closed form", "[renderer]") {
   CHECK(mean.z() == Approx(5.0 * per_radiance).epsilon(0.005));
 }
 
+TEST_CASE("a closed lamp is sampled where it faces what it lights", "[renderer][lights]") {
+  const bool is_double_sided = GENERATE(false, true);
+  const bool is_inside_out = GENERATE(false, true);
+  const bool is_mirrored = GENERATE(false, true);
+  CAPTURE(is_double_sided, is_inside_out, is_mirrored);
+  TestWorld world;
+  world.add("floor", make_plane(4, 5), matte(0.5f));
+  Mesh ball = make_sphere(0.3, 64);
+  ball.is_double_sided = is_double_sided;
+  if (is_inside_out) {
+    for (auto& t : ball.triangles) std::swap(t[1], t[2]);
+  }
+  Material glow = matte(0.0f);
+  glow.emission = Vec3f(20.0f, 10.0f, 5.0f);
+  Affine pose = at(0.4, -0.2, 1.5);
+  if (is_mirrored) pose.linear().col(1) *= -1.0;
+  world.add("lamp", ball, glow, pose);
+  const NodeId camera = world.add_camera(40, 30, 4000.0, Vec3(-2, 1, 2), Vec3(0.1, 0.3, 0));
+  const Image<Vec3f> image = render(world, camera, reference(1));
+  double mean = 0.0;
+  double squares = 0.0;
+  const double pixels = double(image.pixels().size());
+  for (const Vec3f& p : image.pixels()) {
+    mean += double(p.x()) / pixels;
+    squares += double(p.x()) * double(p.x()) / pixels;
+  }
+  if (is_inside_out && !is_double_sided) {
+    CHECK(mean == 0.0);
+    return;
+  }
+  const double d2 = 0.3 * 0.3 + 0.5 * 0.5 + 1.5 * 1.5;
+  const double per_radiance = 0.5 * 0.3 * 0.3 / d2 * 1.5 / std::sqrt(d2);
+  CHECK(mean == Approx(20.0 * per_radiance).epsilon(0.02));
+  // Points drawn evenly over the whole ball spread by more than 1.3 of their mean.
+  CHECK(std::sqrt(squares - mean * mean) < mean);
+}
+
 TEST_CASE("a panel with a picture lights a floor by the closed form", "[renderer]") {
   // Brighter towards one corner: the halves of the panel shine unlike each other.
   constexpr int kTexels = 8;
