@@ -112,7 +112,7 @@ inline float LightTree::score(const Block& b, std::uint32_t i, const Receiver& r
       -(to.x() * b.direction_x[i] + to.y() * b.direction_y[i] + to.z() * b.direction_z[i]);
   const float facing = std::min(1.0f, b.slope[i] * ((height + b.depth[i]) * scale) + b.base[i]);
   const float shining = facing * (1.0f + b.spread[i] * (facing - 1.0f));
-  const float at_light = facing > 0.0f ? std::max(kFloor, shining) : b.behind[i];
+  const float at_light = select(facing > 0.0f, std::max(kFloor, shining), b.behind[i]);
   return b.power[i] * at_receiver * at_light * scale * scale;
 }
 
