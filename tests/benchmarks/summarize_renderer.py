@@ -45,7 +45,7 @@ def summarize(values, materials):
     tell("64 paths at 640x480 with loading, over Cycles", whole / median("cycles_64.cpu"))
     tell("CPU seconds to load and prepare", prepare)
     tell("these over Cycles' sync", prepare / sync)
-    tell("relative squared error of 19 paths", median("ours_equal.rel_mse"))
+    tell("relative squared error of as many paths as 64 of Cycles need", median("ours_equal.rel_mse"))
     small = median("cycles_small.cpu") - sync
     tell("their time over 64 of Cycles, both once loaded", median("ours_equal.frame_cpu_s") / small)
     tell("relative squared error of 2 paths, denoised", median("ours_denoised.rel_mse"))
