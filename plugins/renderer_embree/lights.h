@@ -357,6 +357,8 @@ inline void Lights::choose(const Wishes& wishes, Choices& choices) const {
     choices.light[i] = std::int32_t(bodies_[within.light]);
     choices.probability[i] *= within.probability;
   }
+  // Loops over whole steps look up lights behind the last place, too.
+  std::fill(choices.light.begin() + std::ptrdiff_t(wishes.count), choices.light.end(), 0);
 }
 
 // Rounding may leave a number beyond the last share: then the last is taken.
