@@ -237,7 +237,6 @@ void fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshe
   host.parallel_for(std::size_t(height), [&](std::size_t row) {
     const int y = int(row);
     std::array<int, kBatch> columns;
-    std::array<CameraRay, kBatch> camera_rays;
     BatchRays rays;
     rays.is_coherent = true;
     BatchHits hits;
@@ -249,7 +248,6 @@ void fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshe
         const auto ray = view.ray(Vec2(x + 0.5, y + 0.5));
         if (!ray) continue;
         columns[rays.count] = x;
-        camera_rays[rays.count] = *ray;
         rays.add(ray->origin, ray->direction, ray->t_min, ray->t_max, kMoment);
       }
       meshes.intersect_now(rays, hits);
@@ -257,7 +255,9 @@ void fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshe
         if (!hits.instance[i]) continue;
         RayHit& hit = seen.at(columns[i], y);
         hit = hits.at(i);
-        if (!wanted.empty()) channels.put(columns[i], y, camera_rays[i], hit);
+        if (wanted.empty()) continue;
+        const CameraRay ray{rays.origin.at(i), rays.direction.at(i), rays.t_min[i], rays.t_max[i]};
+        channels.put(columns[i], y, ray, hit);
       }
     }
   });

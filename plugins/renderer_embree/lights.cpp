@@ -105,18 +105,15 @@ void Lights::learn_sky(const GridOf& grid_of) {
 }
 
 void Lights::find_direction(Record& light) {
-  const auto normal_of = [&](const EmittingTriangles::Triangle& t) -> Vec3f {
-    return t.ab.cross(t.ac) * (light.is_mirrored ? -1.0f : 1.0f);
-  };
   Vec3f sum = Vec3f::Zero();
-  for (const auto& t : light.triangles) sum += normal_of(t);
+  for (const auto& t : light.triangles) sum += t.front(light.is_mirrored);
   if (!(sum.norm() > 0.0f)) return;
   const Vec3f direction = sum.normalized();
   float cosine = 1.0f;
   float depth = 0.0f;
   for (const auto& t : light.triangles) {
-    cosine = std::min(cosine, direction.dot(normal_of(t).normalized()));
-    for (const Vec3f& corner : {t.a, Vec3f(t.a + t.ab), Vec3f(t.a + t.ac)}) {
+    cosine = std::min(cosine, direction.dot(t.front(light.is_mirrored).normalized()));
+    for (const Vec3f& corner : t.corners()) {
       depth = std::max(depth, std::abs(direction.dot(corner - light.position)));
     }
   }
@@ -143,8 +140,7 @@ std::uint32_t Lights::add(EmittingTriangles source) {
     area += size;
     r.triangles.push_back(t);
     r.cumulative_area.push_back(float(area));
-    for (const Vec3f& p : {t.a, Vec3f(t.a + t.ab), Vec3f(t.a + t.ac)})
-      bounds.add(Vec3(p.cast<double>()));
+    for (const Vec3f& corner : t.corners()) bounds.add(Vec3(corner.cast<double>()));
   }
   r.area = float(area);
   if (!bounds.is_empty()) {

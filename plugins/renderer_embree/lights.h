@@ -21,6 +21,10 @@ struct EmittingTriangles {
   struct Triangle {
     Vec3f a, ab, ac;          ///< Corner and edges.
     std::uint32_t index = 0;  ///< In its mesh.
+
+    std::array<Vec3f, 3> corners() const { return {a, a + ab, a + ac}; }
+    /// Out of the front (see is_mirrored below), twice as long as the area is large.
+    Vec3f front(bool is_mirrored) const { return ab.cross(ac) * (is_mirrored ? -1.0f : 1.0f); }
   };
   std::vector<Triangle> triangles;
   std::uint32_t geometry = 0;

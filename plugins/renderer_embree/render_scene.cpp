@@ -509,7 +509,7 @@ std::array<std::vector<EmittingTriangles::Triangle>, 8> by_facing(const Emitting
   std::array<std::vector<EmittingTriangles::Triangle>, 8> groups;
   const bool faces_all_ways = lamp.is_double_sided && !lamp.is_closed;
   for (const EmittingTriangles::Triangle& triangle : lamp.triangles) {
-    const Vec3f normal = triangle.ab.cross(triangle.ac) * (lamp.is_mirrored ? -1.0f : 1.0f);
+    const Vec3f normal = triangle.front(lamp.is_mirrored);
     const std::size_t octant = std::size_t(normal.x() > 0.0f) |
                                std::size_t(normal.y() > 0.0f) << 1 |
                                std::size_t(normal.z() > 0.0f) << 2;
@@ -533,13 +533,13 @@ void RenderScene::add_emitters() {
       EmittingTriangles emitting;
       emitting.geometry = std::uint32_t(g);
       emitting.is_double_sided = instance.mesh->is_double_sided;
+      emitting.is_mirrored = instance.is_mirrored;
       emitting.mean_radiance = material.source->emission;
       if (material.emission) {
         const int top = material.emission.texture->level_count() - 1;
         emitting.mean_radiance = emitting.mean_radiance.cwiseProduct(
             Vec3f(material.emission.texture->texel(top, 0, 0).head<3>().matrix()));
       }
-      emitting.is_mirrored = instance.is_mirrored;
       for (std::uint32_t t = 0; t < instance.shading->number_end(); ++t) {
         if (instance.shading->is_repeated(t) || instance.slot(t) != slot) continue;
         const auto corners = instance.shading->corners(t);

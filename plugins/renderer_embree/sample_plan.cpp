@@ -52,7 +52,7 @@ std::vector<TraceJob> SamplePlan::next_round(const Image<PixelSum>& sums, double
     if (wanted <= block.job.sample_end) continue;
     block.job.sample_begin = block.job.sample_end;
     block.job.sample_end = wanted;
-    paths_ += double(block.pixels()) * double(wanted - block.job.sample_begin);
+    paths_ += double(block.job.path_count());
     jobs.push_back(block.job);
   }
   return jobs;
@@ -79,8 +79,9 @@ void SamplePlan::keep_to_time(double elapsed_s) {
   double asked = 0.0;
   for (const Block& block : blocks_) {
     const std::uint32_t taken = block.job.sample_end;
-    pixels += block.pixels();
-    if (block.wanted > taken) asked += double(block.pixels()) * double(block.wanted - taken);
+    pixels += block.job.pixel_count();
+    if (block.wanted > taken)
+      asked += double(block.job.pixel_count()) * double(block.wanted - taken);
   }
   double affordable = pixels;
   if (paths_ > 0.0) {
@@ -105,7 +106,7 @@ double SamplePlan::error_of(const Block& block, const Image<PixelSum>& sums, dou
       if (scale > 0.0) sum += double(pixel.variance) / (scale * scale);
     }
   }
-  return std::sqrt(sum / double(block.pixels()));
+  return std::sqrt(sum / double(block.job.pixel_count()));
 }
 
 }  // namespace diorama

@@ -35,7 +35,6 @@ class SamplePlan {
   struct Block {
     TraceJob job;  ///< sample_end: samples taken.
     std::uint32_t wanted = 0;
-    std::uint32_t pixels() const { return job.pixel_count(); }
   };
 
   void want_by_error(const Image<PixelSum>& sums);
