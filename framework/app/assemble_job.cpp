@@ -215,15 +215,19 @@ DescribeComponent describe_from(Registry& registry) {
 }
 
 OutputFolders output_folders(const Job& job) {
-  const auto below = [&](const std::string& name) {
-    // "out/." would end in a slash.
-    fs::path place = (fs::path(job.output.folder) / name).lexically_normal();
-    return place.has_filename() ? place : place.parent_path();
+  const auto below = [&](const std::string& what, const std::string& name) {
+    const fs::path place = fs::path(name).lexically_normal();
+    const std::string text = place.has_filename() ? place.string() : place.parent_path().string();
+    if (text == "." || is_plain_relative(text)) return text;
+    throw Error(ErrorKind::Config, what + ": expected a folder below output.folder, found \"" + name +
+                                       "\"; --output chooses another place for the whole dataset");
   };
   OutputFolders folders;
-  folders.records = below(job.output.records);
+  folders.base = job.output.folder;
+  folders.records = below("output.records", job.output.records);
   for (const WriterEntry& writer : job.writers) {
-    folders.writers.push_back({writer.name, below(writer.output_dir.value_or(writer.name))});
+    folders.writers.push_back({writer.name, below("writer '" + writer.name + "': output_dir",
+                                                  writer.output_dir.value_or(writer.name))});
   }
   return folders;
 }

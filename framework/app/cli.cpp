@@ -23,8 +23,11 @@
 #include "framework/app/command_run.h"
 #include "framework/app/command_schema.h"
 #include "framework/app/command_sensors.h"
+#include "framework/app/command_status.h"
+#include "framework/app/exit_codes.h"
 #include "framework/app/options.h"
 #include "framework/host/console_log.h"
+#include "framework/output/workers.h"
 #include "framework/plugins/plugin_search.h"
 
 namespace diorama {
@@ -38,6 +41,9 @@ struct CommandLine {
   std::string assets_root;
   RunCommandOptions run;
   std::string shard;
+  std::string progress = "bar";
+  StatusOptions status;
+  std::filesystem::path finish;
   bool close_on_completion = false;
   JobOptions config;
   bool config_json = false;
@@ -97,12 +103,15 @@ void add_job_options(CLI::App& command, JobOptions& job) {
 /// "2/5": the second of five parts.
 void read_shard(const std::string& text, RunCommandOptions& run) {
   if (text.empty()) return;
+  run.takes_visits = text == "auto";
+  if (run.takes_visits) return;
   int shard = 0;
   int used = 0;
   if (std::sscanf(text.c_str(), "%8d/%8d%n", &shard, &run.shards, &used) != 2 ||
       std::size_t(used) != text.size() || shard < 1 || shard > run.shards) {
     throw Error(ErrorKind::Usage,
-                "--shard: expected i/n with 1 <= i <= n, for instance 2/5, found '" + text + "'");
+                "--shard: expected `auto`, or i/n with 1 <= i <= n, for instance 2/5, found '" +
+                    text + "'");
   }
   run.shard = shard - 1;
 }
@@ -119,15 +128,68 @@ void add_run(CLI::App& app, CommandLine& line) {
   command->add_flag("--resume", line.run.resume, "Go on with the dataset in the output folder");
   command->add_flag("--overwrite", line.run.overwrite,
                     "Remove the dataset in the output folder first");
-  command->add_option("--shard", line.shard, "Make one part of the dataset, 1/N to N/N")
+  command
+      ->add_option("--shard", line.shard,
+                   "Make one part of the dataset, 1/N to N/N; auto: visits that no other process "
+                   "has, until there are none")
       ->type_name("I/N");
+  command->add_flag("--verify", line.run.verify,
+                    "With --resume: read all files first, make anew what is missing or damaged");
+  command
+      ->add_option("--lease-timeout", line.run.lease_timeout_s,
+                   "Seconds without a sign of life after which a process of another machine counts "
+                   "as dead")
+      ->check(CLI::Range(5, 86400))
+      ->type_name("N")
+      ->capture_default_str();
+  command
+      ->add_option("--stopped-exit-code", line.run.stopped_exit_code,
+                   "Exit code when a signal stopped the run, for schedulers that start it again")
+      ->check(CLI::Range(0, 255))
+      ->type_name("N")
+      ->capture_default_str();
+  command
+      ->add_option("--progress", line.progress,
+                   "How far the run is: bar (on stderr); json, openjd (lines on stdout)")
+      ->check(CLI::IsMember({"bar", "json", "openjd"}))
+      ->type_name("FORMAT")
+      ->capture_default_str();
   command->add_flag("--dry-run", line.run.dry_run, "Check and plan the job, write nothing");
   command->add_flag("--close-on-completion", line.close_on_completion,
                     "Accepted for scripts made for Isaac Sim; the program always ends");
   command->callback([&line] {
     line.command = [&line](ConsoleLog& log) {
       read_shard(line.shard, line.run);
+      using Progress = RunCommandOptions::Progress;
+      line.run.progress = line.progress == "json"     ? Progress::Json
+                          : line.progress == "openjd" ? Progress::OpenJd
+                                                      : Progress::Bar;
       return command_run(line.global, line.run, log);
+    };
+  });
+}
+
+void add_status(CLI::App& app, CommandLine& line) {
+  CLI::App* command = app.add_subcommand("status", "Say how far a dataset is, and who works on it");
+  command->add_option("dataset", line.status.dataset, "Folder of dataset.json")
+      ->required()
+      ->type_name("FOLDER");
+  command->add_flag("--json", line.status.as_json, "As JSON");
+  command->add_flag("--verify", line.status.verify,
+                    "Read all files and say which are missing or not what was written");
+  command->callback(
+      [&line] { line.command = [&line](ConsoleLog&) { return command_status(line.status); }; });
+}
+
+void add_finish(CLI::App& app, CommandLine& line) {
+  CLI::App* command = app.add_subcommand(
+      "finish", "Write what formats need at the end of a dataset whose captures are all there");
+  command->add_option("dataset", line.finish, "Folder of dataset.json")
+      ->required()
+      ->type_name("FOLDER");
+  command->callback([&line] {
+    line.command = [&line](ConsoleLog& log) {
+      return command_finish(line.global, line.finish, log);
     };
   });
 }
@@ -411,6 +473,8 @@ void add_all(CLI::App& app, CommandLine& line) {
   app.get_formatter()->column_width(34);
   add_global_options(app, line);
   add_run(app, line);
+  add_status(app, line);
+  add_finish(app, line);
   add_config(app, line);
   add_plugins(app, line);
   add_plugins_check(app, line);
@@ -467,6 +531,8 @@ int run_program(int argc, const char* const* argv) {
     return code;
   } catch (const Error& error) {
     return report(error.what(), exit_code(error.kind()));
+  } catch (const Busy& busy) {
+    return report(busy.what(), kBusy);
   } catch (const std::bad_alloc&) {
     return report("out of memory", exit_code(ErrorKind::Internal));
   } catch (const std::exception& error) {

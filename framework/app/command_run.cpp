@@ -9,8 +9,11 @@
 
 #include "framework/app/assemble.h"
 #include "framework/app/assemble_job.h"
+#include "framework/app/exit_codes.h"
 #include "framework/app/job_file.h"
+#include "framework/config/yaml_config.h"
 #include "framework/host/progress_bar.h"
+#include "framework/host/progress_lines.h"
 #include "framework/pipeline/dataset_description.h"
 #include "framework/plugins/plugin_search.h"
 
@@ -18,8 +21,6 @@ namespace diorama {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr int kInterrupted = 130;
 
 // The one thing that a signal handler may reach.
 std::atomic<bool> stop_requested = false;
@@ -52,32 +53,53 @@ OutputStore::Existing existing_policy(const RunCommandOptions& options) {
   if (options.resume && options.overwrite) {
     throw Error(ErrorKind::Usage, "--resume and --overwrite exclude each other");
   }
-  if (options.overwrite && options.shards > 1) {
+  if (options.overwrite && (options.shards > 1 || options.takes_visits)) {
     throw Error(ErrorKind::Usage,
                 "--overwrite and --shard exclude each other, as one shard would remove the work of "
                 "the others");
   }
   if (options.overwrite) return OutputStore::Existing::Overwrite;
   // Shards join a dataset.
-  return options.resume || options.shards > 1 ? OutputStore::Existing::Resume
-                                              : OutputStore::Existing::Refuse;
+  const bool joins = options.resume || options.shards > 1 || options.takes_visits;
+  return joins ? OutputStore::Existing::Resume : OutputStore::Existing::Refuse;
 }
 
 RunSummary run_job(JobAssembly& assembly, Host& host, const RunCommandOptions& options,
                    ConsoleLog& log) {
   const StopOnSignal stop;
   LocalFileSystem file_system;
-  OutputStore store(file_system, output_folders(assembly.job), assembly.plan.capture_count());
+  OutputStore::Options store_options;
+  store_options.existing = existing_policy(options);
+  store_options.shard = options.shard;
+  store_options.shards = options.shards;
+  store_options.takes_visits = options.takes_visits;
+  store_options.verifies_all = options.verify;
+  store_options.lease_timeout = std::chrono::seconds(options.lease_timeout_s);
+  store_options.warn = [&](const std::string& text) { log.write(LogLevel::Warning, text); };
+  OutputStore store(file_system, output_folders(assembly.job), assembly.plan.capture_count(),
+                    store_options);
   std::optional<ProgressBar> bar;
+  std::optional<ProgressLines> lines;
+  if (options.progress != RunCommandOptions::Progress::Bar) {
+    lines.emplace(options.progress == RunCommandOptions::Progress::Json
+                      ? ProgressLines::Format::Json
+                      : ProgressLines::Format::OpenJd,
+                  std::cout);
+  }
   RunOptions run;
   run.shard = options.shard;
   run.shards = options.shards;
-  run.existing = existing_policy(options);
+  run.takes_visits = options.takes_visits;
   run.queue_bytes = std::size_t(options.queue_mib) << 20;
   run.stop = &stop_requested;
-  run.progress = [&](int done, int total, int resumed) {
-    if (!bar) bar.emplace(log, "captures", total);
-    bar->update(done, resumed);
+  run.only_finishes = options.only_finishes;
+  run.progress = [&](const RunProgress& progress) {
+    if (lines) {
+      lines->update(progress.done, progress.total, progress.resumed, progress.respawned);
+      return;
+    }
+    if (!bar) bar.emplace(log, "captures", progress.total);
+    bar->update(progress.done, progress.resumed);
   };
   Pipeline pipeline(assembly.job, assembly.plan, assembly.components, host, store, run);
   return pipeline.run(assembly.dataset, assembly.dataset_json);
@@ -92,11 +114,16 @@ void log_lines(const std::string& text, ConsoleLog& log) {
   }
 }
 
-}  // namespace
+/// Where the dataset is, and what comes after it.
+void log_next_step(const RunSummary& summary, const fs::path& dataset, ConsoleLog& log) {
+  const std::string folder = dataset.string();
+  log.write(LogLevel::Info, "dataset: " + folder);
+  log.write(LogLevel::Info, summary.is_finished ? "next: diorama lint " + folder
+                                                : "next: diorama status " + folder);
+}
 
-int command_run(const GlobalOptions& global, const RunCommandOptions& options, ConsoleLog& log) {
-  existing_policy(options);
-  const Value job = load_job(options.job, log.sink());
+int run_value(const GlobalOptions& global, const Value& job, const RunCommandOptions& options,
+              ConsoleLog& log) {
   const std::unique_ptr<Registry> registry = make_registry(global, log.sink());
   warn_of_rejected(*registry, log.sink());
   const std::optional<std::string> job_root = assets_root_of(job);
@@ -113,11 +140,31 @@ int command_run(const GlobalOptions& global, const RunCommandOptions& options, C
   try {
     const RunSummary summary = run_job(assembly, *host, options, log);
     log_lines(summary_text(summary), log);
+    log_next_step(summary, output_folders(assembly.job).records_path(), log);
     return 0;
   } catch (const Interrupted&) {
     log.write(LogLevel::Warning, "interrupted; `--resume` goes on");
-    return kInterrupted;
+    return options.stopped_exit_code;
   }
+}
+
+}  // namespace
+
+int command_run(const GlobalOptions& global, const RunCommandOptions& options, ConsoleLog& log) {
+  existing_policy(options);
+  return run_value(global, load_job(options.job, log.sink()), options, log);
+}
+
+int finish_dataset(const GlobalOptions& global, const DatasetStatus& status, ConsoleLog& log) {
+  Value job = parse_yaml(status.job, "the job in dataset.json");
+  Value* output = job.find("output");
+  if (!output) output = &job.set("output", Value::make_map());
+  output->set("folder", Value::text(status.base.string()));
+  RunCommandOptions options;
+  options.resume = true;
+  options.takes_visits = true;
+  options.only_finishes = true;
+  return run_value(global, job, options, log);
 }
 
 }  // namespace diorama

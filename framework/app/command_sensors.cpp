@@ -15,7 +15,7 @@
 #include "framework/config/yaml_config.h"
 #include "framework/host/progress_bar.h"
 #include "framework/pipeline/job.h"
-#include "framework/pipeline/output_store.h"
+#include "framework/output/output_store.h"
 #include "framework/pipeline/writer_queue.h"
 #include "framework/plugins/plugin_call.h"
 #include "framework/replay/stored_captures.h"
@@ -117,8 +117,8 @@ class Replay {
          OutputStore& store)
       : stored_(stored), effects_(effects), writer_(writer), host_(host), store_(store) {}
 
-  void run(const std::string& dataset_json, ConsoleLog& log) {
-    begin(dataset_json);
+  void run(ConsoleLog& log) {
+    begin();
     constexpr std::size_t kQueueBytes = std::size_t(256) << 20;
     WriterQueue queue(std::clamp(host_.thread_count(), 1, 4), kQueueBytes,
                       [this](const PendingCapture& pending) { write(pending.capture); });
@@ -135,13 +135,11 @@ class Replay {
   }
 
  private:
-  void begin(const std::string& dataset_json) {
+  void begin() {
     Transaction transaction;
     CollectedFiles files(transaction, 0, stored_.writer_name());
     writer_.begin(info_of(stored_), files);
-    const auto text = std::as_bytes(std::span(dataset_json));
-    transaction.files.push_back({kRecordsFolder, "dataset.json", {text.begin(), text.end()}});
-    store_.commit_begin(transaction, 0);
+    store_.commit_begin(transaction);
   }
 
   Capture annotated(int index) const {
@@ -182,15 +180,14 @@ int command_sensors(const GlobalOptions& global, const SensorsOptions& options, 
   const std::unique_ptr<Writer> writer = make_writer(stored, effects, *registry, *host);
 
   LocalFileSystem file_system;
-  const OutputFolders folders{options.output,
-                              {{stored.writer_name(), options.output / stored.writer_name()}}};
-  OutputStore store(file_system, folders, stored.capture_count());
-  const auto existing =
-      options.overwrite ? OutputStore::Existing::Overwrite : OutputStore::Existing::Refuse;
+  const OutputFolders folders{options.output, ".", {{stored.writer_name(), stored.writer_name()}}};
+  OutputStore::Options store_options;
+  if (options.overwrite) store_options.existing = OutputStore::Existing::Overwrite;
+  OutputStore store(file_system, folders, stored.capture_count(), store_options);
   const std::string dataset_json = sensors_json(stored, effects);
-  store.check(dataset_json, existing);
-  store.open(existing, {});
-  Replay(stored, effects, *writer, *host, store).run(dataset_json, log);
+  store.join(dataset_json);
+  store.open();
+  Replay(stored, effects, *writer, *host, store).run(log);
   const std::size_t count = stored.indices().size();
   log.write(LogLevel::Info, options.output.string() + ": " + std::to_string(count) + " of " +
                                 std::to_string(stored.capture_count()) + " captures");

@@ -34,10 +34,17 @@ struct RunCommandOptions {
   JobOptions job;
   int shard = 0;  ///< 0-based here; --shard counts from 1.
   int shards = 1;
+  bool takes_visits = false;  ///< --shard auto.
   bool resume = false;
+  bool verify = false;        ///< Reads all files of the dataset first.
+  int lease_timeout_s = 120;  ///< See OutputStore::Options.
+  int stopped_exit_code = 130;
+  enum class Progress : std::uint8_t { Bar, Json, OpenJd };
+  Progress progress = Progress::Bar;
   int queue_mib = 256;
   bool overwrite = false;
-  bool dry_run = false;  ///< Checks the job, plans it, writes nothing.
+  bool only_finishes = false;  ///< See RunOptions.
+  bool dry_run = false;        ///< Checks the job, plans it, writes nothing.
 };
 
 }  // namespace diorama

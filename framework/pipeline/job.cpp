@@ -497,7 +497,7 @@ void WriterEntry::visit(ParamVisitor& v) {
   v.param("type", type, {"Type of the component."});
   v.param("name", name, {"Name of the writer. Default: the type."});
   v.param("output_dir", output_dir,
-          {"Its folder, below output.folder unless absolute; null: the name."});
+          {"Its folder, below output.folder; null: the name."});
 }
 
 void SettleSection::visit(ParamVisitor& v) {

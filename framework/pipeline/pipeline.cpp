@@ -5,7 +5,6 @@
 #include <chrono>
 #include <cstdio>
 #include <cstring>
-#include <set>
 
 #include "diorama/error.h"
 #include "framework/annotators/motion.h"
@@ -78,7 +77,8 @@ Pipeline::Pipeline(const Job& job, const CapturePlan& plan, JobComponents& compo
       store_(store),
       options_(std::move(options)),
       streams_(job.seed),
-      visits_(shard_of(plan, options_.shard, options_.shards)) {}
+      visits_(options_.takes_visits ? plan.visits
+                                    : shard_of(plan, options_.shard, options_.shards)) {}
 
 Pipeline::~Pipeline() = default;
 
@@ -86,21 +86,18 @@ RunSummary Pipeline::run(const DatasetInfo& dataset, const std::string& dataset_
   dataset_ = &dataset;
   dataset_json_ = &dataset_json;
   summary_.cameras = int(dataset.camera_names.size());
-  store_.check(dataset_json, options_.existing);
+  store_.join(dataset_json);
   for (const PlannedVisit& visit : visits_) {
     total_ += int(visit.captures.size());
     for (const PlannedCapture& capture : visit.captures) {
-      const bool is_kept = options_.existing == OutputStore::Existing::Resume;
-      summary_.resumed += is_kept && store_.is_done(capture.index) ? 1 : 0;
+      summary_.resumed += store_.is_done(capture.index) ? 1 : 0;
     }
   }
   const int writing_threads = std::clamp(host_.thread_count(), 1, 4);
   queue_ = std::make_unique<WriterQueue>(writing_threads, options_.queue_bytes,
                                          [this](const PendingCapture& pending) { write(pending); });
   try {
-    for (const PlannedVisit& visit : visits_) {
-      if (is_needed(visit)) run_visit(visit);
-    }
+    run_visits();
   } catch (const Interrupted&) {
     queue_->drain();
     store_.close();
@@ -110,15 +107,27 @@ RunSummary Pipeline::run(const DatasetInfo& dataset, const std::string& dataset_
     const Clock clock(summary_, "waiting for writers");
     queue_->drain();
   }
-  begin_output();
   finish_output(dataset);
   store_.close();
   summary_.bytes_written = store_.bytes_written();
   return std::move(summary_);
 }
 
+void Pipeline::run_visits() {
+  if (options_.only_finishes) return;
+  if (!options_.takes_visits) {
+    for (const PlannedVisit& visit : visits_) {
+      if (is_needed(visit)) run_visit(visit);
+    }
+    return;
+  }
+  const auto needs_work = [&](int visit) { return is_needed(visits_[std::size_t(visit)]); };
+  while (const auto visit = store_.claim_visit(int(visits_.size()), needs_work)) {
+    run_visit(visits_[std::size_t(*visit)]);
+  }
+}
+
 bool Pipeline::is_needed(const PlannedVisit& planned) const {
-  if (options_.existing != OutputStore::Existing::Resume) return true;
   return std::any_of(planned.captures.begin(), planned.captures.end(),
                      [&](const PlannedCapture& c) { return !store_.is_done(c.index); });
 }
@@ -146,6 +155,7 @@ void Pipeline::run_visit(const PlannedVisit& planned) {
         break;
     }
   }
+  summary_.respawned += int(visit.report.respawned.size());
 }
 
 Pipeline::Visit Pipeline::set_up(const PlannedVisit& planned) {
@@ -277,9 +287,7 @@ void Pipeline::take_captures(Visit& visit, const TimelineStep& step) {
     if (visit.next_capture == visit.planned->captures.size()) return;
     const PlannedCapture& planned = visit.planned->captures[visit.next_capture++];
     randomize(visit, planned.phase, planned.number, planned.index);
-    const bool is_done =
-        options_.existing == OutputStore::Existing::Resume && store_.is_done(planned.index);
-    if (!is_done) take(visit, planned);
+    if (!store_.is_done(planned.index)) take(visit, planned);
   }
 }
 
@@ -316,7 +324,8 @@ void Pipeline::take(Visit& visit, const PlannedCapture& planned) {
   }
   ++summary_.captures;
   if (options_.progress) {
-    options_.progress(summary_.resumed + summary_.captures, total_, summary_.resumed);
+    options_.progress({summary_.resumed + summary_.captures, total_, summary_.resumed,
+                       summary_.respawned + int(visit.report.respawned.size())});
   }
 }
 
@@ -385,11 +394,7 @@ VisitReport Pipeline::report_on(const Visit& visit) const {
 void Pipeline::begin_output() {
   if (has_begun_) return;
   has_begun_ = true;
-  std::set<int> own;
-  for (const PlannedVisit& visit : visits_) {
-    for (const PlannedCapture& capture : visit.captures) own.insert(capture.index);
-  }
-  store_.open(options_.existing, own);
+  store_.open();
   Transaction transaction;
   for (std::size_t i = 0; i < components_.writers.size(); ++i) {
     const std::string& name = job_.writers[i].name;
@@ -397,9 +402,7 @@ void Pipeline::begin_output() {
     call_component("writer '" + name + "'",
                    [&] { components_.writers[i]->begin(*dataset_, files); });
   }
-  const auto text = std::as_bytes(std::span(*dataset_json_));
-  transaction.files.push_back({kRecordsFolder, "dataset.json", {text.begin(), text.end()}});
-  store_.commit_begin(transaction, options_.shard);
+  store_.commit_begin(transaction);
 }
 
 void Pipeline::write(const PendingCapture& pending) {
@@ -428,8 +431,15 @@ void Pipeline::write(const PendingCapture& pending) {
 void Pipeline::finish_output(const DatasetInfo& dataset) {
   const Clock clock(summary_, "finishing");
   store_.refresh();
-  summary_.is_complete = store_.done_count() >= dataset.capture_count;
-  if (!summary_.is_complete) return;
+  summary_.missing = dataset.capture_count - store_.done_count();
+  summary_.is_finished = store_.is_finished();
+  if (summary_.missing > 0 || summary_.is_finished) return;
+  // Who loses this claim to another worker has done its part; the other one's is to finish.
+  begin_output();
+  if (!store_.claim_finish()) {
+    summary_.is_finished = store_.is_finished();
+    return;
+  }
   Transaction transaction;
   for (std::size_t i = 0; i < components_.writers.size(); ++i) {
     const std::string& name = job_.writers[i].name;
@@ -440,7 +450,8 @@ void Pipeline::finish_output(const DatasetInfo& dataset) {
     call_component("writer '" + name + "'",
                    [&] { components_.writers[i]->finish(records, files); });
   }
-  store_.commit_finish(transaction, options_.shard);
+  store_.commit_finish(transaction);
+  summary_.is_finished = true;
 }
 
 std::string summary_text(const RunSummary& summary) {
@@ -463,6 +474,12 @@ std::string summary_text(const RunSummary& summary) {
   text += "Finished, captured " + std::to_string(summary.captures * summary.cameras) + " frames (" +
           std::to_string(summary.captures) + " captures x " + std::to_string(summary.cameras) +
           " cameras)";
+  if (!summary.is_finished) {
+    text += "; this part is done, ";
+    text += summary.missing > 0 ? "the dataset lacks " + std::to_string(summary.missing) +
+                                      " captures of other workers"
+                                : "another worker finishes the dataset";
+  }
   return text;
 }
 

@@ -18,10 +18,10 @@
 #include "diorama/randomizer.h"
 #include "diorama/renderer.h"
 #include "diorama/writer.h"
+#include "framework/output/output_store.h"
 #include "framework/pipeline/capture_plan.h"
 #include "framework/pipeline/demand.h"
 #include "framework/pipeline/job.h"
-#include "framework/pipeline/output_store.h"
 #include "framework/pipeline/settling.h"
 #include "framework/pipeline/writer_queue.h"
 
@@ -39,21 +39,32 @@ struct JobComponents {
   Demand demand;
 };
 
+/// How far a run is.
+struct RunProgress {
+  int done = 0;       ///< With `resumed`.
+  int total = 0;      ///< Of this shard; of the whole job with RunOptions::takes_visits.
+  int resumed = 0;    ///< Were there before.
+  int respawned = 0;  ///< Objects that had left the room and were placed anew.
+};
+
 struct RunOptions {
   int shard = 0;
   int shards = 1;
-  OutputStore::Existing existing = OutputStore::Existing::Refuse;
+  bool takes_visits = false;   ///< Instead of a shard: visits that no other worker has.
+  bool only_finishes = false;  ///< Makes no captures.
   std::size_t queue_bytes = std::size_t(256) << 20;  ///< Of captures that wait to be written.
-  const std::atomic<bool>* stop = nullptr;  ///< True asks the run to end soon.
+  const std::atomic<bool>* stop = nullptr;           ///< True asks the run to end soon.
   /// Called on the main thread after each capture.
-  std::function<void(int done, int total, int resumed)> progress;
+  std::function<void(const RunProgress&)> progress;
 };
 
 struct RunSummary {
   int captures = 0;  ///< Made by this run.
   int resumed = 0;   ///< Were there before.
   int cameras = 0;
-  bool is_complete = false;  ///< All captures of the job exist.
+  int respawned = 0;         ///< Objects that had left the room and were placed anew.
+  int missing = 0;           ///< Captures of the job that other workers have to make.
+  bool is_finished = false;  ///< The dataset is complete, whoever finished it.
   std::uint64_t bytes_written = 0;
   std::map<std::string, double> seconds;  ///< Phase to wall time.
   std::vector<VisitReport> visits;
@@ -76,7 +87,8 @@ class Pipeline {
            OutputStore& store, RunOptions options);
   ~Pipeline();
 
-  /// `dataset_json` is the text of dataset.json. Throws Error, and Interrupted when asked to stop.
+  /// `dataset_json` is the text of dataset.json. Throws Error, Busy when other processes have this
+  /// part of the job, and Interrupted when asked to stop.
   RunSummary run(const DatasetInfo& dataset, const std::string& dataset_json);
 
  private:
@@ -98,6 +110,7 @@ class Pipeline {
   Image<Rgba8> make_overview(Visit& visit, int capture);
   VisitReport report_on(const Visit& visit) const;
   bool is_needed(const PlannedVisit& planned) const;
+  void run_visits();
   void begin_output();
   void write(const PendingCapture& pending);
   void finish_output(const DatasetInfo& dataset);
@@ -110,7 +123,7 @@ class Pipeline {
   OutputStore& store_;
   RunOptions options_;
   JobStreams streams_;
-  std::vector<PlannedVisit> visits_;  // of this shard
+  std::vector<PlannedVisit> visits_;  // of this shard, or all
   const DatasetInfo* dataset_ = nullptr;
   const std::string* dataset_json_ = nullptr;
   bool has_begun_ = false;

@@ -9,7 +9,7 @@
 #include "framework/images/linear_picture.h"
 #include "framework/lint/replicator_files.h"
 #include "framework/pipeline/capture_plan.h"
-#include "framework/pipeline/file_system.h"
+#include "framework/output/file_system.h"
 
 namespace diorama {
 namespace {

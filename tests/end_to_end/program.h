@@ -105,13 +105,14 @@ inline Outcome run(const std::vector<std::string>& arguments, const fs::path& fo
   return Process(arguments, folder).wait();
 }
 
-/// Every file below a folder with its content.
+/// Every file below a folder with its content, without what workers keep for themselves.
 inline std::map<std::string, std::string> tree(const fs::path& root) {
   std::map<std::string, std::string> files;
   if (!fs::exists(root)) return files;
-  for (const auto& entry : fs::recursive_directory_iterator(root)) {
-    if (!entry.is_regular_file()) continue;
-    files[entry.path().lexically_relative(root).string()] = read_file(entry.path());
+  for (auto entry = fs::recursive_directory_iterator(root); entry != fs::end(entry); ++entry) {
+    if (entry->path().filename() == ".diorama") entry.disable_recursion_pending();
+    if (!entry->is_regular_file()) continue;
+    files[entry->path().lexically_relative(root).string()] = read_file(entry->path());
   }
   return files;
 }

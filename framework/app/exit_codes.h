@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+namespace diorama {
+
+/// Exit codes that are no errors (framework/docs/exit_codes.md); errors have those of exit_code().
+
+inline constexpr int kDatasetIncomplete = 8;  ///< `status` and `finish`: captures are missing.
+inline constexpr int kBusy = 75;              ///< Another process has this part; later it is free.
+inline constexpr int kInterrupted = 130;      ///< Asked to stop, unless --stopped-exit-code says so.
+
+}  // namespace diorama

@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/output/dataset_status.h"
+
+#include <algorithm>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "diorama/error.h"
+#include "framework/output/journal.h"
+#include "framework/output/workers.h"
+
+namespace diorama {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+void read_description(FileSystem& file_system, const fs::path& file, DatasetStatus& status) {
+  if (!file_system.exists(file)) {
+    throw Error(ErrorKind::Output, file.string() + ": no dataset here: no such file");
+  }
+  const Json json = Json::parse(file_system.read(file), nullptr, false);
+  const bool is_dataset = json.is_object() && json.contains("captures") &&
+                          json["captures"].is_number_integer() && json.contains("job") &&
+                          json["job"].is_string();
+  const std::int64_t captures = is_dataset ? json["captures"].get<std::int64_t>() : -1;
+  if (captures < 0 || captures > INT32_MAX) {
+    throw Error(ErrorKind::Output,
+                file.string() + ": expected a dataset's description with `captures` and `job`");
+  }
+  status.captures = int(captures);
+  status.job = json["job"].get<std::string>();
+}
+
+/// The output folder above the folder of dataset.json.
+fs::path base_of(const fs::path& folder, const std::string& records) {
+  fs::path base = fs::absolute(folder).lexically_normal();
+  if (!base.has_filename()) base = base.parent_path();
+  if (records == ".") return base;
+  for (const fs::path& part : fs::path(records)) {
+    if (!part.empty()) base = base.parent_path();
+  }
+  return base;
+}
+
+void add_workers(FileSystem& file_system, const fs::path& folder, const Journals& journals,
+                 DatasetStatus& status) {
+  // A reader takes no part: it has no lease, and no role.
+  Workers leases(file_system, folder, this_worker(), std::chrono::seconds(120));
+  std::map<std::string, DatasetStatus::Worker> workers;
+  for (const auto& [name, index] : journals.workers()) {
+    if (index.published > 0) workers[name] = {name, "", "", false, index.published};
+  }
+  for (const Workers::Lease& lease : leases.others()) {
+    DatasetStatus::Worker& worker = workers[lease.worker];
+    worker.name = lease.worker;
+    worker.role = lease.role;
+    worker.description = leases.describe(lease);
+    worker.is_alive = leases.is_alive(lease);
+  }
+  for (auto& [name, worker] : workers) status.workers.push_back(std::move(worker));
+}
+
+void verify(FileSystem& file_system, const Journals& journals, DatasetStatus& status) {
+  journals.visit_entries([&](const std::string& worker, const EntryPlace& place) {
+    if (!place.is_published || place.entry >= status.captures) return;
+    const auto content = journals.files_of(worker, place);
+    if (!content) {
+      status.faults.push_back(entry_name(place.entry) + ": its journal entry is torn");
+      return;
+    }
+    for (const JournalledFile& file : content->files) {
+      const fs::path path = status.base / file.path;
+      const auto found = file_system.status(path);
+      if (!found || found->kind != FileStatus::Kind::File) {
+        status.faults.push_back(file.path + ": missing");
+      } else if (found->size != file.size) {
+        status.faults.push_back(file.path + ": expected " + std::to_string(file.size) +
+                                " bytes, found " + std::to_string(found->size));
+      } else if (digest_of(file_system.read(path)) != file.digest) {
+        status.faults.push_back(file.path + ": not what was written");
+      }
+    }
+  });
+}
+
+std::string ranges_text(const std::vector<std::pair<int, int>>& ranges) {
+  constexpr std::size_t kMost = 20;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(ranges.size(), kMost); ++i) {
+    text += (i > 0 ? ", " : "") + std::to_string(ranges[i].first);
+    if (ranges[i].second > ranges[i].first) text += "-" + std::to_string(ranges[i].second);
+  }
+  if (ranges.size() > kMost)
+    text += " and " + std::to_string(ranges.size() - kMost) + " ranges more";
+  return text;
+}
+
+}  // namespace
+
+DatasetStatus read_status(FileSystem& file_system, const fs::path& folder, bool verifies) {
+  DatasetStatus status;
+  read_description(file_system, folder / "dataset.json", status);
+  Journals journals(file_system, folder / ".diorama" / "journal", status.captures);
+  journals.refresh();
+  status.done = journals.published_captures();
+  status.is_finished = status.done == status.captures && journals.is_published(kFinishEntry);
+  status.base = base_of(folder, journals.records_folder().value_or("."));
+  for (int capture = 0; capture < status.captures; ++capture) {
+    if (journals.is_published(capture)) continue;
+    if (!status.missing.empty() && status.missing.back().second == capture - 1) {
+      status.missing.back().second = capture;
+    } else {
+      status.missing.emplace_back(capture, capture);
+    }
+  }
+  add_workers(file_system, folder / ".diorama", journals, status);
+  if (verifies) verify(file_system, journals, status);
+  return status;
+}
+
+std::string status_text(const DatasetStatus& status, const fs::path& folder) {
+  std::string text = folder.string() + ": " + std::to_string(status.done) + " of " +
+                     std::to_string(status.captures) + " captures, " +
+                     (status.is_finished ? "finished" : "not finished") + "\n";
+  if (!status.missing.empty()) text += "missing: " + ranges_text(status.missing) + "\n";
+  int ended = 0;
+  int captures_of_ended = 0;
+  for (const DatasetStatus::Worker& worker : status.workers) {
+    if (worker.role.empty()) {
+      ++ended;
+      captures_of_ended += worker.captures;
+      continue;
+    }
+    text += (worker.is_alive ? "at work: " : "dead: ") + worker.role + " (" + worker.description +
+            "), " + std::to_string(worker.captures) + " captures\n";
+  }
+  if (ended > 0) {
+    text += "ended: " + std::to_string(ended) + (ended == 1 ? " worker, " : " workers, ") +
+            std::to_string(captures_of_ended) + " captures\n";
+  }
+  for (const std::string& fault : status.faults) text += "fault: " + fault + "\n";
+  if (!status.faults.empty()) text += "`diorama run --resume --verify` makes them anew\n";
+  return text;
+}
+
+std::string status_json(const DatasetStatus& status) {
+  Json json{{"captures", status.captures},    {"done", status.done},
+            {"finished", status.is_finished}, {"missing", Json::array()},
+            {"workers", Json::array()},       {"faults", status.faults}};
+  for (const auto& [first, last] : status.missing) json["missing"].push_back({first, last});
+  for (const DatasetStatus::Worker& worker : status.workers) {
+    const char* const state = worker.role.empty() ? "ended" : worker.is_alive ? "alive" : "dead";
+    json["workers"].push_back({{"name", worker.name},
+                               {"role", worker.role},
+                               {"state", state},
+                               {"description", worker.description},
+                               {"captures", worker.captures}});
+  }
+  return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace diorama

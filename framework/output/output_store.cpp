@@ -1,0 +1,742 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/output/output_store.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <unordered_map>
+
+#include "diorama/error.h"
+
+namespace diorama {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr int kCommitsPerCheckpoint = 64;
+constexpr int kVisitsPerClaimFolder = 256;
+
+std::span<const std::byte> bytes_of(const std::string& text) {
+  return std::as_bytes(std::span(text));
+}
+
+std::string keys_that_differ(const std::string& before, const std::string& now) {
+  const Json old_json = Json::parse(before, nullptr, false);
+  const Json new_json = Json::parse(now, nullptr, false);
+  std::string keys;
+  for (const auto& [key, value] : new_json.items()) {
+    const bool is_same = old_json.is_object() && old_json.contains(key) && old_json[key] == value;
+    if (!is_same) keys += (keys.empty() ? "" : ", ") + key;
+  }
+  return keys.empty() ? "format" : keys;
+}
+
+/// "out/." without what does not count.
+fs::path joined(const fs::path& base, const std::string& below) {
+  const fs::path place = (base / below).lexically_normal();
+  return place.has_filename() ? place : place.parent_path();
+}
+
+OutputFolders normal(OutputFolders folders) {
+  folders.base = joined(folders.base, ".");
+  return folders;
+}
+
+std::string below(const std::string& folder, const std::string& path) {
+  return folder == "." ? path : folder + "/" + path;
+}
+
+bool is_below(const std::string& folder, const std::string& path) {
+  return folder == "." || path.starts_with(folder + "/");
+}
+
+/// What "shard-3-of-16" shares its work with.
+std::string split_of(const std::string& role) {
+  const std::size_t of = role.rfind("-of-");
+  return of == std::string::npos ? role : role.substr(of);
+}
+
+std::string role_text(const std::string& role) {
+  if (role == "auto") return "with `--shard auto`";
+  if (role == "overwrite") return "replacing the dataset";
+  if (role == "shard-1-of-1") return "as the only worker";
+  std::string text = role;
+  std::replace(text.begin(), text.end(), '-', ' ');
+  return "as " + text;
+}
+
+std::string visit_folder(int visit) {
+  char name[32];
+  std::snprintf(name, sizeof name, "visits-%05d", visit / kVisitsPerClaimFolder);
+  return name;
+}
+
+std::string visit_task(int visit) { return visit_folder(visit) + "/" + std::to_string(visit); }
+
+}  // namespace
+
+const std::string& OutputFolders::folder(std::size_t index) const {
+  return index == kRecordsFolder ? records : writers[index].folder;
+}
+
+fs::path OutputFolders::records_path() const { return joined(base, records); }
+
+CollectedFiles::CollectedFiles(Transaction& transaction, std::size_t folder, std::string writer)
+    : transaction_(transaction), folder_(folder), writer_(std::move(writer)) {}
+
+void CollectedFiles::add(std::string_view path, std::vector<std::byte> bytes) {
+  if (!is_plain_relative(path)) {
+    throw Error(ErrorKind::Plugin, "writer '" + writer_ +
+                                       "': expected a relative path without `..`, found \"" +
+                                       std::string(path) + "\"");
+  }
+  transaction_.files.push_back({folder_, std::string(path), std::move(bytes)});
+}
+
+void CollectedFiles::record(std::string_view line) {
+  if (line.find('\n') != std::string_view::npos) {
+    throw Error(ErrorKind::Plugin, "writer '" + writer_ + "': a record may not hold a line break");
+  }
+  for (const auto& [folder, text] : transaction_.records) {
+    if (folder == folder_) {
+      throw Error(ErrorKind::Plugin, "writer '" + writer_ + "': a capture has one record only");
+    }
+  }
+  transaction_.records.emplace_back(folder_, std::string(line));
+}
+
+OutputStore::OutputStore(FileSystem& file_system, OutputFolders folders, int capture_count,
+                         Options options)
+    : file_system_(file_system),
+      folders_(normal(std::move(folders))),
+      capture_count_(capture_count),
+      options_(std::move(options)),
+      workers_(file_system, diorama_folder(), options_.self, options_.lease_timeout),
+      journals_(file_system, diorama_folder() / "journal", capture_count),
+      writer_(file_system, diorama_folder() / "journal", options_.self.name, folders_.records) {}
+
+OutputStore::~OutputStore() {
+  try {
+    leave();
+  } catch (const std::exception&) {
+    // What is left behind is settled by the next worker.
+  }
+}
+
+fs::path OutputStore::stage(const std::string& worker) const {
+  return diorama_folder() / "stage" / worker;
+}
+
+fs::path OutputStore::staged(const std::string& worker, int entry, std::size_t file) const {
+  return stage(worker) / (entry_name(entry) + "-" + std::to_string(file));
+}
+
+std::string OutputStore::role() const {
+  if (options_.existing == Existing::Overwrite) return "overwrite";
+  if (options_.takes_visits) return "auto";
+  return "shard-" + std::to_string(options_.shard + 1) + "-of-" + std::to_string(options_.shards);
+}
+
+void OutputStore::say(const std::string& text) const {
+  if (options_.warn) options_.warn(text);
+}
+
+// Joining and leaving.
+
+/// The folder for files that are to come can be made and written.
+void OutputStore::probe(const fs::path& target) {
+  fs::path existing = fs::absolute(target).lexically_normal();
+  while (!file_system_.exists(existing) && existing.has_relative_path()) {
+    existing = existing.parent_path();
+  }
+  if (existing.filename().empty() && existing.has_parent_path()) existing = existing.parent_path();
+  const fs::path trial = existing / (".diorama-write-test-" + options_.self.name);
+  file_system_.make_folders(trial);
+  file_system_.remove_if_empty(trial);
+}
+
+/// A stranger's dataset could lead our files and removals elsewhere.
+void OutputStore::refuse_links() const {
+  const fs::path top = diorama_folder();
+  for (const fs::path& folder :
+       {top, top / "journal", top / "workers", top / "claims", top / "stage"}) {
+    const auto status = file_system_.status(folder);
+    if (status && status->kind != FileStatus::Kind::Folder) {
+      throw Error(ErrorKind::Output,
+                  folder.string() + ": expected a folder, found a " +
+                      (status->kind == FileStatus::Kind::Link ? "link" : "file"));
+    }
+  }
+}
+
+void OutputStore::check_same_dataset() const {
+  const std::string before = file_system_.read(dataset_file());
+  if (before == dataset_json_) return;
+  throw Error(ErrorKind::Output, dataset_file().string() +
+                                     ": belongs to another job or version (differs in: " +
+                                     keys_that_differ(before, dataset_json_) +
+                                     "); resume with the same job, choose another --output or use "
+                                     "--overwrite");
+}
+
+void OutputStore::check_folder() {
+  refuse_links();
+  const bool is_there = file_system_.exists(dataset_file());
+  journals_.refresh();
+  if (options_.existing == Existing::Refuse && is_there) {
+    throw Error(ErrorKind::Output,
+                folders_.records_path().string() + ": already holds a dataset with " +
+                    std::to_string(journals_.published_captures()) +
+                    " captures; go on with it by --resume, replace it by --overwrite, or choose "
+                    "another --output");
+  }
+  if (options_.existing == Existing::Refuse && !journals_.workers().empty()) {
+    throw Error(ErrorKind::Output,
+                folders_.records_path().string() +
+                    ": the removal of a dataset was interrupted here; --resume and --overwrite "
+                    "complete it, or choose another --output");
+  }
+  if (options_.existing == Existing::Resume && is_there) check_same_dataset();
+  for (const auto& writer : folders_.writers) probe(joined(folders_.base, writer.folder));
+}
+
+/// Living workers whose part overlaps with this one's.
+void OutputStore::refuse_rivals() {
+  const std::string own = role();
+  for (const Workers::Lease& lease : workers_.others()) {
+    const bool is_exclusive = own == "overwrite" || lease.role == "overwrite";
+    if (!is_exclusive && split_of(lease.role) == split_of(own)) continue;
+    if (!workers_.is_alive(lease)) continue;
+    throw Busy(folders_.records_path().string() + ": another process works on this dataset " +
+               role_text(lease.role) + " (" + workers_.describe(lease) +
+               "); wait for it or stop it first");
+  }
+  if (options_.takes_visits) return;
+  if (const auto owner = workers_.claim(own)) {
+    throw Busy(folders_.records_path().string() + ": another process works on this dataset " +
+               role_text(own) + ", too (" + workers_.describe(*owner) +
+               "); wait for it or stop it first");
+  }
+}
+
+void OutputStore::join(const std::string& dataset_json) {
+  dataset_json_ = dataset_json;
+  check_folder();
+  has_joined_ = true;
+  try {
+    created_ = file_system_.make_folders(diorama_folder());
+    for (const fs::path& folder : created_) unsynced_folders_.insert(folder.parent_path());
+    workers_.join(role());
+    refuse_rivals();
+    start_heart();
+    replaces_ = options_.existing == Existing::Overwrite;
+    if (!replaces_) settle_dead_workers();
+    journals_.refresh();
+    if (options_.verifies_all && !replaces_) verify_all();
+  } catch (...) {
+    try {
+      leave();
+    } catch (const Error&) {
+      // The first failure is the one to report.
+    }
+    throw;
+  }
+}
+
+void OutputStore::start_heart() {
+  if (!options_.beats) return;
+  heart_ = std::thread([this] {
+    const auto pause = std::max<std::chrono::milliseconds>(options_.lease_timeout / 8,
+                                                           std::chrono::milliseconds(100));
+    std::unique_lock lock(heart_mutex_);
+    while (!heart_stops_.wait_for(lock, pause, [&] { return stops_beating_; })) {
+      try {
+        if (!workers_.beat()) is_lost_ = true;
+      } catch (const Error&) {
+        // The disk is away: so is this worker, until it comes back.
+      }
+    }
+  });
+}
+
+void OutputStore::leave() {
+  if (!std::exchange(has_joined_, false)) return;
+  if (heart_.joinable()) {
+    {
+      const std::lock_guard lock(heart_mutex_);
+      stops_beating_ = true;
+    }
+    heart_stops_.notify_all();
+    heart_.join();
+  }
+  // What is staged for good stays for who comes next.
+  file_system_.remove_if_empty(stage(options_.self.name));
+  file_system_.remove_if_empty(diorama_folder() / "stage");
+  if (is_finished()) workers_.sweep();
+  workers_.leave();
+  if (writer_.has_lines() || has_opened_) return;
+  for (auto folder = created_.rbegin(); folder != created_.rend(); ++folder) {
+    file_system_.remove_if_empty(*folder);
+  }
+}
+
+void OutputStore::close() {
+  checkpoint();
+  leave();
+}
+
+void OutputStore::open() {
+  if (std::exchange(has_opened_, true)) return;
+  if (replaces_) remove_dataset();
+  replaces_ = false;
+  const auto created = file_system_.make_folders(stage(options_.self.name));
+  for (const fs::path& folder : created) unsynced_folders_.insert(folder.parent_path());
+  const fs::path draft = stage(options_.self.name) / "dataset";
+  file_system_.write(draft, bytes_of(dataset_json_));
+  file_system_.sync(draft);
+  if (!file_system_.move_new(draft, dataset_file())) {
+    file_system_.remove_file(draft);
+    check_same_dataset();
+  }
+  // From here on names in these folders count.
+  for (const fs::path& folder : std::exchange(unsynced_folders_, {})) {
+    file_system_.sync_folder(folder);
+  }
+  file_system_.sync_folder(folders_.records_path());
+}
+
+// What is there.
+
+bool OutputStore::is_done(int capture) const {
+  return !replaces_ && journals_.is_published(capture);
+}
+
+int OutputStore::done_count() const { return replaces_ ? 0 : journals_.published_captures(); }
+
+bool OutputStore::is_finished() const {
+  return !replaces_ && is_complete() && journals_.is_published(kFinishEntry);
+}
+
+void OutputStore::refresh() { journals_.refresh(); }
+
+OutputStore::FileState OutputStore::state_of(const fs::path& path, const JournalledFile& file) {
+  const auto status = file_system_.status(path);
+  if (!status) return FileState::Missing;
+  if (status->kind != FileStatus::Kind::File || status->size != file.size) return FileState::Wrong;
+  return digest_of(file_system_.read(path)) == file.digest ? FileState::Right : FileState::Wrong;
+}
+
+// Dead workers: what they committed is completed, the rest is taken away.
+
+void OutputStore::settle_dead_workers() {
+  if (!file_system_.exists(dataset_file())) {
+    journals_.refresh();
+    if (journals_.workers().empty()) return;
+    // Without dataset.json the journals are the rest of a dataset whose removal was cut short.
+    if (const auto owner = workers_.claim("removal")) {
+      throw Busy(folders_.records_path().string() + ": another process removes a dataset here (" +
+                 workers_.describe(*owner) + ")");
+    }
+    if (!file_system_.exists(dataset_file())) remove_dataset();
+    workers_.release("removal");
+    return;
+  }
+  std::set<std::string> alive{options_.self.name};
+  std::set<std::string> dead;
+  for (const Workers::Lease& lease : workers_.others()) {
+    (workers_.is_alive(lease) ? alive : dead).insert(lease.worker);
+  }
+  journals_.refresh();
+  for (const auto& [worker, index] : journals_.workers()) {
+    if (!index.unsettled.empty() && index.settled_bytes < index.bytes_read) dead.insert(worker);
+  }
+  for (const std::string& worker : file_system_.list(diorama_folder() / "stage")) {
+    if (is_plain_name(worker)) dead.insert(worker);
+  }
+  for (const std::string& worker : dead) {
+    if (alive.contains(worker)) continue;
+    const auto index = journals_.workers().find(worker);
+    settle(worker, index == journals_.workers().end() ? WorkerIndex() : index->second);
+  }
+}
+
+void OutputStore::settle(const std::string& worker, const WorkerIndex& index) {
+  if (workers_.claim("settle-" + worker)) return;
+  if (index.settled_bytes < index.bytes_read) {
+    for (const EntryPlace& place : index.unsettled) settle_entry(worker, place);
+    checkpoint();
+    writer_.settled(worker, index.bytes_read);
+  }
+  remove_stage(worker);
+  for (const Workers::Lease& lease : workers_.others()) {
+    if (lease.worker == worker) workers_.remove(lease);
+  }
+  workers_.release("settle-" + worker);
+}
+
+/// Moves what is staged to its place; false when files are missing.
+bool OutputStore::settle_entry(const std::string& worker, const EntryPlace& place) {
+  const auto content = journals_.files_of(worker, place);
+  // Torn: the power went before it counted.
+  if (!content) {
+    if (place.is_published) take_back(worker, place, "its journal entry is torn", {});
+    return false;
+  }
+  std::vector<JournalledFile> damaged;
+  std::string reason;
+  for (std::size_t i = 0; i < content->files.size(); ++i) {
+    const JournalledFile& file = content->files[i];
+    const fs::path target = folders_.base / file.path;
+    check_no_links(target.parent_path());
+    const fs::path source = staged(worker, place.entry, i);
+    FileState state = state_of(target, file);
+    const bool is_staged = state_of(source, file) == FileState::Right;
+    if (state == FileState::Missing && is_staged) {
+      make_target_folder(target.parent_path());
+      file_system_.move_new(source, target);
+    }
+    // Another worker may have moved it meanwhile.
+    if (state != FileState::Right) state = state_of(target, file);
+    if (state == FileState::Right) continue;
+    reason = file.path + (state == FileState::Missing ? " is missing" : " is not what was written");
+    // Beside its staged twin a file is somebody else's.
+    if (state == FileState::Wrong && !is_staged) damaged.push_back(file);
+  }
+  if (!reason.empty()) {
+    take_back(worker, place, reason, damaged);
+    return false;
+  }
+  if (!place.is_published) writer_.published_for(worker, place.entry);
+  return true;
+}
+
+void OutputStore::take_back(const std::string& worker, const EntryPlace& place,
+                            const std::string& reason, const std::vector<JournalledFile>& damaged) {
+  writer_.void_entry(worker, place.entry);
+  for (const JournalledFile& file : damaged) {
+    if (may_remove(file)) file_system_.remove_file(folders_.base / file.path);
+  }
+  if (place.is_published) {
+    say((place.entry < 0 ? entry_name(place.entry) : "capture " + std::to_string(place.entry)) +
+        ": " + reason + "; it is made anew");
+  }
+}
+
+void OutputStore::verify_all() {
+  journals_.visit_entries([&](const std::string& worker, const EntryPlace& place) {
+    const auto lives = [&](const Workers::Lease& lease) {
+      return lease.worker == worker && workers_.is_alive(lease);
+    };
+    const auto others = workers_.others();
+    if (!place.is_published || std::any_of(others.begin(), others.end(), lives)) return;
+    settle_entry(worker, place);
+  });
+  journals_.refresh();
+}
+
+void OutputStore::remove_stage(const std::string& worker) {
+  const fs::path folder = stage(worker);
+  const auto status = file_system_.status(folder);
+  if (!status || status->kind != FileStatus::Kind::Folder) return;
+  for (const std::string& name : file_system_.list(folder)) {
+    const auto file = file_system_.status(folder / name);
+    if (is_plain_name(name) && file && file->kind == FileStatus::Kind::File) {
+      file_system_.remove_file(folder / name);
+    }
+  }
+  file_system_.remove_if_empty(folder);
+}
+
+// Removing a dataset: what its journals name, and nothing else.
+
+/// In the folders of this job by its name; elsewhere below the output folder, where a journal may
+/// name anything, only what is known to the byte.
+bool OutputStore::may_remove(const JournalledFile& file) {
+  const fs::path path = folders_.base / file.path;
+  check_no_links(path.parent_path());
+  const auto status = file_system_.status(path);
+  if (!status || status->kind != FileStatus::Kind::File) return false;
+  const bool is_own =
+      (folders_.records != "." && is_below(folders_.records, file.path)) ||
+      std::any_of(folders_.writers.begin(), folders_.writers.end(), [&](const auto& writer) {
+        return writer.folder != "." && is_below(writer.folder, file.path);
+      });
+  return is_own || state_of(path, file) == FileState::Right;
+}
+
+void OutputStore::remove_dataset() {
+  Journals old(file_system_, diorama_folder() / "journal", capture_count_);
+  old.refresh();
+  std::set<std::string> workers;
+  for (const auto& [worker, index] : old.workers()) workers.insert(worker);
+  // All of it is read before anything goes: a bad journal is an error, not half a removal.
+  old.visit_entries([&](const std::string& worker, const EntryPlace& place) {
+    const auto content = old.files_of(worker, place);
+    if (!content) return;
+    for (const JournalledFile& file : content->files) {
+      check_no_links((folders_.base / file.path).parent_path());
+    }
+  });
+  // dataset.json goes first: from then on the folder holds no dataset that could be resumed.
+  file_system_.remove_file(dataset_file());
+  file_system_.sync_folder(folders_.records_path());
+  std::set<fs::path> emptied;
+  old.visit_entries([&](const std::string& worker, const EntryPlace& place) {
+    const auto content = old.files_of(worker, place);
+    if (!content) return;
+    for (const JournalledFile& file : content->files) {
+      if (!may_remove(file)) continue;
+      const fs::path path = folders_.base / file.path;
+      file_system_.remove_file(path);
+      for (fs::path above = path.parent_path();
+           above != folders_.base && emptied.insert(above).second; above = above.parent_path()) {
+      }
+    }
+  });
+  for (auto folder = emptied.rbegin(); folder != emptied.rend(); ++folder) {
+    if (*folder != folders_.records_path()) file_system_.remove_if_empty(*folder);
+  }
+  // The journals go last: a power cut must not bring back files that nothing names.
+  for (const fs::path& folder : emptied) file_system_.sync_folder(folder);
+  file_system_.sync_folder(folders_.base);
+  {
+    const std::lock_guard lock(folders_mutex_);
+    known_folders_.clear();
+  }
+  for (const std::string& name : file_system_.list(diorama_folder() / "claims")) {
+    if (name.starts_with("visits-") && is_plain_name(name)) workers_.remove_claims(name);
+  }
+  for (const std::string& worker : file_system_.list(diorama_folder() / "stage")) {
+    if (worker != options_.self.name && is_plain_name(worker)) remove_stage(worker);
+  }
+  for (const Workers::Lease& lease : workers_.others()) {
+    if (!workers_.is_alive(lease)) workers_.remove(lease);
+  }
+  for (const std::string& worker : workers) {
+    file_system_.remove_file(old.index_file(worker));
+    file_system_.remove_file(old.entries_file(worker));
+  }
+  file_system_.sync_folder(diorama_folder() / "journal");
+  journals_.forget();
+}
+
+// Committing.
+
+void OutputStore::check_no_links(const fs::path& folder) {
+  const std::lock_guard lock(folders_mutex_);
+  for (fs::path place = folder; place != folders_.base && !known_folders_.contains(place);
+       place = place.parent_path()) {
+    const auto status = file_system_.status(place);
+    if (status && status->kind != FileStatus::Kind::Folder) {
+      throw Error(ErrorKind::Output, place.string() +
+                                         ": expected a folder, found a link or a file; a dataset "
+                                         "lies in one folder, without links");
+    }
+    if (place == place.parent_path() || place.empty()) return;
+  }
+}
+
+void OutputStore::make_target_folder(const fs::path& folder) {
+  check_no_links(folder);
+  {
+    const std::lock_guard lock(folders_mutex_);
+    unsynced_folders_.insert(folder);
+    if (known_folders_.contains(folder)) return;
+  }
+  const auto created = file_system_.make_folders(folder);
+  const std::lock_guard lock(folders_mutex_);
+  for (const fs::path& made : created) unsynced_folders_.insert(made.parent_path());
+  known_folders_.insert(folder);
+}
+
+JournalledFiles OutputStore::journalled(const Transaction& transaction) const {
+  JournalledFiles content;
+  std::set<std::string> places;
+  for (const StagedFile& file : transaction.files) {
+    const std::string path = below(folders_.folder(file.folder), file.path);
+    if (!places.insert(path).second) {
+      throw Error(ErrorKind::Config, (folders_.base / path).string() +
+                                         ": two files of one capture have this name; give the "
+                                         "writers different `output_dir`s");
+    }
+    content.files.push_back({path, file.bytes.size(), digest_of(file.bytes)});
+  }
+  for (const auto& [writer, line] : transaction.records) {
+    content.records.emplace_back(folders_.writers[writer].name, line);
+  }
+  return content;
+}
+
+void OutputStore::write_stage(int entry, const Transaction& transaction) {
+  const std::string& self = options_.self.name;
+  for (std::size_t i = 0; i < transaction.files.size(); ++i) {
+    const std::vector<std::byte>& bytes = transaction.files[i].bytes;
+    file_system_.write(staged(self, entry, i), bytes);
+    bytes_written_ += bytes.size();
+  }
+  // Once all are on their way: the first sync takes the others along.
+  for (std::size_t i = 0; i < transaction.files.size(); ++i) {
+    file_system_.sync(staged(self, entry, i));
+  }
+  file_system_.sync_folder(stage(self));
+}
+
+void OutputStore::clear_stage(int entry, std::size_t files) {
+  for (std::size_t i = 0; i < files; ++i) {
+    file_system_.remove_file(staged(options_.self.name, entry, i));
+  }
+}
+
+void OutputStore::publish(int entry, const JournalledFiles& content) {
+  std::vector<fs::path> moved;
+  for (std::size_t i = 0; i < content.files.size(); ++i) {
+    const JournalledFile& file = content.files[i];
+    const fs::path target = folders_.base / file.path;
+    const fs::path source = staged(options_.self.name, entry, i);
+    make_target_folder(target.parent_path());
+    if (file_system_.move_new(source, target)) {
+      moved.push_back(target);
+      continue;
+    }
+    if (state_of(target, file) == FileState::Right) {
+      file_system_.remove_file(source);
+      continue;
+    }
+    // Somebody else's file: this capture will not be, and leaves none of its own.
+    writer_.void_entry(options_.self.name, entry);
+    for (const fs::path& path : moved) file_system_.remove_file(path);
+    clear_stage(entry, content.files.size());
+    throw Error(ErrorKind::Output,
+                target.string() + ": exists and is no file of this dataset (" + entry_name(entry) +
+                    " has another content); move it away or choose another --output");
+  }
+}
+
+void OutputStore::check_membership() {
+  if (!is_lost_ && workers_.is_member()) return;
+  throw Busy(folders_.records_path().string() +
+             ": other processes took this one for dead and go on with its part; it was cut off for "
+             "more than " +
+             std::to_string(options_.lease_timeout.count()) + " s");
+}
+
+void OutputStore::commit(int entry, const Transaction& transaction) {
+  const JournalledFiles content = journalled(transaction);
+  try {
+    write_stage(entry, transaction);
+    check_membership();
+    writer_.commit(entry, content);
+  } catch (...) {
+    try {
+      clear_stage(entry, transaction.files.size());
+    } catch (const Error&) {
+      // The first failure is the one to report; who joins next clears what is left.
+    }
+    // Who took over also took the stage away: that is the reason then.
+    check_membership();
+    throw;
+  }
+  {
+    const std::shared_lock lock(publishing_);
+    publish(entry, content);
+    writer_.published(entry);
+  }
+  if (++commits_since_checkpoint_ >= kCommitsPerCheckpoint) checkpoint();
+}
+
+void OutputStore::checkpoint() {
+  const std::unique_lock lock(publishing_);
+  commits_since_checkpoint_ = 0;
+  std::set<fs::path> unsynced;
+  {
+    const std::lock_guard folders_lock(folders_mutex_);
+    unsynced.swap(unsynced_folders_);
+  }
+  for (const fs::path& folder : unsynced) file_system_.sync_folder(folder);
+  writer_.checkpoint();
+}
+
+void OutputStore::commit_capture(int capture, const Transaction& transaction) {
+  commit(capture, transaction);
+}
+
+void OutputStore::commit_begin(const Transaction& transaction) {
+  if (!journals_.is_published(kBeginEntry)) commit(kBeginEntry, transaction);
+}
+
+bool OutputStore::claim_finish() {
+  if (workers_.claim("finish")) return false;
+  journals_.refresh();
+  return !is_finished();
+}
+
+void OutputStore::commit_finish(const Transaction& transaction) {
+  commit(kFinishEntry, transaction);
+  checkpoint();
+  journals_.refresh();
+}
+
+std::optional<int> OutputStore::claim_visit(int visit_count,
+                                            const std::function<bool(int)>& needs_work) {
+  const auto claim = [&](int visit) { return !workers_.claim(visit_task(visit)); };
+  std::vector<int> taken;  // by others, dead or alive
+  for (int first = 0; first < visit_count; first += kVisitsPerClaimFolder) {
+    const int end = std::min(visit_count, first + kVisitsPerClaimFolder);
+    std::vector<int> wanted;
+    for (int visit = first; visit < end; ++visit) {
+      if (needs_work(visit)) wanted.push_back(visit);
+    }
+    if (wanted.empty()) continue;
+    const std::set<std::string> tasks = workers_.claims_in(visit_folder(first));
+    std::vector<int> free;
+    for (const int visit : wanted) {
+      if (!tasks.contains(visit_task(visit)))
+        free.push_back(visit);
+      else if (!workers_.has_claimed(visit_task(visit)))
+        taken.push_back(visit);
+    }
+    // Workers that start together look for different ones.
+    const std::size_t start = free.empty() ? 0 : std::hash<std::string>()(options_.self.name);
+    for (std::size_t i = 0; i < free.size(); ++i) {
+      const int visit = free[(start + i) % free.size()];
+      if (claim(visit)) return visit;
+      taken.push_back(visit);
+    }
+  }
+  // Nothing is free; what dead workers left is.
+  journals_.refresh();
+  for (const int visit : taken) {
+    if (needs_work(visit) && claim(visit)) return visit;
+  }
+  return std::nullopt;
+}
+
+void OutputStore::read_records(std::size_t writer, const RecordVisitor& visit) const {
+  const std::string& name = folders_.writers[writer].name;
+  struct Place {
+    EntryPlace place;
+    const std::string* worker;
+  };
+  std::unordered_map<std::string, const std::string*> names;
+  std::vector<Place> places;
+  journals_.visit_entries([&](const std::string& worker, const EntryPlace& place) {
+    if (place.entry < 0 || place.entry >= capture_count_ || !place.is_published) return;
+    const auto known = journals_.workers().find(worker);
+    if (known != journals_.workers().end()) places.push_back({place, &known->first});
+  });
+  std::sort(places.begin(), places.end(), [](const Place& a, const Place& b) {
+    return std::pair(a.place.entry, *a.worker) < std::pair(b.place.entry, *b.worker);
+  });
+  int last = -1;
+  for (const Place& place : places) {
+    if (place.place.entry == last) continue;
+    const auto content = journals_.files_of(*place.worker, place.place);
+    if (!content) continue;
+    last = place.place.entry;
+    for (const auto& [who, line] : content->records) {
+      if (who == name) visit(place.place.entry, line);
+    }
+  }
+}
+
+}  // namespace diorama

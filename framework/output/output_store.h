@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <shared_mutex>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "diorama/writer.h"
+#include "framework/output/file_system.h"
+#include "framework/output/journal.h"
+#include "framework/output/workers.h"
+
+namespace diorama {
+
+/// One file of a transaction, still in memory.
+struct StagedFile {
+  std::size_t folder = 0;  ///< Index into OutputFolders::writers, or kRecordsFolder.
+  std::string path;        ///< Below that folder.
+  std::vector<std::byte> bytes;
+};
+
+inline constexpr std::size_t kRecordsFolder = std::size_t(-1);
+
+/// What becomes visible on disk together.
+struct Transaction {
+  std::vector<StagedFile> files;
+  /// Per writer that recorded something: index and line.
+  std::vector<std::pair<std::size_t, std::string>> records;
+};
+
+/// Where a run writes: all of it below one folder, on one file system.
+struct OutputFolders {
+  std::filesystem::path base;
+  std::string records;  ///< Holds dataset.json and `.diorama`; below base, "." for base itself.
+  struct WriterFolder {
+    std::string name;    ///< Of the writer, unique.
+    std::string folder;  ///< Below base, or ".".
+  };
+  std::vector<WriterFolder> writers;
+
+  /// Of a writer or kRecordsFolder, below base.
+  const std::string& folder(std::size_t index) const;
+  std::filesystem::path records_path() const;
+};
+
+/// Collects what writers hand over; checks paths. Used by one thread.
+class CollectedFiles final : public CaptureFiles {
+ public:
+  /// Adds to `transaction`, which must outlive this. `writer` is for messages.
+  CollectedFiles(Transaction& transaction, std::size_t folder, std::string writer);
+  void add(std::string_view path, std::vector<std::byte> bytes) override;
+  void record(std::string_view line) override;
+
+ private:
+  Transaction& transaction_;
+  std::size_t folder_;
+  std::string writer_;
+};
+
+/// A dataset on disk, and one worker's part in it. Each capture is a transaction: its files are
+/// written to the worker's own stage and synced, a line in its journal makes them count, then they
+/// are moved to their names. What was cut short before that line leaves no trace but the stage;
+/// what was cut short after it is completed by whoever joins next. So a killed run, or a power cut,
+/// leaves whole captures only, and any number of workers share a folder: nobody touches another's
+/// stage or journal while it lives, a file that exists is never replaced, and captures are the same
+/// bytes whoever makes them (ADR 0004).
+///
+/// Layout: `<records>/dataset.json` and `<records>/.diorama/` with `journal/` (see Journals),
+/// `workers/` and `claims/` (see Workers), `stage/<worker>/` while a run goes on.
+class OutputStore {
+ public:
+  enum class Existing : std::uint8_t { Refuse, Resume, Overwrite };
+
+  struct Options {
+    Existing existing = Existing::Refuse;
+    int shard = 0;  ///< From 0.
+    int shards = 1;
+    bool takes_visits = false;  ///< Instead of a shard: see claim_visit().
+    bool verifies_all = false;  ///< Not only what a dead worker left: join() reads every file.
+    std::chrono::seconds lease_timeout{120};
+    WorkerIdentity self = this_worker();
+    bool beats = true;  ///< Shows by a thread of its own that it lives.
+    std::function<void(const std::string&)> warn = {};  ///< Of what had to be repaired.
+  };
+
+  /// `file_system` must outlive the store. `capture_count` is that of the whole job.
+  OutputStore(FileSystem& file_system, OutputFolders folders, int capture_count, Options options);
+  /// Leaves; faults are passed over.
+  ~OutputStore();
+  OutputStore(const OutputStore&) = delete;
+  OutputStore& operator=(const OutputStore&) = delete;
+
+  /// Takes part in the dataset: reads what is there, completes or takes back what dead workers
+  /// began. Throws Error(Output) when folders cannot be written, hold a dataset that
+  /// Options::existing does not allow (for Refuse any, for Resume one whose dataset.json differs),
+  /// or a journal that is none; Busy when a living worker has this part. Then it leaves nothing
+  /// behind.
+  void join(const std::string& dataset_json);
+  /// Before the first commit: removes the old dataset (Overwrite), and makes dataset.json, which
+  /// only one job can.
+  void open();
+
+  bool is_done(int capture) const;
+  int done_count() const;
+  bool is_complete() const { return done_count() == capture_count_; }
+  bool is_finished() const;  ///< finish files are there, too.
+
+  /// Makes a capture appear. Safe from any thread. Throws Error(Output), then nothing of it shows;
+  /// Busy when others took this worker for dead.
+  void commit_capture(int capture, const Transaction& transaction);
+  /// Files that belong to no capture; nothing happens when they are there.
+  void commit_begin(const Transaction& transaction);
+  /// Of all workers that find the dataset complete, one may make the finish files.
+  bool claim_finish();
+  void commit_finish(const Transaction& transaction);
+
+  /// With takes_visits: a visit that `needs_work` and that no living worker has; empty when there
+  /// is none.
+  std::optional<int> claim_visit(int visit_count, const std::function<bool(int)>& needs_work);
+
+  /// Looks again for captures that other workers have finished meanwhile.
+  void refresh();
+  /// Records of one writer in capture order.
+  void read_records(std::size_t writer, const RecordVisitor& visit) const;
+  /// Ends the part in an orderly way: what it wrote survives power cuts, its lease is given back.
+  void close();
+
+  std::uint64_t bytes_written() const { return bytes_written_; }
+
+ private:
+  std::filesystem::path diorama_folder() const { return folders_.records_path() / ".diorama"; }
+  std::filesystem::path dataset_file() const { return folders_.records_path() / "dataset.json"; }
+  std::filesystem::path stage(const std::string& worker) const;
+  std::filesystem::path staged(const std::string& worker, int entry, std::size_t file) const;
+
+  std::string role() const;
+  void check_folder();
+  void refuse_links() const;
+  void refuse_rivals();
+  void check_same_dataset() const;
+  void probe(const std::filesystem::path& folder);
+  void leave();
+  void start_heart();
+
+  void settle_dead_workers();
+  void settle(const std::string& worker, const WorkerIndex& index);
+  bool settle_entry(const std::string& worker, const EntryPlace& place);
+  void verify_all();
+  void take_back(const std::string& worker, const EntryPlace& place, const std::string& reason,
+                 const std::vector<JournalledFile>& damaged);
+  void remove_dataset();
+  bool may_remove(const JournalledFile& file);
+  void remove_stage(const std::string& worker);
+
+  enum class FileState : std::uint8_t { Right, Missing, Wrong };
+  FileState state_of(const std::filesystem::path& path, const JournalledFile& file);
+  void make_target_folder(const std::filesystem::path& folder);
+  void check_no_links(const std::filesystem::path& folder);
+
+  void check_membership();
+  void commit(int entry, const Transaction& transaction);
+  JournalledFiles journalled(const Transaction& transaction) const;
+  void write_stage(int entry, const Transaction& transaction);
+  void clear_stage(int entry, std::size_t files);
+  void publish(int entry, const JournalledFiles& content);
+  void checkpoint();
+  void say(const std::string& text) const;
+
+  FileSystem& file_system_;
+  OutputFolders folders_;
+  int capture_count_;
+  Options options_;
+  std::string dataset_json_;
+  Workers workers_;
+  Journals journals_;
+  JournalWriter writer_;
+  bool has_joined_ = false;
+  bool has_opened_ = false;
+  bool replaces_ = false;  ///< The old dataset is still there and does not count.
+  std::vector<std::filesystem::path> created_;
+
+  std::mutex folders_mutex_;
+  std::set<std::filesystem::path> known_folders_;  ///< Made or found, without links.
+  std::set<std::filesystem::path> unsynced_folders_;
+  std::shared_mutex publishing_;  ///< Shared by commits, alone by a checkpoint.
+  std::atomic<int> commits_since_checkpoint_ = 0;
+  std::atomic<std::uint64_t> bytes_written_ = 0;
+
+  std::atomic<bool> is_lost_ = false;  ///< Others took this worker for dead.
+  std::mutex heart_mutex_;
+  std::condition_variable heart_stops_;
+  bool stops_beating_ = false;
+  std::thread heart_;
+};
+
+}  // namespace diorama
