@@ -157,7 +157,7 @@ class Replay {
   }
 
   void write(const Capture& capture) {
-    Transaction transaction;
+    Transaction transaction = store_.capture_transaction(capture.index);
     CollectedFiles files(transaction, 0, stored_.writer_name());
     call_component("writer '" + stored_.writer_name() + "'",
                    [&] { writer_.write(capture, files); });

@@ -29,8 +29,9 @@ namespace fs = std::filesystem;
 /// Closes on every way out; close() itself may report what write() did not.
 class OpenFile {
  public:
-  explicit OpenFile(const fs::path& file)
-      : file_(file), handle_(::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666)) {
+  /// `how`: O_CREAT | O_TRUNC, or O_APPEND.
+  OpenFile(const fs::path& file, int how)
+      : file_(file), handle_(::open(file.c_str(), O_WRONLY | O_CLOEXEC | how, 0666)) {
     if (handle_ < 0) fail("cannot create", file_, errno);
   }
   ~OpenFile() {
@@ -68,7 +69,13 @@ void LocalFileSystem::make_folders(const fs::path& folder) {
 }
 
 void LocalFileSystem::write(const fs::path& file, std::span<const std::byte> bytes) {
-  OpenFile open_file(file);
+  OpenFile open_file(file, O_CREAT | O_TRUNC);
+  open_file.write(bytes);
+  open_file.close();
+}
+
+void LocalFileSystem::append(const fs::path& file, std::span<const std::byte> bytes) {
+  OpenFile open_file(file, O_APPEND);
   open_file.write(bytes);
   open_file.close();
 }

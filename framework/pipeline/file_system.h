@@ -19,6 +19,8 @@ class FileSystem {
   virtual void make_folders(const std::filesystem::path& folder) = 0;
   /// Creates or replaces a file.
   virtual void write(const std::filesystem::path& file, std::span<const std::byte> bytes) = 0;
+  /// Puts bytes at the end of a file that is there.
+  virtual void append(const std::filesystem::path& file, std::span<const std::byte> bytes) = 0;
   /// Replaces `to` atomically.
   virtual void rename(const std::filesystem::path& from, const std::filesystem::path& to) = 0;
   /// A file, or a folder with all that is in it; nothing happens when it is not there.
@@ -37,6 +39,7 @@ class LocalFileSystem final : public FileSystem {
  public:
   void make_folders(const std::filesystem::path& folder) override;
   void write(const std::filesystem::path& file, std::span<const std::byte> bytes) override;
+  void append(const std::filesystem::path& file, std::span<const std::byte> bytes) override;
   void rename(const std::filesystem::path& from, const std::filesystem::path& to) override;
   void remove(const std::filesystem::path& path) override;
   void remove_if_empty(const std::filesystem::path& folder) override;

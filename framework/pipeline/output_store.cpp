@@ -33,6 +33,9 @@ bool is_capture_entry(const std::string& entry) {
          std::all_of(entry.begin(), entry.end(), [](char c) { return c >= '0' && c <= '9'; });
 }
 
+std::string begin_stage(int shard) { return kBegin + std::to_string(shard); }
+std::string finish_stage(int shard) { return kFinish + std::to_string(shard); }
+
 std::span<const std::byte> bytes_of(const std::string& text) {
   return std::as_bytes(std::span(text));
 }
@@ -50,16 +53,58 @@ std::string keys_that_differ(const std::string& before, const std::string& now) 
 
 }  // namespace
 
+Stage::~Stage() = default;
+
 CollectedFiles::CollectedFiles(Transaction& transaction, std::size_t folder, std::string writer)
     : transaction_(transaction), folder_(folder), writer_(std::move(writer)) {}
 
-void CollectedFiles::add(std::string_view path, std::vector<std::byte> bytes) {
-  if (!is_plain_relative(path)) {
-    throw Error(ErrorKind::Plugin, "writer '" + writer_ +
-                                       "': expected a relative path without `..`, found \"" +
-                                       std::string(path) + "\"");
+void CollectedFiles::check(std::string_view path) const {
+  if (is_plain_relative(path)) return;
+  throw Error(ErrorKind::Plugin, "writer '" + writer_ +
+                                     "': expected a relative path without `..`, found \"" +
+                                     std::string(path) + "\"");
+}
+
+/// Puts bytes at the end of a file; when it has become large, all of it goes to the stage.
+void CollectedFiles::put(std::size_t number, std::span<const std::byte> bytes) {
+  StagedFile& file = transaction_.files[number];
+  if (transaction_.stage && file.bytes.size() + bytes.size() >= kKeptBytes) {
+    for (const auto part : {std::span<const std::byte>(file.bytes), bytes}) {
+      if (!part.empty()) transaction_.stage->put(number, file, part);
+    }
+    file.bytes = {};
+    return;
   }
-  transaction_.files.push_back({folder_, std::string(path), std::move(bytes)});
+  file.bytes.insert(file.bytes.end(), bytes.begin(), bytes.end());
+}
+
+void CollectedFiles::add(std::string_view path, std::vector<std::byte> bytes) {
+  check(path);
+  transaction_.files.push_back({folder_, std::string(path), {}});
+  if (transaction_.stage && bytes.size() >= kKeptBytes) {
+    put(transaction_.files.size() - 1, bytes);
+  } else {
+    transaction_.files.back().bytes = std::move(bytes);
+  }
+}
+
+void CollectedFiles::append(std::string_view path, std::span<const std::byte> bytes) {
+  auto found = growing_.find(path);
+  if (found == growing_.end()) {
+    add(path, {});
+    found = growing_.emplace(path, transaction_.files.size() - 1).first;
+  }
+  const std::size_t before = transaction_.files[found->second].bytes.size();
+  put(found->second, bytes);
+  kept_ += transaction_.files[found->second].bytes.size() - before;
+  if (!transaction_.stage || kept_ < kKeptGrowingBytes) return;
+  for (const auto& [growing_path, number] : growing_) {
+    StagedFile& file = transaction_.files[number];
+    if (file.bytes.empty()) continue;
+    transaction_.stage->put(number, file, file.bytes);
+    file.bytes = {};
+  }
+  kept_ = 0;
 }
 
 void CollectedFiles::record(std::string_view line) {
@@ -73,6 +118,30 @@ void CollectedFiles::record(std::string_view line) {
   }
   transaction_.records.emplace_back(folder_, std::string(line));
 }
+
+class OutputStore::DiskStage final : public Stage {
+ public:
+  DiskStage(OutputStore& store, std::string name) : store_(store), name_(std::move(name)) {}
+  ~DiskStage() override {
+    try {
+      store_.clear_stage(name_, used_);
+    } catch (const Error&) {
+      // The next open() clears what is left.
+    }
+  }
+  void put(std::size_t number, StagedFile& file, std::span<const std::byte> bytes) override {
+    const fs::path folder = store_.stage(file.folder, name_);
+    if (used_.insert(file.folder).second) store_.file_system_.make_folders(folder);
+    store_.write_staged(folder / std::to_string(number), file.is_begun, bytes);
+    file.is_begun = true;
+  }
+  void release() override { used_.clear(); }
+
+ private:
+  OutputStore& store_;
+  std::string name_;
+  std::set<std::size_t> used_;
+};
 
 OutputStore::OutputStore(FileSystem& file_system, OutputFolders folders, int capture_count)
     : file_system_(file_system), folders_(std::move(folders)), capture_count_(capture_count) {}
@@ -231,9 +300,19 @@ void OutputStore::write_stage(const std::string& stage_name, const Transaction& 
   }
   for (std::size_t i = 0; i < transaction.files.size(); ++i) {
     const StagedFile& file = transaction.files[i];
-    file_system_.write(stage(file.folder, stage_name) / std::to_string(i), file.bytes);
-    bytes_written_ += file.bytes.size();
+    if (file.is_begun && file.bytes.empty()) continue;
+    write_staged(stage(file.folder, stage_name) / std::to_string(i), file.is_begun, file.bytes);
   }
+}
+
+void OutputStore::write_staged(const fs::path& place, bool is_begun,
+                               std::span<const std::byte> bytes) {
+  if (is_begun) {
+    file_system_.append(place, bytes);
+  } else {
+    file_system_.write(place, bytes);
+  }
+  bytes_written_ += bytes.size();
 }
 
 void OutputStore::publish(const std::string& stage_name,
@@ -284,8 +363,21 @@ void OutputStore::commit(const std::string& entry, const std::string& stage_name
     }
     throw;
   }
+  if (transaction.stage) transaction.stage->release();
   publish(stage_name, files);
   clear_stage(stage_name, used);
+}
+
+Transaction OutputStore::begin_transaction(int shard) {
+  return {std::make_unique<DiskStage>(*this, begin_stage(shard)), {}, {}};
+}
+
+Transaction OutputStore::capture_transaction(int capture) {
+  return {std::make_unique<DiskStage>(*this, capture_entry(capture)), {}, {}};
+}
+
+Transaction OutputStore::finish_transaction(int shard) {
+  return {std::make_unique<DiskStage>(*this, finish_stage(shard)), {}, {}};
 }
 
 void OutputStore::commit_capture(int capture, const Transaction& transaction) {
@@ -294,11 +386,11 @@ void OutputStore::commit_capture(int capture, const Transaction& transaction) {
 }
 
 void OutputStore::commit_begin(const Transaction& transaction, int shard) {
-  commit(kBegin, std::string(kBegin) + std::to_string(shard), transaction);
+  commit(kBegin, begin_stage(shard), transaction);
 }
 
 void OutputStore::commit_finish(const Transaction& transaction, int shard) {
-  commit(kFinish, std::string(kFinish) + std::to_string(shard), transaction);
+  commit(kFinish, finish_stage(shard), transaction);
   is_finished_ = true;
 }
 

@@ -390,7 +390,7 @@ void Pipeline::begin_output() {
     for (const PlannedCapture& capture : visit.captures) own.insert(capture.index);
   }
   store_.open(options_.existing, own);
-  Transaction transaction;
+  Transaction transaction = store_.begin_transaction(options_.shard);
   for (std::size_t i = 0; i < components_.writers.size(); ++i) {
     const std::string& name = job_.writers[i].name;
     CollectedFiles files(transaction, i, name);
@@ -403,7 +403,7 @@ void Pipeline::begin_output() {
 }
 
 void Pipeline::write(const PendingCapture& pending) {
-  Transaction transaction;
+  Transaction transaction = store_.capture_transaction(pending.capture.index);
   for (std::size_t i = 0; i < components_.writers.size(); ++i) {
     const std::string& name = job_.writers[i].name;
     CollectedFiles files(transaction, i, name);
@@ -430,7 +430,7 @@ void Pipeline::finish_output(const DatasetInfo& dataset) {
   store_.refresh();
   summary_.is_complete = store_.done_count() >= dataset.capture_count;
   if (!summary_.is_complete) return;
-  Transaction transaction;
+  Transaction transaction = store_.finish_transaction(options_.shard);
   for (std::size_t i = 0; i < components_.writers.size(); ++i) {
     const std::string& name = job_.writers[i].name;
     CollectedFiles files(transaction, i, name);

@@ -89,7 +89,9 @@ struct Visibility {
   std::int64_t amodal_pixels = 0;      ///< Covered without occluders, inside the image.
   std::int64_t outside_pixels = 0;     ///< Covered without occluders, outside the image.
   std::optional<PixelBox> amodal_box;  ///< Clipped to the image; absent when nothing is inside.
-  CoverageMask amodal_mask;            ///< Filled only when "amodal_mask" was demanded.
+  /// Of all covered pixels, as far out as CoverageMask reaches; absent when nothing is covered.
+  std::optional<PixelBox> whole_box;
+  CoverageMask amodal_mask;  ///< Filled only when "amodal_mask" was demanded.
 
   /// 1 - visible / amodal, in [0, 1]; nothing when no pixel is inside the image.
   std::optional<double> occlusion() const {

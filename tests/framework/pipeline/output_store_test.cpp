@@ -46,6 +46,11 @@ class FaultyFileSystem final : public FileSystem {
     count();
     local_.write(file, bytes);
   }
+  void append(const fs::path& file, std::span<const std::byte> bytes) override {
+    if (changes_ + 1 == at_) local_.append(file, bytes.first(bytes.size() / 2));
+    count();
+    local_.append(file, bytes);
+  }
   void rename(const fs::path& from, const fs::path& to) override {
     count();
     local_.rename(from, to);
@@ -82,12 +87,15 @@ std::vector<std::byte> bytes_of(const std::string& text) {
 constexpr int kCaptures = 3;
 const std::string kDataset = R"({"seed": 4, "job": "a"})";
 
-Transaction capture_files(int capture) {
-  Transaction transaction;
+/// The one below depth/ is too large to wait in memory.
+Transaction capture_files(OutputStore& store, int capture) {
+  Transaction transaction = store.capture_transaction(capture);
   CollectedFiles first(transaction, 0, "one");
   first.add_text("rgb_" + std::to_string(capture) + ".png", "colour " + std::to_string(capture));
-  first.add_text("depth/" + std::to_string(capture) + ".npy",
-                 std::string(3000, char('a' + capture)));
+  for (const std::size_t size : {CollectedFiles::kKeptBytes, std::size_t(3000)}) {
+    first.append_text("depth/" + std::to_string(capture) + ".npy",
+                      std::string(size, char('a' + capture)));
+  }
   first.record("line " + std::to_string(capture));
   CollectedFiles second(transaction, 1, "two");
   second.add_text("boxes/deep/" + std::to_string(capture) + ".json", "{}");
@@ -110,15 +118,14 @@ void run(FileSystem& file_system, const fs::path& root, OutputStore::Existing ex
   begin.files.push_back({0, "classes.txt", bytes_of("mug")});
   store.commit_begin(begin, 0);
   for (int i = 0; i < kCaptures; ++i) {
-    if (!store.is_done(i)) store.commit_capture(i, capture_files(i));
+    if (!store.is_done(i)) store.commit_capture(i, capture_files(store, i));
   }
   store.refresh();
-  Transaction finish;
-  std::string all;
+  Transaction finish = store.finish_transaction(0);
+  CollectedFiles last(finish, 0, "one");
   store.read_records(0, [&](int capture, std::string_view line) {
-    all += std::to_string(capture) + "=" + std::string(line) + ";";
+    last.append_text("all.txt", std::to_string(capture) + "=" + std::string(line) + ";");
   });
-  finish.files.push_back({0, "all.txt", bytes_of(all)});
   store.commit_finish(finish, 0);
   store.close();
 }
@@ -222,7 +229,7 @@ TEST_CASE("Overwriting removes all files of the old dataset, others stay", "[sto
     OutputStore store(local, folders_in(folder.path()), 9);
     store.check(kDataset, OutputStore::Existing::Resume);
     store.open(OutputStore::Existing::Resume, {8});
-    store.commit_capture(8, capture_files(8));
+    store.commit_capture(8, capture_files(store, 8));
   }
   std::ofstream(folder.path() / "out/one/notes.txt") << "mine";
   CHECK(visible_files_of(folder.path(), 8) == 3);
@@ -294,6 +301,53 @@ TEST_CASE("Files of writers stay inside their folders", "[store]") {
   files.add_text("a/b/c.txt", "x");
   CHECK(transaction.files.size() == 1);
   CHECK_THROWS_WITH(files.record("two\nlines"), ContainsSubstring("line break"));
+}
+
+TEST_CASE("What is appended to a file leaves the memory and comes out whole", "[store]") {
+  const TemporaryFolder folder;
+  LocalFileSystem local;
+  OutputStore store(local, folders_in(folder.path()), 1);
+  store.check(kDataset, OutputStore::Existing::Refuse);
+  store.open(OutputStore::Existing::Refuse, {0});
+  std::string odd, even;
+  {
+    Transaction transaction = store.capture_transaction(0);
+    CollectedFiles files(transaction, 0, "one");
+    files.append_text("empty.txt", "");
+    for (int i = 0; i < 40; ++i) {
+      const std::string piece(50'000 + std::size_t(i), char('a' + i % 26));
+      files.append_text(i % 2 == 0 ? "even.txt" : "odd.txt", piece);
+      (i % 2 == 0 ? even : odd) += piece;
+      std::size_t kept = 0;
+      for (const StagedFile& file : transaction.files) kept += file.bytes.size();
+      CHECK(kept < 2 * CollectedFiles::kKeptBytes);
+    }
+    files.add("large.bin", std::vector<std::byte>(3'000'000, std::byte(7)));
+    CHECK(transaction.files.back().bytes.empty());
+    store.commit_capture(0, transaction);
+  }
+  const auto files = tree(folder.path() / "out/one");
+  CHECK(files.size() == 4);
+  CHECK(files.at("even.txt") == even);
+  CHECK(files.at("odd.txt") == odd);
+  CHECK(files.at("empty.txt").empty());
+  CHECK(files.at("large.bin") == std::string(3'000'000, '\7'));
+  CHECK(store.bytes_written() == odd.size() + even.size() + 3'000'000);
+}
+
+TEST_CASE("What a stage holds goes when its transaction is not committed", "[store]") {
+  const TemporaryFolder folder;
+  LocalFileSystem local;
+  OutputStore store(local, folders_in(folder.path()), 1);
+  store.check(kDataset, OutputStore::Existing::Refuse);
+  store.open(OutputStore::Existing::Refuse, {0});
+  {
+    Transaction transaction = store.capture_transaction(0);
+    CollectedFiles files(transaction, 0, "one");
+    files.add("large.bin", std::vector<std::byte>(3'000'000, std::byte(7)));
+    CHECK(tree(folder.path() / "out/one").size() == 1);
+  }
+  CHECK(tree(folder.path() / "out/one").empty());
 }
 
 TEST_CASE("Two files of one name in a capture are an error", "[store]") {
