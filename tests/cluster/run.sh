@@ -69,7 +69,11 @@ wait_until() {
 }
 pictures() { find "$1" -name 'rgb_*.png' 2>/dev/null | wc -l; }
 has_pictures() { (($(pictures "$1") >= $2)); }
-delay() { echo "$1" >"$work/delay"; }  # milliseconds per rename, for programs that start from now on
+# delay MILLISECONDS [OPTION]...: per rename, and options, for programs that start from now on.
+delay() {
+  echo "$1" >"$work/delay"
+  echo "${*:2}" >"$work/options"
+}
 
 # The program as tasks find it: slowed down, with the plugins of the build.
 make_program() {
@@ -77,7 +81,7 @@ make_program() {
   cat >"$work/bin/diorama" <<-END
 	#!/bin/sh
 	export SLOW_RENAME_MS=\$(cat $work/delay) LD_PRELOAD=$work/slow_rename.so XDG_DATA_HOME=$work/none
-	exec $build/bin/diorama "\$@"
+	exec $build/bin/diorama "\$@" \$(cat $work/options)
 	END
   chmod +x "$work/bin/diorama"
   export PATH=$work/bin:$PATH
