@@ -77,10 +77,10 @@ delay() {
 
 # The program as tasks find it: slowed down, with the plugins of the build.
 make_program() {
-  cc -shared -fPIC -O1 -o "$work/slow_rename.so" tests/cluster/slow_rename.c -ldl
+  cc -shared -fPIC -O1 -o "$work/unkind_files.so" tests/cluster/unkind_files.c -ldl
   cat >"$work/bin/diorama" <<-END
 	#!/bin/sh
-	export SLOW_RENAME_MS=\$(cat $work/delay) LD_PRELOAD=$work/slow_rename.so XDG_DATA_HOME=$work/none
+	export SLOW_RENAME_MS=\$(cat $work/delay) LD_PRELOAD=$work/unkind_files.so XDG_DATA_HOME=$work/none
 	exec $build/bin/diorama "\$@" \$(cat $work/options)
 	END
   chmod +x "$work/bin/diorama"
