@@ -4,10 +4,13 @@
 #   ./bootstrap.sh demo     install what is needed, build, make the sample pack, run the default job
 #   ./bootstrap.sh test     install what is needed, build, run every test
 #   ./bootstrap.sh build    install what is needed, build
-#   ./bootstrap.sh sanitize install what is needed, build the core tests with sanitizers, run them
+#   ./bootstrap.sh sanitize install what is needed, build with sanitizers and run what reads files of others,
+#                           the renderer (address, undefined) and what has threads (thread)
+#   ./bootstrap.sh packages install what is needed for all of these, tests/check_format.sh and tests/check_tidy.sh
 # Options: --preset NAME   a preset of CMakePresets.json (default: release)
 set -euo pipefail
 cd "$(dirname "$0")"
+export CMAKE_GENERATOR=Ninja  # also of the projects that tests build
 
 build_packages=(
   g++ cmake ninja-build pkgconf git
@@ -20,7 +23,21 @@ test_packages=(
   python3-minimal python3-h5py python3-jsonschema python3-numpy python3-opencv
 )
 
-usage() { sed -n '3,8s/^# \{0,1\}//p' "$0"; }
+check_packages=(clang-format-14 clang-tidy-14)
+# Tests by what they are about, for the sanitizers; all of them would take an hour each.
+foreign_bytes=(
+  sdk_test config_test replicator_test host_test plugin_search_test images_test pipeline_test lint_test
+  framework_inspect_test loader_usd_test loader_usd_expected loader_assimp_test physics_bullet_test
+  writer_support_test
+)
+renderer=(renderer_embree_test)
+threads=(host_test pipeline_test)
+writers=(
+  writer_basic writer_bop writer_coco writer_data_visualization writer_hdf5 writer_kitti writer_pose
+  writer_voc writer_webdataset writer_yolo
+)
+
+usage() { sed -n '3,10s/^# \{0,1\}//p' "$0"; }
 
 # Installs the packages that dpkg does not list as installed; says which. sudo only when not root.
 install_packages() {
@@ -54,7 +71,7 @@ configure() {
   rm -f "build-$preset.log"
 }
 
-# sanitize PRESET TEST...: builds and runs some tests only; all of them would take an hour.
+# sanitize PRESET TEST...: builds and runs some tests only.
 sanitize() {
   preset=$1
   shift
@@ -63,6 +80,26 @@ sanitize() {
   local names
   names=$(IFS='|'; echo "$*")
   ctest --preset "$preset" -j "$(nproc)" -R "^($names)\$"
+}
+
+# The program itself, with every writer at once on many threads, two shards after each other.
+run_all_writers() {
+  cmake --build --preset "$1" --target diorama physics_bullet randomizers_core renderer_null "${writers[@]}"
+  local output shard
+  output=$(mktemp -d)
+  for shard in 1/2 2/2; do
+    "build/$1/bin/diorama" run tests/end_to_end/all_writers.yaml --output "$output" --threads 4 --shard "$shard"
+  done
+  rm -rf "$output"
+}
+
+# The program has no place on the PATH yet; says what to type.
+say_program() {
+  cat <<END
+
+The program is build/$preset/bin/diorama; it finds plugins and samples beside itself. To call it by name:
+  export PATH="$PWD/build/$preset/bin:\$PATH"
+END
 }
 
 command=${1:-help}
@@ -80,6 +117,7 @@ case $command in
     install_packages "${build_packages[@]}"
     configure OFF
     cmake --build --preset "$preset"
+    say_program
     ;;
   demo)
     install_packages "${build_packages[@]}"
@@ -87,6 +125,7 @@ case $command in
     cmake --build --preset "$preset"
     # A finished dataset is left as it is, an interrupted one is completed.
     "build/$preset/bin/diorama" run configs/dining_room.yaml --resume
+    say_program
     ;;
   test)
     install_packages "${build_packages[@]}" "${test_packages[@]}"
@@ -96,11 +135,11 @@ case $command in
     ;;
   sanitize)
     install_packages "${build_packages[@]}" "${test_packages[@]}"
-    # What reads files of others, what is shared between threads.
-    sanitize asan sdk_test config_test host_test images_test pipeline_test loader_usd_test \
-      physics_bullet_test writer_support_test
-    sanitize tsan host_test pipeline_test
+    sanitize asan "${foreign_bytes[@]}" "${renderer[@]}"
+    sanitize tsan "${threads[@]}"
+    run_all_writers tsan
     ;;
+  packages) install_packages "${build_packages[@]}" "${test_packages[@]}" "${check_packages[@]}" ;;
   help | -h | --help) usage ;;
   *) echo "bootstrap: unknown command '$command'" >&2; usage >&2; exit 2 ;;
 esac

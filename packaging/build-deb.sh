@@ -12,6 +12,18 @@ usage() { sed -n '3,8s/^# \{0,1\}//p' "$0" >&2; exit 2; }
 mode=${1:-}
 if (($# > 1)); then usage; fi
 
+# Installs what packing needs and is absent. sudo only when not root.
+as_root() { if ((EUID == 0)); then "$@"; else sudo "$@"; fi; }
+tools=(dpkg-dev debhelper fakeroot lintian)
+has_all() { dpkg -s "${tools[@]}" && { [[ $mode == --source ]] || dpkg-checkbuilddeps packaging/debian/control; }; }
+if ! has_all >/dev/null 2>&1; then
+  as_root apt-get update -qq
+  as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${tools[@]}" >/dev/null
+  if [[ $mode != --source ]]; then  # of the folder with debian/control
+    as_root env DEBIAN_FRONTEND=noninteractive apt-get build-dep -y -qq ./packaging >/dev/null
+  fi
+fi
+
 version=$(sed -n '1s/.*(\(.*\)-.*/\1/p' packaging/debian/changelog)
 out=$PWD/build/deb
 source=$out/diorama-$version

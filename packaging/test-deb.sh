@@ -5,7 +5,7 @@
 # come with the packages, removes everything and looks for leftovers.
 #   packaging/test-deb.sh            Debian 12, with the packages of packaging/build-deb.sh
 #   packaging/test-deb.sh trixie     Debian 13: first builds, tests and packs the source there
-# Needs root and debootstrap. Packages come from the mirror that apt uses here. The default job renders
+# Needs root; installs debootstrap. Packages come from the mirror that apt uses here. The default job renders
 # with fewer samples per pixel (SAMPLES, default 2): what is tried is the installation.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -13,7 +13,11 @@ release=${1:-bookworm}
 mirror=$(apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' 'Label: Debian' | head -n 1)
 
 if ((EUID != 0)); then echo "test-deb: must run as root (chroot)" >&2; exit 1; fi
-if ! command -v debootstrap >/dev/null; then echo "test-deb: install debootstrap" >&2; exit 1; fi
+if ! command -v debootstrap >/dev/null; then
+  apt-get update -qq
+  DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends debootstrap >/dev/null
+fi
+mkdir -p build
 if [[ $release == bookworm && ! -e $(echo build/deb/diorama_*.deb) ]]; then
   echo "test-deb: no packages in build/deb; run packaging/build-deb.sh" >&2
   exit 1

@@ -9,11 +9,14 @@ namespace diorama {
 
 void register_builtin_annotators(Registrar& registrar) {
   add<InstanceIds>(registrar, "instance_ids",
-                   "Gives every pixel the id of the nearest labelled node above its surface.");
+                   "Gives every pixel the id of the nearest labelled node above its surface.",
+                   {"", "leaf_id", "instance_id"});
   add<Instances>(registrar, "instances",
-                 "Lists the labelled instances of the scene with pose, bounds and tight box.");
+                 "Lists the labelled instances of the scene with pose, bounds and tight box.",
+                 {"", "instance_id", "instances"});
   add<ObjectCoordinates>(registrar, "object_coordinates",
-                         "Gives every labelled pixel its place inside its instance's box (NOCS).");
+                         "Gives every labelled pixel its place inside its instance's box (NOCS).",
+                         {"", "instance_id position instances", "object_coordinates"});
 }
 
 }  // namespace diorama

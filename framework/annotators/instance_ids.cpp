@@ -24,7 +24,7 @@ std::vector<std::uint32_t> instance_of_leaf(const Scene& scene) {
 NameSet InstanceIds::needs() const { return {std::string(kLeafId.name)}; }
 NameSet InstanceIds::provides() const { return {std::string(kInstanceId.name)}; }
 
-void InstanceIds::annotate(const Scene& scene, Frame& frame) const {
+void InstanceIds::do_annotate(const Scene& scene, Frame& frame) const {
   const std::vector<std::uint32_t> table = instance_of_leaf(scene);
   Image<std::uint32_t> ids = frame.get(kLeafId);
   std::ranges::transform(ids.pixels(), ids.pixels().begin(), [&](std::uint32_t leaf) {

@@ -17,7 +17,9 @@ class InstanceIds final : public Annotator {
 
   NameSet needs() const override;
   NameSet provides() const override;
-  void annotate(const Scene& scene, Frame& frame) const override;
+
+ private:
+  void do_annotate(const Scene& scene, Frame& frame) const override;
 };
 
 }  // namespace diorama

@@ -65,7 +65,7 @@ Aabb instance_bounds(const Scene& scene, const LabelledInstance& instance) {
 NameSet Instances::needs() const { return {std::string(kInstanceId.name)}; }
 NameSet Instances::provides() const { return {"instances"}; }
 
-void Instances::annotate(const Scene& scene, Frame& frame) const {
+void Instances::do_annotate(const Scene& scene, Frame& frame) const {
   frame.instances.clear();
   for (const LabelledInstance& labelled : labelled_instances(scene)) {
     Instance instance;

@@ -18,7 +18,9 @@ class Instances final : public Annotator {
 
   NameSet needs() const override;
   NameSet provides() const override;  ///< The annotation "instances".
-  void annotate(const Scene& scene, Frame& frame) const override;
+
+ private:
+  void do_annotate(const Scene& scene, Frame& frame) const override;
 };
 
 }  // namespace diorama

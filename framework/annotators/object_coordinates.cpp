@@ -26,7 +26,7 @@ NameSet ObjectCoordinates::needs() const {
 }
 NameSet ObjectCoordinates::provides() const { return {std::string(kObjectCoordinates.name)}; }
 
-void ObjectCoordinates::annotate(const Scene&, Frame& frame) const {
+void ObjectCoordinates::do_annotate(const Scene&, Frame& frame) const {
   std::map<std::uint32_t, Affine> maps;
   for (const Instance& instance : frame.instances) {
     maps.emplace(instance.id, unit_from_world(instance));

@@ -19,7 +19,9 @@ class ObjectCoordinates final : public Annotator {
 
   NameSet needs() const override;
   NameSet provides() const override;
-  void annotate(const Scene& scene, Frame& frame) const override;
+
+ private:
+  void do_annotate(const Scene& scene, Frame& frame) const override;
 };
 
 }  // namespace diorama

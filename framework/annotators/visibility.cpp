@@ -41,35 +41,51 @@ std::int64_t count_set(std::span<const std::uint8_t> bits) {
   return count;
 }
 
-/// Counts inside and outside, and the box of what lies inside. Row by row, because bits are counted
-/// many at once.
+constexpr int kFar = std::numeric_limits<int>::max();
+
+/// Widens a box by the set bytes of a row that begins at (x, y). Looks only at what lies outside
+/// the box's columns, so that few bytes are looked at twice.
+void widen(PixelBox& box, int x, int y, std::span<const std::uint8_t> row) {
+  const auto is_set = [](std::uint8_t bit) { return bit != 0; };
+  const auto behind = [&](int edge) {
+    return std::min(row.size(), std::size_t(std::max<std::int64_t>(edge, x) - x));
+  };
+  const auto left = row.first(behind(box.x_min));
+  const auto first = std::ranges::find_if(left, is_set);
+  if (first != left.end()) box.x_min = x + int(first - left.begin());
+  const auto right = row.subspan(behind(box.x_max));
+  const auto last = std::find_if(right.rbegin(), right.rend(), is_set);
+  if (last != right.rend()) box.x_max = x + int(row.size()) - int(last - right.rbegin());
+  box.y_min = std::min(box.y_min, y);
+  box.y_max = y + 1;
+}
+
+/// Counts inside and outside, and the boxes of what lies inside and of all. Row by row, because
+/// bits are counted many at once.
 Visibility measure(const CoverageMask& mask, int image_width, int image_height) {
   Visibility visibility;
   const PixelBox& box = mask.box;
   const PixelBox in_image = box.clipped(image_width, image_height);
-  constexpr int kFar = std::numeric_limits<int>::max();
-  PixelBox inside{kFar, kFar, 0, 0};
+  PixelBox inside{kFar, kFar, std::numeric_limits<int>::min(), 0};
+  PixelBox whole = inside;
   for (int y = box.y_min; y < box.y_max; ++y) {
     const auto row =
         std::span(mask.bits).subspan(mask.index(box.x_min, y), std::size_t(box.width()));
     const std::int64_t count = count_set(row);
+    if (count == 0) continue;
     visibility.outside_pixels += count;
-    if (y < in_image.y_min || y >= in_image.y_max || in_image.is_empty() || count == 0) continue;
+    widen(whole, box.x_min, y, row);
+    if (y < in_image.y_min || y >= in_image.y_max || in_image.is_empty()) continue;
     const auto seen =
         row.subspan(std::size_t(in_image.x_min - box.x_min), std::size_t(in_image.width()));
     const std::int64_t seen_count = count_set(seen);
     if (seen_count == 0) continue;
     visibility.outside_pixels -= seen_count;
     visibility.amodal_pixels += seen_count;
-    const auto is_set = [](std::uint8_t bit) { return bit != 0; };
-    const auto first = std::ranges::find_if(seen, is_set) - seen.begin();
-    const auto last = seen.rend() - std::find_if(seen.rbegin(), seen.rend(), is_set);
-    inside.x_min = std::min(inside.x_min, in_image.x_min + int(first));
-    inside.y_min = std::min(inside.y_min, y);
-    inside.x_max = std::max(inside.x_max, in_image.x_min + int(last));
-    inside.y_max = y + 1;
+    widen(inside, in_image.x_min, y, seen);
   }
   if (visibility.amodal_pixels > 0) visibility.amodal_box = inside;
+  if (!whole.is_empty()) visibility.whole_box = whole;
   return visibility;
 }
 

@@ -41,16 +41,28 @@ class Assembler {
     if (type) note_plugin(registry_.entry(ComponentKind::Loader, *type));
   }
 
+  /// The program's own come first, so that a plugin that is merely there changes no job.
   std::vector<std::string> annotator_types() const {
-    return registry_.types(ComponentKind::Annotator);
+    std::vector<std::string> types = registry_.types(ComponentKind::Annotator);
+    std::ranges::stable_partition(
+        types, [&](const std::string& type) { return annotator_entry(type).file.empty(); });
+    return types;
   }
-  /// Without a word of the job; its plugin is not remembered.
+  const ComponentEntry& annotator_entry(const std::string& type) const {
+    return registry_.entry(ComponentKind::Annotator, type);
+  }
+  /// One that the job does not list; it must be what its plugin lists, by which it was chosen.
   std::unique_ptr<Annotator> make_default_annotator(const std::string& type) {
     Value map = Value::make_map();
     map.set("type", Value::text(type));
     const auto keys = host_keys(ComponentKind::Annotator, "annotators");
     auto made = registry_.make<Annotator>(map, "annotator", keys, complaints_, host_);
     complaints_.raise();
+    const ComponentEntry& entry = annotator_entry(type);
+    call_component("annotator '" + type + "'", [&] {
+      require_listed("needs", made->needs(), entry.needs);
+      require_listed("provides", made->provides(), entry.provides);
+    });
     return made;
   }
   void note_annotator(const std::string& type) {
@@ -71,6 +83,18 @@ class Assembler {
   }
 
  private:
+  static void require_listed(const char* what, const NameSet& names,
+                             const std::vector<std::string>& listed) {
+    if (names == NameSet(listed.begin(), listed.end())) return;
+    std::string found;
+    for (const std::string& name : names) found += (found.empty() ? "" : " ") + name;
+    std::string expected;
+    for (const std::string& name : listed) expected += (expected.empty() ? "" : " ") + name;
+    throw Error(ErrorKind::Plugin, std::string(what) + " other names (" + found +
+                                       ") than its plugin lists (" + expected +
+                                       "); mend its DIORAMA_ADD_ANNOTATOR");
+  }
+
   void note_plugin(const ComponentEntry& entry) { plugins_[entry.plugin] = entry.version; }
 
   Registry& registry_;
@@ -170,25 +194,35 @@ std::vector<Need> needs_of(const JobAssembly& assembly) {
   return needs;
 }
 
-/// Chooses among all annotators, those that the job lists and the others with their defaults.
+/// Chooses among all annotators: those that the job lists, and the others by what their plugins
+/// say of them. Only what is chosen is made.
 void resolve_needs(Assembler& assembler, ListedAnnotators listed, JobAssembly& assembly) {
-  std::vector<std::unique_ptr<Annotator>> annotators;
   std::vector<AnnotatorOffer> offers;
   for (const std::string& type : assembler.annotator_types()) {
-    auto& own = listed[type];
-    const bool is_listed = own != nullptr;
-    annotators.push_back(is_listed ? std::move(own) : assembler.make_default_annotator(type));
-    offers.push_back({type, annotators.back()->needs(), annotators.back()->provides(), is_listed});
+    if (const auto own = listed.find(type); own != listed.end()) {
+      const Annotator& annotator = *own->second;
+      call_component("annotator '" + type + "'", [&] {
+        offers.push_back({type, annotator.needs(), annotator.provides(), true});
+      });
+    } else {
+      const ComponentEntry& entry = assembler.annotator_entry(type);
+      offers.push_back({type,
+                        {entry.needs.begin(), entry.needs.end()},
+                        {entry.provides.begin(), entry.provides.end()},
+                        false});
+    }
   }
   JobComponents& parts = assembly.components;
   parts.demand = resolve_demand(needs_of(assembly), parts.renderer->provides(),
                                 "renderer '" + assembly.job.renderer.type + "'", offers);
   for (const std::size_t index : parts.demand.annotators) {
-    assembler.note_annotator(offers[index].type);
-    parts.annotators.push_back(std::move(annotators[index]));
+    const AnnotatorOffer& offer = offers[index];
+    assembler.note_annotator(offer.type);
+    parts.annotators.push_back(offer.is_listed ? std::move(listed.at(offer.type))
+                                               : assembler.make_default_annotator(offer.type));
   }
-  for (std::size_t i = 0; i < offers.size(); ++i) {
-    if (offers[i].is_listed && annotators[i]) assembler.warn_of_idle(offers[i]);
+  for (const AnnotatorOffer& offer : offers) {
+    if (offer.is_listed && listed.at(offer.type)) assembler.warn_of_idle(offer);
   }
 }
 

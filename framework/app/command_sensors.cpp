@@ -136,7 +136,7 @@ class Replay {
 
  private:
   void begin() {
-    Transaction transaction;
+    Transaction transaction = store_.begin_transaction();
     CollectedFiles files(transaction, 0, stored_.writer_name());
     writer_.begin(info_of(stored_), files);
     store_.commit_begin(transaction);
@@ -155,7 +155,7 @@ class Replay {
   }
 
   void write(const Capture& capture) {
-    Transaction transaction;
+    Transaction transaction = store_.capture_transaction(capture.index);
     CollectedFiles files(transaction, 0, stored_.writer_name());
     call_component("writer '" + stored_.writer_name() + "'",
                    [&] { writer_.write(capture, files); });

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 #include <string_view>
+#include <utility>
 
 #include "framework/pipeline/job.h"
 
@@ -50,16 +51,140 @@ Value any_of(std::vector<Value> choices) {
   return schema;
 }
 
-Value properties_of(const std::vector<ParamSpec>& specs);
+/// Distributions hold distributions, so they stand once per range among the schema's definitions.
+class DistributionSchemas {
+ public:
+  Value reference(const ParamSpec& spec, bool is_vector) {
+    const std::string range = bound_name(spec.min) + "_" + bound_name(spec.max);
+    const std::string name = (is_vector ? "vector_" : "number_") + range;
+    if (!definitions_.find(name)) {
+      definitions_.set(name, Value());  // it refers to itself
+      definitions_.set(name, is_vector ? vectors(spec, name) : numbers(spec, name));
+    }
+    return reference_to(name);
+  }
+  Value texts() {
+    if (!definitions_.find("texts")) {
+      const Value list = list_schema(text_schema(), std::nullopt);
+      definitions_.set(
+          "texts", any_of({text_schema(), list,
+                           forms({choice("choices", text_schema()), sequence(text_schema())})}));
+    }
+    return reference_to("texts");
+  }
+  Value take() { return std::exchange(definitions_, Value::make_map()); }
 
-Value mapping_schema(const std::vector<ParamSpec>& specs) {
+ private:
+  /// A word such as `uniform` and what stands below it.
+  using Form = std::pair<std::string, Value>;
+
+  static std::string bound_name(double bound) {
+    return std::isfinite(bound) ? Value::number(bound).scalar : "any";
+  }
+  static Value reference_to(const std::string& name) {
+    Value schema = Value::make_map();
+    schema.set("$ref", Value::text("#/$defs/" + name));
+    return schema;
+  }
+  /// A mapping with exactly these keys, apart from the optional one.
+  static Value keys(std::vector<Form> properties, const std::string& optional = {}) {
+    Value schema = typed({"object"});
+    Value required = Value::make_list();
+    Value all = Value::make_map();
+    for (auto& [key, value] : properties) {
+      if (key != optional) required.list.push_back(Value::text(key));
+      all.set(key, std::move(value));
+    }
+    schema.set("properties", std::move(all));
+    schema.set("required", std::move(required));
+    schema.set("additionalProperties", Value::boolean(false));
+    return schema;
+  }
+  static Form choice(const std::string& key, Value item) {
+    ParamSpec weight;
+    weight.min = 0.0;
+    Value weights = list_schema(number_schema("number", weight), std::nullopt);
+    return {"choice",
+            keys({{key, some(std::move(item))}, {"weights", std::move(weights)}}, "weights")};
+  }
+  static Form sequence(Value item) {
+    return {"sequence", keys({{"items", some(std::move(item))}})};
+  }
+  static Value some(Value item) {
+    Value list = list_schema(std::move(item), std::nullopt);
+    list.set("minItems", Value::integer(1));
+    return list;
+  }
+  /// One of the words, bare or in Replicator's way.
+  static Value forms(std::vector<Form> forms) {
+    Value properties = Value::make_map();
+    for (const auto& [word, body] : forms) {
+      properties.set(word, body);
+      properties.set("distribution." + word, body);
+    }
+    Value schema = typed({"object"});
+    schema.set("properties", std::move(properties));
+    schema.set("additionalProperties", Value::boolean(false));
+    schema.set("minProperties", Value::integer(1));
+    schema.set("maxProperties", Value::integer(1));
+    return schema;
+  }
+  /// The forms that numbers and vectors share; `point` is a number or a vector.
+  static std::vector<Form> drawn(const Value& point, const Value& deviation,
+                                 const std::string& name) {
+    const Value bounds = keys({{"lower", point}, {"upper", point}});
+    return {{"uniform", bounds},
+            {"log_uniform", bounds},
+            {"normal", keys({{"mean", point}, {"std", deviation}})},
+            choice("choices", reference_to(name)),
+            sequence(reference_to(name))};
+  }
+  static ParamSpec not_negative() {
+    ParamSpec spec;
+    spec.min = 0.0;
+    return spec;
+  }
+  static Value numbers(const ParamSpec& spec, const std::string& name) {
+    const Value number = number_schema("number", spec);
+    return any_of({number, list_schema(number, 2),
+                   forms(drawn(number, number_schema("number", not_negative()), name))});
+  }
+  Value vectors(const ParamSpec& spec, const std::string& name) {
+    const Value axis = reference(spec, false);
+    const auto point = [](const ParamSpec& of) {
+      const Value number = number_schema("number", of);
+      return any_of({number, list_schema(number, 3)});
+    };
+    std::vector<Form> words = drawn(point(spec), point(not_negative()), name);
+    words.emplace_back("combine", keys({{"distributions", list_schema(axis, 3)}}));
+    const Value number = number_schema("number", spec);
+    return any_of({number, list_schema(number, 2), list_schema(axis, 3), forms(std::move(words))});
+  }
+
+  Value definitions_ = Value::make_map();
+};
+
+/// Turns declared parameters into schemas.
+class Schemas {
+ public:
+  Value of(const ParamSpec& spec);
+  Value properties(const std::vector<ParamSpec>& specs);
+  Value definitions() { return distributions_.take(); }
+
+ private:
+  Value mapping(const std::vector<ParamSpec>& specs);
+  Value bare(const ParamSpec& spec);
+  DistributionSchemas distributions_;
+};
+
+Value Schemas::mapping(const std::vector<ParamSpec>& specs) {
   Value schema = typed({"object"});
-  schema.set("properties", properties_of(specs));
+  schema.set("properties", properties(specs));
   schema.set("additionalProperties", Value::boolean(false));
   return schema;
 }
 
-Value bare_schema(const ParamSpec& spec) {
+Value Schemas::bare(const ParamSpec& spec) {
   switch (spec.type) {
     case ParamType::Bool:
       return typed({"boolean"});
@@ -81,12 +206,22 @@ Value bare_schema(const ParamSpec& spec) {
       return any_of({number_schema("number", spec), typed({"null"})});
     case ParamType::OptionalText:
       return typed({"string", "number", "boolean", "null"});
+    case ParamType::Distribution:
+      return distributions_.reference(spec, false);
+    case ParamType::VectorDistribution:
+      return distributions_.reference(spec, true);
+    case ParamType::OptionalDistribution:
+      return any_of({distributions_.reference(spec, false), typed({"null"})});
+    case ParamType::OptionalVectorDistribution:
+      return any_of({distributions_.reference(spec, true), typed({"null"})});
+    case ParamType::TextDistribution:
+      return any_of({distributions_.texts(), typed({"null"})});
     case ParamType::Any:
       return Value::make_map();
     case ParamType::Group:
-      return mapping_schema(spec.children);
+      return mapping(spec.children);
     case ParamType::List:
-      return list_schema(mapping_schema(spec.children), std::nullopt);
+      return list_schema(mapping(spec.children), std::nullopt);
     case ParamType::Choice:
       break;
   }
@@ -95,8 +230,8 @@ Value bare_schema(const ParamSpec& spec) {
   return schema;
 }
 
-Value schema_of(const ParamSpec& spec) {
-  Value schema = bare_schema(spec);
+Value Schemas::of(const ParamSpec& spec) {
+  Value schema = bare(spec);
   schema.set("description",
              Value::text(spec.unit.empty() ? spec.help : spec.help + " [" + spec.unit + "]"));
   if (spec.type != ParamType::Group && spec.type != ParamType::List) {
@@ -105,9 +240,9 @@ Value schema_of(const ParamSpec& spec) {
   return schema;
 }
 
-Value properties_of(const std::vector<ParamSpec>& specs) {
+Value Schemas::properties(const std::vector<ParamSpec>& specs) {
   Value properties = Value::make_map();
-  for (const ParamSpec& spec : specs) properties.set(spec.key, schema_of(spec));
+  for (const ParamSpec& spec : specs) properties.set(spec.key, of(spec));
   return properties;
 }
 
@@ -157,7 +292,7 @@ Value required(const char* key) {
 
 /// If the entry has this type, then it has these keys and no others.
 Value rule_for(const ComponentSection& section, const std::vector<ParamSpec>& host,
-               const DescribedComponent& component) {
+               const DescribedComponent& component, Schemas& schemas) {
   Value types = Value::make_map();
   types.set("type", type_is(component.type));
   Value condition = Value::make_map();
@@ -165,8 +300,8 @@ Value rule_for(const ComponentSection& section, const std::vector<ParamSpec>& ho
   const bool is_default = section.default_type && component.type == section.default_type;
   if (!is_default) condition.set("required", required("type"));
 
-  Value properties = properties_of(component.params);
-  for (const ParamSpec& spec : host) properties.set(spec.key, schema_of(spec));
+  Value properties = schemas.properties(component.params);
+  for (const ParamSpec& spec : host) properties.set(spec.key, schemas.of(spec));
   properties.set("type", type_is(component.type));
   Value keys = Value::make_map();
   keys.set("description", Value::text(component.help));
@@ -180,13 +315,13 @@ Value rule_for(const ComponentSection& section, const std::vector<ParamSpec>& ho
 }
 
 Value entry_schema(const ComponentSection& section, const std::vector<ParamSpec>& host,
-                   const std::vector<DescribedComponent>& components) {
+                   const std::vector<DescribedComponent>& components, Schemas& schemas) {
   Value rules = Value::make_list();
   Value types = Value::make_list();
   const auto allow = [&](const DescribedComponent& component) {
     types.list.push_back(Value::text(component.type));
     if (component.type == "null") types.list.emplace_back();
-    rules.list.push_back(rule_for(section, host, component));
+    rules.list.push_back(rule_for(section, host, component, schemas));
   };
   for (const DescribedComponent& component : components) {
     if (component.kind == section.kind) allow(component);
@@ -219,16 +354,17 @@ Value or_null(Value schema) {
 
 Value job_schema(const std::vector<ParamSpec>& job,
                  const std::vector<DescribedComponent>& components) {
+  Schemas schemas;
   Value properties = Value::make_map();
   for (const ParamSpec& spec : job) {
     const ComponentSection* section = section_called(spec.key);
     Value schema;
     if (section) {
-      schema = entry_schema(*section, spec.children, components);
+      schema = entry_schema(*section, spec.children, components, schemas);
       if (spec.type == ParamType::List) schema = list_schema(std::move(schema), std::nullopt);
       schema.set("description", Value::text(spec.help));
     } else {
-      schema = schema_of(spec);
+      schema = schemas.of(spec);
     }
     const bool is_section = spec.type == ParamType::List || spec.type == ParamType::Group;
     properties.set(spec.key, is_section ? or_null(std::move(schema)) : std::move(schema));
@@ -245,6 +381,7 @@ Value job_schema(const std::vector<ParamSpec>& job,
   schema.set("properties", std::move(properties));
   schema.set("required", required("environments"));
   schema.set("additionalProperties", Value::boolean(false));
+  schema.set("$defs", schemas.definitions());
   return schema;
 }
 

@@ -53,6 +53,16 @@ std::string type_text(const ParamSpec& spec) {
       return "number or null";
     case ParamType::OptionalText:
       return "text or null";
+    case ParamType::Distribution:
+      return "number or distribution";
+    case ParamType::VectorDistribution:
+      return "[x, y, z], number or distribution";
+    case ParamType::OptionalDistribution:
+      return "number, distribution or null";
+    case ParamType::OptionalVectorDistribution:
+      return "[x, y, z], number, distribution or null";
+    case ParamType::TextDistribution:
+      return "text, list of texts, choice or sequence";
     case ParamType::Any:
       return "any";
     case ParamType::Group:

@@ -103,7 +103,8 @@ class Bytes {
   void add(const PixelBox& box) { add_all(box.x_min, box.y_min, box.x_max, box.y_max); }
   void add(const Visibility& visibility) {
     add_all(visibility.visible_pixels, visibility.amodal_pixels, visibility.outside_pixels,
-            visibility.amodal_box, visibility.amodal_mask.box, visibility.amodal_mask.bits);
+            visibility.amodal_box, visibility.whole_box, visibility.amodal_mask.box,
+            visibility.amodal_mask.bits);
   }
   void add(const Occlusion& occlusion) {
     add_all(occlusion.front, occlusion.behind, occlusion.pixels);

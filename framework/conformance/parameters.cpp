@@ -129,6 +129,10 @@ std::optional<Value> value_of(ParamType type, double number) {
     case ParamType::Number:
     case ParamType::OptionalNumber:
     case ParamType::Interval:
+    case ParamType::Distribution:
+    case ParamType::VectorDistribution:
+    case ParamType::OptionalDistribution:
+    case ParamType::OptionalVectorDistribution:
       return Value::number(number);
     case ParamType::NumberList:
       list.list = {Value::number(number)};

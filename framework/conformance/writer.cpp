@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <exception>
+#include <filesystem>
 #include <map>
+#include <set>
+#include <span>
 #include <thread>
 
 #include "framework/conformance/fingerprint.h"
@@ -22,12 +25,17 @@ class MemoryFiles final : public CaptureFiles {
   std::vector<std::string> records;
 
   void add(std::string_view path, std::vector<std::byte> bytes) override {
-    const std::filesystem::path relative(path);
-    const bool leaves = std::find(relative.begin(), relative.end(), "..") != relative.end();
-    require(!path.empty() && relative.is_relative() && !leaves,
-            "writes '" + std::string(path) + "', which lies outside of its folder");
+    check(path);
     require(files.emplace(path, std::move(bytes)).second,
             "writes '" + std::string(path) + "' twice");
+  }
+  void append(std::string_view path, std::span<const std::byte> bytes) override {
+    check(path);
+    const bool is_new = growing.emplace(path).second;
+    require(!is_new || !files.contains(std::string(path)),
+            "writes '" + std::string(path) + "' twice");
+    std::vector<std::byte>& file = files[std::string(path)];
+    file.insert(file.end(), bytes.begin(), bytes.end());
   }
   void record(std::string_view line) override {
     require(line.find('\n') == line.npos, "a record holds a line break");
@@ -36,6 +44,15 @@ class MemoryFiles final : public CaptureFiles {
   friend bool operator==(const MemoryFiles& a, const MemoryFiles& b) {
     return a.files == b.files && a.records == b.records;
   }
+
+ private:
+  static void check(std::string_view path) {
+    const std::filesystem::path relative(path);
+    const bool leaves = std::find(relative.begin(), relative.end(), "..") != relative.end();
+    require(!path.empty() && relative.is_relative() && !leaves,
+            "writes '" + std::string(path) + "', which lies outside of its folder");
+  }
+  std::set<std::string> growing;  ///< What was appended to.
 };
 
 /// All of a dataset; which capture has written a file counts.

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstring>
+#include <map>
 #include <stdexcept>
 #include <string_view>
 
@@ -12,10 +14,11 @@
 namespace diorama::lint {
 namespace {
 
+/// BOP's widths are differences of the first and the last pixel.
 PixelBox box_of(const Json& bbox) {
   const int x = bbox.at(0).get<int>();
   const int y = bbox.at(1).get<int>();
-  return {x, y, x + bbox.at(2).get<int>(), y + bbox.at(3).get<int>()};
+  return {x, y, x + bbox.at(2).get<int>() + 1, y + bbox.at(3).get<int>() + 1};
 }
 
 Mat3 matrix_of(const Json& list) {
@@ -28,6 +31,9 @@ std::string padded_id(const std::string& id) {
   return id.size() < 6 ? std::string(6 - id.size(), '0') + id : id;
 }
 
+/// Of the benchmark's targets.
+constexpr double kLeastVisibleTarget = 0.1;
+
 /// Objects of the scenes to test on, by scene, image and object.
 using TargetCounts = std::map<std::array<int, 3>, int>;
 
@@ -39,7 +45,8 @@ void check_targets(Dataset& dataset, const Json& targets, const TargetCounts& ex
     found[key] += target.at("inst_count").get<int>();
   }
   dataset.check(found == expected, "counts agree between files", "test_targets_bop19.json",
-                "its targets are not the objects of test/*/scene_gt.json");
+                "its targets are not the objects of test/*/scene_gt.json that are at least " +
+                    std::to_string(int(100.0 * kLeastVisibleTarget)) + " % visible");
 }
 
 std::string model_file(const std::string& id) { return "models/obj_" + padded_id(id) + ".ply"; }
@@ -109,49 +116,65 @@ void check_models(Dataset& dataset, const Json& models) {
 
 class BopScene {
  public:
-  /// Adds the scene's objects to `targets` when it is one to test on.
-  BopScene(Dataset& dataset, std::string folder, const Json& models, TargetCounts& targets)
-      : dataset_(dataset), folder_(std::move(folder)), models_(models), targets_(targets) {}
+  /// `suffix` stands behind names where several cameras share a scene. Adds the scene's objects to
+  /// `targets` when it is one to test on; of several cameras, the first one is.
+  BopScene(Dataset& dataset, std::string folder, std::string suffix, bool has_targets,
+           const Json& models, TargetCounts& targets)
+      : dataset_(dataset),
+        folder_(std::move(folder)),
+        suffix_(std::move(suffix)),
+        has_targets_(has_targets && folder_.starts_with("test/")),
+        models_(models),
+        targets_(targets) {}
 
   void run() {
-    const auto cameras = dataset_.json(folder_ + "/scene_camera.json");
-    const auto poses = dataset_.json(folder_ + "/scene_gt.json");
-    const auto infos = dataset_.json(folder_ + "/scene_gt_info.json");
+    const std::string end = suffix_ + ".json";
+    const auto cameras = dataset_.json(folder_ + "/scene_camera" + end);
+    const auto poses = dataset_.json(folder_ + "/scene_gt" + end);
+    const auto infos = dataset_.json(folder_ + "/scene_gt_info" + end);
     if (!cameras || !poses || !infos) return;
-    dataset_.reading(folder_ + "/scene_gt.json", [&] {
+    dataset_.reading(folder_ + "/scene_gt" + end, [&] {
       for (const auto& [id, list] : poses->items()) {
         lint_image(padded_id(id), cameras->at(id), list, infos->at(id));
-        if (!folder_.starts_with("test/")) continue;
-        for (const Json& pose : list) {
-          ++targets_[{std::stoi(folder_.substr(5)), std::stoi(id), pose.at("obj_id").get<int>()}];
+        if (!has_targets_) continue;
+        for (std::size_t i = 0; i < list.size(); ++i) {
+          const double visible = infos->at(id).at(i).at("visib_fract").get<double>();
+          if (visible < kLeastVisibleTarget) continue;
+          ++targets_[{std::stoi(folder_.substr(5)), std::stoi(id),
+                      list[i].at("obj_id").get<int>()}];
         }
       }
     });
   }
 
  private:
+  std::string place(const char* kind, const std::string& name) const {
+    return folder_ + "/" + kind + suffix_ + "/" + name;
+  }
+
   void lint_image(const std::string& stem, const Json& camera, const Json& poses,
                   const Json& infos) {
-    const std::string rgb = folder_ + "/rgb/" + stem;
+    const std::string rgb = place("rgb", stem);
     dataset_.check(dataset_.has(rgb + ".png") || dataset_.has(rgb + ".jpg"), "nothing is missing",
                    rgb, "the picture is missing");
     if (dataset_.has(rgb + ".png")) dataset_.picture(rgb + ".png");
-    depth_file_ = folder_ + "/depth/" + stem + ".png";
+    depth_file_ = place("depth", stem + ".png");
     depth_ = dataset_.picture(depth_file_);
     depth_scale_ = camera.at("depth_scale").get<double>();
     if (!depth_) return;
     lens_ = lens_of(camera, depth_->width, depth_->height, matrix_of(camera.at("cam_K")));
     dataset_.check(poses.size() == infos.size(), "counts agree between files",
-                   folder_ + "/scene_gt_info.json", "image " + stem + ": not one entry per object");
+                   folder_ + "/scene_gt_info" + suffix_ + ".json",
+                   "image " + stem + ": not one entry per object");
     for (std::size_t i = 0; i < poses.size() && i < infos.size(); ++i) {
       lint_object(stem + "_" + padded_id(std::to_string(i)) + ".png", poses[i], infos[i]);
     }
   }
 
   void lint_object(const std::string& name, const Json& pose, const Json& info) {
-    const std::string file = folder_ + "/mask_visib/" + name;
+    const std::string file = place("mask_visib", name);
     const auto visible = dataset_.picture(file);
-    const auto whole = dataset_.picture(folder_ + "/mask/" + name);
+    const auto whole = dataset_.picture(place("mask", name));
     if (!visible || !whole) return;
     if (!visible->has_size_of(*whole) || !depth_->has_size_of(*whole)) {
       dataset_.find("counts agree between files", file, "masks and depth differ in size");
@@ -168,20 +191,33 @@ class BopScene {
     }
     dataset_.check(beyond == 0, "visible <= amodal", file,
                    std::to_string(beyond) + " pixels lie outside the whole object's mask");
-    check_extent("bbox_visib", "px_count_visib", info, inner, file);
-    check_extent("bbox_obj", "px_count_all", info, outer, folder_ + "/mask/" + name);
+    const PixelBox box = box_of(info.at("bbox_visib"));
+    dataset_.check(
+        box == inner.box, "box = extent of mask", file,
+        "bbox_visib " + box_text(box) + ", the mask extends over " + box_text(inner.box));
+    dataset_.check(info.at("px_count_visib").get<std::int64_t>() == inner.count, "area = count",
+                   file,
+                   "px_count_visib " + info.at("px_count_visib").dump() + ", the mask has " +
+                       std::to_string(inner.count) + " pixels");
+    check_silhouette(info, outer, place("mask", name));
     check_pose(file, pose, outer.box, inner.box, *visible);
   }
 
-  void check_extent(const char* box_key, const char* count_key, const Json& info,
-                    const Extent& mask, const std::string& file) {
-    const PixelBox box = box_of(info.at(box_key));
-    dataset_.check(box == mask.box, "box = extent of mask", file,
-                   std::string(box_key) + " " + box_text(box) + ", the mask extends over " +
-                       box_text(mask.box));
-    dataset_.check(info.at(count_key).get<std::int64_t>() == mask.count, "area = count", file,
-                   std::string(count_key) + " " + info.at(count_key).dump() + ", the mask has " +
-                       std::to_string(mask.count) + " pixels");
+  /// Of the silhouette only what lies inside the picture is in the mask.
+  void check_silhouette(const Json& info, const Extent& mask, const std::string& file) {
+    const PixelBox box = box_of(info.at("bbox_obj"));
+    const PixelBox inside = box.clipped(depth_->width, depth_->height);
+    dataset_.check(inside == mask.box, "box = extent of mask", file,
+                   "bbox_obj " + box_text(box) + ", the mask extends over " + box_text(mask.box));
+    const auto all = info.at("px_count_all").get<std::int64_t>();
+    dataset_.check(inside == box ? all == mask.count : all > mask.count, "area = count", file,
+                   "px_count_all " + std::to_string(all) + ", the mask has " +
+                       std::to_string(mask.count) + " pixels" +
+                       (inside == box ? "" : " of a silhouette that is cut off"));
+    const double share = info.at("px_count_visib").get<double>() / double(all);
+    dataset_.check(
+        std::abs(info.at("visib_fract").get<double>() - share) < 1e-6, "area = count", file,
+        "visib_fract " + info.at("visib_fract").dump() + " is not px_count_visib / px_count_all");
   }
 
   void check_pose(const std::string& file, const Json& pose, const PixelBox& whole_box,
@@ -196,7 +232,7 @@ class BopScene {
     dataset_.check((rotation * rotation.transpose() - Mat3::Identity()).norm() < 1e-4 &&
                        rotation.determinant() > 0.0,
                    "pose agrees with the keypoints", file, "cam_R_m2c is not a rotation");
-    seen.camera_from_local.linear() = rotation * vec3_of(pose.at("scale")).asDiagonal();
+    seen.camera_from_local.linear() = rotation;
     seen.camera_from_local.translation() = vec3_of(pose.at("cam_t_m2c"));
     seen.bounds = {vec3_of(pose.at("bounds_min")), vec3_of(pose.at("bounds_max"))};
     seen.box = whole_box;
@@ -223,6 +259,8 @@ class BopScene {
 
   Dataset& dataset_;
   std::string folder_;
+  std::string suffix_;
+  bool has_targets_;
   const Json& models_;
   TargetCounts& targets_;
   std::string depth_file_;
@@ -258,27 +296,42 @@ Json lint_objects(Dataset& dataset, const DatasetPage& page) {
 
 void lint_bop(Dataset& dataset) {
   const DatasetPage page = lint_page(dataset);
-  std::set<std::string> scenes;
+  // One scene per camera, or all cameras as sensors of scene 0.
+  const auto scene_of = [](const PlannedPicture& picture, int number) {
+    return (picture.split == "val" ? "test/" : "train_pbr/") + padded_id(std::to_string(number));
+  };
+  std::map<std::pair<std::string, std::string>, bool> scenes;  // folder, suffix: has targets
   for (const PlannedPicture& picture : page.pictures) {
-    const std::string scene = (picture.split == "val" ? "test/" : "train_pbr/") +
-                              padded_id(std::to_string(picture.camera));
-    scenes.insert(scene);
-    const std::string stem = scene + "/rgb/" + picture.stem.substr(0, picture.stem.find('_'));
+    const std::size_t stem_end = picture.stem.find('_');
+    const std::string suffix = picture.stem.substr(stem_end);
+    const bool is_sensor = dataset.has(scene_of(picture, 0) + "/scene_gt" + suffix + ".json");
+    const std::string folder = scene_of(picture, is_sensor ? 0 : picture.camera);
+    scenes[{folder, is_sensor ? suffix : ""}] = !is_sensor || picture.camera == 0;
+    const std::string stem =
+        folder + "/rgb" + (is_sensor ? suffix : "") + "/" + picture.stem.substr(0, stem_end);
     dataset.check(dataset.has(stem + ".png") || dataset.has(stem + ".jpg"), "nothing is missing",
                   stem, "the picture is missing");
   }
   const Json objects = lint_objects(dataset, page);
   if (const auto found = dataset.json("objects.json")) {
-    dataset.check(*found == objects, "ids within the label map", "objects.json",
+    // Objects of further sizes come behind those of the page.
+    bool holds_all = true;
+    for (const auto& [id, name] : objects.items()) {
+      holds_all &= found->contains(id) && found->at(id) == name;
+    }
+    dataset.check(holds_all, "ids within the label map", "objects.json",
                   "its objects are not those of dataset.json");
   }
   dataset.json("camera.json");
   const auto models = dataset.json("models/models_info.json");
   const auto targets = dataset.json("test_targets_bop19.json");
+  dataset.json("test_targets_bop24.json");
   if (!models || !targets) return;
   dataset.reading("models/models_info.json", [&] { check_models(dataset, *models); });
   TargetCounts counts;
-  for (const std::string& scene : scenes) BopScene(dataset, scene, *models, counts).run();
+  for (const auto& [scene, has_targets] : scenes) {
+    BopScene(dataset, scene.first, scene.second, has_targets, *models, counts).run();
+  }
   dataset.reading("test_targets_bop19.json", [&] { check_targets(dataset, *targets, counts); });
 }
 

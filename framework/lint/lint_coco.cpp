@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 
 #include "framework/lint/lint_formats.h"
@@ -13,6 +14,39 @@ constexpr const char* kBox = "box = extent of mask";
 constexpr const char* kArea = "area = count";
 constexpr const char* kPartition = "pixels partition into instances";
 constexpr const char* kOrder = "occlusion order agrees with masks";
+
+/// Pixels of an image whose centres lie in one of the polygons, row by row.
+std::vector<bool> fill_polygons(const Json& polygons, std::size_t width, std::size_t height) {
+  std::vector<bool> mask(width * height, false);
+  for (const Json& polygon : polygons) {
+    const auto numbers = polygon.get<std::vector<double>>();
+    if (numbers.size() < 6 || numbers.size() % 2 != 0) {
+      throw std::runtime_error("a polygon has " + std::to_string(numbers.size()) + " numbers");
+    }
+    std::vector<double> crossings;
+    for (std::size_t row = 0; row < height; ++row) {
+      const double line = double(row) + 0.5;
+      crossings.clear();
+      for (std::size_t i = 0; i < numbers.size(); i += 2) {
+        const std::size_t j = (i + 2) % numbers.size();
+        if ((numbers[i + 1] <= line) == (numbers[j + 1] <= line)) continue;
+        crossings.push_back(numbers[i] + (line - numbers[i + 1]) /
+                                             (numbers[j + 1] - numbers[i + 1]) *
+                                             (numbers[j] - numbers[i]));
+      }
+      std::ranges::sort(crossings);
+      const auto column = [width](double x) {
+        return std::size_t(std::clamp(std::ceil(x - 0.5), 0.0, double(width)));
+      };
+      for (std::size_t i = 0; i + 1 < crossings.size(); i += 2) {
+        for (std::size_t x = column(crossings[i]); x < column(crossings[i + 1]); ++x) {
+          mask[row * width + x] = true;
+        }
+      }
+    }
+  }
+  return mask;
+}
 
 /// Pixels of a run-length mask, row by row. Throws when the runs do not fill the size.
 std::vector<bool> decode_mask(const Json& rle) {
@@ -209,7 +243,10 @@ class CocoPart {
     dataset_.check(image != images_.end(), "counts agree between files", file_,
                    who + " is about an unknown image");
     if (image == images_.end()) return;
-    const auto mask = decode_mask(annotation.at("segmentation"));
+    const Json& segmentation = annotation.at("segmentation");
+    const auto mask = segmentation.is_array()
+                          ? fill_polygons(segmentation, image->second.width, image->second.height)
+                          : decode_mask(segmentation);
     if (mask.size() != image->second.taken.size()) {
       dataset_.find("counts agree between files", file_, who + ": mask and image differ in size");
       return;

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
+#include <optional>
 #include <regex>
 
 #include "framework/lint/label_lines.h"
@@ -13,6 +15,23 @@
 
 namespace diorama::lint {
 namespace {
+
+/// Indices into VOC's palette, which deals an index's bits to red, green and blue, the highest
+/// first. A gray picture holds them itself.
+std::optional<Picture> indices_of(std::optional<Picture> picture) {
+  if (!picture || picture->channels < 3) return picture;
+  Picture indices{picture->width, picture->height, 1, {}};
+  for (int y = 0; y < picture->height; ++y) {
+    for (int x = 0; x < picture->width; ++x) {
+      std::uint32_t index = 0;
+      for (std::uint32_t bit = 0; bit < 8; ++bit) {
+        index |= ((picture->at(x, y, int(bit % 3)) >> (7 - bit / 3)) & 1u) << bit;
+      }
+      indices.samples.push_back(index);
+    }
+  }
+  return indices;
+}
 
 struct KittiImage {
   Picture picture;
@@ -194,8 +213,8 @@ void lint_voc_image(Dataset& dataset, const std::string& stem,
     std::map<std::uint32_t, Extent> masks;
     std::optional<Picture> objects, class_ids;
     if (xml_text(*xml, "segmented") == "1") {
-      objects = dataset.picture(masks_file);
-      class_ids = dataset.picture("SegmentationClass/" + stem + ".png");
+      objects = indices_of(dataset.picture(masks_file));
+      class_ids = indices_of(dataset.picture("SegmentationClass/" + stem + ".png"));
     }
     const bool has_masks = objects && class_ids && picture && objects->has_size_of(*class_ids) &&
                            objects->has_size_of(*picture);

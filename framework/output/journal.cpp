@@ -26,6 +26,10 @@ std::string hex(std::uint64_t value, int digits) {
   return text;
 }
 
+std::string to_text(const XXH128_hash_t& hash) {
+  return hex(hash.high64, 16) + hex(hash.low64, 16);
+}
+
 std::string checksum(std::string_view line) { return hex(XXH32(line.data(), line.size(), 0), 8); }
 
 std::optional<std::uint64_t> number_in(std::string_view text) {
@@ -96,11 +100,27 @@ std::string entry_name(int entry) {
 }
 
 std::string digest_of(std::span<const std::byte> bytes) {
-  const XXH128_hash_t hash = XXH3_128bits(bytes.data(), bytes.size());
-  return hex(hash.high64, 16) + hex(hash.low64, 16);
+  return to_text(XXH3_128bits(bytes.data(), bytes.size()));
 }
 
 std::string digest_of(std::string_view text) { return digest_of(std::as_bytes(std::span(text))); }
+
+struct Digest::State {
+  XXH3_state_t* hash = XXH3_createState();
+  State() { XXH3_128bits_reset(hash); }
+  ~State() { XXH3_freeState(hash); }
+  State(const State&) = delete;
+  State& operator=(const State&) = delete;
+};
+
+Digest::Digest() : state_(std::make_unique<State>()) {}
+Digest::~Digest() = default;
+
+void Digest::add(std::span<const std::byte> bytes) {
+  XXH3_128bits_update(state_->hash, bytes.data(), bytes.size());
+}
+
+std::string Digest::text() const { return to_text(XXH3_128bits_digest(state_->hash)); }
 
 bool is_plain_relative(std::string_view path) {
   if (path.empty() || path.front() == '/' || path.back() == '/') return false;

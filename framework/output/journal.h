@@ -57,6 +57,21 @@ struct JournalledFiles {
 std::string digest_of(std::span<const std::byte> bytes);
 std::string digest_of(std::string_view text);
 
+/// The same, of what comes piece by piece.
+class Digest {
+ public:
+  Digest();
+  ~Digest();
+  Digest(const Digest&) = delete;
+  Digest& operator=(const Digest&) = delete;
+  void add(std::span<const std::byte> bytes);
+  std::string text() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
 /// Relative, without `..` and the like: what may stand in a journal and what writers may ask for.
 bool is_plain_relative(std::string_view path);
 /// Letters, digits, '.', '_' and '-', at most 200, and not led by a dot.

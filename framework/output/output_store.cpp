@@ -84,6 +84,11 @@ fs::path OutputFolders::records_path() const { return joined(base, records); }
 CollectedFiles::CollectedFiles(Transaction& transaction, std::size_t folder, std::string writer)
     : transaction_(transaction), folder_(folder), writer_(std::move(writer)) {}
 
+void CollectedFiles::stage_if_large(std::size_t number) {
+  StagedFile& file = transaction_.files[number];
+  if (transaction_.stage && file.bytes.size() >= kKeptBytes) transaction_.stage->put(number, file);
+}
+
 void CollectedFiles::add(std::string_view path, std::vector<std::byte> bytes) {
   if (!is_plain_relative(path)) {
     throw Error(ErrorKind::Plugin, "writer '" + writer_ +
@@ -91,6 +96,26 @@ void CollectedFiles::add(std::string_view path, std::vector<std::byte> bytes) {
                                        std::string(path) + "\"");
   }
   transaction_.files.push_back({folder_, std::string(path), std::move(bytes)});
+  stage_if_large(transaction_.files.size() - 1);
+}
+
+void CollectedFiles::append(std::string_view path, std::span<const std::byte> bytes) {
+  auto found = growing_.find(path);
+  if (found == growing_.end()) {
+    add(path, {});
+    found = growing_.emplace(path, transaction_.files.size() - 1).first;
+  }
+  std::vector<std::byte>& kept = transaction_.files[found->second].bytes;
+  kept.insert(kept.end(), bytes.begin(), bytes.end());
+  stage_if_large(found->second);
+  // Many small ones fill the memory, too.
+  std::size_t all = 0;
+  for (const auto& [name, number] : growing_) all += transaction_.files[number].bytes.size();
+  if (!transaction_.stage || all < kKeptGrowingBytes) return;
+  for (const auto& [name, number] : growing_) {
+    StagedFile& file = transaction_.files[number];
+    if (!file.bytes.empty()) transaction_.stage->put(number, file);
+  }
 }
 
 void CollectedFiles::record(std::string_view line) {
@@ -104,6 +129,38 @@ void CollectedFiles::record(std::string_view line) {
   }
   transaction_.records.emplace_back(folder_, std::string(line));
 }
+
+Stage::~Stage() = default;
+
+class OutputStore::DiskStage final : public Stage {
+ public:
+  DiskStage(OutputStore& store, int entry) : store_(store), entry_(entry) {}
+  ~DiskStage() override {
+    try {
+      for (const std::size_t number : used_) {
+        store_.file_system_.remove_file(store_.staged(store_.options_.self.name, entry_, number));
+      }
+    } catch (const std::exception&) {
+      // Who joins next clears what is left.
+    }
+  }
+  void put(std::size_t number, StagedFile& file) override {
+    used_.insert(number);
+    try {
+      store_.put_staged(store_.staged(store_.options_.self.name, entry_, number), file);
+    } catch (const Error&) {
+      // Who took over also took the stage away: that is the reason then.
+      store_.check_membership();
+      throw;
+    }
+  }
+  void release() override { used_.clear(); }
+
+ private:
+  OutputStore& store_;
+  int entry_;
+  std::set<std::size_t> used_;
+};
 
 OutputStore::OutputStore(FileSystem& file_system, OutputFolders folders, int capture_count,
                          Options options)
@@ -342,7 +399,7 @@ void OutputStore::settle_dead_workers() {
     return;
   }
   std::set<std::string> alive{options_.self.name};
-  std::set<std::string> dead;
+  std::set<std::string> dead;  // as far as can be seen: settle() looks again
   for (const Workers::Lease& lease : workers_.others()) {
     (workers_.is_alive(lease) ? alive : dead).insert(lease.worker);
   }
@@ -361,6 +418,10 @@ void OutputStore::settle_dead_workers() {
 }
 
 void OutputStore::settle(const std::string& worker, const WorkerIndex& index) {
+  // A worker has a lease before it has anything else; it may have joined since leases were listed.
+  for (const Workers::Lease& lease : workers_.others()) {
+    if (lease.worker == worker && workers_.is_alive(lease)) return;
+  }
   if (workers_.claim("settle-" + worker)) return;
   if (index.settled_bytes < index.bytes_read) {
     for (const EntryPlace& place : index.unsettled) settle_entry(worker, place);
@@ -395,6 +456,7 @@ bool OutputStore::settle_entry(const std::string& worker, const EntryPlace& plac
       make_target_folder(target.parent_path());
       file_system_.move_new(source, target);
     }
+    sync_later(target.parent_path());
     // Another worker may have moved it meanwhile.
     if (state != FileState::Right) state = state_of(target, file);
     if (state == FileState::Right) continue;
@@ -536,16 +598,27 @@ void OutputStore::check_no_links(const fs::path& folder) {
   }
 }
 
+/// Its names, and at the first time those of the folders above: who made them may have died before
+/// it synced them.
+void OutputStore::sync_later(const fs::path& folder) {
+  const std::lock_guard lock(folders_mutex_);
+  unsynced_folders_.insert(folder);
+  if (known_folders_.contains(folder)) return;
+  for (fs::path above = folder; above != folders_.base && above.has_relative_path();) {
+    above = above.parent_path();
+    unsynced_folders_.insert(above);
+  }
+}
+
 void OutputStore::make_target_folder(const fs::path& folder) {
   check_no_links(folder);
+  sync_later(folder);
   {
     const std::lock_guard lock(folders_mutex_);
-    unsynced_folders_.insert(folder);
     if (known_folders_.contains(folder)) return;
   }
-  const auto created = file_system_.make_folders(folder);
+  file_system_.make_folders(folder);
   const std::lock_guard lock(folders_mutex_);
-  for (const fs::path& made : created) unsynced_folders_.insert(made.parent_path());
   known_folders_.insert(folder);
 }
 
@@ -559,7 +632,7 @@ JournalledFiles OutputStore::journalled(const Transaction& transaction) const {
                                          ": two files of one capture have this name; give the "
                                          "writers different `output_dir`s");
     }
-    content.files.push_back({path, file.bytes.size(), digest_of(file.bytes)});
+    content.files.push_back({path, file.staged_size, file.staged ? file.staged->text() : ""});
   }
   for (const auto& [writer, line] : transaction.records) {
     content.records.emplace_back(folders_.writers[writer].name, line);
@@ -567,12 +640,24 @@ JournalledFiles OutputStore::journalled(const Transaction& transaction) const {
   return content;
 }
 
-void OutputStore::write_stage(int entry, const Transaction& transaction) {
+void OutputStore::put_staged(const fs::path& place, StagedFile& file) {
+  if (!file.staged) {
+    file_system_.write(place, file.bytes);
+    file.staged = std::make_shared<Digest>();
+  } else if (!file.bytes.empty()) {
+    file_system_.append_to(place)->append(file.bytes);
+  }
+  file.staged->add(file.bytes);
+  file.staged_size += file.bytes.size();
+  bytes_written_ += file.bytes.size();
+  file.bytes = {};
+}
+
+void OutputStore::write_stage(int entry, Transaction& transaction) {
   const std::string& self = options_.self.name;
   for (std::size_t i = 0; i < transaction.files.size(); ++i) {
-    const std::vector<std::byte>& bytes = transaction.files[i].bytes;
-    file_system_.write(staged(self, entry, i), bytes);
-    bytes_written_ += bytes.size();
+    StagedFile& file = transaction.files[i];
+    if (!file.staged || !file.bytes.empty()) put_staged(staged(self, entry, i), file);
   }
   // Once all are on their way: the first sync takes the others along.
   for (std::size_t i = 0; i < transaction.files.size(); ++i) {
@@ -620,10 +705,11 @@ void OutputStore::check_membership() {
              std::to_string(options_.lease_timeout.count()) + " s");
 }
 
-void OutputStore::commit(int entry, const Transaction& transaction) {
-  const JournalledFiles content = journalled(transaction);
+void OutputStore::commit(int entry, Transaction& transaction) {
+  JournalledFiles content;
   try {
     write_stage(entry, transaction);
+    content = journalled(transaction);
     check_membership();
     writer_.commit(entry, content);
   } catch (...) {
@@ -636,6 +722,7 @@ void OutputStore::commit(int entry, const Transaction& transaction) {
     check_membership();
     throw;
   }
+  if (transaction.stage) transaction.stage->release();
   {
     const std::shared_lock lock(publishing_);
     publish(entry, content);
@@ -656,11 +743,23 @@ void OutputStore::checkpoint() {
   writer_.checkpoint();
 }
 
-void OutputStore::commit_capture(int capture, const Transaction& transaction) {
+Transaction OutputStore::begin_transaction() {
+  return {std::make_unique<DiskStage>(*this, kBeginEntry), {}, {}};
+}
+
+Transaction OutputStore::capture_transaction(int capture) {
+  return {std::make_unique<DiskStage>(*this, capture), {}, {}};
+}
+
+Transaction OutputStore::finish_transaction() {
+  return {std::make_unique<DiskStage>(*this, kFinishEntry), {}, {}};
+}
+
+void OutputStore::commit_capture(int capture, Transaction& transaction) {
   commit(capture, transaction);
 }
 
-void OutputStore::commit_begin(const Transaction& transaction) {
+void OutputStore::commit_begin(Transaction& transaction) {
   if (!journals_.is_published(kBeginEntry)) commit(kBeginEntry, transaction);
 }
 
@@ -670,7 +769,7 @@ bool OutputStore::claim_finish() {
   return !is_finished();
 }
 
-void OutputStore::commit_finish(const Transaction& transaction) {
+void OutputStore::commit_finish(Transaction& transaction) {
   commit(kFinishEntry, transaction);
   checkpoint();
   journals_.refresh();

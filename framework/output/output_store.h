@@ -8,10 +8,13 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <map>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <set>
 #include <shared_mutex>
+#include <span>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -25,17 +28,31 @@
 
 namespace diorama {
 
-/// One file of a transaction, still in memory.
+/// One file of a transaction.
 struct StagedFile {
   std::size_t folder = 0;  ///< Index into OutputFolders::writers, or kRecordsFolder.
   std::string path;        ///< Below that folder.
   std::vector<std::byte> bytes;
+  /// What lies in the stage already, in front of `bytes`; null when nothing does.
+  std::shared_ptr<Digest> staged = nullptr;
+  std::uint64_t staged_size = 0;
 };
 
 inline constexpr std::size_t kRecordsFolder = std::size_t(-1);
 
+/// Takes over files of a transaction that would fill the memory, before it is committed.
+class Stage {
+ public:
+  virtual ~Stage();
+  /// Puts the file's bytes on disk, behind those that it put there before, and empties them.
+  virtual void put(std::size_t number, StagedFile& file) = 0;
+  /// The transaction counts: what is on disk stays there.
+  virtual void release() = 0;
+};
+
 /// What becomes visible on disk together.
 struct Transaction {
+  std::unique_ptr<Stage> stage = nullptr;  ///< Null: everything stays in memory.
   std::vector<StagedFile> files;
   /// Per writer that recorded something: index and line.
   std::vector<std::pair<std::size_t, std::string>> records;
@@ -56,18 +73,27 @@ struct OutputFolders {
   std::filesystem::path records_path() const;
 };
 
-/// Collects what writers hand over; checks paths. Used by one thread.
+/// Collects what writers hand over; checks paths. Where the transaction has a stage, files of more
+/// than kKeptBytes do not stay in memory. Used by one thread.
 class CollectedFiles final : public CaptureFiles {
  public:
   /// Adds to `transaction`, which must outlive this. `writer` is for messages.
   CollectedFiles(Transaction& transaction, std::size_t folder, std::string writer);
+  static constexpr std::size_t kKeptBytes = std::size_t(256) << 10;
+  /// Of all files together that grow.
+  static constexpr std::size_t kKeptGrowingBytes = std::size_t(4) << 20;
+
   void add(std::string_view path, std::vector<std::byte> bytes) override;
+  void append(std::string_view path, std::span<const std::byte> bytes) override;
   void record(std::string_view line) override;
 
  private:
+  void stage_if_large(std::size_t number);
+
   Transaction& transaction_;
   std::size_t folder_;
   std::string writer_;
+  std::map<std::string, std::size_t, std::less<>> growing_;  ///< Numbers of files by path.
 };
 
 /// A dataset on disk, and one worker's part in it. Each capture is a transaction: its files are
@@ -118,14 +144,20 @@ class OutputStore {
   bool is_complete() const { return done_count() == capture_count_; }
   bool is_finished() const;  ///< finish files are there, too.
 
+  /// Empty ones with stages; what they hold on disk goes when they are not committed. To be handed
+  /// to the function of the same name.
+  Transaction begin_transaction();
+  Transaction capture_transaction(int capture);
+  Transaction finish_transaction();
+
   /// Makes a capture appear. Safe from any thread. Throws Error(Output), then nothing of it shows;
   /// Busy when others took this worker for dead.
-  void commit_capture(int capture, const Transaction& transaction);
+  void commit_capture(int capture, Transaction& transaction);
   /// Files that belong to no capture; nothing happens when they are there.
-  void commit_begin(const Transaction& transaction);
+  void commit_begin(Transaction& transaction);
   /// Of all workers that find the dataset complete, one may make the finish files.
   bool claim_finish();
-  void commit_finish(const Transaction& transaction);
+  void commit_finish(Transaction& transaction);
 
   /// With takes_visits: a visit that `needs_work` and that no living worker has; empty when there
   /// is none.
@@ -141,6 +173,8 @@ class OutputStore {
   std::uint64_t bytes_written() const { return bytes_written_; }
 
  private:
+  class DiskStage;
+
   std::filesystem::path diorama_folder() const { return folders_.records_path() / ".diorama"; }
   std::filesystem::path dataset_file() const { return folders_.records_path() / "dataset.json"; }
   std::filesystem::path stage(const std::string& worker) const;
@@ -167,13 +201,15 @@ class OutputStore {
 
   enum class FileState : std::uint8_t { Right, Missing, Wrong };
   FileState state_of(const std::filesystem::path& path, const JournalledFile& file);
+  void sync_later(const std::filesystem::path& folder);
   void make_target_folder(const std::filesystem::path& folder);
   void check_no_links(const std::filesystem::path& folder);
 
   void check_membership();
-  void commit(int entry, const Transaction& transaction);
+  void commit(int entry, Transaction& transaction);
   JournalledFiles journalled(const Transaction& transaction) const;
-  void write_stage(int entry, const Transaction& transaction);
+  void write_stage(int entry, Transaction& transaction);
+  void put_staged(const std::filesystem::path& place, StagedFile& file);
   void clear_stage(int entry, std::size_t files);
   void publish(int entry, const JournalledFiles& content);
   void checkpoint();

@@ -395,7 +395,7 @@ void Pipeline::begin_output() {
   if (has_begun_) return;
   has_begun_ = true;
   store_.open();
-  Transaction transaction;
+  Transaction transaction = store_.begin_transaction();
   for (std::size_t i = 0; i < components_.writers.size(); ++i) {
     const std::string& name = job_.writers[i].name;
     CollectedFiles files(transaction, i, name);
@@ -406,7 +406,7 @@ void Pipeline::begin_output() {
 }
 
 void Pipeline::write(const PendingCapture& pending) {
-  Transaction transaction;
+  Transaction transaction = store_.capture_transaction(pending.capture.index);
   for (std::size_t i = 0; i < components_.writers.size(); ++i) {
     const std::string& name = job_.writers[i].name;
     CollectedFiles files(transaction, i, name);
@@ -440,7 +440,7 @@ void Pipeline::finish_output(const DatasetInfo& dataset) {
     summary_.is_finished = store_.is_finished();
     return;
   }
-  Transaction transaction;
+  Transaction transaction = store_.finish_transaction();
   for (std::size_t i = 0; i < components_.writers.size(); ++i) {
     const std::string& name = job_.writers[i].name;
     CollectedFiles files(transaction, i, name);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "framework/plugins/plugin_file.h"
 
+#include <algorithm>
+#include <cstdio>
 #include <cstring>
 #include <string_view>
 
@@ -14,6 +16,12 @@ constexpr std::string_view kComponentSection = ".diorama_components";
 constexpr std::string_view kMagic{"DIORAMA\0", 8};
 // The part of the descriptor that keeps its place for ever: magic, size, ABI number.
 constexpr std::size_t kFixedPart = 16;
+
+std::string hexadecimal(std::uint64_t digest) {
+  char digits[17];
+  std::snprintf(digits, sizeof digits, "%016llx", static_cast<unsigned long long>(digest));
+  return digits;
+}
 
 class Gate {
  public:
@@ -75,6 +83,12 @@ class Gate {
              "); link diorama::sdk, which sets the needed definitions, and do not change "
              "EIGEN_MAX_ALIGN_BYTES");
     }
+    if (found.headers != DIORAMA_HEADERS_DIGEST) {
+      refuse("is built with other headers of plugin ABI " + std::to_string(DIORAMA_SDK_ABI) +
+             " (digest " + hexadecimal(found.headers) + ", this program needs " +
+             hexadecimal(DIORAMA_HEADERS_DIGEST) +
+             "); build the plugin again with the headers that belong to this program");
+    }
   }
 
   std::string file_;
@@ -90,24 +104,29 @@ std::vector<std::string> words(std::string_view text) {
   return words;
 }
 
-std::vector<ListedComponent> listed_components(const Gate& gate,
-                                               const std::vector<std::byte>& section) {
+void read_list(const Gate& gate, const std::vector<std::byte>& section, PluginFile& plugin) {
   if (section.size() % sizeof(DioramaComponentEntry) != 0) {
     gate.refuse("its list of components is damaged; build it again");
   }
-  std::vector<ListedComponent> components;
   for (std::size_t at = 0; at < section.size(); at += sizeof(DioramaComponentEntry)) {
     DioramaComponentEntry entry;
     std::memcpy(&entry, section.data() + at, sizeof entry);
+    if (entry.kind == kDioramaLearnsTypes) {
+      plugin.learns_types = true;
+      continue;
+    }
     if (entry.kind > std::uint32_t(ComponentKind::Writer)) {
       gate.refuse("its list of components holds the unknown kind " + std::to_string(entry.kind));
     }
-    components.push_back({ComponentKind(entry.kind),
-                          gate.text(entry.type, sizeof entry.type, "component type"),
-                          gate.text(entry.help, sizeof entry.help, "component help"),
-                          words(gate.text(entry.claims, sizeof entry.claims, "list of claims"))});
+    const auto text = [&](const auto& field, const char* what) {
+      return gate.text(field, sizeof field, what);
+    };
+    plugin.components.push_back({ComponentKind(entry.kind), text(entry.type, "component type"),
+                                 text(entry.help, "component help"),
+                                 words(text(entry.claims, "list of claims")),
+                                 words(text(entry.needs, "list of needs")),
+                                 words(text(entry.provides, "list of what is provided"))});
   }
-  return components;
 }
 
 }  // namespace
@@ -130,10 +149,19 @@ PluginFile read_plugin_file(const std::filesystem::path& file) {
   gate.text(found.build, sizeof found.build, "build text");
   if (plugin.name.empty()) gate.refuse("its name is empty; give DIORAMA_PLUGIN a name");
   const auto components = sections.find(kComponentSection);
-  if (components != sections.end()) {
-    plugin.components = listed_components(gate, components->second);
-  }
+  plugin.learns_types = components == sections.end();
+  if (!plugin.learns_types) read_list(gate, components->second, plugin);
   return plugin;
+}
+
+ListedComponent listed(const ComponentInfo& info) {
+  const Listing& listing = info.listing;
+  return {info.kind,
+          info.type,
+          info.help,
+          words(listing.claims),
+          words(listing.needs),
+          words(listing.provides)};
 }
 
 }  // namespace diorama

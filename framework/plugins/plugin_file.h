@@ -16,7 +16,9 @@ struct ListedComponent {
   ComponentKind kind;
   std::string type;
   std::string help;
-  std::vector<std::string> claims;  ///< Loaders: endings and schemes.
+  std::vector<std::string> claims;    ///< Loaders: endings and schemes.
+  std::vector<std::string> needs;     ///< Annotators: of the default parameters ...
+  std::vector<std::string> provides;  ///< ... both.
   friend bool operator==(const ListedComponent&, const ListedComponent&) = default;
 };
 
@@ -27,13 +29,17 @@ struct PluginFile {
   std::string name;
   std::string version;
   std::string licence;
-  /// Nothing when the plugin lists its components in code only; it must be loaded to know them.
-  std::optional<std::vector<ListedComponent>> components;
+  std::vector<ListedComponent> components;
+  /// Registers more than it lists, or lists nothing; it must be loaded to know its components.
+  bool learns_types = false;
 };
 
+/// What a component is registered with, in the words of a list.
+ListedComponent listed(const ComponentInfo& info);
+
 /// Reads the file and checks that it was built for this host: magic, descriptor size, ABI number,
-/// ABI tag, layout digest, texts. Throws Error(Plugin): file, what was found, what is required,
-/// what to do.
+/// ABI tag, digests of layout and headers, texts. Throws Error(Plugin): file, what was found, what
+/// is required, what to do.
 PluginFile read_plugin_file(const std::filesystem::path& file);
 
 }  // namespace diorama

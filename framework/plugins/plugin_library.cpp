@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <boost/dll/shared_library.hpp>
+#include <cfenv>
 #include <cstring>
+#include <limits>
 #include <set>
 #include <utility>
 
@@ -45,6 +47,14 @@ class Collector final : public Registrar {
     if (!info.help || !info.describe || !info.make) {
       refuse(file_, "registers '" + std::string(info.type) + "' without help or functions");
     }
+    const Listing& listing = info.listing;
+    if (!listing.claims || !listing.needs || !listing.provides) {
+      refuse(file_, "registers '" + std::string(info.type) + "' with a listing that is null");
+    }
+    if (info.kind == ComponentKind::Annotator && !*listing.provides) {
+      refuse(file_, "registers annotator '" + std::string(info.type) +
+                        "' without what it provides; register it with DIORAMA_ADD_ANNOTATOR");
+    }
     if (!seen_.emplace(info.kind, info.type).second) {
       refuse(file_,
              "registers " + std::string(kind_name(info.kind)) + " '" + info.type + "' twice");
@@ -62,21 +72,41 @@ class Collector final : public Registrar {
 
 /// A plugin whose list says something else than its code is refused: jobs were checked by the list.
 void compare_with_list(const PluginFile& file, const std::vector<ComponentInfo>& components) {
-  if (!file.components) return;
-  std::set<std::pair<ComponentKind, std::string>> listed;
-  std::set<std::pair<ComponentKind, std::string>> made;
-  for (const ListedComponent& entry : *file.components) listed.emplace(entry.kind, entry.type);
-  for (const ComponentInfo& info : components) made.emplace(info.kind, info.type);
-  for (const auto& [kind, type] : listed) {
-    if (made.contains({kind, type})) continue;
-    refuse(file, "lists " + std::string(kind_name(kind)) + " '" + type +
-                     "' but does not register it; register it with DIORAMA_ADD");
+  const auto same_type = [](const ListedComponent& component) {
+    return [&component](const ListedComponent& other) {
+      return other.kind == component.kind && other.type == component.type;
+    };
+  };
+  const auto called = [](const ListedComponent& component) {
+    return std::string(kind_name(component.kind)) + " '" + component.type + "'";
+  };
+  std::vector<ListedComponent> made;
+  for (const ComponentInfo& info : components) made.push_back(listed(info));
+  for (const ListedComponent& entry : file.components) {
+    const auto found = std::ranges::find_if(made, same_type(entry));
+    if (found == made.end()) {
+      refuse(file,
+             "lists " + called(entry) + " but does not register it; register it with DIORAMA_ADD");
+    }
+    if (*found != entry) {
+      refuse(file,
+             "registers " + called(entry) +
+                 " with another help, other claims, needs or channels than it lists; register "
+                 "it with DIORAMA_ADD");
+    }
   }
-  for (const auto& [kind, type] : made) {
-    if (listed.contains({kind, type})) continue;
-    refuse(file, "registers " + std::string(kind_name(kind)) + " '" + type +
-                     "' but does not list it; register it with DIORAMA_ADD");
+  if (file.learns_types) return;
+  for (const ListedComponent& component : made) {
+    if (std::ranges::any_of(file.components, same_type(component))) continue;
+    refuse(file, "registers " + called(component) +
+                     " but does not list it; register it with DIORAMA_ADD, or say "
+                     "DIORAMA_LEARNS_TYPES()");
   }
+}
+
+bool keeps_tiny_numbers() {
+  const volatile double least = std::numeric_limits<double>::min();
+  return least / 2.0 != 0.0;
 }
 
 }  // namespace
@@ -89,6 +119,9 @@ PluginLibrary::PluginLibrary(const PluginFile& file) : handle_(std::make_unique<
   // RTLD_NODELETE: code that threads, deleters and exceptions may still need is never unmapped.
   const auto mode = static_cast<boost::dll::load_mode::type>(
       boost::dll::load_mode::rtld_now | boost::dll::load_mode::rtld_local | RTLD_NODELETE);
+  // Libraries that are linked with -ffast-math make the process flush tiny numbers to zero.
+  std::fenv_t arithmetic;
+  std::fegetenv(&arithmetic);
   // Boost's error code says "bad file descriptor" for everything; dlerror knows the reason, but
   // Boost consumes it into the exception's text only.
   try {
@@ -96,6 +129,13 @@ PluginLibrary::PluginLibrary(const PluginFile& file) : handle_(std::make_unique<
   } catch (const std::exception& error) {
     refuse(file, std::string("cannot be loaded: ") + error.what() +
                      "; install what is missing or build the plugin again");
+  }
+  const bool is_exact = keeps_tiny_numbers();
+  std::fesetenv(&arithmetic);
+  if (!is_exact) {
+    refuse(file,
+           "makes the whole process round tiny numbers to zero, which changes datasets; build it "
+           "without -ffast-math");
   }
   if (!handle_->library.has(kEntry)) {
     refuse(file, std::string("has no entry function '") + kEntry +

@@ -71,10 +71,10 @@ PluginLibrary& Registry::State::library(Source& source) {
 }
 
 std::vector<ListedComponent> Registry::State::components_of(Source& source) {
-  if (source.plugin.components) return *source.plugin.components;
+  if (!source.plugin.learns_types) return source.plugin.components;
   std::vector<ListedComponent> components;
   for (const ComponentInfo& info : library(source).components()) {
-    components.push_back({info.kind, info.type, info.help, {}});
+    components.push_back(listed(info));
   }
   return components;
 }
@@ -97,9 +97,11 @@ void Registry::State::take(const ListedComponent& listed, std::size_t source, in
   const auto [at, is_new] = known.try_emplace({listed.kind, listed.type});
   Known& component = at->second;
   if (is_new) {
-    component.entry = {
-        listed.kind, listed.type,    listed.help, listed.claims, plugin.components.has_value(),
-        plugin.name, plugin.version, plugin.file};
+    // Who registers a loader without DIORAMA_ADD_LOADER may have claims all the same.
+    const bool claims_are_listed = !plugin.learns_types || !listed.claims.empty();
+    component.entry = {listed.kind,       listed.type,  listed.help,     listed.claims,
+                       claims_are_listed, listed.needs, listed.provides, plugin.name,
+                       plugin.version,    plugin.file};
     component.source = source;
     component.level = level;
     return;
@@ -165,10 +167,10 @@ void Registry::add_builtin(void (*register_components)(Registrar&), const std::s
   PluginFile program;
   program.name = "diorama";
   program.version = version;
+  program.learns_types = true;
   state_->sources.push_back({program, nullptr, collector.components});
   for (const ComponentInfo& info : collector.components) {
-    state_->take({info.kind, info.type, info.help, {}}, state_->sources.size() - 1,
-                 int(state_->search.levels.size()));
+    state_->take(listed(info), state_->sources.size() - 1, int(state_->search.levels.size()));
   }
 }
 
@@ -192,7 +194,7 @@ std::vector<std::pair<std::string, std::string>> Registry::loaded_plugins() cons
 std::vector<std::string> Registry::types(ComponentKind kind) const {
   std::vector<std::string> types;
   for (const auto& [key, component] : state_->known) {
-    if (key.first == kind) types.push_back(key.second);
+    if (key.first == kind && component.conflict.empty()) types.push_back(key.second);
   }
   return types;
 }
@@ -207,7 +209,7 @@ const ComponentEntry& Registry::entry(ComponentKind kind, std::string_view type)
 
 std::vector<ParamSpec> Registry::describe(ComponentKind kind, std::string_view type) {
   const ComponentInfo& info = state_->info(kind, type);
-  return call_component(titled(kind, type), [&] { return info.describe(); });
+  return call_component(titled(kind, type), [&] { return info.describe(info.context); });
 }
 
 std::unique_ptr<Component> Registry::make_component(ComponentKind kind, const Value& map,
@@ -239,8 +241,9 @@ std::unique_ptr<Component> Registry::make_component(ComponentKind kind, const Va
   std::vector<std::string_view> known(also_known.begin(), also_known.end());
   known.push_back("type");
   const std::size_t before = complaints.messages().size();
-  std::unique_ptr<Component> made = call_component(
-      titled(kind, type->scalar), [&] { return info.make(map, path, known, complaints, host); });
+  std::unique_ptr<Component> made = call_component(titled(kind, type->scalar), [&] {
+    return info.make(info.context, map, path, known, complaints, host);
+  });
   if (!made && complaints.messages().size() == before) {
     throw Error(ErrorKind::Plugin, titled(kind, type->scalar) + ": its factory returned nothing (" +
                                        entry(kind, type->scalar).file.string() + ")");

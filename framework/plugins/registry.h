@@ -21,9 +21,11 @@ struct ComponentEntry {
   ComponentKind kind;
   std::string type;
   std::string help;
-  std::vector<std::string> claims;  ///< Loaders: endings and schemes, when listed in the file.
+  std::vector<std::string> claims;  ///< Loaders: endings and schemes, when they are listed.
   bool claims_are_listed = false;
-  std::string plugin;  ///< Name of the plugin; "diorama" for built-in components.
+  std::vector<std::string> needs;     ///< Annotators: of the default parameters ...
+  std::vector<std::string> provides;  ///< ... both.
+  std::string plugin;                 ///< Name of the plugin; "diorama" for built-in components.
   std::string version;
   std::filesystem::path file;  ///< Empty for built-in components.
 };
@@ -50,7 +52,7 @@ class Registry {
   /// Plugins whose libraries were loaded so far: name and version, sorted.
   std::vector<std::pair<std::string, std::string>> loaded_plugins() const;
 
-  /// Types of one kind, sorted.
+  /// Types of one kind that can be made, sorted.
   std::vector<std::string> types(ComponentKind kind) const;
   /// Throws Error(Plugin) for an unknown type, naming the nearest one, and for twice provided ones.
   const ComponentEntry& entry(ComponentKind kind, std::string_view type) const;

@@ -110,7 +110,7 @@ Photosite CameraSensor::photosite() const {
           params_.shot_noise, (1 << params_.bits) - 1};
 }
 
-void CameraSensor::annotate(const Scene&, Frame& frame) const {
+void CameraSensor::do_annotate(const Scene&, Frame& frame) const {
   const LensEffects lens{params_.vignetting, params_.red_shift_px, params_.blue_shift_px};
   const Image<Vec3f> light =
       through_lens(frame.get(kColorHdr), stored_lens(frame.camera), lens, host_);

@@ -46,13 +46,13 @@ class CameraSensor final : public Annotator {
 
   NameSet needs() const override;
   NameSet provides() const override;
-  void annotate(const Scene& scene, Frame& frame) const override;
 
   /// Share of the well that light of 1 nit fills.
   double manual_exposure() const;
   Photosite photosite() const;
 
  private:
+  void do_annotate(const Scene& scene, Frame& frame) const override;
   Params params_;
   Host& host_;
 };

@@ -43,7 +43,7 @@ NameSet DepthSensor::needs() const { return {std::string(kDistanceToImagePlane.n
 
 NameSet DepthSensor::provides() const { return {std::string(kSensorDepth.name)}; }
 
-void DepthSensor::annotate(const Scene&, Frame& frame) const {
+void DepthSensor::do_annotate(const Scene&, Frame& frame) const {
   const Camera camera = stored_lens(frame.camera);
   frame.set(kSensorDepth, measured(frame.get(kDistanceToImagePlane), camera, frame.seed));
 }

@@ -30,9 +30,9 @@ class DepthSensor final : public Annotator {
 
   NameSet needs() const override;
   NameSet provides() const override;
-  void annotate(const Scene& scene, Frame& frame) const override;
 
  private:
+  void do_annotate(const Scene& scene, Frame& frame) const override;
   Image<float> measured(const Image<float>& depth, const Camera& camera, std::uint64_t seed) const;
 
   Params params_;

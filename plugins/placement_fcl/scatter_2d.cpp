@@ -9,7 +9,7 @@ void Scatter2d::Params::visit(ParamVisitor& v) {
   placement.visit(v);
   v.param("surfaces", surfaces, {"Nodes whose meshes are scattered on."});
   v.param("max_slope_deg", max_slope_deg, {"Faces steeper than this are left out.", "deg", 0, 89});
-  declare(v, "gap_m", gap_m, {"Height of the node's underside above the surface.", "m", 0, 100});
+  v.param("gap_m", gap_m, {"Height of the node's underside above the surface.", "m", 0, 100});
 }
 
 Scatter2d::Scatter2d(Params params, Host& host) : params_(std::move(params)), host_(host) {}

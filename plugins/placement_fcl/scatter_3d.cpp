@@ -70,7 +70,7 @@ void Scatter3d::Params::visit(ParamVisitor& v) {
   v.param("volumes", volumes,
           {"Nodes whose boxes are filled, visible or not; null: `offset` says where."});
   v.param("excluded", excluded, {"Nodes whose boxes are left free; null: none."});
-  declare(v, "offset", offset, {"Place, from the working area along the world's axes.", "m"}, 3);
+  v.param("offset", offset, {"Place, from the working area along the world's axes.", "m"}, 3);
 }
 
 Scatter3d::Scatter3d(Params params, Host& host) : params_(std::move(params)), host_(host) {}

@@ -7,14 +7,14 @@ namespace diorama {
 
 void CameraLens::Params::visit(ParamVisitor& v) {
   v.param("nodes", nodes, {"Cameras to change."});
-  declare(v, "focal_length_mm", focal_length_mm, {"Focal length; null keeps it.", "mm", 0.01, 1e5});
-  declare(v, "principal_point_px", principal_point_px,
+  v.param("focal_length_mm", focal_length_mm, {"Focal length; null keeps it.", "mm", 0.01, 1e5});
+  v.param("principal_point_px", principal_point_px,
           {"Shift of the principal point off the image centre along x and y; null keeps it. A "
            "vector's third number is not used.",
            "px"},
           3);
-  declare(v, "f_stop", f_stop, {"Aperture; 0: everything is in focus; null keeps it.", "", 0, 1e3});
-  declare(v, "focus_distance_m", focus_distance_m,
+  v.param("f_stop", f_stop, {"Aperture; 0: everything is in focus; null keeps it.", "", 0, 1e3});
+  v.param("focus_distance_m", focus_distance_m,
           {"Distance of the plane in focus; null keeps it.", "m", 1e-3, 1e6});
 }
 

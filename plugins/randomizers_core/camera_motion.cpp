@@ -7,10 +7,10 @@ namespace diorama {
 
 void CameraMotion::Params::visit(ParamVisitor& v) {
   v.param("nodes", nodes, {"Cameras to move."});
-  declare(v, "velocity", velocity, {"Along the camera's axes: right, up, backwards.", "m/s"}, 3);
-  declare(v, "angular_velocity_deg", angular_velocity_deg,
+  v.param("velocity", velocity, {"Along the camera's axes: right, up, backwards.", "m/s"}, 3);
+  v.param("angular_velocity_deg", angular_velocity_deg,
           {"About the camera's axes: right (tilt), up (pan), backwards (roll).", "deg/s"}, 3);
-  declare(v, "exposure_time_s", exposure_time_s,
+  v.param("exposure_time_s", exposure_time_s,
           {"How long a row gathers light; null keeps it.", "s", 0, 10});
 }
 

@@ -17,10 +17,10 @@ Vec2 pixel_at(const Camera& camera, double horizontal, double vertical) {
 void CameraRelativePose::Params::visit(ParamVisitor& v) {
   v.param("nodes", nodes, {"Nodes to place."});
   v.param("camera", camera, {"The camera; of several that fit, each node picks one."});
-  declare(v, "distance_m", distance_m, {"Distance from the camera's centre.", "m", 1e-3, 1e5});
-  declare(v, "horizontal", horizontal,
+  v.param("distance_m", distance_m, {"Distance from the camera's centre.", "m", 1e-3, 1e5});
+  v.param("horizontal", horizontal,
           {"Place in the picture: -1 is the left edge, 1 the right one.", "", -1, 1});
-  declare(v, "vertical", vertical,
+  v.param("vertical", vertical,
           {"Place in the picture: -1 is the lower edge, 1 the upper one.", "", -1, 1});
 }
 

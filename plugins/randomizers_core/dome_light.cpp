@@ -7,12 +7,12 @@ namespace diorama {
 
 void DomeLight::Params::visit(ParamVisitor& v) {
   v.param("nodes", nodes, {"Dome lights to change."});
-  declare(v, "textures", textures,
+  v.param("textures", textures,
           {"Equirectangular images to choose from; none: the light keeps what it has."});
-  declare(
-      v, "intensity", intensity,
+  v.param(
+      "intensity", intensity,
       {"Luminance of a pixel of value 1, or of the whole sky without an image.", "nit", 0, 1e9});
-  declare(v, "rotation_deg", rotation_deg, {"Turn about the vertical.", "deg", -360, 360});
+  v.param("rotation_deg", rotation_deg, {"Turn about the vertical.", "deg", -360, 360});
 }
 
 DomeLight::DomeLight(Params params, Host& host)

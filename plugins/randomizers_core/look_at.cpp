@@ -23,8 +23,8 @@ Quat view_from_axis(const std::string& axis) {
 void LookAt::Params::visit(ParamVisitor& v) {
   v.param("nodes", nodes, {"Cameras, lights or objects to turn."});
   v.param("targets", targets, {"Nodes to look at; each node picks one."});
-  declare(v, "offset", offset, {"Point looked at, from the target's centre.", "m"}, 3);
-  declare(v, "roll_deg", roll_deg, {"Turn about the viewing direction.", "deg", -360, 360});
+  v.param("offset", offset, {"Point looked at, from the target's centre.", "m"}, 3);
+  v.param("roll_deg", roll_deg, {"Turn about the viewing direction.", "deg", -360, 360});
   v.choice("axis", axis, kAxes,
            {"The node's axis that points at the target; cameras and lights look along -z."});
 }

@@ -22,11 +22,11 @@ struct OrbitCameras::Surroundings {
 void OrbitCameras::Params::visit(ParamVisitor& v) {
   v.param("nodes", nodes, {"Cameras (or lights) to place."});
   v.param("targets", targets, {"Nodes to look at; each camera picks one."});
-  declare(v, "distance", distance, {"Distance from the target's centre.", "m", 1e-3, 1e5});
-  declare(v, "polar_angle_deg", polar_angle_deg,
+  v.param("distance", distance, {"Distance from the target's centre.", "m", 1e-3, 1e5});
+  v.param("polar_angle_deg", polar_angle_deg,
           {"Angle off the vertical: 0 looks straight down, 90 level.", "deg", 0, 180});
-  declare(v, "azimuth_deg", azimuth_deg, {"Direction round the vertical.", "deg", -360, 360});
-  declare(v, "look_at_offset", look_at_offset,
+  v.param("azimuth_deg", azimuth_deg, {"Direction round the vertical.", "deg", -360, 360});
+  v.param("look_at_offset", look_at_offset,
           {"Point looked at, from the target's centre; a number is drawn per axis.", "m"}, 3);
   v.choice("roll", roll, kRolls,
            {"level: the horizon is level; arc: the shortest turn from looking down, as the "

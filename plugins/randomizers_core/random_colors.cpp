@@ -22,7 +22,7 @@ std::shared_ptr<const Material> painted(const Node& node, const Vec3& color) {
 
 void RandomColors::Params::visit(ParamVisitor& v) {
   v.param("nodes", nodes, {"Nodes to paint; those without a mesh are passed over."});
-  declare(v, "color", color, {"Red, green and blue, linear.", "", 0, 1}, 3);
+  v.param("color", color, {"Red, green and blue, linear.", "", 0, 1}, 3);
 }
 
 RandomColors::RandomColors(Params params, Host&) : params_(std::move(params)) {}

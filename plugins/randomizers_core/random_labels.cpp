@@ -17,7 +17,7 @@ void RandomLabels::Params::visit(ParamVisitor& v) {
            {"replace: the only label of the node; add: its other taxonomies stay; clear: no label "
             "in any taxonomy, whatever `labels` says."});
   v.param("taxonomy", taxonomy, {"Taxonomy of the label."});
-  declare(v, "labels", labels, {"Labels to choose from."});
+  v.param("labels", labels, {"Labels to choose from."});
 }
 
 RandomLabels::RandomLabels(Params params, Host&) : params_(std::move(params)) {

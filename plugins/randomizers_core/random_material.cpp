@@ -20,11 +20,11 @@ std::shared_ptr<const Material> first_material(const Scene& scene) {
 
 void RandomMaterial::Params::visit(ParamVisitor& v) {
   v.param("nodes", nodes, {"Nodes to change; those without a mesh are passed over."});
-  declare(v, "assets", assets,
+  v.param("assets", assets,
           {"Model files whose first material is put on the mesh; none: the mesh keeps its own."});
-  declare(v, "roughness", roughness,
+  v.param("roughness", roughness,
           {"Perceptual roughness: 0 is a mirror, 1 is matt; null keeps it.", "", 0, 1});
-  declare(v, "metallic", metallic,
+  v.param("metallic", metallic,
           {"0: plastic, wood, cloth; 1: bare metal; null keeps it.", "", 0, 1});
 }
 

@@ -9,10 +9,9 @@ namespace diorama {
 
 void RandomTexture::Params::visit(ParamVisitor& v) {
   v.param("nodes", nodes, {"Nodes to change; those without a mesh are passed over."});
-  declare(v, "textures", textures,
-          {"Image files to choose from; none: the mesh keeps what it has."});
-  declare(v, "repeat", repeat, {"How often the picture fits along the mesh's uv.", "", 1e-3, 1e3});
-  declare(v, "rotation_deg", rotation_deg, {"Turn of the picture.", "deg", -360, 360});
+  v.param("textures", textures, {"Image files to choose from; none: the mesh keeps what it has."});
+  v.param("repeat", repeat, {"How often the picture fits along the mesh's uv.", "", 1e-3, 1e3});
+  v.param("rotation_deg", rotation_deg, {"Turn of the picture.", "deg", -360, 360});
 }
 
 RandomTexture::RandomTexture(Params params, Host& host)

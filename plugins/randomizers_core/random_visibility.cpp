@@ -7,7 +7,7 @@ namespace diorama {
 
 void RandomVisibility::Params::visit(ParamVisitor& v) {
   v.param("nodes", nodes, {"Nodes to show or hide, with all below them."});
-  declare(v, "visible_chance", visible_chance,
+  v.param("visible_chance", visible_chance,
           {"Probability that a node is shown; a sequence of 1 and 0 shows and hides in turn.", "",
            0, 1});
 }

@@ -15,11 +15,11 @@ bool is_placeable(const Node& node) {
 
 void ScatterLights::Params::visit(ParamVisitor& v) {
   v.param("nodes", nodes, {"Lights to place."});
-  declare(v, "offset", offset, {"Place, from the working area along the world's axes.", "m"}, 3);
-  declare(v, "color", color, {"Red, green and blue, linear.", "", 0, 1}, 3);
-  declare(v, "intensity", intensity,
+  v.param("offset", offset, {"Place, from the working area along the world's axes.", "m"}, 3);
+  v.param("color", color, {"Red, green and blue, linear.", "", 0, 1}, 3);
+  v.param("intensity", intensity,
           {"Luminance of the light's surface for white, as in Replicator.", "nit", 0, 1e9});
-  declare(v, "radius_m", radius_m,
+  v.param("radius_m", radius_m,
           {"Radius of sphere and disk lights; null keeps what they have.", "m", 0, 1000});
 }
 

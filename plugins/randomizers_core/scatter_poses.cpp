@@ -16,14 +16,14 @@ Quat about(const Vec3& axis, double degrees) {
 
 void ScatterPoses::Params::visit(ParamVisitor& v) {
   v.param("nodes", nodes, {"Nodes to place."});
-  declare(v, "offset", offset, {"Place, from the working area along the world's axes.", "m"}, 3);
+  v.param("offset", offset, {"Place, from the working area along the world's axes.", "m"}, 3);
   v.choice("rotation", rotation, kRotations,
            {"uniform: every orientation is as likely; euler: angles about x, then y, then z, from "
             "rotation_deg (drawn evenly they favour the poles); upright: about z alone, from "
             "rotation_deg; none."});
-  declare(v, "rotation_deg", rotation_deg,
+  v.param("rotation_deg", rotation_deg,
           {"Angles of euler (a number is drawn per axis) and upright.", "deg", -360, 360}, 3);
-  declare(v, "scale", scale, {"Scale; a single number is that of all axes.", "", 1e-4, 1e4}, 3);
+  v.param("scale", scale, {"Scale; a single number is that of all axes.", "", 1e-4, 1e4}, 3);
 }
 
 ScatterPoses::ScatterPoses(Params params, Host&) : params_(std::move(params)) {}

@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <limits>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "writer_basic/box_files.h"
@@ -31,8 +33,8 @@ void write_rgb(const FrameOutput& output, const std::string& format) {
 }
 
 void write_distance(const FrameOutput& output, const Channel<float>& channel, bool colorize) {
-  output.files.add(output.path(channel.name, channel.name, ".npy"),
-                   npy_file(output.frame.get(channel)));
+  add_npy(output.files, output.path(channel.name, channel.name, ".npy"),
+          output.frame.image_named(channel.name));
   if (!colorize) return;
   auto distances = output.frame.get(channel);
   // What a sensor does not measure looks like what no ray met.
@@ -42,16 +44,20 @@ void write_distance(const FrameOutput& output, const Channel<float>& channel, bo
       png_file(output.host, distances.width(), distances.height(), distance_picture(distances)));
 }
 
+/// Row by row: the format's four numbers per pixel are twice what the channel takes.
 void write_motion_vectors(const FrameOutput& output) {
   const auto& motion = output.frame.get(kMotion);
-  std::vector<std::array<float, 4>> vectors(motion.pixels().size());
-  // The format counts motion to the left and up; 0 - x keeps zero positive.
-  std::ranges::transform(motion.pixels(), vectors.begin(), [](const Vec2f& pixels) {
-    return std::array{0.0f - pixels.x(), 0.0f - pixels.y(), 0.0f, 0.0f};
-  });
-  output.files.add(
-      output.path("motion_vectors", "motion_vectors", ".npy"),
-      npy_file("'<f4'", {motion.height(), motion.width(), 4}, std::as_bytes(std::span(vectors))));
+  const std::string path = output.path("motion_vectors", "motion_vectors", ".npy");
+  const std::array<std::int64_t, 3> shape{motion.height(), motion.width(), 4};
+  output.files.append(path, npy_header("'<f4'", shape));
+  std::vector<std::array<float, 4>> row(std::size_t(motion.width()));
+  for (int y = 0; y < motion.height(); ++y) {
+    // The format counts motion to the left and up; 0 - x keeps zero positive.
+    std::ranges::transform(motion.row(y), row.begin(), [](const Vec2f& pixels) {
+      return std::array{0.0f - pixels.x(), 0.0f - pixels.y(), 0.0f, 0.0f};
+    });
+    output.files.append(path, std::as_bytes(std::span(row)));
+  }
 }
 
 void write_unlabelled_files(const BasicWriter::Params& params, const FrameOutput& output) {
@@ -77,6 +83,9 @@ void write_unlabelled_files(const BasicWriter::Params& params, const FrameOutput
                           python_json(camera_params_json(output.frame)));
   }
   if (params.pointcloud) write_point_cloud(output, params.pointcloud_include_unlabelled);
+  for (const std::string& channel : params.channels.names) {
+    add_npy(output.files, output.path(channel, channel, ".npy"), output.frame.image_named(channel));
+  }
 }
 
 void write_labelled_files(const BasicWriter::Params& params, const FrameOutput& output) {
@@ -117,6 +126,7 @@ void BasicWriter::Params::visit(ParamVisitor& v) {
           {"Points of unlabelled surfaces too."});
   v.param("sensor_depth", sensor_depth,
           {"Depth as the annotator depth_sensor measures it, 0 where it measures nothing."});
+  channels.visit(v);
   v.choice("image_output_format", image_output_format, kImageEndings,
            {"Format of the rgb files; all other pictures are PNG."});
   v.param("colorize_semantic_segmentation", colorize_semantic_segmentation,
@@ -147,6 +157,14 @@ BasicWriter::BasicWriter(Params params, Host& host)
                                           params_.semantic_filter_predicate)),
       frame_padding_(params_.frame_padding) {
   params_.remote.check();
+  std::vector<std::string_view> taken{"pointcloud", "motion_vectors"};
+  const auto take = [&taken](bool is_written, std::string_view name) {
+    if (is_written) taken.push_back(name);
+  };
+  take(params_.distance_to_camera, kDistanceToCamera.name);
+  take(params_.distance_to_image_plane, kDistanceToImagePlane.name);
+  take(params_.sensor_depth, kSensorDepth.name);
+  params_.channels.check(taken);
 }
 
 NameSet BasicWriter::needs() const {
@@ -164,6 +182,7 @@ NameSet BasicWriter::needs() const {
   add(p.normals, {kNormals.name});
   add(p.motion_vectors, {kMotion.name});
   add(p.pointcloud, {kPosition.name, kColor.name, kNormals.name, kLeafId.name, kInstanceId.name});
+  p.channels.add_to(names);
   add(p.bounding_box_2d_tight || p.bounding_box_2d_loose || p.bounding_box_3d || p.occlusion,
       {kInstanceId.name, "visibility"});
   return names;

@@ -8,12 +8,14 @@
 #include "diorama/host.h"
 #include "diorama/params.h"
 #include "diorama/writer.h"
+#include "writer_support/channel_list.h"
 #include "writer_support/replicator.h"
 #include "writer_support/semantic_filter.h"
 
 namespace diorama {
 
 /// Files as Omniverse Replicator's BasicWriter 0.0.2 writes them: names, folders, types, JSON text.
+/// Beyond it, `channels` are written as arrays: disparity_0007.npy.
 class BasicWriter final : public Writer {
  public:
   struct Params {
@@ -34,6 +36,7 @@ class BasicWriter final : public Writer {
     bool skeleton_data = false;
     bool pointcloud_include_unlabelled = false;
     bool sensor_depth = false;
+    ChannelList channels;
     std::string image_output_format = "png";
     bool colorize_semantic_segmentation = true;
     bool colorize_instance_id_segmentation = true;

@@ -1,8 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "writer_basic/point_cloud_files.h"
 
+#include <algorithm>
 #include <array>
+#include <cstdint>
+#include <initializer_list>
 #include <span>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "writer_support/npy.h"
@@ -23,13 +28,22 @@ std::vector<std::uint32_t> point_pixels(const Image<std::uint32_t>& semantic,
   return chosen;
 }
 
-/// value_of(pixel) of all points, one after the other.
+/// Adds an array of value_of(pixel) for all points, a part at a time.
 template <class Function>
-auto of_points(const std::vector<std::uint32_t>& pixels, Function&& value_of) {
+void add_array(const FrameOutput& output, std::string_view stem, std::string_view descr,
+               std::span<const std::int64_t> shape, const std::vector<std::uint32_t>& pixels,
+               const Function& value_of) {
+  constexpr std::size_t kPart = 1 << 16;
+  const std::string path = output.path("pointcloud", stem, ".npy");
+  output.files.append(path, npy_header(descr, shape));
   std::vector<decltype(value_of(0u))> values;
-  values.reserve(pixels.size());
-  for (const std::uint32_t pixel : pixels) values.push_back(value_of(pixel));
-  return values;
+  for (std::size_t begin = 0; begin < pixels.size(); begin += kPart) {
+    values.clear();
+    for (std::size_t i = begin; i < std::min(begin + kPart, pixels.size()); ++i) {
+      values.push_back(value_of(pixels[i]));
+    }
+    output.files.append(path, std::as_bytes(std::span(values)));
+  }
 }
 
 }  // namespace
@@ -44,12 +58,9 @@ void write_point_cloud(const FrameOutput& output, bool include_unlabelled) {
   const std::vector<std::uint32_t> points = point_pixels(semantic, include_unlabelled);
   const auto count = std::int64_t(points.size());
 
-  constexpr std::string_view kName = "pointcloud";
   const auto add = [&](std::string_view stem, std::string_view descr,
-                       std::initializer_list<std::int64_t> shape, auto&& value_of) {
-    const auto values = of_points(points, value_of);
-    output.files.add(output.path(kName, stem, ".npy"),
-                     npy_file(descr, shape, std::as_bytes(std::span(values))));
+                       std::initializer_list<std::int64_t> shape, const auto& value_of) {
+    add_array(output, stem, descr, std::span(shape.begin(), shape.size()), points, value_of);
   };
   add("pointcloud", "'<f4'", {count, 3}, [&](std::uint32_t i) { return positions[i]; });
   add("pointcloud_rgb", "'|u1'", {count, 4}, [&](std::uint32_t i) { return colors[i]; });

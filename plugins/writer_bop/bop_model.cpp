@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <numeric>
 #include <string>
+#include <utility>
+
+#include "writer_bop/point_diameter.h"
 
 namespace diorama {
 namespace {
@@ -103,23 +105,20 @@ Aabb BopModel::bounds() const {
   return box;
 }
 
-// Two vertices are at most as far apart as both are from the middle together, so vertices are
-// paired from the outermost inwards until that sum falls below the best pair.
-double BopModel::diameter() const {
-  const Vec3f middle =
-      positions.empty() ? Vec3f(Vec3f::Zero()) : Vec3f(bounds().centre().cast<float>());
-  std::vector<float> reach;
-  for (const Vec3f& position : positions) reach.push_back((position - middle).norm());
-  std::vector<std::size_t> order(positions.size());
-  std::iota(order.begin(), order.end(), std::size_t(0));
-  std::ranges::sort(order, std::ranges::greater(), [&](std::size_t i) { return reach[i]; });
-  float best = 0.0f;
-  for (std::size_t i = 0; i < order.size() && 2.0f * reach[order[i]] > best; ++i) {
-    for (std::size_t j = 0; j < i && reach[order[i]] + reach[order[j]] > best; ++j) {
-      best = std::max(best, (positions[order[i]] - positions[order[j]]).norm());
-    }
+double BopModel::diameter() const { return point_diameter(positions); }
+
+BopModel BopModel::scaled(const Vec3& factors) const {
+  BopModel model = *this;
+  for (Vec3f& position : model.positions) {
+    position = position.cast<double>().cwiseProduct(factors).cast<float>();
   }
-  return double(best);
+  for (Vec3f& normal : model.normals) {
+    normal = normal.cast<double>().cwiseQuotient(factors).normalized().cast<float>();
+  }
+  if (factors.prod() < 0.0) {
+    for (auto& triangle : model.triangles) std::swap(triangle[1], triangle[2]);
+  }
+  return model;
 }
 
 std::vector<std::byte> BopModel::ply() const {

@@ -22,6 +22,8 @@ struct BopModel {
   Aabb bounds() const;
   /// The largest distance between two vertices.
   double diameter() const;
+  /// The same stretched along its axes; no factor may be 0. Negative ones mirror.
+  BopModel scaled(const Vec3& factors) const;
   /// A binary little-endian PLY file.
   std::vector<std::byte> ply() const;
 };

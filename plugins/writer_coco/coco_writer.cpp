@@ -2,11 +2,14 @@
 #include "writer_coco/coco_writer.h"
 
 #include <algorithm>
-#include <cstdlib>
+#include <charconv>
 #include <iterator>
 #include <map>
+#include <set>
+#include <system_error>
 
 #include "diorama/error.h"
+#include "writer_support/contours.h"
 #include "writer_support/cuboid.h"
 #include "writer_support/image_files.h"
 #include "writer_support/lens_json.h"
@@ -15,6 +18,8 @@
 
 namespace diorama {
 namespace {
+
+constexpr const char* kSegmentations[] = {"rle", "polygon"};
 
 Json box_json(const PixelBox& box) { return {box.x_min, box.y_min, box.width(), box.height()}; }
 
@@ -56,47 +61,128 @@ Json amodal_json(const Frame& frame, const Instance& instance) {
       {"occluded_by", occluded_by_json(frame, instance)}};
 }
 
-Json image_json(const Capture& capture, const Frame& frame, int id, const std::string& file) {
+/// A flat list x, y, x, y ... per part.
+Json polygons_json(const Image<std::uint32_t>& ids, const Instance& instance) {
+  Json list = Json::array();
+  for (const Outline& part : outlines(ids, instance.id, *instance.tight_box)) {
+    Json polygon = Json::array();
+    for (const Vec2& corner : joined(part)) {
+      polygon.push_back(int(corner.x()));
+      polygon.push_back(int(corner.y()));
+    }
+    list.push_back(std::move(polygon));
+  }
+  return list;
+}
+
+Json image_json(const Capture& capture, const Frame& frame, int id, const std::string& file,
+                const Json& licenses) {
   const Camera& camera = frame.camera;
   return {{"id", id},
           {"file_name", file},
           {"width", camera.width},
           {"height", camera.height},
-          {"license", 0},
+          {"license", licenses.at(0).at("id")},
           {"capture", capture.index},
           {"camera", frame.camera_name},
-          {"intrinsics", {camera.fx, camera.fy, camera.cx, camera.cy}},
+          {"intrinsics", intrinsics_json(camera)},
           {"lens", lens_json(camera)},
           {"world_from_camera", nested_list(frame.world_from_camera.matrix())}};
 }
 
-Json dataset_json(const char* what, Json licenses, Json images, Json annotations, Json categories) {
-  return {{"info", {{"description", what}, {"version", "1.0"}, {"contributor", "diorama"}}},
-          {"licenses", std::move(licenses)},
-          {"images", std::move(images)},
-          {"annotations", std::move(annotations)},
-          {"categories", std::move(categories)}};
+// A record is the split's name and the JSON texts that the capture adds to the annotation files,
+// each behind a tab and the letter of its list: no JSON text holds a tab. So finish() need not
+// parse them.
+constexpr char kImage = 'i';
+constexpr char kAnnotation = 'a';
+constexpr char kPanoptic = 'p';
+
+void add_to(std::string& record, char kind, const std::string& text) {
+  record += '\t';
+  record += kind;
+  record += text;
 }
 
-/// Replicator's list of licences: id, name and url each.
+/// `visit(split, kind, text)` for every text of every record.
+template <class Visit>
+void for_each_part(const RecordReader& records, const Visit& visit) {
+  records([&visit](int, std::string_view line) {
+    const std::string split(line.substr(0, line.find('\t')));
+    for (std::size_t at = line.find('\t'); at != std::string_view::npos;) {
+      const std::size_t end = line.find('\t', at + 1);
+      visit(split, line.at(at + 1), line.substr(at + 2, end - at - 2));
+      at = end;
+    }
+  });
+}
+
+/// One of the files below annotations/, which grows from its beginning to its end.
+class AnnotationFile {
+ public:
+  AnnotationFile(DatasetFiles& files, std::string path, const char* what, const Json& licenses)
+      : files_(files), path_(std::move(path)) {
+    const Json info{{"description", what}, {"version", "1.0"}, {"contributor", "diorama"}};
+    put("{\"info\": " + python_json(info) + ", \"licenses\": " + python_json(licenses) +
+        ", \"images\": [");
+  }
+  /// The next element of the list.
+  void add(std::string_view text) {
+    if (count_++ > 0) put(", ");
+    put(text);
+  }
+  /// The same with its number as its id.
+  void add_numbered(std::string_view object) {
+    if (count_++ > 0) put(", ");
+    put("{\"id\": " + std::to_string(count_) + ", ");
+    put(object.substr(1));
+  }
+  void begin_annotations() {
+    put("], \"annotations\": [");
+    count_ = 0;
+  }
+  void end(const Json& categories) { put("], \"categories\": " + python_json(categories) + "}"); }
+
+ private:
+  void put(std::string_view text) { files_.append_text(path_, text); }
+
+  DatasetFiles& files_;
+  std::string path_;
+  std::size_t count_ = 0;
+};
+
+/// Replicator's list of licences: id, name and url each. Without one, that nothing is said.
 Json licenses_json(const Value& value) {
   constexpr const char* kKey = "coco_license_info";
+  const bool is_empty = value.kind == Value::Kind::List && value.list.empty();
+  if (value.kind == Value::Kind::Null || is_empty) {
+    return Json::array({{{"id", 1}, {"name", "unspecified"}, {"url", ""}}});
+  }
+  const auto complain = [&](const Value& at, const std::string& what) {
+    throw Error(ErrorKind::Config, complaint_about(at, kKey) + what);
+  };
+  if (value.kind != Value::Kind::List) {
+    complain(value, "expected a list of {id, name, url} or null, found " + value.describe());
+  }
   Json list = Json::array();
-  if (value.kind == Value::Kind::Null) return list;
+  std::set<int> ids;
   for (const Value& entry : value.list) {
+    const Value* id = entry.kind == Value::Kind::Map ? entry.find("id") : nullptr;
+    if (!id || !entry.find("name")) {
+      complain(entry, "expected {id, name, url}, found " + entry.describe());
+    }
+    int number = 0;
+    const char* end = id->scalar.data() + id->scalar.size();
+    const auto read = std::from_chars(id->scalar.data(), end, number);
+    if (read.ec != std::errc() || read.ptr != end) {
+      complain(*id, "expected a whole number as the id of a licence, found " + id->describe());
+    }
+    if (!ids.insert(number).second) complain(*id, "two licences have this id");
     Json license = Json::object();
     for (const auto& [key, field] : entry.map) license[key] = field.scalar;
-    if (license.contains("id")) license["id"] = std::atoi(entry.find("id")->scalar.c_str());
+    license["id"] = number;
     list.push_back(std::move(license));
   }
-  const bool is_good =
-      value.kind == Value::Kind::List && std::ranges::all_of(value.list, [](const Value& entry) {
-        return entry.kind == Value::Kind::Map && entry.find("id") && entry.find("name");
-      });
-  if (is_good) return list;
-  throw Error(ErrorKind::Config, complaint_about(value, kKey) +
-                                     "expected a list of {id, name, url} or null, found " +
-                                     value.describe());
+  return list;
 }
 
 /// Where categories are given, their labels are the classes, in that order.
@@ -114,10 +200,6 @@ TrainingParams with_categories(TrainingParams params, const std::vector<CocoCate
   return params;
 }
 
-void append(Json& list, Json& more) {
-  for (Json& element : more) list.push_back(std::move(element));
-}
-
 }  // namespace
 
 void CocoWriter::Params::visit(ParamVisitor& v) {
@@ -126,6 +208,8 @@ void CocoWriter::Params::visit(ParamVisitor& v) {
   v.param("amodal", amodal,
           {"Mask, box and area of the whole object, and who hides it, under \"amodal\"."});
   v.param("panoptic", panoptic, {"Panoptic pictures and annotations."});
+  v.choice("segmentation", segmentation, kSegmentations,
+           {"Masks as compressed run lengths, exact, or as polygons along pixel edges."});
   v.param("crowd_below_px", crowd_below_px,
           {"Objects with fewer visible pixels are marked iscrowd.", "px", 0.0});
   v.param(
@@ -209,16 +293,22 @@ void CocoWriter::begin(const DatasetInfo& dataset, DatasetFiles& files) {
       dataset, files);
 }
 
+/// Crowds are run lengths in any case, as evaluations expect them.
+Json CocoWriter::segmentation_json(const Frame& frame, const Instance& instance,
+                                   bool is_crowd) const {
+  const auto& ids = frame.get(kInstanceId);
+  if (params_.segmentation == "polygon" && !is_crowd) return polygons_json(ids, instance);
+  return coco_rle(run_length(ids, instance.id, *instance.tight_box));
+}
+
 Json CocoWriter::annotation(const Frame& frame, const TrainingObject& object, int image_id) const {
   const Instance& instance = *object.instance;
-  Json json{{"image_id", image_id},
-            {"category_id", category_id(object.class_index)},
-            {"iscrowd", object.visible_px < params_.crowd_below_px ? 1 : 0},
-            {"bbox", box_json(*instance.tight_box)},
-            {"area", object.visible_px},
-            {"segmentation",
-             coco_rle(run_length(frame.get(kInstanceId), instance.id, *instance.tight_box))},
-            {"node", instance.node_path}};
+  const bool is_crowd = object.visible_px < params_.crowd_below_px;
+  Json json{
+      {"image_id", image_id},        {"category_id", category_id(object.class_index)},
+      {"iscrowd", is_crowd ? 1 : 0}, {"bbox", box_json(*instance.tight_box)},
+      {"area", object.visible_px},   {"segmentation", segmentation_json(frame, instance, is_crowd)},
+      {"node", instance.node_path}};
   if (params_.keypoints) {
     int count = 0;
     json["keypoints"] = keypoints_json(frame, instance, count);
@@ -260,56 +350,51 @@ Json CocoWriter::panoptic_annotation(const Frame& frame, const std::vector<Train
 
 void CocoWriter::write(const Capture& capture, CaptureFiles& files) const {
   const char* split = training_.split(capture.index);
-  Json record{{"split", split},
-              {"images", Json::array()},
-              {"annotations", Json::array()},
-              {"panoptic", Json::array()}};
+  std::string record = split;
   for (std::size_t camera = 0; camera < capture.frames.size(); ++camera) {
     const Frame& frame = capture.frames[camera];
     const int id = capture.index * int(capture.frames.size()) + int(camera) + 1;
     const std::string stem = training_.image_stem(capture, frame);
     const std::string file = stem + "." + training_.image_format();
     files.add(std::string("images/") + split + "/" + file, training_.image_file(host_, frame));
-    record["images"].push_back(image_json(capture, frame, id, file));
+    add_to(record, kImage, python_json(image_json(capture, frame, id, file, licenses_)));
     const auto objects = training_.objects(frame);
     for (const TrainingObject& object : objects) {
-      record["annotations"].push_back(annotation(frame, object, id));
+      add_to(record, kAnnotation, python_json(annotation(frame, object, id)));
     }
     if (params_.panoptic) {
-      record["panoptic"].push_back(panoptic_annotation(frame, objects, id, stem, split, files));
+      add_to(record, kPanoptic,
+             python_json(panoptic_annotation(frame, objects, id, stem, split, files)));
     }
   }
-  files.record(python_json(record));
+  files.record(record);
 }
 
 void CocoWriter::finish(const RecordReader& records, DatasetFiles& files) {
-  struct Part {
-    Json images = Json::array();
-    Json annotations = Json::array();
-    Json panoptic = Json::array();
-  };
-  std::map<std::string, Part> parts;
-  for (const std::string& split : training_.splits()) parts[split];
-  records([&parts](int, std::string_view line) {
-    Json record = Json::parse(line);
-    Part& part = parts[record.at("split")];
-    append(part.images, record.at("images"));
-    for (Json& annotation : record.at("annotations")) {
-      Json numbered{{"id", part.annotations.size() + 1}};
-      numbered.update(annotation);
-      part.annotations.push_back(std::move(numbered));
-    }
-    append(part.panoptic, record.at("panoptic"));
+  std::map<std::string, AnnotationFile> instances, panoptic;
+  for (const std::string& split : training_.splits()) {
+    const auto begin = [&](const char* kind, const char* what, auto& all) {
+      const std::string path = std::string("annotations/") + kind + "_" + split + ".json";
+      all.emplace(split, AnnotationFile(files, path, what, licenses_));
+    };
+    begin("instances", "Instances", instances);
+    if (params_.panoptic) begin("panoptic", "Panoptic segmentation", panoptic);
+  }
+  // Pictures come before annotations, so the records are read twice: little of them is in memory.
+  for_each_part(records, [&](const std::string& split, char kind, std::string_view text) {
+    if (kind != kImage) return;
+    instances.at(split).add(text);
+    if (params_.panoptic) panoptic.at(split).add(text);
   });
-  for (auto& [split, part] : parts) {
-    if (params_.panoptic) {
-      files.add_text("annotations/panoptic_" + split + ".json",
-                     python_json(dataset_json("Panoptic segmentation", licenses_, part.images,
-                                              std::move(part.panoptic), categories())));
-    }
-    files.add_text("annotations/instances_" + split + ".json",
-                   python_json(dataset_json("Instances", licenses_, std::move(part.images),
-                                            std::move(part.annotations), categories())));
+  for (auto* all : {&instances, &panoptic}) {
+    for (auto& [split, file] : *all) file.begin_annotations();
+  }
+  for_each_part(records, [&](const std::string& split, char kind, std::string_view text) {
+    if (kind == kAnnotation) instances.at(split).add_numbered(text);
+    if (kind == kPanoptic) panoptic.at(split).add(text);
+  });
+  for (auto* all : {&instances, &panoptic}) {
+    for (auto& [split, file] : *all) file.end(categories());
   }
 }
 

@@ -23,7 +23,9 @@ namespace diorama {
 ///     annotations/panoptic_{train,val}.json  panoptic/{train,val}/000012_cam_0.png
 ///
 /// Image ids count from 1 over captures and cameras, annotation ids from 1 within a file. Masks are
-/// compressed run lengths of the visible pixels. Annotations with fewer visible pixels than
+/// compressed run lengths of the visible pixels, or polygons along pixel edges, one per part, holes
+/// joined to their border by bridges of no width. Every picture has the first licence. Annotations
+/// with fewer visible pixels than
 /// `crowd_below_px` are marked iscrowd, so that an evaluation ignores them instead of punishing a
 /// detector for either answer.
 ///
@@ -37,6 +39,7 @@ class CocoWriter final : public Writer {
     bool keypoints = true;
     bool amodal = true;
     bool panoptic = true;
+    std::string segmentation = "rle";
     int crowd_below_px = 0;
     Value coco_categories;    ///< See read_coco_categories().
     Value coco_license_info;  ///< A list of {id, name, url} or null.
@@ -59,6 +62,7 @@ class CocoWriter final : public Writer {
  private:
   int category_id(int class_index) const;
   Json categories() const;
+  Json segmentation_json(const Frame& frame, const Instance& instance, bool is_crowd) const;
   Json annotation(const Frame& frame, const TrainingObject& object, int image_id) const;
   Json panoptic_annotation(const Frame& frame, const std::vector<TrainingObject>& objects,
                            int image_id, const std::string& stem, const char* split,

@@ -3,6 +3,9 @@
 
 #include <hdf5.h>
 
+#include <type_traits>
+#include <variant>
+
 #include "diorama/error.h"
 
 namespace diorama {
@@ -70,6 +73,26 @@ void Hdf5File::add(const char* name, std::span<const std::size_t> shape, const f
 
 void Hdf5File::add(const char* name, std::span<const std::size_t> shape, const double* data) {
   write_array(file_, name, shape, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, data);
+}
+
+void Hdf5File::add(const char* name, const AnyImage& any) {
+  std::visit(
+      [&]<class Pixel>(const Image<Pixel>& image) {
+        constexpr bool kIsColor = std::is_same_v<Pixel, Rgba8>;
+        constexpr bool kIsId = std::is_same_v<Pixel, std::uint32_t>;
+        constexpr std::size_t kNumbers = sizeof(Pixel) / (kIsColor ? 1 : 4);
+        const std::size_t shape[] = {std::size_t(image.height()), std::size_t(image.width()),
+                                     kNumbers};
+        write_array(file_, name, std::span(shape).first(kNumbers > 1 ? 3 : 2),
+                    kIsColor ? H5T_STD_U8LE
+                    : kIsId  ? H5T_STD_U32LE
+                             : H5T_IEEE_F32LE,
+                    kIsColor ? H5T_NATIVE_UINT8
+                    : kIsId  ? H5T_NATIVE_UINT32
+                             : H5T_NATIVE_FLOAT,
+                    image.pixels().data());
+      },
+      any);
 }
 
 void Hdf5File::add_text(const char* name, std::string_view text) {

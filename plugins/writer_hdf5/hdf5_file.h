@@ -8,6 +8,8 @@
 #include <string_view>
 #include <vector>
 
+#include "diorama/image.h"
+
 namespace diorama {
 
 /// An HDF5 file in memory. Data sets are compressed and carry no times, so the same content gives
@@ -25,6 +27,8 @@ class Hdf5File {
   void add(const char* name, std::span<const std::size_t> shape, const std::uint16_t* data);
   void add(const char* name, std::span<const std::size_t> shape, const float* data);
   void add(const char* name, std::span<const std::size_t> shape, const double* data);
+  /// With a third extent where a pixel has several numbers.
+  void add(const char* name, const AnyImage& image);
   void add_text(const char* name, std::string_view text);
   std::vector<std::byte> bytes();
 

@@ -69,15 +69,28 @@ void Hdf5Writer::Params::visit(ParamVisitor& v) {
   training.visit(v);
   v.param("depth", depth, {"Depth along the viewing axis."});
   v.param("normals", normals, {"World normals."});
+  channels.visit(v);
 }
 
 Hdf5Writer::Hdf5Writer(Params params, Host&)
-    : params_(std::move(params)), training_(params_.training) {}
+    : params_(std::move(params)), training_(params_.training) {
+  constexpr std::string_view kTaken[] = {"colors",
+                                         "depth",
+                                         "normals",
+                                         "instance_segmaps",
+                                         "category_id_segmaps",
+                                         "cam_K",
+                                         "world_from_camera",
+                                         "lens",
+                                         "instance_attribute_maps"};
+  params_.channels.check(kTaken);
+}
 
 NameSet Hdf5Writer::needs() const {
   NameSet names{std::string(kColor.name), std::string(kInstanceId.name), "instances"};
   if (params_.depth) names.emplace(kDistanceToImagePlane.name);
   if (params_.normals) names.emplace(kNormals.name);
+  params_.channels.add_to(names);
   return names;
 }
 
@@ -98,8 +111,8 @@ std::vector<std::byte> Hdf5Writer::frame_file(const Frame& frame) const {
   const Segmentation segmentation = segmentation_of(frame, objects);
   const auto h = std::size_t(camera.height);
   const auto w = std::size_t(camera.width);
-  const std::array<double, 9> intrinsics{camera.fx, 0.0, camera.cx, 0.0, camera.fy,
-                                         camera.cy, 0.0, 0.0,       1.0};
+  const Intrinsics k = intrinsics_of(camera);
+  const std::array<double, 9> intrinsics{k.fx, 0.0, k.cx, 0.0, k.fy, k.cy, 0.0, 0.0, 1.0};
   const Mat4 rows = frame.world_from_camera.matrix().transpose();  // Eigen keeps columns together
 
   const std::lock_guard lock(hdf5_mutex());
@@ -114,6 +127,9 @@ std::vector<std::byte> Hdf5Writer::frame_file(const Frame& frame) const {
   }
   file.add("instance_segmaps", std::array{h, w}, segmentation.instances.data());
   file.add("category_id_segmaps", std::array{h, w}, segmentation.categories.data());
+  for (const std::string& channel : params_.channels.names) {
+    file.add(channel.c_str(), frame.image_named(channel));
+  }
   file.add("cam_K", std::array{std::size_t(3), std::size_t(3)}, intrinsics.data());
   file.add("world_from_camera", std::array{std::size_t(4), std::size_t(4)}, rows.data());
   file.add_text("lens", python_json(lens_json(camera)));

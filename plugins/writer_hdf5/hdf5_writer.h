@@ -4,6 +4,7 @@
 #include "diorama/host.h"
 #include "diorama/params.h"
 #include "diorama/writer.h"
+#include "writer_support/channel_list.h"
 #include "writer_support/training_data.h"
 
 namespace diorama {
@@ -16,13 +17,15 @@ namespace diorama {
 /// normals (h, w, 3) float32, world space, (n + 1) / 2; instance_segmaps (h, w) uint16, the
 /// object's place in instance_attribute_maps (JSON text) + 1; category_id_segmaps (h, w) uint16,
 /// class index + 1; cam_K (3, 3), world_from_camera (4, 4) float64; lens: JSON text, see
-/// lens_json(). 0 is background in both segmentations.
+/// lens_json(). 0 is background in both segmentations. Each of `channels` is a data set of its own
+/// name, as the channel has it.
 class Hdf5Writer final : public Writer {
  public:
   struct Params {
     TrainingParams training;
     bool depth = true;
     bool normals = true;
+    ChannelList channels;
 
     void visit(ParamVisitor& v);
   };

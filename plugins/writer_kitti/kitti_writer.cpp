@@ -75,18 +75,21 @@ std::string label_line(const Frame& frame, const TrainingObject& object, const s
 }
 
 std::string calibration(const Camera& camera) {
+  const Intrinsics k = intrinsics_of(camera);
   std::array<char, 256> p{};
-  std::snprintf(p.data(), p.size(), "%.12e 0 %.12e 0 0 %.12e %.12e 0 0 0 1 0\n", camera.fx,
-                camera.cx, camera.fy, camera.cy);
+  std::snprintf(p.data(), p.size(), "%.12e 0 %.12e 0 0 %.12e %.12e 0 0 0 1 0\n", k.fx, k.cx, k.fy,
+                k.cy);
   std::string text;
   for (int i = 0; i < 4; ++i) text += "P" + std::to_string(i) + ": " + p.data();
+  text +=
+      "R0_rect: 1 0 0 0 1 0 0 0 1\n"
+      "Tr_velo_to_cam: 1 0 0 0 0 1 0 0 0 0 1 0\n"
+      "Tr_imu_to_velo: 1 0 0 0 0 1 0 0 0 0 1 0\n";
+  // Last, because readers count the standard lines.
   if (camera.lens != LensModel::Pinhole) {
     text += "lens_2: " + python_json(lens_json(camera)) + "\n";
   }
-  return text +
-         "R0_rect: 1 0 0 0 1 0 0 0 1\n"
-         "Tr_velo_to_cam: 1 0 0 0 0 1 0 0 0 0 1 0\n"
-         "Tr_imu_to_velo: 1 0 0 0 0 1 0 0 0 0 1 0\n";
+  return text;
 }
 
 Image<std::uint32_t> depth_picture(const Image<float>& depth) {

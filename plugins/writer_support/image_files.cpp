@@ -3,11 +3,39 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
+#include <string_view>
 
 #include "diorama/error.h"
 
 namespace diorama {
+namespace {
+
+constexpr std::size_t kPngSignature = 8;
+constexpr std::size_t kPngHeaderChunk = 4 + 4 + 13 + 4;  ///< Length, "IHDR", content, checksum.
+
+/// The CRC of PNG's chunks (ISO/IEC 15948, annex D).
+std::uint32_t png_crc(std::span<const std::byte> bytes) {
+  std::uint32_t crc = 0xFFFFFFFFu;
+  for (const std::byte byte : bytes) {
+    crc ^= std::uint32_t(byte);
+    for (int bit = 0; bit < 8; ++bit) crc = (crc >> 1) ^ ((crc & 1u) != 0 ? 0xEDB88320u : 0u);
+  }
+  return ~crc;
+}
+
+void put_big_endian(std::uint32_t value, std::byte* to) {
+  for (int i = 0; i < 4; ++i) to[i] = std::byte((value >> (24 - 8 * i)) & 0xFFu);
+}
+
+/// Sets the checksum of the chunk that begins there.
+void seal(std::span<std::byte> chunk) {
+  const std::size_t content = chunk.size() - 4;
+  put_big_endian(png_crc(chunk.subspan(4, content - 4)), &chunk[content]);
+}
+
+}  // namespace
 
 std::vector<std::uint8_t> without_alpha(const Image<Rgba8>& image) {
   std::vector<std::uint8_t> rgb;
@@ -24,6 +52,29 @@ std::vector<std::byte> png_file(const Host& host, const Image<Rgba8>& image) {
 std::vector<std::byte> png_file(const Host& host, int width, int height,
                                 std::span<const std::uint8_t> gray) {
   return host.encode_image({gray.data(), width, height, 1, 8}, ImageFormat::Png);
+}
+
+// Gray and indexed pictures of 8 bits differ in the header's type of colour and the palette behind
+// it; their pixels are coded alike.
+std::vector<std::byte> indexed_png_file(const Host& host, int width, int height,
+                                        std::span<const std::uint8_t> indices,
+                                        std::span<const std::array<std::uint8_t, 3>> palette) {
+  std::vector<std::byte> png = png_file(host, width, height, indices);
+  constexpr std::size_t kColorType = kPngSignature + 8 + 9;
+  constexpr std::byte kIndexed{3};
+  if (png.size() < kPngSignature + kPngHeaderChunk || png[kColorType] != std::byte(0)) {
+    throw Error(ErrorKind::Internal, "png: the host's gray picture is none");
+  }
+  png[kColorType] = kIndexed;
+  seal(std::span(png).subspan(kPngSignature, kPngHeaderChunk));
+  std::vector<std::byte> chunk(8 + 3 * palette.size() + 4);
+  put_big_endian(std::uint32_t(3 * palette.size()), chunk.data());
+  constexpr std::string_view kName = "PLTE";
+  std::memcpy(&chunk[4], kName.data(), kName.size());
+  std::memcpy(&chunk[8], palette.data(), 3 * palette.size());
+  seal(chunk);
+  png.insert(png.begin() + kPngSignature + kPngHeaderChunk, chunk.begin(), chunk.end());
+  return png;
 }
 
 std::vector<std::byte> png_file(const Host& host, const Image<std::uint32_t>& image,

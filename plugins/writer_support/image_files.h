@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -24,6 +25,10 @@ std::vector<std::byte> rgb_png_file(const Host& host, const Image<Rgba8>& image)
 /// Eight bits of gray.
 std::vector<std::byte> png_file(const Host& host, int width, int height,
                                 std::span<const std::uint8_t> gray);
+/// Eight bits of indices into a palette of up to 256 colours.
+std::vector<std::byte> indexed_png_file(const Host& host, int width, int height,
+                                        std::span<const std::uint8_t> indices,
+                                        std::span<const std::array<std::uint8_t, 3>> palette);
 /// Sixteen bits of gray. Throws Error(Output) that begins with `what` when a value is above 65535.
 std::vector<std::byte> png_file(const Host& host, const Image<std::uint32_t>& image,
                                 const std::string& what);

@@ -17,4 +17,18 @@ Json lens_json(const Camera& camera) {
   return {{"model", "pinhole"}};
 }
 
+Intrinsics intrinsics_of(const Camera& camera) {
+  Intrinsics result{camera.fx, camera.fy, camera.cx, camera.cy};
+  // The angle off the axis grows by this much per pixel at the centre.
+  const double growth = camera.fisheye_polynomial[1];
+  if (camera.lens == LensModel::FisheyePolynomial && growth > 0.0)
+    result.fx = result.fy = 1.0 / growth;
+  return result;
+}
+
+Json intrinsics_json(const Camera& camera) {
+  const Intrinsics k = intrinsics_of(camera);
+  return {k.fx, k.fy, k.cx, k.cy};
+}
+
 }  // namespace diorama

@@ -11,4 +11,13 @@ namespace diorama {
 /// off the axis by the radius in pixels, six factors], "max_angle_rad": ...}.
 Json lens_json(const Camera& camera);
 
+/// fx, fy, cx, cy in pixels, of a pinhole that sees what the lens sees at its centre. A fisheye
+/// lens's own polynomial says its focal length there; Camera::fx has no part in it.
+struct Intrinsics {
+  double fx = 0.0, fy = 0.0, cx = 0.0, cy = 0.0;
+};
+Intrinsics intrinsics_of(const Camera& camera);
+/// [fx, fy, cx, cy].
+Json intrinsics_json(const Camera& camera);
+
 }  // namespace diorama

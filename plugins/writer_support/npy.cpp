@@ -4,6 +4,9 @@
 #include <array>
 #include <bit>
 #include <string>
+#include <type_traits>
+#include <utility>
+#include <variant>
 
 #include "diorama/error.h"
 
@@ -27,8 +30,7 @@ void PackedBytes::add_u32(std::uint32_t value) {
 void PackedBytes::add_i32(std::int32_t value) { add_u32(std::bit_cast<std::uint32_t>(value)); }
 void PackedBytes::add_f32(float value) { add_u32(std::bit_cast<std::uint32_t>(value)); }
 
-std::vector<std::byte> npy_file(std::string_view descr, std::initializer_list<std::int64_t> shape,
-                                std::span<const std::byte> data) {
+std::vector<std::byte> npy_header(std::string_view descr, std::span<const std::int64_t> shape) {
   std::string header = "{'descr': " + std::string(descr) + ", 'fortran_order': False, 'shape': (";
   const char* separator = "";
   for (const std::int64_t extent : shape) {
@@ -38,25 +40,50 @@ std::vector<std::byte> npy_file(std::string_view descr, std::initializer_list<st
   if (shape.size() == 1) header += ',';
   header += "), }";
   // Room for the first extent to grow to 21 digits, so that a file can be appended to in place.
-  if (shape.size() > 0) header.append(21 - std::to_string(*shape.begin()).size(), ' ');
+  if (!shape.empty()) header.append(21 - std::to_string(shape[0]).size(), ' ');
   constexpr std::size_t kPrefix = 10;
   while ((kPrefix + header.size() + 1) % 64 != 0) header += ' ';
   header += '\n';
   if (header.size() > 0xFFFF) throw Error(ErrorKind::Internal, "npy: header too long");
 
   PackedBytes file;
-  file.bytes.reserve(kPrefix + header.size() + data.size());
+  file.bytes.reserve(kPrefix + header.size());
   for (const unsigned char c : std::string_view("\x93NUMPY")) file.add_u8(c);
   file.add_u8(1);
   file.add_u8(0);
   file.add_u16(std::uint16_t(header.size()));
   for (const char c : header) file.add_u8(std::uint8_t(c));
-  file.bytes.insert(file.bytes.end(), data.begin(), data.end());
   return std::move(file.bytes);
 }
 
-std::vector<std::byte> npy_file(const Image<float>& image) {
-  return npy_file("'<f4'", {image.height(), image.width()}, std::as_bytes(image.pixels()));
+std::vector<std::byte> npy_file(std::string_view descr, std::initializer_list<std::int64_t> shape,
+                                std::span<const std::byte> data) {
+  std::vector<std::byte> file = npy_header(descr, std::span(shape.begin(), shape.size()));
+  file.insert(file.end(), data.begin(), data.end());
+  return file;
+}
+
+ImageNumbers numbers_of(const AnyImage& any) {
+  return std::visit(
+      []<class Pixel>(const Image<Pixel>& image) {
+        constexpr bool kIsColor = std::is_same_v<Pixel, Rgba8>;
+        constexpr bool kIsId = std::is_same_v<Pixel, std::uint32_t>;
+        constexpr std::size_t kNumbers = sizeof(Pixel) / (kIsColor ? 1 : 4);
+        ImageNumbers numbers{kIsColor ? "'|u1'"
+                             : kIsId  ? "'<u4'"
+                                      : "'<f4'",
+                             {image.height(), image.width()},
+                             std::as_bytes(image.pixels())};
+        if (kNumbers > 1) numbers.shape.push_back(std::int64_t(kNumbers));
+        return numbers;
+      },
+      any);
+}
+
+void add_npy(DatasetFiles& files, const std::string& path, const AnyImage& image) {
+  const ImageNumbers numbers = numbers_of(image);
+  files.append(path, npy_header(numbers.descr, numbers.shape));
+  files.append(path, numbers.bytes);
 }
 
 }  // namespace diorama

@@ -5,10 +5,12 @@
 #include <cstdint>
 #include <initializer_list>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
 #include "diorama/image.h"
+#include "diorama/writer.h"
 
 namespace diorama {
 
@@ -30,7 +32,18 @@ class PackedBytes {
 std::vector<std::byte> npy_file(std::string_view descr, std::initializer_list<std::int64_t> shape,
                                 std::span<const std::byte> data);
 
-/// A float image as '<f4' of shape (height, width).
-std::vector<std::byte> npy_file(const Image<float>& image);
+/// Adds an image of any kind without a copy of its data: shape (height, width), with a third extent
+/// where a pixel has several numbers. Colours are '|u1', ids '<u4', all else '<f4'.
+void add_npy(DatasetFiles& files, const std::string& path, const AnyImage& image);
+
+/// The numbers of an image as they lie in memory, and what a .npy file says of them.
+struct ImageNumbers {
+  std::string_view descr;
+  std::vector<std::int64_t> shape;
+  std::span<const std::byte> bytes;
+};
+ImageNumbers numbers_of(const AnyImage& image);
+/// What stands before the data in a .npy file.
+std::vector<std::byte> npy_header(std::string_view descr, std::span<const std::int64_t> shape);
 
 }  // namespace diorama

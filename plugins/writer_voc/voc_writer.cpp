@@ -2,7 +2,10 @@
 #include "writer_voc/voc_writer.h"
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <map>
+#include <sstream>
 
 #include "writer_support/image_files.h"
 #include "writer_support/replicator.h"
@@ -28,6 +31,45 @@ std::string escaped(const std::string& text) {
     }
   }
   return result;
+}
+
+/// The benchmark's colours: the index's bits dealt to red, green and blue, the highest first.
+std::vector<std::array<std::uint8_t, 3>> voc_palette() {
+  std::vector<std::array<std::uint8_t, 3>> palette(256);
+  for (unsigned index = 0; index < 256; ++index) {
+    for (unsigned bit = 0; bit < 8; ++bit) {
+      palette[index][bit % 3] =
+          std::uint8_t(palette[index][bit % 3] | (((index >> bit) & 1u) << (7 - bit / 3)));
+    }
+  }
+  return palette;
+}
+
+/// Names of classes as parts of file names, all different.
+std::vector<std::string> list_names(const std::vector<std::string>& classes) {
+  std::vector<std::string> names;
+  for (const std::string& label : classes) {
+    std::string name = label;
+    for (char& c : name) {
+      const auto byte = static_cast<unsigned char>(c);
+      if (byte < 0x80 && !std::isalnum(byte) && c != '-' && c != '.') c = '_';
+    }
+    std::string free = name;
+    for (int number = 2; std::ranges::count(names, free) > 0; ++number) {
+      free = name + "_" + std::to_string(number);
+    }
+    names.push_back(free);
+  }
+  return names;
+}
+
+// What the list of a class says of a picture.
+constexpr char kShown = 's';
+constexpr char kDifficult = 'd';
+constexpr char kAbsent = '-';
+
+const char* list_mark(char occurrence) {
+  return occurrence == kShown ? "  1\n" : occurrence == kDifficult ? "  0\n" : " -1\n";
 }
 
 std::string element(const char* name, const std::string& text) {
@@ -56,31 +98,50 @@ void VocWriter::begin(const DatasetInfo& dataset, DatasetFiles& files) {
     throw Error(ErrorKind::Config, "segmentation: " + std::to_string(training_.classes().size()) +
                                        " classes; 8-bit pictures have room for 255");
   }
-  std::string labels, train, val, both;
+  std::string labels;
   for (const std::string& name : training_.classes()) labels += name + "\n";
-  for (int i = 0; i < dataset.capture_count; ++i) {
-    Capture capture;
-    capture.index = i;
-    for (const std::string& camera : dataset.camera_names) {
-      Frame frame;
-      frame.camera_name = camera;
-      const std::string line = training_.image_stem(capture, frame) + "\n";
-      (std::string_view(training_.split(i)) == "val" ? val : train) += line;
-      both += line;
-    }
-  }
   files.add_text("labels.txt", labels);
   for (const char* kind : {"Main", "Segmentation"}) {
     if (!params_.segmentation && std::string_view(kind) == "Segmentation") continue;
-    files.add_text(std::string("ImageSets/") + kind + "/train.txt", train);
-    files.add_text(std::string("ImageSets/") + kind + "/val.txt", val);
-    files.add_text(std::string("ImageSets/") + kind + "/trainval.txt", both);
+    add_image_sets(std::string("ImageSets/") + kind + "/", dataset, files);
   }
   training_.add_dataset_page(
       "Pascal VOC",
       {{"boxes", "pixels counted from 1, the last one included"},
-       {"segmentation", "8-bit gray: class index + 1 or object's place + 1, 0 is background"}},
+       {"segmentation", "8-bit palette: class index + 1 or object's place + 1, 0 is background"}},
       dataset, files);
+}
+
+void VocWriter::add_image_sets(const std::string& folder, const DatasetInfo& dataset,
+                               DatasetFiles& files) const {
+  for (const char* part : {"train", "val", "trainval"})
+    files.append_text(folder + part + ".txt", "");
+  Capture capture;
+  for (capture.index = 0; capture.index < dataset.capture_count; ++capture.index) {
+    for (const std::string& camera : dataset.camera_names) {
+      Frame frame;
+      frame.camera_name = camera;
+      const std::string line = training_.image_stem(capture, frame) + "\n";
+      files.append_text(folder + training_.split(capture.index) + ".txt", line);
+      files.append_text(folder + "trainval.txt", line);
+    }
+  }
+}
+
+bool VocWriter::is_difficult(const Instance& instance) const {
+  const double visible =
+      instance.visibility ? 1.0 - instance.visibility->occlusion().value_or(0.0) : 1.0;
+  return visible < params_.difficult_below;
+}
+
+std::string VocWriter::occurrences(const std::vector<TrainingObject>& objects) const {
+  std::string marks(training_.classes().size(), kAbsent);
+  for (const TrainingObject& object : objects) {
+    char& mark = marks[std::size_t(object.class_index)];
+    if (!is_difficult(*object.instance)) mark = kShown;
+    if (mark == kAbsent) mark = kDifficult;
+  }
+  return marks;
 }
 
 std::string VocWriter::object_xml(const Frame& frame, const TrainingObject& object) const {
@@ -97,7 +158,7 @@ std::string VocWriter::object_xml(const Frame& frame, const TrainingObject& obje
          element("pose", "Unspecified") + "\n    " +
          element("truncated", is_truncated ? "1" : "0") + "\n    " +
          element("occluded", visible < 1.0 ? "1" : "0") + "\n    " +
-         element("difficult", visible < params_.difficult_below ? "1" : "0") + "\n    <bndbox>" +
+         element("difficult", is_difficult(instance) ? "1" : "0") + "\n    <bndbox>" +
          element("xmin", std::to_string(box.x_min + 1)) +
          element("ymin", std::to_string(box.y_min + 1)) +
          element("xmax", std::to_string(box.x_max)) + element("ymax", std::to_string(box.y_max)) +
@@ -122,13 +183,15 @@ void VocWriter::write_segmentation(const Frame& frame, const std::vector<Trainin
     classes[i] = std::uint8_t(objects[found->second].class_index + 1);
     instances[i] = std::uint8_t(found->second + 1);
   }
+  static const auto kPalette = voc_palette();
   files.add("SegmentationClass/" + stem + ".png",
-            png_file(host_, ids.width(), ids.height(), classes));
+            indexed_png_file(host_, ids.width(), ids.height(), classes, kPalette));
   files.add("SegmentationObject/" + stem + ".png",
-            png_file(host_, ids.width(), ids.height(), instances));
+            indexed_png_file(host_, ids.width(), ids.height(), instances, kPalette));
 }
 
 void VocWriter::write(const Capture& capture, CaptureFiles& files) const {
+  std::string record;
   for (const Frame& frame : capture.frames) {
     const std::string stem = training_.image_stem(capture, frame);
     const std::string file = stem + "." + training_.image_format();
@@ -143,7 +206,31 @@ void VocWriter::write(const Capture& capture, CaptureFiles& files) const {
     for (const TrainingObject& object : objects) xml += object_xml(frame, object);
     files.add_text("Annotations/" + stem + ".xml", xml + "</annotation>\n");
     if (params_.segmentation) write_segmentation(frame, objects, stem, files);
+    record += stem + " " + occurrences(objects) + " ";
   }
+  files.record(record);
+}
+
+/// The records are pairs of a picture's name and its occurrences, spaces between them.
+void VocWriter::finish(const RecordReader& records, DatasetFiles& files) {
+  const std::vector<std::string> names = list_names(training_.classes());
+  const auto list = [&names](std::size_t index, const char* part) {
+    return "ImageSets/Main/" + names[index] + "_" + part + ".txt";
+  };
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    for (const char* part : {"train", "val", "trainval"}) files.append_text(list(i, part), "");
+  }
+  records([&](int capture, std::string_view line) {
+    const char* split = training_.split(capture);
+    std::istringstream words{std::string(line)};
+    for (std::string stem, marks; words >> stem >> marks;) {
+      for (std::size_t i = 0; i < std::min(names.size(), marks.size()); ++i) {
+        const std::string text = stem + list_mark(marks[i]);
+        files.append_text(list(i, split), text);
+        files.append_text(list(i, "trainval"), text);
+      }
+    }
+  });
 }
 
 }  // namespace diorama

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <cstring>
 #include <string>
+#include <vector>
 
 #include "diorama/error.h"
 
@@ -36,25 +37,28 @@ std::array<char, kBlock> make_header(std::string_view name, std::size_t size) {
 
 }  // namespace
 
-void TarArchive::add(std::string_view name, std::span<const std::byte> content) {
-  if (name.empty() || name.size() > 100 || content.size() >= (std::size_t(1) << 33)) {
+void TarArchive::add(std::string_view name, std::span<const std::span<const std::byte>> parts) {
+  std::size_t size = 0;
+  for (const auto part : parts) size += part.size();
+  if (name.empty() || name.size() > 100 || size >= (std::size_t(1) << 33)) {
     throw Error(ErrorKind::Output, "tar: cannot hold '" + std::string(name) + "' with " +
-                                       std::to_string(content.size()) + " bytes");
+                                       std::to_string(size) + " bytes");
   }
-  const auto header = make_header(name, content.size());
-  const auto* begin = reinterpret_cast<const std::byte*>(header.data());
-  bytes_.insert(bytes_.end(), begin, begin + kBlock);
-  bytes_.insert(bytes_.end(), content.begin(), content.end());
-  bytes_.resize((bytes_.size() + kBlock - 1) / kBlock * kBlock);
+  const auto header = make_header(name, size);
+  files_.append(path_, std::as_bytes(std::span(header)));
+  for (const auto part : parts) files_.append(path_, part);
+  const std::vector<std::byte> rest((kBlock - size % kBlock) % kBlock);
+  files_.append(path_, rest);
+}
+
+void TarArchive::add(std::string_view name, std::span<const std::byte> content) {
+  add(name, std::span(&content, 1));
 }
 
 void TarArchive::add(std::string_view name, std::string_view content) {
   add(name, std::as_bytes(std::span(content.data(), content.size())));
 }
 
-std::vector<std::byte> TarArchive::take() {
-  bytes_.resize(bytes_.size() + 2 * kBlock);
-  return std::move(bytes_);
-}
+void TarArchive::end() { files_.append(path_, std::vector<std::byte>(2 * kBlock)); }
 
 }  // namespace diorama

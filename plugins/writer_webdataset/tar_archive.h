@@ -3,23 +3,29 @@
 
 #include <cstddef>
 #include <span>
+#include <string>
 #include <string_view>
-#include <vector>
+
+#include "diorama/writer.h"
 
 namespace diorama {
 
-/// A tar archive in memory: POSIX ustar, plain files of mode 644, owner and time 0, so that the
-/// same files give the same bytes.
+/// A tar archive that grows in a dataset: POSIX ustar, plain files of mode 644, owner and time 0,
+/// so that the same files give the same bytes.
 class TarArchive {
  public:
-  /// Throws Error(Output) when the name is longer than 100 bytes or the file larger than 8 GiB.
+  TarArchive(DatasetFiles& files, std::string path) : files_(files), path_(std::move(path)) {}
+
+  /// The parts are one after the other the file's content. Throws Error(Output) when the name is
+  /// longer than 100 bytes or the file larger than 8 GiB.
+  void add(std::string_view name, std::span<const std::span<const std::byte>> parts);
   void add(std::string_view name, std::span<const std::byte> content);
   void add(std::string_view name, std::string_view content);
-  /// Closes the archive and hands it over.
-  std::vector<std::byte> take();
+  void end();
 
  private:
-  std::vector<std::byte> bytes_;
+  DatasetFiles& files_;
+  std::string path_;
 };
 
 }  // namespace diorama

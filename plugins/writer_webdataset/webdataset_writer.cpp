@@ -2,6 +2,9 @@
 #include "writer_webdataset/webdataset_writer.h"
 
 #include <map>
+#include <span>
+#include <string_view>
+#include <vector>
 
 #include "writer_support/image_files.h"
 #include "writer_support/lens_json.h"
@@ -54,14 +57,19 @@ void WebDatasetWriter::Params::visit(ParamVisitor& v) {
   training.visit(v);
   v.param("depth", depth, {"A depth array per sample."});
   v.param("instances", instances, {"A picture of object numbers per sample."});
+  channels.visit(v);
 }
 
 WebDatasetWriter::WebDatasetWriter(Params params, Host& host)
-    : params_(std::move(params)), host_(host), training_(params_.training) {}
+    : params_(std::move(params)), host_(host), training_(params_.training) {
+  constexpr std::string_view kTaken[] = {"depth", "instances"};
+  params_.channels.check(kTaken);
+}
 
 NameSet WebDatasetWriter::needs() const {
   NameSet names{std::string(kColor.name), std::string(kInstanceId.name), "instances", "visibility"};
   if (params_.depth) names.emplace(kDistanceToImagePlane.name);
+  params_.channels.add_to(names);
   return names;
 }
 
@@ -90,7 +98,7 @@ Json WebDatasetWriter::sample_json(const Capture& capture, const Frame& frame,
             {"camera", frame.camera_name},
             {"width", camera.width},
             {"height", camera.height},
-            {"intrinsics", {camera.fx, camera.fy, camera.cx, camera.cy}},
+            {"intrinsics", intrinsics_json(camera)},
             {"lens", lens_json(camera)},
             {"world_from_camera", nested_list(frame.world_from_camera.matrix())},
             {"objects", Json::array()}};
@@ -102,18 +110,25 @@ Json WebDatasetWriter::sample_json(const Capture& capture, const Frame& frame,
 }
 
 void WebDatasetWriter::write(const Capture& capture, CaptureFiles& files) const {
-  TarArchive archive;
+  TarArchive archive(files, shard_name(capture.index, training_.capture_count()));
   for (const Frame& frame : capture.frames) {
     const std::string key = training_.image_stem(capture, frame);
     const auto objects = training_.objects(frame);
+    const auto add_array = [&](const std::string& ending, std::string_view channel) {
+      const ImageNumbers numbers = numbers_of(frame.image_named(channel));
+      const std::vector<std::byte> header = npy_header(numbers.descr, numbers.shape);
+      const std::span<const std::byte> parts[] = {header, numbers.bytes};
+      archive.add(key + "." + ending + ".npy", parts);
+    };
     archive.add(key + "." + training_.image_format(), training_.image_file(host_, frame));
     archive.add(key + ".json", python_json(sample_json(capture, frame, objects)));
     if (params_.instances) {
       archive.add(key + ".instances.png", png_file(host_, instance_picture(frame, objects), key));
     }
-    if (params_.depth) archive.add(key + ".depth.npy", npy_file(frame.get(kDistanceToImagePlane)));
+    if (params_.depth) add_array("depth", kDistanceToImagePlane.name);
+    for (const std::string& channel : params_.channels.names) add_array(channel, channel);
   }
-  files.add(shard_name(capture.index, training_.capture_count()), archive.take());
+  archive.end();
 }
 
 }  // namespace diorama

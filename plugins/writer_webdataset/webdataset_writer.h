@@ -4,6 +4,7 @@
 #include "diorama/host.h"
 #include "diorama/params.h"
 #include "diorama/writer.h"
+#include "writer_support/channel_list.h"
 #include "writer_support/training_data.h"
 
 namespace diorama {
@@ -19,12 +20,14 @@ namespace diorama {
 ///     000012_cam_0.json             camera and objects: class, box, pose, bounds, visible share
 ///     000012_cam_0.instances.png    16 bit: object's place in the list + 1; 0: none
 ///     000012_cam_0.depth.npy        float32, metres along the viewing axis, infinity: nothing
+///     000012_cam_0.disparity.npy    each of `channels`
 class WebDatasetWriter final : public Writer {
  public:
   struct Params {
     TrainingParams training;
     bool depth = true;
     bool instances = true;
+    ChannelList channels;
 
     void visit(ParamVisitor& v);
   };

@@ -4,8 +4,8 @@
 #include <array>
 #include <cstdio>
 
+#include "writer_support/contours.h"
 #include "writer_support/cuboid.h"
-#include "writer_yolo/contours.h"
 
 namespace diorama {
 namespace {
@@ -57,7 +57,8 @@ void YoloWriter::begin(const DatasetInfo& dataset, DatasetFiles& files) {
   training_.begin(dataset);
   // Trainers insist on a validation folder.
   const std::string val = training_.splits().back();
-  std::string yaml = "path: .\ntrain: images/train\nval: images/" + val + "\n";
+  // Without `path`, which trainers would resolve against their own folder, splits lie beside it.
+  std::string yaml = "train: images/train\nval: images/" + val + "\n";
   if (params_.task == "pose") {
     yaml += "kpt_shape: [" + std::to_string(kKeypointCount) + ", 3]\n";
   }

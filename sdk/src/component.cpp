@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "diorama/component.h"
 
-#include "diorama/annotator.h"
 #include "diorama/host.h"
 #include "diorama/loader.h"
 #include "diorama/plugin.h"
@@ -29,7 +28,6 @@ std::string_view kind_name(ComponentKind kind) {
 
 // The virtual tables of the interfaces live here, once, and not in every plugin.
 Component::~Component() = default;
-Annotator::~Annotator() = default;
 Host::~Host() = default;
 Loader::~Loader() = default;
 Randomizer::~Randomizer() = default;

@@ -249,12 +249,21 @@ Distribution Distribution::between(const Vec3& lower, const Vec3& upper) {
   return made;
 }
 
+std::optional<Distribution> Distribution::read(const Value& value, const std::string& name,
+                                               const ParamDoc& doc, int width,
+                                               Complaints& complaints) {
+  const std::size_t before = complaints.messages().size();
+  Distribution made = Reader{doc, width, complaints}.read(value, name);
+  if (complaints.messages().size() != before) return std::nullopt;
+  return made;
+}
+
 Distribution Distribution::parse(const Value& value, const std::string& name, const ParamDoc& doc,
                                  int width) {
   Complaints complaints;
-  Distribution made = Reader{doc, width, complaints}.read(value, name);
+  std::optional<Distribution> made = read(value, name, doc, width, complaints);
   complaints.raise();
-  return made;
+  return *std::move(made);
 }
 
 double Distribution::draw_axis(int axis, Rng& rng) const {
@@ -299,8 +308,10 @@ TextDistribution::TextDistribution(const std::vector<std::string>& choices)
   for (const std::string& text : choices) source_.list.push_back(Value::text(text));
 }
 
-TextDistribution TextDistribution::parse(const Value& value, const std::string& name) {
-  Complaints complaints;
+std::optional<TextDistribution> TextDistribution::read(const Value& value, const std::string& name,
+                                                       Complaints& complaints) {
+  const std::size_t before = complaints.messages().size();
+  const auto is_bad = [&] { return complaints.messages().size() != before; };
   TextDistribution made;
   Value items = value;
   const auto* entry = only_entry(value);
@@ -313,7 +324,7 @@ TextDistribution TextDistribution::parse(const Value& value, const std::string& 
     ItemKeys keys(entry->second, made.is_sequence_, name + "." + std::string(word), complaints);
     items = std::move(keys.items);
     made.weights_ = std::move(keys.weights);
-    if (!made.is_sequence_ && complaints.is_empty()) {
+    if (!made.is_sequence_ && !is_bad()) {
       check_weights(made.weights_, items.list.size(), entry->second, name + ".choice", complaints);
     }
   } else if (value.kind != Value::Kind::List && value.kind != Value::Kind::Null) {
@@ -322,41 +333,27 @@ TextDistribution TextDistribution::parse(const Value& value, const std::string& 
                                     "`sequence`, found " +
                                     value.describe());
   }
-  complaints.raise();
+  if (is_bad()) return std::nullopt;
   if (items.kind == Value::Kind::List) {
     ParamReader(mapping(name.c_str(), items), "", complaints)
         .param(name.c_str(), made.texts_, {"Texts."});
   }
-  complaints.raise();
+  if (is_bad()) return std::nullopt;
   if (!entry) made.weights_.assign(made.texts_.size(), 1.0);
   made.source_ = value;
   return made;
 }
 
+TextDistribution TextDistribution::parse(const Value& value, const std::string& name) {
+  Complaints complaints;
+  std::optional<TextDistribution> made = read(value, name, complaints);
+  complaints.raise();
+  return *std::move(made);
+}
+
 std::size_t TextDistribution::draw(Rng& rng, std::uint64_t index) const {
   if (is_sequence_) return std::size_t(index % texts_.size());
   return pick(weights_, rng.uniform());
-}
-
-void declare(ParamVisitor& v, const char* key, Distribution& field, const ParamDoc& doc,
-             int width) {
-  Value value = field.source();
-  v.param(key, value, doc);
-  field = Distribution::parse(value, key, doc, width);
-}
-
-void declare(ParamVisitor& v, const char* key, std::optional<Distribution>& field,
-             const ParamDoc& doc, int width) {
-  Value value = field ? field->source() : Value();
-  v.param(key, value, doc);
-  field.reset();
-  if (value.kind != Value::Kind::Null) field = Distribution::parse(value, key, doc, width);
-}
-
-void declare(ParamVisitor& v, const char* key, TextDistribution& field, const ParamDoc& doc) {
-  Value value = field.source();
-  v.param(key, value, doc);
-  field = TextDistribution::parse(value, key);
 }
 
 }  // namespace diorama

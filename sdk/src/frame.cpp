@@ -6,6 +6,20 @@
 #include <iterator>
 
 namespace diorama {
+namespace {
+
+/// get() throws when the pixel type differs from the one in frame.h.
+template <class... Pixels>
+void check_type(const Frame& frame, std::string_view name, const Channel<Pixels>&... channels) {
+  ((name == channels.name ? void(frame.get(channels)) : void()), ...);
+}
+
+}  // namespace
+
+bool is_annotation(std::string_view name) {
+  return name == "instances" || name == "visibility" || name == "amodal_mask" ||
+         name == "occlusion_order";
+}
 
 bool CoverageMask::covers(int x, int y) const {
   if (x < box.x_min || x >= box.x_max || y < box.y_min || y >= box.y_max) return false;
@@ -52,23 +66,54 @@ Frame::~Frame() = default;
 Frame::Frame(Frame&&) noexcept = default;
 Frame& Frame::operator=(Frame&&) noexcept = default;
 
-bool Frame::has(std::string_view channel) const { return images_.contains(channel); }
+bool Frame::is_readable(std::string_view channel) const {
+  return !access_ || access_->readable.contains(channel);
+}
+
+bool Frame::has(std::string_view channel) const {
+  return is_readable(channel) && images_.contains(channel);
+}
 
 NameSet Frame::channels() const {
   NameSet names;
-  for (const auto& [name, image] : images_) names.insert(name);
+  for (const auto& [name, image] : images_) {
+    if (is_readable(name)) names.insert(name);
+  }
   return names;
 }
 
+void Frame::check_channel(std::string_view channel) const {
+  const auto check_size = [&](const auto& image) {
+    if (image.width() == camera.width && image.height() == camera.height) return;
+    throw Error(ErrorKind::Internal, camera_path + ": channel '" + std::string(channel) + "' has " +
+                                         std::to_string(image.width()) + " x " +
+                                         std::to_string(image.height()) + " pixels, expected " +
+                                         std::to_string(camera.width) + " x " +
+                                         std::to_string(camera.height));
+  };
+  std::visit(check_size, image_named(channel));
+  check_type(*this, channel, kColor, kColorHdr, kDistanceToCamera, kDistanceToImagePlane, kNormals,
+             kLeafId, kInstanceId, kPosition, kUv, kAlbedo, kObjectCoordinates, kMotion,
+             kSensorDepth);
+}
+
 void Frame::set_image(std::string_view channel, AnyImage image) {
+  if (access_ && !access_->settable.contains(channel)) {
+    throw Error(ErrorKind::Internal, camera_path + ": sets the channel '" + std::string(channel) +
+                                         "', which is not among those that it says it provides");
+  }
   images_.insert_or_assign(std::string(channel), std::move(image));
 }
 
 const AnyImage& Frame::image_named(std::string_view channel) const {
   const auto found = images_.find(channel);
-  if (found != images_.end()) return found->second;
+  if (found != images_.end() && is_readable(channel)) return found->second;
+  if (!is_readable(channel)) {
+    throw Error(ErrorKind::Internal, camera_path + ": reads the channel '" + std::string(channel) +
+                                         "', which is not among those that it says it needs");
+  }
   std::string known;
-  for (const auto& [name, image] : images_) known += (known.empty() ? "" : ", ") + name;
+  for (const std::string& name : channels()) known += (known.empty() ? "" : ", ") + name;
   throw Error(ErrorKind::Internal, camera_path + ": there is no channel '" + std::string(channel) +
                                        "'; there are: " + (known.empty() ? "none" : known));
 }

@@ -7,6 +7,8 @@
 #include <type_traits>
 #include <utility>
 
+#include "diorama/distribution.h"
+
 namespace diorama {
 
 ParamVisitor::~ParamVisitor() = default;
@@ -311,6 +313,29 @@ void ParamReader::param(const char* key, std::optional<std::string>& field, cons
   state_->complain(*value, state_->full_name(key), "a text or null");
 }
 
+void ParamReader::param(const char* key, Distribution& field, const ParamDoc& doc, int width) {
+  const Value* value = state_->take(key);
+  if (!value) return;
+  auto read = Distribution::read(*value, state_->full_name(key), doc, width, state_->complaints);
+  if (read) field = *std::move(read);
+}
+
+void ParamReader::param(const char* key, std::optional<Distribution>& field, const ParamDoc& doc,
+                        int width) {
+  const Value* value = state_->take(key);
+  if (!value) return;
+  field.reset();
+  if (value->kind == Value::Kind::Null) return;
+  field = Distribution::read(*value, state_->full_name(key), doc, width, state_->complaints);
+}
+
+void ParamReader::param(const char* key, TextDistribution& field, const ParamDoc&) {
+  const Value* value = state_->take(key);
+  if (!value) return;
+  auto read = TextDistribution::read(*value, state_->full_name(key), state_->complaints);
+  if (read) field = *std::move(read);
+}
+
 void ParamReader::param(const char* key, Value& field, const ParamDoc&) {
   if (const Value* value = state_->take(key)) field = *value;
 }
@@ -466,6 +491,22 @@ void ParamLister::param(const char* key, std::optional<double>& field, const Par
 
 void ParamLister::param(const char* key, std::optional<std::string>& field, const ParamDoc& doc) {
   state_->add(spec_of(key, ParamType::OptionalText, doc, field ? Value::text(*field) : Value()));
+}
+
+void ParamLister::param(const char* key, Distribution& field, const ParamDoc& doc, int width) {
+  const ParamType type = width == 3 ? ParamType::VectorDistribution : ParamType::Distribution;
+  state_->add(spec_of(key, type, doc, field.source()));
+}
+
+void ParamLister::param(const char* key, std::optional<Distribution>& field, const ParamDoc& doc,
+                        int width) {
+  const ParamType type =
+      width == 3 ? ParamType::OptionalVectorDistribution : ParamType::OptionalDistribution;
+  state_->add(spec_of(key, type, doc, field ? field->source() : Value()));
+}
+
+void ParamLister::param(const char* key, TextDistribution& field, const ParamDoc& doc) {
+  state_->add(spec_of(key, ParamType::TextDistribution, doc, field.source()));
 }
 
 void ParamLister::param(const char* key, Value& field, const ParamDoc& doc) {

@@ -21,25 +21,6 @@ const Camera& checked_camera(const Scene* scene, NodeId id) {
   return *node.camera;
 }
 
-void check_size(const Frame& frame, std::string_view channel) {
-  std::visit(
-      [&](const auto& image) {
-        const Camera& camera = frame.camera;
-        if (image.width() == camera.width && image.height() == camera.height) return;
-        fail(frame.camera_path + ": channel '" + std::string(channel) + "' has " +
-             std::to_string(image.width()) + " x " + std::to_string(image.height()) +
-             " pixels, expected " + std::to_string(camera.width) + " x " +
-             std::to_string(camera.height));
-      },
-      frame.image_named(channel));
-}
-
-/// get() throws when the pixel type differs from the one in frame.h.
-template <class... Pixels>
-void check_types(const Frame& frame, const Channel<Pixels>&... channels) {
-  ((frame.has(channels.name) ? void(frame.get(channels)) : void()), ...);
-}
-
 std::map<std::uint32_t, std::string> paths_of_leaves(const Scene& scene,
                                                      const Image<std::uint32_t>& leaf_ids) {
   std::map<std::uint32_t, std::string> paths;
@@ -100,9 +81,8 @@ Frame Renderer::render(const RenderRequest& request) {
   frame.world_from_camera = scene_->world_from_node(request.camera);
   frame.seed = request.seed;
 
-  for (const std::string& channel : request.channels) check_size(frame, channel);
-  check_types(frame, kColor, kColorHdr, kDistanceToCamera, kDistanceToImagePlane, kNormals, kLeafId,
-              kPosition, kUv, kAlbedo, kMotion);
+  for (const std::string& channel : request.channels) frame.check_channel(channel);
+  for (const std::string& channel : frame.channels()) frame.check_channel(channel);
   frame.leaf_paths.clear();
   if (frame.has(kLeafId.name)) frame.leaf_paths = paths_of_leaves(*scene_, frame.get(kLeafId));
   return frame;

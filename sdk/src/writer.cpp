@@ -15,6 +15,10 @@ void DatasetFiles::add_text(std::string_view path, std::string_view text) {
   add(path, std::move(bytes));
 }
 
+void DatasetFiles::append_text(std::string_view path, std::string_view text) {
+  append(path, std::as_bytes(std::span(text)));
+}
+
 void Writer::begin(const DatasetInfo&, DatasetFiles&) {}
 void Writer::finish(const RecordReader&, DatasetFiles&) {}
 

@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -131,9 +132,9 @@ TEST_CASE("a good plugin is listed without being loaded", "[plugins]") {
   CHECK(plugin.name == "well_behaved");
   CHECK(plugin.version == "1.2.3");
   CHECK(plugin.licence == "MIT");
-  REQUIRE(plugin.components);
-  CHECK(*plugin.components ==
-        std::vector<ListedComponent>{{ComponentKind::Writer, "quiet", "Writes nothing.", {}}});
+  CHECK_FALSE(plugin.learns_types);
+  CHECK(plugin.components == std::vector<ListedComponent>{
+                                 {ComponentKind::Writer, "quiet", "Writes nothing.", {}, {}, {}}});
   const Registry registry(search, [](LogLevel, std::string_view) {});
   CHECK(registry.loaded_plugins().empty());
 }
@@ -259,6 +260,13 @@ TEST_CASE("plugins for other ABIs are refused before their code can run", "[plug
                                     "; install a newer Diorama or a plugin built for this one");
   patch("crashes_when_loaded", file, [](auto& d) { d.layout ^= 1; });
   CHECK(folder.only_reason().starts_with("its types have another memory layout (digest "));
+  patch("crashes_when_loaded", file, [](auto& d) { d.headers = 0x1234abcd; });
+  char digest[17];
+  std::snprintf(digest, sizeof digest, "%016llx", DIORAMA_HEADERS_DIGEST);
+  CHECK(folder.only_reason() ==
+        "is built with other headers of plugin ABI " + here +
+            " (digest 000000001234abcd, this program needs " + digest +
+            "); build the plugin again with the headers that belong to this program");
   patch("crashes_when_loaded", file, [](auto& d) { d.abi_tag[4] = 'X'; });
   const std::string tag = folder.only_reason();
   CHECK(tag.starts_with("is built with another toolchain or other settings\n  found:    sdk=X"));
@@ -306,6 +314,49 @@ TEST_CASE("plugins whose code is not what the file says are refused when they ar
               ": lists writer 'promised' but does not register it; register it with "
               "DIORAMA_ADD");
   }
+}
+
+TEST_CASE("an annotator is what its plugin lists", "[plugins]") {
+  const PluginFolder folder;
+  const fs::path file = folder.copy("lists_other_channels", "a.so");
+  Registry registry(folder.search(), [](LogLevel, std::string_view) {});
+  CHECK(registry.entry(ComponentKind::Annotator, "edges").provides ==
+        std::vector<std::string>{"corners"});
+  CHECK(registry.loaded_plugins().empty());
+  CHECK(error_of([&] { registry.describe(ComponentKind::Annotator, "edges"); }) ==
+        file.string() +
+            ": registers annotator 'edges' with another help, other claims, needs or channels than "
+            "it lists; register it with DIORAMA_ADD");
+}
+
+TEST_CASE("a library may register types that it learns at run time", "[plugins]") {
+  const PluginFolder folder;
+  folder.copy("learns_types", "a.so");
+  Registry registry(folder.search(), [](LogLevel, std::string_view) {});
+  CHECK(registry.rejected().empty());
+  CHECK(registry.types(ComponentKind::Writer) ==
+        std::vector<std::string>{"fixed", "quiet", "script_a", "script_b"});
+  const auto only_param = [&](const char* type) {
+    const std::vector<ParamSpec> specs = registry.describe(ComponentKind::Writer, type);
+    REQUIRE(specs.size() == 1);
+    return specs.front();
+  };
+  CHECK(only_param("script_a").key == "amount");
+  CHECK(only_param("script_b").key == "breadth");
+  CHECK(only_param("script_b").min == 4.0);
+
+  HostServices host(registry, {}, [](LogLevel, std::string_view) {});
+  Value map = Value::make_map();
+  map.set("type", Value::text("script_b"));
+  map.set("breadth", Value::integer(7));
+  Complaints complaints;
+  const auto writer = registry.make<Writer>(map, "writers[0]", {}, complaints, host);
+  REQUIRE(writer);
+  CHECK(writer->needs() == NameSet{"breadth7"});
+  map.set("breadth", Value::integer(3));
+  CHECK_FALSE(registry.make<Writer>(map, "writers[0]", {}, complaints, host));
+  CHECK(complaints.messages() ==
+        std::vector<std::string>{"writers[0].breadth: expected an integer in [4, 9], found \"3\""});
 }
 
 TEST_CASE("the same type twice in one folder cannot be used, and both files are named",

@@ -48,9 +48,14 @@ DIORAMA_PLUGIN("faulty_components", "1.0.0", "MIT") {
   DIORAMA_ADD(test::NotAWriter, "not_a_writer", "Is of another kind.");
   DIORAMA_ADD(test::QuietWriter, "works", "Has no fault.");
   __attribute__((section(".diorama_components"), used)) static const DioramaComponentEntry entry{
-      std::uint32_t(ComponentKind::Writer), 0, "returns_null", "Makes nothing.", ""};
-  registrar.add({ComponentKind::Writer, "returns_null", "Makes nothing.",
-                 [] { return std::vector<ParamSpec>(); },
-                 [](const Value&, const std::string&, std::span<const std::string_view>,
-                    Complaints&, Host&) { return std::unique_ptr<Component>(); }});
+      std::uint32_t(ComponentKind::Writer), 0, "returns_null", "Makes nothing.", "", "", ""};
+  registrar.add(
+      {ComponentKind::Writer,
+       "returns_null",
+       "Makes nothing.",
+       {},
+       nullptr,
+       [](const void*) { return std::vector<ParamSpec>(); },
+       [](const void*, const Value&, const std::string&, std::span<const std::string_view>,
+          Complaints&, Host&) { return std::unique_ptr<Component>(); }});
 }

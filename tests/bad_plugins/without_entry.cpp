@@ -6,6 +6,7 @@ __attribute__((section(".diorama_plugin"), used)) static const DioramaPluginDesc
     sizeof(DioramaPluginDescriptor),
     DIORAMA_SDK_ABI,
     diorama::abi::kLayout,
+    DIORAMA_HEADERS_DIGEST,
     DIORAMA_ABI_TAG,
     "without_entry",
     "1.0.0",

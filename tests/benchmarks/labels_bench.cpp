@@ -59,6 +59,7 @@ class Times {
 class ForgottenFiles final : public CaptureFiles {
  public:
   void add(std::string_view, std::vector<std::byte> bytes) override { size += bytes.size(); }
+  void append(std::string_view, std::span<const std::byte> bytes) override { size += bytes.size(); }
   void record(std::string_view) override {}
   std::size_t size = 0;
 };

@@ -86,7 +86,7 @@ struct PromisesEdges : Annotator {
   PromisesEdges(Params, Host&) {}
   NameSet needs() const override { return {"color"}; }
   NameSet provides() const override { return {"edges"}; }
-  void annotate(const Scene&, Frame&) const override {}
+  void do_annotate(const Scene&, Frame&) const override {}
 };
 
 }  // namespace diorama::test
@@ -97,5 +97,5 @@ DIORAMA_PLUGIN("misbehaving_others", "1.0.0", "MIT") {
   DIORAMA_ADD_LOADER(TakesAnything, "takes_anything", "Loads what is not there.", ".any");
   DIORAMA_ADD(MovesTheFloor, "moves_the_floor", "Lowers everything.");
   DIORAMA_ADD(Restless, "restless", "Shows another colour each time.");
-  DIORAMA_ADD(PromisesEdges, "promises_edges", "Provides nothing.");
+  DIORAMA_ADD_ANNOTATOR(PromisesEdges, "promises_edges", "Provides nothing.", "color", "edges");
 }

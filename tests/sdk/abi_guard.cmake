@@ -3,24 +3,13 @@
 #         [-DACCEPT=ON] -P abi_guard.cmake
 # Compiled plugins are only as good as these headers: see sdk/docs/abi_policy.md.
 cmake_minimum_required(VERSION 3.25)
-file(GLOB headers RELATIVE ${INCLUDE_DIR} ${INCLUDE_DIR}/*.h)
-list(SORT headers)
-
-set(lines "")
-foreach(header IN LISTS headers)
-  file(READ ${INCLUDE_DIR}/${header} text)
-  # CMake lists are split at ';' and '[' pairs; neither may change the hash by how it is read.
-  string(REGEX REPLACE "//[^\n]*" "" text "${text}")
-  string(REGEX REPLACE "[ \t\r\n]+" "" text "${text}")
-  string(SHA256 hash "${text}")
-  string(SUBSTRING ${hash} 0 16 hash)
-  string(APPEND lines "${header} ${hash}\n")
-endforeach()
+include(${CMAKE_CURRENT_LIST_DIR}/../../sdk/cmake/HeadersDigest.cmake)
+diorama_headers_digest(digest ${INCLUDE_DIR})
 
 file(STRINGS ${INCLUDE_DIR}/abi.h abi REGEX "^#define DIORAMA_SDK_ABI ")
 string(REGEX REPLACE "[^0-9]" "" abi "${abi}")
 execute_process(COMMAND ${LAYOUT} OUTPUT_VARIABLE layout COMMAND_ERROR_IS_FATAL ANY)
-set(found "abi ${abi}\nlayout ${layout}${lines}")
+set(found "abi ${abi}\nlayout ${layout}headers ${digest}\n${digest_LINES}")
 
 if(ACCEPT)
   file(WRITE ${LOCK} "${found}")

@@ -182,3 +182,67 @@ TEST_CASE("Texts are chosen by weight or in turn", "[distribution]") {
   CHECK_THAT(error_text([&] { text_from("{choice: {choices: [a], weights: [-1]}}"); }),
              ContainsSubstring("sky.choice.weights[0]"));
 }
+
+namespace {
+
+struct Drawn {
+  Distribution size = 1.5;
+  Distribution place = Vec3(0, 1, 2);
+  std::optional<Distribution> length;
+  std::optional<Distribution> speed = Distribution(Vec3(1, 0, 0));
+  TextDistribution sky{{"a.hdr", "b.hdr"}};
+
+  void visit(ParamVisitor& v) {
+    v.param("size", size, {"Size.", "m", 0.5, 4.0});
+    v.param("place", place, {"Place.", "m"}, 3);
+    v.param("length", length, {"Length; null keeps it.", "mm", 1.0});
+    v.param("speed", speed, {"Speed.", "m/s"}, 3);
+    v.param("sky", sky, {"Pictures."});
+  }
+};
+
+}  // namespace
+
+TEST_CASE("Distributions are declared with type and range like other parameters",
+          "[distribution]") {
+  Drawn drawn;
+  ParamLister lister;
+  drawn.visit(lister);
+  const std::vector<ParamSpec> specs = lister.take();
+  REQUIRE(specs.size() == 5);
+  CHECK(specs[0].type == ParamType::Distribution);
+  CHECK(specs[0].min == 0.5);
+  CHECK(specs[0].max == 4.0);
+  CHECK(specs[0].unit == "m");
+  CHECK(specs[0].default_value.scalar == "1.5");
+  CHECK(specs[1].type == ParamType::VectorDistribution);
+  CHECK(specs[1].default_value.list.size() == 3);
+  CHECK(specs[2].type == ParamType::OptionalDistribution);
+  CHECK(specs[2].default_value.kind == Value::Kind::Null);
+  CHECK(specs[3].type == ParamType::OptionalVectorDistribution);
+  CHECK(specs[4].type == ParamType::TextDistribution);
+}
+
+TEST_CASE("Mistakes in distributions are collected with the others, with their place",
+          "[distribution]") {
+  const Value job = parse_yaml(
+      "size: {uniform: {lower: 1, upper: 9}}\nplace: [0, 1]\nlength: null\nspeed: null\n"
+      "sky: {shuffle: [a]}\nsise: 1\n",
+      "job.yaml");
+  Complaints complaints;
+  Drawn drawn;
+  ParamReader reader(job, "randomizers[2]", complaints);
+  drawn.visit(reader);
+  reader.finish();
+  CHECK(complaints.messages() ==
+        std::vector<std::string>{
+            "job.yaml:1:35: randomizers[2].size.uniform.upper: expected a number in [0.5, 4], "
+            "found \"9\"",
+            "job.yaml:5:6: randomizers[2].sky: expected a text, a list of texts, `choice` or "
+            "`sequence`, found a mapping",
+            "job.yaml:6:1: randomizers[2]: unknown key 'sise', did you mean 'size'?"});
+  CHECK(drawn.place.width() == 1);
+  CHECK_FALSE(drawn.length);
+  CHECK_FALSE(drawn.speed);
+  CHECK(drawn.sky.texts().size() == 2);
+}

@@ -5,6 +5,7 @@
 #include <diorama/plugin.h>
 #include <diorama/writer.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cstdio>
 
@@ -75,13 +76,16 @@ class CsvBoxes final : public diorama::Writer {
 
   //! [finish]
   void finish(const diorama::RecordReader& records, diorama::DatasetFiles& files) override {
-    std::string table =
-        "picture,phase,object,label,x_min,y_min,x_max,y_max,visibility,truncation\n";
+    // The table grows on disk: it may be larger than the memory.
+    const char* const table = "boxes.csv";
+    files.append_text(table,
+                      "picture,phase,object,label,x_min,y_min,x_max,y_max,visibility,truncation\n");
     // A record is one line; its rows are told apart by tabs, which no row holds.
-    records([&table](int, std::string_view line) {
-      for (const char c : line) table += c == '\t' ? '\n' : c;
+    records([&](int, std::string_view line) {
+      std::string rows(line);
+      std::ranges::replace(rows, '\t', '\n');
+      files.append_text(table, rows);
     });
-    files.add_text("boxes.csv", table);
   }
   //! [finish]
 

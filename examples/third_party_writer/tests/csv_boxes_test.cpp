@@ -2,6 +2,7 @@
 #include <diorama/writer.h>
 
 #include <map>
+#include <span>
 
 #include "plugin_under_test.h"
 
@@ -13,6 +14,9 @@ class Files final : public diorama::CaptureFiles {
   std::vector<std::string> records;
   void add(std::string_view path, std::vector<std::byte> bytes) override {
     texts[std::string(path)].assign(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  }
+  void append(std::string_view path, std::span<const std::byte> bytes) override {
+    texts[std::string(path)].append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   }
   void record(std::string_view line) override { records.emplace_back(line); }
 };

@@ -10,6 +10,11 @@
 
 #define DIORAMA_SDK_API __attribute__((visibility("default")))
 
+// What components are and what they throw is found out at run time, across library borders.
+#if !defined(__cpp_rtti) || !defined(__cpp_exceptions)
+#error "Diorama's plugins are built with run-time type information and exceptions: remove -fno-rtti and -fno-exceptions"
+#endif
+
 #define DIORAMA_DETAIL_TEXT2(x) #x
 #define DIORAMA_DETAIL_TEXT(x) DIORAMA_DETAIL_TEXT2(x)
 
@@ -19,6 +24,12 @@
 #define DIORAMA_DETAIL_SANITIZER "thread"
 #else
 #define DIORAMA_DETAIL_SANITIZER "none"
+#endif
+
+#if defined(__clang__)
+#define DIORAMA_DETAIL_COMPILER __VERSION__
+#else
+#define DIORAMA_DETAIL_COMPILER "g++ " __VERSION__
 #endif
 
 #if defined(_GLIBCXX_DEBUG)

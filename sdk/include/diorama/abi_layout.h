@@ -7,7 +7,9 @@
 #include "diorama/abi.h"
 #include "diorama/annotator.h"
 #include "diorama/config.h"
+#include "diorama/distribution.h"
 #include "diorama/frame.h"
+#include "diorama/headers_digest.h"
 #include "diorama/host.h"
 #include "diorama/loader.h"
 #include "diorama/params.h"
@@ -44,8 +46,9 @@ inline constexpr std::uint64_t kLayout =
               PixelBox, Mesh, Texture, TextureInput, Material, Light, Camera, Collider, RigidBody,
               NodeId, Node, Scene, LabelledInstance, CoverageMask, Visibility, Instance, Frame,
               Capture, Place, Value, Complaints, Range, ParamDoc, ParamSpec, ParamReader,
-              ParamLister, Component, Host, ImageView, Loader, PhysicsReport, PhysicsBackend,
-              RandomizeContext, Randomizer, RenderRequest, RenderReport, Renderer, Annotator,
-              DatasetInfo, DatasetFiles, CaptureFiles, Writer, Error>();
+              ParamLister, Distribution, TextDistribution, Component, Host, ImageView, Loader,
+              PhysicsReport, PhysicsBackend, RandomizeContext, Randomizer, RenderRequest,
+              RenderReport, Renderer, Annotator, DatasetInfo, DatasetFiles, CaptureFiles, Writer,
+              Error>();
 
 }  // namespace diorama::abi

@@ -21,18 +21,26 @@ struct Place {
   DIORAMA_SDK_API std::string text() const;  ///< "configs/dining.yaml:31:7", or the file alone.
 };
 
-/// One value of a job file with its place: null, a scalar, a list or a map. Scalars keep their text;
-/// the reader decides what it may be, so `012` or `1e3` are never mangled on the way.
+/// One value of a job file with its place: null, a scalar, a list or a map. Scalars keep their
+/// text; the reader decides what it may be, so `012` or `1e3` are never mangled on the way.
 struct DIORAMA_SDK_API Value {
   enum class Kind : std::uint8_t { Null, Scalar, List, Map };
 
   Kind kind = Kind::Null;
-  std::string scalar;      ///< Kind::Scalar.
-  bool is_quoted = false;  ///< A quoted scalar is text whatever it looks like.
-  std::vector<Value> list;                        ///< Kind::List.
+  std::string scalar;       ///< Kind::Scalar.
+  bool is_quoted = false;   ///< A quoted scalar is text whatever it looks like.
+  std::vector<Value> list;  ///< Kind::List.
   std::vector<std::pair<std::string, Value>> map;  ///< Kind::Map, in file order, keys unique.
   Place place;
   Place key_place;  ///< Of the key, when the value stands in a map.
+
+  // Out of line, where the list and the map of values are complete types.
+  Value();
+  ~Value();
+  Value(const Value&);
+  Value(Value&&) noexcept;
+  Value& operator=(const Value&);
+  Value& operator=(Value&&) noexcept;
 
   const Value* find(std::string_view key) const;  ///< Null when absent or when this is no map.
   Value* find(std::string_view key);

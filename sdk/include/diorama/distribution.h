@@ -27,7 +27,8 @@ namespace diorama {
 ///     {combine: {distributions: [...]}}            ... the same, in Replicator's words
 ///
 /// The words may be written with a prefix, `distribution.uniform`. Choices and items may be
-/// distributions themselves.
+/// distributions themselves. A parameter is declared as any other: `v.param("scale", scale,
+/// {"Scale."}, 3)`.
 class DIORAMA_SDK_API Distribution {
  public:
   Distribution(double always = 0.0);
@@ -49,8 +50,12 @@ class DIORAMA_SDK_API Distribution {
   const Value& source() const { return source_; }
 
  private:
+  friend class ParamReader;
   enum class Kind : std::uint8_t { Uniform, Normal, LogUniform, Choice, Sequence, Combine };
   struct Reader;
+  /// parse() with complaints instead of an exception; nothing when there are any.
+  static std::optional<Distribution> read(const Value& value, const std::string& name,
+                                          const ParamDoc& doc, int width, Complaints& complaints);
   double draw_axis(int axis, Rng& rng) const;
 
   Kind kind_ = Kind::Uniform;
@@ -78,21 +83,14 @@ class DIORAMA_SDK_API TextDistribution {
   const Value& source() const { return source_; }
 
  private:
+  friend class ParamReader;
+  /// parse() with complaints instead of an exception; nothing when there are any.
+  static std::optional<TextDistribution> read(const Value& value, const std::string& name,
+                                              Complaints& complaints);
   std::vector<std::string> texts_;
   std::vector<double> weights_;  ///< One per text, unless it is a sequence.
   bool is_sequence_ = false;
   Value source_ = Value::make_list();
 };
-
-/// Declares a parameter inside Params::visit(): `declare(v, "scale", scale, {"Scale."})`. A mistake
-/// in the job is thrown as Error(Config) at once. Vectors (`width` 3) may be given as a
-/// distribution of numbers, too.
-DIORAMA_SDK_API void declare(ParamVisitor& v, const char* key, Distribution& field,
-                             const ParamDoc& doc, int width = 1);
-/// Null or absent: no value, which means that the quantity stays as it is.
-DIORAMA_SDK_API void declare(ParamVisitor& v, const char* key, std::optional<Distribution>& field,
-                             const ParamDoc& doc, int width = 1);
-DIORAMA_SDK_API void declare(ParamVisitor& v, const char* key, TextDistribution& field,
-                             const ParamDoc& doc);
 
 }  // namespace diorama

@@ -58,6 +58,10 @@ inline constexpr Channel<Vec2f> kMotion{"motion"};
 /// Made by annotators, not a label.
 inline constexpr Channel<float> kSensorDepth{"sensor_depth"};
 
+/// True for names that stand for fields of a frame instead of channels: "instances", "visibility",
+/// "amodal_mask", "occlusion_order".
+DIORAMA_SDK_API bool is_annotation(std::string_view name);
+
 /// The pixels that an object covers when nothing else is in the scene, by the same pixel-centre
 /// rays. The box may reach beyond the image by up to one image size to each side, so that the part
 /// outside can be counted; what lies further out is not counted.
@@ -85,7 +89,9 @@ struct Visibility {
   std::int64_t amodal_pixels = 0;      ///< Covered without occluders, inside the image.
   std::int64_t outside_pixels = 0;     ///< Covered without occluders, outside the image.
   std::optional<PixelBox> amodal_box;  ///< Clipped to the image; absent when nothing is inside.
-  CoverageMask amodal_mask;            ///< Filled only when "amodal_mask" was demanded.
+  /// Of all covered pixels, as far out as CoverageMask reaches; absent when nothing is covered.
+  std::optional<PixelBox> whole_box;
+  CoverageMask amodal_mask;  ///< Filled only when "amodal_mask" was demanded.
 
   /// 1 - visible / amodal, in [0, 1]; nothing when no pixel is inside the image.
   std::optional<double> occlusion() const {
@@ -159,9 +165,22 @@ class DIORAMA_SDK_API Frame {
   /// For code that treats all pixel types alike. Throws Error when the channel is not there.
   const AnyImage& image_named(std::string_view channel) const;
 
+  /// Throws Error unless the channel, which must be there, has the camera's size, and, when it is
+  /// one of those above, its pixel type.
+  void check_channel(std::string_view channel) const;
+
  private:
+  friend class Annotator;
+  /// What an annotator may touch while it works.
+  struct Access {
+    NameSet readable;
+    NameSet settable;
+  };
+  bool is_readable(std::string_view channel) const;
   void set_image(std::string_view channel, AnyImage image);
+
   std::map<std::string, AnyImage, std::less<>> images_;
+  const Access* access_ = nullptr;  ///< Null: everything.
 };
 
 /// One moment of the scene seen by all cameras.

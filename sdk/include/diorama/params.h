@@ -16,10 +16,13 @@
 
 namespace diorama {
 
+class Distribution;
+class TextDistribution;
+
 /// What a parameter says of itself beyond name, type and default.
 struct ParamDoc {
-  const char* help;       ///< One sentence with a full stop.
-  const char* unit = "";  ///< "m", "deg", "kg" ...; empty: none.
+  const char* help;                                       ///< One sentence with a full stop.
+  const char* unit = "";                                  ///< "m", "deg", "kg" ...; empty: none.
   double min = -std::numeric_limits<double>::infinity();  ///< Inclusive; numbers and their lists.
   double max = std::numeric_limits<double>::infinity();
 };
@@ -52,6 +55,12 @@ class DIORAMA_SDK_API ParamVisitor {
   /// Null or absent: no value.
   virtual void param(const char* key, std::optional<double>& field, const ParamDoc& doc) = 0;
   virtual void param(const char* key, std::optional<std::string>& field, const ParamDoc& doc) = 0;
+  /// A quantity that is drawn at random (distribution.h): numbers (`width` 1), or vectors (3),
+  /// which may be given as a distribution of numbers, too. Without a value it stays as it is.
+  virtual void param(const char* key, Distribution& field, const ParamDoc& doc, int width = 1) = 0;
+  virtual void param(const char* key, std::optional<Distribution>& field, const ParamDoc& doc,
+                     int width = 1) = 0;
+  virtual void param(const char* key, TextDistribution& field, const ParamDoc& doc) = 0;
   /// Any value, unchecked here: for free-form mappings that the component reads itself.
   virtual void param(const char* key, Value& field, const ParamDoc& doc) = 0;
   /// One of the given words.
@@ -108,6 +117,11 @@ enum class ParamType : std::uint8_t {
   NumberList,
   OptionalNumber,
   OptionalText,
+  Distribution,        ///< Of numbers.
+  VectorDistribution,  ///< Of vectors, or of numbers that hold for all axes.
+  OptionalDistribution,
+  OptionalVectorDistribution,
+  TextDistribution,
   Any,
   Choice,
   Group,
@@ -148,6 +162,10 @@ class DIORAMA_SDK_API ParamReader final : public ParamVisitor {
   void param(const char* key, std::vector<double>& field, const ParamDoc& doc) override;
   void param(const char* key, std::optional<double>& field, const ParamDoc& doc) override;
   void param(const char* key, std::optional<std::string>& field, const ParamDoc& doc) override;
+  void param(const char* key, Distribution& field, const ParamDoc& doc, int width) override;
+  void param(const char* key, std::optional<Distribution>& field, const ParamDoc& doc,
+             int width) override;
+  void param(const char* key, TextDistribution& field, const ParamDoc& doc) override;
   void param(const char* key, Value& field, const ParamDoc& doc) override;
   void choice(const char* key, std::string& field, std::span<const char* const> words,
               const ParamDoc& doc) override;
@@ -184,6 +202,10 @@ class DIORAMA_SDK_API ParamLister final : public ParamVisitor {
   void param(const char* key, std::vector<double>& field, const ParamDoc& doc) override;
   void param(const char* key, std::optional<double>& field, const ParamDoc& doc) override;
   void param(const char* key, std::optional<std::string>& field, const ParamDoc& doc) override;
+  void param(const char* key, Distribution& field, const ParamDoc& doc, int width) override;
+  void param(const char* key, std::optional<Distribution>& field, const ParamDoc& doc,
+             int width) override;
+  void param(const char* key, TextDistribution& field, const ParamDoc& doc) override;
   void param(const char* key, Value& field, const ParamDoc& doc) override;
   void choice(const char* key, std::string& field, std::span<const char* const> words,
               const ParamDoc& doc) override;

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -44,6 +45,11 @@ class DIORAMA_SDK_API DatasetFiles {
   virtual ~DatasetFiles();
   virtual void add(std::string_view path, std::vector<std::byte> bytes) = 0;
   void add_text(std::string_view path, std::string_view text);
+  /// Puts bytes at the end of a file, which begins empty. The host keeps little of it in memory:
+  /// for large files that are made piece by piece. Several may grow by turns. A path is either
+  /// added or appended to.
+  virtual void append(std::string_view path, std::span<const std::byte> bytes) = 0;
+  void append_text(std::string_view path, std::string_view text);
 };
 
 /// The files of one capture, and one record: text (without line breaks, JSON by habit) that the

@@ -27,7 +27,8 @@ class @CLASS@ final : public diorama::Annotator {
   }
   diorama::NameSet provides() const override { return {std::string(kOutlines.name)}; }
 
-  void annotate(const diorama::Scene&, diorama::Frame& frame) const override {
+ private:
+  void do_annotate(const diorama::Scene&, diorama::Frame& frame) const override {
     const auto& distance = frame.get(diorama::kDistanceToImagePlane);
     diorama::Image<float> outlines(distance.width(), distance.height(), 0.0f);
     for (int y = 0; y < distance.height(); ++y) {
@@ -40,7 +41,6 @@ class @CLASS@ final : public diorama::Annotator {
     frame.set(kOutlines, std::move(outlines));
   }
 
- private:
   bool jumps(const diorama::Image<float>& distance, int x, int y, int x2, int y2) const {
     if (!distance.contains(x2, y2)) return false;
     const float a = distance.at(x, y), b = distance.at(x2, y2);
@@ -55,5 +55,6 @@ class @CLASS@ final : public diorama::Annotator {
 }  // namespace
 
 DIORAMA_PLUGIN("@NAME@", "0.1.0", "@LICENCE@") {
-  DIORAMA_ADD(@CLASS@, "@NAME@", "Marks jumps of the distance between pixels.");
+  DIORAMA_ADD_ANNOTATOR(@CLASS@, "@NAME@", "Marks jumps of the distance between pixels.",
+                        "distance_to_image_plane", "@NAME@");
 }

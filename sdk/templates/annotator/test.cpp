@@ -15,6 +15,8 @@ int main(int, char** argv) {
     distance.at(3, y) = std::numeric_limits<float>::infinity();
   }
   diorama::Frame frame;
+  frame.camera.width = distance.width();
+  frame.camera.height = distance.height();
   frame.set(diorama::kDistanceToImagePlane, distance);
   annotator->annotate(diorama::Scene(), frame);
   const auto& outlines = frame.get(diorama::Channel<float>{"@NAME@"});

@@ -115,6 +115,7 @@ TEST_CASE("visibility counts pixels inside and outside the image", "[annotators]
   CHECK(first.amodal_pixels == 5);
   CHECK(first.outside_pixels == 2);
   CHECK(first.amodal_box == PixelBox{0, 1, 3, 3});
+  CHECK(first.whole_box == PixelBox{-1, 1, 3, 3});
   CHECK(first.occlusion() == Approx(1.0 - 2.0 / 5.0));
   CHECK(first.truncation() == Approx(2.0 / 7.0));
   CHECK(first.amodal_mask.box == PixelBox{0, 1, 3, 3});
@@ -122,6 +123,7 @@ TEST_CASE("visibility counts pixels inside and outside the image", "[annotators]
   const Visibility& second = *frame.instances[1].visibility;
   CHECK(second.outside_pixels == 2);
   CHECK_FALSE(second.amodal_box.has_value());
+  CHECK(second.whole_box == PixelBox{6, -2, 8, -1});
   CHECK_FALSE(second.occlusion().has_value());
 
   measure_visibility(masks, false, frame);
@@ -130,6 +132,26 @@ TEST_CASE("visibility counts pixels inside and outside the image", "[annotators]
                     ContainsSubstring("1 coverage masks for 2 instances"));
   const std::vector<CoverageMask> torn{seven, {{6, -2, 8, -1}, {1}, {}}};
   CHECK_THROWS_WITH(measure_visibility(torn, false, frame), ContainsSubstring("holds 1 values"));
+}
+
+TEST_CASE("the whole box is the extent of a mask of any shape", "[annotators]") {
+  Frame frame = frame_of({});
+  frame.set(kInstanceId, Image<std::uint32_t>(5, 4, 0));
+  frame.instances.resize(1);
+  frame.instances[0].id = 7;
+  std::uint32_t random = 1;
+  for (int i = 0; i < 200; ++i) {
+    CoverageMask mask{{-4, -3, 9, 7}, std::vector<std::uint8_t>(13 * 10, 0), {}};
+    for (int bits = i % 7; bits > 0; --bits) {
+      random = random * 1664525u + 1013904223u;
+      mask.bits[(random >> 8) % mask.bits.size()] = 1;
+    }
+    measure_visibility(std::span(&mask, 1), false, frame);
+    const Visibility& visibility = *frame.instances[0].visibility;
+    CHECK(visibility.whole_box.value_or(PixelBox{}) == mask.extent());
+    const PixelBox image{0, 0, 5, 4};
+    CHECK(visibility.amodal_box.value_or(PixelBox{}) == mask.cropped(image).extent());
+  }
 }
 
 TEST_CASE("occlusion order says in how many pixels one is in front of another", "[annotators]") {

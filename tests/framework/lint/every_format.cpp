@@ -61,6 +61,18 @@ YoloWriter::Params yolo(const char* task) {
   return params;
 }
 
+CocoWriter::Params polygons() {
+  CocoWriter::Params params;
+  params.segmentation = "polygon";
+  return params;
+}
+
+BopWriter::Params one_scene() {
+  BopWriter::Params params;
+  params.layout = "cameras";
+  return params;
+}
+
 }  // namespace
 
 BasicWriter::Params everything() {
@@ -80,6 +92,7 @@ std::vector<SampleFormat> every_format() {
           format<PoseWriter>("pose_centerpose", pose("centerpose")),
           format<DataVisualizationWriter>("boxes", boxes()),
           format<CocoWriter>("coco"),
+          format<CocoWriter>("coco_polygon", polygons()),
           format<YoloWriter>("yolo_detect", yolo("detect")),
           format<YoloWriter>("yolo_segment", yolo("segment")),
           format<YoloWriter>("yolo_pose", yolo("pose")),
@@ -87,6 +100,7 @@ std::vector<SampleFormat> every_format() {
           format<KittiWriter>("kitti"),
           format<VocWriter>("voc"),
           format<BopWriter>("bop"),
+          format<BopWriter>("bop_cameras", one_scene()),
           format<WebDatasetWriter>("webdataset"),
           format<Hdf5Writer>("hdf5")};
 }

@@ -340,6 +340,8 @@ def check_yolo(root):
             equal(data["names"], {0: "ball", 1: "crate", 2: "mug"}, "names")
             equal(data.get("kpt_shape"), [9, 3] if task == "pose" else None, "kpt_shape")
             for split in ("train", "val"):
+                # Without a path, trainers take the folder of data.yaml.
+                assert "path" not in data
                 assert os.path.isdir(f"{root}/yolo_{task}/{data[split]}")
         for path in labels:
             stem = path.replace("/labels/", "/images/")[:-4]
@@ -370,37 +372,175 @@ def check_kitti(root):
 def check_voc(root):
     files = glob.glob(f"{root}/voc/Annotations/*.xml")
     equal(len(files), 6, "annotations")
+    # The development kit's colours: bits of the index by turns to red, green and blue.
+    palette = np.array([[sum(((i >> (3 * j + c)) & 1) << (7 - j) for j in range(3))
+                         for c in range(3)] for i in range(256)])
+    number = {tuple(color): i for i, color in enumerate(palette)}
     for path in files:
         tree = ElementTree.parse(path).getroot()
         image = picture(f"{root}/voc/JPEGImages/{tree.findtext('filename')}")
         equal(image.shape, tuple(int(tree.find("size").findtext(k))
                                  for k in ("height", "width", "depth")), path)
         stem = os.path.basename(path)[:-4]
-        objects = picture(f"{root}/voc/SegmentationObject/{stem}.png")
+        colors = cv2.cvtColor(picture(f"{root}/voc/SegmentationObject/{stem}.png"),
+                              cv2.COLOR_BGR2RGB)
+        objects = np.array([[number[tuple(c)] for c in row] for row in colors.tolist()])
         for place, element in enumerate(tree.iter("object"), start=1):
             box = [int(element.find("bndbox").findtext(k)) for k in ("xmin", "ymin", "xmax", "ymax")]
             x0, y0, x1, y1 = extent(objects == place)
             equal(box, [x0 + 1, y0 + 1, x1, y1], f"{path}: object {place}")
 
 
+def load_lines(path, brackets):
+    """A list or an object with a line per element, each as Python would write it."""
+    with open(path, encoding="utf-8") as file:
+        text = file.read()
+    value = json.loads(text)
+    if brackets == "{}":
+        lines = [f"  {json.dumps(key)}: {json.dumps(element)}" for key, element in value.items()]
+    else:
+        lines = ["  " + json.dumps(element) for element in value]
+    expected = brackets[0] + "\n" + ",\n".join(lines) + "\n" + brackets[1] + "\n"
+    equal(text, expected if lines else brackets + "\n", path)
+    return value
+
+
+def load_ply(path):
+    """Corners and triangles."""
+    with open(path, "rb") as file:
+        data = file.read()
+    header, body = data.split(b"end_header\n", 1)
+    counts = {words[1]: int(words[2]) for words in
+              (line.split() for line in header.decode().split("\n")) if words[:1] == ["element"]}
+    vertex = np.dtype([("place", "<f4", 3), ("normal", "<f4", 3), ("color", "u1", 3)])
+    face = np.dtype([("count", "u1"), ("corners", "<i4", 3)])
+    vertices = np.frombuffer(body, vertex, counts["vertex"])
+    faces = np.frombuffer(body[27 * len(vertices):], face, counts["face"])
+    assert (faces["count"] == 3).all()
+    return vertices["place"].astype(float), faces["corners"]
+
+
+def silhouette(points, triangles, k, size):
+    """The pixels of a picture of three times the size round the picture, drawn by OpenCV."""
+    height, width = size
+    pixels = points @ k.T
+    pixels = pixels[:, :2] / pixels[:, 2:] + [width, height] - 0.5  # OpenCV's centres are whole
+    mask = np.zeros((3 * height, 3 * width), np.uint8)
+    shift = 8
+    for triangle in triangles:
+        corners = np.round(pixels[triangle] * (1 << shift)).astype(np.int32)
+        cv2.fillConvexPoly(mask, corners, 1, cv2.LINE_8, shift)
+    return mask
+
+
+def check_silhouette(info, mask, size, what):
+    """OpenCV draws borders too, so a pixel all round is allowed."""
+    height, width = size
+    inner = cv2.erode(mask, np.ones((3, 3), np.uint8))
+    count = info["px_count_all"]
+    assert inner.sum() <= count <= mask.sum(), (what, inner.sum(), count, mask.sum())
+    share = info["px_count_visib"] / count
+    assert abs(info["visib_fract"] - share) < 1e-9, (what, info["visib_fract"], share)
+    ys, xs = np.nonzero(mask)
+    box = [xs.min() - width, ys.min() - height, xs.max() - xs.min(), ys.max() - ys.min()]
+    assert all(abs(a - b) <= 2 for a, b in zip(info["bbox_obj"], box)), (what, info, box)
+    return xs.min() < width or ys.min() < height or xs.max() >= 2 * width or ys.max() >= 2 * height
+
+
+def check_models(root):
+    models = {}
+    for key, info in load_json(f"{root}/bop/models/models_info.json", indent=2,
+                               newline="\n").items():
+        path = f"{root}/bop/models/obj_{int(key):06d}.ply"
+        if not os.path.exists(path):
+            continue
+        points, triangles = models[int(key)] = load_ply(path)
+        distances = np.linalg.norm(points[:, None] - points[None], axis=2)
+        assert abs(distances.max() - info["diameter"]) < 1e-3, (key, distances.max(), info)
+        for axis, name in enumerate("xyz"):
+            assert abs(points[:, axis].min() - info["min_" + name]) < 1e-3
+            assert abs(np.ptp(points[:, axis]) - info["size_" + name]) < 1e-3
+        for matrix in info.get("symmetries_discrete", []):
+            turn = np.array(matrix).reshape(4, 4)
+            turned = points @ turn[:3, :3].T + turn[:3, 3]
+            nearest = np.linalg.norm(turned[:, None] - points[None], axis=2).min(axis=1)
+            assert nearest.max() < 0.05 * info["diameter"], (key, nearest.max())
+    assert models
+    return models
+
+
 def check_bop(root):
+    models = check_models(root)
     scenes = glob.glob(f"{root}/bop/*/*/scene_gt.json")
     assert len(scenes) >= 2
-    for path in scenes:
+    drawn = 0
+    targets = []
+    for path in sorted(scenes):
         scene = os.path.dirname(path)
-        poses = load_json(path, indent=2, newline="\n")
-        infos = load_json(f"{scene}/scene_gt_info.json", indent=2, newline="\n")
-        cameras = load_json(f"{scene}/scene_camera.json", indent=2, newline="\n")
+        poses = load_lines(path, "{}")
+        infos = load_lines(f"{scene}/scene_gt_info.json", "{}")
+        cameras = load_lines(f"{scene}/scene_camera.json", "{}")
         for image, objects in poses.items():
             stem = f"{int(image):06d}"
             depth = picture(f"{scene}/depth/{stem}.png")
             equal(str(depth.dtype), "uint16", "depth")
-            equal(np.array(cameras[image]["cam_K"]).shape, (9,), "cam_K")
+            k = np.array(cameras[image]["cam_K"]).reshape(3, 3)
             for i, (pose, info) in enumerate(zip(objects, infos[image])):
                 rotation = np.array(pose["cam_R_m2c"]).reshape(3, 3)
                 assert np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-6)
+                assert "scale" not in pose
                 mask = picture(f"{scene}/mask_visib/{stem}_{i:06d}.png")
                 equal(int((mask == 255).sum()), info["px_count_visib"], "visible pixels")
+                x0, y0, x1, y1 = extent(mask)
+                equal(info["bbox_visib"], [x0, y0, x1 - 1 - x0, y1 - 1 - y0], "bbox_visib")
+                if "/test/" in path and info["visib_fract"] >= 0.1:
+                    targets.append((int(os.path.basename(scene)), int(image), pose["obj_id"]))
+                if pose["obj_id"] not in models:
+                    continue
+                points, triangles = models[pose["obj_id"]]
+                placed = points @ rotation.T + np.array(pose["cam_t_m2c"])
+                whole = silhouette(placed, triangles, k, depth.shape)
+                check_silhouette(info, whole, depth.shape, f"{scene} {image} {i}")
+                drawn += 1
+    assert drawn >= 4, drawn
+    listed = load_lines(f"{root}/bop/test_targets_bop19.json", "[]")
+    equal(sorted((t["scene_id"], t["im_id"], t["obj_id"]) for t in listed for _ in
+                 range(t["inst_count"])), sorted(targets), "targets")
+
+
+def check_polygons(root):
+    """OpenCV fills COCO's polygons: their pixels and those of the run lengths differ by borders."""
+    for split in ("train", "val"):
+        runs = load_json(f"{root}/coco/annotations/instances_{split}.json")
+        polygons = load_json(f"{root}/coco_polygon/annotations/instances_{split}.json")
+        licences = [entry["id"] for entry in polygons["licenses"]]
+        assert all(image["license"] in licences for image in polygons["images"])
+        equal(len(runs["annotations"]), len(polygons["annotations"]), "annotations")
+        for exact, annotation in zip(runs["annotations"], polygons["annotations"]):
+            mask = decode(exact["segmentation"]).astype(np.uint8)
+            # Enlarged, so that pixel edges are between the enlarged pixels' centres.
+            large = np.zeros([8 * n for n in mask.shape], np.uint8)
+            for polygon in annotation["segmentation"]:
+                corners = np.array(polygon).reshape(-1, 2) * 8
+                cv2.fillPoly(large, [corners.astype(np.int32)], 1)
+            equal(large[4::8, 4::8], mask, "pixels of polygons")
+
+
+def check_imagefolder(root):
+    lines = 0
+    for split in ("train", "validation"):
+        folder = f"{root}/imagefolder/{split}"
+        with open(f"{folder}/metadata.jsonl", encoding="utf-8") as file:
+            for text in file:
+                line = json.loads(text)
+                lines += 1
+                shape = picture(f"{folder}/{line['file_name']}").shape
+                equal(shape, (line["height"], line["width"], 3), line["file_name"])
+                objects = line["objects"]
+                equal(len(objects["bbox"]), len(objects["categories"]), line["file_name"])
+                for x, y, width, height in objects["bbox"]:
+                    assert 0 <= x and 0 <= y and x + width <= shape[1] and y + height <= shape[0]
+    equal(lines, 6, "lines of metadata.jsonl")
 
 
 def check_page(root):
@@ -514,8 +654,8 @@ def main():
             root = sys.argv[2]
         subprocess.run([sys.argv[1], root], check=True)
         for check in (check_basic, check_pose, check_boxes, check_page, check_coco, check_yolo,
-                      check_kitti, check_voc, check_bop, check_webdataset, check_hdf5,
-                      check_across):
+                      check_kitti, check_voc, check_bop, check_polygons, check_imagefolder,
+                      check_webdataset, check_hdf5, check_across):
             check(root)
             print(check.__name__, "ok")
 

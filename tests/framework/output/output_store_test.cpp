@@ -44,16 +44,24 @@ constexpr double kRestartSeconds = 300;
 
 const std::string kDataset = R"({"seed": 4, "job": "a"})";
 
-Transaction capture_files(int capture) {
-  Transaction transaction;
+/// One of its files waits in the stage, in two pieces.
+Transaction capture_files(OutputStore& store, int capture) {
+  Transaction transaction = store.capture_transaction(capture);
   CollectedFiles first(transaction, 0, "one");
   first.add_text("rgb_" + std::to_string(capture) + ".png", "colour " + std::to_string(capture));
-  first.add_text("depth/" + std::to_string(capture) + ".npy",
-                 std::string(300, char('a' + capture % 26)));
+  const std::string depth = "depth/" + std::to_string(capture) + ".npy";
+  first.append_text(depth, std::string(300, char('a' + capture % 26)));
+  transaction.stage->put(1, transaction.files[1]);
+  first.append_text(depth, "end");
   first.record("line " + std::to_string(capture));
   CollectedFiles second(transaction, 1, "two");
   second.add_text("boxes/deep/" + std::to_string(capture) + ".json", "{}");
   return transaction;
+}
+
+void commit(OutputStore& store, int capture) {
+  Transaction transaction = capture_files(store, capture);
+  store.commit_capture(capture, transaction);
 }
 
 OutputFolders folders_in(const fs::path& root) {
@@ -90,12 +98,11 @@ OutputStore::Options options_of(const Job& job) {
 void finish(OutputStore& store) {
   store.refresh();
   if (!store.is_complete() || store.is_finished() || !store.claim_finish()) return;
-  Transaction files;
-  std::string all;
+  Transaction files = store.finish_transaction();
+  CollectedFiles last(files, 0, "one");
   store.read_records(0, [&](int capture, std::string_view line) {
-    all += std::to_string(capture) + "=" + std::string(line) + ";";
+    last.append_text("all.txt", std::to_string(capture) + "=" + std::string(line) + ";");
   });
-  files.files.push_back({0, "all.txt", bytes_of(all)});
   store.commit_finish(files);
 }
 
@@ -116,7 +123,7 @@ bool run(FileSystem& file_system, const fs::path& root, const Job& job) {
     for (int i = 2 * visit; i < std::min(job.captures, 2 * visit + 2); ++i) {
       if (store.is_done(i)) continue;
       begin();
-      store.commit_capture(i, capture_files(i));
+      commit(store, i);
     }
   };
   const int visits = (job.captures + 1) / 2;
@@ -448,7 +455,7 @@ TEST_CASE("A living worker keeps its part; the message names it", "[store]") {
   OutputStore holder(first, folders_in("/data"), 8, options_of(resuming("w1", 8)));
   holder.join(kDataset);
   holder.open();
-  holder.commit_capture(0, capture_files(0));
+  commit(holder, 0);
 
   SimulatedProcess second(disk);
   disk.wait(40);
@@ -465,7 +472,7 @@ TEST_CASE("A living worker keeps its part; the message names it", "[store]") {
   overwriting.existing = Existing::Overwrite;
   CHECK_THROWS_AS(run(second, "/data", overwriting), Busy);
   // Nothing of it was touched.
-  holder.commit_capture(1, capture_files(1));
+  commit(holder, 1);
   holder.close();
   CHECK(run(second, "/data", resuming("w5", 8)));
   CHECK(dataset_files(disk.tree("/data")) == expected_files(8));
@@ -478,7 +485,7 @@ TEST_CASE("A worker that was cut off for too long stops when it comes back", "[s
   OutputStore cut_off(first, folders_in("/data"), 8, options_of(resuming("w1", 8)));
   cut_off.join(kDataset);
   cut_off.open();
-  cut_off.commit_capture(0, capture_files(0));
+  commit(cut_off, 0);
   SimulatedProcess second(disk);
   second.set_locks(false);
   Job other = resuming("w2", 8);
@@ -487,7 +494,7 @@ TEST_CASE("A worker that was cut off for too long stops when it comes back", "[s
   CHECK_THROWS_AS(run(second, "/data", other), Busy);
   disk.wait(100);
   CHECK(run(second, "/data", other));
-  CHECK_THAT(thrown<Busy>([&] { cut_off.commit_capture(1, capture_files(1)); }),
+  CHECK_THAT(thrown<Busy>([&] { commit(cut_off, 1); }),
              ContainsSubstring("other processes took this one for dead"));
   CHECK(dataset_files(disk.tree("/data")) == expected_files(8));
 }
@@ -780,6 +787,54 @@ TEST_CASE("Bad journal lines are one message, torn ones do not count", "[store]"
     CHECK(dataset_files(tree(folder.path())) == files);
     fs::resize_file(index, before);
   }
+}
+
+TEST_CASE("What is appended to a file leaves the memory and comes out whole", "[store]") {
+  const TemporaryFolder folder;
+  LocalFileSystem local;
+  OutputStore store(local, folders_in(folder.path()), 1, options_of({}));
+  store.join(kDataset);
+  store.open();
+  std::string odd, even;
+  {
+    Transaction transaction = store.capture_transaction(0);
+    CollectedFiles files(transaction, 0, "one");
+    files.append_text("empty.txt", "");
+    for (int i = 0; i < 40; ++i) {
+      const std::string piece(50'000 + std::size_t(i), char('a' + i % 26));
+      files.append_text(i % 2 == 0 ? "even.txt" : "odd.txt", piece);
+      (i % 2 == 0 ? even : odd) += piece;
+      std::size_t kept = 0;
+      for (const StagedFile& file : transaction.files) kept += file.bytes.size();
+      CHECK(kept < 2 * CollectedFiles::kKeptBytes);
+    }
+    files.add("large.bin", std::vector<std::byte>(3'000'000, std::byte(7)));
+    CHECK(transaction.files.back().bytes.empty());
+    store.commit_capture(0, transaction);
+  }
+  const auto files = tree(folder.path() / "out/one");
+  CHECK(files.size() == 4);
+  CHECK(files.at("even.txt") == even);
+  CHECK(files.at("odd.txt") == odd);
+  CHECK(files.at("empty.txt").empty());
+  CHECK(files.at("large.bin") == std::string(3'000'000, '\7'));
+  CHECK(store.bytes_written() == odd.size() + even.size() + 3'000'000);
+}
+
+TEST_CASE("What a stage holds goes when its transaction is not committed", "[store]") {
+  const TemporaryFolder folder;
+  LocalFileSystem local;
+  OutputStore store(local, folders_in(folder.path()), 1, options_of({}));
+  store.join(kDataset);
+  store.open();
+  const fs::path stage = folder.path() / "out/.diorama/stage/w1";
+  {
+    Transaction transaction = store.capture_transaction(0);
+    CollectedFiles files(transaction, 0, "one");
+    files.add("large.bin", std::vector<std::byte>(3'000'000, std::byte(7)));
+    CHECK(tree(stage).size() == 1);
+  }
+  CHECK(tree(stage).empty());
 }
 
 TEST_CASE("Files of writers stay inside their folders", "[store]") {

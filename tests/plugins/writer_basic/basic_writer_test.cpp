@@ -462,3 +462,43 @@ TEST_CASE("semantic_types may be null, must be texts, and replaces the class fil
   CHECK_THROWS_WITH(BasicWriter(params, host),
                     ContainsSubstring("semantic_types: expected a list of texts or null"));
 }
+
+TEST_CASE("channels of other plugins are written as they are", "[writers]") {
+  const SampleScene sample(24, 16, 1);
+  Capture capture = test::ray_cast_capture(sample, 0);
+  Image<float> disparity(24, 16, 0.5f);
+  disparity.at(3, 2) = 7.25f;
+  capture.frames[0].set(Channel<float>{"disparity"}, disparity);
+  capture.frames[0].set(Channel<Vec2f>{"flow"}, Image<Vec2f>(24, 16, Vec2f(1.0f, 2.0f)));
+  BasicWriter::Params params;
+  params.channels.names = {"disparity", "flow", "leaf_id", "color"};
+  const MemoryFiles files = write(params, capture, test::sample_dataset(sample));
+  const auto header = [&](const std::string& path) { return files.text(path).substr(10, 118); };
+  CHECK(header("disparity_0000.npy").find("'<f4', 'fortran_order': False, 'shape': (16, 24), }") !=
+        std::string::npos);
+  CHECK(header("flow_0000.npy").find("'<f4', 'fortran_order': False, 'shape': (16, 24, 2), }") !=
+        std::string::npos);
+  CHECK(header("leaf_id_0000.npy").find("'<u4'") != std::string::npos);
+  CHECK(header("color_0000.npy").find("'|u1', 'fortran_order': False, 'shape': (16, 24, 4), }") !=
+        std::string::npos);
+  CHECK(value_at<float>(files.bytes("disparity_0000.npy"), 128 + 4 * (2 * 24 + 3)) == 7.25f);
+  CHECK(value_at<float>(files.bytes("flow_0000.npy"), 128 + 4) == 2.0f);
+}
+
+TEST_CASE("a list of channels that cannot be written says why", "[writers]") {
+  FakeHost host;
+  const auto complaint = [&](std::vector<std::string> names, const std::string& what) {
+    BasicWriter::Params params;
+    params.distance_to_camera = true;
+    params.channels.names = std::move(names);
+    CHECK_THROWS_WITH(BasicWriter(params, host), ContainsSubstring(what));
+  };
+  complaint({"../up"}, "channels: \"../up\" is no name of a channel");
+  complaint({""}, "channels: \"\" is no name of a channel");
+  complaint({"visibility"}, "channels: \"visibility\" is an annotation, not a channel");
+  complaint({"a", "a"}, "channels: \"a\" is listed twice");
+  complaint({"distance_to_camera"}, "is the name of something that this writer makes");
+  BasicWriter::Params params;
+  params.channels.names = {"disparity"};
+  CHECK(BasicWriter(params, host).needs().contains("disparity"));
+}

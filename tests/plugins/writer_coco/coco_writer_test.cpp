@@ -255,3 +255,59 @@ TEST_CASE("bad categories are refused with what is wrong", "[writers]") {
   CHECK_THROWS_WITH(CocoWriter(remote, host),
                     "s3_bucket: found \"b\"; files go to the output folder only, remove the key");
 }
+
+TEST_CASE("every picture's licence is in the list", "[writers]") {
+  const Json json = Json::parse(write({}).text("annotations/instances_train.json"));
+  REQUIRE(json.at("licenses").size() == 1);
+  for (const Json& image : json.at("images")) {
+    CHECK(image.at("license") == json.at("licenses")[0].at("id"));
+  }
+  CocoWriter::Params params;
+  params.coco_license_info = Value::make_list();
+  params.coco_license_info.list.push_back(category("free", 7));
+  params.coco_license_info.list.push_back(category("other", 3));
+  const Json two = Json::parse(write(params).text("annotations/panoptic_train.json"));
+  for (const Json& image : two.at("images")) CHECK(image.at("license") == 7);
+  params.coco_license_info.list[1] = category("same", 7);
+  CHECK_THROWS_WITH(write(params), ContainsSubstring("two licences have this id"));
+  params.coco_license_info.list[1].set("id", Value::text("seven"));
+  CHECK_THROWS_WITH(write(params), ContainsSubstring("expected a whole number"));
+}
+
+TEST_CASE("polygons cover the pixels of the run lengths", "[writers]") {
+  CocoWriter::Params params;
+  params.segmentation = "polygon";
+  const MemoryFiles polygons = write(params);
+  const MemoryFiles runs = write({});
+  for (const std::string split : {"train", "val"}) {
+    const std::string path = "annotations/instances_" + split + ".json";
+    const Json json = Json::parse(polygons.text(path));
+    const Json expected = Json::parse(runs.text(path));
+    std::map<int, std::pair<int, int>> sizes;
+    for (const Json& image : json.at("images")) {
+      sizes[image.at("id")] = {image.at("width"), image.at("height")};
+    }
+    REQUIRE(json.at("annotations").size() == expected.at("annotations").size());
+    for (std::size_t i = 0; i < json.at("annotations").size(); ++i) {
+      const Json& annotation = json.at("annotations")[i];
+      const auto [width, height] = sizes.at(annotation.at("image_id"));
+      const std::string mask = decoded(expected.at("annotations")[i].at("segmentation"));
+      for (int x = 0; x < width; ++x) {
+        for (int y = 0; y < height; ++y) {
+          // Even-odd in each polygon; parts do not overlap.
+          bool is_inside = false;
+          for (const Json& polygon : annotation.at("segmentation")) {
+            for (std::size_t a = 0; a < polygon.size(); a += 2) {
+              const std::size_t b = (a + 2) % polygon.size();
+              const double ay = polygon[a + 1], by = polygon[b + 1], ax = polygon[a],
+                           bx = polygon[b];
+              if ((ay > y + 0.5) == (by > y + 0.5)) continue;
+              if (x + 0.5 < ax + (y + 0.5 - ay) / (by - ay) * (bx - ax)) is_inside = !is_inside;
+            }
+          }
+          CHECK(is_inside == (mask[std::size_t(x * height + y)] == '#'));
+        }
+      }
+    }
+  }
+}

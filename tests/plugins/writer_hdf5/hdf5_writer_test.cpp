@@ -73,3 +73,27 @@ TEST_CASE("equal frames give equal HDF5 bytes", "[writers]") {
   const MemoryFiles second = test::write_sample<Hdf5Writer>({}, host);
   CHECK(first.files == second.files);
 }
+
+TEST_CASE("channels of other plugins are data sets of their names", "[writers]") {
+  test::FakeHost host;
+  Hdf5Writer::Params params;
+  params.channels.names = {"flow", "parts"};
+  Hdf5Writer writer(params, host);
+  CHECK(writer.needs().contains("flow"));
+  const test::SampleScene sample(24, 16, 1);
+  Capture capture = test::ray_cast_capture(sample, 0);
+  Image<Vec2f> flow(24, 16, Vec2f(1.0f, 2.0f));
+  flow.at(3, 2) = {7.25f, -1.0f};
+  capture.frames[0].set(Channel<Vec2f>{"flow"}, flow);
+  Image<std::uint32_t> parts(24, 16, 70000);
+  capture.frames[0].set(Channel<std::uint32_t>{"parts"}, parts);
+  const MemoryFiles files = test::write_dataset(writer, test::sample_dataset(sample), {&capture});
+  const OpenFile file(files.bytes(test::split_of(files, 0) + "/000000_cam_0.hdf5"));
+  const auto values = file.read<float>("flow", H5T_NATIVE_FLOAT, {16, 24, 2});
+  CHECK(values[2 * (2 * 24 + 3)] == 7.25f);
+  CHECK(values[2 * (2 * 24 + 3) + 1] == -1.0f);
+  CHECK(file.read<std::uint32_t>("parts", H5T_NATIVE_UINT32, {16, 24})[5] == 70000);
+  Hdf5Writer::Params taken;
+  taken.channels.names = {"lens"};
+  CHECK_THROWS_WITH(Hdf5Writer(taken, host), ContainsSubstring("channels: \"lens\""));
+}

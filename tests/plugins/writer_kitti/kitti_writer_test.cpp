@@ -145,3 +145,27 @@ TEST_CASE("Replicator's thresholds count, what stands for its folders is named",
             "names",
             "KittiWriter: there are no segmentation pictures whose colours could be chosen"});
 }
+
+TEST_CASE("calibration has its standard lines first and a fisheye's central focal length",
+          "[writers]") {
+  test::SampleScene sample(24, 16, 1);
+  Camera& camera = *sample.scene.edit(sample.cameras[0]).camera;
+  camera.lens = LensModel::FisheyePolynomial;
+  camera.fisheye_polynomial = {0.0, 0.05, 0.0, 1e-5, 0.0, 0.0};
+  camera.fisheye_max_angle_rad = 1.5;
+  camera.fx = camera.fy = 999.0;  // of no meaning to this lens
+  const Capture capture = test::ray_cast_capture(sample, 0);
+  test::FakeHost host;
+  KittiWriter writer({}, host);
+  const MemoryFiles files = test::write_dataset(writer, test::sample_dataset(sample), {&capture});
+  std::istringstream text(files.text("training/calib/000000.txt"));
+  std::vector<std::string> keys;
+  for (std::string row; std::getline(text, row);) {
+    keys.push_back(row.substr(0, row.find(':')));
+    if (keys.back() != "P2") continue;
+    // A pixel beside the centre is seen at 0.05 rad.
+    CHECK(std::stod(row.substr(4)) == Approx(20.0));
+  }
+  CHECK(keys == std::vector<std::string>{"P0", "P1", "P2", "P3", "R0_rect", "Tr_velo_to_cam",
+                                         "Tr_imu_to_velo", "lens_2"});
+}

@@ -18,6 +18,7 @@ struct RawImage {
   int channels = 0;
   int bits_per_channel = 0;
   std::vector<std::byte> samples;
+  std::vector<std::byte> palette;  ///< Red, green and blue by turns; empty: none.
 
   /// Sample `c` of a pixel, 8 or 16 bits.
   int at(int x, int y, int c) const;

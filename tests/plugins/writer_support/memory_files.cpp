@@ -11,6 +11,12 @@ void MemoryFiles::add(std::string_view path, std::vector<std::byte> bytes) {
   }
 }
 
+void MemoryFiles::append(std::string_view path, std::span<const std::byte> bytes) {
+  if (growing_.emplace(path).second) add(path, {});
+  std::vector<std::byte>& file = files[std::string(path)];
+  file.insert(file.end(), bytes.begin(), bytes.end());
+}
+
 void MemoryFiles::record(std::string_view line) { records.emplace_back(capture, line); }
 
 std::set<std::string> MemoryFiles::paths() const {

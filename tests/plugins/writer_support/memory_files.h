@@ -3,6 +3,7 @@
 
 #include <map>
 #include <set>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -11,10 +12,12 @@
 
 namespace diorama::test {
 
-/// Keeps files and records in memory. Adding a path twice throws.
+/// Keeps files and records in memory. Adding a path twice throws, and so does appending to one that
+/// was added.
 class MemoryFiles final : public CaptureFiles {
  public:
   void add(std::string_view path, std::vector<std::byte> bytes) override;
+  void append(std::string_view path, std::span<const std::byte> bytes) override;
   void record(std::string_view line) override;
 
   std::set<std::string> paths() const;
@@ -25,6 +28,9 @@ class MemoryFiles final : public CaptureFiles {
   std::map<std::string, std::vector<std::byte>> files;
   std::vector<std::pair<int, std::string>> records;  ///< With `capture`, see below.
   int capture = 0;                                   ///< What the next record belongs to.
+
+ private:
+  std::set<std::string> growing_;
 };
 
 /// Runs begin(), write() for each capture and finish().

@@ -127,7 +127,7 @@ CoverageMask cover(const Frame& frame, const std::vector<WorldMesh>& all,
   }
   const Camera& camera = frame.camera;
   CoverageMask mask;
-  mask.box = {-camera.width / 2, -camera.height / 2, camera.width * 3 / 2, camera.height * 3 / 2};
+  mask.box = {-camera.width, -camera.height, 2 * camera.width, 2 * camera.height};
   for (int y = mask.box.y_min; y < mask.box.y_max; ++y) {
     for (int x = mask.box.x_min; x < mask.box.x_max; ++x) {
       const auto ray = pixel_ray(frame, x, y);

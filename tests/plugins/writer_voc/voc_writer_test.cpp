@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "writer_voc/voc_writer.h"
 
+#include <array>
+#include <string>
+
 #include "plugins/writer_support/sample_dataset.h"
 #include "support/catch.h"
 
@@ -63,4 +66,56 @@ TEST_CASE("image sets list every picture once", "[writers]") {
             files.text("ImageSets/Main/val.txt").size() ==
         all.size());
   CHECK(files.text("labels.txt") == "ball\ncrate\nmug\n");
+}
+
+TEST_CASE("segmentation pictures carry the benchmark's palette", "[writers]") {
+  test::FakeHost host;
+  const MemoryFiles files = test::write_sample<VocWriter>({}, host);
+  for (const char* folder : {"SegmentationClass", "SegmentationObject"}) {
+    const std::string path = std::string(folder) + "/000001_cam_1.png";
+    const auto& palette = test::raw_image(files.bytes(path)).palette;
+    REQUIRE(palette.size() == 3 * 256);
+    const auto color = [&](std::size_t index) {
+      return std::array{int(palette[3 * index]), int(palette[3 * index + 1]),
+                        int(palette[3 * index + 2])};
+    };
+    // Of the development kit: background, aeroplane, bicycle, bird, bottle, tv monitor, void.
+    CHECK(color(0) == std::array{0, 0, 0});
+    CHECK(color(1) == std::array{128, 0, 0});
+    CHECK(color(2) == std::array{0, 128, 0});
+    CHECK(color(3) == std::array{128, 128, 0});
+    CHECK(color(5) == std::array{128, 0, 128});
+    CHECK(color(20) == std::array{0, 64, 128});
+    CHECK(color(255) == std::array{224, 224, 192});
+  }
+}
+
+TEST_CASE("each class has lists of the pictures that show it", "[writers]") {
+  test::FakeHost host;
+  VocWriter::Params params;
+  params.difficult_below = 0.9;
+  params.training.classes = {"mug", "ball", "no such/thing", "no such?thing"};
+  const MemoryFiles files = test::write_sample<VocWriter>(params, host);
+  const std::string lists = "ImageSets/Main/";
+  std::string mugs, balls;
+  for (const Capture& capture : test::sample_captures()) {
+    for (const Frame& frame : capture.frames) {
+      const std::string stem = "00000" + std::to_string(capture.index) + "_" + frame.camera_name;
+      const auto mark = [&](const std::string& path) -> std::string {
+        const Instance& instance = test::instance_at(frame, path);
+        if (!instance.tight_box) return " -1\n";
+        return instance.visibility->occlusion().value() > 0.1 ? "  0\n" : "  1\n";
+      };
+      mugs += stem + mark("/Assets/mug");
+      balls += stem + mark("/Assets/ball");
+    }
+  }
+  CHECK(files.text(lists + "mug_trainval.txt") == mugs);
+  CHECK(files.text(lists + "ball_trainval.txt") == balls);
+  CHECK(mugs.find("  0\n") != std::string::npos);
+  CHECK(mugs.find("  1\n") != std::string::npos);
+  CHECK(files.text(lists + "mug_train.txt").size() + files.text(lists + "mug_val.txt").size() ==
+        mugs.size());
+  CHECK(files.text(lists + "no_such_thing_trainval.txt").find(" 1") == std::string::npos);
+  CHECK(files.files.contains(lists + "no_such_thing_2_train.txt"));
 }

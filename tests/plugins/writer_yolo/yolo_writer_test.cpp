@@ -5,7 +5,7 @@
 
 #include "plugins/writer_support/sample_dataset.h"
 #include "support/catch.h"
-#include "writer_yolo/contours.h"
+#include "writer_support/contours.h"
 
 using namespace diorama;
 using test::MemoryFiles;
@@ -32,6 +32,20 @@ bool is_inside(const Polygon& polygon, const Vec2& p) {
     if (p.x() < (b.x() - a.x()) * (p.y() - a.y()) / (b.y() - a.y()) + a.x()) inside = !inside;
   }
   return inside;
+}
+
+/// How often a polygon goes round a point, clockwise on the screen.
+int winding(const Polygon& polygon, const Vec2& p) {
+  int turns = 0;
+  for (std::size_t i = 0, j = polygon.size() - 1; i < polygon.size(); j = i++) {
+    const Vec2& a = polygon[j];
+    const Vec2& b = polygon[i];
+    if ((a.y() > p.y()) == (b.y() > p.y())) continue;
+    if (p.x() < (b.x() - a.x()) * (p.y() - a.y()) / (b.y() - a.y()) + a.x()) {
+      turns += b.y() > a.y() ? 1 : -1;
+    }
+  }
+  return turns;
 }
 
 std::vector<std::vector<double>> numbers_of(const std::string& text) {
@@ -63,12 +77,47 @@ TEST_CASE("outlines run along pixel edges, clockwise, one per part", "[writers]"
   const auto image = image_of({".....", ".##.#", ".#..#", ".###."});
   const auto parts = outlines(image, 7, {1, 1, 5, 4});
   REQUIRE(parts.size() == 2);
-  CHECK(parts[0] == Polygon{{1, 1}, {3, 1}, {3, 2}, {2, 2}, {2, 3}, {4, 3}, {4, 4}, {1, 4}});
-  CHECK(parts[1] == Polygon{{4, 1}, {5, 1}, {5, 3}, {4, 3}});
+  CHECK(parts[0].outer == Polygon{{1, 1}, {3, 1}, {3, 2}, {2, 2}, {2, 3}, {4, 3}, {4, 4}, {1, 4}});
+  CHECK(parts[1].outer == Polygon{{4, 1}, {5, 1}, {5, 3}, {4, 3}});
   const Polygon all = joined(parts);
   for (int y = 0; y < 4; ++y) {
     for (int x = 0; x < 5; ++x) {
       CHECK(is_inside(all, {x + 0.5, y + 0.5}) == (image.at(x, y) == 7));
+    }
+  }
+}
+
+TEST_CASE("polygons leave out holes, and what lies in them is a part of its own", "[writers]") {
+  const auto image = image_of({"........", ".######.", ".#....#.", ".#.##.#.", ".#.#.##.",  //
+                               ".#..#.#.", ".######.", ".#.#.##.", ".######."});
+  const auto parts = outlines(image, 7, {0, 0, 8, 9});
+  REQUIRE(parts.size() == 2);
+  CHECK(parts[0].outer.size() == 4);
+  // Holes that touch at a corner are one.
+  CHECK(parts[0].holes.size() == 3);
+  const auto agrees = [&](const Polygon& polygon) {
+    for (int y = 0; y < image.height(); ++y) {
+      for (int x = 0; x < image.width(); ++x) {
+        CAPTURE(x, y);
+        CHECK(is_inside(polygon, {x + 0.5, y + 0.5}) == (image.at(x, y) == 7));
+        CHECK(winding(polygon, {x + 0.5, y + 0.5}) == (image.at(x, y) == 7 ? 1 : 0));
+      }
+    }
+  };
+  agrees(joined(parts));
+
+  // Noise: every kind of contact.
+  Image<std::uint32_t> noise(23, 17, 0);
+  std::uint32_t random = 3;
+  for (std::uint32_t& pixel : noise.pixels()) {
+    random = random * 1664525u + 1013904223u;
+    pixel = (random >> 16) % 5 < 3 ? 7 : 0;
+  }
+  const Polygon all = joined(outlines(noise, 7, {0, 0, 23, 17}));
+  for (int y = 0; y < noise.height(); ++y) {
+    for (int x = 0; x < noise.width(); ++x) {
+      CHECK(is_inside(all, {x + 0.5, y + 0.5}) == (noise.at(x, y) == 7));
+      CHECK(winding(all, {x + 0.5, y + 0.5}) == (noise.at(x, y) == 7 ? 1 : 0));
     }
   }
 }
@@ -137,7 +186,7 @@ TEST_CASE("polygons hold the object's pixels and no others", "[writers]") {
 TEST_CASE("pose lines and data.yaml agree on nine keypoints", "[writers]") {
   const MemoryFiles files = write("pose");
   CHECK(files.text("data.yaml") ==
-        "path: .\ntrain: images/train\nval: images/val\nkpt_shape: [9, 3]\nnames:\n"
+        "train: images/train\nval: images/val\nkpt_shape: [9, 3]\nnames:\n"
         "  0: \"ball\"\n  1: \"crate\"\n  2: \"mug\"\n");
   for (const auto& line : numbers_of(files.text(label_file(files, 1, "cam_1")))) {
     CHECK(line.size() == 1 + 4 + 27);

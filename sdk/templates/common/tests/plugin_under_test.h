@@ -66,7 +66,8 @@ class PluginUnderTest final : private diorama::Registrar {
     for (const diorama::ComponentInfo& info : components_) {
       if (info.kind != T::kKind) continue;
       diorama::Complaints complaints;
-      std::unique_ptr<diorama::Component> made = info.make(params, info.type, {}, complaints, host_);
+      std::unique_ptr<diorama::Component> made =
+          info.make(info.context, params, info.type, {}, complaints, host_);
       complaints.raise();
       return std::unique_ptr<T>(dynamic_cast<T*>(made.release()));
     }

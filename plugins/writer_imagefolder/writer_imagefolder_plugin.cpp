@@ -1,0 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "diorama/plugin.h"
+#include "writer_imagefolder/image_folder_writer.h"
+
+DIORAMA_PLUGIN("writer_imagefolder", "1.0.0", "Apache-2.0") {
+  DIORAMA_ADD(diorama::ImageFolderWriter, "ImageFolderWriter",
+              "Writes an image folder with metadata.jsonl for Hugging Face Datasets.");
+}

@@ -1,0 +1,203 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Shards that work on one folder at the same time are killed, stopped, started twice and given a slow and
+faulty file system, until a number of kills and faults is reached. What must hold for every round:
+
+- a process that nobody disturbed ends with 0, or with 75 while another one owns its shard;
+- one whose file system failed ends with 0, 6 or 75, and says why;
+- when all shards were started once more and ended, the dataset has the files of one undisturbed run, byte
+  by byte.
+
+    tests/cluster/torture.py --kills 1000 --faults 5000 [--build FOLDER] [--seed N]
+
+Ends with a line of counts, and with 1 when something did not hold; then the folders of that round are kept.
+"""
+import argparse
+import errno
+import filecmp
+import os
+import pathlib
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+HERE = pathlib.Path(__file__).resolve().parent
+SHARDS = 4
+DELAYS_MS = [0, 0, 0, 2, 2, 2, 2, 120]  # of every file operation in a round
+ERRORS = [errno.ENOSPC, errno.EIO, errno.EDQUOT, errno.EACCES, errno.ESTALE, errno.EMFILE]
+RETRY_LATER = 75
+STOPPED = 130
+
+
+class Round:
+    """One dataset, from the first start to the comparison."""
+
+    def __init__(self, torture, number):
+        self.torture = torture
+        self.rng = random.Random(f"{torture.options.seed}/{number}")
+        self.folder = torture.work / f"round_{number}"
+        self.folder.mkdir()
+        self.dataset = self.folder / "dataset"
+        self.delay_ms = self.rng.choice(DELAYS_MS)
+        self.starts = 0
+        self.faults = []
+
+    def start(self, shard, environment=None):
+        log = self.folder / f"{self.starts}_shard_{shard}.log"
+        self.starts += 1
+        with open(log, "wb") as file:
+            process = subprocess.Popen(
+                [self.torture.program, "run", HERE / "job.yaml", "--output", self.dataset, "--resume",
+                 "--threads", "2", "--shard", f"{shard}/{SHARDS}", *self.torture.smaller()],
+                stdout=file, stderr=file,
+                env={**os.environ, "LD_PRELOAD": str(self.torture.library),
+                     "SLOW_FILES_MS": str(self.delay_ms), **(environment or {})})
+        process.log, process.shard, process.disturbed = log, shard, bool(environment)
+        return process
+
+    def check(self, process):
+        """Of a process that has ended."""
+        code = process.returncode
+        allowed = {0, RETRY_LATER}
+        if process.disturbed == "killed":
+            allowed |= {-signal.SIGKILL, -signal.SIGTERM, -signal.SIGINT, STOPPED}
+        elif process.disturbed:
+            allowed |= {6}
+        text = process.log.read_text(errors="replace")
+        if code not in allowed:
+            last = text.strip().splitlines()[-1:] or ["(no output)"]
+            self.faults.append(f"shard {process.shard} ended with {code}: {last[0][-200:]}")
+        elif code == 6 and "error: " not in text:
+            self.faults.append(f"shard {process.shard} ended with 6 and no message")
+
+    def run_with_kills(self, budget):
+        """All shards, one of them twice in most rounds; some are killed in the middle. Returns the kills."""
+        processes = [self.start(shard) for shard in range(1, SHARDS + 1)]
+        if self.rng.random() < 0.7:
+            processes.append(self.start(self.rng.randint(1, SHARDS)))
+        # In most rounds a process is killed early; a slow disk makes the middle later.
+        span = 0.6 + 0.05 * self.delay_ms
+        kills = sorted((self.rng.uniform(0.02, span), process) for process in processes
+                       if self.rng.random() < 0.8)[:budget]
+        begin, done = time.monotonic(), 0
+        for at, process in kills:
+            time.sleep(max(0.0, begin + at - time.monotonic()))
+            if process.poll() is None:
+                process.send_signal(self.rng.choice([signal.SIGKILL] * 4 + [signal.SIGTERM, signal.SIGINT]))
+                process.disturbed = "killed"
+                done += 1
+        self.wait(processes)
+        return done
+
+    def run_with_faults(self, budget):
+        """All shards, each with one operation (or all from one on) that fails. Returns the faults."""
+        processes = []
+        for shard in range(1, SHARDS + 1):
+            environment = {"FAIL_AT": str(self.rng.randint(1, 400)),
+                           "FAIL_ERRNO": str(self.rng.choice(ERRORS)),
+                           "FAIL_ON": str(self.rng.randint(0, 1)),
+                           "FAIL_MARK": str(self.folder / f"failed_{shard}")}
+            processes.append(self.start(shard, environment if shard <= budget else None))
+        self.wait(processes)
+        return len(list(self.folder.glob("failed_*")))  # some ended before their operation came
+
+    def wait(self, processes):
+        for process in processes:
+            try:
+                process.wait(timeout=900)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+                self.faults.append(f"shard {process.shard} hung")
+                continue
+            self.check(process)
+
+    def finish(self):
+        """Starts shards again, at the same time, until each has ended with 0; then compares."""
+        self.delay_ms = min(self.delay_ms, 2)
+        missing = set(range(1, SHARDS + 1))
+        for _ in range(20):
+            processes = [self.start(shard) for shard in sorted(missing)]
+            self.wait(processes)
+            missing = {process.shard for process in processes if process.returncode != 0}
+            if not missing:
+                break
+        else:
+            self.faults.append(f"shards {sorted(missing)} did not end")
+        self.compare()
+
+    def compare(self):
+        expected, found = self.torture.expected, files_of(self.dataset)
+        differing = [name for name in expected & found
+                     if not filecmp.cmp(self.torture.reference / name, self.dataset / name, shallow=False)]
+        for what, names in (("lost", expected - found), ("left over", found - expected),
+                            ("different", differing)):
+            if names:
+                self.faults.append(f"{len(names)} files {what}, such as {min(names)}")
+
+
+class Torture:
+    def __init__(self, options):
+        self.options = options
+        self.program = options.build / "bin/diorama"
+        self.work = pathlib.Path(tempfile.mkdtemp(prefix="diorama-torture."))
+        self.library = self.work / "unkind_files.so"
+        subprocess.run(["cc", "-shared", "-fPIC", "-O1", "-o", self.library, HERE / "unkind_files.c", "-ldl"],
+                       check=True)
+        self.reference = self.work / "reference"
+        subprocess.run([self.program, "run", HERE / "job.yaml", "--output", self.reference, *self.smaller()],
+                       check=True, capture_output=True)
+        self.expected = files_of(self.reference)
+
+    def smaller(self):
+        return ["--set", f"total_captures={self.options.captures}"]
+
+    def run(self):
+        kills = injected = rounds = bad = 0
+        begin = time.monotonic()
+        while kills < self.options.kills or injected < self.options.faults:
+            rounds += 1
+            round_ = Round(self, rounds)
+            if kills < self.options.kills:
+                kills += round_.run_with_kills(self.options.kills - kills)
+            else:
+                injected += round_.run_with_faults(self.options.faults - injected)
+            round_.finish()
+            for fault in round_.faults:
+                print(f"round {rounds} ({round_.folder}): {fault}", flush=True)
+            bad += bool(round_.faults)
+            if not round_.faults:
+                shutil.rmtree(round_.folder)
+        print(f"torture: {rounds} rounds of {SHARDS} shards, {kills} kills, {injected} faults, "
+              f"{len(self.expected)} files each, {bad} rounds with faults, {time.monotonic() - begin:.0f} s")
+        if not bad:
+            shutil.rmtree(self.work)
+        return 1 if bad else 0
+
+
+def files_of(folder):
+    """Names of all files but the journal, whose parts may lie in another order."""
+    names = set()
+    for at, folders, files in os.walk(folder):
+        if ".diorama" in folders:
+            folders.remove(".diorama")
+        names.update(os.path.relpath(os.path.join(at, name), folder) for name in files)
+    return names
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
+    parser.add_argument("--kills", type=int, default=0)
+    parser.add_argument("--faults", type=int, default=0)
+    parser.add_argument("--captures", type=int, default=16, help="of the job")
+    parser.add_argument("--seed", default="1")
+    parser.add_argument("--build", type=pathlib.Path, default=HERE.parent.parent / "build/release")
+    return Torture(parser.parse_args()).run()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,41 @@
+# The digest that plugins carry moves with the interface, not with its comments.
+#   cmake -DMODULE=HeadersDigest.cmake -DINCLUDE_DIR=sdk/include/diorama -DGENERATED=headers_digest.h
+#         -DWORK=folder -P headers_digest.cmake
+cmake_minimum_required(VERSION 3.25)
+include(${MODULE})
+file(REMOVE_RECURSE ${WORK})
+file(COPY ${INCLUDE_DIR}/ DESTINATION ${WORK})
+diorama_headers_digest(before ${WORK})
+file(READ ${GENERATED} generated)
+if(NOT generated MATCHES "DIORAMA_HEADERS_DIGEST 0x${before}ull")
+  message(FATAL_ERROR "the build has another digest than its headers (${before}):\n${generated}")
+endif()
+
+# expect(is_same what from to): writer.h with a text replaced.
+file(READ ${WORK}/writer.h original)
+function(expect is_same what from to)
+  string(REPLACE "${from}" "${to}" changed "${original}")
+  if(changed STREQUAL original)
+    message(FATAL_ERROR "${what}: writer.h does not hold '${from}'")
+  endif()
+  file(WRITE ${WORK}/writer.h "${changed}")
+  diorama_headers_digest(after ${WORK})
+  string(COMPARE EQUAL ${before} ${after} same)
+  if(is_same AND NOT same OR same AND NOT is_same)
+    message(FATAL_ERROR "${what}: ${before} and ${after}")
+  endif()
+endfunction()
+expect(ON "a comment" "/// Turns captures into files." "/// Files from captures: see [0]; and // more.")
+expect(ON "a block comment" "public:\n" "public: /* what ** /everybody/ sees\n; */\n")
+expect(ON "line breaks" "const Capture& capture, CaptureFiles& files"
+       "const Capture& capture,\n          CaptureFiles& files")
+expect(OFF "two functions of the same type change places" "virtual void record(std::string_view line) = 0;"
+       "virtual void store(std::string_view line) = 0;")
+expect(OFF "a default" "int capture_count = 0" "int capture_count = 1")
+expect(OFF "const" "CaptureFiles& files) const = 0" "CaptureFiles& files) = 0")
+file(WRITE ${WORK}/writer.h "${original}")
+file(WRITE ${WORK}/one_more.h "#pragma once\n")
+diorama_headers_digest(after ${WORK})
+if(before STREQUAL after)
+  message(FATAL_ERROR "a new header leaves the digest as it was")
+endif()
