@@ -32,10 +32,7 @@ foreign_bytes=(
 )
 renderer=(renderer_embree_test)
 threads=(host_test pipeline_test)
-writers=(
-  writer_basic writer_bop writer_coco writer_data_visualization writer_hdf5 writer_kitti writer_pose
-  writer_voc writer_webdataset writer_yolo
-)
+mapfile -t writers < <(cd plugins && ls -d writer_*/ | sed '/^writer_support/d; s,/,,')
 
 usage() { sed -n '3,10s/^# \{0,1\}//p' "$0"; }
 

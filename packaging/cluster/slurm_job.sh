@@ -5,8 +5,8 @@
 #   sbatch --array=1-16 slurm_job.sh configs/dining_room.yaml /scratch/dataset 16
 # The last argument is the number of shards, so that one of them can be made again: --array=7.
 # Every start goes on where the last one stopped. A task is put back into the queue when its time is nearly
-# over, when its node fails or it is preempted, and when the dataset could not be written or the shard is
-# still in use elsewhere (20 times); a wrong job ends at once. --no-requeue, scancel: never.
+# over, when its node fails or it is preempted, while the shard is in use elsewhere, and when the dataset could
+# not be written (20 times); a wrong job ends at once. --no-requeue, scancel: never.
 #SBATCH --cpus-per-task=8
 #SBATCH --mem=8G
 #SBATCH --time=04:00:00
@@ -28,8 +28,8 @@ code=$?
 
 # Codes: framework/docs/exit_codes.md. 137 and 143: killed, by lack of memory for example.
 case $code in
-  130) again=1 ;;
-  6 | 75 | 137 | 143) again=$((${SLURM_RESTART_COUNT:-0} < 20)) ;;
+  75 | 130) again=1 ;;
+  6 | 137 | 143) again=$((${SLURM_RESTART_COUNT:-0} < 20)) ;;
   *) again=0 ;;
 esac
 # A task that was cancelled or preempted is no longer running; what becomes of it is settled.
