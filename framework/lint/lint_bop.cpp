@@ -323,6 +323,10 @@ void lint_bop(Dataset& dataset) {
                   "its objects are not those of dataset.json");
   }
   dataset.json("camera.json");
+  for (const PlannedPicture& picture : page.pictures) {
+    if (page.cameras < 2 || picture.capture > 0) continue;
+    dataset.json("camera" + picture.stem.substr(picture.stem.find('_')) + ".json");
+  }
   const auto models = dataset.json("models/models_info.json");
   const auto targets = dataset.json("test_targets_bop19.json");
   dataset.json("test_targets_bop24.json");
