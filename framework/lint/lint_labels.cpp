@@ -2,9 +2,11 @@
 // KITTI and Pascal VOC: one small label file per picture.
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <map>
 #include <optional>
 #include <regex>
 
@@ -196,11 +198,50 @@ std::set<std::uint32_t> values_below(const Picture& objects, std::uint32_t first
   return values;
 }
 
-void lint_voc_image(Dataset& dataset, const std::string& stem,
-                    const std::vector<std::string>& classes) {
+/// What the lists of the classes say of a picture: 1, 0 where it shows difficult ones only, or -1.
+using VocMarks = std::vector<int>;
+
+/// The part that a class has in the names of its lists.
+std::vector<std::string> voc_list_names(const std::vector<std::string>& classes) {
+  std::vector<std::string> names;
+  for (std::string name : classes) {
+    for (char& c : name) {
+      const auto byte = static_cast<unsigned char>(c);
+      if (byte < 0x80 && !std::isalnum(byte) && c != '-' && c != '.') c = '_';
+    }
+    const std::string plain = name;
+    for (int number = 2; std::ranges::count(names, name) > 0; ++number) {
+      name = plain + "_" + std::to_string(number);
+    }
+    names.push_back(name);
+  }
+  return names;
+}
+
+void check_voc_lists(Dataset& dataset, const DatasetPage& page,
+                     const std::vector<VocMarks>& marks) {
+  const std::vector<std::string> names = voc_list_names(page.classes);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    std::map<std::string, std::vector<std::string>> lines;
+    for (std::size_t picture = 0; picture < page.pictures.size(); ++picture) {
+      const PlannedPicture& planned = page.pictures[picture];
+      const int mark = marks[picture][i];
+      const std::string line = planned.stem + (mark < 0 ? " " : "  ") + std::to_string(mark);
+      lines[planned.split].push_back(line);
+      lines["trainval"].push_back(line);
+    }
+    for (const char* part : {"train", "val", "trainval"}) {
+      check_lines(dataset, "ImageSets/Main/" + names[i] + "_" + part + ".txt", lines[part]);
+    }
+  }
+}
+
+VocMarks lint_voc_image(Dataset& dataset, const std::string& stem,
+                        const std::vector<std::string>& classes) {
+  VocMarks marks(classes.size(), -1);
   const std::string file = "Annotations/" + stem + ".xml";
   const auto xml = dataset.text(file);
-  if (!xml) return;
+  if (!xml) return marks;
   dataset.reading(file, [&] {
     if (!xml->ends_with("</annotation>\n")) throw std::runtime_error("is cut short");
     const std::string picture_name = "JPEGImages/" + xml_text(*xml, "filename");
@@ -231,6 +272,11 @@ void lint_voc_image(Dataset& dataset, const std::string& stem,
                          std::stoi(xml_text(object, "ymin")) - 1,
                          std::stoi(xml_text(object, "xmax")), std::stoi(xml_text(object, "ymax"))};
       ++place;
+      const auto name = std::ranges::find(classes, unescaped(xml_text(object, "name")));
+      if (name != classes.end()) {
+        int& mark = marks[std::size_t(name - classes.begin())];
+        mark = std::max(mark, xml_text(object, "difficult") == "1" ? 0 : 1);
+      }
       if (!has_masks) continue;
       dataset.check(masks.contains(place) && masks.at(place).box == box, "box = extent of mask",
                     file,
@@ -238,7 +284,6 @@ void lint_voc_image(Dataset& dataset, const std::string& stem,
                         ", its pixels extend over " +
                         (masks.contains(place) ? box_text(masks.at(place).box) : "nothing"));
       masks.erase(place);
-      const auto name = std::ranges::find(classes, unescaped(xml_text(object, "name")));
       const auto index = std::uint32_t(name - classes.begin()) + 1;
       dataset.check(values_below(*objects, place, *class_ids) == std::set{index},
                     "pixels partition into instances", file,
@@ -248,6 +293,7 @@ void lint_voc_image(Dataset& dataset, const std::string& stem,
     dataset.check(masks.empty(), "ids within the label map", masks_file,
                   std::to_string(masks.size()) + " values have no object in " + file);
   });
+  return marks;
 }
 
 }  // namespace
@@ -288,7 +334,11 @@ void lint_voc(Dataset& dataset) {
     check_lines(dataset, folder + "val.txt", split["val"]);
     check_lines(dataset, folder + "trainval.txt", stems);
   }
-  for (const std::string& stem : stems) lint_voc_image(dataset, stem, page.classes);
+  std::vector<VocMarks> marks;
+  for (const std::string& stem : stems) {
+    marks.push_back(lint_voc_image(dataset, stem, page.classes));
+  }
+  check_voc_lists(dataset, page, marks);
 }
 
 }  // namespace diorama::lint

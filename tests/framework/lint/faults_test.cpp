@@ -125,6 +125,22 @@ TEST_CASE("what is seen through any lens is found good in every format", "[lint]
   }
 }
 
+TEST_CASE("objects that are largely outside of the picture are found good", "[lint]") {
+  test::SampleScene sample(36, 24, 2);
+  for (const NodeId node : sample.cameras) {
+    Camera& camera = *sample.scene.edit(node).camera;
+    camera.fx *= 3.0;
+    camera.fy *= 3.0;
+    camera.cy -= 9.0;
+  }
+  const Capture capture = test::ray_cast_capture(sample, 0);
+  for (const test::SampleFormat& format : test::every_format()) {
+    const LintReport report = write(format, capture).lint();
+    INFO(lint_text(report, 20));
+    CHECK(report.findings.empty());
+  }
+}
+
 TEST_CASE("any file that is missing or cut short is found", "[lint]") {
   for (const test::SampleFormat& format : test::every_format()) {
     const auto dataset = write(format, capture_through(LensModel::Pinhole));
