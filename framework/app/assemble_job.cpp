@@ -218,8 +218,9 @@ void resolve_needs(Assembler& assembler, ListedAnnotators listed, JobAssembly& a
   for (const std::size_t index : parts.demand.annotators) {
     const AnnotatorOffer& offer = offers[index];
     assembler.note_annotator(offer.type);
-    parts.annotators.push_back(offer.is_listed ? std::move(listed.at(offer.type))
-                                               : assembler.make_default_annotator(offer.type));
+    auto annotator = offer.is_listed ? std::move(listed.at(offer.type))
+                                     : assembler.make_default_annotator(offer.type);
+    parts.annotators.push_back({offer.type, std::move(annotator)});
   }
   for (const AnnotatorOffer& offer : offers) {
     if (offer.is_listed && listed.at(offer.type)) assembler.warn_of_idle(offer);

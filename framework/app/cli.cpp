@@ -28,6 +28,7 @@
 #include "framework/app/options.h"
 #include "framework/host/console_log.h"
 #include "framework/output/workers.h"
+#include "framework/plugins/fatal_end.h"
 #include "framework/plugins/plugin_search.h"
 
 namespace diorama {
@@ -78,7 +79,7 @@ void add_global_options(CLI::App& app, CommandLine& line) {
       ->type_name("DIR")
       ->allow_extra_args(false);
   app.add_flag("--allow-unsafe-plugin-dir", line.global.allow_unsafe_plugin_dir,
-               "Also load plugins from folders that everybody may write to");
+               "Also load plugins that others than you may change");
   app.add_option("--assets-root", line.assets_root, "Folder below which asset paths are looked up")
       ->type_name("DIR");
 }
@@ -496,6 +497,7 @@ int run_command(CommandLine& line) {
   if (!line.assets_root.empty()) line.global.assets_root = line.assets_root;
   ConsoleLog log(level);
   line.global.log_level = level;
+  const FatalEndReports reports;
   return line.command(log);
 }
 

@@ -27,6 +27,8 @@ class Journal {
   virtual ~Journal() = default;
   virtual void begin(const std::string& subject, const std::string& check) = 0;
   virtual void end(const CheckResult& result) = 0;
+  /// Something that the checks found out for whoever runs them.
+  virtual void fact(const std::string& name, const std::string& value) = 0;
 };
 
 /// Runs the checks of one subject.

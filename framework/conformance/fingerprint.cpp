@@ -134,6 +134,12 @@ std::string fingerprint(const Scene& scene) {
   return bytes.text;
 }
 
+std::string fingerprint(const Node& node) {
+  Bytes bytes;
+  bytes.add(node);
+  return bytes.text;
+}
+
 std::string fingerprint(const Frame& frame) {
   Bytes bytes;
   bytes.add_all(frame.camera_name, frame.camera_path, frame.camera, frame.world_from_camera,

@@ -12,6 +12,7 @@ namespace diorama::conformance {
 /// All content as bytes: equal exactly when nothing that a component could notice differs.
 /// Addresses and revisions do not count.
 std::string fingerprint(const Scene& scene);
+std::string fingerprint(const Node& node);  ///< Its name and its place in the tree do not count.
 std::string fingerprint(const Frame& frame);
 std::string fingerprint(const Capture& capture);
 

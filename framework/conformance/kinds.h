@@ -42,4 +42,13 @@ void check_renderer(const CheckRun& run, const Subject& subject);
 void check_annotator(const CheckRun& run, const Subject& subject);
 void check_writer(const CheckRun& run, const Subject& subject);
 
+/// All that a component makes of the same input, as bytes: must be equal in every process. May
+/// throw.
+std::string loader_output(const Subject& subject);
+std::string physics_output(const Subject& subject);
+std::string randomizer_output(const Subject& subject);
+std::string renderer_output(const Subject& subject);
+std::string annotator_output(const Subject& subject);
+std::string writer_output(const Subject& subject);
+
 }  // namespace diorama::conformance

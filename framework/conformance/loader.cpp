@@ -70,6 +70,11 @@ void refuse_broken_files(Loader& loader, const std::string& ending) {
 
 }  // namespace
 
+std::string loader_output(const Subject& subject) {
+  const std::vector<std::string> assets = subject.make<Loader>()->assets();
+  return assets.empty() ? "" : loaded(subject, assets.front());
+}
+
 void check_loader(const CheckRun& run, const Subject& subject) {
   const std::unique_ptr<Loader> loader = subject.make<Loader>();
   const std::vector<std::string> claims = loader->claims();

@@ -47,6 +47,14 @@ void check_spec(const ParamSpec& spec) {
   for (const ParamSpec& child : spec.children) check_spec(child);
 }
 
+void require_no_twins(const std::vector<ParamSpec>& specs) {
+  NameSet keys;
+  for (const ParamSpec& spec : specs) {
+    require(keys.insert(spec.key).second, "'" + spec.key + "' is declared twice");
+    require_no_twins(spec.children);
+  }
+}
+
 /// A parameter at any depth: how to put a value for it into a job, and its name in messages.
 struct Slot {
   const ParamSpec& spec;
@@ -154,6 +162,21 @@ void refuse_out_of_range(const Subject& subject, const Slot& slot) {
   }
 }
 
+/// Whoever copies a default into a job must not be refused.
+void accept_default(const Subject& subject, const Slot& slot) {
+  const bool has_parts = slot.spec.type == ParamType::Group || slot.spec.type == ParamType::List;
+  if (has_parts || slot.spec.default_value.kind == Value::Kind::Null) return;
+  Complaints complaints;
+  const Value job = slot.in_job(subject, slot.spec.default_value);
+  try {
+    make_any(subject, job, complaints);
+  } catch (const Error&) {
+    return;  // it needs other keys as well, or the asset that it names
+  }
+  require(complaints.is_empty(), "refuses the default of '" + slot.spec.key + "': " +
+                                     (complaints.is_empty() ? "" : complaints.messages().front()));
+}
+
 }  // namespace
 
 bool check_parameters(const CheckRun& run, const Subject& subject) {
@@ -163,6 +186,7 @@ bool check_parameters(const CheckRun& run, const Subject& subject) {
     specs = subject.registry.describe(entry.kind, entry.type);
     require(!entry.help.empty() && entry.help.back() == '.', "its help is no sentence");
     for (const ParamSpec& spec : specs) check_spec(spec);
+    require_no_twins(specs);
   });
   const std::vector<Slot> slots = slots_of(specs);
   const bool is_made = run.check("defaults are valid", [&] {
@@ -172,6 +196,9 @@ bool check_parameters(const CheckRun& run, const Subject& subject) {
     const auto one = make_any(subject, map, complaints);
     const auto other = make_any(subject, map, complaints);
     complaints.raise();
+  });
+  run.check("defaults are within their ranges", [&] {
+    for (const Slot& slot : slots) accept_default(subject, slot);
   });
   run.check("unknown keys are refused", [&] { refuse_unknown_keys(subject, slots); });
   run.check("wrong types are refused", [&] {

@@ -37,6 +37,10 @@ void check_falling(const Subject& subject) {
 
 }  // namespace
 
+std::string physics_output(const Subject& subject) {
+  return fingerprint(simulated(subject, subject.host));
+}
+
 void check_physics(const CheckRun& run, const Subject& subject) {
   run.check("an empty scene stays empty", [&] {
     const auto physics = subject.make<PhysicsBackend>();

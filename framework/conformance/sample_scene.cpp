@@ -45,8 +45,13 @@ NodeId add_solid(Scene& scene, NodeId parent, const char* name, Mesh mesh, const
   return id;
 }
 
-void add_assets(Scene& scene, int moment) {
+void add_assets(Scene& scene, int moment, Extra extra) {
   const NodeId assets = scene.create(scene.root(), "Assets");
+  if (extra == Extra::Place) scene.create(assets, "extra");
+  if (extra == Extra::Crumb) {
+    add_solid(scene, assets, "extra", make_box(Vec3::Constant(1e-3)), {1000, 0, 0},
+              material("dust", {0.5f, 0.5f, 0.5f}));
+  }
   const NodeId box = add_solid(scene, assets, "box", make_box({0.4, 0.3, 0.2}),
                                {-0.3, 0.05 * moment, 0.8}, material("red", {0.8f, 0.1f, 0.1f}));
   scene.edit(box).labels = {{"class", "box"}, {"color", "red"}};
@@ -67,8 +72,9 @@ void add_assets(Scene& scene, int moment) {
   scene.edit(hidden).is_visible = false;
 }
 
-void add_lights(Scene& scene) {
+void add_lights(Scene& scene, Extra extra) {
   const NodeId lights = scene.create(scene.root(), "Lights");
+  if (extra == Extra::Lamp) scene.edit(scene.create(lights, "extra")).light.emplace();
   const NodeId lamp = scene.create(lights, "lamp");
   scene.set_pose(lamp, Transform{{0.5, -0.5, 2.5}, Quat::Identity(), Vec3::Ones()});
   scene.edit(lamp).light.emplace().color = Vec3f::Constant(40.0f);
@@ -78,8 +84,11 @@ void add_lights(Scene& scene) {
   dome.color = Vec3f::Constant(0.4f);
 }
 
-void add_cameras(Scene& scene, int moment) {
+void add_cameras(Scene& scene, int moment, Extra extra) {
   const NodeId cameras = scene.create(scene.root(), "Cameras");
+  if (extra == Extra::Camera) {
+    scene.edit(scene.create(cameras, "extra")).camera = Camera::from_lens(20, 10, 24.0, 20.955);
+  }
   const Vec3 places[]{{2.2 + 0.02 * moment, 0.4, 1.1}, {-0.4, -2.0, 1.6}};
   for (const Vec3& place : places) {
     const NodeId id = scene.create(cameras, "cam_0");
@@ -213,15 +222,15 @@ void annotate(const Scene& scene, const std::vector<Rectangle>& painted, Host& h
 
 }  // namespace
 
-Scene sample_scene(int moment) {
+Scene sample_scene(int moment, Extra extra) {
   Scene scene;
   const NodeId environment = scene.create(scene.root(), "Environment");
   const NodeId floor =
       add_solid(scene, environment, "floor", make_box({4, 4, 0.2}), {0, 0, -0.1}, checkered());
   scene.edit(floor).collider = Collider{.shape = ColliderShape::TriangleMesh};
-  add_assets(scene, moment);
-  add_lights(scene);
-  add_cameras(scene, moment);
+  add_assets(scene, moment, extra);
+  add_lights(scene, extra);
+  add_cameras(scene, moment, extra);
   return scene;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "diorama/host.h"
@@ -9,14 +10,24 @@
 
 namespace diorama::conformance {
 
+/// A node that may be added to the sample scene, called "extra".
+enum class Extra : std::uint8_t {
+  None,
+  Place,   ///< Below /Assets, without a mesh.
+  Crumb,   ///< Below /Assets, a box of a millimetre, far away.
+  Camera,  ///< Below /Cameras.
+  Lamp,    ///< Below /Lights.
+};
+
 /// A small scene with one of everything:
 ///   /Environment/floor    static, textured, its top at z = 0
 ///   /Assets/box           labelled "box", a body in the air, falls
 ///   /Assets/pair          labelled "pair", of two meshes; stands on the floor
 ///   /Assets/hidden        labelled "box", not visible
 ///   /Lights/lamp, /Lights/sky, /Cameras/cam_0, /Cameras/cam_1 (cameras of different size)
-/// `moment` shifts the box and the cameras a little, so that captures differ.
-Scene sample_scene(int moment = 0);
+/// `moment` shifts the box and the cameras a little, so that captures differ. `extra` is the first
+/// of its folder.
+Scene sample_scene(int moment = 0, Extra extra = Extra::None);
 
 /// Nodes with cameras, in creation order.
 std::vector<NodeId> cameras_of(const Scene& scene);

@@ -2,9 +2,12 @@
 #include "diorama/writer.h"
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <exception>
 #include <filesystem>
 #include <map>
+#include <mutex>
 #include <set>
 #include <span>
 #include <thread>
@@ -21,10 +24,12 @@ constexpr int kCaptures = 4;
 /// Files in memory; complains about names that lead elsewhere and about names that come twice.
 class MemoryFiles final : public CaptureFiles {
  public:
+  explicit MemoryFiles(bool yields = false) : yields_(yields) {}
   std::map<std::string, std::vector<std::byte>> files;
   std::vector<std::string> records;
 
   void add(std::string_view path, std::vector<std::byte> bytes) override {
+    give_way();
     check(path);
     require(files.emplace(path, std::move(bytes)).second,
             "writes '" + std::string(path) + "' twice");
@@ -38,6 +43,7 @@ class MemoryFiles final : public CaptureFiles {
     file.insert(file.end(), bytes.begin(), bytes.end());
   }
   void record(std::string_view line) override {
+    give_way();
     require(line.find('\n') == line.npos, "a record holds a line break");
     records.emplace_back(line);
   }
@@ -53,6 +59,11 @@ class MemoryFiles final : public CaptureFiles {
             "writes '" + std::string(path) + "', which lies outside of its folder");
   }
   std::set<std::string> growing;  ///< What was appended to.
+  /// Lets other threads in, in the midst of writing.
+  void give_way() const {
+    if (yields_) std::this_thread::sleep_for(std::chrono::microseconds(50));
+  }
+  bool yields_;
 };
 
 /// All of a dataset; which capture has written a file counts.
@@ -114,6 +125,39 @@ Dataset write_on_two_threads(Writer& writer, const std::vector<Capture>& capture
   return dataset;
 }
 
+/// Many threads write the same captures through one writer, again and again, each as it was written
+/// alone: what they share in the writer they share without knowing.
+void write_all_at_once(Writer& writer, const std::vector<Capture>& captures,
+                       const Dataset& expected) {
+  constexpr int kThreads = 8;
+  constexpr int kRounds = 12;
+  begun(writer, captures);
+  std::atomic<bool> differs = false;
+  std::atomic<int> waiting = kThreads;
+  std::mutex mutex;
+  std::exception_ptr failure;
+  const auto work = [&](int thread) {
+    --waiting;
+    while (waiting > 0) std::this_thread::yield();
+    try {
+      for (int round = 0; round < kRounds && !differs; ++round) {
+        const std::size_t i = std::size_t(thread + round) % captures.size();
+        MemoryFiles files(true);
+        writer.write(captures[i], files);
+        if (!(files == expected.captures[i])) differs = true;
+      }
+    } catch (...) {
+      const std::lock_guard lock(mutex);
+      failure = std::current_exception();
+    }
+  };
+  std::vector<std::thread> threads;
+  for (int thread = 0; thread < kThreads; ++thread) threads.emplace_back(work, thread);
+  for (std::thread& thread : threads) thread.join();
+  if (failure) std::rethrow_exception(failure);
+  require(!differs, "writes something else when several threads write at once");
+}
+
 /// The first name it needs that no frame of the checks has: a channel of another plugin.
 std::string foreign_need(const Writer& writer, const Frame& frame) {
   for (const std::string& name : writer.needs()) {
@@ -161,6 +205,11 @@ void check_dataset(const CheckRun& run, const Subject& subject, const std::strin
     require(dataset == write_on_two_threads(*fresh(subject.host), captures),
             "differs from captures in order");
   });
+  run.check("several threads may write at once" + which, [&] {
+    require(dataset.captures.size() == captures.size(),
+            "could not be tried, as nothing is written");
+    write_all_at_once(*fresh(subject.host), captures, dataset);
+  });
 }
 
 Capture capture_that_shows_nothing(Host& host) {
@@ -185,6 +234,24 @@ std::optional<Value> usable_switches(const Subject& subject) {
 }
 
 }  // namespace
+
+std::string writer_output(const Subject& subject) {
+  const std::vector<Capture> captures = sample_captures(kCaptures, subject.host);
+  const auto writer = subject.make<Writer>();
+  if (!foreign_need(*writer, captures.front().frames.front()).empty()) return {};
+  const Dataset dataset = write_in_order(*writer, captures);
+  std::string all;
+  const auto append = [&](const MemoryFiles& files) {
+    for (const auto& [path, bytes] : files.files) {
+      all += path + '\0';
+      all.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    }
+    for (const std::string& record : files.records) all += record + '\n';
+  };
+  for (const MemoryFiles& capture : dataset.captures) append(capture);
+  append(dataset.whole);
+  return all;
+}
 
 void check_writer(const CheckRun& run, const Subject& subject) {
   run.check("a dataset without captures is survived",

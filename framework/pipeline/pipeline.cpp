@@ -11,6 +11,7 @@
 #include "framework/annotators/occlusion_order.h"
 #include "framework/annotators/visibility.h"
 #include "framework/pipeline/scene_setup.h"
+#include "framework/plugins/fatal_end.h"
 #include "framework/plugins/plugin_call.h"
 
 namespace diorama {
@@ -294,6 +295,7 @@ void Pipeline::take_captures(Visit& visit, const TimelineStep& step) {
 void Pipeline::take(Visit& visit, const PlannedCapture& planned) {
   stop_if_asked();
   begin_output();
+  const AtCapture at_capture(planned.index);
   PendingCapture pending;
   Capture& capture = pending.capture;
   capture.index = planned.index;
@@ -342,8 +344,8 @@ Frame Pipeline::make_frame(Visit& visit, std::size_t camera, int capture) {
     frame = call_component(who, [&] { return components_.renderer->render(request); });
   }
   const Clock clock(summary_, "annotating");
-  for (const auto& annotator : components_.annotators) {
-    call_component("annotator", [&] { annotator->annotate(visit.scene, frame); });
+  for (const auto& [type, annotator] : components_.annotators) {
+    call_component("annotator '" + type + "'", [&] { annotator->annotate(visit.scene, frame); });
   }
   if (components_.demand.visibility) {
     const auto instances = labelled_instances(visit.scene);

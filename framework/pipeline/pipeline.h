@@ -35,7 +35,11 @@ struct JobComponents {
   std::vector<std::unique_ptr<Randomizer>> randomizers;
   std::vector<std::unique_ptr<Writer>> writers;
   /// Those that the writers' needs ask for, in working order.
-  std::vector<std::unique_ptr<Annotator>> annotators;
+  struct NamedAnnotator {
+    std::string type;
+    std::unique_ptr<Annotator> annotator;
+  };
+  std::vector<NamedAnnotator> annotators;
   Demand demand;
 };
 

@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "framework/plugins/fatal_end.h"
+
 namespace diorama {
 
 struct WriterQueue::State {
@@ -34,6 +36,7 @@ struct WriterQueue::State {
     const int index = pending.capture.index;
     std::exception_ptr error;
     try {
+      const AtCapture at_capture(index);
       work(pending);
     } catch (...) {
       error = std::current_exception();

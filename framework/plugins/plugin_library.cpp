@@ -119,6 +119,7 @@ PluginLibrary::PluginLibrary(const PluginFile& file) : handle_(std::make_unique<
   // RTLD_NODELETE: code that threads, deleters and exceptions may still need is never unmapped.
   const auto mode = static_cast<boost::dll::load_mode::type>(
       boost::dll::load_mode::rtld_now | boost::dll::load_mode::rtld_local | RTLD_NODELETE);
+  const AtWork at_work(file.file.string());
   // Libraries that are linked with -ffast-math make the process flush tiny numbers to zero.
   std::fenv_t arithmetic;
   std::fegetenv(&arithmetic);

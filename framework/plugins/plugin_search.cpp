@@ -5,6 +5,8 @@
 #include <string_view>
 #include <system_error>
 
+#include "framework/plugins/file_safety.h"
+
 namespace diorama {
 namespace {
 
@@ -22,6 +24,11 @@ std::vector<fs::path> split_folders(std::string_view list) {
   return folders;
 }
 
+/// As an installation below `prefix` has it.
+fs::path plugin_folder_below(const fs::path& prefix) {
+  return (prefix / "bin" / DIORAMA_LIB_FROM_BIN / "diorama" / kAbiFolder).lexically_normal();
+}
+
 bool is_build_tree(const fs::path& program) {
   return fs::exists(program.parent_path().parent_path() / "CMakeCache.txt");
 }
@@ -29,7 +36,7 @@ bool is_build_tree(const fs::path& program) {
 class Searcher {
  public:
   Searcher(PluginSearch& search, bool allow_unsafe_folders)
-      : search_(search), allow_unsafe_folders_(allow_unsafe_folders) {}
+      : search_(search), allow_unsafe_folders_(allow_unsafe_folders), safety_(program_file()) {}
 
   void look_through(const fs::path& folder, int level) {
     const SearchLevel& rank = search_.levels[std::size_t(level)];
@@ -40,18 +47,19 @@ class Searcher {
       reject(folder, "given by " + rank.name + ", but it is no folder");
       return;
     }
-    if ((status.permissions() & fs::perms::others_write) != fs::perms::none &&
-        !allow_unsafe_folders_) {
-      reject(folder,
-             "everybody may write to this plugin folder, so anybody could place code in it "
-             "that runs with your rights; remove that right (chmod o-w) or give "
-             "--allow-unsafe-plugin-dir");
-      return;
-    }
+    if (is_dangerous(folder, true)) return;
     for (const fs::path& file : libraries_in(folder)) take(file, level);
   }
 
  private:
+  bool is_dangerous(const fs::path& place, bool is_plugin_folder) {
+    if (allow_unsafe_folders_) return false;
+    const std::string danger = safety_.danger(place, is_plugin_folder);
+    if (danger.empty()) return false;
+    reject(place, danger + ", or give --allow-unsafe-plugin-dir");
+    return true;
+  }
+
   std::vector<fs::path> libraries_in(const fs::path& folder) {
     std::vector<fs::path> files;
     std::error_code failed;
@@ -81,6 +89,7 @@ class Searcher {
     // A folder that stands on two levels, or a link beside its target, is one plugin.
     if (std::find(seen_.begin(), seen_.end(), real) != seen_.end()) return;
     seen_.push_back(real);
+    if (is_dangerous(file, false)) return;
     try {
       search_.plugins.push_back({read_plugin_file(file), level});
     } catch (const Error& error) {
@@ -94,6 +103,7 @@ class Searcher {
 
   PluginSearch& search_;
   bool allow_unsafe_folders_;
+  FileSafety safety_;
   std::vector<fs::path> seen_;
 };
 
@@ -101,7 +111,8 @@ class Searcher {
 
 std::vector<SearchLevel> plugin_search_levels(const std::vector<fs::path>& command_line,
                                               const Environment& environment,
-                                              const fs::path& bundled) {
+                                              const fs::path& bundled,
+                                              const std::optional<fs::path>& local) {
   std::vector<SearchLevel> levels;
   levels.push_back({"--plugin-dir", command_line, true});
   if (const char* list = environment("DIORAMA_PLUGIN_PATH")) {
@@ -110,12 +121,15 @@ std::vector<SearchLevel> plugin_search_levels(const std::vector<fs::path>& comma
   const char* data = environment("XDG_DATA_HOME");
   const char* home = environment("HOME");
   // The XDG specification says that relative paths are to be ignored.
-  if (data && fs::path(data).is_absolute()) {
-    levels.push_back({"XDG_DATA_HOME", {fs::path(data) / "diorama" / kAbiFolder}, false});
-  } else if (home && fs::path(home).is_absolute()) {
-    levels.push_back(
-        {"the home folder", {fs::path(home) / ".local/share/diorama" / kAbiFolder}, false});
+  const bool has_data = data && fs::path(data).is_absolute();
+  if (has_data || (home && fs::path(home).is_absolute())) {
+    const fs::path share = has_data ? fs::path(data) : fs::path(home) / ".local/share";
+    std::vector<fs::path> folders{share / "diorama" / kAbiFolder};
+    // Where `cmake --install --prefix ~/.local` puts plugins.
+    if (share.filename() == "share") folders.push_back(plugin_folder_below(share.parent_path()));
+    levels.push_back({has_data ? "XDG_DATA_HOME" : "the home folder", folders, false});
   }
+  if (local && *local != bundled) levels.push_back({"the local system", {*local}, false});
   levels.push_back({"bundled", {bundled}, false});
   return levels;
 }
@@ -134,7 +148,12 @@ PluginSearch search_plugins(std::vector<SearchLevel> levels, bool allow_unsafe_f
 
 fs::path bundled_plugin_folder(const fs::path& program) {
   if (is_build_tree(program)) return program.parent_path().parent_path() / "plugins";
-  return (program.parent_path() / DIORAMA_LIB_FROM_BIN / "diorama" / kAbiFolder).lexically_normal();
+  return plugin_folder_below(program.parent_path().parent_path());
+}
+
+std::optional<fs::path> local_plugin_folder(const fs::path& program) {
+  if (is_build_tree(program)) return std::nullopt;
+  return plugin_folder_below("/usr/local");
 }
 
 fs::path sample_pack_folder(const fs::path& program) {

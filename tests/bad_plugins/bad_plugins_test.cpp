@@ -418,9 +418,83 @@ TEST_CASE("a folder that everybody may write to is refused unless allowed", "[pl
   CHECK(search.plugins.empty());
   REQUIRE(search.rejected.size() == 1);
   CHECK(search.rejected.front().reason ==
-        folder.path.string() +
-            ": everybody may write to this plugin folder, so anybody could place code in it that "
-            "runs with your rights; remove that right (chmod o-w) or give "
-            "--allow-unsafe-plugin-dir");
+        folder.path.string() + ": everybody may write to " + folder.path.string() +
+            ", so anybody could place code there that runs with your rights; remove that right "
+            "(chmod o-w " +
+            folder.path.string() + "), or give --allow-unsafe-plugin-dir");
   CHECK(folder.search(true).plugins.size() == 1);
+  // Nobody else can exchange our files in there, but everybody can add some.
+  fs::permissions(folder.path, fs::perms(01777));
+  CHECK(folder.search().plugins.empty());
+}
+
+TEST_CASE("files that others may change are refused, and so are those in folders that they may",
+          "[plugins]") {
+  const PluginFolder folder;
+  const auto reasons = [&](const fs::path& in) {
+    std::string all;
+    for (const RejectedPlugin& rejected :
+         search_plugins({{"--plugin-dir", {in}, true}}, false).rejected) {
+      all += rejected.reason;
+    }
+    return all;
+  };
+  const fs::path inner = folder.path / "a/plugins";
+  fs::create_directories(inner);
+  const fs::path file = inner / "it.so";
+  fs::copy_file(module("well_behaved"), file);
+  CHECK(reasons(inner).empty());
+  SECTION("the file") {
+    fs::permissions(file, fs::perms(0666));
+    CHECK(reasons(inner) ==
+          file.string() + ": everybody may write to " + file.string() +
+              ", so anybody could place code there that runs with your rights; remove that right "
+              "(chmod o-w " +
+              file.string() + "), or give --allow-unsafe-plugin-dir");
+  }
+  SECTION("a folder above") {
+    fs::permissions(folder.path / "a", fs::perms(0777));
+    CHECK(reasons(inner).starts_with(inner.string() + ": everybody may write to " +
+                                     (folder.path / "a").string() + ", so anybody"));
+    // As in /tmp: what is ours stays ours.
+    fs::permissions(folder.path / "a", fs::perms(01777));
+    CHECK(reasons(inner).empty());
+  }
+  SECTION("the folder of a link's target") {
+    const fs::path links = folder.path / "links";
+    fs::create_directory(links);
+    fs::create_symlink(file, links / "linked.so");
+    CHECK(reasons(links).empty());
+    fs::permissions(inner, fs::perms(0777));
+    CHECK(reasons(links).starts_with((links / "linked.so").string() + ": everybody may write to " +
+                                     inner.string()));
+  }
+  if (geteuid() != 0) return;  // the rest needs files of others
+  constexpr uid_t kStranger = 12345;
+  SECTION("a group of others") {
+    REQUIRE(chown(file.c_str(), 0, kStranger) == 0);
+    fs::permissions(file, fs::perms(0664));
+    CHECK(reasons(inner).starts_with(file.string() + ": group 12345 may write to " + file.string() +
+                                     ", so others could"));
+    CHECK(reasons(inner).find("(chmod g-w " + file.string() + "), or give") != std::string::npos);
+    REQUIRE(chown(file.c_str(), 0, 0) == 0);
+    CHECK(reasons(inner).empty());  // root's own group
+  }
+  SECTION("a file of somebody else") {
+    REQUIRE(chown(file.c_str(), kStranger, 0) == 0);
+    CHECK(reasons(inner) ==
+          file.string() + ": " + file.string() +
+              " belongs to user 12345, who could place code there that runs with your rights; take "
+              "it over (chown) or copy it to a folder of yours, or give --allow-unsafe-plugin-dir");
+  }
+  SECTION("a folder of somebody else, above") {
+    REQUIRE(chown((folder.path / "a").c_str(), kStranger, 0) == 0);
+    CHECK(reasons(inner).find("/a belongs to user 12345, who") != std::string::npos);
+  }
+  SECTION("a link of somebody else") {
+    const fs::path link = folder.path / "link";
+    fs::create_symlink(inner, link);
+    REQUIRE(lchown(link.c_str(), kStranger, 0) == 0);
+    CHECK(reasons(link).find("/link belongs to user 12345, who") != std::string::npos);
+  }
 }

@@ -1,7 +1,8 @@
 include(${CMAKE_CURRENT_LIST_DIR}/steps.cmake)
 set(build ${WORK}/find_package)
 file(REMOVE_RECURSE ${build})
-configure_command(configure ${SOURCE}/find_package ${build})
+configure_command(configure ${SOURCE}/find_package ${build} -DCMAKE_BUILD_TYPE=
+                  -DCMAKE_EXPORT_COMPILE_COMMANDS=ON)
 run(${configure})
 run(${CMAKE_COMMAND} --build ${build})
 run(${build}/stranger)
@@ -18,6 +19,14 @@ run(readelf -SW ${build}/plugins/stranger_plugin.so)
 expect_text(".diorama_plugin")
 run(${DIORAMA} --plugin-dir ${build}/plugins plugins)
 expect_text("stranger")
+
+# Without a build type plugins are optimised all the same; numbers agree between machines.
+file(READ ${build}/compile_commands.json commands)
+foreach(flag IN ITEMS "-ffp-contract=off" "-O2")
+  if(NOT commands MATCHES "${flag}[^\n]*plugin[.]cpp")
+    message(FATAL_ERROR "a plugin is built without ${flag}:\n${commands}")
+  endif()
+endforeach()
 
 # Mistakes are told when configuring or linking.
 file(REMOVE_RECURSE ${build}_wrong)

@@ -13,6 +13,14 @@ foreach(file CMakeLists.txt README.md LICENSE .gitignore job.yaml src/my_${KIND}
 endforeach()
 build_and_list(${project} ${project}_build my_${KIND})
 
+# Tools that go by clang see what the compiler sees.
+find_program(CLANG_TIDY clang-tidy)
+if(CLANG_TIDY)
+  run(${CLANG_TIDY} -p ${project}_build --quiet
+      --checks=-*,clang-diagnostic-*,bugprone-use-after-move,modernize-use-override
+      --warnings-as-errors=* ${project}/src/my_${KIND}.cpp)
+endif()
+
 # The job is a good one: its keys, and those of the plugin.
 run(${DIORAMA} --plugin-dir ${project}_build/plugins run --dry-run ${project}/job.yaml)
 

@@ -42,14 +42,18 @@ function(configure_command variable source build)
       PARENT_SCOPE)
 endfunction()
 
-# Configures, builds, tests and installs a plugin project; its plugin must then be listed.
+# Configures, builds, tests and installs a plugin project; its plugin must then be listed, without a word
+# where it was installed beside the program or below ~/.local, as it is here.
 function(build_and_list source build type)
-  configure_command(configure ${source} ${build} -DCMAKE_INSTALL_PREFIX=${build}/installed)
+  configure_command(configure ${source} ${build})
   run(${configure})
   run(${CMAKE_COMMAND} --build ${build})
   run(${CMAKE_CTEST_COMMAND} --test-dir ${build} --output-on-failure --no-tests=error)
-  run(${CMAKE_COMMAND} --install ${build})
-  set(plugins ${build}/installed/${LIBDIR}/diorama/plugins-${ABI})
-  run(${DIORAMA} --plugin-dir ${plugins} plugins describe ${type})
+  set(home ${CMAKE_COMMAND} -E env HOME=${build}/home --unset=XDG_DATA_HOME)
+  run(${home} ${CMAKE_COMMAND} --install ${build} --prefix ${build}/home/.local)
+  set(plugins ${build}/home/.local/${LIBDIR}/diorama/plugins-${ABI})
+  run(${home} ${DIORAMA} plugins describe ${type})
   expect_text("${plugins}")
+  run(${home} ${CMAKE_COMMAND} --install ${build} --prefix ${build}/elsewhere)
+  expect_text("set DIORAMA_PLUGIN_PATH=${build}/elsewhere/${LIBDIR}/diorama/plugins-${ABI}")
 endfunction()

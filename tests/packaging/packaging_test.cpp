@@ -79,3 +79,21 @@ TEST_CASE("every plugin is in one package", "[packaging]") {
     CHECK(packages == 1);
   }
 }
+
+TEST_CASE("nobody needs what few use", "[packaging]") {
+  // What is installed with the program, by need and by default.
+  const std::string control = debian("control");
+  const std::size_t program = control.find("\nPackage: diorama\n");
+  REQUIRE(program != control.npos);
+  const std::size_t suggested = control.find("\nSuggests:", program);
+  const std::string wanted = control.substr(program, suggested - program);
+  for (const std::string& package : all(wanted, "(diorama-plugins?-[a-z0-9]+) ?")) {
+    if (!fs::exists(kRoot / "packaging/debian" / (package + ".install"))) continue;
+    INFO(package);
+    for (const char* heavy : {"placement_fcl", "writer_hdf5"}) {
+      for (const std::string& pattern : all(debian(package + ".install"), "plugins-\\*/(\\S+)\\.so")) {
+        CHECK_FALSE(names(pattern, heavy));
+      }
+    }
+  }
+}

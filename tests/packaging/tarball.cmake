@@ -21,6 +21,9 @@ file(ARCHIVE_EXTRACT INPUT ${tarball} DESTINATION "${WORK}/any folder")
 cmake_path(GET tarball FILENAME name)
 string(REGEX REPLACE "\\.tar\\.gz$" "" name ${name})
 set(place "${WORK}/any folder/${name}")
+if(NOT EXISTS "${place}/share/doc/diorama/LICENSE")
+  message(FATAL_ERROR "the tarball has no licence")
+endif()
 
 # Without anything that points elsewhere.
 set(diorama ${CMAKE_COMMAND} -E env --unset=DIORAMA_PLUGIN_PATH --unset=DIORAMA_ASSETS_ROOT

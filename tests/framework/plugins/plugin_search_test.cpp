@@ -66,13 +66,30 @@ TEST_CASE("plugins are searched in four places, in order", "[plugins]") {
   CHECK(level_texts({}, {}) == std::vector<std::string>{"--plugin-dir!", "bundled /bundled"});
   CHECK(level_texts({{"HOME", "/home/u"}, {"DIORAMA_PLUGIN_PATH", "/p:rel::/q"}}, {"/a", "/b"}) ==
         std::vector<std::string>{"--plugin-dir! /a /b", "DIORAMA_PLUGIN_PATH! /p rel /q",
-                                 "the home folder /home/u/.local/share/diorama/" + kAbi,
+                                 "the home folder /home/u/.local/share/diorama/" + kAbi + " " +
+                                     bundled_plugin_folder("/home/u/.local/bin/diorama").string(),
                                  "bundled /bundled"});
   CHECK(level_texts({{"HOME", "/home/u"}, {"XDG_DATA_HOME", "/data"}}, {})[1] ==
         "XDG_DATA_HOME /data/diorama/" + kAbi);
   // Relative paths in it are to be ignored.
   CHECK(level_texts({{"HOME", "/home/u"}, {"XDG_DATA_HOME", "data"}}, {})[1] ==
-        "the home folder /home/u/.local/share/diorama/" + kAbi);
+        "the home folder /home/u/.local/share/diorama/" + kAbi + " " +
+            bundled_plugin_folder("/home/u/.local/bin/diorama").string());
+}
+
+TEST_CASE("plugins that CMake installs by itself are found", "[plugins]") {
+  const fs::path local = *local_plugin_folder("/opt/diorama/bin/diorama");
+  CHECK(local == bundled_plugin_folder("/usr/local/bin/diorama"));
+  CHECK(local.string().starts_with("/usr/local/lib"));
+  const Environment nothing = [](const char*) { return nullptr; };
+  const auto levels = plugin_search_levels({}, nothing, "/bundled", local);
+  REQUIRE(levels.size() == 3);
+  CHECK(levels[1].folders == std::vector<fs::path>{local});
+  CHECK_FALSE(levels[1].must_exist);
+  // The program that is installed there has one level for both.
+  CHECK(plugin_search_levels({}, nothing, local, local).size() == 2);
+  // What a developer has installed shows in no build tree.
+  CHECK_FALSE(local_plugin_folder(DIORAMA_BINARY_DIR "/bin/diorama"));
 }
 
 TEST_CASE("a named folder that is not there is reported, a usual one is not", "[plugins]") {

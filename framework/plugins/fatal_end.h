@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string_view>
+
+namespace diorama {
+
+/// Says, while it lives, which component this thread has called: "writer 'boxes'". The line that a
+/// crash leaves names it.
+class AtWork {
+ public:
+  explicit AtWork(std::string_view who);
+  ~AtWork();
+  AtWork(const AtWork&) = delete;
+  AtWork& operator=(const AtWork&) = delete;
+
+  const char* who() const { return who_; }
+
+ private:
+  char who_[128];  // read by signal handlers
+  const AtWork* before_;
+};
+
+/// Says, while it lives, which capture this thread works on.
+class AtCapture {
+ public:
+  explicit AtCapture(int index);
+  ~AtCapture();
+  AtCapture(const AtCapture&) = delete;
+  AtCapture& operator=(const AtCapture&) = delete;
+
+ private:
+  int before_;
+};
+
+/// While it lives, the process does not end without a word: a crash prints one line that names
+/// component and capture, then ends the process by its signal; an exit() from within a component
+/// prints one, too, and the exit code is that of a broken plugin. Child processes are left alone,
+/// as are builds with sanitizers, which tell more. One at a time, made by the main thread.
+class FatalEndReports {
+ public:
+  FatalEndReports();
+  ~FatalEndReports();
+  FatalEndReports(const FatalEndReports&) = delete;
+  FatalEndReports& operator=(const FatalEndReports&) = delete;
+};
+
+}  // namespace diorama

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+// Seeded plugins that lie, one promise each: every one is found out, by the check that is meant to.
+#include <map>
+#include <set>
+
+#include "framework/conformance/conformance.h"
+#include "support/catch.h"
+
+using namespace diorama;
+using namespace diorama::conformance;
+
+namespace {
+
+using Expected = std::map<std::string, std::string>;  // component -> check that must fail
+
+constexpr const char* kRays = "channels are what exact rays meet";
+constexpr const char* kCoverage = "coverage is what exact rays meet";
+constexpr const char* kHistory = "pictures depend on the scene alone, not on pictures before";
+constexpr const char* kAnotherProcess = "another process gives the same";
+constexpr const char* kLeftAsItWas = "the process is left as it was";
+constexpr const char* kStreams = "one node more leaves the draws of the others as they were";
+constexpr const char* kAtOnce = "several threads may write at once";
+constexpr const char* kFrame = "it sets what it provides and reads what it needs";
+constexpr const char* kFirstCapture = "a frame that shows nothing is survived";
+
+/// Checks a plugin; every component is either honest or fails what is expected.
+void expect(const std::string& module, const std::string& kind, const Expected& liars,
+            const std::set<std::string>& honest) {
+  CheckLimits limits;
+  limits.busy_seconds = 5.0;
+  limits.idle_seconds = 3.0;
+  const std::vector<CheckResult> results = check_plugin(
+      DIORAMA_CONFORMANCE_PLUGINS "/" + module + ".so", [](LogLevel, std::string_view) {}, limits);
+  std::map<std::string, std::map<std::string, std::string>> failed;
+  std::set<std::string> subjects;
+  for (const CheckResult& result : results) {
+    subjects.insert(result.subject);
+    if (result.outcome == Outcome::Failed) failed[result.subject][result.check] = result.message;
+  }
+  for (const std::string& name : honest) {
+    INFO(name);
+    CHECK(subjects.contains(kind + "/" + name));
+    CHECK(failed[kind + "/" + name] == std::map<std::string, std::string>{});
+  }
+  std::size_t found = 0;
+  for (const auto& [name, check] : liars) {
+    std::string told;
+    for (const auto& [other, message] : failed[kind + "/" + name]) {
+      told += "\n  " + other + ": " + message;
+    }
+    INFO(name << " should fail '" << check << "', fails" << (told.empty() ? " nothing" : told));
+    CHECK(failed[kind + "/" + name].contains(check));
+    found += told.empty() ? 0 : 1;
+  }
+  WARN(kind << "s: " << found << " of " << liars.size() << " liars found out, " << honest.size()
+            << " honest");
+}
+
+}  // namespace
+
+TEST_CASE("writers that lie are found out", "[conformance]") {
+  expect("lying_writers", "writer",
+         {{"says_process", kAnotherProcess},
+          {"says_seconds", kAnotherProcess},
+          {"says_address", kAnotherProcess},
+          {"says_heap_order", kAnotherProcess},
+          {"says_user", kAnotherProcess},
+          {"says_time_zone", kAnotherProcess},
+          {"says_thread", "captures may come in any order, on two threads"},
+          {"loops", "a capture without frames is survived"},
+          {"sleeps", "a capture without frames is survived"},
+          {"stops", "a capture without frames is survived"},
+          {"leaves", "a capture without frames is survived"},
+          {"leaves_at_once", "a capture without frames is survived"},
+          {"overflows", "a capture without frames is survived"},
+          {"goes_elsewhere", kLeftAsItWas},
+          {"opens_rights", kLeftAsItWas},
+          {"speaks_differently", kLeftAsItWas},
+          {"sets_variable", kLeftAsItWas},
+          {"ignores_interrupts", kLeftAsItWas},
+          {"shares_its_buffer", kAtOnce},
+          {"counts_frames", kAtOnce},
+          {"default_too_large", "defaults are within their ranges"},
+          {"default_not_among_words", "defaults are within their ranges"},
+          {"says_it_twice", "parameters are documented"}},
+         {"honest"});
+}
+
+TEST_CASE("annotators that lie are found out", "[conformance]") {
+  expect("lying_annotators", "annotator",
+         {{"overwrites_colour", kFrame},
+          {"wrong_size", kFrame},
+          {"one_size_for_all", kFrame},
+          {"reads_unasked", kFrame},
+          {"looks_around", kFrame},
+          {"changes_instances", kFrame},
+          {"changes_exposure", kFrame},
+          {"replaces_the_frame", kFrame},
+          {"remembers", "a frame does not depend on the frames before"},
+          {"wrong_type", kFrame},
+          {"needs_more", "it needs and provides what its plugin lists"},
+          {"needs_itself", "it needs and provides what its plugin lists"},
+          {"hangs_when_empty", kFirstCapture}},
+         {"plain"});
+}
+
+TEST_CASE("randomizers that lie are found out", "[conformance]") {
+  expect("lying_annotators", "randomizer",
+         {{"one_stream", kStreams},
+          {"node_numbers", kStreams},
+          {"clock", kAnotherProcess},
+          {"addresses", kAnotherProcess},
+          {"turns_cameras", kStreams},
+          {"paints_in_order", kStreams}},
+         {"lifts"});
+}
+
+TEST_CASE("renderers that lie are found out", "[conformance]") {
+  expect("lying_renderers", "renderer",
+         {{"picture_left_right", kRays},
+          {"picture_upside_down", kRays},
+          {"all_left_right", kRays},
+          {"rows_from_below", kRays},
+          {"masks_all_ones", kCoverage},
+          {"masks_of_the_whole_scene", kCoverage},
+          {"masks_stop_at_the_image", kCoverage},
+          {"depth_along_the_ray", kRays},
+          {"distance_along_the_axis", kRays},
+          {"cover_depth_along_the_axis", kCoverage},
+          {"normals_away", kRays},
+          {"normals_in_camera_space", kRays},
+          {"normals_in_node_space", kRays},
+          {"positions_in_camera_space", kRays},
+          {"half_a_pixel_off", kRays},
+          {"principal_point_in_the_centre", kRays},
+          {"no_distortion", kRays},
+          {"no_roll", kRays},
+          {"encoded_albedo", kRays},
+          {"uv_from_above", kRays},
+          {"no_alpha", kRays},
+          {"shows_hidden", kRays},
+          {"parent_ids", kRays},
+          {"keeps_the_first_poses", kHistory},
+          {"counts_pictures", kHistory},
+          {"millimetre_distances", kRays}},
+         {"honest"});
+}
