@@ -60,7 +60,9 @@ std::string describe_units(const usd::Stage& stage) {
 
 }  // namespace
 
-std::vector<std::string> UsdLoader::claims() const { return {".usd", ".usda", ".usdc", ".usdz"}; }
+std::vector<std::string> UsdLoader::claims() const {
+  return {".usd", ".usda", ".usdc", ".usdz", "=PXR-USDC", "=#usda", "=#sdf", "=PK"};
+}
 
 std::vector<std::filesystem::path> UsdLoader::files(std::string_view asset) const {
   try {
