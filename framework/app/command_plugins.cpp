@@ -119,7 +119,13 @@ void print_description(const ComponentEntry& entry, const std::vector<ParamSpec>
   std::cout << "plugin " << entry.plugin << " " << entry.version;
   if (!entry.file.empty()) std::cout << ", " << entry.file.string();
   std::cout << "\n";
-  for (const std::string& claim : entry.claims) std::cout << "reads " << claim << "\n";
+  for (const std::string& claim : entry.claims) {
+    const bool is_beginning = claim.starts_with('=');
+    std::cout << "reads "
+              << (is_beginning ? "files without an ending that begin with " + claim.substr(1)
+                               : claim)
+              << "\n";
+  }
   if (specs.empty()) std::cout << "no parameters\n";
   for (const ParamRow& row : param_rows(specs)) {
     std::cout << "\n" << row.key << ": " << row.type;

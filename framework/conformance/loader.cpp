@@ -18,8 +18,12 @@ namespace fs = std::filesystem;
 void check_claim(const std::string& claim) {
   const bool is_ending = claim.size() > 1 && claim.front() == '.';
   const bool is_scheme = claim.size() > 1 && claim.back() == ':';
-  require(is_ending || is_scheme,
-          "claims '" + claim + "', expected an ending such as '.obj' or a scheme such as 'shelf:'");
+  const bool is_beginning = claim.size() > 1 && claim.front() == '=';
+  require(is_ending || is_scheme || is_beginning,
+          "claims '" + claim +
+              "', expected an ending such as '.obj', a scheme such as 'shelf:' or " +
+              "what files without an ending begin with, '=#shelf'");
+  if (is_beginning) return;
   require(std::none_of(claim.begin(), claim.end(), [](unsigned char c) { return std::isupper(c); }),
           "claims '" + claim + "', expected lower case");
 }
@@ -78,13 +82,14 @@ std::string loader_output(const Subject& subject) {
 void check_loader(const CheckRun& run, const Subject& subject) {
   const std::unique_ptr<Loader> loader = subject.make<Loader>();
   const std::vector<std::string> claims = loader->claims();
-  run.check("claims are endings and schemes, and the listed ones", [&] {
+  run.check("claims are endings, schemes and beginnings, and the listed ones", [&] {
     for (const std::string& claim : claims) check_claim(claim);
     require(!subject.entry.claims_are_listed || claims == subject.entry.claims,
             "claims() returns something else than the plugin file lists");
   });
   run.check("a missing asset is an error that names it", [&] {
     for (const std::string& claim : claims) {
+      if (claim.front() == '=') continue;
       const std::string asset =
           claim.front() == '.' ? "/nowhere/missing" + claim : claim + "\x01 no such thing";
       require_error_naming(asset, [&] { load_into_new_scene(*loader, asset); });

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <iterator>
 #include <set>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -141,6 +142,27 @@ const HostServices::Claim* HostServices::claim_of(std::string_view asset, bool i
   return best;
 }
 
+// Files without an ending say by their first bytes what they are.
+const HostServices::Claim* HostServices::claim_of_content(const fs::path& file) const {
+  std::size_t longest = 0;
+  for (const Claim& claim : claims_) {
+    if (claim.text.starts_with('=')) longest = std::max(longest, claim.text.size() - 1);
+  }
+  std::error_code error;
+  if (longest == 0 || !fs::is_regular_file(file, error)) return nullptr;
+  std::string content(longest, '\0');
+  std::ifstream stream(file, std::ios::binary);
+  stream.read(content.data(), std::streamsize(longest));
+  content.resize(std::size_t(stream.gcount()));
+  const Claim* best = nullptr;
+  for (const Claim& claim : claims_) {
+    const bool fits =
+        claim.text.starts_with('=') && content.starts_with(std::string_view(claim.text).substr(1));
+    if (fits && (!best || claim.text.size() > best->text.size())) best = &claim;
+  }
+  return best;
+}
+
 std::optional<HostServices::Source> HostServices::claimed_source(std::string_view asset) const {
   if (has_scheme(asset)) {
     if (const Claim* claim = claim_of(asset, true)) {
@@ -149,10 +171,14 @@ std::optional<HostServices::Source> HostServices::claimed_source(std::string_vie
     }
   }
   const fs::path file = paths_.resolve(asset);
-  const Claim* claim = claim_of(file.filename().string(), false);
-  if (!claim) return std::nullopt;
   std::string name = file.filename().string();
-  name.resize(name.size() - claim->text.size());
+  const Claim* claim = claim_of(name, false);
+  if (claim) {
+    name.resize(name.size() - claim->text.size());
+  } else if (file.extension().empty()) {
+    claim = claim_of_content(file);
+  }
+  if (!claim) return std::nullopt;
   return Source{file.string(), fs::canonical(file).string(), claim->loader, node_name(name)};
 }
 
@@ -165,9 +191,12 @@ HostServices::Source HostServices::find_source(std::string_view asset) const {
   std::string list;
   for (const std::string& ending : endings) list += (list.empty() ? "" : " ") + ending;
   const fs::path file = paths_.resolve(asset);
+  const std::string found = file.extension().empty()
+                                ? "a file without an ending that begins like this"
+                                : "'" + file.extension().string() + "' files";
   throw Error(ErrorKind::Asset,
-              file.string() + ": no loader reads '" + file.extension().string() +
-                  "' files; there are loaders for: " + (list.empty() ? "nothing" : list));
+              file.string() + ": no loader reads " + found +
+                  "; there are loaders for: " + (list.empty() ? "nothing" : list));
 }
 
 Loader& HostServices::loader(const std::string& type) {

@@ -67,12 +67,13 @@ class HostServices final : public Host {
     std::string stem;  ///< For the node's name.
   };
   struct Claim {
-    std::string text;  ///< ".usd" or "dining_room:".
+    std::string text;  ///< ".usd", "dining_room:" or "=#usda".
     std::string loader;
   };
   std::optional<Source> claimed_source(std::string_view asset) const;
   Source find_source(std::string_view asset) const;
   const Claim* claim_of(std::string_view asset, bool is_scheme) const;
+  const Claim* claim_of_content(const std::filesystem::path& file) const;
   void learn_claims();
   void take_claims(const ComponentEntry& entry, const std::vector<std::string>& claims);
   Loader& loader(const std::string& type);

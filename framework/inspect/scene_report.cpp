@@ -165,7 +165,7 @@ std::string report_text(const SceneReport& report, int tree_depth) {
                       double(report.texture_bytes) / (1024.0 * 1024.0), report.lights.size(),
                       report.cameras, report.rigid_bodies, report.labelled);
   if (report.bounds.is_empty()) {
-    text += "  bounds: none (no meshes)\n";
+    text += "  bounds: none (no visible meshes)\n";
   } else {
     const Vec3 size = report.bounds.size();
     text += fmt::format("  bounds: ({:.4g}, {:.4g}, {:.4g}) to ({:.4g}, {:.4g}, {:.4g}) m, "

@@ -39,7 +39,7 @@ struct SceneReport {
   std::size_t cameras = 0;
   std::size_t rigid_bodies = 0;
   std::size_t labelled = 0;
-  Aabb bounds;  ///< World box of all meshes, metres.
+  Aabb bounds;  ///< World box of the visible meshes, metres.
   std::vector<NodeLine> tree;
   std::vector<MaterialLine> materials;  ///< By name.
   std::vector<LightLine> lights;

@@ -47,7 +47,7 @@ class MeshAssembly {
  public:
   MeshAssembly(MeshSources sources, const std::function<void()>& rest);
 
-  Mesh build();
+  AssembledMesh build();
 
  private:
   static constexpr std::uint32_t kNone = 0xFFFFFFFF;
@@ -92,7 +92,7 @@ class MeshAssembly {
   }
   void add_seam(const std::optional<CornerData>& data, bool has_three);
   const float* values_of_corners(const CornerData& data) const;
-  bool has_usable_points(std::span<const std::int32_t> indices) const;
+  bool has_usable_points(std::span<const std::int32_t> indices);
   bool is_same(std::uint32_t vertex, const Corner& wanted) const;
   std::uint32_t vertex(std::size_t face, std::size_t corner);
   std::uint32_t add_vertex(std::size_t face, std::size_t corner);
@@ -133,6 +133,7 @@ class MeshAssembly {
   std::vector<std::uint32_t> ring_;
   std::vector<Vec3f> ring_points_;
   std::vector<std::array<std::uint32_t, 3>> split_;
+  Losses losses_;
 };
 
 MeshAssembly::MeshAssembly(MeshSources sources, const std::function<void()>& rest)
@@ -195,11 +196,16 @@ std::uint32_t MeshAssembly::vertex(std::size_t face, std::size_t corner) {
   return add_vertex(face, corner);
 }
 
-bool MeshAssembly::has_usable_points(std::span<const std::int32_t> indices) const {
-  if (!are_indices_sound_ && !all_below(indices, last_.size())) return false;
+bool MeshAssembly::has_usable_points(std::span<const std::int32_t> indices) {
+  if (!are_indices_sound_ && !all_below(indices, last_.size())) {
+    losses_.insert("has faces with points that do not exist, which are left out");
+    return false;
+  }
   if (are_points_finite_) return true;
   for (const std::int32_t index : indices) {
-    if (!all_finite(points_.subspan(static_cast<std::size_t>(index) * 3, 3))) return false;
+    if (all_finite(points_.subspan(static_cast<std::size_t>(index) * 3, 3))) continue;
+    losses_.insert("has faces with points that are not finite, which are left out");
+    return false;
   }
   return true;
 }
@@ -297,7 +303,8 @@ void MeshAssembly::add_faces() {
   if (!sources_.slot_of_face.empty()) mesh_.material_slots.reserve(mesh_.triangles.capacity());
   std::size_t corner = 0;
   std::size_t next_rest = kCornersBetweenRests;
-  for (std::size_t face = 0; face < counts_.size(); ++face) {
+  std::size_t face = 0;
+  for (; face < counts_.size(); ++face) {
     if (counts_[face] < 0) break;
     if (corner >= next_rest) {
       rest_();
@@ -307,6 +314,11 @@ void MeshAssembly::add_faces() {
     if (count > corners - corner) break;
     if (count >= 3 && (is_hole.empty() || !is_hole[face])) add_face(face, corner, count);
     corner += count;
+  }
+  if (face < counts_.size()) {
+    losses_.insert("has a face that reaches behind the indices, from which on faces are left out");
+  } else if (corner < corners) {
+    losses_.insert("has more indices than its faces have corners");
   }
 }
 
@@ -379,7 +391,7 @@ void MeshAssembly::gather_attributes(bool are_of_points) {
 
 // Gives back what it read as soon as nothing needs it any more: big meshes decide how much memory
 // a whole scene takes.
-Mesh MeshAssembly::build() {
+AssembledMesh MeshAssembly::build() {
   // Along seams there are several vertices per point; points need not be used.
   const std::size_t used = std::min(last_.size(), indices_.size());
   const std::size_t vertices = used + (seams_.empty() ? 0 : used / 8);
@@ -399,12 +411,12 @@ Mesh MeshAssembly::build() {
   gather_attributes(false);
   give_back_room(mesh_.triangles);
   give_back_room(mesh_.normals);
-  return std::move(mesh_);
+  return {std::move(mesh_), std::move(losses_)};
 }
 
 }  // namespace
 
-Mesh assemble_mesh(MeshSources sources, const std::function<void()>& rest) {
+AssembledMesh assemble_mesh(MeshSources sources, const std::function<void()>& rest) {
   return MeshAssembly(std::move(sources), rest).build();
 }
 

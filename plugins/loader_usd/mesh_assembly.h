@@ -8,6 +8,7 @@
 
 #include "diorama/geometry.h"
 #include "loader_usd/corner_data.h"
+#include "loader_usd/losses.h"
 #include "loader_usd/usd/value.h"
 
 namespace diorama::loader_usd {
@@ -26,10 +27,15 @@ struct MeshSources {
   bool is_smooth = false;  ///< Points get the mean normal of their faces where none are authored.
 };
 
+struct AssembledMesh {
+  Mesh mesh;
+  Losses losses;
+};
+
 /// Makes triangles of the faces. Corners of the same point with the same attributes share a vertex.
 /// Faces with points that do not exist or are not finite are left out; so is what follows a face
 /// count that reaches behind the indices. What comes out passes Mesh::validate(). `rest` is called
 /// now and then: pages of the sources that were read so far may be given back.
-Mesh assemble_mesh(MeshSources sources, const std::function<void()>& rest);
+AssembledMesh assemble_mesh(MeshSources sources, const std::function<void()>& rest);
 
 }  // namespace diorama::loader_usd

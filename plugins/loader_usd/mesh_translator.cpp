@@ -36,7 +36,9 @@ std::string find_uv(const std::vector<usd::Primvar>& primvars,
   }
   for (const char* type : {"texCoord2", "texCoord3", "float2", "half2", "double2"}) {
     for (const usd::Primvar& primvar : primvars) {
-      if (primvar.type.starts_with(type)) return primvar.name;
+      // Old files have old names for the same types.
+      const std::string canonical = usd::parse_value_type(primvar.type).canonical;
+      if (canonical.starts_with(type)) return primvar.name;
     }
   }
   return {};
@@ -73,9 +75,58 @@ std::optional<CornerData> read_varied_colors(const Stage& stage, const Prim* own
   return colors;
 }
 
+// How many elements the data must have for this mesh.
+std::size_t needed_elements(const CornerData& data, const MeshSources& mesh) {
+  switch (data.interpolation) {
+    case Interpolation::Uniform:
+      return mesh.counts.span.size();
+    case Interpolation::Vertex:
+    case Interpolation::Varying:
+      return mesh.points.span.size() / 3;
+    case Interpolation::FaceVarying:
+      return mesh.indices.span.size();
+    default:
+      return 1;
+  }
+}
+
+bool has_sound_indices(const CornerData& data) {
+  if (!data.indices) return true;
+  const auto values = static_cast<std::uint32_t>(
+      std::min<std::size_t>(data.values.span.size() / data.width, 0x7FFFFFFF));
+  bool result = true;
+  for (const std::int32_t index : data.indices->span) {
+    result &= static_cast<std::uint32_t>(index) < values;
+  }
+  return result;
+}
+
+// Whether there is a value for all of the mesh.
+bool check_values(const std::optional<CornerData>& data, const MeshSources& mesh,
+                  const std::string& what, Losses& losses) {
+  if (!data) return true;
+  const std::size_t needed = needed_elements(*data, mesh);
+  const std::size_t found = data->count();
+  if (found > needed && data->interpolation != Interpolation::Constant) {
+    losses.insert("has more " + what + " than their interpolation asks for, of which the first " +
+                  "ones count");
+  }
+  if (found < needed) losses.insert("has fewer " + what + " than their interpolation asks for");
+  const bool is_sound = has_sound_indices(*data);
+  if (!is_sound) losses.insert("has indices of " + what + " that do not exist");
+  return found >= needed && is_sound;
+}
+
+void check_values(MeshSources& mesh, Losses& losses) {
+  // Normals that are missing would be wrong ones; those that the faces have are better.
+  if (!check_values(mesh.normals, mesh, "normals", losses)) mesh.normals.reset();
+  check_values(mesh.uvs, mesh, "uvs", losses);
+  check_values(mesh.colors, mesh, "colors", losses);
+}
+
 // The slot of each face; empty when all faces are of slot 0.
 std::vector<std::uint16_t> slots_of_faces(const Stage& stage, const MeshTranslator::Prims& subsets,
-                                          std::size_t faces) {
+                                          std::size_t faces, Losses& losses) {
   std::vector<std::uint16_t> slots;
   if (subsets.empty()) return slots;
   slots.resize(faces);
@@ -85,6 +136,8 @@ std::vector<std::uint16_t> slots_of_faces(const Stage& stage, const MeshTranslat
     for (const std::int32_t face : indices->span) {
       if (face >= 0 && static_cast<std::size_t>(face) < slots.size()) {
         slots[static_cast<std::size_t>(face)] = static_cast<std::uint16_t>(i + 1);
+      } else {
+        losses.insert("has subsets of faces that do not exist");
       }
     }
   }
@@ -153,15 +206,20 @@ TranslatedMesh MeshTranslator::translate_mesh(const Prim& prim, const Primvars& 
   add_primvar(key, uv_owner, uv);
   add_primvar(key, color_owner, kDisplayColor);
   for (const Prim* subset : subsets) key.push_back(stage_.value_spec(*subset, "indices"));
-  std::shared_ptr<const Mesh>& known = meshes_[{key, uv_name}];
-  if (known) {
-    result.mesh = known;
+  Made& known = meshes_[{key, uv_name}];
+  if (known.mesh) {
+    result.mesh = known.mesh;
+    result.losses = known.losses;
     return result;
   }
 
   auto points = usd::numbers<float>(stage_.value(prim, "points"), 3);
   auto counts = usd::numbers<std::int32_t>(stage_.value(prim, "faceVertexCounts"), 1);
   auto indices = usd::numbers<std::int32_t>(stage_.value(prim, "faceVertexIndices"), 1);
+  // A mesh that says nothing at all is a placeholder; one that says a part of it is broken.
+  const bool is_said = (points && !points->span.empty()) || (counts && !counts->span.empty()) ||
+                       (indices && !indices->span.empty());
+  if (is_said) result.lacks = "without a face that can be drawn";
   if (!points || !counts || !indices) return result;
   MeshSources sources;
   sources.points = std::move(*points);
@@ -174,30 +232,34 @@ TranslatedMesh MeshTranslator::translate_mesh(const Prim& prim, const Primvars& 
   sources.colors = read_varied_colors(stage_, color_owner);
   sources.is_left_handed =
       usd::token_or(stage_, prim, "orientation", "rightHanded") == "leftHanded";
-  sources.slot_of_face = slots_of_faces(stage_, subsets, sources.counts.span.size());
+  sources.slot_of_face = slots_of_faces(stage_, subsets, sources.counts.span.size(), result.losses);
   sources.is_smooth = usd::token_or(stage_, prim, "subdivisionScheme", "catmullClark") != "none";
+  check_values(sources, result.losses);
   corners_read_ += sources.indices.span.size();
   if (corners_read_ > kCornersBetweenReleases) {
     stage_.assets().release_pages();
     corners_read_ = 0;
   }
-  Mesh mesh = assemble_mesh(std::move(sources), [this] { stage_.assets().release_pages(); });
-  if (mesh.triangles.empty()) return result;
-  mesh.is_double_sided = usd::bool_or(stage_, prim, "doubleSided", false);
-  known = pool_.share(std::move(mesh));
-  result.mesh = known;
+  AssembledMesh made =
+      assemble_mesh(std::move(sources), [this] { stage_.assets().release_pages(); });
+  result.losses.merge(made.losses);
+  if (made.mesh.triangles.empty()) return result;
+  result.lacks.clear();
+  made.mesh.is_double_sided = usd::bool_or(stage_, prim, "doubleSided", false);
+  known = {pool_.share(std::move(made.mesh)), result.losses};
+  result.mesh = known.mesh;
   return result;
 }
 
 TranslatedMesh MeshTranslator::translate_shape(const Prim& prim) {
   Key key;
   for (const char* name : kShapeAttributes) key.push_back(stage_.value_spec(prim, name));
-  std::shared_ptr<const Mesh>& known = meshes_[{key, prim.type_name}];
-  if (!known) {
-    if (auto mesh = make_shape(stage_, prim)) known = pool_.share(std::move(*mesh));
+  Made& known = meshes_[{key, prim.type_name}];
+  if (!known.mesh) {
+    if (auto mesh = make_shape(stage_, prim)) known.mesh = pool_.share(std::move(*mesh));
   }
   TranslatedMesh result;
-  result.mesh = known;
+  result.mesh = known.mesh;
   return result;
 }
 
@@ -212,9 +274,9 @@ TranslatedMesh MeshTranslator::translate_thin(const Prim& prim, const Primvars& 
   const std::string width_name = primvar_widths ? "primvars:widths" : "widths";
   add_primvar(key, width_owner, width_name);
   add_primvar(key, color_owner, kDisplayColor);
-  std::shared_ptr<const Mesh>& known = meshes_[{key, prim.type_name}];
+  Made& known = meshes_[{key, prim.type_name}];
   TranslatedMesh result;
-  if (!known) {
+  if (!known.mesh) {
     const auto widths = read_corner_data(stage_, *width_owner, width_name, 1,
                                          primvar_widths ? "constant" : "vertex");
     const auto colors = read_varied_colors(stage_, color_owner);
@@ -224,11 +286,14 @@ TranslatedMesh MeshTranslator::translate_thin(const Prim& prim, const Primvars& 
             : mesh_of_curves(stage_, prim, widths ? &*widths : nullptr,
                              colors ? &*colors : nullptr);
     result.lacks = std::move(made.lacks);
+    known.losses = std::move(made.losses);
+    result.losses = known.losses;
     if (made.mesh.triangles.empty()) return result;
     made.mesh.validate(prim.path);
-    known = pool_.share(std::move(made.mesh));
+    known.mesh = pool_.share(std::move(made.mesh));
   }
-  result.mesh = known;
+  result.mesh = known.mesh;
+  result.losses = known.losses;
   return result;
 }
 

@@ -9,6 +9,7 @@
 
 #include "diorama/geometry.h"
 #include "loader_support/mesh_pool.h"
+#include "loader_usd/losses.h"
 #include "loader_usd/usd/geometry.h"
 #include "loader_usd/usd/stage.h"
 
@@ -20,6 +21,7 @@ struct TranslatedMesh {
   float display_opacity = 1.0f;
   std::string lacks;       ///< Why there is no mesh, if that is a surprise: "without widths".
   bool lacks_uvs = false;  ///< The materials read several primvars; a mesh has the first one.
+  Losses losses;
 };
 
 /// Makes meshes out of Mesh prims, shapes, points and curves. The same data give the same mesh, be
@@ -52,8 +54,12 @@ class MeshTranslator {
 
   usd::Stage& stage_;
   usd::Geometry& geometry_;
+  struct Made {
+    std::shared_ptr<const Mesh> mesh;
+    Losses losses;
+  };
   /// By the specs that they are made of; what is equal without being the same is found in the pool.
-  std::map<std::pair<Key, std::string>, std::shared_ptr<const Mesh>> meshes_;
+  std::map<std::pair<Key, std::string>, Made> meshes_;
   loader_support::MeshPool pool_;
   /// Since pages were given back: layers stay mapped while they are translated, but need not stay
   /// in memory besides the meshes.

@@ -21,6 +21,7 @@ using usd::Stage;
 constexpr std::size_t kMostTriangles = 8'000'000;
 constexpr const char* kNoWidths = "without widths";
 constexpr const char* kTooMany = "with too many points";
+constexpr const char* kTooFewWidths = "has fewer widths than points, of which the rest is left out";
 
 bool is_finite(const float* p) {
   return std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]);
@@ -146,7 +147,8 @@ class TubeBuilder {
               const CornerData* colors, Detail detail)
       : kind_(kind), points_(points), widths_(widths), colors_(colors), detail_(detail) {}
 
-  void add(const CurvePart& curve);
+  /// False when it has points that are not finite; then nothing is added.
+  bool add(const CurvePart& curve);
   Mesh take() { return std::move(mesh_); }
 
  private:
@@ -300,12 +302,12 @@ Vec3 TubeBuilder::direction(const std::vector<Sample>& samples, std::size_t i) c
   return step.norm() > 0.0 ? Vec3(step.normalized()) : Vec3(Vec3::UnitZ());
 }
 
-void TubeBuilder::add(const CurvePart& curve) {
+bool TubeBuilder::add(const CurvePart& curve) {
   for (std::size_t i = 0; i < curve.points; ++i) {
-    if (!is_finite(points_ + 3 * (curve.first_point + i))) return;
+    if (!is_finite(points_ + 3 * (curve.first_point + i))) return false;
   }
   const std::vector<Sample> samples = sample(curve);
-  if (samples.size() < 2) return;
+  if (samples.size() < 2) return true;
   const auto rings = std::uint32_t(samples.size());
   const auto sides = std::uint32_t(detail_.sides);
   const auto first = std::uint32_t(mesh_.positions.size());
@@ -327,9 +329,10 @@ void TubeBuilder::add(const CurvePart& curve) {
       mesh_.triangles.push_back({a, b + sides, a + sides});
     }
   }
-  if (kind_.is_periodic) return;
+  if (kind_.is_periodic) return true;
   add_cap(samples.front().centre, first, -direction(samples, 0), true);
   add_cap(samples.back().centre, first + (rings - 1) * sides, along, false);
+  return true;
 }
 
 std::vector<CurvePart> parts_of(const CurveKind& kind, std::span<const std::int32_t> counts,
@@ -363,6 +366,10 @@ ThinMesh mesh_of_points(const Stage& stage, const Prim& prim, const CornerData* 
   for (std::size_t i = 0; i < count; ++i) {
     const float* point = points->span.data() + 3 * i;
     const float* width = widths->at(0, i, i);
+    if (!width) result.losses.insert(kTooFewWidths);
+    if (!is_finite(point)) {
+      result.losses.insert("has points that are not finite, which are left out");
+    }
     const bool is_drawn = width && std::isfinite(*width) && *width > 0.0f && is_finite(point);
     if (!is_drawn) continue;
     const auto first = std::uint32_t(mesh.positions.size());
@@ -405,7 +412,15 @@ ThinMesh mesh_of_curves(const Stage& stage, const Prim& prim, const CornerData* 
     return result;
   }
   TubeBuilder builder(kind, points->span.data(), *widths, colors, *detail);
-  for (const CurvePart& part : parts) builder.add(part);
+  for (const CurvePart& part : parts) {
+    if (builder.add(part)) continue;
+    result.losses.insert("has curves with points that are not finite, which are left out");
+  }
+  if (parts.size() < counts->span.size()) {
+    result.losses.insert(
+        "has a curve that reaches behind the points, from which on curves are "
+        "left out");
+  }
   result.mesh = builder.take();
   return result;
 }

@@ -5,12 +5,14 @@
 
 #include "diorama/geometry.h"
 #include "loader_usd/corner_data.h"
+#include "loader_usd/losses.h"
 
 namespace diorama::loader_usd {
 
 struct ThinMesh {
   Mesh mesh;          ///< Without triangles when there is nothing to draw.
   std::string lacks;  ///< Why not, "without widths"; empty when that is no surprise.
+  Losses losses;
 };
 
 /// Points: a ball for each, as wide as its width; coarser the more there are. `widths` and `colors`

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 #include <tuple>
 
 #include "diorama/error.h"
@@ -21,26 +22,14 @@ constexpr int kMaxInstancerNesting = 8;
 constexpr int kCameraWidth = 1280;
 // Small files may ask for any number of nodes by references to references and nested instancers.
 constexpr std::size_t kMaxNodes = 500'000;
+// What a unit is where a stage does not say: a centimetre.
+constexpr double kFallbackUnit = 0.01;
 
-// What a layer says about its units and axis, if it does.
-struct Metrics {
-  std::optional<double> meters_per_unit;
-  std::optional<bool> is_z_up;
-};
-
-Metrics metrics_of(const usd::Layer& layer) {
-  Metrics metrics;
-  metrics.meters_per_unit = layer.get(layer.root(), "metersPerUnit").as_number();
-  const usd::Value axis = layer.get(layer.root(), "upAxis");
-  if (axis.as_text()) metrics.is_z_up = *axis.as_text() == "Z";
-  return metrics;
-}
+bool is_length(double number) { return number > 0.0 && std::isfinite(number); }
 
 // How many units of the outer layer one of the inner layer is, as far as both say so.
-double unit_ratio(const Metrics& inside, const Metrics& outside) {
-  const bool is_said =
-      inside.meters_per_unit.value_or(0.0) > 0.0 && outside.meters_per_unit.value_or(0.0) > 0.0;
-  return is_said ? *inside.meters_per_unit / *outside.meters_per_unit : 1.0;
+double unit_ratio(std::optional<double> inside, std::optional<double> outside) {
+  return inside && outside ? *inside / *outside : 1.0;
 }
 
 // Whether the author took care of the units by hand: a scale of about that much.
@@ -53,10 +42,6 @@ bool is_left_out(const std::string& type) {
   constexpr std::string_view kTypes[] = {"NurbsCurves", "HermiteCurves", "NurbsPatch", "TetMesh",
                                          "Volume",      "GeometryLight", "PluginLight"};
   return std::find(std::begin(kTypes), std::end(kTypes), type) != std::end(kTypes);
-}
-
-Affine affine_or_identity(const Affine& affine) {
-  return affine.matrix().allFinite() ? affine : Affine::Identity();
 }
 
 // The rotation and translation of a map.
@@ -79,8 +64,38 @@ SceneTranslator::SceneTranslator(Stage& stage, Host& host, Scene& scene)
       physics_(stage, scene),
       meters_per_unit_(stage.meters_per_unit()),
       root_from_stage_(stage.is_z_up() ? Affine::Identity() : z_up_from_y_up()) {
-  if (!(meters_per_unit_ > 0.0) || !std::isfinite(meters_per_unit_)) meters_per_unit_ = 0.01;
+  metrics_of(stage.root_layer());
+  if (!is_length(meters_per_unit_)) meters_per_unit_ = kFallbackUnit;
   root_from_stage_.linear() *= meters_per_unit_;
+}
+
+std::string SceneTranslator::describe_units() const {
+  std::ostringstream text;
+  text << "units: " << meters_per_unit_ << " m, " << (stage_.is_z_up() ? "z" : "y") << " up";
+  return text.str();
+}
+
+// Warns of what cannot be believed; it is then as if nothing were said.
+SceneTranslator::Metrics SceneTranslator::metrics_of(const usd::Layer& layer) const {
+  Metrics metrics;
+  metrics.meters_per_unit = layer.get(layer.root(), "metersPerUnit").as_number();
+  if (metrics.meters_per_unit && !is_length(*metrics.meters_per_unit)) {
+    std::ostringstream text;
+    text << layer.identifier() << ": metersPerUnit is " << *metrics.meters_per_unit
+         << ", expected a number above 0; it counts as not said, which is " << kFallbackUnit;
+    stage_.diagnostics().warn(text.str());
+    metrics.meters_per_unit.reset();
+  }
+  const usd::Value axis = layer.get(layer.root(), "upAxis");
+  if (axis.is_empty()) return metrics;
+  const std::string word = axis.as_text() ? *axis.as_text() : "no text";
+  if (word == "Y" || word == "Z") {
+    metrics.is_z_up = word == "Z";
+  } else {
+    stage_.diagnostics().warn(layer.identifier() + ": upAxis is \"" + word +
+                              "\", expected \"Y\" or \"Z\"; it counts as not said, which is \"Y\"");
+  }
+  return metrics;
 }
 
 void SceneTranslator::translate(NodeId root) {
@@ -98,6 +113,7 @@ void SceneTranslator::translate(NodeId root) {
 void SceneTranslator::report_notes() {
   for (const auto& [what, noted] : notes_) {
     std::string line = stage_.root_layer().identifier() + ": <" + noted.first_path + "> " + what;
+    if (!noted.first_detail.empty()) line += " (" + noted.first_detail + ")";
     if (noted.count > 1) {
       line += ", like " + std::to_string(noted.count - 1) + " more of them";
     }
@@ -105,9 +121,11 @@ void SceneTranslator::report_notes() {
   }
 }
 
-void SceneTranslator::note(const Prim& prim, const std::string& what) {
+void SceneTranslator::note(const Prim& prim, const std::string& what, const std::string& detail) {
   Noted& noted = notes_[what];
-  if (noted.count++ == 0) noted.first_path = prim.path;
+  if (noted.count++ > 0) return;
+  noted.first_path = prim.path;
+  noted.first_detail = detail;
 }
 
 void SceneTranslator::translate_children(const Prim& prim, const Place& place) {
@@ -156,7 +174,7 @@ Affine SceneTranslator::unit_correction(const Prim& prim) const {
     if (outer == node.stack) continue;
     const Metrics inside = metrics_of(node.stack->root());
     const Metrics outside = metrics_of(outer->root());
-    const double ratio = unit_ratio(inside, outside);
+    const double ratio = unit_ratio(inside.meters_per_unit, outside.meters_per_unit);
     if (!is_scaled_by(usd::local_transform(stage_, prim), ratio)) result.linear() *= ratio;
     if (inside.is_z_up && outside.is_z_up && *inside.is_z_up != *outside.is_z_up) {
       const Affine turn = z_up_from_y_up();
@@ -169,11 +187,18 @@ Affine SceneTranslator::unit_correction(const Prim& prim) const {
 
 Affine SceneTranslator::local_pose(const Prim& prim, const Place& parent) {
   const usd::LocalTransform local = usd::local_transform(stage_, prim);
-  Affine pose = affine_or_identity(to_affine(local.matrix)) * unit_correction(prim);
+  if (!local.lost_op.empty()) note(prim, "has a transform that cannot be read", local.lost_op);
+  Affine pose = finite_pose(prim, to_affine(local.matrix)) * unit_correction(prim);
   if (local.resets_stack && prim.parent && prim.parent->parent) {
     pose = parent.root_from_node.inverse() * root_from_stage_ * pose;
   }
-  return affine_or_identity(pose);
+  return finite_pose(prim, pose);
+}
+
+Affine SceneTranslator::finite_pose(const Prim& prim, const Affine& pose) {
+  if (pose.matrix().allFinite()) return pose;
+  note(prim, "has a pose that is not finite; it stays where its parent is");
+  return Affine::Identity();
 }
 
 void SceneTranslator::translate_prim(const Prim& prim, const Place& parent, const Affine& pose) {
@@ -189,7 +214,6 @@ void SceneTranslator::translate_prim(const Prim& prim, const Place& parent, cons
                          usd::token_or(stage_, prim, "visibility", "inherited") == "invisible";
   if (is_hidden) scene_.edit(place.node).is_visible = false;
   if (is_left_out(prim.type_name)) note_undrawn(prim, prim.type_name);
-  if (!stage_.metadata(prim, "clips").is_empty()) note(prim, "has value clips, which are not read");
   if (prim.traits.is_gprim) add_shape(prim, place);
   if (prim.type_name == "Camera") add_camera(prim, place);
   if (prim.traits.is_light) add_light(prim, place);
@@ -228,8 +252,11 @@ std::shared_ptr<const Material> SceneTranslator::plain_material(const Translated
 
 // What the prim is drawn with in full; a material for previews alone is better than none.
 std::string SceneTranslator::drawn_material(const Prim& prim) {
-  std::string path = geometry_.material(prim, "full");
-  return path.empty() ? geometry_.material(prim, "preview") : path;
+  std::string lost;
+  std::string path = geometry_.material(prim, "full", &lost);
+  if (path.empty()) path = geometry_.material(prim, "preview");
+  if (!lost.empty()) note(prim, "is bound to a material that is not there", "<" + lost + ">");
+  return path;
 }
 
 void SceneTranslator::add_shape(const Prim& prim, const Place& place) {
@@ -257,6 +284,7 @@ void SceneTranslator::add_shape(const Prim& prim, const Place& place) {
   }
   const TranslatedMesh mesh = meshes_.translate(prim, subsets, uv_names, with_colors);
   if (!mesh.lacks.empty()) note_undrawn(prim, prim.type_name + " " + mesh.lacks);
+  for (const std::string& loss : mesh.losses) note(prim, loss);
   if (mesh.lacks_uvs) note(prim, "is textured by several primvars, of which the first one counts");
   if (!mesh.mesh) return;
   std::vector<std::shared_ptr<const Material>> materials;
@@ -339,7 +367,7 @@ void SceneTranslator::add_camera(const Prim& prim, Place& place) {
   const Affine root_from_camera = without_scale(place.root_from_node);
   const Affine root_from_parent =
       place.root_from_node * scene_[place.node].parent_from_node.inverse();
-  scene_.set_pose(place.node, affine_or_identity(root_from_parent.inverse() * root_from_camera));
+  scene_.set_pose(place.node, finite_pose(prim, root_from_parent.inverse() * root_from_camera));
   place.root_from_node = root_from_camera;
   scene_.edit(place.node).camera = camera;
 }
@@ -412,10 +440,13 @@ void SceneTranslator::add_instances(const Prim& prim, const Place& place) {
     return;
   }
   ++instancer_depth_;
-  for (const usd::PointInstance& instance : usd::point_instances(stage_, prim)) {
+  const usd::PointInstances instances = usd::point_instances(stage_, prim);
+  if (instances.lacks_prototypes) note(prim, "has instances of prototypes that are not there");
+  if (instances.lacks_positions) note(prim, "has fewer positions than instances");
+  for (const usd::PointInstance& instance : instances.list) {
     const Affine pose =
         to_affine(instance.instancer_from_prototype) * unit_correction(*instance.prototype);
-    translate_prim(*instance.prototype, place, affine_or_identity(pose));
+    translate_prim(*instance.prototype, place, finite_pose(prim, pose));
   }
   --instancer_depth_;
 }

@@ -26,6 +26,8 @@ class SceneTranslator {
 
   /// Adds the stage's root prims below `root`.
   void translate(NodeId root);
+  /// The length and the axis that the stage was taken to mean.
+  std::string describe_units() const;
 
  private:
   struct Place {
@@ -33,6 +35,13 @@ class SceneTranslator {
     Affine root_from_node = Affine::Identity();
   };
 
+  /// What a layer says about its units and axis, if it does and can be believed.
+  struct Metrics {
+    std::optional<double> meters_per_unit;
+    std::optional<bool> is_z_up;
+  };
+
+  Metrics metrics_of(const usd::Layer& layer) const;
   void translate_children(const usd::Prim& prim, const Place& place);
   void translate_prim(const usd::Prim& prim, const Place& parent, const Affine& parent_from_placed);
   std::vector<const usd::Prim*> drawn_children(const usd::Prim& prim);
@@ -40,6 +49,7 @@ class SceneTranslator {
   Affine local_pose(const usd::Prim& prim, const Place& parent);
   Affine unit_correction(const usd::Prim& prim) const;
 
+  Affine finite_pose(const usd::Prim& prim, const Affine& pose);
   std::string drawn_material(const usd::Prim& prim);
   void add_shape(const usd::Prim& prim, const Place& place);
   void add_camera(const usd::Prim& prim, Place& place);
@@ -48,7 +58,7 @@ class SceneTranslator {
   bool has_z_pole(const usd::Prim& dome) const;
   void add_labels(const usd::Prim& prim, NodeId node);
   void add_instances(const usd::Prim& prim, const Place& place);
-  void note(const usd::Prim& prim, const std::string& what);
+  void note(const usd::Prim& prim, const std::string& what, const std::string& detail = {});
   void note_undrawn(const usd::Prim& prim, const std::string& type);
   void report_notes();
   void finish_materials();
@@ -75,6 +85,7 @@ class SceneTranslator {
   /// Prims with something that the scene cannot hold.
   struct Noted {
     std::string first_path;
+    std::string first_detail;
     std::size_t count = 0;
   };
   std::map<std::string, Noted> notes_;  ///< By what is said of them.

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <set>
-#include <sstream>
 
 #include "diorama/error.h"
 #include "loader_usd/scene_translator.h"
@@ -52,15 +51,11 @@ class FileCollector {
   std::set<std::string> known_;
   std::vector<std::filesystem::path> files_;
 };
-std::string describe_units(const usd::Stage& stage) {
-  std::ostringstream text;
-  text << "units: " << stage.meters_per_unit() << " m, " << (stage.is_z_up() ? "z" : "y") << " up";
-  return text.str();
-}
-
 }  // namespace
 
-std::vector<std::string> UsdLoader::claims() const { return {".usd", ".usda", ".usdc", ".usdz"}; }
+std::vector<std::string> UsdLoader::claims() const {
+  return {".usd", ".usda", ".usdc", ".usdz", "=PXR-USDC", "=#usda", "=#sdf", "=PK"};
+}
 
 std::vector<std::filesystem::path> UsdLoader::files(std::string_view asset) const {
   try {
@@ -74,9 +69,11 @@ std::vector<std::filesystem::path> UsdLoader::files(std::string_view asset) cons
 
 void UsdLoader::load(std::string_view asset, Scene& scene, NodeId root) {
   try {
-    usd::Stage stage(std::string(asset), usd::Sampling::OrFirstSample);
-    host_.log(LogLevel::Debug, describe_units(stage));
-    SceneTranslator(stage, host_, scene).translate(root);
+    usd::Stage stage(std::string(asset), usd::Sampling::OrFirstSample,
+                     std::uint64_t(params_.max_prims_mib) << 20);
+    SceneTranslator translator(stage, host_, scene);
+    host_.log(LogLevel::Debug, translator.describe_units());
+    translator.translate(root);
     const auto& missing = stage.diagnostics().missing_assets();
     if (params_.missing_assets_are_errors && !missing.empty()) {
       throw Error(ErrorKind::Asset, std::string(asset) + ": " + missing.front());

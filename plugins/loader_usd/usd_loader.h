@@ -8,6 +8,7 @@
 #include "diorama/host.h"
 #include "diorama/loader.h"
 #include "diorama/params.h"
+#include "loader_usd/usd/stage.h"
 
 namespace diorama::loader_usd {
 
@@ -17,9 +18,14 @@ class UsdLoader final : public Loader {
  public:
   struct Params {
     bool missing_assets_are_errors = false;
+    int max_prims_mib = int(usd::Stage::kComposedBytes >> 20);
     void visit(ParamVisitor& v) {
       v.param("missing_assets_are_errors", missing_assets_are_errors,
               {"Whether a missing layer or texture ends the job instead of being warned about."});
+      v.param("max_prims_mib", max_prims_mib,
+              {"Memory that composed prims may take, besides 64 times the size of the layers; "
+               "references to references that multiply end there.",
+               "MiB", 1, 1048576});
     }
   };
 

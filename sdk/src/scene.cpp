@@ -239,9 +239,15 @@ Labels Scene::effective_labels(NodeId node) const {
 
 Aabb Scene::world_bounds(NodeId node) const {
   Aabb box;
-  for (const NodeId id : subtree(node)) {
-    if (const Node& below = (*this)[id]; below.mesh)
-      add_mesh(box, *below.mesh, world_from_node(id));
+  if (!is_visible(node)) return box;
+  std::vector<NodeId> waiting{node};
+  while (!waiting.empty()) {
+    const NodeId id = waiting.back();
+    waiting.pop_back();
+    const Node& below = (*this)[id];
+    if (!below.is_visible) continue;
+    if (below.mesh) add_mesh(box, *below.mesh, world_from_node(id));
+    waiting.insert(waiting.end(), below.children.begin(), below.children.end());
   }
   return box;
 }

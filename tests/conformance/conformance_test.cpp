@@ -79,7 +79,7 @@ TEST_CASE("components of the other kinds that break a promise are found out", "[
   CHECK(forgetful["a capture does not depend on the captures before"].starts_with(
       "remembers earlier calls: /Assets/box, /Assets/pair"));
   auto loader = failures(results, "loader/takes_anything");
-  CHECK(loader["claims are endings and schemes, and the listed ones"] ==
+  CHECK(loader["claims are endings, schemes and beginnings, and the listed ones"] ==
         "claims 'Shelf:', expected lower case");
   CHECK(loader["a missing asset is an error that names it"] ==
         "accepts '/nowhere/missing.any', expected an error");

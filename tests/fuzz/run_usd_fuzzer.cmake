@@ -8,7 +8,7 @@ function(run)
 endfunction()
 
 run(${CMAKE_COMMAND} -S ${SOURCE}/tests/fuzz/usd -B ${BUILD} -DCMAKE_CXX_COMPILER=${CLANGXX})
-run(${CMAKE_COMMAND} --build ${BUILD})
+run(${CMAKE_COMMAND} --build ${BUILD} --parallel)
 file(MAKE_DIRECTORY ${BUILD}/corpus ${BUILD}/seeds)
 if(EXISTS ${SOURCE}/../shared/data/usd)
   file(GLOB_RECURSE files ${SOURCE}/../shared/data/usd/*.usd ${SOURCE}/../shared/data/usd/*.usda

@@ -216,7 +216,20 @@ TEST_CASE("Bounds are those of the vertices, not of a turned box", "[scene]") {
 
   k.scene.edit(k.handle).is_visible = false;
   CHECK(node_bounds(k.scene, k.cup).is_empty());
-  CHECK_FALSE(k.scene.world_bounds(k.cup).is_empty());
+  CHECK(k.scene.world_bounds(k.cup).is_empty());
+}
+
+TEST_CASE("World bounds are those of what can be seen", "[scene]") {
+  Kitchen k;
+  k.scene.edit(k.body).mesh = std::make_shared<const Mesh>(make_box(Vec3(1, 2, 3)));
+  k.scene.edit(k.handle).mesh = std::make_shared<const Mesh>(make_box(Vec3(40, 50, 60)));
+  k.scene.edit(k.handle).is_visible = false;
+  CHECK(k.scene.world_bounds(k.cup).size().isApprox(Vec3(1, 2, 3)));
+  // Something above may hide it as well.
+  k.scene.edit(k.handle).is_visible = true;
+  k.scene.edit(k.assets).is_visible = false;
+  CHECK(k.scene.world_bounds(k.handle).is_empty());
+  CHECK(k.scene.world_bounds(k.scene.root()).is_empty());
 }
 
 TEST_CASE("A labelled instance owns the visible meshes whose nearest label it is", "[scene]") {

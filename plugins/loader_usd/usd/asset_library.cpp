@@ -139,6 +139,7 @@ std::shared_ptr<const Layer> AssetLibrary::read_layer(const std::string& identif
     name = join_package(name, first);
     bytes = read(name);
   }
+  layer_bytes_ += bytes.bytes.size();
   return usd::read_layer(name, std::move(bytes));
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <optional>
@@ -35,6 +36,9 @@ class AssetLibrary {
   /// again.
   std::shared_ptr<const Layer> open(const std::string& identifier);
 
+  /// What the layers that were opened so far take on disk.
+  std::uint64_t layer_bytes() const { return layer_bytes_; }
+
  private:
   std::shared_ptr<const Layer> read_layer(const std::string& identifier) const;
   std::shared_ptr<const Package> package(const std::string& identifier) const;
@@ -44,6 +48,7 @@ class AssetLibrary {
     std::string error;
   };
   std::map<std::string, Opened> layers_;
+  mutable std::uint64_t layer_bytes_ = 0;
   mutable std::map<std::string, std::shared_ptr<const Package>> packages_;
   mutable std::vector<ByteView> mapped_files_;
 };

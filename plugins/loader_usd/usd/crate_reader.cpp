@@ -14,12 +14,15 @@ namespace {
 constexpr std::string_view kMagic = "PXR-USDC";
 constexpr int kNewestMinor = 12;
 constexpr std::uint64_t kHeaderSize = 88;
+constexpr std::uint64_t kLeastPathRecord = 12;
 constexpr std::uint32_t kEndOfFieldSet = 0xFFFFFFFF;
 // Elements on the way to a prim, and bytes that all prim paths may take beyond the file's own size:
 // far above real scenes, far below what a small damaged file could ask for.
 constexpr std::uint32_t kMaxDepth = 2000;
 constexpr std::uint64_t kPathBytes = std::uint64_t{1} << 20;
 constexpr std::uint64_t kPathBytesPerFileByte = 256;
+// Not every path has a place in the tree: the empty path, for one, is an index without a record.
+constexpr std::uint64_t kPathsBesideTree = 1024;
 
 struct Section {
   std::uint64_t start = 0;
@@ -271,7 +274,9 @@ void CrateReader::read_paths() {
   const std::uint64_t start = cursor.position();
   const auto count = cursor.read<std::uint64_t>("the number of paths");
   // Compressed trees may take less than a byte for an entry; 1024 bounds what they can expand to.
-  const std::uint64_t most = at_least(4) ? cursor.remaining() * 1024 : cursor.remaining() / 12;
+  const std::uint64_t in_tree =
+      at_least(4) ? cursor.remaining() * 1024 : cursor.remaining() / kLeastPathRecord;
+  const std::uint64_t most = in_tree * 2 + kPathsBesideTree;
   if (count == 0 || count > most || count > CrateValues::PathEntry::kRoot) {
     cursor.fail_at(std::to_string(count) + " paths do not fit into " +
                        std::to_string(cursor.remaining()) + " bytes",
@@ -296,7 +301,7 @@ void CrateReader::read_compressed_paths(CrateCursor& cursor) {
   const auto indices = cursor.read_integers<std::uint32_t>(count, "path indices");
   const auto tokens = cursor.read_integers<std::int32_t>(count, "path elements");
   const auto jumps = cursor.read_integers<std::int32_t>(count, "path jumps");
-  if (count == 0 || table_size > count * 2 + 1024) {
+  if (count == 0 || table_size > count * 2 + kPathsBesideTree) {
     cursor.fail_at("a table of " + std::to_string(table_size) + " paths has a tree of " +
                        std::to_string(count),
                    start);

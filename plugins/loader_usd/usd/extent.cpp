@@ -132,7 +132,7 @@ std::optional<Box> instancer_extent(Stage& stage, const Prim& prim, int nesting)
   if (nesting >= kMaxInstancerNesting) return std::nullopt;
   std::map<const Prim*, Box> bounds;
   Box result;
-  for (const PointInstance& instance : point_instances(stage, prim)) {
+  for (const PointInstance& instance : point_instances(stage, prim).list) {
     auto [entry, is_new] = bounds.try_emplace(instance.prototype);
     if (is_new) entry->second = subtree_bounds(stage, *instance.prototype, nesting + 1);
     result.add(transform(instance.instancer_from_prototype, entry->second));
@@ -314,8 +314,8 @@ std::optional<Box> local_extent(Stage& stage, const Prim& prim) {
   return extent_at(stage, prim, 0);
 }
 
-std::vector<PointInstance> point_instances(Stage& stage, const Prim& instancer) {
-  std::vector<PointInstance> result;
+PointInstances point_instances(Stage& stage, const Prim& instancer) {
+  PointInstances result;
   const std::vector<double> which = read_list(stage, instancer, "protoIndices", 1);
   const std::vector<double> positions = read_list(stage, instancer, "positions", 3);
   const std::vector<double> scales = read_list(stage, instancer, "scales", 3);
@@ -335,11 +335,13 @@ std::vector<PointInstance> point_instances(Stage& stage, const Prim& instancer) 
   for (const std::string& path : stage.targets(instancer, "prototypes")) {
     prototypes.push_back(stage.find(path));
   }
+  result.lacks_positions = positions.size() / 3 < which.size();
   for (std::size_t i = 0; i < which.size() && i * 3 + 2 < positions.size(); ++i) {
+    if (masked.contains(ids[i])) continue;
     const bool is_known = which[i] >= 0.0 && which[i] < static_cast<double>(prototypes.size());
-    if (!is_known || masked.contains(ids[i])) continue;
     PointInstance instance;
-    instance.prototype = prototypes[static_cast<std::size_t>(which[i])];
+    if (is_known) instance.prototype = prototypes[static_cast<std::size_t>(which[i])];
+    result.lacks_prototypes |= !instance.prototype;
     if (!instance.prototype || !instance.prototype->is_active) continue;
     Matrix matrix = local_transform(stage, *instance.prototype).matrix;
     if (i * 3 + 2 < scales.size()) {
@@ -351,7 +353,7 @@ std::vector<PointInstance> point_instances(Stage& stage, const Prim& instancer) 
     }
     instance.instancer_from_prototype =
         matrix * translation({positions[i * 3], positions[i * 3 + 1], positions[i * 3 + 2]});
-    result.push_back(instance);
+    result.list.push_back(instance);
   }
   return result;
 }

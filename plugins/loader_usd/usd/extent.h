@@ -20,6 +20,11 @@ struct PointInstance {
   const Prim* prototype = nullptr;
   Matrix instancer_from_prototype;
 };
-std::vector<PointInstance> point_instances(Stage& stage, const Prim& instancer);
+struct PointInstances {
+  std::vector<PointInstance> list;
+  bool lacks_prototypes = false;  ///< Some are of prototypes that are not there.
+  bool lacks_positions = false;   ///< There are fewer positions than instances.
+};
+PointInstances point_instances(Stage& stage, const Prim& instancer);
 
 }  // namespace diorama::usd

@@ -36,18 +36,20 @@ std::optional<std::size_t> axis_of(std::string_view kind, std::string_view stem)
   return static_cast<std::size_t>(c - 'X');
 }
 
-Matrix op_matrix(std::string_view kind, const Value& value) {
+// Nothing for words that are no ops and for values that do not fit.
+std::optional<Matrix> op_matrix(std::string_view kind, const Value& value) {
+  using Result = std::optional<Matrix>;
   Vector3 v{};
   if (kind == "transform") {
     Matrix matrix;
-    return value.read(matrix.m) ? matrix : Matrix();
+    return value.read(matrix.m) ? Result(matrix) : std::nullopt;
   }
   if (kind == "orient") {
     std::array<double, 4> quaternion{};
-    return value.read(quaternion) ? rotation(quaternion) : Matrix();
+    return value.read(quaternion) ? Result(rotation(quaternion)) : std::nullopt;
   }
-  if (kind == "translate") return value.read(v) ? translation(v) : Matrix();
-  if (kind == "scale") return value.read(v) ? scaling(v) : Matrix();
+  if (kind == "translate") return value.read(v) ? Result(translation(v)) : std::nullopt;
+  if (kind == "scale") return value.read(v) ? Result(scaling(v)) : std::nullopt;
   const auto number = value.as_number();
   if (const auto axis = axis_of(kind, "translate"); axis && number) {
     v[*axis] = *number;
@@ -62,7 +64,7 @@ Matrix op_matrix(std::string_view kind, const Value& value) {
     return rotation(static_cast<int>(*axis), *number);
   }
   const auto axes = rotation_axes(kind);
-  if (!axes || !value.read(v)) return {};
+  if (!axes || !value.read(v)) return std::nullopt;
   Matrix result;
   for (const int axis : *axes) {
     result = result * rotation(axis, v[static_cast<std::size_t>(axis)]);
@@ -120,13 +122,27 @@ LocalTransform local_transform(const Stage& stage, const Prim& prim) {
       --op;
       continue;
     }
-    if (!name.starts_with("xformOp:")) continue;
+    const auto lose = [&] {
+      if (result.lost_op.empty()) result.lost_op = name;
+    };
+    if (!name.starts_with("xformOp:")) {
+      lose();
+      continue;
+    }
     std::string_view kind = name.substr(8);
     kind = kind.substr(0, kind.find(':'));
     const Value value = stage.value(prim, name);
-    if (value.is_empty()) continue;
-    const Matrix matrix = op_matrix(kind, value);
-    result.matrix = result.matrix * (is_inverse ? inverse(matrix) : matrix);
+    if (value.is_empty()) {
+      // One that is there without a value, or blocked, is meant to do nothing.
+      if (!stage.has_property(prim, name)) lose();
+      continue;
+    }
+    const std::optional<Matrix> matrix = op_matrix(kind, value);
+    if (!matrix) {
+      lose();
+      continue;
+    }
+    result.matrix = result.matrix * (is_inverse ? inverse(*matrix) : *matrix);
   }
   return result;
 }
@@ -188,21 +204,22 @@ bool Geometry::collection_includes(const std::string& collection, const std::str
   return nearest(includes) > nearest(stage_.targets(*owner, base + ":excludes"));
 }
 
-std::string Geometry::material(const Prim& prim, std::string_view purpose) {
+std::string Geometry::material(const Prim& prim, std::string_view purpose, std::string* lost) {
   const std::string for_all = "material:binding";
   const std::string collections_for_all = for_all + ":collection:";
   if (!purpose.empty()) {
     const std::string word(purpose);
     const std::string special =
-        material_by(prim, for_all + ":" + word, collections_for_all + word + ":");
+        material_by(prim, for_all + ":" + word, collections_for_all + word + ":", lost);
     if (!special.empty()) return special;
   }
-  return material_by(prim, for_all, collections_for_all);
+  return material_by(prim, for_all, collections_for_all, lost);
 }
 
 std::string Geometry::material_by(const Prim& prim, const std::string& relationship,
-                                  const std::string& collection_prefix) {
+                                  const std::string& collection_prefix, std::string* lost) {
   std::string bound;
+  std::string unmapped;
   const auto consider = [&](const Prim& owner, const std::string& name, const std::string& target,
                             bool replaces_same_prim) {
     const Value strength = stage_.property_metadata(owner, name, "bindMaterialAs");
@@ -211,7 +228,7 @@ std::string Geometry::material_by(const Prim& prim, const std::string& relations
   };
   for (const Prim* at = &prim; at; at = at->parent) {
     const std::string before = bound;
-    const Strings direct = stage_.targets(*at, relationship);
+    const Strings direct = stage_.targets(*at, relationship, bound.empty() ? &unmapped : nullptr);
     if (direct.size() == 1) consider(*at, relationship, direct.front(), false);
     const bool is_bound_here = bound != before;
     for (const std::string& name : stage_.property_names(*at, collection_prefix)) {
@@ -227,7 +244,9 @@ std::string Geometry::material_by(const Prim& prim, const std::string& relations
     }
   }
   const Prim* material = bound.empty() ? nullptr : stage_.find(bound);
-  return material && material->type_name == "Material" ? bound : std::string();
+  if (material && material->type_name == "Material") return bound;
+  if (lost && !(bound.empty() && unmapped.empty())) *lost = bound.empty() ? unmapped : bound;
+  return {};
 }
 
 std::vector<Primvar> Geometry::own_primvars(const Prim& prim) const {

@@ -16,6 +16,8 @@ namespace diorama::usd {
 struct LocalTransform {
   Matrix matrix;
   bool resets_stack = false;  ///< The parents' transforms do not count.
+  /// The first op of the list that has no attribute, or one that cannot be read; empty mostly.
+  std::string lost_op;
 };
 
 LocalTransform local_transform(const Stage& stage, const Prim& prim);
@@ -24,7 +26,7 @@ LocalTransform local_transform(const Stage& stage, const Prim& prim);
 struct Primvar {
   std::string name;  ///< Without `primvars:`.
   const Prim* owner = nullptr;
-  std::string type;           ///< `color3f[]`.
+  std::string type;           ///< `color3f[]`, as authored.
   std::string interpolation;  ///< constant where nothing is authored.
   bool is_indexed = false;
 };
@@ -40,15 +42,17 @@ class Geometry {
   /// default, render, proxy or guide: authored on the prim or its nearest ancestor.
   std::string purpose(const Prim& prim);
   /// The material that is bound to the prim; empty when there is none. A binding for `purpose`
-  /// ("full", "preview"), be it that of an ancestor, beats one for all purposes.
-  std::string material(const Prim& prim, std::string_view purpose = {});
+  /// ("full", "preview"), be it that of an ancestor, beats one for all purposes. `lost` becomes
+  /// where a binding leads that leads to no material.
+  std::string material(const Prim& prim, std::string_view purpose = {},
+                       std::string* lost = nullptr);
   /// All primvars, by name: its own, and constant ones of its ancestors.
   std::vector<Primvar> primvars(const Prim& prim);
 
  private:
   /// Bound by this relationship or by one that begins with the prefix and names a collection.
   std::string material_by(const Prim& prim, const std::string& relationship,
-                          const std::string& collection_prefix);
+                          const std::string& collection_prefix, std::string* lost);
   bool collection_includes(const std::string& collection, const std::string& path, int nesting);
   std::vector<Primvar> own_primvars(const Prim& prim) const;
   /// What the prims below `parent` inherit from it and from its ancestors.

@@ -70,6 +70,15 @@ Value Layer::get(const FieldSet& fields, std::string_view name) const {
   return field ? value_of(*field) : Value();
 }
 
+std::vector<std::pair<std::string_view, Value>> Layer::fields(const FieldSet& set) const {
+  std::vector<std::pair<std::string_view, Value>> result;
+  for (std::uint32_t i = 0; i < set.count; ++i) {
+    const Field& field = fields_[field_indices_[set.begin + i]];
+    result.emplace_back(field.name, value_of(field));
+  }
+  return result;
+}
+
 Layer::NamedAssets Layer::named_assets() const {
   NamedAssets named;
   collect_texts(get(root(), "subLayers"), named.layers);

@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "types.h"
@@ -62,6 +63,11 @@ class Layer {
   /// Empty when the field is absent. Throws FormatError when a crate lies about it.
   Value get(const FieldSet& fields, std::string_view name) const;
   Value get(const PrimSpec& spec, std::string_view name) const { return get(spec.fields, name); }
+  /// All fields of a spec, as the file has them.
+  std::vector<std::pair<std::string_view, Value>> fields(const FieldSet& set) const;
+
+  using Prims = std::unordered_map<std::string, PrimSpec, StringHash, std::equal_to<>>;
+  const Prims& prims() const { return prims_; }
 
   /// What the layer names, as it is written.
   struct NamedAssets {
@@ -85,7 +91,7 @@ class Layer {
   std::uint32_t add_field(Field field);
   std::string_view intern(std::string_view text);
   std::vector<std::uint32_t>& field_indices() { return field_indices_; }
-  std::unordered_map<std::string, PrimSpec, StringHash, std::equal_to<>>& prims() { return prims_; }
+  Prims& prims() { return prims_; }
   void set_source(std::shared_ptr<const ValueSource> source) { source_ = std::move(source); }
 
  private:
@@ -98,7 +104,7 @@ class Layer {
   std::deque<std::string> strings_;
   std::vector<Field> fields_;
   std::vector<std::uint32_t> field_indices_;
-  std::unordered_map<std::string, PrimSpec, StringHash, std::equal_to<>> prims_;
+  Prims prims_;
 };
 
 }  // namespace diorama::usd

@@ -56,13 +56,14 @@ Matrix rotation(int axis, double degrees) {
 }
 
 Matrix rotation(const std::array<double, 4>& quaternion) {
-  const double length = std::hypot(std::hypot(quaternion[0], quaternion[1]),
-                                   std::hypot(quaternion[2], quaternion[3]));
-  if (!(length > 0.0)) return {};
-  const double x = quaternion[0] / length;
-  const double y = quaternion[1] / length;
-  const double z = quaternion[2] / length;
-  const double w = quaternion[3] / length;
+  constexpr double kLeastAxis = 1e-10;
+  const double length = std::hypot(quaternion[0], quaternion[1], quaternion[2]);
+  if (length <= kLeastAxis) return {};
+  const double w = std::clamp(quaternion[3], -1.0, 1.0);
+  const double share = std::sqrt(1.0 - w * w) / length;
+  const double x = quaternion[0] * share;
+  const double y = quaternion[1] * share;
+  const double z = quaternion[2] * share;
   Matrix result;
   result.m = {1 - 2 * (y * y + z * z),
               2 * (x * y + z * w),

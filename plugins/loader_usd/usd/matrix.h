@@ -23,7 +23,8 @@ Matrix translation(const Vector3& offset);
 Matrix scaling(const Vector3& factors);
 /// About x (0), y (1) or z (2).
 Matrix rotation(int axis, double degrees);
-/// i, j, k, real; need not be of unit length.
+/// i, j, k, real. By OpenUSD's rule for those that are not of unit length: the real part is the
+/// cosine of half the angle, the others are the direction of the axis.
 Matrix rotation(const std::array<double, 4>& quaternion);
 /// The identity for a matrix that has no inverse.
 Matrix inverse(const Matrix& matrix);

@@ -2,10 +2,13 @@
 #include "prim_index.h"
 
 #include <algorithm>
+#include <cstring>
 #include <map>
 #include <optional>
 #include <set>
 #include <tuple>
+#include <unordered_set>
+#include <utility>
 
 #include "error.h"
 #include "path.h"
@@ -118,6 +121,14 @@ struct Task {
   int sibling = 0;
 };
 
+// Names a site in sets.
+std::string site_key(const LayerStack& stack, std::string_view path) {
+  std::string key(sizeof(void*), '\0');
+  const LayerStack* address = &stack;
+  std::memcpy(key.data(), &address, sizeof(void*));
+  return key.append(path);
+}
+
 struct ArcOptions {
   bool contributes = true;
   bool with_ancestors = false;
@@ -195,9 +206,12 @@ class PrimIndexer::Builder {
   int append(PrimIndex subtree, int parent, IndexNode arc_node);
   void insert_child(int parent, int child);
   bool is_stronger_sibling(int a, int b) const;
-  bool is_cycle(Arc arc, int parent, int origin, const LayerStack& stack,
-                const std::string& path) const;
-  bool is_duplicate(int parent, const LayerStack& stack, const std::string& path) const;
+  bool has_few_nodes() const;
+  void know_sites();
+  bool has_site(const LayerStack& stack, const std::string& path);
+  bool may_be_near(const LayerStack& stack, const std::string& path);
+  bool is_cycle(Arc arc, int parent, const LayerStack& stack, const std::string& path);
+  bool is_duplicate(const LayerStack& stack, const std::string& path);
 
   void eval_relocations(int node);
   void elide(int node);
@@ -210,7 +224,7 @@ class PrimIndexer::Builder {
   void eval_implied_class_tree(int destination, int source, const MapFunction& transfer,
                                bool is_start);
   bool has_class_child(int node) const;
-  int class_hierarchy_start(int node) const;
+  int class_hierarchy_start(int node);
 
   void eval_variant_sets(int node);
   void eval_variant(const Task& task);
@@ -232,6 +246,13 @@ class PrimIndexer::Builder {
   bool with_variants_ = true;
   PrimIndex index_;
   std::vector<Task> tasks_;
+  // What long chains of arcs ask for again and again, for the first so many nodes.
+  static constexpr std::size_t kFewNodes = 64;
+  std::size_t known_sites_ = 0;
+  bool holds_relocates_ = false;
+  std::unordered_set<std::string> sites_;            ///< Keys of the nodes' sites ...
+  std::unordered_set<std::string> sites_and_above_;  ///< ... and of all that are above them.
+  std::vector<int> class_starts_;                    ///< kNone: not known.
 };
 
 // --- Beginning an index ---------------------------------------------------------------------
@@ -503,14 +524,42 @@ int PrimIndexer::Builder::append(PrimIndex subtree, int parent, IndexNode arc_no
   return base;
 }
 
-bool PrimIndexer::Builder::is_cycle(Arc arc, int parent, int, const LayerStack& stack,
-                                    const std::string& path) const {
+// Copies of a parent's nodes are known when they are first asked for, arcs as they are added.
+// Looking at a few nodes is quicker than knowing them.
+bool PrimIndexer::Builder::has_few_nodes() const { return index_.nodes.size() < kFewNodes; }
+
+void PrimIndexer::Builder::know_sites() {
+  for (; known_sites_ < index_.nodes.size(); ++known_sites_) {
+    const IndexNode& each = index_.nodes[known_sites_];
+    holds_relocates_ |= each.arc == Arc::Relocate;
+    sites_.insert(site_key(*each.stack, each.path));
+    for (std::string_view at = each.path; !at.empty(); at = path::parent(at)) {
+      if (!sites_and_above_.insert(site_key(*each.stack, at)).second) break;
+    }
+  }
+}
+
+// Whether a node may stand at the site, above it or below it.
+bool PrimIndexer::Builder::may_be_near(const LayerStack& stack, const std::string& path) {
+  if (has_few_nodes()) return true;
+  know_sites();
+  if (holds_relocates_) return true;
+  if (sites_and_above_.contains(site_key(stack, path))) return true;
+  for (std::string_view at = path; !at.empty(); at = path::parent(at)) {
+    if (sites_.contains(site_key(stack, at))) return true;
+  }
+  return false;
+}
+
+bool PrimIndexer::Builder::is_cycle(Arc arc, int parent, const LayerStack& stack,
+                                    const std::string& path) {
   if (arc == Arc::Variant || arc == Arc::Relocate) return false;
   std::string child_path = path;
-  const Builder* builder = this;
+  Builder* builder = this;
   int at = parent;
   for (;;) {
-    for (int i = at; i != IndexNode::kNone; i = builder->node(i).parent) {
+    const bool is_near = builder->may_be_near(stack, child_path);
+    for (int i = at; is_near && i != IndexNode::kNone; i = builder->node(i).parent) {
       const IndexNode& site = builder->node(i);
       // Relocated prims stand below their own source.
       if (site.arc == Arc::Relocate) return false;
@@ -533,15 +582,21 @@ bool PrimIndexer::Builder::is_cycle(Arc arc, int parent, int, const LayerStack& 
   }
 }
 
-bool PrimIndexer::Builder::is_duplicate(int parent, const LayerStack& stack,
-                                        const std::string& path) const {
-  (void)parent;
+bool PrimIndexer::Builder::has_site(const LayerStack& stack, const std::string& path) {
+  if (has_few_nodes()) {
+    return std::any_of(index_.nodes.begin(), index_.nodes.end(), [&](const IndexNode& each) {
+      return each.stack == &stack && each.path == path;
+    });
+  }
+  know_sites();
+  return sites_.contains(site_key(stack, path));
+}
+
+bool PrimIndexer::Builder::is_duplicate(const LayerStack& stack, const std::string& path) {
   std::string site_path = path;
-  const Builder* builder = this;
+  Builder* builder = this;
   for (;;) {
-    for (const IndexNode& each : builder->index_.nodes) {
-      if (each.stack == &stack && each.path == site_path) return true;
-    }
+    if (builder->has_site(stack, site_path)) return true;
     const Frame* frame = builder->frame_;
     if (!frame) return false;
     const std::string& current = builder->node(0).path;
@@ -555,7 +610,7 @@ bool PrimIndexer::Builder::is_duplicate(int parent, const LayerStack& stack,
 int PrimIndexer::Builder::add_arc(Arc arc, int parent, int origin, const LayerStack& stack,
                                   const std::string& path, std::shared_ptr<const MapFunction> map,
                                   int sibling, ArcOptions options) {
-  if (is_cycle(arc, parent, origin, stack, path)) {
+  if (is_cycle(arc, parent, stack, path)) {
     stacks_.diagnostics().warn(node(parent).stack->root().identifier() + ": <" + node(parent).path +
                                "> leads back to itself through <" + path + "> of " +
                                stack.root().identifier());
@@ -568,7 +623,7 @@ int PrimIndexer::Builder::add_arc(Arc arc, int parent, int origin, const LayerSt
     return IndexNode::kNone;
   }
   options.skip_duplicates |= frame_ && frame_->skip_duplicates;
-  if (options.skip_duplicates && is_duplicate(parent, stack, path)) return IndexNode::kNone;
+  if (options.skip_duplicates && is_duplicate(stack, path)) return IndexNode::kNone;
   if (options.contributes && options.with_ancestors && holds_relocate_source(stack, path)) {
     options.contributes = false;
   }
@@ -715,10 +770,20 @@ bool PrimIndexer::Builder::has_class_child(int i) const {
 }
 
 // The prim that begins the chain of classes which the node belongs to.
-int PrimIndexer::Builder::class_hierarchy_start(int i) const {
+int PrimIndexer::Builder::class_hierarchy_start(int i) {
+  class_starts_.resize(index_.nodes.size(), IndexNode::kNone);
   const int level = node(i).levels_below_arc;
-  while (is_class_arc(node(i).arc) && node(i).levels_below_arc == level) i = node(i).parent;
-  return i;
+  int start = i;
+  while (is_class_arc(node(start).arc) && node(start).levels_below_arc == level) {
+    start = node(start).parent;
+    const int known = class_starts_[static_cast<std::size_t>(start)];
+    if (known != IndexNode::kNone && node(start).levels_below_arc == level) {
+      start = known;
+      break;
+    }
+  }
+  class_starts_[static_cast<std::size_t>(i)] = start;
+  return start;
 }
 
 // What a referenced prim inherits, the referring prim inherits as well, in its own namespace.

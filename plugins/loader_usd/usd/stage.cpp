@@ -3,12 +3,15 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <iterator>
 
 #include "error.h"
 #include "path.h"
 
 namespace diorama::usd {
 namespace {
+
+constexpr std::uint64_t kComposedBytesPerFileByte = 64;
 
 // `visit` gets the node, the layer and the spec, and says whether to go on.
 template <class Visit>
@@ -31,12 +34,14 @@ void collect_opinions(Prim& prim) {
 
 }  // namespace
 
-Stage::Stage(const std::string& file, Sampling sampling)
+Stage::Stage(const std::string& file, Sampling sampling, std::uint64_t most_composed_bytes)
     : sampling_(sampling),
+      most_composed_bytes_(most_composed_bytes),
       stacks_(assets_, diagnostics_),
       root_stack_(
           &stacks_.open(std::filesystem::absolute(file).lexically_normal().generic_string(), {})),
-      indexer_(stacks_, *root_stack_) {
+      indexer_(stacks_, *root_stack_),
+      clips_(std::make_unique<ValueClips>(assets_, stacks_, diagnostics_, root_stack_->root())) {
   auto root = std::make_unique<Prim>();
   root->path = "/";
   root->index = indexer_.root_index();
@@ -49,9 +54,9 @@ Stage::Stage(const std::string& file, Sampling sampling)
 
 Stage::~Stage() = default;
 
-bool Stage::is_z_up() const {
+std::string Stage::up_axis() const {
   const Value axis = root_layer().get(root_layer().root(), "upAxis");
-  return axis.as_text() && *axis.as_text() == "Z";
+  return axis.as_text() ? *axis.as_text() : "Y";
 }
 
 double Stage::meters_per_unit() const {
@@ -75,10 +80,16 @@ const Prim* Stage::find(std::string_view path) {
   if (const auto known = prims_.find(path); known != prims_.end()) return known->second.get();
   const Prim* parent = find(path::parent(path));
   if (!parent) return nullptr;
-  // Asked for one child, people ask for its siblings next; their names are composed together.
-  if (listed_.insert(parent).second) children(*parent);
-  const auto found = prims_.find(path);
-  return found == prims_.end() ? nullptr : found->second.get();
+  if (!parent->is_active) return nullptr;
+  // Asked for one child, people ask for its siblings next.
+  auto [names, is_new] = listed_.try_emplace(parent);
+  if (is_new) {
+    Strings list = child_names(parent->index);
+    names->second.insert(std::make_move_iterator(list.begin()),
+                         std::make_move_iterator(list.end()));
+  }
+  const std::string name(path::name(path));
+  return names->second.contains(name) ? compose(*parent, name) : nullptr;
 }
 
 std::vector<const Prim*> Stage::children(const Prim& prim) {
@@ -89,14 +100,47 @@ std::vector<const Prim*> Stage::children(const Prim& prim) {
 }
 
 std::vector<const Prim*> Stage::visible_children(const Prim& prim) {
-  std::vector<const Prim*> result = children(prim);
-  result.erase(std::remove_if(result.begin(), result.end(),
-                              [](const Prim* child) {
-                                return !child->is_active || !child->is_defined ||
-                                       child->is_abstract;
-                              }),
-               result.end());
+  std::vector<const Prim*> result;
+  if (!prim.is_active || prim.is_abstract) return result;
+  for (const std::string& name : child_names(prim.index)) {
+    // Classes may inherit from long chains of others, all of them to be left out again.
+    if (is_plain_class(prim, name)) continue;
+    const Prim* child = compose(prim, name);
+    if (child->is_active && child->is_defined && !child->is_abstract) result.push_back(child);
+  }
   return result;
+}
+
+// Whether the strongest opinion of all, a local one, makes it a class.
+bool Stage::is_plain_class(const Prim& parent, std::string_view name) const {
+  const IndexNode& local = parent.index.nodes.front();
+  if (local.is_inert || parent.is_instance || !local.stack->relocate_targets.empty()) return false;
+  const std::string path = path::append_child(local.path, name);
+  for (const LayerStack::Entry& entry : local.stack->layers) {
+    const PrimSpec* spec = entry.layer->prim(path);
+    if (!spec) continue;
+    const auto specifier = entry.layer->get(*spec, "specifier").as_enumerator();
+    if (specifier && *specifier != static_cast<int>(Specifier::Over)) {
+      return *specifier == static_cast<int>(Specifier::Class);
+    }
+  }
+  return false;
+}
+
+// Arcs to arcs multiply: thirty small files can make as many prims as there are atoms in a room.
+void Stage::count_memory(const Prim& prim) {
+  std::size_t bytes = sizeof(Prim) + 2 * prim.path.size() + prim.opinions.size() * sizeof(Opinion);
+  for (const IndexNode& node : prim.index.nodes) {
+    bytes += sizeof(IndexNode) + node.path.size() + (node.children.size() + 1) * sizeof(int);
+  }
+  composed_bytes_ += bytes;
+  const std::uint64_t most =
+      most_composed_bytes_ + kComposedBytesPerFileByte * assets_.layer_bytes();
+  if (composed_bytes_ <= most) return;
+  throw FormatError(root_layer().identifier() + ": its prims take more than " +
+                    std::to_string(most >> 20) + " MiB, at <" + prim.path +
+                    ">, which is too much for " + std::to_string(assets_.layer_bytes()) +
+                    " bytes of layers; do references multiply?");
 }
 
 const Prim* Stage::compose(const Prim& parent, std::string_view name) {
@@ -108,7 +152,9 @@ const Prim* Stage::compose(const Prim& parent, std::string_view name) {
   prim->index = indexer_.child_index(parent.index, name);
   prim->order = prim->index.strength_order();
   collect_opinions(*prim);
+  count_memory(*prim);
   prim->is_instance = prim->index.is_instance;
+  prim->has_clips = parent.has_clips || !metadata(*prim, "clips").is_empty();
   prim->is_instance_proxy = parent.is_instance || parent.is_instance_proxy;
   prim->is_active = metadata(*prim, "active").as_bool().value_or(true);
   bool is_defining = false;
@@ -213,7 +259,7 @@ std::string Stage::attribute_type(const Prim& prim, std::string_view name) const
   if (!type.as_text()) return {};
   const std::string_view known = schema_attribute_type(prim.traits, name);
   if (!known.empty()) return std::string(known);
-  return parse_value_type(*type.as_text()).canonical;
+  return *type.as_text();
 }
 
 bool Stage::has_authored_value(const Prim& prim, std::string_view name) const {
@@ -269,6 +315,9 @@ FoundValue Stage::find_value(const Prim& prim, std::string_view name) const {
       });
   const bool has_default = first_default && !first_default.value.is_block();
   FoundValue result = has_default ? first_default : first_sample;
+  if (!result && prim.has_clips && sampling_ == Sampling::OrFirstSample) {
+    result = clips_->find(prim, name);
+  }
   return result.value.is_block() ? FoundValue() : result;
 }
 
@@ -288,11 +337,14 @@ const PropertySpec* Stage::value_spec(const Prim& prim, std::string_view name) c
     if (!is_block) with_default = property;
     return false;
   });
+  if (!with_default && !with_samples && prim.has_clips && sampling_ == Sampling::OrFirstSample) {
+    return clips_->find(prim, name).spec;
+  }
   return with_default ? with_default : with_samples;
 }
 
-Strings Stage::compose_paths(const Prim& prim, std::string_view name,
-                             std::string_view field) const {
+Strings Stage::compose_paths(const Prim& prim, std::string_view name, std::string_view field,
+                             std::string* lost) const {
   std::vector<ListOp<std::string>> opinions;
   for_each_spec(prim,
                 [&](const IndexNode& node, const LayerStack::Entry& entry, const PrimSpec& spec) {
@@ -305,8 +357,11 @@ Strings Stage::compose_paths(const Prim& prim, std::string_view name,
                     Strings mapped;
                     for (const std::string& item : items) {
                       // Paths that the arc does not carry out of its asset are lost.
-                      if (auto path = node.map_to_root->to_target(item))
+                      if (auto path = node.map_to_root->to_target(item)) {
                         mapped.push_back(std::move(*path));
+                      } else if (lost) {
+                        *lost = item;
+                      }
                     }
                     items = std::move(mapped);
                   };
@@ -323,12 +378,12 @@ Strings Stage::compose_paths(const Prim& prim, std::string_view name,
   return result;
 }
 
-Strings Stage::targets(const Prim& prim, std::string_view name) const {
-  return compose_paths(prim, name, "targetPaths");
+Strings Stage::targets(const Prim& prim, std::string_view name, std::string* lost) const {
+  return compose_paths(prim, name, "targetPaths", lost);
 }
 
 Strings Stage::connections(const Prim& prim, std::string_view name) const {
-  return compose_paths(prim, name, "connectionPaths");
+  return compose_paths(prim, name, "connectionPaths", nullptr);
 }
 
 std::string Stage::anchor(const FoundValue& value) const {

@@ -14,6 +14,7 @@
 #include "layer_stack.h"
 #include "prim_index.h"
 #include "schema.h"
+#include "value_clips.h"
 
 namespace diorama::usd {
 
@@ -38,6 +39,7 @@ struct Prim {
   bool is_abstract = false;  ///< A class or below one.
   bool is_instance = false;
   bool is_instance_proxy = false;  ///< Below an instance.
+  bool has_clips = false;          ///< It or an ancestor has value clips.
 };
 
 /// A value with the layer that it was found in, which asset paths are relative to.
@@ -54,16 +56,22 @@ struct FoundValue {
 enum class Sampling {
   DefaultTime,  ///< The default alone: an attribute with time samples only has no value.
   /// The first time sample where no layer has a default: a blocked default is none, a blocked
-  /// sample is no value.
+  /// sample is no value. Where there is neither, what value clips say when the stage starts.
   OrFirstSample,
 };
 
 /// A composed scene: what all layers together say, with all payloads loaded, default variants and
-/// at the default time. Prims are composed when they are asked for. Not thread safe.
+/// at the default time. Prims are composed when they are asked for and take memory in proportion to
+/// what the files hold; small files that refer to themselves over and over end with a FormatError.
+/// Not thread safe.
 class Stage {
  public:
+  /// What composed prims may take, besides 64 times the size of the layers.
+  static constexpr std::uint64_t kComposedBytes = std::uint64_t{512} << 20;
+
   /// Throws FormatError when the layer cannot be read. What its arcs cannot reach becomes warnings.
-  explicit Stage(const std::string& file, Sampling sampling = Sampling::DefaultTime);
+  explicit Stage(const std::string& file, Sampling sampling = Sampling::DefaultTime,
+                 std::uint64_t most_composed_bytes = kComposedBytes);
   ~Stage();
 
   const Layer& root_layer() const { return root_stack_->root(); }
@@ -71,13 +79,17 @@ class Stage {
   Diagnostics& diagnostics() { return diagnostics_; }
   const AssetLibrary& assets() const { return assets_; }
 
-  bool is_z_up() const;
-  /// 0.01 where nothing is authored.
+  /// What the layer says, be it an axis or not; "Y" where nothing is authored.
+  std::string up_axis() const;
+  bool is_z_up() const { return up_axis() == "Z"; }
+  /// What the layer says, be it a length or not; 0.01 where nothing is authored.
   double meters_per_unit() const;
   /// Path of the default prim if there is such a prim; empty otherwise.
   std::string default_prim();
 
   const Prim& root() const { return *root_; }
+  /// About what the prims that were composed so far take.
+  std::uint64_t composed_bytes() const { return composed_bytes_; }
   /// Null if there is no such prim. Also finds prims that a traversal leaves out.
   const Prim* find(std::string_view path);
   /// All children that have opinions, in composed order.
@@ -94,8 +106,8 @@ class Stage {
   /// Names of all authored properties that begin with `prefix`, sorted.
   Strings property_names(const Prim& prim, std::string_view prefix = {}) const;
   Value property_metadata(const Prim& prim, std::string_view name, std::string_view field) const;
-  /// The type, `float3[]`: the schema's for attributes that it defines, else the authored one;
-  /// empty if there is no such attribute.
+  /// The type, `float3[]`: the schema's for attributes that it defines, else the authored one, also
+  /// where that is an old name (`Vec3f[]`); empty if there is no such attribute.
   std::string attribute_type(const Prim& prim, std::string_view name) const;
   /// The strongest value by the stage's sampling. Empty when there is none or it is blocked.
   FoundValue find_value(const Prim& prim, std::string_view name) const;
@@ -106,8 +118,9 @@ class Stage {
   bool has_authored_value(const Prim& prim, std::string_view name) const;
   /// A composed list of integers: inactiveIds.
   std::vector<std::int64_t> metadata_integers(const Prim& prim, std::string_view field) const;
-  /// Composed paths that a relationship leads to, or an attribute is connected to.
-  Strings targets(const Prim& prim, std::string_view name) const;
+  /// Composed paths that a relationship leads to, or an attribute is connected to. `lost` becomes
+  /// a path that an arc does not carry out of its asset.
+  Strings targets(const Prim& prim, std::string_view name, std::string* lost = nullptr) const;
   Strings connections(const Prim& prim, std::string_view name) const;
 
   /// The spec that `find_value` would read, without reading it; null where there is no value.
@@ -118,17 +131,23 @@ class Stage {
 
  private:
   const Prim* compose(const Prim& parent, std::string_view name);
+  bool is_plain_class(const Prim& parent, std::string_view name) const;
+  void count_memory(const Prim& prim);
   Specifier compose_specifier(const Prim& prim, bool& is_defining) const;
-  Strings compose_paths(const Prim& prim, std::string_view name, std::string_view field) const;
+  Strings compose_paths(const Prim& prim, std::string_view name, std::string_view field,
+                        std::string* lost) const;
 
   Sampling sampling_;
+  std::uint64_t most_composed_bytes_;
   AssetLibrary assets_;
   Diagnostics diagnostics_;
   LayerStacks stacks_;
   const LayerStack* root_stack_;
   PrimIndexer indexer_;
   std::unordered_map<std::string, std::unique_ptr<Prim>, StringHash, std::equal_to<>> prims_;
-  std::unordered_set<const Prim*> listed_;  ///< Prims whose children find() has composed.
+  std::unordered_map<const Prim*, std::unordered_set<std::string>> listed_;  ///< For find().
+  std::uint64_t composed_bytes_ = 0;
+  std::unique_ptr<ValueClips> clips_;
   const Prim* root_ = nullptr;
 };
 

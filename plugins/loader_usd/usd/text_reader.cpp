@@ -60,8 +60,10 @@ constexpr std::array kFieldTypes = {
     FieldType{"customLayerData", FieldKind::Dictionary, {}},
     FieldType{"defaultPrim", FieldKind::Value, "token"},
     FieldType{"displayGroup", FieldKind::Value, "string"},
+    FieldType{"displayGroupOrder", FieldKind::Value, "string[]"},
     FieldType{"displayName", FieldKind::Value, "string"},
     FieldType{"elementSize", FieldKind::Value, "int"},
+    FieldType{"endFrame", FieldKind::Value, "double"},
     FieldType{"endTimeCode", FieldKind::Value, "double"},
     FieldType{"expressionVariables", FieldKind::Dictionary, {}},
     FieldType{"fallbackPrimTypes", FieldKind::Dictionary, {}},
@@ -76,12 +78,16 @@ constexpr std::array kFieldTypes = {
     FieldType{"metersPerUnit", FieldKind::Value, "double"},
     FieldType{"noLoadHint", FieldKind::Value, "bool"},
     FieldType{"owner", FieldKind::Value, "string"},
+    FieldType{"prefix", FieldKind::Value, "string"},
     FieldType{"renderSettingsPrimPath", FieldKind::Value, "string"},
     FieldType{"renderType", FieldKind::Value, "token"},
     FieldType{"sdrMetadata", FieldKind::Dictionary, {}},
     FieldType{"sessionOwner", FieldKind::Value, "string"},
+    FieldType{"startFrame", FieldKind::Value, "double"},
     FieldType{"startTimeCode", FieldKind::Value, "double"},
+    FieldType{"suffix", FieldKind::Value, "string"},
     FieldType{"symmetricPeer", FieldKind::Value, "string"},
+    FieldType{"symmetryArguments", FieldKind::Dictionary, {}},
     FieldType{"timeCodesPerSecond", FieldKind::Value, "double"},
     FieldType{"unauthoredValuesIndex", FieldKind::Value, "int"},
     FieldType{"upAxis", FieldKind::Value, "token"},
@@ -91,6 +97,16 @@ FieldType field_type(std::string_view name) {
   const auto* found = std::find_if(kFieldTypes.begin(), kFieldTypes.end(),
                                    [&](const FieldType& type) { return type.name == name; });
   return found == kFieldTypes.end() ? FieldType{name, FieldKind::Free, {}} : *found;
+}
+
+constexpr std::array<std::string_view, 12> kDisplayUnits = {
+    "mm", "cm", "dm", "m", "km", "in", "ft", "yd", "mi", "deg", "rad", "default"};
+
+template <class Words>
+std::string list_of(const Words& words) {
+  std::string list;
+  for (const std::string_view word : words) list.append(list.empty() ? "" : ", ").append(word);
+  return list;
 }
 
 const Value* find_field(const Fields& fields, std::string_view name) {
@@ -532,6 +548,10 @@ Reference TextReader::read_reference(bool is_payload) {
   Reference reference;
   if (scanner_.peek() == '@') {
     reference.asset = scanner_.read_asset();
+    if (reference.asset.empty()) {
+      scanner_.fail(std::string("the asset of a ") + (is_payload ? "payload" : "reference") +
+                    " is empty; a prim of the same layer is named without @@");
+    }
     const std::size_t after = scanner_.position();
     scanner_.skip_inline();
     if (scanner_.peek() != '<') scanner_.rewind(after);
@@ -889,16 +909,15 @@ void TextReader::read_attribute(PrimBuilder& prim, Edit edit, bool is_edit, bool
   const ValueTypeName type = parse_value_type(type_name);
   PropertyBuilder& attribute = property(prim, read_property_name(), SpecType::Attribute);
   const Value* old_type = find_field(attribute.fields, "typeName");
-  const std::string& stored_type = type.type == Type::Invalid ? type_name : type.canonical;
-  if (old_type && *old_type->as_text() != stored_type) {
+  if (old_type && *old_type->as_text() != type_name) {
     scanner_.fail("\"" + attribute.name + "\" is of type " + *old_type->as_text() +
-                  " in one place and of type " + stored_type + " in another");
+                  " in one place and of type " + type_name + " in another");
   }
   const Value* variability = find_field(attribute.fields, "variability");
   if (old_type && (variability != nullptr) != is_uniform) {
     scanner_.fail("\"" + attribute.name + "\" is uniform in one place and varying in another");
   }
-  set_field(attribute.fields, "typeName", Value::text(Type::Token, stored_type));
+  set_field(attribute.fields, "typeName", Value::text(Type::Token, type_name));
   if (is_custom) set_field(attribute.fields, "custom", Value::boolean(true));
   if (is_uniform)
     set_field(attribute.fields, "variability", Value::enumerator(Type::Variability, 1));
@@ -1006,7 +1025,10 @@ void TextReader::read_property_metadata(Fields& fields, bool is_attribute) {
     if (is_attribute && scanner_.accept_word("displayUnit")) {
       scanner_.expect_assignment();
       const std::string_view word = scanner_.peek_word();
-      if (word.empty()) scanner_.fail("expected a unit");
+      if (std::find(kDisplayUnits.begin(), kDisplayUnits.end(), word) == kDisplayUnits.end()) {
+        scanner_.fail("\"" + std::string(word) + "\" is not a unit; known are " +
+                      list_of(kDisplayUnits));
+      }
       scanner_.advance(word.size());
       return;
     }

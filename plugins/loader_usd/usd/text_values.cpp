@@ -68,7 +68,10 @@ void ValueReader::read_list(int nesting) {
   scanner_.expect('[', "before a list");
   const std::size_t start = scanner_.position();
   scanner_.skip_inline();
-  if (scanner_.accept(']')) return;
+  if (scanner_.accept(']')) {
+    if (nesting > 0) scanner_.fail("a list within a list is empty");
+    return;
+  }
   scanner_.rewind(start);
   scanner_.skip_lines();
   do {
@@ -253,6 +256,9 @@ void skip_any(TextScanner& scanner, int nesting) {
     scanner.advance(1);
     const char close = c == '[' ? ']' : ')';
     scanner.skip_lines();
+    if (nesting > 0 && c == '[' && scanner.peek() == ']') {
+      scanner.fail("a list within a list is empty");
+    }
     while (!scanner.accept(close)) {
       skip_any(scanner, nesting + 1);
       scanner.skip_inline();

@@ -20,7 +20,7 @@ class DIORAMA_SDK_API Loader : public Component {
 
   ~Loader() override;
 
-  /// What it loads: endings in lower case with dot (".usd"), schemes with colon ("dining_room:").
+  /// In lower case endings ".usd", schemes "shelf:"; how files without an ending begin, "=#usda".
   virtual std::vector<std::string> claims() const = 0;
 
   /// The assets that its parameters name when it stands in a job's `environments` or `objects`

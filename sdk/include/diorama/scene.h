@@ -82,7 +82,7 @@ class DIORAMA_SDK_API Scene {
   bool is_visible(NodeId node) const;
   /// Labels of the node and, per taxonomy, of its nearest labelled ancestor.
   Labels effective_labels(NodeId node) const;
-  /// World box of all meshes at and below the node, visible or not; empty when there are none.
+  /// World box of the visible meshes at and below the node; empty when there are none.
   Aabb world_bounds(NodeId node) const;
 
   /// Counts as a pose change. Throws when a number is not finite.

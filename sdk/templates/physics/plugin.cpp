@@ -46,12 +46,25 @@ class @CLASS@ final : public diorama::PhysicsBackend {
     bool is_at_rest = false;
   };
 
+  // World box of a body's meshes; hidden ones fall as well.
+  static diorama::Aabb bounds_of(const diorama::Scene& scene, diorama::NodeId body) {
+    diorama::Aabb bounds;
+    for (const diorama::NodeId id : scene.subtree(body)) {
+      if (!scene[id].mesh) continue;
+      const diorama::Affine world_from_mesh = scene.world_from_node(id);
+      for (const diorama::Vec3f& position : scene[id].mesh->positions) {
+        bounds.add(world_from_mesh * position.cast<double>());
+      }
+    }
+    return bounds;
+  }
+
   // The world is built anew from the scene; velocities begin at zero.
   void do_reset(const diorama::Scene& scene) override {
     bodies_.clear();
     for (const diorama::NodeId id : scene.subtree(scene.root())) {
       if (!scene[id].rigid_body || !scene[id].rigid_body->has_gravity) continue;
-      const diorama::Aabb bounds = scene.world_bounds(id);
+      const diorama::Aabb bounds = bounds_of(scene, id);
       if (bounds.is_empty()) continue;
       bodies_.push_back({id, scene.world_from_node(id), bounds.min.z()});
     }

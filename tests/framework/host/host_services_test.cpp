@@ -22,7 +22,9 @@ class PartLoader final : public Loader {
     void visit(ParamVisitor& v) { v.param("weight", weight, {"Of a lid.", "kg"}); }
   };
   PartLoader(const Params& params, Host& host) : params_(params), host_(host) {}
-  std::vector<std::string> claims() const override { return {".part", ".big.part", "part:"}; }
+  std::vector<std::string> claims() const override {
+    return {".part", ".big.part", "part:", "=PART", "=PA"};
+  }
   std::vector<fs::path> files(std::string_view asset) const override {
     return {fs::path(asset), std::to_string(int(params_.weight)) + ".kg"};
   }
@@ -141,6 +143,24 @@ TEST_CASE("the longest claim takes the asset, in any case; schemes give names", 
   CHECK(shop.scene.path(shop.host->load_asset("part:x/7", shop.scene, shop.scene.root())) ==
         "/part_x_7");
   CHECK(shop.log.back() == "load part:x/7");
+}
+
+TEST_CASE("files without an ending are taken by how they begin", "[host]") {
+  Workshop shop;
+  std::ofstream(shop.folder / "crate") << "PART and more";
+  std::ofstream(shop.folder / "short") << "P";
+  std::ofstream(shop.folder / "other") << "a PART";
+  std::ofstream(shop.folder / "named.txt") << "PART";
+  CHECK(shop.scene.path(shop.host->load_asset("crate", shop.scene, shop.scene.root())) == "/crate");
+  CHECK(shop.host->loader_of("crate") == "parts");
+  for (const char* name : {"short", "other", "named.txt"}) {
+    INFO(name);
+    CHECK_FALSE(shop.host->loader_of(name));
+  }
+  CHECK_THROWS_WITH(shop.host->load_asset("short", shop.scene, shop.scene.root()),
+                    (shop.folder / "short").string() +
+                        ": no loader reads a file without an ending that begins like this; there "
+                        "are loaders for: .big.part .part");
 }
 
 TEST_CASE("the cache keeps to its bytes and drops what was unused longest", "[host]") {

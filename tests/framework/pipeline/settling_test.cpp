@@ -44,6 +44,16 @@ TEST_CASE("An environment without meshes has no outside", "[settle]") {
   CHECK(Room(stage.scene, stage.environment).holds(stage.scene, stage.objects[0]));
 }
 
+TEST_CASE("Hidden geometry does not make a room larger", "[settle]") {
+  Stage stage({{5, 0, 1}, {1, 0, 1}});
+  const NodeId guide = stage.scene.create(stage.environment, "guide");
+  stage.scene.edit(guide).mesh = std::make_shared<const Mesh>(make_box(Vec3(20, 30, 40)));
+  stage.scene.edit(guide).is_visible = false;
+  const Room room(stage.scene, stage.environment);
+  CHECK_FALSE(room.holds(stage.scene, stage.objects[0]));
+  CHECK(room.holds(stage.scene, stage.objects[1]));
+}
+
 TEST_CASE("The fastest object is one that falls, in the room", "[settle]") {
   Stage stage({{0, 0, 1}, {1, 0, 1}, {9, 0, 1}, {-1, 0, 1}});
   const auto set_speed = [&](std::size_t object, double speed, bool has_gravity) {

@@ -110,7 +110,8 @@ TEST_CASE("an empty registry is a valid one", "[plugins]") {
   Scene scene;
   CHECK_THROWS_WITH(host.load_asset(DIORAMA_SOURCE_DIR "/LICENSE", scene, scene.root()),
                     DIORAMA_SOURCE_DIR
-                    "/LICENSE: no loader reads '' files; there are loaders for: nothing");
+                    "/LICENSE: no loader reads a file without an ending that begins like this; "
+                    "there are loaders for: nothing");
 }
 
 TEST_CASE("making components complains about everything that a job got wrong", "[plugins]") {

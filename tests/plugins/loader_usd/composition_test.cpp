@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <array>
+#include <cmath>
 #include <string>
 
 #include "loader_usd/usd/error.h"
@@ -36,6 +38,16 @@ bool warns(const Stage& stage, const std::string& text) {
 }
 
 }  // namespace
+
+TEST_CASE("quaternions of another length turn as OpenUSD turns them", "[composition]") {
+  // Half numbers are not of unit length; the real part alone says how far.
+  const Matrix half = rotation(std::array<double, 4>{0.0, 0.0, 0.70703125, 0.70703125});
+  const double angle = 2.0 * std::acos(0.70703125);
+  CHECK(half.at(0, 0) == Approx(std::cos(angle)).epsilon(1e-12).margin(1e-12));
+  CHECK(half.at(0, 1) == Approx(std::sin(angle)).epsilon(1e-12));
+  CHECK(rotation(std::array<double, 4>{0.0, 0.0, 0.0, 0.5}) == Matrix());
+  CHECK(std::isnan(rotation(std::array<double, 4>{std::nan(""), 0.0, 0.0, 1.0}).at(0, 0)));
+}
 
 TEST_CASE("arcs are as strong as USD says", "[composition]") {
   const TemporaryFolder folder;

@@ -9,7 +9,8 @@
 namespace diorama::usd::test {
 
 /// Bytes of a small crate file of version 0.1.0, whose sections are not compressed: a layer with
-/// the prim /Box of type Mesh and its attribute `points` of two points.
+/// the prim /Box of type Mesh and its attribute `points` of two points. As in files with references
+/// to default prims, one of the paths is the empty one, which has a number but no record.
 class CrateBytes {
  public:
   template <class T>
@@ -77,7 +78,7 @@ class CrateBytes {
     for (const std::uint32_t index : {0u, 1u, ~0u, 2u, 3u, ~0u, ~0u}) crate.add(index);
     begin("PATHS");
     places.path_count = crate.size();
-    crate.add<std::uint64_t>(3);
+    crate.add<std::uint64_t>(4);
     const auto path = [&](std::uint32_t index, std::uint32_t token, std::uint8_t bits) {
       crate.add(index);
       crate.add(token);

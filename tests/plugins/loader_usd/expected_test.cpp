@@ -46,6 +46,28 @@ std::string first_difference(const fs::path& source, const fs::path& expected_fi
 
 }  // namespace
 
+TEST_CASE("matrices are compared as what they do to the stage", "[expected]") {
+  // A thing of a hundred metres, turned by a right angle about z.
+  const auto stage = [](double cosine, double x) {
+    const auto bounds = nlohmann::json::array({{0, 0, 0}, {100, 20, 3}});
+    nlohmann::json prim{{"path", "/A"}, {"worldBounds", bounds}};
+    prim["localToWorld"] = {cosine, 1, 0, 0, -1, cosine, 0, 0, 0, 0, 1, 0, x, 0, 50, 1};
+    return nlohmann::json{{"opens", true},
+                          {"upAxis", "Z"},
+                          {"metersPerUnit", 1.0},
+                          {"defaultPrim", nullptr},
+                          {"totals", {{"worldBounds", bounds}}},
+                          {"prims", nlohmann::json::array({prim})}};
+  };
+  const auto are_equal = [&](double cosine, double x) {
+    return test::compare_dumps(stage(cosine, x), stage(0.0, 0.0)).empty();
+  };
+  // What is nothing beside the largest numbers counts as nothing, whatever it is beside itself.
+  CHECK(are_equal(6e-17, 5e-5));
+  CHECK_FALSE(are_equal(1e-5, 0.0));
+  CHECK_FALSE(are_equal(0.0, 1e-3));
+}
+
 TEST_CASE("composed stages equal what OpenUSD says about them", "[expected][slow]") {
   const auto data = data_folder();
   if (!data) return;

@@ -504,7 +504,7 @@ def Sphere "Elsewhere"
 }
 )");
   std::vector<double> places;
-  for (const PointInstance& instance : point_instances(stage, *stage.find("/I"))) {
+  for (const PointInstance& instance : point_instances(stage, *stage.find("/I")).list) {
     places.push_back(instance.instancer_from_prototype.m[12]);
   }
   CHECK(places == std::vector<double>{1, 5});

@@ -40,7 +40,7 @@ class StageDump {
   json dump() {
     json result;
     result["opens"] = true;
-    result["upAxis"] = stage_.is_z_up() ? "Z" : "Y";
+    result["upAxis"] = stage_.up_axis();
     result["metersPerUnit"] = stage_.meters_per_unit();
     const std::string default_prim = stage_.default_prim();
     result["defaultPrim"] = default_prim.empty() ? json(nullptr) : json(default_prim);
@@ -232,7 +232,8 @@ class StageDump {
 // Compares, collecting at most a few differences.
 class Comparison {
  public:
-  explicit Comparison(double tolerance) : tolerance_(tolerance) {}
+  /// `size` is that of the stage.
+  explicit Comparison(double size) : size_(size) {}
 
   void compare(const std::string& where, const json& ours, const json& expected) {
     if (differences.size() >= 8) return;
@@ -240,9 +241,12 @@ class Comparison {
       const auto a = ours.get<double>();
       const auto b = expected.get<double>();
       const double allowed =
-          is_place(where) ? tolerance_ : 1e-6 * std::max(std::abs(a), std::abs(b));
+          is_place(where) ? 1e-4 * size_ : 1e-6 * std::max(std::abs(a), std::abs(b));
       if (!(std::abs(a - b) <= allowed)) add(where, ours, expected);
       return;
+    }
+    if (is_matrix(where, ours) && is_matrix(where, expected)) {
+      return compare_matrices(where, ours, expected);
     }
     // Numbers that are not finite are written as null.
     if (ours.is_number() && expected.is_null() && !std::isfinite(ours.get<double>())) return;
@@ -260,8 +264,27 @@ class Comparison {
 
  private:
   static bool is_place(const std::string& where) {
-    return where.find("localToWorld") != std::string::npos ||
-           where.find("orldBounds") != std::string::npos;
+    return where.find("orldBounds") != std::string::npos;
+  }
+
+  static bool is_matrix(const std::string& where, const json& value) {
+    return where.ends_with("localToWorld") && value.is_array() && value.size() == 16 &&
+           std::all_of(value.begin(), value.end(), [](const json& n) { return n.is_number(); });
+  }
+
+  // A small number beside large ones may be off by more than itself: a translation counts beside
+  // the stage's size, everything else beside the largest of its kind.
+  void compare_matrices(const std::string& where, const json& ours, const json& expected) {
+    const auto is_translation = [](std::size_t i) { return i >= 12 && i < 15; };
+    double largest = 0.0;
+    for (std::size_t i = 0; i < 16; ++i) {
+      if (!is_translation(i)) largest = std::max(largest, std::abs(expected[i].get<double>()));
+    }
+    for (std::size_t i = 0; i < 16; ++i) {
+      const double allowed = 1e-6 * (is_translation(i) ? size_ : largest);
+      const double off = std::abs(ours[i].get<double>() - expected[i].get<double>());
+      if (!(off <= allowed)) add(where + "[" + std::to_string(i) + "]", ours[i], expected[i]);
+    }
   }
 
   void compare_objects(const std::string& where, const json& ours, const json& expected) {
@@ -287,7 +310,7 @@ class Comparison {
     differences.push_back(where + ": ours " + text(ours) + ", expected " + text(expected));
   }
 
-  double tolerance_;
+  double size_;
 };
 
 double stage_size(const json& expected) {
@@ -304,9 +327,13 @@ double stage_size(const json& expected) {
   if (expected.contains("prims")) {
     for (const json& prim : expected["prims"]) {
       if (prim.contains("worldBounds")) add(prim["worldBounds"]);
+      if (!prim.contains("localToWorld")) continue;
+      const json& matrix = prim["localToWorld"];
+      add(json::array({json::array({matrix[12], matrix[13], matrix[14]})}));
     }
   }
-  return std::max(size, 1.0);
+  // Without anything that has a size, all that counts is one.
+  return size > 0.0 ? size : 1.0;
 }
 
 }  // namespace
@@ -326,7 +353,7 @@ std::vector<std::string> compare_dumps(const json& ours, const json& expected) {
     return {"opens: ours " + ours["opens"].dump() + ", expected " + expected["opens"].dump() +
             (ours.contains("error") ? ": " + ours["error"].get<std::string>() : "")};
   }
-  Comparison comparison(1e-4 * stage_size(expected));
+  Comparison comparison(stage_size(expected));
   for (const char* key : {"upAxis", "metersPerUnit", "defaultPrim", "totals"}) {
     comparison.compare(key, ours[key], expected[key]);
   }

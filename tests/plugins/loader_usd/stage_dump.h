@@ -12,7 +12,8 @@ namespace diorama::usd::test {
 nlohmann::json dump_stage(const std::string& file);
 
 /// Differences between our dump and the expected one, the first few of them; empty when equal.
-/// Counts and texts must be equal, places within 1e-4 of the stage's size.
+/// Counts and texts must be equal, boxes within 1e-4 and translations within 1e-6 of the stage's
+/// size, the rest of a matrix within 1e-6 of its largest number, other numbers within 1e-6.
 std::vector<std::string> compare_dumps(const nlohmann::json& ours, const nlohmann::json& expected);
 
 }  // namespace diorama::usd::test

@@ -220,4 +220,63 @@ TEST_CASE("paths are taken apart and put together", "[path]") {
   CHECK_FALSE(path::is_identifier("2a"));
 }
 
+TEST_CASE("only a whole list may be empty", "[usda]") {
+  const auto in_prim = [](const std::string& line) {
+    return error_of("def \"A\"\n{\n    " + line + "\n}\n");
+  };
+  CHECK(in_prim("int[] a = [[1, 2], [3, 4]]") == "no error");
+  CHECK(in_prim("int[] a = []") == "no error");
+  CHECK(in_prim("int[] a = [[]]") == "test.usda:4:18: a list within a list is empty");
+  CHECK(in_prim("int[] a = [[1, 2], []]") == "test.usda:4:26: a list within a list is empty");
+  CHECK(in_prim("Unknown[] a = [[]]") == "test.usda:4:21: a list within a list is empty");
+}
+
+TEST_CASE("arcs name an asset, or none at all", "[usda]") {
+  CHECK(error_of("def \"A\" (\n    references = @@\n)\n{\n}\n") ==
+        "test.usda:3:20: the asset of a reference is empty; a prim of the same layer is named "
+        "without @@");
+  CHECK(error_of("def \"A\" (\n    payload = [@a.usda@, @@</B>]\n)\n{\n}\n")
+            .find("the asset of a payload is empty") != std::string::npos);
+  // An attribute may say that it has none.
+  CHECK(error_of("def \"A\"\n{\n    asset a = @@\n}\n") == "no error");
+}
+
+TEST_CASE("metadata that USD knows have their types", "[usda]") {
+  const auto with = [](const std::string& field) {
+    return error_of("def \"A\" (\n    " + field + "\n)\n{\n}\n");
+  };
+  CHECK(with("prefix = \"$Left\"") == "no error");
+  CHECK(with("anything = 3") == "no error");
+  CHECK(with("prefix = 3") == "test.usda:3:14: expected a quoted text for string");
+  CHECK(with("suffix = [\"a\"]") == "test.usda:3:14: found a list where string is one value");
+  CHECK(with("displayGroupOrder = \"a\"").find("expected a list") != std::string::npos);
+  CHECK(with("symmetryArguments = 3").find("before a dictionary") != std::string::npos);
+  CHECK(error_of("(\n    startFrame = \"x\"\n)\n").find("expected a number for double") !=
+        std::string::npos);
+}
+
+TEST_CASE("display units are those that USD knows", "[usda]") {
+  const auto with_unit = [](const std::string& unit) {
+    return error_of("def \"A\"\n{\n    float a = 1 (\n        displayUnit = " + unit +
+                    "\n    )\n}\n");
+  };
+  CHECK(with_unit("cm") == "no error");
+  CHECK(with_unit("deg") == "no error");
+  CHECK(with_unit("parsec") ==
+        "test.usda:5:23: \"parsec\" is not a unit; known are mm, cm, dm, m, km, in, ft, yd, mi, "
+        "deg, rad, default");
+  CHECK(with_unit("3").find("is not a unit") != std::string::npos);
+}
+
+TEST_CASE("old names of types stay as they are written", "[usda]") {
+  const auto layer = read(
+      "def \"A\"\n{\n    Vec2f[] primvars:st = [(1, 2)]\n"
+      "    Transform t\n}\n");
+  CHECK(*attribute(*layer, "/A", "primvars:st", "typeName").as_text() == "Vec2f[]");
+  CHECK(attribute(*layer, "/A", "primvars:st").type() == Type::Vec2f);
+  // Two names of one type are two types where a layer says both.
+  CHECK(error_of("def \"A\"\n{\n    Vec2f a\n    float2 a = (1, 2)\n}\n") ==
+        "test.usda:5:13: \"a\" is of type Vec2f in one place and of type float2 in another");
+}
+
 }  // namespace diorama::usd

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "layer_stack.h"
+
+namespace diorama::usd {
+
+struct Prim;
+struct FoundValue;
+
+/// Reads values that stand in the layers of value clips, as they are at the stage's start time, or
+/// where the stage has none at the first time of the clips. Between two samples the earlier one
+/// holds. Belongs to one stage.
+class ValueClips {
+ public:
+  /// `root` says when the stage starts. All must outlive it.
+  ValueClips(AssetLibrary& assets, const LayerStacks& stacks, Diagnostics& diagnostics,
+             const Layer& root);
+  ~ValueClips();
+
+  /// What clips of the prim or of its ancestors say of the attribute; the nearest clips count. Its
+  /// `spec` is the same for the same sample of the same attribute, and for nothing else.
+  FoundValue find(const Prim& prim, std::string_view attribute);
+
+ private:
+  struct ClipSet;
+
+  const std::vector<ClipSet>& sets_of(const Prim& prim);
+  std::vector<ClipSet> read_sets(const Prim& prim);
+  void read_explicit(ClipSet& set, const Dictionary& fields);
+  bool read_template(ClipSet& set, const Dictionary& fields);
+  std::shared_ptr<const Layer> open(const std::string& identifier, const ClipSet& set);
+
+  AssetLibrary& assets_;
+  const LayerStacks& stacks_;
+  Diagnostics& diagnostics_;
+  const Layer& root_;
+  std::map<const Prim*, std::vector<ClipSet>> sets_;
+  std::map<std::pair<const PropertySpec*, std::size_t>, std::unique_ptr<PropertySpec>> samples_;
+};
+
+}  // namespace diorama::usd
