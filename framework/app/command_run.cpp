@@ -10,6 +10,8 @@
 #include "framework/app/assemble.h"
 #include "framework/app/assemble_job.h"
 #include "framework/app/job_file.h"
+#include "framework/app/output_check.h"
+#include "framework/config/clean_text.h"
 #include "framework/host/progress_bar.h"
 #include "framework/pipeline/dataset_description.h"
 #include "framework/plugins/plugin_search.h"
@@ -107,9 +109,10 @@ int command_run(const GlobalOptions& global, const RunCommandOptions& options, C
   JobAssembly assembly = assemble_job(job, *registry, *host, assets_root, program_version(),
                                       options.dry_run ? AssembleFor::Plan : AssembleFor::Run);
   if (options.dry_run) {
-    std::cout << plan_text(assembly.plan, assembly.job, assets_root);
+    std::cout << printable(plan_text(assembly.plan, assembly.job, assets_root));
     return 0;
   }
+  check_folders_are_free(output_folders(assembly.job));
   try {
     const RunSummary summary = run_job(assembly, *host, options, log);
     log_lines(summary_text(summary), log);

@@ -44,7 +44,7 @@ struct RunOptions {
   int shards = 1;
   OutputStore::Existing existing = OutputStore::Existing::Refuse;
   std::size_t queue_bytes = std::size_t(256) << 20;  ///< Of captures that wait to be written.
-  const std::atomic<bool>* stop = nullptr;  ///< True asks the run to end soon.
+  const std::atomic<bool>* stop = nullptr;           ///< True asks the run to end soon.
   /// Called on the main thread after each capture.
   std::function<void(int done, int total, int resumed)> progress;
 };
@@ -97,6 +97,8 @@ class Pipeline {
   Frame make_frame(Visit& visit, std::size_t camera, int capture);
   Image<Rgba8> make_overview(Visit& visit, int capture);
   VisitReport report_on(const Visit& visit) const;
+  /// Calls `visit` with every planned visit of this shard.
+  void for_each_visit(const std::function<void(const PlannedVisit&)>& visit) const;
   bool is_needed(const PlannedVisit& planned) const;
   void begin_output();
   void write(const PendingCapture& pending);
@@ -110,7 +112,6 @@ class Pipeline {
   OutputStore& store_;
   RunOptions options_;
   JobStreams streams_;
-  std::vector<PlannedVisit> visits_;  // of this shard
   const DatasetInfo* dataset_ = nullptr;
   const std::string* dataset_json_ = nullptr;
   bool has_begun_ = false;
