@@ -1,14 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "framework/app/cli.h"
 
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
+#include <charconv>
+#include <cstdint>
 #include <cstdio>
 #include <functional>
 #include <iostream>
 #include <new>
+#include <sstream>
 #include <string>
+#include <system_error>
 #include <vector>
 
+#include "diorama/config.h"
 #include "framework/app/assemble.h"
 #include "framework/app/command_bench.h"
 #include "framework/app/command_config.h"
@@ -26,7 +33,9 @@
 #include "framework/app/command_status.h"
 #include "framework/app/exit_codes.h"
 #include "framework/app/options.h"
+#include "framework/config/clean_text.h"
 #include "framework/host/console_log.h"
+#include "framework/host/terminal.h"
 #include "framework/output/workers.h"
 #include "framework/plugins/fatal_end.h"
 #include "framework/plugins/plugin_search.h"
@@ -74,6 +83,11 @@ void add_global_options(CLI::App& app, CommandLine& line) {
   app.add_option("--threads", line.global.threads, "Threads to work with; 0: all of the machine")
       ->type_name("N")
       ->check(CLI::Range(0, 1024));
+  app.add_option("--picture-mib", line.global.picture_mib,
+                 "Memory that decoding one picture may take; what needs more is refused")
+      ->type_name("N")
+      ->check(CLI::Range(1, 1 << 20))
+      ->capture_default_str();
   app.add_option("--plugin-dir", line.global.plugin_dirs,
                  "Folder with plugins, before all others (repeatable)")
       ->type_name("DIR")
@@ -82,6 +96,18 @@ void add_global_options(CLI::App& app, CommandLine& line) {
                "Also load plugins that others than you may change");
   app.add_option("--assets-root", line.assets_root, "Folder below which asset paths are looked up")
       ->type_name("DIR");
+}
+
+/// The parser would take "-1" for 2^64 - 1.
+CLI::Validator whole_number() {
+  const auto check = [](const std::string& text) -> std::string {
+    std::uint64_t value = 0;
+    const char* end = text.data() + text.size();
+    const auto [rest, failed] = std::from_chars(text.data(), end, value);
+    if (failed == std::errc() && rest == end) return {};
+    return "expected a whole number of 0 to 18446744073709551615, found \"" + text + "\"";
+  };
+  return CLI::Validator(check, "");
 }
 
 /// The job file may be given by its place or as --config FILE.
@@ -96,6 +122,7 @@ void add_job_options(CLI::App& command, JobOptions& job) {
       ->type_name("KEY=VALUE")
       ->allow_extra_args(false);
   command.add_option("--seed", job.seed, "Start of all random streams, instead of the job's")
+      ->check(whole_number())
       ->type_name("N");
   command.add_option("--output", job.output, "Output folder, instead of the job's")
       ->type_name("DIR");
@@ -283,7 +310,9 @@ void add_picture_options(CLI::App& command, PictureOptions& options) {
                   "Set a parameter of the renderer, for instance samples=256 (repeatable)")
       ->type_name("KEY=VALUE")
       ->allow_extra_args(false);
-  command.add_option("--seed", options.seed, "Pattern of the noise")->type_name("N");
+  command.add_option("--seed", options.seed, "Pattern of the noise")
+      ->check(whole_number())
+      ->type_name("N");
 }
 
 void add_render(CLI::App& app, CommandLine& line) {
@@ -501,9 +530,63 @@ int run_command(CommandLine& line) {
   return line.command(log);
 }
 
+/// Of the commands that were given the last: "diorama plugins describe".
+const CLI::App& given_command(const CLI::App& app, std::string& name) {
+  const CLI::App* command = &app;
+  name = app.get_name();
+  while (!command->get_subcommands().empty()) {
+    command = command->get_subcommands().front();
+    name += " " + command->get_name();
+  }
+  return *command;
+}
+
+std::vector<std::string> option_names(const CLI::App& app, const CLI::App& command) {
+  std::vector<std::string> names;
+  for (const CLI::App* source = &command; source != nullptr; source = source->get_parent()) {
+    for (const CLI::Option* option : source->get_options()) {
+      for (const std::string& flag : option->get_lnames()) names.push_back("--" + flag);
+    }
+    if (source == &app) break;
+  }
+  return names;
+}
+
+std::string not_known(const char* what, const std::string& name,
+                      const std::vector<std::string>& names) {
+  const std::string near = nearest_name(name, names);
+  return std::string("unknown ") + what + " \"" + name + "\"" +
+         (near.empty() ? "" : "; did you mean \"" + near + "\"?");
+}
+
+/// What is wrong with a command line, and which help to read.
+std::string usage_message(const CLI::App& app, const CLI::ParseError& error) {
+  std::string name;
+  const CLI::App& command = given_command(app, name);
+  const std::string advice = " (try " + name + " --help)";
+  const bool may_have_more = error.get_exit_code() == int(CLI::ExitCodes::ExtrasError) ||
+                             error.get_exit_code() == int(CLI::ExitCodes::RequiredError);
+  const std::vector<std::string> rest = app.remaining(true);
+  if (!may_have_more || rest.empty()) {
+    const bool lacks_command = &command == &app;
+    return (lacks_command && may_have_more ? "no command is given" : error.what()) + advice;
+  }
+  const std::string& first = rest.front();
+  if (first.starts_with("-") && first.size() > 1) {
+    return not_known("option", first.substr(0, first.find('=')), option_names(app, command)) +
+           advice;
+  }
+  std::vector<std::string> commands;
+  for (const CLI::App* below : command.get_subcommands([](const CLI::App*) { return true; })) {
+    commands.push_back(below->get_name());
+  }
+  if (commands.empty()) return "nothing takes the argument \"" + first + "\"" + advice;
+  return not_known("command", first, commands) + advice;
+}
+
 int report(const std::string& message, int code) {
   std::cout.flush();
-  std::fprintf(stderr, "error: %s\n", message.c_str());
+  std::fprintf(stderr, "error: %s\n", printable(message).c_str());
   return code;
 }
 
@@ -522,8 +605,15 @@ int run_program(int argc, const char* const* argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     // Help and version are no errors, they go to stdout.
-    if (error.get_exit_code() == 0) return app.exit(error);
-    return report(std::string(error.what()) + " (try --help)", exit_code(ErrorKind::Usage));
+    if (error.get_exit_code() == 0) {
+      std::ostringstream text;
+      app.exit(error, text);
+      const bool is_terminal = isatty(STDOUT_FILENO) == 1;
+      std::cout << (is_terminal ? wrapped(text.str(), terminal_columns(STDOUT_FILENO))
+                                : text.str());
+      return 0;
+    }
+    return report(usage_message(app, error), exit_code(ErrorKind::Usage));
   }
   try {
     const int code = run_command(line);

@@ -161,7 +161,7 @@ std::string result_json(const BenchOptions& options, const BenchResult& result) 
   }
   json["runs"] = Json::array();
   for (const BenchRun& run : result.runs) json["runs"].push_back(run_json(run));
-  return json.dump(1) + "\n";
+  return json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
 std::string time_line(const std::string& name, double wall_s, std::optional<double> cpu_s) {

@@ -5,6 +5,7 @@
 #include <mutex>
 
 #include "framework/app/assemble.h"
+#include "framework/config/clean_text.h"
 #include "framework/inspect/scene_report.h"
 
 namespace diorama {
@@ -33,7 +34,8 @@ int command_inspect(const GlobalOptions& global, const InspectOptions& options, 
   SceneReport report = report_scene(scene, root, options.asset);
   report.notes = std::move(notes);
   report.warnings = std::move(warnings);
-  std::cout << (options.as_json ? report_json(report) : report_text(report, options.depth));
+  std::cout << (options.as_json ? report_json(report)
+                                : printable(report_text(report, options.depth)));
   return 0;
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <iostream>
 
+#include "framework/config/clean_text.h"
 #include "framework/lint/lint_dataset.h"
 
 namespace diorama {
@@ -13,7 +14,7 @@ int command_lint(const LintOptions& options) {
   if (options.as_json) {
     std::cout << lint_json(reports);
   } else {
-    for (const LintReport& report : reports) std::cout << lint_text(report);
+    for (const LintReport& report : reports) std::cout << printable(lint_text(report));
   }
   const bool is_clean = std::ranges::all_of(
       reports, [](const LintReport& report) { return report.findings.empty(); });

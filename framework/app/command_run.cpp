@@ -11,6 +11,8 @@
 #include "framework/app/assemble_job.h"
 #include "framework/app/exit_codes.h"
 #include "framework/app/job_file.h"
+#include "framework/app/output_check.h"
+#include "framework/config/clean_text.h"
 #include "framework/config/yaml_config.h"
 #include "framework/host/progress_bar.h"
 #include "framework/host/progress_lines.h"
@@ -134,9 +136,10 @@ int run_value(const GlobalOptions& global, const Value& job, const RunCommandOpt
   JobAssembly assembly = assemble_job(job, *registry, *host, assets_root, program_version(),
                                       options.dry_run ? AssembleFor::Plan : AssembleFor::Run);
   if (options.dry_run) {
-    std::cout << plan_text(assembly.plan, assembly.job, assets_root);
+    std::cout << printable(plan_text(assembly.plan, assembly.job, assets_root));
     return 0;
   }
+  check_folders_are_free(output_folders(assembly.job));
   try {
     const RunSummary summary = run_job(assembly, *host, options, log);
     log_lines(summary_text(summary), log);

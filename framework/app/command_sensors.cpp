@@ -11,6 +11,7 @@
 #include "diorama/writer.h"
 #include "framework/app/assemble.h"
 #include "framework/app/assemble_job.h"
+#include "framework/app/output_check.h"
 #include "framework/config/value_text.h"
 #include "framework/config/yaml_config.h"
 #include "framework/host/progress_bar.h"
@@ -99,7 +100,7 @@ std::string sensors_json(const StoredCaptures& stored, const Effects& effects) {
   const std::string& name = stored.writer_name();
   json["writers"] = {{{"name", name}, {"type", "BasicWriter"}, {"folder", name}}};
   json["sensors"] = effects.resolved;
-  return json.dump(1) + "\n";
+  return json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
 DatasetInfo info_of(const StoredCaptures& stored) {
@@ -181,6 +182,7 @@ int command_sensors(const GlobalOptions& global, const SensorsOptions& options, 
 
   LocalFileSystem file_system;
   const OutputFolders folders{options.output, ".", {{stored.writer_name(), stored.writer_name()}}};
+  check_folders_are_free(folders);
   OutputStore::Options store_options;
   if (options.overwrite) store_options.existing = OutputStore::Existing::Overwrite;
   OutputStore store(file_system, folders, stored.capture_count(), store_options);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "diorama/host.h"
+#include "framework/images/image_codecs.h"
 
 namespace diorama {
 
@@ -16,6 +17,7 @@ struct GlobalOptions {
   std::filesystem::path program;  ///< The running executable, links resolved.
   LogLevel log_level = LogLevel::Info;
   int threads = 0;  ///< 0: as many as the machine offers.
+  int picture_mib = int(kPictureBudget >> 20);
   std::vector<std::filesystem::path> plugin_dirs;
   bool allow_unsafe_plugin_dir = false;
   std::optional<std::filesystem::path> assets_root;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "framework/config/job_overrides.h"
 
+#include <algorithm>
 #include <charconv>
 #include <string>
 #include <vector>
@@ -14,13 +15,24 @@ namespace {
   throw Error(ErrorKind::Usage, "--set " + std::string(assignment) + ": " + message);
 }
 
-std::vector<std::string> split(std::string_view path) {
+/// "cameras[0].width", as messages spell it, and "cameras.0.width" are the same.
+std::vector<std::string> split(std::string_view path, std::string_view assignment) {
   std::vector<std::string> parts;
   for (;;) {
-    const std::size_t dot = path.find('.');
-    parts.emplace_back(path.substr(0, dot));
-    if (dot == std::string_view::npos) return parts;
-    path.remove_prefix(dot + 1);
+    const std::size_t end = std::min(path.find_first_of(".["), path.size());
+    parts.emplace_back(path.substr(0, end));
+    path.remove_prefix(end);
+    while (path.starts_with('[')) {
+      const std::size_t close = path.find(']');
+      const std::size_t next = close == std::string_view::npos ? close : close + 1;
+      if (next > path.size() || (next < path.size() && path[next] != '.' && path[next] != '[')) {
+        refuse(assignment, "expected entries of lists as in cameras[0].width");
+      }
+      parts.emplace_back(path.substr(1, close - 1));
+      path.remove_prefix(next);
+    }
+    if (path.empty()) return parts;
+    path.remove_prefix(1);
   }
 }
 
@@ -90,9 +102,10 @@ void apply_set(Value& job, std::string_view assignment) {
   }
   Value* at = &job;
   std::string path;
-  for (const std::string& part : split(assignment.substr(0, equals))) {
+  for (const std::string& part : split(assignment.substr(0, equals), assignment)) {
     if (part.empty()) refuse(assignment, "the key has an empty part");
-    if (at->kind == Value::Kind::List) {
+    const bool is_entry = at->kind == Value::Kind::List;
+    if (is_entry) {
       at = &list_entry(*at, part, assignment, path);
     } else if (at->kind == Value::Kind::Scalar) {
       refuse(assignment, path + " is " + at->describe() + ", it has no key '" + part + "'");
@@ -100,7 +113,7 @@ void apply_set(Value& job, std::string_view assignment) {
       Value* next = at->find(part);
       at = next ? next : &at->set(part, Value());
     }
-    path += (path.empty() ? "" : ".") + part;
+    path += is_entry ? "[" + part + "]" : (path.empty() ? "" : ".") + part;
   }
   const Place key_place = at->key_place;
   *at = std::move(value);

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 
+#include "framework/config/clean_text.h"
+
 namespace diorama {
 namespace {
 
@@ -143,21 +145,6 @@ void json(const Value& value, int indent, int depth, std::string& text) {
     }
     text += end + "}";
   }
-}
-
-/// Length of the UTF-8 sequence at the front, or 0 when it is none.
-std::size_t utf8_length(std::string_view text) {
-  const auto at = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
-  const std::size_t length = at(0) < 0x80       ? 1
-                             : at(0) >> 5 == 6  ? 2
-                             : at(0) >> 4 == 14 ? 3
-                             : at(0) >> 3 == 30 ? 4
-                                                : 0;
-  if (length == 0 || length > text.size()) return 0;
-  for (std::size_t k = 1; k < length; ++k) {
-    if ((at(k) & 0xC0) != 0x80) return 0;
-  }
-  return length;
 }
 
 }  // namespace

@@ -15,6 +15,9 @@
 #include <utility>
 #include <vector>
 
+#include "framework/config/clean_text.h"
+#include "framework/config/yaml_faults.h"
+
 namespace diorama {
 namespace {
 
@@ -79,6 +82,9 @@ class TreeBuilder final : public YAML::EventHandler {
                 const std::string& text) override {
     check_tag(tag, place(mark), {"str", "int", "float", "bool", "null"});
     check_quotes(mark);
+    if (text.find('\0') != std::string::npos) {
+      refuse(place(mark), "this text holds the character NUL, which no name and no path may");
+    }
     Value value;
     value.kind = Value::Kind::Scalar;
     value.place = place(mark);
@@ -115,7 +121,7 @@ class TreeBuilder final : public YAML::EventHandler {
     std::string key;
     Place key_place;
     std::set<std::string, std::less<>> keys;
-    std::vector<Value> merged;                // values of "<<"
+    std::vector<Value> merged;  // values of "<<"
   };
 
   Place place(const YAML::Mark& mark) const { return {file_, mark.line + 1, mark.column + 1}; }
@@ -274,16 +280,9 @@ void check_text(std::string_view text, const std::string& file) {
   int line = 1;
   std::size_t line_start = 0;
   for (std::size_t i = 0; i < text.size();) {
-    const auto byte = static_cast<unsigned char>(text[i]);
-    const std::size_t length = byte < 0x80       ? 1
-                               : byte >> 5 == 6  ? 2
-                               : byte >> 4 == 14 ? 3
-                               : byte >> 3 == 30 ? 4
-                                                 : 0;
-    bool is_good = length > 0 && i + length <= text.size() && byte != 0;
-    for (std::size_t k = 1; is_good && k < length; ++k) {
-      is_good = (static_cast<unsigned char>(text[i + k]) & 0xC0) == 0x80;
-    }
+    const char byte = text[i];
+    const std::size_t length = utf8_length(text.substr(i));
+    const bool is_good = length > 0 && byte != '\0';
     if (!is_good) {
       refuse({file, line, int(i - line_start) + 1},
              "this is no UTF-8 text; save the file as UTF-8 (is it really a job file?)");
@@ -314,9 +313,10 @@ Value parse_yaml(std::string_view text, std::string file) {
     refuse({file, error.mark.line + 1, error.mark.column + 1},
            "nested deeper than " + std::to_string(kMaxDepth) + " levels");
   } catch (const YAML::Exception& error) {
-    const bool has_place = !error.mark.is_null();
-    refuse(has_place ? Place{file, error.mark.line + 1, error.mark.column + 1} : Place{file, 0, 0},
-           "YAML syntax error: " + error.msg);
+    const int line = error.mark.is_null() ? 1 : error.mark.line + 1;
+    const int column = error.mark.is_null() ? 1 : error.mark.column + 1;
+    const YamlFault fault = explain_yaml_fault(text, line, column, error.msg);
+    refuse({file, fault.line, fault.column}, "YAML syntax error: " + fault.message);
   }
 }
 

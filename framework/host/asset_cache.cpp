@@ -4,6 +4,7 @@
 #include <set>
 #include <utility>
 
+#include "framework/config/clean_text.h"
 #include "framework/host/node_content.h"
 
 namespace diorama {
@@ -89,14 +90,16 @@ std::size_t scene_bytes(const Scene& scene) {
 
 NodeId instantiate(const Scene& from, NodeId source, Scene& to, NodeId parent,
                    std::string_view stem) {
-  const NodeId top = to.create(parent, stem);
+  const NodeId top = to.create(parent, clean_name(stem));
   std::map<NodeId, NodeId> copies;
   for (const NodeId node : from.subtree(source)) {
     const Node& original = from[node];
-    const NodeId copy = node == source ? top : to.create(copies.at(original.parent), original.name);
+    const NodeId copy =
+        node == source ? top : to.create(copies.at(original.parent), clean_name(original.name));
     copies[node] = copy;
     to.set_pose(copy, original.parent_from_node);
     copy_content(original, to.edit(copy));
+    if (!original.labels.empty()) clean_labels(to.edit(copy));
   }
   return top;
 }

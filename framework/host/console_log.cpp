@@ -12,6 +12,7 @@
 #include <mutex>
 
 #include "diorama/error.h"
+#include "framework/config/clean_text.h"
 
 namespace diorama {
 namespace {
@@ -68,7 +69,8 @@ void ConsoleLog::write(LogLevel level, std::string_view message) {
   const std::lock_guard lock(state_->mutex);
   if (!state_->logger.should_log(level_of(level))) return;
   state_->erase_status();
-  state_->logger.log(level_of(level), spdlog::string_view_t(message.data(), message.size()));
+  const std::string text = printable(message);
+  state_->logger.log(level_of(level), spdlog::string_view_t(text.data(), text.size()));
   state_->draw_status();
 }
 

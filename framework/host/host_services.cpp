@@ -9,7 +9,8 @@
 #include <system_error>
 #include <utility>
 
-#include "framework/images/image_codecs.h"
+#include "framework/config/clean_text.h"
+#include "framework/host/node_content.h"
 #include "framework/plugins/plugin_call.h"
 
 namespace diorama {
@@ -60,7 +61,8 @@ HostServices::HostServices(Registry& registry, HostOptions options, Log log)
       paths_(std::move(options.assets_root)),
       log_(std::move(log)),
       pool_(options.threads),
-      cache_(options.asset_cache_bytes) {
+      cache_(options.asset_cache_bytes),
+      picture_bytes_(options.picture_bytes) {
   learn_claims();
 }
 
@@ -231,6 +233,11 @@ NodeId HostServices::load_asset(std::string_view asset, Scene& scene, NodeId par
   const auto loaded = cache_.get(key, [&](Scene& own) {
     const NodeId root = own.create(own.root(), source.stem);
     call_component("loader '" + source.loader + "'", [&] { with.load(source.asset, own, root); });
+    const std::string word = first_unclean_word(own, root);
+    if (word.empty()) return;
+    log_(LogLevel::Warning, source.asset + ": the name \"" + clean_name(word) +
+                                "\" is no plain UTF-8 text; bytes of it are written as \\x00 to "
+                                "\\xFF, in datasets, too");
   });
   const NodeId root = (*loaded)[loaded->root()].children.front();
   return instantiate(*loaded, root, scene, parent, source.stem);
@@ -238,11 +245,11 @@ NodeId HostServices::load_asset(std::string_view asset, Scene& scene, NodeId par
 
 std::shared_ptr<const Texture> HostServices::decode_texture(std::span<const std::byte> bytes,
                                                             std::string_view name) const {
-  return decode_image(bytes, name);
+  return decode_image(bytes, name, picture_bytes_);
 }
 
 std::shared_ptr<const Texture> HostServices::read_texture(const fs::path& file) const {
-  return decode_image(read_bytes(file), file.string());
+  return decode_image(read_bytes(file), file.string(), picture_bytes_);
 }
 
 std::vector<std::byte> HostServices::encode_image(const ImageView& image,

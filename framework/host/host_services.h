@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -17,6 +18,7 @@
 #include "framework/host/asset_paths.h"
 #include "framework/host/log.h"
 #include "framework/host/thread_pool.h"
+#include "framework/images/image_codecs.h"
 #include "framework/plugins/registry.h"
 
 namespace diorama {
@@ -25,6 +27,7 @@ struct HostOptions {
   std::optional<std::filesystem::path> assets_root;
   int threads = 1;
   std::size_t asset_cache_bytes = std::size_t(1) << 30;
+  std::uint64_t picture_bytes = kPictureBudget;  ///< Memory to decode one picture.
 };
 
 /// The services that plugins get. Loaders are made on first use, with default parameters unless a
@@ -83,6 +86,7 @@ class HostServices final : public Host {
   Log log_;
   ThreadPool pool_;
   AssetCache cache_;
+  std::uint64_t picture_bytes_;
   std::map<std::string, std::unique_ptr<Loader>> loaders_;
   std::vector<Claim> claims_;  // earlier ones win
   mutable std::mutex resolved_mutex_;

@@ -2,9 +2,12 @@
 #include "framework/host/progress_bar.h"
 
 #include <spdlog/fmt/fmt.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <utility>
+
+#include "framework/host/terminal.h"
 
 namespace diorama {
 namespace {
@@ -42,6 +45,17 @@ std::string progress_text(std::string_view what, std::int64_t done, std::int64_t
   return text;
 }
 
+std::string progress_line(std::string_view what, std::int64_t done, std::int64_t total,
+                          std::int64_t resumed, double seconds, int columns) {
+  constexpr int kLeastBar = 5;
+  constexpr int kAroundBar = 4;  // brackets and spaces
+  const std::string text = progress_text(what, done, total, resumed, seconds, 0);
+  const int room = columns - 1;  // the cursor takes a place, too
+  const int bar = std::min(kBarWidth, room - kAroundBar - int(text.size()));
+  if (bar >= kLeastBar) return progress_text(what, done, total, resumed, seconds, bar);
+  return text.substr(0, std::size_t(std::max(room, 0)));
+}
+
 ProgressBar::ProgressBar(ConsoleLog& log, std::string what, std::int64_t total)
     : log_(log),
       what_(std::move(what)),
@@ -60,12 +74,11 @@ void ProgressBar::update(std::int64_t done, std::int64_t resumed) {
   if (!is_due && done < total_) return;
   last_shown_ = now;
   const double seconds = std::chrono::duration<double>(now - start_).count();
-  const std::string text =
-      progress_text(what_, done, total_, resumed, seconds, is_terminal ? kBarWidth : 0);
   if (is_terminal) {
-    log_.set_status(text);
+    const int columns = terminal_columns(STDERR_FILENO);
+    log_.set_status(progress_line(what_, done, total_, resumed, seconds, columns));
   } else {
-    log_.write(LogLevel::Info, text);
+    log_.write(LogLevel::Info, progress_text(what_, done, total_, resumed, seconds, 0));
   }
 }
 

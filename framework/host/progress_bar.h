@@ -35,4 +35,9 @@ class ProgressBar {
 std::string progress_text(std::string_view what, std::int64_t done, std::int64_t total,
                           std::int64_t resumed, double seconds, int bar_width);
 
+/// The same for a terminal that is so wide: with as much of the bar as there is room for, and cut
+/// off where that is not enough. A line that is broken by the terminal cannot be redrawn.
+std::string progress_line(std::string_view what, std::int64_t done, std::int64_t total,
+                          std::int64_t resumed, double seconds, int columns);
+
 }  // namespace diorama

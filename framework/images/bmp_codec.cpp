@@ -30,6 +30,7 @@ class BmpReader {
     if (pixels_at > source_.bytes.size() || stride * rows > source_.bytes.size() - pixels_at) {
       cut_off();
     }
+    source_.check_budget(std::uint64_t(width), rows, std::uint64_t(width) * rows * 3);
     if (bits_ == 8) read_palette(14 + header_size, pixels_at);
     Texture texture;
     texture.width = width;

@@ -5,10 +5,13 @@
 #include <ImfIO.h>
 #include <ImfInputFile.h>
 #include <ImfOutputFile.h>
+#include <ImfTileDescription.h>
 
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <string_view>
+#include <utility>
 
 #include "framework/images/codecs.h"
 
@@ -94,22 +97,181 @@ Imf::FrameBuffer buffer_for(float* pixels, const Names& names, std::size_t width
   return buffer;
 }
 
+/// Lines that are packed together.
+std::uint64_t lines_per_chunk(Imf::Compression compression) {
+  switch (compression) {
+    case Imf::NO_COMPRESSION:
+    case Imf::RLE_COMPRESSION:
+    case Imf::ZIPS_COMPRESSION:
+      return 1;
+    case Imf::ZIP_COMPRESSION:
+    case Imf::PXR24_COMPRESSION:
+      return 16;
+    case Imf::DWAB_COMPRESSION:
+      return 256;
+    default:
+      return 32;
+  }
+}
+
+std::uint64_t sample_size(Imf::PixelType type) { return type == Imf::HALF ? 2 : 4; }
+
+constexpr std::uint64_t kMarkAndVersion = 8;
+
+/// Walks over the attributes: the library takes as much memory as one claims to need before it
+/// looks whether the file has that much.
+class AttributeWalk {
+ public:
+  explicit AttributeWalk(const Source& source) : source_(source) {}
+
+  void run() {
+    constexpr std::uint32_t kHasParts = 0x1000;
+    const bool has_parts = (u32(4) & kHasParts) != 0;
+    at_ = kMarkAndVersion;
+    // Several headers end with an empty one.
+    do {
+      while (!skip_word().empty()) {
+        const std::string_view type = skip_word();
+        const std::uint64_t size = u32(at_);
+        at_ += 4;
+        if (size > source_.bytes.size() - at_) cut_off();
+        const std::uint64_t end = at_ + size;
+        check_size_of(type, size);
+        at_ = end;
+      }
+    } while (has_parts && at_ < source_.bytes.size() && source_.bytes[at_] != std::byte(0));
+  }
+
+ private:
+  [[noreturn]] void cut_off() const { source_.refuse("damaged EXR: the file is cut off"); }
+
+  [[noreturn]] void wrong_size(std::string_view type) const {
+    source_.refuse("damaged EXR: an attribute of type " + std::string(type) + " has a wrong size");
+  }
+
+  /// The library reads values of types that it knows by their types, and goes on behind them. What
+  /// stands there must be the next attribute.
+  void check_size_of(std::string_view type, std::uint64_t size) {
+    static constexpr std::array<std::pair<std::string_view, std::uint64_t>, 23> kSizes{
+        {{"box2f", 16},      {"box2i", 16},   {"chromaticities", 32},
+         {"compression", 1}, {"double", 8},   {"envmap", 1},
+         {"float", 4},       {"int", 4},      {"keycode", 28},
+         {"lineOrder", 1},   {"m33d", 72},    {"m33f", 36},
+         {"m44d", 128},      {"m44f", 64},    {"rational", 8},
+         {"tiledesc", 9},    {"timecode", 8}, {"v2d", 16},
+         {"v2f", 8},         {"v2i", 8},      {"v3d", 24},
+         {"v3f", 12},        {"v3i", 12}}};
+    for (const auto& [known, expected] : kSizes) {
+      if (type == known && size != expected) wrong_size(type);
+    }
+    // Packed lists of ids are of use in deep files only, and may unpack to anything.
+    if (type == "idmanifest" || type == "deepImageState") {
+      source_.refuse("deep EXR files are not read; save it flat");
+    }
+    if (type != "chlist") return;
+    constexpr std::uint64_t kAfterName = 16;
+    const std::uint64_t end = at_ + size;
+    while (!skip_word().empty()) {
+      if (at_ > end || kAfterName > end - at_) wrong_size(type);
+      at_ += kAfterName;
+    }
+    if (at_ != end) wrong_size(type);
+  }
+
+  std::uint32_t u32(std::uint64_t at) const {
+    if (source_.bytes.size() < 4 || at > source_.bytes.size() - 4) cut_off();
+    std::uint32_t value = 0;
+    for (std::uint64_t i = 0; i < 4; ++i) {
+      value |= std::uint32_t(source_.bytes[at + i]) << (8 * i);
+    }
+    return value;
+  }
+
+  std::string_view skip_word() {
+    const auto* text = reinterpret_cast<const char*>(source_.bytes.data());
+    const std::string_view rest = std::string_view(text, source_.bytes.size()).substr(at_);
+    const std::size_t end = rest.find('\0');
+    if (end == std::string_view::npos) cut_off();
+    at_ += end + 1;
+    return rest.substr(0, end);
+  }
+
+  const Source& source_;
+  std::uint64_t at_ = 0;
+};
+
+/// The header alone: opening a file lets the library take memory by what its header says.
+Imf::Header read_header(const Source& source) {
+  AttributeWalk(source).run();
+  MemoryReader stream(source);
+  stream.seekg(kMarkAndVersion);
+  Imf::Header header;
+  int version = 0;
+  header.readFrom(stream, version);
+  return header;
+}
+
+struct Size {
+  std::uint64_t width = 0;
+  std::uint64_t height = 0;
+};
+
+/// Refuses what the file is too short for, and what takes too much memory.
+Size check_sizes(const Imf::Header& header, std::uint64_t channels, const Source& source) {
+  const Imath::Box2i& window = header.dataWindow();
+  const auto side = [](int low, int high) {
+    return std::uint64_t(std::max<std::int64_t>(std::int64_t(high) - low + 1, 0));
+  };
+  const Size size{side(window.min.x, window.max.x), side(window.min.y, window.max.y)};
+  source.check_size(size.width, size.height);
+  std::uint64_t pixel_size = 0;
+  for (auto channel = header.channels().begin(); channel != header.channels().end(); ++channel) {
+    pixel_size += sample_size(channel.channel().type);
+  }
+  // Deflate makes at most 1032 bytes of one, the others less. DWA drops what is zero.
+  const bool is_dwa = header.compression() == Imf::DWAA_COMPRESSION ||
+                      header.compression() == Imf::DWAB_COMPRESSION;
+  if (!is_dwa && size.width * size.height * pixel_size / 1032 > source.bytes.size()) {
+    source.refuse("damaged EXR: the file is cut off");
+  }
+  std::uint64_t chunk_pixels = size.width * lines_per_chunk(header.compression());
+  if (header.hasTileDescription()) {
+    const Imf::TileDescription& tiles = header.tileDescription();
+    const auto padded = std::max<std::uint64_t>(size.width, tiles.xSize) + tiles.xSize;
+    chunk_pixels = padded * std::min<std::uint64_t>(tiles.ySize, 1u << 20);
+  }
+  // Packed, unpacked and as the decoder has it.
+  constexpr std::uint64_t kCopiesOfChunk = 3;
+  source.check_budget(size.width, size.height,
+                      size.width * size.height * channels * sizeof(float) +
+                          kCopiesOfChunk * chunk_pixels * pixel_size);
+  return size;
+}
+
 Texture read(const Source& source) {
+  const Imf::Header header = read_header(source);
+  const Names names = picture_channels(header.channels(), source);
+  const Size size = check_sizes(header, names.size(), source);
   MemoryReader stream(source);
   Imf::InputFile file(stream, 0);
-  const Imath::Box2i window = file.header().dataWindow();
-  const auto width = std::int64_t(window.max.x) - window.min.x + 1;
-  const auto height = std::int64_t(window.max.y) - window.min.y + 1;
-  source.check_size(std::uint64_t(std::max<std::int64_t>(width, 0)),
-                    std::uint64_t(std::max<std::int64_t>(height, 0)));
-  const Names names = picture_channels(file.header().channels(), source);
+  const Imath::Box2i window = header.dataWindow();
+  if (file.header().dataWindow() != window) source.refuse("damaged EXR: it has two headers");
+  const std::size_t row_size = std::size_t(size.width) * names.size();
+  GrowingRows<float> rows(row_size, std::size_t(size.height));
+  file.setFrameBuffer(buffer_for(rows.begin(), names, std::size_t(size.width), window));
+  const int step = int(lines_per_chunk(header.compression()));
+  for (int y = window.min.y;;) {
+    const int last = window.max.y - y < step ? window.max.y : y + step - 1;
+    rows.add(std::size_t(last - y) + 1);
+    file.readPixels(y, last);
+    if (last == window.max.y) break;
+    y = last + 1;
+  }
   Texture texture;
-  texture.width = int(width);
-  texture.height = int(height);
+  texture.width = int(size.width);
+  texture.height = int(size.height);
   texture.channels = int(names.size());
-  texture.floats.resize(std::size_t(width * height) * names.size());
-  file.setFrameBuffer(buffer_for(texture.floats.data(), names, std::size_t(width), window));
-  file.readPixels(window.min.y, window.max.y);
+  texture.floats = rows.take();
   return texture;
 }
 

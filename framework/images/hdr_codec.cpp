@@ -45,23 +45,28 @@ class HdrReader {
 
   Texture read() {
     read_header();
-    const bool is_plain = read_size();
-    source_.check_size(std::uint64_t(texture_.width), std::uint64_t(texture_.height));
-    texture_.channels = 3;
+    const bool is_from_top = read_size();
     const std::size_t width = std::size_t(texture_.width);
-    // A run covers at most 127 bytes with two, so fewer bytes than this cannot hold the rows.
-    if (width * std::size_t(texture_.height) / 64 > source_.bytes.size()) cut_off();
-    texture_.floats.resize(width * std::size_t(texture_.height) * 3);
+    const std::size_t height = std::size_t(texture_.height);
+    source_.check_size(width, height);
+    // A pixel of its own and up to two old-style runs make the shortest row.
+    const std::size_t shortest_row = width == 1 ? 4 : width <= 256 ? 8 : 12;
+    if (shortest_row * height > source_.bytes.size()) cut_off();
+    const std::size_t row_size = 3 * width;
+    source_.check_budget(width, height, row_size * height * sizeof(float));
+    GrowingRows<float> rows(row_size, height);
     std::vector<Rgbe> row(width);
-    for (int y = 0; y < texture_.height; ++y) {
+    for (std::size_t y = 0; y < height; ++y) {
       read_row(row);
-      const int to = is_plain ? y : texture_.height - 1 - y;
-      float* floats = texture_.floats.data() + std::size_t(to) * width * 3;
+      float* floats = rows.add();
       for (std::size_t x = 0; x < width; ++x) {
         to_floats(row[x], floats + 3 * x);
         for (std::size_t c = 0; c < 3; ++c) floats[3 * x + c] *= float(1.0 / exposure_);
       }
     }
+    texture_.channels = 3;
+    texture_.floats = rows.take();
+    if (!is_from_top) turn_rows(texture_.floats, row_size);
     return std::move(texture_);
   }
 

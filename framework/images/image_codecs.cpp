@@ -56,9 +56,9 @@ void check(const ImageView& image, std::initializer_list<std::pair<int, int>> kn
 
 }  // namespace
 
-std::shared_ptr<const Texture> decode_image(std::span<const std::byte> bytes,
-                                            std::string_view name) {
-  auto texture = std::make_shared<Texture>(decode_any({bytes, name}));
+std::shared_ptr<const Texture> decode_image(std::span<const std::byte> bytes, std::string_view name,
+                                            std::uint64_t budget) {
+  auto texture = std::make_shared<Texture>(decode_any({bytes, name, budget}));
   texture->name = name;
   texture->color_space =
       !texture->bytes.empty() && texture->channels >= 3 ? ColorSpace::Srgb : ColorSpace::Linear;

@@ -4,6 +4,7 @@
 #include <jerror.h>
 #include <jpeglib.h>
 
+#include <algorithm>
 #include <csetjmp>
 #include <cstdlib>
 #include <cstring>
@@ -45,7 +46,18 @@ void connect(JpegErrors& errors) {
   errors.base.output_message = [](j_common_ptr) {};
 }
 
-bool start_read(jpeg_decompress_struct& jpeg, JpegErrors& errors, const Source& source) {
+/// Each scan goes over all blocks, and a scan of nothing takes a few bytes. Pictures have ten.
+constexpr int kMostScans = 100;
+
+void on_progress(j_common_ptr codec) {
+  const auto* jpeg = reinterpret_cast<const jpeg_decompress_struct*>(codec);
+  if (jpeg->input_scan_number <= kMostScans) return;
+  auto* errors = reinterpret_cast<JpegErrors*>(codec->err);
+  std::strcpy(errors->message, "it has more than 100 scans");
+  std::longjmp(errors->failed, 1);
+}
+
+bool read_header(jpeg_decompress_struct& jpeg, JpegErrors& errors, const Source& source) {
   if (setjmp(errors.failed)) return false;
   jpeg_create_decompress(&jpeg);
   jpeg_mem_src(&jpeg, reinterpret_cast<const unsigned char*>(source.bytes.data()),
@@ -56,16 +68,58 @@ bool start_read(jpeg_decompress_struct& jpeg, JpegErrors& errors, const Source& 
   return true;
 }
 
-bool read_pixels(jpeg_decompress_struct& jpeg, JpegErrors& errors, std::uint8_t* to) {
+bool start_rows(jpeg_decompress_struct& jpeg, JpegErrors& errors) {
   if (setjmp(errors.failed)) return false;
   jpeg_start_decompress(&jpeg);
-  const std::size_t row = std::size_t(jpeg.output_width) * std::size_t(jpeg.output_components);
-  while (jpeg.output_scanline < jpeg.output_height) {
-    JSAMPROW line = to + row * jpeg.output_scanline;
-    jpeg_read_scanlines(&jpeg, &line, 1);
-  }
+  return true;
+}
+
+bool read_row(jpeg_decompress_struct& jpeg, JpegErrors& errors, std::uint8_t* to) {
+  if (setjmp(errors.failed)) return false;
+  JSAMPROW line = to;
+  jpeg_read_scanlines(&jpeg, &line, 1);
+  return true;
+}
+
+bool read_end(jpeg_decompress_struct& jpeg, JpegErrors& errors) {
+  if (setjmp(errors.failed)) return false;
   jpeg_finish_decompress(&jpeg);
   return true;
+}
+
+/// Blocks of 8 x 8 samples, by component.
+struct BlockCounts {
+  std::uint64_t all = 0;
+  std::uint64_t fewest = ~std::uint64_t(0);
+};
+
+BlockCounts block_counts(const jpeg_decompress_struct& jpeg) {
+  BlockCounts counts;
+  for (int i = 0; i < jpeg.num_components; ++i) {
+    const jpeg_component_info& component = jpeg.comp_info[i];
+    const std::uint64_t blocks =
+        std::uint64_t(component.width_in_blocks) * component.height_in_blocks;
+    counts.all += blocks;
+    counts.fewest = std::min(counts.fewest, blocks);
+  }
+  return counts;
+}
+
+/// Refuses what the file is too short for, and what takes too much memory.
+void check_sizes(jpeg_decompress_struct& jpeg, const Source& source) {
+  source.check_size(jpeg.output_width, jpeg.output_height);
+  const BlockCounts blocks = block_counts(jpeg);
+  // Huffman codes take a bit at least, and each block of a component that is there has one. The
+  // arithmetic coder knows no such limit.
+  if (!jpeg.arith_code && blocks.fewest / 8 > source.bytes.size()) {
+    source.refuse("damaged JPEG: the file is cut off");
+  }
+  const bool keeps_blocks = jpeg.progressive_mode || jpeg_has_multiple_scans(&jpeg);
+  const std::uint64_t pixels = std::uint64_t(jpeg.output_width) * jpeg.output_height;
+  const bool is_cmyk = jpeg.out_color_space == JCS_CMYK;
+  source.check_budget(jpeg.output_width, jpeg.output_height,
+                      pixels * std::uint64_t(jpeg.out_color_components + (is_cmyk ? 3 : 0)) +
+                          (keeps_blocks ? blocks.all * sizeof(JBLOCK) : 0));
 }
 
 /// CMYK as Adobe writes it (inverted) or not, by the simple product rule.
@@ -115,19 +169,25 @@ Texture decode_jpeg(const Source& source) {
   jpeg.err = &errors.base;
   const auto destroy = [](jpeg_decompress_struct* codec) { jpeg_destroy_decompress(codec); };
   const std::unique_ptr<jpeg_decompress_struct, decltype(destroy)> owner(&jpeg, destroy);
-  if (!start_read(jpeg, errors, source)) {
-    source.refuse(std::string("damaged JPEG: ") + errors.message);
-  }
-  source.check_size(jpeg.output_width, jpeg.output_height);
+  const auto require = [&](bool is_good) {
+    if (!is_good) source.refuse(std::string("damaged JPEG: ") + errors.message);
+  };
+  require(read_header(jpeg, errors, source));
+  check_sizes(jpeg, source);
+  jpeg_progress_mgr progress{};
+  progress.progress_monitor = on_progress;
+  jpeg.progress = &progress;
+  require(start_rows(jpeg, errors));
+
   Texture texture;
   texture.width = int(jpeg.output_width);
   texture.height = int(jpeg.output_height);
   texture.channels = jpeg.out_color_components;
-  texture.bytes.resize(std::size_t(texture.width) * std::size_t(texture.height) *
-                       std::size_t(texture.channels));
-  if (!read_pixels(jpeg, errors, texture.bytes.data())) {
-    source.refuse(std::string("damaged JPEG: ") + errors.message);
-  }
+  GrowingRows<std::uint8_t> rows(
+      std::size_t(jpeg.output_width) * std::size_t(jpeg.output_components), jpeg.output_height);
+  while (jpeg.output_scanline < jpeg.output_height) require(read_row(jpeg, errors, rows.add()));
+  require(read_end(jpeg, errors));
+  texture.bytes = rows.take();
   if (jpeg.out_color_space == JCS_CMYK) {
     texture.bytes = rgb_of_cmyk(texture.bytes, jpeg.saw_Adobe_marker);
     texture.channels = 3;

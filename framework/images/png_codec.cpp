@@ -46,32 +46,61 @@ void on_warning(png_structp, png_const_charp) {}
 struct PngHeader {
   png_uint_32 width = 0;
   png_uint_32 height = 0;
-  int channels = 0;
-  int bits = 0;  // 8 or 16, after conversion
+  int channels = 0;  // after conversion
+  int bits = 0;      // 8 or 16, after conversion
+  bool is_interlaced = false;
   std::uint64_t coded_row_bits = 0;
 };
 
-/// Reads up to the pixels and asks for 8 or 16 bits per channel without palette.
+/// Reads up to the pixels. libpng allocates nothing by the header's sizes here.
 bool read_header(png_structp png, png_infop info, PngRead& read, PngHeader& header) {
   if (setjmp(read.failed)) return false;
   png_set_user_limits(png, 0x7fffffff, 0x7fffffff);  // our own check has the better message
+  // Texts, profiles and what else may be packed a thousandfold is of no use here.
+  png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
   png_read_info(png, info);
   header.width = png_get_image_width(png, info);
   header.height = png_get_image_height(png, info);
+  header.is_interlaced = png_get_interlace_type(png, info) != PNG_INTERLACE_NONE;
+  const int bits = png_get_bit_depth(png, info);
+  const int channels = png_get_channels(png, info);
   header.coded_row_bits =
-      std::uint64_t(header.width) * png_get_bit_depth(png, info) * png_get_channels(png, info);
-  png_set_expand(png);
-  if (png_get_bit_depth(png, info) == 16) png_set_swap(png);
-  png_set_interlace_handling(png);
-  png_read_update_info(png, info);
-  header.channels = png_get_channels(png, info);
-  header.bits = png_get_bit_depth(png, info);
+      std::uint64_t(header.width) * std::uint64_t(bits) * std::uint64_t(channels);
+  header.bits = bits == 16 ? 16 : 8;
+  header.channels = (png_get_color_type(png, info) == PNG_COLOR_TYPE_PALETTE ? 3 : channels) +
+                    (png_get_valid(png, info, PNG_INFO_tRNS) ? 1 : 0);
   return true;
 }
 
-bool read_rows(png_structp png, png_bytepp rows, PngRead& read) {
+/// Asks for 8 or 16 bits per channel without palette. False also when libpng converts otherwise.
+bool start_rows(png_structp png, png_infop info, PngRead& read, const PngHeader& header) {
+  if (setjmp(read.failed)) return false;
+  png_set_expand(png);
+  if (header.bits == 16) png_set_swap(png);
+  png_set_interlace_handling(png);
+  png_read_update_info(png, info);
+  if (png_get_channels(png, info) == header.channels &&
+      png_get_bit_depth(png, info) == header.bits) {
+    return true;
+  }
+  std::strcpy(read.message, "its pixels are of an unknown kind");
+  return false;
+}
+
+bool read_row(png_structp png, png_bytep row, PngRead& read) {
+  if (setjmp(read.failed)) return false;
+  png_read_row(png, row, nullptr);
+  return true;
+}
+
+bool read_all_rows(png_structp png, png_bytepp rows, PngRead& read) {
   if (setjmp(read.failed)) return false;
   png_read_image(png, rows);
+  return true;
+}
+
+bool read_end(png_structp png, PngRead& read) {
+  if (setjmp(read.failed)) return false;
   png_read_end(png, nullptr);
   return true;
 }
@@ -232,35 +261,61 @@ Texture decode_png(const Source& source) {
   read.left = source.bytes.size();
   PngReader reader(read);
   PngHeader header;
-  if (!read_header(reader.png(), reader.info(), read, header)) {
-    source.refuse(std::string("damaged PNG: ") + read.message);
-  }
+  const auto require = [&](bool is_good) {
+    if (!is_good) source.refuse(std::string("damaged PNG: ") + read.message);
+  };
+  require(read_header(reader.png(), reader.info(), read, header));
   source.check_size(header.width, header.height);
-  // Deflate shrinks to 1/1032 at best, so a small file that claims many pixels lacks data.
-  const std::uint64_t coded = (header.coded_row_bits + 7) / 8 * header.height;
-  if (coded / 1040 > source.bytes.size()) source.refuse("damaged PNG: the file is cut off");
+  // Deflate makes at most 1032 bytes of one.
+  if (header.coded_row_bits / 8 * header.height / 1032 > source.bytes.size()) {
+    source.refuse("damaged PNG: the file is cut off");
+  }
+  const bool is_deep = header.bits == 16;
+  const std::size_t row_samples = std::size_t(header.width) * std::size_t(header.channels);
+  const std::uint64_t samples = std::uint64_t(row_samples) * header.height;
+  const std::uint64_t raw = samples * (is_deep ? 2 : 1);
+  source.check_budget(header.width, header.height,
+                      samples * (is_deep ? 4 : 1) + (header.is_interlaced && is_deep ? raw : 0) +
+                          header.height * sizeof(png_bytep));
+  require(start_rows(reader.png(), reader.info(), read, header));
 
   Texture texture;
   texture.width = int(header.width);
   texture.height = int(header.height);
   texture.channels = header.channels;
-  const std::size_t row_size =
-      std::size_t(header.width) * std::size_t(header.channels * header.bits / 8);
-  std::vector<std::uint8_t> pixels(row_size * header.height);
-  std::vector<png_bytep> rows(header.height);
-  for (std::size_t y = 0; y < rows.size(); ++y) rows[y] = pixels.data() + y * row_size;
-  if (!read_rows(reader.png(), rows.data(), read)) {
-    source.refuse(std::string("damaged PNG: ") + read.message);
+  const std::size_t row_size = row_samples * (is_deep ? 2 : 1);
+  GrowingRows<std::uint8_t> bytes(row_size, is_deep && !header.is_interlaced ? 1 : header.height);
+  GrowingRows<float> floats(row_samples, is_deep ? header.height : 0);
+  const auto add_deep_row = [&](const std::uint8_t* from) {
+    float* to = floats.add();
+    for (std::size_t i = 0; i < row_samples; ++i) {
+      std::uint16_t value;
+      std::memcpy(&value, from + 2 * i, 2);
+      to[i] = float(value) / 65535.0f;
+    }
+  };
+  if (header.is_interlaced) {
+    std::uint8_t* pixels = bytes.add(header.height);
+    std::vector<png_bytep> rows(header.height);
+    for (std::size_t y = 0; y < rows.size(); ++y) rows[y] = pixels + y * row_size;
+    require(read_all_rows(reader.png(), rows.data(), read));
+    for (std::size_t y = 0; is_deep && y < rows.size(); ++y) add_deep_row(rows[y]);
+  } else if (is_deep) {
+    std::uint8_t* row = bytes.add();
+    for (png_uint_32 y = 0; y < header.height; ++y) {
+      require(read_row(reader.png(), row, read));
+      add_deep_row(row);
+    }
+  } else {
+    for (png_uint_32 y = 0; y < header.height; ++y) {
+      require(read_row(reader.png(), bytes.add(), read));
+    }
   }
-  if (header.bits == 8) {
-    texture.bytes = std::move(pixels);
-    return texture;
-  }
-  texture.floats.resize(pixels.size() / 2);
-  for (std::size_t i = 0; i < texture.floats.size(); ++i) {
-    std::uint16_t value;
-    std::memcpy(&value, pixels.data() + 2 * i, 2);
-    texture.floats[i] = float(value) / 65535.0f;
+  require(read_end(reader.png(), read));
+  if (is_deep) {
+    texture.floats = floats.take();
+  } else {
+    texture.bytes = bytes.take();
   }
   return texture;
 }

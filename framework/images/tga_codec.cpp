@@ -19,10 +19,14 @@ class TgaReader {
   Texture read() {
     read_header();
     source_.check_size(width_, height_);
-    // A packet of two bytes or more holds at most 128 pixels.
-    if (std::uint64_t(width_) * height_ / 128 > source_.bytes.size()) cut_off();
-    read_palette();
     const std::size_t count = std::size_t(width_) * height_;
+    // A run holds at most 128 pixels and is its head and one pixel.
+    const std::size_t pixel_size = (bits_ + 7) / 8;
+    const std::size_t least = is_run_coded_ ? (count + 127) / 128 * (1 + pixel_size)  //
+                                            : count * pixel_size;
+    if (least > source_.bytes.size()) cut_off();
+    source_.check_budget(width_, height_, count * (sizeof(Pixel) + channels()));
+    read_palette();
     std::vector<Pixel> pixels;
     pixels.reserve(count);
     while (pixels.size() < count) read_packet(pixels, count);

@@ -156,23 +156,23 @@ std::vector<std::string> warnings_about(const SceneReport& report, const std::st
 
 std::string report_text(const SceneReport& report, int tree_depth) {
   std::string text = report.file + "\n";
-  text += fmt::format("  {} nodes, {} meshes ({} different), {} triangles ({} stored)\n",
-                      report.nodes, report.meshes, report.unique_meshes, report.triangles,
-                      report.unique_triangles);
-  text += fmt::format("  {} materials, {} textures ({:.1f} MiB), {} lights, {} cameras, {} bodies, "
-                      "{} labelled nodes\n",
-                      report.materials.size(), report.textures,
-                      double(report.texture_bytes) / (1024.0 * 1024.0), report.lights.size(),
-                      report.cameras, report.rigid_bodies, report.labelled);
+  text +=
+      fmt::format("  {} nodes, {} meshes ({} different), {} triangles ({} stored)\n", report.nodes,
+                  report.meshes, report.unique_meshes, report.triangles, report.unique_triangles);
+  text += fmt::format(
+      "  {} materials, {} textures ({:.1f} MiB), {} lights, {} cameras, {} bodies, "
+      "{} labelled nodes\n",
+      report.materials.size(), report.textures, double(report.texture_bytes) / (1024.0 * 1024.0),
+      report.lights.size(), report.cameras, report.rigid_bodies, report.labelled);
   if (report.bounds.is_empty()) {
     text += "  bounds: none (no visible meshes)\n";
   } else {
     const Vec3 size = report.bounds.size();
-    text += fmt::format("  bounds: ({:.4g}, {:.4g}, {:.4g}) to ({:.4g}, {:.4g}, {:.4g}) m, "
-                        "{:.4g} x {:.4g} x {:.4g} m\n",
-                        report.bounds.min.x(), report.bounds.min.y(), report.bounds.min.z(),
-                        report.bounds.max.x(), report.bounds.max.y(), report.bounds.max.z(),
-                        size.x(), size.y(), size.z());
+    text += fmt::format(
+        "  bounds: ({:.4g}, {:.4g}, {:.4g}) to ({:.4g}, {:.4g}, {:.4g}) m, "
+        "{:.4g} x {:.4g} x {:.4g} m\n",
+        report.bounds.min.x(), report.bounds.min.y(), report.bounds.min.z(), report.bounds.max.x(),
+        report.bounds.max.y(), report.bounds.max.z(), size.x(), size.y(), size.z());
   }
   for (const std::string& note : report.notes) text += "  " + note + "\n";
   text += "tree\n" + tree_text(report, tree_depth);
@@ -220,20 +220,21 @@ std::string report_json(const SceneReport& report) {
   }
   json["materials"] = nlohmann::json::array();
   for (const SceneReport::MaterialLine& line : report.materials) {
-    json["materials"].push_back(
-        {{"name", line.name},
-         {"users", line.users},
-         {"textures", line.textures},
-         {"warnings", warnings_about(report, line.name)}});
+    json["materials"].push_back({{"name", line.name},
+                                 {"users", line.users},
+                                 {"textures", line.textures},
+                                 {"warnings", warnings_about(report, line.name)}});
   }
   json["lights"] = nlohmann::json::array();
   for (const SceneReport::LightLine& line : report.lights) {
-    json["lights"].push_back(
-        {{"path", line.path}, {"kind", line.kind}, {"color", json_vector(line.color.cast<double>())}});
+    json["lights"].push_back({{"path", line.path},
+                              {"kind", line.kind},
+                              {"color", json_vector(line.color.cast<double>())}});
   }
   json["notes"] = report.notes;
   json["warnings"] = report.warnings;
-  return json.dump(2) + "\n";
+  // Names of files, materials and textures may be any bytes.
+  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace diorama

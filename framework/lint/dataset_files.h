@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -28,7 +29,11 @@ struct Picture {
   int channels = 0;
   std::vector<std::uint32_t> samples;  ///< 8 or 16 bit, interleaved.
 
+  /// Throws std::runtime_error outside of the picture.
   std::uint32_t at(int x, int y, int c = 0) const {
+    if (x < 0 || x >= width || y < 0 || y >= height) {
+      throw std::runtime_error("a picture is smaller than others say");
+    }
     return samples[(std::size_t(y) * std::size_t(width) + std::size_t(x)) * std::size_t(channels) +
                    std::size_t(c)];
   }
@@ -47,9 +52,13 @@ struct NpyArray {
   std::vector<std::byte> data;
 
   std::size_t count() const;  ///< Elements.
+  /// Throws std::runtime_error beyond the end.
   template <class T>
   T value(std::size_t offset) const {
     T result{};
+    if (offset > data.size() || sizeof result > data.size() - offset) {
+      throw std::runtime_error("an array is smaller than others say");
+    }
     std::memcpy(&result, data.data() + offset, sizeof result);
     return result;
   }
@@ -79,6 +88,10 @@ class Dataset {
   LintReport& report_;
   std::vector<std::string> files_;
 };
+
+/// Bytes of an array by its shape and size of elements. Throws std::runtime_error when that cannot
+/// be, as a file holds `most` bytes of it at most.
+std::size_t checked_size(const NpyArray& array, std::size_t most);
 
 /// Throws std::runtime_error that says what is wrong.
 NpyArray parse_npy(const std::string& bytes);

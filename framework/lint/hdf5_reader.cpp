@@ -33,8 +33,12 @@ class Bytes {
     return std::string_view(file_).substr(at, size);
   }
   std::string word(std::uint64_t at) const {
+    constexpr std::size_t kLongest = 1024;
     check(at, 1);
-    return std::string(file_.c_str() + at);
+    const std::string_view rest = std::string_view(file_).substr(at, kLongest);
+    const std::size_t end = rest.find('\0');
+    if (end == std::string_view::npos) throw std::runtime_error("has a name without end");
+    return std::string(rest.substr(0, end));
   }
   void expect(std::uint64_t at, std::string_view signature) const {
     if (part(at, signature.size()) != signature) {
@@ -98,19 +102,20 @@ class Hdf5Reader {
     const std::uint64_t heap = bytes_.u64(88);
     bytes_.expect(heap, "HEAP");
     names_ = bytes_.u64(heap + 24);
-    read_group(tree);
+    read_group(tree, kMostLevels);
     return std::move(arrays_);
   }
 
  private:
-  void read_group(std::uint64_t node) {
+  void read_group(std::uint64_t node, std::size_t above) {
     bytes_.expect(node, "TREE");
     if (!seen_.insert(node).second) throw std::runtime_error("its group tree goes in a circle");
     const std::size_t level = bytes_.u8(node + 5);
+    if (level >= above) throw std::runtime_error("its group tree has levels out of order");
     for (std::size_t i = 0; i < bytes_.u16(node + 6); ++i) {
       const std::uint64_t child = bytes_.u64(node + 24 + 8 + 16 * i);
       if (level > 0) {
-        read_group(child);
+        read_group(child, level);
       } else {
         read_symbols(child);
       }
@@ -172,6 +177,7 @@ class Hdf5Reader {
 
   void read_space(std::uint64_t at, NpyArray& array) {
     const std::uint64_t extents = at + (bytes_.u8(at) == 1 ? 8 : 4);
+    array.shape.clear();
     for (std::size_t i = 0; i < bytes_.u8(at + 1); ++i) {
       array.shape.push_back(bytes_.u64(extents + 8 * i));
     }
@@ -204,6 +210,7 @@ class Hdf5Reader {
     }
     const std::size_t rank = bytes_.u8(at + 2);  // counts the element's size as well
     storage.address = bytes_.u64(at + 3);
+    storage.chunk.clear();
     for (std::size_t i = 0; i + 1 < rank; ++i) storage.chunk.push_back(bytes_.u32(at + 11 + 4 * i));
   }
 
@@ -214,13 +221,11 @@ class Hdf5Reader {
   }
 
   void load(DataSet& set) {
-    std::uint64_t size = set.array.item_size;
-    for (const std::size_t extent : set.array.shape) {
-      if (extent != 0 && size > (std::uint64_t(1) << 40) / extent) {
-        throw std::runtime_error("has an absurd size");
-      }
-      size *= extent;
-    }
+    constexpr std::uint64_t kMostPerByte = 1032;  // of deflate
+    const std::uint64_t size = checked_size(set.array, kMostPerByte * bytes_.size());
+    // Many names may share one data set.
+    if (size > kMostInAll - loaded_) throw std::runtime_error("holds more than 2 GiB");
+    loaded_ += size;
     const Storage& storage = set.storage;
     std::string plain;
     if (storage.is_chunked) {
@@ -250,8 +255,11 @@ class Hdf5Reader {
     return is_filtered ? inflated(packed, size) : std::string(packed);
   }
 
+  static constexpr std::size_t kMostLevels = 32;
+  static constexpr std::uint64_t kMostInAll = std::uint64_t(2) << 30;
   Bytes bytes_;
   std::uint64_t names_ = 0;
+  std::uint64_t loaded_ = 0;
   std::set<std::uint64_t> seen_;
   std::map<std::string, NpyArray> arrays_;
 };

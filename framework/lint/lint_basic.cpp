@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <cstdio>
+#include <stdexcept>
 
 #include "framework/lint/lint_formats.h"
 #include "framework/lint/object_checks.h"
@@ -37,7 +39,15 @@ struct FrameData {
 
 /// "(1, 2, 3, 4)" or "12" as Picture::packed() gives it.
 std::uint32_t id_of_key(const std::string& key) {
-  if (!key.starts_with('(')) return std::uint32_t(std::stoul(key));
+  if (!key.starts_with('(')) {
+    std::uint32_t id = 0;
+    const char* end = key.data() + key.size();
+    const auto [rest, failed] = std::from_chars(key.data(), end, id);
+    if (failed != std::errc() || rest != end) {
+      throw std::runtime_error("'" + key + "' is neither a colour nor an id");
+    }
+    return id;
+  }
   std::array<unsigned, 4> c{};
   if (std::sscanf(key.c_str(), "(%3u, %3u, %3u, %3u)", &c[0], &c[1], &c[2], &c[3]) != 4) {
     throw std::runtime_error("'" + key + "' is neither a colour nor an id");
@@ -58,6 +68,12 @@ class BasicLint {
 
  private:
   void check_counts() {
+    // Of files that have little to do with each other most are missing; nobody reads such a list.
+    const std::size_t expected =
+        files_.kinds().size() * files_.products().size() * files_.numbers().size();
+    if (expected > 1000 + 100 * dataset_.files().size()) {
+      throw std::runtime_error("its files are not those of one dataset");
+    }
     for (const std::string& kind : files_.kinds()) {
       for (const std::string& product : files_.products()) {
         for (const std::string& number : files_.numbers()) {
@@ -68,9 +84,12 @@ class BasicLint {
       }
     }
     if (files_.numbers().empty()) return;
-    const auto count = std::stoul(*files_.numbers().rbegin()) + 1;
-    dataset_.check(files_.numbers().size() == count, kMissing, ".",
-                   "frames end with number " + *files_.numbers().rbegin() + ", but there are " +
+    const std::string& last = *files_.numbers().rbegin();
+    std::uint64_t number = 0;
+    const bool is_number =
+        std::from_chars(last.data(), last.data() + last.size(), number).ec == std::errc();
+    dataset_.check(is_number && files_.numbers().size() == number + 1, kMissing, ".",
+                   "frames end with number " + last + ", but there are " +
                        std::to_string(files_.numbers().size()));
   }
 

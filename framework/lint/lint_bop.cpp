@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <map>
@@ -56,7 +57,12 @@ std::size_t ply_count(const std::string& header, const std::string& element) {
   const std::string line = "\nelement " + element + " ";
   const std::size_t at = header.find(line);
   if (at == std::string::npos) throw std::runtime_error("has no element " + element);
-  return std::stoul(header.substr(at + line.size(), 20));
+  std::size_t count = 0;
+  const char* begin = header.data() + at + line.size();
+  if (std::from_chars(begin, header.data() + header.size(), count).ec != std::errc()) {
+    throw std::runtime_error("has no number of elements " + element);
+  }
+  return count;
 }
 
 /// The extent of a model's vertices. They begin with three floats and take 27 bytes each, faces 13.

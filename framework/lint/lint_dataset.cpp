@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "diorama/error.h"
+#include "framework/config/json_text.h"
 #include "framework/lint/lint_formats.h"
 
 namespace diorama {
@@ -32,6 +33,8 @@ constexpr std::array kFormats{Format{"BasicWriter", &lint::lint_basic},
                               Format{"HDF5", &lint::lint_hdf5}};
 
 std::string read_text(const std::filesystem::path& file) {
+  std::error_code failed;
+  if (!std::filesystem::is_regular_file(file, failed)) return {};
   std::ifstream in(file, std::ios::binary);
   std::ostringstream text;
   text << in.rdbuf();
@@ -41,7 +44,7 @@ std::string read_text(const std::filesystem::path& file) {
 /// Null when the folder is none of ours.
 const Format* format_of(const std::filesystem::path& folder) {
   for (const auto& [page, key] : {std::pair{"metadata.txt", "name"}, {"dataset.json", "format"}}) {
-    const auto json = lint::Json::parse(read_text(folder / page), nullptr, false);
+    const auto json = parse_json_or_nothing(read_text(folder / page));
     if (!json.is_object() || !json.contains(key) || !json.at(key).is_string()) continue;
     const std::string name = json.at(key).get<std::string>();
     const auto found =
@@ -56,7 +59,8 @@ LintReport lint_folder(const std::filesystem::path& folder, const Format& format
   report.dataset = folder.string();
   report.format = format.name;
   Dataset dataset(folder, report);
-  format.lint(dataset);
+  // Readers tell their file where they can; what they do not expect must not end the others' work.
+  dataset.reading(".", [&] { format.lint(dataset); });
   return report;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 
+#include "framework/config/json_text.h"
 #include "framework/lint/hdf5_reader.h"
 #include "framework/lint/lint_formats.h"
 #include "framework/lint/lint_page.h"
@@ -28,7 +29,7 @@ class Hdf5Picture {
     const NpyArray& k = array("cam_K", "<f8", 2);
     const Mat3 intrinsics =
         intrinsics_matrix(number(k, 0), number(k, 4), number(k, 2), number(k, 5));
-    const Json camera{{"lens", Json::parse(text("lens"))}};
+    const Json camera{{"lens", parse_json(text("lens"))}};
     lens_ = lens_of(camera, int(width_), int(height_), intrinsics);
     Affine world_from_camera = Affine::Identity();
     for (std::size_t i = 0; i < 16; ++i) {
@@ -36,7 +37,7 @@ class Hdf5Picture {
           number(array("world_from_camera", "<f8", 2), i);
     }
     camera_from_world_ = flipped_axes() * world_from_camera.inverse();
-    check_objects(Json::parse(text("instance_attribute_maps")), classes);
+    check_objects(parse_json(text("instance_attribute_maps")), classes);
   }
 
  private:

@@ -8,8 +8,8 @@
 #include <cstring>
 #include <map>
 #include <optional>
-#include <regex>
 
+#include "framework/config/json_text.h"
 #include "framework/lint/label_lines.h"
 #include "framework/lint/lint_formats.h"
 #include "framework/lint/lint_page.h"
@@ -45,7 +45,7 @@ Lens read_kitti_lens(const std::string& text, const Picture& picture) {
   std::optional<Mat3> camera;
   Json holder = Json::object();
   for (const std::string& line : lines_of(text)) {
-    if (line.starts_with("lens_2: ")) holder["lens"] = Json::parse(line.substr(8));
+    if (line.starts_with("lens_2: ")) holder["lens"] = parse_json(line.substr(8));
     if (!line.starts_with("P2: ")) continue;
     const auto p = numbers_of(words_of(line), 1);
     camera = intrinsics_matrix(p.at(0), p.at(5), p.at(2), p.at(6));
@@ -178,12 +178,16 @@ std::string unescaped(std::string text) {
 }
 
 std::string xml_text(const std::string& xml, const char* name) {
-  std::smatch found;
-  const std::string tag(name);
-  if (!std::regex_search(xml, found, std::regex("<" + tag + ">([^<]*)</" + tag + ">"))) {
-    throw std::runtime_error("has no element <" + tag + ">");
+  const std::string open = "<" + std::string(name) + ">";
+  const std::string close = "</" + std::string(name) + ">";
+  for (std::size_t at = xml.find(open); at != std::string::npos; at = xml.find(open, at + 1)) {
+    const std::size_t begin = at + open.size();
+    const std::size_t end = xml.find('<', begin);
+    if (xml.compare(std::min(end, xml.size()), close.size(), close) == 0) {
+      return xml.substr(begin, end - begin);
+    }
   }
-  return found[1];
+  throw std::runtime_error("has no element " + open);
 }
 
 /// Pixels of two pictures of one size that have `first` in one: the values of the other.

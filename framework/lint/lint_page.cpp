@@ -2,6 +2,7 @@
 #include "framework/lint/lint_page.h"
 
 #include <algorithm>
+#include <stdexcept>
 
 namespace diorama::lint {
 namespace {
@@ -9,6 +10,7 @@ namespace {
 constexpr const char* kPage = "dataset.json";
 constexpr const char* kStated = "conventions and origin are stated";
 constexpr const char* kSplit = "each capture is in one split";
+constexpr std::size_t kMostPictures = 10'000'000;
 
 void check_stated(Dataset& dataset, const Json& page) {
   for (const char* key : {"format", "program", "seed", "captures", "cameras", "classes", "split",
@@ -47,6 +49,9 @@ void check_split(Dataset& dataset, const Json& page, DatasetPage& result) {
       const int capture = entry.get<int>();
       dataset.check(capture >= 0 && capture < captures && seen.insert(capture).second, kSplit,
                     kPage, "capture " + std::to_string(capture) + " is in two splits or unknown");
+      if (result.pictures.size() + cameras.size() > kMostPictures) {
+        throw std::runtime_error("names more pictures than any dataset has");
+      }
       for (int camera = 0; camera < result.cameras; ++camera) {
         result.pictures.push_back(
             {split, capture, camera, padded(capture, digits) + "_" + cameras[std::size_t(camera)]});

@@ -234,9 +234,13 @@ void lint_visualization(Dataset& dataset) {
     dataset.picture(file);
     const std::size_t slash = file.rfind('/') + 1;  // 0 without a folder
     const std::size_t cut = file.rfind('_');
+    if (cut == std::string::npos || cut < slash) continue;
     folders.insert(file.substr(0, slash));
     kinds.insert(file.substr(slash, cut - slash));
     numbers.insert(file.substr(cut));
+  }
+  if (folders.size() * kinds.size() * numbers.size() > 1000 + 100 * dataset.files().size()) {
+    throw std::runtime_error("its files are not those of one dataset");
   }
   for (const std::string& folder : folders) {
     for (const std::string& kind : kinds) {

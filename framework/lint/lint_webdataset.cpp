@@ -1,35 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "framework/config/json_text.h"
 #include "framework/lint/lint_formats.h"
 #include "framework/lint/lint_page.h"
 #include "framework/lint/object_checks.h"
+#include "framework/lint/tar_reader.h"
 
 namespace diorama::lint {
 namespace {
-
-std::size_t octal_number(const std::string& tar, std::size_t at, std::size_t length) {
-  return std::stoull("0" + std::string(tar.substr(at, length).c_str()), nullptr, 8);
-}
-
-/// Names and contents. Throws when a header's checksum is wrong or the end is missing.
-std::map<std::string, std::string> read_tar(const std::string& tar) {
-  constexpr std::size_t kBlock = 512;
-  std::map<std::string, std::string> members;
-  std::size_t at = 0;
-  while (at + kBlock <= tar.size() && tar[at] != '\0') {
-    std::size_t sum = 0;
-    for (std::size_t i = 0; i < kBlock; ++i) {
-      sum += i >= 148 && i < 156 ? ' ' : static_cast<unsigned char>(tar[at + i]);
-    }
-    if (sum != octal_number(tar, at + 148, 8)) throw std::runtime_error("a header is damaged");
-    const std::string name(tar.substr(at, 100).c_str());
-    const std::size_t size = octal_number(tar, at + 124, 12);
-    if (at + kBlock + size > tar.size()) throw std::runtime_error(name + " is cut short");
-    members.emplace(name, tar.substr(at + kBlock, size));
-    at += kBlock + (size + kBlock - 1) / kBlock * kBlock;
-  }
-  if (at + 2 * kBlock > tar.size()) throw std::runtime_error("the end of the archive is missing");
-  return members;
-}
 
 /// One camera's picture: the members whose names begin with its key.
 class Sample {
@@ -39,7 +16,7 @@ class Sample {
       : dataset_(dataset), file_(file), key_(key), members_(members) {}
 
   void run() {
-    const Json json = Json::parse(member(".json"));
+    const Json json = parse_json(member(".json"));
     width_ = json.at("width").get<int>();
     height_ = json.at("height").get<int>();
     const std::string ending = members_.contains(key_ + ".png") ? ".png" : ".jpg";

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <array>
+#include <string_view>
+#include <tuple>
 
 #include "framework/lint/object_checks.h"
 
@@ -45,6 +47,16 @@ std::string key_of(const std::string& product, const std::string& number, const 
 }
 
 }  // namespace
+
+bool NumberLess::operator()(const std::string& a, const std::string& b) const {
+  const auto value = [](std::string_view digits) {
+    return digits.substr(std::min(digits.find_first_not_of('0'), digits.size()));
+  };
+  const auto key = [&](const std::string& digits) {
+    return std::tuple(value(digits).size(), value(digits), digits.size());
+  };
+  return key(a) < key(b);
+}
 
 ReplicatorFiles::ReplicatorFiles(const Dataset& dataset) {
   for (const std::string& file : dataset.files()) {

@@ -10,6 +10,11 @@
 
 namespace diorama::lint {
 
+/// Orders texts of digits by value: 9999 comes before 10000.
+struct NumberLess {
+  bool operator()(const std::string& a, const std::string& b) const;
+};
+
 /// The files of one BasicWriter dataset, told apart by their names alone.
 class ReplicatorFiles {
  public:
@@ -17,7 +22,7 @@ class ReplicatorFiles {
 
   /// Render products; "" when the files lie flat.
   const std::set<std::string>& products() const { return products_; }
-  const std::set<std::string>& numbers() const { return numbers_; }
+  const std::set<std::string, NumberLess>& numbers() const { return numbers_; }
   /// Kinds that the dataset holds: "rgb.png", "bounding_box_3d_labels.json".
   const std::set<std::string>& kinds() const { return kinds_; }
   /// Empty when there is none.
@@ -26,7 +31,7 @@ class ReplicatorFiles {
 
  private:
   std::set<std::string> products_;
-  std::set<std::string> numbers_;
+  std::set<std::string, NumberLess> numbers_;
   std::set<std::string> kinds_;
   std::map<std::string, std::string> paths_;
 };

@@ -42,15 +42,44 @@ struct PlannedCapture {
 struct PlannedVisit {
   int index = 0;
   std::size_t environment = 0;  ///< Index into CapturePlan::environments.
-  std::vector<PlannedCapture> captures;
+  int first_capture = 0;        ///< Those of a visit are numbered in a row.
+  int capture_count = 0;        ///< At least 1; the last visit of a job may have fewer than others.
 };
 
-struct CapturePlan {
+/// Captures that follow each other in one visit and belong to one series.
+struct PlannedSeries {
+  std::string phase;
+  int count = 0;
+};
+
+/// Visits and captures follow from the timeline by a formula, so a plan takes the same memory for
+/// any number of them. Both are counted from 0.
+class CapturePlan {
+ public:
+  CapturePlan() = default;
+  /// Throws Error(Config) when captures are wanted and the timeline has none.
+  CapturePlan(const Job& job, std::vector<EnvironmentChoice> environments);
+
   std::vector<EnvironmentChoice> environments;
   std::vector<PlannedObject> objects;
-  std::vector<PlannedVisit> visits;
 
-  int capture_count() const;
+  int capture_count() const { return capture_count_; }
+  int visit_count() const;
+  PlannedVisit visit(int index) const;
+  PlannedCapture capture(int index) const;
+  std::vector<PlannedSeries> series(const PlannedVisit& visit) const;
+
+ private:
+  /// A step of the timeline that takes captures.
+  struct Step {
+    std::string phase;
+    std::int64_t first = 0;  // of the visit's captures
+    std::int64_t count = 0;
+    std::int64_t first_number = 0;
+  };
+  std::vector<Step> steps_;
+  std::int64_t captures_per_visit_ = 0;
+  int capture_count_ = 0;
 };
 
 /// `environments` is not empty. `object_assets` holds, per group of the job, what to pick from.
@@ -58,8 +87,8 @@ struct CapturePlan {
 CapturePlan plan_captures(const Job& job, std::vector<EnvironmentChoice> environments,
                           const std::vector<std::vector<std::string>>& object_assets);
 
-/// The visits of one shard: those whose index leaves remainder `shard` when divided by `shards`.
-std::vector<PlannedVisit> shard_of(const CapturePlan& plan, int shard, int shards);
+/// Visits of a shard: those whose index leaves remainder `shard` when divided by `shards`.
+inline bool is_in_shard(int visit, int shard, int shards) { return visit % shards == shard; }
 
 /// How a randomizer is called at one moment.
 struct RandomizerCall {

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "diorama/error.h"
+#include "framework/config/clean_text.h"
 #include "framework/config/value_text.h"
 #include "framework/pipeline/sha256.h"
 
@@ -34,9 +35,8 @@ using UsedAssets = std::map<std::string, std::set<Labels>>;
 
 UsedAssets used_assets(const CapturePlan& plan, const std::vector<std::string>& drawn_assets) {
   UsedAssets assets;
-  for (const PlannedVisit& visit : plan.visits) {
-    assets.try_emplace(plan.environments[visit.environment].asset);
-  }
+  const auto used = std::min(plan.environments.size(), std::size_t(plan.visit_count()));
+  for (std::size_t i = 0; i < used; ++i) assets.try_emplace(plan.environments[i].asset);
   for (const std::string& asset : drawn_assets) assets.try_emplace(asset);
   for (const PlannedObject& object : plan.objects) {
     std::set<Labels>& labels = assets[object.asset];
@@ -73,23 +73,17 @@ std::string labels_text(const Labels& labels) {
   return text;
 }
 
-std::string series_text(const PlannedVisit& visit) {
+std::string series_text(const CapturePlan& plan, const PlannedVisit& visit) {
   std::string text;
-  std::size_t i = 0;
-  while (i < visit.captures.size()) {
-    std::size_t end = i;
-    while (end < visit.captures.size() && visit.captures[end].phase == visit.captures[i].phase) {
-      ++end;
-    }
-    text += (text.empty() ? "" : ", ") + visit.captures[i].phase + " " + std::to_string(end - i);
-    i = end;
+  for (const PlannedSeries& series : plan.series(visit)) {
+    text += (text.empty() ? "" : ", ") + series.phase + " " + std::to_string(series.count);
   }
   return text;
 }
 
 std::string captures_text(const PlannedVisit& visit) {
-  const int first = visit.captures.front().index;
-  const int last = visit.captures.back().index;
+  const int first = visit.first_capture;
+  const int last = first + visit.capture_count - 1;
   if (first == last) return "capture " + std::to_string(first);
   return "captures " + std::to_string(first) + "-" + std::to_string(last);
 }
@@ -124,12 +118,18 @@ std::string parameters_text(const Value& entry, std::initializer_list<std::strin
 
 void add_visits(std::string& text, const CapturePlan& plan,
                 const std::optional<fs::path>& assets_root) {
-  text += "visits (" + std::to_string(plan.visits.size()) + ")\n";
-  for (const PlannedVisit& visit : plan.visits) {
-    text += "  " + std::to_string(visit.index) + "  " +
+  // As many as anybody reads; the others go on in the same way.
+  constexpr int kMostVisits = 1000;
+  const int count = plan.visit_count();
+  text += "visits (" + std::to_string(count) + ")\n";
+  const int shown = std::min(count, kMostVisits);
+  for (int i = 0; i < shown; ++i) {
+    const PlannedVisit visit = plan.visit(i);
+    text += "  " + std::to_string(i) + "  " +
             asset_name(plan.environments[visit.environment].asset, assets_root) + "  " +
-            captures_text(visit) + ": " + series_text(visit) + "\n";
+            captures_text(visit) + ": " + series_text(plan, visit) + "\n";
   }
+  if (shown < count) text += "  ... " + std::to_string(count - shown) + " more in the same order\n";
 }
 
 void add_objects(std::string& text, const CapturePlan& plan, const Job& job,
@@ -253,10 +253,10 @@ std::string dataset_json(const DatasetInfo& info, const Job& job) {
 
 std::string asset_name(std::string_view asset, const std::optional<fs::path>& assets_root) {
   const fs::path path(asset);
-  if (!assets_root || !path.is_absolute()) return std::string(asset);
+  if (!assets_root || !path.is_absolute()) return clean_name(asset);
   const fs::path below = path.lexically_relative(*assets_root);
-  if (below.empty() || *below.begin() == "..") return std::string(asset);
-  return "/" + below.generic_string();
+  if (below.empty() || *below.begin() == "..") return clean_name(asset);
+  return clean_name("/" + below.generic_string());
 }
 
 std::string plan_text(const CapturePlan& plan, const Job& job,

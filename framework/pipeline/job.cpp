@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
 #include <map>
-#include <regex>
 #include <set>
 
+#include "framework/config/clean_text.h"
 #include "framework/pipeline/job_keys.h"
+#include "framework/pipeline/label_pattern.h"
 
 namespace diorama {
 namespace {
@@ -111,9 +113,10 @@ void require_unique(const std::vector<Entry>& list, std::string_view section, Na
 
 void check_node_name(const std::string& name, const Value& map, const std::string& path,
                      Complaints& complaints) {
-  if (name.find('/') == std::string::npos) return;
+  if (name.find('/') == std::string::npos && is_clean_name(name)) return;
   complaints.add(place_of(map, "name"),
-                 path + ".name: expected a name without '/', found \"" + name + "\"");
+                 path + ".name: expected a name without \"/\" and control characters, found \"" +
+                     clean_name(name) + "\"");
 }
 
 template <class Group>
@@ -163,10 +166,9 @@ void check_pattern(const ObjectGroup& group, const Value& map, const std::string
                    Complaints& complaints) {
   if (!group.label_pattern) return;
   try {
-    const std::regex pattern(*group.label_pattern, std::regex::ECMAScript);
-  } catch (const std::regex_error& error) {
-    complaints.add(place_of(map, "label_pattern"),
-                   path + ".label_pattern: not a regular expression: " + error.what());
+    const LabelPattern pattern(*group.label_pattern);
+  } catch (const Error& error) {
+    complaints.add(place_of(map, "label_pattern"), path + ".label_pattern: " + error.what());
   }
 }
 
@@ -301,6 +303,42 @@ void read_writers(const Value& value, Job& job, Complaints& complaints) {
       [](const WriterEntry& e) -> const Value& { return e.component.map; }, complaints);
 }
 
+/// Where a folder of the job leads, seen from the output folder; nothing when that is out of it or
+/// into the bookkeeping.
+std::optional<std::filesystem::path> place_below_output(const Job& job, const std::string& folder) {
+  namespace fs = std::filesystem;
+  std::error_code ignored;
+  fs::path root = fs::absolute(job.output.folder.empty() ? "." : job.output.folder, ignored);
+  root = (root / "").lexically_normal();
+  fs::path place = ((root / folder) / "").lexically_normal().lexically_relative(root);
+  if (place.empty() || *place.begin() == "..") return std::nullopt;
+  for (const fs::path& part : place) {
+    if (part.string().starts_with(".diorama")) return std::nullopt;
+  }
+  return place;
+}
+
+/// A job of somebody else must not write where nobody expects it.
+void check_folders(const Value& value, const Job& job, Complaints& complaints) {
+  const std::string root = "the output folder \"" + job.output.folder + "\"";
+  const std::string advice =
+      "; name a folder below it, or choose one that holds both by `--output`";
+  for (std::size_t i = 0; i < job.writers.size(); ++i) {
+    const WriterEntry& writer = job.writers[i];
+    const char* key = writer.output_dir ? "output_dir" : "name";
+    const std::string& folder = writer.output_dir ? *writer.output_dir : writer.name;
+    if (place_below_output(job, folder)) continue;
+    complaints.add(place_of(writer.component.map, key), writer.component.path + "." + key +
+                                                            ": the folder \"" + folder +
+                                                            "\" is not below " + root + advice);
+  }
+  if (place_below_output(job, job.output.records)) return;
+  const Value* output = value.find("output");
+  complaints.add(
+      output ? place_of(*output, "records") : value.place,
+      "output.records: the folder \"" + job.output.records + "\" is not below " + root + advice);
+}
+
 ComponentConfig read_engine(const Value& value, std::string_view section, const char* default_type,
                             Complaints& complaints) {
   ComponentConfig entry{default_type, std::string(section), Value::make_map(),
@@ -360,7 +398,7 @@ void read_timeline(const Value& value, Job& job, Complaints& complaints) {
     if (auto step = read_step(map, path, complaints)) job.timeline.push_back(*step);
   }
   if (complaints.messages().size() != before) return;
-  int captures_per_visit = 0;
+  std::int64_t captures_per_visit = 0;
   for (const TimelineStep& step : job.timeline) captures_per_visit += step.count;
   if (captures_per_visit == 0 && job.total_captures > 0) {
     complaints.add(list->place,
@@ -423,9 +461,12 @@ void ObjectGroup::visit(ParamVisitor& v) {
   v.param("under", under, {"Path of the parent node."});
   v.param("count", count, {"Objects, each picked at random from the loader's assets.", "", 0, 1e5});
   v.param("label", label, {"Label of every object of the group; null: none."});
-  v.param("label_pattern", label_pattern,
-          {"Regular expression; the label is the file's stem with every match replaced."});
-  v.param("label_replacement", label_replacement, {"What a match of label_pattern becomes."});
+  v.param(
+      "label_pattern", label_pattern,
+      {"Regular expression, without back references and look-around; the label is the file's stem "
+       "with every match replaced."});
+  v.param("label_replacement", label_replacement,
+          {"What a match of label_pattern becomes; `$1` is its first group."});
   v.param("taxonomy", taxonomy, {"Taxonomy of the label."});
   v.param("gravity_disabled_chance", gravity_disabled_chance,
           {"Share of the objects that float.", "", 0, 1});
@@ -496,8 +537,7 @@ void RandomizerEntry::visit(ParamVisitor& v) {
 void WriterEntry::visit(ParamVisitor& v) {
   v.param("type", type, {"Type of the component."});
   v.param("name", name, {"Name of the writer. Default: the type."});
-  v.param("output_dir", output_dir,
-          {"Its folder, below output.folder; null: the name."});
+  v.param("output_dir", output_dir, {"Its folder, below output.folder; null: the name."});
 }
 
 void SettleSection::visit(ParamVisitor& v) {
@@ -573,6 +613,7 @@ Job read_job(const Value& value, Complaints& complaints) {
   read_section(value, "settle", job.settle, complaints);
   read_writers(value, job, complaints);
   read_section(value, "output", job.output, complaints);
+  check_folders(value, job, complaints);
   if (job.camera_names().empty() && job.total_captures > 0) {
     const Value* cameras = value.find("cameras");
     complaints.add(cameras ? cameras->place : value.place,

@@ -112,7 +112,7 @@ struct WriterEntry {
   ComponentConfig component;
   std::string type;
   std::string name;
-  /// Below OutputSection::folder unless absolute; null: the name.
+  /// Not outside of OutputSection::folder; null: the name.
   std::optional<std::string> output_dir;
   void visit(ParamVisitor& v);
 };

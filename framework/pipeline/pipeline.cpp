@@ -10,6 +10,7 @@
 #include "framework/annotators/motion.h"
 #include "framework/annotators/occlusion_order.h"
 #include "framework/annotators/visibility.h"
+#include "framework/config/clean_text.h"
 #include "framework/pipeline/scene_setup.h"
 #include "framework/plugins/fatal_end.h"
 #include "framework/plugins/plugin_call.h"
@@ -42,7 +43,7 @@ struct Pipeline::Visit {
   std::vector<NodeId> cameras;
   BodyPoses before_last_step;  ///< Empty when nothing moved by itself since it was placed.
   NodeId overview;             ///< Null unless this visit makes an overview picture.
-  std::size_t next_capture = 0;
+  int next_capture = 0;        ///< Of the visit's.
   std::map<std::string, int> events;
   int simulations_to_come = 0;  ///< Steps of the timeline that let things move.
   double simulated_s = 0.0;
@@ -77,9 +78,7 @@ Pipeline::Pipeline(const Job& job, const CapturePlan& plan, JobComponents& compo
       host_(host),
       store_(store),
       options_(std::move(options)),
-      streams_(job.seed),
-      visits_(options_.takes_visits ? plan.visits
-                                    : shard_of(plan, options_.shard, options_.shards)) {}
+      streams_(job.seed) {}
 
 Pipeline::~Pipeline() = default;
 
@@ -88,12 +87,12 @@ RunSummary Pipeline::run(const DatasetInfo& dataset, const std::string& dataset_
   dataset_json_ = &dataset_json;
   summary_.cameras = int(dataset.camera_names.size());
   store_.join(dataset_json);
-  for (const PlannedVisit& visit : visits_) {
-    total_ += int(visit.captures.size());
-    for (const PlannedCapture& capture : visit.captures) {
-      summary_.resumed += store_.is_done(capture.index) ? 1 : 0;
+  for_each_visit([&](const PlannedVisit& visit) {
+    total_ += visit.capture_count;
+    for (int i = 0; i < visit.capture_count; ++i) {
+      summary_.resumed += store_.is_done(visit.first_capture + i) ? 1 : 0;
     }
-  }
+  });
   const int writing_threads = std::clamp(host_.thread_count(), 1, 4);
   queue_ = std::make_unique<WriterQueue>(writing_threads, options_.queue_bytes,
                                          [this](const PendingCapture& pending) { write(pending); });
@@ -114,23 +113,32 @@ RunSummary Pipeline::run(const DatasetInfo& dataset, const std::string& dataset_
   return std::move(summary_);
 }
 
+void Pipeline::for_each_visit(const std::function<void(const PlannedVisit&)>& visit) const {
+  for (int i = 0; i < plan_.visit_count(); ++i) {
+    const bool is_own = options_.takes_visits || is_in_shard(i, options_.shard, options_.shards);
+    if (is_own) visit(plan_.visit(i));
+  }
+}
+
 void Pipeline::run_visits() {
   if (options_.only_finishes) return;
   if (!options_.takes_visits) {
-    for (const PlannedVisit& visit : visits_) {
+    for_each_visit([&](const PlannedVisit& visit) {
       if (is_needed(visit)) run_visit(visit);
-    }
+    });
     return;
   }
-  const auto needs_work = [&](int visit) { return is_needed(visits_[std::size_t(visit)]); };
-  while (const auto visit = store_.claim_visit(int(visits_.size()), needs_work)) {
-    run_visit(visits_[std::size_t(*visit)]);
+  const auto needs_work = [&](int visit) { return is_needed(plan_.visit(visit)); };
+  while (const auto visit = store_.claim_visit(plan_.visit_count(), needs_work)) {
+    run_visit(plan_.visit(*visit));
   }
 }
 
 bool Pipeline::is_needed(const PlannedVisit& planned) const {
-  return std::any_of(planned.captures.begin(), planned.captures.end(),
-                     [&](const PlannedCapture& c) { return !store_.is_done(c.index); });
+  for (int i = 0; i < planned.capture_count; ++i) {
+    if (!store_.is_done(planned.first_capture + i)) return true;
+  }
+  return false;
 }
 
 void Pipeline::stop_if_asked() const {
@@ -142,7 +150,7 @@ void Pipeline::run_visit(const PlannedVisit& planned) {
   randomize(visit, "environment", 0, -1);
   reset_physics(visit);
   for (const TimelineStep& step : job_.timeline) {
-    if (visit.next_capture == planned.captures.size()) return;
+    if (visit.next_capture == planned.capture_count) return;
     switch (step.kind) {
       case TimelineStep::Kind::Simulate:
         --visit.simulations_to_come;
@@ -164,7 +172,7 @@ Pipeline::Visit Pipeline::set_up(const PlannedVisit& planned) {
   stop_if_asked();
   const EnvironmentChoice& choice = plan_.environments[planned.environment];
   host_.log(LogLevel::Info, "visit " + std::to_string(planned.index + 1) + " of " +
-                                std::to_string(plan_.visits.size()) + ": " + choice.asset);
+                                std::to_string(plan_.visit_count()) + ": " + choice.asset);
   Visit visit;
   visit.planned = &planned;
   visit.environment = load_environment(choice.asset, job_.environments[choice.entry],
@@ -285,8 +293,9 @@ void Pipeline::drop(Visit& visit, const std::vector<NodeId>& lost) {
 
 void Pipeline::take_captures(Visit& visit, const TimelineStep& step) {
   for (int i = 0; i < step.count; ++i) {
-    if (visit.next_capture == visit.planned->captures.size()) return;
-    const PlannedCapture& planned = visit.planned->captures[visit.next_capture++];
+    if (visit.next_capture == visit.planned->capture_count) return;
+    const PlannedCapture planned =
+        plan_.capture(visit.planned->first_capture + visit.next_capture++);
     randomize(visit, planned.phase, planned.number, planned.index);
     if (!store_.is_done(planned.index)) take(visit, planned);
   }
@@ -301,7 +310,7 @@ void Pipeline::take(Visit& visit, const PlannedCapture& planned) {
   capture.index = planned.index;
   capture.visit = visit.planned->index;
   capture.phase = planned.phase;
-  capture.environment = plan_.environments[visit.planned->environment].asset;
+  capture.environment = clean_name(plan_.environments[visit.planned->environment].asset);
   {
     const Clock clock(summary_, "preparing renderer");
     call_component("renderer '" + job_.renderer.type + "'",
@@ -315,7 +324,7 @@ void Pipeline::take(Visit& visit, const PlannedCapture& planned) {
     pending.overview = make_overview(visit, planned.index);
   }
   // A visit that is cut short ends with its objects in the air, which says nothing.
-  const bool is_last = visit.next_capture == visit.planned->captures.size();
+  const bool is_last = visit.next_capture == visit.planned->capture_count;
   if (is_last && visit.simulations_to_come == 0) {
     summary_.visits.push_back(report_on(visit));
     pending.settle_json = settle_json(summary_.visits.back());
@@ -373,7 +382,7 @@ Image<Rgba8> Pipeline::make_overview(Visit& visit, int capture) {
 VisitReport Pipeline::report_on(const Visit& visit) const {
   VisitReport report = visit.report;
   report.visit = visit.planned->index;
-  report.environment = plan_.environments[visit.planned->environment].asset;
+  report.environment = clean_name(plan_.environments[visit.planned->environment].asset);
   report.simulated_s = visit.simulated_s;
   if (visit.moving_until_s < visit.simulated_s || visit.simulated_s == 0.0) {
     report.rest_after_s = visit.moving_until_s;

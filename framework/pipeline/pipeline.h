@@ -113,6 +113,8 @@ class Pipeline {
   Frame make_frame(Visit& visit, std::size_t camera, int capture);
   Image<Rgba8> make_overview(Visit& visit, int capture);
   VisitReport report_on(const Visit& visit) const;
+  /// Calls `visit` with every planned visit of this shard.
+  void for_each_visit(const std::function<void(const PlannedVisit&)>& visit) const;
   bool is_needed(const PlannedVisit& planned) const;
   void run_visits();
   void begin_output();
@@ -127,7 +129,6 @@ class Pipeline {
   OutputStore& store_;
   RunOptions options_;
   JobStreams streams_;
-  std::vector<PlannedVisit> visits_;  // of this shard, or all
   const DatasetInfo* dataset_ = nullptr;
   const std::string* dataset_json_ = nullptr;
   bool has_begun_ = false;

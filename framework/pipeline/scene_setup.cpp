@@ -5,6 +5,8 @@
 #include <string_view>
 
 #include "diorama/error.h"
+#include "framework/config/clean_text.h"
+#include "framework/host/node_content.h"
 #include "framework/plugins/plugin_call.h"
 
 namespace diorama {
@@ -156,6 +158,11 @@ NodeId load_environment(const std::string& asset, const ComponentConfig& entry, 
   if (!claims_scheme(loader, asset)) return host.load_asset(asset, scene, parent);
   const NodeId environment = scene.create(parent, node_name(asset_stem(asset)));
   call_component("loader '" + entry.type + "'", [&] { loader.load(asset, scene, environment); });
+  if (const std::string word = first_unclean_word(scene, environment); !word.empty()) {
+    throw Error(ErrorKind::Plugin, "loader '" + entry.type + "': " + asset + ": the name \"" +
+                                       clean_name(word) +
+                                       "\" is no UTF-8 text without control characters");
+  }
   return environment;
 }
 

@@ -2,9 +2,11 @@
 #include "framework/replay/stored_captures.h"
 
 #include <algorithm>
+#include <charconv>
 #include <nlohmann/json.hpp>
 
 #include "diorama/error.h"
+#include "framework/config/json_text.h"
 #include "framework/config/yaml_config.h"
 #include "framework/images/linear_picture.h"
 #include "framework/lint/replicator_files.h"
@@ -75,9 +77,14 @@ Camera camera_from(const lint::Lens& lens) {
 }
 
 Camera read_camera(const fs::path& file) {
-  const Json json = Json::parse(LocalFileSystem().read(file), nullptr, false);
+  const std::string text = LocalFileSystem().read(file);
   try {
-    return camera_from(lint::camera_of(json).lens);
+    const Camera camera = camera_from(lint::camera_of(parse_json(text)).lens);
+    constexpr int kMost = 16384;
+    if (camera.width < 1 || camera.width > kMost || camera.height < 1 || camera.height > kMost) {
+      throw std::runtime_error("has a resolution outside of 1 to 16384 pixels a side");
+    }
+    return camera;
   } catch (const std::exception& error) {
     refuse(file, error.what());
   }
@@ -117,12 +124,13 @@ StoredCaptures::StoredCaptures(const fs::path& folder, const NameSet& channels)
   dataset_json_ = LocalFileSystem().read(file);
   std::string job;
   try {
-    const Json json = Json::parse(dataset_json_);
+    const Json json = parse_json(dataset_json_);
     seed_ = json.at("seed").get<std::uint64_t>();
     capture_count_ = json.at("captures").get<int>();
     camera_names_ = json.at("cameras").get<std::vector<std::string>>();
     job = json.at("job").get<std::string>();
-  } catch (const Json::exception& error) {
+    if (capture_count_ < 0) throw std::runtime_error("a negative number of captures");
+  } catch (const std::exception& error) {
     refuse(file, "is not the description of a run's dataset (" + std::string(error.what()) + ")");
   }
   choose_writer(folder, job);
@@ -141,8 +149,18 @@ void StoredCaptures::choose_writer(const fs::path& folder, const std::string& jo
     const Value* place = entry.find("output_dir");
     const Value* name = entry.find("name");
     if (!fits || !place || !name) continue;
+    // What is made of this dataset goes into a folder of the writer's name.
+    const std::string& folder_name = name->scalar;
+    const bool is_plain = !folder_name.empty() && !folder_name.starts_with('.') &&
+                          folder_name.find('/') == std::string::npos;
+    const fs::path relative = fs::path(place->scalar).lexically_normal();
+    const bool is_below = relative.is_relative() && *relative.begin() != "..";
+    if (!is_plain || !is_below) {
+      refuse(folder / "dataset.json", "its writer \"" + folder_name + "\" in \"" + place->scalar +
+                                          "\" lies outside of the dataset");
+    }
     writer_ = entry;
-    writer_name_ = name->scalar;
+    writer_name_ = folder_name;
     writer_folder_ = (folder / place->scalar).lexically_normal();
     return;
   }
@@ -174,7 +192,10 @@ void StoredCaptures::list_files() {
         frame[kind] = writer_folder_ / path;
       }
     }
-    if (is_whole) captures_[std::stoi(number)] = std::move(frames);
+    int index = 0;
+    const char* end = number.data() + number.size();
+    const bool is_index = std::from_chars(number.data(), end, index).ec == std::errc();
+    if (is_whole && is_index) captures_[index] = std::move(frames);
   }
   if (captures_.empty()) {
     throw Error(ErrorKind::Usage, writer_folder_.string() + ": holds no whole capture");

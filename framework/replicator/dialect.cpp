@@ -153,7 +153,7 @@ Value numbers(double lo, double hi) {
   return list;
 }
 
-/// "\1" and "\g<1>" of Python become "$1"; a '$' stands for itself there.
+/// "\1" of Python becomes "$1", "\g<name>" "${name}"; a '$' stands for itself there.
 std::string ecmascript_replacement(const std::string& python) {
   std::string text;
   for (std::size_t i = 0; i < python.size(); ++i) {
@@ -165,7 +165,7 @@ std::string ecmascript_replacement(const std::string& python) {
     } else if (c == '\\' && python.compare(i + 1, 2, "g<") == 0 &&
                python.find('>', i) != std::string::npos) {
       const std::size_t end = python.find('>', i);
-      text += "$" + python.substr(i + 3, end - i - 3);
+      text += "${" + python.substr(i + 3, end - i - 3) + "}";
       i = end;
     } else {
       text += c;

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <cstdlib>
+
 #include "program.h"
 #include "support/catch.h"
 
@@ -152,4 +154,101 @@ TEST_CASE("Flags that exclude each other", "[errors]") {
       run({"run", config_file("smoke.yaml"), "--resume", "--overwrite"}, folder.path());
   CHECK(outcome.exit_code == 2);
   CHECK_THAT(outcome.errors, ContainsSubstring("exclude each other"));
+}
+
+TEST_CASE("Descriptors that are closed at start catch no files", "[streams]") {
+  const TemporaryFolder folder;
+  const auto smoke = [&](const std::string& output, const std::string& streams) {
+    const std::string command = "cd " + folder.path().string() +
+                                " && " DIORAMA_PROGRAM
+                                " --log-level debug --plugin-dir " DIORAMA_PLUGIN_DIR " run " +
+                                config_file("smoke.yaml") + " --output " + output + " " + streams;
+    const int status = std::system(("sh -c '" + command + "'").c_str());
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  };
+  REQUIRE(smoke("open", ">log 2>&1") == 0);
+  const auto expected = tree(folder / "open");
+  REQUIRE(expected.size() > 10);
+  for (const char* closed : {"0<&- 1>&- 2>&-", "1>&-", "2>&-", "1>&- 2>&-", "0<&- 2>&-"}) {
+    INFO(closed);
+    CHECK(smoke("closed", closed) == 0);
+    CHECK(difference(expected, tree(folder / "closed")) == "");
+    fs::remove_all(folder / "closed");
+  }
+  // Printing to what was closed is still an error.
+  const int status = std::system(DIORAMA_PROGRAM " --version >/dev/null");
+  CHECK(WEXITSTATUS(status) == 0);
+  const int lost = std::system("sh -c '" DIORAMA_PROGRAM " schema 1>&- 2>/dev/null'");
+  CHECK(WEXITSTATUS(lost) == 6);
+}
+
+TEST_CASE("A new dataset does not go among files of others", "[errors]") {
+  const TemporaryFolder folder;
+  write_file(folder / "mine/notes.txt", "x");
+  const auto run_into = [&](const std::string& output, std::vector<std::string> more = {}) {
+    std::vector<std::string> arguments{"run", config_file("smoke.yaml"), "--output", output};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run(arguments, folder.path());
+  };
+  const std::string mine = (folder / "mine").string();
+  for (const std::vector<std::string>& more :
+       {std::vector<std::string>{}, {"--overwrite"}, {"--resume"}, {"--shard", "1/2"}}) {
+    const Outcome outcome = run_into("mine", more);
+    CHECK(outcome.exit_code == 6);
+    CHECK_THAT(outcome.errors, ContainsSubstring("error: " + mine +
+                                                 ": holds \"notes.txt\", which is "
+                                                 "of no dataset; choose a new or empty folder"));
+    CHECK(tree(folder / "mine").size() == 1);
+  }
+  const Outcome root = run_into("/");
+  CHECK(root.exit_code == 6);
+  CHECK_THAT(root.errors, ContainsSubstring("error: /: holds \""));
+  // Hidden files and what file systems put at their root are nobody's.
+  fs::create_directories(folder / "volume/lost+found");
+  write_file(folder / "volume/.keep", "");
+  CHECK(run_into("volume").exit_code == 0);
+  CHECK(run_into("volume", {"--resume"}).exit_code == 0);
+  write_file(folder / "volume/notes.txt", "x");
+  CHECK(run_into("volume", {"--overwrite"}).exit_code == 0);
+  CHECK(fs::exists(folder / "volume/notes.txt"));
+}
+
+TEST_CASE("Files with names that are no UTF-8 make datasets that are", "[errors]") {
+  const TemporaryFolder folder;
+  const std::string cube = "#usda 1.0\ndef Cube \"C\"\n{\n    double size = 0.1\n}\n";
+  write_file(folder / "things/caf\xE9.usda", cube);
+  write_file(folder / "things/caf\xE8.usda", cube);
+  write_file(folder / "rooms/sal\xF3n.usda", cube);
+  std::string job = job_with("{type: shapes, shapes: [cube, sphere]}",
+                             "{type: files, folders: [" + (folder / "rooms").string() + "]}");
+  const std::string targets = "{type: shapes, name: targets,";
+  job =
+      job.replace(job.find(targets), targets.size(),
+                  "{type: files, folders: [" + (folder / "things").string() + "], name: targets,");
+  write_file(folder / "job.yaml", job);
+  const Outcome outcome = run({"run", "job.yaml", "--output", "out"}, folder.path());
+  INFO(outcome.errors);
+  CHECK(outcome.exit_code == 0);
+  CHECK(outcome.errors.find('\xE9') == std::string::npos);
+  CHECK_THAT(read_file(folder / "out/dataset.json"), ContainsSubstring("caf\\\\xE9"));
+  const Outcome plan = run({"run", "job.yaml", "--dry-run"}, folder.path());
+  CHECK_THAT(plan.output, ContainsSubstring("class: caf\\xE8"));
+  const Outcome inspected =
+      run({"inspect", "--json", (folder / "rooms/sal\xF3n.usda").string()}, folder.path());
+  INFO(inspected.errors);
+  CHECK(inspected.exit_code == 0);
+  CHECK_THAT(inspected.output, ContainsSubstring("sal\\\\xF3n"));
+}
+
+TEST_CASE("A plan for a hundred million captures and a hundred thousand objects", "[errors]") {
+  const TemporaryFolder folder;
+  std::string job = job_with("total_captures: 4", "total_captures: 100000000");
+  job = job.replace(job.find("count: 4"), 8, "count: 100000");
+  write_file(folder / "job.yaml", job);
+  const Outcome outcome = run({"run", "job.yaml", "--dry-run"}, folder.path());
+  INFO(outcome.errors);
+  CHECK(outcome.exit_code == 0);
+  CHECK_THAT(outcome.output, ContainsSubstring("visits (50000000)") &&
+                                 ContainsSubstring("... 49999000 more in the same order"));
+  CHECK(outcome.max_rss_kb < 400 * 1024);
 }

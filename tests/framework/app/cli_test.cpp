@@ -54,7 +54,29 @@ TEST_CASE("mistakes on the command line end with code 2", "[cli]") {
   CHECK(run_program("fly").code == 2);
   const auto unknown = run_program("run --fast job.yaml");
   CHECK(unknown.code == 2);
-  CHECK(unknown.err == "error: The following argument was not expected: --fast (try --help)\n");
+  CHECK(unknown.err == "error: unknown option \"--fast\" (try diorama run --help)\n");
+  check_error(
+      run_program("run --overwrit job.yaml"), 2,
+      "unknown option \"--overwrit\"; did you mean \"--overwrite\"? (try diorama run --help)");
+  check_error(
+      run_program("--thread=2 plugins"), 2,
+      "unknown option \"--thread\"; did you mean \"--threads\"? (try diorama plugins --help)");
+  check_error(run_program("rnu job.yaml"), 2,
+              "unknown command \"rnu\"; did you mean \"run\"? (try diorama --help)");
+  check_error(
+      run_program("plugins describ quiet"), 2,
+      "unknown command \"describ\"; did you mean \"describe\"? (try diorama plugins --help)");
+  check_error(run_program("inspect a.usd b.usd"), 2,
+              "nothing takes the argument \"b.usd\" (try diorama inspect --help)");
+  check_error(run_program(""), 2, "no command is given (try diorama --help)");
+  for (const char* seed : {"--seed=-1", "--seed -1", "--seed 0x10", "--seed 1.5",
+                           "--seed 18446744073709551616", "--seed ''"}) {
+    INFO(seed);
+    const auto run = run_program("run a.yaml " + std::string(seed));
+    CHECK(run.code == 2);
+  }
+  CHECK(has(run_program("run a.yaml --seed=-1").err,
+            "expected a whole number of 0 to 18446744073709551615, found \"-1\""));
   CHECK(run_program("--threads 2000 plugins").code == 2);
   CHECK(run_program("run a.yaml --seed many").code == 2);
   check_error(run_program("--log-level loud plugins"), 2,

@@ -2,6 +2,7 @@
 #include "framework/host/progress_bar.h"
 
 #include "diorama/error.h"
+#include "framework/host/terminal.h"
 #include "support/catch.h"
 
 using namespace diorama;
@@ -16,6 +17,28 @@ TEST_CASE("progress shows what is done, the rate and the time left", "[host]") {
   // What was there before does not make this run look fast.
   CHECK(progress_text("captures", 9, 12, 8, 2.0, 0) == "9/12 captures  2.0 s each  6 s left");
   CHECK(progress_text("captures", 0, 0, 0, 1.0, 4) == "[====]  0/0 captures");
+}
+
+TEST_CASE("progress fits narrow terminals", "[host]") {
+  const auto line = [](int columns) { return progress_line("captures", 6, 12, 0, 3.0, columns); };
+  CHECK(line(80) == "[===========>            ]  6/12 captures  2.0/s  3 s left");
+  CHECK(line(45) == "[====>     ]  6/12 captures  2.0/s  3 s left");
+  CHECK(line(39) == "6/12 captures  2.0/s  3 s left");
+  CHECK(line(20) == "6/12 captures  2.0/");
+  for (int columns = 1; columns < 100; ++columns) CHECK(int(line(columns).size()) < columns);
+}
+
+TEST_CASE("long lines of help go on in their column", "[host]") {
+  const std::string text =
+      "Options:\n  --seed N          Start of all random streams, instead of it\n";
+  CHECK(wrapped(text, 80) == text);
+  CHECK(wrapped(text, 45) ==
+        "Options:\n  --seed N          Start of all random\n                    streams, instead "
+        "of it\n");
+  CHECK(wrapped(text, 30) ==
+        "Options:\n  --seed N          Start of\n   all random streams, instead\n   of it\n");
+  CHECK(wrapped("averylongwordthatnothingbreaks\n", 20) == "averylongwordthatnothingbreaks\n");
+  CHECK(wrapped("", 20).empty());
 }
 
 TEST_CASE("log levels have four names", "[host]") {

@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "framework/pipeline/capture_plan.h"
 
+#include <unistd.h>
+
+#include <fstream>
 #include <set>
 
 #include "diorama/error.h"
+#include "framework/config/clean_text.h"
 #include "jobs.h"
 #include "support/catch.h"
 
@@ -20,6 +24,13 @@ CapturePlan plan_of(const Job& job) {
   return plan_captures(job, {{"/rooms/a.usd", 0}, {"/rooms/b.usd", 0}}, assets);
 }
 
+long resident_kb() {
+  long all = 0;
+  long resident = 0;
+  std::ifstream("/proc/self/statm") >> all >> resident;
+  return resident * (sysconf(_SC_PAGESIZE) / 1024);
+}
+
 std::vector<std::string> choices(const CapturePlan& plan, std::size_t group) {
   std::vector<std::string> result;
   for (const PlannedObject& object : plan.objects) {
@@ -32,27 +43,33 @@ std::vector<std::string> choices(const CapturePlan& plan, std::size_t group) {
 
 TEST_CASE("Environments are cycled until all captures are planned", "[plan]") {
   const CapturePlan plan = plan_of(job_from(good_job()));
-  REQUIRE(plan.visits.size() == 3);
+  REQUIRE(plan.visit_count() == 3);
   CHECK(plan.capture_count() == 7);
-  CHECK(plan.visits[0].environment == 0);
-  CHECK(plan.visits[1].environment == 1);
-  CHECK(plan.visits[2].environment == 0);
+  CHECK(plan.visit(0).environment == 0);
+  CHECK(plan.visit(1).environment == 1);
+  CHECK(plan.visit(2).environment == 0);
 
   // 3 captures per visit; the last visit is cut short.
-  CHECK(plan.visits[1].captures.size() == 3);
-  CHECK(plan.visits[1].captures[0].index == 3);
-  CHECK(plan.visits[1].captures[1].phase == "floating");
-  CHECK(plan.visits[1].captures[1].number == 1);
-  CHECK(plan.visits[1].captures[2].phase == "dropped");
-  CHECK(plan.visits[1].captures[2].number == 0);
-  REQUIRE(plan.visits[2].captures.size() == 1);
-  CHECK(plan.visits[2].captures[0].index == 6);
+  CHECK(plan.visit(1).first_capture == 3);
+  CHECK(plan.visit(1).capture_count == 3);
+  CHECK(plan.capture(4).index == 4);
+  CHECK(plan.capture(4).phase == "floating");
+  CHECK(plan.capture(4).number == 1);
+  CHECK(plan.capture(5).phase == "dropped");
+  CHECK(plan.capture(5).number == 0);
+  CHECK(plan.visit(2).first_capture == 6);
+  CHECK(plan.visit(2).capture_count == 1);
+  CHECK(plan.series(plan.visit(1)).size() == 2);
+  CHECK(plan.series(plan.visit(1))[1].phase == "dropped");
+  REQUIRE(plan.series(plan.visit(2)).size() == 1);
+  CHECK(plan.series(plan.visit(2))[0].count == 1);
 }
 
 TEST_CASE("No captures wanted, no visits planned", "[plan]") {
   const CapturePlan plan =
       plan_of(job_from(with(good_job(), "total_captures: 7", "total_captures: 0")));
-  CHECK(plan.visits.empty());
+  CHECK(plan.visit_count() == 0);
+  CHECK(plan.capture_count() == 0);
 }
 
 TEST_CASE("Shards are disjoint and together make the whole", "[plan]") {
@@ -61,8 +78,10 @@ TEST_CASE("Shards are disjoint and together make the whole", "[plan]") {
   for (const int shards : {1, 2, 3, 7, 50}) {
     std::multiset<int> indices;
     for (int shard = 0; shard < shards; ++shard) {
-      for (const PlannedVisit& visit : shard_of(plan, shard, shards)) {
-        for (const PlannedCapture& capture : visit.captures) indices.insert(capture.index);
+      for (int i = 0; i < plan.visit_count(); ++i) {
+        if (!is_in_shard(i, shard, shards)) continue;
+        const PlannedVisit visit = plan.visit(i);
+        for (int k = 0; k < visit.capture_count; ++k) indices.insert(visit.first_capture + k);
       }
     }
     CHECK(indices.size() == 100);
@@ -212,4 +231,50 @@ TEST_CASE("The stem of an asset is its name without folders, scheme and ending",
   CHECK(asset_stem("shape:cube") == "cube");
   CHECK(asset_stem("dining_room:7") == "7");
   CHECK(asset_stem(".hidden") == ".hidden");
+}
+
+TEST_CASE("One series in several steps of a visit counts on", "[plan]") {
+  const CapturePlan plan = plan_of(
+      job_from(with(good_job(), "{simulate: 200}",
+                    "{capture: rest, count: 0}, {capture: mid}, {capture: floating, count: 3}")));
+  std::string text;
+  for (int i = 0; i < plan.capture_count(); ++i) {
+    text += plan.capture(i).phase.substr(0, 1) + std::to_string(plan.capture(i).number) + " ";
+  }
+  CHECK(text == "f0 f1 m0 f2 f3 f4 d0 ");
+  CHECK(plan.series(plan.visit(0)).size() == 4);
+}
+
+TEST_CASE("A plan of a hundred million captures is small, and each can be asked for", "[plan]") {
+  const long before = resident_kb();
+  const CapturePlan plan =
+      plan_of(job_from(with(good_job(), "total_captures: 7", "total_captures: 100000000")));
+  CHECK(plan.capture_count() == 100'000'000);
+  CHECK(plan.visit_count() == 33'333'334);
+  CHECK(plan.visit(33'333'333).first_capture == 99'999'999);
+  CHECK(plan.visit(33'333'333).capture_count == 1);
+  CHECK(plan.visit(33'333'333).environment == 1);
+  CHECK(plan.capture(99'999'998).phase == "dropped");
+  CHECK(resident_kb() - before < 4096);
+}
+
+TEST_CASE("A hundred thousand objects of one name are planned by as many steps", "[plan]") {
+  std::string yaml = with(good_job(), "count: 20", "count: 100000");
+  yaml = with(yaml, "gravity_disabled_chance: 0.25", "gravity_disabled_chance: 0, label: mug");
+  const CapturePlan plan = plan_of(job_from(yaml));
+  REQUIRE(plan.objects.size() == 100'008);
+  CHECK(plan.objects[99].path == "/Assets/falling_mug_99");
+  CHECK(plan.objects[99'999].path == "/Assets/falling_mug_99999");
+}
+
+TEST_CASE("Names of files that are no UTF-8 become labels that are, and stay different", "[plan]") {
+  const Job job = job_from(with(good_job(), "count: 20", "count: 40"));
+  const CapturePlan plan = plan_captures(
+      job, {{"/rooms/a.usd", 0}}, {{"/x/001_caf\xE9.usd", "/x/002_caf\xE8.usd"}, {"/x/a\nb.usd"}});
+  std::set<std::string> labels;
+  for (const PlannedObject& object : plan.objects) {
+    if (object.group == 0) labels.insert(object.labels.at("class"));
+    CHECK(is_clean_name(object.path));
+  }
+  CHECK(labels == std::set<std::string>{"caf\\xE8", "caf\\xE9"});
 }

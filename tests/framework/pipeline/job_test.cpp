@@ -120,3 +120,37 @@ TEST_CASE("The resolved job has every default and means the same", "[job]") {
   CHECK(again.total_captures == first.total_captures);
   CHECK(to_yaml(resolved_job(job_value(text), describe)) == text);
 }
+
+TEST_CASE("Writers stay below the output folder, and out of its bookkeeping", "[job]") {
+  const auto complaints = [](const std::string& writer) {
+    return complaints_about(with(good_job(), "name: basic", writer));
+  };
+  CHECK(complaints("name: ../../x") ==
+        "job.yaml:12:37: writers[0].name: the folder \"../../x\" is not below the output folder "
+        "\"out\"; name a folder below it, or choose one that holds both by `--output`\n");
+  CHECK_THAT(complaints("name: basic, output_dir: /etc/x"),
+             ContainsSubstring("job.yaml:12:56: writers[0].output_dir: the folder \"/etc/x\" is "
+                               "not below the output folder \"out\""));
+  for (const char* folder : {"..", "a/../..", "./../out2", ".diorama", "a/.diorama-stage/b",
+                             "../out/.diorama/journal"}) {
+    INFO(folder);
+    CHECK_THAT(complaints("name: basic, output_dir: " + std::string(folder)),
+               ContainsSubstring("is not below the output folder"));
+  }
+  for (const char* folder : {".", "a", "a/b/", "a/../b", "../out/c", "..."}) {
+    INFO(folder);
+    CHECK(complaints("name: basic, output_dir: " + std::string(folder)).empty());
+  }
+  CHECK(complaints("name: ../../x, output_dir: inside").empty());
+  CHECK_THAT(complaints_about(with(good_job(), "{folder: out}", "{folder: out, records: ../y}")),
+             ContainsSubstring("job.yaml:13:32: output.records: the folder \"../y\" is not below"));
+  CHECK(complaints_about(with(with(good_job(), "{folder: out}", "{folder: /data}"), "name: basic",
+                              "name: basic, output_dir: /data/basic"))
+            .empty());
+}
+
+TEST_CASE("Names of groups hold nothing that a terminal would obey", "[job]") {
+  CHECK_THAT(complaints_about(with(good_job(), "name: cam", "name: \"a\\e[2J\"")),
+             ContainsSubstring("cameras[0].name: expected a name without \"/\" and control "
+                               "characters, found \"a\\x1B[2J\""));
+}

@@ -1,0 +1,15 @@
+# cmake -D CLANGXX=... -D SOURCE=... -D BUILD=... -D NAME=pictures -D FUZZER=picture_fuzzer
+#       -D SECONDS=... -P run_reader_fuzzer.cmake
+# Builds one of the fuzzers of readers/ and runs it for a while on the seeds of its name.
+function(run)
+  execute_process(COMMAND ${ARGN} RESULT_VARIABLE result)
+  if(NOT result EQUAL 0)
+    message(FATAL_ERROR "failed: ${ARGN}")
+  endif()
+endfunction()
+
+run(${CMAKE_COMMAND} -S ${SOURCE}/tests/fuzz/readers -B ${BUILD} -DCMAKE_CXX_COMPILER=${CLANGXX})
+run(${CMAKE_COMMAND} --build ${BUILD} --target ${FUZZER})
+file(MAKE_DIRECTORY ${BUILD}/corpus/${NAME})
+run(${BUILD}/${FUZZER} -max_total_time=${SECONDS} -rss_limit_mb=1024 -timeout=10 -max_len=65536
+    -artifact_prefix=${BUILD}/${NAME}- ${BUILD}/corpus/${NAME} ${SOURCE}/tests/fuzz/seeds/${NAME})
