@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <cstdio>
 #include <map>
+#include <numeric>
 #include <regex>
 #include <set>
+#include <utility>
 
 #include "diorama/error.h"
 
@@ -30,8 +32,43 @@ std::string free_name(const std::string& stem, std::set<std::string>& taken) {
   return name;
 }
 
+/// Picks from a group's assets.
+class Picks {
+ public:
+  Picks(const JobStreams& streams, const ObjectGroup& group, const std::vector<std::string>& assets)
+      : streams_(streams), group_(group), assets_(assets) {}
+
+  /// `rng` is the object's own stream, `number` counts the group's picks over all visits.
+  const std::string& pick(Rng& rng, std::uint64_t number) {
+    if (!group_.balance) return assets_[rng.index(assets_.size())];
+    shuffle(number / assets_.size());
+    return assets_[order_[number % assets_.size()]];
+  }
+
+ private:
+  void shuffle(std::uint64_t round) {
+    if (!order_.empty() && round == round_) return;
+    round_ = round;
+    order_.resize(assets_.size());
+    std::iota(order_.begin(), order_.end(), std::size_t(0));
+    Rng rng = streams_.round(group_.name, round);
+    for (std::size_t i = order_.size(); i > 1; --i) std::swap(order_[i - 1], order_[rng.index(i)]);
+  }
+
+  const JobStreams& streams_;
+  const ObjectGroup& group_;
+  const std::vector<std::string>& assets_;
+  std::uint64_t round_ = 0;
+  std::vector<std::size_t> order_;
+};
+
+bool picks_per_visit(const ObjectGroup& group) {
+  return group.pick == "per_visit" && group.count > 0;
+}
+
 void plan_group(const Job& job, std::size_t index, const std::vector<std::string>& assets,
-                std::map<std::string, std::set<std::string>>& taken_below, CapturePlan& plan) {
+                int visit, std::map<std::string, std::set<std::string>>& taken_below,
+                std::vector<PlannedObject>& objects) {
   const ObjectGroup& group = job.objects[index];
   if (group.count == 0) return;
   if (assets.empty()) {
@@ -39,12 +76,15 @@ void plan_group(const Job& job, std::size_t index, const std::vector<std::string
                                        ": names no assets, but " + std::to_string(group.count) +
                                        " objects are wanted");
   }
+  const bool is_anew = picks_per_visit(group);
   const JobStreams streams(job.seed);
+  Picks picks(streams, group, assets);
+  const std::uint64_t before = is_anew ? std::uint64_t(visit) * std::uint64_t(group.count) : 0;
   for (int number = 0; number < group.count; ++number) {
-    Rng rng = streams.object(group.name, number);
+    Rng rng = streams.object(group.name, number, is_anew ? visit : -1);
     PlannedObject object;
     object.group = index;
-    object.asset = assets[rng.index(assets.size())];
+    object.asset = picks.pick(rng, before + std::uint64_t(number));
     object.floats = rng.chance(group.gravity_disabled_chance);
     const std::string stem = asset_stem(object.asset);
     object.labels = labels_of(group, stem);
@@ -52,7 +92,7 @@ void plan_group(const Job& job, std::size_t index, const std::vector<std::string
     object.name = free_name((object.floats ? "floating_" : "falling_") + node_name(word),
                             taken_below[group.under]);
     object.path = group.under + "/" + object.name;
-    plan.objects.push_back(std::move(object));
+    objects.push_back(std::move(object));
   }
 }
 
@@ -92,10 +132,8 @@ CapturePlan plan_captures(const Job& job, std::vector<EnvironmentChoice> environ
                           const std::vector<std::vector<std::string>>& object_assets) {
   CapturePlan plan;
   plan.environments = std::move(environments);
-  std::map<std::string, std::set<std::string>> taken_below;
-  for (std::size_t i = 0; i < job.objects.size(); ++i) {
-    plan_group(job, i, object_assets[i], taken_below, plan);
-  }
+  plan.object_assets = object_assets;
+  plan.objects = plan_objects(job, object_assets, 0);
   int captures = 0;
   while (captures < job.total_captures) {
     PlannedVisit visit = plan_visit(job, int(plan.visits.size()), captures);
@@ -107,6 +145,52 @@ CapturePlan plan_captures(const Job& job, std::vector<EnvironmentChoice> environ
     plan.visits.push_back(std::move(visit));
   }
   return plan;
+}
+
+std::vector<PlannedObject> plan_objects(const Job& job,
+                                        const std::vector<std::vector<std::string>>& object_assets,
+                                        int visit) {
+  std::vector<PlannedObject> objects;
+  std::map<std::string, std::set<std::string>> taken_below;
+  for (std::size_t i = 0; i < job.objects.size(); ++i) {
+    plan_group(job, i, object_assets[i], visit, taken_below, objects);
+  }
+  return objects;
+}
+
+void visit_planned_objects(const Job& job, const CapturePlan& plan,
+                           const std::function<void(const PlannedObject&)>& body) {
+  using Asset = std::pair<std::size_t, std::string>;  // with its group
+  std::set<Asset> all;                                // a list may name one twice
+  for (std::size_t i = 0; i < job.objects.size(); ++i) {
+    if (!picks_per_visit(job.objects[i])) continue;
+    for (const std::string& asset : plan.object_assets[i]) all.emplace(i, asset);
+  }
+  std::set<Asset> seen;
+  const auto look_at = [&](const PlannedObject& object) {
+    body(object);
+    if (picks_per_visit(job.objects[object.group])) seen.emplace(object.group, object.asset);
+  };
+  for (const PlannedObject& object : plan.objects) look_at(object);
+  for (std::size_t visit = 1; visit < plan.visits.size() && seen.size() < all.size(); ++visit) {
+    for (const PlannedObject& object : plan_objects(job, plan.object_assets, int(visit))) {
+      look_at(object);
+    }
+  }
+}
+
+std::vector<std::vector<std::string>> unused_assets(const Job& job, const CapturePlan& plan) {
+  std::vector<std::set<std::string>> used(job.objects.size());
+  visit_planned_objects(
+      job, plan, [&](const PlannedObject& object) { used[object.group].insert(object.asset); });
+  std::vector<std::vector<std::string>> unused(job.objects.size());
+  for (std::size_t i = 0; i < job.objects.size(); ++i) {
+    if (job.objects[i].count == 0) continue;
+    for (const std::string& asset : plan.object_assets[i]) {
+      if (!used[i].contains(asset)) unused[i].push_back(asset);
+    }
+  }
+  return unused;
 }
 
 std::vector<PlannedVisit> shard_of(const CapturePlan& plan, int shard, int shards) {
@@ -136,8 +220,13 @@ std::string asset_stem(std::string_view asset) {
   return std::string(name);
 }
 
-Rng JobStreams::object(std::string_view group, int number) const {
-  return root_.fork("objects").fork(group).fork(std::uint64_t(number));
+Rng JobStreams::object(std::string_view group, int number, int visit) const {
+  const Rng stream = root_.fork("objects").fork(group).fork(std::uint64_t(number));
+  return visit < 0 ? stream : stream.fork("visit").fork(std::uint64_t(visit));
+}
+
+Rng JobStreams::round(std::string_view group, std::uint64_t number) const {
+  return root_.fork("rounds").fork(group).fork(number);
 }
 
 Rng JobStreams::randomizer(std::string_view name, int visit, std::string_view moment,
