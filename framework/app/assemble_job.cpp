@@ -6,6 +6,7 @@
 
 #include "framework/config/value_text.h"
 #include "framework/pipeline/dataset_description.h"
+#include "framework/pipeline/pattern_check.h"
 #include "framework/plugins/plugin_call.h"
 
 namespace diorama {
@@ -184,6 +185,29 @@ CapturePlan plan_from_assets(const JobAssembly& assembly,
   return plan_captures(job, std::move(environments), object_assets);
 }
 
+/// A folder that holds more than is used may be a mistake.
+void tell_unused_assets(const JobAssembly& assembly, const std::optional<fs::path>& assets_root,
+                        Host& host) {
+  constexpr std::size_t kNamed = 12;
+  const auto unused = unused_assets(assembly.job, assembly.plan);
+  for (std::size_t i = 0; i < unused.size(); ++i) {
+    if (unused[i].empty()) continue;
+    std::string names;
+    for (std::size_t k = 0; k < std::min(kNamed, unused[i].size()); ++k) {
+      names += (k > 0 ? ", " : "") + asset_name(unused[i][k], assets_root);
+    }
+    if (unused[i].size() > kNamed) {
+      names += " and " + std::to_string(unused[i].size() - kNamed) + " more";
+    }
+    host.log(LogLevel::Info,
+             "objects '" + assembly.job.objects[i].name + "': " + std::to_string(unused[i].size()) +
+                 " of " + std::to_string(assembly.plan.object_assets[i].size()) +
+                 " assets are left out (`pick: per_visit`, `balance: true` or a larger `count` "
+                 "takes more): " +
+                 names);
+  }
+}
+
 std::vector<Need> needs_of(const JobAssembly& assembly) {
   std::vector<Need> needs;
   for (std::size_t i = 0; i < assembly.components.writers.size(); ++i) {
@@ -250,19 +274,20 @@ DescribeComponent describe_from(Registry& registry) {
 }
 
 OutputFolders output_folders(const Job& job) {
-  const auto below = [&](const std::string& what, const std::string& name) {
-    const fs::path place = fs::path(name).lexically_normal();
-    const std::string text = place.has_filename() ? place.string() : place.parent_path().string();
-    if (text == "." || is_plain_relative(text)) return text;
-    throw Error(ErrorKind::Config, what + ": expected a folder below output.folder, found \"" + name +
-                                       "\"; --output chooses another place for the whole dataset");
+  const fs::path base = (fs::path(job.output.folder) / ".").lexically_normal();
+  const auto below = [&](const std::string& name) {
+    const fs::path place = (base / name).lexically_normal().lexically_relative(base);
+    std::string text = place.has_filename() ? place.string() : place.parent_path().string();
+    if (text != "." && !is_plain_relative(text)) {
+      throw Error(ErrorKind::Internal, "the folder \"" + name + "\" is not below the output folder");
+    }
+    return text;
   };
   OutputFolders folders;
   folders.base = job.output.folder;
-  folders.records = below("output.records", job.output.records);
+  folders.records = below(job.output.records);
   for (const WriterEntry& writer : job.writers) {
-    folders.writers.push_back({writer.name, below("writer '" + writer.name + "': output_dir",
-                                                  writer.output_dir.value_or(writer.name))});
+    folders.writers.push_back({writer.name, below(writer.output_dir.value_or(writer.name))});
   }
   return folders;
 }
@@ -295,13 +320,17 @@ JobAssembly assemble_job(const Value& value, Registry& registry, HostServices& h
   for (auto& [type, loader] : loaders.of_files) host.use_loader(type, std::move(loader));
   assembly.resolved = resolved_job(value, describe_from(registry));
   assembly.plan = plan_from_assets(assembly, loaders.of_objects);
+  assembly.components.environment_patterns =
+      check_patterns(assembly.job, assembly.plan, describe_from(registry), assembler.complaints());
+  assembler.complaints().raise();
+  tell_unused_assets(assembly, assets_root, host);
   resolve_needs(assembler, std::move(annotators), assembly);
   for (const EnvironmentChoice& choice : assembly.plan.environments) {
     assembler.note_loader(host.loader_of(choice.asset));
   }
-  for (const PlannedObject& object : assembly.plan.objects) {
+  visit_planned_objects(assembly.job, assembly.plan, [&](const PlannedObject& object) {
     assembler.note_loader(host.loader_of(object.asset));
-  }
+  });
   for (const std::string& asset : drawn_assets) assembler.note_loader(host.loader_of(asset));
   if (assembly.job.writers.empty()) {
     host.log(LogLevel::Warning, "writers: there are none, so the run leaves no pictures");

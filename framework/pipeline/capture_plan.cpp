@@ -5,7 +5,9 @@
 #include <cstdio>
 #include <iterator>
 #include <map>
+#include <numeric>
 #include <set>
+#include <utility>
 
 #include "diorama/error.h"
 #include "framework/config/clean_text.h"
@@ -50,8 +52,43 @@ AssetWords words_of(const ObjectGroup& group, const std::string& asset,
   return words;
 }
 
+/// Picks from a group's assets.
+class Picks {
+ public:
+  Picks(const JobStreams& streams, const ObjectGroup& group, const std::vector<std::string>& assets)
+      : streams_(streams), group_(group), assets_(assets) {}
+
+  /// An index of `assets`. `rng` is the object's own stream, `number` counts the group's picks over all visits.
+  std::size_t pick(Rng& rng, std::uint64_t number) {
+    if (!group_.balance) return rng.index(assets_.size());
+    shuffle(number / assets_.size());
+    return order_[number % assets_.size()];
+  }
+
+ private:
+  void shuffle(std::uint64_t round) {
+    if (!order_.empty() && round == round_) return;
+    round_ = round;
+    order_.resize(assets_.size());
+    std::iota(order_.begin(), order_.end(), std::size_t(0));
+    Rng rng = streams_.round(group_.name, round);
+    for (std::size_t i = order_.size(); i > 1; --i) std::swap(order_[i - 1], order_[rng.index(i)]);
+  }
+
+  const JobStreams& streams_;
+  const ObjectGroup& group_;
+  const std::vector<std::string>& assets_;
+  std::uint64_t round_ = 0;
+  std::vector<std::size_t> order_;
+};
+
+bool picks_per_visit(const ObjectGroup& group) {
+  return group.pick == "per_visit" && group.count > 0;
+}
+
 void plan_group(const Job& job, std::size_t index, const std::vector<std::string>& assets,
-                std::map<std::string, SiblingNames>& names_below, CapturePlan& plan) {
+                int visit, std::map<std::string, SiblingNames>& names_below,
+                std::vector<PlannedObject>& objects) {
   const ObjectGroup& group = job.objects[index];
   if (group.count == 0) return;
   if (assets.empty()) {
@@ -59,16 +96,19 @@ void plan_group(const Job& job, std::size_t index, const std::vector<std::string
                                        ": names no assets, but " + std::to_string(group.count) +
                                        " objects are wanted");
   }
+  const bool is_anew = picks_per_visit(group);
   const JobStreams streams(job.seed);
   std::optional<LabelPattern> pattern;
   if (group.label_pattern) pattern.emplace(*group.label_pattern);
   SiblingNames& names = names_below[group.under];
   std::map<std::size_t, AssetWords> words_of_asset;
+  Picks picks(streams, group, assets);
+  const std::uint64_t before = is_anew ? std::uint64_t(visit) * std::uint64_t(group.count) : 0;
   for (int number = 0; number < group.count; ++number) {
-    Rng rng = streams.object(group.name, number);
+    Rng rng = streams.object(group.name, number, is_anew ? visit : -1);
     PlannedObject object;
     object.group = index;
-    const std::size_t choice = rng.index(assets.size());
+    const std::size_t choice = picks.pick(rng, before + std::uint64_t(number));
     object.asset = assets[choice];
     object.floats = rng.chance(group.gravity_disabled_chance);
     const auto known = words_of_asset.find(choice);
@@ -80,7 +120,7 @@ void plan_group(const Job& job, std::size_t index, const std::vector<std::string
     const std::string& word = object.labels.empty() ? words.stem : object.labels.begin()->second;
     object.name = names.free_name((object.floats ? "floating_" : "falling_") + node_name(word));
     object.path = group.under + "/" + object.name;
-    plan.objects.push_back(std::move(object));
+    objects.push_back(std::move(object));
   }
 }
 
@@ -147,11 +187,55 @@ std::vector<PlannedSeries> CapturePlan::series(const PlannedVisit& visit) const 
 CapturePlan plan_captures(const Job& job, std::vector<EnvironmentChoice> environments,
                           const std::vector<std::vector<std::string>>& object_assets) {
   CapturePlan plan(job, std::move(environments));
+  plan.object_assets = object_assets;
+  plan.objects = plan_objects(job, object_assets, 0);
+  return plan;
+}
+
+std::vector<PlannedObject> plan_objects(const Job& job,
+                                        const std::vector<std::vector<std::string>>& object_assets,
+                                        int visit) {
+  std::vector<PlannedObject> objects;
   std::map<std::string, SiblingNames> names_below;
   for (std::size_t i = 0; i < job.objects.size(); ++i) {
-    plan_group(job, i, object_assets[i], names_below, plan);
+    plan_group(job, i, object_assets[i], visit, names_below, objects);
   }
-  return plan;
+  return objects;
+}
+
+void visit_planned_objects(const Job& job, const CapturePlan& plan,
+                           const std::function<void(const PlannedObject&)>& body) {
+  using Asset = std::pair<std::size_t, std::string>;  // with its group
+  std::set<Asset> all;                                // a list may name one twice
+  for (std::size_t i = 0; i < job.objects.size(); ++i) {
+    if (!picks_per_visit(job.objects[i])) continue;
+    for (const std::string& asset : plan.object_assets[i]) all.emplace(i, asset);
+  }
+  std::set<Asset> seen;
+  const auto look_at = [&](const PlannedObject& object) {
+    body(object);
+    if (picks_per_visit(job.objects[object.group])) seen.emplace(object.group, object.asset);
+  };
+  for (const PlannedObject& object : plan.objects) look_at(object);
+  for (int visit = 1; visit < plan.visit_count() && seen.size() < all.size(); ++visit) {
+    for (const PlannedObject& object : plan_objects(job, plan.object_assets, visit)) {
+      look_at(object);
+    }
+  }
+}
+
+std::vector<std::vector<std::string>> unused_assets(const Job& job, const CapturePlan& plan) {
+  std::vector<std::set<std::string>> used(job.objects.size());
+  visit_planned_objects(
+      job, plan, [&](const PlannedObject& object) { used[object.group].insert(object.asset); });
+  std::vector<std::vector<std::string>> unused(job.objects.size());
+  for (std::size_t i = 0; i < job.objects.size(); ++i) {
+    if (job.objects[i].count == 0) continue;
+    for (const std::string& asset : plan.object_assets[i]) {
+      if (!used[i].contains(asset)) unused[i].push_back(asset);
+    }
+  }
+  return unused;
 }
 
 std::optional<RandomizerCall> randomizer_call(const Job& job, const RandomizerEntry& entry,
@@ -173,8 +257,13 @@ std::string asset_stem(std::string_view asset) {
   return std::string(name);
 }
 
-Rng JobStreams::object(std::string_view group, int number) const {
-  return root_.fork("objects").fork(group).fork(std::uint64_t(number));
+Rng JobStreams::object(std::string_view group, int number, int visit) const {
+  const Rng stream = root_.fork("objects").fork(group).fork(std::uint64_t(number));
+  return visit < 0 ? stream : stream.fork("visit").fork(std::uint64_t(visit));
+}
+
+Rng JobStreams::round(std::string_view group, std::uint64_t number) const {
+  return root_.fork("rounds").fork(group).fork(number);
 }
 
 Rng JobStreams::randomizer(std::string_view name, int visit, std::string_view moment,

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -23,7 +24,7 @@ struct EnvironmentChoice {
   std::size_t entry = 0;
 };
 
-/// An object that every visit spawns.
+/// An object that a visit spawns.
 struct PlannedObject {
   std::size_t group = 0;  ///< Index into Job::objects.
   std::string asset;
@@ -61,7 +62,8 @@ class CapturePlan {
   CapturePlan(const Job& job, std::vector<EnvironmentChoice> environments);
 
   std::vector<EnvironmentChoice> environments;
-  std::vector<PlannedObject> objects;
+  std::vector<std::vector<std::string>> object_assets;  ///< Per group, what is picked from.
+  std::vector<PlannedObject> objects;                   ///< Of the first visit.
 
   int capture_count() const { return capture_count_; }
   int visit_count() const;
@@ -86,6 +88,18 @@ class CapturePlan {
 /// Throws Error(Config) when a group wants objects and has nothing to pick from.
 CapturePlan plan_captures(const Job& job, std::vector<EnvironmentChoice> environments,
                           const std::vector<std::vector<std::string>>& object_assets);
+
+/// The objects of any visit, found without those before it.
+std::vector<PlannedObject> plan_objects(const Job& job,
+                                        const std::vector<std::vector<std::string>>& object_assets,
+                                        int visit);
+
+/// Calls body(object) for objects of the job's visits until every asset and its labels came up.
+void visit_planned_objects(const Job& job, const CapturePlan& plan,
+                           const std::function<void(const PlannedObject&)>& body);
+
+/// The assets of each group that no visit uses, in the loader's order.
+std::vector<std::vector<std::string>> unused_assets(const Job& job, const CapturePlan& plan);
 
 /// Visits of a shard: those whose index leaves remainder `shard` when divided by `shards`.
 inline bool is_in_shard(int visit, int shard, int shards) { return visit % shards == shard; }
@@ -112,7 +126,10 @@ class JobStreams {
  public:
   explicit JobStreams(std::uint64_t seed) : root_(seed) {}
 
-  Rng object(std::string_view group, int number) const;
+  /// `visit` is -1 for what is picked once per job.
+  Rng object(std::string_view group, int number, int visit) const;
+  /// For the order of a group's assets in one round through all of them.
+  Rng round(std::string_view group, std::uint64_t number) const;
   /// `occurrence` tells calls at the same moment of one visit apart: the capture's index, or a
   /// running number for events.
   Rng randomizer(std::string_view name, int visit, std::string_view moment, int occurrence) const;

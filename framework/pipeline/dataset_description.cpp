@@ -33,15 +33,16 @@ Json conventions() {
 /// Names of assets, each with the labels of the objects that are made of it.
 using UsedAssets = std::map<std::string, std::set<Labels>>;
 
-UsedAssets used_assets(const CapturePlan& plan, const std::vector<std::string>& drawn_assets) {
+UsedAssets used_assets(const Job& job, const CapturePlan& plan,
+                       const std::vector<std::string>& drawn_assets) {
   UsedAssets assets;
   const auto used = std::min(plan.environments.size(), std::size_t(plan.visit_count()));
   for (std::size_t i = 0; i < used; ++i) assets.try_emplace(plan.environments[i].asset);
   for (const std::string& asset : drawn_assets) assets.try_emplace(asset);
-  for (const PlannedObject& object : plan.objects) {
+  visit_planned_objects(job, plan, [&](const PlannedObject& object) {
     std::set<Labels>& labels = assets[object.asset];
     if (!object.labels.empty()) labels.insert(object.labels);
-  }
+  });
   return assets;
 }
 
@@ -88,13 +89,18 @@ std::string captures_text(const PlannedVisit& visit) {
   return "captures " + std::to_string(first) + "-" + std::to_string(last);
 }
 
+std::string simulation_text(const TimelineStep& step) {
+  if (!step.until_rest) return std::to_string(step.steps);
+  return "until rest, " + std::to_string(step.at_least) + " to " + std::to_string(step.steps);
+}
+
 std::string timeline_text(const Job& job) {
   std::string text;
   for (const TimelineStep& step : job.timeline) {
     text += text.empty() ? "" : " -> ";
     switch (step.kind) {
       case TimelineStep::Kind::Simulate:
-        text += "simulate " + std::to_string(step.steps);
+        text += "simulate " + simulation_text(step);
         break;
       case TimelineStep::Kind::Capture:
         text += "capture " + step.name + " x " + std::to_string(step.count);
@@ -139,7 +145,12 @@ void add_objects(std::string& text, const CapturePlan& plan, const Job& job,
     const auto floating = std::count_if(plan.objects.begin(), plan.objects.end(),
                                         [&](auto& o) { return o.group == group && o.floats; });
     text += "  " + job.objects[group].name + ": " + std::to_string(job.objects[group].count) +
-            " below " + job.objects[group].under + ", " + std::to_string(floating) + " floating\n";
+            " below " + job.objects[group].under;
+    if (job.objects[group].pick == "per_visit") {
+      text += ", picked anew in each visit from " +
+              std::to_string(plan.object_assets[group].size()) + " assets; in visit 0";
+    }
+    text += ", " + std::to_string(floating) + " floating\n";
     for (const PlannedObject& object : plan.objects) {
       if (object.group != group) continue;
       text += "    " + object.path + "  " + labels_text(object.labels) + "  " +
@@ -206,14 +217,14 @@ DatasetInfo describe_dataset(const Job& job, const CapturePlan& plan, std::strin
   info.capture_count = plan.capture_count();
   info.camera_names = job.camera_names();
   std::set<Labels> labels;
-  for (const PlannedObject& object : plan.objects) {
+  visit_planned_objects(job, plan, [&](const PlannedObject& object) {
     if (!object.labels.empty()) labels.insert(object.labels);
-  }
+  });
   info.labels.assign(labels.begin(), labels.end());
   info.resolved_job = std::move(resolved);
   info.program_version = std::move(program_version);
   info.plugin_versions = std::move(plugin_versions);
-  info.assets = hashed_assets(used_assets(plan, drawn_assets), files_of, assets_root);
+  info.assets = hashed_assets(used_assets(job, plan, drawn_assets), files_of, assets_root);
   return info;
 }
 

@@ -18,12 +18,15 @@ namespace {
 using detail::EngineHead;
 using detail::EntryHead;
 using detail::JobHead;
+using detail::RestKeys;
 using detail::StepKeys;
+using detail::StepsKeys;
 
 constexpr const char* kColliderWords[] = {"none", "triangle_mesh", "convex_hull", "bounding_box",
                                           "bounding_sphere"};
 constexpr const char* kEnvironmentColliderWords[] = {"none", "triangle_mesh", "convex_hull",
                                                      "bounding_box"};
+constexpr const char* kPickWords[] = {"per_job", "per_visit"};
 constexpr const char* kSettlePolicies[] = {"keep", "respawn", "drop"};
 constexpr const char* kLightWords[] = {"sphere", "rect", "disk", "distant", "dome"};
 constexpr const char* kCameraWords[] = {"pinhole", "opencv_pinhole", "fisheye_polynomial"};
@@ -359,25 +362,50 @@ ComponentConfig read_engine(const Value& value, std::string_view section, const 
   return entry;
 }
 
+/// `simulate: 200` or `simulate: {until: rest, ...}`.
+std::optional<TimelineStep> read_simulation(const Value& map, const std::string& path,
+                                            Complaints& complaints) {
+  const std::size_t before = complaints.messages().size();
+  const Value& value = *map.find("simulate");
+  TimelineStep step;
+  if (value.kind == Value::Kind::Map) {
+    RestKeys keys;
+    read_all_keys(value, path + ".simulate", keys, complaints);
+    if (keys.at_least > keys.at_most) {
+      complaints.add(place_of(value, "at_least"), path + ".simulate.at_least: expected at_most (" +
+                                                      std::to_string(keys.at_most) +
+                                                      ") or less, found " +
+                                                      std::to_string(keys.at_least));
+    }
+    step.until_rest = true;
+    step.steps = keys.at_most;
+    step.at_least = keys.at_least;
+  } else {
+    StepsKeys keys;
+    read_all_keys(map, path, keys, complaints);
+    if (keys.simulate != std::floor(keys.simulate)) {
+      complaints.add(value.place, path + ".simulate: expected a whole number");
+    }
+    step.steps = int(keys.simulate);
+  }
+  if (complaints.messages().size() != before) return std::nullopt;
+  return step;
+}
+
 std::optional<TimelineStep> read_step(const Value& map, const std::string& path,
                                       Complaints& complaints) {
   StepKeys keys;
   const std::size_t before = complaints.messages().size();
   read_all_keys(map, path, keys, complaints);
   if (complaints.messages().size() != before) return std::nullopt;
-  if (int(keys.simulate.has_value()) + int(keys.capture.has_value()) +
-          int(keys.event.has_value()) !=
-      1) {
+  const bool simulates = keys.simulate.kind != Value::Kind::Null;
+  if (int(simulates) + int(keys.capture.has_value()) + int(keys.event.has_value()) != 1) {
     complaints.add(map.place, path +
                                   ": expected one of `simulate: STEPS`, `capture: NAME` (with "
                                   "`count`) and `event: NAME`");
     return std::nullopt;
   }
-  if (keys.simulate && *keys.simulate != std::floor(*keys.simulate)) {
-    complaints.add(place_of(map, "simulate"), path + ".simulate: expected a whole number");
-    return std::nullopt;
-  }
-  if (keys.simulate) return TimelineStep{TimelineStep::Kind::Simulate, int(*keys.simulate), "", 0};
+  if (simulates) return read_simulation(map, path, complaints);
   const std::string& name = keys.capture ? *keys.capture : *keys.event;
   if (name.empty() || name == "environment") {
     complaints.add(map.place, path + ": a moment needs a name of its own, found \"" + name + "\"");
@@ -444,7 +472,9 @@ Value head_of(const Value& job) {
 }  // namespace
 
 void EnvironmentRules::visit(ParamVisitor& v) {
-  v.param("hide", hide, {"Hides nodes whose path holds one of these texts."});
+  v.param("hide", hide,
+          {"Hides nodes whose path holds one of these texts, in which * stands for anything "
+           "within a name."});
   v.param("hide_in_debug", hide_in_debug, {"The same, in debug mode only."});
   v.choice("colliders", colliders, kEnvironmentColliderWords,
            {"Collider of every mesh of the environment."});
@@ -460,6 +490,11 @@ void ObjectGroup::visit(ParamVisitor& v) {
   v.param("name", name, {"Name of the group; keys its random choices. Default: the type."});
   v.param("under", under, {"Path of the parent node."});
   v.param("count", count, {"Objects, each picked at random from the loader's assets.", "", 0, 1e5});
+  v.choice("pick", pick, kPickWords,
+           {"per_job: every visit has the same objects; per_visit: each visit picks its own."});
+  v.param("balance", balance,
+          {"Every asset comes to use equally often: none twice before all were picked once. Else "
+           "each pick is independent."});
   v.param("label", label, {"Label of every object of the group; null: none."});
   v.param(
       "label_pattern", label_pattern,
@@ -542,11 +577,13 @@ void WriterEntry::visit(ParamVisitor& v) {
 
 void SettleSection::visit(ParamVisitor& v) {
   v.choice("policy", policy, kSettlePolicies,
-           {"What becomes of objects that are outside the room after a simulation. keep: they stay "
-            "there; respawn: the randomizers of the moment environment place them anew, and the "
-            "simulation is repeated; drop: they are taken out of the visit."});
+           {"What becomes of objects that are outside the room after a simulation, and of those "
+            "that move, hang in the air or are stuck in something after one that goes on until "
+            "rest. keep: they stay; respawn: the randomizers of the moment environment place them "
+            "anew, and the simulation is repeated; drop: they are taken out of the visit. settle/ "
+            "names them in any case."});
   v.param("max_respawns", max_respawns,
-          {"Repeats per simulation at most; what is outside then stays.", "", 1, 1000});
+          {"Repeats per simulation at most; what has not settled then is taken out.", "", 1, 1000});
   v.param("rest_speed", rest_speed, {"Slower than this is at rest.", "m/s", 0, 1e3});
 }
 
@@ -581,7 +618,7 @@ std::vector<TimelineStep> default_timeline() {
   using Kind = TimelineStep::Kind;
   return {{Kind::Simulate, 4, "", 0},
           {Kind::Capture, 0, "floating", 2},
-          {Kind::Simulate, 200, "", 0},
+          {Kind::Simulate, 800, "", 0, true, 200},
           {Kind::Capture, 0, "dropped", 2}};
 }
 
@@ -635,6 +672,8 @@ std::vector<std::string_view> host_keys(ComponentKind kind, std::string_view sec
             "name",
             "under",
             "count",
+            "pick",
+            "balance",
             "label",
             "label_pattern",
             "label_replacement",

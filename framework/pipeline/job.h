@@ -26,8 +26,8 @@ struct ComponentConfig {
   std::string path;  ///< For messages: "environments[0]".
 };
 
-/// Rules for what was loaded below /Environment. Texts are compared with the part of a node's path
-/// below the environment's own node, as plain parts of it.
+/// Rules for what was loaded below /Environment. Texts are looked for in the part of a node's path
+/// below the environment's own node; a '*' in them stands for anything but '/'.
 struct EnvironmentRules {
   std::vector<std::string> hide;
   std::vector<std::string> hide_in_debug;
@@ -37,13 +37,15 @@ struct EnvironmentRules {
   void visit(ParamVisitor& v);
 };
 
-/// Objects of one kind, chosen once per job and spawned in every visit.
+/// Objects of one kind, chosen once per job or per visit, and spawned in every visit.
 struct ObjectGroup {
   ComponentConfig loader;
   std::string type;
   std::string name;
   std::string under = "/Assets";
   int count = 1;
+  std::string pick = "per_job";
+  bool balance = false;
   std::optional<std::string> label;
   std::optional<std::string> label_pattern;
   std::string label_replacement;
@@ -121,14 +123,17 @@ struct WriterEntry {
 struct TimelineStep {
   enum class Kind : std::uint8_t { Simulate, Capture, Event };
   Kind kind = Kind::Simulate;
-  int steps = 0;     ///< Simulate.
+  int steps = 0;     ///< Simulate; until rest: at most.
   std::string name;  ///< Capture: the series. Event: the moment that randomizers are called at.
   int count = 0;     ///< Capture: captures of the series per visit.
+  bool until_rest = false;  ///< Simulate: ends when everything is at rest.
+  int at_least = 0;         ///< Simulate until rest: steps that are taken in any case.
 };
 
-/// What becomes of objects that are outside the environment's box after a simulation.
+/// What becomes of objects that are outside the environment's box after a simulation, or not
+/// settled after one that goes on until rest.
 struct SettleSection {
-  std::string policy = "keep";
+  std::string policy = "respawn";
   int max_respawns = 3;
   double rest_speed = 0.05;
   void visit(ParamVisitor& v);
@@ -171,7 +176,7 @@ inline constexpr const char* kDefaultPhysics = "bullet";
 inline constexpr const char* kDefaultRenderer = "embree";
 
 /// What a visit does when the job says nothing: 4 steps that resolve overlaps, floating captures,
-/// 200 steps to fall, dropped captures.
+/// 200 steps or more to fall and come to rest, dropped captures.
 std::vector<TimelineStep> default_timeline();
 
 /// Reads a native job. All complaints are collected; the result is of use only when there are none.

@@ -108,6 +108,15 @@ Value groups(const Value& job, const char* section_name, const char* default_nam
   return list;
 }
 
+Value simulation(const TimelineStep& step) {
+  if (!step.until_rest) return Value::integer(step.steps);
+  Value rest = Value::make_map();
+  rest.set("until", Value::text("rest"));
+  rest.set("at_least", Value::integer(step.at_least));
+  rest.set("at_most", Value::integer(step.steps));
+  return rest;
+}
+
 Value timeline(const Value& job) {
   const Value* given = job.find("timeline");
   if (given && given->kind != Value::Kind::Null) return *given;
@@ -115,7 +124,7 @@ Value timeline(const Value& job) {
   for (const TimelineStep& step : default_timeline()) {
     Value item = Value::make_map();
     if (step.kind == TimelineStep::Kind::Simulate) {
-      item.set("simulate", Value::integer(step.steps));
+      item.set("simulate", simulation(step));
     } else {
       item.set("capture", Value::text(step.name));
       item.set("count", Value::integer(step.count));

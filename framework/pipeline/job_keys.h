@@ -45,14 +45,38 @@ struct JobHead {
   }
 };
 
+/// `simulate: STEPS`.
+struct StepsKeys {
+  double simulate = 0;
+  void visit(ParamVisitor& v) {
+    v.param("simulate", simulate, {"Fixed physics steps to take.", "", 0, 1e7});
+  }
+};
+
+/// `simulate: {until: rest}`.
+struct RestKeys {
+  std::string until = "rest";
+  int at_least = 0;
+  int at_most = 800;
+  void visit(ParamVisitor& v) {
+    static constexpr const char* kUntil[] = {"rest"};
+    v.choice("until", until, kUntil, {"What ends the simulation."});
+    v.param("at_least", at_least, {"Steps that are taken in any case.", "", 0, 1e7});
+    v.param("at_most", at_most, {"Steps after which it ends in any case.", "", 1, 1e7});
+  }
+};
+
 /// All forms of a timeline step, for reading and for the reference.
 struct StepKeys {
-  std::optional<double> simulate;
+  Value simulate;
   std::optional<std::string> capture;
   int count = 1;
   std::optional<std::string> event;
   void visit(ParamVisitor& v) {
-    v.param("simulate", simulate, {"Fixed physics steps to take.", "", 0, 1e7});
+    v.param("simulate", simulate,
+            {"Fixed physics steps to take; or `{until: rest, at_least: 0, at_most: 800}`: until "
+             "every object is at rest, and what is not settled then is dealt with as "
+             "`settle.policy` says."});
     v.param("capture", capture, {"Name of a capture series, whose captures are taken here."});
     v.param("count", count, {"Captures of the series per visit.", "", 0, 1e6});
     v.param("event", event, {"Calls the randomizers that name this moment."});

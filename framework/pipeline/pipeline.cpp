@@ -11,6 +11,7 @@
 #include "framework/annotators/occlusion_order.h"
 #include "framework/annotators/visibility.h"
 #include "framework/config/clean_text.h"
+#include "framework/pipeline/physics_view.h"
 #include "framework/pipeline/scene_setup.h"
 #include "framework/plugins/fatal_end.h"
 #include "framework/plugins/plugin_call.h"
@@ -48,6 +49,7 @@ struct Pipeline::Visit {
   int simulations_to_come = 0;  ///< Steps of the timeline that let things move.
   double simulated_s = 0.0;
   double moving_until_s = 0.0;  ///< When something in the room was last seen moving.
+  int redraws = 0;              ///< Streams that placed objects anew so far.
   VisitReport report;
 };
 
@@ -58,6 +60,16 @@ std::vector<Mat4> object_poses(const Scene& scene, const std::vector<NodeId>& ob
   poses.reserve(objects.size());
   for (const NodeId object : objects) poses.push_back(scene.world_from_node(object).matrix());
   return poses;
+}
+
+std::vector<NodeId> nodes_of(const std::vector<Flaw>& flaws) {
+  std::vector<NodeId> nodes;
+  for (const Flaw& flaw : flaws) nodes.push_back(flaw.node);
+  return nodes;
+}
+
+void note(const Scene& scene, const std::vector<Flaw>& flaws, std::vector<Incident>& incidents) {
+  for (const Flaw& flaw : flaws) incidents.push_back({scene.path(flaw.node), flaw.why});
 }
 
 std::string duration_text(double seconds) {
@@ -148,13 +160,14 @@ void Pipeline::stop_if_asked() const {
 void Pipeline::run_visit(const PlannedVisit& planned) {
   Visit visit = set_up(planned);
   randomize(visit, "environment", 0, -1);
+  note(visit.scene, find_born_inside(visit.scene, visit.objects), visit.report.born_inside);
   reset_physics(visit);
   for (const TimelineStep& step : job_.timeline) {
     if (visit.next_capture == planned.capture_count) return;
     switch (step.kind) {
       case TimelineStep::Kind::Simulate:
         --visit.simulations_to_come;
-        simulate(visit, step.steps);
+        simulate(visit, step);
         break;
       case TimelineStep::Kind::Capture:
         take_captures(visit, step);
@@ -179,13 +192,19 @@ Pipeline::Visit Pipeline::set_up(const PlannedVisit& planned) {
                                        *components_.environments[choice.entry], visit.scene, host_);
   visit.working_area_world =
       apply_environment_rules(job_.environment, job_.debug, visit.environment, visit.scene, host_);
-  visit.objects = spawn_objects(plan_, job_, visit.scene, host_);
+  visit.objects = spawn_objects(plan_objects(job_, plan_.object_assets, planned.index), job_,
+                                visit.scene, host_);
   create_lights(job_.lights, visit.scene, host_);
   visit.cameras = create_cameras(job_.cameras, visit.scene);
   visit.simulations_to_come =
       int(std::count_if(job_.timeline.begin(), job_.timeline.end(), [](const TimelineStep& step) {
         return step.kind == TimelineStep::Kind::Simulate;
       }));
+  for (const EnvironmentPattern& pattern : components_.environment_patterns) {
+    if (!visit.scene.match(pattern.text).empty()) continue;
+    host_.log(LogLevel::Warning,
+              choice.asset + ": no node fits \"" + pattern.text + "\" (" + pattern.key + ")");
+  }
   // The first visit of each environment shows it from above.
   if (job_.debug && std::size_t(planned.index) == planned.environment) {
     visit.overview = create_overview_camera(visit.working_area_world, visit.scene);
@@ -195,11 +214,12 @@ Pipeline::Visit Pipeline::set_up(const PlannedVisit& planned) {
 
 void Pipeline::randomize(Visit& visit, const std::string& moment, int number, int capture) {
   const Clock clock(summary_, "randomizing");
-  const std::vector<Mat4> before = object_poses(visit.scene, visit.objects);
+  const PhysicsView before(visit.scene);
+  const std::vector<Mat4> poses = object_poses(visit.scene, visit.objects);
   call_randomizers(visit, moment, number, capture, 0);
-  // The engine holds the bodies where it left them; where they were moved, it starts anew.
-  if (moment == "environment" || object_poses(visit.scene, visit.objects) == before) return;
-  visit.before_last_step.clear();
+  if (moment == "environment" || before.is_of(visit.scene)) return;
+  if (object_poses(visit.scene, visit.objects) != poses) visit.before_last_step.clear();
+  // The engine holds everything as it was, and what sleeps there rests on what may be gone.
   reset_physics(visit);
 }
 
@@ -228,62 +248,104 @@ void Pipeline::reset_physics(Visit& visit) {
   }
 }
 
-/// Takes the steps, and deals with what is outside the room afterwards.
-void Pipeline::simulate(Visit& visit, int steps) {
-  advance(visit, steps);
+/// Takes the steps, and deals with what has not settled afterwards.
+void Pipeline::simulate(Visit& visit, const TimelineStep& step) {
+  advance(visit, step);
   if (job_.settle.policy == "keep") return;
-  const Room room(visit.scene, visit.environment);
-  const auto lost_objects = [&] {
-    std::vector<NodeId> lost = visit.objects;
-    std::erase_if(lost, [&](NodeId object) { return room.holds(visit.scene, object); });
-    return lost;
-  };
-  std::vector<NodeId> lost = lost_objects();
-  if (job_.settle.policy == "drop") return drop(visit, lost);
-  for (int i = 0; i < job_.settle.max_respawns && !lost.empty(); ++i) {
-    respawn(visit, lost, int(visit.report.respawned.size()) + 1);
-    advance(visit, steps);
-    lost = lost_objects();
+  std::vector<Flaw> flaws = unsettled(visit, step);
+  if (job_.settle.policy == "respawn") {
+    for (int i = 0; i < job_.settle.max_respawns && !flaws.empty(); ++i) {
+      respawn(visit, flaws);
+      advance(visit, step);
+      flaws = unsettled(visit, step);
+    }
+  }
+  while (!flaws.empty()) {
+    drop(visit, flaws);
+    // What lay on them falls.
+    if (!step.until_rest) return;
+    advance(visit, step);
+    flaws = unsettled(visit, step);
   }
 }
 
-void Pipeline::advance(Visit& visit, int steps) {
+/// After a fixed number of steps things may well be in motion; nothing may be outside the room.
+std::vector<Flaw> Pipeline::unsettled(const Visit& visit, const TimelineStep& step) const {
+  if (components_.physics.empty()) return {};
+  const Room room(visit.scene, visit.environment);
+  if (step.until_rest) {
+    return find_unsettled(visit.scene, room, visit.objects, {job_.settle.rest_speed});
+  }
+  std::vector<Flaw> flaws;
+  for (const NodeId object : visit.objects) {
+    if (!room.holds(visit.scene, object)) flaws.push_back({object, "left the room"});
+  }
+  return flaws;
+}
+
+void Pipeline::advance(Visit& visit, const TimelineStep& step) {
   const Clock clock(summary_, "simulating");
   const Room room(visit.scene, visit.environment);
   // Short enough that Ctrl-C is felt, and that the time to rest is known well.
   constexpr int kStepsAtOnce = 5;
-  for (int left = steps; left > 0;) {
-    stop_if_asked();
-    // The last step goes by itself: what it moves is the motion that captures show.
-    const int now = left == 1 ? 1 : std::min(kStepsAtOnce, left - 1);
-    if (left == 1 && components_.demand.motion) visit.before_last_step = body_poses(visit.scene);
+  // At its highest point a thing is slow as well.
+  constexpr double kRestS = 0.25;
+  const auto take = [&](int steps) {
     for (auto& physics : components_.physics) {
       call_component("physics '" + job_.physics.type + "'",
-                     [&] { physics->advance(visit.scene, now); });
-      visit.simulated_s += now * physics->step_seconds();
+                     [&] { physics->advance(visit.scene, steps); });
+      visit.simulated_s += steps * physics->step_seconds();
     }
+  };
+  const double start_s = visit.simulated_s;
+  const auto is_at_rest = [&] {
+    return visit.simulated_s - std::max(start_s, visit.moving_until_s) >= kRestS - 1e-9;
+  };
+  for (int taken = 0; taken < step.steps;) {
+    stop_if_asked();
+    const int now = std::min(kStepsAtOnce, step.steps - taken);
+    const bool may_be_last = step.until_rest || taken + now == step.steps;
+    // The last step goes by itself: what it moves is the motion that captures show.
+    if (may_be_last && components_.demand.motion) {
+      take(now - 1);
+      visit.before_last_step = body_poses(visit.scene);
+      take(1);
+    } else {
+      take(now);
+    }
+    taken += now;
     if (fastest_falling(visit.scene, room, visit.objects) > job_.settle.rest_speed) {
       visit.moving_until_s = visit.simulated_s;
     }
-    left -= now;
+    if (step.until_rest && taken >= step.at_least && is_at_rest()) return;
+    if (components_.physics.empty()) return;
   }
 }
 
-/// Places the lost objects as the moment "environment" may place them; all else stays as it is.
-void Pipeline::respawn(Visit& visit, const std::vector<NodeId>& lost, int number) {
+/// Places the objects as the moment "environment" may place them, where they meet nothing; all else
+/// stays as it is.
+void Pipeline::respawn(Visit& visit, const std::vector<Flaw>& flaws) {
   const Clock clock(summary_, "randomizing");
-  for (const NodeId object : lost) visit.report.respawned.push_back(visit.scene.path(object));
-  const SavedNodes others(visit.scene, lost);
-  call_randomizers(visit, "environment", 0, -1, number);
-  others.restore(visit.scene);
+  // The randomizers place all objects, and clear of each other; those that stay are elsewhere.
+  constexpr int kDraws = 16;
+  note(visit.scene, flaws, visit.report.respawned);
+  std::vector<NodeId> to_place = nodes_of(flaws);
+  for (int i = 0; i < kDraws && !to_place.empty(); ++i) {
+    const SavedNodes others(visit.scene, to_place);
+    call_randomizers(visit, "environment", 0, -1, ++visit.redraws);
+    others.restore(visit.scene);
+    std::vector<NodeId> inside = nodes_of(find_born_inside(visit.scene, visit.objects));
+    std::erase_if(to_place, [&](NodeId object) {
+      return std::find(inside.begin(), inside.end(), object) == inside.end();
+    });
+  }
   visit.before_last_step.clear();
   reset_physics(visit);
 }
 
-void Pipeline::drop(Visit& visit, const std::vector<NodeId>& lost) {
-  if (lost.empty()) return;
-  for (const NodeId object : lost) {
-    visit.report.dropped.push_back(visit.scene.path(object));
+void Pipeline::drop(Visit& visit, const std::vector<Flaw>& flaws) {
+  note(visit.scene, flaws, visit.report.dropped);
+  for (const NodeId object : nodes_of(flaws)) {
     visit.scene.erase(object);
     std::erase(visit.objects, object);
   }
@@ -311,6 +373,7 @@ void Pipeline::take(Visit& visit, const PlannedCapture& planned) {
   capture.visit = visit.planned->index;
   capture.phase = planned.phase;
   capture.environment = clean_name(plan_.environments[visit.planned->environment].asset);
+  note(visit.scene, find_blocked_cameras(visit.scene, visit.cameras), visit.report.cameras);
   {
     const Clock clock(summary_, "preparing renderer");
     call_component("renderer '" + job_.renderer.type + "'",
@@ -393,6 +456,10 @@ VisitReport Pipeline::report_on(const Visit& visit) const {
     report.deepest_body = state.deepest_body;
   }
   const Room room(visit.scene, visit.environment);
+  if (!components_.physics.empty()) {
+    note(visit.scene, find_unsettled(visit.scene, room, visit.objects, {job_.settle.rest_speed}),
+         report.unsettled);
+  }
   report.max_speed = fastest_falling(visit.scene, room, visit.objects);
   for (const NodeId object : visit.objects) {
     const auto& body = visit.scene[object].rigid_body;

@@ -22,6 +22,8 @@
 #include "framework/pipeline/capture_plan.h"
 #include "framework/pipeline/demand.h"
 #include "framework/pipeline/job.h"
+#include "framework/pipeline/pattern_check.h"
+#include "framework/pipeline/settle_check.h"
 #include "framework/pipeline/settling.h"
 #include "framework/pipeline/writer_queue.h"
 
@@ -41,6 +43,8 @@ struct JobComponents {
   };
   std::vector<NamedAnnotator> annotators;
   Demand demand;
+  /// Of randomizers; they can be tried only once an environment is there.
+  std::vector<EnvironmentPattern> environment_patterns;
 };
 
 /// How far a run is.
@@ -103,10 +107,11 @@ class Pipeline {
   void randomize(Visit& visit, const std::string& moment, int number, int capture);
   void call_randomizers(Visit& visit, const std::string& moment, int number, int capture,
                         int respawn);
-  void simulate(Visit& visit, int steps);
-  void advance(Visit& visit, int steps);
-  void respawn(Visit& visit, const std::vector<NodeId>& lost, int number);
-  void drop(Visit& visit, const std::vector<NodeId>& lost);
+  void simulate(Visit& visit, const TimelineStep& step);
+  void advance(Visit& visit, const TimelineStep& step);
+  std::vector<Flaw> unsettled(const Visit& visit, const TimelineStep& step) const;
+  void respawn(Visit& visit, const std::vector<Flaw>& flaws);
+  void drop(Visit& visit, const std::vector<Flaw>& flaws);
   void reset_physics(Visit& visit);
   void take_captures(Visit& visit, const TimelineStep& step);
   void take(Visit& visit, const PlannedCapture& planned);

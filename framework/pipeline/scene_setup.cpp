@@ -12,10 +12,29 @@
 namespace diorama {
 namespace {
 
+/// Whether the rest of the path goes on with the text, whose '*' stand for anything within a name.
+bool starts_with_text(std::string_view path, std::string_view text) {
+  const std::size_t star = std::min(text.find('*'), text.size());
+  if (path.substr(0, star) != text.substr(0, star)) return false;
+  if (star == text.size()) return true;
+  path.remove_prefix(star);
+  text.remove_prefix(star + 1);
+  for (;; path.remove_prefix(1)) {
+    if (starts_with_text(path, text)) return true;
+    if (path.empty() || path.front() == '/') return false;
+  }
+}
+
+bool holds_text(std::string_view path, std::string_view text) {
+  for (std::size_t start = 0; start <= path.size(); ++start) {
+    if (starts_with_text(path.substr(start), text)) return true;
+  }
+  return false;
+}
+
 bool holds_any(std::string_view path, const std::vector<std::string>& texts) {
-  return std::any_of(texts.begin(), texts.end(), [&](const std::string& text) {
-    return path.find(text) != std::string_view::npos;
-  });
+  return std::any_of(texts.begin(), texts.end(),
+                     [&](const std::string& text) { return holds_text(path, text); });
 }
 
 std::optional<ColliderShape> collider_shape(std::string_view word) {
@@ -53,7 +72,7 @@ class PathsBelow {
   const std::vector<std::pair<NodeId, std::string>>& all() const { return paths_; }
   NodeId first_with(std::string_view text) const {
     for (const auto& [node, path] : paths_) {
-      if (path.find(text) != std::string::npos) return node;
+      if (holds_text(path, text)) return node;
     }
     return {};
   }
@@ -199,12 +218,12 @@ Vec3 apply_environment_rules(const EnvironmentRules& rules, bool debug, NodeId e
   return Vec3::Zero();
 }
 
-std::vector<NodeId> spawn_objects(const CapturePlan& plan, const Job& job, Scene& scene,
-                                  Host& host) {
+std::vector<NodeId> spawn_objects(const std::vector<PlannedObject>& objects, const Job& job,
+                                  Scene& scene, Host& host) {
   for (const ObjectGroup& group : job.objects) node_at(scene, group.under);
   std::vector<NodeId> nodes;
-  nodes.reserve(plan.objects.size());
-  for (const PlannedObject& object : plan.objects) {
+  nodes.reserve(objects.size());
+  for (const PlannedObject& object : objects) {
     nodes.push_back(spawn(object, job.objects[object.group], scene, host));
   }
   return nodes;

@@ -28,8 +28,8 @@ Vec3 apply_environment_rules(const EnvironmentRules& rules, bool debug, NodeId e
 
 /// Spawns the planned objects at the origin, with labels, colliders and rigid bodies. What an asset
 /// itself says about labels is dropped; its mass is kept. Returns their nodes in plan order.
-std::vector<NodeId> spawn_objects(const CapturePlan& plan, const Job& job, Scene& scene,
-                                  Host& host);
+std::vector<NodeId> spawn_objects(const std::vector<PlannedObject>& objects, const Job& job,
+                                  Scene& scene, Host& host);
 
 void create_lights(const std::vector<LightGroup>& groups, Scene& scene, Host& host);
 

@@ -28,13 +28,31 @@ const VisitReport& worst(const std::vector<VisitReport>& visits, const ValueOf& 
                            [&](auto& a, auto& b) { return value_of(a) < value_of(b); });
 }
 
-std::string objects_text(const VisitReport& visit, const std::vector<std::string>& paths,
-                         const char* what) {
+std::string incidents_text(const VisitReport& visit, const std::vector<Incident>& incidents,
+                           const char* what) {
   std::string text;
-  for (const std::string& path : paths) {
-    text += visit_text(visit) + ": " + path + " " + what + "\n";
+  for (const Incident& incident : incidents) {
+    text += visit_text(visit) + ": " + incident.path + " " + incident.why + what + "\n";
   }
   return text;
+}
+
+/// A long run may tell of thousands.
+std::string first_lines(const std::string& text) {
+  constexpr int kLines = 40;
+  std::size_t end = 0;
+  for (int line = 0; line < kLines && end < text.size(); ++line) end = text.find('\n', end) + 1;
+  const auto more = std::count(text.begin() + std::ptrdiff_t(end), text.end(), '\n');
+  if (more == 0) return text;
+  return text.substr(0, end) + "... and " + std::to_string(more) + " more, in settle/\n";
+}
+
+nlohmann::ordered_json as_json(const std::vector<Incident>& incidents, const char* name) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const Incident& incident : incidents) {
+    list.push_back({{name, incident.path}, {"why", incident.why}});
+  }
+  return list;
 }
 
 }  // namespace
@@ -63,15 +81,18 @@ std::string settle_text(const std::vector<VisitReport>& visits) {
   text += number_text(", deepest penetration %.2f mm (", deepest.max_penetration_m * 1000.0) +
           visit_text(deepest) + (deepest.deepest_body.empty() ? "" : ", " + deepest.deepest_body) +
           ")\n";
+  std::string details;
   for (const VisitReport& visit : visits) {
     if (!visit.rest_after_s) {
-      text += visit_text(visit) + number_text(": not at rest after %.2f s\n", visit.simulated_s);
+      details += visit_text(visit) + number_text(": not at rest after %.2f s\n", visit.simulated_s);
     }
-    text += objects_text(visit, visit.respawned, "had left the room and was placed anew");
-    text += objects_text(visit, visit.dropped, "had left the room and was taken out");
-    text += objects_text(visit, visit.left_room, "left the room");
+    details += incidents_text(visit, visit.born_inside, "");
+    details += incidents_text(visit, visit.respawned, ", so it was placed anew");
+    details += incidents_text(visit, visit.dropped, ", so it was taken out");
+    details += incidents_text(visit, visit.unsettled, "");
+    details += incidents_text(visit, visit.cameras, "");
   }
-  return text;
+  return text + first_lines(details);
 }
 
 std::string settle_json(const VisitReport& report) {
@@ -86,8 +107,11 @@ std::string settle_json(const VisitReport& report) {
   json["max_penetration_m"] = report.max_penetration_m;
   json["deepest_body"] = report.deepest_body;
   json["left_room"] = report.left_room;
-  json["respawned"] = report.respawned;
-  json["dropped"] = report.dropped;
+  json["born_inside"] = as_json(report.born_inside, "object");
+  json["respawned"] = as_json(report.respawned, "object");
+  json["dropped"] = as_json(report.dropped, "object");
+  json["unsettled"] = as_json(report.unsettled, "object");
+  json["blocked_cameras"] = as_json(report.cameras, "camera");
   return json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 

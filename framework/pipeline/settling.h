@@ -10,6 +10,12 @@
 /// How the objects of a visit come to rest, and what becomes of those that do not stay in the room.
 namespace diorama {
 
+/// What happened to a thing of a visit.
+struct Incident {
+  std::string path;
+  std::string why;  ///< Follows the path: "left the room", "hangs in the air".
+};
+
 /// How the objects of one visit ended.
 struct VisitReport {
   int visit = 0;
@@ -23,8 +29,11 @@ struct VisitReport {
   double max_penetration_m = 0.0;  ///< At the end of the visit.
   std::string deepest_body;
   std::vector<std::string> left_room;  ///< Paths of objects outside the environment's box.
-  std::vector<std::string> respawned;  ///< Paths, once per time.
-  std::vector<std::string> dropped;    ///< Paths of objects that were taken out.
+  std::vector<Incident> born_inside;   ///< Where the moment "environment" put them.
+  std::vector<Incident> respawned;     ///< Once per time.
+  std::vector<Incident> dropped;       ///< Objects that were taken out.
+  std::vector<Incident> unsettled;     ///< Objects that the last captures show all the same.
+  std::vector<Incident> cameras;       ///< Blocked ones, once per capture.
 };
 
 /// As JSON text with a newline at its end.

@@ -294,7 +294,10 @@ class Translator {
       list.list.push_back(std::move(entry));
     }
     set("environments", std::move(list));
-    set("environment", native("{hide: [001_SPLIT_GLA], hide_in_debug: [_exterior, _ceiling], "
+    // The reference hides every node of that ending, glass table tops with all that stands on them
+    // included, to let the light of ceiling lamps out.
+    set("environment", native("{hide: ['CeilingLight*001_SPLIT_GLA', 'Lamp*001_SPLIT_GLA'], "
+                              "hide_in_debug: [_exterior, _ceiling], "
                               "colliders: triangle_mesh, box_colliders: [TableDining], "
                               "working_area: TableDining}"));
   }
@@ -457,8 +460,9 @@ class Translator {
   }
 
   void add_timeline(const CaptureBlock& capture) {
-    Value list =
-        native("[{simulate: 4}, {capture: floating}, {simulate: 200}, {capture: dropped}]");
+    Value list = native(
+        "[{simulate: 4}, {capture: floating}, "
+        "{simulate: {until: rest, at_least: 200, at_most: 800}}, {capture: dropped}]");
     list.place = section("capture").place;
     list.list[1].set("count", Value::integer(capture.floating));
     list.list[3].set("count", Value::integer(capture.dropped));

@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "collision_world.h"
 
-#include <fcl/broadphase/broadphase_dynamic_AABB_tree.h>
 #include <fcl/geometry/bvh/BVH_model.h>
 #include <fcl/narrowphase/collision.h>
 #include <fcl/narrowphase/collision_object.h>
 
 #include <cmath>
+#include <memory>
+#include <span>
 #include <vector>
+
+#include "diorama/obstacles.h"
 
 namespace diorama {
 namespace {
@@ -15,35 +18,62 @@ namespace {
 using Model = fcl::BVHModel<fcl::OBBRSSd>;
 using Object = fcl::CollisionObjectd;
 
-/// One mesh in the world's axes, at its place when it was read.
-struct Part {
-  std::shared_ptr<Model> model;
-  std::vector<Vec3> corners_world;  ///< Three per triangle.
-  Aabb box_world;
-};
-
-Part part_of(const Mesh& mesh, const Affine& world_from_mesh) {
-  std::vector<Vec3> points;
-  points.reserve(mesh.positions.size());
-  for (const Vec3f& position : mesh.positions) {
-    points.push_back(world_from_mesh * position.cast<double>());
-  }
-  Part part;
-  part.model = std::make_shared<Model>();
-  part.model->beginModel(int(mesh.triangles.size()), int(points.size()));
-  std::vector<fcl::Triangle> triangles;
-  triangles.reserve(mesh.triangles.size());
-  for (const auto& [a, b, c] : mesh.triangles) {
-    triangles.emplace_back(a, b, c);
-    for (const std::uint32_t corner : {a, b, c}) {
-      part.corners_world.push_back(points[corner]);
-      part.box_world.add(points[corner]);
+/// One mesh in the world's axes, at its place when it was read. Most meshes of a room are never
+/// near to what is placed, so what FCL needs is made when it is first asked for.
+class Part {
+ public:
+  Part(const Scene& scene, NodeId node)
+      : mesh_(scene[node].mesh),
+        world_from_mesh_(scene.world_from_node(node)),
+        triangles_(scene, std::span(&node, 1), Obstacles::Hidden::Count) {
+    for (const auto& triangle : mesh_->triangles) {
+      for (const std::uint32_t corner : triangle) box_world_.add(point(corner));
     }
   }
-  part.model->addSubModel(points, triangles);
-  part.model->endModel();
-  return part;
-}
+
+  const Aabb& box_world() const { return box_world_; }
+  bool reaches_into(const Aabb& box_world) const {
+    return triangles_.meets_box(box_world, Affine::Identity());
+  }
+  const std::shared_ptr<Model>& model() const {
+    if (!model_) model_ = make_model();
+    return model_;
+  }
+  /// Three per triangle.
+  const std::vector<Vec3>& corners_world() const {
+    if (corners_world_.empty()) {
+      for (const auto& triangle : mesh_->triangles) {
+        for (const std::uint32_t corner : triangle) corners_world_.push_back(point(corner));
+      }
+    }
+    return corners_world_;
+  }
+
+ private:
+  Vec3 point(std::uint32_t index) const {
+    return world_from_mesh_ * mesh_->positions[index].cast<double>();
+  }
+  std::shared_ptr<Model> make_model() const {
+    std::vector<Vec3> points;
+    points.reserve(mesh_->positions.size());
+    for (std::uint32_t i = 0; i < mesh_->positions.size(); ++i) points.push_back(point(i));
+    std::vector<fcl::Triangle> triangles;
+    triangles.reserve(mesh_->triangles.size());
+    for (const auto& [a, b, c] : mesh_->triangles) triangles.emplace_back(a, b, c);
+    auto model = std::make_shared<Model>();
+    model->beginModel(int(triangles.size()), int(points.size()));
+    model->addSubModel(points, triangles);
+    model->endModel();
+    return model;
+  }
+
+  std::shared_ptr<const Mesh> mesh_;
+  Affine world_from_mesh_;
+  Obstacles triangles_;
+  Aabb box_world_;
+  mutable std::shared_ptr<Model> model_;
+  mutable std::vector<Vec3> corners_world_;
+};
 
 bool holds(const Aabb& outer, const Aabb& inner) {
   return (outer.min.array() <= inner.min.array()).all() &&
@@ -72,17 +102,37 @@ double winding_number(const std::vector<Vec3>& corners, const Vec3& point) {
   return sum / (4.0 * kPi);
 }
 
-bool meet(Object* one, Object* two) {
-  fcl::CollisionRequestd request;
-  fcl::CollisionResultd result;
-  return fcl::collide(one, two, request, result) > 0;
+/// A part and how far it was moved.
+struct Placed {
+  const Part& part;
+  const Vec3& shift;
+
+  Aabb box() const { return shifted(part.box_world(), shift); }
+  /// Whether a triangle may be met by something in the box.
+  bool reaches_into(const Aabb& box_world) const {
+    return part.reaches_into(shifted(box_world, -shift));
+  }
+  bool encloses(const Placed& other) const {
+    if (!holds(box(), other.box())) return false;
+    const Vec3 point = other.part.corners_world().front() + other.shift - shift;
+    return std::abs(winding_number(part.corners_world(), point)) > kClosed;
+  }
+};
+
+bool overlaps(const Aabb& a, const Aabb& b) {
+  return (a.min.array() <= b.max.array()).all() && (a.max.array() >= b.min.array()).all();
 }
 
-/// Ends the search at the first contact.
-bool stop_when_met(Object* one, Object* two, void* has_met) {
-  bool& answer = *static_cast<bool*>(has_met);
-  answer = answer || meet(one, two);
-  return answer;
+bool meet(const Placed& one, const Placed& two) {
+  if (!overlaps(one.box(), two.box())) return false;
+  if (one.reaches_into(two.box()) && two.reaches_into(one.box())) {
+    const Object a(one.part.model(), Mat3::Identity(), one.shift);
+    const Object b(two.part.model(), Mat3::Identity(), two.shift);
+    fcl::CollisionRequestd request;
+    fcl::CollisionResultd result;
+    if (fcl::collide(&a, &b, request, result) > 0) return true;
+  }
+  return one.encloses(two) || two.encloses(one);
 }
 
 }  // namespace
@@ -96,8 +146,8 @@ CollisionBody::CollisionBody(const Scene& scene, NodeId node) : parts_(std::make
   for (const NodeId below : scene.subtree(node)) {
     const auto& mesh = scene[below].mesh;
     if (!mesh || mesh->triangles.empty()) continue;
-    parts_->all.push_back(part_of(*mesh, scene.world_from_node(below)));
-    parts_->bounds_world.add(parts_->all.back().box_world);
+    parts_->all.emplace_back(scene, below);
+    parts_->bounds_world.add(parts_->all.back().box_world());
   }
 }
 
@@ -110,46 +160,25 @@ const Aabb& CollisionBody::bounds_world() const { return parts_->bounds_world; }
 
 struct CollisionWorld::State {
   struct Standing {
-    Part part;
+    CollisionBody body;
     Vec3 shift;
-    Object object;
   };
-  // The manager keeps pointers to the objects, so they must not move, and must outlive it.
-  std::vector<std::unique_ptr<Standing>> standing;
-  fcl::DynamicAABBTreeCollisionManagerd manager;
+  std::vector<Standing> standing;
 };
 
 CollisionWorld::CollisionWorld() : state_(std::make_unique<State>()) {}
 CollisionWorld::~CollisionWorld() = default;
 
 void CollisionWorld::add(CollisionBody body, const Vec3& shift) {
-  for (Part& part : body.parts_->all) {
-    Object object(part.model, Mat3::Identity(), shift);
-    state_->standing.push_back(
-        std::make_unique<State::Standing>(State::Standing{std::move(part), shift, object}));
-    state_->manager.registerObject(&state_->standing.back()->object);
-  }
+  state_->standing.push_back({std::move(body), shift});
 }
 
 bool CollisionWorld::is_free(const CollisionBody& body, const Vec3& shift) const {
-  for (const Part& part : body.parts_->all) {
-    Object object(part.model, Mat3::Identity(), shift);
-    object.computeAABB();
-    bool has_met = false;
-    state_->manager.collide(&object, &has_met, stop_when_met);
-    if (has_met) return false;
-    const Aabb box = shifted(part.box_world, shift);
-    for (const auto& standing : state_->standing) {
-      const Aabb other = shifted(standing->part.box_world, standing->shift);
-      const auto is_inside = [](const Part& outer, const Vec3& outer_shift, const Part& inner,
-                                const Vec3& inner_shift) {
-        const Vec3 point = inner.corners_world.front() + inner_shift - outer_shift;
-        return std::abs(winding_number(outer.corners_world, point)) > kClosed;
-      };
-      if (holds(other, box) && is_inside(standing->part, standing->shift, part, shift))
-        return false;
-      if (holds(box, other) && is_inside(part, shift, standing->part, standing->shift))
-        return false;
+  for (const State::Standing& standing : state_->standing) {
+    for (const Part& other : standing.body.parts_->all) {
+      for (const Part& part : body.parts_->all) {
+        if (meet({other, standing.shift}, {part, shift})) return false;
+      }
     }
   }
   return true;

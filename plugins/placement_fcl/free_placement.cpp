@@ -1,21 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "free_placement.h"
 
+#include "diorama/node_pattern.h"
+
 #include <algorithm>
 #include <set>
 
 #include "collision_world.h"
+#include "diorama/obstacles.h"
 
 namespace diorama {
 namespace {
 
-/// Obstacles that are neither moved nor below a node that is.
+/// Obstacles that are neither moved nor below a node that is, nor wait to be placed by others.
 void add_obstacles(const PlacementParams& params, const std::vector<NodeId>& moved,
                    const Scene& scene, CollisionWorld& world) {
   std::set<NodeId> known;
-  for (const NodeId node : moved) {
-    for (const NodeId below : scene.subtree(node)) known.insert(below);
-  }
+  const auto leave_out = [&](const std::vector<NodeId>& nodes) {
+    for (const NodeId node : nodes) {
+      for (const NodeId below : scene.subtree(node)) known.insert(below);
+    }
+  };
+  leave_out(moved);
+  leave_out(unplaced_bodies(scene));
   for (const std::string& pattern : params.obstacles) {
     for (const NodeId node : scene.match(pattern)) {
       if (known.contains(node)) continue;
@@ -42,10 +49,11 @@ Aabb box_of(const Scene& scene, NodeId node, const CollisionBody& body) {
 }  // namespace
 
 void PlacementParams::visit(ParamVisitor& v) {
-  v.param("nodes", nodes, {"Nodes to place."});
+  v.param("nodes", nodes, {"Nodes to place.", kNodePattern});
   v.param("avoid_overlap", avoid_overlap,
           {"Draw again while a node would meet an obstacle or one placed before it."});
-  v.param("obstacles", obstacles, {"Nodes that must not be met, with all below them."});
+  v.param("obstacles", obstacles,
+          {"Nodes that must not be met, with all below them.", kNodePattern});
   v.param("max_tries", max_tries, {"Draws per node at most.", "", 1, 100000});
 }
 

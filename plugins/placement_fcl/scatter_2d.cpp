@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scatter_2d.h"
 
+#include "diorama/node_pattern.h"
+
 #include "surface_points.h"
 
 namespace diorama {
 
 void Scatter2d::Params::visit(ParamVisitor& v) {
   placement.visit(v);
-  v.param("surfaces", surfaces, {"Nodes whose meshes are scattered on."});
+  v.param("surfaces", surfaces, {"Nodes whose meshes are scattered on.", kNodePattern});
   v.param("max_slope_deg", max_slope_deg, {"Faces steeper than this are left out.", "deg", 0, 89});
   v.param("gap_m", gap_m, {"Height of the node's underside above the surface.", "m", 0, 100});
 }

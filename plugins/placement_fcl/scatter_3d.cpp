@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scatter_3d.h"
 
+#include "diorama/node_pattern.h"
+
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -67,9 +69,10 @@ Vec3 draw_in_union(const std::vector<Volume>& volumes, Rng& rng) {
 
 void Scatter3d::Params::visit(ParamVisitor& v) {
   placement.visit(v);
-  v.param("volumes", volumes,
-          {"Nodes whose boxes are filled, visible or not; null: `offset` says where."});
-  v.param("excluded", excluded, {"Nodes whose boxes are left free; null: none."});
+  v.param(
+      "volumes", volumes,
+      {"Nodes whose boxes are filled, visible or not; null: `offset` says where.", kNodePattern});
+  v.param("excluded", excluded, {"Nodes whose boxes are left free; null: none.", kNodePattern});
   v.param("offset", offset, {"Place, from the working area along the world's axes.", "m"}, 3);
 }
 

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "camera_lens.h"
 
+#include "diorama/node_pattern.h"
+
 #include "sampling.h"
 
 namespace diorama {
 
 void CameraLens::Params::visit(ParamVisitor& v) {
-  v.param("nodes", nodes, {"Cameras to change."});
+  v.param("nodes", nodes, {"Cameras to change.", kNodePattern});
   v.param("focal_length_mm", focal_length_mm, {"Focal length; null keeps it.", "mm", 0.01, 1e5});
   v.param("principal_point_px", principal_point_px,
           {"Shift of the principal point off the image centre along x and y; null keeps it. A "

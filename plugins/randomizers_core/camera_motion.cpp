@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "camera_motion.h"
 
+#include "diorama/node_pattern.h"
+
 #include "sampling.h"
 
 namespace diorama {
 
 void CameraMotion::Params::visit(ParamVisitor& v) {
-  v.param("nodes", nodes, {"Cameras to move."});
+  v.param("nodes", nodes, {"Cameras to move.", kNodePattern});
   v.param("velocity", velocity, {"Along the camera's axes: right, up, backwards.", "m/s"}, 3);
   v.param("angular_velocity_deg", angular_velocity_deg,
           {"About the camera's axes: right (tilt), up (pan), backwards (roll).", "deg/s"}, 3);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "camera_relative_pose.h"
 
+#include "diorama/node_pattern.h"
+
 #include "diorama/error.h"
 #include "sampling.h"
 
@@ -15,8 +17,9 @@ Vec2 pixel_at(const Camera& camera, double horizontal, double vertical) {
 }  // namespace
 
 void CameraRelativePose::Params::visit(ParamVisitor& v) {
-  v.param("nodes", nodes, {"Nodes to place."});
-  v.param("camera", camera, {"The camera; of several that fit, each node picks one."});
+  v.param("nodes", nodes, {"Nodes to place.", kNodePattern});
+  v.param("camera", camera,
+          {"The camera; of several that fit, each node picks one.", kNodePattern});
   v.param("distance_m", distance_m, {"Distance from the camera's centre.", "m", 1e-3, 1e5});
   v.param("horizontal", horizontal,
           {"Place in the picture: -1 is the left edge, 1 the right one.", "", -1, 1});

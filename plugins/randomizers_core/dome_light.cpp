@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dome_light.h"
 
+#include "diorama/node_pattern.h"
+
 #include "sampling.h"
 
 namespace diorama {
 
 void DomeLight::Params::visit(ParamVisitor& v) {
-  v.param("nodes", nodes, {"Dome lights to change."});
+  v.param("nodes", nodes, {"Dome lights to change.", kNodePattern});
   v.param("textures", textures,
           {"Equirectangular images to choose from; none: the light keeps what it has."});
   v.param(

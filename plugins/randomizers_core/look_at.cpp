@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "look_at.h"
 
+#include "diorama/node_pattern.h"
+
 #include "sampling.h"
 
 namespace diorama {
@@ -21,8 +23,8 @@ Quat view_from_axis(const std::string& axis) {
 }  // namespace
 
 void LookAt::Params::visit(ParamVisitor& v) {
-  v.param("nodes", nodes, {"Cameras, lights or objects to turn."});
-  v.param("targets", targets, {"Nodes to look at; each node picks one."});
+  v.param("nodes", nodes, {"Cameras, lights or objects to turn.", kNodePattern});
+  v.param("targets", targets, {"Nodes to look at; each node picks one.", kNodePattern});
   v.param("offset", offset, {"Point looked at, from the target's centre.", "m"}, 3);
   v.param("roll_deg", roll_deg, {"Turn about the viewing direction.", "deg", -360, 360});
   v.choice("axis", axis, kAxes,

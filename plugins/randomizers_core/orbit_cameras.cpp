@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "orbit_cameras.h"
 
+#include "diorama/node_pattern.h"
+
 #include <cmath>
 #include <optional>
 
-#include "obstacles.h"
+#include "diorama/obstacles.h"
 #include "sampling.h"
 
 namespace diorama {
@@ -20,8 +22,8 @@ struct OrbitCameras::Surroundings {
 };
 
 void OrbitCameras::Params::visit(ParamVisitor& v) {
-  v.param("nodes", nodes, {"Cameras (or lights) to place."});
-  v.param("targets", targets, {"Nodes to look at; each camera picks one."});
+  v.param("nodes", nodes, {"Cameras (or lights) to place.", kNodePattern});
+  v.param("targets", targets, {"Nodes to look at; each camera picks one.", kNodePattern});
   v.param("distance", distance, {"Distance from the target's centre.", "m", 1e-3, 1e5});
   v.param("polar_angle_deg", polar_angle_deg,
           {"Angle off the vertical: 0 looks straight down, 90 level.", "deg", 0, 180});
@@ -33,7 +35,7 @@ void OrbitCameras::Params::visit(ParamVisitor& v) {
             "reference does."});
   v.param("avoid_obstacles", avoid_obstacles,
           {"Draw again while the view of the target is blocked or anything is too near."});
-  v.param("obstacles", obstacles, {"Nodes that may block a view."});
+  v.param("obstacles", obstacles, {"Nodes that may block a view.", kNodePattern});
   v.param("clearance_m", clearance_m,
           {"Nothing visible is nearer to a camera. More than the cameras' near_m, or their near "
            "plane cuts things open.",
@@ -63,14 +65,19 @@ OrbitCameras::View OrbitCameras::draw_free_view(const std::vector<Vec3>& targets
   const auto attempt = [&](int number) {
     return draw_view(targets, {draws.rng.fork(std::uint64_t(number)), draws.index});
   };
-  std::optional<View> unblocked;
+  std::optional<View> best;
+  double best_m = -1.0;
   for (int i = 0; i < params_.max_tries; ++i) {
     const View view = attempt(i);
     if (surroundings.blocking.is_between(view.position, view.target)) continue;
-    if (!surroundings.all.is_near(view.position, params_.clearance_m)) return view;
-    if (!unblocked) unblocked = view;
+    if (surroundings.all.encloser(view.position)) continue;
+    const double clear_m = surroundings.all.distance(view.position, params_.clearance_m);
+    if (clear_m >= params_.clearance_m) return view;
+    if (clear_m <= best_m) continue;
+    best = view;
+    best_m = clear_m;
   }
-  return unblocked ? *unblocked : attempt(0);
+  return best ? *best : attempt(0);
 }
 
 Affine OrbitCameras::pose_of(const View& view) const {

@@ -17,9 +17,10 @@ struct NodeDraws;
 /// itself, not from the point looked at. Without targets the working area takes their place.
 ///
 /// A camera behind a wall sees nothing. With `avoid_obstacles` a view is drawn again, target
-/// included, while an obstacle stands between camera and target or anything close to the camera,
-/// whose near plane would cut it open. When no draw
-/// within `max_tries` is free, one with a free line of sight is taken, else the first.
+/// included, while an obstacle stands between camera and target, the camera stands inside something
+/// solid, or anything visible is close to it, which its near plane would cut open. When no draw
+/// within `max_tries` is free, the farthest from everything among those with a free line of sight
+/// is taken, else the first.
 class OrbitCameras final : public Randomizer {
  public:
   struct Params {
@@ -33,7 +34,7 @@ class OrbitCameras final : public Randomizer {
     bool avoid_obstacles = true;
     std::string obstacles = "/Environment/**";
     double clearance_m = 0.3;
-    int max_tries = 64;
+    int max_tries = 200;
 
     void visit(ParamVisitor& v);
   };

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "random_colors.h"
 
+#include "diorama/node_pattern.h"
+
 #include <algorithm>
 
 #include "sampling.h"
@@ -21,7 +23,7 @@ std::shared_ptr<const Material> painted(const Node& node, const Vec3& color) {
 }  // namespace
 
 void RandomColors::Params::visit(ParamVisitor& v) {
-  v.param("nodes", nodes, {"Nodes to paint; those without a mesh are passed over."});
+  v.param("nodes", nodes, {"Nodes to paint; those without a mesh are passed over.", kNodePattern});
   v.param("color", color, {"Red, green and blue, linear.", "", 0, 1}, 3);
 }
 

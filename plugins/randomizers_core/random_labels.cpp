@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "random_labels.h"
 
+#include "diorama/node_pattern.h"
+
 #include "diorama/error.h"
 #include "sampling.h"
 
@@ -12,7 +14,7 @@ constexpr const char* kModes[] = {"replace", "add", "clear"};
 }  // namespace
 
 void RandomLabels::Params::visit(ParamVisitor& v) {
-  v.param("nodes", nodes, {"Nodes to label."});
+  v.param("nodes", nodes, {"Nodes to label.", kNodePattern});
   v.choice("mode", mode, kModes,
            {"replace: the only label of the node; add: its other taxonomies stay; clear: no label "
             "in any taxonomy, whatever `labels` says."});

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "random_material.h"
 
+#include "diorama/node_pattern.h"
+
 #include "diorama/error.h"
 #include "sampling.h"
 
@@ -19,7 +21,7 @@ std::shared_ptr<const Material> first_material(const Scene& scene) {
 }  // namespace
 
 void RandomMaterial::Params::visit(ParamVisitor& v) {
-  v.param("nodes", nodes, {"Nodes to change; those without a mesh are passed over."});
+  v.param("nodes", nodes, {"Nodes to change; those without a mesh are passed over.", kNodePattern});
   v.param("assets", assets,
           {"Model files whose first material is put on the mesh; none: the mesh keeps its own."});
   v.param("roughness", roughness,

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "random_texture.h"
 
+#include "diorama/node_pattern.h"
+
 #include <algorithm>
 
 #include "sampling.h"
@@ -8,7 +10,7 @@
 namespace diorama {
 
 void RandomTexture::Params::visit(ParamVisitor& v) {
-  v.param("nodes", nodes, {"Nodes to change; those without a mesh are passed over."});
+  v.param("nodes", nodes, {"Nodes to change; those without a mesh are passed over.", kNodePattern});
   v.param("textures", textures, {"Image files to choose from; none: the mesh keeps what it has."});
   v.param("repeat", repeat, {"How often the picture fits along the mesh's uv.", "", 1e-3, 1e3});
   v.param("rotation_deg", rotation_deg, {"Turn of the picture.", "deg", -360, 360});

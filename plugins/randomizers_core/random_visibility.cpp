@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "random_visibility.h"
 
+#include "diorama/node_pattern.h"
+
 #include "sampling.h"
 
 namespace diorama {
 
 void RandomVisibility::Params::visit(ParamVisitor& v) {
-  v.param("nodes", nodes, {"Nodes to show or hide, with all below them."});
+  v.param("nodes", nodes, {"Nodes to show or hide, with all below them.", kNodePattern});
   v.param("visible_chance", visible_chance,
           {"Probability that a node is shown; a sequence of 1 and 0 shows and hides in turn.", "",
            0, 1});

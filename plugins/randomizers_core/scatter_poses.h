@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "diorama/distribution.h"
 #include "diorama/host.h"
@@ -13,6 +14,11 @@ struct NodeDraws;
 
 /// Gives nodes a random place, as an offset from the working area along the world's axes, a random
 /// rotation and a random scale. The node's own pose is replaced.
+///
+/// With `avoid_overlap` the place is drawn again while the node's box (along its own axes) would
+/// come too near to an obstacle or to a node placed before it; rotation and scale stay as first
+/// drawn, so that none is rarer than the job says. When no place within `max_tries` is free, the
+/// first stands.
 class ScatterPoses final : public Randomizer {
  public:
   struct Params {
@@ -21,6 +27,10 @@ class ScatterPoses final : public Randomizer {
     std::string rotation = "uniform";
     Distribution rotation_deg = Range{0.0, 360.0};
     Distribution scale = 1.0;
+    bool avoid_overlap = true;
+    std::vector<std::string> obstacles{"/**"};
+    double clearance_m = 0.01;
+    int max_tries = 100;
 
     void visit(ParamVisitor& v);
   };
@@ -32,6 +42,7 @@ class ScatterPoses final : public Randomizer {
   Quat draw_rotation(NodeDraws& draws) const;
 
   Params params_;
+  Host& host_;
 };
 
 }  // namespace diorama

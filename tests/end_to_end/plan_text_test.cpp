@@ -64,9 +64,11 @@ void check_golden(const std::string& name, const std::string& text) {
 TEST_CASE("The plan of the tutorial's defaults is what the tutorial prescribes", "[plan]") {
   const std::string text = dry_run({});
   CHECK_THAT(text, ContainsSubstring("9 captures x 2 cameras = 18 frames, seed 12, debug"));
-  CHECK_THAT(text,
-             ContainsSubstring("timeline: simulate 4 -> capture floating x 2 -> simulate 200 -> "
-                               "capture dropped x 2"));
+  CHECK_THAT(
+      text,
+      ContainsSubstring(
+          "timeline: simulate 4 -> capture floating x 2 -> simulate until rest, 200 to 800 -> "
+          "capture dropped x 2"));
   CHECK_THAT(text, ContainsSubstring("environments (3)"));
   // 9 captures, 4 per visit: the third visit is cut short.
   CHECK_THAT(text, ContainsSubstring("capture 8: floating 1"));
@@ -94,7 +96,8 @@ TEST_CASE("The plan of the tutorial's multi-writer job is what the tutorial pres
   const std::string text = dry_run({config_file("infinigen_multi_writers_pt.yaml")});
   CHECK_THAT(text, ContainsSubstring("12 captures x 2 cameras = 24 frames, seed 12, debug"));
   CHECK_THAT(text,
-             ContainsSubstring("capture floating x 2 -> simulate 200 -> capture dropped x 3"));
+             ContainsSubstring(
+                 "capture floating x 2 -> simulate until rest, 200 to 800 -> capture dropped x 3"));
   CHECK_THAT(text, ContainsSubstring("objects (49)"));
   CHECK_THAT(text, ContainsSubstring("auto_label: 5 below /Assets"));
   CHECK_THAT(text, ContainsSubstring("shape_distractors: 30 below"));

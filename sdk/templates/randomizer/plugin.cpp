@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: @LICENCE@
 // Turns nodes about their own vertical axis and scales them, each by its own chance.
+#include <diorama/node_pattern.h>
 #include <diorama/plugin.h>
 #include <diorama/randomizer.h>
 
@@ -14,7 +15,7 @@ class @CLASS@ final : public diorama::Randomizer {
     diorama::Range angle_deg{-180.0, 180.0};
     diorama::Range scale{1.0, 1.0};
     void visit(diorama::ParamVisitor& v) {
-      v.param("nodes", nodes, {"Pattern of the nodes to turn."});
+      v.param("nodes", nodes, {"Pattern of the nodes to turn.", diorama::kNodePattern});
       v.param("angle_deg", angle_deg, {"Turn about the world's z axis.", "deg", -360.0, 360.0});
       v.param("scale", scale, {"Factor of the size.", "", 0.01, 100.0});
     }

@@ -3,7 +3,9 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <fstream>
+#include <map>
 #include <set>
 
 #include "diorama/error.h"
@@ -164,6 +166,68 @@ TEST_CASE("Over many seeds picks are uniform and gravity keeps its chance", "[pl
   CHECK(chi_square < 16.27);  // 3 degrees of freedom, level 0.001
   const double deviation = std::sqrt(all * 0.25 * 0.75);
   CHECK(std::abs(floating - all * 0.25) < 3.29 * deviation);  // level 0.001
+}
+
+TEST_CASE("Objects picked per visit differ between visits and are planned one visit at a time",
+          "[plan]") {
+  const Job job = job_from(with(with(good_job(), "count: 20,", "count: 20, pick: per_visit,"),
+                                "total_captures: 7", "total_captures: 30"));
+  const CapturePlan plan = plan_of(job);
+  REQUIRE(plan.visits.size() == 10);
+  const auto names = [&](int visit, std::size_t group) {
+    std::vector<std::string> assets;
+    for (const PlannedObject& object : plan_objects(job, plan.object_assets, visit)) {
+      if (object.group == group) assets.push_back(object.asset);
+    }
+    return assets;
+  };
+  CHECK(names(3, 0) == names(3, 0));
+  CHECK(names(3, 0) != names(4, 0));
+  CHECK(names(3, 1) == names(4, 1));  // per job
+  CHECK(names(0, 0) != names(1, 0));
+}
+
+TEST_CASE("Balanced picks use every asset equally often, over visits too", "[plan]") {
+  // Four assets, seven objects per visit.
+  Job job =
+      job_from(with(with(good_job(), "count: 20,", "count: 7, balance: true, pick: per_visit,"),
+                    "total_captures: 7", "total_captures: 24"));
+  const CapturePlan plan = plan_of(job);
+  std::map<std::string, int> uses;
+  for (int visit = 0; visit < 8; ++visit) {
+    for (const PlannedObject& object : plan_objects(job, plan.object_assets, visit)) {
+      if (object.group == 0) ++uses[object.asset];
+    }
+    int least = 1000, most = 0;
+    for (const std::string& asset : kFood) {
+      least = std::min(least, uses[asset]);
+      most = std::max(most, uses[asset]);
+    }
+    CHECK(most - least <= 1);
+  }
+  CHECK(uses[kFood[0]] == 14);
+  // Once per job: none twice before all were picked.
+  job = job_from(with(good_job(), "count: 20,", "count: 4, balance: true,"));
+  std::set<std::string> once;
+  for (const PlannedObject& object : plan_of(job).objects) {
+    if (object.group == 0) once.insert(object.asset);
+  }
+  CHECK(once.size() == 4);
+  const auto order = choices(plan_of(job), 0);
+  job.seed = 77;
+  CHECK(order != choices(plan_of(job), 0));
+}
+
+TEST_CASE("Assets that no visit uses are known", "[plan]") {
+  const Job job = job_from(with(good_job(), "count: 20,", "count: 1,"));
+  CHECK(unused_assets(job, plan_of(job))[0].size() == 3);
+  const Job all = job_from(with(good_job(), "count: 20,", "count: 4, balance: true,"));
+  CHECK(unused_assets(all, plan_of(all))[0].empty());
+  const Job over_visits =
+      job_from(with(with(good_job(), "count: 20,", "count: 1, balance: true, pick: per_visit,"),
+                    "total_captures: 7", "total_captures: 12"));
+  REQUIRE(plan_of(over_visits).visits.size() == 4);
+  CHECK(unused_assets(over_visits, plan_of(over_visits))[0].empty());
 }
 
 TEST_CASE("A group without assets is an error that names the place", "[plan]") {

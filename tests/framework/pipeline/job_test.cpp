@@ -30,7 +30,9 @@ TEST_CASE("Without a timeline a visit does what the tutorial does", "[job]") {
   CHECK(job.timeline[0].steps == 4);
   CHECK(job.timeline[1].name == "floating");
   CHECK(job.timeline[1].count == 2);
-  CHECK(job.timeline[2].steps == 200);
+  CHECK(job.timeline[2].until_rest);
+  CHECK(job.timeline[2].at_least == 200);
+  CHECK(job.timeline[2].steps == 800);
   CHECK(job.timeline[3].name == "dropped");
 }
 
@@ -153,4 +155,27 @@ TEST_CASE("Names of groups hold nothing that a terminal would obey", "[job]") {
   CHECK_THAT(complaints_about(with(good_job(), "name: cam", "name: \"a\\e[2J\"")),
              ContainsSubstring("cameras[0].name: expected a name without \"/\" and control "
                                "characters, found \"a\\x1B[2J\""));
+}
+
+TEST_CASE("A simulation takes steps or goes on until rest", "[job]") {
+  const std::string good = good_job();
+  const Job job = job_from(
+      with(good, "{simulate: 200}", "{simulate: {until: rest, at_least: 50, at_most: 300}}"));
+  CHECK(job.timeline[2].until_rest);
+  CHECK(job.timeline[2].at_least == 50);
+  CHECK(job.timeline[2].steps == 300);
+  CHECK_FALSE(job.timeline[0].until_rest);
+  CHECK(job_from(with(good, "{simulate: 200}", "{simulate: {until: rest}}")).timeline[2].steps ==
+        800);
+  CHECK_THAT(complaints_about(with(good, "{simulate: 200}", "{simulate: {until: reset}}")),
+             ContainsSubstring("timeline[2].simulate.until"));
+  CHECK_THAT(
+      complaints_about(with(good, "{simulate: 200}", "{simulate: {until: rest, at_least: 900}}")),
+      ContainsSubstring("at_least: expected at_most (800) or less, found 900"));
+  CHECK_THAT(complaints_about(with(good, "{simulate: 200}", "{simulate: 2.5}")),
+             ContainsSubstring("timeline[2].simulate: expected a whole number"));
+  CHECK_THAT(complaints_about(with(good, "{simulate: 200}", "{simulate: lots}")),
+             ContainsSubstring("timeline[2].simulate"));
+  CHECK_THAT(complaints_about(with(good, "{simulate: 200}", "{simulate: -1}")),
+             ContainsSubstring("timeline[2].simulate"));
 }

@@ -65,6 +65,28 @@ TEST_CASE("Rules hide by part of the path and find the working area in the world
   CHECK(room.host.warnings.empty());
 }
 
+TEST_CASE("A star in a rule stands for anything within one name", "[environment]") {
+  Room room;
+  const auto hidden_by = [&](const char* text) {
+    EnvironmentRules rules;
+    rules.hide = {text};
+    apply_environment_rules(rules, false, room.environment, room.scene, room.host);
+    std::vector<std::string> names;
+    for (const NodeId node : room.scene.subtree(room.environment)) {
+      if (room.scene[node].is_visible) continue;
+      names.push_back(room.scene[node].name);
+      room.scene.edit(node).is_visible = true;
+    }
+    return names;
+  };
+  using Names = std::vector<std::string>;
+  CHECK(hidden_by("Ceiling*_GLA") == Names{"CeilingLight_001_SPLIT_GLA", "glass"});
+  CHECK(hidden_by("Table*_GLA").empty());
+  CHECK(hidden_by("Ceiling*ass").empty());  // "glass" is another name
+  CHECK(hidden_by("T*F*1_spawn") == Names{"TableDiningFactory_1_spawn", "top"});
+  CHECK(hidden_by("*").size() == 7);
+}
+
 TEST_CASE("Debug mode also hides walls and ceiling", "[environment]") {
   Room room;
   apply_environment_rules(infinigen_rules(), true, room.environment, room.scene, room.host);
@@ -127,7 +149,7 @@ objects:
   host.assets["box"] = [](Scene& scene, NodeId root) { add_mesh(scene, root, "m", Vec3::Zero()); };
   const CapturePlan plan = plan_captures(job, {{"room", 0}}, {{"mug"}, {"box"}});
   Scene scene;
-  const std::vector<NodeId> objects = spawn_objects(plan, job, scene, host);
+  const std::vector<NodeId> objects = spawn_objects(plan.objects, job, scene, host);
   REQUIRE(objects.size() == 3);
   CHECK(scene.path(objects[0]) == "/Assets/Deep/falling_mug");
   CHECK(scene.path(objects[1]) == "/Assets/Deep/falling_mug_01");

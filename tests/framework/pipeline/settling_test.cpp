@@ -104,7 +104,11 @@ TEST_CASE("The report names the worst visits and every object that left", "[sett
   wild.simulated_s = 3.4;
   wild.max_speed = 0.5;
   wild.left_room = {"/Assets/mug"};
-  wild.respawned = {"/Assets/can", "/Assets/can"};
+  wild.born_inside = {{"/Assets/egg", "starts in /Environment/lamp"}};
+  wild.respawned = {{"/Assets/can", "left the room"}, {"/Assets/can", "moves at 0.20 m/s"}};
+  wild.dropped = {{"/Assets/pot", "hangs in the air"}};
+  wild.unsettled = {{"/Assets/mug", "left the room"}};
+  wild.cameras = {{"/Cameras/cam_0", "stands in /Environment/lamp"}};
   CHECK(settle_text({}).empty());
   const std::string text = settle_text({quiet, wild});
   CHECK_THAT(text, ContainsSubstring("11 falling over all visits, 1 left the room"));
@@ -113,10 +117,21 @@ TEST_CASE("The report names the worst visits and every object that left", "[sett
   CHECK_THAT(text, ContainsSubstring("deepest penetration 2.00 mm (visit 1, /Assets/bowl)"));
   CHECK_THAT(text, ContainsSubstring("visit 2: not at rest after 3.40 s"));
   CHECK_THAT(text, ContainsSubstring("visit 2: /Assets/mug left the room"));
-  CHECK_THAT(text, ContainsSubstring("visit 2: /Assets/can had left the room and was placed anew"));
+  CHECK_THAT(text, ContainsSubstring("visit 2: /Assets/can left the room, so it was placed anew"));
+  CHECK_THAT(text, ContainsSubstring("visit 2: /Assets/pot hangs in the air, so it was taken out"));
+  CHECK_THAT(text, ContainsSubstring("visit 2: /Assets/egg starts in /Environment/lamp\n"));
+  CHECK_THAT(text, ContainsSubstring("visit 2: /Cameras/cam_0 stands in /Environment/lamp\n"));
+  VisitReport terrible;
+  for (int i = 0; i < 100; ++i) terrible.dropped.push_back({"/Assets/a", "hangs in the air"});
+  CHECK_THAT(settle_text({terrible}), ContainsSubstring("... and 61 more, in settle/\n"));
   const auto json = nlohmann::json::parse(settle_json(wild));
   CHECK(json["rest_after_s"].is_null());
   CHECK(json["environment"] == "room.usdc");
   CHECK(json["respawned"].size() == 2);
+  CHECK(json["respawned"][1]["why"] == "moves at 0.20 m/s");
+  CHECK(json["dropped"][0]["object"] == "/Assets/pot");
+  CHECK(json["unsettled"][0]["why"] == "left the room");
+  CHECK(json["born_inside"].size() == 1);
+  CHECK(json["blocked_cameras"][0]["camera"] == "/Cameras/cam_0");
   CHECK(nlohmann::json::parse(settle_json(quiet))["rest_after_s"] == 1.25);
 }

@@ -77,7 +77,9 @@ TEST_CASE("The built-in job has the tutorial's defaults", "[replicator]") {
   REQUIRE(job.timeline.size() == 4);
   CHECK(job.timeline[0].steps == 4);
   CHECK(job.timeline[1].count == 2);
-  CHECK(job.timeline[2].steps == 200);
+  CHECK(job.timeline[2].until_rest);
+  CHECK(job.timeline[2].at_least == 200);
+  CHECK(job.timeline[2].steps == 800);
   CHECK(job.timeline[3].count == 2);
   REQUIRE(job.writers.size() == 1);
   CHECK(job.writers[0].type == "PoseWriter");

@@ -75,7 +75,7 @@ Scene scene_of(const Job& job, const CapturePlan& plan, FakeHost& host) {
   const auto build = [&](Scene& scene, NodeId root) { scene.edit(root).mesh = shared; };
   for (const PlannedObject& object : plan.objects) host.assets[object.asset] = build;
   Scene scene;
-  spawn_objects(plan, job, scene, host);
+  spawn_objects(plan.objects, job, scene, host);
   create_lights(job.lights, scene, host);
   create_cameras(job.cameras, scene);
   return scene;

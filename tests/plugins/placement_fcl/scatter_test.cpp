@@ -176,3 +176,19 @@ TEST_CASE("Patterns that lead nowhere are told in words", "[placement]") {
   CHECK_THAT(text_of([&] { Scatter3d(in_nothing, stage.host).randomize(stage.scene, {}, Rng(1)); }),
              ContainsSubstring("\"/Marks/*\" has a mesh"));
 }
+
+TEST_CASE("What waits at the origin for another randomizer is in nobody's way", "[placement]") {
+  Stage stage(1);
+  const NodeId other = stage.scene.create(stage.scene.find("/Assets"), "waits");
+  stage.scene.edit(other).mesh = std::make_shared<const Mesh>(make_box(Vec3::Constant(2)));
+  stage.scene.edit(other).rigid_body = RigidBody{};
+  Scatter3d::Params params;
+  params.placement.nodes = "/Assets/cube";
+  params.placement.max_tries = 3;
+  params.offset = Distribution(Vec3(0, 0, 0.5));
+  Scatter3d(params, stage.host).randomize(stage.scene, {}, Rng(1));
+  CHECK(stage.host.warnings.empty());
+  stage.scene.set_pose(other, Affine(Eigen::Translation3d(0, 0, 1.2)));
+  Scatter3d(params, stage.host).randomize(stage.scene, {}, Rng(1));
+  CHECK(stage.host.warnings.size() == 1);
+}

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "orbit_cameras.h"
 
+#include "diorama/obstacles.h"
 #include "framework/pipeline/fake_host.h"
-#include "obstacles.h"
 #include "support/catch.h"
 #include "support/statistics.h"
 
@@ -197,4 +197,40 @@ TEST_CASE("hidden obstacles block no view, distances to triangles are exact", "[
   set.scene.edit(wall).is_visible = false;
   CHECK_FALSE(
       Obstacles(set.scene, "/Environment/**").is_between(Vec3(10.9, 1.9, 0), Vec3(10.9, 1.9, 2)));
+}
+
+TEST_CASE("cameras never stand in a closed thing, and leave the nearest for the freest place",
+          "[randomizers]") {
+  Set set;
+  // Shades of lamps, hollow for a camera of 0.3 m clearance, on the sphere of views.
+  for (const Vec3& centre : set.centres) {
+    for (int i = 0; i < 6; ++i) {
+      const double angle = kPi / 3 * i;
+      set.add_wall("shade", make_sphere(0.5, 24),
+                   centre + Vec3(1.3 * std::cos(angle), 1.3 * std::sin(angle), 0.4));
+    }
+  }
+  set.add_wall("far", make_box(Vec3(0.1, 0.1, 0.1)), Vec3(40, 40, 40));
+  OrbitCameras orbit(orbit_params(), set.host);
+  const Obstacles things(set.scene, "/Environment/**");
+  for (int seed = 0; seed < 100; ++seed) {
+    orbit.randomize(set.scene, {}, Rng(std::uint64_t(seed)));
+    const Vec3 place = set.pose().translation();
+    CHECK_FALSE(things.encloser(place));
+    CHECK(things.distance(place, 1.0) >= 0.3);
+  }
+  // Nowhere is a metre of room: the freest of all draws is taken.
+  OrbitCameras::Params params = orbit_params();
+  params.clearance_m = 3.0;
+  OrbitCameras choosy(params, set.host);
+  params.clearance_m = 0.0;
+  OrbitCameras easy(params, set.host);
+  double chosen = 0.0, any = 0.0;
+  for (int seed = 0; seed < 30; ++seed) {
+    choosy.randomize(set.scene, {}, Rng(std::uint64_t(seed)));
+    chosen += things.distance(set.pose().translation(), 3.0);
+    easy.randomize(set.scene, {}, Rng(std::uint64_t(seed)));
+    any += things.distance(set.pose().translation(), 3.0);
+  }
+  CHECK(chosen > 1.2 * any);
 }

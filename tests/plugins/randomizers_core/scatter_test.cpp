@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "diorama/obstacles.h"
 #include "framework/pipeline/fake_host.h"
 #include "scatter_lights.h"
 #include "scatter_poses.h"
@@ -147,4 +148,110 @@ TEST_CASE("scattered lights fill box, colour and intensity, and spare other ligh
   stage.scene.edit(lamp).light->radius_m = 0.77;
   ScatterLights(params, stage.host).randomize(stage.scene, stage.context, Rng(1));
   CHECK(stage.scene[lamp].light->radius_m == 0.77);
+}
+
+namespace {
+
+/// A floor, a table of 1 x 1 x 1 m at (3, -2) and objects that wait at the origin, which is in the
+/// middle of a pillar that is not to matter to them.
+struct Furnished : Stage {
+  explicit Furnished(int objects) {
+    const NodeId room = group("Environment");
+    add(room, "floor", make_box(Vec3(20, 20, 0.1)), Vec3(0, 0, -0.05));
+    add(room, "table", make_box(Vec3(1, 1, 1)), Vec3(3, -2, 0.5));
+    const NodeId assets = group("Assets");
+    for (int i = 0; i < objects; ++i) {
+      const NodeId node = add(assets, "box", make_box(Vec3(0.3, 0.1, 0.05)), Vec3::Zero());
+      scene.edit(node).rigid_body = RigidBody{};
+      nodes.push_back(node);
+    }
+  }
+  NodeId add(NodeId parent, const std::string& name, const Mesh& mesh, const Vec3& place) {
+    const NodeId node = scene.create(parent, name);
+    scene.edit(node).mesh = std::make_shared<const Mesh>(mesh);
+    scene.set_pose(node, Affine(Eigen::Translation3d(place)));
+    return node;
+  }
+  int overlaps() const {
+    const Obstacles all(scene, scene.match("/*/*"), Obstacles::Hidden::Count);
+    int count = 0;
+    for (const NodeId node : nodes) {
+      const bool meets = !all.near_node(scene, node, 0.0).empty() ||
+                         all.encloser(scene.world_bounds(node).centre(), node);
+      count += meets ? 1 : 0;
+    }
+    return count;
+  }
+  std::vector<NodeId> nodes;
+};
+
+}  // namespace
+
+TEST_CASE("Scattered things start neither in furniture nor in each other", "[randomizers]") {
+  ScatterPoses::Params params;
+  // The table's upper half is within reach.
+  params.offset = Distribution::between({-0.6, -0.6, -0.2}, {0.6, 0.6, 1.0});
+  params.scale = Range{0.8, 1.2};
+  Furnished stage(40);
+  ScatterPoses(params, stage.host).randomize(stage.scene, stage.context, Rng(5));
+  CHECK(stage.overlaps() == 0);
+  CHECK(stage.host.warnings.empty());
+  std::vector<double> scales;
+  for (const NodeId node : stage.nodes) {
+    scales.push_back(scale_of(stage.scene.world_from_node(node)));
+  }
+
+  Furnished blind(40);
+  params.avoid_overlap = false;
+  ScatterPoses(params, blind.host).randomize(blind.scene, blind.context, Rng(5));
+  CHECK(blind.overlaps() > 10);
+  // Only places are drawn again.
+  for (std::size_t i = 0; i < blind.nodes.size(); ++i) {
+    CHECK(scale_of(blind.scene.world_from_node(blind.nodes[i])) == Approx(scales[i]));
+  }
+}
+
+TEST_CASE("What waits to be placed is in nobody's way, what is placed is", "[randomizers]") {
+  Furnished stage(1);
+  const NodeId other =
+      stage.add(stage.scene.find("/Assets"), "crate", make_box(Vec3(4, 4, 4)), Vec3::Zero());
+  stage.scene.edit(other).rigid_body = RigidBody{};
+  ScatterPoses::Params params;
+  params.nodes = "/Assets/box";
+  params.offset = Vec3(-3, 2, 0.5);  // (0, 0, 1): inside of the crate that waits
+  ScatterPoses scatter(params, stage.host);
+  scatter.randomize(stage.scene, stage.context, Rng(1));
+  CHECK(stage.host.warnings.empty());
+  stage.scene.set_pose(other, Affine(Eigen::Translation3d(0, 0, 2.5)));
+  scatter.randomize(stage.scene, stage.context, Rng(1));
+  REQUIRE(stage.host.warnings.size() == 1);
+  CHECK_THAT(stage.host.warnings[0], ContainsSubstring("1 of 1 nodes that fit \"/Assets/box\""));
+}
+
+TEST_CASE("Lights stay off surfaces and in front of walls", "[randomizers]") {
+  Furnished stage(0);
+  stage.add(stage.scene.find("/Environment"), "wall", make_box(Vec3(0.1, 20, 6)), Vec3(4.2, 0, 3));
+  const NodeId lamp = stage.scene.create(stage.group("Lights"), "lamp");
+  stage.scene.edit(lamp).light = Light{};
+  stage.scene.edit(lamp).light->radius_m = 0.1;
+  ScatterLights::Params params;
+  params.offset = Distribution::between({-2, -2, 0}, {2, 2, 2});
+  params.clearance_m = 0.4;
+  ScatterLights scatter(params, stage.host);
+  params.clearance_m = 0.0;
+  ScatterLights blind(params, stage.host);
+  const Obstacles things(stage.scene, "/Environment/**");
+  int too_near = 0, behind = 0;
+  for (int seed = 0; seed < 100; ++seed) {
+    scatter.randomize(stage.scene, stage.context, Rng(std::uint64_t(seed)));
+    const Vec3 place = stage.scene.world_from_node(lamp).translation();
+    CHECK(things.distance(place, 1.0) >= 0.5);
+    CHECK(place.x() < 4.2);
+    blind.randomize(stage.scene, stage.context, Rng(std::uint64_t(seed)));
+    const Vec3 anywhere = stage.scene.world_from_node(lamp).translation();
+    too_near += things.distance(anywhere, 1.0) < 0.5 ? 1 : 0;
+    behind += anywhere.x() > 4.2 ? 1 : 0;
+  }
+  CHECK(too_near > 10);
+  CHECK(behind > 5);
 }

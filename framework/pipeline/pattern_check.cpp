@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/pipeline/pattern_check.h"
+
+#include <algorithm>
+#include <set>
+
+#include "diorama/node_pattern.h"
+
+namespace diorama {
+namespace {
+
+using Names = std::vector<std::string_view>;
+
+/// "/Assets/*" is "Assets" and "*".
+Names names_of(std::string_view path) {
+  Names names;
+  if (!path.starts_with('/')) return {path};
+  std::size_t start = 1;
+  while (start <= path.size()) {
+    const std::size_t end = std::min(path.find('/', start), path.size());
+    names.push_back(path.substr(start, end - start));
+    start = end + 1;
+  }
+  return names;
+}
+
+bool reaches_deeper(std::string_view name) { return name.find("**") != std::string_view::npos; }
+
+/// One name, in which '*' stands for any text.
+bool fits_name(std::string_view pattern, std::string_view name) {
+  if (pattern.empty()) return name.empty();
+  if (pattern.front() != '*') {
+    return !name.empty() && pattern.front() == name.front() &&
+           fits_name(pattern.substr(1), name.substr(1));
+  }
+  for (std::size_t skipped = 0; skipped <= name.size(); ++skipped) {
+    if (fits_name(pattern.substr(1), name.substr(skipped))) return true;
+  }
+  return false;
+}
+
+/// How many names of the pattern fit those of the path, from the start; all of them when the
+/// shorter of the two is used up or "**" leaves the rest open.
+std::size_t fitting_names(const Names& pattern, const Names& path) {
+  for (std::size_t i = 0; i < std::min(pattern.size(), path.size()); ++i) {
+    if (reaches_deeper(pattern[i])) return pattern.size();
+    if (!fits_name(pattern[i], path[i])) return i;
+  }
+  return pattern.size();
+}
+
+/// Every path that a visit may have outside of the environment: of all assets, falling and
+/// floating.
+std::vector<std::string> possible_paths(const Job& job, const CapturePlan& plan) {
+  std::set<std::string> paths{"/Environment"};
+  // A group that is switched off may be spoken of.
+  for (const ObjectGroup& group : job.objects) {
+    if (group.count == 0) paths.insert(group.under);
+  }
+  visit_planned_objects(job, plan, [&](const PlannedObject& object) {
+    const std::string& parent = job.objects[object.group].under;
+    paths.insert(object.path);
+    const std::string name = object.name.substr(object.name.find('_') + 1);
+    for (const char* fate : {"falling_", "floating_"}) paths.insert(parent + "/" + fate + name);
+  });
+  for (const LightGroup& group : job.lights) {
+    for (int i = 0; i < std::max(group.count, 1); ++i) {
+      paths.insert("/Lights/" + group.name + "_" + std::to_string(i));
+    }
+  }
+  for (const std::string& name : job.camera_names()) paths.insert("/Cameras/" + name);
+  return {paths.begin(), paths.end()};
+}
+
+std::vector<const Value*> texts_of(const Value& value) {
+  std::vector<const Value*> texts;
+  if (value.kind == Value::Kind::Scalar && !value.scalar.empty()) texts.push_back(&value);
+  for (const Value& item : value.list) {
+    if (item.kind == Value::Kind::Scalar) texts.push_back(&item);
+  }
+  return texts;
+}
+
+bool is_about_environment(std::string_view pattern) {
+  const Names names = names_of(pattern);
+  return names.size() > 1 && names.front() == "Environment";
+}
+
+}  // namespace
+
+bool may_fit(std::string_view pattern, std::string_view path) {
+  const Names names = names_of(pattern);
+  return fitting_names(names, names_of(path)) == names.size();
+}
+
+std::string nearest_pattern(std::string_view pattern, const std::vector<std::string>& paths) {
+  Names names = names_of(pattern);
+  std::size_t fitting = 0;
+  for (const std::string& path : paths) {
+    fitting = std::max(fitting, fitting_names(names, names_of(path)));
+  }
+  if (fitting >= names.size()) return std::string(pattern);
+  std::vector<std::string> known;
+  for (const std::string& path : paths) {
+    const Names of_path = names_of(path);
+    if (of_path.size() > fitting && fitting_names(names, of_path) == fitting) {
+      known.emplace_back(of_path[fitting]);
+    }
+  }
+  const std::string near = nearest_name(names[fitting], known);
+  if (near.empty()) return {};
+  names[fitting] = near;
+  std::string text;
+  for (const std::string_view name : names) text += "/" + std::string(name);
+  return text;
+}
+
+std::vector<EnvironmentPattern> check_patterns(const Job& job, const CapturePlan& plan,
+                                               const DescribeComponent& describe,
+                                               Complaints& complaints) {
+  const std::vector<std::string> paths = possible_paths(job, plan);
+  std::vector<EnvironmentPattern> open;
+  for (const RandomizerEntry& entry : job.randomizers) {
+    const auto specs = describe(ComponentKind::Randomizer, entry.type);
+    if (!specs) continue;
+    for (const ParamSpec& spec : *specs) {
+      const Value* value = spec.unit == kNodePattern ? entry.component.map.find(spec.key) : nullptr;
+      if (!value) continue;
+      for (const Value* text : texts_of(*value)) {
+        const std::string& pattern = text->scalar;
+        const std::string key = entry.component.path + "." + spec.key;
+        if (is_about_environment(pattern)) {
+          open.push_back({pattern, key});
+          continue;
+        }
+        const bool fits = std::any_of(paths.begin(), paths.end(), [&](const std::string& path) {
+          return may_fit(pattern, path);
+        });
+        if (fits) continue;
+        const std::string near = nearest_pattern(pattern, paths);
+        complaints.add(text->place,
+                       key + ": \"" + pattern + "\" fits no node" +
+                           (near.empty() ? std::string("; nodes are below /Environment, "
+                                                       "/Lights, /Cameras and what "
+                                                       "`under` of the objects says")
+                                         : "; did you mean \"" + near + "\"?"));
+      }
+    }
+  }
+  return open;
+}
+
+}  // namespace diorama

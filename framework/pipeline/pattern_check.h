@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "framework/pipeline/capture_plan.h"
+#include "framework/pipeline/job.h"
+
+/// Patterns of node paths in a job, tried before anything is loaded.
+namespace diorama {
+
+/// A pattern that may fit something in an environment, and the key that gives it.
+struct EnvironmentPattern {
+  std::string text;
+  std::string key;  ///< "randomizers[2].surfaces"
+};
+
+/// Complains about every pattern in the job's randomizers (parameters of the unit kNodePattern)
+/// that can fit no object, light or camera of any visit, with the nearest path. Defaults that the
+/// job does not spell out are no complaint. Returns those about environments, which nobody knows
+/// yet.
+std::vector<EnvironmentPattern> check_patterns(const Job& job, const CapturePlan& plan,
+                                               const DescribeComponent& describe,
+                                               Complaints& complaints);
+
+/// Whether the pattern fits the path or may fit a node below it or above it.
+bool may_fit(std::string_view pattern, std::string_view path);
+
+/// The pattern with its first name that fits none of the paths replaced by the nearest one that
+/// does; empty when none is near.
+std::string nearest_pattern(std::string_view pattern, const std::vector<std::string>& paths);
+
+}  // namespace diorama

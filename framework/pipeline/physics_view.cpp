@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/pipeline/physics_view.h"
+
+#include <algorithm>
+
+namespace diorama {
+namespace {
+
+bool are_equal(const std::optional<Collider>& a, const std::optional<Collider>& b) {
+  if (!a || !b) return a.has_value() == b.has_value();
+  return a->shape == b->shape && a->primitive == b->primitive &&
+         a->primitive_size == b->primitive_size && a->friction == b->friction &&
+         a->restitution == b->restitution;
+}
+
+bool are_equal(const std::optional<RigidBody>& a, const std::optional<RigidBody>& b) {
+  if (!a || !b) return a.has_value() == b.has_value();
+  return a->mass_kg == b->mass_kg && a->has_gravity == b->has_gravity;
+}
+
+}  // namespace
+
+PhysicsView::PhysicsView(const Scene& scene)
+    : pose_revision_(scene.pose_revision()),
+      shape_revision_(scene.shape_revision()),
+      parts_(parts_of(scene)) {}
+
+std::vector<PhysicsView::Part> PhysicsView::parts_of(const Scene& scene) {
+  std::vector<Part> parts;
+  for (const NodeId id : scene.subtree(scene.root())) {
+    const Node& node = scene[id];
+    if (!node.collider && !node.rigid_body) continue;
+    parts.push_back({id, scene.world_from_node(id).matrix(), node.mesh, node.collider,
+                     node.rigid_body, scene.is_visible(id)});
+  }
+  return parts;
+}
+
+bool PhysicsView::are_equal(const Part& a, const Part& b) {
+  return a.node == b.node && a.world_from_node == b.world_from_node && a.mesh == b.mesh &&
+         diorama::are_equal(a.collider, b.collider) && diorama::are_equal(a.body, b.body) &&
+         a.is_visible == b.is_visible;
+}
+
+bool PhysicsView::is_of(const Scene& scene) const {
+  if (scene.pose_revision() == pose_revision_ && scene.shape_revision() == shape_revision_) {
+    return true;
+  }
+  const std::vector<Part> now = parts_of(scene);
+  return std::equal(parts_.begin(), parts_.end(), now.begin(), now.end(),
+                    [](const Part& a, const Part& b) { return are_equal(a, b); });
+}
+
+}  // namespace diorama

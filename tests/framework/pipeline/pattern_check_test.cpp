@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/pipeline/pattern_check.h"
+
+#include "diorama/node_pattern.h"
+#include "jobs.h"
+#include "support/catch.h"
+
+using namespace diorama;
+using namespace diorama::test;
+
+namespace {
+
+/// Every randomizer has `nodes` and `targets`, a list of patterns.
+std::optional<std::vector<ParamSpec>> describe(ComponentKind, std::string_view) {
+  ParamSpec nodes;
+  nodes.key = "nodes";
+  nodes.type = ParamType::Text;
+  nodes.unit = kNodePattern;
+  ParamSpec targets = nodes;
+  targets.key = "targets";
+  targets.type = ParamType::TextList;
+  ParamSpec file = nodes;
+  file.key = "file";
+  file.unit = "";
+  return std::vector<ParamSpec>{nodes, targets, file};
+}
+
+struct Checked {
+  std::string complaints;
+  std::vector<EnvironmentPattern> open;
+};
+
+Checked check(const std::string& keys) {
+  const Job job =
+      job_from(with(good_job(), "{type: scatter_poses, name: poses, on: [environment]}",
+                    "{type: scatter_poses, name: poses, on: [environment], " + keys + "}"));
+  const std::vector<std::vector<std::string>> assets{{"011_banana.usd", "024_bowl.usd"},
+                                                     {"shape:cube"}};
+  const CapturePlan plan = plan_captures(job, {{"room", 0}}, assets);
+  Complaints complaints;
+  Checked checked;
+  checked.open = check_patterns(job, plan, describe, complaints);
+  for (const std::string& message : complaints.messages()) checked.complaints += message + "\n";
+  return checked;
+}
+
+}  // namespace
+
+TEST_CASE("A pattern that fits no node is told with its place and the nearest path", "[patterns]") {
+  CHECK_THAT(check(R"(nodes: "/Asset/*")").complaints,
+             ContainsSubstring("job.yaml:9:") &&
+                 ContainsSubstring("randomizers[0].nodes: \"/Asset/*\" fits no node; did you mean "
+                                   "\"/Assets/*\"?"));
+  CHECK_THAT(check(R"(nodes: "/Cameras/cm_1")").complaints,
+             ContainsSubstring("did you mean \"/Cameras/cam_1\"?"));
+  CHECK_THAT(check(R"(targets: ["/Assets/*", "/Distrctors/*/x"])").complaints,
+             ContainsSubstring("randomizers[0].targets: \"/Distrctors/*/x\" fits no node; did you "
+                               "mean \"/Distractors/*/x\"?"));
+  CHECK_THAT(check(R"(nodes: "/Quux/*")").complaints,
+             ContainsSubstring("fits no node; nodes are below /Environment"));
+  CHECK_THAT(check(R"(nodes: "/Assets/falling_banan")").complaints,
+             ContainsSubstring("did you mean \"/Assets/falling_banana\"?"));
+}
+
+TEST_CASE("Patterns that may fit are no complaint", "[patterns]") {
+  for (const char* pattern :
+       {"/Assets/*", "/Assets", "/**", "/Assets/**", "/Assets/*/mesh/*", "/Cameras/cam_1",
+        "/Assets/*banana*", "/Assets/floating_bowl", "/*/falling_*", "/Distractors/*", ""}) {
+    INFO(pattern);
+    CHECK(check(std::string("nodes: \"") + pattern + "\"").complaints.empty());
+  }
+  CHECK(check(R"(file: "/Asset/*")").complaints.empty());
+}
+
+TEST_CASE("Patterns about the environment are tried when it is there", "[patterns]") {
+  const Checked checked = check(R"(nodes: "/Environment/**/Tabel*")");
+  CHECK(checked.complaints.empty());
+  REQUIRE(checked.open.size() == 1);
+  CHECK(checked.open[0].text == "/Environment/**/Tabel*");
+  CHECK(checked.open[0].key == "randomizers[0].nodes");
+}
