@@ -423,15 +423,16 @@ void OutputStore::settle(const std::string& worker, const WorkerIndex& index) {
     if (lease.worker == worker && workers_.is_alive(lease)) return;
   }
   if (workers_.claim("settle-" + worker)) return;
+  // First: should it come back, it finds that it is out.
+  for (const Workers::Lease& lease : workers_.others()) {
+    if (lease.worker == worker) workers_.remove(lease);
+  }
   if (index.settled_bytes < index.bytes_read) {
     for (const EntryPlace& place : index.unsettled) settle_entry(worker, place);
     checkpoint();
     writer_.settled(worker, index.bytes_read);
   }
   remove_stage(worker);
-  for (const Workers::Lease& lease : workers_.others()) {
-    if (lease.worker == worker) workers_.remove(lease);
-  }
   workers_.release("settle-" + worker);
 }
 

@@ -6,6 +6,7 @@
 
 #include <cstdlib>
 #include <fstream>
+#include <functional>
 #include <map>
 #include <sstream>
 
@@ -95,9 +96,11 @@ OutputStore::Options options_of(const Job& job) {
   return options;
 }
 
-void finish(OutputStore& store) {
+void finish(OutputStore& store, const std::function<void()>& begin) {
   store.refresh();
-  if (!store.is_complete() || store.is_finished() || !store.claim_finish()) return;
+  if (!store.is_complete() || store.is_finished()) return;
+  begin();
+  if (!store.claim_finish()) return;
   Transaction files = store.finish_transaction();
   CollectedFiles last(files, 0, "one");
   store.read_records(0, [&](int capture, std::string_view line) {
@@ -136,9 +139,7 @@ bool run(FileSystem& file_system, const fs::path& root, const Job& job) {
   } else {
     for (int visit = job.shard; visit < visits; visit += job.shards) make_visit(visit);
   }
-  store.refresh();
-  if (!store.is_finished() && store.is_complete()) begin();
-  finish(store);
+  finish(store, begin);
   store.refresh();
   const bool is_finished = store.is_finished();
   store.close();
