@@ -173,7 +173,7 @@ TEST_CASE("Objects picked per visit differ between visits and are planned one vi
   const Job job = job_from(with(with(good_job(), "count: 20,", "count: 20, pick: per_visit,"),
                                 "total_captures: 7", "total_captures: 30"));
   const CapturePlan plan = plan_of(job);
-  REQUIRE(plan.visits.size() == 10);
+  REQUIRE(plan.visit_count() == 10);
   const auto names = [&](int visit, std::size_t group) {
     std::vector<std::string> assets;
     for (const PlannedObject& object : plan_objects(job, plan.object_assets, visit)) {
@@ -226,7 +226,7 @@ TEST_CASE("Assets that no visit uses are known", "[plan]") {
   const Job over_visits =
       job_from(with(with(good_job(), "count: 20,", "count: 1, balance: true, pick: per_visit,"),
                     "total_captures: 7", "total_captures: 12"));
-  REQUIRE(plan_of(over_visits).visits.size() == 4);
+  REQUIRE(plan_of(over_visits).visit_count() == 4);
   CHECK(unused_assets(over_visits, plan_of(over_visits))[0].empty());
 }
 

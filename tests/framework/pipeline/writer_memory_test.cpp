@@ -9,7 +9,7 @@
 #include <memory>
 #include <string>
 
-#include "framework/pipeline/output_store.h"
+#include "framework/output/output_store.h"
 #include "plugins/writer_support/fake_host.h"
 #include "plugins/writer_support/sample_capture.h"
 #include "support/catch.h"
@@ -28,13 +28,13 @@ void write_dataset(Writer& writer, Capture& capture, DatasetInfo dataset, int ca
                    const fs::path& folder) {
   dataset.capture_count = captures;
   LocalFileSystem disk;
-  OutputStore store(disk, {folder, {{"writer", folder / "writer"}}}, captures);
-  store.check("{}", OutputStore::Existing::Refuse);
-  store.open(OutputStore::Existing::Refuse, {});
-  Transaction begin = store.begin_transaction(0);
+  OutputStore store(disk, {folder, ".", {{"writer", "writer"}}}, captures, {});
+  store.join("{}");
+  store.open();
+  Transaction begin = store.begin_transaction();
   CollectedFiles first(begin, 0, "writer");
   writer.begin(dataset, first);
-  store.commit_begin(begin, 0);
+  store.commit_begin(begin);
   for (capture.index = 0; capture.index < captures; ++capture.index) {
     Transaction transaction = store.capture_transaction(capture.index);
     CollectedFiles files(transaction, 0, "writer");
@@ -42,10 +42,10 @@ void write_dataset(Writer& writer, Capture& capture, DatasetInfo dataset, int ca
     store.commit_capture(capture.index, transaction);
   }
   store.refresh();
-  Transaction finish = store.finish_transaction(0);
+  Transaction finish = store.finish_transaction();
   CollectedFiles last(finish, 0, "writer");
   writer.finish([&store](const RecordVisitor& visit) { store.read_records(0, visit); }, last);
-  store.commit_finish(finish, 0);
+  store.commit_finish(finish);
 }
 
 /// The most memory, in KiB, of a process that writes so many captures.
