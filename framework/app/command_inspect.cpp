@@ -31,7 +31,7 @@ int command_inspect(const GlobalOptions& global, const InspectOptions& options, 
   const NodeId root = host->load_asset(options.asset, scene, scene.root());
   is_loading = false;
 
-  SceneReport report = report_scene(scene, root, options.asset);
+  SceneReport report = report_scene(scene, root, clean_name(options.asset));
   report.notes = std::move(notes);
   report.warnings = std::move(warnings);
   std::cout << (options.as_json ? report_json(report)
