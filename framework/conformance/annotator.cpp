@@ -18,7 +18,8 @@ Frame reduced(const Frame& frame, const NameSet& names) {
   less.camera = frame.camera;
   less.world_from_camera = frame.world_from_camera;
   less.leaf_paths = frame.leaf_paths;
-  less.exposure = frame.exposure;
+  // Whoever makes the picture says how it was exposed.
+  if (names.contains(kColor.name)) less.exposure = frame.exposure;
   less.seed = frame.seed;
   for (const std::string& name : frame.channels()) {
     if (!names.contains(name)) continue;
