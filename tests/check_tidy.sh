@@ -3,7 +3,8 @@
 # Runs clang-tidy (the checks of .clang-tidy, all of them errors) over the sources, the most recently changed
 # ones first, until the time is over, and says how far it came.
 #   tests/check_tidy.sh [--minutes N] [--all-checks]
-# Reads how build/release compiles, and what was generated there. --all-checks adds the static analyzer, which takes three times as long.
+# Reads how build/release compiles, and what was generated there. --all-checks adds the static analyzer, which
+# takes three times as long.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 minutes=1000

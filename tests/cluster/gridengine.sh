@@ -93,6 +93,13 @@ gridengine_test_one_shard_alone() {
   same_as_reference "$data"
 }
 
+gridengine_test_auto() {
+  delay 20
+  enqueue 1-4 auto
+  complete 120 0
+  same_as_reference "$data"
+}
+
 gridengine_test_sixteen_together() {
   local round
   for round in 1 2 3; do

@@ -115,6 +115,16 @@ slurm_test_one_shard_alone() {
   same_as_reference "$data"
 }
 
+# Workers that take visits, one of them put back in mid-run.
+slurm_test_auto() {
+  delay 20
+  submit 1-4 auto
+  wait_until 60 has_pictures "$data" 12 || fault 'no pictures'
+  scontrol requeue "${id}_2"
+  finish 180 COMPLETED
+  same_as_reference "$data"
+}
+
 slurm_test_sixteen_together() {
   local round
   for round in 1 2 3; do
@@ -157,8 +167,9 @@ slurm_test_killed_daemon() {
 }
 runs_on() { squeue --noheader --jobs="$id" --nodelist="$1" --states=RUNNING | grep -q .; }
 
+# The owner's host cannot be asked whether it lives: its lease must run out.
 slurm_test_lost_node() {
-  delay 50
+  delay 50 --lease-timeout 20
   submit 1-4 4
   wait_until 60 has_pictures "$data" 8 || fault 'no pictures'
   lose_node n1
