@@ -32,11 +32,14 @@ EmittingTriangles square(double half, const Affine& world_from_node) {
 }
 
 std::shared_ptr<const DomeTexture> white_sky() {
-  auto texture = std::make_shared<Texture>();
-  texture->width = 64;
-  texture->height = 32;
-  texture->channels = 1;
-  texture->floats.assign(64 * 32, 1.0f);
+  static const Texture texture = [] {
+    Texture white;
+    white.width = 64;
+    white.height = 32;
+    white.channels = 1;
+    white.floats.assign(64 * 32, 1.0f);
+    return white;
+  }();
   return std::make_shared<const DomeTexture>(texture);
 }
 
@@ -296,8 +299,8 @@ TEST_CASE("a lamp taken as a turning disk gives a near point less light", "[ligh
     REQUIRE(s.density > 0.0f);
     sum += double(s.radiance.x() * s.direction.z() / s.density) / kSamples;
     float met = 0.0f;
-    lights.along_ray(Vec3f::Zero(), s.direction, std::numeric_limits<float>::infinity(), false,
-                     [&](std::uint32_t, const Vec3f&, float density) { met = density; });
+    lights.along_ray(Vec3f::Zero(), s.direction, std::numeric_limits<float>::infinity(),
+                     false, [&](std::uint32_t, const Vec3f&, float density) { met = density; });
     if (i % 100 == 0) CHECK(met == Approx(s.density).epsilon(2e-3));
   }
   CHECK(sum == Approx(kPi * 3.0 * 0.25 / (0.25 + 1.69)).epsilon(0.005));
@@ -416,7 +419,7 @@ TEST_CASE("a dome's image lies as the scene format says", "[lights]") {
       texture->floats.push_back(x == 3 || x == 4 ? 1.0f : 0.0f);
     }
   }
-  const DomeTexture dome(texture);
+  const DomeTexture dome(*texture);
   const auto seen = [&](const Vec3f& direction) { return dome.place(direction).radiance; };
   CHECK(seen(Vec3f(0.01f, 0, 1).normalized()).x() > 0.9f);
   CHECK(seen(Vec3f(0.01f, 0, -1).normalized()).x() < 0.1f);
