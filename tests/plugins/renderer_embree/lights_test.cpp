@@ -111,7 +111,7 @@ TEST_CASE("a ray towards a light sample meets that light with the same density",
       const Sampled s = sample(lights, from, {float(rng.uniform()), float(rng.uniform())});
       REQUIRE(s.density > 0.0f);
       int met = 0;
-      lights.along_ray(from, s.direction, std::numeric_limits<float>::infinity(), false,
+      lights.along_ray(from, s.direction, 0.0f, std::numeric_limits<float>::infinity(), false,
                        [&](std::uint32_t, const Vec3f& radiance, float density) {
                          ++met;
                          CHECK(density == Approx(s.density).epsilon(2e-3));
@@ -169,7 +169,7 @@ TEST_CASE("a batch of places gets what each would get alone, and its rays meet t
     CHECK(alone.distance[0] == samples.distance[i]);
     CHECK(alone.direction.at(0) == samples.direction.at(i));
     int bodies = 0;
-    lights.along_ray(wishes.position.at(i), samples.direction.at(i), 1e6f, false,
+    lights.along_ray(wishes.position.at(i), samples.direction.at(i), 0.0f, 1e6f, false,
                      [&](std::uint32_t, const Vec3f&, float) { ++bodies; });
     if (bodies > 0) CHECK(may_meet[i] != 0);
   }
@@ -186,7 +186,7 @@ TEST_CASE("the density of every light integrates to one", "[lights]") {
     constexpr int kSamples = 400000;
     for (int i = 0; i < kSamples; ++i) {
       const Vec3f d = uniform_sphere({float(rng.uniform()), float(rng.uniform())});
-      lights.along_ray(from, d, std::numeric_limits<float>::infinity(), false,
+      lights.along_ray(from, d, 0.0f, std::numeric_limits<float>::infinity(), false,
                        [&](std::uint32_t, const Vec3f&, float density) {
                          sum += double(density) * 4.0 * kPi / kSamples;
                        });
@@ -299,7 +299,7 @@ TEST_CASE("a lamp taken as a turning disk gives a near point less light", "[ligh
     REQUIRE(s.density > 0.0f);
     sum += double(s.radiance.x() * s.direction.z() / s.density) / kSamples;
     float met = 0.0f;
-    lights.along_ray(Vec3f::Zero(), s.direction, std::numeric_limits<float>::infinity(),
+    lights.along_ray(Vec3f::Zero(), s.direction, 0.0f, std::numeric_limits<float>::infinity(),
                      false, [&](std::uint32_t, const Vec3f&, float density) { met = density; });
     if (i % 100 == 0) CHECK(met == Approx(s.density).epsilon(2e-3));
   }
