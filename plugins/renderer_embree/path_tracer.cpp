@@ -86,6 +86,7 @@ inline RayCounts PathTracer::trace_all(const TraceJob& job, PixelSum* sums,
           trace_batch<kTogether>(batch);
           for (std::size_t i = 0; i < paths.size(); ++i) pixels[i]->add(paths[i].result);
           paths.clear();
+          if (settings_.host) settings_.host->stop_if_asked();
         }
       }
     }
