@@ -66,9 +66,10 @@ OutputStore::Existing existing_policy(const RunCommandOptions& options) {
   return joins ? OutputStore::Existing::Resume : OutputStore::Existing::Refuse;
 }
 
-RunSummary run_job(JobAssembly& assembly, Host& host, const RunCommandOptions& options,
+RunSummary run_job(JobAssembly& assembly, HostServices& host, const RunCommandOptions& options,
                    ConsoleLog& log) {
   const StopOnSignal stop;
+  host.stop_on(stop_requested);
   LocalFileSystem file_system;
   OutputStore::Options store_options;
   store_options.existing = existing_policy(options);
