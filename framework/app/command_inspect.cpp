@@ -33,7 +33,7 @@ int command_inspect(const GlobalOptions& global, const InspectOptions& options, 
 
   SceneReport report = report_scene(scene, root, clean_name(options.asset));
   report.notes = std::move(notes);
-  report.warnings = std::move(warnings);
+  report.warnings.insert(report.warnings.begin(), warnings.begin(), warnings.end());
   std::cout << (options.as_json ? report_json(report)
                                 : printable(report_text(report, options.depth)));
   return 0;

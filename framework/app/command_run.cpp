@@ -16,7 +16,9 @@
 #include "framework/config/yaml_config.h"
 #include "framework/host/progress_bar.h"
 #include "framework/host/progress_lines.h"
+#include "framework/pipeline/capture_memory.h"
 #include "framework/pipeline/dataset_description.h"
+#include "framework/pipeline/scene_setup.h"
 #include "framework/plugins/plugin_search.h"
 
 namespace diorama {
@@ -66,9 +68,10 @@ OutputStore::Existing existing_policy(const RunCommandOptions& options) {
   return joins ? OutputStore::Existing::Resume : OutputStore::Existing::Refuse;
 }
 
-RunSummary run_job(JobAssembly& assembly, Host& host, const RunCommandOptions& options,
+RunSummary run_job(JobAssembly& assembly, HostServices& host, const RunCommandOptions& options,
                    ConsoleLog& log) {
   const StopOnSignal stop;
+  host.stop_on(stop_requested);
   LocalFileSystem file_system;
   OutputStore::Options store_options;
   store_options.existing = existing_policy(options);
@@ -107,6 +110,18 @@ RunSummary run_job(JobAssembly& assembly, Host& host, const RunCommandOptions& o
   return pipeline.run(assembly.dataset, assembly.dataset_json);
 }
 
+CaptureMemory memory_of(const JobAssembly& assembly) {
+  const JobComponents& parts = assembly.components;
+  std::vector<Camera> cameras;
+  for (const CameraGroup& group : assembly.job.cameras) {
+    cameras.insert(cameras.end(), std::size_t(group.count), camera_of(group));
+  }
+  NameSet channels = parts.demand.channels;
+  for (const auto& named : parts.annotators) channels.merge(named.annotator->provides());
+  if (parts.demand.motion) channels.emplace(kMotion.name);
+  return capture_memory(cameras, channels, *parts.renderer);
+}
+
 void log_lines(const std::string& text, ConsoleLog& log) {
   std::size_t start = 0;
   while (start < text.size()) {
@@ -136,7 +151,8 @@ int run_value(const GlobalOptions& global, const Value& job, const RunCommandOpt
   JobAssembly assembly = assemble_job(job, *registry, *host, assets_root, program_version(),
                                       options.dry_run ? AssembleFor::Plan : AssembleFor::Run);
   if (options.dry_run) {
-    std::cout << printable(plan_text(assembly.plan, assembly.job, assets_root));
+    std::cout << printable(plan_text(assembly.plan, assembly.job, assets_root))
+              << memory_text(memory_of(assembly));
     return 0;
   }
   check_folders_are_free(output_folders(assembly.job));

@@ -258,7 +258,12 @@ std::vector<std::byte> HostServices::encode_image(const ImageView& image,
 }
 
 void HostServices::parallel_for(std::size_t count, const std::function<void(std::size_t)>& body) {
-  pool_.parallel_for(count, body);
+  // Not for writers, which have threads of their own: what was captured is written.
+  if (!stop_ || std::this_thread::get_id() != main_thread_) return pool_.parallel_for(count, body);
+  pool_.parallel_for(count, [&](std::size_t i) {
+    stop_if_asked();
+    body(i);
+  });
 }
 
 int HostServices::thread_count() const { return pool_.thread_count(); }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -10,6 +11,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "diorama/host.h"
@@ -60,6 +62,10 @@ class HostServices final : public Host {
   std::vector<std::byte> encode_image(const ImageView& image, ImageFormat format) const override;
   void parallel_for(std::size_t count, const std::function<void(std::size_t)>& body) override;
   int thread_count() const override;
+  bool stop_requested() const override { return stop_ && *stop_; }
+
+  /// From now on the job is to end when this becomes true.
+  void stop_on(const std::atomic<bool>& stop) { stop_ = &stop; }
 
  private:
   /// An asset with the loader that takes it.
@@ -85,6 +91,8 @@ class HostServices final : public Host {
   AssetPaths paths_;
   Log log_;
   ThreadPool pool_;
+  std::thread::id main_thread_ = std::this_thread::get_id();
+  const std::atomic<bool>* stop_ = nullptr;
   AssetCache cache_;
   std::uint64_t picture_bytes_;
   std::map<std::string, std::unique_ptr<Loader>> loaders_;

@@ -11,6 +11,8 @@
 #include <set>
 #include <tuple>
 
+#include "framework/pipeline/lamps.h"
+
 namespace diorama {
 namespace {
 
@@ -84,7 +86,8 @@ void add_node(const Scene& scene, NodeId id, SceneReport& report, Shared& shared
     for (const Texture* texture : textures_of(*material)) shared.textures.insert(texture);
   }
   if (node.light) {
-    report.lights.push_back({scene.path(id), light_kind_name(node.light->kind), node.light->color});
+    report.lights.push_back({scene.path(id), light_kind_name(node.light->kind), node.light->color,
+                             lamp_lux(scene, id)});
   }
   report.cameras += node.camera ? 1 : 0;
   report.rigid_bodies += node.rigid_body ? 1 : 0;
@@ -95,6 +98,28 @@ void add_tree(const Scene& scene, NodeId id, int depth, SceneReport& report) {
   const Node& node = scene[id];
   report.tree.push_back({scene.path(id), describe_node(node), depth, node.is_visible});
   for (const NodeId child : node.children) add_tree(scene, child, depth + 1, report);
+}
+
+/// Lamps beside which no sky would be seen.
+void warn_of_lamps(const Scene& scene, NodeId root, SceneReport& report) {
+  constexpr double kTimesSky = 10.0;
+  std::size_t count = 0;
+  NodeId brightest;
+  double most = kTimesSky * kSkyLux;
+  for (const NodeId id : scene.subtree(root)) {
+    const double lux = lamp_lux(scene, id);
+    count += lux > kTimesSky * kSkyLux ? 1 : 0;
+    if (lux <= most) continue;
+    most = lux;
+    brightest = id;
+  }
+  if (count == 0) return;
+  report.warnings.push_back(fmt::format(
+      "{}{} lights a surface {:g} m away with {:.3g} lux, {:.3g} times as much as an open sky of "
+      "1000 nits: no sky will be seen beside it; environment.max_lamp_lux dims such lamps in a job",
+      scene.path(brightest),
+      count > 1 ? fmt::format(" (the brightest of {} such lamps)", count) : "", kLampDistance, most,
+      most / kSkyLux));
 }
 
 nlohmann::json json_vector(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
@@ -126,6 +151,7 @@ SceneReport report_scene(const Scene& scene, NodeId root, const std::string& fil
   Shared shared;
   for (const NodeId id : scene.subtree(root)) add_node(scene, id, report, shared);
   add_tree(scene, root, 0, report);
+  warn_of_lamps(scene, root, report);
 
   report.unique_meshes = shared.meshes.size();
   report.textures = shared.textures.size();
@@ -187,8 +213,10 @@ std::string report_text(const SceneReport& report, int tree_depth) {
   }
   if (!report.lights.empty()) text += "lights\n";
   for (const SceneReport::LightLine& line : report.lights) {
-    text += fmt::format("  {}  {}  ({:.4g}, {:.4g}, {:.4g})\n", line.path, line.kind,
-                        line.color.x(), line.color.y(), line.color.z());
+    text += fmt::format("  {}  {}  ({:.4g}, {:.4g}, {:.4g})", line.path, line.kind, line.color.x(),
+                        line.color.y(), line.color.z());
+    if (line.lux > 0.0) text += fmt::format("  {:.4g} lux at {:g} m", line.lux, kLampDistance);
+    text += '\n';
   }
   if (!report.warnings.empty()) text += fmt::format("warnings ({})\n", report.warnings.size());
   for (const std::string& warning : report.warnings) text += "  " + warning + "\n";
@@ -229,7 +257,8 @@ std::string report_json(const SceneReport& report) {
   for (const SceneReport::LightLine& line : report.lights) {
     json["lights"].push_back({{"path", line.path},
                               {"kind", line.kind},
-                              {"color", json_vector(line.color.cast<double>())}});
+                              {"color", json_vector(line.color.cast<double>())},
+                              {"lux_at_2_m", line.lux}});
   }
   json["notes"] = report.notes;
   json["warnings"] = report.warnings;

@@ -26,6 +26,7 @@ struct SceneReport {
     std::string path;
     std::string kind;
     Vec3f color = Vec3f::Zero();
+    double lux = 0.0;  ///< See lamp_lux().
   };
 
   std::string file;

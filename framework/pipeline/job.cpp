@@ -483,6 +483,10 @@ void EnvironmentRules::visit(ParamVisitor& v) {
   v.param("working_area", working_area,
           {"The first node whose path holds this text is the centre of the working area; null: the "
            "origin."});
+  v.param("max_lamp_lux", max_lamp_lux,
+          {"Lamps of the environment that light a surface 2 m away with more are dimmed to this; "
+           "null: they stay as they are.",
+           "lux", 1e-3, 1e12});
 }
 
 void ObjectGroup::visit(ParamVisitor& v) {

@@ -34,6 +34,7 @@ struct EnvironmentRules {
   std::string colliders = "triangle_mesh";
   std::vector<std::string> box_colliders;
   std::optional<std::string> working_area;
+  std::optional<double> max_lamp_lux;  ///< At kLampDistance.
   void visit(ParamVisitor& v);
 };
 

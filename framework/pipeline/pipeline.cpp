@@ -111,9 +111,11 @@ RunSummary Pipeline::run(const DatasetInfo& dataset, const std::string& dataset_
   try {
     run_visits();
   } catch (const Interrupted&) {
-    queue_->drain();
-    store_.close();
+    end_early();
     throw;
+  } catch (const Stopped&) {
+    end_early();
+    throw Interrupted();
   }
   {
     const Clock clock(summary_, "waiting for writers");
@@ -144,6 +146,12 @@ void Pipeline::run_visits() {
   while (const auto visit = store_.claim_visit(plan_.visit_count(), needs_work)) {
     run_visit(plan_.visit(*visit));
   }
+}
+
+/// Keeps what is whole.
+void Pipeline::end_early() {
+  queue_->drain();
+  store_.close();
 }
 
 bool Pipeline::is_needed(const PlannedVisit& planned) const {

@@ -120,6 +120,7 @@ class Pipeline {
   VisitReport report_on(const Visit& visit) const;
   /// Calls `visit` with every planned visit of this shard.
   void for_each_visit(const std::function<void(const PlannedVisit&)>& visit) const;
+  void end_early();
   bool is_needed(const PlannedVisit& planned) const;
   void run_visits();
   void begin_output();

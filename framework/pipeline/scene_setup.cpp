@@ -2,11 +2,13 @@
 #include "framework/pipeline/scene_setup.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <string_view>
 
 #include "diorama/error.h"
 #include "framework/config/clean_text.h"
 #include "framework/host/node_content.h"
+#include "framework/pipeline/lamps.h"
 #include "framework/plugins/plugin_call.h"
 
 namespace diorama {
@@ -163,6 +165,16 @@ Light light_of(const LightGroup& group, Host& host) {
   return light;
 }
 
+void dim_environment(double most_lux, NodeId environment, Scene& scene, Host& host) {
+  const DimmedLamps dimmed = dim_lamps(scene, environment, most_lux);
+  if (dimmed.count == 0) return;
+  char text[160];
+  std::snprintf(text, sizeof text,
+                ": %zu lamps dimmed to %.4g lux 2 m away, the brightest from %.4g lux",
+                dimmed.count, most_lux, dimmed.brightest_lux);
+  host.log(LogLevel::Info, scene.path(environment) + text);
+}
+
 Quat rotation_xyz(const Vec3& degrees) {
   return Quat(Eigen::AngleAxisd(radians(degrees.z()), Vec3::UnitZ()) *
               Eigen::AngleAxisd(radians(degrees.y()), Vec3::UnitY()) *
@@ -209,6 +221,7 @@ Vec3 apply_environment_rules(const EnvironmentRules& rules, bool debug, NodeId e
       if (scene[node].mesh) set_collider(scene, node, ColliderShape::BoundingBox);
     }
   }
+  if (rules.max_lamp_lux) dim_environment(*rules.max_lamp_lux, environment, scene, host);
   if (!rules.working_area) return Vec3::Zero();
   const NodeId match = paths.first_with(*rules.working_area);
   if (match) return scene.world_from_node(match).translation();

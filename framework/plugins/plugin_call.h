@@ -6,19 +6,21 @@
 #include <string>
 #include <utility>
 
-#include "diorama/error.h"
+#include "diorama/host.h"
 #include "framework/plugins/fatal_end.h"
 
 namespace diorama {
 
 /// Calls into a component and puts `who` ("renderer 'embree'") in front of what it throws. An Error
-/// keeps its kind; memory shortage passes unchanged; any other exception becomes Error(Plugin).
-/// Should the process crash or exit in there, its last line names `who`.
+/// keeps its kind; memory shortage and Stopped pass unchanged; any other exception becomes
+/// Error(Plugin). Should the process crash or exit in there, its last line names `who`.
 template <class Call>
 decltype(auto) call_component(const std::string& who, Call&& call) {
   const AtWork at_work(who);
   try {
     return std::forward<Call>(call)();
+  } catch (const Stopped&) {
+    throw;
   } catch (const Error& error) {
     throw Error(error.kind(), who + ": " + error.what());
   } catch (const std::bad_alloc&) {

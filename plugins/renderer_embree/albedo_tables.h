@@ -31,6 +31,11 @@ class AlbedoTables {
   };
   /// Made when it is first asked for; stays where it is.
   const Row& row(float alpha) { return rows_.try_emplace(alpha, alpha).first->second; }
+  /// Forgets all rows if there are more.
+  void forget_beyond(std::size_t most_rows) {
+    if (rows_.size() > most_rows) rows_.clear();
+  }
+  std::size_t row_count() const { return rows_.size(); }
 
  private:
   std::map<float, Row> rows_;

@@ -134,11 +134,12 @@ OwnMeshes meshes_of(const LabelledInstance& instance, const RenderScene& meshes)
 
 /// By a ray through every pixel of the box: for bent lenses and holes.
 CoverageMask traced(const RenderScene& meshes, const View& view, const OwnMeshes& own,
-                    const PixelBox& box, bool with_distances) {
+                    const PixelBox& box, bool with_distances, const Host& host) {
   CoverageMask mask;
   mask.box = box;
   const RenderScene::Part part(meshes, own.numbers);
   for (int y = box.y_min; y < box.y_max; ++y) {
+    host.stop_if_asked();
     for (int x = box.x_min; x < box.x_max; ++x) {
       const auto ray = view.ray(Vec2(x + 0.5, y + 0.5));
       const float distance =
@@ -161,23 +162,6 @@ CoverageMask drawn(const RenderScene& meshes, const View& view, const OwnMeshes&
   return silhouette.take();
 }
 
-/// What the view's rays meet: its mesh by number, apart from the rest, which is many times as
-/// large.
-struct SeenMeshes {
-  static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
-
-  SeenMeshes(const Image<RayHit>& seen, Host& host)
-      : hits(seen), numbers(seen.width(), seen.height(), kNone) {
-    host.parallel_for(std::size_t(seen.height()), [&](std::size_t y) {
-      std::ranges::transform(seen.row(int(y)), numbers.row(int(y)).begin(),
-                             [](const RayHit& hit) { return hit ? hit.geometry : kNone; });
-    });
-  }
-
-  const Image<RayHit>& hits;
-  Image<std::uint32_t> numbers;
-};
-
 /// A ray along an edge may meet what arithmetic finds a hair beside it. What is seen is covered, at
 /// the distance seen, and nothing is nearer.
 void agree_with(const SeenMeshes& seen, const OwnMeshes& own, CoverageMask& mask) {
@@ -192,24 +176,25 @@ void agree_with(const SeenMeshes& seen, const OwnMeshes& own, CoverageMask& mask
       for (std::size_t i = 0; i < width; ++i) bits[i] |= std::uint8_t(numbers[i] == number);
     }
     if (mask.distances.empty()) continue;
-    const auto hits = seen.hits.row(y).subspan(std::size_t(box.x_min), width);
+    const auto distances = seen.distances.row(y).subspan(std::size_t(box.x_min), width);
     for (std::size_t i = 0; i < width; ++i) {
-      if (!hits[i] || bits[i] == 0) continue;
+      if (numbers[i] == SeenMeshes::kNone || bits[i] == 0) continue;
       float& distance = mask.distances[first + i];
       const bool is_own = own.is_own[numbers[i]];
-      distance = is_own ? hits[i].distance : std::max(distance, hits[i].distance);
+      distance = is_own ? distances[i] : std::max(distance, distances[i]);
     }
   }
 }
 
 CoverageMask coverage_of(const RenderScene& meshes, const View& view,
                          const std::optional<RayBlocks>& blocks, const SeenMeshes& seen,
-                         const LabelledInstance& instance, bool with_distances, Isa isa) {
+                         const LabelledInstance& instance, bool with_distances, Isa isa,
+                         const Host& host) {
   const OwnMeshes own = meshes_of(instance, meshes);
   const PixelBox box = possible_pixels(view, blocks, own.bounds);
   if (box.is_empty()) return {};
   const bool needs_rays = blocks || own.has_holes;
-  CoverageMask mask = needs_rays ? traced(meshes, view, own, box, with_distances)
+  CoverageMask mask = needs_rays ? traced(meshes, view, own, box, with_distances, host)
                                  : drawn(meshes, view, own, box, with_distances, isa);
   agree_with(seen, own, mask);
   return mask.cropped(mask.extent());
@@ -227,12 +212,14 @@ NameSet geometry_channels() {
 }
 
 void fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshes, const View& view,
-                   Image<RayHit>& seen, Host& host) {
+                   SeenMeshes& seen, Image<RayHit>* all_hits, Host& host) {
   const int width = view.camera().width;
   const int height = view.camera().height;
-  if (seen.width() != width || seen.height() != height) {
-    seen = Image<RayHit>(width, height, RayHit());
+  if (seen.numbers.width() != width || seen.numbers.height() != height) {
+    seen.numbers = Image<std::uint32_t>(width, height, SeenMeshes::kNone);
+    seen.distances = Image<float>(width, height, kInfinite);
   }
+  if (all_hits) *all_hits = Image<RayHit>(width, height, RayHit());
   ChannelImages channels(wanted, view);
   host.parallel_for(std::size_t(height), [&](std::size_t row) {
     const int y = int(row);
@@ -244,7 +231,7 @@ void fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshe
     for (int begin = 0; begin < width; begin += int(kBatch)) {
       rays.count = 0;
       for (int x = begin; x < std::min(width, begin + int(kBatch)); ++x) {
-        seen.at(x, y) = RayHit();
+        seen.numbers.at(x, y) = SeenMeshes::kNone;
         const auto ray = view.ray(Vec2(x + 0.5, y + 0.5));
         if (!ray) continue;
         columns[rays.count] = x;
@@ -253,8 +240,10 @@ void fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshe
       meshes.intersect_now(rays, hits);
       for (std::size_t i = 0; i < rays.count; ++i) {
         if (!hits.instance[i]) continue;
-        RayHit& hit = seen.at(columns[i], y);
-        hit = hits.at(i);
+        const RayHit hit = hits.at(i);
+        seen.numbers.at(columns[i], y) = hit.geometry;
+        seen.distances.at(columns[i], y) = hit.distance;
+        if (all_hits) all_hits->at(columns[i], y) = hit;
         if (wanted.empty()) continue;
         const CameraRay ray{rays.origin.at(i), rays.direction.at(i), rays.t_min[i], rays.t_max[i]};
         channels.put(columns[i], y, ray, hit);
@@ -265,15 +254,14 @@ void fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshe
 }
 
 std::vector<CoverageMask> coverage(const RenderScene& meshes, const View& view,
-                                   const Image<RayHit>& seen,
+                                   const SeenMeshes& seen,
                                    std::span<const LabelledInstance> instances, bool with_distances,
                                    Isa isa, Host& host) {
   std::vector<CoverageMask> masks(instances.size());
   std::optional<RayBlocks> blocks;
   if (view.camera().lens != LensModel::Pinhole) blocks.emplace(view.camera(), host);
-  const SeenMeshes seen_meshes(seen, host);
   host.parallel_for(instances.size(), [&](std::size_t i) {
-    masks[i] = coverage_of(meshes, view, blocks, seen_meshes, instances[i], with_distances, isa);
+    masks[i] = coverage_of(meshes, view, blocks, seen, instances[i], with_distances, isa, host);
   });
   return masks;
 }

@@ -12,18 +12,26 @@
 
 namespace diorama {
 
+/// What the rays through the pixels' centres met: as little of it as labels need.
+struct SeenMeshes {
+  static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
+
+  Image<std::uint32_t> numbers;  ///< Of the meshes; kNone: nothing.
+  Image<float> distances;
+};
+
 /// Names of the channels that fill_channels() knows.
 NameSet geometry_channels();
 
 /// Fills the wanted ones among the id and geometry channels, all from one ray per pixel centre, and
-/// `seen` with what these rays met; valid until the scene's next take(). Its memory is used again
-/// where it has the view's size.
+/// `seen` with what these rays met; its memory is used again where it has the view's size. `hits`
+/// gets all of it, if there: they are valid until the scene's next take().
 void fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshes, const View& view,
-                   Image<RayHit>& seen, Host& host);
+                   SeenMeshes& seen, Image<RayHit>* hits, Host& host);
 
 /// See Renderer::cover. `seen` is that of the same view.
 std::vector<CoverageMask> coverage(const RenderScene& meshes, const View& view,
-                                   const Image<RayHit>& seen,
+                                   const SeenMeshes& seen,
                                    std::span<const LabelledInstance> instances, bool with_distances,
                                    Isa isa, Host& host);
 

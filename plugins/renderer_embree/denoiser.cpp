@@ -5,8 +5,10 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
+#include "forget_pages.h"
 #include "pixel_layers.h"
 #include "sampling.h"
 
@@ -29,6 +31,11 @@ constexpr float kMixedTolerance = 100.0f;
 constexpr float kLonely = 0.35f;
 constexpr float kWitnesses = 10.0f;  // averaged pixels near a lonely one that make it suspect
 constexpr float kLeeway = 2.0f;      // by which it may leave their range
+
+// Of the paths of one pixel: what so many may bring each, one of more may bring for all of them.
+constexpr float kLimitedPaths = 16.0f;
+// A path may be so many times as bright as the others around it, whatever the limit.
+constexpr float kTimesOthers = 4.0f;
 
 constexpr int kBlock = 16;             // pixels of a square whose light is summed up
 constexpr float kMostReturned = 1.5f;  // of the light that is left
@@ -84,21 +91,20 @@ inline Lanes surfaces(const Guides::Row& guides, int x) {
 
 class Denoiser {
  public:
-  Denoiser(const Film& film, const Vec3f& view_position, Isa isa, Host& host)
-      : film_(film),
-        view_position_(view_position),
+  Denoiser(Film film, const DenoiseSettings& settings, Isa isa, Host& host)
+      : film_(std::move(film)),
+        settings_(settings),
         isa_(isa),
         host_(host),
-        width_(film.width()),
-        height_(film.height()),
-        guides_(width_, height_, kMargin, {0, 0, 0, 0, 0, 0, kNoSurface}),
-        lights_(width_, height_, kMargin, {}),
-        next_(width_, height_, kMargin, {}),
-        support_(width_, height_, kMargin, {}),
+        width_(film_.width()),
+        height_(film_.height()),
+        guides_(width_, height_, kMargin),
+        lights_(width_, height_, kMargin),
         columns_((width_ + kBlock - 1) / kBlock),
         block_rows_((height_ + kBlock - 1) / kBlock),
         before_(std::size_t(columns_ * block_rows_)),
         after_(before_.size()),
+        albedo_(std::size_t(width_) * std::size_t(height_)),
         image_(width_, height_, Vec3f::Zero()) {}
 
   Image<Vec3f> run();
@@ -114,6 +120,7 @@ class Denoiser {
   void rows_avx2(Step step, int round, int begin, int end);
   void rows_avx512(Step step, int round, int begin, int end);
   void read(int y);
+  Vec3f believable(int x, int y, float& variance, float& removed) const;
   void tame(int y);
   void weigh(const Lights& light, int y_begin, std::vector<float>& sums) const;
   void measure(int y);
@@ -125,23 +132,25 @@ class Denoiser {
   void give_back(int y);
   void write(int y);
 
-  const Film& film_;
-  Vec3f view_position_;
+  Film film_;  ///< Until it is read.
+  DenoiseSettings settings_;
   Isa isa_;
   Host& host_;
   int width_;
   int height_;
   Guides guides_;
   Lights lights_;
-  Lights next_;
-  PixelLayers<1> support_;  ///< Share of the neighbours that agreed in the first round.
+  Lights next_;  ///< After the film.
+  /// After the film: share of the neighbours that agreed in the first round.
+  PixelLayers<1> support_;
   // Sums of luminance over blocks of pixels, as sampled and filtered.
   int columns_;
   int block_rows_;
   std::vector<float> before_;
   std::vector<float> after_;
   std::vector<float> lost_;  ///< By block.
-  Image<Vec3f> image_;
+  HugePages<Vec3f> albedo_;
+  Image<Vec3f> image_;  ///< What is seen without scattering, then all.
 };
 
 /// The rows in the order 0, reach, 2 reach, ..., 1, 1 + reach, ...: each then needs two of the rows
@@ -163,6 +172,8 @@ inline void Denoiser::rows(Step step, int round, int begin, int end) {
         read(y);
         break;
       case Step::Tame:
+        next_.fill_margins(y, {});
+        support_.fill_margins(y, {});
         tame(y);
         break;
       case Step::Measure:
@@ -179,6 +190,12 @@ inline void Denoiser::rows(Step step, int round, int begin, int end) {
         write(y);
         break;
     }
+  }
+  // But for what the blocks above and below look at.
+  if (step == Step::Read && end - begin > 2) {
+    const auto width = std::size_t(width_);
+    forget_pages(film_.pixels().subspan(std::size_t(begin + 1) * width,
+                                        std::size_t(end - begin - 2) * width));
   }
   if (step == Step::Tame) weigh(lights_, begin, before_);
   if (step == Step::Weigh) weigh(lights_, begin, after_);
@@ -213,6 +230,9 @@ void Denoiser::all_rows(Step step, int round) {
 
 Image<Vec3f> Denoiser::run() {
   all_rows(Step::Read);
+  film_ = Film();
+  next_ = Lights(width_, height_, kMargin);
+  support_ = PixelLayers<1>(width_, height_, kMargin);
   all_rows(Step::Tame);
   std::swap(lights_, next_);
   for (int round = 0; round < kRounds; ++round) {
@@ -226,18 +246,58 @@ Image<Vec3f> Denoiser::run() {
   return std::move(image_);
 }
 
+/// The pixel's light without what its brightest path brings beyond belief.
+Vec3f Denoiser::believable(int x, int y, float& variance, float& removed) const {
+  const FilmPixel& pixel = film_.at(x, y);
+  variance = pixel.variance;
+  removed = 0.0f;
+  const bool is_limited = settings_.brightest_path > 0.0f && pixel.count > 1.5f;
+  const float times = std::max(1.0f, pixel.count / kLimitedPaths);
+  if (!is_limited || pixel.brightest <= settings_.brightest_path * times) return pixel.scattered;
+  float others = 0.0f;
+  float count = 0.0f;
+  for (int v = std::max(0, y - 1); v < std::min(height_, y + 2); ++v) {
+    for (int u = std::max(0, x - 1); u < std::min(width_, x + 2); ++u) {
+      const FilmPixel& near = film_.at(u, v);
+      others += luminance(near.scattered) * near.count - near.brightest;
+      count += near.count - 1.0f;
+    }
+  }
+  const float most =
+      times * (settings_.brightest_path + kTimesOthers * std::max(0.0f, others) / count);
+  const float own = luminance(pixel.scattered);
+  removed = std::min(own, (pixel.brightest - most) / pixel.count);
+  if (removed <= 0.0f) {
+    removed = 0.0f;
+    return pixel.scattered;
+  }
+  // As if that path had been as bright as it may be.
+  const double n = double(pixel.count);
+  const double less = double(own) - double(removed);
+  const double squares = double(pixel.variance) * (n - 1.0) + double(own) * double(own) -
+                         (std::pow(double(pixel.brightest), 2) - std::pow(double(most), 2)) / n;
+  variance = float(std::max(0.0, squares - less * less) / (n - 1.0));
+  return pixel.scattered * float(less / double(own));
+}
+
 void Denoiser::read(int y) {
+  guides_.fill_margins(y, {0, 0, 0, 0, 0, 0, kNoSurface});
+  lights_.fill_margins(y, {});
   const auto guides = guides_.row(y);
   const auto light = lights_.row(y);
+  float* const removed_of_block = &before_[std::size_t(y / kBlock * columns_)];
+  if (y % kBlock == 0) std::fill_n(removed_of_block, columns_, 0.0f);
   for (int x = 0; x < width_; ++x) {
     const FilmPixel& pixel = film_.at(x, y);
     const bool is_surface = pixel.surface_share > 0.0f;
     const float length = pixel.normal.norm();
     Vec3f normal = length > 1e-6f ? Vec3f(pixel.normal / length) : Vec3f(Vec3f::UnitZ());
     if (!is_surface) normal.setZero();
-    const Vec3f position = pixel.position - view_position_;
+    const Vec3f position = pixel.position - settings_.view_position;
     const Vec3f color = pixel.albedo.cwiseMax(kMinAlbedo);
-    const Vec3f irradiance = pixel.scattered.cwiseQuotient(color);
+    float variance;
+    float removed;
+    const Vec3f irradiance = believable(x, y, variance, removed).cwiseQuotient(color);
     for (int k = 0; k < 3; ++k) {
       *guides.at(kNormal + k, x) = normal[k];
       *guides.at(kPosition + k, x) = position[k];
@@ -247,7 +307,10 @@ void Denoiser::read(int y) {
     *guides.at(kFirmness, x) =
         is_surface ? 1.0f / (1.0f + kMixedTolerance * std::max(0.0f, 1.0f - length)) : kNoSurface;
     const float own_color = luminance(color);
-    *light.at(kVariance, x) = pixel.variance / (own_color * own_color);
+    *light.at(kVariance, x) = variance / (own_color * own_color);
+    removed_of_block[x / kBlock] += removed / own_color;
+    albedo_.data()[std::size_t(y) * std::size_t(width_) + std::size_t(x)] = color;
+    image_.at(x, y) = pixel.seen;
   }
 }
 
@@ -289,6 +352,7 @@ inline void Denoiser::tame(int y) {
   }
 }
 
+/// Adds to what the blocks have.
 void Denoiser::weigh(const Lights& light, int y_begin, std::vector<float>& sums) const {
   const int y_end = std::min(height_, y_begin + kBlock);
   for (int column = 0; column < columns_; ++column) {
@@ -298,7 +362,7 @@ void Denoiser::weigh(const Lights& light, int y_begin, std::vector<float>& sums)
       const auto row = light.row(y);
       for (int x = column * kBlock; x < x_end; ++x) sum += *row.at(kLuminance, x);
     }
-    sums[std::size_t(y_begin / kBlock * columns_ + column)] = sum;
+    sums[std::size_t(y_begin / kBlock * columns_ + column)] += sum;
   }
 }
 
@@ -508,13 +572,10 @@ inline void Denoiser::give_back(int y) {
 }
 
 void Denoiser::write(int y) {
-  for (int x = 0; x < width_; ++x) {
-    const FilmPixel& pixel = film_.at(x, y);
-    Vec3f color = pixel.seen;
-    for (int k = 0; k < 3; ++k) {
-      color[k] += *next_.row(y).at(kIrradiance + k, x) * std::max(kMinAlbedo, pixel.albedo[k]);
-    }
-    image_.at(x, y) = color;
+  const Vec3f* albedo = albedo_.data() + std::size_t(y) * std::size_t(width_);
+  for (int x = 0; x < width_; ++x, ++albedo) {
+    Vec3f& color = image_.at(x, y);
+    for (int k = 0; k < 3; ++k) color[k] += *next_.row(y).at(kIrradiance + k, x) * (*albedo)[k];
   }
 }
 
@@ -528,8 +589,8 @@ Image<Vec3f> undenoised(const Film& film) {
   return image;
 }
 
-Image<Vec3f> denoised(const Film& film, const Vec3f& view_position, Isa isa, Host& host) {
-  return Denoiser(film, view_position, isa, host).run();
+Image<Vec3f> denoised(Film film, const DenoiseSettings& settings, Isa isa, Host& host) {
+  return Denoiser(std::move(film), settings, isa, host).run();
 }
 
 }  // namespace diorama

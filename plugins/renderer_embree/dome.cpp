@@ -110,8 +110,7 @@ std::vector<float> lightness(const MipTexture& image, int width, int height) {
 }  // namespace
 
 // Smaller versions serve lightness() alone.
-DomeTexture::DomeTexture(std::shared_ptr<const Texture> source)
-    : image_(std::move(source), kColumns * kMostPerPatch) {
+DomeTexture::DomeTexture(const Texture& source) : image_(source, kColumns * kMostPerPatch) {
   // A grid of cells over the image, whole cells per patch.
   const int per_patch_x = std::clamp(image_.width() / kColumns, 2, kMostPerPatch);
   const int per_patch_y = std::clamp(image_.height() / kRows, 2, kMostPerPatch);

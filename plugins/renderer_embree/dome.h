@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <vector>
 
 #include "diorama/light.h"
@@ -56,7 +55,8 @@ class DomeTexture {
   static constexpr int kRows = 8;
   static constexpr int kPatches = kColumns * kRows;
 
-  explicit DomeTexture(std::shared_ptr<const Texture> source);
+  /// The source must outlive all lookups; see MipTexture.
+  explicit DomeTexture(const Texture& source);
 
   /// Luminance times solid angle of a patch.
   float patch_power(int patch) const { return patch_power_[std::size_t(patch)]; }

@@ -98,6 +98,12 @@ void EmbreeRenderer::Params::visit(ParamVisitor& v) {
       "caustics", caustics,
       {"Follow light focused by glass and mirrors; noisy. Off: glass lets light pass straight."});
   v.param("clamp", clamp, {"Largest luminance of one indirect contribution; 0: none.", "", 0.0});
+  v.param(
+      "firefly_limit", firefly_limit,
+      {"Denoised pictures: how bright one path may be, over a few times the other paths around, "
+       "where 1 is white in a well exposed picture; what it brings beyond is spread over its "
+       "surroundings. Beyond 16 paths per pixel it grows with their number; 0: no limit.",
+       "", 0.0});
   v.choice("exposure", exposure, kExposures,
            {"auto: by the picture's middle tones; fixed: exposure_ev alone."});
   v.param("exposure_ev", exposure_ev,
@@ -149,6 +155,18 @@ RenderReport EmbreeRenderer::report() const {
   return report;
 }
 
+std::size_t EmbreeRenderer::working_bytes(const Camera& camera, const NameSet& channels) const {
+  std::size_t per_pixel = sizeof(std::uint32_t) + sizeof(float);  // SeenMeshes
+  if (channels.contains(kColor.name) || channels.contains(kColorHdr.name)) {
+    per_pixel += params_.denoise ? std::max(sizeof(FilmPixel), kDenoiserBytesPerPixel)
+                                 : sizeof(FilmPixel) + sizeof(Vec3f);
+    const bool has_rounds = params_.error_target > 0.0 || params_.time_budget_s > 0.0;
+    if (has_rounds) per_pixel += sizeof(PixelSum);
+    if (params_.mode == "real_time" && params_.samples == 1) per_pixel += sizeof(RayHit);
+  }
+  return per_pixel * std::size_t(camera.width) * std::size_t(camera.height);
+}
+
 void EmbreeRenderer::do_prepare(const Scene& scene) {
   counts_ = {};
   seen_by_ = {};
@@ -159,22 +177,32 @@ void EmbreeRenderer::do_prepare(const Scene& scene) {
 }
 
 /// What the view's camera sees at the pixels' centres.
-const Image<RayHit>& EmbreeRenderer::seen(const View& view, NodeId camera) {
+const SeenMeshes& EmbreeRenderer::seen(const View& view, NodeId camera) {
   if (seen_by_ != camera) {
     Frame frame;
-    fill_channels(frame, {}, meshes_, view, seen_, host_);
+    fill_channels(frame, {}, meshes_, view, seen_, nullptr, host_);
     seen_by_ = camera;
   }
   return seen_;
 }
 
+/// Whether every path starts where the ray through its pixel's centre does.
+bool EmbreeRenderer::starts_at_centres(const View& view) const {
+  const bool sees_one_moment = !view.has_shutter() && !view.has_aperture();
+  return params_.mode == "real_time" && params_.samples == 1 && sees_one_moment;
+}
+
 Film EmbreeRenderer::trace(const View& view, NodeId camera, std::uint64_t seed) {
   TraceSettings settings{params_.max_bounces, float(params_.clamp), params_.caustics};
-  const bool is_real_time = params_.mode == "real_time";
-  if (is_real_time) settings.indirect_share = kRealTimeIndirectShare;
-  const bool sees_one_moment = !view.has_shutter() && !view.has_aperture();
-  if (is_real_time && params_.samples == 1 && sees_one_moment) {
-    settings.first_hits = &seen(view, camera);
+  settings.host = &host_;
+  if (params_.mode == "real_time") settings.indirect_share = kRealTimeIndirectShare;
+  if (starts_at_centres(view)) {
+    if (first_hits_.pixels().empty()) {
+      Frame frame;
+      fill_channels(frame, {}, meshes_, view, seen_, &first_hits_, host_);
+      seen_by_ = camera;
+    }
+    settings.first_hits = &first_hits_;
   }
   const PathTracer tracer(meshes_, view, settings, isa_);
   const int width = view.camera().width;
@@ -237,11 +265,15 @@ Film EmbreeRenderer::trace_in_rounds(const PathTracer& tracer, SamplePlan& plan,
   return film;
 }
 
-Image<Vec3f> EmbreeRenderer::without_noise(const Film& film, const View& view) {
+Image<Vec3f> EmbreeRenderer::without_noise(Film film, const View& view) {
 #ifdef DIORAMA_HAS_OIDN
   if (params_.denoiser == "oidn") return oidn_denoised(film, host_);
 #endif
-  return denoised(film, view.position(), isa_, host_);
+  DenoiseSettings settings{view.position()};
+  if (params_.firefly_limit > 0.0) {
+    settings.brightest_path = float(params_.firefly_limit / automatic_exposure(film));
+  }
+  return denoised(std::move(film), settings, isa_, host_);
 }
 
 void EmbreeRenderer::put_colors(Frame& frame, const RenderRequest& request, const View& view) {
@@ -249,11 +281,13 @@ void EmbreeRenderer::put_colors(Frame& frame, const RenderRequest& request, cons
   {
     const Stopwatch watch(counts_.trace_s);
     film = trace(view, request.camera, request.seed);
+    first_hits_ = {};
   }
   Image<Vec3f> hdr;
   {
     const Stopwatch watch(counts_.denoise_s);
-    hdr = params_.denoise ? without_noise(film, view) : undenoised(film);
+    hdr = params_.denoise ? without_noise(std::move(film), view) : undenoised(film);
+    film = Film();
   }
   const double base = params_.exposure == "auto" ? automatic_exposure(hdr) : 1.0;
   frame.exposure = base * std::exp2(params_.exposure_ev);
@@ -270,15 +304,17 @@ Frame EmbreeRenderer::do_render(const Scene& scene, const RenderRequest& request
   const View view(scene, request.camera);
   Frame frame;
   counts_ = {};
+  first_hits_ = {};
+  const bool wants_color =
+      request.channels.contains(kColor.name) || request.channels.contains(kColorHdr.name);
   const NameSet known = geometry_channels();
   if (std::any_of(known.begin(), known.end(),
                   [&](const auto& name) { return request.channels.contains(name); })) {
     const Stopwatch watch(counts_.channels_s);
-    fill_channels(frame, request.channels, meshes_, view, seen_, host_);
+    Image<RayHit>* hits = wants_color && starts_at_centres(view) ? &first_hits_ : nullptr;
+    fill_channels(frame, request.channels, meshes_, view, seen_, hits, host_);
     seen_by_ = request.camera;
   }
-  const bool wants_color =
-      request.channels.contains(kColor.name) || request.channels.contains(kColorHdr.name);
   if (wants_color) put_colors(frame, request, view);
   return frame;
 }

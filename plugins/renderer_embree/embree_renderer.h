@@ -29,6 +29,7 @@ class EmbreeRenderer final : public Renderer {
     std::string denoiser = "own";  ///< A parameter only where the build found another one.
     bool caustics = false;
     double clamp = 0.0;
+    double firefly_limit = 4.0;
     std::string exposure = "auto";
     double exposure_ev = 0.0;
     std::string view_transform = "filmic";
@@ -61,11 +62,13 @@ class EmbreeRenderer final : public Renderer {
   std::vector<CoverageMask> do_cover(const Scene& scene, NodeId camera,
                                      std::span<const LabelledInstance> instances,
                                      bool with_distances) override;
-  const Image<RayHit>& seen(const View& view, NodeId camera);
+  std::size_t working_bytes(const Camera& camera, const NameSet& channels) const override;
+  const SeenMeshes& seen(const View& view, NodeId camera);
+  bool starts_at_centres(const View& view) const;
   Film trace(const View& view, NodeId camera, std::uint64_t seed);
   Film trace_at_once(const PathTracer& tracer, SamplePlan& plan, int width, int height);
   Film trace_in_rounds(const PathTracer& tracer, SamplePlan& plan, int width, int height);
-  Image<Vec3f> without_noise(const Film& film, const View& view);
+  Image<Vec3f> without_noise(Film film, const View& view);
   void put_colors(Frame& frame, const RenderRequest& request, const View& view);
 
   Params params_;
@@ -74,7 +77,8 @@ class EmbreeRenderer final : public Renderer {
   RenderScene meshes_;
   Counts counts_;
   NodeId seen_by_;  ///< The camera of `seen_`, if there is any.
-  Image<RayHit> seen_;
+  SeenMeshes seen_;
+  Image<RayHit> first_hits_;  ///< Of the picture under way, if its paths start there.
 };
 
 }  // namespace diorama

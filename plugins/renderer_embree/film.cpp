@@ -10,6 +10,8 @@ FilmPixel PixelSum::mean() const {
     // Its own mean; it says nothing of its spread: take the value itself.
     pixel = sum_;
     pixel.variance = float(luminance_ * luminance_);
+    pixel.brightest = float(brightest_);
+    pixel.count = 1.0f;
     pixel.surface_share = float(surfaces_);
     return pixel;
   }
@@ -27,6 +29,8 @@ FilmPixel PixelSum::mean() const {
   const double mean = luminance_ / count_;
   const double spread = std::max(0.0, luminance2_ / count_ - mean * mean);
   pixel.variance = float(spread / (count_ - 1));
+  pixel.brightest = float(brightest_);
+  pixel.count = float(count_);
   return pixel;
 }
 

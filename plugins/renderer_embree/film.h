@@ -29,6 +29,8 @@ struct FilmPixel {
   Vec3f normal = Vec3f::Zero();  ///< Not unit length where samples differ.
   Vec3f position = Vec3f::Zero();
   float variance = 0.0f;       ///< Of the mean of scattered's luminance.
+  float brightest = 0.0f;      ///< Luminance of the brightest sample's scattered ...
+  float count = 0.0f;          ///< ... among so many.
   float surface_share = 0.0f;  ///< Of the samples that met a scattering surface.
 };
 
@@ -69,6 +71,7 @@ class PixelSum {
     const double l = double(luminance(sample.scattered));
     luminance_ += l;
     luminance2_ += l * l;
+    brightest_ = std::max(brightest_, l);
     if (!sample.has_surface) return;
     ++surfaces_;
     sum_.albedo += sample.albedo;
@@ -82,6 +85,7 @@ class PixelSum {
   FilmPixel sum_;
   double luminance_ = 0.0;
   double luminance2_ = 0.0;
+  double brightest_ = 0.0;
   int count_ = 0;
   int surfaces_ = 0;
 };

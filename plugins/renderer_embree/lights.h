@@ -167,12 +167,13 @@ class Lights {
   /// place; other rays need not ask along_ray() but for dome and distant lights.
   void find_near(std::size_t count, const BatchVectors& origin, const BatchVectors& direction,
                  BatchInts& may_meet) const;
-  /// What a ray meets of lights without a mesh, up to t_max, and of dome and distant lights when
-  /// t_max is infinite. Calls found(light, radiance, density) for each; the density is that of
-  /// sample() from `from`, the start of the ray.
+  /// What a ray meets of lights without a mesh, from t_min to t_max, and of dome and distant lights
+  /// when t_max is infinite. Calls found(light, radiance, density) for each; the density is that of
+  /// sample() from `from`, the start of the ray: for one that went straight through panes, the
+  /// place that took the light sample, with t_min at the last pane.
   template <class Found>
-  void along_ray(const Vec3f& from, const Vec3f& direction, float t_max, bool is_camera_ray,
-                 Found&& found) const;
+  void along_ray(const Vec3f& from, const Vec3f& direction, float t_min, float t_max,
+                 bool is_camera_ray, Found&& found) const;
 
  private:
   /// The entry that each place of a batch has come to among those offered so far.
@@ -197,14 +198,14 @@ class Lights {
   static void score_surroundings(const Record& light, const Wishes& wishes, BatchFloats& scores);
   static float cone_factor(const Record& light, const Vec3f& from_light);
   /// Returns the density; zero: not met.
-  static float meet(const Record& light, const Vec3f& from, const Vec3f& direction, float t_max,
-                    Vec3f& radiance);
+  static float meet(const Record& light, const Vec3f& from, const Vec3f& direction, float t_min,
+                    float t_max, Vec3f& radiance);
   static float meet_sphere(const Record& light, const Vec3f& from, const Vec3f& direction,
-                           float t_max, Vec3f& radiance);
+                           float t_min, float t_max, Vec3f& radiance);
   static float meet_turning_disk(const Record& light, const Vec3f& from, const Vec3f& direction,
-                                 float t_max, Vec3f& radiance);
+                                 float t_min, float t_max, Vec3f& radiance);
   static float meet_flat(const Record& light, const Vec3f& from, const Vec3f& direction,
-                         float t_max, Vec3f& radiance);
+                         float t_min, float t_max, Vec3f& radiance);
   struct Draw {
     Vec3f direction;
     float distance = 0.0f;
@@ -265,13 +266,13 @@ inline void Lights::find_near(std::size_t count, const BatchVectors& origin,
 }
 
 template <class Found>
-void Lights::along_ray(const Vec3f& from, const Vec3f& direction, float t_max, bool is_camera_ray,
-                       Found&& found) const {
+void Lights::along_ray(const Vec3f& from, const Vec3f& direction, float t_min, float t_max,
+                       bool is_camera_ray, Found&& found) const {
   const auto report = [&](std::uint32_t index) {
     const Record& light = lights_[index];
     if (is_camera_ray && !light.is_visible_to_camera) return;
     Vec3f radiance = Vec3f::Zero();
-    const float density = meet(light, from, direction, t_max, radiance);
+    const float density = meet(light, from, direction, t_min, t_max, radiance);
     if (density > 0.0f) found(index, radiance, density);
   };
   for (const std::uint32_t index : shapes_) {
@@ -627,15 +628,16 @@ inline float Lights::density_of_surface(std::uint32_t light, float distance,
 }
 
 [[gnu::noinline]] inline float Lights::meet(const Record& light, const Vec3f& from,
-                                            const Vec3f& direction, float t_max, Vec3f& radiance) {
+                                            const Vec3f& direction, float t_min, float t_max,
+                                            Vec3f& radiance) {
   switch (light.shape) {
     case Shape::Sphere:
-      return meet_sphere(light, from, direction, t_max, radiance);
+      return meet_sphere(light, from, direction, t_min, t_max, radiance);
     case Shape::TurningDisk:
-      return meet_turning_disk(light, from, direction, t_max, radiance);
+      return meet_turning_disk(light, from, direction, t_min, t_max, radiance);
     case Shape::Rect:
     case Shape::Disk:
-      return meet_flat(light, from, direction, t_max, radiance);
+      return meet_flat(light, from, direction, t_min, t_max, radiance);
     case Shape::Distant: {
       if (light.one_minus_cos <= 0.0f) return 0.0f;
       // 1 - cos from the difference of the directions keeps narrow suns exact.
@@ -656,7 +658,7 @@ inline float Lights::density_of_surface(std::uint32_t light, float distance,
 }
 
 inline float Lights::meet_sphere(const Record& light, const Vec3f& from, const Vec3f& direction,
-                                 float t_max, Vec3f& radiance) {
+                                 float t_min, float t_max, Vec3f& radiance) {
   const Vec3f to_centre = light.position - from;
   const float distance2 = to_centre.squaredNorm();
   const float radius2 = light.radius * light.radius;
@@ -664,31 +666,33 @@ inline float Lights::meet_sphere(const Record& light, const Vec3f& from, const V
   const float along = to_centre.dot(direction);
   const float off2 = (to_centre - along * direction).squaredNorm();
   if (along <= 0.0f || off2 >= radius2) return 0.0f;
-  if (along - std::sqrt(radius2 - off2) >= t_max) return 0.0f;
+  const float t = along - std::sqrt(radius2 - off2);
+  if (t < t_min || t >= t_max) return 0.0f;
   radiance = light.radiance * cone_factor(light, -direction);
   return 1.0f / (2.0f * kPiF * one_minus_cos_of(radius2 / distance2));
 }
 
 inline float Lights::meet_turning_disk(const Record& light, const Vec3f& from,
-                                       const Vec3f& direction, float t_max, Vec3f& radiance) {
+                                       const Vec3f& direction, float t_min, float t_max,
+                                       Vec3f& radiance) {
   const Vec3f to_centre = light.position - from;
   const float height2 = to_centre.squaredNorm();
   const float along = to_centre.dot(direction);
   if (along <= 0.0f || height2 <= light.radius * light.radius) return 0.0f;
   const float t = height2 / along;
   const float off2 = (t * direction - to_centre).squaredNorm();
-  if (t >= t_max || off2 >= light.radius * light.radius) return 0.0f;
+  if (t < t_min || t >= t_max || off2 >= light.radius * light.radius) return 0.0f;
   radiance = light.radiance * cone_factor(light, -direction);
   return t * t * t / (std::sqrt(height2) * light.area);
 }
 
 [[gnu::noinline]] inline float Lights::meet_flat(const Record& light, const Vec3f& from,
-                                                 const Vec3f& direction, float t_max,
+                                                 const Vec3f& direction, float t_min, float t_max,
                                                  Vec3f& radiance) {
   const float cosine = -direction.dot(light.direction);
   if (cosine <= 1e-6f) return 0.0f;
   const float t = (from - light.position).dot(light.direction) / cosine;
-  if (t <= 0.0f || t >= t_max) return 0.0f;
+  if (t <= t_min || t >= t_max) return 0.0f;
   const Vec3f p = from + t * direction - light.position;
   // Coordinates along the (possibly skew) axes.
   const Vec3f normal = light.axis_x.cross(light.axis_y);

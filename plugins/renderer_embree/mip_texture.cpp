@@ -73,8 +73,7 @@ std::vector<T> halved(const std::vector<T>& from, const Size& size, int channels
 
 }  // namespace
 
-MipTexture::MipTexture(std::shared_ptr<const Texture> source, int wide_enough)
-    : source_(std::move(source)) {
+MipTexture::MipTexture(const Texture& source, int wide_enough) : source_(&source) {
   check(*source_);
   const bool is_srgb = source_->color_space == ColorSpace::Srgb;
   for (std::size_t i = 0; i < 256; ++i) {

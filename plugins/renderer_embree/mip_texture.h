@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <memory>
 #include <vector>
 
 #include "diorama/image.h"
@@ -16,11 +15,12 @@ namespace diorama {
 using Rgba = Eigen::Array4f;
 
 /// A texture with its smaller versions, each half as large, averaged in linear light. 8-bit
-/// textures stay 8-bit. Immutable; lookups from any thread.
+/// textures stay 8-bit. Immutable; lookups from any thread. The source must outlive all lookups; it
+/// is not owned, so that a cache of these does not keep alive what it serves.
 class MipTexture {
  public:
   /// The first version that is no wider than `wide_enough` is the last.
-  explicit MipTexture(std::shared_ptr<const Texture> source, int wide_enough = 0);
+  explicit MipTexture(const Texture& source, int wide_enough = 0);
 
   int width() const { return levels_[0].width; }
   int height() const { return levels_[0].height; }
@@ -48,7 +48,7 @@ class MipTexture {
   static int wrapped(int i, int size, Wrap wrap);
   void add_level();
 
-  std::shared_ptr<const Texture> source_;
+  const Texture* source_;
   std::array<float, 256> linear_from_byte_;
   std::vector<Level> levels_;
 };

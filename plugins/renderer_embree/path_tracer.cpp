@@ -86,6 +86,7 @@ inline RayCounts PathTracer::trace_all(const TraceJob& job, PixelSum* sums,
           trace_batch<kTogether>(batch);
           for (std::size_t i = 0; i < paths.size(); ++i) pixels[i]->add(paths[i].result);
           paths.clear();
+          if (settings_.host) settings_.host->stop_if_asked();
         }
       }
     }
@@ -302,9 +303,13 @@ inline void PathTracer::collect_lights(const Batch& v, std::size_t i) const {
   Path& path = *v.paths[i];
   const bool is_first = std::isinf(path.last_density);
   if (path.hides_lights || (!is_first && !settings_.samples_bsdf)) return;
+  // From the surface that took the light sample, which may lie behind panes: what the sample would
+  // have found has its weight there.
+  const Vec3f direction = v.rays.direction.at(i);
+  const float passed = path.since_last;
   scene_.lights().along_ray(
-      v.rays.origin.at(i), v.rays.direction.at(i), v.hits.distance[i], path.is_camera_ray,
-      [&](std::uint32_t light, const Vec3f& radiance, float density) {
+      v.rays.origin.at(i) - passed * direction, direction, passed, passed + v.hits.distance[i],
+      path.is_camera_ray, [&](std::uint32_t light, const Vec3f& radiance, float density) {
         const bool has_rival = !is_first && settings_.samples_lights;
         const float rival =
             has_rival ? scene_.lights().probability(light, path.last) * density : 0.0f;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "batch.h"
+#include "diorama/host.h"
 #include "film.h"
 #include "isa.h"
 #include "render_scene.h"
@@ -35,6 +36,8 @@ struct TraceSettings {
   /// What the rays through the pixels' centres met, if known: every path then starts there. For
   /// views without aperture and shutter, and no more than a path per pixel.
   const Image<RayHit>* first_hits = nullptr;
+  /// Asked after every batch of paths whether to stop.
+  const Host* host = nullptr;
   /// For tests of the estimators: which of the two techniques that find light are used.
   bool samples_lights = true;
   bool samples_bsdf = true;

@@ -18,19 +18,22 @@ class PixelLayers {
  public:
   using Pixel = std::array<float, kLayers>;
 
-  /// Only the margins have values, those of `outside`; they reach as far as the last whole group.
-  PixelLayers(int width, int height, int margin, const Pixel& outside)
-      : margin_(std::size_t(margin)),
+  PixelLayers() = default;
+  /// Without values as yet.
+  PixelLayers(int width, int height, int margin)
+      : width_(width),
+        margin_(std::size_t(margin)),
         stride_(std::size_t((width + kLanes - 1) / kLanes * kLanes) + 2 * margin_),
-        values_(stride_ * kLayers * std::size_t(height)) {
-    for (int y = 0; y < height; ++y) {
-      const Row own = row(y);
-      for (int layer = 0; layer < kLayers; ++layer) {
-        const float value = outside[std::size_t(layer)];
-        float* begin = own.at(layer, 0);
-        std::fill_n(begin - margin_, margin_, value);
-        std::fill(begin + width, begin - margin_ + stride_, value);
-      }
+        values_(stride_ * kLayers * std::size_t(height)) {}
+
+  /// Gives the margins of a row these values; they reach as far as the last whole group.
+  void fill_margins(int y, const Pixel& outside) {
+    const Row own = row(y);
+    for (int layer = 0; layer < kLayers; ++layer) {
+      const float value = outside[std::size_t(layer)];
+      float* begin = own.at(layer, 0);
+      std::fill_n(begin - margin_, margin_, value);
+      std::fill(begin + width_, begin - margin_ + stride_, value);
     }
   }
 
@@ -57,8 +60,9 @@ class PixelLayers {
   }
 
  private:
-  std::size_t margin_;
-  std::size_t stride_;
+  int width_ = 0;
+  std::size_t margin_ = 0;
+  std::size_t stride_ = 0;
   HugePages<float> values_;
 };
 

@@ -127,6 +127,11 @@ void RenderScene::take(const Scene& scene) {
   learn_sky();
 }
 
+RenderScene::Kept RenderScene::kept() const {
+  return {shading_meshes_.size(), materials_.material_count(), materials_.texture_count(),
+          domes_.size(), materials_.albedo_row_count()};
+}
+
 // Only what stays counts, so that the grid is the same whatever moved before, and is kept.
 void RenderScene::learn_sky() {
   Surroundings now = surroundings();
@@ -476,7 +481,7 @@ void RenderScene::add_lights(const Scene& scene) {
       const auto& image = light.texture ? light.texture : white_sky_;
       CachedDome& cached = domes_[image.get()];
       if (cached.owner.lock() != image) {
-        cached = {image, std::make_shared<const DomeTexture>(image)};
+        cached = {image, std::make_shared<const DomeTexture>(*image)};
       }
       dome = cached.dome;
     }

@@ -171,6 +171,16 @@ class RenderScene {
   };
   const Times& times() const { return times_; }
 
+  /// What is kept for scenes to come.
+  struct Kept {
+    std::size_t meshes = 0;
+    std::size_t materials = 0;
+    std::size_t textures = 0;
+    std::size_t skies = 0;
+    std::size_t albedo_rows = 0;
+  };
+  Kept kept() const;
+
   const std::vector<std::unique_ptr<MeshInstance>>& instances() const { return instances_; }
   const Lights& lights() const { return lights_; }
   bool stacks_lobes() const { return options_.stacks_lobes; }
@@ -228,6 +238,7 @@ class RenderScene {
   static void add_uv(SurfaceGeometry& surface, const RayHit& hit);
 
  private:
+  /// Kept while anybody else, a scene or a cache of assets, keeps the image.
   struct CachedDome {
     std::weak_ptr<const Texture> owner;
     std::shared_ptr<const DomeTexture> dome;

@@ -6,6 +6,9 @@
 namespace diorama {
 namespace {
 
+// Of roughnesses that are kept for the next materials; jobs may draw new ones for every capture.
+constexpr std::size_t kMostAlbedoRows = 1024;
+
 std::array<const TextureInput*, 6> texture_inputs(const Material& m) {
   return {&m.base_color_texture, &m.metallic_texture, &m.roughness_texture,
           &m.normal_texture,     &m.opacity_texture,  &m.emission_texture};
@@ -28,6 +31,7 @@ void MaterialLibrary::keep(const std::vector<std::shared_ptr<const Material>>& u
   std::erase_if(textures_, [](const auto& entry) { return entry.second.owner.expired(); });
   std::erase_if(layer_tables_, [](const auto& entry) { return entry.second.expired(); });
   std::erase_if(glass_tables_, [](const auto& entry) { return entry.second.expired(); });
+  albedo_tables_.forget_beyond(kMostAlbedoRows);
   load_textures(used);
   for (const auto& material : used) {
     auto& made = materials_[material.get()];
@@ -47,7 +51,7 @@ void MaterialLibrary::load_textures(const std::vector<std::shared_ptr<const Mate
   }
   std::vector<std::shared_ptr<const MipTexture>> made(missing.size());
   host_.parallel_for(missing.size(), [&](std::size_t i) {
-    made[i] = std::make_shared<const MipTexture>(missing[i]);
+    made[i] = std::make_shared<const MipTexture>(*missing[i]);
   });
   for (std::size_t i = 0; i < missing.size(); ++i) {
     textures_[missing[i].get()] = {missing[i], made[i]};

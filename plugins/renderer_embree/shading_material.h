@@ -60,10 +60,14 @@ class MaterialLibrary {
   const ShadingMaterial* at(const std::shared_ptr<const Material>& material) const {
     return materials_.at(material.get()).get();
   }
+  std::size_t material_count() const { return materials_.size(); }
+  std::size_t texture_count() const { return textures_.size(); }
+  std::size_t albedo_row_count() const { return albedo_tables_.row_count(); }
 
  private:
   using LayerKey = std::tuple<LayerTable::Layers, float>;  ///< Alpha below 0: for all.
   using GlassKey = std::tuple<float, float>;               ///< eta, alpha as above.
+  /// Kept while anybody else, a scene or a cache of assets, keeps the texture.
   struct CachedTexture {
     std::weak_ptr<const Texture> owner;
     std::shared_ptr<const MipTexture> mips;

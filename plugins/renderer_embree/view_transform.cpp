@@ -23,17 +23,17 @@ float filmic(float x) {
   return std::clamp(x * (2.51f * x + 0.03f) / (x * (2.43f * x + 0.59f) + 0.14f), 0.0f, 1.0f);
 }
 
-}  // namespace
-
-double automatic_exposure(const Image<Vec3f>& hdr) {
+/// By the luminance of the pixels.
+template <class LuminanceAt>
+double exposure_of(int width, int height, const LuminanceAt& luminance_at) {
   constexpr double kMiddleGrey = 0.18;
   // Of large pictures every so many pixels will do.
-  const double share = double(hdr.pixels().size()) / kExposurePixels;
+  const double share = double(width) * double(height) / kExposurePixels;
   const int step = std::max(1, int(std::sqrt(share)));
   std::vector<float> lit;
-  for (int y = 0; y < hdr.height(); y += step) {
-    for (int x = 0; x < hdr.width(); x += step) {
-      const float l = luminance(hdr.at(x, y));
+  for (int y = 0; y < height; y += step) {
+    for (int x = 0; x < width; x += step) {
+      const float l = luminance_at(x, y);
       if (l > 0.0f && std::isfinite(l)) lit.push_back(l);
     }
   }
@@ -47,6 +47,19 @@ double automatic_exposure(const Image<Vec3f>& hdr) {
   double sum = 0.0;
   for (auto it = begin; it != end; ++it) sum += std::log(double(*it));
   return std::clamp(kMiddleGrey / std::exp(sum / double(end - begin)), 1e-8, 1e8);
+}
+
+}  // namespace
+
+double automatic_exposure(const Image<Vec3f>& hdr) {
+  return exposure_of(hdr.width(), hdr.height(),
+                     [&](int x, int y) { return luminance(hdr.at(x, y)); });
+}
+
+double automatic_exposure(const Film& film) {
+  return exposure_of(film.width(), film.height(), [&](int x, int y) {
+    return luminance(film.at(x, y).seen + film.at(x, y).scattered);
+  });
 }
 
 Image<Rgba8> displayed(const Image<Vec3f>& hdr, double exposure, ViewTransform transform,

@@ -3,6 +3,7 @@
 
 #include "diorama/host.h"
 #include "diorama/image.h"
+#include "film.h"
 
 namespace diorama {
 
@@ -10,6 +11,8 @@ namespace diorama {
 /// light. The darkest and the brightest tenth do not count, so that a lamp or a window in view does
 /// not darken a room. 1 for a picture without light.
 double automatic_exposure(const Image<Vec3f>& hdr);
+/// The same for a picture that still has its noise.
+double automatic_exposure(const Film& film);
 
 enum class ViewTransform { Standard, Filmic };
 

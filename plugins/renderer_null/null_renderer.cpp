@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <optional>
+#include <utility>
 
 #include "diorama/rng.h"
 
@@ -67,28 +69,6 @@ Vec3f palette(std::uint32_t id) {
   return u.cast<float>();
 }
 
-/// The points of one camera, row by row, and how to make channels of them.
-struct Points {
-  const View& view;
-  std::vector<SurfacePoint> points;
-
-  template <class Pixel, class Value>
-  void put(Frame& frame, const NameSet& wanted, Channel<Pixel> channel, const Pixel& miss,
-           Value&& value) const {
-    if (!wanted.contains(channel.name)) return;
-    Image<Pixel> image(view.camera.width, view.camera.height, miss);
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      if (points[i].node) image.pixels()[i] = value(points[i]);
-    }
-    frame.set(channel, std::move(image));
-  }
-
-  Vec3f flat_color(const SurfacePoint& p) const {
-    const Vec3 to_camera = (view.world_from_camera.translation() - p.position).normalized();
-    return palette(p.node.index) * float(0.3 + 0.7 * std::abs(to_camera.dot(p.normal)));
-  }
-};
-
 Rgba8 encoded(const Vec3f& linear) {
   Rgba8 rgba{0, 0, 0, 255};
   for (int k = 0; k < 3; ++k) {
@@ -97,6 +77,77 @@ Rgba8 encoded(const Vec3f& linear) {
   }
   return rgba;
 }
+
+/// The wanted channels of one picture, filled point by point: the points themselves are many times
+/// as large.
+class ChannelImages {
+ public:
+  ChannelImages(const NameSet& wanted, const View& view)
+      : view_(view),
+        color_hdr_(image(wanted, kColorHdr, none())),
+        color_(image(wanted, kColor, Rgba8{0, 0, 0, 255})),
+        distance_(image(wanted, kDistanceToCamera, kFar)),
+        depth_(image(wanted, kDistanceToImagePlane, kFar)),
+        normals_(image(wanted, kNormals, none())),
+        leaves_(image(wanted, kLeafId, 0u)),
+        positions_(image(wanted, kPosition, none())),
+        uvs_(image(wanted, kUv, Vec2f(Vec2f::Zero()))),
+        albedo_(image(wanted, kAlbedo, none())) {}
+
+  void put(int x, int y, const SurfacePoint& p) {
+    if (color_hdr_) color_hdr_->at(x, y) = flat_color(p);
+    if (color_) color_->at(x, y) = encoded(flat_color(p));
+    if (distance_) distance_->at(x, y) = float(p.distance);
+    if (depth_) depth_->at(x, y) = float(-(view_.camera_from_world * p.position).z());
+    if (normals_) normals_->at(x, y) = p.normal.cast<float>();
+    if (leaves_) leaves_->at(x, y) = p.node.index;
+    if (positions_) positions_->at(x, y) = p.position.cast<float>();
+    if (uvs_) uvs_->at(x, y) = p.uv;
+    if (albedo_) albedo_->at(x, y) = p.albedo;
+  }
+
+  void move_to(Frame& frame) {
+    move(color_hdr_, kColorHdr, frame);
+    move(color_, kColor, frame);
+    move(distance_, kDistanceToCamera, frame);
+    move(depth_, kDistanceToImagePlane, frame);
+    move(normals_, kNormals, frame);
+    move(leaves_, kLeafId, frame);
+    move(positions_, kPosition, frame);
+    move(uvs_, kUv, frame);
+    move(albedo_, kAlbedo, frame);
+  }
+
+ private:
+  static constexpr float kFar = std::numeric_limits<float>::infinity();
+  static Vec3f none() { return Vec3f::Zero(); }
+
+  template <class Pixel>
+  std::optional<Image<Pixel>> image(const NameSet& wanted, Channel<Pixel> channel,
+                                    const Pixel& miss) const {
+    if (!wanted.contains(channel.name)) return std::nullopt;
+    return Image<Pixel>(view_.camera.width, view_.camera.height, miss);
+  }
+  template <class Pixel>
+  static void move(std::optional<Image<Pixel>>& image, Channel<Pixel> channel, Frame& frame) {
+    if (image) frame.set(channel, std::move(*image));
+  }
+  Vec3f flat_color(const SurfacePoint& p) const {
+    const Vec3 to_camera = (view_.world_from_camera.translation() - p.position).normalized();
+    return palette(p.node.index) * float(0.3 + 0.7 * std::abs(to_camera.dot(p.normal)));
+  }
+
+  const View& view_;
+  std::optional<Image<Vec3f>> color_hdr_;
+  std::optional<Image<Rgba8>> color_;
+  std::optional<Image<float>> distance_;
+  std::optional<Image<float>> depth_;
+  std::optional<Image<Vec3f>> normals_;
+  std::optional<Image<std::uint32_t>> leaves_;
+  std::optional<Image<Vec3f>> positions_;
+  std::optional<Image<Vec2f>> uvs_;
+  std::optional<Image<Vec3f>> albedo_;
+};
 
 }  // namespace
 
@@ -116,34 +167,16 @@ void NullRenderer::do_prepare(const Scene& scene) { meshes_.take(scene); }
 
 Frame NullRenderer::do_render(const Scene& scene, const RenderRequest& request) {
   const View view(scene, request.camera);
-  const int width = view.camera.width;
-  const int height = view.camera.height;
-  Points all{view, std::vector<SurfacePoint>(std::size_t(width) * std::size_t(height))};
-  host_.parallel_for(std::size_t(height), [&](std::size_t y) {
-    for (int x = 0; x < width; ++x) {
+  ChannelImages channels(request.channels, view);
+  host_.parallel_for(std::size_t(view.camera.height), [&](std::size_t y) {
+    for (int x = 0; x < view.camera.width; ++x) {
       const auto segment = view.segment(x, int(y));
-      if (segment)
-        all.points[y * std::size_t(width) + std::size_t(x)] = meshes_.first_hit(*segment);
+      const SurfacePoint point = segment ? meshes_.first_hit(*segment) : SurfacePoint();
+      if (point.node) channels.put(x, int(y), point);
     }
   });
-
   Frame frame;
-  const NameSet& wanted = request.channels;
-  constexpr float kFar = std::numeric_limits<float>::infinity();
-  const Vec3f none = Vec3f::Zero();
-  all.put(frame, wanted, kColorHdr, none, [&](const auto& p) { return all.flat_color(p); });
-  all.put(frame, wanted, kColor, Rgba8{0, 0, 0, 255},
-          [&](const auto& p) { return encoded(all.flat_color(p)); });
-  all.put(frame, wanted, kDistanceToCamera, kFar, [](const auto& p) { return float(p.distance); });
-  all.put(frame, wanted, kDistanceToImagePlane, kFar,
-          [&](const auto& p) { return float(-(view.camera_from_world * p.position).z()); });
-  all.put(frame, wanted, kNormals, none,
-          [](const auto& p) { return Vec3f(p.normal.template cast<float>()); });
-  all.put(frame, wanted, kLeafId, 0u, [](const auto& p) { return p.node.index; });
-  all.put(frame, wanted, kPosition, none,
-          [](const auto& p) { return Vec3f(p.position.template cast<float>()); });
-  all.put(frame, wanted, kUv, Vec2f(Vec2f::Zero()), [](const auto& p) { return p.uv; });
-  all.put(frame, wanted, kAlbedo, none, [](const auto& p) { return p.albedo; });
+  channels.move_to(frame);
   return frame;
 }
 
@@ -158,6 +191,7 @@ std::vector<CoverageMask> NullRenderer::do_cover(const Scene& scene, NodeId came
     mask.box = possible_pixels(view, part.bounds);
     if (mask.box.is_empty()) return;
     for (int y = mask.box.y_min; y < mask.box.y_max; ++y) {
+      host_.stop_if_asked();
       for (int x = mask.box.x_min; x < mask.box.x_max; ++x) {
         const auto segment = view.segment(x, y);
         const double distance = segment ? meshes_.distance(part, *segment) : kInfinity;

@@ -28,7 +28,6 @@ std::string_view kind_name(ComponentKind kind) {
 
 // The virtual tables of the interfaces live here, once, and not in every plugin.
 Component::~Component() = default;
-Host::~Host() = default;
 Loader::~Loader() = default;
 Randomizer::~Randomizer() = default;
 Registrar::~Registrar() = default;

@@ -61,6 +61,8 @@ Renderer::~Renderer() = default;
 
 RenderReport Renderer::report() const { return {}; }
 
+std::size_t Renderer::working_bytes(const Camera&, const NameSet&) const { return 0; }
+
 void Renderer::prepare(const Scene& scene) {
   scene_ = nullptr;  // stays so when do_prepare throws
   do_prepare(scene);

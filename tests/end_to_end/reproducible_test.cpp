@@ -139,6 +139,39 @@ TEST_CASE("Ctrl-C ends a run with 130 and leaves it resumable", "[run]") {
   CHECK(difference(expected, tree(folder / "out")) == "");
 }
 
+TEST_CASE("Ctrl-C and SIGTERM are felt inside a picture, which is not written", "[run]") {
+  // Minutes of paths, minutes of label rays: none of them is waited for.
+  const std::string paths =
+      "{type: embree, samples: 1000000, denoise: false}, cameras: [{type: pinhole, name: cam, "
+      "width: 64, height: 48}]";
+  const std::string labels =
+      "{type: \"null\"}, cameras: [{type: pinhole, name: cam, width: 12000, height: 9000}]";
+  for (const int signal : {SIGINT, SIGTERM}) {
+    for (const std::string& slow : {paths, labels}) {
+      const TemporaryFolder folder;
+      const std::string writer = slow == paths ? "rgb: true" : "distance_to_camera: true";
+      write_file(folder / "job.yaml",
+                 "{total_captures: 1, environments: [{type: shapes, shapes: [sphere]}], lights: "
+                 "[{type: dome, name: sky}], timeline: [{capture: shot, count: 1}], writers: "
+                 "[{type: BasicWriter, name: basic, " +
+                     writer + "}], renderer: " + slow + "}");
+      Process process({"run", "job.yaml", "--output", "out"}, folder.path());
+      for (int i = 0; i < 60000 && !fs::exists(folder / "out"); ++i) ::usleep(1000);
+      ::usleep(500000);
+      process.signal(signal);
+      const Outcome outcome = process.wait();
+      CAPTURE(signal, slow, outcome.errors);
+      CHECK(outcome.exit_code == 130);
+      CHECK_THAT(outcome.errors, ContainsSubstring("interrupted; `--resume` goes on"));
+      CHECK(journal_entries(folder / "out") == 0);
+      for (const auto& [name, text] : tree(folder / "out")) {
+        CHECK_THAT(name, !ContainsSubstring(".png"));
+        CHECK_THAT(name, !ContainsSubstring(".npy"));
+      }
+    }
+  }
+}
+
 TEST_CASE("An existing dataset is neither mixed up nor lost by accident", "[run]") {
   const TemporaryFolder folder;
   const auto expected = dataset(folder);

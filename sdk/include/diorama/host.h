@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "diorama/error.h"
 #include "diorama/image.h"
 #include "diorama/material.h"
 #include "diorama/scene.h"
@@ -30,6 +31,14 @@ struct ImageView {
   int height = 0;
   int channels = 0;
   int bits_per_channel = 8;  ///< 8 or 16 unsigned (native byte order), 32 for float.
+};
+
+/// Thrown out of what is under way when the job is to end soon; what is half made is thrown away.
+/// Components let it pass.
+class DIORAMA_SDK_API Stopped : public Error {
+ public:
+  Stopped();
+  ~Stopped() override;
 };
 
 /// What the host does for plugins. Outlives every component. Every function may be called from any
@@ -64,11 +73,18 @@ class DIORAMA_SDK_API Host {
   /// Same pixels, same bytes, on every machine with the same library versions.
   virtual std::vector<std::byte> encode_image(const ImageView& image, ImageFormat format) const = 0;
 
-  /// Runs body(0) ... body(count - 1) on the job's threads and the calling one; returns when all are
-  /// done, rethrows the first error (by index). Bodies must not depend on their order. Calls from
-  /// within a body run in place.
+  /// Runs body(0) ... body(count - 1) on the job's threads and the calling one; returns when all
+  /// are done, rethrows the first error (by index). Bodies must not depend on their order. Calls
+  /// from within a body run in place.
   virtual void parallel_for(std::size_t count, const std::function<void(std::size_t)>& body) = 0;
   virtual int thread_count() const = 0;
+
+  /// Whether the job is to end soon (Ctrl-C, SIGTERM). What takes seconds asks it now and then, but
+  /// for writers: captures that were made are written. On the main thread parallel_for() asks it
+  /// before each body and throws Stopped.
+  virtual bool stop_requested() const;
+  /// Throws Stopped if so.
+  void stop_if_asked() const;
 };
 
 }  // namespace diorama

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -38,6 +39,10 @@ class DIORAMA_SDK_API Renderer : public Component {
   virtual NameSet provides() const = 0;
   /// For `diorama bench`; empty unless a renderer says more.
   virtual RenderReport report() const;
+  /// Memory that it holds at most while it makes one picture of this camera with these channels,
+  /// beside the scene and the channels themselves, in bytes; for the dry run. 0 unless a renderer
+  /// says more.
+  virtual std::size_t working_bytes(const Camera& camera, const NameSet& channels) const;
 
   /// Takes in the scene as it is now. Call after every change and before render(); the scene must
   /// stay as it is and alive until the last render() of this preparation.

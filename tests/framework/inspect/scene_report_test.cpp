@@ -73,6 +73,27 @@ TEST_CASE("a scene report prints tree, lights and warnings", "[inspect]") {
   CHECK(report_text(report, 0).find("... 3 deeper nodes") != std::string::npos);
 }
 
+TEST_CASE("a scene report says which lamps no sky is seen beside", "[inspect]") {
+  Scene scene = make_scene();
+  CHECK(report_scene(scene, scene.find("/room"), "room.usd").warnings.empty());
+  for (const char* name : {"bulb", "spot"}) {
+    const NodeId lamp = scene.create(scene.find("/room"), name);
+    Light light;
+    light.radius_m = 0.05;
+    light.color = Vec3f::Constant(name[0] == 'b' ? 3e8f : 2e8f);
+    scene.edit(lamp).light = light;
+  }
+  const SceneReport report = report_scene(scene, scene.find("/room"), "room.usd");
+  REQUIRE(report.warnings.size() == 1);
+  // 3e8 nits x pi 0.05^2 m^2 / (2 m)^2.
+  CHECK(
+      report.warnings[0] ==
+      "/room/bulb (the brightest of 2 such lamps) lights a surface 2 m away with 5.89e+05 lux, 188 "
+      "times as much as an open sky of 1000 nits: no sky will be seen beside it; "
+      "environment.max_lamp_lux dims such lamps in a job");
+  CHECK(report_text(report, -1).find("5.89e+05 lux at 2 m") != std::string::npos);
+}
+
 TEST_CASE("a material stands with the warnings that name it", "[inspect]") {
   const Scene scene = make_scene();
   SceneReport report = report_scene(scene, scene.find("/room"), "room.usd");

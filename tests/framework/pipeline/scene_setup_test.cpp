@@ -2,6 +2,7 @@
 #include "framework/pipeline/scene_setup.h"
 
 #include "fake_host.h"
+#include "framework/pipeline/lamps.h"
 #include "jobs.h"
 #include "support/catch.h"
 
@@ -211,6 +212,52 @@ cameras:
   CHECK(right.cy == 90);
   CHECK(right.distortion[1] == 0.2);
   CHECK(right.near_m == 0.25);
+}
+
+TEST_CASE("Lamps of the environment are dimmed to a limit, each by itself", "[environment]") {
+  Room room;
+  const auto add_lamp = [&](const char* name, float nits) {
+    const NodeId node = room.scene.create(room.environment, name);
+    Light light;
+    light.radius_m = 0.1;
+    light.color = Vec3f(nits, nits, 0.5f * nits);
+    room.scene.edit(node).light = light;
+    return node;
+  };
+  const NodeId harsh = add_lamp("harsh", 3e8f);
+  const NodeId mild = add_lamp("mild", 2000.0f);
+  const NodeId hidden = add_lamp("hidden_exterior", 3e8f);
+  room.scene.edit(hidden).is_visible = false;
+  Light sky;
+  sky.kind = LightKind::Dome;
+  sky.color = Vec3f::Constant(1e6f);
+  const NodeId dome = room.scene.create(room.environment, "sky");
+  room.scene.edit(dome).light = sky;
+  // Two boxes share a glowing material; one is ten times as large.
+  auto glow = std::make_shared<Material>();
+  glow->emission = Vec3f::Constant(1e5f);
+  std::vector<NodeId> boxes;
+  for (const double size : {0.1, 1.0}) {
+    const NodeId box = room.scene.create(room.environment, "box");
+    room.scene.edit(box).mesh = std::make_shared<const Mesh>(make_box(Vec3::Constant(size)));
+    room.scene.edit(box).materials = {glow};
+    boxes.push_back(box);
+  }
+  EnvironmentRules rules;
+  rules.max_lamp_lux = 500.0;
+  apply_environment_rules(rules, false, room.environment, room.scene, room.host);
+
+  const double before = 3e8 * (0.2126 + 0.7152 + 0.0361) * kPi * 0.01 / 4.0;
+  CHECK(lamp_lux(room.scene, harsh) == Approx(500.0));
+  CHECK(double(room.scene[harsh].light->color.x()) == Approx(3e8 * 500.0 / before));
+  CHECK(room.scene[mild].light->color == Vec3f(2000.0f, 2000.0f, 1000.0f));
+  CHECK(room.scene[hidden].light->color.x() == 3e8f);
+  CHECK(room.scene[dome].light->color.x() == 1e6f);
+  // 6 x 0.01 m^2 x 1e5 nits / 4 / 4 = 375 lux stay; 37,500 do not.
+  CHECK(room.scene[boxes[0]].materials[0] == glow);
+  CHECK(lamp_lux(room.scene, boxes[1]) == Approx(500.0).epsilon(1e-4));
+  CHECK(glow->emission.x() == 1e5f);
+  CHECK(room.host.warnings.empty());
 }
 
 TEST_CASE("The overview camera looks straight down at the working area", "[spawn]") {

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "diorama/rng.h"
 #include "support/catch.h"
@@ -47,16 +48,16 @@ double error(const Image<Vec3f>& image, const Image<Vec3f>& truth) {
 TEST_CASE("noise goes, pattern and corner stay", "[denoiser]") {
   test::RenderHost host(2);
   const Image<Vec3f> truth = undenoised(noisy_corner(0.0));
-  const Film film = noisy_corner(0.3);
-  const double before = error(undenoised(film), truth);
-  const double after = error(denoised(film, Vec3f(30, 30, 20), Isa::Sse2, host), truth);
+  const double before = error(undenoised(noisy_corner(0.3)), truth);
+  const double after =
+      error(denoised(noisy_corner(0.3), {Vec3f(30, 30, 20)}, Isa::Sse2, host), truth);
   CHECK(after < 0.08 * before);
 }
 
 TEST_CASE("a picture without noise stays as it is", "[denoiser]") {
   test::RenderHost host(1);
-  const Film film = noisy_corner(0.0);
-  CHECK(error(denoised(film, Vec3f(30, 30, 20), Isa::Sse2, host), undenoised(film)) < 1e-6);
+  CHECK(error(denoised(noisy_corner(0.0), {Vec3f(30, 30, 20)}, Isa::Sse2, host),
+              undenoised(noisy_corner(0.0))) < 1e-6);
 }
 
 TEST_CASE("pictures of few paths keep their light, however skewed its noise", "[denoiser]") {
@@ -89,7 +90,7 @@ TEST_CASE("pictures of few paths keep their light, however skewed its noise", "[
   };
   const double before = mean(undenoised(film));
   CHECK(before == Approx(1.0).epsilon(0.02));
-  CHECK(mean(denoised(film, Vec3f(1.6f, 1.2f, 3.0f), Isa::Sse2, host)) ==
+  CHECK(mean(denoised(std::move(film), {Vec3f(1.6f, 1.2f, 3.0f)}, Isa::Sse2, host)) ==
         Approx(before).epsilon(0.005));
 }
 
@@ -98,10 +99,82 @@ TEST_CASE("one chance find among quiet neighbours is tamed", "[denoiser]") {
   Film film = noisy_corner(0.05);
   film.at(20, 20).scattered *= 500.0f;
   film.at(20, 20).variance *= 250000.0f;
-  const Image<Vec3f> clean = denoised(film, Vec3f(30, 30, 20), Isa::Sse2, host);
+  const Image<Vec3f> clean = denoised(std::move(film), {Vec3f(30, 30, 20)}, Isa::Sse2, host);
   for (int y = 12; y < 28; ++y) {
     for (int x = 12; x < 28; ++x) CHECK(clean.at(x, y).x() < 1.5f);
   }
+}
+
+TEST_CASE("single paths of extreme light make no dots, and their light is kept", "[denoiser]") {
+  // A wall lit 1, one path of two hundred a thousand times as bright: more than one to a
+  // neighbourhood, so that they vouch for each other.
+  constexpr int kPaths = 16;
+  Film film(160, 112, FilmPixel{});
+  Rng rng(9);
+  for (int y = 0; y < film.height(); ++y) {
+    for (int x = 0; x < film.width(); ++x) {
+      PixelSum sum;
+      for (int i = 0; i < kPaths; ++i) {
+        PathSample sample;
+        sample.has_surface = true;
+        sample.albedo = Vec3f::Constant(0.5f);
+        sample.normal = Vec3f::UnitZ();
+        sample.position = 0.02f * Vec3f(float(x), float(y), 0.0f);
+        const bool is_extreme = rng.uniform() < 0.0002;
+        sample.scattered = Vec3f::Constant(is_extreme ? 1000.0f : float(rng.uniform(0.5, 1.5)));
+        sum.add(sample);
+      }
+      film.at(x, y) = sum.mean();
+    }
+  }
+  const auto brightest = [](const Image<Vec3f>& image) {
+    float most = 0.0f;
+    for (const Vec3f& pixel : image.pixels()) most = std::max(most, pixel.x());
+    return most;
+  };
+  const auto mean = [](const Image<Vec3f>& image) {
+    double total = 0.0;
+    for (const Vec3f& pixel : image.pixels()) total += double(pixel.x());
+    return total / double(image.pixels().size());
+  };
+  const double before = mean(undenoised(film));
+  CHECK(brightest(undenoised(film)) > 50.0f);
+  test::RenderHost host(2);
+  DenoiseSettings settings{Vec3f(1.6f, 1.1f, 3.0f)};
+  settings.brightest_path = 4.0f;
+  const Image<Vec3f> clean = denoised(std::move(film), settings, Isa::Sse2, host);
+  CHECK(brightest(clean) < 2.0f);
+  CHECK(mean(clean) == Approx(before).epsilon(0.02));
+}
+
+TEST_CASE("the limit of a path lets light pass that many paths bring", "[denoiser]") {
+  // A spot ten times as bright as the limit, a pixel's paths of which half meet it at the edge.
+  constexpr int kPaths = 8;
+  Film film(64, 48, FilmPixel{});
+  double expected = 0.0;
+  for (int y = 0; y < film.height(); ++y) {
+    for (int x = 0; x < film.width(); ++x) {
+      PixelSum sum;
+      for (int i = 0; i < kPaths; ++i) {
+        PathSample sample;
+        sample.has_surface = true;
+        sample.albedo = Vec3f::Constant(0.5f);
+        sample.normal = Vec3f::UnitZ();
+        sample.position = 0.02f * Vec3f(float(x), float(y), 0.0f);
+        sample.scattered = Vec3f::Constant(x < 30 || (x == 30 && i % 2 == 0) ? 40.0f : 0.1f);
+        sum.add(sample);
+      }
+      film.at(x, y) = sum.mean();
+      if (x == 20) expected = double(film.at(x, y).scattered.x());
+    }
+  }
+  test::RenderHost host(1);
+  DenoiseSettings settings{Vec3f(0.6f, 0.5f, 3.0f)};
+  settings.brightest_path = 4.0f;
+  const Image<Vec3f> clean = denoised(std::move(film), settings, Isa::Sse2, host);
+  CHECK(double(clean.at(20, 20).x()) == Approx(expected).epsilon(1e-3));
+  CHECK(double(clean.at(30, 20).x()) == Approx(20.05).epsilon(0.1));
+  CHECK(clean.at(50, 20).x() < 0.2f);
 }
 
 TEST_CASE("sources seen directly pass untouched", "[denoiser]") {
@@ -109,8 +182,9 @@ TEST_CASE("sources seen directly pass untouched", "[denoiser]") {
   Film film = noisy_corner(0.2);
   film.at(5, 6) = FilmPixel{};
   film.at(5, 6).seen = Vec3f(70.0f, 60.0f, 50.0f);
-  CHECK((denoised(film, Vec3f(30, 30, 20), Isa::Sse2, host).at(5, 6) - Vec3f(70, 60, 50)).norm() <
-        1e-4f);
+  CHECK(
+      (denoised(std::move(film), {Vec3f(30, 30, 20)}, Isa::Sse2, host).at(5, 6) - Vec3f(70, 60, 50))
+          .norm() < 1e-4f);
 }
 
 TEST_CASE("a large picture is exposed like a small one of the same", "[exposure]") {

@@ -32,11 +32,14 @@ EmittingTriangles square(double half, const Affine& world_from_node) {
 }
 
 std::shared_ptr<const DomeTexture> white_sky() {
-  auto texture = std::make_shared<Texture>();
-  texture->width = 64;
-  texture->height = 32;
-  texture->channels = 1;
-  texture->floats.assign(64 * 32, 1.0f);
+  static const Texture texture = [] {
+    Texture white;
+    white.width = 64;
+    white.height = 32;
+    white.channels = 1;
+    white.floats.assign(64 * 32, 1.0f);
+    return white;
+  }();
   return std::make_shared<const DomeTexture>(texture);
 }
 
@@ -108,7 +111,7 @@ TEST_CASE("a ray towards a light sample meets that light with the same density",
       const Sampled s = sample(lights, from, {float(rng.uniform()), float(rng.uniform())});
       REQUIRE(s.density > 0.0f);
       int met = 0;
-      lights.along_ray(from, s.direction, std::numeric_limits<float>::infinity(), false,
+      lights.along_ray(from, s.direction, 0.0f, std::numeric_limits<float>::infinity(), false,
                        [&](std::uint32_t, const Vec3f& radiance, float density) {
                          ++met;
                          CHECK(density == Approx(s.density).epsilon(2e-3));
@@ -166,7 +169,7 @@ TEST_CASE("a batch of places gets what each would get alone, and its rays meet t
     CHECK(alone.distance[0] == samples.distance[i]);
     CHECK(alone.direction.at(0) == samples.direction.at(i));
     int bodies = 0;
-    lights.along_ray(wishes.position.at(i), samples.direction.at(i), 1e6f, false,
+    lights.along_ray(wishes.position.at(i), samples.direction.at(i), 0.0f, 1e6f, false,
                      [&](std::uint32_t, const Vec3f&, float) { ++bodies; });
     if (bodies > 0) CHECK(may_meet[i] != 0);
   }
@@ -183,7 +186,7 @@ TEST_CASE("the density of every light integrates to one", "[lights]") {
     constexpr int kSamples = 400000;
     for (int i = 0; i < kSamples; ++i) {
       const Vec3f d = uniform_sphere({float(rng.uniform()), float(rng.uniform())});
-      lights.along_ray(from, d, std::numeric_limits<float>::infinity(), false,
+      lights.along_ray(from, d, 0.0f, std::numeric_limits<float>::infinity(), false,
                        [&](std::uint32_t, const Vec3f&, float density) {
                          sum += double(density) * 4.0 * kPi / kSamples;
                        });
@@ -296,8 +299,8 @@ TEST_CASE("a lamp taken as a turning disk gives a near point less light", "[ligh
     REQUIRE(s.density > 0.0f);
     sum += double(s.radiance.x() * s.direction.z() / s.density) / kSamples;
     float met = 0.0f;
-    lights.along_ray(Vec3f::Zero(), s.direction, std::numeric_limits<float>::infinity(), false,
-                     [&](std::uint32_t, const Vec3f&, float density) { met = density; });
+    lights.along_ray(Vec3f::Zero(), s.direction, 0.0f, std::numeric_limits<float>::infinity(),
+                     false, [&](std::uint32_t, const Vec3f&, float density) { met = density; });
     if (i % 100 == 0) CHECK(met == Approx(s.density).epsilon(2e-3));
   }
   CHECK(sum == Approx(kPi * 3.0 * 0.25 / (0.25 + 1.69)).epsilon(0.005));
@@ -416,7 +419,7 @@ TEST_CASE("a dome's image lies as the scene format says", "[lights]") {
       texture->floats.push_back(x == 3 || x == 4 ? 1.0f : 0.0f);
     }
   }
-  const DomeTexture dome(texture);
+  const DomeTexture dome(*texture);
   const auto seen = [&](const Vec3f& direction) { return dome.place(direction).radiance; };
   CHECK(seen(Vec3f(0.01f, 0, 1).normalized()).x() > 0.9f);
   CHECK(seen(Vec3f(0.01f, 0, -1).normalized()).x() < 0.1f);

@@ -31,7 +31,8 @@ float red(const MipTexture& texture, float u, float v, Wrap wrap) {
 }  // namespace
 
 TEST_CASE("texel centres give texels, with the origin at the lower left", "[texture]") {
-  const MipTexture texture(small_texture(ColorSpace::Linear));
+  const auto source = small_texture(ColorSpace::Linear);
+  const MipTexture texture(*source);
   CHECK(red(texture, 0.5f / 3, 0.75f, Wrap::Repeat) == Approx(10.0f).margin(1e-3));
   CHECK(red(texture, 2.5f / 3, 0.75f, Wrap::Repeat) == Approx(30.0f).margin(1e-3));
   CHECK(red(texture, 0.5f / 3, 0.25f, Wrap::Repeat) == Approx(40.0f).margin(1e-3));
@@ -39,7 +40,8 @@ TEST_CASE("texel centres give texels, with the origin at the lower left", "[text
 }
 
 TEST_CASE("wrapping decides what lies outside", "[texture]") {
-  const MipTexture texture(small_texture(ColorSpace::Linear));
+  const auto source = small_texture(ColorSpace::Linear);
+  const MipTexture texture(*source);
   CHECK(red(texture, 0.5f / 3 + 2.0f, 0.75f - 3.0f, Wrap::Repeat) == Approx(10.0f).margin(1e-3));
   CHECK(red(texture, 5.0f, 9.0f, Wrap::Clamp) == Approx(30.0f).margin(1e-3));
   CHECK(red(texture, -5.0f, -9.0f, Wrap::Clamp) == Approx(40.0f).margin(1e-3));
@@ -49,7 +51,8 @@ TEST_CASE("wrapping decides what lies outside", "[texture]") {
 }
 
 TEST_CASE("averages are made in linear light and reach the mean", "[texture]") {
-  const MipTexture texture(small_texture(ColorSpace::Srgb));
+  const auto source = small_texture(ColorSpace::Srgb);
+  const MipTexture texture(*source);
   float mean = 0.0f;
   for (int i = 1; i <= 6; ++i) mean += linear_from_srgb(float(10 * i) / 255.0f) / 6.0f;
   const Rgba widest = texture.lookup({0.3f, 0.6f}, 50.0f, Wrap::Repeat, Wrap::Repeat);
@@ -64,7 +67,7 @@ TEST_CASE("a checkerboard fades to grey with a growing footprint", "[texture]") 
   board->width = board->height = 64;
   board->channels = 1;
   for (int i = 0; i < 64 * 64; ++i) board->bytes.push_back((i + i / 64) % 2 ? 255 : 0);
-  const MipTexture texture(board);
+  const MipTexture texture(*board);
   const Vec2f centre((10 + 0.5f) / 64.0f, (20 + 0.5f) / 64.0f);
   const float sharp = texture.lookup(centre, 0.0f, Wrap::Repeat, Wrap::Repeat)[0];
   const float soft = texture.lookup(centre, 4.0f / 64.0f, Wrap::Repeat, Wrap::Repeat)[0];
@@ -78,7 +81,7 @@ TEST_CASE("an input scales, shifts and maps uv", "[texture]") {
   input.scale = {2.0f, 1.0f, 1.0f, 1.0f};
   input.bias = {0.1f, 0.0f, 0.0f, 0.0f};
   input.uv_from_mesh_uv << 2.0f, 0.0f, 0.5f / 3, 0.0f, 1.0f, 0.0f;
-  const MipTexture texture(input.texture);
+  const MipTexture texture(*input.texture);
   const TextureSlot slot{&input, &texture};
   CHECK(slot.at({0.5f / 3, 0.75f}, 0.0f)[0] == Approx(2.0f * 20.0f / 255.0f + 0.1f).margin(1e-4));
 }
@@ -88,7 +91,7 @@ TEST_CASE("a texture whose data does not fit its size is refused by name", "[tex
   texture->bytes.pop_back();
   std::string text;
   try {
-    const MipTexture made(texture);
+    const MipTexture made(*texture);
   } catch (const Error& error) {
     CHECK(error.kind() == ErrorKind::Asset);
     text = error.what();

@@ -506,6 +506,83 @@ TEST_CASE("glass lets the light of a lamp into a closed room", "[renderer]") {
   CHECK(lit(&wall, 0.02) < 1e-6);
 }
 
+namespace {
+
+/// A room with an opening to the sky and lamps of two kinds, and with screens, if any, before the
+/// opening and around the lamps.
+TestWorld screened_room(const Material* screen) {
+  TestWorld world;
+  Material wall = matte(0.6f);
+  const auto slab = [&](const char* name, const Vec3& size, const Vec3& centre) {
+    world.add(name, make_box(size), wall, at(centre.x(), centre.y(), centre.z()));
+  };
+  slab("floor", Vec3(4, 4, 0.1), Vec3(0, 0, -0.05));
+  slab("ceiling", Vec3(4, 4, 0.1), Vec3(0, 0, 2.55));
+  slab("back", Vec3(4, 0.1, 2.7), Vec3(0, 2.05, 1.25));
+  slab("left", Vec3(0.1, 4, 2.7), Vec3(-2.05, 0, 1.25));
+  slab("front", Vec3(4, 0.1, 2.7), Vec3(0, -2.05, 1.25));
+  slab("below the window", Vec3(0.1, 4, 0.9), Vec3(2.05, 0, 0.45));
+  Light lamp;
+  lamp.radius_m = 0.08;
+  lamp.color = Vec3f::Constant(60.0f);
+  world.add(lamp, at(-0.8, 0.6, 1.6));
+  Light panel;
+  panel.kind = LightKind::Rect;
+  panel.width_m = 0.5;
+  panel.height_m = 0.3;
+  panel.color = Vec3f::Constant(6.0f);
+  world.add(panel, at(0.5, -0.4, 2.2));
+  world.add(dome(0.8f));
+  if (!screen) return world;
+  world.add("bulb", make_sphere(0.1, 48), *screen, at(-0.8, 0.6, 1.6));
+  world.add("cover", make_plane(1.0, 0.8), *screen, at(0.5, -0.4, 2.15));
+  world.add("window", make_box(Vec3(0.01, 4, 1.6)), *screen, at(2.05, 0, 1.7));
+  return world;
+}
+
+/// Means over blocks of 4 x 4 pixels.
+std::vector<double> block_means(const Image<Vec3f>& image) {
+  std::vector<double> means;
+  for (int top = 0; top < image.height(); top += 4) {
+    for (int left = 0; left < image.width(); left += 4) {
+      double sum = 0.0;
+      for (int i = 0; i < 16; ++i) sum += double(image.at(left + i % 4, top + i / 4).sum());
+      means.push_back(sum);
+    }
+  }
+  return means;
+}
+
+}  // namespace
+
+TEST_CASE("screens that cannot be seen leave the light of a room as it is", "[renderer]") {
+  Material pane;
+  pane.base_color.setOnes();
+  pane.transmission = 1.0f;
+  pane.is_thin_walled = true;
+  pane.roughness = 0.0f;
+  pane.ior = 1.00001f;
+  Material veil = matte(0.5f);
+  veil.opacity = 0.0002f;
+  const auto means = [](const Material* screen) {
+    TestWorld world = screened_room(screen);
+    const NodeId camera = world.add_camera(12, 8, 6.5, Vec3(-1.0, -1.9, 1.5), Vec3(0.0, 1.0, 0.9));
+    return block_means(render(world, camera, reference(65536, 1)));
+  };
+  const std::vector<double> bare = means(nullptr);
+  for (const Material* screen : {&pane, &veil}) {
+    const std::vector<double> screened = means(screen);
+    CAPTURE(screen == &pane ? "panes" : "veils");
+    double sum = 0.0;
+    for (std::size_t i = 0; i < bare.size(); ++i) {
+      CAPTURE(i, screened[i] / bare[i]);
+      CHECK(screened[i] == Approx(bare[i]).epsilon(0.01));
+      sum += screened[i] / bare[i] / double(bare.size());
+    }
+    CHECK(sum == Approx(1.0).epsilon(0.002));
+  }
+}
+
 TEST_CASE("modes and exposure do what they say", "[renderer]") {
   TestWorld world = busy_room();
   const NodeId camera = world.add_camera(48, 32, 26.0, Vec3(-1.8, -1.5, 0.6), Vec3(0.3, 0.6, -0.9));

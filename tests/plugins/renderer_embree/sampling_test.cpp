@@ -100,7 +100,7 @@ TEST_CASE("a dome is sampled as bright as it is", "[sampling]") {
   Rng rng(5);
   for (int i = 0; i < 48 * 24 * 3; ++i) texture->floats.push_back(float(rng.uniform(0.1, 1.0)));
   for (int k = 0; k < 3; ++k) texture->floats[std::size_t((7 * 48 + 17) * 3 + k)] = 40.0f;
-  const DomeTexture dome(texture);
+  const DomeTexture dome(*texture);
   // One half of the world sees nothing of the sky but a part.
   test::RenderHost host(2);
   const SkyGrid everything(dome);

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "diorama/camera.h"
+#include "diorama/renderer.h"
+
+namespace diorama {
+
+/// What one capture needs beside the scene, in bytes.
+struct CaptureMemory {
+  std::size_t capture = 0;  ///< The channels of all its cameras; for as long as it waits.
+  std::size_t picture = 0;  ///< More, while its largest picture is rendered.
+};
+
+/// `channels`: those that the renderer and the annotators make; other names count for nothing.
+CaptureMemory capture_memory(const std::vector<Camera>& cameras, const NameSet& channels,
+                             const Renderer& renderer);
+
+/// One line for the dry run.
+std::string memory_text(const CaptureMemory& memory);
+
+}  // namespace diorama

@@ -1,0 +1,12 @@
+#!/usr/bin/env bash
+# Long runs hold no more memory than short ones: every renderer and every writer, generated rooms that
+# come and go, for a bounded number of captures.
+#
+#   tests/soak/run.sh [captures per renderer, default 10000]
+#
+# Needs a build of the program and of all plugins in build/release (DIORAMA_BUILD says another folder).
+# The datasets go to a temporary folder and are removed. Exit code 1: a run grew, or failed.
+set -euo pipefail
+here=$(cd "$(dirname "$0")" && pwd)
+exec python3 "$here/soak.py" --build "${DIORAMA_BUILD:-$here/../../build/release}" \
+  --captures "${1:-10000}"

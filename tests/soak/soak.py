@@ -1,0 +1,165 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Runs long jobs and watches the memory of the program. See run.sh beside it."""
+import argparse
+import os
+import pathlib
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+
+WARM_UP = 50  # captures until all caches are full
+MOST_GROWTH = 0.05
+SECONDS_PER_CAPTURE = 30  # a run that is slower hangs
+
+RENDERERS = {
+    "null": '{type: "null"}',
+    "path_traced": "{type: embree, samples: 1}",
+    "real_time": "{type: embree, mode: real_time, samples: 1}",
+}
+
+JOB = """
+seed: 5
+total_captures: %(captures)d
+environments:
+  - {type: dining_room, first_seed: 1, count: 6}
+environment:
+  colliders: triangle_mesh
+  working_area: TableDining
+objects:
+  - {type: files, name: targets, folders: [/Isaac/Props/YCB/Axis_Aligned/], under: /Assets, count: 6,
+     label_pattern: "^[0-9]+_", label_replacement: ""}
+  - {type: shapes, name: shapes, under: /Distractors, count: 6}
+lights:
+  - {type: sphere, name: lamp, count: 2, radius_m: 0.1}
+  - {type: dome, name: sky}
+cameras:
+  - {type: pinhole, name: cam, count: 1, width: 96, height: 64}
+randomizers:
+  - {type: scatter_poses, name: poses, on: [environment], nodes: "/Assets/*",
+     offset: [[-0.5, 0.5], [-0.5, 0.5], [1.0, 1.5]], scale: [0.9, 1.2]}
+  - {type: scatter_poses, name: shape_poses, on: [environment], nodes: "/Distractors/*",
+     offset: [[-1.0, 1.0], [-1.0, 1.0], [1.0, 1.6]], scale: [0.02, 0.08]}
+  - {type: random_colors, name: colors, on: [floating, dropped], nodes: "/Distractors/**"}
+  - {type: dome_light, name: sky, on: [floating], nodes: "/Lights/sky_*", intensity: 1000,
+     textures: [/NVIDIA/Assets/Skies/Clear/noon_grass_4k.hdr, /NVIDIA/Assets/Skies/Clear/qwantani_4k.hdr]}
+  - {type: orbit_cameras, name: cameras, on: [floating, dropped], nodes: "/Cameras/*",
+     targets: "/Assets/*", distance: [1.0, 2.0], polar_angle_deg: [10, 60]}
+renderer: %(renderer)s
+timeline:
+  - simulate: 4
+  - {capture: floating, count: 2}
+  - simulate: 20
+  - {capture: dropped, count: 2}
+writers:
+%(writers)s
+output:
+  folder: out
+"""
+
+
+def writer_types(program):
+    """Of every writer that the program knows, with what it needs to be told."""
+    listed = subprocess.run(program + ["plugins"], check=True, capture_output=True, text=True)
+    types = sorted({word for line in listed.stdout.splitlines() for word in line.split()
+                    if word.endswith("Writer")})
+    if "BasicWriter" not in types:
+        sys.exit("soak: the program lists no BasicWriter: " + listed.stdout)
+    return types
+
+
+def writer_lines(types):
+    lines = []
+    for kind in types:
+        more = ", rgb: true, distance_to_camera: true, instance_segmentation: true" \
+            if kind == "BasicWriter" else ""
+        lines.append("  - {type: %s, name: %s%s}" % (kind, kind.lower(), more))
+    return "\n".join(lines)
+
+
+def captures_in(folder):
+    """One camera: as many as there are pictures."""
+    try:
+        return sum(1 for entry in os.scandir(folder) if entry.name.startswith("rgb_"))
+    except FileNotFoundError:
+        return 0
+
+
+def rss_mib(process):
+    try:
+        for line in pathlib.Path("/proc/%d/status" % process.pid).read_text().splitlines():
+            if line.startswith("VmRSS:"):
+                return int(line.split()[1]) / 1024
+    except (FileNotFoundError, ProcessLookupError):
+        pass
+    return None
+
+
+def watch(program, job, folder, captures):
+    """Runs the job; returns (captures done, MiB) at intervals."""
+    file = folder / "job.yaml"
+    file.write_text(job)
+    log = (folder / "log").open("w")
+    process = subprocess.Popen(program + ["run", str(file), "--output", str(folder / "out")],
+                               stdout=log, stderr=log, cwd=folder)
+    samples = []
+    deadline = time.monotonic() + SECONDS_PER_CAPTURE * captures
+    try:
+        while process.poll() is None and time.monotonic() < deadline:
+            done = captures_in(folder / "out" / "basicwriter")
+            memory = rss_mib(process)
+            if memory is not None:
+                samples.append((done, memory))
+            time.sleep(max(0.1, captures / 20000))
+    finally:
+        process.kill()
+        process.wait()
+    if process.returncode != 0:
+        sys.exit("soak: exit code %d\n%s" % (process.returncode, (folder / "log").read_text()[-3000:]))
+    return samples
+
+
+def check(name, samples, captures):
+    """Memory towards the end against memory after the warm-up; both are medians of many samples."""
+    rest = captures - WARM_UP
+    begin = [m for done, m in samples if WARM_UP <= done < WARM_UP + rest / 4]
+    end = [m for done, m in samples if done >= captures - rest / 4]
+    if len(begin) < 3 or len(end) < 3:
+        sys.exit("soak: %s: too few samples to judge (%d and %d); ask for more captures"
+                 % (name, len(begin), len(end)))
+    growth = statistics.median(end) / statistics.median(begin) - 1
+    print("%-11s %6d captures: %7.1f MiB after the warm-up, %7.1f MiB at the end (%+.1f %%), most %.1f"
+          % (name, captures, statistics.median(begin), statistics.median(end), 100 * growth,
+             max(m for _, m in samples)), flush=True)
+    return growth <= MOST_GROWTH
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--build", required=True, type=pathlib.Path)
+    parser.add_argument("--captures", type=int, default=10000)
+    parser.add_argument("--renderer", action="append", choices=sorted(RENDERERS))
+    options = parser.parse_args()
+    if options.captures < 2 * WARM_UP:
+        sys.exit("soak: at least %d captures are needed" % (2 * WARM_UP))
+    build = options.build.resolve()
+    program = [str(build / "bin" / "diorama"), "--plugin-dir", str(build / "plugins")]
+    writers = writer_lines(writer_types(program))
+    is_flat = True
+    for name in options.renderer or RENDERERS:
+        folder = pathlib.Path(tempfile.mkdtemp(prefix="diorama-soak-"))
+        try:
+            job = JOB % {"captures": options.captures, "renderer": RENDERERS[name],
+                         "writers": writers}
+            is_flat &= check(name, watch(program, job, folder, options.captures), options.captures)
+        finally:
+            shutil.rmtree(folder)
+    if not is_flat:
+        sys.exit("soak: memory grew by more than %.0f %%" % (100 * MOST_GROWTH))
+
+
+if __name__ == "__main__":
+    main()
