@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "framework/output/workers.h"
 
+#include <sys/random.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <charconv>
+#include <cstdio>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <random>
 
 #include "framework/output/journal.h"
 
@@ -63,9 +64,11 @@ std::optional<std::pair<std::string, int>> task_and_generation(const std::string
 Busy::~Busy() = default;
 
 WorkerIdentity this_worker() {
-  std::random_device device;
+  // Names of workers are no part of a dataset, so they may differ from run to run.
+  unsigned number = 0;
+  if (::getrandom(&number, sizeof number, 0) != sizeof number) number = unsigned(::getpid());
   char random[16];
-  std::snprintf(random, sizeof random, "%08x", device());
+  std::snprintf(random, sizeof random, "%08x", number);
   WorkerIdentity self;
   self.host = host_name();
   self.machine = boot_of_this_machine();

@@ -148,8 +148,9 @@ void Pipeline::run_visits() {
   }
 }
 
-/// Keeps what is whole.
+/// Keeps what is whole, and does not begin what a slow disk would hold up: who asked may not wait.
 void Pipeline::end_early() {
+  queue_->drop_waiting();
   queue_->drain();
   store_.close();
 }

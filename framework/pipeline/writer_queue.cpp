@@ -117,6 +117,12 @@ void WriterQueue::push(PendingCapture pending) {
   state_->changed.notify_all();
 }
 
+void WriterQueue::drop_waiting() {
+  const std::lock_guard lock(state_->mutex);
+  state_->drop_waiting();
+  state_->changed.notify_all();
+}
+
 void WriterQueue::drain() {
   std::unique_lock lock(state_->mutex);
   state_->changed.wait(lock, [&] { return state_->waiting.empty() && state_->in_work == 0; });

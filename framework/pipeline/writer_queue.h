@@ -37,6 +37,8 @@ class WriterQueue {
   /// Rethrows what a worker threw, that of the lowest capture first; afterwards the queue takes no
   /// more.
   void push(PendingCapture pending);
+  /// Forgets captures whose writing has not begun.
+  void drop_waiting();
   /// Returns when all that was pushed is written; rethrows like push().
   void drain();
 
