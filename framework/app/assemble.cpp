@@ -14,10 +14,10 @@ std::unique_ptr<Registry> make_registry(const GlobalOptions& options, const Log&
   const Environment environment = [](const char* name) -> const char* {
     return secure_getenv(name);
   };
-  PluginSearch search = search_plugins(plugin_search_levels(options.plugin_dirs, environment,
-                                                            bundled_plugin_folder(options.program),
-                                                            local_plugin_folder(options.program)),
-                                       options.allow_unsafe_plugin_dir);
+  PluginSearch search = search_plugins(
+      plugin_search_levels(options.plugin_dirs, environment, bundled_plugin_folder(options.program),
+                           local_plugin_folder(options.program)),
+      options.allow_unsafe_plugin_dir);
   auto registry = std::make_unique<Registry>(std::move(search), log);
   registry->add_builtin(register_builtin_loaders, program_version());
   registry->add_builtin(register_builtin_annotators, program_version());

@@ -279,7 +279,8 @@ OutputFolders output_folders(const Job& job) {
     const fs::path place = (base / name).lexically_normal().lexically_relative(base);
     std::string text = place.has_filename() ? place.string() : place.parent_path().string();
     if (text != "." && !is_plain_relative(text)) {
-      throw Error(ErrorKind::Internal, "the folder \"" + name + "\" is not below the output folder");
+      throw Error(ErrorKind::Internal,
+                  "the folder \"" + name + "\" is not below the output folder");
     }
     return text;
   };

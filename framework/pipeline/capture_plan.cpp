@@ -58,7 +58,8 @@ class Picks {
   Picks(const JobStreams& streams, const ObjectGroup& group, const std::vector<std::string>& assets)
       : streams_(streams), group_(group), assets_(assets) {}
 
-  /// An index of `assets`. `rng` is the object's own stream, `number` counts the group's picks over all visits.
+  /// An index of `assets`. `rng` is the object's own stream, `number` counts the group's picks over
+  /// all visits.
   std::size_t pick(Rng& rng, std::uint64_t number) {
     if (!group_.balance) return rng.index(assets_.size());
     shuffle(number / assets_.size());

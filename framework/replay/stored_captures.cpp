@@ -10,8 +10,8 @@
 #include "framework/config/yaml_config.h"
 #include "framework/images/linear_picture.h"
 #include "framework/lint/replicator_files.h"
-#include "framework/pipeline/capture_plan.h"
 #include "framework/output/file_system.h"
+#include "framework/pipeline/capture_plan.h"
 
 namespace diorama {
 namespace {

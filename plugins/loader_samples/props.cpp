@@ -509,7 +509,8 @@ Model potted_plant(Host&, Rng rng) {
 }
 
 Model medical_bag(Host& host, Rng rng) {
-  const TextureSet cloth = make_fabric(host, color(0xa5201f), color(0x951b1b), 0.7, rng.bits(), 256);
+  const TextureSet cloth =
+      make_fabric(host, color(0xa5201f), color(0x951b1b), 0.7, rng.bits(), 256);
   MeshBuilder builder;
   builder.begin(at(0, 0, 0.095), {0, 1 / cloth.size_m});
   add_box(builder, Vec3(0.29, 0.15, 0.19), 0.032, Axis::X, 5);

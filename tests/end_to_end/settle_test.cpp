@@ -130,8 +130,8 @@ writers: [{type: BasicWriter, name: basic, motion_vectors: true}]
     const Outcome outcome = run({"run", name + ".yaml", "--output", name}, folder.path());
     INFO(outcome.errors);
     REQUIRE(outcome.exit_code == 0);
-    const diorama::lint::NpyArray motion = diorama::lint::parse_npy(
-        read_file(folder / name / "basic/motion_vectors_0000.npy"));
+    const diorama::lint::NpyArray motion =
+        diorama::lint::parse_npy(read_file(folder / name / "basic/motion_vectors_0000.npy"));
     return std::any_of(motion.data.begin(), motion.data.end(),
                        [](std::byte byte) { return byte != std::byte{0}; });
   };

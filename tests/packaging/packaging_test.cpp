@@ -91,7 +91,8 @@ TEST_CASE("nobody needs what few use", "[packaging]") {
     if (!fs::exists(kRoot / "packaging/debian" / (package + ".install"))) continue;
     INFO(package);
     for (const char* heavy : {"placement_fcl", "writer_hdf5"}) {
-      for (const std::string& pattern : all(debian(package + ".install"), "plugins-\\*/(\\S+)\\.so")) {
+      for (const std::string& pattern :
+           all(debian(package + ".install"), "plugins-\\*/(\\S+)\\.so")) {
         CHECK_FALSE(names(pattern, heavy));
       }
     }

@@ -7,8 +7,8 @@
 
 namespace diorama::test {
 
-/// The folder of real third-party files beside the repository, or nothing where it is absent: then a
-/// test says so (WARN) and returns. DIORAMA_SHARED_DATA overrides the place.
+/// The folder of real third-party files beside the repository, or nothing where it is absent: then
+/// a test says so (WARN) and returns. DIORAMA_SHARED_DATA overrides the place.
 inline std::optional<std::filesystem::path> shared_folder() {
   const char* chosen = std::getenv("DIORAMA_SHARED_DATA");
   const std::filesystem::path folder = chosen ? chosen : DIORAMA_SOURCE_DIR "/../shared";

@@ -12,7 +12,8 @@
 
 // What components are and what they throw is found out at run time, across library borders.
 #if !defined(__cpp_rtti) || !defined(__cpp_exceptions)
-#error "Diorama's plugins are built with run-time type information and exceptions: remove -fno-rtti and -fno-exceptions"
+#error \
+    "Diorama's plugins are built with run-time type information and exceptions: remove -fno-rtti and -fno-exceptions"
 #endif
 
 #define DIORAMA_DETAIL_TEXT2(x) #x

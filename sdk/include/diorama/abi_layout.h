@@ -21,7 +21,7 @@
 #include "diorama/writer.h"
 
 /// Everything that two C++ binaries must agree on, in one line of text.
-#define DIORAMA_ABI_TAG                                                                         \
+#define DIORAMA_ABI_TAG \
   "sdk=" DIORAMA_DETAIL_TEXT(DIORAMA_SDK_ABI) " gxx=" DIORAMA_DETAIL_TEXT(__GXX_ABI_VERSION)    \
   " libstdcxx=" DIORAMA_DETAIL_TEXT(_GLIBCXX_RELEASE) " stl=" DIORAMA_DETAIL_STL                \
   " sanitizer=" DIORAMA_DETAIL_SANITIZER " std=" DIORAMA_DETAIL_TEXT(__cplusplus)               \

@@ -29,7 +29,7 @@ struct Camera {
   double fisheye_max_angle_rad = kPi;          ///< Largest angle off the axis that is imaged.
   double near_m = 0.25;                        ///< Nothing nearer along the axis is seen.
   double far_m = 1000.0;
-  double focal_length_mm = 24.0;        ///< Of the described lens; pixels follow fx.
+  double focal_length_mm = 24.0;  ///< Of the described lens; pixels follow fx.
   double horizontal_aperture_mm = 20.955;
   double focus_distance_m = 0.0;
   double f_stop = 0.0;  ///< 0: no depth of field.
@@ -46,8 +46,8 @@ struct Camera {
 };
 
 /// The one projection that renderer, annotators and writers share.
-/// Pixel coordinates of a point in camera space; may lie outside the image. Nothing for points on or
-/// behind the camera plane (pinhole models), beyond the lens's angle (fisheye), or where the
+/// Pixel coordinates of a point in camera space; may lie outside the image. Nothing for points on
+/// or behind the camera plane (pinhole models), beyond the lens's angle (fisheye), or where the
 /// distortion folds the picture over.
 DIORAMA_SDK_API std::optional<Vec2> project(const Camera& camera, const Vec3& point_camera);
 

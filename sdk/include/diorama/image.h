@@ -48,8 +48,8 @@ class Image {
   std::vector<Pixel> pixels_;
 };
 
-using AnyImage = std::variant<Image<Rgba8>, Image<float>, Image<Vec2f>, Image<Vec3f>,
-                              Image<std::uint32_t>>;
+using AnyImage =
+    std::variant<Image<Rgba8>, Image<float>, Image<Vec2f>, Image<Vec3f>, Image<std::uint32_t>>;
 
 /// Half open: x_max and y_max are one past the last pixel. Empty when x_min >= x_max. Coordinates
 /// may lie outside an image where the use says so.

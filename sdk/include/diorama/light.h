@@ -20,10 +20,10 @@ struct Light {
   /// Sphere, rect, disk: luminance of the surface, nits (cd/m^2). Dome: nits of a texel of value 1,
   /// or of the whole dome without a texture. Distant: illuminance of a surface facing it, in lux.
   Vec3f color = Vec3f::Ones();
-  double radius_m = 0.1;  ///< Sphere, disk.
-  double width_m = 1.0;   ///< Rect, along x.
-  double height_m = 1.0;  ///< Rect, along y.
-  double angle_rad = 0.0093;  ///< Distant: full angular diameter.
+  double radius_m = 0.1;                   ///< Sphere, disk.
+  double width_m = 1.0;                    ///< Rect, along x.
+  double height_m = 1.0;                   ///< Rect, along y.
+  double angle_rad = 0.0093;               ///< Distant: full angular diameter.
   std::shared_ptr<const Texture> texture;  ///< Dome only.
   /// Shaping: no light beyond this half angle from -z; kPi: no cone.
   double cone_angle_rad = kPi;

@@ -28,13 +28,13 @@ class DIORAMA_SDK_API Loader : public Component {
   virtual std::vector<std::string> assets() const;
 
   /// The files that `asset` consists of as far as they are there, itself first: layers, textures,
-  /// material libraries. As long as a loader does not say otherwise it is the file alone, or nothing
-  /// for a scheme. Throws Error(Asset) when the asset cannot be read.
+  /// material libraries. As long as a loader does not say otherwise it is the file alone, or
+  /// nothing for a scheme. Throws Error(Asset) when the asset cannot be read.
   virtual std::vector<std::filesystem::path> files(std::string_view asset) const;
 
   /// Fills the empty node `root` (pose, mesh, children ...) in metres, Z up. `asset` is a path that
-  /// exists or one of its own schemes. Throws Error(Asset) that begins with the asset's name; what it
-  /// added so far is then erased by the host. Same asset and parameters, same result.
+  /// exists or one of its own schemes. Throws Error(Asset) that begins with the asset's name; what
+  /// it added so far is then erased by the host. Same asset and parameters, same result.
   virtual void load(std::string_view asset, Scene& scene, NodeId root) = 0;
 };
 

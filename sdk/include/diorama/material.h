@@ -20,7 +20,7 @@ struct Texture {
   std::string name;  ///< For messages: the file it came from.
   int width = 0;
   int height = 0;
-  int channels = 0;  ///< 1 to 4.
+  int channels = 0;                             ///< 1 to 4.
   ColorSpace color_space = ColorSpace::Linear;  ///< Of the first three channels; alpha is linear.
   std::vector<std::uint8_t> bytes;              ///< 0..255 stands for 0..1.
   std::vector<float> floats;
@@ -58,8 +58,9 @@ struct Material {
   float transmission = 0.0f;  ///< 1: glass, tinted by base_color.
   /// Glass without a second surface (window panes): light passes straight.
   bool is_thin_walled = false;
-  /// Below opacity_threshold (if > 0) the surface is absent, above it is opaque; without a threshold
-  /// it is the share of light that meets the surface instead of passing straight through it.
+  /// Below opacity_threshold (if > 0) the surface is absent, above it is opaque; without a
+  /// threshold it is the share of light that meets the surface instead of passing straight through
+  /// it.
   float opacity = 1.0f;
   TextureInput opacity_texture;
   float opacity_threshold = 0.0f;

@@ -8,7 +8,8 @@
 #include "diorama/abi.h"
 
 /// Metres, radians, right-handed, world Z up. Column vectors: point_a = a_from_b * point_b.
-/// Camera space: x right, y up, looking along -z. Pixel (0,0) is top left, its centre at (0.5, 0.5).
+/// Camera space: x right, y up, looking along -z. Pixel (0,0) is top left, its centre at (0.5,
+/// 0.5).
 namespace diorama {
 
 static_assert(EIGEN_MAX_ALIGN_BYTES == 16, "link diorama::sdk, it pins Eigen's alignment");

@@ -10,7 +10,7 @@ namespace diorama {
 enum class ColliderShape : std::uint8_t {
   TriangleMesh,  ///< Exact, static bodies only; a moving body gets its convex hull.
   ConvexHull,
-  BoundingBox,     ///< Of the mesh in node space.
+  BoundingBox,  ///< Of the mesh in node space.
   BoundingSphere,
   /// The exact primitive when the node was made from one, see Collider::primitive.
   Primitive,

@@ -28,8 +28,8 @@ struct ComponentInfo {
   Listing listing;
   const void* context;  ///< Handed to both functions: what tells types apart that share them.
   std::vector<ParamSpec> (*describe)(const void* context);
-  /// Reads `params` (keys in `also_known` are the host's); complaints are collected, and no component
-  /// is made when there are any (null).
+  /// Reads `params` (keys in `also_known` are the host's); complaints are collected, and no
+  /// component is made when there are any (null).
   std::unique_ptr<Component> (*make)(const void* context, const Value& params,
                                      const std::string& path,
                                      std::span<const std::string_view> also_known,
@@ -97,14 +97,14 @@ void add(Registrar& registrar, const char* type, const char* help, const Listing
 struct DioramaPluginDescriptor {
   char magic[8];  // "DIORAMA" and NUL
   std::uint32_t descriptor_size;
-  std::uint32_t abi;       // DIORAMA_SDK_ABI
-  std::uint64_t layout;    // diorama::abi::kLayout
-  std::uint64_t headers;   // DIORAMA_HEADERS_DIGEST
-  char abi_tag[160];       // DIORAMA_ABI_TAG
+  std::uint32_t abi;      // DIORAMA_SDK_ABI
+  std::uint64_t layout;   // diorama::abi::kLayout
+  std::uint64_t headers;  // DIORAMA_HEADERS_DIGEST
+  char abi_tag[160];      // DIORAMA_ABI_TAG
   char name[64];
   char version[32];
-  char licence[64];        // SPDX expression
-  char build[96];          // compiler, for messages only
+  char licence[64];  // SPDX expression
+  char build[96];    // compiler, for messages only
 };
 
 /// One component as the library file lists it, in the ELF section ".diorama_components": the host
@@ -125,32 +125,34 @@ static_assert(sizeof(DioramaComponentEntry) % 64 == 0, "entries follow each othe
 inline constexpr std::uint32_t kDioramaLearnsTypes = 0xFFFFFFFFu;
 
 /// Registers T and lists it in the library file. Goes into the body of DIORAMA_PLUGIN.
-#define DIORAMA_ADD(T, TYPE, HELP)                                                              \
-  do {                                                                                          \
-    static_assert(T::kKind != diorama::ComponentKind::Annotator,                                \
-                  "annotators are registered with DIORAMA_ADD_ANNOTATOR");                      \
-    DIORAMA_DETAIL_ADD(T, TYPE, HELP, "", "", "");                                              \
+#define DIORAMA_ADD(T, TYPE, HELP)                                         \
+  do {                                                                     \
+    static_assert(T::kKind != diorama::ComponentKind::Annotator,           \
+                  "annotators are registered with DIORAMA_ADD_ANNOTATOR"); \
+    DIORAMA_DETAIL_ADD(T, TYPE, HELP, "", "", "");                         \
   } while (false)
 /// The same for a loader; CLAIMS is what its claims() returns, separated by blanks: ".obj .ply".
 #define DIORAMA_ADD_LOADER(T, TYPE, HELP, CLAIMS) DIORAMA_DETAIL_ADD(T, TYPE, HELP, CLAIMS, "", "")
 /// The same for an annotator; NEEDS and PROVIDES are what its needs() and provides() return with
 /// the default parameters, separated by blanks: "leaf_id position".
-#define DIORAMA_ADD_ANNOTATOR(T, TYPE, HELP, NEEDS, PROVIDES)                                   \
+#define DIORAMA_ADD_ANNOTATOR(T, TYPE, HELP, NEEDS, PROVIDES) \
   DIORAMA_DETAIL_ADD(T, TYPE, HELP, "", NEEDS, PROVIDES)
 /// Says that the library also registers types that it learns at run time. It is then loaded
 /// whenever components are listed, which costs what its libraries cost.
-#define DIORAMA_LEARNS_TYPES()                                                                  \
-  do {                                                                                          \
-    DIORAMA_DETAIL_LIST(kDioramaLearnsTypes, "", "", "", "", "");                               \
+#define DIORAMA_LEARNS_TYPES()                                    \
+  do {                                                            \
+    DIORAMA_DETAIL_LIST(kDioramaLearnsTypes, "", "", "", "", ""); \
   } while (false)
 
-#define DIORAMA_DETAIL_LIST(KIND, ...)                                                          \
-  __attribute__((section(".diorama_components"), used)) static const DioramaComponentEntry      \
-      diorama_entry{KIND, 0, __VA_ARGS__}
-#define DIORAMA_DETAIL_ADD(T, TYPE, HELP, CLAIMS, NEEDS, PROVIDES)                              \
-  do {                                                                                          \
-    DIORAMA_DETAIL_LIST(std::uint32_t(T::kKind), TYPE, HELP, CLAIMS, NEEDS, PROVIDES);          \
-    diorama::add<T>(registrar, TYPE, HELP, {CLAIMS, NEEDS, PROVIDES});                          \
+#define DIORAMA_DETAIL_LIST(KIND, ...)                                     \
+  __attribute__((section(".diorama_components"),                           \
+                 used)) static const DioramaComponentEntry diorama_entry { \
+    KIND, 0, __VA_ARGS__                                                   \
+  }
+#define DIORAMA_DETAIL_ADD(T, TYPE, HELP, CLAIMS, NEEDS, PROVIDES)                     \
+  do {                                                                                 \
+    DIORAMA_DETAIL_LIST(std::uint32_t(T::kKind), TYPE, HELP, CLAIMS, NEEDS, PROVIDES); \
+    diorama::add<T>(registrar, TYPE, HELP, {CLAIMS, NEEDS, PROVIDES});                 \
   } while (false)
 
 /// What the entry function returns.
@@ -164,21 +166,22 @@ struct DioramaPlugin {
 ///     DIORAMA_PLUGIN("randomizers_core", "1.0.0", "Apache-2.0") {
 ///       DIORAMA_ADD(ScatterPoses, "scatter_poses", "Places nodes at random.");
 ///     }
-#define DIORAMA_PLUGIN(NAME, VERSION, LICENCE)                                                  \
-  __attribute__((section(".diorama_plugin"), used)) static const DioramaPluginDescriptor        \
-      diorama_plugin_descriptor{"DIORAMA",                                                      \
-                                sizeof(DioramaPluginDescriptor),                                \
-                                DIORAMA_SDK_ABI,                                                \
-                                diorama::abi::kLayout,                                          \
-                                DIORAMA_HEADERS_DIGEST,                                         \
-                                DIORAMA_ABI_TAG,                                                \
-                                NAME,                                                           \
-                                VERSION,                                                        \
-                                LICENCE,                                                        \
-                                DIORAMA_DETAIL_COMPILER};                                       \
-  static void diorama_register(diorama::Registrar& registrar);                                  \
-  extern "C" DIORAMA_SDK_API const DioramaPlugin* diorama_plugin() {                            \
-    static const DioramaPlugin plugin{&diorama_plugin_descriptor, &diorama_register};           \
-    return &plugin;                                                                             \
-  }                                                                                             \
+#define DIORAMA_PLUGIN(NAME, VERSION, LICENCE)                                          \
+  __attribute__((section(".diorama_plugin"),                                            \
+                 used)) static const DioramaPluginDescriptor diorama_plugin_descriptor{ \
+      "DIORAMA",                                                                        \
+      sizeof(DioramaPluginDescriptor),                                                  \
+      DIORAMA_SDK_ABI,                                                                  \
+      diorama::abi::kLayout,                                                            \
+      DIORAMA_HEADERS_DIGEST,                                                           \
+      DIORAMA_ABI_TAG,                                                                  \
+      NAME,                                                                             \
+      VERSION,                                                                          \
+      LICENCE,                                                                          \
+      DIORAMA_DETAIL_COMPILER};                                                         \
+  static void diorama_register(diorama::Registrar& registrar);                          \
+  extern "C" DIORAMA_SDK_API const DioramaPlugin* diorama_plugin() {                    \
+    static const DioramaPlugin plugin{&diorama_plugin_descriptor, &diorama_register};   \
+    return &plugin;                                                                     \
+  }                                                                                     \
   static void diorama_register([[maybe_unused]] diorama::Registrar& registrar)

@@ -25,10 +25,10 @@ class DIORAMA_SDK_API Rng {
   double uniform(double lo, double hi);  ///< In [lo, hi); lo when both are equal.
   std::size_t index(std::size_t count);  ///< In [0, count), without bias; count > 0.
   bool chance(double probability);
-  double normal();               ///< Mean 0, standard deviation 1 (Box-Muller, two draws).
+  double normal();  ///< Mean 0, standard deviation 1 (Box-Muller, two draws).
   Vec3 uniform_in(const Aabb& box);
-  Vec3 unit_vector();            ///< Uniform on the sphere.
-  Quat uniform_rotation();       ///< Uniform on SO(3) (Shoemake 1992).
+  Vec3 unit_vector();       ///< Uniform on the sphere.
+  Quat uniform_rotation();  ///< Uniform on SO(3) (Shoemake 1992).
 
  private:
   std::uint64_t key_;

@@ -49,7 +49,8 @@ struct Node {
 };
 
 /// Everything that can be seen and simulated: a tree of named nodes. A concrete class on purpose:
-/// there will be one implementation. Not thread safe for writing; reading from many threads is fine.
+/// there will be one implementation. Not thread safe for writing; reading from many threads is
+/// fine.
 class DIORAMA_SDK_API Scene {
  public:
   Scene();

@@ -31,8 +31,10 @@ Value nested() {
       "a: 1\n'on': yes\nempty: []\nnone: {}\n'null': \n"
       "list: [1, 'two', \"3\", null, [4, [5]], {k: {l: [m, {n: o}]}}]\n"
       "maps:\n  - {type: x, deep: [{p: q}, {r: 's: t'}]}\n  - - - x\n"
-      "texts: ['', ' ', 'a: b', '#c', '- d', '%e', '@f', '`g', \"h\\ti\\x01\", 'true', '1e3', '~',\n"
-      "  '*j', '&k', '!l', '|', '>', '?', 'm, n', '[', '<<', \"two\\nlines\", 'ümlaut', '\\\\d+_']\n"
+      "texts: ['', ' ', 'a: b', '#c', '- d', '%e', '@f', '`g', \"h\\ti\\x01\", 'true', '1e3', "
+      "'~',\n"
+      "  '*j', '&k', '!l', '|', '>', '?', 'm, n', '[', '<<', \"two\\nlines\", 'ümlaut', "
+      "'\\\\d+_']\n"
       "'key with: colon': {'': x}\n",
       "j");
 }

@@ -51,7 +51,8 @@ bool run_reference(const std::string& command, const fs::path& folder) {
     return false;
   }
   const std::string script = DIORAMA_SOURCE_DIR "/tests/framework/images/reference_images.py ";
-  REQUIRE(std::system(("/usr/bin/python3 " + script + command + " " + folder.string()).c_str()) == 0);
+  REQUIRE(std::system(("/usr/bin/python3 " + script + command + " " + folder.string()).c_str()) ==
+          0);
   return true;
 }
 

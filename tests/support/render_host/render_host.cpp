@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "support/render_host/render_host.h"
 
-#include <fstream>
 #include <filesystem>
+#include <fstream>
 
 #include "diorama/error.h"
 #include "framework/images/image_codecs.h"
