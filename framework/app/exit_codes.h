@@ -7,6 +7,5 @@ namespace diorama {
 
 inline constexpr int kDatasetIncomplete = 8;  ///< `status` and `finish`: captures are missing.
 inline constexpr int kBusy = 75;              ///< Another process has this part; later it is free.
-inline constexpr int kInterrupted = 130;  ///< Asked to stop, unless --stopped-exit-code says so.
 
 }  // namespace diorama

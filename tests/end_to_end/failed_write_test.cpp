@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <sstream>
 
 #include "program.h"
 #include "support/catch.h"
@@ -89,14 +90,19 @@ void expect_whole_captures(const fs::path& output) {
   const auto left = tree(output);
   std::size_t captures = 0;
   std::set<std::string> owned{"dataset.json"};
-  for (const auto& [name, text] : left) {
-    if (!name.starts_with(".diorama/journal/")) continue;
-    owned.insert(name);
-    if (name.find("begin") == std::string::npos) ++captures;
-    const auto entry = nlohmann::json::parse(text);
-    for (const auto& file : entry.at("files")) {
-      const std::string writer = file.at(0).get<std::string>();
-      owned.insert((writer.empty() ? "" : writer + "/") + file.at(1).get<std::string>());
+  for (const auto& [name, text] : tree(output / ".diorama/journal")) {
+    if (!name.ends_with(".index")) continue;
+    const std::string entries =
+        read_file(output / ".diorama/journal" / (name.substr(0, name.size() - 6) + ".entries"));
+    std::istringstream lines(text);
+    for (std::string kind, entry; lines >> kind >> entry;) {
+      std::size_t offset = 0, length = 0;
+      if (kind == "c" && lines >> offset >> length) {
+        if (entry != "begin") ++captures;
+        const auto json = nlohmann::json::parse(entries.substr(offset, length));
+        for (const auto& file : json.at("files")) owned.insert(file.at(0).get<std::string>());
+      }
+      lines.ignore(1000, '\n');
     }
   }
   CHECK(captures > 0);

@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+// Several processes on one dataset, and what tells how far it is.
+#include <csignal>
+#include <nlohmann/json.hpp>
+
+#include "program.h"
+#include "support/catch.h"
+
+using namespace diorama::test;
+
+namespace {
+
+constexpr int kCaptures = 20;  // in ten visits
+
+std::vector<std::string> job(std::vector<std::string> more = {}) {
+  std::vector<std::string> arguments{"run",   config_file("smoke.yaml"), "--output", "out",
+                                     "--set", "total_captures=20"};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return arguments;
+}
+
+const std::map<std::string, std::string>& whole_dataset() {
+  static const std::map<std::string, std::string> files = [] {
+    const TemporaryFolder folder;
+    REQUIRE(run(job(), folder.path()).exit_code == 0);
+    return tree(folder / "out");
+  }();
+  return files;
+}
+
+/// A folder of its own for each process, so that their outputs do not mix; "out" is one for all.
+fs::path place_of(const TemporaryFolder& folder, int number) {
+  const fs::path place = folder / ("process" + std::to_string(number));
+  fs::create_directories(place);
+  fs::create_directories(folder / "out");
+  fs::create_directory_symlink(folder / "out", place / "out");
+  return place;
+}
+
+nlohmann::json status_of(const TemporaryFolder& folder) {
+  return nlohmann::json::parse(run({"status", "out", "--json"}, folder.path()).output);
+}
+
+}  // namespace
+
+TEST_CASE("Shards side by side make the dataset of one run", "[workers]") {
+  const TemporaryFolder folder;
+  std::vector<Process> processes;
+  for (int i = 0; i < 4; ++i) {
+    processes.emplace_back(job({"--shard", std::to_string(i + 1) + "/4", "--threads", "1"}),
+                           place_of(folder, i));
+  }
+  for (Process& process : processes) {
+    const Outcome outcome = process.wait();
+    INFO(outcome.errors);
+    CHECK(outcome.exit_code == 0);
+  }
+  CHECK(difference(whole_dataset(), tree(folder / "out")) == "");
+  CHECK(run({"status", "out"}, folder.path()).exit_code == 0);
+}
+
+TEST_CASE("Workers that take visits share a job, also when one of them is killed", "[workers]") {
+  const TemporaryFolder folder;
+  std::vector<Process> processes;
+  for (int i = 0; i < 3; ++i) {
+    processes.emplace_back(job({"--shard", "auto", "--threads", "1"}), place_of(folder, i));
+  }
+  while (!fs::exists(folder / "out/dataset.json")) ::usleep(1000);
+  processes[0].signal(SIGKILL);
+  for (Process& process : processes) {
+    const Outcome outcome = process.wait();
+    INFO(outcome.errors);
+    if (&process != &processes[0]) CHECK(outcome.exit_code == 0);
+  }
+  const Outcome last = run(job({"--shard", "auto"}), folder.path());
+  INFO(last.errors);
+  CHECK(last.exit_code == 0);
+  CHECK(difference(whole_dataset(), tree(folder / "out")) == "");
+}
+
+TEST_CASE("A shard that runs twice ends with 75 and names who has it", "[workers]") {
+  const TemporaryFolder folder;
+  Process first(job({"--shard", "1/2", "--threads", "1"}), place_of(folder, 0));
+  while (!fs::exists(folder / "out/dataset.json")) ::usleep(1000);
+  first.signal(SIGSTOP);
+  const Outcome second = run(job({"--shard", "1/2"}), folder.path());
+  CHECK(second.exit_code == 75);
+  CHECK_THAT(
+      second.errors,
+      ContainsSubstring("another process works on this dataset as shard 1 of 2, too (host ") &&
+          ContainsSubstring(", process "));
+  CHECK(run(job({"--overwrite"}), folder.path()).exit_code == 75);
+  const auto status = status_of(folder);
+  CHECK(status.at("finished") == false);
+  CHECK(status.at("captures") == kCaptures);
+  CHECK(status.at("workers").at(0).at("state") == "alive");
+  CHECK(status.at("workers").at(0).at("role") == "shard-1-of-2");
+  first.signal(SIGCONT);
+  const Outcome outcome = first.wait();
+  CHECK(outcome.exit_code == 0);
+  CHECK_THAT(outcome.errors, ContainsSubstring("this part is done, the dataset lacks 10 captures"));
+  CHECK(run({"status", "out"}, folder.path()).exit_code == 8);
+  CHECK(run({"finish", "out"}, folder.path()).exit_code == 8);
+  CHECK(run(job({"--shard", "2/2"}), folder.path()).exit_code == 0);
+  CHECK(difference(whole_dataset(), tree(folder / "out")) == "");
+}
+
+TEST_CASE("A signal ends a run with the code that the scheduler wants", "[workers]") {
+  const TemporaryFolder folder;
+  Process process(job({"--stopped-exit-code", "99", "--progress", "json"}), folder.path());
+  while (!fs::exists(folder / "out/dataset.json")) ::usleep(1000);
+  process.signal(SIGTERM);
+  const Outcome outcome = process.wait();
+  CHECK(outcome.exit_code == 99);
+  CHECK(run(job({"--resume"}), folder.path()).exit_code == 0);
+  CHECK(difference(whole_dataset(), tree(folder / "out")) == "");
+}
+
+TEST_CASE("Progress comes as lines for programs", "[workers]") {
+  const TemporaryFolder folder;
+  const Outcome json = run(job({"--progress", "json"}), folder.path());
+  REQUIRE(json.exit_code == 0);
+  std::istringstream lines(json.output);
+  int count = 0;
+  for (std::string line; std::getline(lines, line);) {
+    const auto object = nlohmann::json::parse(line);
+    CHECK(object.at("done") == ++count);
+    CHECK(object.at("total") == kCaptures);
+    CHECK(object.at("rss_mib").get<double>() > 1.0);
+    CHECK(object.contains("per_minute"));
+    CHECK(object.contains("seconds_left"));
+  }
+  CHECK(count == kCaptures);
+  const Outcome openjd = run(job({"--progress", "openjd", "--overwrite"}), folder.path());
+  CHECK_THAT(openjd.output, ContainsSubstring("openjd_progress: 5.0\n") &&
+                                ContainsSubstring("openjd_progress: 100.0\n") &&
+                                ContainsSubstring("openjd_status: 20 of 20 captures\n"));
+}
+
+TEST_CASE("What was deleted or damaged is found and made anew", "[workers]") {
+  const TemporaryFolder folder;
+  REQUIRE(run(job(), folder.path()).exit_code == 0);
+  const auto whole = tree(folder / "out");
+  std::string picture;
+  for (const auto& [name, text] : whole) {
+    if (name.ends_with("rgb_0007.png")) picture = name;
+  }
+  REQUIRE(!picture.empty());
+  fs::remove(folder / "out" / picture);
+  CHECK(run({"status", "out"}, folder.path()).exit_code == 0);
+  const Outcome found = run({"status", "out", "--verify"}, folder.path());
+  CHECK(found.exit_code == 8);
+  CHECK_THAT(found.output, ContainsSubstring(picture + ": missing"));
+  const Outcome repaired = run(job({"--resume", "--verify"}), folder.path());
+  INFO(repaired.errors);
+  CHECK(repaired.exit_code == 0);
+  CHECK_THAT(repaired.errors, ContainsSubstring("is missing; it is made anew"));
+  CHECK(difference(whole, tree(folder / "out")) == "");
+  CHECK(run({"status", "out", "--verify"}, folder.path()).exit_code == 0);
+}
+
+TEST_CASE("A dataset whose captures are all there is finished by its own job", "[workers]") {
+  const TemporaryFolder folder;
+  REQUIRE(run(job(), folder.path()).exit_code == 0);
+  // As if the last worker had been killed before the end: nothing says that it is finished.
+  for (const auto& entry : fs::directory_iterator(folder / "out/.diorama/journal")) {
+    if (entry.path().extension() != ".index") continue;
+    const std::string text = read_file(entry.path());
+    const std::size_t end = text.rfind("c finish ");
+    write_file(entry.path(), text.substr(0, end));
+  }
+  CHECK(run({"status", "out"}, folder.path()).exit_code == 8);
+  const Outcome outcome = run({"finish", "out"}, folder.path());
+  INFO(outcome.errors);
+  CHECK(outcome.exit_code == 0);
+  CHECK(run({"status", "out"}, folder.path()).exit_code == 0);
+  CHECK(difference(whole_dataset(), tree(folder / "out")) == "");
+  CHECK(run({"finish", "out"}, folder.path()).exit_code == 0);
+}
