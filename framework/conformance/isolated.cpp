@@ -104,8 +104,12 @@ void enter(const Scratch& scratch) {
 /// order.
 void move_addresses(Surroundings number) {
   constexpr std::size_t kPage = 4096;
-  mmap(nullptr, number * 977 * kPage, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1,
-       0);
+  // Large and small, so that no gap is left where the library lay before.
+  for (std::size_t pages = 1024; pages > 0; pages /= 2) {
+    for (std::uint64_t i = 0; i < 16 * number; ++i) {
+      mmap(nullptr, pages * kPage, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+    }
+  }
   static std::vector<std::unique_ptr<char[]>> blocks;  // those that are not given back
   for (std::size_t size = 16; size <= 2048; size += 16) {
     for (int i = 0; i < 64; ++i) blocks.push_back(std::make_unique<char[]>(size));

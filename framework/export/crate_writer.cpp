@@ -46,9 +46,9 @@ std::uint64_t inlined(Type type, std::uint32_t bits) { return rep(type, bits) | 
 
 template <class Plain>
 void append(Bytes& bytes, const Plain& value) {
-  const std::size_t at = bytes.size();
-  bytes.resize(at + sizeof value);
-  std::memcpy(bytes.data() + at, &value, sizeof value);
+  // Eigen's vectors are plain numbers, but do not say so to the language: byte by byte, then.
+  const auto* const begin = reinterpret_cast<const Bytes::value_type*>(&value);
+  bytes.insert(bytes.end(), begin, begin + sizeof value);
 }
 void append(Bytes& bytes, const Bytes& more) {
   bytes.insert(bytes.end(), more.begin(), more.end());

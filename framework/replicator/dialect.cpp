@@ -404,6 +404,13 @@ class Translator {
     set("cameras", std::move(cameras));
   }
 
+  bool has_objects_below(const std::string& pattern) {
+    const std::vector<Value>& groups = result_.job.find("objects")->list;
+    return std::any_of(groups.begin(), groups.end(), [&](const Value& group) {
+      return pattern.starts_with(group.find("under")->scalar + "/");
+    });
+  }
+
   void add_randomizers(const CaptureBlock& capture) {
     Value list = native(R"([
       {type: scatter_poses, name: target_poses, on: [environment], nodes: "/Assets/*",
@@ -434,6 +441,11 @@ class Translator {
       entry.set("distance", numbers(capture.distance.lo, capture.distance.hi));
       entry.set("look_at_offset", numbers(-capture.look_at_offset, capture.look_at_offset));
     }
+    // Of distractors that the file does not have there is nothing to randomize.
+    std::erase_if(list.list, [&](const Value& entry) {
+      const std::string& nodes = entry.find("nodes")->scalar;
+      return nodes.starts_with("/Distractors/") && !has_objects_below(nodes);
+    });
     set("randomizers", std::move(list));
   }
 

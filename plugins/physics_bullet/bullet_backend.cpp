@@ -118,7 +118,7 @@ void BulletBackend::do_reset(const Scene& scene) {
   // The solver's own generator starts anew with each world.
   info.m_solverMode |= SOLVER_RANDMIZE_ORDER;
   // A share of what stacks need is enough for most contacts.
-  info.m_leastSquaresResidualThreshold = 1e-9;
+  info.m_leastSquaresResidualThreshold = 1e-12;
   info.m_splitImpulse = true;
   // Every overlap is undone by moving, none by speed.
   info.m_splitImpulsePenetrationThreshold = 0.0;

@@ -82,9 +82,9 @@ TEST_CASE("mistakes on the command line end with code 2", "[cli]") {
   check_error(run_program("--log-level loud plugins"), 2,
               "log level 'loud' is unknown; there are debug, info, warning and error");
   check_error(run_program("run a.yaml --shard 3/2"), 2,
-              "--shard: expected i/n with 1 <= i <= n, for instance 2/5, found '3/2'");
+              "--shard: expected `auto`, or i/n with 1 <= i <= n, for instance 2/5, found '3/2'");
   check_error(run_program("run a.yaml --shard 1/2x"), 2,
-              "--shard: expected i/n with 1 <= i <= n, for instance 2/5, found '1/2x'");
+              "--shard: expected `auto`, or i/n with 1 <= i <= n, for instance 2/5, found '1/2x'");
 }
 
 TEST_CASE("mistakes in job files end with code 3 and all of them are named", "[cli]") {
@@ -94,7 +94,8 @@ TEST_CASE("mistakes in job files end with code 3 and all of them are named", "[c
   const auto syntax = folder.write("syntax.yaml", "seed: [1\n");
   const auto run = run_program("run " + syntax.string());
   CHECK(run.code == 3);
-  CHECK(run.err.starts_with("error: " + syntax.string() + ":2:1: YAML syntax error: "));
+  CHECK_THAT(run.err, ContainsSubstring(syntax.string() + ":1:7: YAML syntax error: ") &&
+                          ContainsSubstring("the `[` that opens here is not closed"));
   const auto wrong = folder.write("wrong.yaml",
                                   "sead: 1\ntotal_captures: -2\nenvironments: [{type: shapes}]\n"
                                   "cameras: [{type: pinhole, width: wide}]\n");

@@ -85,6 +85,12 @@ class Tutorial {
  public:
   explicit Tutorial(std::uint64_t seed) {
     job.seed = seed;
+    // What is drawn is in question here, not what has no room and is drawn again.
+    for (RandomizerEntry& entry : job.randomizers) {
+      if (entry.type == "scatter_lights") {
+        entry.component.map.set("clearance_m", Value::number(0.0));
+      }
+    }
     plan = plan_of(job);
     scene = scene_of(job, plan, host);
   }
