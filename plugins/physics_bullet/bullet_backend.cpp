@@ -54,8 +54,7 @@ void BulletBackend::Params::visit(ParamVisitor& v) {
   v.param("rolling_friction", rolling_friction,
           {"Rolling resistance as a share of a body's radius, so that balls stop.", "", 0, 1});
   v.param("solver_iterations", solver_iterations,
-          {"Sweeps of the contact solver per solver step at most; it stops when nothing changes.",
-           "", 1, 1000});
+          {"Sweeps of the contact solver per solver step.", "", 1, 1000});
   v.param(
       "ccd", ccd,
       {"Continuous detection for fast and small bodies, which else tunnel through thin things."});
@@ -114,11 +113,6 @@ void BulletBackend::do_reset(const Scene& scene) {
       btVector3(params_.gravity.x(), params_.gravity.y(), params_.gravity.z()));
   btContactSolverInfo& info = world.dynamics.getSolverInfo();
   info.m_numIterations = params_.solver_iterations;
-  // Always from the first contact to the last, a stack leans into the solver's order and creeps.
-  // The solver's own generator starts anew with each world.
-  info.m_solverMode |= SOLVER_RANDMIZE_ORDER;
-  // A share of what stacks need is enough for most contacts.
-  info.m_leastSquaresResidualThreshold = 1e-12;
   info.m_splitImpulse = true;
   // Every overlap is undone by moving, none by speed.
   info.m_splitImpulsePenetrationThreshold = 0.0;
