@@ -7,8 +7,9 @@ function(run)
   endif()
 endfunction()
 
+cmake_host_system_information(RESULT processors QUERY NUMBER_OF_LOGICAL_CORES)
 run(${CMAKE_COMMAND} -S ${SOURCE}/tests/fuzz/usd -B ${BUILD} -DCMAKE_CXX_COMPILER=${CLANGXX})
-run(${CMAKE_COMMAND} --build ${BUILD} --parallel)
+run(${CMAKE_COMMAND} --build ${BUILD} --parallel ${processors})
 file(MAKE_DIRECTORY ${BUILD}/corpus ${BUILD}/seeds)
 if(EXISTS ${SOURCE}/../shared/data/usd)
   file(GLOB_RECURSE files ${SOURCE}/../shared/data/usd/*.usd ${SOURCE}/../shared/data/usd/*.usda
