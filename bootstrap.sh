@@ -4,8 +4,9 @@
 #   ./bootstrap.sh demo     install what is needed, build, make the sample pack, run the default job
 #   ./bootstrap.sh test     install what is needed, build, run every test
 #   ./bootstrap.sh build    install what is needed, build
-#   ./bootstrap.sh sanitize install what is needed, build with sanitizers and run what reads files of others,
-#                           the renderer (address, undefined) and what has threads (thread)
+#   ./bootstrap.sh sanitize install what is needed, build with sanitizers and run what reads files of others
+#                           (address, undefined) and what has threads (thread)
+#   ./bootstrap.sh sanitize-more the same for tests that take longer, the renderer's among them
 #   ./bootstrap.sh packages install what is needed for all of these, tests/check_format.sh and tests/check_tidy.sh
 # Options: --preset NAME   a preset of CMakePresets.json (default: release)
 set -euo pipefail
@@ -25,17 +26,19 @@ test_packages=(
 )
 
 check_packages=(clang-format-14 clang-tidy-14)
-# Tests by what they are about, for the sanitizers; all of them would take an hour each.
+# Tests by what they are about, for the sanitizers: in every run of CI, and by night.
 foreign_bytes=(
-  sdk_test config_test replicator_test host_test plugin_search_test images_test pipeline_test lint_test
-  framework_inspect_test loader_usd_test loader_usd_expected loader_assimp_test physics_bullet_test
-  writer_support_test
+  sdk_test config_test host_test images_test pipeline_test output_test lint_test loader_usd_test
+  physics_bullet_test writer_support_test
 )
-renderer=(renderer_embree_test)
-threads=(host_test pipeline_test)
+by_night=(
+  replicator_test plugin_search_test framework_inspect_test loader_usd_expected loader_assimp_test
+  renderer_embree_test
+)
+threads=(host_test pipeline_test output_test)
 mapfile -t writers < <(cd plugins && ls -d writer_*/ | sed '/^writer_support/d; s,/,,')
 
-usage() { sed -n '3,10s/^# \{0,1\}//p' "$0"; }
+usage() { sed -n '3,11s/^# \{0,1\}//p' "$0"; }
 
 # Installs the packages that dpkg does not list as installed; says which. sudo only when not root.
 install_packages() {
@@ -133,9 +136,13 @@ case $command in
     ;;
   sanitize)
     install_packages "${build_packages[@]}" "${test_packages[@]}"
-    sanitize asan "${foreign_bytes[@]}" "${renderer[@]}"
+    sanitize asan "${foreign_bytes[@]}"
     sanitize tsan "${threads[@]}"
     run_all_writers tsan
+    ;;
+  sanitize-more)
+    install_packages "${build_packages[@]}" "${test_packages[@]}"
+    sanitize asan "${by_night[@]}"
     ;;
   packages) install_packages "${build_packages[@]}" "${test_packages[@]}" "${check_packages[@]}" ;;
   help | -h | --help) usage ;;

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # What takes longer than CI may. Every part runs, whatever the others say; ends with a table, and with 1 when
 # one failed.
-#   tests/nightly.sh [PART]...   build kills faults cluster soak fuzz tidy deb12 deb13 (default: all)
+#   tests/nightly.sh [PART]...   build kills faults cluster soak fuzz sanitize tidy deb12 deb13 (default: all)
 # Needs root for cluster, deb12 and deb13. KILLS (1000), FAULTS (5000), SOAK_CAPTURES (10000) and FUZZ_MINUTES
 # (60, shared by all fuzzers) say how much. Logs are in build/nightly.
 set -uo pipefail
@@ -35,12 +35,13 @@ part_fuzz() {
   done
   return "$failed"
 }
+part_sanitize() { ./bootstrap.sh sanitize-more; }
 part_tidy() { tests/check_tidy.sh --all-checks; }
 part_deb12() { packaging/build-deb.sh --with-tests && packaging/test-deb.sh; }
 part_deb13() { packaging/test-deb.sh trixie; }
 
 parts=("$@")
-if ((${#parts[@]} == 0)); then parts=(build kills faults cluster soak fuzz tidy deb12 deb13); fi
+if ((${#parts[@]} == 0)); then parts=(build kills faults cluster soak fuzz sanitize tidy deb12 deb13); fi
 for part in "${parts[@]}"; do
   if ! declare -F "part_$part" >/dev/null; then echo "nightly: there is no part '$part'" >&2; exit 2; fi
 done

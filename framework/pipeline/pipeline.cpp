@@ -425,8 +425,9 @@ Frame Pipeline::make_frame(Visit& visit, std::size_t camera, int capture) {
     frame = call_component(who, [&] { return components_.renderer->render(request); });
   }
   const Clock clock(summary_, "annotating");
-  for (const auto& [type, annotator] : components_.annotators) {
-    call_component("annotator '" + type + "'", [&] { annotator->annotate(visit.scene, frame); });
+  for (const auto& entry : components_.annotators) {
+    call_component("annotator '" + entry.type + "'",
+                   [&] { entry.annotator->annotate(visit.scene, frame); });
   }
   if (components_.demand.visibility) {
     const auto instances = labelled_instances(visit.scene);
