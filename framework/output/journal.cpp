@@ -342,49 +342,51 @@ void Journals::take(const std::string& worker, WorkerIndex& index, const Line& l
   }
 }
 
+/// Without its checksum; empty when it is no line of an index.
+std::optional<Journals::Line> Journals::parse(std::string_view text) {
+  const auto words = words_of(text);
+  Line line;
+  if (words.front().size() != 1) return {};
+  line.kind = words.front().front();
+  std::optional<int> entry;
+  switch (line.kind) {
+    case 's':
+      return words.size() == 1 ? std::optional(line) : std::nullopt;
+    case 'h':
+    case 'c': {
+      if (line.kind == 'c') entry = words.size() > 1 ? entry_in(words[1]) : std::nullopt;
+      const auto place = place_in(words, line.kind == 'h' ? 1 : 2);
+      if (!place || (line.kind == 'c' && !entry)) return {};
+      line.place = *place;
+      line.place.entry = entry.value_or(0);
+      return line;
+    }
+    case 'd':
+      if (words.size() != 2 || !(entry = entry_in(words[1]))) return {};
+      line.entry = *entry;
+      return line;
+    case 'p':
+    case 'v':
+      if (words.size() != 3 || !is_plain_name(words[1])) return {};
+      if (!(entry = entry_in(words[2]))) return {};
+      line.worker = words[1];
+      line.entry = *entry;
+      return line;
+    case 'r': {
+      const auto bytes = words.size() == 3 ? number_in(words[2]) : std::nullopt;
+      if (!bytes || !is_plain_name(words[1])) return {};
+      line.worker = words[1];
+      line.bytes = *bytes;
+      return line;
+    }
+    default:
+      return {};
+  }
+}
+
 void Journals::read_worker(const std::string& worker) {
   constexpr std::uint64_t kBlock = std::uint64_t(1) << 22;
   const fs::path file = index_file(worker);
-  const auto parse = [&](std::string_view text) -> std::optional<Line> {
-    const auto words = words_of(text);
-    Line line;
-    if (words.front().size() != 1) return {};
-    line.kind = words.front().front();
-    std::optional<int> entry;
-    switch (line.kind) {
-      case 's':
-        return words.size() == 1 ? std::optional(line) : std::nullopt;
-      case 'h':
-      case 'c': {
-        if (line.kind == 'c') entry = words.size() > 1 ? entry_in(words[1]) : std::nullopt;
-        const auto place = place_in(words, line.kind == 'h' ? 1 : 2);
-        if (!place || (line.kind == 'c' && !entry)) return {};
-        line.place = *place;
-        line.place.entry = entry.value_or(0);
-        return line;
-      }
-      case 'd':
-        if (words.size() != 2 || !(entry = entry_in(words[1]))) return {};
-        line.entry = *entry;
-        return line;
-      case 'p':
-      case 'v':
-        if (words.size() != 3 || !is_plain_name(words[1])) return {};
-        if (!(entry = entry_in(words[2]))) return {};
-        line.worker = words[1];
-        line.entry = *entry;
-        return line;
-      case 'r': {
-        const auto bytes = words.size() == 3 ? number_in(words[2]) : std::nullopt;
-        if (!bytes || !is_plain_name(words[1])) return {};
-        line.worker = words[1];
-        line.bytes = *bytes;
-        return line;
-      }
-      default:
-        return {};
-    }
-  };
   WorkerIndex& index = workers_[worker];
   for (;;) {
     const std::string block = file_system_.read_part(file, index.bytes_read, kBlock);

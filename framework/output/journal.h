@@ -163,6 +163,7 @@ class Journals {
  private:
   using Voids = std::set<std::pair<std::string, int>>;
   struct Line;
+  static std::optional<Line> parse(std::string_view text);
   std::vector<std::string> worker_names() const;
   void read_worker(const std::string& worker);
   void take(const std::string& worker, WorkerIndex& index, const Line& line);
