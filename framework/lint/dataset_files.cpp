@@ -107,8 +107,8 @@ NpyArray parse_npy(const std::string& bytes) {
     throw std::runtime_error("holds " + std::to_string(held) + " bytes of data, its header says " +
                              std::to_string(expected));
   }
-  array.data.resize(expected);
-  std::memcpy(array.data.data(), bytes.data() + 10 + length, expected);
+  const auto data = std::as_bytes(std::span(bytes)).last(expected);
+  array.data.assign(data.begin(), data.end());
   return array;
 }
 
