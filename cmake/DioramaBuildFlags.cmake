@@ -6,7 +6,7 @@ target_compile_options(diorama_build_flags INTERFACE -Wall -Wextra -Wpedantic -W
 # GCC 12 sees overlaps and overruns in std::string that are not there (GCC bugs 105651, 105329, 105762).
 if(CMAKE_CXX_COMPILER_ID STREQUAL GNU AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
   target_compile_options(diorama_build_flags INTERFACE -Wno-restrict -Wno-array-bounds
-                                                       -Wno-stringop-overflow)
+                                                       -Wno-stringop-overflow -Wno-stringop-overread)
 elseif(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
   # GCC 13 takes a reference that a function returns for one into its temporary arguments (107532).
   target_compile_options(diorama_build_flags INTERFACE -Wno-dangling-reference)
