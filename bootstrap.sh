@@ -25,7 +25,7 @@ test_packages=(
   python3-minimal python3-h5py python3-jsonschema python3-numpy python3-opencv
 )
 
-check_packages=(clang-format-14 clang-tidy-14)
+check_packages=(clang-format-14 clang-tidy-19)
 # Tests by what they are about, for the sanitizers: in every run of CI, and by night.
 foreign_bytes=(
   sdk_test config_test host_test images_test pipeline_test output_test lint_test loader_usd_test

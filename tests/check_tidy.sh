@@ -36,7 +36,7 @@ export last=$(($(date +%s) + 60 * minutes)) build log checks
 # shellcheck disable=SC2016  # expanded by the inner shell
 if ! printf '%s\0' "${files[@]}" | xargs -0 -n 1 -P "$(nproc)" bash -c '
   if (($(date +%s) >= last)); then exit 0; fi
-  clang-tidy-14 --quiet -p "$build" $checks "$0" 2>/dev/null || exit 1
+  clang-tidy-19 --quiet -p "$build" $checks "$0" 2>/dev/null || exit 1
   echo "$0" >>"$log"'; then
   echo 'check_tidy: see above' >&2
   exit 1

@@ -7,7 +7,9 @@
 #include <fstream>
 
 namespace diorama {
+namespace {
 
+/// Memory that this process has in use (resident set), bytes; 0 where the system does not say.
 std::uint64_t resident_bytes() {
   std::ifstream stream("/proc/self/statm");
   std::uint64_t all = 0;
@@ -15,6 +17,8 @@ std::uint64_t resident_bytes() {
   if (!(stream >> all >> resident)) return 0;
   return resident * std::uint64_t(::sysconf(_SC_PAGESIZE));
 }
+
+}  // namespace
 
 ProgressLines::ProgressLines(Format format, std::ostream& stream)
     : format_(format), stream_(stream), start_(std::chrono::steady_clock::now()) {}

@@ -29,7 +29,4 @@ class ProgressLines {
   std::chrono::steady_clock::time_point start_;
 };
 
-/// Memory that this process has in use (resident set), bytes; 0 where the system does not say.
-std::uint64_t resident_bytes();
-
 }  // namespace diorama

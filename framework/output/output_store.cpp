@@ -486,13 +486,17 @@ void OutputStore::take_back(const std::string& worker, const EntryPlace& place,
 }
 
 void OutputStore::verify_all() {
+  // Whoever is dead stays so: a worker's name is never used again.
+  std::string looked_at;
+  bool lives = false;
   journals_.visit_entries([&](const std::string& worker, const EntryPlace& place) {
-    const auto lives = [&](const Workers::Lease& lease) {
-      return lease.worker == worker && workers_.is_alive(lease);
-    };
-    const auto others = workers_.others();
-    if (!place.is_published || std::any_of(others.begin(), others.end(), lives)) return;
-    settle_entry(worker, place);
+    if (std::exchange(looked_at, worker) != worker) {
+      const auto others = workers_.others();
+      lives = std::any_of(others.begin(), others.end(), [&](const Workers::Lease& lease) {
+        return lease.worker == worker && workers_.is_alive(lease);
+      });
+    }
+    if (place.is_published && !lives) settle_entry(worker, place);
   });
   journals_.refresh();
 }
