@@ -202,7 +202,7 @@ void tell_unused_assets(const JobAssembly& assembly, const std::optional<fs::pat
     host.log(LogLevel::Info,
              "objects '" + assembly.job.objects[i].name + "': " + std::to_string(unused[i].size()) +
                  " of " + std::to_string(assembly.plan.object_assets[i].size()) +
-                 " assets are left out (`pick: per_visit`, `balance: true` or a larger `count` "
+                 " assets are left out ('pick: per_visit', 'balance: true' or a larger 'count' "
                  "takes more): " +
                  names);
   }
@@ -279,8 +279,7 @@ OutputFolders output_folders(const Job& job) {
     const fs::path place = (base / name).lexically_normal().lexically_relative(base);
     std::string text = place.has_filename() ? place.string() : place.parent_path().string();
     if (text != "." && !is_plain_relative(text)) {
-      throw Error(ErrorKind::Internal,
-                  "the folder \"" + name + "\" is not below the output folder");
+      throw Error(ErrorKind::Internal, "the folder '" + name + "' is not below the output folder");
     }
     return text;
   };

@@ -105,7 +105,7 @@ CLI::Validator whole_number() {
     const char* end = text.data() + text.size();
     const auto [rest, failed] = std::from_chars(text.data(), end, value);
     if (failed == std::errc() && rest == end) return {};
-    return "expected a whole number of 0 to 18446744073709551615, found \"" + text + "\"";
+    return "expected a whole number of 0 to 18446744073709551615, found '" + text + "'";
   };
   return CLI::Validator(check, "");
 }
@@ -138,7 +138,7 @@ void read_shard(const std::string& text, RunCommandOptions& run) {
   if (std::sscanf(text.c_str(), "%8d/%8d%n", &shard, &run.shards, &used) != 2 ||
       std::size_t(used) != text.size() || shard < 1 || shard > run.shards) {
     throw Error(ErrorKind::Usage,
-                "--shard: expected `auto`, or i/n with 1 <= i <= n, for instance 2/5, found '" +
+                "--shard: expected 'auto', or i/n with 1 <= i <= n, for instance 2/5, found '" +
                     text + "'");
   }
   run.shard = shard - 1;
@@ -555,8 +555,8 @@ std::vector<std::string> option_names(const CLI::App& app, const CLI::App& comma
 std::string not_known(const char* what, const std::string& name,
                       const std::vector<std::string>& names) {
   const std::string near = nearest_name(name, names);
-  return std::string("unknown ") + what + " \"" + name + "\"" +
-         (near.empty() ? "" : "; did you mean \"" + near + "\"?");
+  return std::string("unknown ") + what + " '" + name + "'" +
+         (near.empty() ? "" : "; did you mean '" + near + "'?");
 }
 
 /// What is wrong with a command line, and which help to read.
@@ -580,7 +580,7 @@ std::string usage_message(const CLI::App& app, const CLI::ParseError& error) {
   for (const CLI::App* below : command.get_subcommands([](const CLI::App*) { return true; })) {
     commands.push_back(below->get_name());
   }
-  if (commands.empty()) return "nothing takes the argument \"" + first + "\"" + advice;
+  if (commands.empty()) return "nothing takes the argument '" + first + "'" + advice;
   return not_known("command", first, commands) + advice;
 }
 

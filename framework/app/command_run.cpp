@@ -162,7 +162,7 @@ int run_value(const GlobalOptions& global, const Value& job, const RunCommandOpt
     log_next_step(summary, output_folders(assembly.job).records_path(), log);
     return 0;
   } catch (const Interrupted&) {
-    log.write(LogLevel::Warning, "interrupted; `--resume` goes on");
+    log.write(LogLevel::Warning, "interrupted; '--resume' goes on");
     return options.stopped_exit_code;
   }
 }

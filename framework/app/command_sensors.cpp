@@ -42,8 +42,8 @@ void add_needs(const Annotator& annotator, const std::string& type, Effects& eff
     if (!stored.contains(name)) {
       std::string known;
       for (const std::string& channel : stored) known += (known.empty() ? "" : ", ") + channel;
-      throw Error(ErrorKind::Config, "annotators: " + type + " needs \"" + name +
-                                         "\", which stored datasets do not give (they give " +
+      throw Error(ErrorKind::Config, "annotators: " + type + " needs '" + name +
+                                         "', which stored datasets do not give (they give " +
                                          known + ")");
     }
     effects.needs.insert(name);
@@ -65,8 +65,8 @@ Effects make_effects(const fs::path& file, Registry& registry, Host& host) {
   complaints.raise();
   if (entries.empty()) {
     throw Error(ErrorKind::Config, file.string() +
-                                       ": the section `annotators` is missing or empty; name for "
-                                       "example `- {type: camera_sensor}`");
+                                       ": the section 'annotators' is missing or empty; name for "
+                                       "example '- {type: camera_sensor}'");
   }
   for (std::size_t i = 0; i < entries.size(); ++i) {
     add_needs(*effects.annotators[i], effects.types[i], effects);

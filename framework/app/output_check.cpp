@@ -59,9 +59,9 @@ void check_folders_are_free(const OutputFolders& folders) {
       if (is_own || name.starts_with('.') || name == "lost+found") continue;
       // Another worker may have begun the dataset since the first look.
       if (is_known()) return;
-      throw Error(ErrorKind::Output, folder.string() + ": holds \"" + name +
-                                         "\", which is of no dataset; choose a new or empty "
-                                         "folder by `--output`, or move it away");
+      throw Error(ErrorKind::Output, folder.string() + ": holds '" + name +
+                                         "', which is of no dataset; choose a new or empty "
+                                         "folder by '--output', or move it away");
     }
   }
 }

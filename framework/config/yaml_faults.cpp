@@ -133,13 +133,13 @@ YamlFault misplaced_key(const Lines& lines, std::size_t line, std::size_t column
   if (before.find(": ") != std::string_view::npos) {
     return {
         int(line) + 1, int(column) + 1,
-        "a second `key: value` in one line; put the value in quotes if the colon belongs to it"};
+        "a second 'key: value' in one line; put the value in quotes if the colon belongs to it"};
   }
   for (std::size_t y = line; y-- > 0;) {
     if (is_empty(lines[y])) continue;
     if (!has_key(lines[y])) {
       return {int(y) + 1, int(indentation(lines[y])) + 1,
-              "this line is no `key: value`; is the colon missing, or the space behind it?"};
+              "this line is no 'key: value'; is the colon missing, or the space behind it?"};
     }
     if (indentation(lines[y]) < indentation(text)) {
       return {int(line) + 1, int(indentation(text)) + 1,
@@ -148,7 +148,7 @@ YamlFault misplaced_key(const Lines& lines, std::size_t line, std::size_t column
     }
     break;
   }
-  return {int(line) + 1, int(column) + 1, "no `key: value` can stand here"};
+  return {int(line) + 1, int(column) + 1, "no 'key: value' can stand here"};
 }
 
 YamlFault unclosed(const Lines& lines, std::size_t line, std::size_t column) {
@@ -158,8 +158,8 @@ YamlFault unclosed(const Lines& lines, std::size_t line, std::size_t column) {
     return {int(line) + 1, int(column) + 1, "a comma or the closing bracket is missing here"};
   }
   return {open->line, open->column,
-          "the `" + open->message +
-              "` that opens here is not closed, or a comma is missing, before " + where};
+          "the '" + open->message +
+              "' that opens here is not closed, or a comma is missing, before " + where};
 }
 
 /// What needs no look at the document.
@@ -167,29 +167,29 @@ std::string plain_words(std::string_view message) {
   static constexpr std::array<std::pair<std::string_view, std::string_view>, 17> kWords{{
       {"illegal flow end", "this bracket closes nothing that is open"},
       {"illegal block entry",
-       "a list entry `- ` cannot begin here; it begins a line, or follows another `- `"},
-      {"illegal map key", "`? ` cannot begin a key here"},
+       "a list entry '- ' cannot begin here; it begins a line, or follows another '- '"},
+      {"illegal map key", "'? ' cannot begin a key here"},
       {"the referenced anchor is not defined",
-       "no `&anchor` of this name stands before the alias; put text that begins with `*` in "
+       "no '&anchor' of this name stands before the alias; put text that begins with '*' in "
        "quotes"},
       {"alias not found after *",
-       "a name is missing behind `*`; put text that begins with it in quotes"},
+       "a name is missing behind '*'; put text that begins with it in quotes"},
       {"anchor not found after &",
-       "a name is missing behind `&`; put text that begins with it in quotes"},
+       "a name is missing behind '&'; put text that begins with it in quotes"},
       {"unknown token", "no value begins with this character; put it in quotes"},
       {"unknown escape character",
-       "no such escape in double quotes; write `\\\\` for a backslash, or use single quotes"},
+       "no such escape in double quotes; write '\\\\' for a backslash, or use single quotes"},
       {"bad character found while scanning hex number",
-       "the digits behind `\\x`, `\\u` or `\\U` are 0-9 and a-f"},
+       "the digits behind '\\x', '\\u' or '\\U' are 0-9 and a-f"},
       {"invalid unicode", "this escape stands for no character"},
       {"cannot assign multiple", "one value has one tag, one anchor or one alias"},
       {"aliases can't have any content", "an alias stands for its value alone"},
       {"illegal EOF in scalar", "the quotes are not closed before the end of the file"},
       {"illegal document indicator in scalar", "the quotes are not closed before this line"},
-      {"cannot set zero indentation", "the number behind `|` or `>` is 1 to 9"},
+      {"cannot set zero indentation", "the number behind '|' or '>' is 1 to 9"},
       {"unexpected character in block scalar",
-       "only `+`, `-` or a digit may follow `|` or `>`; the text begins in the next line"},
-      {"YAML", "this directive is not understood; leave out lines that begin with `%`"},
+       "only '+', '-' or a digit may follow '|' or '>'; the text begins in the next line"},
+      {"YAML", "this directive is not understood; leave out lines that begin with '%'"},
   }};
   for (const auto& [theirs, ours] : kWords) {
     if (message.starts_with(theirs)) return std::string(ours);
@@ -213,7 +213,7 @@ YamlFault explain_yaml_fault(std::string_view text, int line_from_1, int column_
     const bool is_entry =
         line < lines.size() && lines[line].substr(indentation(lines[line])).starts_with("- ");
     return {line_from_1, column_from_1,
-            is_entry ? "a list entry stands where a `key: value` of the mapping above belongs"
+            is_entry ? "a list entry stands where a 'key: value' of the mapping above belongs"
                      : "something follows a value that is at its end; put the whole in quotes"};
   }
   if (message == "illegal map value") return misplaced_key(lines, line, column);

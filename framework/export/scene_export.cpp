@@ -64,7 +64,7 @@ void export_scene(const Scene& scene, NodeId root, const fs::path& file,
   if (ending == ".hdr") return export_sky(scene, root, file, host);
   if (ending != ".usda" && ending != ".usdc" && ending != ".usd") {
     throw Error(ErrorKind::Usage, file.string() + ": expected a file that ends in .usda, .usdc, " +
-                                      ".usd or .hdr, found \"" + ending + "\"");
+                                      ".usd or .hdr, found '" + ending + "'");
   }
   const usd_export::SceneLayer result =
       usd_export::scene_layer(scene, root, file.stem().string(), options.with_physics);

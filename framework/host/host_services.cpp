@@ -235,8 +235,8 @@ NodeId HostServices::load_asset(std::string_view asset, Scene& scene, NodeId par
     call_component("loader '" + source.loader + "'", [&] { with.load(source.asset, own, root); });
     const std::string word = first_unclean_word(own, root);
     if (word.empty()) return;
-    log_(LogLevel::Warning, source.asset + ": the name \"" + clean_name(word) +
-                                "\" is no plain UTF-8 text; bytes of it are written as \\x00 to "
+    log_(LogLevel::Warning, source.asset + ": the name '" + clean_name(word) +
+                                "' is no plain UTF-8 text; bytes of it are written as \\x00 to "
                                 "\\xFF, in datasets, too");
   });
   const NodeId root = (*loaded)[loaded->root()].children.front();

@@ -173,7 +173,7 @@ SceneReport report_scene(const Scene& scene, NodeId root, const std::string& fil
 std::vector<std::string> warnings_about(const SceneReport& report, const std::string& material) {
   std::vector<std::string> found;
   if (material.empty()) return found;
-  const std::string quoted = '"' + material + '"';
+  const std::string quoted = '\'' + material + '\'';
   std::ranges::copy_if(report.warnings, std::back_inserter(found), [&](const std::string& warning) {
     return warning.find(quoted) != std::string::npos;
   });

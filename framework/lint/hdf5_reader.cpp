@@ -42,7 +42,7 @@ class Bytes {
   }
   void expect(std::uint64_t at, std::string_view signature) const {
     if (part(at, signature.size()) != signature) {
-      throw std::runtime_error("\"" + std::string(signature) + "\" expected at byte " +
+      throw std::runtime_error("'" + std::string(signature) + "' expected at byte " +
                                std::to_string(at));
     }
   }

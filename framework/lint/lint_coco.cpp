@@ -318,7 +318,7 @@ class CocoPart {
     const std::size_t pixels = count == behind.occluded_by.end() ? 0 : count->second;
     dataset_.check(pixels >= seen, kOrder, file_,
                    behind.who + ": " + front + " is in front of it in " + std::to_string(seen) +
-                       " pixels, \"occluded_by\" says " + std::to_string(pixels));
+                       " pixels, 'occluded_by' says " + std::to_string(pixels));
     return pixels;
   }
 

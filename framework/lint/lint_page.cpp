@@ -15,12 +15,12 @@ constexpr std::size_t kMostPictures = 10'000'000;
 void check_stated(Dataset& dataset, const Json& page) {
   for (const char* key : {"format", "program", "seed", "captures", "cameras", "classes", "split",
                           "conventions", "plugins", "assets", "job"}) {
-    dataset.check(page.contains(key), kStated, kPage, "has no entry \"" + std::string(key) + "\"");
+    dataset.check(page.contains(key), kStated, kPage, "has no entry '" + std::string(key) + "'");
   }
   for (const char* key :
        {"units", "world_axes", "camera_axes", "pixels", "boxes", "rotations", "depth"}) {
     dataset.check(page.at("conventions").contains(key), kStated, kPage,
-                  "its conventions do not say \"" + std::string(key) + "\"");
+                  "its conventions do not say '" + std::string(key) + "'");
   }
   for (const Json& asset : page.at("assets")) {
     for (const Json& file : asset.at("files")) {

@@ -26,7 +26,7 @@ void read_description(FileSystem& file_system, const fs::path& file, DatasetStat
   const std::int64_t captures = is_dataset ? json["captures"].get<std::int64_t>() : -1;
   if (captures < 0 || captures > INT32_MAX) {
     throw Error(ErrorKind::Output,
-                file.string() + ": expected a dataset's description with `captures` and `job`");
+                file.string() + ": expected a dataset's description with 'captures' and 'job'");
   }
   status.captures = int(captures);
   status.job = json["job"].get<std::string>();
@@ -140,7 +140,7 @@ std::string status_text(const DatasetStatus& status, const fs::path& folder) {
             std::to_string(captures_of_ended) + " captures\n";
   }
   for (const std::string& fault : status.faults) text += "fault: " + fault + "\n";
-  if (!status.faults.empty()) text += "`diorama run --resume --verify` makes them anew\n";
+  if (!status.faults.empty()) text += "'diorama run --resume --verify' makes them anew\n";
   return text;
 }
 

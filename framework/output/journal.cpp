@@ -402,8 +402,8 @@ void Journals::read_worker(const std::string& worker) {
       const auto line = parse(text);
       if (!line) {
         throw Error(ErrorKind::Output, file.string() + ": no journal of this version: expected " +
-                                           "lines such as `d 000017`, found \"" +
-                                           std::string(text.substr(0, 80)) + "\"");
+                                           "lines such as 'd 000017', found '" +
+                                           std::string(text.substr(0, 80)) + "'");
       }
       take(worker, index, *line);
     }
@@ -466,8 +466,8 @@ std::optional<JournalledFiles> Journals::files_of(const std::string& worker,
   if (!content) {
     throw Error(ErrorKind::Output, file.string() + ": byte " + std::to_string(place.offset) +
                                        ": expected the files of " + entry_name(place.entry) +
-                                       " with relative paths, sizes and digests, found \"" +
-                                       text.substr(0, 80) + "\"");
+                                       " with relative paths, sizes and digests, found '" +
+                                       text.substr(0, 80) + "'");
   }
   return content;
 }

@@ -57,7 +57,7 @@ std::string split_of(const std::string& role) {
 }
 
 std::string role_text(const std::string& role) {
-  if (role == "auto") return "with `--shard auto`";
+  if (role == "auto") return "with '--shard auto'";
   if (role == "overwrite") return "replacing the dataset";
   if (role == "shard-1-of-1") return "as the only worker";
   std::string text = role;
@@ -92,8 +92,8 @@ void CollectedFiles::stage_if_large(std::size_t number) {
 void CollectedFiles::add(std::string_view path, std::vector<std::byte> bytes) {
   if (!is_plain_relative(path)) {
     throw Error(ErrorKind::Plugin, "writer '" + writer_ +
-                                       "': expected a relative path without `..`, found \"" +
-                                       std::string(path) + "\"");
+                                       "': expected a relative path without '..', found '" +
+                                       std::string(path) + "'");
   }
   transaction_.files.push_back({folder_, std::string(path), std::move(bytes)});
   stage_if_large(transaction_.files.size() - 1);
@@ -635,7 +635,7 @@ JournalledFiles OutputStore::journalled(const Transaction& transaction) const {
     if (!places.insert(path).second) {
       throw Error(ErrorKind::Config, (folders_.base / path).string() +
                                          ": two files of one capture have this name; give the "
-                                         "writers different `output_dir`s");
+                                         "writers different 'output_dir's");
     }
     content.files.push_back({path, file.staged_size, file.staged ? file.staged->text() : ""});
   }

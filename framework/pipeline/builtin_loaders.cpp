@@ -28,8 +28,8 @@ void check_shape(const std::string& name) {
   std::string known;
   for (const std::string& shape : kShapes) known += (known.empty() ? "" : ", ") + shape;
   const std::string near = nearest_name(name, kShapes);
-  throw Error(ErrorKind::Config, "unknown shape \"" + name + "\"" +
-                                     (near.empty() ? "" : "; did you mean \"" + near + "\"?") +
+  throw Error(ErrorKind::Config, "unknown shape '" + name + "'" +
+                                     (near.empty() ? "" : "; did you mean '" + near + "'?") +
                                      " (known: " + known + ")");
 }
 
@@ -66,7 +66,7 @@ std::vector<std::string> FilesLoader::assets() const {
 }
 
 void FilesLoader::load(std::string_view asset, Scene&, NodeId) {
-  throw Error(ErrorKind::Internal, std::string(asset) + ": `files` only names files");
+  throw Error(ErrorKind::Internal, std::string(asset) + ": 'files' only names files");
 }
 
 void ShapesLoader::Params::visit(ParamVisitor& v) {

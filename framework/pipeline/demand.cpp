@@ -80,7 +80,7 @@ class Resolution {
     std::sort(known.begin(), known.end());
     std::string list;
     for (const std::string& word : known) list += (list.empty() ? "" : ", ") + word;
-    throw Error(ErrorKind::Config, who + ": needs \"" + name + "\", which neither " + renderer_ +
+    throw Error(ErrorKind::Config, who + ": needs '" + name + "', which neither " + renderer_ +
                                        " nor an annotator provides (there are: " + list + ")");
   }
 

@@ -96,7 +96,7 @@ const Place& place_of(const Value& map, std::string_view key) {
 
 void require_type(const ComponentConfig& entry, Complaints& complaints) {
   if (entry.type.empty() && !entry.map.find("type")) {
-    complaints.add(entry.map.place, entry.path + ": `type` is missing");
+    complaints.add(entry.map.place, entry.path + ": 'type' is missing");
   }
 }
 
@@ -109,8 +109,8 @@ void require_unique(const std::vector<Entry>& list, std::string_view section, Na
     const std::string& name = name_of(list[i]);
     if (name.empty() || seen.insert(name).second) continue;
     complaints.add(place_of(map_of(list[i]), "name"), item_path(section, i) +
-                                                          ": another entry is called \"" + name +
-                                                          "\"; give this one a `name` of its own");
+                                                          ": another entry is called '" + name +
+                                                          "'; give this one a 'name' of its own");
   }
 }
 
@@ -118,8 +118,8 @@ void check_node_name(const std::string& name, const Value& map, const std::strin
                      Complaints& complaints) {
   if (name.find('/') == std::string::npos && is_clean_name(name)) return;
   complaints.add(place_of(map, "name"),
-                 path + ".name: expected a name without \"/\" and control characters, found \"" +
-                     clean_name(name) + "\"");
+                 path + ".name: expected a name without '/' and control characters, found '" +
+                     clean_name(name) + "'");
 }
 
 template <class Group>
@@ -145,7 +145,7 @@ std::vector<ComponentConfig> read_parameters(const Value& value, std::string_vie
     const auto is_same = [&](const ComponentConfig& known) { return known.type == entry.type; };
     if (std::any_of(list.begin(), list.end(), is_same)) {
       complaints.add(place_of(entry.map, "type"),
-                     path + ": another entry is of type \"" + entry.type + "\"; " + why_once);
+                     path + ": another entry is of type '" + entry.type + "'; " + why_once);
     }
     list.push_back(std::move(entry));
   }
@@ -161,7 +161,7 @@ void read_environments(const Value& value, Job& job, Complaints& complaints) {
   if (job.environments.empty() && complaints.messages().size() == before) {
     complaints.add(list ? list->place : value.place,
                    "environments: the list is empty; name at least one, for example "
-                   "`- {type: files, folders: [...]}`");
+                   "'- {type: files, folders: [...]}'");
   }
 }
 
@@ -184,7 +184,7 @@ void read_objects(const Value& value, Job& job, Complaints& complaints) {
     check_node_name(group.name, map, path, complaints);
     if (group.under.size() < 2 || group.under.front() != '/' || group.under.back() == '/') {
       complaints.add(place_of(map, "under"),
-                     path + ".under: expected a path like /Assets, found \"" + group.under + "\"");
+                     path + ".under: expected a path like /Assets, found '" + group.under + "'");
     }
     group.loader = {group.type, group.name, std::move(map), path};
     require_type(group.loader, complaints);
@@ -203,8 +203,8 @@ void read_lights(const Value& value, Job& job, Complaints& complaints) {
     name_after_type(group);
     check_node_name(group.name, map, path, complaints);
     if (!names.insert(group.name).second) {
-      complaints.add(place_of(map, "name"), path + ": another light is called \"" + group.name +
-                                                "\"; give this one a `name` of its own");
+      complaints.add(place_of(map, "name"), path + ": another light is called '" + group.name +
+                                                "'; give this one a 'name' of its own");
     }
     job.lights.push_back(std::move(group));
   }
@@ -239,8 +239,8 @@ void read_cameras(const Value& value, Job& job, Complaints& complaints) {
     check_node_name(group.name, map, path, complaints);
     check_camera(group, map, path, complaints);
     if (!names.insert(group.name).second) {
-      complaints.add(place_of(map, "name"), path + ": another camera is called \"" + group.name +
-                                                "\"; give this one a `name` of its own");
+      complaints.add(place_of(map, "name"), path + ": another camera is called '" + group.name +
+                                                "'; give this one a 'name' of its own");
     }
     job.cameras.push_back(std::move(group));
   }
@@ -262,10 +262,9 @@ void check_moments(const RandomizerEntry& entry, const std::vector<std::string>&
   for (const std::string& moment : entry.on) {
     if (std::find(moments.begin(), moments.end(), moment) != moments.end()) continue;
     const std::string near = nearest_name(moment, moments);
-    complaints.add(place_of(map, "on"),
-                   path + ".on: unknown moment \"" + moment + "\"" +
-                       (near.empty() ? "" : "; did you mean \"" + near + "\"?") +
-                       " (known: " + quoted_list(moments) + ")");
+    complaints.add(place_of(map, "on"), path + ".on: unknown moment '" + moment + "'" +
+                                            (near.empty() ? "" : "; did you mean '" + near + "'?") +
+                                            " (known: " + quoted_list(moments) + ")");
   }
 }
 
@@ -323,23 +322,23 @@ std::optional<std::filesystem::path> place_below_output(const Job& job, const st
 
 /// A job of somebody else must not write where nobody expects it.
 void check_folders(const Value& value, const Job& job, Complaints& complaints) {
-  const std::string root = "the output folder \"" + job.output.folder + "\"";
+  const std::string root = "the output folder '" + job.output.folder + "'";
   const std::string advice =
-      "; name a folder below it, or choose one that holds both by `--output`";
+      "; name a folder below it, or choose one that holds both by '--output'";
   for (std::size_t i = 0; i < job.writers.size(); ++i) {
     const WriterEntry& writer = job.writers[i];
     const char* key = writer.output_dir ? "output_dir" : "name";
     const std::string& folder = writer.output_dir ? *writer.output_dir : writer.name;
     if (place_below_output(job, folder)) continue;
     complaints.add(place_of(writer.component.map, key), writer.component.path + "." + key +
-                                                            ": the folder \"" + folder +
-                                                            "\" is not below " + root + advice);
+                                                            ": the folder '" + folder +
+                                                            "' is not below " + root + advice);
   }
   if (place_below_output(job, job.output.records)) return;
   const Value* output = value.find("output");
   complaints.add(
       output ? place_of(*output, "records") : value.place,
-      "output.records: the folder \"" + job.output.records + "\" is not below " + root + advice);
+      "output.records: the folder '" + job.output.records + "' is not below " + root + advice);
 }
 
 ComponentConfig read_engine(const Value& value, std::string_view section, const char* default_type,
@@ -401,14 +400,14 @@ std::optional<TimelineStep> read_step(const Value& map, const std::string& path,
   const bool simulates = keys.simulate.kind != Value::Kind::Null;
   if (int(simulates) + int(keys.capture.has_value()) + int(keys.event.has_value()) != 1) {
     complaints.add(map.place, path +
-                                  ": expected one of `simulate: STEPS`, `capture: NAME` (with "
-                                  "`count`) and `event: NAME`");
+                                  ": expected one of 'simulate: STEPS', 'capture: NAME' (with "
+                                  "'count') and 'event: NAME'");
     return std::nullopt;
   }
   if (simulates) return read_simulation(map, path, complaints);
   const std::string& name = keys.capture ? *keys.capture : *keys.event;
   if (name.empty() || name == "environment") {
-    complaints.add(map.place, path + ": a moment needs a name of its own, found \"" + name + "\"");
+    complaints.add(map.place, path + ": a moment needs a name of its own, found '" + name + "'");
     return std::nullopt;
   }
   if (keys.capture) return TimelineStep{TimelineStep::Kind::Capture, 0, name, keys.count};
@@ -433,7 +432,7 @@ void read_timeline(const Value& value, Job& job, Complaints& complaints) {
                    "timeline: the capture series have no captures in all, so "
                    "total_captures: " +
                        std::to_string(job.total_captures) +
-                       " can never be reached; give a series a `count` above 0");
+                       " can never be reached; give a series a 'count' above 0");
   }
 }
 
@@ -453,8 +452,8 @@ void complain_about_unknown_sections(const Value& job, Complaints& complaints) {
   for (const auto& [key, value] : job.map) {
     if (std::find(kSections.begin(), kSections.end(), key) != kSections.end()) continue;
     const std::string near = nearest_name(key, kSections);
-    complaints.add(value.key_place, "unknown key `" + key + "`" +
-                                        (near.empty() ? "" : "; did you mean `" + near + "`?"));
+    complaints.add(value.key_place, "unknown key '" + key + "'" +
+                                        (near.empty() ? "" : "; did you mean '" + near + "'?"));
   }
 }
 
@@ -659,7 +658,7 @@ Job read_job(const Value& value, Complaints& complaints) {
     const Value* cameras = value.find("cameras");
     complaints.add(cameras ? cameras->place : value.place,
                    "cameras: there are none, so a capture would hold no picture; add "
-                   "`- {type: pinhole, count: 1}`");
+                   "'- {type: pinhole, count: 1}'");
   }
   return job;
 }

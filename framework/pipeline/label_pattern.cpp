@@ -23,7 +23,7 @@ RE2::Options options() {
 
 std::string fault_in(const RE2& regex) {
   const std::string part(regex.error_arg());
-  const std::string found = part.empty() ? "" : ", found `" + part + "`";
+  const std::string found = part.empty() ? "" : ", found '" + part + "'";
   const bool is_reference = regex.error_code() == RE2::ErrorBadEscape && part.size() == 2 &&
                             part[1] >= '1' && part[1] <= '9';
   if (is_reference) {
@@ -33,19 +33,19 @@ std::string fault_in(const RE2& regex) {
                             part.starts_with("(?<=") || part.starts_with("(?<!");
   if (looks_around || (regex.error_code() == RE2::ErrorBadPerlOp && part.starts_with("(?<"))) {
     return "looking ahead and behind is not supported" + found +
-           "; match the neighbouring text and put it back by `$1`";
+           "; match the neighbouring text and put it back by '$1'";
   }
   switch (regex.error_code()) {
     case RE2::ErrorMissingBracket:
-      return "a `[` is not closed" + found;
+      return "a '[' is not closed" + found;
     case RE2::ErrorMissingParen:
-      return "a `(` is not closed" + found;
+      return "a '(' is not closed" + found;
     case RE2::ErrorUnexpectedParen:
-      return "a `)` closes nothing" + found;
+      return "a ')' closes nothing" + found;
     case RE2::ErrorTrailingBackslash:
       return "it ends with a backslash";
     case RE2::ErrorRepeatArgument:
-      return "`*`, `+`, `?` or `{}` repeats nothing" + found;
+      return "'*', '+', '?' or '{}' repeats nothing" + found;
     case RE2::ErrorRepeatSize:
       return "a part is repeated more than 1000 times" + found;
     case RE2::ErrorRepeatOp:

@@ -139,11 +139,11 @@ std::vector<EnvironmentPattern> check_patterns(const Job& job, const CapturePlan
         if (fits) continue;
         const std::string near = nearest_pattern(pattern, paths);
         complaints.add(text->place,
-                       key + ": \"" + pattern + "\" fits no node" +
+                       key + ": '" + pattern + "' fits no node" +
                            (near.empty() ? std::string("; nodes are below /Environment, "
                                                        "/Lights, /Cameras and what "
-                                                       "`under` of the objects says")
-                                         : "; did you mean \"" + near + "\"?"));
+                                                       "'under' of the objects says")
+                                         : "; did you mean '" + near + "'?"));
       }
     }
   }

@@ -212,7 +212,7 @@ Pipeline::Visit Pipeline::set_up(const PlannedVisit& planned) {
   for (const EnvironmentPattern& pattern : components_.environment_patterns) {
     if (!visit.scene.match(pattern.text).empty()) continue;
     host_.log(LogLevel::Warning,
-              choice.asset + ": no node fits \"" + pattern.text + "\" (" + pattern.key + ")");
+              choice.asset + ": no node fits '" + pattern.text + "' (" + pattern.key + ")");
   }
   // The first visit of each environment shows it from above.
   if (job_.debug && std::size_t(planned.index) == planned.environment) {

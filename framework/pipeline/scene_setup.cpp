@@ -190,9 +190,9 @@ NodeId load_environment(const std::string& asset, const ComponentConfig& entry, 
   const NodeId environment = scene.create(parent, node_name(asset_stem(asset)));
   call_component("loader '" + entry.type + "'", [&] { loader.load(asset, scene, environment); });
   if (const std::string word = first_unclean_word(scene, environment); !word.empty()) {
-    throw Error(ErrorKind::Plugin, "loader '" + entry.type + "': " + asset + ": the name \"" +
+    throw Error(ErrorKind::Plugin, "loader '" + entry.type + "': " + asset + ": the name '" +
                                        clean_name(word) +
-                                       "\" is no UTF-8 text without control characters");
+                                       "' is no UTF-8 text without control characters");
   }
   return environment;
 }
@@ -213,8 +213,8 @@ Vec3 apply_environment_rules(const EnvironmentRules& rules, bool debug, NodeId e
   for (const std::string& text : rules.box_colliders) {
     const NodeId match = paths.first_with(text);
     if (!match) {
-      host.log(LogLevel::Warning, scene.path(environment) + ": no node's path holds \"" + text +
-                                      "\", so nothing gets a bounding box collider");
+      host.log(LogLevel::Warning, scene.path(environment) + ": no node's path holds '" + text +
+                                      "', so nothing gets a bounding box collider");
       continue;
     }
     for (const NodeId node : scene.subtree(match)) {
@@ -225,9 +225,9 @@ Vec3 apply_environment_rules(const EnvironmentRules& rules, bool debug, NodeId e
   if (!rules.working_area) return Vec3::Zero();
   const NodeId match = paths.first_with(*rules.working_area);
   if (match) return scene.world_from_node(match).translation();
-  host.log(LogLevel::Warning, scene.path(environment) + ": no node's path holds \"" +
+  host.log(LogLevel::Warning, scene.path(environment) + ": no node's path holds '" +
                                   *rules.working_area +
-                                  "\", so the working area is centred on the origin");
+                                  "', so the working area is centred on the origin");
   return Vec3::Zero();
 }
 

@@ -156,8 +156,8 @@ void StoredCaptures::choose_writer(const fs::path& folder, const std::string& jo
     const fs::path relative = fs::path(place->scalar).lexically_normal();
     const bool is_below = relative.is_relative() && *relative.begin() != "..";
     if (!is_plain || !is_below) {
-      refuse(folder / "dataset.json", "its writer \"" + folder_name + "\" in \"" + place->scalar +
-                                          "\" lies outside of the dataset");
+      refuse(folder / "dataset.json", "its writer '" + folder_name + "' in '" + place->scalar +
+                                          "' lies outside of the dataset");
     }
     writer_ = entry;
     writer_name_ = folder_name;

@@ -262,9 +262,9 @@ class Translator {
     for (const auto& [key, value] : map.map) {
       if (std::find(known.begin(), known.end(), key) != known.end()) continue;
       const std::string near = nearest_name(key, known);
-      complaints_.add(value.key_place, (path.empty() ? "" : path + ": ") + "unknown key `" + key +
-                                           "`" +
-                                           (near.empty() ? "" : "; did you mean `" + near + "`?"));
+      complaints_.add(value.key_place, (path.empty() ? "" : path + ": ") + "unknown key '" + key +
+                                           "'" +
+                                           (near.empty() ? "" : "; did you mean '" + near + "'?"));
     }
   }
 
@@ -337,7 +337,7 @@ class Translator {
                "labeled_assets.manual_label")) {
       const auto keys = block<ManualLabelBlock>(*map, path);
       if (keys.url.empty() && map->kind == Value::Kind::Map) {
-        complaints_.add(map->place, path + ": `url` is missing");
+        complaints_.add(map->place, path + ": 'url' is missing");
       }
       Value entry = object_entry(*map, "files", "manual_label" + numbered(number++), "/Assets",
                                  keys.num, keys.gravity_disabled_chance);
@@ -511,7 +511,7 @@ class Translator {
     complain_about_unknown(map, path, {"type", "kwargs"});
     const Value* type = map.find("type");
     if (!type || type->kind != Value::Kind::Scalar) {
-      complaints_.add(map.place, path + ": `type` is missing");
+      complaints_.add(map.place, path + ": 'type' is missing");
       return entry;
     }
     entry.set("type", *type);
@@ -527,7 +527,7 @@ class Translator {
     for (const auto& [key, value] : kwargs->map) {
       const bool is_own_name = key == "type" || key == "name";
       if (is_own_name) {
-        complaints_.add(value.key_place, path + ".kwargs: unknown key `" + key + "`");
+        complaints_.add(value.key_place, path + ".kwargs: unknown key '" + key + "'");
       } else if (key != "output_dir" || value.kind != Value::Kind::Null) {
         entry.set(key, value);
       }

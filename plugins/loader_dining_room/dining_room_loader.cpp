@@ -16,8 +16,8 @@ std::uint64_t seed_of(std::string_view asset) {
   if (error != std::errc() || end != digits.data() + digits.size()) {
     throw Error(ErrorKind::Asset, std::string(asset) +
                                       ": expected dining_room:SEED with a seed in "
-                                      "[0, 18446744073709551615], found \"" +
-                                      std::string(digits) + "\"");
+                                      "[0, 18446744073709551615], found '" +
+                                      std::string(digits) + "'");
   }
   return seed;
 }

@@ -41,7 +41,7 @@ std::vector<std::string> sky_names() {
   std::string text = std::string(asset) + ": no such sample";
   const std::string nearest = nearest_name(name, names);
   if (!nearest.empty()) {
-    text += "; did you mean \"" + nearest + "\"?";
+    text += "; did you mean '" + nearest + "'?";
   } else {
     text += "; there are:";
     for (const std::string& n : names) text += " " + n;

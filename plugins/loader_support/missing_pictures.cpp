@@ -20,7 +20,7 @@ std::vector<std::string> MissingPictures::lines() const {
     std::string line = what;
     for (std::size_t i = 0; i < users.size(); ++i) {
       line += i > 0 ? ", " : users.size() == 1 ? " (material " : " (materials ";
-      line += '"' + users[i] + '"';
+      line += '\'' + users[i] + '\'';
     }
     if (!users.empty()) line += ')';
     result.push_back(std::move(line));

@@ -92,8 +92,8 @@ SceneTranslator::Metrics SceneTranslator::metrics_of(const usd::Layer& layer) co
   if (word == "Y" || word == "Z") {
     metrics.is_z_up = word == "Z";
   } else {
-    stage_.diagnostics().warn(layer.identifier() + ": upAxis is \"" + word +
-                              "\", expected \"Y\" or \"Z\"; it counts as not said, which is \"Y\"");
+    stage_.diagnostics().warn(layer.identifier() + ": upAxis is '" + word +
+                              "', expected 'Y' or 'Z'; it counts as not said, which is 'Y'");
   }
   return metrics;
 }

@@ -20,8 +20,8 @@ void Scatter2d::randomize(Scene& scene, const RandomizeContext& context, const R
   if (scene.match(params_.placement.nodes).empty()) return;
   const SurfacePoints points(scene, params_.surfaces, params_.max_slope_deg * kPi / 180.0);
   if (points.is_empty()) {
-    host_.log(LogLevel::Warning, "`surfaces`: nothing that fits \"" + params_.surfaces +
-                                     "\" is visible and faces upwards, so nothing is placed");
+    host_.log(LogLevel::Warning, "'surfaces': nothing that fits '" + params_.surfaces +
+                                     "' is visible and faces upwards, so nothing is placed");
     return;
   }
   const auto draw = [&](const Aabb& box, Rng& draws) -> Vec3 {

@@ -85,7 +85,7 @@ void Scatter3d::randomize(Scene& scene, const RandomizeContext& context, const R
     volumes = volumes_of(scene, *params_.volumes);
     if (volumes.empty()) {
       throw Error(ErrorKind::Config,
-                  "`volumes`: nothing that fits \"" + *params_.volumes + "\" has a mesh");
+                  "'volumes': nothing that fits '" + *params_.volumes + "' has a mesh");
     }
   }
   std::vector<Volume> excluded;

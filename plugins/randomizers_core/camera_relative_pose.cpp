@@ -35,7 +35,7 @@ void CameraRelativePose::randomize(Scene& scene, const RandomizeContext& context
   const auto is_camera = [](const Node& node) { return node.camera.has_value(); };
   const std::vector<NodeId> cameras = match_if(scene, params_.camera, is_camera);
   if (cameras.empty()) {
-    throw Error(ErrorKind::Config, "`camera`: no camera fits \"" + params_.camera + "\"");
+    throw Error(ErrorKind::Config, "'camera': no camera fits '" + params_.camera + "'");
   }
   const auto place = [&](NodeId node, NodeDraws& draws) {
     const NodeId camera = cameras[draws.rng.index(cameras.size())];

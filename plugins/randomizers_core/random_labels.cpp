@@ -24,7 +24,7 @@ void RandomLabels::Params::visit(ParamVisitor& v) {
 
 RandomLabels::RandomLabels(Params params, Host&) : params_(std::move(params)) {
   if (params_.labels.texts().empty()) {
-    throw Error(ErrorKind::Config, "`labels`: expected at least one");
+    throw Error(ErrorKind::Config, "'labels': expected at least one");
   }
 }
 

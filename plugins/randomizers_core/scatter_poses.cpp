@@ -89,8 +89,8 @@ void ScatterPoses::randomize(Scene& scene, const RandomizeContext& context, cons
   draw_for_each(scene, nodes, context, rng, place);
   if (crowded > 0) {
     host_.log(LogLevel::Warning, std::to_string(crowded) + " of " + std::to_string(nodes.size()) +
-                                     " nodes that fit \"" + params_.nodes +
-                                     "\" found no free place, so they start inside something");
+                                     " nodes that fit '" + params_.nodes +
+                                     "' found no free place, so they start inside something");
   }
 }
 

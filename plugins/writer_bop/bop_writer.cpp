@@ -251,7 +251,7 @@ void BopWriter::note_size(int id, const Vec3& scale) const {
   throw Error(
       ErrorKind::Config,
       "max_models: objects come in more than " + std::to_string(params_.max_models) +
-          " sizes, and BOP needs a model of each; draw their scales from a `choice` of few, "
+          " sizes, and BOP needs a model of each; draw their scales from a 'choice' of few, "
           "or raise max_models");
 }
 

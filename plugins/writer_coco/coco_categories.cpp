@@ -45,13 +45,12 @@ void read_color(const Value& entry, CocoCategory& category) {
 
 CocoCategory read_category(const std::string& label, const Value& entry) {
   if (entry.kind != Value::Kind::Map) {
-    complain(entry,
-             "expected {name: ..., id: ...} for \"" + label + "\", found " + entry.describe());
+    complain(entry, "expected {name: ..., id: ...} for '" + label + "', found " + entry.describe());
   }
   for (const auto& [key, value] : entry.map) {
     constexpr std::string_view kKnown[] = {"name", "id", "supercategory", "color", "isthing"};
     if (std::ranges::find(kKnown, key) == std::end(kKnown)) {
-      complain(value, "unknown key `" + key + "` of \"" + label + "\"");
+      complain(value, "unknown key '" + key + "' of '" + label + "'");
     }
   }
   CocoCategory category;
@@ -59,7 +58,7 @@ CocoCategory read_category(const std::string& label, const Value& entry) {
   const auto id = integer(entry.find("id"));
   const Value* name = entry.find("name");
   if (!id || !name || name->kind != Value::Kind::Scalar) {
-    complain(entry, "\"" + label + "\" needs a name and a whole number as its id");
+    complain(entry, "'" + label + "' needs a name and a whole number as its id");
   }
   category.id = *id;
   category.name = name->scalar;

@@ -194,8 +194,8 @@ TrainingParams with_categories(TrainingParams params, const std::vector<CocoCate
   params.image_format = *image_output_format == "jpeg" ? "jpg" : *image_output_format;
   const auto& known = kTrainingImageFormats;
   if (std::ranges::find(known, params.image_format) == std::end(known)) {
-    throw Error(ErrorKind::Config, "image_output_format: expected png, jpg or jpeg, found \"" +
-                                       *image_output_format + "\"");
+    throw Error(ErrorKind::Config, "image_output_format: expected png, jpg or jpeg, found '" +
+                                       *image_output_format + "'");
   }
   return params;
 }

@@ -20,7 +20,7 @@ PoseLayout read_layout(const std::optional<std::string>& format) {
   if (lower == "dope") return PoseLayout::Dope;
   if (lower == "centerpose") return PoseLayout::CenterPose;
   throw Error(ErrorKind::Config,
-              "format: expected null, dope or centerpose, found \"" + *format + "\"");
+              "format: expected null, dope or centerpose, found '" + *format + "'");
 }
 
 }  // namespace

@@ -29,7 +29,7 @@ void ChannelList::check(std::span<const std::string_view> taken) const {
   std::set<std::string> known;
   for (const std::string& name : names) {
     const auto complain = [&name](const std::string& what) {
-      throw Error(ErrorKind::Config, "channels: \"" + name + "\" " + what);
+      throw Error(ErrorKind::Config, "channels: '" + name + "' " + what);
     };
     if (name.empty() || !std::ranges::all_of(name, is_plain)) {
       complain("is no name of a channel (letters, digits, _ and -)");

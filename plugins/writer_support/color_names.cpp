@@ -221,7 +221,7 @@ std::optional<Rgba8> color_from_value(const Value& value, const std::string& key
   }
   throw Error(ErrorKind::Config,
               complaint_about(value, key) +
-                  "expected a colour name, \"#rrggbb\" or a list of 3 or 4 integers in [0, 255], "
+                  "expected a colour name, '#rrggbb' or a list of 3 or 4 integers in [0, 255], "
                   "found " +
                   value.describe());
 }

@@ -42,8 +42,8 @@ void RemoteOutput::check() const {
                                     {"s3_endpoint", &s3_endpoint},
                                     {"backend", &backend}}) {
     if (!*value) continue;
-    throw Error(ErrorKind::Config, std::string(name) + ": found \"" + **value +
-                                       "\"; files go to the output folder only, remove the key");
+    throw Error(ErrorKind::Config, std::string(name) + ": found '" + **value +
+                                       "'; files go to the output folder only, remove the key");
   }
 }
 

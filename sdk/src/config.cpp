@@ -35,8 +35,8 @@ Value* Value::find(std::string_view key) {
 Value& Value::set(std::string_view key, Value value) {
   if (kind == Kind::Null) kind = Kind::Map;
   if (kind != Kind::Map) {
-    throw Error(ErrorKind::Internal, "Value::set(\"" + std::string(key) +
-                                         "\"): expected a mapping, found " + describe());
+    throw Error(ErrorKind::Internal,
+                "Value::set('" + std::string(key) + "'): expected a mapping, found " + describe());
   }
   if (Value* old = find(key)) return *old = std::move(value);
   return map.emplace_back(std::string(key), std::move(value)).second;
@@ -101,7 +101,7 @@ std::string Value::describe() const {
   }
   const bool is_long = scalar.size() > kLongest;
   const std::string shown = is_long ? scalar.substr(0, kLongest) + "..." : scalar;
-  return (is_quoted ? "the text \"" : "\"") + shown + "\"";
+  return (is_quoted ? "the text '" : "'") + shown + "'";
 }
 
 void Complaints::add(const Place& place, std::string_view message) {

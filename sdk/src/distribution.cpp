@@ -123,7 +123,7 @@ struct Distribution::Reader {
   Vec3 point(const Value& map, const char* key, const std::string& name, int& used_width) {
     const Value* value = map.find(key);
     if (!value) {
-      complaints.add(map.place, name + ": `" + key + "` is missing");
+      complaints.add(map.place, name + ": '" + key + "' is missing");
       return Vec3::Zero();
     }
     const std::string full = *key ? name + "." + key : name;
@@ -329,8 +329,8 @@ std::optional<TextDistribution> TextDistribution::read(const Value& value, const
     }
   } else if (value.kind != Value::Kind::List && value.kind != Value::Kind::Null) {
     complaints.add(value.place, name +
-                                    ": expected a text, a list of texts, `choice` or "
-                                    "`sequence`, found " +
+                                    ": expected a text, a list of texts, 'choice' or "
+                                    "'sequence', found " +
                                     value.describe());
   }
   if (is_bad()) return std::nullopt;

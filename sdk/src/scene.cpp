@@ -106,8 +106,8 @@ NodeId Scene::root() const { return NodeId{0}; }
 NodeId Scene::create(NodeId parent, std::string_view stem) {
   Slot& above = state_->at(parent);
   if (stem.empty() || stem.find('/') != std::string_view::npos) {
-    throw Error(ErrorKind::Internal, "Scene::create below " + path(parent) + ": the name \"" +
-                                         std::string(stem) + "\" is empty or holds a '/'");
+    throw Error(ErrorKind::Internal, "Scene::create below " + path(parent) + ": the name '" +
+                                         std::string(stem) + "' is empty or holds a '/'");
   }
   std::string name(stem);
   if (above.children_by_name.contains(name)) {

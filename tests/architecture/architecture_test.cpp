@@ -229,6 +229,27 @@ TEST_CASE("Chance comes from diorama::Rng alone", "[architecture]") {
   CHECK(files_with_code(R"((\bstd::|[^\w:.>])s?rand\s*\()", is_code) == None{});
 }
 
+TEST_CASE("Messages quote in one way", "[architecture]") {
+  // 'like this'; these write JSON, YAML, USD, man pages or shell.
+  static const std::set<std::string> kOtherLanguages{
+      "framework/app/completion_scripts.cpp",
+      "framework/app/reference_pages.cpp",
+      "framework/config/value_text.cpp",
+      "framework/export/usda_writer.cpp",
+      "framework/host/progress_lines.cpp",
+      "plugins/loader_assimp/texture_library.cpp",
+      "plugins/writer_bop/bop_writer.cpp",
+      "plugins/writer_coco/coco_writer.cpp",
+      "plugins/writer_imagefolder/image_folder_writer.cpp",
+      "plugins/writer_support/python_json.cpp"};
+  const auto speaks = [](const Source& source) {
+    return (source.is_below("framework") || source.is_below("plugins") ||
+            source.is_below("sdk/src")) &&
+           !kOtherLanguages.contains(source.path.generic_string());
+  };
+  CHECK(files_with_code(R"(\\")", speaks) == None{});
+}
+
 TEST_CASE("Every source says its licence first", "[architecture]") {
   None missing;
   for (const Source& source : sources()) {

@@ -356,7 +356,7 @@ TEST_CASE("a library may register types that it learns at run time", "[plugins]"
   map.set("breadth", Value::integer(3));
   CHECK_FALSE(registry.make<Writer>(map, "writers[0]", {}, complaints, host));
   CHECK(complaints.messages() ==
-        std::vector<std::string>{"writers[0].breadth: expected an integer in [4, 9], found \"3\""});
+        std::vector<std::string>{"writers[0].breadth: expected an integer in [4, 9], found '3'"});
 }
 
 TEST_CASE("the same type twice in one folder cannot be used, and both files are named",

@@ -88,7 +88,7 @@ TEST_CASE("A YAML syntax error has its place", "[errors]") {
 
 TEST_CASE("An unknown key has its place and the nearest name", "[errors]") {
   expect_error(job_with("total_captures", "total_capture"), 3,
-               "unknown key `total_capture`; did you mean `total_captures`?");
+               "unknown key 'total_capture'; did you mean 'total_captures'?");
   expect_error(job_with("camera_params: true", "camera_parms: true"), 3, "camera_parms");
 }
 
@@ -196,13 +196,13 @@ TEST_CASE("A new dataset does not go among files of others", "[errors]") {
     const Outcome outcome = run_into("mine", more);
     CHECK(outcome.exit_code == 6);
     CHECK_THAT(outcome.errors, ContainsSubstring("error: " + mine +
-                                                 ": holds \"notes.txt\", which is "
+                                                 ": holds 'notes.txt', which is "
                                                  "of no dataset; choose a new or empty folder"));
     CHECK(tree(folder / "mine").size() == 1);
   }
   const Outcome root = run_into("/");
   CHECK(root.exit_code == 6);
-  CHECK_THAT(root.errors, ContainsSubstring("error: /: holds \""));
+  CHECK_THAT(root.errors, ContainsSubstring("error: /: holds '"));
   // Hidden files and what file systems put at their root are nobody's.
   fs::create_directories(folder / "volume/lost+found");
   write_file(folder / "volume/.keep", "");

@@ -132,7 +132,7 @@ TEST_CASE("Ctrl-C ends a run with 130 and leaves it resumable", "[run]") {
   process.signal(SIGINT);
   const Outcome outcome = process.wait();
   CHECK(outcome.exit_code == 130);
-  CHECK_THAT(outcome.errors, ContainsSubstring("interrupted; `--resume` goes on"));
+  CHECK_THAT(outcome.errors, ContainsSubstring("interrupted; '--resume' goes on"));
   CHECK_FALSE(fs::exists(folder / "out/.diorama/stage"));
   CHECK(run(smoke("out", {"--set", "total_captures=40", "--resume"}), folder.path()).exit_code ==
         0);
@@ -162,7 +162,7 @@ TEST_CASE("Ctrl-C and SIGTERM are felt inside a picture, which is not written", 
       const Outcome outcome = process.wait();
       CAPTURE(signal, slow, outcome.errors);
       CHECK(outcome.exit_code == 130);
-      CHECK_THAT(outcome.errors, ContainsSubstring("interrupted; `--resume` goes on"));
+      CHECK_THAT(outcome.errors, ContainsSubstring("interrupted; '--resume' goes on"));
       CHECK(journal_entries(folder / "out") == 0);
       for (const auto& [name, text] : tree(folder / "out")) {
         CHECK_THAT(name, !ContainsSubstring(".png"));

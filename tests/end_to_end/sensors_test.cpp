@@ -135,14 +135,13 @@ TEST_CASE("what sensors cannot use is told", "[sensors]") {
              ContainsSubstring("nowhere: holds no dataset.json; give the output folder of a run"));
   write_file(folder / "none.yaml", "seed: 1\n");
   CHECK_THAT(error_of(folder, {"out", "--effects", "none.yaml"}, 3),
-             ContainsSubstring("none.yaml: the section `annotators` is missing or empty"));
+             ContainsSubstring("none.yaml: the section 'annotators' is missing or empty"));
   write_file(folder / "wrong.yaml", "annotators: [{type: camera_sensor, isso: 100}]\n");
   CHECK_THAT(error_of(folder, {"out", "--effects", "wrong.yaml"}, 3),
              ContainsSubstring("wrong.yaml:1:") && ContainsSubstring("isso"));
   write_file(folder / "needy.yaml", "annotators: [{type: instance_ids}]\n");
-  CHECK_THAT(
-      error_of(folder, {"out", "--effects", "needy.yaml"}, 3),
-      ContainsSubstring("instance_ids needs \"leaf_id\", which stored datasets do not give"));
+  CHECK_THAT(error_of(folder, {"out", "--effects", "needy.yaml"}, 3),
+             ContainsSubstring("instance_ids needs 'leaf_id', which stored datasets do not give"));
 }
 
 TEST_CASE("a cut file of the dataset is named", "[sensors]") {

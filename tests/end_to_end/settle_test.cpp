@@ -170,7 +170,7 @@ TEST_CASE("A misspelt pattern ends a run and a dry run with the nearest path", "
       if (is_dry) arguments.push_back("--dry-run");
       const Outcome outcome = run(arguments, folder.path());
       CHECK(outcome.exit_code == 3);
-      CHECK_THAT(outcome.errors, ContainsSubstring("did you mean \"/Assets/*\"?"));
+      CHECK_THAT(outcome.errors, ContainsSubstring("did you mean '/Assets/*'?"));
     }
   }
   CHECK_FALSE(fs::exists(folder / "out"));

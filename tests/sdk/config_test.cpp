@@ -25,7 +25,7 @@ TEST_CASE("A map keeps its order and replaces in place", "[config]") {
   CHECK(map.find("b") == nullptr);
   Value number = Value::number(1);
   CHECK(test::error_text([&] { number.set("k", {}); }) ==
-        "Value::set(\"k\"): expected a mapping, found \"1\"");
+        "Value::set('k'): expected a mapping, found '1'");
 }
 
 TEST_CASE("Numbers are written so that they read back the same", "[config]") {
@@ -38,8 +38,8 @@ TEST_CASE("Numbers are written so that they read back the same", "[config]") {
 TEST_CASE("Values describe themselves for messages", "[config]") {
   Value unquoted = Value::text("lots");
   unquoted.is_quoted = false;
-  CHECK(unquoted.describe() == "\"lots\"");
-  CHECK(Value::text("12").describe() == "the text \"12\"");
+  CHECK(unquoted.describe() == "'lots'");
+  CHECK(Value::text("12").describe() == "the text '12'");
   CHECK(Value().describe() == "nothing");
   CHECK(Value::make_map().describe() == "a mapping");
   CHECK(Value::make_list().describe() == "an empty list");

@@ -139,7 +139,7 @@ TEST_CASE("Mistakes in distributions are told with place, finding and what would
              ContainsSubstring("unknown distribution 'unifrom', did you mean 'uniform'?"));
   CHECK_THAT(complaint("{uniform: {lower: 2, upper: 1}}"),
              ContainsSubstring("scale.uniform: lower must not exceed upper"));
-  CHECK_THAT(complaint("{uniform: {lower: 2}}"), ContainsSubstring("`upper` is missing"));
+  CHECK_THAT(complaint("{uniform: {lower: 2}}"), ContainsSubstring("'upper' is missing"));
   CHECK_THAT(complaint("{uniform: {lower: 1, uper: 2}}"),
              ContainsSubstring("did you mean 'upper'?"));
   CHECK_THAT(complaint("{log_uniform: {lower: 0, upper: 1}}"), ContainsSubstring("above 0"));
@@ -154,7 +154,7 @@ TEST_CASE("Mistakes in distributions are told with place, finding and what would
   CHECK_THAT(complaint("{combine: {distributions: [1, 2]}}", 3),
              ContainsSubstring("a list of three"));
   CHECK_THAT(complaint("[0.5, 7]", 1, {"A quantity.", "m", 0.0, 5.0}),
-             ContainsSubstring("expected a number in [0, 5], found \"7\""));
+             ContainsSubstring("expected a number in [0, 5], found '7'"));
   CHECK_THAT(complaint("{choice: {choices: [1, 9]}}", 1, {"A quantity.", "m", 0.0, 5.0}),
              ContainsSubstring("scale.choice.choices[1]"));
 }
@@ -178,7 +178,7 @@ TEST_CASE("Texts are chosen by weight or in turn", "[distribution]") {
         36);
   CHECK(counts(text_from("{sequence: {items: [a, b]}}"))["a"] == 250);
   CHECK(text_from("[]").texts().empty());
-  CHECK_THAT(error_text([&] { text_from("{shuffle: [a]}"); }), ContainsSubstring("`choice` or"));
+  CHECK_THAT(error_text([&] { text_from("{shuffle: [a]}"); }), ContainsSubstring("'choice' or"));
   CHECK_THAT(error_text([&] { text_from("{choice: {choices: [a], weights: [-1]}}"); }),
              ContainsSubstring("sky.choice.weights[0]"));
 }
@@ -237,9 +237,9 @@ TEST_CASE("Mistakes in distributions are collected with the others, with their p
   CHECK(complaints.messages() ==
         std::vector<std::string>{
             "job.yaml:1:35: randomizers[2].size.uniform.upper: expected a number in [0.5, 4], "
-            "found \"9\"",
-            "job.yaml:5:6: randomizers[2].sky: expected a text, a list of texts, `choice` or "
-            "`sequence`, found a mapping",
+            "found '9'",
+            "job.yaml:5:6: randomizers[2].sky: expected a text, a list of texts, 'choice' or "
+            "'sequence', found a mapping",
             "job.yaml:6:1: randomizers[2]: unknown key 'sise', did you mean 'size'?"});
   CHECK(drawn.place.width() == 1);
   CHECK_FALSE(drawn.length);

@@ -126,9 +126,9 @@ TEST_CASE("Integers are whole decimal numbers in their range", "[params]") {
       "job.yaml:31:12: renderer.samples: expected an integer in [1, 65536]";
   for (const char* text : {"lots", "3.0", "1e3", "0", "65537", "99999999999999999999", "0x10", "",
                            "-", "+-3", "1_000", "true", " 3"}) {
-    CHECK(bad("samples", plain(text)) == expected + ", found \"" + text + "\"");
+    CHECK(bad("samples", plain(text)) == expected + ", found '" + text + "'");
   }
-  CHECK(bad("samples", Value::text("12")) == expected + ", found the text \"12\"");
+  CHECK(bad("samples", Value::text("12")) == expected + ", found the text '12'");
   CHECK(bad("samples", Value()) == expected + ", found nothing");
   CHECK(bad("samples", list({plain("1")})) == expected + ", found a list");
 }
@@ -136,16 +136,16 @@ TEST_CASE("Integers are whole decimal numbers in their range", "[params]") {
 TEST_CASE("A number too large for its type is told the type's limits", "[params]") {
   CHECK(bad("inner", entry("count", plain("-3000000000"))) ==
         "job.yaml:31:12: renderer.inner.count: expected an integer in [-2147483648, 2147483647], "
-        "found \"-3000000000\"");
+        "found '-3000000000'");
 }
 
 TEST_CASE("Seeds take all 64 bits and no sign", "[params]") {
   CHECK(good("seed", plain("18446744073709551615")).seed == 18446744073709551615ull);
   CHECK(bad("seed", plain("-1")) ==
         "job.yaml:31:12: renderer.seed: expected an integer in [0, 18446744073709551615], found "
-        "\"-1\"");
+        "'-1'");
   CHECK(bad("seed", plain("x")) ==
-        "job.yaml:31:12: renderer.seed: expected an integer of at least 0, found \"x\"");
+        "job.yaml:31:12: renderer.seed: expected an integer of at least 0, found 'x'");
 }
 
 TEST_CASE("Numbers may be written in every usual way but not be nan", "[params]") {
@@ -159,7 +159,7 @@ TEST_CASE("Numbers may be written in every usual way but not be nan", "[params]"
   const std::string expected = "job.yaml:31:12: renderer.angle_deg: expected a number in [0, 75]";
   for (const char* text :
        {"-1", "75.001", ".nan", "nan", ".inf", "1,5", "0x1p3", "1e999", "e", "."}) {
-    CHECK(bad("angle_deg", plain(text)) == expected + ", found \"" + text + "\"");
+    CHECK(bad("angle_deg", plain(text)) == expected + ", found '" + text + "'");
   }
 }
 
@@ -168,11 +168,10 @@ TEST_CASE("Truth values are true and false only", "[params]") {
   CHECK_FALSE(good("on", plain("false")).on);
   for (const char* text : {"yes", "True", "1", "on", ""}) {
     CHECK(bad("on", plain(text)) ==
-          std::string("job.yaml:31:12: renderer.on: expected true or false, found \"") + text +
-              "\"");
+          std::string("job.yaml:31:12: renderer.on: expected true or false, found '") + text + "'");
   }
   CHECK(bad("on", Value::text("true")) ==
-        "job.yaml:31:12: renderer.on: expected true or false, found the text \"true\"");
+        "job.yaml:31:12: renderer.on: expected true or false, found the text 'true'");
 }
 
 TEST_CASE("Texts keep the characters of the file", "[params]") {
@@ -190,7 +189,7 @@ TEST_CASE("Ranges are a number or two in order", "[params]") {
   CHECK(bad("height_m", list({plain("3"), plain("1")})) ==
         "job.yaml:31:12: " + name + "expected [lo, hi] with lo <= hi, found [3, 1]");
   CHECK(bad("height_m", list({plain("-1"), plain("1")})) ==
-        "job.yaml:32:5: renderer.height_m[0]: expected a number of at least 0, found \"-1\"");
+        "job.yaml:32:5: renderer.height_m[0]: expected a number of at least 0, found '-1'");
   CHECK(bad("height_m", list({plain("1")})) ==
         "job.yaml:31:12: " + name +
             "expected a number of at least 0 or a list [lo, hi] of two, found a list");
@@ -203,13 +202,13 @@ TEST_CASE("Vectors and lists are checked item by item", "[params]") {
   CHECK(bad("offset", list({plain("1"), plain("2")})) ==
         "job.yaml:31:12: renderer.offset: expected a list of three numbers, found a list of 2");
   CHECK(bad("offset", plain("1")) ==
-        "job.yaml:31:12: renderer.offset: expected a list of three numbers, found \"1\"");
+        "job.yaml:31:12: renderer.offset: expected a list of three numbers, found '1'");
   CHECK(bad("words", plain("a")) ==
-        "job.yaml:31:12: renderer.words: expected a list of texts, found \"a\"");
+        "job.yaml:31:12: renderer.words: expected a list of texts, found 'a'");
   CHECK(bad("words", list({plain("a"), Value()})) ==
         "job.yaml:33:5: renderer.words[1]: expected a text, found nothing");
   CHECK(bad("weights", list({plain("0.5"), plain("7")})) ==
-        "job.yaml:33:5: renderer.weights[1]: expected a number in [0, 1], found \"7\"");
+        "job.yaml:33:5: renderer.weights[1]: expected a number in [0, 1], found '7'");
 }
 
 TEST_CASE("Optional values may be null", "[params]") {
@@ -217,7 +216,7 @@ TEST_CASE("Optional values may be null", "[params]") {
   CHECK_FALSE(good("limit", Value()).limit);
   CHECK(good("label", plain("cup")).label == "cup");
   CHECK(bad("limit", plain("far")) ==
-        "job.yaml:31:12: renderer.limit: expected a number of at least 0 or null, found \"far\"");
+        "job.yaml:31:12: renderer.limit: expected a number of at least 0 or null, found 'far'");
   CHECK(bad("label", list({})) ==
         "job.yaml:31:12: renderer.label: expected a text or null, found an empty list");
 }
@@ -225,11 +224,11 @@ TEST_CASE("Optional values may be null", "[params]") {
 TEST_CASE("A choice lists its words and guesses the meant one", "[params]") {
   CHECK(good("shape", plain("cone")).shape == "cone");
   CHECK(bad("shape", plain("cuve")) ==
-        "job.yaml:31:12: renderer.shape: expected one of 'sphere', 'cube', 'cone', found \"cuve\", "
+        "job.yaml:31:12: renderer.shape: expected one of 'sphere', 'cube', 'cone', found 'cuve', "
         "did you mean 'cube'?");
   CHECK(bad("shape", plain("torus")) ==
         "job.yaml:31:12: renderer.shape: expected one of 'sphere', 'cube', 'cone', found "
-        "\"torus\"");
+        "'torus'");
 }
 
 TEST_CASE("Free values pass unread", "[params]") {
@@ -251,9 +250,9 @@ TEST_CASE("Groups nest in names, unknown keys and types", "[params]") {
   CHECK(bad("inner", entry("widht_m", plain("4"))) ==
         "job.yaml:31:3: renderer.inner: unknown key 'widht_m', did you mean 'width_m'?");
   CHECK(bad("inner", entry("width_m", plain("-4"))) ==
-        "job.yaml:31:12: renderer.inner.width_m: expected a number of at least 0, found \"-4\"");
+        "job.yaml:31:12: renderer.inner.width_m: expected a number of at least 0, found '-4'");
   CHECK(bad("inner", plain("4")) ==
-        "job.yaml:31:12: renderer.inner: expected a mapping, found \"4\"");
+        "job.yaml:31:12: renderer.inner: expected a mapping, found '4'");
 }
 
 TEST_CASE("Lists of mappings replace the default items", "[params]") {
@@ -264,9 +263,9 @@ TEST_CASE("Lists of mappings replace the default items", "[params]") {
   CHECK(params.items[1].count == 3);
   CHECK(good("items", list({})).items.empty());
   CHECK(bad("items", list({Value::make_map(), entry("count", plain("x"))})) ==
-        "job.yaml:31:12: renderer.items[1].count: expected an integer, found \"x\"");
+        "job.yaml:31:12: renderer.items[1].count: expected an integer, found 'x'");
   CHECK(bad("items", list({plain("7")})) ==
-        "job.yaml:32:5: renderer.items[0]: expected a mapping, found \"7\"");
+        "job.yaml:32:5: renderer.items[0]: expected a mapping, found '7'");
   CHECK(bad("items", Value()) ==
         "job.yaml:31:12: renderer.items: expected a list of mappings, found nothing");
 }
@@ -278,7 +277,7 @@ TEST_CASE("All complaints of a mapping are collected", "[params]") {
   map.set("nonsense", plain("1"));
   CHECK(read(map).complaints.size() == 3);
   CHECK(read(plain("7")).complaints ==
-        std::vector<std::string>{"renderer: expected a mapping, found \"7\""});
+        std::vector<std::string>{"renderer: expected a mapping, found '7'"});
 }
 
 TEST_CASE("The lister shows what the reader reads", "[params]") {

@@ -67,9 +67,9 @@ TEST_CASE("Ids follow creation and are never used again", "[scene]") {
 TEST_CASE("A name may not be empty nor hold a slash", "[scene]") {
   Scene scene;
   CHECK(test::error_text([&] { scene.create(scene.root(), "a/b"); }) ==
-        "Scene::create below /: the name \"a/b\" is empty or holds a '/'");
+        "Scene::create below /: the name 'a/b' is empty or holds a '/'");
   CHECK(test::error_text([&] { scene.create(scene.root(), ""); }) ==
-        "Scene::create below /: the name \"\" is empty or holds a '/'");
+        "Scene::create below /: the name '' is empty or holds a '/'");
 }
 
 TEST_CASE("Erasing takes the whole subtree away", "[scene]") {

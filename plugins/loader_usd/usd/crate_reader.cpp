@@ -261,7 +261,7 @@ void CrateReader::set_path(std::uint32_t index, std::uint32_t parent, std::int64
   const bool is_sound = is_property ? path::is_namespaced_identifier(element)
                                     : !is_plain || path::is_identifier(element);
   if (!is_sound) {
-    cursor.fail("\"" + std::string(element) + "\" is not the name of a " +
+    cursor.fail("'" + std::string(element) + "' is not the name of a " +
                 (is_property ? "property" : "prim"));
   }
   entry.token = static_cast<std::uint32_t>(token);

@@ -225,7 +225,7 @@ class TextReader {
 
 std::shared_ptr<Layer> TextReader::read() {
   if (!is_text_layer(scanner_.rest())) {
-    scanner_.fail("the first line of a layer must be \"#usda 1.0\"");
+    scanner_.fail("the first line of a layer must be '#usda 1.0'");
   }
   while (!scanner_.at_end() && scanner_.peek() != '\n' && scanner_.peek() != '\r') {
     scanner_.advance(1);
@@ -279,7 +279,7 @@ void TextReader::read_block(char open, char close, ReadItem read_item) {
     if (!is_separated) scanner_.rewind(after);
     scanner_.skip_lines();
     if (!is_separated && scanner_.peek() != close) {
-      scanner_.fail(std::string("expected a new line or \"") + close + "\"");
+      scanner_.fail(std::string("expected a new line or '") + close + "'");
     }
   }
 }
@@ -474,7 +474,7 @@ void TextReader::read_prim_keyword(PrimBuilder& prim, std::string_view key, Edit
   Strings names = read_name_list();
   require_distinct(names, "variantSets");
   for (const std::string& name : names) {
-    if (!path::is_identifier(name)) scanner_.fail("\"" + name + "\" cannot name a variant set");
+    if (!path::is_identifier(name)) scanner_.fail("'" + name + "' cannot name a variant set");
   }
   edit_list(prim.fields, "variantSetNames", Type::StringListOp, edit, std::move(names));
 }
@@ -646,9 +646,9 @@ void TextReader::read_variant_selections(PrimBuilder& prim) {
   const auto dictionary = read_text_dictionary(scanner_);
   for (const auto& [set, value] : *dictionary) {
     const std::string* variant = value.type() == Type::String ? value.as_text() : nullptr;
-    if (!variant) scanner_.fail("the selection of variant set \"" + set + "\" is not a string");
+    if (!variant) scanner_.fail("the selection of variant set '" + set + "' is not a string");
     if (!variant->empty() && !is_expression(*variant) && !path::is_variant_name(*variant)) {
-      scanner_.fail("\"" + *variant + "\" cannot name a variant");
+      scanner_.fail("'" + *variant + "' cannot name a variant");
     }
     pairs.emplace_back(set, *variant);
   }
@@ -681,9 +681,9 @@ void TextReader::read_prim(PrimBuilder& parent, int nesting) {
   }
   if (!scanner_.at_string()) scanner_.fail("expected the quoted name of the prim");
   const std::string name = scanner_.read_string();
-  if (!path::is_identifier(name)) scanner_.fail("\"" + name + "\" cannot name a prim");
+  if (!path::is_identifier(name)) scanner_.fail("'" + name + "' cannot name a prim");
   if (!parent.child_names.insert(name).second) {
-    scanner_.fail("there is a prim \"" + name + "\" already");
+    scanner_.fail("there is a prim '" + name + "' already");
   }
   parent.children.push_back(name);
   prim.path = path::append_child(parent.path, name);
@@ -718,7 +718,7 @@ void TextReader::read_variant_set(PrimBuilder& prim, int nesting) {
   scanner_.require_space("variantSet");
   if (!scanner_.at_string()) scanner_.fail("expected the quoted name of the variant set");
   const std::string set = scanner_.read_string();
-  if (!path::is_identifier(set)) scanner_.fail("\"" + set + "\" cannot name a variant set");
+  if (!path::is_identifier(set)) scanner_.fail("'" + set + "' cannot name a variant set");
   scanner_.skip_inline();
   scanner_.expect('=', "before the variants");
   scanner_.skip_lines();
@@ -728,7 +728,7 @@ void TextReader::read_variant_set(PrimBuilder& prim, int nesting) {
   while (!scanner_.accept('}')) {
     if (!scanner_.at_string()) scanner_.fail("expected the quoted name of a variant");
     const std::string name = scanner_.read_string();
-    if (!path::is_variant_name(name)) scanner_.fail("\"" + name + "\" cannot name a variant");
+    if (!path::is_variant_name(name)) scanner_.fail("'" + name + "' cannot name a variant");
     PrimBuilder variant;
     variant.path = path::append_variant(prim.path, set, name);
     scanner_.skip_lines();
@@ -814,7 +814,7 @@ PropertyBuilder& TextReader::property(PrimBuilder& prim, const std::string& name
   if (is_new) prim.properties.push_back({name, type, {}});
   PropertyBuilder& result = prim.properties[entry->second];
   if (result.type != type) {
-    scanner_.fail("\"" + name + "\" is an attribute in one place and a relationship in another");
+    scanner_.fail("'" + name + "' is an attribute in one place and a relationship in another");
   }
   return result;
 }
@@ -910,12 +910,12 @@ void TextReader::read_attribute(PrimBuilder& prim, Edit edit, bool is_edit, bool
   PropertyBuilder& attribute = property(prim, read_property_name(), SpecType::Attribute);
   const Value* old_type = find_field(attribute.fields, "typeName");
   if (old_type && *old_type->as_text() != type_name) {
-    scanner_.fail("\"" + attribute.name + "\" is of type " + *old_type->as_text() +
+    scanner_.fail("'" + attribute.name + "' is of type " + *old_type->as_text() +
                   " in one place and of type " + type_name + " in another");
   }
   const Value* variability = find_field(attribute.fields, "variability");
   if (old_type && (variability != nullptr) != is_uniform) {
-    scanner_.fail("\"" + attribute.name + "\" is uniform in one place and varying in another");
+    scanner_.fail("'" + attribute.name + "' is uniform in one place and varying in another");
   }
   set_field(attribute.fields, "typeName", Value::text(Type::Token, type_name));
   if (is_custom) set_field(attribute.fields, "custom", Value::boolean(true));
@@ -1026,7 +1026,7 @@ void TextReader::read_property_metadata(Fields& fields, bool is_attribute) {
       scanner_.expect_assignment();
       const std::string_view word = scanner_.peek_word();
       if (std::find(kDisplayUnits.begin(), kDisplayUnits.end(), word) == kDisplayUnits.end()) {
-        scanner_.fail("\"" + std::string(word) + "\" is not a unit; known are " +
+        scanner_.fail("'" + std::string(word) + "' is not a unit; known are " +
                       list_of(kDisplayUnits));
       }
       scanner_.advance(word.size());

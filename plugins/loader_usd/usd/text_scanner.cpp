@@ -198,8 +198,8 @@ bool TextScanner::accept(char c) {
 
 void TextScanner::expect(char c, const char* what) {
   if (accept(c)) return;
-  const std::string found = at_end() ? "the end of the file" : "\"" + std::string(1, peek()) + "\"";
-  fail(std::string("expected \"") + c + "\" " + what + ", found " + found);
+  const std::string found = at_end() ? "the end of the file" : "'" + std::string(1, peek()) + "'";
+  fail(std::string("expected '") + c + "' " + what + ", found " + found);
 }
 
 void TextScanner::expect_assignment() {

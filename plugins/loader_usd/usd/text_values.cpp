@@ -298,7 +298,7 @@ void read_dictionary_item(TextScanner& scanner, Dictionary& dictionary, int nest
     return;
   }
   std::string type_name(scanner.peek_word());
-  if (type_name.empty() || is_keyword(type_name)) scanner.fail("expected a type or \"}\"");
+  if (type_name.empty() || is_keyword(type_name)) scanner.fail("expected a type or '}'");
   scanner.advance(type_name.size());
   const std::size_t after = scanner.position();
   scanner.skip_inline();
@@ -330,7 +330,7 @@ std::shared_ptr<const Dictionary> read_dictionary(TextScanner& scanner, int nest
     if (!is_separated) scanner.rewind(after);
     scanner.skip_lines();
     if (!is_separated && scanner.peek() != '}') {
-      scanner.fail("expected a new line or \";\" between dictionary entries");
+      scanner.fail("expected a new line or ';' between dictionary entries");
     }
   }
   return dictionary;

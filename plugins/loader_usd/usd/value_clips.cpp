@@ -189,7 +189,7 @@ std::vector<ValueClips::ClipSet> ValueClips::read_sets(const Prim& prim) {
   }
   std::vector<ClipSet> sets;
   for (const auto& [name, fields] : merged) {
-    const std::string where = "the value clips \"" + name + "\" of <" + prim.path + ">";
+    const std::string where = "the value clips '" + name + "' of <" + prim.path + ">";
     const Value* path = usd::find(fields, "primPath");
     const auto origin = origins.find(name);
     const bool is_named = origin != origins.end() && path && path->as_text() &&

@@ -68,7 +68,7 @@ TEST_CASE("--set says which part does not fit", "[config]") {
   CHECK(set_error("writers[2].rgb=1") ==
         "--set writers[2].rgb=1: writers has 2 entries, counted from 0; there is no entry 2");
   CHECK(set_error("writers[0].rgb.x=1") ==
-        "--set writers[0].rgb.x=1: writers[0].rgb is \"true\", it has no key 'x'");
+        "--set writers[0].rgb.x=1: writers[0].rgb is 'true', it has no key 'x'");
   for (const char* key : {"writers[0=1", "writers[0]rgb=1", "writers]0[=1"}) {
     CHECK(set_error(key) != "no error");
   }
@@ -76,6 +76,6 @@ TEST_CASE("--set says which part does not fit", "[config]") {
         "--set writers[0]rgb=1: expected entries of lists as in cameras[0].width");
   CHECK(set_error("twins.x.a=1") ==
         "--set twins.x.a=1: twins has several entries called 'x'; use an index from 0");
-  CHECK(set_error("seed.deep=1") == "--set seed.deep=1: seed is \"1\", it has no key 'deep'");
+  CHECK(set_error("seed.deep=1") == "--set seed.deep=1: seed is '1', it has no key 'deep'");
   CHECK(set_error("seed=[1").starts_with("--set seed=[1:1:"));
 }

@@ -100,7 +100,7 @@ TEST_CASE("anchors, aliases and merge keys are resolved", "[config]") {
   CHECK_FALSE(lamp->find("<<"));
   CHECK(job.find("copy")->find("type")->scalar == "sphere");
   CHECK(job.find("copy")->place.text() == "j.yaml:6:7");
-  CHECK(error_of("a: &x 1\nb: {<<: *x}\n") == "job.yaml:2:9: '<<' merges mappings, found \"1\"");
+  CHECK(error_of("a: &x 1\nb: {<<: *x}\n") == "job.yaml:2:9: '<<' merges mappings, found '1'");
 }
 
 TEST_CASE("what is no job is refused with its place", "[config]") {
@@ -127,11 +127,11 @@ TEST_CASE("syntax errors name line and column", "[config]") {
     return error.substr(9, at - 9) + " " + error.substr(at + kind.size());
   };
   CHECK(fault_of("a: [1, 2\nb: 3\n") ==
-        "1:4 the `[` that opens here is not closed, or a comma is missing, before 2:2");
+        "1:4 the '[' that opens here is not closed, or a comma is missing, before 2:2");
   CHECK(fault_of("a: {b: \"]\", c: [\n  1, 2\n") ==
-        "1:16 the `[` that opens here is not closed, or a comma is missing, before 3:1");
+        "1:16 the '[' that opens here is not closed, or a comma is missing, before 3:1");
   CHECK(fault_of("a: {b: 1 c: 2}\n") ==
-        "1:4 the `{` that opens here is not closed, or a comma is missing, before 1:11");
+        "1:4 the '{' that opens here is not closed, or a comma is missing, before 1:11");
   CHECK(fault_of("a: [1]]\n") == "1:7 this bracket closes nothing that is open");
   CHECK(fault_of("a:\n\tb: 1\n") ==
         "2:1 a tab indents this line; YAML is indented by spaces alone");
@@ -146,23 +146,23 @@ TEST_CASE("syntax errors name line and column", "[config]") {
   CHECK(fault_of("a:\n  b: 1\n   c: 2\n") ==
         "3:4 this line is indented deeper than line 2, which has a value already");
   CHECK(fault_of("seed: 1\ncount 2\nb: 2\n") ==
-        "2:1 this line is no `key: value`; is the colon missing, or the space behind it?");
+        "2:1 this line is no 'key: value'; is the colon missing, or the space behind it?");
   CHECK(fault_of("seed:1\nb: 2\n") ==
-        "1:1 this line is no `key: value`; is the colon missing, or the space behind it?");
+        "1:1 this line is no 'key: value'; is the colon missing, or the space behind it?");
   CHECK(
       fault_of("a: b: c\n") ==
-      "1:5 a second `key: value` in one line; put the value in quotes if the colon belongs to it");
+      "1:5 a second 'key: value' in one line; put the value in quotes if the colon belongs to it");
   CHECK(fault_of("a: 1\n- b\n") ==
-        "2:1 a list entry stands where a `key: value` of the mapping above belongs");
+        "2:1 a list entry stands where a 'key: value' of the mapping above belongs");
   CHECK(fault_of("a: 'it's'\n") ==
         "1:8 something follows a value that is at its end; put the whole in quotes");
   CHECK(fault_of("a: @x\n") == "1:4 no value begins with this character; put it in quotes");
   CHECK(fault_of("a: \"\\d+\"\n") ==
-        "1:7 no such escape in double quotes; write `\\\\` for a backslash, or use single quotes");
+        "1:7 no such escape in double quotes; write '\\\\' for a backslash, or use single quotes");
   CHECK(fault_of("a: - b\n") ==
-        "1:4 a list entry `- ` cannot begin here; it begins a line, or follows another `- `");
+        "1:4 a list entry '- ' cannot begin here; it begins a line, or follows another '- '");
   CHECK(fault_of("a: *nobody\n") ==
-        "1:4 no `&anchor` of this name stands before the alias; put text that begins with `*` in "
+        "1:4 no '&anchor' of this name stands before the alias; put text that begins with '*' in "
         "quotes");
   CHECK(error_of("a: \"x\\0y\"\n") ==
         "job.yaml:1:4: this text holds the character NUL, which no name and no path may");

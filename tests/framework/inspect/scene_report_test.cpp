@@ -97,8 +97,8 @@ TEST_CASE("a scene report says which lamps no sky is seen beside", "[inspect]") 
 TEST_CASE("a material stands with the warnings that name it", "[inspect]") {
   const Scene scene = make_scene();
   SceneReport report = report_scene(scene, scene.find("/room"), "room.usd");
-  const std::string missing = "room.usd: texture @x.png@ could not be found (material \"wood\")";
-  report.warnings = {"room.usd: \"woodwork\" is something else", missing};
+  const std::string missing = "room.usd: texture @x.png@ could not be found (material 'wood')";
+  report.warnings = {"room.usd: 'woodwork' is something else", missing};
   CHECK(warnings_about(report, "wood") == std::vector<std::string>{missing});
   CHECK(warnings_about(report, "").empty());
   CHECK(report_text(report, -1).find("  wood  used 2x  [wood.png]\n    ! " + missing + "\n") !=

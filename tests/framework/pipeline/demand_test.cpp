@@ -67,15 +67,13 @@ TEST_CASE("Motion is made from ids and positions unless the renderer provides it
 }
 
 TEST_CASE("A need that nothing provides names the writer, the need and what there is", "[demand]") {
-  CHECK_THROWS_WITH(
-      demand_for({"heat"}),
-      ContainsSubstring("writer 'w': needs \"heat\", which neither renderer 'r' nor an "
-                        "annotator provides") &&
-          ContainsSubstring("color") && ContainsSubstring("visibility"));
+  CHECK_THROWS_WITH(demand_for({"heat"}),
+                    ContainsSubstring("writer 'w': needs 'heat', which neither renderer 'r' nor an "
+                                      "annotator provides") &&
+                        ContainsSubstring("color") && ContainsSubstring("visibility"));
   const std::vector<Need> needs{{"writer 'w'", {"boxes"}}};
-  CHECK_THROWS_WITH(
-      resolve_demand(needs, {"color", "leaf_id"}, "renderer 'r'", kOffers),
-      ContainsSubstring("writer 'w' (through annotator 'boxes'): needs \"position\""));
+  CHECK_THROWS_WITH(resolve_demand(needs, {"color", "leaf_id"}, "renderer 'r'", kOffers),
+                    ContainsSubstring("writer 'w' (through annotator 'boxes'): needs 'position'"));
 }
 
 TEST_CASE("What the job lists comes before the renderer's own", "[demand]") {

@@ -44,7 +44,7 @@ TEST_CASE("All complaints about a job come in one go, with places and near names
   const std::string text = complaints_about(yaml);
   CHECK_THAT(text, ContainsSubstring("job.yaml:2:17") && ContainsSubstring("total_captures") &&
                        ContainsSubstring("-7"));
-  CHECK_THAT(text, ContainsSubstring("unknown key `timelime`; did you mean `timeline`?"));
+  CHECK_THAT(text, ContainsSubstring("unknown key 'timelime'; did you mean 'timeline'?"));
   CHECK_THAT(text, ContainsSubstring("widht") && ContainsSubstring("width"));
   CHECK_THAT(text, ContainsSubstring("objects[0].count") && ContainsSubstring("lots"));
 }
@@ -60,21 +60,21 @@ TEST_CASE("Mistakes that make a job pointless are named", "[job]") {
                         "total_captures: 7 can never be reached"));
   CHECK_THAT(complaints_about(with(good, "name: cam, count: 2", "name: cam, count: 0")),
              ContainsSubstring("cameras: there are none"));
-  CHECK_THAT(complaints_about(with(good, "on: [floating, dropped]", "on: [floting]")),
-             ContainsSubstring(
-                 "randomizers[1].on: unknown moment \"floting\"; did you mean \"floating\"?"));
+  CHECK_THAT(
+      complaints_about(with(good, "on: [floating, dropped]", "on: [floting]")),
+      ContainsSubstring("randomizers[1].on: unknown moment 'floting'; did you mean 'floating'?"));
   CHECK_THAT(complaints_about(with(good, "name: clutter", "name: targets")),
-             ContainsSubstring("objects[1]: another entry is called \"targets\""));
+             ContainsSubstring("objects[1]: another entry is called 'targets'"));
   CHECK_THAT(complaints_about(with(good, "name: orbit", "name: poses")),
-             ContainsSubstring("randomizers[1]: another entry is called \"poses\""));
+             ContainsSubstring("randomizers[1]: another entry is called 'poses'"));
   CHECK_THAT(complaints_about(with(good, "{type: shapes, name: clutter", "{name: clutter")),
-             ContainsSubstring("objects[1]: `type` is missing"));
+             ContainsSubstring("objects[1]: 'type' is missing"));
   CHECK_THAT(complaints_about(with(good, "{simulate: 4}", "{simulate: 4, capture: x}")),
              ContainsSubstring("timeline[0]: expected one of"));
   CHECK_THAT(complaints_about(with(good, "\"^\\\\d+_\"", "\"(\"")),
              ContainsSubstring("objects[0].label_pattern: not a regular expression"));
   CHECK_THAT(complaints_about(with(good, "under: /Assets", "under: Assets")),
-             ContainsSubstring("objects[0].under: expected a path like /Assets, found \"Assets\""));
+             ContainsSubstring("objects[0].under: expected a path like /Assets, found 'Assets'"));
   CHECK_THAT(complaints_about("[1, 2]"), ContainsSubstring("a job is a mapping of sections"));
 }
 
@@ -85,7 +85,7 @@ TEST_CASE("A job may say how loaders read its files", "[job]") {
   CHECK(job.loaders[0].type == "usd");
   CHECK(job.loaders[0].map.find("missing_assets_are_errors"));
   CHECK_THAT(complaints_about(good_job() + "loaders: [{type: usd}, {name: b, type: usd}]\n"),
-             ContainsSubstring("loaders[1]: another entry is of type \"usd\""));
+             ContainsSubstring("loaders[1]: another entry is of type 'usd'"));
 }
 
 TEST_CASE("The null renderer may be written without quotes", "[job]") {
@@ -128,11 +128,11 @@ TEST_CASE("Writers stay below the output folder, and out of its bookkeeping", "[
     return complaints_about(with(good_job(), "name: basic", writer));
   };
   CHECK(complaints("name: ../../x") ==
-        "job.yaml:12:37: writers[0].name: the folder \"../../x\" is not below the output folder "
-        "\"out\"; name a folder below it, or choose one that holds both by `--output`\n");
+        "job.yaml:12:37: writers[0].name: the folder '../../x' is not below the output folder "
+        "'out'; name a folder below it, or choose one that holds both by '--output'\n");
   CHECK_THAT(complaints("name: basic, output_dir: /etc/x"),
-             ContainsSubstring("job.yaml:12:56: writers[0].output_dir: the folder \"/etc/x\" is "
-                               "not below the output folder \"out\""));
+             ContainsSubstring("job.yaml:12:56: writers[0].output_dir: the folder '/etc/x' is "
+                               "not below the output folder 'out'"));
   for (const char* folder : {"..", "a/../..", "./../out2", ".diorama", "a/.diorama-stage/b",
                              "../out/.diorama/journal"}) {
     INFO(folder);
@@ -145,7 +145,7 @@ TEST_CASE("Writers stay below the output folder, and out of its bookkeeping", "[
   }
   CHECK(complaints("name: ../../x, output_dir: inside").empty());
   CHECK_THAT(complaints_about(with(good_job(), "{folder: out}", "{folder: out, records: ../y}")),
-             ContainsSubstring("job.yaml:13:32: output.records: the folder \"../y\" is not below"));
+             ContainsSubstring("job.yaml:13:32: output.records: the folder '../y' is not below"));
   CHECK(complaints_about(with(with(good_job(), "{folder: out}", "{folder: /data}"), "name: basic",
                               "name: basic, output_dir: /data/basic"))
             .empty());
@@ -153,8 +153,8 @@ TEST_CASE("Writers stay below the output folder, and out of its bookkeeping", "[
 
 TEST_CASE("Names of groups hold nothing that a terminal would obey", "[job]") {
   CHECK_THAT(complaints_about(with(good_job(), "name: cam", "name: \"a\\e[2J\"")),
-             ContainsSubstring("cameras[0].name: expected a name without \"/\" and control "
-                               "characters, found \"a\\x1B[2J\""));
+             ContainsSubstring("cameras[0].name: expected a name without '/' and control "
+                               "characters, found 'a\\x1B[2J'"));
 }
 
 TEST_CASE("A simulation takes steps or goes on until rest", "[job]") {

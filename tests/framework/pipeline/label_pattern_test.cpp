@@ -59,18 +59,18 @@ TEST_CASE("A pattern that backtracks for ever elsewhere takes no time", "[label_
 }
 
 TEST_CASE("What is wrong with a pattern is said in words", "[label_pattern]") {
-  CHECK(fault("(") == "not a regular expression: a `(` is not closed, found `(`");
-  CHECK(fault("[a") == "not a regular expression: a `[` is not closed, found `[a`");
-  CHECK(fault("a)") == "not a regular expression: a `)` closes nothing, found `a)`");
+  CHECK(fault("(") == "not a regular expression: a '(' is not closed, found '('");
+  CHECK(fault("[a") == "not a regular expression: a '[' is not closed, found '[a'");
+  CHECK(fault("a)") == "not a regular expression: a ')' closes nothing, found 'a)'");
   CHECK(fault("*a") ==
-        "not a regular expression: `*`, `+`, `?` or `{}` repeats nothing, found `*`");
+        "not a regular expression: '*', '+', '?' or '{}' repeats nothing, found '*'");
   CHECK(fault("a\\") == "not a regular expression: it ends with a backslash");
   CHECK(fault("(a)\\1") ==
-        "not a regular expression: back references are not supported, found `\\1`; write the "
+        "not a regular expression: back references are not supported, found '\\1'; write the "
         "repeated part out");
   for (const char* pattern : {"a(?=b)", "a(?!b)", "(?<=a)b", "(?<!a)b"}) {
     CHECK_THAT(fault(pattern),
-               ContainsSubstring("looking ahead and behind is not supported, found `(?"));
+               ContainsSubstring("looking ahead and behind is not supported, found '(?"));
   }
   CHECK_THAT(complaints_about(with(good_job(), "\"^\\\\d+_\"", "\"a(?=b)\"")),
              ContainsSubstring("job.yaml:5:") &&

@@ -49,17 +49,17 @@ Checked check(const std::string& keys) {
 TEST_CASE("A pattern that fits no node is told with its place and the nearest path", "[patterns]") {
   CHECK_THAT(check(R"(nodes: "/Asset/*")").complaints,
              ContainsSubstring("job.yaml:9:") &&
-                 ContainsSubstring("randomizers[0].nodes: \"/Asset/*\" fits no node; did you mean "
-                                   "\"/Assets/*\"?"));
+                 ContainsSubstring("randomizers[0].nodes: '/Asset/*' fits no node; did you mean "
+                                   "'/Assets/*'?"));
   CHECK_THAT(check(R"(nodes: "/Cameras/cm_1")").complaints,
-             ContainsSubstring("did you mean \"/Cameras/cam_1\"?"));
+             ContainsSubstring("did you mean '/Cameras/cam_1'?"));
   CHECK_THAT(check(R"(targets: ["/Assets/*", "/Distrctors/*/x"])").complaints,
-             ContainsSubstring("randomizers[0].targets: \"/Distrctors/*/x\" fits no node; did you "
-                               "mean \"/Distractors/*/x\"?"));
+             ContainsSubstring("randomizers[0].targets: '/Distrctors/*/x' fits no node; did you "
+                               "mean '/Distractors/*/x'?"));
   CHECK_THAT(check(R"(nodes: "/Quux/*")").complaints,
              ContainsSubstring("fits no node; nodes are below /Environment"));
   CHECK_THAT(check(R"(nodes: "/Assets/falling_banan")").complaints,
-             ContainsSubstring("did you mean \"/Assets/falling_banana\"?"));
+             ContainsSubstring("did you mean '/Assets/falling_banana'?"));
 }
 
 TEST_CASE("Patterns that may fit are no complaint", "[patterns]") {

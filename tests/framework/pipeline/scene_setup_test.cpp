@@ -114,7 +114,7 @@ TEST_CASE("A room without a table gets a warning and the origin", "[environment]
   CHECK(area == Vec3::Zero());
   REQUIRE(room.host.warnings.size() == 1);
   CHECK_THAT(room.host.warnings[0],
-             ContainsSubstring("/Environment/loaded: no node's path holds \"TablePingPong\""));
+             ContainsSubstring("/Environment/loaded: no node's path holds 'TablePingPong'"));
 }
 
 TEST_CASE("The environment's own name matches no rule", "[environment]") {

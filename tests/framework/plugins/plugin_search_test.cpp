@@ -143,7 +143,7 @@ TEST_CASE("making components complains about everything that a job got wrong", "
   CHECK(
       complaints.messages()[2] ==
       "job.yaml:8:3: environments[0]: expected a mapping that names a loader with the key 'type', "
-      "found the text \"ball\"");
+      "found the text 'ball'");
   CHECK(complaints.messages()[3].starts_with("job.yaml:9:3: "));
   CHECK(complaints.messages()[3].find("radius") != std::string::npos);
   const Value good = job_entry("ball");

@@ -220,11 +220,11 @@ writers: [{kwargs: {}}]
   CHECK_THAT(text, ContainsSubstring("job.yaml:3:19") && ContainsSubstring("-1"));
   CHECK_THAT(text, ContainsSubstring("num_camera") && ContainsSubstring("num_cameras"));
   CHECK_THAT(text, ContainsSubstring("capture.resolution: expected [width, height]"));
-  CHECK_THAT(text, ContainsSubstring("unknown key `auto_labels`; did you mean `auto_label`?"));
-  CHECK_THAT(text, ContainsSubstring("labeled_assets.manual_label[0]: `url` is missing"));
+  CHECK_THAT(text, ContainsSubstring("unknown key 'auto_labels'; did you mean 'auto_label'?"));
+  CHECK_THAT(text, ContainsSubstring("labeled_assets.manual_label[0]: 'url' is missing"));
   CHECK_THAT(text, ContainsSubstring("gravity_disabled_chance") && ContainsSubstring("1.5"));
-  CHECK_THAT(text, ContainsSubstring("unknown key `physic`; did you mean `physics`?"));
-  CHECK_THAT(text, ContainsSubstring("writers[0]: `type` is missing"));
+  CHECK_THAT(text, ContainsSubstring("unknown key 'physic'; did you mean 'physics'?"));
+  CHECK_THAT(text, ContainsSubstring("writers[0]: 'type' is missing"));
 }
 
 TEST_CASE("Empty environments and counts that lead nowhere are complaints", "[replicator]") {

@@ -39,7 +39,7 @@ TEST_CASE("a missing texture is one warning that names file and texture", "[load
                                 "o A\nusemtl A\nf 1/1 2/2 3/3\no B\nusemtl B\nf 1/1 2/2 3/3\n");
   const LoadedFile loaded(file);
   const std::string line =
-      file + ": texture @pictures/wood.png@ could not be found (materials \"A\", \"B\")";
+      file + ": texture @pictures/wood.png@ could not be found (materials 'A', 'B')";
   CHECK(loaded.host.messages == std::vector<std::string>{line});
   CHECK_FALSE(loaded.node("A").materials.at(0)->base_color_texture);
 

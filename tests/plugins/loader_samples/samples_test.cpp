@@ -112,8 +112,8 @@ TEST_CASE("skies are finite, bright where the sun is, and differ", "[samples][sl
 TEST_CASE("names that do not exist get a suggestion", "[samples]") {
   CHECK_THROWS_WITH(
       Loaded("sample:011_bananas"),
-      ContainsSubstring("sample:011_bananas: no such sample; did you mean \"011_banana\"?"));
-  CHECK_THROWS_WITH(Loaded("prop:S_WetFloorSigns"), ContainsSubstring("\"S_WetFloorSign\""));
+      ContainsSubstring("sample:011_bananas: no such sample; did you mean '011_banana'?"));
+  CHECK_THROWS_WITH(Loaded("prop:S_WetFloorSigns"), ContainsSubstring("'S_WetFloorSign'"));
   CHECK_THROWS_WITH(Loaded("sky:Mars"),
                     ContainsSubstring("there are: Cloudy/champagne_castle_1_4k"));
 }

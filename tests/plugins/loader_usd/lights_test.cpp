@@ -135,7 +135,7 @@ def Xform "Crowd" (
   CHECK(has_warning(loaded, "</C> is a light whose inputs:diffuse is not taken"));
   CHECK(has_warning(loaded, "</C> is a light whose collection:lightLink:excludes is not taken"));
   CHECK(has_warning(loaded,
-                    "the value clips \"default\" of </Crowd> name no assets or no prim in "
+                    "the value clips 'default' of </Crowd> name no assets or no prim in "
                     "them, so they are not read"));
   CHECK(loaded.host.warnings.size() == 6);
 }

@@ -268,7 +268,7 @@ def Material "Mat"
   CHECK_FALSE(material.roughness_texture);
   REQUIRE(loaded.host.warnings.size() == 1);
   const std::string missing =
-      file + ": texture @tex/rough.png@ could not be found (material \"Mat\")";
+      file + ": texture @tex/rough.png@ could not be found (material 'Mat')";
   CHECK(loaded.host.warnings[0] == missing);
 
   UsdLoader::Params strict;
@@ -605,7 +605,7 @@ TEST_CASE("a broken file is an asset error that begins with its name", "[loader_
   const std::string file = folder.write("a.usda", "#usda 1.0\ndef \"A\" {\n");
   CHECK_THROWS_AS(Loaded(file), Error);
   CHECK_THROWS_WITH(Loaded(file), file +
-                                      ":3:1: expected \"}\" after the contents of a prim, "
+                                      ":3:1: expected '}' after the contents of a prim, "
                                       "found the end of the file");
   const std::string empty = folder.write("b.usdc", "");
   CHECK_THROWS_WITH(Loaded(empty),

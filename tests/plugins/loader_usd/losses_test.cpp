@@ -217,8 +217,8 @@ TEST_CASE("units and axes that are none are said, and count as not said", "[load
   for (const std::string axis : {"X", "z", "up", ""}) {
     const Loaded loaded = loaded_with("1", axis);
     CHECK(warnings_of(loaded) ==
-          Warnings{"upAxis is \"" + axis +
-                   "\", expected \"Y\" or \"Z\"; it counts as not said, which is \"Y\""});
+          Warnings{"upAxis is '" + axis +
+                   "', expected 'Y' or 'Z'; it counts as not said, which is 'Y'"});
     CHECK(loaded.scene.world_bounds(loaded.root).max.isApprox(Vec3(2, 0, 3), 1e-6));
   }
   // What a referenced file says wrongly does not scale it.

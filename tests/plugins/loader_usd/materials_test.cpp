@@ -94,7 +94,7 @@ TEST_CASE("a set of UDIM tiles is one texture with its own layout", "[loader_usd
                                              shaders.substr(shaders.find("wood") + 4))));
   REQUIRE(none.host.warnings.size() == 1);
   CHECK(none.host.warnings[0].ends_with(
-      "texture @gone.<UDIM>.png@ could not be found (material \"Mat\")"));
+      "texture @gone.<UDIM>.png@ could not be found (material 'Mat')"));
 }
 
 TEST_CASE("MaterialX surfaces are read through their nodes", "[loader_usd]") {

@@ -174,8 +174,7 @@ def "Chair" (
 TEST_CASE("a text error says file, line and column", "[usda]") {
   CHECK(error_of("def \"A\"\n{\n    float x = one\n}\n") ==
         "test.usda:4:15: expected a number for float");
-  CHECK(error_of("def \"A\" { }\ndef \"A\" { }\n") ==
-        "test.usda:3:8: there is a prim \"A\" already");
+  CHECK(error_of("def \"A\" { }\ndef \"A\" { }\n") == "test.usda:3:8: there is a prim 'A' already");
   CHECK(error_of("def \"A\" { float x = 1 }\n") == "test.usda:2:23: expected the end of the line");
   CHECK(error_of("def \"A\"\n{\n    string s = \"open\n}\n") ==
         "test.usda:4:16: the string is not closed");
@@ -263,7 +262,7 @@ TEST_CASE("display units are those that USD knows", "[usda]") {
   CHECK(with_unit("cm") == "no error");
   CHECK(with_unit("deg") == "no error");
   CHECK(with_unit("parsec") ==
-        "test.usda:5:23: \"parsec\" is not a unit; known are mm, cm, dm, m, km, in, ft, yd, mi, "
+        "test.usda:5:23: 'parsec' is not a unit; known are mm, cm, dm, m, km, in, ft, yd, mi, "
         "deg, rad, default");
   CHECK(with_unit("3").find("is not a unit") != std::string::npos);
 }
@@ -276,7 +275,7 @@ TEST_CASE("old names of types stay as they are written", "[usda]") {
   CHECK(attribute(*layer, "/A", "primvars:st").type() == Type::Vec2f);
   // Two names of one type are two types where a layer says both.
   CHECK(error_of("def \"A\"\n{\n    Vec2f a\n    float2 a = (1, 2)\n}\n") ==
-        "test.usda:5:13: \"a\" is of type Vec2f in one place and of type float2 in another");
+        "test.usda:5:13: 'a' is of type Vec2f in one place and of type float2 in another");
 }
 
 }  // namespace diorama::usd

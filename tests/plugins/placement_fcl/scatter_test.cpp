@@ -169,12 +169,12 @@ TEST_CASE("Patterns that lead nowhere are told in words", "[placement]") {
   Scatter2d(on_nothing, stage.host).randomize(stage.scene, {}, Rng(1));
   REQUIRE(stage.host.warnings.size() == 1);
   CHECK_THAT(stage.host.warnings[0],
-             ContainsSubstring("\"/Environment/sofa/**\" is visible and faces upwards"));
+             ContainsSubstring("'/Environment/sofa/**' is visible and faces upwards"));
   CHECK(stage.place(0) == Vec3::Zero());
   Scatter3d::Params in_nothing;
   in_nothing.volumes = "/Marks/*";
   CHECK_THAT(text_of([&] { Scatter3d(in_nothing, stage.host).randomize(stage.scene, {}, Rng(1)); }),
-             ContainsSubstring("\"/Marks/*\" has a mesh"));
+             ContainsSubstring("'/Marks/*' has a mesh"));
 }
 
 TEST_CASE("What waits at the origin for another randomizer is in nobody's way", "[placement]") {

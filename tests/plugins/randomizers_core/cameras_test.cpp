@@ -110,7 +110,7 @@ TEST_CASE("A pattern without cameras is told in words", "[randomizers]") {
   params.camera = "/Assets/*";
   CameraRelativePose placement(params, set.host);
   CHECK_THROWS_WITH(placement.randomize(set.scene, {}, Rng(1)),
-                    ContainsSubstring("no camera fits \"/Assets/*\""));
+                    ContainsSubstring("no camera fits '/Assets/*'"));
 }
 
 TEST_CASE("Lenses are drawn, what is not given stays", "[randomizers]") {

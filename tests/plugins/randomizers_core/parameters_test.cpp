@@ -48,7 +48,7 @@ TEST_CASE("labels to choose from must be there", "[randomizers]") {
   FakeHost host;
   RandomLabels::Params none;
   none.labels = {};
-  CHECK(text_of([&] { RandomLabels(none, host); }) == "`labels`: expected at least one");
+  CHECK(text_of([&] { RandomLabels(none, host); }) == "'labels': expected at least one");
 }
 
 TEST_CASE("parameters out of range or unknown are named", "[randomizers]") {

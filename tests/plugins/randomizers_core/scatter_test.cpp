@@ -225,7 +225,7 @@ TEST_CASE("What waits to be placed is in nobody's way, what is placed is", "[ran
   stage.scene.set_pose(other, Affine(Eigen::Translation3d(0, 0, 2.5)));
   scatter.randomize(stage.scene, stage.context, Rng(1));
   REQUIRE(stage.host.warnings.size() == 1);
-  CHECK_THAT(stage.host.warnings[0], ContainsSubstring("1 of 1 nodes that fit \"/Assets/box\""));
+  CHECK_THAT(stage.host.warnings[0], ContainsSubstring("1 of 1 nodes that fit '/Assets/box'"));
 }
 
 TEST_CASE("Lights stay off surfaces and in front of walls", "[randomizers]") {

@@ -445,7 +445,7 @@ TEST_CASE("S3 output is refused with a message", "[writers]") {
   FakeHost host;
   BasicWriter::Params params;
   params.remote.s3_bucket = "pictures";
-  CHECK_THROWS_WITH(BasicWriter(params, host), ContainsSubstring("s3_bucket: found \"pictures\""));
+  CHECK_THROWS_WITH(BasicWriter(params, host), ContainsSubstring("s3_bucket: found 'pictures'"));
 }
 
 TEST_CASE("semantic_types may be null, must be texts, and replaces the class filter", "[writers]") {
@@ -493,10 +493,10 @@ TEST_CASE("a list of channels that cannot be written says why", "[writers]") {
     params.channels.names = std::move(names);
     CHECK_THROWS_WITH(BasicWriter(params, host), ContainsSubstring(what));
   };
-  complaint({"../up"}, "channels: \"../up\" is no name of a channel");
-  complaint({""}, "channels: \"\" is no name of a channel");
-  complaint({"visibility"}, "channels: \"visibility\" is an annotation, not a channel");
-  complaint({"a", "a"}, "channels: \"a\" is listed twice");
+  complaint({"../up"}, "channels: '../up' is no name of a channel");
+  complaint({""}, "channels: '' is no name of a channel");
+  complaint({"visibility"}, "channels: 'visibility' is an annotation, not a channel");
+  complaint({"a", "a"}, "channels: 'a' is listed twice");
   complaint({"distance_to_camera"}, "is the name of something that this writer makes");
   BasicWriter::Params params;
   params.channels.names = {"disparity"};

@@ -242,18 +242,18 @@ TEST_CASE("bad categories are refused with what is wrong", "[writers]") {
     CHECK_THROWS_WITH(CocoWriter(params, host), message);
   };
   refused(Value::text("all"),
-          "coco_categories: expected a mapping of labels to categories, found the text \"all\"");
+          "coco_categories: expected a mapping of labels to categories, found the text 'all'");
   Value map = Value::make_map();
   map.set("mug", category("Cup", 1));
   map.find("mug")->erase("id");
-  refused(map, "coco_categories: \"mug\" needs a name and a whole number as its id");
+  refused(map, "coco_categories: 'mug' needs a name and a whole number as its id");
   map.set("mug", category("Cup", 1));
   map.set("ball", category("Ball", 1));
   refused(map, "coco_categories: id 1 is used twice");
   CocoWriter::Params remote;
   remote.remote.s3_bucket = "b";
   CHECK_THROWS_WITH(CocoWriter(remote, host),
-                    "s3_bucket: found \"b\"; files go to the output folder only, remove the key");
+                    "s3_bucket: found 'b'; files go to the output folder only, remove the key");
 }
 
 TEST_CASE("every picture's licence is in the list", "[writers]") {

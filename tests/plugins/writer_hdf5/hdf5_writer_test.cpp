@@ -95,5 +95,5 @@ TEST_CASE("channels of other plugins are data sets of their names", "[writers]")
   CHECK(file.read<std::uint32_t>("parts", H5T_NATIVE_UINT32, {16, 24})[5] == 70000);
   Hdf5Writer::Params taken;
   taken.channels.names = {"lens"};
-  CHECK_THROWS_WITH(Hdf5Writer(taken, host), ContainsSubstring("channels: \"lens\""));
+  CHECK_THROWS_WITH(Hdf5Writer(taken, host), ContainsSubstring("channels: 'lens'"));
 }

@@ -81,5 +81,5 @@ TEST_CASE("an unknown format is refused", "[writers]") {
   PoseWriter::Params params;
   params.format = "yolo";
   CHECK_THROWS_WITH(PoseWriter(params, host),
-                    ContainsSubstring("expected null, dope or centerpose, found \"yolo\""));
+                    ContainsSubstring("expected null, dope or centerpose, found 'yolo'"));
 }

@@ -88,5 +88,5 @@ TEST_CASE("channels of other plugins are members of their names", "[writers]") {
   CHECK(value == 7.25f);
   WebDatasetWriter::Params taken;
   taken.channels.names = {"depth"};
-  CHECK_THROWS_WITH(WebDatasetWriter(taken, host), ContainsSubstring("channels: \"depth\""));
+  CHECK_THROWS_WITH(WebDatasetWriter(taken, host), ContainsSubstring("channels: 'depth'"));
 }
