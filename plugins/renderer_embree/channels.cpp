@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "path_tracer.h"
-#include "ray_blocks.h"
-#include "silhouette.h"
+#include "renderer_support/ray_blocks.h"
+#include "renderer_support/silhouette.h"
 
 namespace diorama {
 namespace {

@@ -8,7 +8,7 @@
 #include "diorama/frame.h"
 #include "diorama/host.h"
 #include "render_scene.h"
-#include "view.h"
+#include "renderer_support/view.h"
 
 namespace diorama {
 

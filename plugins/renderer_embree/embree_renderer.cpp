@@ -11,10 +11,10 @@
 #include <cmath>
 #include <vector>
 
-#include "oidn_denoiser.h"
-#include "sample_plan.h"
-#include "stopwatch.h"
-#include "view_transform.h"
+#include "renderer_support/oidn_denoiser.h"
+#include "renderer_support/sample_plan.h"
+#include "renderer_support/stopwatch.h"
+#include "renderer_support/view_transform.h"
 
 namespace diorama {
 namespace {

@@ -6,13 +6,13 @@
 #include <vector>
 
 #include "channels.h"
-#include "denoiser.h"
 #include "diorama/host.h"
 #include "diorama/params.h"
 #include "diorama/renderer.h"
 #include "path_tracer.h"
 #include "render_scene.h"
-#include "sample_plan.h"
+#include "renderer_support/denoiser.h"
+#include "renderer_support/sample_plan.h"
 
 namespace diorama {
 

@@ -4,13 +4,13 @@
 #include <cstdint>
 #include <vector>
 
-#include "batch.h"
 #include "diorama/host.h"
-#include "film.h"
-#include "isa.h"
 #include "render_scene.h"
-#include "sobol.h"
-#include "view.h"
+#include "renderer_support/batch.h"
+#include "renderer_support/film.h"
+#include "renderer_support/isa.h"
+#include "renderer_support/trace_job.h"
+#include "renderer_support/view.h"
 
 namespace diorama {
 
@@ -43,22 +43,6 @@ struct TraceSettings {
   bool samples_bsdf = true;
   /// For benchmarks: gets every ray, from one thread only.
   std::vector<LoggedRay>* ray_log = nullptr;
-};
-
-/// A rectangle of pixels and the samples wanted of each.
-struct TraceJob {
-  int x_begin = 0;
-  int y_begin = 0;
-  int x_end = 0;
-  int y_end = 0;
-  std::uint32_t sample_begin = 0;
-  std::uint32_t sample_end = 1;
-  SampleOrder order{0, 1};
-
-  std::uint32_t pixel_count() const { return std::uint32_t((x_end - x_begin) * (y_end - y_begin)); }
-  std::uint64_t path_count() const {
-    return std::uint64_t(pixel_count()) * (sample_end - sample_begin);
-  }
 };
 
 struct RayCounts {

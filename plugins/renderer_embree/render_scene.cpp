@@ -7,7 +7,7 @@
 #include <span>
 
 #include "diorama/error.h"
-#include "stopwatch.h"
+#include "renderer_support/stopwatch.h"
 
 namespace diorama {
 namespace {
@@ -26,9 +26,8 @@ std::shared_ptr<const Texture> make_white_sky() {
 }
 
 ShadingMesh::Point hit_point(const RTCFilterFunctionNArguments* args, unsigned i) {
-  return ShadingMesh::on_triangle(RTCHitN_primID(args->hit, args->N, i),
-                                  RTCHitN_u(args->hit, args->N, i),
-                                  RTCHitN_v(args->hit, args->N, i));
+  return point_on_triangle(RTCHitN_primID(args->hit, args->N, i), RTCHitN_u(args->hit, args->N, i),
+                           RTCHitN_v(args->hit, args->N, i));
 }
 
 void pass_where_cut_out(const RTCFilterFunctionNArguments* args) {

@@ -9,16 +9,16 @@
 #include <type_traits>
 #include <vector>
 
-#include "batch.h"
 #include "diorama/host.h"
 #include "diorama/scene.h"
 #include "embree.h"
-#include "isa.h"
-#include "lights.h"
-#include "rigid_motion.h"
-#include "sampling.h"
-#include "shading_material.h"
-#include "shading_mesh.h"
+#include "renderer_support/batch.h"
+#include "renderer_support/isa.h"
+#include "renderer_support/lights.h"
+#include "renderer_support/rigid_motion.h"
+#include "renderer_support/sampling.h"
+#include "renderer_support/shading_material.h"
+#include "renderer_support/shading_mesh.h"
 
 namespace diorama {
 
@@ -77,6 +77,15 @@ struct RayHit {
   Vec3f normal = Vec3f::Zero();  ///< Of the triangle, as long as twice its area.
   explicit operator bool() const { return instance != nullptr; }
 };
+
+/// A hit as Embree tells it, on the triangle that it belongs to. The quad's corners a, b, c, d are
+/// the triangles a, b, d and c, d, b; u leads from a to b, v from a to d.
+inline ShadingMesh::Point point_on_triangle(std::uint32_t primitive, float u, float v) {
+  if constexpr (!embree::kTakesQuads) return {primitive, u, v};
+  const bool is_second = u + v > 1.0f;
+  return {2 * primitive + std::uint32_t(is_second), is_second ? 1.0f - u : u,
+          is_second ? 1.0f - v : v};
+}
 
 /// What the rays of a batch met.
 struct BatchHits {
@@ -355,7 +364,7 @@ inline RayHit RenderScene::intersect(RTCScene scene, const Vec3f& origin, const 
   embree::init(context);
   embree::intersect(scene, context, ray);
   if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
-  const auto point = ShadingMesh::on_triangle(ray.hit.primID, ray.hit.u, ray.hit.v);
+  const auto point = point_on_triangle(ray.hit.primID, ray.hit.u, ray.hit.v);
   instances_[ray.hit.geomID]->shading->prefetch(point.triangle);
   return {instances_[ray.hit.geomID].get(),
           ray.hit.geomID,
@@ -435,7 +444,7 @@ inline void RenderScene::intersect(RTCScene scene, RayBundle& bundle, bool is_co
     const std::size_t to = begin + i;
     const bool is_met = rays.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
     hits.geometry[to] = std::int32_t(rays.hit.geomID[i]);
-    const auto point = ShadingMesh::on_triangle(rays.hit.primID[i], rays.hit.u[i], rays.hit.v[i]);
+    const auto point = point_on_triangle(rays.hit.primID[i], rays.hit.u[i], rays.hit.v[i]);
     hits.triangle[to] = std::int32_t(point.triangle);
     hits.u[to] = point.u;
     hits.v[to] = point.v;

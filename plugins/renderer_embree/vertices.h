@@ -4,8 +4,8 @@
 #include <array>
 #include <vector>
 
-#include "bsdf.h"
 #include "render_scene.h"
+#include "renderer_support/bsdf.h"
 
 namespace diorama {
 

@@ -203,6 +203,22 @@ TEST_CASE("A plugin includes the SDK, its engine, itself and shared libraries", 
   CHECK(offending_includes("plugins", is_allowed) == None{});
 }
 
+TEST_CASE("What path tracers share knows no engine that traces rays", "[architecture]") {
+  const std::string folder = "plugins/renderer_support";
+  const auto is_allowed = [&](const Source& source, const Include& include) {
+    const std::string& file = include.file;
+    if (include.is_quoted) {
+      return file.starts_with("diorama/") || stands_in(source, file, fs::path(folder));
+    }
+    return is_standard_header(file) || file.starts_with("Eigen/") || file.starts_with("sys/") ||
+           file.starts_with("OpenImageDenoise/");
+  };
+  CHECK(offending_includes(folder, is_allowed) == None{});
+  CHECK_FALSE(offending_includes("plugins/renderer_embree", is_allowed).empty());
+  const auto is_inside = [&](const Source& source) { return source.is_below(folder); };
+  CHECK(files_with_code(R"(\b[Ee]mbree|\bRTC[A-Z]|\brtc[A-Z])", is_inside) == None{});
+}
+
 TEST_CASE("One file knows yaml-cpp and one knows Boost.DLL", "[architecture]") {
   CHECK(files_including("yaml-cpp/").size() == 1);
   CHECK(files_including("boost/dll").size() == 1);

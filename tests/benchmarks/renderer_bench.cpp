@@ -16,7 +16,7 @@
 #include "framework/bench/cpu_time.h"
 #include "framework/bench/picture_error.h"
 #include "framework/images/linear_picture.h"
-#include "sample_plan.h"
+#include "renderer_support/sample_plan.h"
 #include "support/render_host/render_host.h"
 
 namespace {

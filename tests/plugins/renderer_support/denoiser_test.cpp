@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "denoiser.h"
+#include "renderer_support/denoiser.h"
 
 #include <cmath>
 #include <limits>
 #include <utility>
 
 #include "diorama/rng.h"
+#include "renderer_support/view_transform.h"
 #include "support/catch.h"
 #include "support/render_host/render_host.h"
-#include "view_transform.h"
 
 namespace diorama {
 namespace {

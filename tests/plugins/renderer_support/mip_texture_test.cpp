@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "mip_texture.h"
+#include "renderer_support/mip_texture.h"
 
 #include "diorama/error.h"
 #include "diorama/image.h"

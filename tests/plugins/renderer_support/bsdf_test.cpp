@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "bsdf.h"
+#include "renderer_support/bsdf.h"
 
 #include <array>
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "sampling.h"
+#include "renderer_support/sampling.h"
 
 #include <algorithm>
 #include <array>
@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "diorama/rng.h"
-#include "dome.h"
-#include "microfacet.h"
-#include "sky_grid.h"
-#include "sobol.h"
+#include "renderer_support/dome.h"
+#include "renderer_support/microfacet.h"
+#include "renderer_support/sky_grid.h"
+#include "renderer_support/sobol.h"
 #include "support/catch.h"
 #include "support/render_host/render_host.h"
 

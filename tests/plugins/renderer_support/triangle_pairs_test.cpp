@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "triangle_pairs.h"
+#include "renderer_support/triangle_pairs.h"
 
 #include <algorithm>
 #include <set>

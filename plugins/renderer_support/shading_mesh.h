@@ -7,15 +7,14 @@
 #include <vector>
 
 #include "diorama/geometry.h"
-#include "embree.h"
 #include "triangle_pairs.h"
 
 namespace diorama {
 
 /// What tracing and shading read of a mesh, shared by its instances.
 ///
-/// Embree gets the triangles two by two, as quads (where it takes them, see embree.h). Triangles
-/// are numbered by them: 2 * quad for the first half, 2 * quad + 1 for the second. A triangle's
+/// Triangles are paired to quads, for engines that trace them two by two, and numbered by them:
+/// 2 * quad for the first half, 2 * quad + 1 for the second. A triangle's
 /// corners begin with its tip, see TrianglePair; the weights u and v of a point belong to the
 /// second and third.
 ///
@@ -38,15 +37,6 @@ class ShadingMesh {
     float u = 0.0f;
     float v = 0.0f;
   };
-  /// A hit as Embree tells it, on the triangle that it belongs to. The quad's corners a, b, c, d
-  /// are the triangles a, b, d and c, d, b; u leads from a to b, v from a to d.
-  static Point on_triangle(std::uint32_t primitive, float u, float v) {
-    if constexpr (!embree::kTakesQuads) return {primitive, u, v};
-    const bool is_second = u + v > 1.0f;
-    return {2 * primitive + std::uint32_t(is_second), is_second ? 1.0f - u : u,
-            is_second ? 1.0f - v : v};
-  }
-
   /// All numbers are below.
   std::uint32_t number_end() const { return std::uint32_t(tips_.size()); }
   /// Whether this is the second number of a triangle without a partner.

@@ -4,8 +4,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "diorama/image.h"
 #include "film.h"
-#include "path_tracer.h"
+#include "trace_job.h"
 
 namespace diorama {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "sample_plan.h"
+#include "renderer_support/sample_plan.h"
 
 #include <cmath>
 #include <vector>

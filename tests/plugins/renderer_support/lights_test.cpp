@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lights.h"
+#include "renderer_support/lights.h"
 
 #include <cmath>
 #include <vector>
