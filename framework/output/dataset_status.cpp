@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "diorama/error.h"
+#include "framework/config/json_text.h"
 #include "framework/output/journal.h"
 #include "framework/output/workers.h"
 
@@ -19,7 +20,7 @@ void read_description(FileSystem& file_system, const fs::path& file, DatasetStat
   if (!file_system.exists(file)) {
     throw Error(ErrorKind::Output, file.string() + ": no dataset here: no such file");
   }
-  const Json json = Json::parse(file_system.read(file), nullptr, false);
+  const Json json = parse_json_or_nothing<Json>(file_system.read(file));
   const bool is_dataset = json.is_object() && json.contains("captures") &&
                           json["captures"].is_number_integer() && json.contains("job") &&
                           json["job"].is_string();

@@ -23,12 +23,21 @@ namespace fs = std::filesystem;
   throw Error(ErrorKind::Output, what + " " + path.string() + ": " + code.message());
 }
 
+bool is_gone(int error_number) { return error_number == ENOENT || error_number == ENOTDIR; }
+
 /// Closes on every way out; close() itself may report what write() did not.
 class OpenFile {
  public:
   OpenFile(const fs::path& file, int flags, const char* what)
       : file_(file), handle_(open_again(file, flags | O_CLOEXEC)) {
     if (handle_ < 0) fail(what, file_, errno);
+  }
+  /// Null when there is no such file: others remove theirs at any time, also between two looks.
+  static std::unique_ptr<OpenFile> if_there(const fs::path& file, int flags, const char* what) {
+    const int handle = open_again(file, flags | O_CLOEXEC);
+    if (handle < 0 && is_gone(errno)) return nullptr;
+    if (handle < 0) fail(what, file, errno);
+    return std::unique_ptr<OpenFile>(new OpenFile(file, handle));
   }
   ~OpenFile() {
     if (handle_ >= 0) ::close(handle_);
@@ -73,6 +82,7 @@ class OpenFile {
   }
 
  private:
+  OpenFile(fs::path file, int handle) : file_(std::move(file)), handle_(handle) {}
   static int open_again(const fs::path& file, int flags) {
     int handle = -1;
     do {
@@ -96,6 +106,13 @@ class LocalAppendFile final : public AppendFile {
 };
 
 /// A lock of the open file, not of the process: several stores in one process exclude each other.
+struct flock whole_file() {
+  struct flock whole {};
+  whole.l_type = F_WRLCK;
+  whole.l_whence = SEEK_SET;
+  return whole;
+}
+
 class LocalLock final : public FileLock {
  public:
   explicit LocalLock(const fs::path& file) : file_(file, O_RDWR | O_NOFOLLOW, "cannot lock") {}
@@ -103,22 +120,10 @@ class LocalLock final : public FileLock {
     struct flock whole = whole_file();
     return ::fcntl(file_.handle(), F_OFD_SETLK, &whole) == 0;
   }
-  bool is_taken() {
-    struct flock whole = whole_file();
-    return ::fcntl(file_.handle(), F_OFD_GETLK, &whole) == 0 && whole.l_type != F_UNLCK;
-  }
 
  private:
-  static struct flock whole_file() {
-    struct flock whole {};
-    whole.l_type = F_WRLCK;
-    whole.l_whence = SEEK_SET;
-    return whole;
-  }
   OpenFile file_;
 };
-
-bool is_gone(int error_number) { return error_number == ENOENT || error_number == ENOTDIR; }
 
 /// For file systems that cannot rename without replacing.
 bool move_by_link(const fs::path& from, const fs::path& to) {
@@ -254,7 +259,8 @@ std::string LocalFileSystem::read_part(const fs::path& file, std::uint64_t offse
                                        std::uint64_t length) {
   const auto found = status(file);
   if (!found || found->kind != FileStatus::Kind::File || found->size <= offset) return {};
-  return OpenFile(file, O_RDONLY | O_NOFOLLOW, "cannot read").read(offset, length);
+  const auto open = OpenFile::if_there(file, O_RDONLY | O_NOFOLLOW, "cannot read");
+  return open ? open->read(offset, length) : std::string();
 }
 
 std::vector<std::string> LocalFileSystem::list(const fs::path& folder) {
@@ -285,7 +291,9 @@ std::unique_ptr<FileLock> LocalFileSystem::lock(const fs::path& file) {
 bool LocalFileSystem::is_locked(const fs::path& file) {
   const auto found = status(file);
   if (!found || found->kind != FileStatus::Kind::File) return false;
-  return LocalLock(file).is_taken();
+  const auto open = OpenFile::if_there(file, O_RDWR | O_NOFOLLOW, "cannot lock");
+  struct flock whole = whole_file();
+  return open && ::fcntl(open->handle(), F_OFD_GETLK, &whole) == 0 && whole.l_type != F_UNLCK;
 }
 
 }  // namespace diorama

@@ -10,6 +10,8 @@
 
 #include "diorama/error.h"
 
+#include "framework/config/json_text.h"
+
 namespace diorama {
 namespace {
 
@@ -70,7 +72,7 @@ std::string to_text(const JournalledFiles& content) {
 
 /// Nothing but what to_text() writes; std::nullopt otherwise.
 std::optional<JournalledFiles> from_text(std::string_view text) {
-  const Json json = Json::parse(text, nullptr, false);
+  const Json json = parse_json_or_nothing<Json>(text);
   if (!json.is_object() || !json.contains("files") || !json["files"].is_array()) return {};
   JournalledFiles content;
   for (const Json& file : json["files"]) {
@@ -478,7 +480,7 @@ std::optional<std::string> Journals::records_folder() const {
     const std::string text =
         file_system_.read_part(entries_file(worker), index.header.offset, index.header.length);
     if (digest_of(text) != index.header.digest) continue;
-    const Json json = Json::parse(text, nullptr, false);
+    const Json json = parse_json_or_nothing<Json>(text);
     if (!json.is_object() || !json.contains("records") || !json["records"].is_string()) continue;
     std::string records = json["records"].get<std::string>();
     if (records == "." || is_plain_relative(records)) return records;

@@ -7,6 +7,8 @@
 
 #include "diorama/error.h"
 
+#include "framework/config/json_text.h"
+
 namespace diorama {
 namespace {
 
@@ -21,8 +23,8 @@ std::span<const std::byte> bytes_of(const std::string& text) {
 }
 
 std::string keys_that_differ(const std::string& before, const std::string& now) {
-  const Json old_json = Json::parse(before, nullptr, false);
-  const Json new_json = Json::parse(now, nullptr, false);
+  const Json old_json = parse_json_or_nothing<Json>(before);
+  const Json new_json = parse_json_or_nothing<Json>(now);
   std::string keys;
   for (const auto& [key, value] : new_json.items()) {
     const bool is_same = old_json.is_object() && old_json.contains(key) && old_json[key] == value;

@@ -10,6 +10,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "framework/config/json_text.h"
 #include "framework/output/journal.h"
 
 namespace diorama {
@@ -148,7 +149,7 @@ bool Workers::is_alive(const Lease& lease) {
   if (!found || found->kind != FileStatus::Kind::File) return false;
   if (file_system_.is_locked(file)) return true;
   const std::string text = file_system_.read_part(file, 0, 4096);
-  const Json content = Json::parse(text, nullptr, false);
+  const Json content = parse_json_or_nothing<Json>(text);
   // Within one machine locks are certain, and nobody holds this one.
   if (content.is_object() && content.value("machine", Json()) == self_.machine) return false;
   const auto age = age_ns(lease);
@@ -157,7 +158,7 @@ bool Workers::is_alive(const Lease& lease) {
 
 std::string Workers::describe(const Lease& lease) {
   const std::string text = file_system_.read_part(lease_file(lease), 0, 4096);
-  const Json content = Json::parse(text, nullptr, false);
+  const Json content = parse_json_or_nothing<Json>(text);
   std::string who = "worker " + lease.worker;
   if (content.is_object() && content.contains("host") && content["host"].is_string() &&
       content.contains("process") && content["process"].is_number_integer()) {

@@ -132,9 +132,8 @@ gridengine_test_killed_daemon() {
   same_as_reference "$data"
 }
 
-# With a short queue captures wait for the disk, as they do in a long run.
 gridengine_test_time_limit() {
-  delay 100 --queue-mib 1
+  delay 100
   enqueue 1-4 4 10
   complete 400 0
   (($(requeued) >= 4)) || fault 'was not requeued'

@@ -180,10 +180,9 @@ slurm_test_lost_node() {
   same_as_reference "$data"
 }
 
-# A minute is the least that Slurm has; a shard takes longer. With a short queue captures wait for the disk, as
-# they do in a long run.
+# A minute is the least that Slurm has; a shard takes longer.
 slurm_test_time_limit() {
-  delay 200 --queue-mib 1
+  delay 200
   submit 1-4 4 --time=1 --signal=TERM@40
   finish 500 COMPLETED
   (($(restarts) >= 1)) || fault 'was not requeued'

@@ -4,11 +4,13 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cstdlib>
 #include <fstream>
 #include <functional>
 #include <map>
 #include <sstream>
+#include <thread>
 
 #include "diorama/error.h"
 #include "simulated_disk.h"
@@ -479,6 +481,30 @@ TEST_CASE("A living worker keeps its part; the message names it", "[store]") {
   CHECK(dataset_files(disk.tree("/data")) == expected_files(8));
 }
 
+TEST_CASE("A file that others remove between two looks is gone, and no failure", "[store]") {
+  const TemporaryFolder folder;
+  const fs::path lease = folder.path() / "lease";
+  LocalFileSystem local;
+  std::atomic<bool> stops = false;
+  std::thread other([&] {
+    LocalFileSystem its_own;
+    while (!stops) {
+      its_own.write(lease, bytes_of("who"));
+      its_own.remove_file(lease);
+    }
+  });
+  int seen = 0;
+  for (int i = 0; i < 30000; ++i) {
+    const std::string text = local.read_part(lease, 0, 100);
+    if (!text.empty() && text != "who") FAIL("read \"" << text << "\"");
+    seen += text.empty() ? 0 : 1;
+    if (local.is_locked(lease)) FAIL("nobody locks it");
+  }
+  stops = true;
+  other.join();
+  CHECK(seen > 0);
+}
+
 TEST_CASE("A worker that was cut off for too long stops when it comes back", "[store]") {
   SimulatedDisk disk(1);
   SimulatedProcess first(disk);
@@ -906,4 +932,44 @@ TEST_CASE("A capture costs few steps beside its own files, whatever the number o
   const double per_capture = double(process.steps()) / kCaptures - own;
   INFO(per_capture << " steps per capture beside its files");
   CHECK(per_capture < 25);
+}
+
+// By night (tests/nightly.sh): seconds of CPU time for each thousand captures of a farm.
+TEST_CASE("A million captures of a thousand shards cost few steps each", "[.large]") {
+  constexpr int kShards = 1000;
+  constexpr int kOfShard = 1000;
+  constexpr int kCaptures = kShards * kOfShard;
+  SimulatedDisk disk(1);
+  disk.set_step_time(1e-6);  // leases of the first are not old when the last one joins
+  std::int64_t steps = 0;
+  int most_to_join = 0;
+  const auto run_shard = [&](int shard) {
+    SimulatedProcess process(disk);
+    Job job = resuming("w" + std::to_string(shard), kCaptures);
+    job.shard = shard;
+    job.shards = kShards;
+    OutputStore store(process, folders_in("/data"), kCaptures, options_of(job));
+    store.join(kDataset);
+    store.open();
+    most_to_join = std::max(most_to_join, process.steps());
+    for (int i = 0; i < kOfShard; ++i) {
+      const int capture = shard + i * kShards;
+      Transaction transaction;
+      transaction.files.push_back({0, "x/" + std::to_string(capture), bytes_of("x")});
+      store.commit_capture(capture, transaction);
+    }
+    finish(store, [] {});
+    const bool is_last = shard + 1 == kShards;
+    CHECK(store.is_finished() == is_last);
+    store.close();
+    steps += process.steps();
+  };
+  for (int shard = 0; shard < kShards; ++shard) run_shard(shard);
+  constexpr double kOwn = 3;  // written, synced, moved
+  const double per_capture = double(steps) / kCaptures - kOwn;
+  INFO(per_capture << " steps per capture beside its file, at most " << most_to_join
+                   << " before a shard's first");
+  CHECK(per_capture < 60);
+  WARN(per_capture << " steps per capture beside its file; " << most_to_join
+                   << " before the last shard's first");
 }
