@@ -30,6 +30,7 @@
 #include "framework/app/command_run.h"
 #include "framework/app/command_schema.h"
 #include "framework/app/command_sensors.h"
+#include "framework/app/command_stats.h"
 #include "framework/app/command_status.h"
 #include "framework/app/exit_codes.h"
 #include "framework/app/options.h"
@@ -62,6 +63,7 @@ struct CommandLine {
   BenchOptions bench;
   SensorsOptions sensors;
   LintOptions lint;
+  StatsOptions stats;
   ExportCommandOptions export_;
   NewPluginOptions new_plugin;
   bool plugins_json = false;
@@ -400,8 +402,26 @@ void add_lint(CLI::App& app, CommandLine& line) {
       ->required()
       ->type_name("FOLDER");
   command->add_flag("--json", line.lint.as_json, "All findings as JSON");
-  command->callback(
-      [&line] { line.command = [&line](ConsoleLog&) { return command_lint(line.lint); }; });
+  command->add_option("--reader", line.lint.reader, "Reader to use; default: the one that knows it")
+      ->type_name("TYPE");
+  command->callback([&line] {
+    line.command = [&line](ConsoleLog& log) { return command_lint(line.global, line.lint, log); };
+  });
+}
+
+void add_stats(CLI::App& app, CommandLine& line) {
+  CLI::App* command =
+      app.add_subcommand("stats", "Count what is in a dataset, and find pictures to look at");
+  command->add_option("dataset", line.stats.dataset, "A dataset's folder, or the output of a run")
+      ->required()
+      ->type_name("FOLDER");
+  command->add_flag("--json", line.stats.as_json, "Everything as JSON");
+  command
+      ->add_option("--reader", line.stats.reader, "Reader to use; default: the one that knows it")
+      ->type_name("TYPE");
+  command->callback([&line] {
+    line.command = [&line](ConsoleLog& log) { return command_stats(line.global, line.stats, log); };
+  });
 }
 
 void add_new_plugin(CLI::App& app, CommandLine& line) {
@@ -514,6 +534,7 @@ void add_all(CLI::App& app, CommandLine& line) {
   add_export(app, line);
   add_sensors(app, line);
   add_lint(app, line);
+  add_stats(app, line);
   add_new_plugin(app, line);
   add_schema(app, line);
   add_docs(app, line);

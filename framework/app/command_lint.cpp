@@ -3,15 +3,25 @@
 
 #include <algorithm>
 #include <iostream>
+#include <memory>
 
+#include "framework/app/assemble.h"
 #include "framework/config/clean_text.h"
 #include "framework/lint/lint_dataset.h"
 
 namespace diorama {
 
-int command_lint(const LintOptions& options) {
-  const std::vector<LintReport> reports = lint_datasets(options.dataset);
-  if (options.as_json) {
+int command_lint(const GlobalOptions& global, const LintOptions& options, ConsoleLog& log) {
+  const std::unique_ptr<Registry> registry = make_registry(global, log.sink());
+  warn_of_rejected(*registry, log.sink());
+  const std::unique_ptr<HostServices> host = make_host(*registry, global, std::nullopt, log.sink());
+  DatasetReaders readers(*registry, *host);
+  return print_lint(lint_datasets(options.dataset, readers, *host, options.reader),
+                    options.as_json);
+}
+
+int print_lint(const std::vector<LintReport>& reports, bool as_json) {
+  if (as_json) {
     std::cout << lint_json(reports);
   } else {
     for (const LintReport& report : reports) std::cout << printable(lint_text(report));

@@ -19,7 +19,8 @@ using conformance::Outcome;
 
 constexpr std::array kKinds{ComponentKind::Loader,     ComponentKind::Physics,
                             ComponentKind::Randomizer, ComponentKind::Renderer,
-                            ComponentKind::Annotator,  ComponentKind::Writer};
+                            ComponentKind::Annotator,  ComponentKind::Writer,
+                            ComponentKind::Reader};
 
 std::string padded(std::string text, std::size_t width) {
   if (text.size() < width) text.resize(width, ' ');

@@ -123,11 +123,11 @@ class Replay {
     constexpr std::size_t kQueueBytes = std::size_t(256) << 20;
     WriterQueue queue(std::clamp(host_.thread_count(), 1, 4), kQueueBytes,
                       [this](const PendingCapture& pending) { write(pending.capture); });
-    const std::vector<int> indices = stored_.indices();
+    const std::vector<int>& indices = stored_.indices();
     ProgressBar bar(log, "captures", int(indices.size()));
     for (std::size_t i = 0; i < indices.size(); ++i) {
       PendingCapture pending;
-      pending.capture = annotated(indices[i]);
+      pending.capture = annotated(i);
       queue.push(std::move(pending));
       bar.update(int(i) + 1, 0);
     }
@@ -143,8 +143,8 @@ class Replay {
     store_.commit_begin(transaction);
   }
 
-  Capture annotated(int index) const {
-    Capture capture = stored_.read(index, host_);
+  Capture annotated(std::size_t place) const {
+    Capture capture = stored_.read(place);
     const Scene nothing;
     for (Frame& frame : capture.frames) {
       for (std::size_t i = 0; i < effects_.annotators.size(); ++i) {
@@ -177,7 +177,8 @@ int command_sensors(const GlobalOptions& global, const SensorsOptions& options, 
   warn_of_rejected(*registry, log.sink());
   const std::unique_ptr<HostServices> host = make_host(*registry, global, std::nullopt, log.sink());
   const Effects effects = make_effects(options.effects, *registry, *host);
-  const StoredCaptures stored(options.dataset, effects.needs);
+  DatasetReaders readers(*registry, *host);
+  const StoredCaptures stored(options.dataset, effects.needs, readers);
   const std::unique_ptr<Writer> writer = make_writer(stored, effects, *registry, *host);
 
   LocalFileSystem file_system;

@@ -33,6 +33,8 @@ void check_kind(const CheckRun& run, const Subject& subject) {
       return check_annotator(run, subject);
     case ComponentKind::Writer:
       return check_writer(run, subject);
+    case ComponentKind::Reader:
+      return check_reader(run, subject);
   }
 }
 
@@ -50,6 +52,8 @@ std::string output_of(const Subject& subject) {
       return annotator_output(subject);
     case ComponentKind::Writer:
       return writer_output(subject);
+    case ComponentKind::Reader:
+      return reader_output(subject);
   }
   return {};
 }

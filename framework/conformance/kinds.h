@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
+
 #include "framework/conformance/check_run.h"
 #include "framework/host/host_services.h"
 #include "framework/plugins/registry.h"
@@ -31,6 +33,10 @@ struct Subject {
   }
 };
 
+/// A writer's parameters with every switch on, so that as much as possible is written. Nothing when
+/// it has none, or when its switches exclude each other, which a component may say.
+std::optional<Value> usable_switches(const Subject& subject);
+
 /// Documented; defaults valid; unknown keys, wrong types, unknown words and values out of range
 /// refused. False when no component can be made with the defaults.
 bool check_parameters(const CheckRun& run, const Subject& subject);
@@ -41,6 +47,7 @@ void check_randomizer(const CheckRun& run, const Subject& subject);
 void check_renderer(const CheckRun& run, const Subject& subject);
 void check_annotator(const CheckRun& run, const Subject& subject);
 void check_writer(const CheckRun& run, const Subject& subject);
+void check_reader(const CheckRun& run, const Subject& subject);
 
 /// All that a component makes of the same input, as bytes: must be equal in every process. May
 /// throw.
@@ -50,5 +57,6 @@ std::string randomizer_output(const Subject& subject);
 std::string renderer_output(const Subject& subject);
 std::string annotator_output(const Subject& subject);
 std::string writer_output(const Subject& subject);
+std::string reader_output(const Subject& subject);
 
 }  // namespace diorama::conformance

@@ -6,6 +6,7 @@
 #include "diorama/loader.h"
 #include "diorama/physics_backend.h"
 #include "diorama/randomizer.h"
+#include "diorama/reader.h"
 #include "diorama/renderer.h"
 #include "diorama/writer.h"
 #include "framework/conformance/kinds.h"
@@ -33,6 +34,8 @@ std::unique_ptr<Component> make_any(const Subject& subject, const Value& map,
       return make_as(static_cast<Annotator*>(nullptr));
     case ComponentKind::Writer:
       return make_as(static_cast<Writer*>(nullptr));
+    case ComponentKind::Reader:
+      return make_as(static_cast<Reader*>(nullptr));
   }
   return nullptr;
 }

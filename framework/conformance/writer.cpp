@@ -166,15 +166,6 @@ std::string foreign_need(const Writer& writer, const Frame& frame) {
   return {};
 }
 
-/// Every switch on, so that as much as possible is written.
-Value with_all_switches(const Subject& subject) {
-  Value params = Value::make_map();
-  for (const ParamSpec& spec : subject.registry.describe(subject.entry.kind, subject.entry.type)) {
-    if (spec.type == ParamType::Bool) params.set(spec.key, Value::boolean(true));
-  }
-  return params;
-}
-
 void check_dataset(const CheckRun& run, const Subject& subject, const std::string& which,
                    const Value& params) {
   const std::vector<Capture> captures = sample_captures(kCaptures, subject.host);
@@ -221,9 +212,13 @@ Capture capture_that_shows_nothing(Host& host) {
   return capture;
 }
 
-/// Nothing when its switches exclude each other, which a component may say.
+}  // namespace
+
 std::optional<Value> usable_switches(const Subject& subject) {
-  const Value params = with_all_switches(subject);
+  Value params = Value::make_map();
+  for (const ParamSpec& spec : subject.registry.describe(subject.entry.kind, subject.entry.type)) {
+    if (spec.type == ParamType::Bool) params.set(spec.key, Value::boolean(true));
+  }
   if (params.map.empty()) return std::nullopt;
   try {
     subject.make<Writer>(subject.host, params);
@@ -232,8 +227,6 @@ std::optional<Value> usable_switches(const Subject& subject) {
   }
   return params;
 }
-
-}  // namespace
 
 std::string writer_output(const Subject& subject) {
   const std::vector<Capture> captures = sample_captures(kCaptures, subject.host);

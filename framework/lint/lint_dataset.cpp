@@ -5,10 +5,16 @@
 #include <array>
 #include <fstream>
 #include <map>
+#include <memory>
+#include <optional>
 #include <sstream>
 
 #include "diorama/error.h"
 #include "framework/config/json_text.h"
+#include "framework/datasets/capture_sweep.h"
+#include "framework/datasets/frame_checks.h"
+#include "framework/datasets/page_checks.h"
+#include "framework/datasets/run_checks.h"
 #include "framework/lint/lint_formats.h"
 
 namespace diorama {
@@ -21,16 +27,10 @@ struct Format {
   void (*lint)(Dataset&);
 };
 
-constexpr std::array kFormats{Format{"BasicWriter", &lint::lint_basic},
-                              Format{"PoseWriter", &lint::lint_pose},
-                              Format{"DataVisualizationWriter", &lint::lint_visualization},
-                              Format{"COCO", &lint::lint_coco},
-                              Format{"YOLO", &lint::lint_yolo},
-                              Format{"KITTI", &lint::lint_kitti},
-                              Format{"Pascal VOC", &lint::lint_voc},
-                              Format{"BOP", &lint::lint_bop},
-                              Format{"WebDataset", &lint::lint_webdataset},
-                              Format{"HDF5", &lint::lint_hdf5}};
+constexpr std::array kFormats{
+    Format{"PoseWriter", &lint::lint_pose},
+    Format{"DataVisualizationWriter", &lint::lint_visualization}, Format{"BOP", &lint::lint_bop},
+    Format{"WebDataset", &lint::lint_webdataset}, Format{"HDF5", &lint::lint_hdf5}};
 
 std::string read_text(const std::filesystem::path& file) {
   std::error_code failed;
@@ -64,32 +64,114 @@ LintReport lint_folder(const std::filesystem::path& folder, const Format& format
   return report;
 }
 
+void take(ReadLog&& log, LintReport& report) {
+  report.files += log.files;
+  report.checks += log.checks;
+  for (Finding& finding : log.findings) report.findings.push_back(lint_finding(std::move(finding)));
+}
+
+LintReport lint_read(const StoredDataset& dataset, const std::filesystem::path& folder,
+                     Host& host) {
+  LintReport report;
+  report.dataset = folder.string();
+  const StoredInfo& info = dataset.info();
+  report.format = info.format;
+  ReadLog log = dataset.log();
+  const auto planned = check_page(folder, info, log);
+  take(std::move(log), report);
+  CaptureComparison comparison(info);
+  sweep_captures<StoredCapture>(
+      dataset, info.holds, host,
+      [&](StoredCapture stored) {
+        check_frames(info, stored);
+        return stored;
+      },
+      [&](StoredCapture stored) {
+        if (planned) check_planned(*planned, stored, stored.log);
+        comparison.add(stored, stored.log);
+        take(std::move(stored.log), report);
+      });
+  return report;
+}
+
+/// Datasets of one run, one after the other.
+class RunLint {
+ public:
+  RunLint(DatasetReaders& readers, Host& host) : readers_(readers), host_(host) {}
+
+  /// False for a folder that is no dataset.
+  bool lint(const std::filesystem::path& folder, std::string reader) {
+    if (reader.empty()) reader = readers_.recognise(folder);
+    if (reader.empty()) {
+      const Format* format = format_of(folder);
+      if (format) reports_.push_back(lint_folder(folder, *format));
+      return format != nullptr;
+    }
+    try {
+      const std::shared_ptr<const StoredDataset> dataset = readers_.open(folder, reader);
+      reports_.push_back(lint_read(*dataset, folder, host_));
+      datasets_.push_back({folder.filename().string(), dataset});
+    } catch (const Error& error) {
+      if (error.kind() != ErrorKind::Asset) throw;
+      reports_.push_back({folder.string(), reader, 0, 1, {}});
+      reports_.back().findings.push_back(
+          lint_finding({"every file can be read", ".", std::nullopt, "", "", error.what(), ""}));
+    }
+    return true;
+  }
+
+  /// The datasets against each other.
+  void lint_run(const std::filesystem::path& run) {
+    if (datasets_.empty()) return;
+    LintReport report;
+    report.dataset = run.string();
+    report.format = "run";
+    take(check_run(run, datasets_, host_), report);
+    if (report.checks > 0 || !report.findings.empty()) reports_.push_back(std::move(report));
+  }
+
+  std::vector<LintReport> take_reports() { return std::move(reports_); }
+  bool has_reports() const { return !reports_.empty(); }
+
+ private:
+  DatasetReaders& readers_;
+  Host& host_;
+  std::vector<RunDataset> datasets_;
+  std::vector<LintReport> reports_;
+};
+
 }  // namespace
 
-std::vector<LintReport> lint_datasets(const std::filesystem::path& folder) {
+std::vector<LintReport> lint_datasets(const std::filesystem::path& folder, DatasetReaders& readers,
+                                      Host& host, const std::string& reader) {
   if (!std::filesystem::is_directory(folder)) {
     throw Error(ErrorKind::Usage, folder.string() + ": not a folder; give the output of a run");
   }
-  std::vector<LintReport> reports;
-  if (const Format* format = format_of(folder)) {
-    reports.push_back(lint_folder(folder, *format));
-    return reports;
+  RunLint run(readers, host);
+  if (run.lint(folder, reader)) return run.take_reports();
+  for (const auto& path : folders_of_run(folder)) run.lint(path, "");
+  if (!run.has_reports()) {
+    throw Error(ErrorKind::Usage, folder.string() +
+                                      ": holds no dataset that a reader or lint knows, nor do its "
+                                      "folders; 'diorama plugins' lists the readers");
   }
-  std::vector<std::filesystem::path> below;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    if (entry.is_directory()) below.push_back(entry.path());
-  }
-  std::ranges::sort(below);
-  for (const auto& path : below) {
-    if (const Format* format = format_of(path)) reports.push_back(lint_folder(path, *format));
-  }
-  if (reports.empty()) {
-    throw Error(ErrorKind::Usage,
-                folder.string() +
-                    ": holds no dataset (no metadata.txt or dataset.json of a known "
-                    "format, nor do its folders)");
-  }
-  return reports;
+  run.lint_run(folder);
+  return run.take_reports();
+}
+
+LintFinding lint_finding(Finding finding) {
+  std::string message;
+  const auto add = [&message](const std::string& text, const char* front) {
+    if (!text.empty()) message += (message.empty() ? "" : front) + text;
+  };
+  if (finding.capture) add("capture " + std::to_string(*finding.capture), "");
+  add(finding.camera, ", ");
+  add(finding.object, ", ");
+  add(finding.found, ": ");
+  add(finding.expected, "; right would be: ");
+  return {std::move(finding.check), std::move(finding.file),    std::move(message),
+          finding.capture,          std::move(finding.camera),  std::move(finding.object),
+          std::move(finding.found), std::move(finding.expected)};
 }
 
 std::string lint_text(const LintReport& report, std::size_t most) {
@@ -114,8 +196,16 @@ std::string lint_json(const std::vector<LintReport>& reports) {
   for (const LintReport& report : reports) {
     nlohmann::ordered_json findings = nlohmann::ordered_json::array();
     for (const LintFinding& finding : report.findings) {
-      findings.push_back(
-          {{"check", finding.check}, {"file", finding.file}, {"message", finding.message}});
+      nlohmann::ordered_json entry{
+          {"check", finding.check}, {"file", finding.file}, {"message", finding.message}};
+      if (finding.capture) entry["capture"] = *finding.capture;
+      for (const auto& [key, value] : {std::pair{"camera", &finding.camera},
+                                       {"object", &finding.object},
+                                       {"found", &finding.found},
+                                       {"expected", &finding.expected}}) {
+        if (!value->empty()) entry[key] = *value;
+      }
+      findings.push_back(std::move(entry));
     }
     list.push_back({{"dataset", report.dataset},
                     {"format", report.format},

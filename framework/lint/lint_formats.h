@@ -6,13 +6,8 @@
 /// One function per format; each reads the whole dataset and adds findings.
 namespace diorama::lint {
 
-void lint_basic(Dataset& dataset);
 void lint_pose(Dataset& dataset);
 void lint_visualization(Dataset& dataset);
-void lint_coco(Dataset& dataset);
-void lint_yolo(Dataset& dataset);
-void lint_kitti(Dataset& dataset);
-void lint_voc(Dataset& dataset);
 void lint_bop(Dataset& dataset);
 void lint_webdataset(Dataset& dataset);
 void lint_hdf5(Dataset& dataset);

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
+
+#include "diorama/reader.h"
 
 namespace diorama {
 
@@ -11,7 +14,16 @@ struct LintFinding {
   std::string check;    ///< "box = extent of mask", the rule that is broken.
   std::string file;     ///< Relative to the dataset.
   std::string message;  ///< What was found and what would be right.
+  // What of it is known apart; formats without a reader leave these empty.
+  std::optional<int> capture{};
+  std::string camera{};
+  std::string object{};
+  std::string found{};
+  std::string expected{};
 };
+
+/// With a message: "capture 3, cam_0, /Assets/mug: its box is ...; right would be: ...".
+LintFinding lint_finding(Finding finding);
 
 /// What `diorama lint` says of one dataset (one writer's folder).
 struct LintReport {

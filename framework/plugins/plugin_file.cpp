@@ -115,7 +115,7 @@ void read_list(const Gate& gate, const std::vector<std::byte>& section, PluginFi
       plugin.learns_types = true;
       continue;
     }
-    if (entry.kind > std::uint32_t(ComponentKind::Writer)) {
+    if (entry.kind > std::uint32_t(ComponentKind::Reader)) {
       gate.refuse("its list of components holds the unknown kind " + std::to_string(entry.kind));
     }
     const auto text = [&](const auto& field, const char* what) {

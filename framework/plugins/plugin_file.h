@@ -16,7 +16,7 @@ struct ListedComponent {
   ComponentKind kind;
   std::string type;
   std::string help;
-  std::vector<std::string> claims;    ///< Loaders: what they claim.
+  std::vector<std::string> claims;    ///< Loaders: what they claim; readers: patterns.
   std::vector<std::string> needs;     ///< Annotators: of the default parameters ...
   std::vector<std::string> provides;  ///< ... both.
   friend bool operator==(const ListedComponent&, const ListedComponent&) = default;

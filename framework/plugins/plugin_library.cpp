@@ -36,7 +36,7 @@ class Collector final : public Registrar {
   explicit Collector(const PluginFile& file) : file_(file) {}
 
   void add(const ComponentInfo& info) override {
-    if (std::uint8_t(info.kind) > std::uint8_t(ComponentKind::Writer)) {
+    if (std::uint8_t(info.kind) > std::uint8_t(ComponentKind::Reader)) {
       refuse(file_, "registers a component of an unknown kind");
     }
     if (!info.type || !is_type_name(info.type)) {

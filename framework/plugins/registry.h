@@ -21,7 +21,7 @@ struct ComponentEntry {
   ComponentKind kind;
   std::string type;
   std::string help;
-  std::vector<std::string> claims;  ///< Loaders: what they claim, when that is listed.
+  std::vector<std::string> claims;  ///< Of loaders and readers, when they are listed.
   bool claims_are_listed = false;
   std::vector<std::string> needs;     ///< Annotators: of the default parameters ...
   std::vector<std::string> provides;  ///< ... both.

@@ -3,31 +3,35 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "diorama/config.h"
 #include "diorama/frame.h"
-#include "diorama/host.h"
+#include "framework/datasets/dataset_readers.h"
 
 namespace diorama {
 
-/// What a run's BasicWriter left of its captures, as frames again: linear colour, depth, lens and
-/// seed are those of the run, number by number. Poses and labels are not read.
+/// What a run's writers left of its captures, as frames again for sensors: linear colour, depth,
+/// lens and seed are those of the run, number by number. Any dataset of the run will do that holds
+/// them.
 class StoredCaptures {
  public:
   /// `folder` is the output of a run, `channels` of those in stored_channels(). Throws Error(Usage)
-  /// when it holds no dataset, or none of its writers stored all of the channels and the cameras.
-  StoredCaptures(const std::filesystem::path& folder, const NameSet& channels);
+  /// when it holds no dataset, or none of them holds all of the channels and the cameras. The
+  /// readers must outlive the object.
+  StoredCaptures(const std::filesystem::path& folder, const NameSet& channels,
+                 DatasetReaders& readers);
 
-  /// Channels that can be read back.
+  /// Channels that sensors may need and datasets may hold.
   static NameSet stored_channels();
 
   /// Of the captures that are there, ascending.
-  std::vector<int> indices() const;
-  /// Throws Error(Asset) naming the file that cannot be read.
-  Capture read(int index, const Host& host) const;
+  const std::vector<int>& indices() const { return dataset_->info().captures; }
+  /// The capture at place `i` of indices(). Throws Error(Asset) naming the file that cannot be
+  /// read.
+  Capture read(std::size_t i) const;
 
   /// dataset.json of the run.
   const std::string& dataset_json() const { return dataset_json_; }
@@ -39,12 +43,9 @@ class StoredCaptures {
   const std::vector<std::string>& camera_names() const { return camera_names_; }
 
  private:
-  /// Files of one camera in one capture by kind: "rgb.exr".
-  using FrameFiles = std::map<std::string, std::filesystem::path>;
-  void choose_writer(const std::filesystem::path& folder, const std::string& job);
-  void list_files();
-  Frame read_frame(const std::string& camera, int index, const FrameFiles& files,
-                   const Host& host) const;
+  void choose_dataset(const std::filesystem::path& folder, const std::string& job,
+                      DatasetReaders& readers);
+  [[noreturn]] void refuse_capture(const StoredCapture& stored, const std::string& camera) const;
 
   NameSet channels_;
   std::string dataset_json_;
@@ -54,7 +55,7 @@ class StoredCaptures {
   Value writer_;
   std::string writer_name_;
   std::filesystem::path writer_folder_;
-  std::map<int, std::vector<FrameFiles>> captures_;  ///< Whole ones; frames in camera order.
+  std::unique_ptr<const StoredDataset> dataset_;
 };
 
 }  // namespace diorama

@@ -1,8 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "diorama/plugin.h"
+#include "writer_kitti/kitti_reader.h"
 #include "writer_kitti/kitti_writer.h"
 
 DIORAMA_PLUGIN("writer_kitti", "1.0.0", "Apache-2.0") {
   DIORAMA_ADD(diorama::KittiWriter, "KittiWriter",
               "Writes KITTI object labels with 3-D boxes, calibration and depth.");
+  DIORAMA_ADD_READER(diorama::KittiReader, "KittiReader",
+                     "Reads KITTI object folders, whoever wrote them: pictures, boxes, upright "
+                     "3-D boxes, cameras, depth.",
+                     "training/label_2/*.txt label_2/*.txt");
 }

@@ -22,6 +22,8 @@ std::string_view kind_name(ComponentKind kind) {
       return "annotator";
     case ComponentKind::Writer:
       return "writer";
+    case ComponentKind::Reader:
+      return "reader";
   }
   return "unknown";
 }

@@ -2,8 +2,8 @@
 #include <nlohmann/json.hpp>
 
 #include "framework/lint/dataset_files.h"
-#include "framework/lint/replicator_files.h"
 #include "program.h"
+#include "replicator_camera.h"
 #include "support/catch.h"
 
 using namespace diorama;

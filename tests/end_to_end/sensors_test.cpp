@@ -127,10 +127,8 @@ TEST_CASE("what sensors cannot use is told", "[sensors]") {
   text.replace(text.find("camera_params: true"), 19, "camera_params: false");
   REQUIRE(run_job(folder, text).exit_code == 0);
   CHECK_THAT(error_of(folder, {"out", "--effects", "effects.yaml"}, 2),
-             ContainsSubstring(
-                 "out: no writer stored what the effects need; that takes a BasicWriter with "
-                 "{camera_params: true, rgb: true, image_output_format: exr, "
-                 "distance_to_image_plane: true}"));
+             ContainsSubstring("out: no writer stored what the effects need, camera, color_hdr, "
+                               "distance_to_image_plane: stored lacks camera"));
   CHECK_THAT(error_of(folder, {"nowhere", "--effects", "effects.yaml"}, 2),
              ContainsSubstring("nowhere: holds no dataset.json; give the output folder of a run"));
   write_file(folder / "none.yaml", "seed: 1\n");

@@ -15,6 +15,7 @@
 #include "diorama/params.h"
 #include "diorama/physics_backend.h"
 #include "diorama/randomizer.h"
+#include "diorama/reader.h"
 #include "diorama/renderer.h"
 #include "diorama/rng.h"
 #include "diorama/scene.h"
@@ -49,6 +50,6 @@ inline constexpr std::uint64_t kLayout =
               ParamLister, Distribution, TextDistribution, Component, Host, ImageView, Loader,
               PhysicsReport, PhysicsBackend, RandomizeContext, Randomizer, RenderRequest,
               RenderReport, Renderer, Annotator, DatasetInfo, DatasetFiles, CaptureFiles, Writer,
-              Error>();
+              Finding, ReadLog, StoredInfo, StoredCapture, StoredDataset, Reader, Error>();
 
 }  // namespace diorama::abi

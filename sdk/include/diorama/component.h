@@ -15,9 +15,10 @@ enum class ComponentKind : std::uint8_t {
   Renderer,
   Annotator,
   Writer,
+  Reader,
 };
 
-/// "loader", "physics", "randomizer", "renderer", "annotator", "writer".
+/// "loader", "physics", "randomizer", "renderer", "annotator", "writer", "reader".
 DIORAMA_SDK_API std::string_view kind_name(ComponentKind kind);
 
 /// Base of everything that a plugin provides. Owned by the host; plugin libraries are never

@@ -155,6 +155,9 @@ inline constexpr std::uint32_t kDioramaLearnsTypes = 0xFFFFFFFFu;
     diorama::add<T>(registrar, TYPE, HELP, {CLAIMS, NEEDS, PROVIDES});                 \
   } while (false)
 
+/// The same for a reader; PATTERNS is what its patterns() returns: "data.yaml labels/*.txt".
+#define DIORAMA_ADD_READER(T, TYPE, HELP, PATTERNS) DIORAMA_ADD_LOADER(T, TYPE, HELP, PATTERNS)
+
 /// What the entry function returns.
 struct DioramaPlugin {
   const DioramaPluginDescriptor* descriptor;

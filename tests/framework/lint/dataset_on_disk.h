@@ -8,6 +8,8 @@
 #include <fstream>
 #include <sstream>
 
+#include "framework/lint/encoding_host.h"
+#include "framework/lint/every_format.h"
 #include "framework/lint/lint_dataset.h"
 #include "plugins/writer_support/memory_files.h"
 #include "support/catch.h"
@@ -65,7 +67,9 @@ class DatasetOnDisk {
   }
 
   LintReport lint() const {
-    const auto reports = lint_datasets(folder_);
+    EncodingHost host;
+    DatasetReaders readers = every_reader(host);
+    const auto reports = lint_datasets(folder_, readers, host);
     REQUIRE(reports.size() == 1);
     return reports[0];
   }

@@ -6,11 +6,15 @@
 
 namespace diorama::test {
 
-/// Encodes pictures for real.
+/// Encodes and decodes pictures for real.
 class EncodingHost final : public FakeHost {
  public:
   std::vector<std::byte> encode_image(const ImageView& image, ImageFormat format) const override {
     return diorama::encode_image(image, format);
+  }
+  std::shared_ptr<const Texture> decode_texture(std::span<const std::byte> bytes,
+                                                std::string_view name) const override {
+    return decode_image(bytes, name);
   }
 };
 

@@ -1,14 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "framework/lint/every_format.h"
 
+#include "writer_basic/basic_reader.h"
 #include "writer_bop/bop_writer.h"
+#include "writer_coco/coco_reader.h"
 #include "writer_coco/coco_writer.h"
 #include "writer_data_visualization/data_visualization_writer.h"
 #include "writer_hdf5/hdf5_writer.h"
+#include "writer_kitti/kitti_reader.h"
 #include "writer_kitti/kitti_writer.h"
 #include "writer_pose/pose_writer.h"
+#include "writer_voc/voc_reader.h"
 #include "writer_voc/voc_writer.h"
 #include "writer_webdataset/webdataset_writer.h"
+#include "writer_yolo/yolo_reader.h"
 #include "writer_yolo/yolo_writer.h"
 
 namespace diorama::test {
@@ -22,6 +27,12 @@ SampleFormat format(std::string name, typename W::Params params = {}) {
     return write_dataset(writer, dataset, captures);
   };
   return {std::move(name), write};
+}
+
+template <class R>
+DatasetReaders::Entry reader(const char* type, Host& host) {
+  return {type, R({}, host).patterns(),
+          [&host] { return std::make_unique<R>(typename R::Params(), host); }};
 }
 
 Value look_of(const char* background, const char* color) {
@@ -74,6 +85,13 @@ BopWriter::Params one_scene() {
 }
 
 }  // namespace
+
+DatasetReaders every_reader(Host& host) {
+  return DatasetReaders(
+      {reader<BasicReader>("BasicReader", host), reader<CocoReader>("CocoReader", host),
+       reader<KittiReader>("KittiReader", host), reader<VocReader>("VocReader", host),
+       reader<YoloReader>("YoloReader", host)});
+}
 
 BasicWriter::Params everything() {
   BasicWriter::Params p;

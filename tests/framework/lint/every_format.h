@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "framework/datasets/dataset_readers.h"
 #include "plugins/writer_support/memory_files.h"
 #include "writer_basic/basic_writer.h"
 
@@ -21,5 +22,8 @@ struct SampleFormat {
 
 /// Every writer, with the parameters that change what is in its files.
 std::vector<SampleFormat> every_format();
+
+/// The readers of all formats that have one. The host must outlive them.
+DatasetReaders every_reader(Host& host);
 
 }  // namespace diorama::test

@@ -74,8 +74,10 @@ TEST_CASE("a missing file is named once", "[lint]") {
   const LintReport report = basic.lint();
   REQUIRE(report.findings.size() == 1);
   CHECK(report.findings[0].check == "nothing is missing");
-  CHECK(report.findings[0].message.find("distance_to_camera.npy of frame 0002") !=
-        std::string::npos);
+  CHECK(report.findings[0].file == "rp_cam_1/distance_to_camera/distance_to_camera_0002.npy");
+  CHECK(report.findings[0].message ==
+        "capture 2, cam_1: the file is not there; right would be: other frames have "
+        "distance_to_camera.npy");
 }
 
 TEST_CASE("the wrong kind of depth is found, with and without the other kind", "[lint]") {
@@ -140,13 +142,16 @@ TEST_CASE("a folder of several datasets is linted in one go, others are refused"
   const std::filesystem::path outer = pose.folder().string() + "_outer";
   std::filesystem::create_directories(outer / "not_a_dataset");
   std::filesystem::copy(pose.folder(), outer / "poses", std::filesystem::copy_options::recursive);
-  const auto reports = lint_datasets(outer);
+  test::EncodingHost host;
+  DatasetReaders readers = test::every_reader(host);
+  const auto reports = lint_datasets(outer, readers, host);
   REQUIRE(reports.size() == 1);
   CHECK(reports[0].format == "PoseWriter");
   CHECK(lint_json(reports).find("\"findings\": []") != std::string::npos);
   std::filesystem::remove_all(outer / "poses");
-  CHECK_THROWS_WITH(lint_datasets(outer), ContainsSubstring("holds no dataset"));
-  CHECK_THROWS_WITH(lint_datasets(outer / "absent"), ContainsSubstring("not a folder"));
+  CHECK_THROWS_WITH(lint_datasets(outer, readers, host), ContainsSubstring("holds no dataset"));
+  CHECK_THROWS_WITH(lint_datasets(outer / "absent", readers, host),
+                    ContainsSubstring("not a folder"));
   std::filesystem::remove_all(outer);
 }
 
@@ -154,9 +159,9 @@ TEST_CASE("the command's exit code tells clean from faulty", "[lint]") {
   const auto pose = dataset_of<PoseWriter>();
   std::ostringstream text;
   std::streambuf* const before = std::cout.rdbuf(text.rdbuf());
-  const int clean = command_lint({pose.folder().string(), false});
+  const int clean = print_lint({pose.lint()}, false);
   pose.remove("000000.png");
-  const int faulty = command_lint({pose.folder().string(), true});
+  const int faulty = print_lint({pose.lint()}, true);
   std::cout.rdbuf(before);
   CHECK(clean == 0);
   CHECK(faulty == 7);

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/app/command_stats.h"
+
+#include <iostream>
+
+#include "framework/app/assemble.h"
+#include "framework/datasets/dataset_readers.h"
+#include "framework/datasets/dataset_stats.h"
+
+namespace diorama {
+
+int command_stats(const GlobalOptions& global, const StatsOptions& options, ConsoleLog& log) {
+  const std::unique_ptr<Registry> registry = make_registry(global, log.sink());
+  warn_of_rejected(*registry, log.sink());
+  const std::unique_ptr<HostServices> host = make_host(*registry, global, std::nullopt, log.sink());
+  DatasetReaders readers(*registry, *host);
+  const FoundDataset found = find_dataset(options.dataset, readers, options.reader);
+  const auto dataset = readers.open(found.folder, found.reader);
+  const DatasetStats stats = dataset_stats(*dataset, *host);
+  std::cout << (options.as_json ? stats_json(stats) : stats_text(stats));
+  return 0;
+}
+
+}  // namespace diorama

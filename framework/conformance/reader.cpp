@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "diorama/reader.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <fstream>
+#include <memory>
+#include <span>
+
+#include "diorama/writer.h"
+#include "framework/conformance/fingerprint.h"
+#include "framework/conformance/kinds.h"
+#include "framework/conformance/sample_scene.h"
+#include "framework/datasets/frame_difference.h"
+
+namespace diorama::conformance {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kCaptures = 3;
+
+/// Removed with the object.
+class Folder {
+ public:
+  explicit Folder(const std::string& name)
+      : path_(fs::temp_directory_path() /
+              ("diorama_check_" + std::to_string(getpid()) + "_" + name)) {
+    fs::remove_all(path_);
+    fs::create_directories(path_);
+  }
+  ~Folder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  const fs::path& path() const { return path_; }
+  void append(const std::string& file, std::span<const std::byte> bytes) const {
+    fs::create_directories((path_ / file).parent_path());
+    std::ofstream out(path_ / file, std::ios::binary | std::ios::app);
+    out.write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
+  }
+  void write(const std::string& file, const void* data, std::size_t size) const {
+    fs::create_directories((path_ / file).parent_path());
+    std::ofstream out(path_ / file, std::ios::binary);
+    out.write(static_cast<const char*>(data), std::streamsize(size));
+  }
+
+ private:
+  fs::path path_;
+};
+
+/// A writer's files on disk, records kept for finish().
+class FilesInFolder final : public CaptureFiles {
+ public:
+  explicit FilesInFolder(const Folder& folder) : folder_(folder) {}
+  void add(std::string_view path, std::vector<std::byte> bytes) override {
+    folder_.write(std::string(path), bytes.data(), bytes.size());
+  }
+  void append(std::string_view path, std::span<const std::byte> bytes) override {
+    folder_.append(std::string(path), bytes);
+  }
+  void record(std::string_view line) override { records.emplace_back(line); }
+  std::vector<std::string> records;
+
+ private:
+  const Folder& folder_;
+};
+
+void write_dataset(Writer& writer, const std::vector<Capture>& captures, const Folder& folder) {
+  std::vector<std::vector<std::string>> records;
+  FilesInFolder whole(folder);
+  writer.begin(sample_dataset(int(captures.size())), whole);
+  for (const Capture& capture : captures) {
+    FilesInFolder files(folder);
+    writer.write(capture, files);
+    records.push_back(std::move(files.records));
+  }
+  writer.finish(
+      [&records](const RecordVisitor& visit) {
+        for (std::size_t i = 0; i < records.size(); ++i) {
+          for (const std::string& line : records[i]) visit(int(i), line);
+        }
+      },
+      whole);
+}
+
+void read_all(const StoredDataset& dataset) {
+  for (std::size_t i = 0; i < dataset.info().captures.size(); ++i) {
+    dataset.read(i, dataset.info().holds);
+  }
+}
+
+/// Files that are not what their names say: findings or one Error(Asset), nothing else.
+void read_nonsense(const Reader& reader, const std::string& content) {
+  const Folder folder("nonsense");
+  for (std::string file : reader.patterns()) {
+    std::replace(file.begin(), file.end(), '*', 'x');
+    folder.write(file, content.data(), content.size());
+  }
+  reader.recognise(folder.path());
+  try {
+    read_all(*reader.open(folder.path()));
+  } catch (const Error& error) {
+    require(error.kind() == ErrorKind::Asset,
+            std::string("throws another error than Error(Asset): ") + error.what());
+  }
+}
+
+/// Why the dataset that was read is not the one that was written; empty when it is. Findings do not
+/// count: painted frames are no pictures of a world.
+std::string difference(const StoredDataset& dataset, const std::vector<Capture>& captures) {
+  const StoredInfo& info = dataset.info();
+  if (info.captures.size() != captures.size()) {
+    return "gives " + std::to_string(info.captures.size()) + " captures of " +
+           std::to_string(captures.size());
+  }
+  for (std::size_t i = 0; i < captures.size(); ++i) {
+    const StoredCapture stored = dataset.read(i, info.holds);
+    const std::string where = "capture " + std::to_string(i) + ": ";
+    if (stored.capture.frames.size() != captures[i].frames.size()) {
+      return where + "gives " + std::to_string(stored.capture.frames.size()) + " frames of " +
+             std::to_string(captures[i].frames.size());
+    }
+    for (std::size_t k = 0; k < captures[i].frames.size(); ++k) {
+      const auto differences =
+          frame_differences(info, captures[i].frames[k], stored.capture.frames[k]);
+      if (!differences.empty()) return where + differences.front();
+    }
+  }
+  return {};
+}
+
+Subject writer_subject(const Subject& subject, const std::string& type) {
+  return {subject.registry.entry(ComponentKind::Writer, type), subject.registry, subject.host,
+          subject.single_threaded_host};
+}
+
+void check_round_trip(const CheckRun& run, const Subject& subject, const Reader& reader,
+                      const std::string& writer_type, const std::string& which,
+                      const Value& params) {
+  const std::string name =
+      "what " + writer_type + " writes comes back as far as it is held" + which;
+  const std::vector<Capture> captures = sample_captures(kCaptures, subject.host);
+  const auto writer = writer_subject(subject, writer_type).make<Writer>(subject.host, params);
+  for (const std::string& need : writer->needs()) {
+    const bool is_there =
+        captures.front().frames.front().has(need) || painted_annotations().contains(need);
+    if (!is_there) {
+      run.skip(name, "the writer needs '" + need + "', which another plugin makes");
+      return;
+    }
+  }
+  const Folder folder("round_trip");
+  write_dataset(*writer, captures, folder);
+  if (reader.recognise(folder.path()) == Recognition::No) {
+    run.skip(name, "the reader does not know the folder");
+    return;
+  }
+  if (reader.open(folder.path())->info().holds.empty()) {
+    run.skip(name, "the writer leaves nothing that could be read");
+    return;
+  }
+  run.check(name, [&] {
+    const std::string found = difference(*reader.open(folder.path()), captures);
+    require(found.empty(), found);
+  });
+}
+
+}  // namespace
+
+/// Of what the writers of its library leave.
+std::string reader_output(const Subject& subject) {
+  const auto reader = subject.make<Reader>();
+  const std::vector<Capture> captures = sample_captures(kCaptures, subject.host);
+  std::string all;
+  for (const std::string& type : subject.registry.types(ComponentKind::Writer)) {
+    const auto writer = writer_subject(subject, type).make<Writer>();
+    const Frame& frame = captures.front().frames.front();
+    const bool is_possible = std::ranges::all_of(writer->needs(), [&](const std::string& need) {
+      return frame.has(need) || painted_annotations().contains(need);
+    });
+    if (!is_possible) continue;
+    const Folder folder("output");
+    write_dataset(*writer, captures, folder);
+    if (reader->recognise(folder.path()) == Recognition::No) continue;
+    const auto dataset = reader->open(folder.path());
+    for (std::size_t i = 0; i < dataset->info().captures.size(); ++i) {
+      all += fingerprint(dataset->read(i, dataset->info().holds).capture);
+    }
+  }
+  return all;
+}
+
+void check_reader(const CheckRun& run, const Subject& subject) {
+  const auto reader = subject.make<Reader>();
+  run.check("its patterns are those that the library lists", [&] {
+    require(!reader->patterns().empty(), "has none, so it is never asked");
+    require(!subject.entry.claims_are_listed || reader->patterns() == subject.entry.claims,
+            "patterns() returns others than DIORAMA_ADD_READER says");
+  });
+  run.check("an empty folder is refused by name", [&] {
+    const Folder folder("empty");
+    require(reader->recognise(folder.path()) == Recognition::No, "knows an empty folder");
+    require_error_naming(folder.path().string(), [&] { reader->open(folder.path()); });
+  });
+  run.check("files that are not what their names say are survived", [&] {
+    for (const std::string& content :
+         {std::string(), std::string("{"), std::string("<<< nonsense >>>\n"), std::string(64, '\0'),
+          std::string(5000, '\xff'), std::string(20000, '[')}) {
+      read_nonsense(*reader, content);
+    }
+  });
+  for (const std::string& type : subject.registry.types(ComponentKind::Writer)) {
+    check_round_trip(run, subject, *reader, type, "", Value::make_map());
+    if (const auto params = usable_switches(writer_subject(subject, type))) {
+      check_round_trip(run, subject, *reader, type, ", every switch on", *params);
+    }
+  }
+}
+
+}  // namespace diorama::conformance

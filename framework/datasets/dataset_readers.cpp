@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/datasets/dataset_readers.h"
+
+#include <fnmatch.h>
+
+#include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
+
+#include "diorama/config.h"
+#include "diorama/error.h"
+#include "framework/config/json_text.h"
+#include "framework/plugins/plugin_call.h"
+
+namespace diorama {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
+  return text;
+}
+
+std::string who(const std::string& type) { return "reader '" + type + "'"; }
+
+/// Folders that the page of a run names, as far as they lie below it.
+std::set<fs::path> named_folders(const fs::path& run) {
+  std::set<fs::path> folders;
+  std::ifstream in(run / "dataset.json", std::ios::binary);
+  std::ostringstream text;
+  if (in) text << in.rdbuf();
+  const auto json = parse_json_or_nothing(text.str());
+  if (!json.is_object() || !json.contains("writers") || !json.at("writers").is_array()) return {};
+  for (const auto& writer : json.at("writers")) {
+    if (!writer.is_object() || !writer.contains("folder") || !writer.at("folder").is_string()) {
+      continue;
+    }
+    const fs::path below = fs::path(writer.at("folder").get<std::string>()).lexically_normal();
+    if (below.is_absolute() || std::ranges::find(below, "..") != below.end()) continue;
+    if (fs::is_directory(run / below)) folders.insert(run / below);
+  }
+  return folders;
+}
+
+}  // namespace
+
+std::vector<fs::path> folders_of_run(const fs::path& run) {
+  std::set<fs::path> folders = named_folders(run);
+  std::error_code error;
+  for (fs::directory_iterator at(run, error), end; !error && at != end; at.increment(error)) {
+    const bool is_hidden = at->path().filename().string().starts_with('.');
+    std::error_code ignored;
+    if (!is_hidden && at->is_directory(ignored)) folders.insert(at->path());
+  }
+  return {folders.begin(), folders.end()};
+}
+
+bool has_file_like(const fs::path& folder, std::string_view pattern) {
+  const std::size_t cut = pattern.find('/');
+  const std::string part(pattern.substr(0, cut));
+  std::error_code error;
+  if (part.find('*') == part.npos) {
+    return cut == pattern.npos ? fs::is_regular_file(folder / part, error)
+                               : has_file_like(folder / part, pattern.substr(cut + 1));
+  }
+  for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
+    if (fnmatch(part.c_str(), at->path().filename().c_str(), FNM_PERIOD) != 0) continue;
+    std::error_code ignored;
+    if (cut == pattern.npos
+            ? at->is_regular_file(ignored)
+            : at->is_directory(ignored) && has_file_like(at->path(), pattern.substr(cut + 1))) {
+      return true;
+    }
+  }
+  return false;
+}
+
+DatasetReaders::DatasetReaders(Registry& registry, Host& host) {
+  const auto maker = [&registry, &host](const std::string& type) {
+    return [&registry, &host, type] {
+      Value map = Value::make_map();
+      map.set("type", Value::text(type));
+      Complaints complaints;
+      auto made = registry.make<Reader>(map, who(type), {}, complaints, host);
+      complaints.raise();
+      return made;
+    };
+  };
+  for (const std::string& type : registry.types(ComponentKind::Reader)) {
+    const ComponentEntry& entry = registry.entry(ComponentKind::Reader, type);
+    entries_.push_back({type, entry.claims, maker(type)});
+    if (!entry.claims_are_listed) {
+      entries_.back().patterns =
+          call_component(who(type), [&] { return reader(entries_.back()).patterns(); });
+    }
+  }
+}
+
+Reader& DatasetReaders::reader(const Entry& entry) {
+  std::unique_ptr<Reader>& made = made_[entry.type];
+  if (!made) made = entry.make();
+  return *made;
+}
+
+std::string DatasetReaders::recognise(const fs::path& folder) {
+  Recognition best = Recognition::No;
+  std::vector<std::string> found;
+  for (const Entry& entry : entries_) {
+    const bool may_be = std::ranges::any_of(
+        entry.patterns, [&](const std::string& pattern) { return has_file_like(folder, pattern); });
+    if (!may_be) continue;
+    const Recognition said =
+        call_component(who(entry.type), [&] { return reader(entry).recognise(folder); });
+    if (said == Recognition::No || said < best) continue;
+    if (said > best) found.clear();
+    best = said;
+    found.push_back(entry.type);
+  }
+  if (found.size() > 1) {
+    throw Error(ErrorKind::Usage, folder.string() + ": looks like a dataset of " + joined(found) +
+                                      "; say which with --reader");
+  }
+  return found.empty() ? std::string() : found.front();
+}
+
+std::unique_ptr<const StoredDataset> DatasetReaders::open(const fs::path& folder,
+                                                          const std::string& type) {
+  const auto entry = std::ranges::find(entries_, type, &Entry::type);
+  if (entry == entries_.end()) {
+    const std::string near = nearest_name(type, types());
+    throw Error(ErrorKind::Usage, "unknown " + who(type) +
+                                      (near.empty() ? "" : "; did you mean '" + near + "'?") +
+                                      " Known: " + joined(types()));
+  }
+  auto opened = call_component(who(type), [&] { return reader(*entry).open(folder); });
+  if (!opened) throw Error(ErrorKind::Plugin, who(type) + ": opened nothing");
+  return opened;
+}
+
+std::vector<std::string> DatasetReaders::types() const {
+  std::vector<std::string> types;
+  for (const Entry& entry : entries_) types.push_back(entry.type);
+  return types;
+}
+
+std::vector<FoundDataset> find_datasets(const fs::path& folder, DatasetReaders& readers,
+                                        const std::string& reader) {
+  if (!fs::is_directory(folder)) {
+    throw Error(ErrorKind::Usage,
+                folder.string() + ": not a folder; give a dataset or the output of a run");
+  }
+  if (!reader.empty()) return {{folder, reader}};
+  if (std::string type = readers.recognise(folder); !type.empty()) return {{folder, type}};
+  std::vector<FoundDataset> found;
+  for (const fs::path& below : folders_of_run(folder)) {
+    if (std::string type = readers.recognise(below); !type.empty()) found.push_back({below, type});
+  }
+  return found;
+}
+
+FoundDataset find_dataset(const fs::path& folder, DatasetReaders& readers,
+                          const std::string& reader) {
+  const std::vector<FoundDataset> found = find_datasets(folder, readers, reader);
+  if (found.size() == 1) return found.front();
+  if (found.empty()) {
+    throw Error(ErrorKind::Usage, folder.string() +
+                                      ": holds no dataset that a reader knows, nor do its "
+                                      "folders; readers: " +
+                                      joined(readers.types()));
+  }
+  std::vector<std::string> names;
+  for (const FoundDataset& each : found) {
+    names.push_back(each.folder.string() + " (" + each.reader + ")");
+  }
+  throw Error(ErrorKind::Usage,
+              folder.string() + ": holds several datasets, name one: " + joined(names));
+}
+
+}  // namespace diorama

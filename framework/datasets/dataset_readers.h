@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "diorama/host.h"
+#include "diorama/reader.h"
+#include "framework/plugins/registry.h"
+
+namespace diorama {
+
+/// The readers of this process. A reader is made, and its library loaded, for the first folder in
+/// which one of its patterns is found. Main thread only.
+class DatasetReaders {
+ public:
+  struct Entry {
+    std::string type;
+    std::vector<std::string> patterns;
+    std::function<std::unique_ptr<Reader>()> make;
+  };
+
+  explicit DatasetReaders(std::vector<Entry> entries) : entries_(std::move(entries)) {}
+  /// All that plugins provide. Registry and host must outlive the object.
+  DatasetReaders(Registry& registry, Host& host);
+
+  /// Type of the reader that knows the folder best; empty when none does. Throws Error(Usage) that
+  /// names the readers when two know it equally well.
+  std::string recognise(const std::filesystem::path& folder);
+  /// Opens the folder with a reader of this type. Throws Error(Usage) for an unknown type, naming
+  /// the nearest one, and Error(Asset) when the folder cannot be read.
+  std::unique_ptr<const StoredDataset> open(const std::filesystem::path& folder,
+                                            const std::string& type);
+  std::vector<std::string> types() const;
+
+ private:
+  Reader& reader(const Entry& entry);
+
+  std::vector<Entry> entries_;
+  std::map<std::string, std::unique_ptr<Reader>> made_;
+};
+
+/// The folders of a run: those that its dataset.json names and those right below, sorted.
+std::vector<std::filesystem::path> folders_of_run(const std::filesystem::path& run);
+
+/// A dataset's folder, and who reads it.
+struct FoundDataset {
+  std::filesystem::path folder;
+  std::string reader;  ///< Type.
+};
+
+/// The folder itself; else the folders that a run's dataset.json names and those right below that
+/// some reader knows, sorted. `reader`, when given, is taken for the folder whatever it looks like.
+/// Throws Error(Usage) when there is no folder.
+std::vector<FoundDataset> find_datasets(const std::filesystem::path& folder,
+                                        DatasetReaders& readers, const std::string& reader = {});
+
+/// The one dataset that a command is about. Throws Error(Usage) when there is none, or several; the
+/// text lists what there is.
+FoundDataset find_dataset(const std::filesystem::path& folder, DatasetReaders& readers,
+                          const std::string& reader = {});
+
+/// True when the folder has a file of this name: '*' stands for any text within one part.
+bool has_file_like(const std::filesystem::path& folder, std::string_view pattern);
+
+}  // namespace diorama

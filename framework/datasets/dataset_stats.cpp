@@ -1,0 +1,241 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/datasets/dataset_stats.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <set>
+
+#include "framework/datasets/capture_sweep.h"
+
+namespace diorama {
+namespace {
+
+/// Shares of a picture from which on it is worth a look.
+constexpr double kBlack = 0.02;
+constexpr double kBurntShare = 0.5;
+constexpr double kCloseM = 0.15;
+constexpr double kCloseShare = 0.5;
+constexpr double kMovingPx = 1.0;
+
+struct SeenObject {
+  std::string name;
+  double box_side = 0.0;
+  Vec2 place = Vec2::Zero();  ///< Shares of the picture.
+  std::optional<double> visible;
+  std::optional<double> truncation;
+  std::optional<double> distance_m;
+  std::optional<std::pair<std::size_t, std::size_t>> view;  ///< Elevation, azimuth.
+};
+
+/// One picture, reduced to what is counted.
+struct SeenPicture {
+  std::string camera;
+  int width = 0;
+  int height = 0;
+  std::vector<SeenObject> objects;
+  std::optional<double> brightness;
+  std::vector<const char*> suspicions;
+};
+
+struct SeenCapture {
+  int index = 0;
+  std::string split;
+  std::vector<SeenPicture> pictures;
+  std::size_t findings = 0;
+};
+
+std::string class_of(const Instance& instance) {
+  if (const auto label = instance.labels.find("class"); label != instance.labels.end()) {
+    return label->second;
+  }
+  return instance.labels.empty() ? std::string() : instance.labels.begin()->second;
+}
+
+std::size_t bin(double share, std::size_t bins) {
+  return std::size_t(std::clamp(share * double(bins), 0.0, double(bins) - 1.0));
+}
+
+/// Measures frames of one dataset.
+class Measurement {
+ public:
+  explicit Measurement(const StoredInfo& info) : info_(info) {}
+
+  SeenCapture measure(const StoredCapture& stored) const {
+    SeenCapture seen;
+    seen.index = stored.capture.index;
+    seen.split = stored.split;
+    seen.findings = stored.log.findings.size();
+    for (const Frame& frame : stored.capture.frames) seen.pictures.push_back(picture(frame));
+    return seen;
+  }
+
+ private:
+  bool holds(std::string_view name) const { return info_.holds.contains(name); }
+
+  SeenPicture picture(const Frame& frame) const {
+    SeenPicture seen;
+    seen.camera = frame.camera_name;
+    seen.width = frame.camera.width;
+    seen.height = frame.camera.height;
+    for (const Instance& instance : frame.instances) {
+      if (auto one = object(frame, instance)) seen.objects.push_back(std::move(*one));
+    }
+    if (holds(kHoldsInstances) && seen.objects.empty()) seen.suspicions.push_back("no object");
+    if (frame.has(kColor.name)) judge_color(frame.get(kColor), seen);
+    judge_depth(frame, seen);
+    if (frame.has(kMotion.name) && frame.has(kInstanceId.name)) judge_motion(frame, seen);
+    return seen;
+  }
+
+  /// Nothing for what is not in the picture.
+  std::optional<SeenObject> object(const Frame& frame, const Instance& instance) const {
+    if (!instance.tight_box || instance.tight_box->is_empty()) return std::nullopt;
+    const PixelBox& box = *instance.tight_box;
+    const double width = std::max(frame.camera.width, 1);
+    const double height = std::max(frame.camera.height, 1);
+    SeenObject seen;
+    seen.name = class_of(instance);
+    seen.box_side = std::sqrt(double(box.width()) * box.height() / (width * height));
+    seen.place = {0.5 * (box.x_min + box.x_max) / width, 0.5 * (box.y_min + box.y_max) / height};
+    if (instance.visibility && holds(kHoldsOcclusion)) {
+      if (const auto occlusion = instance.visibility->occlusion()) seen.visible = 1.0 - *occlusion;
+    }
+    if (instance.visibility && holds(kHoldsTruncation)) {
+      seen.truncation = instance.visibility->truncation();
+    }
+    if (holds(kHoldsPoses) || holds(kHoldsBoxes3d)) measure_pose(frame, instance, seen);
+    return seen;
+  }
+
+  void measure_pose(const Frame& frame, const Instance& instance, SeenObject& seen) const {
+    const bool has_bounds = holds(kHoldsBoxes3d) && !instance.bounds_node.is_empty();
+    const Vec3 middle = has_bounds ? instance.bounds_node.centre() : Vec3(Vec3::Zero());
+    const Vec3 camera = frame.world_from_camera.translation();
+    seen.distance_m = (instance.world_from_node * middle - camera).norm();
+    const Vec3 view = instance.world_from_node.inverse() * camera - middle;
+    if (!view.allFinite() || view.norm() == 0.0) return;
+    const double azimuth = std::atan2(view.y(), view.x()) / (2.0 * kPi);
+    const double elevation = std::asin(std::clamp(view.z() / view.norm(), -1.0, 1.0)) / kPi + 0.5;
+    seen.view = {bin(elevation, kElevations),
+                 bin(azimuth < 0.0 ? azimuth + 1.0 : azimuth, kAzimuths)};
+  }
+
+  static void judge_color(const Image<Rgba8>& image, SeenPicture& seen) {
+    std::uint64_t sum = 0;
+    std::size_t burnt = 0;
+    bool is_uniform = true;
+    for (const Rgba8& pixel : image.pixels()) {
+      sum += std::uint64_t(pixel[0]) + pixel[1] + pixel[2];
+      if (pixel[0] >= 254 && pixel[1] >= 254 && pixel[2] >= 254) ++burnt;
+      is_uniform = is_uniform && pixel == image.pixels()[0];
+    }
+    const double count = double(std::max<std::size_t>(image.pixels().size(), 1));
+    seen.brightness = double(sum) / (3.0 * 255.0 * count);
+    if (*seen.brightness < kBlack) {
+      seen.suspicions.push_back("black");
+    } else if (double(burnt) > kBurntShare * count) {
+      seen.suspicions.push_back("burnt");
+    } else if (is_uniform) {
+      seen.suspicions.push_back("one colour");
+    }
+  }
+
+  static void judge_depth(const Frame& frame, SeenPicture& seen) {
+    for (const Channel<float>& channel : {kDistanceToImagePlane, kDistanceToCamera}) {
+      if (!frame.has(channel.name)) continue;
+      const auto pixels = frame.get(channel).pixels();
+      const auto close = std::ranges::count_if(pixels, [](float d) { return double(d) < kCloseM; });
+      if (double(close) > kCloseShare * double(pixels.size())) {
+        seen.suspicions.push_back("something close before the camera");
+      }
+      return;
+    }
+  }
+
+  static void judge_motion(const Frame& frame, SeenPicture& seen) {
+    const auto motion = frame.get(kMotion).pixels();
+    const auto ids = frame.get(kInstanceId).pixels();
+    const bool is_moving = [&] {
+      for (std::size_t i = 0; i < motion.size(); ++i) {
+        if (ids[i] != 0 && double(motion[i].norm()) > kMovingPx) return true;
+      }
+      return false;
+    }();
+    if (is_moving) seen.suspicions.push_back("moving");
+  }
+
+  const StoredInfo& info_;
+};
+
+void add(const SeenObject& object, ClassStats& own) {
+  ++own.objects;
+  own.box_side.add(object.box_side);
+  if (object.visible) own.visible.add(*object.visible);
+  if (object.truncation) own.truncation.add(*object.truncation);
+  if (object.distance_m) own.distance_m.add(*object.distance_m);
+  if (object.view) ++own.views[object.view->first][object.view->second];
+  ++own.places[bin(object.place.y(), kHeatRows)][bin(object.place.x(), kHeatColumns)];
+}
+
+void add(const SeenCapture& capture, DatasetStats& stats) {
+  ++stats.captures;
+  stats.findings += std::int64_t(capture.findings);
+  for (const SeenPicture& picture : capture.pictures) {
+    ++stats.pictures;
+    ++stats.pictures_by_camera[picture.camera];
+    if (!capture.split.empty()) ++stats.pictures_by_split[capture.split];
+    ++stats
+          .pictures_by_size[std::to_string(picture.width) + " x " + std::to_string(picture.height)];
+    stats.objects_per_picture.add(double(picture.objects.size()));
+    if (picture.brightness) stats.brightness.add(*picture.brightness);
+    std::set<std::string> here;
+    for (const SeenObject& object : picture.objects) {
+      ClassStats& own = stats.classes[object.name];
+      add(object, own);
+      if (here.insert(object.name).second) ++own.pictures;
+    }
+    for (const char* what : picture.suspicions) {
+      SuspiciousPictures& list = stats.suspicious[what];
+      ++list.count;
+      if (list.names.size() < SuspiciousPictures::kMostNames) {
+        list.names.push_back("capture " + std::to_string(capture.index) + ", " + picture.camera);
+      }
+    }
+  }
+}
+
+}  // namespace
+
+void Histogram::add(double value) {
+  if (std::isnan(value)) return;
+  ++counts_[bin((value - low_) / (high_ - low_), counts_.size())];
+  ++total_;
+  sum_ += value;
+  least_ = std::min(least_, value);
+  most_ = std::max(most_, value);
+}
+
+DatasetStats dataset_stats(const StoredDataset& dataset, Host& host) {
+  const StoredInfo& info = dataset.info();
+  DatasetStats stats;
+  stats.format = info.format;
+  stats.holds = info.holds;
+  stats.findings = std::int64_t(dataset.log().findings.size());
+  // Classes without an object are worth knowing.
+  for (const std::string& name : info.classes) stats.classes.try_emplace(name);
+  NameSet wanted = info.holds;
+  // Masks are the largest of what is not counted; boxes and counts do.
+  for (const std::string_view name : {std::string_view("amodal_mask"), kColorHdr.name,
+                                      kNormals.name, kPosition.name, kLeafId.name}) {
+    if (const auto found = wanted.find(name); found != wanted.end()) wanted.erase(found);
+  }
+  const Measurement measurement(info);
+  sweep_captures<SeenCapture>(
+      dataset, wanted, host,
+      [&](const StoredCapture& stored) { return measurement.measure(stored); },
+      [&](const SeenCapture& capture) { add(capture, stats); });
+  return stats;
+}
+
+}  // namespace diorama

@@ -1,0 +1,504 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/datasets/frame_checks.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "framework/lint/lens.h"
+#include "framework/lint/object_checks.h"
+
+namespace diorama {
+namespace {
+
+constexpr const char* kCounts = "counts agree between files";
+constexpr const char* kFinite = "numbers are finite";
+constexpr const char* kIds = "ids within the label map";
+constexpr const char* kBox = "box = extent of mask";
+constexpr const char* kAmodal = "visible <= amodal";
+constexpr const char* kOrder = "occlusion order agrees with masks";
+constexpr const char* kNormalsFace = "normals face the camera";
+constexpr const char* kSame = "an object stays what it is";
+constexpr const char* kOwnPixels = "each capture has pixels of its own";
+
+/// A single wrong pixel is a fault; edges of 8-bit normals are not.
+constexpr double kNormalSlack = 0.08;
+
+struct Extent {
+  PixelBox box{1 << 30, 1 << 30, 0, 0};
+  std::int64_t count = 0;
+};
+
+std::map<std::uint32_t, Extent> extents_of(const Image<std::uint32_t>& ids) {
+  std::map<std::uint32_t, Extent> result;
+  for (int y = 0; y < ids.height(); ++y) {
+    Extent* last = nullptr;
+    std::uint32_t last_id = 0;
+    for (int x = 0; x < ids.width(); ++x) {
+      const std::uint32_t id = ids.at(x, y);
+      if (!last || id != last_id) {
+        last = &result[id];
+        last_id = id;
+      }
+      PixelBox& box = last->box;
+      box = {std::min(box.x_min, x), std::min(box.y_min, y), std::max(box.x_max, x + 1),
+             std::max(box.y_max, y + 1)};
+      ++last->count;
+    }
+  }
+  result.erase(0);
+  return result;
+}
+
+lint::Lens lens_of(const Camera& camera) {
+  lint::Lens lens;
+  if (camera.lens == LensModel::OpencvPinhole) lens.model = lint::Lens::Model::Opencv;
+  if (camera.lens == LensModel::FisheyePolynomial) lens.model = lint::Lens::Model::Fisheye;
+  lens.width = camera.width;
+  lens.height = camera.height;
+  lens.focal = {camera.fx, camera.fy};
+  lens.centre = {camera.cx, camera.cy};
+  lens.distortion = camera.distortion;
+  lens.polynomial = camera.fisheye_polynomial;
+  lens.max_angle = camera.fisheye_max_angle_rad;
+  return lens;
+}
+
+bool is_inside(const PixelBox& inner, const PixelBox& outer, int slack) {
+  return inner.x_min >= outer.x_min - slack && inner.y_min >= outer.y_min - slack &&
+         inner.x_max <= outer.x_max + slack && inner.y_max <= outer.y_max + slack;
+}
+
+/// The checks of one frame.
+class FrameChecks {
+ public:
+  FrameChecks(const StoredInfo& info, StoredCapture& stored, std::size_t place)
+      : info_(info), stored_(stored), place_(place), frame_(stored.capture.frames[place]) {
+    if (frame_.has(kInstanceId.name)) masks_ = extents_of(frame_.get(kInstanceId));
+  }
+
+  void run() {
+    if (!check_sizes()) return;
+    check_numbers();
+    check_poses();
+    if (frame_.has(kInstanceId.name)) {
+      check_ids();
+      if (holds(kHoldsTightBoxes)) check_boxes();
+    }
+    check_visibility();
+    if (holds("occlusion_order") && holds("amodal_mask")) check_order();
+    if (holds(kHoldsCamera)) check_geometry();
+  }
+
+ private:
+  bool holds(std::string_view name) const { return info_.holds.contains(name); }
+
+  void check(bool is_good, const char* rule, std::string_view held, const std::string& object,
+             const std::string& found, const std::string& expected = {}) {
+    ++stored_.log.checks;
+    if (is_good) return;
+    stored_.log.findings.push_back({rule, file_of(stored_, place_, held), stored_.capture.index,
+                                    frame_.camera_name, object, found, expected});
+  }
+
+  bool check_sizes() {
+    bool is_good = true;
+    for (const std::string& name : frame_.channels()) {
+      const auto size =
+          std::visit([](const auto& image) { return std::pair(image.width(), image.height()); },
+                     frame_.image_named(name));
+      const bool fits = size == std::pair(frame_.camera.width, frame_.camera.height);
+      is_good = is_good && fits;
+      check(fits, kCounts, name, "",
+            name + " has " + std::to_string(size.first) + " x " + std::to_string(size.second) +
+                " pixels",
+            "the camera has " + std::to_string(frame_.camera.width) + " x " +
+                std::to_string(frame_.camera.height));
+    }
+    return is_good;
+  }
+
+  /// How many pixels of a channel break a rule.
+  template <class Pixel, class Rule>
+  void check_pixels(const Channel<Pixel>& channel, const char* rule, const char* found,
+                    Rule&& is_good) {
+    if (!frame_.has(channel.name)) return;
+    std::size_t wrong = 0;
+    for (const Pixel& pixel : frame_.get(channel).pixels()) {
+      if (!is_good(pixel)) ++wrong;
+    }
+    check(wrong == 0, rule, channel.name, "", std::to_string(wrong) + " values " + found);
+  }
+
+  void check_numbers() {
+    const auto is_distance = [](float d) { return d > 0.0f; };
+    check_pixels(kDistanceToCamera, kFinite, "are no distance above 0", is_distance);
+    check_pixels(kDistanceToImagePlane, kFinite, "are no distance above 0", is_distance);
+    check_pixels(kSensorDepth, kFinite, "are neither a depth nor 0 for none",
+                 [](float z) { return z >= 0.0f && std::isfinite(z); });
+    check_pixels(kMotion, kFinite, "have a motion that is not finite",
+                 [](const Vec2f& v) { return v.allFinite(); });
+    check_pixels(kPosition, kFinite, "have a position that is not finite",
+                 [](const Vec3f& v) { return v.allFinite(); });
+    check_pixels(kColorHdr, kFinite, "have a radiance that is none",
+                 [](const Vec3f& v) { return v.allFinite() && (v.array() >= 0.0f).all(); });
+    const double slack = 1e-3 + 2.0 * step_of(info_, kNormals.name);
+    check_pixels(kNormals, kFinite, "have a normal that is neither zero nor of length 1",
+                 [&](const Vec3f& n) {
+                   const double length = double(n.norm());
+                   return length <= slack || std::abs(length - 1.0) <= slack;
+                 });
+  }
+
+  void check_poses() {
+    if (holds(kHoldsCameraPose)) {
+      check(frame_.world_from_camera.matrix().allFinite(), kFinite, kHoldsCameraPose, "",
+            "the camera's pose is not finite");
+    }
+    if (!holds(kHoldsPoses) && !holds(kHoldsBoxes3d)) return;
+    for (const Instance& instance : frame_.instances) {
+      check(instance.world_from_node.matrix().allFinite() &&
+                (!holds(kHoldsBoxes3d) || instance.bounds_node.is_empty() ||
+                 (instance.bounds_node.min.allFinite() && instance.bounds_node.max.allFinite())),
+            kFinite, kHoldsPoses, instance.node_path, "its pose or size is not finite");
+    }
+  }
+
+  void check_ids() {
+    std::map<std::uint32_t, int> known;
+    for (const Instance& instance : frame_.instances) ++known[instance.id];
+    for (const auto& [id, count] : known) {
+      check(count == 1, kIds, kHoldsInstances, "",
+            std::to_string(count) + " objects have the id " + std::to_string(id));
+    }
+    for (const auto& [id, extent] : masks_) {
+      check(known.contains(id), kIds, kInstanceId.name, "",
+            std::to_string(extent.count) + " pixels from " + lint::box_text(extent.box) +
+                " have the id " + std::to_string(id) + ", which no object has");
+    }
+  }
+
+  void check_boxes() {
+    const int slack = int(step_of(info_, kHoldsTightBoxes));
+    for (const Instance& instance : frame_.instances) {
+      const auto mask = masks_.find(instance.id);
+      const std::string box = instance.tight_box ? lint::box_text(*instance.tight_box) : "none";
+      const std::string extent =
+          mask == masks_.end() ? "nothing" : lint::box_text(mask->second.box);
+      const bool has_box = instance.tight_box && !instance.tight_box->is_empty();
+      bool is_good = has_box == (mask != masks_.end());
+      if (has_box && mask != masks_.end()) {
+        is_good = is_inside(*instance.tight_box, mask->second.box, slack) &&
+                  is_inside(mask->second.box, *instance.tight_box, slack);
+      }
+      check(is_good, kBox, kHoldsTightBoxes, instance.node_path, "its box is " + box,
+            "its pixels extend over " + extent);
+    }
+  }
+
+  void check_visibility() {
+    for (const Instance& instance : frame_.instances) {
+      if (instance.tight_box && instance.visibility && instance.visibility->amodal_box &&
+          holds(kHoldsAmodalBoxes)) {
+        check(is_inside(*instance.tight_box, *instance.visibility->amodal_box, 0), kAmodal,
+              kHoldsAmodalBoxes, instance.node_path,
+              "its visible box is " + lint::box_text(*instance.tight_box),
+              "inside the whole one, " + lint::box_text(*instance.visibility->amodal_box));
+      }
+      if (!instance.visibility || !holds(kHoldsOcclusion)) continue;
+      const Visibility& seen = *instance.visibility;
+      check(seen.visible_pixels >= 0 && seen.visible_pixels <= seen.amodal_pixels, kAmodal,
+            kHoldsOcclusion, instance.node_path,
+            std::to_string(seen.visible_pixels) + " of its pixels are visible",
+            "at most the " + std::to_string(seen.amodal_pixels) + " of the whole object");
+      if (seen.amodal_mask.bits.empty() || !frame_.has(kInstanceId.name)) continue;
+      std::int64_t beyond = 0;
+      const auto& ids = frame_.get(kInstanceId);
+      for (int y = 0; y < ids.height(); ++y) {
+        for (int x = 0; x < ids.width(); ++x) {
+          if (ids.at(x, y) == instance.id && !seen.amodal_mask.covers(x, y)) ++beyond;
+        }
+      }
+      check(beyond == 0, kAmodal, "amodal_mask", instance.node_path,
+            std::to_string(beyond) + " visible pixels lie outside its amodal mask");
+    }
+  }
+
+  /// Where one is seen and the other's whole mask lies it is in front; in no pixel are both.
+  void check_order() {
+    if (!frame_.has(kInstanceId.name)) return;
+    std::map<std::pair<std::uint32_t, std::uint32_t>, std::int64_t> said;
+    for (const Occlusion& o : frame_.occlusions) said[{o.front, o.behind}] = o.pixels;
+    const auto pixels_said = [&](const Instance& front, const Instance& behind) {
+      const auto found = said.find({front.id, behind.id});
+      return found == said.end() ? std::int64_t(0) : found->second;
+    };
+    const auto has_mask = [](const Instance& i) {
+      return i.visibility && !i.visibility->amodal_mask.bits.empty();
+    };
+    for (std::size_t i = 0; i < frame_.instances.size(); ++i) {
+      for (std::size_t j = i + 1; j < frame_.instances.size(); ++j) {
+        const Instance& a = frame_.instances[i];
+        const Instance& b = frame_.instances[j];
+        if (!has_mask(a) || !has_mask(b)) continue;
+        const auto [shared, a_seen, b_seen] = overlap(a, b);
+        const std::int64_t a_front = pixels_said(a, b);
+        const std::int64_t b_front = pixels_said(b, a);
+        const std::string both = a.node_path + " and " + b.node_path;
+        check(a_front >= a_seen && b_front >= b_seen && a_front + b_front <= shared, kOrder,
+              "occlusion_order", both,
+              "the order says that they are in front of each other in " + std::to_string(a_front) +
+                  " and " + std::to_string(b_front) + " pixels",
+              "at least " + std::to_string(a_seen) + " and " + std::to_string(b_seen) +
+                  ", in all at most " + std::to_string(shared));
+      }
+    }
+  }
+
+  struct Overlap {
+    std::int64_t shared = 0;
+    std::int64_t a_seen = 0;
+    std::int64_t b_seen = 0;
+  };
+  Overlap overlap(const Instance& a, const Instance& b) const {
+    const CoverageMask& m = a.visibility->amodal_mask;
+    const CoverageMask& n = b.visibility->amodal_mask;
+    const PixelBox box =
+        PixelBox{std::max(m.box.x_min, n.box.x_min), std::max(m.box.y_min, n.box.y_min),
+                 std::min(m.box.x_max, n.box.x_max), std::min(m.box.y_max, n.box.y_max)}
+            .clipped(frame_.camera.width, frame_.camera.height);
+    const auto& ids = frame_.get(kInstanceId);
+    Overlap result;
+    for (int y = box.y_min; y < box.y_max; ++y) {
+      for (int x = box.x_min; x < box.x_max; ++x) {
+        if (m.bits[m.index(x, y)] == 0 || n.bits[n.index(x, y)] == 0) continue;
+        ++result.shared;
+        if (ids.at(x, y) == a.id) ++result.a_seen;
+        if (ids.at(x, y) == b.id) ++result.b_seen;
+      }
+    }
+    return result;
+  }
+
+  void check_geometry() {
+    const lint::Lens lens = lens_of(frame_.camera);
+    const Affine camera_from_world = lint::flipped_axes() * frame_.world_from_camera.inverse();
+    check_distance_kinds(lens);
+    check_normals(lens);
+    if (!holds(kHoldsBoxes3d)) return;
+    for (const Instance& instance : frame_.instances) {
+      if (!instance.world_from_node.matrix().allFinite()) continue;
+      if (instance.bounds_node.is_empty()) continue;
+      const Affine camera_from_node = camera_from_world * instance.world_from_node;
+      check_reprojection(lens, camera_from_node, instance);
+      check_depth(lens, camera_from_node, instance, kDistanceToCamera, true);
+      check_depth(lens, camera_from_node, instance, kDistanceToImagePlane, false);
+    }
+  }
+
+  double pose_step() const {
+    return std::max(step_of(info_, kHoldsPoses), step_of(info_, kHoldsBoxes3d));
+  }
+
+  void check_reprojection(const lint::Lens& lens, const Affine& camera_from_node,
+                          const Instance& instance) {
+    std::optional<PixelBox> box;
+    if (holds(kHoldsTightBoxes)) box = instance.tight_box;
+    if (holds(kHoldsAmodalBoxes) && instance.visibility && instance.visibility->amodal_box) {
+      box = instance.visibility->amodal_box;
+    }
+    if (!box || box->is_empty()) return;
+    const auto extent = lint::projected_extent(lens, camera_from_node, instance.bounds_node);
+    if (!extent) return;
+    // Pixel centres lie inside.
+    const double depth = std::max((camera_from_node * instance.bounds_node.centre()).z(), 0.05);
+    const double slack =
+        0.6 + step_of(info_, kHoldsTightBoxes) + 2.0 * pose_step() * lens.focal.maxCoeff() / depth;
+    const bool is_good =
+        extent->min().x() <= box->x_min + slack && extent->min().y() <= box->y_min + slack &&
+        extent->max().x() >= box->x_max - slack && extent->max().y() >= box->y_max - slack;
+    check(is_good, lint::kReproject, kHoldsPoses, instance.node_path,
+          "its 3-D box projects to x " + std::to_string(extent->min().x()) + " to " +
+              std::to_string(extent->max().x()) + ", y " + std::to_string(extent->min().y()) +
+              " to " + std::to_string(extent->max().y()),
+          "its pixels extend over " + lint::box_text(*box));
+  }
+
+  /// The object's surface points lie in its box.
+  void check_depth(const lint::Lens& lens, const Affine& camera_from_node, const Instance& instance,
+                   const Channel<float>& channel, bool is_along_ray) {
+    const auto mask = masks_.find(instance.id);
+    if (!frame_.has(channel.name) || mask == masks_.end()) return;
+    const auto& depth = frame_.get(channel);
+    const auto& ids = frame_.get(kInstanceId);
+    const Affine node_from_camera = camera_from_node.inverse();
+    const double step =
+        (step_of(info_, channel.name) + pose_step()) * node_from_camera.linear().norm();
+    const Aabb& bounds = instance.bounds_node;
+    const Vec3 slack = 0.002 * bounds.size() + Vec3::Constant(step + 1e-3 * bounds.size().norm());
+    std::size_t wrong = 0;
+    std::size_t all = 0;
+    const PixelBox& box = mask->second.box;
+    for (int y = box.y_min; y < box.y_max; ++y) {
+      for (int x = box.x_min; x < box.x_max; ++x) {
+        if (ids.at(x, y) != instance.id || !std::isfinite(depth.at(x, y))) continue;
+        auto ray = lens.direction(Vec2(x + 0.5, y + 0.5));
+        if (!ray) continue;
+        *ray /= is_along_ray ? ray->norm() : ray->z();
+        const Vec3 p = node_from_camera * (*ray * double(depth.at(x, y)));
+        ++all;
+        const bool is_in_box = ((p - bounds.min + slack).array() >= 0.0).all() &&
+                               ((bounds.max + slack - p).array() >= 0.0).all();
+        if (!is_in_box) ++wrong;
+      }
+    }
+    check(wrong == 0, lint::kBackProject, channel.name, instance.node_path,
+          std::to_string(wrong) + " of " + std::to_string(all) +
+              " surface points lie outside its 3-D box");
+  }
+
+  /// The two kinds differ by the angle of the ray.
+  void check_distance_kinds(const lint::Lens& lens) {
+    if (!frame_.has(kDistanceToCamera.name) || !frame_.has(kDistanceToImagePlane.name)) return;
+    const auto& ray = frame_.get(kDistanceToCamera);
+    const auto& plane = frame_.get(kDistanceToImagePlane);
+    const double step =
+        step_of(info_, kDistanceToCamera.name) + step_of(info_, kDistanceToImagePlane.name);
+    std::size_t wrong = 0;
+    for (int y = 0; y < ray.height(); ++y) {
+      for (int x = 0; x < ray.width(); ++x) {
+        const double d = double(ray.at(x, y));
+        const double z = double(plane.at(x, y));
+        const auto direction = lens.direction(Vec2(x + 0.5, y + 0.5));
+        if (std::isfinite(d) != std::isfinite(z)) {
+          ++wrong;
+        } else if (std::isfinite(d) && direction &&
+                   std::abs(z - d * direction->normalized().z()) > step + 1e-4 + 1e-4 * d) {
+          ++wrong;
+        }
+      }
+    }
+    check(wrong == 0, lint::kBackProject, kDistanceToCamera.name, "",
+          std::to_string(wrong) +
+              " pixels do not agree with distance_to_image_plane and the camera's rays");
+  }
+
+  void check_normals(const lint::Lens& lens) {
+    if (!frame_.has(kNormals.name) || !holds(kHoldsCameraPose)) return;
+    const auto& normals = frame_.get(kNormals);
+    const Mat3 world_from_lens =
+        (frame_.world_from_camera * lint::flipped_axes().inverse()).linear();
+    std::size_t wrong = 0;
+    std::size_t all = 0;
+    for (int y = 0; y < normals.height(); ++y) {
+      for (int x = 0; x < normals.width(); ++x) {
+        const Vec3 normal = normals.at(x, y).cast<double>();
+        const auto ray = lens.direction(Vec2(x + 0.5, y + 0.5));
+        if (!ray || normal.norm() < 0.5) continue;
+        ++all;
+        if (normal.dot((world_from_lens * *ray).normalized()) > kNormalSlack) ++wrong;
+      }
+    }
+    // Smooth shading may bend a normal away at an outline.
+    check(double(wrong) <= 0.02 * double(all), kNormalsFace, kNormals.name, "",
+          std::to_string(wrong) + " of " + std::to_string(all) + " normals look away from it");
+  }
+
+  const StoredInfo& info_;
+  StoredCapture& stored_;
+  std::size_t place_;
+  const Frame& frame_;
+  std::map<std::uint32_t, Extent> masks_;
+};
+
+/// FNV-1a, eight bytes at a time.
+std::uint64_t digest(const void* data, std::size_t size,
+                     std::uint64_t hash = 0xcbf29ce484222325ull) {
+  const auto* bytes = static_cast<const unsigned char*>(data);
+  for (std::size_t i = 0; i < size; ++i) hash = (hash ^ bytes[i]) * 0x100000001b3ull;
+  return hash;
+}
+
+bool is_uniform(const Image<Rgba8>& image) {
+  return image.pixels().empty() || std::ranges::all_of(image.pixels(), [&](const Rgba8& pixel) {
+           return pixel == image.pixels()[0];
+         });
+}
+
+/// Of what the camera saw of which objects.
+std::uint64_t label_digest(const Frame& frame) {
+  std::uint64_t hash = digest("", 0);
+  for (const Instance& instance : frame.instances) {
+    if (!instance.tight_box) continue;
+    hash = digest(&*instance.tight_box, sizeof *instance.tight_box, hash);
+  }
+  return hash;
+}
+
+}  // namespace
+
+std::string file_of(const StoredCapture& stored, std::size_t frame, std::string_view held) {
+  if (frame >= stored.files.size()) return ".";
+  const auto& files = stored.files[frame];
+  if (const auto found = files.find(held); found != files.end()) return found->second;
+  // What has no file of its own stands where the objects do.
+  const auto found = files.find(kHoldsInstances);
+  return found == files.end() ? "." : found->second;
+}
+
+double step_of(const StoredInfo& info, std::string_view held) {
+  const auto found = info.steps.find(held);
+  return found == info.steps.end() ? 0.0 : found->second;
+}
+
+void check_frames(const StoredInfo& info, StoredCapture& stored) {
+  for (std::size_t i = 0; i < stored.capture.frames.size(); ++i) {
+    FrameChecks(info, stored, i).run();
+  }
+}
+
+void CaptureComparison::add(const StoredCapture& stored, ReadLog& log) {
+  for (std::size_t i = 0; i < stored.capture.frames.size(); ++i) {
+    if (info_.holds.contains(kHoldsNodePaths)) compare_objects(stored, i, log);
+    compare_pixels(stored, i, log);
+  }
+}
+
+void CaptureComparison::compare_objects(const StoredCapture& stored, std::size_t place,
+                                        ReadLog& log) {
+  const Frame& frame = stored.capture.frames[place];
+  for (const Instance& instance : frame.instances) {
+    const auto [known, is_new] = objects_.try_emplace(
+        instance.node_path, KnownObject{stored.capture.index, instance.labels});
+    if (is_new) continue;
+    const KnownObject& before = known->second;
+    // An environment's nodes may be others in the next visit.
+    if (!instance.node_path.starts_with("/Assets/")) continue;
+    if (info_.holds.contains(kHoldsLabels)) {
+      log.check(instance.labels == before.labels,
+                {kSame, file_of(stored, place, kHoldsLabels), stored.capture.index,
+                 frame.camera_name, instance.node_path, "has other labels",
+                 "those of capture " + std::to_string(before.capture)});
+    }
+  }
+}
+
+void CaptureComparison::compare_pixels(const StoredCapture& stored, std::size_t place,
+                                       ReadLog& log) {
+  const Frame& frame = stored.capture.frames[place];
+  if (!frame.has(kColor.name) || is_uniform(frame.get(kColor))) return;
+  const auto pixels = frame.get(kColor).pixels();
+  const std::uint64_t key = digest(pixels.data(), pixels.size_bytes());
+  const std::uint64_t labels = label_digest(frame);
+  const auto camera = std::size_t(std::ranges::find(info_.camera_names, frame.camera_name) -
+                                  info_.camera_names.begin());
+  const auto [known, is_new] =
+      pictures_.try_emplace({camera, key}, KnownPicture{stored.capture.index, labels});
+  log.check(
+      is_new || known->second.labels == labels,
+      {kOwnPixels, file_of(stored, place, kColor.name), stored.capture.index, frame.camera_name, "",
+       "has the picture of capture " + std::to_string(known->second.capture),
+       "a picture of its own, as the labels differ"});
+}
+
+}  // namespace diorama

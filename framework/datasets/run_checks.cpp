@@ -1,0 +1,300 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/datasets/run_checks.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <sstream>
+
+#include "framework/config/json_text.h"
+#include "framework/datasets/capture_sweep.h"
+#include "framework/datasets/frame_checks.h"
+
+namespace diorama {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr const char* kMissing = "nothing is missing";
+constexpr const char* kReadable = "every file can be read";
+constexpr const char* kBetween = "writers of one run agree";
+
+/// Lossy pictures of the same thing differ by less than this in the mean, of 255.
+constexpr double kLossyMean = 12.0;
+/// What is as frequent as this is another choice of objects or classes, not a fault.
+constexpr double kRare = 0.2;
+constexpr std::size_t kMostExamples = 100;
+/// Boxes that are rounded to more do not tell objects apart.
+constexpr int kTellingStep = 16;
+
+/// What the page of the run plans; nothing when there is none.
+struct RunPlan {
+  int captures = 0;
+  std::vector<std::string> cameras;
+};
+
+std::optional<RunPlan> read_plan(const std::filesystem::path& run, ReadLog& log) {
+  std::ifstream in(run / "dataset.json", std::ios::binary);
+  if (!in) return std::nullopt;
+  std::ostringstream text;
+  text << in.rdbuf();
+  ++log.files;
+  try {
+    const Json page = parse_json(text.str());
+    return RunPlan{page.at("captures").get<int>(),
+                   page.at("cameras").get<std::vector<std::string>>()};
+  } catch (const std::exception& error) {
+    log.findings.push_back({kReadable, "dataset.json", std::nullopt, "", "", error.what(), ""});
+    return std::nullopt;
+  }
+}
+
+void check_plan(const RunPlan& plan, const RunDataset& dataset, ReadLog& log) {
+  const StoredInfo& info = dataset.data->info();
+  log.check(int(info.captures.size()) == plan.captures,
+            {kMissing, dataset.name, std::nullopt, "", "",
+             "holds " + std::to_string(info.captures.size()) + " captures",
+             "dataset.json plans " + std::to_string(plan.captures)});
+  const bool has_names = info.camera_names != std::vector<std::string>{"camera"};
+  for (const std::string& camera : plan.cameras) {
+    log.check(
+        !has_names || std::ranges::find(info.camera_names, camera) != info.camera_names.end(),
+        {kMissing, dataset.name, std::nullopt, camera, "", "has no pictures of this camera", ""});
+  }
+}
+
+/// An object of one dataset without a partner in the other, or with one of a rare class.
+struct Example {
+  Finding finding;
+  std::int64_t count = 0;
+};
+
+/// Compares a dataset with the one that holds most.
+class Comparison {
+ public:
+  Comparison(const RunDataset& reference, const RunDataset& other)
+      : reference_(reference), other_(other), a_(reference.data->info()), b_(other.data->info()) {}
+
+  NameSet wanted() const {
+    NameSet both;
+    for (const std::string& name : b_.holds) {
+      if (a_.holds.contains(name) && name != "amodal_mask" && name != "pointcloud") {
+        both.insert(name);
+      }
+    }
+    return both;
+  }
+
+  void compare(const StoredCapture& a, const StoredCapture& b, ReadLog& log) {
+    for (std::size_t k = 0; k < b.capture.frames.size(); ++k) {
+      const std::size_t camera = camera_of(b_, b.capture.frames[k]);
+      for (std::size_t i = 0; i < a.capture.frames.size(); ++i) {
+        if (is_same_camera(a.capture.frames[i], b.capture.frames[k], camera)) {
+          compare_frames(a, i, b, k, log);
+        }
+      }
+    }
+  }
+
+  /// What was rare enough to be a fault.
+  void finish(ReadLog& log) {
+    const bool is_other_choice =
+        double(unmatched_) > kRare * double(std::max<std::int64_t>(objects_, 1));
+    if (!is_other_choice) {
+      for (Finding& finding : unmatched_examples_) log.findings.push_back(std::move(finding));
+    }
+    for (auto& [labels, classes] : classes_of_labels_) {
+      std::int64_t all = 0;
+      for (const auto& [name, example] : classes) all += example.count;
+      for (auto& [name, example] : classes) {
+        ++log.checks;
+        if (double(example.count) > kRare * double(all)) continue;
+        example.finding.expected += "; most such objects are called otherwise";
+        log.findings.push_back(std::move(example.finding));
+      }
+    }
+  }
+
+ private:
+  static std::size_t camera_of(const StoredInfo& info, const Frame& frame) {
+    return std::size_t(std::ranges::find(info.camera_names, frame.camera_name) -
+                       info.camera_names.begin());
+  }
+
+  /// One camera alone may have no name in a format.
+  bool is_same_camera(const Frame& a, const Frame& b, std::size_t camera_of_b) const {
+    if (a.camera_name == b.camera_name) return true;
+    const bool is_nameless = a_.camera_names.size() == 1 && b_.camera_names.size() == 1;
+    return is_nameless && camera_of(a_, a) == camera_of_b;
+  }
+
+  Finding about(const StoredCapture& b, std::size_t k, std::string_view held,
+                const std::string& object, const std::string& found,
+                const std::string& expected) const {
+    return {kBetween,        other_.name + "/" + file_of(b, k, held),
+            b.capture.index, b.capture.frames[k].camera_name,
+            object,          found,
+            expected};
+  }
+
+  void compare_frames(const StoredCapture& a, std::size_t i, const StoredCapture& b, std::size_t k,
+                      ReadLog& log) {
+    const Frame& one = a.capture.frames[i];
+    const Frame& other = b.capture.frames[k];
+    const auto in_reference = [&](std::string_view held) {
+      return reference_.name + "/" + file_of(a, i, held);
+    };
+    const bool is_same_size =
+        one.camera.width == other.camera.width && one.camera.height == other.camera.height;
+    log.check(is_same_size, about(b, k, kColor.name, "", "has another size of picture",
+                                  "that of " + in_reference(kColor.name)));
+    if (!is_same_size) return;
+    if (one.has(kColor.name) && other.has(kColor.name)) {
+      log.check(is_same_picture(one, other),
+                about(b, k, kColor.name, "", "is another picture than", in_reference(kColor.name)));
+    }
+    compare_depth(one, other, b, k, in_reference(kDistanceToImagePlane.name), log);
+    if (a_.holds.contains(kHoldsTightBoxes) && b_.holds.contains(kHoldsTightBoxes)) {
+      compare_objects(one, b, k, in_reference(kHoldsInstances), log);
+    }
+  }
+
+  bool is_same_picture(const Frame& one, const Frame& other) const {
+    const auto a = one.get(kColor).pixels();
+    const auto b = other.get(kColor).pixels();
+    const bool is_lossy = step_of(a_, kColor.name) > 0.0 || step_of(b_, kColor.name) > 0.0;
+    std::uint64_t sum = 0;
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      for (std::size_t c = 0; c < 3; ++c)
+        sum += std::uint64_t(std::abs(int(a[i][c]) - int(b[i][c])));
+    }
+    if (!is_lossy) return sum == 0;
+    return double(sum) <= kLossyMean * 3.0 * double(std::max<std::size_t>(a.size(), 1));
+  }
+
+  void compare_depth(const Frame& one, const Frame& other, const StoredCapture& b, std::size_t k,
+                     const std::string& in_reference, ReadLog& log) const {
+    const Channel<float>& channel = kDistanceToImagePlane;
+    if (!one.has(channel.name) || !other.has(channel.name)) return;
+    const auto p = one.get(channel).pixels();
+    const auto q = other.get(channel).pixels();
+    const double step = step_of(a_, channel.name) + step_of(b_, channel.name) + 1e-5;
+    std::size_t wrong = 0;
+    for (std::size_t i = 0; i < p.size(); ++i) {
+      // A format of 16 bits ends before far walls do.
+      if (!std::isfinite(p[i]) || !std::isfinite(q[i])) continue;
+      if (std::abs(double(p[i]) - double(q[i])) > step) ++wrong;
+    }
+    log.check(wrong == 0,
+              about(b, k, channel.name, "",
+                    std::to_string(wrong) + " pixels have another depth than in", in_reference));
+  }
+
+  void compare_objects(const Frame& one, const StoredCapture& b, std::size_t k,
+                       const std::string& in_reference, ReadLog& log) {
+    const int slack = int(std::ceil(step_of(a_, kHoldsTightBoxes) + step_of(b_, kHoldsTightBoxes)));
+    if (slack >= kTellingStep) return;
+    for (const Instance& object : b.capture.frames[k].instances) {
+      if (!object.tight_box) continue;
+      ++objects_;
+      ++log.checks;
+      std::vector<const Instance*> partners;
+      for (const Instance& candidate : one.instances) {
+        if (candidate.tight_box && is_near(*candidate.tight_box, *object.tight_box, slack)) {
+          partners.push_back(&candidate);
+        }
+      }
+      if (partners.empty()) {
+        ++unmatched_;
+        if (unmatched_examples_.size() < kMostExamples) {
+          unmatched_examples_.push_back(about(b, k, kHoldsTightBoxes, object.node_path,
+                                              "lies where no object is",
+                                              "the place of an object in " + in_reference));
+        }
+        continue;
+      }
+      // Of several in one place, none says which is meant.
+      if (partners.size() == 1) remember_class(*partners.front(), object, b, k, in_reference);
+    }
+  }
+
+  static bool is_near(const PixelBox& a, const PixelBox& b, int slack) {
+    return std::abs(a.x_min - b.x_min) <= slack && std::abs(a.y_min - b.y_min) <= slack &&
+           std::abs(a.x_max - b.x_max) <= slack && std::abs(a.y_max - b.y_max) <= slack;
+  }
+
+  static std::string text_of(const Labels& labels) {
+    std::string text;
+    for (const auto& [taxonomy, label] : labels) {
+      text += (text.empty() ? "" : ", ") + taxonomy + ": " + label;
+    }
+    return text;
+  }
+
+  void remember_class(const Instance& partner, const Instance& object, const StoredCapture& b,
+                      std::size_t k, const std::string& in_reference) {
+    if (partner.labels.empty() || object.labels.empty()) return;
+    const std::string name = text_of(object.labels);
+    Example& example = classes_of_labels_[text_of(partner.labels)][name];
+    if (++example.count > 1) return;
+    example.finding = about(b, k, kHoldsLabels, object.node_path, "is called " + name,
+                            text_of(partner.labels) + ", by " + in_reference);
+  }
+
+  const RunDataset& reference_;
+  const RunDataset& other_;
+  const StoredInfo& a_;
+  const StoredInfo& b_;
+  std::int64_t objects_ = 0;
+  std::int64_t unmatched_ = 0;
+  std::vector<Finding> unmatched_examples_;
+  /// Labels in the reference, then classes in the other dataset.
+  std::map<std::string, std::map<std::string, Example>> classes_of_labels_;
+};
+
+void compare_datasets(const RunDataset& reference, const RunDataset& other, Host& host,
+                      ReadLog& log) {
+  Comparison comparison(reference, other);
+  const NameSet wanted = comparison.wanted();
+  if (wanted.empty()) return;
+  const std::vector<int>& captures = reference.data->info().captures;
+  struct Pair {
+    StoredCapture a;
+    StoredCapture b;
+  };
+  sweep_captures<Pair>(
+      *other.data, wanted, host,
+      [&](StoredCapture b) {
+        Pair pair;
+        const auto place = std::ranges::lower_bound(captures, b.capture.index);
+        if (place != captures.end() && *place == b.capture.index) {
+          pair.a = reference.data->read(std::size_t(place - captures.begin()), wanted);
+        }
+        pair.b = std::move(b);
+        return pair;
+      },
+      [&](const Pair& pair) { comparison.compare(pair.a, pair.b, log); });
+  comparison.finish(log);
+}
+
+}  // namespace
+
+ReadLog check_run(const std::filesystem::path& run, const std::vector<RunDataset>& datasets,
+                  Host& host) {
+  ReadLog log;
+  if (const auto plan = read_plan(run, log)) {
+    for (const RunDataset& dataset : datasets) check_plan(*plan, dataset, log);
+  }
+  if (datasets.size() < 2) return log;
+  const auto reference = std::ranges::max_element(
+      datasets, {}, [](const RunDataset& dataset) { return dataset.data->info().holds.size(); });
+  for (const RunDataset& dataset : datasets) {
+    if (&dataset != &*reference) compare_datasets(*reference, dataset, host, log);
+  }
+  return log;
+}
+
+}  // namespace diorama

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "reader_support/camera_json.h"
+
+#include <cmath>
+#include <stdexcept>
+
+namespace diorama {
+
+void read_lens_entry(const Json& holder, Camera& camera) {
+  if (!holder.contains("lens")) return;
+  const Json& entry = holder.at("lens");
+  const std::string model = entry.at("model").get<std::string>();
+  if (model == "opencv_pinhole") {
+    camera.lens = LensModel::OpencvPinhole;
+    camera.distortion = entry.at("distortion").get<std::array<double, 8>>();
+  } else if (model == "fisheye_polynomial") {
+    camera.lens = LensModel::FisheyePolynomial;
+    camera.fisheye_polynomial = entry.at("polynomial").get<std::array<double, 6>>();
+    camera.fisheye_max_angle_rad = entry.at("max_angle_rad").get<double>();
+  } else if (model != "pinhole") {
+    throw std::runtime_error("unknown lens model '" + model + "'");
+  }
+}
+
+Affine affine_of_rows(const Json& rows) {
+  Affine map;
+  for (int i = 0; i < 16; ++i) {
+    map.matrix()(i / 4, i % 4) = rows.at(std::size_t(i / 4)).at(std::size_t(i % 4)).get<double>();
+  }
+  if (!map.matrix().allFinite())
+    throw std::runtime_error("a matrix has numbers that are not finite");
+  if (map.matrix().row(3) != Eigen::RowVector4d(0.0, 0.0, 0.0, 1.0)) {
+    throw std::runtime_error("the last row of a matrix is not 0 0 0 1");
+  }
+  return map;
+}
+
+void require_usable(const Camera& camera) {
+  const bool is_usable = std::isfinite(camera.fx) && std::isfinite(camera.fy) && camera.fx > 0.0 &&
+                         camera.fy > 0.0 && std::isfinite(camera.cx) && std::isfinite(camera.cy);
+  if (!is_usable) throw std::runtime_error("its focal lengths are not positive numbers");
+}
+
+}  // namespace diorama

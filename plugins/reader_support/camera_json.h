@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "diorama/camera.h"
+#include "diorama/math.h"
+#include "reader_support/stored_files.h"
+
+namespace diorama {
+
+/// Reads the entry "lens" that our writers put beside intrinsics; a missing one is a pinhole.
+/// Throws std::runtime_error or a JSON exception when it is damaged.
+void read_lens_entry(const Json& holder, Camera& camera);
+
+/// Row by row: four by four numbers in nested lists, the last row 0 0 0 1. Throws the same.
+Affine affine_of_rows(const Json& rows);
+
+/// Focal lengths of a camera that can see: finite and positive. Throws std::runtime_error.
+void require_usable(const Camera& camera);
+
+}  // namespace diorama

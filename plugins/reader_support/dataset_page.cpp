@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "reader_support/dataset_page.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace diorama {
+namespace {
+
+constexpr const char* kPage = "dataset.json";
+constexpr std::uintmax_t kMostBytes = std::uintmax_t(256) << 20;
+constexpr int kMostCaptures = 100'000'000;
+
+Json parsed_page(const std::filesystem::path& folder) {
+  try {
+    Json page = parse_stored_json(read_whole_file(folder / kPage, kMostBytes));
+    return page.is_object() ? page : Json::object();
+  } catch (const std::exception&) {
+    return Json::object();
+  }
+}
+
+}  // namespace
+
+std::string zero_padded(int number, std::size_t digits) {
+  const std::string text = std::to_string(number);
+  return text.size() < digits ? std::string(digits - text.size(), '0') + text : text;
+}
+
+std::string DatasetPage::stem(int capture, const std::string& camera) const {
+  const std::size_t digits =
+      std::max<std::size_t>(6, std::to_string(std::max(captures - 1, 0)).size());
+  return zero_padded(capture, digits) + "_" + camera;
+}
+
+std::optional<DatasetPage> read_dataset_page(const std::filesystem::path& folder) {
+  const Json json = parsed_page(folder);
+  if (!json.contains("split") || !json.contains("cameras")) return std::nullopt;
+  try {
+    DatasetPage page;
+    page.captures = json.at("captures").get<int>();
+    if (page.captures < 0 || page.captures > kMostCaptures) return std::nullopt;
+    page.cameras = json.at("cameras").get<std::vector<std::string>>();
+    if (json.contains("classes")) page.classes = json.at("classes").get<std::vector<std::string>>();
+    if (json.contains("conventions")) page.conventions = json.at("conventions");
+    for (const auto& [split, captures] : json.at("split").items()) {
+      for (const Json& capture : captures) {
+        const int index = capture.get<int>();
+        if (index >= 0 && index < page.captures) page.split_of_capture.emplace(index, split);
+      }
+    }
+    return page;
+  } catch (const Json::exception&) {
+    return std::nullopt;
+  }
+}
+
+Recognition recognise_page(const std::filesystem::path& folder, const std::string& format) {
+  const Json json = parsed_page(folder);
+  const auto said = json.find("format");
+  const bool is_named = said != json.end() && said->is_string() && *said == format;
+  return is_named ? Recognition::ByName : Recognition::No;
+}
+
+}  // namespace diorama

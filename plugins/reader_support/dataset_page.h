@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "diorama/reader.h"
+#include "reader_support/stored_files.h"
+
+namespace diorama {
+
+/// What the page dataset.json says that our writers put into a training dataset's folder.
+struct DatasetPage {
+  int captures = 0;
+  std::vector<std::string> cameras;
+  std::vector<std::string> classes;
+  std::map<int, std::string> split_of_capture;
+  Json conventions = Json::object();
+
+  /// One picture per capture and camera.
+  std::size_t picture_count() const { return std::size_t(captures) * cameras.size(); }
+  /// "000012_cam_0", as such writers name pictures.
+  std::string stem(int capture, const std::string& camera) const;
+};
+
+/// Nothing when there is no such page, or one that cannot be read: such a dataset is read by the
+/// format's rules alone.
+std::optional<DatasetPage> read_dataset_page(const std::filesystem::path& folder);
+
+/// ByName when the page says this format.
+Recognition recognise_page(const std::filesystem::path& folder, const std::string& format);
+
+/// `number` with leading zeros.
+std::string zero_padded(int number, std::size_t digits);
+
+}  // namespace diorama

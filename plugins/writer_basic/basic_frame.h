@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "diorama/reader.h"
+#include "reader_support/npy_array.h"
+#include "reader_support/stored_files.h"
+#include "writer_basic/basic_files.h"
+
+namespace diorama {
+
+/// Reads the files of one camera in one capture, checks them against each other, and makes a frame.
+class BasicFrameReading {
+ public:
+  using Sources = std::map<std::string, std::string, std::less<>>;
+
+  BasicFrameReading(const BasicFiles& names, std::string product, int number, const NameSet& wanted,
+                    StoredFiles& files)
+      : names_(names),
+        product_(std::move(product)),
+        number_(number),
+        wanted_(wanted),
+        files_(files) {}
+
+  /// Nothing when no file tells the picture's size.
+  std::optional<Frame> read(const std::string& camera, Sources& sources);
+
+ private:
+  /// A segmentation picture: ids from 2 on where its JSON file names objects, 0 background, 1
+  /// unlabelled.
+  struct Segmentation {
+    std::string file;
+    Image<std::uint32_t> ids;
+    std::map<std::uint32_t, std::uint32_t> id_of_key;  ///< By the picture's own value.
+    std::map<std::uint32_t, Json> entries;             ///< What the JSON file says, by id.
+  };
+
+  bool wants(std::string_view name) const { return wanted_.contains(name); }
+  std::string path(std::string_view kind) const { return names_.path(product_, number_, kind); }
+  /// The first file that tells a size tells that of the frame; false for another one.
+  bool note_size(int width, int height, const std::string& file);
+
+  void read_camera();
+  void read_color();
+  void read_distances();
+  void read_normals();
+  void read_motion();
+  std::optional<StoredArray> pixel_array(const std::string& file, std::size_t values);
+
+  std::optional<Segmentation> read_segmentation(std::string_view picture, std::string_view mapping);
+  std::map<std::uint32_t, Json> read_keys(const std::string& file);
+  void read_instances();
+  void read_leaves();
+  void check_semantics();
+  void set_ids(const Segmentation& from);
+
+  struct BoxRows {
+    StoredArray array;
+    std::vector<std::string> paths;
+    std::vector<Labels> labels;
+    std::vector<std::optional<double>> ratios;
+  };
+  std::optional<BoxRows> read_rows(const std::string& name);
+  void read_boxes();
+  void read_tight();
+  void read_loose();
+  void read_3d();
+  void take_row(const BoxRows& rows, std::size_t row, const std::string& file, Instance& instance);
+  void read_occlusion();
+  void read_points();
+  void check_point_places(const StoredArray& points, const std::vector<std::size_t>& pixels,
+                          const std::string& file);
+  void set_visibility();
+
+  Instance& instance(const std::string& path);
+
+  const BasicFiles& names_;
+  std::string product_;
+  int number_;
+  const NameSet& wanted_;
+  StoredFiles& files_;
+  Frame frame_;
+  Sources sources_;
+  bool has_size_ = false;
+  std::string size_file_;
+  std::map<std::string, std::size_t> place_of_path_;  ///< In Frame::instances.
+  std::map<std::string, double> ratio_of_path_;
+  std::map<std::string, PixelBox> loose_of_path_;
+  std::map<std::string, Labels> labels_of_path_;
+  std::optional<Segmentation> instances_;
+  std::map<std::uint32_t, std::int64_t> visible_;  ///< By id.
+};
+
+}  // namespace diorama

@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "writer_basic/basic_reader.h"
+
+#include <algorithm>
+
+#include "diorama/error.h"
+#include "reader_support/stored_files.h"
+#include "writer_basic/basic_files.h"
+#include "writer_basic/basic_frame.h"
+
+namespace diorama {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kFormat = "BasicWriter";
+constexpr std::string_view kProduct = "rp_";
+
+std::string camera_of(const std::string& product) {
+  if (product.empty()) return "camera";
+  return product.starts_with(kProduct) ? product.substr(kProduct.size()) : product;
+}
+
+/// What metadata.txt calls the writer; empty when it does not say.
+std::string said_writer(const fs::path& folder) {
+  try {
+    const Json json =
+        parse_stored_json(read_whole_file(folder / "metadata.txt", 1 << 20));
+    if (!json.is_object() || !json.contains("name")) return {};
+    return json.at("name").is_string() ? json.at("name").get<std::string>() : std::string();
+  } catch (const std::exception&) {
+    return {};
+  }
+}
+
+class BasicDataset final : public StoredDataset {
+ public:
+  BasicDataset(fs::path folder, const Host& host)
+      : folder_(std::move(folder)), host_(host), names_(folder_) {
+    if (names_.numbers().empty() && said_writer(folder_) != kFormat) {
+      throw Error(ErrorKind::Asset, folder_.string() + ": holds no files of BasicWriter");
+    }
+    check_numbers();
+    describe();
+  }
+
+  const StoredInfo& info() const override { return info_; }
+  const ReadLog& log() const override { return log_; }
+
+  StoredCapture read(std::size_t i, const NameSet& wanted) const override {
+    StoredCapture stored;
+    const int number = info_.captures.at(i);
+    stored.capture.index = number;
+    for (const std::string& product : names_.products()) {
+      const std::string camera = camera_of(product);
+      StoredFiles files(folder_, host_, stored.log, number, camera);
+      check_complete(product, number, files);
+      BasicFrameReading::Sources sources;
+      auto frame = BasicFrameReading(names_, product, number, wanted, files).read(camera, sources);
+      if (!frame) continue;
+      stored.capture.frames.push_back(std::move(*frame));
+      stored.files.push_back(std::move(sources));
+    }
+    return stored;
+  }
+
+ private:
+  void check_numbers() {
+    StoredFiles files(folder_, host_, log_);
+    if (files.has("metadata.txt")) {
+      files.check(said_writer(folder_) == kFormat, kReadable, "metadata.txt", "",
+                  "does not say that BasicWriter wrote this");
+    }
+    for (const std::string& name : names_.unnumbered()) {
+      files.find(kReadable, name, "", "its number is beyond reason");
+    }
+    const std::vector<int> numbers = names_.numbers();
+    if (numbers.empty()) return;
+    files.check(numbers.size() == std::size_t(numbers.back()) + 1, kMissing, ".", "",
+                "there are " + std::to_string(numbers.size()) + " frames",
+                "their numbers end with " + std::to_string(numbers.back()));
+  }
+
+  /// What other frames have.
+  void check_complete(const std::string& product, int number, StoredFiles& files) const {
+    for (const std::string& kind : names_.kinds()) {
+      const std::string expected = names_.expected_path(product, number, kind);
+      files.check(!names_.path(product, number, kind).empty(), kMissing, expected, "",
+                  "the file is not there", "other frames have " + kind);
+    }
+  }
+
+  void describe() {
+    info_.format = kFormat;
+    for (const std::string& product : names_.products()) {
+      info_.camera_names.push_back(camera_of(product));
+    }
+    info_.captures = names_.numbers();
+    const auto hold = [&](std::string_view kind, std::initializer_list<std::string_view> names) {
+      if (names_.has(kind)) info_.holds.insert(names.begin(), names.end());
+    };
+    for (const char* kind : {"rgb.png", "rgb.jpg", "rgb.jpeg"}) hold(kind, {kColor.name});
+    hold("rgb.exr", {kColorHdr.name});
+    hold("normals.png", {kNormals.name});
+    hold("distance_to_camera.npy", {kDistanceToCamera.name});
+    hold("distance_to_image_plane.npy", {kDistanceToImagePlane.name});
+    hold("sensor_depth.npy", {kSensorDepth.name});
+    hold("motion_vectors.npy", {kMotion.name});
+    hold("camera_params.json", {kHoldsCamera, kHoldsCameraPose});
+    hold("instance_segmentation.png",
+         {kInstanceId.name, kHoldsInstances, kHoldsLabels, kHoldsNodePaths});
+    hold("instance_id_segmentation.png", {kLeafId.name, kHoldsLeafPaths});
+    hold("semantic_segmentation.png", {kHoldsLabels});
+    hold("bounding_box_2d_tight.npy",
+         {kHoldsInstances, kHoldsLabels, kHoldsNodePaths, kHoldsTightBoxes, kHoldsOcclusion});
+    hold("bounding_box_2d_loose.npy",
+         {kHoldsInstances, kHoldsLabels, kHoldsNodePaths, kHoldsAmodalBoxes, kHoldsOcclusion});
+    hold("bounding_box_3d.npy",
+         {kHoldsInstances, kHoldsLabels, kHoldsNodePaths, kHoldsPoses, kHoldsBounds, kHoldsBoxes3d,
+          kHoldsOcclusion, kHoldsUnseenInstances});
+    hold("occlusion.npy", {kHoldsOcclusion});
+    hold("pointcloud.npy", {"pointcloud"});
+    info_.steps[std::string(kNormals.name)] = 0.01;
+    if (!names_.has("rgb.png")) info_.steps[std::string(kColor.name)] = 16.0;
+  }
+
+  fs::path folder_;
+  const Host& host_;
+  BasicFiles names_;
+  StoredInfo info_;
+  ReadLog log_;
+};
+
+}  // namespace
+
+std::vector<std::string> BasicReader::patterns() const {
+  return {"metadata.txt",         "rgb_*.*",   "*/rgb/rgb_*.*",        "rgb/*_rgb_*.*",
+          "camera_params_*.json", "*/*/*.npy", "*/*/*_mapping_*.json", "*.npy"};
+}
+
+Recognition BasicReader::recognise(const fs::path& folder) const {
+  const std::string said = said_writer(folder);
+  if (said == kFormat) return Recognition::ByName;
+  if (!said.empty()) return Recognition::No;
+  return BasicFiles(folder).numbers().empty() ? Recognition::No : Recognition::ByFiles;
+}
+
+std::unique_ptr<const StoredDataset> BasicReader::open(const fs::path& folder) const {
+  return std::make_unique<BasicDataset>(folder, host_);
+}
+
+}  // namespace diorama

@@ -1,0 +1,313 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "writer_coco/coco_tables.h"
+
+#include <algorithm>
+#include <set>
+
+#include "diorama/error.h"
+
+namespace diorama {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kMostParts = 1000;
+constexpr std::size_t kMostCameras = 60'000;
+
+bool ends_with_any(const std::string& name, std::initializer_list<const char*> endings) {
+  return std::ranges::any_of(endings, [&](const char* ending) { return name.ends_with(ending); });
+}
+
+/// Annotation files of other tasks, which lie beside those of instances.
+bool is_of_another_task(const std::string& name) {
+  return std::ranges::any_of(
+      std::initializer_list<const char*>{"panoptic_", "captions_", "person_keypoints_", "stuff_",
+                                         "image_info_"},
+      [&](const char* start) { return name.starts_with(start); });
+}
+
+std::string split_of(const std::string& name) {
+  std::string stem = fs::path(name).stem().string();
+  for (const char* start : {"instances_", "annotations_"}) {
+    if (stem.starts_with(start)) return stem.substr(std::string(start).size());
+  }
+  for (const char* split : {"train", "val", "valid", "test"}) {
+    if (stem == split) return stem;
+  }
+  return {};
+}
+
+/// An annotation as it comes, before all images are known.
+struct RawAnnotation {
+  std::int64_t image_id = 0;
+  JsonSpan span;
+};
+
+struct RawImage {
+  CocoImageEntry entry;
+  std::string file_name;
+};
+
+/// Reads one annotation file after the other.
+class TableReader {
+ public:
+  TableReader(const fs::path& folder, const std::optional<DatasetPage>& page, StoredFiles& files)
+      : folder_(folder), page_(page), files_(files) {}
+
+  CocoTables read() {
+    tables_.parts = find_coco_parts(folder_);
+    if (page_) tables_.cameras = page_->cameras;
+    std::size_t readable = 0;
+    for (std::size_t part = 0; part < tables_.parts.size(); ++part) {
+      if (read_part(std::uint16_t(part))) ++readable;
+    }
+    if (readable == 0) {
+      throw Error(ErrorKind::Asset,
+                  folder_.string() + ": holds no annotation file of COCO that can be read");
+    }
+    check_names_once();
+    number_captures();
+    return std::move(tables_);
+  }
+
+ private:
+  bool read_part(std::uint16_t part) {
+    CocoPart& own = tables_.parts[part];
+    images_.clear();
+    annotations_.clear();
+    ids_.clear();
+    bool is_whole = true;
+    try {
+      visit_json_file(folder_ / own.file, [&](const std::string& key, bool is_element,
+                                              JsonSpan span, std::string_view text) {
+        if (!is_element) return;
+        if (key == "images") {
+          add_image(part, span, parse_stored_json(text));
+        } else if (key == "annotations") {
+          add_annotation(span, parse_stored_json(text));
+        } else if (key == "categories") {
+          add_category(own, parse_stored_json(text));
+        }
+      });
+    } catch (const Json::exception& error) {
+      is_whole = false;
+      files_.find(kReadable, own.file, "", error.what());
+    } catch (const std::runtime_error& error) {
+      is_whole = false;
+      files_.find(kReadable, own.file, "", error.what());
+    }
+    if (!is_whole && images_.empty()) return false;
+    std::ranges::sort(images_, {}, [](const CocoImageEntry& image) { return image.id; });
+    check_ids(own);
+    if (!own.panoptic.empty()) read_panoptic(own);
+    join(own);
+    return true;
+  }
+
+  void add_image(std::uint16_t part, JsonSpan span, const Json& json) {
+    CocoImageEntry entry;
+    entry.id = json.at("id").get<std::int64_t>();
+    entry.span = span;
+    entry.part = part;
+    const bool says_capture = json.contains("capture") && json.contains("camera");
+    entry.capture = says_capture ? json.at("capture").get<std::int32_t>() : -1;
+    if (says_capture) entry.camera = camera_number(json.at("camera").get<std::string>());
+    tables_.has_cameras = tables_.has_cameras || json.contains("intrinsics");
+    names_.push_back(tables_.parts[part].file + "\n" + json.at("file_name").get<std::string>());
+    images_.push_back(entry);
+  }
+
+  std::uint16_t camera_number(const std::string& name) {
+    const auto found = std::ranges::find(tables_.cameras, name);
+    if (found == tables_.cameras.end()) {
+      if (tables_.cameras.size() >= kMostCameras) throw std::runtime_error("has too many cameras");
+      tables_.cameras.push_back(name);
+      return std::uint16_t(tables_.cameras.size() - 1);
+    }
+    return std::uint16_t(found - tables_.cameras.begin());
+  }
+
+  void add_annotation(JsonSpan span, const Json& json) {
+    if (json.contains("id")) ids_.push_back(json.at("id").get<std::int64_t>());
+    annotations_.push_back({json.at("image_id").get<std::int64_t>(), span});
+    tables_.has_masks = tables_.has_masks || json.contains("segmentation");
+    tables_.has_amodal = tables_.has_amodal || json.contains("amodal");
+    tables_.has_nodes = tables_.has_nodes || json.contains("node");
+    tables_.has_keypoints = tables_.has_keypoints || json.contains("keypoints");
+  }
+
+  void add_category(CocoPart& part, const Json& json) {
+    StoredCategory category;
+    category.name = json.at("name").get<std::string>();
+    if (const auto points = json.find("keypoints"); points != json.end() && points->is_array()) {
+      category.has_cuboid_keypoints =
+          points->size() == 9 && points->at(0) == "Center" && points->at(1) == "LDB";
+    }
+    const std::int64_t id = json.at("id").get<std::int64_t>();
+    const bool has_group = json.contains("supercategory") && json.at("supercategory") != "object";
+    tables_.has_own_categories = tables_.has_own_categories || json.contains("color") ||
+                                 has_group || id != std::int64_t(part.categories.size()) + 1;
+    if (std::ranges::find(tables_.classes, category.name) == tables_.classes.end()) {
+      tables_.classes.push_back(category.name);
+    }
+    const bool is_new = part.categories.emplace(id, std::move(category)).second;
+    files_.check(is_new, kOnce, part.file, "category " + std::to_string(id), "is listed twice");
+  }
+
+  void check_ids(const CocoPart& part) {
+    for (std::size_t i = 1; i < images_.size(); ++i) {
+      files_.check(images_[i].id != images_[i - 1].id, kOnce, part.file,
+                   "image " + std::to_string(images_[i].id), "is listed twice");
+    }
+    std::ranges::sort(ids_);
+    for (std::size_t i = 1; i < ids_.size(); ++i) {
+      files_.check(ids_[i] != ids_[i - 1], kOnce, part.file,
+                   "annotation " + std::to_string(ids_[i]), "is listed twice");
+    }
+  }
+
+  CocoImageEntry* image_of(std::int64_t id) {
+    const auto found = std::ranges::lower_bound(
+        images_, id, {}, [](const CocoImageEntry& image) { return image.id; });
+    return found == images_.end() || found->id != id ? nullptr : &*found;
+  }
+
+  void read_panoptic(const CocoPart& part) {
+    std::size_t count = 0;
+    files_.reading(part.panoptic, [&] {
+      visit_json_file(folder_ / part.panoptic, [&](const std::string& key, bool is_element,
+                                                   JsonSpan span, std::string_view text) {
+        if (!is_element || key != "annotations") return;
+        const std::int64_t id = parse_stored_json(text).at("image_id").get<std::int64_t>();
+        CocoImageEntry* image = image_of(id);
+        const std::string who = "image " + std::to_string(id);
+        files_.check(image != nullptr, kCounts, part.panoptic, who, "is not in " + part.file);
+        if (!image) return;
+        files_.check(image->panoptic.length == 0, kOnce, part.panoptic, who, "is listed twice");
+        image->panoptic = span;
+        ++count;
+      });
+    });
+    files_.check(count == images_.size(), kCounts, part.panoptic, "",
+                 "has entries for " + std::to_string(count) + " images",
+                 part.file + " lists " + std::to_string(images_.size()));
+  }
+
+  /// Puts the annotations of each image behind each other.
+  void join(const CocoPart& part) {
+    std::ranges::stable_sort(annotations_, {}, &RawAnnotation::image_id);
+    std::size_t at = 0;
+    for (CocoImageEntry& image : images_) {
+      for (; at < annotations_.size() && annotations_[at].image_id < image.id; ++at)
+        unknown(part, at);
+      image.first_annotation = std::uint32_t(tables_.annotations.size());
+      for (; at < annotations_.size() && annotations_[at].image_id == image.id; ++at) {
+        tables_.annotations.push_back(annotations_[at].span);
+      }
+      image.annotation_count = std::uint32_t(tables_.annotations.size()) - image.first_annotation;
+    }
+    for (; at < annotations_.size(); ++at) unknown(part, at);
+    tables_.images.insert(tables_.images.end(), images_.begin(), images_.end());
+  }
+
+  void unknown(const CocoPart& part, std::size_t at) {
+    files_.check(
+        false, kCounts, part.file, "",
+        "has an annotation of the unknown image " + std::to_string(annotations_[at].image_id));
+  }
+
+  /// A picture listed twice, in one split or in two.
+  void check_names_once() {
+    std::vector<std::pair<std::string, std::string>> by_name;
+    for (std::string& name : names_) {
+      const std::size_t cut = name.find('\n');
+      by_name.emplace_back(name.substr(cut + 1), name.substr(0, cut));
+    }
+    names_.clear();
+    names_.shrink_to_fit();
+    std::ranges::sort(by_name);
+    for (std::size_t i = 1; i < by_name.size(); ++i) {
+      // Splits of other people may have folders of their own, with equal names inside.
+      const bool may_repeat = !page_ && by_name[i].second != by_name[i - 1].second;
+      files_.check(may_repeat || by_name[i].first != by_name[i - 1].first, kOnce, by_name[i].second,
+                   by_name[i].first, "is listed in " + by_name[i - 1].second + " too");
+    }
+  }
+
+  void number_captures() {
+    tables_.has_captures = std::ranges::all_of(
+        tables_.images, [](const CocoImageEntry& image) { return image.capture >= 0; });
+    if (!tables_.has_captures || tables_.cameras.empty()) {
+      tables_.has_captures = false;
+      tables_.cameras = {"camera"};
+      for (std::size_t i = 0; i < tables_.images.size(); ++i) {
+        tables_.images[i].capture = std::int32_t(i);
+        tables_.images[i].camera = 0;
+      }
+      return;
+    }
+    std::ranges::stable_sort(tables_.images, {}, [](const CocoImageEntry& image) {
+      return std::pair(image.capture, image.camera);
+    });
+    for (std::size_t i = 1; i < tables_.images.size(); ++i) {
+      const CocoImageEntry& a = tables_.images[i - 1];
+      const CocoImageEntry& b = tables_.images[i];
+      files_.check(a.capture != b.capture || a.camera != b.camera, kOnce,
+                   tables_.parts[b.part].file, "image " + std::to_string(b.id),
+                   "is of the capture and camera of image " + std::to_string(a.id));
+    }
+  }
+
+  const fs::path& folder_;
+  const std::optional<DatasetPage>& page_;
+  StoredFiles& files_;
+  CocoTables tables_;
+  std::vector<CocoImageEntry> images_;  ///< Of one part.
+  std::vector<RawAnnotation> annotations_;
+  std::vector<std::int64_t> ids_;
+  std::vector<std::string> names_;
+};
+
+}  // namespace
+
+std::vector<CocoPart> find_coco_parts(const fs::path& folder) {
+  std::vector<CocoPart> all;
+  const auto take = [&](const std::string& below, const std::string& name,
+                        const std::string& split) {
+    if (is_of_another_task(name) || all.size() >= kMostParts) return;
+    const std::string front = below.empty() ? "" : below + "/";
+    CocoPart part{front + name, split.empty() ? split_of(name) : split, "", {}};
+    const std::string panoptic = front + "panoptic_" + part.split + ".json";
+    if (name.starts_with("instances_") && fs::is_regular_file(folder / panoptic)) {
+      part.panoptic = panoptic;
+    }
+    all.push_back(std::move(part));
+  };
+  for (const std::string& name : names_in(folder / "annotations")) {
+    if (name.ends_with(".json")) take("annotations", name, "");
+  }
+  for (const std::string& name : names_in(folder)) {
+    const bool fits = name.starts_with("instances") || name == "annotations.json";
+    if (ends_with_any(name, {".json"}) && (fits || name.ends_with(".coco.json")))
+      take("", name, "");
+  }
+  for (const std::string& below : names_in(folder, true)) {
+    if (fs::is_regular_file(folder / below / "_annotations.coco.json")) {
+      take(below, "_annotations.coco.json", below);
+    }
+  }
+  const auto is_of_instances = [](const CocoPart& part) {
+    return fs::path(part.file).filename().string().starts_with("instances_");
+  };
+  if (std::ranges::any_of(all, is_of_instances)) {
+    std::erase_if(all, [&](const CocoPart& part) { return !is_of_instances(part); });
+  }
+  return all;
+}
+
+CocoTables read_coco_tables(const fs::path& folder, const std::optional<DatasetPage>& page,
+                            StoredFiles& files) {
+  return TableReader(folder, page, files).read();
+}
+
+}  // namespace diorama

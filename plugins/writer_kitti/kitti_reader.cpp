@@ -1,0 +1,434 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "writer_kitti/kitti_reader.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include "diorama/error.h"
+#include "reader_support/camera_json.h"
+#include "reader_support/label_text.h"
+#include "reader_support/picture_list.h"
+
+namespace diorama {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kFormat = "KITTI";
+constexpr const char* kBackProject = "depth back-projects";
+constexpr const char* kAngles = "angles agree";
+
+/// The fields of a label line but the class.
+struct KittiLabel {
+  std::string name;
+  double truncation = 0.0;
+  double occlusion = 0.0;
+  double alpha = 0.0;
+  std::array<double, 4> box{};
+  Vec3 size = Vec3::Zero();      ///< Length, height, width.
+  Vec3 location = Vec3::Zero();  ///< Middle of the bottom face; x right, y down, z forward.
+  double rotation_y = 0.0;
+
+  bool has_box_3d() const { return (size.array() > 0.0).all(); }
+};
+
+KittiLabel label_of(const std::vector<std::string>& words) {
+  if (words.size() != 15 && words.size() != 16) {
+    throw std::runtime_error("a line of " + std::to_string(words.size()) + " fields, not 15 or 16");
+  }
+  const std::vector<double> v = numbers_from(words, 1);
+  return {words[0],
+          v[0],
+          v[1],
+          v[2],
+          {v[3], v[4], v[5], v[6]},
+          {v[9], v[7], v[8]},
+          {v[10], v[11], v[12]},
+          v[13]};
+}
+
+/// From the upright box's own space (length, height, width; the origin in the middle of the bottom
+/// face) to a camera that looks along -z.
+Affine camera_from_box(const KittiLabel& label) {
+  Affine kitti_from_box = Affine::Identity();
+  kitti_from_box.linear() = Eigen::AngleAxisd(label.rotation_y, Vec3::UnitY()).toRotationMatrix();
+  kitti_from_box.translation() = label.location;
+  Affine camera_from_kitti = Affine::Identity();
+  camera_from_kitti.linear() = Vec3(1.0, -1.0, -1.0).asDiagonal();
+  return camera_from_kitti * kitti_from_box;
+}
+
+class KittiDataset final : public StoredDataset {
+ public:
+  KittiDataset(fs::path folder, const Host& host) : folder_(std::move(folder)), host_(host) {
+    page_ = read_dataset_page(folder_);
+    StoredFiles files(folder_, host_, log_);
+    front_ = fs::is_directory(folder_ / "training") || page_ ? "training/" : "";
+    std::vector<ListedPicture> listed;
+    for (const std::string& name : names_in(folder_ / front_ / "label_2")) {
+      if (name.ends_with(".txt")) listed.push_back({name.substr(0, name.size() - 4), "", 0, 0, 0});
+    }
+    if (listed.empty() && !page_) {
+      throw Error(ErrorKind::Asset, folder_.string() + ": holds no labels of KITTI");
+    }
+    pictures_.set(
+        std::move(listed), page_, [&](const std::string& s) { return number_of(s); },
+        {front_ + "label_2/"}, files);
+    has_depth_ = fs::is_directory(folder_ / front_ / "depth_2");
+    has_calibration_ = fs::is_directory(folder_ / front_ / "calib");
+    read_lists(files);
+    if (page_) check_own_files(files);
+    describe();
+  }
+
+  const StoredInfo& info() const override { return info_; }
+  const ReadLog& log() const override { return log_; }
+  StoredCapture read(std::size_t i, const NameSet& wanted) const override;
+
+ private:
+  std::string stem(std::size_t number) const {
+    const std::size_t all = std::max<std::size_t>(page_->picture_count(), 1);
+    return zero_padded(int(number), std::max<std::size_t>(6, std::to_string(all - 1).size()));
+  }
+
+  /// The number is capture x cameras + camera.
+  std::optional<std::pair<int, int>> number_of(const std::string& name) const {
+    if (name.empty() || name.size() > 9) return std::nullopt;
+    if (name.find_first_not_of("0123456789") != name.npos) return std::nullopt;
+    const std::size_t number = std::stoul(name);
+    const std::size_t cameras = page_->cameras.size();
+    if (number >= page_->picture_count() || stem(number) != name) return std::nullopt;
+    return std::pair(int(number / cameras), int(number % cameras));
+  }
+
+  void read_lists(StoredFiles& files) {
+    for (const char* split : {"train", "val"}) {
+      const std::string file = std::string("ImageSets/") + split + ".txt";
+      if (!files.has(file)) continue;
+      const auto text = files.text(file);
+      if (!text) continue;
+      for (const std::string& line : text_lines(*text)) {
+        const auto words = text_words(line);
+        if (words.empty()) continue;
+        const auto [known, is_new] = split_of_.emplace(words[0], split);
+        files.check(is_new, kOnce, file, words[0], "is in '" + known->second + "' too");
+      }
+    }
+  }
+
+  void check_own_files(StoredFiles& files) {
+    std::map<std::string, std::string> lists{{"train", ""}, {"val", ""}};
+    std::string all;
+    for (const auto& [capture, split] : page_->split_of_capture) {
+      for (std::size_t camera = 0; camera < page_->cameras.size(); ++camera) {
+        const std::string line = stem(std::size_t(capture) * page_->cameras.size() + camera) + "\n";
+        lists[split] += line;
+        all += line;
+      }
+    }
+    lists["trainval"] = all;
+    for (const auto& [split, lines] : lists) {
+      const std::string file = "ImageSets/" + split + ".txt";
+      if (const auto text = files.text(file)) {
+        files.check(*text == lines, kCounts, file, "",
+                    "does not hold the lines that follow from dataset.json");
+      }
+    }
+    // What has no label file is in no list, so it is looked for here.
+    for (const char* below : {"image_2", "calib", "depth_2"}) {
+      for (const std::string& name : names_in(folder_ / front_ / below)) {
+        const std::string label = front_ + "label_2/" + fs::path(name).stem().string() + ".txt";
+        files.check(files.has(label), kMissing, label, "", "the file is not there",
+                    std::string("one for ") + below + "/" + name);
+      }
+    }
+  }
+
+  void describe() {
+    info_.format = kFormat;
+    info_.camera_names = pictures_.cameras();
+    info_.captures = pictures_.captures();
+    if (page_) info_.classes = page_->classes;
+    info_.holds = {std::string(kColor.name), std::string(kHoldsInstances),
+                   std::string(kHoldsLabels), std::string(kHoldsTightBoxes),
+                   std::string(kHoldsBoxes3d)};
+    if (has_calibration_) info_.holds.emplace(kHoldsCamera);
+    if (has_depth_) info_.holds.emplace(kDistanceToImagePlane.name);
+    info_.steps[std::string(kDistanceToImagePlane.name)] = 0.5 / 256.0;
+    // The benchmark's own boxes were drawn, and fitted to points of a laser.
+    info_.steps[std::string(kHoldsTightBoxes)] = page_ ? 0.0 : 3.0;
+    info_.steps[std::string(kHoldsBoxes3d)] = page_ ? 5e-4 : 0.5;
+    const auto pictures = names_in(folder_ / front_ / "image_2");
+    const bool is_lossy = std::ranges::any_of(
+        pictures, [](const std::string& name) { return !name.ends_with(".png"); });
+    if (is_lossy) info_.steps[std::string(kColor.name)] = 16.0;
+  }
+
+  friend class KittiPictureReading;
+
+  fs::path folder_;
+  const Host& host_;
+  std::optional<DatasetPage> page_;
+  std::string front_;  ///< "training/" or nothing.
+  PictureList pictures_;
+  std::map<std::string, std::string> split_of_;  ///< By stem.
+  bool has_depth_ = false;
+  bool has_calibration_ = false;
+  StoredInfo info_;
+  ReadLog log_;
+};
+
+/// Makes one frame of the files of one number.
+class KittiPictureReading {
+ public:
+  KittiPictureReading(const KittiDataset& dataset, const ListedPicture& picture,
+                      const NameSet& wanted, ReadLog& log)
+      : dataset_(dataset),
+        stem_(picture.stem),
+        labels_(dataset.front_ + "label_2/" + stem_ + ".txt"),
+        wanted_(wanted),
+        files_(dataset.folder_, dataset.host_, log, picture.capture,
+               dataset.pictures_.cameras()[picture.camera]) {
+    frame_.camera_name = dataset.pictures_.cameras()[picture.camera];
+    frame_.camera_path = "/Cameras/" + frame_.camera_name;
+  }
+
+  std::optional<Frame> read(std::map<std::string, std::string, std::less<>>& sources) {
+    const std::string file = picture_file();
+    files_.check(!file.empty(), kMissing, dataset_.front_ + "image_2/" + stem_, "",
+                 "the picture is missing");
+    if (file.empty()) return std::nullopt;
+    const auto picture = files_.picture(file);
+    if (!picture) return std::nullopt;
+    frame_.camera.width = picture->width();
+    frame_.camera.height = picture->height();
+    if (wanted_.contains(kColor.name)) {
+      frame_.set(kColor, picture->color());
+      sources.emplace(kColor.name, file);
+    }
+    if (dataset_.has_calibration_) read_calibration(sources);
+    if (dataset_.has_depth_ && wanted_.contains(kDistanceToImagePlane.name)) read_depth(sources);
+    sources.emplace(kHoldsInstances, labels_);
+    if (const auto text = files_.text(labels_)) read_labels(*text);
+    return std::move(frame_);
+  }
+
+ private:
+  std::string picture_file() const {
+    for (const char* ending : {".png", ".jpg", ".jpeg"}) {
+      const std::string file = dataset_.front_ + "image_2/" + stem_ + ending;
+      if (files_.has(file)) return file;
+    }
+    return {};
+  }
+
+  void read_calibration(std::map<std::string, std::string, std::less<>>& sources) {
+    const std::string file = dataset_.front_ + "calib/" + stem_ + ".txt";
+    const auto text = files_.text(file);
+    if (!text) return;
+    sources.emplace(kHoldsCamera, file);
+    files_.reading(file, [&] {
+      bool has_camera = false;
+      std::size_t lines = 0;
+      Json lens = Json::object();
+      for (const std::string& line : text_lines(*text)) {
+        if (line.starts_with("lens_2: ")) lens["lens"] = parse_stored_json(line.substr(8));
+        const std::vector<std::string> words = text_words(line);
+        if (words.empty()) continue;
+        ++lines;
+        if (words[0] != "P2:") continue;
+        const auto p = numbers_from(words, 1);
+        if (p.size() != 12) throw std::runtime_error("P2 has not twelve numbers");
+        Camera& camera = frame_.camera;
+        camera.fx = p[0];
+        camera.fy = p[5];
+        camera.cx = p[2];
+        camera.cy = p[6];
+        require_usable(camera);
+        // Labels are in the space of camera 0; the last column shifts them to camera 2.
+        offset_ = {(p[3] - camera.cx * p[11]) / camera.fx, (p[7] - camera.cy * p[11]) / camera.fy,
+                   p[11]};
+        has_camera = true;
+      }
+      if (!has_camera) throw std::runtime_error("has no line P2");
+      read_lens_entry(lens, frame_.camera);
+      if (dataset_.page_) {
+        files_.check(lines >= 7 && text->ends_with('\n'), kReadable, file, "", "is cut short");
+      }
+    });
+  }
+
+  void read_depth(std::map<std::string, std::string, std::less<>>& sources) {
+    const std::string file = dataset_.front_ + "depth_2/" + stem_ + ".png";
+    if (!dataset_.page_ && !files_.has(file)) return;
+    const auto picture =
+        files_.picture_of_size(file, frame_.camera.width, frame_.camera.height, "the picture");
+    if (!picture) return;
+    Image<float> depth(picture->width(), picture->height(), std::numeric_limits<float>::infinity());
+    for (int y = 0; y < depth.height(); ++y) {
+      for (int x = 0; x < depth.width(); ++x) {
+        const std::uint32_t value = picture->at(x, y);
+        if (value != 0) depth.at(x, y) = float(value) / 256.0f;
+      }
+    }
+    frame_.set(kDistanceToImagePlane, std::move(depth));
+    sources.emplace(kDistanceToImagePlane.name, file);
+  }
+
+  void read_labels(const std::string& text) {
+    if (dataset_.page_ && !text.empty()) {
+      files_.check(text.back() == '\n', kReadable, labels_, "", "its last line is cut short");
+    }
+    std::size_t number = 0;
+    for (const std::string& line : text_lines(text)) {
+      ++number;
+      files_.reading(labels_, [&] {
+        const std::vector<std::string> words = text_words(line);
+        if (words.empty()) return;
+        const KittiLabel label = label_of(words);
+        if (label.name != "DontCare") {
+          add_object(label, "line " + std::to_string(number) + ", " + label.name);
+        }
+      });
+    }
+  }
+
+  void add_object(KittiLabel label, const std::string& who) {
+    const bool is_own = dataset_.page_.has_value();
+    std::string name = label.name;
+    if (is_own) {
+      // Fields are separated by blanks, so names lost theirs.
+      const auto& classes = dataset_.page_->classes;
+      const auto found = std::ranges::find_if(classes, [&](std::string each) {
+        std::ranges::replace(each, ' ', '_');
+        return each == name;
+      });
+      files_.check(found != classes.end(), kIds, labels_, who, "is of an unknown class");
+      if (found != classes.end()) name = *found;
+    }
+    const PixelBox box{int(std::floor(label.box[0])), int(std::floor(label.box[1])),
+                       int(std::ceil(label.box[2])), int(std::ceil(label.box[3]))};
+    const int slack = is_own ? 0 : 1;
+    const bool is_inside = !box.is_empty() && box.x_min >= -slack && box.y_min >= -slack &&
+                           box.x_max <= frame_.camera.width + slack &&
+                           box.y_max <= frame_.camera.height + slack;
+    files_.check(is_inside, kInImage, labels_, who, "its box is " + box_text(box),
+                 "a box with pixels inside the image");
+    check_numbers(label, who);
+    label.location += offset_;
+    Instance instance;
+    instance.id = std::uint32_t(frame_.instances.size()) + 1;
+    instance.node_path = "/Assets/" + std::to_string(instance.id);
+    instance.labels["class"] = name;
+    instance.tight_box = box;
+    if (label.has_box_3d()) {
+      const Vec3 half = 0.5 * label.size;
+      instance.world_from_node = camera_from_box(label);
+      instance.bounds_node.min = {-half.x(), -label.size.y(), -half.z()};
+      instance.bounds_node.max = {half.x(), 0.0, half.z()};
+      if (is_inside && is_own) check_sides(instance, who);
+    }
+    frame_.instances.push_back(std::move(instance));
+  }
+
+  void check_numbers(const KittiLabel& label, const std::string& who) {
+    files_.check(label.truncation >= 0.0 && label.truncation <= 1.0, kAmodal, labels_, who,
+                 "its truncation is " + std::to_string(label.truncation), "0 to 1");
+    const bool is_level = label.occlusion == 0.0 || label.occlusion == 1.0 ||
+                          label.occlusion == 2.0 || label.occlusion == 3.0;
+    files_.check(is_level && !(dataset_.page_ && label.occlusion == 3.0), kAmodal, labels_, who,
+                 "its occlusion is " + std::to_string(label.occlusion), "0, 1, 2 or, unknown, 3");
+    files_.check(std::abs(label.rotation_y) <= kPi + 0.01 && std::abs(label.alpha) <= kPi + 0.01,
+                 kAngles, labels_, who, "an angle is beyond pi");
+    if (!label.has_box_3d()) {
+      files_.check(!dataset_.page_, kReadable, labels_, who, "its 3-D box has no size");
+      return;
+    }
+    // The benchmark's own angles were made of another point of the box.
+    const double slack = dataset_.page_ ? 0.0052 : 0.3;
+    const double bearing = std::atan2(label.location.x(), label.location.z());
+    const double expected = std::remainder(label.rotation_y - bearing, 2.0 * kPi);
+    files_.check(std::abs(std::remainder(label.alpha - expected, 2.0 * kPi)) <= slack, kAngles,
+                 labels_, who, "its alpha is " + std::to_string(label.alpha),
+                 std::to_string(expected) + ", by rotation and place");
+  }
+
+  /// Each side of the 2-D box touches the object: by the depth, some pixel of its outermost row or
+  /// column lies in the 3-D box.
+  void check_sides(const Instance& instance, const std::string& who) {
+    if (!frame_.has(kDistanceToImagePlane.name)) return;
+    const auto& depth = frame_.get(kDistanceToImagePlane);
+    const Affine box_from_camera = instance.world_from_node.inverse();
+    const Aabb& bounds = instance.bounds_node;
+    const Vec3 slack = Vec3::Constant(0.01) + 0.01 * bounds.size();
+    const auto is_met = [&](int x, int y) {
+      const auto ray = ray_direction(frame_.camera, Vec2(x + 0.5, y + 0.5));
+      if (!ray || ray->z() >= 0.0 || !std::isfinite(depth.at(x, y))) return false;
+      const Vec3 p = box_from_camera * (*ray * (double(depth.at(x, y)) / -ray->z()));
+      return ((p - bounds.min + slack).array() >= 0.0).all() &&
+             ((bounds.max + slack - p).array() >= 0.0).all();
+    };
+    const PixelBox& b = *instance.tight_box;
+    std::array<bool, 4> touches{};
+    for (int x = b.x_min; x < b.x_max; ++x) {
+      touches[0] |= is_met(x, b.y_min);
+      touches[1] |= is_met(x, b.y_max - 1);
+    }
+    for (int y = b.y_min; y < b.y_max; ++y) {
+      touches[2] |= is_met(b.x_min, y);
+      touches[3] |= is_met(b.x_max - 1, y);
+    }
+    files_.check(
+        touches[0] && touches[1] && touches[2] && touches[3], kBackProject, labels_, who,
+        "by the depth, a side of its 2-D box " + box_text(b) + " does not touch its 3-D box");
+  }
+
+  const KittiDataset& dataset_;
+  std::string stem_;
+  std::string labels_;
+  const NameSet& wanted_;
+  StoredFiles files_;
+  Vec3 offset_ = Vec3::Zero();  ///< Of camera 0 in the space of camera 2.
+  Frame frame_;
+};
+
+StoredCapture KittiDataset::read(std::size_t i, const NameSet& wanted) const {
+  StoredCapture stored;
+  stored.capture.index = info_.captures.at(i);
+  for (const ListedPicture& picture : pictures_.pictures(i)) {
+    const auto split = split_of_.find(picture.stem);
+    if (split != split_of_.end()) stored.split = split->second;
+    std::map<std::string, std::string, std::less<>> sources;
+    auto frame = KittiPictureReading(*this, picture, wanted, stored.log).read(sources);
+    if (!frame) continue;
+    stored.capture.frames.push_back(std::move(*frame));
+    stored.files.push_back(std::move(sources));
+  }
+  return stored;
+}
+
+}  // namespace
+
+std::vector<std::string> KittiReader::patterns() const {
+  return {"training/label_2/*.txt", "label_2/*.txt"};
+}
+
+Recognition KittiReader::recognise(const fs::path& folder) const {
+  if (recognise_page(folder, kFormat) == Recognition::ByName) return Recognition::ByName;
+  for (const char* front : {"training", "."}) {
+    const auto names = names_in(folder / front / "label_2");
+    if (std::ranges::any_of(names, [](const std::string& n) { return n.ends_with(".txt"); })) {
+      return Recognition::ByFiles;
+    }
+  }
+  return Recognition::No;
+}
+
+std::unique_ptr<const StoredDataset> KittiReader::open(const fs::path& folder) const {
+  return std::make_unique<KittiDataset>(folder, host_);
+}
+
+}  // namespace diorama
