@@ -80,9 +80,9 @@ class Comparison {
     const double pixels = step(kHoldsCamera);
     // A fisheye's polynomial says its focal length.
     const bool has_focal_length = a.lens != LensModel::FisheyePolynomial;
-    bool is_same = a.lens == b.lens && is_near(a.cx, b.cx, pixels) && is_near(a.cy, b.cy, pixels) &&
-                   (!has_focal_length ||
-                    (is_near(a.fx, b.fx, pixels) && is_near(a.fy, b.fy, pixels)));
+    bool is_same =
+        a.lens == b.lens && is_near(a.cx, b.cx, pixels) && is_near(a.cy, b.cy, pixels) &&
+        (!has_focal_length || (is_near(a.fx, b.fx, pixels) && is_near(a.fy, b.fy, pixels)));
     for (std::size_t i = 0; i < a.distortion.size() && a.lens == LensModel::OpencvPinhole; ++i) {
       is_same = is_same && is_near(a.distortion[i], b.distortion[i], 1e-6);
     }

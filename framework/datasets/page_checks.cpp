@@ -28,12 +28,12 @@ Finding about_page(const char* rule, const std::string& found, const std::string
 void check_stated(const Json& page, ReadLog& log) {
   for (const char* key : {"format", "program", "seed", "captures", "cameras", "classes", "split",
                           "conventions", "plugins", "assets", "job"}) {
-    log.check(page.contains(key), about_page(kStated, "has no entry \"" + std::string(key) + "\""));
+    log.check(page.contains(key), about_page(kStated, "has no entry '" + std::string(key) + "'"));
   }
   for (const char* key :
        {"units", "world_axes", "camera_axes", "pixels", "boxes", "rotations", "depth"}) {
     log.check(page.at("conventions").contains(key),
-              about_page(kStated, "its conventions do not say \"" + std::string(key) + "\""));
+              about_page(kStated, "its conventions do not say '" + std::string(key) + "'"));
   }
   for (const Json& asset : page.at("assets")) {
     for (const Json& file : asset.at("files")) {

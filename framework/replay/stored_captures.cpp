@@ -78,9 +78,9 @@ void StoredCaptures::choose_dataset(const fs::path& folder, const std::string& j
     const fs::path relative = fs::path(place->scalar).lexically_normal();
     const bool is_below = relative.is_relative() && *relative.begin() != "..";
     if (!is_plain || !is_below) {
-      throw Error(ErrorKind::Asset, (folder / "dataset.json").string() + ": its writer \"" +
-                                        name->scalar + "\" in \"" + place->scalar +
-                                        "\" lies outside of the dataset");
+      throw Error(ErrorKind::Asset, (folder / "dataset.json").string() + ": its writer '" +
+                                        name->scalar + "' in '" + place->scalar +
+                                        "' lies outside of the dataset");
     }
     const fs::path below = (folder / relative).lexically_normal();
     const std::string reader = fs::is_directory(below) ? readers.recognise(below) : std::string();

@@ -24,8 +24,7 @@ std::string camera_of(const std::string& product) {
 /// What metadata.txt calls the writer; empty when it does not say.
 std::string said_writer(const fs::path& folder) {
   try {
-    const Json json =
-        parse_stored_json(read_whole_file(folder / "metadata.txt", 1 << 20));
+    const Json json = parse_stored_json(read_whole_file(folder / "metadata.txt", 1 << 20));
     if (!json.is_object() || !json.contains("name")) return {};
     return json.at("name").is_string() ? json.at("name").get<std::string>() : std::string();
   } catch (const std::exception&) {

@@ -166,9 +166,8 @@ class VocDataset final : public StoredDataset {
       return "ImageSets/Main/" + name + "_" + part + ".txt";
     };
     const bool has_any = std::ranges::any_of(names, [&](const std::string& name) {
-      return std::ranges::any_of(pictures, [&](const auto& part) {
-        return files.has(file_of(name, part.first));
-      });
+      return std::ranges::any_of(
+          pictures, [&](const auto& part) { return files.has(file_of(name, part.first)); });
     });
     if (!has_any) return;
     for (const std::string& name : names) {
@@ -185,9 +184,9 @@ class VocDataset final : public StoredDataset {
           if (!words.empty()) found.push_back(words[0]);
           if (words.size() == 2 && part == "trainval") marks_of_[words[0]] += words[1] + " ";
         }
-        files.check(are_marked && found == stems, kCounts, file, "",
-                    "does not say 1, 0 or -1 of each of the " + std::to_string(stems.size()) +
-                        " pictures");
+        files.check(
+            are_marked && found == stems, kCounts, file, "",
+            "does not say 1, 0 or -1 of each of the " + std::to_string(stems.size()) + " pictures");
       }
     }
   }
