@@ -955,7 +955,8 @@ TEST_CASE("A million captures of a thousand shards cost few steps each", "[.larg
     for (int i = 0; i < kOfShard; ++i) {
       const int capture = shard + i * kShards;
       Transaction transaction;
-      transaction.files.push_back({0, "x/" + std::to_string(capture), bytes_of("x")});
+      const std::string folder = std::to_string(shard);
+      transaction.files.push_back({0, folder + "/" + std::to_string(capture), bytes_of("x")});
       store.commit_capture(capture, transaction);
     }
     finish(store, [] {});
