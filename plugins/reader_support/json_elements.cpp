@@ -95,9 +95,11 @@ class Walker {
   }
 
   void list(const std::string& key) {
+    const JsonSpan begin{characters_.offset(), 2};
     characters_.take();
     if (next() == ']') {
       characters_.take();
+      visit_(key, false, begin, "[]");
       return;
     }
     while (true) {

@@ -370,7 +370,7 @@ class BopWriter::Finish {
   void give_id(Json& pose) {
     const int own = pose.at("obj_id");
     const Scale scale = pose.at("scale");
-    pose.erase("scale");
+    if (scale == Scale{1.0, 1.0, 1.0}) pose.erase("scale");
     if (writer_.objects_.at(std::size_t(own - 1)).asset.empty()) {
       for (const char* bound : {"bounds_min", "bounds_max"}) {
         boxes_[own].add(vec3_of(pose.at(bound)));

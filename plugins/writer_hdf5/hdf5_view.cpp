@@ -179,7 +179,7 @@ std::string_view Hdf5View::part(std::uint64_t at, std::uint64_t size) const {
 
 void Hdf5View::expect(std::uint64_t at, std::string_view signature) const {
   if (part(at, signature.size()) != signature) {
-    throw std::runtime_error("\"" + std::string(signature) + "\" expected at byte " +
+    throw std::runtime_error("'" + std::string(signature) + "' expected at byte " +
                              std::to_string(at));
   }
 }

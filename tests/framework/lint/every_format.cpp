@@ -2,16 +2,22 @@
 #include "framework/lint/every_format.h"
 
 #include "writer_basic/basic_reader.h"
+#include "writer_bop/bop_reader.h"
 #include "writer_bop/bop_writer.h"
 #include "writer_coco/coco_reader.h"
 #include "writer_coco/coco_writer.h"
 #include "writer_data_visualization/data_visualization_writer.h"
+#include "writer_hdf5/hdf5_reader.h"
 #include "writer_hdf5/hdf5_writer.h"
+#include "writer_imagefolder/image_folder_reader.h"
+#include "writer_imagefolder/image_folder_writer.h"
 #include "writer_kitti/kitti_reader.h"
 #include "writer_kitti/kitti_writer.h"
+#include "writer_pose/pose_reader.h"
 #include "writer_pose/pose_writer.h"
 #include "writer_voc/voc_reader.h"
 #include "writer_voc/voc_writer.h"
+#include "writer_webdataset/webdataset_reader.h"
 #include "writer_webdataset/webdataset_writer.h"
 #include "writer_yolo/yolo_reader.h"
 #include "writer_yolo/yolo_writer.h"
@@ -88,8 +94,11 @@ BopWriter::Params one_scene() {
 
 DatasetReaders every_reader(Host& host) {
   return DatasetReaders(
-      {reader<BasicReader>("BasicReader", host), reader<CocoReader>("CocoReader", host),
-       reader<KittiReader>("KittiReader", host), reader<VocReader>("VocReader", host),
+      {reader<BasicReader>("BasicReader", host), reader<BopReader>("BopReader", host),
+       reader<CocoReader>("CocoReader", host), reader<Hdf5Reader>("Hdf5Reader", host),
+       reader<ImageFolderReader>("ImageFolderReader", host),
+       reader<KittiReader>("KittiReader", host), reader<PoseReader>("PoseReader", host),
+       reader<VocReader>("VocReader", host), reader<WebDatasetReader>("WebDatasetReader", host),
        reader<YoloReader>("YoloReader", host)});
 }
 
@@ -120,7 +129,8 @@ std::vector<SampleFormat> every_format() {
           format<BopWriter>("bop"),
           format<BopWriter>("bop_cameras", one_scene()),
           format<WebDatasetWriter>("webdataset"),
-          format<Hdf5Writer>("hdf5")};
+          format<Hdf5Writer>("hdf5"),
+          format<ImageFolderWriter>("imagefolder")};
 }
 
 }  // namespace diorama::test

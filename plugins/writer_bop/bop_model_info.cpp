@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "writer_bop/bop_model_info.h"
+
+#include <charconv>
+#include <cstring>
+#include <fstream>
+#include <stdexcept>
+#include <vector>
+
+#include "reader_support/dataset_page.h"
+
+namespace diorama {
+namespace {
+
+/// The number behind a line "element NAME" of a PLY file's header.
+std::size_t ply_count(const std::string& header, const std::string& element) {
+  const std::string line = "\nelement " + element + " ";
+  const std::size_t at = header.find(line);
+  if (at == std::string::npos) throw std::runtime_error("has no element " + element);
+  std::size_t count = 0;
+  const char* begin = header.data() + at + line.size();
+  if (std::from_chars(begin, header.data() + header.size(), count).ec != std::errc()) {
+    throw std::runtime_error("has no number of elements " + element);
+  }
+  return count;
+}
+
+/// The extent of a model of our writer's: vertices begin with three floats and take 27 bytes each,
+/// faces 13.
+Aabb ply_extent(const std::filesystem::path& file) {
+  constexpr std::string_view kEnd = "\nend_header\n";
+  constexpr std::size_t kVertex = 27;
+  constexpr std::size_t kFace = 13;
+  std::ifstream in(file, std::ios::binary);
+  std::string front(4096, '\0');
+  in.read(front.data(), std::streamsize(front.size()));
+  front.resize(std::size_t(in.gcount()));
+  const std::size_t end = front.find(kEnd);
+  if (!front.starts_with("ply\nformat binary_little_endian 1.0\n") || end == std::string::npos) {
+    throw std::runtime_error("is not a binary PLY file");
+  }
+  const std::string header = front.substr(0, end);
+  const std::size_t data = end + kEnd.size();
+  const std::size_t vertices = ply_count(header, "vertex");
+  const std::size_t size = std::filesystem::file_size(file);
+  if ((size - data) / kVertex < vertices ||
+      size - data - kVertex * vertices != kFace * ply_count(header, "face")) {
+    throw std::runtime_error("is cut short");
+  }
+  in.clear();
+  in.seekg(std::streamoff(data));
+  Aabb box;
+  std::vector<char> block(kVertex * 4096);
+  for (std::size_t left = vertices; left > 0;) {
+    const std::size_t now = std::min<std::size_t>(left, 4096);
+    in.read(block.data(), std::streamsize(now * kVertex));
+    if (!in) throw std::runtime_error("has become shorter");
+    for (std::size_t i = 0; i < now; ++i) {
+      Vec3f position;
+      std::memcpy(position.data(), block.data() + kVertex * i, 12);
+      box.add(position.cast<double>());
+    }
+    left -= now;
+  }
+  return box;
+}
+
+}  // namespace
+
+std::string bop_model_file(int id) { return "models/obj_" + zero_padded(id, 6) + ".ply"; }
+
+BopModelBoxes read_bop_models(StoredFiles& files, bool is_own) {
+  BopModelBoxes boxes;
+  std::string page = "models/models_info.json";
+  for (const char* folder : {"models", "models_eval", "models_cad", "models_reconst"}) {
+    const std::string file = std::string(folder) + "/models_info.json";
+    if (!files.has(file)) continue;
+    page = file;
+    break;
+  }
+  if (!is_own && !files.has(page)) return boxes;
+  const auto json = files.json(page);
+  if (!json) return boxes;
+  files.reading(page, [&] {
+    for (const auto& [key, model] : json->items()) {
+      int id = 0;
+      if (std::from_chars(key.data(), key.data() + key.size(), id).ec != std::errc()) {
+        throw std::runtime_error("'" + key + "' is no obj_id");
+      }
+      const auto number = [&](const char* name) { return model.at(name).get<double>(); };
+      const Vec3 low(number("min_x"), number("min_y"), number("min_z"));
+      const Vec3 size(number("size_x"), number("size_y"), number("size_z"));
+      const Aabb box{low, low + size};
+      boxes[id] = box;
+      const std::string who = "obj_id " + key;
+      const double diameter = number("diameter");
+      // Meshes of the benchmark were measured on fewer points.
+      const double slack = is_own ? 1e-5 : 0.02;
+      files.check(size.allFinite() && low.allFinite() && (size.array() >= 0.0).all() &&
+                      diameter <= size.norm() * (1.0 + slack) &&
+                      diameter >= size.maxCoeff() * (1.0 - slack),
+                  kCounts, page, who, "its diameter is " + std::to_string(diameter),
+                  "one that goes with its size");
+      const std::string file = bop_model_file(id);
+      if (!is_own || !files.has(file)) continue;
+      files.reading(file, [&] {
+        const Aabb extent = ply_extent(files.root() / file);
+        const double near = 1e-5 * size.norm();
+        files.check((extent.min - box.min).norm() <= near && (extent.max - box.max).norm() <= near,
+                    kCounts, file, "", "is not as large as " + page + " says");
+      });
+    }
+  });
+  return boxes;
+}
+
+}  // namespace diorama

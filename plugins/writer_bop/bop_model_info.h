@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <string>
+
+#include "diorama/math.h"
+#include "reader_support/stored_files.h"
+
+namespace diorama {
+
+/// The extent of a model by obj_id, millimetres: what models_info.json says.
+using BopModelBoxes = std::map<int, Aabb>;
+
+/// Reads it from the first folder of models that has one; nothing when there is none. With
+/// `is_own`, models must be there and as large as the page says.
+BopModelBoxes read_bop_models(StoredFiles& files, bool is_own);
+
+std::string bop_model_file(int id);  ///< "models/obj_000001.ply"
+
+}  // namespace diorama

@@ -1,0 +1,626 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "writer_pose/pose_reader.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "diorama/error.h"
+#include "reader_support/dataset_page.h"
+#include "reader_support/picture_list.h"
+#include "writer_pose/pose_entry.h"
+
+namespace diorama {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kFormat = "PoseWriter";
+constexpr const char* kProject = "keypoints project onto their pixels";
+constexpr const char* kPose = "pose agrees with the keypoints";
+constexpr std::string_view kProduct = "rp_";
+/// Files that are looked at before it is decided by whose rules poses are.
+constexpr std::size_t kLookedAt = 16;
+
+/// What metadata.txt calls the writer; empty when it does not say.
+std::string said_writer(const fs::path& folder) {
+  try {
+    const Json json = parse_stored_json(read_whole_file(folder / "metadata.txt", 1 << 20));
+    if (!json.is_object() || !json.contains("name")) return {};
+    return json.at("name").is_string() ? json.at("name").get<std::string>() : std::string();
+  } catch (const std::exception&) {
+    return {};
+  }
+}
+
+/// Cameras of the run that a folder is of, in their order.
+std::vector<std::string> cameras_of_run(const fs::path& folder) {
+  for (const fs::path& place : {folder, folder / ".."}) {
+    try {
+      const Json page =
+          parse_stored_json(read_whole_file(place / "dataset.json", std::uintmax_t(256) << 20));
+      if (!page.is_object() || !page.contains("writers") || !page.contains("cameras")) continue;
+      return page.at("cameras").get<std::vector<std::string>>();
+    } catch (const std::exception&) {
+      continue;
+    }
+  }
+  return {};
+}
+
+std::optional<int> number_of(const std::string& stem) {
+  int number = 0;
+  const char* end = stem.data() + stem.size();
+  const auto parsed = std::from_chars(stem.data(), end, number);
+  if (stem.empty() || stem[0] == '-' || parsed.ec != std::errc() || parsed.ptr != end) {
+    return std::nullopt;
+  }
+  return number;
+}
+
+struct PoseFrame {
+  std::string stem;
+  std::uint32_t folder = 0;
+  std::int32_t capture = 0;
+  std::uint32_t camera = 0;
+};
+
+class PoseDataset final : public StoredDataset {
+ public:
+  PoseDataset(fs::path folder, const Host& host) : folder_(std::move(folder)), host_(host) {
+    StoredFiles files(folder_, host_, log_);
+    const bool is_named = said_writer(folder_) == kFormat;
+    files.check(is_named || !files.has("metadata.txt"), kReadable, "metadata.txt", "",
+                "does not say that PoseWriter wrote this");
+    folders_ = {""};
+    for (const std::string& below : names_in(folder_, true)) folders_.push_back(below + "/");
+    for (std::uint32_t i = 0; i < folders_.size(); ++i) list(i, files);
+    if (frames_.empty() && !is_named) {
+      throw Error(ErrorKind::Asset, folder_.string() + ": holds no files of PoseWriter");
+    }
+    group(files);
+    describe();
+  }
+
+  const StoredInfo& info() const override { return info_; }
+  const ReadLog& log() const override { return log_; }
+  StoredCapture read(std::size_t i, const NameSet& wanted) const override;
+
+ private:
+  void list(std::uint32_t place, StoredFiles& files) {
+    const std::string& folder = folders_[place];
+    std::set<std::string> tables;
+    std::vector<ListedPicture> pictures;
+    for (const std::string& name : names_in(folder_ / folder)) {
+      const fs::path path(name);
+      const std::string stem = path.stem().string();
+      const std::string ending = path.extension().string();
+      if (ending == ".json" && number_of(stem)) tables.insert(stem);
+      if (is_picture_ending(ending)) pictures.push_back({stem, ending, place, 0, 0});
+    }
+    if (tables.empty() && !folder.starts_with(kProduct)) return;
+    std::set<std::string> overlays;
+    constexpr std::string_view kOverlay = "_overlay";
+    for (const ListedPicture& picture : pictures) {
+      std::string stem = picture.stem;
+      const bool is_overlay = stem.ends_with(kOverlay);
+      if (is_overlay) stem.resize(stem.size() - kOverlay.size());
+      if (!number_of(stem)) continue;
+      if (is_overlay) {
+        overlays.insert(stem);
+        has_overlays_ = true;
+      }
+      files.check(tables.contains(stem), kMissing, folder + stem + ".json", "",
+                  "the file is not there", "one for " + folder + picture.stem + picture.ending);
+    }
+    for (const std::string& stem : tables) {
+      frames_.push_back({stem, place, *number_of(stem), 0});
+      if (!overlays.contains(stem)) lacking_.push_back(folder + stem);
+    }
+  }
+
+  void group(StoredFiles& files) {
+    const bool is_flat =
+        std::ranges::any_of(frames_, [](const PoseFrame& frame) { return frame.folder == 0; });
+    if (is_flat) {
+      cameras_ = cameras_of_run(folder_);
+      if (cameras_.empty()) cameras_ = {"camera"};
+      const auto count = std::int32_t(cameras_.size());
+      for (PoseFrame& frame : frames_) {
+        if (frame.folder != 0) continue;
+        frame.camera = std::uint32_t(frame.capture % count);
+        frame.capture /= count;
+      }
+    }
+    for (PoseFrame& frame : frames_) {
+      if (frame.folder == 0) continue;
+      std::string name = folders_[frame.folder];
+      name.pop_back();
+      if (name.starts_with(kProduct)) name.erase(0, kProduct.size());
+      auto found = std::ranges::find(cameras_, name);
+      if (found == cameras_.end()) found = cameras_.insert(cameras_.end(), name);
+      frame.camera = std::uint32_t(found - cameras_.begin());
+    }
+    std::ranges::stable_sort(frames_, {}, [](const PoseFrame& frame) {
+      return std::pair(frame.capture, frame.camera);
+    });
+    std::vector<PoseFrame> once;
+    for (PoseFrame& frame : frames_) {
+      const bool is_again = !once.empty() && once.back().capture == frame.capture &&
+                            once.back().camera == frame.camera;
+      files.check(!is_again, kOnce, folders_[frame.folder] + frame.stem + ".json", "",
+                  "its number is there a second time");
+      if (is_again) continue;
+      if (once.empty() || once.back().capture != frame.capture) first_.push_back(once.size());
+      once.push_back(std::move(frame));
+    }
+    frames_ = std::move(once);
+    first_.push_back(frames_.size());
+    if (!has_overlays_) return;
+    for (const std::string& stem : lacking_) {
+      files.find(kMissing, stem + "_overlay.png", "", "the drawing is not there",
+                 "other pictures have one");
+    }
+  }
+
+  void describe() {
+    info_.format = kFormat;
+    info_.camera_names = cameras_;
+    for (std::size_t i = 0; i + 1 < first_.size(); ++i) {
+      info_.captures.push_back(frames_[first_[i]].capture);
+    }
+    info_.holds = {std::string(kHoldsInstances), std::string(kHoldsLabels),
+                   std::string(kHoldsNodePaths), std::string(kHoldsOcclusion),
+                   std::string(kHoldsCamera),    std::string(kHoldsCameraPose)};
+    info_.steps[std::string(kHoldsOcclusion)] = 5.1e-4;
+    // The view matrix has five decimals.
+    info_.steps[std::string(kHoldsCameraPose)] = 2e-4;
+    for (const PoseFrame& frame : frames_) {
+      const std::string file = picture_file(frame);
+      if (file.empty()) continue;
+      info_.holds.emplace(file.ends_with(".exr") ? kColorHdr.name : kColor.name);
+      if (!file.ends_with(".png")) info_.steps[std::string(kColor.name)] = 16.0;
+      break;
+    }
+    std::size_t seen = 0;
+    std::size_t right = 0;
+    std::size_t swapped = 0;
+    std::size_t pinhole = 0;
+    for (std::size_t i = 0; i < frames_.size() && seen < kLookedAt; ++i) {
+      const auto file = look_at(frames_[i]);
+      if (!file) continue;
+      if (!file->objects.empty() && !has_layout_) {
+        layout_ = file->layout;
+        has_layout_ = true;
+      }
+      if (!file->objects.empty()) ++seen;
+      for (const StoredPose& object : file->objects) {
+        if (const auto miss = pose_miss(*file, object)) {
+          const double slack = slack_of(*file, object);
+          if (miss->right <= slack && miss->swapped > slack) ++right;
+          if (miss->right > slack && miss->swapped <= slack) ++swapped;
+        }
+        if (has_good_pixels(*file, object)) ++pinhole;
+      }
+    }
+    is_swapped_ = swapped > right;
+    checks_pixels_ = !is_swapped_ || pinhole > 0;
+    if (is_swapped_) info_.steps[std::string(kHoldsCamera)] = 0.02;
+    if (!has_layout_ || layout_ == PoseLayout::Dope) return;
+    info_.holds.emplace(kHoldsBoxes3d);
+    info_.steps[std::string(kHoldsBoxes3d)] = 1e-4;
+    if (layout_ == PoseLayout::Full) {
+      info_.holds.insert({std::string(kHoldsPoses), std::string(kHoldsBounds)});
+    }
+  }
+
+  std::optional<StoredPoseFile> look_at(const PoseFrame& frame) const {
+    ReadLog ignored;
+    StoredFiles files(folder_, host_, ignored);
+    std::optional<StoredPoseFile> file;
+    const std::string table = folders_[frame.folder] + frame.stem + ".json";
+    const auto text = files.text(table);
+    if (!text) return std::nullopt;
+    files.reading(table, [&] {
+      file = parse_pose_file(*text);
+      if (file->camera.width > 0) return;
+      const std::string picture = picture_file(frame);
+      const auto decoded = picture.empty() ? std::nullopt : files.picture(picture);
+      if (decoded) file = parse_pose_file(*text, decoded->width(), decoded->height());
+    });
+    return file;
+  }
+
+  static double slack_of(const StoredPoseFile& file, const StoredPose& object) {
+    if (object.size) return 1e-3 + 0.01 * object.size->norm();
+    return 1.5 / std::min(file.camera.fx, file.camera.fy);
+  }
+
+  /// By the reference's own formula, which knows no lens.
+  static bool has_good_pixels(const StoredPoseFile& file, const StoredPose& object) {
+    if (object.camera_points.empty()) return true;
+    std::size_t wrong = 0;
+    for (std::size_t i = 0; i < object.camera_points.size(); ++i) {
+      const auto pixel = project(file.projection, object.camera_points[i]);
+      if (pixel && (*pixel - object.pixels[i]).cwiseAbs().maxCoeff() > 0.6) ++wrong;
+    }
+    return wrong == 0;
+  }
+
+  /// Empty when there is none.
+  std::string picture_file(const PoseFrame& frame) const {
+    std::error_code ignored;
+    for (const char* ending : {".png", ".jpg", ".jpeg", ".exr"}) {
+      const std::string file = folders_[frame.folder] + frame.stem + ending;
+      if (fs::is_regular_file(folder_ / file, ignored)) return file;
+    }
+    return {};
+  }
+
+  friend class PoseFrameReading;
+
+  fs::path folder_;
+  const Host& host_;
+  std::vector<std::string> folders_;  ///< "" and those below, with '/'.
+  std::vector<PoseFrame> frames_;
+  std::vector<std::size_t> first_;  ///< Per capture, and one behind the last.
+  std::vector<std::string> cameras_;
+  std::vector<std::string> lacking_;  ///< Stems without a drawing.
+  bool has_overlays_ = false;
+  bool has_layout_ = false;
+  PoseLayout layout_ = PoseLayout::Full;
+  bool is_swapped_ = false;  ///< Camera-frame poses are the reference's.
+  bool checks_pixels_ = true;
+  StoredInfo info_;
+  ReadLog log_;
+};
+
+/// Makes one frame of one file and its picture.
+class PoseFrameReading {
+ public:
+  using Sources = std::map<std::string, std::string, std::less<>>;
+
+  PoseFrameReading(const PoseDataset& dataset, const PoseFrame& of, const NameSet& wanted,
+                   ReadLog& log)
+      : dataset_(dataset),
+        of_(of),
+        table_(dataset.folders_[of.folder] + of.stem + ".json"),
+        wanted_(wanted),
+        files_(dataset.folder_, dataset.host_, log, of.capture, dataset.cameras_[of.camera]) {
+    frame_.camera_name = dataset.cameras_[of.camera];
+    frame_.camera_path = "/Cameras/" + frame_.camera_name;
+  }
+
+  std::optional<Frame> read(Sources& sources) {
+    const auto text = files_.text(table_);
+    std::optional<StoredPoseFile> file;
+    if (text) files_.reading(table_, [&] { file = parse_pose_file(*text); });
+    read_picture(file && file->camera.width > 0 ? &file->camera : nullptr, sources);
+    if (file && file->camera.width == 0 && has_size_) {
+      files_.reading(table_, [&] {
+        file = parse_pose_file(*text, frame_.camera.width, frame_.camera.height);
+      });
+    }
+    if (!has_size_) return std::nullopt;
+    if (!file) return std::move(frame_);
+    file_ = std::move(*file);
+    read_camera();
+    for (const StoredPose& object : file_.objects) add_object(object);
+    for (const std::string_view held : {kHoldsInstances, kHoldsCamera, kHoldsCameraPose}) {
+      sources.emplace(held, table_);
+    }
+    return std::move(frame_);
+  }
+
+ private:
+  bool wants(std::string_view name) const {
+    return wanted_.contains(name) && dataset_.info_.holds.contains(name);
+  }
+
+  void read_picture(const Camera* said, Sources& sources) {
+    if (said) {
+      frame_.camera.width = said->width;
+      frame_.camera.height = said->height;
+      has_size_ = true;
+    }
+    const std::string file = dataset_.picture_file(of_);
+    files_.check(!file.empty(), kMissing, dataset_.folders_[of_.folder] + of_.stem + ".png", "",
+                 "the picture is not there", "one for " + table_);
+    if (file.empty()) return;
+    if (has_size_ && !wants(kColor.name) && !wants(kColorHdr.name)) return;
+    const auto picture = has_size_ ? files_.picture_of_size(file, frame_.camera.width,
+                                                            frame_.camera.height, table_)
+                                   : files_.picture(file);
+    if (!picture) return;
+    frame_.camera.width = picture->width();
+    frame_.camera.height = picture->height();
+    has_size_ = true;
+    if (file.ends_with(".exr")) {
+      if (wants(kColorHdr.name)) set_light(*picture, file, sources);
+    } else if (wants(kColor.name)) {
+      frame_.set(kColor, picture->color());
+      sources.emplace(kColor.name, file);
+    }
+  }
+
+  void set_light(const StoredPicture& picture, const std::string& file, Sources& sources) {
+    files_.reading(file, [&] {
+      const auto& floats = picture.texture->floats;
+      if (floats.empty() || picture.channels() < 3) throw std::runtime_error("has no three channels");
+      Image<Vec3f> light(picture.width(), picture.height(), Vec3f::Zero());
+      const auto channels = std::size_t(picture.channels());
+      for (std::size_t i = 0; i < light.pixels().size(); ++i) {
+        const float* pixel = floats.data() + i * channels;
+        light.pixels()[i] = {pixel[0], pixel[1], pixel[2]};
+      }
+      frame_.set(kColorHdr, std::move(light));
+      sources.emplace(kColorHdr.name, file);
+    });
+  }
+
+  void read_camera() {
+    const Camera& from = dataset_.is_swapped_ ? file_.projection : file_.camera;
+    const int width = frame_.camera.width;
+    const int height = frame_.camera.height;
+    frame_.camera = from;
+    frame_.camera.width = width;
+    frame_.camera.height = height;
+    Affine camera_from_world = Affine::Identity();
+    camera_from_world.matrix() = file_.view.transpose();
+    const Mat3 turn = camera_from_world.linear();
+    files_.check((turn * turn.transpose() - Mat3::Identity()).norm() < 1e-3 &&
+                     turn.determinant() > 0.0,
+                 kPose, table_, "", "its view matrix is no rotation and shift");
+    const Mat3 rotation = Transform::from_affine(camera_from_world).rotation.toRotationMatrix();
+    frame_.world_from_camera.linear() = rotation.transpose();
+    frame_.world_from_camera.translation() =
+        -(rotation.transpose() * camera_from_world.translation());
+  }
+
+  void add_object(const StoredPose& object) {
+    const std::string& who = object.path;
+    const bool is_first = std::ranges::find(frame_.instances, object.path, &Instance::node_path) ==
+                          frame_.instances.end();
+    files_.check(is_first, kOnce, table_, who, "is there a second time");
+    files_.check(!object.label.empty(), kIds, table_, who, "has no label");
+    files_.check(object.visibility >= 0.0 && object.visibility <= 1.0, kAmodal, table_, who,
+                 "its visibility is " + std::to_string(object.visibility), "0 to 1");
+    check_truncation(object);
+    check_pixels(object);
+    check_world(object);
+    check_camera_pose(object);
+    Instance instance;
+    instance.id = std::uint32_t(frame_.instances.size()) + 1;
+    instance.node_path = object.path;
+    instance.labels["class"] = object.label;
+    constexpr std::int64_t kUnknownSize = std::int64_t(1) << 24;
+    Visibility seen;
+    seen.amodal_pixels = kUnknownSize;
+    seen.visible_pixels =
+        std::llround(std::clamp(object.visibility, 0.0, 1.0) * double(kUnknownSize));
+    instance.visibility = std::move(seen);
+    set_box(object, instance);
+    frame_.instances.push_back(std::move(instance));
+  }
+
+  void set_box(const StoredPose& object, Instance& instance) {
+    if (object.world_from_local) {
+      instance.world_from_node.matrix() = object.world_from_local->transpose();
+      const Affine node_from_world = instance.world_from_node.inverse();
+      for (const Vec3& point : object.world_points) {
+        instance.bounds_node.add(node_from_world * point);
+      }
+      return;
+    }
+    if (object.camera_points.empty() || !object.size) return;
+    Affine camera_from_box = Affine::Identity();
+    const Mat3 rotation = object.rotation.toRotationMatrix();
+    camera_from_box.linear() = dataset_.is_swapped_ ? unswapped(file_, rotation) : rotation;
+    for (std::size_t i = 0; i < file_.sides.size(); ++i) {
+      if (file_.sides[i].isZero()) camera_from_box.translation() = object.camera_points[i];
+    }
+    instance.world_from_node = frame_.world_from_camera * camera_from_box;
+    instance.bounds_node.add(-0.5 * *object.size);
+    instance.bounds_node.add(0.5 * *object.size);
+  }
+
+  /// Share of the box round the pixels that lies outside the picture.
+  void check_truncation(const StoredPose& object) {
+    if (!object.truncation) return;
+    Vec2 low = object.pixels[0];
+    Vec2 high = object.pixels[0];
+    for (const Vec2& pixel : object.pixels) {
+      low = low.cwiseMin(pixel);
+      high = high.cwiseMax(pixel);
+    }
+    const double area = (high - low).prod();
+    const Vec2 size(frame_.camera.width, frame_.camera.height);
+    const Vec2 inside = high.cwiseMin(size).cwiseMax(0.0) - low.cwiseMin(size).cwiseMax(0.0);
+    const double expected = area == 0.0 ? 1.0 : 1.0 - inside.prod() / area;
+    files_.check(std::abs(*object.truncation - expected) <= 1e-5, kProject, table_, object.path,
+                 "its truncation_ratio is " + std::to_string(*object.truncation),
+                 std::to_string(expected) + ", by its projected keypoints");
+  }
+
+  void check_pixels(const StoredPose& object) {
+    if (!dataset_.checks_pixels_) return;
+    const Camera& camera = frame_.camera;
+    for (std::size_t i = 0; i < object.camera_points.size(); ++i) {
+      const auto expected = project(camera, object.camera_points[i]);
+      if (!expected) continue;
+      const Vec2& found = object.pixels[i];
+      const double slack = dataset_.is_swapped_ ? 0.6 : 0.51;
+      files_.check((*expected - found).cwiseAbs().maxCoeff() <= slack, kProject, table_,
+                   object.path,
+                   "its keypoint " + std::to_string(i) + " is at " + std::to_string(found.x()) +
+                       ", " + std::to_string(found.y()),
+                   std::to_string(expected->x()) + ", " + std::to_string(expected->y()) +
+                       ", where its camera-frame point projects to");
+    }
+  }
+
+  static Vec3 mapped(const Mat4& row_vector_matrix, const Vec3& point) {
+    return (point.homogeneous().transpose() * row_vector_matrix).head<3>().transpose();
+  }
+
+  /// World-frame entries against each other and against the camera frame.
+  void check_world(const StoredPose& object) {
+    if (!object.world_from_local) return;
+    const Mat4& world = *object.world_from_local;
+    const auto near = [](const Vec3& a, const Vec3& b, double slack) {
+      return (a - b).norm() <= slack * (1.0 + b.norm());
+    };
+    const auto check = [&](bool holds, const std::string& found, const std::string& expected = {}) {
+      files_.check(holds, kPose, table_, object.path, found, expected);
+    };
+    // The file's view matrix is rounded to five decimals.
+    for (std::size_t i = 0; i < object.world_points.size(); ++i) {
+      check(near(mapped(file_.view, object.world_points[i]), object.camera_points[i], 1e-3),
+            "its keypoint " + std::to_string(i) + " differs between world and camera frame");
+    }
+    check(near(world.row(3).head<3>().transpose(), object.world_location, 1e-5),
+          "its location_world_frame is not that of local_to_world_transform");
+    check((object.world_matrix - world.topLeftCorner<3, 3>()).cwiseAbs().maxCoeff() <= 1e-5,
+          "its rotation_matrix_world_frame is not that of local_to_world_transform");
+    check(world.col(3) == Eigen::Vector4d(0.0, 0.0, 0.0, 1.0),
+          "the last column of local_to_world_transform is not 0 0 0 1");
+    check(is_turned_like(object.world_rotation, rotation_of(world)),
+          "its quat_wxyz_world_frame is not the turn of local_to_world_transform",
+          "(quaternion order?)");
+    // Corners lie where the box that the centre and one corner span has them.
+    const Mat4 local_from_world = world.inverse();
+    Aabb box;
+    for (const Vec3& point : object.world_points) box.add(mapped(local_from_world, point));
+    const Vec3 scale = world.topLeftCorner<3, 3>().rowwise().norm();
+    double worst = 0.0;
+    for (std::size_t i = 0; i < object.world_points.size(); ++i) {
+      const Vec3 corner = box.centre() + 0.5 * file_.sides[i].cwiseProduct(box.size());
+      worst = std::max(worst, (mapped(world, corner) - object.world_points[i]).norm());
+    }
+    const double slack = 1e-4 * (1.0 + object.size->norm());
+    check(std::isfinite(worst) && worst <= slack,
+          "local_to_world_transform puts a corner " + std::to_string(worst) +
+              " m beside its keypoint");
+    check((box.size().cwiseProduct(scale) - *object.size).norm() <= slack,
+          "its size is not that of its keypoints");
+  }
+
+  static bool is_turned_like(const Quat& a, const Quat& b) {
+    return std::abs(a.norm() - 1.0) < 1e-4 && std::abs(std::abs(a.dot(b)) - 1.0) < 1e-5;
+  }
+
+  void check_camera_pose(const StoredPose& object) {
+    const double length = object.rotation.norm();
+    files_.check(std::abs(length - 1.0) < 1e-4, kPose, table_, object.path,
+                 "its quaternion has length " + std::to_string(length), "1");
+    if (const auto miss = pose_miss(file_, object)) {
+      const double found = dataset_.is_swapped_ ? miss->swapped : miss->right;
+      // The reference's product turns scales along; only equal ones can be told.
+      const bool can_tell = !dataset_.is_swapped_ || has_equal_scales(object);
+      files_.check(!can_tell || found <= PoseDataset::slack_of(file_, object), kPose, table_,
+                   object.path,
+                   "its camera-frame rotation misses its keypoints by " + std::to_string(found) +
+                       (object.size ? " m" : " rad"),
+                   "none (swapped product or quaternion order?)");
+    }
+    if (object.world_from_local) {
+      const Mat4 pose = dataset_.is_swapped_ ? Mat4(file_.view * *object.world_from_local)
+                                             : Mat4(*object.world_from_local * file_.view);
+      const Vec3 place = pose.row(3).head<3>().transpose();
+      files_.check((place - object.location).norm() <= 1e-3 * (1.0 + place.norm()), kPose, table_,
+                   object.path,
+                   "its camera-frame location is " +
+                       std::to_string((place - object.location).norm()) +
+                       " m from the world-frame one");
+      files_.check((pose.topLeftCorner<3, 3>() - object.camera_matrix).cwiseAbs().maxCoeff() <=
+                       1e-3 * (1.0 + pose.topLeftCorner<3, 3>().cwiseAbs().maxCoeff()),
+                   kPose, table_, object.path,
+                   "its rotation_matrix_camera_frame is not that of its world-frame pose");
+      files_.check(is_turned_like(object.rotation, rotation_of(pose)), kPose, table_, object.path,
+                   "its quat_wxyz_camera_frame is not the turn of its world-frame pose",
+                   "(quaternion order?)");
+      return;
+    }
+    if (!dataset_.is_swapped_ && !object.camera_points.empty()) check_origin(object);
+  }
+
+  bool has_equal_scales(const StoredPose& object) const {
+    if (!object.world_from_local) return true;
+    const Vec3 scale = object.world_from_local->topLeftCorner<3, 3>().rowwise().norm();
+    return scale.maxCoeff() - scale.minCoeff() <= 1e-3 * scale.maxCoeff();
+  }
+
+  /// A location lies where the object is: where in its box is nothing that one file can tell.
+  void check_origin(const StoredPose& object) {
+    Vec3 centre = Vec3::Zero();
+    for (std::size_t i = 0; i < file_.sides.size(); ++i) {
+      if (file_.sides[i].isZero()) centre = object.camera_points[i];
+    }
+    const Vec3 aside = object.rotation.inverse() * (object.location - centre);
+    const Vec3 slack = Vec3::Constant(1e-3) + 0.51 * *object.size;
+    // Most models have their origin in their box, or below it.
+    const bool is_near = (aside.cwiseAbs().array() <= (2.0 * slack).array()).all();
+    files_.check(is_near, kPose, table_, object.path,
+                 "its camera-frame location is " + std::to_string(aside.norm()) +
+                     " m from the middle of its keypoints");
+  }
+
+  const PoseDataset& dataset_;
+  const PoseFrame& of_;
+  std::string table_;
+  const NameSet& wanted_;
+  StoredFiles files_;
+  StoredPoseFile file_;
+  bool has_size_ = false;
+  Frame frame_;
+};
+
+StoredCapture PoseDataset::read(std::size_t i, const NameSet& wanted) const {
+  StoredCapture stored;
+  stored.capture.index = info_.captures.at(i);
+  for (std::size_t at = first_[i]; at < first_[i + 1]; ++at) {
+    PoseFrameReading::Sources sources;
+    auto frame = PoseFrameReading(*this, frames_[at], wanted, stored.log).read(sources);
+    if (!frame) continue;
+    stored.capture.frames.push_back(std::move(*frame));
+    stored.files.push_back(std::move(sources));
+  }
+  return stored;
+}
+
+}  // namespace
+
+std::vector<std::string> PoseReader::patterns() const {
+  return {"metadata.txt", "*.json", "rp_*/*.json"};
+}
+
+Recognition PoseReader::recognise(const fs::path& folder) const {
+  const std::string said = said_writer(folder);
+  if (said == kFormat) return Recognition::ByName;
+  if (!said.empty()) return Recognition::No;
+  std::vector<std::string> folders{""};
+  for (const std::string& below : names_in(folder, true)) {
+    if (below.starts_with(kProduct)) folders.push_back(below + "/");
+  }
+  for (const std::string& below : folders) {
+    for (const std::string& name : names_in(folder / below)) {
+      const fs::path path(name);
+      if (path.extension() != ".json" || !number_of(path.stem().string())) continue;
+      try {
+        const Json json = parse_stored_json(read_whole_file(folder / below / name, 1 << 24));
+        return is_pose_file(json) ? Recognition::ByFiles : Recognition::No;
+      } catch (const std::exception&) {
+        break;
+      }
+    }
+  }
+  return Recognition::No;
+}
+
+std::unique_ptr<const StoredDataset> PoseReader::open(const fs::path& folder) const {
+  return std::make_unique<PoseDataset>(folder, host_);
+}
+
+}  // namespace diorama
