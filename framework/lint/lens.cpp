@@ -66,32 +66,4 @@ std::optional<Vec3> Lens::direction(const Vec2& pixel) const {
   return Vec3(flat.x(), flat.y(), 1.0);
 }
 
-Mat3 intrinsics_matrix(double fx, double fy, double cx, double cy) {
-  Mat3 matrix;
-  matrix << fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0;
-  return matrix;
-}
-
-Lens lens_of(const Json& holder, int width, int height, const Mat3& intrinsics) {
-  Lens lens;
-  lens.width = width;
-  lens.height = height;
-  lens.focal = {intrinsics(0, 0), intrinsics(1, 1)};
-  lens.centre = {intrinsics(0, 2), intrinsics(1, 2)};
-  if (!holder.contains("lens")) return lens;
-  const Json& entry = holder.at("lens");
-  const std::string model = entry.at("model").get<std::string>();
-  if (model == "opencv_pinhole") {
-    lens.model = Lens::Model::Opencv;
-    lens.distortion = entry.at("distortion").get<std::array<double, 8>>();
-  } else if (model == "fisheye_polynomial") {
-    lens.model = Lens::Model::Fisheye;
-    lens.polynomial = entry.at("polynomial").get<std::array<double, 6>>();
-    lens.max_angle = entry.at("max_angle_rad").get<double>();
-  } else if (model != "pinhole") {
-    throw std::runtime_error("unknown lens model '" + model + "'");
-  }
-  return lens;
-}
-
 }  // namespace diorama::lint

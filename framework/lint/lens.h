@@ -29,11 +29,4 @@ struct Lens {
   std::optional<Vec3> direction(const Vec2& pixel) const;
 };
 
-/// Reads the "lens" entry that our writers put beside intrinsics; a missing one is a pinhole.
-/// Throws when it is damaged.
-Lens lens_of(const Json& holder, int width, int height, const Mat3& intrinsics);
-
-/// fx, fy, cx, cy in a matrix.
-Mat3 intrinsics_matrix(double fx, double fy, double cx, double cy);
-
 }  // namespace diorama::lint

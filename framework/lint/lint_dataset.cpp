@@ -28,9 +28,7 @@ struct Format {
 };
 
 constexpr std::array kFormats{
-    Format{"PoseWriter", &lint::lint_pose},
-    Format{"DataVisualizationWriter", &lint::lint_visualization}, Format{"BOP", &lint::lint_bop},
-    Format{"WebDataset", &lint::lint_webdataset}, Format{"HDF5", &lint::lint_hdf5}};
+    Format{"DataVisualizationWriter", &lint::lint_visualization}};
 
 std::string read_text(const std::filesystem::path& file) {
   std::error_code failed;

@@ -64,7 +64,7 @@ TEST_CASE("Every format that has a reader comes back", "[readers]") {
       }
     }
   }
-  CHECK(formats == 10);
+  CHECK(formats == 18);
 }
 
 TEST_CASE("A frame that differs is told", "[readers]") {

@@ -8,7 +8,6 @@
 #include "framework/lint/encoding_host.h"
 #include "framework/lint/every_format.h"
 #include "plugins/writer_support/sample_dataset.h"
-#include "writer_imagefolder/image_folder_writer.h"
 
 using namespace diorama;
 
@@ -31,8 +30,6 @@ void write_all(const std::filesystem::path& folder) {
   for (const test::SampleFormat& format : test::every_format()) {
     save(format.write(host, dataset, captures), folder / format.name);
   }
-  ImageFolderWriter image_folder({}, host);
-  save(test::write_dataset(image_folder, dataset, captures), folder / "imagefolder");
 }
 
 }  // namespace
