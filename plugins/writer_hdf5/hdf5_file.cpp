@@ -3,8 +3,10 @@
 
 #include <hdf5.h>
 
+#include <algorithm>
 #include <type_traits>
 #include <variant>
+#include <vector>
 
 #include "diorama/error.h"
 
@@ -28,24 +30,35 @@ class Handle {
   hid_t id_;
 };
 
-void write_array(hid_t file, const char* name, std::span<const std::size_t> shape, hid_t file_type,
-                 hid_t memory_type, const void* data) {
-  const std::vector<hsize_t> extent(shape.begin(), shape.end());
-  const Handle space(H5Screate_simple(int(extent.size()), extent.data(), nullptr), name);
-  const Handle properties(H5Pcreate(H5P_DATASET_CREATE), name);
-  H5Pset_obj_track_times(properties, false);
-  H5Pset_chunk(properties, int(extent.size()), extent.data());
-  H5Pset_deflate(properties, 4);
-  const Handle set(H5Dcreate2(file, name, file_type, space, H5P_DEFAULT, properties, H5P_DEFAULT),
-                   name);
-  if (H5Dwrite(set, memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0) {
-    throw Error(ErrorKind::Output, std::string("HDF5: cannot write ") + name);
+/// In a file, and in memory.
+struct NumberType {
+  hid_t file;
+  hid_t memory;
+  std::size_t size;
+};
+
+NumberType type_of(Hdf5File::Number number) {
+  switch (number) {
+    case Hdf5File::Number::U8:
+      return {H5T_STD_U8LE, H5T_NATIVE_UINT8, 1};
+    case Hdf5File::Number::U16:
+      return {H5T_STD_U16LE, H5T_NATIVE_UINT16, 2};
+    case Hdf5File::Number::U32:
+      return {H5T_STD_U32LE, H5T_NATIVE_UINT32, 4};
+    case Hdf5File::Number::F32:
+      return {H5T_IEEE_F32LE, H5T_NATIVE_FLOAT, 4};
+    case Hdf5File::Number::F64:
+      break;
   }
+  return {H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, 8};
 }
+
+/// Of a chunk: the library packs each in a buffer of its own.
+constexpr std::size_t kChunkBytes = std::size_t(1) << 19;
 
 hid_t create_in_memory() {
   const Handle access(H5Pcreate(H5P_FILE_ACCESS), "file properties");
-  constexpr std::size_t kGrowth = std::size_t(1) << 20;
+  constexpr std::size_t kGrowth = std::size_t(1) << 18;
   H5Pset_fapl_core(access, kGrowth, false);
   return H5Fcreate("diorama.hdf5", H5F_ACC_TRUNC, H5P_DEFAULT, access);
 }
@@ -58,21 +71,42 @@ Hdf5File::Hdf5File() : file_(create_in_memory()) {
 
 Hdf5File::~Hdf5File() { H5Fclose(file_); }
 
-void Hdf5File::add(const char* name, std::span<const std::size_t> shape, const std::uint8_t* data) {
-  write_array(file_, name, shape, H5T_STD_U8LE, H5T_NATIVE_UINT8, data);
-}
-
-void Hdf5File::add(const char* name, std::span<const std::size_t> shape,
-                   const std::uint16_t* data) {
-  write_array(file_, name, shape, H5T_STD_U16LE, H5T_NATIVE_UINT16, data);
-}
-
-void Hdf5File::add(const char* name, std::span<const std::size_t> shape, const float* data) {
-  write_array(file_, name, shape, H5T_IEEE_F32LE, H5T_NATIVE_FLOAT, data);
+void Hdf5File::add(const char* name, Number number, std::span<const std::size_t> shape,
+                   const Rows& rows) {
+  const NumberType type = type_of(number);
+  const std::vector<hsize_t> extent(shape.begin(), shape.end());
+  std::size_t row_size = type.size;
+  for (const std::size_t length : shape.subspan(1)) row_size *= length;
+  std::vector<hsize_t> chunk = extent;
+  const std::size_t rows_at_once = kChunkBytes / std::max<std::size_t>(row_size, 1);
+  chunk[0] = std::clamp<hsize_t>(rows_at_once, 1, std::max<hsize_t>(extent[0], 1));
+  const Handle space(H5Screate_simple(int(extent.size()), extent.data(), nullptr), name);
+  const Handle properties(H5Pcreate(H5P_DATASET_CREATE), name);
+  H5Pset_obj_track_times(properties, false);
+  H5Pset_chunk(properties, int(chunk.size()), chunk.data());
+  H5Pset_deflate(properties, 4);
+  // Chunks are written once and in order: none needs to be kept.
+  const Handle access(H5Pcreate(H5P_DATASET_ACCESS), name);
+  H5Pset_chunk_cache(access, 0, 0, 1.0);
+  const Handle set(H5Dcreate2(file_, name, type.file, space, H5P_DEFAULT, properties, access), name);
+  std::vector<hsize_t> start(extent.size(), 0);
+  std::vector<hsize_t> count = extent;
+  for (hsize_t row = 0; row < extent[0]; row += chunk[0]) {
+    start[0] = row;
+    count[0] = std::min(chunk[0], extent[0] - row);
+    const Handle memory(H5Screate_simple(int(count.size()), count.data(), nullptr), name);
+    H5Sselect_hyperslab(space, H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr);
+    const void* data = rows(std::size_t(row), std::size_t(count[0]));
+    if (H5Dwrite(set, type.memory, memory, space, H5P_DEFAULT, data) < 0) {
+      throw Error(ErrorKind::Output, std::string("HDF5: cannot write ") + name);
+    }
+  }
 }
 
 void Hdf5File::add(const char* name, std::span<const std::size_t> shape, const double* data) {
-  write_array(file_, name, shape, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, data);
+  std::size_t row = 1;
+  for (const std::size_t length : shape.subspan(1)) row *= length;
+  add(name, Number::F64, shape, [&](std::size_t first, std::size_t) { return data + first * row; });
 }
 
 void Hdf5File::add(const char* name, const AnyImage& any) {
@@ -83,14 +117,11 @@ void Hdf5File::add(const char* name, const AnyImage& any) {
         constexpr std::size_t kNumbers = sizeof(Pixel) / (kIsColor ? 1 : 4);
         const std::size_t shape[] = {std::size_t(image.height()), std::size_t(image.width()),
                                      kNumbers};
-        write_array(file_, name, std::span(shape).first(kNumbers > 1 ? 3 : 2),
-                    kIsColor ? H5T_STD_U8LE
-                    : kIsId  ? H5T_STD_U32LE
-                             : H5T_IEEE_F32LE,
-                    kIsColor ? H5T_NATIVE_UINT8
-                    : kIsId  ? H5T_NATIVE_UINT32
-                             : H5T_NATIVE_FLOAT,
-                    image.pixels().data());
+        add(name, kIsColor ? Number::U8 : kIsId ? Number::U32 : Number::F32,
+            std::span(shape).first(kNumbers > 1 ? 3 : 2),
+            [&](std::size_t first, std::size_t) -> const void* {
+              return image.pixels().data() + first * std::size_t(image.width());
+            });
       },
       any);
 }
@@ -110,14 +141,16 @@ void Hdf5File::add_text(const char* name, std::string_view text) {
   }
 }
 
-std::vector<std::byte> Hdf5File::bytes() {
+void Hdf5File::append_to(DatasetFiles& files, std::string_view path) {
   H5Fflush(file_, H5F_SCOPE_LOCAL);
   const ssize_t size = H5Fget_file_image(file_, nullptr, 0);
-  std::vector<std::byte> image(size < 0 ? 0 : std::size_t(size));
-  if (size <= 0 || H5Fget_file_image(file_, image.data(), image.size()) != size) {
+  // The file as it lies in memory: a copy would double it.
+  void* place = nullptr;
+  if (size <= 0 || H5Fget_vfd_handle(file_, H5P_DEFAULT, &place) < 0 || !place) {
     throw Error(ErrorKind::Output, "HDF5: cannot read the file back from memory");
   }
-  return image;
+  const auto* bytes = *static_cast<const std::byte* const*>(place);
+  files.append(path, {bytes, std::size_t(size)});
 }
 
 }  // namespace diorama

@@ -4,9 +4,9 @@
 #include <array>
 #include <map>
 #include <mutex>
+#include <span>
 
 #include "writer_hdf5/hdf5_file.h"
-#include "writer_support/image_files.h"
 #include "writer_support/lens_json.h"
 
 namespace diorama {
@@ -18,33 +18,39 @@ std::mutex& hdf5_mutex() {
   return mutex;
 }
 
-struct Segmentation {
-  std::vector<std::uint16_t> instances;
-  std::vector<std::uint16_t> categories;
-};
+using Number = Hdf5File::Number;
 
-Segmentation segmentation_of(const Frame& frame, const std::vector<TrainingObject>& objects) {
-  std::map<std::uint32_t, std::size_t> place;
-  for (std::size_t i = 0; i < objects.size(); ++i) place.emplace(objects[i].instance->id, i);
-  const auto ids = frame.get(kInstanceId).pixels();
-  Segmentation maps{std::vector<std::uint16_t>(ids.size(), 0),
-                    std::vector<std::uint16_t>(ids.size(), 0)};
-  for (std::size_t i = 0; i < ids.size(); ++i) {
-    const auto found = place.find(ids[i]);
-    if (found == place.end()) continue;
-    maps.instances[i] = std::uint16_t(found->second + 1);
-    maps.categories[i] = std::uint16_t(objects[found->second].class_index + 1);
-  }
-  return maps;
+/// Values of a picture, made of some rows at a time.
+template <class Value, class Pixel, class Make>
+void add_rows(Hdf5File& file, const char* name, Number number, const Image<Pixel>& image,
+              std::size_t values, Make&& make) {
+  const auto width = std::size_t(image.width());
+  const std::array shape{std::size_t(image.height()), width, values};
+  std::vector<Value> rows;
+  file.add(name, number, std::span(shape).first(values > 1 ? 3 : 2),
+           [&](std::size_t first, std::size_t count) -> const void* {
+             rows.clear();
+             const auto pixels = image.pixels().subspan(first * width, count * width);
+             for (const Pixel& pixel : pixels) make(pixel, rows);
+             return rows.data();
+           });
 }
 
-std::vector<float> mapped_normals(const Image<Vec3f>& normals) {
-  std::vector<float> values;
-  values.reserve(normals.pixels().size() * 3);
-  for (const Vec3f& normal : normals.pixels()) {
-    for (int axis = 0; axis < 3; ++axis) values.push_back(0.5f * (normal[axis] + 1.0f));
-  }
-  return values;
+void add_segmentation(Hdf5File& file, const Frame& frame,
+                      const std::vector<TrainingObject>& objects) {
+  std::map<std::uint32_t, std::size_t> place;
+  for (std::size_t i = 0; i < objects.size(); ++i) place.emplace(objects[i].instance->id, i);
+  const auto add = [&](const char* name, auto&& value_of) {
+    add_rows<std::uint16_t>(file, name, Number::U16, frame.get(kInstanceId), 1,
+                            [&](std::uint32_t id, std::vector<std::uint16_t>& rows) {
+                              const auto found = place.find(id);
+                              rows.push_back(found == place.end() ? std::uint16_t(0)
+                                                                  : value_of(found->second));
+                            });
+  };
+  add("instance_segmaps", [](std::size_t i) { return std::uint16_t(i + 1); });
+  add("category_id_segmaps",
+      [&](std::size_t i) { return std::uint16_t(objects[i].class_index + 1); });
 }
 
 Json attributes_json(const std::vector<TrainingObject>& objects,
@@ -105,28 +111,28 @@ void Hdf5Writer::begin(const DatasetInfo& dataset, DatasetFiles& files) {
       dataset, files);
 }
 
-std::vector<std::byte> Hdf5Writer::frame_file(const Frame& frame) const {
+void Hdf5Writer::write_frame(const Frame& frame, CaptureFiles& files,
+                             const std::string& path) const {
   const Camera& camera = frame.camera;
   const auto objects = training_.objects(frame);
-  const Segmentation segmentation = segmentation_of(frame, objects);
-  const auto h = std::size_t(camera.height);
-  const auto w = std::size_t(camera.width);
   const Intrinsics k = intrinsics_of(camera);
   const std::array<double, 9> intrinsics{k.fx, 0.0, k.cx, 0.0, k.fy, k.cy, 0.0, 0.0, 1.0};
   const Mat4 rows = frame.world_from_camera.matrix().transpose();  // Eigen keeps columns together
 
   const std::lock_guard lock(hdf5_mutex());
   Hdf5File file;
-  file.add("colors", std::array{h, w, std::size_t(3)}, without_alpha(frame.get(kColor)).data());
-  if (params_.depth) {
-    file.add("depth", std::array{h, w}, frame.get(kDistanceToImagePlane).pixels().data());
-  }
+  add_rows<std::uint8_t>(file, "colors", Number::U8, frame.get(kColor), 3,
+                         [](const Rgba8& pixel, std::vector<std::uint8_t>& to) {
+                           to.insert(to.end(), pixel.begin(), pixel.begin() + 3);
+                         });
+  if (params_.depth) file.add("depth", frame.image_named(kDistanceToImagePlane.name));
   if (params_.normals) {
-    file.add("normals", std::array{h, w, std::size_t(3)},
-             mapped_normals(frame.get(kNormals)).data());
+    add_rows<float>(file, "normals", Number::F32, frame.get(kNormals), 3,
+                    [](const Vec3f& normal, std::vector<float>& to) {
+                      for (int axis = 0; axis < 3; ++axis) to.push_back(0.5f * (normal[axis] + 1.0f));
+                    });
   }
-  file.add("instance_segmaps", std::array{h, w}, segmentation.instances.data());
-  file.add("category_id_segmaps", std::array{h, w}, segmentation.categories.data());
+  add_segmentation(file, frame, objects);
   for (const std::string& channel : params_.channels.names) {
     file.add(channel.c_str(), frame.image_named(channel));
   }
@@ -135,14 +141,14 @@ std::vector<std::byte> Hdf5Writer::frame_file(const Frame& frame) const {
   file.add_text("lens", python_json(lens_json(camera)));
   file.add_text("instance_attribute_maps",
                 python_json(attributes_json(objects, training_.classes())));
-  return file.bytes();
+  file.append_to(files, path);
 }
 
 void Hdf5Writer::write(const Capture& capture, CaptureFiles& files) const {
   for (const Frame& frame : capture.frames) {
-    files.add(std::string(training_.split(capture.index)) + "/" +
-                  training_.image_stem(capture, frame) + ".hdf5",
-              frame_file(frame));
+    write_frame(frame, files,
+                std::string(training_.split(capture.index)) + "/" +
+                    training_.image_stem(capture, frame) + ".hdf5");
   }
 }
 

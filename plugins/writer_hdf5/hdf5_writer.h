@@ -37,7 +37,7 @@ class Hdf5Writer final : public Writer {
   void write(const Capture& capture, CaptureFiles& files) const override;
 
  private:
-  std::vector<std::byte> frame_file(const Frame& frame) const;
+  void write_frame(const Frame& frame, CaptureFiles& files, const std::string& path) const;
 
   Params params_;
   TrainingData training_;

@@ -48,8 +48,10 @@ struct Table {
   std::string path() const { return folder + name; }
 };
 
-/// True for a folder in which there are pictures and nothing else.
-bool holds_pictures_only(const fs::path& folder) {
+/// True for a folder in which there are pictures and nothing else. Those of render products are
+/// none of classes.
+bool may_be_class(const fs::path& folder) {
+  if (folder.filename().string().starts_with("rp_")) return false;
   const auto names = names_in(folder);
   return !names.empty() && names_in(folder, true).empty() &&
          std::ranges::all_of(names, [](const std::string& name) {
@@ -61,7 +63,7 @@ bool holds_pictures_only(const fs::path& folder) {
 std::vector<std::string> class_folders(const fs::path& folder) {
   const auto below = names_in(folder, true);
   const bool are_classes = below.size() >= 2 && std::ranges::all_of(below, [&](const auto& name) {
-    return holds_pictures_only(folder / name);
+    return may_be_class(folder / name);
   });
   return are_classes ? below : std::vector<std::string>();
 }
@@ -140,7 +142,14 @@ class ImageFolder final : public StoredDataset {
       const std::string table = (split == "val" ? "validation" : split) + "/metadata.jsonl";
       files.check(files.has(table), kMissing, table, "", "the file is not there");
     }
-    files.check(files.has("README.md"), kMissing, "README.md", "", "the file is not there");
+    const auto card = files.text("README.md");
+    if (!card) return;
+    std::size_t number = 0;
+    for (const std::string& name : page_->classes) {
+      const std::string line = "\n" + std::to_string(number++) + ". " + name + "\n";
+      files.check(card->find(line) != card->npos, kIds, "README.md", "class '" + name + "'",
+                  "is not there with its number");
+    }
   }
 
   void list_class(std::uint32_t place) {

@@ -21,6 +21,7 @@ constexpr const char* kFormat = "PoseWriter";
 constexpr const char* kProject = "keypoints project onto their pixels";
 constexpr const char* kPose = "pose agrees with the keypoints";
 constexpr std::string_view kProduct = "rp_";
+constexpr std::string_view kOverlays = "overlay";  ///< Drawings: read, and nothing in a frame.
 /// Files that are looked at before it is decided by whose rules poses are.
 constexpr std::size_t kLookedAt = 16;
 
@@ -110,7 +111,7 @@ class PoseDataset final : public StoredDataset {
       if (!number_of(stem)) continue;
       if (is_overlay) {
         overlays.insert(stem);
-        has_overlays_ = true;
+        overlay_ending_ = picture.ending;
       }
       files.check(tables.contains(stem), kMissing, folder + stem + ".json", "",
                   "the file is not there", "one for " + folder + picture.stem + picture.ending);
@@ -158,9 +159,9 @@ class PoseDataset final : public StoredDataset {
     }
     frames_ = std::move(once);
     first_.push_back(frames_.size());
-    if (!has_overlays_) return;
+    if (overlay_ending_.empty()) return;
     for (const std::string& stem : lacking_) {
-      files.find(kMissing, stem + "_overlay.png", "", "the drawing is not there",
+      files.find(kMissing, stem + "_overlay" + overlay_ending_, "", "the drawing is not there",
                  "other pictures have one");
     }
   }
@@ -174,6 +175,7 @@ class PoseDataset final : public StoredDataset {
     info_.holds = {std::string(kHoldsInstances), std::string(kHoldsLabels),
                    std::string(kHoldsNodePaths), std::string(kHoldsOcclusion),
                    std::string(kHoldsCamera),    std::string(kHoldsCameraPose)};
+    if (!overlay_ending_.empty()) info_.holds.emplace(kOverlays);
     info_.steps[std::string(kHoldsOcclusion)] = 5.1e-4;
     // The view matrix has five decimals.
     info_.steps[std::string(kHoldsCameraPose)] = 2e-4;
@@ -268,7 +270,7 @@ class PoseDataset final : public StoredDataset {
   std::vector<std::size_t> first_;  ///< Per capture, and one behind the last.
   std::vector<std::string> cameras_;
   std::vector<std::string> lacking_;  ///< Stems without a drawing.
-  bool has_overlays_ = false;
+  std::string overlay_ending_;  ///< Empty: there are no drawings.
   bool has_layout_ = false;
   PoseLayout layout_ = PoseLayout::Full;
   bool is_swapped_ = false;  ///< Camera-frame poses are the reference's.
@@ -304,6 +306,7 @@ class PoseFrameReading {
       });
     }
     if (!has_size_) return std::nullopt;
+    check_overlay();
     if (!file) return std::move(frame_);
     file_ = std::move(*file);
     read_camera();
@@ -343,6 +346,15 @@ class PoseFrameReading {
       frame_.set(kColor, picture->color());
       sources.emplace(kColor.name, file);
     }
+  }
+
+  /// One that is not there was found when the folder was opened.
+  void check_overlay() {
+    if (!wants(kOverlays)) return;
+    const std::string file = dataset_.folders_[of_.folder] + of_.stem + "_overlay" +
+                             dataset_.overlay_ending_;
+    if (!files_.has(file)) return;
+    files_.picture_of_size(file, frame_.camera.width, frame_.camera.height, table_);
   }
 
   void set_light(const StoredPicture& picture, const std::string& file, Sources& sources) {
@@ -416,14 +428,27 @@ class PoseFrameReading {
     }
     if (object.camera_points.empty() || !object.size) return;
     Affine camera_from_box = Affine::Identity();
-    const Mat3 rotation = object.rotation.toRotationMatrix();
-    camera_from_box.linear() = dataset_.is_swapped_ ? unswapped(file_, rotation) : rotation;
+    camera_from_box.linear() = object.rotation.toRotationMatrix();
+    if (dataset_.is_swapped_) camera_from_box.linear() = turn_of_keypoints(object);
     for (std::size_t i = 0; i < file_.sides.size(); ++i) {
       if (file_.sides[i].isZero()) camera_from_box.translation() = object.camera_points[i];
     }
     instance.world_from_node = frame_.world_from_camera * camera_from_box;
     instance.bounds_node.add(-0.5 * *object.size);
     instance.bounds_node.add(0.5 * *object.size);
+  }
+
+  /// By the edges of the box; what is too thin for that is taken from the file.
+  Mat3 turn_of_keypoints(const StoredPose& object) const {
+    Mat3 turn = unswapped(file_, object.rotation.toRotationMatrix());
+    for (int axis = 0; axis < 3; ++axis) {
+      Vec3 along = Vec3::Zero();
+      for (std::size_t i = 0; i < file_.sides.size(); ++i) {
+        along += file_.sides[i][axis] * object.camera_points[i];
+      }
+      if (along.norm() > 1e-6) turn.col(axis) = along.normalized();
+    }
+    return turn;
   }
 
   /// Share of the box round the pixels that lies outside the picture.
@@ -547,7 +572,7 @@ class PoseFrameReading {
   }
 
   bool has_equal_scales(const StoredPose& object) const {
-    if (!object.world_from_local) return true;
+    if (!object.world_from_local) return false;
     const Vec3 scale = object.world_from_local->topLeftCorner<3, 3>().rowwise().norm();
     return scale.maxCoeff() - scale.minCoeff() <= 1e-3 * scale.maxCoeff();
   }
