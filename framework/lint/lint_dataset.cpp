@@ -27,8 +27,7 @@ struct Format {
   void (*lint)(Dataset&);
 };
 
-constexpr std::array kFormats{
-    Format{"DataVisualizationWriter", &lint::lint_visualization}};
+constexpr std::array kFormats{Format{"DataVisualizationWriter", &lint::lint_visualization}};
 
 std::string read_text(const std::filesystem::path& file) {
   std::error_code failed;

@@ -35,6 +35,12 @@ Affine affine_of_rows(const Json& rows) {
   return map;
 }
 
+Vec3 vector_of_json(const Json& list) {
+  const Vec3 v(list.at(0).get<double>(), list.at(1).get<double>(), list.at(2).get<double>());
+  if (!v.allFinite()) throw std::runtime_error("a vector has numbers that are not finite");
+  return v;
+}
+
 void require_usable(const Camera& camera) {
   const bool is_usable = std::isfinite(camera.fx) && std::isfinite(camera.fy) && camera.fx > 0.0 &&
                          camera.fy > 0.0 && std::isfinite(camera.cx) && std::isfinite(camera.cy);

@@ -14,6 +14,9 @@ void read_lens_entry(const Json& holder, Camera& camera);
 /// Row by row: four by four numbers in nested lists, the last row 0 0 0 1. Throws the same.
 Affine affine_of_rows(const Json& rows);
 
+/// Three finite numbers. Throws the same.
+Vec3 vector_of_json(const Json& list);
+
 /// Focal lengths of a camera that can see: finite and positive. Throws std::runtime_error.
 void require_usable(const Camera& camera);
 

@@ -17,9 +17,9 @@ struct JsonSpan {
 
 /// Walks through a file that holds one JSON object, however large, with one value in memory at a
 /// time. `visit(key, is_element, span, text)` is called for each value of the object; a list gives
-/// each of its elements instead (is_element), an empty one "[]" as a value. Texts are cut out by their brackets and quotes, and
-/// left to the caller to parse. Throws std::runtime_error: no object, cut short, a value above 1
-/// GiB.
+/// each of its elements instead (is_element), an empty one "[]" as a value. Texts are cut out by
+/// their brackets and quotes, and left to the caller to parse. Throws std::runtime_error: no
+/// object, cut short, a value above 1 GiB.
 using JsonVisitor = std::function<void(const std::string& key, bool is_element, JsonSpan span,
                                        std::string_view text)>;
 void visit_json_file(const std::filesystem::path& file, const JsonVisitor& visit);

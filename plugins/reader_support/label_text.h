@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -14,6 +15,8 @@ namespace diorama {
 std::vector<std::string> text_lines(std::string_view text);
 /// Split at blanks.
 std::vector<std::string> text_words(std::string_view line);
+/// FNV-1a: names by the million are told apart by their digests.
+std::uint64_t text_hash(std::string_view text);
 /// The whole word, finite.
 double number_of(std::string_view word);
 int integer_of(std::string_view word);

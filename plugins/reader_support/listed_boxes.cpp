@@ -8,7 +8,7 @@
 namespace diorama {
 namespace {
 
-constexpr std::array kLabelKeys{"category",   "categories", "label",  "labels",      "class",
+constexpr std::array kLabelKeys{"category",   "categories", "label",   "labels",      "class",
                                 "class_name", "name",       "classes", "category_id", "cls"};
 
 const Json* label_entry(const Json& object) {

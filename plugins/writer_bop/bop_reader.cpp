@@ -42,12 +42,6 @@ Mat3 matrix_of(const Json& list) {
   return matrix;
 }
 
-Vec3 vector_of(const Json& list) {
-  const Vec3 v(list.at(0).get<double>(), list.at(1).get<double>(), list.at(2).get<double>());
-  if (!v.allFinite()) throw std::runtime_error("a vector has numbers that are not finite");
-  return v;
-}
-
 /// Widths are differences of the first and the last pixel; nothing for what no pixel shows.
 std::optional<PixelBox> box_of(const Json& bbox) {
   std::array<int, 4> n{};
@@ -117,17 +111,18 @@ class BopDataset final : public StoredDataset {
                 "is of no camera that dataset.json has");
     if (!camera) return;
     if (page_) {
-      for (const auto& [has, name] : {std::pair(scene.has_cameras, "scene_camera"),
-                                      std::pair(scene.has_poses, "scene_gt"),
-                                      std::pair(scene.has_infos, "scene_gt_info")}) {
+      for (const auto& [has, name] :
+           {std::pair(scene.has_cameras, "scene_camera"), std::pair(scene.has_poses, "scene_gt"),
+            std::pair(scene.has_infos, "scene_gt_info")}) {
         files.check(has, kMissing, scene.table(name), "", "the file is not there");
       }
     }
-    const bool has_targets = page_ && scene.split == "test" && (scene.suffix.empty() || *camera == 0);
+    const bool has_targets =
+        page_ && scene.split == "test" && (scene.suffix.empty() || *camera == 0);
     std::map<int, std::vector<int>> objects;
     std::map<int, std::vector<double>> visible;
-    auto images = read_bop_tables(
-        scene, files, [&](bool is_info, int image, std::string_view text) {
+    auto images =
+        read_bop_tables(scene, files, [&](bool is_info, int image, std::string_view text) {
           if (!has_targets) return;
           const Json entry = parse_stored_json(text);
           if (is_info) {
@@ -210,9 +205,10 @@ class BopDataset final : public StoredDataset {
           found[{target.at("scene_id").get<int>(), target.at("im_id").get<int>(),
                  target.at("obj_id").get<int>()}] += target.at("inst_count").get<int>();
         }
-        files.check(found == expected, kCounts, file, "",
-                    "its targets are not the objects of test/*/scene_gt.json that are at least 10 % "
-                    "visible");
+        files.check(
+            found == expected, kCounts, file, "",
+            "its targets are not the objects of test/*/scene_gt.json that are at least 10 % "
+            "visible");
       });
     }
     files.json("test_targets_bop24.json");
@@ -239,9 +235,8 @@ class BopDataset final : public StoredDataset {
         image.capture = found->second;
       }
     }
-    std::ranges::stable_sort(images_, {}, [](const BopImage& image) {
-      return std::pair(image.capture, image.camera);
-    });
+    std::ranges::stable_sort(
+        images_, {}, [](const BopImage& image) { return std::pair(image.capture, image.camera); });
     std::vector<BopImage> once;
     for (const BopImage& image : images_) {
       const bool is_again = !once.empty() && once.back().capture == image.capture &&
@@ -448,13 +443,14 @@ class BopImageReading {
       if (json.contains("cam_R_w2c")) {
         Affine bop_from_world = Affine::Identity();
         bop_from_world.linear() = matrix_of(json.at("cam_R_w2c"));
-        bop_from_world.translation() = kMetres * vector_of(json.at("cam_t_w2c"));
+        bop_from_world.translation() = kMetres * vector_of_json(json.at("cam_t_w2c"));
         files_.check(is_rotation(bop_from_world.linear(), is_own_ ? 1e-6 : 1e-2), kPose, table, who,
                      "cam_R_w2c is not a rotation");
         frame_.world_from_camera = (camera_from_bop() * bop_from_world).inverse();
         sources.emplace(kHoldsCameraPose, table);
       }
-      const double scale = json.contains("depth_scale") ? json.at("depth_scale").get<double>() : 1.0;
+      const double scale =
+          json.contains("depth_scale") ? json.at("depth_scale").get<double>() : 1.0;
       if (!(scale > 0.0) || !std::isfinite(scale)) {
         throw std::runtime_error(who + ": depth_scale is " + std::to_string(scale));
       }
@@ -495,8 +491,8 @@ class BopImageReading {
       Instance instance;
       instance.id = std::uint32_t(i) + 1;
       instance.node_path = "/Assets/" + std::to_string(i + 1);
-      files_.reading(table, [&] { read_pose(poses[i], who + ", object " + std::to_string(i),
-                                            instance); });
+      files_.reading(table,
+                     [&] { read_pose(poses[i], who + ", object " + std::to_string(i), instance); });
       masks_.emplace_back();
       const bool has_info = image_.has_infos && i < infos.size();
       files_.reading(info_table, [&] {
@@ -522,17 +518,18 @@ class BopImageReading {
     files_.check(is_first, kOnce, table, who, instance.node_path + " is there a second time");
     Affine bop_from_model = Affine::Identity();
     bop_from_model.linear() = matrix_of(pose.at("cam_R_m2c"));
-    bop_from_model.translation() = kMetres * vector_of(pose.at("cam_t_m2c"));
+    bop_from_model.translation() = kMetres * vector_of_json(pose.at("cam_t_m2c"));
     files_.check(is_rotation(bop_from_model.linear(), is_own_ ? 1e-4 : 1e-2), kPose, table, who,
                  "cam_R_m2c is not a rotation");
     // Models are as large as their objects; what our writer's objects are scaled by stands beside.
-    const Vec3 scale = pose.contains("scale") ? vector_of(pose.at("scale")) : Vec3(Vec3::Ones());
+    const Vec3 scale =
+        pose.contains("scale") ? vector_of_json(pose.at("scale")) : Vec3(Vec3::Ones());
     if ((scale.array() == 0.0).any()) throw std::runtime_error(who + ": a scale is 0");
     instance.world_from_node =
         frame_.world_from_camera * camera_from_bop() * bop_from_model * Eigen::Scaling(scale);
     Aabb box;
     if (pose.contains("bounds_min")) {
-      box = {vector_of(pose.at("bounds_min")), vector_of(pose.at("bounds_max"))};
+      box = {vector_of_json(pose.at("bounds_min")), vector_of_json(pose.at("bounds_max"))};
       if (model != dataset_.models_.end()) {
         const double slack = 1e-5 * model->second.size().norm();
         files_.check(((box.min - model->second.min).array() >= -slack).all() &&
@@ -549,8 +546,8 @@ class BopImageReading {
 
   /// The pixels of a mask; nothing when it is not there or of another size.
   std::optional<CoverageMask> mask_of(const std::string& file) {
-    const auto picture = files_.picture_of_size(file, frame_.camera.width, frame_.camera.height,
-                                                "the picture");
+    const auto picture =
+        files_.picture_of_size(file, frame_.camera.width, frame_.camera.height, "the picture");
     if (!picture) return std::nullopt;
     CoverageMask mask;
     mask.box = {0, 0, picture->width(), picture->height()};
@@ -571,8 +568,7 @@ class BopImageReading {
     return mask.cropped(extent);
   }
 
-  void read_masks(std::size_t place, const Json& info, const std::string& who,
-                  Instance& instance) {
+  void read_masks(std::size_t place, const Json& info, const std::string& who, Instance& instance) {
     const std::string table = scene_.table("scene_gt_info");
     const std::string name = stem_ + "_" + zero_padded(int(place), 6) + ".png";
     const bool wants_masks = wants(kInstanceId.name) || wants("amodal_mask") ||
@@ -629,10 +625,9 @@ class BopImageReading {
     const bool is_whole = inside == *box;
     const int slack = is_own_ ? 0 : 1;
     // What is cut off may be wider than what is left.
-    const bool is_within = mask.box.x_min >= inside.x_min - slack &&
-                           mask.box.y_min >= inside.y_min - slack &&
-                           mask.box.x_max <= inside.x_max + slack &&
-                           mask.box.y_max <= inside.y_max + slack;
+    const bool is_within =
+        mask.box.x_min >= inside.x_min - slack && mask.box.y_min >= inside.y_min - slack &&
+        mask.box.x_max <= inside.x_max + slack && mask.box.y_max <= inside.y_max + slack;
     const bool fits = is_whole && is_own_ ? *box == mask.box : count == 0 || is_within;
     files_.check(fits, kBox, table, who, "its bbox_obj is " + box_text(*box),
                  "its mask extends over " + box_text(mask.box));
@@ -652,9 +647,8 @@ class BopImageReading {
     }
     files_.check(is_own_ && depth_ ? valid == measured : valid >= 0 && valid <= all, kArea, table,
                  who, "its px_count_valid is " + std::to_string(valid),
-                 is_own_ && depth_
-                     ? std::to_string(measured) + " pixels of its mask have a depth"
-                     : "at most px_count_all");
+                 is_own_ && depth_ ? std::to_string(measured) + " pixels of its mask have a depth"
+                                   : "at most px_count_all");
   }
 
   /// Ids, once all masks are known.

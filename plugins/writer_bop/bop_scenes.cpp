@@ -44,8 +44,8 @@ void add_scenes(const fs::path& root, const std::string& folder, const std::stri
       suffixes.insert(*suffix);
     }
   }
-  if (suffixes.empty() && (has(folders, "rgb") || has(folders, "gray")) && is_number(
-          fs::path(folder).parent_path().filename().string())) {
+  if (suffixes.empty() && (has(folders, "rgb") || has(folders, "gray")) &&
+      is_number(fs::path(folder).parent_path().filename().string())) {
     suffixes.insert("");
   }
   for (const std::string& suffix : suffixes) {

@@ -37,7 +37,7 @@ struct BopScene {
 /// one.
 struct BopImage {
   std::uint32_t scene = 0;
-  std::int32_t image = 0;    ///< im_id
+  std::int32_t image = 0;  ///< im_id
   std::int32_t capture = 0;
   std::uint32_t camera = 0;
   JsonSpan camera_entry;

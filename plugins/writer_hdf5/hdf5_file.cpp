@@ -88,7 +88,8 @@ void Hdf5File::add(const char* name, Number number, std::span<const std::size_t>
   // Chunks are written once and in order: none needs to be kept.
   const Handle access(H5Pcreate(H5P_DATASET_ACCESS), name);
   H5Pset_chunk_cache(access, 0, 0, 1.0);
-  const Handle set(H5Dcreate2(file_, name, type.file, space, H5P_DEFAULT, properties, access), name);
+  const Handle set(H5Dcreate2(file_, name, type.file, space, H5P_DEFAULT, properties, access),
+                   name);
   std::vector<hsize_t> start(extent.size(), 0);
   std::vector<hsize_t> count = extent;
   for (hsize_t row = 0; row < extent[0]; row += chunk[0]) {
@@ -117,7 +118,10 @@ void Hdf5File::add(const char* name, const AnyImage& any) {
         constexpr std::size_t kNumbers = sizeof(Pixel) / (kIsColor ? 1 : 4);
         const std::size_t shape[] = {std::size_t(image.height()), std::size_t(image.width()),
                                      kNumbers};
-        add(name, kIsColor ? Number::U8 : kIsId ? Number::U32 : Number::F32,
+        add(name,
+            kIsColor ? Number::U8
+            : kIsId  ? Number::U32
+                     : Number::F32,
             std::span(shape).first(kNumbers > 1 ? 3 : 2),
             [&](std::size_t first, std::size_t) -> const void* {
               return image.pixels().data() + first * std::size_t(image.width());

@@ -14,9 +14,9 @@
 namespace diorama {
 
 /// An HDF5 file that is made in memory, compressed as it grows. Data sets are in chunks of whole
-/// rows and carry no times, so the same content gives the same bytes. Only one thread of the process
-/// may be between the constructor and the end of the destructor: Debian's HDF5 is not built for
-/// threads. Throws Error(Output) that names the data set when the library fails.
+/// rows and carry no times, so the same content gives the same bytes. Only one thread of the
+/// process may be between the constructor and the end of the destructor: Debian's HDF5 is not built
+/// for threads. Throws Error(Output) that names the data set when the library fails.
 class Hdf5File {
  public:
   Hdf5File();

@@ -417,24 +417,18 @@ class Hdf5PictureReading {
       const auto category = object.at("category_id").get<std::int64_t>();
       categories_[id] = category;
       const auto& classes = dataset_.info_.classes;
-      files_.check(!dataset_.page_ || (category >= 1 && std::size_t(category) <= classes.size() &&
-                                       classes[std::size_t(category - 1)] ==
-                                           instance.labels.at("class")),
-                   kIds, file_, who, "its category_id is " + std::to_string(category),
-                   "the place of '" + instance.labels.at("class") + "' in the classes");
+      files_.check(
+          !dataset_.page_ || (category >= 1 && std::size_t(category) <= classes.size() &&
+                              classes[std::size_t(category - 1)] == instance.labels.at("class")),
+          kIds, file_, who, "its category_id is " + std::to_string(category),
+          "the place of '" + instance.labels.at("class") + "' in the classes");
     }
     if (object.contains("world_from_node")) {
       instance.world_from_node = affine_of_rows(object.at("world_from_node"));
-      instance.bounds_node = {vector_of(object.at("bounds_min")),
-                              vector_of(object.at("bounds_max"))};
+      instance.bounds_node = {vector_of_json(object.at("bounds_min")),
+                              vector_of_json(object.at("bounds_max"))};
     }
     frame_.instances.push_back(std::move(instance));
-  }
-
-  static Vec3 vector_of(const Json& list) {
-    const Vec3 v(list.at(0).get<double>(), list.at(1).get<double>(), list.at(2).get<double>());
-    if (!v.allFinite()) throw std::runtime_error("a bound is not finite");
-    return v;
   }
 
   /// The name that attributes give, else the category's number.

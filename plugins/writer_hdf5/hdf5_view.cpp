@@ -275,8 +275,9 @@ void Hdf5View::read_message(std::size_t type, std::size_t flags, std::uint64_t a
     case 0x02:
       if (!group) return;
       if (u64(at + 2 + ((u8(at + 1) & 1) != 0 ? 8 : 0)) != kUndefined) {
-        throw std::runtime_error("keeps the names of its data sets in a heap of many, which is "
-                                 "not understood");
+        throw std::runtime_error(
+            "keeps the names of its data sets in a heap of many, which is "
+            "not understood");
       }
       return;
     case 0x03:
@@ -367,11 +368,11 @@ void Hdf5View::read_type(std::uint64_t at, DataSet& set) const {
     set.is_variable_text = true;
     letter = 'S';
   }
-  const bool is_known = letter == 'S' || (letter == 'f' && (set.item_size == 2 || set.item_size == 4 ||
-                                                            set.item_size == 8)) ||
-                        ((letter == 'i' || letter == 'u') &&
-                         (set.item_size == 1 || set.item_size == 2 || set.item_size == 4 ||
-                          set.item_size == 8));
+  const bool is_known =
+      letter == 'S' ||
+      (letter == 'f' && (set.item_size == 2 || set.item_size == 4 || set.item_size == 8)) ||
+      ((letter == 'i' || letter == 'u') &&
+       (set.item_size == 1 || set.item_size == 2 || set.item_size == 4 || set.item_size == 8));
   if (!is_known || set.item_size == 0) {
     throw std::runtime_error("has a type that is not understood");
   }
@@ -430,8 +431,9 @@ void Hdf5View::read_new_chunks(std::uint64_t at, DataSet& set) const {
     set.layout = Layout::FixedArray;
     ++place;  // bits of a page, which the array's own header says, too
   } else {
-    throw std::runtime_error("has an index of chunks that is not understood; h5repack --low=0 "
-                             "--high=0 writes one that is");
+    throw std::runtime_error(
+        "has an index of chunks that is not understood; h5repack --low=0 "
+        "--high=0 writes one that is");
   }
   set.address = u64(place);
 }
@@ -597,8 +599,9 @@ std::vector<Hdf5View::Chunk> Hdf5View::fixed_array(const DataSet& set, std::size
     throw std::runtime_error("has an index of another number of chunks");
   }
   if (page_bits < 63 && entries > (std::uint64_t(1) << page_bits)) {
-    throw std::runtime_error("has an index of chunks in pages, which is not understood; h5repack "
-                             "--low=0 --high=0 writes another");
+    throw std::runtime_error(
+        "has an index of chunks in pages, which is not understood; h5repack "
+        "--low=0 --high=0 writes another");
   }
   std::vector<Chunk> chunks;
   if (block == kUndefined) return chunks;
@@ -705,7 +708,8 @@ std::string Hdf5View::text(std::string_view name) const {
       const std::size_t index = u16(at);
       const std::uint64_t size = u64(at + 8);
       check_place(at + 16, size);
-      if (index == wanted && index != 0) return std::string(part(at + 16, std::min<std::uint64_t>(length, size)));
+      if (index == wanted && index != 0)
+        return std::string(part(at + 16, std::min<std::uint64_t>(length, size)));
       if (index == 0) break;
       at += 16 + (size + 7) / 8 * 8;
     }

@@ -41,12 +41,12 @@ void add_segmentation(Hdf5File& file, const Frame& frame,
   std::map<std::uint32_t, std::size_t> place;
   for (std::size_t i = 0; i < objects.size(); ++i) place.emplace(objects[i].instance->id, i);
   const auto add = [&](const char* name, auto&& value_of) {
-    add_rows<std::uint16_t>(file, name, Number::U16, frame.get(kInstanceId), 1,
-                            [&](std::uint32_t id, std::vector<std::uint16_t>& rows) {
-                              const auto found = place.find(id);
-                              rows.push_back(found == place.end() ? std::uint16_t(0)
-                                                                  : value_of(found->second));
-                            });
+    add_rows<std::uint16_t>(
+        file, name, Number::U16, frame.get(kInstanceId), 1,
+        [&](std::uint32_t id, std::vector<std::uint16_t>& rows) {
+          const auto found = place.find(id);
+          rows.push_back(found == place.end() ? std::uint16_t(0) : value_of(found->second));
+        });
   };
   add("instance_segmaps", [](std::size_t i) { return std::uint16_t(i + 1); });
   add("category_id_segmaps",
@@ -129,7 +129,8 @@ void Hdf5Writer::write_frame(const Frame& frame, CaptureFiles& files,
   if (params_.normals) {
     add_rows<float>(file, "normals", Number::F32, frame.get(kNormals), 3,
                     [](const Vec3f& normal, std::vector<float>& to) {
-                      for (int axis = 0; axis < 3; ++axis) to.push_back(0.5f * (normal[axis] + 1.0f));
+                      for (int axis = 0; axis < 3; ++axis)
+                        to.push_back(0.5f * (normal[axis] + 1.0f));
                     });
   }
   add_segmentation(file, frame, objects);

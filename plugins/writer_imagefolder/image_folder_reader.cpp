@@ -7,6 +7,7 @@
 #include <set>
 
 #include "diorama/error.h"
+#include "reader_support/label_text.h"
 #include "reader_support/listed_boxes.h"
 #include "reader_support/picture_list.h"
 #include "writer_imagefolder/metadata_lines.h"
@@ -22,7 +23,8 @@ constexpr const char* kTables[] = {"metadata.jsonl", "metadata.csv"};
 /// The library's name of a split; empty for other folders.
 std::string split_of(const std::string& folder) {
   if (folder == "train" || folder == "training") return "train";
-  if (folder == "validation" || folder == "valid" || folder == "val" || folder == "dev") return "val";
+  if (folder == "validation" || folder == "valid" || folder == "val" || folder == "dev")
+    return "val";
   if (folder == "test" || folder == "testing" || folder == "eval") return "test";
   return {};
 }
@@ -42,7 +44,7 @@ struct Table {
   std::string folder;  ///< With a '/' behind; empty: the dataset's own.
   std::string name;    ///< Empty: the folder of a class.
   std::string split;
-  std::string label;  ///< Of a class folder.
+  std::string label;                 ///< Of a class folder.
   std::vector<std::string> columns;  ///< Of .csv.
 
   std::string path() const { return folder + name; }
@@ -63,8 +65,8 @@ bool may_be_class(const fs::path& folder) {
 std::vector<std::string> class_folders(const fs::path& folder) {
   const auto below = names_in(folder, true);
   const bool are_classes = below.size() >= 2 && std::ranges::all_of(below, [&](const auto& name) {
-    return may_be_class(folder / name);
-  });
+                             return may_be_class(folder / name);
+                           });
   return are_classes ? below : std::vector<std::string>();
 }
 
@@ -163,8 +165,7 @@ class ImageFolder final : public StoredDataset {
   }
 
   Json row_json(const Table& table, const std::string& row) const {
-    const Json json =
-        is_csv(table.name) ? json_of_csv(table.columns, row) : parse_stored_json(row);
+    const Json json = is_csv(table.name) ? json_of_csv(table.columns, row) : parse_stored_json(row);
     if (!json.is_object()) throw std::runtime_error("a row is no JSON object");
     return json;
   }
@@ -194,7 +195,7 @@ class ImageFolder final : public StoredDataset {
         files.reading(path, [&] {
           const Json json = row_json(table, row);
           const std::string name = file_name(json);
-          files.check(known.insert(hash_of(name)).second, kOnce, path, who,
+          files.check(known.insert(text_hash(name)).second, kOnce, path, who,
                       "'" + name + "' is there a second time");
           Entry entry{place, span, "", 0, 0};
           if (page_) {
@@ -211,29 +212,23 @@ class ImageFolder final : public StoredDataset {
     });
     for (const ListedPicture& picture : pictures_in(folder_ / table.folder, 0)) {
       const std::string name = picture.stem + picture.ending;
-      files.check(known.contains(hash_of(name)), kMissing, path, name, "the picture has no row");
+      files.check(known.contains(text_hash(name)), kMissing, path, name, "the picture has no row");
     }
-  }
-
-  static std::uint64_t hash_of(const std::string& text) {
-    std::uint64_t hash = 0xcbf29ce484222325ull;
-    for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3ull;
-    return hash;
   }
 
   void group(StoredFiles& files) {
     if (!page_) {
       for (std::size_t i = 0; i < entries_.size(); ++i) entries_[i].capture = std::int32_t(i);
     }
-    std::ranges::stable_sort(entries_, {}, [](const Entry& entry) {
-      return std::pair(entry.capture, entry.camera);
-    });
+    std::ranges::stable_sort(
+        entries_, {}, [](const Entry& entry) { return std::pair(entry.capture, entry.camera); });
     std::vector<Entry> once;
     for (Entry& entry : entries_) {
       const bool is_again = !once.empty() && once.back().capture == entry.capture &&
                             once.back().camera == entry.camera;
       files.check(!is_again, kOnce, tables_[entry.table].path(),
-                  "capture " + std::to_string(entry.capture), "is there a second time by one camera");
+                  "capture " + std::to_string(entry.capture),
+                  "is there a second time by one camera");
       if (is_again) continue;
       if (once.empty() || once.back().capture != entry.capture) first_.push_back(once.size());
       once.push_back(std::move(entry));
@@ -332,8 +327,7 @@ class ImageFolderReading {
     if (!table_.name.empty()) {
       is_good = false;
       files_.reading(table_.path(), [&] {
-        row_ = dataset_.row_json(table_,
-                                 read_row(dataset_.folder_ / table_.path(), entry_.row));
+        row_ = dataset_.row_json(table_, read_row(dataset_.folder_ / table_.path(), entry_.row));
         const fs::path name = fs::path(ImageFolder::file_name(row_)).lexically_normal();
         if (name.is_absolute() || name.empty() || *name.begin() == "..") {
           throw std::runtime_error("'" + name.string() + "' lies outside of the dataset");
@@ -382,8 +376,8 @@ class ImageFolderReading {
       const std::string who = file + ", object " + std::to_string(place);
       if (dataset_.page_) {
         const auto& classes = dataset_.classes_;
-        files_.check(std::ranges::find(classes, listed.label) != classes.end(), kIds,
-                     table_.path(), who, "its category '" + listed.label + "' is none");
+        files_.check(std::ranges::find(classes, listed.label) != classes.end(), kIds, table_.path(),
+                     who, "its category '" + listed.label + "' is none");
       }
       if (listed.box) check_box(*listed.box, who);
       if (has_shares) {
@@ -428,15 +422,14 @@ class ImageFolderReading {
                  "a box with pixels inside the image");
   }
 
-  void read_share(const Json& area, const Json& share, const std::string& who,
-                  Instance& instance) {
+  void read_share(const Json& area, const Json& share, const std::string& who, Instance& instance) {
     const auto visible = area.get<std::int64_t>();
     const double visible_share = share.get<double>();
     const auto box = instance.tight_box;
-    files_.check(visible > 0 && box &&
-                     visible <= std::int64_t(box->width()) * std::int64_t(box->height()),
-                 kAmodal, table_.path(), who, "its area is " + std::to_string(visible),
-                 "above 0, at most that of its box");
+    files_.check(
+        visible > 0 && box && visible <= std::int64_t(box->width()) * std::int64_t(box->height()),
+        kAmodal, table_.path(), who, "its area is " + std::to_string(visible),
+        "above 0, at most that of its box");
     files_.check(visible_share > 0.0 && visible_share <= 1.0, kAmodal, table_.path(), who,
                  "its visible_share is " + std::to_string(visible_share), "above 0, at most 1");
     if (visible <= 0 || !(visible_share > 0.0 && visible_share <= 1.0)) return;
@@ -473,9 +466,8 @@ StoredCapture ImageFolder::read(std::size_t i, const NameSet& wanted) const {
 }  // namespace
 
 std::vector<std::string> ImageFolderReader::patterns() const {
-  return {"metadata.jsonl", "metadata.csv", "*/metadata.jsonl", "*/metadata.csv",
-          "*/*.png",        "*/*.jpg",      "*/*.jpeg",         "*/*/*.png",
-          "*/*/*.jpg",      "*/*/*.jpeg"};
+  return {"metadata.jsonl", "metadata.csv", "*/metadata.jsonl", "*/metadata.csv", "*/*.png",
+          "*/*.jpg",        "*/*.jpeg",     "*/*/*.png",        "*/*/*.jpg",      "*/*/*.jpeg"};
 }
 
 Recognition ImageFolderReader::recognise(const fs::path& folder) const {

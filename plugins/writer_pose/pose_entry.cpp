@@ -19,11 +19,6 @@ double finite(double value) {
   return value;
 }
 
-Vec3 vector_of(const Json& list) {
-  return {finite(list.at(0).get<double>()), finite(list.at(1).get<double>()),
-          finite(list.at(2).get<double>())};
-}
-
 template <int kRows>
 Eigen::Matrix<double, kRows, kRows> rows_of(const Json& rows) {
   Eigen::Matrix<double, kRows, kRows> matrix;
@@ -48,7 +43,7 @@ Vec3 side_of(const std::string& name) {
 
 std::vector<Vec3> points_of(const Json& list, std::size_t count) {
   std::vector<Vec3> points;
-  for (const Json& point : list) points.push_back(vector_of(point));
+  for (const Json& point : list) points.push_back(vector_of_json(point));
   if (points.size() != count) {
     throw std::runtime_error("has " + std::to_string(points.size()) + " keypoints of " +
                              std::to_string(count));
@@ -82,23 +77,23 @@ StoredPose pose_of(const Json& json, StoredPoseFile& file) {
     pose.pixels = pixels_of(json.at("cuboid_keypoints_projected"), count);
     pose.camera_points = points_of(json.at("cuboid_keypoints_camera_frame"), count);
     pose.world_points = points_of(json.at("cuboid_keypoints_world_frame"), count);
-    pose.location = vector_of(json.at("location_camera_frame"));
+    pose.location = vector_of_json(json.at("location_camera_frame"));
     pose.rotation = quaternion(json.at("quat_wxyz_camera_frame"), true);
-    pose.size = vector_of(json.at("size"));
+    pose.size = vector_of_json(json.at("size"));
     pose.world_from_local = rows_of<4>(json.at("local_to_world_transform"));
-    pose.world_location = vector_of(json.at("location_world_frame"));
+    pose.world_location = vector_of_json(json.at("location_world_frame"));
     pose.world_rotation = quaternion(json.at("quat_wxyz_world_frame"), true);
     pose.world_matrix = rows_of<3>(json.at("rotation_matrix_world_frame"));
     pose.camera_matrix = rows_of<3>(json.at("rotation_matrix_camera_frame"));
     return pose;
   }
   pose.pixels = pixels_of(json.at("projected_cuboid"), count);
-  pose.location = vector_of(json.at("location"));
+  pose.location = vector_of_json(json.at("location"));
   pose.rotation = quaternion(json.at("quaternion_xyzw"), false);
   file.layout = json.contains("keypoints_3d") ? PoseLayout::CenterPose : PoseLayout::Dope;
   if (file.layout == PoseLayout::CenterPose) {
     pose.camera_points = points_of(json.at("keypoints_3d"), count);
-    pose.size = vector_of(json.at("scale"));
+    pose.size = vector_of_json(json.at("scale"));
   }
   return pose;
 }
@@ -118,8 +113,8 @@ double corner_miss(const StoredPoseFile& file, const StoredPose& object, const M
 }
 
 /// DOPE's files say neither size nor keypoints in space. Pixels and rotation must leave room for
-/// some box: its middle c and half size h solve, for every keypoint, d x (c + R (side h)) = 0 with d
-/// the direction of the pixel. Both are found but for a common factor.
+/// some box: its middle c and half size h solve, for every keypoint, d x (c + R (side h)) = 0 with
+/// d the direction of the pixel. Both are found but for a common factor.
 std::optional<double> ray_miss(const StoredPoseFile& file, const StoredPose& object,
                                const Mat3& rotation) {
   Eigen::MatrixXd equations(3 * Eigen::Index(file.sides.size()), 6);

@@ -18,11 +18,11 @@ struct StoredPose {
   std::string path;
   double visibility = 0.0;
   std::optional<double> truncation;
-  std::vector<Vec2> pixels;  ///< Of the keypoints, in their order.
+  std::vector<Vec2> pixels;      ///< Of the keypoints, in their order.
   Vec3 location = Vec3::Zero();  ///< Camera frame, as it stands there.
   Quat rotation = Quat::Identity();
-  std::optional<Vec3> size;            ///< Not in DOPE's layout.
-  std::vector<Vec3> camera_points;     ///< Nor are these.
+  std::optional<Vec3> size;              ///< Not in DOPE's layout.
+  std::vector<Vec3> camera_points;       ///< Nor are these.
   std::optional<Mat4> world_from_local;  ///< Full layout only, as the ones below.
   std::vector<Vec3> world_points;
   Vec3 world_location = Vec3::Zero();
@@ -34,8 +34,8 @@ struct StoredPose {
 /// A file.
 struct StoredPoseFile {
   PoseLayout layout = PoseLayout::Full;
-  Camera camera;          ///< Width 0 where the file does not say one.
-  Camera projection;      ///< By the projection matrix: what the reference's own pixels follow.
+  Camera camera;      ///< Width 0 where the file does not say one.
+  Camera projection;  ///< By the projection matrix: what the reference's own pixels follow.
   Mat4 view = Mat4::Identity();  ///< World to camera.
   std::vector<Vec3> sides;       ///< Of the keypoints: -1, 0 or 1 along each axis.
   std::vector<StoredPose> objects;

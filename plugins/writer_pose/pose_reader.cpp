@@ -144,9 +144,8 @@ class PoseDataset final : public StoredDataset {
       if (found == cameras_.end()) found = cameras_.insert(cameras_.end(), name);
       frame.camera = std::uint32_t(found - cameras_.begin());
     }
-    std::ranges::stable_sort(frames_, {}, [](const PoseFrame& frame) {
-      return std::pair(frame.capture, frame.camera);
-    });
+    std::ranges::stable_sort(
+        frames_, {}, [](const PoseFrame& frame) { return std::pair(frame.capture, frame.camera); });
     std::vector<PoseFrame> once;
     for (PoseFrame& frame : frames_) {
       const bool is_again = !once.empty() && once.back().capture == frame.capture &&
@@ -270,7 +269,7 @@ class PoseDataset final : public StoredDataset {
   std::vector<std::size_t> first_;  ///< Per capture, and one behind the last.
   std::vector<std::string> cameras_;
   std::vector<std::string> lacking_;  ///< Stems without a drawing.
-  std::string overlay_ending_;  ///< Empty: there are no drawings.
+  std::string overlay_ending_;        ///< Empty: there are no drawings.
   bool has_layout_ = false;
   PoseLayout layout_ = PoseLayout::Full;
   bool is_swapped_ = false;  ///< Camera-frame poses are the reference's.
@@ -333,9 +332,9 @@ class PoseFrameReading {
                  "the picture is not there", "one for " + table_);
     if (file.empty()) return;
     if (has_size_ && !wants(kColor.name) && !wants(kColorHdr.name)) return;
-    const auto picture = has_size_ ? files_.picture_of_size(file, frame_.camera.width,
-                                                            frame_.camera.height, table_)
-                                   : files_.picture(file);
+    const auto picture =
+        has_size_ ? files_.picture_of_size(file, frame_.camera.width, frame_.camera.height, table_)
+                  : files_.picture(file);
     if (!picture) return;
     frame_.camera.width = picture->width();
     frame_.camera.height = picture->height();
@@ -351,8 +350,8 @@ class PoseFrameReading {
   /// One that is not there was found when the folder was opened.
   void check_overlay() {
     if (!wants(kOverlays)) return;
-    const std::string file = dataset_.folders_[of_.folder] + of_.stem + "_overlay" +
-                             dataset_.overlay_ending_;
+    const std::string file =
+        dataset_.folders_[of_.folder] + of_.stem + "_overlay" + dataset_.overlay_ending_;
     if (!files_.has(file)) return;
     files_.picture_of_size(file, frame_.camera.width, frame_.camera.height, table_);
   }
@@ -360,7 +359,8 @@ class PoseFrameReading {
   void set_light(const StoredPicture& picture, const std::string& file, Sources& sources) {
     files_.reading(file, [&] {
       const auto& floats = picture.texture->floats;
-      if (floats.empty() || picture.channels() < 3) throw std::runtime_error("has no three channels");
+      if (floats.empty() || picture.channels() < 3)
+        throw std::runtime_error("has no three channels");
       Image<Vec3f> light(picture.width(), picture.height(), Vec3f::Zero());
       const auto channels = std::size_t(picture.channels());
       for (std::size_t i = 0; i < light.pixels().size(); ++i) {
@@ -382,9 +382,9 @@ class PoseFrameReading {
     Affine camera_from_world = Affine::Identity();
     camera_from_world.matrix() = file_.view.transpose();
     const Mat3 turn = camera_from_world.linear();
-    files_.check((turn * turn.transpose() - Mat3::Identity()).norm() < 1e-3 &&
-                     turn.determinant() > 0.0,
-                 kPose, table_, "", "its view matrix is no rotation and shift");
+    files_.check(
+        (turn * turn.transpose() - Mat3::Identity()).norm() < 1e-3 && turn.determinant() > 0.0,
+        kPose, table_, "", "its view matrix is no rotation and shift");
     const Mat3 rotation = Transform::from_affine(camera_from_world).rotation.toRotationMatrix();
     frame_.world_from_camera.linear() = rotation.transpose();
     frame_.world_from_camera.translation() =
@@ -525,9 +525,9 @@ class PoseFrameReading {
       worst = std::max(worst, (mapped(world, corner) - object.world_points[i]).norm());
     }
     const double slack = 1e-4 * (1.0 + object.size->norm());
-    check(std::isfinite(worst) && worst <= slack,
-          "local_to_world_transform puts a corner " + std::to_string(worst) +
-              " m beside its keypoint");
+    check(std::isfinite(worst) && worst <= slack, "local_to_world_transform puts a corner " +
+                                                      std::to_string(worst) +
+                                                      " m beside its keypoint");
     check((box.size().cwiseProduct(scale) - *object.size).norm() <= slack,
           "its size is not that of its keypoints");
   }

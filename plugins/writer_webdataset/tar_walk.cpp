@@ -115,7 +115,8 @@ std::optional<TarMember> TarWalk::next() {
     if (size > size_ - begin) throw std::runtime_error(name + " is cut short");
     at_ = begin + (size + kBlock - 1) / kBlock * kBlock;
     if (is_extra) {
-      if (size > kMostName) throw std::runtime_error("a name has " + std::to_string(size) + " bytes");
+      if (size > kMostName)
+        throw std::runtime_error("a name has " + std::to_string(size) + " bytes");
       if (type == 'L') long_name_ = text_of(bytes(begin, size));
       if (type == 'x') read_pax(bytes(begin, size));
       continue;

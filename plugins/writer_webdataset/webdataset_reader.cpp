@@ -82,12 +82,6 @@ std::string split_in(const std::string& path) {
   return {};
 }
 
-std::uint64_t hash_of(const std::string& text) {
-  std::uint64_t hash = 0xcbf29ce484222325ull;
-  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3ull;
-  return hash;
-}
-
 struct Sample {
   std::uint64_t offset = 0;
   std::uint32_t shard = 0;
@@ -142,7 +136,7 @@ class WebDataset final : public StoredDataset {
             files.check(key < names->key, kOrder, file, names->key, "stands behind " + key);
           }
           key = names->key;
-          hashes.push_back(hash_of(key));
+          hashes.push_back(text_hash(key));
           samples_.push_back({member->header, shard, 0, 0, 0});
           number(samples_.back(), key, files);
         }
@@ -220,8 +214,9 @@ class WebDataset final : public StoredDataset {
       const bool is_again = !once.empty() && once.back().capture == sample.capture &&
                             once.back().camera == sample.camera;
       files.check(!is_again, kOnce, shards_[sample.shard], "",
-                  "capture " + std::to_string(sample.capture) + " is there a second time by one "
-                  "camera",
+                  "capture " + std::to_string(sample.capture) +
+                      " is there a second time by one "
+                      "camera",
                   is_again ? "only in " + shards_[once.back().shard] : "");
       if (is_again) continue;
       if (once.empty() || once.back().capture != sample.capture) first_.push_back(once.size());
@@ -288,11 +283,10 @@ class WebDataset final : public StoredDataset {
       const Json json = parse_stored_json(members.at("json"));
       if (is_own(json)) {
         has_own_json_ = true;
-        info_.holds.insert({std::string(kHoldsInstances), std::string(kHoldsLabels),
-                            std::string(kHoldsNodePaths), std::string(kHoldsTightBoxes),
-                            std::string(kHoldsPoses), std::string(kHoldsBounds),
-                            std::string(kHoldsBoxes3d), std::string(kHoldsCamera),
-                            std::string(kHoldsCameraPose)});
+        info_.holds.insert(
+            {std::string(kHoldsInstances), std::string(kHoldsLabels), std::string(kHoldsNodePaths),
+             std::string(kHoldsTightBoxes), std::string(kHoldsPoses), std::string(kHoldsBounds),
+             std::string(kHoldsBoxes3d), std::string(kHoldsCamera), std::string(kHoldsCameraPose)});
         for (const Json& object : json.at("objects")) {
           if (!object.contains("visible_share")) continue;
           info_.holds.insert({std::string(kHoldsOcclusion), std::string(kHoldsTruncation)});
@@ -524,12 +518,6 @@ class SampleReading {
     }
   }
 
-  static Vec3 vector_of(const Json& list) {
-    const Vec3 v(list.at(0).get<double>(), list.at(1).get<double>(), list.at(2).get<double>());
-    if (!v.allFinite()) throw std::runtime_error("a bound is not finite");
-    return v;
-  }
-
   void read_own() {
     files_.check(json_.at("capture").get<std::int64_t>() == sample_.capture || !dataset_.page_,
                  kCounts, file_, key_, "its json says capture " + json_.at("capture").dump());
@@ -584,7 +572,8 @@ class SampleReading {
     instance.tight_box = PixelBox{box.at(0).get<int>(), box.at(1).get<int>(), box.at(2).get<int>(),
                                   box.at(3).get<int>()};
     instance.world_from_node = affine_of_rows(object.at("world_from_node"));
-    instance.bounds_node = {vector_of(object.at("bounds_min")), vector_of(object.at("bounds_max"))};
+    instance.bounds_node = {vector_of_json(object.at("bounds_min")),
+                            vector_of_json(object.at("bounds_max"))};
     const auto visible = object.at("visible_px").get<std::int64_t>();
     if (frame_.has(kInstanceId.name)) {
       const auto found = counts.find(instance.id);

@@ -345,8 +345,9 @@ TEST_CASE("Image folders with metadata in lines, in columns, and with a folder p
     const test::TemporaryFolder folder;
     folder.write("a.png", png);
     folder.write("b.png", png);
-    folder.write("metadata.csv", "file_name,text,label\na.png,\"one, \"\"two\"\"\nthree\",cat\n"
-                                 "b.png,plain,dog\n");
+    folder.write("metadata.csv",
+                 "file_name,text,label\na.png,\"one, \"\"two\"\"\nthree\",cat\n"
+                 "b.png,plain,dog\n");
     const Opened opened(folder, "ImageFolderReader");
     REQUIRE(opened.dataset->info().captures.size() == 2);
     CHECK(opened.read(1).capture.frames.at(0).instances.at(0).labels.at("class") == "dog");

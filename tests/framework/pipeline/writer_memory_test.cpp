@@ -15,6 +15,7 @@
 #include "support/catch.h"
 #include "writer_bop/bop_writer.h"
 #include "writer_coco/coco_writer.h"
+#include "writer_hdf5/hdf5_writer.h"
 #include "writer_imagefolder/image_folder_writer.h"
 #include "writer_voc/voc_writer.h"
 
@@ -48,11 +49,9 @@ void write_dataset(Writer& writer, Capture& capture, DatasetInfo dataset, int ca
   store.commit_finish(finish);
 }
 
-/// The most memory, in KiB, of a process that writes so many captures.
+/// The most memory, in KiB, of a process that writes so many captures like `capture`.
 template <class W>
-long peak_kib(int captures) {
-  static const test::SampleScene sample(24, 16, 1);
-  static Capture capture = test::ray_cast_capture(sample, 0);
+long peak_kib(int captures, const test::SampleScene& sample, Capture& capture) {
   std::string folder = (fs::temp_directory_path() / "diorama-memory-XXXXXX").string();
   REQUIRE(::mkdtemp(folder.data()) != nullptr);
   const pid_t child = ::fork();
@@ -75,6 +74,40 @@ long peak_kib(int captures) {
   return usage.ru_maxrss;
 }
 
+template <class W>
+long peak_kib(int captures) {
+  static const test::SampleScene sample(24, 16, 1);
+  static Capture capture = test::ray_cast_capture(sample, 0);
+  return peak_kib<W>(captures, sample, capture);
+}
+
+/// A frame as large as cameras are, with surfaces that are neither flat nor noise.
+Capture large_capture(const test::SampleScene& sample, int size) {
+  Capture capture = test::ray_cast_capture(sample, 0);
+  Frame& frame = capture.frames.at(0);
+  const auto ids = frame.get(kInstanceId).pixels();
+  Image<Rgba8> color(size, size, {0, 0, 0, 255});
+  Image<float> depth(size, size, 0.0f);
+  Image<Vec3f> normals(size, size, Vec3f::Zero());
+  Image<std::uint32_t> instances(size, size, 0);
+  for (int y = 0; y < size; ++y) {
+    for (int x = 0; x < size; ++x) {
+      const auto grain = std::uint8_t((x * 7 + y * 13) % 5);
+      color.at(x, y) = {std::uint8_t(x / 9 + grain), std::uint8_t(y / 11), grain, 255};
+      depth.at(x, y) = 1.0f + 0.001f * float(x / 4) + 0.002f * float(y / 4);
+      normals.at(x, y) =
+          Vec3f(0.1f * float(x / 64 % 9), 0.05f * float(y / 64 % 9), 1.0f).normalized();
+      instances.at(x, y) = ids[std::size_t(x / 256 + y / 256 * 8) % ids.size()];
+    }
+  }
+  frame.camera.width = frame.camera.height = size;
+  frame.set(kColor, std::move(color));
+  frame.set(kDistanceToImagePlane, std::move(depth));
+  frame.set(kNormals, std::move(normals));
+  frame.set(kInstanceId, std::move(instances));
+  return capture;
+}
+
 /// What may grow: the buffers of files that grow, and the store's list of captures.
 template <class W>
 void check_flat(const char* name) {
@@ -92,4 +125,14 @@ TEST_CASE("a writer's memory does not grow with the number of captures", "[write
   check_flat<CocoWriter>("CocoWriter");
   check_flat<ImageFolderWriter>("ImageFolderWriter");
   check_flat<VocWriter>("VocWriter");
+}
+
+TEST_CASE("an HDF5 file of a large camera needs little beside its frame", "[writers][slow]") {
+  const test::SampleScene sample(24, 16, 1);
+  Capture capture = large_capture(sample, 2048);
+  // The frame is there in both processes; nothing is written in the first one.
+  const long without = peak_kib<Hdf5Writer>(0, sample, capture);
+  const long with = peak_kib<Hdf5Writer>(1, sample, capture);
+  INFO(without << " KiB with the frame alone, " << with << " KiB with a file of it");
+  CHECK(with - without < 32 * 1024);
 }
