@@ -6,10 +6,10 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <span>
 #include <sstream>
 
 #include "diorama/error.h"
-#include "framework/config/json_text.h"
 #include "framework/images/image_codecs.h"
 
 namespace diorama::lint {
@@ -56,12 +56,6 @@ std::string between(const std::string& text, const std::string& before, const st
 }
 
 }  // namespace
-
-std::uint32_t Picture::packed(int x, int y) const {
-  std::uint32_t value = 0;
-  for (int c = channels - 1; c >= 0; --c) value = (value << (channels == 1 ? 16 : 8)) | at(x, y, c);
-  return value;
-}
 
 std::size_t NpyArray::count() const {
   std::size_t product = 1;
@@ -170,17 +164,6 @@ std::optional<std::string> Dataset::text(const std::string& file) {
   return std::move(content).str();
 }
 
-std::optional<Json> Dataset::json(const std::string& file) {
-  const auto content = text(file);
-  if (!content) return std::nullopt;
-  try {
-    return parse_json(*content);
-  } catch (const std::exception& error) {
-    find("every file can be read", file, error.what());
-    return std::nullopt;
-  }
-}
-
 std::optional<Picture> Dataset::picture(const std::string& file) {
   const auto content = text(file);
   if (!content) return std::nullopt;
@@ -195,65 +178,11 @@ std::optional<Picture> Dataset::picture(const std::string& file) {
   }
 }
 
-std::optional<NpyArray> Dataset::npy(const std::string& file) {
-  const auto content = text(file);
-  if (!content) return std::nullopt;
-  try {
-    return parse_npy(*content);
-  } catch (const std::exception& error) {
-    find("every file can be read", file, error.what());
-    return std::nullopt;
-  }
-}
-
 void Dataset::reading(const std::string& file, const std::function<void()>& body) {
   try {
     body();
   } catch (const std::exception& error) {
     find("every file can be read", file, error.what());
-  }
-}
-
-void Extent::add(int x, int y) {
-  box.x_min = std::min(box.x_min, x);
-  box.y_min = std::min(box.y_min, y);
-  box.x_max = std::max(box.x_max, x + 1);
-  box.y_max = std::max(box.y_max, y + 1);
-  ++count;
-}
-
-std::map<std::uint32_t, Extent> extents(const Picture& picture) {
-  std::map<std::uint32_t, Extent> result;
-  for (int y = 0; y < picture.height; ++y) {
-    Extent* last = nullptr;
-    std::uint32_t last_value = 0;
-    for (int x = 0; x < picture.width; ++x) {
-      const std::uint32_t value = picture.packed(x, y);
-      if (last == nullptr || value != last_value) {
-        last = &result[value];
-        last_value = value;
-      }
-      last->add(x, y);
-    }
-  }
-  return result;
-}
-
-void check_lines(Dataset& dataset, const std::string& file, const std::vector<std::string>& lines) {
-  const auto text = dataset.text(file);
-  if (!text) return;
-  std::string expected;
-  for (const std::string& line : lines) expected += line + "\n";
-  dataset.check(
-      *text == expected, "counts agree between files", file,
-      "does not hold the " + std::to_string(lines.size()) + " lines that follow from dataset.json");
-}
-
-void check_all_or_none(Dataset& dataset, const std::vector<std::string>& files) {
-  const auto is_there = [&](const std::string& file) { return dataset.has(file); };
-  if (std::ranges::none_of(files, is_there)) return;
-  for (const std::string& file : files) {
-    dataset.check(is_there(file), "nothing is missing", file, "other pictures have such a file");
   }
 }
 

@@ -5,10 +5,7 @@
 #include <cstring>
 #include <filesystem>
 #include <functional>
-#include <map>
-#include <nlohmann/json.hpp>
 #include <optional>
-#include <set>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -19,8 +16,6 @@
 
 /// How lint reads: every reader reports what it cannot read as a finding and returns nothing.
 namespace diorama::lint {
-
-using Json = nlohmann::json;
 
 /// Decoded samples of a picture.
 struct Picture {
@@ -37,11 +32,6 @@ struct Picture {
     return samples[(std::size_t(y) * std::size_t(width) + std::size_t(x)) * std::size_t(channels) +
                    std::size_t(c)];
   }
-  bool has_size_of(const Picture& other) const {
-    return width == other.width && height == other.height;
-  }
-  /// All channels of a pixel in one number, the first in the lowest eight (or sixteen) bits.
-  std::uint32_t packed(int x, int y) const;
 };
 
 /// One column of a structured array, or a plain one.
@@ -77,10 +67,8 @@ class Dataset {
   void find(const char* rule, const std::string& file, const std::string& message);
 
   std::optional<std::string> text(const std::string& file);
-  std::optional<Json> json(const std::string& file);
   std::optional<Picture> picture(const std::string& file);
-  std::optional<NpyArray> npy(const std::string& file);
-  /// Runs `body`; a JSON access or number that fails inside becomes a finding about `file`.
+  /// Runs `body`; what it throws becomes a finding about `file`.
   void reading(const std::string& file, const std::function<void()>& body);
 
  private:
@@ -96,22 +84,6 @@ std::size_t checked_size(const NpyArray& array, std::size_t most);
 /// Throws std::runtime_error that says what is wrong.
 NpyArray parse_npy(const std::string& bytes);
 Picture parse_picture(const std::string& bytes, const std::string& name);
-
-/// Half-open extent of a set of pixels.
-struct Extent {
-  PixelBox box{1 << 30, 1 << 30, 0, 0};
-  std::int64_t count = 0;
-
-  void add(int x, int y);
-};
-/// Extents by value of Picture::packed().
-std::map<std::uint32_t, Extent> extents(const Picture& picture);
-
-/// Checks that a text file holds exactly these lines.
-void check_lines(Dataset& dataset, const std::string& file, const std::vector<std::string>& lines);
-
-/// Files that all pictures have or none: reports those that some lack.
-void check_all_or_none(Dataset& dataset, const std::vector<std::string>& files);
 
 std::string box_text(const PixelBox& box);  ///< "[3, 5, 10, 12)".
 

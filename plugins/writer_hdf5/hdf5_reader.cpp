@@ -206,8 +206,8 @@ class Hdf5PictureReading {
                    "other files have it");
     }
     if (!read_size()) return std::nullopt;
-    read_pictures();
     read_camera();
+    read_pictures();
     read_objects();
     for (const std::string& name : dataset_.info_.holds) sources.emplace(name, file_);
     return std::move(frame_);
@@ -217,6 +217,8 @@ class Hdf5PictureReading {
   bool wants(std::string_view name) const {
     return wanted_.contains(name) && dataset_.info_.holds.contains(name);
   }
+
+  bool is_own() const { return view_->has("world_from_camera"); }
 
   /// Runs `body` for a data set that is there; what it throws is a finding about it.
   void with(const char* name, const std::function<void()>& body) {
@@ -284,7 +286,7 @@ class Hdf5PictureReading {
     with(name, [&] {
       auto image = floats_of_array(view_->read(name));
       if (!has_size(name, image)) return;
-      if (!dataset_.page_) {
+      if (!is_own()) {
         for (float& value : image.pixels()) {
           if (value == 0.0f || value > kNothingBeyond) {
             value = std::numeric_limits<float>::infinity();
@@ -302,10 +304,13 @@ class Hdf5PictureReading {
     auto* image = any ? std::get_if<Image<Vec3f>>(&*any) : nullptr;
     if (!image) throw std::runtime_error(array_text(array) + " is no picture of normals");
     if (!has_size("normals", *image)) return;
-    // What is nothing differs: the middle here, black there.
+    // Ours are in the world, and the middle where nothing is; BlenderProc's in the camera's axes,
+    // and black.
+    const Eigen::Matrix3f turn = frame_.world_from_camera.linear().cast<float>();
     for (Vec3f& normal : image->pixels()) {
-      const bool is_none = normal == Vec3f::Zero() && !dataset_.page_;
+      const bool is_none = normal == Vec3f::Zero() && !is_own();
       normal = is_none ? Vec3f(Vec3f::Zero()) : Vec3f(2.0f * normal - Vec3f::Ones());
+      if (!is_own()) normal = turn * normal;
     }
     frame_.set(kNormals, std::move(*image));
   }

@@ -8,7 +8,7 @@
 
 using namespace diorama;
 using namespace diorama::test;
-using lint::Json;
+using Json = nlohmann::json;
 using lint::NpyArray;
 
 namespace {

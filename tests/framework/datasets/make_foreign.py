@@ -16,8 +16,8 @@ except ImportError:
 HEIGHT, WIDTH = 30, 44
 
 
-def pictures():
-    rng = np.random.default_rng(5)
+def pictures(seed):
+    rng = np.random.default_rng(seed)
     ids = np.zeros((HEIGHT, WIDTH), np.int64)
     ids[4:14, 6:20] = 1
     ids[10:25, 25:40] = 7
@@ -30,9 +30,9 @@ def pictures():
     return colors, depth, normals, ids
 
 
-def write_blenderproc(path, how):
+def write_blenderproc(path, how, seed):
     """The names and types of BlenderProc's writer."""
-    colors, depth, normals, ids = pictures()
+    colors, depth, normals, ids = pictures(seed)
     attributes = [
         {"idx": 0, "category_id": 0, "name": "background"},
         {"idx": 1, "category_id": 3, "name": "Suzanne"},
@@ -72,7 +72,7 @@ def make_hdf5(folder):
             how["packed"] = dict(how["packed"])
     # Numbers without zeros in front: 2 comes before 10.
     for place, how in enumerate(ways):
-        write_blenderproc(os.path.join(folder, f"{place * 5}.hdf5"), how)
+        write_blenderproc(os.path.join(folder, f"{place * 5}.hdf5"), how, place)
 
 
 def make_pieces(folder):
@@ -103,9 +103,11 @@ def npy(array):
 
 
 def make_tar(folder):
-    with open(os.path.join(folder, "picture.png"), "rb") as file:
-        picture = file.read()
-    os.remove(os.path.join(folder, "picture.png"))
+    pictures = []
+    for name in sorted(os.listdir(folder)):
+        with open(os.path.join(folder, name), "rb") as file:
+            pictures.append(file.read())
+        os.remove(os.path.join(folder, name))
     for part, count in (("train", 3), ("val", 1)):
         for shard in range(2):
             form = tarfile.PAX_FORMAT if shard == 0 else tarfile.GNU_FORMAT
@@ -117,7 +119,7 @@ def make_tar(folder):
                 for i in range(count):
                     # Long enough for what ustar cannot say.
                     key = "images/" + "a" * 120 + f"/{shard}_{i:04d}"
-                    add(archive, key + ".IMAGE.PNG", picture)
+                    add(archive, key + ".IMAGE.PNG", pictures.pop())
                     add(archive, key + ".cls", b"3")
                     add(archive, key + ".txt", "ein Becher für Tee".encode())
                     add(archive, key + ".embedding.npy", npy(np.zeros(8, np.float16)))
