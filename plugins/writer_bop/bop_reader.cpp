@@ -273,13 +273,13 @@ class BopDataset final : public StoredDataset {
     hold(any(&BopScene::has_poses) && any(&BopScene::has_infos), {kHoldsTightBoxes});
     hold(any(&BopScene::has_infos) && any(&BopScene::has_masks),
          {"amodal_mask", kHoldsOcclusion, kHoldsTruncation, kHoldsAmodalBoxes});
-    for (const BopImage& image : images_) {
-      if (look_at(image)) break;
-    }
+    constexpr std::size_t kLookedAt = 1000;
     double scale = 0.0;
-    for (const BopImage& image : images_) {
-      scale = depth_scale_of(image);
-      if (scale > 0.0) break;
+    bool has_seen = false;
+    for (std::size_t i = 0; i < std::min(images_.size(), kLookedAt); ++i) {
+      has_seen = has_seen || look_at(images_[i]);
+      if (!(scale > 0.0)) scale = depth_scale_of(images_[i]);
+      if (has_seen && scale > 0.0) break;
     }
     info_.steps[std::string(kDistanceToImagePlane.name)] = 0.5 * kMetres * scale;
     if (!page_) {

@@ -36,19 +36,28 @@ std::string said_writer(const fs::path& folder) {
   }
 }
 
-/// Cameras of the run that a folder is of, in their order.
-std::vector<std::string> cameras_of_run(const fs::path& folder) {
-  for (const fs::path& place : {folder, folder / ".."}) {
+/// What the page of the run says that a folder is of.
+struct RunPage {
+  std::vector<std::string> cameras;
+  int captures = 0;
+};
+
+std::optional<RunPage> page_of_run(const fs::path& folder) {
+  for (const fs::path& place : {folder, folder / "..", folder / "../.."}) {
     try {
       const Json page =
           parse_stored_json(read_whole_file(place / "dataset.json", std::uintmax_t(256) << 20));
       if (!page.is_object() || !page.contains("writers") || !page.contains("cameras")) continue;
-      return page.at("cameras").get<std::vector<std::string>>();
+      RunPage run{page.at("cameras").get<std::vector<std::string>>(),
+                  page.at("captures").get<int>()};
+      constexpr int kMostCaptures = 10'000'000;
+      if (run.cameras.empty() || run.captures < 0 || run.captures > kMostCaptures) continue;
+      return run;
     } catch (const std::exception&) {
       continue;
     }
   }
-  return {};
+  return std::nullopt;
 }
 
 std::optional<int> number_of(const std::string& stem) {
@@ -125,8 +134,9 @@ class PoseDataset final : public StoredDataset {
   void group(StoredFiles& files) {
     const bool is_flat =
         std::ranges::any_of(frames_, [](const PoseFrame& frame) { return frame.folder == 0; });
+    const auto run = page_of_run(folder_);
+    if (run) cameras_ = run->cameras;
     if (is_flat) {
-      cameras_ = cameras_of_run(folder_);
       if (cameras_.empty()) cameras_ = {"camera"};
       const auto count = std::int32_t(cameras_.size());
       for (PoseFrame& frame : frames_) {
@@ -152,12 +162,10 @@ class PoseDataset final : public StoredDataset {
                             once.back().camera == frame.camera;
       files.check(!is_again, kOnce, folders_[frame.folder] + frame.stem + ".json", "",
                   "its number is there a second time");
-      if (is_again) continue;
-      if (once.empty() || once.back().capture != frame.capture) first_.push_back(once.size());
-      once.push_back(std::move(frame));
+      if (!is_again) once.push_back(std::move(frame));
     }
     frames_ = std::move(once);
-    first_.push_back(frames_.size());
+    number_captures(run ? run->captures : 0);
     if (overlay_ending_.empty()) return;
     for (const std::string& stem : lacking_) {
       files.find(kMissing, stem + "_overlay" + overlay_ending_, "", "the drawing is not there",
@@ -165,12 +173,26 @@ class PoseDataset final : public StoredDataset {
     }
   }
 
+  /// Captures of a run that the writer left out, because nothing is in sight, have no frames.
+  void number_captures(int planned) {
+    const bool is_plan = frames_.empty() || frames_.back().capture < planned;
+    for (int capture = 0; is_plan && capture < planned; ++capture) {
+      info_.captures.push_back(capture);
+    }
+    for (const PoseFrame& frame : frames_) {
+      const bool is_new = info_.captures.empty() || info_.captures.back() < frame.capture;
+      if (is_new) info_.captures.push_back(frame.capture);
+    }
+    for (const int capture : info_.captures) {
+      const auto first = std::ranges::lower_bound(frames_, capture, {}, &PoseFrame::capture);
+      first_.push_back(std::size_t(first - frames_.begin()));
+    }
+    first_.push_back(frames_.size());
+  }
+
   void describe() {
     info_.format = kFormat;
     info_.camera_names = cameras_;
-    for (std::size_t i = 0; i + 1 < first_.size(); ++i) {
-      info_.captures.push_back(frames_[first_[i]].capture);
-    }
     info_.holds = {std::string(kHoldsInstances), std::string(kHoldsLabels),
                    std::string(kHoldsNodePaths), std::string(kHoldsOcclusion),
                    std::string(kHoldsCamera),    std::string(kHoldsCameraPose)};

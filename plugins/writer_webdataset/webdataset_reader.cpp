@@ -427,7 +427,7 @@ class SampleReading {
     if (ending == "instances.png") return wants(kInstanceId.name);
     if (ending.ends_with(".npy")) {
       const std::string name = ending.substr(0, ending.size() - 4);
-      return dataset_.channels_.contains(name) ? wants(name) : wants(kColor.name);
+      return dataset_.channels_.contains(name) && wants(name);
     }
     return is_picture_of_colors(ending) && (wants(kColor.name) || !dataset_.has_own_json_);
   }
