@@ -8,6 +8,7 @@
 #include "framework/lint/every_format.h"
 #include "plugins/writer_support/sample_dataset.h"
 #include "support/catch.h"
+#include "writer_pose/pose_writer.h"
 
 using namespace diorama;
 
@@ -65,6 +66,29 @@ TEST_CASE("Every format that has a reader comes back", "[readers]") {
     }
   }
   CHECK(formats == 18);
+}
+
+TEST_CASE("Cameras that take turns in one folder are told by the run's page", "[readers]") {
+  test::EncodingHost host;
+  test::MemoryFiles run;
+  for (const auto& [path, bytes] : test::write_sample<PoseWriter>({}, host).files) {
+    run.files["poses/" + path] = bytes;
+  }
+  const test::DatasetOnDisk disk(run);
+  DatasetReaders readers = test::every_reader(host);
+  const auto open = [&] { return readers.open(disk.folder() / "poses", "PoseReader"); };
+  CHECK(open()->info().camera_names == std::vector<std::string>{"camera"});
+  CHECK(open()->info().captures.size() == 6);
+  // A capture that nothing shows has no files.
+  disk.write("dataset.json", R"({"writers": [], "cameras": ["cam_0", "cam_1"], "captures": 4})");
+  const auto dataset = open();
+  CHECK(dataset->info().camera_names == std::vector<std::string>{"cam_0", "cam_1"});
+  REQUIRE(dataset->info().captures == std::vector<int>{0, 1, 2, 3});
+  const StoredCapture stored = dataset->read(2, dataset->info().holds);
+  REQUIRE(stored.capture.frames.size() == 2);
+  CHECK(frame_differences(dataset->info(), test::sample_captures()[2].frames[1],
+                          stored.capture.frames[1]) == std::vector<std::string>{});
+  CHECK(dataset->read(3, dataset->info().holds).capture.frames.empty());
 }
 
 TEST_CASE("A frame that differs is told", "[readers]") {
