@@ -569,8 +569,12 @@ class SampleReading {
                  kIds, file_, key_ + ", " + who, "its class_index is " + std::to_string(index),
                  "the place of '" + instance.labels.at("class") + "' in the classes");
     const Json& box = object.at("box");
-    instance.tight_box = PixelBox{box.at(0).get<int>(), box.at(1).get<int>(), box.at(2).get<int>(),
-                                  box.at(3).get<int>()};
+    const auto edge = [&](std::size_t i) {
+      const auto value = box.at(i).get<std::int64_t>();
+      if (std::abs(value) > 100'000'000) throw std::runtime_error("a box is beyond reason");
+      return int(value);
+    };
+    instance.tight_box = PixelBox{edge(0), edge(1), edge(2), edge(3)};
     instance.world_from_node = affine_of_rows(object.at("world_from_node"));
     instance.bounds_node = {vector_of_json(object.at("bounds_min")),
                             vector_of_json(object.at("bounds_max"))};

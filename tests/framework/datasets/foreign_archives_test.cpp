@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <cstring>
 #include <fstream>
 #include <limits>
-#include <numeric>
 #include <sstream>
 
 #include "framework/datasets/dataset_readers.h"
