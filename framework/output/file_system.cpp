@@ -18,12 +18,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
+bool is_gone(int error_number) { return error_number == ENOENT || error_number == ENOTDIR; }
+
 [[noreturn]] void fail(const std::string& what, const fs::path& path, int error_number) {
   const std::error_code code(error_number, std::generic_category());
-  throw Error(ErrorKind::Output, what + " " + path.string() + ": " + code.message());
+  const std::string text = what + " " + path.string() + ": " + code.message();
+  if (error_number == ENOENT) throw NotThere(ErrorKind::Output, text);
+  throw Error(ErrorKind::Output, text);
 }
-
-bool is_gone(int error_number) { return error_number == ENOENT || error_number == ENOTDIR; }
 
 /// Closes on every way out; close() itself may report what write() did not.
 class OpenFile {

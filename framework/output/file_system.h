@@ -37,6 +37,12 @@ class FileLock {
   virtual ~FileLock();
 };
 
+/// A file or its folder is not there, or not any more.
+class NotThere final : public Error {
+ public:
+  using Error::Error;
+};
+
 /// What the output store does to the disk; an interface so that tests can make any step fail, lose
 /// what was not synced, and run many processes on one disk. Every function throws Error(Output)
 /// naming the path and the system's reason. Safe from any thread.
@@ -80,7 +86,8 @@ class FileSystem {
   bool exists(const std::filesystem::path& path) { return status(path).has_value(); }
 };
 
-/// Makes something in a folder that other processes may remove while it is empty.
+/// Makes something in a folder that other processes may remove while it is empty, and make again.
+/// What `action` needs elsewhere and others may remove, it makes itself.
 template <class Action>
 auto in_folder(FileSystem& file_system, const std::filesystem::path& folder, Action action) {
   constexpr int kAttempts = 100;
@@ -88,8 +95,8 @@ auto in_folder(FileSystem& file_system, const std::filesystem::path& folder, Act
     file_system.make_folders(folder);
     try {
       return action();
-    } catch (const Error&) {
-      if (attempt == kAttempts || file_system.exists(folder)) throw;
+    } catch (const NotThere&) {
+      if (attempt == kAttempts) throw;
     }
   }
 }

@@ -203,9 +203,11 @@ std::optional<Workers::Lease> Workers::claim(const std::string& task) {
     const fs::path draft =
         folder_ / "workers" / (kDraft + self_.name + "-" + std::to_string(drafts_++));
     const std::string text = lease_->file_name();
-    file_system_.write(draft, std::as_bytes(std::span(text)));
-    const bool is_mine = in_folder(
-        file_system_, folder, [&] { return file_system_.move_new(draft, claim_file(task, next)); });
+    const bool is_mine = in_folder(file_system_, folder, [&] {
+      // Whoever found no worker when we joined may sweep drafts away.
+      file_system_.write(draft, std::as_bytes(std::span(text)));
+      return file_system_.move_new(draft, claim_file(task, next));
+    });
     if (is_mine) {
       claimed_[task] = next;
       return std::nullopt;

@@ -20,7 +20,11 @@ std::string key(const fs::path& path) {
 }
 
 [[noreturn]] void fail(const std::string& what, const fs::path& path, const char* reason) {
-  throw Error(ErrorKind::Output, what + " " + path.string() + ": " + reason);
+  const std::string text = what + " " + path.string() + ": " + reason;
+  if (std::string_view(reason) == "No such file or directory") {
+    throw NotThere(ErrorKind::Output, text);
+  }
+  throw Error(ErrorKind::Output, text);
 }
 
 std::string text_of(std::span<const std::byte> bytes) {
