@@ -137,13 +137,13 @@ CoverageMask traced(const RenderScene& meshes, const View& view, const OwnMeshes
                     const PixelBox& box, bool with_distances, const Host& host) {
   CoverageMask mask;
   mask.box = box;
-  const RenderScene::Part part(meshes, own.numbers);
+  const RenderScene::SubScene sub_scene(meshes, own.numbers);
   for (int y = box.y_min; y < box.y_max; ++y) {
     host.stop_if_asked();
     for (int x = box.x_min; x < box.x_max; ++x) {
       const auto ray = view.ray(Vec2(x + 0.5, y + 0.5));
       const float distance =
-          ray ? part.distance(ray->origin, ray->direction, ray->t_min, ray->t_max) : kInfinite;
+          ray ? sub_scene.distance(ray->origin, ray->direction, ray->t_min, ray->t_max) : kInfinite;
       mask.bits.push_back(distance < kInfinite);
       if (with_distances) mask.distances.push_back(distance);
     }

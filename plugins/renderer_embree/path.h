@@ -18,7 +18,7 @@ struct PathTracer::Path {
   Vec3f throughput = Vec3f::Ones();
   float left_by_first = 1.0f;  ///< Largest throughput behind the first scattering surface.
   int bounce = 0;
-  int passages = 0;
+  int straight_passes = 0;
   bool is_camera_ray = true;
   bool has_scattered = false;  ///< Over a surface that is no mirror.
   bool hides_lights = false;   ///< Their light was already counted, or is left out on purpose.
@@ -51,7 +51,7 @@ struct BatchNumbers {
 };
 
 /// What became of a path at a surface that may let it through or mirror it.
-struct PathTracer::Passage {
+struct PathTracer::StraightPass {
   bool is_scattered = false;  ///< By the surface's own BSDF, from here on.
   bool goes_on = false;       ///< Along this ray.
   Vec3f origin = Vec3f::Zero();
@@ -60,12 +60,12 @@ struct PathTracer::Passage {
 
 struct PathTracer::Batch : Vertices {
   std::array<Path*, kBatch> paths;  ///< Of `rays`, then of the vertices.
-  BatchInts may_meet_light;
+  BatchInts may_hit_light;
   BatchInts bounce;  ///< Of the vertices.
 
   /// The rays to the lights, those to one light side by side: the vertices that they start from.
-  std::array<std::uint8_t, kBatch> asking;
-  std::size_t asking_count = 0;
+  std::array<std::uint8_t, kBatch> shadow_rays;
+  std::size_t shadow_ray_count = 0;
 
   BatchRays next_rays;
   std::array<Path*, kBatch> next_paths;

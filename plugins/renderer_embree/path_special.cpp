@@ -9,7 +9,7 @@
 namespace diorama {
 namespace {
 
-constexpr int kMaxPassages = 64;  // straight through cut-outs and panes
+constexpr int kMaxStraightPasses = 64;  // straight through cut-outs and panes
 
 Vec3f leave(const SurfaceGeometry& s, const Vec3f& towards) {
   return diorama::leave(s.position, s.flat_normal, step_off(s.position, s.flat_normal), towards);
@@ -79,30 +79,30 @@ void PathTracer::collect_emission(Path& path, const Vec3f& direction, const RayH
   const std::uint32_t light = hit.instance->triangle_lights[hit.triangle];
   if (!is_first && settings_.samples_lights && light != MeshInstance::kNoLight) {
     const float cosine = surface.flat_normal.dot(direction);
-    const float rival = scene_.lights().probability(light, path.last) *
+    const float rival = choice_probability(scene_.lights(), light, path.last) *
                         scene_.lights().density_of_surface(light, path.since_last, cosine);
     weight = mis_weight(path.last_density, rival);
   }
   add(path, path.bounce, path.throughput.cwiseProduct(radiance) * weight);
 }
 
-PathTracer::Passage PathTracer::pass_or_reflect(Path& path, const Vec3f& direction,
-                                                const SurfaceGeometry& surface,
-                                                const ShadingMaterial& material,
-                                                SurfaceBsdf& bsdf) const {
+PathTracer::StraightPass PathTracer::pass_or_reflect(Path& path, const Vec3f& direction,
+                                                     const SurfaceGeometry& surface,
+                                                     const ShadingMaterial& material,
+                                                     SurfaceBsdf& bsdf) const {
   const Material& m = *material.source;
   const Vec2f u = path.sampler.next();
-  const auto pass = [&]() -> Passage {
-    const bool goes_on = ++path.passages <= kMaxPassages;
+  const auto pass = [&]() -> StraightPass {
+    const bool goes_on = ++path.straight_passes <= kMaxStraightPasses;
     return {false, goes_on, leave(surface, direction), direction};
   };
   float rest = u.x();
-  if (material.is_veil) {
-    const float veil = 1.0f - std::clamp(material.opacity_at(surface.uv, 0.0f), 0.0f, 1.0f);
-    if (rest < veil) return pass();
-    rest = (rest - veil) / (1.0f - veil);
+  if (material.is_blended) {
+    const float gap = 1.0f - std::clamp(material.opacity_at(surface.uv, 0.0f), 0.0f, 1.0f);
+    if (rest < gap) return pass();
+    rest = (rest - gap) / (1.0f - gap);
   }
-  if (!material.is_pane) return {.is_scattered = true};
+  if (!material.is_thin_glass) return {.is_scattered = true};
   const float share = (1.0f - bsdf.metallic) * bsdf.transmission;
   if (rest >= share) {
     bsdf.metallic = share < 1.0f ? bsdf.metallic / (1.0f - share) : 0.0f;
@@ -116,7 +116,7 @@ PathTracer::Passage PathTracer::pass_or_reflect(Path& path, const Vec3f& directi
   // A reflection on the first pane seen is faint but plain to see: it gets one sample of four,
   // which stratified samples divide without noise. Panes behind it are left to their own share, or
   // bright skies behind double windows would have black pixels.
-  const bool is_first_seen = !path.has_scattered && path.passages == 0 && path.bounce == 0;
+  const bool is_first_seen = !path.has_scattered && path.straight_passes == 0 && path.bounce == 0;
   const float chance = is_first_seen ? std::clamp(reflected, 0.25f, 0.75f) : reflected;
   if (u.y() >= chance) {
     path.throughput =

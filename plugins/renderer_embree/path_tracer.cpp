@@ -45,10 +45,10 @@ RayCounts PathTracer::trace(const TraceJob& job, PixelSum* sums, std::size_t str
 #else
 #define DIORAMA_FLATTEN gnu::flatten
 #endif
-#define DIORAMA_KERNEL(NAME, ARCH, TOGETHER)                                 \
+#define DIORAMA_KERNEL(NAME, ARCH, PACKET_SIZE)                              \
   [[gnu::target("arch=" ARCH), DIORAMA_FLATTEN]] RayCounts PathTracer::NAME( \
       const TraceJob& job, PixelSum* sums, std::size_t stride) const {       \
-    return trace_all<TOGETHER>(job, sums, stride);                           \
+    return trace_all<PACKET_SIZE>(job, sums, stride);                        \
   }
 DIORAMA_KERNEL(trace_sse42, "x86-64-v2", 8)
 DIORAMA_KERNEL(trace_avx2, "x86-64-v3", 8)
@@ -56,7 +56,7 @@ DIORAMA_KERNEL(trace_avx512, "x86-64-v4", 16)
 #undef DIORAMA_KERNEL
 #undef DIORAMA_FLATTEN
 
-template <int kTogether>
+template <int kPacketSize>
 inline RayCounts PathTracer::trace_all(const TraceJob& job, PixelSum* sums,
                                        std::size_t stride) const {
   std::vector<Path> paths;
@@ -83,7 +83,7 @@ inline RayCounts PathTracer::trace_all(const TraceJob& job, PixelSum* sums,
           add_path(x, y, sample);
           if (--left > 0 && paths.size() < kBatch) continue;
           start_paths(paths, columns, rows, batch);
-          trace_batch<kTogether>(batch);
+          trace_batch<kPacketSize>(batch);
           for (std::size_t i = 0; i < paths.size(); ++i) pixels[i]->add(paths[i].result);
           paths.clear();
           if (settings_.host) settings_.host->stop_if_asked();
@@ -124,31 +124,31 @@ inline void PathTracer::start_paths(std::vector<Path>& paths, const BatchFloats&
 
 // Paths advance together, step by step: rays of one kind in a row, then the surfaces that they met.
 // Code and data of each step stay close to the processor, and memory is fetched meanwhile.
-template <int kTogether>
+template <int kPacketSize>
 inline void PathTracer::trace_batch(Batch& v) const {
   while (v.rays.count > 0) {
     v.next_rays.count = 0;
-    v.asking_count = 0;
+    v.shadow_ray_count = 0;
     v.own_bsdfs.clear();
     find_surfaces(v);
-    meet(v);
+    process_hits(v);
     v.find_surfaces();
     std::size_t scattered = 0;
     for (std::size_t i = 0; i < v.count; ++i) {
-      if (dress(v, i)) v.move(i, scattered++);
+      if (evaluate_material(v, i)) v.move(i, scattered++);
     }
     v.count = scattered;
     v.find_bases();
     draw_numbers(v);
     for (std::size_t i = 0; i < v.count; ++i) take_lobes(v, i);
     if (scene_.stacks_lobes()) {
-      v.weigh_ways<true>();
+      v.balance_strategies<true>();
     } else {
-      v.weigh_ways<false>();
+      v.balance_strategies<false>();
     }
     for (std::size_t i = 0; i < v.count; ++i) scatter(v, i);
-    arrange_by_light(v);
-    find_lights<kTogether>(v);
+    sort_by_light(v);
+    trace_shadow_rays<kPacketSize>(v);
     v.rays = v.next_rays;
     v.paths = v.next_paths;
   }
@@ -176,43 +176,44 @@ inline void PathTracer::trace_rays(Batch& v) const {
   }
 }
 
-/// Rays to the same light side by side: bundles that go similar ways are traced faster.
-inline void PathTracer::arrange_by_light(Batch& v) {
+/// Rays to the same light side by side: packets that go similar ways are traced faster.
+inline void PathTracer::sort_by_light(Batch& v) {
   constexpr std::uint32_t kKeys = 8;
   std::array<std::uint32_t, kKeys + 1> starts{};
-  for (std::size_t k = 0; k < v.asking_count; ++k) {
-    ++starts[std::uint32_t(v.lights.light[v.asking[k]]) % kKeys + 1];
+  for (std::size_t k = 0; k < v.shadow_ray_count; ++k) {
+    ++starts[std::uint32_t(v.lights.light[v.shadow_rays[k]]) % kKeys + 1];
   }
   for (std::uint32_t k = 0; k < kKeys; ++k) starts[k + 1] += starts[k];
-  const std::array<std::uint8_t, kBatch> before = v.asking;
-  for (std::size_t k = 0; k < v.asking_count; ++k) {
-    v.asking[starts[std::uint32_t(v.lights.light[before[k]]) % kKeys]++] = before[k];
+  const std::array<std::uint8_t, kBatch> before = v.shadow_rays;
+  for (std::size_t k = 0; k < v.shadow_ray_count; ++k) {
+    v.shadow_rays[starts[std::uint32_t(v.lights.light[before[k]]) % kKeys]++] = before[k];
   }
 }
 
-template <int kTogether>
-inline void PathTracer::find_lights(Batch& v) const {
-  RaysTogether<kTogether> bundle;
-  for (std::size_t begin = 0; begin < v.asking_count; begin += kTogether) {
-    const std::size_t end = std::min(begin + kTogether, v.asking_count);
-    bundle.clear();
+template <int kPacketSize>
+inline void PathTracer::trace_shadow_rays(Batch& v) const {
+  RayPacket<kPacketSize> packet;
+  for (std::size_t begin = 0; begin < v.shadow_ray_count; begin += kPacketSize) {
+    const std::size_t end = std::min(begin + kPacketSize, v.shadow_ray_count);
+    packet.clear();
     for (std::size_t k = begin; k < end; ++k) {
-      const std::size_t i = v.asking[k];
+      const std::size_t i = v.shadow_rays[k];
       const Vec3f origin = v.light_origin.at(i);
       const Vec3f direction = v.lights.direction.at(i);
-      bundle.add(origin, direction, 0.0f, v.light_reach[i], v.paths[i]->time);
+      packet.add(origin, direction, 0.0f, v.light_reach[i], v.paths[i]->time);
       log({origin, direction, 0.0f, v.light_reach[i], true});
     }
-    scene_.transmittance(bundle, !settings_.has_caustics, [&](int k, const Vec3f& kept) {
-      add_light(v, v.asking[begin + std::size_t(k)], kept);
+    scene_.transmittance(packet, !settings_.has_caustics, [&](int k, const Vec3f& transmittance) {
+      add_light_sample(v, v.shadow_rays[begin + std::size_t(k)], transmittance);
     });
   }
-  v.counts.shadow_rays += v.asking_count;
+  v.counts.shadow_rays += v.shadow_ray_count;
 }
 
-inline void PathTracer::add_light(const Batch& v, std::size_t i, const Vec3f& kept) const {
+inline void PathTracer::add_light_sample(const Batch& v, std::size_t i,
+                                         const Vec3f& transmittance) const {
   const LightPlace place = v.lights.place(i);
-  const Lights& lights = scene_.lights();
+  const LightTable& lights = scene_.lights();
   Vec3f radiance;
   if (lights.is_surface(place)) {
     const MeshInstance& emitter = *scene_.instances()[lights.geometry_of(place)];
@@ -221,16 +222,17 @@ inline void PathTracer::add_light(const Batch& v, std::size_t i, const Vec3f& ke
   } else {
     radiance = lights.radiance_of(place, v.lights.direction.at(i));
   }
-  add(*v.paths[i], v.bounce[i], v.light_share.at(i).cwiseProduct(kept).cwiseProduct(radiance));
+  add(*v.paths[i], v.bounce[i],
+      v.light_share.at(i).cwiseProduct(transmittance).cwiseProduct(radiance));
 }
 
-inline void PathTracer::meet(Batch& v) const {
-  scene_.lights().find_near(v.count, v.rays.origin, v.rays.direction, v.may_meet_light);
+inline void PathTracer::process_hits(Batch& v) const {
+  scene_.lights().find_near(v.count, v.rays.origin, v.rays.direction, v.may_hit_light);
   for (std::size_t i = 0; i < v.count; ++i) {
     Path& path = *v.paths[i];
     const float distance = v.hits.distance[i];
     const MeshInstance* instance = v.hits.instance[i];
-    if (v.may_meet_light[i] != 0 || !instance) collect_lights(v, i);
+    if (v.may_hit_light[i] != 0 || !instance) collect_lights(v, i);
     v.material[i] = nullptr;
     if (!instance) continue;
     path.since_last += distance;
@@ -243,7 +245,7 @@ inline void PathTracer::meet(Batch& v) const {
   }
 }
 
-inline bool PathTracer::dress(Batch& v, std::size_t i) const {
+inline bool PathTracer::evaluate_material(Batch& v, std::size_t i) const {
   if (!v.material[i]) return false;
   Path& path = *v.paths[i];
   const ShadingMaterial& material = *v.material[i];
@@ -265,23 +267,23 @@ inline bool PathTracer::dress(Batch& v, std::size_t i) const {
     bsdf.finish();
     v.normal.set(i, surface.normal);
   }
-  if (!material.is_pane && !material.is_veil) return true;
-  const Passage passage = pass_or_reflect(path, direction, surface, material, bsdf);
-  if (passage.goes_on) v.go_on(path, passage.origin, passage.direction);
-  return passage.is_scattered;
+  if (!material.is_thin_glass && !material.is_blended) return true;
+  const StraightPass pass_through = pass_or_reflect(path, direction, surface, material, bsdf);
+  if (pass_through.goes_on) v.go_on(path, pass_through.origin, pass_through.direction);
+  return pass_through.is_scattered;
 }
 
 inline void PathTracer::draw_numbers(Batch& v) const {
-  Lights::Wishes& wishes = v.wishes;
+  LightQueries& queries = v.queries;
   const std::size_t size = whole_steps(v.count);
-  wishes.count = v.count;
-  wishes.position = v.position;
-  wishes.normal = v.normal;
+  queries.count = v.count;
+  queries.position = v.position;
+  queries.normal = v.normal;
   BatchNumbers numbers;
   for (std::size_t i = 0; i < v.count; ++i) {
     Path& path = *v.paths[i];
     numbers.take(i, path.sampler, Vertices::kPairs);
-    wishes.is_two_sided[i] = !path.is_soft(settings_) && v.bsdf[i]->lobes.glass > 0.0f;
+    queries.is_two_sided[i] = !path.is_soft(settings_) && v.bsdf[i]->lobes.glass > 0.0f;
   }
   for (std::uint32_t k = 0; k < Vertices::kPairs; ++k) {
     for (std::size_t i = 0; i < size; ++i) {
@@ -290,12 +292,12 @@ inline void PathTracer::draw_numbers(Batch& v) const {
       v.numbers[2 * k + 1][i] = pair.y();
     }
   }
-  wishes.u = v.numbers[Vertices::kLight];
-  scene_.lights().choose(wishes, v.choices);
-  // Else their densities stay zero, and none is asked for.
+  queries.u = v.numbers[Vertices::kLight];
+  choose_lights(scene_.lights(), queries, v.selections);
+  // Else their densities stay zero, and none is points for.
   if (settings_.samples_lights) {
-    scene_.lights().sample(wishes, v.choices, v.numbers[Vertices::kPlaceU],
-                           v.numbers[Vertices::kPlaceV], v.lights);
+    sample_lights(scene_.lights(), queries, v.selections, v.numbers[Vertices::kPlaceU],
+                  v.numbers[Vertices::kPlaceV], v.lights);
   }
 }
 
@@ -312,7 +314,7 @@ inline void PathTracer::collect_lights(const Batch& v, std::size_t i) const {
       path.is_camera_ray, [&](std::uint32_t light, const Vec3f& radiance, float density) {
         const bool has_rival = !is_first && settings_.samples_lights;
         const float rival =
-            has_rival ? scene_.lights().probability(light, path.last) * density : 0.0f;
+            has_rival ? choice_probability(scene_.lights(), light, path.last) * density : 0.0f;
         add(path, path.bounce,
             path.throughput.cwiseProduct(radiance) *
                 (has_rival ? mis_weight(path.last_density, rival) : 1.0f));
@@ -341,7 +343,7 @@ inline void PathTracer::scatter(Batch& v, std::size_t i) const {
     record_surface(v, i, s.albedo(v.albedo.at(i)));
   }
   take_light_samples(v, i);
-  ask_light(v, i);
+  queue_shadow_ray(v, i);
   path.hides_lights = false;
   if (ends_at(path, s)) return;
   BsdfSample next;
@@ -360,7 +362,7 @@ inline void PathTracer::scatter(Batch& v, std::size_t i) const {
     if (!path.result.has_surface) record_surface(v, i, bsdf.albedo());
     take_light_samples(v, i);
     light_glass(v, i, bsdf);
-    ask_light(v, i);
+    queue_shadow_ray(v, i);
   }
   path.is_camera_ray = false;
   const BsdfSample next =
@@ -379,7 +381,7 @@ inline void PathTracer::light_glass(Batch& v, std::size_t i, const Bsdf& bsdf) c
   const Vec3f towards = v.lights.direction.at(i);
   const Vec3f wi = v.basis(i).to_local(towards);
   const bool is_behind = wi.z() <= 0.0f;
-  if (is_behind && v.wishes.is_two_sided[i] == 0) return;
+  if (is_behind && v.queries.is_two_sided[i] == 0) return;
   if ((v.flat_normal.at(i).dot(towards) <= 0.0f) != is_behind) return;
   const BsdfValue value = bsdf.evaluate(wi);
   v.light_share.set(i, value.f_cos * v.weight_of_light(i, settings_.samples_bsdf, value.density));
@@ -398,16 +400,16 @@ inline void PathTracer::take_light_samples(const Batch& v, std::size_t i) const 
   Path& path = *v.paths[i];
   path.is_camera_ray = false;
   path.has_scattered = true;
-  path.last = v.wishes.receiver(i);
-  path.last.total_score = v.choices.total_score[i];
+  path.last = v.queries.receiver(i);
+  path.last.total_score = v.selections.total_score[i];
 }
 
 /// What comes of the light's share, if nothing within its reach is in the way.
-inline void PathTracer::ask_light(Batch& v, std::size_t i) const {
+inline void PathTracer::queue_shadow_ray(Batch& v, std::size_t i) const {
   const Vec3f share = v.light_share.at(i);
   if (!(v.light_reach[i] > 0.0f) || share.maxCoeff() <= 0.0f) return;
   v.light_share.set(i, v.paths[i]->throughput.cwiseProduct(share));
-  v.asking[v.asking_count++] = std::uint8_t(i);
+  v.shadow_rays[v.shadow_ray_count++] = std::uint8_t(i);
 }
 
 inline void PathTracer::go_on(Batch& v, std::size_t i, const BsdfSample& next, const Vec3f& origin,

@@ -62,26 +62,26 @@ class PathTracer {
 
  private:
   struct Path;
-  struct Passage;
+  struct StraightPass;
   struct Batch;
 
-  // Rays to lights are traced kTogether at a time.
-  template <int kTogether>
+  // Rays to lights are traced kPacketSize at a time.
+  template <int kPacketSize>
   RayCounts trace_all(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
   RayCounts trace_sse42(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
   RayCounts trace_avx2(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
   RayCounts trace_avx512(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
   void start_paths(std::vector<Path>& paths, const BatchFloats& columns, const BatchFloats& rows,
                    Batch& v) const;
-  template <int kTogether>
+  template <int kPacketSize>
   void trace_batch(Batch& v) const;
   void open_shutter(Path& path, int row, CameraRay& ray) const;
   void find_surfaces(Batch& v) const;
   void log(const LoggedRay& ray) const;
   void trace_rays(Batch& v) const;
-  void meet(Batch& v) const;
+  void process_hits(Batch& v) const;
   /// Adds the light that the surface emits. False: the path is not scattered here.
-  bool dress(Batch& v, std::size_t i) const;
+  bool evaluate_material(Batch& v, std::size_t i) const;
   void draw_numbers(Batch& v) const;
   void take_lobes(Batch& v, std::size_t i) const;
   bool ends_at(const Path& path, const SurfaceBsdf& s) const;
@@ -90,19 +90,19 @@ class PathTracer {
   void light_glass(Batch& v, std::size_t i, const Bsdf& bsdf) const;
   void record_surface(const Batch& v, std::size_t i, const Vec3f& albedo) const;
   void take_light_samples(const Batch& v, std::size_t i) const;
-  void ask_light(Batch& v, std::size_t i) const;
+  void queue_shadow_ray(Batch& v, std::size_t i) const;
   void go_on(Batch& v, std::size_t i, const BsdfSample& next, const Vec3f& origin,
              const Vec3f& direction) const;
-  static void arrange_by_light(Batch& v);
-  template <int kTogether>
-  void find_lights(Batch& v) const;
-  void add_light(const Batch& v, std::size_t i, const Vec3f& kept) const;
+  static void sort_by_light(Batch& v);
+  template <int kPacketSize>
+  void trace_shadow_rays(Batch& v) const;
+  void add_light_sample(const Batch& v, std::size_t i, const Vec3f& transmittance) const;
   void collect_lights(const Batch& v, std::size_t i) const;
   // `direction`: of the ray that met the surface.
   void collect_emission(Path& path, const Vec3f& direction, const RayHit& hit,
                         const SurfaceGeometry& surface, const ShadingMaterial& material) const;
-  Passage pass_or_reflect(Path& path, const Vec3f& direction, const SurfaceGeometry& surface,
-                          const ShadingMaterial& material, SurfaceBsdf& bsdf) const;
+  StraightPass pass_or_reflect(Path& path, const Vec3f& direction, const SurfaceGeometry& surface,
+                               const ShadingMaterial& material, SurfaceBsdf& bsdf) const;
   void read_textures(const Path& path, const Vec3f& direction, const RayHit& hit,
                      const SurfaceGeometry& surface, const ShadingMaterial& material, bool is_soft,
                      SurfaceBsdf& bsdf, Vec3f& normal) const;

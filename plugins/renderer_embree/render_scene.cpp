@@ -119,7 +119,7 @@ void RenderScene::take(const Scene& scene) {
     blur(scene);
   }
   const Stopwatch watch(times_.lights_s);
-  lights_ = Lights(options_.has_disk_lamps);
+  lights_ = LightTable(options_.has_disk_lamps);
   add_lights(scene);
   add_emitters();
   lights_.finish();
@@ -136,15 +136,15 @@ void RenderScene::learn_sky() {
   Surroundings now = surroundings();
   if (!(now == surroundings_)) sky_grids_.clear();
   surroundings_ = std::move(now);
-  static_assert(SkyGrid::kMostRays <= RayBundle::kSize);
+  static_assert(SkyGrid::kMostRays <= RayPacket8::kSize);
   const auto sees = [this](std::span<const SkyGrid::Ray> rays) {
-    RayBundle bundle;
-    bundle.clear();
+    RayPacket8 packet;
+    packet.clear();
     for (const auto& [origin, direction] : rays) {
-      bundle.add(origin, direction, 0.0f, kInfinite, kMoment);
+      packet.add(origin, direction, 0.0f, kInfinite, kMoment);
     }
     std::uint32_t lit = 0;
-    transmittance(scene_, bundle, true, kStaticMask, [&](int i, const Vec3f& share) {
+    transmittance(scene_, packet, true, kStaticMask, [&](int i, const Vec3f& share) {
       lit |= std::uint32_t(share.maxCoeff() > 0.0f) << i;
     });
     return lit;
@@ -258,7 +258,7 @@ void RenderScene::pack_uvs() {
   host_.parallel_for(meshes.size(), [&](std::size_t i) { meshes[i]->pack_uvs(); });
 }
 
-void RenderScene::weaken_shadow_ray(const RTCFilterFunctionNArguments* args) {
+void RenderScene::attenuate_shadow_ray(const RTCFilterFunctionNArguments* args) {
   auto& shadow = *reinterpret_cast<ShadowContext*>(args->context);
   const auto& instance = *static_cast<const MeshInstance*>(args->geometryUserPtr);
   const unsigned count = args->N;
@@ -269,8 +269,8 @@ void RenderScene::weaken_shadow_ray(const RTCFilterFunctionNArguments* args) {
     const Vec3f share =
         straight_share(instance, hit_point(args, i), direction.normalized(), shadow.passes_glass);
     const unsigned ray = RTCRayN_id(args->ray, count, i);
-    shadow.weaken(ray, share);
-    if (shadow.kept[ray].maxCoeff() > 1e-4f) args->valid[i] = 0;
+    shadow.attenuate(ray, share);
+    if (shadow.transmittance[ray].maxCoeff() > 1e-4f) args->valid[i] = 0;
   }
 }
 
@@ -349,7 +349,7 @@ void RenderScene::set_filters(const MeshInstance& instance, RTCGeometry geometry
     dims_shadows |= m->dims_shadows;
   }
   rtcSetGeometryIntersectFilterFunction(geometry, is_cut_out ? &pass_where_cut_out : nullptr);
-  rtcSetGeometryOccludedFilterFunction(geometry, dims_shadows ? &weaken_shadow_ray : nullptr);
+  rtcSetGeometryOccludedFilterFunction(geometry, dims_shadows ? &attenuate_shadow_ray : nullptr);
 }
 
 /// Puts the mesh's vertices into the world; returns their box.
@@ -568,7 +568,8 @@ void RenderScene::add_emitters() {
   }
 }
 
-RenderScene::Part::Part(const RenderScene& scene, const std::vector<std::uint32_t>& instances)
+RenderScene::SubScene::SubScene(const RenderScene& scene,
+                                const std::vector<std::uint32_t>& instances)
     : scene_(rtcNewScene(scene.device_)) {
   for (std::uint32_t i : instances) {
     rtcAttachGeometryByID(scene_, scene.instances_[i]->geometry, i);
@@ -577,10 +578,10 @@ RenderScene::Part::Part(const RenderScene& scene, const std::vector<std::uint32_
   scene.check_device("build the structure of one instance");
 }
 
-RenderScene::Part::~Part() { rtcReleaseScene(scene_); }
+RenderScene::SubScene::~SubScene() { rtcReleaseScene(scene_); }
 
-float RenderScene::Part::distance(const Vec3f& origin, const Vec3f& direction, float t_min,
-                                  float t_max) const {
+float RenderScene::SubScene::distance(const Vec3f& origin, const Vec3f& direction, float t_min,
+                                      float t_max) const {
   RTCRayHit ray = make_ray(origin, direction, t_min, t_max, kMoment);
   embree::Context context;
   embree::init(context);

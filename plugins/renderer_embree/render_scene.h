@@ -14,7 +14,7 @@
 #include "embree.h"
 #include "renderer_support/batch.h"
 #include "renderer_support/isa.h"
-#include "renderer_support/lights.h"
+#include "renderer_support/light_table.h"
 #include "renderer_support/rigid_motion.h"
 #include "renderer_support/sampling.h"
 #include "renderer_support/shading_material.h"
@@ -122,7 +122,7 @@ struct BatchHits {
 
 /// Up to 8 or 16 rays that are traced together, which is faster where they go similar ways.
 template <int kWidth>
-class RaysTogether {
+class RayPacket {
  public:
   static constexpr int kSize = kWidth;
 
@@ -143,7 +143,7 @@ class RaysTogether {
   std::conditional_t<kSize == 8, RTCRayHit8, RTCRayHit16> rays_;
   int count_ = 0;
 };
-using RayBundle = RaysTogether<8>;
+using RayPacket8 = RayPacket<8>;
 
 /// The surface at a hit, without its material. World space.
 struct SurfaceGeometry {
@@ -162,7 +162,7 @@ class RenderScene {
  public:
   struct Options {
     std::string isa = "sse2";     ///< Of Embree's kernels; one of kIsaNames.
-    bool has_disk_lamps = false;  ///< See Lights.
+    bool has_disk_lamps = false;  ///< See LightTable.
     bool stacks_lobes = false;    ///< See SurfaceBsdf.
   };
   RenderScene(Host& host, const Options& options);
@@ -191,7 +191,7 @@ class RenderScene {
   Kept kept() const;
 
   const std::vector<std::unique_ptr<MeshInstance>>& instances() const { return instances_; }
-  const Lights& lights() const { return lights_; }
+  const LightTable& lights() const { return lights_; }
   bool stacks_lobes() const { return options_.stacks_lobes; }
 
   /// The first surface not cut out. The direction is unit length.
@@ -215,20 +215,20 @@ class RenderScene {
   void intersect_now(const BatchRays& rays, BatchHits& hits) const {
     intersect(scene_, rays, hits);
   }
-  /// Calls lit(i, share) for every ray of which light is left; spends the bundle.
+  /// Calls lit(i, share) for every ray of which light is left; spends the packet.
   template <int kWidth, class Lit>
-  void transmittance(RaysTogether<kWidth>& rays, bool passes_glass, Lit&& lit) const {
+  void transmittance(RayPacket<kWidth>& rays, bool passes_glass, Lit&& lit) const {
     transmittance(scene_over_time(), rays, passes_glass, ~0u, lit);
   }
   /// Seconds around the moment of the poses that `time` runs through; see shutter_window().
   double window() const { return window_; }
   /// Some instances of the scene with nothing else; valid until the next take().
-  class Part {
+  class SubScene {
    public:
-    Part(const RenderScene& scene, const std::vector<std::uint32_t>& instances);
-    ~Part();
-    Part(const Part&) = delete;
-    Part& operator=(const Part&) = delete;
+    SubScene(const RenderScene& scene, const std::vector<std::uint32_t>& instances);
+    ~SubScene();
+    SubScene(const SubScene&) = delete;
+    SubScene& operator=(const SubScene&) = delete;
     /// To its first surface; infinity where the ray misses it.
     float distance(const Vec3f& origin, const Vec3f& direction, float t_min, float t_max) const;
 
@@ -273,31 +273,31 @@ class RenderScene {
   static constexpr std::uint32_t kStaticMask = 1;
   static constexpr std::uint32_t kMovableMask = 2;
 
-  /// Carried by shadow rays; the filter of the surfaces on their way weakens what they carry.
+  /// Carried by shadow rays; the filter of the surfaces on their way attenuates what they carry.
   struct ShadowContext {
     embree::Context context;
-    std::array<Vec3f, 16> kept;  ///< By the rays' ids; set when is_weakened.
-    bool is_weakened = false;
+    std::array<Vec3f, 16> transmittance;  ///< By the rays' ids; set when is_attenuated.
+    bool is_attenuated = false;
     bool passes_glass = true;
-    void weaken(unsigned ray, const Vec3f& share) {
-      if (!is_weakened) kept.fill(Vec3f::Ones());
-      is_weakened = true;
-      kept[ray] = kept[ray].cwiseProduct(share);
+    void attenuate(unsigned ray, const Vec3f& share) {
+      if (!is_attenuated) transmittance.fill(Vec3f::Ones());
+      is_attenuated = true;
+      transmittance[ray] = transmittance[ray].cwiseProduct(share);
     }
   };
 
   static RTCRayHit make_ray(const Vec3f& origin, const Vec3f& direction, float t_min, float t_max,
                             float time);
   void intersect(RTCScene scene, const BatchRays& rays, BatchHits& hits) const;
-  void intersect(RTCScene scene, RayBundle& rays, bool is_coherent, std::size_t begin,
+  void intersect(RTCScene scene, RayPacket8& rays, bool is_coherent, std::size_t begin,
                  BatchHits& hits) const;
   RayHit intersect(RTCScene scene, const Vec3f& origin, const Vec3f& direction, float t_min,
                    float t_max, float time) const;
   template <int kWidth, class Lit>
-  static void transmittance(RTCScene scene, RaysTogether<kWidth>& rays, bool passes_glass,
+  static void transmittance(RTCScene scene, RayPacket<kWidth>& rays, bool passes_glass,
                             std::uint32_t mask, Lit&& lit);
   RTCScene scene_over_time() const { return moving_scene_ ? moving_scene_ : scene_; }
-  static void weaken_shadow_ray(const RTCFilterFunctionNArguments* args);
+  static void attenuate_shadow_ray(const RTCFilterFunctionNArguments* args);
   void collect(const Scene& scene, NodeId node, const Affine& world_from_parent, bool is_movable);
   void assign_materials(const Scene& scene);
   void assign_shading_meshes();
@@ -332,7 +332,7 @@ class RenderScene {
   std::shared_ptr<const Texture> white_sky_;  ///< Of domes without an image.
   Instances instances_;
   std::vector<NodeId> light_nodes_;
-  Lights lights_;
+  LightTable lights_;
   Surroundings surroundings_;
   std::vector<CachedGrid> sky_grids_;  ///< Valid for surroundings_.
 };
@@ -384,12 +384,12 @@ inline Vec3f RenderScene::transmittance(const Vec3f& origin, const Vec3f& direct
   embree::init(shadow.context);
   embree::occluded(scene_over_time(), shadow.context, ray.ray);
   if (ray.ray.tfar == -kInfinite) return Vec3f::Zero();
-  return shadow.is_weakened ? shadow.kept[0] : Vec3f(Vec3f::Ones());
+  return shadow.is_attenuated ? shadow.transmittance[0] : Vec3f(Vec3f::Ones());
 }
 
 template <int kWidth>
-inline void RaysTogether<kWidth>::put(int i, const Vec3f& origin, const Vec3f& direction,
-                                      float t_min, float t_max, float time) {
+inline void RayPacket<kWidth>::put(int i, const Vec3f& origin, const Vec3f& direction, float t_min,
+                                   float t_max, float time) {
   auto& r = rays_.ray;
   r.org_x[i] = origin.x();
   r.org_y[i] = origin.y();
@@ -403,7 +403,7 @@ inline void RaysTogether<kWidth>::put(int i, const Vec3f& origin, const Vec3f& d
 }
 
 template <int kWidth>
-inline void RaysTogether<kWidth>::take(const BatchRays& from, std::size_t begin) {
+inline void RayPacket<kWidth>::take(const BatchRays& from, std::size_t begin) {
   auto& r = rays_.ray;
   std::copy_n(&from.origin.x[begin], kSize, r.org_x);
   std::copy_n(&from.origin.y[begin], kSize, r.org_y);
@@ -419,7 +419,7 @@ inline void RaysTogether<kWidth>::take(const BatchRays& from, std::size_t begin)
 
 /// Fills the rest with rays that go nowhere: not all of Embree's kernels heed which are valid.
 template <int kWidth>
-inline void RaysTogether<kWidth>::finish(std::uint32_t mask) {
+inline void RayPacket<kWidth>::finish(std::uint32_t mask) {
   for (int i = count_; i < kSize; ++i) {
     put(i, Vec3f::Zero(), Vec3f::UnitZ(), 0.0f, -1.0f, kMoment);
   }
@@ -433,14 +433,14 @@ inline void RaysTogether<kWidth>::finish(std::uint32_t mask) {
   }
 }
 
-inline void RenderScene::intersect(RTCScene scene, RayBundle& bundle, bool is_coherent,
+inline void RenderScene::intersect(RTCScene scene, RayPacket8& packet, bool is_coherent,
                                    std::size_t begin, BatchHits& hits) const {
-  bundle.finish(~0u);
-  RTCRayHit8& rays = bundle.rays_;
+  packet.finish(~0u);
+  RTCRayHit8& rays = packet.rays_;
   embree::Context context;
   embree::init(context);
-  embree::intersect(bundle.valid_.data(), scene, context, rays, is_coherent);
-  for (std::size_t i = 0; i < RayBundle::kSize; ++i) {
+  embree::intersect(packet.valid_.data(), scene, context, rays, is_coherent);
+  for (std::size_t i = 0; i < RayPacket8::kSize; ++i) {
     const std::size_t to = begin + i;
     const bool is_met = rays.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
     hits.geometry[to] = std::int32_t(rays.hit.geomID[i]);
@@ -454,7 +454,7 @@ inline void RenderScene::intersect(RTCScene scene, RayBundle& bundle, bool is_co
     hits.normal.y[to] = rays.hit.Ng_y[i];
     hits.normal.z[to] = rays.hit.Ng_z[i];
   }
-  for (int i = 0; i < bundle.count_; ++i) {
+  for (int i = 0; i < packet.count_; ++i) {
     const std::size_t to = begin + std::size_t(i);
     hits.instance[to] = nullptr;
     if (rays.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
@@ -464,24 +464,24 @@ inline void RenderScene::intersect(RTCScene scene, RayBundle& bundle, bool is_co
 }
 
 inline void RenderScene::intersect(RTCScene scene, const BatchRays& rays, BatchHits& hits) const {
-  RayBundle bundle;
-  for (std::size_t begin = 0; begin < rays.count; begin += RayBundle::kSize) {
-    bundle.take(rays, begin);
-    intersect(scene, bundle, rays.is_coherent, begin, hits);
+  RayPacket8 packet;
+  for (std::size_t begin = 0; begin < rays.count; begin += RayPacket8::kSize) {
+    packet.take(rays, begin);
+    intersect(scene, packet, rays.is_coherent, begin, hits);
   }
 }
 
 template <int kWidth, class Lit>
-inline void RenderScene::transmittance(RTCScene scene, RaysTogether<kWidth>& bundle,
-                                       bool passes_glass, std::uint32_t mask, Lit&& lit) {
-  bundle.finish(mask);
+inline void RenderScene::transmittance(RTCScene scene, RayPacket<kWidth>& packet, bool passes_glass,
+                                       std::uint32_t mask, Lit&& lit) {
+  packet.finish(mask);
   ShadowContext shadow;
   shadow.passes_glass = passes_glass;
   embree::init(shadow.context);
-  embree::occluded(bundle.valid_.data(), scene, shadow.context, bundle.rays_.ray);
-  for (int i = 0; i < bundle.count_; ++i) {
-    if (bundle.rays_.ray.tfar[i] == -kInfinite) continue;
-    lit(i, shadow.is_weakened ? shadow.kept[std::size_t(i)] : Vec3f(Vec3f::Ones()));
+  embree::occluded(packet.valid_.data(), scene, shadow.context, packet.rays_.ray);
+  for (int i = 0; i < packet.count_; ++i) {
+    if (packet.rays_.ray.tfar[i] == -kInfinite) continue;
+    lit(i, shadow.is_attenuated ? shadow.transmittance[std::size_t(i)] : Vec3f(Vec3f::Ones()));
   }
 }
 

@@ -6,6 +6,7 @@
 
 #include "render_scene.h"
 #include "renderer_support/bsdf.h"
+#include "renderer_support/light_samples.h"
 
 namespace diorama {
 
@@ -96,9 +97,9 @@ struct Vertices {
   BatchVectors to_viewer;                       ///< Local, unit.
   BatchVectors step;                            ///< Off the surface, on the viewer's side.
   std::array<BatchFloats, 2 * kPairs> numbers;  ///< Random ones, by purpose.
-  Lights::Wishes wishes;
-  Lights::Choices choices;
-  Lights::Samples lights;
+  LightQueries queries;
+  LightSelections selections;
+  LightSamples lights;
 
   BatchLobes lobes;
   BatchInts has_rival;    ///< The BSDF's own sample may find the light, too.
@@ -131,10 +132,10 @@ struct Vertices {
   /// From lobes and lights: the ways to the light and to the next vertex, and how much light takes
   /// them.
   template <bool kStacks>
-  void weigh_ways() {
-    aim<kStacks>();
-    look_up();
-    weigh<kStacks>();
+  void balance_strategies() {
+    sample_directions<kStacks>();
+    look_up_albedos();
+    evaluate_strategies<kStacks>();
   }
   /// How far to look for what hides a light.
   static float reach(float distance) { return std::max(0.0f, distance * 0.9998f - 1e-4f); }
@@ -143,17 +144,17 @@ struct Vertices {
   float weight_of_light(std::size_t i, bool is_rival, float rival) const {
     const float found = lights.density[i];
     const bool is_point = found == kInfinite;
-    const float density = (is_point ? 1.0f : found) * choices.probability[i];
+    const float density = (is_point ? 1.0f : found) * selections.probability[i];
     const bool is_shared = is_rival & !is_point;
     return (is_shared ? mis_weight(density, rival) : 1.0f) / density;
   }
 
  private:
   template <bool kStacks>
-  void aim();
-  void look_up();
+  void sample_directions();
+  void look_up_albedos();
   template <bool kStacks>
-  void weigh();
+  void evaluate_strategies();
 };
 
 inline SurfaceGeometry Vertices::surface(std::size_t i) const {
@@ -191,7 +192,7 @@ inline void Vertices::find_bases() {
 }
 
 template <bool kStacks>
-inline void Vertices::aim() {
+inline void Vertices::sample_directions() {
   for (std::size_t i = 0; i < whole_steps(count); ++i) {
     const Basis axes = basis(i);
     to_light.set(i, axes.to_local(lights.direction.at(i)));
@@ -204,7 +205,7 @@ inline void Vertices::aim() {
   }
 }
 
-inline void Vertices::look_up() {
+inline void Vertices::look_up_albedos() {
   for (std::size_t i = 0; i < count; ++i) {
     at_light.set(i, bsdf[i]->albedo_at(to_light.z[i]));
     at_next.set(i, bsdf[i]->albedo_at(to_next.z[i]));
@@ -212,7 +213,7 @@ inline void Vertices::look_up() {
 }
 
 template <bool kStacks>
-inline void Vertices::weigh() {
+inline void Vertices::evaluate_strategies() {
   for (std::size_t i = 0; i < whole_steps(count); ++i) {
     const Lobes seen(lobes.at(i), albedo.at(i), to_viewer.at(i), kStacks);
     const BsdfValue lit = seen.evaluate(to_light.at(i), at_light.at(i));

@@ -16,7 +16,7 @@ struct Receiver {
   Vec3f position = Vec3f::Zero();
   Vec3f normal = Vec3f::UnitZ();
   bool is_two_sided = false;  ///< Light from behind counts as well.
-  float total_score = 0.0f;   ///< Written by Lights::choose.
+  float total_score = 0.0f;   ///< Written by choose_lights().
 };
 
 /// Chooses among lights with a place in the scene, in proportion to the light that each would send

@@ -118,11 +118,11 @@ std::unique_ptr<ShadingMaterial> MaterialLibrary::make(std::shared_ptr<const Mat
       material->base_color || material->metallic || material->roughness || material->normal;
   material->reads_uv = material->is_textured || material->opacity || material->emission;
   material->is_cut_out = material->opacity || m.opacity < 1.0f;
-  material->is_veil = material->is_cut_out && m.opacity_threshold <= 0.0f;
-  material->is_pane = m.is_thin_walled && m.transmission > 0.0f;
+  material->is_blended = material->is_cut_out && m.opacity_threshold <= 0.0f;
+  material->is_thin_glass = m.is_thin_walled && m.transmission > 0.0f;
   material->dims_shadows = material->is_cut_out || m.transmission > 0.0f;
   material->emits = m.emission.maxCoeff() > 0.0f;
-  material->is_special = material->is_textured || material->is_veil || material->is_pane ||
+  material->is_special = material->is_textured || material->is_blended || material->is_thin_glass ||
                          material->emits || material->sharp.glass;
   return material;
 }

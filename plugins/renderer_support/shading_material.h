@@ -26,12 +26,12 @@ struct ShadingMaterial {
   TextureSlot normal;
   TextureSlot opacity;
   TextureSlot emission;
-  bool is_pane = false;       ///< Thin-walled glass.
-  bool is_veil = false;       ///< Lets a share of the rays pass straight.
-  bool reads_uv = false;      ///< In any input.
-  bool is_textured = false;   ///< In one of the inputs that scattering reads.
-  bool is_cut_out = false;    ///< Rays may pass where the opacity says so.
-  bool dims_shadows = false;  ///< Shadow rays may pass, weakened.
+  bool is_thin_glass = false;  ///< Thin-walled glass.
+  bool is_blended = false;     ///< Lets a share of the rays pass straight.
+  bool reads_uv = false;       ///< In any input.
+  bool is_textured = false;    ///< In one of the inputs that scattering reads.
+  bool is_cut_out = false;     ///< Rays may pass where the opacity says so.
+  bool dims_shadows = false;   ///< Shadow rays may pass, weakened.
   bool emits = false;
   bool is_special = false;  ///< Any of the above but cut-outs, or solid glass.
 

@@ -97,14 +97,14 @@ struct Sheet {
     return {(world_from_base * (point - direction.normalized())).cast<float>(),
             (world_from_base.linear() * direction.normalized()).cast<float>()};
   }
-  /// One by one and in a bundle, which must agree.
+  /// One by one and in a packet, which must agree.
   Vec3f light_through(const Vec2& uv, const Vec3& direction) const {
     const Ray ray = ray_through(uv, direction);
     const Vec3f alone = scene.transmittance(ray.origin, ray.direction, 2.0f, true, kMoment);
-    RayBundle bundle;
-    bundle.clear();
-    for (int i = 0; i < 3; ++i) bundle.add(ray.origin, ray.direction, 0.0f, 2.0f, kMoment);
-    scene.transmittance(bundle, true,
+    RayPacket8 packet;
+    packet.clear();
+    for (int i = 0; i < 3; ++i) packet.add(ray.origin, ray.direction, 0.0f, 2.0f, kMoment);
+    scene.transmittance(packet, true,
                         [&](int, const Vec3f& share) { CHECK((share - alone).norm() < 1e-5f); });
     return alone;
   }
@@ -201,7 +201,7 @@ TEST_CASE("a hit tells of the triangle at its place, in either half of a quad", 
     BatchRays rays;
     std::vector<RayHit> hits;
     std::vector<std::array<double, 3>> weights;
-    for (int i = 0; i < RayBundle::kSize; ++i) {
+    for (int i = 0; i < RayPacket8::kSize; ++i) {
       const double u = rng.uniform(0.01, 0.98);
       const double v = rng.uniform(0.01, 0.99 - u);
       weights.push_back({1.0 - u - v, u, v});
@@ -212,15 +212,15 @@ TEST_CASE("a hit tells of the triangle at its place, in either half of a quad", 
       hits.push_back(scene.intersect(origin, direction.cast<float>(), 0.0f, 0.02f, kMoment));
       rays.add(origin, direction.cast<float>(), 0.0f, 0.02f, kMoment);
     }
-    // Once more, as the second bundle of the batch.
-    for (std::size_t i = 0; i < RayBundle::kSize; ++i) {
+    // Once more, as the second packet of the batch.
+    for (std::size_t i = 0; i < RayPacket8::kSize; ++i) {
       rays.add(rays.origin.at(i), rays.direction.at(i), rays.t_min[i], rays.t_max[i], rays.time[i]);
     }
     BatchHits batch;
     scene.intersect(rays, batch);
-    for (std::size_t i = 0; i < 2 * RayBundle::kSize; ++i) {
-      const std::size_t ray = i % RayBundle::kSize;
-      const RayHit hit = i < RayBundle::kSize ? hits[ray] : batch.at(8 + ray);
+    for (std::size_t i = 0; i < 2 * RayPacket8::kSize; ++i) {
+      const std::size_t ray = i % RayPacket8::kSize;
+      const RayHit hit = i < RayPacket8::kSize ? hits[ray] : batch.at(8 + ray);
       CAPTURE(t, i);
       REQUIRE(hit.instance == &instance);
       CHECK(hit.distance == Approx(0.01f).margin(1e-4));

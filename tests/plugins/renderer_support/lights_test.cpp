@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "renderer_support/lights.h"
+#include "renderer_support/light_samples.h"
 
 #include <cmath>
 #include <vector>
@@ -64,17 +64,17 @@ struct Chosen {
   std::uint32_t light = 0;
   float probability = 0.0f;
 };
-Chosen choose(const Lights& lights, Receiver& receiver, float u) {
-  Lights::Wishes wishes;
-  wishes.count = 1;
-  wishes.position.set(0, receiver.position);
-  wishes.normal.set(0, receiver.normal);
-  wishes.is_two_sided[0] = receiver.is_two_sided;
-  wishes.u[0] = u;
-  Lights::Choices choices;
-  lights.choose(wishes, choices);
-  receiver.total_score = choices.total_score[0];
-  return {std::uint32_t(choices.light[0]), choices.probability[0]};
+Chosen choose(const LightTable& lights, Receiver& receiver, float u) {
+  LightQueries queries;
+  queries.count = 1;
+  queries.position.set(0, receiver.position);
+  queries.normal.set(0, receiver.normal);
+  queries.is_two_sided[0] = receiver.is_two_sided;
+  queries.u[0] = u;
+  LightSelections selections;
+  choose_lights(lights, queries, selections);
+  receiver.total_score = selections.total_score[0];
+  return {std::uint32_t(selections.light[0]), selections.probability[0]};
 }
 
 /// A point of one light, as one place gets it.
@@ -83,18 +83,18 @@ struct Sampled {
   float density = 0.0f;
   Vec3f radiance;
 };
-Sampled sample(const Lights& lights, const Vec3f& from, const Vec2f& u) {
-  Lights::Wishes wishes;
-  wishes.count = 1;
-  wishes.position.set(0, from);
-  Lights::Choices choices;
-  choices.probability[0] = 1.0f;
+Sampled sample(const LightTable& lights, const Vec3f& from, const Vec2f& u) {
+  LightQueries queries;
+  queries.count = 1;
+  queries.position.set(0, from);
+  LightSelections selections;
+  selections.probability[0] = 1.0f;
   BatchFloats x{};
   BatchFloats y{};
   x[0] = u.x();
   y[0] = u.y();
-  Lights::Samples samples;
-  lights.sample(wishes, choices, x, y, samples);
+  LightSamples samples;
+  sample_lights(lights, queries, selections, x, y, samples);
   const Vec3f direction = samples.direction.at(0);
   return {direction, samples.density[0], lights.radiance_of(samples.place(0), direction)};
 }
@@ -104,7 +104,7 @@ TEST_CASE("a ray towards a light sample meets that light with the same density",
   const Vec3f from(0.1f, 0.2f, 0.3f);
   Rng rng(12);
   for (const Light& light : every_kind()) {
-    Lights lights;
+    LightTable lights;
     lights.add(light, pose(), white_sky());
     lights.finish();
     for (int i = 0; i < 500; ++i) {
@@ -126,52 +126,52 @@ TEST_CASE("a ray towards a light sample meets that light with the same density",
 
 TEST_CASE("a batch of places gets what each would get alone, and its rays meet the same lights",
           "[lights]") {
-  Lights lights;
+  LightTable lights;
   for (const Light& light : every_kind()) lights.add(light, pose(), white_sky());
   lights.add(square(0.4, pose()));
   lights.finish();
   Rng rng(3);
-  Lights::Wishes wishes;
-  Lights::Choices choices;
+  LightQueries queries;
+  LightSelections selections;
   BatchFloats u{};
   BatchFloats v{};
-  wishes.count = 61;
-  for (std::size_t i = 0; i < wishes.count; ++i) {
-    wishes.position.set(i, {float(rng.uniform()), float(rng.uniform()), float(rng.uniform())});
-    choices.light[i] = std::int32_t(i % lights.count());
-    choices.probability[i] = i % 5 == 4 ? 0.0f : 0.5f;
+  queries.count = 61;
+  for (std::size_t i = 0; i < queries.count; ++i) {
+    queries.position.set(i, {float(rng.uniform()), float(rng.uniform()), float(rng.uniform())});
+    selections.light[i] = std::int32_t(i % lights.count());
+    selections.probability[i] = i % 5 == 4 ? 0.0f : 0.5f;
     u[i] = float(rng.uniform());
     v[i] = float(rng.uniform());
   }
-  Lights::Samples samples;
-  lights.sample(wishes, choices, u, v, samples);
-  BatchInts may_meet{};
-  lights.find_near(wishes.count, wishes.position, samples.direction, may_meet);
-  for (std::size_t i = 0; i < wishes.count; ++i) {
+  LightSamples samples;
+  sample_lights(lights, queries, selections, u, v, samples);
+  BatchInts may_hit{};
+  lights.find_near(queries.count, queries.position, samples.direction, may_hit);
+  for (std::size_t i = 0; i < queries.count; ++i) {
     CAPTURE(i);
-    if (choices.probability[i] == 0.0f) {
+    if (selections.probability[i] == 0.0f) {
       CHECK(samples.density[i] == 0.0f);
       continue;
     }
-    Lights::Wishes one;
+    LightQueries one;
     one.count = 1;
-    one.position.set(0, wishes.position.at(i));
-    Lights::Choices chosen;
-    chosen.light[0] = choices.light[i];
+    one.position.set(0, queries.position.at(i));
+    LightSelections chosen;
+    chosen.light[0] = selections.light[i];
     chosen.probability[0] = 0.5f;
     BatchFloats own_u{};
     BatchFloats own_v{};
     own_u[0] = u[i];
     own_v[0] = v[i];
-    Lights::Samples alone;
-    lights.sample(one, chosen, own_u, own_v, alone);
+    LightSamples alone;
+    sample_lights(lights, one, chosen, own_u, own_v, alone);
     CHECK(alone.density[0] == samples.density[i]);
     CHECK(alone.distance[0] == samples.distance[i]);
     CHECK(alone.direction.at(0) == samples.direction.at(i));
     int bodies = 0;
-    lights.along_ray(wishes.position.at(i), samples.direction.at(i), 0.0f, 1e6f, false,
+    lights.along_ray(queries.position.at(i), samples.direction.at(i), 0.0f, 1e6f, false,
                      [&](std::uint32_t, const Vec3f&, float) { ++bodies; });
-    if (bodies > 0) CHECK(may_meet[i] != 0);
+    if (bodies > 0) CHECK(may_hit[i] != 0);
   }
 }
 
@@ -179,7 +179,7 @@ TEST_CASE("the density of every light integrates to one", "[lights]") {
   const Vec3f from(0.1f, 0.2f, 0.3f);
   Rng rng(13);
   for (const Light& light : every_kind()) {
-    Lights lights;
+    LightTable lights;
     lights.add(light, pose(), white_sky());
     lights.finish();
     double sum = 0.0;
@@ -197,7 +197,7 @@ TEST_CASE("the density of every light integrates to one", "[lights]") {
 }
 
 TEST_CASE("lights are chosen as often as their probability says", "[lights]") {
-  Lights lights;
+  LightTable lights;
   for (const Light& light : every_kind()) lights.add(light, pose(), white_sky());
   lights.add(square(0.4, pose()));
   lights.finish();
@@ -206,20 +206,21 @@ TEST_CASE("lights are chosen as often as their probability says", "[lights]") {
   constexpr int kSamples = 200000;
   for (int i = 0; i < kSamples; ++i) {
     const Chosen choice = choose(lights, receiver, (float(i) + 0.5f) / float(kSamples));
-    CHECK(choice.probability == Approx(lights.probability(choice.light, receiver)).epsilon(1e-4));
+    CHECK(choice.probability ==
+          Approx(choice_probability(lights, choice.light, receiver)).epsilon(1e-4));
     counts[choice.light] += 1.0 / kSamples;
   }
   double total = 0.0;
   for (std::uint32_t i = 0; i < lights.count(); ++i) {
-    CHECK(counts[i] == Approx(lights.probability(i, receiver)).margin(2e-3));
+    CHECK(counts[i] == Approx(choice_probability(lights, i, receiver)).margin(2e-3));
     CHECK(counts[i] > 0.0);
-    total += double(lights.probability(i, receiver));
+    total += double(choice_probability(lights, i, receiver));
   }
   CHECK(total == Approx(1.0).epsilon(1e-4));
 }
 
 TEST_CASE("places that ask together get the lights that they get alone", "[lights]") {
-  Lights lights;
+  LightTable lights;
   for (int i = 0; i < 5; ++i) {
     for (const Light& light : every_kind()) {
       lights.add(light, Affine(Eigen::Translation3d(i, 0.5 * i, 0.0)) * pose(), white_sky());
@@ -227,19 +228,19 @@ TEST_CASE("places that ask together get the lights that they get alone", "[light
   }
   lights.finish();
   Rng rng(4);
-  Lights::Wishes wishes;
-  wishes.count = 13;
-  for (std::size_t i = 0; i < wishes.count; ++i) {
-    wishes.position.set(i, rng.uniform_in({Vec3(0, 0, 0), Vec3(5, 5, 1)}).cast<float>());
-    wishes.normal.set(i, Vec3(rng.uniform_rotation() * Vec3::UnitZ()).cast<float>());
-    wishes.is_two_sided[i] = i % 3 == 0;
-    wishes.u[i] = float(rng.uniform());
+  LightQueries queries;
+  queries.count = 13;
+  for (std::size_t i = 0; i < queries.count; ++i) {
+    queries.position.set(i, rng.uniform_in({Vec3(0, 0, 0), Vec3(5, 5, 1)}).cast<float>());
+    queries.normal.set(i, Vec3(rng.uniform_rotation() * Vec3::UnitZ()).cast<float>());
+    queries.is_two_sided[i] = i % 3 == 0;
+    queries.u[i] = float(rng.uniform());
   }
-  Lights::Choices together;
-  lights.choose(wishes, together);
-  for (std::size_t i = 0; i < wishes.count; ++i) {
-    Receiver alone = wishes.receiver(i);
-    const Chosen chosen = choose(lights, alone, wishes.u[i]);
+  LightSelections together;
+  choose_lights(lights, queries, together);
+  for (std::size_t i = 0; i < queries.count; ++i) {
+    Receiver alone = queries.receiver(i);
+    const Chosen chosen = choose(lights, alone, queries.u[i]);
     CHECK(std::uint32_t(together.light[i]) == chosen.light);
     CHECK(together.probability[i] == chosen.probability);
     CHECK(together.total_score[i] == alone.total_score);
@@ -248,7 +249,7 @@ TEST_CASE("places that ask together get the lights that they get alone", "[light
 
 TEST_CASE("hundreds of lights are chosen as often as their probability says", "[lights]") {
   Rng rng(21);
-  Lights lights;
+  LightTable lights;
   for (int i = 0; i < 300; ++i) {
     Light lamp;
     lamp.kind = i % 3 == 0 ? LightKind::Disk : LightKind::Sphere;
@@ -270,14 +271,14 @@ TEST_CASE("hundreds of lights are chosen as often as their probability says", "[
       missed += 1.0 / kSamples;
       continue;
     }
-    const float again = lights.probability(choice.light, receiver);
+    const float again = choice_probability(lights, choice.light, receiver);
     mismatches += std::abs(again / choice.probability - 1.0f) > 1e-3f;
     counts[choice.light] += 1.0 / kSamples;
   }
   CHECK(mismatches == 0);
   double total = 0.0;
   for (std::uint32_t i = 0; i < lights.count(); ++i) {
-    const double p = double(lights.probability(i, receiver));
+    const double p = double(choice_probability(lights, i, receiver));
     CHECK(counts[i] == Approx(p).margin(1e-4).epsilon(0.02));
     total += p;
   }
@@ -288,7 +289,7 @@ TEST_CASE("a lamp taken as a turning disk gives a near point less light", "[ligh
   Light lamp;
   lamp.radius_m = 0.5;
   lamp.color = Vec3f::Constant(3.0f);
-  Lights lights(true);
+  LightTable lights(true);
   lights.add(lamp, Affine(Eigen::Translation3d(0, 0, 1.3)), nullptr);
   lights.finish();
   Rng rng(5);
@@ -310,7 +311,7 @@ TEST_CASE("a light below the horizon or turned away is never chosen", "[lights]"
   Light lamp;
   lamp.kind = LightKind::Disk;
   lamp.radius_m = 0.2;
-  Lights lights;
+  LightTable lights;
   lights.add(lamp, Affine(Eigen::Translation3d(0, 0, 1)), nullptr);  // shines along -z
   lights.finish();
   Receiver below{Vec3f::Zero(), Vec3f::UnitZ(), false, 0.0f};
@@ -323,7 +324,7 @@ TEST_CASE("a light below the horizon or turned away is never chosen", "[lights]"
 
 TEST_CASE("the light that falls on a point is that of the closed forms", "[lights]") {
   // A surface at the origin facing +z, lights above it shining down.
-  const auto irradiance = [](const Lights& lights) {
+  const auto irradiance = [](const LightTable& lights) {
     Rng rng(8);
     double sum = 0.0;
     constexpr int kSamples = 100000;
@@ -336,7 +337,7 @@ TEST_CASE("the light that falls on a point is that of the closed forms", "[light
     return sum;
   };
   const auto make = [](const Light& light, const Affine& at) {
-    Lights lights;
+    LightTable lights;
     lights.add(light, at, white_sky());
     lights.finish();
     return lights;
@@ -371,7 +372,7 @@ TEST_CASE("the light that falls on a point is that of the closed forms", "[light
   CHECK(irradiance(make(light, Affine(Eigen::Translation3d(0, 0, 1.2)))) ==
         Approx(kPi * 3.0 * rect_above(1.5, 0.9, 1.2)).epsilon(0.01));
 
-  Lights emitting;
+  LightTable emitting;
   emitting.add(square(0.6, Affine(Eigen::Translation3d(0, 0, 1.2))));
   emitting.finish();
   CHECK(irradiance(emitting) == Approx(kPi * 3.0 * rect_above(1.2, 1.2, 1.2)).epsilon(0.01));
@@ -393,7 +394,7 @@ TEST_CASE("a cone keeps light to its inside", "[lights]") {
   spot.radius_m = 0.05;
   spot.cone_angle_rad = 0.5;
   spot.cone_softness = 0.2;
-  Lights lights;
+  LightTable lights;
   lights.add(spot, Affine(Eigen::Translation3d(0, 0, 2)), nullptr);
   lights.finish();
   const auto at_angle = [&](double angle) {

@@ -1,27 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lights.h"
+#include "light_table.h"
 
 #include <algorithm>
 #include <cmath>
 
 namespace diorama {
 
-void Lights::finish() {
+void LightTable::finish() {
   std::vector<LightTree::Light> placed;
-  order_.resize(lights_.size());
-  for (std::uint32_t i = 0; i < lights_.size(); ++i) {
-    const Record& r = lights_[i];
-    if (!is_body(r)) {
+  order_.resize(records_.size());
+  for (std::uint32_t i = 0; i < records_.size(); ++i) {
+    const Record& r = records_[i];
+    if (!r.is_body()) {
       surroundings_.push_back(i);
       continue;
     }
     order_[i] = std::uint32_t(bodies_.size());
     bodies_.push_back(i);
-    if (r.shape != Shape::Triangles) shapes_.push_back(i);
+    if (r.shape != LightShape::Triangles) shapes_.push_back(i);
     placed.push_back({r.position, r.radius, r.direction, r.spread, r.depth, r.behind, r.power});
   }
   tree_ = LightTree(placed);
-  for (const Record& light : lights_) columns_.add(light);
+  for (const Record& light : records_) columns_.add(light);
   for (std::uint32_t lane = 0; lane < tree_.root_count(); ++lane) {
     const std::int32_t body = tree_.light_of_root(lane);
     entry_lights_.push_back(body < 0 ? -1 : std::int32_t(bodies_[std::uint32_t(body)]));
@@ -29,7 +29,7 @@ void Lights::finish() {
   entry_lights_.insert(entry_lights_.end(), surroundings_.begin(), surroundings_.end());
 }
 
-void Lights::Columns::add(const Record& light) {
+void LightTable::Columns::add(const Record& light) {
   shape.push_back(std::int32_t(light.shape));
   for (int k = 0; k < 3; ++k) {
     position[std::size_t(k)].push_back(light.position[k]);
@@ -42,8 +42,8 @@ void Lights::Columns::add(const Record& light) {
   one_minus_cos.push_back(light.one_minus_cos);
 }
 
-void Lights::add(const Light& light, const Affine& world_from_node,
-                 std::shared_ptr<const DomeTexture> texture) {
+void LightTable::add(const Light& light, const Affine& world_from_node,
+                     std::shared_ptr<const DomeTexture> texture) {
   Record r;
   const Eigen::Matrix3f linear = world_from_node.linear().cast<float>();
   r.position = world_from_node.translation().cast<float>();
@@ -57,14 +57,14 @@ void Lights::add(const Light& light, const Affine& world_from_node,
   }
   switch (light.kind) {
     case LightKind::Sphere:
-      r.shape = has_disk_lamps_ ? Shape::TurningDisk : Shape::Sphere;
+      r.shape = has_disk_lamps_ ? LightShape::TurningDisk : LightShape::Sphere;
       r.radius = float(light.radius_m) * std::cbrt(std::abs(linear.determinant()));
       r.area = kPiF * r.radius * r.radius;
       break;
     case LightKind::Rect:
     case LightKind::Disk: {
       const bool is_disk = light.kind == LightKind::Disk;
-      r.shape = is_disk ? Shape::Disk : Shape::Rect;
+      r.shape = is_disk ? LightShape::Disk : LightShape::Rect;
       r.axis_x = linear.col(0) * float(is_disk ? light.radius_m : 0.5 * light.width_m);
       r.axis_y = linear.col(1) * float(is_disk ? light.radius_m : 0.5 * light.height_m);
       const Vec3f normal = r.axis_x.cross(r.axis_y);
@@ -78,7 +78,7 @@ void Lights::add(const Light& light, const Affine& world_from_node,
       break;
     }
     case LightKind::Distant: {
-      r.shape = Shape::Distant;
+      r.shape = LightShape::Distant;
       const double half = 0.5 * std::clamp(light.angle_rad, 0.0, kPi);
       r.power = luminance(r.radiance);
       r.one_minus_cos = float(2.0 * std::pow(std::sin(0.5 * half), 2));
@@ -86,25 +86,25 @@ void Lights::add(const Light& light, const Affine& world_from_node,
       break;
     }
     case LightKind::Dome:
-      r.shape = Shape::Dome;
+      r.shape = LightShape::Dome;
       r.dome_from_world = world_from_node.rotation().transpose().cast<float>();
       r.texture = std::move(texture);
       r.sky = std::make_shared<const SkyGrid>(*r.texture);
       r.power = luminance(r.radiance);
       break;
   }
-  if (is_body(r)) r.power = luminance(r.radiance) * r.area;
-  if (r.power > 0.0f && std::isfinite(r.power)) lights_.push_back(std::move(r));
+  if (r.is_body()) r.power = luminance(r.radiance) * r.area;
+  if (r.power > 0.0f && std::isfinite(r.power)) records_.push_back(std::move(r));
 }
 
-void Lights::learn_sky(const GridOf& grid_of) {
-  for (Record& light : lights_) {
-    if (light.shape != Shape::Dome) continue;
+void LightTable::learn_sky(const GridOf& grid_of) {
+  for (Record& light : records_) {
+    if (light.shape != LightShape::Dome) continue;
     if (auto grid = grid_of(light.texture, light.dome_from_world.transpose())) light.sky = grid;
   }
 }
 
-void Lights::find_direction(Record& light) {
+void LightTable::find_direction(Record& light) {
   Vec3f sum = Vec3f::Zero();
   for (const auto& t : light.triangles) sum += t.front(light.is_mirrored);
   if (!(sum.norm() > 0.0f)) return;
@@ -125,9 +125,9 @@ void Lights::find_direction(Record& light) {
   light.power *= 2.0f;
 }
 
-std::uint32_t Lights::add(EmittingTriangles source) {
+std::uint32_t LightTable::add(EmittingTriangles source) {
   Record r;
-  r.shape = Shape::Triangles;
+  r.shape = LightShape::Triangles;
   r.geometry = source.geometry;
   r.is_double_sided = source.is_double_sided;
   r.is_mirrored = source.is_mirrored;
@@ -149,8 +149,8 @@ std::uint32_t Lights::add(EmittingTriangles source) {
   }
   r.power = 0.5f * luminance(r.radiance) * r.area;
   if (!r.is_double_sided || source.is_closed) find_direction(r);
-  lights_.push_back(std::move(r));
-  return std::uint32_t(lights_.size() - 1);
+  records_.push_back(std::move(r));
+  return std::uint32_t(records_.size() - 1);
 }
 
 }  // namespace diorama
