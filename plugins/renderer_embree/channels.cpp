@@ -29,8 +29,8 @@ class ChannelImages {
 
   void put(int x, int y, const CameraRay& ray, const RayHit& hit) {
     if (leaves_) leaves_->at(x, y) = hit.instance->node.index;
-    SurfaceGeometry s = RenderScene::surface_at(hit, ray.origin, ray.direction);
-    if (uvs_ || albedo_) RenderScene::add_uv(s, hit);
+    SurfaceGeometry s = surface_at(hit, ray.origin, ray.direction);
+    if (uvs_ || albedo_) add_uv(s, hit);
     if (distance_) distance_->at(x, y) = (s.position - ray.origin).norm();
     if (depth_)
       depth_->at(x, y) = float(-(view_.camera_from_world() * s.position.cast<double>()).z());
@@ -116,11 +116,11 @@ struct OwnMeshes {
   bool has_holes = false;  ///< By texture.
 };
 
-OwnMeshes meshes_of(const LabelledInstance& instance, const RenderScene& meshes) {
+OwnMeshes meshes_of(const LabelledInstance& instance, const EmbreeScene& meshes) {
   OwnMeshes own;
   own.is_own.resize(meshes.instances().size(), false);
   for (std::uint32_t i = 0; i < meshes.instances().size(); ++i) {
-    const MeshInstance& mesh = *meshes.instances()[i];
+    const MeshInstance& mesh = meshes.instances()[i];
     const auto& leaves = instance.leaves;
     if (std::find(leaves.begin(), leaves.end(), mesh.node) == leaves.end()) continue;
     own.numbers.push_back(i);
@@ -133,11 +133,11 @@ OwnMeshes meshes_of(const LabelledInstance& instance, const RenderScene& meshes)
 }
 
 /// By a ray through every pixel of the box: for bent lenses and holes.
-CoverageMask traced(const RenderScene& meshes, const View& view, const OwnMeshes& own,
+CoverageMask traced(const EmbreeScene& meshes, const View& view, const OwnMeshes& own,
                     const PixelBox& box, bool with_distances, const Host& host) {
   CoverageMask mask;
   mask.box = box;
-  const RenderScene::SubScene sub_scene(meshes, own.numbers);
+  const EmbreeScene::SubScene sub_scene(meshes, own.numbers);
   for (int y = box.y_min; y < box.y_max; ++y) {
     host.stop_if_asked();
     for (int x = box.x_min; x < box.x_max; ++x) {
@@ -151,13 +151,12 @@ CoverageMask traced(const RenderScene& meshes, const View& view, const OwnMeshes
   return mask;
 }
 
-CoverageMask drawn(const RenderScene& meshes, const View& view, const OwnMeshes& own,
+CoverageMask drawn(const EmbreeScene& meshes, const View& view, const OwnMeshes& own,
                    const PixelBox& box, bool with_distances, Isa isa) {
   Silhouette silhouette(view.camera(), box, with_distances, isa);
   for (const std::uint32_t number : own.numbers) {
-    const MeshInstance& mesh = *meshes.instances()[number];
-    silhouette.add(mesh.mesh->triangles, mesh.world_positions, mesh.mesh->positions.size(),
-                   view.camera_from_world());
+    const MeshInstance& mesh = meshes.instances()[number];
+    silhouette.add(mesh.source(), mesh.linear, mesh.translation, view.camera_from_world());
   }
   return silhouette.take();
 }
@@ -186,7 +185,7 @@ void agree_with(const SeenMeshes& seen, const OwnMeshes& own, CoverageMask& mask
   }
 }
 
-CoverageMask coverage_of(const RenderScene& meshes, const View& view,
+CoverageMask coverage_of(const EmbreeScene& meshes, const View& view,
                          const std::optional<RayBlocks>& blocks, const SeenMeshes& seen,
                          const LabelledInstance& instance, bool with_distances, Isa isa,
                          const Host& host) {
@@ -211,7 +210,7 @@ NameSet geometry_channels() {
   return names;
 }
 
-void fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshes, const View& view,
+void fill_channels(Frame& frame, const NameSet& wanted, const EmbreeScene& meshes, const View& view,
                    SeenMeshes& seen, Image<RayHit>* all_hits, Host& host) {
   const int width = view.camera().width;
   const int height = view.camera().height;
@@ -241,7 +240,7 @@ void fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshe
       for (std::size_t i = 0; i < rays.count; ++i) {
         if (!hits.instance[i]) continue;
         const RayHit hit = hits.at(i);
-        seen.numbers.at(columns[i], y) = hit.geometry;
+        seen.numbers.at(columns[i], y) = hit.number;
         seen.distances.at(columns[i], y) = hit.distance;
         if (all_hits) all_hits->at(columns[i], y) = hit;
         if (wanted.empty()) continue;
@@ -253,7 +252,7 @@ void fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshe
   channels.move_to(frame);
 }
 
-std::vector<CoverageMask> coverage(const RenderScene& meshes, const View& view,
+std::vector<CoverageMask> coverage(const EmbreeScene& meshes, const View& view,
                                    const SeenMeshes& seen,
                                    std::span<const LabelledInstance> instances, bool with_distances,
                                    Isa isa, Host& host) {

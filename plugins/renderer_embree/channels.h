@@ -7,7 +7,8 @@
 
 #include "diorama/frame.h"
 #include "diorama/host.h"
-#include "render_scene.h"
+#include "embree_scene.h"
+#include "renderer_support/isa.h"
 #include "renderer_support/view.h"
 
 namespace diorama {
@@ -26,11 +27,11 @@ NameSet geometry_channels();
 /// Fills the wanted ones among the id and geometry channels, all from one ray per pixel centre, and
 /// `seen` with what these rays met; its memory is used again where it has the view's size. `hits`
 /// gets all of it, if there: they are valid until the scene's next take().
-void fill_channels(Frame& frame, const NameSet& wanted, const RenderScene& meshes, const View& view,
+void fill_channels(Frame& frame, const NameSet& wanted, const EmbreeScene& meshes, const View& view,
                    SeenMeshes& seen, Image<RayHit>* hits, Host& host);
 
 /// See Renderer::cover. `seen` is that of the same view.
-std::vector<CoverageMask> coverage(const RenderScene& meshes, const View& view,
+std::vector<CoverageMask> coverage(const EmbreeScene& meshes, const View& view,
                                    const SeenMeshes& seen,
                                    std::span<const LabelledInstance> instances, bool with_distances,
                                    Isa isa, Host& host);

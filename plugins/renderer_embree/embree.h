@@ -9,7 +9,21 @@
 #include <embree3/rtcore.h>
 #endif
 
+#include <memory>
+#include <type_traits>
+
 namespace diorama::embree {
+
+template <class Object, void (*kRelease)(Object)>
+struct Release {
+  void operator()(Object object) const { kRelease(object); }
+};
+template <class Object, void (*kRelease)(Object)>
+using Handle = std::unique_ptr<std::remove_pointer_t<Object>, Release<Object, kRelease>>;
+// Embree counts uses: a scene goes on using a geometry whose handle is gone.
+using DeviceHandle = Handle<RTCDevice, &rtcReleaseDevice>;
+using SceneHandle = Handle<RTCScene, &rtcReleaseScene>;
+using GeometryHandle = Handle<RTCGeometry, &rtcReleaseGeometry>;
 
 // Rays that are coherent, neighbours going nearly the same way, are traced faster when it is said.
 

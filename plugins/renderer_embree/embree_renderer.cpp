@@ -125,8 +125,8 @@ EmbreeRenderer::EmbreeRenderer(Params params, Host& host)
     : params_(std::move(params)),
       host_(host),
       isa_(isa_by_name(params_.isa)),
-      meshes_(host, {kIsaNames[std::size_t(isa_)], params_.sphere_lights == "disk",
-                     params_.principled == "blender"}) {
+      meshes_(host, {kIsaNames[std::size_t(isa_)],
+                     {params_.sphere_lights == "disk", params_.principled == "blender"}}) {
   if (params_.mode == "path_traced") return;
   params_.denoise = true;
   params_.max_bounces = std::min(params_.max_bounces, params_.mode == "real_time" ? 1 : 0);
@@ -140,7 +140,7 @@ NameSet EmbreeRenderer::provides() const {
 }
 
 RenderReport EmbreeRenderer::report() const {
-  const RenderScene::Times& prepared = meshes_.times();
+  const EmbreeScene::Times& prepared = meshes_.times();
   RenderReport report;
   report.paths = counts_.paths;
   report.rays = counts_.rays + counts_.shadow_rays;

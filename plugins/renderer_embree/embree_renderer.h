@@ -9,8 +9,8 @@
 #include "diorama/host.h"
 #include "diorama/params.h"
 #include "diorama/renderer.h"
+#include "embree_scene.h"
 #include "path_tracer.h"
-#include "render_scene.h"
 #include "renderer_support/denoiser.h"
 #include "renderer_support/sample_plan.h"
 
@@ -74,7 +74,7 @@ class EmbreeRenderer final : public Renderer {
   Params params_;
   Host& host_;
   Isa isa_;
-  RenderScene meshes_;
+  EmbreeScene meshes_;
   Counts counts_;
   NodeId seen_by_;  ///< The camera of `seen_`, if there is any.
   SeenMeshes seen_;

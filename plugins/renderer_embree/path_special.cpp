@@ -47,7 +47,7 @@ Vec3f mapped_normal(const RayHit& hit, const SurfaceGeometry& s, const TextureSl
 }  // namespace
 
 Vec3f base_color_at(const RayHit& hit, const SurfaceGeometry& surface, float uv_footprint) {
-  const Mesh& mesh = *hit.instance->mesh;
+  const Mesh& mesh = hit.instance->source();
   const ShadingMaterial& material = hit.instance->material(hit.triangle);
   Vec3f color = material.source->base_color;
   if (material.base_color) {
@@ -73,7 +73,7 @@ void PathTracer::collect_emission(Path& path, const Vec3f& direction, const RayH
                                   const ShadingMaterial& material) const {
   const bool is_first = std::isinf(path.last_density);
   if (path.hides_lights || (!is_first && !settings_.samples_bsdf)) return;
-  if (surface.is_back && !hit.instance->mesh->is_double_sided) return;
+  if (surface.is_back && !hit.instance->source().is_double_sided) return;
   const Vec3f radiance = material.emission_at(surface.uv, path.width * surface.uv_per_metre);
   float weight = 1.0f;
   const std::uint32_t light = hit.instance->triangle_lights[hit.triangle];

@@ -20,7 +20,7 @@ constexpr std::uint32_t kRun = 8;
 
 }  // namespace
 
-PathTracer::PathTracer(const RenderScene& scene, const View& view, const TraceSettings& settings,
+PathTracer::PathTracer(const EmbreeScene& scene, const View& view, const TraceSettings& settings,
                        Isa isa)
     : scene_(scene), view_(view), settings_(settings), isa_(isa) {}
 
@@ -216,7 +216,7 @@ inline void PathTracer::add_light_sample(const Batch& v, std::size_t i,
   const LightTable& lights = scene_.lights();
   Vec3f radiance;
   if (lights.is_surface(place)) {
-    const MeshInstance& emitter = *scene_.instances()[lights.geometry_of(place)];
+    const MeshInstance& emitter = scene_.instances()[lights.instance_of(place)];
     const Vec2f uv = emitter.uv(place.triangle, place.place.x(), place.place.y());
     radiance = emitter.material(place.triangle).emission_at(uv, 0.0f);
   } else {
@@ -240,7 +240,7 @@ inline void PathTracer::process_hits(Batch& v) const {
     const ShadingMaterial& material = instance->material(std::uint32_t(v.hits.triangle[i]));
     if (path.bounce > settings_.max_bounces && !material.emits) continue;
     v.material[i] = &material;
-    v.interpolated.set(i, RenderScene::interpolated_normal(v.hits.at(i)));
+    v.interpolated.set(i, interpolated_normal(v.hits.at(i)));
     v.is_mirrored[i] = instance->is_mirrored;
   }
 }
@@ -251,11 +251,11 @@ inline bool PathTracer::evaluate_material(Batch& v, std::size_t i) const {
   const ShadingMaterial& material = *v.material[i];
   const bool is_soft = path.is_soft(settings_);
   v.bsdf[i] = is_soft ? &material.soft : &material.sharp;
-  const bool has_colors = !v.hits.instance[i]->mesh->colors.empty();
+  const bool has_colors = !v.hits.instance[i]->source().colors.empty();
   if (!material.is_special && !has_colors) return true;
   const RayHit hit = v.hits.at(i);
   SurfaceGeometry surface = v.surface(i);
-  if (material.reads_uv) RenderScene::add_uv(surface, hit);
+  if (material.reads_uv) add_uv(surface, hit);
   const Vec3f direction = v.rays.direction.at(i);
   if (material.emits) collect_emission(path, direction, hit, surface, material);
   if (path.bounce > settings_.max_bounces) return false;

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "diorama/host.h"
-#include "render_scene.h"
+#include "embree_scene.h"
 #include "renderer_support/batch.h"
 #include "renderer_support/film.h"
 #include "renderer_support/isa.h"
@@ -54,7 +54,7 @@ struct RayCounts {
 /// finds (multiple importance sampling). Const and shareable between threads.
 class PathTracer {
  public:
-  PathTracer(const RenderScene& scene, const View& view, const TraceSettings& settings, Isa isa);
+  PathTracer(const EmbreeScene& scene, const View& view, const TraceSettings& settings, Isa isa);
 
   /// Adds samples to the sums of the job's pixels, which lie row by row from its first on, `stride`
   /// per row. Equal jobs give equal sums. Uses the kernel compiled for the instruction set.
@@ -108,7 +108,7 @@ class PathTracer {
                      SurfaceBsdf& bsdf, Vec3f& normal) const;
   void add(Path& path, int bounce, const Vec3f& radiance) const;
 
-  const RenderScene& scene_;
+  const EmbreeScene& scene_;
   const View& view_;
   TraceSettings settings_;
   Isa isa_;

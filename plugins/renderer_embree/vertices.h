@@ -4,7 +4,7 @@
 #include <array>
 #include <vector>
 
-#include "render_scene.h"
+#include "embree_scene.h"
 #include "renderer_support/bsdf.h"
 #include "renderer_support/light_samples.h"
 
@@ -78,7 +78,7 @@ struct Vertices {
   std::size_t count = 0;
   BatchRays rays;  ///< That met them.
   BatchHits hits;
-  BatchVectors interpolated;  ///< Normal; see RenderScene::interpolated_normal().
+  BatchVectors interpolated;  ///< Normal; see interpolated_normal().
   BatchInts is_mirrored;
 
   BatchVectors position;
@@ -170,8 +170,8 @@ inline void Vertices::find_surfaces() {
   for (std::size_t i = 0; i < whole_steps(count); ++i) {
     const Vec3f direction = rays.direction.at(i);
     const Vec3f met = rays.origin.at(i) + hits.distance[i] * direction;
-    const SurfaceGeometry s = RenderScene::surface_of(met, direction, hits.normal.at(i),
-                                                      interpolated.at(i), is_mirrored[i] != 0);
+    const SurfaceGeometry s =
+        surface_of(met, direction, hits.normal.at(i), interpolated.at(i), is_mirrored[i] != 0);
     position.set(i, s.position);
     flat_normal.set(i, s.flat_normal);
     normal.set(i, s.normal);

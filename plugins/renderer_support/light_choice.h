@@ -25,12 +25,15 @@ struct LightQueries {
     return {position.at(i), normal.at(i), is_two_sided[i] != 0, 0.0f};
   }
 };
+/// The lights chosen for them.
 struct LightSelections {
   BatchInts light{};
   BatchFloats probability{};        ///< Zero: no light can contribute.
   BatchFloats total_score{};        ///< For Receiver.
   std::vector<BatchFloats> scores;  ///< Of the entries that are compared.
 };
+
+namespace detail {
 
 /// The entry that each place of a batch has come to among those offered so far.
 struct LightPicks {
@@ -104,7 +107,9 @@ inline void LightPicks::offer(int index, const BatchFloats& scores, const BatchF
   std::fill(selections.light.begin() + std::ptrdiff_t(queries.count), selections.light.end(), 0);
 }
 
-// Scores first, then the light in whose share of their sum a place's number falls.
+}  // namespace detail
+
+/// Scores first, then the light in whose share of their sum a place's number falls.
 inline void choose_lights(const LightTable& table, const LightQueries& queries,
                           LightSelections& selections) {
   const std::size_t size = whole_steps(queries.count);
@@ -118,11 +123,12 @@ inline void choose_lights(const LightTable& table, const LightQueries& queries,
         scores[i] = table.tree().root_score(entry, queries.receiver(i));
       }
     } else {
-      score_surroundings(table.records()[table.surroundings()[entry - roots]], queries, scores);
+      detail::score_surroundings(table.records()[table.surroundings()[entry - roots]], queries,
+                                 scores);
     }
     for (std::size_t i = 0; i < size; ++i) selections.total_score[i] += scores[i];
   }
-  LightPicks picks;
+  detail::LightPicks picks;
   for (std::size_t entry = 0; entry < selections.scores.size(); ++entry) {
     picks.offer(int(entry), selections.scores[entry], queries.u, selections.total_score, size);
   }
@@ -138,7 +144,7 @@ inline void choose_lights(const LightTable& table, const LightQueries& queries,
     selections.light[i] = is_none ? 0 : picked[i];
     selections.probability[i] = is_none ? 0.0f : share;
   }
-  if (table.tree().has_groups()) descend_groups(table, queries, picks, selections);
+  if (table.tree().has_groups()) detail::descend_groups(table, queries, picks, selections);
 }
 
 /// With which choose_lights() picks this light for the receiver.
@@ -147,7 +153,7 @@ inline float choice_probability(const LightTable& table, std::uint32_t light,
   const float total = receiver.total_score;
   if (!(total > 0.0f)) return 0.0f;
   const LightTable::Record& record = table.records()[light];
-  if (!record.is_body()) return score_of_surroundings(record, receiver) / total;
+  if (!record.is_body()) return detail::score_of_surroundings(record, receiver) / total;
   float tree_score = 0.0f;
   const float within = table.tree().probability(table.order()[light], receiver, tree_score);
   return within * (tree_score / total);

@@ -128,7 +128,7 @@ void LightTable::find_direction(Record& light) {
 std::uint32_t LightTable::add(EmittingTriangles source) {
   Record r;
   r.shape = LightShape::Triangles;
-  r.geometry = source.geometry;
+  r.instance = source.instance;
   r.is_double_sided = source.is_double_sided;
   r.is_mirrored = source.is_mirrored;
   r.radiance = source.mean_radiance;

@@ -27,7 +27,7 @@ struct EmittingTriangles {
     Vec3f front(bool is_mirrored) const { return ab.cross(ac) * (is_mirrored ? -1.0f : 1.0f); }
   };
   std::vector<Triangle> triangles;
-  std::uint32_t geometry = 0;
+  std::uint32_t instance = 0;
   bool is_double_sided = true;
   /// Of a double-sided lamp: its inner side is hardly seen from anywhere.
   bool is_closed = false;
@@ -71,7 +71,7 @@ class LightTable {
     Eigen::Matrix3f dome_from_world = Eigen::Matrix3f::Identity();
     std::shared_ptr<const DomeTexture> texture;
     std::shared_ptr<const SkyGrid> sky;
-    std::uint32_t geometry = 0;
+    std::uint32_t instance = 0;
     std::vector<EmittingTriangles::Triangle> triangles;
     std::vector<float> cumulative_area;
 
@@ -129,8 +129,8 @@ class LightTable {
   bool is_surface(const LightPlace& place) const {
     return records_[place.light].shape == LightShape::Triangles;
   }
-  std::uint32_t geometry_of(const LightPlace& place) const {
-    return records_[place.light].geometry;
+  std::uint32_t instance_of(const LightPlace& place) const {
+    return records_[place.light].instance;
   }
   /// Density per solid angle of an emitting triangle's point, seen from `from`.
   float density_of_surface(std::uint32_t light, float distance, float cos_at_light) const;

@@ -29,6 +29,7 @@ class ShadingMesh {
   void pack_uvs();
 
   const Mesh& source() const { return *source_; }
+  const std::shared_ptr<const Mesh>& shared_source() const { return source_; }
   /// Vertices of the source.
   const std::vector<std::array<std::uint32_t, 4>>& quads() const { return quads_; }
 

@@ -37,38 +37,37 @@ Silhouette::Silhouette(const Camera& camera, const PixelBox& box, bool with_dist
   if (with_distances) nearness_.assign(bits_.size(), 0.0f);
 }
 
-void Silhouette::add(const std::vector<std::array<std::uint32_t, 3>>& triangles,
-                     const std::vector<float>& positions, std::size_t vertex_count,
+void Silhouette::add(const Mesh& mesh, const Eigen::Matrix3f& linear, const Vec3f& translation,
                      const Affine& camera_from_world) {
-  corners_.resize(vertex_count);
-  reaches_.resize(vertex_count);
+  corners_.resize(mesh.positions.size());
+  reaches_.resize(mesh.positions.size());
+  const Placed placed{mesh.positions, linear, translation};
   if (has_avx2_) {
-    place_avx2(positions, camera_from_world);
-    add_all_avx2(triangles);
+    place_avx2(placed, camera_from_world);
+    add_all_avx2(mesh.triangles);
   } else {
-    place(positions, camera_from_world);
-    add_all(triangles);
+    place(placed, camera_from_world);
+    add_all(mesh.triangles);
   }
 }
 
 // Without fused multiplications, which would move edges by a hair.
-[[gnu::target("avx2"), gnu::flatten]] void Silhouette::place_avx2(
-    const std::vector<float>& positions, const Affine& camera_from_world) {
-  place(positions, camera_from_world);
+[[gnu::target("avx2"), gnu::flatten]] void Silhouette::place_avx2(const Placed& mesh,
+                                                                  const Affine& camera_from_world) {
+  place(mesh, camera_from_world);
 }
 [[gnu::target("avx2"), gnu::flatten]] void Silhouette::add_all_avx2(
     const std::vector<std::array<std::uint32_t, 3>>& triangles) {
   add_all(triangles);
 }
 
-inline void Silhouette::place(const std::vector<float>& positions,
-                              const Affine& camera_from_world) {
+inline void Silhouette::place(const Placed& mesh, const Affine& camera_from_world) {
   const Mat3 linear = camera_from_world.linear();
   const Vec3 translation = camera_from_world.translation();
   for (std::size_t i = 0; i < corners_.size(); ++i) {
     Corner& corner = corners_[i];
-    corner.position =
-        linear * Eigen::Map<const Vec3f>(&positions[3 * i]).cast<double>() + translation;
+    const Vec3f in_world = mesh.linear * mesh.positions[i] + mesh.translation;
+    corner.position = linear * in_world.cast<double>() + translation;
     reaches_[i] = reach_of(corner);
   }
 }

@@ -7,6 +7,7 @@
 
 #include "diorama/camera.h"
 #include "diorama/frame.h"
+#include "diorama/geometry.h"
 #include "diorama/math.h"
 #include "isa.h"
 
@@ -20,9 +21,8 @@ class Silhouette {
   /// Pixels of `box` only, which may reach beyond the image.
   Silhouette(const Camera& camera, const PixelBox& box, bool with_distances, Isa isa);
 
-  /// `positions`: x, y, z of each vertex in the world.
-  void add(const std::vector<std::array<std::uint32_t, 3>>& triangles,
-           const std::vector<float>& positions, std::size_t vertex_count,
+  /// A mesh at a pose in the world.
+  void add(const Mesh& mesh, const Eigen::Matrix3f& linear, const Vec3f& translation,
            const Affine& camera_from_world);
 
   /// What was covered, in the whole box. Leaves nothing behind.
@@ -50,8 +50,14 @@ class Silhouette {
     int last;
   };
 
-  void place(const std::vector<float>& positions, const Affine& camera_from_world);
-  void place_avx2(const std::vector<float>& positions, const Affine& camera_from_world);
+  /// In the world.
+  struct Placed {
+    const std::vector<Vec3f>& positions;
+    const Eigen::Matrix3f& linear;
+    const Vec3f& translation;
+  };
+  void place(const Placed& mesh, const Affine& camera_from_world);
+  void place_avx2(const Placed& mesh, const Affine& camera_from_world);
   void add_all(const std::vector<std::array<std::uint32_t, 3>>& triangles);
   void add_all_avx2(const std::vector<std::array<std::uint32_t, 3>>& triangles);
   FourInts reach_of(const Corner& corner) const;

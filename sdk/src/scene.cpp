@@ -2,6 +2,7 @@
 #include "diorama/scene.h"
 
 #include <algorithm>
+#include <atomic>
 
 #include "diorama/error.h"
 
@@ -76,6 +77,12 @@ bool fits(const std::vector<PatternStep>& steps, std::string_view text) {
   return reached[text.size()] != 0;
 }
 
+/// Drawn from one count by all scenes: equal revisions mean the same scene, unchanged.
+std::uint64_t next_revision() {
+  static std::atomic<std::uint64_t> last{0};
+  return ++last;
+}
+
 void add_mesh(Aabb& box, const Mesh& mesh, const Affine& box_from_mesh) {
   for (const Vec3f& position : mesh.positions) box.add(box_from_mesh * position.cast<double>());
 }
@@ -84,8 +91,8 @@ void add_mesh(Aabb& box, const Mesh& mesh, const Affine& box_from_mesh) {
 
 struct Scene::State {
   std::vector<std::unique_ptr<Slot>> slots;  // by id; null: erased
-  std::uint64_t pose_revision = 1;
-  std::uint64_t shape_revision = 1;
+  std::uint64_t pose_revision = next_revision();
+  std::uint64_t shape_revision = next_revision();
 
   Slot& at(NodeId id) const {
     if (id.index < slots.size() && slots[id.index]) return *slots[id.index];
@@ -124,7 +131,7 @@ NodeId Scene::create(NodeId parent, std::string_view stem) {
   state_->slots.push_back(std::move(slot));
   above.node.children.push_back(id);
   above.children_by_name.emplace(std::move(name), id);
-  ++state_->shape_revision;
+  state_->shape_revision = next_revision();
   return id;
 }
 
@@ -135,7 +142,7 @@ void Scene::erase(NodeId top) {
   std::erase(parent.node.children, top);
   parent.children_by_name.erase(state_->at(top).node.name);
   for (const NodeId id : gone) state_->slots[id.index].reset();
-  ++state_->shape_revision;
+  state_->shape_revision = next_revision();
 }
 
 bool Scene::contains(NodeId node) const {
@@ -258,7 +265,7 @@ void Scene::set_pose(NodeId node, const Affine& parent_from_node) {
     throw Error(ErrorKind::Internal, path(node) + ": the pose is not finite");
   }
   slot.node.parent_from_node = parent_from_node;
-  ++state_->pose_revision;
+  state_->pose_revision = next_revision();
 }
 
 void Scene::set_pose(NodeId node, const Transform& parent_from_node) {
@@ -267,7 +274,7 @@ void Scene::set_pose(NodeId node, const Transform& parent_from_node) {
 
 Node& Scene::edit(NodeId node) {
   Slot& slot = state_->at(node);
-  ++state_->shape_revision;
+  state_->shape_revision = next_revision();
   return slot.node;
 }
 

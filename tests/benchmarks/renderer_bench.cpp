@@ -35,8 +35,8 @@ double thread_seconds() {
 double share_of_raw_rays(const Scene& scene, NodeId camera, Host& host,
                          const EmbreeRenderer::Params& params) {
   const Isa isa = isa_by_name(params.isa);
-  RenderScene meshes(host, {kIsaNames[std::size_t(isa)], params.sphere_lights == "disk",
-                            params.principled == "blender"});
+  EmbreeScene meshes(host, {kIsaNames[std::size_t(isa)],
+                            {params.sphere_lights == "disk", params.principled == "blender"}});
   meshes.take(scene);
   const View view(scene, camera);
   TraceSettings settings{params.max_bounces, float(params.clamp), params.caustics};

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "diorama/scene.h"
 
+#include <cstdint>
+#include <set>
+
 #include "error_text.h"
 #include "support/catch.h"
 
@@ -177,6 +180,18 @@ TEST_CASE("Revisions tell poses from shapes", "[scene]") {
   k.scene.erase(created);
   CHECK(k.scene.shape_revision() > grown);
   CHECK(k.scene.pose_revision() == moved_pose);
+}
+
+TEST_CASE("no two scenes ever have the same revision", "[scene]") {
+  std::set<std::uint64_t> seen;
+  for (int i = 0; i < 3; ++i) {
+    // After equal changes, and likely at the same address.
+    Scene scene;
+    const NodeId node = scene.create(scene.root(), "node");
+    scene.set_pose(node, Affine::Identity());
+    CHECK(seen.insert(scene.pose_revision()).second);
+    CHECK(seen.insert(scene.shape_revision()).second);
+  }
 }
 
 TEST_CASE("Labels are inherited per taxonomy from the nearest ancestor", "[scene]") {

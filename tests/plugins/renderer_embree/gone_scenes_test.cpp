@@ -6,8 +6,8 @@
 
 #include "diorama/renderer.h"
 #include "embree_renderer.h"
+#include "embree_scene.h"
 #include "null_renderer.h"
-#include "render_scene.h"
 #include "support/catch.h"
 #include "support/render_host/render_host.h"
 #include "test_world.h"
@@ -111,7 +111,7 @@ TEST_CASE("renderers keep nothing of scenes that are gone", "[memory]") {
 
 TEST_CASE("tables of textures and skies go with them", "[memory]") {
   RenderHost host(2);
-  RenderScene uploaded(host, {});
+  EmbreeScene uploaded(host, {});
   Remains remains;
   RenderScene::Kept most;
   for (int i = 0; i < kVisits; ++i) {
@@ -131,7 +131,7 @@ TEST_CASE("tables of textures and skies go with them", "[memory]") {
 
 TEST_CASE("what an asset cache keeps is made ready once", "[memory]") {
   RenderHost host(2);
-  RenderScene uploaded(host, {});
+  EmbreeScene uploaded(host, {});
   Remains remains;
   const auto cached = std::make_unique<const Visit>(0, remains);
   uploaded.take(cached->world.scene);
@@ -146,7 +146,7 @@ TEST_CASE("what an asset cache keeps is made ready once", "[memory]") {
 
 TEST_CASE("roughness drawn for every capture leaves no tables behind", "[memory]") {
   RenderHost host(2);
-  RenderScene uploaded(host, {});
+  EmbreeScene uploaded(host, {});
   std::size_t most = 0;
   for (int capture = 0; capture < 30; ++capture) {
     TestWorld world;

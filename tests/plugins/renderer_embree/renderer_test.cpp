@@ -228,7 +228,7 @@ TEST_CASE("light samples, BSDF samples and both together agree", "[renderer][mis
   TestWorld world = busy_room();
   const NodeId camera = world.add_camera(40, 30, 22.0, Vec3(-1.8, -1.5, 0.6), Vec3(0.3, 0.6, -0.9));
   RenderHost host(2);
-  RenderScene scene(host, {});
+  EmbreeScene scene(host, {});
   scene.take(world.scene);
   const View view(world.scene, camera);
   const auto measure = [&](bool lights, bool bsdf, int samples, float indirect_share = 1.0f) {
@@ -273,7 +273,7 @@ TEST_CASE("fireflies are rarer than one in a million samples", "[renderer]") {
   TestWorld world = busy_room();
   const NodeId camera = world.add_camera(40, 30, 22.0, Vec3(-1.8, -1.5, 0.6), Vec3(0.3, 0.6, -0.9));
   RenderHost host(2);
-  RenderScene scene(host, {});
+  EmbreeScene scene(host, {});
   scene.take(world.scene);
   const View view(world.scene, camera);
   const PathTracer tracer(scene, view, TraceSettings{}, Isa::Sse2);

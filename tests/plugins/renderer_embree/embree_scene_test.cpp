@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Rays meet quads; what they tell is about the triangles of the source.
-#include "render_scene.h"
+#include "embree_scene.h"
 
 #include <algorithm>
 #include <cmath>
@@ -80,7 +80,7 @@ float ramp_at(const Vec2& uv) {
 struct Sheet {
   TestWorld world;
   RenderHost host{1};
-  RenderScene scene{host, {}};
+  EmbreeScene scene{host, {}};
 
   explicit Sheet(const Material& material) {
     world.add("sheet", make_plane(2.0, 1.0), material);
@@ -125,7 +125,7 @@ TEST_CASE("rays traced together meet what each meets alone, said to be coherent 
               at(std::cos(angle), 0.7 * std::sin(angle), 0.03 * i));
   }
   RenderHost host(1);
-  RenderScene scene(host, {});
+  EmbreeScene scene(host, {});
   scene.take(world.scene);
   Rng rng(3);
   const auto within = [&](double range) { return rng.uniform(-range, range); };
@@ -184,10 +184,10 @@ TEST_CASE("a hit tells of the triangle at its place, in either half of a quad", 
     world.scene.edit(camera).camera->exposure_time_s = 0.02;
   }
   RenderHost host(2);
-  RenderScene scene(host, {});
+  EmbreeScene scene(host, {});
   scene.take(world.scene);
   REQUIRE((scene.window() > 0.0) == is_moving);
-  const MeshInstance& instance = *scene.instances()[0];
+  const MeshInstance& instance = scene.instances()[0];
   const Affine world_from_node = world.scene.world_from_node(node);
 
   Rng rng(11);
@@ -253,7 +253,7 @@ TEST_CASE("a triangle without a partner is met where it is and nowhere else", "[
   const NodeId node = world.create(world.root(), "triangle");
   world.edit(node).mesh = std::make_shared<const Mesh>(mesh);
   RenderHost host(1);
-  RenderScene scene(host, {});
+  EmbreeScene scene(host, {});
   scene.take(world);
   const Vec3f direction(0.0f, 0.0f, -1.0f);
   // Along its edges and far beyond them, where the quad's other half would be.
@@ -270,7 +270,7 @@ TEST_CASE("a triangle without a partner is met where it is and nowhere else", "[
       if (!hit) continue;
       const Vec2f uv = (1.0f - u - v) * mesh.uvs[0] + u * mesh.uvs[1] + v * mesh.uvs[2];
       CHECK((hit.instance->uv(hit.triangle, hit.u, hit.v) - uv).norm() < 1e-5f);
-      const Vec3f normal = RenderScene::interpolated_normal(hit) / 32767.0f;
+      const Vec3f normal = interpolated_normal(hit) / 32767.0f;
       CHECK((normal - Vec3f(1.0f - u - v, u, v)).norm() < 1e-4f);
       CHECK(hit.instance->shading->slot(hit.triangle) == 1);
       const auto corners = hit.instance->shading->corners(hit.triangle);
@@ -283,7 +283,7 @@ TEST_CASE("a triangle without a partner is met where it is and nowhere else", "[
 
 TEST_CASE("a hit has the same uv before and after its mesh gets a texture", "[rays]") {
   Sheet sheet(matte(0.5f));
-  const NodeId node = sheet.scene.instances()[0]->node;
+  const NodeId node = sheet.scene.instances()[0].node;
   Material textured = matte(0.5f);
   textured.base_color_texture.texture = ramp();
   const auto check_uvs = [&] {
@@ -295,11 +295,254 @@ TEST_CASE("a hit has the same uv before and after its mesh gets a texture", "[ra
     }
   };
   check_uvs();
-  const ShadingMesh* before = sheet.scene.instances()[0]->shading.get();
+  const ShadingMesh* before = sheet.scene.instances()[0].shading;
   sheet.world.scene.edit(node).materials = {std::make_shared<const Material>(textured)};
   sheet.scene.take(sheet.world.scene);
   check_uvs();
-  CHECK(sheet.scene.instances()[0]->shading.get() == before);
+  CHECK(sheet.scene.instances()[0].shading == before);
+}
+
+namespace {
+
+/// Skewed, mirrored and scaled.
+Affine crooked(Rng& rng) {
+  Affine pose = at(rng.uniform(-2.0, 2.0), rng.uniform(-2.0, 2.0), rng.uniform(-0.5, 0.5));
+  const Vec3 axis(rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0), 0.7);
+  Mat3 shear = Mat3::Identity();
+  shear(0, 1) = 0.3;
+  const double side = rng.uniform() < 0.5 ? -1.0 : 1.0;
+  pose.linear() = Eigen::AngleAxisd(rng.uniform(0.0, 3.0), axis.normalized()) * shear *
+                  Eigen::Scaling(side * rng.uniform(0.4, 0.9), 0.6, 0.5).toDenseMatrix();
+  return pose;
+}
+
+/// Copies of one mesh at many poses, which share it or have it each as their own; every third lets
+/// light through, every fourth has holes.
+TestWorld copies(bool are_shared, bool are_moving) {
+  TestWorld world;
+  Rng rng(5);
+  const auto mesh = std::make_shared<const Mesh>(patchwork());
+  Material glass;
+  glass.base_color = Vec3f(0.9f, 0.6f, 0.3f);
+  glass.transmission = 0.8f;
+  glass.is_thin_walled = true;
+  Material fence = matte(0.5f);
+  fence.opacity_texture.texture = ramp();
+  fence.opacity_threshold = 0.45f;
+  for (int i = 0; i < 24; ++i) {
+    const Material& material = i % 3 == 0 ? glass : i % 4 == 0 ? fence : matte(0.5f);
+    const NodeId node = world.add("copy", *mesh, material, crooked(rng));
+    if (are_shared) world.scene.edit(node).mesh = mesh;
+    if (!are_moving || i % 2 == 0) continue;
+    RigidBody body;
+    body.linear_velocity = Vec3(0.4, -0.3, 0.2);
+    body.angular_velocity = Vec3(0.5, 0.1, -0.3);
+    world.scene.edit(node).rigid_body = body;
+  }
+  const NodeId camera = world.add_camera(8, 6, 5.0, Vec3(3, 0, 0), Vec3(0, 0, 0));
+  if (are_moving) world.scene.edit(camera).camera->exposure_time_s = 0.02;
+  return world;
+}
+
+void check_same(const RayHit& a, const RayHit& b) {
+  CHECK(a.triangle == b.triangle);
+  CHECK(a.u == Approx(b.u).margin(2e-3));
+  CHECK(a.v == Approx(b.v).margin(2e-3));
+  CHECK(a.distance == Approx(b.distance).epsilon(1e-4).margin(1e-5));
+  CHECK((a.normal - b.normal).norm() < 2e-3f * b.normal.norm());
+  const Vec3f normal = interpolated_normal(b);
+  CHECK((interpolated_normal(a) - normal).norm() < 4e-3f * normal.norm());
+}
+
+}  // namespace
+
+TEST_CASE("a mesh that is used several times is met like as many meshes", "[rays][instances]") {
+  const bool are_moving = GENERATE(false, true);
+  CAPTURE(are_moving);
+  const TestWorld shared_world = copies(true, are_moving);
+  const TestWorld own_world = copies(false, are_moving);
+  RenderHost host(2);
+  EmbreeScene shared(host, {});
+  shared.take(shared_world.scene);
+  EmbreeScene own(host, {});
+  own.take(own_world.scene);
+  REQUIRE(shared.trees().shared == 1);
+  REQUIRE(own.trees().shared == 0);
+  REQUIRE((shared.window() > 0.0) == are_moving);
+
+  Rng rng(8);
+  const auto within = [&](double range) { return rng.uniform(-range, range); };
+  const Affine world_from_base = shared_world.scene.world_from_node(shared_world.base);
+  constexpr int kRays = 6000;
+  int met = 0;
+  int differing = 0;
+  int tinted = 0;
+  for (int i = 0; i < kRays; i += RayPacket8::kSize) {
+    BatchRays rays;
+    for (int k = 0; k < RayPacket8::kSize; ++k) {
+      const Vec3 eye(within(3.0), within(3.0), rng.uniform(0.5, 3.0));
+      const Vec3 target(within(2.0), within(2.0), within(0.5));
+      const float time = are_moving ? float(rng.uniform()) : kMoment;
+      rays.add((world_from_base * eye).cast<float>(),
+               (world_from_base.linear() * (target - eye).normalized()).cast<float>(), 0.0f,
+               kInfinite, time);
+    }
+    BatchHits hits;
+    shared.intersect(rays, hits);
+    RayPacket8 packet;
+    packet.clear();
+    std::array<Vec3f, RayPacket8::kSize> passed;
+    passed.fill(Vec3f::Zero());
+    packet.load(rays, 0);
+    shared.transmittance(packet, true,
+                         [&](int k, const Vec3f& share) { passed[std::size_t(k)] = share; });
+    for (std::size_t k = 0; k < rays.count; ++k) {
+      CAPTURE(i, k);
+      const Vec3f origin = rays.origin.at(k);
+      const Vec3f direction = rays.direction.at(k);
+      const RayHit alone = shared.intersect(origin, direction, 0.0f, kInfinite, rays.time[k]);
+      const RayHit hit = own.intersect(origin, direction, 0.0f, kInfinite, rays.time[k]);
+      const Vec3f through = own.transmittance(origin, direction, kInfinite, true, rays.time[k]);
+      // Rays along an edge may go either way.
+      const RayHit together = hits.at(k);
+      const bool is_same = alone.instance == together.instance && bool(alone) == bool(hit) &&
+                           (!hit || (alone.number == hit.number && alone.triangle == hit.triangle &&
+                                     alone.triangle == together.triangle));
+      differing += is_same && (through - passed[k]).norm() < 1e-2f ? 0 : 1;
+      tinted += through.maxCoeff() > 0.0f && through.minCoeff() < 1.0f ? 1 : 0;
+      if (!is_same || !hit) continue;
+      ++met;
+      check_same(alone, hit);
+      check_same(together, alone);
+    }
+  }
+  CHECK(met > kRays / 4);
+  CHECK(tinted > kRays / 50);
+  CHECK(differing < kRays / 500);
+}
+
+TEST_CASE("copies that become glass let light through, and block it again", "[instances]") {
+  for (const int count : {1, 2}) {
+    TestWorld world;
+    std::vector<NodeId> nodes;
+    const auto mesh = std::make_shared<const Mesh>(make_plane(2.0, 2.0));
+    for (int i = 0; i < count; ++i) {
+      nodes.push_back(world.add("sheet", *mesh, matte(0.5f), at(3.0 * i, 0.0, 0.0)));
+      world.scene.edit(nodes.back()).mesh = mesh;
+    }
+    RenderHost host(1);
+    EmbreeScene scene(host, {});
+    const auto light_through = [&](int i) {
+      const Affine pose = world.scene.world_from_node(nodes[std::size_t(i)]);
+      const Vec3 origin = pose * Vec3(0.3, 0.2, 1.0);
+      const Vec3 direction = pose.linear() * Vec3(0.0, 0.0, -1.0);
+      return scene.transmittance(origin.cast<float>(), direction.cast<float>(), 2.0f, true, kMoment)
+          .x();
+    };
+    const auto set_material = [&](int i, const Material& material) {
+      world.scene.edit(nodes[std::size_t(i)]).materials = {
+          std::make_shared<const Material>(material)};
+      scene.take(world.scene);
+    };
+    Material glass;
+    glass.base_color.setOnes();
+    glass.transmission = 1.0f;
+    glass.is_thin_walled = true;
+    scene.take(world.scene);
+    CHECK(light_through(0) == 0.0f);
+    set_material(0, glass);
+    CHECK(light_through(0) > 0.8f);
+    if (count == 2) CHECK(light_through(1) == 0.0f);
+    set_material(0, matte(0.5f));
+    CHECK(light_through(0) == 0.0f);
+  }
+}
+
+TEST_CASE("copies of a mesh cost a pose each, and come and go", "[instances]") {
+  constexpr int kCopies = 400;
+  TestWorld world;
+  Rng rng(2);
+  const auto mesh = std::make_shared<const Mesh>(make_sphere(0.3, 40));
+  world.add("floor", make_plane(6.0, 5.0), matte(0.5f));
+  std::vector<NodeId> nodes;
+  for (int i = 0; i < kCopies; ++i) {
+    nodes.push_back(world.add("copy", make_plane(1.0, 1.0), matte(0.3f), crooked(rng)));
+    world.scene.edit(nodes.back()).mesh = mesh;
+    if (i % 2 == 0) world.scene.edit(nodes.back()).rigid_body = RigidBody{};
+  }
+  RenderHost host(2);
+  EmbreeScene scene(host, {});
+  const auto check = [&](std::size_t in_world, std::size_t shared, std::size_t vertices) {
+    scene.take(world.scene);
+    CHECK(scene.trees().in_world == in_world);
+    CHECK(scene.trees().shared == shared);
+    CHECK(scene.trees().vertices == vertices);
+  };
+  const std::size_t of_mesh = mesh->positions.size();
+  check(1, 1, of_mesh + 4);
+  REQUIRE(scene.instances().size() == kCopies + 1);
+
+  // From above the last copy, wherever it is.
+  const auto sees_last = [&] {
+    const Affine pose = world.scene.world_from_node(nodes.back());
+    const Vec3f up = world.scene.world_from_node(world.base).linear().col(2).cast<float>();
+    const Vec3f origin = pose.translation().cast<float>() + 3.0f * up;
+    const RayHit hit = scene.intersect(origin, -up, 0.0f, kInfinite);
+    return hit && hit.instance->node == nodes.back();
+  };
+  world.scene.set_pose(nodes.back(), at(5.0, 5.0, 0.2));
+  check(1, 1, of_mesh + 4);
+  CHECK(sees_last());
+  world.scene.set_pose(nodes.back(), at(-5.0, 5.0, 0.4));
+  check(1, 1, of_mesh + 4);
+  CHECK(sees_last());
+
+  for (int i = 2; i < kCopies; ++i) world.scene.edit(nodes[std::size_t(i)]).is_visible = false;
+  check(1, 1, of_mesh + 4);
+  world.scene.edit(nodes[1]).is_visible = false;
+  check(2, 0, of_mesh + 4);
+  world.scene.edit(nodes.back()).is_visible = true;
+  check(1, 1, of_mesh + 4);
+  CHECK(sees_last());
+  // Pressed flat, it is better met in the world.
+  Affine flat = at(-5.0, 5.0, 0.4);
+  flat.linear() = Eigen::Scaling(1.0, 1.0, 1e-5).toDenseMatrix();
+  world.scene.set_pose(nodes.back(), flat);
+  check(2, 1, 2 * of_mesh + 4);
+  CHECK(sees_last());
+  world.scene.edit(nodes.back()).mesh = std::make_shared<const Mesh>(*mesh);
+  check(3, 0, 2 * of_mesh + 4);
+  CHECK(sees_last());
+}
+
+TEST_CASE("a scene that takes the place of another is taken in anew", "[instances]") {
+  // At the same address and after as many changes.
+  RenderHost host(1);
+  EmbreeScene scene(host, {});
+  for (const double size : {1.0, 2.0, 3.0}) {
+    TestWorld world;
+    const NodeId node = world.add("sheet", make_plane(size, size), matte(0.5f));
+    scene.take(world.scene);
+    const Aabb bounds = world.scene.world_bounds(node);
+    CHECK((scene.instances()[0].bounds.size() - bounds.size()).norm() < 1e-5);
+  }
+}
+
+TEST_CASE("what has not changed is not made again", "[instances]") {
+  TestWorld world = copies(true, false);
+  world.add(test::dome(1.0f));
+  RenderHost host(1);
+  EmbreeScene scene(host, {});
+  scene.take(world.scene);
+  const ShadingMesh* mesh = scene.instances()[0].shading;
+  const LightTable::Record* light = scene.lights().records().data();
+  scene.take(world.scene);
+  CHECK(scene.times().tree_s == 0.0);
+  // A camera that moves changes nothing.
+  world.scene.set_pose(world.scene.find("/base/camera"), at(0.1, 0.2, 0.3));
+  scene.take(world.scene);
+  CHECK(scene.lights().records().data() == light);
+  CHECK(scene.instances()[0].shading == mesh);
 }
 
 TEST_CASE("cut-outs have their holes in both halves of a quad", "[rays]") {

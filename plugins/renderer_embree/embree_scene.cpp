@@ -1,0 +1,472 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "embree_scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <span>
+#include <utility>
+
+#include "diorama/error.h"
+#include "renderer_support/stopwatch.h"
+
+namespace diorama {
+namespace {
+
+std::string device_options(const std::string& isa, int threads) {
+  return "threads=" + std::to_string(std::max(1, threads)) + ",start_threads=0,isa=" + isa;
+}
+
+ShadingMesh::Point hit_point(const RTCFilterFunctionNArguments* args, unsigned i) {
+  return point_on_triangle(RTCHitN_primID(args->hit, args->N, i), RTCHitN_u(args->hit, args->N, i),
+                           RTCHitN_v(args->hit, args->N, i));
+}
+
+/// The share of light along a straight line through one surface of this material.
+Vec3f straight_share(const MeshInstance& instance, const ShadingMesh::Point& point,
+                     const Vec3f& direction, bool passes_glass) {
+  const ShadingMaterial& material = instance.material(point.triangle);
+  if (!material.dims_shadows) return Vec3f::Zero();
+  const Material& m = *material.source;
+  const Vec2f uv = instance.uv(point.triangle, point.u, point.v);
+  const float opacity = material.opacity_at(uv, 0.0f);
+  const float present = m.opacity_threshold > 0.0f ? (opacity < m.opacity_threshold ? 0.0f : 1.0f)
+                                                   : std::clamp(opacity, 0.0f, 1.0f);
+  Vec3f share = Vec3f::Constant(1.0f - present);
+  const bool is_clear = m.transmission > 0.0f && (passes_glass || m.is_thin_walled);
+  if (present <= 0.0f || !is_clear) return share;
+
+  const auto corners = instance.shading->corners(point.triangle);
+  const Vec3f a = instance.vertex(corners[0]);
+  const Vec3f normal = (instance.vertex(corners[1]) - a).cross(instance.vertex(corners[2]) - a);
+  const float cosine = std::abs(normal.normalized().dot(direction));
+  const float once = fresnel_dielectric(std::max(1e-4f, cosine), std::max(1.0001f, m.ior));
+  const float reflected = m.is_thin_walled ? 2.0f * once / (1.0f + once) : once;
+  Vec3f tint = m.base_color;
+  if (material.base_color) {
+    tint = tint.cwiseProduct(material.base_color.at(uv, 0.0f).head<3>().matrix());
+  }
+  if (!m.is_thin_walled) tint = tint.cwiseMax(0.0f).cwiseSqrt();
+  const float weight = present * m.transmission * (1.0f - m.metallic) * (1.0f - reflected);
+  return share + weight * tint;
+}
+
+/// One float more than the vertices need: Embree reads them in pieces of 16 bytes.
+std::vector<float> room_for(const Mesh& mesh) {
+  return std::vector<float>(3 * mesh.positions.size() + 1, 0.0f);
+}
+
+/// x, y, z of a mesh's vertices at a pose.
+void place(const Mesh& mesh, const Eigen::Matrix3f& linear, const Vec3f& translation,
+           std::vector<float>& positions) {
+  for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+    const Vec3f p = linear * mesh.positions[i] + translation;
+    positions[3 * i] = p.x();
+    positions[3 * i + 1] = p.y();
+    positions[3 * i + 2] = p.z();
+  }
+}
+
+void set_positions(RTCGeometry geometry, unsigned step, const std::vector<float>& positions) {
+  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, step, RTC_FORMAT_FLOAT3,
+                             positions.data(), 0, 3 * sizeof(float), positions.size() / 3);
+}
+
+void set_pose(RTCGeometry geometry, unsigned step, const Eigen::Matrix3f& linear,
+              const Vec3f& translation) {
+  Eigen::Matrix<float, 3, 4> pose;
+  pose << linear, translation;
+  rtcSetGeometryTransform(geometry, step, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, pose.data());
+}
+
+}  // namespace
+
+EmbreeScene::EmbreeScene(Host& host, const Options& options)
+    : host_(host),
+      scene_(host, options.scene),
+      device_(rtcNewDevice(device_options(options.isa, host.thread_count()).c_str())) {
+  if (!device_) throw Error(ErrorKind::Plugin, "Embree cannot start on this machine");
+}
+
+EmbreeScene::~EmbreeScene() = default;
+
+void EmbreeScene::check_device(const char* action) const {
+  const RTCError error = rtcGetDeviceError(device_.get());
+  if (error == RTC_ERROR_NONE) return;
+  throw Error(ErrorKind::Internal,
+              std::string("Embree failed to ") + action + " (error " + std::to_string(int(error)) +
+                  (error == RTC_ERROR_OUT_OF_MEMORY ? ", out of memory)" : ")"));
+}
+
+void EmbreeScene::take(const Scene& scene) {
+  const bool was_ready = std::exchange(is_ready_, false);
+  bool has_changed = false;
+  {
+    const Stopwatch watch(times_.shading_s);
+    has_changed = scene_.take(scene);
+  }
+  if (!has_changed && was_ready) {
+    times_.tree_s = times_.lights_s = 0.0;
+    is_ready_ = true;
+    return;
+  }
+  moving_tree_.reset();
+  if (!was_ready) tree_.reset();  // what an error left half made
+  {
+    const Stopwatch watch(times_.tree_s);
+    update_trees();
+    blur();
+  }
+  {
+    const Stopwatch watch(times_.lights_s);
+    scene_.light(scene, [this](std::span<const SkyGrid::Ray> rays) { return sees(rays); });
+  }
+  is_ready_ = true;
+}
+
+// A mesh pressed nearly flat is met in world space: rays lose too much on their way into its own.
+bool EmbreeScene::is_shared(const MeshInstance& instance) const {
+  constexpr float kMostStretch = 1e4f;
+  return scene_.meshes()[instance.mesh].instance_count > 1 &&
+         instance.linear.norm() * instance.normal_from_node.norm() < kMostStretch;
+}
+
+EmbreeScene::Trees EmbreeScene::trees() const {
+  Trees trees;
+  trees.shared = shared_trees_.size();
+  for (const auto& [mesh, tree] : shared_trees_) trees.vertices += tree.positions.size() / 3;
+  for (const Placed& placed : placed_) {
+    if (placed.is_shared) continue;
+    ++trees.in_world;
+    trees.vertices += placed.positions.size() / 3;
+  }
+  return trees;
+}
+
+/// Which of the rays leave what follows no rigid body.
+std::uint32_t EmbreeScene::sees(std::span<const SkyGrid::Ray> rays) const {
+  static_assert(SkyGrid::kMostRays <= RayPacket8::kSize);
+  RayPacket8 packet;
+  packet.clear();
+  for (const auto& [origin, direction] : rays) {
+    packet.add(origin, direction, 0.0f, kInfinite, kMoment);
+  }
+  std::uint32_t lit = 0;
+  transmittance(tree_.get(), packet, true, kStaticMask, [&](int i, const Vec3f& share) {
+    lit |= std::uint32_t(share.maxCoeff() > 0.0f) << i;
+  });
+  return lit;
+}
+
+const MeshInstance& EmbreeScene::instance_of(const RTCFilterFunctionNArguments* args, unsigned i) {
+  const auto& instances = *static_cast<const std::vector<MeshInstance>*>(args->geometryUserPtr);
+  const unsigned shared = RTCHitN_instID(args->hit, args->N, i, 0);
+  const bool is_shared = shared != RTC_INVALID_GEOMETRY_ID;
+  return instances[is_shared ? shared : RTCHitN_geomID(args->hit, args->N, i)];
+}
+
+void EmbreeScene::pass_where_cut_out(const RTCFilterFunctionNArguments* args) {
+  for (unsigned i = 0; i < args->N; ++i) {
+    if (args->valid[i] == 0) continue;
+    const MeshInstance& instance = instance_of(args, i);
+    const ShadingMesh::Point point = hit_point(args, i);
+    const ShadingMaterial& material = instance.material(point.triangle);
+    if (!material.is_cut_out) continue;
+    const Vec2f uv = instance.uv(point.triangle, point.u, point.v);
+    const float opacity = material.opacity_at(uv, 0.0f);
+    const float threshold = material.source->opacity_threshold;
+    const bool is_absent = threshold > 0.0f ? opacity < threshold : opacity <= 0.0f;
+    if (is_absent) args->valid[i] = 0;
+  }
+}
+
+void EmbreeScene::attenuate_shadow_ray(const RTCFilterFunctionNArguments* args) {
+  auto& shadow = *reinterpret_cast<ShadowContext*>(args->context);
+  const unsigned count = args->N;
+  for (unsigned i = 0; i < count; ++i) {
+    if (args->valid[i] == 0) continue;
+    const MeshInstance& instance = instance_of(args, i);
+    Vec3f direction(RTCRayN_dir_x(args->ray, count, i), RTCRayN_dir_y(args->ray, count, i),
+                    RTCRayN_dir_z(args->ray, count, i));
+    // In shared trees rays are in the space of the mesh.
+    if (RTCHitN_instID(args->hit, count, i, 0) != RTC_INVALID_GEOMETRY_ID) {
+      direction = instance.linear * direction;
+    }
+    const Vec3f share =
+        straight_share(instance, hit_point(args, i), direction.normalized(), shadow.passes_glass);
+    const unsigned ray = RTCRayN_id(args->ray, count, i);
+    shadow.attenuate(ray, share);
+    if (shadow.transmittance[ray].maxCoeff() > 1e-4f) args->valid[i] = 0;
+  }
+}
+
+// Equal meshes in equal order keep their trees; moved ones are fitted or built again. Otherwise all
+// in world space is built, so that geometry numbers never depend on what was shown before.
+void EmbreeScene::update_trees() {
+  find_filters();
+  update_shared_trees();
+  if (can_keep()) {
+    update_filters();
+  } else {
+    attach_all();
+    // What follows a body has its tree built as attach_all() left it, in its own space.
+    rtcCommitScene(tree_.get());
+  }
+  move_to_poses();
+  rtcCommitScene(tree_.get());
+  check_device("build the ray tracing structure");
+  forget_shared_trees();
+}
+
+/// Trees have the filters that any instance of their mesh needs: filters look at the material.
+void EmbreeScene::find_filters() {
+  filters_.assign(scene_.meshes().size(), Filters());
+  for (const MeshInstance& instance : instances()) {
+    for (const ShadingMaterial* m : instance.materials) {
+      filters_[instance.mesh].cuts_out |= m->is_cut_out;
+      filters_[instance.mesh].attenuates |= m->dims_shadows;
+    }
+  }
+}
+
+/// To be followed by a commit: Embree counts filters then.
+void EmbreeScene::set_filters(RTCGeometry geometry, const Filters& filters) const {
+  rtcSetGeometryUserData(geometry, const_cast<std::vector<MeshInstance>*>(&instances()));
+  rtcSetGeometryIntersectFilterFunction(geometry, filters.cuts_out ? &pass_where_cut_out : nullptr);
+  rtcSetGeometryOccludedFilterFunction(geometry,
+                                       filters.attenuates ? &attenuate_shadow_ray : nullptr);
+}
+
+void EmbreeScene::update_filters() {
+  for (std::size_t i = 0; i < placed_.size(); ++i) {
+    const Filters& filters = filters_[instances()[i].mesh];
+    if (placed_[i].filters == filters) continue;
+    placed_[i].filters = filters;
+    if (!placed_[i].is_shared) set_filters(placed_[i].geometry.get(), filters);
+    rtcCommitGeometry(placed_[i].geometry.get());
+  }
+}
+
+void EmbreeScene::update_shared_trees() {
+  for (std::size_t i = 0; i < scene_.meshes().size(); ++i) {
+    const auto& [mesh, count] = scene_.meshes()[i];
+    if (count < 2) continue;
+    const auto known = shared_trees_.find(mesh.get());
+    if (known == shared_trees_.end()) {
+      shared_trees_.emplace(mesh.get(), make_shared_tree(mesh, filters_[i]));
+    } else if (known->second.filters != filters_[i]) {
+      known->second.filters = filters_[i];
+      commit(known->second);
+    }
+  }
+}
+
+void EmbreeScene::forget_shared_trees() {
+  std::set<const ShadingMesh*> used;
+  for (const auto& [mesh, count] : scene_.meshes()) {
+    if (count > 1) used.insert(mesh.get());
+  }
+  std::erase_if(shared_trees_, [&](const auto& entry) { return !used.contains(entry.first); });
+}
+
+EmbreeScene::SharedTree EmbreeScene::make_shared_tree(std::shared_ptr<const ShadingMesh> mesh,
+                                                      const Filters& filters) const {
+  SharedTree shared{std::move(mesh), {}, filters, nullptr, nullptr};
+  const Mesh& source = shared.mesh->source();
+  shared.positions = room_for(source);
+  place(source, Eigen::Matrix3f::Identity(), Vec3f::Zero(), shared.positions);
+  shared.geometry = new_geometry(*shared.mesh);
+  set_positions(shared.geometry.get(), 0, shared.positions);
+  rtcSetGeometryMask(shared.geometry.get(), ~0u);  // instances have masks of their own
+  shared.tree.reset(rtcNewScene(device_.get()));
+  rtcAttachGeometryByID(shared.tree.get(), shared.geometry.get(), 0);
+  commit(shared);
+  return shared;
+}
+
+void EmbreeScene::commit(const SharedTree& shared) const {
+  set_filters(shared.geometry.get(), shared.filters);
+  rtcCommitGeometry(shared.geometry.get());
+  rtcCommitScene(shared.tree.get());
+  check_device("build the tree of a mesh");
+}
+
+bool EmbreeScene::can_keep() const {
+  if (!tree_ || placed_.size() != instances().size()) return false;
+  for (std::size_t i = 0; i < placed_.size(); ++i) {
+    const MeshInstance& instance = instances()[i];
+    if (placed_[i].mesh.get() != instance.shading) return false;
+    if (placed_[i].is_movable != instance.is_movable) return false;
+    if (placed_[i].is_shared != is_shared(instance)) return false;
+  }
+  return true;
+}
+
+// A tree that is fitted to new poses depends on the pose it was built in. What may move is built in
+// its own space, so that the result is the same whatever poses came before.
+void EmbreeScene::attach_all() {
+  tree_.reset(rtcNewScene(device_.get()));
+  // Two levels: the scene over whole meshes is rebuilt cheaply, each mesh has a good tree.
+  rtcSetSceneFlags(tree_.get(), RTC_SCENE_FLAG_DYNAMIC);
+  rtcSetSceneBuildQuality(tree_.get(), RTC_BUILD_QUALITY_LOW);
+  placed_.clear();
+  placed_.resize(instances().size());
+  host_.parallel_for(placed_.size(), [&](std::size_t i) {
+    const MeshInstance& instance = instances()[i];
+    Placed& placed = placed_[i];
+    placed.mesh = scene_.meshes()[instance.mesh].shading;
+    placed.is_movable = instance.is_movable;
+    placed.is_shared = is_shared(instance);
+    placed.filters = filters_[instance.mesh];
+    if (placed.is_shared || !placed.is_movable) {
+      placed.linear = instance.linear;
+      placed.translation = instance.translation;
+    }
+    if (placed.is_shared) return;
+    placed.positions = room_for(instance.source());
+    place(instance.source(), placed.linear, placed.translation, placed.positions);
+  });
+  for (std::size_t i = 0; i < placed_.size(); ++i) {
+    Placed& placed = placed_[i];
+    if (placed.is_shared) {
+      placed.geometry = new_instance(*placed.mesh);
+      set_pose(placed.geometry.get(), 0, placed.linear, placed.translation);
+    } else {
+      placed.geometry = new_geometry(*placed.mesh);
+      // Refit: built once, then fitted.
+      rtcSetGeometryBuildQuality(placed.geometry.get(), placed.is_movable
+                                                            ? RTC_BUILD_QUALITY_REFIT
+                                                            : RTC_BUILD_QUALITY_MEDIUM);
+      set_positions(placed.geometry.get(), 0, placed.positions);
+      set_filters(placed.geometry.get(), placed.filters);
+    }
+    rtcSetGeometryMask(placed.geometry.get(), placed.is_movable ? kMovableMask : kStaticMask);
+    rtcCommitGeometry(placed.geometry.get());
+    rtcAttachGeometryByID(tree_.get(), placed.geometry.get(), unsigned(i));
+  }
+}
+
+void EmbreeScene::move_to_poses() {
+  std::vector<std::uint8_t> has_moved(placed_.size(), 0);
+  host_.parallel_for(placed_.size(), [&](std::size_t i) {
+    const MeshInstance& instance = instances()[i];
+    Placed& placed = placed_[i];
+    if (placed.linear == instance.linear && placed.translation == instance.translation) return;
+    has_moved[i] = 1;
+    placed.linear = instance.linear;
+    placed.translation = instance.translation;
+    if (placed.is_shared) return;
+    place(instance.source(), placed.linear, placed.translation, placed.positions);
+  });
+  for (std::size_t i = 0; i < placed_.size(); ++i) {
+    if (has_moved[i] == 0) continue;
+    const Placed& placed = placed_[i];
+    if (placed.is_shared) {
+      set_pose(placed.geometry.get(), 0, placed.linear, placed.translation);
+    } else {
+      rtcUpdateGeometryBuffer(placed.geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0);
+    }
+    rtcCommitGeometry(placed.geometry.get());
+  }
+}
+
+/// The mesh's triangles, as yet without vertices.
+embree::GeometryHandle EmbreeScene::new_geometry(const ShadingMesh& mesh) const {
+  const auto& quads = mesh.quads();
+  if constexpr (embree::kTakesQuads) {
+    embree::GeometryHandle geometry(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_QUAD));
+    rtcSetSharedGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT4,
+                               quads.data(), 0, sizeof(quads[0]), quads.size());
+    return geometry;
+  } else {
+    using Corners = std::array<std::uint32_t, 3>;
+    embree::GeometryHandle geometry(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_TRIANGLE));
+    void* room = rtcSetNewGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                         sizeof(Corners), 2 * quads.size());
+    check_device("make a geometry");
+    auto* corners = static_cast<Corners*>(room);
+    for (const auto& [a, b, c, d] : quads) {
+      *corners++ = {a, b, d};
+      *corners++ = {c, d, b};
+    }
+    return geometry;
+  }
+}
+
+/// Of a mesh with a shared tree, as yet without a pose.
+embree::GeometryHandle EmbreeScene::new_instance(const ShadingMesh& mesh) const {
+  embree::GeometryHandle geometry(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_INSTANCE));
+  rtcSetGeometryInstancedScene(geometry.get(), shared_trees_.at(&mesh).tree.get());
+  return geometry;
+}
+
+// A second tree for the colours: what moves is there at several times, the rest is shared. Labels
+// go on meeting the first one, so that they are the same with and without a shutter.
+void EmbreeScene::blur() {
+  moving_positions_.clear();
+  const auto moves = [](const MeshInstance& instance) { return instance.motion != nullptr; };
+  if (std::ranges::none_of(instances(), moves)) return;
+  moving_tree_.reset(rtcNewScene(device_.get()));
+  for (std::uint32_t i = 0; i < placed_.size(); ++i) {
+    const MeshInstance& instance = instances()[i];
+    const embree::GeometryHandle moving = moves(instance) ? make_moving(i) : nullptr;
+    rtcAttachGeometryByID(moving_tree_.get(), moving ? moving.get() : placed_[i].geometry.get(), i);
+  }
+  rtcCommitScene(moving_tree_.get());
+  check_device("build the ray tracing structure of moving things");
+}
+
+embree::GeometryHandle EmbreeScene::make_moving(std::uint32_t number) {
+  // Vertices run straight from step to step: short enough that a turn stays round. An odd number of
+  // steps has one in the middle.
+  constexpr double kTurnPerStep = 0.1;  // radians
+  constexpr double kMostHalves = RTC_MAX_TIME_STEP_COUNT / 2;
+  const MeshInstance& instance = instances()[number];
+  const auto& [motion, window, world_from_node] = *instance.motion;
+  const double turn = 0.5 * motion.angular.norm() * window;
+  const int half = int(std::clamp(std::ceil(turn / kTurnPerStep), 1.0, kMostHalves));
+  const unsigned steps = 2 * unsigned(half) + 1;
+  const bool is_shared = placed_[number].is_shared;
+  embree::GeometryHandle geometry =
+      is_shared ? new_instance(*instance.shading) : new_geometry(*instance.shading);
+  rtcSetGeometryMask(geometry.get(), kMovableMask);
+  rtcSetGeometryTimeStepCount(geometry.get(), steps);
+  for (unsigned step = 0; step < steps; ++step) {
+    const double share = double(step) / (steps - 1) - double(kMoment);
+    const Affine pose = motion.then_from_now(share * window) * world_from_node;
+    const Eigen::Matrix3f linear = pose.linear().cast<float>();
+    const Vec3f translation = pose.translation().cast<float>();
+    if (is_shared) {
+      set_pose(geometry.get(), step, linear, translation);
+      continue;
+    }
+    std::vector<float>& positions = moving_positions_.emplace_back(room_for(instance.source()));
+    place(instance.source(), linear, translation, positions);
+    set_positions(geometry.get(), step, positions);
+  }
+  if (!is_shared) set_filters(geometry.get(), filters_[instance.mesh]);
+  rtcCommitGeometry(geometry.get());
+  return geometry;
+}
+
+EmbreeScene::SubScene::SubScene(const EmbreeScene& scene,
+                                const std::vector<std::uint32_t>& instances)
+    : tree_(rtcNewScene(scene.device_.get())) {
+  for (const std::uint32_t i : instances) {
+    rtcAttachGeometryByID(tree_.get(), scene.placed_[i].geometry.get(), i);
+  }
+  rtcCommitScene(tree_.get());
+  scene.check_device("build the structure of one instance");
+}
+
+float EmbreeScene::SubScene::distance(const Vec3f& origin, const Vec3f& direction, float t_min,
+                                      float t_max) const {
+  RTCRayHit ray = make_ray(origin, direction, t_min, t_max, kMoment);
+  embree::Context context;
+  embree::init(context);
+  embree::intersect(tree_.get(), context, ray);
+  const bool is_met = ray.hit.geomID != RTC_INVALID_GEOMETRY_ID;
+  return is_met ? ray.ray.tfar : kInfinite;
+}
+
+}  // namespace diorama
