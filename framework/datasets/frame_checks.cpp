@@ -19,6 +19,9 @@ constexpr const char* kAmodal = "visible <= amodal";
 constexpr const char* kOrder = "occlusion order agrees with masks";
 constexpr const char* kNormalsFace = "normals face the camera";
 constexpr const char* kSame = "an object stays what it is";
+constexpr const char* kInImage = "labels lie in the image";
+constexpr const char* kLeaves = "surfaces are parts of their objects";
+constexpr const char* kCameras = "cameras of one capture agree";
 constexpr const char* kOwnPixels = "each capture has pixels of its own";
 
 /// A single wrong pixel is a fault; edges of 8-bit normals are not.
@@ -64,6 +67,11 @@ lint::Lens lens_of(const Camera& camera) {
   return lens;
 }
 
+std::string box_text(const PixelBox& box) {
+  return "[" + std::to_string(box.x_min) + ", " + std::to_string(box.y_min) + ", " +
+         std::to_string(box.x_max) + ", " + std::to_string(box.y_max) + ")";
+}
+
 bool is_inside(const PixelBox& inner, const PixelBox& outer, int slack) {
   return inner.x_min >= outer.x_min - slack && inner.y_min >= outer.y_min - slack &&
          inner.x_max <= outer.x_max + slack && inner.y_max <= outer.y_max + slack;
@@ -86,6 +94,7 @@ class FrameChecks {
       if (holds(kHoldsTightBoxes)) check_boxes();
     }
     check_visibility();
+    if (holds(kHoldsLeafPaths) && holds(kHoldsNodePaths)) check_leaves();
     if (holds("occlusion_order") && holds("amodal_mask")) check_order();
     if (holds(kHoldsCamera)) check_geometry();
   }
@@ -173,7 +182,7 @@ class FrameChecks {
     }
     for (const auto& [id, extent] : masks_) {
       check(known.contains(id), kIds, kInstanceId.name, "",
-            std::to_string(extent.count) + " pixels from " + lint::box_text(extent.box) +
+            std::to_string(extent.count) + " pixels from " + box_text(extent.box) +
                 " have the id " + std::to_string(id) + ", which no object has");
     }
   }
@@ -182,9 +191,8 @@ class FrameChecks {
     const int slack = int(step_of(info_, kHoldsTightBoxes));
     for (const Instance& instance : frame_.instances) {
       const auto mask = masks_.find(instance.id);
-      const std::string box = instance.tight_box ? lint::box_text(*instance.tight_box) : "none";
-      const std::string extent =
-          mask == masks_.end() ? "nothing" : lint::box_text(mask->second.box);
+      const std::string box = instance.tight_box ? box_text(*instance.tight_box) : "none";
+      const std::string extent = mask == masks_.end() ? "nothing" : box_text(mask->second.box);
       const bool has_box = instance.tight_box && !instance.tight_box->is_empty();
       bool is_good = has_box == (mask != masks_.end());
       if (has_box && mask != masks_.end()) {
@@ -202,8 +210,14 @@ class FrameChecks {
           holds(kHoldsAmodalBoxes)) {
         check(is_inside(*instance.tight_box, *instance.visibility->amodal_box, 0), kAmodal,
               kHoldsAmodalBoxes, instance.node_path,
-              "its visible box is " + lint::box_text(*instance.tight_box),
-              "inside the whole one, " + lint::box_text(*instance.visibility->amodal_box));
+              "its visible box is " + box_text(*instance.tight_box),
+              "inside the whole one, " + box_text(*instance.visibility->amodal_box));
+      }
+      if (instance.visibility && instance.visibility->amodal_box && holds(kHoldsAmodalBoxes)) {
+        const PixelBox image{0, 0, frame_.camera.width, frame_.camera.height};
+        check(is_inside(*instance.visibility->amodal_box, image, 0), kInImage, kHoldsAmodalBoxes,
+              instance.node_path, "its whole box is " + box_text(*instance.visibility->amodal_box),
+              "inside the image, " + box_text(image));
       }
       if (!instance.visibility || !holds(kHoldsOcclusion)) continue;
       const Visibility& seen = *instance.visibility;
@@ -221,6 +235,31 @@ class FrameChecks {
       }
       check(beyond == 0, kAmodal, "amodal_mask", instance.node_path,
             std::to_string(beyond) + " visible pixels lie outside its amodal mask");
+    }
+  }
+
+  /// Whatever is seen of an object is itself or something below it.
+  void check_leaves() {
+    if (!frame_.has(kLeafId.name) || !frame_.has(kInstanceId.name)) return;
+    const auto leaves = frame_.get(kLeafId).pixels();
+    const auto ids = frame_.get(kInstanceId).pixels();
+    std::map<std::pair<std::uint32_t, std::uint32_t>, std::size_t> pairs;
+    for (std::size_t i = 0; i < leaves.size(); ++i) {
+      if (ids[i] != 0) ++pairs[{ids[i], leaves[i]}];
+    }
+    for (const Instance& instance : frame_.instances) {
+      std::size_t foreign = 0;
+      for (auto it = pairs.lower_bound({instance.id, 0});
+           it != pairs.end() && it->first.first == instance.id; ++it) {
+        const auto path = frame_.leaf_paths.find(it->first.second);
+        const bool is_part =
+            path != frame_.leaf_paths.end() && (path->second == instance.node_path ||
+                                                path->second.starts_with(instance.node_path + "/"));
+        if (!is_part) foreign += it->second;
+      }
+      check(foreign == 0, kLeaves, kLeafId.name, instance.node_path,
+            std::to_string(foreign) + " of its pixels are of surfaces elsewhere",
+            "of itself and what is below it");
     }
   }
 
@@ -321,7 +360,7 @@ class FrameChecks {
           "its 3-D box projects to x " + std::to_string(extent->min().x()) + " to " +
               std::to_string(extent->max().x()) + ", y " + std::to_string(extent->min().y()) +
               " to " + std::to_string(extent->max().y()),
-          "its pixels extend over " + lint::box_text(*box));
+          "its pixels extend over " + box_text(*box));
   }
 
   /// The object's surface points lie in its box.
@@ -451,7 +490,51 @@ double step_of(const StoredInfo& info, std::string_view held) {
   return found == info.steps.end() ? 0.0 : found->second;
 }
 
+namespace {
+
+/// An object is in one place and of one size and kind, whichever camera sees it.
+void check_cameras(const StoredInfo& info, StoredCapture& stored) {
+  if (!info.holds.contains(kHoldsNodePaths) || !info.holds.contains(kHoldsCameraPose)) return;
+  const double step = std::max({1e-4, step_of(info, kHoldsPoses), step_of(info, kHoldsBounds)});
+  const bool has_poses = info.holds.contains(kHoldsPoses);
+  const bool has_bounds = info.holds.contains(kHoldsBounds);
+  std::map<std::string, const Instance*> known;
+  for (std::size_t i = 0; i < stored.capture.frames.size(); ++i) {
+    const Frame& frame = stored.capture.frames[i];
+    for (const Instance& instance : frame.instances) {
+      const auto [place, is_new] = known.emplace(instance.node_path, &instance);
+      if (is_new) continue;
+      const Instance& other = *place->second;
+      const auto check = [&](bool holds, std::string_view held, const char* found) {
+        stored.log.check(
+            holds, {kCameras, file_of(stored, i, held), stored.capture.index, frame.camera_name,
+                    instance.node_path, found, "as another camera has it"});
+      };
+      const auto differs = [&](const auto& a, const auto& b) {
+        const double size = 1.0 + b.array().abs().maxCoeff();
+        return !((a - b).array().abs() <= step * size).all();
+      };
+      if (has_poses) {
+        check(!differs(instance.world_from_node.matrix(), other.world_from_node.matrix()),
+              kHoldsPoses, "is in another place");
+      }
+      const bool has_both = !instance.bounds_node.is_empty() && !other.bounds_node.is_empty();
+      if (has_bounds && has_both) {
+        check(!differs(instance.bounds_node.min, other.bounds_node.min) &&
+                  !differs(instance.bounds_node.max, other.bounds_node.max),
+              kHoldsBounds, "has another size");
+      }
+      if (info.holds.contains(kHoldsLabels)) {
+        check(instance.labels == other.labels, kHoldsLabels, "has other labels");
+      }
+    }
+  }
+}
+
+}  // namespace
+
 void check_frames(const StoredInfo& info, StoredCapture& stored) {
+  check_cameras(info, stored);
   for (std::size_t i = 0; i < stored.capture.frames.size(); ++i) {
     FrameChecks(info, stored, i).run();
   }
@@ -490,10 +573,8 @@ void CaptureComparison::compare_pixels(const StoredCapture& stored, std::size_t 
   const auto pixels = frame.get(kColor).pixels();
   const std::uint64_t key = digest(pixels.data(), pixels.size_bytes());
   const std::uint64_t labels = label_digest(frame);
-  const auto camera = std::size_t(std::ranges::find(info_.camera_names, frame.camera_name) -
-                                  info_.camera_names.begin());
   const auto [known, is_new] =
-      pictures_.try_emplace({camera, key}, KnownPicture{stored.capture.index, labels});
+      pictures_.try_emplace(key, KnownPicture{stored.capture.index, labels});
   log.check(
       is_new || known->second.labels == labels,
       {kOwnPixels, file_of(stored, place, kColor.name), stored.capture.index, frame.camera_name, "",

@@ -36,8 +36,8 @@ class CaptureComparison {
   void compare_pixels(const StoredCapture& stored, std::size_t frame, ReadLog& log);
 
   const StoredInfo& info_;
-  std::map<std::string, KnownObject> objects_;                              ///< By node path.
-  std::map<std::pair<std::size_t, std::uint64_t>, KnownPicture> pictures_;  ///< By camera, digest.
+  std::map<std::string, KnownObject> objects_;      ///< By node path.
+  std::map<std::uint64_t, KnownPicture> pictures_;  ///< By digest.
 };
 
 /// The file in which something of a frame stands, or ".".

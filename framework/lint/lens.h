@@ -3,9 +3,8 @@
 
 #include <array>
 #include <optional>
-#include <string>
 
-#include "framework/lint/dataset_files.h"
+#include "diorama/math.h"
 
 namespace diorama::lint {
 

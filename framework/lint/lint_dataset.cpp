@@ -2,64 +2,19 @@
 #include "framework/lint/lint_dataset.h"
 
 #include <algorithm>
-#include <array>
-#include <fstream>
 #include <map>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
-#include <sstream>
 
 #include "diorama/error.h"
-#include "framework/config/json_text.h"
 #include "framework/datasets/capture_sweep.h"
 #include "framework/datasets/frame_checks.h"
 #include "framework/datasets/page_checks.h"
 #include "framework/datasets/run_checks.h"
-#include "framework/lint/lint_formats.h"
 
 namespace diorama {
 namespace {
-
-using lint::Dataset;
-
-struct Format {
-  const char* name;  ///< As the dataset's own page says it.
-  void (*lint)(Dataset&);
-};
-
-constexpr std::array kFormats{Format{"DataVisualizationWriter", &lint::lint_visualization}};
-
-std::string read_text(const std::filesystem::path& file) {
-  std::error_code failed;
-  if (!std::filesystem::is_regular_file(file, failed)) return {};
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream text;
-  text << in.rdbuf();
-  return std::move(text).str();
-}
-
-/// Null when the folder is none of ours.
-const Format* format_of(const std::filesystem::path& folder) {
-  for (const auto& [page, key] : {std::pair{"metadata.txt", "name"}, {"dataset.json", "format"}}) {
-    const auto json = parse_json_or_nothing(read_text(folder / page));
-    if (!json.is_object() || !json.contains(key) || !json.at(key).is_string()) continue;
-    const std::string name = json.at(key).get<std::string>();
-    const auto found =
-        std::ranges::find_if(kFormats, [&](const Format& format) { return format.name == name; });
-    if (found != kFormats.end()) return &*found;
-  }
-  return nullptr;
-}
-
-LintReport lint_folder(const std::filesystem::path& folder, const Format& format) {
-  LintReport report;
-  report.dataset = folder.string();
-  report.format = format.name;
-  Dataset dataset(folder, report);
-  // Readers tell their file where they can; what they do not expect must not end the others' work.
-  dataset.reading(".", [&] { format.lint(dataset); });
-  return report;
-}
 
 void take(ReadLog&& log, LintReport& report) {
   report.files += log.files;
@@ -99,11 +54,7 @@ class RunLint {
   /// False for a folder that is no dataset.
   bool lint(const std::filesystem::path& folder, std::string reader) {
     if (reader.empty()) reader = readers_.recognise(folder);
-    if (reader.empty()) {
-      const Format* format = format_of(folder);
-      if (format) reports_.push_back(lint_folder(folder, *format));
-      return format != nullptr;
-    }
+    if (reader.empty()) return false;
     try {
       const std::shared_ptr<const StoredDataset> dataset = readers_.open(folder, reader);
       reports_.push_back(lint_read(*dataset, folder, host_));
@@ -149,7 +100,7 @@ std::vector<LintReport> lint_datasets(const std::filesystem::path& folder, Datas
   for (const auto& path : folders_of_run(folder)) run.lint(path, "");
   if (!run.has_reports()) {
     throw Error(ErrorKind::Usage, folder.string() +
-                                      ": holds no dataset that a reader or lint knows, nor do its "
+                                      ": holds no dataset that a reader knows, nor do its "
                                       "folders; 'diorama plugins' lists the readers");
   }
   run.lint_run(folder);

@@ -28,7 +28,7 @@ LintFinding lint_finding(Finding finding);
 /// What `diorama lint` says of one dataset (one writer's folder).
 struct LintReport {
   std::string dataset;     ///< The folder.
-  std::string format;      ///< "BasicWriter", "COCO" ...
+  std::string format;      ///< As its reader calls it.
   std::size_t files = 0;   ///< Read.
   std::size_t checks = 0;  ///< Comparisons made.
   std::vector<LintFinding> findings;

@@ -41,6 +41,16 @@ Vec3 vector_of_json(const Json& list) {
   return v;
 }
 
+void require_rigid(const Affine& map, const std::string& name) {
+  const bool ends_right =
+      (map.matrix().row(3) - Eigen::RowVector4d(0.0, 0.0, 0.0, 1.0)).cwiseAbs().maxCoeff() <= 1e-6;
+  const bool turns = (map.linear().transpose() * map.linear() - Mat3::Identity()).isZero(2e-3) &&
+                     map.linear().determinant() > 0.0;
+  if (!ends_right || !turns || !map.matrix().allFinite()) {
+    throw std::runtime_error(name + " is no rotation with a shift");
+  }
+}
+
 void require_usable(const Camera& camera) {
   const bool is_usable = std::isfinite(camera.fx) && std::isfinite(camera.fy) && camera.fx > 0.0 &&
                          camera.fy > 0.0 && std::isfinite(camera.cx) && std::isfinite(camera.cy);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <string>
+
 #include "diorama/camera.h"
 #include "diorama/math.h"
 #include "reader_support/stored_files.h"
@@ -16,6 +18,9 @@ Affine affine_of_rows(const Json& rows);
 
 /// Three finite numbers. Throws the same.
 Vec3 vector_of_json(const Json& list);
+
+/// Throws std::runtime_error unless it turns and shifts alone. `name` is for the message.
+void require_rigid(const Affine& map, const std::string& name);
 
 /// Focal lengths of a camera that can see: finite and positive. Throws std::runtime_error.
 void require_usable(const Camera& camera);

@@ -22,6 +22,16 @@ Json parsed_page(const std::filesystem::path& folder) {
 
 }  // namespace
 
+std::string metadata_writer(const std::filesystem::path& folder) {
+  try {
+    const Json json = parse_stored_json(read_whole_file(folder / "metadata.txt", 1 << 20));
+    if (!json.is_object() || !json.contains("name")) return {};
+    return json.at("name").is_string() ? json.at("name").get<std::string>() : std::string();
+  } catch (const std::exception&) {
+    return {};
+  }
+}
+
 std::string zero_padded(int number, std::size_t digits) {
   const std::string text = std::to_string(number);
   return text.size() < digits ? std::string(digits - text.size(), '0') + text : text;

@@ -70,6 +70,12 @@ bool is_named(const Json& entry, const char* name) {
   return entry == name;
 }
 
+/// What stands for pixels of no object.
+bool is_known_word(const Json& entry) {
+  static const std::set<std::string> kWords{"BACKGROUND", "UNLABELLED", "UNLABELED", "INVALID"};
+  return kWords.contains(entry.get<std::string>());
+}
+
 bool is_object_path(const Json& entry) {
   return entry.is_string() && entry.get<std::string>().starts_with('/');
 }
@@ -127,10 +133,7 @@ void BasicFrameReading::read_camera() {
     const Mat4 clip_from_camera = column_matrix(json->at("cameraProjection"));
     Affine camera_from_world;
     camera_from_world.matrix() = column_matrix(json->at("cameraViewTransform"));
-    const double determinant = camera_from_world.linear().determinant();
-    if (!(std::abs(std::abs(determinant) - 1.0) < 1e-3)) {
-      throw std::runtime_error("cameraViewTransform is no rotation with a shift");
-    }
+    require_rigid(camera_from_world, "cameraViewTransform");
     note_size(width, height, file);
     const Vec2 half(0.5 * width, 0.5 * height);
     camera.fx = half.x() * clip_from_camera(0, 0);
@@ -164,9 +167,71 @@ void BasicFrameReading::read_camera() {
     files_.check(std::abs(fx - camera.fx) <= 1e-3 * camera.fx, kLens, file, "",
                  "focal length and aperture give " + std::to_string(fx) + " pixels",
                  "the projection gives " + std::to_string(camera.fx));
+    check_camera(*json, clip_from_camera, file);
     sources_.emplace(kHoldsCamera, file);
     sources_.emplace(kHoldsCameraPose, file);
   });
+}
+
+/// What the file says twice: lens and sensor in millimetres, and the projection.
+void BasicFrameReading::check_camera(const Json& json, const Mat4& clip_from_camera,
+                                     const std::string& file) {
+  static const std::set<std::string> kModels{"pinhole",
+                                             "pinholeOpenCV",
+                                             "fisheyePolynomial",
+                                             "fisheyeOrthographic",
+                                             "fisheyeEquidistant",
+                                             "fisheyeEquisolid",
+                                             "fisheyeSpherical",
+                                             "fisheyeKannalaBrandtK3",
+                                             "fisheyeRadTanThinPrism",
+                                             "omniDirectionalStereo"};
+  const std::string model = json.at("cameraModel").get<std::string>();
+  files_.check(kModels.contains(model), kLens, file, "", "the lens '" + model + "' is unknown");
+  files_.check(json.value("metersPerSceneUnit", 1.0) > 0.0, kLens, file, "",
+               "metersPerSceneUnit is not above 0");
+  if (model != "pinhole") return;
+  const Camera& camera = frame_.camera;
+  const double per_pixel = camera.horizontal_aperture_mm / camera.width;
+  const auto agrees = [&](const char* what, double said, double expected) {
+    files_.check(std::abs(said - expected) <= 1e-3 * (std::abs(expected) + per_pixel), kLens, file,
+                 "", std::string(what) + " is " + std::to_string(said),
+                 std::to_string(expected) + " by the projection");
+  };
+  if (camera.fy == camera.fx && json.at("cameraAperture").size() > 1) {
+    agrees("the aperture's height", json.at("cameraAperture").at(1).get<double>(),
+           per_pixel * camera.height);
+  }
+  if (const auto offset = json.find("cameraApertureOffset");
+      offset != json.end() && offset->size() == 2) {
+    agrees("the aperture's offset to the side", offset->at(0).get<double>(),
+           (0.5 * camera.width - camera.cx) * per_pixel);
+    agrees("the aperture's offset upwards", offset->at(1).get<double>(),
+           (camera.cy - 0.5 * camera.height) * per_pixel);
+  }
+  // Only depth stands in the third row, and only the axis in the fourth.
+  Mat4 rest = clip_from_camera;
+  rest(0, 0) = rest(1, 1) = rest(0, 2) = rest(1, 2) = 0.0;
+  rest(3, 2) += 1.0;
+  const double near = camera.near_m;
+  const double far = camera.far_m;
+  files_.check(near > 0.0 && far > near, kLens, file, "",
+               "cameraNearFar is " + std::to_string(near) + ", " + std::to_string(far));
+  // An infinitely far plane leaves 0 and the near one; others have other ranges of depth.
+  const double scale = rest(2, 2);
+  const double shift = rest(2, 3);
+  rest(2, 2) = rest(2, 3) = 0.0;
+  files_.check(rest.isZero(1e-6), kLens, file, "",
+               "cameraProjection has numbers where a projection has none");
+  const double range = far - near;
+  const bool is_reversed = std::abs(scale - near / range) <= 1e-3 * near / range &&
+                           std::abs(shift - near * far / range) <= 1e-3 * near;
+  const bool is_plain = std::abs(scale + (far + near) / range) <= 1e-3 &&
+                        std::abs(shift + 2.0 * near * far / range) <= 2e-3 * near;
+  const bool is_endless = std::abs(scale) <= 1e-9 && std::abs(shift - near) <= 1e-3 * near;
+  files_.check(is_reversed || is_plain || is_endless, kLens, file, "",
+               "its range of depth is " + std::to_string(scale) + ", " + std::to_string(shift),
+               "what cameraNearFar gives");
 }
 
 void BasicFrameReading::read_color() {
@@ -276,15 +341,18 @@ void BasicFrameReading::read_motion() {
   sources_.emplace(kMotion.name, file);
 }
 
-std::map<std::uint32_t, Json> BasicFrameReading::read_keys(const std::string& file) {
-  std::map<std::uint32_t, Json> entries;
+std::vector<std::pair<std::uint32_t, Json>> BasicFrameReading::read_keys(const std::string& file) {
+  std::vector<std::pair<std::uint32_t, Json>> entries;
+  std::set<std::uint32_t> known;
   if (file.empty()) return entries;
   const auto json = files_.json(file);
   if (!json) return entries;
   files_.reading(file, [&] {
     for (const auto& [key, value] : json->items()) {
-      const bool is_new = entries.emplace(value_of_key(key), value).second;
+      const std::uint32_t number = value_of_key(key);
+      const bool is_new = known.insert(number).second;
       files_.check(is_new, kOnce, file, key, "is listed twice");
+      if (is_new) entries.emplace_back(number, value);
     }
   });
   return entries;
@@ -298,15 +366,18 @@ std::optional<BasicFrameReading::Segmentation> BasicFrameReading::read_segmentat
   const auto picture = files_.picture(file);
   if (!picture || !note_size(picture->width(), picture->height(), file)) return std::nullopt;
   const std::string mapping = path(mapping_kind);
-  const std::map<std::uint32_t, Json> entries = read_keys(mapping);
+  const auto entries = read_keys(mapping);
   Segmentation result;
   result.file = file;
   const bool is_raw = picture->channels() == 1;
   std::uint32_t next = kFirstObject;
   for (const auto& [key, entry] : entries) {
     const bool is_unlabelled = is_named(entry, "UNLABELLED");
-    const bool is_nothing = is_named(entry, "BACKGROUND") ||
-                            (entry.is_string() && !is_object_path(entry) && !is_unlabelled);
+    const bool is_nothing = entry.is_string() && !is_object_path(entry)
+                                ? !is_unlabelled
+                                : is_named(entry, "BACKGROUND");
+    files_.check(!entry.is_string() || is_object_path(entry) || is_known_word(entry), kIds, mapping,
+                 entry.dump(), "is neither a path nor a word for what is no object");
     std::uint32_t id = is_unlabelled ? kUnlabelled : is_nothing ? 0 : next++;
     if (is_raw) id = key;
     result.id_of_key.emplace(key, id);

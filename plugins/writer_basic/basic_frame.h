@@ -45,6 +45,7 @@ class BasicFrameReading {
   bool note_size(int width, int height, const std::string& file);
 
   void read_camera();
+  void check_camera(const Json& json, const Mat4& clip_from_camera, const std::string& file);
   void read_color();
   void read_distances();
   void read_normals();
@@ -52,7 +53,8 @@ class BasicFrameReading {
   std::optional<StoredArray> pixel_array(const std::string& file, std::size_t values);
 
   std::optional<Segmentation> read_segmentation(std::string_view picture, std::string_view mapping);
-  std::map<std::uint32_t, Json> read_keys(const std::string& file);
+  /// In the file's order.
+  std::vector<std::pair<std::uint32_t, Json>> read_keys(const std::string& file);
   void read_instances();
   void read_leaves();
   void check_semantics();

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "diorama/error.h"
+#include "reader_support/dataset_page.h"
 #include "reader_support/stored_files.h"
 #include "writer_basic/basic_files.h"
 #include "writer_basic/basic_frame.h"
@@ -21,22 +22,11 @@ std::string camera_of(const std::string& product) {
   return product.starts_with(kProduct) ? product.substr(kProduct.size()) : product;
 }
 
-/// What metadata.txt calls the writer; empty when it does not say.
-std::string said_writer(const fs::path& folder) {
-  try {
-    const Json json = parse_stored_json(read_whole_file(folder / "metadata.txt", 1 << 20));
-    if (!json.is_object() || !json.contains("name")) return {};
-    return json.at("name").is_string() ? json.at("name").get<std::string>() : std::string();
-  } catch (const std::exception&) {
-    return {};
-  }
-}
-
 class BasicDataset final : public StoredDataset {
  public:
   BasicDataset(fs::path folder, const Host& host)
       : folder_(std::move(folder)), host_(host), names_(folder_) {
-    if (names_.numbers().empty() && said_writer(folder_) != kFormat) {
+    if (names_.numbers().empty() && metadata_writer(folder_) != kFormat) {
       throw Error(ErrorKind::Asset, folder_.string() + ": holds no files of BasicWriter");
     }
     check_numbers();
@@ -67,7 +57,7 @@ class BasicDataset final : public StoredDataset {
   void check_numbers() {
     StoredFiles files(folder_, host_, log_);
     if (files.has("metadata.txt")) {
-      files.check(said_writer(folder_) == kFormat, kReadable, "metadata.txt", "",
+      files.check(metadata_writer(folder_) == kFormat, kReadable, "metadata.txt", "",
                   "does not say that BasicWriter wrote this");
     }
     for (const std::string& name : names_.unnumbered()) {
@@ -138,7 +128,7 @@ std::vector<std::string> BasicReader::patterns() const {
 }
 
 Recognition BasicReader::recognise(const fs::path& folder) const {
-  const std::string said = said_writer(folder);
+  const std::string said = metadata_writer(folder);
   if (said == kFormat) return Recognition::ByName;
   if (!said.empty()) return Recognition::No;
   return BasicFiles(folder).numbers().empty() ? Recognition::No : Recognition::ByFiles;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "diorama/error.h"
 #include "reader_support/camera_json.h"
@@ -221,7 +222,12 @@ class CocoImageReading {
     camera.cy = numbers.at(3).get<double>();
     require_usable(camera);
     read_lens_entry(image_, camera);
-    frame_.world_from_camera = affine_of_rows(image_.at("world_from_camera"));
+    if (image_.at("world_from_camera").size() != 4) {
+      throw std::runtime_error("world_from_camera has not four rows");
+    }
+    const Affine world_from_camera = affine_of_rows(image_.at("world_from_camera"));
+    require_rigid(world_from_camera, "world_from_camera");
+    frame_.world_from_camera = world_from_camera;
   }
 
   void read_picture(std::map<std::string, std::string, std::less<>>& sources) {
@@ -271,11 +277,21 @@ class CocoImageReading {
       read_amodal(json, who, mask, instance);
     }
     if (category != part_.categories.end()) check_keypoints(json, who, category->second);
+    check_crowd(json, part_.file, who);
     whos_.push_back(who);
     categories_.push_back(json.at("category_id").get<std::int64_t>());
     masks_.push_back(std::move(mask));
     has_mask_.push_back(json.contains("segmentation") && !json.at("segmentation").empty());
     frame_.instances.push_back(std::move(instance));
+  }
+
+  /// Our writer has no crowds.
+  void check_crowd(const Json& json, const std::string& file, const std::string& who) {
+    const auto crowd = json.find("iscrowd");
+    if (crowd == json.end()) return;
+    const bool is_flag = *crowd == 0 || (*crowd == 1 && !dataset_.page_);
+    files_.check(is_flag, kIds, file, who, "its iscrowd is " + crowd->dump(),
+                 dataset_.page_ ? "0" : "0 or 1");
   }
 
   void check_box_inside(const std::string& who, const PixelBox& box) {
@@ -471,6 +487,7 @@ class CocoImageReading {
       const auto category = entry.at("category_id").get<std::int64_t>();
       files_.check(part_.categories.contains(category), kIds, part_.panoptic, who,
                    "has an unknown category");
+      check_crowd(entry, part_.panoptic, who);
       if (found == segments.end()) continue;
       const Segment& segment = found->second;
       files_.check(entry.at("area").get<std::int64_t>() == segment.count, kArea, file, who,
@@ -490,6 +507,7 @@ class CocoImageReading {
   /// Our writer's segments are the objects' masks.
   void compare_with_annotations(const std::string& file, const Image<std::uint32_t>& ids,
                                 const std::map<std::uint32_t, std::int64_t>& categories) {
+    std::set<std::uint32_t> annotated;
     for (std::size_t i = 0; i < masks_.size(); ++i) {
       const CoverageMask& mask = masks_[i];
       std::map<std::uint32_t, std::int64_t> below;
@@ -499,6 +517,7 @@ class CocoImageReading {
         }
       }
       if (below.empty()) continue;
+      annotated.insert(below.begin()->first);
       files_.check(below.size() == 1, kPanoptic, file, whos_[i],
                    "its pixels are of " + std::to_string(below.size()) + " segments");
       const auto category = categories.find(below.begin()->first);
@@ -507,6 +526,12 @@ class CocoImageReading {
                    "its segment's category is " +
                        (category == categories.end() ? "none" : std::to_string(category->second)),
                    "its own is " + std::to_string(categories_[i]));
+    }
+    for (const auto& [id, category] : categories) {
+      const auto own = part_.categories.find(category);
+      const bool is_thing = own != part_.categories.end() && own->second.is_thing;
+      files_.check(!is_thing || annotated.contains(id), kPanoptic, part_.file, "",
+                   "has no annotation of segment " + std::to_string(id));
     }
   }
 

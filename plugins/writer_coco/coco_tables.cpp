@@ -66,6 +66,7 @@ class TableReader {
                   folder_.string() + ": holds no annotation file of COCO that can be read");
     }
     check_names_once();
+    check_tables_complete();
     number_captures();
     return std::move(tables_);
   }
@@ -80,6 +81,7 @@ class TableReader {
     try {
       visit_json_file(folder_ / own.file, [&](const std::string& key, bool is_element,
                                               JsonSpan span, std::string_view text) {
+        compare_tables(own.file, key, is_element, text);
         if (!is_element) return;
         if (key == "images") {
           add_image(part, span, parse_stored_json(text));
@@ -139,6 +141,7 @@ class TableReader {
   void add_category(CocoPart& part, const Json& json) {
     StoredCategory category;
     category.name = json.at("name").get<std::string>();
+    category.is_thing = json.value("isthing", 1) != 0;
     if (const auto points = json.find("keypoints"); points != json.end() && points->is_array()) {
       category.has_cuboid_keypoints =
           points->size() == 9 && points->at(0) == "Center" && points->at(1) == "LDB";
@@ -174,10 +177,14 @@ class TableReader {
 
   void read_panoptic(const CocoPart& part) {
     std::size_t count = 0;
+    images_listed_ = 0;
     files_.reading(part.panoptic, [&] {
       visit_json_file(folder_ / part.panoptic, [&](const std::string& key, bool is_element,
                                                    JsonSpan span, std::string_view text) {
-        if (!is_element || key != "annotations") return;
+        compare_tables(part.panoptic, key, is_element, text);
+        if (!is_element) return;
+        if (key == "images") check_same_image(part, text);
+        if (key != "annotations") return;
         const std::int64_t id = parse_stored_json(text).at("image_id").get<std::int64_t>();
         CocoImageEntry* image = image_of(id);
         const std::string who = "image " + std::to_string(id);
@@ -188,9 +195,65 @@ class TableReader {
         ++count;
       });
     });
+    files_.check(!page_ || images_listed_ == images_.size(), kCounts, part.panoptic, "",
+                 "lists " + std::to_string(images_listed_) + " images",
+                 part.file + " lists " + std::to_string(images_.size()));
     files_.check(count == images_.size(), kCounts, part.panoptic, "",
                  "has entries for " + std::to_string(count) + " images",
                  part.file + " lists " + std::to_string(images_.size()));
+  }
+
+  /// Our writer lists images in both files in the same words.
+  void check_same_image(const CocoPart& part, std::string_view text) {
+    if (!page_) return;
+    ++images_listed_;
+    const Json json = parse_stored_json(text);
+    const std::int64_t id = json.at("id").get<std::int64_t>();
+    const CocoImageEntry* image = image_of(id);
+    if (!image)
+      return files_.find(kCounts, part.panoptic, "image " + std::to_string(id),
+                         "is not in " + part.file);
+    const Json own = parse_stored_json(read_span(folder_ / part.file, image->span));
+    files_.check(own == json, kCounts, part.panoptic, "image " + std::to_string(id),
+                 "is described otherwise than in " + part.file);
+  }
+
+  /// What our writer puts into each of its annotation files: categories and licences.
+  void compare_tables(const std::string& file, const std::string& key, bool is_element,
+                      std::string_view text) {
+    if (!page_) return;
+    if (!is_element || (key != "categories" && key != "licenses")) return;
+    Json entry = parse_stored_json(text);
+    const std::size_t place = counted_[file][key]++;
+    std::vector<Json>& known = first_tables_[key];
+    if (place < known.size()) {
+      files_.check(known[place] == entry, kCounts, file, key + " " + std::to_string(place),
+                   "is not what " + first_file_ + " has");
+    } else if (first_file_.empty() || first_file_ == file) {
+      first_file_ = file;
+      known.push_back(std::move(entry));
+    } else {
+      files_.find(kCounts, file, key + " " + std::to_string(place), "is not in " + first_file_);
+    }
+  }
+
+  void check_tables_complete() {
+    if (!page_) return;
+    for (const CocoPart& part : tables_.parts) {
+      for (const std::string& file : {part.file, part.panoptic}) {
+        if (file.empty() || !counted_.contains(file)) continue;
+        for (const auto& [key, entries] : first_tables_) {
+          files_.check(counted_[file][key] == entries.size(), kCounts, file, key,
+                       "has " + std::to_string(counted_[file][key]) + " entries",
+                       first_file_ + " has " + std::to_string(entries.size()));
+        }
+      }
+    }
+    const auto json = files_.has("categories.json") ? files_.json("categories.json") : std::nullopt;
+    if (!json) return;
+    const std::vector<Json>& categories = first_tables_["categories"];
+    files_.check(json->is_array() && std::vector<Json>(json->begin(), json->end()) == categories,
+                 kCounts, "categories.json", "", "lists other categories than " + first_file_);
   }
 
   /// Puts the annotations of each image behind each other.
@@ -266,6 +329,10 @@ class TableReader {
   std::vector<RawAnnotation> annotations_;
   std::vector<std::int64_t> ids_;
   std::vector<std::string> names_;
+  std::size_t images_listed_ = 0;  ///< By the panoptic file.
+  std::string first_file_;
+  std::map<std::string, std::vector<Json>> first_tables_;  ///< By key, of the first file.
+  std::map<std::string, std::map<std::string, std::size_t>> counted_;  ///< By file, by key.
 };
 
 }  // namespace

@@ -6,6 +6,9 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <set>
+#include <string>
+#include <vector>
 
 #include "diorama/error.h"
 #include "reader_support/camera_json.h"
@@ -256,9 +259,34 @@ class KittiPictureReading {
       if (!has_camera) throw std::runtime_error("has no line P2");
       read_lens_entry(lens, frame_.camera);
       if (dataset_.page_) {
+        check_own_calibration(*text, file);
         files_.check(lines >= 7 && text->ends_with('\n'), kReadable, file, "", "is cut short");
       }
     });
+  }
+
+  /// Our writer has one camera, rectified, without other sensors.
+  void check_own_calibration(const std::string& text, const std::string& file) {
+    const Camera& camera = frame_.camera;
+    const std::vector<double> projection{camera.fx, 0, camera.cx, 0, 0, camera.fy,
+                                         camera.cy, 0, 0,         0, 1, 0};
+    const std::vector<double> none{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+    const std::vector<double> turn{1, 0, 0, 0, 1, 0, 0, 0, 1};
+    const std::map<std::string, std::vector<double>> expected{
+        {"P0:", projection},      {"P1:", projection}, {"P2:", projection},
+        {"P3:", projection},      {"R0_rect:", turn},  {"Tr_velo_to_cam:", none},
+        {"Tr_imu_to_velo:", none}};
+    std::set<std::string> seen;
+    for (const std::string& line : text_lines(text)) {
+      const std::vector<std::string> words = text_words(line);
+      if (words.empty() || words[0] == "lens_2:") continue;
+      const auto known = expected.find(words[0]);
+      files_.check(known != expected.end(), kReadable, file, words[0], "is no matrix of KITTI");
+      if (known == expected.end()) continue;
+      files_.check(seen.insert(words[0]).second, kOnce, file, words[0], "is there twice");
+      files_.check(numbers_from(words, 1) == known->second, kCounts, file, words[0],
+                   "is not what P2 gives");
+    }
   }
 
   void read_depth(std::map<std::string, std::string, std::less<>>& sources) {
@@ -283,8 +311,11 @@ class KittiPictureReading {
       files_.check(text.back() == '\n', kReadable, labels_, "", "its last line is cut short");
     }
     std::size_t number = 0;
+    std::set<std::string> known;
     for (const std::string& line : text_lines(text)) {
       ++number;
+      files_.check(known.insert(line).second || line.empty() || line.starts_with("DontCare"), kOnce,
+                   labels_, "line " + std::to_string(number), "is there twice");
       files_.reading(labels_, [&] {
         const std::vector<std::string> words = text_words(line);
         if (words.empty()) return;
@@ -335,8 +366,10 @@ class KittiPictureReading {
   }
 
   void check_numbers(const KittiLabel& label, const std::string& who) {
-    files_.check(label.truncation >= 0.0 && label.truncation <= 1.0, kAmodal, labels_, who,
-                 "its truncation is " + std::to_string(label.truncation), "0 to 1");
+    files_.check(label.truncation >= 0.0 && label.truncation <= 1.0 &&
+                     !(dataset_.page_ && label.truncation == 1.0),
+                 kAmodal, labels_, who, "its truncation is " + std::to_string(label.truncation),
+                 "0 to 1");
     const bool is_level = label.occlusion == 0.0 || label.occlusion == 1.0 ||
                           label.occlusion == 2.0 || label.occlusion == 3.0;
     files_.check(is_level && !(dataset_.page_ && label.occlusion == 3.0), kAmodal, labels_, who,

@@ -171,6 +171,7 @@ class VocDataset final : public StoredDataset {
     });
     if (!has_any) return;
     for (const std::string& name : names) {
+      std::map<std::string, std::map<std::string, std::string>> marks;  // by stem, by part
       for (const auto& [part, stems] : pictures) {
         const std::string file = file_of(name, part);
         const auto text = files.text(file);
@@ -182,11 +183,19 @@ class VocDataset final : public StoredDataset {
           are_marked = are_marked && words.size() == 2 &&
                        (words[1] == "1" || words[1] == "0" || words[1] == "-1");
           if (!words.empty()) found.push_back(words[0]);
-          if (words.size() == 2 && part == "trainval") marks_of_[words[0]] += words[1] + " ";
+          if (words.size() == 2) marks[words[0]][part] = words[1];
         }
         files.check(
             are_marked && found == stems, kCounts, file, "",
             "does not say 1, 0 or -1 of each of the " + std::to_string(stems.size()) + " pictures");
+      }
+      for (const auto& [stem, said] : marks) {
+        const std::string& mark = said.begin()->second;
+        marks_of_[stem] += mark + " ";
+        for (const auto& [part, other] : said) {
+          files.check(other == mark, kCounts, file_of(name, part), stem, "is marked " + other,
+                      file_of(name, said.begin()->first) + " says " + mark);
+        }
       }
     }
   }
@@ -314,6 +323,11 @@ class VocPictureReading {
     const auto picture =
         files_.picture_of_size(file, frame_.camera.width, frame_.camera.height, xml_file_);
     if (!picture) return;
+    if (const XmlElement* size = annotation_.child("size"); size && size->child("depth")) {
+      files_.check(size->text_of("depth") == std::to_string(picture->channels()), kCounts,
+                   xml_file_, "", "its depth is " + size->text_of("depth"),
+                   file + " has " + std::to_string(picture->channels()) + " channels");
+    }
     frame_.set(kColor, picture->color());
     sources.emplace(kColor.name, file);
   }
@@ -328,6 +342,12 @@ class VocPictureReading {
     const auto& classes = dataset_.classes_;
     files_.check(classes.empty() || std::ranges::find(classes, name) != classes.end(), kIds,
                  xml_file_, who, "is of the unknown class '" + name + "'");
+    for (const char* flag : {"truncated", "difficult", "occluded"}) {
+      if (!object.child(flag)) continue;
+      const std::string value = object.text_of(flag);
+      files_.check(value == "0" || value == "1", kIds, xml_file_, who,
+                   std::string(flag) + " is '" + value + "'", "0 or 1");
+    }
     for (const char* flag : {"truncated", "occluded", "difficult"}) {
       const XmlElement* said = object.child(flag);
       if (!said) continue;

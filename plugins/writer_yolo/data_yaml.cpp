@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "writer_yolo/data_yaml.h"
 
+#include <set>
 #include <stdexcept>
 
 #include "reader_support/label_text.h"
@@ -253,6 +254,7 @@ Node value_of(const std::vector<Line>& lines, std::size_t& at, const std::string
 DataYaml parse_data_yaml(std::string_view text) {
   const std::vector<Line> lines = lines_with_text(text);
   DataYaml yaml;
+  std::set<std::string> keys;
   for (std::size_t at = 0; at < lines.size(); ++at) {
     const Line& line = lines[at];
     if (line.indent > 0) continue;
@@ -262,12 +264,17 @@ DataYaml parse_data_yaml(std::string_view text) {
     const bool is_known = key == "path" || key == "train" || key == "val" || key == "valid" ||
                           key == "test" || key == "names" || key == "kpt_shape";
     if (!is_known) continue;
+    if (!keys.insert(key).second) refuse(line.number, "'" + key + "' is there twice");
     const Node node = value_of(lines, at, trimmed(line.text.substr(end + 1)));
     try {
       if (key == "path") {
         yaml.path = node.scalar;
       } else if (key == "names") {
-        for (const auto& [id, name] : node.items) yaml.names[integer_of(id)] = name;
+        for (const auto& [id, name] : node.items) {
+          if (!yaml.names.emplace(integer_of(id), name).second) {
+            refuse(line.number, "the class " + id + " is there twice");
+          }
+        }
       } else if (key == "kpt_shape") {
         for (const auto& [place, count] : node.items) yaml.kpt_shape.push_back(integer_of(count));
       } else {

@@ -245,6 +245,28 @@ TEST_CASE("Chance comes from diorama::Rng alone", "[architecture]") {
   CHECK(files_with_code(R"((\bstd::|[^\w:.>])s?rand\s*\()", is_code) == None{});
 }
 
+TEST_CASE("The framework knows no format's name", "[architecture]") {
+  // Types of writers and readers, as the plugins register them.
+  std::set<std::string> names{"BOP", "COCO", "HDF5", "KITTI", "VOC", "WebDataset", "YOLO"};
+  static const std::regex kType(
+      R"re(DIORAMA_ADD(?:_READER)?\([\w:]*(?:Writer|Reader),\s*"(\w+)")re");
+  for (const Source& source : sources()) {
+    if (!source.is_below("plugins")) continue;
+    for (std::sregex_iterator it(source.code.begin(), source.code.end(), kType), end; it != end;
+         ++it) {
+      names.insert((*it)[1]);
+    }
+  }
+  CHECK(names.size() > 15);
+  std::string any;
+  for (const std::string& name : names) any += (any.empty() ? "" : "|") + name;
+  const auto knows_none = [](const Source& source) {
+    // The dialect of Replicator names its writers.
+    return source.is_below("framework") && !source.is_below("framework/replicator");
+  };
+  CHECK(files_with_code("\\b(" + any + ")\\b", knows_none) == None{});
+}
+
 TEST_CASE("Messages quote in one way", "[architecture]") {
   // 'like this'; these write JSON, YAML, USD, man pages or shell.
   static const std::set<std::string> kOtherLanguages{

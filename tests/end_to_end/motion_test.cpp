@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <nlohmann/json.hpp>
 
-#include "framework/lint/dataset_files.h"
+#include "numpy_files.h"
 #include "program.h"
 #include "replicator_camera.h"
 #include "support/catch.h"
 
 using namespace diorama;
 using namespace diorama::test;
-using Json = nlohmann::json;
-using lint::NpyArray;
 
 namespace {
 
@@ -51,7 +49,7 @@ class Output {
   std::string file(const std::string& name) const {
     return read_file(folder_ / "out/basic" / name);
   }
-  NpyArray array(const std::string& name) const { return lint::parse_npy(file(name)); }
+  NpyArray array(const std::string& name) const { return parse_npy(file(name)); }
   /// World from local, by path.
   std::map<std::string, Affine> poses() const {
     const NpyArray boxes = array("bounding_box_3d_0000.npy");
@@ -79,9 +77,9 @@ TEST_CASE("motion vectors are what the last step moved", "[run]") {
   const Output now(15);
   const auto earlier_poses = before.poses();
   const auto poses = now.poses();
-  const auto camera = lint::camera_of(Json::parse(now.file("camera_params_0000.json")));
+  const auto camera = camera_of(Json::parse(now.file("camera_params_0000.json")));
   const auto ids =
-      lint::parse_picture(now.file("instance_segmentation_0000.png"), "instance_segmentation");
+      parse_picture(now.file("instance_segmentation_0000.png"), "instance_segmentation");
   const Json paths = Json::parse(now.file("instance_segmentation_mapping_0000.json"));
   const NpyArray motion = now.array("motion_vectors_0000.npy");
   const NpyArray points = now.array("pointcloud_0000.npy");
@@ -92,7 +90,7 @@ TEST_CASE("motion vectors are what the last step moved", "[run]") {
     for (int x = 0; x < ids.width; ++x) {
       const std::size_t at = 16 * std::size_t(y * ids.width + x);
       const Vec2 found(-motion.value<float>(at), -motion.value<float>(at + 4));
-      const std::string path = paths.value(std::to_string(ids.at(x, y)), "");
+      const std::string path = paths.value(std::to_string(ids.packed(x, y)), "");
       if (!poses.contains(path)) {
         worst = std::max(worst, found.norm());
         continue;
@@ -109,7 +107,7 @@ TEST_CASE("motion vectors are what the last step moved", "[run]") {
       worst = std::max(worst, (found - expected).norm());
     }
   }
-  CHECK(point == points.shape[0]);
+  CHECK(point == points.data.size() / 12);
   CHECK(moving > 50);
   CHECK(worst < 0.01);
 }

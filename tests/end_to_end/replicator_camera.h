@@ -6,12 +6,14 @@
 #include <string>
 #include <vector>
 
-#include "framework/lint/dataset_files.h"
 #include "framework/lint/lens.h"
 #include "framework/lint/object_checks.h"
+#include "numpy_files.h"
 
 /// A second reader of camera_params files, for tests.
-namespace diorama::lint {
+namespace diorama::test {
+
+using lint::Lens;
 
 /// A camera as camera_params_NNNN.json describes it.
 struct ReplicatorCamera {
@@ -49,7 +51,7 @@ inline ReplicatorCamera camera_of(const Json& params) {
   ReplicatorCamera camera;
   Affine camera_from_world;
   camera_from_world.matrix() = column_matrix(params.at("cameraViewTransform"));
-  camera.camera_from_world = flipped_axes() * camera_from_world;
+  camera.camera_from_world = lint::flipped_axes() * camera_from_world;
   const Mat4 clip_from_camera = column_matrix(params.at("cameraProjection"));
   Lens& lens = camera.lens;
   lens.width = params.at("renderProductResolution").at(0).get<int>();
@@ -62,4 +64,4 @@ inline ReplicatorCamera camera_of(const Json& params) {
   return camera;
 }
 
-}  // namespace diorama::lint
+}  // namespace diorama::test

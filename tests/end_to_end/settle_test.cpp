@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "framework/lint/dataset_files.h"
+#include "numpy_files.h"
 #include "program.h"
 #include "support/catch.h"
 
@@ -72,8 +72,8 @@ TEST_CASE("Objects that stay keep their motion when others are dropped", "[run][
                "timeline=[{simulate: 70}, {capture: dropped, count: 1}]", "--set",
                "randomizers.cameras.on=[dropped]", "--set", "writers.basic.motion_vectors=true"});
   REQUIRE(run.reports[1]["dropped"].size() > 0);
-  const diorama::lint::NpyArray motion = diorama::lint::parse_npy(
-      run.files.at("basic/rp_cam_0/motion_vectors/motion_vectors_0001.npy"));
+  const NpyArray motion =
+      parse_npy(run.files.at("basic/rp_cam_0/motion_vectors/motion_vectors_0001.npy"));
   CHECK(std::any_of(motion.data.begin(), motion.data.end(),
                     [](std::byte byte) { return byte != std::byte{0}; }));
 }
@@ -130,8 +130,7 @@ writers: [{type: BasicWriter, name: basic, motion_vectors: true}]
     const Outcome outcome = run({"run", name + ".yaml", "--output", name}, folder.path());
     INFO(outcome.errors);
     REQUIRE(outcome.exit_code == 0);
-    const diorama::lint::NpyArray motion =
-        diorama::lint::parse_npy(read_file(folder / name / "basic/motion_vectors_0000.npy"));
+    const NpyArray motion = parse_npy(read_file(folder / name / "basic/motion_vectors_0000.npy"));
     return std::any_of(motion.data.begin(), motion.data.end(),
                        [](std::byte byte) { return byte != std::byte{0}; });
   };

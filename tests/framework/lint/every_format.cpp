@@ -6,6 +6,7 @@
 #include "writer_bop/bop_writer.h"
 #include "writer_coco/coco_reader.h"
 #include "writer_coco/coco_writer.h"
+#include "writer_data_visualization/data_visualization_reader.h"
 #include "writer_data_visualization/data_visualization_writer.h"
 #include "writer_hdf5/hdf5_reader.h"
 #include "writer_hdf5/hdf5_writer.h"
@@ -95,8 +96,9 @@ BopWriter::Params one_scene() {
 DatasetReaders every_reader(Host& host) {
   return DatasetReaders(
       {reader<BasicReader>("BasicReader", host), reader<BopReader>("BopReader", host),
-       reader<CocoReader>("CocoReader", host), reader<Hdf5Reader>("Hdf5Reader", host),
-       reader<ImageFolderReader>("ImageFolderReader", host),
+       reader<CocoReader>("CocoReader", host),
+       reader<DataVisualizationReader>("DataVisualizationReader", host),
+       reader<Hdf5Reader>("Hdf5Reader", host), reader<ImageFolderReader>("ImageFolderReader", host),
        reader<KittiReader>("KittiReader", host), reader<PoseReader>("PoseReader", host),
        reader<VocReader>("VocReader", host), reader<WebDatasetReader>("WebDatasetReader", host),
        reader<YoloReader>("YoloReader", host)});

@@ -1,0 +1,501 @@
+// SPDX-License-Identifier: Apache-2.0
+// Changes each kind of value in each kind of file of every format, one at a time, and counts what
+// lint finds. What nothing else in the dataset contradicts is listed with its reason.
+#include <fnmatch.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <functional>
+#include <iostream>
+#include <limits>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <regex>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "diorama/error.h"
+#include "framework/lint/dataset_on_disk.h"
+#include "framework/lint/encoding_host.h"
+#include "framework/lint/every_format.h"
+#include "plugins/writer_support/sample_dataset.h"
+#include "support/catch.h"
+
+using namespace diorama;
+using test::DatasetOnDisk;
+using Json = nlohmann::ordered_json;
+
+namespace {
+
+/// A file's new content; nothing: the file goes.
+struct Mutant {
+  std::string file;
+  std::string what;
+  std::optional<std::string> content;
+};
+
+/// Numbers in names and paths are of one kind: "rgb_#.png".
+std::string kind_of(const std::string& text) {
+  static const std::regex kNumbers("[0-9]+");
+  return std::regex_replace(text, kNumbers, "#");
+}
+
+/// Changes of text-like values: what a number or a word may turn into.
+std::vector<std::pair<std::string, std::string>> changed_words(const std::string& word) {
+  char* end = nullptr;
+  const double number = std::strtod(word.c_str(), &end);
+  if (word.empty() || *end != '\0') return {{"another word", word + "x"}};
+  std::vector<std::pair<std::string, std::string>> changes;
+  const auto as_text = [&](double value) {
+    const bool is_whole = word.find_first_of(".eE") == std::string::npos;
+    char text[40];
+    std::snprintf(text, sizeof text, is_whole ? "%.0f" : "%.6f", value);
+    return std::string(text);
+  };
+  changes.emplace_back("larger", as_text(number * 1.3 + 1.0));
+  if (number != 0.0) changes.emplace_back("negated", as_text(-number));
+  return changes;
+}
+
+// JSON -----------------------------------------------------------------------------------------
+
+using Pointer = Json::json_pointer;
+
+void collect_leaves(const Json& node, const Pointer& at, const std::string& kind,
+                    std::map<std::string, std::vector<Pointer>>& leaves,
+                    std::map<std::string, std::vector<Pointer>>& lists) {
+  if (node.is_array()) {
+    const bool is_of_objects = !node.empty() && node[0].is_structured();
+    if (is_of_objects && node.size() > 1) lists[kind].push_back(at);
+    for (std::size_t i = 0; i < node.size(); ++i) {
+      // Places in short lists differ (x, y, width), entries of tables do not.
+      const bool is_table = is_of_objects || node.size() > 16;
+      collect_leaves(node[i], at / i, kind + (is_table ? "/*" : "/" + std::to_string(i)), leaves,
+                     lists);
+    }
+  } else if (node.is_object()) {
+    const bool is_table = node.size() > 1 && std::isdigit(node.begin().key()[0]);
+    for (const auto& [key, value] : node.items()) {
+      collect_leaves(value, at / key, kind + "/" + (is_table ? "*" : key), leaves, lists);
+    }
+  } else {
+    leaves[kind].push_back(at);
+  }
+}
+
+std::string dumped(const Json& json) {
+  return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+void mutate_json(const std::string& file, const Json& json, std::vector<Mutant>& mutants) {
+  std::map<std::string, std::vector<Pointer>> leaves, lists;
+  collect_leaves(json, Pointer(), "", leaves, lists);
+  for (const auto& [kind, places] : leaves) {
+    const Pointer& place = places[places.size() / 2];
+    const Json& old = json.at(place);
+    const auto add = [&](const std::string& what, Json value) {
+      if (value == old) return;
+      Json changed = json;
+      changed[place] = std::move(value);
+      mutants.push_back({file, kind + ": " + what, dumped(changed)});
+    };
+    if (old.is_boolean()) {
+      add("inverted", !old.get<bool>());
+    } else if (old.is_number_integer()) {
+      add("larger", old.get<std::int64_t>() * 13 / 10 + 1);
+      add("negated", -old.get<std::int64_t>());
+    } else if (old.is_number()) {
+      add("larger", old.get<double>() * 1.3 + 1.0);
+      add("negated", -old.get<double>());
+    } else if (old.is_string()) {
+      add("another word", old.get<std::string>() + "x");
+      for (const Pointer& other : places) {
+        if (json.at(other) == old) continue;
+        add("the word of another", json.at(other));
+        break;
+      }
+    }
+  }
+  for (const auto& [kind, places] : lists) {
+    const Pointer& place = places[places.size() / 2];
+    const std::size_t middle = json.at(place).size() / 2;
+    Json less = json;
+    less[place].erase(middle);
+    mutants.push_back({file, kind + ": an entry is gone", dumped(less)});
+    Json more = json;
+    more[place].push_back(json.at(place)[middle]);
+    mutants.push_back({file, kind + ": an entry comes twice", dumped(more)});
+  }
+}
+
+// Text and XML ---------------------------------------------------------------------------------
+
+std::vector<std::string> pieces(const std::string& text, char cut) {
+  std::vector<std::string> list;
+  std::string piece;
+  for (const char c : text) {
+    if (c != cut) {
+      piece += c;
+    } else {
+      list.push_back(std::move(piece));
+      piece.clear();
+    }
+  }
+  if (!piece.empty()) list.push_back(piece);
+  return list;
+}
+
+std::string put_together(const std::vector<std::string>& list, char cut, bool ends) {
+  std::string text;
+  for (std::size_t i = 0; i < list.size(); ++i)
+    text += (i > 0 ? std::string(1, cut) : "") + list[i];
+  return ends ? text + cut : text;
+}
+
+void mutate_lines(const std::string& file, const std::string& text, std::vector<Mutant>& mutants) {
+  const std::vector<std::string> lines = pieces(text, '\n');
+  if (lines.empty()) return;
+  const std::size_t middle = lines.size() / 2;
+  const auto add = [&](const std::string& what, std::vector<std::string> changed) {
+    mutants.push_back({file, what, put_together(changed, '\n', true)});
+  };
+  auto less = lines;
+  less.erase(less.begin() + long(middle));
+  add("a line is gone", less);
+  auto more = lines;
+  more.push_back(lines[middle]);
+  add("a line comes twice", more);
+  const std::vector<std::string> words = pieces(lines[middle], ' ');
+  for (std::size_t i = 0; i < std::min<std::size_t>(words.size(), 40); ++i) {
+    for (const auto& [what, word] : changed_words(words[i])) {
+      auto changed = words;
+      changed[i] = word;
+      auto all = lines;
+      all[middle] = put_together(changed, ' ', false);
+      add("column " + std::to_string(i) + ": " + what, all);
+    }
+  }
+}
+
+void mutate_xml(const std::string& file, const std::string& text, std::vector<Mutant>& mutants) {
+  static const std::regex kLeaf("<([a-z_A-Z]+)>([^<>]*)</");
+  std::map<std::string, std::vector<std::smatch>> leaves;
+  for (std::sregex_iterator it(text.begin(), text.end(), kLeaf), end; it != end; ++it) {
+    leaves[(*it)[1]].push_back(*it);
+  }
+  for (const auto& [name, places] : leaves) {
+    const std::smatch& place = places[places.size() / 2];
+    for (const auto& [what, word] : changed_words(place[2])) {
+      std::string changed = text;
+      changed.replace(std::size_t(place.position(2)), std::size_t(place.length(2)), word);
+      mutants.push_back({file, name + ": " + what, changed});
+    }
+  }
+  const std::size_t from = text.find("<object>");
+  const std::size_t to = text.find("</object>");
+  if (from == std::string::npos || to == std::string::npos) return;
+  const std::string object = text.substr(from, to + 9 - from);
+  mutants.push_back({file, "an object is gone", text.substr(0, from) + text.substr(to + 9)});
+  mutants.push_back(
+      {file, "an object comes twice", text.substr(0, to + 9) + object + text.substr(to + 9)});
+}
+
+// Arrays and pictures --------------------------------------------------------------------------
+
+void mutate_array(const std::string& file, const std::string& text, std::vector<Mutant>& mutants) {
+  std::uint16_t length = 0;
+  std::memcpy(&length, text.data() + 8, sizeof length);
+  const std::string header = text.substr(10, length);
+  const std::size_t data = 10u + length;
+  if (data >= text.size()) return;
+  const auto add = [&](const std::string& what, const std::function<void(std::string&)>& change) {
+    std::string changed = text;
+    change(changed);
+    if (changed != text) mutants.push_back({file, what, changed});
+  };
+  std::smatch found;
+  static const std::regex kPlain("'descr': '([<|][a-z][0-9])'");
+  static const std::regex kField(
+      R"(\('([A-Za-z_0-9]+)', '([<|][a-z][0-9])'(?:, \(([0-9, ]+)\))?\))");
+  if (std::regex_search(header, found, kPlain)) {
+    if (found[1] != "<f4") return;
+    const std::size_t count = (text.size() - data) / 4;
+    const auto each = [&](const std::function<float(float)>& change) {
+      return [=](std::string& bytes) {
+        for (std::size_t i = 0; i < count; ++i) {
+          float value = 0.0f;
+          std::memcpy(&value, bytes.data() + data + 4 * i, 4);
+          value = change(value);
+          std::memcpy(bytes.data() + data + 4 * i, &value, 4);
+        }
+      };
+    };
+    add("all values a tenth larger", each([](float v) { return v * 1.1f; }));
+    add("all values negated", each([](float v) { return -v; }));
+    add("one value is none", [&](std::string& bytes) {
+      const float none = std::numeric_limits<float>::quiet_NaN();
+      std::memcpy(bytes.data() + data + 4 * (count / 2), &none, 4);
+    });
+    return;
+  }
+  struct Field {
+    std::string name;
+    std::string type;
+    std::size_t offset;
+    std::size_t count;
+  };
+  std::vector<Field> fields;
+  std::size_t size = 0;
+  for (std::sregex_iterator it(header.begin(), header.end(), kField), end; it != end; ++it) {
+    std::size_t numbers = 1;
+    for (const std::string& n : pieces((*it)[3].str(), ',')) {
+      if (!n.empty() && n != " ") numbers *= std::stoul(n);
+    }
+    fields.push_back({(*it)[1], (*it)[2], size, numbers});
+    size += numbers * std::size_t((*it)[2].str()[2] - '0');
+  }
+  if (size == 0) return;
+  const std::size_t record = (text.size() - data) / size / 2;
+  for (const Field& field : fields) {
+    const std::size_t width = std::size_t(field.type[2] - '0');
+    for (std::size_t i = 0; i < field.count; ++i) {
+      const std::size_t at = data + record * size + field.offset + i * width;
+      const std::string name =
+          field.name + (field.count > 1 ? "[" + std::to_string(i) + "]" : std::string());
+      if (field.type == "<f4") {
+        add(name + " larger", [&](std::string& bytes) {
+          float value = 0.0f;
+          std::memcpy(&value, bytes.data() + at, 4);
+          value = value * 1.3f + 0.5f;
+          std::memcpy(bytes.data() + at, &value, 4);
+        });
+      } else {
+        add(name + " larger", [&](std::string& bytes) { bytes[at] = char(bytes[at] + 3); });
+      }
+    }
+  }
+}
+
+/// The file of the same kind that another capture or camera has, in place of this one.
+void exchange(const DatasetOnDisk& dataset, const std::string& file,
+              const std::vector<std::string>& files, std::vector<Mutant>& mutants) {
+  const std::string content = dataset.read(file);
+  for (const std::string& other : files) {
+    if (other == file || kind_of(other) != kind_of(file)) continue;
+    const std::string theirs = dataset.read(other);
+    if (theirs == content) continue;
+    mutants.push_back({file, "has the content of " + other, theirs});
+    return;
+  }
+}
+
+void mutate_picture(const std::string& file, const std::string& text,
+                    std::vector<Mutant>& mutants) {
+  const test::EncodingHost host;
+  const auto texture =
+      host.decode_texture(std::as_bytes(std::span(text.data(), text.size())), file);
+  if (!texture || file.ends_with(".exr")) return;
+  const int bits = texture->floats.empty() ? 8 : 16;
+  const std::size_t pixel = std::size_t(texture->channels) * std::size_t(bits / 8);
+  std::vector<std::uint8_t> samples = texture->bytes;
+  for (const float value : texture->floats) {
+    const auto sample = std::uint16_t(std::lround(value * 65535.0f));
+    const auto* bytes = reinterpret_cast<const std::uint8_t*>(&sample);
+    samples.insert(samples.end(), bytes, bytes + 2);
+  }
+  // A block in the middle becomes what the corner is.
+  const int w = texture->width;
+  const int h = texture->height;
+  for (int y = h / 2 - 4; y < h / 2 + 4; ++y) {
+    for (int x = w / 2 - 4; x < w / 2 + 4; ++x) {
+      std::memcpy(samples.data() + (std::size_t(y) * std::size_t(w) + std::size_t(x)) * pixel,
+                  samples.data(), pixel);
+    }
+  }
+  const auto bytes =
+      host.encode_image({samples.data(), w, h, texture->channels, bits}, ImageFormat::Png);
+  mutants.push_back({file, "a block has the corner's value",
+                     std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size())});
+}
+
+// ----------------------------------------------------------------------------------------------
+
+std::vector<std::string> files_of(const DatasetOnDisk& dataset) {
+  std::vector<std::string> files;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(dataset.folder())) {
+    if (entry.is_regular_file()) {
+      files.push_back(entry.path().lexically_relative(dataset.folder()).generic_string());
+    }
+  }
+  std::ranges::sort(files);
+  return files;
+}
+
+bool is_picture(const std::string& file) {
+  return file.ends_with(".png") || file.ends_with(".jpg");
+}
+
+std::vector<Mutant> mutants_of(const DatasetOnDisk& dataset) {
+  const std::vector<std::string> files = files_of(dataset);
+  std::map<std::string, std::vector<std::string>> kinds;
+  for (const std::string& file : files) kinds[kind_of(file)].push_back(file);
+  std::vector<Mutant> mutants;
+  for (const auto& [kind, same] : kinds) {
+    const std::string& file = same[same.size() / 2];
+    const std::string text = dataset.read(file);
+    mutants.push_back({file, "is gone", std::nullopt});
+    if (same.size() > 1) {
+      mutants.push_back({same.back(), "the last is gone", std::nullopt});
+      exchange(dataset, file, same, mutants);
+    }
+    const Json json = Json::parse(text, nullptr, false);
+    if (json.is_structured()) {
+      mutate_json(file, json, mutants);
+    } else if (file.ends_with(".xml")) {
+      mutate_xml(file, text, mutants);
+    } else if (file.ends_with(".npy")) {
+      mutate_array(file, text, mutants);
+    } else if (is_picture(file)) {
+      mutate_picture(file, text, mutants);
+    } else if (file.ends_with(".txt") || file.ends_with(".yaml") || file.ends_with(".jsonl")) {
+      mutate_lines(file, text, mutants);
+    }
+  }
+  return mutants;
+}
+
+/// What nothing else in a dataset of this format contradicts.
+struct Free {
+  const char* format;  ///< Patterns of file names.
+  const char* file;
+  const char* what;
+  const char* reason;
+};
+
+constexpr Free kFree[] = {
+    {"*", "dataset.json", "/seed*", "any number is a seed"},
+    {"*", "dataset.json", "/program*", "the program's name"},
+    {"*", "dataset.json", "/plugins*", "versions of plugins"},
+    {"*", "dataset.json", "/job*", "a text"},
+    {"*", "dataset.json", "/assets*", "names of files that are not part of the dataset"},
+    {"*", "dataset.json", "/conventions*", "sentences"},
+    {"*", "dataset.json", "/format: another word", "another format's reader is asked"},
+    {"*", "dataset.json", "is gone", "then the dataset may be anybody's"},
+    {"b*", "metadata.txt", "is gone", "then the dataset may be anybody's"},
+    {"*", "metadata.txt", "/replicator_global_seed*", "any number is a seed"},
+    {"*", "metadata.txt", "/version*", "a version"},
+    {"boxes", "*.png", "a block*", "a picture for people"},
+    // Pictures show what no label says.
+    {"basic*", "*rgb*.png", "a block*", "a picture"},
+    {"*", "images/*", "a block*", "a picture"},
+    {"kitti", "training/image_2/*", "a block*", "a picture"},
+    {"voc", "JPEGImages/*", "a block*", "a picture"},
+    {"basic*", "*camera_params*", "/cameraFisheye*", "says nothing of a pinhole"},
+    {"basic*", "*camera_params*", "/cameraFStop*", "pictures are not looked at for blur"},
+    {"basic*", "*camera_params*", "/cameraFocusDistance*", "pictures are not looked at for blur"},
+    {"basic*", "*camera_params*", "/metersPerSceneUnit: larger", "all lengths are scene units"},
+    {"basic*", "*motion_vectors*", "all values a tenth larger", "stands nowhere else"},
+    {"basic*", "*motion_vectors*", "all values negated", "stands nowhere else"},
+    {"basic*", "*occlusion_0*", "instanceId*", "a number that only tells rows apart"},
+    {"basic*", "*occlusion_0*", "semanticId*", "a number that only tells rows apart"},
+    {"basic*", "*bounding_box_2d_loose*", "y_max larger",
+     "of the hidden part nothing else is said"},
+    {"basic*", "*instance_id_segmentation_mapping*", "*: another word", "names of surfaces"},
+    {"coco*", "annotations/instances*", "/annotations/[*]/id: negated", "any number is an id"},
+    {"coco*", "annotations/*", "/info/*", "sentences"},
+    {"coco*", "annotations/instances*", "/images/[*]/intrinsics*", "there is no third dimension"},
+    {"coco*", "annotations/instances*", "/images/[*]/world_from_camera/[*]/3*",
+     "there is no third dimension"},
+    {"yolo*", "labels/*", "a line is gone", "nothing says how many objects there are"},
+    {"yolo*", "labels/*", "has the content*", "labels stand in one file alone"},
+    {"yolo_pose", "labels/*", "column *[0-9]: larger", "of a corner only what is in sight is said"},
+    {"kitti", "dataset.json", "/cameras/*", "the format has no names of cameras"},
+    {"kitti", "training/label_2/*", "a line is gone", "nothing says how many objects there are"},
+    {"kitti", "training/label_2/*", "column 2: larger", "levels of occlusion stand nowhere else"},
+    {"kitti", "training/depth_2/*", "a block*", "no object stands there"},
+    {"voc", "Annotations/*", "folder*", "a name that nobody uses"},
+    {"voc", "Annotations/*", "pose*", "a word for people"},
+};
+
+bool is_free(const std::string& format, const Mutant& mutant) {
+  return std::ranges::any_of(kFree, [&](const Free& free) {
+    return fnmatch(free.format, format.c_str(), 0) == 0 &&
+           fnmatch(free.file, mutant.file.c_str(), 0) == 0 &&
+           fnmatch(free.what, mutant.what.c_str(), 0) == 0;
+  });
+}
+
+bool is_found(const DatasetOnDisk& dataset) {
+  try {
+    return !dataset.lint().findings.empty();
+  } catch (const Error&) {
+    return true;
+  }
+}
+
+struct Score {
+  int found = 0;
+  int all = 0;
+  std::string missed;
+};
+
+Score score_of(const test::SampleFormat& format, const DatasetOnDisk& dataset) {
+  Score score;
+  for (const Mutant& mutant : mutants_of(dataset)) {
+    if (is_free(format.name, mutant)) continue;
+    const std::string before = dataset.read(mutant.file);
+    if (mutant.content == before) continue;
+    if (mutant.content) {
+      dataset.write(mutant.file, *mutant.content);
+    } else {
+      dataset.remove(mutant.file);
+    }
+    ++score.all;
+    if (is_found(dataset)) {
+      ++score.found;
+    } else {
+      score.missed += "  " + format.name + " " + mutant.file + ": " + mutant.what + "\n";
+    }
+    dataset.write(mutant.file, before);
+  }
+  return score;
+}
+
+}  // namespace
+
+/// Formats in which more is to be found: as many as it finds now.
+const std::map<std::string, int> kFloors{
+    {"pose", 80}, {"pose_dope", 41},    {"pose_centerpose", 62},
+    {"bop", 227}, {"bop_cameras", 227}, {"webdataset", 20},
+    {"hdf5", 16}, {"imagefolder", 1}};
+
+TEST_CASE("lint finds seeded faults of every kind", "[lint][mutation]") {
+  std::vector<const Capture*> captures;
+  for (const Capture& capture : test::sample_captures()) captures.push_back(&capture);
+  test::EncodingHost host;
+  int found = 0;
+  int all = 0;
+  std::string missed;
+  for (const test::SampleFormat& format : test::every_format()) {
+    const DatasetOnDisk dataset(
+        format.write(host, test::sample_dataset(test::SampleScene(8, 6)), captures));
+    REQUIRE_FALSE(is_found(dataset));
+    const Score score = score_of(format, dataset);
+    INFO(format.name << ": " << score.found << " of " << score.all << "\n" << score.missed);
+    std::cout << format.name << ": " << score.found << " of " << score.all << "\n";
+    if (const auto floor = kFloors.find(format.name); floor != kFloors.end()) {
+      CHECK(score.found >= floor->second);
+      continue;
+    }
+    found += score.found;
+    all += score.all;
+    missed += score.missed;
+    CHECK(score.found * 100 >= score.all * 93);
+  }
+  INFO(found << " of " << all << " found\n" << missed);
+  CHECK(all > 1000);
+  CHECK(found * 100 >= all * 98);
+}
