@@ -19,6 +19,8 @@
 #include "framework/app/assemble.h"
 #include "framework/app/command_bench.h"
 #include "framework/app/command_config.h"
+#include "framework/app/command_convert.h"
+#include "framework/app/command_diff.h"
 #include "framework/app/command_docs.h"
 #include "framework/app/command_doctor.h"
 #include "framework/app/command_export.h"
@@ -27,6 +29,7 @@
 #include "framework/app/command_new_plugin.h"
 #include "framework/app/command_plugins.h"
 #include "framework/app/command_render.h"
+#include "framework/app/command_replay.h"
 #include "framework/app/command_run.h"
 #include "framework/app/command_schema.h"
 #include "framework/app/command_sensors.h"
@@ -64,6 +67,9 @@ struct CommandLine {
   SensorsOptions sensors;
   LintOptions lint;
   StatsOptions stats;
+  ConvertOptions convert;
+  ReplayOptions replay;
+  DiffOptions diff;
   ExportCommandOptions export_;
   NewPluginOptions new_plugin;
   bool plugins_json = false;
@@ -415,7 +421,10 @@ void add_stats(CLI::App& app, CommandLine& line) {
   command->add_option("dataset", line.stats.dataset, "A dataset's folder, or the output of a run")
       ->required()
       ->type_name("FOLDER");
-  command->add_flag("--json", line.stats.as_json, "Everything as JSON");
+  CLI::Option* json = command->add_flag("--json", line.stats.as_json, "Everything as JSON");
+  command->add_option("--html", line.stats.html, "Write a page of tables and pictures instead")
+      ->type_name("FILE")
+      ->excludes(json);
   command
       ->add_option("--reader", line.stats.reader, "Reader to use; default: the one that knows it")
       ->type_name("TYPE");
@@ -424,11 +433,120 @@ void add_stats(CLI::App& app, CommandLine& line) {
   });
 }
 
+void add_conversion(CLI::App* command, CommandLine& line) {
+  command
+      ->add_option("--writer", line.convert.writers,
+                   "Writer and its parameters: 'TYPE key=value ...' (repeatable)")
+      ->required()
+      ->type_name("WRITER")
+      ->allow_extra_args(false);
+  command
+      ->add_option("--reader", line.convert.reader, "Reader to use; default: the one that knows it")
+      ->type_name("TYPE");
+  command->add_option("-o,--output", line.convert.output, "Output folder")
+      ->required()
+      ->type_name("DIR");
+  command->add_flag("--overwrite", line.convert.overwrite,
+                    "Remove the dataset in the output folder first");
+  command->callback([&line] {
+    line.command = [&line](ConsoleLog& log) {
+      return command_convert(line.global, line.convert, log);
+    };
+  });
+}
+
+void add_convert(CLI::App& app, CommandLine& line) {
+  CLI::App* command = app.add_subcommand("convert", "Write a dataset of any format in another one");
+  command
+      ->add_option("dataset", line.convert.datasets,
+                   "A dataset's folder, or the output of a run that holds one")
+      ->required()
+      ->expected(1)
+      ->type_name("FOLDER");
+  add_conversion(command, line);
+}
+
+void add_merge(CLI::App& app, CommandLine& line) {
+  CLI::App* command = app.add_subcommand(
+      "merge", "Make one dataset of several: captures numbered anew, classes united, splits kept");
+  command
+      ->add_option("datasets", line.convert.datasets,
+                   "Datasets' folders, or outputs of runs that hold one each")
+      ->required()
+      ->expected(2, 1000)
+      ->type_name("FOLDER");
+  add_conversion(command, line);
+}
+
+void add_diff(CLI::App& app, CommandLine& line) {
+  CLI::App* command =
+      app.add_subcommand("diff", "Say in what two datasets or runs differ; exit code as of diff");
+  command->add_option("first", line.diff.first, "A dataset's folder, or the output of a run")
+      ->required()
+      ->type_name("FOLDER");
+  command->add_option("second", line.diff.second, "Another one")->required()->type_name("FOLDER");
+  command
+      ->add_option("--tolerance", line.diff.tolerance,
+                   "How far pictures may be off in the mean, of 255")
+      ->check(CLI::Range(0.0, 255.0))
+      ->type_name("X")
+      ->capture_default_str();
+  command->add_option("--reader", line.diff.reader, "Reader to use; default: the one that knows it")
+      ->type_name("TYPE");
+  command->callback([&line] {
+    line.command = [&line](ConsoleLog& log) { return command_diff(line.global, line.diff, log); };
+  });
+}
+
+void add_replay(CLI::App& app, CommandLine& line) {
+  CLI::App* command = app.add_subcommand(
+      "replay", "Make captures of a run again from its own job, and compare their bytes");
+  command->add_option("dataset", line.replay.dataset, "Output folder of a run")
+      ->required()
+      ->type_name("FOLDER");
+  command->add_option("--capture", line.replay.captures, "Number of a capture (repeatable)")
+      ->required()
+      ->type_name("N")
+      ->allow_extra_args(false);
+  command
+      ->add_option("--set", line.replay.sets,
+                   "Set a key of the job, for instance renderer.samples=256 (repeatable)")
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false);
+  command->add_option("-o,--output", line.replay.output, "Keep what is made in this folder")
+      ->type_name("DIR");
+  command->callback([&line] {
+    line.command = [&line](ConsoleLog& log) {
+      return command_replay(line.global, line.replay, log);
+    };
+  });
+}
+
+void add_verify(CLI::App& app, CommandLine& line) {
+  CLI::App* command = app.add_subcommand(
+      "verify", "Make some captures of a run again, drawn by chance, and compare their bytes");
+  command->add_option("dataset", line.replay.dataset, "Output folder of a run")
+      ->required()
+      ->type_name("FOLDER");
+  command->add_option("--sample", line.replay.sample, "How many captures")
+      ->check(CLI::Range(1, 1 << 20))
+      ->type_name("N")
+      ->capture_default_str();
+  command->add_option("--seed", line.replay.seed, "Of the choice")
+      ->check(whole_number())
+      ->type_name("N");
+  command->callback([&line] {
+    line.command = [&line](ConsoleLog& log) {
+      return command_replay(line.global, line.replay, log);
+    };
+  });
+}
+
 void add_new_plugin(CLI::App& app, CommandLine& line) {
   CLI::App* command = app.add_subcommand("new-plugin", "Write a plugin project to start from");
   command
       ->add_option("kind", line.new_plugin.kind,
-                   "loader, physics, randomizer, renderer, annotator or writer")
+                   "loader, physics, randomizer, renderer, annotator, writer or format")
       ->required()
       ->type_name("KIND");
   command
@@ -535,6 +653,11 @@ void add_all(CLI::App& app, CommandLine& line) {
   add_sensors(app, line);
   add_lint(app, line);
   add_stats(app, line);
+  add_convert(app, line);
+  add_merge(app, line);
+  add_diff(app, line);
+  add_replay(app, line);
+  add_verify(app, line);
   add_new_plugin(app, line);
   add_schema(app, line);
   add_docs(app, line);

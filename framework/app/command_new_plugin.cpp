@@ -26,9 +26,13 @@ struct Kind {
   const char* name;
   const char* class_suffix;
 };
-constexpr std::array kKinds{Kind{"loader", "Loader"},         Kind{"physics", "Physics"},
-                            Kind{"randomizer", "Randomizer"}, Kind{"renderer", "Renderer"},
-                            Kind{"annotator", "Annotator"},   Kind{"writer", "Writer"}};
+constexpr std::array kKinds{Kind{"loader", "Loader"},
+                            Kind{"physics", "Physics"},
+                            Kind{"randomizer", "Randomizer"},
+                            Kind{"renderer", "Renderer"},
+                            Kind{"annotator", "Annotator"},
+                            Kind{"writer", "Writer"},
+                            Kind{"format", ""}};
 
 [[noreturn]] void refuse(const std::string& text) {
   throw Error(ErrorKind::Usage, "new-plugin: " + text);

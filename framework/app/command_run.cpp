@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <iostream>
 #include <optional>
+#include <utility>
 
 #include "framework/app/assemble.h"
 #include "framework/app/assemble_job.h"
@@ -13,6 +14,7 @@
 #include "framework/app/job_file.h"
 #include "framework/app/output_check.h"
 #include "framework/config/clean_text.h"
+#include "framework/config/job_overrides.h"
 #include "framework/config/yaml_config.h"
 #include "framework/host/progress_bar.h"
 #include "framework/host/progress_lines.h"
@@ -98,6 +100,7 @@ RunSummary run_job(JobAssembly& assembly, HostServices& host, const RunCommandOp
   run.queue_bytes = std::size_t(options.queue_mib) << 20;
   run.stop = &stop_requested;
   run.only_finishes = options.only_finishes;
+  run.only = options.only;
   run.progress = [&](const RunProgress& progress) {
     if (lines) {
       lines->update(progress.done, progress.total, progress.resumed, progress.respawned);
@@ -159,12 +162,21 @@ int run_value(const GlobalOptions& global, const Value& job, const RunCommandOpt
   try {
     const RunSummary summary = run_job(assembly, *host, options, log);
     log_lines(summary_text(summary), log);
-    log_next_step(summary, output_folders(assembly.job).records_path(), log);
+    if (!options.only) log_next_step(summary, output_folders(assembly.job).records_path(), log);
     return 0;
   } catch (const Interrupted&) {
     log.write(LogLevel::Warning, "interrupted; '--resume' goes on");
     return options.stopped_exit_code;
   }
+}
+
+/// The job of a dataset, with another output folder.
+Value job_of(const DatasetStatus& status, const fs::path& folder) {
+  Value job = parse_yaml(status.job, "the job in dataset.json");
+  Value* output = job.find("output");
+  if (!output) output = &job.set("output", Value::make_map());
+  output->set("folder", Value::text(folder.string()));
+  return job;
 }
 
 }  // namespace
@@ -175,15 +187,25 @@ int command_run(const GlobalOptions& global, const RunCommandOptions& options, C
 }
 
 int finish_dataset(const GlobalOptions& global, const DatasetStatus& status, ConsoleLog& log) {
-  Value job = parse_yaml(status.job, "the job in dataset.json");
-  Value* output = job.find("output");
-  if (!output) output = &job.set("output", Value::make_map());
-  output->set("folder", Value::text(status.base.string()));
+  const Value job = job_of(status, status.base);
   RunCommandOptions options;
   options.resume = true;
   options.takes_visits = true;
   options.only_finishes = true;
   return run_value(global, job, options, log);
+}
+
+fs::path make_captures_again(const GlobalOptions& global, const DatasetStatus& status,
+                             const fs::path& output, std::set<int> captures,
+                             const std::vector<std::string>& sets, ConsoleLog& log) {
+  Value job = job_of(status, output);
+  for (const std::string& assignment : sets) apply_set(job, assignment);
+  RunCommandOptions options;
+  options.only = std::move(captures);
+  run_value(global, job, options, log);
+  const Value* section = job.find("output");
+  const Value* records = section ? section->find("records") : nullptr;
+  return records ? output / records->scalar : output;
 }
 
 }  // namespace diorama

@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <filesystem>
+#include <set>
+#include <string>
+#include <vector>
+
 #include "framework/app/options.h"
 #include "framework/host/console_log.h"
 #include "framework/output/dataset_status.h"
@@ -13,5 +18,12 @@ int command_run(const GlobalOptions& global, const RunCommandOptions& options, C
 
 /// What is left to do when all captures of a dataset are there. Throws like command_run().
 int finish_dataset(const GlobalOptions& global, const DatasetStatus& status, ConsoleLog& log);
+
+/// Makes captures of a dataset again, by its own job with `sets` on top, into the folder `output`.
+/// Returns where dataset.json lies there. Throws like command_run().
+std::filesystem::path make_captures_again(const GlobalOptions& global, const DatasetStatus& status,
+                                          const std::filesystem::path& output,
+                                          std::set<int> captures,
+                                          const std::vector<std::string>& sets, ConsoleLog& log);
 
 }  // namespace diorama

@@ -5,6 +5,9 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "diorama/annotator.h"
@@ -14,10 +17,9 @@
 #include "framework/app/output_check.h"
 #include "framework/config/value_text.h"
 #include "framework/config/yaml_config.h"
+#include "framework/datasets/dataset_output.h"
 #include "framework/host/progress_bar.h"
-#include "framework/output/output_store.h"
 #include "framework/pipeline/job.h"
-#include "framework/pipeline/writer_queue.h"
 #include "framework/plugins/plugin_call.h"
 #include "framework/replay/stored_captures.h"
 
@@ -77,16 +79,7 @@ Effects make_effects(const fs::path& file, Registry& registry, Host& host) {
   return effects;
 }
 
-/// A writer that names its files as the stored ones are named.
-std::unique_ptr<Writer> make_writer(const StoredCaptures& stored, const Effects& effects,
-                                    Registry& registry, Host& host) {
-  Value entry = Value::make_map();
-  entry.set("type", Value::text("BasicWriter"));
-  entry.set("rgb", Value::boolean(effects.provides.contains(kColor.name)));
-  entry.set("sensor_depth", Value::boolean(effects.provides.contains(kSensorDepth.name)));
-  for (const char* key : {"frame_padding", "use_common_output_dir", "colorize_depth"}) {
-    if (const Value* value = stored.writer().find(key)) entry.set(key, *value);
-  }
+std::unique_ptr<Writer> make_writer(const Value& entry, Registry& registry, Host& host) {
   Complaints complaints;
   const std::vector<std::string_view> keys{"type"};
   auto writer = registry.make<Writer>(entry, "writer", keys, complaints, host);
@@ -94,11 +87,68 @@ std::unique_ptr<Writer> make_writer(const StoredCaptures& stored, const Effects&
   return writer;
 }
 
+/// Counts what a writer writes, and throws it away.
+class CountedFiles final : public CaptureFiles {
+ public:
+  void add(std::string_view, std::vector<std::byte>) override { ++count; }
+  void append(std::string_view, std::span<const std::byte>) override { ++count; }
+  void record(std::string_view) override {}
+  int count = 0;
+};
+
+int file_count(const Writer& writer, const Capture& capture) {
+  CountedFiles files;
+  call_component("writer", [&] { writer.write(capture, files); });
+  return files.count;
+}
+
+/// The writer of the stored files, with the same names and layout, that writes what the effects
+/// make: of the switches that ask for channels those are on that ask for nothing else.
+std::unique_ptr<Writer> make_writer(const StoredCaptures& stored, const Effects& effects,
+                                    Registry& registry, Host& host) {
+  const std::string& type = stored.writer().find("type")->scalar;
+  Value entry = Value::make_map();
+  entry.set("type", Value::text(type));
+  std::vector<std::string> switches;
+  for (const ParamSpec& param : registry.describe(ComponentKind::Writer, type)) {
+    const Value* value = stored.writer().find(param.key);
+    if (param.type == ParamType::Bool) {
+      switches.push_back(param.key);
+      entry.set(param.key, Value::boolean(false));
+    } else if (param.type == ParamType::Int && value) {
+      entry.set(param.key, *value);
+    }
+  }
+  const auto plain = make_writer(entry, registry, host);
+  const NameSet always = plain->needs();
+  const Capture sample = stored.read(0);
+  const int always_files = file_count(*plain, sample);
+  Value chosen = entry;
+  for (const std::string& name : switches) {
+    Value one = entry;
+    one.set(name, Value::boolean(true));
+    const auto writer = make_writer(one, registry, host);
+    const NameSet needs = writer->needs();
+    if (needs == always) {
+      if (file_count(*writer, sample) > always_files) continue;
+      // It says how files look.
+      if (const Value* value = stored.writer().find(name)) chosen.set(name, *value);
+      continue;
+    }
+    const bool is_made = std::ranges::all_of(needs, [&](const std::string& need) {
+      return always.contains(need) || effects.provides.contains(need);
+    });
+    chosen.set(name, Value::boolean(is_made));
+  }
+  return make_writer(chosen, registry, host);
+}
+
 /// That of the run, with the writer of this dataset and the effects.
 std::string sensors_json(const StoredCaptures& stored, const Effects& effects) {
   auto json = nlohmann::ordered_json::parse(stored.dataset_json());
   const std::string& name = stored.writer_name();
-  json["writers"] = {{{"name", name}, {"type", "BasicWriter"}, {"folder", name}}};
+  json["writers"] = {
+      {{"name", name}, {"type", stored.writer().find("type")->scalar}, {"folder", name}}};
   json["sensors"] = effects.resolved;
   return json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
@@ -112,63 +162,17 @@ DatasetInfo info_of(const StoredCaptures& stored) {
   return info;
 }
 
-class Replay {
- public:
-  Replay(const StoredCaptures& stored, const Effects& effects, Writer& writer, Host& host,
-         OutputStore& store)
-      : stored_(stored), effects_(effects), writer_(writer), host_(host), store_(store) {}
-
-  void run(ConsoleLog& log) {
-    begin();
-    constexpr std::size_t kQueueBytes = std::size_t(256) << 20;
-    WriterQueue queue(std::clamp(host_.thread_count(), 1, 4), kQueueBytes,
-                      [this](const PendingCapture& pending) { write(pending.capture); });
-    const std::vector<int>& indices = stored_.indices();
-    ProgressBar bar(log, "captures", int(indices.size()));
-    for (std::size_t i = 0; i < indices.size(); ++i) {
-      PendingCapture pending;
-      pending.capture = annotated(i);
-      queue.push(std::move(pending));
-      bar.update(int(i) + 1, 0);
+Capture annotated(const StoredCaptures& stored, std::size_t place, const Effects& effects) {
+  Capture capture = stored.read(place);
+  const Scene nothing;
+  for (Frame& frame : capture.frames) {
+    for (std::size_t i = 0; i < effects.annotators.size(); ++i) {
+      call_component("annotator '" + effects.types[i] + "'",
+                     [&] { effects.annotators[i]->annotate(nothing, frame); });
     }
-    queue.drain();
-    store_.close();
   }
-
- private:
-  void begin() {
-    Transaction transaction = store_.begin_transaction();
-    CollectedFiles files(transaction, 0, stored_.writer_name());
-    writer_.begin(info_of(stored_), files);
-    store_.commit_begin(transaction);
-  }
-
-  Capture annotated(std::size_t place) const {
-    Capture capture = stored_.read(place);
-    const Scene nothing;
-    for (Frame& frame : capture.frames) {
-      for (std::size_t i = 0; i < effects_.annotators.size(); ++i) {
-        call_component("annotator '" + effects_.types[i] + "'",
-                       [&] { effects_.annotators[i]->annotate(nothing, frame); });
-      }
-    }
-    return capture;
-  }
-
-  void write(const Capture& capture) {
-    Transaction transaction = store_.capture_transaction(capture.index);
-    CollectedFiles files(transaction, 0, stored_.writer_name());
-    call_component("writer '" + stored_.writer_name() + "'",
-                   [&] { writer_.write(capture, files); });
-    store_.commit_capture(capture.index, transaction);
-  }
-
-  const StoredCaptures& stored_;
-  const Effects& effects_;
-  Writer& writer_;
-  Host& host_;
-  OutputStore& store_;
-};
+  return capture;
+}
 
 }  // namespace
 
@@ -179,19 +183,24 @@ int command_sensors(const GlobalOptions& global, const SensorsOptions& options, 
   const Effects effects = make_effects(options.effects, *registry, *host);
   DatasetReaders readers(*registry, *host);
   const StoredCaptures stored(options.dataset, effects.needs, readers);
-  const std::unique_ptr<Writer> writer = make_writer(stored, effects, *registry, *host);
+  std::vector<NamedWriter> writers;
+  writers.push_back({stored.writer_name(), make_writer(stored, effects, *registry, *host)});
 
-  LocalFileSystem file_system;
-  const OutputFolders folders{options.output, ".", {{stored.writer_name(), stored.writer_name()}}};
-  check_folders_are_free(folders);
-  OutputStore::Options store_options;
-  if (options.overwrite) store_options.existing = OutputStore::Existing::Overwrite;
-  OutputStore store(file_system, folders, stored.capture_count(), store_options);
-  const std::string dataset_json = sensors_json(stored, effects);
-  store.join(dataset_json);
-  store.open();
-  Replay(stored, effects, *writer, *host, store).run(log);
+  check_folders_are_free(output_folders_of(options.output, writers));
+  DatasetOutput output(options.output, std::move(writers), stored.capture_count(),
+                       options.overwrite);
+  output.open(info_of(stored), sensors_json(stored, effects));
   const std::size_t count = stored.indices().size();
+  ProgressBar bar(log, "captures", int(count));
+  output.write(
+      [&](const DatasetOutput::Take& take) {
+        for (std::size_t i = 0; i < count; ++i) {
+          take(annotated(stored, i, effects));
+          bar.update(int(i) + 1, 0);
+        }
+      },
+      *host);
+  output.close();
   log.write(LogLevel::Info, options.output.string() + ": " + std::to_string(count) + " of " +
                                 std::to_string(stored.capture_count()) + " captures");
   return 0;

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "framework/app/command_stats.h"
 
+#include <fstream>
 #include <iostream>
 
+#include "diorama/error.h"
 #include "framework/app/assemble.h"
 #include "framework/datasets/dataset_readers.h"
 #include "framework/datasets/dataset_stats.h"
@@ -17,7 +19,15 @@ int command_stats(const GlobalOptions& global, const StatsOptions& options, Cons
   const FoundDataset found = find_dataset(options.dataset, readers, options.reader);
   const auto dataset = readers.open(found.folder, found.reader);
   const DatasetStats stats = dataset_stats(*dataset, *host);
-  std::cout << (options.as_json ? stats_json(stats) : stats_text(stats));
+  if (options.html.empty()) {
+    std::cout << (options.as_json ? stats_json(stats) : stats_text(stats));
+    return 0;
+  }
+  std::ofstream page(options.html, std::ios::binary);
+  page << stats_html(stats, found.folder.filename().string());
+  page.close();
+  if (!page) throw Error(ErrorKind::Output, options.html.string() + ": cannot be written");
+  log.write(LogLevel::Info, "wrote " + options.html.string());
   return 0;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <filesystem>
 #include <string>
 
 #include "framework/app/options.h"
@@ -12,6 +13,7 @@ struct StatsOptions {
   std::string dataset;  ///< A dataset's folder, or the output of a run that holds one.
   std::string reader;   ///< Type; empty: the one that knows the folder.
   bool as_json = false;
+  std::filesystem::path html;  ///< File for a page of tables and pictures; empty: none.
 };
 
 /// `diorama stats DATASET`: what is in a dataset of any format that a reader knows: classes, sizes,

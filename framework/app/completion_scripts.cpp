@@ -20,7 +20,7 @@ constexpr std::array kValueOffers{
     ValueOffer{"DIR", Offer::Folders},
     ValueOffer{"I/N", Offer::Nothing},
     ValueOffer{"KEY=VALUE", Offer::Nothing},
-    ValueOffer{"KIND", Offer::Words, "loader physics randomizer renderer annotator writer"},
+    ValueOffer{"KIND", Offer::Words, "loader physics randomizer renderer annotator writer format"},
     ValueOffer{"LEVEL", Offer::Words, "debug info warning error"},
     ValueOffer{"LICENCE", Offer::Words, "Apache-2.0 BSD-3-Clause MIT"},
     ValueOffer{"N", Offer::Nothing},

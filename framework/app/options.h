@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -46,7 +47,8 @@ struct RunCommandOptions {
   int queue_mib = 256;
   bool overwrite = false;
   bool only_finishes = false;  ///< See RunOptions.
-  bool dry_run = false;        ///< Checks the job, plans it, writes nothing.
+  std::optional<std::set<int>> only = {};
+  bool dry_run = false;  ///< Checks the job, plans it, writes nothing.
 };
 
 }  // namespace diorama

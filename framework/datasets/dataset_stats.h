@@ -87,5 +87,7 @@ DatasetStats dataset_stats(const StoredDataset& dataset, Host& host);
 /// Tables for people.
 std::string stats_text(const DatasetStats& stats);
 std::string stats_json(const DatasetStats& stats);
+/// A page that needs no other file.
+std::string stats_html(const DatasetStats& stats, const std::string& title);
 
 }  // namespace diorama

@@ -157,9 +157,13 @@ void Pipeline::end_early() {
 
 bool Pipeline::is_needed(const PlannedVisit& planned) const {
   for (int i = 0; i < planned.capture_count; ++i) {
-    if (!store_.is_done(planned.first_capture + i)) return true;
+    if (is_needed(planned.first_capture + i)) return true;
   }
   return false;
+}
+
+bool Pipeline::is_needed(int capture) const {
+  return !store_.is_done(capture) && (!options_.only || options_.only->contains(capture));
 }
 
 void Pipeline::stop_if_asked() const {
@@ -368,7 +372,7 @@ void Pipeline::take_captures(Visit& visit, const TimelineStep& step) {
     const PlannedCapture planned =
         plan_.capture(visit.planned->first_capture + visit.next_capture++);
     randomize(visit, planned.phase, planned.number, planned.index);
-    if (!store_.is_done(planned.index)) take(visit, planned);
+    if (is_needed(planned.index)) take(visit, planned);
   }
 }
 

@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -58,8 +59,9 @@ struct RunProgress {
 struct RunOptions {
   int shard = 0;
   int shards = 1;
-  bool takes_visits = false;   ///< Instead of a shard: visits that no other worker has.
-  bool only_finishes = false;  ///< Makes no captures.
+  bool takes_visits = false;               ///< Instead of a shard: visits that no other worker has.
+  bool only_finishes = false;              ///< Makes no captures.
+  std::optional<std::set<int>> only = {};  ///< Captures to make; the others are left out.
   std::size_t queue_bytes = std::size_t(256) << 20;  ///< Of captures that wait to be written.
   const std::atomic<bool>* stop = nullptr;           ///< True asks the run to end soon.
   /// Called on the main thread after each capture.
@@ -122,6 +124,7 @@ class Pipeline {
   void for_each_visit(const std::function<void(const PlannedVisit&)>& visit) const;
   void end_early();
   bool is_needed(const PlannedVisit& planned) const;
+  bool is_needed(int capture) const;
   void run_visits();
   void begin_output();
   void write(const PendingCapture& pending);

@@ -8,6 +8,7 @@
 #include "diorama/error.h"
 #include "framework/config/json_text.h"
 #include "framework/config/yaml_config.h"
+#include "framework/datasets/conversion.h"
 #include "framework/output/file_system.h"
 #include "framework/pipeline/capture_plan.h"
 
@@ -121,27 +122,15 @@ Capture StoredCaptures::read(std::size_t i) const {
     const bool is_whole =
         frame != stored.capture.frames.end() &&
         std::ranges::all_of(channels_, [&](const std::string& name) { return frame->has(name); });
-    if (!is_whole) refuse_capture(stored, camera);
+    if (!is_whole) {
+      refuse_capture(writer_folder_, stored, camera_names_.size() > 1 ? camera : std::string());
+    }
     frame->camera_name = camera;
     frame->camera_path = "/Cameras/" + camera;
     frame->seed = JobStreams(seed_).render_seed(capture.index, camera);
     capture.frames.push_back(std::move(*frame));
   }
   return capture;
-}
-
-/// Names the file whose fault it is: one that cannot be read rather than one that is not there.
-void StoredCaptures::refuse_capture(const StoredCapture& stored, const std::string& camera) const {
-  const Finding* reason = nullptr;
-  for (const Finding& finding : stored.log.findings) {
-    const bool is_missing = finding.check == "nothing is missing";
-    if (!finding.camera.empty() && finding.camera != camera && camera_names_.size() > 1) continue;
-    if (!reason || (reason->check == "nothing is missing" && !is_missing)) reason = &finding;
-  }
-  const std::string where = (writer_folder_ / (reason ? reason->file : ".")).string();
-  throw Error(ErrorKind::Asset,
-              where + ": " + (reason ? reason->found : "does not hold what its dataset holds") +
-                  " (capture " + std::to_string(stored.capture.index) + ", " + camera + ")");
 }
 
 }  // namespace diorama

@@ -45,7 +45,6 @@ class StoredCaptures {
  private:
   void choose_dataset(const std::filesystem::path& folder, const std::string& job,
                       DatasetReaders& readers);
-  [[noreturn]] void refuse_capture(const StoredCapture& stored, const std::string& camera) const;
 
   NameSet channels_;
   std::string dataset_json_;

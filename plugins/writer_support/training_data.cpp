@@ -28,6 +28,12 @@ std::vector<bool> choose_validation(int count, double share, std::uint64_t seed)
   return is_val;
 }
 
+std::vector<bool> as_flags(int count, const std::vector<int>& captures) {
+  std::vector<bool> flags(std::size_t(std::max(count, 0)), false);
+  for (const int capture : captures) flags.at(std::size_t(capture)) = true;
+  return flags;
+}
+
 std::map<std::uint32_t, std::int64_t> count_visible(const Image<std::uint32_t>& ids) {
   std::map<std::uint32_t, std::int64_t> counts;
   std::uint32_t run_id = 0;
@@ -70,7 +76,7 @@ void TrainingParams::visit(ParamVisitor& v) {
 }
 
 void TrainingData::begin(const DatasetInfo& dataset) {
-  classes_ = params_.classes;
+  classes_ = params_.classes.empty() ? dataset.classes : params_.classes;
   if (classes_.empty()) {
     std::set<std::string> names;
     for (const Labels& labels : dataset.labels) {
@@ -78,7 +84,9 @@ void TrainingData::begin(const DatasetInfo& dataset) {
     }
     classes_.assign(names.begin(), names.end());
   }
-  is_val_ = choose_validation(dataset.capture_count, params_.val_share, dataset.seed);
+  is_val_ = dataset.validation
+                ? as_flags(dataset.capture_count, *dataset.validation)
+                : choose_validation(dataset.capture_count, params_.val_share, dataset.seed);
   padding_ = grown_padding(6, dataset.capture_count);
   camera_count_ = int(dataset.camera_names.size());
 }

@@ -43,8 +43,8 @@ class TrainingData {
   TrainingData(TrainingParams params, ClassChoice choice, std::string other = {})
       : params_(std::move(params)), choice_(std::move(choice)), other_(std::move(other)) {}
 
-  /// Fixes the class list and the split; both follow from the job alone, so they are equal in every
-  /// shard.
+  /// Fixes the class list and the split. Where the dataset does not say them both follow from the
+  /// job alone, so they are equal in every shard.
   void begin(const DatasetInfo& dataset);
 
   const std::vector<std::string>& classes() const { return classes_; }

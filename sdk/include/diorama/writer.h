@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -35,6 +36,9 @@ struct DatasetInfo {
   std::string program_version;
   std::vector<std::pair<std::string, std::string>> plugin_versions;
   std::vector<DatasetAsset> assets;  ///< Sorted by name.
+  // Of data that were a dataset before: what writers would otherwise choose themselves.
+  std::vector<std::string> classes;            ///< Class list in its order; empty: not settled.
+  std::optional<std::vector<int>> validation;  ///< Captures kept for validation, ascending.
 };
 
 /// Where a writer's files go. The host owns the disk: a capture's files appear all together or not

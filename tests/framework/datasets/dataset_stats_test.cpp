@@ -99,3 +99,19 @@ TEST_CASE("Black, burnt and empty pictures are named", "[stats]") {
   CHECK(stats.suspicious.at("black").names == std::vector<std::string>{"capture 1, cam_0"});
   CHECK(stats.suspicious.at("burnt").names == std::vector<std::string>{"capture 2, cam_0"});
 }
+
+TEST_CASE("The page of statistics holds what the tables hold and needs nothing else", "[stats]") {
+  test::EncodingHost host;
+  const test::DatasetOnDisk disk(test::write_sample<BasicWriter>(test::everything(), host));
+  DatasetStats stats = stats_of(disk, host);
+  stats.classes["<script>"] = stats.classes.at("mug");
+  const std::string page = stats_html(stats, "a & b");
+  CHECK(page.starts_with("<!DOCTYPE html>"));
+  CHECK(page.find("<h1>a &amp; b</h1>") != std::string::npos);
+  CHECK(page.find("BasicWriter: 3 captures, 6 pictures") != std::string::npos);
+  CHECK(page.find("<td>mug</td>") != std::string::npos);
+  CHECK(page.find("<li>capture 0, cam_0</li>") != std::string::npos);
+  CHECK(page.find("<script>") == std::string::npos);
+  CHECK(page.find("http") == std::string::npos);
+  CHECK(page.find("src=") == std::string::npos);
+}

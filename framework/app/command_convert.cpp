@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/app/command_convert.h"
+
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <utility>
+
+#include "diorama/writer.h"
+#include "framework/app/assemble.h"
+#include "framework/app/output_check.h"
+#include "framework/config/json_text.h"
+#include "framework/config/yaml_config.h"
+#include "framework/datasets/conversion.h"
+#include "framework/datasets/dataset_origin.h"
+#include "framework/datasets/dataset_output.h"
+#include "framework/datasets/dataset_readers.h"
+#include "framework/host/progress_bar.h"
+
+namespace diorama {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A writer as the command line names it: "TYPE key=value ...", or a YAML mapping like in a job.
+Value writer_entry(const std::string& text) {
+  const std::string place = "--writer " + text;
+  if (text.starts_with('{')) {
+    Value entry = parse_yaml(text, place);
+    if (entry.kind == Value::Kind::Map) return entry;
+  }
+  std::istringstream words(text);
+  std::string type;
+  words >> type;
+  Value entry = Value::make_map();
+  entry.set("type", Value::text(type));
+  for (std::string word; words >> word;) {
+    const std::size_t cut = word.find('=');
+    if (cut == std::string::npos || cut == 0) {
+      throw Error(ErrorKind::Usage, place + ": expected key=value, got '" + word + "'");
+    }
+    entry.set(word.substr(0, cut), parse_yaml(word.substr(cut + 1), place));
+  }
+  return entry;
+}
+
+std::string free_name(const std::string& wanted, const std::vector<NamedWriter>& taken) {
+  const auto is_taken = [&](const std::string& name) {
+    return std::ranges::any_of(taken, [&](const NamedWriter& each) { return each.name == name; });
+  };
+  std::string name = wanted;
+  for (int i = 2; is_taken(name); ++i) name = wanted + "_" + std::to_string(i);
+  return name;
+}
+
+struct ChosenWriters {
+  std::vector<NamedWriter> writers;
+  NameSet needs;
+  nlohmann::ordered_json pages = nlohmann::ordered_json::array();  ///< For dataset.json.
+};
+
+ChosenWriters make_writers(const std::vector<std::string>& texts, Registry& registry, Host& host) {
+  constexpr std::array<std::string_view, 2> kKeys{"type", "name"};
+  ChosenWriters chosen;
+  Complaints complaints;
+  for (const std::string& text : texts) {
+    const Value entry = writer_entry(text);
+    auto writer = registry.make<Writer>(entry, "--writer", kKeys, complaints, host);
+    if (!writer) continue;
+    const std::string& type = entry.find("type")->scalar;
+    const Value* own = entry.find("name");
+    const std::string name = free_name(own ? own->scalar : type, chosen.writers);
+    const bool is_plain = !name.starts_with('.') && name.find('/') == std::string::npos;
+    if (!is_plain) {
+      throw Error(ErrorKind::Usage, "--writer " + text + ": its name becomes a folder and may " +
+                                        "neither begin with '.' nor hold '/'");
+    }
+    chosen.needs.merge(writer->needs());
+    chosen.pages.push_back({{"name", name}, {"type", type}, {"folder", name}});
+    chosen.writers.push_back({name, std::move(writer)});
+  }
+  complaints.raise();
+  return chosen;
+}
+
+ConversionSource open_source(const fs::path& folder, const ConvertOptions& options,
+                             DatasetReaders& readers, Host& host) {
+  const FoundDataset found = find_dataset(folder, readers, options.reader);
+  ConversionSource source{found.folder, readers.open(found.folder, found.reader), {}};
+  source.info = dataset_info_of(found.folder, *source.data, host);
+  return source;
+}
+
+/// That of the run which the only source comes from, where there is one; else what readers know.
+std::string page_text(const std::vector<fs::path>& sources, const std::vector<std::string>& formats,
+                      const DatasetInfo& info, nlohmann::ordered_json writers) {
+  using Json = nlohmann::ordered_json;
+  Json page;
+  if (sources.size() == 1) page = parse_json_or_nothing<Json>(page_of_run(sources[0]));
+  if (!page.is_object()) {
+    page = Json::object();
+    page["format"] = "diorama dataset 1";
+    page["job"] = info.resolved_job;
+    page["labels"] = Json::array();
+    for (const Labels& labels : info.labels) page["labels"].push_back(labels);
+  }
+  page["diorama"] = info.program_version;
+  page["seed"] = info.seed;
+  page["captures"] = info.capture_count;
+  page["cameras"] = info.camera_names;
+  page["writers"] = std::move(writers);
+  page["converted_from"] = formats;
+  return page.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace
+
+int command_convert(const GlobalOptions& global, const ConvertOptions& options, ConsoleLog& log) {
+  const std::unique_ptr<Registry> registry = make_registry(global, log.sink());
+  warn_of_rejected(*registry, log.sink());
+  const std::unique_ptr<HostServices> host = make_host(*registry, global, std::nullopt, log.sink());
+  DatasetReaders readers(*registry, *host);
+  ChosenWriters chosen = make_writers(options.writers, *registry, *host);
+
+  std::vector<ConversionSource> sources;
+  std::vector<fs::path> folders;
+  std::vector<std::string> formats;
+  for (const fs::path& dataset : options.datasets) {
+    sources.push_back(open_source(dataset, options, readers, *host));
+    folders.push_back(sources.back().folder);
+    formats.push_back(sources.back().data->info().format);
+    sources.back().info.program_version = program_version();
+  }
+  const Conversion conversion(std::move(sources), chosen.needs);
+  for (const std::string& note : conversion.notes()) log.write(LogLevel::Warning, note);
+
+  const DatasetInfo& info = conversion.info();
+  check_folders_are_free(output_folders_of(options.output, chosen.writers));
+  const std::string page = page_text(folders, formats, info, chosen.pages);
+  DatasetOutput output(options.output, std::move(chosen.writers), info.capture_count,
+                       options.overwrite);
+  output.open(info, page);
+  ProgressBar bar(log, "captures", info.capture_count);
+  output.write(
+      [&](const DatasetOutput::Take& take) {
+        conversion.run(*host, [&](Capture capture) {
+          bar.update(capture.index + 1, 0);
+          take(std::move(capture));
+        });
+      },
+      *host);
+  output.finish();
+  output.close();
+  log.write(LogLevel::Info, "dataset: " + options.output.string());
+  return 0;
+}
+
+}  // namespace diorama

@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/app/command_replay.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <fstream>
+#include <iostream>
+#include <set>
+#include <system_error>
+
+#include "diorama/error.h"
+#include "diorama/rng.h"
+#include "framework/app/command_run.h"
+#include "framework/config/clean_text.h"
+#include "framework/output/dataset_status.h"
+#include "framework/output/journal.h"
+
+namespace diorama {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A folder of its own, removed with the object unless the user named it.
+class Place {
+ public:
+  explicit Place(const std::optional<fs::path>& wanted)
+      : path_(wanted.value_or(fs::temp_directory_path() /
+                              ("diorama_replay_" + std::to_string(getpid())))),
+        is_kept_(wanted.has_value()) {}
+  ~Place() {
+    std::error_code ignored;
+    if (!is_kept_) fs::remove_all(path_, ignored);
+  }
+  Place(const Place&) = delete;
+  Place& operator=(const Place&) = delete;
+  const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+  bool is_kept_;
+};
+
+bool is_missing(const DatasetStatus& status, int capture) {
+  return std::ranges::any_of(status.missing, [&](const auto& range) {
+    return capture >= range.first && capture <= range.second;
+  });
+}
+
+std::set<int> chosen_captures(const ReplayOptions& options, const DatasetStatus& status) {
+  std::set<int> chosen;
+  for (const int capture : options.captures) {
+    if (capture < 0 || capture >= status.captures || is_missing(status, capture)) {
+      throw Error(ErrorKind::Usage, options.dataset.string() + ": has no capture " +
+                                        std::to_string(capture) + "; of " +
+                                        std::to_string(status.captures) + " captures, " +
+                                        std::to_string(status.done) + " are there");
+    }
+    chosen.insert(capture);
+  }
+  if (!chosen.empty()) return chosen;
+  std::vector<std::pair<std::uint64_t, int>> order;
+  const Rng stream = Rng(options.seed).fork("captures to verify");
+  for (int i = 0; i < status.captures; ++i) {
+    if (!is_missing(status, i)) order.emplace_back(stream.fork(std::uint64_t(i)).bits(), i);
+  }
+  std::ranges::sort(order);
+  for (std::size_t i = 0; i < order.size() && int(i) < options.sample; ++i) {
+    chosen.insert(order[i].second);
+  }
+  return chosen;
+}
+
+std::string digest_of_file(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  if (!in) return {};
+  Digest digest;
+  std::vector<char> piece(std::size_t(1) << 20);
+  while (in) {
+    in.read(piece.data(), std::streamsize(piece.size()));
+    digest.add(std::as_bytes(std::span(piece.data(), std::size_t(in.gcount()))));
+  }
+  return digest.text();
+}
+
+struct Comparison {
+  std::size_t files = 0;
+  std::vector<std::string> differences;
+};
+
+/// The files of the captures that were made again against those of the dataset.
+Comparison compare(const fs::path& again, const DatasetStatus& again_status,
+                   const DatasetStatus& status, const std::set<int>& captures) {
+  LocalFileSystem file_system;
+  Journals journals(file_system, again / ".diorama" / "journal", again_status.captures);
+  journals.refresh();
+  Comparison result;
+  journals.visit_entries([&](const std::string& worker, const EntryPlace& place) {
+    if (!place.is_published || !captures.contains(place.entry)) return;
+    const auto content = journals.files_of(worker, place);
+    if (!content) return;
+    for (const JournalledFile& file : content->files) {
+      ++result.files;
+      const std::string there = digest_of_file(status.base / file.path);
+      if (there == file.digest) continue;
+      result.differences.push_back("capture " + std::to_string(place.entry) + ": " + file.path +
+                                   (there.empty() ? " is missing" : " differs"));
+    }
+  });
+  return result;
+}
+
+}  // namespace
+
+int command_replay(const GlobalOptions& global, const ReplayOptions& options, ConsoleLog& log) {
+  LocalFileSystem file_system;
+  const DatasetStatus status = read_status(file_system, options.dataset, false);
+  const std::set<int> captures = chosen_captures(options, status);
+  const Place place(options.output);
+  const fs::path records =
+      make_captures_again(global, status, place.path(), captures, options.sets, log);
+  const Comparison result =
+      compare(records, read_status(file_system, records, false), status, captures);
+  for (const std::string& difference : result.differences) {
+    std::cout << printable(difference) << "\n";
+  }
+  std::cout << captures.size() << " captures made again, " << result.files << " files compared, "
+            << result.differences.size() << " differ\n";
+  return result.differences.empty() || !options.sets.empty() ? 0 : kReplayDiffers;
+}
+
+}  // namespace diorama

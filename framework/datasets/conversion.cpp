@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/datasets/conversion.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include "diorama/error.h"
+#include "framework/datasets/capture_sweep.h"
+
+namespace diorama {
+namespace {
+
+std::string joined(const NameSet& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+/// Each of the two kinds of distance follows from the other one and the lens.
+std::string_view twin_of(std::string_view channel) {
+  if (channel == kDistanceToCamera.name) return kDistanceToImagePlane.name;
+  if (channel == kDistanceToImagePlane.name) return kDistanceToCamera.name;
+  return {};
+}
+
+bool is_derivable(std::string_view channel, const NameSet& holds) {
+  return !twin_of(channel).empty() && holds.contains(twin_of(channel)) &&
+         holds.contains(kHoldsCamera);
+}
+
+void derive_distance(std::string_view channel, Frame& frame) {
+  const bool is_plane = channel == kDistanceToImagePlane.name;
+  const auto& from = frame.get(is_plane ? kDistanceToCamera : kDistanceToImagePlane);
+  Image<float> to(from.width(), from.height(), std::numeric_limits<float>::infinity());
+  for (int y = 0; y < from.height(); ++y) {
+    for (int x = 0; x < from.width(); ++x) {
+      const auto ray = ray_direction(frame.camera, Vec2(x + 0.5, y + 0.5));
+      if (!ray || !std::isfinite(from.at(x, y))) continue;
+      const double along_axis = -ray->z();
+      const double d = double(from.at(x, y));
+      to.at(x, y) = float(is_plane ? d * along_axis : d / along_axis);
+    }
+  }
+  frame.set(is_plane ? kDistanceToImagePlane : kDistanceToCamera, std::move(to));
+}
+
+struct Seen {
+  PixelBox box{1 << 30, 1 << 30, 0, 0};
+  std::int64_t pixels = 0;
+};
+
+std::map<std::uint32_t, Seen> seen_in(const Image<std::uint32_t>& ids) {
+  std::map<std::uint32_t, Seen> seen;
+  for (int y = 0; y < ids.height(); ++y) {
+    for (int x = 0; x < ids.width(); ++x) {
+      Seen& each = seen[ids.at(x, y)];
+      PixelBox& box = each.box;
+      box = {std::min(box.x_min, x), std::min(box.y_min, y), std::max(box.x_max, x + 1),
+             std::max(box.y_max, y + 1)};
+      ++each.pixels;
+    }
+  }
+  seen.erase(0);
+  return seen;
+}
+
+/// The visible pixels alone.
+CoverageMask visible_mask(const Image<std::uint32_t>& ids, std::uint32_t id, const PixelBox& box) {
+  CoverageMask mask;
+  mask.box = box;
+  mask.bits.reserve(std::size_t(box.width()) * std::size_t(box.height()));
+  for (int y = box.y_min; y < box.y_max; ++y) {
+    for (int x = box.x_min; x < box.x_max; ++x) mask.bits.push_back(ids.at(x, y) == id ? 1 : 0);
+  }
+  return mask;
+}
+
+/// Boxes of pixels, and visibility as if nothing were hidden or cut off, where they are missing.
+void complete_instances(Frame& frame, const NameSet& needs) {
+  if (!frame.has(kInstanceId.name)) return;
+  const Image<std::uint32_t>& ids = frame.get(kInstanceId);
+  const auto seen = seen_in(ids);
+  for (Instance& instance : frame.instances) {
+    const auto found = seen.find(instance.id);
+    const std::int64_t pixels = found == seen.end() ? 0 : found->second.pixels;
+    if (!instance.tight_box && pixels > 0) instance.tight_box = found->second.box;
+    if (!needs.contains("visibility")) continue;
+    if (!instance.visibility) {
+      instance.visibility.emplace();
+      instance.visibility->visible_pixels = instance.visibility->amodal_pixels = pixels;
+    }
+    Visibility& visibility = *instance.visibility;
+    if (pixels == 0) continue;
+    if (!visibility.amodal_box) visibility.amodal_box = found->second.box;
+    if (!visibility.whole_box) visibility.whole_box = visibility.amodal_box;
+    if (needs.contains("amodal_mask") && visibility.amodal_mask.bits.empty()) {
+      visibility.amodal_mask = visible_mask(ids, instance.id, found->second.box);
+    }
+  }
+}
+
+std::string source_name(const ConversionSource& source) {
+  return source.folder.string() + " (" + source.data->info().format + ")";
+}
+
+}  // namespace
+
+Conversion::Conversion(std::vector<ConversionSource> sources, NameSet needs)
+    : sources_(std::move(sources)), needs_(std::move(needs)) {
+  for (const ConversionSource& source : sources_) {
+    if (source.data->info().captures.empty()) {
+      throw Error(ErrorKind::Usage, source_name(source) + ": holds no capture");
+    }
+    note_differences(source);
+  }
+  unite_infos();
+}
+
+void Conversion::note_differences(const ConversionSource& source) {
+  const NameSet& holds = source.data->info().holds;
+  NameSet missing;
+  NameSet derived;
+  NameSet made_up;
+  const auto is_annotation_held = [&](std::string_view name) {
+    return holds.contains(name == "visibility" ? kHoldsOcclusion : name);
+  };
+  for (const std::string& name : needs_) {
+    if (is_annotation(name)) {
+      if (!is_annotation_held(name)) made_up.insert(name);
+    } else if (!holds.contains(name)) {
+      (is_derivable(name, holds) ? derived : missing).insert(name);
+    }
+  }
+  if (!missing.empty() || made_up.contains("instances")) {
+    if (made_up.contains("instances")) missing.emplace("instances");
+    throw Error(ErrorKind::Usage, source_name(source) + ": does not hold " + joined(missing) +
+                                      ", which the writers need; it holds " + joined(holds));
+  }
+  const std::string who = source_name(source);
+  if (!derived.empty()) {
+    notes_.push_back(who + ": " + joined(derived) + " comes from the other kind of distance");
+  }
+  if (!made_up.empty()) {
+    notes_.push_back(who + ": does not hold " + joined(made_up) +
+                     "; objects count as neither hidden nor cut off");
+  }
+  NameSet unknown;
+  for (const std::string_view name : {kHoldsLabels, kHoldsPoses, kHoldsBounds, kHoldsCamera,
+                                      kHoldsCameraPose, kHoldsTruncation}) {
+    if (!holds.contains(name)) unknown.emplace(name);
+  }
+  if (holds.contains(kHoldsBoxes3d)) {
+    unknown.erase(std::string(kHoldsPoses));
+    unknown.erase(std::string(kHoldsBounds));
+  }
+  if (!unknown.empty()) {
+    notes_.push_back(who + ": does not hold " + joined(unknown) +
+                     "; where writers write these, they mean nothing");
+  }
+  NameSet left;
+  for (const std::string& name : holds) {
+    const bool is_channel =
+        name == kInstanceId.name || name == kLeafId.name || name.starts_with("distance_") ||
+        name == kNormals.name || name == kMotion.name || name == kColorHdr.name ||
+        name == kSensorDepth.name || name == "pointcloud" || is_annotation(name);
+    if (is_channel && !needs_.contains(name)) left.insert(name);
+  }
+  if (!left.empty()) notes_.push_back(who + ": no writer takes " + joined(left));
+}
+
+void Conversion::unite_infos() {
+  info_ = sources_.front().info;
+  if (sources_.size() == 1) return;
+  info_.capture_count = 0;
+  info_.camera_names.clear();
+  info_.classes.clear();
+  info_.resolved_job.clear();
+  info_.validation.reset();
+  std::set<Labels> labels;
+  std::map<std::string, DatasetAsset> assets;
+  const bool have_classes = std::ranges::all_of(
+      sources_, [](const ConversionSource& source) { return !source.info.classes.empty(); });
+  for (const ConversionSource& source : sources_) {
+    const DatasetInfo& each = source.info;
+    for (const std::string& camera : each.camera_names) {
+      if (std::ranges::find(info_.camera_names, camera) == info_.camera_names.end()) {
+        info_.camera_names.push_back(camera);
+      }
+    }
+    for (const std::string& name : each.classes) {
+      if (have_classes && std::ranges::find(info_.classes, name) == info_.classes.end()) {
+        info_.classes.push_back(name);
+      }
+      if (!have_classes) labels.insert(Labels{{"class", name}});
+    }
+    labels.insert(each.labels.begin(), each.labels.end());
+    for (const DatasetAsset& asset : each.assets) assets.emplace(asset.asset, asset);
+    if (each.validation) {
+      if (!info_.validation) info_.validation.emplace();
+      for (const int capture : *each.validation) {
+        info_.validation->push_back(info_.capture_count + capture);
+      }
+    }
+    info_.capture_count += each.capture_count;
+  }
+  info_.labels.assign(labels.begin(), labels.end());
+  info_.assets.clear();
+  for (auto& [name, asset] : assets) info_.assets.push_back(std::move(asset));
+}
+
+void Conversion::run(Host& host, const std::function<void(Capture)>& take) const {
+  int number = 0;
+  for (const ConversionSource& source : sources_) {
+    NameSet wanted = source.data->info().holds;
+    for (const auto* channel : {&kDistanceToCamera, &kDistanceToImagePlane}) {
+      const bool is_used =
+          needs_.contains(channel->name) || needs_.contains(twin_of(channel->name));
+      if (!is_used) wanted.erase(std::string(channel->name));
+    }
+    for (const std::string_view name : {kNormals.name, kMotion.name, kColorHdr.name,
+                                        kSensorDepth.name, std::string_view("pointcloud")}) {
+      if (!needs_.contains(name)) wanted.erase(std::string(name));
+    }
+    sweep_captures<Capture>(
+        *source.data, wanted, host,
+        [&](StoredCapture stored) { return converted(source, std::move(stored)); },
+        [&](Capture capture) {
+          capture.index = number++;
+          take(std::move(capture));
+        });
+  }
+}
+
+Capture Conversion::converted(const ConversionSource& source, StoredCapture stored) const {
+  for (const std::string& camera : source.data->info().camera_names) {
+    const bool is_there = std::ranges::any_of(
+        stored.capture.frames, [&](const Frame& frame) { return frame.camera_name == camera; });
+    if (!is_there) refuse_capture(source.folder, stored, camera);
+  }
+  for (Frame& frame : stored.capture.frames) {
+    for (const std::string& name : needs_) {
+      if (is_annotation(name) || frame.has(name)) continue;
+      const std::string_view twin = twin_of(name);
+      const bool can_derive = !twin.empty() && frame.has(twin);
+      if (!can_derive) refuse_capture(source.folder, stored, frame.camera_name);
+      derive_distance(name, frame);
+    }
+    if (frame.camera_path.empty()) frame.camera_path = "/Cameras/" + frame.camera_name;
+    if (needs_.contains("instances")) complete_instances(frame, needs_);
+  }
+  return std::move(stored.capture);
+}
+
+void refuse_capture(const std::filesystem::path& folder, const StoredCapture& stored,
+                    const std::string& camera) {
+  const Finding* reason = nullptr;
+  for (const Finding& finding : stored.log.findings) {
+    const bool is_missing = finding.check == "nothing is missing";
+    if (!finding.camera.empty() && !camera.empty() && finding.camera != camera) continue;
+    if (!reason || (reason->check == "nothing is missing" && !is_missing)) reason = &finding;
+  }
+  const std::string where = (folder / (reason ? reason->file : ".")).string();
+  throw Error(ErrorKind::Asset,
+              where + ": " + (reason ? reason->found : "does not hold what its dataset holds") +
+                  " (capture " + std::to_string(stored.capture.index) +
+                  (camera.empty() ? "" : ", " + camera) + ")");
+}
+
+}  // namespace diorama

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "diorama/host.h"
+#include "diorama/reader.h"
+#include "diorama/writer.h"
+
+namespace diorama {
+
+/// A dataset that goes into another one.
+struct ConversionSource {
+  std::filesystem::path folder;
+  std::unique_ptr<const StoredDataset> data;
+  DatasetInfo info;  ///< See dataset_info_of().
+};
+
+/// Stored captures as writers want them: those of one dataset, or of several one after the other,
+/// with new numbers, classes united and splits kept.
+class Conversion {
+ public:
+  /// `needs` of all writers. Throws Error(Usage) when a source lacks a channel that cannot be
+  /// derived, or holds nothing.
+  Conversion(std::vector<ConversionSource> sources, NameSet needs);
+
+  const DatasetInfo& info() const { return info_; }
+  /// What the sources do not have and what no writer takes, a line each.
+  const std::vector<std::string>& notes() const { return notes_; }
+
+  /// Gives the captures in order to `take`; they are read on the host's threads, some at a time.
+  /// Throws Error(Asset) that names the file when one does not hold what its dataset holds.
+  void run(Host& host, const std::function<void(Capture)>& take) const;
+
+ private:
+  void unite_infos();
+  void note_differences(const ConversionSource& source);
+  Capture converted(const ConversionSource& source, StoredCapture stored) const;
+
+  std::vector<ConversionSource> sources_;
+  NameSet needs_;
+  DatasetInfo info_;
+  std::vector<std::string> notes_;
+};
+
+/// Throws Error(Asset) that names the file whose fault it is that a frame lacks something: one that
+/// cannot be read rather than one that is not there. `camera` may be empty.
+[[noreturn]] void refuse_capture(const std::filesystem::path& folder, const StoredCapture& stored,
+                                 const std::string& camera);
+
+}  // namespace diorama

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "diorama/host.h"
+#include "diorama/reader.h"
+
+namespace diorama {
+
+/// In what two datasets differ: a line each, the first kMostLines of what captures differ in.
+struct DatasetDifference {
+  static constexpr std::size_t kMostLines = 100;
+  std::vector<std::string> pages;     ///< Jobs, versions, seeds, assets, labels.
+  std::vector<std::string> contents;  ///< Formats, cameras, classes, captures, frames.
+  std::int64_t captures = 0;          ///< Compared.
+  std::int64_t differing_captures = 0;
+
+  bool is_empty() const { return pages.empty() && contents.empty(); }
+};
+
+/// A dataset for comparison.
+struct ComparedDataset {
+  std::filesystem::path folder;
+  const StoredDataset& data;
+};
+
+/// Compares what both formats hold, as exactly as the coarser one holds it; pictures may be off by
+/// `tolerance` (of 255) in the mean, other numbers not. Goes through all captures on the host's
+/// threads.
+DatasetDifference dataset_difference(const ComparedDataset& a, const ComparedDataset& b,
+                                     double tolerance, Host& host);
+
+/// Lines for what two pages dataset.json say differently.
+std::vector<std::string> page_differences(const std::string& a, const std::string& b);
+
+}  // namespace diorama

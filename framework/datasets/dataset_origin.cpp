@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/datasets/dataset_origin.h"
+
+#include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
+#include <utility>
+
+#include "framework/config/json_text.h"
+#include "framework/datasets/capture_sweep.h"
+
+namespace diorama {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+std::string read_page(const fs::path& folder) {
+  std::error_code failed;
+  const fs::path file = folder / "dataset.json";
+  if (!fs::is_regular_file(file, failed)) return {};
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return std::move(text).str();
+}
+
+/// Pages of runs list their writers.
+bool is_page_of_run(const Json& page) {
+  return page.is_object() && page.contains("writers") && page.at("writers").is_array();
+}
+
+bool names_folder(const Json& page, const fs::path& name) {
+  return std::ranges::any_of(page.at("writers"), [&](const Json& writer) {
+    return writer.is_object() && writer.contains("folder") && writer.at("folder").is_string() &&
+           fs::path(writer.at("folder").get<std::string>()).lexically_normal() == name;
+  });
+}
+
+fs::path plain(const fs::path& folder) {
+  const fs::path normal = fs::absolute(folder).lexically_normal();
+  return normal.has_filename() ? normal : normal.parent_path();
+}
+
+/// What a page, of a dataset or of a run, says of the making. Pages of others say nothing.
+void add_making(const Json& page, DatasetInfo& info) {
+  info.seed = page.value("seed", info.seed);
+  info.resolved_job = page.value("job", info.resolved_job);
+  const auto labels = page.find("labels");
+  if (labels != page.end() && labels->is_array()) {
+    for (const Json& entry : *labels) info.labels.push_back(entry.get<Labels>());
+  }
+  const auto plugins = page.find("plugins");
+  if (plugins != page.end() && plugins->is_object()) {
+    for (const auto& [name, version] : plugins->items()) {
+      info.plugin_versions.emplace_back(name, version.get<std::string>());
+    }
+  }
+  const auto assets = page.find("assets");
+  if (assets == page.end() || !assets->is_array()) return;
+  for (const Json& entry : *assets) {
+    DatasetAsset asset{entry.at("asset").get<std::string>(), {}, {}};
+    for (const Json& file : entry.at("files")) {
+      asset.files.emplace_back(file.at("file").get<std::string>(),
+                               file.at("sha256").get<std::string>());
+    }
+    info.assets.push_back(std::move(asset));
+  }
+}
+
+void add_making_of(const std::string& text, DatasetInfo& info) {
+  const Json page = parse_json_or_nothing(text);
+  if (!page.is_object()) return;
+  DatasetInfo more = info;
+  try {
+    add_making(page, more);
+  } catch (const Json::exception&) {
+    return;  // somebody else's page of that name
+  }
+  info = std::move(more);
+}
+
+/// What of a capture tells the dataset's labels and split.
+struct Front {
+  std::set<Labels> labels;
+  std::string split;
+};
+
+void add_from_captures(const StoredDataset& dataset, bool wants_labels, DatasetInfo& info,
+                       Host& host) {
+  const StoredInfo& stored = dataset.info();
+  if (stored.captures.empty()) return;
+  const NameSet wanted =
+      wants_labels ? NameSet{std::string(kHoldsInstances), std::string(kHoldsLabels)} : NameSet{};
+  const bool has_splits = !dataset.read(0, {}).split.empty();
+  if (!has_splits && !wants_labels) return;
+  std::set<Labels> labels;
+  std::vector<int> validation;
+  int place = 0;
+  sweep_captures<Front>(
+      dataset, wanted, host,
+      [](const StoredCapture& capture) {
+        Front front{{}, capture.split};
+        for (const Frame& frame : capture.capture.frames) {
+          for (const Instance& instance : frame.instances) front.labels.insert(instance.labels);
+        }
+        return front;
+      },
+      [&](Front front) {
+        labels.merge(front.labels);
+        // Whatever is not for training is for validation: "val", "test", "valid".
+        if (!front.split.empty() && !front.split.starts_with("train")) validation.push_back(place);
+        ++place;
+      });
+  labels.erase(Labels());
+  if (wants_labels) info.labels.assign(labels.begin(), labels.end());
+  if (has_splits) info.validation = std::move(validation);
+}
+
+}  // namespace
+
+std::string page_of_run(const fs::path& dataset) {
+  std::string own = read_page(dataset);
+  if (is_page_of_run(parse_json_or_nothing(own))) return own;
+  const fs::path folder = plain(dataset);
+  std::string above = read_page(folder.parent_path());
+  const Json page = parse_json_or_nothing(above);
+  return is_page_of_run(page) && names_folder(page, folder.filename()) ? above : std::string();
+}
+
+DatasetInfo dataset_info_of(const fs::path& folder, const StoredDataset& dataset, Host& host) {
+  DatasetInfo info;
+  const std::string run = page_of_run(folder);
+  add_making_of(run.empty() ? read_page(folder) : run, info);
+  const StoredInfo& stored = dataset.info();
+  info.capture_count = int(stored.captures.size());
+  info.camera_names = stored.camera_names;
+  info.classes = stored.classes;
+  add_from_captures(dataset, info.labels.empty() && info.classes.empty(), info, host);
+  return info;
+}
+
+}  // namespace diorama

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/datasets/dataset_output.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <utility>
+
+#include "framework/pipeline/writer_queue.h"
+#include "framework/plugins/plugin_call.h"
+
+namespace diorama {
+namespace {
+
+constexpr std::size_t kQueueBytes = std::size_t(256) << 20;
+
+std::string who(const std::string& name) { return "writer '" + name + "'"; }
+
+OutputStore::Options store_options(bool overwrite) {
+  OutputStore::Options options;
+  if (overwrite) options.existing = OutputStore::Existing::Overwrite;
+  return options;
+}
+
+}  // namespace
+
+OutputFolders output_folders_of(const std::filesystem::path& folder,
+                                const std::vector<NamedWriter>& writers) {
+  OutputFolders folders{folder, ".", {}};
+  for (const NamedWriter& each : writers) folders.writers.push_back({each.name, each.name});
+  return folders;
+}
+
+DatasetOutput::DatasetOutput(const std::filesystem::path& folder, std::vector<NamedWriter> writers,
+                             int capture_count, bool overwrite)
+    : writers_(std::move(writers)),
+      store_(file_system_, output_folders_of(folder, writers_), capture_count,
+             store_options(overwrite)) {}
+
+void DatasetOutput::open(const DatasetInfo& info, const std::string& dataset_json) {
+  store_.join(dataset_json);
+  store_.open();
+  Transaction transaction = store_.begin_transaction();
+  for (std::size_t i = 0; i < writers_.size(); ++i) {
+    CollectedFiles files(transaction, i, writers_[i].name);
+    call_component(who(writers_[i].name), [&] { writers_[i].writer->begin(info, files); });
+  }
+  store_.commit_begin(transaction);
+}
+
+void DatasetOutput::write(const std::function<void(const Take&)>& give, Host& host) {
+  WriterQueue queue(std::clamp(host.thread_count(), 1, 4), kQueueBytes,
+                    [this](const PendingCapture& pending) { write_capture(pending.capture); });
+  give([&queue](Capture capture) {
+    PendingCapture pending;
+    pending.capture = std::move(capture);
+    queue.push(std::move(pending));
+  });
+  queue.drain();
+}
+
+void DatasetOutput::write_capture(const Capture& capture) {
+  Transaction transaction = store_.capture_transaction(capture.index);
+  for (std::size_t i = 0; i < writers_.size(); ++i) {
+    CollectedFiles files(transaction, i, writers_[i].name);
+    call_component(who(writers_[i].name), [&] { writers_[i].writer->write(capture, files); });
+  }
+  store_.commit_capture(capture.index, transaction);
+}
+
+void DatasetOutput::finish() {
+  if (!store_.claim_finish()) return;
+  Transaction transaction = store_.finish_transaction();
+  for (std::size_t i = 0; i < writers_.size(); ++i) {
+    CollectedFiles files(transaction, i, writers_[i].name);
+    const RecordReader records = [&](const RecordVisitor& visit) { store_.read_records(i, visit); };
+    call_component(who(writers_[i].name), [&] { writers_[i].writer->finish(records, files); });
+  }
+  store_.commit_finish(transaction);
+}
+
+void DatasetOutput::close() { store_.close(); }
+
+}  // namespace diorama
