@@ -71,6 +71,9 @@ void expect_same_tree(const Files& one, const Files& other) {
   CHECK(difference(one, other) == "");
 }
 
+/// Without a sign of zero.
+double rounded(double number) { return std::round(number * 1e3) + 0.0; }
+
 /// Cameras go through 32-bit numbers in the first format.
 Files without_lens_digits(const fs::path& folder) {
   Files files = tree(folder);
@@ -79,9 +82,9 @@ Files without_lens_digits(const fs::path& folder) {
     auto json = nlohmann::ordered_json::parse(text);
     for (auto& image : json.at("images")) {
       REQUIRE(image.contains("intrinsics"));
-      for (auto& number : image.at("intrinsics")) number = std::round(number.get<double>() * 1e3);
+      for (auto& number : image.at("intrinsics")) number = rounded(number.get<double>());
       for (auto& row : image.at("world_from_camera")) {
-        for (auto& number : row) number = std::round(number.get<double>() * 1e3);
+        for (auto& number : row) number = rounded(number.get<double>());
       }
     }
     text = json.dump();
