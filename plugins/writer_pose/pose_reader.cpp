@@ -25,15 +25,30 @@ constexpr std::string_view kOverlays = "overlay";  ///< Drawings: read, and noth
 /// Files that are looked at before it is decided by whose rules poses are.
 constexpr std::size_t kLookedAt = 16;
 
-/// What metadata.txt calls the writer; empty when it does not say.
-std::string said_writer(const fs::path& folder) {
+/// What metadata.txt says; an empty object when that is nothing.
+Json metadata_of(const fs::path& folder) {
   try {
     const Json json = parse_stored_json(read_whole_file(folder / "metadata.txt", 1 << 20));
-    if (!json.is_object() || !json.contains("name")) return {};
-    return json.at("name").is_string() ? json.at("name").get<std::string>() : std::string();
+    return json.is_object() ? json : Json::object();
   } catch (const std::exception&) {
-    return {};
+    return Json::object();
   }
+}
+
+/// What metadata.txt calls the writer; empty when it does not say.
+std::string said_writer(const fs::path& folder) {
+  const Json json = metadata_of(folder);
+  const auto name = json.find("name");
+  return name != json.end() && name->is_string() ? name->get<std::string>() : std::string();
+}
+
+/// Cameras that take turns in the folder; empty when metadata.txt does not say.
+std::vector<std::string> said_cameras(const fs::path& folder) {
+  const Json json = metadata_of(folder);
+  const auto cameras = json.find("cameras");
+  const bool are_names = cameras != json.end() && cameras->is_array() &&
+                         std::ranges::all_of(*cameras, [](const Json& c) { return c.is_string(); });
+  return are_names ? cameras->get<std::vector<std::string>>() : std::vector<std::string>();
 }
 
 /// What the page of the run says that a folder is of.
@@ -135,7 +150,8 @@ class PoseDataset final : public StoredDataset {
     const bool is_flat =
         std::ranges::any_of(frames_, [](const PoseFrame& frame) { return frame.folder == 0; });
     const auto run = page_of_run(folder_);
-    if (run) cameras_ = run->cameras;
+    cameras_ = said_cameras(folder_);
+    if (cameras_.empty() && run) cameras_ = run->cameras;
     if (is_flat) {
       if (cameras_.empty()) cameras_ = {"camera"};
       const auto count = std::int32_t(cameras_.size());

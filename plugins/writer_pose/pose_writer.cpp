@@ -70,7 +70,9 @@ NameSet PoseWriter::needs() const {
 void PoseWriter::begin(const DatasetInfo& dataset, DatasetFiles& files) {
   const int cameras = params_.use_subfolders ? 1 : int(dataset.camera_names.size());
   frame_padding_ = grown_padding(params_.frame_padding, dataset.capture_count * cameras);
-  add_replicator_metadata("PoseWriter", "0.2.0", dataset, files);
+  const bool take_turns = cameras > 1 && !format_.is_replicator;
+  add_replicator_metadata("PoseWriter", "0.2.0", dataset, files,
+                          take_turns ? dataset.camera_names : std::vector<std::string>());
 }
 
 /// Cameras take turns in one folder. A skipped frame keeps its number, so that names follow from

@@ -16,7 +16,8 @@ namespace diorama {
 /// JSON files of object poses and cuboid keypoints, as Replicator's PoseWriter 0.2.0 writes them.
 /// Camera-frame poses are right by default; `compat: replicator` repeats the reference's swapped
 /// matrix product, its pixel formulas (no lens distortion) and its principal point. Lenses other
-/// than pinholes have an entry of ours, `lens`, in camera_data, which the reference leaves out.
+/// than pinholes have an entry of ours, `lens`, in camera_data, which the reference leaves out; so
+/// do the names of cameras that take turns in one folder, `cameras`, in metadata.txt.
 class PoseWriter final : public Writer {
  public:
   struct Params {

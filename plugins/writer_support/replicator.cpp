@@ -22,10 +22,11 @@ int grown_padding(int padding, int count) {
 }
 
 void add_replicator_metadata(std::string_view writer, std::string_view version,
-                             const DatasetInfo& dataset, DatasetFiles& files) {
+                             const DatasetInfo& dataset, DatasetFiles& files,
+                             const std::vector<std::string>& cameras) {
   // The colon inside the last key is what readers of such files know.
-  const Json metadata{
-      {"name", writer}, {"version", version}, {"replicator_global_seed:", dataset.seed}};
+  Json metadata{{"name", writer}, {"version", version}, {"replicator_global_seed:", dataset.seed}};
+  if (!cameras.empty()) metadata["cameras"] = cameras;
   files.add_text("metadata.txt", python_json(metadata));
 }
 

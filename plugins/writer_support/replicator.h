@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "diorama/frame.h"
 #include "diorama/params.h"
@@ -20,9 +21,11 @@ std::string padded(int number, int padding);
 /// `padding`, or more where the numbers 0 ... count - 1 need it, so that names sort like numbers.
 int grown_padding(int padding, int count);
 
-/// Adds metadata.txt.
+/// Adds metadata.txt; with the names of cameras that take turns in one folder, which the reference
+/// does not say.
 void add_replicator_metadata(std::string_view writer, std::string_view version,
-                             const DatasetInfo& dataset, DatasetFiles& files);
+                             const DatasetInfo& dataset, DatasetFiles& files,
+                             const std::vector<std::string>& cameras = {});
 
 /// Parameters of Replicator writers that stand for places which Diorama does not write to. They may
 /// be given as null, as generated files have them.

@@ -68,7 +68,8 @@ TEST_CASE("Every format that has a reader comes back", "[readers]") {
   CHECK(formats == 19);
 }
 
-TEST_CASE("Cameras that take turns in one folder are told by the run's page", "[readers]") {
+TEST_CASE("Cameras that take turns in one folder are told by metadata or the run's page",
+          "[readers]") {
   test::EncodingHost host;
   test::MemoryFiles run;
   for (const auto& [path, bytes] : test::write_sample<PoseWriter>({}, host).files) {
@@ -77,6 +78,10 @@ TEST_CASE("Cameras that take turns in one folder are told by the run's page", "[
   const test::DatasetOnDisk disk(run);
   DatasetReaders readers = test::every_reader(host);
   const auto open = [&] { return readers.open(disk.folder() / "poses", "PoseReader"); };
+  CHECK(open()->info().camera_names == std::vector<std::string>{"cam_0", "cam_1"});
+  CHECK(open()->info().captures == std::vector<int>{0, 1, 2});
+  // As the reference writes it.
+  disk.write("poses/metadata.txt", R"({"name": "PoseWriter", "version": "0.2.0"})");
   CHECK(open()->info().camera_names == std::vector<std::string>{"camera"});
   CHECK(open()->info().captures.size() == 6);
   // A capture that nothing shows has no files.
