@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -40,8 +41,13 @@ struct Picture {
 
 inline Picture parse_picture(const std::string& bytes, const std::string& name) {
   const auto texture = decode_image(std::as_bytes(std::span(bytes.data(), bytes.size())), name);
-  return {texture->width, texture->height, texture->channels,
-          std::vector<std::uint32_t>(texture->bytes.begin(), texture->bytes.end())};
+  Picture picture{texture->width, texture->height, texture->channels, {}};
+  picture.samples.assign(texture->bytes.begin(), texture->bytes.end());
+  // Samples of 16 bits.
+  for (const float value : texture->floats) {
+    picture.samples.push_back(std::uint32_t(std::lround(double(value) * 65535.0)));
+  }
+  return picture;
 }
 
 /// What stands behind the header of an array.

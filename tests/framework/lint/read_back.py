@@ -488,7 +488,6 @@ def check_bop(root):
             for i, (pose, info) in enumerate(zip(objects, infos[image])):
                 rotation = np.array(pose["cam_R_m2c"]).reshape(3, 3)
                 assert np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-6)
-                assert "scale" not in pose
                 mask = picture(f"{scene}/mask_visib/{stem}_{i:06d}.png")
                 equal(int((mask == 255).sum()), info["px_count_visib"], "visible pixels")
                 x0, y0, x1, y1 = extent(mask)
