@@ -1,0 +1,257 @@
+// SPDX-License-Identifier: Apache-2.0
+// Renders what the denoiser is trained on and judged by: films of the same views with few and with
+// many paths, independent of each other. See README.md beside this file for the format.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "channels.h"
+#include "half_floats.h"
+#include "path_tracer.h"
+#include "renderer_support/denoiser.h"
+#include "renderer_support/film.h"
+#include "renderer_support/sample_plan.h"
+#include "renderer_support/view_transform.h"
+#include "support/render_host/render_host.h"
+#include "training_scenes.h"
+
+namespace {
+
+using namespace diorama;
+using namespace diorama::training;
+
+/// What a film is traced with.
+struct Pass {
+  int samples = 1;
+  bool is_real_time = false;  ///< Through the pixels' centres, half of the bounces.
+};
+
+Film trace(const EmbreeScene& meshes, const View& view, const Pass& pass, int max_bounces,
+           std::uint64_t seed, Isa isa, Host& host) {
+  TraceSettings settings{max_bounces, 0.0f, false};
+  Image<RayHit> hits;
+  SeenMeshes seen;
+  if (pass.is_real_time) {
+    Frame frame;
+    fill_channels(frame, {}, meshes, view, seen, &hits, host);
+    settings.first_hits = &hits;
+    settings.indirect_share = 0.5f;
+  }
+  const PathTracer tracer(meshes, view, settings, isa);
+  const int width = view.camera().width;
+  Film film(width, view.camera().height);
+  const auto jobs = SamplePlan(width, view.camera().height, {pass.samples}, seed).next_round({}, 0);
+  host.parallel_for(jobs.size(), [&](std::size_t i) {
+    const TraceJob& job = jobs[i];
+    std::vector<PixelSum> sums(job.pixel_count());
+    tracer.trace(job, sums.data(), std::size_t(job.x_end - job.x_begin));
+    const PixelSum* sum = sums.data();
+    for (int y = job.y_begin; y < job.y_end; ++y) {
+      for (int x = job.x_begin; x < job.x_end; ++x) film.at(x, y) = (sum++)->mean();
+    }
+  });
+  return film;
+}
+
+/// That of the means of blocks of pixels: it hardly depends on the noise.
+double quiet_exposure(const Film& film) {
+  constexpr int kBlock = 16;
+  Image<Vec3f> means((film.width() + kBlock - 1) / kBlock, (film.height() + kBlock - 1) / kBlock,
+                     Vec3f::Zero());
+  for (int y = 0; y < film.height(); ++y) {
+    for (int x = 0; x < film.width(); ++x) {
+      means.at(x / kBlock, y / kBlock) += film.at(x, y).seen + film.at(x, y).scattered;
+    }
+  }
+  for (int y = 0; y < means.height(); ++y) {
+    for (int x = 0; x < means.width(); ++x) {
+      const int columns = std::min(kBlock, film.width() - x * kBlock);
+      const int rows = std::min(kBlock, film.height() - y * kBlock);
+      means.at(x, y) /= float(columns * rows);
+    }
+  }
+  return automatic_exposure(means);
+}
+
+constexpr int kChannels = 16;
+
+/// Of one pixel; light times `scale`.
+std::array<float, kChannels> channels_of(const FilmPixel& p, const Vec3f& eye, float scale) {
+  const float distance = p.surface_share > 0.0f ? (p.position - eye).norm() : 0.0f;
+  return {scale * p.seen.x(),
+          scale * p.seen.y(),
+          scale * p.seen.z(),
+          scale * p.scattered.x(),
+          scale * p.scattered.y(),
+          scale * p.scattered.z(),
+          p.albedo.x(),
+          p.albedo.y(),
+          p.albedo.z(),
+          p.normal.x(),
+          p.normal.y(),
+          p.normal.z(),
+          distance,
+          scale * std::sqrt(std::max(0.0f, p.variance)),
+          scale * p.brightest,
+          p.surface_share};
+}
+
+/// The whole file at once, so that who reads while we write never meets half of one.
+class FilmFile {
+ public:
+  FilmFile(int width, int height, int films) { put({kMagic, width, height, films, kChannels}); }
+  /// Light is stored times `scale`; the film's own exposure is told relative to that.
+  void add(const Film& film, const Pass& pass, const Vec3f& eye, float scale) {
+    const auto exposure = float(quiet_exposure(film) / double(scale));
+    put({pass.samples, pass.is_real_time ? 1 : 0, std::bit_cast<std::int32_t>(exposure)});
+    std::vector<std::uint16_t> planes(film.pixels().size() * kChannels);
+    for (std::size_t i = 0; i < film.pixels().size(); ++i) {
+      const auto values = channels_of(film.pixels()[i], eye, scale);
+      for (std::size_t k = 0; k < kChannels; ++k) {
+        planes[k * film.pixels().size() + i] = half_bits(values[k]);
+      }
+    }
+    bytes_.append(reinterpret_cast<const char*>(planes.data()), 2 * planes.size());
+  }
+  void write(const std::filesystem::path& file) const {
+    const std::filesystem::path temporary = file.string() + ".part";
+    std::ofstream out(temporary, std::ios::binary);
+    out.write(bytes_.data(), std::streamsize(bytes_.size()));
+    out.close();
+    if (!out) throw Error(ErrorKind::Output, file.string() + ": cannot be written");
+    std::filesystem::rename(temporary, file);
+  }
+
+ private:
+  static constexpr std::int32_t kMagic = 0x4D4C4946;  // "FILM"
+  void put(const std::vector<std::int32_t>& numbers) {
+    bytes_.append(reinterpret_cast<const char*>(numbers.data()), 4 * numbers.size());
+  }
+  std::string bytes_;
+};
+
+struct Options {
+  std::filesystem::path out;
+  std::filesystem::path judge;
+  std::uint64_t first = 1;
+  int sets = 1;
+  int views = 8;
+  int width = 256;
+  int height = 192;
+  int target_paths = 64;
+  double seconds = 1e9;
+  int threads = 1;
+};
+
+/// Whether something can be learnt from it: not black, not inside of a thing.
+bool is_worthy(const Film& film, const Vec3f& eye) {
+  std::size_t lit = 0;
+  std::size_t near = 0;
+  for (const FilmPixel& p : film.pixels()) {
+    lit += luminance(p.scattered) > 0.0f ? 1 : 0;
+    near += p.surface_share > 0.0f && (p.position - eye).norm() < 0.25f ? 1 : 0;
+  }
+  return lit > film.pixels().size() / 20 && near < film.pixels().size() / 2;
+}
+
+void render_set(const Set& set, std::uint64_t seed, const Options& options, Host& host) {
+  const Isa isa = isa_by_name(best_isa_name());
+  EmbreeScene meshes(host, {best_isa_name(), {false, false}});
+  meshes.take(set.scene);
+  Rng rng = Rng(seed).fork("passes");
+  const bool is_judged = !options.judge.empty();
+  for (std::size_t i = 0; i < set.cameras.size(); ++i) {
+    const View view(set.scene, set.cameras[i]);
+    const double depth = rng.uniform();
+    const int bounces = is_judged || depth < 0.72 ? 6 : depth < 0.8 ? 4 : depth < 0.94 ? 1 : 0;
+    const bool sees_one_moment = !view.has_shutter() && !view.has_aperture();
+    std::vector<Pass> passes{{1, sees_one_moment && bounces < 2}, {2}, {4}, {16}};
+    if (is_judged) {
+      passes = {{2}, {4}, {16}, {256}};
+    } else if (rng.chance(0.04)) {
+      passes.push_back({256});
+    }
+    passes.insert(passes.end(), 2, {options.target_paths});
+    std::vector<Film> films;
+    for (const Pass& pass : passes) {
+      films.push_back(trace(meshes, view, pass, bounces, rng.bits(), isa, host));
+      if (films.size() == 2 && !is_judged && !is_worthy(films.back(), view.position())) break;
+    }
+    if (films.size() < passes.size()) continue;
+    const auto scale = float(quiet_exposure(films.back()));
+    FilmFile file(options.width, options.height, int(films.size()));
+    for (std::size_t k = 0; k < films.size(); ++k) {
+      file.add(films[k], passes[k], view.position(), scale);
+    }
+    file.write(options.out / (set.name + "_" + std::to_string(i) + ".films"));
+    if (!is_judged) continue;
+    std::ofstream own(options.out / (set.name + "_" + std::to_string(i) + ".own"),
+                      std::ios::binary);
+    for (std::size_t k = 0; k + 2 < films.size(); ++k) {
+      DenoiseSettings denoise{view.position()};
+      denoise.brightest_path = float(4.0 / automatic_exposure(films[k]));
+      const Image<Vec3f> picture = denoised(std::move(films[k]), denoise, isa, host);
+      for (int c = 0; c < 3; ++c) {
+        for (const Vec3f& pixel : picture.pixels()) {
+          const std::uint16_t bits = half_bits(scale * pixel[c]);
+          own.write(reinterpret_cast<const char*>(&bits), 2);
+        }
+      }
+    }
+  }
+}
+
+void make(const Options& options) {
+  test::RenderHost host(options.threads);
+  std::filesystem::create_directories(options.out);
+  const auto start = std::chrono::steady_clock::now();
+  for (int i = 0; i < options.sets; ++i) {
+    const double elapsed =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    if (elapsed > options.seconds) break;
+    const std::uint64_t seed = options.first + std::uint64_t(i);
+    try {
+      const Set set =
+          options.judge.empty()
+              ? training_set(seed, options.views, options.width, options.height, host)
+              : judged_set(int(seed), options.width, options.height, options.judge, host);
+      render_set(set, seed, options, host);
+    } catch (const Error& error) {
+      std::fprintf(stderr, "set %d: %s\n", int(seed), error.what());
+    }
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options options;
+  CLI::App app{"Renders pictures to train the denoiser on, or to judge it by"};
+  app.add_option("folder", options.out, "Where the films go")->required();
+  app.add_option("--judge", options.judge,
+                 "Folder with assets_root/ and bench/: the sets to judge by, instead");
+  app.add_option("--first", options.first, "Number of the first set");
+  app.add_option("--sets", options.sets, "How many sets");
+  app.add_option("--views", options.views, "Per set");
+  app.add_option("--width", options.width);
+  app.add_option("--height", options.height);
+  app.add_option("--target-paths", options.target_paths,
+                 "Of each of the two films to compare with");
+  app.add_option("--seconds", options.seconds, "No further set is begun after that");
+  app.add_option("--threads", options.threads);
+  CLI11_PARSE(app, argc, argv);
+  try {
+    make(options);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 1;
+  }
+}

@@ -1,0 +1,232 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The denoiser's network and what surrounds it, as in plugins/renderer_embree/denoiser*.cpp.
+
+A U-Net on blocks of 2x2 pixels predicts kernels for six levels of a pyramid. They average pairs of
+scattered light and the surfaces' colours; only their quotient, the light that falls on a surface, is
+used, times the pixel's own colour, averaged by a third kernel over 3x3 pixels.
+"""
+import struct
+
+import numpy as np
+import torch
+import torch.nn.functional as F
+from torch import nn
+
+CHANNELS = 16  # of a film, and of the network's input
+LEVELS = 6  # of the pyramid
+FINE = 25  # taps of a level's own pixels,
+COARSE = 9  # of the next level's result,
+OWN = 9  # of the pixel's colour
+ALIGNMENT = 32  # pixels, so that all levels have whole ones
+MIN_ALBEDO = 0.02
+TIMES_OTHERS = 4.0
+LIMITED_PATHS = 16.0
+SMALLEST = 1e-6
+MAGIC = 0x574E4544  # "DENW"
+
+
+def luminance(rgb):
+    return (0.2126 * rgb[:, 0:1] + 0.7152 * rgb[:, 1:2]) + 0.0722 * rgb[:, 2:3]
+
+
+def box3(values):
+    return 9.0 * F.avg_pool2d(values, 3, 1, 1)
+
+
+class Film:
+    """Films of equal size as the network takes them; channels as make_pictures.cpp writes them."""
+
+    def __init__(self, raw, paths, exposure, firefly_limit=4.0):
+        n = paths.view(-1, 1, 1, 1)
+        e = exposure.view(-1, 1, 1, 1)
+        self.seen = raw[:, 0:3]
+        scattered, albedo, normal = raw[:, 3:6], raw[:, 6:9], raw[:, 9:12]
+        distance, deviation, brightest, share = (raw[:, k : k + 1] for k in range(12, 16))
+        own = luminance(scattered)
+        variance = deviation * deviation
+        # The brightest path brings no more than is believable.
+        times = torch.clamp(n / LIMITED_PATHS, min=1.0)
+        others = box3(own * n - brightest)
+        count = box3((n - 1.0).expand_as(own))
+        limit = firefly_limit / e
+        most = times * (limit + TIMES_OTHERS * others.clamp(min=0.0) / count.clamp(min=1.0))
+        removed = torch.minimum(own, (brightest - most) / n).clamp(min=0.0)
+        removed = torch.where((n > 1.5) & (brightest > limit * times), removed, torch.zeros_like(own))
+        less = own - removed
+        squares = variance * (n - 1.0) + own * own - (brightest**2 - most**2) / n
+        cut = (squares - less * less).clamp(min=0.0) / (n - 1.0).clamp(min=1.0)
+        variance = torch.where(removed > 0.0, cut, variance)
+        self.scattered = scattered * torch.where(own > 0.0, less / own.clamp(min=1e-30), own)
+        self.albedo = torch.maximum(albedo, MIN_ALBEDO * share)
+        self.own_albedo = self.albedo
+        irradiance = self.scattered / self.albedo.clamp(min=SMALLEST)
+        seen = luminance(self.seen)
+        shade = less * e
+        relative = variance.sqrt() * e / (shade + 0.02)
+        peak = brightest / (n * own).clamp(min=1e-12)
+        self.features = torch.cat(
+            [
+                torch.log1p(8.0 * e * irradiance) / 3.0,
+                albedo,
+                normal,
+                torch.log1p(distance) / 2.0,
+                relative / (1.0 + relative),
+                torch.log1p(8.0 * e * seen) / 3.0,
+                share,
+                peak.clamp(0.0, 1.0),
+                (torch.log2(n) / 8.0).expand_as(share),
+                torch.log1p(8.0 * shade) / 3.0,
+            ],
+            1,
+        )
+
+
+class Convs(nn.Module):
+    """3x3 convolutions with ReLU, one after the other."""
+
+    def __init__(self, begin, width, count):
+        super().__init__()
+        self.layers = nn.ModuleList(
+            nn.Conv2d(begin if i == 0 else width, width, 3, padding=1) for i in range(count)
+        )
+
+    def forward(self, x):
+        for layer in self.layers:
+            x = F.relu(layer(x))
+        return x
+
+
+class Network(nn.Module):
+    """Film features -> logits per level, the finest first.
+
+    widths: of the five levels from half the resolution on; encoder, decoder: convolutions there."""
+
+    def __init__(self, widths=(48, 64, 80, 80, 80), encoder=(2, 2, 2, 2, 2), decoder=(2, 2, 2, 2)):
+        super().__init__()
+        self.widths, self.encoder_counts, self.decoder_counts = widths, encoder, decoder
+        begins = (4 * CHANNELS,) + tuple(widths[:-1])
+        self.encoder = nn.ModuleList(Convs(b, w, c) for b, w, c in zip(begins, widths, encoder))
+        self.narrow = nn.ModuleList(
+            nn.Conv2d(widths[i + 1], widths[i], 1) for i in range(len(widths) - 1)
+        )
+        self.decoder = nn.ModuleList(Convs(w, w, c) for w, c in zip(widths[:-1], decoder))
+        pixel = FINE + COARSE + OWN + 1
+        level = FINE + COARSE + 1
+        self.heads = nn.ModuleList(
+            nn.Conv2d(w, level + (4 * pixel if i == 0 else 0), 1) for i, w in enumerate(widths)
+        )
+        for module in self.modules():
+            if isinstance(module, nn.Conv2d):
+                nn.init.kaiming_normal_(module.weight, nonlinearity="relu")
+                nn.init.zeros_(module.bias)
+        with torch.no_grad():
+            for i, head in enumerate(self.heads):
+                head.weight.mul_(0.1)
+                head.bias[FINE // 2] = 1.0
+                if i == 0:
+                    finest = head.bias[level:].view(pixel, 4)
+                    finest[FINE // 2] = 1.0
+                    finest[FINE + COARSE + OWN // 2] = 3.0
+
+    def forward(self, features):
+        x = F.pixel_unshuffle(features, 2)
+        skips = []
+        for i, convs in enumerate(self.encoder):
+            x = convs(x if i == 0 else F.max_pool2d(x, 2))
+            skips.append(x)
+        logits = [self.heads[-1](x)]
+        for i in reversed(range(len(self.widths) - 1)):
+            x = skips[i] + F.interpolate(self.narrow[i](x), scale_factor=2, mode="nearest")
+            x = self.decoder[i](x)
+            logits.insert(0, self.heads[i](x))
+        level = FINE + COARSE + 1
+        finest = F.pixel_shuffle(logits[0][:, level:].float(), 2)
+        return [finest, logits[0][:, :level].float()] + [l.float() for l in logits[1:]]
+
+    def layers(self):
+        """In the order of the file."""
+        for convs in self.encoder:
+            yield from convs.layers
+        for i in reversed(range(len(self.widths) - 1)):
+            yield self.narrow[i]
+            yield from self.decoder[i].layers
+        yield from self.heads
+
+    def save(self, path):
+        with open(path, "wb") as out:
+            numbers = (MAGIC, 1, *self.widths, *self.encoder_counts, *self.decoder_counts)
+            out.write(struct.pack(f"<{len(numbers)}i", *numbers))
+            for layer in self.layers():
+                for tensor in (layer.weight, layer.bias):
+                    out.write(tensor.detach().cpu().numpy().astype("<f2").tobytes())
+
+    @staticmethod
+    def load(path):
+        with open(path, "rb") as file:
+            numbers = struct.unpack("<16i", file.read(64))
+            if numbers[:2] != (MAGIC, 1):
+                raise ValueError(f"{path}: not the weights of a denoiser")
+            network = Network(numbers[2:7], numbers[7:12], numbers[12:16])
+            with torch.no_grad():
+                for layer in network.layers():
+                    for tensor in (layer.weight, layer.bias):
+                        values = np.frombuffer(file.read(2 * tensor.numel()), "<f2")
+                        tensor.copy_(torch.from_numpy(values.astype(np.float32)).view_as(tensor))
+        return network
+
+
+def shifted(padded, k, side, height, width):
+    y, x = divmod(k, side)
+    return padded[:, :, y : y + height, x : x + width]
+
+
+def averaged(values, weights, side):
+    """Of the pixels around, by weights per tap; beside the picture is nothing."""
+    height, width = values.shape[2:]
+    padded = F.pad(values, (side // 2,) * 4)
+    total = 0.0
+    for k, weight in enumerate(weights.unbind(1)):
+        total = total + weight.unsqueeze(1) * shifted(padded, k, side, height, width)
+    return total
+
+
+def widened(values):
+    return F.interpolate(values, scale_factor=2, mode="nearest")
+
+
+def denoised(film, logits):
+    pairs = [torch.cat([film.scattered, film.albedo], 1)]
+    for level in range(LEVELS - 1):
+        keep = logits[level][:, -1:]
+        keep = F.softmax(F.pixel_unshuffle(keep, 2), 1)
+        quads = F.pixel_unshuffle(pairs[level], 2)
+        b, _, h, w = keep.shape
+        pairs.append((quads.view(b, 6, 4, h, w) * keep.unsqueeze(1)).sum(2))
+    result = averaged(pairs[-1], F.softmax(logits[-1][:, :FINE], 1), 5)
+    for level in reversed(range(LEVELS - 1)):
+        weights = F.softmax(logits[level][:, : FINE + COARSE], 1)
+        height, width = pairs[level].shape[2:]
+        total = averaged(pairs[level], weights[:, :FINE], 5)
+        padded = F.pad(result, (1,) * 4)
+        for k, weight in enumerate(weights[:, FINE:].unbind(1)):
+            part = widened(shifted(padded, k, 3, height // 2, width // 2))
+            total = total + weight.unsqueeze(1) * part
+        result = total
+    irradiance = result[:, :3] / result[:, 3:].clamp(min=SMALLEST)
+    weights = F.softmax(logits[0][:, FINE + COARSE : FINE + COARSE + OWN], 1)
+    own = torch.cat([film.own_albedo, film.seen], 1)
+    height, width = own.shape[2:]
+    padded = F.pad(own, (1,) * 4, mode="replicate")
+    total = 0.0
+    for k, weight in enumerate(weights[:, :, :height, :width].unbind(1)):
+        total = total + weight.unsqueeze(1) * shifted(padded, k, 3, height, width)
+    return irradiance[:, :, :height, :width] * total[:, :3] + total[:, 3:]
+
+
+def denoise(network, raw, paths, exposure):
+    """Pictures of any size: beside them is nothing."""
+    film = Film(raw, paths, exposure)
+    height, width = raw.shape[2:]
+    pad = (0, -width % ALIGNMENT, 0, -height % ALIGNMENT)
+    film.scattered, film.albedo = F.pad(film.scattered, pad), F.pad(film.albedo, pad)
+    return denoised(film, network(F.pad(film.features, pad)))
