@@ -10,7 +10,7 @@ namespace diorama {
 namespace {
 
 /// A key's value: a scalar, or what a list or map holds, keys of lists being 0, 1, 2 ...
-struct Node {
+struct YamlNode {
   std::string scalar;
   std::vector<std::pair<std::string, std::string>> items;
   bool is_collection = false;
@@ -73,8 +73,8 @@ class Flow {
  public:
   Flow(std::string_view text, std::size_t line) : text_(text), line_(line) {}
 
-  Node value() {
-    Node node;
+  YamlNode value() {
+    YamlNode node;
     skip();
     if (accept('[')) {
       node.is_collection = true;
@@ -221,14 +221,14 @@ std::size_t key_end(const std::string& text) {
 }
 
 /// The value that stands behind a key and on the deeper lines that follow.
-Node value_of(const std::vector<Line>& lines, std::size_t& at, const std::string& rest) {
+YamlNode value_of(const std::vector<Line>& lines, std::size_t& at, const std::string& rest) {
   const Line& line = lines[at];
   if (!rest.empty()) {
     std::string text = rest;
     while (open_brackets(text) > 0 && at + 1 < lines.size()) text += " " + lines[++at].text;
     return Flow(text, line.number).value();
   }
-  Node node;
+  YamlNode node;
   node.is_collection = true;
   while (at + 1 < lines.size()) {
     const Line& next = lines[at + 1];
@@ -265,7 +265,7 @@ DataYaml parse_data_yaml(std::string_view text) {
                           key == "test" || key == "names" || key == "kpt_shape";
     if (!is_known) continue;
     if (!keys.insert(key).second) refuse(line.number, "'" + key + "' is there twice");
-    const Node node = value_of(lines, at, trimmed(line.text.substr(end + 1)));
+    const YamlNode node = value_of(lines, at, trimmed(line.text.substr(end + 1)));
     try {
       if (key == "path") {
         yaml.path = node.scalar;
