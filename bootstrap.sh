@@ -28,7 +28,7 @@ test_packages=(
 check_packages=(clang-format-14 clang-tidy-19)
 # Tests by what they are about, for the sanitizers: in every run of CI, and by night.
 foreign_bytes=(
-  sdk_test config_test host_test images_test pipeline_test output_test lint_test loader_usd_test
+  sdk_test config_test host_test images_test pipeline_test output_test datasets_test lint_test loader_usd_test
   physics_bullet_test writer_support_test
 )
 by_night=(
