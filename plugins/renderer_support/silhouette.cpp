@@ -149,11 +149,9 @@ inline void Silhouette::add_triangle(const PixelBox& around, const Corner& a, co
   const Four x{a.position.x(), b.position.x(), c.position.x(), a.position.x()};
   const Four y{a.position.y(), b.position.y(), c.position.y(), a.position.y()};
   const Four z{a.position.z(), b.position.z(), c.position.z(), a.position.z()};
-  using Order [[gnu::vector_size(32)]] = std::int64_t;
-  constexpr Order kNext{1, 2, 0, 1};
-  const Four next_x = __builtin_shuffle(x, kNext);
-  const Four next_y = __builtin_shuffle(y, kNext);
-  const Four next_z = __builtin_shuffle(z, kNext);
+  const Four next_x = __builtin_shufflevector(x, x, 1, 2, 0, 1);
+  const Four next_y = __builtin_shufflevector(y, y, 1, 2, 0, 1);
+  const Four next_z = __builtin_shufflevector(z, z, 1, 2, 0, 1);
   const double side = volume < 0.0 ? -1.0 : 1.0;
   const Four normal_x = (y * next_z - z * next_y) * side;
   const Four normal_y = (z * next_x - x * next_z) * side;
