@@ -2,6 +2,7 @@
 #include "framework/plugins/fatal_end.h"
 
 #include <sys/mman.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -101,14 +102,25 @@ void on_crash(int number) {
   std::raise(number);
 }
 
-void on_exit() {
-  if (!is_watched()) return;
+[[noreturn]] void end_process(int code) {
+  while (true) syscall(SYS_exit_group, code);
+}
+
+[[noreturn]] void end_for_component(const char* call) {
   Line line;
   line << "error: ";
   name_work(line);
-  line << " ended the program with exit(), which components must not";
+  line << " ended the program with " << call << ", which components must not";
   line.print();
-  _exit(kBrokenPlugin);
+  end_process(kBrokenPlugin);
+}
+
+void on_exit() {
+  if (is_watched()) end_for_component("exit()");
+}
+
+void on_quick_exit() {
+  if (is_watched()) end_for_component("quick_exit()");
 }
 
 /// Room for the handler where the stack has none left.
@@ -177,7 +189,8 @@ AtCapture::~AtCapture() {
 
 FatalEndReports::FatalEndReports() {
   // Handlers of exit() cannot be taken back.
-  [[maybe_unused]] static const int registered = std::atexit(on_exit);
+  [[maybe_unused]] static const int registered =
+      std::atexit(on_exit) | std::at_quick_exit(on_quick_exit);
   watched_process = getpid();
   make_handler_stack();
   if (!kHandlesSignals) return;
@@ -194,3 +207,16 @@ FatalEndReports::~FatalEndReports() {
 }
 
 }  // namespace diorama
+
+// No handler hears of these two. The program exports them (framework/app/CMakeLists.txt), so that
+// they come before the C library's for every component; the C library's own exit() does not pass
+// through here.
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+extern "C" {
+[[noreturn, gnu::visibility("default")]] void _exit(int code) {
+  if (diorama::is_watched()) diorama::end_for_component("_exit()");
+  diorama::end_process(code);
+}
+[[noreturn, gnu::visibility("default")]] void _Exit(int code) noexcept { _exit(code); }
+}
+#endif

@@ -34,9 +34,10 @@ class AtCapture {
 };
 
 /// While it lives, the process does not end without a word: a crash prints one line that names
-/// component and capture, then ends the process by its signal; an exit() from within a component
-/// prints one, too, and the exit code is that of a broken plugin. Child processes are left alone,
-/// as are builds with sanitizers, which tell more. One at a time, made by the main thread.
+/// component and capture, then ends the process by its signal; an exit(), quick_exit() or _exit()
+/// from within a component prints one, too, and the exit code is that of a broken plugin. Child
+/// processes are left alone, as are builds with sanitizers, which tell more. One at a time, made by
+/// the main thread.
 class FatalEndReports {
  public:
   FatalEndReports();

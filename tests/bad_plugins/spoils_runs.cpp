@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Components that end the process, and an annotator that cannot even be made.
+#include <unistd.h>
+
 #include <csignal>
 #include <cstdlib>
 #include <stdexcept>
@@ -19,6 +21,9 @@ struct Acts final : QuietWriter {
 };
 
 void leave() { std::exit(0); }
+void leave_quickly() { std::quick_exit(0); }
+void leave_at_once() { _exit(0); }
+void leave_at_once_by_c() { std::_Exit(0); }
 void touch_nothing() { std::raise(SIGSEGV); }
 void abort_all() { std::abort(); }
 void dig(int depth) {
@@ -91,6 +96,9 @@ struct WantsHeat final : QuietWriter {
 DIORAMA_PLUGIN("spoils_runs", "1.0.0", "MIT") {
   using namespace diorama::test;
   DIORAMA_ADD(Acts<leave>, "leaves", "Ends the program.");
+  DIORAMA_ADD(Acts<leave_quickly>, "leaves_quickly", "Ends the program, without its destructors.");
+  DIORAMA_ADD(Acts<leave_at_once>, "leaves_at_once", "Ends the program, without any handler.");
+  DIORAMA_ADD(Acts<leave_at_once_by_c>, "leaves_at_once_by_c", "The same by C's name.");
   DIORAMA_ADD(Acts<touch_nothing>, "crashes", "Crashes.");
   DIORAMA_ADD(Acts<abort_all>, "aborts", "Aborts.");
   DIORAMA_ADD(Acts<dig_down>, "digs", "Has no end of calls.");

@@ -67,6 +67,18 @@ TEST_CASE("exit(0) in a plugin ends a run with an error", "[plugins]") {
 }
 
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+TEST_CASE("nor does any other way to end the process pass for success", "[plugins]") {
+  const auto [writer, call] =
+      GENERATE(std::pair("leaves_quickly", "quick_exit()"), std::pair("leaves_at_once", "_exit()"),
+               std::pair("leaves_at_once_by_c", "_exit()"));
+  const Outcome outcome = run_with(writer);
+  INFO(outcome.errors);
+  CHECK(outcome.exit_code == 4);
+  CHECK_THAT(outcome.errors, ContainsSubstring("error: writer '" + std::string(writer) +
+                                               "' at capture 1 ended the program with " + call +
+                                               ", which components must not\n"));
+}
+
 TEST_CASE("a crash names component and capture and ends the program by its signal", "[plugins]") {
   const Outcome crash = run_with("crashes");
   INFO(crash.errors);

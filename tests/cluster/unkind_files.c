@@ -1,19 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 // Preloaded into the program; makes its file system slow or faulty:
-//   SLOW_RENAME_MS  every rename takes so long. A run then lasts long enough to be disturbed,
-//   without using the
-//                   processor.
-//   SLOW_FILES_MS   so does everything that makes, renames, removes or syncs a file or folder, as
-//   on a network. FAIL_AT         the operation of that number (1, 2, ...; writes count, too) fails
-//   with the error number FAIL_ERRNO      (default: no space left), and with FAIL_ON=1 every later
-//   one as well; FAIL_MARK names a file
-//                   that is made then.
+//   SLOW_RENAME_MS  every move of a file takes so long. A run then lasts long enough to be
+//   disturbed, without
+//                   using the processor.
+//   SLOW_FILES_MS   so does everything that makes, moves, removes or syncs a file or folder, as on
+//   a network. FAIL_AT         the operation of that number (1, 2, ...; writes count, too) fails
+//   with the error number
+//                   FAIL_ERRNO (default: no space left), and with FAIL_ON=1 every later one as
+//                   well; FAIL_MARK names a file that is made then.
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <stdarg.h>
 #include <stdatomic.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <sys/stat.h>
 #include <sys/types.h>
@@ -42,10 +43,18 @@ static int disturbed(const char* delay) {
   return 1;
 }
 
-int rename(const char* from, const char* to) {
+static int disturbed_move(void) {
   const long delay_ms = number("SLOW_RENAME_MS", 0);
   if (delay_ms > 0) usleep((useconds_t)delay_ms * 1000);
-  return disturbed("SLOW_FILES_MS") ? -1 : REAL(rename)(from, to);
+  return disturbed("SLOW_FILES_MS");
+}
+
+int rename(const char* from, const char* to) {
+  return disturbed_move() ? -1 : REAL(rename)(from, to);
+}
+
+int renameat2(int from_folder, const char* from, int to_folder, const char* to, unsigned flags) {
+  return disturbed_move() ? -1 : REAL(renameat2)(from_folder, from, to_folder, to, flags);
 }
 
 int mkdir(const char* path, mode_t mode) {
