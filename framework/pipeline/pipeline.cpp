@@ -110,16 +110,14 @@ RunSummary Pipeline::run(const DatasetInfo& dataset, const std::string& dataset_
                                          [this](const PendingCapture& pending) { write(pending); });
   try {
     run_visits();
+    const Clock clock(summary_, "waiting for writers");
+    if (!queue_->drain(options_.stop)) throw Interrupted();
   } catch (const Interrupted&) {
     end_early();
     throw;
   } catch (const Stopped&) {
     end_early();
     throw Interrupted();
-  }
-  {
-    const Clock clock(summary_, "waiting for writers");
-    queue_->drain();
   }
   finish_output(dataset);
   store_.close();
@@ -407,7 +405,7 @@ void Pipeline::take(Visit& visit, const PlannedCapture& planned) {
   }
   {
     const Clock clock(summary_, "waiting for writers");
-    queue_->push(std::move(pending));
+    if (!queue_->push(std::move(pending), options_.stop)) throw Interrupted();
   }
   ++summary_.captures;
   if (options_.progress) {

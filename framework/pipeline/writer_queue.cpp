@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "framework/pipeline/writer_queue.h"
 
+#include <chrono>
 #include <condition_variable>
 #include <deque>
 #include <exception>
@@ -57,6 +58,15 @@ struct WriterQueue::State {
     waiting.clear();
   }
 
+  /// Waits until `is_over()`; whoever sets `stop` cannot notify.
+  template <class IsOver>
+  void wait(std::unique_lock<std::mutex>& lock, const std::atomic<bool>* stop, IsOver is_over) {
+    constexpr std::chrono::milliseconds kLook{100};
+    if (!stop) return changed.wait(lock, is_over);
+    while (!changed.wait_for(lock, kLook, is_over) && !*stop) {
+    }
+  }
+
   void rethrow() {
     if (!errors.empty()) std::rethrow_exception(errors.begin()->second);
   }
@@ -103,18 +113,20 @@ WriterQueue::~WriterQueue() {
   for (std::thread& thread : state_->threads) thread.join();
 }
 
-void WriterQueue::push(PendingCapture pending) {
+bool WriterQueue::push(PendingCapture pending, const std::atomic<bool>* stop) {
   const std::size_t bytes = capture_bytes(pending);
   std::unique_lock lock(state_->mutex);
   // One capture always has room, however large it is.
-  state_->changed.wait(lock, [&] {
-    return !state_->errors.empty() || state_->bytes_under_way == 0 ||
-           state_->bytes_under_way + bytes <= state_->max_bytes;
-  });
+  const auto has_room = [&] {
+    return state_->bytes_under_way == 0 || state_->bytes_under_way + bytes <= state_->max_bytes;
+  };
+  state_->wait(lock, stop, [&] { return !state_->errors.empty() || has_room(); });
   state_->rethrow();
+  if (!has_room()) return false;
   state_->bytes_under_way += bytes;
   state_->waiting.push_back(std::move(pending));
   state_->changed.notify_all();
+  return true;
 }
 
 void WriterQueue::drop_waiting() {
@@ -123,10 +135,14 @@ void WriterQueue::drop_waiting() {
   state_->changed.notify_all();
 }
 
-void WriterQueue::drain() {
+bool WriterQueue::drain(const std::atomic<bool>* stop) {
   std::unique_lock lock(state_->mutex);
-  state_->changed.wait(lock, [&] { return state_->waiting.empty() && state_->in_work == 0; });
+  const auto is_idle = [&] { return state_->waiting.empty() && state_->in_work == 0; };
+  state_->wait(lock, stop, is_idle);
+  // What is begun is written all the same.
+  if (state_->waiting.empty()) state_->changed.wait(lock, is_idle);
   state_->rethrow();
+  return is_idle();
 }
 
 }  // namespace diorama

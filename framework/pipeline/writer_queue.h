@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <functional>
 #include <memory>
@@ -34,13 +35,15 @@ class WriterQueue {
   WriterQueue(const WriterQueue&) = delete;
   WriterQueue& operator=(const WriterQueue&) = delete;
 
+  /// Whether the queue took it: not when it had no room yet as `stop` (may be null) became true.
   /// Rethrows what a worker threw, that of the lowest capture first; afterwards the queue takes no
   /// more.
-  void push(PendingCapture pending);
+  [[nodiscard]] bool push(PendingCapture pending, const std::atomic<bool>* stop = nullptr);
   /// Forgets captures whose writing has not begun.
   void drop_waiting();
-  /// Returns when all that was pushed is written; rethrows like push().
-  void drain();
+  /// Returns true when all that was pushed is written, false when captures still waited as `stop`
+  /// (may be null) became true; rethrows like push().
+  bool drain(const std::atomic<bool>* stop = nullptr);
 
  private:
   struct State;

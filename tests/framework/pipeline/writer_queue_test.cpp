@@ -31,7 +31,7 @@ TEST_CASE("Every capture that was pushed is worked on once", "[queue]") {
       const std::lock_guard lock(mutex);
       seen.insert(pending.capture.index);
     });
-    for (int i = 0; i < 200; ++i) queue.push(capture_of(i, 10));
+    for (int i = 0; i < 200; ++i) CHECK(queue.push(capture_of(i, 10)));
     queue.drain();
   }
   CHECK(seen.size() == 200);
@@ -48,10 +48,10 @@ TEST_CASE("No more bytes are under way than allowed, but one capture always is",
   });
   for (int i = 0; i < 50; ++i) {
     // Counted when push() returns, so never below what the queue holds less one.
-    queue.push(capture_of(i, 10));
+    REQUIRE(queue.push(capture_of(i, 10)));
     most = std::max(most.load(), ++under_way);
   }
-  queue.push(capture_of(50, 1000));
+  REQUIRE(queue.push(capture_of(50, 1000)));
   queue.drain();
   CHECK(most <= 3);
 }
@@ -65,10 +65,33 @@ TEST_CASE("An error in the work comes out of the queue and ends it", "[queue]") 
     }
   });
   const auto push_all = [&] {
-    for (int i = 0; i < 1000; ++i) queue.push(capture_of(i, 1));
+    for (int i = 0; i < 1000; ++i) REQUIRE(queue.push(capture_of(i, 1)));
     queue.drain();
   };
   CHECK_THROWS_WITH(push_all(), ContainsSubstring("no room for"));
   CHECK_THROWS_WITH(queue.drain(), ContainsSubstring("no room for"));
   CHECK(worked < 1000);
+}
+
+TEST_CASE("Who asks a run to stop does not wait for captures whose writing has not begun",
+          "[queue]") {
+  std::atomic<bool> stop = false;
+  std::atomic<bool> is_disk_back = false;
+  std::atomic<int> worked = 0;
+  // One in work, which the disk holds up, and one waiting: no room for a third.
+  WriterQueue queue(1, 80, [&](const PendingCapture&) {
+    ++worked;
+    is_disk_back.wait(false);
+  });
+  REQUIRE(queue.push(capture_of(0, 10), &stop));
+  REQUIRE(queue.push(capture_of(1, 10), &stop));
+  while (worked == 0) std::this_thread::yield();
+  stop = true;
+  CHECK_FALSE(queue.push(capture_of(2, 10), &stop));
+  CHECK_FALSE(queue.drain(&stop));
+  queue.drop_waiting();
+  is_disk_back = true;
+  is_disk_back.notify_all();
+  CHECK(queue.drain(&stop));
+  CHECK(worked == 1);
 }
