@@ -339,7 +339,7 @@ JobAssembly assemble_job(const Value& value, Registry& registry, HostServices& h
   assembly.dataset = describe_dataset(
       assembly.job, assembly.plan, portable_job(assembly.resolved), program_version,
       assembler.plugins(), drawn_assets,
-      [&](const std::string& asset) { return host.files_of(asset); }, assets_root);
+      [&](const std::string& asset) { return host.files_of(asset); }, assets_root, host);
   assembly.dataset_json = dataset_json(assembly.dataset, assembly.job);
   return assembly;
 }

@@ -48,15 +48,23 @@ UsedAssets used_assets(const Job& job, const CapturePlan& plan,
 
 /// Files that several assets share are read once.
 std::vector<DatasetAsset> hashed_assets(const UsedAssets& used, const AssetFiles& files_of,
-                                        const std::optional<fs::path>& assets_root) {
+                                        const std::optional<fs::path>& assets_root, Host& host) {
   std::map<fs::path, std::string> hashes;
+  std::map<std::string, std::vector<fs::path>> files_of_assets;
+  for (const auto& [name, labels] : used) {
+    std::vector<fs::path>& files = files_of_assets[name] = files_of(name);
+    for (const fs::path& file : files) hashes.try_emplace(file);
+  }
+  std::vector<decltype(hashes)::pointer> all;
+  for (auto& entry : hashes) all.push_back(&entry);
+  host.parallel_for(all.size(),
+                    [&](std::size_t i) { all[i]->second = file_sha256(all[i]->first); });
+
   std::vector<DatasetAsset> assets;
   for (const auto& [name, labels] : used) {
     DatasetAsset asset{asset_name(name, assets_root), {labels.begin(), labels.end()}, {}};
-    for (const fs::path& file : files_of(name)) {
-      std::string& hash = hashes[file];
-      if (hash.empty()) hash = file_sha256(file);
-      asset.files.emplace_back(asset_name(file.string(), assets_root), hash);
+    for (const fs::path& file : files_of_assets[name]) {
+      asset.files.emplace_back(asset_name(file.string(), assets_root), hashes[file]);
     }
     assets.push_back(std::move(asset));
   }
@@ -210,8 +218,8 @@ DatasetInfo describe_dataset(const Job& job, const CapturePlan& plan, std::strin
                              std::string program_version,
                              std::vector<std::pair<std::string, std::string>> plugin_versions,
                              const std::vector<std::string>& drawn_assets,
-                             const AssetFiles& files_of,
-                             const std::optional<fs::path>& assets_root) {
+                             const AssetFiles& files_of, const std::optional<fs::path>& assets_root,
+                             Host& host) {
   DatasetInfo info;
   info.seed = job.seed;
   info.capture_count = plan.capture_count();
@@ -224,7 +232,7 @@ DatasetInfo describe_dataset(const Job& job, const CapturePlan& plan, std::strin
   info.resolved_job = std::move(resolved);
   info.program_version = std::move(program_version);
   info.plugin_versions = std::move(plugin_versions);
-  info.assets = hashed_assets(used_assets(job, plan, drawn_assets), files_of, assets_root);
+  info.assets = hashed_assets(used_assets(job, plan, drawn_assets), files_of, assets_root, host);
   return info;
 }
 

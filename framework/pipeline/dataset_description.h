@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "diorama/host.h"
 #include "diorama/writer.h"
 #include "framework/pipeline/capture_plan.h"
 #include "framework/pipeline/job.h"
@@ -19,14 +20,14 @@ namespace diorama {
 using AssetFiles = std::function<std::vector<std::filesystem::path>(const std::string& asset)>;
 
 /// What writers are told before the first capture. `resolved` is the text of the resolved job;
-/// `drawn_assets` are those that randomizers choose from.
+/// `drawn_assets` are those that randomizers choose from; their files are read on `host`'s threads.
 /// Throws Error(Asset) when a file of an asset cannot be read.
 DatasetInfo describe_dataset(const Job& job, const CapturePlan& plan, std::string resolved,
                              std::string program_version,
                              std::vector<std::pair<std::string, std::string>> plugin_versions,
                              const std::vector<std::string>& drawn_assets,
                              const AssetFiles& files_of,
-                             const std::optional<std::filesystem::path>& assets_root);
+                             const std::optional<std::filesystem::path>& assets_root, Host& host);
 
 /// The text of dataset.json: conventions, seed, resolved job, plugin versions, and the hashes of
 /// all files of the assets that the job uses. Holds nothing that depends on the machine or the
