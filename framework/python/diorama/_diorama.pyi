@@ -1,0 +1,14 @@
+# SPDX-License-Identifier: Apache-2.0
+from typing import Any
+
+__version__: str
+
+class Error(RuntimeError):
+    kind: str
+
+class OpenDataset:
+    def info(self) -> dict[str, Any]: ...
+    def read(self, place: int, wanted: list[str] | None = None) -> dict[str, Any]: ...
+
+def open_dataset(program: str, folder: str, reader: str = "") -> OpenDataset: ...
+def find_datasets(program: str, folder: str) -> list[tuple[str, str]]: ...
