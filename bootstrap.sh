@@ -22,7 +22,7 @@ build_packages=(
 )
 test_packages=(
   catch2 binutils clang libclang-rt-14-dev
-  python3-minimal python3-h5py python3-jsonschema python3-numpy python3-opencv
+  pybind11-dev python3-dev python3-minimal python3-h5py python3-jsonschema python3-numpy python3-opencv
 )
 
 check_packages=(clang-format-14 clang-tidy-19)

@@ -35,9 +35,13 @@ Value translated(const Value& job, const Log& log) {
 }  // namespace
 
 Value load_job(const JobOptions& options, const Log& log) {
-  Value job = options.job.empty()
-                  ? parse_yaml(builtin_replicator_job(), "built-in infinigen_default.yaml")
-                  : read_job_file(options.job);
+  return native_job(options.job.empty()
+                        ? parse_yaml(builtin_replicator_job(), "built-in infinigen_default.yaml")
+                        : read_job_file(options.job),
+                    options, log);
+}
+
+Value native_job(Value job, const JobOptions& options, const Log& log) {
   const bool is_replicator = is_replicator_job(job);
   for (const std::string& assignment : options.sets) {
     if (is_replicator && is_replicator_key(assignment)) apply_set(job, assignment);

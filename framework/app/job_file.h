@@ -12,4 +12,7 @@ namespace diorama {
 /// order, then --seed and --output. Throws Error(Config) or Error(Usage).
 Value load_job(const JobOptions& options, const Log& log);
 
+/// The same for a job that was read already; JobOptions::job is not looked at.
+Value native_job(Value job, const JobOptions& options, const Log& log);
+
 }  // namespace diorama

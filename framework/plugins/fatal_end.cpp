@@ -213,10 +213,10 @@ FatalEndReports::~FatalEndReports() {
 // through here.
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 extern "C" {
-[[noreturn, gnu::visibility("default")]] void _exit(int code) {
+[[gnu::visibility("default")]] void _exit(int code) {
   if (diorama::is_watched()) diorama::end_for_component("_exit()");
   diorama::end_process(code);
 }
-[[noreturn, gnu::visibility("default")]] void _Exit(int code) noexcept { _exit(code); }
+[[gnu::visibility("default")]] void _Exit(int code) noexcept { _exit(code); }
 }
 #endif

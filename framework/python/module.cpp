@@ -6,7 +6,11 @@
 #include <pybind11/stl.h>
 #include <unistd.h>
 
+#include <atomic>
+#include <condition_variable>
+#include <cstdlib>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
@@ -16,7 +20,12 @@
 #include "diorama/error.h"
 #include "diorama/reader.h"
 #include "framework/app/assemble.h"
+#include "framework/app/assemble_job.h"
+#include "framework/app/job_file.h"
+#include "framework/config/yaml_config.h"
 #include "framework/datasets/dataset_readers.h"
+#include "framework/output/memory_file_system.h"
+#include "framework/plugins/plugin_search.h"
 
 namespace py = pybind11;
 
@@ -29,9 +38,8 @@ constexpr const char* kErrorKinds[]{"internal", "usage", "config", "plugin", "as
 void log_to_python(LogLevel level, std::string_view message) {
   constexpr int kPythonLevels[]{10, 20, 30, 40};
   const py::gil_scoped_acquire lock;
-  py::module_::import("logging")
-      .attr("getLogger")("diorama")
-      .attr("log")(kPythonLevels[std::size_t(level)], "%s", std::string(message));
+  py::module_::import("logging").attr("getLogger")("diorama").attr("log")(
+      kPythonLevels[std::size_t(level)], "%s", std::string(message));
 }
 
 /// What all datasets of the process share. Made when the first one is opened, never destroyed:
@@ -113,8 +121,7 @@ py::object visibility_of(const std::optional<Visibility>& seen, const py::capsul
     result["amodal_mask"] = py::none();
   } else {
     result["amodal_mask"] = py::make_tuple(
-        box_of(mask.box),
-        view_of(mask.bits.data(), {mask.box.height(), mask.box.width()}, owner));
+        box_of(mask.box), view_of(mask.bits.data(), {mask.box.height(), mask.box.width()}, owner));
   }
   return result;
 }
@@ -123,13 +130,13 @@ py::dict instance_of(const Instance& instance, const NameSet& holds, const py::c
   py::dict result;
   result["id"] = instance.id;
   result["path"] = instance.node_path;
-  result["labels"] = py::cast(
-      std::map<std::string, std::string>(instance.labels.begin(), instance.labels.end()));
+  result["labels"] =
+      py::cast(std::map<std::string, std::string>(instance.labels.begin(), instance.labels.end()));
   const auto if_held = [&](std::string_view name, auto make) -> py::object {
     return holds.contains(name) ? py::object(make()) : py::object(py::none());
   };
-  result["world_from_object"] = if_held(
-      kHoldsPoses, [&] { return py::cast(Mat4(instance.world_from_node.matrix())); });
+  result["world_from_object"] =
+      if_held(kHoldsPoses, [&] { return py::cast(Mat4(instance.world_from_node.matrix())); });
   result["bounds"] = if_held(kHoldsBounds, [&]() -> py::object {
     const Aabb& bounds = instance.bounds_node;
     if (bounds.is_empty()) return py::none();
@@ -186,9 +193,8 @@ py::list findings_of(const ReadLog& log) {
 py::dict capture_of(std::shared_ptr<const StoredCapture> stored, const NameSet& holds) {
   // Every array refers to the capsule, which ends with the last of them.
   auto* const shared = new std::shared_ptr<const StoredCapture>(stored);
-  const py::capsule owner(shared, [](void* held) {
-    delete static_cast<std::shared_ptr<const StoredCapture>*>(held);
-  });
+  const py::capsule owner(
+      shared, [](void* held) { delete static_cast<std::shared_ptr<const StoredCapture>*>(held); });
   py::dict result;
   result["index"] = stored->capture.index;
   result["visit"] = stored->capture.visit;
@@ -269,6 +275,179 @@ std::vector<std::pair<std::string, std::string>> find_in(const std::string& prog
   return all;
 }
 
+/// Hands captures to a Python function, in their order, one at a time.
+class Listener {
+ public:
+  Listener(py::object on_capture, NameSet needs)
+      : on_capture_(std::move(on_capture)), needs_(std::move(needs)) {}
+
+  const NameSet& needs() const { return needs_; }
+  bool is_over() const { return is_over_; }
+  const std::atomic<bool>& stop() const { return is_over_; }
+
+  /// Called by several threads; those of later captures wait, and with them the run.
+  void take(const Capture& capture) {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return is_over_ || capture.index == next_; });
+    if (!is_over_) call(capture);
+    ++next_;
+    lock.unlock();
+    changed_.notify_all();
+  }
+
+  /// Ends the run when the interpreter has a signal to handle: Ctrl-C.
+  void look_for_signals() {
+    {
+      const py::gil_scoped_acquire python;
+      if (PyErr_CheckSignals() == 0) return;
+      keep(py::error_already_set());
+    }
+    // Not while the interpreter is locked: who holds this may wait for it.
+    const std::lock_guard lock(mutex_);
+    is_over_ = true;
+    changed_.notify_all();
+  }
+
+  /// With the interpreter's lock held: throws what the function threw.
+  void rethrow() {
+    if (error_) throw py::error_already_set(*error_);
+  }
+
+ private:
+  void call(const Capture& capture) {
+    auto stored = std::make_shared<StoredCapture>();
+    stored->capture.index = capture.index;
+    stored->capture.visit = capture.visit;
+    stored->capture.phase = capture.phase;
+    stored->capture.environment = capture.environment;
+    for (const Frame& frame : capture.frames) stored->capture.frames.push_back(copy_of(frame));
+    const py::gil_scoped_acquire python;
+    try {
+      const NameSet holds{std::string(kHoldsPoses), std::string(kHoldsBounds),
+                          std::string(kHoldsCameraPose)};
+      const py::object goes_on = on_capture_(capture_of(std::move(stored), holds));
+      if (goes_on.is(py::bool_(false))) is_over_ = true;
+    } catch (const py::error_already_set& error) {
+      keep(error);
+      is_over_ = true;
+    }
+  }
+
+  /// The first one; the interpreter's lock guards it.
+  void keep(const py::error_already_set& error) {
+    if (!error_) error_ = error;
+  }
+
+  /// The run's own frames end when they are written.
+  Frame copy_of(const Frame& frame) const {
+    Frame copy;
+    copy.camera_name = frame.camera_name;
+    copy.camera_path = frame.camera_path;
+    copy.camera = frame.camera;
+    copy.world_from_camera = frame.world_from_camera;
+    copy.instances = frame.instances;
+    copy.occlusions = frame.occlusions;
+    copy.leaf_paths = frame.leaf_paths;
+    copy.exposure = frame.exposure;
+    copy.seed = frame.seed;
+    for (const std::string& name : frame.channels()) {
+      if (!needs_.contains(name)) continue;
+      std::visit(
+          [&](const auto& image) {
+            using Pixel = typename std::decay_t<decltype(image)>::PixelType;
+            copy.set(Channel<Pixel>{name}, image);
+          },
+          frame.image_named(name));
+    }
+    return copy;
+  }
+
+  py::object on_capture_;
+  NameSet needs_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  int next_ = 0;
+  std::optional<py::error_already_set> error_;
+  std::atomic<bool> is_over_ = false;
+};
+
+// Components are made by name; a process has one such run at a time.
+Listener* listener = nullptr;
+
+/// Takes the place of the job's writers.
+class ListenerWriter final : public Writer {
+ public:
+  struct Params {
+    void visit(ParamVisitor&) {}
+  };
+  ListenerWriter(Params, Host&) {}
+  NameSet needs() const override { return listener->needs(); }
+  void write(const Capture& capture, CaptureFiles&) const override { listener->take(capture); }
+};
+
+void register_listener(Registrar& registrar) {
+  add<ListenerWriter>(registrar, "python", "Hands captures to a Python function.");
+}
+
+/// Of a file, or of its text when that is not empty.
+Value job_value(const std::string& file, const std::string& text,
+                const std::vector<std::string>& sets, std::optional<std::uint64_t> seed) {
+  JobOptions options;
+  options.job = file;
+  options.sets = sets;
+  options.seed = seed;
+  if (text.empty()) return load_job(options, log_to_python);
+  return native_job(parse_yaml(text, "job"), options, log_to_python);
+}
+
+/// Without output: nothing is written anywhere.
+void listen(const std::string& program, const Value& given, const py::object& on_capture,
+            const std::vector<std::string>& needs, int threads) {
+  if (listener) throw Error(ErrorKind::Usage, "run() with on_capture is at work already");
+  GlobalOptions options;
+  options.program = program;
+  options.threads = threads;
+  Value job = given;
+  Value writer = Value::make_map();
+  writer.set("type", Value::text("python"));
+  Value writers = Value::make_list();
+  writers.list.push_back(std::move(writer));
+  job.set("writers", std::move(writers));
+
+  Listener own(on_capture, NameSet(needs.begin(), needs.end()));
+  listener = &own;
+  const std::unique_ptr<Listener*, void (*)(Listener**)> forget(
+      &listener, [](Listener** held) { *held = nullptr; });
+  {
+    const py::gil_scoped_release unlocked;
+    const std::unique_ptr<Registry> registry = make_registry(options, log_to_python);
+    registry->add_builtin(register_listener, program_version());
+    warn_of_rejected(*registry, log_to_python);
+    const auto root = assets_root_of(job);
+    const std::unique_ptr<HostServices> host = make_host(*registry, options, root, log_to_python);
+    host->stop_on(own.stop());
+    JobAssembly assembly =
+        assemble_job(job, *registry, *host,
+                     choose_assets_root(options.assets_root, std::getenv("DIORAMA_ASSETS_ROOT"),
+                                        root, sample_pack_folder(options.program)),
+                     program_version(), AssembleFor::Run);
+    MemoryFileSystem memory;
+    OutputFolders folders = output_folders(assembly.job);
+    folders.base = "/memory";
+    OutputStore store(memory, folders, assembly.plan.capture_count(), {});
+    RunOptions run;
+    run.stop = &own.stop();
+    run.progress = [&](const RunProgress&) { own.look_for_signals(); };
+    try {
+      Pipeline(assembly.job, assembly.plan, assembly.components, *host, store, run)
+          .run(assembly.dataset, assembly.dataset_json);
+    } catch (const Interrupted&) {
+      // Whoever ended it knows.
+    }
+  }
+  own.rethrow();
+}
+
 }  // namespace
 }  // namespace diorama
 
@@ -295,5 +474,14 @@ PYBIND11_MODULE(_diorama, module) {
       .def("read", &OpenDataset::read, py::arg("place"), py::arg("wanted") = py::none());
   module.def("open_dataset", &open_dataset, py::arg("program"), py::arg("folder"),
              py::arg("reader") = "");
+  module.def(
+      "listen",
+      [](const std::string& program, const std::string& file, const std::string& text,
+         const std::vector<std::string>& sets, std::optional<std::uint64_t> seed,
+         const py::object& on_capture, const std::vector<std::string>& needs, int threads) {
+        listen(program, job_value(file, text, sets, seed), on_capture, needs, threads);
+      },
+      py::arg("program"), py::arg("file"), py::arg("text"), py::arg("sets"), py::arg("seed"),
+      py::arg("on_capture"), py::arg("needs"), py::arg("threads"));
   module.def("find_datasets", &find_in, py::arg("program"), py::arg("folder"));
 }

@@ -5,7 +5,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <cstring>
+#include <cstdint>
 #include <span>
 #include <utility>
 
@@ -73,8 +73,10 @@ class MeshAssembly {
     }
     // By bits, so that numbers that are none are equal, too.
     bool is_same(const float* a, const float* b) const {
-      if (std::memcmp(a, b, 2 * sizeof(float)) != 0) return false;
-      return !has_three || std::memcmp(a + 2, b + 2, sizeof(float)) == 0;
+      const auto is_equal = [&](std::size_t i) {
+        return std::bit_cast<std::uint32_t>(a[i]) == std::bit_cast<std::uint32_t>(b[i]);
+      };
+      return is_equal(0) && is_equal(1) && (!has_three || is_equal(2));
     }
     [[gnu::noinline]] bool is_same_element(const Corner& a, const Corner& b) const {
       const float* first = data->at(a.face, 0, a.corner);

@@ -15,10 +15,11 @@ What a format does not hold is None or not there (`Dataset.holds`). Messages go 
 from __future__ import annotations
 
 import dataclasses
+import json
 import os
 import pathlib
 import shutil
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, overload
 
 import numpy as np
@@ -27,7 +28,7 @@ from . import _diorama
 from ._diorama import Error, __version__
 
 __all__ = ["Camera", "Capture", "Dataset", "Error", "Finding", "Frame", "Instance", "Visibility", "find", "open",
-           "__version__"]
+           "run", "__version__"]
 
 Box = tuple[int, int, int, int]
 
@@ -136,6 +137,12 @@ def _frame(values: dict[str, Any]) -> Frame:
     return Frame(camera=Camera(**camera), instances=instances, **values)
 
 
+def _capture(values: dict[str, Any]) -> Capture:
+    values["frames"] = [_frame(frame) for frame in values["frames"]]
+    values["findings"] = [Finding(**finding) for finding in values["findings"]]
+    return Capture(**values)
+
+
 def _refused(kind: str, text: str) -> Error:
     error = Error(text)
     error.kind = kind
@@ -197,10 +204,7 @@ class Dataset(Sequence[Capture]):
         place = range(len(self))[place]  # negative ones count from the end; others raise IndexError
         if os.getpid() != self._process:
             self._open()  # after a fork the threads of readers are gone
-        values = self._stored.read(place, self._wanted)
-        values["frames"] = [_frame(frame) for frame in values["frames"]]
-        values["findings"] = [Finding(**finding) for finding in values["findings"]]
-        return Capture(**values)
+        return _capture(self._stored.read(place, self._wanted))
 
     def __iter__(self) -> Iterator[Capture]:
         return (self[i] for i in range(len(self)))
@@ -261,3 +265,19 @@ def open(folder: str | os.PathLike[str], *, reader: str = "", wanted: Iterable[s
 def find(folder: str | os.PathLike[str]) -> Mapping[str, str]:
     """The datasets of a run: folder to the reader's type."""
     return dict(_diorama.find_datasets(_program(), os.fspath(folder)))
+
+
+def run(job: Mapping[str, Any] | str | os.PathLike[str], on_capture: Callable[[Capture], object], *,
+        wanted: Iterable[str] = ("color", "instances", "instance_id"), settings: Mapping[str, Any] | None = None,
+        seed: int | None = None, threads: int = 0) -> None:
+    """Makes the captures of a job and hands each to `on_capture`, in their order, as soon as it is there; nothing is
+    written to the disk. While the function works the next captures are made, until 256 MB of them wait.
+
+    `job` is a file, or the same as a dictionary; its writers are not looked at. `wanted` names channels and the
+    annotations "instances", "visibility", "amodal_mask" and "occlusion_order". `settings` overrides single values,
+    {"renderer.samples": 16}. The same job and seed give the same pixels as `diorama run` writes, for any number of
+    threads (0: all). The function ends the run by returning False or by an exception, which comes out here."""
+    file, text = ("", json.dumps(job)) if isinstance(job, Mapping) else (os.fspath(job), "")
+    sets = [f"{key}={json.dumps(value)}" for key, value in (settings or {}).items()]
+    _diorama.listen(_program(), file, text, sets, seed, lambda values: on_capture(_capture(values)), sorted(set(wanted)),
+                    threads)

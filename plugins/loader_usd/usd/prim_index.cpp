@@ -511,7 +511,7 @@ int PrimIndexer::Builder::append(PrimIndex subtree, int parent, IndexNode arc_no
       arc_node.children = std::move(each.children);
       arc_node.is_inert = each.is_inert;
       arc_node.has_specs = each.has_specs;
-      each = std::move(arc_node);
+      each = std::exchange(arc_node, {});
     } else {
       each.parent += base;
       each.origin += base;

@@ -13,6 +13,7 @@
 #include <thread>
 
 #include "diorama/error.h"
+#include "framework/output/memory_file_system.h"
 #include "simulated_disk.h"
 #include "support/catch.h"
 
@@ -450,6 +451,33 @@ TEST_CASE("Two jobs that start into one new folder do not both succeed", "[store
     both_refused += succeeded == 0;
   }
   CHECK(both_refused < 40);
+}
+
+TEST_CASE("A dataset in memory has the files of one on a disk, and is held by one process",
+          "[store]") {
+  MemoryFileSystem memory;
+  OutputStore holder(memory, folders_in("/data"), 8, options_of(resuming("w1", 8)));
+  holder.join(kDataset);
+  holder.open();
+  commit(holder, 0);
+  CHECK_THROWS_AS(run(memory, "/data", resuming("w2", 8)), Busy);
+  holder.close();
+  CHECK(run(memory, "/data", resuming("w3", 8)));
+  Files files;
+  const std::function<void(const fs::path&)> collect = [&](const fs::path& folder) {
+    for (const std::string& name : memory.list(folder)) {
+      const fs::path path = folder / name;
+      if (memory.status(path)->kind == FileStatus::Kind::Folder) {
+        collect(path);
+      } else {
+        files[path.lexically_relative("/data").string()] = memory.read(path);
+      }
+    }
+  };
+  collect("/data");
+  CHECK(dataset_files(files) == expected_files(8));
+  CHECK_THROWS_AS(memory.read("/data/nothing"), NotThere);
+  CHECK_THROWS_AS(memory.write("/nowhere/file", {}), NotThere);
 }
 
 TEST_CASE("A living worker keeps its part; the message names it", "[store]") {

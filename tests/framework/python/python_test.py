@@ -5,6 +5,7 @@ import json
 import multiprocessing
 import pathlib
 import pickle
+import signal
 import subprocess
 import sys
 import tempfile
@@ -180,6 +181,65 @@ class Workers(unittest.TestCase):
     def test_pickled(self):
         again = pickle.loads(pickle.dumps(diorama.open(run / "basic", wanted=["color"])))
         self.assertEqual(set(again[0].frames[0].channels), {"color"})
+
+
+class Run(unittest.TestCase):
+    def test_the_pixels_and_labels_of_a_dataset(self):
+        seen = []
+        diorama.run(JOB, seen.append, wanted=["color", "instance_id", "instances", "normals"], threads=3)
+        self.assertEqual([capture.index for capture in seen], list(range(24)))
+        stored = diorama.open(run / "hdf5")
+        for ours, theirs in zip(seen, stored):
+            for frame, other in zip(ours.frames, theirs.frames):
+                np.testing.assert_array_equal(frame.channels["color"], other.channels["color"])
+                np.testing.assert_allclose(frame.world_from_camera, other.world_from_camera, atol=1e-6)
+                boxes = {instance.path: instance.box for instance in frame.instances if instance.box}
+                self.assertEqual(boxes, {instance.path: instance.box for instance in other.instances if instance.box})
+        self.assertEqual(set(seen[0].frames[0].channels), {"color", "instance_id", "normals"})
+
+    def test_a_dictionary_with_settings(self):
+        job = {"seed": 3, "total_captures": 6, "environments": [{"type": "shapes", "shapes": ["cube"]}],
+               "cameras": [{"type": "pinhole", "name": "cam", "width": 32, "height": 24}], "physics": {"type": "none"},
+               "renderer": {"type": "null"}, "timeline": [{"capture": "floating", "count": 2}]}
+        sizes = []
+        diorama.run(job, lambda capture: sizes.append(capture.frames[0].channels["color"].shape),
+                    settings={"cameras[0].width": 40})
+        self.assertEqual(sizes, [(24, 40, 4)] * 6)
+        with self.assertRaisesRegex(diorama.Error, "renderer: unknown renderer 'nul', did you mean 'null'") as caught:
+            diorama.run({**job, "renderer": {"type": "nul"}}, print)
+        self.assertIn(caught.exception.kind, ("config", "plugin"))
+        with self.assertRaisesRegex(diorama.Error, "colour"):
+            diorama.run(job, print, wanted=["colour"])
+
+    def test_an_end_before_the_end(self):
+        seen = []
+
+        def take(capture):
+            seen.append(capture.index)
+            return len(seen) < 5
+
+        diorama.run(JOB, take)
+        self.assertEqual(seen, [0, 1, 2, 3, 4])
+
+        def fail(capture):
+            raise KeyError("mine")
+
+        with self.assertRaisesRegex(KeyError, "mine"):
+            diorama.run(JOB, fail)
+
+    def test_ctrl_c(self):
+        def interrupt(capture):
+            signal.raise_signal(signal.SIGINT)
+
+        with self.assertRaises(KeyboardInterrupt):
+            diorama.run(JOB, interrupt)
+
+    def test_one_at_a_time(self):
+        def again(capture):
+            diorama.run(JOB, print)
+
+        with self.assertRaisesRegex(diorama.Error, "at work already"):
+            diorama.run(JOB, again)
 
 
 if __name__ == "__main__":
