@@ -11,25 +11,30 @@ constexpr const char* kPage = "dataset.json";
 constexpr std::uintmax_t kMostBytes = std::uintmax_t(256) << 20;
 constexpr int kMostCaptures = 100'000'000;
 
-Json parsed_page(const std::filesystem::path& folder) {
+/// An empty object when there is none to be read.
+Json object_in(const std::filesystem::path& file, std::uintmax_t most_bytes) {
   try {
-    Json page = parse_stored_json(read_whole_file(folder / kPage, kMostBytes));
+    Json page = parse_stored_json(read_whole_file(file, most_bytes));
     return page.is_object() ? page : Json::object();
   } catch (const std::exception&) {
     return Json::object();
   }
 }
 
+Json parsed_page(const std::filesystem::path& folder) {
+  return object_in(folder / kPage, kMostBytes);
+}
+
 }  // namespace
 
+Json metadata_page(const std::filesystem::path& folder) {
+  return object_in(folder / "metadata.txt", std::uintmax_t(1) << 20);
+}
+
 std::string metadata_writer(const std::filesystem::path& folder) {
-  try {
-    const Json json = parse_stored_json(read_whole_file(folder / "metadata.txt", 1 << 20));
-    if (!json.is_object() || !json.contains("name")) return {};
-    return json.at("name").is_string() ? json.at("name").get<std::string>() : std::string();
-  } catch (const std::exception&) {
-    return {};
-  }
+  const Json json = metadata_page(folder);
+  const auto name = json.find("name");
+  return name != json.end() && name->is_string() ? name->get<std::string>() : std::string();
 }
 
 std::string zero_padded(int number, std::size_t digits) {

@@ -33,6 +33,9 @@ std::optional<DatasetPage> read_dataset_page(const std::filesystem::path& folder
 /// ByName when the page says this format.
 Recognition recognise_page(const std::filesystem::path& folder, const std::string& format);
 
+/// What Replicator's page metadata.txt says; an empty object when that is nothing.
+Json metadata_page(const std::filesystem::path& folder);
+
 /// The writer that Replicator's page metadata.txt names; empty when there is no such page.
 std::string metadata_writer(const std::filesystem::path& folder);
 

@@ -11,48 +11,24 @@ namespace diorama {
 void PictureList::set(std::vector<ListedPicture> pictures, const std::optional<DatasetPage>& page,
                       const NumberOf& number_of, const std::vector<std::string>& folders,
                       StoredFiles& files) {
-  pictures_.clear();
+  std::vector<ListedPicture> planned;
   cameras_ = page ? page->cameras : std::vector<std::string>{"camera"};
   for (ListedPicture& picture : pictures) {
     const auto number =
-        page ? number_of(picture.stem) : std::optional(std::pair(int(pictures_.size()), 0));
+        page ? number_of(picture.stem) : std::optional(std::pair(int(planned.size()), 0));
     const std::string file = folders.at(picture.folder) + picture.stem + picture.ending;
     files.check(number.has_value(), kCounts, file, "",
                 "is of no capture and camera that dataset.json plans");
     if (!number) continue;
     picture.capture = number->first;
     picture.camera = std::uint32_t(number->second);
-    pictures_.push_back(std::move(picture));
+    planned.push_back(std::move(picture));
   }
-  std::ranges::stable_sort(pictures_, {}, [](const ListedPicture& picture) {
-    return std::pair(picture.capture, picture.camera);
-  });
-  std::vector<ListedPicture> once;
-  first_.clear();
-  for (ListedPicture& picture : pictures_) {
-    const bool is_again = !once.empty() && once.back().capture == picture.capture &&
-                          once.back().camera == picture.camera;
-    files.check(!is_again, kOnce, folders.at(picture.folder) + picture.stem + picture.ending, "",
+  rows_.set(std::move(planned), [&](const ListedPicture& picture, const ListedPicture* known) {
+    files.check(!known, kOnce, folders.at(picture.folder) + picture.stem + picture.ending, "",
                 "is there a second time",
-                is_again ? "only as " + folders.at(once.back().folder) + once.back().stem : "");
-    if (is_again) continue;
-    if (once.empty() || once.back().capture != picture.capture) first_.push_back(once.size());
-    once.push_back(std::move(picture));
-  }
-  pictures_ = std::move(once);
-  first_.push_back(pictures_.size());
-}
-
-std::vector<int> PictureList::captures() const {
-  std::vector<int> captures;
-  for (std::size_t i = 0; i + 1 < first_.size(); ++i)
-    captures.push_back(pictures_[first_[i]].capture);
-  return captures;
-}
-
-std::span<const ListedPicture> PictureList::pictures(std::size_t capture) const {
-  return std::span(pictures_).subspan(first_.at(capture),
-                                      first_.at(capture + 1) - first_.at(capture));
+                known ? "only as " + folders.at(known->folder) + known->stem : "");
+  });
 }
 
 std::optional<std::pair<int, int>> capture_and_camera(const DatasetPage& page,

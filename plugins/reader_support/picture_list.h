@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "reader_support/capture_rows.h"
 #include "reader_support/dataset_page.h"
 #include "reader_support/stored_files.h"
 
@@ -36,14 +37,13 @@ class PictureList {
            const NumberOf& number_of, const std::vector<std::string>& folders, StoredFiles& files);
 
   const std::vector<std::string>& cameras() const { return cameras_; }
-  std::vector<int> captures() const;
+  std::vector<int> captures() const { return rows_.captures(); }
   /// The pictures of a capture, by camera.
-  std::span<const ListedPicture> pictures(std::size_t capture) const;
-  const std::vector<ListedPicture>& all() const { return pictures_; }
+  std::span<const ListedPicture> pictures(std::size_t capture) const { return rows_.of(capture); }
+  const std::vector<ListedPicture>& all() const { return rows_.all(); }
 
  private:
-  std::vector<ListedPicture> pictures_;
-  std::vector<std::size_t> first_;  ///< Per capture, and one behind the last.
+  CaptureRows<ListedPicture> rows_;
   std::vector<std::string> cameras_;
 };
 

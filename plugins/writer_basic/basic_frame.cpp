@@ -18,6 +18,16 @@ constexpr const char* kRatio = "occlusion agrees between files";
 constexpr const char* kPoints = "point clouds agree with pictures";
 constexpr const char* kLens = "focal length agrees with the projection";
 
+/// Throws std::runtime_error when there is no such column of that type.
+template <class T>
+T number_in(const StoredArray& array, std::size_t row, const char* column, const char* type) {
+  const auto* field = array.field(column);
+  if (!field || field->type != type) {
+    throw std::runtime_error("has no column " + std::string(column));
+  }
+  return array.value<T>(row, *field);
+}
+
 /// Sixteen numbers for row vectors, as a matrix for column vectors.
 Mat4 column_matrix(const Json& list) {
   Mat4 matrix;
@@ -82,7 +92,7 @@ bool is_object_path(const Json& entry) {
 
 }  // namespace
 
-std::optional<Frame> BasicFrameReading::read(const std::string& camera, Sources& sources) {
+std::optional<Frame> BasicFrameReading::read(const std::string& camera, FrameSources& sources) {
   frame_.camera_name = camera;
   frame_.camera_path = "/Cameras/" + camera;
   read_camera();
@@ -582,55 +592,46 @@ void BasicFrameReading::read_boxes() {
   }
 }
 
-void BasicFrameReading::read_tight() {
-  const auto rows = read_rows("bounding_box_2d_tight");
-  if (!rows) return;
-  const std::string file = path("bounding_box_2d_tight.npy");
+template <class Take>
+bool BasicFrameReading::read_pixel_boxes(const std::string& name, Take&& take) {
+  const auto rows = read_rows(name);
+  if (!rows) return false;
+  const std::string file = path(name + ".npy");
   files_.reading(file, [&] {
     for (std::size_t row = 0; row < rows->array.count(); ++row) {
       if (rows->paths[row].empty()) continue;
-      const auto number = [&](const char* name) {
-        const auto* field = rows->array.field(name);
-        if (!field || field->type != "<i4")
-          throw std::runtime_error("has no column " + std::string(name));
-        return rows->array.value<std::int32_t>(row, *field);
+      const auto number = [&](const char* column) {
+        return number_in<std::int32_t>(rows->array, row, column, "<i4");
       };
       Instance& object = instance(rows->paths[row]);
       // The format names the last pixel.
-      object.tight_box = {number("x_min"), number("y_min"), number("x_max") + 1,
-                          number("y_max") + 1};
+      take(object,
+           PixelBox{number("x_min"), number("y_min"), number("x_max") + 1, number("y_max") + 1});
       take_row(*rows, row, file, object);
     }
   });
-  sources_.emplace(kHoldsTightBoxes, file);
   sources_.emplace(kHoldsInstances, file);
+  return true;
+}
+
+void BasicFrameReading::read_tight() {
+  const std::string name = "bounding_box_2d_tight";
+  const bool is_there =
+      read_pixel_boxes(name, [](Instance& object, const PixelBox& box) { object.tight_box = box; });
+  if (is_there) sources_.emplace(kHoldsTightBoxes, path(name + ".npy"));
 }
 
 void BasicFrameReading::read_loose() {
-  const auto rows = read_rows("bounding_box_2d_loose");
-  if (!rows) return;
-  const std::string file = path("bounding_box_2d_loose.npy");
-  files_.reading(file, [&] {
-    for (std::size_t row = 0; row < rows->array.count(); ++row) {
-      if (rows->paths[row].empty()) continue;
-      const auto number = [&](const char* name) {
-        const auto* field = rows->array.field(name);
-        if (!field || field->type != "<i4")
-          throw std::runtime_error("has no column " + std::string(name));
-        return rows->array.value<std::int32_t>(row, *field);
-      };
-      Instance& object = instance(rows->paths[row]);
-      loose_of_path_[object.node_path] = {number("x_min"), number("y_min"), number("x_max") + 1,
-                                          number("y_max") + 1};
-      take_row(*rows, row, file, object);
-    }
-  });
+  const std::string name = "bounding_box_2d_loose";
+  const bool is_there = read_pixel_boxes(
+      name, [&](Instance& object, const PixelBox& box) { loose_of_path_[object.node_path] = box; });
+  if (!is_there) return;
+  const std::string file = path(name + ".npy");
   for (const Instance& object : frame_.instances) {
     files_.check(!object.tight_box || loose_of_path_.contains(object.node_path), kAmodal, file,
                  object.node_path, "has a tight box, but no loose one");
   }
   sources_.emplace(kHoldsAmodalBoxes, file);
-  sources_.emplace(kHoldsInstances, file);
 }
 
 void BasicFrameReading::read_3d() {
@@ -644,11 +645,8 @@ void BasicFrameReading::read_3d() {
     }
     for (std::size_t row = 0; row < rows->array.count(); ++row) {
       if (rows->paths[row].empty()) continue;
-      const auto number = [&](const char* name) {
-        const auto* field = rows->array.field(name);
-        if (!field || field->type != "<f4")
-          throw std::runtime_error("has no column " + std::string(name));
-        return double(rows->array.value<float>(row, *field));
+      const auto number = [&](const char* column) {
+        return double(number_in<float>(rows->array, row, column, "<f4"));
       };
       Instance& object = instance(rows->paths[row]);
       object.bounds_node.min = {number("x_min"), number("y_min"), number("z_min")};

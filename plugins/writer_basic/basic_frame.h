@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "diorama/reader.h"
+#include "reader_support/frame_reading.h"
 #include "reader_support/npy_array.h"
 #include "reader_support/stored_files.h"
 #include "writer_basic/basic_files.h"
@@ -16,8 +17,6 @@ namespace diorama {
 /// Reads the files of one camera in one capture, checks them against each other, and makes a frame.
 class BasicFrameReading {
  public:
-  using Sources = std::map<std::string, std::string, std::less<>>;
-
   BasicFrameReading(const BasicFiles& names, std::string product, int number, const NameSet& wanted,
                     StoredFiles& files)
       : names_(names),
@@ -27,7 +26,7 @@ class BasicFrameReading {
         files_(files) {}
 
   /// Nothing when no file tells the picture's size.
-  std::optional<Frame> read(const std::string& camera, Sources& sources);
+  std::optional<Frame> read(const std::string& camera, FrameSources& sources);
 
  private:
   /// A segmentation picture: ids from 2 on where its JSON file names objects, 0 background, 1
@@ -68,6 +67,9 @@ class BasicFrameReading {
   };
   std::optional<BoxRows> read_rows(const std::string& name);
   void read_boxes();
+  /// Calls `take` with each row's object and its box in pixels; false without rows.
+  template <class Take>
+  bool read_pixel_boxes(const std::string& name, Take&& take);
   void read_tight();
   void read_loose();
   void read_3d();
@@ -86,7 +88,7 @@ class BasicFrameReading {
   const NameSet& wanted_;
   StoredFiles& files_;
   Frame frame_;
-  Sources sources_;
+  FrameSources sources_;
   bool has_size_ = false;
   std::string size_file_;
   std::map<std::string, std::size_t> place_of_path_;  ///< In Frame::instances.

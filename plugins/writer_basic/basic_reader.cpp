@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "diorama/error.h"
+#include "reader_support/capture_rows.h"
 #include "reader_support/dataset_page.h"
 #include "reader_support/stored_files.h"
 #include "writer_basic/basic_files.h"
@@ -37,20 +38,15 @@ class BasicDataset final : public StoredDataset {
   const ReadLog& log() const override { return log_; }
 
   StoredCapture read(std::size_t i, const NameSet& wanted) const override {
-    StoredCapture stored;
     const int number = info_.captures.at(i);
-    stored.capture.index = number;
-    for (const std::string& product : names_.products()) {
-      const std::string camera = camera_of(product);
-      StoredFiles files(folder_, host_, stored.log, number, camera);
-      check_complete(product, number, files);
-      BasicFrameReading::Sources sources;
-      auto frame = BasicFrameReading(names_, product, number, wanted, files).read(camera, sources);
-      if (!frame) continue;
-      stored.capture.frames.push_back(std::move(*frame));
-      stored.files.push_back(std::move(sources));
-    }
-    return stored;
+    return read_frames(
+        number, names_.products(),
+        [&](const std::string& product, StoredCapture& stored, FrameSources& sources) {
+          const std::string camera = camera_of(product);
+          StoredFiles files(folder_, host_, stored.log, number, camera);
+          check_complete(product, number, files);
+          return BasicFrameReading(names_, product, number, wanted, files).read(camera, sources);
+        });
   }
 
  private:

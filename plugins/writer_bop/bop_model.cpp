@@ -7,21 +7,13 @@
 #include <string>
 #include <utility>
 
+#include "diorama/image.h"
 #include "writer_bop/point_diameter.h"
 
 namespace diorama {
 namespace {
 
 constexpr float kMillimetres = 1000.0f;
-
-float srgb_from_linear(float value) {
-  const float v = std::clamp(value, 0.0f, 1.0f);
-  return v <= 0.0031308f ? 12.92f * v : 1.055f * std::pow(v, 1.0f / 2.4f) - 0.055f;
-}
-
-float linear_from_srgb(float value) {
-  return value <= 0.04045f ? value / 12.92f : std::pow((value + 0.055f) / 1.055f, 2.4f);
-}
 
 /// The pixel at a uv, rows from the top, the texture repeated; linear.
 Vec3f texel(const TextureInput& input, const Vec2f& mesh_uv) {
@@ -68,7 +60,8 @@ std::array<std::uint8_t, 3> vertex_color(const Node& node, const Mesh& mesh, std
   if (!mesh.colors.empty()) color = color.cwiseProduct(mesh.colors[vertex]);
   std::array<std::uint8_t, 3> bytes{};
   for (std::size_t c = 0; c < 3; ++c) {
-    bytes[c] = std::uint8_t(std::lround(255.0f * srgb_from_linear(color[Eigen::Index(c)])));
+    const float linear = std::clamp(color[Eigen::Index(c)], 0.0f, 1.0f);
+    bytes[c] = std::uint8_t(std::lround(255.0f * srgb_from_linear(linear)));
   }
   return bytes;
 }

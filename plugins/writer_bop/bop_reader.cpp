@@ -10,7 +10,9 @@
 
 #include "diorama/error.h"
 #include "reader_support/camera_json.h"
+#include "reader_support/capture_rows.h"
 #include "reader_support/dataset_page.h"
+#include "reader_support/frame_reading.h"
 #include "reader_support/object_masks.h"
 #include "reader_support/picture_list.h"
 #include "writer_bop/bop_model_info.h"
@@ -235,29 +237,17 @@ class BopDataset final : public StoredDataset {
         image.capture = found->second;
       }
     }
-    std::ranges::stable_sort(
-        images_, {}, [](const BopImage& image) { return std::pair(image.capture, image.camera); });
-    std::vector<BopImage> once;
-    for (const BopImage& image : images_) {
-      const bool is_again = !once.empty() && once.back().capture == image.capture &&
-                            once.back().camera == image.camera;
-      files.check(!is_again, kOnce, scenes_[image.scene].table("scene_gt"),
+    rows_.set(std::move(images_), [&](const BopImage& image, const BopImage* known) {
+      files.check(!known, kOnce, scenes_[image.scene].table("scene_gt"),
                   "image " + std::to_string(image.image), "is there a second time",
-                  is_again ? "only in " + scenes_[once.back().scene].folder : "");
-      if (is_again) continue;
-      if (once.empty() || once.back().capture != image.capture) first_.push_back(once.size());
-      once.push_back(image);
-    }
-    images_ = std::move(once);
-    first_.push_back(images_.size());
+                  known ? "only in " + scenes_[known->scene].folder : "");
+    });
   }
 
   void describe() {
     info_.format = kFormat;
     info_.camera_names = page_ ? page_->cameras : cameras_;
-    for (std::size_t i = 0; i + 1 < first_.size(); ++i) {
-      info_.captures.push_back(images_[first_[i]].capture);
-    }
+    info_.captures = rows_.captures();
     if (page_) info_.classes = page_->classes;
     const auto any = [&](bool BopScene::*has) {
       return std::ranges::any_of(scenes_, [&](const BopScene& scene) { return scene.*has; });
@@ -276,9 +266,10 @@ class BopDataset final : public StoredDataset {
     constexpr std::size_t kLookedAt = 1000;
     double scale = 0.0;
     bool has_seen = false;
-    for (std::size_t i = 0; i < std::min(images_.size(), kLookedAt); ++i) {
-      has_seen = has_seen || look_at(images_[i]);
-      if (!(scale > 0.0)) scale = depth_scale_of(images_[i]);
+    const auto& rows = rows_.all();
+    for (std::size_t i = 0; i < std::min(rows.size(), kLookedAt); ++i) {
+      has_seen = has_seen || look_at(rows[i]);
+      if (!(scale > 0.0)) scale = depth_scale_of(rows[i]);
       if (has_seen && scale > 0.0) break;
     }
     info_.steps[std::string(kDistanceToImagePlane.name)] = 0.5 * kMetres * scale;
@@ -288,7 +279,7 @@ class BopDataset final : public StoredDataset {
       info_.steps[std::string(kHoldsPoses)] = 0.01;
       info_.steps[std::string(kHoldsBoxes3d)] = 0.01;
     }
-    const bool is_lossy = !images_.empty() && !picture_file(images_[0]).ends_with(".png");
+    const bool is_lossy = !rows.empty() && !picture_file(rows[0]).ends_with(".png");
     if (is_lossy) info_.steps[std::string(kColor.name)] = 16.0;
   }
 
@@ -350,32 +341,26 @@ class BopDataset final : public StoredDataset {
   std::vector<std::string> cameras_;  ///< Without a page.
   BopModelBoxes models_;
   std::map<std::string, std::string> names_;  ///< By obj_id.
-  std::vector<BopImage> images_;
-  std::vector<std::size_t> first_;  ///< Per capture, and one behind the last.
+  std::vector<BopImage> images_;              ///< While scenes are read.
+  CaptureRows<BopImage> rows_;
   StoredInfo info_;
   ReadLog log_;
 };
 
 /// Makes one frame of one image.
-class BopImageReading {
+class BopImageReading : private FrameReading {
  public:
-  using Sources = std::map<std::string, std::string, std::less<>>;
-
   BopImageReading(const BopDataset& dataset, const BopImage& image, const NameSet& wanted,
                   ReadLog& log)
-      : dataset_(dataset),
+      : FrameReading(dataset.folder_, dataset.host_, dataset.info_, image.capture,
+                     dataset.info_.camera_names[image.camera], wanted, log),
+        dataset_(dataset),
         scene_(dataset.scenes_[image.scene]),
         image_(image),
         stem_(dataset.stem(image.image)),
-        is_own_(dataset.page_.has_value()),
-        wanted_(wanted),
-        files_(dataset.folder_, dataset.host_, log, image.capture,
-               dataset.info_.camera_names[image.camera]) {
-    frame_.camera_name = dataset.info_.camera_names[image.camera];
-    frame_.camera_path = "/Cameras/" + frame_.camera_name;
-  }
+        is_own_(dataset.page_.has_value()) {}
 
-  std::optional<Frame> read(Sources& sources) {
+  std::optional<Frame> read(FrameSources& sources) {
     if (!read_pictures(sources)) return std::nullopt;
     read_camera(sources);
     if (image_.has_poses) read_objects(sources);
@@ -384,17 +369,8 @@ class BopImageReading {
   }
 
  private:
-  bool wants(std::string_view name) const {
-    return wanted_.contains(name) && dataset_.info_.holds.contains(name);
-  }
-
-  void set_size(const StoredPicture& picture) {
-    frame_.camera.width = picture.width();
-    frame_.camera.height = picture.height();
-  }
-
   /// False when no picture tells the size.
-  bool read_pictures(Sources& sources) {
+  bool read_pictures(FrameSources& sources) {
     const std::string file = dataset_.picture_file(image_);
     files_.check(!file.empty() || !scene_.has_pictures, kMissing, scene_.place("rgb", stem_), "",
                  "the picture is missing");
@@ -425,7 +401,7 @@ class BopImageReading {
     return has_size;
   }
 
-  void read_camera(Sources& sources) {
+  void read_camera(FrameSources& sources) {
     if (image_.camera_entry.length == 0) return;
     const std::string table = scene_.table("scene_camera");
     files_.reading(table, [&] {
@@ -458,7 +434,7 @@ class BopImageReading {
     });
   }
 
-  void set_depth(double metres, Sources& sources) {
+  void set_depth(double metres, FrameSources& sources) {
     Image<float> depth(depth_->width(), depth_->height(), std::numeric_limits<float>::infinity());
     for (int y = 0; y < depth.height(); ++y) {
       for (int x = 0; x < depth.width(); ++x) {
@@ -470,7 +446,7 @@ class BopImageReading {
     sources.emplace(kDistanceToImagePlane.name, depth_file_);
   }
 
-  void read_objects(Sources& sources) {
+  void read_objects(FrameSources& sources) {
     const std::string table = scene_.table("scene_gt");
     const std::string info_table = scene_.table("scene_gt_info");
     Json poses = Json::array();
@@ -652,7 +628,7 @@ class BopImageReading {
   }
 
   /// Ids, once all masks are known.
-  void finish(Sources& sources) {
+  void finish(FrameSources& sources) {
     if (!wants(kInstanceId.name) || !image_.has_poses) return;
     InstancePainter painter(frame_.camera.width, frame_.camera.height);
     bool have_all = true;
@@ -676,29 +652,19 @@ class BopImageReading {
   const BopImage& image_;
   std::string stem_;
   bool is_own_;
-  const NameSet& wanted_;
-  StoredFiles files_;
   std::string depth_file_;
   std::optional<StoredPicture> depth_;
   std::vector<std::optional<CoverageMask>> masks_;  ///< What is seen of each object.
-  Frame frame_;
 };
 
 StoredCapture BopDataset::read(std::size_t i, const NameSet& wanted) const {
-  StoredCapture stored;
-  stored.capture.index = info_.captures.at(i);
-  for (std::size_t at = first_[i]; at < first_[i + 1]; ++at) {
-    const BopImage& image = images_[at];
-    const std::string& split = scenes_[image.scene].split;
-    // Our writer's validation captures are what the benchmark tests on.
-    stored.split = page_ && split == "test" ? "val" : split;
-    BopImageReading::Sources sources;
-    auto frame = BopImageReading(*this, image, wanted, stored.log).read(sources);
-    if (!frame) continue;
-    stored.capture.frames.push_back(std::move(*frame));
-    stored.files.push_back(std::move(sources));
-  }
-  return stored;
+  return read_frames(info_.captures.at(i), rows_.of(i),
+                     [&](const BopImage& image, StoredCapture& stored, FrameSources& sources) {
+                       const std::string& split = scenes_[image.scene].split;
+                       // Our writer's validation captures are what the benchmark tests on.
+                       stored.split = page_ && split == "test" ? "val" : split;
+                       return BopImageReading(*this, image, wanted, stored.log).read(sources);
+                     });
 }
 
 }  // namespace

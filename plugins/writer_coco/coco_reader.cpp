@@ -5,8 +5,12 @@
 #include <cmath>
 #include <set>
 
+#include <span>
 #include "diorama/error.h"
 #include "reader_support/camera_json.h"
+#include "reader_support/capture_rows.h"
+#include "reader_support/frame_reading.h"
+#include "reader_support/listed_boxes.h"
 #include "reader_support/object_masks.h"
 #include "writer_coco/coco_tables.h"
 
@@ -20,20 +24,6 @@ constexpr const char* kArea = "area = count";
 constexpr const char* kPanoptic = "panoptic segments agree with annotations";
 constexpr const char* kKeypoints = "keypoints project onto their pixels";
 constexpr const char* kReproject = "pose and camera reproject onto the mask";
-
-/// x, y, width, height in pixels; half a pixel and more counts where numbers are not whole.
-PixelBox box_of(const Json& bbox) {
-  const auto number = [&](std::size_t i) {
-    const double value = bbox.at(i).get<double>();
-    if (!(std::abs(value) < 1e8)) throw std::runtime_error("a bbox is beyond reason");
-    return value;
-  };
-  constexpr double kRounding = 1e-3;
-  const double x = number(0);
-  const double y = number(1);
-  return {int(std::floor(x + kRounding)), int(std::floor(y + kRounding)),
-          int(std::ceil(x + number(2) - kRounding)), int(std::ceil(y + number(3) - kRounding))};
-}
 
 bool is_whole(const Json& bbox) {
   return std::ranges::all_of(bbox, [](const Json& v) {
@@ -176,21 +166,18 @@ class CocoDataset final : public StoredDataset {
 };
 
 /// Makes one frame of one image.
-class CocoImageReading {
+class CocoImageReading : private FrameReading {
  public:
   CocoImageReading(const CocoDataset& dataset, const CocoImageEntry& entry, const NameSet& wanted,
                    ReadLog& log)
-      : dataset_(dataset),
+      : FrameReading(dataset.folder_, dataset.host_, dataset.info_, entry.capture,
+                     dataset.tables_.cameras[entry.camera], wanted, log),
+        dataset_(dataset),
         part_(dataset.tables_.parts[entry.part]),
-        entry_(entry),
-        wanted_(wanted),
-        files_(dataset.folder_, dataset.host_, log, entry.capture,
-               dataset.tables_.cameras[entry.camera]) {}
+        entry_(entry) {}
 
   /// Nothing when not even the image's size can be known.
-  std::optional<Frame> read(std::map<std::string, std::string, std::less<>>& sources) {
-    frame_.camera_name = dataset_.tables_.cameras[entry_.camera];
-    frame_.camera_path = "/Cameras/" + frame_.camera_name;
+  std::optional<Frame> read(FrameSources& sources) {
     bool has_size = false;
     files_.reading(part_.file, [&] {
       image_ = parse_stored_json(read_span(dataset_.folder_ / part_.file, entry_.span));
@@ -230,7 +217,7 @@ class CocoImageReading {
     frame_.world_from_camera = world_from_camera;
   }
 
-  void read_picture(std::map<std::string, std::string, std::less<>>& sources) {
+  void read_picture(FrameSources& sources) {
     if (!wanted_.contains(kColor.name)) return;
     files_.reading(part_.file, [&] {
       const std::string name = image_.at("file_name").get<std::string>();
@@ -269,7 +256,7 @@ class CocoImageReading {
     files_.check(category != part_.categories.end(), kIds, part_.file, who,
                  "has the unknown category " + json.at("category_id").dump());
     if (category != part_.categories.end()) instance.labels["class"] = category->second.name;
-    instance.tight_box = box_of(json.at("bbox"));
+    instance.tight_box = box_of_json(json.at("bbox"));
     check_box_inside(who, *instance.tight_box);
     CoverageMask mask;
     if (wants_masks && json.contains("segmentation")) {
@@ -334,7 +321,7 @@ class CocoImageReading {
     visibility.amodal_mask =
         mask_of_run_lengths(entry->at("segmentation"), frame_.camera.width, frame_.camera.height);
     visibility.amodal_pixels = pixel_count(visibility.amodal_mask);
-    visibility.amodal_box = box_of(entry->at("bbox"));
+    visibility.amodal_box = box_of_json(entry->at("bbox"));
     files_.check(entry->at("area").get<std::int64_t>() == visibility.amodal_pixels, kArea,
                  part_.file, who, "its amodal area is " + entry->at("area").dump(),
                  "its amodal mask has " + std::to_string(visibility.amodal_pixels) + " pixels");
@@ -391,7 +378,7 @@ class CocoImageReading {
   /// The corners of a 3-D box surround the object; leaves a tenth for what a lens bends.
   void check_surrounded(const Json& json, const std::string& who,
                         const Eigen::AlignedBox2d& keypoints) {
-    const PixelBox box = box_of(json.at("bbox"));
+    const PixelBox box = box_of_json(json.at("bbox"));
     const Vec2 slack = Vec2::Ones() + 0.1 * keypoints.sizes();
     const bool holds =
         ((Vec2(box.x_min, box.y_min) - keypoints.min() + slack).array() >= 0.0).all() &&
@@ -401,7 +388,7 @@ class CocoImageReading {
   }
 
   /// Ids, and who hides whom, once all annotations are known.
-  void finish(std::map<std::string, std::string, std::less<>>& sources) {
+  void finish(FrameSources& sources) {
     sources.emplace(kHoldsInstances, part_.file);
     for (const OccludedBy& entry : occluded_by_) {
       const auto front = std::ranges::find(frame_.instances, entry.front, &Instance::node_path);
@@ -493,8 +480,8 @@ class CocoImageReading {
       files_.check(entry.at("area").get<std::int64_t>() == segment.count, kArea, file, who,
                    "its area is " + entry.at("area").dump(),
                    std::to_string(segment.count) + " pixels");
-      files_.check(box_of(entry.at("bbox")) == segment.box, kBox, file, who,
-                   "its bbox is " + box_text(box_of(entry.at("bbox"))),
+      files_.check(box_of_json(entry.at("bbox")) == segment.box, kBox, file, who,
+                   "its bbox is " + box_text(box_of_json(entry.at("bbox"))),
                    "its pixels extend over " + box_text(segment.box));
       categories.emplace(id, category);
       segments.erase(found);
@@ -544,10 +531,7 @@ class CocoImageReading {
   const CocoDataset& dataset_;
   const CocoPart& part_;
   const CocoImageEntry& entry_;
-  const NameSet& wanted_;
-  StoredFiles files_;
   Json image_;
-  Frame frame_;
   // Of each instance.
   std::vector<std::string> whos_;
   std::vector<std::int64_t> categories_;
@@ -557,18 +541,14 @@ class CocoImageReading {
 };
 
 StoredCapture CocoDataset::read(std::size_t i, const NameSet& wanted) const {
-  StoredCapture stored;
-  stored.capture.index = info_.captures.at(i);
-  for (std::size_t at = first_image_[i]; at < first_image_[i + 1]; ++at) {
-    const CocoImageEntry& entry = tables_.images[at];
-    stored.split = tables_.parts[entry.part].split;
-    std::map<std::string, std::string, std::less<>> sources;
-    auto frame = CocoImageReading(*this, entry, wanted, stored.log).read(sources);
-    if (!frame) continue;
-    stored.capture.frames.push_back(std::move(*frame));
-    stored.files.push_back(std::move(sources));
-  }
-  return stored;
+  const auto images = std::span(tables_.images)
+                          .subspan(first_image_.at(i), first_image_.at(i + 1) - first_image_[i]);
+  return read_frames(
+      info_.captures.at(i), images,
+      [&](const CocoImageEntry& entry, StoredCapture& stored, FrameSources& sources) {
+        stored.split = tables_.parts[entry.part].split;
+        return CocoImageReading(*this, entry, wanted, stored.log).read(sources);
+      });
 }
 
 }  // namespace

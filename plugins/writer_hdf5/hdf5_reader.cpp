@@ -9,7 +9,9 @@
 
 #include "diorama/error.h"
 #include "reader_support/camera_json.h"
+#include "reader_support/capture_rows.h"
 #include "reader_support/channel_arrays.h"
+#include "reader_support/frame_reading.h"
 #include "reader_support/picture_list.h"
 #include "writer_hdf5/hdf5_view.h"
 
@@ -181,22 +183,16 @@ class Hdf5Dataset final : public StoredDataset {
 };
 
 /// Makes one frame of one file.
-class Hdf5PictureReading {
+class Hdf5PictureReading : private FrameReading {
  public:
-  using Sources = std::map<std::string, std::string, std::less<>>;
-
   Hdf5PictureReading(const Hdf5Dataset& dataset, const ListedPicture& picture,
                      const NameSet& wanted, ReadLog& log)
-      : dataset_(dataset),
-        file_(dataset.file_of(picture)),
-        wanted_(wanted),
-        files_(dataset.folder_, dataset.host_, log, picture.capture,
-               dataset.pictures_.cameras()[picture.camera]) {
-    frame_.camera_name = dataset.pictures_.cameras()[picture.camera];
-    frame_.camera_path = "/Cameras/" + frame_.camera_name;
-  }
+      : FrameReading(dataset.folder_, dataset.host_, dataset.info_, picture.capture,
+                     dataset.pictures_.cameras()[picture.camera], wanted, log),
+        dataset_(dataset),
+        file_(dataset.file_of(picture)) {}
 
-  std::optional<Frame> read(Sources& sources) {
+  std::optional<Frame> read(FrameSources& sources) {
     auto content = files_.text(file_);
     if (!content) return std::nullopt;
     files_.reading(file_, [&] { view_.emplace(std::move(*content)); });
@@ -214,10 +210,6 @@ class Hdf5PictureReading {
   }
 
  private:
-  bool wants(std::string_view name) const {
-    return wanted_.contains(name) && dataset_.info_.holds.contains(name);
-  }
-
   bool is_own() const { return view_->has("world_from_camera"); }
 
   /// Runs `body` for a data set that is there; what it throws is a finding about it.
@@ -471,26 +463,18 @@ class Hdf5PictureReading {
 
   const Hdf5Dataset& dataset_;
   std::string file_;
-  const NameSet& wanted_;
-  StoredFiles files_;
   std::optional<Hdf5View> view_;
-  Frame frame_;
   std::map<std::uint32_t, std::int64_t> categories_;  ///< By idx.
 };
 
 StoredCapture Hdf5Dataset::read(std::size_t i, const NameSet& wanted) const {
-  StoredCapture stored;
-  stored.capture.index = info_.captures.at(i);
-  for (const ListedPicture& picture : pictures_.pictures(i)) {
-    const std::string& folder = folders_[picture.folder];
-    stored.split = folder.empty() ? "" : folder.substr(0, folder.size() - 1);
-    Hdf5PictureReading::Sources sources;
-    auto frame = Hdf5PictureReading(*this, picture, wanted, stored.log).read(sources);
-    if (!frame) continue;
-    stored.capture.frames.push_back(std::move(*frame));
-    stored.files.push_back(std::move(sources));
-  }
-  return stored;
+  return read_frames(
+      info_.captures.at(i), pictures_.pictures(i),
+      [&](const ListedPicture& picture, StoredCapture& stored, FrameSources& sources) {
+        const std::string& folder = folders_[picture.folder];
+        stored.split = folder.empty() ? "" : folder.substr(0, folder.size() - 1);
+        return Hdf5PictureReading(*this, picture, wanted, stored.log).read(sources);
+      });
 }
 
 }  // namespace

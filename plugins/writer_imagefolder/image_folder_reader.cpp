@@ -7,6 +7,8 @@
 #include <set>
 
 #include "diorama/error.h"
+#include "reader_support/capture_rows.h"
+#include "reader_support/frame_reading.h"
 #include "reader_support/label_text.h"
 #include "reader_support/listed_boxes.h"
 #include "reader_support/picture_list.h"
@@ -220,35 +222,24 @@ class ImageFolder final : public StoredDataset {
     if (!page_) {
       for (std::size_t i = 0; i < entries_.size(); ++i) entries_[i].capture = std::int32_t(i);
     }
-    std::ranges::stable_sort(
-        entries_, {}, [](const Entry& entry) { return std::pair(entry.capture, entry.camera); });
-    std::vector<Entry> once;
-    for (Entry& entry : entries_) {
-      const bool is_again = !once.empty() && once.back().capture == entry.capture &&
-                            once.back().camera == entry.camera;
-      files.check(!is_again, kOnce, tables_[entry.table].path(),
+    rows_.set(std::move(entries_), [&](const Entry& entry, const Entry* known) {
+      files.check(!known, kOnce, tables_[entry.table].path(),
                   "capture " + std::to_string(entry.capture),
                   "is there a second time by one camera");
-      if (is_again) continue;
-      if (once.empty() || once.back().capture != entry.capture) first_.push_back(once.size());
-      once.push_back(std::move(entry));
-    }
-    entries_ = std::move(once);
-    first_.push_back(entries_.size());
+    });
   }
 
   void describe() {
     info_.format = kFormat;
     info_.camera_names = page_ ? page_->cameras : std::vector<std::string>{"camera"};
-    for (std::size_t i = 0; i + 1 < first_.size(); ++i) {
-      info_.captures.push_back(entries_[first_[i]].capture);
-    }
+    info_.captures = rows_.captures();
     info_.classes = classes_;
     info_.holds = {std::string(kColor.name)};
     bool is_lossy = false;
     constexpr std::size_t kLookedAt = 32;
-    const std::size_t step = entries_.size() / kLookedAt + 1;
-    for (std::size_t i = 0; i < entries_.size(); i += step) look_at(entries_[i], is_lossy);
+    const auto& rows = rows_.all();
+    const std::size_t step = rows.size() / kLookedAt + 1;
+    for (std::size_t i = 0; i < rows.size(); i += step) look_at(rows[i], is_lossy);
     if (is_lossy) info_.steps[std::string(kColor.name)] = 16.0;
     info_.steps[std::string(kHoldsTightBoxes)] = page_ ? 0.0 : 2.0;
     info_.steps[std::string(kHoldsOcclusion)] = 1e-6;
@@ -297,31 +288,25 @@ class ImageFolder final : public StoredDataset {
   const Host& host_;
   std::optional<DatasetPage> page_;
   std::vector<Table> tables_;
-  std::vector<Entry> entries_;
-  std::vector<std::size_t> first_;  ///< Per capture, and one behind the last.
+  std::vector<Entry> entries_;  ///< While tables are listed.
+  CaptureRows<Entry> rows_;
   std::vector<std::string> classes_;
   StoredInfo info_;
   ReadLog log_;
 };
 
 /// Makes one frame of a row, or of a picture in the folder of its class.
-class ImageFolderReading {
+class ImageFolderReading : private FrameReading {
  public:
-  using Sources = std::map<std::string, std::string, std::less<>>;
-
   ImageFolderReading(const ImageFolder& dataset, const Entry& entry, const NameSet& wanted,
                      ReadLog& log)
-      : dataset_(dataset),
+      : FrameReading(dataset.folder_, dataset.host_, dataset.info_, entry.capture,
+                     dataset.info_.camera_names[entry.camera], wanted, log),
+        dataset_(dataset),
         entry_(entry),
-        table_(dataset.tables_[entry.table]),
-        wanted_(wanted),
-        files_(dataset.folder_, dataset.host_, log, entry.capture,
-               dataset.info_.camera_names[entry.camera]) {
-    frame_.camera_name = dataset.info_.camera_names[entry.camera];
-    frame_.camera_path = "/Cameras/" + frame_.camera_name;
-  }
+        table_(dataset.tables_[entry.table]) {}
 
-  std::optional<Frame> read(Sources& sources) {
+  std::optional<Frame> read(FrameSources& sources) {
     std::string file = table_.folder + entry_.picture;
     bool is_good = true;
     if (!table_.name.empty()) {
@@ -339,8 +324,7 @@ class ImageFolderReading {
     if (!is_good) return std::nullopt;
     const auto picture = files_.picture(file);
     if (!picture) return std::nullopt;
-    frame_.camera.width = picture->width();
-    frame_.camera.height = picture->height();
+    set_size(*picture);
     if (wanted_.contains(kColor.name)) {
       frame_.set(kColor, picture->color());
       sources.emplace(kColor.name, file);
@@ -355,15 +339,6 @@ class ImageFolderReading {
   }
 
  private:
-  Instance& add_instance(const std::string& label) {
-    Instance instance;
-    instance.id = std::uint32_t(frame_.instances.size()) + 1;
-    instance.node_path = "/Assets/" + std::to_string(instance.id);
-    if (!label.empty()) instance.labels["class"] = label;
-    frame_.instances.push_back(std::move(instance));
-    return frame_.instances.back();
-  }
-
   void read_row_objects(const std::string& file) {
     check_row(file);
     const auto objects = row_.find("objects");
@@ -442,25 +417,15 @@ class ImageFolderReading {
   const ImageFolder& dataset_;
   const Entry& entry_;
   const Table& table_;
-  const NameSet& wanted_;
-  StoredFiles files_;
   Json row_;
-  Frame frame_;
 };
 
 StoredCapture ImageFolder::read(std::size_t i, const NameSet& wanted) const {
-  StoredCapture stored;
-  stored.capture.index = info_.captures.at(i);
-  for (std::size_t at = first_[i]; at < first_[i + 1]; ++at) {
-    const Entry& entry = entries_[at];
-    stored.split = tables_[entry.table].split;
-    ImageFolderReading::Sources sources;
-    auto frame = ImageFolderReading(*this, entry, wanted, stored.log).read(sources);
-    if (!frame) continue;
-    stored.capture.frames.push_back(std::move(*frame));
-    stored.files.push_back(std::move(sources));
-  }
-  return stored;
+  return read_frames(info_.captures.at(i), rows_.of(i),
+                     [&](const Entry& entry, StoredCapture& stored, FrameSources& sources) {
+                       stored.split = tables_[entry.table].split;
+                       return ImageFolderReading(*this, entry, wanted, stored.log).read(sources);
+                     });
 }
 
 }  // namespace

@@ -12,8 +12,11 @@
 
 #include "diorama/error.h"
 #include "reader_support/camera_json.h"
+#include "reader_support/capture_rows.h"
+#include "reader_support/frame_reading.h"
 #include "reader_support/label_text.h"
 #include "reader_support/picture_list.h"
+#include "reader_support/split_lists.h"
 
 namespace diorama {
 namespace {
@@ -82,7 +85,7 @@ class KittiDataset final : public StoredDataset {
         {front_ + "label_2/"}, files);
     has_depth_ = fs::is_directory(folder_ / front_ / "depth_2");
     has_calibration_ = fs::is_directory(folder_ / front_ / "calib");
-    read_lists(files);
+    split_of_ = read_split_lists(files, "ImageSets", {"train", "val"});
     if (page_) check_own_files(files);
     describe();
   }
@@ -105,21 +108,6 @@ class KittiDataset final : public StoredDataset {
     const std::size_t cameras = page_->cameras.size();
     if (number >= page_->picture_count() || stem(number) != name) return std::nullopt;
     return std::pair(int(number / cameras), int(number % cameras));
-  }
-
-  void read_lists(StoredFiles& files) {
-    for (const char* split : {"train", "val"}) {
-      const std::string file = std::string("ImageSets/") + split + ".txt";
-      if (!files.has(file)) continue;
-      const auto text = files.text(file);
-      if (!text) continue;
-      for (const std::string& line : text_lines(*text)) {
-        const auto words = text_words(line);
-        if (words.empty()) continue;
-        const auto [known, is_new] = split_of_.emplace(words[0], split);
-        files.check(is_new, kOnce, file, words[0], "is in '" + known->second + "' too");
-      }
-    }
   }
 
   void check_own_files(StoredFiles& files) {
@@ -185,29 +173,24 @@ class KittiDataset final : public StoredDataset {
 };
 
 /// Makes one frame of the files of one number.
-class KittiPictureReading {
+class KittiPictureReading : private FrameReading {
  public:
   KittiPictureReading(const KittiDataset& dataset, const ListedPicture& picture,
                       const NameSet& wanted, ReadLog& log)
-      : dataset_(dataset),
+      : FrameReading(dataset.folder_, dataset.host_, dataset.info_, picture.capture,
+                     dataset.pictures_.cameras()[picture.camera], wanted, log),
+        dataset_(dataset),
         stem_(picture.stem),
-        labels_(dataset.front_ + "label_2/" + stem_ + ".txt"),
-        wanted_(wanted),
-        files_(dataset.folder_, dataset.host_, log, picture.capture,
-               dataset.pictures_.cameras()[picture.camera]) {
-    frame_.camera_name = dataset.pictures_.cameras()[picture.camera];
-    frame_.camera_path = "/Cameras/" + frame_.camera_name;
-  }
+        labels_(dataset.front_ + "label_2/" + stem_ + ".txt") {}
 
-  std::optional<Frame> read(std::map<std::string, std::string, std::less<>>& sources) {
+  std::optional<Frame> read(FrameSources& sources) {
     const std::string file = picture_file();
     files_.check(!file.empty(), kMissing, dataset_.front_ + "image_2/" + stem_, "",
                  "the picture is missing");
     if (file.empty()) return std::nullopt;
     const auto picture = files_.picture(file);
     if (!picture) return std::nullopt;
-    frame_.camera.width = picture->width();
-    frame_.camera.height = picture->height();
+    set_size(*picture);
     if (wanted_.contains(kColor.name)) {
       frame_.set(kColor, picture->color());
       sources.emplace(kColor.name, file);
@@ -228,7 +211,7 @@ class KittiPictureReading {
     return {};
   }
 
-  void read_calibration(std::map<std::string, std::string, std::less<>>& sources) {
+  void read_calibration(FrameSources& sources) {
     const std::string file = dataset_.front_ + "calib/" + stem_ + ".txt";
     const auto text = files_.text(file);
     if (!text) return;
@@ -289,7 +272,7 @@ class KittiPictureReading {
     }
   }
 
-  void read_depth(std::map<std::string, std::string, std::less<>>& sources) {
+  void read_depth(FrameSources& sources) {
     const std::string file = dataset_.front_ + "depth_2/" + stem_ + ".png";
     if (!dataset_.page_ && !files_.has(file)) return;
     const auto picture =
@@ -350,10 +333,7 @@ class KittiPictureReading {
                  "a box with pixels inside the image");
     check_numbers(label, who);
     label.location += offset_;
-    Instance instance;
-    instance.id = std::uint32_t(frame_.instances.size()) + 1;
-    instance.node_path = "/Assets/" + std::to_string(instance.id);
-    instance.labels["class"] = name;
+    Instance instance = next_instance(name);
     instance.tight_box = box;
     if (label.has_box_3d()) {
       const Vec3 half = 0.5 * label.size;
@@ -422,25 +402,17 @@ class KittiPictureReading {
   const KittiDataset& dataset_;
   std::string stem_;
   std::string labels_;
-  const NameSet& wanted_;
-  StoredFiles files_;
   Vec3 offset_ = Vec3::Zero();  ///< Of camera 0 in the space of camera 2.
-  Frame frame_;
 };
 
 StoredCapture KittiDataset::read(std::size_t i, const NameSet& wanted) const {
-  StoredCapture stored;
-  stored.capture.index = info_.captures.at(i);
-  for (const ListedPicture& picture : pictures_.pictures(i)) {
-    const auto split = split_of_.find(picture.stem);
-    if (split != split_of_.end()) stored.split = split->second;
-    std::map<std::string, std::string, std::less<>> sources;
-    auto frame = KittiPictureReading(*this, picture, wanted, stored.log).read(sources);
-    if (!frame) continue;
-    stored.capture.frames.push_back(std::move(*frame));
-    stored.files.push_back(std::move(sources));
-  }
-  return stored;
+  return read_frames(
+      info_.captures.at(i), pictures_.pictures(i),
+      [&](const ListedPicture& picture, StoredCapture& stored, FrameSources& sources) {
+        const auto split = split_of_.find(picture.stem);
+        if (split != split_of_.end()) stored.split = split->second;
+        return KittiPictureReading(*this, picture, wanted, stored.log).read(sources);
+      });
 }
 
 }  // namespace

@@ -7,8 +7,11 @@
 #include <map>
 #include <set>
 
+#include <span>
 #include "diorama/error.h"
+#include "reader_support/capture_rows.h"
 #include "reader_support/dataset_page.h"
+#include "reader_support/frame_reading.h"
 #include "reader_support/picture_list.h"
 #include "writer_pose/pose_entry.h"
 
@@ -25,26 +28,9 @@ constexpr std::string_view kOverlays = "overlay";  ///< Drawings: read, and noth
 /// Files that are looked at before it is decided by whose rules poses are.
 constexpr std::size_t kLookedAt = 16;
 
-/// What metadata.txt says; an empty object when that is nothing.
-Json metadata_of(const fs::path& folder) {
-  try {
-    const Json json = parse_stored_json(read_whole_file(folder / "metadata.txt", 1 << 20));
-    return json.is_object() ? json : Json::object();
-  } catch (const std::exception&) {
-    return Json::object();
-  }
-}
-
-/// What metadata.txt calls the writer; empty when it does not say.
-std::string said_writer(const fs::path& folder) {
-  const Json json = metadata_of(folder);
-  const auto name = json.find("name");
-  return name != json.end() && name->is_string() ? name->get<std::string>() : std::string();
-}
-
 /// Cameras that take turns in the folder; empty when metadata.txt does not say.
 std::vector<std::string> said_cameras(const fs::path& folder) {
-  const Json json = metadata_of(folder);
+  const Json json = metadata_page(folder);
   const auto cameras = json.find("cameras");
   const bool are_names = cameras != json.end() && cameras->is_array() &&
                          std::ranges::all_of(*cameras, [](const Json& c) { return c.is_string(); });
@@ -96,7 +82,7 @@ class PoseDataset final : public StoredDataset {
  public:
   PoseDataset(fs::path folder, const Host& host) : folder_(std::move(folder)), host_(host) {
     StoredFiles files(folder_, host_, log_);
-    const bool is_named = said_writer(folder_) == kFormat;
+    const bool is_named = metadata_writer(folder_) == kFormat;
     files.check(is_named || !files.has("metadata.txt"), kReadable, "metadata.txt", "",
                 "does not say that PoseWriter wrote this");
     folders_ = {""};
@@ -170,17 +156,10 @@ class PoseDataset final : public StoredDataset {
       if (found == cameras_.end()) found = cameras_.insert(cameras_.end(), name);
       frame.camera = std::uint32_t(found - cameras_.begin());
     }
-    std::ranges::stable_sort(
-        frames_, {}, [](const PoseFrame& frame) { return std::pair(frame.capture, frame.camera); });
-    std::vector<PoseFrame> once;
-    for (PoseFrame& frame : frames_) {
-      const bool is_again = !once.empty() && once.back().capture == frame.capture &&
-                            once.back().camera == frame.camera;
-      files.check(!is_again, kOnce, folders_[frame.folder] + frame.stem + ".json", "",
+    frames_ = sorted_once(std::move(frames_), [&](const PoseFrame& frame, const PoseFrame* known) {
+      files.check(!known, kOnce, folders_[frame.folder] + frame.stem + ".json", "",
                   "its number is there a second time");
-      if (!is_again) once.push_back(std::move(frame));
-    }
-    frames_ = std::move(once);
+    });
     number_captures(run ? run->captures : 0);
     if (overlay_ending_.empty()) return;
     for (const std::string& stem : lacking_) {
@@ -317,22 +296,17 @@ class PoseDataset final : public StoredDataset {
 };
 
 /// Makes one frame of one file and its picture.
-class PoseFrameReading {
+class PoseFrameReading : private FrameReading {
  public:
-  using Sources = std::map<std::string, std::string, std::less<>>;
-
   PoseFrameReading(const PoseDataset& dataset, const PoseFrame& of, const NameSet& wanted,
                    ReadLog& log)
-      : dataset_(dataset),
+      : FrameReading(dataset.folder_, dataset.host_, dataset.info_, of.capture,
+                     dataset.cameras_[of.camera], wanted, log),
+        dataset_(dataset),
         of_(of),
-        table_(dataset.folders_[of.folder] + of.stem + ".json"),
-        wanted_(wanted),
-        files_(dataset.folder_, dataset.host_, log, of.capture, dataset.cameras_[of.camera]) {
-    frame_.camera_name = dataset.cameras_[of.camera];
-    frame_.camera_path = "/Cameras/" + frame_.camera_name;
-  }
+        table_(dataset.folders_[of.folder] + of.stem + ".json") {}
 
-  std::optional<Frame> read(Sources& sources) {
+  std::optional<Frame> read(FrameSources& sources) {
     const auto text = files_.text(table_);
     std::optional<StoredPoseFile> file;
     if (text) files_.reading(table_, [&] { file = parse_pose_file(*text); });
@@ -355,11 +329,7 @@ class PoseFrameReading {
   }
 
  private:
-  bool wants(std::string_view name) const {
-    return wanted_.contains(name) && dataset_.info_.holds.contains(name);
-  }
-
-  void read_picture(const Camera* said, Sources& sources) {
+  void read_picture(const Camera* said, FrameSources& sources) {
     if (said) {
       frame_.camera.width = said->width;
       frame_.camera.height = said->height;
@@ -374,8 +344,7 @@ class PoseFrameReading {
         has_size_ ? files_.picture_of_size(file, frame_.camera.width, frame_.camera.height, table_)
                   : files_.picture(file);
     if (!picture) return;
-    frame_.camera.width = picture->width();
-    frame_.camera.height = picture->height();
+    set_size(*picture);
     has_size_ = true;
     if (file.ends_with(".exr")) {
       if (wants(kColorHdr.name)) set_light(*picture, file, sources);
@@ -394,7 +363,7 @@ class PoseFrameReading {
     files_.picture_of_size(file, frame_.camera.width, frame_.camera.height, table_);
   }
 
-  void set_light(const StoredPicture& picture, const std::string& file, Sources& sources) {
+  void set_light(const StoredPicture& picture, const std::string& file, FrameSources& sources) {
     files_.reading(file, [&] {
       const auto& floats = picture.texture->floats;
       if (floats.empty() || picture.channels() < 3)
@@ -633,24 +602,16 @@ class PoseFrameReading {
   const PoseDataset& dataset_;
   const PoseFrame& of_;
   std::string table_;
-  const NameSet& wanted_;
-  StoredFiles files_;
   StoredPoseFile file_;
   bool has_size_ = false;
-  Frame frame_;
 };
 
 StoredCapture PoseDataset::read(std::size_t i, const NameSet& wanted) const {
-  StoredCapture stored;
-  stored.capture.index = info_.captures.at(i);
-  for (std::size_t at = first_[i]; at < first_[i + 1]; ++at) {
-    PoseFrameReading::Sources sources;
-    auto frame = PoseFrameReading(*this, frames_[at], wanted, stored.log).read(sources);
-    if (!frame) continue;
-    stored.capture.frames.push_back(std::move(*frame));
-    stored.files.push_back(std::move(sources));
-  }
-  return stored;
+  const auto frames = std::span(frames_).subspan(first_.at(i), first_.at(i + 1) - first_[i]);
+  return read_frames(info_.captures.at(i), frames,
+                     [&](const PoseFrame& frame, StoredCapture& stored, FrameSources& sources) {
+                       return PoseFrameReading(*this, frame, wanted, stored.log).read(sources);
+                     });
 }
 
 }  // namespace
@@ -660,7 +621,7 @@ std::vector<std::string> PoseReader::patterns() const {
 }
 
 Recognition PoseReader::recognise(const fs::path& folder) const {
-  const std::string said = said_writer(folder);
+  const std::string said = metadata_writer(folder);
   if (said == kFormat) return Recognition::ByName;
   if (!said.empty()) return Recognition::No;
   std::vector<std::string> folders{""};

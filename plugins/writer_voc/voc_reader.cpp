@@ -9,8 +9,12 @@
 #include <set>
 
 #include "diorama/error.h"
+#include "reader_support/capture_rows.h"
+#include "reader_support/frame_reading.h"
 #include "reader_support/label_text.h"
 #include "reader_support/picture_list.h"
+#include "reader_support/split_lists.h"
+#include "writer_voc/class_list_names.h"
 #include "writer_voc/xml_tree.h"
 
 namespace diorama {
@@ -93,18 +97,7 @@ class VocDataset final : public StoredDataset {
 
  private:
   void read_lists(StoredFiles& files) {
-    for (const char* split : {"train", "val", "test"}) {
-      const std::string file = std::string("ImageSets/Main/") + split + ".txt";
-      if (!files.has(file)) continue;
-      const auto text = files.text(file);
-      if (!text) continue;
-      for (const std::string& line : text_lines(*text)) {
-        const auto words = text_words(line);
-        if (words.empty()) continue;
-        const auto [known, is_new] = split_of_.emplace(words[0], split);
-        files.check(is_new, kOnce, file, words[0], "is in '" + known->second + "' too");
-      }
-    }
+    split_of_ = read_split_lists(files, "ImageSets/Main", {"train", "val", "test"});
     for (const char* name : {"labels.txt", "classes.txt"}) {
       if (!files.has(name)) continue;
       if (const auto text = files.text(name)) {
@@ -149,19 +142,7 @@ class VocDataset final : public StoredDataset {
   /// The lists of single classes, as far as a dataset has them: each picture with 1, 0 or -1.
   void check_class_lists(const std::map<std::string, std::vector<std::string>>& pictures,
                          StoredFiles& files) {
-    std::vector<std::string> names;
-    for (const std::string& label : page_->classes) {
-      std::string name = label;
-      for (char& c : name) {
-        const auto byte = static_cast<unsigned char>(c);
-        if (byte < 0x80 && !std::isalnum(byte) && c != '-' && c != '.') c = '_';
-      }
-      std::string free = name;
-      for (int number = 2; std::ranges::count(names, free) > 0; ++number) {
-        free = name + "_" + std::to_string(number);
-      }
-      names.push_back(free);
-    }
+    const std::vector<std::string> names = class_list_names(page_->classes);
     const auto file_of = [](const std::string& name, const std::string& part) {
       return "ImageSets/Main/" + name + "_" + part + ".txt";
     };
@@ -243,18 +224,17 @@ class VocDataset final : public StoredDataset {
 };
 
 /// Makes one frame of one annotation file.
-class VocPictureReading {
+class VocPictureReading : private FrameReading {
  public:
   VocPictureReading(const VocDataset& dataset, const ListedPicture& picture, const NameSet& wanted,
                     ReadLog& log)
-      : dataset_(dataset),
+      : FrameReading(dataset.folder_, dataset.host_, dataset.info_, picture.capture,
+                     dataset.pictures_.cameras()[picture.camera], wanted, log),
+        dataset_(dataset),
         picture_(picture),
-        xml_file_(kAnnotations + picture.stem + ".xml"),
-        wanted_(wanted),
-        files_(dataset.folder_, dataset.host_, log, picture.capture,
-               dataset.pictures_.cameras()[picture.camera]) {}
+        xml_file_(kAnnotations + picture.stem + ".xml") {}
 
-  std::optional<Frame> read(std::map<std::string, std::string, std::less<>>& sources) {
+  std::optional<Frame> read(FrameSources& sources) {
     const auto text = files_.text(xml_file_);
     if (!text) return std::nullopt;
     bool is_good = false;
@@ -277,8 +257,6 @@ class VocPictureReading {
 
  private:
   void read_size() {
-    frame_.camera_name = dataset_.pictures_.cameras()[picture_.camera];
-    frame_.camera_path = "/Cameras/" + frame_.camera_name;
     const XmlElement* size = annotation_.child("size");
     if (!size) throw std::runtime_error("has no <size>");
     frame_.camera.width = integer_of(size->text_of("width"));
@@ -307,7 +285,7 @@ class VocPictureReading {
                  "the lists of the classes say " + said->second, expected);
   }
 
-  void read_picture(std::map<std::string, std::string, std::less<>>& sources) {
+  void read_picture(FrameSources& sources) {
     const std::string name = annotation_.text_of("filename");
     const fs::path path(name);
     files_.check(!path.has_parent_path() && path.stem() == picture_.stem, kCounts, xml_file_, "",
@@ -333,12 +311,9 @@ class VocPictureReading {
   }
 
   void add_object(const XmlElement& object) {
-    Instance instance;
-    instance.id = std::uint32_t(frame_.instances.size()) + 1;
-    instance.node_path = "/Assets/" + std::to_string(instance.id);
-    const std::string who = "object " + std::to_string(instance.id);
     const std::string name = object.text_of("name");
-    instance.labels["class"] = name;
+    Instance instance = next_instance(name);
+    const std::string who = "object " + std::to_string(instance.id);
     const auto& classes = dataset_.classes_;
     files_.check(classes.empty() || std::ranges::find(classes, name) != classes.end(), kIds,
                  xml_file_, who, "is of the unknown class '" + name + "'");
@@ -371,7 +346,7 @@ class VocPictureReading {
     frame_.instances.push_back(std::move(instance));
   }
 
-  void read_masks(std::map<std::string, std::string, std::less<>>& sources) {
+  void read_masks(FrameSources& sources) {
     const std::string objects = "SegmentationObject/" + picture_.stem + ".png";
     const std::string classes = "SegmentationClass/" + picture_.stem + ".png";
     const XmlElement* segmented = annotation_.child("segmented");
@@ -436,25 +411,17 @@ class VocPictureReading {
   const VocDataset& dataset_;
   const ListedPicture& picture_;
   std::string xml_file_;
-  const NameSet& wanted_;
-  StoredFiles files_;
   XmlElement annotation_;
-  Frame frame_;
 };
 
 StoredCapture VocDataset::read(std::size_t i, const NameSet& wanted) const {
-  StoredCapture stored;
-  stored.capture.index = info_.captures.at(i);
-  for (const ListedPicture& picture : pictures_.pictures(i)) {
-    const auto split = split_of_.find(picture.stem);
-    if (split != split_of_.end()) stored.split = split->second;
-    std::map<std::string, std::string, std::less<>> sources;
-    auto frame = VocPictureReading(*this, picture, wanted, stored.log).read(sources);
-    if (!frame) continue;
-    stored.capture.frames.push_back(std::move(*frame));
-    stored.files.push_back(std::move(sources));
-  }
-  return stored;
+  return read_frames(
+      info_.captures.at(i), pictures_.pictures(i),
+      [&](const ListedPicture& picture, StoredCapture& stored, FrameSources& sources) {
+        const auto split = split_of_.find(picture.stem);
+        if (split != split_of_.end()) stored.split = split->second;
+        return VocPictureReading(*this, picture, wanted, stored.log).read(sources);
+      });
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 
 #include "writer_support/image_files.h"
 #include "writer_support/replicator.h"
+#include "writer_voc/class_list_names.h"
 
 namespace diorama {
 namespace {
@@ -43,24 +44,6 @@ std::vector<std::array<std::uint8_t, 3>> voc_palette() {
     }
   }
   return palette;
-}
-
-/// Names of classes as parts of file names, all different.
-std::vector<std::string> list_names(const std::vector<std::string>& classes) {
-  std::vector<std::string> names;
-  for (const std::string& label : classes) {
-    std::string name = label;
-    for (char& c : name) {
-      const auto byte = static_cast<unsigned char>(c);
-      if (byte < 0x80 && !std::isalnum(byte) && c != '-' && c != '.') c = '_';
-    }
-    std::string free = name;
-    for (int number = 2; std::ranges::count(names, free) > 0; ++number) {
-      free = name + "_" + std::to_string(number);
-    }
-    names.push_back(free);
-  }
-  return names;
 }
 
 // What the list of a class says of a picture.
@@ -213,7 +196,7 @@ void VocWriter::write(const Capture& capture, CaptureFiles& files) const {
 
 /// The records are pairs of a picture's name and its occurrences, spaces between them.
 void VocWriter::finish(const RecordReader& records, DatasetFiles& files) {
-  const std::vector<std::string> names = list_names(training_.classes());
+  const std::vector<std::string> names = class_list_names(training_.classes());
   const auto list = [&names](std::size_t index, const char* part) {
     return "ImageSets/Main/" + names[index] + "_" + part + ".txt";
   };

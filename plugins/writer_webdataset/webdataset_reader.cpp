@@ -13,7 +13,9 @@
 
 #include "diorama/error.h"
 #include "reader_support/camera_json.h"
+#include "reader_support/capture_rows.h"
 #include "reader_support/channel_arrays.h"
+#include "reader_support/frame_reading.h"
 #include "reader_support/label_text.h"
 #include "reader_support/listed_boxes.h"
 #include "reader_support/picture_list.h"
@@ -205,33 +207,18 @@ class WebDataset final : public StoredDataset {
   /// Samples of one capture lie together, each camera once.
   void group(StoredFiles& files) {
     std::erase_if(samples_, [](const Sample& sample) { return sample.capture < 0; });
-    std::ranges::stable_sort(samples_, {}, [](const Sample& sample) {
-      return std::pair(sample.capture, sample.camera);
+    rows_.set(std::move(samples_), [&](const Sample& sample, const Sample* known) {
+      files.check(
+          !known, kOnce, shards_[sample.shard], "",
+          "capture " + std::to_string(sample.capture) + " is there a second time by one camera",
+          known ? "only in " + shards_[known->shard] : "");
     });
-    std::vector<Sample> once;
-    once.reserve(samples_.size());
-    for (const Sample& sample : samples_) {
-      const bool is_again = !once.empty() && once.back().capture == sample.capture &&
-                            once.back().camera == sample.camera;
-      files.check(!is_again, kOnce, shards_[sample.shard], "",
-                  "capture " + std::to_string(sample.capture) +
-                      " is there a second time by one "
-                      "camera",
-                  is_again ? "only in " + shards_[once.back().shard] : "");
-      if (is_again) continue;
-      if (once.empty() || once.back().capture != sample.capture) first_.push_back(once.size());
-      once.push_back(sample);
-    }
-    samples_ = std::move(once);
-    first_.push_back(samples_.size());
   }
 
   void describe() {
     info_.format = kFormat;
     info_.camera_names = page_ ? page_->cameras : std::vector<std::string>{"camera"};
-    for (std::size_t i = 0; i + 1 < first_.size(); ++i) {
-      info_.captures.push_back(samples_[first_[i]].capture);
-    }
+    info_.captures = rows_.captures();
     if (page_) info_.classes = page_->classes;
     std::string picture;
     for (const std::string& ending : endings_) {
@@ -248,9 +235,10 @@ class WebDataset final : public StoredDataset {
     }
     // What JSON says is seen by looking: a few samples from all over.
     constexpr std::size_t kLookedAt = 32;
-    const std::size_t step = samples_.size() / kLookedAt + 1;
+    const auto& rows = rows_.all();
+    const std::size_t step = rows.size() / kLookedAt + 1;
     if (endings_.contains("json")) {
-      for (std::size_t i = 0; i < samples_.size(); i += step) look_at(samples_[i]);
+      for (std::size_t i = 0; i < rows.size(); i += step) look_at(rows[i]);
     }
     if (has_own_json_) {
       if (endings_.contains("instances.png")) info_.holds.emplace(kInstanceId.name);
@@ -363,8 +351,8 @@ class WebDataset final : public StoredDataset {
   std::optional<DatasetPage> page_;
   std::vector<std::string> shards_;  ///< Paths in the folder.
   std::vector<std::string> splits_;  ///< Of each shard.
-  std::vector<Sample> samples_;
-  std::vector<std::size_t> first_;  ///< Per capture, and one behind the last.
+  std::vector<Sample> samples_;      ///< While shards are scanned.
+  CaptureRows<Sample> rows_;
   std::set<std::string> endings_;
   std::set<std::string> channels_;  ///< Arrays of these names are.
   bool has_own_json_ = false;
@@ -374,24 +362,18 @@ class WebDataset final : public StoredDataset {
 };
 
 /// Makes one frame of one sample.
-class SampleReading {
+class SampleReading : private FrameReading {
  public:
-  using Sources = std::map<std::string, std::string, std::less<>>;
-
   SampleReading(const WebDataset& dataset, const Sample& sample, const NameSet& wanted,
                 ReadLog& log)
-      : dataset_(dataset),
+      : FrameReading(dataset.folder_, dataset.host_, dataset.info_, sample.capture,
+                     dataset.info_.camera_names[sample.camera], wanted, log),
+        dataset_(dataset),
         sample_(sample),
         file_(dataset.shards_[sample.shard]),
-        wanted_(wanted),
-        files_(dataset.folder_, dataset.host_, log, sample.capture,
-               dataset.info_.camera_names[sample.camera]),
-        log_(log) {
-    frame_.camera_name = dataset.info_.camera_names[sample.camera];
-    frame_.camera_path = "/Cameras/" + frame_.camera_name;
-  }
+        log_(log) {}
 
-  std::optional<Frame> read(Sources& sources) {
+  std::optional<Frame> read(FrameSources& sources) {
     ++log_.files;
     bool is_loaded = false;
     files_.reading(file_, [&] {
@@ -416,10 +398,6 @@ class SampleReading {
   }
 
  private:
-  bool wants(std::string_view name) const {
-    return wanted_.contains(name) && dataset_.info_.holds.contains(name);
-  }
-
   /// Pictures tell the size, so that one is always read where JSON does not.
   bool is_used(const std::string& ending) const {
     if (ending == "json" || ending == "cls") return true;
@@ -494,8 +472,7 @@ class SampleReading {
     }
     color_ = picture(ending);
     if (!color_) return false;
-    frame_.camera.width = color_->width();
-    frame_.camera.height = color_->height();
+    set_size(*color_);
     return true;
   }
 
@@ -626,15 +603,6 @@ class SampleReading {
     }
   }
 
-  Instance& add_instance(const std::string& label) {
-    Instance instance;
-    instance.id = std::uint32_t(frame_.instances.size()) + 1;
-    instance.node_path = "/Assets/" + std::to_string(instance.id);
-    if (!label.empty()) instance.labels["class"] = label;
-    frame_.instances.push_back(std::move(instance));
-    return frame_.instances.back();
-  }
-
   /// A class of the whole picture: an object without a place.
   void read_class() {
     with("cls", [&] {
@@ -678,30 +646,20 @@ class SampleReading {
   const WebDataset& dataset_;
   const Sample& sample_;
   const std::string& file_;
-  const NameSet& wanted_;
-  StoredFiles files_;
   ReadLog& log_;
   std::string key_;
   std::map<std::string, std::string> members_;
   Json json_;
   bool is_own_ = false;
   std::optional<StoredPicture> color_;
-  Frame frame_;
 };
 
 StoredCapture WebDataset::read(std::size_t i, const NameSet& wanted) const {
-  StoredCapture stored;
-  stored.capture.index = info_.captures.at(i);
-  for (std::size_t at = first_[i]; at < first_[i + 1]; ++at) {
-    const Sample& sample = samples_[at];
-    stored.split = splits_[sample.shard];
-    SampleReading::Sources sources;
-    auto frame = SampleReading(*this, sample, wanted, stored.log).read(sources);
-    if (!frame) continue;
-    stored.capture.frames.push_back(std::move(*frame));
-    stored.files.push_back(std::move(sources));
-  }
-  return stored;
+  return read_frames(info_.captures.at(i), rows_.of(i),
+                     [&](const Sample& sample, StoredCapture& stored, FrameSources& sources) {
+                       stored.split = splits_[sample.shard];
+                       return SampleReading(*this, sample, wanted, stored.log).read(sources);
+                     });
 }
 
 }  // namespace

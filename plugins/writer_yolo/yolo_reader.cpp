@@ -6,6 +6,8 @@
 #include <set>
 
 #include "diorama/error.h"
+#include "reader_support/capture_rows.h"
+#include "reader_support/frame_reading.h"
 #include "reader_support/label_text.h"
 #include "reader_support/object_masks.h"
 #include "reader_support/picture_list.h"
@@ -282,27 +284,23 @@ class YoloDataset final : public StoredDataset {
 };
 
 /// Makes one frame of one picture and its label lines.
-class YoloPictureReading {
+class YoloPictureReading : private FrameReading {
  public:
   YoloPictureReading(const YoloDataset& dataset, const ListedPicture& picture,
                      const NameSet& wanted, ReadLog& log)
-      : dataset_(dataset),
+      : FrameReading(dataset.folder_, dataset.host_, dataset.info_, picture.capture,
+                     dataset.pictures_.cameras()[picture.camera], wanted, log),
+        dataset_(dataset),
         picture_(picture),
         folder_(dataset.folders_[picture.folder]),
-        labels_(folder_.labels + picture.stem + ".txt"),
-        wanted_(wanted),
-        files_(dataset.folder_, dataset.host_, log, picture.capture,
-               dataset.pictures_.cameras()[picture.camera]) {}
+        labels_(folder_.labels + picture.stem + ".txt") {}
 
   /// Nothing when the picture cannot be read: labels are shares of its size.
-  std::optional<Frame> read(std::map<std::string, std::string, std::less<>>& sources) {
+  std::optional<Frame> read(FrameSources& sources) {
     const std::string file = folder_.pictures + picture_.stem + picture_.ending;
     const auto decoded = files_.picture(file);
     if (!decoded) return std::nullopt;
-    frame_.camera_name = dataset_.pictures_.cameras()[picture_.camera];
-    frame_.camera_path = "/Cameras/" + frame_.camera_name;
-    frame_.camera.width = decoded->width();
-    frame_.camera.height = decoded->height();
+    set_size(*decoded);
     if (wanted_.contains(kColor.name)) {
       frame_.set(kColor, decoded->color());
       sources.emplace(kColor.name, file);
@@ -344,10 +342,7 @@ class YoloPictureReading {
                  "one of the " + std::to_string(dataset_.yaml_.names.size()) + " names");
     if (!check_count(numbers, who)) return;
     check_range(numbers, who);
-    Instance instance;
-    instance.id = std::uint32_t(frame_.instances.size()) + 1;
-    instance.node_path = "/Assets/" + std::to_string(instance.id);
-    instance.labels["class"] = is_known ? name->second : std::to_string(id);
+    Instance instance = next_instance(is_known ? name->second : std::to_string(id));
     if (numbers.size() == 4 || dataset_.task_ == Task::Keypoints) {
       instance.tight_box = box_of(numbers, who);
       if (dataset_.task_ == Task::Keypoints && dataset_.has_cuboid_points_) {
@@ -536,7 +531,7 @@ class YoloPictureReading {
     }
   }
 
-  void set_ids(std::map<std::string, std::string, std::less<>>& sources) {
+  void set_ids(FrameSources& sources) {
     const bool are_all_masks =
         std::ranges::none_of(masks_, [](const CoverageMask& mask) { return mask.bits.empty(); });
     PolygonParts parts(frame_.camera.width, frame_.camera.height);
@@ -560,24 +555,16 @@ class YoloPictureReading {
   const ListedPicture& picture_;
   const PictureFolder& folder_;
   std::string labels_;
-  const NameSet& wanted_;
-  StoredFiles files_;
-  Frame frame_;
   std::vector<CoverageMask> masks_;  ///< Of each instance; without bits for boxes.
 };
 
 StoredCapture YoloDataset::read(std::size_t i, const NameSet& wanted) const {
-  StoredCapture stored;
-  stored.capture.index = info_.captures.at(i);
-  for (const ListedPicture& picture : pictures_.pictures(i)) {
-    stored.split = folders_[picture.folder].split;
-    std::map<std::string, std::string, std::less<>> sources;
-    auto frame = YoloPictureReading(*this, picture, wanted, stored.log).read(sources);
-    if (!frame) continue;
-    stored.capture.frames.push_back(std::move(*frame));
-    stored.files.push_back(std::move(sources));
-  }
-  return stored;
+  return read_frames(
+      info_.captures.at(i), pictures_.pictures(i),
+      [&](const ListedPicture& picture, StoredCapture& stored, FrameSources& sources) {
+        stored.split = folders_[picture.folder].split;
+        return YoloPictureReading(*this, picture, wanted, stored.log).read(sources);
+      });
 }
 
 }  // namespace
