@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "diorama/error.h"
+#include "diorama/image.h"
 #include "loader_assimp/file_space.h"
 #include "loader_assimp/material_translator.h"
 
@@ -20,10 +21,6 @@ Affine root_from(const aiNode& node) {
     result = to_affine(at->mTransformation) * result;
   }
   return result;
-}
-
-float linear_from_srgb(float encoded) {
-  return encoded <= 0.04045f ? encoded / 12.92f : std::pow((encoded + 0.055f) / 1.055f, 2.4f);
 }
 
 // Where bones move the points of a mesh, they take their places at rest.
