@@ -278,8 +278,20 @@ bool Journals::is_published(int entry) const {
   return entry < capture_count_ && published_[std::size_t(entry)];
 }
 
+std::vector<EntryPlace> WorkerIndex::unsettled() const {
+  std::vector<EntryPlace> places = published_since;
+  for (const auto& [entry, place] : committed) places.push_back(place);
+  std::ranges::stable_sort(places, {}, &EntryPlace::offset);
+  return places;
+}
+
 void Journals::set_published(const std::string& worker, int entry, WorkerIndex& index) {
-  for (EntryPlace& place : index.unsettled) place.is_published |= place.entry == entry;
+  const auto [first, last] = index.committed.equal_range(entry);
+  for (auto at = first; at != last; ++at) {
+    at->second.is_published = true;
+    index.published_since.push_back(std::move(at->second));
+  }
+  index.committed.erase(first, last);
   if (voids_.contains({worker, entry})) return;
   if (entry == kBeginEntry) has_begun_ = true;
   if (entry == kFinishEntry) has_finished_ = true;
@@ -320,14 +332,14 @@ void Journals::take(const std::string& worker, WorkerIndex& index, const Line& l
       index.header = line.place;
       break;
     case 'c':
-      index.unsettled.push_back(line.place);
+      index.committed.emplace(line.place.entry, line.place);
       break;
     case 'd':
       set_published(worker, line.entry, index);
       break;
     case 's':
       // What is still on its way to its place is not covered.
-      std::erase_if(index.unsettled, [](const EntryPlace& place) { return place.is_published; });
+      index.published_since.clear();
       break;
     case 'p':
       set_published(line.worker, line.entry, workers_[line.worker]);

@@ -130,8 +130,14 @@ struct WorkerIndex {
   std::uint64_t settled_bytes = 0;  ///< By a worker that came later.
   EntryPlace header;
   int published = 0;  ///< Captures.
-  /// Entries behind the last checkpoint: what a power cut may have taken.
-  std::vector<EntryPlace> unsettled;
+  // Entries behind the last checkpoint: what a power cut may have taken. Kept apart, so that any
+  // line of an index is dealt with at once, however many are open.
+  std::multimap<int, EntryPlace> committed;  ///< By entry.
+  std::vector<EntryPlace> published_since;
+
+  bool has_unsettled() const { return !committed.empty() || !published_since.empty(); }
+  /// In the order in which they were committed.
+  std::vector<EntryPlace> unsettled() const;
 };
 
 /// Reads all workers' journals. Bad ones are Error(Output); torn lines do not count.

@@ -407,7 +407,7 @@ void OutputStore::settle_dead_workers() {
   }
   journals_.refresh();
   for (const auto& [worker, index] : journals_.workers()) {
-    if (!index.unsettled.empty() && index.settled_bytes < index.bytes_read) dead.insert(worker);
+    if (index.has_unsettled() && index.settled_bytes < index.bytes_read) dead.insert(worker);
   }
   for (const std::string& worker : file_system_.list(diorama_folder() / "stage")) {
     if (is_plain_name(worker)) dead.insert(worker);
@@ -430,7 +430,7 @@ void OutputStore::settle(const std::string& worker, const WorkerIndex& index) {
     if (lease.worker == worker) workers_.remove(lease);
   }
   if (index.settled_bytes < index.bytes_read) {
-    for (const EntryPlace& place : index.unsettled) settle_entry(worker, place);
+    for (const EntryPlace& place : index.unsettled()) settle_entry(worker, place);
     checkpoint();
     writer_.settled(worker, index.bytes_read);
   }

@@ -844,6 +844,36 @@ TEST_CASE("Bad journal lines are one message, torn ones do not count", "[store]"
   }
 }
 
+// Minutes, were a line to cost a look at all open ones.
+TEST_CASE("A journal of any length, of any order, is read line by line", "[store]") {
+  const TemporaryFolder folder;
+  constexpr int kEntries = 300'000;
+  const fs::path journal = folder.path() / "out/.diorama/journal";
+  fs::create_directories(journal);
+  const auto entry = [](int i) { return std::to_string(1'000'000 + i); };
+  {
+    std::ofstream index(journal / "w1.index");
+    for (int i = 0; i < kEntries; ++i) {
+      index << journal_line("c " + entry(i) + " " + std::to_string(10 * i) + " 9 " +
+                            std::string(32, '0'));
+    }
+    for (int i = 0; i < kEntries; i += 2) {
+      index << journal_line("d " + entry(i)) << journal_line("s");
+    }
+    index << journal_line("d " + entry(1));
+  }
+  LocalFileSystem local;
+  Journals journals(local, journal, 2 * 1'000'000);
+  journals.refresh();
+  CHECK(journals.published_captures() == kEntries / 2 + 1);
+  const WorkerIndex& index = journals.workers().at("w1");
+  const auto unsettled = index.unsettled();
+  REQUIRE(unsettled.size() == kEntries / 2);
+  CHECK((unsettled[0].entry == 1'000'001 && unsettled[0].is_published));
+  CHECK((unsettled[1].entry == 1'000'003 && !unsettled[1].is_published));
+  CHECK(unsettled.back().entry == 1'000'000 + kEntries - 1);
+}
+
 TEST_CASE("What is appended to a file leaves the memory and comes out whole", "[store]") {
   const TemporaryFolder folder;
   LocalFileSystem local;
