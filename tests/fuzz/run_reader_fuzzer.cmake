@@ -1,12 +1,7 @@
 # cmake -D CLANGXX=... -D SOURCE=... -D BUILD=... -D NAME=pictures -D FUZZER=picture_fuzzer
 #       -D SECONDS=... -P run_reader_fuzzer.cmake
 # Builds one of the fuzzers of readers/ and runs it for a while on the seeds of its name.
-function(run)
-  execute_process(COMMAND ${ARGN} RESULT_VARIABLE result)
-  if(NOT result EQUAL 0)
-    message(FATAL_ERROR "failed: ${ARGN}")
-  endif()
-endfunction()
+include(${CMAKE_CURRENT_LIST_DIR}/run.cmake)
 
 cmake_host_system_information(RESULT processors QUERY NUMBER_OF_LOGICAL_CORES)
 run(${CMAKE_COMMAND} -S ${SOURCE}/tests/fuzz/readers -B ${BUILD} -DCMAKE_CXX_COMPILER=${CLANGXX})

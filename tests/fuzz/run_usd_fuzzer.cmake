@@ -1,11 +1,6 @@
 # cmake -D CLANGXX=... -D SOURCE=... -D BUILD=... -D SECONDS=... -P run_usd_fuzzer.cmake
 # Builds the fuzzer and runs it for a while. Seeds are the small shared files, where they are there.
-function(run)
-  execute_process(COMMAND ${ARGN} RESULT_VARIABLE result)
-  if(NOT result EQUAL 0)
-    message(FATAL_ERROR "failed: ${ARGN}")
-  endif()
-endfunction()
+include(${CMAKE_CURRENT_LIST_DIR}/run.cmake)
 
 cmake_host_system_information(RESULT processors QUERY NUMBER_OF_LOGICAL_CORES)
 run(${CMAKE_COMMAND} -S ${SOURCE}/tests/fuzz/usd -B ${BUILD} -DCMAKE_CXX_COMPILER=${CLANGXX})

@@ -9,15 +9,14 @@
 #include <limits>
 #include <sstream>
 
-#include "framework/datasets/dataset_readers.h"
-#include "framework/lint/encoding_host.h"
-#include "framework/lint/every_format.h"
-#include "framework/lint/lint_dataset.h"
+#include "framework/datasets/opened_dataset.h"
 #include "support/catch.h"
 #include "support/temporary_folder.h"
 #include "writer_hdf5/hdf5_view.h"
 
 using namespace diorama;
+using test::lint;
+using Opened = test::OpenedDataset;
 
 namespace {
 
@@ -37,9 +36,7 @@ bool make(const std::string& kind, const test::TemporaryFolder& folder) {
 }
 
 std::string picture(int width, int height, int channels, const std::vector<std::uint8_t>& samples) {
-  const auto bytes = test::EncodingHost().encode_image({samples.data(), width, height, channels, 8},
-                                                       ImageFormat::Png);
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+  return test::encoded({samples.data(), width, height, channels, 8});
 }
 
 /// Another one for each shade.
@@ -61,32 +58,7 @@ std::string mask(int width, int height, const PixelBox& box) {
 
 std::string depth(int width, int height, std::uint16_t value) {
   const std::vector<std::uint16_t> samples(std::size_t(width) * std::size_t(height), value);
-  const auto bytes =
-      test::EncodingHost().encode_image({samples.data(), width, height, 1, 16}, ImageFormat::Png);
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
-
-/// The dataset as its reader sees it, found by what it looks like; lint must find nothing.
-struct Opened {
-  test::EncodingHost host;
-  DatasetReaders readers = test::every_reader(host);
-  std::unique_ptr<const StoredDataset> dataset;
-
-  Opened(const test::TemporaryFolder& folder, const std::string& type) {
-    REQUIRE(readers.recognise(folder.path("")) == type);
-    dataset = readers.open(folder.path(""), type);
-    const LintReport report = lint_datasets(folder.path(""), readers, host).at(0);
-    INFO(lint_text(report, 20));
-    CHECK(report.findings.empty());
-  }
-  StoredCapture read(std::size_t i) const { return dataset->read(i, dataset->info().holds); }
-  bool holds(std::string_view name) const { return dataset->info().holds.contains(name); }
-};
-
-LintReport lint(const test::TemporaryFolder& folder) {
-  test::EncodingHost host;
-  DatasetReaders readers = test::every_reader(host);
-  return lint_datasets(folder.path(""), readers, host).at(0);
+  return test::encoded({samples.data(), width, height, 1, 16});
 }
 
 bool finds(const LintReport& report, const std::string& check, const std::string& message) {

@@ -3,14 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "framework/datasets/dataset_readers.h"
-#include "framework/lint/encoding_host.h"
-#include "framework/lint/every_format.h"
-#include "framework/lint/lint_dataset.h"
+#include "framework/datasets/opened_dataset.h"
 #include "support/catch.h"
 #include "support/temporary_folder.h"
 
 using namespace diorama;
+using test::lint;
+using Opened = test::OpenedDataset;
 
 namespace {
 
@@ -19,38 +18,11 @@ std::string picture(int width, int height, std::uint8_t shade, ImageFormat forma
   for (int i = 0; i < width * height; ++i) {
     samples.insert(samples.end(), {shade, std::uint8_t(i % 251), std::uint8_t(i / 7 % 251)});
   }
-  const auto bytes =
-      test::EncodingHost().encode_image({samples.data(), width, height, 3, 8}, format);
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+  return test::encoded({samples.data(), width, height, 3, 8}, format);
 }
 
 std::string gray(int width, int height, const std::vector<std::uint8_t>& samples) {
-  const auto bytes =
-      test::EncodingHost().encode_image({samples.data(), width, height, 1, 8}, ImageFormat::Png);
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
-
-/// The dataset as its reader sees it, found by what it looks like; lint must find nothing.
-struct Opened {
-  test::EncodingHost host;
-  DatasetReaders readers = test::every_reader(host);
-  std::unique_ptr<const StoredDataset> dataset;
-
-  Opened(const test::TemporaryFolder& folder, const std::string& type) {
-    REQUIRE(readers.recognise(folder.path("")) == type);
-    dataset = readers.open(folder.path(""), type);
-    const LintReport report = lint_datasets(folder.path(""), readers, host).at(0);
-    INFO(lint_text(report));
-    CHECK(report.findings.empty());
-  }
-  StoredCapture read(std::size_t i) const { return dataset->read(i, dataset->info().holds); }
-  bool holds(std::string_view name) const { return dataset->info().holds.contains(name); }
-};
-
-LintReport lint(const test::TemporaryFolder& folder) {
-  test::EncodingHost host;
-  DatasetReaders readers = test::every_reader(host);
-  return lint_datasets(folder.path(""), readers, host).at(0);
+  return test::encoded({samples.data(), width, height, 1, 8});
 }
 
 bool finds(const LintReport& report, const std::string& check, const std::string& file) {

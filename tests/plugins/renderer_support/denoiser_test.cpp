@@ -35,6 +35,34 @@ Film noisy_corner(double noise) {
   return film;
 }
 
+/// A grey wall of `paths` a pixel; `light(x, path)` is what each path brings.
+template <class Light>
+Film wall(int width, int height, int paths, Light&& light) {
+  Film film(width, height, FilmPixel{});
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      PixelSum sum;
+      for (int i = 0; i < paths; ++i) {
+        PathSample sample;
+        sample.has_surface = true;
+        sample.albedo = Vec3f::Constant(0.5f);
+        sample.normal = Vec3f::UnitZ();
+        sample.position = 0.02f * Vec3f(float(x), float(y), 0.0f);
+        sample.scattered = Vec3f::Constant(light(x, i));
+        sum.add(sample);
+      }
+      film.at(x, y) = sum.mean();
+    }
+  }
+  return film;
+}
+
+double mean(const Image<Vec3f>& image) {
+  double total = 0.0;
+  for (const Vec3f& pixel : image.pixels()) total += double(pixel.x());
+  return total / double(image.pixels().size());
+}
+
 double error(const Image<Vec3f>& image, const Image<Vec3f>& truth) {
   double sum = 0.0;
   for (std::size_t i = 0; i < image.pixels().size(); ++i) {
@@ -62,32 +90,12 @@ TEST_CASE("a picture without noise stays as it is", "[denoiser]") {
 
 TEST_CASE("pictures of few paths keep their light, however skewed its noise", "[denoiser]") {
   test::RenderHost host(2);
-  constexpr int kPaths = 4;
-  Film film(160, 120, FilmPixel{});
   Rng rng(5);
-  for (int y = 0; y < film.height(); ++y) {
-    for (int x = 0; x < film.width(); ++x) {
-      PixelSum sum;
-      for (int i = 0; i < kPaths; ++i) {
-        PathSample sample;
-        sample.has_surface = true;
-        sample.albedo = Vec3f::Constant(0.5f);
-        sample.normal = Vec3f::UnitZ();
-        sample.position = 0.02f * Vec3f(float(x), float(y), 0.0f);
-        // Mostly in shadow, seldom bright: the mean is 1.
-        const double u = rng.uniform(0.0, 1.0);
-        sample.scattered =
-            Vec3f::Constant(u < 0.6 ? 0.0f : float(-std::log((1.0 - u) / 0.4)) / 0.4f);
-        sum.add(sample);
-      }
-      film.at(x, y) = sum.mean();
-    }
-  }
-  const auto mean = [](const Image<Vec3f>& image) {
-    double total = 0.0;
-    for (const Vec3f& pixel : image.pixels()) total += double(pixel.x());
-    return total / double(image.pixels().size());
-  };
+  Film film = wall(160, 120, 4, [&](int, int) {
+    // Mostly in shadow, seldom bright: the mean is 1.
+    const double u = rng.uniform(0.0, 1.0);
+    return u < 0.6 ? 0.0f : float(-std::log((1.0 - u) / 0.4)) / 0.4f;
+  });
   const double before = mean(undenoised(film));
   CHECK(before == Approx(1.0).epsilon(0.02));
   CHECK(mean(denoised(std::move(film), {Vec3f(1.6f, 1.2f, 3.0f)}, Isa::Sse2, host)) ==
@@ -108,34 +116,15 @@ TEST_CASE("one chance find among quiet neighbours is tamed", "[denoiser]") {
 TEST_CASE("single paths of extreme light make no dots, and their light is kept", "[denoiser]") {
   // A wall lit 1, one path of two hundred a thousand times as bright: more than one to a
   // neighbourhood, so that they vouch for each other.
-  constexpr int kPaths = 16;
-  Film film(160, 112, FilmPixel{});
   Rng rng(9);
-  for (int y = 0; y < film.height(); ++y) {
-    for (int x = 0; x < film.width(); ++x) {
-      PixelSum sum;
-      for (int i = 0; i < kPaths; ++i) {
-        PathSample sample;
-        sample.has_surface = true;
-        sample.albedo = Vec3f::Constant(0.5f);
-        sample.normal = Vec3f::UnitZ();
-        sample.position = 0.02f * Vec3f(float(x), float(y), 0.0f);
-        const bool is_extreme = rng.uniform() < 0.0002;
-        sample.scattered = Vec3f::Constant(is_extreme ? 1000.0f : float(rng.uniform(0.5, 1.5)));
-        sum.add(sample);
-      }
-      film.at(x, y) = sum.mean();
-    }
-  }
+  Film film = wall(160, 112, 16, [&](int, int) {
+    const bool is_extreme = rng.uniform() < 0.0002;
+    return is_extreme ? 1000.0f : float(rng.uniform(0.5, 1.5));
+  });
   const auto brightest = [](const Image<Vec3f>& image) {
     float most = 0.0f;
     for (const Vec3f& pixel : image.pixels()) most = std::max(most, pixel.x());
     return most;
-  };
-  const auto mean = [](const Image<Vec3f>& image) {
-    double total = 0.0;
-    for (const Vec3f& pixel : image.pixels()) total += double(pixel.x());
-    return total / double(image.pixels().size());
   };
   const double before = mean(undenoised(film));
   CHECK(brightest(undenoised(film)) > 50.0f);
@@ -149,25 +138,10 @@ TEST_CASE("single paths of extreme light make no dots, and their light is kept",
 
 TEST_CASE("the limit of a path lets light pass that many paths bring", "[denoiser]") {
   // A spot ten times as bright as the limit, a pixel's paths of which half meet it at the edge.
-  constexpr int kPaths = 8;
-  Film film(64, 48, FilmPixel{});
-  double expected = 0.0;
-  for (int y = 0; y < film.height(); ++y) {
-    for (int x = 0; x < film.width(); ++x) {
-      PixelSum sum;
-      for (int i = 0; i < kPaths; ++i) {
-        PathSample sample;
-        sample.has_surface = true;
-        sample.albedo = Vec3f::Constant(0.5f);
-        sample.normal = Vec3f::UnitZ();
-        sample.position = 0.02f * Vec3f(float(x), float(y), 0.0f);
-        sample.scattered = Vec3f::Constant(x < 30 || (x == 30 && i % 2 == 0) ? 40.0f : 0.1f);
-        sum.add(sample);
-      }
-      film.at(x, y) = sum.mean();
-      if (x == 20) expected = double(film.at(x, y).scattered.x());
-    }
-  }
+  Film film = wall(64, 48, 8, [](int x, int path) {
+    return x < 30 || (x == 30 && path % 2 == 0) ? 40.0f : 0.1f;
+  });
+  const double expected = double(film.at(20, 47).scattered.x());
   test::RenderHost host(1);
   DenoiseSettings settings{Vec3f(0.6f, 0.5f, 3.0f)};
   settings.brightest_path = 4.0f;
