@@ -22,9 +22,7 @@ class FrameReading {
                int capture, const std::string& camera, const NameSet& wanted, ReadLog& log);
 
   /// Asked for, and there.
-  bool wants(std::string_view name) const {
-    return wanted_.contains(name) && held_.contains(name);
-  }
+  bool wants(std::string_view name) const { return wanted_.contains(name) && held_.contains(name); }
   void set_size(const StoredPicture& picture);
   /// An object of which no file says the node: it is called by its number. Not in the frame yet.
   Instance next_instance(const std::string& label) const;

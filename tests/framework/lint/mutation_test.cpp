@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <functional>
 #include <iostream>
@@ -489,7 +490,8 @@ TEST_CASE("lint finds seeded faults of every kind", "[lint][mutation]") {
     REQUIRE_FALSE(is_found(dataset));
     const Score score = score_of(format, dataset);
     INFO(format.name << ": " << score.found << " of " << score.all << "\n" << score.missed);
-    std::cout << format.name << ": " << score.found << " of " << score.all << "\n";
+    std::cout << format.name << ": " << score.found << " of " << score.all << "\n"
+              << (std::getenv("DIORAMA_MUTANTS") ? score.missed : "");
     if (const auto floor = kFloors.find(format.name); floor != kFloors.end()) {
       CHECK(score.found >= floor->second);
       continue;
