@@ -492,6 +492,38 @@ double step_of(const StoredInfo& info, std::string_view held) {
 
 namespace {
 
+/// One object has one name: what cameras call otherwise is not in the same place, of the same size
+/// and kind, when neither camera sees both.
+void check_names(StoredCapture& stored, double step) {
+  const auto is_near = [&](const auto& a, const auto& b) {
+    return ((a - b).array().abs() <= step * (1.0 + b.array().abs().maxCoeff())).all();
+  };
+  const auto is_twin = [&](const Instance& a, const Instance& b) {
+    return a.labels == b.labels && !a.bounds_node.is_empty() && !b.bounds_node.is_empty() &&
+           is_near(a.world_from_node.matrix(), b.world_from_node.matrix()) &&
+           is_near(a.bounds_node.min, b.bounds_node.min) &&
+           is_near(a.bounds_node.max, b.bounds_node.max);
+  };
+  const auto& frames = stored.capture.frames;
+  std::vector<std::set<std::string_view>> paths(frames.size());
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    for (const Instance& instance : frames[i].instances) paths[i].insert(instance.node_path);
+  }
+  for (std::size_t i = 1; i < frames.size(); ++i) {
+    for (const Instance& instance : frames[i].instances) {
+      if (paths[i - 1].contains(instance.node_path)) continue;
+      const auto twin = std::ranges::find_if(frames[i - 1].instances, [&](const Instance& other) {
+        return !paths[i].contains(other.node_path) && is_twin(instance, other);
+      });
+      const bool is_alone = twin == frames[i - 1].instances.end();
+      stored.log.check(is_alone,
+                       {kCameras, file_of(stored, i, kHoldsNodePaths), stored.capture.index,
+                        frames[i].camera_name, instance.node_path, "is another name",
+                        is_alone ? "" : twin->node_path + ", by another camera"});
+    }
+  }
+}
+
 /// An object is in one place and of one size and kind, whichever camera sees it.
 void check_cameras(const StoredInfo& info, StoredCapture& stored) {
   if (!info.holds.contains(kHoldsNodePaths) || !info.holds.contains(kHoldsCameraPose)) return;
@@ -529,6 +561,7 @@ void check_cameras(const StoredInfo& info, StoredCapture& stored) {
       }
     }
   }
+  if (has_poses && has_bounds) check_names(stored, step);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 #include <set>
+#include <utility>
 
 #include "reader_support/camera_json.h"
 
@@ -294,10 +295,10 @@ std::optional<StoredArray> BasicFrameReading::pixel_array(const std::string& fil
 void BasicFrameReading::read_distances() {
   for (const Channel<float>& channel : {kDistanceToCamera, kDistanceToImagePlane, kSensorDepth}) {
     const std::string picture = path(std::string(channel.name) + ".png");
+    std::optional<StoredPicture> drawn;
     if (!picture.empty() && wants(channel.name)) {
-      if (const auto decoded = files_.picture(picture)) {
-        note_size(decoded->width(), decoded->height(), picture);
-      }
+      drawn = files_.picture(picture);
+      if (drawn) note_size(drawn->width(), drawn->height(), picture);
     }
     const std::string file = path(std::string(channel.name) + ".npy");
     if (file.empty() || !wants(channel.name)) continue;
@@ -305,9 +306,41 @@ void BasicFrameReading::read_distances() {
     if (!array) continue;
     Image<float> image(int(array->shape[1]), int(array->shape[0]), 0.0f);
     std::memcpy(image.pixels().data(), array->data.data(), array->data.size());
+    if (drawn && drawn->width() == image.width() && drawn->height() == image.height()) {
+      check_drawn(*drawn, image, picture);
+    }
     frame_.set(channel, std::move(image));
     sources_.emplace(channel.name, file);
   }
+}
+
+/// However distances are drawn: with them, shades go one way, and what was not met has one.
+void BasicFrameReading::check_drawn(const StoredPicture& drawn, const Image<float>& distances,
+                                    const std::string& file) {
+  std::vector<std::pair<float, std::int64_t>> shades;
+  std::set<std::uint32_t> unmet;
+  for (int y = 0; y < distances.height(); ++y) {
+    for (int x = 0; x < distances.width(); ++x) {
+      const float distance = distances.at(x, y);
+      if (std::isfinite(distance) && distance > 0.0f) {
+        shades.emplace_back(distance, std::int64_t(drawn.at(x, y)));
+      } else {
+        unmet.insert(drawn.at(x, y));
+      }
+    }
+  }
+  const auto falls = [&] {
+    std::ranges::sort(shades);
+    const auto is_fall = [](const auto& a, const auto& b) { return b.second < a.second; };
+    return std::ranges::adjacent_find(shades, is_fall) != shades.end();
+  };
+  bool is_one_way = !falls();
+  if (!is_one_way) {
+    for (auto& [distance, shade] : shades) shade = -shade;
+    is_one_way = !falls();
+  }
+  files_.check(is_one_way && unmet.size() <= 1, kCounts, file, "",
+               "its shades do not follow the distances beside it");
 }
 
 void BasicFrameReading::read_normals() {
@@ -442,7 +475,14 @@ void BasicFrameReading::read_instances() {
       continue;
     }
     const auto path_entry = instances_->entries.find(id->second);
-    if (path_entry == instances_->entries.end() || !is_object_path(path_entry->second)) continue;
+    if (path_entry == instances_->entries.end()) continue;
+    if (!is_object_path(path_entry->second)) {
+      const bool has_class = entry.is_object() && entry.contains("class");
+      files_.check(
+          !has_class || !path_entry->second.is_string() || entry.at("class") == path_entry->second,
+          kIds, semantics_file, path_entry->second.dump(), "is called " + entry.dump());
+      continue;
+    }
     if (entry.is_object())
       labels_of_path_[path_entry->second.get<std::string>()] = labels_of(entry);
   }
@@ -651,6 +691,8 @@ void BasicFrameReading::read_3d() {
       Instance& object = instance(rows->paths[row]);
       object.bounds_node.min = {number("x_min"), number("y_min"), number("z_min")};
       object.bounds_node.max = {number("x_max"), number("y_max"), number("z_max")};
+      files_.check(!object.bounds_node.is_empty(), kReadable, file, object.node_path,
+                   "its 3-D box ends before it begins");
       for (std::size_t i = 0; i < 16; ++i) {
         // For row vectors in the file.
         object.world_from_node.matrix()(Eigen::Index(i % 4), Eigen::Index(i / 4)) =

@@ -47,6 +47,8 @@ class BasicFrameReading {
   void check_camera(const Json& json, const Mat4& clip_from_camera, const std::string& file);
   void read_color();
   void read_distances();
+  void check_drawn(const StoredPicture& drawn, const Image<float>& distances,
+                   const std::string& file);
   void read_normals();
   void read_motion();
   std::optional<StoredArray> pixel_array(const std::string& file, std::size_t values);

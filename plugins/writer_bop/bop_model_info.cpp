@@ -2,6 +2,7 @@
 #include "writer_bop/bop_model_info.h"
 
 #include <charconv>
+#include <cmath>
 #include <cstring>
 #include <fstream>
 #include <stdexcept>
@@ -82,7 +83,9 @@ BopModelBoxes read_bop_models(StoredFiles& files, bool is_own) {
   const auto json = files.json(page);
   if (!json) return boxes;
   files.reading(page, [&] {
-    for (const auto& [key, model] : json->items()) {
+    for (const auto& item : json->items()) {
+      const std::string& key = item.key();
+      const Json& model = item.value();
       int id = 0;
       if (std::from_chars(key.data(), key.data() + key.size(), id).ec != std::errc()) {
         throw std::runtime_error("'" + key + "' is no obj_id");
@@ -102,7 +105,13 @@ BopModelBoxes read_bop_models(StoredFiles& files, bool is_own) {
                   kCounts, page, who, "its diameter is " + std::to_string(diameter),
                   "one that goes with its size");
       const std::string file = bop_model_file(id);
-      if (!is_own || !files.has(file)) continue;
+      if (!is_own) continue;
+      if (!files.has(file)) {
+        // A box is all that is known of such an object.
+        files.check(std::abs(diameter - size.norm()) <= 1e-5 * size.norm(), kCounts, page, who,
+                    "its diameter is " + std::to_string(diameter), "the diagonal of its size");
+        continue;
+      }
       files.reading(file, [&] {
         const Aabb extent = ply_extent(files.root() / file);
         const double near = 1e-5 * size.norm();

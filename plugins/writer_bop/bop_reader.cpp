@@ -61,8 +61,11 @@ bool is_rotation(const Mat3& matrix, double slack) {
          matrix.determinant() > 0.0;
 }
 
-/// Objects of the scenes to test on, by scene, image and object.
-using TargetCounts = std::map<std::array<int, 3>, int>;
+/// Objects of the scenes to test on, by scene, image and object; and the images.
+struct Targets {
+  std::map<std::array<int, 3>, int> objects;
+  std::multiset<std::pair<int, int>> images;
+};
 
 class BopDataset final : public StoredDataset {
  public:
@@ -75,10 +78,10 @@ class BopDataset final : public StoredDataset {
     StoredFiles files(folder_, host_, log_);
     models_ = read_bop_models(files, page_.has_value());
     read_names(files);
-    TargetCounts targets;
+    Targets targets;
     for (std::uint32_t i = 0; i < scenes_.size(); ++i) read_scene(i, files, targets);
-    if (page_) check_own_files(files, targets);
     group(files);
+    if (page_) check_own_files(files, targets);
     describe();
   }
 
@@ -104,7 +107,7 @@ class BopDataset final : public StoredDataset {
     return std::uint32_t(found - names.begin());
   }
 
-  void read_scene(std::uint32_t place, StoredFiles& files, TargetCounts& targets) {
+  void read_scene(std::uint32_t place, StoredFiles& files, Targets& targets) {
     const BopScene& scene = scenes_[place];
     log_.files += std::size_t(scene.has_cameras) + std::size_t(scene.has_poses) +
                   std::size_t(scene.has_infos);
@@ -136,10 +139,11 @@ class BopDataset final : public StoredDataset {
     for (const auto& [image, ids] : objects) {
       const auto& shares = visible[image];
       for (std::size_t i = 0; i < std::min(ids.size(), shares.size()); ++i) {
-        if (shares[i] >= kLeastVisibleTarget) ++targets[{scene.number, image, ids[i]}];
+        if (shares[i] >= kLeastVisibleTarget) ++targets.objects[{scene.number, image, ids[i]}];
       }
     }
     for (BopImage& image : images) {
+      if (has_targets) targets.images.emplace(scene.number, image.image);
       image.scene = place;
       image.camera = *camera;
       images_.push_back(image);
@@ -194,26 +198,66 @@ class BopDataset final : public StoredDataset {
     });
   }
 
-  void check_own_files(StoredFiles& files, const TargetCounts& expected) {
-    files.json("camera.json");
-    for (const std::string& camera : page_->cameras) {
-      if (page_->cameras.size() > 1) files.json("camera_" + camera + ".json");
+  void check_own_files(StoredFiles& files, const Targets& expected) {
+    check_camera_file(files, "camera.json", std::nullopt);
+    for (std::uint32_t i = 0; i < page_->cameras.size() && page_->cameras.size() > 1; ++i) {
+      check_camera_file(files, "camera_" + page_->cameras[i] + ".json", i);
     }
     const std::string file = "test_targets_bop19.json";
     if (const auto targets = files.json(file)) {
       files.reading(file, [&] {
-        TargetCounts found;
+        std::map<std::array<int, 3>, int> found;
         for (const Json& target : *targets) {
           found[{target.at("scene_id").get<int>(), target.at("im_id").get<int>(),
                  target.at("obj_id").get<int>()}] += target.at("inst_count").get<int>();
         }
         files.check(
-            found == expected, kCounts, file, "",
+            found == expected.objects, kCounts, file, "",
             "its targets are not the objects of test/*/scene_gt.json that are at least 10 % "
             "visible");
       });
     }
-    files.json("test_targets_bop24.json");
+    const std::string pictures = "test_targets_bop24.json";
+    if (const auto targets = files.json(pictures)) {
+      files.reading(pictures, [&] {
+        std::multiset<std::pair<int, int>> found;
+        for (const Json& target : *targets) {
+          found.emplace(target.at("scene_id").get<int>(), target.at("im_id").get<int>());
+        }
+        files.check(found == expected.images, kCounts, pictures, "",
+                    "its targets are not the images of test/*/scene_gt.json");
+      });
+    }
+  }
+
+  /// The simulated camera is that of its first image; without a number: of the first camera.
+  void check_camera_file(StoredFiles& files, const std::string& file,
+                         std::optional<std::uint32_t> camera) {
+    const auto json = files.json(file);
+    if (!json) return;
+    const auto& images = rows_.all();
+    const std::uint32_t first =
+        images.empty() ? 0 : std::ranges::min_element(images, {}, &BopImage::camera)->camera;
+    const auto image = std::ranges::find(images, camera.value_or(first), &BopImage::camera);
+    if (image == images.end()) return;
+    const std::string table = scenes_[image->scene].table("scene_camera");
+    files.reading(file, [&] {
+      const Json own = entry(table, image->camera_entry, false);
+      const auto number = [&](const char* name) { return json->at(name).get<double>(); };
+      const Json& k = own.at("cam_K");
+      const std::array expected{k.at(0).get<double>(), k.at(4).get<double>(), k.at(2).get<double>(),
+                                k.at(5).get<double>(), own.at("depth_scale").get<double>()};
+      const std::array found{number("fx"), number("fy"), number("cx"), number("cy"),
+                             number("depth_scale")};
+      files.check(found == expected, kCounts, file, "", "is another camera than that of " + table,
+                  "image " + std::to_string(image->image));
+      const std::string name = picture_file(*image);
+      if (name.empty()) return;
+      const auto picture = files.picture(name);
+      files.check(!picture || (json->at("width") == picture->width() &&
+                               json->at("height") == picture->height()),
+                  kCounts, file, "", "has another size than " + name);
+    });
   }
 
   /// Our own image ids are captures; else each image of a scene is one, all its cameras together.
@@ -414,6 +458,9 @@ class BopImageReading : private FrameReading {
       camera.cx = k.at(2).get<double>();
       camera.cy = k.at(5).get<double>();
       require_usable(camera);
+      const bool is_upper = k.at(3) == 0.0 && k.at(6) == 0.0 && k.at(7) == 0.0 && k.at(8) == 1.0;
+      files_.check(is_upper && (!is_own_ || k.at(1) == 0.0), kPose, table, who,
+                   "its cam_K is no matrix of a camera");
       read_lens_entry(json, camera);
       sources.emplace(kHoldsCamera, table);
       if (json.contains("cam_R_w2c")) {
@@ -506,6 +553,7 @@ class BopImageReading : private FrameReading {
     Aabb box;
     if (pose.contains("bounds_min")) {
       box = {vector_of_json(pose.at("bounds_min")), vector_of_json(pose.at("bounds_max"))};
+      files_.check(!box.is_empty(), kCounts, table, who, "its bounds end before they begin");
       if (model != dataset_.models_.end()) {
         const double slack = 1e-5 * model->second.size().norm();
         files_.check(((box.min - model->second.min).array() >= -slack).all() &&

@@ -13,6 +13,7 @@
 #include "reader_support/listed_boxes.h"
 #include "reader_support/object_masks.h"
 #include "writer_coco/coco_tables.h"
+#include "writer_support/cuboid.h"
 
 namespace diorama {
 namespace {
@@ -23,6 +24,8 @@ constexpr const char* kFormat = "COCO";
 constexpr const char* kArea = "area = count";
 constexpr const char* kPanoptic = "panoptic segments agree with annotations";
 constexpr const char* kKeypoints = "keypoints project onto their pixels";
+/// Pixels that the middle of a box may lie beside the line of two corners.
+constexpr double kLineSlack = 0.05;
 constexpr const char* kReproject = "pose and camera reproject onto the mask";
 
 bool is_whole(const Json& bbox) {
@@ -293,10 +296,12 @@ class CocoImageReading : private FrameReading {
   CoverageMask read_mask(const Json& json, const std::string& who) {
     const Json& segmentation = json.at("segmentation");
     const Camera& camera = frame_.camera;
-    if (segmentation.is_array()) {
-      return mask_of_polygons(polygons_of(segmentation), camera.width, camera.height);
-    }
     CoverageMask mask;
+    if (segmentation.is_array()) {
+      mask = mask_of_polygons(polygons_of(segmentation), camera.width, camera.height);
+      check_polygon_area(json, who, mask);
+      return mask;
+    }
     try {
       mask = mask_of_run_lengths(segmentation, camera.width, camera.height);
     } catch (const std::exception& error) {
@@ -310,6 +315,17 @@ class CocoImageReading : private FrameReading {
                    "its mask has " + std::to_string(count) + " pixels");
     }
     return mask;
+  }
+
+  /// Of pixels, or of the polygon, which cuts pixels of the outline.
+  void check_polygon_area(const Json& json, const std::string& who, const CoverageMask& mask) {
+    if (!dataset_.page_ || !json.contains("area")) return;
+    const double area = json.at("area").get<double>();
+    const auto count = double(pixel_count(mask));
+    const double outline = 2.0 * (mask.box.width() + mask.box.height());
+    files_.check(std::abs(area - count) <= std::min(outline, 0.2 * count + 2.0), kArea, part_.file,
+                 who, "its area is " + json.at("area").dump(),
+                 "its polygons have about " + std::to_string(pixel_count(mask)) + " pixels");
   }
 
   void read_amodal(const Json& json, const std::string& who, const CoverageMask& mask,
@@ -373,6 +389,28 @@ class CocoImageReading : private FrameReading {
                    std::to_string(count) + " keypoints are in the image");
     }
     if (category.has_cuboid_keypoints && count == 9) check_surrounded(json, who, extent);
+    if (category.has_cuboid_keypoints) check_diagonals(numbers, who);
+  }
+
+  /// A pinhole keeps lines: opposite corners of a box and its middle lie on one.
+  void check_diagonals(const std::vector<double>& numbers, const std::string& who) {
+    const bool is_pinhole =
+        dataset_.tables_.has_cameras && frame_.camera.lens == LensModel::Pinhole;
+    if (!is_pinhole || numbers.size() != 3 * kCuboidKeypoints.size()) return;
+    const auto point = [&](std::size_t i) { return Vec2(numbers[3 * i], numbers[3 * i + 1]); };
+    const auto in_sight = [&](std::size_t i) { return numbers[3 * i + 2] > 0.0; };
+    // The middle comes first; behind it, opposite corners are as far from either end.
+    constexpr std::size_t kMiddle = 0;
+    for (std::size_t i = 1; 2 * i < kCuboidKeypoints.size(); ++i) {
+      const std::size_t other = kCuboidKeypoints.size() - i;
+      if (!in_sight(i) || !in_sight(other) || !in_sight(kMiddle)) continue;
+      const Vec2 along = point(other) - point(i);
+      const Vec2 off = point(kMiddle) - point(i);
+      const double aside = std::abs(along.x() * off.y() - along.y() * off.x());
+      files_.check(aside <= kLineSlack * (along.norm() + off.norm()), kKeypoints, part_.file, who,
+                   "the middle of its box is not between corners " + std::to_string(i) + " and " +
+                       std::to_string(other));
+    }
   }
 
   /// The corners of a 3-D box surround the object; leaves a tenth for what a lens bends.

@@ -21,6 +21,10 @@ double finite(double value) {
 
 template <int kRows>
 Eigen::Matrix<double, kRows, kRows> rows_of(const Json& rows) {
+  const auto is_full = [](const Json& list) { return list.size() == std::size_t(kRows); };
+  if (!is_full(rows) || !std::ranges::all_of(rows, is_full)) {
+    throw std::runtime_error("a matrix has not " + std::to_string(kRows) + " rows of as many");
+  }
   Eigen::Matrix<double, kRows, kRows> matrix;
   for (int i = 0; i < kRows * kRows; ++i) {
     const Json& value = rows.at(std::size_t(i / kRows)).at(std::size_t(i % kRows));
@@ -61,6 +65,15 @@ std::vector<Vec2> pixels_of(const Json& list, std::size_t count) {
                              std::to_string(count));
   }
   return pixels;
+}
+
+StoredOptics optics_of(const Json& data) {
+  const auto pair = [&](const char* name) {
+    const Json& list = data.at(name);
+    return Vec2(finite(list.at(0).get<double>()), finite(list.at(1).get<double>()));
+  };
+  return {pair("aperture"), pair("aperture_offset"), finite(data.at("focal_length").get<double>()),
+          finite(data.at("meters_per_scene_unit").get<double>())};
 }
 
 StoredPose pose_of(const Json& json, StoredPoseFile& file) {
@@ -181,12 +194,14 @@ StoredPoseFile parse_pose_file(const std::string& text, int width, int height) {
   file.projection = camera;
   if (data.contains("camera_projection_matrix") && camera.width > 0) {
     const Mat4 p = rows_of<4>(data.at("camera_projection_matrix"));
+    file.clip_from_camera = p.transpose();
     file.projection.fx = 0.5 * p(0, 0) * camera.width;
     file.projection.fy = 0.5 * p(1, 1) * camera.height;
     file.projection.cx = 0.5 * (1.0 - p(2, 0)) * camera.width;
     file.projection.cy = 0.5 * (1.0 + p(2, 1)) * camera.height;
   }
   file.view = rows_of<4>(data.at("camera_view_matrix"));
+  if (data.contains("aperture")) file.optics = optics_of(data);
   for (const Json& name : json.at("keypoint_order")) {
     if (file.sides.size() >= kKeypointCount) throw std::runtime_error("names too many keypoints");
     file.sides.push_back(side_of(name.get<std::string>()));

@@ -31,13 +31,23 @@ struct StoredPose {
   Mat3 camera_matrix = Mat3::Identity();
 };
 
+/// Numbers beside the intrinsics that say the same, in millimetres.
+struct StoredOptics {
+  Vec2 aperture;
+  Vec2 offset;
+  double focal_length = 0.0;
+  double metres_per_unit = 1.0;
+};
+
 /// A file.
 struct StoredPoseFile {
   PoseLayout layout = PoseLayout::Full;
   Camera camera;      ///< Width 0 where the file does not say one.
   Camera projection;  ///< By the projection matrix: what the reference's own pixels follow.
-  Mat4 view = Mat4::Identity();  ///< World to camera.
-  std::vector<Vec3> sides;       ///< Of the keypoints: -1, 0 or 1 along each axis.
+  std::optional<Mat4> clip_from_camera;  ///< Of column vectors, where the size is known.
+  std::optional<StoredOptics> optics;    ///< Full layout only.
+  Mat4 view = Mat4::Identity();          ///< World to camera.
+  std::vector<Vec3> sides;               ///< Of the keypoints: -1, 0 or 1 along each axis.
   std::vector<StoredPose> objects;
 };
 

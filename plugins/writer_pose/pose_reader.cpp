@@ -224,6 +224,7 @@ class PoseDataset final : public StoredDataset {
       }
     }
     is_swapped_ = swapped > right;
+    is_right_ = right > swapped;
     checks_pixels_ = !is_swapped_ || pinhole > 0;
     if (is_swapped_) info_.steps[std::string(kHoldsCamera)] = 0.02;
     if (!has_layout_ || layout_ == PoseLayout::Dope) return;
@@ -290,10 +291,18 @@ class PoseDataset final : public StoredDataset {
   bool has_layout_ = false;
   PoseLayout layout_ = PoseLayout::Full;
   bool is_swapped_ = false;  ///< Camera-frame poses are the reference's.
+  bool is_right_ = false;    ///< They are known to be none of those.
   bool checks_pixels_ = true;
   StoredInfo info_;
   ReadLog log_;
 };
+
+/// Where cameras of one capture see an object's origin, in the world.
+struct SeenLocation {
+  Vec3 place;
+  std::string label;
+};
+using SeenLocations = std::map<std::string, SeenLocation>;
 
 /// Makes one frame of one file and its picture.
 class PoseFrameReading : private FrameReading {
@@ -326,6 +335,35 @@ class PoseFrameReading : private FrameReading {
       sources.emplace(held, table_);
     }
     return std::move(frame_);
+  }
+
+  /// With the other cameras of the capture.
+  void compare(SeenLocations& known) {
+    const auto near = [&](const Vec3& a, const Vec3& b) {
+      return (a - b).norm() <= 1e-3 * (1.0 + std::max(a.norm(), b.norm()));
+    };
+    SeenLocations own;
+    for (const StoredPose& object : file_.objects) {
+      own.try_emplace(object.path,
+                      SeenLocation{world_from_camera_ * object.location, object.label});
+    }
+    for (const auto& each : own) {
+      const std::string& path = each.first;
+      const SeenLocation& seen = each.second;
+      const auto same = known.find(path);
+      if (same != known.end()) {
+        files_.check(near(same->second.place, seen.place), kPose, table_, path,
+                     "its location is another one than by other cameras");
+        continue;
+      }
+      const auto twin = std::ranges::find_if(known, [&](const auto& other) {
+        return !own.contains(other.first) && other.second.label == seen.label &&
+               near(other.second.place, seen.place);
+      });
+      files_.check(twin == known.end(), kPose, table_, path,
+                   "is where other cameras see " + (twin == known.end() ? "" : twin->first));
+    }
+    known.merge(own);
   }
 
  private:
@@ -392,10 +430,53 @@ class PoseFrameReading : private FrameReading {
     files_.check(
         (turn * turn.transpose() - Mat3::Identity()).norm() < 1e-3 && turn.determinant() > 0.0,
         kPose, table_, "", "its view matrix is no rotation and shift");
+    files_.check(file_.view.col(3) == Eigen::Vector4d(0.0, 0.0, 0.0, 1.0), kPose, table_, "",
+                 "the last column of its view matrix is not 0, 0, 0, 1");
+    check_projection();
     const Mat3 rotation = Transform::from_affine(camera_from_world).rotation.toRotationMatrix();
     frame_.world_from_camera.linear() = rotation.transpose();
     frame_.world_from_camera.translation() =
         -(rotation.transpose() * camera_from_world.translation());
+    world_from_camera_ = frame_.world_from_camera;
+  }
+
+  /// What the camera says of itself in several ways. The reference has errors of its own in
+  /// intrinsics, so that these are compared where poses follow no such rules.
+  void check_projection() {
+    const auto check = [&](bool holds, const char* found, const char* expected = "") {
+      files_.check(holds, kProject, table_, "", found, expected);
+    };
+    if (file_.optics) {
+      check(file_.optics->metres_per_unit > 0.0, "meters_per_scene_unit is not above 0");
+    }
+    if (!file_.clip_from_camera) return;
+    const Mat4& clip = *file_.clip_from_camera;
+    Mat4 other = clip;
+    for (const auto& [row, column] : {std::pair(0, 0), {0, 2}, {1, 1}, {1, 2}, {2, 2}, {2, 3}}) {
+      other(row, column) = 0.0;
+    }
+    other(3, 2) += 1.0;
+    check(other.isZero() && clip(2, 2) >= 0.0 && clip(2, 2) < 1.0 && clip(2, 3) > 0.0,
+          "its projection matrix is none of a camera");
+    if (!dataset_.is_right_) return;
+    const Vec2 size(frame_.camera.width, frame_.camera.height);
+    const Camera& camera = file_.camera;
+    const Camera& by_clip = file_.projection;
+    const Eigen::Vector4d said(camera.fx, camera.fy, camera.cx, camera.cy);
+    const Eigen::Vector4d projected(by_clip.fx, by_clip.fy, by_clip.cx, by_clip.cy);
+    check((said - projected).cwiseAbs().maxCoeff() <= 1e-5 * size.maxCoeff(),
+          "its intrinsics are not those of its projection matrix");
+    if (!file_.optics) return;
+    const StoredOptics& optics = *file_.optics;
+    const double per_pixel = optics.aperture.x() / size.x();
+    const double slack = 1e-5 * size.maxCoeff() * std::abs(per_pixel);
+    check(optics.aperture.x() > 0.0 &&
+              std::abs(optics.aperture.y() - per_pixel * size.y()) <= slack &&
+              std::abs(optics.focal_length - per_pixel * camera.fx) <= slack,
+          "its aperture and focal length are not those of its intrinsics");
+    const Vec2 offset = per_pixel * Vec2(0.5 * size.x() - camera.cx, camera.cy - 0.5 * size.y());
+    check((optics.offset - offset).cwiseAbs().maxCoeff() <= slack,
+          "its aperture_offset is not that of its intrinsics");
   }
 
   void add_object(const StoredPose& object) {
@@ -433,7 +514,13 @@ class PoseFrameReading : private FrameReading {
       }
       return;
     }
-    if (object.camera_points.empty() || !object.size) return;
+    if (object.camera_points.empty() || !object.size) {
+      Affine camera_from_node = Affine::Identity();
+      camera_from_node.linear() = object.rotation.toRotationMatrix();
+      camera_from_node.translation() = object.location;
+      instance.world_from_node = frame_.world_from_camera * camera_from_node;
+      return;
+    }
     Affine camera_from_box = Affine::Identity();
     camera_from_box.linear() = object.rotation.toRotationMatrix();
     if (dataset_.is_swapped_) camera_from_box.linear() = turn_of_keypoints(object);
@@ -540,7 +627,8 @@ class PoseFrameReading : private FrameReading {
   }
 
   static bool is_turned_like(const Quat& a, const Quat& b) {
-    return std::abs(a.norm() - 1.0) < 1e-4 && std::abs(std::abs(a.dot(b)) - 1.0) < 1e-5;
+    const double off = std::min((a.coeffs() - b.coeffs()).norm(), (a.coeffs() + b.coeffs()).norm());
+    return std::abs(a.norm() - 1.0) < 1e-4 && off < 1e-3;
   }
 
   void check_camera_pose(const StoredPose& object) {
@@ -603,14 +691,19 @@ class PoseFrameReading : private FrameReading {
   const PoseFrame& of_;
   std::string table_;
   StoredPoseFile file_;
+  Affine world_from_camera_ = Affine::Identity();  ///< The frame goes to the caller.
   bool has_size_ = false;
 };
 
 StoredCapture PoseDataset::read(std::size_t i, const NameSet& wanted) const {
   const auto frames = std::span(frames_).subspan(first_.at(i), first_.at(i + 1) - first_[i]);
+  SeenLocations locations;
   return read_frames(info_.captures.at(i), frames,
                      [&](const PoseFrame& frame, StoredCapture& stored, FrameSources& sources) {
-                       return PoseFrameReading(*this, frame, wanted, stored.log).read(sources);
+                       PoseFrameReading reading(*this, frame, wanted, stored.log);
+                       auto result = reading.read(sources);
+                       if (is_right_) reading.compare(locations);
+                       return result;
                      });
 }
 

@@ -149,7 +149,9 @@ SemanticFilter SemanticFilter::from_params(std::span<const std::string> types,
 
 Labels SemanticFilter::apply(const Labels& labels) const {
   Labels kept;
-  for (const auto& [type, joined] : labels) {
+  for (const auto& label : labels) {
+    const std::string& type = label.first;
+    const std::string& joined = label.second;
     std::vector<std::string> single;
     for (std::size_t begin = 0; begin <= joined.size();) {
       const std::size_t end = std::min(joined.find(',', begin), joined.size());

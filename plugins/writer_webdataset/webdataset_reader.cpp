@@ -614,7 +614,9 @@ class SampleReading : private FrameReading {
   }
 
   void read_arrays() {
-    for (const auto& [ending, content] : members_) {
+    for (const auto& member : members_) {
+      const std::string& ending = member.first;
+      const std::string& content = member.second;
       if (!ending.ends_with(".npy") || content.empty()) continue;
       with(ending, [&] {
         const StoredArray array = parse_array(content);
