@@ -20,10 +20,15 @@
 #include "framework/datasets/frame_checks.h"
 #include "framework/images/image_codecs.h"
 #include "writer_basic/basic_reader.h"
+#include "writer_bop/bop_reader.h"
 #include "writer_coco/coco_reader.h"
 #include "writer_data_visualization/data_visualization_reader.h"
+#include "writer_hdf5/hdf5_reader.h"
+#include "writer_imagefolder/image_folder_reader.h"
 #include "writer_kitti/kitti_reader.h"
+#include "writer_pose/pose_reader.h"
 #include "writer_voc/voc_reader.h"
+#include "writer_webdataset/webdataset_reader.h"
 #include "writer_yolo/yolo_reader.h"
 
 namespace {
@@ -59,8 +64,12 @@ std::unique_ptr<Reader> make(Host& host) {
   return std::make_unique<R>(typename R::Params(), host);
 }
 
-constexpr std::array kReaders{&make<BasicReader>, &make<CocoReader>, &make<DataVisualizationReader>,
-                              &make<KittiReader>, &make<VocReader>,  &make<YoloReader>};
+// Seeds begin with places in this list.
+constexpr std::array kReaders{
+    &make<BasicReader>, &make<CocoReader>,       &make<DataVisualizationReader>,
+    &make<KittiReader>, &make<VocReader>,        &make<YoloReader>,
+    &make<PoseReader>,  &make<BopReader>,        &make<WebDatasetReader>,
+    &make<Hdf5Reader>,  &make<ImageFolderReader>};
 
 /// One folder for all inputs of this process.
 const fs::path& scratch() {
