@@ -9,7 +9,7 @@
 #include <system_error>
 
 #include "diorama/error.h"
-#include "writer_support/contours.h"
+#include "opencv_support/contours.h"
 #include "writer_support/cuboid.h"
 #include "writer_support/image_files.h"
 #include "writer_support/lens_json.h"

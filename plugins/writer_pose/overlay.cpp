@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "writer_support/canvas.h"
+#include "opencv_support/canvas.h"
 
 namespace diorama {
 namespace {

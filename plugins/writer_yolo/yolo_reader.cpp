@@ -11,8 +11,8 @@
 #include "reader_support/label_text.h"
 #include "reader_support/object_masks.h"
 #include "reader_support/picture_list.h"
-#include "reader_support/polygon_parts.h"
 #include "writer_yolo/data_yaml.h"
+#include "writer_yolo/polygon_parts.h"
 
 namespace diorama {
 namespace {

@@ -4,7 +4,7 @@
 #include <array>
 #include <cstdio>
 
-#include "writer_support/contours.h"
+#include "opencv_support/contours.h"
 #include "writer_support/cuboid.h"
 
 namespace diorama {

@@ -11,8 +11,8 @@
 #include "framework/lint/every_format.h"
 #include "plugins/writer_support/sample_dataset.h"
 #include "reader_support/object_masks.h"
-#include "reader_support/polygon_parts.h"
 #include "support/catch.h"
+#include "writer_yolo/polygon_parts.h"
 
 using namespace diorama;
 using test::DatasetOnDisk;

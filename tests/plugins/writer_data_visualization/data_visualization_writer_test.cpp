@@ -58,6 +58,7 @@ TEST_CASE("a 2-D box is drawn on the outermost pixels of its object", "[writers]
   DataVisualizationWriter::Params params;
   params.bounding_box_2d_tight = true;
   params.bounding_box_2d_tight_params = params_of({{"outline", Value::text("#010203")}});
+  params.labels = false;
   const RawImage image =
       test::raw_image(write(params).bytes("rp_cam_0/bounding_box_2d_tight_fast_0001.png"));
   const Rgba8 ink{1, 2, 3, 255};

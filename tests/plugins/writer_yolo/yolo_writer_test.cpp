@@ -3,24 +3,14 @@
 
 #include <sstream>
 
+#include "opencv_support/contours.h"
 #include "plugins/writer_support/sample_dataset.h"
 #include "support/catch.h"
-#include "writer_support/contours.h"
 
 using namespace diorama;
 using test::MemoryFiles;
 
 namespace {
-
-Image<std::uint32_t> image_of(const std::vector<std::string>& rows) {
-  Image<std::uint32_t> image(int(rows[0].size()), int(rows.size()), 0);
-  for (int y = 0; y < image.height(); ++y) {
-    for (int x = 0; x < image.width(); ++x) {
-      image.at(x, y) = rows[std::size_t(y)][std::size_t(x)] == '#' ? 7 : 0;
-    }
-  }
-  return image;
-}
 
 /// Even-odd rule at pixel centres.
 bool is_inside(const Polygon& polygon, const Vec2& p) {
@@ -32,20 +22,6 @@ bool is_inside(const Polygon& polygon, const Vec2& p) {
     if (p.x() < (b.x() - a.x()) * (p.y() - a.y()) / (b.y() - a.y()) + a.x()) inside = !inside;
   }
   return inside;
-}
-
-/// How often a polygon goes round a point, clockwise on the screen.
-int winding(const Polygon& polygon, const Vec2& p) {
-  int turns = 0;
-  for (std::size_t i = 0, j = polygon.size() - 1; i < polygon.size(); j = i++) {
-    const Vec2& a = polygon[j];
-    const Vec2& b = polygon[i];
-    if ((a.y() > p.y()) == (b.y() > p.y())) continue;
-    if (p.x() < (b.x() - a.x()) * (p.y() - a.y()) / (b.y() - a.y()) + a.x()) {
-      turns += b.y() > a.y() ? 1 : -1;
-    }
-  }
-  return turns;
 }
 
 std::vector<std::vector<double>> numbers_of(const std::string& text) {
@@ -72,70 +48,6 @@ std::string label_file(const MemoryFiles& files, int capture, const std::string&
 }
 
 }  // namespace
-
-TEST_CASE("outlines run along pixel edges, clockwise, one per part", "[writers]") {
-  const auto image = image_of({".....", ".##.#", ".#..#", ".###."});
-  const auto parts = outlines(image, 7, {1, 1, 5, 4});
-  REQUIRE(parts.size() == 2);
-  CHECK(parts[0].outer == Polygon{{1, 1}, {3, 1}, {3, 2}, {2, 2}, {2, 3}, {4, 3}, {4, 4}, {1, 4}});
-  CHECK(parts[1].outer == Polygon{{4, 1}, {5, 1}, {5, 3}, {4, 3}});
-  const Polygon all = joined(parts);
-  for (int y = 0; y < 4; ++y) {
-    for (int x = 0; x < 5; ++x) {
-      CHECK(is_inside(all, {x + 0.5, y + 0.5}) == (image.at(x, y) == 7));
-    }
-  }
-}
-
-TEST_CASE("polygons leave out holes, and what lies in them is a part of its own", "[writers]") {
-  const auto image = image_of({"........", ".######.", ".#....#.", ".#.##.#.", ".#.#.##.",  //
-                               ".#..#.#.", ".######.", ".#.#.##.", ".######."});
-  const auto parts = outlines(image, 7, {0, 0, 8, 9});
-  REQUIRE(parts.size() == 2);
-  CHECK(parts[0].outer.size() == 4);
-  // Holes that touch at a corner are one.
-  CHECK(parts[0].holes.size() == 3);
-  const auto agrees = [&](const Polygon& polygon) {
-    for (int y = 0; y < image.height(); ++y) {
-      for (int x = 0; x < image.width(); ++x) {
-        CAPTURE(x, y);
-        CHECK(is_inside(polygon, {x + 0.5, y + 0.5}) == (image.at(x, y) == 7));
-        CHECK(winding(polygon, {x + 0.5, y + 0.5}) == (image.at(x, y) == 7 ? 1 : 0));
-      }
-    }
-  };
-  agrees(joined(parts));
-
-  // Noise: every kind of contact.
-  Image<std::uint32_t> noise(23, 17, 0);
-  std::uint32_t random = 3;
-  for (std::uint32_t& pixel : noise.pixels()) {
-    random = random * 1664525u + 1013904223u;
-    pixel = (random >> 16) % 5 < 3 ? 7 : 0;
-  }
-  const Polygon all = joined(outlines(noise, 7, {0, 0, 23, 17}));
-  for (int y = 0; y < noise.height(); ++y) {
-    for (int x = 0; x < noise.width(); ++x) {
-      CHECK(is_inside(all, {x + 0.5, y + 0.5}) == (noise.at(x, y) == 7));
-      CHECK(winding(all, {x + 0.5, y + 0.5}) == (noise.at(x, y) == 7 ? 1 : 0));
-    }
-  }
-}
-
-TEST_CASE("the least rectangle of a slanted strip is slanted", "[writers]") {
-  const auto image = image_of({"#....", "##...", ".##..", "..##.", "...##"});
-  const auto corners = least_rectangle(outlines(image, 7, {0, 0, 5, 5}));
-  const double a = (corners[1] - corners[0]).norm();
-  const double b = (corners[2] - corners[1]).norm();
-  CHECK((corners[1] - corners[0]).dot(corners[2] - corners[1]) == Approx(0.0).margin(1e-9));
-  CHECK(a * b < 25.0 - 5.0);
-  for (int y = 0; y < 5; ++y) {
-    for (int x = 0; x < 5; ++x) {
-      if (image.at(x, y) != 7) continue;
-      CHECK(is_inside({corners.begin(), corners.end()}, {x + 0.5, y + 0.5}));
-    }
-  }
-}
 
 TEST_CASE("detection lines are boxes in shares of the image", "[writers]") {
   const MemoryFiles files = write("detect");

@@ -23,7 +23,6 @@ class PolygonParts {
   std::int64_t contested() const;
 
  private:
-  std::vector<int> number_parts(const CoverageMask& mask);
   void claim(std::size_t pixel, int part);
 
   int width_;

@@ -1,42 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "reader_support/polygon_parts.h"
+#include "writer_yolo/polygon_parts.h"
 
 #include <algorithm>
 #include <numeric>
 
+#include "opencv_support/mask_parts.h"
 #include "reader_support/object_masks.h"
 
 namespace diorama {
-
-std::vector<int> PolygonParts::number_parts(const CoverageMask& mask) {
-  constexpr int kUnnumbered = -1;
-  std::vector<int> parts(mask.bits.size());
-  std::ranges::transform(mask.bits, parts.begin(),
-                         [](std::uint8_t bit) { return bit != 0 ? kUnnumbered : 0; });
-  const auto width = std::size_t(std::max(mask.box.width(), 1));
-  std::vector<std::size_t> open;
-  for (std::size_t start = 0; start < parts.size(); ++start) {
-    if (parts[start] != kUnnumbered) continue;
-    const auto part = int(part_sizes_.size());
-    part_sizes_.push_back(0);
-    const auto reach = [&](bool is_inside, std::size_t pixel) {
-      if (!is_inside || parts[pixel] != kUnnumbered) return;
-      parts[pixel] = part;
-      open.push_back(pixel);
-    };
-    reach(true, start);
-    while (!open.empty()) {
-      const std::size_t at = open.back();
-      open.pop_back();
-      ++part_sizes_.back();
-      reach(at % width > 0, at - 1);
-      reach(at % width + 1 < width, at + 1);
-      reach(at >= width, at - width);
-      reach(at + width < parts.size(), at + width);
-    }
-  }
-  return parts;
-}
 
 void PolygonParts::claim(std::size_t pixel, int part) {
   if (first_owner_[pixel] == 0) {
@@ -50,13 +21,14 @@ void PolygonParts::claim(std::size_t pixel, int part) {
 }
 
 void PolygonParts::add(const CoverageMask& mask) {
-  const std::vector<int> parts = number_parts(mask);
-  const auto width = std::size_t(std::max(mask.box.width(), 1));
-  for (std::size_t i = 0; i < parts.size(); ++i) {
-    if (parts[i] == 0) continue;
-    const std::size_t x = std::size_t(mask.box.x_min) + i % width;
-    const std::size_t y = std::size_t(mask.box.y_min) + i / width;
-    claim(y * std::size_t(width_) + x, parts[i]);
+  const MaskParts parts = connected_parts(mask.bits, mask.box.width(), mask.box.height());
+  const int before = int(part_sizes_.size()) - 1;
+  part_sizes_.insert(part_sizes_.end(), parts.sizes.begin(), parts.sizes.end());
+  for (int y = mask.box.y_min; y < mask.box.y_max; ++y) {
+    for (int x = mask.box.x_min; x < mask.box.x_max; ++x) {
+      const std::int32_t part = parts.part[mask.index(x, y)];
+      if (part != 0) claim(std::size_t(y) * std::size_t(width_) + std::size_t(x), before + part);
+    }
   }
 }
 

@@ -15,7 +15,7 @@ using Polygon = std::vector<Vec2>;
 /// A 4-connected part of a mask. All polygons run along pixel edges.
 struct Outline {
   Polygon outer;               ///< Clockwise on the screen.
-  std::vector<Polygon> holes;  ///< Counter-clockwise.
+  std::vector<Polygon> holes;  ///< Counter-clockwise; those that touch at a corner are two.
 };
 
 /// The parts of `id`'s pixels inside `box`, the largest outer polygon first.
@@ -27,7 +27,8 @@ std::vector<Outline> outlines(const Image<std::uint32_t>& ids, std::uint32_t id,
 Polygon joined(const Outline& part);
 Polygon joined(const std::vector<Outline>& parts);
 
-/// The rectangle of least area round all points, corners clockwise on the screen.
+/// The rectangle of least area round all points, corners clockwise on the screen from the one
+/// nearest to the image's top left corner on.
 std::array<Vec2, 4> least_rectangle(const std::vector<Outline>& parts);
 
 }  // namespace diorama
