@@ -53,20 +53,6 @@ std::map<std::uint32_t, Extent> extents_of(const Image<std::uint32_t>& ids) {
   return result;
 }
 
-lint::Lens lens_of(const Camera& camera) {
-  lint::Lens lens;
-  if (camera.lens == LensModel::OpencvPinhole) lens.model = lint::Lens::Model::Opencv;
-  if (camera.lens == LensModel::FisheyePolynomial) lens.model = lint::Lens::Model::Fisheye;
-  lens.width = camera.width;
-  lens.height = camera.height;
-  lens.focal = {camera.fx, camera.fy};
-  lens.centre = {camera.cx, camera.cy};
-  lens.distortion = camera.distortion;
-  lens.polynomial = camera.fisheye_polynomial;
-  lens.max_angle = camera.fisheye_max_angle_rad;
-  return lens;
-}
-
 std::string box_text(const PixelBox& box) {
   return "[" + std::to_string(box.x_min) + ", " + std::to_string(box.y_min) + ", " +
          std::to_string(box.x_max) + ", " + std::to_string(box.y_max) + ")";
@@ -320,7 +306,7 @@ class FrameChecks {
   }
 
   void check_geometry() {
-    const lint::Lens lens = lens_of(frame_.camera);
+    const lint::Lens lens = lint::lens_of(frame_.camera);
     const Affine camera_from_world = lint::flipped_axes() * frame_.world_from_camera.inverse();
     check_distance_kinds(lens);
     check_normals(lens);

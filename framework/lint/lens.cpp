@@ -28,6 +28,20 @@ double angle_at(const std::array<double, 6>& k, double radius) {
 
 }  // namespace
 
+Lens lens_of(const Camera& camera) {
+  Lens lens;
+  if (camera.lens == LensModel::OpencvPinhole) lens.model = Lens::Model::Opencv;
+  if (camera.lens == LensModel::FisheyePolynomial) lens.model = Lens::Model::Fisheye;
+  lens.width = camera.width;
+  lens.height = camera.height;
+  lens.focal = {camera.fx, camera.fy};
+  lens.centre = {camera.cx, camera.cy};
+  lens.distortion = camera.distortion;
+  lens.polynomial = camera.fisheye_polynomial;
+  lens.max_angle = camera.fisheye_max_angle_rad;
+  return lens;
+}
+
 std::optional<Vec2> Lens::pixel(const Vec3& p) const {
   if (model == Model::Fisheye) {
     const double flat = p.head<2>().norm();

@@ -4,6 +4,7 @@
 #include <array>
 #include <optional>
 
+#include "diorama/camera.h"
 #include "diorama/math.h"
 
 namespace diorama::lint {
@@ -27,5 +28,7 @@ struct Lens {
   /// Direction of a pixel coordinate; z is 1 but for fisheyes, whose directions have length 1.
   std::optional<Vec3> direction(const Vec2& pixel) const;
 };
+
+Lens lens_of(const Camera& camera);
 
 }  // namespace diorama::lint

@@ -12,6 +12,7 @@
 #include "framework/datasets/frame_checks.h"
 #include "framework/datasets/page_checks.h"
 #include "framework/datasets/run_checks.h"
+#include "framework/lint/second_opinion.h"
 
 namespace diorama {
 namespace {
@@ -36,6 +37,7 @@ LintReport lint_read(const StoredDataset& dataset, const std::filesystem::path& 
       dataset, info.holds, host,
       [&](StoredCapture stored) {
         check_frames(info, stored);
+        check_second_opinion(info, stored);
         return stored;
       },
       [&](StoredCapture stored) {

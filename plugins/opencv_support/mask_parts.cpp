@@ -22,8 +22,8 @@ MaskParts connected_parts(std::span<const std::uint8_t> bits, int width, int hei
   for (int i = 1; i < count; ++i) {
     const int x = stats.at<int>(i, cv::CC_STAT_LEFT);
     const int y = stats.at<int>(i, cv::CC_STAT_TOP);
-    result.boxes.push_back({x, y, x + stats.at<int>(i, cv::CC_STAT_WIDTH),
-                            y + stats.at<int>(i, cv::CC_STAT_HEIGHT)});
+    result.boxes.push_back(
+        {x, y, x + stats.at<int>(i, cv::CC_STAT_WIDTH), y + stats.at<int>(i, cv::CC_STAT_HEIGHT)});
     result.sizes.push_back(stats.at<int>(i, cv::CC_STAT_AREA));
   }
   return result;

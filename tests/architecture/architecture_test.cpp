@@ -224,6 +224,17 @@ TEST_CASE("One file knows yaml-cpp and one knows Boost.DLL", "[architecture]") {
   CHECK(files_including("boost/dll").size() == 1);
 }
 
+TEST_CASE("OpenCV is known to libraries that are mapped on demand", "[architecture]") {
+  const auto is_allowed = [](const Source& source, const Include& include) {
+    return !include.file.starts_with("opencv2/") || source.is_below("plugins/opencv_support") ||
+           source.path == "framework/lint/opencv_geometry.cpp";
+  };
+  CHECK(offending_includes("sdk", is_allowed) == None{});
+  CHECK(offending_includes("framework", is_allowed) == None{});
+  CHECK(offending_includes("plugins", is_allowed) == None{});
+  CHECK(files_including("opencv2/").size() > 3);
+}
+
 TEST_CASE("Nothing but the program writes to the standard streams", "[architecture]") {
   const auto is_elsewhere = [](const Source& s) { return !s.is_below("framework/app"); };
   CHECK(files_with_code(R"(\bstd::c(out|err|log)\b|\b(std::)?printf\s*\()", is_elsewhere) ==
