@@ -20,6 +20,8 @@ std::vector<int> position_of_id(const std::vector<Instance>& instances) {
   return table;
 }
 
+}  // namespace
+
 void measure_tight_boxes(const Image<std::uint32_t>& ids, std::vector<Instance>& instances) {
   const std::vector<int> position = position_of_id(instances);
   std::vector<PixelBox> boxes(instances.size(), kNothing);
@@ -43,8 +45,6 @@ void measure_tight_boxes(const Image<std::uint32_t>& ids, std::vector<Instance>&
   }
 }
 
-/// Box of the instance's own leaves. A labelled node below another one is an instance of its own
-/// and does not widen the outer one.
 Aabb instance_bounds(const Scene& scene, const LabelledInstance& instance) {
   const Affine node_from_world = scene.world_from_node(instance.node).inverse();
   Aabb box;
@@ -59,8 +59,6 @@ Aabb instance_bounds(const Scene& scene, const LabelledInstance& instance) {
   }
   return box;
 }
-
-}  // namespace
 
 NameSet Instances::needs() const { return {std::string(kInstanceId.name)}; }
 NameSet Instances::provides() const { return {"instances"}; }

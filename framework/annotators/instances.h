@@ -1,11 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
+#include <vector>
+
 #include "diorama/annotator.h"
 #include "diorama/host.h"
 #include "diorama/params.h"
 
 namespace diorama {
+
+/// Box, in its node's space, of the instance's own leaves. A labelled node below another one is an
+/// instance of its own and does not widen the outer one.
+Aabb instance_bounds(const Scene& scene, const LabelledInstance& instance);
+
+/// Sets Instance::tight_box of those that have pixels; `ids` is kInstanceId.
+void measure_tight_boxes(const Image<std::uint32_t>& ids, std::vector<Instance>& instances);
 
 /// Fills Frame::instances: one entry per labelled instance of the scene, in the order of
 /// labelled_instances(), everything but `visibility` (see visibility.h).

@@ -9,23 +9,6 @@
 namespace diorama {
 namespace {
 
-std::map<std::uint32_t, std::int64_t> count_pixels(const Image<std::uint32_t>& ids) {
-  std::map<std::uint32_t, std::int64_t> counts;
-  // Neighbours are mostly equal: look up once per run.
-  std::uint32_t run_id = 0;
-  std::int64_t run_length = 0;
-  for (const std::uint32_t id : ids.pixels()) {
-    if (id != run_id) {
-      if (run_length > 0) counts[run_id] += run_length;
-      run_id = id;
-      run_length = 0;
-    }
-    ++run_length;
-  }
-  if (run_length > 0) counts[run_id] += run_length;
-  return counts;
-}
-
 /// How many of a mask's bytes, which are 0 or 1, are set.
 std::int64_t count_set(std::span<const std::uint8_t> bits) {
   // Parts whose sums fit into a byte, which compilers make vectors of.
@@ -90,6 +73,23 @@ Visibility measure(const CoverageMask& mask, int image_width, int image_height) 
 }
 
 }  // namespace
+
+std::map<std::uint32_t, std::int64_t> count_pixels(const Image<std::uint32_t>& ids) {
+  std::map<std::uint32_t, std::int64_t> counts;
+  // Neighbours are mostly equal: look up once per run.
+  std::uint32_t run_id = 0;
+  std::int64_t run_length = 0;
+  for (const std::uint32_t id : ids.pixels()) {
+    if (id != run_id) {
+      if (run_length > 0) counts[run_id] += run_length;
+      run_id = id;
+      run_length = 0;
+    }
+    ++run_length;
+  }
+  if (run_length > 0) counts[run_id] += run_length;
+  return counts;
+}
 
 void check_coverage(std::span<const CoverageMask> coverage, const Frame& frame) {
   if (coverage.size() != frame.instances.size()) {

@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
+#include <map>
 #include <span>
 
 #include "diorama/frame.h"
 
 namespace diorama {
+
+/// How often each id but 0 occurs in an id channel.
+std::map<std::uint32_t, std::int64_t> count_pixels(const Image<std::uint32_t>& ids);
 
 /// Fills Instance::visibility of every instance. Needs kInstanceId and Frame::instances, so call it
 /// after the annotators `instance_ids` and `instances`. `coverage` is what Renderer::cover() gives

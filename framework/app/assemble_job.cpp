@@ -215,6 +215,11 @@ std::vector<Need> needs_of(const JobAssembly& assembly) {
     const Writer& writer = *assembly.components.writers[i];
     needs.push_back({who, call_component(who, [&] { return writer.needs(); })});
   }
+  for (const ViewRule& rule : assembly.job.views) {
+    Need need{"views '" + rule.name + "'", {std::string(kLeafId.name)}};
+    if (rule.brightness.is_set()) need.names.emplace(kColor.name);
+    needs.push_back(std::move(need));
+  }
   return needs;
 }
 
@@ -324,6 +329,9 @@ JobAssembly assemble_job(const Value& value, Registry& registry, HostServices& h
       check_patterns(assembly.job, assembly.plan, describe_from(registry), assembler.complaints());
   assembler.complaints().raise();
   tell_unused_assets(assembly, assets_root, host);
+  for (const std::string& message : unknown_view_labels(assembly.job, assembly.plan)) {
+    host.log(LogLevel::Warning, message);
+  }
   resolve_needs(assembler, std::move(annotators), assembly);
   for (const EnvironmentChoice& choice : assembly.plan.environments) {
     assembler.note_loader(host.loader_of(choice.asset));

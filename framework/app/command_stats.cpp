@@ -6,6 +6,7 @@
 
 #include "diorama/error.h"
 #include "framework/app/assemble.h"
+#include "framework/datasets/dataset_origin.h"
 #include "framework/datasets/dataset_readers.h"
 #include "framework/datasets/dataset_stats.h"
 
@@ -18,7 +19,8 @@ int command_stats(const GlobalOptions& global, const StatsOptions& options, Cons
   DatasetReaders readers(*registry, *host);
   const FoundDataset found = find_dataset(options.dataset, readers, options.reader);
   const auto dataset = readers.open(found.folder, found.reader);
-  const DatasetStats stats = dataset_stats(*dataset, *host);
+  DatasetStats stats = dataset_stats(*dataset, *host);
+  stats.views = views_of_run(found.folder);
   if (options.html.empty()) {
     std::cout << (options.as_json ? stats_json(stats) : stats_text(stats));
     return 0;

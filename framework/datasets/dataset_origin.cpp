@@ -10,6 +10,7 @@
 
 #include "framework/config/json_text.h"
 #include "framework/datasets/capture_sweep.h"
+#include "framework/pipeline/view_report.h"
 
 namespace diorama {
 namespace {
@@ -17,15 +18,16 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
-std::string read_page(const fs::path& folder) {
+std::string read_file(const fs::path& file) {
   std::error_code failed;
-  const fs::path file = folder / "dataset.json";
   if (!fs::is_regular_file(file, failed)) return {};
   std::ifstream in(file, std::ios::binary);
   std::ostringstream text;
   text << in.rdbuf();
   return std::move(text).str();
 }
+
+std::string read_page(const fs::path& folder) { return read_file(folder / "dataset.json"); }
 
 /// Pages of runs list their writers.
 bool is_page_of_run(const Json& page) {
@@ -121,13 +123,22 @@ void add_from_captures(const StoredDataset& dataset, bool wants_labels, DatasetI
 
 }  // namespace
 
-std::string page_of_run(const fs::path& dataset) {
-  std::string own = read_page(dataset);
-  if (is_page_of_run(parse_json_or_nothing(own))) return own;
+std::optional<fs::path> run_of(const fs::path& dataset) {
+  if (is_page_of_run(parse_json_or_nothing(read_page(dataset)))) return dataset;
   const fs::path folder = plain(dataset);
-  std::string above = read_page(folder.parent_path());
-  const Json page = parse_json_or_nothing(above);
-  return is_page_of_run(page) && names_folder(page, folder.filename()) ? above : std::string();
+  const Json page = parse_json_or_nothing(read_page(folder.parent_path()));
+  if (!is_page_of_run(page) || !names_folder(page, folder.filename())) return std::nullopt;
+  return folder.parent_path();
+}
+
+std::string page_of_run(const fs::path& dataset) {
+  const std::optional<fs::path> run = run_of(dataset);
+  return run ? read_page(*run) : std::string();
+}
+
+std::string views_of_run(const fs::path& dataset) {
+  const std::optional<fs::path> run = run_of(dataset);
+  return run ? read_file(*run / kViewsFile) : std::string();
 }
 
 DatasetInfo dataset_info_of(const fs::path& folder, const StoredDataset& dataset, Host& host) {

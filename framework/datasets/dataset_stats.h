@@ -79,6 +79,8 @@ struct DatasetStats {
   /// "no object", "black", "burnt", "one colour", "something close before the camera", "moving".
   std::map<std::string, SuspiciousPictures> suspicious;
   std::int64_t findings = 0;  ///< Of the reader; lint says which.
+  /// Text of views.json, how views came about; empty when the dataset has none. Filled by callers.
+  std::string views;
 };
 
 /// Goes through all captures on the host's threads. Memory does not depend on how many there are.

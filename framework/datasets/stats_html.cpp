@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "framework/datasets/dataset_stats.h"
+#include "framework/pipeline/view_report.h"
 
 namespace diorama {
 namespace {
@@ -195,6 +196,9 @@ std::string stats_html(const DatasetStats& stats, const std::string& title) {
   if (stats.findings > 0) {
     text += "<p class='bad'>" + std::to_string(stats.findings) +
             " things in the files cannot be right; <code>diorama lint</code> says which</p>\n";
+  }
+  if (const std::string views = views_text(stats.views); !views.empty()) {
+    text += "<h2>Views</h2>\n<pre>" + escaped(views) + "</pre>\n";
   }
   for (const auto& [name, own] : stats.classes) text += class_pictures(name, own);
   return text + "</body></html>\n";

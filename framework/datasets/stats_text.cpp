@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "framework/datasets/dataset_stats.h"
+#include "framework/pipeline/view_report.h"
 
 namespace diorama {
 namespace {
@@ -144,6 +145,7 @@ std::string stats_text(const DatasetStats& stats) {
     }
     text += list.count > 5 ? " ...)\n" : ")\n";
   }
+  if (const std::string views = views_text(stats.views); !views.empty()) text += "\n" + views;
   if (stats.findings > 0) {
     text += "\n" + std::to_string(stats.findings) +
             " things in the files cannot be right; 'diorama lint' says which\n";
@@ -168,18 +170,19 @@ std::string stats_json(const DatasetStats& stats) {
   for (const auto& [what, list] : stats.suspicious) {
     suspicious[what] = {{"count", list.count}, {"first", list.names}};
   }
-  const Json json{{"format", stats.format},
-                  {"holds", stats.holds},
-                  {"captures", stats.captures},
-                  {"pictures", stats.pictures},
-                  {"cameras", stats.pictures_by_camera},
-                  {"splits", stats.pictures_by_split},
-                  {"sizes", stats.pictures_by_size},
-                  {"classes", std::move(classes)},
-                  {"objects_per_picture", histogram_json(stats.objects_per_picture)},
-                  {"brightness", histogram_json(stats.brightness)},
-                  {"suspicious", std::move(suspicious)},
-                  {"findings", stats.findings}};
+  Json json{{"format", stats.format},
+            {"holds", stats.holds},
+            {"captures", stats.captures},
+            {"pictures", stats.pictures},
+            {"cameras", stats.pictures_by_camera},
+            {"splits", stats.pictures_by_split},
+            {"sizes", stats.pictures_by_size},
+            {"classes", std::move(classes)},
+            {"objects_per_picture", histogram_json(stats.objects_per_picture)},
+            {"brightness", histogram_json(stats.brightness)},
+            {"suspicious", std::move(suspicious)},
+            {"findings", stats.findings}};
+  if (!stats.views.empty()) json["views"] = Json::parse(stats.views, nullptr, false);
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

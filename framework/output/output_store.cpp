@@ -81,6 +81,10 @@ const std::string& OutputFolders::folder(std::size_t index) const {
   return index == kRecordsFolder ? records : writers[index].folder;
 }
 
+std::string OutputFolders::name(std::size_t index) const {
+  return index == kRecordsFolder ? std::string() : writers[index].name;
+}
+
 fs::path OutputFolders::records_path() const { return joined(base, records); }
 
 CollectedFiles::CollectedFiles(Transaction& transaction, std::size_t folder, std::string writer)
@@ -642,7 +646,7 @@ JournalledFiles OutputStore::journalled(const Transaction& transaction) const {
     content.files.push_back({path, file.staged_size, file.staged ? file.staged->text() : ""});
   }
   for (const auto& [writer, line] : transaction.records) {
-    content.records.emplace_back(folders_.writers[writer].name, line);
+    content.records.emplace_back(folders_.name(writer), line);
   }
   return content;
 }
@@ -818,7 +822,7 @@ std::optional<int> OutputStore::claim_visit(int visit_count,
 }
 
 void OutputStore::read_records(std::size_t writer, const RecordVisitor& visit) const {
-  const std::string& name = folders_.writers[writer].name;
+  const std::string name = folders_.name(writer);
   struct Place {
     EntryPlace place;
     const std::string* worker;

@@ -54,7 +54,7 @@ class Stage {
 struct Transaction {
   std::unique_ptr<Stage> stage = nullptr;  ///< Null: everything stays in memory.
   std::vector<StagedFile> files;
-  /// Per writer that recorded something: index and line.
+  /// Per writer that recorded something: index (or kRecordsFolder, for the run itself) and line.
   std::vector<std::pair<std::size_t, std::string>> records;
 };
 
@@ -70,6 +70,8 @@ struct OutputFolders {
 
   /// Of a writer or kRecordsFolder, below base.
   const std::string& folder(std::size_t index) const;
+  /// Of a writer; of kRecordsFolder empty, as no writer's is.
+  std::string name(std::size_t index) const;
   std::filesystem::path records_path() const;
 };
 
@@ -165,7 +167,7 @@ class OutputStore {
 
   /// Looks again for captures that other workers have finished meanwhile.
   void refresh();
-  /// Records of one writer in capture order.
+  /// Records of one writer, or of the run itself (kRecordsFolder), in capture order.
   void read_records(std::size_t writer, const RecordVisitor& visit) const;
   /// Ends the part in an orderly way: what it wrote survives power cuts, its lease is given back.
   void close();

@@ -276,6 +276,10 @@ Rng JobStreams::randomizer(std::string_view name, int visit, std::string_view mo
       .fork(std::uint64_t(std::int64_t(occurrence)));
 }
 
+Rng JobStreams::views(std::string_view rule, std::size_t quota) const {
+  return root_.fork("views").fork(rule).fork(std::uint64_t(quota));
+}
+
 std::uint64_t JobStreams::render_seed(int capture, std::string_view camera) const {
   return root_.fork("render").fork(std::uint64_t(capture)).fork(camera).bits();
 }

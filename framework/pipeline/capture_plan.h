@@ -133,6 +133,8 @@ class JobStreams {
   /// `occurrence` tells calls at the same moment of one visit apart: the capture's index, or a
   /// running number for events.
   Rng randomizer(std::string_view name, int visit, std::string_view moment, int occurrence) const;
+  /// For the order in which the parts of a quota come up.
+  Rng views(std::string_view rule, std::size_t quota) const;
   std::uint64_t render_seed(int capture, std::string_view camera) const;
 
  private:

@@ -11,6 +11,7 @@
 #include "framework/config/clean_text.h"
 #include "framework/config/value_text.h"
 #include "framework/pipeline/sha256.h"
+#include "framework/pipeline/view_report.h"
 
 namespace diorama {
 namespace {
@@ -203,6 +204,12 @@ void add_annotators(std::string& text, const Job& job) {
   }
 }
 
+void add_views(std::string& text, const Job& job) {
+  for (const ViewRule& rule : job.views) {
+    text += "views " + rule.name + ": " + parameters_text(rule.map, {"name"}) + "\n";
+  }
+}
+
 void add_writers(std::string& text, const Job& job) {
   text += "writers (" + std::to_string(job.writers.size()) + ")\n";
   for (const WriterEntry& entry : job.writers) {
@@ -257,6 +264,7 @@ std::string dataset_json(const DatasetInfo& info, const Job& job) {
                                {"type", writer.type},
                                {"folder", writer.output_dir.value_or(writer.name)}});
   }
+  if (!job.views.empty()) json["views"] = kViewsFile;
   json["conventions"] = conventions();
   json["assets"] = Json::array();
   for (const DatasetAsset& asset : info.assets) {
@@ -299,6 +307,7 @@ std::string plan_text(const CapturePlan& plan, const Job& job,
       "renderer " + job.renderer.type + ": " + parameters_text(job.renderer.map, {"type"}) + "\n";
   add_annotators(text, job);
   text += "physics " + job.physics.type + ": " + parameters_text(job.physics.map, {"type"}) + "\n";
+  add_views(text, job);
   add_writers(text, job);
   return text;
 }

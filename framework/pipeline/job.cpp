@@ -32,9 +32,10 @@ constexpr const char* kLightWords[] = {"sphere", "rect", "disk", "distant", "dom
 constexpr const char* kCameraWords[] = {"pinhole", "opencv_pinhole", "fisheye_polynomial"};
 
 const std::vector<std::string> kSections{
-    "seed",        "assets_root", "debug",    "total_captures", "loaders",     "environments",
-    "environment", "objects",     "lights",   "cameras",        "randomizers", "physics",
-    "renderer",    "annotators",  "timeline", "settle",         "writers",     "output"};
+    "seed",         "assets_root", "debug",    "total_captures", "loaders",
+    "environments", "environment", "objects",  "lights",         "cameras",
+    "randomizers",  "physics",     "renderer", "annotators",     "timeline",
+    "settle",       "views",       "writers",  "output"};
 
 std::string item_path(std::string_view section, std::size_t index) {
   return std::string(section) + "[" + std::to_string(index) + "]";
@@ -303,6 +304,21 @@ void read_writers(const Value& value, Job& job, Complaints& complaints) {
   require_unique(
       job.writers, "writers", [](const WriterEntry& e) -> const std::string& { return e.name; },
       [](const WriterEntry& e) -> const Value& { return e.component.map; }, complaints);
+}
+
+void read_views(const Value& value, Job& job, Complaints& complaints) {
+  for (auto& [path, map] : entries(value, "views", complaints)) {
+    ViewRule rule;
+    read_all_keys(map, path, rule, complaints);
+    if (rule.name.empty()) rule.name = "views_" + std::to_string(job.views.size());
+    rule.map = std::move(map);
+    rule.path = path;
+    check_view_rule(rule, job.series(), complaints);
+    job.views.push_back(std::move(rule));
+  }
+  require_unique(
+      job.views, "views", [](const ViewRule& r) -> const std::string& { return r.name; },
+      [](const ViewRule& r) -> const Value& { return r.map; }, complaints);
 }
 
 /// Where a folder of the job leads, seen from the output folder; nothing when that is out of it or
@@ -651,6 +667,7 @@ Job read_job(const Value& value, Complaints& complaints) {
   job.renderer = read_engine(value, "renderer", kDefaultRenderer, complaints);
   job.annotators = read_annotators(value, complaints);
   read_section(value, "settle", job.settle, complaints);
+  read_views(value, job, complaints);
   read_writers(value, job, complaints);
   read_section(value, "output", job.output, complaints);
   check_folders(value, job, complaints);

@@ -11,6 +11,7 @@
 #include "diorama/component.h"
 #include "diorama/config.h"
 #include "diorama/params.h"
+#include "framework/pipeline/view_rules.h"
 
 namespace diorama {
 
@@ -164,6 +165,7 @@ struct Job {
       annotators;  ///< Come before the renderer's own channels; see Demand.
   std::vector<TimelineStep> timeline;
   SettleSection settle;
+  std::vector<ViewRule> views;
   std::vector<WriterEntry> writers;
   OutputSection output;
 

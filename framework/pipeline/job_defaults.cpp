@@ -168,6 +168,15 @@ Value resolved_job(const Value& job, const DescribeComponent& describe) {
   if (!annotators.list.empty()) result.set("annotators", annotators);
   result.set("timeline", timeline(job));
   result.set("settle", with_defaults(section_or_empty(job, "settle"), specs_of<SettleSection>()));
+  if (const Value* views = job.find("views"); views && !views->list.empty()) {
+    Value list = Value::make_list();
+    for (const Value& entry : views->list) {
+      Value rule = with_defaults(entry, specs_of<ViewRule>());
+      set_if_null(rule, "name", Value::text("views_" + std::to_string(list.list.size())));
+      list.list.push_back(std::move(rule));
+    }
+    result.set("views", list);
+  }
   result.set("writers",
              components(job, "writers", Kind::Writer, specs_of<WriterEntry>(), describe));
   result.set("output", with_defaults(section_or_empty(job, "output"), specs_of<OutputSection>()));
@@ -200,6 +209,10 @@ std::vector<ParamSpec> job_specs() {
                           specs_of<detail::StepKeys>()));
   specs.push_back(
       section("settle", ParamType::Group, "How objects come to rest.", specs_of<SettleSection>()));
+  specs.push_back(section("views", ParamType::List,
+                          "What pictures have to show; views that do not are drawn anew before "
+                          "they are rendered.",
+                          specs_of<ViewRule>()));
   specs.push_back(section("writers", ParamType::List, "What is written.", specs_of<WriterEntry>()));
   specs.push_back(
       section("output", ParamType::Group, "Where it is written.", specs_of<OutputSection>()));

@@ -120,34 +120,62 @@ std::vector<EnvironmentPattern> check_patterns(const Job& job, const CapturePlan
                                                Complaints& complaints) {
   const std::vector<std::string> paths = possible_paths(job, plan);
   std::vector<EnvironmentPattern> open;
+  const auto check_value = [&](const Value& value, const std::string& key) {
+    for (const Value* text : texts_of(value)) {
+      const std::string& pattern = text->scalar;
+      if (is_about_environment(pattern)) {
+        open.push_back({pattern, key});
+        continue;
+      }
+      const bool fits = std::any_of(paths.begin(), paths.end(), [&](const std::string& path) {
+        return may_fit(pattern, path);
+      });
+      if (fits) continue;
+      const std::string near = nearest_pattern(pattern, paths);
+      complaints.add(text->place, key + ": '" + pattern + "' fits no node" +
+                                      (near.empty() ? std::string("; nodes are below /Environment, "
+                                                                  "/Lights, /Cameras and what "
+                                                                  "'under' of the objects says")
+                                                    : "; did you mean '" + near + "'?"));
+    }
+  };
   for (const RandomizerEntry& entry : job.randomizers) {
     const auto specs = describe(ComponentKind::Randomizer, entry.type);
     if (!specs) continue;
     for (const ParamSpec& spec : *specs) {
       const Value* value = spec.unit == kNodePattern ? entry.component.map.find(spec.key) : nullptr;
-      if (!value) continue;
-      for (const Value* text : texts_of(*value)) {
-        const std::string& pattern = text->scalar;
-        const std::string key = entry.component.path + "." + spec.key;
-        if (is_about_environment(pattern)) {
-          open.push_back({pattern, key});
-          continue;
-        }
-        const bool fits = std::any_of(paths.begin(), paths.end(), [&](const std::string& path) {
-          return may_fit(pattern, path);
-        });
-        if (fits) continue;
-        const std::string near = nearest_pattern(pattern, paths);
-        complaints.add(text->place,
-                       key + ": '" + pattern + "' fits no node" +
-                           (near.empty() ? std::string("; nodes are below /Environment, "
-                                                       "/Lights, /Cameras and what "
-                                                       "'under' of the objects says")
-                                         : "; did you mean '" + near + "'?"));
-      }
+      if (value) check_value(*value, entry.component.path + "." + spec.key);
+    }
+  }
+  for (const ViewRule& rule : job.views) {
+    for (const char* key : {"cameras", "targets"}) {
+      if (const Value* value = rule.map.find(key)) check_value(*value, rule.path + "." + key);
     }
   }
   return open;
+}
+
+std::vector<std::string> unknown_view_labels(const Job& job, const CapturePlan& plan) {
+  std::set<std::string> known;
+  visit_planned_objects(job, plan, [&](const PlannedObject& object) {
+    for (const auto& [taxonomy, label] : object.labels) known.insert(label);
+  });
+  const std::vector<std::string> names(known.begin(), known.end());
+  std::vector<std::string> messages;
+  const auto check = [&](const std::string& label, const std::string& key) {
+    if (known.contains(label)) return;
+    const std::string near = nearest_name(label, names);
+    messages.push_back(key + ": the job labels no object '" + label + "'" +
+                       (near.empty() ? "" : "; did you mean '" + near + "'?"));
+  };
+  for (const ViewRule& rule : job.views) {
+    for (const std::string& label : rule.labels) check(label, rule.path + ".labels");
+    for (std::size_t i = 0; i < rule.quotas.size(); ++i) {
+      const std::string key = rule.path + ".quotas[" + std::to_string(i) + "].labels";
+      for (const std::string& label : rule.quotas[i].labels) check(label, key);
+    }
+  }
+  return messages;
 }
 
 }  // namespace diorama

@@ -17,13 +17,17 @@ struct EnvironmentPattern {
   std::string key;  ///< "randomizers[2].surfaces"
 };
 
-/// Complains about every pattern in the job's randomizers (parameters of the unit kNodePattern)
-/// that can fit no object, light or camera of any visit, with the nearest path. Defaults that the
-/// job does not spell out are no complaint. Returns those about environments, which nobody knows
-/// yet.
+/// Complains about every pattern in the job's randomizers (parameters of the unit kNodePattern) and
+/// views that can fit no object, light or camera of any visit, with the nearest path. Defaults that
+/// the job does not spell out are no complaint. Returns those about environments, which nobody
+/// knows yet.
 std::vector<EnvironmentPattern> check_patterns(const Job& job, const CapturePlan& plan,
                                                const DescribeComponent& describe,
                                                Complaints& complaints);
+
+/// About labels in the job's `views` that none of its objects gets, with the nearest one. Assets
+/// and randomizers may know more, so these are no errors.
+std::vector<std::string> unknown_view_labels(const Job& job, const CapturePlan& plan);
 
 /// Whether the pattern fits the path or may fit a node below it or above it.
 bool may_fit(std::string_view pattern, std::string_view path);

@@ -13,6 +13,7 @@
 #include "framework/config/clean_text.h"
 #include "framework/pipeline/physics_view.h"
 #include "framework/pipeline/scene_setup.h"
+#include "framework/pipeline/view_search.h"
 #include "framework/plugins/fatal_end.h"
 #include "framework/plugins/plugin_call.h"
 
@@ -44,13 +45,23 @@ struct Pipeline::Visit {
   std::vector<NodeId> cameras;
   BodyPoses before_last_step;  ///< Empty when nothing moved by itself since it was placed.
   NodeId overview;             ///< Null unless this visit makes an overview picture.
-  int next_capture = 0;        ///< Of the visit's.
+  std::map<NodeId, NodeId> small_cameras;  ///< For the brightness of views; by camera.
+  /// Randomizers that placed cameras at the last moment.
+  std::vector<std::size_t> camera_randomizers;
+  int next_capture = 0;  ///< Of the visit's.
   std::map<std::string, int> events;
   int simulations_to_come = 0;  ///< Steps of the timeline that let things move.
   double simulated_s = 0.0;
   double moving_until_s = 0.0;  ///< When something in the room was last seen moving.
   int redraws = 0;              ///< Streams that placed objects anew so far.
   VisitReport report;
+};
+
+/// Which numbers randomizers draw at a moment: 0 of any stream are the first ones.
+struct Pipeline::Draw {
+  const char* stream = "";
+  int number = 0;
+  const std::vector<std::size_t>* only = nullptr;  ///< Indices of randomizers; null: all.
 };
 
 namespace {
@@ -60,6 +71,12 @@ std::vector<Mat4> object_poses(const Scene& scene, const std::vector<NodeId>& ob
   poses.reserve(objects.size());
   for (const NodeId object : objects) poses.push_back(scene.world_from_node(object).matrix());
   return poses;
+}
+
+/// Cameras and rigs.
+std::vector<NodeId> camera_tops(const Scene& scene) {
+  const NodeId parent = scene.find("/Cameras");
+  return parent ? scene[parent].children : std::vector<NodeId>();
 }
 
 std::vector<NodeId> nodes_of(const std::vector<Flaw>& flaws) {
@@ -207,6 +224,7 @@ Pipeline::Visit Pipeline::set_up(const PlannedVisit& planned) {
                                 visit.scene, host_);
   create_lights(job_.lights, visit.scene, host_);
   visit.cameras = create_cameras(job_.cameras, visit.scene);
+  visit.small_cameras = create_small_cameras(job_, visit.cameras, visit.scene);
   visit.simulations_to_come =
       int(std::count_if(job_.timeline.begin(), job_.timeline.end(), [](const TimelineStep& step) {
         return step.kind == TimelineStep::Kind::Simulate;
@@ -227,30 +245,35 @@ void Pipeline::randomize(Visit& visit, const std::string& moment, int number, in
   const Clock clock(summary_, "randomizing");
   const PhysicsView before(visit.scene);
   const std::vector<Mat4> poses = object_poses(visit.scene, visit.objects);
-  call_randomizers(visit, moment, number, capture, 0);
+  visit.camera_randomizers = call_randomizers(visit, moment, number, capture, {});
   if (moment == "environment" || before.is_of(visit.scene)) return;
   if (object_poses(visit.scene, visit.objects) != poses) visit.before_last_step.clear();
   // The engine holds everything as it was, and what sleeps there rests on what may be gone.
   reset_physics(visit);
 }
 
-/// `respawn`: 0 for the first draw, then another stream for each.
-void Pipeline::call_randomizers(Visit& visit, const std::string& moment, int number, int capture,
-                                int respawn) {
+/// Returns those that moved cameras or changed their lenses.
+std::vector<std::size_t> Pipeline::call_randomizers(Visit& visit, const std::string& moment,
+                                                    int number, int capture, const Draw& draw) {
   RandomizeContext context;
   context.moment = moment;
   context.capture = capture;
   context.working_area_world = visit.working_area_world;
+  std::vector<std::size_t> of_cameras;
   for (std::size_t i = 0; i < job_.randomizers.size(); ++i) {
+    if (draw.only && std::ranges::find(*draw.only, i) == draw.only->end()) continue;
     const RandomizerEntry& entry = job_.randomizers[i];
     const auto call = randomizer_call(job_, entry, moment, visit.planned->index, number);
     if (!call) continue;
     context.occurrence = call->occurrence;
     Rng rng = streams_.randomizer(entry.name, call->visit, moment, capture >= 0 ? capture : number);
-    if (respawn > 0) rng = rng.fork("respawn").fork(std::uint64_t(respawn));
+    if (draw.number > 0) rng = rng.fork(draw.stream).fork(std::uint64_t(draw.number));
+    const SavedView cameras(visit.scene, camera_tops(visit.scene));
     call_component("randomizer '" + entry.name + "'",
                    [&] { components_.randomizers[i]->randomize(visit.scene, context, rng); });
+    if (!cameras.is_of(visit.scene)) of_cameras.push_back(i);
   }
+  return of_cameras;
 }
 
 void Pipeline::reset_physics(Visit& visit) {
@@ -343,7 +366,7 @@ void Pipeline::respawn(Visit& visit, const std::vector<Flaw>& flaws) {
   std::vector<NodeId> to_place = nodes_of(flaws);
   for (int i = 0; i < kDraws && !to_place.empty(); ++i) {
     const SavedNodes others(visit.scene, to_place);
-    call_randomizers(visit, "environment", 0, -1, ++visit.redraws);
+    call_randomizers(visit, "environment", 0, -1, {"respawn", ++visit.redraws});
     others.restore(visit.scene);
     std::vector<NodeId> inside = nodes_of(find_born_inside(visit.scene, visit.objects));
     std::erase_if(to_place, [&](NodeId object) {
@@ -384,19 +407,16 @@ void Pipeline::take(Visit& visit, const PlannedCapture& planned) {
   capture.visit = visit.planned->index;
   capture.phase = planned.phase;
   capture.environment = clean_name(plan_.environments[visit.planned->environment].asset);
-  note(visit.scene, find_blocked_cameras(visit.scene, visit.cameras), visit.report.cameras);
-  {
-    const Clock clock(summary_, "preparing renderer");
-    call_component("renderer '" + job_.renderer.type + "'",
-                   [&] { components_.renderer->prepare(visit.scene); });
-  }
-  for (std::size_t i = 0; i < visit.cameras.size(); ++i) {
-    stop_if_asked();
-    capture.frames.push_back(make_frame(visit, i, planned.index));
-  }
+  const SavedView drawn(visit.scene, camera_tops(visit.scene));
+  const std::vector<ViewOutcome> views = take_frames(visit, planned, capture.frames);
+  if (!views.empty()) pending.views_json = outcomes_json(views);
+  summary_.views.add(planned.index, views);
   if (visit.overview && visit.next_capture == 1) {
     pending.overview = make_overview(visit, planned.index);
   }
+  // The next capture starts from where the randomizers put the cameras, whatever views this one
+  // chose: it may be made alone.
+  drawn.restore(visit.scene);
   // A visit that is cut short ends with its objects in the air, which says nothing.
   const bool is_last = visit.next_capture == visit.planned->capture_count;
   if (is_last && visit.simulations_to_come == 0) {
@@ -412,6 +432,41 @@ void Pipeline::take(Visit& visit, const PlannedCapture& planned) {
     options_.progress({summary_.resumed + summary_.captures, total_, summary_.resumed,
                        summary_.respawned + int(visit.report.respawned.size())});
   }
+}
+
+void Pipeline::prepare_renderer(const Visit& visit) {
+  const Clock clock(summary_, "preparing renderer");
+  call_component("renderer '" + job_.renderer.type + "'",
+                 [&] { components_.renderer->prepare(visit.scene); });
+}
+
+/// The pictures of all cameras, from views as the job wants them.
+std::vector<ViewOutcome> Pipeline::take_frames(Visit& visit, const PlannedCapture& planned,
+                                               std::vector<Frame>& frames) {
+  ViewSearch search({job_, streams_, host_, *components_.renderer, visit.scene, visit.cameras,
+                     visit.small_cameras, planned, !visit.camera_randomizers.empty(),
+                     [&](int number) {
+                       call_randomizers(visit, planned.phase, planned.number, planned.index,
+                                        {"view", number, &visit.camera_randomizers});
+                     }});
+  const auto choose_views = [&] {
+    const Clock clock(summary_, "choosing views");
+    search.run();
+  };
+  choose_views();
+  note(visit.scene, find_blocked_cameras(visit.scene, visit.cameras), visit.report.cameras);
+  prepare_renderer(visit);
+  for (std::size_t i = 0; i < visit.cameras.size(); ++i) {
+    stop_if_asked();
+    frames.push_back(make_frame(visit, i, planned.index));
+  }
+  for (auto refused = search.refuse_pictures(frames); !refused.empty();) {
+    choose_views();
+    prepare_renderer(visit);
+    for (const std::size_t i : refused) frames[i] = make_frame(visit, i, planned.index);
+    refused = search.refuse_pictures(frames);
+  }
+  return search.outcomes();
 }
 
 Frame Pipeline::make_frame(Visit& visit, std::size_t camera, int capture) {
@@ -510,6 +565,9 @@ void Pipeline::write(const PendingCapture& pending) {
     transaction.files.push_back(
         {kRecordsFolder, "settle/" + visit_name + ".json", {text.begin(), text.end()}});
   }
+  if (!pending.views_json.empty()) {
+    transaction.records.emplace_back(kRecordsFolder, pending.views_json);
+  }
   if (const auto& overview = pending.overview; overview.width() > 0) {
     const ImageView view{overview.pixels().data(), overview.width(), overview.height(), 4, 8};
     transaction.files.push_back({kRecordsFolder, "overview/" + visit_name + ".png",
@@ -540,6 +598,15 @@ void Pipeline::finish_output(const DatasetInfo& dataset) {
     call_component("writer '" + name + "'",
                    [&] { components_.writers[i]->finish(records, files); });
   }
+  if (!job_.views.empty()) {
+    ViewCounts counts;
+    store_.read_records(kRecordsFolder, [&](int capture, std::string_view line) {
+      counts.add(capture, outcomes_from_json(line));
+    });
+    const std::string text = views_json(counts);
+    const auto bytes = std::as_bytes(std::span(text));
+    transaction.files.push_back({kRecordsFolder, kViewsFile, {bytes.begin(), bytes.end()}});
+  }
   store_.commit_finish(transaction);
   summary_.is_finished = true;
 }
@@ -554,6 +621,7 @@ std::string summary_text(const RunSummary& summary) {
   }
   if (!text.empty()) text += "\n";
   text += settle_text(summary.visits);
+  text += views_text(summary.views);
   char line[64];
   std::snprintf(line, sizeof line, "%.1f MB written", double(summary.bytes_written) * 1e-6);
   text += line;

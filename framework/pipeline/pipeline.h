@@ -26,6 +26,7 @@
 #include "framework/pipeline/pattern_check.h"
 #include "framework/pipeline/settle_check.h"
 #include "framework/pipeline/settling.h"
+#include "framework/pipeline/view_report.h"
 #include "framework/pipeline/writer_queue.h"
 
 namespace diorama {
@@ -78,6 +79,7 @@ struct RunSummary {
   std::uint64_t bytes_written = 0;
   std::map<std::string, double> seconds;  ///< Phase to wall time.
   std::vector<VisitReport> visits;
+  ViewCounts views;  ///< Of the captures that this run made.
 };
 
 std::string summary_text(const RunSummary& summary);
@@ -107,8 +109,9 @@ class Pipeline {
   void run_visit(const PlannedVisit& planned);
   Visit set_up(const PlannedVisit& planned);
   void randomize(Visit& visit, const std::string& moment, int number, int capture);
-  void call_randomizers(Visit& visit, const std::string& moment, int number, int capture,
-                        int respawn);
+  struct Draw;
+  std::vector<std::size_t> call_randomizers(Visit& visit, const std::string& moment, int number,
+                                            int capture, const Draw& draw);
   void simulate(Visit& visit, const TimelineStep& step);
   void advance(Visit& visit, const TimelineStep& step);
   std::vector<Flaw> unsettled(const Visit& visit, const TimelineStep& step) const;
@@ -117,6 +120,9 @@ class Pipeline {
   void reset_physics(Visit& visit);
   void take_captures(Visit& visit, const TimelineStep& step);
   void take(Visit& visit, const PlannedCapture& planned);
+  std::vector<ViewOutcome> take_frames(Visit& visit, const PlannedCapture& planned,
+                                       std::vector<Frame>& frames);
+  void prepare_renderer(const Visit& visit);
   Frame make_frame(Visit& visit, std::size_t camera, int capture);
   Image<Rgba8> make_overview(Visit& visit, int capture);
   VisitReport report_on(const Visit& visit) const;

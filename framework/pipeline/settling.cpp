@@ -157,4 +157,11 @@ void SavedNodes::restore(Scene& scene) const {
   }
 }
 
+void SavedNodes::restore_poses(Scene& scene) const {
+  for (const auto& [node, saved] : nodes_) {
+    if (scene[node].parent_from_node.matrix() == saved.parent_from_node.matrix()) continue;
+    scene.set_pose(node, saved.parent_from_node);
+  }
+}
+
 }  // namespace diorama

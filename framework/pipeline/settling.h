@@ -63,6 +63,8 @@ class SavedNodes {
   /// Saves all nodes outside the subtrees of `without`.
   SavedNodes(const Scene& scene, const std::vector<NodeId>& without);
   void restore(Scene& scene) const;
+  /// Enough when no shape has changed since; touches only what moved.
+  void restore_poses(Scene& scene) const;
 
  private:
   std::vector<std::pair<NodeId, Node>> nodes_;

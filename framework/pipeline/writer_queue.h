@@ -16,6 +16,7 @@ struct PendingCapture {
   Capture capture;
   Image<Rgba8> overview;    ///< Empty unless this capture carries the visit's overview picture.
   std::string settle_json;  ///< Empty unless this capture is the visit's last.
+  std::string views_json;   ///< Empty unless the job has conditions for its views.
 };
 
 /// Memory that a capture's pictures hold, from above.

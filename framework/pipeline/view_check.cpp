@@ -1,0 +1,466 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/pipeline/view_check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <set>
+#include <span>
+#include <utility>
+
+#include "framework/annotators/instance_ids.h"
+#include "framework/annotators/instances.h"
+#include "framework/annotators/visibility.h"
+
+namespace diorama {
+namespace {
+
+// A view that fails before anything is traced is farther from holding than any that is traced.
+constexpr double kUntraced = 1000.0;
+// More than any target is short of.
+constexpr double kNoTarget = 100.0;
+
+constexpr double degrees(double radians) { return radians * 180.0 / kPi; }
+
+/// A labelled thing that rules may ask for.
+struct Target {
+  LabelledInstance instance;
+  std::string path;
+  Labels labels;
+  Affine node_from_world;
+  Vec3 middle_node;
+  Vec3 middle_world;
+  double radius_m = 0.0;  ///< Of a ball round its box.
+};
+
+/// Everything that rules ask of a target, as far as it is known.
+struct Measures {
+  double distance_m = 0.0;
+  double azimuth_deg = 0.0;
+  double elevation_deg = 0.0;
+  double visible_pixels = 0.0;
+  double visible_share = 0.0;
+  double occlusion = 0.0;
+  double truncation = 0.0;
+  double size_px = 0.0;
+  double size_share = 0.0;
+  double occluders = 0.0;
+};
+
+/// How a target does: the first condition that it misses, and how far it is off in all.
+struct Score {
+  const char* failed = nullptr;
+  double shortfall = 0.0;
+  void take(const char* key, const Limits& limits, double value) {
+    if (limits.hold(value)) return;
+    if (!failed) failed = key;
+    shortfall += std::max(limits.shortfall(value), 1e-3);
+  }
+};
+
+bool is_about_place(const std::string& of) {
+  return of == "label" || of == "direction" || of == "distance_m" || of == "azimuth_deg" ||
+         of == "elevation_deg";
+}
+
+bool needs_coverage(const ViewRule& rule) {
+  const bool by_limits = rule.visible_share.is_set() || rule.occlusion.is_set() ||
+                         rule.truncation.is_set() || rule.occluders.is_set();
+  return by_limits || std::any_of(rule.quotas.begin(), rule.quotas.end(), [](const Quota& quota) {
+           return quota.of == "visible_share" || quota.of == "occlusion" ||
+                  quota.of == "truncation" || quota.of == "occluders";
+         });
+}
+
+Target target_of(const Scene& scene, const LabelledInstance& instance) {
+  Target target;
+  target.instance = instance;
+  target.path = scene.path(instance.node);
+  target.labels = scene.effective_labels(instance.node);
+  const Affine world_from_node = scene.world_from_node(instance.node);
+  target.node_from_world = world_from_node.inverse();
+  const Aabb box = instance_bounds(scene, instance);
+  target.middle_node = box.centre();
+  target.middle_world = world_from_node * target.middle_node;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vec3 point((corner & 1 ? box.max : box.min).x(), (corner & 2 ? box.max : box.min).y(),
+                     (corner & 4 ? box.max : box.min).z());
+    target.radius_m =
+        std::max(target.radius_m, (world_from_node * point - target.middle_world).norm());
+  }
+  return target;
+}
+
+void measure_place(const Target& target, const ViewRule& rule, const Vec3& camera_world,
+                   Measures& measures) {
+  measures.distance_m = (target.middle_world - camera_world).norm();
+  const Vec3 view = rule.direction_space == "world"
+                        ? Vec3(camera_world - target.middle_world)
+                        : Vec3(target.node_from_world * camera_world - target.middle_node);
+  if (!view.allFinite() || view.norm() == 0.0) return;
+  measures.azimuth_deg = turned_into(rule.azimuth_deg, degrees(std::atan2(view.y(), view.x())));
+  measures.elevation_deg = degrees(std::asin(std::clamp(view.z() / view.norm(), -1.0, 1.0)));
+}
+
+void score_place(const ViewRule& rule, const Measures& measures, Score& score) {
+  score.take("distance_m", rule.distance_m, measures.distance_m);
+  score.take("azimuth_deg", rule.azimuth_deg, measures.azimuth_deg);
+  score.take("elevation_deg", rule.elevation_deg, measures.elevation_deg);
+}
+
+void score_pixels(const ViewRule& rule, const Measures& measures, Score& score) {
+  static const Limits kSeen{1.0, std::nullopt};
+  score.take("visible_pixels", kSeen, measures.visible_pixels);
+  score.take("visible_pixels", rule.visible_pixels, measures.visible_pixels);
+  score.take("size_px", rule.size_px, measures.size_px);
+  score.take("size_share", rule.size_share, measures.size_share);
+}
+
+void score_coverage(const ViewRule& rule, const Measures& measures, Score& score) {
+  score.take("truncation", rule.truncation, measures.truncation);
+  score.take("occlusion", rule.occlusion, measures.occlusion);
+  score.take("visible_share", rule.visible_share, measures.visible_share);
+  score.take("occluders", rule.occluders, measures.occluders);
+}
+
+std::string label_of(const Target& target, const ViewRule& rule) {
+  const auto label = target.labels.find(rule.taxonomy);
+  return label == target.labels.end() ? std::string() : label->second;
+}
+
+std::optional<std::size_t> bin_of(const Quota& quota, const ViewRule& rule, const Target& target,
+                                  const Measures& measures) {
+  if (quota.of == "label") return quota.bin_of_label(label_of(target, rule));
+  if (quota.of == "direction") {
+    return rule.direction_bin(quota, measures.azimuth_deg, measures.elevation_deg);
+  }
+  const std::pair<const char*, double> numbers[] = {
+      {"distance_m", measures.distance_m},       {"azimuth_deg", measures.azimuth_deg},
+      {"elevation_deg", measures.elevation_deg}, {"visible_pixels", measures.visible_pixels},
+      {"visible_share", measures.visible_share}, {"occlusion", measures.occlusion},
+      {"truncation", measures.truncation},       {"size_px", measures.size_px},
+      {"size_share", measures.size_share},       {"occluders", measures.occluders}};
+  for (const auto& [key, value] : numbers) {
+    if (quota.of == key) return quota.bin_of(value);
+  }
+  return std::nullopt;
+}
+
+std::string full_name(const ViewRule& rule, const std::string& key) {
+  return rule.name + "." + key;
+}
+
+/// The largest angle off the axis that the picture shows; pi where its edge shows nothing.
+double widest_angle(const Camera& camera) {
+  constexpr int kSteps = 8;
+  double widest = 0.0;
+  for (int i = 0; i <= kSteps; ++i) {
+    const double x = double(camera.width) * i / kSteps;
+    const double y = double(camera.height) * i / kSteps;
+    for (const Vec2& pixel :
+         {Vec2(x, 0), Vec2(x, camera.height), Vec2(0, y), Vec2(camera.width, y)}) {
+      const auto ray = ray_direction(camera, pixel);
+      if (!ray) return kPi;
+      widest = std::max(widest, std::acos(std::clamp(-ray->z(), -1.0, 1.0)));
+    }
+  }
+  return widest;
+}
+
+bool may_be_seen(const Target& target, const Affine& camera_from_world, double widest) {
+  const Vec3 place = camera_from_world * target.middle_world;
+  const double distance = place.norm();
+  if (distance <= target.radius_m) return true;
+  const double angle = std::acos(std::clamp(-place.z() / distance, -1.0, 1.0));
+  return angle - std::asin(target.radius_m / distance) <= widest + 1e-6;
+}
+
+/// How many different things are seen where the target would be.
+int occluders_of(const CoverageMask& mask, std::uint32_t target,
+                 const Image<std::uint32_t>& instances, const Image<std::uint32_t>& leaves) {
+  std::set<std::uint32_t> things;
+  const PixelBox box = mask.box.clipped(instances.width(), instances.height());
+  std::uint32_t last = 0;
+  for (int y = box.y_min; y < box.y_max; ++y) {
+    for (int x = box.x_min; x < box.x_max; ++x) {
+      if (!mask.covers(x, y) || instances.at(x, y) == target) continue;
+      const std::uint32_t labelled = instances.at(x, y);
+      // No labelled node's id is that of a leaf below another one.
+      const std::uint32_t thing = labelled != 0 ? labelled : leaves.at(x, y);
+      if (thing == 0 || thing == last) continue;
+      things.insert(last = thing);
+    }
+  }
+  return int(things.size());
+}
+
+/// Which of the targets of a rule score how; as many entries as the rule has targets.
+struct Scored {
+  const Target* target = nullptr;
+  Measures measures;
+  Score score;
+};
+
+/// What stands in the way of `count` targets that hold: the misses of those that are nearest to it.
+ViewVerdict missing_targets(const ViewRule& rule, std::vector<Scored> scored, std::size_t holding) {
+  ViewVerdict verdict;
+  std::erase_if(scored, [](const Scored& one) { return !one.score.failed; });
+  std::stable_sort(scored.begin(), scored.end(), [](const Scored& a, const Scored& b) {
+    return a.score.shortfall < b.score.shortfall;
+  });
+  const double wanted = rule.count.min.value_or(0.0) - double(holding);
+  for (std::size_t i = 0; double(i) < wanted; ++i) {
+    verdict.shortfall += i < scored.size() ? scored[i].score.shortfall : kNoTarget;
+  }
+  verdict.failed = {full_name(rule, scored.empty() ? "count" : scored.front().score.failed)};
+  return verdict;
+}
+
+}  // namespace
+
+void ViewVerdict::add(const ViewVerdict& other) {
+  failed.insert(failed.end(), other.failed.begin(), other.failed.end());
+  shortfall += other.shortfall;
+}
+
+struct ViewCheck::State {
+  std::vector<LabelledInstance> instances;
+  std::vector<std::uint32_t> instance_of_leaf;
+  std::vector<Target> targets;
+  std::map<const ViewRule*, std::vector<const Target*>> of_rule;
+
+  const std::vector<const Target*>& targets_of(const ViewRule& rule) const {
+    return of_rule.at(&rule);
+  }
+
+  std::vector<Scored> by_place(const ViewRule& rule, const Vec3& camera_world) const {
+    std::vector<Scored> list;
+    for (const Target* target : targets_of(rule)) {
+      Scored scored;
+      scored.target = target;
+      measure_place(*target, rule, camera_world, scored.measures);
+      score_place(rule, scored.measures, scored.score);
+      list.push_back(std::move(scored));
+    }
+    return list;
+  }
+};
+
+namespace {
+
+std::size_t count_holding(const std::vector<Scored>& scored) {
+  return std::size_t(std::count_if(scored.begin(), scored.end(),
+                                   [](const Scored& one) { return !one.score.failed; }));
+}
+
+/// Whether the target lies in the wanted bins; the first one that it misses.
+const Quota* missed_quota(const WantedView& wanted, const Scored& scored, bool only_of_place) {
+  for (std::size_t i = 0; i < wanted.bins.size(); ++i) {
+    const Quota& quota = wanted.rule->quotas[i];
+    if (!wanted.bins[i] || (only_of_place && !is_about_place(quota.of))) continue;
+    if (bin_of(quota, *wanted.rule, *scored.target, scored.measures) != wanted.bins[i]) {
+      return &quota;
+    }
+  }
+  return nullptr;
+}
+
+ViewVerdict refused(const ViewRule& rule, const std::string& key, double shortfall) {
+  return {{full_name(rule, key)}, shortfall};
+}
+
+bool wants_bins(const WantedView& wanted) {
+  return std::any_of(wanted.bins.begin(), wanted.bins.end(),
+                     [](const auto& bin) { return bin.has_value(); });
+}
+
+/// All that a rule says, once its targets have been scored.
+ViewVerdict judge(const WantedView& wanted, const std::vector<Scored>& scored) {
+  const ViewRule& rule = *wanted.rule;
+  const std::size_t holding = count_holding(scored);
+  if (rule.count.min && double(holding) < *rule.count.min) {
+    return missing_targets(rule, scored, holding);
+  }
+  if (rule.count.max && double(holding) > *rule.count.max) {
+    return refused(rule, "count", double(holding) - *rule.count.max);
+  }
+  if (rule.every_target) {
+    ViewVerdict verdict;
+    for (const Scored& one : scored) {
+      if (one.measures.visible_pixels < 1.0 || !one.score.failed) continue;
+      if (verdict.failed.empty()) verdict.failed = {full_name(rule, one.score.failed)};
+      verdict.shortfall += one.score.shortfall;
+    }
+    if (!verdict.holds()) return verdict;
+  }
+  if (!wants_bins(wanted)) return {};
+  const Scored* main = nullptr;
+  for (const Scored& one : scored) {
+    const bool is_larger =
+        !one.score.failed && (!main || one.measures.visible_pixels > main->measures.visible_pixels);
+    if (is_larger) main = &one;
+  }
+  if (!main) return refused(rule, "count", 1.0);
+  if (const Quota* missed = missed_quota(wanted, *main, false)) {
+    return refused(rule, "quotas." + missed->of, 1.0);
+  }
+  return {};
+}
+
+}  // namespace
+
+ViewCheck::ViewCheck(const Scene& scene, const std::vector<const ViewRule*>& rules)
+    : state_(std::make_unique<State>()) {
+  state_->instances = labelled_instances(scene);
+  state_->instance_of_leaf = instance_of_leaf(state_->instances);
+  std::map<const ViewRule*, std::set<NodeId>> wanted;
+  std::set<NodeId> all;
+  for (const ViewRule* rule : rules) {
+    const std::vector<NodeId> nodes = scene.match(rule->targets);
+    wanted[rule] = {nodes.begin(), nodes.end()};
+    all.insert(nodes.begin(), nodes.end());
+  }
+  for (const LabelledInstance& instance : state_->instances) {
+    if (all.contains(instance.node)) state_->targets.push_back(target_of(scene, instance));
+  }
+  for (const ViewRule* rule : rules) {
+    std::vector<const Target*>& own = state_->of_rule[rule];
+    for (const Target& target : state_->targets) {
+      if (!wanted[rule].contains(target.instance.node)) continue;
+      const bool has_label =
+          rule->labels.empty() || std::find(rule->labels.begin(), rule->labels.end(),
+                                            label_of(target, *rule)) != rule->labels.end();
+      if (has_label) own.push_back(&target);
+    }
+  }
+}
+
+ViewCheck::~ViewCheck() = default;
+ViewCheck::ViewCheck(ViewCheck&&) noexcept = default;
+ViewCheck& ViewCheck::operator=(ViewCheck&&) noexcept = default;
+
+bool ViewCheck::has_targets(const ViewRule& rule) const {
+  return double(state_->targets_of(rule).size()) >= rule.count.min.value_or(0.0);
+}
+
+bool ViewCheck::has_label(const ViewRule& rule, const std::string& label) const {
+  const auto& targets = state_->targets_of(rule);
+  return std::any_of(targets.begin(), targets.end(),
+                     [&](const Target* target) { return label_of(*target, rule) == label; });
+}
+
+ViewVerdict ViewCheck::by_place(const Scene& scene, NodeId camera, const WantedView& wanted) const {
+  const ViewRule& rule = *wanted.rule;
+  const Affine world_from_camera = scene.world_from_node(camera);
+  const Affine camera_from_world = world_from_camera.inverse();
+  const double widest = widest_angle(*scene[camera].camera);
+  std::vector<Scored> scored = state_->by_place(rule, world_from_camera.translation());
+  for (Scored& one : scored) {
+    if (may_be_seen(*one.target, camera_from_world, widest)) continue;
+    if (!one.score.failed) one.score.failed = "visible_pixels";
+    one.score.shortfall += 1.0;
+  }
+  const std::size_t possible = count_holding(scored);
+  if (rule.count.min && double(possible) < *rule.count.min) {
+    ViewVerdict verdict = missing_targets(rule, std::move(scored), possible);
+    verdict.shortfall += kUntraced;
+    return verdict;
+  }
+  if (!wants_bins(wanted)) return {};
+  const Quota* missed = nullptr;
+  for (const Scored& one : scored) {
+    if (one.score.failed) continue;
+    missed = missed_quota(wanted, one, true);
+    if (!missed) return {};
+  }
+  return refused(rule, missed ? "quotas." + missed->of : "count", kUntraced);
+}
+
+ViewVerdict ViewCheck::by_labels(const Scene& scene, NodeId camera,
+                                 const std::vector<WantedView>& wanted,
+                                 const Labels& labels) const {
+  const Vec3 camera_world = scene.world_from_node(camera).translation();
+  const Image<std::uint32_t> leaves = labels.render();
+  const Image<std::uint32_t> ids = instance_ids(state_->instance_of_leaf, leaves);
+  const std::map<std::uint32_t, std::int64_t> pixels = count_pixels(ids);
+  std::vector<Instance> seen;
+  std::vector<LabelledInstance> seen_instances;
+  for (const Target& target : state_->targets) {
+    if (!pixels.contains(target.instance.node.index)) continue;
+    Instance instance;
+    instance.id = target.instance.node.index;
+    instance.node_path = target.path;
+    seen.push_back(std::move(instance));
+    seen_instances.push_back(target.instance);
+  }
+  measure_tight_boxes(ids, seen);
+  std::map<std::uint32_t, Measures> measures;
+  for (const Instance& instance : seen) {
+    Measures& own = measures[instance.id];
+    own.visible_pixels = double(pixels.at(instance.id));
+    const PixelBox& box = *instance.tight_box;
+    own.size_px = std::max(box.width(), box.height());
+    own.size_share =
+        std::max(double(box.width()) / ids.width(), double(box.height()) / ids.height());
+  }
+  bool is_covered = false;
+  const auto measure_coverage = [&] {
+    if (std::exchange(is_covered, true)) return;
+    const std::vector<CoverageMask> masks = labels.cover(seen_instances);
+    Frame frame;
+    frame.camera_path = scene.path(camera);
+    frame.camera = *scene[camera].camera;
+    frame.set(kInstanceId, ids);
+    frame.instances = seen;
+    measure_visibility(masks, false, frame);
+    for (std::size_t i = 0; i < seen.size(); ++i) {
+      const Visibility& visibility = *frame.instances[i].visibility;
+      Measures& own = measures.at(seen[i].id);
+      const double all = double(visibility.amodal_pixels + visibility.outside_pixels);
+      own.visible_share = all > 0.0 ? double(visibility.visible_pixels) / all : 0.0;
+      own.occlusion = visibility.occlusion().value_or(1.0);
+      own.truncation = visibility.truncation();
+      own.occluders = occluders_of(masks[i], seen[i].id, ids, leaves);
+    }
+  };
+  ViewVerdict verdict;
+  for (const WantedView& one : wanted) {
+    const ViewRule& rule = *one.rule;
+    std::vector<Scored> scored = state_->by_place(rule, camera_world);
+    const auto score = [&](const auto& add) {
+      for (Scored& target : scored) {
+        const auto known = measures.find(target.target->instance.node.index);
+        Measures own = known == measures.end() ? Measures() : known->second;
+        own.distance_m = target.measures.distance_m;
+        own.azimuth_deg = target.measures.azimuth_deg;
+        own.elevation_deg = target.measures.elevation_deg;
+        target.measures = own;
+        add(rule, own, target.score);
+      }
+    };
+    score(score_pixels);
+    // What shares and coverage say makes no target hold that does not hold without them.
+    const std::size_t possible = count_holding(scored);
+    const bool is_lost = rule.count.min && double(possible) < *rule.count.min;
+    if (!is_lost && needs_coverage(rule)) {
+      measure_coverage();
+      score(score_coverage);
+    }
+    verdict.add(is_lost ? missing_targets(rule, std::move(scored), possible) : judge(one, scored));
+  }
+  return verdict;
+}
+
+ViewVerdict judge_brightness(const ViewRule& rule, const Image<Rgba8>& picture) {
+  std::uint64_t sum = 0;
+  for (const Rgba8& pixel : picture.pixels()) {
+    sum += std::uint64_t(pixel[0]) + pixel[1] + pixel[2];
+  }
+  const double mean =
+      double(sum) / (3.0 * 255.0 * double(std::max<std::size_t>(picture.pixels().size(), 1)));
+  if (rule.brightness.hold(mean)) return {};
+  return refused(rule, "brightness", rule.brightness.shortfall(mean));
+}
+
+}  // namespace diorama

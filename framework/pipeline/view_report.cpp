@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/pipeline/view_report.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "diorama/error.h"
+
+namespace diorama {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::string dumped(const Json& json, int indent) {
+  return json.dump(indent, ' ', false, Json::error_handler_t::replace);
+}
+
+ViewCounts counts_from(const Json& json) {
+  ViewCounts counts;
+  counts.views = json.at("views").get<std::int64_t>();
+  counts.draws = json.at("draws").get<std::int64_t>();
+  for (const auto& [condition, count] : json.at("refused").items()) {
+    counts.refused[condition] = count.get<std::int64_t>();
+  }
+  for (const auto& [quota, parts] : json.at("quotas").items()) {
+    for (const auto& [part, count] : parts.items()) {
+      counts.parts[quota][part] = count.get<std::int64_t>();
+    }
+  }
+  for (const Json& one : json.at("unmet")) {
+    counts.unmet.push_back({one.at("capture").get<int>(), one.at("camera").get<std::string>(),
+                            one.at("conditions").get<std::vector<std::string>>()});
+  }
+  return counts;
+}
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
+  return text;
+}
+
+}  // namespace
+
+void ViewCounts::add(int capture, const std::vector<ViewOutcome>& outcomes) {
+  for (const ViewOutcome& outcome : outcomes) {
+    ++views;
+    draws += outcome.draws;
+    for (const auto& [condition, count] : outcome.refused) refused[condition] += count;
+    if (!outcome.unmet.empty()) {
+      unmet.push_back({capture, outcome.camera, outcome.unmet});
+      continue;
+    }
+    for (const auto& [quota, part] : outcome.parts) ++parts[quota][part];
+  }
+}
+
+std::string outcomes_json(const std::vector<ViewOutcome>& outcomes) {
+  Json list = Json::array();
+  for (const ViewOutcome& outcome : outcomes) {
+    list.push_back({{"camera", outcome.camera},
+                    {"draws", outcome.draws},
+                    {"refused", outcome.refused},
+                    {"unmet", outcome.unmet},
+                    {"quotas", outcome.parts}});
+  }
+  return dumped(list, -1);
+}
+
+std::vector<ViewOutcome> outcomes_from_json(std::string_view text) {
+  try {
+    std::vector<ViewOutcome> outcomes;
+    for (const Json& one : Json::parse(text)) {
+      outcomes.push_back({one.at("camera").get<std::string>(), one.at("draws").get<int>(),
+                          one.at("refused").get<std::map<std::string, int>>(),
+                          one.at("unmet").get<std::vector<std::string>>(),
+                          one.at("quotas").get<std::map<std::string, std::string>>()});
+    }
+    return outcomes;
+  } catch (const Json::exception& error) {
+    throw Error(ErrorKind::Output,
+                std::string("the journal's record of views cannot be read: ") + error.what());
+  }
+}
+
+std::string views_json(const ViewCounts& counts) {
+  Json json;
+  json["views"] = counts.views;
+  json["draws"] = counts.draws;
+  json["refused"] = Json::object();
+  for (const auto& [condition, count] : counts.refused) json["refused"][condition] = count;
+  json["quotas"] = Json::object();
+  for (const auto& [quota, parts] : counts.parts) {
+    for (const auto& [part, count] : parts) json["quotas"][quota][part] = count;
+  }
+  json["unmet"] = Json::array();
+  for (const auto& one : counts.unmet) {
+    json["unmet"].push_back(
+        {{"capture", one.capture}, {"camera", one.camera}, {"conditions", one.conditions}});
+  }
+  return dumped(json, 1) + "\n";
+}
+
+std::string views_text(std::string_view json) {
+  const Json parsed = Json::parse(json, nullptr, false);
+  if (!parsed.is_object()) return {};
+  try {
+    return views_text(counts_from(parsed));
+  } catch (const Json::exception&) {
+    return {};  // somebody else's file of that name
+  }
+}
+
+std::string views_text(const ViewCounts& counts) {
+  if (counts.views == 0) return {};
+  std::int64_t refused = 0;
+  std::vector<std::pair<std::int64_t, std::string>> by_count;
+  for (const auto& [condition, count] : counts.refused) {
+    refused += count;
+    by_count.emplace_back(-count, condition);
+  }
+  std::sort(by_count.begin(), by_count.end());
+  std::string text = "views: " + std::to_string(counts.views) + " of " +
+                     std::to_string(counts.draws) + " draws; " + std::to_string(refused) +
+                     " refused";
+  const char* front = ": ";
+  for (const auto& [count, condition] : by_count) {
+    text += front + condition + " " + std::to_string(-count);
+    front = ", ";
+  }
+  text += "\n";
+  for (const auto& [quota, parts] : counts.parts) {
+    // One line each, as far as anybody reads it.
+    constexpr std::size_t kMostParts = 12;
+    std::int64_t least = parts.begin()->second;
+    std::int64_t most = least;
+    std::string list;
+    for (const auto& [part, count] : parts) {
+      least = std::min(least, count);
+      most = std::max(most, count);
+      list += (list.empty() ? "" : ", ") + part + ": " + std::to_string(count);
+    }
+    text += "quota " + quota + ": ";
+    text += parts.size() <= kMostParts
+                ? list
+                : std::to_string(parts.size()) + " parts with " + std::to_string(least) + " to " +
+                      std::to_string(most) + " views";
+    text += "\n";
+  }
+  if (counts.unmet.empty()) return text;
+  constexpr std::size_t kNamed = 10;
+  text += std::to_string(counts.unmet.size()) + " views do not hold what 'views' asks for:\n";
+  for (std::size_t i = 0; i < std::min(kNamed, counts.unmet.size()); ++i) {
+    const ViewCounts::Unmet& one = counts.unmet[i];
+    text += "  capture " + std::to_string(one.capture) + ", " + one.camera + ": " +
+            joined(one.conditions) + "\n";
+  }
+  if (counts.unmet.size() > kNamed) {
+    text += "  and " + std::to_string(counts.unmet.size() - kNamed) + " more, in views.json\n";
+  }
+  return text;
+}
+
+}  // namespace diorama

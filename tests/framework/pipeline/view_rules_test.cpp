@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/pipeline/view_rules.h"
+
+#include <cmath>
+#include <map>
+
+#include "diorama/error.h"
+#include "framework/config/value_text.h"
+#include "framework/pipeline/capture_plan.h"
+#include "framework/pipeline/view_report.h"
+#include "framework/pipeline/view_search.h"
+#include "jobs.h"
+#include "support/catch.h"
+
+using namespace diorama;
+using namespace diorama::test;
+
+namespace {
+
+std::string job_with_views(const std::string& entry) {
+  return good_job() + "views: [" + entry + "]\n";
+}
+
+}  // namespace
+
+TEST_CASE("Of every block of views each part of a quota gets its share exactly", "[views]") {
+  Quota quota;
+  quota.labels = {"banana", "mug", "can"};
+  quota.shares = {1, 3, 2};
+  const Rng rng = JobStreams(5).views("seen", 0);
+  std::map<std::size_t, int> counts;
+  std::string order;
+  for (std::uint64_t view = 0; view < 600; ++view) {
+    const std::size_t bin = quota_bin(quota, rng, view);
+    ++counts[bin];
+    order += char('0' + bin);
+    if (view % 6 != 5) continue;
+    CHECK(counts[0] * 3 == counts[1]);
+    CHECK(counts[0] * 2 == counts[2]);
+  }
+  CHECK(order.substr(0, 6) != order.substr(6, 6));  // no pattern that anything else may share
+  CHECK(quota_bin(quota, rng, 123) == std::size_t(order[123] - '0'));
+}
+
+TEST_CASE("Views of a rule are counted without gaps over captures, series and cameras", "[views]") {
+  // Per visit two floating captures and a dropped one.
+  const Job job =
+      job_from(job_with_views("{name: a, on: [floating]}, {name: b, on: [dropped]}, "
+                              "{name: c}"));
+  const auto numbers = [&](std::size_t rule, const std::vector<int>& captures) {
+    std::vector<std::uint64_t> list;
+    for (const int capture : captures) {
+      for (std::size_t camera = 0; camera < 2; ++camera) {
+        list.push_back(view_number(job, job.views[rule], capture, camera, 2));
+      }
+    }
+    return list;
+  };
+  using Numbers = std::vector<std::uint64_t>;
+  CHECK(numbers(0, {0, 1, 3, 4}) == Numbers{0, 1, 2, 3, 4, 5, 6, 7});
+  CHECK(numbers(1, {2, 5}) == Numbers{0, 1, 2, 3});
+  CHECK(numbers(2, {0, 1, 2, 3}) == Numbers{0, 1, 2, 3, 4, 5, 6, 7});
+}
+
+TEST_CASE("Directions fall into cells of equal area within the rule's limits", "[views]") {
+  ViewRule rule;
+  rule.azimuth_deg.min = -90.0;
+  rule.azimuth_deg.max = 90.0;
+  rule.elevation_deg.min = 0.0;
+  Quota quota;
+  quota.of = "direction";
+  quota.columns = 3;
+  quota.rows = 2;
+  std::map<std::size_t, int> counts;
+  Rng rng(3);
+  int inside = 0;
+  for (int i = 0; i < 60000; ++i) {
+    const Vec3 direction = rng.unit_vector();
+    const auto bin =
+        rule.direction_bin(quota, std::atan2(direction.y(), direction.x()) * 180.0 / kPi,
+                           std::asin(direction.z()) * 180.0 / kPi);
+    CHECK(bin.has_value() == (direction.x() >= 0.0 && direction.z() >= 0.0));
+    if (!bin) continue;
+    ++inside;
+    ++counts[*bin];
+  }
+  REQUIRE(counts.size() == 6);
+  for (const auto& [bin, count] : counts) CHECK(std::abs(count - inside / 6) < 250);
+  CHECK(rule.direction_bin(quota, -89.0, 1.0) == 0u);
+  CHECK(rule.direction_bin(quota, 271.0, 1.0) == 0u);
+  CHECK(rule.direction_bin(quota, 89.0, 89.0) == 5u);
+}
+
+TEST_CASE("Mistakes in views are named with the nearest key", "[views]") {
+  const auto complaints = [](const std::string& entry) {
+    return complaints_about(job_with_views(entry));
+  };
+  CHECK_THAT(complaints("{truncaton: {max: 0.1}}"),
+             ContainsSubstring("views[0]") && ContainsSubstring("truncaton") &&
+                 ContainsSubstring("did you mean 'truncation'?"));
+  CHECK_THAT(complaints("{truncation: {mx: 0.1}}"), ContainsSubstring("did you mean 'max'?"));
+  CHECK_THAT(complaints("{truncation: {max: 2}}"), ContainsSubstring("views[0].truncation.max"));
+  CHECK_THAT(complaints("{distance_m: {min: 2, max: 1}}"),
+             ContainsSubstring("views[0].distance_m: min (2) is greater than max (1)"));
+  CHECK_THAT(complaints("{on: [droped]}"),
+             ContainsSubstring("unknown capture series 'droped'; did you mean 'dropped'?"));
+  CHECK_THAT(complaints("{on: [environment]}"), ContainsSubstring("unknown capture series"));
+  CHECK_THAT(complaints("{at_limit: keep}"), ContainsSubstring("keep_best"));
+  CHECK_THAT(complaints("{quotas: [{of: distance}]}"), ContainsSubstring("distance_m"));
+  CHECK_THAT(complaints("{quotas: [{of: label, labels: [a]}]}"),
+             ContainsSubstring("views[0].quotas[0].labels: expected two or more different labels"));
+  CHECK_THAT(complaints("{quotas: [{of: distance_m, edges: [1, 2, 2]}]}"),
+             ContainsSubstring("views[0].quotas[0].edges: expected three or more rising numbers"));
+  CHECK_THAT(complaints("{quotas: [{of: distance_m, edges: [1, 2, 3], shares: [1]}]}"),
+             ContainsSubstring("views[0].quotas[0].shares: expected 2 numbers"));
+  CHECK_THAT(complaints("{quotas: [{of: distance_m, edges: [1, 2, 3], shares: [0.5, 1]}]}"),
+             ContainsSubstring("expected whole numbers"));
+  CHECK_THAT(complaints("{name: a}, {name: a}"),
+             ContainsSubstring("views[1]: another entry is called 'a'"));
+  CHECK(complaints("{truncation: {max: 0.1}}").empty());
+}
+
+TEST_CASE("The resolved job has the views with all defaults and means the same", "[views]") {
+  const std::string yaml = job_with_views(
+      "{truncation: {max: 0.1}, quotas: [{of: distance_m, edges: [1, 2, 3], shares: [1, 2]}]}");
+  const auto nothing = [](ComponentKind, std::string_view) {
+    return std::optional<std::vector<ParamSpec>>();
+  };
+  const std::string text = to_yaml(resolved_job(job_value(yaml), nothing));
+  const Job again = job_from(text);
+  REQUIRE(again.views.size() == 1);
+  CHECK(again.views[0].name == "views_0");
+  CHECK(again.views[0].truncation.max == 0.1);
+  CHECK_FALSE(again.views[0].truncation.min);
+  CHECK(again.views[0].count.min == 1.0);
+  CHECK(again.views[0].quotas[0].shares == std::vector<double>{1, 2});
+  CHECK(to_yaml(resolved_job(job_value(text), nothing)) == text);
+}
+
+TEST_CASE("How views came about survives the journal and is added up", "[views]") {
+  const std::vector<ViewOutcome> first{
+      {"cam_0", 5, {{"seen.truncation", 3}, {"seen.count", 1}}, {}, {{"seen.label", "mug"}}}};
+  const std::vector<ViewOutcome> second{
+      {"cam_0", 2, {{"seen.truncation", 2}}, {"seen.truncation"}, {{"seen.label", "can"}}}};
+  ViewCounts counts;
+  counts.add(0, outcomes_from_json(outcomes_json(first)));
+  counts.add(1, outcomes_from_json(outcomes_json(second)));
+  const std::string text = views_text(views_json(counts));
+  CHECK(text == views_text(counts));
+  CHECK_THAT(text, ContainsSubstring("views: 2 of 7 draws; 6 refused: seen.truncation 5, "
+                                     "seen.count 1"));
+  CHECK_THAT(text, ContainsSubstring("quota seen.label: mug: 1"));
+  CHECK_THAT(text, !ContainsSubstring("can: 1"));
+  CHECK_THAT(text, ContainsSubstring("capture 1, cam_0: seen.truncation"));
+  CHECK(views_text("[1]").empty());
+  CHECK(views_text("no json").empty());
+  CHECK_THROWS_AS(outcomes_from_json("{"), Error);
+}
