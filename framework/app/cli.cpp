@@ -35,6 +35,7 @@
 #include "framework/app/command_sensors.h"
 #include "framework/app/command_stats.h"
 #include "framework/app/command_status.h"
+#include "framework/app/command_view.h"
 #include "framework/app/exit_codes.h"
 #include "framework/app/options.h"
 #include "framework/config/clean_text.h"
@@ -67,6 +68,9 @@ struct CommandLine {
   SensorsOptions sensors;
   LintOptions lint;
   StatsOptions stats;
+  ViewOptions view;
+  bool no_browser = false;
+  ReportOptions report;
   ConvertOptions convert;
   ReplayOptions replay;
   DiffOptions diff;
@@ -433,6 +437,57 @@ void add_stats(CLI::App& app, CommandLine& line) {
   });
 }
 
+void add_view(CLI::App& app, CommandLine& line) {
+  CLI::App* command = app.add_subcommand("view", "Show a dataset on a page in the browser");
+  command->add_option("dataset", line.view.dataset, "A dataset's folder, or the output of a run")
+      ->required()
+      ->type_name("FOLDER");
+  command->add_option("--port", line.view.port, "Port of this machine; 0: one that is free")
+      ->check(CLI::Range(0, 65535))
+      ->type_name("N")
+      ->capture_default_str();
+  command->add_flag("--no-browser", line.no_browser, "Print the address only");
+  command
+      ->add_option("--idle-minutes", line.view.idle_minutes,
+                   "End when no page has asked for so long; 0: never")
+      ->check(CLI::Range(0, 1 << 20))
+      ->type_name("N")
+      ->capture_default_str();
+  command->add_option("--reader", line.view.reader, "Reader to use; default: the one that knows it")
+      ->type_name("TYPE");
+  command->callback([&line] {
+    line.command = [&line](ConsoleLog& log) {
+      line.view.opens_browser = !line.no_browser;
+      return command_view(line.global, line.view, log);
+    };
+  });
+}
+
+void add_report(CLI::App& app, CommandLine& line) {
+  CLI::App* command =
+      app.add_subcommand("report", "Write the page of view as files that need no program");
+  command->add_option("dataset", line.report.dataset, "A dataset's folder, or the output of a run")
+      ->required()
+      ->type_name("FOLDER");
+  command->add_option("-o,--output", line.report.output, "Output folder")
+      ->required()
+      ->type_name("DIR");
+  command
+      ->add_option("--captures", line.report.captures,
+                   "Show so many captures at most, spread over the dataset; counts are of all")
+      ->check(CLI::Range(1, 1 << 20))
+      ->type_name("N")
+      ->capture_default_str();
+  command
+      ->add_option("--reader", line.report.reader, "Reader to use; default: the one that knows it")
+      ->type_name("TYPE");
+  command->callback([&line] {
+    line.command = [&line](ConsoleLog& log) {
+      return command_report(line.global, line.report, log);
+    };
+  });
+}
+
 void add_conversion(CLI::App* command, CommandLine& line) {
   command
       ->add_option("--writer", line.convert.writers,
@@ -653,6 +708,8 @@ void add_all(CLI::App& app, CommandLine& line) {
   add_sensors(app, line);
   add_lint(app, line);
   add_stats(app, line);
+  add_view(app, line);
+  add_report(app, line);
   add_convert(app, line);
   add_merge(app, line);
   add_diff(app, line);

@@ -45,13 +45,6 @@ struct SeenCapture {
   std::size_t findings = 0;
 };
 
-std::string class_of(const Instance& instance) {
-  if (const auto label = instance.labels.find("class"); label != instance.labels.end()) {
-    return label->second;
-  }
-  return instance.labels.empty() ? std::string() : instance.labels.begin()->second;
-}
-
 std::size_t bin(double share, std::size_t bins) {
   return std::size_t(std::clamp(share * double(bins), 0.0, double(bins) - 1.0));
 }
@@ -104,21 +97,13 @@ class Measurement {
     if (instance.visibility && holds(kHoldsTruncation)) {
       seen.truncation = instance.visibility->truncation();
     }
-    if (holds(kHoldsPoses) || holds(kHoldsBoxes3d)) measure_pose(frame, instance, seen);
+    if (const auto from = seen_from(info_, frame, instance)) {
+      seen.distance_m = from->distance_m;
+      const double turn = from->azimuth / (2.0 * kPi);
+      seen.view = {bin(from->elevation / kPi + 0.5, kElevations),
+                   bin(turn < 0.0 ? turn + 1.0 : turn, kAzimuths)};
+    }
     return seen;
-  }
-
-  void measure_pose(const Frame& frame, const Instance& instance, SeenObject& seen) const {
-    const bool has_bounds = holds(kHoldsBoxes3d) && !instance.bounds_node.is_empty();
-    const Vec3 middle = has_bounds ? instance.bounds_node.centre() : Vec3(Vec3::Zero());
-    const Vec3 camera = frame.world_from_camera.translation();
-    seen.distance_m = (instance.world_from_node * middle - camera).norm();
-    const Vec3 view = instance.world_from_node.inverse() * camera - middle;
-    if (!view.allFinite() || view.norm() == 0.0) return;
-    const double azimuth = std::atan2(view.y(), view.x()) / (2.0 * kPi);
-    const double elevation = std::asin(std::clamp(view.z() / view.norm(), -1.0, 1.0)) / kPi + 0.5;
-    seen.view = {bin(elevation, kElevations),
-                 bin(azimuth < 0.0 ? azimuth + 1.0 : azimuth, kAzimuths)};
   }
 
   static void judge_color(const Image<Rgba8>& image, SeenPicture& seen) {
@@ -206,6 +191,27 @@ void add(const SeenCapture& capture, DatasetStats& stats) {
 }
 
 }  // namespace
+
+std::string class_of(const Instance& instance) {
+  if (const auto label = instance.labels.find("class"); label != instance.labels.end()) {
+    return label->second;
+  }
+  return instance.labels.empty() ? std::string() : instance.labels.begin()->second;
+}
+
+std::optional<SeenFrom> seen_from(const StoredInfo& info, const Frame& frame,
+                                  const Instance& instance) {
+  const bool has_boxes = info.holds.contains(kHoldsBoxes3d);
+  if (!has_boxes && !info.holds.contains(kHoldsPoses)) return std::nullopt;
+  const bool has_bounds = has_boxes && !instance.bounds_node.is_empty();
+  const Vec3 middle = has_bounds ? instance.bounds_node.centre() : Vec3(Vec3::Zero());
+  const Vec3 camera = frame.world_from_camera.translation();
+  const Vec3 view = instance.world_from_node.inverse() * camera - middle;
+  if (!view.allFinite() || view.norm() == 0.0) return std::nullopt;
+  return SeenFrom{(instance.world_from_node * middle - camera).norm(),
+                  std::atan2(view.y(), view.x()),
+                  std::asin(std::clamp(view.z() / view.norm(), -1.0, 1.0))};
+}
 
 void Histogram::add(double value) {
   if (std::isnan(value)) return;

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -57,6 +58,19 @@ struct ClassStats {
   /// Where in the picture the middles of boxes lie, from the top left.
   std::array<std::array<std::int64_t, kHeatColumns>, kHeatRows> places{};
 };
+
+/// Its label of the taxonomy `class`, else the first one; empty without labels.
+std::string class_of(const Instance& instance);
+
+/// From where a camera sees an object, in the object's axes; radians.
+struct SeenFrom {
+  double distance_m = 0.0;  ///< From the camera to the middle of the object's box.
+  double azimuth = 0.0;     ///< From the x axis, -pi to pi.
+  double elevation = 0.0;   ///< -pi/2 to pi/2.
+};
+/// Nothing where the dataset holds no poses.
+std::optional<SeenFrom> seen_from(const StoredInfo& info, const Frame& frame,
+                                  const Instance& instance);
 
 /// Pictures that one should look at, the first of them by name.
 struct SuspiciousPictures {

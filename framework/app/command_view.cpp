@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/app/command_view.h"
+
+#include <fcntl.h>
+#include <spawn.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <cstdlib>
+#include <fstream>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <thread>
+
+#include "diorama/error.h"
+#include "framework/app/assemble.h"
+#include "framework/config/clean_text.h"
+#include "framework/datasets/dataset_readers.h"
+#include "framework/view/dataset_view.h"
+#include "framework/view/http_server.h"
+#include "framework/view/report.h"
+
+namespace diorama {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::atomic<bool> view_is_to_end = false;
+static_assert(std::atomic<bool>::is_always_lock_free);
+
+/// The first signal ends the view in good order, the second one the program.
+void end_view(int signal) {
+  view_is_to_end = true;
+  std::signal(signal, SIG_DFL);
+}
+
+/// Starts the user's browser, if there is a desktop. The address has a secret in it, and all users
+/// of a machine see the arguments of programs: the browser gets a file that only its user reads.
+class BrowserStart {
+ public:
+  explicit BrowserStart(const std::string& address) {
+    if (std::getenv("DISPLAY") == nullptr && std::getenv("WAYLAND_DISPLAY") == nullptr) return;
+    std::error_code failed;
+    std::string pattern = (fs::temp_directory_path(failed) / "diorama_view_XXXXXX").string();
+    if (failed || mkdtemp(pattern.data()) == nullptr) return;
+    folder_ = pattern;
+    const std::string page = (folder_ / "open.html").string();
+    std::ofstream(page) << "<!DOCTYPE html><meta charset='utf-8'><meta name='referrer' "
+                           "content='no-referrer'><meta http-equiv='refresh' content='0;url="
+                        << address << "'><title>diorama view</title>\n";
+    start(page);
+  }
+  ~BrowserStart() {
+    std::error_code ignored;
+    if (!folder_.empty()) fs::remove_all(folder_, ignored);
+  }
+  BrowserStart(const BrowserStart&) = delete;
+  BrowserStart& operator=(const BrowserStart&) = delete;
+
+ private:
+  static void start(const std::string& page) {
+    posix_spawn_file_actions_t files;
+    posix_spawn_file_actions_init(&files);
+    for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+      posix_spawn_file_actions_addopen(&files, stream, "/dev/null", O_RDWR, 0);
+    }
+    std::string program = "xdg-open";
+    std::string argument = page;
+    char* const arguments[] = {program.data(), argument.data(), nullptr};
+    pid_t child = 0;
+    posix_spawnp(&child, program.c_str(), &files, nullptr, arguments, environ);
+    posix_spawn_file_actions_destroy(&files);
+  }
+
+  fs::path folder_;
+};
+
+}  // namespace
+
+int command_view(const GlobalOptions& global, const ViewOptions& options, ConsoleLog& log) {
+  const std::unique_ptr<Registry> registry = make_registry(global, log.sink());
+  warn_of_rejected(*registry, log.sink());
+  const std::unique_ptr<HostServices> host = make_host(*registry, global, std::nullopt, log.sink());
+  DatasetReaders readers(*registry, *host);
+  DatasetView view({options.dataset, options.reader}, readers, *host);
+
+  view_is_to_end = false;
+  std::signal(SIGINT, &end_view);
+  std::signal(SIGTERM, &end_view);
+  std::signal(SIGHUP, &end_view);
+  host->stop_on(view_is_to_end);
+  HttpServer::Options server_options;
+  server_options.port = options.port;
+  HttpServer server(server_options, [&view](std::string_view path) { return view.answer(path); });
+  std::cout << server.address() << std::endl;
+  log.write(LogLevel::Info,
+            "Open the address in a browser of this machine; from another one, forward its port: "
+            "ssh -L " + std::to_string(server.port()) + ":localhost:" +
+                std::to_string(server.port()) + " THIS_MACHINE. Ctrl-C ends.");
+  std::optional<BrowserStart> browser;
+  if (options.opens_browser) browser.emplace(server.address());
+
+  const std::chrono::minutes most_idle(options.idle_minutes);
+  try {
+    while (!view_is_to_end) {
+      if (options.idle_minutes > 0 && server.idle_time() >= most_idle) {
+        log.write(LogLevel::Info, "ended, as nobody has asked for " +
+                                      std::to_string(options.idle_minutes) + " minutes");
+        break;
+      }
+      if (!view.work()) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+  } catch (const Stopped&) {
+    // Ctrl-C while the index was made.
+  }
+  return 0;
+}
+
+int command_report(const GlobalOptions& global, const ReportOptions& options, ConsoleLog& log) {
+  const std::unique_ptr<Registry> registry = make_registry(global, log.sink());
+  warn_of_rejected(*registry, log.sink());
+  const std::unique_ptr<HostServices> host = make_host(*registry, global, std::nullopt, log.sink());
+  DatasetReaders readers(*registry, *host);
+  DatasetView view({options.dataset, options.reader, options.captures}, readers, *host);
+  const ReportSize size = write_report(view, options.output);
+  log.write(LogLevel::Info, "wrote " + (options.output / "index.html").string() + ": " +
+                                std::to_string(size.captures) + " captures, " +
+                                std::to_string((size.bytes + (1U << 20) - 1) >> 20) + " MiB");
+  return 0;
+}
+
+}  // namespace diorama

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/view/capture_index.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "framework/datasets/dataset_stats.h"
+
+namespace diorama {
+namespace {
+
+using Json = nlohmann::json;
+
+std::int32_t whole(double value, double least, double most) {
+  if (!std::isfinite(value)) return CaptureIndex::kUnknown;
+  return std::int32_t(std::lround(std::clamp(value, least, most)));
+}
+
+/// Whole numbers faster than a tree of JSON would write them.
+template <class Numbers>
+void add_column(std::string& text, const char* key, const Numbers& numbers, std::size_t from,
+                std::size_t to) {
+  text += text.back() == '{' ? "'" : ",'";
+  text += key;
+  text += "':[";
+  for (std::size_t i = from; i < to; ++i) {
+    if (i != from) text += ',';
+    text += std::to_string(numbers[i]);
+  }
+  text += ']';
+}
+
+/// How many each has, of where they begin.
+std::vector<std::size_t> counts(const std::vector<std::size_t>& firsts, std::size_t from,
+                                std::size_t to) {
+  std::vector<std::size_t> made;
+  for (std::size_t i = from; i < to; ++i) made.push_back(firsts[i + 1] - firsts[i]);
+  return made;
+}
+
+CaptureIndex::Object object_of(const StoredInfo& info, const Frame& frame,
+                               const Instance& instance) {
+  const auto holds = [&](std::string_view name) { return info.holds.contains(name); };
+  CaptureIndex::Object object;
+  object.name = class_of(instance);
+  const PixelBox& box = *instance.tight_box;
+  const double pixels =
+      double(std::max(frame.camera.width, 1)) * double(std::max(frame.camera.height, 1));
+  object.box_side = whole(1000.0 * std::sqrt(double(box.width()) * box.height() / pixels), 0, 1000);
+  if (instance.visibility && holds(kHoldsOcclusion)) {
+    if (const auto occlusion = instance.visibility->occlusion()) {
+      object.visible = whole(100.0 * (1.0 - *occlusion), 0, 100);
+    }
+  }
+  if (instance.visibility && holds(kHoldsTruncation)) {
+    object.truncation = whole(100.0 * instance.visibility->truncation(), 0, 100);
+  }
+  if (const auto seen = seen_from(info, frame, instance)) {
+    object.distance = whole(100.0 * seen->distance_m, 0, 1e8);
+    object.elevation = whole(seen->elevation * 180.0 / kPi, -90, 90);
+  }
+  return object;
+}
+
+}  // namespace
+
+NameSet CaptureIndex::wanted(const StoredInfo& info) {
+  NameSet names;
+  for (const std::string_view name :
+       {kHoldsInstances, kHoldsLabels, kHoldsTightBoxes, kHoldsPoses, kHoldsBounds, kHoldsBoxes3d,
+        kHoldsOcclusion, kHoldsTruncation, kHoldsCamera, kHoldsCameraPose,
+        std::string_view("visibility")}) {
+    if (info.holds.contains(name)) names.emplace(name);
+  }
+  // Boxes may follow from pixels alone.
+  if (!names.contains(kHoldsTightBoxes)) names.emplace(kInstanceId.name);
+  return names;
+}
+
+CaptureIndex::Entry CaptureIndex::entry_of(const StoredInfo& info, const StoredCapture& stored) {
+  Entry entry;
+  entry.visit = stored.capture.visit;
+  entry.phase = stored.capture.phase;
+  entry.environment = stored.capture.environment;
+  entry.split = stored.split;
+  entry.findings = std::int32_t(stored.log.findings.size());
+  for (const Frame& frame : stored.capture.frames) {
+    Picture picture;
+    const auto name = std::ranges::find(info.camera_names, frame.camera_name);
+    picture.camera = std::int32_t(name - info.camera_names.begin());
+    picture.width = frame.camera.width;
+    picture.height = frame.camera.height;
+    for (const Instance& instance : frame.instances) {
+      if (!instance.tight_box || instance.tight_box->is_empty()) continue;
+      picture.objects.push_back(object_of(info, frame, instance));
+    }
+    entry.pictures.push_back(std::move(picture));
+  }
+  return entry;
+}
+
+std::int32_t CaptureIndex::Names::number(const std::string& name) {
+  const auto [at, is_new] = numbers_.emplace(name, std::int32_t(list_.size()));
+  if (is_new) list_.push_back(name);
+  return at->second;
+}
+
+void CaptureIndex::add(const Entry& entry) {
+  const std::lock_guard lock(mutex_);
+  phase_.push_back(phases_.number(entry.phase));
+  environment_.push_back(environments_.number(entry.environment));
+  split_.push_back(splits_.number(entry.split));
+  findings_.push_back(entry.findings);
+  for (const Picture& picture : entry.pictures) {
+    camera_.push_back(picture.camera);
+    width_.push_back(picture.width);
+    height_.push_back(picture.height);
+    for (const Object& object : picture.objects) {
+      class_.push_back(classes_.number(object.name));
+      visible_.push_back(object.visible);
+      truncation_.push_back(object.truncation);
+      box_side_.push_back(object.box_side);
+      distance_.push_back(object.distance);
+      elevation_.push_back(object.elevation);
+    }
+    first_object_.push_back(class_.size());
+  }
+  first_picture_.push_back(camera_.size());
+  visit_.push_back(entry.visit);
+}
+
+std::size_t CaptureIndex::size() const {
+  const std::lock_guard lock(mutex_);
+  return visit_.size();
+}
+
+std::string CaptureIndex::json(std::size_t from, std::size_t most) const {
+  const std::lock_guard lock(mutex_);
+  from = std::min(from, visit_.size());
+  const std::size_t to = std::min(from + most, visit_.size());
+  const std::size_t pictures = first_picture_[from];
+  const std::size_t pictures_end = first_picture_[to];
+  const std::size_t objects = first_object_[pictures];
+  const std::size_t objects_end = first_object_[pictures_end];
+
+  std::string text = "{";
+  add_column(text, "visit", visit_, from, to);
+  add_column(text, "phase", phase_, from, to);
+  add_column(text, "environment", environment_, from, to);
+  add_column(text, "split", split_, from, to);
+  add_column(text, "findings", findings_, from, to);
+  add_column(text, "pictures", counts(first_picture_, from, to), 0, to - from);
+  add_column(text, "camera", camera_, pictures, pictures_end);
+  add_column(text, "width", width_, pictures, pictures_end);
+  add_column(text, "height", height_, pictures, pictures_end);
+  add_column(text, "objects", counts(first_object_, pictures, pictures_end), 0,
+             pictures_end - pictures);
+  add_column(text, "class", class_, objects, objects_end);
+  add_column(text, "visible", visible_, objects, objects_end);
+  add_column(text, "truncation", truncation_, objects, objects_end);
+  add_column(text, "box_side", box_side_, objects, objects_end);
+  add_column(text, "distance", distance_, objects, objects_end);
+  add_column(text, "elevation", elevation_, objects, objects_end);
+  std::ranges::replace(text, '\'', '"');
+  const Json names{{"classes", classes_.list()},
+                   {"phases", phases_.list()},
+                   {"environments", environments_.list()},
+                   {"splits", splits_.list()}};
+  return "{\"from\":" + std::to_string(from) + ",\"columns\":" + text + "},\"names\":" +
+         names.dump(-1, ' ', false, Json::error_handler_t::replace) + "}";
+}
+
+}  // namespace diorama

@@ -1,0 +1,377 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/view/dataset_view.h"
+
+#include <algorithm>
+#include <charconv>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "diorama/error.h"
+#include "framework/config/json_text.h"
+#include "framework/datasets/dataset_origin.h"
+#include "framework/datasets/dataset_stats.h"
+#include "framework/lint/lint_dataset.h"
+#include "framework/output/dataset_status.h"
+#include "framework/plugins/plugin_call.h"
+#include "framework/view/capture_json.h"
+#include "framework/view/page.h"
+#include "framework/view/pictures.h"
+
+namespace diorama {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kJson = "application/json";
+/// How often a run that goes on is looked at.
+constexpr std::chrono::seconds kFollowTime{3};
+
+HttpAnswer answer_of(std::string type, std::string body) {
+  return {200, std::move(type), std::make_shared<const std::string>(std::move(body))};
+}
+
+HttpAnswer json_answer(const Json& json, int status = 200) {
+  HttpAnswer answer =
+      answer_of(kJson, json.dump(-1, ' ', false, Json::error_handler_t::replace));
+  answer.status = status;
+  return answer;
+}
+
+HttpAnswer not_there() {
+  HttpAnswer answer = answer_of("text/plain; charset=utf-8", "nothing here\n");
+  answer.status = 404;
+  return answer;
+}
+
+/// "7", not "+7", "07" or "7.0".
+std::optional<std::size_t> whole_number(std::string_view word) {
+  std::size_t value = 0;
+  const char* const end = word.data() + word.size();
+  const auto [rest, failed] = std::from_chars(word.data(), end, value);
+  const bool is_plain = word.size() == 1 || !word.starts_with('0');
+  if (failed != std::errc() || rest != end || !is_plain) return std::nullopt;
+  return value;
+}
+
+/// Some captures of a dataset, evenly spread.
+class PartOfDataset final : public StoredDataset {
+ public:
+  PartOfDataset(std::shared_ptr<const StoredDataset> whole, std::size_t most)
+      : whole_(std::move(whole)), info_(whole_->info()) {
+    const std::vector<int> all = std::move(info_.captures);
+    info_.captures.clear();
+    for (std::size_t i = 0; i < most; ++i) {
+      places_.push_back(i * all.size() / most);
+      info_.captures.push_back(all[places_.back()]);
+    }
+  }
+
+  const StoredInfo& info() const override { return info_; }
+  const ReadLog& log() const override { return whole_->log(); }
+  StoredCapture read(std::size_t i, const NameSet& wanted) const override {
+    return whole_->read(places_[i], wanted);
+  }
+
+ private:
+  std::shared_ptr<const StoredDataset> whole_;
+  StoredInfo info_;
+  std::vector<std::size_t> places_;
+};
+
+/// The folder of the run's dataset.json: this one or the one above.
+fs::path folder_of_run(const fs::path& folder) {
+  fs::path plain = fs::absolute(folder).lexically_normal();
+  if (!plain.has_filename()) plain = plain.parent_path();
+  std::error_code ignored;
+  return fs::is_regular_file(plain / "dataset.json", ignored) ? plain : plain.parent_path();
+}
+
+std::optional<DatasetStatus> status_of_run(const fs::path& folder) {
+  if (page_of_run(folder).empty()) return std::nullopt;
+  try {
+    LocalFileSystem file_system;
+    return read_status(file_system, folder_of_run(folder), false);
+  } catch (const Error&) {
+    return std::nullopt;  // a run of others, or files that come and go
+  }
+}
+
+}  // namespace
+
+struct DatasetView::Opened {
+  std::string name;
+  fs::path folder;
+  std::shared_ptr<const StoredDataset> whole;
+  std::shared_ptr<const StoredDataset> shown;
+  CaptureIndex index;
+  std::atomic<bool> wants_stats{false};
+  std::mutex mutex;
+  std::shared_ptr<const std::string> stats;  ///< JSON; null until they were counted.
+};
+
+DatasetView::DatasetView(Options options, DatasetReaders& readers, Host& host)
+    : options_(std::move(options)), readers_(readers), host_(host), datasets_(open()) {
+  if (const auto status = status_of_run(options_.folder)) {
+    done_ = status->done;
+    is_finished_ = status->is_finished;
+  }
+}
+
+DatasetView::~DatasetView() = default;
+
+std::shared_ptr<const DatasetView::Datasets> DatasetView::open() const {
+  const std::vector<FoundDataset> found = find_datasets(options_.folder, readers_, options_.reader);
+  auto opened = std::make_shared<Datasets>();
+  for (const FoundDataset& each : found) {
+    auto dataset = std::make_shared<Opened>();
+    dataset->folder = each.folder;
+    dataset->name = each.folder.filename().empty() ? each.folder.parent_path().filename().string()
+                                                   : each.folder.filename().string();
+    dataset->whole = readers_.open(each.folder, each.reader);
+    dataset->shown = dataset->whole;
+    const std::size_t count = dataset->whole->info().captures.size();
+    if (options_.most_captures && *options_.most_captures < count) {
+      dataset->shown =
+          std::make_shared<const PartOfDataset>(dataset->whole, *options_.most_captures);
+    }
+    opened->push_back(std::move(dataset));
+  }
+  if (opened->empty()) find_dataset(options_.folder, readers_, options_.reader);
+  // Those that hold most come first: what the page shows unless asked.
+  std::ranges::stable_sort(*opened, std::ranges::greater(), [](const auto& dataset) {
+    const StoredInfo& info = dataset->whole->info();
+    return std::pair(info.holds.contains(kColor.name), info.holds.size());
+  });
+  return opened;
+}
+
+std::shared_ptr<const DatasetView::Datasets> DatasetView::datasets() const {
+  const std::lock_guard lock(mutex_);
+  return datasets_;
+}
+
+std::vector<DatasetView::Shown> DatasetView::shown() const {
+  std::vector<Shown> all;
+  for (const auto& opened : *datasets()) {
+    const StoredInfo& info = opened->shown->info();
+    all.push_back({info.captures, info.camera_names, info.holds});
+  }
+  return all;
+}
+
+bool DatasetView::index_some(Opened& opened) {
+  const StoredDataset& data = *opened.shown;
+  const std::size_t first = opened.index.size();
+  const std::size_t count = data.info().captures.size();
+  if (first >= count) return false;
+  const std::size_t at_once = 32 * std::size_t(std::max(host_.thread_count(), 1));
+  std::vector<CaptureIndex::Entry> entries(std::min(at_once, count - first));
+  const NameSet wanted = CaptureIndex::wanted(data.info());
+  host_.parallel_for(entries.size(), [&](std::size_t i) {
+    entries[i] = CaptureIndex::entry_of(
+        data.info(), call_component("reader of " + data.info().format,
+                                    [&] { return data.read(first + i, wanted); }));
+  });
+  for (const CaptureIndex::Entry& entry : entries) opened.index.add(entry);
+  return true;
+}
+
+bool DatasetView::make_stats(Opened& opened) {
+  if (!opened.wants_stats.exchange(false)) return false;
+  auto text = std::make_shared<const std::string>(stats_json(dataset_stats(*opened.whole, host_)));
+  const std::lock_guard lock(opened.mutex);
+  opened.stats = std::move(text);
+  return true;
+}
+
+bool DatasetView::make_findings() {
+  if (!wants_findings_) return false;
+  auto text = std::make_shared<const std::string>(
+      lint_json(lint_datasets(options_.folder, readers_, host_, options_.reader)));
+  const std::lock_guard lock(mutex_);
+  findings_ = std::move(text);
+  wants_findings_ = false;
+  return true;
+}
+
+bool DatasetView::follow_run() {
+  const auto now = std::chrono::steady_clock::now();
+  if (is_finished_ || now < next_look_) return false;
+  const auto status = status_of_run(options_.folder);
+  if (status && (status->done != done_ || status->is_finished)) {
+    try {
+      auto fresh = open();
+      const std::lock_guard lock(mutex_);
+      datasets_ = std::move(fresh);
+      ++generation_;
+      findings_ = nullptr;
+      done_ = status->done;
+      is_finished_ = status->is_finished;
+    } catch (const Error& error) {
+      // A file that is just being replaced: the next look will see it.
+      host_.log(LogLevel::Debug, error.what());
+    }
+  }
+  // Large datasets take long to open; that is no reason to do nothing else.
+  const auto later = std::chrono::steady_clock::now();
+  next_look_ = later + std::max<std::chrono::steady_clock::duration>(kFollowTime, 10 * (later - now));
+  return false;
+}
+
+bool DatasetView::work() {
+  follow_run();
+  const auto all = datasets();
+  for (const auto& opened : *all) {
+    if (make_stats(*opened)) return true;
+  }
+  if (make_findings()) return true;
+  return std::ranges::any_of(*all, [&](const auto& opened) { return index_some(*opened); });
+}
+
+HttpAnswer DatasetView::state() const {
+  Json json;
+  fs::path folder = fs::absolute(options_.folder).lexically_normal();
+  json["folder"] = folder.string();
+  {
+    const std::lock_guard lock(mutex_);
+    json["generation"] = generation_;
+    json["is_finished"] = is_finished_;
+  }
+  json["datasets"] = Json::array();
+  for (const auto& opened : *datasets()) {
+    const StoredInfo& info = opened->shown->info();
+    json["datasets"].push_back({{"name", opened->name},
+                                {"format", info.format},
+                                {"captures", info.captures.size()},
+                                {"all_captures", opened->whole->info().captures.size()},
+                                {"indexed", opened->index.size()}});
+  }
+  return json_answer(json);
+}
+
+HttpAnswer DatasetView::run_answer() const {
+  Json json = Json::object();
+  const Json page = parse_json_or_nothing<Json>(page_of_run(options_.folder));
+  if (page.is_object()) {
+    json["folder"] = folder_of_run(options_.folder).string();
+    for (const char* key : {"seed", "version", "job", "plugins"}) {
+      if (page.contains(key)) json[key] = page.at(key);
+    }
+  }
+  if (const auto status = status_of_run(options_.folder)) {
+    json["captures"] = status->captures;
+    json["done"] = status->done;
+    json["is_finished"] = status->is_finished;
+    json["workers"] = Json::array();
+    for (const DatasetStatus::Worker& worker : status->workers) {
+      json["workers"].push_back({{"name", worker.name},
+                                 {"role", worker.role},
+                                 {"description", worker.description},
+                                 {"is_alive", worker.is_alive},
+                                 {"captures", worker.captures}});
+    }
+  }
+  return json_answer(json);
+}
+
+HttpAnswer DatasetView::lint_answer() {
+  const std::lock_guard lock(mutex_);
+  if (findings_) return {200, kJson, findings_};
+  wants_findings_ = true;
+  return json_answer({{"state", "running"}}, 202);
+}
+
+HttpAnswer DatasetView::capture_answer(const Opened& opened, Words words) {
+  const StoredDataset& data = *opened.shown;
+  const StoredInfo& info = data.info();
+  const auto number = whole_number(words[0]);
+  if (!number || *number > std::size_t(INT32_MAX)) return not_there();
+  const auto at = std::ranges::lower_bound(info.captures, int(*number));
+  if (at == info.captures.end() || *at != int(*number)) return not_there();
+  const auto read = [&](const NameSet& wanted) {
+    return call_component("reader of " + info.format, [&] {
+      return data.read(std::size_t(at - info.captures.begin()), wanted);
+    });
+  };
+  if (words.size() == 1) {
+    return answer_of(kJson, capture_json(info, read(wanted_for_labels(info))));
+  }
+  if (words.size() != 3) return not_there();
+  const auto place = whole_number(words[1]);
+  const auto kind = picture_kind(words[2]);
+  if (!place || (!kind && words[2] != "amodal")) return not_there();
+  const StoredCapture stored =
+      read(kind ? channels_of(*kind)
+                : NameSet{"amodal_mask", "visibility", std::string(kHoldsInstances)});
+  if (*place >= stored.capture.frames.size()) return not_there();
+  const Frame& frame = stored.capture.frames[*place];
+  if (!kind) return answer_of(kJson, amodal_json(frame));
+  auto picture = make_picture(frame, *kind, host_);
+  return picture ? answer_of(std::move(picture->type), std::move(picture->bytes)) : not_there();
+}
+
+HttpAnswer DatasetView::dataset_answer(Opened& opened, Words words) {
+  const StoredInfo& info = opened.shown->info();
+  if (words[0] == "info" && words.size() == 1) {
+    return json_answer({{"name", opened.name},
+                        {"folder", opened.folder.string()},
+                        {"format", info.format},
+                        {"holds", info.holds},
+                        {"cameras", info.camera_names},
+                        {"classes", info.classes},
+                        {"captures", info.captures}});
+  }
+  if (words[0] == "stats" && words.size() == 1) {
+    const std::lock_guard lock(opened.mutex);
+    if (opened.stats) return {200, kJson, opened.stats};
+    opened.wants_stats = true;
+    return json_answer({{"state", "running"}}, 202);
+  }
+  if (words[0] == "index" && words.size() == 2) {
+    const auto from = whole_number(words[1]);
+    return from ? answer_of(kJson, opened.index.json(*from, kIndexPart)) : not_there();
+  }
+  if (words[0] == "capture" && words.size() >= 2) return capture_answer(opened, words.subspan(1));
+  return not_there();
+}
+
+HttpAnswer DatasetView::answer(std::string_view path) {
+  if (path == "/") return answer_of("text/html; charset=utf-8", std::string(page_html()));
+  if (path == "/view.js") {
+    return answer_of("text/javascript; charset=utf-8", std::string(page_script()));
+  }
+  if (path == "/view.css") return answer_of("text/css; charset=utf-8", std::string(page_style()));
+  if (path == "/icon.svg") return answer_of("image/svg+xml", std::string(page_icon()));
+  std::vector<std::string_view> words;
+  for (std::string_view rest = path; !rest.empty();) {
+    rest.remove_prefix(1);
+    words.push_back(rest.substr(0, rest.find('/')));
+    rest.remove_prefix(words.back().size());
+  }
+  if (words.size() < 2 || words[0] != "api") return not_there();
+  if (words.size() == 2 && words[1] == "state") return state();
+  if (words.size() == 2 && words[1] == "run") return run_answer();
+  if (words.size() == 2 && words[1] == "lint") return lint_answer();
+  const auto all = datasets();
+  const auto number = whole_number(words[1]);
+  if (words.size() < 3 || !number || *number >= all->size()) return not_there();
+  Opened& opened = *all->at(*number);
+  const Words rest = Words(words).subspan(2);
+  if (rest[0] != "capture") return dataset_answer(opened, rest);
+
+  // What captures hold stays the same for as long as a dataset is open.
+  std::string key;
+  {
+    const std::lock_guard lock(mutex_);
+    key = std::to_string(generation_) + std::string(path);
+  }
+  if (const auto known = cache_.find(key)) return *known;
+  HttpAnswer made = dataset_answer(opened, rest);
+  if (made.status == 200) {
+    cache_.add(key, std::make_shared<const HttpAnswer>(made), made.body->size() + key.size() + 256);
+  }
+  return made;
+}
+
+}  // namespace diorama

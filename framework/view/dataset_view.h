@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "diorama/host.h"
+#include "diorama/reader.h"
+#include "framework/datasets/dataset_readers.h"
+#include "framework/view/byte_cache.h"
+#include "framework/view/capture_index.h"
+#include "framework/view/http_server.h"
+
+namespace diorama {
+
+/// A dataset, or all of a run, as the page asks for it. Addresses are made of words that stand here
+/// and of whole numbers that count datasets, captures and pictures; none becomes a path.
+///
+///   /  /view.js  /view.css  /icon.svg       the page
+///   /api/state                              which datasets, how far each is indexed
+///   /api/run  /api/lint                     what dataset.json and the journals say; findings
+///   /api/D/info  /api/D/stats               one dataset
+///   /api/D/index/FROM                       CaptureIndex::json(), kIndexPart captures
+///   /api/D/capture/N                        capture_json() of capture number N
+///   /api/D/capture/N/F/KIND                 of its frame F a PictureKind, or "amodal"
+class DatasetView {
+ public:
+  static constexpr std::size_t kIndexPart = 5000;
+  static constexpr std::size_t kCacheBytes = std::size_t(96) << 20;
+
+  struct Options {
+    std::filesystem::path folder;
+    std::string reader;  ///< Type; empty: the one that knows the folder.
+    /// Show no more captures than this, spread over the dataset; statistics are of all.
+    std::optional<std::size_t> most_captures = {};
+  };
+
+  /// Throws Error(Usage) when there is no dataset. Readers and host must outlive the object.
+  DatasetView(Options options, DatasetReaders& readers, Host& host);
+  ~DatasetView();
+
+  /// Any thread.
+  HttpAnswer answer(std::string_view path);
+
+  /// On the main thread: makes what is due, and what the page has asked for: the index, statistics,
+  /// findings; follows a run that goes on. False when there was nothing to do. Throws Stopped.
+  bool work();
+
+  /// Numbers of the captures shown, and their pictures, of each dataset.
+  struct Shown {
+    std::vector<int> captures;
+    std::vector<std::string> cameras;
+    NameSet holds;
+  };
+  std::vector<Shown> shown() const;
+
+ private:
+  struct Opened;
+  using Datasets = std::vector<std::shared_ptr<Opened>>;
+
+  std::shared_ptr<const Datasets> open() const;
+  std::shared_ptr<const Datasets> datasets() const;
+  bool index_some(Opened& opened);
+  bool make_stats(Opened& opened);
+  bool make_findings();
+  bool follow_run();
+
+  using Words = std::span<const std::string_view>;
+  HttpAnswer state() const;
+  HttpAnswer run_answer() const;
+  HttpAnswer lint_answer();
+  HttpAnswer dataset_answer(Opened& opened, Words words);
+  HttpAnswer capture_answer(const Opened& opened, Words words);
+
+  Options options_;
+  DatasetReaders& readers_;
+  Host& host_;
+  mutable std::mutex mutex_;
+  std::shared_ptr<const Datasets> datasets_;
+  int generation_ = 0;  ///< Counts how often the datasets were opened.
+  std::atomic<bool> wants_findings_{false};
+  std::shared_ptr<const std::string> findings_;  ///< JSON; null until they were looked for.
+  ByteCache<HttpAnswer> cache_{kCacheBytes};
+  // Of the run that is followed.
+  int done_ = 0;
+  bool is_finished_ = true;
+  std::chrono::steady_clock::time_point next_look_{};
+};
+
+}  // namespace diorama

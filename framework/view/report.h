@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+
+#include "framework/view/dataset_view.h"
+
+namespace diorama {
+
+/// What was written.
+struct ReportSize {
+  std::size_t captures = 0;
+  std::size_t files = 0;
+  std::uintmax_t bytes = 0;
+};
+
+/// Writes the page of a view, with what it shows, as files that a browser opens without a server.
+/// The folder must be free. Throws Error(Output).
+ReportSize write_report(DatasetView& view, const std::filesystem::path& folder);
+
+}  // namespace diorama

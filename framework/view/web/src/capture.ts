@@ -1,0 +1,389 @@
+// SPDX-License-Identifier: Apache-2.0
+// One picture in full: zoom to its pixels, a probe, its objects.
+import { App } from './app';
+import { CaptureLabels, FrameLabels, ObjectLabels, pictureAddress } from './data';
+import { button, clear, el, on } from './dom';
+import { FramePixels, Numbers, View, css, drawLines, kLayers, motionOf, overlays } from './layers';
+import { SpaceView } from './scene';
+
+const kMostScale = 64;
+
+function percent(value: number | null | undefined): string {
+  return value === null || value === undefined ? '–' : `${(100 * value).toFixed(1)} %`;
+}
+
+function metres(value: number | null | undefined): string {
+  return value === null || value === undefined ? '–' : `${value.toFixed(value < 10 ? 3 : 2)} m`;
+}
+
+export class CapturePage {
+  readonly element = el('main', { class: 'capture' });
+  private readonly canvas = el('canvas', { class: 'big', tabindex: '0', role: 'img' });
+  private readonly probe = el('div', { class: 'probe', 'aria-live': 'off' });
+  private readonly head = el('div', { class: 'bar' });
+  private readonly panel = el('aside', { class: 'objects', 'aria-label': 'Objects' });
+  private readonly space = new SpaceView((frame, object) => {
+    this.app.go(frame !== null ? { frame } : { object: object ?? 0 });
+  });
+  private readonly stage = el('div', { class: 'stage' }, this.canvas, this.probe);
+  private app!: App;
+  private key = '';
+  private capture: CaptureLabels | null = null;
+  private frame: FrameLabels | null = null;
+  private pixels: FramePixels | null = null;
+  private view: View = { scale: 1, x: 0, y: 0 };
+  private fits = true;
+  private pointer: [number, number] | null = null;  ///< Pixels of the picture.
+
+  constructor() {
+    this.element.append(this.head, el('div', { class: 'parts' }, this.stage, this.space.canvas, this.panel));
+    new ResizeObserver(() => this.draw()).observe(this.stage);
+    this.listen();
+  }
+
+  async show(app: App): Promise<void> {
+    this.app = app;
+    const { state } = app;
+    const key = JSON.stringify([app.site.generation, state.dataset, state.capture, state.frame]);
+    if (key !== this.key) {
+      this.key = key;
+      this.frame = null;
+      this.fits = true;
+      this.pixels = new FramePixels(state.dataset, state.capture, state.frame);
+      this.pointer = null;
+      try {
+        const capture = await app.labels(state.capture);
+        if (key !== this.key) return;
+        this.capture = capture;
+        this.frame = capture.frames[state.frame] ?? null;
+      } catch (error) {
+        if (key !== this.key) return;
+        this.capture = null;
+        this.showHead();
+        clear(this.panel);
+        this.panel.append(el('p', { class: 'bad' }, `Capture ${state.capture}: ${(error as Error).message}`));
+        this.draw();
+        return;
+      }
+      if (app.holds.has('color')) this.pixels.picture('color').then(() => this.draw(), () => this.draw());
+      for (const [held, kind] of [['instance_id', 'ids'], ['distance_to_image_plane', 'depth'], ['distance_to_camera', 'depth']]) {
+        if (app.holds.has(held)) this.pixels.numbers(kind).then(() => this.showProbe(), () => undefined);
+      }
+    }
+    if (!this.capture) return;
+    this.showHead();
+    this.showPanel();
+    const canSpace = this.capture.frames.some((frame) => frame.world_from_camera);
+    this.space.canvas.hidden = !app.state.space || !canSpace;
+    if (!this.space.canvas.hidden) {
+      this.space.show(this.capture, app.state, app.palette, (frame) =>
+        app.holds.has('color') ? pictureAddress(app.state.dataset, app.state.capture, frame, 'thumbnail') : null);
+    }
+    this.draw();
+    this.showProbe();
+  }
+
+  private showHead(): void {
+    const { app } = this;
+    const { state } = app;
+    clear(this.head);
+    this.head.append(
+      button('← Grid', 'Back to all captures (Escape)', () => app.go({ page: 'grid' })),
+      button('‹', 'Capture before (arrow left)', () => this.step(-1)),
+      el('b', {}, `Capture ${state.capture}`),
+      button('›', 'Next capture (arrow right)', () => this.step(1)));
+    const cameras = el('span', { class: 'tabs', role: 'tablist', 'aria-label': 'Cameras' });
+    this.capture?.frames.forEach((frame, i) => {
+      cameras.append(button(frame.camera, `Camera ${frame.camera} (${i + 1})`, () => app.go({ frame: i, object: 0 }),
+        { role: 'tab', 'aria-selected': i === state.frame ? 'true' : 'false' }));
+    });
+    this.head.append(cameras, el('span', { class: 'words' },
+      [this.capture?.phase, this.capture?.environment, this.capture?.split].filter((word) => word).join(' · ')));
+    this.head.append(el('span', { class: 'right' },
+      button('Fit', 'Whole picture (0)', () => this.fit()),
+      button('1:1', 'One pixel for one (1:1)', () => this.zoomTo(1 / (window.devicePixelRatio || 1))),
+      app.holds.has('camera_pose') && button('3-D', 'Cameras and boxes in space (s)', () => app.go({ space: !state.space }),
+        { 'aria-pressed': state.space ? 'true' : 'false' })));
+  }
+
+  /** To another capture of those that the filters leave. */
+  private step(by: number): void {
+    const { info, filtered, state } = this.app;
+    const numbers = [...filtered.places].map((place) => info.captures[place]);
+    const list = numbers.length > 0 ? numbers : info.captures;
+    let at = list.indexOf(state.capture);
+    if (at < 0) at = list.findIndex((number) => number > state.capture) - (by > 0 ? 1 : 0);
+    const next = list[at + by];
+    if (next !== undefined) this.app.go({ capture: next, object: 0 });
+  }
+
+  private showPanel(): void {
+    const { app, frame } = this;
+    const scroll = this.panel.scrollTop;
+    clear(this.panel);
+    if (!frame) return;
+    const seen = frame.objects.filter((object) => object.box);
+    this.panel.append(el('h3', {}, 'Objects', el('small', {}, `${seen.length} in the picture, ${frame.objects.length} in all`)));
+    for (const object of [...seen].sort((a, b) => this.area(b) - this.area(a))) {
+      const isChosen = object.id === app.state.object;
+      const dot = el('em');
+      dot.style.background = css(app.palette.of(object, app.state));
+      const row = button('', object.path, () => app.go({ object: isChosen ? 0 : object.id }, true),
+        { class: 'object', 'aria-pressed': isChosen ? 'true' : 'false' });
+      row.append(dot, el('span', {}, object.class === '' ? object.path : object.class),
+        el('small', {}, object.occlusion === undefined ? '' : percent(1 - (object.occlusion ?? 1))));
+      this.panel.append(row);
+      if (isChosen) this.panel.append(this.detail(object));
+    }
+    const about = el('dl', {});
+    const add = (name: string, value: string) => about.append(el('dt', {}, name), el('dd', {}, value));
+    add('Size', `${frame.width} × ${frame.height}`);
+    if (frame.lens) add('Lens', `${frame.lens}, f ${frame.focal!.map((f) => f.toFixed(1)).join(' × ')} px`);
+    const eye = frame.world_from_camera;
+    if (eye) add('Stands at', `${eye[3].toFixed(2)}, ${eye[7].toFixed(2)}, ${eye[11].toFixed(2)} m`);
+    add('Visit', String(this.capture!.visit));
+    this.panel.append(el('h3', {}, 'Picture'), about);
+    const files = Object.entries(frame.files ?? {});
+    if (files.length > 0) {
+      const list = el('dl', { class: 'files' });
+      for (const [held, file] of files) list.append(el('dt', {}, held), el('dd', {}, file));
+      this.panel.append(el('details', {}, el('summary', {}, 'Files'), list));
+    }
+    if (this.capture!.findings.length > 0) {
+      this.panel.append(el('h3', { class: 'bad' }, 'Faults'));
+      for (const finding of this.capture!.findings) {
+        this.panel.append(el('p', { class: 'bad' }, `${finding.check}: ${finding.found ?? ''}`));
+      }
+    }
+    this.panel.scrollTop = scroll;
+  }
+
+  private detail(object: ObjectLabels): HTMLElement {
+    const list = el('dl', { class: 'detail' });
+    const add = (name: string, value: string) => list.append(el('dt', {}, name), el('dd', {}, value));
+    for (const [taxonomy, label] of Object.entries(object.labels)) add(taxonomy, label);
+    add('Path', object.path);
+    if (object.occlusion !== undefined) add('Visible', percent(object.occlusion === null ? null : 1 - object.occlusion));
+    if (object.truncation !== undefined) add('Outside', percent(object.truncation));
+    if (object.visible_pixels !== undefined) add('Pixels', object.visible_pixels.toLocaleString('en'));
+    if (object.distance_m !== undefined) add('Distance', metres(object.distance_m));
+    add('Box', object.box!.join(', '));
+    if (object.bounds) {
+      const [low, high] = object.bounds;
+      add('Size', high.map((value, i) => (value - low[i]).toFixed(3)).join(' × ') + ' m');
+    }
+    return list;
+  }
+
+  private area(object: ObjectLabels): number {
+    return object.box ? (object.box[2] - object.box[0]) * (object.box[3] - object.box[1]) : 0;
+  }
+
+  private fit(): void {
+    this.fits = true;
+    this.draw();
+  }
+
+  private zoomTo(scale: number, at?: [number, number]): void {
+    const [x, y] = at ?? [this.canvas.clientWidth / 2, this.canvas.clientHeight / 2];
+    const next = Math.max(0.05, Math.min(kMostScale, scale));
+    const px = (x - this.view.x) / this.view.scale;
+    const py = (y - this.view.y) / this.view.scale;
+    this.view = { scale: next, x: x - px * next, y: y - py * next };
+    this.fits = false;
+    this.draw();
+  }
+
+  /** The chosen object, or all of them, with some room around. */
+  private zoomToObject(): void {
+    const object = this.frame?.objects.find((one) => one.id === this.app.state.object && one.box);
+    if (!object) return this.fit();
+    const [left, top, right, bottom] = object.box!;
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    const scale = Math.min(kMostScale, 0.6 * Math.min(width / Math.max(1, right - left), height / Math.max(1, bottom - top)));
+    this.view = { scale, x: width / 2 - (scale * (left + right)) / 2, y: height / 2 - (scale * (top + bottom)) / 2 };
+    this.fits = false;
+    this.draw();
+  }
+
+  private draw(): void {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    const ratio = window.devicePixelRatio || 1;
+    if (width === 0 || height === 0) return;
+    this.canvas.width = Math.round(width * ratio);
+    this.canvas.height = Math.round(height * ratio);
+    const context = this.canvas.getContext('2d')!;
+    const { frame, pixels } = this;
+    if (!frame || !pixels) return;
+    if (this.fits) {
+      const scale = Math.min(width / frame.width, height / frame.height) * 0.98;
+      this.view = { scale, x: (width - scale * frame.width) / 2, y: (height - scale * frame.height) / 2 };
+    }
+    const { scale, x, y } = this.view;
+    context.scale(ratio, ratio);
+    context.imageSmoothingEnabled = scale * ratio < 1;
+    context.imageSmoothingQuality = 'high';
+    context.fillStyle = '#000';
+    context.fillRect(x, y, scale * frame.width, scale * frame.height);
+    const picture = pixels.now<HTMLImageElement>('picture color');
+    if (picture) context.drawImage(picture, x, y, scale * frame.width, scale * frame.height);
+    const { state, palette, holds } = this.app;
+    context.globalAlpha = state.opacity / 100;
+    for (const layer of overlays(pixels, frame, state, palette, holds, () => this.draw())) {
+      context.drawImage(layer, x, y, scale * frame.width, scale * frame.height);
+    }
+    context.globalAlpha = 1;
+    if (scale >= 16) this.drawGrid(context);
+    drawLines(context, frame, this.view, state, palette, 1, state.object);
+    this.canvas.setAttribute('aria-label', `Capture ${state.capture}, ${frame.camera}: ` +
+      frame.objects.filter((object) => object.box).map((object) => object.class).join(', '));
+  }
+
+  /** Edges of single pixels. */
+  private drawGrid(context: CanvasRenderingContext2D): void {
+    const { scale, x, y } = this.view;
+    context.strokeStyle = 'rgba(128, 128, 128, 0.35)';
+    context.lineWidth = 1;
+    context.beginPath();
+    const first = (offset: number) => Math.max(0, Math.floor(-offset / scale));
+    for (let i = first(x); i <= this.frame!.width && x + i * scale < this.canvas.clientWidth; ++i) {
+      context.moveTo(x + i * scale, Math.max(0, y));
+      context.lineTo(x + i * scale, Math.min(this.canvas.clientHeight, y + this.frame!.height * scale));
+    }
+    for (let i = first(y); i <= this.frame!.height && y + i * scale < this.canvas.clientHeight; ++i) {
+      context.moveTo(Math.max(0, x), y + i * scale);
+      context.lineTo(Math.min(this.canvas.clientWidth, x + this.frame!.width * scale), y + i * scale);
+    }
+    context.stroke();
+  }
+
+  /** Objects at a pixel: by the mask where there is one, then by boxes, small ones first. */
+  private objectsAt(x: number, y: number): ObjectLabels[] {
+    const frame = this.frame!;
+    const id = this.pixels?.now<Numbers>('ids')?.at(x, y) ?? null;
+    const inside = frame.objects.filter((object) => object.box && x >= object.box[0] && y >= object.box[1] &&
+      x < object.box[2] && y < object.box[3]);
+    inside.sort((a, b) => this.area(a) - this.area(b));
+    const shown = frame.objects.find((object) => id !== null && id !== 0 && (object.id & 0xffffff) === id);
+    return shown ? [shown, ...inside.filter((object) => object !== shown)] : inside;
+  }
+
+  private showProbe(): void {
+    clear(this.probe);
+    if (!this.frame || !this.pixels || !this.pointer) {
+      this.probe.append(el('span', {}, 'Point at a pixel. Wheel zooms, drag moves, click chooses, ? lists all keys.'));
+      return;
+    }
+    const [x, y] = this.pointer;
+    const word = (name: string, value: string) => this.probe.append(el('span', {}, el('small', {}, name), ' ', value));
+    word('pixel', `${x}, ${y}`);
+    const depth = this.pixels.now<Numbers>('depth')?.at(x, y);
+    if (depth !== null && depth !== undefined) word('depth', depth === 0 ? 'nothing' : metres(depth / 1e4));
+    const motion = this.pixels.now<Numbers>('motion')?.at(x, y);
+    if (motion !== null && motion !== undefined) word('motion', motionOf(motion).map((value) => value.toFixed(2)).join(', ') + ' px');
+    const normal = this.pixels.now<Numbers>('normals')?.at(x, y);
+    if (normal) word('normal', [normal & 255, (normal >> 8) & 255, normal >> 16].map((value) => (value / 127.5 - 1).toFixed(2)).join(', '));
+    const [object, ...others] = this.objectsAt(x, y);
+    if (!object) return word('object', 'none');
+    word('object', object.class === '' ? object.path : object.class);
+    if (object.class !== '' && object.path !== object.class) word('path', object.path);
+    if (object.occlusion !== undefined && object.occlusion !== null) word('visible', percent(1 - object.occlusion));
+    if (object.truncation) word('outside', percent(object.truncation));
+    if (object.distance_m) word('distance', metres(object.distance_m));
+    if (others.length > 0) word('below', others.map((other) => other.class).join(', '));
+  }
+
+  private listen(): void {
+    let held: [number, number] | null = null;
+    let moved = 0;
+    const place = (event: MouseEvent): [number, number] => {
+      const frame = this.canvas.getBoundingClientRect();
+      return [event.clientX - frame.left, event.clientY - frame.top];
+    };
+    on(this.canvas, {
+      wheel: (event: WheelEvent) => {
+        event.preventDefault();
+        this.zoomTo(this.view.scale * Math.exp(-event.deltaY * 0.002), place(event));
+      },
+      pointerdown: (event: PointerEvent) => {
+        held = [event.clientX, event.clientY];
+        moved = 0;
+        this.canvas.setPointerCapture(event.pointerId);
+      },
+      pointermove: (event: PointerEvent) => {
+        const [x, y] = place(event);
+        const px: [number, number] = [Math.floor((x - this.view.x) / this.view.scale), Math.floor((y - this.view.y) / this.view.scale)];
+        const isInside = this.frame && px[0] >= 0 && px[1] >= 0 && px[0] < this.frame.width && px[1] < this.frame.height;
+        this.pointer = isInside ? px : null;
+        this.showProbe();
+        if (!held) return;
+        moved += Math.abs(event.clientX - held[0]) + Math.abs(event.clientY - held[1]);
+        if (moved < 4) return;
+        this.view = { ...this.view, x: this.view.x + event.clientX - held[0], y: this.view.y + event.clientY - held[1] };
+        held = [event.clientX, event.clientY];
+        this.fits = false;
+        this.draw();
+      },
+      pointerup: () => {
+        held = null;
+        if (moved >= 4 || !this.frame) return;
+        const found = this.pointer ? this.objectsAt(...this.pointer) : [];
+        // Clicks at one place go through what lies there.
+        const at = found.findIndex((object) => object.id === this.app.state.object);
+        this.app.go({ object: found[at + 1]?.id ?? 0 }, true);
+      },
+      pointerleave: () => {
+        this.pointer = null;
+        this.showProbe();
+      },
+      dblclick: () => this.fit(),
+    });
+  }
+
+  /** Goes through the labels under the pointer, else through all. */
+  private cycle(by: number): void {
+    if (!this.frame) return;
+    const under = this.pointer ? this.objectsAt(...this.pointer) : [];
+    const list = under.length > 1 ? under : this.frame.objects.filter((object) => object.box);
+    if (list.length === 0) return;
+    const at = list.findIndex((object) => object.id === this.app.state.object);
+    const next = at < 0 ? (by > 0 ? 0 : list.length - 1) : (at + by + list.length) % list.length;
+    this.app.go({ object: list[next].id }, true);
+  }
+
+  /** True when the key means something here. */
+  press(event: KeyboardEvent): boolean {
+    const { app } = this;
+    const frames = this.capture?.frames.length ?? 0;
+    const digit = /^[1-9]$/.test(event.key) ? Number(event.key) - 1 : -1;
+    if (digit >= 0 && digit < frames) app.go({ frame: digit, object: 0 });
+    else if (event.key === 'ArrowLeft') this.step(-1);
+    else if (event.key === 'ArrowRight') this.step(1);
+    else if (event.key === 'ArrowUp') this.cycle(-1);
+    else if (event.key === 'ArrowDown') this.cycle(1);
+    else if (event.key === '+' || event.key === '=') this.zoomTo(this.view.scale * 1.4);
+    else if (event.key === '-') this.zoomTo(this.view.scale / 1.4);
+    else if (event.key === '0') this.fit();
+    else if (event.key === 'z') this.zoomToObject();
+    else if (event.key === 's') app.go({ space: !app.state.space });
+    else if (event.key === 'Escape') app.go(app.state.object !== 0 ? { object: 0 } : { page: 'grid' });
+    else return false;
+    return true;
+  }
+}
+
+export const kKeys: [string, string][] = [
+  ...kLayers.map((layer): [string, string] => [layer.hotkey, `${layer.title} on or off`]),
+  ['i', 'Colours by class or by instance'],
+  ['[  ]', 'Overlays fainter, stronger'],
+  ['← →', 'Capture before, next one (of those that the filters leave)'],
+  ['↑ ↓', 'Through the labels under the pointer, or all'],
+  ['1 … 9', 'Camera'],
+  ['+ −  wheel', 'Zoom'],
+  ['0', 'Whole picture'],
+  ['z', 'Zoom to the chosen object'],
+  ['s', '3-D view'],
+  ['g', 'Grid'],
+  ['Esc', 'Back'],
+  ['?', 'This list'],
+];

@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the server says, or the files of a report: addresses are those of dataset_view.h.
+
+export interface DatasetState {
+  name: string;
+  format: string;
+  captures: number;
+  all_captures: number;
+  indexed: number;
+}
+
+export interface SiteState {
+  folder: string;
+  generation: number;
+  is_finished: boolean;
+  datasets: DatasetState[];
+}
+
+export interface DatasetInfo {
+  name: string;
+  folder: string;
+  format: string;
+  holds: string[];
+  cameras: string[];
+  classes: string[];
+  captures: number[];
+}
+
+export type Box = [number, number, number, number];
+
+export interface ObjectLabels {
+  id: number;
+  path: string;
+  class: string;
+  labels: { [taxonomy: string]: string };
+  box: Box | null;
+  amodal_box?: Box | null;
+  occlusion?: number | null;
+  truncation?: number | null;
+  visible_pixels?: number;
+  distance_m?: number | null;
+  world_from_node?: number[];
+  bounds?: [number[], number[]];
+  edges?: number[][];
+}
+
+export interface FrameLabels {
+  camera: string;
+  width: number;
+  height: number;
+  lens?: string;
+  focal?: [number, number];
+  centre?: [number, number];
+  world_from_camera?: number[];
+  objects: ObjectLabels[];
+  files?: { [held: string]: string };
+}
+
+export interface Finding {
+  check: string;
+  file?: string;
+  message?: string;
+  capture?: number;
+  camera?: string;
+  object?: string;
+  found?: string;
+  expected?: string;
+}
+
+export interface CaptureLabels {
+  capture: number;
+  visit: number;
+  phase: string;
+  environment: string;
+  split: string;
+  frames: FrameLabels[];
+  findings: Finding[];
+}
+
+export interface AmodalMasks {
+  objects: { id: number; box: Box; runs: number[] }[];
+}
+
+export interface RunState {
+  folder?: string;
+  seed?: number;
+  version?: string;
+  job?: string;
+  captures?: number;
+  done?: number;
+  is_finished?: boolean;
+  workers?: { name: string; role: string; description: string; is_alive: boolean; captures: number }[];
+}
+
+interface IndexPart {
+  from: number;
+  columns: { [name: string]: number[] };
+  names: { classes: string[]; phases: string[]; environments: string[]; splits: string[] };
+}
+
+/** A report: files beside the page instead of a server. */
+export const isReport = document.querySelector('meta[name=diorama]') !== null;
+
+/** The program has ended, or the token is not known any more. */
+export class Gone extends Error {}
+
+const waiting = new Map<string, (value: unknown) => void>();
+(window as any).diorama_data = (path: string, value: unknown): void => {
+  waiting.get(path)?.(value);
+  waiting.delete(path);
+};
+
+function fileOf(path: string): string {
+  return 'data/' + path.slice('/api/'.length).replaceAll('/', '_');
+}
+
+function getFromFile(path: string): Promise<any> {
+  return new Promise((resolve, reject) => {
+    waiting.set(path, resolve);
+    const script = document.createElement('script');
+    script.src = fileOf(path) + '.js';
+    script.onload = () => script.remove();
+    script.onerror = () => {
+      script.remove();
+      waiting.delete(path);
+      reject(new Error('not in this report'));
+    };
+    document.head.append(script);
+  });
+}
+
+/** JSON at an address; null while the program is still at work on it. */
+export async function get(path: string): Promise<any> {
+  if (isReport) return getFromFile(path);
+  let response: Response;
+  try {
+    response = await fetch(path, { credentials: 'same-origin' });
+  } catch {
+    throw new Gone('the program has ended');
+  }
+  if (response.status === 403) throw new Gone('the program was started anew');
+  if (response.status === 202) return null;
+  if (!response.ok) throw new Error((await response.text()).trim());
+  return response.json();
+}
+
+export function pictureAddress(dataset: number, capture: number, frame: number, kind: string): string {
+  const path = `/api/${dataset}/capture/${capture}/${frame}/${kind}`;
+  return isReport ? fileOf(path) : path;
+}
+
+/** An element with the picture, decoded. Those with numbers are inside of scripts in a report. */
+export async function loadPicture(dataset: number, capture: number, frame: number,
+                                  kind: string): Promise<HTMLImageElement> {
+  const image = new Image();
+  const hasNumbers = kind !== 'color' && kind !== 'thumbnail';
+  image.src = isReport && hasNumbers
+    ? await getFromFile(`/api/${dataset}/capture/${capture}/${frame}/${kind}`)
+    : pictureAddress(dataset, capture, frame, kind);
+  await image.decode();
+  return image;
+}
+
+/** Whole numbers in one growing array. */
+class Column {
+  values = new Int32Array(1024);
+  length = 0;
+
+  add(numbers: number[]): void {
+    const needed = this.length + numbers.length;
+    if (needed > this.values.length) {
+      const larger = new Int32Array(Math.max(needed, 2 * this.values.length));
+      larger.set(this.values.subarray(0, this.length));
+      this.values = larger;
+    }
+    this.values.set(numbers, this.length);
+    this.length = needed;
+  }
+}
+
+export const kUnknown = -1000;
+
+/** All captures as columns: see capture_index.h. */
+export class CaptureTable {
+  readonly columns: { [name: string]: Column } = {};
+  names: IndexPart['names'] = { classes: [], phases: [], environments: [], splits: [] };
+  captures = 0;
+  pictures = 0;
+  objects = 0;
+
+  constructor() {
+    for (const name of ['visit', 'phase', 'environment', 'split', 'findings', 'pictures', 'camera', 'width',
+      'height', 'objects', 'class', 'visible', 'truncation', 'box_side', 'distance', 'elevation']) {
+      this.columns[name] = new Column();
+    }
+  }
+
+  of(name: string): Int32Array {
+    return this.columns[name].values;
+  }
+
+  add(part: IndexPart): void {
+    if (part.from !== this.captures) return;
+    for (const [name, numbers] of Object.entries(part.columns)) this.columns[name]?.add(numbers);
+    this.names = part.names;
+    this.captures += part.columns.visit.length;
+    this.pictures += part.columns.camera.length;
+    this.objects += part.columns.class.length;
+  }
+}

@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+// One card per capture with its cameras. Only cards that are in sight exist.
+import { App } from './app';
+import { pictureAddress } from './data';
+import { button, clear, el, on } from './dom';
+import { FramePixels, drawLines, overlays } from './layers';
+
+const kGap = 12;
+const kHead = 26;
+
+interface Card {
+  element: HTMLElement;
+  redraw: () => void;
+}
+
+export class Grid {
+  readonly element = el('div', { class: 'grid', tabindex: '0', role: 'grid', 'aria-label': 'Captures' });
+  private readonly field = el('div', { class: 'field' });
+  private readonly empty = el('p', { class: 'empty' });
+  private readonly cards = new Map<number, Card>();
+  private app!: App;
+  private key = '';
+  private columns = 1;
+  private cardWidth = 1;
+  private cardHeight = 1;
+  private chosen = 0;
+
+  constructor() {
+    this.element.append(this.empty, this.field);
+    on(this.element, { scroll: () => this.fill(), keydown: (event: KeyboardEvent) => this.press(event) });
+    new ResizeObserver(() => this.app && this.show(this.app)).observe(this.element);
+  }
+
+  show(app: App): void {
+    this.app = app;
+    const { state, table } = app;
+    // Pictures of a capture stand side by side as long as the card fits into the window.
+    const pictures = Math.max(1, table.captures > 0 ? table.of('pictures')[0] : app.info.cameras.length);
+    const aspect = table.pictures > 0 && table.of('width')[0] > 0 ? table.of('height')[0] / table.of('width')[0] : 0.75;
+    const inside = Math.max(200, this.element.clientWidth - 2 * kGap);
+    const beside = Math.max(1, Math.min(pictures, Math.floor((inside - 2) / (state.card + 2))));
+    this.cardWidth = beside * (state.card + 2) - 2;
+    const rows = Math.ceil(pictures / beside);
+    this.cardHeight = kHead + rows * (Math.round(state.card * aspect) + 2);
+    this.columns = Math.max(1, Math.floor((inside + kGap) / (this.cardWidth + kGap)));
+    const lines = Math.ceil(app.filtered.places.length / this.columns);
+    this.field.style.height = `${lines * (this.cardHeight + kGap) + kGap}px`;
+    this.empty.hidden = app.filtered.places.length > 0;
+    if (!this.empty.hidden) {
+      clear(this.empty);
+      const isReading = table.captures < app.info.captures.length;
+      this.empty.append(isReading ? 'Reading labels …' : 'No capture fits these filters. ');
+      if (!isReading) this.empty.append(button('Clear all filters', '', () => app.go({ facets: new Map() })));
+    }
+    const key = JSON.stringify([state.dataset, app.site.generation, [...state.layers].sort(), state.colour, state.opacity,
+      state.card, this.columns, this.cardWidth, this.cardHeight]);
+    if (key !== this.key) {
+      this.key = key;
+      for (const card of this.cards.values()) card.element.remove();
+      this.cards.clear();
+    }
+    this.fill();
+  }
+
+  private fill(): void {
+    if (!this.app || this.element.clientHeight === 0) return;
+    const pitch = this.cardHeight + kGap;
+    const first = Math.max(0, Math.floor(this.element.scrollTop / pitch) - 1) * this.columns;
+    const lines = Math.ceil(this.element.clientHeight / pitch) + 3;
+    const places = this.app.filtered.places;
+    const last = Math.min(places.length, first + lines * this.columns);
+    const wanted = new Set<number>();
+    for (let i = first; i < last; ++i) {
+      const place = places[i];
+      wanted.add(place);
+      let card = this.cards.get(place);
+      if (!card) {
+        card = this.make(place);
+        this.cards.set(place, card);
+        this.field.append(card.element);
+      }
+      const column = i % this.columns;
+      const line = Math.floor(i / this.columns);
+      card.element.style.transform = `translate(${kGap + column * (this.cardWidth + kGap)}px, ${kGap + line * pitch}px)`;
+      card.element.dataset.at = String(i);
+      card.element.classList.toggle('chosen', i === this.chosen);
+    }
+    for (const [place, card] of this.cards) {
+      if (wanted.has(place)) continue;
+      card.element.remove();
+      this.cards.delete(place);
+    }
+  }
+
+  private make(place: number): Card {
+    const { app } = this;
+    const { table, state } = app;
+    const capture = app.info.captures[place];
+    const phase = table.names.phases[table.of('phase')[place]] ?? '';
+    const environment = table.names.environments[table.of('environment')[place]] ?? '';
+    const split = table.names.splits[table.of('split')[place]] ?? '';
+    const words = [phase, split].filter((word) => word !== '').join(' · ');
+    const count = table.of('pictures')[place];
+    const element = el('div', { class: 'card', role: 'row', title: environment },
+      el('div', { class: 'head' }, el('b', {}, `#${capture}`), el('span', {}, words),
+        table.of('findings')[place] > 0 && el('span', { class: 'bad', title: 'The reader found faults in its files' }, '⚠')));
+    element.style.width = `${this.cardWidth}px`;
+    element.style.height = `${this.cardHeight}px`;
+    const draws: (() => void)[] = [];
+    const row = el('div', { class: 'pictures' });
+    for (let frame = 0; frame < count; ++frame) {
+      const link = on(el('a', { href: '#', class: 'picture', role: 'gridcell', tabindex: '-1',
+        'aria-label': `capture ${capture}, picture ${frame + 1}` }), {
+        click: (event: MouseEvent) => {
+          event.preventDefault();
+          this.chosen = Number(element.dataset.at);
+          app.go({ page: 'capture', capture, frame, object: 0 });
+        },
+      });
+      link.style.width = `${state.card}px`;
+      const canvas = el('canvas');
+      if (app.holds.has('color')) {
+        const image = on(el('img', { alt: '', decoding: 'async', src: pictureAddress(state.dataset, capture, frame, 'thumbnail') }), {
+          error: () => image.classList.add('missing'),
+        });
+        link.append(image);
+      } else {
+        link.append(el('span', { class: 'missing' }));
+      }
+      link.append(canvas);
+      row.append(link);
+      draws.push(this.drawer(capture, frame, canvas, element));
+    }
+    element.append(row);
+    const redraw = () => draws.forEach((draw) => draw());
+    redraw();
+    return { element, redraw };
+  }
+
+  /** Overlays of one picture of a card. */
+  private drawer(capture: number, frame: number, canvas: HTMLCanvasElement, card: HTMLElement): () => void {
+    const { app } = this;
+    const { state } = app;
+    const pixels = new FramePixels(state.dataset, capture, frame);
+    const draw = async (): Promise<void> => {
+      if (state.layers.size === 0) return;
+      const labels = (await app.labels(capture).catch(() => null))?.frames[frame];
+      if (!labels || !card.isConnected) return;
+      const ratio = Math.min(2, window.devicePixelRatio || 1);
+      canvas.width = Math.round(state.card * ratio);
+      canvas.height = Math.round((state.card * ratio * labels.height) / Math.max(1, labels.width));
+      const context = canvas.getContext('2d')!;
+      context.globalAlpha = state.opacity / 100;
+      for (const layer of overlays(pixels, labels, state, app.palette, app.holds, () => void draw())) {
+        context.drawImage(layer, 0, 0, canvas.width, canvas.height);
+      }
+      context.globalAlpha = 1;
+      drawLines(context, labels, { scale: canvas.width / labels.width, x: 0, y: 0 }, state, app.palette, 0.9 * ratio, 0);
+    };
+    return () => requestAnimationFrame(() => void draw());
+  }
+
+  private press(event: KeyboardEvent): void {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const places = this.app.filtered.places;
+    const page = Math.max(1, Math.floor(this.element.clientHeight / (this.cardHeight + kGap))) * this.columns;
+    const steps: { [key: string]: number } = { ArrowLeft: -1, ArrowRight: 1, ArrowUp: -this.columns, ArrowDown: this.columns,
+      PageUp: -page, PageDown: page, Home: -places.length, End: places.length };
+    if (event.key === 'Enter' && places.length > 0) {
+      this.app.go({ page: 'capture', capture: this.app.info.captures[places[this.chosen]], frame: 0, object: 0 });
+    } else if (event.key in steps) {
+      this.chosen = Math.max(0, Math.min(places.length - 1, this.chosen + steps[event.key]));
+      const top = Math.floor(this.chosen / this.columns) * (this.cardHeight + kGap);
+      const bottom = top + this.cardHeight + 2 * kGap;
+      if (top < this.element.scrollTop) this.element.scrollTop = top;
+      if (bottom > this.element.scrollTop + this.element.clientHeight) {
+        this.element.scrollTop = bottom - this.element.clientHeight;
+      }
+      this.fill();
+    } else {
+      return;
+    }
+    event.preventDefault();
+  }
+}

@@ -1,0 +1,317 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is drawn over a picture: exact labels where they are few numbers, pictures of numbers where they
+// are many.
+import { AmodalMasks, FrameLabels, ObjectLabels, get, loadPicture } from './data';
+import { State } from './state';
+
+export interface Layer {
+  key: string;
+  title: string;
+  hotkey: string;
+  held: string[];  ///< Of which a dataset must hold one.
+}
+
+export const kLayers: Layer[] = [
+  { key: 'box', title: '2-D boxes', hotkey: 'b', held: ['tight_boxes', 'instance_id'] },
+  { key: 'cube', title: '3-D boxes', hotkey: 'c', held: ['boxes_3d'] },
+  { key: 'mask', title: 'Masks', hotkey: 'm', held: ['instance_id'] },
+  { key: 'amodal', title: 'Amodal masks', hotkey: 'a', held: ['amodal_mask'] },
+  { key: 'name', title: 'Names', hotkey: 'l', held: ['labels'] },
+  { key: 'depth', title: 'Depth', hotkey: 'd', held: ['distance_to_image_plane', 'distance_to_camera'] },
+  { key: 'normals', title: 'Normals', hotkey: 'n', held: ['normals'] },
+  { key: 'motion', title: 'Motion', hotkey: 'f', held: ['motion'] },
+];
+
+export type Rgb = [number, number, number];
+
+/** Hues far from each other for neighbouring numbers. */
+export function colourOf(index: number): Rgb {
+  const hue = ((index * 137.508 + 200) % 360) / 60;
+  const light = 0.56 + 0.08 * (index % 3 - 1);
+  const chroma = (1 - Math.abs(2 * light - 1)) * 0.85;
+  const part = (shift: number): number => {
+    const k = (shift + hue) % 6;
+    const value = light - chroma / 2 + chroma * Math.max(0, Math.min(1, Math.abs(k - 3) - 1));
+    return Math.round(255 * value);
+  };
+  return [part(0), part(4), part(2)];
+}
+
+export function css(colour: Rgb, alpha = 1): string {
+  return `rgba(${colour[0]}, ${colour[1]}, ${colour[2]}, ${alpha})`;
+}
+
+export class Palette {
+  private readonly numbers = new Map<string, number>();
+
+  /** Classes of the whole dataset in its order. */
+  constructor(classes: string[]) {
+    for (const name of classes) this.numbers.set(name, this.numbers.size);
+  }
+
+  ofClass(name: string): Rgb {
+    let number = this.numbers.get(name);
+    if (number === undefined) this.numbers.set(name, (number = this.numbers.size));
+    return colourOf(number);
+  }
+
+  of(object: ObjectLabels, state: State): Rgb {
+    return state.colour === 'instance' ? colourOf(object.id) : this.ofClass(object.class);
+  }
+}
+
+function canvasOf(width: number, height: number): [HTMLCanvasElement, CanvasRenderingContext2D] {
+  const canvas = document.createElement('canvas');
+  canvas.width = width;
+  canvas.height = height;
+  return [canvas, canvas.getContext('2d', { willReadFrequently: true })!];
+}
+
+/** The three bytes of each pixel as one number. */
+export class Numbers {
+  constructor(readonly width: number, readonly height: number, readonly values: Uint32Array) {}
+
+  static of(image: HTMLImageElement): Numbers {
+    const [, context] = canvasOf(image.naturalWidth, image.naturalHeight);
+    context.drawImage(image, 0, 0);
+    const bytes = context.getImageData(0, 0, image.naturalWidth, image.naturalHeight).data;
+    const values = new Uint32Array(bytes.length / 4);
+    for (let i = 0; i < values.length; ++i) {
+      values[i] = bytes[4 * i] | (bytes[4 * i + 1] << 8) | (bytes[4 * i + 2] << 16);
+    }
+    return new Numbers(image.naturalWidth, image.naturalHeight, values);
+  }
+
+  at(x: number, y: number): number | null {
+    return x >= 0 && y >= 0 && x < this.width && y < this.height ? this.values[y * this.width + x] : null;
+  }
+
+  /** A picture with a colour per number; null: nothing there. */
+  coloured(colour: (value: number) => Rgb | null, alpha = 255): HTMLCanvasElement {
+    const [canvas, context] = canvasOf(this.width, this.height);
+    const image = context.createImageData(this.width, this.height);
+    const known = new Map<number, Rgb | null>();
+    for (let i = 0; i < this.values.length; ++i) {
+      let rgb = known.get(this.values[i]);
+      if (rgb === undefined) {
+        rgb = colour(this.values[i]);
+        if (known.size < 65536) known.set(this.values[i], rgb);
+      }
+      if (rgb === null) continue;
+      image.data.set(rgb, 4 * i);
+      image.data[4 * i + 3] = alpha;
+    }
+    context.putImageData(image, 0, 0);
+    return canvas;
+  }
+}
+
+/** Near is bright and warm. Anchors of the colour map "inferno", reversed. */
+const kHeat: Rgb[] = [[252, 255, 164], [250, 193, 39], [237, 105, 37], [188, 55, 84], [120, 28, 109], [58, 12, 96], [10, 7, 34]];
+
+function heat(share: number): Rgb {
+  const at = Math.max(0, Math.min(0.9999, share)) * (kHeat.length - 1);
+  const low = kHeat[Math.floor(at)];
+  const high = kHeat[Math.floor(at) + 1];
+  const part = at - Math.floor(at);
+  return [0, 1, 2].map((i) => Math.round(low[i] + (high[i] - low[i]) * part)) as Rgb;
+}
+
+export function motionOf(value: number): [number, number] {
+  return [(value & 4095) / 16 - 128, (value >> 12) / 16 - 128];
+}
+
+function motionColour(value: number): Rgb | null {
+  const [x, y] = motionOf(value);
+  const length = Math.hypot(x, y);
+  if (length < 0.05) return null;
+  const hue = Math.atan2(y, x) / (2 * Math.PI) + 0.5;
+  const strength = Math.min(1, Math.log1p(length) / 3);
+  const part = (shift: number): number => {
+    const k = (shift + hue * 6) % 6;
+    return Math.round(255 * (1 - strength + strength * Math.max(0, Math.min(1, Math.abs(k - 3) - 1))));
+  };
+  return [part(0), part(4), part(2)];
+}
+
+/** Pixels of one frame, fetched when they are first wanted. */
+export class FramePixels {
+  private readonly made = new Map<string, Promise<unknown>>();
+  private readonly ready = new Map<string, unknown>();
+
+  constructor(readonly dataset: number, readonly capture: number, readonly frame: number) {}
+
+  /** What has come until now; null while it has not. */
+  now<T>(key: string): T | null {
+    return (this.ready.get(key) as T) ?? null;
+  }
+
+  private keep<T>(key: string, make: () => Promise<T>): Promise<T> {
+    let promise = this.made.get(key) as Promise<T> | undefined;
+    if (!promise) {
+      promise = make().then((value) => {
+        this.ready.set(key, value);
+        return value;
+      });
+      this.made.set(key, promise);
+    }
+    return promise;
+  }
+
+  numbers(kind: string): Promise<Numbers> {
+    return this.keep(kind, async () => Numbers.of(await loadPicture(this.dataset, this.capture, this.frame, kind)));
+  }
+
+  picture(kind: string): Promise<HTMLImageElement> {
+    return this.keep('picture ' + kind, () => loadPicture(this.dataset, this.capture, this.frame, kind));
+  }
+
+  amodal(): Promise<AmodalMasks> {
+    return this.keep('amodal masks', () => get(`/api/${this.dataset}/capture/${this.capture}/${this.frame}/amodal`));
+  }
+
+  drawing(key: string, make: () => Promise<HTMLCanvasElement>): Promise<HTMLCanvasElement> {
+    return this.keep(key, make);
+  }
+}
+
+function maskDrawing(pixels: FramePixels, labels: FrameLabels, state: State, palette: Palette) {
+  return async (): Promise<HTMLCanvasElement> => {
+    const ids = await pixels.numbers('ids');
+    const objects = new Map(labels.objects.map((object) => [object.id & 0xffffff, object]));
+    return ids.coloured((id) => {
+      const object = objects.get(id);
+      return object ? palette.of(object, state) : null;
+    });
+  };
+}
+
+function amodalDrawing(pixels: FramePixels, labels: FrameLabels, state: State, palette: Palette) {
+  return async (): Promise<HTMLCanvasElement> => {
+    const masks = await pixels.amodal();
+    const [canvas, context] = canvasOf(labels.width, labels.height);
+    const objects = new Map(labels.objects.map((object) => [object.id, object]));
+    for (const mask of masks.objects) {
+      const object = objects.get(mask.id);
+      if (!object) continue;
+      const width = mask.box[2] - mask.box[0];
+      const height = mask.box[3] - mask.box[1];
+      if (width <= 0 || height <= 0) continue;
+      const [part, partContext] = canvasOf(width, height);
+      const image = partContext.createImageData(width, height);
+      const [r, g, b] = palette.of(object, state);
+      let at = 0;
+      mask.runs.forEach((length, i) => {
+        for (const end = at + length; at < end; ++at) if (i % 2 === 1) image.data.set([r, g, b, 150], 4 * at);
+      });
+      // A rim, so that masks on top of each other can be told apart.
+      const covers = (x: number, y: number) =>
+        x >= 0 && y >= 0 && x < width && y < height && image.data[4 * (y * width + x) + 3] > 0;
+      for (let y = 0; y < height; ++y) {
+        for (let x = 0; x < width; ++x) {
+          if (!covers(x, y) || (covers(x - 1, y) && covers(x + 1, y) && covers(x, y - 1) && covers(x, y + 1))) continue;
+          image.data[4 * (y * width + x) + 3] = 255;
+        }
+      }
+      partContext.putImageData(image, 0, 0);
+      context.drawImage(part, mask.box[0], mask.box[1]);
+    }
+    return canvas;
+  };
+}
+
+function depthDrawing(pixels: FramePixels) {
+  return async (): Promise<HTMLCanvasElement> => {
+    const depth = await pixels.numbers('depth');
+    let near = Infinity;
+    const some: number[] = [];
+    for (let i = 0; i < depth.values.length; ++i) {
+      if (depth.values[i] === 0) continue;
+      near = Math.min(near, depth.values[i]);
+      if (i % 37 === 0) some.push(depth.values[i]);
+    }
+    some.sort((a, b) => a - b);
+    // Windows let one see far; what is beyond all but the last pixels is as dark as it gets.
+    const far = some.length > 0 ? some[Math.floor(some.length * 0.98)] : near + 1;
+    return depth.coloured((value) => value === 0 ? null : heat((value - near) / Math.max(1, far - near)));
+  };
+}
+
+/** Pictures to lay over, from below; those that are not there yet come later and call `changed`. */
+export function overlays(pixels: FramePixels, labels: FrameLabels, state: State, palette: Palette,
+                         holds: Set<string>, changed: () => void): HTMLCanvasElement[] {
+  const found: HTMLCanvasElement[] = [];
+  const take = (key: string, make: () => Promise<HTMLCanvasElement>): void => {
+    const ready = pixels.now<HTMLCanvasElement>(key);
+    if (ready) found.push(ready);
+    else pixels.drawing(key, make).then(changed, () => undefined);
+  };
+  for (const layer of kLayers) {
+    if (!state.layers.has(layer.key) || !layer.held.some((name) => holds.has(name))) continue;
+    if (layer.key === 'depth') take('depth drawing', depthDrawing(pixels));
+    if (layer.key === 'normals') {
+      take('normals drawing', async () => (await pixels.numbers('normals')).coloured((value) =>
+        value === 0 ? null : [value & 255, (value >> 8) & 255, value >> 16]));
+    }
+    if (layer.key === 'motion') {
+      take('motion drawing', async () => (await pixels.numbers('motion')).coloured(motionColour));
+    }
+    if (layer.key === 'mask') take('mask ' + state.colour, maskDrawing(pixels, labels, state, palette));
+    if (layer.key === 'amodal') take('amodal ' + state.colour, amodalDrawing(pixels, labels, state, palette));
+  }
+  return found;
+}
+
+/** Picture coordinates to the canvas. */
+export interface View {
+  scale: number;
+  x: number;
+  y: number;
+}
+
+/** Boxes and names; `chosen` stands out. */
+export function drawLines(context: CanvasRenderingContext2D, labels: FrameLabels, view: View, state: State,
+                          palette: Palette, line: number, chosen: number, chosenOnly = false): void {
+  const x = (value: number) => view.x + value * view.scale;
+  const y = (value: number) => view.y + value * view.scale;
+  const objects = [...labels.objects].sort((a, b) => Number(a.id === chosen) - Number(b.id === chosen));
+  for (const object of objects) {
+    const isChosen = object.id === chosen;
+    if (chosenOnly && !isChosen) continue;
+    const colour = palette.of(object, state);
+    const widths = [line * (isChosen ? 4.5 : 2.6), line * (isChosen ? 2.2 : 1.3)];
+    const strokes = ['rgba(0, 0, 0, 0.55)', isChosen ? '#fff' : css(colour)];
+    for (let pass = 0; pass < 2; ++pass) {
+      context.lineWidth = widths[pass];
+      context.strokeStyle = strokes[pass];
+      context.lineJoin = 'round';
+      if (object.box && (state.layers.has('box') || isChosen)) {
+        const [left, top, right, bottom] = object.box;
+        context.strokeRect(x(left), y(top), (right - left) * view.scale, (bottom - top) * view.scale);
+      }
+      if (object.edges && object.box && state.layers.has('cube')) {
+        context.beginPath();
+        for (const edge of object.edges) {
+          context.moveTo(x(edge[0]), y(edge[1]));
+          for (let i = 2; i < edge.length; i += 2) context.lineTo(x(edge[i]), y(edge[i + 1]));
+        }
+        context.stroke();
+      }
+    }
+  }
+  if (!state.layers.has('name')) return;
+  const size = 12 * line;
+  context.font = `600 ${size}px system-ui, sans-serif`;
+  context.textBaseline = 'middle';
+  for (const object of objects) {
+    if (!object.box) continue;
+    const name = object.class === '' ? object.path : object.class;
+    const text = name.length > 28 ? name.slice(0, 27) + '…' : name;
+    const width = context.measureText(text).width + 8 * line;
+    const top = Math.max(0, y(object.box[1]) - size - 5 * line);
+    context.fillStyle = css(palette.of(object, state));
+    context.fillRect(x(object.box[0]) - line, top, width, size + 5 * line);
+    context.fillStyle = '#101418';
+    context.fillText(text, x(object.box[0]) + 3 * line, top + (size + 5 * line) / 2);
+  }
+}

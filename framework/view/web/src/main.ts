@@ -1,0 +1,254 @@
+// SPDX-License-Identifier: Apache-2.0
+import { App, LabelStore } from './app';
+import { CapturePage, kKeys } from './capture';
+import { CaptureTable, DatasetInfo, Gone, SiteState, get, isReport } from './data';
+import { button, clear, el, on, plural } from './dom';
+import { FacetBar } from './facets';
+import { filter } from './filter';
+import { Grid } from './grid';
+import { Palette, kLayers } from './layers';
+import { FindingsPage, RunPage, StatsPage } from './pages';
+import { Page, State, addressOf, readState } from './state';
+
+class Site {
+  private readonly top = el('header');
+  private readonly tools = el('div', { class: 'tools', role: 'toolbar', 'aria-label': 'Overlays' });
+  private readonly status = el('div', { class: 'status', role: 'status' });
+  private readonly facets = new FacetBar();
+  private readonly grid = new Grid();
+  private readonly gridPage = el('main', { class: 'browse' }, this.facets.element, this.grid.element);
+  private readonly capture = new CapturePage();
+  private readonly stats = new StatsPage();
+  private readonly findings = new FindingsPage(isReport);
+  private readonly run = new RunPage();
+  private readonly help = el('dialog', { 'aria-label': 'Keys' });
+  private app!: App;
+  private store = new LabelStore(0);
+  private loading = 0;
+
+  async start(): Promise<void> {
+    document.body.append(this.top, this.tools, this.gridPage, this.capture.element, this.stats.element,
+      this.findings.element, this.run.element, this.status, this.help);
+    this.makeHelp();
+    this.setTheme(this.keptTheme());
+    await this.load(readState(location.hash));
+    window.addEventListener('hashchange', () => void this.follow(readState(location.hash)));
+    document.addEventListener('keydown', (event) => this.press(event));
+    if (!isReport) this.watch();
+  }
+
+  /** Opens the dataset that the address names. */
+  private async load(state: State): Promise<void> {
+    const site = (await get('/api/state')) as SiteState;
+    if (state.dataset >= site.datasets.length) state.dataset = 0;
+    const info = (await get(`/api/${state.dataset}/info`)) as DatasetInfo;
+    const store = new LabelStore(state.dataset);
+    this.store = store;
+    const table = new CaptureTable();
+    this.app = {
+      state, site, info, table, holds: new Set(info.holds), palette: new Palette(info.classes),
+      filtered: filter(table, info.cameras, state.facets),
+      go: (change, replaces) => this.go(change, replaces),
+      labels: (capture) => this.store.of(capture),
+    };
+    document.title = `${info.name} – diorama view`;
+    const ticket = ++this.loading;
+    this.show();
+    await this.readIndex(ticket);
+  }
+
+  /** Columns come while they are made. */
+  private async readIndex(ticket: number): Promise<void> {
+    const { app } = this;
+    let shown = 0;
+    while (app.table.captures < app.info.captures.length) {
+      const before = app.table.captures;
+      const part = await get(`/api/${app.state.dataset}/index/${before}`);
+      if (ticket !== this.loading) return;
+      app.table.add(part);
+      const isDone = app.table.captures >= app.info.captures.length;
+      if (isDone || performance.now() - shown > 400) {
+        for (const name of app.table.names.classes) app.palette.ofClass(name);
+        this.refilter();
+        this.show();
+        shown = performance.now();
+      }
+      if (app.table.captures === before) {
+        if (isReport) return;
+        await new Promise((resolve) => setTimeout(resolve, 120));
+      }
+    }
+  }
+
+  private refilter(): void {
+    this.app.filtered = filter(this.app.table, this.app.info.cameras, this.app.state.facets);
+  }
+
+  private go(change: Partial<State>, replaces = false): void {
+    const state = { ...this.app.state, ...change };
+    const address = addressOf(state);
+    if (replaces) history.replaceState(null, '', address);
+    else if (address !== location.hash) history.pushState(null, '', address);
+    void this.follow(state);
+  }
+
+  private async follow(state: State): Promise<void> {
+    if (state.dataset !== this.app.state.dataset) {
+      await this.load(state).catch((error: Error) => this.fail(error));
+      return;
+    }
+    const filters = JSON.stringify([...state.facets]) !== JSON.stringify([...this.app.state.facets]);
+    this.app.state = state;
+    if (filters) this.refilter();
+    this.show();
+  }
+
+  private show(): void {
+    const { app } = this;
+    const { page } = app.state;
+    this.showTop();
+    this.showTools();
+    const pages: [Page, HTMLElement][] = [['grid', this.gridPage], ['capture', this.capture.element],
+      ['stats', this.stats.element], ['findings', this.findings.element], ['run', this.run.element]];
+    for (const [name, element] of pages) element.hidden = name !== page;
+    this.tools.hidden = page !== 'grid' && page !== 'capture';
+    if (page === 'grid') {
+      this.facets.show(app);
+      this.grid.show(app);
+    }
+    if (page === 'capture') void this.capture.show(app);
+    if (page === 'stats') this.stats.show(app);
+    if (page === 'findings') this.findings.show(app);
+    if (page === 'run') this.run.show(app);
+    const left = app.info.captures.length - app.table.captures;
+    this.status.hidden = left === 0 || app.info.captures.length === 0;
+    this.status.textContent = `Reading labels: ${app.table.captures.toLocaleString('en')} of ${plural(app.info.captures.length, 'capture')}`;
+  }
+
+  private showTop(): void {
+    const { app } = this;
+    const focus = document.activeElement instanceof HTMLElement ? document.activeElement.dataset.page : undefined;
+    clear(this.top);
+    const choice = on(el('select', { 'aria-label': 'Dataset' }), {
+      change: () => this.go({ dataset: Number(choice.value), page: 'grid', facets: new Map(), object: 0 }),
+    });
+    app.site.datasets.forEach((dataset, i) => choice.append(el('option', { value: i }, `${dataset.name} (${dataset.format})`)));
+    choice.value = String(app.state.dataset);
+    this.top.append(el('span', { class: 'mark' }, 'diorama'),
+      app.site.datasets.length > 1 ? choice : el('span', { class: 'dataset' }, app.info.name, el('small', {}, app.info.format)));
+    const tabs = el('nav', { 'aria-label': 'Pages' });
+    for (const [page, title] of [['grid', 'Captures'], ['stats', 'Statistics'], ['findings', 'Findings'], ['run', 'Run']] as [Page, string][]) {
+      const isHere = page === app.state.page || (page === 'grid' && app.state.page === 'capture');
+      tabs.append(button(title, '', () => this.go({ page }), { 'aria-current': isHere ? 'page' : false, 'data-page': page }));
+    }
+    this.top.append(tabs, el('span', { class: 'folder', title: app.site.folder }, app.site.folder),
+      button('◐', 'Light or dark', () => this.setTheme(document.documentElement.dataset.theme === 'dark' ? 'light' : 'dark')),
+      button('?', 'Keys (?)', () => this.help.showModal()));
+    if (focus) this.top.querySelector<HTMLElement>(`[data-page="${focus}"]`)?.focus();
+  }
+
+  private showTools(): void {
+    const { state, holds } = this.app;
+    const focus = document.activeElement instanceof HTMLElement ? document.activeElement.dataset.tool : undefined;
+    clear(this.tools);
+    for (const layer of kLayers) {
+      if (!layer.held.some((name) => holds.has(name)) || (isReport && ['depth', 'normals', 'motion'].includes(layer.key))) continue;
+      const tool = button('', `${layer.title} (${layer.hotkey})`, () => this.toggle(layer.key),
+        { 'aria-pressed': state.layers.has(layer.key) ? 'true' : 'false', 'data-tool': layer.key });
+      tool.append(layer.title, el('kbd', {}, layer.hotkey));
+      this.tools.append(tool);
+    }
+    const slider = (title: string, key: 'opacity' | 'card', least: number, most: number) => {
+      const input = on(el('input', { type: 'range', min: least, max: most, step: key === 'card' ? 20 : 5, 'data-tool': key, 'aria-label': title }), {
+        input: () => this.go({ [key]: Number(input.value) }, true),
+      });
+      input.value = String(state[key]);
+      return el('label', {}, el('small', {}, title), input);
+    };
+    const colour = button('', 'Colours by class or by instance (i)',
+      () => this.go({ colour: state.colour === 'class' ? 'instance' : 'class' }, true), { 'data-tool': 'colour' });
+    colour.append(`by ${state.colour}`, el('kbd', {}, 'i'));
+    this.tools.append(colour, slider('Opacity', 'opacity', 0, 100));
+    if (state.page === 'grid') this.tools.append(slider('Size', 'card', 120, 640));
+    if (focus) this.tools.querySelector<HTMLElement>(`[data-tool="${focus}"]`)?.focus();
+  }
+
+  private toggle(layer: string): void {
+    const layers = new Set(this.app.state.layers);
+    if (!layers.delete(layer)) layers.add(layer);
+    this.go({ layers }, true);
+  }
+
+  private press(event: KeyboardEvent): void {
+    if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey || this.help.open || !this.app) return;
+    const target = event.target as HTMLElement;
+    if (target.matches('input, select, textarea') && event.key !== 'Escape') return;
+    const { state } = this.app;
+    const layer = kLayers.find((one) => one.hotkey === event.key);
+    const pictures = state.page === 'grid' || state.page === 'capture';
+    if (event.key === '?') this.help.showModal();
+    else if (state.page === 'capture' && this.capture.press(event)) event.preventDefault();
+    else if (event.key === 'g') this.go({ page: 'grid' });
+    else if (pictures && layer && layer.held.some((name) => this.app.holds.has(name))) this.toggle(layer.key);
+    else if (pictures && event.key === 'i') this.go({ colour: state.colour === 'class' ? 'instance' : 'class' }, true);
+    else if (pictures && event.key === '[') this.go({ opacity: Math.max(0, state.opacity - 10) }, true);
+    else if (pictures && event.key === ']') this.go({ opacity: Math.min(100, state.opacity + 10) }, true);
+    else if (state.page === 'grid' && event.key.startsWith('Arrow') && target === document.body) this.grid.element.focus();
+    else return;
+    event.preventDefault();
+  }
+
+  private makeHelp(): void {
+    const list = el('dl');
+    for (const [key, what] of kKeys) list.append(el('dt', {}, key), el('dd', {}, what));
+    this.help.append(el('h2', {}, 'Keys'), list, button('Close', '', () => this.help.close(), { class: 'main' }));
+  }
+
+  private keptTheme(): string {
+    try {
+      const kept = localStorage.getItem('diorama-theme');
+      if (kept === 'light' || kept === 'dark') return kept;
+    } catch {
+      // Files may have no storage.
+    }
+    return matchMedia('(prefers-color-scheme: dark)').matches ? 'dark' : 'light';
+  }
+
+  private setTheme(theme: string): void {
+    document.documentElement.dataset.theme = theme;
+    try {
+      localStorage.setItem('diorama-theme', theme);
+    } catch {
+      // Then it is not kept.
+    }
+    if (this.app) this.show();
+  }
+
+  /** Sees that a run has gone on. A page that nobody looks at lets the program end. */
+  private watch(): void {
+    const look = async (): Promise<void> => {
+      if (document.visibilityState === 'visible') {
+        try {
+          const site = (await get('/api/state')) as SiteState;
+          if (site.generation !== this.app.site.generation) await this.load(this.app.state);
+          else if (!site.is_finished && this.app.state.page === 'run') this.run.show(this.app);
+        } catch (error) {
+          this.fail(error as Error);
+          if (error instanceof Gone) return;
+        }
+      }
+      window.setTimeout(() => void look(), 4000);
+    };
+    window.setTimeout(() => void look(), 4000);
+  }
+
+  fail(error: Error): void {
+    this.status.hidden = false;
+    this.status.classList.add('bad');
+    this.status.textContent = error instanceof Gone
+      ? `No answer: ${error.message}. Start "diorama view" again and open the address that it prints.` : error.message;
+  }
+}
+
+const site = new Site();
+site.start().catch((error: Error) => site.fail(error));

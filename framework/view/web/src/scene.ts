@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: Apache-2.0
+// The capture in space: boxes of objects and cameras with their pictures. The projection is
+// orthographic, in which the picture of a pinhole camera stays a parallelogram: exact without WebGL.
+import { CaptureLabels, FrameLabels, ObjectLabels } from './data';
+import { el, on } from './dom';
+import { Palette, css } from './layers';
+import { State } from './state';
+
+type Vec = [number, number, number];
+
+const kEdges = [[0, 1], [2, 3], [4, 5], [6, 7], [0, 2], [1, 3], [4, 6], [5, 7], [0, 4], [1, 5], [2, 6], [3, 7]];
+
+function mapped(matrix: number[], p: Vec): Vec {
+  return [0, 1, 2].map((row) =>
+    matrix[4 * row] * p[0] + matrix[4 * row + 1] * p[1] + matrix[4 * row + 2] * p[2] + matrix[4 * row + 3]) as Vec;
+}
+
+function corners(object: ObjectLabels): Vec[] {
+  const [low, high] = object.bounds!;
+  return [0, 1, 2, 3, 4, 5, 6, 7].map((i) =>
+    mapped(object.world_from_node!, [i & 1 ? high[0] : low[0], i & 2 ? high[1] : low[1], i & 4 ? high[2] : low[2]]));
+}
+
+/** Centre and picture corners (top left, top right, bottom left, bottom right) of a camera. */
+function frustum(frame: FrameLabels, length: number): Vec[] | null {
+  if (!frame.world_from_camera || !frame.focal || !frame.centre) return null;
+  const at = (x: number, y: number): Vec => mapped(frame.world_from_camera!, [
+    ((x - frame.centre![0]) / frame.focal![0]) * length, (-(y - frame.centre![1]) / frame.focal![1]) * length, -length]);
+  return [mapped(frame.world_from_camera, [0, 0, 0]), at(0, 0), at(frame.width, 0), at(0, frame.height), at(frame.width, frame.height)];
+}
+
+export class SpaceView {
+  readonly canvas = el('canvas', { class: 'space', tabindex: '0', role: 'img',
+    'aria-label': '3-D view; arrow keys turn it, plus and minus zoom, t looks from above' });
+  private turn = 0.7;
+  private rise = 0.5;
+  private zoom = 1;
+  private labels: CaptureLabels | null = null;
+  private state!: State;
+  private palette!: Palette;
+  private readonly pictures = new Map<number, HTMLImageElement>();
+  private spots: { x: number; y: number; frame?: number; object?: number }[] = [];
+
+  constructor(private readonly pick: (frame: number | null, object: number | null) => void) {
+    let held: [number, number] | null = null;
+    let moved = 0;
+    on(this.canvas, {
+      pointerdown: (event: PointerEvent) => {
+        held = [event.clientX, event.clientY];
+        moved = 0;
+        this.canvas.setPointerCapture(event.pointerId);
+      },
+      pointermove: (event: PointerEvent) => {
+        if (!held) return;
+        this.turn -= (event.clientX - held[0]) * 0.008;
+        this.rise = Math.max(-1.57, Math.min(1.57, this.rise + (event.clientY - held[1]) * 0.008));
+        moved += Math.abs(event.clientX - held[0]) + Math.abs(event.clientY - held[1]);
+        held = [event.clientX, event.clientY];
+        this.draw();
+      },
+      pointerup: (event: PointerEvent) => {
+        held = null;
+        if (moved < 4) this.click(event);
+      },
+      wheel: (event: WheelEvent) => {
+        event.preventDefault();
+        this.zoom = Math.max(0.2, Math.min(20, this.zoom * Math.exp(-event.deltaY * 0.0015)));
+        this.draw();
+      },
+      keydown: (event: KeyboardEvent) => {
+        const acts: { [key: string]: () => void } = {
+          ArrowLeft: () => (this.turn += 0.1), ArrowRight: () => (this.turn -= 0.1),
+          ArrowUp: () => (this.rise = Math.min(1.57, this.rise + 0.1)), ArrowDown: () => (this.rise = Math.max(-1.57, this.rise - 0.1)),
+          '+': () => (this.zoom *= 1.2), '-': () => (this.zoom /= 1.2), t: () => (this.rise = 1.57),
+        };
+        if (!(event.key in acts)) return;
+        acts[event.key]();
+        event.preventDefault();
+        event.stopPropagation();
+        this.draw();
+      },
+    });
+    new ResizeObserver(() => this.draw()).observe(this.canvas);
+  }
+
+  show(labels: CaptureLabels, state: State, palette: Palette, address: (frame: number) => string | null): void {
+    if (labels !== this.labels) {
+      this.pictures.clear();
+      labels.frames.forEach((_, i) => {
+        const source = address(i);
+        if (source === null) return;
+        const image = new Image();
+        image.src = source;
+        image.onload = () => this.draw();
+        this.pictures.set(i, image);
+      });
+    }
+    this.labels = labels;
+    this.state = state;
+    this.palette = palette;
+    this.draw();
+  }
+
+  private click(event: PointerEvent): void {
+    const frame = this.canvas.getBoundingClientRect();
+    const x = event.clientX - frame.left;
+    const y = event.clientY - frame.top;
+    const distance = (spot: { x: number; y: number }) => Math.hypot(spot.x - x, spot.y - y);
+    const near = [...this.spots].sort((a, b) => distance(a) - distance(b))[0];
+    if (near && distance(near) < 24) this.pick(near.frame ?? null, near.object ?? null);
+  }
+
+  private draw(): void {
+    if (!this.labels || this.canvas.clientWidth === 0) return;
+    const ratio = window.devicePixelRatio || 1;
+    const width = this.canvas.clientWidth;
+    const height = this.canvas.clientHeight;
+    this.canvas.width = Math.round(width * ratio);
+    this.canvas.height = Math.round(height * ratio);
+    const context = this.canvas.getContext('2d')!;
+    const colours = getComputedStyle(this.canvas);
+
+    // An object is the same in all pictures.
+    const objects = new Map<string, ObjectLabels>();
+    for (const frame of this.labels.frames) {
+      for (const object of frame.objects) if (object.bounds && object.world_from_node) objects.set(object.path, object);
+    }
+    const boxes = [...objects.values()].map((object) => ({ object, points: corners(object) }));
+    const eyes = this.labels.frames.map((frame) => frustum(frame, 1)?.[0]).filter((eye) => eye !== undefined);
+    const all: Vec[] = [...boxes.flatMap((box) => box.points), ...eyes].filter((p) => p.every(Number.isFinite));
+    if (all.length === 0) return;
+    const low = [0, 1, 2].map((i) => Math.min(...all.map((p) => p[i])));
+    const high = [0, 1, 2].map((i) => Math.max(...all.map((p) => p[i])));
+    const middle = low.map((value, i) => (value + high[i]) / 2);
+    const extent = Math.max(1e-6, Math.hypot(...high.map((value, i) => value - low[i])));
+    const scale = (Math.min(width, height) / extent) * 0.85 * this.zoom;
+    const [ct, st, cr, sr] = [Math.cos(this.turn), Math.sin(this.turn), Math.cos(this.rise), Math.sin(this.rise)];
+    const project = (p: Vec): [number, number] => {
+      const [x, y, z] = p.map((value, i) => value - middle[i]);
+      return [width / 2 + scale * (-st * x + ct * y), height / 2 - scale * (cr * z - sr * (ct * x + st * y))];
+    };
+    const line = (a: Vec, b: Vec): void => {
+      context.moveTo(...project(a));
+      context.lineTo(...project(b));
+    };
+
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    context.clearRect(0, 0, width, height);
+    this.spots = [];
+    // A grid of metres below everything.
+    context.strokeStyle = colours.getPropertyValue('--line');
+    context.lineWidth = 1;
+    context.beginPath();
+    const step = extent > 40 ? 10 : extent > 2 ? 1 : 0.1;
+    for (let x = Math.floor(low[0] / step); x <= Math.ceil(high[0] / step); ++x) {
+      line([x * step, Math.floor(low[1] / step) * step, low[2]], [x * step, Math.ceil(high[1] / step) * step, low[2]]);
+    }
+    for (let y = Math.floor(low[1] / step); y <= Math.ceil(high[1] / step); ++y) {
+      line([Math.floor(low[0] / step) * step, y * step, low[2]], [Math.ceil(high[0] / step) * step, y * step, low[2]]);
+    }
+    context.stroke();
+
+    this.labels.frames.forEach((frame, i) => {
+      const points = frustum(frame, 0.16 * extent);
+      if (!points) return;
+      const [eye, a, b, c, d] = points;
+      const image = this.pictures.get(i);
+      if (image?.complete && image.naturalWidth > 0 && frame.lens === 'pinhole') {
+        const [pa, pb, pc] = [project(a), project(b), project(c)];
+        context.save();
+        context.globalAlpha = i === this.state.frame ? 0.95 : 0.55;
+        context.transform((pb[0] - pa[0]) / image.naturalWidth, (pb[1] - pa[1]) / image.naturalWidth,
+          (pc[0] - pa[0]) / image.naturalHeight, (pc[1] - pa[1]) / image.naturalHeight, pa[0], pa[1]);
+        context.drawImage(image, 0, 0);
+        context.restore();
+      }
+      context.strokeStyle = colours.getPropertyValue(i === this.state.frame ? '--accent' : '--quiet');
+      context.lineWidth = i === this.state.frame ? 2 : 1;
+      context.beginPath();
+      for (const corner of [a, b, c, d]) line(eye, corner);
+      for (const [from, to] of [[a, b], [b, d], [d, c], [c, a]]) line(from, to);
+      context.stroke();
+      const [x, y] = project(eye);
+      context.fillStyle = colours.getPropertyValue('--text');
+      context.font = '12px system-ui, sans-serif';
+      context.fillText(frame.camera, x + 6, y - 6);
+      for (const spot of [eye, a, b, c, d]) {
+        const [sx, sy] = project(spot);
+        this.spots.push({ x: sx, y: sy, frame: i });
+      }
+    });
+    for (const { object, points } of boxes) {
+      const isChosen = object.id === this.state.object;
+      context.strokeStyle = css(this.palette.of(object, this.state));
+      context.lineWidth = isChosen ? 3 : 1.4;
+      context.beginPath();
+      for (const [from, to] of kEdges) line(points[from], points[to]);
+      context.stroke();
+      const centre = [0, 1, 2].map((i) => points.reduce((sum, p) => sum + p[i], 0) / 8) as Vec;
+      const [x, y] = project(centre);
+      this.spots.push({ x, y, object: object.id });
+      if (isChosen || boxes.length <= 12) {
+        context.fillStyle = colours.getPropertyValue('--text');
+        context.font = `${isChosen ? 600 : 400} 12px system-ui, sans-serif`;
+        context.fillText(object.class, x + 4, y);
+      }
+    }
+  }
+}

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is shown, as an address behind '#': whoever opens it sees the same.
+
+export type Page = 'grid' | 'capture' | 'stats' | 'findings' | 'run';
+
+export interface State {
+  page: Page;
+  dataset: number;
+  capture: number;
+  frame: number;
+  object: number;  ///< Id of the one that is chosen; 0: none.
+  layers: Set<string>;
+  colour: 'class' | 'instance';
+  opacity: number;  ///< Percent.
+  card: number;  ///< Width of pictures in the grid.
+  facets: Map<string, string>;
+  space: boolean;  ///< The 3-D view is open.
+}
+
+const kPages: Page[] = ['grid', 'capture', 'stats', 'findings', 'run'];
+
+function whole(text: string | null, otherwise: number): number {
+  return text !== null && /^\d{1,9}$/.test(text) ? Number(text) : otherwise;
+}
+
+export function readState(hash: string): State {
+  const cut = hash.indexOf('?');
+  const words = hash.slice(0, cut < 0 ? undefined : cut).replace(/^#?\/?/, '').split('/');
+  const query = new URLSearchParams(cut < 0 ? '' : hash.slice(cut + 1));
+  const facets = new Map<string, string>();
+  for (const [key, value] of query) if (key.startsWith('f.')) facets.set(key.slice(2), value);
+  const layers = query.get('layers');
+  return {
+    page: kPages.includes(words[0] as Page) ? (words[0] as Page) : 'grid',
+    dataset: whole(query.get('dataset'), 0),
+    capture: whole(words[1] ?? null, 0),
+    frame: whole(words[2] ?? null, 0),
+    object: whole(query.get('object'), 0),
+    layers: new Set(layers === null ? ['box'] : layers.split('.').filter((name) => name !== '')),
+    colour: query.get('colour') === 'instance' ? 'instance' : 'class',
+    opacity: Math.min(100, whole(query.get('opacity'), 60)),
+    card: Math.min(640, Math.max(120, whole(query.get('card'), 240))),
+    facets,
+    space: query.get('space') === '1',
+  };
+}
+
+export function addressOf(state: State): string {
+  const query = new URLSearchParams();
+  if (state.dataset !== 0) query.set('dataset', String(state.dataset));
+  if (state.object !== 0 && state.page === 'capture') query.set('object', String(state.object));
+  const layers = [...state.layers].sort().join('.');
+  if (layers !== 'box') query.set('layers', layers);
+  if (state.colour !== 'class') query.set('colour', state.colour);
+  if (state.opacity !== 60) query.set('opacity', String(state.opacity));
+  if (state.card !== 240) query.set('card', String(state.card));
+  if (state.space && state.page === 'capture') query.set('space', '1');
+  for (const [key, value] of state.facets) query.set('f.' + key, value);
+  const place = state.page === 'capture' ? `/${state.capture}/${state.frame}` : '';
+  const text = query.toString();
+  return `#/${state.page}${place}${text === '' ? '' : '?' + text}`;
+}
