@@ -53,7 +53,7 @@ void DatasetOutput::write(const std::function<void(const Take&)>& give, Host& ho
   give([&queue](Capture capture) {
     PendingCapture pending;
     pending.capture = std::move(capture);
-    queue.push(std::move(pending));
+    static_cast<void>(queue.push(std::move(pending)));  // waits for room as nobody stops it
   });
   queue.drain();
 }
