@@ -8,6 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <sstream>
+#include <utility>
+#include <vector>
 
 #include "framework/config/json_text.h"
 #include "framework/datasets/capture_sweep.h"
@@ -87,6 +89,9 @@ class Comparison {
         both.insert(name);
       }
     }
+    if (knows_sights()) {
+      both.insert({std::string(kInstanceId.name), std::string(kHoldsOcclusion)});
+    }
     return both;
   }
 
@@ -103,6 +108,7 @@ class Comparison {
 
   /// What was rare enough to be a fault.
   void finish(ReadLog& log) {
+    find_lost(log);
     const bool is_other_choice =
         double(unmatched_) > kRare * double(std::max<std::int64_t>(objects_, 1));
     if (!is_other_choice) {
@@ -221,6 +227,61 @@ class Comparison {
       // Of several in one place, none says which is meant.
       if (partners.size() == 1) remember_class(*partners.front(), object, b, k, in_reference);
     }
+    if (knows_sights()) remember_choice(one, b, k, in_reference, slack);
+  }
+
+  /// What is seen of an object, by which writers leave some out.
+  struct Sight {
+    std::int64_t pixels = 0;
+    double share = 1.0;
+
+    bool is_at_least(const Sight& other) const {
+      return pixels >= other.pixels && share >= other.share;
+    }
+  };
+
+  bool knows_sights() const {
+    return a_.holds.contains(kInstanceId.name) && a_.holds.contains(kHoldsOcclusion) &&
+           a_.holds.contains(kHoldsTightBoxes) && b_.holds.contains(kHoldsTightBoxes) &&
+           a_.holds.contains(kHoldsLabels);
+  }
+
+  /// Which objects of the reference the other dataset has, and which not.
+  void remember_choice(const Frame& one, const StoredCapture& b, std::size_t k,
+                       const std::string& in_reference, int slack) {
+    if (!one.has(kInstanceId.name)) return;
+    std::map<std::uint32_t, std::int64_t> pixels;
+    for (const std::uint32_t id : one.get(kInstanceId).pixels()) ++pixels[id];
+    for (const Instance& object : one.instances) {
+      const auto occlusion = object.visibility ? object.visibility->occlusion() : std::nullopt;
+      if (!object.tight_box || object.labels.empty() || !occlusion) continue;
+      const auto& others = b.capture.frames[k].instances;
+      const bool is_there = std::ranges::any_of(others, [&](const Instance& other) {
+        return other.tight_box && is_near(*object.tight_box, *other.tight_box, slack);
+      });
+      const Sight sight{pixels[object.id], 1.0 - *occlusion};
+      Choice& choice = choices_[text_of(object.labels)];
+      ++(is_there ? choice.kept_count : choice.missing_count);
+      if (is_there && choice.kept.size() < kMostExamples) choice.kept.push_back(sight);
+      if (is_there || choice.missing.size() >= kMostExamples) continue;
+      choice.missing.emplace_back(sight, about(b, k, kHoldsTightBoxes, object.node_path,
+                                               "is not there", "an object as in " + in_reference));
+    }
+  }
+
+  /// An object that is not there while one of its kind is of which less was seen has been lost, if
+  /// that is rare.
+  void find_lost(ReadLog& log) {
+    for (auto& [labels, choice] : choices_) {
+      ++log.checks;
+      const double rare = std::max(1.0, kRare * double(choice.kept_count));
+      if (double(choice.missing_count) > rare) continue;
+      for (auto& [sight, finding] : choice.missing) {
+        const bool is_lost = std::ranges::any_of(
+            choice.kept, [&](const Sight& kept) { return sight.is_at_least(kept); });
+        if (is_lost) log.findings.push_back(std::move(finding));
+      }
+    }
   }
 
   static bool is_near(const PixelBox& a, const PixelBox& b, int slack) {
@@ -253,6 +314,13 @@ class Comparison {
   std::int64_t objects_ = 0;
   std::int64_t unmatched_ = 0;
   std::vector<Finding> unmatched_examples_;
+  struct Choice {
+    std::int64_t kept_count = 0;
+    std::int64_t missing_count = 0;
+    std::vector<Sight> kept;
+    std::vector<std::pair<Sight, Finding>> missing;
+  };
+  std::map<std::string, Choice> choices_;  ///< By labels in the reference.
   /// Labels in the reference, then classes in the other dataset.
   std::map<std::string, std::map<std::string, Example>> classes_of_labels_;
 };
