@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <optional>
 #include <utility>
 
 #include "framework/pipeline/writer_queue.h"
@@ -11,7 +12,7 @@
 namespace diorama {
 namespace {
 
-constexpr std::size_t kQueueBytes = std::size_t(256) << 20;
+constexpr std::size_t kMostQueueBytes = std::size_t(256) << 20;
 
 std::string who(const std::string& name) { return "writer '" + name + "'"; }
 
@@ -48,14 +49,20 @@ void DatasetOutput::open(const DatasetInfo& info, const std::string& dataset_jso
 }
 
 void DatasetOutput::write(const std::function<void(const Take&)>& give, Host& host) {
-  WriterQueue queue(std::clamp(host.thread_count(), 1, 4), kQueueBytes,
-                    [this](const PendingCapture& pending) { write_capture(pending.capture); });
-  give([&queue](Capture capture) {
+  const int threads = std::clamp(host.thread_count(), 1, 4);
+  std::optional<WriterQueue> queue;
+  give([&](Capture capture) {
     PendingCapture pending;
     pending.capture = std::move(capture);
-    static_cast<void>(queue.push(std::move(pending)));  // waits for room as nobody stops it
+    if (!queue) {
+      // Captures are read faster than written: as many wait as are at work, and memory stays flat.
+      const std::size_t few = 2 * std::size_t(threads) * capture_bytes(pending);
+      queue.emplace(threads, std::min(few, kMostQueueBytes),
+                    [this](const PendingCapture& each) { write_capture(each.capture); });
+    }
+    static_cast<void>(queue->push(std::move(pending)));  // Waits for room.
   });
-  queue.drain();
+  if (queue) queue->drain();
 }
 
 void DatasetOutput::write_capture(const Capture& capture) {
