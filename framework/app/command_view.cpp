@@ -98,8 +98,9 @@ int command_view(const GlobalOptions& global, const ViewOptions& options, Consol
   std::cout << server.address() << std::endl;
   log.write(LogLevel::Info,
             "Open the address in a browser of this machine; from another one, forward its port: "
-            "ssh -L " + std::to_string(server.port()) + ":localhost:" +
-                std::to_string(server.port()) + " THIS_MACHINE. Ctrl-C ends.");
+            "ssh -L " +
+                std::to_string(server.port()) + ":localhost:" + std::to_string(server.port()) +
+                " THIS_MACHINE. Ctrl-C ends.");
   std::optional<BrowserStart> browser;
   if (options.opens_browser) browser.emplace(server.address());
 

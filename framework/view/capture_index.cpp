@@ -167,8 +167,8 @@ std::string CaptureIndex::json(std::size_t from, std::size_t most) const {
                    {"phases", phases_.list()},
                    {"environments", environments_.list()},
                    {"splits", splits_.list()}};
-  return "{\"from\":" + std::to_string(from) + ",\"columns\":" + text + "},\"names\":" +
-         names.dump(-1, ' ', false, Json::error_handler_t::replace) + "}";
+  return "{\"from\":" + std::to_string(from) + ",\"columns\":" + text +
+         "},\"names\":" + names.dump(-1, ' ', false, Json::error_handler_t::replace) + "}";
 }
 
 }  // namespace diorama

@@ -19,7 +19,7 @@ class CaptureIndex {
   /// One capture reduced to what is kept. Numbers that the format does not hold are kUnknown.
   static constexpr std::int32_t kUnknown = -1000;
   struct Object {
-    std::string name;  ///< See class_of().
+    std::string name;                    ///< See class_of().
     std::int32_t visible = kUnknown;     ///< Percent of the pixels that it would cover.
     std::int32_t truncation = kUnknown;  ///< Percent of it outside of the picture.
     std::int32_t box_side = 0;           ///< Per mille: root of the box's share of the picture.

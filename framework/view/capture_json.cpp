@@ -56,8 +56,7 @@ constexpr std::array<std::pair<int, int>, 12> kEdges{{{0, 1},
 Json edges_json(const Frame& frame, const Instance& instance) {
   const bool is_straight = frame.camera.lens == LensModel::Pinhole;
   const int parts = is_straight ? 8 : 24;
-  const Affine camera_from_node =
-      frame.world_from_camera.inverse() * instance.world_from_node;
+  const Affine camera_from_node = frame.world_from_camera.inverse() * instance.world_from_node;
   const double far = 4.0 * double(frame.camera.width + frame.camera.height);
   Json lines = Json::array();
   for (const auto& [from, to] : kEdges) {
@@ -142,7 +141,8 @@ NameSet wanted_for_labels(const StoredInfo& info) {
   for (const std::string_view pixels :
        {kColor.name, kColorHdr.name, kDistanceToCamera.name, kDistanceToImagePlane.name,
         kNormals.name, kLeafId.name, kPosition.name, kUv.name, kAlbedo.name,
-        kObjectCoordinates.name, kMotion.name, kSensorDepth.name, std::string_view("amodal_mask")}) {
+        kObjectCoordinates.name, kMotion.name, kSensorDepth.name,
+        std::string_view("amodal_mask")}) {
     names.erase(std::string(pixels));
   }
   if (names.contains(kHoldsTightBoxes)) names.erase(std::string(kInstanceId.name));
@@ -151,8 +151,11 @@ NameSet wanted_for_labels(const StoredInfo& info) {
 
 std::string capture_json(const StoredInfo& info, const StoredCapture& stored) {
   const Capture& capture = stored.capture;
-  Json json{{"capture", capture.index},     {"visit", capture.visit}, {"phase", capture.phase},
-            {"environment", capture.environment}, {"split", stored.split}};
+  Json json{{"capture", capture.index},
+            {"visit", capture.visit},
+            {"phase", capture.phase},
+            {"environment", capture.environment},
+            {"split", stored.split}};
   json["frames"] = Json::array();
   for (const Frame& frame : capture.frames) json["frames"].push_back(frame_json(info, frame));
   for (std::size_t i = 0; i < stored.files.size() && i < json["frames"].size(); ++i) {
@@ -186,7 +189,8 @@ std::string amodal_json(const Frame& frame) {
       ++length;
     }
     runs.push_back(length);
-    objects.push_back({{"id", instance.id}, {"box", box_json(mask.box)}, {"runs", std::move(runs)}});
+    objects.push_back(
+        {{"id", instance.id}, {"box", box_json(mask.box)}, {"runs", std::move(runs)}});
   }
   return dumped({{"objects", std::move(objects)}});
 }

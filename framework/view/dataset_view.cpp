@@ -32,8 +32,7 @@ HttpAnswer answer_of(std::string type, std::string body) {
 }
 
 HttpAnswer json_answer(const Json& json, int status = 200) {
-  HttpAnswer answer =
-      answer_of(kJson, json.dump(-1, ' ', false, Json::error_handler_t::replace));
+  HttpAnswer answer = answer_of(kJson, json.dump(-1, ' ', false, Json::error_handler_t::replace));
   answer.status = status;
   return answer;
 }
@@ -215,7 +214,8 @@ bool DatasetView::follow_run() {
   }
   // Large datasets take long to open; that is no reason to do nothing else.
   const auto later = std::chrono::steady_clock::now();
-  next_look_ = later + std::max<std::chrono::steady_clock::duration>(kFollowTime, 10 * (later - now));
+  next_look_ =
+      later + std::max<std::chrono::steady_clock::duration>(kFollowTime, 10 * (later - now));
   return false;
 }
 

@@ -247,24 +247,24 @@ void HttpServer::State::listen() {
 }
 
 void HttpServer::State::accept(tcp::acceptor& acceptor) {
-  acceptor.async_accept(
-      asio::make_strand(context), [this, &acceptor](beast::error_code failed, tcp::socket socket) {
-        if (failed == asio::error::operation_aborted) return;
-        if (failed) {
-          // Out of descriptors, say: not at once again.
-          auto pause = std::make_shared<asio::steady_timer>(context, std::chrono::milliseconds(100));
-          pause->async_wait([this, &acceptor, pause](beast::error_code stopped) {
-            if (!stopped) accept(acceptor);
-          });
-          return;
-        }
-        // A surplus connection ends with its socket.
-        if (connections < options.connections) {
-          const auto connection = std::make_shared<Connection<State>>(std::move(socket), *this);
-          connection->read(options.request_time);
-        }
-        accept(acceptor);
+  acceptor.async_accept(asio::make_strand(context), [this, &acceptor](beast::error_code failed,
+                                                                      tcp::socket socket) {
+    if (failed == asio::error::operation_aborted) return;
+    if (failed) {
+      // Out of descriptors, say: not at once again.
+      auto pause = std::make_shared<asio::steady_timer>(context, std::chrono::milliseconds(100));
+      pause->async_wait([this, &acceptor, pause](beast::error_code stopped) {
+        if (!stopped) accept(acceptor);
       });
+      return;
+    }
+    // A surplus connection ends with its socket.
+    if (connections < options.connections) {
+      const auto connection = std::make_shared<Connection<State>>(std::move(socket), *this);
+      connection->read(options.request_time);
+    }
+    accept(acceptor);
+  });
 }
 
 std::optional<HttpAnswer> HttpServer::State::refusal(const Request& request) const {
@@ -344,8 +344,8 @@ Response HttpServer::State::respond(const Request& request) {
   if (made->status == 405) response.set(http::field::allow, "GET, HEAD");
   if (greets) {
     response.set(http::field::location, "/");
-    response.set(http::field::set_cookie, cookie + "=" + token +
-                                              "; Path=/; HttpOnly; SameSite=Strict");
+    response.set(http::field::set_cookie,
+                 cookie + "=" + token + "; Path=/; HttpOnly; SameSite=Strict");
   }
   response.content_length(made->body->size());
   if (request.method() != http::verb::head) response.body() = *made->body;

@@ -20,8 +20,8 @@ struct HttpAnswer {
 /// listens on the loopback addresses only; wants a Host that is this machine (against rebound
 /// names), no Origin but its own, no other site behind the request, and the token: once in the
 /// address, afterwards as a cookie that scripts do not see and other sites do not send. Bodies and
-/// long headers are refused, slow and surplus connections closed, nothing is kept by the browser. Paths reach the handler only as
-/// letters, digits and "/._-".
+/// long headers are refused, slow and surplus connections closed, nothing is kept by the browser.
+/// Paths reach the handler only as letters, digits and "/._-".
 class HttpServer {
  public:
   struct Options {

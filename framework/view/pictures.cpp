@@ -135,7 +135,8 @@ std::optional<PictureFile> make_picture(const Frame& frame, PictureKind kind, co
   }
   if (kind == PictureKind::Depth) {
     for (const Channel<float>& channel : {kDistanceToImagePlane, kDistanceToCamera}) {
-      if (const auto* depth = image_of(frame, channel)) return picture_of(*depth, host, packed_depth);
+      if (const auto* depth = image_of(frame, channel))
+        return picture_of(*depth, host, packed_depth);
     }
   }
   if (kind == PictureKind::Normals) {

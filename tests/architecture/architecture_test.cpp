@@ -219,9 +219,10 @@ TEST_CASE("What path tracers share knows no engine that traces rays", "[architec
   CHECK(files_with_code(R"(\b[Ee]mbree|\bRTC[A-Z]|\brtc[A-Z])", is_inside) == None{});
 }
 
-TEST_CASE("One file knows yaml-cpp and one knows Boost.DLL", "[architecture]") {
+TEST_CASE("One file each knows yaml-cpp, Boost.DLL and Boost.Beast", "[architecture]") {
   CHECK(files_including("yaml-cpp/").size() == 1);
   CHECK(files_including("boost/dll").size() == 1);
+  CHECK(files_including("boost/beast").size() == 1);
 }
 
 TEST_CASE("OpenCV is known to libraries that are mapped on demand", "[architecture]") {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // One picture in full: zoom to its pixels, a probe, its objects.
 import { App } from './app';
-import { CaptureLabels, FrameLabels, ObjectLabels, pictureAddress } from './data';
+import { CaptureLabels, FrameLabels, ObjectLabels, isReport, pictureAddress } from './data';
 import { button, clear, el, on } from './dom';
 import { FramePixels, Numbers, View, css, drawLines, kLayers, motionOf, overlays } from './layers';
 import { SpaceView } from './scene';
@@ -67,7 +67,8 @@ export class CapturePage {
       }
       if (app.holds.has('color')) this.pixels.picture('color').then(() => this.draw(), () => this.draw());
       for (const [held, kind] of [['instance_id', 'ids'], ['distance_to_image_plane', 'depth'], ['distance_to_camera', 'depth']]) {
-        if (app.holds.has(held)) this.pixels.numbers(kind).then(() => this.showProbe(), () => undefined);
+        // Reports are small: they have ids alone.
+        if (app.holds.has(held) && !(isReport && kind === 'depth')) this.pixels.numbers(kind).then(() => this.showProbe(), () => undefined);
       }
     }
     if (!this.capture) return;

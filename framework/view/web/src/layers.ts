@@ -305,13 +305,15 @@ export function drawLines(context: CanvasRenderingContext2D, labels: FrameLabels
   context.textBaseline = 'middle';
   for (const object of objects) {
     if (!object.box) continue;
+    if (y(object.box[3]) < 0) continue;
     const name = object.class === '' ? object.path : object.class;
     const text = name.length > 28 ? name.slice(0, 27) + '…' : name;
     const width = context.measureText(text).width + 8 * line;
     const top = Math.max(0, y(object.box[1]) - size - 5 * line);
-    context.fillStyle = css(palette.of(object, state));
+    const colour = palette.of(object, state);
+    context.fillStyle = css(colour);
     context.fillRect(x(object.box[0]) - line, top, width, size + 5 * line);
-    context.fillStyle = '#101418';
+    context.fillStyle = 0.3 * colour[0] + 0.59 * colour[1] + 0.11 * colour[2] > 115 ? '#101418' : '#fff';
     context.fillText(text, x(object.box[0]) + 3 * line, top + (size + 5 * line) / 2);
   }
 }

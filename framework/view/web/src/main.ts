@@ -10,6 +10,8 @@ import { Palette, kLayers } from './layers';
 import { FindingsPage, RunPage, StatsPage } from './pages';
 import { Page, State, addressOf, readState } from './state';
 
+const kNotInReports = ['depth', 'normals', 'motion'];
+
 class Site {
   private readonly top = el('header');
   private readonly tools = el('div', { class: 'tools', role: 'toolbar', 'aria-label': 'Overlays' });
@@ -141,7 +143,7 @@ class Site {
       const isHere = page === app.state.page || (page === 'grid' && app.state.page === 'capture');
       tabs.append(button(title, '', () => this.go({ page }), { 'aria-current': isHere ? 'page' : false, 'data-page': page }));
     }
-    this.top.append(tabs, el('span', { class: 'folder', title: app.site.folder }, app.site.folder),
+    this.top.append(tabs, el('span', { class: 'folder', title: app.site.folder }, el('bdi', {}, app.site.folder)),
       button('◐', 'Light or dark', () => this.setTheme(document.documentElement.dataset.theme === 'dark' ? 'light' : 'dark')),
       button('?', 'Keys (?)', () => this.help.showModal()));
     if (focus) this.top.querySelector<HTMLElement>(`[data-page="${focus}"]`)?.focus();
@@ -152,7 +154,7 @@ class Site {
     const focus = document.activeElement instanceof HTMLElement ? document.activeElement.dataset.tool : undefined;
     clear(this.tools);
     for (const layer of kLayers) {
-      if (!layer.held.some((name) => holds.has(name)) || (isReport && ['depth', 'normals', 'motion'].includes(layer.key))) continue;
+      if (!layer.held.some((name) => holds.has(name)) || (isReport && kNotInReports.includes(layer.key))) continue;
       const tool = button('', `${layer.title} (${layer.hotkey})`, () => this.toggle(layer.key),
         { 'aria-pressed': state.layers.has(layer.key) ? 'true' : 'false', 'data-tool': layer.key });
       tool.append(layer.title, el('kbd', {}, layer.hotkey));
@@ -184,7 +186,7 @@ class Site {
     const target = event.target as HTMLElement;
     if (target.matches('input, select, textarea') && event.key !== 'Escape') return;
     const { state } = this.app;
-    const layer = kLayers.find((one) => one.hotkey === event.key);
+    const layer = kLayers.find((one) => one.hotkey === event.key && !(isReport && kNotInReports.includes(one.key)));
     const pictures = state.page === 'grid' || state.page === 'capture';
     if (event.key === '?') this.help.showModal();
     else if (state.page === 'capture' && this.capture.press(event)) event.preventDefault();

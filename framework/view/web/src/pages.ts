@@ -60,7 +60,7 @@ function bars(title: string, histogram: Histogram | null, scale: number, unit: s
     svg('text', { x: 0, y: height + 14 }, says(histogram.low)),
     svg('text', { x: width, y: height + 14, 'text-anchor': 'end' }, `${says(histogram.low + counts.length * step)} ${unit}`));
   return el('figure', {}, el('figcaption', {}, title,
-    el('small', {}, `mean ${says(histogram.mean)} ${unit}, ${says(histogram.least)} to ${says(histogram.most)}`)), drawing);
+    el('small', {}, `mean ${[says(histogram.mean), unit].join(' ').trim()}, ${says(histogram.least)} to ${says(histogram.most)}`)), drawing);
 }
 
 function heatMap(title: string, rows: number[][], width: number): HTMLElement {

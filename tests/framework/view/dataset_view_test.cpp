@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the page asks for, over a dataset whose every text is hostile.
+#include "framework/view/dataset_view.h"
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "diorama/error.h"
+#include "framework/lint/encoding_host.h"
+#include "framework/view/byte_cache.h"
+#include "framework/view/report.h"
+#include "support/catch.h"
+#include "support/temporary_folder.h"
+
+using namespace diorama;
+
+namespace {
+
+using Json = nlohmann::json;
+
+const std::string kHostile = "</script><script>alert('1')</script>\"\\ \u2028 ../../etc/passwd";
+
+/// Three captures, numbers 3, 7 and 9; one camera; 6 x 4 pixels.
+class HostileDataset final : public StoredDataset {
+ public:
+  HostileDataset() {
+    info_.format = kHostile;
+    info_.camera_names = {kHostile};
+    info_.captures = {3, 7, 9};
+    for (const std::string_view name :
+         {kColor.name, kInstanceId.name, kDistanceToImagePlane.name, kNormals.name, kHoldsInstances,
+          kHoldsLabels, kHoldsTightBoxes, kHoldsPoses, kHoldsBoxes3d, kHoldsOcclusion, kHoldsCamera,
+          kHoldsCameraPose}) {
+      info_.holds.emplace(name);
+    }
+  }
+  const StoredInfo& info() const override { return info_; }
+  const ReadLog& log() const override { return log_; }
+  StoredCapture read(std::size_t i, const NameSet& wanted) const override {
+    StoredCapture stored;
+    stored.capture.index = info_.captures[i];
+    stored.capture.phase = kHostile;
+    stored.split = i == 0 ? "val" : "train";
+    Frame frame;
+    frame.camera_name = kHostile;
+    frame.camera.width = 6;
+    frame.camera.height = 4;
+    frame.camera.fx = frame.camera.fy = 5.0;
+    frame.camera.cx = 3.0;
+    frame.camera.cy = 2.0;
+    Instance instance;
+    instance.id = 0x123456;
+    instance.node_path = kHostile;
+    instance.labels = {{"class", kHostile}};
+    instance.world_from_node.translation() = Vec3(0.0, 0.0, -2.0);
+    instance.bounds_node.add(Vec3(-0.1, -0.2, -0.3));
+    instance.bounds_node.add(Vec3(0.3, 0.2, 0.1));
+    instance.tight_box = PixelBox{1, 1, 4, 3};
+    instance.visibility = Visibility{};
+    instance.visibility->visible_pixels = 6;
+    instance.visibility->amodal_pixels = 8;
+    frame.instances.push_back(instance);
+    if (wanted.contains(kColor.name)) {
+      Image<Rgba8> color(6, 4, Rgba8{10, 20, 30, 255});
+      color.at(5, 3) = Rgba8{200, 100, 50, 255};
+      frame.set(kColor, std::move(color));
+    }
+    if (wanted.contains(kInstanceId.name)) {
+      Image<std::uint32_t> ids(6, 4, 0U);
+      ids.at(2, 1) = 0x123456;
+      frame.set(kInstanceId, std::move(ids));
+    }
+    if (wanted.contains(kDistanceToImagePlane.name)) {
+      Image<float> depth(6, 4, 1.2345F);
+      depth.at(0, 0) = std::numeric_limits<float>::infinity();
+      frame.set(kDistanceToImagePlane, std::move(depth));
+    }
+    stored.capture.frames.push_back(std::move(frame));
+    return stored;
+  }
+
+ private:
+  StoredInfo info_;
+  ReadLog log_;
+};
+
+class HostileReader final : public Reader {
+ public:
+  std::vector<std::string> patterns() const override { return {"mark.txt"}; }
+  Recognition recognise(const std::filesystem::path&) const override { return Recognition::ByName; }
+  std::unique_ptr<const StoredDataset> open(const std::filesystem::path&) const override {
+    return std::make_unique<HostileDataset>();
+  }
+};
+
+/// A view of a folder with a hostile name.
+struct Viewed {
+  explicit Viewed(std::optional<std::size_t> most = {}) {
+    folder.write("<img src=x>/mark.txt", "");
+    view.emplace(DatasetView::Options{folder.path("<img src=x>"), "", most}, readers, host);
+  }
+  HttpAnswer answer(const std::string& path) { return view->answer(path); }
+  Json json(const std::string& path) {
+    const HttpAnswer made = answer(path);
+    REQUIRE(made.status == 200);
+    REQUIRE(made.type == "application/json");
+    return Json::parse(*made.body);
+  }
+  Rgba8 pixel(const std::string& path, int x, int y) {
+    const HttpAnswer made = answer(path);
+    REQUIRE(made.status == 200);
+    REQUIRE(made.type == "image/png");
+    const auto image = decode_image(std::as_bytes(std::span(*made.body)), "picture");
+    const std::uint8_t* at =
+        image->bytes.data() + (std::size_t(y) * std::size_t(image->width) + std::size_t(x)) * 3;
+    return {at[0], at[1], at[2], 255};
+  }
+
+  test::TemporaryFolder folder;
+  test::EncodingHost host;
+  DatasetReaders readers{
+      {{"hostile", {"mark.txt"}, [] { return std::make_unique<HostileReader>(); }}}};
+  std::optional<DatasetView> view;
+};
+
+}  // namespace
+
+TEST_CASE("Addresses count what the readers have, all others are nowhere", "[view]") {
+  Viewed viewed;
+  for (const char* path :
+       {"/api", "/api/", "/api/1/info", "/api/0", "/api/0/", "/api/00/info", "/api/-1/info",
+        "/api/+0/info", "/api/0/capture", "/api/0/capture/4", "/api/0/capture/07",
+        "/api/0/capture/99999999999999999999999", "/api/0/capture/7/1/color",
+        "/api/0/capture/7/0/normals", "/api/0/capture/7/0/motion", "/api/0/capture/7/0/../color",
+        "/api/0/capture/7/0/rgb.png", "/api/0/capture/7/0", "/api/0/index/x", "/etc/passwd", "//",
+        "/../mark.txt", "/mark.txt", "/api/0/info/mark.txt", "/view.js/", "/index.html"}) {
+    INFO(path);
+    CHECK(viewed.answer(path).status == 404);
+  }
+  for (const char* path : {"/", "/view.js", "/view.css", "/icon.svg", "/api/state", "/api/run",
+                           "/api/0/info", "/api/0/index/0", "/api/0/capture/7"}) {
+    INFO(path);
+    CHECK(viewed.answer(path).status == 200);
+  }
+}
+
+TEST_CASE("Hostile texts arrive as texts in JSON", "[view]") {
+  Viewed viewed;
+  CHECK(viewed.json("/api/state")["datasets"][0]["name"] == "<img src=x>");
+  CHECK(viewed.json("/api/0/info")["cameras"][0] == kHostile);
+  const Json capture = viewed.json("/api/0/capture/7");
+  CHECK(capture["capture"] == 7);
+  CHECK(capture["phase"] == kHostile);
+  const Json object = capture["frames"][0]["objects"][0];
+  CHECK(object["class"] == kHostile);
+  CHECK(object["path"] == kHostile);
+  CHECK(object["box"] == Json({1, 1, 4, 3}));
+  CHECK(object["occlusion"] == 0.25);
+  // The corner (-0.1, -0.2, -0.3) of the box at z = -2 is 2.3 m before the camera.
+  CHECK(object["edges"].size() == 12);
+  CHECK(object["edges"][0][0].get<double>() == Approx(3.0 - 5.0 * 0.1 / 2.3).margin(0.006));
+  CHECK(object["edges"][0][1].get<double>() == Approx(2.0 + 5.0 * 0.2 / 2.3).margin(0.006));
+}
+
+TEST_CASE("Pictures of numbers hold them exactly", "[view]") {
+  Viewed viewed;
+  CHECK(viewed.pixel("/api/0/capture/7/0/color", 5, 3) == Rgba8{200, 100, 50, 255});
+  CHECK(viewed.pixel("/api/0/capture/7/0/ids", 2, 1) == Rgba8{0x56, 0x34, 0x12, 255});
+  CHECK(viewed.pixel("/api/0/capture/7/0/ids", 0, 0) == Rgba8{0, 0, 0, 255});
+  CHECK(viewed.pixel("/api/0/capture/7/0/depth", 1, 1) == Rgba8{12345 & 255, 12345 >> 8, 0, 255});
+  CHECK(viewed.pixel("/api/0/capture/7/0/depth", 0, 0) == Rgba8{0, 0, 0, 255});
+  CHECK(viewed.answer("/api/0/capture/7/0/thumbnail").type == "image/jpeg");
+}
+
+TEST_CASE("The index grows by work, statistics come when they were asked for", "[view]") {
+  Viewed viewed;
+  CHECK(viewed.json("/api/0/index/0")["columns"]["visit"].empty());
+  CHECK(viewed.answer("/api/0/stats").status == 202);
+  while (viewed.view->work()) {
+  }
+  const Json index = viewed.json("/api/0/index/1");
+  CHECK(index["from"] == 1);
+  CHECK(index["columns"]["objects"] == Json({1, 1}));
+  CHECK(index["columns"]["visible"] == Json({75, 75}));
+  CHECK(index["columns"]["split"] == Json({1, 1}));
+  CHECK(index["names"]["splits"] == Json({"val", "train"}));
+  CHECK(index["names"]["classes"] == Json({kHostile}));
+  CHECK(viewed.json("/api/0/stats")["pictures"] == 3);
+}
+
+TEST_CASE("A report is the same as files, whose names no text of the dataset makes", "[view]") {
+  Viewed viewed(2);
+  const std::filesystem::path out = viewed.folder.path("report");
+  const ReportSize size = write_report(*viewed.view, out);
+  CHECK(size.captures == 2);
+  const auto read = [&](const std::string& name) {
+    std::ifstream stream(out / name, std::ios::binary);
+    return std::string(std::istreambuf_iterator<char>(stream), {});
+  };
+  CHECK(read("index.html").find("Content-Security-Policy") != std::string::npos);
+  const std::string capture = read("data/0_capture_3.js");
+  CHECK(capture.starts_with("diorama_data('/api/0/capture/3',{"));
+  CHECK(read("data/0_capture_3_0_ids.js").find("'data:image/png;base64,iVBOR") != std::string::npos);
+  CHECK(read("data/0_stats.js").find("\"captures\": 3") != std::string::npos);
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(out)) {
+    const std::string name = entry.path().filename().string();
+    INFO(name);
+    CHECK(name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_.") == name.npos);
+  }
+  CHECK_THROWS_WITH(write_report(*viewed.view, out), ContainsSubstring("is not empty"));
+}
+
+TEST_CASE("What was not asked for the longest leaves a full cache", "[view]") {
+  ByteCache<int> cache(100);
+  cache.add("a", std::make_shared<const int>(1), 40);
+  cache.add("b", std::make_shared<const int>(2), 40);
+  CHECK(*cache.find("a") == 1);
+  cache.add("c", std::make_shared<const int>(3), 40);
+  CHECK(cache.find("b") == nullptr);
+  CHECK(*cache.find("a") == 1);
+  CHECK(*cache.find("c") == 3);
+  cache.add("d", std::make_shared<const int>(4), 101);
+  CHECK(cache.find("d") == nullptr);
+}

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tries the page of `diorama view` in Chromium. See browser.sh.
+import { spawn } from 'node:child_process';
+import { mkdirSync } from 'node:fs';
+import { chromium } from 'playwright-core';
+
+const [program, dataset, pictures, report] = process.argv.slice(2);
+mkdirSync(pictures, { recursive: true });
+let failures = 0;
+function check(holds, what) {
+  console.log(`${holds ? 'ok    ' : 'FAILED'} ${what}`);
+  if (!holds) ++failures;
+}
+
+const server = spawn(program, [...(process.env.DIORAMA_OPTIONS ?? '').split(' ').filter(Boolean), 'view', dataset, '--no-browser'],
+  { stdio: ['ignore', 'pipe', 'inherit'] });
+const address = await new Promise((resolve, reject) => {
+  let text = '';
+  server.stdout.on('data', (bytes) => {
+    text += bytes;
+    if (text.includes('\n')) resolve(text.trim());
+  });
+  server.on('exit', (code) => reject(new Error(`view ended with ${code}`)));
+});
+const browser = await chromium.launch({ executablePath: '/usr/bin/chromium', args: ['--no-sandbox'] });
+const faults = [];
+async function newPage(scheme = 'light') {
+  const context = await browser.newContext({ viewport: { width: 1366, height: 820 }, colorScheme: scheme });
+  const page = await context.newPage();
+  page.on('pageerror', (error) => faults.push(error.message));
+  page.on('console', (message) => message.type() === 'error' && faults.push(message.text()));
+  page.on('request', (request) => {
+    const url = request.url();
+    if (!/^(http:\/\/127\.0\.0\.1[:/]|file:|data:|blob:)/.test(url)) faults.push('asked elsewhere: ' + url);
+  });
+  page.on('dialog', (dialog) => {
+    faults.push('a text of the dataset ran');
+    void dialog.dismiss();
+  });
+  return page;
+}
+
+try {
+  const page = await newPage();
+  const began = performance.now();
+  await page.goto(address);
+  await page.waitForSelector('.card img');
+  await page.waitForFunction(() => document.querySelector('.card img')?.naturalWidth > 0);
+  console.log(`       first card after ${Math.round(performance.now() - began)} ms`);
+  await page.waitForFunction(() => document.querySelector('.status')?.hidden, null, { timeout: 120000 });
+  console.log(`       all labels read after ${Math.round(performance.now() - began)} ms`);
+  check(!page.url().includes('token'), 'the token leaves the address');
+  const total = await page.textContent('.total b');
+  check(Number(total.replaceAll(',', '')) > 0, `the grid counts captures (${total})`);
+  await page.waitForTimeout(800);
+  await page.screenshot({ path: `${pictures}/grid.png` });
+  for (const key of ['c', 'l']) await page.keyboard.press(key);
+  check(page.url().includes('layers='), 'overlays stand in the address');
+  await page.waitForTimeout(800);
+  await page.screenshot({ path: `${pictures}/grid_overlays.png` });
+
+  // A facet filters, and its count says how many stay.
+  const first = page.locator('.facets section').first().locator('.name').first();
+  await first.click();
+  await page.waitForTimeout(300);
+  const filtered = await page.textContent('.total b');
+  check(Number(filtered.replaceAll(',', '')) <= Number(total.replaceAll(',', '')) && page.url().includes('f.class'),
+    `a class filters (${total} to ${filtered})`);
+  const other = await newPage();
+  await other.goto(address);
+  await other.goto(page.url());
+  await other.reload().catch(() => undefined);
+  await other.waitForFunction(() => document.querySelector('.status')?.hidden, null, { timeout: 120000 });
+  check((await other.textContent('.total b')) === filtered, 'the address shows the same elsewhere');
+  await other.close();
+  await page.screenshot({ path: `${pictures}/grid_filtered.png` });
+  await page.getByRole('button', { name: 'Clear all filters' }).first().click();
+
+  await page.locator('.card a.picture').first().click();
+  await page.waitForSelector('.capture .objects .object');
+  await page.waitForTimeout(700);
+  check(page.url().includes('#/capture/'), 'a card opens its picture');
+  await page.locator('.object').first().click();
+  await page.waitForSelector('.detail');
+  const box = await page.locator('canvas.big').boundingBox();
+  await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+  await page.waitForTimeout(300);
+  const probe = await page.textContent('.probe');
+  check(/pixel \d+, \d+/.test(probe), `the probe speaks: ${probe}`);
+  await page.screenshot({ path: `${pictures}/capture.png` });
+  await page.keyboard.press('m');
+  await page.waitForTimeout(500);
+  await page.screenshot({ path: `${pictures}/capture_masks.png` });
+  await page.keyboard.press('z');
+  await page.waitForTimeout(300);
+  await page.screenshot({ path: `${pictures}/capture_zoom.png` });
+  await page.keyboard.press('0');
+  await page.keyboard.press('m');
+  await page.keyboard.press('d');
+  await page.waitForTimeout(600);
+  await page.screenshot({ path: `${pictures}/capture_depth.png` });
+  await page.keyboard.press('d');
+  const before = page.url();
+  await page.keyboard.press('ArrowRight');
+  await page.waitForTimeout(400);
+  check(page.url() !== before, 'arrow right goes to the next capture');
+  await page.goBack();
+  await page.waitForTimeout(400);
+  check(page.url() === before, 'back goes back');
+  await page.keyboard.press('ArrowDown');
+  await page.waitForTimeout(200);
+  check(page.url().includes('object='), 'arrow down goes through objects');
+  if (await page.locator('button', { hasText: '3-D' }).last().isVisible()) {
+    await page.keyboard.press('s');
+    await page.waitForTimeout(700);
+    await page.screenshot({ path: `${pictures}/space.png` });
+    check(await page.locator('canvas.space').isVisible(), 'the 3-D view opens');
+    await page.keyboard.press('s');
+  }
+  await page.keyboard.press('?');
+  await page.waitForTimeout(150);
+  await page.screenshot({ path: `${pictures}/keys.png` });
+  await page.getByRole('button', { name: 'Close' }).click();
+
+  await page.getByRole('button', { name: 'Statistics' }).click();
+  await page.waitForSelector('.page table', { timeout: 120000 });
+  await page.locator('.page:not([hidden]) details summary').first().click();
+  await page.waitForTimeout(200);
+  await page.screenshot({ path: `${pictures}/stats.png` });
+  await page.screenshot({ path: `${pictures}/stats_full.png`, fullPage: true });
+  if (process.env.DIORAMA_VIEW_LINT !== 'no') {
+    await page.getByRole('button', { name: 'Findings' }).click();
+    await page.getByRole('button', { name: 'Check the dataset' }).click();
+    await page.waitForSelector('.page:not([hidden]) .good, .page:not([hidden]) .bad', { timeout: 300000 });
+    await page.screenshot({ path: `${pictures}/findings.png` });
+  }
+  await page.getByRole('button', { name: 'Run', exact: true }).click();
+  await page.waitForSelector('.page:not([hidden]) h1');
+  await page.waitForTimeout(400);
+  await page.screenshot({ path: `${pictures}/run.png` });
+
+  const dark = await newPage('dark');
+  await dark.goto(address);
+  await dark.waitForFunction(() => document.querySelector('.card img')?.naturalWidth > 0);
+  await dark.waitForTimeout(500);
+  await dark.screenshot({ path: `${pictures}/grid_dark.png` });
+  await dark.locator('.card a.picture').first().click();
+  await dark.waitForTimeout(900);
+  await dark.screenshot({ path: `${pictures}/capture_dark.png` });
+
+  if (report) {
+    const files = await newPage();
+    await files.goto(`file://${report}/index.html`);
+    await files.waitForFunction(() => document.querySelector('.card img')?.naturalWidth > 0);
+    await files.locator('.card a.picture').first().click();
+    await files.waitForSelector('.object');
+    await files.keyboard.press('m');
+    await files.waitForTimeout(700);
+    await files.screenshot({ path: `${pictures}/report.png` });
+    await files.getByRole('button', { name: 'Statistics' }).click();
+    await files.waitForSelector('.page table');
+    check(true, 'a report opens without a server');
+  }
+  check(faults.length === 0, 'no fault in the page' + (faults.length ? ': ' + [...new Set(faults)].join(' | ') : ''));
+} catch (error) {
+  check(false, error.message);
+  for (const fault of new Set(faults)) console.log('       ' + fault);
+} finally {
+  await browser.close();
+  server.removeAllListeners('exit');
+  server.kill('SIGTERM');
+}
+process.exit(failures === 0 ? 0 : 1);
