@@ -132,13 +132,32 @@ struct Viewed {
 
 TEST_CASE("Addresses count what the readers have, all others are nowhere", "[view]") {
   Viewed viewed;
-  for (const char* path :
-       {"/api", "/api/", "/api/1/info", "/api/0", "/api/0/", "/api/00/info", "/api/-1/info",
-        "/api/+0/info", "/api/0/capture", "/api/0/capture/4", "/api/0/capture/07",
-        "/api/0/capture/99999999999999999999999", "/api/0/capture/7/1/color",
-        "/api/0/capture/7/0/normals", "/api/0/capture/7/0/motion", "/api/0/capture/7/0/../color",
-        "/api/0/capture/7/0/rgb.png", "/api/0/capture/7/0", "/api/0/index/x", "/etc/passwd", "//",
-        "/../mark.txt", "/mark.txt", "/api/0/info/mark.txt", "/view.js/", "/index.html"}) {
+  for (const char* path : {"/api",
+                           "/api/",
+                           "/api/1/info",
+                           "/api/0",
+                           "/api/0/",
+                           "/api/00/info",
+                           "/api/-1/info",
+                           "/api/+0/info",
+                           "/api/0/capture",
+                           "/api/0/capture/4",
+                           "/api/0/capture/07",
+                           "/api/0/capture/99999999999999999999999",
+                           "/api/0/capture/7/1/color",
+                           "/api/0/capture/7/0/normals",
+                           "/api/0/capture/7/0/motion",
+                           "/api/0/capture/7/0/../color",
+                           "/api/0/capture/7/0/rgb.png",
+                           "/api/0/capture/7/0",
+                           "/api/0/index/x",
+                           "/etc/passwd",
+                           "//",
+                           "/../mark.txt",
+                           "/mark.txt",
+                           "/api/0/info/mark.txt",
+                           "/view.js/",
+                           "/index.html"}) {
     INFO(path);
     CHECK(viewed.answer(path).status == 404);
   }
@@ -205,7 +224,8 @@ TEST_CASE("A report is the same as files, whose names no text of the dataset mak
   CHECK(read("index.html").find("Content-Security-Policy") != std::string::npos);
   const std::string capture = read("data/0_capture_3.js");
   CHECK(capture.starts_with("diorama_data('/api/0/capture/3',{"));
-  CHECK(read("data/0_capture_3_0_ids.js").find("'data:image/png;base64,iVBOR") != std::string::npos);
+  CHECK(read("data/0_capture_3_0_ids.js").find("'data:image/png;base64,iVBOR") !=
+        std::string::npos);
   CHECK(read("data/0_stats.js").find("\"captures\": 3") != std::string::npos);
   for (const auto& entry : std::filesystem::recursive_directory_iterator(out)) {
     const std::string name = entry.path().filename().string();

@@ -116,9 +116,9 @@ TEST_CASE("Who knows the token is served, with headers that keep the page to its
   CHECK(has_status(answer, 200));
   CHECK(answer.ends_with("\r\n\r\npath /a/1"));
   for (const char* header :
-       {"X-Content-Type-Options: nosniff", "Referrer-Policy: no-referrer", "Cache-Control: no-store",
-        "Cross-Origin-Resource-Policy: same-origin", "Cross-Origin-Opener-Policy: same-origin",
-        "X-Frame-Options: DENY",
+       {"X-Content-Type-Options: nosniff", "Referrer-Policy: no-referrer",
+        "Cache-Control: no-store", "Cross-Origin-Resource-Policy: same-origin",
+        "Cross-Origin-Opener-Policy: same-origin", "X-Frame-Options: DENY",
         "Content-Security-Policy: default-src 'none'; script-src 'self'; style-src 'self'; img-src "
         "'self' blob:; connect-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action "
         "'none'"}) {
@@ -141,9 +141,9 @@ TEST_CASE("Without the token there is nothing, not even which pages exist", "[vi
       CHECK(has_status(served.request("GET", target, headers), 403));
     }
   }
-  for (const std::string& target :
-       {std::string("/?token="), "/?token=" + served.token + "0", "/?token=" + served.token.substr(1),
-        "/?x=1&token=" + served.token, "/a?token=" + served.token}) {
+  for (const std::string& target : {std::string("/?token="), "/?token=" + served.token + "0",
+                                    "/?token=" + served.token.substr(1),
+                                    "/?x=1&token=" + served.token, "/a?token=" + served.token}) {
     INFO(target);
     CHECK(has_status(served.request("GET", target, ""), 403));
   }
@@ -160,8 +160,8 @@ TEST_CASE("Names that others can point at this machine are refused", "[view]") {
     CHECK(has_status(with_host("Host: " + std::string(host) + "\r\n"), 200));
   }
   for (const char* host :
-       {"evil.example", "localhost.evil.example", "127.0.0.1.nip.io", "localhost:80a", "localhost:",
-        "127.0.0.2", "0.0.0.0", "a@localhost", "localhost:123456"}) {
+       {"evil.example", "localhost.evil.example", "127.0.0.1.nip.io", "localhost:80a",
+        "localhost:", "127.0.0.2", "0.0.0.0", "a@localhost", "localhost:123456"}) {
     INFO(host);
     CHECK(has_status(with_host("Host: " + std::string(host) + "\r\n"), 403));
   }
@@ -172,7 +172,8 @@ TEST_CASE("Names that others can point at this machine are refused", "[view]") {
 TEST_CASE("Other pages get nothing, even with the cookie", "[view]") {
   const Served served;
   const std::string own = "http://localhost:" + std::to_string(served.server.port());
-  CHECK(has_status(served.get("/a", "Origin: " + own + "\r\nSec-Fetch-Site: same-origin\r\n"), 200));
+  CHECK(
+      has_status(served.get("/a", "Origin: " + own + "\r\nSec-Fetch-Site: same-origin\r\n"), 200));
   CHECK(has_status(served.get("/a", "Sec-Fetch-Site: none\r\n"), 200));
   for (const std::string& header :
        {std::string("Origin: null"), std::string("Origin: https://evil.example"),
@@ -195,11 +196,13 @@ TEST_CASE("Nothing but GET and HEAD, and no bodies", "[view]") {
   CHECK(has_status(head, 200));
   CHECK(head.find("Content-Length: 9\r\n") != head.npos);
   CHECK(head.ends_with("\r\n\r\n"));
-  CHECK(has_status(served.request("GET", "/a", served.cookie + "Content-Length: 5\r\n\r\nabcd"), 413));
+  CHECK(has_status(served.request("GET", "/a", served.cookie + "Content-Length: 5\r\n\r\nabcd"),
+                   413));
   CHECK(has_status(served.request("POST", "/a", served.cookie + "Content-Length: 999999999\r\n"),
                    413));
   CHECK(has_status(
-      served.request("GET", "/a", served.cookie + "Transfer-Encoding: chunked\r\n\r\n1\r\na\r\n0\r\n"),
+      served.request("GET", "/a",
+                     served.cookie + "Transfer-Encoding: chunked\r\n\r\n1\r\na\r\n0\r\n"),
       413));
 }
 
@@ -235,8 +238,8 @@ TEST_CASE("It listens on loopback addresses and nowhere else", "[view]") {
   for (const char* table : {"/proc/net/tcp", "/proc/net/tcp6"}) {
     std::ifstream lines(table);
     for (std::string line; std::getline(lines, line);) {
-      const std::string local = line.substr(line.find(':') + 2, line.find(' ', line.find(':') + 2) -
-                                                                     line.find(':') - 2);
+      const std::string local =
+          line.substr(line.find(':') + 2, line.find(' ', line.find(':') + 2) - line.find(':') - 2);
       const bool listens = line.find(" 0A ") != line.npos;
       if (!listens || !local.ends_with(port)) continue;
       ++listening;
