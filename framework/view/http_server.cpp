@@ -112,6 +112,17 @@ HttpAnswer text_answer(int status, std::string text) {
   return answer;
 }
 
+/// The page that takes the cookie along to the real one. A redirection would not do: browsers that
+/// come from elsewhere, a file or another program's link, send no strict cookie after it.
+HttpAnswer greeting() {
+  HttpAnswer answer;
+  answer.type = "text/html; charset=utf-8";
+  answer.body = std::make_shared<const std::string>(
+      "<!DOCTYPE html><meta charset='utf-8'><meta http-equiv='refresh' content='0;url=/'>"
+      "<title>diorama view</title>\n");
+  return answer;
+}
+
 }  // namespace
 
 struct HttpServer::State {
@@ -312,7 +323,7 @@ Response HttpServer::State::respond(const Request& request) {
     greets = is_same_secret(query.substr(kToken.size()), token);
   }
   if (greets) {
-    made = text_answer(303, "see /");
+    made = greeting();
   } else if (!made) {
     const auto shown = request.count(http::field::cookie) == 1
                            ? cookie_of(plain(request[http::field::cookie]), cookie)
@@ -343,7 +354,6 @@ Response HttpServer::State::respond(const Request& request) {
   response.set(http::field::cache_control, "no-store");
   if (made->status == 405) response.set(http::field::allow, "GET, HEAD");
   if (greets) {
-    response.set(http::field::location, "/");
     response.set(http::field::set_cookie,
                  cookie + "=" + token + "; Path=/; HttpOnly; SameSite=Strict");
   }

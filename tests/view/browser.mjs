@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tries the page of `diorama view` in Chromium. See browser.sh.
 import { spawn } from 'node:child_process';
-import { mkdirSync } from 'node:fs';
+import { mkdirSync, writeFileSync } from 'node:fs';
 import { chromium } from 'playwright-core';
 
 const [program, dataset, pictures, report] = process.argv.slice(2);
@@ -68,6 +68,7 @@ try {
     `a class filters (${total} to ${filtered})`);
   const other = await newPage();
   await other.goto(address);
+  await other.waitForSelector('.card');
   await other.goto(page.url());
   await other.reload().catch(() => undefined);
   await other.waitForFunction(() => document.querySelector('.status')?.hidden, null, { timeout: 120000 });
@@ -147,6 +148,13 @@ try {
   await dark.locator('.card a.picture').first().click();
   await dark.waitForTimeout(900);
   await dark.screenshot({ path: `${pictures}/capture_dark.png` });
+
+  // As the program opens the browser: from a file, which is another site.
+  const opened = await newPage();
+  writeFileSync(`${pictures}/open.html`, `<meta http-equiv='refresh' content='0;url=${address}'>`);
+  await opened.goto(`file://${pictures}/open.html`);
+  await opened.waitForSelector('.card');
+  check(!opened.url().includes('token'), 'a file of the user opens the page');
 
   if (report) {
     const files = await newPage();
