@@ -119,7 +119,7 @@ HttpAnswer greeting() {
   answer.type = "text/html; charset=utf-8";
   answer.body = std::make_shared<const std::string>(
       "<!DOCTYPE html><meta charset='utf-8'><meta http-equiv='refresh' content='0;url=/'>"
-      "<title>diorama view</title>\n");
+      "<link rel='icon' href='icon.svg'><title>diorama view</title>\n");
   return answer;
 }
 
