@@ -121,8 +121,7 @@ class SecondOpinion {
       }
       const double scale = instance.world_from_node.linear().norm();
       const double step = step_of(info_, kObjectCoordinates.name) * scale * size.norm() +
-                          step_of(info_, kHoldsPoses) +
-                          step_of(info_, kHoldsBounds) * scale;
+                          step_of(info_, kHoldsPoses) + step_of(info_, kHoldsBounds) * scale;
       compare(seen, step, kObjectCoordinates.name, kHoldsPoses, instance.node_path);
     }
   }
@@ -211,9 +210,9 @@ class SecondOpinion {
         const auto extent = extent_of_side(bounds, side, kParts, camera_from_node);
         is_whole = extent.has_value();
         if (!extent) break;
-        farthest = std::max({farthest, extent->min().x() - seen.x_max,
-                             seen.x_min - extent->max().x(), extent->min().y() - seen.y_max,
-                             seen.y_min - extent->max().y()});
+        farthest =
+            std::max({farthest, extent->min().x() - seen.x_max, seen.x_min - extent->max().x(),
+                      extent->min().y() - seen.y_max, seen.y_min - extent->max().y()});
       }
       if (!is_whole) continue;
       const bool is_good = farthest <= slack;

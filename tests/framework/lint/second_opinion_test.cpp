@@ -10,9 +10,17 @@
 
 #include "diorama/camera.h"
 #include "framework/datasets/frame_checks.h"
+#include "framework/lint/dataset_on_disk.h"
+#include "framework/lint/encoding_host.h"
+#include "framework/lint/every_format.h"
+#include "framework/lint/lint_report.h"
 #include "framework/lint/opencv_geometry.h"
 #include "plugins/writer_support/sample_capture.h"
 #include "support/catch.h"
+#include "writer_basic/basic_writer.h"
+#include "writer_bop/bop_writer.h"
+#include "writer_hdf5/hdf5_writer.h"
+#include "writer_webdataset/webdataset_writer.h"
 
 using namespace diorama;
 
@@ -82,6 +90,26 @@ Instance& crate(Frame& frame) {
   return *std::ranges::find(frame.instances, "/Assets/crate", &Instance::node_path);
 }
 
+void turn_crate(Frame& frame) {
+  const Vec3 centre = crate(frame).bounds_node.centre();
+  Affine turn = Affine::Identity();
+  turn.translate(centre).rotate(Eigen::AngleAxisd(kPi, Vec3::UnitZ())).translate(-centre);
+  crate(frame).world_from_node = crate(frame).world_from_node * turn;
+}
+
+template <class W>
+LintReport lint_written(const typename W::Params& params, const Capture& capture) {
+  test::EncodingHost host;
+  W writer(params, host);
+  DatasetInfo dataset = test::sample_dataset(test::SampleScene(8, 6));
+  dataset.capture_count = 1;
+  return test::DatasetOnDisk(test::write_dataset(writer, dataset, {&capture})).lint();
+}
+
+bool has(const LintReport& report, const char* check) {
+  return std::ranges::count(report.findings, check, &LintFinding::check) > 0;
+}
+
 bool has(const std::vector<Finding>& findings, const char* check) {
   return std::ranges::count(findings, check, &Finding::check) > 0;
 }
@@ -96,7 +124,8 @@ TEST_CASE("OpenCV and the formulas of lint and of the SDK see points at the same
   const lint::Lens lens = lint::lens_of(camera);
   std::vector<Vec3> points;
   for (int i = -4; i <= 4; ++i) {
-    for (int j = -3; j <= 3; ++j) points.emplace_back(0.13 * i, 0.11 * j, 1.0 + 0.1 * ((i + j) % 3));
+    for (int j = -3; j <= 3; ++j)
+      points.emplace_back(0.13 * i, 0.11 * j, 1.0 + 0.1 * ((i + j) % 3));
   }
   const auto pixels = lint::opencv_geometry().project(lens, points);
   const double slack = model == LensModel::FisheyePolynomial ? 0.1 : 1e-6;
@@ -120,7 +149,8 @@ TEST_CASE("a pose is found from points and their pixels", "[lint]") {
   std::vector<Vec3> points;
   std::vector<Vec2> pixels;
   for (int i = 0; i < 20; ++i) {
-    points.emplace_back(0.1 * std::sin(i * 1.7), 0.15 * std::cos(i * 2.3), 0.12 * std::sin(i * 0.9));
+    points.emplace_back(0.1 * std::sin(i * 1.7), 0.15 * std::cos(i * 2.3),
+                        0.12 * std::sin(i * 0.9));
     pixels.push_back(*lens.pixel(camera_from_local * points.back()));
   }
   const auto solved = lint::opencv_geometry().solve_pose(lens, points, pixels);
@@ -153,14 +183,8 @@ TEST_CASE("wrong poses that other checks pass are found by OpenCV's projection",
       GENERATE(LensModel::Pinhole, LensModel::OpencvPinhole, LensModel::FisheyePolynomial);
   CAPTURE(int(lens));
   SECTION("a box that is turned round half a turn looks the same") {
-    const auto spoil = [](Frame& frame) {
-      const Vec3 centre = crate(frame).bounds_node.centre();
-      Affine turn = Affine::Identity();
-      turn.translate(centre).rotate(Eigen::AngleAxisd(kPi, Vec3::UnitZ())).translate(-centre);
-      crate(frame).world_from_node = crate(frame).world_from_node * turn;
-    };
-    CHECK(found_in(lens, spoil, true).empty());
-    const auto findings = found_in(lens, spoil);
+    CHECK(found_in(lens, turn_crate, true).empty());
+    const auto findings = found_in(lens, turn_crate);
     REQUIRE(has(findings, kSurface));
     CHECK(findings[0].object == "/Assets/crate");
     CHECK_THAT(findings[0].found, ContainsSubstring("pixels of object_coordinates show what"));
@@ -186,5 +210,47 @@ TEST_CASE("wrong poses that other checks pass are found by OpenCV's projection",
     };
     CHECK(found_in(lens, spoil, true).empty());
     CHECK(has(found_in(lens, spoil), kReach));
+  }
+}
+
+TEST_CASE("poses are checked in files that hold positions and object coordinates", "[lint]") {
+  WebDatasetWriter::Params web;
+  web.channels.names = {std::string(kPosition.name), std::string(kObjectCoordinates.name)};
+  web.depth = web.instances = true;
+  Hdf5Writer::Params hdf5;
+  hdf5.channels.names = web.channels.names;
+  for (const LensModel lens :
+       {LensModel::Pinhole, LensModel::OpencvPinhole, LensModel::FisheyePolynomial}) {
+    CAPTURE(int(lens));
+    Capture capture = sample_through(lens);
+    for (const LintReport& report :
+         {lint_written<WebDatasetWriter>(web, capture), lint_written<Hdf5Writer>(hdf5, capture)}) {
+      INFO(lint_text(report));
+      CHECK(report.findings.empty());
+    }
+    for (Frame& frame : capture.frames) turn_crate(frame);
+    for (const LintReport& report :
+         {lint_written<WebDatasetWriter>(web, capture), lint_written<Hdf5Writer>(hdf5, capture)}) {
+      INFO(lint_text(report));
+      CHECK(has(report, kSurface));
+    }
+  }
+}
+
+TEST_CASE("3-D boxes that are too large are found in files that hold them", "[lint]") {
+  // Along its y axis the crate's box grows within the slack, or out of the picture.
+  for (const int axis : {0, 2}) {
+    CAPTURE(axis);
+    Capture capture = sample_through(LensModel::OpencvPinhole);
+    for (Frame& frame : capture.frames) {
+      Aabb& bounds = crate(frame).bounds_node;
+      bounds.max[axis] += 1.2 * bounds.size()[axis];
+    }
+    for (const LintReport& report : {lint_written<BopWriter>({}, capture),
+                                     lint_written<BasicWriter>(test::everything(), capture)}) {
+      INFO(lint_text(report));
+      CHECK(has(report, kReach));
+      CHECK(report.findings.size() == 1);
+    }
   }
 }
