@@ -226,6 +226,8 @@ bool DatasetView::work() {
     if (make_stats(*opened)) return true;
   }
   if (make_findings()) return true;
+  const std::size_t asked = asked_;
+  if (asked < all->size() && index_some(*all->at(asked))) return true;
   return std::ranges::any_of(*all, [&](const auto& opened) { return index_some(*opened); });
 }
 
@@ -358,6 +360,7 @@ HttpAnswer DatasetView::answer(std::string_view path) {
   if (words.size() < 3 || !number || *number >= all->size()) return not_there();
   Opened& opened = *all->at(*number);
   const Words rest = Words(words).subspan(2);
+  if (rest[0] == "index") asked_ = *number;
   if (rest[0] != "capture") return dataset_answer(opened, rest);
 
   // What captures hold stays the same for as long as a dataset is open.

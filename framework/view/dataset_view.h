@@ -86,7 +86,8 @@ class DatasetView {
   Host& host_;
   mutable std::mutex mutex_;
   std::shared_ptr<const Datasets> datasets_;
-  int generation_ = 0;  ///< Counts how often the datasets were opened.
+  int generation_ = 0;                 ///< Counts how often the datasets were opened.
+  std::atomic<std::size_t> asked_{0};  ///< The dataset that the page shows: indexed first.
   std::atomic<bool> wants_findings_{false};
   std::shared_ptr<const std::string> findings_;  ///< JSON; null until they were looked for.
   ByteCache<HttpAnswer> cache_{kCacheBytes};
