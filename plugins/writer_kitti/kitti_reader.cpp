@@ -26,7 +26,6 @@ namespace fs = std::filesystem;
 constexpr const char* kFormat = "KITTI";
 constexpr const char* kBackProject = "depth back-projects";
 constexpr const char* kAngles = "angles agree";
-constexpr const char* kReproject = "pose and camera reproject onto the mask";
 
 /// The fields of a label line but the class.
 struct KittiLabel {
@@ -218,6 +217,7 @@ class KittiPictureReading : private FrameReading {
     if (!text) return;
     sources.emplace(kHoldsCamera, file);
     files_.reading(file, [&] {
+      bool has_camera = false;
       std::size_t lines = 0;
       Json lens = Json::object();
       for (const std::string& line : text_lines(*text)) {
@@ -237,9 +237,9 @@ class KittiPictureReading : private FrameReading {
         // Labels are in the space of camera 0; the last column shifts them to camera 2.
         offset_ = {(p[3] - camera.cx * p[11]) / camera.fx, (p[7] - camera.cy * p[11]) / camera.fy,
                    p[11]};
-        has_camera_ = true;
+        has_camera = true;
       }
-      if (!has_camera_) throw std::runtime_error("has no line P2");
+      if (!has_camera) throw std::runtime_error("has no line P2");
       read_lens_entry(lens, frame_.camera);
       if (dataset_.page_) {
         check_own_calibration(*text, file);
@@ -341,8 +341,6 @@ class KittiPictureReading : private FrameReading {
       instance.bounds_node.min = {-half.x(), -label.size.y(), -half.z()};
       instance.bounds_node.max = {half.x(), 0.0, half.z()};
       if (is_inside && is_own) check_sides(instance, who);
-      const bool is_whole = label.occlusion == 0.0 && label.truncation == 0.0;
-      if (is_inside && is_own && is_whole && has_camera_) check_faces(instance, who);
     }
     frame_.instances.push_back(std::move(instance));
   }
@@ -369,33 +367,6 @@ class KittiPictureReading : private FrameReading {
     files_.check(std::abs(std::remainder(label.alpha - expected, 2.0 * kPi)) <= slack, kAngles,
                  labels_, who, "its alpha is " + std::to_string(label.alpha),
                  std::to_string(expected) + ", by rotation and place");
-  }
-
-  /// A 3-D box ends where its object does: of one in full sight, no face lies wholly beside the 2-D
-  /// box.
-  void check_faces(const Instance& instance, const std::string& who) {
-    const Aabb& bounds = instance.bounds_node;
-    const PixelBox& box = *instance.tight_box;
-    const Vec2 low(box.x_min, box.y_min);
-    const Vec2 high(box.x_max, box.y_max);
-    // A little of it may be hidden all the same, and be long.
-    const Vec2 slack = Vec2::Constant(2.0) + (high - low);
-    for (int face = 0; face < 6; ++face) {
-      Eigen::AlignedBox2d seen;
-      for (int corner = 0; corner < 8; ++corner) {
-        if (((corner >> face / 2) & 1) != face % 2) continue;
-        Vec3 point;
-        for (int i = 0; i < 3; ++i) point[i] = (corner >> i) & 1 ? bounds.max[i] : bounds.min[i];
-        const auto pixel = project(frame_.camera, instance.world_from_node * point);
-        if (!pixel) return;
-        seen.extend(*pixel);
-      }
-      const bool meets = ((seen.min() - slack).array() <= high.array()).all() &&
-                         ((seen.max() + slack).array() >= low.array()).all();
-      files_.check(meets, kReproject, labels_, who,
-                   "a face of its 3-D box lies beside its 2-D box " + box_text(box),
-                   "the object reaches to each face");
-    }
   }
 
   /// Each side of the 2-D box touches the object: by the depth, some pixel of its outermost row or
@@ -431,7 +402,6 @@ class KittiPictureReading : private FrameReading {
   const KittiDataset& dataset_;
   std::string stem_;
   std::string labels_;
-  bool has_camera_ = false;
   Vec3 offset_ = Vec3::Zero();  ///< Of camera 0 in the space of camera 2.
 };
 
