@@ -12,7 +12,8 @@ mkdir -p "$logs"
 export CMAKE_GENERATOR=Ninja
 
 part_build() {
-  ./bootstrap.sh packages && cmake --preset release -D DIORAMA_BUILD_TESTS=ON && cmake --build --preset release
+  ./bootstrap.sh packages && cmake --preset release -D DIORAMA_BUILD_TESTS=ON -D DIORAMA_WARNINGS_AS_ERRORS=ON &&
+    cmake --build --preset release --target all benchmarks denoiser_pictures
 }
 part_kills() { tests/cluster/torture.py --kills "${KILLS:-1000}" --seed "$(date +%F)"; }
 part_faults() { tests/cluster/torture.py --faults "${FAULTS:-5000}" --seed "$(date +%F)"; }
