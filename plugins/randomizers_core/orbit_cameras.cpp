@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "orbit_cameras.h"
 
-#include "diorama/node_pattern.h"
-
+#include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 
+#include "diorama/node_pattern.h"
 #include "diorama/obstacles.h"
 #include "sampling.h"
 
@@ -14,11 +15,37 @@ namespace {
 
 constexpr const char* kRolls[] = {"level", "arc"};
 
+/// Places, in the node's space, of the cameras that move with it; its own for what has none.
+std::vector<Vec3> cameras_at(const Scene& scene, NodeId node) {
+  std::vector<Vec3> places;
+  const Affine node_from_world = scene.world_from_node(node).inverse();
+  for (const NodeId below : scene.subtree(node)) {
+    if (!scene[below].camera) continue;
+    places.push_back(below == node
+                         ? Vec3(Vec3::Zero())
+                         : Vec3(node_from_world * scene.world_from_node(below).translation()));
+  }
+  if (places.empty()) places.push_back(Vec3::Zero());
+  return places;
+}
+
 }  // namespace
 
+/// What stands round the cameras. Nothing of it changes while a view is drawn again and again.
 struct OrbitCameras::Surroundings {
-  Obstacles blocking;  ///< What may not stand between a camera and its target.
-  Obstacles all;       ///< What may not be too near to a camera.
+  Obstacles blocking;         ///< What may not stand between a camera and its target.
+  Obstacles all;              ///< What may not be too near to a camera.
+  std::vector<Vec3> targets;  ///< Empty: nothing fits the pattern.
+
+  std::uint64_t shape_revision = 0;
+  std::vector<std::pair<NodeId, Affine>> poses;  ///< In the world, of all that this depends on.
+
+  bool is_of(const Scene& scene) const {
+    return scene.shape_revision() == shape_revision &&
+           std::all_of(poses.begin(), poses.end(), [&](const auto& pose) {
+             return scene.world_from_node(pose.first).matrix() == pose.second.matrix();
+           });
+  }
 };
 
 void OrbitCameras::Params::visit(ParamVisitor& v) {
@@ -45,6 +72,28 @@ void OrbitCameras::Params::visit(ParamVisitor& v) {
 
 OrbitCameras::OrbitCameras(Params params, Host&) : params_(std::move(params)) {}
 
+OrbitCameras::~OrbitCameras() = default;
+
+void OrbitCameras::look_around(const Scene& scene) {
+  if (surroundings_ && surroundings_->is_of(scene)) return;
+  // Without obstacles every draw is free, so the first one stands: the same as when switched off.
+  const bool avoid = params_.avoid_obstacles;
+  const std::vector<NodeId> targets = scene.match(params_.targets);
+  surroundings_ = std::make_unique<Surroundings>(
+      Surroundings{Obstacles(scene, avoid ? params_.obstacles : std::string()),
+                   Obstacles(scene, avoid ? "/**" : ""),
+                   centres_of(scene, targets),
+                   scene.shape_revision(),
+                   {}});
+  const auto depend_on = [&](NodeId node) {
+    surroundings_->poses.emplace_back(node, scene.world_from_node(node));
+  };
+  for (const NodeId node : scene.subtree(scene.root())) {
+    if (scene[node].mesh) depend_on(node);
+  }
+  for (const NodeId node : targets) depend_on(node);
+}
+
 OrbitCameras::View OrbitCameras::draw_view(const std::vector<Vec3>& targets,
                                            NodeDraws draws) const {
   View view;
@@ -59,8 +108,22 @@ OrbitCameras::View OrbitCameras::draw_view(const std::vector<Vec3>& targets,
   return view;
 }
 
+/// How far all cameras of the node are from everything, up to the clearance; below 0: one of them
+/// does not see the target or stands in something.
+double OrbitCameras::clearance_of(const View& view, const std::vector<Vec3>& cameras) const {
+  const Affine world_from_node = pose_of(view);
+  double clear_m = params_.clearance_m;
+  for (const Vec3& camera : cameras) {
+    const Vec3 place = camera.isZero() ? view.position : Vec3(world_from_node * camera);
+    if (surroundings_->blocking.is_between(place, view.target)) return -1.0;
+    if (surroundings_->all.encloser(place)) return -1.0;
+    clear_m = surroundings_->all.distance(place, clear_m);
+  }
+  return clear_m;
+}
+
 OrbitCameras::View OrbitCameras::draw_free_view(const std::vector<Vec3>& targets,
-                                                const Surroundings& surroundings,
+                                                const std::vector<Vec3>& cameras,
                                                 const NodeDraws& draws) const {
   const auto attempt = [&](int number) {
     return draw_view(targets, {draws.rng.fork(std::uint64_t(number)), draws.index});
@@ -69,9 +132,7 @@ OrbitCameras::View OrbitCameras::draw_free_view(const std::vector<Vec3>& targets
   double best_m = -1.0;
   for (int i = 0; i < params_.max_tries; ++i) {
     const View view = attempt(i);
-    if (surroundings.blocking.is_between(view.position, view.target)) continue;
-    if (surroundings.all.encloser(view.position)) continue;
-    const double clear_m = surroundings.all.distance(view.position, params_.clearance_m);
+    const double clear_m = clearance_of(view, cameras);
     if (clear_m >= params_.clearance_m) return view;
     if (clear_m <= best_m) continue;
     best = view;
@@ -90,14 +151,13 @@ Affine OrbitCameras::pose_of(const View& view) const {
 void OrbitCameras::randomize(Scene& scene, const RandomizeContext& context, const Rng& rng) {
   const std::vector<NodeId> nodes = scene.match(params_.nodes);
   if (nodes.empty()) return;
-  const std::vector<Vec3> targets =
-      target_centres(scene, params_.targets, context.working_area_world);
-  // Without obstacles every draw is free, so the first one stands: the same as when switched off.
-  const bool avoid = params_.avoid_obstacles;
-  const Surroundings surroundings{Obstacles(scene, avoid ? params_.obstacles : std::string()),
-                                  Obstacles(scene, avoid ? "/**" : "")};
+  look_around(scene);
+  const std::vector<Vec3> targets = surroundings_->targets.empty()
+                                        ? std::vector<Vec3>{context.working_area_world}
+                                        : surroundings_->targets;
   const auto place = [&](NodeId node, const NodeDraws& draws) {
-    set_world_pose(scene, node, pose_of(draw_free_view(targets, surroundings, draws)));
+    const View view = draw_free_view(targets, cameras_at(scene, node), draws);
+    set_world_pose(scene, node, pose_of(view));
   };
   draw_for_each(scene, nodes, context, rng, place);
 }

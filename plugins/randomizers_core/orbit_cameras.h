@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -20,7 +21,7 @@ struct NodeDraws;
 /// included, while an obstacle stands between camera and target, the camera stands inside something
 /// solid, or anything visible is close to it, which its near plane would cut open. When no draw
 /// within `max_tries` is free, the farthest from everything among those with a free line of sight
-/// is taken, else the first.
+/// is taken, else the first. A rig of cameras is placed as one, and each of them has to be free.
 class OrbitCameras final : public Randomizer {
  public:
   struct Params {
@@ -40,6 +41,7 @@ class OrbitCameras final : public Randomizer {
   };
 
   OrbitCameras(Params params, Host& host);
+  ~OrbitCameras() override;
   void randomize(Scene& scene, const RandomizeContext& context, const Rng& rng) override;
 
  private:
@@ -49,12 +51,15 @@ class OrbitCameras final : public Randomizer {
     Vec3 look_at;
   };
   struct Surroundings;
+  void look_around(const Scene& scene);
   View draw_view(const std::vector<Vec3>& targets, NodeDraws draws) const;
-  View draw_free_view(const std::vector<Vec3>& targets, const Surroundings& surroundings,
+  View draw_free_view(const std::vector<Vec3>& targets, const std::vector<Vec3>& cameras,
                       const NodeDraws& draws) const;
+  double clearance_of(const View& view, const std::vector<Vec3>& cameras) const;
   Affine pose_of(const View& view) const;
 
   Params params_;
+  std::unique_ptr<Surroundings> surroundings_;  ///< Of the last scene.
 };
 
 }  // namespace diorama

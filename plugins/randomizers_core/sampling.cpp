@@ -14,14 +14,19 @@ void set_world_pose(Scene& scene, NodeId node, const Affine& world_from_node) {
   scene.set_pose(node, world_from_parent.inverse() * world_from_node);
 }
 
-std::vector<Vec3> target_centres(const Scene& scene, const std::string& pattern,
-                                 const Vec3& fallback) {
+std::vector<Vec3> centres_of(const Scene& scene, const std::vector<NodeId>& nodes) {
   std::vector<Vec3> centres;
-  for (const NodeId node : scene.match(pattern)) {
+  for (const NodeId node : nodes) {
     const Aabb box = scene.world_bounds(node);
     centres.push_back(box.is_empty() ? Vec3(scene.world_from_node(node).translation())
                                      : box.centre());
   }
+  return centres;
+}
+
+std::vector<Vec3> target_centres(const Scene& scene, const std::string& pattern,
+                                 const Vec3& fallback) {
+  std::vector<Vec3> centres = centres_of(scene, scene.match(pattern));
   if (centres.empty()) centres.push_back(fallback);
   return centres;
 }

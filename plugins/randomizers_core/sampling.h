@@ -50,8 +50,10 @@ std::vector<NodeId> match_if(const Scene& scene, const std::string& pattern,
 /// Sets the node's pose from one in the world, whatever its ancestors' poses are.
 void set_world_pose(Scene& scene, NodeId node, const Affine& world_from_node);
 
-/// Centres of the boxes of the nodes that fit (where they have no mesh, their places); `fallback`
-/// alone when none fits.
+/// Centres of the boxes of the nodes; of those without a mesh, their places.
+std::vector<Vec3> centres_of(const Scene& scene, const std::vector<NodeId>& nodes);
+
+/// Those of the nodes that fit; `fallback` alone when none fits.
 std::vector<Vec3> target_centres(const Scene& scene, const std::string& pattern,
                                  const Vec3& fallback);
 

@@ -46,36 +46,64 @@ std::vector<PatternStep> parsed(std::string_view pattern) {
   return steps;
 }
 
-/// Text length times pattern length, whatever the pattern: no backtracking. `reached[i]` says that
-/// the steps so far fit the first i characters.
-bool fits(const std::vector<PatternStep>& steps, std::string_view text) {
-  std::vector<char> reached(text.size() + 1, 0), next(text.size() + 1);
-  reached[0] = 1;
-  for (const PatternStep& step : steps) {
-    std::fill(next.begin(), next.end(), 0);
-    bool is_after_slash = false;  // AnyFolders: its first '/' was met
-    for (std::size_t i = 0; i <= text.size(); ++i) {
-      const char before = i > 0 ? text[i - 1] : 0;
+/// How far a pattern has been followed along a path, name by name: no backtracking, whatever the
+/// pattern, and what a parent's path has reached serves all of its children.
+class PatternPlaces {
+ public:
+  /// Nothing of the path has been read.
+  explicit PatternPlaces(const std::vector<PatternStep>& steps)
+      : steps_(&steps), reached_(steps.size() + 1, 0), opened_(steps.size(), 0) {
+    reached_[0] = 1;
+    skip_empty_steps();
+  }
+  void read(std::string_view text) {
+    for (const char character : text) read(character);
+  }
+  bool is_at_end() const { return reached_.back() != 0; }
+  /// Nothing that begins with what was read fits.
+  bool is_lost() const {
+    const auto is_set = [](char place) { return place != 0; };
+    return std::none_of(reached_.begin(), reached_.end(), is_set) &&
+           std::none_of(opened_.begin(), opened_.end(), is_set);
+  }
+
+ private:
+  using Kind = PatternStep::Kind;
+
+  /// From behind, as each place depends on itself and on the one before as they were.
+  void read(char character) {
+    for (std::size_t i = steps_->size(); i > 0; --i) {
+      const PatternStep& step = (*steps_)[i - 1];
+      const bool was_before = reached_[i - 1] != 0;
       switch (step.kind) {
-        case PatternStep::Kind::Character:
-          next[i] = i > 0 && reached[i - 1] && before == step.character;
+        case Kind::Character:
+          reached_[i] = was_before && character == step.character;
           break;
-        case PatternStep::Kind::AnyInName:
-          next[i] = reached[i] || (i > 0 && next[i - 1] && before != '/');
+        case Kind::AnyInName:
+          reached_[i] = reached_[i] && character != '/';
           break;
-        case PatternStep::Kind::Any:
-          next[i] = reached[i] || (i > 0 && next[i - 1]);
+        case Kind::Any:
           break;
-        case PatternStep::Kind::AnyFolders:
-          if (i > 0 && reached[i - 1] && before == '/') is_after_slash = true;
-          next[i] = is_after_slash && before == '/';
+        case Kind::AnyFolders:
+          if (was_before && character == '/') opened_[i - 1] = 1;
+          reached_[i] = opened_[i - 1] && character == '/';
           break;
       }
     }
-    std::swap(reached, next);
+    reached_[0] = 0;
+    skip_empty_steps();
   }
-  return reached[text.size()] != 0;
-}
+  void skip_empty_steps() {
+    for (std::size_t i = 0; i < steps_->size(); ++i) {
+      const Kind kind = (*steps_)[i].kind;
+      if (reached_[i] && (kind == Kind::AnyInName || kind == Kind::Any)) reached_[i + 1] = 1;
+    }
+  }
+
+  const std::vector<PatternStep>* steps_;
+  std::vector<char> reached_;  ///< By number of steps: they fit all that was read.
+  std::vector<char> opened_;   ///< By step: a '/' that it begins with was read.
+};
 
 /// Drawn from one count by all scenes: equal revisions mean the same scene, unchanged.
 std::uint64_t next_revision() {
@@ -182,14 +210,25 @@ std::vector<NodeId> Scene::match(std::string_view pattern) const {
     return matches;
   }
   const std::vector<PatternStep> steps = parsed(pattern);
-  // Parents have smaller ids than their children, so every parent's path is there in time.
-  std::vector<std::string> paths(state_->slots.size());
-  for (std::uint32_t i = 1; i < paths.size(); ++i) {
-    if (!state_->slots[i]) continue;
-    const Node& node = state_->slots[i]->node;
-    paths[i] = paths[node.parent.index] + "/" + node.name;
-    if (fits(steps, paths[i])) matches.push_back(NodeId{i});
+  struct Below {
+    NodeId parent;
+    PatternPlaces places;  // at the parent's path
+  };
+  std::vector<Below> waiting{{root(), PatternPlaces(steps)}};
+  while (!waiting.empty()) {
+    const Below below = std::move(waiting.back());
+    waiting.pop_back();
+    for (const NodeId id : state_->at(below.parent).node.children) {
+      const Node& node = state_->at(id).node;
+      PatternPlaces places = below.places;
+      places.read("/");
+      places.read(node.name);
+      if (places.is_lost()) continue;
+      if (places.is_at_end()) matches.push_back(id);
+      if (!node.children.empty()) waiting.push_back({id, std::move(places)});
+    }
   }
+  std::sort(matches.begin(), matches.end());  // creation order
   return matches;
 }
 

@@ -134,6 +134,27 @@ inline std::string difference(const std::map<std::string, std::string>& a,
   return list;
 }
 
+/// Captures that the journals call done.
+inline std::size_t journal_entries(const fs::path& output) {
+  std::size_t count = 0;
+  std::error_code gone;
+  for (const auto& entry : fs::directory_iterator(output / ".diorama" / "journal", gone)) {
+    if (entry.path().extension() != ".index") continue;
+    std::ifstream stream(entry.path());
+    for (std::string line; std::getline(stream, line);) count += line.starts_with("d 0");
+  }
+  return count;
+}
+
+/// Waits until the dataset has so many captures; false when the process has ended before.
+inline bool wait_for_captures(const fs::path& output, std::size_t count) {
+  for (int i = 0; i < 60000; ++i) {
+    if (journal_entries(output) >= count) return true;
+    ::usleep(1000);
+  }
+  return false;
+}
+
 inline std::string config_file(const std::string& name) {
   return std::string(DIORAMA_SOURCE_DIR "/configs/") + name;
 }

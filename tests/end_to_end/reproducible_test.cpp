@@ -22,27 +22,6 @@ std::map<std::string, std::string> dataset(const TemporaryFolder& folder,
   return tree(folder / "out");
 }
 
-/// Captures that the journals call done.
-std::size_t journal_entries(const fs::path& output) {
-  std::size_t count = 0;
-  std::error_code gone;
-  for (const auto& entry : fs::directory_iterator(output / ".diorama" / "journal", gone)) {
-    if (entry.path().extension() != ".index") continue;
-    std::ifstream stream(entry.path());
-    for (std::string line; std::getline(stream, line);) count += line.starts_with("d 0");
-  }
-  return count;
-}
-
-/// Waits until the dataset has so many captures; false when the process has ended before.
-bool wait_for_captures(const fs::path& output, std::size_t count) {
-  for (int i = 0; i < 60000; ++i) {
-    if (journal_entries(output) >= count) return true;
-    ::usleep(1000);
-  }
-  return false;
-}
-
 }  // namespace
 
 TEST_CASE("A run leaves a whole dataset, no warnings, and a summary", "[run]") {

@@ -3,6 +3,7 @@
 // them.
 #include <algorithm>
 #include <cmath>
+#include <csignal>
 #include <nlohmann/json.hpp>
 
 #include "program.h"
@@ -173,6 +174,25 @@ TEST_CASE(
   const Outcome verified = run({"verify", "whole", "--sample", "3"}, folder.path());
   INFO(verified.errors);
   CHECK(verified.exit_code == 0);
+}
+
+TEST_CASE("Views are the same bytes after kill -9 and resume, and are counted once", "[views]") {
+  const TemporaryFolder folder;
+  const std::string text = job(kConditions, 60);
+  const auto whole = run_job(text, "whole", folder);
+  const std::vector<std::string> arguments{"run",      "views.yaml", "--output", "killed",
+                                           "--resume", "--threads",  "2"};
+  for (const std::size_t captures : {1, 17, 38}) {
+    Process process(arguments, folder.path());
+    REQUIRE(wait_for_captures(folder / "killed", captures));
+    process.signal(SIGKILL);
+    CHECK(process.wait().exit_code == 128 + SIGKILL);
+  }
+  CHECK(journal_entries(folder / "killed") < 60);
+  const Outcome resumed = run(arguments, folder.path());
+  INFO(resumed.errors);
+  REQUIRE(resumed.exit_code == 0);
+  CHECK(difference(whole, tree(folder / "killed")) == "");
 }
 
 TEST_CASE("At the limit a job keeps the nearest view and says so, or ends", "[views]") {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <set>
 
+#include "diorama/rng.h"
 #include "error_text.h"
 #include "support/catch.h"
 
@@ -125,6 +126,58 @@ TEST_CASE("Patterns match paths in creation order", "[scene]") {
   CHECK(matches("/**/handle/**") == Names{});
   k.scene.erase(k.banana);
   CHECK(matches("/Assets/b*") == Names{"/Assets/banana_01"});
+}
+
+namespace {
+
+/// What a pattern means, letter by letter.
+bool fits(std::string_view pattern, std::string_view path) {
+  if (pattern.empty()) return path.empty();
+  const auto fits_behind = [&](std::string_view rest, bool crosses_names) {
+    for (std::size_t i = 0;; ++i) {
+      if (fits(rest, path.substr(i))) return true;
+      if (i == path.size() || (path[i] == '/' && !crosses_names)) return false;
+    }
+  };
+  if (pattern.starts_with("/**/")) {
+    if (!path.starts_with('/')) return false;
+    for (std::size_t i = 0; i < path.size(); ++i) {
+      if (path[i] == '/' && fits(pattern.substr(4), path.substr(i + 1))) return true;
+    }
+    return false;
+  }
+  if (pattern.starts_with("**")) return fits_behind(pattern.substr(2), true);
+  if (pattern.starts_with("*")) return fits_behind(pattern.substr(1), false);
+  return !path.empty() && path.front() == pattern.front() &&
+         fits(pattern.substr(1), path.substr(1));
+}
+
+}  // namespace
+
+TEST_CASE("Patterns mean the same wherever they part a path", "[scene]") {
+  Rng rng(20);
+  Scene scene;
+  std::vector<NodeId> nodes{scene.root()};
+  for (int i = 0; i < 150; ++i) {
+    std::string name;
+    for (std::size_t k = rng.index(3) + 1; k > 0; --k) name += "ab"[rng.index(2)];
+    nodes.push_back(scene.create(nodes[rng.index(nodes.size())], name));
+  }
+  const std::vector<std::string> parts{"a", "b", "/", "*", "**", "/**/", "/a", "b/"};
+  int matches = 0;
+  for (int i = 0; i < 2000; ++i) {
+    std::string pattern = rng.index(4) == 0 ? "" : "/";
+    for (std::size_t k = rng.index(6) + 1; k > 0; --k) pattern += parts[rng.index(parts.size())];
+    if (pattern.find('*') == std::string::npos) continue;
+    std::vector<NodeId> expected;
+    for (std::size_t k = 1; k < nodes.size(); ++k) {
+      if (fits(pattern, scene.path(nodes[k]))) expected.push_back(nodes[k]);
+    }
+    CAPTURE(pattern);
+    CHECK(scene.match(pattern) == expected);
+    matches += expected.empty() ? 0 : 1;
+  }
+  CHECK(matches > 200);
 }
 
 TEST_CASE("A pattern of many stars against a long path stays quick", "[scene]") {

@@ -199,6 +199,38 @@ TEST_CASE("hidden obstacles block no view, distances to triangles are exact", "[
       Obstacles(set.scene, "/Environment/**").is_between(Vec3(10.9, 1.9, 0), Vec3(10.9, 1.9, 2)));
 }
 
+TEST_CASE("cameras know the scene as it is at each call", "[randomizers]") {
+  Set set;
+  Set other;
+  NodeId wall;
+  for (const Vec3& centre : set.centres) {
+    wall = set.add_wall("wall", make_box(Vec3(0.1, 8, 8)), centre + Vec3(0.4, 0, 0));
+  }
+  OrbitCameras orbit(orbit_params(), set.host);
+  const auto sees_what_is_there = [&](Set& now) {
+    for (int seed = 0; seed < 20; ++seed) {
+      orbit.randomize(now.scene, {}, Rng(std::uint64_t(seed)));
+      const Affine pose = now.pose();
+      OrbitCameras(orbit_params(), now.host).randomize(now.scene, {}, Rng(std::uint64_t(seed)));
+      if (pose.matrix() != now.pose().matrix()) return false;
+    }
+    return true;
+  };
+  CHECK(sees_what_is_there(set));
+  set.scene.set_pose(wall, Affine(Eigen::Translation3d(set.centres[1] - Vec3(0.4, 0, 0))));
+  CHECK(sees_what_is_there(set));
+  set.scene.set_pose(set.scene[wall].parent, Affine(Eigen::Translation3d(0.1, 0, 0)));
+  CHECK(sees_what_is_there(set));
+  set.scene.edit(wall).is_visible = false;
+  CHECK(sees_what_is_there(set));
+  const NodeId target = set.scene.match("/Assets/*").front();
+  set.scene.set_pose(target, Affine(Eigen::Translation3d(3, 1, 2)));
+  CHECK(sees_what_is_there(set));
+  CHECK(sees_what_is_there(other));
+  set.scene.erase(target);
+  CHECK(sees_what_is_there(set));
+}
+
 TEST_CASE("cameras never stand in a closed thing, and leave the nearest for the freest place",
           "[randomizers]") {
   Set set;

@@ -1,0 +1,122 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Makes a thousand captures with five conditions and three quotas (job.yaml beside this file) in shards, and
+looks at the written labels alone: every picture has a target that meets all conditions, the main one of each
+lies where the quotas want it, each part of a quota has its share exactly, and views.json counts the same.
+
+    tests/chosen_views/check_views.py [--captures 1000] [--shards 3] [--build FOLDER]
+
+Ends with a line of counts, and with 1 when something does not hold; the dataset is then kept.
+"""
+import argparse
+import collections
+import json
+import math
+import pathlib
+import shutil
+import subprocess
+import sys
+import tarfile
+import tempfile
+
+HERE = pathlib.Path(__file__).resolve().parent
+WIDTH, HEIGHT = 80, 60
+LABELS = ["capsule", "cone", "cylinder", "sphere", "cube"]
+LOWEST = math.sin(math.radians(-40))
+SLACK = 1e-6  # numbers are written with fewer digits than they are judged with
+
+
+def pictures(dataset):
+    for archive in sorted((dataset / "web" / "shards").glob("*.tar")):
+        with tarfile.open(archive) as tar:
+            for member in tar:
+                if member.name.endswith(".json"):
+                    yield json.load(tar.extractfile(member))
+
+
+def measures(thing, picture):
+    pose = thing["world_from_node"]
+    middle = [0.5 * (low + high) for low, high in zip(thing["bounds_min"], thing["bounds_max"])]
+    way = [picture["world_from_camera"][row][3] - pose[row][3] -
+           sum(pose[row][k] * middle[k] for k in range(3)) for row in range(3)]
+    distance = math.dist(way, (0, 0, 0))
+    left, top, right, bottom = thing["box"]
+    return {
+        "label": thing["class"],
+        "pixels": thing["visible_px"],
+        "occlusion": 1 - thing["visible_share"],
+        "truncation": thing["truncation"],
+        "size": max((right - left) / WIDTH, (bottom - top) / HEIGHT),
+        "distance": distance,
+        "azimuth": math.degrees(math.atan2(way[1], way[0])) % 360,
+        "height": way[2] / distance,
+    }
+
+
+def meets_all(one):
+    return (one["pixels"] >= 15 and one["occlusion"] <= 0.4 + SLACK and one["truncation"] <= 0.25 + SLACK and
+            0.05 - SLACK <= one["size"] <= 0.8 + SLACK and one["distance"] <= 2.2 + SLACK and
+            one["height"] >= LOWEST - SLACK)
+
+
+def check(dataset, captures):
+    faults, numbers = [], []
+    parts = {"label": collections.Counter(), "distance_m": collections.Counter(), "direction": collections.Counter()}
+    for picture in pictures(dataset):
+        numbers.append(picture["capture"])
+        holding = [one for one in (measures(thing, picture) for thing in picture["objects"]) if meets_all(one)]
+        if not holding:
+            faults.append(f"capture {picture['capture']}: no target meets all conditions")
+            continue
+        main = max(holding, key=lambda one: one["pixels"])
+        if main["distance"] < 0.5 - SLACK:
+            faults.append(f"capture {picture['capture']}: the main target is {main['distance']:.4f} m away")
+        parts["label"][main["label"]] += 1
+        parts["distance_m"]["near" if main["distance"] < 1.2 else "far"] += 1
+        row = (main["height"] - LOWEST) / (1 - LOWEST) >= 0.5
+        parts["direction"][int(main["azimuth"] // 90) + 4 * row] += 1
+    if sorted(numbers) != list(range(captures)):
+        faults.append(f"{len(set(numbers))} captures of {captures} are there")
+    wanted = {
+        "label": {label: captures // 5 for label in LABELS},
+        "distance_m": {"near": captures // 4, "far": captures - captures // 4},
+        "direction": {cell: captures // 8 for cell in range(8)},
+    }
+    for quota, counts in parts.items():
+        if dict(counts) != wanted[quota]:
+            faults.append(f"quota {quota}: found {dict(counts)}, expected {wanted[quota]}")
+    report = json.loads((dataset / "views.json").read_text())
+    refused = sum(report["refused"].values())
+    if report["unmet"]:
+        faults.append(f"views.json names {len(report['unmet'])} views that do not hold")
+    if report["views"] != captures or report["draws"] != captures + refused:
+        faults.append(f"views.json: {report['views']} views, {report['draws']} draws, {refused} refused")
+    return faults, report
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
+    parser.add_argument("--captures", type=int, default=1000, help="a multiple of 40, the default is %(default)s")
+    parser.add_argument("--shards", type=int, default=3)
+    parser.add_argument("--build", type=pathlib.Path, default=HERE.parents[1] / "build" / "release")
+    options = parser.parse_args()
+    if options.captures % 40:
+        parser.error(f"--captures {options.captures}: expected a multiple of 40, which all quotas divide")
+    dataset = pathlib.Path(tempfile.mkdtemp(prefix="diorama-views-")) / "out"
+    for shard in range(options.shards, 0, -1):
+        command = [options.build / "bin" / "diorama", "run", HERE / "job.yaml", "--output", dataset, "--shard",
+                   f"{shard}/{options.shards}", "--set", f"total_captures={options.captures}"]
+        ended = subprocess.run(command, stderr=subprocess.PIPE, text=True)
+        if ended.returncode != 0:
+            sys.exit(f"shard {shard} ended with {ended.returncode}: {ended.stderr[-2000:]}")
+    faults, report = check(dataset, options.captures)
+    for fault in faults[:20]:
+        print(fault)
+    print(f"{options.captures} captures in {options.shards} shards, {report['draws']} draws: {len(faults)} faults")
+    if faults:
+        sys.exit(f"the dataset is kept: {dataset}")
+    shutil.rmtree(dataset.parent)
+
+
+if __name__ == "__main__":
+    main()
