@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "random_texture.h"
 
-#include "diorama/node_pattern.h"
-
 #include <algorithm>
 
+#include "diorama/node_pattern.h"
 #include "sampling.h"
 
 namespace diorama {
@@ -14,6 +13,8 @@ void RandomTexture::Params::visit(ParamVisitor& v) {
   v.param("textures", textures, {"Image files to choose from; none: the mesh keeps what it has."});
   v.param("repeat", repeat, {"How often the picture fits along the mesh's uv.", "", 1e-3, 1e3});
   v.param("rotation_deg", rotation_deg, {"Turn of the picture.", "deg", -360, 360});
+  v.param("picture_m", picture_m,
+          {"Size of the picture on meshes without uv, before it is repeated.", "m", 1e-3, 1e3});
 }
 
 RandomTexture::RandomTexture(Params params, Host& host)
@@ -24,7 +25,8 @@ void RandomTexture::randomize(Scene& scene, const RandomizeContext& context, con
   const auto change = [&](NodeId node, NodeDraws& draws) {
     TextureInput input;
     input.texture = textures_.draw(draws);
-    const double repeat = draws.number(params_.repeat);
+    const double repeat =
+        draws.number(params_.repeat) * box_mapping_.fit(scene, node, params_.picture_m);
     const Eigen::Rotation2Dd turn(radians(draws.number(params_.rotation_deg)));
     input.uv_from_mesh_uv.leftCols<2>() = (repeat * turn.toRotationMatrix()).cast<float>();
     auto& slots = scene.edit(node).materials;

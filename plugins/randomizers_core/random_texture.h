@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "box_mapping.h"
 #include "diorama/distribution.h"
 #include "diorama/host.h"
 #include "diorama/randomizer.h"
@@ -11,7 +12,7 @@
 namespace diorama {
 
 /// Puts a random picture on every mesh among the nodes, as the colour of all its materials. Meshes
-/// without uv coordinates show the picture's lower left pixel only.
+/// without uv coordinates get some by box mapping.
 class RandomTexture final : public Randomizer {
  public:
   struct Params {
@@ -19,6 +20,7 @@ class RandomTexture final : public Randomizer {
     TextDistribution textures;
     Distribution repeat = 1.0;
     Distribution rotation_deg = 0.0;
+    double picture_m = 0.3;
 
     void visit(ParamVisitor& v);
   };
@@ -29,6 +31,7 @@ class RandomTexture final : public Randomizer {
  private:
   Params params_;
   TextureChoice textures_;
+  BoxMapping box_mapping_;
 };
 
 }  // namespace diorama

@@ -39,6 +39,8 @@ class FakeHost final : public Host {
   std::shared_ptr<const Texture> read_texture(const std::filesystem::path& file) const override {
     Texture texture;
     texture.name = file.string();
+    texture.channels = 3;
+    texture.color_space = ColorSpace::Srgb;
     return std::make_shared<Texture>(texture);
   }
   std::vector<std::byte> encode_image(const ImageView&, ImageFormat) const override { return {}; }
