@@ -36,10 +36,25 @@ std::optional<std::string> assets_root_of(const Value& job) {
   return root->scalar;
 }
 
+std::vector<AssetPrefix> asset_prefixes_of(const Value& job) {
+  std::vector<AssetPrefix> prefixes;
+  const Value* list = job.find("asset_prefixes");
+  if (!list) return prefixes;
+  for (const Value& item : list->list) {
+    AssetPrefix prefix;
+    Complaints complaints;  // read_job() makes them
+    ParamReader reader(item, "asset_prefixes", complaints);
+    prefix.visit(reader);
+    prefixes.push_back(std::move(prefix));
+  }
+  return prefixes;
+}
+
 std::unique_ptr<HostServices> make_host(Registry& registry, const GlobalOptions& options,
                                         const std::optional<std::string>& job_assets_root,
-                                        const Log& log) {
+                                        const Log& log, std::vector<AssetPrefix> asset_prefixes) {
   HostOptions host;
+  host.asset_prefixes = std::move(asset_prefixes);
   host.assets_root = choose_assets_root(options.assets_root, std::getenv("DIORAMA_ASSETS_ROOT"),
                                         job_assets_root, sample_pack_folder(options.program));
   host.threads = options.threads > 0 ? options.threads : ThreadPool::available_threads();

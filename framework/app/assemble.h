@@ -24,10 +24,14 @@ void warn_of_rejected(const Registry& registry, const Log& log);
 /// The assets root that a native job names, if it names one.
 std::optional<std::string> assets_root_of(const Value& job);
 
+/// Its asset_prefixes, as far as they are well formed.
+std::vector<AssetPrefix> asset_prefixes_of(const Value& job);
+
 /// Host services for a job; `job_assets_root` is what the job says, if it says something. Throws
 /// Error(Asset) when the assets root is no folder.
 std::unique_ptr<HostServices> make_host(Registry& registry, const GlobalOptions& options,
                                         const std::optional<std::string>& job_assets_root,
-                                        const Log& log);
+                                        const Log& log,
+                                        std::vector<AssetPrefix> asset_prefixes = {});
 
 }  // namespace diorama

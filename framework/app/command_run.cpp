@@ -147,7 +147,8 @@ int run_value(const GlobalOptions& global, const Value& job, const RunCommandOpt
   const std::unique_ptr<Registry> registry = make_registry(global, log.sink());
   warn_of_rejected(*registry, log.sink());
   const std::optional<std::string> job_root = assets_root_of(job);
-  const std::unique_ptr<HostServices> host = make_host(*registry, global, job_root, log.sink());
+  const std::unique_ptr<HostServices> host =
+      make_host(*registry, global, job_root, log.sink(), asset_prefixes_of(job));
   const std::optional<fs::path> assets_root =
       choose_assets_root(global.assets_root, std::getenv("DIORAMA_ASSETS_ROOT"), job_root,
                          sample_pack_folder(global.program));

@@ -2,6 +2,7 @@
 #include "framework/host/asset_paths.h"
 
 #include <algorithm>
+#include <iterator>
 #include <system_error>
 #include <utility>
 
@@ -13,6 +14,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view kFileScheme = "file://";
+/// What the folders of Isaac Sim's assets are called on every server and disk.
+constexpr std::string_view kKnownFolders[] = {"/Isaac/", "/NVIDIA/"};
 
 std::string lower(std::string_view text) {
   std::string out(text);
@@ -28,16 +31,14 @@ int hex_value(char c) {
   return -1;
 }
 
-/// The path of a file:// URL (RFC 8089): an empty or local host, %XX decoded.
-fs::path path_of_url(std::string_view url) {
-  std::string_view rest = url.substr(kFileScheme.size());
-  if (rest.starts_with("localhost/")) rest.remove_prefix(9);
+/// %XX decoded.
+std::string decoded(std::string_view text) {
   std::string path;
-  for (std::size_t i = 0; i < rest.size(); ++i) {
-    const int high = rest[i] == '%' && i + 2 < rest.size() ? hex_value(rest[i + 1]) : -1;
-    const int low = high >= 0 ? hex_value(rest[i + 2]) : -1;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const int high = text[i] == '%' && i + 2 < text.size() ? hex_value(text[i + 1]) : -1;
+    const int low = high >= 0 ? hex_value(text[i + 2]) : -1;
     if (low < 0) {
-      path += rest[i];
+      path += text[i];
       continue;
     }
     path += char(high * 16 + low);
@@ -46,20 +47,38 @@ fs::path path_of_url(std::string_view url) {
   return path;
 }
 
+/// The path of a file:// URL (RFC 8089): an empty or local host.
+fs::path path_of_file_url(std::string_view url) {
+  std::string_view rest = url.substr(kFileScheme.size());
+  if (rest.starts_with("localhost/")) rest.remove_prefix(9);
+  return decoded(rest);
+}
+
+bool is_url(std::string_view asset) {
+  return asset.find("://") != std::string_view::npos && has_scheme(asset);
+}
+
+/// What follows the host, or the whole of what is no URL; begins with '/'.
+std::string path_of(std::string_view asset) {
+  if (!is_url(asset)) return (asset.starts_with('/') ? "" : "/") + std::string(asset);
+  const std::size_t slash = asset.find('/', asset.find("://") + 3);
+  return slash == std::string_view::npos ? "/" : decoded(asset.substr(slash));
+}
+
 bool is_there(const fs::path& path) {
   std::error_code failed;
   return fs::exists(path, failed);
 }
 
-[[noreturn]] void refuse_remote(std::string_view asset) {
-  const std::size_t host = asset.find("://") + 3;
-  const std::size_t slash = asset.find('/', host);
-  const std::string below(slash == std::string_view::npos ? "/..." : asset.substr(slash));
-  throw Error(ErrorKind::Asset,
-              std::string(asset) +
-                  ": remote assets are not fetched; copy the file below the assets "
-                  "root (--assets-root, DIORAMA_ASSETS_ROOT) and name it '" +
-                  below + "'");
+/// From the last known folder on: whatever the server puts above it.
+std::string usual_name(const std::string& path) {
+  std::size_t start = std::string::npos;
+  for (const std::string_view folder : kKnownFolders) {
+    const std::size_t found = path.rfind(folder);
+    if (found != std::string::npos && (start == std::string::npos || found > start)) start = found;
+  }
+  if (start != std::string::npos) return path.substr(start);
+  return path.size() > 1 ? path : "/...";
 }
 
 /// Walks down folders in sorted order.
@@ -129,27 +148,77 @@ bool has_scheme(std::string_view asset) {
   });
 }
 
-AssetPaths::AssetPaths(std::optional<fs::path> root) : root_(std::move(root)) {}
+void AssetPrefix::visit(ParamVisitor& v) {
+  v.param("prefix", prefix, {"How names begin: 'omniverse://nucleus/Projects/'."});
+  v.param("below", below,
+          {"Folder below the assets root in which the rest of such a name is looked up."});
+}
+
+std::pair<std::string_view, std::string_view> split_variants(std::string_view asset) {
+  if (!asset.ends_with('}') || is_there(asset)) return {asset, {}};
+  const std::size_t slash = asset.rfind('/');
+  const std::size_t brace = asset.find('{', slash == std::string_view::npos ? 0 : slash);
+  if (brace == std::string_view::npos) return {asset, {}};
+  return {asset.substr(0, brace), asset.substr(brace)};
+}
+
+AssetPaths::AssetPaths(std::optional<fs::path> root, std::vector<AssetPrefix> prefixes)
+    : root_(std::move(root)), prefixes_(std::move(prefixes)) {
+  std::stable_sort(prefixes_.begin(), prefixes_.end(),
+                   [](const auto& a, const auto& b) { return a.prefix.size() > b.prefix.size(); });
+}
+
+std::vector<fs::path> AssetPaths::places_below(std::string_view asset) const {
+  std::vector<fs::path> places;
+  const auto add = [&](const fs::path& below) {
+    const fs::path place = *root_ / below.relative_path();
+    if (std::find(places.begin(), places.end(), place) == places.end()) places.push_back(place);
+  };
+  for (const AssetPrefix& one : prefixes_) {
+    if (one.prefix.empty() || !asset.starts_with(one.prefix)) continue;
+    const std::string rest(asset.substr(one.prefix.size()));
+    add(fs::path(one.below) / fs::path(is_url(asset) ? decoded(rest) : rest).relative_path());
+  }
+  const std::string path = path_of(asset);
+  add(path);
+  for (std::size_t slash = path.find('/', 1); slash != std::string::npos;
+       slash = path.find('/', slash + 1)) {
+    const std::string_view rest = std::string_view(path).substr(slash);
+    const auto begins = [&](std::string_view folder) { return rest.starts_with(folder); };
+    if (std::any_of(std::begin(kKnownFolders), std::end(kKnownFolders), begins)) add(rest);
+  }
+  return places;
+}
 
 fs::path AssetPaths::resolve(std::string_view asset) const {
   if (asset.empty()) throw Error(ErrorKind::Asset, "an asset has an empty name");
+  const std::string name(asset);
   if (asset.starts_with(kFileScheme)) {
-    const fs::path path = path_of_url(asset);
+    const fs::path path = path_of_file_url(asset);
     if (is_there(path)) return path;
-    throw Error(ErrorKind::Asset, std::string(asset) + ": there is no file " + path.string());
+    throw Error(ErrorKind::Asset, name + ": there is no file " + path.string());
   }
+  const bool is_remote = is_url(asset);
   const fs::path local(asset);
-  if (is_there(local)) return local;
-  if (asset.find("://") != std::string_view::npos && has_scheme(asset)) refuse_remote(asset);
-  std::string tried = "not found; tried " + local.string();
-  if (root_) {
-    const fs::path below = *root_ / local.relative_path();
-    if (is_there(below)) return below;
-    tried += " and " + below.string();
-  } else {
-    tried += "; there is no assets root (--assets-root, DIORAMA_ASSETS_ROOT) to look below";
+  if (!is_remote && is_there(local)) return local;
+  std::string tried;
+  for (const fs::path& place : root_ ? places_below(asset) : std::vector<fs::path>()) {
+    if (is_there(place)) return place;
+    tried += (tried.empty() ? "" : " and ") + place.string();
   }
-  throw Error(ErrorKind::Asset, std::string(asset) + ": " + tried);
+  if (is_remote) {
+    throw Error(ErrorKind::Asset,
+                name +
+                    ": remote assets are not fetched; copy the file below the assets root "
+                    "(--assets-root, DIORAMA_ASSETS_ROOT) and name it '" +
+                    usual_name(path_of(asset)) + "'" + (tried.empty() ? "" : "; tried " + tried));
+  }
+  if (!root_) {
+    throw Error(ErrorKind::Asset,
+                name + ": not found; tried " + local.string() +
+                    "; there is no assets root (--assets-root, DIORAMA_ASSETS_ROOT) to look below");
+  }
+  throw Error(ErrorKind::Asset, name + ": not found; tried " + local.string() + " and " + tried);
 }
 
 std::vector<fs::path> AssetPaths::list(std::string_view folder,

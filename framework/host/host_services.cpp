@@ -58,7 +58,7 @@ std::vector<std::byte> read_bytes(const fs::path& file) {
 
 HostServices::HostServices(Registry& registry, HostOptions options, Log log)
     : registry_(registry),
-      paths_(std::move(options.assets_root)),
+      paths_(std::move(options.assets_root), std::move(options.asset_prefixes)),
       log_(std::move(log)),
       pool_(options.threads),
       cache_(options.asset_cache_bytes),
@@ -172,7 +172,8 @@ std::optional<HostServices::Source> HostServices::claimed_source(std::string_vie
                     node_name(std::string(asset))};
     }
   }
-  const fs::path file = paths_.resolve(asset);
+  const auto [plain, variants] = split_variants(asset);
+  const fs::path file = paths_.resolve(plain);
   std::string name = file.filename().string();
   const Claim* claim = claim_of(name, false);
   if (claim) {
@@ -181,7 +182,9 @@ std::optional<HostServices::Source> HostServices::claimed_source(std::string_vie
     claim = claim_of_content(file);
   }
   if (!claim) return std::nullopt;
-  return Source{file.string(), fs::canonical(file).string(), claim->loader, node_name(name)};
+  const std::string suffix(variants);
+  return Source{file.string() + suffix, fs::canonical(file).string() + suffix, claim->loader,
+                node_name(name)};
 }
 
 HostServices::Source HostServices::find_source(std::string_view asset) const {

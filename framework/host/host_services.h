@@ -27,6 +27,7 @@ namespace diorama {
 
 struct HostOptions {
   std::optional<std::filesystem::path> assets_root;
+  std::vector<AssetPrefix> asset_prefixes;
   int threads = 1;
   std::size_t asset_cache_bytes = std::size_t(1) << 30;
   std::uint64_t picture_bytes = kPictureBudget;  ///< Memory to decode one picture.

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "diorama/error.h"
+#include "framework/host/asset_paths.h"
 
 namespace diorama {
 namespace {
@@ -44,7 +45,7 @@ bool is_generated(std::string_view asset) {
 
 void FilesLoader::Params::visit(ParamVisitor& v) {
   v.param("folders", folders, {"Folders whose files are taken, at any depth, sorted by path."});
-  v.param("files", files, {"Single files."});
+  v.param("files", files, {"Single files; variants may follow: mug.usd{look=red}."});
   v.param("skip", skip, {"Leaves out files and folders whose name holds one of these, any case."});
 }
 
@@ -55,7 +56,12 @@ std::vector<std::string> FilesLoader::claims() const { return {}; }
 std::vector<std::string> FilesLoader::assets() const {
   std::vector<std::string> assets;
   for (const std::string& file : params_.files) {
-    assets.push_back(is_generated(file) ? file : host_.resolve(file).string());
+    if (is_generated(file)) {
+      assets.push_back(file);
+      continue;
+    }
+    const auto [plain, variants] = split_variants(file);
+    assets.push_back(host_.resolve(plain).string() + std::string(variants));
   }
   for (const std::string& folder : params_.folders) {
     for (const auto& file : host_.list_assets(folder, params_.skip)) {

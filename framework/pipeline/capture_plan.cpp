@@ -11,6 +11,7 @@
 
 #include "diorama/error.h"
 #include "framework/config/clean_text.h"
+#include "framework/host/asset_paths.h"
 #include "framework/pipeline/label_pattern.h"
 
 namespace diorama {
@@ -111,6 +112,10 @@ void plan_group(const Job& job, std::size_t index, const std::vector<std::string
     object.group = index;
     const std::size_t choice = picks.pick(rng, before + std::uint64_t(number));
     object.asset = assets[choice];
+    for (const auto& [set, names_of_set] : group.variant_sets) {
+      Rng own = rng.fork("variants").fork(set);
+      object.asset += "{" + set + "=" + names_of_set[own.index(names_of_set.size())] + "}";
+    }
     object.floats = rng.chance(group.gravity_disabled_chance);
     const auto known = words_of_asset.find(choice);
     const AssetWords& words =
@@ -251,6 +256,7 @@ std::optional<RandomizerCall> randomizer_call(const Job& job, const RandomizerEn
 }
 
 std::string asset_stem(std::string_view asset) {
+  asset = split_variants(asset).first;
   const std::size_t start = asset.find_last_of("/:");
   std::string_view name = start == std::string_view::npos ? asset : asset.substr(start + 1);
   const std::size_t dot = name.find_last_of('.');

@@ -32,10 +32,10 @@ constexpr const char* kLightWords[] = {"sphere", "rect", "disk", "distant", "dom
 constexpr const char* kCameraWords[] = {"pinhole", "opencv_pinhole", "fisheye_polynomial"};
 
 const std::vector<std::string> kSections{
-    "seed",         "assets_root", "debug",    "total_captures", "loaders",
-    "environments", "environment", "objects",  "lights",         "cameras",
-    "randomizers",  "physics",     "renderer", "annotators",     "timeline",
-    "settle",       "views",       "writers",  "output"};
+    "seed",     "assets_root",  "asset_prefixes", "debug",    "total_captures",
+    "loaders",  "environments", "environment",    "objects",  "lights",
+    "cameras",  "randomizers",  "physics",        "renderer", "annotators",
+    "timeline", "settle",       "views",          "writers",  "output"};
 
 std::string item_path(std::string_view section, std::size_t index) {
   return std::string(section) + "[" + std::to_string(index) + "]";
@@ -176,12 +176,43 @@ void check_pattern(const ObjectGroup& group, const Value& map, const std::string
   }
 }
 
+void read_variants(ObjectGroup& group, const std::string& path, Complaints& complaints) {
+  const Value& given = group.variants;
+  if (given.kind == Value::Kind::Null) return;
+  const std::string key = path + ".variants";
+  if (given.kind != Value::Kind::Map) {
+    complaints.add(
+        given.place,
+        key + ": expected variants by set, {lookVariant: [red, blue]}, found " + given.describe());
+    return;
+  }
+  for (const auto& [set, value] : given.map) {
+    std::vector<std::string> names;
+    const std::vector<Value> one{value};
+    for (const Value& item : value.kind == Value::Kind::List ? value.list : one) {
+      const bool is_name = item.kind == Value::Kind::Scalar && !item.scalar.empty() &&
+                           item.scalar.find_first_of("{}=/") == std::string::npos;
+      if (is_name) {
+        names.push_back(item.scalar);
+      } else {
+        complaints.add(item.place, key + "." + set + ": expected the name of a variant, found " +
+                                       item.describe());
+      }
+    }
+    if (names.empty() && value.kind == Value::Kind::List) {
+      complaints.add(value.place, key + "." + set + ": the list is empty");
+    }
+    group.variant_sets.emplace_back(set, std::move(names));
+  }
+}
+
 void read_objects(const Value& value, Job& job, Complaints& complaints) {
   for (auto& [path, map] : entries(value, "objects", complaints)) {
     ObjectGroup group;
     read_keys(map, path, group, complaints);
     name_after_type(group);
     check_pattern(group, map, path, complaints);
+    read_variants(group, path, complaints);
     check_node_name(group.name, map, path, complaints);
     if (group.under.size() < 2 || group.under.front() != '/' || group.under.back() == '/') {
       complaints.add(place_of(map, "under"),
@@ -477,11 +508,20 @@ Value head_of(const Value& job) {
   Value head = Value::make_map();
   head.place = job.place;
   for (const auto& [key, value] : job.map) {
-    if (key == "seed" || key == "assets_root" || key == "debug" || key == "total_captures") {
-      head.map.emplace_back(key, value);
-    }
+    const bool is_of_head = key == "seed" || key == "assets_root" || key == "asset_prefixes" ||
+                            key == "debug" || key == "total_captures";
+    if (is_of_head) head.map.emplace_back(key, value);
   }
   return head;
+}
+
+void check_asset_prefixes(const Value& value, const Job& job, Complaints& complaints) {
+  for (std::size_t i = 0; i < job.asset_prefixes.size(); ++i) {
+    if (!job.asset_prefixes[i].prefix.empty()) continue;
+    complaints.add(value.find("asset_prefixes")->list[i].place,
+                   item_path("asset_prefixes", i) +
+                       ".prefix: is empty, expected how names begin: 'omniverse://nucleus/'");
+  }
 }
 
 }  // namespace
@@ -522,6 +562,9 @@ void ObjectGroup::visit(ParamVisitor& v) {
   v.param("label_replacement", label_replacement,
           {"What a match of label_pattern becomes; `$1` is its first group."});
   v.param("taxonomy", taxonomy, {"Taxonomy of the label."});
+  v.param("variants", variants,
+          {"Variants of the assets to choose from, by set: {lookVariant: [red, blue]}. Drawn for "
+           "each object; null: what the asset itself selects."});
   v.param("gravity_disabled_chance", gravity_disabled_chance,
           {"Share of the objects that float.", "", 0, 1});
   v.choice("collider", collider, kColliderWords, {"Collider of every mesh of the object."});
@@ -652,6 +695,8 @@ Job read_job(const Value& value, Complaints& complaints) {
   read_all_keys(head_of(value), "", head, complaints);
   job.seed = head.seed;
   job.assets_root = head.assets_root;
+  job.asset_prefixes = head.asset_prefixes;
+  check_asset_prefixes(value, job, complaints);
   job.debug = head.debug;
   job.total_captures = head.total_captures;
   job.loaders =
@@ -688,19 +733,11 @@ std::string node_name(std::string_view text) {
 
 std::vector<std::string_view> host_keys(ComponentKind kind, std::string_view section) {
   if (section == "objects") {
-    return {"type",
-            "name",
-            "under",
-            "count",
-            "pick",
-            "balance",
-            "label",
-            "label_pattern",
-            "label_replacement",
-            "taxonomy",
-            "gravity_disabled_chance",
-            "collider",
-            "mass_kg"};
+    return {"type",     "name",          "under",
+            "count",    "pick",          "balance",
+            "label",    "label_pattern", "label_replacement",
+            "taxonomy", "variants",      "gravity_disabled_chance",
+            "collider", "mass_kg"};
   }
   switch (kind) {
     case ComponentKind::Loader:

@@ -6,11 +6,13 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "diorama/component.h"
 #include "diorama/config.h"
 #include "diorama/params.h"
+#include "framework/host/asset_paths.h"
 #include "framework/pipeline/view_rules.h"
 
 namespace diorama {
@@ -52,6 +54,9 @@ struct ObjectGroup {
   std::optional<std::string> label_pattern;
   std::string label_replacement;
   std::string taxonomy = "class";
+  Value variants;  ///< As given.
+  /// Variant set and what is chosen from, in the job's order.
+  std::vector<std::pair<std::string, std::vector<std::string>>> variant_sets;
   double gravity_disabled_chance = 0.0;
   std::string collider = "convex_hull";
   double mass_kg = 1.0;
@@ -168,6 +173,7 @@ struct Job {
   std::vector<ViewRule> views;
   std::vector<WriterEntry> writers;
   OutputSection output;
+  std::vector<AssetPrefix> asset_prefixes;
 
   /// Names of the capture series in timeline order, each once.
   std::vector<std::string> series() const;

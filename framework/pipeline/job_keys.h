@@ -4,8 +4,10 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "diorama/params.h"
+#include "framework/host/asset_paths.h"
 
 /// Keys of a job file that have no struct of their own in job.h. For job.cpp and job_defaults.cpp.
 namespace diorama::detail {
@@ -29,6 +31,7 @@ struct EngineHead {
 struct JobHead {
   std::uint64_t seed = 0;
   std::optional<std::string> assets_root;
+  std::vector<AssetPrefix> asset_prefixes;
   bool debug = false;
   int total_captures = 1;
   void visit(ParamVisitor& v) {
@@ -36,6 +39,10 @@ struct JobHead {
     v.param("assets_root", assets_root,
             {"Folder below which asset paths are looked up; null: --assets-root, "
              "DIORAMA_ASSETS_ROOT, then the installed sample pack."});
+    v.list(
+        "asset_prefixes", asset_prefixes,
+        {"Where names in jobs and scenes are looked up below the assets root, the longest prefix "
+         "first. Without: their whole path, and what begins with /Isaac/ or /NVIDIA/ in it."});
     v.param("debug", debug,
             {"Also hides environment.hide_in_debug and writes one overview picture per "
              "environment."});

@@ -424,7 +424,8 @@ void listen(const std::string& program, const Value& given, const py::object& on
     registry->add_builtin(register_listener, program_version());
     warn_of_rejected(*registry, log_to_python);
     const auto root = assets_root_of(job);
-    const std::unique_ptr<HostServices> host = make_host(*registry, options, root, log_to_python);
+    const std::unique_ptr<HostServices> host =
+        make_host(*registry, options, root, log_to_python, asset_prefixes_of(job));
     host->stop_on(own.stop());
     JobAssembly assembly =
         assemble_job(job, *registry, *host,

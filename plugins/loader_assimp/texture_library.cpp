@@ -110,7 +110,8 @@ std::string TextureLibrary::identify(const std::string& name) {
 
 void TextureLibrary::report(const std::string& name, const std::string& why,
                             const std::string& material) {
-  missing_.add(file_.name() + ": texture @" + plain_path(name) + "@ " + why, material);
+  const std::string what = file_.name() + ": texture @" + plain_path(name) + "@ " + why;
+  missing_.add(what, what, material);
 }
 
 std::shared_ptr<const Texture> TextureLibrary::read(const std::string& name, ColorSpace space,

@@ -8,7 +8,6 @@ namespace diorama::loader_usd {
 namespace {
 
 constexpr std::string_view kTileMark = "<UDIM>";
-constexpr int kFirstTile = 1001;
 constexpr int kTileColumns = 10;
 constexpr int kTiles = 100;
 
@@ -20,25 +19,15 @@ std::optional<ColorSpace> to_color_space(TextureSpace space) {
 
 }  // namespace
 
-std::vector<std::string> tile_names(const std::string& identifier) {
-  const std::size_t mark = identifier.find(kTileMark);
-  if (mark == std::string::npos) return {identifier};
-  std::vector<std::string> names;
-  for (int i = 0; i < kTiles; ++i) {
-    names.push_back(identifier);
-    names.back().replace(mark, kTileMark.size(), std::to_string(kFirstTile + i));
-  }
-  return names;
-}
-
 void TextureLibrary::missing(const usd::FoundValue& asset, const std::string& why,
                              const std::string& material) {
-  missing_.add(asset.layer->identifier() + ": texture @" + *asset.value.as_text() + "@ " + why,
+  missing_.add(stage_.anchor(asset),
+               asset.layer->identifier() + ": texture @" + *asset.value.as_text() + "@ " + why,
                material);
 }
 
 void TextureLibrary::report_missing() const {
-  for (const std::string& line : missing_.lines()) stage_.diagnostics().missing(line);
+  for (const std::string& line : missing_.lines()) stage_.diagnostics().missing(line, line);
 }
 
 std::optional<TextureLibrary::Picture> TextureLibrary::find_tiles(const std::string& identifier) {
@@ -49,7 +38,7 @@ std::optional<TextureLibrary::Picture> TextureLibrary::find_tiles(const std::str
   };
   std::vector<File> files;
   std::vector<UdimTile> tiles;
-  const std::vector<std::string> names = tile_names(identifier);
+  const std::vector<std::string> names = usd::tile_names(identifier);
   for (int i = 0; i < kTiles; ++i) {
     const std::string& name = names[std::size_t(i)];
     if (!stage_.assets().exists(name)) continue;
@@ -75,7 +64,7 @@ std::optional<TextureLibrary::Picture> TextureLibrary::find(const usd::FoundValu
   const auto [entry, is_new] = found_.try_emplace(identifier);
   Found& found = entry->second;
   if (is_new) {
-    found.why_not = "could not be found";
+    found.why_not = stage_.assets().missing_text(identifier);
     try {
       if (identifier.find(kTileMark) != std::string::npos) {
         found.picture = find_tiles(identifier);

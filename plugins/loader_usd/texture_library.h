@@ -19,9 +19,6 @@ namespace diorama::loader_usd {
 /// How the colours of a texture file are to be read.
 enum class TextureSpace { Auto, Raw, Srgb };
 
-/// What a set of UDIM tiles, "wood.<UDIM>.png", can have as files; other names stand by themselves.
-std::vector<std::string> tile_names(const std::string& identifier);
-
 struct FoundTexture {
   std::shared_ptr<const Texture> texture;
   /// From mesh uv to that of the texture: other than the identity for sets of UDIM tiles.

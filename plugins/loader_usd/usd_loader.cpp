@@ -2,7 +2,9 @@
 #include "loader_usd/usd_loader.h"
 
 #include <algorithm>
+#include <map>
 #include <set>
+#include <system_error>
 
 #include "diorama/error.h"
 #include "loader_usd/scene_translator.h"
@@ -13,9 +15,74 @@
 namespace diorama::loader_usd {
 namespace {
 
+/// Files of servers, and of disks of others, as far as the host has them below its assets root.
+usd::AssetLibrary::LookUp look_up_by(const Host& host) {
+  return [&host](const std::string& asset) {
+    const bool is_url = asset.find("://") != std::string::npos;
+    usd::AssetLibrary::Lookup result;
+    // From the root of all paths: never beside whoever runs the program.
+    const std::string name = is_url || asset.starts_with('/') ? asset : "/" + asset;
+    try {
+      const std::filesystem::path file = host.resolve(name);
+      std::error_code error;
+      if (std::filesystem::is_regular_file(file, error)) result.file = file.generic_string();
+    } catch (const Error& error) {
+      const std::string text = error.what();
+      if (is_url) result.why_not = text.substr(text.starts_with(name + ": ") ? name.size() + 2 : 0);
+    }
+    return result;
+  };
+}
+
+/// A file, and the variants that are chosen by set: "mug.usd{look=red}{size=big}".
+struct NamedAsset {
+  std::string file;
+  std::map<std::string, std::string> variants;
+
+  explicit NamedAsset(std::string_view name) {
+    file = name;
+    std::error_code error;
+    if (!name.ends_with('}') || std::filesystem::exists(file, error)) return;
+    const std::size_t slash = name.rfind('/');
+    const std::size_t brace = name.find('{', slash == std::string_view::npos ? 0 : slash);
+    if (brace == std::string_view::npos) return;
+    file = name.substr(0, brace);
+    for (std::string_view rest = name.substr(brace); !rest.empty();) {
+      const std::size_t end = rest.find('}');
+      const std::size_t equals = std::min(rest.find('='), end);
+      if (!rest.starts_with('{') || end == std::string_view::npos || equals == end || equals == 1) {
+        throw Error(ErrorKind::Asset, std::string(name) + ": found '" + std::string(rest) +
+                                          "', expected variants as {set=variant}");
+      }
+      variants[std::string(rest.substr(1, equals - 1))] = rest.substr(equals + 1, end - equals - 1);
+      rest.remove_prefix(end + 1);
+    }
+  }
+};
+
+/// Throws unless the scene has what was chosen.
+void check_variants(usd::Stage& stage, const NamedAsset& asset) {
+  if (asset.variants.empty()) return;
+  const auto known = stage.root_variants();
+  std::string text;
+  for (const auto& [set, names] : known) {
+    text += (text.empty() ? "" : "; ") + set + ":";
+    for (const std::string& name : names) text += " " + name;
+  }
+  for (const auto& [set, name] : asset.variants) {
+    const auto found = known.find(set);
+    if (found != known.end() && found->second.contains(name)) continue;
+    throw Error(ErrorKind::Asset, asset.file + ": has no variant '" + name + "' of a set '" + set +
+                                      "'; there " +
+                                      (text.empty() ? "are none at its root prims" : "is " + text));
+  }
+}
+
 /// The layers and other assets that a file leads to.
 class FileCollector {
  public:
+  explicit FileCollector(const Host& host) : library_(look_up_by(host)) {}
+
   void add_layer(const std::string& identifier) {
     if (!add(identifier)) return;
     std::shared_ptr<const usd::Layer> layer;
@@ -30,7 +97,7 @@ class FileCollector {
       add_layer(library_.anchor(name, layer->identifier()));
     }
     for (const std::string& name : named.values) {
-      for (const std::string& file : tile_names(library_.anchor(name, layer->identifier()))) {
+      for (const std::string& file : usd::tile_names(library_.anchor(name, layer->identifier()))) {
         add(file);
       }
     }
@@ -59,8 +126,8 @@ std::vector<std::string> UsdLoader::claims() const {
 
 std::vector<std::filesystem::path> UsdLoader::files(std::string_view asset) const {
   try {
-    FileCollector collector;
-    collector.add_layer(std::string(asset));
+    FileCollector collector(host_);
+    collector.add_layer(NamedAsset(asset).file);
     return collector.files();
   } catch (const usd::FormatError& error) {
     throw Error(ErrorKind::Asset, error.what());
@@ -68,9 +135,11 @@ std::vector<std::filesystem::path> UsdLoader::files(std::string_view asset) cons
 }
 
 void UsdLoader::load(std::string_view asset, Scene& scene, NodeId root) {
+  const NamedAsset named(asset);
   try {
-    usd::Stage stage(std::string(asset), usd::Sampling::OrFirstSample,
-                     std::uint64_t(params_.max_prims_mib) << 20);
+    usd::Stage stage(named.file, usd::Sampling::OrFirstSample,
+                     std::uint64_t(params_.max_prims_mib) << 20, look_up_by(host_), named.variants);
+    check_variants(stage, named);
     SceneTranslator translator(stage, host_, scene);
     host_.log(LogLevel::Debug, translator.describe_units());
     translator.translate(root);
@@ -81,8 +150,7 @@ void UsdLoader::load(std::string_view asset, Scene& scene, NodeId root) {
     for (const std::string& warning : stage.warnings()) host_.log(LogLevel::Warning, warning);
   } catch (const usd::FormatError& error) {
     const std::string text = error.what();
-    const std::string name(asset);
-    throw Error(ErrorKind::Asset, text.starts_with(name) ? text : name + ": " + text);
+    throw Error(ErrorKind::Asset, text.starts_with(named.file) ? text : named.file + ": " + text);
   }
 }
 

@@ -13,7 +13,8 @@
 namespace diorama::loader_usd {
 
 /// Loads USD scenes: text, crate and packages, composed with all payloads and default variants, at
-/// the default time or, where an attribute has time samples only, at the first one.
+/// the default time or, where an attribute has time samples only, at the first one. Names may
+/// choose variants of the root prims: "mug.usd{look=red}".
 class UsdLoader final : public Loader {
  public:
   struct Params {

@@ -10,6 +10,7 @@
 #include "random_labels.h"
 #include "random_material.h"
 #include "random_texture.h"
+#include "random_variant.h"
 #include "random_visibility.h"
 #include "scatter_lights.h"
 #include "scatter_poses.h"
@@ -25,6 +26,8 @@ DIORAMA_PLUGIN("randomizers_core", "0.1.0", "Apache-2.0") {
               "Draws the materials of every mesh, or their roughness and metalness.");
   DIORAMA_ADD(diorama::RandomTexture, "random_texture", "Puts a random picture on every mesh.");
   DIORAMA_ADD(diorama::RandomLabels, "random_labels", "Draws, adds or clears the labels of nodes.");
+  DIORAMA_ADD(diorama::RandomVariant, "random_variant",
+              "Gives objects the looks of a variant of their asset.");
   DIORAMA_ADD(diorama::RandomVisibility, "random_visibility", "Shows or hides nodes by chance.");
   DIORAMA_ADD(diorama::OrbitCameras, "orbit_cameras",
               "Places cameras round random targets and looks at them.");

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <algorithm>
+#include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -15,12 +17,15 @@ namespace diorama::test {
 class TextureHost final : public Host {
  public:
   std::vector<std::string> warnings;
+  std::function<std::filesystem::path(std::string_view)> find;  ///< Null: all names are paths.
   mutable std::vector<std::string> decoded;
 
   void log(LogLevel level, std::string_view message) override {
     if (level == LogLevel::Warning) warnings.emplace_back(message);
   }
-  std::filesystem::path resolve(std::string_view asset) const override { return asset; }
+  std::filesystem::path resolve(std::string_view asset) const override {
+    return find ? find(asset) : std::filesystem::path(asset);
+  }
   std::vector<std::filesystem::path> list_assets(std::string_view,
                                                  std::span<const std::string>) const override {
     return {};

@@ -77,18 +77,58 @@ bool is_file_relative(std::string_view asset) {
 
 }  // namespace
 
+std::vector<std::string> tile_names(const std::string& identifier) {
+  constexpr std::string_view kMark = "<UDIM>";
+  constexpr int kFirstTile = 1001;
+  constexpr int kTiles = 100;
+  const std::size_t mark = identifier.find(kMark);
+  if (mark == std::string::npos) return {identifier};
+  std::vector<std::string> names;
+  for (int i = 0; i < kTiles; ++i) {
+    names.push_back(identifier);
+    names.back().replace(mark, kMark.size(), std::to_string(kFirstTile + i));
+  }
+  return names;
+}
+
 std::string AssetLibrary::anchor(std::string_view asset, const std::string& anchor_layer) const {
-  asset = asset.substr(0, asset.find(":SDF_FORMAT_ARGS:"));
-  if (asset.empty()) return {};
-  const std::string text(asset);
-  if (asset.find("://") != std::string_view::npos) return text;
+  const std::string text(asset.substr(0, asset.find(":SDF_FORMAT_ARGS:")));
+  if (text.empty()) return {};
   const auto [outer, inside] = split_outer(text);
   if (!inside.empty()) return join_package(anchor(outer, anchor_layer), inside);
 
+  const std::string anchored = anchor_to_layer(text, anchor_layer);
+  if (!look_up_ || is_file_relative(text)) return anchored;
+  const auto [entry, is_new] = looked_up_.try_emplace(anchored);
+  if (!is_new) return entry->second.file.empty() ? anchored : entry->second.file;
+  const std::vector<std::string> own = tile_names(anchored);
+  const std::vector<std::string> elsewhere = tile_names(text);
+  const auto is_there = [&](const std::string& name) { return exists(name); };
+  if (std::any_of(own.begin(), own.end(), is_there)) return anchored;
+  for (std::size_t i = 0; i < elsewhere.size() && entry->second.file.empty(); ++i) {
+    entry->second = look_up_(elsewhere[i]);
+  }
+  std::string& file = entry->second.file;
+  if (file.empty()) return anchored;
+  // A set of tiles is beside the tile that was found.
+  if (elsewhere.size() > 1) file = beside(file, text.substr(text.rfind('/') + 1));
+  return file;
+}
+
+std::string AssetLibrary::missing_text(const std::string& identifier) const {
+  const std::string text = "could not be found";
+  const auto known = looked_up_.find(identifier);
+  if (known == looked_up_.end() || known->second.why_not.empty()) return text;
+  return text + ": " + known->second.why_not;
+}
+
+std::string AssetLibrary::anchor_to_layer(const std::string& text,
+                                          const std::string& anchor_layer) const {
+  if (text.find("://") != std::string::npos) return text;
   const auto [package, member] = split_inner(anchor_layer);
   if (member.empty() || text.starts_with('/')) return beside(anchor_layer, text);
   const std::string anchored = join_package(package, beside(member, text));
-  if (is_file_relative(asset) || exists(anchored)) return anchored;
+  if (is_file_relative(text) || exists(anchored)) return anchored;
   // A bare path is looked for at the top of the package as well.
   const std::string at_top = join_package(package, normalize(text));
   if (exists(at_top)) return at_top;

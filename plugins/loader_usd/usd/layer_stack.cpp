@@ -41,10 +41,21 @@ void Diagnostics::warn(const std::string& text) {
   if (known_.insert(text).second) warnings_.push_back(text);
 }
 
-void Diagnostics::missing(const std::string& text) {
+void Diagnostics::missing(const std::string& asset, const std::string& text) {
   if (!known_.insert(text).second) return;
-  warnings_.push_back(text);
-  missing_.push_back(text);
+  const auto [entry, is_new] =
+      by_asset_.try_emplace(asset, Missing{warnings_.size(), missing_.size(), text});
+  if (is_new) {
+    warnings_.push_back(text);
+    missing_.push_back(text);
+    return;
+  }
+  Missing& known = entry->second;
+  ++known.others;
+  const std::string all = known.text + " (and " + std::to_string(known.others) + " more " +
+                          (known.others == 1 ? "reference" : "references") + " to it)";
+  warnings_[known.warning] = all;
+  missing_[known.place] = all;
 }
 
 bool LayerStack::has_prim(std::string_view path) const {
@@ -113,14 +124,14 @@ void LayerStacks::add_layer(LayerStack& stack, std::shared_ptr<const Layer> laye
     std::shared_ptr<const Layer> sublayer;
     try {
       if (!assets_.exists(identifier)) {
-        diagnostics_.missing(layer->identifier() + ": sublayer @" + assets[i] +
-                             "@ could not be found");
+        diagnostics_.missing(identifier, layer->identifier() + ": sublayer @" + assets[i] + "@ " +
+                                             assets_.missing_text(identifier));
         continue;
       }
       sublayer = assets_.open(identifier);
     } catch (const FormatError& error) {
-      diagnostics_.missing(layer->identifier() + ": sublayer @" + assets[i] +
-                           "@ could not be read: " + error.what());
+      diagnostics_.missing(identifier, layer->identifier() + ": sublayer @" + assets[i] +
+                                           "@ could not be read: " + error.what());
       continue;
     }
     if (std::find(chain.begin(), chain.end(), sublayer->identifier()) != chain.end()) {

@@ -17,8 +17,9 @@ namespace diorama::usd {
 class Diagnostics {
  public:
   void warn(const std::string& text);
-  /// The same for an asset that cannot be found or read.
-  void missing(const std::string& text);
+  /// The same for an asset that cannot be found or read: what names it first is told, and how many
+  /// others do.
+  void missing(const std::string& asset, const std::string& text);
   const std::vector<std::string>& warnings() const { return warnings_; }
   /// The warnings that are about missing assets.
   const std::vector<std::string>& missing_assets() const { return missing_; }
@@ -27,6 +28,13 @@ class Diagnostics {
   std::vector<std::string> warnings_;
   std::vector<std::string> missing_;
   std::set<std::string> known_;
+  struct Missing {
+    std::size_t warning = 0;  ///< Index.
+    std::size_t place = 0;    ///< Among missing_.
+    std::string text;
+    int others = 0;
+  };
+  std::map<std::string, Missing> by_asset_;
 };
 
 /// A layer and its sublayers, strongest first.

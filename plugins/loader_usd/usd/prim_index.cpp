@@ -670,12 +670,14 @@ void PrimIndexer::Builder::eval_references(int i, Arc arc) {
       if (reference.asset.empty()) continue;
       try {
         if (!stacks_.assets().exists(reference.asset)) {
-          stacks_.diagnostics().missing(where + " could not be found");
+          stacks_.diagnostics().missing(
+              reference.asset, where + " " + stacks_.assets().missing_text(reference.asset));
           continue;
         }
         target_stack = &stacks_.open(reference.asset, stack.expression_variables);
       } catch (const FormatError& error) {
-        stacks_.diagnostics().missing(where + " could not be read: " + error.what());
+        stacks_.diagnostics().missing(reference.asset,
+                                      where + " could not be read: " + error.what());
         continue;
       }
       offset.scale *= time_codes_per_second(*source) / target_stack->time_codes_per_second;
@@ -980,6 +982,11 @@ std::optional<std::string> PrimIndexer::Builder::find_selection(int i,
     frames.emplace_back(frame, builder);
     builder = outer;
     path = *in_root;
+  }
+  const auto& selections = indexer_.selections_;
+  const bool is_in_stage = start == 0 && !builder->frame_;
+  if (is_in_stage && !selections.empty() && path::is_root_prim(path)) {
+    if (const auto own = selections.find(set); own != selections.end()) return own->second;
   }
   return builder->search_selection(start, path, set, frames);
 }

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "layer_stack.h"
@@ -53,7 +55,10 @@ class PrimIndex {
 /// relocates, references, payloads, specializes). Problems go to the diagnostics.
 class PrimIndexer {
  public:
-  PrimIndexer(LayerStacks& stacks, const LayerStack& root) : stacks_(stacks), root_(root) {}
+  /// `selections`, variant by set, are stronger than what layers say of root prims.
+  PrimIndexer(LayerStacks& stacks, const LayerStack& root,
+              std::map<std::string, std::string> selections = {})
+      : stacks_(stacks), root_(root), selections_(std::move(selections)) {}
 
   /// The index of the pseudo-root.
   PrimIndex root_index() const;
@@ -66,6 +71,7 @@ class PrimIndexer {
 
   LayerStacks& stacks_;
   const LayerStack& root_;
+  std::map<std::string, std::string> selections_;
 };
 
 /// Names of the composed children, in composed order.

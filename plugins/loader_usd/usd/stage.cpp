@@ -34,13 +34,15 @@ void collect_opinions(Prim& prim) {
 
 }  // namespace
 
-Stage::Stage(const std::string& file, Sampling sampling, std::uint64_t most_composed_bytes)
+Stage::Stage(const std::string& file, Sampling sampling, std::uint64_t most_composed_bytes,
+             AssetLibrary::LookUp look_up, std::map<std::string, std::string> selections)
     : sampling_(sampling),
       most_composed_bytes_(most_composed_bytes),
+      assets_(std::move(look_up)),
       stacks_(assets_, diagnostics_),
       root_stack_(
           &stacks_.open(std::filesystem::absolute(file).lexically_normal().generic_string(), {})),
-      indexer_(stacks_, *root_stack_),
+      indexer_(stacks_, *root_stack_, std::move(selections)),
       clips_(std::make_unique<ValueClips>(assets_, stacks_, diagnostics_, root_stack_->root())) {
   auto root = std::make_unique<Prim>();
   root->path = "/";
@@ -72,6 +74,24 @@ std::string Stage::default_prim() {
   const std::string path =
       name.as_text()->starts_with('/') ? *name.as_text() : std::string("/").append(*name.as_text());
   return find(path) ? path : std::string();
+}
+
+std::map<std::string, std::set<std::string>> Stage::root_variants() {
+  std::map<std::string, std::set<std::string>> variants;
+  for (const Prim* prim : visible_children(root())) {
+    for (const IndexNode& node : prim->index.nodes) {
+      const std::string start = path::strip_variants(node.path) + "{";
+      for (const LayerStack::Entry& entry : node.stack->layers) {
+        for (const auto& [path, spec] : entry.layer->prims()) {
+          if (!path.starts_with(start) || !path::is_variant(path)) continue;
+          if (path::parent(path) != path::strip_variants(node.path)) continue;
+          const auto [set, name] = path::variant_selection(path);
+          if (!name.empty()) variants[std::string(set)].insert(std::string(name));
+        }
+      }
+    }
+  }
+  return variants;
 }
 
 const Prim* Stage::find(std::string_view path) {

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <unordered_map>
@@ -70,8 +72,11 @@ class Stage {
   static constexpr std::uint64_t kComposedBytes = std::uint64_t{512} << 20;
 
   /// Throws FormatError when the layer cannot be read. What its arcs cannot reach becomes warnings.
+  /// `selections` choose variants of the root prims, by set, whatever layers say.
   explicit Stage(const std::string& file, Sampling sampling = Sampling::DefaultTime,
-                 std::uint64_t most_composed_bytes = kComposedBytes);
+                 std::uint64_t most_composed_bytes = kComposedBytes,
+                 AssetLibrary::LookUp look_up = {},
+                 std::map<std::string, std::string> selections = {});
   ~Stage();
 
   const Layer& root_layer() const { return root_stack_->root(); }
@@ -86,6 +91,8 @@ class Stage {
   double meters_per_unit() const;
   /// Path of the default prim if there is such a prim; empty otherwise.
   std::string default_prim();
+  /// The variants, by set, that the root prims have.
+  std::map<std::string, std::set<std::string>> root_variants();
 
   const Prim& root() const { return *root_; }
   /// About what the prims that were composed so far take.

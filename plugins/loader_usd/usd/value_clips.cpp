@@ -210,8 +210,9 @@ std::vector<ValueClips::ClipSet> ValueClips::read_sets(const Prim& prim) {
     if (assets && assets->as_strings() && !assets->as_strings()->empty()) {
       read_explicit(set, fields);
     } else if (!read_template(set, fields)) {
-      diagnostics_.missing(set.layer->identifier() + ": " + where +
-                           " lead to no file, so they are not read");
+      const std::string text =
+          set.layer->identifier() + ": " + where + " lead to no file, so they are not read";
+      diagnostics_.missing(text, text);
       continue;
     }
     if (!set.asset.empty()) sets.push_back(std::move(set));
@@ -229,9 +230,9 @@ std::shared_ptr<const Layer> ValueClips::open(const std::string& identifier, con
   const std::string where = set.layer->identifier() + ": value clip @" + set.asset + "@";
   try {
     if (assets_.exists(identifier)) return assets_.open(identifier);
-    diagnostics_.missing(where + " could not be found");
+    diagnostics_.missing(identifier, where + " " + assets_.missing_text(identifier));
   } catch (const FormatError& error) {
-    diagnostics_.missing(where + " could not be read: " + error.what());
+    diagnostics_.missing(identifier, where + " could not be read: " + error.what());
   }
   return nullptr;
 }

@@ -33,7 +33,8 @@ class DIORAMA_SDK_API Loader : public Component {
   virtual std::vector<std::filesystem::path> files(std::string_view asset) const;
 
   /// Fills the empty node `root` (pose, mesh, children ...) in metres, Z up. `asset` is a path that
-  /// exists or one of its own schemes. Throws Error(Asset) that begins with the asset's name; what
+  /// exists or one of its own schemes; the variants of a file may follow it, "mug.usd{look=red}",
+  /// for loaders that know such. Throws Error(Asset) that begins with the asset's name; what
   /// it added so far is then erased by the host. Same asset and parameters, same result.
   virtual void load(std::string_view asset, Scene& scene, NodeId root) = 0;
 };

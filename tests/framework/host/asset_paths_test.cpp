@@ -74,14 +74,54 @@ TEST_CASE("paths that do not resolve list what was tried", "[assets]") {
   CHECK(error_of([&] { paths.resolve(""); }) == "an asset has an empty name");
 }
 
-TEST_CASE("remote assets are refused with what to do", "[assets]") {
-  const AssetPaths paths(std::nullopt);
-  CHECK(error_of([&] { paths.resolve("omniverse://server/NVIDIA/Assets/sky.hdr"); }) ==
+TEST_CASE("assets of servers and of other disks are looked up below the assets root", "[assets]") {
+  const AssetFolder assets;
+  const fs::path box = assets.root / "Isaac/Props/YCB/003_box.usd";
+  const AssetPaths paths(assets.root);
+  for (const char* name :
+       {"omniverse://localhost/NVIDIA/Assets/Isaac/4.2/Isaac/Props/YCB/003_box.usd",
+        "https://content.example.com/Assets/Isaac/2023.1/Isaac/Props/YCB/003_box.usd",
+        "omniverse://server/Isaac/Props/YCB/003_box.usd", "/home/bob/Isaac/Props/YCB/003_box.usd",
+        "C:/assets/Isaac/Props/YCB/003_box.usd"}) {
+    CAPTURE(name);
+    CHECK(paths.resolve(name) == box);
+  }
+  CHECK(paths.resolve("https://host/Isaac/Props/with%20space.usd") ==
+        assets.root / "Isaac/Props/with space.usd");
+  // Other folders have other prefixes; the longest one counts, and what is not there is looked up
+  // as ever.
+  const AssetPaths mapped(assets.root, {{"omniverse://nucleus/", "/nowhere"},
+                                        {"omniverse://nucleus/Lib/", "Isaac/Props"},
+                                        {"/mnt/lib", "/Isaac/Props/YCB/"}});
+  CHECK(mapped.resolve("omniverse://nucleus/Lib/YCB/003_box.usd") == box);
+  CHECK(mapped.resolve("omniverse://nucleus/Lib/with%20space.usd") ==
+        assets.root / "Isaac/Props/with space.usd");
+  CHECK(mapped.resolve("/mnt/lib/003_box.usd") == box);
+  CHECK(mapped.resolve("omniverse://nucleus/Isaac/Props/YCB/003_box.usd") == box);
+  // A file that is where it says needs no table.
+  CHECK(AssetPaths(assets.root, {{"/", "/nowhere"}}).resolve(box.string()) == box);
+}
+
+TEST_CASE("remote assets that are nowhere are refused with what to do", "[assets]") {
+  CHECK(error_of([&] {
+          AssetPaths(std::nullopt).resolve("omniverse://server/NVIDIA/Assets/sky.hdr");
+        }) ==
         "omniverse://server/NVIDIA/Assets/sky.hdr: remote assets are not fetched; copy the file "
         "below the assets root (--assets-root, DIORAMA_ASSETS_ROOT) and name it "
         "'/NVIDIA/Assets/sky.hdr'");
-  CHECK(error_of([&] { paths.resolve("https://host"); }).find("name it '/...'") !=
-        std::string::npos);
+  const AssetFolder assets;
+  CHECK(error_of([&] {
+          AssetPaths(assets.root).resolve("https://host/Assets/Isaac/4.2/Isaac/gone.usd");
+        }) ==
+        "https://host/Assets/Isaac/4.2/Isaac/gone.usd: remote assets are not fetched; copy the "
+        "file below the assets root (--assets-root, DIORAMA_ASSETS_ROOT) and name it "
+        "'/Isaac/gone.usd'; tried " +
+            (assets.root / "Assets/Isaac/4.2/Isaac/gone.usd").string() + " and " +
+            (assets.root / "Isaac/4.2/Isaac/gone.usd").string() + " and " +
+            (assets.root / "Isaac/gone.usd").string());
+  CHECK(error_of([&] {
+          AssetPaths(std::nullopt).resolve("https://host");
+        }).find("name it '/...'") != std::string::npos);
 }
 
 TEST_CASE("folders are listed sorted, filtered and without loops", "[assets]") {
@@ -118,6 +158,18 @@ TEST_CASE("the assets root is the first one that is given", "[assets]") {
         "/nowhere: the assets root (--assets-root) is no folder that exists");
   CHECK(error_of([&] { choose_assets_root(std::nullopt, "/nowhere", a, a); }) ==
         "/nowhere: the assets root (DIORAMA_ASSETS_ROOT) is no folder that exists");
+}
+
+TEST_CASE("variants are told from names", "[assets]") {
+  using Parts = std::pair<std::string_view, std::string_view>;
+  CHECK(split_variants("/a/mug.usd{look=red}{size=big}") ==
+        Parts{"/a/mug.usd", "{look=red}{size=big}"});
+  CHECK(split_variants("mug.usd") == Parts{"mug.usd", ""});
+  CHECK(split_variants("/a{b}/mug.usd") == Parts{"/a{b}/mug.usd", ""});
+  const AssetFolder assets;
+  const std::string odd = (assets.root / "mug{look=red}").string();
+  std::ofstream(odd) << "x";
+  CHECK(split_variants(odd) == Parts{odd, ""});
 }
 
 TEST_CASE("schemes are told from paths", "[assets]") {

@@ -43,6 +43,35 @@ std::vector<std::string> choices(const CapturePlan& plan, std::size_t group) {
 
 }  // namespace
 
+TEST_CASE("Each object has a variant of each set, the same in every shard", "[plan]") {
+  const std::string variants =
+      "variants: {lookVariant: [red, green, blue], size: [big, small], fixed: plain}, ";
+  const std::string text =
+      with(good_job(), "name: targets,", "name: targets, pick: per_visit, " + variants);
+  const Job job = job_from(text);
+  const std::vector<std::vector<std::string>> assets{{"/a/01_mug.usd", "/a/02_cup.usdz"},
+                                                     {"shape:cube"}};
+  std::map<std::string, int> count;
+  for (int visit = 0; visit < 20; ++visit) {
+    const auto objects = plan_objects(job, assets, visit);
+    const auto plain = plan_objects(
+        job_from(with(good_job(), "name: targets,", "name: targets, pick: per_visit,")), assets,
+        visit);
+    for (std::size_t i = 0; i < objects.size(); ++i) {
+      // All else stays as it is without variants.
+      CHECK(objects[i].name == plain[i].name);
+      CHECK(objects[i].asset.starts_with(plain[i].asset));
+      if (i < 20) ++count[objects[i].asset.substr(plain[i].asset.size())];
+    }
+    CHECK(objects[3].asset == plan_objects(job, assets, visit)[3].asset);
+  }
+  CHECK(count.size() == 6);
+  for (const auto& [suffix, times] : count) {
+    CHECK(suffix.ends_with("{fixed=plain}"));
+    CHECK(std::abs(times - 400 / 6) < 34);  // binomial, four standard deviations
+  }
+}
+
 TEST_CASE("Environments are cycled until all captures are planned", "[plan]") {
   const CapturePlan plan = plan_of(job_from(good_job()));
   REQUIRE(plan.visit_count() == 3);

@@ -10,6 +10,7 @@
 #include "material_folder.h"
 #include "random_material.h"
 #include "random_texture.h"
+#include "random_variant.h"
 #include "support/catch.h"
 #include "support/temporary_folder.h"
 
@@ -207,6 +208,67 @@ TEST_CASE("a mesh without uv gets some by box mapping, in metres, whatever its s
   const auto own = plain.scene[plain.node].mesh;
   materials.randomize(plain.scene, {}, Rng(1));
   CHECK(plain.scene[plain.node].mesh == own);
+}
+
+TEST_CASE("objects get the looks of a variant of their asset", "[randomizers]") {
+  FakeHost host;
+  const auto body = std::make_shared<const Mesh>(make_box(Vec3(1, 2, 3)));
+  const auto lid = std::make_shared<const Mesh>(make_box(Vec3(1, 2, 0.5)));
+  const auto add = [&](const std::string& look, bool has_lid) {
+    auto material = std::make_shared<Material>();
+    material->name = look;
+    host.assets["mug.usd{look=" + look + "}"] = [=](Scene& scene, NodeId root) {
+      const NodeId part = scene.create(root, "Body");
+      scene.edit(part).mesh = body;
+      scene.edit(part).materials = {material};
+      if (has_lid) scene.edit(scene.create(root, "Lid")).mesh = lid;
+    };
+  };
+  add("red", true);
+  add("blue", true);
+  add("open", false);
+  Scene scene;
+  const NodeId assets = scene.create(scene.root(), "Assets");
+  for (const char* name : {"falling_mug", "falling_mug_01"}) {
+    host.load_asset("mug.usd{look=red}", scene, scene.create(assets, name));
+  }
+  RandomVariant::Params params;
+  params.asset = "mug.usd";
+  Value list = Value::make_list();
+  for (const char* look : {"red", "blue", "open"}) list.list.push_back(Value::text(look));
+  params.variants = Value::make_map();
+  params.variants.set("look", list);
+  RandomVariant variants(params, host);
+  std::map<std::string, int> count;
+  bool differs = false;
+  for (int seed = 0; seed < 60; ++seed) {
+    variants.randomize(scene, {}, Rng(std::uint64_t(seed)));
+    const Node& part = scene[scene.require("/Assets/falling_mug/loaded/Body")];
+    const NodeId top = scene.require("/Assets/falling_mug/loaded/Lid");
+    const std::string look = part.materials.at(0)->name;
+    ++count[look];
+    CHECK(part.mesh == body);
+    CHECK(scene.is_visible(top) == (look != "open"));
+    const Node& other = scene[scene.require("/Assets/falling_mug_01/loaded/Body")];
+    differs |= other.materials.at(0)->name != look;
+  }
+  CHECK(count.size() == 3);
+  CHECK(differs);
+  // What is as it should be is not touched.
+  variants.randomize(scene, {}, Rng(1));
+  const std::uint64_t revision = scene.shape_revision();
+  variants.randomize(scene, {}, Rng(1));
+  CHECK(scene.shape_revision() == revision);
+
+  Scene bare;
+  host.load_asset("mug.usd{look=open}", bare, bare.create(bare.create(bare.root(), "Assets"), "mug"));
+  list.list = {Value::text("red")};
+  params.variants.set("look", list);
+  CHECK_THROWS_WITH(RandomVariant(params, host).randomize(bare, {}, Rng(1)),
+                    ContainsSubstring("/Assets/mug: has no part 'loaded/Lid' as mug.usd{look=red} has"));
+  params.variants = Value::text("red");
+  CHECK_THROWS_WITH(RandomVariant(params, host),
+                    ContainsSubstring("expected lists by set: {lookVariant: [red, blue]}"));
 }
 
 TEST_CASE("random textures lie on meshes without uv, too", "[randomizers]") {
