@@ -18,9 +18,9 @@
 #include "framework/config/yaml_config.h"
 #include "framework/host/progress_bar.h"
 #include "framework/host/progress_lines.h"
+#include "framework/pipeline/camera_rig.h"
 #include "framework/pipeline/capture_memory.h"
 #include "framework/pipeline/dataset_description.h"
-#include "framework/pipeline/scene_setup.h"
 #include "framework/plugins/plugin_search.h"
 
 namespace diorama {
@@ -116,8 +116,8 @@ RunSummary run_job(JobAssembly& assembly, HostServices& host, const RunCommandOp
 CaptureMemory memory_of(const JobAssembly& assembly) {
   const JobComponents& parts = assembly.components;
   std::vector<Camera> cameras;
-  for (const CameraGroup& group : assembly.job.cameras) {
-    cameras.insert(cameras.end(), std::size_t(group.count), camera_of(group));
+  for (const PlannedCamera& planned : planned_cameras(assembly.job.cameras)) {
+    cameras.push_back(planned.camera);
   }
   NameSet channels = parts.demand.channels;
   for (const auto& named : parts.annotators) channels.merge(named.annotator->provides());

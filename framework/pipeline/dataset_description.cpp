@@ -10,6 +10,7 @@
 #include "diorama/error.h"
 #include "framework/config/clean_text.h"
 #include "framework/config/value_text.h"
+#include "framework/pipeline/camera_rig.h"
 #include "framework/pipeline/sha256.h"
 #include "framework/pipeline/view_report.h"
 
@@ -219,6 +220,20 @@ void add_writers(std::string& text, const Job& job) {
   }
 }
 
+Json rigs_json(const Job& job) {
+  Json rigs = Json::object();
+  for (const PlannedCamera& camera : planned_cameras(job.cameras)) {
+    if (camera.rig.empty()) continue;
+    Json rows = Json::array();
+    const Mat4 matrix = camera.rig_from_camera.matrix();
+    for (int row = 0; row < 4; ++row) {
+      rows.push_back({matrix(row, 0), matrix(row, 1), matrix(row, 2), matrix(row, 3)});
+    }
+    rigs[camera.rig].push_back({{"camera", camera.name}, {"rig_from_camera", std::move(rows)}});
+  }
+  return rigs;
+}
+
 }  // namespace
 
 DatasetInfo describe_dataset(const Job& job, const CapturePlan& plan, std::string resolved,
@@ -252,6 +267,7 @@ std::string dataset_json(const DatasetInfo& info, const Job& job) {
   json["seed"] = info.seed;
   json["captures"] = info.capture_count;
   json["cameras"] = info.camera_names;
+  if (const Json rigs = rigs_json(job); !rigs.empty()) json["rigs"] = rigs;
   json["labels"] = Json::array();
   for (const Labels& labels : info.labels) {
     Json entry = Json::object();

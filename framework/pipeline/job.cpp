@@ -9,6 +9,7 @@
 #include <set>
 
 #include "framework/config/clean_text.h"
+#include "framework/pipeline/camera_rig.h"
 #include "framework/pipeline/job_keys.h"
 #include "framework/pipeline/label_pattern.h"
 
@@ -262,6 +263,40 @@ void check_camera(const CameraGroup& group, const Value& map, const std::string&
   }
 }
 
+void check_rig(const CameraGroup& group, const Value& map, const std::string& path,
+               Complaints& complaints) {
+  std::set<std::string> names;
+  for (std::size_t i = 0; i < group.rig.size(); ++i) {
+    const RigMember& member = group.rig[i];
+    const Value& item = map.find("rig")->list[i];
+    const std::string item_path = path + ".rig[" + std::to_string(i) + "]";
+    if (member.name.empty()) {
+      complaints.add(item.place, item_path + ".name: is empty, expected one such as 'left'");
+      continue;
+    }
+    check_node_name(member.name, item, item_path, complaints);
+    if (!names.insert(member.name).second) {
+      complaints.add(place_of(item, "name"),
+                     item_path + ": another camera of the rig is called '" + member.name + "'");
+    }
+  }
+}
+
+void check_camera_names(const Value& value, const Job& job, Complaints& complaints) {
+  std::set<std::string> names;
+  for (const PlannedCamera& camera : planned_cameras(job.cameras)) {
+    for (const std::string& name : {camera.rig, camera.name}) {
+      if (name.empty() || (name == camera.rig && names.contains(name + "/"))) continue;
+      if (!names.insert(name).second) {
+        complaints.add(value.find("cameras")->place,
+                       "cameras: two would be called '" + name + "'; give one another 'name'");
+        return;
+      }
+      if (name == camera.rig) names.insert(name + "/");
+    }
+  }
+}
+
 void read_cameras(const Value& value, Job& job, Complaints& complaints) {
   std::set<std::string> names;
   for (auto& [path, map] : entries(value, "cameras", complaints)) {
@@ -270,12 +305,14 @@ void read_cameras(const Value& value, Job& job, Complaints& complaints) {
     read_all_keys(map, path, group, complaints);
     check_node_name(group.name, map, path, complaints);
     check_camera(group, map, path, complaints);
+    check_rig(group, map, path, complaints);
     if (!names.insert(group.name).second) {
       complaints.add(place_of(map, "name"), path + ": another camera is called '" + group.name +
                                                 "'; give this one a 'name' of its own");
     }
     job.cameras.push_back(std::move(group));
   }
+  check_camera_names(value, job, complaints);
 }
 
 std::string quoted_list(const std::vector<std::string>& names) {
@@ -592,10 +629,30 @@ void LightGroup::visit(ParamVisitor& v) {
   v.param("rotation_deg", rotation_deg, {"Turns about x, then y, then z.", "deg"});
 }
 
+void RigMember::visit(ParamVisitor& v) {
+  v.param("name", name, {"Its node is /Cameras/RIG_0/RIG_0_NAME and so on."});
+  v.param("position", position,
+          {"Place in the rig's space: x right, y up, z back, as a camera sees it.", "m"});
+  v.param("rotation_deg", rotation_deg,
+          {"Turn about the rig's x, then y, then z axis; none: it looks along -z.", "deg"});
+  v.param(
+      "count", count,
+      {"So many, evenly round the rig's y axis, each turned with its place: a ring.", "", 1, 360});
+  v.param("width", width_px, {"Image width; null: the entry's.", "px", 1, 16384});
+  v.param("height", height_px, {"Image height; null: the entry's.", "px", 1, 16384});
+  v.param("focal_length_mm", focal_length_mm, {"Focal length; null: the entry's.", "mm", 0.01});
+  v.param("horizontal_aperture_mm", horizontal_aperture_mm,
+          {"Width of the sensor; null: the entry's.", "mm", 0.01});
+  v.param("fx_px", fx_px, {"Focal length in pixels along x; null: the entry's.", "px", 0});
+  v.param("fy_px", fy_px, {"Focal length in pixels along y; null: the entry's.", "px", 0});
+  v.param("cx_px", cx_px, {"Principal point from the left edge; null: the entry's.", "px"});
+  v.param("cy_px", cy_px, {"Principal point from the upper edge; null: the entry's.", "px"});
+}
+
 void CameraGroup::visit(ParamVisitor& v) {
   v.choice("type", type, kCameraWords, {"Lens model."});
   v.param("name", name, {"Nodes are /Cameras/NAME_0 and so on. Default: cam."});
-  v.param("count", count, {"How many cameras.", "", 0, 1e4});
+  v.param("count", count, {"How many cameras, or rigs.", "", 0, 1e4});
   v.param("width", width, {"Image width.", "px", 1, 16384});
   v.param("height", height, {"Image height.", "px", 1, 16384});
   v.param("focal_length_mm", focal_length_mm, {"Focal length.", "mm", 0.01});
@@ -619,6 +676,9 @@ void CameraGroup::visit(ParamVisitor& v) {
           {"From the first row to the last of a rolling shutter; 0: all at once.", "s", 0, 10});
   v.param("position", position, {"World position until a randomizer moves it.", "m"});
   v.param("look_at", look_at, {"World point that it looks at.", "m"});
+  v.list("rig", rig,
+         {"Cameras that move as one: stereo pairs, colour and depth, rings. /Cameras/NAME_0 is the "
+          "rig then, which randomizers place, and these are below it; without: one camera."});
 }
 
 void RandomizerEntry::visit(ParamVisitor& v) {
@@ -670,9 +730,7 @@ std::vector<std::string> Job::series() const {
 
 std::vector<std::string> Job::camera_names() const {
   std::vector<std::string> names;
-  for (const CameraGroup& group : cameras) {
-    for (int i = 0; i < group.count; ++i) names.push_back(group.name + "_" + std::to_string(i));
-  }
+  for (const PlannedCamera& camera : planned_cameras(cameras)) names.push_back(camera.name);
   return names;
 }
 

@@ -82,6 +82,23 @@ struct LightGroup {
   void visit(ParamVisitor& v);
 };
 
+/// A camera (or a ring of them) at a fixed place of a rig.
+struct RigMember {
+  std::string name;
+  Vec3 position{0.0, 0.0, 0.0};
+  Vec3 rotation_deg{0.0, 0.0, 0.0};
+  int count = 1;
+  std::optional<double> width_px;
+  std::optional<double> height_px;
+  std::optional<double> focal_length_mm;
+  std::optional<double> horizontal_aperture_mm;
+  std::optional<double> fx_px;
+  std::optional<double> fy_px;
+  std::optional<double> cx_px;
+  std::optional<double> cy_px;
+  void visit(ParamVisitor& v);
+};
+
 struct CameraGroup {
   std::string type = "pinhole";
   std::string name;
@@ -105,6 +122,7 @@ struct CameraGroup {
   double readout_time_s = 0.0;
   Vec3 position{0.0, 0.0, 0.0};
   Vec3 look_at{1.0, 0.0, 0.0};
+  std::vector<RigMember> rig;  ///< Empty: the camera stands alone.
   void visit(ParamVisitor& v);
 };
 
@@ -155,6 +173,7 @@ struct OutputSection {
 struct Job {
   std::uint64_t seed = 0;
   std::optional<std::string> assets_root;
+  std::vector<AssetPrefix> asset_prefixes;
   bool debug = false;
   int total_captures = 1;
   std::vector<ComponentConfig> loaders;  ///< Parameters of the loaders of files; types are unique.
@@ -173,11 +192,10 @@ struct Job {
   std::vector<ViewRule> views;
   std::vector<WriterEntry> writers;
   OutputSection output;
-  std::vector<AssetPrefix> asset_prefixes;
 
   /// Names of the capture series in timeline order, each once.
   std::vector<std::string> series() const;
-  /// "/Cameras/cam_0" ... in job order.
+  /// "cam_0", "stereo_0_left" ... in job order.
   std::vector<std::string> camera_names() const;
 };
 

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "diorama/node_pattern.h"
+#include "framework/pipeline/camera_rig.h"
 
 namespace diorama {
 namespace {
@@ -68,7 +69,11 @@ std::vector<std::string> possible_paths(const Job& job, const CapturePlan& plan)
       paths.insert("/Lights/" + group.name + "_" + std::to_string(i));
     }
   }
-  for (const std::string& name : job.camera_names()) paths.insert("/Cameras/" + name);
+  for (const PlannedCamera& camera : planned_cameras(job.cameras)) {
+    const std::string top = "/Cameras/" + (camera.rig.empty() ? camera.name : camera.rig);
+    paths.insert(top);
+    if (!camera.rig.empty()) paths.insert(top + "/" + camera.name);
+  }
   return {paths.begin(), paths.end()};
 }
 

@@ -8,6 +8,7 @@
 #include "diorama/error.h"
 #include "framework/config/clean_text.h"
 #include "framework/host/node_content.h"
+#include "framework/pipeline/camera_rig.h"
 #include "framework/pipeline/lamps.h"
 #include "framework/plugins/plugin_call.h"
 
@@ -255,38 +256,25 @@ void create_lights(const std::vector<LightGroup>& groups, Scene& scene, Host& ho
   }
 }
 
-Camera camera_of(const CameraGroup& group) {
-  Camera camera = Camera::from_lens(group.width, group.height, group.focal_length_mm,
-                                    group.horizontal_aperture_mm);
-  if (group.type == "opencv_pinhole") camera.lens = LensModel::OpencvPinhole;
-  if (group.type == "fisheye_polynomial") camera.lens = LensModel::FisheyePolynomial;
-  camera.fx = group.fx_px.value_or(camera.fx);
-  camera.fy = group.fy_px.value_or(camera.fx);
-  camera.cx = group.cx_px.value_or(camera.cx);
-  camera.cy = group.cy_px.value_or(camera.cy);
-  std::copy(group.distortion.begin(), group.distortion.end(), camera.distortion.begin());
-  std::copy(group.fisheye_polynomial.begin(), group.fisheye_polynomial.end(),
-            camera.fisheye_polynomial.begin());
-  camera.fisheye_max_angle_rad = radians(group.fisheye_max_angle_deg);
-  camera.near_m = group.near_m;
-  camera.far_m = group.far_m;
-  camera.f_stop = group.f_stop;
-  camera.focus_distance_m = group.focus_distance_m;
-  camera.exposure_time_s = group.exposure_time_s;
-  camera.readout_time_s = group.readout_time_s;
-  return camera;
-}
-
 std::vector<NodeId> create_cameras(const std::vector<CameraGroup>& groups, Scene& scene) {
   const NodeId parent = node_at(scene, "/Cameras");
   std::vector<NodeId> nodes;
   for (const CameraGroup& group : groups) {
-    const Camera camera = camera_of(group);
-    const Quat rotation = look_rotation(group.look_at - group.position);
-    for (int i = 0; i < group.count; ++i) {
-      const NodeId node = scene.create(parent, group.name + "_" + std::to_string(i));
-      scene.edit(node).camera = camera;
-      scene.set_pose(node, Transform{group.position, rotation});
+    const Transform place{group.position, look_rotation(group.look_at - group.position)};
+    NodeId rig;
+    for (const PlannedCamera& planned : planned_cameras(group)) {
+      const bool is_alone = planned.rig.empty();
+      if (!is_alone && (!rig || scene[rig].name != planned.rig)) {
+        rig = scene.create(parent, planned.rig);
+        scene.set_pose(rig, place);
+      }
+      const NodeId node = scene.create(is_alone ? parent : rig, planned.name);
+      scene.edit(node).camera = planned.camera;
+      if (is_alone) {
+        scene.set_pose(node, place);
+      } else {
+        scene.set_pose(node, planned.rig_from_camera);
+      }
       nodes.push_back(node);
     }
   }

@@ -33,13 +33,10 @@ std::vector<NodeId> spawn_objects(const std::vector<PlannedObject>& objects, con
 
 void create_lights(const std::vector<LightGroup>& groups, Scene& scene, Host& host);
 
-/// Returns the cameras in job order.
+/// Returns the cameras in job order, members of rigs below the nodes of these.
 std::vector<NodeId> create_cameras(const std::vector<CameraGroup>& groups, Scene& scene);
 
 /// A camera straight above the working area, looking down, +y of the world up in the picture.
 NodeId create_overview_camera(const Vec3& working_area_world, Scene& scene);
-
-/// The described lens in pixels.
-Camera camera_of(const CameraGroup& group);
 
 }  // namespace diorama

@@ -53,6 +53,15 @@ NodeId top_of(const Scene& scene, NodeId camera) {
   return top;
 }
 
+/// Nodes that fit the rule's pattern, and what is below them: it may name cameras or rigs.
+std::set<NodeId> nodes_of(const Scene& scene, const ViewRule& rule) {
+  std::set<NodeId> nodes;
+  for (const NodeId top : scene.match(rule.cameras)) {
+    for (const NodeId node : scene.subtree(top)) nodes.insert(node);
+  }
+  return nodes;
+}
+
 std::string limit_text(const std::map<std::string, int>& refused, int draws) {
   const auto most =
       std::max_element(refused.begin(), refused.end(),
@@ -120,8 +129,7 @@ std::map<NodeId, NodeId> create_small_cameras(const Job& job, const std::vector<
   std::set<NodeId> wanted;
   for (const ViewRule& rule : job.views) {
     if (!rule.brightness.is_set()) continue;
-    const std::vector<NodeId> nodes = scene.match(rule.cameras);
-    wanted.insert(nodes.begin(), nodes.end());
+    wanted.merge(nodes_of(scene, rule));
   }
   std::map<NodeId, NodeId> small;
   for (const NodeId camera : cameras) {
@@ -168,8 +176,7 @@ WantedView ViewSearch::wanted_view(const ViewRule& rule, std::size_t camera) {
   const Scene& scene = setting_.scene;
   std::size_t count = 0;
   std::size_t place = 0;
-  const std::vector<NodeId> nodes = scene.match(rule.cameras);
-  const std::set<NodeId> own(nodes.begin(), nodes.end());
+  const std::set<NodeId> own = nodes_of(scene, rule);
   for (std::size_t i = 0; i < setting_.cameras.size(); ++i) {
     if (!own.contains(setting_.cameras[i])) continue;
     if (i < camera) ++place;
@@ -193,8 +200,7 @@ void ViewSearch::make_groups() {
     const NodeId node = setting_.cameras[camera];
     std::vector<const ViewRule*> own;
     for (const ViewRule* rule : rules_) {
-      const std::vector<NodeId> nodes = scene.match(rule->cameras);
-      if (std::find(nodes.begin(), nodes.end(), node) != nodes.end()) own.push_back(rule);
+      if (nodes_of(scene, *rule).contains(node)) own.push_back(rule);
     }
     if (own.empty()) continue;
     const NodeId top = top_of(scene, node);

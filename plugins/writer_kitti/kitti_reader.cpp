@@ -85,6 +85,7 @@ class KittiDataset final : public StoredDataset {
         {front_ + "label_2/"}, files);
     has_depth_ = fs::is_directory(folder_ / front_ / "depth_2");
     has_calibration_ = fs::is_directory(folder_ / front_ / "calib");
+    is_stereo_ = page_ && page_->conventions.contains("image_3");
     split_of_ = read_split_lists(files, "ImageSets", {"train", "val"});
     if (page_) check_own_files(files);
     describe();
@@ -129,7 +130,7 @@ class KittiDataset final : public StoredDataset {
       }
     }
     // What has no label file is in no list, so it is looked for here.
-    for (const char* below : {"image_2", "calib", "depth_2"}) {
+    for (const char* below : {"image_2", "image_3", "calib", "depth_2"}) {
       for (const std::string& name : names_in(folder_ / front_ / below)) {
         const std::string label = front_ + "label_2/" + fs::path(name).stem().string() + ".txt";
         files.check(files.has(label), kMissing, label, "", "the file is not there",
@@ -168,6 +169,7 @@ class KittiDataset final : public StoredDataset {
   std::map<std::string, std::string> split_of_;  ///< By stem.
   bool has_depth_ = false;
   bool has_calibration_ = false;
+  bool is_stereo_ = false;
   StoredInfo info_;
   ReadLog log_;
 };
@@ -196,6 +198,7 @@ class KittiPictureReading : private FrameReading {
       sources.emplace(kColor.name, file);
     }
     if (dataset_.has_calibration_) read_calibration(sources);
+    if (dataset_.is_stereo_) check_right_picture(file);
     if (dataset_.has_depth_ && wanted_.contains(kDistanceToImagePlane.name)) read_depth(sources);
     sources.emplace(kHoldsInstances, labels_);
     if (const auto text = files_.text(labels_)) read_labels(*text);
@@ -209,6 +212,14 @@ class KittiPictureReading : private FrameReading {
       if (files_.has(file)) return file;
     }
     return {};
+  }
+
+  /// No frame: nothing but its picture is told of the camera to the right.
+  void check_right_picture(const std::string& left) {
+    std::string file = left;
+    file.replace(file.rfind("image_2"), 7, "image_3");
+    (void)files_.picture_of_size(file, frame_.camera.width, frame_.camera.height,
+                                 "the picture to its left");
   }
 
   void read_calibration(FrameSources& sources) {
@@ -225,6 +236,7 @@ class KittiPictureReading : private FrameReading {
         const std::vector<std::string> words = text_words(line);
         if (words.empty()) continue;
         ++lines;
+        if (words[0] == "P3:" && words.size() == 13) shift_ = numbers_from(words, 1)[3];
         if (words[0] != "P2:") continue;
         const auto p = numbers_from(words, 1);
         if (p.size() != 12) throw std::runtime_error("P2 has not twelve numbers");
@@ -244,20 +256,24 @@ class KittiPictureReading : private FrameReading {
       if (dataset_.page_) {
         check_own_calibration(*text, file);
         files_.check(lines >= 7 && text->ends_with('\n'), kReadable, file, "", "is cut short");
+        files_.check(!dataset_.is_stereo_ || shift_ < 0.0, kReadable, file,
+                     "P3:", "has no baseline", "a fourth number below 0");
       }
     });
   }
 
-  /// Our writer has one camera, rectified, without other sensors.
+  /// Our writer has one camera, or two side by side, rectified, without other sensors.
   void check_own_calibration(const std::string& text, const std::string& file) {
     const Camera& camera = frame_.camera;
     const std::vector<double> projection{camera.fx, 0, camera.cx, 0, 0, camera.fy,
                                          camera.cy, 0, 0,         0, 1, 0};
+    std::vector<double> right = projection;
+    if (dataset_.is_stereo_) right[3] = shift_;
     const std::vector<double> none{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     const std::vector<double> turn{1, 0, 0, 0, 1, 0, 0, 0, 1};
     const std::map<std::string, std::vector<double>> expected{
-        {"P0:", projection},      {"P1:", projection}, {"P2:", projection},
-        {"P3:", projection},      {"R0_rect:", turn},  {"Tr_velo_to_cam:", none},
+        {"P0:", projection},      {"P1:", right},     {"P2:", projection},
+        {"P3:", right},           {"R0_rect:", turn}, {"Tr_velo_to_cam:", none},
         {"Tr_imu_to_velo:", none}};
     std::set<std::string> seen;
     for (const std::string& line : text_lines(text)) {
@@ -403,6 +419,7 @@ class KittiPictureReading : private FrameReading {
   std::string stem_;
   std::string labels_;
   Vec3 offset_ = Vec3::Zero();  ///< Of camera 0 in the space of camera 2.
+  double shift_ = 0.0;          ///< Of P3: -fx x baseline.
 };
 
 StoredCapture KittiDataset::read(std::size_t i, const NameSet& wanted) const {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "diorama/error.h"
 #include "writer_support/image_files.h"
 #include "writer_support/lens_json.h"
 #include "writer_support/replicator.h"
@@ -74,13 +75,43 @@ std::string label_line(const Frame& frame, const TrainingObject& object, const s
   return word + text.data();
 }
 
-std::string calibration(const Camera& camera) {
+/// From the left camera to the right one, in metres. Pictures are rectified: rows of both show the
+/// same, and all that differs is the place along x.
+double baseline_of(const Frame& left, const Frame& right) {
+  const Camera& a = left.camera;
+  const Camera& b = right.camera;
+  const auto fail = [&](const std::string& found) {
+    throw Error(ErrorKind::Config,
+                "stereo: '" + right.camera_name + "' " + found + " '" + left.camera_name +
+                    "', expected equal pinhole cameras by twos, left before right, as in rig: "
+                    "[{name: left}, {name: right, position: [0.54, 0, 0]}]");
+  };
+  const bool has_same_lens = a.width == b.width && a.height == b.height && a.fx == b.fx &&
+                             a.fy == b.fy && a.cx == b.cx && a.cy == b.cy &&
+                             a.lens == LensModel::Pinhole && b.lens == LensModel::Pinhole;
+  if (!has_same_lens) fail("has another lens or size than");
+  const Affine left_from_right = left.world_from_camera.inverse() * right.world_from_camera;
+  const Vec3 place = left_from_right.translation();
+  const double turn = (left_from_right.linear() - Mat3::Identity()).norm();
+  const bool is_right = place.x() > 0.0 && place.tail<2>().norm() <= 1e-6 * place.norm();
+  if (turn > 1e-6 || !is_right) fail("does not stand to the right of and parallel to");
+  return place.x();
+}
+
+/// P1 and P3 are those of the camera to the right, if there is one: `baseline_m` above 0.
+std::string calibration(const Camera& camera, double baseline_m) {
   const Intrinsics k = intrinsics_of(camera);
-  std::array<char, 256> p{};
-  std::snprintf(p.data(), p.size(), "%.12e 0 %.12e 0 0 %.12e %.12e 0 0 0 1 0\n", k.fx, k.cx, k.fy,
-                k.cy);
   std::string text;
-  for (int i = 0; i < 4; ++i) text += "P" + std::to_string(i) + ": " + p.data();
+  for (int i = 0; i < 4; ++i) {
+    std::array<char, 32> shift{"0"};
+    if (i % 2 == 1 && baseline_m > 0.0) {
+      std::snprintf(shift.data(), shift.size(), "%.12e", -k.fx * baseline_m);
+    }
+    std::array<char, 256> p{};
+    std::snprintf(p.data(), p.size(), "P%d: %.12e 0 %.12e %s 0 %.12e %.12e 0 0 0 1 0\n", i, k.fx,
+                  k.cx, shift.data(), k.fy, k.cy);
+    text += p.data();
+  }
   text +=
       "R0_rect: 1 0 0 0 1 0 0 0 1\n"
       "Tr_velo_to_cam: 1 0 0 0 0 1 0 0 0 0 1 0\n"
@@ -101,11 +132,27 @@ Image<std::uint32_t> depth_picture(const Image<float>& depth) {
   return picture;
 }
 
+/// Every second camera.
+std::vector<std::string> left_cameras(const DatasetInfo& dataset) {
+  if (dataset.camera_names.size() % 2 != 0) {
+    throw Error(ErrorKind::Config,
+                "stereo: takes cameras by twos, left before right; the job has " +
+                    std::to_string(dataset.camera_names.size()));
+  }
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < dataset.camera_names.size(); i += 2) {
+    names.push_back(dataset.camera_names[i]);
+  }
+  return names;
+}
+
 }  // namespace
 
 void KittiWriter::Params::visit(ParamVisitor& v) {
   training.visit(v);
   v.param("depth", depth, {"Depth pictures, 16 bit, metres x 256."});
+  v.param("stereo", stereo,
+          {"Cameras go by twos, left before right; the right one's picture is image_3."});
   v.param("bbox_height_threshold", bbox_height_threshold,
           {"Objects whose 2-D box is lower are left out.", "px", 0});
   v.param("fully_visible_threshold", fully_visible_threshold,
@@ -158,7 +205,9 @@ std::string KittiWriter::stem(int capture, int camera) const {
   return padded(capture * training_.camera_count() + camera, padding_);
 }
 
-void KittiWriter::begin(const DatasetInfo& dataset, DatasetFiles& files) {
+void KittiWriter::begin(const DatasetInfo& all, DatasetFiles& files) {
+  DatasetInfo dataset = all;
+  if (params_.stereo) dataset.camera_names = left_cameras(all);
   training_.begin(dataset);
   padding_ = grown_padding(6, dataset.capture_count * training_.camera_count());
   std::string train, val, both;
@@ -172,21 +221,31 @@ void KittiWriter::begin(const DatasetInfo& dataset, DatasetFiles& files) {
   files.add_text("ImageSets/train.txt", train);
   files.add_text("ImageSets/val.txt", val);
   files.add_text("ImageSets/trainval.txt", both);
-  training_.add_dataset_page(
-      "KITTI",
-      {{"camera_axes", "x right, y down, z forward"},
-       {"rotations", "rotation_y about the camera's y axis, radians; there are no quaternions"},
-       {"dimensions", "height, width, length in metres; length along the object's x axis"},
-       {"location", "middle of the bottom face in the camera's space"},
-       {"number", "capture x cameras + camera"},
-       {"depth", "along the viewing axis, metres x 256 in 16 bit, 0: nothing"}},
-      dataset, files);
+  nlohmann::ordered_json conventions{
+      {"camera_axes", "x right, y down, z forward"},
+      {"rotations", "rotation_y about the camera's y axis, radians; there are no quaternions"},
+      {"dimensions", "height, width, length in metres; length along the object's x axis"},
+      {"location", "middle of the bottom face in the camera's space"},
+      {"number", "capture x cameras + camera"},
+      {"depth", "along the viewing axis, metres x 256 in 16 bit, 0: nothing"}};
+  if (params_.stereo) {
+    conventions["image_3"] = "the camera to the right; P1 and P3 hold -fx x baseline in metres";
+  }
+  training_.add_dataset_page("KITTI", std::move(conventions), dataset, files);
 }
 
 void KittiWriter::write(const Capture& capture, CaptureFiles& files) const {
-  for (std::size_t camera = 0; camera < capture.frames.size(); ++camera) {
-    const Frame& frame = capture.frames[camera];
-    const std::string name = stem(capture.index, int(camera));
+  const std::size_t step = params_.stereo ? 2 : 1;
+  for (std::size_t i = 0; i + step <= capture.frames.size(); i += step) {
+    const Frame& frame = capture.frames[i];
+    const std::string name = stem(capture.index, int(i / step));
+    double baseline_m = 0.0;
+    if (params_.stereo) {
+      const Frame& right = capture.frames[i + 1];
+      baseline_m = baseline_of(frame, right);
+      files.add("training/image_3/" + name + "." + training_.image_format(),
+                training_.image_file(host_, right));
+    }
     files.add("training/image_2/" + name + "." + training_.image_format(),
               training_.image_file(host_, frame));
     std::string labels;
@@ -196,7 +255,7 @@ void KittiWriter::write(const Capture& capture, CaptureFiles& files) const {
           label_line(frame, object, training_.classes()[std::size_t(object.class_index)], params_);
     }
     files.add_text("training/label_2/" + name + ".txt", labels);
-    files.add_text("training/calib/" + name + ".txt", calibration(frame.camera));
+    files.add_text("training/calib/" + name + ".txt", calibration(frame.camera, baseline_m));
     if (params_.depth) {
       const std::string path = "training/depth_2/" + name + ".png";
       files.add(path, png_file(host_, depth_picture(frame.get(kDistanceToImagePlane)), path));

@@ -17,8 +17,11 @@ namespace diorama {
 ///
 ///     dataset.json ImageSets/{train,val,trainval}.txt
 ///     training/image_2/000024.png  label_2/000024.txt  calib/000024.txt  depth_2/000024.png
+///              image_3/000024.png
 ///
-/// Cameras take turns: number = capture x cameras + camera. Boxes are upright in the camera's own
+/// Cameras take turns: number = capture x cameras + camera. With `stereo` they go by twos, left
+/// before right: the right one's picture is image_3, its projection P3 (and P1) with the baseline,
+/// and all else is the left one's. Boxes are upright in the camera's own
 /// space (x right, y down, z forward): turned about y by the object's heading and wide enough to
 /// hold its box; `location` is the middle of the bottom face. Depth is 16 bit, metres x 256, 0
 /// where nothing is or beyond 255.99 m. KITTI's pictures are rectified: for another lens than a
@@ -32,6 +35,7 @@ class KittiWriter final : public Writer {
   struct Params {
     TrainingParams training;
     bool depth = true;
+    bool stereo = false;
     int bbox_height_threshold = 0;
     double fully_visible_threshold = 0.95;
     double partly_occluded_threshold = 0.5;
@@ -50,7 +54,7 @@ class KittiWriter final : public Writer {
   KittiWriter(Params params, Host& host);
 
   NameSet needs() const override;
-  void begin(const DatasetInfo& dataset, DatasetFiles& files) override;
+  void begin(const DatasetInfo& all, DatasetFiles& files) override;
   void write(const Capture& capture, CaptureFiles& files) const override;
 
  private:

@@ -60,6 +60,32 @@ TEST_CASE("Mistakes that make a job pointless are named", "[job]") {
                         "total_captures: 7 can never be reached"));
   CHECK_THAT(complaints_about(with(good, "name: cam, count: 2", "name: cam, count: 0")),
              ContainsSubstring("cameras: there are none"));
+  const auto about_variants = [](const std::string& variants) {
+    return complaints_about(
+        with(good_job(), "name: targets,", "name: targets, variants: " + variants + ","));
+  };
+  CHECK(about_variants("{lookVariant: [red, blue]}").empty());
+  CHECK_THAT(about_variants("[red]"),
+             ContainsSubstring("objects[0].variants: expected variants by set, {lookVariant: [red, "
+                               "blue]}, found"));
+  CHECK_THAT(about_variants("{look: []}"),
+             ContainsSubstring("objects[0].variants.look: the list is empty"));
+  CHECK_THAT(about_variants("{look: ['a}']}"),
+             ContainsSubstring("objects[0].variants.look: expected the name of a variant, found"));
+  const std::string plain = "{type: pinhole, name: cam, count: 2, width: 64, height: 48}";
+  CHECK_THAT(
+      complaints_about(with(good_job(), plain, "{type: pinhole, rig: [{name: a}, {name: a}]}")),
+      ContainsSubstring("cameras[0].rig[1]: another camera of the rig is called 'a'"));
+  CHECK_THAT(
+      complaints_about(with(good_job(), plain, "{type: pinhole, rig: [{position: [1, 0, 0]}]}")),
+      ContainsSubstring("cameras[0].rig[0].name: is empty, expected one such as 'left'"));
+  CHECK_THAT(complaints_about(with(
+                 good_job(), plain,
+                 "{type: pinhole, name: a, rig: [{name: b_0}]}, {type: pinhole, name: a_0_b}")),
+             ContainsSubstring("cameras: two would be called 'a_0_b_0'"));
+  CHECK_THAT(complaints_about(
+                 with(good_job(), plain, "{type: pinhole, rig: [{name: a, postion: [1, 0, 0]}]}")),
+             ContainsSubstring("did you mean 'position'?"));
   CHECK_THAT(
       complaints_about(with(good, "on: [floating, dropped]", "on: [floting]")),
       ContainsSubstring("randomizers[1].on: unknown moment 'floting'; did you mean 'floating'?"));

@@ -260,6 +260,57 @@ TEST_CASE("Lamps of the environment are dimmed to a limit, each by itself", "[en
   CHECK(room.host.warnings.empty());
 }
 
+TEST_CASE("The cameras of a rig keep their places in it wherever it goes", "[spawn]") {
+  const Job job = job_from(
+      with(good_job(), "cameras: [{type: pinhole, name: cam, count: 2, width: 64, height: 48}]",
+           R"(cameras:
+  - type: pinhole
+    name: head
+    count: 2
+    width: 64
+    height: 48
+    position: [1, 2, 3]
+    look_at: [1, 5, 3]
+    rig:
+      - {name: left, position: [-0.06, 0, 0]}
+      - {name: depth, position: [0.03, 0.02, 0], rotation_deg: [0, -90, 0], width: 32, fx_px: 40}
+      - {name: ring, position: [0, 0, -0.5], count: 4})"));
+  Scene scene;
+  const std::vector<NodeId> cameras = create_cameras(job.cameras, scene);
+  std::vector<std::string> paths;
+  for (const NodeId camera : cameras) paths.push_back(scene.path(camera));
+  REQUIRE(paths.size() == 12);
+  CHECK(paths[0] == "/Cameras/head_0/head_0_left");
+  CHECK(paths[2] == "/Cameras/head_0/head_0_ring_0");
+  CHECK(paths[11] == "/Cameras/head_1/head_1_ring_3");
+  CHECK(job.camera_names()[11] == "head_1_ring_3");
+  const NodeId rig = scene.require("/Cameras/head_0");
+  CHECK_FALSE(scene[rig].camera);
+  CHECK(scene[cameras[0]].camera->width == 64);
+  CHECK(scene[cameras[1]].camera->width == 32);
+  CHECK(scene[cameras[1]].camera->height == 48);
+  CHECK(scene[cameras[1]].camera->fx == 40.0);
+  // Looking along +y: right is +x, back is -y.
+  const auto place = [&](std::size_t i) {
+    return Vec3(scene.world_from_node(cameras[i]).translation());
+  };
+  const auto forward = [&](std::size_t i) {
+    return Vec3(-scene.world_from_node(cameras[i]).linear().col(2));
+  };
+  CHECK((place(0) - Vec3(0.94, 2, 3)).norm() < 1e-9);
+  CHECK((forward(0) - Vec3(0, 1, 0)).norm() < 1e-9);
+  CHECK((place(1) - Vec3(1.03, 2, 3.02)).norm() < 1e-9);
+  CHECK((forward(1) - Vec3(1, 0, 0)).norm() < 1e-9);
+  // Outwards: ahead, right, back, left.
+  const Vec3 ways[] = {{0, 1, 0}, {1, 0, 0}, {0, -1, 0}, {-1, 0, 0}};
+  for (std::size_t k = 0; k < 4; ++k) {
+    CHECK((place(2 + k) - Vec3(1, 2, 3) - 0.5 * ways[k]).norm() < 1e-9);
+    CHECK((forward(2 + k) - ways[k]).norm() < 1e-9);
+  }
+  scene.set_pose(rig, Affine(Eigen::Translation3d(0, 0, 10)));
+  CHECK((place(0) - Vec3(-0.06, 0, 10)).norm() < 1e-9);
+}
+
 TEST_CASE("The overview camera looks straight down at the working area", "[spawn]") {
   Scene scene;
   const Vec3 area(3.0, -2.0, 0.75);

@@ -47,6 +47,53 @@ TEST_CASE("cameras take turns and every picture has its files", "[writers]") {
         files.text("ImageSets/trainval.txt").size());
 }
 
+TEST_CASE("a stereo pair is image_2 and image_3, and P3 holds the baseline", "[writers]") {
+  test::SampleScene sample(24, 16, 2);
+  const Affine rig = sample.scene.world_from_node(sample.cameras[0]);
+  sample.scene.set_pose(sample.cameras[1], rig * Eigen::Translation3d(0.54, 0, 0));
+  sample.scene.edit(sample.cameras[1]).camera = *sample.scene[sample.cameras[0]].camera;
+  Capture capture = test::ray_cast_capture(sample, 0);
+  test::FakeHost host;
+  KittiWriter::Params params;
+  params.stereo = true;
+  KittiWriter writer(params, host);
+  const MemoryFiles files = test::write_dataset(writer, test::sample_dataset(sample), {&capture});
+  for (const char* name : {"image_2/000000.png", "image_3/000000.png", "label_2/000000.txt"}) {
+    CHECK(files.paths().contains(std::string("training/") + name));
+  }
+  CHECK(files.bytes("training/image_2/000000.png") != files.bytes("training/image_3/000000.png"));
+  CHECK_FALSE(files.paths().contains("training/image_2/000001.png"));
+  CHECK(files.text("ImageSets/trainval.txt") == "000000\n000001\n000002\n");
+  std::istringstream text(files.text("training/calib/000000.txt"));
+  const double fx = capture.frames[0].camera.fx;
+  for (std::string row; std::getline(text, row);) {
+    std::istringstream words(row);
+    std::string key;
+    std::vector<double> p;
+    words >> key;
+    for (double value = 0.0; words >> value;) p.push_back(value);
+    if (key.front() != 'P') continue;
+    CAPTURE(row);
+    const bool is_right = key == "P1:" || key == "P3:";
+    CHECK(p.at(3) == Approx(is_right ? -0.54 * fx : 0.0));
+    CHECK(p.at(0) == Approx(fx));
+  }
+  const DatasetInfo dataset = test::sample_dataset(sample);
+  std::swap(capture.frames[0].world_from_camera, capture.frames[1].world_from_camera);
+  CHECK_THROWS_WITH(test::write_dataset(writer, dataset, {&capture}),
+                    ContainsSubstring("does not stand to the right of and parallel to"));
+  std::swap(capture.frames[0].world_from_camera, capture.frames[1].world_from_camera);
+  capture.frames[1].camera.cx += 1.0;
+  CHECK_THROWS_WITH(
+      test::write_dataset(writer, dataset, {&capture}),
+      ContainsSubstring("has another lens or size than") &&
+          ContainsSubstring("expected equal pinhole cameras by twos, left before right"));
+  DatasetInfo odd = dataset;
+  odd.camera_names.pop_back();
+  CHECK_THROWS_WITH(test::write_dataset(writer, odd, {&capture}),
+                    ContainsSubstring("by twos, left before right; the job has 1"));
+}
+
 TEST_CASE("an upright object keeps its own size, place and heading", "[writers]") {
   // A level camera looking along world +x; a box turned by 30 degrees about the vertical.
   Scene scene;
