@@ -308,6 +308,91 @@ ViewVerdict judge(const WantedView& wanted, const std::vector<Scored>& scored) {
   return {};
 }
 
+/// What one camera shows of the targets, each thing measured when it is first asked for.
+class SeenTargets {
+ public:
+  SeenTargets(const std::vector<Target>& targets, const Scene& scene, NodeId camera,
+              Image<std::uint32_t> leaves, const std::vector<std::uint32_t>& instance_of_leaf)
+      : leaves_(std::move(leaves)) {
+    frame_.camera_path = scene.path(camera);
+    frame_.camera = *scene[camera].camera;
+    frame_.set(kInstanceId, instance_ids(instance_of_leaf, leaves_));
+    const auto& ids = frame_.get(kInstanceId);
+    const std::map<std::uint32_t, std::int64_t> pixels = count_pixels(ids);
+    std::vector<Instance> seen;
+    for (const Target& target : targets) {
+      const std::uint32_t id = target.instance.node.index;
+      if (!pixels.contains(id)) continue;
+      seen.push_back({});
+      seen.back().id = id;
+      seen.back().node_path = target.path;
+    }
+    measure_tight_boxes(ids, seen);
+    for (const Instance& instance : seen) {
+      Measures& own = known_[instance.id];
+      own.visible_pixels = double(pixels.at(instance.id));
+      const PixelBox& box = *instance.tight_box;
+      own.size_px = std::max(box.width(), box.height());
+      own.size_share =
+          std::max(double(box.width()) / ids.width(), double(box.height()) / ids.height());
+    }
+  }
+
+  void measure_pixels(Scored& target) const {
+    const auto known = known_.find(target.target->instance.node.index);
+    if (known == known_.end()) return;
+    target.measures.visible_pixels = known->second.visible_pixels;
+    target.measures.size_px = known->second.size_px;
+    target.measures.size_share = known->second.size_share;
+  }
+
+  /// Finds the coverage of those that are seen and not covered yet; on demand not of those that
+  /// failed already.
+  void cover(const std::vector<Scored>& targets, bool only_holding, const auto& cover_targets) {
+    std::vector<LabelledInstance> missing;
+    frame_.instances.clear();
+    for (const Scored& target : targets) {
+      const std::uint32_t id = target.target->instance.node.index;
+      if (!known_.contains(id) || covered_.contains(id)) continue;
+      if (only_holding && target.score.failed) continue;
+      covered_.insert(id);
+      missing.push_back(target.target->instance);
+      frame_.instances.push_back({});
+      frame_.instances.back().id = id;
+      frame_.instances.back().node_path = target.target->path;
+    }
+    if (missing.empty()) return;
+    const std::vector<CoverageMask> masks = cover_targets(missing);
+    measure_visibility(masks, false, frame_);
+    for (std::size_t i = 0; i < missing.size(); ++i) {
+      const Instance& instance = frame_.instances[i];
+      const Visibility& visibility = *instance.visibility;
+      Measures& own = known_.at(instance.id);
+      const double all = double(visibility.amodal_pixels + visibility.outside_pixels);
+      own.visible_share = all > 0.0 ? double(visibility.visible_pixels) / all : 0.0;
+      own.occlusion = visibility.occlusion().value_or(1.0);
+      own.truncation = visibility.truncation();
+      own.occluders = occluders_of(masks[i], instance.id, frame_.get(kInstanceId), leaves_);
+    }
+  }
+
+  /// Of what cover() was asked for.
+  void measure_coverage(Scored& target) const {
+    const auto known = known_.find(target.target->instance.node.index);
+    if (known == known_.end()) return;
+    target.measures.visible_share = known->second.visible_share;
+    target.measures.occlusion = known->second.occlusion;
+    target.measures.truncation = known->second.truncation;
+    target.measures.occluders = known->second.occluders;
+  }
+
+ private:
+  Frame frame_;  ///< Instances are those that are being covered.
+  Image<std::uint32_t> leaves_;
+  std::map<std::uint32_t, Measures> known_;  ///< By id, of what has pixels.
+  std::set<std::uint32_t> covered_;
+};
+
 }  // namespace
 
 ViewCheck::ViewCheck(const Scene& scene, const std::vector<const ViewRule*>& rules)
@@ -380,74 +465,44 @@ ViewVerdict ViewCheck::by_place(const Scene& scene, NodeId camera, const WantedV
 ViewVerdict ViewCheck::by_labels(const Scene& scene, NodeId camera,
                                  const std::vector<WantedView>& wanted,
                                  const Labels& labels) const {
+  SeenTargets seen(state_->targets, scene, camera, labels.render(), state_->instance_of_leaf);
   const Vec3 camera_world = scene.world_from_node(camera).translation();
-  const Image<std::uint32_t> leaves = labels.render();
-  const Image<std::uint32_t> ids = instance_ids(state_->instance_of_leaf, leaves);
-  const std::map<std::uint32_t, std::int64_t> pixels = count_pixels(ids);
-  std::vector<Instance> seen;
-  std::vector<LabelledInstance> seen_instances;
-  for (const Target& target : state_->targets) {
-    if (!pixels.contains(target.instance.node.index)) continue;
-    Instance instance;
-    instance.id = target.instance.node.index;
-    instance.node_path = target.path;
-    seen.push_back(std::move(instance));
-    seen_instances.push_back(target.instance);
-  }
-  measure_tight_boxes(ids, seen);
-  std::map<std::uint32_t, Measures> measures;
-  for (const Instance& instance : seen) {
-    Measures& own = measures[instance.id];
-    own.visible_pixels = double(pixels.at(instance.id));
-    const PixelBox& box = *instance.tight_box;
-    own.size_px = std::max(box.width(), box.height());
-    own.size_share =
-        std::max(double(box.width()) / ids.width(), double(box.height()) / ids.height());
-  }
-  bool is_covered = false;
-  const auto measure_coverage = [&] {
-    if (std::exchange(is_covered, true)) return;
-    const std::vector<CoverageMask> masks = labels.cover(seen_instances);
-    Frame frame;
-    frame.camera_path = scene.path(camera);
-    frame.camera = *scene[camera].camera;
-    frame.set(kInstanceId, ids);
-    frame.instances = seen;
-    measure_visibility(masks, false, frame);
-    for (std::size_t i = 0; i < seen.size(); ++i) {
-      const Visibility& visibility = *frame.instances[i].visibility;
-      Measures& own = measures.at(seen[i].id);
-      const double all = double(visibility.amodal_pixels + visibility.outside_pixels);
-      own.visible_share = all > 0.0 ? double(visibility.visible_pixels) / all : 0.0;
-      own.occlusion = visibility.occlusion().value_or(1.0);
-      own.truncation = visibility.truncation();
-      own.occluders = occluders_of(masks[i], seen[i].id, ids, leaves);
-    }
-  };
   ViewVerdict verdict;
   for (const WantedView& one : wanted) {
     const ViewRule& rule = *one.rule;
     std::vector<Scored> scored = state_->by_place(rule, camera_world);
-    const auto score = [&](const auto& add) {
-      for (Scored& target : scored) {
-        const auto known = measures.find(target.target->instance.node.index);
-        Measures own = known == measures.end() ? Measures() : known->second;
-        own.distance_m = target.measures.distance_m;
-        own.azimuth_deg = target.measures.azimuth_deg;
-        own.elevation_deg = target.measures.elevation_deg;
-        target.measures = own;
-        add(rule, own, target.score);
-      }
-    };
-    score(score_pixels);
+    for (Scored& target : scored) {
+      seen.measure_pixels(target);
+      score_pixels(rule, target.measures, target.score);
+    }
     // What shares and coverage say makes no target hold that does not hold without them.
     const std::size_t possible = count_holding(scored);
-    const bool is_lost = rule.count.min && double(possible) < *rule.count.min;
-    if (!is_lost && needs_coverage(rule)) {
-      measure_coverage();
-      score(score_coverage);
+    if (rule.count.min && double(possible) < *rule.count.min) {
+      verdict.add(missing_targets(rule, std::move(scored), possible));
+      continue;
     }
-    verdict.add(is_lost ? missing_targets(rule, std::move(scored), possible) : judge(one, scored));
+    if (!needs_coverage(rule)) {
+      verdict.add(judge(one, scored));
+      continue;
+    }
+    // Coverage is dear: that of targets which cannot hold any more counts only for what is
+    // nearest to holding, or where every target counts.
+    std::vector<Scored> judged = scored;
+    const auto add_coverage = [&](Scored& target) {
+      seen.measure_coverage(target);
+      score_coverage(rule, target.measures, target.score);
+    };
+    seen.cover(judged, !rule.every_target, labels.cover);
+    for (Scored& target : judged) {
+      if (rule.every_target || !target.score.failed) add_coverage(target);
+    }
+    ViewVerdict own = judge(one, judged);
+    if (!own.holds() && !rule.every_target) {
+      seen.cover(scored, false, labels.cover);
+      for (Scored& target : scored) add_coverage(target);
+      own = judge(one, scored);
+    }
+    verdict.add(own);
   }
   return verdict;
 }

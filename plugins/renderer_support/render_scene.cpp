@@ -57,6 +57,16 @@ bool RenderScene::take(const Scene& scene) {
   placed_lights_.clear();
   std::vector<Placed> placed;
   collect(scene, scene.root(), Affine::Identity(), false, placed);
+  const auto is_same = [](const Placed& a, const Placed& b) {
+    return a.world_from_node.matrix() == b.world_from_node.matrix();
+  };
+  const bool has_same_lights = std::ranges::equal(placed_lights_, previous_lights, is_same);
+  if (has_same_shapes && has_same_lights && std::ranges::equal(placed, placed_meshes_, is_same)) {
+    // Only cameras moved, or what is neither seen nor shines.
+    pose_revision_ = scene.pose_revision();
+    shape_revision_ = scene.shape_revision();
+    return false;
+  }
   const std::vector<MeshInstance> previous = instances_;
   const std::vector<UsedMesh> previous_meshes = meshes_;  // that `previous` points to
   if (!has_same_shapes) {
@@ -67,10 +77,8 @@ bool RenderScene::take(const Scene& scene) {
   }
   assign_poses(placed, previous);
   assign_motions(scene, placed);
-  const auto is_same = [](const Placed& a, const Placed& b) {
-    return a.world_from_node.matrix() == b.world_from_node.matrix();
-  };
-  needs_light_ |= !std::ranges::equal(placed_lights_, previous_lights, is_same);
+  needs_light_ |= !has_same_lights;
+  placed_meshes_ = std::move(placed);
   pose_revision_ = scene.pose_revision();
   shape_revision_ = scene.shape_revision();
   return true;

@@ -126,6 +126,7 @@ class RenderScene {
   std::vector<const ShadingMaterial*> slot_materials_;
   std::vector<std::uint32_t> triangle_lights_;
   std::vector<ShutterMotion> motions_;
+  std::vector<Placed> placed_meshes_;  ///< In the order of instances_.
   std::vector<Placed> placed_lights_;
   LightTable lights_;
   Surroundings surroundings_;
