@@ -129,8 +129,8 @@ TEST_CASE("a folder without materials is an error that says what one is", "[rand
   params.folders = {shelf.folder.path("lonely")};
   CHECK_THROWS_WITH(RandomMaterial(params, shelf.host), shelf.folder.path("lonely") + expected);
   params.folders = {shelf.folder.path("empty/readme.txt")};
-  CHECK_THROWS_WITH(RandomMaterial(params, shelf.host),
-                    shelf.folder.path("empty/readme.txt") + ": is a file, expected a folder of "
+  CHECK_THROWS_WITH(RandomMaterial(params, shelf.host), shelf.folder.path("empty/readme.txt") +
+                                                            ": is a file, expected a folder of "
                                                             "materials");
   params.folders = {shelf.folder.path("brick_wall")};
   params.assets = TextDistribution({"oak.usd"});
@@ -180,12 +180,13 @@ TEST_CASE("a mesh without uv gets some by box mapping, in metres, whatever its s
     mapped = block.scene[block.node].mesh;
     REQUIRE(mesh.triangles.size() == source->triangles.size());
     CHECK(mesh.normals.size() == mesh.positions.size());
-    const auto& map =
-        block.scene[block.node].materials.at(0)->base_color_texture.uv_from_mesh_uv;
+    const auto& map = block.scene[block.node].materials.at(0)->base_color_texture.uv_from_mesh_uv;
     for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
       const auto& corner = mesh.triangles[i];
       const auto place = [&](std::size_t k) { return mesh.positions[corner[k]]; };
-      const auto uv = [&](std::size_t k) -> Vec2f { return map * mesh.uvs[corner[k]].homogeneous(); };
+      const auto uv = [&](std::size_t k) -> Vec2f {
+        return map * mesh.uvs[corner[k]].homogeneous();
+      };
       for (std::size_t k = 0; k < 3; ++k) {
         CHECK(place(k) == source->positions[source->triangles[i][k]]);
         // Lengths on the picture are those in the world, which is twice as large as the mesh.
@@ -261,11 +262,13 @@ TEST_CASE("objects get the looks of a variant of their asset", "[randomizers]") 
   CHECK(scene.shape_revision() == revision);
 
   Scene bare;
-  host.load_asset("mug.usd{look=open}", bare, bare.create(bare.create(bare.root(), "Assets"), "mug"));
+  host.load_asset("mug.usd{look=open}", bare,
+                  bare.create(bare.create(bare.root(), "Assets"), "mug"));
   list.list = {Value::text("red")};
   params.variants.set("look", list);
-  CHECK_THROWS_WITH(RandomVariant(params, host).randomize(bare, {}, Rng(1)),
-                    ContainsSubstring("/Assets/mug: has no part 'loaded/Lid' as mug.usd{look=red} has"));
+  CHECK_THROWS_WITH(
+      RandomVariant(params, host).randomize(bare, {}, Rng(1)),
+      ContainsSubstring("/Assets/mug: has no part 'loaded/Lid' as mug.usd{look=red} has"));
   params.variants = Value::text("red");
   CHECK_THROWS_WITH(RandomVariant(params, host),
                     ContainsSubstring("expected lists by set: {lookVariant: [red, blue]}"));
