@@ -161,8 +161,9 @@ std::vector<MaterialMaps> find_materials(const std::string& folder, const Host& 
   }
   if (materials.empty()) {
     throw Error(ErrorKind::Asset,
-                folder + ": holds no material, expected pictures named as those of ambientCG or "
-                         "Poly Haven: 'Wood051_1K-JPG_Color.jpg', 'brick_wall_diff_1k.png'");
+                folder +
+                    ": holds no material, expected pictures named as those of ambientCG or "
+                    "Poly Haven: 'Wood051_1K-JPG_Color.jpg', 'brick_wall_diff_1k.png'");
   }
   // Datasets name what they are made of.
   for (const MaterialMaps& maps : materials) {

@@ -66,10 +66,11 @@ void RandomVariant::dress(Scene& scene, NodeId node, const std::string& name) {
     if (from == look.root()) continue;
     const NodeId to = scene.find(front + look.path(from));
     if (!to) {
-      throw Error(ErrorKind::Asset,
-                  front + ": has no part '" + look.path(from).substr(1) + "' as " + name +
-                      " has; spawn a variant with all parts (objects: variants), and name the asset "
-                      "that it is made of");
+      throw Error(
+          ErrorKind::Asset,
+          front + ": has no part '" + look.path(from).substr(1) + "' as " + name +
+              " has; spawn a variant with all parts (objects: variants), and name the asset "
+              "that it is made of");
     }
     parts.insert(to);
     const Node& wanted = look[from];

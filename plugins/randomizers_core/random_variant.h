@@ -16,8 +16,8 @@ namespace diorama {
 
 struct NodeDraws;
 
-/// Gives objects that were made of one asset the looks of one of its variants: materials, meshes and
-/// visibility of the parts, which have to be those of the variant that was spawned, or more.
+/// Gives objects that were made of one asset the looks of one of its variants: materials, meshes
+/// and visibility of the parts, which have to be those of the variant that was spawned, or more.
 class RandomVariant final : public Randomizer {
  public:
   struct Params {

@@ -58,7 +58,8 @@ class Output {
   /// By camera and the end of its name.
   const std::string& of(const std::string& camera, const std::string& end) const {
     for (const auto& [name, text] : files_) {
-      if (name.find("rp_stereo_0_" + camera) != std::string::npos && name.ends_with(end)) return text;
+      if (name.find("rp_stereo_0_" + camera) != std::string::npos && name.ends_with(end))
+        return text;
     }
     throw std::runtime_error("no file " + end + " of " + camera);
   }
@@ -120,8 +121,7 @@ TEST_CASE("Extrinsics of a rig stand in dataset.json, and views speak of each of
           "[run]") {
   const Output output;
   const Json page = Json::parse(output.file("dataset.json"));
-  CHECK(page["cameras"] ==
-        Json::array({"stereo_0_left", "stereo_0_right", "stereo_0_depth"}));
+  CHECK(page["cameras"] == Json::array({"stereo_0_left", "stereo_0_right", "stereo_0_depth"}));
   const Json& rig = page["rigs"]["stereo_0"];
   REQUIRE(rig.size() == 3);
   CHECK(rig[1]["camera"] == "stereo_0_right");

@@ -63,7 +63,8 @@ def Xform "Handle"
   std::string scene_of(const std::vector<std::string>& names) const {
     std::string prims;
     for (std::size_t i = 0; i < names.size(); ++i) {
-      prims += "    def \"P" + std::to_string(i) + "\" ( references = @" + names[i] + "@ )\n    {\n    }\n";
+      prims += "    def \"P" + std::to_string(i) + "\" ( references = @" + names[i] +
+               "@ )\n    {\n    }\n";
     }
     return scene_with(prims);
   }
@@ -95,7 +96,8 @@ TEST_CASE("what servers and other disks have is found below the assets root", "[
   // The files of the scene are these, too, so that a dataset names them.
   const auto files = UsdLoader({}, disk.host).files(disk.elsewhere.path("scene.usda"));
   REQUIRE(files.size() == 3);
-  CHECK(std::ranges::find(files, std::filesystem::path(disk.root.path("Isaac/Props/cup.usda"))) != files.end());
+  CHECK(std::ranges::find(files, std::filesystem::path(disk.root.path("Isaac/Props/cup.usda"))) !=
+        files.end());
 }
 
 TEST_CASE("what lies beside a layer comes before the assets root, and stays there if it says so",
@@ -118,11 +120,12 @@ TEST_CASE("an asset that is nowhere is one warning that says where it would be l
   const std::string gone = "omniverse://server/Isaac/Props/gone.usda";
   disk.load(disk.scene_of({gone, gone, gone, "beside.usda"}));
   REQUIRE(disk.host.warnings.size() == 2);
-  CHECK(disk.host.warnings[0] ==
-        disk.elsewhere.path("scene.usda") + ": </Root/P0> reference @" + gone +
-            "@ could not be found: remote assets are not fetched; copy the file below the assets "
-            "root (--assets-root, DIORAMA_ASSETS_ROOT) and name it '/Isaac/Props/gone.usda'; tried " +
-            disk.root.path("Isaac/Props/gone.usda") + " (and 2 more references to it)");
+  CHECK(
+      disk.host.warnings[0] ==
+      disk.elsewhere.path("scene.usda") + ": </Root/P0> reference @" + gone +
+          "@ could not be found: remote assets are not fetched; copy the file below the assets "
+          "root (--assets-root, DIORAMA_ASSETS_ROOT) and name it '/Isaac/Props/gone.usda'; tried " +
+          disk.root.path("Isaac/Props/gone.usda") + " (and 2 more references to it)");
   CHECK(disk.host.warnings[1].ends_with("@beside.usda@ could not be found"));
 }
 
@@ -162,8 +165,7 @@ TEST_CASE("pictures and sets of tiles of servers are found, too", "[loader_usd]"
     }
 )"));
   CHECK(disk.host.warnings.empty());
-  const Material& material =
-      *disk.scene[disk.scene.require("/asset/Root/C")].materials.at(0);
+  const Material& material = *disk.scene[disk.scene.require("/asset/Root/C")].materials.at(0);
   CHECK(material.base_color_texture);
   CHECK(material.roughness_texture);
   CHECK(disk.host.decoded.size() == 3);

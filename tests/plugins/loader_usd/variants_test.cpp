@@ -118,19 +118,22 @@ TEST_CASE("a variant that is not there is an error that lists those that are", "
   const TemporaryFolder folder;
   const std::string file = write_mug(folder);
   CHECK_THROWS_WITH(Loaded(file + "{look=pink}"),
-                    file + ": has no variant 'pink' of a set 'look'; there is look: blue green red; "
-                           "size: big small");
+                    file +
+                        ": has no variant 'pink' of a set 'look'; there is look: blue green red; "
+                        "size: big small");
   CHECK_THROWS_WITH(Loaded(file + "{colour=red}"),
-                    file + ": has no variant 'red' of a set 'colour'; there is look: blue green "
-                           "red; size: big small");
+                    file +
+                        ": has no variant 'red' of a set 'colour'; there is look: blue green "
+                        "red; size: big small");
   CHECK_THROWS_WITH(Loaded(file + "{look}"),
                     file + "{look}: found '{look}', expected variants as {set=variant}");
   CHECK_THROWS_WITH(Loaded(file + "{look=red}x}"),
                     file + "{look=red}x}: found 'x}', expected variants as {set=variant}");
   const std::string plain = folder.write("plain.usda", "#usda 1.0\ndef Cube \"C\"\n{\n}\n");
   CHECK_THROWS_WITH(Loaded(plain + "{look=red}"),
-                    plain + ": has no variant 'red' of a set 'look'; there are none at its root "
-                            "prims");
+                    plain +
+                        ": has no variant 'red' of a set 'look'; there are none at its root "
+                        "prims");
   // A file may really be called so.
   const std::string odd = folder.write("odd.usda{look=red}", "#usda 1.0\ndef Cube \"C\"\n{\n}\n");
   CHECK(Loaded(odd).scene.find("/asset/C"));
