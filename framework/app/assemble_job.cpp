@@ -5,8 +5,12 @@
 #include <map>
 
 #include "framework/config/value_text.h"
+#include "framework/host/machine_memory.h"
+#include "framework/pipeline/capture_memory.h"
+#include "framework/pipeline/camera_rig.h"
 #include "framework/pipeline/dataset_description.h"
 #include "framework/pipeline/pattern_check.h"
+#include "framework/pipeline/scene_setup.h"
 #include "framework/plugins/plugin_call.h"
 
 namespace diorama {
@@ -123,7 +127,8 @@ JobLoaders make_loaders(Assembler& assembler, JobAssembly& assembly) {
     loaders.of_files[config.type] = assembler.make<Loader>(config, "loaders");
   }
   for (const ComponentConfig& config : job.environments) {
-    assembly.components.environments.push_back(assembler.make<Loader>(config, "environments"));
+    assembly.components.sets.front().environments.push_back(
+        assembler.make<Loader>(config, "environments"));
   }
   for (const ObjectGroup& group : job.objects) {
     loaders.of_objects.push_back(assembler.make<Loader>(group.loader, "objects"));
@@ -133,7 +138,7 @@ JobLoaders make_loaders(Assembler& assembler, JobAssembly& assembly) {
 
 void make_randomizers(Assembler& assembler, JobAssembly& assembly) {
   for (const RandomizerEntry& entry : assembly.job.randomizers) {
-    assembly.components.randomizers.push_back(
+    assembly.components.sets.front().randomizers.push_back(
         assembler.make<Randomizer>(entry.component, "randomizers"));
   }
 }
@@ -141,10 +146,11 @@ void make_randomizers(Assembler& assembler, JobAssembly& assembly) {
 void make_engines_and_writers(Assembler& assembler, JobAssembly& assembly) {
   const Job& job = assembly.job;
   JobComponents& parts = assembly.components;
+  VisitComponents& set = parts.sets.front();
   if (job.physics.type != "none") {
-    parts.physics.push_back(assembler.make<PhysicsBackend>(job.physics, "physics"));
+    set.physics = assembler.make<PhysicsBackend>(job.physics, "physics");
   }
-  parts.renderer = assembler.make<Renderer>(job.renderer, "renderer");
+  set.renderer = assembler.make<Renderer>(job.renderer, "renderer");
   for (const WriterEntry& entry : job.writers) {
     parts.writers.push_back(assembler.make<Writer>(entry.component, "writers"));
   }
@@ -166,7 +172,7 @@ CapturePlan plan_from_assets(const JobAssembly& assembly,
   const Job& job = assembly.job;
   std::vector<EnvironmentChoice> environments;
   for (std::size_t i = 0; i < job.environments.size(); ++i) {
-    const Loader& loader = *assembly.components.environments[i];
+    const Loader& loader = *assembly.components.sets.front().environments[i];
     for (std::string& asset : assets_of(loader, job.environments[i])) {
       environments.push_back({std::move(asset), i});
     }
@@ -242,18 +248,43 @@ void resolve_needs(Assembler& assembler, ListedAnnotators listed, JobAssembly& a
     }
   }
   JobComponents& parts = assembly.components;
-  parts.demand = resolve_demand(needs_of(assembly), parts.renderer->provides(),
+  VisitComponents& set = parts.sets.front();
+  parts.demand = resolve_demand(needs_of(assembly), set.renderer->provides(),
                                 "renderer '" + assembly.job.renderer.type + "'", offers);
   for (const std::size_t index : parts.demand.annotators) {
     const AnnotatorOffer& offer = offers[index];
     assembler.note_annotator(offer.type);
     auto annotator = offer.is_listed ? std::move(listed.at(offer.type))
                                      : assembler.make_default_annotator(offer.type);
-    parts.annotators.push_back({offer.type, std::move(annotator)});
+    set.annotators.push_back({offer.type, std::move(annotator)});
   }
   for (const AnnotatorOffer& offer : offers) {
     if (offer.is_listed && listed.at(offer.type)) assembler.warn_of_idle(offer);
   }
+}
+
+/// One more set of what works on a visit, with the same parameters as the first.
+void add_set(Assembler& assembler, JobAssembly& assembly) {
+  const Job& job = assembly.job;
+  VisitComponents set;
+  for (const ComponentConfig& config : job.environments) {
+    set.environments.push_back(assembler.make<Loader>(config, "environments"));
+  }
+  for (const RandomizerEntry& entry : job.randomizers) {
+    set.randomizers.push_back(assembler.make<Randomizer>(entry.component, "randomizers"));
+  }
+  if (job.physics.type != "none") {
+    set.physics = assembler.make<PhysicsBackend>(job.physics, "physics");
+  }
+  set.renderer = assembler.make<Renderer>(job.renderer, "renderer");
+  ListedAnnotators listed = make_annotators(assembler, job);
+  for (const auto& [type, first] : assembly.components.sets.front().annotators) {
+    const auto own = listed.find(type);
+    set.annotators.push_back({type, own != listed.end() ? std::move(own->second)
+                                                        : assembler.make_default_annotator(type)});
+  }
+  assembler.complaints().raise();
+  assembly.components.sets.push_back(std::move(set));
 }
 
 std::vector<std::string> texts_of(const std::vector<fs::path>& paths) {
@@ -278,6 +309,19 @@ DescribeComponent describe_from(Registry& registry) {
   };
 }
 
+CaptureMemory memory_of(const JobAssembly& assembly) {
+  const JobComponents& parts = assembly.components;
+  const VisitComponents& set = parts.sets.front();
+  std::vector<Camera> cameras;
+  for (const PlannedCamera& planned : planned_cameras(assembly.job.cameras)) {
+    cameras.push_back(planned.camera);
+  }
+  NameSet channels = parts.demand.channels;
+  for (const auto& named : set.annotators) channels.merge(named.annotator->provides());
+  if (parts.demand.motion) channels.emplace(kMotion.name);
+  return capture_memory(cameras, channels, *set.renderer);
+}
+
 OutputFolders output_folders(const Job& job) {
   const fs::path base = (fs::path(job.output.folder) / ".").lexically_normal();
   const auto below = [&](const std::string& name) {
@@ -299,6 +343,7 @@ OutputFolders output_folders(const Job& job) {
 
 Value check_job(const Value& value, Registry& registry, Host& host) {
   JobAssembly assembly;
+  assembly.components.sets.resize(1);
   Assembler assembler(registry, host);
   assembly.job = read_job(value, assembler.complaints());
   make_loaders(assembler, assembly);
@@ -311,8 +356,10 @@ Value check_job(const Value& value, Registry& registry, Host& host) {
 
 JobAssembly assemble_job(const Value& value, Registry& registry, HostServices& host,
                          const std::optional<fs::path>& assets_root,
-                         const std::string& program_version, AssembleFor purpose) {
+                         const std::string& program_version, AssembleFor purpose,
+                         int visits_in_flight) {
   JobAssembly assembly;
+  assembly.components.sets.resize(1);
   Assembler assembler(registry, host);
   assembly.job = read_job(value, assembler.complaints());
   JobLoaders loaders = make_loaders(assembler, assembly);
@@ -349,6 +396,12 @@ JobAssembly assemble_job(const Value& value, Registry& registry, HostServices& h
       assembler.plugins(), drawn_assets,
       [&](const std::string& asset) { return host.files_of(asset); }, assets_root, host);
   assembly.dataset_json = dataset_json(assembly.dataset, assembly.job);
+  if (visits_in_flight == 0) {
+    visits_in_flight =
+        default_visits_in_flight(host.thread_count(), available_memory(), memory_of(assembly));
+  }
+  visits_in_flight = std::min(visits_in_flight, assembly.plan.visit_count());
+  for (int i = 1; i < visits_in_flight; ++i) add_set(assembler, assembly);
   return assembly;
 }
 

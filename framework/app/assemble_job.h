@@ -8,6 +8,7 @@
 #include "diorama/host.h"
 #include "diorama/writer.h"
 #include "framework/host/host_services.h"
+#include "framework/pipeline/capture_memory.h"
 #include "framework/pipeline/capture_plan.h"
 #include "framework/pipeline/job.h"
 #include "framework/pipeline/pipeline.h"
@@ -38,10 +39,16 @@ enum class AssembleFor { Plan, Run };
 
 /// Reads the job, makes its components, lists its assets, plans its captures and resolves what its
 /// writers need. The host gets the job's loaders. Nothing is loaded or written. All complaints
-/// about the file come in one Error (Config); then Error(Plugin), Error(Asset) as found.
+/// about the file come in one Error (Config); then Error(Plugin), Error(Asset) as found. For a run
+/// there are sets of components for `visits_in_flight` visits at a time; 0: for
+/// default_visits_in_flight(). Never for more than the job has.
 JobAssembly assemble_job(const Value& job, Registry& registry, HostServices& host,
                          const std::optional<std::filesystem::path>& assets_root,
-                         const std::string& program_version, AssembleFor purpose);
+                         const std::string& program_version, AssembleFor purpose,
+                         int visits_in_flight = 0);
+
+/// Of the job's cameras and what its writers need.
+CaptureMemory memory_of(const JobAssembly& assembly);
 
 /// Where the dataset goes.
 OutputFolders output_folders(const Job& job);

@@ -165,6 +165,14 @@ void add_run(CLI::App& app, CommandLine& line) {
       ->check(CLI::Range(1, 1 << 20))
       ->type_name("N")
       ->capture_default_str();
+  command
+      ->add_option(
+          "--visits-in-flight", line.run.visits_in_flight,
+          "Visits that are worked on at a time: while pictures of one are rendered, others "
+          "are loaded and simulated; the files are the same for any number. By default as "
+          "many as threads and memory suggest")
+      ->check(CLI::Range(1, 1024))
+      ->type_name("N");
   command->add_flag("--resume", line.run.resume, "Go on with the dataset in the output folder");
   command->add_flag("--overwrite", line.run.overwrite,
                     "Remove the dataset in the output folder first");

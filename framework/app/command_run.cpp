@@ -18,7 +18,6 @@
 #include "framework/config/yaml_config.h"
 #include "framework/host/progress_bar.h"
 #include "framework/host/progress_lines.h"
-#include "framework/pipeline/camera_rig.h"
 #include "framework/pipeline/capture_memory.h"
 #include "framework/pipeline/dataset_description.h"
 #include "framework/plugins/plugin_search.h"
@@ -113,18 +112,6 @@ RunSummary run_job(JobAssembly& assembly, HostServices& host, const RunCommandOp
   return pipeline.run(assembly.dataset, assembly.dataset_json);
 }
 
-CaptureMemory memory_of(const JobAssembly& assembly) {
-  const JobComponents& parts = assembly.components;
-  std::vector<Camera> cameras;
-  for (const PlannedCamera& planned : planned_cameras(assembly.job.cameras)) {
-    cameras.push_back(planned.camera);
-  }
-  NameSet channels = parts.demand.channels;
-  for (const auto& named : parts.annotators) channels.merge(named.annotator->provides());
-  if (parts.demand.motion) channels.emplace(kMotion.name);
-  return capture_memory(cameras, channels, *parts.renderer);
-}
-
 void log_lines(const std::string& text, ConsoleLog& log) {
   std::size_t start = 0;
   while (start < text.size()) {
@@ -153,7 +140,8 @@ int run_value(const GlobalOptions& global, const Value& job, const RunCommandOpt
       choose_assets_root(global.assets_root, std::getenv("DIORAMA_ASSETS_ROOT"), job_root,
                          sample_pack_folder(global.program));
   JobAssembly assembly = assemble_job(job, *registry, *host, assets_root, program_version(),
-                                      options.dry_run ? AssembleFor::Plan : AssembleFor::Run);
+                                      options.dry_run ? AssembleFor::Plan : AssembleFor::Run,
+                                      options.visits_in_flight);
   if (options.dry_run) {
     std::cout << printable(plan_text(assembly.plan, assembly.job, assets_root))
               << memory_text(memory_of(assembly));

@@ -45,6 +45,7 @@ struct RunCommandOptions {
   enum class Progress : std::uint8_t { Bar, Json, OpenJd };
   Progress progress = Progress::Bar;
   int queue_mib = 256;
+  int visits_in_flight = 0;  ///< 0: see default_visits_in_flight().
   bool overwrite = false;
   bool only_finishes = false;  ///< See RunOptions.
   std::optional<std::set<int>> only = {};

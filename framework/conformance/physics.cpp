@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "diorama/physics_backend.h"
+#include <exception>
+#include <thread>
 
+#include "diorama/physics_backend.h"
 #include "framework/conformance/fingerprint.h"
 #include "framework/conformance/kinds.h"
 #include "framework/conformance/sample_scene.h"
@@ -10,13 +12,42 @@ namespace {
 
 constexpr int kSteps = 20;
 
-Scene simulated(const Subject& subject, Host& host) {
+Scene simulated(PhysicsBackend& physics) {
   Scene scene = sample_scene();
-  const auto physics = subject.make<PhysicsBackend>(host);
-  physics->reset(scene);
-  physics->advance(scene, kSteps);
-  physics->advance(scene, kSteps);
+  physics.reset(scene);
+  physics.advance(scene, kSteps);
+  physics.advance(scene, kSteps);
   return scene;
+}
+
+Scene simulated(const Subject& subject, Host& host) {
+  return simulated(*subject.make<PhysicsBackend>(host));
+}
+
+/// As visits in flight have it.
+void check_two_at_once(const Subject& subject) {
+  const Scene alone = simulated(subject, subject.host);
+  const auto first = subject.make<PhysicsBackend>();
+  const auto second = subject.make<PhysicsBackend>();
+  std::exception_ptr error;
+  Scene by_second;
+  std::thread other([&] {
+    try {
+      by_second = simulated(*second);
+    } catch (...) {
+      error = std::current_exception();
+    }
+  });
+  Scene by_first;
+  try {
+    by_first = simulated(*first);
+  } catch (...) {
+    error = std::current_exception();
+  }
+  other.join();
+  if (error) std::rethrow_exception(error);
+  require_same(alone, by_first, "differs while another instance is at work");
+  require_same(alone, by_second, "differs while another instance is at work");
 }
 
 double height(const Scene& scene, const char* path) {
@@ -65,6 +96,8 @@ void check_physics(const CheckRun& run, const Subject& subject) {
     require_same(scene, simulated(subject, subject.single_threaded_host),
                  "differs with one thread");
   });
+  run.check("two instances at work at once give the same bits",
+            [&] { check_two_at_once(subject); });
   run.check("a second scene after the first one was destroyed is survived", [&] {
     const auto physics = subject.make<PhysicsBackend>();
     for (int round = 0; round < 2; ++round) {

@@ -57,21 +57,28 @@ void DatasetOutput::write(const std::function<void(const Take&)>& give, Host& ho
     if (!queue) {
       // Captures are read faster than written: as many wait as are at work, and memory stays flat.
       const std::size_t few = 2 * std::size_t(threads) * capture_bytes(pending);
-      queue.emplace(threads, std::min(few, kMostQueueBytes),
-                    [this](const PendingCapture& each) { write_capture(each.capture); });
+      WriterQueue::Options options;
+      options.threads = threads;
+      options.max_bytes = std::min(few, kMostQueueBytes);
+      queue.emplace(options, WriterQueue::Work{[this](const PendingCapture& each) {
+                                                 return encode(each.capture);
+                                               },
+                                               [this](int index, Transaction& transaction) {
+                                                 store_.commit_capture(index, transaction);
+                                               }});
     }
     static_cast<void>(queue->push(std::move(pending)));  // Waits for room.
   });
   if (queue) queue->drain();
 }
 
-void DatasetOutput::write_capture(const Capture& capture) {
+Transaction DatasetOutput::encode(const Capture& capture) {
   Transaction transaction = store_.capture_transaction(capture.index);
   for (std::size_t i = 0; i < writers_.size(); ++i) {
     CollectedFiles files(transaction, i, writers_[i].name);
     call_component(who(writers_[i].name), [&] { writers_[i].writer->write(capture, files); });
   }
-  store_.commit_capture(capture.index, transaction);
+  return transaction;
 }
 
 void DatasetOutput::finish() {

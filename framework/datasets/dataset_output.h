@@ -43,7 +43,7 @@ class DatasetOutput {
   void close();
 
  private:
-  void write_capture(const Capture& capture);
+  Transaction encode(const Capture& capture);
 
   std::vector<NamedWriter> writers_;
   LocalFileSystem file_system_;

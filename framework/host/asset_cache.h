@@ -14,8 +14,8 @@
 namespace diorama {
 
 /// Assets that were loaded before, each below the root of a scene of its own, up to a number of
-/// bytes; the longest unused go first. An asset that alone exceeds the budget is not kept. Main
-/// thread only.
+/// bytes; the longest unused go first. An asset that alone exceeds the budget is not kept. Used by
+/// one thread at a time.
 class AssetCache {
  public:
   explicit AssetCache(std::size_t budget_bytes);

@@ -11,6 +11,7 @@
 
 #include "framework/config/clean_text.h"
 #include "framework/host/node_content.h"
+#include "framework/host/stoppable.h"
 #include "framework/plugins/plugin_call.h"
 
 namespace diorama {
@@ -231,6 +232,11 @@ std::vector<fs::path> HostServices::files_of(std::string_view asset) {
 
 NodeId HostServices::load_asset(std::string_view asset, Scene& scene, NodeId parent) {
   const Source source = find_source(asset);
+  std::unique_lock lock(loading_, std::try_to_lock);
+  if (!lock) {
+    const ThreadPool::Rest rest(pool_);
+    lock.lock();
+  }
   Loader& with = loader(source.loader);
   const std::string key = source.loader + " " + source.key;
   const auto loaded = cache_.get(key, [&](Scene& own) {
@@ -242,6 +248,7 @@ NodeId HostServices::load_asset(std::string_view asset, Scene& scene, NodeId par
                                 "' is no plain UTF-8 text; bytes of it are written as \\x00 to "
                                 "\\xFF, in datasets, too");
   });
+  lock.unlock();
   const NodeId root = (*loaded)[loaded->root()].children.front();
   return instantiate(*loaded, root, scene, parent, source.stem);
 }
@@ -262,11 +269,19 @@ std::vector<std::byte> HostServices::encode_image(const ImageView& image,
 
 void HostServices::parallel_for(std::size_t count, const std::function<void(std::size_t)>& body) {
   // Not for writers, which have threads of their own: what was captured is written.
-  if (!stop_ || std::this_thread::get_id() != main_thread_) return pool_.parallel_for(count, body);
+  const std::atomic<bool>* const own = Stoppable::flag_of_this_thread();
+  const bool may_stop = own || (stop_ && std::this_thread::get_id() == main_thread_);
+  const WorkAtHand work;
   pool_.parallel_for(count, [&](std::size_t i) {
-    stop_if_asked();
+    const WorkAtHand::Helper helper(work);
+    if (may_stop && ((stop_ && *stop_) || (own && *own))) throw Stopped();
     body(i);
   });
+}
+
+bool HostServices::stop_requested() const {
+  const std::atomic<bool>* const own = Stoppable::flag_of_this_thread();
+  return (stop_ && *stop_) || (own && *own);
 }
 
 int HostServices::thread_count() const { return pool_.thread_count(); }

@@ -63,10 +63,11 @@ class HostServices final : public Host {
   std::vector<std::byte> encode_image(const ImageView& image, ImageFormat format) const override;
   void parallel_for(std::size_t count, const std::function<void(std::size_t)>& body) override;
   int thread_count() const override;
-  bool stop_requested() const override { return stop_ && *stop_; }
+  bool stop_requested() const override;
 
   /// From now on the job is to end when this becomes true.
   void stop_on(const std::atomic<bool>& stop) { stop_ = &stop; }
+  ThreadPool& pool() { return pool_; }
 
  private:
   /// An asset with the loader that takes it.
@@ -94,6 +95,7 @@ class HostServices final : public Host {
   ThreadPool pool_;
   std::thread::id main_thread_ = std::this_thread::get_id();
   const std::atomic<bool>* stop_ = nullptr;
+  std::recursive_mutex loading_;  ///< Loaders may load what theirs consists of.
   AssetCache cache_;
   std::uint64_t picture_bytes_;
   std::map<std::string, std::unique_ptr<Loader>> loaders_;

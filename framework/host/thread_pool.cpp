@@ -6,11 +6,13 @@
 #include <algorithm>
 #include <atomic>
 #include <condition_variable>
+#include <cstdint>
 #include <cstdlib>
 #include <deque>
 #include <exception>
 #include <fstream>
 #include <limits>
+#include <map>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -91,10 +93,16 @@ struct ThreadPool::State {
   bool is_ending = false;
   std::vector<std::thread> threads;
 
+  int free_seats = 0;
+  std::map<std::thread::id, int> seated;  // rank, of threads that are not the pool's own
+  std::map<std::pair<int, std::uint64_t>, std::thread::id> waiting;  // by rank and order
+  std::uint64_t next_in_line = 0;
+  std::condition_variable seat_taken;
+
   void help_until_end() {
     std::unique_lock lock(mutex);
     for (;;) {
-      has_loop.wait(lock, [&] { return is_ending || !loops.empty(); });
+      has_loop.wait(lock, [&] { return is_ending || (!loops.empty() && free_seats > 0); });
       if (is_ending) return;
       Loop* loop = loops.front();
       if (!loop->has_work()) {
@@ -102,12 +110,40 @@ struct ThreadPool::State {
         continue;
       }
       ++loop->helpers;
+      --free_seats;
       lock.unlock();
       loop->work();
       lock.lock();
       --loop->helpers;
       helper_left.notify_all();
+      give_back_seat();
     }
+  }
+
+  // These three are called with the mutex held.
+
+  void take_seat(std::unique_lock<std::mutex>& lock, int rank) {
+    const std::thread::id self = std::this_thread::get_id();
+    waiting.emplace(std::pair(rank, next_in_line++), self);
+    hand_out_seats();
+    seat_taken.wait(lock, [&] { return seated.contains(self); });
+  }
+
+  void give_back_seat() {
+    ++free_seats;
+    hand_out_seats();
+  }
+
+  void hand_out_seats() {
+    bool is_taken = false;
+    for (; free_seats > 0 && !waiting.empty(); --free_seats) {
+      const auto first = waiting.begin();
+      seated.emplace(first->second, first->first.first);
+      waiting.erase(first);
+      is_taken = true;
+    }
+    if (is_taken) seat_taken.notify_all();
+    if (free_seats > 0 && !loops.empty()) has_loop.notify_all();
   }
 };
 
@@ -115,6 +151,8 @@ ThreadPool::ThreadPool(int threads) : state_(std::make_unique<State>()) {
   if (threads < 1 || threads > 1024) {
     throw Error(ErrorKind::Usage, "expected 1 to 1024 threads, found " + std::to_string(threads));
   }
+  state_->seated.emplace(std::this_thread::get_id(), std::numeric_limits<int>::max());
+  state_->free_seats = threads - 1;
   for (int i = 1; i < threads; ++i) {
     state_->threads.emplace_back([state = state_.get()] { state->help_until_end(); });
   }
@@ -129,6 +167,33 @@ ThreadPool::~ThreadPool() {
   for (std::thread& thread : state_->threads) thread.join();
 }
 
+ThreadPool::Seat::Seat(ThreadPool& pool, int rank) : pool_(pool) {
+  std::unique_lock lock(pool_.state_->mutex);
+  pool_.state_->take_seat(lock, rank);
+}
+
+ThreadPool::Seat::~Seat() {
+  const std::lock_guard lock(pool_.state_->mutex);
+  pool_.state_->seated.erase(std::this_thread::get_id());
+  pool_.state_->give_back_seat();
+}
+
+ThreadPool::Rest::Rest(ThreadPool& pool) : pool_(pool) {
+  const std::lock_guard lock(pool_.state_->mutex);
+  const auto own = pool_.state_->seated.find(std::this_thread::get_id());
+  had_seat_ = own != pool_.state_->seated.end();
+  if (!had_seat_) return;
+  rank_ = own->second;
+  pool_.state_->seated.erase(own);
+  pool_.state_->give_back_seat();
+}
+
+ThreadPool::Rest::~Rest() {
+  if (!had_seat_) return;
+  std::unique_lock lock(pool_.state_->mutex);
+  pool_.state_->take_seat(lock, rank_);
+}
+
 void ThreadPool::parallel_for(std::size_t count, const std::function<void(std::size_t)>& body) {
   Loop loop(count, body);
   if (count < 2 || state_->threads.empty() || is_inside_body()) {
@@ -139,8 +204,8 @@ void ThreadPool::parallel_for(std::size_t count, const std::function<void(std::s
   {
     const std::lock_guard lock(state_->mutex);
     state_->loops.push_back(&loop);
+    if (state_->free_seats > 0) state_->has_loop.notify_all();
   }
-  state_->has_loop.notify_all();
   loop.work();
   {
     std::unique_lock lock(state_->mutex);

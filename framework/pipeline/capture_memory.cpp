@@ -49,6 +49,16 @@ CaptureMemory capture_memory(const std::vector<Camera>& cameras, const NameSet& 
   return memory;
 }
 
+int default_visits_in_flight(int threads, std::uint64_t available_bytes,
+                             const CaptureMemory& memory) {
+  // Measured with furnished rooms: trees of the renderer and the physics, textures, work space.
+  constexpr std::uint64_t kVisitBytes = std::uint64_t(256) << 20;
+  // One that renders feeds several threads; one that simulates keeps one busy.
+  const int wanted = threads == 1 ? 1 : threads / 2 + 1;
+  const std::uint64_t each = kVisitBytes + memory.capture + memory.picture;
+  return int(std::clamp<std::uint64_t>(available_bytes / 2 / each, 1, std::uint64_t(wanted)));
+}
+
 std::string memory_text(const CaptureMemory& memory) {
   return "memory beside the scene: " + mib_text(memory.capture) + " for each capture, " +
          mib_text(memory.picture) + " more while a picture is rendered\n";

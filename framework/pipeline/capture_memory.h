@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,11 @@ struct CaptureMemory {
 /// `channels`: those that the renderer and the annotators make; other names count for nothing.
 CaptureMemory capture_memory(const std::vector<Camera>& cameras, const NameSet& channels,
                              const Renderer& renderer);
+
+/// How many visits keep that many threads busy, as far as their memory is there: each needs its
+/// scene, the engines' views of it and its captures. At most half of the memory is counted on.
+int default_visits_in_flight(int threads, std::uint64_t available_bytes,
+                             const CaptureMemory& memory);
 
 /// One line for the dry run.
 std::string memory_text(const CaptureMemory& memory);

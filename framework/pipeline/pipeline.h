@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <exception>
 #include <functional>
 #include <map>
 #include <memory>
@@ -12,42 +13,18 @@
 #include <string>
 #include <vector>
 
-#include "diorama/annotator.h"
-#include "diorama/host.h"
-#include "diorama/loader.h"
-#include "diorama/physics_backend.h"
-#include "diorama/randomizer.h"
-#include "diorama/renderer.h"
 #include "diorama/writer.h"
+#include "framework/host/host_services.h"
 #include "framework/output/output_store.h"
 #include "framework/pipeline/capture_plan.h"
-#include "framework/pipeline/demand.h"
 #include "framework/pipeline/job.h"
-#include "framework/pipeline/pattern_check.h"
-#include "framework/pipeline/settle_check.h"
+#include "framework/pipeline/job_components.h"
 #include "framework/pipeline/settling.h"
 #include "framework/pipeline/view_report.h"
+#include "framework/pipeline/visit_run.h"
 #include "framework/pipeline/writer_queue.h"
 
 namespace diorama {
-
-/// Everything that a job's entries turned into, in the order of the job.
-struct JobComponents {
-  std::vector<std::unique_ptr<Loader>> environments;
-  std::vector<std::unique_ptr<PhysicsBackend>> physics;  ///< Empty or one.
-  std::unique_ptr<Renderer> renderer;
-  std::vector<std::unique_ptr<Randomizer>> randomizers;
-  std::vector<std::unique_ptr<Writer>> writers;
-  /// Those that the writers' needs ask for, in working order.
-  struct NamedAnnotator {
-    std::string type;
-    std::unique_ptr<Annotator> annotator;
-  };
-  std::vector<NamedAnnotator> annotators;
-  Demand demand;
-  /// Of randomizers; they can be tried only once an environment is there.
-  std::vector<EnvironmentPattern> environment_patterns;
-};
 
 /// How far a run is.
 struct RunProgress {
@@ -64,7 +41,10 @@ struct RunOptions {
   bool only_finishes = false;              ///< Makes no captures.
   std::optional<std::set<int>> only = {};  ///< Captures to make; the others are left out.
   std::size_t queue_bytes = std::size_t(256) << 20;  ///< Of captures that wait to be written.
-  const std::atomic<bool>* stop = nullptr;           ///< True asks the run to end soon.
+  /// Whether writers get captures in their order, and none of a visit before all of those before it
+  /// were made. If not, later visits are encoded meanwhile; either way they are published in order.
+  bool encodes_in_order = false;
+  const std::atomic<bool>* stop = nullptr;  ///< True asks the run to end soon.
   /// Called on the main thread after each capture.
   std::function<void(const RunProgress&)> progress;
 };
@@ -77,25 +57,22 @@ struct RunSummary {
   int missing = 0;           ///< Captures of the job that other workers have to make.
   bool is_finished = false;  ///< The dataset is complete, whoever finished it.
   std::uint64_t bytes_written = 0;
-  std::map<std::string, double> seconds;  ///< Phase to wall time.
+  double wall_s = 0.0;
+  std::map<std::string, double> seconds;  ///< Phase to wall time, summed over all visits.
   std::vector<VisitReport> visits;
   ViewCounts views;  ///< Of the captures that this run made.
 };
 
 std::string summary_text(const RunSummary& summary);
 
-/// The run was asked to stop; what is on disk can be resumed.
-class Interrupted final : public std::exception {
- public:
-  ~Interrupted() override;
-  const char* what() const noexcept override { return "interrupted"; }
-};
-
-/// Runs a planned job. The source reads in the order in which things happen.
+/// Runs a planned job: as many visits at a time as there are sets of components, each by a thread
+/// of its own (a single one by the calling thread), their captures handed on in planned order. What
+/// is on disk, and what is thrown, is what the visits would have left one after the other (ADR
+/// 0052).
 class Pipeline {
  public:
-  /// All references must outlive the pipeline.
-  Pipeline(const Job& job, const CapturePlan& plan, JobComponents& components, Host& host,
+  /// All references must outlive the pipeline. Made and run by the thread that made the host.
+  Pipeline(const Job& job, const CapturePlan& plan, JobComponents& components, HostServices& host,
            OutputStore& store, RunOptions options);
   ~Pipeline();
 
@@ -104,51 +81,42 @@ class Pipeline {
   RunSummary run(const DatasetInfo& dataset, const std::string& dataset_json);
 
  private:
-  struct Visit;
-  class Clock;
-  void run_visit(const PlannedVisit& planned);
-  Visit set_up(const PlannedVisit& planned);
-  void randomize(Visit& visit, const std::string& moment, int number, int capture);
-  struct Draw;
-  std::vector<std::size_t> call_randomizers(Visit& visit, const std::string& moment, int number,
-                                            int capture, const Draw& draw);
-  void simulate(Visit& visit, const TimelineStep& step);
-  void advance(Visit& visit, const TimelineStep& step);
-  std::vector<Flaw> unsettled(const Visit& visit, const TimelineStep& step) const;
-  void respawn(Visit& visit, const std::vector<Flaw>& flaws);
-  void drop(Visit& visit, const std::vector<Flaw>& flaws);
-  void reset_physics(Visit& visit);
-  void take_captures(Visit& visit, const TimelineStep& step);
-  void take(Visit& visit, const PlannedCapture& planned);
-  std::vector<ViewOutcome> take_frames(Visit& visit, const PlannedCapture& planned,
-                                       std::vector<Frame>& frames);
-  void prepare_renderer(const Visit& visit);
-  Frame make_frame(Visit& visit, std::size_t camera, int capture);
-  Image<Rgba8> make_overview(Visit& visit, int capture);
-  VisitReport report_on(const Visit& visit) const;
+  struct Flight;
+  struct Turn;
+  void run_visits();
+  void take_turns(VisitComponents& components);
+  std::optional<Turn> next_turn();
+  std::optional<PlannedVisit> next_visit();
+  VisitResult run_visit(const Turn& turn, VisitComponents& components);
+  void end_turn(const Turn& turn, VisitResult result);
+  void fail_turn(const Turn& turn, std::exception_ptr error);
+  void add_up(VisitResult result);
+  void wait_for_output(const Turn& turn);
+  void hand_over(const Turn& turn, PendingCapture pending, const VisitResult& result);
+  void call_on_main_thread(const std::function<void()>& call);
+  void serve_visits();
+  bool has_to_stop(const Turn& turn) const;
   /// Calls `visit` with every planned visit of this shard.
   void for_each_visit(const std::function<void(const PlannedVisit&)>& visit) const;
   void end_early();
   bool is_needed(const PlannedVisit& planned) const;
   bool is_needed(int capture) const;
-  void run_visits();
   void begin_output();
-  void write(const PendingCapture& pending);
+  Transaction encode(const PendingCapture& pending);
   void finish_output(const DatasetInfo& dataset);
-  void stop_if_asked() const;
 
   const Job& job_;
   const CapturePlan& plan_;
   JobComponents& components_;
-  Host& host_;
+  HostServices& host_;
   OutputStore& store_;
   RunOptions options_;
   JobStreams streams_;
   const DatasetInfo* dataset_ = nullptr;
   const std::string* dataset_json_ = nullptr;
-  bool has_begun_ = false;
   int total_ = 0;
   RunSummary summary_;
+  std::unique_ptr<Flight> flight_;
   std::unique_ptr<WriterQueue> queue_;
 };
 

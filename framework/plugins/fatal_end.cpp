@@ -34,9 +34,11 @@ std::atomic<pid_t> watched_process = 0;  // 0: none
 
 thread_local const AtWork* at_work = nullptr;
 thread_local int at_capture = kNoCapture;
-// What the main thread is at: threads that a component has started say nothing of themselves.
+// Threads that a component has started say nothing of themselves. They are those of what the main
+// thread is at, or else, while visits overlap, most likely of what was begun last.
 std::atomic<const AtWork*> main_at_work = nullptr;
 std::atomic<int> main_at_capture = kNoCapture;
+std::atomic<const AtWork*> last_at_work = nullptr;
 
 bool is_watched() { return watched_process == getpid(); }
 bool is_main_thread() { return gettid() == getpid(); }
@@ -73,16 +75,17 @@ class Line {
   std::size_t size_ = 0;
 };
 
-/// "writer 'boxes' at capture 3"; `by_other_thread` when it is what the main thread is at.
+/// "writer 'boxes' at capture 3".
 void name_work(Line& line) {
   const AtWork* const own = at_work;
-  const AtWork* const work = own ? own : main_at_work.load();
+  const AtWork* const of_main = main_at_work.load();
+  const AtWork* const work = own ? own : of_main ? of_main : last_at_work.load();
   if (!work) {
     line << "the program";
     return;
   }
   line << work->who();
-  const int capture = own ? at_capture : main_at_capture.load();
+  const int capture = own ? at_capture : of_main ? main_at_capture.load() : kNoCapture;
   if (capture != kNoCapture) line << " at capture " << capture;
   if (!own) line << " (or a thread of its libraries)";
 }
@@ -169,12 +172,28 @@ AtWork::AtWork(std::string_view who) : before_(at_work) {
   who_[count] = '\0';
   make_handler_stack();
   at_work = this;
+  last_at_work = this;
   if (is_main_thread()) main_at_work = this;
 }
 
 AtWork::~AtWork() {
   at_work = before_;
+  const AtWork* self = this;
+  last_at_work.compare_exchange_strong(self, before_);
   if (is_main_thread()) main_at_work = before_;
+}
+
+WorkAtHand::WorkAtHand() : work_(at_work), capture_(at_capture) {}
+
+WorkAtHand::Helper::Helper(const WorkAtHand& work) : before_(at_work), capture_before_(at_capture) {
+  make_handler_stack();
+  at_work = work.work_;
+  at_capture = work.capture_;
+}
+
+WorkAtHand::Helper::~Helper() {
+  at_work = before_;
+  at_capture = capture_before_;
 }
 
 AtCapture::AtCapture(int index) : before_(at_capture) {

@@ -21,6 +21,30 @@ class AtWork {
   const AtWork* before_;
 };
 
+/// What the thread that makes it is at, for threads that help it.
+class WorkAtHand {
+ public:
+  WorkAtHand();
+
+  /// Says, while it lives, that this thread is at the same. The helped one must not go on
+  /// meanwhile.
+  class Helper {
+   public:
+    explicit Helper(const WorkAtHand& work);
+    ~Helper();
+    Helper(const Helper&) = delete;
+    Helper& operator=(const Helper&) = delete;
+
+   private:
+    const AtWork* before_;
+    int capture_before_;
+  };
+
+ private:
+  const AtWork* work_;
+  int capture_;
+};
+
 /// Says, while it lives, which capture this thread works on.
 class AtCapture {
  public:

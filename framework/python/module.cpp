@@ -438,6 +438,7 @@ void listen(const std::string& program, const Value& given, const py::object& on
     OutputStore store(memory, folders, assembly.plan.capture_count(), {});
     RunOptions run;
     run.stop = &own.stop();
+    run.encodes_in_order = true;
     run.progress = [&](const RunProgress&) { own.look_for_signals(); };
     try {
       Pipeline(assembly.job, assembly.plan, assembly.components, *host, store, run)

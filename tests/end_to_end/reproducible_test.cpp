@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <csignal>
+#include <utility>
 
 #include "program.h"
 #include "support/catch.h"
@@ -62,6 +63,42 @@ TEST_CASE("Path-traced datasets are the same bytes for any number of threads", "
   }
 }
 
+TEST_CASE("Any number of visits in flight gives the same bytes", "[run]") {
+  // What the default job randomizes, on rooms that need no assets.
+  std::string job = read_file(config_file("smoke.yaml"));
+  const auto put_behind = [&](const std::string& line, const std::string& more) {
+    job.insert(job.find(line) + line.size(), more);
+  };
+  put_behind("lights:\n", "  - {type: sphere, name: lamp, count: 2, radius_m: 0.1}\n");
+  put_behind(
+      "randomizers:\n",
+      "  - {type: random_colors, name: colors, on: [environment], nodes: \"/Assets/**\"}\n"
+      "  - {type: scatter_lights, name: lamps, on: [environment], nodes: \"/Lights/lamp_*\", "
+      "offset: [[-1, 1], [-1, 1], [1, 2]], intensity: [500, 2500]}\n"
+      "  - {type: dome_light, name: sky, on: [environment], nodes: \"/Lights/sky_*\", "
+      "intensity: [500, 1500]}\n");
+  const TemporaryFolder folder;
+  write_file(folder / "job.yaml", job);
+  int runs = 0;
+  const auto dataset_with = [&](const std::string& visits, const std::string& threads) {
+    const std::string output = "out_" + std::to_string(runs++);
+    const Outcome outcome = run(
+        {"run", "job.yaml", "--set", "total_captures=9", "--visits-in-flight", visits, "--threads",
+         threads, "--output", output, "--set", "renderer={type: embree, mode: real_time}"},
+        folder.path());
+    INFO(outcome.errors);
+    REQUIRE(outcome.exit_code == 0);
+    return tree(folder / output);
+  };
+  const auto expected = dataset_with("1", "1");
+  for (const char* visits : {"1", "2", "4"}) {
+    for (const char* threads : {"1", "2", "4"}) {
+      CAPTURE(visits, threads);
+      CHECK(difference(expected, dataset_with(visits, threads)) == "");
+    }
+  }
+}
+
 TEST_CASE("Another seed gives other data", "[run]") {
   const TemporaryFolder first;
   const TemporaryFolder second;
@@ -86,36 +123,46 @@ TEST_CASE("After kill -9 a resumed run gives the same bytes", "[run]") {
   const std::vector<std::string> longer{"--set", "total_captures=40"};
   const TemporaryFolder whole;
   const auto expected = dataset(whole, longer);
-  const TemporaryFolder folder;
-  std::vector<std::string> arguments = smoke("out", {"--set", "total_captures=40", "--resume"});
-  for (const std::size_t captures : {1, 9, 22}) {
-    Process process(arguments, folder.path());
-    REQUIRE(wait_for_captures(folder / "out", captures));
-    process.signal(SIGKILL);
-    CHECK(process.wait().exit_code == 128 + SIGKILL);
+  for (const char* visits : {"1", "4"}) {
+    CAPTURE(visits);
+    const TemporaryFolder folder;
+    const std::vector<std::string> arguments =
+        smoke("out", {"--set", "total_captures=40", "--resume", "--visits-in-flight", visits});
+    for (const std::size_t captures : {1, 9, 22}) {
+      Process process(arguments, folder.path());
+      REQUIRE(wait_for_captures(folder / "out", captures));
+      process.signal(SIGKILL);
+      CHECK(process.wait().exit_code == 128 + SIGKILL);
+    }
+    CHECK(journal_entries(folder / "out") < 40);
+    const Outcome outcome = run(arguments, folder.path());
+    INFO(outcome.errors);
+    CHECK(outcome.exit_code == 0);
+    CHECK(difference(expected, tree(folder / "out")) == "");
   }
-  CHECK(journal_entries(folder / "out") < 40);
-  const Outcome outcome = run(arguments, folder.path());
-  INFO(outcome.errors);
-  CHECK(outcome.exit_code == 0);
-  CHECK(difference(expected, tree(folder / "out")) == "");
 }
 
-TEST_CASE("Ctrl-C ends a run with 130 and leaves it resumable", "[run]") {
+TEST_CASE("Ctrl-C and SIGTERM end a run with 130 and leave it resumable", "[run]") {
   const std::vector<std::string> longer{"--set", "total_captures=40"};
   const TemporaryFolder whole;
   const auto expected = dataset(whole, longer);
-  const TemporaryFolder folder;
-  Process process(smoke("out", longer), folder.path());
-  REQUIRE(wait_for_captures(folder / "out", 2));
-  process.signal(SIGINT);
-  const Outcome outcome = process.wait();
-  CHECK(outcome.exit_code == 130);
-  CHECK_THAT(outcome.errors, ContainsSubstring("interrupted; '--resume' goes on"));
-  CHECK_FALSE(fs::exists(folder / "out/.diorama/stage"));
-  CHECK(run(smoke("out", {"--set", "total_captures=40", "--resume"}), folder.path()).exit_code ==
-        0);
-  CHECK(difference(expected, tree(folder / "out")) == "");
+  for (const auto& [signal, visits] : {std::pair(SIGINT, "1"), {SIGTERM, "4"}}) {
+    CAPTURE(signal, visits);
+    const TemporaryFolder folder;
+    const std::vector<std::string> arguments =
+        smoke("out", {"--set", "total_captures=40", "--visits-in-flight", visits});
+    Process process(arguments, folder.path());
+    REQUIRE(wait_for_captures(folder / "out", 2));
+    process.signal(signal);
+    const Outcome outcome = process.wait();
+    CHECK(outcome.exit_code == 130);
+    CHECK_THAT(outcome.errors, ContainsSubstring("interrupted; '--resume' goes on"));
+    CHECK_FALSE(fs::exists(folder / "out/.diorama/stage"));
+    std::vector<std::string> resumed = arguments;
+    resumed.emplace_back("--resume");
+    CHECK(run(resumed, folder.path()).exit_code == 0);
+    CHECK(difference(expected, tree(folder / "out")) == "");
+  }
 }
 
 TEST_CASE("Ctrl-C and SIGTERM are felt inside a picture, which is not written", "[run]") {

@@ -7,7 +7,7 @@
 
 namespace diorama {
 
-/// Derives channels or annotations from what was rendered. Called on the main thread. With its
+/// Derives channels or annotations from what was rendered. Called by one thread at a time. With its
 /// default parameters it needs and provides what its plugin lists (DIORAMA_ADD_ANNOTATOR), so that
 /// none is made that no job uses.
 class DIORAMA_SDK_API Annotator : public Component {

@@ -42,7 +42,7 @@ class DIORAMA_SDK_API Stopped : public Error {
 };
 
 /// What the host does for plugins. Outlives every component. Every function may be called from any
-/// thread, except load_asset (main thread only).
+/// thread; load_asset not from within the bodies of parallel_for.
 class DIORAMA_SDK_API Host {
  public:
   virtual ~Host();
@@ -80,7 +80,7 @@ class DIORAMA_SDK_API Host {
   virtual int thread_count() const = 0;
 
   /// Whether the job is to end soon (Ctrl-C, SIGTERM). What takes seconds asks it now and then, but
-  /// for writers: captures that were made are written. On the main thread parallel_for() asks it
+  /// for writers: captures that were made are written. Except in writers parallel_for() asks it
   /// before each body and throws Stopped.
   virtual bool stop_requested() const;
   /// Throws Stopped if so.

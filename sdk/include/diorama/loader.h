@@ -13,7 +13,7 @@
 namespace diorama {
 
 /// Puts environments and assets into a scene. An asset is named by a file path or by
-/// "scheme:rest" ("dining_room:7", "shape:cube"). Called on the main thread.
+/// "scheme:rest" ("dining_room:7", "shape:cube"). Called by one thread at a time.
 class DIORAMA_SDK_API Loader : public Component {
  public:
   static constexpr ComponentKind kKind = ComponentKind::Loader;

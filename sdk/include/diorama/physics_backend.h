@@ -18,7 +18,7 @@ struct PhysicsReport {
 };
 
 /// Rigid bodies. The scene is the truth between calls; the engine holds velocities and contacts.
-/// Called on the main thread. Same scene, same calls: same bits.
+/// Called by one thread at a time. Same scene, same calls: same bits.
 class DIORAMA_SDK_API PhysicsBackend : public Component {
  public:
   static constexpr ComponentKind kKind = ComponentKind::Physics;

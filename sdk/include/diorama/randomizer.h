@@ -19,7 +19,7 @@ struct RandomizeContext {
   int occurrence = 0;
 };
 
-/// Changes poses, lights, materials, cameras. Called on the main thread.
+/// Changes poses, lights, materials, cameras. Called by one thread at a time.
 class DIORAMA_SDK_API Randomizer : public Component {
  public:
   static constexpr ComponentKind kKind = ComponentKind::Randomizer;

@@ -28,7 +28,7 @@ struct RenderReport {
   std::vector<std::pair<std::string, double>> seconds;
 };
 
-/// Turns a scene into channels. Called on the main thread; may use Host::parallel_for inside.
+/// Turns a scene into channels. Called by one thread at a time; may use Host::parallel_for.
 class DIORAMA_SDK_API Renderer : public Component {
  public:
   static constexpr ComponentKind kKind = ComponentKind::Renderer;

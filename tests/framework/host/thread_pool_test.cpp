@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
+#include <mutex>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -62,4 +65,93 @@ TEST_CASE("a pool needs at least one thread", "[host]") {
   CHECK_THROWS_WITH(ThreadPool(0), "expected 1 to 1024 threads, found 0");
   CHECK_THROWS_WITH(ThreadPool(-4), "expected 1 to 1024 threads, found -4");
   CHECK(ThreadPool::available_threads() >= 1);
+}
+
+TEST_CASE("no more threads have a seat than the pool has, by rank and then in order", "[host]") {
+  ThreadPool pool(2);
+  std::atomic<int> seated = 0;
+  std::atomic<int> most = 0;
+  std::mutex mutex;
+  std::vector<int> order;
+  std::vector<std::thread> threads;
+  std::atomic<int> waiting = 0;
+  std::atomic<bool> is_full = false;
+  std::atomic<bool> may_leave = false;
+  std::thread busy([&] {  // with this thread's own, both seats
+    const ThreadPool::Seat seat(pool, 0);
+    is_full = true;
+    while (!may_leave) std::this_thread::yield();
+  });
+  while (!is_full) std::this_thread::yield();
+  for (const int rank : {5, 3, 9, 1}) {
+    threads.emplace_back([&, rank] {
+      ++waiting;
+      const ThreadPool::Seat seat(pool, rank);
+      most = std::max(most.load(), ++seated);
+      {
+        const std::lock_guard lock(mutex);
+        order.push_back(rank);
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+      --seated;
+    });
+  }
+  while (waiting < 4) std::this_thread::yield();
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  {
+    const std::lock_guard lock(mutex);
+    CHECK(order.empty());
+  }
+  may_leave = true;
+  busy.join();
+  for (std::thread& thread : threads) thread.join();
+  CHECK(order == std::vector<int>{1, 3, 5, 9});
+  CHECK(most == 1);
+}
+
+TEST_CASE("a thread that rests lends its seat to another and to helpers of loops", "[host]") {
+  ThreadPool pool(1);
+  std::atomic<bool> had_seat = false;
+  std::thread other([&] {
+    const ThreadPool::Seat seat(pool, 1);
+    had_seat = true;
+    std::atomic<int> runs = 0;
+    pool.parallel_for(10, [&](std::size_t) { ++runs; });
+    CHECK(runs == 10);
+  });
+  {
+    const ThreadPool::Rest rest(pool);
+    const ThreadPool::Rest again(pool);  // has nothing to lend
+    other.join();
+  }
+  CHECK(had_seat);
+}
+
+TEST_CASE("loops are shared only with threads that find a free seat", "[host]") {
+  ThreadPool pool(3);
+  const auto threads_of_loop = [&] {
+    std::mutex mutex;
+    std::set<std::thread::id> threads;
+    pool.parallel_for(300, [&](std::size_t) {
+      std::this_thread::sleep_for(std::chrono::microseconds(100));
+      const std::lock_guard lock(mutex);
+      threads.insert(std::this_thread::get_id());
+    });
+    return threads.size();
+  };
+  std::atomic<bool> is_over = false;
+  std::atomic<int> seated = 0;
+  std::vector<std::thread> busy;
+  for (int i = 0; i < 2; ++i) {
+    busy.emplace_back([&] {
+      const ThreadPool::Seat seat(pool, i);
+      ++seated;
+      while (!is_over) std::this_thread::yield();
+    });
+  }
+  while (seated < 2) std::this_thread::yield();
+  CHECK(threads_of_loop() == 1);
+  is_over = true;
+  for (std::thread& thread : busy) thread.join();
+  CHECK(threads_of_loop() > 1);
 }

@@ -1,0 +1,423 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/pipeline/visit_run.h"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include "framework/annotators/occlusion_order.h"
+#include "framework/annotators/visibility.h"
+#include "framework/config/clean_text.h"
+#include "framework/pipeline/physics_view.h"
+#include "framework/pipeline/scene_setup.h"
+#include "framework/pipeline/view_search.h"
+#include "framework/plugins/fatal_end.h"
+#include "framework/plugins/plugin_call.h"
+
+namespace diorama {
+
+/// Adds the time until its end to a phase.
+class VisitRun::Clock {
+ public:
+  Clock(VisitResult& result, const char* phase)
+      : seconds_(result.seconds[phase]), start_(std::chrono::steady_clock::now()) {}
+  ~Clock() {
+    seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  }
+  Clock(const Clock&) = delete;
+  Clock& operator=(const Clock&) = delete;
+
+ private:
+  double& seconds_;
+  std::chrono::steady_clock::time_point start_;
+};
+
+/// Which numbers randomizers draw at a moment: 0 of any stream are the first ones.
+struct VisitRun::Draw {
+  const char* stream = "";
+  int number = 0;
+  const std::vector<std::size_t>* only = nullptr;  ///< Indices of randomizers; null: all.
+};
+
+namespace {
+
+std::vector<Mat4> object_poses(const Scene& scene, const std::vector<NodeId>& objects) {
+  std::vector<Mat4> poses;
+  poses.reserve(objects.size());
+  for (const NodeId object : objects) poses.push_back(scene.world_from_node(object).matrix());
+  return poses;
+}
+
+/// Cameras and rigs.
+std::vector<NodeId> camera_tops(const Scene& scene) {
+  const NodeId parent = scene.find("/Cameras");
+  return parent ? scene[parent].children : std::vector<NodeId>();
+}
+
+std::vector<NodeId> nodes_of(const std::vector<Flaw>& flaws) {
+  std::vector<NodeId> nodes;
+  for (const Flaw& flaw : flaws) nodes.push_back(flaw.node);
+  return nodes;
+}
+
+void note(const Scene& scene, const std::vector<Flaw>& flaws, std::vector<Incident>& incidents) {
+  for (const Flaw& flaw : flaws) incidents.push_back({scene.path(flaw.node), flaw.why});
+}
+
+}  // namespace
+
+Interrupted::~Interrupted() = default;
+
+VisitRun::VisitRun(Setting setting, const PlannedVisit& planned)
+    : setting_(std::move(setting)),
+      job_(setting_.job),
+      components_(setting_.components),
+      host_(setting_.host),
+      planned_(planned) {}
+
+VisitRun::~VisitRun() = default;
+
+VisitResult VisitRun::run() {
+  set_up();
+  randomize("environment", 0, -1);
+  note(scene_, find_born_inside(scene_, objects_), report_.born_inside);
+  reset_physics();
+  for (const TimelineStep& step : job_.timeline) {
+    if (next_capture_ == planned_.capture_count) break;
+    switch (step.kind) {
+      case TimelineStep::Kind::Simulate:
+        --simulations_to_come_;
+        simulate(step);
+        break;
+      case TimelineStep::Kind::Capture:
+        take_captures(step);
+        break;
+      case TimelineStep::Kind::Event:
+        randomize(step.name, events_[step.name]++, -1);
+        break;
+    }
+  }
+  result_.respawned = int(report_.respawned.size());
+  return std::move(result_);
+}
+
+void VisitRun::set_up() {
+  const Clock clock(result_, "loading");
+  setting_.stop_if_asked();
+  const EnvironmentChoice& choice = setting_.plan.environments[planned_.environment];
+  host_.log(LogLevel::Info, "visit " + std::to_string(planned_.index + 1) + " of " +
+                                std::to_string(setting_.plan.visit_count()) + ": " + choice.asset);
+  environment_ = load_environment(choice.asset, job_.environments[choice.entry],
+                                       *components_.environments[choice.entry], scene_, host_);
+  working_area_world_ =
+      apply_environment_rules(job_.environment, job_.debug, environment_, scene_, host_);
+  objects_ = spawn_objects(plan_objects(job_, setting_.plan.object_assets, planned_.index), job_,
+                                scene_, host_);
+  create_lights(job_.lights, scene_, host_);
+  cameras_ = create_cameras(job_.cameras, scene_);
+  small_cameras_ = create_small_cameras(job_, cameras_, scene_);
+  simulations_to_come_ =
+      int(std::count_if(job_.timeline.begin(), job_.timeline.end(), [](const TimelineStep& step) {
+        return step.kind == TimelineStep::Kind::Simulate;
+      }));
+  for (const EnvironmentPattern& pattern : setting_.shared.environment_patterns) {
+    if (!scene_.match(pattern.text).empty()) continue;
+    host_.log(LogLevel::Warning,
+              choice.asset + ": no node fits '" + pattern.text + "' (" + pattern.key + ")");
+  }
+  // The first visit of each environment shows it from above.
+  if (job_.debug && std::size_t(planned_.index) == planned_.environment) {
+    overview_ = create_overview_camera(working_area_world_, scene_);
+  }
+}
+
+void VisitRun::randomize(const std::string& moment, int number, int capture) {
+  const Clock clock(result_, "randomizing");
+  const PhysicsView before(scene_);
+  const std::vector<Mat4> poses = object_poses(scene_, objects_);
+  camera_randomizers_ = call_randomizers(moment, number, capture, {});
+  if (moment == "environment" || before.is_of(scene_)) return;
+  if (object_poses(scene_, objects_) != poses) before_last_step_.clear();
+  // The engine holds everything as it was, and what sleeps there rests on what may be gone.
+  reset_physics();
+}
+
+/// Returns those that moved cameras or changed their lenses.
+std::vector<std::size_t> VisitRun::call_randomizers(const std::string& moment,
+                                                    int number, int capture, const Draw& draw) {
+  RandomizeContext context;
+  context.moment = moment;
+  context.capture = capture;
+  context.working_area_world = working_area_world_;
+  std::vector<std::size_t> of_cameras;
+  for (std::size_t i = 0; i < job_.randomizers.size(); ++i) {
+    if (draw.only && std::ranges::find(*draw.only, i) == draw.only->end()) continue;
+    const RandomizerEntry& entry = job_.randomizers[i];
+    const auto call = randomizer_call(job_, entry, moment, planned_.index, number);
+    if (!call) continue;
+    context.occurrence = call->occurrence;
+    Rng rng = setting_.streams.randomizer(entry.name, call->visit, moment, capture >= 0 ? capture : number);
+    if (draw.number > 0) rng = rng.fork(draw.stream).fork(std::uint64_t(draw.number));
+    const SavedView cameras(scene_, camera_tops(scene_));
+    call_component("randomizer '" + entry.name + "'",
+                   [&] { components_.randomizers[i]->randomize(scene_, context, rng); });
+    if (!cameras.is_of(scene_)) of_cameras.push_back(i);
+  }
+  return of_cameras;
+}
+
+void VisitRun::reset_physics() {
+  if (!components_.physics) return;
+  call_component("physics '" + job_.physics.type + "'",
+                 [&] { components_.physics->reset(scene_); });
+}
+
+/// Takes the steps, and deals with what has not settled afterwards.
+void VisitRun::simulate(const TimelineStep& step) {
+  advance(step);
+  if (job_.settle.policy == "keep") return;
+  std::vector<Flaw> flaws = unsettled(step);
+  if (job_.settle.policy == "respawn") {
+    for (int i = 0; i < job_.settle.max_respawns && !flaws.empty(); ++i) {
+      respawn(flaws);
+      advance(step);
+      flaws = unsettled(step);
+    }
+  }
+  while (!flaws.empty()) {
+    drop(flaws);
+    // What lay on them falls.
+    if (!step.until_rest) return;
+    advance(step);
+    flaws = unsettled(step);
+  }
+}
+
+/// After a fixed number of steps things may well be in motion; nothing may be outside the room.
+std::vector<Flaw> VisitRun::unsettled(const TimelineStep& step) const {
+  if (!components_.physics) return {};
+  const Room room(scene_, environment_);
+  if (step.until_rest) {
+    return find_unsettled(scene_, room, objects_, {job_.settle.rest_speed});
+  }
+  std::vector<Flaw> flaws;
+  for (const NodeId object : objects_) {
+    if (!room.holds(scene_, object)) flaws.push_back({object, "left the room"});
+  }
+  return flaws;
+}
+
+void VisitRun::advance(const TimelineStep& step) {
+  const Clock clock(result_, "simulating");
+  const Room room(scene_, environment_);
+  // Short enough that Ctrl-C is felt, and that the time to rest is known well.
+  constexpr int kStepsAtOnce = 5;
+  // At its highest point a thing is slow as well.
+  constexpr double kRestS = 0.25;
+  const auto take = [&](int steps) {
+    if (!components_.physics) return;
+    call_component("physics '" + job_.physics.type + "'",
+                   [&] { components_.physics->advance(scene_, steps); });
+    simulated_s_ += steps * components_.physics->step_seconds();
+  };
+  const double start_s = simulated_s_;
+  const auto is_at_rest = [&] {
+    return simulated_s_ - std::max(start_s, moving_until_s_) >= kRestS - 1e-9;
+  };
+  for (int taken = 0; taken < step.steps;) {
+    setting_.stop_if_asked();
+    const int now = std::min(kStepsAtOnce, step.steps - taken);
+    const bool may_be_last = step.until_rest || taken + now == step.steps;
+    // The last step goes by itself: what it moves is the motion that captures show.
+    if (may_be_last && setting_.shared.demand.motion) {
+      take(now - 1);
+      before_last_step_ = body_poses(scene_);
+      take(1);
+    } else {
+      take(now);
+    }
+    taken += now;
+    if (fastest_falling(scene_, room, objects_) > job_.settle.rest_speed) {
+      moving_until_s_ = simulated_s_;
+    }
+    if (step.until_rest && taken >= step.at_least && is_at_rest()) return;
+    if (!components_.physics) return;
+  }
+}
+
+/// Places the objects as the moment "environment" may place them, where they meet nothing; all else
+/// stays as it is.
+void VisitRun::respawn(const std::vector<Flaw>& flaws) {
+  const Clock clock(result_, "randomizing");
+  // The randomizers place all objects, and clear of each other; those that stay are elsewhere.
+  constexpr int kDraws = 16;
+  note(scene_, flaws, report_.respawned);
+  std::vector<NodeId> to_place = nodes_of(flaws);
+  for (int i = 0; i < kDraws && !to_place.empty(); ++i) {
+    const SavedNodes others(scene_, to_place);
+    call_randomizers("environment", 0, -1, {"respawn", ++redraws_});
+    others.restore(scene_);
+    std::vector<NodeId> inside = nodes_of(find_born_inside(scene_, objects_));
+    std::erase_if(to_place, [&](NodeId object) {
+      return std::find(inside.begin(), inside.end(), object) == inside.end();
+    });
+  }
+  before_last_step_.clear();
+  reset_physics();
+}
+
+void VisitRun::drop(const std::vector<Flaw>& flaws) {
+  note(scene_, flaws, report_.dropped);
+  for (const NodeId object : nodes_of(flaws)) {
+    scene_.erase(object);
+    std::erase(objects_, object);
+  }
+  // The others stay where their last step took them: captures show its motion.
+  reset_physics();
+}
+
+void VisitRun::take_captures(const TimelineStep& step) {
+  for (int i = 0; i < step.count; ++i) {
+    if (next_capture_ == planned_.capture_count) return;
+    const PlannedCapture planned =
+        setting_.plan.capture(planned_.first_capture + next_capture_++);
+    randomize(planned.phase, planned.number, planned.index);
+    if (setting_.is_needed(planned.index)) take(planned);
+  }
+}
+
+void VisitRun::take(const PlannedCapture& planned) {
+  setting_.stop_if_asked();
+  setting_.before_capture();
+  const AtCapture at_capture(planned.index);
+  PendingCapture pending;
+  Capture& capture = pending.capture;
+  capture.index = planned.index;
+  capture.visit = planned_.index;
+  capture.phase = planned.phase;
+  capture.environment = clean_name(setting_.plan.environments[planned_.environment].asset);
+  const SavedView drawn(scene_, camera_tops(scene_));
+  const std::vector<ViewOutcome> views = take_frames(planned, capture.frames);
+  if (!views.empty()) pending.views_json = outcomes_json(views);
+  result_.views.emplace_back(planned.index, views);
+  if (overview_ && next_capture_ == 1) {
+    pending.overview = make_overview(planned.index);
+  }
+  // The next capture starts from where the randomizers put the cameras, whatever views this one
+  // chose: it may be made alone.
+  drawn.restore(scene_);
+  // A visit that is cut short ends with its objects in the air, which says nothing.
+  const bool is_last = next_capture_ == planned_.capture_count;
+  if (is_last && simulations_to_come_ == 0) {
+    result_.reports.push_back(report());
+    pending.settle_json = settle_json(result_.reports.back());
+  }
+  ++result_.captures;
+  result_.respawned = int(report_.respawned.size());
+  const Clock clock(result_, "waiting for writers");
+  setting_.hand_over(std::move(pending), result_);
+}
+
+void VisitRun::prepare_renderer() {
+  const Clock clock(result_, "preparing renderer");
+  call_component("renderer '" + job_.renderer.type + "'",
+                 [&] { components_.renderer->prepare(scene_); });
+}
+
+/// The pictures of all cameras, from views as the job wants them.
+std::vector<ViewOutcome> VisitRun::take_frames(const PlannedCapture& planned,
+                                               std::vector<Frame>& frames) {
+  ViewSearch search({job_, setting_.streams, host_, *components_.renderer, scene_, cameras_,
+                     small_cameras_, planned, !camera_randomizers_.empty(),
+                     [&](int number) {
+                       call_randomizers(planned.phase, planned.number, planned.index,
+                                        {"view", number, &camera_randomizers_});
+                     }});
+  const auto choose_views = [&] {
+    const Clock clock(result_, "choosing views");
+    search.run();
+  };
+  choose_views();
+  note(scene_, find_blocked_cameras(scene_, cameras_), report_.cameras);
+  prepare_renderer();
+  for (std::size_t i = 0; i < cameras_.size(); ++i) {
+    setting_.stop_if_asked();
+    frames.push_back(make_frame(i, planned.index));
+  }
+  for (auto refused = search.refuse_pictures(frames); !refused.empty();) {
+    choose_views();
+    prepare_renderer();
+    for (const std::size_t i : refused) frames[i] = make_frame(i, planned.index);
+    refused = search.refuse_pictures(frames);
+  }
+  return search.outcomes();
+}
+
+Frame VisitRun::make_frame(std::size_t camera, int capture) {
+  const NodeId node = cameras_[camera];
+  const std::string who = "renderer '" + job_.renderer.type + "'";
+  RenderRequest request;
+  request.camera = node;
+  request.channels = setting_.shared.demand.channels;
+  request.seed = setting_.streams.render_seed(capture, scene_[node].name);
+  Frame frame;
+  {
+    const Clock clock(result_, "rendering");
+    frame = call_component(who, [&] { return components_.renderer->render(request); });
+  }
+  const Clock clock(result_, "annotating");
+  for (const auto& entry : components_.annotators) {
+    call_component("annotator '" + entry.type + "'",
+                   [&] { entry.annotator->annotate(scene_, frame); });
+  }
+  if (setting_.shared.demand.visibility) {
+    const auto instances = labelled_instances(scene_);
+    const bool is_ordered = setting_.shared.demand.occlusion_order;
+    const auto coverage = call_component(
+        who, [&] { return components_.renderer->cover(node, instances, is_ordered); });
+    measure_visibility(coverage, setting_.shared.demand.amodal_mask, frame);
+    if (is_ordered) order_occlusions(coverage, frame);
+  }
+  if (setting_.shared.demand.motion) measure_motion(scene_, before_last_step_, frame);
+  return frame;
+}
+
+Image<Rgba8> VisitRun::make_overview(int capture) {
+  const Clock clock(result_, "rendering");
+  if (!components_.renderer->provides().contains(kColor.name)) return {};
+  RenderRequest request;
+  request.camera = overview_;
+  request.channels = {std::string(kColor.name)};
+  request.seed = setting_.streams.render_seed(capture, "overview");
+  return call_component("renderer '" + job_.renderer.type + "'",
+                        [&] { return components_.renderer->render(request).get(kColor); });
+}
+
+VisitReport VisitRun::report() const {
+  VisitReport report = report_;
+  report.visit = planned_.index;
+  report.environment = clean_name(setting_.plan.environments[planned_.environment].asset);
+  report.simulated_s = simulated_s_;
+  if (moving_until_s_ < simulated_s_ || simulated_s_ == 0.0) {
+    report.rest_after_s = moving_until_s_;
+  }
+  if (components_.physics) {
+    const PhysicsReport state = components_.physics->report();
+    report.max_penetration_m = state.max_penetration_m;
+    report.deepest_body = state.deepest_body;
+  }
+  const Room room(scene_, environment_);
+  if (components_.physics) {
+    note(scene_, find_unsettled(scene_, room, objects_, {job_.settle.rest_speed}),
+         report.unsettled);
+  }
+  report.max_speed = fastest_falling(scene_, room, objects_);
+  for (const NodeId object : objects_) {
+    const auto& body = scene_[object].rigid_body;
+    if (body && body->has_gravity) ++report.falling_objects;
+    if (!room.holds(scene_, object)) report.left_room.push_back(scene_.path(object));
+  }
+  return report;
+}
+
+}  // namespace diorama

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <exception>
+#include <functional>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "diorama/host.h"
+#include "diorama/scene.h"
+#include "framework/annotators/motion.h"
+#include "framework/pipeline/capture_plan.h"
+#include "framework/pipeline/job.h"
+#include "framework/pipeline/job_components.h"
+#include "framework/pipeline/settle_check.h"
+#include "framework/pipeline/settling.h"
+#include "framework/pipeline/view_report.h"
+#include "framework/pipeline/writer_queue.h"
+
+namespace diorama {
+
+/// The run was asked to stop; what is on disk can be resumed.
+class Interrupted final : public std::exception {
+ public:
+  ~Interrupted() override;
+  const char* what() const noexcept override { return "interrupted"; }
+};
+
+/// What a visit leaves beside its captures.
+struct VisitResult {
+  int captures = 0;
+  std::vector<VisitReport> reports;  ///< None when the visit was cut short by the end of the job.
+  int respawned = 0;                 ///< Objects that had left the room and were placed anew.
+  std::vector<std::pair<int, std::vector<ViewOutcome>>> views;  ///< By capture.
+  std::map<std::string, double> seconds;  ///< Phase to wall time.
+};
+
+/// One pass through one environment, in a scene of its own and by one thread. The source reads in
+/// the order in which things happen.
+class VisitRun {
+ public:
+  struct Setting {
+    const Job& job;
+    const CapturePlan& plan;
+    const JobStreams& streams;
+    const JobComponents& shared;
+    VisitComponents& components;  ///< No other visit's meanwhile.
+    Host& host;
+    std::function<bool(int capture)> is_needed;
+    std::function<void()> stop_if_asked;  ///< Throws Interrupted or Stopped.
+    /// Called before each capture is made; throws when it cannot be written.
+    std::function<void()> before_capture;
+    /// Takes finished captures in planned order; `result` is that of the visit so far.
+    std::function<void(PendingCapture, const VisitResult& result)> hand_over;
+  };
+
+  VisitRun(Setting setting, const PlannedVisit& planned);
+  ~VisitRun();
+
+  /// Throws what components throw, Interrupted and Stopped.
+  VisitResult run();
+
+ private:
+  class Clock;
+  struct Draw;
+  void set_up();
+  void randomize(const std::string& moment, int number, int capture);
+  std::vector<std::size_t> call_randomizers(const std::string& moment, int number, int capture,
+                                            const Draw& draw);
+  void simulate(const TimelineStep& step);
+  void advance(const TimelineStep& step);
+  std::vector<Flaw> unsettled(const TimelineStep& step) const;
+  void respawn(const std::vector<Flaw>& flaws);
+  void drop(const std::vector<Flaw>& flaws);
+  void reset_physics();
+  void take_captures(const TimelineStep& step);
+  void take(const PlannedCapture& planned);
+  std::vector<ViewOutcome> take_frames(const PlannedCapture& planned, std::vector<Frame>& frames);
+  void prepare_renderer();
+  Frame make_frame(std::size_t camera, int capture);
+  Image<Rgba8> make_overview(int capture);
+  VisitReport report() const;
+
+  Setting setting_;
+  const Job& job_;
+  VisitComponents& components_;
+  Host& host_;
+  PlannedVisit planned_;
+  VisitResult result_;
+
+  Scene scene_;
+  NodeId environment_;
+  Vec3 working_area_world_ = Vec3::Zero();
+  std::vector<NodeId> objects_;
+  std::vector<NodeId> cameras_;
+  BodyPoses before_last_step_;  ///< Empty when nothing moved by itself since it was placed.
+  NodeId overview_;             ///< Null unless this visit makes an overview picture.
+  std::map<NodeId, NodeId> small_cameras_;  ///< For the brightness of views; by camera.
+  /// Randomizers that placed cameras at the last moment.
+  std::vector<std::size_t> camera_randomizers_;
+  int next_capture_ = 0;  ///< Of the visit's.
+  std::map<std::string, int> events_;
+  int simulations_to_come_ = 0;  ///< Steps of the timeline that let things move.
+  double simulated_s_ = 0.0;
+  double moving_until_s_ = 0.0;  ///< When something in the room was last seen moving.
+  int redraws_ = 0;              ///< Streams that placed objects anew so far.
+  VisitReport report_;           ///< What happened so far.
+};
+
+}  // namespace diorama

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/host/machine_memory.h"
+
+#include <cstdlib>
+#include <fstream>
+#include <limits>
+#include <string>
+
+#include "support/catch.h"
+
+using namespace diorama;
+namespace fs = std::filesystem;
+
+namespace {
+
+/// A folder in which a machine says what memory it has.
+class Machine {
+ public:
+  Machine() {
+    std::string pattern = (fs::temp_directory_path() / "diorama-memory-XXXXXX").string();
+    root_ = ::mkdtemp(pattern.data());
+  }
+  ~Machine() { fs::remove_all(root_); }
+  void says(const std::string& file, const std::string& text) const {
+    fs::create_directories((root_ / file).parent_path());
+    std::ofstream(root_ / file) << text;
+  }
+  std::uint64_t memory() const { return available_memory(root_); }
+
+ private:
+  fs::path root_;
+};
+
+}  // namespace
+
+TEST_CASE("available memory is the system's, or what a cgroup leaves if that is less", "[host]") {
+  const Machine machine;
+  CHECK(machine.memory() == std::numeric_limits<std::uint64_t>::max());
+  machine.says("proc/meminfo", "MemTotal: 16 kB\nMemFree:  3 kB\nMemAvailable:    9000 kB\n");
+  CHECK(machine.memory() == 9000 * 1024);
+  machine.says("sys/fs/cgroup/memory.current", "4000000\n");
+  machine.says("sys/fs/cgroup/memory.max", "max\n");
+  CHECK(machine.memory() == 9000 * 1024);
+  machine.says("sys/fs/cgroup/memory.max", "5000000\n");
+  CHECK(machine.memory() == 1'000'000);
+  machine.says("sys/fs/cgroup/memory.stat", "anon 5\nfile 70\ninactive_file 500000\nx 1\n");
+  CHECK(machine.memory() == 1'500'000);
+  machine.says("sys/fs/cgroup/memory.current", "6000000\n");
+  CHECK(machine.memory() == 0);
+}
+
+TEST_CASE("this machine has some memory", "[host]") {
+  CHECK(available_memory() > (std::uint64_t(1) << 20));
+}

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/pipeline/capture_memory.h"
+
+#include "support/catch.h"
+
+using namespace diorama;
+
+TEST_CASE("Visits in flight follow from threads as long as there is memory for them", "[memory]") {
+  constexpr std::uint64_t kGiB = std::uint64_t(1) << 30;
+  const CaptureMemory small{std::size_t(100) << 20, std::size_t(156) << 20};  // 512 MiB a visit
+  CHECK(default_visits_in_flight(1, 100 * kGiB, small) == 1);
+  CHECK(default_visits_in_flight(2, 100 * kGiB, small) == 2);
+  CHECK(default_visits_in_flight(4, 100 * kGiB, small) == 3);
+  CHECK(default_visits_in_flight(16, 100 * kGiB, small) == 9);
+  CHECK(default_visits_in_flight(16, 4 * kGiB, small) == 4);
+  CHECK(default_visits_in_flight(16, kGiB / 8, small) == 1);
+  CHECK(default_visits_in_flight(16, 0, small) == 1);
+  const CaptureMemory large{std::size_t(7) << 30, std::size_t(768) << 20};  // 8 GiB a visit
+  CHECK(default_visits_in_flight(16, 100 * kGiB, large) == 6);
+}
