@@ -53,10 +53,27 @@ std::uint64_t group_memory(const fs::path& group) {
   return *limit - std::min(*limit, held);
 }
 
+/// Where this process is among the groups, "/system.slice/job_7"; "/" in a container of its own.
+fs::path own_group(const fs::path& root) {
+  std::ifstream stream(root / "proc/self/cgroup");
+  for (std::string line; std::getline(stream, line);) {
+    if (line.starts_with("0::/")) return line.substr(3);
+  }
+  return "/";
+}
+
 }  // namespace
 
 std::uint64_t available_memory(const fs::path& root) {
-  return std::min(system_memory(root), group_memory(root / "sys/fs/cgroup"));
+  const fs::path groups = root / "sys/fs/cgroup";
+  std::uint64_t least = std::min(system_memory(root), group_memory(groups));
+  // A limit holds for all groups below.
+  fs::path group = groups;
+  for (const fs::path& name : own_group(root).relative_path()) {
+    group /= name;
+    least = std::min(least, group_memory(group));
+  }
+  return least;
 }
 
 }  // namespace diorama

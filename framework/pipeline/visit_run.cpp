@@ -108,11 +108,11 @@ void VisitRun::set_up() {
   host_.log(LogLevel::Info, "visit " + std::to_string(planned_.index + 1) + " of " +
                                 std::to_string(setting_.plan.visit_count()) + ": " + choice.asset);
   environment_ = load_environment(choice.asset, job_.environments[choice.entry],
-                                       *components_.environments[choice.entry], scene_, host_);
+                                  *components_.environments[choice.entry], scene_, host_);
   working_area_world_ =
       apply_environment_rules(job_.environment, job_.debug, environment_, scene_, host_);
   objects_ = spawn_objects(plan_objects(job_, setting_.plan.object_assets, planned_.index), job_,
-                                scene_, host_);
+                           scene_, host_);
   create_lights(job_.lights, scene_, host_);
   cameras_ = create_cameras(job_.cameras, scene_);
   small_cameras_ = create_small_cameras(job_, cameras_, scene_);
@@ -143,8 +143,8 @@ void VisitRun::randomize(const std::string& moment, int number, int capture) {
 }
 
 /// Returns those that moved cameras or changed their lenses.
-std::vector<std::size_t> VisitRun::call_randomizers(const std::string& moment,
-                                                    int number, int capture, const Draw& draw) {
+std::vector<std::size_t> VisitRun::call_randomizers(const std::string& moment, int number,
+                                                    int capture, const Draw& draw) {
   RandomizeContext context;
   context.moment = moment;
   context.capture = capture;
@@ -156,7 +156,8 @@ std::vector<std::size_t> VisitRun::call_randomizers(const std::string& moment,
     const auto call = randomizer_call(job_, entry, moment, planned_.index, number);
     if (!call) continue;
     context.occurrence = call->occurrence;
-    Rng rng = setting_.streams.randomizer(entry.name, call->visit, moment, capture >= 0 ? capture : number);
+    Rng rng = setting_.streams.randomizer(entry.name, call->visit, moment,
+                                          capture >= 0 ? capture : number);
     if (draw.number > 0) rng = rng.fork(draw.stream).fork(std::uint64_t(draw.number));
     const SavedView cameras(scene_, camera_tops(scene_));
     call_component("randomizer '" + entry.name + "'",
@@ -279,8 +280,7 @@ void VisitRun::drop(const std::vector<Flaw>& flaws) {
 void VisitRun::take_captures(const TimelineStep& step) {
   for (int i = 0; i < step.count; ++i) {
     if (next_capture_ == planned_.capture_count) return;
-    const PlannedCapture planned =
-        setting_.plan.capture(planned_.first_capture + next_capture_++);
+    const PlannedCapture planned = setting_.plan.capture(planned_.first_capture + next_capture_++);
     randomize(planned.phase, planned.number, planned.index);
     if (setting_.is_needed(planned.index)) take(planned);
   }
@@ -328,8 +328,7 @@ void VisitRun::prepare_renderer() {
 std::vector<ViewOutcome> VisitRun::take_frames(const PlannedCapture& planned,
                                                std::vector<Frame>& frames) {
   ViewSearch search({job_, setting_.streams, host_, *components_.renderer, scene_, cameras_,
-                     small_cameras_, planned, !camera_randomizers_.empty(),
-                     [&](int number) {
+                     small_cameras_, planned, !camera_randomizers_.empty(), [&](int number) {
                        call_randomizers(planned.phase, planned.number, planned.index,
                                         {"view", number, &camera_randomizers_});
                      }});

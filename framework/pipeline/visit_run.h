@@ -35,7 +35,7 @@ struct VisitResult {
   std::vector<VisitReport> reports;  ///< None when the visit was cut short by the end of the job.
   int respawned = 0;                 ///< Objects that had left the room and were placed anew.
   std::vector<std::pair<int, std::vector<ViewOutcome>>> views;  ///< By capture.
-  std::map<std::string, double> seconds;  ///< Phase to wall time.
+  std::map<std::string, double> seconds;                        ///< Phase to wall time.
 };
 
 /// One pass through one environment, in a scene of its own and by one thread. The source reads in

@@ -45,6 +45,13 @@ TEST_CASE("available memory is the system's, or what a cgroup leaves if that is 
   CHECK(machine.memory() == 1'000'000);
   machine.says("sys/fs/cgroup/memory.stat", "anon 5\nfile 70\ninactive_file 500000\nx 1\n");
   CHECK(machine.memory() == 1'500'000);
+  machine.says("proc/self/cgroup", "1:cpu:/other\n0::/slice/job_7\n");
+  CHECK(machine.memory() == 1'500'000);
+  machine.says("sys/fs/cgroup/slice/memory.current", "100\n");
+  machine.says("sys/fs/cgroup/slice/memory.max", "700100\n");
+  machine.says("sys/fs/cgroup/slice/job_7/memory.current", "100\n");
+  machine.says("sys/fs/cgroup/slice/job_7/memory.max", "max\n");
+  CHECK(machine.memory() == 700'000);
   machine.says("sys/fs/cgroup/memory.current", "6000000\n");
   CHECK(machine.memory() == 0);
 }

@@ -154,8 +154,8 @@ class Painter final : public Renderer {
       Rng rng = Rng(request.seed).fork(std::uint64_t(y));
       for (int x = 0; x < image.width(); ++x) {
         const auto value = std::uint8_t(rng.index(250));
-        image.at(x, int(y)) = Rgba8{value, std::uint8_t(int(depth) % 256),
-                                 std::uint8_t(visit_of(scene)), 255};
+        image.at(x, int(y)) =
+            Rgba8{value, std::uint8_t(int(depth) % 256), std::uint8_t(visit_of(scene)), 255};
       }
     });
     frame.set(kColor, std::move(image));
