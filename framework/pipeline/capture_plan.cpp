@@ -106,7 +106,10 @@ void plan_group(const Job& job, std::size_t index, const std::vector<std::string
   std::map<std::size_t, AssetWords> words_of_asset;
   Picks picks(streams, group, assets);
   const std::uint64_t before = is_anew ? std::uint64_t(visit) * std::uint64_t(group.count) : 0;
-  for (int number = 0; number < group.count; ++number) {
+  // What is left out is picked all the same, so that rounds stay rounds.
+  const int count =
+      group.count - int(streams.fewer(group.name, visit).index(std::size_t(group.fewer) + 1));
+  for (int number = 0; number < count; ++number) {
     Rng rng = streams.object(group.name, number, is_anew ? visit : -1);
     PlannedObject object;
     object.group = index;
@@ -267,6 +270,10 @@ std::string asset_stem(std::string_view asset) {
 Rng JobStreams::object(std::string_view group, int number, int visit) const {
   const Rng stream = root_.fork("objects").fork(group).fork(std::uint64_t(number));
   return visit < 0 ? stream : stream.fork("visit").fork(std::uint64_t(visit));
+}
+
+Rng JobStreams::fewer(std::string_view group, int visit) const {
+  return root_.fork("fewer objects").fork(group).fork(std::uint64_t(visit));
 }
 
 Rng JobStreams::round(std::string_view group, std::uint64_t number) const {

@@ -128,6 +128,8 @@ class JobStreams {
 
   /// `visit` is -1 for what is picked once per job.
   Rng object(std::string_view group, int number, int visit) const;
+  /// For how many objects of a group a visit has.
+  Rng fewer(std::string_view group, int visit) const;
   /// For the order of a group's assets in one round through all of them.
   Rng round(std::string_view group, std::uint64_t number) const;
   /// `occurrence` tells calls at the same moment of one visit apart: the capture's index, or a

@@ -207,6 +207,19 @@ void read_variants(ObjectGroup& group, const std::string& path, Complaints& comp
   }
 }
 
+void check_fewer(const ObjectGroup& group, const Value& map, const std::string& path,
+                 Complaints& complaints) {
+  if (group.fewer > group.count) {
+    complaints.add(place_of(map, "fewer"), path + ".fewer: expected at most the count, " +
+                                               std::to_string(group.count) + ", found " +
+                                               std::to_string(group.fewer));
+  }
+  if (group.fewer > 0 && group.pick != "per_visit") {
+    complaints.add(place_of(map, "fewer"),
+                   path + ".fewer: visits can differ only with 'pick: per_visit'");
+  }
+}
+
 void read_objects(const Value& value, Job& job, Complaints& complaints) {
   for (auto& [path, map] : entries(value, "objects", complaints)) {
     ObjectGroup group;
@@ -219,6 +232,7 @@ void read_objects(const Value& value, Job& job, Complaints& complaints) {
       complaints.add(place_of(map, "under"),
                      path + ".under: expected a path like /Assets, found '" + group.under + "'");
     }
+    check_fewer(group, map, path, complaints);
     group.loader = {group.type, group.name, std::move(map), path};
     require_type(group.loader, complaints);
     job.objects.push_back(std::move(group));
@@ -586,6 +600,8 @@ void ObjectGroup::visit(ParamVisitor& v) {
   v.param("name", name, {"Name of the group; keys its random choices. Default: the type."});
   v.param("under", under, {"Path of the parent node."});
   v.param("count", count, {"Objects, each picked at random from the loader's assets.", "", 0, 1e5});
+  v.param("fewer", fewer,
+          {"Each visit has 0 to this many objects less, every number as likely.", "", 0, 1e5});
   v.choice("pick", pick, kPickWords,
            {"per_job: every visit has the same objects; per_visit: each visit picks its own."});
   v.param("balance", balance,
@@ -791,11 +807,21 @@ std::string node_name(std::string_view text) {
 
 std::vector<std::string_view> host_keys(ComponentKind kind, std::string_view section) {
   if (section == "objects") {
-    return {"type",     "name",          "under",
-            "count",    "pick",          "balance",
-            "label",    "label_pattern", "label_replacement",
-            "taxonomy", "variants",      "gravity_disabled_chance",
-            "collider", "mass_kg"};
+    return {"type",
+            "name",
+            "under",
+            "count",
+            "fewer",
+            "pick",
+            "balance",
+            "label",
+            "label_pattern",
+            "label_replacement",
+            "taxonomy",
+            "variants",
+            "gravity_disabled_chance",
+            "collider",
+            "mass_kg"};
   }
   switch (kind) {
     case ComponentKind::Loader:

@@ -48,6 +48,7 @@ struct ObjectGroup {
   std::string name;
   std::string under = "/Assets";
   int count = 1;
+  int fewer = 0;  ///< At most `count`.
   std::string pick = "per_job";
   bool balance = false;
   std::optional<std::string> label;

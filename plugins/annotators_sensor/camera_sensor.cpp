@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <string_view>
 #include <vector>
 
 #include "lens_effects.h"
@@ -19,17 +20,24 @@ double luminance(const Vec3f& rgb) {
   return 0.2126 * double(rgb.x()) + 0.7152 * double(rgb.y()) + 0.0722 * double(rgb.z());
 }
 
-/// Brings the median of what is lit to middle grey; 1 for a picture without light.
-double metered(const Image<Vec3f>& light) {
+/// Brings the median of what is lit to middle grey, `stops` brighter, but leaves no more than
+/// `burnt_share` of it above white; 1 and its stops for a picture without light.
+double metered(const Image<Vec3f>& light, double stops, double burnt_share) {
+  const double factor = std::exp2(stops);
   std::vector<double> lit;
   for (const Vec3f& pixel : light.pixels()) {
     const double l = luminance(pixel);
     if (l > 0.0 && std::isfinite(l)) lit.push_back(l);
   }
-  if (lit.empty()) return 1.0;
+  if (lit.empty()) return factor;
   const auto middle = lit.begin() + std::ptrdiff_t(lit.size() / 2);
   std::nth_element(lit.begin(), middle, lit.end());
-  return kMiddleGrey / *middle;
+  const double exposure = kMiddleGrey / *middle * factor;
+  const auto burnt = std::size_t(burnt_share * double(lit.size()));
+  if (burnt >= lit.size()) return exposure;
+  const auto brightest = lit.end() - 1 - std::ptrdiff_t(burnt);
+  std::nth_element(lit.begin(), brightest, lit.end());
+  return std::min(exposure, 1.0 / *brightest);
 }
 
 /// Photons come by themselves: their count follows the law of Poisson, which from 30 on is all but
@@ -51,6 +59,59 @@ std::vector<std::uint8_t> bytes_by_code(int largest_code) {
   return bytes;
 }
 
+/// Gaussian blur; outside of the picture is its edge.
+Image<Vec3f> blurred(const Image<Vec3f>& picture, double sigma_px) {
+  const int reach = std::max(1, int(std::ceil(3.0 * sigma_px)));
+  std::vector<float> weights;
+  float sum = 0.0f;
+  for (int i = -reach; i <= reach; ++i) {
+    weights.push_back(float(std::exp(-0.5 * i * i / (sigma_px * sigma_px))));
+    sum += weights.back();
+  }
+  for (float& weight : weights) weight /= sum;
+  const int width = picture.width(), height = picture.height();
+  const auto along = [&](const Image<Vec3f>& from, int step_x, int step_y) {
+    Image<Vec3f> to(width, height, Vec3f::Zero());
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        Vec3f mean = Vec3f::Zero();
+        for (int i = -reach; i <= reach; ++i) {
+          mean += weights[std::size_t(i + reach)] * from.at(std::clamp(x + i * step_x, 0, width - 1),
+                                                            std::clamp(y + i * step_y, 0, height - 1));
+        }
+        to.at(x, y) = mean;
+      }
+    }
+    return to;
+  };
+  return along(along(picture, 1, 0), 0, 1);
+}
+
+/// What the software of a camera makes of an encoded picture: less noise, sharper edges.
+void finish(Image<Rgba8>& picture, double smoothing_px, double sharpening) {
+  constexpr double kSharpeningRadius_px = 1.0;
+  if (smoothing_px <= 0.0 && sharpening <= 0.0) return;
+  Image<Vec3f> smooth(picture.width(), picture.height(), Vec3f::Zero());
+  for (std::size_t i = 0; i < smooth.pixels().size(); ++i) {
+    const Rgba8& pixel = picture.pixels()[i];
+    smooth.pixels()[i] = Vec3f(pixel[0], pixel[1], pixel[2]);
+  }
+  if (smoothing_px > 0.0) smooth = blurred(smooth, smoothing_px);
+  if (sharpening > 0.0) {
+    const Image<Vec3f> soft = blurred(smooth, kSharpeningRadius_px);
+    for (std::size_t i = 0; i < smooth.pixels().size(); ++i) {
+      Vec3f& pixel = smooth.pixels()[i];
+      pixel += float(sharpening) * (pixel - soft.pixels()[i]);
+    }
+  }
+  for (std::size_t i = 0; i < smooth.pixels().size(); ++i) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const float value = std::clamp(smooth.pixels()[i][Eigen::Index(k)], 0.0f, 255.0f);
+      picture.pixels()[i][k] = std::uint8_t(std::lround(value));
+    }
+  }
+}
+
 }  // namespace
 
 int Photosite::code(double fill, Rng& rng) const {
@@ -67,7 +128,15 @@ void CameraSensor::Params::visit(ParamVisitor& v) {
       "exposure", exposure, kExposures,
       {"auto: the median of the picture becomes 18 % grey; manual: by iso, exposure_time_s and "
        "f_stop."});
-  v.param("exposure_ev", exposure_ev, {"Stops added to the exposure.", "EV", -40, 40});
+  v.param("exposure_ev", exposure_ev,
+          {"Stops added to the exposure, drawn for every picture.", "EV", -40, 40});
+  v.param("burnt_share", burnt_share,
+          {"auto: exposure is taken back until no larger share of the picture is brighter than "
+           "white, as phones do; 1: never.",
+           "", 0, 1});
+  v.param("warmth_ev", warmth_ev,
+          {"Stops by which a wrong white balance makes red stronger and blue weaker.", "EV", -4,
+           4});
   v.param("iso", iso,
           {"Sensitivity; the well counts as full at full_well_electrons * 100 / iso.", "", 1, 1e7});
   v.param("exposure_time_s", exposure_time_s,
@@ -89,6 +158,11 @@ void CameraSensor::Params::visit(ParamVisitor& v) {
   v.param("read_noise_electrons", read_noise_electrons,
           {"Standard deviation of what reading a pixel adds.", "", 0, 1e6});
   v.param("bits", bits, {"Of the numbers that the sensor gives.", "", 1, 16});
+  v.param("smoothing_px", smoothing_px,
+          {"Noise reduction: standard deviation of a blur of the encoded picture.", "px", 0, 20});
+  v.param("sharpening", sharpening,
+          {"Share of the difference from a blur of 1 px that is added to the encoded picture.", "",
+           0, 10});
 }
 
 CameraSensor::CameraSensor(Params params, Host& host) : params_(std::move(params)), host_(host) {}
@@ -114,12 +188,20 @@ void CameraSensor::do_annotate(const Scene&, Frame& frame) const {
   const LensEffects lens{params_.vignetting, params_.red_shift_px, params_.blue_shift_px};
   const Image<Vec3f> light =
       through_lens(frame.get(kColorHdr), stored_lens(frame.camera), lens, host_);
-  const double base = params_.exposure == "auto" ? metered(light) : manual_exposure();
-  frame.exposure = base * std::exp2(params_.exposure_ev);
+  const Rng rng = Rng(frame.seed).fork("camera_sensor");
+  const auto drawn = [&](const Distribution& what, std::string_view name) {
+    Rng stream = rng.fork(name);
+    return what.draw(stream);
+  };
+  const double stops = drawn(params_.exposure_ev, "exposure_ev");
+  frame.exposure = params_.exposure == "auto" ? metered(light, stops, params_.burnt_share)
+                                              : manual_exposure() * std::exp2(stops);
+  const double warmth = std::exp2(drawn(params_.warmth_ev, "warmth_ev"));
+  const std::array<double, 3> gains{frame.exposure * warmth, frame.exposure,
+                                    frame.exposure / warmth};
 
   const Photosite site = photosite();
   const std::vector<std::uint8_t> bytes = bytes_by_code(site.largest_code);
-  const Rng rng = Rng(frame.seed).fork("camera_sensor");
   Image<Rgba8> picture(light.width(), light.height(), Rgba8{0, 0, 0, 255});
   host_.parallel_for(std::size_t(light.height()), [&](std::size_t y) {
     Rng row_rng = rng.fork(std::uint64_t(y));
@@ -127,11 +209,13 @@ void CameraSensor::do_annotate(const Scene&, Frame& frame) const {
     const auto to = picture.row(int(y));
     for (std::size_t x = 0; x < to.size(); ++x) {
       for (std::size_t k = 0; k < 3; ++k) {
-        const double fill = double(from[x][Eigen::Index(k)]) * frame.exposure;
+        const double fill = double(from[x][Eigen::Index(k)]) * gains[k];
         to[x][k] = bytes[std::size_t(site.code(fill, row_rng))];
       }
     }
   });
+  finish(picture, drawn(params_.smoothing_px, "smoothing_px"),
+         drawn(params_.sharpening, "sharpening"));
   frame.set(kColor, std::move(picture));
 }
 

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "diorama/annotator.h"
+#include "diorama/distribution.h"
 #include "diorama/host.h"
 #include "diorama/params.h"
 #include "diorama/rng.h"
@@ -27,7 +28,9 @@ class CameraSensor final : public Annotator {
  public:
   struct Params {
     std::string exposure = "auto";
-    double exposure_ev = 0.0;
+    Distribution exposure_ev = 0.0;
+    double burnt_share = 1.0;
+    Distribution warmth_ev = 0.0;
     double iso = 400.0;
     double exposure_time_s = 1.0 / 60.0;
     double f_stop = 2.8;
@@ -38,6 +41,8 @@ class CameraSensor final : public Annotator {
     double full_well_electrons = 15000.0;
     double read_noise_electrons = 3.0;
     int bits = 12;
+    Distribution smoothing_px = 0.0;
+    Distribution sharpening = 0.0;
 
     void visit(ParamVisitor& v);
   };

@@ -23,9 +23,14 @@ void append_point(std::string& line, const Frame& frame, const Vec2& point) {
   append_number(line, point.y() / frame.camera.height);
 }
 
-void append_box(std::string& line, const Frame& frame, const PixelBox& box) {
-  append_point(line, frame, {0.5 * (box.x_min + box.x_max), 0.5 * (box.y_min + box.y_max)});
-  append_point(line, frame, {double(box.width()), double(box.height())});
+/// `margin` is a share of the box's sides; what it would take outside the picture is cut off.
+void append_box(std::string& line, const Frame& frame, const PixelBox& box, double margin) {
+  const Vec2 more = 0.5 * margin * Vec2(box.width(), box.height());
+  const Vec2 low = (Vec2(box.x_min, box.y_min) - more).cwiseMax(0.0);
+  const Vec2 high = (Vec2(box.x_max, box.y_max) + more)
+                        .cwiseMin(Vec2(frame.camera.width, frame.camera.height));
+  append_point(line, frame, 0.5 * (low + high));
+  append_point(line, frame, high - low);
 }
 
 void append_keypoints(std::string& line, const Frame& frame, const Instance& instance) {
@@ -42,6 +47,10 @@ void append_keypoints(std::string& line, const Frame& frame, const Instance& ins
 void YoloWriter::Params::visit(ParamVisitor& v) {
   training.visit(v);
   v.choice("task", task, kTasks, {"What the label lines hold."});
+  v.param("box_margin", box_margin,
+          {"Share by which boxes are wider and higher than what is seen, where a detector is to match "
+           "boxes drawn by hand, which are looser.",
+           "", 0, 10});
 }
 
 YoloWriter::YoloWriter(Params params, Host& host)
@@ -68,6 +77,7 @@ void YoloWriter::begin(const DatasetInfo& dataset, DatasetFiles& files) {
   }
   files.add_text("data.yaml", yaml);
   Json more{{"task", params_.task}, {"labels", "shares of the image's width and height"}};
+  if (params_.box_margin > 0.0) more["box_margin"] = params_.box_margin;
   if (params_.task == "pose") {
     for (const Keypoint& point : kCuboidKeypoints) more["keypoints"].push_back(point.name);
     more["keypoint_visibility"] = "0 outside the image, 1 hidden, 2 visible";
@@ -79,7 +89,7 @@ std::string YoloWriter::line(const Frame& frame, const TrainingObject& object) c
   const Instance& instance = *object.instance;
   std::string text = std::to_string(object.class_index);
   if (params_.task == "detect" || params_.task == "pose") {
-    append_box(text, frame, *instance.tight_box);
+    append_box(text, frame, *instance.tight_box, params_.box_margin);
     if (params_.task == "pose") append_keypoints(text, frame, instance);
     return text;
   }

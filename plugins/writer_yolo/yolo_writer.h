@@ -17,7 +17,7 @@ namespace diorama {
 ///     labels/{train,val}/000012_cam_0.txt
 ///
 /// One line per object, the class index first, all coordinates as shares of the image's size:
-/// detect: box centre and size; segment: a polygon of the visible pixels; pose: box, then x y v of
+/// detect: box centre and size, of what is seen and a margin round it; segment: a polygon of the visible pixels; pose: box, then x y v of
 /// nine cuboid points; obb: the four corners of the least rectangle. A picture without objects has
 /// an empty label file.
 class YoloWriter final : public Writer {
@@ -25,6 +25,7 @@ class YoloWriter final : public Writer {
   struct Params {
     TrainingParams training;
     std::string task = "detect";
+    double box_margin = 0.0;
 
     void visit(ParamVisitor& v);
   };
