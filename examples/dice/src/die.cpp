@@ -188,8 +188,8 @@ DieLook any_shape(Rng& rng) {
   look.ball = rng.chance(0.4) ? rng.uniform(1.28, 1.5) : 2.0;
   look.is_mirrored = rng.chance(0.5);
   for (bool& turned : look.is_turned) turned = rng.chance(0.5);
-  look.pip_radius = rng.uniform(0.15, 0.25);
   look.pip_offset = rng.uniform(0.44, 0.58);
+  look.pip_radius = std::min(rng.uniform(0.15, 0.25), 0.42 * look.pip_offset);
   look.dent = rng.chance(0.2) ? 0.0 : rng.uniform(0.2, 0.9);
   look.first_pip = rng.chance(0.1) ? rng.uniform(1.2, 1.8) : 1.0;
   return look;
@@ -247,8 +247,8 @@ DieLook any_look(Rng rng) {
   if (contrast(look.one, look.color) < 0.5) look.one = look.pips;
   look.pattern_scale = rng.uniform(0.5, 2.0);
   look.wear = rng.chance(0.15) ? rng.uniform(0.2, 0.8) : 0.0;
-  look.roughness = rng.uniform(0.05, 0.35);
-  look.clearcoat = rng.chance(0.5) ? rng.uniform(0.3, 1.0) : 0.0;
+  look.roughness = rng.chance(0.6) ? rng.uniform(0.03, 0.15) : rng.uniform(0.15, 0.4);
+  look.clearcoat = rng.chance(0.6) ? rng.uniform(0.3, 1.0) : 0.0;
   if (look.body == Body::Clear) look.transmission = rng.uniform(0.3, 0.7);
   return look;
 }

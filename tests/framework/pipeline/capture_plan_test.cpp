@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <map>
 #include <set>
@@ -245,6 +246,28 @@ TEST_CASE("Balanced picks use every asset equally often, over visits too", "[pla
   const auto order = choices(plan_of(job), 0);
   job.seed = 77;
   CHECK(order != choices(plan_of(job), 0));
+}
+
+TEST_CASE("Visits may have fewer objects, every number as likely", "[plan]") {
+  const Job job =
+      job_from(with(good_job(), "count: 20,", "count: 5, fewer: 3, pick: per_visit,"));
+  const Job all = job_from(with(good_job(), "count: 20,", "count: 5, pick: per_visit,"));
+  const CapturePlan plan = plan_of(job);
+  std::map<std::size_t, int> counts;
+  for (int visit = 0; visit < 400; ++visit) {
+    const auto objects = plan_objects(job, plan.object_assets, visit);
+    const auto full = plan_objects(all, plan.object_assets, visit);
+    const auto of_first = [](const PlannedObject& object) { return object.group == 0; };
+    const auto count = std::size_t(std::ranges::count_if(objects, of_first));
+    ++counts[count];
+    for (std::size_t i = 0; i < count; ++i) CHECK(objects[i].asset == full[i].asset);
+    CHECK(objects.size() == count + 8);  // the other group has all of its own
+  }
+  CHECK(counts.size() == 4);
+  for (const auto& [count, visits] : counts) {
+    CHECK((count >= 2 && count <= 5));
+    CHECK(std::abs(visits - 100) < 3.29 * std::sqrt(400 * 0.25 * 0.75));  // level 0.001
+  }
 }
 
 TEST_CASE("Assets that no visit uses are known", "[plan]") {

@@ -101,6 +101,10 @@ TEST_CASE("Mistakes that make a job pointless are named", "[job]") {
              ContainsSubstring("objects[0].label_pattern: not a regular expression"));
   CHECK_THAT(complaints_about(with(good, "under: /Assets", "under: Assets")),
              ContainsSubstring("objects[0].under: expected a path like /Assets, found 'Assets'"));
+  CHECK_THAT(complaints_about(with(good, "count: 20,", "count: 20, fewer: 21, pick: per_visit,")),
+             ContainsSubstring("objects[0].fewer: expected at most the count, 20, found 21"));
+  CHECK_THAT(complaints_about(with(good, "count: 20,", "count: 20, fewer: 2,")),
+             ContainsSubstring("objects[0].fewer: visits can differ only with 'pick: per_visit'"));
   CHECK_THAT(complaints_about("[1, 2]"), ContainsSubstring("a job is a mapping of sections"));
 }
 

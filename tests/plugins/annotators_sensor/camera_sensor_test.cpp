@@ -2,6 +2,8 @@
 #include "camera_sensor.h"
 
 #include <cmath>
+#include <set>
+#include <utility>
 
 #include "lens_effects.h"
 #include "sensor_frames.h"
@@ -144,6 +146,73 @@ TEST_CASE("exposure follows ISO 12232 or the picture's median", "[camera_sensor]
     CHECK(int(picture_of(metering, grey_frame(light)).at(3, 3)[2]) == 118);  // sRGB of 0.18
   }
   CHECK(int(picture_of(metering, grey_frame(0.0f)).at(3, 3)[2]) == 0);
+}
+
+TEST_CASE("exposure is taken back where too much would burn", "[camera_sensor]") {
+  Frame frame = grey_frame(1.0f);  // 48 rows; the lower 12 are ten times as bright
+  Image<Vec3f> light = frame.get(kColorHdr);
+  for (int y = 36; y < 48; ++y) {
+    for (int x = 0; x < 64; ++x) light.at(x, y) = Vec3f::Constant(10.0f);
+  }
+  frame.set(kColorHdr, light);
+  const auto grey_with = [&](double burnt_share) {
+    Frame copy = grey_frame(1.0f);
+    copy.set(kColorHdr, light);
+    CameraSensor::Params params = plain_params();
+    params.burnt_share = burnt_share;
+    return int(picture_of(params, std::move(copy)).at(3, 3)[1]);
+  };
+  CHECK(grey_with(1.0) == 118);   // the median is 18 % grey
+  CHECK(grey_with(0.26) == 118);  // a quarter may burn
+  CHECK(grey_with(0.24) == 89);   // it may not: it becomes white, and grey a tenth of it
+}
+
+TEST_CASE("a wrong white balance moves red and blue apart", "[camera_sensor]") {
+  CameraSensor::Params params = plain_params();
+  params.warmth_ev = 0.5;
+  const Rgba8 pixel = picture_of(params, grey_frame(1.0f)).at(3, 3);
+  CHECK(int(pixel[0]) == 138);  // sRGB of 0.18 * 2^0.5
+  CHECK(int(pixel[1]) == 118);
+  CHECK(int(pixel[2]) == 100);
+}
+
+TEST_CASE("what is drawn is drawn for every picture", "[camera_sensor]") {
+  CameraSensor::Params params = plain_params();
+  params.exposure_ev = Distribution(Range{-1.0, 1.0});
+  std::set<int> seen;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    Frame frame = grey_frame(1.0f);
+    frame.seed = seed;
+    seen.insert(int(picture_of(params, std::move(frame)).at(3, 3)[1]));
+  }
+  CHECK(seen.size() > 10);
+  CHECK(*seen.begin() >= 85);    // sRGB of 0.09
+  CHECK(*seen.rbegin() <= 162);  // of 0.36
+}
+
+TEST_CASE("software takes noise away and sharpens edges", "[camera_sensor]") {
+  CameraSensor::Params params = plain_params();
+  params.shot_noise = true;
+  params.iso = 6400.0;
+  const double noisy = spread(picture_of(params, grey_frame(1.0f)));
+  params.smoothing_px = 1.0;
+  // A Gaussian blur leaves 1 / (2 sqrt(pi) sigma) of independent noise.
+  CHECK(spread(picture_of(params, grey_frame(1.0f))) == Approx(0.2821 * noisy).epsilon(0.1));
+
+  Frame edge = grey_frame(1.0f);
+  Image<Vec3f> light = edge.get(kColorHdr);
+  for (int y = 0; y < 48; ++y) {
+    for (int x = 32; x < 64; ++x) light.at(x, y) = Vec3f::Constant(2.0f);
+  }
+  edge.set(kColorHdr, light);
+  CameraSensor::Params plain = plain_params();
+  plain.sharpening = 1.0;
+  const Image<Rgba8> sharp = picture_of(plain, std::move(edge));
+  const int dark = sharp.at(3, 9)[0], bright = sharp.at(60, 9)[0];
+  // A blur of 1 px has 0.2420 + 0.0540 + 0.0044 / 2 + ... of an edge on its other side: 0.30.
+  CHECK(int(sharp.at(31, 9)[0]) == Approx(dark - 0.30 * (bright - dark)).margin(1.5));
+  CHECK(int(sharp.at(32, 9)[0]) == Approx(bright + 0.30 * (bright - dark)).margin(1.5));
+  CHECK(int(sharp.at(25, 9)[0]) == dark);
 }
 
 TEST_CASE("noise doubles with four times the ISO", "[camera_sensor]") {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "writer_yolo/yolo_writer.h"
 
+#include <algorithm>
 #include <sstream>
 
 #include "opencv_support/contours.h"
@@ -66,6 +67,29 @@ TEST_CASE("detection lines are boxes in shares of the image", "[writers]") {
         CHECK((line[2] + 0.5 * line[4]) * frame.camera.height == Approx(box.y_max).margin(1e-3));
       }
       CHECK(row == lines.size());
+    }
+  }
+}
+
+TEST_CASE("boxes may be looser than what is seen, but stay in the picture", "[writers]") {
+  test::FakeHost host;
+  YoloWriter::Params params;
+  params.box_margin = 0.5;
+  const MemoryFiles loose = test::write_sample<YoloWriter>(params, host);
+  const MemoryFiles tight = write("detect");
+  CHECK(loose.text("dataset.json").find("box_margin") != std::string::npos);
+  CHECK(tight.text("dataset.json").find("box_margin") == std::string::npos);
+  const std::string file = label_file(loose, 0, "cam_0");
+  const auto looser = numbers_of(loose.text(file)), lines = numbers_of(tight.text(file));
+  REQUIRE(looser.size() == lines.size());
+  REQUIRE_FALSE(lines.empty());
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    CHECK(looser[i][0] == lines[i][0]);
+    for (const std::size_t axis : {1u, 2u}) {
+      const double low = lines[i][axis] - 0.75 * lines[i][axis + 2];
+      const double high = lines[i][axis] + 0.75 * lines[i][axis + 2];
+      CHECK(looser[i][axis] - 0.5 * looser[i][axis + 2] == Approx(std::max(0.0, low)).margin(2e-6));
+      CHECK(looser[i][axis] + 0.5 * looser[i][axis + 2] == Approx(std::min(1.0, high)).margin(2e-6));
     }
   }
 }
