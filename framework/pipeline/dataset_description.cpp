@@ -154,8 +154,10 @@ void add_objects(std::string& text, const CapturePlan& plan, const Job& job,
   for (std::size_t group = 0; group < job.objects.size(); ++group) {
     const auto floating = std::count_if(plan.objects.begin(), plan.objects.end(),
                                         [&](auto& o) { return o.group == group && o.floats; });
-    text += "  " + job.objects[group].name + ": " + std::to_string(job.objects[group].count) +
-            " below " + job.objects[group].under;
+    const ObjectGroup& asked = job.objects[group];
+    text += "  " + asked.name + ": ";
+    if (asked.fewer > 0) text += std::to_string(asked.count - asked.fewer) + " to ";
+    text += std::to_string(asked.count) + " below " + asked.under;
     if (job.objects[group].pick == "per_visit") {
       text += ", picked anew in each visit from " +
               std::to_string(plan.object_assets[group].size()) + " assets; in visit 0";

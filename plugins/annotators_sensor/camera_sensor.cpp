@@ -76,8 +76,9 @@ Image<Vec3f> blurred(const Image<Vec3f>& picture, double sigma_px) {
       for (int x = 0; x < width; ++x) {
         Vec3f mean = Vec3f::Zero();
         for (int i = -reach; i <= reach; ++i) {
-          mean += weights[std::size_t(i + reach)] * from.at(std::clamp(x + i * step_x, 0, width - 1),
-                                                            std::clamp(y + i * step_y, 0, height - 1));
+          mean +=
+              weights[std::size_t(i + reach)] * from.at(std::clamp(x + i * step_x, 0, width - 1),
+                                                        std::clamp(y + i * step_y, 0, height - 1));
         }
         to.at(x, y) = mean;
       }
@@ -134,9 +135,9 @@ void CameraSensor::Params::visit(ParamVisitor& v) {
           {"auto: exposure is taken back until no larger share of the picture is brighter than "
            "white, as phones do; 1: never.",
            "", 0, 1});
-  v.param("warmth_ev", warmth_ev,
-          {"Stops by which a wrong white balance makes red stronger and blue weaker.", "EV", -4,
-           4});
+  v.param(
+      "warmth_ev", warmth_ev,
+      {"Stops by which a wrong white balance makes red stronger and blue weaker.", "EV", -4, 4});
   v.param("iso", iso,
           {"Sensitivity; the well counts as full at full_well_electrons * 100 / iso.", "", 1, 1e7});
   v.param("exposure_time_s", exposure_time_s,

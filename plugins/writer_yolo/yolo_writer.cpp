@@ -27,8 +27,8 @@ void append_point(std::string& line, const Frame& frame, const Vec2& point) {
 void append_box(std::string& line, const Frame& frame, const PixelBox& box, double margin) {
   const Vec2 more = 0.5 * margin * Vec2(box.width(), box.height());
   const Vec2 low = (Vec2(box.x_min, box.y_min) - more).cwiseMax(0.0);
-  const Vec2 high = (Vec2(box.x_max, box.y_max) + more)
-                        .cwiseMin(Vec2(frame.camera.width, frame.camera.height));
+  const Vec2 high =
+      (Vec2(box.x_max, box.y_max) + more).cwiseMin(Vec2(frame.camera.width, frame.camera.height));
   append_point(line, frame, 0.5 * (low + high));
   append_point(line, frame, high - low);
 }
@@ -47,10 +47,11 @@ void append_keypoints(std::string& line, const Frame& frame, const Instance& ins
 void YoloWriter::Params::visit(ParamVisitor& v) {
   training.visit(v);
   v.choice("task", task, kTasks, {"What the label lines hold."});
-  v.param("box_margin", box_margin,
-          {"Share by which boxes are wider and higher than what is seen, where a detector is to match "
-           "boxes drawn by hand, which are looser.",
-           "", 0, 10});
+  v.param(
+      "box_margin", box_margin,
+      {"Share by which boxes are wider and higher than what is seen, where a detector is to match "
+       "boxes drawn by hand, which are looser.",
+       "", 0, 10});
 }
 
 YoloWriter::YoloWriter(Params params, Host& host)

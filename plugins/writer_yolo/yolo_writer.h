@@ -17,9 +17,9 @@ namespace diorama {
 ///     labels/{train,val}/000012_cam_0.txt
 ///
 /// One line per object, the class index first, all coordinates as shares of the image's size:
-/// detect: box centre and size, of what is seen and a margin round it; segment: a polygon of the visible pixels; pose: box, then x y v of
-/// nine cuboid points; obb: the four corners of the least rectangle. A picture without objects has
-/// an empty label file.
+/// detect: box centre and size, of what is seen and a margin round it; segment: a polygon of the
+/// visible pixels; pose: box, then x y v of nine cuboid points; obb: the four corners of the least
+/// rectangle. A picture without objects has an empty label file.
 class YoloWriter final : public Writer {
  public:
   struct Params {

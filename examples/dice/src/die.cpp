@@ -83,8 +83,9 @@ Color body_color(const DieLook& look, const Vec3& at) {
     case Body::Clear:
       return look.color;
     case Body::Marbled: {
-      const Vec3 bent = far + 0.8 * Vec3(noise(look.seed + 10, far, 2), noise(look.seed + 20, far, 2),
-                                         noise(look.seed + 30, far, 2));
+      const Vec3 bent =
+          far + 0.8 * Vec3(noise(look.seed + 10, far, 2), noise(look.seed + 20, far, 2),
+                           noise(look.seed + 30, far, 2));
       const Color two =
           mix(look.color, look.second, smooth_step(-0.22, 0.22, noise(look.seed, bent, 3)));
       const double vein = 1.0 - std::abs(noise(look.seed + 40, 1.7 * bent, 2));
@@ -97,8 +98,9 @@ Color body_color(const DieLook& look, const Vec3& at) {
       return mix(spot, look.color, smooth_step(size - 0.06, size + 0.06, grain.distance));
     }
     case Body::Striped:
-      return mix(look.color, look.second,
-                 smooth_step(-0.15, 0.15, at.x() * 0.5 + at.z() * 0.3 + 0.5 * noise(look.seed, far, 2)));
+      return mix(
+          look.color, look.second,
+          smooth_step(-0.15, 0.15, at.x() * 0.5 + at.z() * 0.3 + 0.5 * noise(look.seed, far, 2)));
   }
   return look.color;
 }
@@ -181,7 +183,7 @@ DieLook any_shape(Rng& rng) {
   look.seed = rng.bits();
   const double size = rng.uniform();
   const double any_size = rng.uniform();
-  look.edge_m = size < 0.35 ? 0.0115 + 0.001 * any_size
+  look.edge_m = size < 0.35   ? 0.0115 + 0.001 * any_size
                 : size < 0.75 ? 0.0155 + 0.001 * any_size
                               : 0.010 + 0.010 * any_size;
   look.rounding = rng.uniform(0.08, 0.34);
@@ -220,7 +222,8 @@ std::vector<Vec2> pip_places(const DieLook& look, int number) {
     const double x = is_turned ? -s : s;
     places.insert(places.end(), {Vec2(x, s), Vec2(-x, -s)});
   }
-  if (number >= 4) places.insert(places.end(), {Vec2(s, s), Vec2(-s, -s), Vec2(s, -s), Vec2(-s, s)});
+  if (number >= 4)
+    places.insert(places.end(), {Vec2(s, s), Vec2(-s, -s), Vec2(s, -s), Vec2(-s, s)});
   if (number == 6) {
     const Vec2 middle = look.is_turned[2] ? Vec2(0.0, s) : Vec2(s, 0.0);
     places.insert(places.end(), {middle, -middle});
@@ -275,8 +278,8 @@ std::shared_ptr<const Mesh> die_mesh(const DieLook& look) {
           constexpr double kReach = 0.4 * diorama::kPi;
           return std::sin(kReach * (2.0 * i / kCells - 1.0)) / std::sin(kReach);
         };
-        const Vec3 p = surface_point(
-            look, (turn * Vec3(along(column), along(row), 1.0)).normalized());
+        const Vec3 p =
+            surface_point(look, (turn * Vec3(along(column), along(row), 1.0)).normalized());
         const Vec3 on_face = turn.transpose() * p;
         const Vec2 pixel = atlas_point(number, on_face.head<2>());
         mesh->positions.push_back((half_m * p).cast<float>());

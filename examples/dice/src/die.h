@@ -14,15 +14,15 @@ enum class Body { Plain, Marbled, Speckled, Striped, Clear };
 /// All that tells one die from another. Lengths are shares of half an edge unless they end in _m.
 struct DieLook {
   double edge_m = 0.016;
-  double rounding = 0.2;   ///< Radius of the edges.
-  double ball = 2.0;       ///< Radius of the ball that cuts the corners; above 1.73 it cuts nothing.
+  double rounding = 0.2;  ///< Radius of the edges.
+  double ball = 2.0;      ///< Radius of the ball that cuts the corners; above 1.73 it cuts nothing.
   bool is_mirrored = false;  ///< 1, 2, 3 run clockwise round their corner.
   /// The two, three and six may lie either way on their faces.
   std::array<bool, 3> is_turned{};
   double pip_radius = 0.2;
-  double pip_offset = 0.5;     ///< From the middle of a face to the outer pips.
-  double first_pip = 1.0;      ///< Factor on the radius of the one.
-  double dent = 0.5;           ///< Slope of the pips' rims; 0: painted.
+  double pip_offset = 0.5;  ///< From the middle of a face to the outer pips.
+  double first_pip = 1.0;   ///< Factor on the radius of the one.
+  double dent = 0.5;        ///< Slope of the pips' rims; 0: painted.
   Body body = Body::Plain;
   Color color = Color::Ones();
   Color second = Color::Ones();

@@ -37,7 +37,8 @@ TopFace top_face(const Scene& scene, NodeId thing, std::string_view prefix) {
 void NumberOnTop::Params::visit(diorama::ParamVisitor& v) {
   v.param("nodes", nodes, {"Things to label.", diorama::kNodePattern});
   v.param("prefix", prefix,
-          {"Nodes below whose names begin so look out of the faces; the rest of the name is the label."});
+          {"Nodes below whose names begin so look out of the faces; the rest of the name is the "
+           "label."});
   v.param("taxonomy", taxonomy, {"Which label is set."});
   v.param("max_lean_deg", max_lean_deg,
           {"What leans more than this has no number on top: it is hidden.", "deg", 0, 90});

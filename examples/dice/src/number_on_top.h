@@ -9,9 +9,9 @@
 namespace dice {
 
 /// Labels things by the face that they show upwards as they lie now. Nodes called PREFIX_WORD below
-/// them look along +z out of the faces; WORD becomes the label. What leans, and what lies on another of
-/// the nodes, has no label that a picture could show: it is hidden, so that no picture has it
-/// without a label.
+/// them look along +z out of the faces; WORD becomes the label. What leans, and what lies on
+/// another of the nodes, has no label that a picture could show: it is hidden, so that no picture
+/// has it without a label.
 class NumberOnTop final : public diorama::Randomizer {
  public:
   struct Params {

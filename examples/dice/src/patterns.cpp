@@ -2,6 +2,7 @@
 #include "patterns.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace dice {
@@ -31,8 +32,8 @@ double smooth_noise(std::uint64_t seed, const Vec3& at) {
   double sum = 0.0;
   for (int corner = 0; corner < 8; ++corner) {
     const int dx = corner & 1, dy = (corner >> 1) & 1, dz = corner >> 2;
-    const double weight = (dx ? s.x() : 1.0 - s.x()) * (dy ? s.y() : 1.0 - s.y()) *
-                          (dz ? s.z() : 1.0 - s.z());
+    const double weight =
+        (dx ? s.x() : 1.0 - s.x()) * (dy ? s.y() : 1.0 - s.y()) * (dz ? s.z() : 1.0 - s.z());
     sum += weight * unit(mixed(seed, std::int64_t(cell.x()) + dx, std::int64_t(cell.y()) + dy,
                                std::int64_t(cell.z()) + dz));
   }
@@ -64,14 +65,14 @@ Color any_color(Rng& rng) {
   if (kind < 0.14) return from_hsv(0.08 + 0.08 * hue, 0.18 * a, 0.82 + 0.18 * b);  // white, ivory
   if (kind < 0.28) return from_hsv(hue, 0.4 * a, 0.04 + 0.16 * b);                 // black
   if (kind < 0.36) return from_hsv(hue, 0.12 * a, 0.25 + 0.5 * b);                 // grey
-  if (kind < 0.48) return from_hsv(0.05 + 0.07 * hue, 0.5 + 0.5 * a, 0.3 + 0.55 * b);  // brown, gold
+  if (kind < 0.48)
+    return from_hsv(0.05 + 0.07 * hue, 0.5 + 0.5 * a, 0.3 + 0.55 * b);  // brown, gold
   return from_hsv(hue, 0.5 + 0.5 * a, 0.2 + 0.75 * b);
 }
 
 Vec3f linear(const Color& color) {
-  return color.unaryExpr([](float v) {
-    return v <= 0.04045f ? v / 12.92f : std::pow((v + 0.055f) / 1.055f, 2.4f);
-  });
+  return color.unaryExpr(
+      [](float v) { return v <= 0.04045f ? v / 12.92f : std::pow((v + 0.055f) / 1.055f, 2.4f); });
 }
 
 double noise(std::uint64_t seed, const Vec3& at, int octaves) {
@@ -87,18 +88,33 @@ double noise(std::uint64_t seed, const Vec3& at, int octaves) {
 
 NearestPoint nearest_point(std::uint64_t seed, const Vec3& at) {
   const Vec3 cell = at.array().floor();
-  NearestPoint nearest{diorama::kInfinity, 0};
+  const Vec3 inside = at - cell;
+  double least = diorama::kInfinity;  // squared
+  std::uint64_t nearest = 0;
+  // The own cell first: most of the others are farther away than its point.
+  constexpr std::array kSteps{0, -1, 1};
   for (int i = 0; i < 27; ++i) {
-    const Vec3 neighbour = cell + Vec3(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
-    const auto x = std::int64_t(neighbour.x()), y = std::int64_t(neighbour.y()),
-               z = std::int64_t(neighbour.z());
-    const std::uint64_t number = mixed(seed, x, y, z);
+    const std::array steps{kSteps[std::size_t(i % 3)], kSteps[std::size_t(i / 3 % 3)],
+                           kSteps[std::size_t(i / 9)]};
+    double gap = 0.0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double x = inside[Eigen::Index(axis)];
+      const double to_cell = steps[axis] == 0 ? 0.0 : steps[axis] < 0 ? x : 1.0 - x;
+      gap += to_cell * to_cell;
+    }
+    if (gap >= least) continue;
+    const Vec3 neighbour = cell + Vec3(steps[0], steps[1], steps[2]);
+    const std::uint64_t number = mixed(seed, std::int64_t(neighbour.x()),
+                                       std::int64_t(neighbour.y()), std::int64_t(neighbour.z()));
     const Vec3 point =
         neighbour + Vec3(unit(number), unit(mixed(number, 1, 0, 0)), unit(mixed(number, 2, 0, 0)));
-    const double distance = (point - at).norm();
-    if (distance < nearest.distance) nearest = {distance, number};
+    const double distance = (point - at).squaredNorm();
+    if (distance < least) {
+      least = distance;
+      nearest = number;
+    }
   }
-  return nearest;
+  return {std::sqrt(least), nearest};
 }
 
 std::shared_ptr<const diorama::Texture> painted(

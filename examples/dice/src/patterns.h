@@ -25,8 +25,8 @@ Color from_hsv(double hue, double saturation, double value);
 Color any_color(diorama::Rng& rng);
 diorama::Vec3f linear(const Color& color);
 
-/// Smooth noise in [-1, 1] about 0 with features of about 1; sum of `octaves`, each of half the size
-/// and height of the one before.
+/// Smooth noise in [-1, 1] about 0 with features of about 1; sum of `octaves`, each of half the
+/// size and height of the one before.
 double noise(std::uint64_t seed, const diorama::Vec3& at, int octaves = 1);
 /// Distance from `at` to the nearest of one random point per unit cell, and that point's number.
 struct NearestPoint {

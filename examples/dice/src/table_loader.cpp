@@ -72,15 +72,16 @@ MaterialPtr patterned(double size_m, double repeat_m, double roughness,
                       const std::function<Color(double u, double v)>& pattern) {
   auto material = coated(Color::Ones(), roughness);
   auto& input = material->base_color_texture;
-  input.texture = painted("surface", kPixels, kPixels, [&](double x, double y) {
-    return pattern(x / kPixels, y / kPixels);
-  });
+  input.texture = painted("surface", kPixels, kPixels,
+                          [&](double x, double y) { return pattern(x / kPixels, y / kPixels); });
   input.wrap_u = input.wrap_v = diorama::Wrap::Mirror;
   input.uv_from_mesh_uv *= float(size_m / repeat_m);
   return material;
 }
 
-Color white(Rng& rng) { return from_hsv(rng.uniform(), 0.06 * rng.uniform(), rng.uniform(0.62, 1.0)); }
+Color white(Rng& rng) {
+  return from_hsv(rng.uniform(), 0.06 * rng.uniform(), rng.uniform(0.62, 1.0));
+}
 
 /// Paper, card and plastic: clouds of light, fibres, and specks of dirt.
 MaterialPtr sheet(Rng& rng, const Color& color, double size_m) {
@@ -90,16 +91,19 @@ MaterialPtr sheet(Rng& rng, const Color& color, double size_m) {
   return patterned(size_m, 0.32, rng.uniform(0.25, 0.95), [=](double u, double v) {
     const Vec3 p(u, v, 0.0);
     double shade = 1.0 + clouds * noise(seed, 5.0 * p, 2) + grain * noise(seed + 9, 150.0 * p);
-    const NearestPoint speck = nearest_point(seed + 5, Vec3(18.0 * u, 18.0 * v, 0.5));
-    const double size = specks * double(speck.number % 64) / 64.0;
-    if (speck.number % 5 == 0 && speck.distance < size) shade *= 0.5;
+    if (specks > 0.0) {
+      const NearestPoint speck = nearest_point(seed + 5, Vec3(18.0 * u, 18.0 * v, 0.5));
+      const double size = specks * double(speck.number % 64) / 64.0;
+      if (speck.number % 5 == 0 && speck.distance < size) shade *= 0.5;
+    }
     return Color(color * float(shade));
   });
 }
 
 MaterialPtr wood(Rng& rng, double size_m) {
   const std::uint64_t seed = rng.bits();
-  const Color light = from_hsv(rng.uniform(0.04, 0.11), rng.uniform(0.2, 0.7), rng.uniform(0.35, 0.9));
+  const Color light =
+      from_hsv(rng.uniform(0.04, 0.11), rng.uniform(0.2, 0.7), rng.uniform(0.35, 0.9));
   const Color dark = light * float(rng.uniform(0.4, 0.85));
   const double rings = rng.uniform(6.0, 25.0), planks = rng.uniform(2.0, 6.0);
   const bool has_planks = rng.chance(0.4);
@@ -118,8 +122,8 @@ MaterialPtr cloth(Rng& rng, double size_m) {
   const Color color = any_color(rng);
   const double threads = rng.uniform(40.0, 160.0), relief = rng.uniform(0.05, 0.35);
   return patterned(size_m, 0.25, 1.0, [=](double u, double v) {
-    const double weave = std::sin(threads * 2.0 * diorama::kPi * u) *
-                         std::sin(threads * 2.0 * diorama::kPi * v);
+    const double weave =
+        std::sin(threads * 2.0 * diorama::kPi * u) * std::sin(threads * 2.0 * diorama::kPi * v);
     const double fuzz = noise(seed, Vec3(90.0 * u, 90.0 * v, 0.0), 2);
     return Color(color * float(1.0 + relief * (0.5 * weave + 0.5 * fuzz)));
   });
@@ -197,8 +201,8 @@ void add_strip(Rng& rng, Builder& builder, double x, double y, double turn, doub
 void add_clutter(Rng& rng, Builder& builder, double x, double y, double floor) {
   const double turn = rng.uniform(0.0, 2.0 * diorama::kPi);
   const int kind = int(rng.index(5));
-  const MaterialPtr material = rng.chance(0.4) ? print(rng, 0.09, 0.06)
-                                               : coated(any_color(rng), rng.uniform(0.1, 0.9));
+  const MaterialPtr material =
+      rng.chance(0.4) ? print(rng, 0.09, 0.06) : coated(any_color(rng), rng.uniform(0.1, 0.9));
   if (kind == 0) {
     builder.box("card", {0.088, 0.063, 0.0006}, at(x, y, floor + 0.0003, turn), material);
   } else if (kind == 1) {
@@ -206,8 +210,8 @@ void add_clutter(Rng& rng, Builder& builder, double x, double y, double floor) {
     metal->metallic = 1.0f;
     builder.disc("coin", rng.uniform(0.008, 0.0125), 0.002, at(x, y, floor + 0.001), metal);
   } else if (kind == 2) {
-    const Affine lying = at(x, y, floor + 0.0045, turn) *
-                         Eigen::AngleAxisd(0.5 * diorama::kPi, Vec3::UnitX());
+    const Affine lying =
+        at(x, y, floor + 0.0045, turn) * Eigen::AngleAxisd(0.5 * diorama::kPi, Vec3::UnitX());
     builder.disc("pen", 0.0045, 0.14, lying, material);
   } else if (kind == 3) {
     builder.disc("top", rng.uniform(0.01, 0.03), 0.012, at(x, y, floor + 0.006), material);
@@ -226,13 +230,14 @@ void build_any(Rng rng, Builder& builder, double& half_x, double& half_y) {
   if (has_tray) {
     const double thickness = rng.uniform(0.001, 0.004);
     floor = -thickness;
-    const MaterialPtr bottom = rng.chance(0.65) ? sheet(rng, white(rng), 2.0 * half_x)
-                                                : any_surface(rng, 2.0 * half_x);
+    const MaterialPtr bottom =
+        rng.chance(0.65) ? sheet(rng, white(rng), 2.0 * half_x) : any_surface(rng, 2.0 * half_x);
     builder.box("bottom", {2.0 * half_x + 0.002, 2.0 * half_y + 0.002, thickness},
                 at(0.0, 0.0, -0.5 * thickness), bottom);
     add_tray(rng, builder, half_x, half_y);
   } else if (rng.chance(0.25)) {
-    builder.box("sheet", {2.0 * half_x * rng.uniform(1.0, 1.6), 2.0 * half_y * rng.uniform(1.0, 1.6), 0.001},
+    builder.box("sheet",
+                {2.0 * half_x * rng.uniform(1.0, 1.6), 2.0 * half_y * rng.uniform(1.0, 1.6), 0.001},
                 at(0.0, 0.0, -0.0005, rng.uniform(0.0, diorama::kPi)),
                 any_surface(rng, 2.0 * half_x));
     floor = -0.001;

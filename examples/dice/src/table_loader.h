@@ -7,9 +7,9 @@
 
 namespace dice {
 
-/// Makes places where dice are thrown, from numbers: a table with or without sheet, tray and clutter
-/// round it ("dice_table:7"), or a bare one of one colour ("plain_table:7"). The floor on which dice
-/// land is at z = 0; the node `area` has axes that reach from its middle to its rims.
+/// Makes places where dice are thrown, from numbers: a table with or without sheet, tray and
+/// clutter round it ("dice_table:7"), or a bare one of one colour ("plain_table:7"). The floor on
+/// which dice land is at z = 0; the node `area` has axes that reach from its middle to its rims.
 class TableLoader final : public diorama::Loader {
  public:
   struct Params {

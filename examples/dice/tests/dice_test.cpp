@@ -60,8 +60,8 @@ class TestHost final : public diorama::Host {
 TestHost host;
 
 NodeId add_die(Scene& scene, const std::string& asset) {
-  const NodeId parent = scene.find("/Assets") ? scene.find("/Assets")
-                                              : scene.create(scene.root(), "Assets");
+  const NodeId parent =
+      scene.find("/Assets") ? scene.find("/Assets") : scene.create(scene.root(), "Assets");
   const NodeId die = scene.create(parent, "die");
   dice::DieLoader({}, host).load(asset, scene, die);
   return die;
@@ -118,8 +118,8 @@ int spots_on_top(const Scene& scene, NodeId die) {
 
 /// One of the 24 ways to stand on a face, turned about the vertical and leaning a little.
 diorama::Quat standing(Rng& rng, double lean_deg) {
-  const std::array<Vec3, 6> axes{Vec3::UnitX(), -Vec3::UnitX(), Vec3::UnitY(),
-                                 -Vec3::UnitY(), Vec3::UnitZ(), -Vec3::UnitZ()};
+  const std::array<Vec3, 6> axes{Vec3::UnitX(),  -Vec3::UnitX(), Vec3::UnitY(),
+                                 -Vec3::UnitY(), Vec3::UnitZ(),  -Vec3::UnitZ()};
   const Vec3 up = axes[rng.index(6)];
   const Eigen::AngleAxisd yaw(rng.uniform(0.0, 2.0 * diorama::kPi), Vec3::UnitZ());
   const Eigen::AngleAxisd lean(lean_deg * diorama::kPi / 180.0, Vec3::UnitX());
@@ -128,7 +128,7 @@ diorama::Quat standing(Rng& rng, double lean_deg) {
 
 void labels_are_what_is_painted_on_top() {
   std::array<int, 7> seen{};
-  for (int model = 1; model <= 150; ++model) {
+  for (int model = 1; model <= 90; ++model) {
     Scene scene;
     const NodeId die = add_die(scene, "plain_die:" + std::to_string(model));
     Rng rng = Rng(7).fork(std::uint64_t(model));
@@ -142,7 +142,7 @@ void labels_are_what_is_painted_on_top() {
     ++seen[std::size_t(spots)];
   }
   for (int number = 1; number <= 6; ++number) {
-    check(seen[std::size_t(number)] > 10, "every number comes up");
+    check(seen[std::size_t(number)] > 5, "every number comes up");
   }
 }
 
@@ -165,7 +165,7 @@ void what_has_no_number_on_top_is_hidden() {
 
 void dice_are_as_dice_are() {
   int left = 0, right = 0;
-  for (int model = 1; model <= 100; ++model) {
+  for (int model = 1; model <= 50; ++model) {
     Scene scene;
     const NodeId die = add_die(scene, "die:" + std::to_string(model));
     std::array<Vec3, 6> normals;
@@ -183,7 +183,7 @@ void dice_are_as_dice_are() {
       check(mesh.normals[i].dot(mesh.positions[i]) > 0.0f, "normals look outwards");
     }
   }
-  check(left > 30 && right > 30, "dice of both hands are made");
+  check(left > 12 && right > 12, "dice of both hands are made");
 }
 
 void throws_start_apart_and_within() {

@@ -249,8 +249,7 @@ TEST_CASE("Balanced picks use every asset equally often, over visits too", "[pla
 }
 
 TEST_CASE("Visits may have fewer objects, every number as likely", "[plan]") {
-  const Job job =
-      job_from(with(good_job(), "count: 20,", "count: 5, fewer: 3, pick: per_visit,"));
+  const Job job = job_from(with(good_job(), "count: 20,", "count: 5, fewer: 3, pick: per_visit,"));
   const Job all = job_from(with(good_job(), "count: 20,", "count: 5, pick: per_visit,"));
   const CapturePlan plan = plan_of(job);
   std::map<std::size_t, int> counts;

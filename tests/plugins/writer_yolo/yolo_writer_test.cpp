@@ -89,7 +89,8 @@ TEST_CASE("boxes may be looser than what is seen, but stay in the picture", "[wr
       const double low = lines[i][axis] - 0.75 * lines[i][axis + 2];
       const double high = lines[i][axis] + 0.75 * lines[i][axis + 2];
       CHECK(looser[i][axis] - 0.5 * looser[i][axis + 2] == Approx(std::max(0.0, low)).margin(2e-6));
-      CHECK(looser[i][axis] + 0.5 * looser[i][axis + 2] == Approx(std::min(1.0, high)).margin(2e-6));
+      CHECK(looser[i][axis] + 0.5 * looser[i][axis + 2] ==
+            Approx(std::min(1.0, high)).margin(2e-6));
     }
   }
 }
