@@ -39,6 +39,7 @@ std::uint64_t asset_number(std::string_view asset) {
 void DieLoader::Params::visit(diorama::ParamVisitor& v) {
   static constexpr std::array<const char*, 2> kLooks{"any", "plain"};
   v.param("models", models, {"How many different dice there are.", "", 1, 1e6});
+  v.param("first", first, {"Number of the first of them.", "", 0, 1e9});
   v.choice("look", look, kLooks,
            {"any: marbled, speckled, clear, worn and plain plastic; plain: one colour, matt."});
 }
@@ -46,7 +47,9 @@ void DieLoader::Params::visit(diorama::ParamVisitor& v) {
 std::vector<std::string> DieLoader::assets() const {
   std::vector<std::string> names;
   const std::string scheme(params_.look == "any" ? kAny : kPlain);
-  for (int i = 1; i <= params_.models; ++i) names.push_back(scheme + std::to_string(i));
+  for (int i = 0; i < params_.models; ++i) {
+    names.push_back(scheme + std::to_string(params_.first + i));
+  }
   return names;
 }
 

@@ -13,6 +13,7 @@ class DieLoader final : public diorama::Loader {
  public:
   struct Params {
     int models = 500;
+    int first = 1;
     std::string look = "any";
     void visit(diorama::ParamVisitor& v);
   };

@@ -264,13 +264,16 @@ void build_any(Rng rng, Builder& builder, double& half_x, double& half_y) {
 void TableLoader::Params::visit(diorama::ParamVisitor& v) {
   static constexpr std::array<const char*, 2> kLooks{"any", "plain"};
   v.param("models", models, {"How many different tables there are.", "", 1, 1e6});
+  v.param("first", first, {"Number of the first of them.", "", 0, 1e9});
   v.choice("look", look, kLooks, {"any: all there is; plain: a bare table of one colour."});
 }
 
 std::vector<std::string> TableLoader::assets() const {
   std::vector<std::string> names;
   const std::string scheme(params_.look == "any" ? kAny : kPlain);
-  for (int i = 1; i <= params_.models; ++i) names.push_back(scheme + std::to_string(i));
+  for (int i = 0; i < params_.models; ++i) {
+    names.push_back(scheme + std::to_string(params_.first + i));
+  }
   return names;
 }
 

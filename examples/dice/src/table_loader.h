@@ -14,6 +14,7 @@ class TableLoader final : public diorama::Loader {
  public:
   struct Params {
     int models = 2000;
+    int first = 1;
     std::string look = "any";
     void visit(diorama::ParamVisitor& v);
   };
