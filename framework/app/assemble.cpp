@@ -62,4 +62,17 @@ std::unique_ptr<HostServices> make_host(Registry& registry, const GlobalOptions&
   return std::make_unique<HostServices>(registry, host, log);
 }
 
+JobServices make_job_services(const GlobalOptions& options, const Value& job, const Log& log,
+                              void (*more)(Registrar&)) {
+  JobServices services;
+  services.registry = make_registry(options, log);
+  if (more) services.registry->add_builtin(more, program_version());
+  warn_of_rejected(*services.registry, log);
+  const std::optional<std::string> job_root = assets_root_of(job);
+  services.host = make_host(*services.registry, options, job_root, log, asset_prefixes_of(job));
+  services.assets_root = choose_assets_root(options.assets_root, std::getenv("DIORAMA_ASSETS_ROOT"),
+                                            job_root, sample_pack_folder(options.program));
+  return services;
+}
+
 }  // namespace diorama

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -26,6 +27,19 @@ std::optional<std::string> assets_root_of(const Value& job);
 
 /// Its asset_prefixes, as far as they are well formed.
 std::vector<AssetPrefix> asset_prefixes_of(const Value& job);
+
+/// What a job is assembled with. The host must not outlive the registry.
+struct JobServices {
+  std::unique_ptr<Registry> registry;
+  std::unique_ptr<HostServices> host;
+  std::optional<std::filesystem::path> assets_root;
+};
+
+/// Searches for plugins as make_registry() does, warns of those that were refused, and makes host
+/// services for a native job; `more`, if given, adds components of the program's own. Throws
+/// Error(Asset) when the assets root is no folder.
+JobServices make_job_services(const GlobalOptions& options, const Value& job, const Log& log,
+                              void (*more)(Registrar&) = nullptr);
 
 /// Host services for a job; `job_assets_root` is what the job says, if it says something. Throws
 /// Error(Asset) when the assets root is no folder.

@@ -6,8 +6,8 @@
 
 #include "framework/config/value_text.h"
 #include "framework/host/machine_memory.h"
-#include "framework/pipeline/capture_memory.h"
 #include "framework/pipeline/camera_rig.h"
+#include "framework/pipeline/capture_memory.h"
 #include "framework/pipeline/dataset_description.h"
 #include "framework/pipeline/pattern_check.h"
 #include "framework/pipeline/scene_setup.h"
@@ -394,7 +394,10 @@ JobAssembly assemble_job(const Value& value, Registry& registry, HostServices& h
   assembly.dataset = describe_dataset(
       assembly.job, assembly.plan, portable_job(assembly.resolved), program_version,
       assembler.plugins(), drawn_assets,
-      [&](const std::string& asset) { return host.files_of(asset); }, assets_root, host);
+      [&](const std::string& asset) {
+        return purpose == AssembleFor::Trial ? std::vector<fs::path>() : host.files_of(asset);
+      },
+      assets_root, host);
   assembly.dataset_json = dataset_json(assembly.dataset, assembly.job);
   if (visits_in_flight == 0) {
     visits_in_flight =

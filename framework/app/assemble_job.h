@@ -34,8 +34,9 @@ DescribeComponent describe_from(Registry& registry);
 /// Error(Config).
 Value check_job(const Value& job, Registry& registry, Host& host);
 
-/// A plan needs no description of the dataset, for which every file of every asset is read.
-enum class AssembleFor { Plan, Run };
+/// A plan needs no description of the dataset, for which every file of every asset is read. A trial
+/// has one that names no files.
+enum class AssembleFor { Plan, Trial, Run };
 
 /// Reads the job, makes its components, lists its assets, plans its captures and resolves what its
 /// writers need. The host gets the job's loaders. Nothing is loaded or written. All complaints

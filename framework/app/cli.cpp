@@ -28,6 +28,7 @@
 #include "framework/app/command_lint.h"
 #include "framework/app/command_new_plugin.h"
 #include "framework/app/command_plugins.h"
+#include "framework/app/command_preview.h"
 #include "framework/app/command_render.h"
 #include "framework/app/command_replay.h"
 #include "framework/app/command_run.h"
@@ -57,6 +58,7 @@ struct CommandLine {
   RunCommandOptions run;
   std::string shard;
   std::string progress = "bar";
+  PreviewOptions preview;
   StatusOptions status;
   std::filesystem::path finish;
   bool close_on_completion = false;
@@ -202,7 +204,11 @@ void add_run(CLI::App& app, CommandLine& line) {
       ->check(CLI::IsMember({"bar", "json", "openjd"}))
       ->type_name("FORMAT")
       ->capture_default_str();
-  command->add_flag("--dry-run", line.run.dry_run, "Check and plan the job, write nothing");
+  command->add_flag("--dry-run", line.run.dry_run,
+                    "Check and plan the job, try a visit of it in memory, and estimate time, disk "
+                    "and memory; write nothing");
+  command->add_flag("--plan", line.run.plan,
+                    "Check and plan the job, without a look at its assets; write nothing");
   command->add_flag("--close-on-completion", line.close_on_completion,
                     "Accepted for scripts made for Isaac Sim; the program always ends");
   command->callback([&line] {
@@ -213,6 +219,31 @@ void add_run(CLI::App& app, CommandLine& line) {
                           : line.progress == "openjd" ? Progress::OpenJd
                                                       : Progress::Bar;
       return command_run(line.global, line.run, log);
+    };
+  });
+}
+
+void add_preview(CLI::App& app, CommandLine& line) {
+  CLI::App* command = app.add_subcommand(
+      "preview", "Make a few of a job's pictures quickly, and estimate the whole job");
+  add_job_options(*command, line.preview.job);
+  command
+      ->add_option("--capture", line.preview.captures,
+                   "Number of a capture (repeatable); default: the first, the middle and the last")
+      ->type_name("N")
+      ->allow_extra_args(false);
+  command
+      ->add_option("--samples", line.preview.samples,
+                   "Paths per pixel at most, for renderers that have them")
+      ->check(CLI::Range(1, 1 << 20))
+      ->type_name("N")
+      ->capture_default_str();
+  command->add_option("--dir", line.preview.folder, "Folder of the pictures")
+      ->type_name("DIR")
+      ->capture_default_str();
+  command->callback([&line] {
+    line.command = [&line](ConsoleLog& log) {
+      return command_preview(line.global, line.preview, log);
     };
   });
 }
@@ -704,6 +735,7 @@ void add_all(CLI::App& app, CommandLine& line) {
   app.get_formatter()->column_width(34);
   add_global_options(app, line);
   add_run(app, line);
+  add_preview(app, line);
   add_status(app, line);
   add_finish(app, line);
   add_config(app, line);

@@ -3,9 +3,12 @@
 
 #include <atomic>
 #include <csignal>
-#include <cstdlib>
+#include <functional>
 #include <iostream>
+#include <mutex>
 #include <optional>
+#include <set>
+#include <string_view>
 #include <utility>
 
 #include "framework/app/assemble.h"
@@ -13,6 +16,7 @@
 #include "framework/app/exit_codes.h"
 #include "framework/app/job_file.h"
 #include "framework/app/output_check.h"
+#include "framework/app/trial_run.h"
 #include "framework/config/clean_text.h"
 #include "framework/config/job_overrides.h"
 #include "framework/config/yaml_config.h"
@@ -20,7 +24,6 @@
 #include "framework/host/progress_lines.h"
 #include "framework/pipeline/capture_memory.h"
 #include "framework/pipeline/dataset_description.h"
-#include "framework/plugins/plugin_search.h"
 
 namespace diorama {
 namespace {
@@ -125,31 +128,50 @@ void log_lines(const std::string& text, ConsoleLog& log) {
 void log_next_step(const RunSummary& summary, const fs::path& dataset, ConsoleLog& log) {
   const std::string folder = dataset.string();
   log.write(LogLevel::Info, "dataset: " + folder);
-  log.write(LogLevel::Info, summary.is_finished ? "next: diorama lint " + folder
-                                                : "next: diorama status " + folder);
+  log.write(LogLevel::Info, summary.is_finished
+                                ? "next: diorama lint " + folder + ", diorama view " + folder
+                                : "next: diorama status " + folder);
+}
+
+/// The plan, and what a capture needs.
+void print_plan(const GlobalOptions& global, const Value& job, const Log& log) {
+  const JobServices services = make_job_services(global, job, log);
+  const JobAssembly assembly =
+      assemble_job(job, *services.registry, *services.host, services.assets_root, program_version(),
+                   AssembleFor::Plan);
+  std::cout << printable(plan_text(assembly.plan, assembly.job, services.assets_root))
+            << memory_text(memory_of(assembly));
+}
+
+/// The plan, then what a trial of it says. Both read the job; what they say about it is said once.
+void print_estimate(const GlobalOptions& global, const Value& job, ConsoleLog& log) {
+  std::set<std::string, std::less<>> said;
+  std::mutex mutex;
+  const Log once = [&](LogLevel level, std::string_view text) {
+    {
+      const std::lock_guard lock(mutex);
+      if (!said.emplace(text).second) return;
+    }
+    log.write(level, text);
+  };
+  print_plan(global, job, once);
+  std::cout.flush();
+  TrialOptions trial;
+  trial.is_within_visit = true;
+  trial.spread = 2;
+  trial.max_samples = 2;
+  std::cout << estimate_text(run_trial(global, job, trial, once));
 }
 
 int run_value(const GlobalOptions& global, const Value& job, const RunCommandOptions& options,
               ConsoleLog& log) {
-  const std::unique_ptr<Registry> registry = make_registry(global, log.sink());
-  warn_of_rejected(*registry, log.sink());
-  const std::optional<std::string> job_root = assets_root_of(job);
-  const std::unique_ptr<HostServices> host =
-      make_host(*registry, global, job_root, log.sink(), asset_prefixes_of(job));
-  const std::optional<fs::path> assets_root =
-      choose_assets_root(global.assets_root, std::getenv("DIORAMA_ASSETS_ROOT"), job_root,
-                         sample_pack_folder(global.program));
-  JobAssembly assembly = assemble_job(job, *registry, *host, assets_root, program_version(),
-                                      options.dry_run ? AssembleFor::Plan : AssembleFor::Run,
-                                      options.visits_in_flight);
-  if (options.dry_run) {
-    std::cout << printable(plan_text(assembly.plan, assembly.job, assets_root))
-              << memory_text(memory_of(assembly));
-    return 0;
-  }
+  const JobServices services = make_job_services(global, job, log.sink());
+  JobAssembly assembly =
+      assemble_job(job, *services.registry, *services.host, services.assets_root, program_version(),
+                   AssembleFor::Run, options.visits_in_flight);
   check_folders_are_free(output_folders(assembly.job));
   try {
-    const RunSummary summary = run_job(assembly, *host, options, log);
+    const RunSummary summary = run_job(assembly, *services.host, options, log);
     log_lines(summary_text(summary), log);
     if (!options.only) log_next_step(summary, output_folders(assembly.job).records_path(), log);
     return 0;
@@ -172,7 +194,16 @@ Value job_of(const DatasetStatus& status, const fs::path& folder) {
 
 int command_run(const GlobalOptions& global, const RunCommandOptions& options, ConsoleLog& log) {
   existing_policy(options);
-  return run_value(global, load_job(options.job, log.sink()), options, log);
+  const Value job = load_job(options.job, log.sink());
+  if (options.plan) {
+    print_plan(global, job, log.sink());
+    return 0;
+  }
+  if (options.dry_run) {
+    print_estimate(global, job, log);
+    return 0;
+  }
+  return run_value(global, job, options, log);
 }
 
 int finish_dataset(const GlobalOptions& global, const DatasetStatus& status, ConsoleLog& log) {

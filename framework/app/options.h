@@ -49,7 +49,8 @@ struct RunCommandOptions {
   bool overwrite = false;
   bool only_finishes = false;  ///< See RunOptions.
   std::optional<std::set<int>> only = {};
-  bool dry_run = false;  ///< Checks the job, plans it, writes nothing.
+  bool plan = false;     ///< Checks the job and plans it, opens no asset.
+  bool dry_run = false;  ///< The same, then estimates what a run takes.
 };
 
 }  // namespace diorama

@@ -107,16 +107,14 @@ class Measurement {
   }
 
   static void judge_color(const Image<Rgba8>& image, SeenPicture& seen) {
-    std::uint64_t sum = 0;
     std::size_t burnt = 0;
     bool is_uniform = true;
     for (const Rgba8& pixel : image.pixels()) {
-      sum += std::uint64_t(pixel[0]) + pixel[1] + pixel[2];
       if (pixel[0] >= 254 && pixel[1] >= 254 && pixel[2] >= 254) ++burnt;
       is_uniform = is_uniform && pixel == image.pixels()[0];
     }
     const double count = double(std::max<std::size_t>(image.pixels().size(), 1));
-    seen.brightness = double(sum) / (3.0 * 255.0 * count);
+    seen.brightness = mean_brightness(image);
     if (*seen.brightness < kBlack) {
       seen.suspicions.push_back("black");
     } else if (double(burnt) > kBurntShare * count) {
@@ -197,6 +195,12 @@ std::string class_of(const Instance& instance) {
     return label->second;
   }
   return instance.labels.empty() ? std::string() : instance.labels.begin()->second;
+}
+
+double mean_brightness(const Image<Rgba8>& image) {
+  std::uint64_t sum = 0;
+  for (const Rgba8& pixel : image.pixels()) sum += std::uint64_t(pixel[0]) + pixel[1] + pixel[2];
+  return double(sum) / (3.0 * 255.0 * double(std::max<std::size_t>(image.pixels().size(), 1)));
 }
 
 std::optional<SeenFrom> seen_from(const StoredInfo& info, const Frame& frame,

@@ -68,6 +68,9 @@ struct SeenFrom {
   double azimuth = 0.0;     ///< From the x axis, -pi to pi.
   double elevation = 0.0;   ///< -pi/2 to pi/2.
 };
+/// Mean of a picture's sRGB values, 0 to 1.
+double mean_brightness(const Image<Rgba8>& image);
+
 /// Nothing where the dataset holds no poses.
 std::optional<SeenFrom> seen_from(const StoredInfo& info, const Frame& frame,
                                   const Instance& instance);

@@ -420,18 +420,10 @@ void listen(const std::string& program, const Value& given, const py::object& on
       &listener, [](Listener** held) { *held = nullptr; });
   {
     const py::gil_scoped_release unlocked;
-    const std::unique_ptr<Registry> registry = make_registry(options, log_to_python);
-    registry->add_builtin(register_listener, program_version());
-    warn_of_rejected(*registry, log_to_python);
-    const auto root = assets_root_of(job);
-    const std::unique_ptr<HostServices> host =
-        make_host(*registry, options, root, log_to_python, asset_prefixes_of(job));
-    host->stop_on(own.stop());
-    JobAssembly assembly =
-        assemble_job(job, *registry, *host,
-                     choose_assets_root(options.assets_root, std::getenv("DIORAMA_ASSETS_ROOT"),
-                                        root, sample_pack_folder(options.program)),
-                     program_version(), AssembleFor::Run);
+    const JobServices services = make_job_services(options, job, log_to_python, register_listener);
+    services.host->stop_on(own.stop());
+    JobAssembly assembly = assemble_job(job, *services.registry, *services.host,
+                                        services.assets_root, program_version(), AssembleFor::Run);
     MemoryFileSystem memory;
     OutputFolders folders = output_folders(assembly.job);
     folders.base = "/memory";
@@ -441,7 +433,7 @@ void listen(const std::string& program, const Value& given, const py::object& on
     run.encodes_in_order = true;
     run.progress = [&](const RunProgress&) { own.look_for_signals(); };
     try {
-      Pipeline(assembly.job, assembly.plan, assembly.components, *host, store, run)
+      Pipeline(assembly.job, assembly.plan, assembly.components, *services.host, store, run)
           .run(assembly.dataset, assembly.dataset_json);
     } catch (const Interrupted&) {
       // Whoever ended it knows.

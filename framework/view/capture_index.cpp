@@ -59,6 +59,7 @@ CaptureIndex::Object object_of(const StoredInfo& info, const Frame& frame,
   if (const auto seen = seen_from(info, frame, instance)) {
     object.distance = whole(100.0 * seen->distance_m, 0, 1e8);
     object.elevation = whole(seen->elevation * 180.0 / kPi, -90, 90);
+    object.azimuth = whole(seen->azimuth * 180.0 / kPi, -180, 180);
   }
   return object;
 }
@@ -123,11 +124,23 @@ void CaptureIndex::add(const Entry& entry) {
       box_side_.push_back(object.box_side);
       distance_.push_back(object.distance);
       elevation_.push_back(object.elevation);
+      azimuth_.push_back(object.azimuth);
     }
     first_object_.push_back(class_.size());
   }
   first_picture_.push_back(camera_.size());
   visit_.push_back(entry.visit);
+}
+
+void CaptureIndex::add_brightness(const std::vector<std::int32_t>& pictures) {
+  const std::lock_guard lock(mutex_);
+  brightness_.insert(brightness_.end(), pictures.begin(), pictures.end());
+  first_bright_.push_back(brightness_.size());
+}
+
+std::size_t CaptureIndex::brightness_size() const {
+  const std::lock_guard lock(mutex_);
+  return first_bright_.size() - 1;
 }
 
 std::size_t CaptureIndex::size() const {
@@ -162,6 +175,7 @@ std::string CaptureIndex::json(std::size_t from, std::size_t most) const {
   add_column(text, "box_side", box_side_, objects, objects_end);
   add_column(text, "distance", distance_, objects, objects_end);
   add_column(text, "elevation", elevation_, objects, objects_end);
+  add_column(text, "azimuth", azimuth_, objects, objects_end);
   std::ranges::replace(text, '\'', '"');
   const Json names{{"classes", classes_.list()},
                    {"phases", phases_.list()},
@@ -169,6 +183,18 @@ std::string CaptureIndex::json(std::size_t from, std::size_t most) const {
                    {"splits", splits_.list()}};
   return "{\"from\":" + std::to_string(from) + ",\"columns\":" + text +
          "},\"names\":" + names.dump(-1, ' ', false, Json::error_handler_t::replace) + "}";
+}
+
+std::string CaptureIndex::brightness_json(std::size_t from, std::size_t most) const {
+  const std::lock_guard lock(mutex_);
+  const std::size_t count = first_bright_.size() - 1;
+  from = std::min(from, count);
+  const std::size_t to = std::min(from + most, count);
+  std::string text = "{";
+  add_column(text, "brightness", brightness_, first_bright_[from], first_bright_[to]);
+  std::ranges::replace(text, '\'', '"');
+  return text + ",\"from\":" + std::to_string(from) + ",\"captures\":" + std::to_string(to - from) +
+         "}";
 }
 
 }  // namespace diorama

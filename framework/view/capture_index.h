@@ -25,6 +25,7 @@ class CaptureIndex {
     std::int32_t box_side = 0;           ///< Per mille: root of the box's share of the picture.
     std::int32_t distance = kUnknown;    ///< Centimetres.
     std::int32_t elevation = kUnknown;   ///< Degrees, of the camera as seen from the object.
+    std::int32_t azimuth = kUnknown;     ///< Degrees, from the object's x axis.
   };
   struct Picture {
     std::int32_t camera = 0;  ///< Place in StoredInfo::camera_names.
@@ -47,10 +48,15 @@ class CaptureIndex {
 
   /// Captures come in the order of StoredInfo::captures.
   void add(const Entry& entry);
+  /// Brightness of the next capture's pictures, percent or kUnknown each; after its entry.
+  void add_brightness(const std::vector<std::int32_t>& pictures);
   std::size_t size() const;
+  std::size_t brightness_size() const;  ///< Of captures, too.
   /// JSON of up to `most` captures from place `from` on, as columns of whole numbers: see
   /// web/src/data.ts.
   std::string json(std::size_t from, std::size_t most) const;
+  /// The same of the pictures' brightness, which takes longer to find.
+  std::string brightness_json(std::size_t from, std::size_t most) const;
 
  private:
   using Column = std::vector<std::int32_t>;
@@ -71,7 +77,10 @@ class CaptureIndex {
   std::vector<std::size_t> first_picture_{0};              ///< Per capture, and the end.
   Column camera_, width_, height_;                         ///< Per picture.
   std::vector<std::size_t> first_object_{0};               ///< Per picture, and the end.
-  Column class_, visible_, truncation_, box_side_, distance_, elevation_;  ///< Per object.
+  Column brightness_;                                      ///< Per picture, of the first captures.
+  std::vector<std::size_t> first_bright_{0};               ///< Per capture in it, and the end.
+  Column class_, visible_, truncation_, box_side_, distance_, elevation_,
+      azimuth_;  ///< Per object.
 };
 
 }  // namespace diorama

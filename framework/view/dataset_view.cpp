@@ -176,6 +176,28 @@ bool DatasetView::index_some(Opened& opened) {
   return true;
 }
 
+/// Pictures have to be decoded for it: when all else is there.
+bool DatasetView::brighten_some(Opened& opened) {
+  const StoredDataset& data = *opened.shown;
+  const std::size_t first = opened.index.brightness_size();
+  const std::size_t count = data.info().captures.size();
+  const NameSet wanted{std::string(kColor.name)};
+  if (first >= count || !data.info().holds.contains(kColor.name)) return false;
+  const std::size_t at_once = 8 * std::size_t(std::max(host_.thread_count(), 1));
+  std::vector<std::vector<std::int32_t>> found(std::min(at_once, count - first));
+  host_.parallel_for(found.size(), [&](std::size_t i) {
+    const StoredCapture stored = call_component("reader of " + data.info().format,
+                                                [&] { return data.read(first + i, wanted); });
+    for (const Frame& frame : stored.capture.frames) {
+      found[i].push_back(frame.has(kColor.name)
+                             ? std::int32_t(std::lround(100.0 * mean_brightness(frame.get(kColor))))
+                             : CaptureIndex::kUnknown);
+    }
+  });
+  for (const auto& pictures : found) opened.index.add_brightness(pictures);
+  return true;
+}
+
 bool DatasetView::make_stats(Opened& opened) {
   if (!opened.wants_stats.exchange(false)) return false;
   auto text = std::make_shared<const std::string>(stats_json(dataset_stats(*opened.whole, host_)));
@@ -228,7 +250,10 @@ bool DatasetView::work() {
   if (make_findings()) return true;
   const std::size_t asked = asked_;
   if (asked < all->size() && index_some(*all->at(asked))) return true;
-  return std::ranges::any_of(*all, [&](const auto& opened) { return index_some(*opened); });
+  if (std::ranges::any_of(*all, [&](const auto& opened) { return index_some(*opened); })) {
+    return true;
+  }
+  return std::ranges::any_of(*all, [&](const auto& opened) { return brighten_some(*opened); });
 }
 
 HttpAnswer DatasetView::state() const {
@@ -333,6 +358,10 @@ HttpAnswer DatasetView::dataset_answer(Opened& opened, Words words) {
   if (words[0] == "index" && words.size() == 2) {
     const auto from = whole_number(words[1]);
     return from ? answer_of(kJson, opened.index.json(*from, kIndexPart)) : not_there();
+  }
+  if (words[0] == "brightness" && words.size() == 2) {
+    const auto from = whole_number(words[1]);
+    return from ? answer_of(kJson, opened.index.brightness_json(*from, kIndexPart)) : not_there();
   }
   if (words[0] == "capture" && words.size() >= 2) return capture_answer(opened, words.subspan(1));
   return not_there();

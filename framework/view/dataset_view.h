@@ -30,6 +30,7 @@ namespace diorama {
 ///   /api/run  /api/lint                     what dataset.json and the journals say; findings
 ///   /api/D/info  /api/D/stats               one dataset
 ///   /api/D/index/FROM                       CaptureIndex::json(), kIndexPart captures
+///   /api/D/brightness/FROM                  CaptureIndex::brightness_json(), the same
 ///   /api/D/capture/N                        capture_json() of capture number N
 ///   /api/D/capture/N/F/KIND                 of its frame F a PictureKind, or "amodal"
 class DatasetView {
@@ -70,6 +71,7 @@ class DatasetView {
   std::shared_ptr<const Datasets> open() const;
   std::shared_ptr<const Datasets> datasets() const;
   bool index_some(Opened& opened);
+  bool brighten_some(Opened& opened);
   bool make_stats(Opened& opened);
   bool make_findings();
   bool follow_run();

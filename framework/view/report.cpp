@@ -101,6 +101,7 @@ class ReportWriter {
     add_data(at + "/stats");
     for (std::size_t i = 0; i == 0 || i < shown.captures.size(); i += DatasetView::kIndexPart) {
       add_data(at + "/index/" + std::to_string(i));
+      add_data(at + "/brightness/" + std::to_string(i));
     }
     for (const int capture : shown.captures) {
       const std::string address = at + "/capture/" + std::to_string(capture);

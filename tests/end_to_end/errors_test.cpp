@@ -231,7 +231,7 @@ TEST_CASE("Files with names that are no UTF-8 make datasets that are", "[errors]
   CHECK(outcome.exit_code == 0);
   CHECK(outcome.errors.find('\xE9') == std::string::npos);
   CHECK_THAT(read_file(folder / "out/dataset.json"), ContainsSubstring("caf\\\\xE9"));
-  const Outcome plan = run({"run", "job.yaml", "--dry-run"}, folder.path());
+  const Outcome plan = run({"run", "job.yaml", "--plan"}, folder.path());
   CHECK_THAT(plan.output, ContainsSubstring("class: caf\\xE8"));
   const Outcome inspected =
       run({"inspect", "--json", (folder / "rooms/sal\xF3n.usda").string()}, folder.path());
@@ -245,7 +245,7 @@ TEST_CASE("A plan for a hundred million captures and a hundred thousand objects"
   std::string job = job_with("total_captures: 4", "total_captures: 100000000");
   job = job.replace(job.find("count: 4"), 8, "count: 100000");
   write_file(folder / "job.yaml", job);
-  const Outcome outcome = run({"run", "job.yaml", "--dry-run"}, folder.path());
+  const Outcome outcome = run({"run", "job.yaml", "--plan"}, folder.path());
   INFO(outcome.errors);
   CHECK(outcome.exit_code == 0);
   CHECK_THAT(outcome.output, ContainsSubstring("visits (50000000)") &&

@@ -41,8 +41,7 @@ void make_assets_root(const fs::path& root) {
 std::string dry_run(const std::vector<std::string>& job) {
   const TemporaryFolder folder;
   make_assets_root(folder / "root");
-  std::vector<std::string> arguments{"--assets-root", (folder / "root").string(), "run",
-                                     "--dry-run"};
+  std::vector<std::string> arguments{"--assets-root", (folder / "root").string(), "run", "--plan"};
   arguments.insert(arguments.end(), job.begin(), job.end());
   const Outcome outcome = run(arguments, folder.path());
   INFO(outcome.errors);

@@ -258,12 +258,12 @@ TEST_CASE("Without views nothing changes", "[views]") {
 TEST_CASE("Wrong patterns and labels in views are named before anything is loaded", "[views]") {
   const TemporaryFolder folder;
   write_file(folder / "job.yaml", job("{name: seen, targets: \"/Asset/*\"}", 2));
-  const Outcome outcome = run({"run", "job.yaml", "--dry-run"}, folder.path());
+  const Outcome outcome = run({"run", "job.yaml", "--plan"}, folder.path());
   CHECK(outcome.exit_code == 3);
   CHECK_THAT(outcome.errors, ContainsSubstring("views[0].targets: '/Asset/*' fits no node; did you "
                                                "mean '/Assets/*'?"));
   write_file(folder / "job.yaml", job("{name: seen, labels: [sphera]}", 2));
-  CHECK_THAT(run({"run", "job.yaml", "--dry-run"}, folder.path()).errors,
+  CHECK_THAT(run({"run", "job.yaml", "--plan"}, folder.path()).errors,
              ContainsSubstring("views[0].labels: the job labels no object 'sphera'; did you mean "
                                "'sphere'?"));
 }

@@ -22,7 +22,7 @@ if(CLANG_TIDY)
 endif()
 
 # The job is a good one: its keys, and those of the plugin.
-run(${DIORAMA} --plugin-dir ${project}_build/plugins run --dry-run ${project}/job.yaml)
+run(${DIORAMA} --plugin-dir ${project}_build/plugins run --plan ${project}/job.yaml)
 
 run_refused("expected a new or empty folder" ${DIORAMA} new-plugin ${KIND} again --dir ${project})
 run_refused("there is no kind '${KIND}x', did you mean '${KIND}'?" ${DIORAMA} new-plugin ${KIND}x a)

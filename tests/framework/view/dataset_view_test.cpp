@@ -151,6 +151,7 @@ TEST_CASE("Addresses count what the readers have, all others are nowhere", "[vie
                            "/api/0/capture/7/0/rgb.png",
                            "/api/0/capture/7/0",
                            "/api/0/index/x",
+                           "/api/0/brightness/-1",
                            "/etc/passwd",
                            "//",
                            "/../mark.txt",
@@ -206,6 +207,12 @@ TEST_CASE("The index grows by work, statistics come when they were asked for", "
   CHECK(index["from"] == 1);
   CHECK(index["columns"]["objects"] == Json({1, 1}));
   CHECK(index["columns"]["visible"] == Json({75, 75}));
+  // From the middle of its bounds the camera lies in the direction of -x.
+  CHECK(index["columns"]["azimuth"] == Json({180, 180}));
+  // 23 pixels of (10, 20, 30) and one of (200, 100, 50).
+  const Json bright = viewed.json("/api/0/brightness/0");
+  CHECK(bright["captures"] == 3);
+  CHECK(bright["brightness"] == Json({9, 9, 9}));
   CHECK(index["columns"]["split"] == Json({1, 1}));
   CHECK(index["names"]["splits"] == Json({"val", "train"}));
   CHECK(index["names"]["classes"] == Json({kHostile}));

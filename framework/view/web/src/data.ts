@@ -92,6 +92,12 @@ export interface RunState {
   workers?: { name: string; role: string; description: string; is_alive: boolean; captures: number }[];
 }
 
+export interface BrightnessPart {
+  from: number;
+  captures: number;
+  brightness: number[];
+}
+
 interface IndexPart {
   from: number;
   columns: { [name: string]: number[] };
@@ -187,10 +193,13 @@ export class CaptureTable {
   captures = 0;
   pictures = 0;
   objects = 0;
+  brightCaptures = 0;  ///< The first so many have their brightness.
+  private brightPictures = 0;
 
   constructor() {
     for (const name of ['visit', 'phase', 'environment', 'split', 'findings', 'pictures', 'camera', 'width',
-      'height', 'objects', 'class', 'visible', 'truncation', 'box_side', 'distance', 'elevation']) {
+      'height', 'objects', 'class', 'visible', 'truncation', 'box_side', 'distance', 'elevation', 'azimuth',
+      'brightness']) {
       this.columns[name] = new Column();
     }
   }
@@ -202,9 +211,17 @@ export class CaptureTable {
   add(part: IndexPart): void {
     if (part.from !== this.captures) return;
     for (const [name, numbers] of Object.entries(part.columns)) this.columns[name]?.add(numbers);
+    this.columns.brightness.add(new Array<number>(part.columns.camera.length).fill(kUnknown));
     this.names = part.names;
     this.captures += part.columns.visit.length;
     this.pictures += part.columns.camera.length;
     this.objects += part.columns.class.length;
+  }
+
+  addBrightness(part: BrightnessPart): void {
+    if (part.from !== this.brightCaptures || part.captures === 0) return;
+    this.of('brightness').set(part.brightness, this.brightPictures);
+    this.brightCaptures += part.captures;
+    this.brightPictures += part.brightness.length;
   }
 }

@@ -28,7 +28,8 @@ export class FacetBar {
       const counts = filtered.counts.get(facet.key) ?? [];
       const chosen = this.chosenOf(app, facet);
       if (facet.range) {
-        if (chosen || counts.some((count) => count > 0)) this.element.append(this.rangeFacet(app, facet, counts, chosen));
+        const filled = counts.filter((count) => count > 0).length;
+        if (chosen || filled > (facet.range.isWhole ? 1 : 0)) this.element.append(this.rangeFacet(app, facet, counts, chosen));
         continue;
       }
       const names = facet.names!(table, app.info.cameras);
@@ -98,6 +99,7 @@ export class FacetBar {
 
   private rangeFacet(app: App, facet: Facet, counts: number[], chosen: Chosen | null): HTMLElement {
     const { low, scale, unit } = facet.range!;
+    const last = facet.range!.isWhole ? 1 : 0;  // a bar's end is the next one's begin
     const high = app.filtered.highs.get(facet.key) ?? facet.range!.high;
     const [from, to] = chosen?.range ?? [low, high];
     const says = (value: number) => String(Math.round(value * scale * 100) / 100);
@@ -111,10 +113,10 @@ export class FacetBar {
     counts.forEach((count, i) => {
       const begin = low + ((high - low) * i) / counts.length;
       const end = low + ((high - low) * (i + 1)) / counts.length;
-      const isIn = end > from && begin < to;
+      const isIn = end > from && begin < to + last;
       const tall = count === 0 ? 0 : Math.max(1.5, (count / most) * (height - 4));
       drawing.append(svg('rect', { x: i * step, y: 0, width: step, height, class: 'hit' },
-        svg('title', {}, `${says(begin)} to ${says(end)} ${unit}: ${count.toLocaleString('en')}`)));
+        svg('title', {}, `${says(begin)} to ${says(end - last)} ${unit}: ${count.toLocaleString('en')}`)));
       drawing.append(svg('rect', { x: i * step + 0.5, y: height - tall, width: Math.max(0.5, step - 1), height: tall, class: isIn ? 'bar' : 'bar out' }));
     });
     drawing.append(svg('line', { x1: 0, x2: width, y1: height - 0.25, y2: height - 0.25, class: 'axis' }));
@@ -146,7 +148,7 @@ export class FacetBar {
         const begin = Math.min(...bins);
         const end = Math.max(...bins) + 1;
         this.choose(app, facet, { range: [Math.round(low + ((high - low) * begin) / counts.length),
-          Math.round(low + ((high - low) * end) / counts.length)] });
+          Math.round(low + ((high - low) * end) / counts.length) - last] });
       },
       pointercancel: () => (this.dragging = false),
     });

@@ -3,13 +3,16 @@
 // facet are of what fits all the others, so that they say what a click would give.
 import { CaptureTable, kUnknown } from './data';
 
+/** Bars hold whole visits. */
+const kVisitBins = 25;
+
 export interface Facet {
   key: string;
   title: string;
   of: 'capture' | 'picture' | 'object';
   column: string;
-  /** A range has bins; the others have names. */
-  range?: { low: number; high: number; bins: number; unit: string; scale: number };
+  /** A range has bins, of whole numbers each where they are counted; the others have names. */
+  range?: { low: number; high: number; bins: number; unit: string; scale: number; isWhole?: boolean };
   names?: (table: CaptureTable, cameras: string[]) => string[];
 }
 
@@ -20,7 +23,10 @@ export const kFacets: Facet[] = [
   { key: 'size', title: 'Size', of: 'object', column: 'box_side', range: { low: 0, high: 1000, bins: 25, unit: '% of the side', scale: 0.1 } },
   { key: 'distance', title: 'Distance', of: 'object', column: 'distance', range: { low: 0, high: 1000, bins: 25, unit: 'm', scale: 0.01 } },
   { key: 'elevation', title: 'Seen from above', of: 'object', column: 'elevation', range: { low: -90, high: 90, bins: 18, unit: '°', scale: 1 } },
+  { key: 'azimuth', title: 'Seen from around', of: 'object', column: 'azimuth', range: { low: -180, high: 180, bins: 24, unit: '°', scale: 1 } },
+  { key: 'brightness', title: 'Brightness', of: 'picture', column: 'brightness', range: { low: 0, high: 100, bins: 25, unit: '%', scale: 1 } },
   { key: 'camera', title: 'Camera', of: 'picture', column: 'camera', names: (_, cameras) => cameras },
+  { key: 'visit', title: 'Visit', of: 'capture', column: 'visit', range: { low: 0, high: 0, bins: kVisitBins, unit: '', scale: 1, isWhole: true } },
   { key: 'phase', title: 'Phase', of: 'capture', column: 'phase', names: (t) => t.names.phases },
   { key: 'environment', title: 'Environment', of: 'capture', column: 'environment', names: (t) => t.names.environments },
   { key: 'split', title: 'Split', of: 'capture', column: 'split', names: (t) => t.names.splits },
@@ -51,13 +57,15 @@ export interface Filtered {
   highs: Map<string, number>;  ///< Upper ends of ranges.
 }
 
-/** Distances have no end of their own. */
+/** Distances and visits have no end of their own. */
 function highOf(facet: Facet, table: CaptureTable): number {
-  if (facet.key !== 'distance') return facet.range!.high;
-  const values = table.of('distance');
+  const isDistance = facet.key === 'distance';
+  if (!isDistance && facet.key !== 'visit') return facet.range!.high;
+  const values = table.of(facet.column);
+  const count = isDistance ? table.objects : table.captures;
   let most = 0;
-  for (let i = 0; i < table.objects; ++i) most = Math.max(most, values[i]);
-  return Math.max(100, Math.ceil(most / 100) * 100);
+  for (let i = 0; i < count; ++i) most = Math.max(most, values[i]);
+  return isDistance ? Math.max(100, Math.ceil(most / 100) * 100) : Math.ceil((most + 1) / kVisitBins) * kVisitBins;
 }
 
 export function filter(table: CaptureTable, cameras: string[], facets: Map<string, string>): Filtered {

@@ -57,6 +57,7 @@ class Site {
     const ticket = ++this.loading;
     this.show();
     await this.readIndex(ticket);
+    if (this.app.holds.has('color')) await this.readBrightness(ticket);
   }
 
   /** Columns come while they are made. */
@@ -78,6 +79,28 @@ class Site {
       if (app.table.captures === before) {
         if (isReport) return;
         await new Promise((resolve) => setTimeout(resolve, 120));
+      }
+    }
+  }
+
+  /** Comes last: the pictures have to be looked at for it. */
+  private async readBrightness(ticket: number): Promise<void> {
+    const { app } = this;
+    let shown = performance.now();
+    while (app.table.brightCaptures < app.info.captures.length) {
+      const before = app.table.brightCaptures;
+      const part = await get(`/api/${app.state.dataset}/brightness/${before}`);
+      if (ticket !== this.loading) return;
+      app.table.addBrightness(part);
+      const isDone = app.table.brightCaptures >= app.info.captures.length;
+      if (isDone || performance.now() - shown > 1500) {
+        this.refilter();
+        if (app.state.page === 'grid') this.show();
+        shown = performance.now();
+      }
+      if (app.table.brightCaptures === before) {
+        if (isReport) return;
+        await new Promise((resolve) => setTimeout(resolve, 500));
       }
     }
   }

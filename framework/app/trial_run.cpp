@@ -1,0 +1,237 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/app/trial_run.h"
+
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cstdint>
+#include <cstdio>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string_view>
+#include <utility>
+
+#include "diorama/error.h"
+#include "framework/app/assemble.h"
+#include "framework/app/assemble_job.h"
+#include "framework/output/memory_file_system.h"
+
+namespace diorama {
+namespace {
+
+constexpr const char* kWriterType = "trial_pictures";
+constexpr const char* kSamples = "samples";
+
+// Components are made by name: a process has one trial that keeps pictures at a time.
+std::vector<TrialPicture>* kept_pictures = nullptr;
+std::mutex kept_mutex;
+
+class KeepPictures {
+ public:
+  explicit KeepPictures(std::vector<TrialPicture>& pictures) { kept_pictures = &pictures; }
+  ~KeepPictures() { kept_pictures = nullptr; }
+  KeepPictures(const KeepPictures&) = delete;
+  KeepPictures& operator=(const KeepPictures&) = delete;
+};
+
+/// Stands behind the job's own writers.
+class TrialWriter final : public Writer {
+ public:
+  struct Params {
+    void visit(ParamVisitor&) {}
+  };
+  TrialWriter(Params, Host& host) : host_(host) {}
+  NameSet needs() const override { return {std::string(kColor.name)}; }
+  void write(const Capture& capture, CaptureFiles&) const override {
+    for (const Frame& frame : capture.frames) {
+      const Image<Rgba8>& color = frame.get(kColor);
+      const ImageView view{color.pixels().data(), color.width(), color.height(), 4, 8};
+      TrialPicture picture{capture.index, capture.phase, frame.camera_name,
+                           host_.encode_image(view, ImageFormat::Png)};
+      const std::lock_guard lock(kept_mutex);
+      kept_pictures->push_back(std::move(picture));
+    }
+  }
+
+ private:
+  Host& host_;
+};
+
+void register_trial_writer(Registrar& registrar) {
+  add<TrialWriter>(registrar, kWriterType, "Keeps the pictures of a trial.");
+}
+
+std::optional<int> whole_number(const Value& value) {
+  int number = 0;
+  const char* const end = value.scalar.data() + value.scalar.size();
+  const auto [stop, error] = std::from_chars(value.scalar.data(), end, number);
+  if (value.kind != Value::Kind::Scalar || error != std::errc() || stop != end) return std::nullopt;
+  return number;
+}
+
+/// The job's samples per pixel where they are more than `most`, which the job then has. What is
+/// wrong in the job is for assemble_job() to say.
+std::optional<int> limit_samples(Value& job, int most, Registry& registry) {
+  Value* renderer = job.find("renderer");
+  const Value* const type = renderer ? renderer->find("type") : nullptr;
+  const std::string name = type ? type->scalar : kDefaultRenderer;
+  if (!registry.has(ComponentKind::Renderer, name)) return std::nullopt;
+  if (renderer && renderer->kind != Value::Kind::Map) return std::nullopt;
+  const std::vector<ParamSpec> specs = registry.describe(ComponentKind::Renderer, name);
+  const auto spec = std::ranges::find(specs, kSamples, &ParamSpec::key);
+  if (spec == specs.end()) return std::nullopt;
+  const Value* const given = renderer ? renderer->find(kSamples) : nullptr;
+  const std::optional<int> samples = whole_number(given ? *given : spec->default_value);
+  if (!samples || *samples <= most) return std::nullopt;
+  if (!renderer) renderer = &job.set("renderer", Value::make_map());
+  renderer->set(kSamples, Value::integer(most));
+  return samples;
+}
+
+std::set<int> chosen_captures(const TrialOptions& options, const CapturePlan& plan) {
+  const int count = options.is_within_visit ? plan.visit(0).capture_count : plan.capture_count();
+  std::set<int> chosen(options.captures.begin(), options.captures.end());
+  for (const int capture : chosen) {
+    if (capture >= 0 && capture < plan.capture_count()) continue;
+    throw Error(ErrorKind::Usage, "--capture " + std::to_string(capture) +
+                                      ": the job has captures 0 to " +
+                                      std::to_string(plan.capture_count() - 1));
+  }
+  if (!chosen.empty()) return chosen;
+  const int steps = std::max(1, options.spread - 1);
+  for (int i = 0; i <= steps; ++i) {
+    chosen.insert(int(std::int64_t(count - 1) * i / steps));
+  }
+  return chosen;
+}
+
+double seconds_of(const RunSummary& summary, std::string_view phase) {
+  const auto found = summary.seconds.find(std::string(phase));
+  return found == summary.seconds.end() ? 0.0 : found->second;
+}
+
+/// What more samples would add to a picture. Without a report all of the rendering grows with them.
+double more_paths_s(const RenderReport& report, double rendering_s, double factor) {
+  for (const auto& [phase, seconds] : report.seconds) {
+    if (phase == "paths") return seconds * (factor - 1.0);
+  }
+  return rendering_s * (factor - 1.0);
+}
+
+Estimate estimate_of(const RunSummary& summary, const CapturePlan& plan, const RenderReport& report,
+                     double samples_factor) {
+  Estimate estimate;
+  estimate.captures = plan.capture_count();
+  estimate.visits = plan.visit_count();
+  const double visits = std::max(1.0, double(summary.visits.size()));
+  const double captures = std::max(1, summary.captures);
+  double per_visit = 0.0;
+  double per_capture = 0.0;
+  for (const auto& [phase, seconds] : summary.seconds) {
+    (phase == "loading" || phase == "simulating" ? per_visit : per_capture) += seconds;
+  }
+  const double cameras = std::max(1, summary.cameras);
+  const double picture_s = seconds_of(summary, "rendering") / captures / cameras;
+  estimate.visit_s = per_visit / visits;
+  estimate.capture_s =
+      per_capture / captures + cameras * more_paths_s(report, picture_s, samples_factor);
+  estimate.bytes = double(summary.bytes_written) / captures * estimate.captures;
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  estimate.memory_bytes = double(usage.ru_maxrss) * 1024.0;
+  return estimate;
+}
+
+/// "40 s", "4 min", "3.5 h", "2.1 days".
+std::string long_duration_text(double seconds) {
+  char text[32];
+  if (seconds < 90.0) {
+    std::snprintf(text, sizeof text, "%.*f s", seconds < 9.95 ? 1 : 0, seconds);
+  } else if (seconds < 90.0 * 60.0) {
+    std::snprintf(text, sizeof text, "%.0f min", seconds / 60.0);
+  } else if (seconds < 36.0 * 3600.0) {
+    std::snprintf(text, sizeof text, "%.1f h", seconds / 3600.0);
+  } else {
+    std::snprintf(text, sizeof text, "%.1f days", seconds / 86400.0);
+  }
+  return text;
+}
+
+std::string size_text(double bytes) {
+  char text[32];
+  if (bytes < 0.9995e6) {
+    std::snprintf(text, sizeof text, "%.0f kB", bytes * 1e-3);
+  } else if (bytes < 999.5e6) {
+    std::snprintf(text, sizeof text, "%.*f MB", bytes < 9.95e6 ? 1 : 0, bytes * 1e-6);
+  } else {
+    std::snprintf(text, sizeof text, "%.1f GB", bytes * 1e-9);
+  }
+  return text;
+}
+
+}  // namespace
+
+Trial run_trial(const GlobalOptions& global, const Value& given, const TrialOptions& options,
+                const Log& log) {
+  Trial trial;
+  Value job = given;
+  const JobServices services = make_job_services(global, job, log, register_trial_writer);
+  if (const auto samples = limit_samples(job, options.max_samples, *services.registry)) {
+    trial.samples = options.max_samples;
+    trial.job_samples = *samples;
+  }
+  if (options.keeps_pictures) {
+    Value writer = Value::make_map();
+    writer.set("type", Value::text(kWriterType));
+    Value* writers = job.find("writers");
+    if (!writers || writers->kind == Value::Kind::Null) {
+      writers = &job.set("writers", Value::make_list());
+    }
+    if (writers->kind == Value::Kind::List) writers->list.push_back(std::move(writer));
+  }
+  JobAssembly assembly = assemble_job(job, *services.registry, *services.host, services.assets_root,
+                                      program_version(), AssembleFor::Trial, 1);
+  OutputFolders folders = output_folders(assembly.job);
+  folders.base = "/memory";
+
+  MemoryFileSystem memory;
+  OutputStore store(memory, folders, assembly.plan.capture_count(), {});
+  RunOptions run;
+  run.only = chosen_captures(options, assembly.plan);
+  trial.captures = int(run.only->size());
+  const KeepPictures keep(trial.pictures);
+  const RunSummary summary =
+      Pipeline(assembly.job, assembly.plan, assembly.components, *services.host, store, run)
+          .run(assembly.dataset, assembly.dataset_json);
+  std::ranges::sort(trial.pictures, {}, [](const TrialPicture& picture) {
+    return std::pair(picture.capture, std::string_view(picture.camera));
+  });
+  trial.threads = services.host->thread_count();
+  const double factor = trial.samples > 0 ? double(trial.job_samples) / trial.samples : 1.0;
+  trial.estimate = estimate_of(summary, assembly.plan,
+                               assembly.components.sets.front().renderer->report(), factor);
+  return trial;
+}
+
+std::string estimate_text(const Trial& trial) {
+  const Estimate& estimate = trial.estimate;
+  const auto counted = [](int count, const char* what) {
+    return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
+  };
+  std::string text = "estimate from " + counted(trial.captures, "capture");
+  if (trial.samples > 0) {
+    text += " with " + std::to_string(trial.samples) + " of " + std::to_string(trial.job_samples) +
+            " samples";
+  }
+  text += ": " + counted(estimate.captures, "capture") + " in " +
+          long_duration_text(estimate.seconds()) + " or less on " +
+          counted(trial.threads, "thread");
+  text += " (" + counted(estimate.visits, "visit") + " of " + long_duration_text(estimate.visit_s) +
+          ", " + long_duration_text(estimate.capture_s) + " a capture), ";
+  return text + size_text(estimate.bytes) + " on disk, " + size_text(estimate.memory_bytes) +
+         " of memory\n";
+}
+
+}  // namespace diorama

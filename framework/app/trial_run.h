@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "diorama/config.h"
+#include "framework/app/options.h"
+#include "framework/host/log.h"
+#include "framework/pipeline/pipeline.h"
+
+namespace diorama {
+
+/// A few captures of a job, made in memory and thrown away: what a run will look like and take.
+struct TrialOptions {
+  std::vector<int> captures;  ///< Empty: `spread` of them over the job, the first and last included.
+  int spread = 3;
+  bool is_within_visit = false;  ///< Spread over the first visit only.
+  int max_samples = 4;           ///< Paths per pixel at most, where the renderer has `samples`.
+  bool keeps_pictures = false;
+};
+
+struct TrialPicture {
+  int capture = 0;
+  std::string phase;
+  std::string camera;
+  std::vector<std::byte> png;
+};
+
+/// What the whole job will take on this machine, as far as a trial tells.
+struct Estimate {
+  int captures = 0;
+  int visits = 0;
+  double visit_s = 0.0;    ///< Loading and simulating.
+  double capture_s = 0.0;  ///< With all of the job's samples.
+  double bytes = 0.0;      ///< On the disk.
+  double memory_bytes = 0.0;
+
+  double seconds() const { return visits * visit_s + captures * capture_s; }
+};
+
+struct Trial {
+  std::vector<TrialPicture> pictures;  ///< By capture and camera.
+  int captures = 0;                    ///< That were made.
+  int samples = 0;                     ///< Traced per pixel; 0: as many as the job says.
+  int job_samples = 0;                 ///< The job's, where it says more.
+  int threads = 1;
+  Estimate estimate;
+};
+
+/// `job` is native. Nothing is written. Throws Error(Usage) for captures that the job has not, and
+/// as assemble_job() and Pipeline::run() do.
+Trial run_trial(const GlobalOptions& global, const Value& job, const TrialOptions& options,
+                const Log& log);
+
+/// One line: "estimate from 2 captures: 24 captures in about 4 min ...".
+std::string estimate_text(const Trial& trial);
+
+}  // namespace diorama
