@@ -231,7 +231,7 @@ std::string estimate_text(const Trial& trial) {
   text += " (" + counted(estimate.visits, "visit") + " of " + long_duration_text(estimate.visit_s) +
           ", " + long_duration_text(estimate.capture_s) + " a capture), ";
   return text + size_text(estimate.bytes) + " on disk, " + size_text(estimate.memory_bytes) +
-         " of memory\n";
+         " of memory for one visit at a time\n";
 }
 
 }  // namespace diorama
