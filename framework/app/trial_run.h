@@ -15,7 +15,7 @@ namespace diorama {
 
 /// A few captures of a job, made in memory and thrown away: what a run will look like and take.
 struct TrialOptions {
-  std::vector<int> captures;  ///< Empty: `spread` of them over the job, the first and last included.
+  std::vector<int> captures;  ///< Empty: `spread` of them over the job, from first to last.
   int spread = 3;
   bool is_within_visit = false;  ///< Spread over the first visit only.
   int max_samples = 4;           ///< Paths per pixel at most, where the renderer has `samples`.
