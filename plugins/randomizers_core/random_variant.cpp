@@ -11,11 +11,13 @@ namespace diorama {
 
 void RandomVariant::Params::visit(ParamVisitor& v) {
   v.param("nodes", nodes, {"Objects to change, all made of the asset.", kNodePattern});
-  v.param("asset", asset, {"The model file that they were made of."});
+  v.param("asset", asset,
+          {"The model file that they were made of; without it and variants nothing is done."});
   v.param("variants", variants, {"What is chosen from, by set: {lookVariant: [red, blue]}."});
 }
 
 RandomVariant::RandomVariant(Params params, Host& host) : params_(std::move(params)), host_(host) {
+  if (params_.asset.empty() && params_.variants.kind == Value::Kind::Null) return;
   const auto expect = [&](bool holds, const std::string& found) {
     if (holds) return;
     throw Error(ErrorKind::Config,
@@ -91,6 +93,7 @@ void RandomVariant::dress(Scene& scene, NodeId node, const std::string& name) {
 }
 
 void RandomVariant::randomize(Scene& scene, const RandomizeContext& context, const Rng& rng) {
+  if (sets_.empty()) return;
   const auto change = [&](NodeId node, NodeDraws& draws) { dress(scene, node, draw_name(draws)); };
   draw_for_each(scene, scene.match(params_.nodes), context, rng, change);
 }

@@ -269,6 +269,11 @@ TEST_CASE("objects get the looks of a variant of their asset", "[randomizers]") 
   CHECK_THROWS_WITH(
       RandomVariant(params, host).randomize(bare, {}, Rng(1)),
       ContainsSubstring("/Assets/mug: has no part 'loaded/Lid' as mug.usd{look=red} has"));
+  RandomVariant({}, host).randomize(bare, {}, Rng(1));
+  RandomVariant::Params nameless = params;
+  nameless.asset.clear();
+  CHECK_THROWS_WITH(RandomVariant(nameless, host),
+                    "asset: is empty, expected the file that the nodes are made of");
   params.variants = Value::text("red");
   CHECK_THROWS_WITH(RandomVariant(params, host),
                     ContainsSubstring("expected lists by set: {lookVariant: [red, blue]}"));
