@@ -252,18 +252,20 @@ TEST_CASE("The resolved job gives the dataset of the job", "[run]") {
 
 TEST_CASE("Memory does not grow from the third visit on", "[run][slow]") {
   const TemporaryFolder folder;
-  const auto peak_of = [&](const char* captures, const char* output) {
-    const Outcome outcome =
-        run(smoke(output, {"--queue-mib", "1", "--set", std::string("total_captures=") + captures}),
-            folder.path());
+  const auto peak_of = [&](const char* captures, const char* visits, const char* output) {
+    const Outcome outcome = run(smoke(output, {"--queue-mib", "1", "--visits-in-flight", visits,
+                                               "--set", std::string("total_captures=") + captures}),
+                                folder.path());
     REQUIRE(outcome.exit_code == 0);
     return outcome.max_rss_kb;
   };
   // Two captures per visit.
-  const long after_3 = peak_of("6", "a");
-  const long after_40 = peak_of("80", "b");
+  const long after_3 = peak_of("6", "1", "a");
+  const long after_40 = peak_of("80", "1", "b");
   INFO("peak after 3 visits " << after_3 << " kB, after 40 visits " << after_40 << " kB");
   // 37 visits that each kept as little as their pictures (64 x 48 pixels in two cameras, with ids,
   // distances and colour, some 100 kB) would add 3.7 MB. Half of that is left to the allocator.
   CHECK(after_40 < after_3 + 1850);
+  // Each visit in flight takes no more than a run by itself.
+  CHECK(peak_of("80", "4", "c") < 4 * after_40);
 }
