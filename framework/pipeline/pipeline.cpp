@@ -23,6 +23,9 @@ namespace {
 
 // More of them than of other threads would only wait: encoding takes seats of the pool.
 constexpr int kMostWritingThreads = 16;
+// Visits that are begun, per set of components, before the first of them has ended: what runs ahead
+// of a slow one is published late, and lost when the process is killed.
+constexpr int kTurnsAhead = 2;
 // Whoever asks to stop cannot notify.
 constexpr std::chrono::milliseconds kLook{100};
 
@@ -192,6 +195,7 @@ void Pipeline::take_turns(VisitComponents& components) {
       const std::lock_guard lock(flight_->mutex);
       flight_->begins_no_more = true;
       flight_->errors.emplace(flight_->next_turn++, std::current_exception());
+      flight_->changed.notify_all();
     }
     if (!turn) return;
     std::optional<ThreadPool::Seat> seat;
@@ -206,7 +210,11 @@ void Pipeline::take_turns(VisitComponents& components) {
 }
 
 std::optional<Pipeline::Turn> Pipeline::next_turn() {
-  const std::lock_guard lock(flight_->mutex);
+  std::unique_lock lock(flight_->mutex);
+  const int most = kTurnsAhead * int(components_.sets.size());
+  flight_->changed.wait(lock, [&] {
+    return flight_->begins_no_more || flight_->next_turn - flight_->first_under_way < most;
+  });
   if (flight_->begins_no_more) return std::nullopt;
   const std::optional<PlannedVisit> visit = next_visit();
   if (!visit) return std::nullopt;

@@ -482,6 +482,22 @@ TEST_CASE("Memory for captures is bounded while a slow visit holds up all later 
   CHECK(script.most_frames_alive <= 2 * (4 + 1));
 }
 
+TEST_CASE("Visits run ahead of a slow one only so far", "[pipeline]") {
+  Script script;
+  std::atomic<int> renders = 0;
+  std::atomic<int> begun_early = 0;
+  script.at = [&](const std::string& who, int visit) {
+    if (who == "physics" && visit == 0 && renders == 0) pause(60);
+    if (who == "render" && visit == 0) ++renders;
+    // Visit 0 ends after its six pictures.
+    if (who == "loader" && visit >= 4 && renders < 6) ++begun_early;
+  };
+  Run run(script, 2, 2);
+  run.go();
+  CHECK(begun_early == 0);
+  CHECK(run.captures() == first_captures(23));
+}
+
 TEST_CASE("Writers that want it get captures in their order", "[pipeline]") {
   for (const int threads : {1, 4}) {
     Script script;
