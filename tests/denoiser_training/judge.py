@@ -13,7 +13,7 @@ import torch
 import torch.nn.functional as F
 
 from network import Network, denoise, luminance
-from train import read_films
+from train import edges_of, read_films
 
 
 def read_tza(path):
@@ -102,19 +102,6 @@ def shown(light):
     light = light.clamp(min=0.0)
     curve = light * (2.51 * light + 0.03) / (light * (2.43 * light + 0.59) + 0.14)
     return curve.clamp(0.0, 1.0) ** (1.0 / 2.2)
-
-
-def edges_of(raw):
-    """Pixels whose neighbours show other surfaces."""
-
-    def span(values):
-        return F.max_pool2d(values, 3, 1, 1) + F.max_pool2d(-values, 3, 1, 1)
-
-    distance = torch.log(raw[:, 12:13] + 0.05)
-    is_edge = (span(distance) > 0.1) | (span(raw[:, 15:16]) > 0.1)
-    is_edge |= (span(raw[:, 9:12]) > 0.4).any(1, keepdim=True)
-    is_edge |= (span(raw[:, 6:9]) > 0.25).any(1, keepdim=True)
-    return is_edge
 
 
 def errors(picture, references, edges):

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The denoiser's network and what surrounds it, as in plugins/renderer_embree/denoiser*.cpp.
+"""The denoiser's network and what surrounds it.
 
 A U-Net on blocks of 2x2 pixels predicts kernels for six levels of a pyramid. They average pairs of
 scattered light and the surfaces' colours; only their quotient, the light that falls on a surface, is
-used, times the pixel's own colour, averaged by a third kernel over 3x3 pixels.
+used, times the pixel's own colour, averaged by a third kernel over 3x3 pixels. Where there is noise
+the coarse levels may also become brighter or darker, and a share of each pixel is left as it was.
 """
 import struct
 
@@ -22,7 +23,10 @@ MIN_ALBEDO = 0.02
 TIMES_OTHERS = 4.0
 LIMITED_PATHS = 16.0
 SMALLEST = 1e-6
+PRIOR_BIAS = 0.05  # what a picture's mean is off by before it is set right
+MOST_GAIN = 1.0  # of a level, where it is all noise
 MAGIC = 0x574E4544  # "DENW"
+VERSION = 2
 
 
 def luminance(rgb):
@@ -62,7 +66,10 @@ class Film:
         irradiance = self.scattered / self.albedo.clamp(min=SMALLEST)
         seen = luminance(self.seen)
         shade = less * e
-        relative = variance.sqrt() * e / (shade + 0.02)
+        noise = variance.sqrt() * e
+        relative = noise / (shade + 0.02)
+        # Of a single path nobody knows.
+        self.noise = torch.cat([torch.where(n > 1.5, noise, shade + 0.02), shade + 0.02], 1)
         peak = brightest / (n * own).clamp(min=1e-12)
         self.features = torch.cat(
             [
@@ -110,8 +117,8 @@ class Network(nn.Module):
             nn.Conv2d(widths[i + 1], widths[i], 1) for i in range(len(widths) - 1)
         )
         self.decoder = nn.ModuleList(Convs(w, w, c) for w, c in zip(widths[:-1], decoder))
-        pixel = FINE + COARSE + OWN + 1
-        level = FINE + COARSE + 1
+        pixel = FINE + COARSE + OWN + 2
+        level = FINE + COARSE + 2
         self.heads = nn.ModuleList(
             nn.Conv2d(w, level + (4 * pixel if i == 0 else 0), 1) for i, w in enumerate(widths)
         )
@@ -126,7 +133,8 @@ class Network(nn.Module):
                 if i == 0:
                     finest = head.bias[level:].view(pixel, 4)
                     finest[FINE // 2] = 1.0
-                    finest[FINE + COARSE + OWN // 2] = 3.0
+                    finest[FINE + COARSE + OWN // 2] = 5.0
+                    finest[-1] = -3.0
 
     def forward(self, features):
         x = F.pixel_unshuffle(features, 2)
@@ -139,9 +147,10 @@ class Network(nn.Module):
             x = skips[i] + F.interpolate(self.narrow[i](x), scale_factor=2, mode="nearest")
             x = self.decoder[i](x)
             logits.insert(0, self.heads[i](x))
-        level = FINE + COARSE + 1
-        finest = F.pixel_shuffle(logits[0][:, level:].float(), 2)
-        return [finest, logits[0][:, :level].float()] + [l.float() for l in logits[1:]]
+        level = FINE + COARSE + 2
+        finest = F.pixel_shuffle(logits[0][:, level:], 2)
+        # Each kernel's weights side by side, wherever they came from.
+        return [l.float().contiguous() for l in (finest, logits[0][:, :level], *logits[1:])]
 
     def layers(self):
         """In the order of the file."""
@@ -154,7 +163,7 @@ class Network(nn.Module):
 
     def save(self, path):
         with open(path, "wb") as out:
-            numbers = (MAGIC, 1, *self.widths, *self.encoder_counts, *self.decoder_counts)
+            numbers = (MAGIC, VERSION, *self.widths, *self.encoder_counts, *self.decoder_counts)
             out.write(struct.pack(f"<{len(numbers)}i", *numbers))
             for layer in self.layers():
                 for tensor in (layer.weight, layer.bias):
@@ -164,7 +173,7 @@ class Network(nn.Module):
     def load(path):
         with open(path, "rb") as file:
             numbers = struct.unpack("<16i", file.read(64))
-            if numbers[:2] != (MAGIC, 1):
+            if numbers[:2] != (MAGIC, VERSION):
                 raise ValueError(f"{path}: not the weights of a denoiser")
             network = Network(numbers[2:7], numbers[7:12], numbers[12:16])
             with torch.no_grad():
@@ -194,16 +203,26 @@ def widened(values):
     return F.interpolate(values, scale_factor=2, mode="nearest")
 
 
+def gained(pairs, logit, noise):
+    """Light of a level, as much brighter or darker as the network says and its noise allows."""
+    share = noise[:, 0:1] / noise.sum(1, keepdim=True).clamp(min=1e-12)
+    gain = 1.0 + MOST_GAIN * share * F.softsign(logit)
+    return torch.cat([pairs[:, :3] * gain, pairs[:, 3:]], 1)
+
+
 def denoised(film, logits):
-    pairs = [torch.cat([film.scattered, film.albedo], 1)]
+    """Light and colour; `logits` are of the network: per level FINE, COARSE, (the finest) OWN, what
+    the pixel counts for the next level, and its gain (the finest: the share that stays)."""
+    pairs, noise = [torch.cat([film.scattered, film.albedo], 1)], [film.noise]
     for level in range(LEVELS - 1):
-        keep = logits[level][:, -1:]
-        keep = F.softmax(F.pixel_unshuffle(keep, 2), 1)
+        keep = F.softmax(F.pixel_unshuffle(logits[level][:, -2:-1], 2), 1)
         quads = F.pixel_unshuffle(pairs[level], 2)
         b, _, h, w = keep.shape
         pairs.append((quads.view(b, 6, 4, h, w) * keep.unsqueeze(1)).sum(2))
+        noise.append(F.avg_pool2d(noise[level], 2))
     result = averaged(pairs[-1], F.softmax(logits[-1][:, :FINE], 1), 5)
     for level in reversed(range(LEVELS - 1)):
+        result = gained(result, logits[level + 1][:, -1:], noise[level + 1])
         weights = F.softmax(logits[level][:, : FINE + COARSE], 1)
         height, width = pairs[level].shape[2:]
         total = averaged(pairs[level], weights[:, :FINE], 5)
@@ -220,7 +239,21 @@ def denoised(film, logits):
     total = 0.0
     for k, weight in enumerate(weights[:, :, :height, :width].unbind(1)):
         total = total + weight.unsqueeze(1) * shifted(padded, k, 3, height, width)
-    return irradiance[:, :, :height, :width] * total[:, :3] + total[:, 3:]
+    clean = irradiance[:, :, :height, :width] * total[:, :3] + total[:, 3:]
+    stays = torch.sigmoid(logits[0][:, -1:, :height, :width])
+    return clean + stays * (film.scattered[:, :, :height, :width] + film.seen - clean)
+
+
+def rebalanced(picture, film, raw):
+    """With the mean of the undenoised picture, as far as its noise lets that be known."""
+    scattered = luminance(raw[:, 3:6])
+    before = scattered.mean((1, 2, 3))
+    after = luminance(picture - film.seen).mean((1, 2, 3)).clamp(min=1e-12)
+    variance = (raw[:, 13:14] ** 2).mean((1, 2, 3)) / scattered[0].numel()
+    uncertain = variance / (before * before).clamp(min=1e-12)
+    trust = PRIOR_BIAS**2 / (PRIOR_BIAS**2 + uncertain)
+    gain = 1.0 + trust * ((before / after).clamp(0.5, 2.0) - 1.0)
+    return film.seen + (picture - film.seen) * gain.view(-1, 1, 1, 1)
 
 
 def denoise(network, raw, paths, exposure):
@@ -228,5 +261,9 @@ def denoise(network, raw, paths, exposure):
     film = Film(raw, paths, exposure)
     height, width = raw.shape[2:]
     pad = (0, -width % ALIGNMENT, 0, -height % ALIGNMENT)
-    film.scattered, film.albedo = F.pad(film.scattered, pad), F.pad(film.albedo, pad)
-    return denoised(film, network(F.pad(film.features, pad)))
+    whole = Film.__new__(Film)
+    whole.seen, whole.own_albedo = film.seen, film.own_albedo
+    whole.scattered, whole.albedo = F.pad(film.scattered, pad), F.pad(film.albedo, pad)
+    whole.noise = F.pad(film.noise, pad)
+    picture = denoised(whole, network(F.pad(film.features, pad)))
+    return rebalanced(picture, film, raw)

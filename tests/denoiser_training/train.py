@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Trains the denoiser's network on films that denoiser_pictures rendered; see README.md."""
+"""Trains the denoiser's networks on films that denoiser_pictures rendered; see README.md."""
 import argparse
+import contextlib
 import math
 import pathlib
-import random
 import struct
 import threading
 import time
@@ -13,24 +13,28 @@ import numpy as np
 import torch
 import torch.nn.functional as F
 
-from network import CHANNELS, Film, Network, denoised
+from network import CHANNELS, Film, Network, denoised, luminance
 
 MAGIC = 0x4D4C4946  # "FILM"
 CROP = 192
 EPSILON = 0.1  # of the relative error; 0.18 is middle grey
-SLACK = 1.5  # relative errors beyond count less: chance finds in what is compared with
-# How often which number of paths is drawn.
-SHARES = {1: 0.12, 2: 0.26, 4: 0.24, 16: 0.2, 64: 0.12, 256: 0.5}
+SLACK = 4.0  # relative errors beyond count less: chance finds in what is compared with
+POOLS = ((4, 1.0), (16, 1.0))  # blocks of pixels whose means are compared, too, and how much they count
+EDGES_COUNT = 1.0  # more than the other pixels
+REACH = 4  # pixels over which light of chance finds is spread
+KEPT = 0.9995  # of the average of weights, per step
+# How often which number of paths is drawn, where a view has it.
+SHARES = {1: 0.08, 2: 0.26, 4: 0.24, 16: 0.22, 256: 2.0}
+QUICK_SHARES = {1: 0.4, 2: 0.3, 4: 0.2, 16: 0.1}
+OTHER_SHARE = 0.12
 SIZES = {
     "base": dict(widths=(48, 64, 80, 80, 64), encoder=(2, 2, 2, 2, 2), decoder=(2, 2, 2, 2)),
-    "mid": dict(widths=(32, 64, 80, 80, 64), encoder=(2, 2, 2, 2, 2), decoder=(2, 2, 2, 2)),
-    "small": dict(widths=(16, 32, 48, 48, 48), encoder=(2, 2, 2, 1, 1), decoder=(1, 1, 1, 1)),
-    "wide_small": dict(widths=(32, 32, 48, 48, 48), encoder=(1, 2, 2, 1, 1), decoder=(0, 1, 1, 1)),
+    "quick": dict(widths=(16, 32, 48, 64, 64), encoder=(2, 2, 2, 1, 1), decoder=(1, 1, 1, 1)),
 }
 
 
 def read_films(path):
-    """-> values [films, CHANNELS, height, width] in half precision, paths, real time, exposures."""
+    """-> values [films, CHANNELS, height, width] in half precision, paths, exposures."""
     data = path.read_bytes()
     magic, width, height, count, channels = struct.unpack_from("<5i", data)
     if magic != MAGIC or channels != CHANNELS:
@@ -47,176 +51,415 @@ def read_films(path):
     return np.stack(values).reshape(count, channels, height, width), paths, exposures
 
 
+def edges_of(raw):
+    """Pixels whose neighbours show other surfaces."""
+
+    def span(values):
+        return F.max_pool2d(values, 3, 1, 1) + F.max_pool2d(-values, 3, 1, 1)
+
+    distance = torch.log(raw[:, 12:13] + 0.05)
+    is_edge = (span(distance) > 0.1) | (span(raw[:, 15:16]) > 0.1)
+    is_edge |= (span(raw[:, 9:12]) > 0.4).any(1, keepdim=True)
+    is_edge |= (span(raw[:, 6:9]) > 0.25).any(1, keepdim=True)
+    return is_edge
+
+
+def spread(raw, paths):
+    """Light of films, to compare with: what a pixel's brightest path brings beyond half of what the
+    paths around bring goes to pixels around of the same kind, none is lost."""
+    scattered, normal = raw[:, 3:6], raw[:, 9:12]
+    albedo = luminance(raw[:, 6:9]).clamp(min=0.02)
+    distance = torch.log(raw[:, 12:13] + 0.05)
+    own = luminance(scattered)
+    brought = torch.minimum(own, raw[:, 14:15] / paths.view(-1, 1, 1, 1))
+    around = F.avg_pool2d((own - brought) / albedo, 7, 1, 3, count_include_pad=False)
+    excess = (brought - 0.5 * around * albedo).clamp(min=0.0)
+    taken = scattered * (excess / own.clamp(min=1e-12))
+    height, width = own.shape[2:]
+    pad = (REACH,) * 4
+    guides = F.pad(torch.cat([normal, distance], 1), pad, value=100.0)
+
+    def around_sum(values):
+        """Of the pixels around by how much they are of one kind, which is the same both ways."""
+        padded, total = F.pad(values, pad), torch.zeros_like(values)
+        for dy in range(2 * REACH + 1):
+            for dx in range(2 * REACH + 1):
+                there = slice(dy, dy + height), slice(dx, dx + width)
+                other = guides[:, :, there[0], there[1]]
+                away = (dx - REACH) ** 2 + (dy - REACH) ** 2
+                unlike = 4.0 * ((other[:, :3] - normal) ** 2).sum(1, keepdim=True)
+                unlike = unlike + 20.0 * (other[:, 3:] - distance).abs() + away / (REACH * REACH)
+                total = total + torch.exp(-unlike) * padded[:, :, there[0], there[1]]
+        return total
+
+    given = albedo * around_sum(taken / around_sum(albedo))
+    return raw[:, 0:3] + scattered - taken + given
+
+
 class Pictures:
     """Views in the device's memory; further ones come in while training runs."""
 
     def __init__(self, folder, device, most):
         self.folder, self.device, self.most = pathlib.Path(folder), device, most
-        self.views, self.names = [], set()
+        self.names = set()
+        self.views = []  # [(number of the film, paths, exposure, its target's other half is apart)]
+        self.films = self.targets = None
+        self.film_count = 0
         self.is_done = False
+        self.lock = threading.Lock()  # nothing is loaded while work is recorded
 
     def look(self):
         for path in sorted(self.folder.glob("*.films")):
-            if path.name in self.names or len(self.views) >= self.most:
+            if path.name in self.names or len(self.views) >= self.most or self.is_done:
                 continue
             self.names.add(path.name)
-            values, paths, exposures = read_films(path)
-            self.views.append((torch.from_numpy(values).to(self.device), paths, exposures))
+            try:
+                values, paths, exposures = read_films(path)
+            except (ValueError, struct.error) as error:
+                print(f"{path}: {error}", flush=True)
+                continue
+            with self.lock:
+                self.add(values, paths, exposures)
+
+    def add(self, values, paths, exposures):
+        count, _, height, width = values.shape
+        if self.films is None:
+            self.height, self.width = height, width
+            size = height * width
+            self.films = torch.zeros(
+                (7 * self.most, CHANNELS, size), dtype=torch.float16, device=self.device
+            )
+            self.targets = torch.zeros(
+                (self.most, 7, size), dtype=torch.float16, device=self.device
+            )
+        if (height, width) != (self.height, self.width):
+            raise ValueError("films of different sizes")
+        raw = torch.from_numpy(values).to(self.device)
+        view = len(self.views)
+        first = self.film_count
+        self.films[first : first + count - 1] = raw[:-1].flatten(2)
+        pair = raw[-2:].float()
+        counts = torch.tensor(paths[-2:], dtype=torch.float32, device=self.device)
+        self.targets[view, 0:6] = spread(pair, counts).clamp(max=65000.0).reshape(6, -1).half()
+        self.targets[view, 6:7] = edges_of(pair[1:2]).reshape(1, -1).half()
+        self.film_count += count - 1
+        self.views.append(
+            [(first + i, paths[i], exposures[i], i == count - 2) for i in range(count - 1)]
+        )
 
     def keep_looking(self):
         while not self.is_done:
             self.look()
-            time.sleep(2.0)
-
-    def batch(self, size, chance, most_paths):
-        inputs, targets, counts, exposures = [], [], [], []
-        views = self.views
-        while len(inputs) < size:
-            values, paths, own_exposures = views[chance.randrange(len(views))]
-            usable = [i for i in range(len(paths) - 1) if paths[i] <= most_paths]
-            weights = [SHARES.get(paths[i], 0.1) for i in usable]
-            film = chance.choices(usable, weights)[0]
-            height, width = values.shape[2:]
-            y = chance.randrange(height - CROP + 1)
-            x = chance.randrange(width - CROP + 1)
-            window = values[:, :, y : y + CROP, x : x + CROP]
-            raw = window[film].float()
-            last = window[-1, 0:3].float() + window[-1, 3:6].float()
-            if film == len(paths) - 2:
-                target = last
-            else:
-                target = 0.5 * (last + window[-2, 0:3].float() + window[-2, 3:6].float())
-            inputs.append(raw)
-            targets.append(target)
-            counts.append(float(paths[film]))
-            exposures.append(own_exposures[film])
-        inputs, targets = torch.stack(inputs), torch.stack(targets)
-        counts = torch.tensor(counts, device=self.device)
-        exposures = torch.tensor(exposures, device=self.device)
-        return varied(inputs, targets, exposures, counts, chance)
+            time.sleep(1.0)
 
 
-def varied(inputs, targets, exposures, counts, chance):
-    """Mirrored and turned pictures, other axes for the normals, other colours, other exposures."""
-    for axis in (2, 3):
-        if chance.random() < 0.5:
-            inputs, targets = inputs.flip(axis), targets.flip(axis)
-    if chance.random() < 0.5:
-        inputs, targets = inputs.transpose(2, 3), targets.transpose(2, 3)
-    colors = chance.sample(range(3), 3) if chance.random() < 0.3 else list(range(3))
-    axes = chance.sample(range(3), 3)
-    order = [*colors, *(3 + c for c in colors), *(6 + c for c in colors), *(9 + a for a in axes)]
-    inputs = inputs[:, order + list(range(12, CHANNELS))].contiguous()
-    signs = torch.tensor([chance.choice((-1.0, 1.0)) for _ in range(3)], device=inputs.device)
-    inputs[:, 9:12] *= signs.view(1, 3, 1, 1)
-    factor = torch.tensor(
-        [2.0 ** chance.gauss(0.0, 0.4) for _ in range(len(inputs))], device=inputs.device
-    )
-    return inputs, targets[:, colors], counts, exposures * factor, factor
+class Batch:
+    """Which windows are taken and how they are varied: mirrored and turned pictures, other axes for
+    the normals, other colours, other exposures. Drawn here, made on the device."""
+
+    LONGS = 2 + CHANNELS + 7 + 5
+    FLOATS = 3 + 3 + 2
+
+    def __init__(self, pictures, size, chance, shares):
+        self.pictures, self.size, self.chance, self.shares = pictures, size, chance, shares
+        device = pictures.device
+        self.longs = torch.zeros((size, self.LONGS), dtype=torch.int64, device=device)
+        self.floats = torch.zeros((size, self.FLOATS), dtype=torch.float32, device=device)
+        self.steps = torch.arange(CROP, device=device)
+
+    def draw(self):
+        chance, pictures, size = self.chance, self.pictures, self.size
+        longs = np.zeros((size, self.LONGS), np.int64)
+        floats = np.zeros((size, self.FLOATS), np.float32)
+        views = chance.integers(len(pictures.views), size=size)
+        for b, view in enumerate(views):
+            films = [f for f in pictures.views[view] if f[1] in self.shares or f[3]]
+            sums = np.cumsum([self.shares.get(f[1], OTHER_SHARE) for f in films])
+            film, paths, exposure, is_apart = films[
+                int(np.searchsorted(sums, chance.random() * sums[-1]))
+            ]
+            longs[b, 0] = film
+            floats[b, 0:2] = paths, exposure
+            floats[b, 6:8] = (0.0, 1.0) if is_apart else (0.5, 0.5)
+        longs[:, 1] = views
+        colors = np.argsort(chance.random((size, 3)), 1)
+        colors[chance.random(size) > 0.3] = np.arange(3)
+        axes = np.argsort(chance.random((size, 3)), 1)
+        rest = np.broadcast_to(np.arange(12, CHANNELS), (size, CHANNELS - 12))
+        longs[:, 2 : 2 + CHANNELS] = np.hstack([colors, 3 + colors, 6 + colors, 9 + axes, rest])
+        longs[:, 2 + CHANNELS : 9 + CHANNELS] = np.hstack(
+            [colors, 3 + colors, np.full((size, 1), 6)]
+        )
+        longs[:, 9 + CHANNELS] = chance.integers(pictures.height - CROP + 1, size=size)
+        longs[:, 10 + CHANNELS] = chance.integers(pictures.width - CROP + 1, size=size)
+        longs[:, 11 + CHANNELS :] = chance.integers(0, 2, (size, 3))
+        floats[:, 2] = 2.0 ** (0.4 * chance.standard_normal(size))
+        floats[:, 3:6] = chance.choice((-1.0, 1.0), (size, 3))
+        self.longs.copy_(torch.from_numpy(longs))
+        self.floats.copy_(torch.from_numpy(floats))
+
+    def make(self):
+        """-> films' channels, paths, exposures, targets, edges, factors"""
+        longs, floats, pictures = self.longs, self.floats, self.pictures
+        down, across = self.steps.view(1, -1, 1), self.steps.view(1, 1, -1)
+        y0, x0, is_down, is_across, is_turned = (
+            longs[:, 9 + CHANNELS + k].view(-1, 1, 1) for k in range(5)
+        )
+        y = down + is_turned * (across - down)
+        x = across + is_turned * (down - across)
+        y = y0 + y + is_down * (CROP - 1 - 2 * y)
+        x = x0 + x + is_across * (CROP - 1 - 2 * x)
+        places = (y * pictures.width + x).view(self.size, 1, -1)
+
+        def taken(bank, number, order):
+            rows = bank.shape[1]
+            chosen = (longs[:, number : number + 1] * rows + order).flatten()
+            found = bank.view(-1, bank.shape[2]).index_select(0, chosen)
+            found = found.view(self.size, rows, -1)
+            found = found.gather(2, places.expand(-1, rows, -1))
+            return found.view(self.size, rows, CROP, CROP).float()
+
+        raw = taken(pictures.films, 0, longs[:, 2 : 2 + CHANNELS])
+        signs = floats[:, 3:6].view(-1, 3, 1, 1)
+        raw = torch.cat([raw[:, :9], raw[:, 9:12] * signs, raw[:, 12:]], 1)
+        both = taken(pictures.targets, 1, longs[:, 2 + CHANNELS : 9 + CHANNELS])
+        halves = floats[:, 6:8].view(-1, 2, 1, 1)
+        target = both[:, 0:3] * halves[:, 0:1] + both[:, 3:6] * halves[:, 1:2]
+        return raw, floats[:, 0], floats[:, 1] * floats[:, 2], target, both[:, 6:7], floats[:, 2]
 
 
-def loss_of(output, target):
+def relative_error(output, target, brightness):
+    error = (output - target) / (brightness + EPSILON)
+    size = error.abs()
+    return torch.where(size < SLACK, error * error, SLACK * (2.0 * size - SLACK))
+
+
+def loss_of(output, target, edges):
     """Relative squared error, by what the network itself thinks of the brightness: unbiased for
-    targets that have noise. Beyond SLACK it grows linearly."""
+    targets that have noise. Of pixels, and of blocks of them, whose targets have less."""
     with torch.no_grad():
         grey = F.avg_pool2d(output.mean(1, keepdim=True), 3, 1, 1, count_include_pad=False)
-        scale = 1.0 / (0.5 * (grey + output) + EPSILON).clamp(min=EPSILON)
-    error = (output - target) * scale
-    size = error.abs()
-    return torch.where(size < SLACK, error * error, SLACK * (2.0 * size - SLACK)).mean()
+        brightness = (0.5 * (grey + output)).clamp(min=0.0)
+    loss = (relative_error(output, target, brightness) * (1.0 + EDGES_COUNT * edges)).mean()
+    for side, share in POOLS:
+        means, wanted = F.avg_pool2d(output, side), F.avg_pool2d(target, side)
+        brightness = means.detach().mean(1, keepdim=True).clamp(min=0.0)
+        loss = loss + share * relative_error(means, wanted, brightness).mean()
+    return loss
+
+
+class Trainee:
+    """A network with its optimizer (Adam), whose steps can be recorded once and played again."""
+
+    def __init__(self, name, pictures, options, chance):
+        self.name, self.device = name, pictures.device
+        size = options.batch if name == "base" else options.batch // 2
+        self.network = Network(**SIZES[name])
+        begin = options.begin_from / f"{name}.bin" if options.begin_from else None
+        if begin and begin.exists():
+            self.network = Network.load(begin)
+        self.network = self.network.to(self.device)
+        if self.device.type == "cuda":
+            self.network = self.network.to(memory_format=torch.channels_last)
+        self.batch = Batch(pictures, size, chance, SHARES if name == "base" else QUICK_SHARES)
+        self.parameters = list(self.network.parameters())
+        self.sizes = [p.numel() for p in self.parameters]
+        flat = torch.cat([p.detach().flatten() for p in self.parameters])
+        self.flat, self.mean = flat.clone(), flat.clone()
+        self.first, self.second = torch.zeros_like(flat), torch.zeros_like(flat)
+        self.norm = torch.zeros((), device=self.device)
+        self.loss = torch.zeros((), device=self.device)
+        # Rate, its corrections for the first steps, share of the average that is kept.
+        self.numbers = torch.zeros(4, device=self.device)
+        self.count = 0
+        self.graph = None
+        self.put(self.flat)
+
+    def put(self, flat):
+        for p, values in zip(self.parameters, flat.split(self.sizes)):
+            p.data.copy_(values.view_as(p))
+
+    def gradient(self):
+        raw, paths, exposures, target, edges, factor = self.batch.make()
+        with torch.no_grad():
+            film = Film(raw, paths, exposures)
+        is_cuda = self.device.type == "cuda"
+        with (
+            torch.autocast("cuda", torch.bfloat16, cache_enabled=False)
+            if is_cuda
+            else contextlib.nullcontext()
+        ):
+            features = film.features
+            if is_cuda:
+                features = features.contiguous(memory_format=torch.channels_last)
+            logits = self.network(features)
+        scale = factor.view(-1, 1, 1, 1)
+        loss = loss_of(denoised(film, logits) * scale, target * scale, edges)
+        gradients = torch.autograd.grad(loss, self.parameters)
+        return loss.detach(), torch.cat([g.flatten() for g in gradients])
+
+    def work(self):
+        loss, gradient = self.gradient()
+        with torch.no_grad():
+            rate, first_share, second_share, kept = self.numbers.unbind()
+            norm = gradient.norm()
+            is_sound = torch.isfinite(norm)
+            gradient = torch.where(is_sound, gradient, torch.zeros_like(gradient))
+            norm = torch.where(is_sound, norm, self.norm)
+            # Steps that are far larger than usual are cut.
+            usual = torch.where(self.norm > 0.0, self.norm, norm)
+            gradient = gradient * (3.0 * usual / norm.clamp(min=1e-12)).clamp(max=1.0)
+            self.norm.copy_(usual + 0.02 * (torch.minimum(norm, 3.0 * usual) - usual))
+            self.first.mul_(0.9).add_(gradient, alpha=0.1)
+            self.second.mul_(0.99).addcmul_(gradient, gradient, value=0.01)
+            root = (self.second / second_share).sqrt() + 1e-8
+            self.flat.sub_(rate * (self.first / first_share) / root)
+            self.mean.copy_(kept * self.mean + (1.0 - kept) * self.flat)
+            self.put(self.flat)
+            seen = torch.where(self.loss > 0.0, self.loss, loss)
+            self.loss.copy_(seen + 0.01 * (loss - seen))
+
+    def step(self, rate):
+        self.count += 1
+        n = self.count
+        numbers = (
+            rate * min(1.0, n / 200),
+            1.0 - 0.9**n,
+            1.0 - 0.99**n,
+            min(KEPT, n / (n + 10.0)),
+        )
+        self.numbers.copy_(torch.tensor(numbers))
+        self.batch.draw()
+        if self.graph:
+            self.graph.replay()
+        else:
+            self.work()
+
+    def record(self):
+        """One launch a step instead of thousands."""
+        stream = torch.cuda.Stream()
+        stream.wait_stream(torch.cuda.current_stream())
+        with torch.cuda.stream(stream):
+            for _ in range(3):
+                self.step(0.0)
+        torch.cuda.current_stream().wait_stream(stream)
+        torch.cuda.synchronize()
+        graph = torch.cuda.CUDAGraph()
+        with torch.cuda.graph(graph):
+            self.work()
+        torch.cuda.synchronize()
+        self.graph = graph
+
+    def state(self):
+        tensors = (self.flat, self.mean, self.first, self.second, self.norm, self.loss)
+        return [t.cpu() for t in tensors], self.count
+
+    def restore(self, state):
+        tensors, self.count = state
+        own = (self.flat, self.mean, self.first, self.second, self.norm, self.loss)
+        for to, values in zip(own, tensors):
+            to.copy_(values)
+        self.put(self.flat)
+
+    def save(self, folder):
+        """The average of the weights."""
+        network = Network(**SIZES[self.name])
+        means = self.mean.cpu().split(self.sizes)
+        with torch.no_grad():
+            for p, values in zip(network.parameters(), means):
+                p.copy_(values.view_as(p))
+        part = folder / f"{self.name}.bin.part"
+        network.save(part)
+        part.rename(folder / f"{self.name}.bin")
+
+
+def save_state(trainees, file):
+    part = file.with_suffix(".part")
+    torch.save({t.name: t.state() for t in trainees}, part)
+    part.rename(file)
 
 
 def train(options):
     device = torch.device(options.device)
     torch.manual_seed(options.seed)
-    chance = random.Random(options.seed)
+    chance = np.random.default_rng((options.seed, int(time.time())))
+    options.out.mkdir(parents=True, exist_ok=True)
     if device.type == "cuda":
         torch.backends.cudnn.benchmark = True
         torch.backends.cuda.matmul.allow_tf32 = True
         torch.backends.cudnn.allow_tf32 = True
     pictures = Pictures(options.pictures, device, options.most_views)
-    while len(pictures.views) < options.first_views:
-        pictures.look()
-        time.sleep(0.5)
+    begun = time.time()
     threading.Thread(target=pictures.keep_looking, daemon=True).start()
-    network = Network(**SIZES[options.size]).to(device)
-    if device.type == "cuda":
-        network = network.to(memory_format=torch.channels_last)
-    average = [p.detach().clone() for p in network.parameters()]
-    optimizer = torch.optim.Adam(network.parameters(), lr=options.rate, betas=(0.9, 0.99))
-    start = time.time()
-    step, losses = 0, []
-    told = start
-    while True:
-        part = (time.time() - start) / options.seconds
-        if part >= 1.0 or step >= options.steps:
-            break
-        rate = options.rate * max(0.01, 0.5 + 0.5 * math.cos(math.pi * part))
-        for group in optimizer.param_groups:
-            group["lr"] = rate * min(1.0, (step + 1) / 200)
-        inputs, targets, counts, exposures, factor = pictures.batch(
-            options.batch, chance, options.most_paths
-        )
-        with torch.no_grad():
-            film = Film(inputs, counts, exposures)
-        with torch.autocast(device.type, torch.bfloat16, enabled=device.type == "cuda"):
-            logits = network(film.features)
-        output = denoised(film, logits)
-        scale = factor.view(-1, 1, 1, 1)
-        loss = loss_of(output * scale, targets * scale)
-        optimizer.zero_grad(set_to_none=True)
-        loss.backward()
-        torch.nn.utils.clip_grad_norm_(network.parameters(), 1.0)
-        optimizer.step()
-        step += 1
-        keep = min(0.999, step / (step + 10.0))
-        with torch.no_grad():
-            torch._foreach_mul_(average, keep)
-            torch._foreach_add_(average, list(network.parameters()), alpha=1.0 - keep)
-        if step % 20 == 0:
-            losses.append(float(loss.detach()))
-        if time.time() - told > options.tell:
-            told = time.time()
-            seconds = told - start
-            print(
-                f"{options.size} {seconds:.0f} s, step {step}, {len(pictures.views)} views, "
-                f"loss {np.mean(losses[-200:]):.4f}",
-                flush=True,
-            )
-            save(network, average, options)
+    while len(pictures.views) < options.first_views and time.time() < options.until:
+        time.sleep(0.2)
+    trainees = [Trainee(name, pictures, options, chance) for name in options.sizes]
+    file = options.out / "state.pt"
+    if file.exists():
+        states = torch.load(file, map_location="cpu")
+        for trainee in trainees:
+            if trainee.name in states:
+                trainee.restore(states[trainee.name])
+    if options.graphs and device.type == "cuda":
+        for trainee in trainees:
+            with pictures.lock:
+                trainee.record()
+    print(f"first step after {time.time() - begun:.0f} s, {len(pictures.views)} views", flush=True)
+    told = saved = time.time()
+    tick = 0
+    while time.time() < options.until and tick < options.steps:
+        part = (time.time() - options.since) / (options.until - options.since)
+        rate = options.rate * max(0.005, 0.5 + 0.5 * math.cos(math.pi * min(1.0, max(0.0, part))))
+        # Of four steps the last network has one.
+        trainee = trainees[-1] if tick % 4 == 3 else trainees[0]
+        trainee.step(rate)
+        tick += 1
+        if tick % 50 == 0 and device.type == "cuda":
+            torch.cuda.synchronize()
+        now = time.time()
+        if now - told > options.tell or tick == 20:
+            told = now
+            words = ", ".join(f"{t.name} {t.count} {float(t.loss):.4f}" for t in trainees)
+            print(f"{now - begun:.0f} s, rate {rate:.5f}, {len(pictures.views)} views: {words}",
+                  flush=True)
+            (options.out / "alive").touch()
+        if now - saved > options.save_every:
+            saved = now
+            save_state(trainees, file)
+            for t in trainees:
+                t.save(options.out)
     pictures.is_done = True
-    save(network, average, options)
-    print(f"{options.size}: {step} steps, {len(pictures.views)} views", flush=True)
-
-
-def save(network, average, options):
-    own = [p.detach().clone() for p in network.parameters()]
-    with torch.no_grad():
-        for p, mean in zip(network.parameters(), average):
-            p.copy_(mean)
-        part = pathlib.Path(str(options.out) + ".part")
-        network.save(part)
-        part.rename(options.out)
-        for p, value in zip(network.parameters(), own):
-            p.copy_(value)
+    save_state(trainees, file)
+    for t in trainees:
+        t.save(options.out)
+        print(f"{t.name}: {t.count} steps, {len(pictures.views)} views", flush=True)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("pictures", help="folder that denoiser_pictures writes to, or has written")
-    parser.add_argument("out", type=pathlib.Path, help="the weights")
-    parser.add_argument("--size", choices=SIZES, default="base")
-    parser.add_argument("--seconds", type=float, default=900.0)
+    parser.add_argument("out", type=pathlib.Path,
+                        help="folder of the weights, and of what a later call goes on from")
+    parser.add_argument("--sizes", nargs="+", choices=SIZES, default=["base", "quick"])
+    parser.add_argument("--begin-from", type=pathlib.Path, help="folder of weights to begin with")
+    parser.add_argument("--seconds", type=float, default=1800.0)
+    parser.add_argument("--since", type=float, help="seconds since 1970 when the schedule began")
+    parser.add_argument("--until", type=float, help="... and when it ends")
     parser.add_argument("--steps", type=int, default=10**9)
-    parser.add_argument("--batch", type=int, default=24)
+    parser.add_argument("--batch", type=int, default=48)
     parser.add_argument("--rate", type=float, default=1e-3)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--first-views", type=int, default=100, help="training begins with so many")
-    parser.add_argument("--most-views", type=int, default=4000)
-    parser.add_argument("--most-paths", type=int, default=256)
-    parser.add_argument("--tell", type=float, default=30.0, help="seconds between lines")
+    parser.add_argument("--first-views", type=int, default=60, help="training begins with so many")
+    parser.add_argument("--most-views", type=int, default=4500)
+    parser.add_argument("--tell", type=float, default=15.0, help="seconds between lines")
+    parser.add_argument("--save-every", type=float, default=60.0, help="seconds")
+    parser.add_argument("--no-graphs", dest="graphs", action="store_false",
+                        help="begin each piece of the GPU's work on its own")
     parser.add_argument("--device", default="cuda" if torch.cuda.is_available() else "cpu")
-    train(parser.parse_args())
+    options = parser.parse_args()
+    options.since = options.since or time.time()
+    options.until = options.until or options.since + options.seconds
+    train(options)
 
 
 if __name__ == "__main__":

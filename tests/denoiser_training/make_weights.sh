@@ -1,0 +1,136 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# Renders pictures and trains on them at once; see README.md. What is under way goes on by itself
+# when this call ends before it; another call waits for the rest, or takes up what was killed.
+#   PROGRAM        denoiser_pictures, as a command
+#   STATE          folder for films, states and logs             (denoiser_state)
+#   OUT            folder for weights, log and table             (STATE/result)
+#   TOTAL_MINUTES  from the first call until all is done         (60)
+#   MINUTES        that this call waits                          (TOTAL_MINUTES)
+#   THREADS        that render                                   (all)
+#   TARGET_PATHS   of each of the two films to compare with      (32)
+#   GPU            which                                         (0)
+#   BEGIN_FROM     folder of weights to begin with               (none)
+#   JUDGE          folder with assets_root/ and bench/           (no judging)
+#   JUDGED_SETS    numbers of the sets to judge by               (0 1 2 3 4 5 6 7 8)
+#   OIDN           NAME=FILE.tza ...: to compare with            (none)
+set -u
+here=$(cd "$(dirname "$(readlink -f "$0")")" && pwd)
+STATE=$(realpath -m "${STATE:-denoiser_state}")
+OUT=$(realpath -m "${OUT:-$STATE/result}")
+TOTAL_MINUTES=${TOTAL_MINUTES:-60}
+MINUTES=${MINUTES:-$TOTAL_MINUTES}
+THREADS=${THREADS:-$(nproc)}
+PYTHON=${PYTHON:-python3}
+mkdir -p "$STATE"/{films,judged,weights,sets} "$OUT"
+cd "$STATE"
+export STATE OUT TOTAL_MINUTES THREADS PYTHONUNBUFFERED=1 OMP_NUM_THREADS=2
+export CUDA_VISIBLE_DEVICES=${GPU:-0}
+[ -e since ] || date +%s >since
+since=$(<since)
+judging=$([ -n "${JUDGE:-}" ] && echo 60 || echo 5)
+until=$(awk "BEGIN { print int($since + 60 * $TOTAL_MINUTES - $judging) }")
+
+seconds() { date +%s; }
+
+# Takes the sets to judge by that nobody has, one after the other.
+render_judged() {
+  for set in ${JUDGED_SETS:-0 1 2 3 4 5 6 7 8}; do
+    mkdir "sets/judged_$set" 2>/dev/null || continue
+    nice $PROGRAM judged --judge "$JUDGE" --first "$set" --sets 1 --width 240 --height 180 \
+      --target-paths 384
+  done
+}
+
+# One process a set: none can end more than its own.
+render() {
+  local worker=$1 number=0
+  [ "$worker" -le 4 ] && [ -n "${JUDGE:-}" ] && render_judged
+  while [ "$(seconds)" -lt $((until - 20)) ]; do
+    number=$((number + 1))
+    mkdir "sets/${worker}_$number" 2>/dev/null || continue
+    nice $PROGRAM films --first $((worker * 10000 + number)) --sets 1 --views 7 \
+      --target-paths "${TARGET_PATHS:-32}"
+  done
+}
+
+# Ends what makes no step within two minutes, once there is what to train on.
+watch() {
+  local pid=$1 now alive ready=0
+  touch weights/alive
+  while kill -0 "$pid" 2>/dev/null; do
+    sleep 2
+    now=$(seconds)
+    alive=$(stat -c %Y weights/alive)
+    if [ "$ready" = 0 ]; then
+      [ "$(find films -name '*.films' | wc -l)" -ge 60 ] && ready=$now
+      continue
+    fi
+    [ "$alive" -gt "$ready" ] || alive=$ready
+    if [ $((now - alive)) -gt 120 ]; then
+      echo "training stands still: ended"
+      kill -9 "$pid"
+    fi
+  done
+}
+
+train() {
+  local way pid
+  for way in "" "" "--no-graphs" "--no-graphs --batch 24" "--no-graphs --batch 24"; do
+    [ "$(seconds)" -lt "$until" ] || break
+    # shellcheck disable=SC2086
+    "$PYTHON" "$here/train.py" films weights --since "$since" --until "$until" \
+      ${BEGIN_FROM:+--begin-from "$BEGIN_FROM"} ${TRAIN_OPTIONS:-} $way &
+    pid=$!
+    watch $pid
+    wait $pid && break
+    echo "training failed $way"
+  done
+}
+
+all() {
+  for i in $(seq 1 "$THREADS"); do
+    render "$i" 2>&1 | grep -v '^set ' &
+  done
+  train
+  if [ -n "${JUDGE:-}" ]; then
+    mkdir -p sheets
+    networks=()
+    for file in weights/*.bin; do networks+=(--network "$(basename "$file" .bin)=$file"); done
+    judges=()
+    for judge in ${OIDN:-}; do judges+=(--oidn "$judge"); done
+    timeout 100 "$PYTHON" "$here/judge.py" judged "${networks[@]}" "${judges[@]}" --out sheets \
+      >table.txt 2>&1
+    tar czf sheets.tar.gz sheets
+  fi
+  touch done
+}
+
+if [ "${1:-}" = --all ]; then
+  all
+  exit
+fi
+begin() {
+  [ -e pid ] && kill -0 "$(<pid)" 2>/dev/null && return
+  echo "begun at $(date -u +%T)" >>log
+  setsid nohup bash "$(readlink -f "$0")" --all >>log 2>&1 </dev/null &
+  echo $! >pid
+}
+end=$(awk "BEGIN { print int($(seconds) + 60 * $MINUTES) }")
+lines=0
+hand_out() {
+  for file in weights/base.bin weights/quick.bin log table.txt sheets.tar.gz; do
+    [ -e "$file" ] && cp -p "$file" "$OUT/.part" && mv "$OUT/.part" "$OUT/$(basename "$file")"
+  done
+  tail -n +$((lines + 1)) log
+  lines=$(wc -l <log)
+}
+while [ ! -e done ] && [ "$(seconds)" -lt "$end" ]; do
+  begin
+  sleep 5
+  hand_out
+done
+hand_out
+echo "$(find films -name '*.films' | wc -l) views, $(find judged -name '*.films' | wc -l) judged"
+[ -e done ] && cat table.txt 2>/dev/null
+exit 0
