@@ -29,7 +29,7 @@ export CUDA_VISIBLE_DEVICES=${GPU:-0}
 [ -e since ] || date +%s >since
 since=$(<since)
 judging=$([ -n "${JUDGE:-}" ] && echo 60 || echo 5)
-until=$(awk "BEGIN { print int($since + 60 * $TOTAL_MINUTES - $judging) }")
+until=$("$PYTHON" -c "print(int($since + 60 * $TOTAL_MINUTES - $judging))")
 
 seconds() { date +%s; }
 
@@ -116,7 +116,7 @@ begin() {
   setsid nohup bash "$(readlink -f "$0")" --all >>log 2>&1 </dev/null &
   echo $! >pid
 }
-end=$(awk "BEGIN { print int($(seconds) + 60 * $MINUTES) }")
+end=$("$PYTHON" -c "print(int($(seconds) + 60 * $MINUTES))")
 lines=0
 hand_out() {
   for file in weights/base.bin weights/quick.bin log table.txt sheets.tar.gz; do
