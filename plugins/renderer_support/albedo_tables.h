@@ -72,9 +72,10 @@ class LayerTable {
   class Row {
    public:
     explicit operator bool() const { return low_ != nullptr; }
+    /// Any number will do: who looks up many at once has some that nobody asks for.
     Node at(float cos_theta) const {
       const float x = std::sqrt(std::max(0.0f, cos_theta)) * float(kNodes - 1);
-      const int i = std::min(int(x), kNodes - 2);
+      const int i = int(std::min(x, float(kNodes - 2)));
       const float t = x - float(i);
       const Node low = low_[i] + (low_[i + 1] - low_[i]) * t;
       if (rest_ == 0.0f) return low;

@@ -3,7 +3,9 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "diorama/rng.h"
@@ -136,6 +138,17 @@ TEST_CASE("stacked lobes return as much as Blender's Principled BSDF", "[bsdf][f
       CHECK(furnace(made.surface, float(cosine)) == Approx(row.radiance[i]).epsilon(0.01));
     }
   }
+}
+
+TEST_CASE("albedos can be looked up for what is no direction", "[bsdf]") {
+  AlbedoTables tables;
+  const LayerTable layers(tables, {}, std::nullopt);
+  const LayerTable::Row row = layers.row(0.3f);
+  constexpr float kInf = std::numeric_limits<float>::infinity();
+  CHECK(row.at(-kInf).isApprox(row.at(0.0f)));
+  CHECK(row.at(std::numeric_limits<float>::quiet_NaN()).isApprox(row.at(0.0f)));
+  // What is found means nothing, but it is looked for inside of the table.
+  for (const float cosine : {1.5f, 1e9f, 1e30f}) CHECK(std::isfinite(row.at(cosine)[0]));
 }
 
 TEST_CASE("glass loses no light at every roughness, from both sides", "[bsdf][furnace]") {
