@@ -146,7 +146,8 @@ struct Options {
   int views = 8;
   int width = 256;
   int height = 192;
-  int target_paths = 64;
+  int target_paths = 32;
+  int bounces = 6;
   double seconds = 1e9;
   int threads = 1;
 };
@@ -171,11 +172,16 @@ void render_set(const Set& set, std::uint64_t seed, const Options& options, Host
   for (std::size_t i = 0; i < set.cameras.size(); ++i) {
     const View view(set.scene, set.cameras[i]);
     const double depth = rng.uniform();
-    const int bounces = is_judged || depth < 0.72 ? 6 : depth < 0.8 ? 4 : depth < 0.94 ? 1 : 0;
+    const int bounces = is_judged      ? options.bounces
+                        : depth < 0.72 ? 6
+                        : depth < 0.8  ? 4
+                        : depth < 0.94 ? 1
+                                       : 0;
     const bool sees_one_moment = !view.has_shutter() && !view.has_aperture();
     std::vector<Pass> passes{{1, sees_one_moment && bounces < 2}, {2}, {4}, {16}};
     if (is_judged) {
-      passes = {{2}, {4}, {16}, {256}};
+      if (bounces > 1) passes.erase(passes.begin());
+      passes.push_back({256});
     } else if (rng.chance(0.04)) {
       passes.push_back({256});
     }
@@ -245,6 +251,7 @@ int main(int argc, char** argv) {
   app.add_option("--height", options.height);
   app.add_option("--target-paths", options.target_paths,
                  "Of each of the two films to compare with");
+  app.add_option("--bounces", options.bounces, "Of what is judged by; few: as in real time, too");
   app.add_option("--seconds", options.seconds, "No further set is begun after that");
   app.add_option("--threads", options.threads);
   CLI11_PARSE(app, argc, argv);

@@ -253,7 +253,8 @@ def rebalanced(picture, film, raw):
     uncertain = variance / (before * before).clamp(min=1e-12)
     trust = PRIOR_BIAS**2 / (PRIOR_BIAS**2 + uncertain)
     gain = 1.0 + trust * ((before / after).clamp(0.5, 2.0) - 1.0)
-    return film.seen + (picture - film.seen) * gain.view(-1, 1, 1, 1)
+    seen = torch.minimum(film.seen, picture)
+    return seen + (picture - seen) * gain.view(-1, 1, 1, 1)
 
 
 def denoise(network, raw, paths, exposure):
