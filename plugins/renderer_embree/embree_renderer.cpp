@@ -157,14 +157,18 @@ RenderReport EmbreeRenderer::report() const {
 
 std::size_t EmbreeRenderer::working_bytes(const Camera& camera, const NameSet& channels) const {
   std::size_t per_pixel = sizeof(std::uint32_t) + sizeof(float);  // SeenMeshes
+  std::size_t denoising = 0;
   if (channels.contains(kColor.name) || channels.contains(kColorHdr.name)) {
-    per_pixel += params_.denoise ? std::max(sizeof(FilmPixel), kDenoiserBytesPerPixel)
-                                 : sizeof(FilmPixel) + sizeof(Vec3f);
+    if (params_.denoise) {
+      denoising = denoiser_bytes(camera.width, camera.height, is_quick());
+    } else {
+      per_pixel += sizeof(FilmPixel) + sizeof(Vec3f);
+    }
     const bool has_rounds = params_.error_target > 0.0 || params_.time_budget_s > 0.0;
     if (has_rounds) per_pixel += sizeof(PixelSum);
     if (params_.mode == "real_time" && params_.samples == 1) per_pixel += sizeof(RayHit);
   }
-  return per_pixel * std::size_t(camera.width) * std::size_t(camera.height);
+  return per_pixel * std::size_t(camera.width) * std::size_t(camera.height) + denoising;
 }
 
 void EmbreeRenderer::do_prepare(const Scene& scene) {
@@ -270,8 +274,9 @@ Image<Vec3f> EmbreeRenderer::without_noise(Film film, const View& view) {
   if (params_.denoiser == "oidn") return oidn_denoised(film, host_);
 #endif
   DenoiseSettings settings{view.position()};
+  settings.is_quick = is_quick();
   if (params_.firefly_limit > 0.0) {
-    settings.brightest_path = float(params_.firefly_limit / automatic_exposure(film));
+    settings.brightest_path = float(params_.firefly_limit / quiet_exposure(film));
   }
   return denoised(std::move(film), settings, isa_, host_);
 }

@@ -69,6 +69,7 @@ class EmbreeRenderer final : public Renderer {
   Film trace_at_once(const PathTracer& tracer, SamplePlan& plan, int width, int height);
   Film trace_in_rounds(const PathTracer& tracer, SamplePlan& plan, int width, int height);
   Image<Vec3f> without_noise(Film film, const View& view);
+  bool is_quick() const { return params_.mode != "path_traced"; }
   void put_colors(Frame& frame, const RenderRequest& request, const View& view);
 
   Params params_;

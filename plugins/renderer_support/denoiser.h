@@ -15,19 +15,21 @@ struct DenoiseSettings {
   /// one brings beyond is spread over a wide neighbourhood. With more than 16 paths per pixel it
   /// grows with their number. 0: no limit.
   float brightest_path = 0.0f;
+  bool is_quick = false;  ///< By planes alone: an eighth of the time.
 };
 
-/// Held at most, with what is left of the film.
-inline constexpr std::size_t kDenoiserBytesPerPixel = 104;
+/// What is held at most to denoise a picture of this size, the film included.
+std::size_t denoiser_bytes(int width, int height, bool is_quick);
 
-/// Removes sampling noise from a film: light without the surfaces' own colour is averaged over
-/// neighbours that lie on the same plane, face the same way and differ by no more than the noise
-/// explains, in rounds of growing reach (Dammertz et al. 2010, with the variance of Schied et al.
-/// 2017). Sources seen directly and the surfaces' colours stay as they are.
-/// The film's memory is given back on the way.
+/// Removes sampling noise from a film by two filters, one that looks at planes (plane_filter.h) and
+/// one that was trained (network_filter.h). They err in different places: of each, as much is taken
+/// as the noisy picture around agrees with it. The film's memory is given back on the way.
 Image<Vec3f> denoised(Film film, const DenoiseSettings& settings, Isa isa, Host& host);
 
 /// The plain means.
 Image<Vec3f> undenoised(const Film& film);
+
+/// The exposure of a film's means over blocks of pixels: it hardly depends on the noise.
+double quiet_exposure(const Film& film);
 
 }  // namespace diorama

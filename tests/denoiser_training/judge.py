@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Compares networks, the filter without one and Open Image Denoise on films that denoiser_pictures
---judge made."""
+"""Compares the renderer's denoiser, its parts, networks and Open Image Denoise on films that
+denoiser_pictures --judge made."""
 import argparse
 import json
 import math
@@ -13,7 +13,7 @@ import torch
 import torch.nn.functional as F
 
 from network import Network, denoise, luminance
-from train import edges_of, read_films
+from train import edges_of, read_films, spread
 
 
 def read_tza(path):
@@ -104,12 +104,18 @@ def shown(light):
     return curve.clamp(0.0, 1.0) ** (1.0 / 2.2)
 
 
+def box(values, side):
+    return F.avg_pool2d(values, side, 1, side // 2, count_include_pad=False)
+
+
 def errors(picture, references, edges):
     """relMSE against both references by turns, so that their own noise cancels; root mean square of
-    what is seen on edges; relative mean."""
+    what is seen on edges. Relative to the mean brightness of 5x5 pixels: were it that of the pixel,
+    references that are dark by chance would count most, and dark pictures would win."""
     first, second = references
     mean = 0.5 * (first + second)
-    scale = 1.0 / (mean * mean + 0.01)
+    around = box(luminance(mean), 5)
+    scale = 1.0 / (around * around + 0.01)
     pixels = ((picture - first) * (picture - second) * scale).mean(1).flatten()
     plain = ((picture - mean) ** 2 * scale).mean(1).flatten()
     kept = plain.argsort()[: int(0.999 * len(plain))]
@@ -118,7 +124,6 @@ def errors(picture, references, edges):
         "rel_mse": float(pixels[kept].mean()),
         "plain": float(plain[kept].mean()),
         "edges": float(seen[edges].mean().clamp(min=0.0) ** 0.5),
-        "mean": float(picture.mean() / mean.mean()),
     }
 
 
@@ -145,10 +150,14 @@ def main():
     for path in sorted(options.films.glob("*.films")):
         values, paths, exposures = read_films(path)
         height, width = values.shape[2:]
-        own = np.frombuffer(path.with_suffix(".own").read_bytes(), "<f2")
-        own = torch.from_numpy(own.reshape(-1, 3, height, width).astype(np.float32)).to(device)
+        own = {}
+        for part in ("own", "planes"):
+            data = np.frombuffer(path.with_suffix("." + part).read_bytes(), "<f2")
+            data = data.reshape(-1, 3, height, width).astype(np.float32)
+            own[part] = torch.from_numpy(data).to(device)
         films = torch.from_numpy(values.astype(np.float32)).to(device)
-        references = [films[[i], 0:3] + films[[i], 3:6] for i in (-2, -1)]
+        counts = torch.tensor(paths[-2:], dtype=torch.float32, device=device)
+        references = spread(films[-2:], counts).split(1)
         edges = edges_of(0.5 * (films[-2:-1] + films[-1:]))
         rows = []
         for i in range(len(paths) - 2):
@@ -159,9 +168,11 @@ def main():
             with torch.no_grad():
                 for name, way in ways.items():
                     pictures[name] = way(raw, n, e)
-            pictures["own"] = own[i : i + 1]
+            pictures.update((part, values[i : i + 1]) for part, values in own.items())
+            noisy = float((raw[:, 0:3] + raw[:, 3:6]).mean())
             for name, picture in pictures.items():
                 table.append({"view": path.stem, "paths": paths[i], "way": name,
+                              "mean": float(picture.mean()) / noisy,
                               **errors(picture, references, edges)})
             wanted = [w for w in pictures if not w.endswith("_scattered")]
             rows.append(torch.cat([shown(pictures[w])[0] for w in wanted]
@@ -191,7 +202,7 @@ def summarize(table):
     for kind in ("room", "other"):
         rows = [r for r in table if r["view"].startswith("room") == (kind == "room")]
         for paths in sorted({r["paths"] for r in rows}):
-            print(f"{kind}, {paths} paths: relMSE (with noise of the references), edges, mean")
+            print(f"{kind}, {paths} paths: relMSE (with noise of the references), edges, mean of the noisy")
             for way in ways:
                 found = [r for r in rows if r["way"] == way and r["paths"] == paths]
 

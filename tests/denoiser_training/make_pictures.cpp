@@ -19,7 +19,6 @@
 #include "renderer_support/denoiser.h"
 #include "renderer_support/film.h"
 #include "renderer_support/sample_plan.h"
-#include "renderer_support/view_transform.h"
 #include "support/render_host/render_host.h"
 #include "training_scenes.h"
 
@@ -59,26 +58,6 @@ Film trace(const EmbreeScene& meshes, const View& view, const Pass& pass, int ma
     }
   });
   return film;
-}
-
-/// That of the means of blocks of pixels: it hardly depends on the noise.
-double quiet_exposure(const Film& film) {
-  constexpr int kBlock = 16;
-  Image<Vec3f> means((film.width() + kBlock - 1) / kBlock, (film.height() + kBlock - 1) / kBlock,
-                     Vec3f::Zero());
-  for (int y = 0; y < film.height(); ++y) {
-    for (int x = 0; x < film.width(); ++x) {
-      means.at(x / kBlock, y / kBlock) += film.at(x, y).seen + film.at(x, y).scattered;
-    }
-  }
-  for (int y = 0; y < means.height(); ++y) {
-    for (int x = 0; x < means.width(); ++x) {
-      const int columns = std::min(kBlock, film.width() - x * kBlock);
-      const int rows = std::min(kBlock, film.height() - y * kBlock);
-      means.at(x, y) /= float(columns * rows);
-    }
-  }
-  return automatic_exposure(means);
 }
 
 constexpr int kChannels = 16;
@@ -163,6 +142,27 @@ bool is_worthy(const Film& film, const Vec3f& eye) {
   return lit > film.pixels().size() / 20 && near < film.pixels().size() / 2;
 }
 
+/// What the renderer makes of the first `count` films, light times `scale`.
+void write_denoised(const std::vector<Film>& films, std::size_t count, const View& view,
+                    float scale, bool is_quick, Isa isa, Host& host,
+                    const std::filesystem::path& file) {
+  std::ofstream out(file, std::ios::binary);
+  for (std::size_t k = 0; k < count; ++k) {
+    Film film(films[k].width(), films[k].height());
+    std::ranges::copy(films[k].pixels(), film.pixels().begin());
+    DenoiseSettings settings{view.position()};
+    settings.brightest_path = float(4.0 / quiet_exposure(film));
+    settings.is_quick = is_quick;
+    const Image<Vec3f> picture = denoised(std::move(film), settings, isa, host);
+    for (int c = 0; c < 3; ++c) {
+      for (const Vec3f& pixel : picture.pixels()) {
+        const std::uint16_t bits = half_bits(scale * pixel[c]);
+        out.write(reinterpret_cast<const char*>(&bits), 2);
+      }
+    }
+  }
+}
+
 void render_set(const Set& set, std::uint64_t seed, const Options& options, Host& host) {
   const Isa isa = isa_by_name(best_isa_name());
   EmbreeScene meshes(host, {best_isa_name(), {false, false}});
@@ -199,18 +199,10 @@ void render_set(const Set& set, std::uint64_t seed, const Options& options, Host
     }
     file.write(options.out / (set.name + "_" + std::to_string(i) + ".films"));
     if (!is_judged) continue;
-    std::ofstream own(options.out / (set.name + "_" + std::to_string(i) + ".own"),
-                      std::ios::binary);
-    for (std::size_t k = 0; k + 2 < films.size(); ++k) {
-      DenoiseSettings denoise{view.position()};
-      denoise.brightest_path = float(4.0 / automatic_exposure(films[k]));
-      const Image<Vec3f> picture = denoised(std::move(films[k]), denoise, isa, host);
-      for (int c = 0; c < 3; ++c) {
-        for (const Vec3f& pixel : picture.pixels()) {
-          const std::uint16_t bits = half_bits(scale * pixel[c]);
-          own.write(reinterpret_cast<const char*>(&bits), 2);
-        }
-      }
+    for (const bool is_quick : {false, true}) {
+      write_denoised(
+          films, passes.size() - 2, view, scale, is_quick, isa, host,
+          options.out / (set.name + "_" + std::to_string(i) + (is_quick ? ".planes" : ".own")));
     }
   }
 }

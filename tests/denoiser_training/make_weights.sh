@@ -10,7 +10,7 @@
 #   THREADS        that render                                   (all)
 #   TARGET_PATHS   of each of the two films to compare with      (32)
 #   GPU            which                                         (0)
-#   BEGIN_FROM     folder of weights to begin with               (none)
+#   BEGIN_FROM     weights to begin with                         (none)
 #   JUDGE          folder with assets_root/ and bench/           (no judging)
 #   JUDGED_SETS    numbers of the sets to judge by               (0 1 2 3 4 5 6 7 8)
 #   OIDN           NAME=FILE.tza ...: to compare with            (none)
@@ -95,8 +95,7 @@ all() {
   train
   if [ -n "${JUDGE:-}" ]; then
     mkdir -p sheets
-    networks=()
-    for file in weights/*.bin; do networks+=(--network "$(basename "$file" .bin)=$file"); done
+    networks=(--network network=weights/denoiser.bin)
     judges=()
     for judge in ${OIDN:-}; do judges+=(--oidn "$judge"); done
     timeout 100 "$PYTHON" "$here/judge.py" judged "${networks[@]}" "${judges[@]}" --out sheets \
@@ -119,7 +118,7 @@ begin() {
 end=$("$PYTHON" -c "print(int($(seconds) + 60 * $MINUTES))")
 lines=0
 hand_out() {
-  for file in weights/base.bin weights/quick.bin log table.txt sheets.tar.gz; do
+  for file in weights/denoiser.bin log table.txt sheets.tar.gz; do
     [ -e "$file" ] && cp -p "$file" "$OUT/.part" && mv "$OUT/.part" "$OUT/$(basename "$file")"
   done
   tail -n +$((lines + 1)) log

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Trains the denoiser's networks on films that denoiser_pictures rendered; see README.md."""
+"""Trains the denoiser's network on films that denoiser_pictures rendered; see README.md."""
 import argparse
 import contextlib
 import math
@@ -25,12 +25,8 @@ REACH = 4  # pixels over which light of chance finds is spread
 KEPT = 0.9995  # of the average of weights, per step
 # How often which number of paths is drawn, where a view has it.
 SHARES = {1: 0.08, 2: 0.26, 4: 0.24, 16: 0.22, 256: 2.0}
-QUICK_SHARES = {1: 0.4, 2: 0.3, 4: 0.2, 16: 0.1}
 OTHER_SHARE = 0.12
-SIZES = {
-    "base": dict(widths=(48, 64, 80, 80, 64), encoder=(2, 2, 2, 2, 2), decoder=(2, 2, 2, 2)),
-    "quick": dict(widths=(16, 32, 48, 64, 64), encoder=(2, 2, 2, 1, 1), decoder=(1, 1, 1, 1)),
-}
+SIZE = dict(widths=(48, 64, 80, 80, 64), encoder=(2, 2, 2, 2, 2), decoder=(2, 2, 2, 2))
 
 
 def read_films(path):
@@ -160,8 +156,8 @@ class Batch:
     LONGS = 2 + CHANNELS + 7 + 5
     FLOATS = 3 + 3 + 2
 
-    def __init__(self, pictures, size, chance, shares):
-        self.pictures, self.size, self.chance, self.shares = pictures, size, chance, shares
+    def __init__(self, pictures, size, chance):
+        self.pictures, self.size, self.chance = pictures, size, chance
         device = pictures.device
         self.longs = torch.zeros((size, self.LONGS), dtype=torch.int64, device=device)
         self.floats = torch.zeros((size, self.FLOATS), dtype=torch.float32, device=device)
@@ -173,8 +169,8 @@ class Batch:
         floats = np.zeros((size, self.FLOATS), np.float32)
         views = chance.integers(len(pictures.views), size=size)
         for b, view in enumerate(views):
-            films = [f for f in pictures.views[view] if f[1] in self.shares or f[3]]
-            sums = np.cumsum([self.shares.get(f[1], OTHER_SHARE) for f in films])
+            films = [f for f in pictures.views[view] if f[1] in SHARES or f[3]]
+            sums = np.cumsum([SHARES.get(f[1], OTHER_SHARE) for f in films])
             film, paths, exposure, is_apart = films[
                 int(np.searchsorted(sums, chance.random() * sums[-1]))
             ]
@@ -251,17 +247,13 @@ def loss_of(output, target, edges):
 class Trainee:
     """A network with its optimizer (Adam), whose steps can be recorded once and played again."""
 
-    def __init__(self, name, pictures, options, chance):
-        self.name, self.device = name, pictures.device
-        size = options.batch if name == "base" else options.batch // 2
-        self.network = Network(**SIZES[name])
-        begin = options.begin_from / f"{name}.bin" if options.begin_from else None
-        if begin and begin.exists():
-            self.network = Network.load(begin)
-        self.network = self.network.to(self.device)
+    def __init__(self, pictures, options, chance):
+        self.device = pictures.device
+        begin = options.begin_from
+        self.network = (Network.load(begin) if begin else Network(**SIZE)).to(self.device)
         if self.device.type == "cuda":
             self.network = self.network.to(memory_format=torch.channels_last)
-        self.batch = Batch(pictures, size, chance, SHARES if name == "base" else QUICK_SHARES)
+        self.batch = Batch(pictures, options.batch, chance)
         self.parameters = list(self.network.parameters())
         self.sizes = [p.numel() for p in self.parameters]
         flat = torch.cat([p.detach().flatten() for p in self.parameters])
@@ -361,22 +353,23 @@ class Trainee:
             to.copy_(values)
         self.put(self.flat)
 
-    def save(self, folder):
+    def save(self, file):
         """The average of the weights."""
-        network = Network(**SIZES[self.name])
+        network = Network(**SIZE)
         means = self.mean.cpu().split(self.sizes)
         with torch.no_grad():
             for p, values in zip(network.parameters(), means):
                 p.copy_(values.view_as(p))
-        part = folder / f"{self.name}.bin.part"
+        part = file.with_suffix(".part")
         network.save(part)
-        part.rename(folder / f"{self.name}.bin")
+        part.rename(file)
 
 
-def save_state(trainees, file):
-    part = file.with_suffix(".part")
-    torch.save({t.name: t.state() for t in trainees}, part)
-    part.rename(file)
+def save(trainee, folder):
+    part = folder / "state.part"
+    torch.save(trainee.state(), part)
+    part.rename(folder / "state.pt")
+    trainee.save(folder / "denoiser.bin")
 
 
 def train(options):
@@ -393,46 +386,33 @@ def train(options):
     threading.Thread(target=pictures.keep_looking, daemon=True).start()
     while len(pictures.views) < options.first_views and time.time() < options.until:
         time.sleep(0.2)
-    trainees = [Trainee(name, pictures, options, chance) for name in options.sizes]
+    trainee = Trainee(pictures, options, chance)
     file = options.out / "state.pt"
     if file.exists():
-        states = torch.load(file, map_location="cpu")
-        for trainee in trainees:
-            if trainee.name in states:
-                trainee.restore(states[trainee.name])
+        trainee.restore(torch.load(file, map_location="cpu"))
     if options.graphs and device.type == "cuda":
-        for trainee in trainees:
-            with pictures.lock:
-                trainee.record()
+        with pictures.lock:
+            trainee.record()
     print(f"first step after {time.time() - begun:.0f} s, {len(pictures.views)} views", flush=True)
     told = saved = time.time()
-    tick = 0
-    while time.time() < options.until and tick < options.steps:
+    steps = 0
+    while time.time() < options.until and steps < options.steps:
         part = (time.time() - options.since) / (options.until - options.since)
         rate = options.rate * max(0.005, 0.5 + 0.5 * math.cos(math.pi * min(1.0, max(0.0, part))))
-        # Of four steps the last network has one.
-        trainee = trainees[-1] if tick % 4 == 3 else trainees[0]
         trainee.step(rate)
-        tick += 1
-        if tick % 50 == 0 and device.type == "cuda":
-            torch.cuda.synchronize()
+        steps += 1
         now = time.time()
-        if now - told > options.tell or tick == 20:
+        if now - told > options.tell or steps == 20:
             told = now
-            words = ", ".join(f"{t.name} {t.count} {float(t.loss):.4f}" for t in trainees)
-            print(f"{now - begun:.0f} s, rate {rate:.5f}, {len(pictures.views)} views: {words}",
-                  flush=True)
+            print(f"{now - begun:.0f} s, rate {rate:.5f}, {len(pictures.views)} views, "
+                  f"step {trainee.count}, loss {float(trainee.loss):.4f}", flush=True)
             (options.out / "alive").touch()
         if now - saved > options.save_every:
             saved = now
-            save_state(trainees, file)
-            for t in trainees:
-                t.save(options.out)
+            save(trainee, options.out)
     pictures.is_done = True
-    save_state(trainees, file)
-    for t in trainees:
-        t.save(options.out)
-        print(f"{t.name}: {t.count} steps, {len(pictures.views)} views", flush=True)
+    save(trainee, options.out)
+    print(f"{trainee.count} steps, {len(pictures.views)} views", flush=True)
 
 
 def main():
@@ -440,8 +420,7 @@ def main():
     parser.add_argument("pictures", help="folder that denoiser_pictures writes to, or has written")
     parser.add_argument("out", type=pathlib.Path,
                         help="folder of the weights, and of what a later call goes on from")
-    parser.add_argument("--sizes", nargs="+", choices=SIZES, default=["base", "quick"])
-    parser.add_argument("--begin-from", type=pathlib.Path, help="folder of weights to begin with")
+    parser.add_argument("--begin-from", type=pathlib.Path, help="weights to begin with")
     parser.add_argument("--seconds", type=float, default=1800.0)
     parser.add_argument("--since", type=float, help="seconds since 1970 when the schedule began")
     parser.add_argument("--until", type=float, help="... and when it ends")

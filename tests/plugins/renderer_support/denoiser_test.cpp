@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "renderer_support/denoiser.h"
 
+#include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <utility>
 
 #include "diorama/rng.h"
+#include "renderer_support/network_filter.h"
+#include "renderer_support/plane_filter.h"
 #include "renderer_support/view_transform.h"
 #include "support/catch.h"
 #include "support/render_host/render_host.h"
@@ -13,23 +17,32 @@
 namespace diorama {
 namespace {
 
-/// Two walls meeting in the middle column, lit 1 and 3, with a fine stripe pattern as colour and
-/// noise of relative size `noise`.
+const Vec3f kEye(1.5f, 1.5f, 0.6f);
+
+/// Two walls meeting in the middle column, lit 1 and 3, with a fine stripe pattern as colour, and
+/// noise of relative size `noise` in the means of eight paths.
 Film noisy_corner(double noise) {
+  constexpr int kPaths = 8;
+  constexpr float kPixel = 0.03f;  // metres
   Film film(65, 40, FilmPixel{});
   Rng rng(21);
   for (int y = 0; y < film.height(); ++y) {
     for (int x = 0; x < film.width(); ++x) {
-      FilmPixel& p = film.at(x, y);
       const bool is_left = x < 32;
-      const float light = is_left ? 1.0f : 3.0f;
-      p.albedo = Vec3f::Constant((x / 2) % 2 ? 0.8f : 0.2f);
-      p.normal = is_left ? Vec3f::UnitX() : Vec3f::UnitY();
-      p.position = is_left ? Vec3f(0, float(32 - x), float(y)) : Vec3f(float(x - 32), 0, float(y));
-      const float spread = float(noise) * light;
-      p.scattered = p.albedo * std::max(0.0f, light + spread * float(rng.normal()));
-      p.variance = std::pow(spread * p.albedo.x(), 2.0f);
-      p.surface_share = 1.0f;
+      const float along = kPixel * float(is_left ? 32 - x : x - 32);
+      PathSample sample;
+      sample.has_surface = true;
+      sample.albedo = Vec3f::Constant((x / 2) % 2 ? 0.8f : 0.2f);
+      sample.normal = is_left ? Vec3f::UnitX() : Vec3f::UnitY();
+      sample.position = Vec3f(is_left ? 0.0f : along, is_left ? along : 0.0f, kPixel * float(y));
+      PixelSum sum;
+      for (int i = 0; i < kPaths; ++i) {
+        const double skewed = -std::log(1.0 - rng.uniform()) - 1.0;
+        const double light = (is_left ? 1.0 : 3.0) * (1.0 + noise * std::sqrt(kPaths) * skewed);
+        sample.scattered = sample.albedo * float(light);
+        sum.add(sample);
+      }
+      film.at(x, y) = sum.mean();
     }
   }
   return film;
@@ -77,15 +90,14 @@ TEST_CASE("noise goes, pattern and corner stay", "[denoiser]") {
   test::RenderHost host(2);
   const Image<Vec3f> truth = undenoised(noisy_corner(0.0));
   const double before = error(undenoised(noisy_corner(0.3)), truth);
-  const double after =
-      error(denoised(noisy_corner(0.3), {Vec3f(30, 30, 20)}, Isa::Sse2, host), truth);
+  const double after = error(denoised(noisy_corner(0.3), {kEye}, Isa::Sse2, host), truth);
   CHECK(after < 0.08 * before);
 }
 
 TEST_CASE("a picture without noise stays as it is", "[denoiser]") {
   test::RenderHost host(1);
-  CHECK(error(denoised(noisy_corner(0.0), {Vec3f(30, 30, 20)}, Isa::Sse2, host),
-              undenoised(noisy_corner(0.0))) < 1e-6);
+  CHECK(error(denoised(noisy_corner(0.0), {kEye}, Isa::Sse2, host), undenoised(noisy_corner(0.0))) <
+        1e-6);
 }
 
 TEST_CASE("pictures of few paths keep their light, however skewed its noise", "[denoiser]") {
@@ -104,12 +116,18 @@ TEST_CASE("pictures of few paths keep their light, however skewed its noise", "[
 
 TEST_CASE("one chance find among quiet neighbours is tamed", "[denoiser]") {
   test::RenderHost host(1);
-  Film film = noisy_corner(0.05);
-  film.at(20, 20).scattered *= 500.0f;
-  film.at(20, 20).variance *= 250000.0f;
-  const Image<Vec3f> clean = denoised(std::move(film), {Vec3f(30, 30, 20)}, Isa::Sse2, host);
-  for (int y = 12; y < 28; ++y) {
-    for (int x = 12; x < 28; ++x) CHECK(clean.at(x, y).x() < 1.5f);
+  // Planes know it by its neighbours, the network by the limit of a path.
+  for (const bool is_quick : {false, true}) {
+    Film film = noisy_corner(0.05);
+    FilmPixel& find = film.at(20, 20);
+    find.scattered *= 500.0f;
+    find.variance = find.scattered.x() * find.scattered.x();
+    find.brightest = 8.0f * find.scattered.x();
+    const DenoiseSettings settings{kEye, is_quick ? 0.0f : 10.0f, is_quick};
+    const Image<Vec3f> clean = denoised(std::move(film), settings, Isa::Sse2, host);
+    for (int y = 12; y < 28; ++y) {
+      for (int x = 12; x < 28; ++x) CHECK(clean.at(x, y).x() < 1.5f);
+    }
   }
 }
 
@@ -146,19 +164,159 @@ TEST_CASE("the limit of a path lets light pass that many paths bring", "[denoise
   DenoiseSettings settings{Vec3f(0.6f, 0.5f, 3.0f)};
   settings.brightest_path = 4.0f;
   const Image<Vec3f> clean = denoised(std::move(film), settings, Isa::Sse2, host);
-  CHECK(double(clean.at(20, 20).x()) == Approx(expected).epsilon(1e-3));
+  CHECK(double(clean.at(20, 20).x()) == Approx(expected).epsilon(5e-3));
   CHECK(double(clean.at(30, 20).x()) == Approx(20.05).epsilon(0.1));
   CHECK(clean.at(50, 20).x() < 0.2f);
 }
 
-TEST_CASE("sources seen directly pass untouched", "[denoiser]") {
+TEST_CASE("sources seen directly pass, untouched by planes", "[denoiser]") {
   test::RenderHost host(1);
-  Film film = noisy_corner(0.2);
-  film.at(5, 6) = FilmPixel{};
-  film.at(5, 6).seen = Vec3f(70.0f, 60.0f, 50.0f);
-  CHECK(
-      (denoised(std::move(film), {Vec3f(30, 30, 20)}, Isa::Sse2, host).at(5, 6) - Vec3f(70, 60, 50))
-          .norm() < 1e-4f);
+  for (const bool is_quick : {false, true}) {
+    Film film = noisy_corner(0.2);
+    film.at(5, 6) = FilmPixel{};
+    film.at(5, 6).seen = Vec3f(70.0f, 60.0f, 50.0f);
+    const DenoiseSettings settings{kEye, 0.0f, is_quick};
+    const Vec3f source = denoised(std::move(film), settings, Isa::Sse2, host).at(5, 6);
+    CHECK((source - Vec3f(70, 60, 50)).norm() < (is_quick ? 1e-4f : 3.0f));
+  }
+}
+
+namespace {
+
+/// Films that differ from pixel to pixel in all that the network sees.
+Film rough_film(int width, int height, int paths) {
+  Film film(width, height, FilmPixel{});
+  Rng rng(13);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      PixelSum sum;
+      for (int i = 0; i < paths; ++i) {
+        PathSample sample;
+        sample.has_surface = x % 200 < 2 * y + 20;
+        sample.albedo =
+            sample.has_surface ? Vec3f(0.2f, x % 7 < 3 ? 0.6f : 0.3f, 0.5f) : Vec3f::Zero();
+        sample.normal = x + y < 60 ? Vec3f::UnitZ() : Vec3f::UnitX();
+        sample.position = 0.03f * Vec3f(float(x), float(y), 0.0f);
+        if (sample.has_surface) {
+          sample.scattered =
+              sample.albedo * float(rng.uniform() < 0.3 ? rng.uniform(0.0, 8.0) : 0.1);
+        } else {
+          sample.seen = Vec3f(3.0f, 4.0f, 5.0f);
+        }
+        sum.add(sample);
+      }
+      film.at(x, y) = sum.mean();
+    }
+  }
+  return film;
+}
+
+Image<Vec3f> denoised_by(int threads, const Film& film, bool is_quick = false,
+                         Isa isa = Isa::Sse2) {
+  Film copy(film.width(), film.height());
+  std::ranges::copy(film.pixels(), copy.pixels().begin());
+  test::RenderHost host(threads);
+  return denoised(std::move(copy), {Vec3f(0.5f, -0.4f, 2.0f), 4.0f, is_quick}, isa, host);
+}
+
+bool is_same(const Image<Vec3f>& a, const Image<Vec3f>& b) {
+  return std::memcmp(a.pixels().data(), b.pixels().data(), a.pixels().size_bytes()) == 0;
+}
+
+}  // namespace
+
+TEST_CASE("denoised pictures are the same bytes for any number of threads", "[denoiser]") {
+  const Film film = rough_film(117, 75, 3);
+  for (const bool is_quick : {false, true}) {
+    const Image<Vec3f> one = denoised_by(1, film, is_quick);
+    CHECK(is_same(one, denoised_by(2, film, is_quick)));
+    CHECK(is_same(one, denoised_by(5, film, is_quick)));
+  }
+}
+
+TEST_CASE("instruction sets agree but for rounding", "[denoiser]") {
+  const Film film = rough_film(61, 50, 4);
+  const Image<Vec3f> plain = denoised_by(2, film);
+  const Image<Vec3f> best = denoised_by(2, film, false, isa_by_name(best_isa_name()));
+  CHECK(error(plain, best) < 1e-8);
+}
+
+TEST_CASE("pictures of any size can be denoised", "[denoiser]") {
+  for (const auto& [width, height] : {std::pair{1, 1}, {3, 2}, {1, 40}, {33, 31}, {64, 1}}) {
+    const Image<Vec3f> clean = denoised_by(2, rough_film(width, height, 2));
+    CHECK(clean.width() == width);
+    CHECK(clean.height() == height);
+    for (const Vec3f& pixel : clean.pixels()) {
+      CHECK(pixel.allFinite());
+      CHECK(pixel.minCoeff() >= 0.0f);
+    }
+  }
+  test::RenderHost host(1);
+  CHECK(denoised(Film(), {}, Isa::Sse2, host).pixels().empty());
+}
+
+TEST_CASE("what is no number spoils no picture of the network", "[denoiser]") {
+  constexpr float kInf = std::numeric_limits<float>::infinity();
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  Film film = rough_film(48, 40, 4);
+  film.at(10, 12).scattered = Vec3f(kNan, kInf, -kInf);
+  film.at(30, 12).albedo = Vec3f(kNan, 0.0f, kInf);
+  film.at(10, 30).normal = Vec3f::Constant(kNan);
+  film.at(20, 30).position = Vec3f::Constant(kInf);
+  film.at(30, 30).variance = kNan;
+  film.at(31, 30).brightest = kInf;
+  film.at(5, 5).seen = Vec3f::Constant(kNan);
+  film.at(6, 5).count = kNan;
+  film.at(7, 5).surface_share = kNan;
+  film.at(9, 5).scattered = Vec3f::Constant(1e38f);
+  test::RenderHost host(2);
+  const Image<Vec3f> clean = filtered_by_network(film, {Vec3f(0.5f, -0.4f, 2.0f), 4.0f},
+                                                 quiet_exposure(film), Isa::Sse2, host);
+  for (const Vec3f& pixel : clean.pixels()) CHECK(pixel.allFinite());
+}
+
+TEST_CASE("a large picture, denoised in tiles, has no seams", "[denoiser]") {
+  // Two tiles side by side, which meet at column 1024: there the picture jumps no more than nearby.
+  constexpr int kWidth = 1400;
+  const Film film = rough_film(kWidth, 40, 2);
+  const Image<Vec3f> whole = denoised_by(2, film);
+  const auto column_steps = [&](int x) {
+    double sum = 0.0;
+    for (int y = 0; y < 40; ++y) sum += double((whole.at(x, y) - whole.at(x - 1, y)).norm());
+    return sum;
+  };
+  double around = 0.0;
+  for (int x = 990; x < 1060; ++x) around = std::max(around, x == 1024 ? 0.0 : column_steps(x));
+  CHECK(column_steps(1024) <= around);
+}
+
+TEST_CASE("of two filters the better one has the say", "[denoiser]") {
+  // A shadow's edge on one wall, of which no plane tells, with little noise and with much.
+  for (const double noise : {0.03, 1.0}) {
+    Rng rng(3);
+    const auto shadow = [&](int paths) {
+      return wall(96, 64, paths, [&](int x, int) {
+        const double skewed = paths > 1 ? -std::log(1.0 - rng.uniform()) - 1.0 : 0.0;
+        return float((x < 40 ? 0.2 : 1.0) * (1.0 + noise * skewed));
+      });
+    };
+    const Image<Vec3f> truth = undenoised(shadow(1));
+    const Film film = shadow(8);
+    const auto copy = [&] {
+      Film same(film.width(), film.height());
+      std::ranges::copy(film.pixels(), same.pixels().begin());
+      return same;
+    };
+    test::RenderHost host(2);
+    const DenoiseSettings settings{Vec3f(1.0f, 0.6f, 3.0f)};
+    const double planes = error(filtered_on_planes(copy(), settings, Isa::Sse2, host), truth);
+    const double network =
+        error(filtered_by_network(film, settings, quiet_exposure(film), Isa::Sse2, host), truth);
+    const double both = error(denoised(copy(), settings, Isa::Sse2, host), truth);
+    INFO("planes " << planes << ", network " << network << ", both " << both);
+    CHECK(both < 1.2 * std::min(planes, network) + 0.05 * error(undenoised(film), truth));
+    CHECK(both < 0.7 * std::max(planes, network));
+  }
 }
 
 TEST_CASE("a large picture is exposed like a small one of the same", "[exposure]") {
