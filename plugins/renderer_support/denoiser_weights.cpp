@@ -6,20 +6,20 @@
 
 // The file lies in the library as it is: parsed as a list of numbers it would take the compiler
 // minutes.
-asm(".section .rodata\n"
-    ".balign 16\n"
-    ".global diorama_denoiser_weights\n"
-    ".hidden diorama_denoiser_weights\n"
-    ".type diorama_denoiser_weights, @object\n"
-    "diorama_denoiser_weights:\n"
-    ".incbin \"" DIORAMA_DENOISER_WEIGHTS
-    "\"\n"
-    ".size diorama_denoiser_weights, . - diorama_denoiser_weights\n"
-    ".global diorama_denoiser_weights_end\n"
-    ".hidden diorama_denoiser_weights_end\n"
-    "diorama_denoiser_weights_end:\n"
-    ".byte 0\n"
-    ".previous\n");
+asm(R"(.section .rodata
+.balign 16
+.global diorama_denoiser_weights
+.hidden diorama_denoiser_weights
+.type diorama_denoiser_weights, @object
+diorama_denoiser_weights:
+.incbin ")" DIORAMA_DENOISER_WEIGHTS R"("
+.size diorama_denoiser_weights, . - diorama_denoiser_weights
+.global diorama_denoiser_weights_end
+.hidden diorama_denoiser_weights_end
+diorama_denoiser_weights_end:
+.byte 0
+.previous
+)");
 
 extern "C" {
 extern const std::byte diorama_denoiser_weights[];
