@@ -4,32 +4,12 @@
 #include <pmmintrin.h>
 #include <xmmintrin.h>
 
-#include <algorithm>
-#include <array>
 #include <atomic>
 #include <chrono>
-#include <cmath>
 #include <vector>
-
-#include "renderer_support/oidn_denoiser.h"
-#include "renderer_support/sample_plan.h"
-#include "renderer_support/stopwatch.h"
-#include "renderer_support/view_transform.h"
 
 namespace diorama {
 namespace {
-
-constexpr std::array kModes{"path_traced", "real_time", "preview"};
-#ifdef DIORAMA_HAS_OIDN
-constexpr std::array kDenoisers{"own", "oidn"};
-#endif
-constexpr std::array kExposures{"auto", "fixed"};
-constexpr std::array kViewTransforms{"standard", "filmic"};
-constexpr std::array kSphereLights{"sphere", "disk"};
-constexpr std::array kPrincipled{"layered", "blender"};
-
-// A fifth more error for three quarters of the time (measured on six rooms at one path).
-constexpr float kRealTimeIndirectShare = 0.5f;
 
 using Clock = std::chrono::steady_clock;
 
@@ -71,148 +51,14 @@ class RayTotals {
 
 }  // namespace
 
-void EmbreeRenderer::Params::visit(ParamVisitor& v) {
-  v.choice("mode", mode, kModes,
-           {"path_traced: all light paths; real_time: few samples and one bounce, always denoised; "
-            "preview: direct light only, denoised."});
-  v.param(
-      "samples", samples,
-      {"Light paths per pixel; with an error target or a time budget the most.", "", 1, 1 << 20});
-  v.param("error_target", error_target,
-          {"Where a pixel's standard error over its brightness falls below this, sampling ends "
-           "(judged before denoising, for blocks of 8 x 8 pixels); 0: never.",
-           "", 0.0});
-  v.param(
-      "time_budget_s", time_budget_s,
-      {"Wall time for the paths of one picture, after which sampling ends; pictures then differ "
-       "from run to run; 0: no limit.",
-       "s", 0.0});
-  v.param("max_bounces", max_bounces,
-          {"How often light may be scattered after the first surface.", "", 0, 64});
-  v.param("denoise", denoise, {"Remove noise from the colour channels (never from labels)."});
-#ifdef DIORAMA_HAS_OIDN
-  v.choice("denoiser", denoiser, kDenoisers,
-           {"own: the plugin's; oidn: Open Image Denoise, whose pictures depend on its version."});
-#endif
-  v.param(
-      "caustics", caustics,
-      {"Follow light focused by glass and mirrors; noisy. Off: glass lets light pass straight."});
-  v.param("clamp", clamp, {"Largest luminance of one indirect contribution; 0: none.", "", 0.0});
-  v.param(
-      "firefly_limit", firefly_limit,
-      {"Denoised pictures: how bright one path may be, over a few times the other paths around, "
-       "where 1 is white in a well exposed picture; what it brings beyond is spread over its "
-       "surroundings. Beyond 16 paths per pixel it grows with their number; 0: no limit.",
-       "", 0.0});
-  v.choice("exposure", exposure, kExposures,
-           {"auto: by the picture's middle tones; fixed: exposure_ev alone."});
-  v.param("exposure_ev", exposure_ev,
-          {"Stops added to the exposure; with fixed, 0 leaves radiance as it is.", "EV", -40, 40});
-  v.choice("view_transform", view_transform, kViewTransforms,
-           {"From exposed light to the picture: standard clips, filmic rolls highlights off."});
-  v.choice("sphere_lights", sphere_lights, kSphereLights,
-           {"sphere: as the scene says; disk: like disks that turn to every point they light, as "
-            "Blender's point lights do."});
-  v.choice("principled", principled, kPrincipled,
-           {"layered: layers share the light and lose none of it; blender: as Blender 3.4's "
-            "Principled BSDF, which adds reflections to a whole diffuse base."});
-  v.choice("isa", isa, kIsaNames,
-           {"Instruction set of the kernels, by default the best of this machine; pictures "
-            "are the same bytes within one."});
-}
-
-EmbreeRenderer::EmbreeRenderer(Params params, Host& host)
-    : params_(std::move(params)),
-      host_(host),
-      isa_(isa_by_name(params_.isa)),
-      meshes_(host, {kIsaNames[std::size_t(isa_)],
-                     {params_.sphere_lights == "disk", params_.principled == "blender"}}) {
-  if (params_.mode == "path_traced") return;
-  params_.denoise = true;
-  params_.max_bounces = std::min(params_.max_bounces, params_.mode == "real_time" ? 1 : 0);
-}
-
-NameSet EmbreeRenderer::provides() const {
-  NameSet names = geometry_channels();
-  names.emplace(kColor.name);
-  names.emplace(kColorHdr.name);
-  return names;
-}
-
-RenderReport EmbreeRenderer::report() const {
-  const EmbreeScene::Times& prepared = meshes_.times();
-  RenderReport report;
-  report.paths = counts_.paths;
-  report.rays = counts_.rays + counts_.shadow_rays;
-  report.seconds = {{"materials and meshes", prepared.shading_s},
-                    {"ray tracing structure", prepared.tree_s},
-                    {"light tables", prepared.lights_s}};
-  if (counts_.paths > 0) {
-    report.seconds = {{"labels and geometry", counts_.channels_s},
-                      {"paths", counts_.trace_s},
-                      {"denoising", counts_.denoise_s}};
-  }
-  return report;
-}
-
-std::size_t EmbreeRenderer::working_bytes(const Camera& camera, const NameSet& channels) const {
-  std::size_t per_pixel = sizeof(std::uint32_t) + sizeof(float);  // SeenMeshes
-  std::size_t denoising = 0;
-  if (channels.contains(kColor.name) || channels.contains(kColorHdr.name)) {
-    if (params_.denoise) {
-      denoising = denoiser_bytes(camera.width, camera.height, is_quick());
-    } else {
-      per_pixel += sizeof(FilmPixel) + sizeof(Vec3f);
-    }
-    const bool has_rounds = params_.error_target > 0.0 || params_.time_budget_s > 0.0;
-    if (has_rounds) per_pixel += sizeof(PixelSum);
-    if (params_.mode == "real_time" && params_.samples == 1) per_pixel += sizeof(RayHit);
-  }
-  return per_pixel * std::size_t(camera.width) * std::size_t(camera.height) + denoising;
-}
-
-void EmbreeRenderer::do_prepare(const Scene& scene) {
-  counts_ = {};
-  seen_by_ = {};
-  meshes_.take(scene);
-  if (meshes_.lights().is_empty()) {
-    host_.log(LogLevel::Warning, "the scene has no light: pictures will be black");
-  }
-}
-
-/// What the view's camera sees at the pixels' centres.
-const SeenMeshes& EmbreeRenderer::seen(const View& view, NodeId camera) {
-  if (seen_by_ != camera) {
-    Frame frame;
-    fill_channels(frame, {}, meshes_, view, seen_, nullptr, host_);
-    seen_by_ = camera;
-  }
-  return seen_;
-}
-
-/// Whether every path starts where the ray through its pixel's centre does.
-bool EmbreeRenderer::starts_at_centres(const View& view) const {
-  const bool sees_one_moment = !view.has_shutter() && !view.has_aperture();
-  return params_.mode == "real_time" && params_.samples == 1 && sees_one_moment;
-}
-
-Film EmbreeRenderer::trace(const View& view, NodeId camera, std::uint64_t seed) {
-  TraceSettings settings{params_.max_bounces, float(params_.clamp), params_.caustics};
-  settings.host = &host_;
-  if (params_.mode == "real_time") settings.indirect_share = kRealTimeIndirectShare;
-  if (starts_at_centres(view)) {
-    if (first_hits_.pixels().empty()) {
-      Frame frame;
-      fill_channels(frame, {}, meshes_, view, seen_, &first_hits_, host_);
-      seen_by_ = camera;
-    }
-    settings.first_hits = &first_hits_;
-  }
-  const PathTracer tracer(meshes_, view, settings, isa_);
+Film EmbreeRenderer::trace(const View& view, const PathSettings& path_settings, SamplePlan& plan) {
+  TraceSettings settings;
+  static_cast<PathSettings&>(settings) = path_settings;
+  settings.host = &host();
+  if (settings.starts_at_centres) settings.first_hits = &first_hits(view);
+  const PathTracer tracer(meshes(), view, settings, isa());
   const int width = view.camera().width;
   const int height = view.camera().height;
-  SamplePlan plan(width, height, {params_.samples, params_.error_target, params_.time_budget_s},
-                  seed);
   return plan.has_one_round() ? trace_at_once(tracer, plan, width, height)
                               : trace_in_rounds(tracer, plan, width, height);
 }
@@ -223,7 +69,7 @@ Film EmbreeRenderer::trace_at_once(const PathTracer& tracer, SamplePlan& plan, i
   Film film(width, height);
   RayTotals totals;
   const std::vector<TraceJob> jobs = plan.next_round({}, 0.0);
-  host_.parallel_for(jobs.size(), [&](std::size_t i) {
+  host().parallel_for(jobs.size(), [&](std::size_t i) {
     const FlushDenormals flush;
     const TraceJob& job = jobs[i];
     const int columns = job.x_end - job.x_begin;
@@ -234,8 +80,8 @@ Film EmbreeRenderer::trace_at_once(const PathTracer& tracer, SamplePlan& plan, i
       for (int x = job.x_begin; x < job.x_end; ++x) film.at(x, y) = (sum++)->mean();
     }
   });
-  counts_.paths = std::uint64_t(params_.samples) * std::uint64_t(width) * std::uint64_t(height);
-  totals.put_into(counts_);
+  for (const TraceJob& job : jobs) counts().paths += job.path_count();
+  totals.put_into(counts());
   return film;
 }
 
@@ -247,7 +93,7 @@ Film EmbreeRenderer::trace_in_rounds(const PathTracer& tracer, SamplePlan& plan,
   while (true) {
     const std::vector<TraceJob> jobs = plan.next_round(sums, seconds_since(start));
     if (jobs.empty()) break;
-    host_.parallel_for(jobs.size(), [&](std::size_t i) {
+    host().parallel_for(jobs.size(), [&](std::size_t i) {
       const FlushDenormals flush;
       const TraceJob& job = jobs[i];
       totals.add(tracer.trace(job, &sums.at(job.x_begin, job.y_begin), std::size_t(width)));
@@ -255,7 +101,7 @@ Film EmbreeRenderer::trace_in_rounds(const PathTracer& tracer, SamplePlan& plan,
   }
   Film film(width, height);
   std::atomic<std::uint64_t> paths{0};
-  host_.parallel_for(std::size_t(height), [&](std::size_t row) {
+  host().parallel_for(std::size_t(height), [&](std::size_t row) {
     std::uint64_t count = 0;
     for (int x = 0; x < width; ++x) {
       const PixelSum& sum = sums.at(x, int(row));
@@ -264,71 +110,9 @@ Film EmbreeRenderer::trace_in_rounds(const PathTracer& tracer, SamplePlan& plan,
     }
     paths += count;
   });
-  counts_.paths = paths;
-  totals.put_into(counts_);
+  counts().paths = paths;
+  totals.put_into(counts());
   return film;
-}
-
-Image<Vec3f> EmbreeRenderer::without_noise(Film film, const View& view) {
-#ifdef DIORAMA_HAS_OIDN
-  if (params_.denoiser == "oidn") return oidn_denoised(film, host_);
-#endif
-  DenoiseSettings settings{view.position()};
-  settings.is_quick = is_quick();
-  if (params_.firefly_limit > 0.0) {
-    settings.brightest_path = float(params_.firefly_limit / quiet_exposure(film));
-  }
-  return denoised(std::move(film), settings, isa_, host_);
-}
-
-void EmbreeRenderer::put_colors(Frame& frame, const RenderRequest& request, const View& view) {
-  Film film;
-  {
-    const Stopwatch watch(counts_.trace_s);
-    film = trace(view, request.camera, request.seed);
-    first_hits_ = {};
-  }
-  Image<Vec3f> hdr;
-  {
-    const Stopwatch watch(counts_.denoise_s);
-    hdr = params_.denoise ? without_noise(std::move(film), view) : undenoised(film);
-    film = Film();
-  }
-  const double base = params_.exposure == "auto" ? automatic_exposure(hdr) : 1.0;
-  frame.exposure = base * std::exp2(params_.exposure_ev);
-  if (request.channels.contains(kColor.name)) {
-    const bool is_filmic = params_.view_transform == "filmic";
-    frame.set(kColor,
-              displayed(hdr, frame.exposure,
-                        is_filmic ? ViewTransform::Filmic : ViewTransform::Standard, host_));
-  }
-  if (request.channels.contains(kColorHdr.name)) frame.set(kColorHdr, std::move(hdr));
-}
-
-Frame EmbreeRenderer::do_render(const Scene& scene, const RenderRequest& request) {
-  const View view(scene, request.camera);
-  Frame frame;
-  counts_ = {};
-  first_hits_ = {};
-  const bool wants_color =
-      request.channels.contains(kColor.name) || request.channels.contains(kColorHdr.name);
-  const NameSet known = geometry_channels();
-  if (std::any_of(known.begin(), known.end(),
-                  [&](const auto& name) { return request.channels.contains(name); })) {
-    const Stopwatch watch(counts_.channels_s);
-    Image<RayHit>* hits = wants_color && starts_at_centres(view) ? &first_hits_ : nullptr;
-    fill_channels(frame, request.channels, meshes_, view, seen_, hits, host_);
-    seen_by_ = request.camera;
-  }
-  if (wants_color) put_colors(frame, request, view);
-  return frame;
-}
-
-std::vector<CoverageMask> EmbreeRenderer::do_cover(const Scene& scene, NodeId camera,
-                                                   std::span<const LabelledInstance> instances,
-                                                   bool with_distances) {
-  const View view(scene, camera);
-  return coverage(meshes_, view, seen(view, camera), instances, with_distances, isa_, host_);
 }
 
 }  // namespace diorama

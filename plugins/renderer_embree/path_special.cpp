@@ -9,8 +9,6 @@
 namespace diorama {
 namespace {
 
-constexpr int kMaxStraightPasses = 64;  // straight through cut-outs and panes
-
 Vec3f leave(const SurfaceGeometry& s, const Vec3f& towards) {
   return diorama::leave(s.position, s.flat_normal, step_off(s.position, s.flat_normal), towards);
 }
@@ -45,22 +43,6 @@ Vec3f mapped_normal(const RayHit& hit, const SurfaceGeometry& s, const TextureSl
 }
 
 }  // namespace
-
-Vec3f base_color_at(const RayHit& hit, const SurfaceGeometry& surface, float uv_footprint) {
-  const Mesh& mesh = hit.instance->source();
-  const ShadingMaterial& material = hit.instance->material(hit.triangle);
-  Vec3f color = material.source->base_color;
-  if (material.base_color) {
-    const Rgba texel = material.base_color.at(surface.uv, uv_footprint);
-    color = color.cwiseProduct(Vec3f(texel.head<3>().matrix()));
-  }
-  if (!mesh.colors.empty()) {
-    const auto corners = hit.instance->shading->corners(hit.triangle);
-    color = color.cwiseProduct(mesh.colors[corners[0]] * (1.0f - hit.u - hit.v) +
-                               mesh.colors[corners[1]] * hit.u + mesh.colors[corners[2]] * hit.v);
-  }
-  return color.cwiseMax(0.0f);
-}
 
 void PathTracer::open_shutter(Path& path, int row, CameraRay& ray) const {
   const double seconds = view_.seconds(row, double(path.sampler.next().x()));

@@ -11,10 +11,6 @@
 namespace diorama {
 namespace {
 
-// Of paths as bright as behind their first surface. Between 0.7 and 1.5 the error for equal time is
-// the same (measured); short paths leave more time for denoised pictures' pixels.
-constexpr float kContinuation = 0.7f;
-
 // Samples of one pixel that are traced side by side: their first rays go nearly the same way.
 constexpr std::uint32_t kRun = 8;
 

@@ -5,10 +5,11 @@
 #include <vector>
 
 #include "diorama/host.h"
-#include "embree_scene.h"
+#include "embree_support/embree_scene.h"
 #include "renderer_support/batch.h"
 #include "renderer_support/film.h"
 #include "renderer_support/isa.h"
+#include "renderer_support/path_settings.h"
 #include "renderer_support/trace_job.h"
 #include "renderer_support/view.h"
 
@@ -23,16 +24,7 @@ struct LoggedRay {
   bool is_shadow = false;
 };
 
-struct TraceSettings {
-  int max_bounces = 6;  ///< Surfaces after the first that may scatter light.
-  float clamp = 0.0f;   ///< Largest luminance of one indirect contribution; 0: no limit.
-  /// True: light focused by glass and mirrors is searched by chance, and glass blocks shadow rays.
-  /// False: shadow rays pass glass straight, and lights seen over a diffuse surface through a
-  /// mirror or glass are left out: far less noise for a little lost light.
-  bool has_caustics = false;
-  /// Share of the paths that go on behind their first scattering surface, with more weight: less
-  /// time for a picture, more noise in its indirect light.
-  float indirect_share = 1.0f;
+struct TraceSettings : PathSettings {
   /// What the rays through the pixels' centres met, if known: every path then starts there. For
   /// views without aperture and shutter, and no more than a path per pixel.
   const Image<RayHit>* first_hits = nullptr;
@@ -113,8 +105,5 @@ class PathTracer {
   TraceSettings settings_;
   Isa isa_;
 };
-
-/// Base colour of a surface point with textures and vertex colours, linear.
-Vec3f base_color_at(const RayHit& hit, const SurfaceGeometry& surface, float uv_footprint);
 
 }  // namespace diorama

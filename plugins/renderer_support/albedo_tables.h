@@ -95,6 +95,10 @@ class LayerTable {
   /// For one alpha, or for all of them (textured roughness).
   LayerTable(AlbedoTables& tables, const Layers& layers, std::optional<float> alpha);
 
+  /// The nodes row by row, and the means of the rows: one row, or one per node of alpha.
+  const std::vector<Node>& nodes() const { return nodes_; }
+  const std::vector<Means>& means() const { return means_; }
+
   /// `alpha` does not count in a table for one alpha.
   Row row(float alpha) const {
     Row row;
@@ -134,6 +138,10 @@ class GlassTable {
   GlassTable(float eta, std::optional<float> alpha);
 
   float eta() const { return eta_; }
+  /// Rows per side; the albedos of both sides, row by row; and their means.
+  int rows() const { return rows_; }
+  const std::vector<float>& directional() const { return directional_; }
+  const std::vector<float>& means() const { return mean_; }
   float at(int side, float cos_theta, float alpha) const;
   /// Cosine-weighted mean over the hemisphere.
   float mean(int side, float alpha) const;

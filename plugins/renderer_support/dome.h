@@ -29,6 +29,11 @@ class SquareDistribution {
     const int y = cell_of(point.y(), height_);
     return weights_[std::size_t(y) * std::size_t(width_) + std::size_t(x)];
   }
+  int width() const { return width_; }
+  int height() const { return height_; }
+  const std::vector<float>& weights() const { return weights_; }
+  const std::vector<float>& row_sums() const { return row_sums_; }
+  const std::vector<float>& within_row() const { return within_row_; }
   static int cell_of(float x, int count) { return std::clamp(int(x * float(count)), 0, count - 1); }
 
  private:
@@ -58,6 +63,8 @@ class DomeTexture {
   /// The source must outlive all lookups; see MipTexture.
   explicit DomeTexture(const Texture& source);
 
+  const MipTexture& image() const { return image_; }
+  const std::vector<SquareDistribution>& patches() const { return patches_; }
   /// Luminance times solid angle of a patch.
   float patch_power(int patch) const { return patch_power_[std::size_t(patch)]; }
 

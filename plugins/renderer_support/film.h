@@ -78,6 +78,19 @@ class PixelSum {
     sum_.normal += sample.normal;
     sum_.position += sample.position;
   }
+  /// Sums that were made elsewhere: `sum` over all samples, those of the surface over the samples
+  /// that met one; of what was scattered the sums of luminances and their squares.
+  static PixelSum of(const FilmPixel& sum, double luminance, double luminance2, int count,
+                     int surfaces) {
+    PixelSum result;
+    result.sum_ = sum;
+    result.luminance_ = luminance;
+    result.luminance2_ = luminance2;
+    result.brightest_ = double(sum.brightest);
+    result.count_ = count;
+    result.surfaces_ = surfaces;
+    return result;
+  }
   FilmPixel mean() const;
   int count() const { return count_; }
 

@@ -115,6 +115,8 @@ class LightTable {
   const std::vector<std::uint32_t>& bodies() const { return bodies_; }
   /// ... and per light: its number among them.
   const std::vector<std::uint32_t>& order() const { return order_; }
+  /// Spheres, rects and disks: rays may meet them.
+  const std::vector<std::uint32_t>& shapes() const { return shapes_; }
   /// Distant lights and domes.
   const std::vector<std::uint32_t>& surroundings() const { return surroundings_; }
   /// What is compared to choose a light: the roots of the tree, then the surroundings. The light of
@@ -165,7 +167,7 @@ class LightTable {
 
   bool has_disk_lamps_;
   std::vector<Record> records_;
-  std::vector<std::uint32_t> shapes_;  ///< Sphere, rect, disk: rays meet them here.
+  std::vector<std::uint32_t> shapes_;
   std::vector<std::uint32_t> bodies_;
   std::vector<std::uint32_t> surroundings_;
   std::vector<std::uint32_t> order_;

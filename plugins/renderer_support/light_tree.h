@@ -40,6 +40,25 @@ class LightTree {
 
   static constexpr std::size_t kLanes = 8;
 
+  using Lanes = std::array<float, kLanes>;
+  /// Lights or groups that are compared.
+  struct Block {
+    alignas(32) Lanes x{}, y{}, z{}, radius{}, power{};
+    Lanes direction_x{}, direction_y{}, direction_z{};
+    // What leaves the light, by the cosine of its direction.
+    Lanes depth{}, slope{}, base{}, spread{}, behind{};
+    /// A light, or ~index of a block. Lanes without one have no power.
+    std::array<std::int32_t, kLanes> child{};
+    std::uint32_t count = 0;
+    std::uint32_t parent = 0;
+    std::uint32_t lane_of_parent = 0;
+  };
+  /// Where a light stands.
+  struct Place {
+    std::uint32_t block = 0;
+    std::uint32_t lane = 0;
+  };
+
   LightTree() = default;
   explicit LightTree(const std::vector<Light>& lights);
 
@@ -48,6 +67,11 @@ class LightTree {
   float root_score(std::uint32_t lane, const Receiver& receiver) const {
     return score(blocks_[0], lane, receiver);
   }
+
+  /// The root first.
+  const std::vector<Block>& blocks() const { return blocks_; }
+  /// By light.
+  const std::vector<Place>& places() const { return places_; }
 
   /// The light of a root's lane; negative: it is a group.
   std::int32_t light_of_root(std::uint32_t lane) const { return blocks_[0].child[lane]; }
@@ -63,22 +87,6 @@ class LightTree {
   float probability(std::uint32_t light, const Receiver& receiver, float& tree_score) const;
 
  private:
-  using Lanes = std::array<float, kLanes>;
-  struct Block {
-    alignas(32) Lanes x{}, y{}, z{}, radius{}, power{};
-    Lanes direction_x{}, direction_y{}, direction_z{};
-    // What leaves the light, by the cosine of its direction.
-    Lanes depth{}, slope{}, base{}, spread{}, behind{};
-    /// A light, or ~index of a block. Lanes without one have no power.
-    std::array<std::int32_t, kLanes> child{};
-    std::uint32_t count = 0;
-    std::uint32_t parent = 0;
-    std::uint32_t lane_of_parent = 0;
-  };
-  struct Place {
-    std::uint32_t block = 0;
-    std::uint32_t lane = 0;
-  };
   using Range = std::vector<std::uint32_t>;
 
   struct Scores {

@@ -136,4 +136,7 @@ inline void add_uv(SurfaceGeometry& s, const RayHit& hit) {
   s.uv_per_metre = twice_area > 0.0f ? std::sqrt(uv_area / twice_area) : 0.0f;
 }
 
+/// Base colour of a surface point with textures and vertex colours, linear.
+Vec3f base_color_at(const RayHit& hit, const SurfaceGeometry& surface, float uv_footprint);
+
 }  // namespace diorama

@@ -2,6 +2,7 @@
 #include "mip_texture.h"
 
 #include <algorithm>
+#include <atomic>
 
 #include "diorama/error.h"
 #include "diorama/image.h"
@@ -25,6 +26,11 @@ void check(const Texture& texture) {
                                     std::to_string(texture.bytes.size()) + " bytes and " +
                                     std::to_string(texture.floats.size()) +
                                     " floats; one of them must fit the size");
+}
+
+std::uint64_t next_number() {
+  static std::atomic<std::uint64_t> last{0};
+  return ++last;
 }
 
 const SrgbBytes& srgb_bytes() {
@@ -73,7 +79,8 @@ std::vector<T> halved(const std::vector<T>& from, const Size& size, int channels
 
 }  // namespace
 
-MipTexture::MipTexture(const Texture& source, int wide_enough) : source_(&source) {
+MipTexture::MipTexture(const Texture& source, int wide_enough)
+    : source_(&source), number_(next_number()) {
   check(*source_);
   const bool is_srgb = source_->color_space == ColorSpace::Srgb;
   for (std::size_t i = 0; i < 256; ++i) {

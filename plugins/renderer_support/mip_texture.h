@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "diorama/image.h"
@@ -25,6 +26,16 @@ class MipTexture {
   int width() const { return levels_[0].width; }
   int height() const { return levels_[0].height; }
   int level_count() const { return int(levels_.size()); }
+  int level_width(int level) const { return levels_[std::size_t(level)].width; }
+  int level_height(int level) const { return levels_[std::size_t(level)].height; }
+  /// Of 8-bit textures: a level's values as they are stored, interleaved; else none.
+  std::span<const std::uint8_t> bytes(int level) const {
+    return level == 0 ? source_->bytes : levels_[std::size_t(level)].bytes;
+  }
+  int channels() const { return source_->channels; }
+  bool is_srgb() const { return source_->color_space == ColorSpace::Srgb; }
+  /// No other texture of the process has or had it.
+  std::uint64_t number() const { return number_; }
 
   /// Linear values at texture coordinates, (0, 0) lower left, filtered bilinearly and between
   /// levels. `footprint` is the width of the wanted average as a share of the texture's. Missing
@@ -49,6 +60,7 @@ class MipTexture {
   void add_level();
 
   const Texture* source_;
+  std::uint64_t number_;
   std::array<float, 256> linear_from_byte_;
   std::vector<Level> levels_;
 };

@@ -35,6 +35,10 @@ class RenderScene {
   /// of SkyGrid among what follows no rigid body.
   void light(const Scene& scene, const SkyGrid::Sees& sees);
 
+  /// Those of the scene that was taken in; see Scene::pose_revision.
+  std::uint64_t pose_revision() const { return pose_revision_; }
+  std::uint64_t shape_revision() const { return shape_revision_; }
+
   /// A mesh that is in use.
   struct UsedMesh {
     std::shared_ptr<const ShadingMesh> shading;

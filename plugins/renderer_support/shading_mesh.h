@@ -65,11 +65,14 @@ class ShadingMesh {
     return uvs_.empty() ? source_uvs(triangle) : uvs_[triangle];
   }
 
- private:
   struct Triangle {
     std::array<std::int16_t, 9> normals{};  ///< Of the corners, 32767 long.
     std::uint16_t slot = 0;                 ///< Of its material.
   };
+  /// By their numbers.
+  const std::vector<Triangle>& triangles() const { return triangles_; }
+
+ private:
   std::array<Vec2f, 3> source_uvs(std::uint32_t triangle) const {
     const auto [a, b, c] = corners(triangle);
     return {source_->uvs[a], source_->uvs[b], source_->uvs[c]};

@@ -33,6 +33,15 @@ class SkyGrid {
   SkyGrid(const DomeTexture& dome, const Eigen::Matrix3f& world_from_dome, const Aabb& bounds,
           const Sees& sees, Host& host);
 
+  /// Cells lie row by row from the low corner on, x fastest.
+  const Vec3f& low() const { return low_; }
+  const Vec3f& cells_per_metre() const { return cells_per_metre_; }
+  const std::array<int, 3>& counts() const { return counts_; }
+  /// Borders of the patches' shares in a cell, from 0 to 1.
+  const std::array<float, DomeTexture::kPatches + 1>& borders(std::uint32_t cell) const {
+    return cells_[cell].cumulative;
+  }
+
   std::uint32_t cell(const Vec3f& position) const;
   /// The same for the first `size` entries of a batch.
   void find_cells(const BatchVectors& positions, std::size_t size, BatchInts& cells) const {

@@ -28,6 +28,9 @@ class SampleOrder {
       : seed_(seed),
         bits_(std::min(int(std::bit_width(std::max(samples, 1u) - 1u)), kSampleBits)) {}
 
+  /// Of the samples of one round, which share a sequence.
+  int sample_bits() const { return bits_; }
+
   struct Place {
     std::uint32_t key = 0;    ///< Of the sequence.
     std::uint32_t index = 0;  ///< In it.

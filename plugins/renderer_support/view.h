@@ -35,6 +35,17 @@ class View {
     return is_plain_ ? straight_ray(pixel) : bent_ray(pixel.cast<double>(), aperture);
   }
 
+  /// Rays of a pinhole without depth of field leave `origin` towards
+  /// towards + x per_column + y per_row, which is one metre deep.
+  struct Pinhole {
+    Vec3f origin, towards, per_column, per_row;
+    float near, far;  ///< Along the axis.
+  };
+  std::optional<Pinhole> pinhole() const {
+    if (!is_plain_) return std::nullopt;
+    return Pinhole{origin_, towards_, per_column_, per_row_, near_, far_};
+  }
+
   /// Whether sample_ray() heeds the point of the aperture.
   bool has_aperture() const { return aperture_radius_ > 0.0; }
   /// Whether rows or samples see different moments.

@@ -7,7 +7,6 @@
 #include <optional>
 #include <vector>
 
-#include "path_tracer.h"
 #include "renderer_support/ray_blocks.h"
 #include "renderer_support/silhouette.h"
 

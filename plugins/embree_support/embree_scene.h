@@ -123,6 +123,7 @@ class EmbreeScene {
   Trees trees() const;
   RenderScene::Kept kept() const { return scene_.kept(); }
 
+  const RenderScene& render_scene() const { return scene_; }
   const std::vector<MeshInstance>& instances() const { return scene_.instances(); }
   const LightTable& lights() const { return scene_.lights(); }
   bool stacks_lobes() const { return scene_.stacks_lobes(); }

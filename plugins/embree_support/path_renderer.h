@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "channels.h"
+#include "diorama/host.h"
+#include "diorama/params.h"
+#include "diorama/renderer.h"
+#include "embree_scene.h"
+#include "renderer_support/denoiser.h"
+#include "renderer_support/isa.h"
+#include "renderer_support/path_settings.h"
+#include "renderer_support/sample_plan.h"
+
+namespace diorama {
+
+/// What jobs say of pictures made of light paths, whatever traces these.
+struct PictureParams {
+  std::string mode = "path_traced";
+  int samples = 32;
+  double error_target = 0.0;
+  double time_budget_s = 0.0;
+  int max_bounces = 6;
+  bool denoise = true;
+  std::string denoiser = "own";  ///< A parameter only where the build found another one.
+  bool caustics = false;
+  double clamp = 0.0;
+  double firefly_limit = 4.0;
+  std::string exposure = "auto";
+  double exposure_ev = 0.0;
+  std::string view_transform = "filmic";
+  std::string sphere_lights = "sphere";
+  std::string principled = "layered";
+  std::string isa = best_isa_name();  ///< So that the dataset names it.
+
+  void visit(ParamVisitor& v);
+};
+
+/// A path tracer but for its paths: what it makes of them, and labels, which Embree's rays find.
+/// Labels of all renderers derived from it are therefore the same bytes.
+class PathRenderer : public Renderer {
+ public:
+  NameSet provides() const override;
+  /// Phases of the preparation, and once a picture was rendered those of the picture.
+  RenderReport report() const override;
+
+  /// What the last render() did; for benchmarks.
+  struct Counts {
+    std::uint64_t paths = 0;
+    std::uint64_t rays = 0;
+    std::uint64_t shadow_rays = 0;
+    double trace_s = 0.0;  ///< Wall time.
+    double denoise_s = 0.0;
+    double channels_s = 0.0;
+  };
+  const Counts& last_counts() const { return counts_; }
+
+ protected:
+  PathRenderer(PictureParams params, Host& host);
+
+  /// A picture's light paths.
+  virtual Film trace(const View& view, const PathSettings& settings, SamplePlan& plan) = 0;
+  /// Memory per pixel that trace() holds beside the film.
+  virtual std::size_t traced_bytes_per_pixel() const = 0;
+  /// Called after the scene was taken in.
+  virtual void prepare_paths() {}
+
+  bool has_rounds() const { return params_.error_target > 0.0 || params_.time_budget_s > 0.0; }
+  /// What the rays through the pixels' centres met, for pictures whose paths all start there.
+  const Image<RayHit>& first_hits(const View& view);
+  Host& host() { return host_; }
+  Isa isa() const { return isa_; }
+  const EmbreeScene& meshes() const { return meshes_; }
+  Counts& counts() { return counts_; }
+
+ private:
+  void do_prepare(const Scene& scene) override;
+  Frame do_render(const Scene& scene, const RenderRequest& request) override;
+  std::vector<CoverageMask> do_cover(const Scene& scene, NodeId camera,
+                                     std::span<const LabelledInstance> instances,
+                                     bool with_distances) override;
+  std::size_t working_bytes(const Camera& camera, const NameSet& channels) const override;
+  const SeenMeshes& seen(const View& view, NodeId camera);
+  bool starts_at_centres(const View& view) const;
+  PathSettings path_settings(const View& view) const;
+  Image<Vec3f> without_noise(Film film, const View& view);
+  bool is_quick() const { return params_.mode != "path_traced"; }
+  void put_colors(Frame& frame, const RenderRequest& request, const View& view);
+
+  PictureParams params_;
+  Host& host_;
+  Isa isa_;
+  EmbreeScene meshes_;
+  Counts counts_;
+  NodeId rendered_by_;  ///< The camera of the picture under way.
+  NodeId seen_by_;      ///< The camera of `seen_`, if there is any.
+  SeenMeshes seen_;
+  Image<RayHit> first_hits_;  ///< Of the picture under way, if its paths start there.
+};
+
+}  // namespace diorama
