@@ -8,11 +8,15 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 
 #include "bench_scene.h"
 #include "embree_renderer.h"
+#ifdef DIORAMA_HAS_VULKAN
+#include "vulkan_renderer.h"
+#endif
 #include "framework/bench/cpu_time.h"
 #include "framework/bench/picture_error.h"
 #include "framework/images/linear_picture.h"
@@ -79,7 +83,7 @@ double share_of_raw_rays(const Scene& scene, NodeId camera, Host& host,
 }
 
 /// Wall time from a change of the scene to the first ray: all that has a rigid body has moved.
-double update_seconds(Scene& scene, EmbreeRenderer& renderer) {
+double update_seconds(Scene& scene, PathRenderer& renderer) {
   std::vector<double> times;
   for (int i = 0; i < 5; ++i) {
     for (const NodeId node : scene.match("/room/*")) {
@@ -109,9 +113,22 @@ struct Options {
   int threads = 2;
   int repetitions = 1;
   bool probes = false;
+  int device = -1;  ///< Of Vulkan; -1: none.
   std::uint64_t seed = 1;
   EmbreeRenderer::Params params;
 };
+
+std::unique_ptr<PathRenderer> make_renderer(const Options& options, Host& host) {
+#ifdef DIORAMA_HAS_VULKAN
+  if (options.device >= 0) {
+    VulkanRenderer::Params params;
+    static_cast<PictureParams&>(params) = options.params;
+    params.device = options.device;
+    return std::make_unique<VulkanRenderer>(params, host);
+  }
+#endif
+  return std::make_unique<EmbreeRenderer>(options.params, host);
+}
 
 void run(const Options& options) {
   test::RenderHost host(options.threads);
@@ -121,7 +138,8 @@ void run(const Options& options) {
       bench::add_bench_camera(options.folder, scene, options.width, options.height);
   const double load = cpu_seconds() - start;
   start = cpu_seconds();
-  EmbreeRenderer renderer(options.params, host);
+  const std::unique_ptr<PathRenderer> made = make_renderer(options, host);
+  PathRenderer& renderer = *made;
   const double make = cpu_seconds() - start;
   start = cpu_seconds();
   renderer.prepare(scene);
@@ -140,6 +158,7 @@ void run(const Options& options) {
     nlohmann::ordered_json line;
     line["materials"] = options.materials;
     line["size"] = std::to_string(options.width) + "x" + std::to_string(options.height);
+    if (options.device >= 0) line["device"] = options.device;
     line["samples"] = options.params.samples;
     line["denoise"] = options.params.denoise;
     line["load_cpu_s"] = load;
@@ -152,6 +171,7 @@ void run(const Options& options) {
     line["rays_per_path"] = double(counts.rays) / double(counts.paths);
     line["shadow_rays_per_path"] = double(counts.shadow_rays) / double(counts.paths);
     line["mrays_per_cpu_s"] = 1e-6 * double(counts.rays + counts.shadow_rays) / cpu;
+    line["mrays_per_wall_s"] = 1e-6 * double(counts.rays + counts.shadow_rays) / counts.trace_s;
     if (reference) {
       const auto error = bench::picture_error(frame.get(kColorHdr), *reference);
       line["rel_mse"] = error.trimmed_mse;
@@ -169,7 +189,8 @@ void run(const Options& options) {
   if (options.probes) {
     // Last, because the second moves things.
     nlohmann::ordered_json line;
-    line["raw_ray_share"] = share_of_raw_rays(scene, camera, host, options.params);
+    if (options.device < 0)
+      line["raw_ray_share"] = share_of_raw_rays(scene, camera, host, options.params);
     line["update_wall_s"] = update_seconds(scene, renderer);
     std::printf("%s\n", line.dump().c_str());
   }
@@ -196,6 +217,9 @@ int main(int argc, char** argv) {
   app.add_option("--threads", options.threads);
   app.add_option("--repetitions", options.repetitions);
   app.add_option("--seed", options.seed);
+#ifdef DIORAMA_HAS_VULKAN
+  app.add_option("--device", options.device, "Vulkan device that traces the paths");
+#endif
   app.add_flag("--probes", options.probes,
                "Also compare with Embree alone and time the update of a scene whose things moved");
   app.add_option("--mode", options.params.mode);

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "diorama/math.h"
+
+namespace diorama {
+
+/// A box around something that rays may meet. Empty: nothing can.
+struct TreeBox {
+  Vec3f low = Vec3f::Constant(3e38f);
+  Vec3f high = Vec3f::Constant(-3e38f);
+
+  void add(const Vec3f& point) {
+    low = low.cwiseMin(point);
+    high = high.cwiseMax(point);
+  }
+  void add(const TreeBox& other) {
+    low = low.cwiseMin(other.low);
+    high = high.cwiseMax(other.high);
+  }
+};
+
+/// Two children, as kernels read them. Children are nodes, or leaves: kLeaf with what stands there.
+struct TreeNode {
+  static constexpr std::uint32_t kLeaf = 0x80000000u;
+
+  Vec3f low_a = TreeBox().low;
+  std::uint32_t child_a = kLeaf;
+  Vec3f high_a = TreeBox().high;
+  std::uint32_t pad_a = 0;
+  Vec3f low_b = TreeBox().low;
+  std::uint32_t child_b = kLeaf;
+  Vec3f high_b = TreeBox().high;
+  std::uint32_t pad_b = 0;
+};
+static_assert(sizeof(TreeNode) == 64);
+
+/// A tree of boxes that rays pass fast: split where the surface area heuristic says so, among bins
+/// (Wald 2007), and not too deep for the kernels' stacks.
+struct BoxTree {
+  /// Boxes below one leaf at most.
+  static constexpr std::uint32_t kMostPerLeaf = 4;
+  /// No path from the root is longer, for up to 2^26 boxes.
+  static constexpr int kDeepest = 46;
+
+  std::vector<TreeNode> nodes;       ///< The root first; there is always one.
+  std::vector<std::uint32_t> order;  ///< Of the boxes as leaves hold them, without the empty ones.
+};
+
+/// Leaves hold a run of `order`: kLeaf | first << 3 | count - 1.
+BoxTree tree_of_runs(std::span<const TreeBox> boxes);
+/// Leaves hold one box: kLeaf | its index. `order` stays empty.
+BoxTree tree_of_single(std::span<const TreeBox> boxes);
+
+}  // namespace diorama

@@ -1,0 +1,585 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gpu_scene.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <set>
+#include <utility>
+
+#include "box_tree.h"
+
+namespace diorama {
+namespace {
+
+std::uint32_t bits(float value) { return std::bit_cast<std::uint32_t>(value); }
+
+void add_floats(std::vector<std::uint32_t>& words, std::span<const float> values) {
+  for (const float value : values) words.push_back(bits(value));
+}
+
+/// Numbers as kernels read them: three columns of four.
+struct TriangleColumns {
+  std::array<float, 4> corner;
+  std::array<float, 4> ab;
+  std::array<float, 4> ac;
+};
+TriangleColumns columns_of(const Vec3f& a, std::uint32_t number, const Vec3f& ab, float end_area,
+                           const Vec3f& ac) {
+  return {{a.x(), a.y(), a.z(), std::bit_cast<float>(number)},
+          {ab.x(), ab.y(), ab.z(), end_area},
+          {ac.x(), ac.y(), ac.z(), 0.0f}};
+}
+
+/// All of a mesh that kernels read, in parts that begin at multiples of 16 bytes.
+struct MeshBytes {
+  BoxTree tree;
+  std::vector<TriangleColumns> triangles;
+  std::vector<std::array<float, 6>> uvs;
+  std::vector<std::array<float, 9>> colors;
+};
+
+MeshBytes bytes_of(const ShadingMesh& mesh) {
+  const Mesh& source = mesh.source();
+  std::vector<TreeBox> boxes(mesh.number_end());
+  for (std::uint32_t t = 0; t < mesh.number_end(); ++t) {
+    if (mesh.is_repeated(t)) continue;
+    for (const std::uint32_t corner : mesh.corners(t)) boxes[t].add(source.positions[corner]);
+  }
+  MeshBytes bytes;
+  bytes.tree = tree_of_runs(boxes);
+  bytes.triangles.reserve(bytes.tree.order.size());
+  for (const std::uint32_t t : bytes.tree.order) {
+    const auto corners = mesh.corners(t);
+    const Vec3f& a = source.positions[corners[0]];
+    bytes.triangles.push_back(
+        columns_of(a, t, source.positions[corners[1]] - a, 0.0f, source.positions[corners[2]] - a));
+  }
+  for (std::uint32_t t = 0; mesh.has_uvs() && t < mesh.number_end(); ++t) {
+    const auto uvs = mesh.uvs(t);
+    bytes.uvs.push_back({uvs[0].x(), uvs[0].y(), uvs[1].x(), uvs[1].y(), uvs[2].x(), uvs[2].y()});
+  }
+  for (std::uint32_t t = 0; !source.colors.empty() && t < mesh.number_end(); ++t) {
+    auto& corners = bytes.colors.emplace_back();
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec3f& color = source.colors[mesh.corners(t)[k]];
+      std::copy_n(color.data(), 3, &corners[3 * k]);
+    }
+  }
+  return bytes;
+}
+
+/// Levels' offsets, then their texels.
+std::vector<std::uint32_t> words_of(const MipTexture& texture) {
+  std::vector<std::uint32_t> words(gpu::kMostLevels, 0);
+  std::uint32_t texels = 0;
+  const int levels = std::min(texture.level_count(), int(gpu::kMostLevels));
+  const bool has_bytes = !texture.bytes(0).empty();
+  for (int level = 0; level < levels; ++level) {
+    const int width = texture.level_width(level);
+    const int height = texture.level_height(level);
+    words[std::size_t(level)] = texels;
+    texels += std::uint32_t(width) * std::uint32_t(height);
+    if (!has_bytes) {
+      for (int y = 0; y < height; ++y) {
+        for (int x = 0; x < width; ++x) {
+          const Rgba texel = texture.texel(level, x, y);
+          add_floats(words, {texel.data(), 4});
+        }
+      }
+      continue;
+    }
+    const auto channels = std::size_t(texture.channels());
+    const std::span<const std::uint8_t> bytes = texture.bytes(level);
+    for (std::size_t at = 0; at < bytes.size(); at += channels) {
+      // Grey is repeated, alpha is 1; see MipTexture::texel().
+      const std::uint32_t red = bytes[at];
+      const std::uint32_t green = channels < 3 ? red : bytes[at + 1];
+      const std::uint32_t blue = channels < 3 ? red : bytes[at + 2];
+      const std::uint32_t alpha =
+          channels == 2 ? bytes[at + 1] : (channels == 4 ? bytes[at + 3] : 255u);
+      words.push_back(red | green << 8 | blue << 16 | alpha << 24);
+    }
+  }
+  return words;
+}
+
+/// See sample_dome() of lights.glsl.
+std::vector<std::uint32_t> words_of(const DomeTexture& dome) {
+  constexpr std::size_t kWords = 5;
+  std::vector<std::uint32_t> words(kWords * dome.patches().size());
+  for (std::size_t i = 0; i < dome.patches().size(); ++i) {
+    const SquareDistribution& patch = dome.patches()[i];
+    words[kWords * i] = std::uint32_t(patch.width());
+    words[kWords * i + 1] = std::uint32_t(patch.height());
+    words[kWords * i + 2] = std::uint32_t(words.size());
+    add_floats(words, patch.weights());
+    words[kWords * i + 3] = std::uint32_t(words.size());
+    add_floats(words, patch.row_sums());
+    words[kWords * i + 4] = std::uint32_t(words.size());
+    add_floats(words, patch.within_row());
+  }
+  return words;
+}
+
+/// See sky_cell() of lights.glsl.
+std::vector<std::uint32_t> words_of(const SkyGrid& grid) {
+  std::vector<std::uint32_t> words;
+  add_floats(words, {grid.low().data(), 3});
+  add_floats(words, {grid.cells_per_metre().data(), 3});
+  std::uint32_t cells = 1;
+  for (const int count : grid.counts()) {
+    words.push_back(std::uint32_t(count));
+    cells *= std::uint32_t(count);
+  }
+  for (std::uint32_t cell = 0; cell < cells; ++cell) {
+    words.push_back(bits(grid.power(cell)));
+    add_floats(words, grid.borders(cell));
+  }
+  return words;
+}
+
+/// See tree_score() of lights.glsl.
+std::vector<std::uint32_t> words_of(const LightTree& tree) {
+  std::vector<std::uint32_t> words;
+  for (const LightTree::Block& b : tree.blocks()) {
+    for (const auto* lanes : {&b.x, &b.y, &b.z, &b.radius, &b.power, &b.direction_x, &b.direction_y,
+                              &b.direction_z, &b.depth, &b.slope, &b.base, &b.spread, &b.behind}) {
+      add_floats(words, *lanes);
+    }
+    for (const std::int32_t child : b.child) words.push_back(std::uint32_t(child));
+    words.insert(words.end(), {b.count, b.parent, b.lane_of_parent, 0u});
+  }
+  return words;
+}
+
+gpu::Rows rows_of(const Eigen::Matrix3f& linear, const Vec3f& translation) {
+  gpu::Rows rows;
+  for (int k = 0; k < 3; ++k) {
+    rows[std::size_t(k)] = {linear(k, 0), linear(k, 1), linear(k, 2), translation[k]};
+  }
+  return rows;
+}
+
+std::array<Vec3f, 3> rows_of(const Eigen::Matrix3f& matrix) {
+  return {matrix.row(0).transpose(), matrix.row(1).transpose(), matrix.row(2).transpose()};
+}
+
+/// Of all places that an instance comes to while the shutter is open.
+TreeBox box_of(const MeshInstance& instance, double window) {
+  Aabb bounds = instance.bounds;
+  if (instance.motion) {
+    const RigidMotion& motion = instance.motion->motion;
+    const double half = 0.5 * window;
+    Aabb swept;
+    if (motion.angular.norm() > 0.0) {
+      double radius = 0.0;
+      for (int i = 0; i < 8; ++i) {
+        radius = std::max(radius, (bounds.corner(i) - motion.centre).norm());
+      }
+      for (const double side : {-1.0, 1.0}) {
+        const Vec3 centre = motion.centre + side * half * motion.linear;
+        swept.add(Vec3(centre - Vec3::Constant(radius)));
+        swept.add(Vec3(centre + Vec3::Constant(radius)));
+      }
+    } else {
+      for (const double side : {-1.0, 1.0}) {
+        swept.add(Vec3(bounds.min + side * half * motion.linear));
+        swept.add(Vec3(bounds.max + side * half * motion.linear));
+      }
+    }
+    bounds = swept;
+  }
+  // Rays meet triangles in the space of the mesh: rounding may put them beside the box.
+  const float margin = 1e-6f * float(bounds.min.cwiseAbs().cwiseMax(bounds.max.cwiseAbs()).sum());
+  TreeBox box;
+  box.add(Vec3f(bounds.min.cast<float>() - Vec3f::Constant(margin)));
+  box.add(Vec3f(bounds.max.cast<float>() + Vec3f::Constant(margin)));
+  return box;
+}
+
+}  // namespace
+
+class GpuScene::Blob {
+ public:
+  /// Where the values begin.
+  template <class Value>
+  std::size_t add(std::span<const Value> values) {
+    const std::size_t begin = (bytes_.size() + 15) / 16 * 16;
+    bytes_.resize(begin + values.size_bytes());
+    if (!values.empty()) {
+      std::memcpy(&bytes_[begin], static_cast<const void*>(values.data()), values.size_bytes());
+    }
+    return begin;
+  }
+  template <class Value>
+  std::size_t add(const std::vector<Value>& values) {
+    return add(std::span<const Value>(values));
+  }
+  std::span<const std::byte> bytes() const { return bytes_; }
+
+ private:
+  std::vector<std::byte> bytes_;
+};
+
+struct GpuScene::Parts {
+  gpu::Address base = 0;
+  std::map<const LayerTable*, std::size_t> layers;
+  std::map<const GlassTable*, std::size_t> glasses;
+};
+
+void GpuScene::take(const RenderScene& scene) {
+  const bool has_same_shapes = shape_revision_ == scene.shape_revision();
+  if (has_same_shapes && pose_revision_ == scene.pose_revision()) return;
+  // Set at the end: what an error leaves undone is done by the next call.
+  shape_revision_ = 0;
+  if (!has_same_shapes) {
+    take_meshes(scene);
+    take_textures(scene);
+  }
+  take_skies(scene.lights());
+  take_tables(scene);
+  pose_revision_ = scene.pose_revision();
+  shape_revision_ = scene.shape_revision();
+}
+
+VulkanBuffer GpuScene::upload(std::span<const std::byte> bytes, const char* what) const {
+  VulkanBuffer buffer(device_, bytes.size(), VulkanBuffer::Place::Device, what);
+  device_.upload(bytes, buffer, 0);
+  return buffer;
+}
+
+void GpuScene::upload(std::span<const std::byte> bytes, VulkanBuffer& buffer,
+                      const char* what) const {
+  if (buffer.size() < bytes.size()) {
+    buffer = VulkanBuffer();
+    buffer = VulkanBuffer(device_, bytes.size(), VulkanBuffer::Place::Device, what);
+  }
+  device_.upload(bytes, buffer, 0);
+}
+
+void GpuScene::take_meshes(const RenderScene& scene) {
+  std::set<const ShadingMesh*> used;
+  std::vector<std::shared_ptr<const ShadingMesh>> missing;
+  for (const RenderScene::UsedMesh& mesh : scene.meshes()) {
+    used.insert(mesh.shading.get());
+    if (!meshes_.contains(mesh.shading.get())) missing.push_back(mesh.shading);
+  }
+  std::erase_if(meshes_, [&](const auto& entry) { return !used.contains(entry.first); });
+  std::vector<MeshBytes> made(missing.size());
+  host_.parallel_for(missing.size(), [&](std::size_t i) { made[i] = bytes_of(*missing[i]); });
+  for (std::size_t i = 0; i < missing.size(); ++i) {
+    const ShadingMesh& mesh = *missing[i];
+    const MeshBytes bytes = std::move(made[i]);
+    Blob blob;
+    const std::size_t nodes = blob.add(bytes.tree.nodes);
+    const std::size_t triangles = blob.add(bytes.triangles);
+    const std::size_t shading = blob.add(mesh.triangles());
+    const std::size_t uvs = blob.add(bytes.uvs);
+    const std::size_t colors = blob.add(bytes.colors);
+    MeshOnDevice on_device{missing[i], upload(blob.bytes(), "a mesh and its tree"), {}};
+    const gpu::Address base = on_device.buffer.address();
+    gpu::Instance& parts = on_device.parts;
+    parts.nodes = base + nodes;
+    parts.triangles = base + triangles;
+    parts.shading = base + shading;
+    parts.uvs = base + uvs;
+    parts.colors = base + colors;
+    parts.flags = (mesh.has_normals() ? gpu::kHasNormals : 0u) |
+                  (bytes.uvs.empty() ? 0u : gpu::kHasUvs) |
+                  (bytes.colors.empty() ? 0u : gpu::kHasColors) |
+                  (mesh.source().is_double_sided ? gpu::kDoubleSided : 0u);
+    meshes_.emplace(missing[i].get(), std::move(on_device));
+  }
+}
+
+void GpuScene::take_textures(const RenderScene& scene) {
+  std::map<std::uint64_t, const MipTexture*> used;
+  for (const MeshInstance& instance : scene.instances()) {
+    for (const ShadingMaterial* m : instance.materials) {
+      for (const TextureSlot* slot :
+           {&m->base_color, &m->metallic, &m->roughness, &m->normal, &m->opacity, &m->emission}) {
+        if (*slot) used.emplace(slot->texture->number(), slot->texture);
+      }
+    }
+  }
+  for (const LightTable::Record& light : scene.lights().records()) {
+    if (light.texture) used.emplace(light.texture->image().number(), &light.texture->image());
+  }
+  std::erase_if(textures_, [&](const auto& entry) { return !used.contains(entry.first); });
+  for (const auto& [number, texture] : used) {
+    if (textures_.contains(number)) continue;
+    const std::vector<std::uint32_t> words = words_of(*texture);
+    TextureOnDevice on_device{upload(std::as_bytes(std::span(words)), "a texture"), {}, 0};
+    on_device.record.texels = on_device.buffer.address();
+    on_device.record.width = texture->width();
+    on_device.record.height = texture->height();
+    on_device.record.level_count =
+        std::min(std::uint32_t(texture->level_count()), gpu::kMostLevels);
+    on_device.record.kind = texture->bytes(0).empty() ? gpu::kFloats
+                            : texture->is_srgb()      ? gpu::kSrgbBytes
+                                                      : gpu::kLinearBytes;
+    textures_.emplace(number, std::move(on_device));
+  }
+  std::uint32_t place = 0;
+  for (auto& [number, texture] : textures_) texture.number = place++;
+}
+
+void GpuScene::take_skies(const LightTable& lights) {
+  std::set<const void*> used;
+  const auto take = [&](const auto& source) {
+    used.insert(source.get());
+    if (skies_.contains(source.get())) return;
+    const std::vector<std::uint32_t> words = words_of(*source);
+    skies_.emplace(source.get(),
+                   WordsOnDevice{source, upload(std::as_bytes(std::span(words)), "a sky")});
+  };
+  for (const LightTable::Record& light : lights.records()) {
+    if (light.shape != LightShape::Dome) continue;
+    take(light.texture);
+    take(light.sky);
+  }
+  std::erase_if(skies_, [&](const auto& entry) { return !used.contains(entry.first); });
+}
+
+gpu::Slot GpuScene::slot_of(const TextureSlot& slot) const {
+  gpu::Slot result{};
+  result.texture = gpu::kNone;
+  if (!slot) return result;
+  const TextureInput& input = *slot.input;
+  result.scale = input.scale;
+  result.bias = input.bias;
+  for (int k = 0; k < 3; ++k) {
+    result.map_u[std::size_t(k)] = input.uv_from_mesh_uv(0, k);
+    result.map_v[std::size_t(k)] = input.uv_from_mesh_uv(1, k);
+  }
+  result.texture = textures_.at(slot.texture->number()).number;
+  result.wrap_u = std::uint32_t(input.wrap_u);
+  result.wrap_v = std::uint32_t(input.wrap_v);
+  result.channel = std::uint32_t(input.channel);
+  return result;
+}
+
+gpu::Surface GpuScene::surface_of(const SurfaceBsdf& surface, const Parts& parts) const {
+  gpu::Surface result;
+  if (surface.table) {
+    result.layer = parts.base + parts.layers.at(surface.table);
+    result.layer_rows = std::uint32_t(surface.table->means().size());
+  }
+  if (surface.glass) {
+    result.glass = parts.base + parts.glasses.at(surface.glass);
+    result.glass_rows = std::uint32_t(surface.glass->rows());
+    result.eta = surface.glass->eta();
+    result.has_glass = 1;
+  }
+  result.base = surface.base;
+  result.metallic = surface.metallic;
+  result.transmission = surface.transmission;
+  result.alpha = surface.alpha;
+  result.f0 = surface.layers.f0;
+  result.specular = surface.layers.specular;
+  result.coat = surface.layers.coat;
+  result.coat_alpha = surface.layers.coat_alpha;
+  return result;
+}
+
+gpu::Material GpuScene::material_of(const ShadingMaterial& material, const Parts& parts) const {
+  const Material& m = *material.source;
+  gpu::Material result;
+  result.surfaces = {surface_of(material.sharp, parts), surface_of(material.soft, parts)};
+  result.slots = {slot_of(material.base_color), slot_of(material.metallic),
+                  slot_of(material.roughness),  slot_of(material.normal),
+                  slot_of(material.opacity),    slot_of(material.emission)};
+  result.base_color = m.base_color;
+  result.emission = m.emission;
+  result.opacity = m.opacity;
+  result.opacity_threshold = m.opacity_threshold;
+  result.ior = m.ior;
+  result.transmission = m.transmission;
+  result.metallic = m.metallic;
+  const auto set = [&](bool is_set, std::uint32_t flag) { result.flags |= is_set ? flag : 0u; };
+  set(material.is_thin_glass, gpu::kThinGlass);
+  set(material.is_blended, gpu::kBlended);
+  set(material.reads_uv, gpu::kReadsUv);
+  set(material.is_textured, gpu::kTextured);
+  set(material.is_cut_out, gpu::kCutOut);
+  set(material.dims_shadows, gpu::kDimsShadows);
+  set(material.emits, gpu::kEmits);
+  set(material.is_special, gpu::kSpecial);
+  set(m.is_thin_walled, gpu::kThinWalled);
+  return result;
+}
+
+gpu::Instance GpuScene::instance_of(const MeshInstance& instance, double window) const {
+  gpu::Instance result = meshes_.at(instance.shading).parts;
+  const Eigen::Matrix3f inverse = instance.linear.cast<double>().inverse().cast<float>();
+  const Vec3f back =
+      -(instance.linear.cast<double>().inverse() * instance.translation.cast<double>())
+           .cast<float>();
+  result.world_from_node = rows_of(instance.linear, instance.translation);
+  result.node_from_world = rows_of(inverse, back);
+  result.normal_from_node = rows_of(instance.normal_from_node);
+  result.material_count = std::uint32_t(instance.materials.size());
+  if (instance.is_mirrored) result.flags |= gpu::kMirrored;
+  if (!instance.triangle_lights.empty()) result.flags |= gpu::kHasLights;
+  for (const ShadingMaterial* m : instance.materials) {
+    if (m->is_cut_out) result.flags |= gpu::kCutsOut;
+    if (m->dims_shadows) result.flags |= gpu::kDims;
+  }
+  if (instance.motion && window > 0.0) {
+    const RigidMotion& motion = instance.motion->motion;
+    const double speed = motion.angular.norm();
+    result.flags |= gpu::kMoves;
+    result.centre = motion.centre.cast<float>();
+    result.linear = motion.linear.cast<float>();
+    if (speed > 0.0) result.axis = (motion.angular / speed).cast<float>();
+    result.turns_per_s = float(speed);
+  }
+  return result;
+}
+
+gpu::Light GpuScene::light_of(const LightTable::Record& light) const {
+  gpu::Light result{};
+  if (light.shape == LightShape::Dome) {
+    result.patches = skies_.at(light.texture.get()).buffer.address();
+    result.grid = skies_.at(light.sky.get()).buffer.address();
+  }
+  result.position = light.position;
+  result.axis_x = light.axis_x;
+  result.axis_y = light.axis_y;
+  result.direction = light.direction;
+  result.radiance = light.radiance;
+  result.dome_from_world = rows_of(light.dome_from_world);
+  result.radius = light.radius;
+  result.area = light.area;
+  result.power = light.power;
+  result.one_minus_cos = light.one_minus_cos;
+  result.cos_outer = light.cos_outer;
+  result.cos_inner = light.cos_inner;
+  result.shape = std::uint32_t(light.shape);
+  result.flags = (light.is_mirrored ? gpu::kLightMirrored : 0u) |
+                 (light.is_double_sided ? gpu::kLightDoubleSided : 0u) |
+                 (light.is_visible_to_camera ? gpu::kLightVisible : 0u);
+  result.texture = light.texture ? textures_.at(light.texture->image().number()).number : 0u;
+  result.instance = light.instance;
+  result.triangle_count = std::uint32_t(light.triangles.size());
+  return result;
+}
+
+void GpuScene::take_tables(const RenderScene& scene) {
+  const LightTable& table = scene.lights();
+  std::map<const ShadingMaterial*, std::uint32_t> material_numbers;
+  std::vector<const ShadingMaterial*> used;
+  std::vector<std::uint32_t> slot_materials;
+  for (const MeshInstance& instance : scene.instances()) {
+    for (const ShadingMaterial* m : instance.materials) {
+      const auto [entry, is_new] = material_numbers.emplace(m, std::uint32_t(used.size()));
+      if (is_new) used.push_back(m);
+      slot_materials.push_back(entry->second);
+    }
+  }
+
+  // What the tables below point to.
+  Blob blob;
+  Parts parts;
+  for (const ShadingMaterial* m : used) {
+    for (const SurfaceBsdf* s : {&m->sharp, &m->soft}) {
+      if (s->table && !parts.layers.contains(s->table)) {
+        std::vector<std::array<float, 4>> columns;
+        for (const LayerTable::Node& n : s->table->nodes())
+          columns.push_back({n[0], n[1], n[2], n[3]});
+        for (const LayerTable::Means& mean : s->table->means()) {
+          columns.push_back({mean.kept, mean.plastic, mean.missing, mean.above});
+        }
+        parts.layers.emplace(s->table, blob.add(columns));
+      }
+      if (s->glass && !parts.glasses.contains(s->glass)) {
+        std::vector<float> values = s->glass->directional();
+        values.insert(values.end(), s->glass->means().begin(), s->glass->means().end());
+        parts.glasses.emplace(s->glass, blob.add(values));
+      }
+    }
+  }
+  std::vector<std::size_t> triangle_lights;
+  for (const MeshInstance& instance : scene.instances()) {
+    triangle_lights.push_back(
+        instance.triangle_lights.empty() ? 0 : blob.add(instance.triangle_lights));
+  }
+  std::vector<std::size_t> lamp_triangles;
+  for (const LightTable::Record& light : table.records()) {
+    std::vector<TriangleColumns> columns;
+    for (std::size_t i = 0; i < light.triangles.size(); ++i) {
+      const EmittingTriangles::Triangle& t = light.triangles[i];
+      columns.push_back(columns_of(t.a, t.index, t.ab, light.cumulative_area[i], t.ac));
+    }
+    lamp_triangles.push_back(blob.add(columns));
+  }
+  std::vector<float> linear_from_srgb_bytes;
+  for (int i = 0; i < 256; ++i)
+    linear_from_srgb_bytes.push_back(linear_from_srgb(float(i) / 255.0f));
+  const std::size_t linear = blob.add(linear_from_srgb_bytes);
+  upload(blob.bytes(), parts_, "tables of materials and lamps");
+  parts.base = parts_.address();
+
+  std::vector<gpu::Instance> instances;
+  std::vector<TreeBox> boxes;
+  std::uint32_t first_material = 0;
+  for (std::size_t i = 0; i < scene.instances().size(); ++i) {
+    const MeshInstance& instance = scene.instances()[i];
+    gpu::Instance& made = instances.emplace_back(instance_of(instance, scene.window()));
+    made.first_material = first_material;
+    made.triangle_lights = parts.base + triangle_lights[i];
+    first_material += made.material_count;
+    boxes.push_back(box_of(instance, scene.window()));
+  }
+  std::vector<gpu::Material> materials;
+  for (const ShadingMaterial* m : used) materials.push_back(material_of(*m, parts));
+  std::vector<gpu::Texture> textures;
+  for (const auto& [number, texture] : textures_) textures.push_back(texture.record);
+  std::vector<gpu::Light> lights;
+  for (std::size_t i = 0; i < table.records().size(); ++i) {
+    lights.push_back(light_of(table.records()[i]));
+    lights.back().triangles = parts.base + lamp_triangles[i];
+  }
+  std::vector<std::uint32_t> places;
+  for (const LightTree::Place& place : table.tree().places()) {
+    places.insert(places.end(), {place.block, place.lane});
+  }
+
+  Blob tables;
+  gpu::World world;
+  world.tree = tables.add(tree_of_single(boxes).nodes);
+  world.instances = tables.add(instances);
+  world.slot_materials = tables.add(slot_materials);
+  world.materials = tables.add(materials);
+  world.textures = tables.add(textures);
+  world.lights = tables.add(lights);
+  world.light_blocks = tables.add(words_of(table.tree()));
+  world.light_places = tables.add(places);
+  world.light_bodies = tables.add(table.bodies());
+  world.light_order = tables.add(table.order());
+  world.surroundings = tables.add(table.surroundings());
+  world.entry_lights = tables.add(table.entry_lights());
+  world.light_shapes = tables.add(table.shapes());
+  upload(tables.bytes(), tables_, "tables of the scene");
+  for (gpu::Address* address :
+       {&world.tree, &world.instances, &world.slot_materials, &world.materials, &world.textures,
+        &world.lights, &world.light_blocks, &world.light_places, &world.light_bodies,
+        &world.light_order, &world.surroundings, &world.entry_lights, &world.light_shapes}) {
+    *address += tables_.address();
+  }
+  world.linear_from_srgb = parts.base + linear;
+  world.instance_count = std::uint32_t(instances.size());
+  world.light_count = std::uint32_t(lights.size());
+  world.root_count = table.tree().root_count();
+  world.entry_count = std::uint32_t(table.entry_lights().size());
+  world.shape_count = std::uint32_t(table.shapes().size());
+  world.surroundings_count = std::uint32_t(table.surroundings().size());
+  world.block_count = std::uint32_t(table.tree().blocks().size());
+  world.stacks_lobes = scene.stacks_lobes() ? 1 : 0;
+  world.window = float(scene.window());
+  upload(std::as_bytes(std::span(&world, 1)), world_, "tables of the scene");
+}
+
+}  // namespace diorama

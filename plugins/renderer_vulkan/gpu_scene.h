@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "diorama/host.h"
+#include "gpu_world.h"
+#include "renderer_support/render_scene.h"
+#include "vulkan_device.h"
+
+namespace diorama {
+
+/// A scene in a device's memory. take() is called for every change and transfers what is new:
+/// meshes with their trees and textures stay as long as the scene uses them.
+class GpuScene {
+ public:
+  GpuScene(const VulkanDevice& device, Host& host) : device_(device), host_(host) {}
+
+  void take(const RenderScene& scene);
+
+  gpu::Address world() const { return world_.address(); }
+
+ private:
+  struct MeshOnDevice {
+    std::shared_ptr<const ShadingMesh> source;
+    VulkanBuffer buffer;
+    gpu::Instance parts;  ///< Addresses and flags of the mesh.
+  };
+  struct TextureOnDevice {
+    VulkanBuffer buffer;
+    gpu::Texture record;
+    std::uint32_t number = 0;  ///< In the table of this scene.
+  };
+  struct WordsOnDevice {
+    std::shared_ptr<const void> source;
+    VulkanBuffer buffer;
+  };
+  /// Bytes that go to the device together.
+  class Blob;
+  /// Where albedo tables and the triangles of lamps stand.
+  struct Parts;
+
+  void take_meshes(const RenderScene& scene);
+  void take_textures(const RenderScene& scene);
+  void take_skies(const LightTable& lights);
+  VulkanBuffer upload(std::span<const std::byte> bytes, const char* what) const;
+  /// As above, into a buffer that is made anew only where it is too small.
+  void upload(std::span<const std::byte> bytes, VulkanBuffer& buffer, const char* what) const;
+  gpu::Slot slot_of(const TextureSlot& slot) const;
+  gpu::Surface surface_of(const SurfaceBsdf& surface, const Parts& parts) const;
+  gpu::Material material_of(const ShadingMaterial& material, const Parts& parts) const;
+  gpu::Instance instance_of(const MeshInstance& instance, double window) const;
+  gpu::Light light_of(const LightTable::Record& light) const;
+  void take_tables(const RenderScene& scene);
+
+  const VulkanDevice& device_;
+  Host& host_;
+  std::uint64_t pose_revision_ = 0;
+  std::uint64_t shape_revision_ = 0;
+  std::map<const ShadingMesh*, MeshOnDevice> meshes_;
+  std::map<std::uint64_t, TextureOnDevice> textures_;  ///< By MipTexture::number().
+  std::map<const void*, WordsOnDevice> skies_;         ///< Domes' patches and their grids.
+  VulkanBuffer parts_;
+  VulkanBuffer tables_;
+  VulkanBuffer world_;
+};
+
+}  // namespace diorama

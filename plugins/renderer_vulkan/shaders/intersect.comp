@@ -1,0 +1,30 @@
+#version 460
+// SPDX-License-Identifier: Apache-2.0
+// Finds what the rays of all paths under way meet first.
+#extension GL_GOOGLE_include_directive : require
+layout(local_size_x = 64) in;
+#include "world.glsl"
+#include "job.glsl"
+#include "sampling.glsl"
+#include "textures.glsl"
+#include "surfaces.glsl"
+#include "rays.glsl"
+
+Hit closest(vec3 origin, vec3 direction, float t_min, float t_max, float time) {
+  Hit hit = Hit(kInfinite, 0.0, 0.0, kNone, 0u);
+  TRAVERSE(
+      if ((flags & kCutsOut) != 0u && is_absent(instance, number, u, v)) continue;
+      t_max = t;
+      hit = Hit(t, u, v, instance, triangle);)
+  return hit;
+}
+
+void main() {
+  if (gl_GlobalInvocationID.x >= job.counters.path_count) return;
+  const uint path = job.queues[queue].v[gl_GlobalInvocationID.x];
+  const vec4 range = STATE(kFootprint, path);
+  const Hit hit = closest(STATE(kOrigin, path).xyz, STATE(kDirection, path).xyz, range.z, range.w,
+                          STATE(kSampler, path).w);
+  job.hits.v[path] = vec4(hit.t, hit.u, hit.v, uintBitsToFloat(hit.instance));
+  job.hit_triangles.v[path] = hit.triangle;
+}

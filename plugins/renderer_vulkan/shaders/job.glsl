@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+// What paths carry from kernel to kernel, by columns: an entry of every column per path.
+layout(buffer_reference, scalar, buffer_reference_align = 16) buffer Columns { vec4 v[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Queue { uint v[]; };
+
+// 64 paths: one sample of each pixel of a block.
+struct SampleSlot {
+  uint x;
+  uint y;
+  uint columns;
+  uint rows;
+  uint key;
+  uint sample_index;
+};
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer SampleSlots { SampleSlot v[]; };
+
+// Slots of one block that stand side by side.
+struct SlotRange {
+  uint first;
+  uint count;
+};
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer SlotRanges { SlotRange v[]; };
+
+struct PixelSum {
+  vec3 seen;
+  vec3 scattered;
+  vec3 albedo;
+  vec3 normal;
+  vec3 position;
+  float mean;     // of the luminance of what was scattered ...
+  float squares;  // ... and the sum of its squared deviations
+  float brightest;
+  uint count;
+  uint surfaces;
+};
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer PixelSums { PixelSum v[]; };
+
+// Counts and the arguments of the next dispatches.
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Counters {
+  uint paths_groups[3];
+  uint shadow_groups[3];
+  uint path_count;    // of the queue that is worked on
+  uint next_count;    // of the queue that is filled
+  uint shadow_count;  // likewise
+  uint ready_shadow_count;  // of the queue of shadow rays that is worked on
+  uint is_over_limit;  // a kernel would have looped more often than the device can
+  uint rays;
+  uint shadow_rays;
+};
+
+layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Job {
+  Counters counters;
+  SampleSlots slots;
+  SlotRanges ranges;
+  Columns state;
+  Columns results;
+  Columns hits;
+  Queue hit_triangles;
+  Columns shadows;
+  Queue queues[2];
+  Columns camera_rays;  // three columns, where the lens is no pinhole
+  PixelSums sums;
+  uint capacity;  // of the columns
+  uint width;
+  uint sample_bits;
+  uint slot_count;
+  uint has_camera_rays;
+  uint starts_at_centres;
+  uint iteration_limit;
+  int max_bounces;
+  float clamp_to;
+  uint has_caustics;
+  float indirect_share;
+  float pixel_angle;
+  vec3 camera;
+  vec3 towards;
+  vec3 per_column;
+  vec3 per_row;
+  float near;
+  float far;
+};
+
+layout(push_constant, scalar) uniform Push {
+  World world;
+  Job job;
+  uint queue;  // that is worked on
+};
+
+const uint kGroup = 64u;
+
+// Columns of the state.
+const uint kOrigin = 0u;      // and flags
+const uint kDirection = 1u;   // and metres since the last vertex
+const uint kThroughput = 2u;  // and what was left behind the first surface
+const uint kLastPosition = 3u;  // and its total score
+const uint kLastNormal = 4u;    // and the density of the direction from there
+const uint kFootprint = 5u;     // width, spread, and the ray's range
+const uint kSampler = 6u;       // key, dimension, place, and the time
+const uint kStateColumns = 7u;
+
+const uint kIsCameraRay = 1u << 16;
+const uint kHasScattered = 1u << 17;
+const uint kHidesLights = 1u << 18;
+const uint kLastTwoSided = 1u << 19;
+const uint kHasSurface = 1u << 20;
+
+#define STATE(column, path) job.state.v[(column) * job.capacity + (path)]
+#define RESULT(column, path) job.results.v[(column) * job.capacity + (path)]

@@ -1,0 +1,46 @@
+#version 460
+// SPDX-License-Identifier: Apache-2.0
+// Adds the light that arrives along the rays to lights.
+#extension GL_GOOGLE_include_directive : require
+layout(local_size_x = 64) in;
+#include "world.glsl"
+#include "job.glsl"
+#include "sampling.glsl"
+#include "textures.glsl"
+#include "surfaces.glsl"
+#include "rays.glsl"
+
+vec3 transmittance(vec3 origin, vec3 direction, float t_max, float time) {
+  const float t_min = 0.0;
+  vec3 left = vec3(1.0);
+  TRAVERSE(
+      if ((flags & kDims) != 0u) {
+        const vec3 across = turned_vector(
+            instance, flags, normal_in_world(instance, cross(ab, ac)), time);
+        left *= straight_share(instance, number, u, v, across, direction,
+                               job.has_caustics == 0u);
+        if (largest(left) > 1e-4) continue;
+      }
+      left = vec3(0.0);
+      node = kEnd;
+      break;)
+  return left;
+}
+
+void main() {
+  if (gl_GlobalInvocationID.x >= job.counters.ready_shadow_count) return;
+  const uint ray = gl_GlobalInvocationID.x;
+  const vec4 from = job.shadows.v[ray];
+  const vec4 towards = job.shadows.v[job.capacity + ray];
+  const vec4 light = job.shadows.v[2u * job.capacity + ray];
+  const uint path = floatBitsToUint(towards.w) & 0x7FFFFFFFu;
+  const bool is_indirect = floatBitsToUint(towards.w) >> 31 != 0u;
+  const float time = STATE(kSampler, path).w;
+  vec3 value = light.xyz * transmittance(from.xyz, towards.xyz, from.w, time);
+  if (!(value.x + value.y + value.z < 1e20)) return;
+  if (job.clamp_to > 0.0 && is_indirect) {
+    const float l = luminance(value);
+    if (l > job.clamp_to) value *= job.clamp_to / l;
+  }
+  if (value != vec3(0.0)) RESULT(1u, path).xyz += value;
+}

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "vulkan_instance.h"
+
+namespace diorama {
+
+class VulkanDevice;
+
+/// Memory that kernels address. Belongs to a device, which outlives it.
+class VulkanBuffer {
+ public:
+  enum class Place : std::uint8_t {
+    Device,    ///< Kernels read and write it fast.
+    ToDevice,  ///< The processor writes it.
+    ToHost,    ///< The processor reads it.
+  };
+  VulkanBuffer() = default;
+  /// `what` is for the message where there is too little memory.
+  VulkanBuffer(const VulkanDevice& device, std::size_t size, Place place, const char* what);
+  ~VulkanBuffer();
+  VulkanBuffer(VulkanBuffer&& other) noexcept;
+  VulkanBuffer& operator=(VulkanBuffer&& other) noexcept;
+
+  std::size_t size() const { return size_; }
+  VkBuffer handle() const { return buffer_; }
+  VkDeviceAddress address() const { return address_; }
+  std::byte* data() const { return data_; }  ///< Null on the device.
+
+ private:
+  const VulkanDevice* device_ = nullptr;
+  VkBuffer buffer_ = VK_NULL_HANDLE;
+  VkDeviceMemory memory_ = VK_NULL_HANDLE;
+  std::size_t size_ = 0;
+  VkDeviceAddress address_ = 0;
+  std::byte* data_ = nullptr;
+};
+
+/// A compiled shader whose only input are its push constants.
+class VulkanKernel {
+ public:
+  VulkanKernel(const VulkanDevice& device, std::span<const std::uint32_t> code);
+  ~VulkanKernel();
+  VulkanKernel(const VulkanKernel&) = delete;
+  VulkanKernel& operator=(const VulkanKernel&) = delete;
+  VkPipeline pipeline() const { return pipeline_; }
+
+ private:
+  const VulkanDevice& device_;
+  VkPipeline pipeline_ = VK_NULL_HANDLE;
+};
+
+/// Commands under way to the device.
+class VulkanCommands {
+ public:
+  VulkanCommands(const VulkanDevice& device, VkCommandBuffer commands)
+      : device_(device), commands_(commands) {}
+
+  /// Constants must fit VulkanDevice::kMostConstants.
+  template <class Constants>
+  void constants(const Constants& values) {
+    push(&values, sizeof(values));
+  }
+  void dispatch(const VulkanKernel& kernel, std::uint32_t groups);
+  /// The numbers of groups are read from the buffer.
+  void dispatch(const VulkanKernel& kernel, const VulkanBuffer& groups, std::size_t offset);
+  void copy(const VulkanBuffer& from, std::size_t from_offset, const VulkanBuffer& to,
+            std::size_t to_offset, std::size_t size);
+  void zero(const VulkanBuffer& buffer, std::size_t size);
+  /// What comes after sees what came before.
+  void barrier();
+
+ private:
+  void push(const void* values, std::size_t size);
+  const VulkanDevice& device_;
+  VkCommandBuffer commands_;
+};
+
+/// A device of the machine with its one queue. Used by one thread at a time.
+class VulkanDevice {
+ public:
+  static constexpr std::size_t kMostConstants = 128;
+
+  explicit VulkanDevice(int number);
+  ~VulkanDevice();
+  VulkanDevice(const VulkanDevice&) = delete;
+  VulkanDevice& operator=(const VulkanDevice&) = delete;
+
+  const VulkanDeviceInfo& info() const { return info_; }
+  const VulkanDeviceFunctions& functions() const { return functions_; }
+  VkDevice handle() const { return device_; }
+  VkPipelineLayout layout() const { return layout_; }
+  /// Bytes that buffers hold now.
+  std::uint64_t held() const { return held_; }
+
+  /// Records and runs commands, and waits until they are done.
+  void run(const std::function<void(VulkanCommands&)>& record) const;
+  /// Puts bytes into a buffer on the device.
+  void upload(std::span<const std::byte> bytes, const VulkanBuffer& to, std::size_t offset) const;
+  /// And back.
+  void download(const VulkanBuffer& from, std::size_t offset, std::span<std::byte> bytes) const;
+
+  /// Throws unless the call went well. `action`: "run a kernel".
+  void check(VkResult result, const char* action) const;
+
+ private:
+  friend class VulkanBuffer;
+  std::uint32_t memory_type(std::uint32_t allowed, VkMemoryPropertyFlags wanted,
+                            VkMemoryPropertyFlags liked) const;
+  [[noreturn]] void fail_for_memory(std::size_t size, const char* what) const;
+  void create_queue();
+  void destroy();
+
+  VulkanInstance instance_;
+  const VulkanDeviceInfo& info_;
+  int number_;
+  VulkanDeviceFunctions functions_;
+  VkDevice device_ = VK_NULL_HANDLE;
+  VkQueue queue_ = VK_NULL_HANDLE;
+  VkPipelineLayout layout_ = VK_NULL_HANDLE;
+  VkCommandPool pool_ = VK_NULL_HANDLE;
+  VkCommandBuffer commands_ = VK_NULL_HANDLE;
+  VkFence fence_ = VK_NULL_HANDLE;
+  VkPhysicalDeviceMemoryProperties memory_{};
+  mutable std::uint64_t held_ = 0;
+  std::unique_ptr<VulkanBuffer> staging_;
+  std::unique_ptr<VulkanBuffer> returning_;
+};
+
+}  // namespace diorama

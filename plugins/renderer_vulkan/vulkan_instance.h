@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "vulkan_functions.h"
+
+namespace diorama {
+
+/// A device as the machine's Vulkan tells of it.
+struct VulkanDeviceInfo {
+  VkPhysicalDevice handle = VK_NULL_HANDLE;
+  std::string name;
+  std::string driver;         ///< And its version.
+  std::string api;            ///< "1.3.230"
+  bool is_processor = false;  ///< A driver that computes on the machine's processor.
+  std::uint64_t memory = 0;   ///< Bytes of its largest heap of its own.
+  std::uint32_t queue_family = 0;
+  std::vector<std::string> missing;  ///< What path tracing needs and it does not have.
+};
+
+/// The machine's Vulkan, found at run time.
+class VulkanInstance {
+ public:
+  /// Throws Error(Plugin) where there is no loader or no driver.
+  VulkanInstance();
+  ~VulkanInstance();
+  VulkanInstance(const VulkanInstance&) = delete;
+  VulkanInstance& operator=(const VulkanInstance&) = delete;
+
+  const std::vector<VulkanDeviceInfo>& devices() const { return devices_; }
+  /// Throws Error(Config) where there is no such device, Error(Plugin) where it lacks something.
+  const VulkanDeviceInfo& device(int number) const;
+  const VulkanInstanceFunctions& functions() const { return functions_; }
+
+ private:
+  struct Unload {
+    void operator()(void* library) const;
+  };
+  VulkanDeviceInfo describe(VkPhysicalDevice device) const;
+  std::string list_of_devices() const;
+
+  std::unique_ptr<void, Unload> library_;
+  VulkanInstanceFunctions functions_;
+  VkInstance instance_ = VK_NULL_HANDLE;
+  std::vector<VulkanDeviceInfo> devices_;
+};
+
+/// One line: name, driver, memory, and what is missing.
+std::string description_of(const VulkanDeviceInfo& device);
+
+/// What a call's failure means, in words.
+std::string words_for(VkResult result);
+
+}  // namespace diorama

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "vulkan_renderer.h"
+
+#include <chrono>
+#include <utility>
+
+namespace diorama {
+
+void VulkanRenderer::Params::visit(ParamVisitor& v) {
+  v.param("device", device,
+          {"Which of the machine's Vulkan devices, counted from 0 as the driver lists them.", "", 0,
+           1023});
+  PictureParams::visit(v);
+}
+
+VulkanRenderer::VulkanRenderer(const Params& params, Host& host)
+    : PathRenderer(params, host),
+      device_(params.device),
+      scene_(device_, host),
+      tracer_(device_, host) {
+  host.log(LogLevel::Info, "paths are traced by " + description_of(device_.info()));
+}
+
+void VulkanRenderer::prepare_paths() { scene_.take(meshes().render_scene()); }
+
+Film VulkanRenderer::trace(const View& view, const PathSettings& settings, SamplePlan& plan) {
+  using Clock = std::chrono::steady_clock;
+  const int width = view.camera().width;
+  const int height = view.camera().height;
+  const auto start = Clock::now();
+  tracer_.begin(view, settings, scene_.world(), meshes().window());
+  Image<PixelSum> sums;
+  while (true) {
+    const double elapsed = std::chrono::duration<double>(Clock::now() - start).count();
+    const std::vector<TraceJob> jobs = plan.next_round(sums, elapsed);
+    if (jobs.empty()) break;
+    const GpuPathTracer::Counts own = tracer_.trace(jobs);
+    counts().rays += own.rays;
+    counts().shadow_rays += own.shadow_rays;
+    for (const TraceJob& job : jobs) counts().paths += job.path_count();
+    sums = tracer_.sums();
+    if (plan.has_one_round()) break;
+  }
+  Film film(width, height);
+  host().parallel_for(std::size_t(height), [&](std::size_t row) {
+    for (int x = 0; x < width; ++x) film.at(x, int(row)) = sums.at(x, int(row)).mean();
+  });
+  return film;
+}
+
+}  // namespace diorama

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+
+#include "embree_support/path_renderer.h"
+#include "gpu_path_tracer.h"
+#include "gpu_scene.h"
+#include "vulkan_device.h"
+
+namespace diorama {
+
+/// The project's path tracer on GPUs; see README.md beside this file.
+class VulkanRenderer final : public PathRenderer {
+ public:
+  struct Params : PictureParams {
+    int device = 0;
+
+    void visit(ParamVisitor& v);
+  };
+
+  VulkanRenderer(const Params& params, Host& host);
+
+ private:
+  void prepare_paths() override;
+  Film trace(const View& view, const PathSettings& settings, SamplePlan& plan) override;
+  std::size_t traced_bytes_per_pixel() const override { return 2 * sizeof(PixelSum); }
+
+  VulkanDevice device_;
+  GpuScene scene_;
+  GpuPathTracer tracer_;
+};
+
+}  // namespace diorama

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cstdlib>
+#include <string>
+
+#include "diorama/error.h"
+#include "plugins/renderer_embree/test_world.h"
+#include "support/catch.h"
+#include "support/render_host/render_host.h"
+#include "vulkan_for_tests.h"
+#include "vulkan_renderer.h"
+
+namespace diorama {
+namespace {
+
+std::string error_of(const VulkanRenderer::Params& params) {
+  test::RenderHost host(1);
+  try {
+    VulkanRenderer(params, host);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+/// A variable of the environment while it lives.
+class Environment {
+ public:
+  Environment(const char* name, const char* value) : name_(name) {
+    const char* before = std::getenv(name);
+    if (before) before_ = before;
+    had_ = before != nullptr;
+    setenv(name, value, 1);
+  }
+  ~Environment() {
+    if (had_) {
+      setenv(name_, before_.c_str(), 1);
+    } else {
+      unsetenv(name_);
+    }
+  }
+  Environment(const Environment&) = delete;
+  Environment& operator=(const Environment&) = delete;
+
+ private:
+  const char* name_;
+  std::string before_;
+  bool had_ = false;
+};
+
+}  // namespace
+
+TEST_CASE("a device that is not there is named with those that are", "[vulkan]") {
+  if (!test::has_vulkan_device()) return;
+  VulkanRenderer::Params params;
+  params.device = 77;
+  const std::string text = error_of(params);
+  CHECK(text.starts_with("device: there is no Vulkan device 77; this machine has 0: "));
+  CHECK(text.find(VulkanInstance().device(0).name) != std::string::npos);
+}
+
+TEST_CASE("a machine without a driver is told what to install", "[vulkan]") {
+  if (!test::has_vulkan_device()) return;
+  const Environment none("VK_ICD_FILENAMES", "/nowhere/no_icd.json");
+  const Environment none_of_new("VK_DRIVER_FILES", "/nowhere/no_icd.json");
+  const std::string text = error_of({});
+  CAPTURE(text);
+  CHECK(text.starts_with("Vulkan "));
+  CHECK(text.find("install the driver of the device, or mesa-vulkan-drivers") != std::string::npos);
+}
+
+TEST_CASE("too little memory is told with what was wanted and what there is", "[vulkan]") {
+  if (!test::has_vulkan_device()) return;
+  const VulkanDevice device(0);
+  std::string text;
+  try {
+    const VulkanBuffer buffer(device, std::size_t(1) << 50, VulkanBuffer::Place::Device, "a test");
+  } catch (const Error& error) {
+    text = error.what();
+  }
+  CAPTURE(text);
+  CHECK(text.find("has too little memory: 1073741825 MiB for a test beside") != std::string::npos);
+  CHECK(text.find("or the renderer embree") != std::string::npos);
+}
+
+TEST_CASE("what is lost with a device is told", "[vulkan]") {
+  if (!test::has_vulkan_device()) return;
+  const VulkanDevice device(0);
+  CHECK_THROWS_WITH(device.check(VK_ERROR_DEVICE_LOST, "run kernels"),
+                    Catch::Contains("failed to run kernels: the device was lost; the captures that "
+                                    "were written stay: run the job again with --resume"));
+}
+
+TEST_CASE("bytes go to the device and come back", "[vulkan]") {
+  if (!test::has_vulkan_device()) return;
+  const VulkanDevice device(0);
+  // More than fits the transfer buffer, and no multiple of anything.
+  std::vector<std::byte> bytes((std::size_t(33) << 20) + 5);
+  for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i] = std::byte((i * 2654435761u) >> 13);
+  const VulkanBuffer buffer(device, bytes.size() + 16, VulkanBuffer::Place::Device, "a test");
+  device.upload(bytes, buffer, 16);
+  std::vector<std::byte> back(bytes.size());
+  device.download(buffer, 16, back);
+  CHECK(back == bytes);
+}
+
+TEST_CASE("a device that ends long loops is found out", "[vulkan]") {
+  if (!test::has_vulkan_device()) return;
+  test::RenderHost host(1);
+  const VulkanDevice device(0);
+  const std::uint32_t limit = GpuPathTracer(device, host).iteration_limit();
+  const bool is_old_lavapipe =
+      device.info().is_processor && device.info().driver.find("Mesa 22.3") != std::string::npos;
+  // 65,535 rounds, less what is left for a kernel's small loops.
+  if (is_old_lavapipe) {
+    CHECK(limit == 65535 - 512);
+  } else {
+    CHECK(limit > 65535 - 513);
+  }
+}
+
+}  // namespace diorama
