@@ -260,6 +260,8 @@ inline void sample_lights(const LightTable& table, const LightQueries& queries,
   const std::size_t size = whole_steps(queries.count);
   samples.light = selections.light;
   std::fill_n(samples.density.begin(), size, 0.0f);
+  // Places without a light have a direction as well: loops over all of them look up tables by it.
+  for (std::size_t i = 0; i < size; ++i) samples.direction.set(i, Vec3f::Zero());
   if (table.records().empty()) return;
   const std::int32_t* shapes = table.columns().shape.data();
   std::uint32_t present = 0;

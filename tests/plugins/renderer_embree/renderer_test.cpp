@@ -117,6 +117,17 @@ TEST_CASE("nothing is seen of any object in a white furnace", "[renderer][furnac
   }
 }
 
+TEST_CASE("a scene without any light is black", "[renderer]") {
+  TestWorld world;
+  Material metal;
+  metal.metallic = 1.0f;
+  metal.roughness = 0.2f;
+  world.add("ball", make_sphere(1.0), metal);
+  world.add("floor", make_plane(5, 4), matte(0.5f), at(0, 0, -1.1));
+  const NodeId camera = world.add_camera(24, 20, 20.0, Vec3(3, -2, 1), Vec3(0.1, 0.2, -0.1));
+  for (const Vec3f& p : render(world, camera, reference(4)).pixels()) REQUIRE(p.isZero());
+}
+
 TEST_CASE("a lamp over a floor lights it by the closed form", "[renderer]") {
   TestWorld world;
   world.add("floor", make_plane(4, 5), matte(0.5f));
