@@ -8,6 +8,7 @@
 #include <optional>
 #include <set>
 
+#include "diorama/renderer.h"
 #include "framework/app/assemble.h"
 #include "framework/app/cli.h"
 
@@ -46,6 +47,7 @@ class Doctor {
     show_program();
     show_machine();
     show_plugins();
+    show_renderers();
     show_assets();
     if (problems_ == 0) {
       std::cout << "\nnothing is missing\n";
@@ -109,6 +111,40 @@ class Doctor {
     } catch (const Error& error) {
       problem(error.what());
     }
+  }
+
+  /// Starts each as a job would: only then is it known whether what it needs of the machine
+  /// (devices, drivers) is there. One that does not start is no problem where another one does.
+  void show_renderers() {
+    std::string said;
+    const auto log = [&](LogLevel level, std::string_view text) {
+      if (level == LogLevel::Info) said += ": " + std::string(text);
+    };
+    std::unique_ptr<HostServices> host;
+    try {
+      host = make_host(*registry_, global_, std::nullopt, log);
+    } catch (const Error&) {
+      return;  // show_assets() says why
+    }
+    std::cout << "renderers\n";
+    std::size_t started = 0;
+    for (const std::string& type : registry_->types(ComponentKind::Renderer)) {
+      said.clear();
+      try {
+        Value parameters = Value::make_map();
+        parameters.set("type", Value::text(type));
+        Complaints complaints;
+        const std::vector<std::string_view> known{"type"};
+        const auto renderer =
+            registry_->make<Renderer>(parameters, "renderer", known, complaints, *host);
+        complaints.raise();
+        std::cout << "  " << type << " starts" << said << "\n";
+        ++started;
+      } catch (const Error& error) {
+        std::cout << "  " << type << " does not start: " << error.what() << "\n";
+      }
+    }
+    if (started == 0) problem("no renderer starts on this machine");
   }
 
   bool has_plugin(ComponentKind kind) const {

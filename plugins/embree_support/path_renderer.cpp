@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <future>
 #include <vector>
 
 #include "renderer_support/oidn_denoiser.h"
@@ -181,15 +182,17 @@ Image<Vec3f> PathRenderer::without_noise(Film film, const View& view) {
   return denoised(std::move(film), settings, isa_, host_);
 }
 
-void PathRenderer::put_colors(Frame& frame, const RenderRequest& request, const View& view) {
-  Film film;
-  {
-    const Stopwatch watch(counts_.trace_s);
-    SamplePlan plan(view.camera().width, view.camera().height,
-                    {params_.samples, params_.error_target, params_.time_budget_s}, request.seed);
-    film = trace(view, path_settings(view), plan);
-    first_hits_ = {};
-  }
+Film PathRenderer::trace_paths(const View& view, std::uint64_t seed) {
+  const Stopwatch watch(counts_.trace_s);
+  SamplePlan plan(view.camera().width, view.camera().height,
+                  {params_.samples, params_.error_target, params_.time_budget_s}, seed);
+  Film film = trace(view, path_settings(view), plan);
+  first_hits_ = {};
+  return film;
+}
+
+void PathRenderer::put_colors(Frame& frame, const RenderRequest& request, const View& view,
+                              Film film) {
   Image<Vec3f> hdr;
   {
     const Stopwatch watch(counts_.denoise_s);
@@ -215,15 +218,23 @@ Frame PathRenderer::do_render(const Scene& scene, const RenderRequest& request) 
   rendered_by_ = request.camera;
   const bool wants_color =
       request.channels.contains(kColor.name) || request.channels.contains(kColorHdr.name);
+  // Where paths leave the processor idle, it makes the labels meanwhile.
+  std::future<Film> film;
+  if (wants_color && traces_elsewhere()) {
+    film = std::async(std::launch::async, [&] { return trace_paths(view, request.seed); });
+  }
   const NameSet known = geometry_channels();
   if (std::any_of(known.begin(), known.end(),
                   [&](const auto& name) { return request.channels.contains(name); })) {
     const Stopwatch watch(counts_.channels_s);
-    Image<RayHit>* hits = wants_color && starts_at_centres(view) ? &first_hits_ : nullptr;
+    const bool wants_hits = wants_color && !traces_elsewhere() && starts_at_centres(view);
+    Image<RayHit>* hits = wants_hits ? &first_hits_ : nullptr;
     fill_channels(frame, request.channels, meshes_, view, seen_, hits, host_);
     seen_by_ = request.camera;
   }
-  if (wants_color) put_colors(frame, request, view);
+  if (wants_color) {
+    put_colors(frame, request, view, film.valid() ? film.get() : trace_paths(view, request.seed));
+  }
   return frame;
 }
 

@@ -63,6 +63,9 @@ class PathRenderer : public Renderer {
 
   /// A picture's light paths.
   virtual Film trace(const View& view, const PathSettings& settings, SamplePlan& plan) = 0;
+  /// Whether trace() leaves the processor idle and asks for no first hits: labels are then made
+  /// while it runs on a thread of its own.
+  virtual bool traces_elsewhere() const { return false; }
   /// Memory per pixel that trace() holds beside the film.
   virtual std::size_t traced_bytes_per_pixel() const = 0;
   /// Called after the scene was taken in.
@@ -88,7 +91,8 @@ class PathRenderer : public Renderer {
   PathSettings path_settings(const View& view) const;
   Image<Vec3f> without_noise(Film film, const View& view);
   bool is_quick() const { return params_.mode != "path_traced"; }
-  void put_colors(Frame& frame, const RenderRequest& request, const View& view);
+  Film trace_paths(const View& view, std::uint64_t seed);
+  void put_colors(Frame& frame, const RenderRequest& request, const View& view, Film film);
 
   PictureParams params_;
   Host& host_;

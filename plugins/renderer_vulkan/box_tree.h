@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <span>
 #include <vector>
 
@@ -49,6 +50,15 @@ struct BoxTree {
 
   std::vector<TreeNode> nodes;       ///< The root first; there is always one.
   std::vector<std::uint32_t> order;  ///< Of the boxes as leaves hold them, without the empty ones.
+
+  /// The nodes of the first levels, by their numbers.
+  std::map<std::uint32_t, TreeNode> top(int levels) const;
+};
+
+/// Part of a tree: a child of one of its nodes, or all of it.
+struct TreePart {
+  std::uint32_t child = 0;  ///< As in TreeNode.
+  TreeBox box;
 };
 
 /// Leaves hold a run of `order`: kLeaf | first << 3 | count - 1.

@@ -27,42 +27,46 @@ std::span<const std::byte> bytes_of(const std::vector<Value>& values) {
   return std::as_bytes(std::span(values));
 }
 
-}  // namespace
-
-GpuPathTracer::GpuPathTracer(const VulkanDevice& device, Host& host)
-    : device_(device),
-      host_(host),
-      iteration_limit_(find_iteration_limit()),
-      start_(device, kernels::kStart),
-      arrange_(device, kernels::kArrange),
-      intersect_(device, kernels::kIntersect),
-      shade_(device, kernels::kShade),
-      shadow_(device, kernels::kShadow),
-      gather_(device, kernels::kGather),
-      job_buffer_(device, sizeof(gpu::Job), VulkanBuffer::Place::Device, "a picture"),
-      counters_(device, sizeof(gpu::Counters), VulkanBuffer::Place::Device, "a picture") {}
-
 /// Lavapipe of Mesa 22.3 ends all loops of a kernel's run after 65,535 rounds, without an error.
-std::uint32_t GpuPathTracer::find_iteration_limit() const {
+std::uint32_t find_iteration_limit(const VulkanDevice& device) {
   constexpr std::uint32_t kWanted = 200'000;
   struct Constants {
     gpu::Address counted;
     std::uint32_t wanted = kWanted;
     std::uint32_t pad = 0;
   };
-  const VulkanKernel kernel(device_, kernels::kLimits);
-  const VulkanBuffer counted(device_, sizeof(std::uint32_t), VulkanBuffer::Place::Device, "a test");
-  device_.run([&](VulkanCommands& commands) {
+  const VulkanKernel kernel(device, kernels::kLimits);
+  const VulkanBuffer counted(device, sizeof(std::uint32_t), VulkanBuffer::Place::Device, "a test");
+  device.run([&](VulkanCommands& commands) {
     commands.constants(Constants{counted.address()});
     commands.dispatch(kernel, 1);
   });
   std::uint32_t found = 0;
-  device_.download(counted, 0, std::as_writable_bytes(std::span(&found, 1)));
-  constexpr std::uint32_t kSpare = 512;  // of the kernel's other loops
+  device.download(counted, 0, std::as_writable_bytes(std::span(&found, 1)));
+  constexpr std::uint32_t kSpare = 512;  // of a kernel's other loops
   return found == kWanted ? 0xFFFFFFFFu : found - std::min(found, kSpare);
 }
 
-std::uint32_t GpuPathTracer::most_slots() const {
+}  // namespace
+
+PathKernels::PathKernels(const VulkanDevice& device)
+    : start(device, kernels::kStart),
+      arrange(device, kernels::kArrange),
+      intersect(device, kernels::kIntersect),
+      shade(device, kernels::kShade),
+      shadow(device, kernels::kShadow),
+      gather(device, kernels::kGather),
+      iteration_limit(find_iteration_limit(device)) {}
+
+GpuPathTracer::GpuPathTracer(const PathDevice& device, Host& host, std::uint32_t most_slots)
+    : device_(device.device),
+      kernels_(device.kernels),
+      host_(host),
+      most_slots_(most_slots > 0 ? std::min(most_slots, kMostGroups) : slots_for_device()),
+      job_buffer_(device_, sizeof(gpu::Job), VulkanBuffer::Place::Device, "a picture"),
+      counters_(device_, sizeof(gpu::Counters), VulkanBuffer::Place::Device, "a picture") {}
+
+std::uint32_t GpuPathTracer::slots_for_device() const {
   // An eighth of the device; processors gain nothing from many paths.
   const std::uint64_t share =
       device_.info().is_processor ? std::uint64_t(64) << 20 : device_.info().memory / 8;
@@ -84,7 +88,7 @@ void GpuPathTracer::make_room(std::uint32_t slots) {
   grow(slots_, slots * sizeof(gpu::SampleSlot), "light paths");
   grow(ranges_, slots * sizeof(gpu::SlotRange), "light paths");
   if (job_.has_camera_rays != 0) {
-    grow(camera_rays_, paths * gpu::kCameraRayColumns * gpu::kColumnSize, "light paths");
+    grow(camera_rays_, paths * gpu::kCameraRaySize, "light paths");
     job_.camera_rays = camera_rays_.address();
   }
   job_.slots = slots_.address();
@@ -116,7 +120,7 @@ void GpuPathTracer::begin(const View& view, const PathSettings& settings, gpu::A
   job_.width = std::uint32_t(view.camera().width);
   job_.has_camera_rays = pinhole ? 0 : 1;
   job_.starts_at_centres = settings.starts_at_centres ? 1 : 0;
-  job_.iteration_limit = iteration_limit_;
+  job_.iteration_limit = kernels_.iteration_limit;
   job_.max_bounces = settings.max_bounces;
   job_.clamp_to = settings.clamp;
   job_.has_caustics = settings.has_caustics ? 1 : 0;
@@ -164,7 +168,11 @@ GpuPathTracer::Counts GpuPathTracer::trace(std::span<const TraceJob> jobs) {
   job_.sample_bits = std::uint32_t(jobs[0].order.sample_bits());
   std::uint64_t all = 0;
   for (const TraceJob& job : jobs) all += job.sample_end - job.sample_begin;
-  const std::uint32_t most = std::uint32_t(std::min<std::uint64_t>(all, most_slots()));
+  // Rays that the processor makes wait in its memory, too.
+  constexpr std::uint32_t kMostWithRays = 4096;
+  const std::uint32_t most_slots =
+      job_.has_camera_rays != 0 ? std::min(most_slots_, kMostWithRays) : most_slots_;
+  const auto most = std::uint32_t(std::min<std::uint64_t>(all, most_slots));
   make_room(most);
   Pass pass;
   const auto finish_pass = [&] {
@@ -190,8 +198,13 @@ GpuPathTracer::Counts GpuPathTracer::trace(std::span<const TraceJob> jobs) {
 
 /// Through lenses that kernels do not know, and open shutters.
 void GpuPathTracer::make_camera_rays(const Pass& pass) {
-  using Column = std::array<float, 4>;
-  std::vector<Column> columns(std::size_t(gpu::kCameraRayColumns) * job_.capacity);
+  struct Ray {
+    std::array<float, 4> origin{};     // and where it begins
+    std::array<float, 4> direction{};  // and where it ends
+    std::array<float, 4> sample{};     // time, and the sampler's dimension
+  };
+  static_assert(sizeof(Ray) == gpu::kCameraRaySize);
+  std::vector<Ray> rays(pass.slots.size() * gpu::kGroup);
   host_.parallel_for(pass.slots.size(), [&](std::size_t k) {
     const gpu::SampleSlot& slot = pass.slots[k];
     for (std::uint32_t i = 0; i < gpu::kGroup; ++i) {
@@ -213,16 +226,14 @@ void GpuPathTracer::make_camera_rays(const Pass& pass) {
         time = float(0.5 + seconds / window_);
         ray = view_->moved(ray, seconds);
       }
-      const std::size_t path = k * gpu::kGroup + i;
       const Vec3f& o = ray.origin;
       const Vec3f& d = ray.direction;
-      columns[path] = {o.x(), o.y(), o.z(), ray.t_min};
-      columns[job_.capacity + path] = {d.x(), d.y(), d.z(), std::min(ray.t_max, gpu::kInfinite)};
-      columns[2 * std::size_t(job_.capacity) + path] = {time, std::bit_cast<float>(dimension), 0.0f,
-                                                        0.0f};
+      rays[k * gpu::kGroup + i] = {{o.x(), o.y(), o.z(), ray.t_min},
+                                   {d.x(), d.y(), d.z(), std::min(ray.t_max, gpu::kInfinite)},
+                                   {time, std::bit_cast<float>(dimension), 0.0f, 0.0f}};
     }
   });
-  device_.upload(bytes_of(columns), camera_rays_, 0);
+  device_.upload(bytes_of(rays), camera_rays_, 0);
 }
 
 GpuPathTracer::Counts GpuPathTracer::trace(const Pass& pass) {
@@ -243,10 +254,10 @@ GpuPathTracer::Counts GpuPathTracer::trace(const Pass& pass) {
   };
   const auto steps = [&](VulkanCommands& commands, std::uint32_t count) {
     for (std::uint32_t i = 0; i < count; ++i) {
-      dispatch(commands, intersect_, counters_, offsetof(gpu::Counters, paths_groups));
-      dispatch(commands, shade_, counters_, offsetof(gpu::Counters, paths_groups));
-      dispatch(commands, arrange_, 1u);
-      dispatch(commands, shadow_, counters_, offsetof(gpu::Counters, shadow_groups));
+      dispatch(commands, kernels_.intersect, counters_, offsetof(gpu::Counters, paths_groups));
+      dispatch(commands, kernels_.shade, counters_, offsetof(gpu::Counters, paths_groups));
+      dispatch(commands, kernels_.arrange, 1u);
+      dispatch(commands, kernels_.shadow, counters_, offsetof(gpu::Counters, shadow_groups));
       queue = 1 - queue;
     }
   };
@@ -254,8 +265,8 @@ GpuPathTracer::Counts GpuPathTracer::trace(const Pass& pass) {
   device_.run([&](VulkanCommands& commands) {
     commands.zero(counters_, sizeof(gpu::Counters));
     commands.barrier();
-    dispatch(commands, start_, job_.slot_count);
-    dispatch(commands, arrange_, 1u);
+    dispatch(commands, kernels_.start, job_.slot_count);
+    dispatch(commands, kernels_.arrange, 1u);
     steps(commands, std::uint32_t(job_.max_bounces) + 2);
   });
   const auto read_counters = [&] {
@@ -263,7 +274,7 @@ GpuPathTracer::Counts GpuPathTracer::trace(const Pass& pass) {
     if (counters.is_over_limit != 0) {
       throw Error(ErrorKind::Plugin,
                   "the driver of " + device_.info().name + " ends loops after " +
-                      std::to_string(iteration_limit_) +
+                      std::to_string(kernels_.iteration_limit) +
                       " rounds, and a ray of this scene needs more; use a newer driver, or the "
                       "renderer embree");
     }
@@ -273,7 +284,7 @@ GpuPathTracer::Counts GpuPathTracer::trace(const Pass& pass) {
     device_.run([&](VulkanCommands& commands) { steps(commands, kFurtherSteps); });
   }
   device_.run([&](VulkanCommands& commands) {
-    dispatch(commands, gather_, std::uint32_t(pass.ranges.size()));
+    dispatch(commands, kernels_.gather, std::uint32_t(pass.ranges.size()));
   });
   return {counters.rays, counters.shadow_rays};
 }
@@ -282,21 +293,24 @@ Image<PixelSum> GpuPathTracer::sums() {
   Image<PixelSum> result(view_->camera().width, view_->camera().height, PixelSum());
   std::vector<gpu::PixelSum> sums(result.pixels().size());
   device_.download(sums_, 0, std::as_writable_bytes(std::span(sums)));
-  for (std::size_t i = 0; i < sums.size(); ++i) {
-    const gpu::PixelSum& sum = sums[i];
-    FilmPixel pixel;
-    pixel.seen = sum.seen;
-    pixel.scattered = sum.scattered;
-    pixel.albedo = sum.albedo;
-    pixel.normal = sum.normal;
-    pixel.position = sum.position;
-    pixel.brightest = sum.brightest;
-    const double mean = double(sum.mean);
-    const double count = double(sum.count);
-    result.pixels()[i] =
-        PixelSum::of(pixel, mean * count, double(sum.squares) + mean * mean * count, int(sum.count),
-                     int(sum.surfaces));
-  }
+  const auto width = std::size_t(result.width());
+  host_.parallel_for(std::size_t(result.height()), [&](std::size_t row) {
+    for (std::size_t i = row * width; i < (row + 1) * width; ++i) {
+      const gpu::PixelSum& sum = sums[i];
+      FilmPixel pixel;
+      pixel.seen = sum.seen;
+      pixel.scattered = sum.scattered;
+      pixel.albedo = sum.albedo;
+      pixel.normal = sum.normal;
+      pixel.position = sum.position;
+      pixel.brightest = sum.brightest;
+      const double mean = double(sum.mean);
+      const double count = double(sum.count);
+      result.pixels()[i] =
+          PixelSum::of(pixel, mean * count, double(sum.squares) + mean * mean * count,
+                       int(sum.count), int(sum.surfaces));
+    }
+  });
   return result;
 }
 

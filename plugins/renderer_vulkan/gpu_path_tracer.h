@@ -17,12 +17,35 @@
 
 namespace diorama {
 
+/// What a device runs for light paths. Making it takes the driver a second or so.
+struct PathKernels {
+  explicit PathKernels(const VulkanDevice& device);
+
+  VulkanKernel start;
+  VulkanKernel arrange;
+  VulkanKernel intersect;
+  VulkanKernel shade;
+  VulkanKernel shadow;
+  VulkanKernel gather;
+  /// How often a kernel may loop here: some drivers end loops silently.
+  std::uint32_t iteration_limit;
+};
+
+/// A device that is ready to trace paths.
+struct PathDevice {
+  explicit PathDevice(int number) : device(number), kernels(device) {}
+
+  VulkanDevice device;
+  PathKernels kernels;
+};
+
 /// Light paths on a device. They advance together, kernel by kernel: rays, then what they met, then
 /// rays to lights. What a path carries waits in columns between kernels, so that none loops longer
 /// than one ray needs: some drivers end long loops silently.
 class GpuPathTracer {
  public:
-  GpuPathTracer(const VulkanDevice& device, Host& host);
+  /// `most_slots`: how many samples of 64 pixels are under way at most; 0: as the device has room.
+  GpuPathTracer(const PathDevice& device, Host& host, std::uint32_t most_slots = 0);
 
   struct Counts {
     std::uint64_t rays = 0;
@@ -39,8 +62,6 @@ class GpuPathTracer {
 
   /// Bytes on the device beside the scene.
   std::size_t working_bytes() const;
-  /// How often a kernel may loop here; see find_iteration_limit().
-  std::uint32_t iteration_limit() const { return iteration_limit_; }
 
  private:
   /// Paths that are under way together.
@@ -49,22 +70,16 @@ class GpuPathTracer {
     std::vector<gpu::SlotRange> ranges;
     std::vector<SampleOrder> orders;  ///< Of the slots, where the processor makes the rays.
   };
-  std::uint32_t find_iteration_limit() const;
-  std::uint32_t most_slots() const;
+  std::uint32_t slots_for_device() const;
   void make_room(std::uint32_t slots);
   void add(const TraceJob& job, std::uint32_t begin, std::uint32_t end, Pass& pass) const;
   void make_camera_rays(const Pass& pass);
   Counts trace(const Pass& pass);
 
   const VulkanDevice& device_;
+  const PathKernels& kernels_;
   Host& host_;
-  std::uint32_t iteration_limit_;
-  VulkanKernel start_;
-  VulkanKernel arrange_;
-  VulkanKernel intersect_;
-  VulkanKernel shade_;
-  VulkanKernel shadow_;
-  VulkanKernel gather_;
+  std::uint32_t most_slots_;
 
   const View* view_ = nullptr;  ///< Of the picture under way.
   double window_ = 0.0;

@@ -5,10 +5,9 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <queue>
 #include <set>
 #include <utility>
-
-#include "box_tree.h"
 
 namespace diorama {
 namespace {
@@ -199,6 +198,29 @@ TreeBox box_of(const MeshInstance& instance, double window) {
   return box;
 }
 
+float half_area(const TreeBox& box) {
+  const Vec3f size = (box.high - box.low).cwiseMax(0.0f);
+  return size.x() * size.y() + size.y() * size.z() + size.z() * size.x();
+}
+
+bool is_empty(const TreeBox& box) { return !(box.low.array() <= box.high.array()).all(); }
+
+/// A box in the space of an instance's mesh, in the world, as far as it reaches into another.
+TreeBox placed(const TreeBox& box, const MeshInstance& instance, const TreeBox& within) {
+  if (is_empty(box)) return box;
+  TreeBox result;
+  for (int i = 0; i < 8; ++i) {
+    const Vec3f corner((i & 1) != 0 ? box.high.x() : box.low.x(),
+                       (i & 2) != 0 ? box.high.y() : box.low.y(),
+                       (i & 4) != 0 ? box.high.z() : box.low.z());
+    result.add(instance.to_world(corner));
+  }
+  const float margin = 2e-6f * result.low.cwiseAbs().cwiseMax(result.high.cwiseAbs()).sum();
+  result.low = (result.low.array() - margin).matrix().cwiseMax(within.low);
+  result.high = (result.high.array() + margin).matrix().cwiseMin(within.high);
+  return result;
+}
+
 }  // namespace
 
 class GpuScene::Blob {
@@ -244,10 +266,10 @@ void GpuScene::take(const RenderScene& scene) {
   shape_revision_ = scene.shape_revision();
 }
 
-VulkanBuffer GpuScene::upload(std::span<const std::byte> bytes, const char* what) const {
-  VulkanBuffer buffer(device_, bytes.size(), VulkanBuffer::Place::Device, what);
-  device_.upload(bytes, buffer, 0);
-  return buffer;
+VulkanRange GpuScene::upload(std::span<const std::byte> bytes, const char* what) {
+  VulkanRange range = arena_.take(bytes.size(), what);
+  device_.upload(bytes, range.buffer(), range.offset());
+  return range;
 }
 
 void GpuScene::upload(std::span<const std::byte> bytes, VulkanBuffer& buffer,
@@ -269,17 +291,25 @@ void GpuScene::take_meshes(const RenderScene& scene) {
   std::erase_if(meshes_, [&](const auto& entry) { return !used.contains(entry.first); });
   std::vector<MeshBytes> made(missing.size());
   host_.parallel_for(missing.size(), [&](std::size_t i) { made[i] = bytes_of(*missing[i]); });
+  std::vector<Blob> blobs(missing.size());
+  constexpr int kTopLevels = 7;
+  std::vector<MeshOnDevice> placed;
+  std::vector<VulkanDevice::Transfer> transfers;
   for (std::size_t i = 0; i < missing.size(); ++i) {
     const ShadingMesh& mesh = *missing[i];
     const MeshBytes bytes = std::move(made[i]);
-    Blob blob;
+    Blob& blob = blobs[i];
     const std::size_t nodes = blob.add(bytes.tree.nodes);
     const std::size_t triangles = blob.add(bytes.triangles);
     const std::size_t shading = blob.add(mesh.triangles());
     const std::size_t uvs = blob.add(bytes.uvs);
     const std::size_t colors = blob.add(bytes.colors);
-    MeshOnDevice on_device{missing[i], upload(blob.bytes(), "a mesh and its tree"), {}};
-    const gpu::Address base = on_device.buffer.address();
+    MeshOnDevice on_device{missing[i],
+                           arena_.take(blob.bytes().size(), "a mesh and its tree"),
+                           {},
+                           bytes.tree.top(kTopLevels)};
+    transfers.push_back({blob.bytes(), &on_device.memory.buffer(), on_device.memory.offset()});
+    const gpu::Address base = on_device.memory.address();
     gpu::Instance& parts = on_device.parts;
     parts.nodes = base + nodes;
     parts.triangles = base + triangles;
@@ -290,8 +320,10 @@ void GpuScene::take_meshes(const RenderScene& scene) {
                   (bytes.uvs.empty() ? 0u : gpu::kHasUvs) |
                   (bytes.colors.empty() ? 0u : gpu::kHasColors) |
                   (mesh.source().is_double_sided ? gpu::kDoubleSided : 0u);
-    meshes_.emplace(missing[i].get(), std::move(on_device));
+    placed.push_back(std::move(on_device));
   }
+  device_.upload(transfers);
+  for (MeshOnDevice& mesh : placed) meshes_.emplace(mesh.source.get(), std::move(mesh));
 }
 
 void GpuScene::take_textures(const RenderScene& scene) {
@@ -312,7 +344,7 @@ void GpuScene::take_textures(const RenderScene& scene) {
     if (textures_.contains(number)) continue;
     const std::vector<std::uint32_t> words = words_of(*texture);
     TextureOnDevice on_device{upload(std::as_bytes(std::span(words)), "a texture"), {}, 0};
-    on_device.record.texels = on_device.buffer.address();
+    on_device.record.texels = on_device.memory.address();
     on_device.record.width = texture->width();
     on_device.record.height = texture->height();
     on_device.record.level_count =
@@ -442,8 +474,8 @@ gpu::Instance GpuScene::instance_of(const MeshInstance& instance, double window)
 gpu::Light GpuScene::light_of(const LightTable::Record& light) const {
   gpu::Light result{};
   if (light.shape == LightShape::Dome) {
-    result.patches = skies_.at(light.texture.get()).buffer.address();
-    result.grid = skies_.at(light.sky.get()).buffer.address();
+    result.patches = skies_.at(light.texture.get()).memory.address();
+    result.grid = skies_.at(light.sky.get()).memory.address();
   }
   result.position = light.position;
   result.axis_x = light.axis_x;
@@ -464,6 +496,46 @@ gpu::Light GpuScene::light_of(const LightTable::Record& light) const {
   result.texture = light.texture ? textures_.at(light.texture->image().number()).number : 0u;
   result.instance = light.instance;
   result.triangle_count = std::uint32_t(light.triangles.size());
+  return result;
+}
+
+// Large things overlap: a room holds all others, a table its cups. Their trees are opened, largest
+// part first, and the tree over the instances is built over the parts, so that rays enter what they
+// pass near (Benthin et al. 2017).
+GpuScene::References GpuScene::references_of(const RenderScene& scene) const {
+  constexpr std::size_t kPartsPerInstance = 4;
+  constexpr std::size_t kFurtherParts = 256;
+  References result;
+  std::priority_queue<std::pair<float, std::uint32_t>> largest;  // area, number
+  const auto add = [&](std::uint32_t instance, std::uint32_t child, const TreeBox& box) {
+    const auto number = std::uint32_t(result.parts.size());
+    result.parts.push_back({instance, child});
+    result.boxes.push_back(box);
+    if ((child & TreeNode::kLeaf) == 0) largest.emplace(half_area(box), number);
+  };
+  for (std::uint32_t i = 0; i < scene.instances().size(); ++i) {
+    add(i, 0, box_of(scene.instances()[i], scene.window()));
+  }
+  const std::size_t most = kPartsPerInstance * result.parts.size() + kFurtherParts;
+  while (!largest.empty() && result.parts.size() < most) {
+    const std::uint32_t number = largest.top().second;
+    largest.pop();
+    const gpu::Reference part = result.parts[number];
+    const MeshInstance& instance = scene.instances()[part.instance];
+    const auto& top = meshes_.at(instance.shading).top;
+    const auto node = top.find(part.child);
+    if (instance.motion || node == top.end()) continue;
+    const TreeBox whole = result.boxes[number];
+    const TreeBox a = placed({node->second.low_a, node->second.high_a}, instance, whole);
+    const TreeBox b = placed({node->second.low_b, node->second.high_b}, instance, whole);
+    // Turned boxes may be no smaller than what they are part of.
+    if (half_area(a) + half_area(b) > 1.5f * half_area(whole)) continue;
+    if (is_empty(b)) continue;
+    result.parts[number].child = node->second.child_a;
+    result.boxes[number] = a;
+    if ((node->second.child_a & TreeNode::kLeaf) == 0) largest.emplace(half_area(a), number);
+    add(part.instance, node->second.child_b, b);
+  }
   return result;
 }
 
@@ -523,7 +595,6 @@ void GpuScene::take_tables(const RenderScene& scene) {
   parts.base = parts_.address();
 
   std::vector<gpu::Instance> instances;
-  std::vector<TreeBox> boxes;
   std::uint32_t first_material = 0;
   for (std::size_t i = 0; i < scene.instances().size(); ++i) {
     const MeshInstance& instance = scene.instances()[i];
@@ -531,7 +602,6 @@ void GpuScene::take_tables(const RenderScene& scene) {
     made.first_material = first_material;
     made.triangle_lights = parts.base + triangle_lights[i];
     first_material += made.material_count;
-    boxes.push_back(box_of(instance, scene.window()));
   }
   std::vector<gpu::Material> materials;
   for (const ShadingMaterial* m : used) materials.push_back(material_of(*m, parts));
@@ -549,7 +619,9 @@ void GpuScene::take_tables(const RenderScene& scene) {
 
   Blob tables;
   gpu::World world;
-  world.tree = tables.add(tree_of_single(boxes).nodes);
+  const References references = references_of(scene);
+  world.tree = tables.add(tree_of_single(references.boxes).nodes);
+  world.references = tables.add(references.parts);
   world.instances = tables.add(instances);
   world.slot_materials = tables.add(slot_materials);
   world.materials = tables.add(materials);
@@ -564,9 +636,10 @@ void GpuScene::take_tables(const RenderScene& scene) {
   world.light_shapes = tables.add(table.shapes());
   upload(tables.bytes(), tables_, "tables of the scene");
   for (gpu::Address* address :
-       {&world.tree, &world.instances, &world.slot_materials, &world.materials, &world.textures,
-        &world.lights, &world.light_blocks, &world.light_places, &world.light_bodies,
-        &world.light_order, &world.surroundings, &world.entry_lights, &world.light_shapes}) {
+       {&world.tree, &world.references, &world.instances, &world.slot_materials, &world.materials,
+        &world.textures, &world.lights, &world.light_blocks, &world.light_places,
+        &world.light_bodies, &world.light_order, &world.surroundings, &world.entry_lights,
+        &world.light_shapes}) {
     *address += tables_.address();
   }
   world.linear_from_srgb = parts.base + linear;

@@ -8,9 +8,11 @@
 #include <span>
 #include <vector>
 
+#include "box_tree.h"
 #include "diorama/host.h"
 #include "gpu_world.h"
 #include "renderer_support/render_scene.h"
+#include "vulkan_arena.h"
 #include "vulkan_device.h"
 
 namespace diorama {
@@ -19,7 +21,7 @@ namespace diorama {
 /// meshes with their trees and textures stay as long as the scene uses them.
 class GpuScene {
  public:
-  GpuScene(const VulkanDevice& device, Host& host) : device_(device), host_(host) {}
+  GpuScene(const VulkanDevice& device, Host& host) : device_(device), host_(host), arena_(device) {}
 
   void take(const RenderScene& scene);
 
@@ -28,38 +30,46 @@ class GpuScene {
  private:
   struct MeshOnDevice {
     std::shared_ptr<const ShadingMesh> source;
-    VulkanBuffer buffer;
-    gpu::Instance parts;  ///< Addresses and flags of the mesh.
+    VulkanRange memory;
+    gpu::Instance parts;                    ///< Addresses and flags of the mesh.
+    std::map<std::uint32_t, TreeNode> top;  ///< Of its tree.
   };
   struct TextureOnDevice {
-    VulkanBuffer buffer;
+    VulkanRange memory;
     gpu::Texture record;
     std::uint32_t number = 0;  ///< In the table of this scene.
   };
   struct WordsOnDevice {
     std::shared_ptr<const void> source;
-    VulkanBuffer buffer;
+    VulkanRange memory;
   };
   /// Bytes that go to the device together.
   class Blob;
+  /// What the tree over the instances holds.
+  struct References {
+    std::vector<gpu::Reference> parts;
+    std::vector<TreeBox> boxes;
+  };
   /// Where albedo tables and the triangles of lamps stand.
   struct Parts;
 
   void take_meshes(const RenderScene& scene);
   void take_textures(const RenderScene& scene);
   void take_skies(const LightTable& lights);
-  VulkanBuffer upload(std::span<const std::byte> bytes, const char* what) const;
-  /// As above, into a buffer that is made anew only where it is too small.
+  VulkanRange upload(std::span<const std::byte> bytes, const char* what);
+  /// Into a buffer that is made anew only where it is too small.
   void upload(std::span<const std::byte> bytes, VulkanBuffer& buffer, const char* what) const;
   gpu::Slot slot_of(const TextureSlot& slot) const;
   gpu::Surface surface_of(const SurfaceBsdf& surface, const Parts& parts) const;
   gpu::Material material_of(const ShadingMaterial& material, const Parts& parts) const;
   gpu::Instance instance_of(const MeshInstance& instance, double window) const;
   gpu::Light light_of(const LightTable::Record& light) const;
+  References references_of(const RenderScene& scene) const;
   void take_tables(const RenderScene& scene);
 
   const VulkanDevice& device_;
   Host& host_;
+  VulkanArena arena_;
   std::uint64_t pose_revision_ = 0;
   std::uint64_t shape_revision_ = 0;
   std::map<const ShadingMesh*, MeshOnDevice> meshes_;

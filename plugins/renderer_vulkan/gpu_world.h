@@ -148,8 +148,15 @@ struct Light {
 };
 static_assert(sizeof(Light) == 168);
 
+/// A part of an instance's tree, as leaves of the tree over the instances name them.
+struct Reference {
+  std::uint32_t instance = 0;
+  std::uint32_t child = 0;  ///< As in TreeNode.
+};
+
 struct World {
   Address tree = 0;
+  Address references = 0;
   Address instances = 0;
   Address slot_materials = 0;
   Address materials = 0;
@@ -258,7 +265,7 @@ inline constexpr std::uint32_t kGroup = 64;
 inline constexpr std::uint32_t kStateColumns = 7;
 inline constexpr std::uint32_t kResultColumns = 4;
 inline constexpr std::uint32_t kShadowColumns = 3;
-inline constexpr std::uint32_t kCameraRayColumns = 3;
 inline constexpr std::uint32_t kColumnSize = 16;
+inline constexpr std::uint32_t kCameraRaySize = 3 * kColumnSize;
 
 }  // namespace diorama::gpu

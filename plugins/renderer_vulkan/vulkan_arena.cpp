@@ -54,8 +54,8 @@ VulkanRange VulkanArena::take(std::size_t size, const char* what) {
 }
 
 void VulkanArena::give_back(const VulkanBuffer* buffer, std::size_t offset, std::size_t size) {
-  const auto found = std::ranges::find_if(
-      blocks_, [&](const auto& block) { return &block->buffer == buffer; });
+  const auto found =
+      std::ranges::find_if(blocks_, [&](const auto& block) { return &block->buffer == buffer; });
   auto& gaps = (*found)->gaps;
   auto gap = gaps.emplace(offset, size).first;
   if (const auto next = std::next(gap); next != gaps.end() && offset + size == next->first) {

@@ -32,7 +32,8 @@ class VulkanRange {
   std::size_t size_ = 0;
 };
 
-/// Memory on the device for many things of all sizes: drivers allow a few thousand allocations only.
+/// Memory on the device for many things of all sizes: drivers allow a few thousand allocations
+/// only.
 class VulkanArena {
  public:
   explicit VulkanArena(const VulkanDevice& device) : device_(device) {}

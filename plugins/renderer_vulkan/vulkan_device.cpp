@@ -267,13 +267,36 @@ void VulkanDevice::run(const std::function<void(VulkanCommands&)>& record) const
   check(functions_.vkWaitForFences(device_, 1, &fence_, VK_TRUE, ~std::uint64_t(0)), "run kernels");
 }
 
-void VulkanDevice::upload(std::span<const std::byte> bytes, const VulkanBuffer& to,
-                          std::size_t offset) const {
-  for (std::size_t done = 0; done < bytes.size(); done += kStagingSize) {
-    const std::size_t size = std::min(kStagingSize, bytes.size() - done);
-    std::memcpy(staging_->data(), bytes.data() + done, size);
-    run([&](VulkanCommands& commands) { commands.copy(*staging_, 0, to, offset + done, size); });
+void VulkanDevice::upload(std::span<const Transfer> transfers) const {
+  struct Copy {
+    std::size_t from = 0;
+    const VulkanBuffer* to = nullptr;
+    std::size_t offset = 0;
+    std::size_t size = 0;
+  };
+  std::vector<Copy> copies;
+  std::size_t filled = 0;
+  const auto send = [&] {
+    if (copies.empty()) return;
+    run([&](VulkanCommands& commands) {
+      for (const Copy& copy : copies) {
+        commands.copy(*staging_, copy.from, *copy.to, copy.offset, copy.size);
+      }
+    });
+    copies.clear();
+    filled = 0;
+  };
+  for (const Transfer& transfer : transfers) {
+    for (std::size_t done = 0; done < transfer.bytes.size();) {
+      if (filled == kStagingSize) send();
+      const std::size_t size = std::min(kStagingSize - filled, transfer.bytes.size() - done);
+      std::memcpy(staging_->data() + filled, transfer.bytes.data() + done, size);
+      copies.push_back({filled, transfer.to, transfer.offset + done, size});
+      filled += size;
+      done += size;
+    }
   }
+  send();
 }
 
 void VulkanDevice::download(const VulkanBuffer& from, std::size_t offset,

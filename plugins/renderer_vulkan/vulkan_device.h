@@ -94,6 +94,7 @@ class VulkanDevice {
   VulkanDevice(const VulkanDevice&) = delete;
   VulkanDevice& operator=(const VulkanDevice&) = delete;
 
+  const VulkanInstance& instance() const { return instance_; }
   const VulkanDeviceInfo& info() const { return info_; }
   const VulkanDeviceFunctions& functions() const { return functions_; }
   VkDevice handle() const { return device_; }
@@ -103,8 +104,17 @@ class VulkanDevice {
 
   /// Records and runs commands, and waits until they are done.
   void run(const std::function<void(VulkanCommands&)>& record) const;
-  /// Puts bytes into a buffer on the device.
-  void upload(std::span<const std::byte> bytes, const VulkanBuffer& to, std::size_t offset) const;
+  /// Bytes for a buffer on the device.
+  struct Transfer {
+    std::span<const std::byte> bytes;
+    const VulkanBuffer* to = nullptr;
+    std::size_t offset = 0;
+  };
+  void upload(std::span<const Transfer> transfers) const;
+  void upload(std::span<const std::byte> bytes, const VulkanBuffer& to, std::size_t offset) const {
+    const Transfer transfer{bytes, &to, offset};
+    upload(std::span(&transfer, 1));
+  }
   /// And back.
   void download(const VulkanBuffer& from, std::size_t offset, std::span<std::byte> bytes) const;
 

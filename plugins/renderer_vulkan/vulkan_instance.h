@@ -34,6 +34,8 @@ class VulkanInstance {
   const std::vector<VulkanDeviceInfo>& devices() const { return devices_; }
   /// Throws Error(Config) where there is no such device, Error(Plugin) where it lacks something.
   const VulkanDeviceInfo& device(int number) const;
+  /// "0: ...; 1: ...", see description_of().
+  std::string list_of_devices() const;
   const VulkanInstanceFunctions& functions() const { return functions_; }
 
  private:
@@ -41,8 +43,6 @@ class VulkanInstance {
     void operator()(void* library) const;
   };
   VulkanDeviceInfo describe(VkPhysicalDevice device) const;
-  std::string list_of_devices() const;
-
   std::unique_ptr<void, Unload> library_;
   VulkanInstanceFunctions functions_;
   VkInstance instance_ = VK_NULL_HANDLE;

@@ -2,6 +2,7 @@
 #include "vulkan_renderer.h"
 
 #include <chrono>
+#include <string>
 #include <utility>
 
 namespace diorama {
@@ -13,12 +14,14 @@ void VulkanRenderer::Params::visit(ParamVisitor& v) {
   PictureParams::visit(v);
 }
 
-VulkanRenderer::VulkanRenderer(const Params& params, Host& host)
+VulkanRenderer::VulkanRenderer(const Params& params, Host& host,
+                               std::shared_ptr<const PathDevice> device)
     : PathRenderer(params, host),
-      device_(params.device),
-      scene_(device_, host),
-      tracer_(device_, host) {
-  host.log(LogLevel::Info, "paths are traced by " + description_of(device_.info()));
+      device_(std::move(device)),
+      scene_(device_->device, host),
+      tracer_(*device_, host) {
+  host.log(LogLevel::Info, "paths are traced by Vulkan device " + std::to_string(params.device) +
+                               " of " + device_->device.instance().list_of_devices());
 }
 
 void VulkanRenderer::prepare_paths() { scene_.take(meshes().render_scene()); }

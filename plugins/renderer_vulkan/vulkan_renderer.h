@@ -19,14 +19,18 @@ class VulkanRenderer final : public PathRenderer {
     void visit(ParamVisitor& v);
   };
 
-  VulkanRenderer(const Params& params, Host& host);
+  VulkanRenderer(const Params& params, Host& host)
+      : VulkanRenderer(params, host, std::make_shared<const PathDevice>(params.device)) {}
+  /// On a device that is open already.
+  VulkanRenderer(const Params& params, Host& host, std::shared_ptr<const PathDevice> device);
 
  private:
   void prepare_paths() override;
   Film trace(const View& view, const PathSettings& settings, SamplePlan& plan) override;
+  bool traces_elsewhere() const override { return true; }
   std::size_t traced_bytes_per_pixel() const override { return 2 * sizeof(PixelSum); }
 
-  VulkanDevice device_;
+  std::shared_ptr<const PathDevice> device_;
   GpuScene scene_;
   GpuPathTracer tracer_;
 };

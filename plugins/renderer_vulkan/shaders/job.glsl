@@ -58,7 +58,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Job
   Queue hit_triangles;
   Columns shadows;
   Queue queues[2];
-  Columns camera_rays;  // three columns, where the lens is no pinhole
+  Columns camera_rays;  // three entries per path, where the lens is no pinhole
   PixelSums sums;
   uint capacity;  // of the columns
   uint width;

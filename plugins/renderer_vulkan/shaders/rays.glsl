@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Trees of boxes with two children each, over the instances and within meshes. A child is a node, or
-// a leaf: an instance, or up to eight triangles in a row.
+// a leaf: a part of an instance, or up to eight triangles in a row.
 const uint kLeaf = 0x80000000u;
 const uint kReturn = 0xFFFFFFFEu;  // from a mesh to the tree of the instances
 const uint kEnd = 0xFFFFFFFFu;
@@ -111,7 +111,8 @@ vec3 straight_share(uint instance, uint number, float u, float v, vec3 triangle_
         node = top > 0u ? stack[--top] : kEnd;                                                    \
       }                                                                                           \
     } else if (instance == kNone) {                                                               \
-      instance = node & 0x7FFFFFFFu;                                                              \
+      const uint reference = 2u * (node & 0x7FFFFFFFu);                                           \
+      instance = world.references.v[reference];                                                   \
       flags = world.instances.v[instance].flags;                                                  \
       nodes = world.instances.v[instance].nodes;                                                  \
       vec3 from = origin;                                                                         \
@@ -130,7 +131,7 @@ vec3 straight_share(uint instance, uint number, float u, float v, vec3 triangle_
       d = vec3(dot(r0.xyz, towards), dot(r1.xyz, towards), dot(r2.xyz, towards));                 \
       inverse = inverse_of(d);                                                                    \
       stack[top++] = kReturn;                                                                     \
-      node = 0u;                                                                                  \
+      node = world.references.v[reference + 1u];                                                  \
     } else {                                                                                      \
       const uint first = (node & 0x7FFFFFFFu) >> 3;                                               \
       const uint end = first + (node & 7u) + 1u;                                                  \

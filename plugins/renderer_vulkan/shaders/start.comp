@@ -31,9 +31,9 @@ bool start(uint path) {
   float t_max;
   float time = 0.5;
   if (job.has_camera_rays != 0u) {
-    const vec4 a = job.camera_rays.v[path];
-    const vec4 b = job.camera_rays.v[job.capacity + path];
-    const vec4 c = job.camera_rays.v[2u * job.capacity + path];
+    const vec4 a = job.camera_rays.v[3u * path];
+    const vec4 b = job.camera_rays.v[3u * path + 1u];
+    const vec4 c = job.camera_rays.v[3u * path + 2u];
     origin = a.xyz;
     direction = b.xyz;
     t_min = a.w;

@@ -156,7 +156,8 @@ layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Tex
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Lights { Light v[]; };
 
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer World {
-  Vec4s tree;  // over the instances
+  Vec4s tree;       // over parts of the instances
+  Uints references;  // of its leaves: an instance and a child in its tree
   Instances instances;
   Uints slot_materials;
   Materials materials;

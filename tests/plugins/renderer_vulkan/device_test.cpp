@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cstdlib>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "diorama/error.h"
+#include "diorama/rng.h"
 #include "plugins/renderer_embree/test_world.h"
 #include "support/catch.h"
 #include "support/render_host/render_host.h"
+#include "vulkan_arena.h"
 #include "vulkan_for_tests.h"
 #include "vulkan_renderer.h"
 
@@ -105,9 +110,8 @@ TEST_CASE("bytes go to the device and come back", "[vulkan]") {
 
 TEST_CASE("a device that ends long loops is found out", "[vulkan]") {
   if (!test::has_vulkan_device()) return;
-  test::RenderHost host(1);
-  const VulkanDevice device(0);
-  const std::uint32_t limit = GpuPathTracer(device, host).iteration_limit();
+  const VulkanDevice& device = test::path_device()->device;
+  const std::uint32_t limit = test::path_device()->kernels.iteration_limit;
   const bool is_old_lavapipe =
       device.info().is_processor && device.info().driver.find("Mesa 22.3") != std::string::npos;
   // 65,535 rounds, less what is left for a kernel's small loops.
@@ -116,6 +120,41 @@ TEST_CASE("a device that ends long loops is found out", "[vulkan]") {
   } else {
     CHECK(limit > 65535 - 513);
   }
+}
+
+TEST_CASE("memory of many things comes from few allocations, and goes back", "[vulkan]") {
+  if (!test::has_vulkan_device()) return;
+  const VulkanDevice& device = test::path_device()->device;
+  const std::uint64_t before = device.held();
+  VulkanArena arena(device);
+  Rng rng(3);
+  std::vector<VulkanRange> ranges;
+  std::vector<std::size_t> sizes;
+  for (int i = 0; i < 4000; ++i) {
+    // Most stay, some go and leave gaps.
+    if (i % 3 == 2) {
+      const auto gone = std::size_t(rng.uniform() * double(ranges.size()));
+      ranges.erase(ranges.begin() + std::ptrdiff_t(gone));
+      sizes.erase(sizes.begin() + std::ptrdiff_t(gone));
+    }
+    sizes.push_back(1 + std::size_t(rng.uniform() * 9000.0));
+    ranges.push_back(arena.take(sizes.back(), "a test"));
+    CHECK(ranges.back().address() % 16 == 0);
+  }
+  CHECK(arena.buffer_count() == 1);
+  std::vector<std::pair<std::size_t, std::size_t>> places;
+  for (std::size_t i = 0; i < ranges.size(); ++i) {
+    places.emplace_back(ranges[i].offset(), ranges[i].offset() + sizes[i]);
+  }
+  std::ranges::sort(places);
+  for (std::size_t i = 1; i < places.size(); ++i) {
+    REQUIRE(places[i - 1].second <= places[i].first);
+  }
+  const VulkanRange large = arena.take(std::size_t(40) << 20, "a test");
+  CHECK(arena.buffer_count() == 2);
+  ranges.clear();
+  CHECK(arena.buffer_count() == 1);
+  CHECK(device.held() == before + (std::size_t(40) << 20));
 }
 
 }  // namespace diorama

@@ -3,8 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
 #include <functional>
+#include <memory>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "embree_renderer.h"
 #include "plugins/renderer_embree/test_world.h"
@@ -27,18 +31,28 @@ struct Pictures {
   Image<Vec3f> vulkan;
 };
 
-template <class Renderer, class Params>
-Frame render(const Scene& scene, NodeId camera, const Params& params, const NameSet& channels) {
-  RenderHost host(2);
-  Renderer renderer(params, host);
+Frame render(PathRenderer&& renderer, const Scene& scene, NodeId camera, const NameSet& channels) {
   renderer.prepare(scene);
   return renderer.render({camera, channels, 5});
+}
+
+Frame render_by_embree(const Scene& scene, NodeId camera, const PictureParams& params,
+                       const NameSet& channels) {
+  RenderHost host(2);
+  return render(EmbreeRenderer(params, host), scene, camera, channels);
 }
 
 VulkanRenderer::Params on_device(const PictureParams& params) {
   VulkanRenderer::Params own;
   static_cast<PictureParams&>(own) = params;
   return own;
+}
+
+Frame render_by_vulkan(const Scene& scene, NodeId camera, const PictureParams& params,
+                       const NameSet& channels) {
+  RenderHost host(2);
+  return render(VulkanRenderer(on_device(params), host, test::path_device()), scene, camera,
+                channels);
 }
 
 PictureParams reference(int samples, int bounces = 4) {
@@ -52,8 +66,8 @@ PictureParams reference(int samples, int bounces = 4) {
 
 Pictures render_both(const TestWorld& world, NodeId camera, const PictureParams& params) {
   const NameSet channels{std::string(kColorHdr.name)};
-  return {render<EmbreeRenderer>(world.scene, camera, params, channels).get(kColorHdr),
-          render<VulkanRenderer>(world.scene, camera, on_device(params), channels).get(kColorHdr)};
+  return {render_by_embree(world.scene, camera, params, channels).get(kColorHdr),
+          render_by_vulkan(world.scene, camera, params, channels).get(kColorHdr)};
 }
 
 /// How far apart two pictures are that share their random numbers: nearly all pixels are equal but
@@ -134,7 +148,7 @@ TestWorld room_with(const Material& material) {
 }
 
 NodeId camera_into(TestWorld& world) {
-  return world.add_camera(32, 24, 26.0, Vec3(-0.6, -1.8, 0.3), Vec3(0.1, 0.5, -0.7));
+  return world.add_camera(35, 26, 28.0, Vec3(-0.6, -1.8, 0.3), Vec3(0.1, 0.5, -0.7));
 }
 
 std::shared_ptr<const Texture> checks(int width, int height, int channels, ColorSpace space,
@@ -197,6 +211,411 @@ TEST_CASE("surfaces of every kind look as Embree's", "[vulkan]") {
       CHECK(d.unequal < 0.05);
     }
   }
+}
+
+TEST_CASE("textures and colours of corners look as Embree's", "[vulkan]") {
+  if (!test::has_vulkan_device()) return;
+  const std::vector<std::pair<const char*, std::function<void(Material&)>>> materials{
+      {"colour",
+       [](Material& m) {
+         m.base_color_texture = input(checks(64, 32, 3, ColorSpace::Srgb, false));
+         m.base_color_texture.uv_from_mesh_uv << 2.0f, 0.3f, 0.1f, -0.2f, 1.5f, 0.4f;
+       }},
+      {"mirrored wrap",
+       [](Material& m) {
+         m.base_color_texture = input(checks(15, 9, 4, ColorSpace::Srgb, false));
+         m.base_color_texture.uv_from_mesh_uv << 3.0f, 0.0f, -1.0f, 0.0f, 3.0f, -1.0f;
+         m.base_color_texture.wrap_u = Wrap::Mirror;
+         m.base_color_texture.wrap_v = Wrap::Black;
+       }},
+      {"floats",
+       [](Material& m) {
+         m.base_color_texture = input(checks(20, 12, 3, ColorSpace::Srgb, true));
+         m.base_color_texture.wrap_u = Wrap::Clamp;
+       }},
+      {"roughness and metal",
+       [](Material& m) {
+         m.roughness_texture = input(checks(16, 16, 1, ColorSpace::Linear, false));
+         m.metallic_texture = input(checks(8, 16, 3, ColorSpace::Linear, false));
+         m.metallic_texture.channel = 2;
+         m.clearcoat = 0.5f;
+       }},
+      {"rough glass",
+       [](Material& m) {
+         m.roughness_texture = input(checks(16, 16, 2, ColorSpace::Linear, false));
+         m.transmission = 0.8f;
+       }},
+      {"bumps",
+       [](Material& m) {
+         m.normal_texture = input(checks(24, 24, 3, ColorSpace::Linear, false));
+         m.normal_texture.scale = {0.8f, 0.8f, 1.0f, 1.0f};
+         m.normal_texture.bias = {-0.4f, -0.4f, 0.3f, 0.0f};
+       }},
+      {"holes",
+       [](Material& m) {
+         m.opacity_texture = input(checks(12, 10, 1, ColorSpace::Linear, false));
+         m.opacity_threshold = 0.5f;
+       }},
+      {"gauze",
+       [](Material& m) {
+         m.opacity_texture = input(checks(12, 10, 1, ColorSpace::Linear, false));
+       }},
+      {"glowing picture",
+       [](Material& m) {
+         m.emission = Vec3f(1.0f, 2.0f, 3.0f);
+         m.emission_texture = input(checks(12, 10, 3, ColorSpace::Srgb, false));
+       }},
+  };
+  for (const auto& [name, change] : materials) {
+    Material material;
+    material.base_color = Vec3f(0.9f, 0.8f, 0.7f);
+    change(material);
+    TestWorld world = room_with(material);
+    Mesh quilt = make_plane(1.5, 1.0);
+    for (std::size_t i = 0; i < quilt.positions.size(); ++i) {
+      quilt.colors.push_back(Vec3f(0.2f + 0.2f * float(i), 0.9f, 0.3f));
+    }
+    Affine wall = at(0.2, 1.9, 0.0);
+    wall.rotate(Eigen::AngleAxisd(1.5, Vec3::UnitX()));
+    world.add("quilt", quilt, matte(0.9f), wall);
+    const NodeId camera = camera_into(world);
+    const Difference d = difference(render_both(world, camera, reference(8)), name);
+    CAPTURE(name, d.mean, d.unequal);
+    CHECK(d.mean < 0.002);
+    CHECK(d.unequal < 0.05);
+  }
+}
+
+TEST_CASE("lights of every kind shine as Embree's", "[vulkan]") {
+  if (!test::has_vulkan_device()) return;
+  const auto sky = [](bool has_picture) {
+    Light light = dome(0.8f);
+    if (has_picture) light.texture = checks(64, 32, 3, ColorSpace::Linear, true);
+    return light;
+  };
+  const auto of_kind = [](LightKind kind, auto&& change) {
+    Light light;
+    light.kind = kind;
+    light.color = Vec3f(9.0f, 8.0f, 7.0f);
+    light.radius_m = 0.3;
+    change(light);
+    return light;
+  };
+  const std::vector<std::pair<const char*, std::vector<Light>>> lights{
+      {"sphere", {of_kind(LightKind::Sphere, [](Light&) {})}},
+      {"disk",
+       {of_kind(LightKind::Disk, [](Light& l) { l.cone_angle_rad = 0.9, l.cone_softness = 0.4; })}},
+      {"hidden", {of_kind(LightKind::Rect, [](Light& l) { l.is_visible_to_camera = false; })}},
+      {"sun", {of_kind(LightKind::Distant, [](Light& l) { l.angle_rad = 0.2; })}},
+      {"point sun", {of_kind(LightKind::Distant, [](Light& l) { l.angle_rad = 0.0; })}},
+      {"white sky", {sky(false)}},
+      {"sky", {sky(true)}},
+      {"sky and sun",
+       {sky(true), of_kind(LightKind::Distant, [](Light& l) { l.angle_rad = 0.05; })}},
+      {"dark", {}},
+  };
+  for (const auto& [name, all] : lights) {
+    TestWorld world;
+    world.add("floor", make_plane(6, 5), matte(0.5f), at(0, 0, -0.7));
+    Affine lying = at(1.2, 0.0, 0.3);
+    lying.rotate(Eigen::AngleAxisd(1.2, Vec3::UnitY()));
+    world.add("wall", make_plane(2, 3), matte(0.7f), lying);
+    Material shiny;
+    shiny.metallic = 1.0f;
+    shiny.roughness = 0.2f;
+    world.add("ball", make_sphere(0.5), shiny, at(0.2, 0.1, -0.1));
+    for (const Light& light : all) {
+      Affine above = at(-0.5, -0.3, 1.6);
+      above.rotate(Eigen::AngleAxisd(0.3, Vec3::UnitX()));
+      world.add(light, above);
+    }
+    const NodeId camera =
+        world.add_camera(32, 24, 26.0, Vec3(-1.6, -2.8, 1.3), Vec3(0.1, 0.2, 0.0));
+    for (const char* lamps : {"sphere", "disk"}) {
+      PictureParams params = reference(8);
+      params.sphere_lights = lamps;
+      const Pictures pictures = render_both(world, camera, params);
+      if (all.empty()) {
+        for (const Vec3f& p : pictures.vulkan.pixels()) REQUIRE(p.isZero());
+        continue;
+      }
+      const Difference d = difference(pictures, name);
+      CAPTURE(name, lamps, d.mean, d.unequal);
+      CHECK(d.mean < 0.002);
+      CHECK(d.unequal < 0.05);
+    }
+  }
+}
+
+TEST_CASE("a hall of lamps is lit as Embree's", "[vulkan]") {
+  if (!test::has_vulkan_device()) return;
+  TestWorld world;
+  world.add("hall", inward_box(Vec3(6, 5, 3)), matte(0.6f));
+  // More than are compared at once, of all shapes, and one mesh many times, mirrored and stretched.
+  const auto lamp = std::make_shared<const Mesh>(make_cone(0.1, 0.2, 12));
+  Material glow;
+  glow.emission = Vec3f(3.0f, 5.0f, 4.0f);
+  const auto material = std::make_shared<const Material>(glow);
+  for (int i = 0; i < 14; ++i) {
+    Affine place = at(-2.4 + 0.36 * i, -1.5 + 0.25 * (i % 5), 0.6 + 0.1 * (i % 7));
+    place.rotate(Eigen::AngleAxisd(0.4 * i, Vec3(0.3, 0.8, 0.5).normalized()));
+    place.scale(Vec3(i % 2 == 0 ? 1.0 : -1.0, 1.0 + 0.05 * i, 0.8));
+    const NodeId node = world.scene.create(world.base, "lamp_" + std::to_string(i));
+    world.scene.edit(node).mesh = lamp;
+    world.scene.edit(node).materials = {material};
+    world.scene.set_pose(node, place);
+    Light light;
+    light.kind = i % 3 == 0 ? LightKind::Sphere : i % 3 == 1 ? LightKind::Rect : LightKind::Disk;
+    light.radius_m = 0.08;
+    light.width_m = light.height_m = 0.2;
+    light.color = Vec3f(10.0f, 4.0f + float(i), 6.0f);
+    world.add(light, at(-2.2 + 0.33 * i, 1.2 - 0.2 * (i % 4), 1.2));
+  }
+  const NodeId camera = world.add_camera(40, 30, 30.0, Vec3(-2.0, -2.0, 0.4), Vec3(0.5, 0.6, 0.0));
+  const Difference d = difference(render_both(world, camera, reference(8)), "hall");
+  CAPTURE(d.mean, d.unequal);
+  CHECK(d.mean < 0.002);
+  CHECK(d.unequal < 0.05);
+}
+
+TEST_CASE("lenses and shutters show what they show with Embree", "[vulkan]") {
+  if (!test::has_vulkan_device()) return;
+  const std::vector<std::pair<const char*, std::function<void(Camera&)>>> cameras{
+      {"bent",
+       [](Camera& c) {
+         c.lens = LensModel::OpencvPinhole, c.distortion = {-0.1, 0.02};
+       }},
+      {"fisheye",
+       [](Camera& c) {
+         c.lens = LensModel::FisheyePolynomial;
+         c.fisheye_polynomial = {0.0, 1.0 / 15.0, 0.0, 1e-6, 0.0, 0.0};
+         c.fisheye_max_angle_rad = 1.1;  // nothing in the corners
+       }},
+      {"blur", [](Camera& c) { c.f_stop = 0.2, c.focus_distance_m = 1.2; }},
+      {"shutter", [](Camera& c) { c.exposure_time_s = 0.04, c.readout_time_s = 0.03; }},
+  };
+  for (const auto& [name, change] : cameras) {
+    Material material;
+    material.roughness = 0.4f;
+    TestWorld world = room_with(material);
+    const NodeId ball = world.scene.match("/base/ball").at(0);
+    RigidBody body;
+    body.linear_velocity = Vec3(1.0, 2.0, -3.0);
+    world.scene.edit(ball).rigid_body = body;
+    const NodeId box = world.scene.match("/base/box").at(0);
+    body.angular_velocity = Vec3(5.0, -9.0, 7.0);
+    world.scene.edit(box).rigid_body = body;
+    const NodeId camera = camera_into(world);
+    change(*world.scene.edit(camera).camera);
+    world.scene.edit(camera).camera->linear_velocity = Vec3(0.5, 0.2, 0.0);
+    const Difference d = difference(render_both(world, camera, reference(16)), name);
+    CAPTURE(name, d.mean, d.unequal);
+    CHECK(d.mean < 0.004);
+    // Embree moves vertices straight from step to step, we turn them: edges that move differ.
+    CHECK(d.unequal < (std::string(name) == "shutter" ? 0.25 : 0.06));
+  }
+}
+
+TEST_CASE("what a job says of pictures holds on the device", "[vulkan]") {
+  if (!test::has_vulkan_device()) return;
+  const std::vector<std::pair<const char*, std::function<void(PictureParams&)>>> changes{
+      {"blender", [](PictureParams& p) { p.principled = "blender"; }},
+      {"clamp", [](PictureParams& p) { p.clamp = 0.2; }},
+      {"direct", [](PictureParams& p) { p.max_bounces = 0; }},
+      {"long", [](PictureParams& p) { p.max_bounces = 30, p.samples = 4; }},
+      {"denoised", [](PictureParams& p) { p.denoise = true; }},
+      {"real_time", [](PictureParams& p) { p.mode = "real_time", p.samples = 1; }},
+      {"preview", [](PictureParams& p) { p.mode = "preview", p.samples = 2; }},
+      {"error target", [](PictureParams& p) { p.error_target = 0.12, p.samples = 64; }},
+  };
+  Material coated;
+  coated.base_color = Vec3f(0.7f, 0.1f, 0.1f);
+  coated.clearcoat = 1.0f;
+  for (const auto& [name, change] : changes) {
+    TestWorld world = room_with(coated);
+    const NodeId camera = camera_into(world);
+    PictureParams params = reference(8);
+    change(params);
+    const Difference d = difference(render_both(world, camera, params), name);
+    CAPTURE(name, d.mean, d.unequal);
+    // A round more or less of an error target hangs on single paths.
+    const bool is_adaptive = params.error_target > 0.0;
+    CHECK(d.mean < (is_adaptive ? 0.01 : 0.003));
+    if (!is_adaptive) CHECK(d.unequal < 0.08);
+  }
+}
+
+TEST_CASE("labels are Embree's to the byte", "[vulkan]") {
+  if (!test::has_vulkan_device()) return;
+  const auto all = geometry_channels();
+  for (const LensModel lens : {LensModel::Pinhole, LensModel::OpencvPinhole}) {
+    Material fence = matte(0.5f);
+    fence.opacity_texture = input(checks(12, 10, 1, ColorSpace::Linear, false));
+    fence.opacity_threshold = 0.5f;
+    TestWorld world = room_with(fence);
+    const NodeId camera = camera_into(world);
+    Camera& c = *world.scene.edit(camera).camera;
+    c.lens = lens;
+    c.distortion = {-0.1, 0.02};
+    const auto p = render_by_embree(world.scene, camera, reference(1), all);
+    const auto q = render_by_vulkan(world.scene, camera, reference(1), all);
+    const auto same = [&](auto channel) {
+      const auto a = std::as_bytes(p.get(channel).pixels());
+      const auto b = std::as_bytes(q.get(channel).pixels());
+      return std::ranges::equal(a, b);
+    };
+    CHECK(same(kDistanceToCamera));
+    CHECK(same(kDistanceToImagePlane));
+    CHECK(same(kNormals));
+    CHECK(same(kLeafId));
+    CHECK(same(kPosition));
+    CHECK(same(kUv));
+    CHECK(same(kAlbedo));
+
+    RenderHost host(2);
+    EmbreeRenderer embree(reference(1), host);
+    VulkanRenderer vulkan(on_device(reference(1)), host, test::path_device());
+    embree.prepare(world.scene);
+    vulkan.prepare(world.scene);
+    std::vector<LabelledInstance> instances;
+    for (const char* path : {"/base/ball", "/base/box"}) {
+      instances.push_back(
+          {.node = world.scene.match(path).at(0), .leaves = {world.scene.match(path).at(0)}});
+    }
+    const auto covered = embree.cover(camera, instances, true);
+    const auto covered_too = vulkan.cover(camera, instances, true);
+    REQUIRE(covered.size() == covered_too.size());
+    for (std::size_t i = 0; i < covered.size(); ++i) {
+      CHECK(covered[i].bits == covered_too[i].bits);
+      CHECK(covered[i].distances == covered_too[i].distances);
+      CHECK(std::ranges::count(covered[i].bits, 1) > 0);
+    }
+  }
+}
+
+TEST_CASE("pictures are the same bytes for any threads, and whatever came before", "[vulkan]") {
+  if (!test::has_vulkan_device()) return;
+  Material glass;
+  glass.transmission = 1.0f;
+  glass.roughness = 0.2f;
+  TestWorld world = room_with(glass);
+  const NodeId camera = camera_into(world);
+  const NameSet channels{std::string(kColorHdr.name)};
+  const auto picture = [&](int threads, bool shows_other_first) {
+    RenderHost host(threads);
+    VulkanRenderer renderer(on_device(reference(4)), host, test::path_device());
+    if (shows_other_first) {
+      TestWorld other = room_with(matte(0.3f));
+      const NodeId from = camera_into(other);
+      renderer.prepare(other.scene);
+      renderer.render({from, channels, 5});
+      // The same scene with things elsewhere, then back.
+      const NodeId ball = world.scene.match("/base/ball").at(0);
+      const Affine pose = world.scene[ball].parent_from_node;
+      world.scene.set_pose(ball, at(0.1, -0.4, -0.2));
+      renderer.prepare(world.scene);
+      renderer.render({camera, channels, 5});
+      world.scene.set_pose(ball, pose);
+    }
+    renderer.prepare(world.scene);
+    return renderer.render({camera, channels, 5}).get(kColorHdr);
+  };
+  const Image<Vec3f> one = picture(1, false);
+  const Image<Vec3f> three = picture(3, false);
+  const Image<Vec3f> later = picture(2, true);
+  const auto same = [&](const Image<Vec3f>& other) {
+    return std::ranges::equal(std::as_bytes(one.pixels()), std::as_bytes(other.pixels()));
+  };
+  CHECK(same(three));
+  CHECK(same(later));
+}
+
+TEST_CASE("memory on the device does not grow with captures", "[vulkan]") {
+  if (!test::has_vulkan_device()) return;
+  Material painted;
+  painted.base_color_texture = input(checks(64, 32, 3, ColorSpace::Srgb, false));
+  TestWorld one = room_with(painted);
+  TestWorld other = room_with(matte(0.3f));
+  other.add(dome(0.2f));
+  const NodeId from_one = camera_into(one);
+  const NodeId from_other = camera_into(other);
+  RenderHost host(2);
+  VulkanRenderer renderer(on_device(reference(1, 1)), host, test::path_device());
+  std::vector<std::uint64_t> held;
+  for (int i = 0; i < 12; ++i) {
+    TestWorld& world = i % 2 == 0 ? one : other;
+    world.scene.set_pose(world.scene.match("/base/ball").at(0), at(0.1 * i, 0.2, -0.5));
+    renderer.prepare(world.scene);
+    renderer.render({i % 2 == 0 ? from_one : from_other, {std::string(kColorHdr.name)}, 5});
+    held.push_back(test::path_device()->device.held());
+  }
+  for (std::size_t i = 2; i < held.size(); ++i) CHECK(held[i] == held[1]);
+}
+
+TEST_CASE("sums do not depend on how many paths are under way", "[vulkan]") {
+  if (!test::has_vulkan_device()) return;
+  TestWorld world = room_with(matte(0.7f));
+  const NodeId camera = camera_into(world);
+  RenderHost host(2);
+  EmbreeScene meshes(host, {"sse2", {}});
+  meshes.take(world.scene);
+  const PathDevice& device = *test::path_device();
+  GpuScene scene(device.device, host);
+  scene.take(meshes.render_scene());
+  const View view(world.scene, camera);
+  const auto sums = [&](std::uint32_t most_slots) {
+    GpuPathTracer tracer(device, host, most_slots);
+    tracer.begin(view, {.max_bounces = 3}, scene.world(), meshes.window());
+    SamplePlan plan(view.camera().width, view.camera().height, {5}, 9);
+    const auto counts = tracer.trace(plan.next_round({}, 0.0));
+    CHECK(counts.rays > 5u * 35u * 26u);
+    Image<PixelSum> image = tracer.sums();
+    std::vector<float> values;
+    for (const PixelSum& sum : image.pixels()) {
+      const FilmPixel pixel = sum.mean();
+      values.insert(values.end(), pixel.scattered.data(), pixel.scattered.data() + 3);
+      values.insert(values.end(), pixel.normal.data(), pixel.normal.data() + 3);
+      values.insert(values.end(), {pixel.variance, pixel.brightest, pixel.count});
+    }
+    return values;
+  };
+  const std::vector<float> many = sums(1000);
+  CHECK(sums(1) == many);
+  CHECK(sums(7) == many);
+}
+
+TEST_CASE("a ray that needs more rounds than the driver can loop ends the job", "[vulkan]") {
+  if (!test::has_vulkan_device()) return;
+  // Sheets that are not there, one behind the other: rays look at all of them.
+  TestWorld world;
+  constexpr int kSheets = 40'000;
+  Mesh sheets;
+  for (int i = 0; i < kSheets; ++i) {
+    const float x = 1.0f + 1e-4f * float(i);
+    const auto first = std::uint32_t(sheets.positions.size());
+    sheets.positions.insert(sheets.positions.end(),
+                            {Vec3f(x, -9, -9), Vec3f(x, 9, -9), Vec3f(x, 0, 9)});
+    sheets.triangles.push_back({first, first + 1, first + 2});
+  }
+  Material absent = matte(0.5f);
+  absent.opacity = 0.0f;
+  absent.opacity_threshold = 0.5f;
+  world.add("sheets", sheets, absent);
+  world.add(dome(1.0f));
+  const NodeId camera = world.add_camera(2, 2, 20.0, Vec3(0, 0, 0), Vec3(1, 0, 0));
+  RenderHost host(1);
+  VulkanRenderer renderer(on_device(reference(1)), host, test::path_device());
+  renderer.prepare(world.scene);
+  const NameSet channels{std::string(kColorHdr.name)};
+  const std::uint32_t limit = test::path_device()->kernels.iteration_limit;
+  if (limit == 0xFFFFFFFFu) {
+    const Frame frame = renderer.render({camera, channels, 5});
+    CHECK(frame.get(kColorHdr).at(0, 0).x() == Approx(1.0f));
+    return;
+  }
+  CHECK_THROWS_WITH(renderer.render({camera, channels, 5}),
+                    Catch::Contains("ends loops after 65023 rounds, and a ray of this scene needs "
+                                    "more; use a newer driver, or the renderer embree"));
 }
 
 }  // namespace diorama

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <memory>
 #include <string>
 
 #include "diorama/error.h"
+#include "gpu_path_tracer.h"
 #include "support/catch.h"
-#include "vulkan_instance.h"
 
 namespace diorama::test {
 
@@ -18,6 +19,12 @@ inline bool has_vulkan_device() {
     WARN("skipped: " << error.what());
     return false;
   }
+}
+
+/// Opened once for all tests.
+inline std::shared_ptr<const PathDevice> path_device() {
+  static const auto device = std::make_shared<const PathDevice>(0);
+  return device;
 }
 
 }  // namespace diorama::test
