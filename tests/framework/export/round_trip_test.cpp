@@ -27,7 +27,7 @@ struct Workshop {
     std::string pattern = (fs::temp_directory_path() / "diorama_export_XXXXXX").string();
     folder = mkdtemp(pattern.data());
     registry.add_builtin(register_usd, "1.0.0");
-    host = std::make_unique<HostServices>(registry, HostOptions{std::nullopt, 2},
+    host = std::make_unique<HostServices>(registry, HostOptions{std::nullopt, {}, 2},
                                           [this](LogLevel level, std::string_view text) {
                                             if (level >= LogLevel::Warning)
                                               warnings.emplace_back(text);
