@@ -365,26 +365,28 @@ DenoiserNetwork::Logits DenoiserNetwork::run(ChannelBlocks features, Isa isa, Ho
     });
     return to;
   };
-  ChannelBlocks now = std::move(features);
-  const auto move_on = [&](ChannelBlocks next) {
+  const auto move_on = [&](ChannelBlocks& now, ChannelBlocks next) {
     now.hand_on(spare);
     now = std::move(next);
   };
   std::array<ChannelBlocks, kDepth> levels;
-  for (std::size_t level = 0; level < kDepth; ++level) {
-    if (level > 0) now = halved(levels[level - 1], host, spare);
-    for (const Convolution& c : encoder_[level]) move_on(convolved(c, now, true));
+  const auto encode = [&](std::size_t level, ChannelBlocks now) {
+    for (const Convolution& c : encoder_[level]) move_on(now, convolved(c, now, true));
     levels[level] = std::move(now);
+  };
+  encode(0, std::move(features));
+  for (std::size_t level = 1; level < kDepth; ++level) {
+    encode(level, halved(levels[level - 1], host, spare));
   }
   Logits logits;
-  now = std::move(levels[kDepth - 1]);
+  ChannelBlocks now = std::move(levels[kDepth - 1]);
   logits.levels[kDepth - 1] = convolved(heads_[kDepth - 1], now, false);
   for (std::size_t level = kDepth - 1; level-- > 0;) {
     ChannelBlocks next = convolved(narrow_[level], now, false);
-    move_on(std::move(levels[level]));
+    move_on(now, std::move(levels[level]));
     add_next_level(now, next, host);
     next.hand_on(spare);
-    for (const Convolution& c : decoder_[level]) move_on(convolved(c, now, true));
+    for (const Convolution& c : decoder_[level]) move_on(now, convolved(c, now, true));
     logits.levels[level] = convolved(heads_[level], now, false);
   }
   logits.last = std::move(now);
