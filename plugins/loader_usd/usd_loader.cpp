@@ -19,13 +19,15 @@ namespace {
 usd::AssetLibrary::LookUp look_up_by(const Host& host) {
   return [&host](const std::string& asset) {
     const bool is_url = asset.find("://") != std::string::npos;
+    const bool is_bare = !is_url && !asset.starts_with('/');
     usd::AssetLibrary::Lookup result;
-    // From the root of all paths: never beside whoever runs the program.
-    const std::string name = is_url || asset.starts_with('/') ? asset : "/" + asset;
+    // Never beside whoever runs the program, nor below the root of all files.
+    const std::string name = is_bare ? "/" + asset : asset;
     try {
       const std::filesystem::path file = host.resolve(name);
       std::error_code error;
-      if (std::filesystem::is_regular_file(file, error)) result.file = file.generic_string();
+      const bool is_found = std::filesystem::is_regular_file(file, error);
+      if (is_found && !(is_bare && file == name)) result.file = file.generic_string();
     } catch (const Error& error) {
       const std::string text = error.what();
       if (is_url) result.why_not = text.substr(text.starts_with(name + ": ") ? name.size() + 2 : 0);

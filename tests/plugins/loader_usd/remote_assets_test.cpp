@@ -106,12 +106,15 @@ TEST_CASE("what lies beside a layer comes before the assets root, and stays ther
   disk.elsewhere.write("Isaac/Props/cup.usda",
                        "#usda 1.0\n(\n    defaultPrim = \"Own\"\n)\ndef Xform \"Own\"\n{\n"
                        "    def Cube \"Mine\"\n    {\n    }\n}\n");
-  disk.load(disk.scene_of({"Isaac/Props/cup.usda", "./Isaac/Props/parts/handle.usda"}));
+  // The last one is there, if it is taken for an absolute path.
+  const std::string bare = disk.elsewhere.write("plain.usda", "#usda 1.0\n").substr(1);
+  disk.load(disk.scene_of({"Isaac/Props/cup.usda", "./Isaac/Props/parts/handle.usda", bare}));
   CHECK(disk.scene.find("/asset/Root/P0/Mine"));
   CHECK_FALSE(disk.scene.find("/asset/Root/P1/Ring"));
-  REQUIRE(disk.host.warnings.size() == 1);
+  REQUIRE(disk.host.warnings.size() == 2);
   CHECK(disk.host.warnings[0].ends_with(
       "scene.usda: </Root/P1> reference @./Isaac/Props/parts/handle.usda@ could not be found"));
+  CHECK(disk.host.warnings[1].ends_with("@" + bare + "@ could not be found"));
 }
 
 TEST_CASE("an asset that is nowhere is one warning that says where it would be looked for",
