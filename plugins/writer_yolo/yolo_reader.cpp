@@ -256,9 +256,11 @@ class YoloDataset final : public StoredDataset {
     info_.holds = {std::string(kColor.name), std::string(kHoldsInstances),
                    std::string(kHoldsLabels), std::string(kHoldsTightBoxes)};
     if (task_ == Task::Polygons) info_.holds.emplace(kInstanceId.name);
-    // The extent of a rotated box reaches further than the pixels, and people do not draw boxes
-    // along pixels.
-    const double step = task_ == Task::RotatedBoxes ? kAnywhere : page_ ? 0.0 : 2.0;
+    // The extent of a rotated box reaches further than the pixels, a margin as far as one likes,
+    // and people do not draw boxes along pixels.
+    const bool is_loose = page_ && page_->conventions.value("box_margin", 0.0) > 0.0;
+    const bool is_anywhere = task_ == Task::RotatedBoxes || is_loose;
+    const double step = is_anywhere ? kAnywhere : page_ ? 0.0 : 2.0;
     info_.steps[std::string(kHoldsTightBoxes)] = step;
     // Trainers' pictures are JPEG as often as not.
     const bool is_lossy = std::ranges::any_of(

@@ -2,6 +2,7 @@
 #include "writer_yolo/yolo_writer.h"
 
 #include <array>
+#include <cmath>
 #include <cstdio>
 
 #include "opencv_support/contours.h"
@@ -23,14 +24,18 @@ void append_point(std::string& line, const Frame& frame, const Vec2& point) {
   append_number(line, point.y() / frame.camera.height);
 }
 
-/// `margin` is a share of the box's sides; what it would take outside the picture is cut off.
-void append_box(std::string& line, const Frame& frame, const PixelBox& box, double margin) {
-  const Vec2 more = 0.5 * margin * Vec2(box.width(), box.height());
-  const Vec2 low = (Vec2(box.x_min, box.y_min) - more).cwiseMax(0.0);
-  const Vec2 high =
-      (Vec2(box.x_max, box.y_max) + more).cwiseMin(Vec2(frame.camera.width, frame.camera.height));
-  append_point(line, frame, 0.5 * (low + high));
-  append_point(line, frame, high - low);
+/// `margin` is a share of the box's sides; edges go on to the next pixel, and not out of the
+/// picture.
+PixelBox with_margin(const PixelBox& box, double margin, const Camera& camera) {
+  const double more_x = 0.5 * margin * box.width(), more_y = 0.5 * margin * box.height();
+  const PixelBox looser{int(std::floor(box.x_min - more_x)), int(std::floor(box.y_min - more_y)),
+                        int(std::ceil(box.x_max + more_x)), int(std::ceil(box.y_max + more_y))};
+  return looser.clipped(camera.width, camera.height);
+}
+
+void append_box(std::string& line, const Frame& frame, const PixelBox& box) {
+  append_point(line, frame, {0.5 * (box.x_min + box.x_max), 0.5 * (box.y_min + box.y_max)});
+  append_point(line, frame, {double(box.width()), double(box.height())});
 }
 
 void append_keypoints(std::string& line, const Frame& frame, const Instance& instance) {
@@ -90,7 +95,7 @@ std::string YoloWriter::line(const Frame& frame, const TrainingObject& object) c
   const Instance& instance = *object.instance;
   std::string text = std::to_string(object.class_index);
   if (params_.task == "detect" || params_.task == "pose") {
-    append_box(text, frame, *instance.tight_box, params_.box_margin);
+    append_box(text, frame, with_margin(*instance.tight_box, params_.box_margin, frame.camera));
     if (params_.task == "pose") append_keypoints(text, frame, instance);
     return text;
   }

@@ -2,6 +2,7 @@
 #include "writer_yolo/yolo_writer.h"
 
 #include <algorithm>
+#include <cmath>
 #include <sstream>
 
 #include "opencv_support/contours.h"
@@ -86,11 +87,13 @@ TEST_CASE("boxes may be looser than what is seen, but stay in the picture", "[wr
   for (std::size_t i = 0; i < lines.size(); ++i) {
     CHECK(looser[i][0] == lines[i][0]);
     for (const std::size_t axis : {1u, 2u}) {
-      const double low = lines[i][axis] - 0.75 * lines[i][axis + 2];
-      const double high = lines[i][axis] + 0.75 * lines[i][axis + 2];
-      CHECK(looser[i][axis] - 0.5 * looser[i][axis + 2] == Approx(std::max(0.0, low)).margin(2e-6));
-      CHECK(looser[i][axis] + 0.5 * looser[i][axis + 2] ==
-            Approx(std::min(1.0, high)).margin(2e-6));
+      const Camera& camera = test::sample_captures()[0].frames[0].camera;
+      const double size = axis == 1 ? camera.width : camera.height;
+      const double middle = size * lines[i][axis], reach = 0.75 * size * lines[i][axis + 2];
+      const double low = size * (looser[i][axis] - 0.5 * looser[i][axis + 2]);
+      const double high = size * (looser[i][axis] + 0.5 * looser[i][axis + 2]);
+      CHECK(low == Approx(std::max(0.0, std::floor(middle - reach + 1e-3))).margin(1e-3));
+      CHECK(high == Approx(std::min(size, std::ceil(middle + reach - 1e-3))).margin(1e-3));
     }
   }
 }
