@@ -5,6 +5,8 @@
 #include <string>
 #include <utility>
 
+#include "diorama/error.h"
+
 namespace diorama {
 
 void VulkanRenderer::Params::visit(ParamVisitor& v) {
@@ -28,6 +30,11 @@ void VulkanRenderer::prepare_paths() { scene_.take(meshes().render_scene()); }
 
 Film VulkanRenderer::trace(const View& view, const PathSettings& settings, SamplePlan& plan) {
   using Clock = std::chrono::steady_clock;
+  if (view.has_shutter()) {
+    throw Error(ErrorKind::Config,
+                "a camera has exposure_time_s or readout_time_s, and the renderer vulkan shows no "
+                "motion as yet: use the renderer embree, or set both to 0");
+  }
   const int width = view.camera().width;
   const int height = view.camera().height;
   const auto start = Clock::now();
