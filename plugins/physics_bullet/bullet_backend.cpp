@@ -116,8 +116,6 @@ void BulletBackend::do_reset(const Scene& scene) {
   info.m_splitImpulse = true;
   // Every overlap is undone by moving, none by speed.
   info.m_splitImpulsePenetrationThreshold = 0.0;
-  // With less, each step begins with contacts that carry too little, and stacks creep.
-  info.m_warmstartingFactor = 1.0;
   btDispatcherInfo& detection = world.dynamics.getDispatchInfo();
   detection.m_allowedCcdPenetration = 0.0;
   detection.m_deterministicOverlappingPairs = true;
