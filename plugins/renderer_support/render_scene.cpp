@@ -61,7 +61,10 @@ bool RenderScene::take(const Scene& scene) {
     return a.world_from_node.matrix() == b.world_from_node.matrix();
   };
   const bool has_same_lights = std::ranges::equal(placed_lights_, previous_lights, is_same);
-  if (has_same_shapes && has_same_lights && std::ranges::equal(placed, placed_meshes_, is_same)) {
+  // What moves while a shutter is open has velocities, too, which may differ at the same place.
+  const bool is_still = window_ <= 0.0 && shutter_window(scene) <= 0.0;
+  if (has_same_shapes && has_same_lights && is_still &&
+      std::ranges::equal(placed, placed_meshes_, is_same)) {
     // Only cameras moved, or what is neither seen nor shines.
     pose_revision_ = scene.pose_revision();
     shape_revision_ = scene.shape_revision();

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gpu_path_tracer.h"
 
+#include <kernels.h>  // made from shaders/
+
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cstddef>
 
 #include "diorama/error.h"
-#include "kernels.h"
 
 namespace diorama {
 namespace {

@@ -14,6 +14,8 @@
 namespace diorama {
 namespace {
 
+constexpr const char* kLayouts[] = {"mono", "stereo"};
+
 /// KITTI's camera axes from ours: y and z change sign.
 Vec3 kitti_from_camera(const Vec3& p) { return {p.x(), -p.y(), -p.z()}; }
 
@@ -82,7 +84,7 @@ double baseline_of(const Frame& left, const Frame& right) {
   const Camera& b = right.camera;
   const auto fail = [&](const std::string& found) {
     throw Error(ErrorKind::Config,
-                "stereo: '" + right.camera_name + "' " + found + " '" + left.camera_name +
+                "layout: stereo: '" + right.camera_name + "' " + found + " '" + left.camera_name +
                     "', expected equal pinhole cameras by twos, left before right, as in rig: "
                     "[{name: left}, {name: right, position: [0.54, 0, 0]}]");
   };
@@ -136,7 +138,7 @@ Image<std::uint32_t> depth_picture(const Image<float>& depth) {
 std::vector<std::string> left_cameras(const DatasetInfo& dataset) {
   if (dataset.camera_names.size() % 2 != 0) {
     throw Error(ErrorKind::Config,
-                "stereo: takes cameras by twos, left before right; the job has " +
+                "layout: stereo takes cameras by twos, left before right; the job has " +
                     std::to_string(dataset.camera_names.size()));
   }
   std::vector<std::string> names;
@@ -151,8 +153,10 @@ std::vector<std::string> left_cameras(const DatasetInfo& dataset) {
 void KittiWriter::Params::visit(ParamVisitor& v) {
   training.visit(v);
   v.param("depth", depth, {"Depth pictures, 16 bit, metres x 256."});
-  v.param("stereo", stereo,
-          {"Cameras go by twos, left before right; the right one's picture is image_3."});
+  v.choice(
+      "layout", layout, kLayouts,
+      {"mono: each camera's pictures are image_2; stereo: cameras go by twos, left before right, "
+       "and the right one's picture is image_3."});
   v.param("bbox_height_threshold", bbox_height_threshold,
           {"Objects whose 2-D box is lower are left out.", "px", 0});
   v.param("fully_visible_threshold", fully_visible_threshold,
@@ -207,7 +211,7 @@ std::string KittiWriter::stem(int capture, int camera) const {
 
 void KittiWriter::begin(const DatasetInfo& all, DatasetFiles& files) {
   DatasetInfo dataset = all;
-  if (params_.stereo) dataset.camera_names = left_cameras(all);
+  if (is_stereo()) dataset.camera_names = left_cameras(all);
   training_.begin(dataset);
   padding_ = grown_padding(6, dataset.capture_count * training_.camera_count());
   std::string train, val, both;
@@ -228,19 +232,19 @@ void KittiWriter::begin(const DatasetInfo& all, DatasetFiles& files) {
       {"location", "middle of the bottom face in the camera's space"},
       {"number", "capture x cameras + camera"},
       {"depth", "along the viewing axis, metres x 256 in 16 bit, 0: nothing"}};
-  if (params_.stereo) {
+  if (is_stereo()) {
     conventions["image_3"] = "the camera to the right; P1 and P3 hold -fx x baseline in metres";
   }
   training_.add_dataset_page("KITTI", std::move(conventions), dataset, files);
 }
 
 void KittiWriter::write(const Capture& capture, CaptureFiles& files) const {
-  const std::size_t step = params_.stereo ? 2 : 1;
+  const std::size_t step = is_stereo() ? 2 : 1;
   for (std::size_t i = 0; i + step <= capture.frames.size(); i += step) {
     const Frame& frame = capture.frames[i];
     const std::string name = stem(capture.index, int(i / step));
     double baseline_m = 0.0;
-    if (params_.stereo) {
+    if (is_stereo()) {
       const Frame& right = capture.frames[i + 1];
       baseline_m = baseline_of(frame, right);
       files.add("training/image_3/" + name + "." + training_.image_format(),

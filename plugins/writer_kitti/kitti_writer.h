@@ -19,13 +19,13 @@ namespace diorama {
 ///     training/image_2/000024.png  label_2/000024.txt  calib/000024.txt  depth_2/000024.png
 ///              image_3/000024.png
 ///
-/// Cameras take turns: number = capture x cameras + camera. With `stereo` they go by twos, left
-/// before right: the right one's picture is image_3, its projection P3 (and P1) with the baseline,
-/// and all else is the left one's. Boxes are upright in the camera's own
-/// space (x right, y down, z forward): turned about y by the object's heading and wide enough to
-/// hold its box; `location` is the middle of the bottom face. Depth is 16 bit, metres x 256, 0
-/// where nothing is or beyond 255.99 m. KITTI's pictures are rectified: for another lens than a
-/// pinhole the calibration has a line of ours, `lens_2`, with JSON text.
+/// Cameras take turns: number = capture x cameras + camera. With the layout `stereo` they go by
+/// twos, left before right: the right one's picture is image_3, its projection P3 (and P1) with the
+/// baseline, and all else is the left one's. Boxes are upright in the camera's own space (x right,
+/// y down, z forward): turned about y by the object's heading and wide enough to hold its box;
+/// `location` is the middle of the bottom face. Depth is 16 bit, metres x 256, 0 where nothing is
+/// or beyond 255.99 m. KITTI's pictures are rectified: for another lens than a pinhole the
+/// calibration has a line of ours, `lens_2`, with JSON text.
 ///
 /// The keywords of Replicator's writer of the same name are understood: the choice of labels and
 /// the thresholds. What it says of segmentation pictures and names of folders has no effect and is
@@ -35,7 +35,7 @@ class KittiWriter final : public Writer {
   struct Params {
     TrainingParams training;
     bool depth = true;
-    bool stereo = false;
+    std::string layout = "mono";
     int bbox_height_threshold = 0;
     double fully_visible_threshold = 0.95;
     double partly_occluded_threshold = 0.5;
@@ -58,6 +58,7 @@ class KittiWriter final : public Writer {
   void write(const Capture& capture, CaptureFiles& files) const override;
 
  private:
+  bool is_stereo() const { return params_.layout == "stereo"; }
   std::string stem(int capture, int camera) const;
   void notice_idle_keywords() const;
 

@@ -125,7 +125,8 @@ TEST_CASE("a scene without any light is black", "[renderer]") {
   world.add("ball", make_sphere(1.0), metal);
   world.add("floor", make_plane(5, 4), matte(0.5f), at(0, 0, -1.1));
   const NodeId camera = world.add_camera(24, 20, 20.0, Vec3(3, -2, 1), Vec3(0.1, 0.2, -0.1));
-  for (const Vec3f& p : render(world, camera, reference(4)).pixels()) REQUIRE(p.isZero());
+  const Image<Vec3f> picture = render(world, camera, reference(4));
+  for (const Vec3f& p : picture.pixels()) REQUIRE(p.isZero());
 }
 
 TEST_CASE("a lamp over a floor lights it by the closed form", "[renderer]") {

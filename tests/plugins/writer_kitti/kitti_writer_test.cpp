@@ -55,7 +55,7 @@ TEST_CASE("a stereo pair is image_2 and image_3, and P3 holds the baseline", "[w
   Capture capture = test::ray_cast_capture(sample, 0);
   test::FakeHost host;
   KittiWriter::Params params;
-  params.stereo = true;
+  params.layout = "stereo";
   KittiWriter writer(params, host);
   const MemoryFiles files = test::write_dataset(writer, test::sample_dataset(sample), {&capture});
   for (const char* name : {"image_2/000000.png", "image_3/000000.png", "label_2/000000.txt"}) {
