@@ -585,7 +585,7 @@ TEST_CASE("sums do not depend on how many paths are under way", "[vulkan]") {
   CHECK(sums(7) == many);
 }
 
-TEST_CASE("a ray that needs more rounds than the driver can loop ends the job", "[vulkan]") {
+TEST_CASE("a ray that passes a hundred thousand surfaces is right, or ends the job", "[vulkan]") {
   if (!test::has_vulkan_device()) return;
   // Sheets that are not there, one behind the other: rays look at all of them.
   TestWorld world;
@@ -608,15 +608,15 @@ TEST_CASE("a ray that needs more rounds than the driver can loop ends the job", 
   VulkanRenderer renderer(on_device(reference(1)), host, test::path_device());
   renderer.prepare(world.scene);
   const NameSet channels{std::string(kColorHdr.name)};
-  const std::uint32_t limit = test::path_device()->kernels.iteration_limit;
-  if (limit == 0xFFFFFFFFu) {
+  try {
     const Frame frame = renderer.render({camera, channels, 5});
     CHECK(frame.get(kColorHdr).at(0, 0).x() == Approx(1.0f));
-    return;
+  } catch (const Error& error) {
+    CHECK(test::path_device()->kernels.iteration_limit != 0xFFFFFFFFu);
+    CHECK_THAT(error.what(),
+               Catch::Contains("and a ray of this scene needs more; use a newer driver, or the "
+                               "renderer embree"));
   }
-  CHECK_THROWS_WITH(renderer.render({camera, channels, 5}),
-                    Catch::Contains("ends loops after 65023 rounds, and a ray of this scene needs "
-                                    "more; use a newer driver, or the renderer embree"));
 }
 
 }  // namespace diorama
