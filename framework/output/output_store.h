@@ -227,7 +227,8 @@ class OutputStore {
   JournalWriter writer_;
   bool has_joined_ = false;
   bool has_opened_ = false;
-  bool replaces_ = false;  ///< The old dataset is still there and does not count.
+  /// The old dataset is still there and does not count. Visits ask while the output begins.
+  std::atomic<bool> replaces_ = false;
   std::vector<std::filesystem::path> created_;
 
   std::mutex folders_mutex_;

@@ -143,7 +143,7 @@ TEST_CASE("loops are shared only with threads that find a free seat", "[host]") 
   std::atomic<int> seated = 0;
   std::vector<std::thread> busy;
   for (int i = 0; i < 2; ++i) {
-    busy.emplace_back([&] {
+    busy.emplace_back([&, i] {
       const ThreadPool::Seat seat(pool, i);
       ++seated;
       while (!is_over) std::this_thread::yield();
