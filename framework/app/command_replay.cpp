@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <fstream>
+#include <functional>
 #include <iostream>
+#include <map>
 #include <set>
 #include <system_error>
 
@@ -88,25 +90,42 @@ struct Comparison {
   std::vector<std::string> differences;
 };
 
-/// The files of the captures that were made again against those of the dataset.
-Comparison compare(const fs::path& again, const DatasetStatus& again_status,
-                   const DatasetStatus& status, const std::set<int>& captures) {
+/// All that the journals of a dataset say of captures.
+void visit_files(const fs::path& folder, const DatasetStatus& status, const std::set<int>& captures,
+                 const std::function<void(const std::string& records, int capture,
+                                          const JournalledFile& file)>& visit) {
   LocalFileSystem file_system;
-  Journals journals(file_system, again / ".diorama" / "journal", again_status.captures);
+  Journals journals(file_system, folder / ".diorama" / "journal", status.captures);
   journals.refresh();
-  Comparison result;
+  const std::string records = journals.records_folder().value_or(".");
   journals.visit_entries([&](const std::string& worker, const EntryPlace& place) {
     if (!place.is_published || !captures.contains(place.entry)) return;
     const auto content = journals.files_of(worker, place);
     if (!content) return;
-    for (const JournalledFile& file : content->files) {
-      ++result.files;
-      const std::string there = digest_of_file(status.base / file.path);
-      if (there == file.digest) continue;
-      result.differences.push_back("capture " + std::to_string(place.entry) + ": " + file.path +
-                                   (there.empty() ? " is missing" : " differs"));
-    }
+    for (const JournalledFile& file : content->files) visit(records, place.entry, file);
   });
+}
+
+/// The files of the captures that were made again against those of the dataset. What captures kept
+/// went into files that they share: its digest is in the dataset's journals.
+Comparison compare(const fs::path& again, const DatasetStatus& again_status,
+                   const fs::path& dataset, const DatasetStatus& status,
+                   const std::set<int>& captures) {
+  std::map<std::string, std::string> kept;
+  visit_files(dataset, status, captures, [&](const auto& records, int, const auto& file) {
+    if (is_kept_path(records, file.path)) kept[file.path] = file.digest;
+  });
+  Comparison result;
+  visit_files(
+      again, again_status, captures, [&](const auto& records, int capture, const auto& file) {
+        ++result.files;
+        const std::string there = is_kept_path(records, file.path)
+                                      ? kept[file.path]
+                                      : digest_of_file(status.base / file.path);
+        if (there == file.digest) return;
+        result.differences.push_back("capture " + std::to_string(capture) + ": " + file.path +
+                                     (there.empty() ? " is missing" : " differs"));
+      });
   return result;
 }
 
@@ -120,7 +139,7 @@ int command_replay(const GlobalOptions& global, const ReplayOptions& options, Co
   const fs::path records =
       make_captures_again(global, status, place.path(), captures, options.sets, log);
   const Comparison result =
-      compare(records, read_status(file_system, records, false), status, captures);
+      compare(records, read_status(file_system, records, false), options.dataset, status, captures);
   for (const std::string& difference : result.differences) {
     std::cout << printable(difference) << "\n";
   }

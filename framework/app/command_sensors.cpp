@@ -92,7 +92,9 @@ class CountedFiles final : public CaptureFiles {
  public:
   void add(std::string_view, std::vector<std::byte>) override { ++count; }
   void append(std::string_view, std::span<const std::byte>) override { ++count; }
+  void append_kept(std::string_view, int) override { ++count; }
   void record(std::string_view) override {}
+  void keep(std::span<const std::byte>) override { ++count; }
   int count = 0;
 };
 

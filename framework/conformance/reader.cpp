@@ -60,8 +60,16 @@ class FilesInFolder final : public CaptureFiles {
   void append(std::string_view path, std::span<const std::byte> bytes) override {
     folder_.append(std::string(path), bytes);
   }
+  void append_kept(std::string_view path, int capture) override {
+    append(path, kept_by_all.at(std::size_t(capture)));
+  }
   void record(std::string_view line) override { records.emplace_back(line); }
+  void keep(std::span<const std::byte> bytes) override {
+    kept.insert(kept.end(), bytes.begin(), bytes.end());
+  }
   std::vector<std::string> records;
+  std::vector<std::byte> kept;
+  std::vector<std::vector<std::byte>> kept_by_all;  ///< Of finish(): by captures.
 
  private:
   const Folder& folder_;
@@ -75,6 +83,7 @@ void write_dataset(Writer& writer, const std::vector<Capture>& captures, const F
     FilesInFolder files(folder);
     writer.write(capture, files);
     records.push_back(std::move(files.records));
+    whole.kept_by_all.push_back(std::move(files.kept));
   }
   writer.finish(
       [&records](const RecordVisitor& visit) {

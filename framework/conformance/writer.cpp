@@ -27,6 +27,8 @@ class MemoryFiles final : public CaptureFiles {
   explicit MemoryFiles(bool yields = false) : yields_(yields) {}
   std::map<std::string, std::vector<std::byte>> files;
   std::vector<std::string> records;
+  std::vector<std::byte> kept;
+  const std::vector<MemoryFiles>* ended = nullptr;  ///< Of finish(): all captures.
 
   void add(std::string_view path, std::vector<std::byte> bytes) override {
     give_way();
@@ -42,13 +44,24 @@ class MemoryFiles final : public CaptureFiles {
     std::vector<std::byte>& file = files[std::string(path)];
     file.insert(file.end(), bytes.begin(), bytes.end());
   }
+  void append_kept(std::string_view path, int capture) override {
+    require(ended != nullptr, "takes what captures keep before finish()");
+    const bool is_there = capture >= 0 && std::size_t(capture) < ended->size() &&
+                          !(*ended)[std::size_t(capture)].kept.empty();
+    require(is_there, "takes what capture " + std::to_string(capture) + " has not kept");
+    append(path, (*ended)[std::size_t(capture)].kept);
+  }
+  void keep(std::span<const std::byte> bytes) override {
+    give_way();
+    kept.insert(kept.end(), bytes.begin(), bytes.end());
+  }
   void record(std::string_view line) override {
     give_way();
     require(line.find('\n') == line.npos, "a record holds a line break");
     records.emplace_back(line);
   }
   friend bool operator==(const MemoryFiles& a, const MemoryFiles& b) {
-    return a.files == b.files && a.records == b.records;
+    return a.files == b.files && a.records == b.records && a.kept == b.kept;
   }
 
  private:
@@ -79,7 +92,9 @@ void finish(Writer& writer, Dataset& dataset) {
       for (const std::string& line : dataset.captures[i].records) visit(int(i), line);
     }
   };
+  dataset.whole.ended = &dataset.captures;
   writer.finish(records, dataset.whole);
+  dataset.whole.ended = nullptr;
   MemoryFiles folder = dataset.whole;
   for (const MemoryFiles& capture : dataset.captures) {
     for (const auto& [path, bytes] : capture.files) folder.add(path, bytes);

@@ -62,7 +62,8 @@ void add_workers(FileSystem& file_system, const fs::path& folder, const Journals
   for (auto& [name, worker] : workers) status.workers.push_back(std::move(worker));
 }
 
-void verify(FileSystem& file_system, const Journals& journals, DatasetStatus& status) {
+void verify(FileSystem& file_system, const Journals& journals, const std::string& records,
+            DatasetStatus& status) {
   journals.visit_entries([&](const std::string& worker, const EntryPlace& place) {
     if (!place.is_published || place.entry >= status.captures) return;
     const auto content = journals.files_of(worker, place);
@@ -71,6 +72,7 @@ void verify(FileSystem& file_system, const Journals& journals, DatasetStatus& st
       return;
     }
     for (const JournalledFile& file : content->files) {
+      if (status.is_finished && is_kept_path(records, file.path)) continue;
       const fs::path path = status.base / file.path;
       const auto found = file_system.status(path);
       if (!found || found->kind != FileStatus::Kind::File) {
@@ -78,7 +80,7 @@ void verify(FileSystem& file_system, const Journals& journals, DatasetStatus& st
       } else if (found->size != file.size) {
         status.faults.push_back(file.path + ": expected " + std::to_string(file.size) +
                                 " bytes, found " + std::to_string(found->size));
-      } else if (digest_of(file_system.read(path)) != file.digest) {
+      } else if (digest_of(file_system, path) != file.digest) {
         status.faults.push_back(file.path + ": not what was written");
       }
     }
@@ -106,7 +108,8 @@ DatasetStatus read_status(FileSystem& file_system, const fs::path& folder, bool 
   journals.refresh();
   status.done = journals.published_captures();
   status.is_finished = status.done == status.captures && journals.is_published(kFinishEntry);
-  status.base = base_of(folder, journals.records_folder().value_or("."));
+  const std::string records = journals.records_folder().value_or(".");
+  status.base = base_of(folder, records);
   for (int capture = 0; capture < status.captures; ++capture) {
     if (journals.is_published(capture)) continue;
     if (!status.missing.empty() && status.missing.back().second == capture - 1) {
@@ -116,7 +119,7 @@ DatasetStatus read_status(FileSystem& file_system, const fs::path& folder, bool 
     }
   }
   add_workers(file_system, folder / ".diorama", journals, status);
-  if (verifies) verify(file_system, journals, status);
+  if (verifies) verify(file_system, journals, records, status);
   return status;
 }
 

@@ -124,6 +124,16 @@ void Digest::add(std::span<const std::byte> bytes) {
 
 std::string Digest::text() const { return to_text(XXH3_128bits_digest(state_->hash)); }
 
+std::string digest_of(FileSystem& file_system, const fs::path& file) {
+  constexpr std::uint64_t kPiece = std::uint64_t(1) << 20;
+  Digest digest;
+  for (std::uint64_t at = 0;; at += kPiece) {
+    const std::string piece = file_system.read_part(file, at, kPiece);
+    digest.add(std::as_bytes(std::span(piece)));
+    if (piece.size() < kPiece) return digest.text();
+  }
+}
+
 bool is_plain_relative(std::string_view path) {
   if (path.empty() || path.front() == '/' || path.back() == '/') return false;
   if (path.find('\\') != std::string_view::npos || path.find('\0') != std::string_view::npos) {
@@ -132,6 +142,11 @@ bool is_plain_relative(std::string_view path) {
   const fs::path parsed(path);
   return std::none_of(parsed.begin(), parsed.end(),
                       [](const fs::path& part) { return part == ".." || part == "."; });
+}
+
+bool is_kept_path(const std::string& records, std::string_view path) {
+  const std::string folder = (records == "." ? "" : records + "/") + kKeptFolder + "/";
+  return path.starts_with(folder);
 }
 
 bool is_plain_name(std::string_view name) {

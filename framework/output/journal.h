@@ -57,6 +57,9 @@ struct JournalledFiles {
 std::string digest_of(std::span<const std::byte> bytes);
 std::string digest_of(std::string_view text);
 
+/// Of a file, in little memory.
+std::string digest_of(FileSystem& file_system, const std::filesystem::path& file);
+
 /// The same, of what comes piece by piece.
 class Digest {
  public:
@@ -74,6 +77,10 @@ class Digest {
 
 /// Relative, without `..` and the like: what may stand in a journal and what writers may ask for.
 bool is_plain_relative(std::string_view path);
+/// Below the folder of dataset.json: what captures keep until the dataset is finished.
+inline constexpr const char* kKeptFolder = ".diorama/kept";
+/// Whether a path below the output folder leads there; `records` is the folder of dataset.json.
+bool is_kept_path(const std::string& records, std::string_view path);
 /// Letters, digits, '.', '_' and '-', at most 200, and not led by a dot.
 bool is_plain_name(std::string_view name);
 

@@ -67,6 +67,11 @@ std::string role_text(const std::string& role) {
   return "as " + text;
 }
 
+/// Below the folder of kept things.
+std::string kept_name(std::size_t writer, int capture) {
+  return std::to_string(writer) + "/" + entry_name(capture);
+}
+
 std::string visit_folder(int visit) {
   char name[32];
   std::snprintf(name, sizeof name, "visits-%05d", visit / kVisitsPerClaimFolder);
@@ -90,17 +95,20 @@ fs::path OutputFolders::records_path() const { return joined(base, records); }
 CollectedFiles::CollectedFiles(Transaction& transaction, std::size_t folder, std::string writer)
     : transaction_(transaction), folder_(folder), writer_(std::move(writer)) {}
 
+void CollectedFiles::check_path(std::string_view path) const {
+  if (is_plain_relative(path)) return;
+  throw Error(ErrorKind::Plugin, "writer '" + writer_ +
+                                     "': expected a relative path without '..', found '" +
+                                     std::string(path) + "'");
+}
+
 void CollectedFiles::stage_if_large(std::size_t number) {
   StagedFile& file = transaction_.files[number];
   if (transaction_.stage && file.bytes.size() >= kKeptBytes) transaction_.stage->put(number, file);
 }
 
 void CollectedFiles::add(std::string_view path, std::vector<std::byte> bytes) {
-  if (!is_plain_relative(path)) {
-    throw Error(ErrorKind::Plugin, "writer '" + writer_ +
-                                       "': expected a relative path without '..', found '" +
-                                       std::string(path) + "'");
-  }
+  check_path(path);
   transaction_.files.push_back({folder_, std::string(path), std::move(bytes)});
   stage_if_large(transaction_.files.size() - 1);
 }
@@ -111,17 +119,42 @@ void CollectedFiles::append(std::string_view path, std::span<const std::byte> by
     add(path, {});
     found = growing_.emplace(path, transaction_.files.size() - 1).first;
   }
-  std::vector<std::byte>& kept = transaction_.files[found->second].bytes;
-  kept.insert(kept.end(), bytes.begin(), bytes.end());
-  stage_if_large(found->second);
+  grow(found->second, bytes);
+}
+
+void CollectedFiles::grow(std::size_t number, std::span<const std::byte> bytes) {
+  std::vector<std::byte>& file = transaction_.files[number].bytes;
+  const std::size_t before = file.size();
+  file.insert(file.end(), bytes.begin(), bytes.end());
+  stage_if_large(number);
+  growing_bytes_ += file.size() - before;
   // Many small ones fill the memory, too.
-  std::size_t all = 0;
-  for (const auto& [name, number] : growing_) all += transaction_.files[number].bytes.size();
-  if (!transaction_.stage || all < kKeptGrowingBytes) return;
-  for (const auto& [name, number] : growing_) {
-    StagedFile& file = transaction_.files[number];
-    if (!file.bytes.empty()) transaction_.stage->put(number, file);
+  if (!transaction_.stage || growing_bytes_ < kKeptGrowingBytes) return;
+  const auto put = [this](std::size_t each) {
+    StagedFile& growing = transaction_.files[each];
+    if (!growing.bytes.empty()) transaction_.stage->put(each, growing);
+  };
+  for (const auto& [path, each] : growing_) put(each);
+  if (kept_) put(*kept_);
+  growing_bytes_ = 0;
+}
+
+void CollectedFiles::append_kept(std::string_view path, int capture) {
+  if (!transaction_.read_kept) {
+    throw Error(ErrorKind::Plugin,
+                "writer '" + writer_ + "': only finish() gets what captures keep");
   }
+  transaction_.read_kept(folder_, capture,
+                         [&](std::span<const std::byte> bytes) { append(path, bytes); });
+}
+
+void CollectedFiles::keep(std::span<const std::byte> bytes) {
+  if (!kept_) {
+    transaction_.files.push_back({folder_, {}, {}});
+    transaction_.files.back().is_kept = true;
+    kept_ = transaction_.files.size() - 1;
+  }
+  grow(*kept_, bytes);
 }
 
 void CollectedFiles::record(std::string_view line) {
@@ -194,6 +227,50 @@ fs::path OutputStore::staged(const std::string& worker, int entry, std::size_t f
   return stage(worker) / (entry_name(entry) + "-" + std::to_string(file));
 }
 
+void OutputStore::read_kept(std::size_t writer, int capture, const BytesVisitor& visit) {
+  constexpr std::uint64_t kPiece = std::uint64_t(1) << 20;
+  const fs::path file = kept_folder() / kept_name(writer, capture);
+  const auto status = file_system_.status(file);
+  if (!status || status->kind != FileStatus::Kind::File) {
+    // Who took over and finished took it away: that is the reason then.
+    check_membership();
+    throw Error(ErrorKind::Output,
+                file.string() + ": is missing; 'diorama run --resume --verify' makes it anew");
+  }
+  for (std::uint64_t at = 0; at < status->size;) {
+    const std::string piece = file_system_.read_part(file, at, std::min(kPiece, status->size - at));
+    if (piece.empty()) throw Error(ErrorKind::Output, file.string() + ": has become shorter");
+    visit(bytes_of(piece));
+    at += piece.size();
+  }
+}
+
+/// The finish files survive a power cut: from then on what captures kept may go.
+bool OutputStore::has_durable_end() const {
+  const auto is_open = [](const auto& worker) {
+    const WorkerIndex& index = worker.second;
+    return index.settled_bytes < index.bytes_read &&
+           (index.committed.contains(kFinishEntry) ||
+            std::ranges::find(index.published_since, kFinishEntry, &EntryPlace::entry) !=
+                index.published_since.end());
+  };
+  return journals_.is_published(kFinishEntry) && std::ranges::none_of(journals_.workers(), is_open);
+}
+
+/// The finished dataset has it in files of its own.
+void OutputStore::remove_kept() {
+  const fs::path folder = kept_folder();
+  for (const std::string& writer : file_system_.list(folder)) {
+    const auto status = file_system_.status(folder / writer);
+    if (!status || status->kind != FileStatus::Kind::Folder) continue;
+    for (const std::string& capture : file_system_.list(folder / writer)) {
+      file_system_.remove_file(folder / writer / capture);
+    }
+    file_system_.remove_if_empty(folder / writer);
+  }
+  file_system_.remove_if_empty(folder);
+}
+
 std::string OutputStore::role() const {
   if (options_.existing == Existing::Overwrite) return "overwrite";
   if (options_.takes_visits) return "auto";
@@ -222,7 +299,7 @@ void OutputStore::probe(const fs::path& target) {
 void OutputStore::refuse_links() const {
   const fs::path top = diorama_folder();
   for (const fs::path& folder :
-       {top, top / "journal", top / "workers", top / "claims", top / "stage"}) {
+       {top, top / "journal", top / "workers", top / "claims", top / "stage", kept_folder()}) {
     const auto status = file_system_.status(folder);
     if (status && status->kind != FileStatus::Kind::Folder) {
       throw Error(ErrorKind::Output,
@@ -335,6 +412,7 @@ void OutputStore::leave() {
   // What is staged for good stays for who comes next.
   file_system_.remove_if_empty(stage(options_.self.name));
   file_system_.remove_if_empty(diorama_folder() / "stage");
+  if (is_finished() && has_durable_end() && !is_lost_) remove_kept();
   if (is_finished()) workers_.sweep();
   workers_.leave();
   if (writer_.has_lines() || has_opened_) return;
@@ -386,7 +464,7 @@ OutputStore::FileState OutputStore::state_of(const fs::path& path, const Journal
   const auto status = file_system_.status(path);
   if (!status) return FileState::Missing;
   if (status->kind != FileStatus::Kind::File || status->size != file.size) return FileState::Wrong;
-  return digest_of(file_system_.read(path)) == file.digest ? FileState::Right : FileState::Wrong;
+  return digest_of(file_system_, path) == file.digest ? FileState::Right : FileState::Wrong;
 }
 
 // Dead workers: what they committed is completed, the rest is taken away.
@@ -460,13 +538,14 @@ bool OutputStore::settle_entry(const std::string& worker, const EntryPlace& plac
     FileState state = state_of(target, file);
     const bool is_staged = state_of(source, file) == FileState::Right;
     if (state == FileState::Missing && is_staged) {
-      make_target_folder(target.parent_path());
-      file_system_.move_new(source, target);
+      move_to_place(source, target, file);
     }
     sync_later(target.parent_path());
     // Another worker may have moved it meanwhile.
     if (state != FileState::Right) state = state_of(target, file);
     if (state == FileState::Right) continue;
+    const bool may_be_gone = is_kept_path(folders_.records, file.path) && has_durable_end();
+    if (state == FileState::Missing && may_be_gone) continue;
     reason = file.path + (state == FileState::Missing ? " is missing" : " is not what was written");
     // Beside its staged twin a file is somebody else's.
     if (state == FileState::Wrong && !is_staged) damaged.push_back(file);
@@ -491,11 +570,18 @@ void OutputStore::take_back(const std::string& worker, const EntryPlace& place,
   }
 }
 
+/// The end first: what captures kept for it has to be there only when it has to be made anew.
 void OutputStore::verify_all() {
+  verify([](int entry) { return entry == kFinishEntry; });
+  verify([](int entry) { return entry != kFinishEntry; });
+}
+
+void OutputStore::verify(const std::function<bool(int)>& is_wanted) {
   // Whoever is dead stays so: a worker's name is never used again.
   std::string looked_at;
   bool lives = false;
   journals_.visit_entries([&](const std::string& worker, const EntryPlace& place) {
+    if (!is_wanted(place.entry)) return;
     if (std::exchange(looked_at, worker) != worker) {
       const auto others = workers_.others();
       lives = std::any_of(others.begin(), others.end(), [&](const Workers::Lease& lease) {
@@ -633,11 +719,22 @@ void OutputStore::make_target_folder(const fs::path& folder) {
   known_folders_.insert(folder);
 }
 
-JournalledFiles OutputStore::journalled(const Transaction& transaction) const {
+/// Who finishes the dataset removes folders of what is kept, whoever is still at work.
+bool OutputStore::move_to_place(const fs::path& source, const fs::path& target,
+                                const JournalledFile& file) {
+  make_target_folder(target.parent_path());
+  const auto move = [&] { return file_system_.move_new(source, target); };
+  if (!is_kept_path(folders_.records, file.path)) return move();
+  return in_folder(file_system_, target.parent_path(), move);
+}
+
+JournalledFiles OutputStore::journalled(int entry, const Transaction& transaction) const {
   JournalledFiles content;
   std::set<std::string> places;
   for (const StagedFile& file : transaction.files) {
-    const std::string path = below(folders_.folder(file.folder), file.path);
+    const std::string path =
+        file.is_kept ? below(folders_.records, kKeptFolder) + "/" + kept_name(file.folder, entry)
+                     : below(folders_.folder(file.folder), file.path);
     if (!places.insert(path).second) {
       throw Error(ErrorKind::Config, (folders_.base / path).string() +
                                          ": two files of one capture have this name; give the "
@@ -689,8 +786,7 @@ void OutputStore::publish(int entry, const JournalledFiles& content) {
     const JournalledFile& file = content.files[i];
     const fs::path target = folders_.base / file.path;
     const fs::path source = staged(options_.self.name, entry, i);
-    make_target_folder(target.parent_path());
-    if (file_system_.move_new(source, target)) {
+    if (move_to_place(source, target, file)) {
       moved.push_back(target);
       continue;
     }
@@ -720,7 +816,7 @@ void OutputStore::commit(int entry, Transaction& transaction) {
   JournalledFiles content;
   try {
     write_stage(entry, transaction);
-    content = journalled(transaction);
+    content = journalled(entry, transaction);
     check_membership();
     writer_.commit(entry, content);
   } catch (...) {
@@ -763,7 +859,11 @@ Transaction OutputStore::capture_transaction(int capture) {
 }
 
 Transaction OutputStore::finish_transaction() {
-  return {std::make_unique<DiskStage>(*this, kFinishEntry), {}, {}};
+  Transaction transaction{std::make_unique<DiskStage>(*this, kFinishEntry), {}, {}};
+  transaction.read_kept = [this](std::size_t writer, int capture, const BytesVisitor& visit) {
+    read_kept(writer, capture, visit);
+  };
+  return transaction;
 }
 
 void OutputStore::commit_capture(int capture, Transaction& transaction) {

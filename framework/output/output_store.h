@@ -36,6 +36,7 @@ struct StagedFile {
   /// What lies in the stage already, in front of `bytes`; null when nothing does.
   std::shared_ptr<Digest> staged = nullptr;
   std::uint64_t staged_size = 0;
+  bool is_kept = false;  ///< What its writer keeps for finish(); has no path.
 };
 
 inline constexpr std::size_t kRecordsFolder = std::size_t(-1);
@@ -50,12 +51,17 @@ class Stage {
   virtual void release() = 0;
 };
 
+using BytesVisitor = std::function<void(std::span<const std::byte>)>;
+
 /// What becomes visible on disk together.
 struct Transaction {
   std::unique_ptr<Stage> stage = nullptr;  ///< Null: everything stays in memory.
   std::vector<StagedFile> files;
   /// Per writer that recorded something: index (or kRecordsFolder, for the run itself) and line.
   std::vector<std::pair<std::size_t, std::string>> records;
+  /// Of the dataset's end: what captures kept for a writer, piece by piece. Throws Error(Output)
+  /// when it is not there.
+  std::function<void(std::size_t writer, int capture, const BytesVisitor&)> read_kept = {};
 };
 
 /// Where a run writes: all of it below one folder, on one file system.
@@ -87,15 +93,21 @@ class CollectedFiles final : public CaptureFiles {
 
   void add(std::string_view path, std::vector<std::byte> bytes) override;
   void append(std::string_view path, std::span<const std::byte> bytes) override;
+  void append_kept(std::string_view path, int capture) override;
   void record(std::string_view line) override;
+  void keep(std::span<const std::byte> bytes) override;
 
  private:
+  void check_path(std::string_view path) const;
   void stage_if_large(std::size_t number);
+  void grow(std::size_t number, std::span<const std::byte> bytes);
 
   Transaction& transaction_;
   std::size_t folder_;
   std::string writer_;
   std::map<std::string, std::size_t, std::less<>> growing_;  ///< Numbers of files by path.
+  std::size_t growing_bytes_ = 0;                            ///< Of them all, in memory.
+  std::optional<std::size_t> kept_;                          ///< Number of what is kept.
 };
 
 /// A dataset on disk, and one worker's part in it. Each capture is a transaction: its files are
@@ -107,7 +119,8 @@ class CollectedFiles final : public CaptureFiles {
 /// bytes whoever makes them (ADR 0004).
 ///
 /// Layout: `<records>/dataset.json` and `<records>/.diorama/` with `journal/` (see Journals),
-/// `workers/` and `claims/` (see Workers), `stage/<worker>/` while a run goes on.
+/// `workers/` and `claims/` (see Workers), `stage/<worker>/` while a run goes on, and
+/// `kept/<writer>/<capture>` until the dataset is finished (ADR 0062).
 class OutputStore {
  public:
   enum class Existing : std::uint8_t { Refuse, Resume, Overwrite };
@@ -181,6 +194,10 @@ class OutputStore {
   std::filesystem::path dataset_file() const { return folders_.records_path() / "dataset.json"; }
   std::filesystem::path stage(const std::string& worker) const;
   std::filesystem::path staged(const std::string& worker, int entry, std::size_t file) const;
+  std::filesystem::path kept_folder() const { return diorama_folder() / "kept"; }
+  void read_kept(std::size_t writer, int capture, const BytesVisitor& visit);
+  bool has_durable_end() const;
+  void remove_kept();
 
   std::string role() const;
   void check_folder();
@@ -195,6 +212,7 @@ class OutputStore {
   void settle(const std::string& worker, const WorkerIndex& index);
   bool settle_entry(const std::string& worker, const EntryPlace& place);
   void verify_all();
+  void verify(const std::function<bool(int)>& is_wanted);
   void take_back(const std::string& worker, const EntryPlace& place, const std::string& reason,
                  const std::vector<JournalledFile>& damaged);
   void remove_dataset();
@@ -205,11 +223,14 @@ class OutputStore {
   FileState state_of(const std::filesystem::path& path, const JournalledFile& file);
   void sync_later(const std::filesystem::path& folder);
   void make_target_folder(const std::filesystem::path& folder);
+  /// False when something is there.
+  bool move_to_place(const std::filesystem::path& source, const std::filesystem::path& target,
+                     const JournalledFile& file);
   void check_no_links(const std::filesystem::path& folder);
 
   void check_membership();
   void commit(int entry, Transaction& transaction);
-  JournalledFiles journalled(const Transaction& transaction) const;
+  JournalledFiles journalled(int entry, const Transaction& transaction) const;
   void write_stage(int entry, Transaction& transaction);
   void put_staged(const std::filesystem::path& place, StagedFile& file);
   void clear_stage(int entry, std::size_t files);

@@ -45,10 +45,9 @@ void TarArchive::add(std::string_view name, std::span<const std::span<const std:
                                        std::to_string(size) + " bytes");
   }
   const auto header = make_header(name, size);
-  files_.append(path_, std::as_bytes(std::span(header)));
-  for (const auto part : parts) files_.append(path_, part);
-  const std::vector<std::byte> rest((kBlock - size % kBlock) % kBlock);
-  files_.append(path_, rest);
+  put(std::as_bytes(std::span(header)));
+  for (const auto part : parts) put(part);
+  put(std::vector<std::byte>((kBlock - size % kBlock) % kBlock));
 }
 
 void TarArchive::add(std::string_view name, std::span<const std::byte> content) {
@@ -59,6 +58,11 @@ void TarArchive::add(std::string_view name, std::string_view content) {
   add(name, std::as_bytes(std::span(content.data(), content.size())));
 }
 
-void TarArchive::end() { files_.append(path_, std::vector<std::byte>(2 * kBlock)); }
+void TarArchive::end() { put(std::vector<std::byte>(2 * kBlock)); }
+
+void TarArchive::put(std::span<const std::byte> bytes) {
+  out_(bytes);
+  bytes_ += bytes.size();
+}
 
 }  // namespace diorama

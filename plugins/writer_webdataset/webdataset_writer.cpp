@@ -1,23 +1,75 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "writer_webdataset/webdataset_writer.h"
 
+#include <cstdint>
+#include <limits>
 #include <map>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
+#include "diorama/error.h"
 #include "writer_support/image_files.h"
 #include "writer_support/lens_json.h"
 #include "writer_support/npy.h"
 #include "writer_support/replicator.h"
-#include "writer_webdataset/tar_archive.h"
 
 namespace diorama {
 namespace {
 
-std::string shard_name(int capture, int count) {
-  return "shards/" + padded(capture, grown_padding(6, count)) + ".tar";
+/// There are at most as many shards as captures.
+std::string shard_name(const std::string& front, int number, int captures) {
+  return "shards/" + front + padded(number, grown_padding(6, captures)) + ".tar";
 }
+
+std::uint64_t bytes_of_record(int capture, std::string_view line) {
+  const Json json = Json::parse(line, nullptr, false);
+  if (!json.is_object() || !json.contains("bytes") || !json["bytes"].is_number_unsigned()) {
+    throw Error(ErrorKind::Output, "capture " + std::to_string(capture) +
+                                       ": expected a record with 'bytes', found '" +
+                                       std::string(line) + "'");
+  }
+  return json["bytes"].get<std::uint64_t>();
+}
+
+/// The shards of one part of a dataset, filled one after the other.
+class ShardFiller {
+ public:
+  ShardFiller(DatasetFiles& files, std::string split, int captures)
+      : files_(files), split_(std::move(split)), captures_(captures) {}
+
+  /// Into the shard at hand, or the next one where that would get too large.
+  void add(int capture, std::uint64_t bytes, int most_captures, double most_bytes) {
+    constexpr double kEnd = 1024;
+    const bool is_full = held_ >= most_captures || double(bytes_ + bytes) + kEnd > most_bytes;
+    if (held_ > 0 && is_full) end_shard();
+    if (held_ == 0) files_.append_text(split_ + ".txt", name() + "\n");
+    files_.append_kept(name(), capture);
+    ++held_;
+    bytes_ += bytes;
+  }
+  void end() {
+    if (held_ > 0) end_shard();
+    files_.append_text(split_ + ".txt", "");
+  }
+
+ private:
+  std::string name() const { return shard_name(split_ + "-", number_, captures_); }
+  void end_shard() {
+    TarArchive([this](std::span<const std::byte> bytes) { files_.append(name(), bytes); }).end();
+    ++number_;
+    held_ = 0;
+    bytes_ = 0;
+  }
+
+  DatasetFiles& files_;
+  std::string split_;
+  int captures_;
+  int number_ = 0;
+  int held_ = 0;
+  std::uint64_t bytes_ = 0;
+};
 
 Json object_json(const TrainingObject& object, const std::string& name) {
   const Instance& instance = *object.instance;
@@ -57,6 +109,11 @@ void WebDatasetWriter::Params::visit(ParamVisitor& v) {
   training.visit(v);
   v.param("depth", depth, {"A depth array per sample."});
   v.param("instances", instances, {"A picture of object numbers per sample."});
+  v.param("shard_captures", shard_captures,
+          {"Most captures in a shard; 0: as many as shard_size_mb allows, or one without it.", "",
+           0.0});
+  v.param("shard_size_mb", shard_size_mb,
+          {"Most megabytes (10^6 bytes) in a shard of several captures; 0: any.", "MB", 0.0, 1e9});
   channels.visit(v);
 }
 
@@ -75,13 +132,13 @@ NameSet WebDatasetWriter::needs() const {
 
 void WebDatasetWriter::begin(const DatasetInfo& dataset, DatasetFiles& files) {
   training_.begin(dataset);
-  std::string train, val;
-  for (int i = 0; i < dataset.capture_count; ++i) {
-    (std::string_view(training_.split(i)) == "val" ? val : train) +=
-        shard_name(i, dataset.capture_count) + "\n";
+  if (!fills_shards()) {
+    for (const char* file : {"train.txt", "val.txt"}) files.append_text(file, "");
+    for (int i = 0; i < dataset.capture_count; ++i) {
+      files.append_text(std::string(training_.split(i)) + ".txt",
+                        shard_name("", i, dataset.capture_count) + "\n");
+    }
   }
-  files.add_text("train.txt", train);
-  files.add_text("val.txt", val);
   training_.add_dataset_page(
       "WebDataset",
       {{"matrices", "four rows of four, column vectors: point_a = a_from_b * point_b"},
@@ -110,7 +167,35 @@ Json WebDatasetWriter::sample_json(const Capture& capture, const Frame& frame,
 }
 
 void WebDatasetWriter::write(const Capture& capture, CaptureFiles& files) const {
-  TarArchive archive(files, shard_name(capture.index, training_.capture_count()));
+  if (fills_shards()) {
+    TarArchive archive([&](std::span<const std::byte> bytes) { files.keep(bytes); });
+    add_samples(capture, archive);
+    files.record(Json{{"bytes", archive.bytes()}}.dump());
+    return;
+  }
+  const std::string shard = shard_name("", capture.index, training_.capture_count());
+  TarArchive archive([&](std::span<const std::byte> bytes) { files.append(shard, bytes); });
+  add_samples(capture, archive);
+  archive.end();
+}
+
+void WebDatasetWriter::finish(const RecordReader& records, DatasetFiles& files) {
+  if (!fills_shards()) return;
+  constexpr int kAnyCount = std::numeric_limits<int>::max();
+  constexpr double kAnySize = std::numeric_limits<double>::infinity();
+  const int most_captures = params_.shard_captures > 0 ? params_.shard_captures : kAnyCount;
+  const double most_bytes = params_.shard_size_mb > 0.0 ? params_.shard_size_mb * 1e6 : kAnySize;
+  ShardFiller train(files, "train", training_.capture_count());
+  ShardFiller val(files, "val", training_.capture_count());
+  records([&](int capture, std::string_view line) {
+    ShardFiller& part = std::string_view(training_.split(capture)) == "val" ? val : train;
+    part.add(capture, bytes_of_record(capture, line), most_captures, most_bytes);
+  });
+  train.end();
+  val.end();
+}
+
+void WebDatasetWriter::add_samples(const Capture& capture, TarArchive& archive) const {
   for (const Frame& frame : capture.frames) {
     const std::string key = training_.image_stem(capture, frame);
     const auto objects = training_.objects(frame);
@@ -128,7 +213,6 @@ void WebDatasetWriter::write(const Capture& capture, CaptureFiles& files) const 
     if (params_.depth) add_array("depth", kDistanceToImagePlane.name);
     for (const std::string& channel : params_.channels.names) add_array(channel, channel);
   }
-  archive.end();
 }
 
 }  // namespace diorama

@@ -60,7 +60,9 @@ class ForgottenFiles final : public CaptureFiles {
  public:
   void add(std::string_view, std::vector<std::byte> bytes) override { size += bytes.size(); }
   void append(std::string_view, std::span<const std::byte> bytes) override { size += bytes.size(); }
+  void append_kept(std::string_view, int) override {}
   void record(std::string_view) override {}
+  void keep(std::span<const std::byte> bytes) override { size += bytes.size(); }
   std::size_t size = 0;
 };
 

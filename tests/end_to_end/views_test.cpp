@@ -34,7 +34,7 @@ randomizers:
 physics: {type: none}
 renderer: {type: "null"}
 timeline: [{capture: still, count: 25}]
-writers: [{type: WebDatasetWriter, name: web}]
+writers: [{type: WebDatasetWriter, name: web, shard_captures: 7}]
 views: [)" +
          views + "]\n" + more;
 }
@@ -180,6 +180,7 @@ TEST_CASE("Views are the same bytes after kill -9 and resume, and are counted on
   const TemporaryFolder folder;
   const std::string text = job(kConditions, 60);
   const auto whole = run_job(text, "whole", folder);
+  CHECK(whole.contains("web/shards/train-000001.tar"));
   const std::vector<std::string> arguments{"run",      "views.yaml", "--output", "killed",
                                            "--resume", "--threads",  "2"};
   for (const std::size_t captures : {1, 17, 38}) {
@@ -251,7 +252,7 @@ TEST_CASE("Without views nothing changes", "[views]") {
   CHECK_FALSE(without.contains("views.json"));
   // A rule that everything holds draws nothing anew.
   const auto with = run_job(job("{name: any, count: {min: 0}}", 3), "with", folder);
-  CHECK(without.at("web/shards/000001.tar") == with.at("web/shards/000001.tar"));
+  CHECK(without.at("web/shards/train-000000.tar") == with.at("web/shards/train-000000.tar"));
   CHECK(Json::parse(with.at("views.json"))["draws"] == 3);
 }
 

@@ -54,6 +54,9 @@ class DIORAMA_SDK_API DatasetFiles {
   /// added or appended to.
   virtual void append(std::string_view path, std::span<const std::byte> bytes) = 0;
   void append_text(std::string_view path, std::string_view text);
+  /// In finish(): puts what a capture kept (CaptureFiles::keep) at the end of a file, as append()
+  /// does. Elsewhere, and for captures that kept nothing, throws.
+  virtual void append_kept(std::string_view path, int capture) = 0;
 };
 
 /// The files of one capture, and one record: text (without line breaks, JSON by habit) that the
@@ -62,6 +65,9 @@ class DIORAMA_SDK_API CaptureFiles : public DatasetFiles {
  public:
   ~CaptureFiles() override;
   virtual void record(std::string_view line) = 0;
+  /// Puts bytes at the end of what the capture keeps for finish(): content of files that captures
+  /// share. It is as safe as files are, and no part of the dataset; it goes once that is finished.
+  virtual void keep(std::span<const std::byte> bytes) = 0;
 };
 
 /// The records of all captures in capture order; captures without a record are left out.

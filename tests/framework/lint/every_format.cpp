@@ -104,6 +104,12 @@ DatasetReaders every_reader(Host& host) {
        reader<YoloReader>("YoloReader", host)});
 }
 
+WebDatasetWriter::Params shards_of_two() {
+  WebDatasetWriter::Params p;
+  p.shard_captures = 2;
+  return p;
+}
+
 BasicWriter::Params everything() {
   BasicWriter::Params p;
   p.rgb = p.bounding_box_2d_tight = p.bounding_box_2d_loose = p.semantic_segmentation = true;
@@ -131,6 +137,7 @@ std::vector<SampleFormat> every_format() {
           format<BopWriter>("bop"),
           format<BopWriter>("bop_cameras", one_scene()),
           format<WebDatasetWriter>("webdataset"),
+          format<WebDatasetWriter>("webdataset_shards", shards_of_two()),
           format<Hdf5Writer>("hdf5"),
           format<ImageFolderWriter>("imagefolder")};
 }

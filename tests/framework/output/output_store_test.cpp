@@ -58,6 +58,9 @@ Transaction capture_files(OutputStore& store, int capture) {
   transaction.stage->put(1, transaction.files[1]);
   first.append_text(depth, "end");
   first.record("line " + std::to_string(capture));
+  first.keep(bytes_of("kept by "));
+  transaction.stage->put(2, transaction.files[2]);
+  first.keep(bytes_of(std::to_string(capture) + "\n"));
   CollectedFiles second(transaction, 1, "two");
   second.add_text("boxes/deep/" + std::to_string(capture) + ".json", "{}");
   return transaction;
@@ -108,6 +111,7 @@ void finish(OutputStore& store, const std::function<void()>& begin) {
   CollectedFiles last(files, 0, "one");
   store.read_records(0, [&](int capture, std::string_view line) {
     last.append_text("all.txt", std::to_string(capture) + "=" + std::string(line) + ";");
+    last.append_kept(capture % 2 == 0 ? "shared/even.txt" : "shared/odd.txt", capture);
   });
   store.commit_finish(files);
 }
@@ -233,12 +237,14 @@ TEST_CASE("A whole run leaves its files, its journal and nothing else", "[store]
   LocalFileSystem local;
   CHECK(run(local, folder.path(), {}));
   const auto files = tree(folder.path());
-  CHECK(files.size() == 1 + 1 + 3 * 3 + 1 + 2);
+  CHECK(files.size() == 1 + 1 + 3 * 3 + 3 + 2);
   CHECK(files.at("out/dataset.json") == kDataset);
   CHECK(files.at("out/one/rgb_2.png") == "colour 2");
   CHECK(files.at("out/one/all.txt") == "0=line 0;1=line 1;2=line 2;");
+  CHECK(files.at("out/one/shared/even.txt") == "kept by 0\nkept by 2\n");
+  CHECK(files.at("out/one/shared/odd.txt") == "kept by 1\n");
   CHECK(files.contains("out/.diorama/journal/w1.index"));
-  for (const char* name : {"stage", "workers", "claims"}) {
+  for (const char* name : {"stage", "workers", "claims", "kept"}) {
     CHECK_FALSE(fs::exists(folder.path() / "out/.diorama" / name));
   }
   // The simulated disk does the same.
@@ -707,7 +713,6 @@ TEST_CASE("What is missing or damaged is made anew when all is verified", "[stor
   run(process, "/data", job);
   disk.erase("/data/out/one/rgb_1.png");
   disk.put("/data/out/one/depth/4.npy", "short");
-  disk.put("/data/out/one/all.txt", "damaged");
   CHECK(run(process, "/data", resuming("w2", 6)));
   CHECK(dataset_files(disk.tree("/data")) != expected);
   Job verifying = resuming("w3", 6);
@@ -724,12 +729,60 @@ TEST_CASE("What is missing or damaged is made anew when all is verified", "[stor
     CHECK_FALSE(store.is_finished());
   }
   CHECK(said == std::vector<std::string>{
-                    "finish: out/one/all.txt is not what was written; it is made anew",
                     "capture 1: out/one/rgb_1.png is missing; it is made anew",
                     "capture 4: out/one/depth/4.npy is not what was written; it is made anew"});
   verifying.name = "w4";
   CHECK(run(process, "/data", verifying));
+  CHECK(disk.tree("/data/out/.diorama/kept").empty());
   CHECK(dataset_files(disk.tree("/data")) == expected);
+}
+
+TEST_CASE("What captures kept is made anew with the files that it went into", "[store]") {
+  const Files expected = expected_files(3);
+  SimulatedDisk disk(1);
+  SimulatedProcess process(disk);
+  run(process, "/data", {});
+  disk.put("/data/out/one/shared/odd.txt", "damaged");
+  Job verifying = resuming("w2");
+  verifying.verifies_all = true;
+  std::vector<std::string> said;
+  {
+    auto options = options_of(verifying);
+    options.warn = [&](const std::string& text) { said.push_back(text); };
+    OutputStore store(process, folders_in("/data"), 3, options);
+    store.join(kDataset);
+    CHECK(store.done_count() == 0);
+  }
+  CHECK(said == std::vector<std::string>{
+                    "finish: out/one/shared/odd.txt is not what was written; it is made anew",
+                    "capture 0: out/.diorama/kept/0/000000 is missing; it is made anew",
+                    "capture 1: out/.diorama/kept/0/000001 is missing; it is made anew",
+                    "capture 2: out/.diorama/kept/0/000002 is missing; it is made anew"});
+  verifying.name = "w3";
+  CHECK(run(process, "/data", verifying));
+  CHECK(dataset_files(disk.tree("/data")) == expected);
+}
+
+TEST_CASE("Without what captures kept the dataset's end is one message", "[store]") {
+  SimulatedDisk disk(1);
+  SimulatedProcess process(disk);
+  OutputStore store(process, folders_in("/data"), 2, options_of({}));
+  store.join(kDataset);
+  store.open();
+  for (int capture : {0, 1}) commit(store, capture);
+  CHECK(disk.tree("/data").at("out/.diorama/kept/0/000001") == "kept by 1\n");
+  disk.erase("/data/out/.diorama/kept/0/000001");
+  store.refresh();
+  REQUIRE(store.claim_finish());
+  Transaction end = store.finish_transaction();
+  CollectedFiles files(end, 0, "one");
+  files.append_kept("shared.txt", 0);
+  CHECK_THROWS_WITH(files.append_kept("shared.txt", 1),
+                    "/data/out/.diorama/kept/0/000001: is missing; 'diorama run --resume --verify' "
+                    "makes it anew");
+  Transaction capture = store.capture_transaction(0);
+  CHECK_THROWS_WITH(CollectedFiles(capture, 0, "one").append_kept("shared.txt", 0),
+                    "writer 'one': only finish() gets what captures keep");
 }
 
 namespace {

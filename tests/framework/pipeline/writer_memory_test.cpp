@@ -18,6 +18,7 @@
 #include "writer_hdf5/hdf5_writer.h"
 #include "writer_imagefolder/image_folder_writer.h"
 #include "writer_voc/voc_writer.h"
+#include "writer_webdataset/webdataset_writer.h"
 
 using namespace diorama;
 namespace fs = std::filesystem;
@@ -51,7 +52,8 @@ void write_dataset(Writer& writer, Capture& capture, DatasetInfo dataset, int ca
 
 /// The most memory, in KiB, of a process that writes so many captures like `capture`.
 template <class W>
-long peak_kib(int captures, const test::SampleScene& sample, Capture& capture) {
+long peak_kib(int captures, const test::SampleScene& sample, Capture& capture,
+              const typename W::Params& params = {}) {
   std::string folder = (fs::temp_directory_path() / "diorama-memory-XXXXXX").string();
   REQUIRE(::mkdtemp(folder.data()) != nullptr);
   const pid_t child = ::fork();
@@ -59,7 +61,7 @@ long peak_kib(int captures, const test::SampleScene& sample, Capture& capture) {
     int status = 1;
     try {
       test::FakeHost host;
-      W writer(typename W::Params(), host);
+      W writer(params, host);
       write_dataset(writer, capture, test::sample_dataset(sample), captures, folder);
       status = 0;
     } catch (const std::exception&) {
@@ -75,10 +77,10 @@ long peak_kib(int captures, const test::SampleScene& sample, Capture& capture) {
 }
 
 template <class W>
-long peak_kib(int captures) {
+long peak_kib(int captures, const typename W::Params& params) {
   static const test::SampleScene sample(24, 16, 1);
   static Capture capture = test::ray_cast_capture(sample, 0);
-  return peak_kib<W>(captures, sample, capture);
+  return peak_kib<W>(captures, sample, capture, params);
 }
 
 /// A frame as large as cameras are, with surfaces that are neither flat nor noise.
@@ -110,10 +112,10 @@ Capture large_capture(const test::SampleScene& sample, int size) {
 
 /// What may grow: the buffers of files that grow, and the store's list of captures.
 template <class W>
-void check_flat(const char* name) {
+void check_flat(const char* name, const typename W::Params& params = {}) {
   constexpr long kBound = long(CollectedFiles::kKeptGrowingBytes >> 10) + 1024;
-  const long few = peak_kib<W>(100);
-  const long many = peak_kib<W>(1200);
+  const long few = peak_kib<W>(100, params);
+  const long many = peak_kib<W>(1200, params);
   INFO(name << ": " << few << " KiB for 100 captures, " << many << " KiB for 1200");
   CHECK(many - few < kBound);
 }
@@ -125,6 +127,9 @@ TEST_CASE("a writer's memory does not grow with the number of captures", "[write
   check_flat<CocoWriter>("CocoWriter");
   check_flat<ImageFolderWriter>("ImageFolderWriter");
   check_flat<VocWriter>("VocWriter");
+  WebDatasetWriter::Params shards;
+  shards.shard_captures = 500;
+  check_flat<WebDatasetWriter>("WebDatasetWriter", shards);
 }
 
 TEST_CASE("an HDF5 file of a large camera needs little beside its frame", "[writers][slow]") {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "plugins/writer_support/memory_files.h"
 
+#include <algorithm>
 #include <stdexcept>
 
 namespace diorama::test {
@@ -15,6 +16,12 @@ void MemoryFiles::append(std::string_view path, std::span<const std::byte> bytes
   if (growing_.emplace(path).second) add(path, {});
   std::vector<std::byte>& file = files[std::string(path)];
   file.insert(file.end(), bytes.begin(), bytes.end());
+}
+
+void MemoryFiles::append_kept(std::string_view path, int from) { append(path, kept.at(from)); }
+
+void MemoryFiles::keep(std::span<const std::byte> bytes) {
+  kept[capture].insert(kept[capture].end(), bytes.begin(), bytes.end());
 }
 
 void MemoryFiles::record(std::string_view line) { records.emplace_back(capture, line); }
@@ -44,7 +51,8 @@ MemoryFiles write_dataset(Writer& writer, const DatasetInfo& dataset,
     files.capture = capture->index;
     writer.write(*capture, files);
   }
-  const auto records = files.records;
+  auto records = files.records;
+  std::ranges::stable_sort(records, {}, &std::pair<int, std::string>::first);
   writer.finish(
       [&records](const RecordVisitor& visit) {
         for (const auto& [capture, line] : records) visit(capture, line);

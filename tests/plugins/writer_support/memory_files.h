@@ -18,7 +18,9 @@ class MemoryFiles final : public CaptureFiles {
  public:
   void add(std::string_view path, std::vector<std::byte> bytes) override;
   void append(std::string_view path, std::span<const std::byte> bytes) override;
+  void append_kept(std::string_view path, int from) override;
   void record(std::string_view line) override;
+  void keep(std::span<const std::byte> bytes) override;
 
   std::set<std::string> paths() const;
   /// Throws when it is not there.
@@ -27,7 +29,8 @@ class MemoryFiles final : public CaptureFiles {
 
   std::map<std::string, std::vector<std::byte>> files;
   std::vector<std::pair<int, std::string>> records;  ///< With `capture`, see below.
-  int capture = 0;                                   ///< What the next record belongs to.
+  std::map<int, std::vector<std::byte>> kept;        ///< Of captures.
+  int capture = 0;  ///< What the next record, and what is kept, belongs to.
 
  private:
   std::set<std::string> growing_;

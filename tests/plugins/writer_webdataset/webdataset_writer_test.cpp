@@ -5,7 +5,10 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <set>
 #include <span>
+#include <string>
+#include <vector>
 
 #include "plugins/writer_support/sample_dataset.h"
 #include "support/catch.h"
@@ -16,7 +19,7 @@ using test::MemoryFiles;
 
 TEST_CASE("tar reads the archive", "[writers]") {
   MemoryFiles files;
-  TarArchive archive(files, "t.tar");
+  TarArchive archive([&](std::span<const std::byte> part) { files.append("t.tar", part); });
   archive.add("a.txt", "hello");
   const std::string half(350, 'x');
   const auto bytes_of_half = std::as_bytes(std::span(half));
@@ -26,6 +29,7 @@ TEST_CASE("tar reads the archive", "[writers]") {
   const auto folder = std::filesystem::temp_directory_path() / "diorama_tar_test";
   std::filesystem::create_directories(folder);
   const auto& bytes = files.bytes("t.tar");
+  CHECK(archive.bytes() == bytes.size());
   CHECK(bytes.size() % 512 == 0);
   std::ofstream(folder / "t.tar", std::ios::binary)
       .write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
@@ -37,8 +41,7 @@ TEST_CASE("tar reads the archive", "[writers]") {
 }
 
 TEST_CASE("names that tar cannot hold are refused", "[writers]") {
-  MemoryFiles files;
-  TarArchive archive(files, "t.tar");
+  TarArchive archive([](std::span<const std::byte>) {});
   CHECK_THROWS_WITH(archive.add(std::string(101, 'n'), "x"), ContainsSubstring("cannot hold"));
 }
 
@@ -62,6 +65,91 @@ TEST_CASE("a shard holds one capture's samples", "[writers]") {
   }
   CHECK(files.text(test::split_of(files, 1) + ".txt").find("shards/000001.tar\n") !=
         std::string::npos);
+}
+
+namespace {
+
+/// Six captures, of which 1 and 4 are for validation.
+DatasetInfo six_captures(const test::SampleScene& sample) {
+  DatasetInfo dataset = test::sample_dataset(sample);
+  dataset.capture_count = 6;
+  dataset.validation = std::vector<int>{1, 4};
+  return dataset;
+}
+
+std::vector<Capture> captures_of(const test::SampleScene& sample) {
+  std::vector<Capture> captures;
+  for (int i = 0; i < 6; ++i) {
+    captures.push_back(test::ray_cast_capture(sample, 0));
+    captures.back().index = i;
+  }
+  return captures;
+}
+
+MemoryFiles write_captures(const WebDatasetWriter::Params& params, std::vector<int> order) {
+  static const test::SampleScene sample(24, 16, 1);
+  static const std::vector<Capture> captures = captures_of(sample);
+  std::vector<const Capture*> given;
+  for (const int i : order) given.push_back(&captures[std::size_t(i)]);
+  test::FakeHost host;
+  WebDatasetWriter writer(params, host);
+  return test::write_dataset(writer, six_captures(sample), given);
+}
+
+std::string end_of_tar() { return std::string(1024, '\0'); }
+
+std::string without_end(const std::string& tar) { return tar.substr(0, tar.size() - 1024); }
+
+}  // namespace
+
+TEST_CASE("Shards of a chosen number of captures are those of single captures put together",
+          "[writers]") {
+  WebDatasetWriter::Params params;
+  const MemoryFiles single = write_captures(params, {0, 1, 2, 3, 4, 5});
+  params.shard_captures = 3;
+  const MemoryFiles filled = write_captures(params, {0, 1, 2, 3, 4, 5});
+  const auto part = [&](int capture) {
+    return without_end(single.text("shards/00000" + std::to_string(capture) + ".tar"));
+  };
+  CHECK(filled.paths() == std::set<std::string>{"dataset.json", "shards/train-000000.tar",
+                                                "shards/train-000001.tar", "shards/val-000000.tar",
+                                                "train.txt", "val.txt"});
+  CHECK(filled.text("shards/train-000000.tar") == part(0) + part(2) + part(3) + end_of_tar());
+  CHECK(filled.text("shards/train-000001.tar") == part(5) + end_of_tar());
+  CHECK(filled.text("shards/val-000000.tar") == part(1) + part(4) + end_of_tar());
+  CHECK(filled.text("train.txt") == "shards/train-000000.tar\nshards/train-000001.tar\n");
+  CHECK(filled.text("val.txt") == "shards/val-000000.tar\n");
+  CHECK(write_captures(params, {5, 3, 1, 0, 4, 2}).files == filled.files);
+  CHECK(filled.text("dataset.json") == single.text("dataset.json"));
+}
+
+TEST_CASE("Shards of a chosen size hold what fits, and what fits in none alone", "[writers]") {
+  WebDatasetWriter::Params params;
+  const MemoryFiles single = write_captures(params, {0, 1, 2, 3, 4, 5});
+  const auto size = double(single.bytes("shards/000000.tar").size() - 1024);
+  // Captures of one scene differ in their numbers alone: all are of one size.
+  params.shard_size_mb = (2.0 * size + 1024.0) / 1e6;
+  const MemoryFiles two = write_captures(params, {0, 1, 2, 3, 4, 5});
+  CHECK(two.bytes("shards/train-000000.tar").size() == std::size_t(2.0 * size) + 1024);
+  CHECK(two.bytes("shards/train-000001.tar").size() == std::size_t(2.0 * size) + 1024);
+  params.shard_size_mb = (2.0 * size + 1023.0) / 1e6;
+  const MemoryFiles one = write_captures(params, {0, 1, 2, 3, 4, 5});
+  CHECK(one.text("shards/train-000003.tar") == single.text("shards/000005.tar"));
+  CHECK(one.text("val.txt") == "shards/val-000000.tar\nshards/val-000001.tar\n");
+  params.shard_size_mb = 1e-6;
+  CHECK(write_captures(params, {0, 1, 2, 3, 4, 5}).files == one.files);
+  params.shard_size_mb = 1e9;
+  CHECK(write_captures(params, {0, 1, 2, 3, 4, 5}).paths().contains("shards/val-000000.tar"));
+}
+
+TEST_CASE("A part without captures has a list without shards", "[writers]") {
+  WebDatasetWriter::Params params;
+  params.shard_captures = 2;
+  params.training.val_share = 0.0;
+  test::FakeHost host;
+  const MemoryFiles files = test::write_sample<WebDatasetWriter>(params, host);
+  CHECK(files.text("val.txt").empty());
+  CHECK_FALSE(files.text("train.txt").empty());
 }
 
 TEST_CASE("channels of other plugins are members of their names", "[writers]") {
