@@ -16,7 +16,6 @@
 #include <vector>
 
 #include "diorama/config.h"
-#include "framework/app/assemble.h"
 #include "framework/app/command_bench.h"
 #include "framework/app/command_config.h"
 #include "framework/app/command_convert.h"
@@ -42,6 +41,7 @@
 #include "framework/config/clean_text.h"
 #include "framework/host/console_log.h"
 #include "framework/host/terminal.h"
+#include "framework/jobs/assemble.h"
 #include "framework/output/workers.h"
 #include "framework/plugins/fatal_end.h"
 #include "framework/plugins/plugin_search.h"

@@ -9,12 +9,12 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "framework/app/assemble.h"
 #include "framework/bench/cpu_time.h"
 #include "framework/bench/picture_error.h"
 #include "framework/bench/scene_rig.h"
 #include "framework/host/replace_file.h"
 #include "framework/images/linear_picture.h"
+#include "framework/jobs/assemble.h"
 #include "framework/plugins/plugin_call.h"
 
 namespace diorama {
@@ -227,26 +227,25 @@ int command_bench(const GlobalOptions& global, const BenchOptions& given, Consol
   if (!options.reference.empty() && options.reference_samples > 0) {
     throw Error(ErrorKind::Usage, "--reference and --reference-samples exclude each other");
   }
-  const std::unique_ptr<Registry> registry = make_registry(global, log.sink());
-  warn_of_rejected(*registry, log.sink());
-  const std::unique_ptr<HostServices> host = make_host(*registry, global, std::nullopt, log.sink());
-  const std::unique_ptr<Renderer> renderer = make_renderer(options.picture, *registry, *host);
+  const JobServices services = make_services(global, log.sink());
+  const std::unique_ptr<Renderer> renderer =
+      make_renderer(options.picture, *services.registry, *services.host);
   const std::string who = "renderer '" + options.picture.renderer + "'";
 
   BenchResult result;
   Scene scene;
   NodeId camera;
-  result.load = measured([&] { camera = load_scene(options, scene, *host, log.sink()); });
+  result.load = measured([&] { camera = load_scene(options, scene, *services.host, log.sink()); });
   result.width = scene[camera].camera->width;
   result.height = scene[camera].camera->height;
   std::optional<Image<Vec3f>> reference;
   if (!options.reference.empty()) {
-    reference = read_linear_picture(options.reference, result.width, result.height, *host);
+    reference = read_linear_picture(options.reference, result.width, result.height, *services.host);
   }
   result.prepare = measured([&] { call_component(who, [&] { renderer->prepare(scene); }); });
   result.prepare_phases = renderer->report().seconds;
   if (options.reference_samples > 0) {
-    reference = make_reference(options, scene, camera, *registry, *host);
+    reference = make_reference(options, scene, camera, *services.registry, *services.host);
   }
   for (int i = 0; i < options.repetitions; ++i) {
     BenchRun& run = result.runs.emplace_back();
@@ -259,14 +258,15 @@ int command_bench(const GlobalOptions& global, const BenchOptions& given, Consol
     run.report = renderer->report();
     const Image<Rgba8>& picture = frame.get(kColor);
     run.encode = measured([&] {
-      host->encode_image({picture.pixels().data(), picture.width(), picture.height(), 4, 8},
-                         ImageFormat::Png);
+      services.host->encode_image(
+          {picture.pixels().data(), picture.width(), picture.height(), 4, 8}, ImageFormat::Png);
     });
     const Image<Vec3f>& light = frame.get(kColorHdr);
     if (reference) run.error = bench::picture_error(light, *reference);
     if (i + 1 < options.repetitions || options.picture_file.empty()) continue;
-    replace_file(options.picture_file,
-                 host->encode_image({light.pixels().data(), light.width(), light.height(), 3, 32},
+    replace_file(
+        options.picture_file,
+        services.host->encode_image({light.pixels().data(), light.width(), light.height(), 3, 32},
                                     ImageFormat::Exr));
   }
   std::cout << (options.as_json ? result_json(options, result) : result_text(options, result));

@@ -3,10 +3,10 @@
 
 #include <iostream>
 
-#include "framework/app/assemble.h"
-#include "framework/app/assemble_job.h"
-#include "framework/app/job_file.h"
 #include "framework/config/value_text.h"
+#include "framework/jobs/assemble.h"
+#include "framework/jobs/assemble_job.h"
+#include "framework/jobs/job_file.h"
 #include "framework/pipeline/job.h"
 
 namespace diorama {
@@ -14,11 +14,8 @@ namespace diorama {
 int command_config(const GlobalOptions& global, const JobOptions& options, bool as_json,
                    ConsoleLog& log) {
   const Value job = load_job(options, log.sink());
-  const std::unique_ptr<Registry> registry = make_registry(global, log.sink());
-  warn_of_rejected(*registry, log.sink());
-  const auto host =
-      make_host(*registry, global, assets_root_of(job), log.sink(), asset_prefixes_of(job));
-  const Value resolved = check_job(job, *registry, *host);
+  const JobServices services = make_job_services(global, job, log.sink());
+  const Value resolved = check_job(job, *services.registry, *services.host);
   std::cout << (as_json ? to_json(resolved, 2) + "\n" : to_yaml(resolved));
   return 0;
 }

@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "diorama/writer.h"
-#include "framework/app/assemble.h"
 #include "framework/app/output_check.h"
 #include "framework/config/json_text.h"
 #include "framework/config/yaml_config.h"
@@ -18,6 +17,7 @@
 #include "framework/datasets/dataset_output.h"
 #include "framework/datasets/dataset_readers.h"
 #include "framework/host/progress_bar.h"
+#include "framework/jobs/assemble.h"
 
 namespace diorama {
 namespace {
@@ -118,17 +118,15 @@ std::string page_text(const std::vector<fs::path>& sources, const std::vector<st
 }  // namespace
 
 int command_convert(const GlobalOptions& global, const ConvertOptions& options, ConsoleLog& log) {
-  const std::unique_ptr<Registry> registry = make_registry(global, log.sink());
-  warn_of_rejected(*registry, log.sink());
-  const std::unique_ptr<HostServices> host = make_host(*registry, global, std::nullopt, log.sink());
-  DatasetReaders readers(*registry, *host);
-  ChosenWriters chosen = make_writers(options.writers, *registry, *host);
+  const JobServices services = make_services(global, log.sink());
+  DatasetReaders readers(*services.registry, *services.host);
+  ChosenWriters chosen = make_writers(options.writers, *services.registry, *services.host);
 
   std::vector<ConversionSource> sources;
   std::vector<fs::path> folders;
   std::vector<std::string> formats;
   for (const fs::path& dataset : options.datasets) {
-    sources.push_back(open_source(dataset, options, readers, *host));
+    sources.push_back(open_source(dataset, options, readers, *services.host));
     folders.push_back(sources.back().folder);
     formats.push_back(sources.back().data->info().format);
     sources.back().info.program_version = program_version();
@@ -145,12 +143,12 @@ int command_convert(const GlobalOptions& global, const ConvertOptions& options, 
   ProgressBar bar(log, "captures", info.capture_count);
   output.write(
       [&](const DatasetOutput::Take& take) {
-        conversion.run(*host, [&](Capture capture) {
+        conversion.run(*services.host, [&](Capture capture) {
           bar.update(capture.index + 1, 0);
           take(std::move(capture));
         });
       },
-      *host);
+      *services.host);
   output.finish();
   output.close();
   log.write(LogLevel::Info, "dataset: " + options.output.string());

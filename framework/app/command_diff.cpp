@@ -9,11 +9,11 @@
 #include <vector>
 
 #include "diorama/error.h"
-#include "framework/app/assemble.h"
 #include "framework/config/clean_text.h"
 #include "framework/datasets/dataset_difference.h"
 #include "framework/datasets/dataset_origin.h"
 #include "framework/datasets/dataset_readers.h"
+#include "framework/jobs/assemble.h"
 
 namespace diorama {
 namespace {
@@ -74,10 +74,8 @@ void print_once(const std::vector<std::string>& lines, std::set<std::string>& pr
 }  // namespace
 
 int command_diff(const GlobalOptions& global, const DiffOptions& options, ConsoleLog& log) {
-  const std::unique_ptr<Registry> registry = make_registry(global, log.sink());
-  warn_of_rejected(*registry, log.sink());
-  const std::unique_ptr<HostServices> host = make_host(*registry, global, std::nullopt, log.sink());
-  DatasetReaders readers(*registry, *host);
+  const JobServices services = make_services(global, log.sink());
+  DatasetReaders readers(*services.registry, *services.host);
   const Pairs pairs = pairs_of(datasets_in(options.first, readers, options.reader),
                                datasets_in(options.second, readers, options.reader));
   bool is_same = pairs.alone.empty();
@@ -86,8 +84,8 @@ int command_diff(const GlobalOptions& global, const DiffOptions& options, Consol
   for (const auto& [first, second] : pairs.pairs) {
     const auto a = readers.open(first.folder, first.reader);
     const auto b = readers.open(second.folder, second.reader);
-    const DatasetDifference difference =
-        dataset_difference({first.folder, *a}, {second.folder, *b}, options.tolerance, *host);
+    const DatasetDifference difference = dataset_difference({first.folder, *a}, {second.folder, *b},
+                                                            options.tolerance, *services.host);
     is_same = is_same && difference.is_empty();
     print_once(difference.pages, printed);
     const std::string name = first.folder.filename().string();

@@ -5,9 +5,9 @@
 #include <iostream>
 #include <system_error>
 
-#include "framework/app/assemble.h"
 #include "framework/app/command_schema.h"
 #include "framework/app/completion_scripts.h"
+#include "framework/jobs/assemble.h"
 #include "framework/pipeline/job.h"
 
 namespace diorama {

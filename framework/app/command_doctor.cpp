@@ -9,8 +9,8 @@
 #include <set>
 
 #include "diorama/renderer.h"
-#include "framework/app/assemble.h"
 #include "framework/app/cli.h"
+#include "framework/jobs/assemble.h"
 
 namespace diorama {
 namespace {

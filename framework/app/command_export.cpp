@@ -1,20 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "framework/app/command_export.h"
 
-#include "framework/app/assemble.h"
 #include "framework/export/scene_export.h"
+#include "framework/jobs/assemble.h"
 
 namespace diorama {
 
 int command_export(const GlobalOptions& global, const ExportCommandOptions& options,
                    ConsoleLog& log) {
   const Log console = log.sink();
-  const std::unique_ptr<Registry> registry = make_registry(global, console);
-  warn_of_rejected(*registry, console);
-  const std::unique_ptr<HostServices> host = make_host(*registry, global, std::nullopt, console);
+  const JobServices services = make_services(global, console);
   Scene scene;
-  const NodeId root = host->load_asset(options.asset, scene, scene.root());
-  export_scene(scene, root, options.file, {!options.without_physics}, *host);
+  const NodeId root = services.host->load_asset(options.asset, scene, scene.root());
+  export_scene(scene, root, options.file, {!options.without_physics}, *services.host);
   return 0;
 }
 

@@ -4,9 +4,9 @@
 #include <iostream>
 #include <mutex>
 
-#include "framework/app/assemble.h"
 #include "framework/config/clean_text.h"
 #include "framework/inspect/scene_report.h"
+#include "framework/jobs/assemble.h"
 
 namespace diorama {
 

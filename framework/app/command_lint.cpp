@@ -5,18 +5,16 @@
 #include <iostream>
 #include <memory>
 
-#include "framework/app/assemble.h"
 #include "framework/config/clean_text.h"
+#include "framework/jobs/assemble.h"
 #include "framework/lint/lint_dataset.h"
 
 namespace diorama {
 
 int command_lint(const GlobalOptions& global, const LintOptions& options, ConsoleLog& log) {
-  const std::unique_ptr<Registry> registry = make_registry(global, log.sink());
-  warn_of_rejected(*registry, log.sink());
-  const std::unique_ptr<HostServices> host = make_host(*registry, global, std::nullopt, log.sink());
-  DatasetReaders readers(*registry, *host);
-  return print_lint(lint_datasets(options.dataset, readers, *host, options.reader),
+  const JobServices services = make_services(global, log.sink());
+  DatasetReaders readers(*services.registry, *services.host);
+  return print_lint(lint_datasets(options.dataset, readers, *services.host, options.reader),
                     options.as_json);
 }
 

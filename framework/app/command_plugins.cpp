@@ -5,11 +5,11 @@
 #include <array>
 #include <iostream>
 
-#include "framework/app/assemble.h"
 #include "framework/app/cli.h"
 #include "framework/app/param_text.h"
 #include "framework/config/value_text.h"
 #include "framework/conformance/conformance.h"
+#include "framework/jobs/assemble.h"
 
 namespace diorama {
 namespace {

@@ -6,10 +6,10 @@
 #include <system_error>
 
 #include "diorama/error.h"
-#include "framework/app/job_file.h"
-#include "framework/app/trial_run.h"
 #include "framework/config/clean_text.h"
 #include "framework/host/replace_file.h"
+#include "framework/jobs/job_file.h"
+#include "framework/jobs/trial_run.h"
 
 namespace diorama {
 namespace {

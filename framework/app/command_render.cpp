@@ -5,8 +5,8 @@
 #include <filesystem>
 
 #include "diorama/renderer.h"
-#include "framework/app/assemble.h"
 #include "framework/host/replace_file.h"
+#include "framework/jobs/assemble.h"
 #include "framework/plugins/plugin_call.h"
 
 namespace diorama {
@@ -49,12 +49,11 @@ std::vector<std::byte> encoded(const Frame& frame, ImageFormat format, const Hos
 
 int command_render(const GlobalOptions& global, const RenderOptions& options, ConsoleLog& log) {
   const ImageFormat format = format_of(options.output);
-  const std::unique_ptr<Registry> registry = make_registry(global, log.sink());
-  warn_of_rejected(*registry, log.sink());
-  const std::unique_ptr<HostServices> host = make_host(*registry, global, std::nullopt, log.sink());
-  const std::unique_ptr<Renderer> renderer = make_renderer(options.picture, *registry, *host);
+  const JobServices services = make_services(global, log.sink());
+  const std::unique_ptr<Renderer> renderer =
+      make_renderer(options.picture, *services.registry, *services.host);
   Scene scene;
-  const NodeId camera = load_picture_scene(options.picture, scene, *host, log.sink());
+  const NodeId camera = load_picture_scene(options.picture, scene, *services.host, log.sink());
 
   RenderRequest request;
   request.camera = camera;
@@ -64,7 +63,7 @@ int command_render(const GlobalOptions& global, const RenderOptions& options, Co
   call_component(who, [&] { renderer->prepare(scene); });
   const Frame frame = call_component(who, [&] { return renderer->render(request); });
 
-  replace_file(options.output, encoded(frame, format, *host));
+  replace_file(options.output, encoded(frame, format, *services.host));
   log.write(LogLevel::Info, options.output + ": " + scene.path(camera) + ", " +
                                 std::to_string(frame.camera.width) + "x" +
                                 std::to_string(frame.camera.height));

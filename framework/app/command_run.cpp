@@ -11,17 +11,17 @@
 #include <string_view>
 #include <utility>
 
-#include "framework/app/assemble.h"
-#include "framework/app/assemble_job.h"
 #include "framework/app/exit_codes.h"
-#include "framework/app/job_file.h"
 #include "framework/app/output_check.h"
-#include "framework/app/trial_run.h"
 #include "framework/config/clean_text.h"
 #include "framework/config/job_overrides.h"
 #include "framework/config/yaml_config.h"
 #include "framework/host/progress_bar.h"
 #include "framework/host/progress_lines.h"
+#include "framework/jobs/assemble.h"
+#include "framework/jobs/assemble_job.h"
+#include "framework/jobs/job_file.h"
+#include "framework/jobs/trial_run.h"
 #include "framework/pipeline/capture_memory.h"
 #include "framework/pipeline/dataset_description.h"
 

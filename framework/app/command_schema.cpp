@@ -3,8 +3,8 @@
 
 #include <iostream>
 
-#include "framework/app/assemble.h"
 #include "framework/config/value_text.h"
+#include "framework/jobs/assemble.h"
 #include "framework/pipeline/job.h"
 
 namespace diorama {

@@ -12,13 +12,13 @@
 
 #include "diorama/annotator.h"
 #include "diorama/writer.h"
-#include "framework/app/assemble.h"
-#include "framework/app/assemble_job.h"
 #include "framework/app/output_check.h"
 #include "framework/config/value_text.h"
 #include "framework/config/yaml_config.h"
 #include "framework/datasets/dataset_output.h"
 #include "framework/host/progress_bar.h"
+#include "framework/jobs/assemble.h"
+#include "framework/jobs/assemble_job.h"
 #include "framework/pipeline/job.h"
 #include "framework/plugins/plugin_call.h"
 #include "framework/replay/stored_captures.h"
@@ -57,7 +57,7 @@ Effects make_effects(const fs::path& file, Registry& registry, Host& host) {
   const Value job = read_job_file(file);
   Complaints complaints;
   const std::vector<ComponentConfig> entries = read_annotators(job, complaints);
-  const auto keys = host_keys(ComponentKind::Annotator, "annotators");
+  const auto keys = host_keys("annotators");
   Effects effects;
   for (const ComponentConfig& entry : entries) {
     effects.types.push_back(entry.type);
@@ -179,14 +179,13 @@ Capture annotated(const StoredCaptures& stored, std::size_t place, const Effects
 }  // namespace
 
 int command_sensors(const GlobalOptions& global, const SensorsOptions& options, ConsoleLog& log) {
-  const std::unique_ptr<Registry> registry = make_registry(global, log.sink());
-  warn_of_rejected(*registry, log.sink());
-  const std::unique_ptr<HostServices> host = make_host(*registry, global, std::nullopt, log.sink());
-  const Effects effects = make_effects(options.effects, *registry, *host);
-  DatasetReaders readers(*registry, *host);
+  const JobServices services = make_services(global, log.sink());
+  const Effects effects = make_effects(options.effects, *services.registry, *services.host);
+  DatasetReaders readers(*services.registry, *services.host);
   const StoredCaptures stored(options.dataset, effects.needs, readers);
   std::vector<NamedWriter> writers;
-  writers.push_back({stored.writer_name(), make_writer(stored, effects, *registry, *host)});
+  writers.push_back(
+      {stored.writer_name(), make_writer(stored, effects, *services.registry, *services.host)});
 
   check_folders_are_free(output_folders_of(options.output, writers));
   DatasetOutput output(options.output, std::move(writers), stored.capture_count(),
@@ -201,7 +200,7 @@ int command_sensors(const GlobalOptions& global, const SensorsOptions& options, 
           bar.update(int(i) + 1, 0);
         }
       },
-      *host);
+      *services.host);
   output.close();
   log.write(LogLevel::Info, options.output.string() + ": " + std::to_string(count) + " of " +
                                 std::to_string(stored.capture_count()) + " captures");

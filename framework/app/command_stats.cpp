@@ -5,21 +5,19 @@
 #include <iostream>
 
 #include "diorama/error.h"
-#include "framework/app/assemble.h"
 #include "framework/datasets/dataset_origin.h"
 #include "framework/datasets/dataset_readers.h"
 #include "framework/datasets/dataset_stats.h"
+#include "framework/jobs/assemble.h"
 
 namespace diorama {
 
 int command_stats(const GlobalOptions& global, const StatsOptions& options, ConsoleLog& log) {
-  const std::unique_ptr<Registry> registry = make_registry(global, log.sink());
-  warn_of_rejected(*registry, log.sink());
-  const std::unique_ptr<HostServices> host = make_host(*registry, global, std::nullopt, log.sink());
-  DatasetReaders readers(*registry, *host);
+  const JobServices services = make_services(global, log.sink());
+  DatasetReaders readers(*services.registry, *services.host);
   const FoundDataset found = find_dataset(options.dataset, readers, options.reader);
   const auto dataset = readers.open(found.folder, found.reader);
-  DatasetStats stats = dataset_stats(*dataset, *host);
+  DatasetStats stats = dataset_stats(*dataset, *services.host);
   stats.views = views_of_run(found.folder);
   if (options.html.empty()) {
     std::cout << (options.as_json ? stats_json(stats) : stats_text(stats));

@@ -16,9 +16,9 @@
 #include <thread>
 
 #include "diorama/error.h"
-#include "framework/app/assemble.h"
 #include "framework/config/clean_text.h"
 #include "framework/datasets/dataset_readers.h"
+#include "framework/jobs/assemble.h"
 #include "framework/view/dataset_view.h"
 #include "framework/view/http_server.h"
 #include "framework/view/report.h"
@@ -81,17 +81,15 @@ class BrowserStart {
 }  // namespace
 
 int command_view(const GlobalOptions& global, const ViewOptions& options, ConsoleLog& log) {
-  const std::unique_ptr<Registry> registry = make_registry(global, log.sink());
-  warn_of_rejected(*registry, log.sink());
-  const std::unique_ptr<HostServices> host = make_host(*registry, global, std::nullopt, log.sink());
-  DatasetReaders readers(*registry, *host);
-  DatasetView view({options.dataset, options.reader}, readers, *host);
+  const JobServices services = make_services(global, log.sink());
+  DatasetReaders readers(*services.registry, *services.host);
+  DatasetView view({options.dataset, options.reader}, readers, *services.host);
 
   view_is_to_end = false;
   std::signal(SIGINT, &end_view);
   std::signal(SIGTERM, &end_view);
   std::signal(SIGHUP, &end_view);
-  host->stop_on(view_is_to_end);
+  services.host->stop_on(view_is_to_end);
   HttpServer::Options server_options;
   server_options.port = options.port;
   HttpServer server(server_options, [&view](std::string_view path) { return view.answer(path); });
@@ -121,11 +119,9 @@ int command_view(const GlobalOptions& global, const ViewOptions& options, Consol
 }
 
 int command_report(const GlobalOptions& global, const ReportOptions& options, ConsoleLog& log) {
-  const std::unique_ptr<Registry> registry = make_registry(global, log.sink());
-  warn_of_rejected(*registry, log.sink());
-  const std::unique_ptr<HostServices> host = make_host(*registry, global, std::nullopt, log.sink());
-  DatasetReaders readers(*registry, *host);
-  DatasetView view({options.dataset, options.reader, options.captures}, readers, *host);
+  const JobServices services = make_services(global, log.sink());
+  DatasetReaders readers(*services.registry, *services.host);
+  DatasetView view({options.dataset, options.reader, options.captures}, readers, *services.host);
   const ReportSize size = write_report(view, options.output);
   log.write(LogLevel::Info, "wrote " + (options.output / "index.html").string() + ": " +
                                 std::to_string(size.captures) + " captures, " +

@@ -3,10 +3,9 @@
 
 #include <cmath>
 #include <optional>
-#include <string_view>
 #include <utility>
 
-#include "framework/pipeline/job.h"
+#include "framework/pipeline/job_sections.h"
 
 namespace diorama {
 namespace {
@@ -246,31 +245,6 @@ Value Schemas::properties(const std::vector<ParamSpec>& specs) {
   return properties;
 }
 
-/// A section of the job whose entries name components.
-struct ComponentSection {
-  std::string_view key;
-  ComponentKind kind;
-  const char* default_type;  // null: the key `type` must be there
-};
-
-constexpr ComponentSection kSections[] = {
-    {"loaders", ComponentKind::Loader, nullptr},
-    {"environments", ComponentKind::Loader, nullptr},
-    {"objects", ComponentKind::Loader, nullptr},
-    {"randomizers", ComponentKind::Randomizer, nullptr},
-    {"physics", ComponentKind::Physics, kDefaultPhysics},
-    {"renderer", ComponentKind::Renderer, kDefaultRenderer},
-    {"annotators", ComponentKind::Annotator, nullptr},
-    {"writers", ComponentKind::Writer, nullptr},
-};
-
-const ComponentSection* section_called(std::string_view key) {
-  for (const ComponentSection& section : kSections) {
-    if (section.key == key) return &section;
-  }
-  return nullptr;
-}
-
 /// `type: null` is what people write for the renderer called "null".
 Value type_is(const std::string& type) {
   Value schema = Value::make_map();
@@ -291,7 +265,7 @@ Value required(const char* key) {
 }
 
 /// If the entry has this type, then it has these keys and no others.
-Value rule_for(const ComponentSection& section, const std::vector<ParamSpec>& host,
+Value rule_for(const JobSection& section, const std::vector<ParamSpec>& host,
                const DescribedComponent& component, Schemas& schemas) {
   Value types = Value::make_map();
   types.set("type", type_is(component.type));
@@ -314,7 +288,7 @@ Value rule_for(const ComponentSection& section, const std::vector<ParamSpec>& ho
   return rule;
 }
 
-Value entry_schema(const ComponentSection& section, const std::vector<ParamSpec>& host,
+Value entry_schema(const JobSection& section, const std::vector<ParamSpec>& host,
                    const std::vector<DescribedComponent>& components, Schemas& schemas) {
   Value rules = Value::make_list();
   Value types = Value::make_list();
@@ -327,7 +301,7 @@ Value entry_schema(const ComponentSection& section, const std::vector<ParamSpec>
     if (component.kind == section.kind) allow(component);
   }
   if (section.kind == ComponentKind::Physics) {
-    allow({section.kind, "none", "Nothing moves by itself.", {}});
+    allow({*section.kind, "none", "Nothing moves by itself.", {}});
   }
   Value type = Value::make_map();
   type.set("description", Value::text("Type of the component."));
@@ -357,9 +331,9 @@ Value job_schema(const std::vector<ParamSpec>& job,
   Schemas schemas;
   Value properties = Value::make_map();
   for (const ParamSpec& spec : job) {
-    const ComponentSection* section = section_called(spec.key);
+    const JobSection* section = job_section(spec.key);
     Value schema;
-    if (section) {
+    if (section && section->kind) {
       schema = entry_schema(*section, spec.children, components, schemas);
       if (spec.type == ParamType::List) schema = list_schema(std::move(schema), std::nullopt);
       schema.set("description", Value::text(spec.help));

@@ -2,37 +2,14 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <optional>
 #include <set>
-#include <string>
-#include <vector>
 
-#include "diorama/host.h"
-#include "framework/images/image_codecs.h"
+#include "framework/jobs/job_options.h"
 
 namespace diorama {
 
-/// What the command line says for every command.
-struct GlobalOptions {
-  std::filesystem::path program;  ///< The running executable, links resolved.
-  LogLevel log_level = LogLevel::Info;
-  int threads = 0;  ///< 0: as many as the machine offers.
-  int picture_mib = int(kPictureBudget >> 20);
-  std::vector<std::filesystem::path> plugin_dirs;
-  bool allow_unsafe_plugin_dir = false;
-  std::optional<std::filesystem::path> assets_root;
-};
-
-/// What it says of the job, for commands that take one.
-struct JobOptions {
-  std::filesystem::path job;      ///< Empty: the built-in one.
-  std::vector<std::string> sets;  ///< "key=value", in order.
-  std::optional<std::uint64_t> seed;
-  std::optional<std::string> output;  ///< Output folder.
-};
-
-/// What it says of the run.
+/// What the command line says of a run.
 struct RunCommandOptions {
   JobOptions job;
   int shard = 0;  ///< 0-based here; --shard counts from 1.

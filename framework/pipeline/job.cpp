@@ -11,6 +11,7 @@
 #include "framework/config/clean_text.h"
 #include "framework/pipeline/camera_rig.h"
 #include "framework/pipeline/job_keys.h"
+#include "framework/pipeline/job_sections.h"
 #include "framework/pipeline/label_pattern.h"
 
 namespace diorama {
@@ -31,12 +32,6 @@ constexpr const char* kPickWords[] = {"per_job", "per_visit"};
 constexpr const char* kSettlePolicies[] = {"keep", "respawn", "drop"};
 constexpr const char* kLightWords[] = {"sphere", "rect", "disk", "distant", "dome"};
 constexpr const char* kCameraWords[] = {"pinhole", "opencv_pinhole", "fisheye_polynomial"};
-
-const std::vector<std::string> kSections{
-    "seed",     "assets_root",  "asset_prefixes", "debug",    "total_captures",
-    "loaders",  "environments", "environment",    "objects",  "lights",
-    "cameras",  "randomizers",  "physics",        "renderer", "annotators",
-    "timeline", "settle",       "views",          "writers",  "output"};
 
 std::string item_path(std::string_view section, std::size_t index) {
   return std::string(section) + "[" + std::to_string(index) + "]";
@@ -546,10 +541,17 @@ void read_section(const Value& job, const char* name, Section& section, Complain
   read_all_keys(*map, name, section, complaints);
 }
 
+bool is_plain_key(std::string_view key) {
+  const auto& specs = plain_job_keys();
+  return std::ranges::any_of(specs, [&](const ParamSpec& spec) { return spec.key == key; });
+}
+
 void complain_about_unknown_sections(const Value& job, Complaints& complaints) {
+  std::vector<std::string> known;
+  for (const ParamSpec& spec : job_specs()) known.push_back(spec.key);
   for (const auto& [key, value] : job.map) {
-    if (std::find(kSections.begin(), kSections.end(), key) != kSections.end()) continue;
-    const std::string near = nearest_name(key, kSections);
+    if (std::find(known.begin(), known.end(), key) != known.end()) continue;
+    const std::string near = nearest_name(key, known);
     complaints.add(value.key_place, "unknown key '" + key + "'" +
                                         (near.empty() ? "" : "; did you mean '" + near + "'?"));
   }
@@ -559,9 +561,7 @@ Value head_of(const Value& job) {
   Value head = Value::make_map();
   head.place = job.place;
   for (const auto& [key, value] : job.map) {
-    const bool is_of_head = key == "seed" || key == "assets_root" || key == "asset_prefixes" ||
-                            key == "debug" || key == "total_captures";
-    if (is_of_head) head.map.emplace_back(key, value);
+    if (is_plain_key(key)) head.map.emplace_back(key, value);
   }
   return head;
 }
@@ -805,35 +805,16 @@ std::string node_name(std::string_view text) {
   return name.empty() ? "object" : name;
 }
 
-std::vector<std::string_view> host_keys(ComponentKind kind, std::string_view section) {
-  if (section == "objects") {
-    return {"type",
-            "name",
-            "under",
-            "count",
-            "fewer",
-            "pick",
-            "balance",
-            "label",
-            "label_pattern",
-            "label_replacement",
-            "taxonomy",
-            "variants",
-            "gravity_disabled_chance",
-            "collider",
-            "mass_kg"};
-  }
-  switch (kind) {
-    case ComponentKind::Loader:
-    case ComponentKind::Annotator:
-      return {"type", "name"};
-    case ComponentKind::Randomizer:
-      return {"type", "name", "on", "every"};
-    case ComponentKind::Writer:
-      return {"type", "name", "output_dir"};
-    default:
-      return {"type"};
-  }
+std::vector<std::string_view> host_keys(std::string_view section) {
+  static const auto all = [] {
+    std::map<std::string, std::vector<std::string>, std::less<>> keys;
+    for (const JobSection& each : job_sections()) {
+      for (const ParamSpec& spec : each.keys()) keys[each.key].push_back(spec.key);
+    }
+    return keys;
+  }();
+  const auto& keys = all.find(section)->second;
+  return {keys.begin(), keys.end()};
 }
 
 }  // namespace diorama

@@ -224,9 +224,9 @@ using DescribeComponent =
 /// the same job.
 Value resolved_job(const Value& job, const DescribeComponent& describe);
 
-/// Keys that the host reads from an entry of a list ("type", "name" ...), by the kind of component
-/// that the rest of the entry belongs to; for Registry::make().
-std::vector<std::string_view> host_keys(ComponentKind kind, std::string_view section);
+/// Keys that the host reads from an entry of a section ("type", "name" ...); the rest belongs to
+/// the component that it names.
+std::vector<std::string_view> host_keys(std::string_view section);
 
 /// The keys of a job file as data; lists of components have the host's keys as children.
 std::vector<ParamSpec> job_specs();

@@ -19,12 +19,12 @@
 
 #include "diorama/error.h"
 #include "diorama/reader.h"
-#include "framework/app/assemble.h"
-#include "framework/app/assemble_job.h"
-#include "framework/app/job_file.h"
 #include "framework/config/yaml_config.h"
 #include "framework/datasets/dataset_readers.h"
-#include "framework/output/memory_file_system.h"
+#include "framework/jobs/assemble.h"
+#include "framework/jobs/assemble_job.h"
+#include "framework/jobs/job_file.h"
+#include "framework/jobs/run_in_memory.h"
 #include "framework/plugins/plugin_search.h"
 
 namespace py = pybind11;
@@ -46,17 +46,13 @@ void log_to_python(LogLevel level, std::string_view message) {
 /// libraries of plugins stay loaded.
 class Services {
  public:
-  explicit Services(GlobalOptions options)
-      : registry_(make_registry(options, log_to_python)),
-        host_(make_host(*registry_, options, std::nullopt, log_to_python)),
-        readers_(*registry_, *host_) {
-    warn_of_rejected(*registry_, log_to_python);
-  }
+  explicit Services(const GlobalOptions& options)
+      : services_(make_services(options, log_to_python)),
+        readers_(*services_.registry, *services_.host) {}
   DatasetReaders& readers() { return readers_; }
 
  private:
-  std::unique_ptr<Registry> registry_;
-  std::unique_ptr<HostServices> host_;
+  JobServices services_;
   DatasetReaders readers_;
 };
 
@@ -424,17 +420,12 @@ void listen(const std::string& program, const Value& given, const py::object& on
     services.host->stop_on(own.stop());
     JobAssembly assembly = assemble_job(job, *services.registry, *services.host,
                                         services.assets_root, program_version(), AssembleFor::Run);
-    MemoryFileSystem memory;
-    OutputFolders folders = output_folders(assembly.job);
-    folders.base = "/memory";
-    OutputStore store(memory, folders, assembly.plan.capture_count(), {});
     RunOptions run;
     run.stop = &own.stop();
     run.encodes_in_order = true;
     run.progress = [&](const RunProgress&) { own.look_for_signals(); };
     try {
-      Pipeline(assembly.job, assembly.plan, assembly.components, *services.host, store, run)
-          .run(assembly.dataset, assembly.dataset_json);
+      run_in_memory(assembly, *services.host, run);
     } catch (const Interrupted&) {
       // Whoever ended it knows.
     }

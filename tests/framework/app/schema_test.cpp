@@ -1,13 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "framework/app/job_schema.h"
 
+#include <algorithm>
 #include <cstdlib>
+#include <optional>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "framework/app/cli.h"
+#include "framework/app/reference_pages.h"
 #include "framework/config/value_text.h"
 #include "framework/config/yaml_config.h"
 #include "framework/pipeline/job.h"
+#include "framework/pipeline/job_sections.h"
 #include "framework/replicator/dialect.h"
 #include "program_run.h"
 #include "support/catch.h"
@@ -104,6 +110,78 @@ TEST_CASE("the schema refuses what the reader refuses, at the same place", "[sch
   for (const auto& [job, place] : broken) {
     INFO(job);
     CHECK(verdict(job) == "refused: " + place + "\n");
+  }
+}
+
+namespace {
+
+/// What read_job() says of a job with one room and this.
+std::vector<std::string> complaints_of(const std::string& key, Value value) {
+  Value job = parse_yaml("environments: [{type: shapes}]\ncameras: [{type: pinhole}]", "job");
+  job.set(key, std::move(value));
+  Complaints complaints;
+  read_job(job, complaints);
+  return complaints.messages();
+}
+
+bool says(const std::vector<std::string>& messages, const std::string& text) {
+  return std::ranges::any_of(messages, [&](const std::string& message) {
+    return message.find(text) != std::string::npos;
+  });
+}
+
+}  // namespace
+
+TEST_CASE("a key of the job's table is known to reader, defaults, schema and reference",
+          "[schema]") {
+  const auto nothing = [](ComponentKind, std::string_view) {
+    return std::optional<std::vector<ParamSpec>>();
+  };
+  const Value schema = job_schema(job_specs(), components());
+  const Value resolved = resolved_job(
+      parse_yaml("environments: [{type: shapes}]\nloaders: [{type: a}]\nannotators: [{type: b}]\n"
+                 "views: [{}]\nobjects: [{type: c}]\nwriters: [{type: d}]\ncameras: [{}]\n"
+                 "lights: [{}]\nrandomizers: [{type: e}]",
+                 "job"),
+      nothing);
+  std::string page;
+  for (const PageFile& file :
+       reference_pages({{"diorama", "Fills rooms.", {}}}, job_specs(), components(), "1")) {
+    page += file.text;
+  }
+  CHECK(job_specs().size() == plain_job_keys().size() + job_sections().size());
+  for (const ParamSpec& spec : job_specs()) {
+    INFO(spec.key);
+    const auto right = complaints_of(spec.key, spec.default_value);
+    CHECK_FALSE(says(right, "unknown key"));
+    // Who reads it knows what it has to be.
+    const bool is_text = spec.type == ParamType::OptionalText;
+    CHECK(says(complaints_of(spec.key, is_text ? Value::make_map() : Value::text("x y")),
+               spec.key + ": expected"));
+    CHECK(says(complaints_of(spec.key.front() + spec.key, Value::text("x")),
+               "did you mean '" + spec.key + "'?"));
+    REQUIRE(resolved.find(spec.key));
+    const Value* described = schema.find("properties")->find(spec.key);
+    REQUIRE(described);
+    CHECK(described->find("description")->scalar.starts_with(spec.help));
+    CHECK(page.find(spec.key) != page.npos);
+    for (const ParamSpec& child : spec.children) {
+      INFO(child.key);
+      CHECK(page.find(child.key) != page.npos);
+      if (const JobSection* const section = job_section(spec.key);
+          !section || section->when_absent) {
+        continue;  // what is given stays as it is
+      }
+      const Value* const in = resolved.find(spec.key);
+      const Value* const entry = in->kind == Value::Kind::List ? &in->list.at(0) : in;
+      CHECK(entry->find(child.key));
+    }
+  }
+  for (const JobSection& section : job_sections()) {
+    INFO(section.key);
+    const auto keys = host_keys(section.key);
+    CHECK(keys.size() == section.keys().size());
+    if (section.kind) CHECK(std::ranges::find(keys, "type") != keys.end());
   }
 }
 

@@ -53,7 +53,7 @@ std::unique_ptr<Randomizer> make(const ComponentConfig& config, Host& host) {
   ParamReader reader(config.map, config.path, complaints);
   typename T::Params params;
   params.visit(reader);
-  reader.finish(host_keys(ComponentKind::Randomizer, "randomizers"));
+  reader.finish(host_keys("randomizers"));
   complaints.raise();
   return std::make_unique<T>(params, host);
 }

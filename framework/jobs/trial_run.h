@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "diorama/config.h"
-#include "framework/app/options.h"
 #include "framework/host/log.h"
+#include "framework/jobs/job_options.h"
 #include "framework/pipeline/pipeline.h"
 
 namespace diorama {

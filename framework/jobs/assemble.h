@@ -6,8 +6,8 @@
 #include <optional>
 #include <string>
 
-#include "framework/app/options.h"
 #include "framework/host/host_services.h"
+#include "framework/jobs/job_options.h"
 #include "framework/plugins/registry.h"
 
 /// The only place that says what the program is made of.
@@ -40,6 +40,9 @@ struct JobServices {
 /// Error(Asset) when the assets root is no folder.
 JobServices make_job_services(const GlobalOptions& options, const Value& job, const Log& log,
                               void (*more)(Registrar&) = nullptr);
+
+/// The same for what is no job.
+JobServices make_services(const GlobalOptions& options, const Log& log);
 
 /// Host services for a job; `job_assets_root` is what the job says, if it says something. Throws
 /// Error(Asset) when the assets root is no folder.

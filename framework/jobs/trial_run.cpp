@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "framework/app/trial_run.h"
+#include "framework/jobs/trial_run.h"
 
 #include <sys/resource.h>
 
@@ -14,9 +14,9 @@
 #include <utility>
 
 #include "diorama/error.h"
-#include "framework/app/assemble.h"
-#include "framework/app/assemble_job.h"
-#include "framework/output/memory_file_system.h"
+#include "framework/jobs/assemble.h"
+#include "framework/jobs/assemble_job.h"
+#include "framework/jobs/run_in_memory.h"
 
 namespace diorama {
 namespace {
@@ -193,18 +193,11 @@ Trial run_trial(const GlobalOptions& global, const Value& given, const TrialOpti
   }
   JobAssembly assembly = assemble_job(job, *services.registry, *services.host, services.assets_root,
                                       program_version(), AssembleFor::Trial, 1);
-  OutputFolders folders = output_folders(assembly.job);
-  folders.base = "/memory";
-
-  MemoryFileSystem memory;
-  OutputStore store(memory, folders, assembly.plan.capture_count(), {});
   RunOptions run;
   run.only = chosen_captures(options, assembly.plan);
   trial.captures = int(run.only->size());
   const KeepPictures keep(trial.pictures);
-  const RunSummary summary =
-      Pipeline(assembly.job, assembly.plan, assembly.components, *services.host, store, run)
-          .run(assembly.dataset, assembly.dataset_json);
+  const RunSummary summary = run_in_memory(assembly, *services.host, run);
   std::ranges::sort(trial.pictures, {}, [](const TrialPicture& picture) {
     return std::pair(picture.capture, std::string_view(picture.camera));
   });

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "framework/app/assemble_job.h"
+#include "framework/jobs/assemble_job.h"
 
 #include <algorithm>
 #include <map>
@@ -29,7 +29,7 @@ class Assembler {
   template <class T>
   std::unique_ptr<T> make(const ComponentConfig& config, std::string_view section) {
     if (config.type.empty()) return nullptr;
-    const auto keys = host_keys(T::kKind, section);
+    const auto keys = host_keys(section);
     try {
       auto made = registry_.make<T>(config.map, config.path, keys, complaints_, host_);
       if (made) note_plugin(registry_.entry(T::kKind, config.type));
@@ -60,7 +60,7 @@ class Assembler {
   std::unique_ptr<Annotator> make_default_annotator(const std::string& type) {
     Value map = Value::make_map();
     map.set("type", Value::text(type));
-    const auto keys = host_keys(ComponentKind::Annotator, "annotators");
+    const auto keys = host_keys("annotators");
     auto made = registry_.make<Annotator>(map, "annotator", keys, complaints_, host_);
     complaints_.raise();
     const ComponentEntry& entry = annotator_entry(type);

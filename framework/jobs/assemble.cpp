@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "framework/app/assemble.h"
+#include "framework/jobs/assemble.h"
 
 #include <cstdlib>
 
@@ -73,6 +73,10 @@ JobServices make_job_services(const GlobalOptions& options, const Value& job, co
   services.assets_root = choose_assets_root(options.assets_root, std::getenv("DIORAMA_ASSETS_ROOT"),
                                             job_root, sample_pack_folder(options.program));
   return services;
+}
+
+JobServices make_services(const GlobalOptions& options, const Log& log) {
+  return make_job_services(options, Value(), log);
 }
 
 }  // namespace diorama

@@ -2,8 +2,8 @@
 #pragma once
 
 #include "diorama/config.h"
-#include "framework/app/options.h"
 #include "framework/host/log.h"
+#include "framework/jobs/job_options.h"
 
 namespace diorama {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "framework/app/job_file.h"
+#include "framework/jobs/job_file.h"
 
 #include "framework/config/job_overrides.h"
 #include "framework/config/yaml_config.h"
