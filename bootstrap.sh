@@ -19,7 +19,7 @@ build_packages=(
   libyaml-cpp-dev libcli11-dev libspdlog-dev libfmt-dev nlohmann-json3-dev
   libre2-dev libhdf5-dev liblz4-dev libdeflate-dev libpng-dev libjpeg-dev libopenexr-dev libtbb-dev
   libvulkan-dev glslang-tools spirv-tools
-  libxxhash-dev nettle-dev libopencv-core-dev libopencv-imgproc-dev libopencv-calib3d-dev
+  libxxhash-dev nettle-dev libopencv-core-dev libopencv-imgproc-dev libopencv-calib3d-dev libopencv-imgcodecs-dev
 )
 test_packages=(
   catch2 binutils clang libclang-rt-14-dev mesa-vulkan-drivers

@@ -83,6 +83,9 @@ Texture decode_hdr(const Source& source);
 Texture decode_exr(const Source& source);
 Texture decode_bmp(const Source& source);
 Texture decode_tga(const Source& source);
+Texture decode_tiff(const Source& source);
+Texture decode_webp(const Source& source);
+Texture decode_jpeg_2000(const Source& source);
 
 std::vector<std::byte> encode_png(const ImageView& image);
 std::vector<std::byte> encode_jpeg(const ImageView& image);

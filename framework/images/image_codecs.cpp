@@ -31,13 +31,25 @@ Texture decode_any(const images::Source& source) {
   }
   if (begins_with(source.bytes, "\x76\x2f\x31\x01")) return images::decode_exr(source);
   if (begins_with(source.bytes, "BM")) return images::decode_bmp(source);
+  if (begins_with(source.bytes, std::string_view("II*\0", 4)) ||
+      begins_with(source.bytes, std::string_view("MM\0*", 4))) {
+    return images::decode_tiff(source);
+  }
+  if (begins_with(source.bytes, "RIFF") &&
+      begins_with(source.bytes.subspan(std::min<std::size_t>(source.bytes.size(), 8)), "WEBP")) {
+    return images::decode_webp(source);
+  }
+  if (begins_with(source.bytes, std::string_view("\0\0\0\x0cjP  \r\n\x87\n", 12)) ||
+      begins_with(source.bytes, "\xff\x4f\xff\x51")) {
+    return images::decode_jpeg_2000(source);
+  }
   // TGA has no mark of its own; a member of a package is called "a.usdz[b.tga]".
   const bool is_tga =
       ends_with_any_case(source.name, ".tga") || ends_with_any_case(source.name, ".tga]");
   if (is_tga) return images::decode_tga(source);
   source.refuse(
-      "is no image of a known format; PNG, JPEG, Radiance HDR, OpenEXR, BMP and TGA are "
-      "read");
+      "is no image of a known format; PNG, JPEG, Radiance HDR, OpenEXR, TIFF, WebP, JPEG 2000, BMP "
+      "and TGA are read");
 }
 
 void check(const ImageView& image, std::initializer_list<std::pair<int, int>> known,

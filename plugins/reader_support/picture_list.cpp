@@ -47,7 +47,8 @@ std::optional<std::pair<int, int>> capture_and_camera(const DatasetPage& page,
 bool is_picture_ending(std::string ending) {
   std::ranges::transform(ending, ending.begin(),
                          [](unsigned char c) { return char(std::tolower(c)); });
-  constexpr std::array kEndings{".png", ".jpg", ".jpeg", ".bmp", ".tga", ".exr", ".hdr"};
+  constexpr std::array kEndings{".png", ".jpg", ".jpeg", ".bmp",  ".tga", ".exr",
+                                ".hdr", ".tif", ".tiff", ".webp", ".jp2"};
   return std::ranges::find(kEndings, ending) != kEndings.end();
 }
 

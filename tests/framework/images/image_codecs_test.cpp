@@ -269,7 +269,7 @@ TEST_CASE("what others write, we read", "[images]") {
     }
     ++count;
   }
-  CHECK(count == 15);
+  CHECK(count == 20);
 }
 
 TEST_CASE("every truncated image is refused with its name", "[images]") {
@@ -323,12 +323,58 @@ TEST_CASE("hostile headers of BMP and TGA files are refused", "[images]") {
   }
 }
 
+TEST_CASE("hostile pictures for OpenCV are one message each", "[images]") {
+  const TemporaryFolder folder;
+  if (!run_reference("make", folder.path)) return;
+  for (const char* name : {"deep.tif", "light.tif", "grey.tif", "picture.webp", "picture.jp2"}) {
+    const Bytes good = read(folder.path / name);
+    INFO(name);
+    CHECK_THROWS_WITH(decode_image(good, name, 300), ContainsSubstring("MiB, the budget is"));
+    // What ends a file may be missing.
+    for (std::size_t size = 0; size + 8 < good.size(); size += size < 300 ? 1 : 37) {
+      INFO(size << " of " << good.size());
+      CHECK(decode_error({good.begin(), good.begin() + std::ptrdiff_t(size)}, name) != "no error");
+    }
+    for (std::size_t at = 0; at < std::min<std::size_t>(good.size(), 150); ++at) {
+      for (const int damage : {0x00, 0x01, 0x7f, 0xff}) {
+        Bytes bytes = good;
+        bytes[at] = std::byte(damage);
+        decode_error(bytes, name);
+      }
+    }
+  }
+}
+
+TEST_CASE("Sizes that TIFF, WebP and JPEG 2000 claim are checked before they are believed",
+          "[images]") {
+  const TemporaryFolder folder;
+  if (!run_reference("make", folder.path)) return;
+  const auto with = [&](const char* name, std::size_t at, std::initializer_list<int> values) {
+    Bytes bytes = read(folder.path / name);
+    for (const int value : values) bytes[at++] = std::byte(value);
+    return decode_error(bytes, name);
+  };
+  // Width: the value of the first of ten fields of 12 bytes.
+  CHECK(with("deep.tif", 18, {0x7f, 0xff}) ==
+        "deep.tif: the image has 32767 x 7 pixels; 1 to 16384 a side are read");
+  CHECK(with("deep.tif", 18, {0x00, 0x00}) == "deep.tif: damaged TIFF: it does not say its size");
+  CHECK(with("picture.webp", 12, {'V', 'P', '9', 'L'}) ==
+        "picture.webp: damaged WebP: it holds no picture");
+  const Bytes jp2 = read(folder.path / "picture.jp2");
+  const std::string text(reinterpret_cast<const char*>(jp2.data()), jp2.size());
+  const std::size_t sizes = text.find("\xff\x4f\xff\x51");
+  REQUIRE(sizes != text.npos);
+  CHECK(with("picture.jp2", sizes + 8, {0x7f, 0xff, 0xff, 0xff}) ==
+        "picture.jp2: the image has 2147483647 x 40 pixels; 1 to 16384 a side are read");
+  CHECK(with("picture.jp2", sizes + 40, {0xff, 0xff}).find("MiB") == std::string::npos);
+}
+
 TEST_CASE("messages say what is wrong with an image", "[images]") {
   CHECK(decode_error({}, "a.png") == "a.png: the image file is empty");
   const Bytes text(40, std::byte('x'));
   CHECK(decode_error(text, "b.dat") ==
-        "b.dat: is no image of a known format; PNG, JPEG, Radiance HDR, OpenEXR, BMP and TGA are "
-        "read");
+        "b.dat: is no image of a known format; PNG, JPEG, Radiance HDR, OpenEXR, TIFF, WebP, "
+        "JPEG 2000, BMP and TGA are read");
   Bytes png = samples()[0].bytes;
   png[16] = std::byte(0x7f);  // a width of 2 000 million with a wrong check sum
   CHECK(decode_error(png, "c.png").starts_with("c.png: damaged PNG: "));

@@ -113,6 +113,63 @@ def make_others(folder, rng):
         expect(folder, name, np.ascontiguousarray(read[..., ::-1]))
 
 
+def tiff(order, pixels, compression=1, rows_per_strip=None):
+    """One page, by TIFF 6.0: the directory first, then what it points at, then strips."""
+    height, width = pixels.shape[:2]
+    samples = 1 if pixels.ndim == 2 else pixels.shape[2]
+    rows = rows_per_strip or height
+    strips = [pixels[y:y + rows].astype(pixels.dtype.newbyteorder(order)).tobytes()
+              for y in range(0, height, rows)]
+    if compression == 8:
+        strips = [zlib.compress(strip) for strip in strips]
+    bits = 8 * pixels.dtype.itemsize
+    sample_format = 3 if pixels.dtype.kind == "f" else 1
+    fields = [(256, 3, [width]), (257, 3, [height]), (258, 3, [bits] * samples), (259, 3, [compression]),
+              (262, 3, [1 if samples == 1 else 2]), (273, 4, [0] * len(strips)), (277, 3, [samples]),
+              (278, 3, [rows]), (279, 4, [len(strip) for strip in strips]),
+              (339, 3, [sample_format] * samples)]
+
+    def pack(kind, values):
+        return struct.pack(order + ("H" if kind == 3 else "I") * len(values), *values)
+
+    def layout(offsets):
+        directory, more = b"", b""
+        more_at = 8 + 2 + 12 * len(fields) + 4
+        for tag, kind, values in fields:
+            data = pack(kind, offsets if tag == 273 else values)
+            if len(data) > 4:
+                value = struct.pack(order + "I", more_at + len(more))
+                more += data + b"\0" * (len(data) % 2)
+            else:
+                value = data.ljust(4, b"\0")
+            directory += struct.pack(order + "HHI", tag, kind, len(values)) + value
+        head = (b"II*\0" if order == "<" else b"MM\0*") + struct.pack(order + "I", 8)
+        return head + struct.pack(order + "H", len(fields)) + directory + struct.pack(order + "I", 0) + more
+
+    size = len(layout([0] * len(strips)))
+    offsets = [size + sum(map(len, strips[:i])) for i in range(len(strips))]
+    return layout(offsets) + b"".join(strips)
+
+
+def make_opencvs(folder, rng):
+    """What the program leaves to OpenCV: files by hand where that is simple."""
+    deep = rng.integers(0, 65536, (7, 13, 3), dtype=np.uint16)
+    write(folder, "deep.tif", tiff(">", deep))
+    expect(folder, "deep.tif", (deep / np.float32(65535)).astype(np.float32))
+    light = np.exp(rng.normal(0, 3, (9, 5, 3))).astype(np.float32)
+    write(folder, "light.tif", tiff("<", light, rows_per_strip=4))
+    expect(folder, "light.tif", light)
+    grey = rng.integers(0, 256, (6, 11), dtype=np.uint8)
+    write(folder, "grey.tif", tiff("<", grey, compression=8))
+    expect(folder, "grey.tif", grey)
+    smooth = cv2.GaussianBlur(rng.integers(0, 256, (21, 34, 3), dtype=np.uint8), (9, 9), 3)
+    cv2.imwrite(f"{folder}/picture.webp", smooth, [cv2.IMWRITE_WEBP_QUALITY, 101])
+    expect(folder, "picture.webp", np.ascontiguousarray(smooth[..., ::-1]))
+    large = cv2.resize(smooth, (48, 40))
+    cv2.imwrite(f"{folder}/picture.jp2", large)
+    expect(folder, "picture.jp2", np.ascontiguousarray(cv2.imread(f"{folder}/picture.jp2")[..., ::-1]))
+
+
 def decode_all(folder):
     for name in sorted(os.listdir(folder)):
         if not name.endswith((".png", ".jpg", ".hdr", ".exr")):
@@ -134,6 +191,7 @@ def main():
     make_pngs(folder, rng)
     make_tgas(folder, rng)
     make_others(folder, rng)
+    make_opencvs(folder, rng)
 
 
 main()

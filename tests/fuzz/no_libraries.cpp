@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "diorama/error.h"
+#include "framework/plugins/on_demand_library.h"
+
+namespace diorama {
+
+// Fuzzers try the project's own code: headers are looked at, OpenCV is not asked.
+void* on_demand_function(const std::string& name, const char*) {
+  throw Error(ErrorKind::Plugin, name + ".so: is no part of this program");
+}
+
+}  // namespace diorama
