@@ -476,11 +476,21 @@ void add_stats(CLI::App& app, CommandLine& line) {
   });
 }
 
+void add_tolerance(CLI::App& command, double& tolerance) {
+  command.add_option("--tolerance", tolerance, "How far pictures may be off in the mean, of 255")
+      ->check(CLI::Range(0.0, 255.0))
+      ->type_name("X")
+      ->capture_default_str();
+}
+
 void add_view(CLI::App& app, CommandLine& line) {
   CLI::App* command = app.add_subcommand("view", "Show a dataset on a page in the browser");
   command->add_option("dataset", line.view.dataset, "A dataset's folder, or the output of a run")
       ->required()
       ->type_name("FOLDER");
+  command->add_option("other", line.view.other, "Another one, to compare with it")
+      ->type_name("FOLDER");
+  add_tolerance(*command, line.view.tolerance);
   command->add_option("--port", line.view.port, "Port of this machine; 0: one that is free")
       ->check(CLI::Range(0, 65535))
       ->type_name("N")
@@ -579,12 +589,7 @@ void add_diff(CLI::App& app, CommandLine& line) {
       ->required()
       ->type_name("FOLDER");
   command->add_option("second", line.diff.second, "Another one")->required()->type_name("FOLDER");
-  command
-      ->add_option("--tolerance", line.diff.tolerance,
-                   "How far pictures may be off in the mean, of 255")
-      ->check(CLI::Range(0.0, 255.0))
-      ->type_name("X")
-      ->capture_default_str();
+  add_tolerance(*command, line.diff.tolerance);
   command->add_option("--reader", line.diff.reader, "Reader to use; default: the one that knows it")
       ->type_name("TYPE");
   command->callback([&line] {

@@ -92,8 +92,8 @@ int command_diff(const GlobalOptions& global, const DiffOptions& options, Consol
     for (const std::string& line : difference.contents) {
       std::cout << printable(name + ": " + line) << "\n";
     }
-    if (difference.differing_captures > 0) {
-      std::cout << printable(name) << ": " << difference.differing_captures << " of "
+    if (!difference.differing.empty()) {
+      std::cout << printable(name) << ": " << difference.differing.size() << " of "
                 << difference.captures << " captures differ\n";
     }
   }

@@ -83,7 +83,11 @@ class BrowserStart {
 int command_view(const GlobalOptions& global, const ViewOptions& options, ConsoleLog& log) {
   const JobServices services = make_services(global, log.sink());
   DatasetReaders readers(*services.registry, *services.host);
-  DatasetView view({options.dataset, options.reader}, readers, *services.host);
+  DatasetView view({.folder = options.dataset,
+                    .other = options.other,
+                    .tolerance = options.tolerance,
+                    .reader = options.reader},
+                   readers, *services.host);
 
   view_is_to_end = false;
   std::signal(SIGINT, &end_view);
@@ -121,7 +125,9 @@ int command_view(const GlobalOptions& global, const ViewOptions& options, Consol
 int command_report(const GlobalOptions& global, const ReportOptions& options, ConsoleLog& log) {
   const JobServices services = make_services(global, log.sink());
   DatasetReaders readers(*services.registry, *services.host);
-  DatasetView view({options.dataset, options.reader, options.captures}, readers, *services.host);
+  DatasetView view(
+      {.folder = options.dataset, .reader = options.reader, .most_captures = options.captures},
+      readers, *services.host);
   const ReportSize size = write_report(view, options.output);
   log.write(LogLevel::Info, "wrote " + (options.output / "index.html").string() + ": " +
                                 std::to_string(size.captures) + " captures, " +

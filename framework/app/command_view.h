@@ -11,15 +11,18 @@
 namespace diorama {
 
 struct ViewOptions {
-  std::string dataset;  ///< A dataset's folder, or the output of a run.
-  std::string reader;   ///< Type; empty: the one that knows the folder.
-  int port = 0;         ///< 0: one that is free.
+  std::string dataset;     ///< A dataset's folder, or the output of a run.
+  std::string other;       ///< The same, to compare with; empty: none.
+  double tolerance = 0.0;  ///< Of comparisons, as DiffOptions has it.
+  std::string reader;      ///< Type; empty: the one that knows the folder.
+  int port = 0;            ///< 0: one that is free.
   bool opens_browser = true;
   int idle_minutes = 30;  ///< 0: never ends by itself.
 };
 
-/// `diorama view DATASET`: serves a page that shows it, to browsers of this machine, until nobody
-/// asked for some time or a signal comes. Returns 0; throws Error(Usage) when there is no dataset.
+/// `diorama view DATASET [OTHER]`: serves a page that shows it, to browsers of this machine, until
+/// nobody asked for some time or a signal comes. Returns 0; throws Error(Usage) when there is no
+/// dataset.
 int command_view(const GlobalOptions& global, const ViewOptions& options, ConsoleLog& log);
 
 struct ReportOptions {

@@ -5,6 +5,7 @@
 #include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
 #include <sstream>
 
@@ -97,7 +98,6 @@ StoredInfo common_info(const StoredInfo& a, const StoredInfo& b, double toleranc
   return common;
 }
 
-/// The differences of one capture; the second one lacks it when its list is empty.
 std::vector<std::string> capture_differences(const StoredInfo& common, const Capture& a,
                                              const Capture& b) {
   std::vector<std::string> lines;
@@ -121,6 +121,22 @@ std::vector<std::string> capture_differences(const StoredInfo& common, const Cap
     }
   }
   return lines;
+}
+
+/// Of the capture with that number, if there is one.
+std::optional<StoredCapture> read_numbered(const StoredDataset& data, int number,
+                                           const NameSet& wanted) {
+  const std::vector<int>& all = data.info().captures;
+  const auto place = std::ranges::lower_bound(all, number);
+  if (place == all.end() || *place != number) return std::nullopt;
+  return data.read(std::size_t(place - all.begin()), wanted);
+}
+
+std::vector<std::string> partner_differences(const StoredInfo& common, const Capture& a,
+                                             const StoredDataset& b) {
+  const std::optional<StoredCapture> partner = read_numbered(b, a.index, common.holds);
+  if (!partner) return {"only in the first"};
+  return capture_differences(common, a, partner->capture);
 }
 
 void compare_infos(const StoredInfo& a, const StoredInfo& b, std::vector<std::string>& lines) {
@@ -162,6 +178,15 @@ std::vector<std::string> page_differences(const std::string& a, const std::strin
   return lines;
 }
 
+std::vector<std::string> capture_difference(const StoredDataset& a, const StoredDataset& b,
+                                            int capture, double tolerance) {
+  const StoredInfo common = common_info(a.info(), b.info(), tolerance);
+  const std::optional<StoredCapture> first = read_numbered(a, capture, common.holds);
+  if (first) return partner_differences(common, first->capture, b);
+  const bool is_there = read_numbered(b, capture, {}).has_value();
+  return {is_there ? "only in the second" : "in neither"};
+}
+
 DatasetDifference dataset_difference(const ComparedDataset& a, const ComparedDataset& b,
                                      double tolerance, Host& host) {
   DatasetDifference result;
@@ -182,19 +207,12 @@ DatasetDifference dataset_difference(const ComparedDataset& a, const ComparedDat
   sweep_captures<Lines>(
       a.data, common.holds, host,
       [&](const StoredCapture& stored) {
-        const int index = stored.capture.index;
-        const auto place = std::ranges::lower_bound(other.captures, index);
-        if (place == other.captures.end() || *place != index) {
-          return Lines{index, {"only in the first"}};
-        }
-        const StoredCapture partner =
-            b.data.read(std::size_t(place - other.captures.begin()), common.holds);
-        return Lines{index, capture_differences(common, stored.capture, partner.capture)};
+        return Lines{stored.capture.index, partner_differences(common, stored.capture, b.data)};
       },
       [&](const Lines& lines) {
         ++result.captures;
         if (lines.lines.empty()) return;
-        ++result.differing_captures;
+        result.differing.push_back(lines.capture);
         for (const std::string& line : lines.lines) {
           if (result.contents.size() >= DatasetDifference::kMostLines) return;
           result.contents.push_back("capture " + std::to_string(lines.capture) + ": " + line);

@@ -17,7 +17,7 @@ struct DatasetDifference {
   std::vector<std::string> pages;     ///< Jobs, versions, seeds, assets, labels.
   std::vector<std::string> contents;  ///< Formats, cameras, classes, captures, frames.
   std::int64_t captures = 0;          ///< Compared.
-  std::int64_t differing_captures = 0;
+  std::vector<int> differing;         ///< Numbers of the captures that differ, ascending.
 
   bool is_empty() const { return pages.empty() && contents.empty(); }
 };
@@ -33,6 +33,11 @@ struct ComparedDataset {
 /// threads.
 DatasetDifference dataset_difference(const ComparedDataset& a, const ComparedDataset& b,
                                      double tolerance, Host& host);
+
+/// In what a capture of that number differs, compared in the same way; one line when only one of
+/// them has it.
+std::vector<std::string> capture_difference(const StoredDataset& a, const StoredDataset& b,
+                                            int capture, double tolerance);
 
 /// Lines for what two pages dataset.json say differently.
 std::vector<std::string> page_differences(const std::string& a, const std::string& b);

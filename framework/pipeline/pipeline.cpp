@@ -16,6 +16,7 @@
 #include "diorama/error.h"
 #include "framework/host/stoppable.h"
 #include "framework/pipeline/scene_setup.h"
+#include "framework/pipeline/stopwatch.h"
 #include "framework/plugins/plugin_call.h"
 
 namespace diorama {
@@ -28,22 +29,6 @@ constexpr int kMostWritingThreads = 16;
 constexpr int kTurnsAhead = 2;
 // Whoever asks to stop cannot notify.
 constexpr std::chrono::milliseconds kLook{100};
-
-/// Adds the time until its end.
-class Stopwatch {
- public:
-  explicit Stopwatch(double& seconds)
-      : seconds_(seconds), start_(std::chrono::steady_clock::now()) {}
-  ~Stopwatch() {
-    seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-  }
-  Stopwatch(const Stopwatch&) = delete;
-  Stopwatch& operator=(const Stopwatch&) = delete;
-
- private:
-  double& seconds_;
-  std::chrono::steady_clock::time_point start_;
-};
 
 std::string duration_text(double seconds) {
   char text[32];

@@ -2,7 +2,6 @@
 #include "framework/pipeline/visit_run.h"
 
 #include <algorithm>
-#include <chrono>
 #include <utility>
 
 #include "framework/annotators/occlusion_order.h"
@@ -10,27 +9,12 @@
 #include "framework/config/clean_text.h"
 #include "framework/pipeline/physics_view.h"
 #include "framework/pipeline/scene_setup.h"
+#include "framework/pipeline/stopwatch.h"
 #include "framework/pipeline/view_search.h"
 #include "framework/plugins/fatal_end.h"
 #include "framework/plugins/plugin_call.h"
 
 namespace diorama {
-
-/// Adds the time until its end to a phase.
-class VisitRun::Clock {
- public:
-  Clock(VisitResult& result, const char* phase)
-      : seconds_(result.seconds[phase]), start_(std::chrono::steady_clock::now()) {}
-  ~Clock() {
-    seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-  }
-  Clock(const Clock&) = delete;
-  Clock& operator=(const Clock&) = delete;
-
- private:
-  double& seconds_;
-  std::chrono::steady_clock::time_point start_;
-};
 
 /// Which numbers randomizers draw at a moment: 0 of any stream are the first ones.
 struct VisitRun::Draw {
@@ -102,7 +86,7 @@ VisitResult VisitRun::run() {
 }
 
 void VisitRun::set_up() {
-  const Clock clock(result_, "loading");
+  const Stopwatch watch(result_.seconds["loading"]);
   setting_.stop_if_asked();
   const EnvironmentChoice& choice = setting_.plan.environments[planned_.environment];
   host_.log(LogLevel::Info, "visit " + std::to_string(planned_.index + 1) + " of " +
@@ -132,7 +116,7 @@ void VisitRun::set_up() {
 }
 
 void VisitRun::randomize(const std::string& moment, int number, int capture) {
-  const Clock clock(result_, "randomizing");
+  const Stopwatch watch(result_.seconds["randomizing"]);
   const PhysicsView before(scene_);
   const std::vector<Mat4> poses = object_poses(scene_, objects_);
   camera_randomizers_ = call_randomizers(moment, number, capture, {});
@@ -209,7 +193,7 @@ std::vector<Flaw> VisitRun::unsettled(const TimelineStep& step) const {
 }
 
 void VisitRun::advance(const TimelineStep& step) {
-  const Clock clock(result_, "simulating");
+  const Stopwatch watch(result_.seconds["simulating"]);
   const Room room(scene_, environment_);
   // Short enough that Ctrl-C is felt, and that the time to rest is known well.
   constexpr int kStepsAtOnce = 5;
@@ -249,7 +233,7 @@ void VisitRun::advance(const TimelineStep& step) {
 /// Places the objects as the moment "environment" may place them, where they meet nothing; all else
 /// stays as it is.
 void VisitRun::respawn(const std::vector<Flaw>& flaws) {
-  const Clock clock(result_, "randomizing");
+  const Stopwatch watch(result_.seconds["randomizing"]);
   // The randomizers place all objects, and clear of each other; those that stay are elsewhere.
   constexpr int kDraws = 16;
   note(scene_, flaws, report_.respawned);
@@ -314,12 +298,12 @@ void VisitRun::take(const PlannedCapture& planned) {
   }
   ++result_.captures;
   result_.respawned = int(report_.respawned.size());
-  const Clock clock(result_, "waiting for writers");
+  const Stopwatch watch(result_.seconds["waiting for writers"]);
   setting_.hand_over(std::move(pending), result_);
 }
 
 void VisitRun::prepare_renderer() {
-  const Clock clock(result_, "preparing renderer");
+  const Stopwatch watch(result_.seconds["preparing renderer"]);
   call_component("renderer '" + job_.renderer.type + "'",
                  [&] { components_.renderer->prepare(scene_); });
 }
@@ -333,7 +317,7 @@ std::vector<ViewOutcome> VisitRun::take_frames(const PlannedCapture& planned,
                                         {"view", number, &camera_randomizers_});
                      }});
   const auto choose_views = [&] {
-    const Clock clock(result_, "choosing views");
+    const Stopwatch watch(result_.seconds["choosing views"]);
     search.run();
   };
   choose_views();
@@ -361,10 +345,10 @@ Frame VisitRun::make_frame(std::size_t camera, int capture) {
   request.seed = setting_.streams.render_seed(capture, scene_[node].name);
   Frame frame;
   {
-    const Clock clock(result_, "rendering");
+    const Stopwatch watch(result_.seconds["rendering"]);
     frame = call_component(who, [&] { return components_.renderer->render(request); });
   }
-  const Clock clock(result_, "annotating");
+  const Stopwatch watch(result_.seconds["annotating"]);
   for (const auto& entry : components_.annotators) {
     call_component("annotator '" + entry.type + "'",
                    [&] { entry.annotator->annotate(scene_, frame); });
@@ -382,7 +366,7 @@ Frame VisitRun::make_frame(std::size_t camera, int capture) {
 }
 
 Image<Rgba8> VisitRun::make_overview(int capture) {
-  const Clock clock(result_, "rendering");
+  const Stopwatch watch(result_.seconds["rendering"]);
   if (!components_.renderer->provides().contains(kColor.name)) return {};
   RenderRequest request;
   request.camera = overview_;

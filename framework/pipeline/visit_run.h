@@ -64,7 +64,6 @@ class VisitRun {
   VisitResult run();
 
  private:
-  class Clock;
   struct Draw;
   void set_up();
   void randomize(const std::string& moment, int number, int capture);

@@ -8,6 +8,7 @@
 
 #include "diorama/error.h"
 #include "framework/config/json_text.h"
+#include "framework/datasets/dataset_difference.h"
 #include "framework/datasets/dataset_origin.h"
 #include "framework/datasets/dataset_stats.h"
 #include "framework/lint/lint_dataset.h"
@@ -31,8 +32,12 @@ HttpAnswer answer_of(std::string type, std::string body) {
   return {200, std::move(type), std::make_shared<const std::string>(std::move(body))};
 }
 
+std::string json_text(const Json& json) {
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
 HttpAnswer json_answer(const Json& json, int status = 200) {
-  HttpAnswer answer = answer_of(kJson, json.dump(-1, ' ', false, Json::error_handler_t::replace));
+  HttpAnswer answer = answer_of(kJson, json_text(json));
   answer.status = status;
   return answer;
 }
@@ -101,6 +106,7 @@ std::optional<DatasetStatus> status_of_run(const fs::path& folder) {
 struct DatasetView::Opened {
   std::string name;
   fs::path folder;
+  bool is_other = false;  ///< Of the folder that is compared with.
   std::shared_ptr<const StoredDataset> whole;
   std::shared_ptr<const StoredDataset> shown;
   CaptureIndex index;
@@ -119,12 +125,12 @@ DatasetView::DatasetView(Options options, DatasetReaders& readers, Host& host)
 
 DatasetView::~DatasetView() = default;
 
-std::shared_ptr<const DatasetView::Datasets> DatasetView::open() const {
-  const std::vector<FoundDataset> found = find_datasets(options_.folder, readers_, options_.reader);
-  auto opened = std::make_shared<Datasets>();
-  for (const FoundDataset& each : found) {
+void DatasetView::open_below(const fs::path& folder, bool is_other, Datasets& all) const {
+  const std::ptrdiff_t before = std::ssize(all);
+  for (const FoundDataset& each : find_datasets(folder, readers_, options_.reader)) {
     auto dataset = std::make_shared<Opened>();
     dataset->folder = each.folder;
+    dataset->is_other = is_other;
     dataset->name = each.folder.filename().empty() ? each.folder.parent_path().filename().string()
                                                    : each.folder.filename().string();
     dataset->whole = readers_.open(each.folder, each.reader);
@@ -134,14 +140,22 @@ std::shared_ptr<const DatasetView::Datasets> DatasetView::open() const {
       dataset->shown =
           std::make_shared<const PartOfDataset>(dataset->whole, *options_.most_captures);
     }
-    opened->push_back(std::move(dataset));
+    all.push_back(std::move(dataset));
   }
-  if (opened->empty()) find_dataset(options_.folder, readers_, options_.reader);
+  if (std::ssize(all) == before) find_dataset(folder, readers_, options_.reader);
   // Those that hold most come first: what the page shows unless asked.
-  std::ranges::stable_sort(*opened, std::ranges::greater(), [](const auto& dataset) {
-    const StoredInfo& info = dataset->whole->info();
-    return std::pair(info.holds.contains(kColor.name), info.holds.size());
+  std::stable_sort(all.begin() + before, all.end(), [](const auto& a, const auto& b) {
+    const auto rank = [](const StoredInfo& info) {
+      return std::pair(info.holds.contains(kColor.name), info.holds.size());
+    };
+    return rank(a->whole->info()) > rank(b->whole->info());
   });
+}
+
+std::shared_ptr<const DatasetView::Datasets> DatasetView::open() const {
+  auto opened = std::make_shared<Datasets>();
+  open_below(options_.folder, false, *opened);
+  if (!options_.other.empty()) open_below(options_.other, true, *opened);
   return opened;
 }
 
@@ -216,6 +230,34 @@ bool DatasetView::make_findings() {
   return true;
 }
 
+bool DatasetView::make_comparison() {
+  Pair asked;
+  std::shared_ptr<const Datasets> all;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto open =
+        std::ranges::find_if(comparisons_, [](const auto& each) { return each.second == nullptr; });
+    if (open == comparisons_.end()) return false;
+    asked = open->first;
+    all = datasets_;
+    if (std::max(asked.first, asked.second) >= all->size()) {  // of a run that has changed since
+      comparisons_.erase(open);
+      return true;
+    }
+  }
+  const Opened& a = *all->at(asked.first);
+  const Opened& b = *all->at(asked.second);
+  const DatasetDifference difference =
+      dataset_difference({a.folder, *a.whole}, {b.folder, *b.whole}, options_.tolerance, host_);
+  auto text = std::make_shared<const std::string>(json_text({{"pages", difference.pages},
+                                                             {"contents", difference.contents},
+                                                             {"captures", difference.captures},
+                                                             {"differing", difference.differing}}));
+  const std::lock_guard lock(mutex_);
+  if (all == datasets_) comparisons_[asked] = std::move(text);
+  return true;
+}
+
 bool DatasetView::follow_run() {
   const auto now = std::chrono::steady_clock::now();
   if (is_finished_ || now < next_look_) return false;
@@ -227,6 +269,7 @@ bool DatasetView::follow_run() {
       datasets_ = std::move(fresh);
       ++generation_;
       findings_ = nullptr;
+      comparisons_.clear();
       done_ = status->done;
       is_finished_ = status->is_finished;
     } catch (const Error& error) {
@@ -247,7 +290,7 @@ bool DatasetView::work() {
   for (const auto& opened : *all) {
     if (make_stats(*opened)) return true;
   }
-  if (make_findings()) return true;
+  if (make_findings() || make_comparison()) return true;
   const std::size_t asked = asked_;
   if (asked < all->size() && index_some(*all->at(asked))) return true;
   if (std::ranges::any_of(*all, [&](const auto& opened) { return index_some(*opened); })) {
@@ -269,6 +312,8 @@ HttpAnswer DatasetView::state() const {
   for (const auto& opened : *datasets()) {
     const StoredInfo& info = opened->shown->info();
     json["datasets"].push_back({{"name", opened->name},
+                                {"folder", opened->folder.string()},
+                                {"is_other", opened->is_other},
                                 {"format", info.format},
                                 {"captures", info.captures.size()},
                                 {"all_captures", opened->whole->info().captures.size()},
@@ -306,6 +351,21 @@ HttpAnswer DatasetView::lint_answer() {
   const std::lock_guard lock(mutex_);
   if (findings_) return {200, kJson, findings_};
   wants_findings_ = true;
+  return json_answer({{"state", "running"}}, 202);
+}
+
+HttpAnswer DatasetView::compare_answer(const Datasets& all, std::size_t first, Words words) {
+  const auto second = words.empty() ? std::nullopt : whole_number(words[0]);
+  if (!second || *second >= all.size() || words.size() > 2) return not_there();
+  if (words.size() == 2) {
+    const auto number = whole_number(words[1]);
+    if (!number || *number > std::size_t(INT32_MAX)) return not_there();
+    return json_answer(capture_difference(*all[first]->whole, *all[*second]->whole, int(*number),
+                                          options_.tolerance));
+  }
+  const std::lock_guard lock(mutex_);
+  const auto& made = comparisons_[{first, *second}];
+  if (made) return {200, kJson, made};
   return json_answer({{"state", "running"}}, 202);
 }
 
@@ -390,6 +450,7 @@ HttpAnswer DatasetView::answer(std::string_view path) {
   Opened& opened = *all->at(*number);
   const Words rest = Words(words).subspan(2);
   if (rest[0] == "index") asked_ = *number;
+  if (rest[0] == "compare") return compare_answer(*all, *number, rest.subspan(1));
   if (rest[0] != "capture") return dataset_answer(opened, rest);
 
   // What captures hold stays the same for as long as a dataset is open.

@@ -5,12 +5,14 @@
 #include <chrono>
 #include <cstddef>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "diorama/host.h"
@@ -22,13 +24,16 @@
 
 namespace diorama {
 
-/// A dataset, or all of a run, as the page asks for it. Addresses are made of words that stand here
-/// and of whole numbers that count datasets, captures and pictures; none becomes a path.
+/// A dataset, or all of a run, and perhaps a second one beside it, as the page asks for them.
+/// Addresses are made of words that stand here and of whole numbers that count datasets, captures
+/// and pictures; none becomes a path.
 ///
 ///   /  /view.js  /view.css  /icon.svg       the page
 ///   /api/state                              which datasets, how far each is indexed
 ///   /api/run  /api/lint                     what dataset.json and the journals say; findings
 ///   /api/D/info  /api/D/stats               one dataset
+///   /api/D/compare/E                        in what dataset E differs from D; of all captures
+///   /api/D/compare/E/N                      the same, of capture number N
 ///   /api/D/index/FROM                       CaptureIndex::json(), kIndexPart captures
 ///   /api/D/brightness/FROM                  CaptureIndex::brightness_json(), the same
 ///   /api/D/capture/N                        capture_json() of capture number N
@@ -40,7 +45,10 @@ class DatasetView {
 
   struct Options {
     std::filesystem::path folder;
-    std::string reader;  ///< Type; empty: the one that knows the folder.
+    /// A second dataset or run to compare with it; empty: none. Its datasets count on.
+    std::filesystem::path other = {};
+    double tolerance = 0.0;   ///< Of comparisons, as dataset_difference() has it.
+    std::string reader = {};  ///< Type; empty: the one that knows the folder.
     /// Show no more captures than this, spread over the dataset; statistics are of all.
     std::optional<std::size_t> most_captures = {};
   };
@@ -69,17 +77,20 @@ class DatasetView {
   using Datasets = std::vector<std::shared_ptr<Opened>>;
 
   std::shared_ptr<const Datasets> open() const;
+  void open_below(const std::filesystem::path& folder, bool is_other, Datasets& all) const;
   std::shared_ptr<const Datasets> datasets() const;
   bool index_some(Opened& opened);
   bool brighten_some(Opened& opened);
   bool make_stats(Opened& opened);
   bool make_findings();
+  bool make_comparison();
   bool follow_run();
 
   using Words = std::span<const std::string_view>;
   HttpAnswer state() const;
   HttpAnswer run_answer() const;
   HttpAnswer lint_answer();
+  HttpAnswer compare_answer(const Datasets& all, std::size_t first, Words words);
   HttpAnswer dataset_answer(Opened& opened, Words words);
   HttpAnswer capture_answer(const Opened& opened, Words words);
 
@@ -92,6 +103,8 @@ class DatasetView {
   std::atomic<std::size_t> asked_{0};  ///< The dataset that the page shows: indexed first.
   std::atomic<bool> wants_findings_{false};
   std::shared_ptr<const std::string> findings_;  ///< JSON; null until they were looked for.
+  using Pair = std::pair<std::size_t, std::size_t>;
+  std::map<Pair, std::shared_ptr<const std::string>> comparisons_;  ///< JSON; null: asked for.
   ByteCache<HttpAnswer> cache_{kCacheBytes};
   // Of the run that is followed.
   int done_ = 0;

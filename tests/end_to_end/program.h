@@ -7,8 +7,10 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <initializer_list>
 #include <map>
 #include <sstream>
 #include <stdexcept>
@@ -153,6 +155,18 @@ inline bool wait_for_captures(const fs::path& output, std::size_t count) {
     ::usleep(1000);
   }
   return false;
+}
+
+/// Starts the program anew for each number, and kills it with -9 when so many captures are done;
+/// false when a process was not there to be killed.
+inline bool run_and_kill(const std::vector<std::string>& arguments, const fs::path& folder,
+                         const fs::path& output, std::initializer_list<std::size_t> captures) {
+  return std::all_of(captures.begin(), captures.end(), [&](std::size_t count) {
+    Process process(arguments, folder);
+    if (!wait_for_captures(output, count)) return false;
+    process.signal(SIGKILL);
+    return process.wait().exit_code == 128 + SIGKILL;
+  });
 }
 
 inline std::string config_file(const std::string& name) {

@@ -128,12 +128,7 @@ TEST_CASE("After kill -9 a resumed run gives the same bytes", "[run]") {
     const TemporaryFolder folder;
     const std::vector<std::string> arguments =
         smoke("out", {"--set", "total_captures=40", "--resume", "--visits-in-flight", visits});
-    for (const std::size_t captures : {1, 9, 22}) {
-      Process process(arguments, folder.path());
-      REQUIRE(wait_for_captures(folder / "out", captures));
-      process.signal(SIGKILL);
-      CHECK(process.wait().exit_code == 128 + SIGKILL);
-    }
+    REQUIRE(run_and_kill(arguments, folder.path(), folder / "out", {1, 9, 22}));
     CHECK(journal_entries(folder / "out") < 40);
     const Outcome outcome = run(arguments, folder.path());
     INFO(outcome.errors);

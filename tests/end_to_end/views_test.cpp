@@ -183,12 +183,7 @@ TEST_CASE("Views are the same bytes after kill -9 and resume, and are counted on
   CHECK(whole.contains("web/shards/train-000001.tar"));
   const std::vector<std::string> arguments{"run",      "views.yaml", "--output", "killed",
                                            "--resume", "--threads",  "2"};
-  for (const std::size_t captures : {1, 17, 38}) {
-    Process process(arguments, folder.path());
-    REQUIRE(wait_for_captures(folder / "killed", captures));
-    process.signal(SIGKILL);
-    CHECK(process.wait().exit_code == 128 + SIGKILL);
-  }
+  REQUIRE(run_and_kill(arguments, folder.path(), folder / "killed", {1, 17, 38}));
   CHECK(journal_entries(folder / "killed") < 60);
   const Outcome resumed = run(arguments, folder.path());
   INFO(resumed.errors);

@@ -4,7 +4,7 @@ import { spawn } from 'node:child_process';
 import { mkdirSync, writeFileSync } from 'node:fs';
 import { chromium } from 'playwright-core';
 
-const [program, dataset, pictures, report] = process.argv.slice(2);
+const [program, dataset, pictures, report, other] = process.argv.slice(2);
 mkdirSync(pictures, { recursive: true });
 let failures = 0;
 function check(holds, what) {
@@ -12,7 +12,7 @@ function check(holds, what) {
   if (!holds) ++failures;
 }
 
-const server = spawn(program, [...(process.env.DIORAMA_OPTIONS ?? '').split(' ').filter(Boolean), 'view', dataset, '--no-browser'],
+const server = spawn(program, [...(process.env.DIORAMA_OPTIONS ?? '').split(' ').filter(Boolean), 'view', dataset, ...(other ? [other] : []), '--no-browser'],
   { stdio: ['ignore', 'pipe', 'inherit'] });
 const address = await new Promise((resolve, reject) => {
   let text = '';
@@ -66,14 +66,14 @@ try {
   const filtered = await page.textContent('.total b');
   check(Number(filtered.replaceAll(',', '')) <= Number(total.replaceAll(',', '')) && page.url().includes('f.class'),
     `a class filters (${total} to ${filtered})`);
-  const other = await newPage();
-  await other.goto(address);
-  await other.waitForSelector('.card');
-  await other.goto(page.url());
-  await other.reload().catch(() => undefined);
-  await other.waitForFunction(() => document.querySelector('.status')?.hidden, null, { timeout: 120000 });
-  check((await other.textContent('.total b')) === filtered, 'the address shows the same elsewhere');
-  await other.close();
+  const same = await newPage();
+  await same.goto(address);
+  await same.waitForSelector('.card');
+  await same.goto(page.url());
+  await same.reload().catch(() => undefined);
+  await same.waitForFunction(() => document.querySelector('.status')?.hidden, null, { timeout: 120000 });
+  check((await same.textContent('.total b')) === filtered, 'the address shows the same elsewhere');
+  await same.close();
   await page.screenshot({ path: `${pictures}/grid_filtered.png` });
   await page.getByRole('button', { name: 'Clear all filters' }).first().click();
 
@@ -83,10 +83,10 @@ try {
   check(page.url().includes('#/capture/'), 'a card opens its picture');
   await page.locator('.object').first().click();
   await page.waitForSelector('.detail');
-  const box = await page.locator('canvas.big').boundingBox();
+  const box = await page.locator('.capture:not([hidden]) canvas.big').boundingBox();
   await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
   await page.waitForTimeout(300);
-  const probe = await page.textContent('.probe');
+  const probe = await page.textContent('.capture:not([hidden]) .probe');
   check(/pixel \d+, \d+/.test(probe), `the probe speaks: ${probe}`);
   await page.screenshot({ path: `${pictures}/capture.png` });
   await page.keyboard.press('m');
@@ -139,6 +139,41 @@ try {
   await page.waitForSelector('.page:not([hidden]) h1');
   await page.waitForTimeout(400);
   await page.screenshot({ path: `${pictures}/run.png` });
+
+  if (other) {
+    await page.getByRole('button', { name: 'Compare', exact: true }).click();
+    await page.waitForFunction(() => /of another colour|Every pixel is the same/.test(document.querySelector('.capture:not([hidden]) .objects')?.textContent ?? ''));
+    await page.waitForFunction(() => /captures? differ|the same in the second/.test(document.querySelector('.capture:not([hidden]) .objects')?.textContent ?? ''), null, { timeout: 120000 });
+    check(page.url().includes('#/compare/') && page.url().includes('other='), 'a comparison stands in the address');
+    await page.waitForTimeout(500);
+    await page.screenshot({ path: `${pictures}/compare_side.png` });
+    const stage = await page.locator('.capture:not([hidden]) canvas.big').boundingBox();
+    const shown = () => page.locator('.capture:not([hidden]) canvas.big').evaluate((canvas) => canvas.toDataURL());
+    await page.keyboard.press('2');
+    await page.waitForTimeout(300);
+    const divided = await shown();
+    await page.mouse.move(stage.x + stage.width / 2, stage.y + stage.height / 3);
+    await page.mouse.down();
+    await page.mouse.move(stage.x + stage.width / 4, stage.y + stage.height / 3, { steps: 4 });
+    await page.mouse.up();
+    check((await shown()) !== divided, 'the divider is dragged');
+    await page.screenshot({ path: `${pictures}/compare_divider.png` });
+    await page.keyboard.press('3');
+    await page.waitForTimeout(300);
+    await page.screenshot({ path: `${pictures}/compare_difference.png` });
+    const place = page.url();
+    await page.keyboard.press('ArrowRight');
+    await page.waitForTimeout(500);
+    check(page.url() !== place && page.url().includes('mode=difference'), 'arrow right goes to the next capture that differs');
+    await page.reload();
+    await page.waitForSelector('.capture:not([hidden]) .objects h3');
+    check(page.url().includes('mode=difference'), 'the address of a comparison opens again');
+    await page.keyboard.press('Escape');
+    check(page.url().includes('#/grid'), 'escape leaves the comparison');
+    await page.goBack();
+    await page.waitForSelector('.capture:not([hidden]) .objects h3');
+    check(page.url().includes('#/compare/'), 'and back comes back');
+  }
 
   const dark = await newPage('dark');
   await dark.goto(address);

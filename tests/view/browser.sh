@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # Tries the page of `diorama view` in Chromium (Debian's, with Playwright from npm), and leaves pictures to
-# look at: tests/view/browser.sh PROGRAM DATASET PICTURES. Not part of the tests that ctest runs.
+# look at: tests/view/browser.sh PROGRAM DATASET PICTURES [OTHER], which is compared with it. Not part of the tests that ctest runs.
 set -euo pipefail
 program=$(realpath "$1") dataset=$(realpath "$2") pictures=$(realpath -m "$3")
+other=${4:+$(realpath "$4")}
 here=$(cd "$(dirname "$0")" && pwd)
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -11,4 +12,4 @@ cp "$here/browser.mjs" "$work"
 (cd "$work" && npm init --yes >npm.log && npm install playwright-core@1 >>npm.log 2>&1) || { cat "$work/npm.log"; exit 1; }
 # shellcheck disable=SC2086
 "$program" ${DIORAMA_OPTIONS:-} report "$dataset" -o "$work/report" --captures 5
-node "$work/browser.mjs" "$program" "$dataset" "$pictures" "$work/report"
+node "$work/browser.mjs" "$program" "$dataset" "$pictures" "$work/report" ${other:+"$other"}

@@ -25,13 +25,14 @@ using Json = nlohmann::json;
 
 const std::string kHostile = "</script><script>alert('1')</script>\"\\ \u2028 ../../etc/passwd";
 
-/// Three captures, numbers 3, 7 and 9; one camera; 6 x 4 pixels.
+/// Three captures, numbers 3, 7 and 9; one camera; 6 x 4 pixels. The changed one has another pixel
+/// in capture 7, and capture 11 instead of 9.
 class HostileDataset final : public StoredDataset {
  public:
-  HostileDataset() {
+  explicit HostileDataset(bool is_changed) : is_changed_(is_changed) {
     info_.format = kHostile;
     info_.camera_names = {kHostile};
-    info_.captures = {3, 7, 9};
+    info_.captures = {3, 7, is_changed ? 11 : 9};
     for (const std::string_view name :
          {kColor.name, kInstanceId.name, kDistanceToImagePlane.name, kNormals.name, kHoldsInstances,
           kHoldsLabels, kHoldsTightBoxes, kHoldsPoses, kHoldsBoxes3d, kHoldsOcclusion, kHoldsCamera,
@@ -68,6 +69,7 @@ class HostileDataset final : public StoredDataset {
     if (wanted.contains(kColor.name)) {
       Image<Rgba8> color(6, 4, Rgba8{10, 20, 30, 255});
       color.at(5, 3) = Rgba8{200, 100, 50, 255};
+      if (is_changed_ && stored.capture.index == 7) color.at(5, 3)[0] = 199;
       frame.set(kColor, std::move(color));
     }
     if (wanted.contains(kInstanceId.name)) {
@@ -85,6 +87,7 @@ class HostileDataset final : public StoredDataset {
   }
 
  private:
+  bool is_changed_;
   StoredInfo info_;
   ReadLog log_;
 };
@@ -93,16 +96,19 @@ class HostileReader final : public Reader {
  public:
   std::vector<std::string> patterns() const override { return {"mark.txt"}; }
   Recognition recognise(const std::filesystem::path&) const override { return Recognition::ByName; }
-  std::unique_ptr<const StoredDataset> open(const std::filesystem::path&) const override {
-    return std::make_unique<HostileDataset>();
+  std::unique_ptr<const StoredDataset> open(const std::filesystem::path& folder) const override {
+    return std::make_unique<HostileDataset>(std::filesystem::file_size(folder / "mark.txt") > 0);
   }
 };
 
-/// A view of a folder with a hostile name.
+/// A view of a folder with a hostile name, perhaps with a changed one beside it.
 struct Viewed {
-  explicit Viewed(std::optional<std::size_t> most = {}) {
+  explicit Viewed(std::optional<std::size_t> most = {}, bool compares = false) {
     folder.write("<img src=x>/mark.txt", "");
-    view.emplace(DatasetView::Options{folder.path("<img src=x>"), "", most}, readers, host);
+    folder.write("changed/mark.txt", "changed");
+    DatasetView::Options options{.folder = folder.path("<img src=x>"), .most_captures = most};
+    if (compares) options.other = folder.path("changed");
+    view.emplace(options, readers, host);
   }
   HttpAnswer answer(const std::string& path) { return view->answer(path); }
   Json json(const std::string& path) {
@@ -217,6 +223,42 @@ TEST_CASE("The index grows by work, statistics come when they were asked for", "
   CHECK(index["names"]["splits"] == Json({"val", "train"}));
   CHECK(index["names"]["classes"] == Json({kHostile}));
   CHECK(viewed.json("/api/0/stats")["pictures"] == 3);
+}
+
+TEST_CASE("Two datasets are compared as a whole and capture by capture", "[view]") {
+  Viewed viewed({}, true);
+  const Json sides = viewed.json("/api/state")["datasets"];
+  REQUIRE(sides.size() == 2);
+  CHECK(sides[0]["is_other"] == false);
+  CHECK(sides[1]["is_other"] == true);
+  CHECK(sides[1]["name"] == "changed");
+  CHECK(viewed.answer("/api/0/compare/1").status == 202);
+  CHECK(viewed.answer("/api/1/compare/1").status == 202);
+  while (viewed.view->work()) {
+  }
+  const Json all = viewed.json("/api/0/compare/1");
+  CHECK(all["captures"] == 3);
+  CHECK(all["differing"] == Json({7, 9}));
+  CHECK(all["pages"].empty());
+  REQUIRE(all["contents"].size() == 3);
+  CHECK(all["contents"][0] == "capture 11: only in the second");
+  CHECK(all["contents"][2] == "capture 9: only in the first");
+  CHECK(viewed.json("/api/1/compare/1")["differing"].empty());
+
+  CHECK(viewed.json("/api/0/compare/1/3").empty());
+  const Json changed = viewed.json("/api/0/compare/1/7");
+  REQUIRE(changed.size() == 1);
+  CHECK(all["contents"][1] == "capture 7: " + changed[0].get<std::string>());
+  CHECK_THAT(changed[0].get<std::string>(), ContainsSubstring("color"));
+  CHECK(viewed.json("/api/0/compare/1/9") == Json({"only in the first"}));
+  CHECK(viewed.json("/api/0/compare/1/11") == Json({"only in the second"}));
+  CHECK(viewed.json("/api/0/compare/1/4") == Json({"in neither"}));
+  for (const char* path :
+       {"/api/0/compare", "/api/0/compare/", "/api/0/compare/2", "/api/2/compare/0",
+        "/api/0/compare/1/", "/api/0/compare/1/07", "/api/0/compare/1/7/0", "/api/0/compare/-1"}) {
+    INFO(path);
+    CHECK(viewed.answer(path).status == 404);
+  }
 }
 
 TEST_CASE("A report is the same as files, whose names no text of the dataset makes", "[view]") {

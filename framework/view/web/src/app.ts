@@ -15,7 +15,8 @@ export interface App {
   palette: Palette;
   /** Changes what is shown, and the address. `replaces`: without a step for the way back. */
   go(change: Partial<State>, replaces?: boolean): void;
-  labels(capture: number): Promise<CaptureLabels>;
+  /** Of the dataset that is shown, unless another one is named. */
+  labels(capture: number, dataset?: number): Promise<CaptureLabels>;
 }
 
 /** Labels of captures that were asked for, the last ones kept. */

@@ -2,11 +2,10 @@
 // One picture in full: zoom to its pixels, a probe, its objects.
 import { App } from './app';
 import { CaptureLabels, FrameLabels, ObjectLabels, isReport, pictureAddress } from './data';
-import { button, clear, el, on } from './dom';
-import { FramePixels, Numbers, View, css, drawLines, kLayers, motionOf, overlays } from './layers';
+import { button, clear, el } from './dom';
+import { FramePixels, Numbers, View, css, drawLines, drawPicture, kLayers, motionOf, overlays } from './layers';
 import { SpaceView } from './scene';
-
-const kMostScale = 64;
+import { Zoom } from './zoom';
 
 function percent(value: number | null | undefined): string {
   return value === null || value === undefined ? '–' : `${(100 * value).toFixed(1)} %`;
@@ -31,14 +30,20 @@ export class CapturePage {
   private capture: CaptureLabels | null = null;
   private frame: FrameLabels | null = null;
   private pixels: FramePixels | null = null;
-  private view: View = { scale: 1, x: 0, y: 0 };
-  private fits = true;
   private pointer: [number, number] | null = null;  ///< Pixels of the picture.
+  private readonly zoom = new Zoom(this.canvas, {
+    size: () => this.frame && [this.frame.width, this.frame.height],
+    draw: () => this.draw(),
+    pointed: (pixel) => {
+      this.pointer = pixel;
+      this.showProbe();
+    },
+    clicked: () => this.choose(),
+  });
 
   constructor() {
     this.element.append(this.head, el('div', { class: 'parts' }, this.stage, this.space.canvas, this.panel));
     new ResizeObserver(() => this.draw()).observe(this.stage);
-    this.listen();
   }
 
   async show(app: App): Promise<void> {
@@ -48,7 +53,7 @@ export class CapturePage {
     if (key !== this.key) {
       this.key = key;
       this.frame = null;
-      this.fits = true;
+      this.zoom.reset();
       this.pixels = new FramePixels(state.dataset, state.capture, state.frame);
       this.pointer = null;
       try {
@@ -101,8 +106,8 @@ export class CapturePage {
     this.head.append(cameras, el('span', { class: 'words' },
       [this.capture?.phase, this.capture?.environment, this.capture?.split].filter((word) => word).join(' · ')));
     this.head.append(el('span', { class: 'right' },
-      button('Fit', 'Whole picture (0)', () => this.fit()),
-      button('1:1', 'One pixel for one (1:1)', () => this.zoomTo(1 / (window.devicePixelRatio || 1))),
+      button('Fit', 'Whole picture (0)', () => this.zoom.fit()),
+      button('1:1', 'One pixel for one (1:1)', () => this.zoom.toPixels()),
       app.holds.has('camera_pose') && button('3-D', 'Cameras and boxes in space (s)', () => app.go({ space: !state.space }),
         { 'aria-pressed': state.space ? 'true' : 'false' })));
   }
@@ -180,69 +185,28 @@ export class CapturePage {
     return object.box ? (object.box[2] - object.box[0]) * (object.box[3] - object.box[1]) : 0;
   }
 
-  private fit(): void {
-    this.fits = true;
-    this.draw();
-  }
-
-  private zoomTo(scale: number, at?: [number, number]): void {
-    const [x, y] = at ?? [this.canvas.clientWidth / 2, this.canvas.clientHeight / 2];
-    const next = Math.max(0.05, Math.min(kMostScale, scale));
-    const px = (x - this.view.x) / this.view.scale;
-    const py = (y - this.view.y) / this.view.scale;
-    this.view = { scale: next, x: x - px * next, y: y - py * next };
-    this.fits = false;
-    this.draw();
-  }
-
   /** The chosen object, or all of them, with some room around. */
   private zoomToObject(): void {
     const object = this.frame?.objects.find((one) => one.id === this.app.state.object && one.box);
-    if (!object) return this.fit();
-    const [left, top, right, bottom] = object.box!;
-    const { clientWidth: width, clientHeight: height } = this.canvas;
-    const scale = Math.min(kMostScale, 0.6 * Math.min(width / Math.max(1, right - left), height / Math.max(1, bottom - top)));
-    this.view = { scale, x: width / 2 - (scale * (left + right)) / 2, y: height / 2 - (scale * (top + bottom)) / 2 };
-    this.fits = false;
-    this.draw();
+    if (object) this.zoom.toBox(object.box!);
+    else this.zoom.fit();
   }
 
   private draw(): void {
-    const { clientWidth: width, clientHeight: height } = this.canvas;
-    const ratio = window.devicePixelRatio || 1;
-    if (width === 0 || height === 0) return;
-    this.canvas.width = Math.round(width * ratio);
-    this.canvas.height = Math.round(height * ratio);
-    const context = this.canvas.getContext('2d')!;
+    const began = this.zoom.begin();
     const { frame, pixels } = this;
-    if (!frame || !pixels) return;
-    if (this.fits) {
-      const scale = Math.min(width / frame.width, height / frame.height) * 0.98;
-      this.view = { scale, x: (width - scale * frame.width) / 2, y: (height - scale * frame.height) / 2 };
-    }
-    const { scale, x, y } = this.view;
-    context.scale(ratio, ratio);
-    context.imageSmoothingEnabled = scale * ratio < 1;
-    context.imageSmoothingQuality = 'high';
-    context.fillStyle = '#000';
-    context.fillRect(x, y, scale * frame.width, scale * frame.height);
-    const picture = pixels.now<HTMLImageElement>('picture color');
-    if (picture) context.drawImage(picture, x, y, scale * frame.width, scale * frame.height);
+    if (!began || !frame || !pixels) return;
+    const [context, view] = began;
     const { state, palette, holds } = this.app;
-    context.globalAlpha = state.opacity / 100;
-    for (const layer of overlays(pixels, frame, state, palette, holds, () => this.draw())) {
-      context.drawImage(layer, x, y, scale * frame.width, scale * frame.height);
-    }
-    context.globalAlpha = 1;
-    if (scale >= 16) this.drawGrid(context);
-    drawLines(context, frame, this.view, state, palette, 1, state.object);
+    drawPicture(context, frame, view, pixels, overlays(pixels, frame, state, palette, holds, () => this.draw()), state);
+    if (view.scale >= 16) this.drawGrid(context, view);
+    drawLines(context, frame, view, state, palette, 1, state.object);
     this.canvas.setAttribute('aria-label', `Capture ${state.capture}, ${frame.camera}: ` +
       frame.objects.filter((object) => object.box).map((object) => object.class).join(', '));
   }
 
   /** Edges of single pixels. */
-  private drawGrid(context: CanvasRenderingContext2D): void {
-    const { scale, x, y } = this.view;
+  private drawGrid(context: CanvasRenderingContext2D, { scale, x, y }: View): void {
     context.strokeStyle = 'rgba(128, 128, 128, 0.35)';
     context.lineWidth = 1;
     context.beginPath();
@@ -294,51 +258,11 @@ export class CapturePage {
     if (others.length > 0) word('below', others.map((other) => other.class).join(', '));
   }
 
-  private listen(): void {
-    let held: [number, number] | null = null;
-    let moved = 0;
-    const place = (event: MouseEvent): [number, number] => {
-      const frame = this.canvas.getBoundingClientRect();
-      return [event.clientX - frame.left, event.clientY - frame.top];
-    };
-    on(this.canvas, {
-      wheel: (event: WheelEvent) => {
-        event.preventDefault();
-        this.zoomTo(this.view.scale * Math.exp(-event.deltaY * 0.002), place(event));
-      },
-      pointerdown: (event: PointerEvent) => {
-        held = [event.clientX, event.clientY];
-        moved = 0;
-        this.canvas.setPointerCapture(event.pointerId);
-      },
-      pointermove: (event: PointerEvent) => {
-        const [x, y] = place(event);
-        const px: [number, number] = [Math.floor((x - this.view.x) / this.view.scale), Math.floor((y - this.view.y) / this.view.scale)];
-        const isInside = this.frame && px[0] >= 0 && px[1] >= 0 && px[0] < this.frame.width && px[1] < this.frame.height;
-        this.pointer = isInside ? px : null;
-        this.showProbe();
-        if (!held) return;
-        moved += Math.abs(event.clientX - held[0]) + Math.abs(event.clientY - held[1]);
-        if (moved < 4) return;
-        this.view = { ...this.view, x: this.view.x + event.clientX - held[0], y: this.view.y + event.clientY - held[1] };
-        held = [event.clientX, event.clientY];
-        this.fits = false;
-        this.draw();
-      },
-      pointerup: () => {
-        held = null;
-        if (moved >= 4 || !this.frame) return;
-        const found = this.pointer ? this.objectsAt(...this.pointer) : [];
-        // Clicks at one place go through what lies there.
-        const at = found.findIndex((object) => object.id === this.app.state.object);
-        this.app.go({ object: found[at + 1]?.id ?? 0 }, true);
-      },
-      pointerleave: () => {
-        this.pointer = null;
-        this.showProbe();
-      },
-      dblclick: () => this.fit(),
-    });
+  /** Clicks at one place go through what lies there. */
+  private choose(): void {
+    const found = this.pointer ? this.objectsAt(...this.pointer) : [];
+    const at = found.findIndex((object) => object.id === this.app.state.object);
+    this.app.go({ object: found[at + 1]?.id ?? 0 }, true);
   }
 
   /** Goes through the labels under the pointer, else through all. */
@@ -362,13 +286,10 @@ export class CapturePage {
     else if (event.key === 'ArrowRight') this.step(1);
     else if (event.key === 'ArrowUp') this.cycle(-1);
     else if (event.key === 'ArrowDown') this.cycle(1);
-    else if (event.key === '+' || event.key === '=') this.zoomTo(this.view.scale * 1.4);
-    else if (event.key === '-') this.zoomTo(this.view.scale / 1.4);
-    else if (event.key === '0') this.fit();
     else if (event.key === 'z') this.zoomToObject();
     else if (event.key === 's') app.go({ space: !app.state.space });
     else if (event.key === 'Escape') app.go(app.state.object !== 0 ? { object: 0 } : { page: 'grid' });
-    else return false;
+    else return this.zoom.press(event.key);
     return true;
   }
 }

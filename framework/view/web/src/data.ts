@@ -3,6 +3,8 @@
 
 export interface DatasetState {
   name: string;
+  folder: string;
+  is_other: boolean;  ///< Of the folder that is compared with.
   format: string;
   captures: number;
   all_captures: number;
@@ -90,6 +92,14 @@ export interface RunState {
   done?: number;
   is_finished?: boolean;
   workers?: { name: string; role: string; description: string; is_alive: boolean; captures: number }[];
+}
+
+/** What all captures of two datasets differ in, as lines, and which ones do. */
+export interface Difference {
+  pages: string[];
+  contents: string[];
+  captures: number;
+  differing: number[];
 }
 
 export interface BrightnessPart {

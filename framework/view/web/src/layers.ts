@@ -237,6 +237,23 @@ function depthDrawing(pixels: FramePixels) {
   };
 }
 
+/** Where and how much two pictures of one size differ; null for others. Small differences show, too. */
+export function differenceDrawing(a: Numbers, b: Numbers): { canvas: HTMLCanvasElement; pixels: number; most: number } | null {
+  if (a.width !== b.width || a.height !== b.height) return null;
+  const distances = new Uint32Array(a.values.length);
+  let [pixels, most] = [0, 0];
+  for (let i = 0; i < distances.length; ++i) {
+    for (const shift of [0, 8, 16]) {
+      distances[i] = Math.max(distances[i], Math.abs(((a.values[i] >> shift) & 255) - ((b.values[i] >> shift) & 255)));
+    }
+    if (distances[i] > 0) ++pixels;
+    most = Math.max(most, distances[i]);
+  }
+  const canvas = new Numbers(a.width, a.height, distances).coloured((distance) =>
+    distance === 0 ? null : heat(0.75 * (1 - Math.log(distance) / Math.log(256))));
+  return { canvas, pixels, most };
+}
+
 /** Pictures to lay over, from below; those that are not there yet come later and call `changed`. */
 export function overlays(pixels: FramePixels, labels: FrameLabels, state: State, palette: Palette,
                          holds: Set<string>, changed: () => void): HTMLCanvasElement[] {
@@ -267,6 +284,19 @@ export interface View {
   scale: number;
   x: number;
   y: number;
+}
+
+/** The picture, as far as it has come, and what lies over it. */
+export function drawPicture(context: CanvasRenderingContext2D, labels: FrameLabels, { scale, x, y }: View,
+                            pixels: FramePixels, over: HTMLCanvasElement[], state: State): void {
+  const [width, height] = [scale * labels.width, scale * labels.height];
+  context.fillStyle = '#000';
+  context.fillRect(x, y, width, height);
+  const picture = pixels.now<HTMLImageElement>('picture color');
+  if (picture) context.drawImage(picture, x, y, width, height);
+  context.globalAlpha = state.opacity / 100;
+  for (const layer of over) context.drawImage(layer, x, y, width, height);
+  context.globalAlpha = 1;
 }
 
 /** Boxes and names; `chosen` stands out. */

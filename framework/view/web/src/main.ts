@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 import { App, LabelStore } from './app';
 import { CapturePage, kKeys } from './capture';
-import { CaptureTable, DatasetInfo, Gone, SiteState, get, isReport } from './data';
+import { ComparePage } from './compare';
+import { CaptureLabels, CaptureTable, DatasetInfo, DatasetState, Gone, SiteState, get, isReport } from './data';
 import { button, clear, el, on, plural } from './dom';
 import { FacetBar } from './facets';
 import { filter } from './filter';
@@ -12,6 +13,25 @@ import { Page, State, addressOf, readState } from './state';
 
 const kNotInReports = ['depth', 'normals', 'motion'];
 
+/** What a dataset is compared with unless asked: the one of its name on the other side; -1: nothing. */
+function partnerOf(datasets: DatasetState[], dataset: number): number {
+  const rank = (i: number): number => i === dataset ? -1
+    : 2 * Number(datasets[i].is_other !== datasets[dataset].is_other) + Number(datasets[i].name === datasets[dataset].name);
+  let best = -1;
+  datasets.forEach((_, i) => {
+    if (rank(i) >= 0 && (best < 0 || rank(i) > rank(best))) best = i;
+  });
+  return best;
+}
+
+/** Addresses may name datasets that are not there. */
+function complete(state: State, datasets: DatasetState[]): void {
+  if (state.dataset >= datasets.length) state.dataset = 0;
+  const isOther = state.other >= 0 && state.other < datasets.length && state.other !== state.dataset;
+  if (!isOther) state.other = partnerOf(datasets, state.dataset);
+  if (state.other < 0 && state.page === 'compare') state.page = 'grid';
+}
+
 class Site {
   private readonly top = el('header');
   private readonly tools = el('div', { class: 'tools', role: 'toolbar', 'aria-label': 'Overlays' });
@@ -20,17 +40,18 @@ class Site {
   private readonly grid = new Grid();
   private readonly gridPage = el('main', { class: 'browse' }, this.facets.element, this.grid.element);
   private readonly capture = new CapturePage();
+  private readonly compare = new ComparePage();
   private readonly stats = new StatsPage();
   private readonly findings = new FindingsPage(isReport);
   private readonly run = new RunPage();
   private readonly help = el('dialog', { 'aria-label': 'Keys' });
   private app!: App;
-  private store = new LabelStore(0);
+  private stores = new Map<number, LabelStore>();
   private loading = 0;
 
   async start(): Promise<void> {
-    document.body.append(this.top, this.tools, this.gridPage, this.capture.element, this.stats.element,
-      this.findings.element, this.run.element, this.status, this.help);
+    document.body.append(this.top, this.tools, this.gridPage, this.capture.element, this.compare.element,
+      this.stats.element, this.findings.element, this.run.element, this.status, this.help);
     this.makeHelp();
     this.setTheme(this.keptTheme());
     await this.load(readState(location.hash));
@@ -42,16 +63,15 @@ class Site {
   /** Opens the dataset that the address names. */
   private async load(state: State): Promise<void> {
     const site = (await get('/api/state')) as SiteState;
-    if (state.dataset >= site.datasets.length) state.dataset = 0;
+    complete(state, site.datasets);
     const info = (await get(`/api/${state.dataset}/info`)) as DatasetInfo;
-    const store = new LabelStore(state.dataset);
-    this.store = store;
+    this.stores.clear();
     const table = new CaptureTable();
     this.app = {
       state, site, info, table, holds: new Set(info.holds), palette: new Palette(info.classes),
       filtered: filter(table, info.cameras, state.facets),
       go: (change, replaces) => this.go(change, replaces),
-      labels: (capture) => this.store.of(capture),
+      labels: (capture, dataset = state.dataset) => this.labels(capture, dataset),
     };
     document.title = `${info.name} – diorama view`;
     const ticket = ++this.loading;
@@ -60,47 +80,54 @@ class Site {
     if (this.app.holds.has('color')) await this.readBrightness(ticket);
   }
 
+  private labels(capture: number, dataset: number): Promise<CaptureLabels> {
+    let store = this.stores.get(dataset);
+    if (!store) this.stores.set(dataset, (store = new LabelStore(dataset)));
+    return store.of(capture);
+  }
+
   /** Columns come while they are made. */
-  private async readIndex(ticket: number): Promise<void> {
+  private readIndex(ticket: number): Promise<void> {
     const { app } = this;
-    let shown = 0;
-    while (app.table.captures < app.info.captures.length) {
-      const before = app.table.captures;
-      const part = await get(`/api/${app.state.dataset}/index/${before}`);
-      if (ticket !== this.loading) return;
+    return this.readParts(ticket, 'index', [400, 120], () => app.table.captures, (part) => {
       app.table.add(part);
-      const isDone = app.table.captures >= app.info.captures.length;
-      if (isDone || performance.now() - shown > 400) {
+      return () => {
         for (const name of app.table.names.classes) app.palette.ofClass(name);
-        this.refilter();
         this.show();
-        shown = performance.now();
-      }
-      if (app.table.captures === before) {
-        if (isReport) return;
-        await new Promise((resolve) => setTimeout(resolve, 120));
-      }
-    }
+      };
+    });
   }
 
   /** Comes last: the pictures have to be looked at for it. */
-  private async readBrightness(ticket: number): Promise<void> {
+  private readBrightness(ticket: number): Promise<void> {
     const { app } = this;
-    let shown = performance.now();
-    while (app.table.brightCaptures < app.info.captures.length) {
-      const before = app.table.brightCaptures;
-      const part = await get(`/api/${app.state.dataset}/brightness/${before}`);
-      if (ticket !== this.loading) return;
+    return this.readParts(ticket, 'brightness', [1500, 500], () => app.table.brightCaptures, (part) => {
       app.table.addBrightness(part);
-      const isDone = app.table.brightCaptures >= app.info.captures.length;
-      if (isDone || performance.now() - shown > 1500) {
-        this.refilter();
+      return () => {
         if (app.state.page === 'grid') this.show();
+      };
+    });
+  }
+
+  /** Asks for parts until `count` has all captures. `take` gives what shows them: called once in a
+   *  while (first of the milliseconds), and when all are there. Asks anew after the second ones. */
+  private async readParts(ticket: number, what: string, [showMs, askMs]: number[], count: () => number,
+    take: (part: any) => () => void): Promise<void> {
+    const { app } = this;
+    let shown = -Infinity;
+    while (count() < app.info.captures.length) {
+      const before = count();
+      const part = await get(`/api/${app.state.dataset}/${what}/${before}`);
+      if (ticket !== this.loading) return;
+      const show = take(part);
+      if (count() >= app.info.captures.length || performance.now() - shown > showMs) {
+        this.refilter();
+        show();
         shown = performance.now();
       }
-      if (app.table.brightCaptures === before) {
+      if (count() === before) {
         if (isReport) return;
-        await new Promise((resolve) => setTimeout(resolve, 500));
+        await new Promise((resolve) => setTimeout(resolve, askMs));
       }
     }
   }
@@ -122,6 +149,7 @@ class Site {
       await this.load(state).catch((error: Error) => this.fail(error));
       return;
     }
+    complete(state, this.app.site.datasets);
     const filters = JSON.stringify([...state.facets]) !== JSON.stringify([...this.app.state.facets]);
     this.app.state = state;
     if (filters) this.refilter();
@@ -134,14 +162,15 @@ class Site {
     this.showTop();
     this.showTools();
     const pages: [Page, HTMLElement][] = [['grid', this.gridPage], ['capture', this.capture.element],
-      ['stats', this.stats.element], ['findings', this.findings.element], ['run', this.run.element]];
+      ['compare', this.compare.element], ['stats', this.stats.element], ['findings', this.findings.element], ['run', this.run.element]];
     for (const [name, element] of pages) element.hidden = name !== page;
-    this.tools.hidden = page !== 'grid' && page !== 'capture';
+    this.tools.hidden = page !== 'grid' && page !== 'capture' && page !== 'compare';
     if (page === 'grid') {
       this.facets.show(app);
       this.grid.show(app);
     }
     if (page === 'capture') void this.capture.show(app);
+    if (page === 'compare') void this.compare.show(app);
     if (page === 'stats') this.stats.show(app);
     if (page === 'findings') this.findings.show(app);
     if (page === 'run') this.run.show(app);
@@ -157,19 +186,27 @@ class Site {
     const choice = on(el('select', { 'aria-label': 'Dataset' }), {
       change: () => this.go({ dataset: Number(choice.value), page: 'grid', facets: new Map(), object: 0 }),
     });
-    app.site.datasets.forEach((dataset, i) => choice.append(el('option', { value: i }, `${dataset.name} (${dataset.format})`)));
+    app.site.datasets.forEach((dataset, i) => choice.append(el('option', { value: i, title: dataset.folder },
+      `${dataset.name} (${dataset.format})${dataset.is_other ? ', the other one' : ''}`)));
     choice.value = String(app.state.dataset);
     this.top.append(el('span', { class: 'mark' }, 'diorama'),
       app.site.datasets.length > 1 ? choice : el('span', { class: 'dataset' }, app.info.name, el('small', {}, app.info.format)));
     const tabs = el('nav', { 'aria-label': 'Pages' });
-    for (const [page, title] of [['grid', 'Captures'], ['stats', 'Statistics'], ['findings', 'Findings'], ['run', 'Run']] as [Page, string][]) {
+    for (const [page, title] of [['grid', 'Captures'], ['compare', 'Compare'], ['stats', 'Statistics'], ['findings', 'Findings'], ['run', 'Run']] as [Page, string][]) {
+      if (page === 'compare' && (isReport || app.state.other < 0)) continue;
       const isHere = page === app.state.page || (page === 'grid' && app.state.page === 'capture');
-      tabs.append(button(title, '', () => this.go({ page }), { 'aria-current': isHere ? 'page' : false, 'data-page': page }));
+      tabs.append(button(title, '', () => this.go(page === 'compare' ? { page, capture: this.captureHere() } : { page }), { 'aria-current': isHere ? 'page' : false, 'data-page': page }));
     }
     this.top.append(tabs, el('span', { class: 'folder', title: app.site.folder }, el('bdi', {}, app.site.folder)),
       button('◐', 'Light or dark', () => this.setTheme(document.documentElement.dataset.theme === 'dark' ? 'light' : 'dark')),
       button('?', 'Keys (?)', () => this.help.showModal()));
     if (focus) this.top.querySelector<HTMLElement>(`[data-page="${focus}"]`)?.focus();
+  }
+
+  /** The capture that is looked at, else the first of the dataset. */
+  private captureHere(): number {
+    const { state, info } = this.app;
+    return info.captures.includes(state.capture) ? state.capture : info.captures[0] ?? 0;
   }
 
   private showTools(): void {
@@ -210,9 +247,10 @@ class Site {
     if (target.matches('input, select, textarea') && event.key !== 'Escape') return;
     const { state } = this.app;
     const layer = kLayers.find((one) => one.hotkey === event.key && !(isReport && kNotInReports.includes(one.key)));
-    const pictures = state.page === 'grid' || state.page === 'capture';
+    const pictures = !this.tools.hidden;
     if (event.key === '?') this.help.showModal();
     else if (state.page === 'capture' && this.capture.press(event)) event.preventDefault();
+    else if (state.page === 'compare' && this.compare.press(event)) event.preventDefault();
     else if (event.key === 'g') this.go({ page: 'grid' });
     else if (pictures && layer && layer.held.some((name) => this.app.holds.has(name))) this.toggle(layer.key);
     else if (pictures && event.key === 'i') this.go({ colour: state.colour === 'class' ? 'instance' : 'class' }, true);

@@ -92,7 +92,7 @@ function jump(app: App, text: string, capture: number, camera: string): HTMLElem
 }
 
 /** JSON that the program may have to make first; the page is asked again until it is there. */
-class Awaited {
+export class Awaited {
   private path = '';
   private timer = 0;
   value: any = null;
@@ -122,7 +122,7 @@ class Awaited {
   }
 }
 
-function waitingFor(what: string): HTMLElement {
+export function waitingFor(what: string): HTMLElement {
   return el('p', { class: 'empty', role: 'status' }, el('span', { class: 'spin' }), what);
 }
 

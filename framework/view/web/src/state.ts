@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // What is shown, as an address behind '#': whoever opens it sees the same.
 
-export type Page = 'grid' | 'capture' | 'stats' | 'findings' | 'run';
+export type Page = 'grid' | 'capture' | 'compare' | 'stats' | 'findings' | 'run';
+export type CompareMode = 'side' | 'divider' | 'difference';
 
 export interface State {
   page: Page;
   dataset: number;
+  other: number;  ///< Dataset that it is compared with.
+  mode: CompareMode;
   capture: number;
   frame: number;
   object: number;  ///< Id of the one that is chosen; 0: none.
@@ -17,7 +20,8 @@ export interface State {
   space: boolean;  ///< The 3-D view is open.
 }
 
-const kPages: Page[] = ['grid', 'capture', 'stats', 'findings', 'run'];
+const kPages: Page[] = ['grid', 'capture', 'compare', 'stats', 'findings', 'run'];
+const kModes: CompareMode[] = ['side', 'divider', 'difference'];
 
 function whole(text: string | null, otherwise: number): number {
   return text !== null && /^\d{1,9}$/.test(text) ? Number(text) : otherwise;
@@ -33,6 +37,8 @@ export function readState(hash: string): State {
   return {
     page: kPages.includes(words[0] as Page) ? (words[0] as Page) : 'grid',
     dataset: whole(query.get('dataset'), 0),
+    other: whole(query.get('other'), -1),
+    mode: kModes.find((mode) => mode === query.get('mode')) ?? 'side',
     capture: whole(words[1] ?? null, 0),
     frame: whole(words[2] ?? null, 0),
     object: whole(query.get('object'), 0),
@@ -48,6 +54,10 @@ export function readState(hash: string): State {
 export function addressOf(state: State): string {
   const query = new URLSearchParams();
   if (state.dataset !== 0) query.set('dataset', String(state.dataset));
+  if (state.page === 'compare') {
+    query.set('other', String(state.other));
+    if (state.mode !== 'side') query.set('mode', state.mode);
+  }
   if (state.object !== 0 && state.page === 'capture') query.set('object', String(state.object));
   const layers = [...state.layers].sort().join('.');
   if (layers !== 'box') query.set('layers', layers);
@@ -56,7 +66,7 @@ export function addressOf(state: State): string {
   if (state.card !== 240) query.set('card', String(state.card));
   if (state.space && state.page === 'capture') query.set('space', '1');
   for (const [key, value] of state.facets) query.set('f.' + key, value);
-  const place = state.page === 'capture' ? `/${state.capture}/${state.frame}` : '';
+  const place = state.page === 'capture' || state.page === 'compare' ? `/${state.capture}/${state.frame}` : '';
   const text = query.toString();
   return `#/${state.page}${place}${text === '' ? '' : '?' + text}`;
 }
