@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // What diorama/__init__.py makes its classes of: plain dictionaries and views of pixels.
-#include <pybind11/eigen.h>
-#include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 #include <unistd.h>
@@ -14,7 +12,6 @@
 #include <optional>
 #include <string>
 #include <utility>
-#include <variant>
 #include <vector>
 
 #include "diorama/error.h"
@@ -26,6 +23,8 @@
 #include "framework/jobs/job_file.h"
 #include "framework/jobs/run_in_memory.h"
 #include "framework/plugins/plugin_search.h"
+#include "framework/python/captures.h"
+#include "framework/python/scenes.h"
 
 namespace py = pybind11;
 
@@ -55,154 +54,6 @@ class Services {
   JobServices services_;
   DatasetReaders readers_;
 };
-
-/// Pixels that keep what they lie in alive and cannot be changed.
-template <class Element>
-py::array view_of(const Element* data, std::vector<py::ssize_t> shape, const py::capsule& owner) {
-  py::array_t<Element> array(std::move(shape), data, owner);
-  py::detail::array_proxy(array.ptr())->flags &= ~py::detail::npy_api::NPY_ARRAY_WRITEABLE_;
-  return array;
-}
-
-py::array image_view(const AnyImage& any, const py::capsule& owner) {
-  return std::visit(
-      [&](const auto& image) -> py::array {
-        using Pixel = typename std::decay_t<decltype(image)>::PixelType;
-        const py::ssize_t height = image.height();
-        const py::ssize_t width = image.width();
-        if constexpr (std::is_arithmetic_v<Pixel>) {
-          return view_of(image.pixels().data(), {height, width}, owner);
-        } else {
-          constexpr py::ssize_t kParts = sizeof(Pixel) / sizeof(std::declval<Pixel>()[0]);
-          return view_of(image.pixels().empty() ? nullptr : &image.pixels()[0][0],
-                         {height, width, kParts}, owner);
-        }
-      },
-      any);
-}
-
-py::object box_of(const std::optional<PixelBox>& box) {
-  if (!box) return py::none();
-  return py::make_tuple(box->x_min, box->y_min, box->x_max, box->y_max);
-}
-
-py::dict camera_of(const Camera& camera) {
-  constexpr const char* kLenses[]{"pinhole", "opencv_pinhole", "fisheye_polynomial"};
-  py::dict result;
-  result["width"] = camera.width;
-  result["height"] = camera.height;
-  result["lens"] = kLenses[std::size_t(camera.lens)];
-  result["fx"] = camera.fx;
-  result["fy"] = camera.fy;
-  result["cx"] = camera.cx;
-  result["cy"] = camera.cy;
-  result["distortion"] = camera.distortion;
-  result["fisheye_polynomial"] = camera.fisheye_polynomial;
-  result["near_m"] = camera.near_m;
-  result["far_m"] = camera.far_m;
-  return result;
-}
-
-py::object visibility_of(const std::optional<Visibility>& seen, const py::capsule& owner) {
-  if (!seen) return py::none();
-  py::dict result;
-  result["visible_pixels"] = seen->visible_pixels;
-  result["amodal_pixels"] = seen->amodal_pixels;
-  result["outside_pixels"] = seen->outside_pixels;
-  result["occlusion"] = seen->occlusion();
-  result["truncation"] = seen->truncation();
-  result["amodal_box"] = box_of(seen->amodal_box);
-  const CoverageMask& mask = seen->amodal_mask;
-  if (mask.bits.empty()) {
-    result["amodal_mask"] = py::none();
-  } else {
-    result["amodal_mask"] = py::make_tuple(
-        box_of(mask.box), view_of(mask.bits.data(), {mask.box.height(), mask.box.width()}, owner));
-  }
-  return result;
-}
-
-py::dict instance_of(const Instance& instance, const NameSet& holds, const py::capsule& owner) {
-  py::dict result;
-  result["id"] = instance.id;
-  result["path"] = instance.node_path;
-  result["labels"] =
-      py::cast(std::map<std::string, std::string>(instance.labels.begin(), instance.labels.end()));
-  const auto if_held = [&](std::string_view name, auto make) -> py::object {
-    return holds.contains(name) ? py::object(make()) : py::object(py::none());
-  };
-  result["world_from_object"] =
-      if_held(kHoldsPoses, [&] { return py::cast(Mat4(instance.world_from_node.matrix())); });
-  result["bounds"] = if_held(kHoldsBounds, [&]() -> py::object {
-    const Aabb& bounds = instance.bounds_node;
-    if (bounds.is_empty()) return py::none();
-    return py::make_tuple(py::cast(bounds.min), py::cast(bounds.max));
-  });
-  result["box"] = box_of(instance.tight_box);
-  result["visibility"] = visibility_of(instance.visibility, owner);
-  return result;
-}
-
-py::dict frame_of(const Frame& frame, const NameSet& holds, const py::capsule& owner) {
-  py::dict result;
-  result["camera_name"] = frame.camera_name;
-  result["camera"] = camera_of(frame.camera);
-  result["world_from_camera"] = holds.contains(kHoldsCameraPose)
-                                    ? py::cast(Mat4(frame.world_from_camera.matrix()))
-                                    : py::none();
-  py::list instances;
-  for (const Instance& instance : frame.instances) {
-    instances.append(instance_of(instance, holds, owner));
-  }
-  result["instances"] = instances;
-  py::list occlusions;
-  for (const Occlusion& occlusion : frame.occlusions) {
-    occlusions.append(py::make_tuple(occlusion.front, occlusion.behind, occlusion.pixels));
-  }
-  result["occlusions"] = occlusions;
-  py::dict channels;
-  for (const std::string& name : frame.channels()) {
-    channels[py::str(name)] = image_view(frame.image_named(name), owner);
-  }
-  result["channels"] = channels;
-  return result;
-}
-
-py::dict finding_of(const Finding& finding) {
-  py::dict result;
-  result["check"] = finding.check;
-  result["file"] = finding.file;
-  result["capture"] = finding.capture;
-  result["camera"] = finding.camera;
-  result["object"] = finding.object;
-  result["found"] = finding.found;
-  result["expected"] = finding.expected;
-  return result;
-}
-
-py::list findings_of(const ReadLog& log) {
-  py::list result;
-  for (const Finding& finding : log.findings) result.append(finding_of(finding));
-  return result;
-}
-
-py::dict capture_of(std::shared_ptr<const StoredCapture> stored, const NameSet& holds) {
-  // Every array refers to the capsule, which ends with the last of them.
-  auto* const shared = new std::shared_ptr<const StoredCapture>(stored);
-  const py::capsule owner(
-      shared, [](void* held) { delete static_cast<std::shared_ptr<const StoredCapture>*>(held); });
-  py::dict result;
-  result["index"] = stored->capture.index;
-  result["visit"] = stored->capture.visit;
-  result["phase"] = stored->capture.phase;
-  result["environment"] = stored->capture.environment;
-  result["split"] = stored->split;
-  py::list frames;
-  for (const Frame& frame : stored->capture.frames) frames.append(frame_of(frame, holds, owner));
-  result["frames"] = frames;
-  result["findings"] = findings_of(stored->log);
-  return result;
-}
 
 class OpenDataset {
  public:
@@ -311,17 +162,10 @@ class Listener {
 
  private:
   void call(const Capture& capture) {
-    auto stored = std::make_shared<StoredCapture>();
-    stored->capture.index = capture.index;
-    stored->capture.visit = capture.visit;
-    stored->capture.phase = capture.phase;
-    stored->capture.environment = capture.environment;
-    for (const Frame& frame : capture.frames) stored->capture.frames.push_back(copy_of(frame));
+    std::shared_ptr<const StoredCapture> stored = copy_of(capture, needs_);
     const py::gil_scoped_acquire python;
     try {
-      const NameSet holds{std::string(kHoldsPoses), std::string(kHoldsBounds),
-                          std::string(kHoldsCameraPose)};
-      const py::object goes_on = on_capture_(capture_of(std::move(stored), holds));
+      const py::object goes_on = on_capture_(capture_of(std::move(stored), made_holds()));
       if (goes_on.is(py::bool_(false))) is_over_ = true;
     } catch (const py::error_already_set& error) {
       keep(error);
@@ -332,30 +176,6 @@ class Listener {
   /// The first one; the interpreter's lock guards it.
   void keep(const py::error_already_set& error) {
     if (!error_) error_ = error;
-  }
-
-  /// The run's own frames end when they are written.
-  Frame copy_of(const Frame& frame) const {
-    Frame copy;
-    copy.camera_name = frame.camera_name;
-    copy.camera_path = frame.camera_path;
-    copy.camera = frame.camera;
-    copy.world_from_camera = frame.world_from_camera;
-    copy.instances = frame.instances;
-    copy.occlusions = frame.occlusions;
-    copy.leaf_paths = frame.leaf_paths;
-    copy.exposure = frame.exposure;
-    copy.seed = frame.seed;
-    for (const std::string& name : frame.channels()) {
-      if (!needs_.contains(name)) continue;
-      std::visit(
-          [&](const auto& image) {
-            using Pixel = typename std::decay_t<decltype(image)>::PixelType;
-            copy.set(Channel<Pixel>{name}, image);
-          },
-          frame.image_named(name));
-    }
-    return copy;
   }
 
   py::object on_capture_;
@@ -468,5 +288,7 @@ PYBIND11_MODULE(_diorama, module) {
       },
       py::arg("program"), py::arg("file"), py::arg("text"), py::arg("sets"), py::arg("seed"),
       py::arg("on_capture"), py::arg("needs"), py::arg("threads"));
+  bind_scenes(module);
+  bind_captures(module);
   module.def("find_datasets", &find_in, py::arg("program"), py::arg("folder"));
 }

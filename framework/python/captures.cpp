@@ -1,0 +1,305 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/python/captures.h"
+
+#include <pybind11/eigen.h>
+#include <pybind11/numpy.h>
+#include <pybind11/stl.h>
+
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "diorama/writer.h"
+#include "framework/python/capsule.h"
+
+namespace py = pybind11;
+
+namespace diorama {
+namespace {
+
+/// Pixels that keep what they lie in alive and cannot be changed.
+template <class Element>
+py::array view_of(const Element* data, std::vector<py::ssize_t> shape, const py::capsule& owner) {
+  py::array_t<Element> array(std::move(shape), data, owner);
+  py::detail::array_proxy(array.ptr())->flags &= ~py::detail::npy_api::NPY_ARRAY_WRITEABLE_;
+  return array;
+}
+
+py::array image_view(const AnyImage& any, const py::capsule& owner) {
+  return std::visit(
+      [&](const auto& image) -> py::array {
+        using Pixel = typename std::decay_t<decltype(image)>::PixelType;
+        const py::ssize_t height = image.height();
+        const py::ssize_t width = image.width();
+        if constexpr (std::is_arithmetic_v<Pixel>) {
+          return view_of(image.pixels().data(), {height, width}, owner);
+        } else {
+          constexpr py::ssize_t kParts = sizeof(Pixel) / sizeof(std::declval<Pixel>()[0]);
+          return view_of(image.pixels().empty() ? nullptr : &image.pixels()[0][0],
+                         {height, width, kParts}, owner);
+        }
+      },
+      any);
+}
+
+py::object box_of(const std::optional<PixelBox>& box) {
+  if (!box) return py::none();
+  return py::make_tuple(box->x_min, box->y_min, box->x_max, box->y_max);
+}
+
+py::dict camera_of(const Camera& camera) {
+  constexpr const char* kLenses[]{"pinhole", "opencv_pinhole", "fisheye_polynomial"};
+  py::dict result;
+  result["width"] = camera.width;
+  result["height"] = camera.height;
+  result["lens"] = kLenses[std::size_t(camera.lens)];
+  result["fx"] = camera.fx;
+  result["fy"] = camera.fy;
+  result["cx"] = camera.cx;
+  result["cy"] = camera.cy;
+  result["distortion"] = camera.distortion;
+  result["fisheye_polynomial"] = camera.fisheye_polynomial;
+  result["near_m"] = camera.near_m;
+  result["far_m"] = camera.far_m;
+  return result;
+}
+
+py::object visibility_of(const std::optional<Visibility>& seen, const py::capsule& owner) {
+  if (!seen) return py::none();
+  py::dict result;
+  result["visible_pixels"] = seen->visible_pixels;
+  result["amodal_pixels"] = seen->amodal_pixels;
+  result["outside_pixels"] = seen->outside_pixels;
+  result["occlusion"] = seen->occlusion();
+  result["truncation"] = seen->truncation();
+  result["amodal_box"] = box_of(seen->amodal_box);
+  const CoverageMask& mask = seen->amodal_mask;
+  if (mask.bits.empty()) {
+    result["amodal_mask"] = py::none();
+  } else {
+    result["amodal_mask"] = py::make_tuple(
+        box_of(mask.box), view_of(mask.bits.data(), {mask.box.height(), mask.box.width()}, owner));
+  }
+  return result;
+}
+
+py::dict instance_of(const Instance& instance, const NameSet& holds, const py::capsule& owner) {
+  py::dict result;
+  result["id"] = instance.id;
+  result["path"] = instance.node_path;
+  result["labels"] =
+      py::cast(std::map<std::string, std::string>(instance.labels.begin(), instance.labels.end()));
+  const auto if_held = [&](std::string_view name, auto make) -> py::object {
+    return holds.contains(name) ? py::object(make()) : py::object(py::none());
+  };
+  result["world_from_object"] =
+      if_held(kHoldsPoses, [&] { return py::cast(Mat4(instance.world_from_node.matrix())); });
+  result["bounds"] = if_held(kHoldsBounds, [&]() -> py::object {
+    const Aabb& bounds = instance.bounds_node;
+    if (bounds.is_empty()) return py::none();
+    return py::make_tuple(py::cast(bounds.min), py::cast(bounds.max));
+  });
+  result["box"] = box_of(instance.tight_box);
+  result["visibility"] = visibility_of(instance.visibility, owner);
+  return result;
+}
+
+py::dict frame_of(const Frame& frame, const NameSet& holds, const py::capsule& owner) {
+  py::dict result;
+  result["camera_name"] = frame.camera_name;
+  result["camera"] = camera_of(frame.camera);
+  result["world_from_camera"] = holds.contains(kHoldsCameraPose)
+                                    ? py::cast(Mat4(frame.world_from_camera.matrix()))
+                                    : py::none();
+  py::list instances;
+  for (const Instance& instance : frame.instances) {
+    instances.append(instance_of(instance, holds, owner));
+  }
+  result["instances"] = instances;
+  py::list occlusions;
+  for (const Occlusion& occlusion : frame.occlusions) {
+    occlusions.append(py::make_tuple(occlusion.front, occlusion.behind, occlusion.pixels));
+  }
+  result["occlusions"] = occlusions;
+  py::dict channels;
+  for (const std::string& name : frame.channels()) {
+    channels[py::str(name)] = image_view(frame.image_named(name), owner);
+  }
+  result["channels"] = channels;
+  return result;
+}
+
+py::dict finding_of(const Finding& finding) {
+  py::dict result;
+  result["check"] = finding.check;
+  result["file"] = finding.file;
+  result["capture"] = finding.capture;
+  result["camera"] = finding.camera;
+  result["object"] = finding.object;
+  result["found"] = finding.found;
+  result["expected"] = finding.expected;
+  return result;
+}
+
+}  // namespace
+
+py::list findings_of(const ReadLog& log) {
+  py::list result;
+  for (const Finding& finding : log.findings) result.append(finding_of(finding));
+  return result;
+}
+
+py::dict capture_of(std::shared_ptr<const StoredCapture> stored, const NameSet& holds) {
+  // Every array refers to the capsule, which ends with the last of them.
+  auto* const shared = new std::shared_ptr<const StoredCapture>(stored);
+  const py::capsule owner(
+      shared, [](void* held) { delete static_cast<std::shared_ptr<const StoredCapture>*>(held); });
+  py::dict result;
+  result["index"] = stored->capture.index;
+  result["visit"] = stored->capture.visit;
+  result["phase"] = stored->capture.phase;
+  result["environment"] = stored->capture.environment;
+  result["split"] = stored->split;
+  py::list frames;
+  for (const Frame& frame : stored->capture.frames) frames.append(frame_of(frame, holds, owner));
+  result["frames"] = frames;
+  result["findings"] = findings_of(stored->log);
+  return result;
+}
+
+namespace {
+
+Frame copy_of(const Frame& frame, const NameSet& needs) {
+  Frame copy;
+  copy.camera_name = frame.camera_name;
+  copy.camera_path = frame.camera_path;
+  copy.camera = frame.camera;
+  copy.world_from_camera = frame.world_from_camera;
+  copy.instances = frame.instances;
+  copy.occlusions = frame.occlusions;
+  copy.leaf_paths = frame.leaf_paths;
+  copy.exposure = frame.exposure;
+  copy.seed = frame.seed;
+  for (const std::string& name : frame.channels()) {
+    if (!needs.contains(name)) continue;
+    std::visit(
+        [&](const auto& image) {
+          using Pixel = typename std::decay_t<decltype(image)>::PixelType;
+          copy.set(Channel<Pixel>{name}, image);
+        },
+        frame.image_named(name));
+  }
+  return copy;
+}
+
+}  // namespace
+
+std::shared_ptr<const StoredCapture> copy_of(const Capture& capture, const NameSet& needs) {
+  auto stored = std::make_shared<StoredCapture>();
+  stored->capture.index = capture.index;
+  stored->capture.visit = capture.visit;
+  stored->capture.phase = capture.phase;
+  stored->capture.environment = capture.environment;
+  for (const Frame& frame : capture.frames) stored->capture.frames.push_back(copy_of(frame, needs));
+  return stored;
+}
+
+NameSet made_holds() {
+  return {std::string(kHoldsPoses), std::string(kHoldsBounds), std::string(kHoldsCameraPose)};
+}
+
+namespace {
+
+/// Of one call of a writer, as Access of scenes.cpp.
+struct PyFiles {
+  DatasetFiles* files = nullptr;
+  CaptureFiles* of_capture = nullptr;  ///< Null in begin() and finish().
+
+  DatasetFiles& get() const {
+    if (!files) throw Error(ErrorKind::Plugin, "the files were given for one call, which is over");
+    return *files;
+  }
+};
+
+using Content = std::variant<py::bytes, std::string>;
+
+std::span<const std::byte> bytes_of(const Content& content) {
+  const std::string_view text =
+      std::visit([](const auto& each) { return std::string_view(each); }, content);
+  return std::as_bytes(std::span(text));
+}
+
+void bind_files(py::module_& module) {
+  py::class_<PyFiles>(module, "Files")
+      .def(
+          "add",
+          [](const PyFiles& f, const std::string& path, const Content& content) {
+            const auto bytes = bytes_of(content);
+            f.get().add(path, {bytes.begin(), bytes.end()});
+          },
+          py::arg("path"), py::arg("content"))
+      .def(
+          "append",
+          [](const PyFiles& f, const std::string& path, const Content& content) {
+            f.get().append(path, bytes_of(content));
+          },
+          py::arg("path"), py::arg("content"))
+      .def(
+          "record",
+          [](const PyFiles& f, const std::string& line) {
+            f.get();
+            if (!f.of_capture) {
+              throw Error(ErrorKind::Plugin, "only write() has a capture to keep a record of");
+            }
+            f.of_capture->record(line);
+          },
+          py::arg("line"))
+      .def("_end", [](PyFiles& f) { f = {}; });
+  module.def("files_of", [](const py::capsule& files) {
+    return PyFiles{held<DatasetFiles>(files, "diorama::DatasetFiles"), nullptr};
+  });
+  module.def("capture_files_of", [](const py::capsule& files) {
+    auto* const of_capture = held<CaptureFiles>(files, "diorama::CaptureFiles");
+    return PyFiles{of_capture, of_capture};
+  });
+}
+
+py::dict dataset_of(const DatasetInfo& info) {
+  const auto plain = [](const Labels& labels) {
+    return std::map<std::string, std::string>(labels.begin(), labels.end());
+  };
+  py::dict result;
+  result["seed"] = info.seed;
+  result["captures"] = info.capture_count;
+  result["cameras"] = info.camera_names;
+  py::list labels;
+  for (const Labels& each : info.labels) labels.append(plain(each));
+  result["labels"] = labels;
+  result["classes"] = info.classes;
+  result["validation"] = info.validation;
+  result["job"] = info.resolved_job;
+  result["version"] = info.program_version;
+  return result;
+}
+
+}  // namespace
+
+void bind_captures(py::module_& module) {
+  bind_files(module);
+  module.def("capture_copy", [](const py::capsule& capture, const std::vector<std::string>& needs) {
+    return capture_of(copy_of(*held<const Capture>(capture, "diorama::Capture"),
+                              NameSet(needs.begin(), needs.end())),
+                      made_holds());
+  });
+  module.def("dataset_of", [](const py::capsule& info) {
+    return dataset_of(*held<const DatasetInfo>(info, "diorama::DatasetInfo"));
+  });
+}
+
+}  // namespace diorama
