@@ -2,14 +2,18 @@
 #include "framework/app/command_doctor.h"
 
 #include <array>
+#include <cstdint>
+#include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <iostream>
+#include <limits>
 #include <optional>
 #include <set>
 
 #include "diorama/renderer.h"
 #include "framework/app/cli.h"
+#include "framework/host/machine_limits.h"
 #include "framework/jobs/assemble.h"
 
 namespace diorama {
@@ -36,6 +40,13 @@ std::string line_of(const char* file, const std::string& key) {
     return start == std::string::npos ? std::string() : line.substr(start);
   }
   return "unknown";
+}
+
+std::string memory_text(std::uint64_t bytes) {
+  if (bytes == std::numeric_limits<std::uint64_t>::max()) return "unknown";
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1f GiB", double(bytes) / double(1 << 30));
+  return text;
 }
 
 class Doctor {
@@ -72,8 +83,8 @@ class Doctor {
 
   void show_machine() const {
     std::cout << "machine\n  processor " << line_of("/proc/cpuinfo", "model name") << "\n  threads "
-              << ThreadPool::available_threads() << "\n  memory "
-              << line_of("/proc/meminfo", "MemTotal") << "\n";
+              << ThreadPool::available_threads() << "\n  memory " << memory_text(total_memory())
+              << ", " << memory_text(available_memory()) << " of it available\n";
 #if defined(__x86_64__)
     std::cout << "  vector units sse2" << (__builtin_cpu_supports("sse4.2") ? " sse4.2" : "")
               << (__builtin_cpu_supports("avx") ? " avx" : "")

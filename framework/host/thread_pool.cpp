@@ -7,10 +7,8 @@
 #include <atomic>
 #include <condition_variable>
 #include <cstdint>
-#include <cstdlib>
 #include <deque>
 #include <exception>
-#include <fstream>
 #include <limits>
 #include <map>
 #include <mutex>
@@ -20,6 +18,7 @@
 #include <vector>
 
 #include "diorama/error.h"
+#include "framework/host/machine_limits.h"
 
 namespace diorama {
 namespace {
@@ -73,15 +72,6 @@ class Loop {
   std::mutex error_mutex_;
   std::exception_ptr error_;
 };
-
-/// CPUs that the cgroup's quota amounts to, rounded up; 0: no quota.
-int cgroup_cpus() {
-  std::ifstream file("/sys/fs/cgroup/cpu.max");
-  std::string quota;
-  double period = 0;
-  if (!(file >> quota >> period) || quota == "max" || period <= 0) return 0;
-  return std::max(1, int(std::atof(quota.c_str()) / period + 0.999));
-}
 
 }  // namespace
 
@@ -221,7 +211,7 @@ int ThreadPool::available_threads() {
   int count = int(std::thread::hardware_concurrency());
   cpu_set_t set;
   if (sched_getaffinity(0, sizeof set, &set) == 0) count = CPU_COUNT(&set);
-  const int quota = cgroup_cpus();
+  const int quota = quota_cpus();
   if (quota > 0) count = std::min(count, quota);
   return std::max(count, 1);
 }

@@ -5,7 +5,7 @@
 #include <map>
 
 #include "framework/config/value_text.h"
-#include "framework/host/machine_memory.h"
+#include "framework/host/machine_limits.h"
 #include "framework/pipeline/camera_rig.h"
 #include "framework/pipeline/capture_memory.h"
 #include "framework/pipeline/dataset_description.h"

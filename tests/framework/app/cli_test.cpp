@@ -204,6 +204,7 @@ TEST_CASE("the doctor names what is missing and how to get it", "[cli]") {
   CHECK(run.code == 4);
   CHECK(has(run.out, "program\n  version "));
   CHECK(has(run.out, "  plugin ABI " DIORAMA_DETAIL_TEXT(DIORAMA_SDK_ABI) "\n"));
+  CHECK(has(run.out, " GiB of it available\n"));
   CHECK(has(run.out, "  ! /nowhere: given by --plugin-dir, but it is no folder\n"));
   CHECK(has(run.out, "renderers\n"));
   CHECK(has(run.out, "  null starts\n"));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "framework/host/machine_memory.h"
+#include "framework/host/machine_limits.h"
 
 #include <cstdlib>
 #include <fstream>
@@ -26,6 +26,8 @@ class Machine {
     std::ofstream(root_ / file) << text;
   }
   std::uint64_t memory() const { return available_memory(root_); }
+  std::uint64_t all_memory() const { return total_memory(root_); }
+  int cpus() const { return quota_cpus(root_); }
 
  private:
   fs::path root_;
@@ -56,6 +58,35 @@ TEST_CASE("available memory is the system's, or what a cgroup leaves if that is 
   CHECK(machine.memory() == 0);
 }
 
+TEST_CASE("all memory is the machine's, or the least limit of the cgroups", "[host]") {
+  const Machine machine;
+  CHECK(machine.all_memory() == std::numeric_limits<std::uint64_t>::max());
+  machine.says("proc/meminfo", "MemTotal: 16 kB\nMemAvailable:    9 kB\n");
+  CHECK(machine.all_memory() == 16 * 1024);
+  machine.says("proc/self/cgroup", "0::/pods/pod_3\n");
+  machine.says("sys/fs/cgroup/memory.max", "12000\n");
+  machine.says("sys/fs/cgroup/pods/memory.max", "9000\n");
+  machine.says("sys/fs/cgroup/pods/pod_3/memory.max", "max\n");
+  CHECK(machine.all_memory() == 9000);
+}
+
+TEST_CASE("processors are counted by the least quota of all cgroups around", "[host]") {
+  const Machine machine;
+  CHECK(machine.cpus() == 0);
+  machine.says("sys/fs/cgroup/cpu.max", "max 100000\n");
+  CHECK(machine.cpus() == 0);
+  machine.says("proc/self/cgroup", "0::/slice/job_7\n");
+  machine.says("sys/fs/cgroup/slice/cpu.max", "350000 100000\n");
+  CHECK(machine.cpus() == 4);
+  machine.says("sys/fs/cgroup/slice/job_7/cpu.max", "150000 100000\n");
+  CHECK(machine.cpus() == 2);
+  machine.says("sys/fs/cgroup/cpu.max", "50000 100000\n");
+  CHECK(machine.cpus() == 1);
+  machine.says("sys/fs/cgroup/cpu.max", "100000 0\n");
+  CHECK(machine.cpus() == 2);
+}
+
 TEST_CASE("this machine has some memory", "[host]") {
   CHECK(available_memory() > (std::uint64_t(1) << 20));
+  CHECK(total_memory() >= available_memory());
 }

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "framework/host/machine_memory.h"
+#include "framework/host/machine_limits.h"
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <limits>
 #include <optional>
 #include <sstream>
 #include <string>
+#include <string_view>
+#include <vector>
 
 namespace diorama {
 namespace {
@@ -23,13 +26,13 @@ std::optional<std::uint64_t> number_in(const fs::path& file) {
   return number;
 }
 
-std::uint64_t system_memory(const fs::path& root) {
+std::uint64_t system_memory(const fs::path& root, std::string_view wanted) {
   std::ifstream stream(root / "proc/meminfo");
   for (std::string line; std::getline(stream, line);) {
     std::istringstream words(line);
     std::string key;
     std::uint64_t kibibytes = 0;
-    if (words >> key >> kibibytes && key == "MemAvailable:") return kibibytes << 10;
+    if (words >> key >> kibibytes && key == wanted) return kibibytes << 10;
   }
   return kUnknown;
 }
@@ -45,7 +48,7 @@ std::uint64_t reclaimable(const fs::path& group) {
   return 0;
 }
 
-std::uint64_t group_memory(const fs::path& group) {
+std::uint64_t memory_left(const fs::path& group) {
   const auto limit = number_in(group / "memory.max");
   const auto used = number_in(group / "memory.current");
   if (!limit || !used) return kUnknown;
@@ -62,16 +65,40 @@ fs::path own_group(const fs::path& root) {
   return "/";
 }
 
+/// The groups that this process is in, outermost first: a limit holds for all groups below.
+std::vector<fs::path> own_groups(const fs::path& root) {
+  std::vector<fs::path> groups{root / "sys/fs/cgroup"};
+  for (const fs::path& name : own_group(root).relative_path()) {
+    groups.push_back(groups.back() / name);
+  }
+  return groups;
+}
+
 }  // namespace
 
 std::uint64_t available_memory(const fs::path& root) {
-  const fs::path groups = root / "sys/fs/cgroup";
-  std::uint64_t least = std::min(system_memory(root), group_memory(groups));
-  // A limit holds for all groups below.
-  fs::path group = groups;
-  for (const fs::path& name : own_group(root).relative_path()) {
-    group /= name;
-    least = std::min(least, group_memory(group));
+  std::uint64_t least = system_memory(root, "MemAvailable:");
+  for (const fs::path& group : own_groups(root)) least = std::min(least, memory_left(group));
+  return least;
+}
+
+std::uint64_t total_memory(const fs::path& root) {
+  std::uint64_t least = system_memory(root, "MemTotal:");
+  for (const fs::path& group : own_groups(root)) {
+    least = std::min(least, number_in(group / "memory.max").value_or(kUnknown));
+  }
+  return least;
+}
+
+int quota_cpus(const fs::path& root) {
+  int least = 0;
+  for (const fs::path& group : own_groups(root)) {
+    std::ifstream stream(group / "cpu.max");
+    double quota = 0.0;  // "max" is no number
+    double period = 0.0;
+    if (!(stream >> quota >> period) || !(quota > 0.0 && period > 0.0)) continue;
+    const int cpus = int(std::min(std::ceil(quota / period), 1e6));
+    least = least == 0 ? cpus : std::min(least, cpus);
   }
   return least;
 }

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+
+/// What the machine and this process's cgroups (version 2) leave to it. `root` is where /proc and
+/// /sys are, for tests.
+namespace diorama {
+
+/// Bytes that this process may still take without others being swapped out: what the system says
+/// is available, or what is left of the limits of its cgroups if that is less. The largest number
+/// when nothing is known.
+std::uint64_t available_memory(const std::filesystem::path& root = "/");
+
+/// Bytes that the machine has, or that a cgroup may have if that is less. The largest number when
+/// nothing is known.
+std::uint64_t total_memory(const std::filesystem::path& root = "/");
+
+/// Processors that the least quota of its cgroups amounts to, rounded up; 0: no quota.
+int quota_cpus(const std::filesystem::path& root = "/");
+
+}  // namespace diorama
