@@ -72,6 +72,17 @@ Visibility measure(const CoverageMask& mask, int image_width, int image_height) 
   return visibility;
 }
 
+void check_mask(const CoverageMask& mask, const Instance& instance, const Frame& frame) {
+  const PixelBox& box = mask.box;
+  const std::size_t size =
+      box.is_empty() ? 0 : std::size_t(box.width()) * std::size_t(box.height());
+  if (mask.bits.size() == size) return;
+  throw Error(ErrorKind::Internal, frame.camera_path + ": the coverage mask of " +
+                                       instance.node_path + " holds " +
+                                       std::to_string(mask.bits.size()) +
+                                       " values, its box has room for " + std::to_string(size));
+}
+
 }  // namespace
 
 std::map<std::uint32_t, std::int64_t> count_pixels(const Image<std::uint32_t>& ids) {
@@ -98,32 +109,44 @@ void check_coverage(std::span<const CoverageMask> coverage, const Frame& frame) 
                                          std::to_string(frame.instances.size()) + " instances");
   }
   for (std::size_t i = 0; i < coverage.size(); ++i) {
-    const PixelBox& box = coverage[i].box;
-    const std::size_t size =
-        box.is_empty() ? 0 : std::size_t(box.width()) * std::size_t(box.height());
-    if (coverage[i].bits.size() == size) continue;
-    throw Error(ErrorKind::Internal, frame.camera_path + ": the coverage mask of " +
-                                         frame.instances[i].node_path + " holds " +
-                                         std::to_string(coverage[i].bits.size()) +
-                                         " values, its box has room for " + std::to_string(size));
+    check_mask(coverage[i], frame.instances[i], frame);
+  }
+}
+
+CoverageMask inside_image(CoverageMask mask, const Camera& camera) {
+  const PixelBox inside = mask.box.clipped(camera.width, camera.height);
+  if (inside == mask.box) return mask;
+  return mask.cropped(inside);
+}
+
+VisibilityMeter::VisibilityMeter(bool keep_masks, Frame& frame)
+    : keep_masks_(keep_masks),
+      frame_(frame),
+      visible_pixels_(count_pixels(frame.get(kInstanceId))) {}
+
+void VisibilityMeter::add(std::span<const CoverageMask> coverage) {
+  const auto& ids = frame_.get(kInstanceId);
+  for (const CoverageMask& mask : coverage) {
+    if (next_ == frame_.instances.size()) {
+      throw Error(ErrorKind::Internal, frame_.camera_path + ": more coverage masks than the " +
+                                           std::to_string(next_) + " instances");
+    }
+    Instance& instance = frame_.instances[next_++];
+    check_mask(mask, instance, frame_);
+    Visibility visibility = measure(mask, ids.width(), ids.height());
+    const auto count = visible_pixels_.find(instance.id);
+    if (count != visible_pixels_.end()) visibility.visible_pixels = count->second;
+    if (keep_masks_ && visibility.amodal_box) {
+      visibility.amodal_mask = mask.cropped(*visibility.amodal_box);
+      visibility.amodal_mask.distances = {};
+    }
+    instance.visibility = std::move(visibility);
   }
 }
 
 void measure_visibility(std::span<const CoverageMask> coverage, bool keep_masks, Frame& frame) {
   check_coverage(coverage, frame);
-  const auto& ids = frame.get(kInstanceId);
-  const std::map<std::uint32_t, std::int64_t> visible_pixels = count_pixels(ids);
-  for (std::size_t i = 0; i < coverage.size(); ++i) {
-    Instance& instance = frame.instances[i];
-    Visibility visibility = measure(coverage[i], ids.width(), ids.height());
-    const auto count = visible_pixels.find(instance.id);
-    if (count != visible_pixels.end()) visibility.visible_pixels = count->second;
-    if (keep_masks && visibility.amodal_box) {
-      visibility.amodal_mask = coverage[i].cropped(*visibility.amodal_box);
-      visibility.amodal_mask.distances = {};
-    }
-    instance.visibility = std::move(visibility);
-  }
+  VisibilityMeter(keep_masks, frame).add(coverage);
 }
 
 }  // namespace diorama

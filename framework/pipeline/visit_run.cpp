@@ -2,6 +2,7 @@
 #include "framework/pipeline/visit_run.h"
 
 #include <algorithm>
+#include <span>
 #include <utility>
 
 #include "framework/annotators/occlusion_order.h"
@@ -354,15 +355,36 @@ Frame VisitRun::make_frame(std::size_t camera, int capture) {
                    [&] { entry.annotator->annotate(scene_, frame); });
   }
   if (setting_.shared.demand.visibility) {
-    const auto instances = labelled_instances(scene_);
-    const bool is_ordered = setting_.shared.demand.occlusion_order;
-    const auto coverage = call_component(
-        who, [&] { return components_.renderer->cover(node, instances, is_ordered); });
-    measure_visibility(coverage, setting_.shared.demand.amodal_mask, frame);
-    if (is_ordered) order_occlusions(coverage, frame);
+    measure_coverage(node, frame);
   }
   if (setting_.shared.demand.motion) measure_motion(scene_, before_last_step_, frame);
   return frame;
+}
+
+/// In groups: masks reach beyond the image, and all of a room's would take gigabytes.
+void VisitRun::measure_coverage(NodeId camera, Frame& frame) {
+  constexpr std::size_t kGroupBytes = std::size_t(256) << 20;
+  const auto all = labelled_instances(scene_);
+  const bool is_ordered = setting_.shared.demand.occlusion_order;
+  const std::size_t largest = 9 * std::size_t(frame.camera.width) *
+                              std::size_t(frame.camera.height) *
+                              (1 + (is_ordered ? sizeof(float) : 0));
+  const std::size_t group =
+      std::max(kGroupBytes / largest, std::size_t(std::max(1, host_.thread_count())));
+  VisibilityMeter meter(setting_.shared.demand.amodal_mask, frame);
+  std::vector<CoverageMask> inside;
+  for (std::size_t first = 0; first < all.size(); first += group) {
+    const auto part = std::span(all).subspan(first, std::min(group, all.size() - first));
+    auto coverage = call_component("renderer '" + job_.renderer.type + "'", [&] {
+      return components_.renderer->cover(camera, part, is_ordered);
+    });
+    meter.add(coverage);
+    if (!is_ordered) continue;
+    for (CoverageMask& mask : coverage) {
+      inside.push_back(inside_image(std::move(mask), frame.camera));
+    }
+  }
+  if (is_ordered) order_occlusions(inside, frame);
 }
 
 Image<Rgba8> VisitRun::make_overview(int capture) {

@@ -80,6 +80,7 @@ class VisitRun {
   std::vector<ViewOutcome> take_frames(const PlannedCapture& planned, std::vector<Frame>& frames);
   void prepare_renderer();
   Frame make_frame(std::size_t camera, int capture);
+  void measure_coverage(NodeId camera, Frame& frame);
   Image<Rgba8> make_overview(int capture);
   VisitReport report() const;
 

@@ -198,15 +198,32 @@ CoverageMask coverage_of(const EmbreeScene& meshes, const View& view,
   return mask.cropped(mask.extent());
 }
 
+/// Calls it with each channel that fill_channels() knows.
+template <class Call>
+void for_each_channel(Call call) {
+  call(kDistanceToCamera);
+  call(kDistanceToImagePlane);
+  call(kNormals);
+  call(kLeafId);
+  call(kPosition);
+  call(kUv);
+  call(kAlbedo);
+}
+
 }  // namespace
 
 NameSet geometry_channels() {
   NameSet names;
-  for (std::string_view name : {kDistanceToCamera.name, kDistanceToImagePlane.name, kNormals.name,
-                                kLeafId.name, kPosition.name, kUv.name, kAlbedo.name}) {
-    names.emplace(name);
-  }
+  for_each_channel([&](auto channel) { names.emplace(channel.name); });
   return names;
+}
+
+std::size_t geometry_bytes_per_pixel(const NameSet& wanted) {
+  std::size_t bytes = 0;
+  for_each_channel([&]<class Pixel>(Channel<Pixel> channel) {
+    if (wanted.contains(channel.name)) bytes += sizeof(Pixel);
+  });
+  return bytes;
 }
 
 void fill_channels(Frame& frame, const NameSet& wanted, const EmbreeScene& meshes, const View& view,

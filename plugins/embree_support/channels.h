@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -23,6 +24,8 @@ struct SeenMeshes {
 
 /// Names of the channels that fill_channels() knows.
 NameSet geometry_channels();
+/// What those of them that are wanted take.
+std::size_t geometry_bytes_per_pixel(const NameSet& wanted);
 
 /// Fills the wanted ones among the id and geometry channels, all from one ray per pixel centre, and
 /// `seen` with what these rays met; its memory is used again where it has the view's size. `hits`

@@ -114,18 +114,22 @@ RenderReport PathRenderer::report() const {
 }
 
 std::size_t PathRenderer::working_bytes(const Camera& camera, const NameSet& channels) const {
-  std::size_t per_pixel = sizeof(std::uint32_t) + sizeof(float);  // SeenMeshes
-  std::size_t denoising = 0;
+  const std::size_t pixels = std::size_t(camera.width) * std::size_t(camera.height);
+  std::size_t colors = 0;
   if (channels.contains(kColor.name) || channels.contains(kColorHdr.name)) {
+    colors = pixels * traced_bytes_per_pixel();
     if (params_.denoise) {
-      denoising = denoiser_bytes(camera.width, camera.height, is_quick());
+      colors += denoiser_bytes(camera.width, camera.height, is_quick());
     } else {
-      per_pixel += sizeof(FilmPixel) + sizeof(Vec3f);
+      colors += pixels * (sizeof(FilmPixel) + sizeof(Vec3f));
     }
-    per_pixel += traced_bytes_per_pixel();
-    if (params_.mode == "real_time" && params_.samples == 1) per_pixel += sizeof(RayHit);
+    if (params_.mode == "real_time" && params_.samples == 1) {
+      colors += pixels * sizeof(RayHit);
+    } else if (!traces_elsewhere()) {
+      colors -= std::min(colors, pixels * geometry_bytes_per_pixel(channels));  // Come after it.
+    }
   }
-  return per_pixel * std::size_t(camera.width) * std::size_t(camera.height) + denoising;
+  return pixels * (sizeof(std::uint32_t) + sizeof(float)) + colors;  // SeenMeshes
 }
 
 void PathRenderer::do_prepare(const Scene& scene) {
@@ -218,22 +222,31 @@ Frame PathRenderer::do_render(const Scene& scene, const RenderRequest& request) 
   rendered_by_ = request.camera;
   const bool wants_color =
       request.channels.contains(kColor.name) || request.channels.contains(kColorHdr.name);
-  // Where paths leave the processor idle, it makes the labels meanwhile.
-  std::future<Film> film;
-  if (wants_color && traces_elsewhere()) {
-    film = std::async(std::launch::async, [&] { return trace_paths(view, request.seed); });
-  }
   const NameSet known = geometry_channels();
-  if (std::any_of(known.begin(), known.end(),
-                  [&](const auto& name) { return request.channels.contains(name); })) {
+  const bool wants_labels = std::any_of(known.begin(), known.end(), [&](const auto& name) {
+    return request.channels.contains(name);
+  });
+  const auto make_labels = [&](Image<RayHit>* hits) {
+    if (!wants_labels) return;
     const Stopwatch watch(counts_.channels_s);
-    const bool wants_hits = wants_color && !traces_elsewhere() && starts_at_centres(view);
-    Image<RayHit>* hits = wants_hits ? &first_hits_ : nullptr;
     fill_channels(frame, request.channels, meshes_, view, seen_, hits, host_);
     seen_by_ = request.camera;
-  }
-  if (wants_color) {
-    put_colors(frame, request, view, film.valid() ? film.get() : trace_paths(view, request.seed));
+  };
+  if (!wants_color) {
+    make_labels(nullptr);
+  } else if (traces_elsewhere()) {
+    // Paths leave the processor idle: it makes the labels meanwhile.
+    std::future<Film> film =
+        std::async(std::launch::async, [&] { return trace_paths(view, request.seed); });
+    make_labels(nullptr);
+    put_colors(frame, request, view, film.get());
+  } else if (starts_at_centres(view)) {
+    make_labels(&first_hits_);
+    put_colors(frame, request, view, trace_paths(view, request.seed));
+  } else {
+    // Labels need not be held while the colours take most memory.
+    put_colors(frame, request, view, trace_paths(view, request.seed));
+    make_labels(nullptr);
   }
   return frame;
 }

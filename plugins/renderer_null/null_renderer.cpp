@@ -190,6 +190,9 @@ std::vector<CoverageMask> NullRenderer::do_cover(const Scene& scene, NodeId came
     CoverageMask mask;
     mask.box = possible_pixels(view, part.bounds);
     if (mask.box.is_empty()) return;
+    const std::size_t pixels = std::size_t(mask.box.width()) * std::size_t(mask.box.height());
+    mask.bits.reserve(pixels);
+    if (with_distances) mask.distances.reserve(pixels);
     for (int y = mask.box.y_min; y < mask.box.y_max; ++y) {
       host_.stop_if_asked();
       for (int x = mask.box.x_min; x < mask.box.x_max; ++x) {

@@ -228,9 +228,10 @@ std::size_t denoiser_bytes(int width, int height, bool is_quick) {
   const std::size_t pixels = std::size_t(width) * std::size_t(height);
   const std::size_t by_planes = std::max(sizeof(FilmPixel), kPlaneFilterBytesPerPixel);
   if (is_quick) return pixels * by_planes;
-  constexpr std::size_t kBeside = 2 * sizeof(Vec3f) + 2 * sizeof(float);  // a picture, Noisy
-  return std::max(pixels * (sizeof(FilmPixel) + kBeside) + network_filter_bytes(width, height),
-                  pixels * (by_planes + kBeside));
+  constexpr std::size_t kNoisy = sizeof(Vec3f) + 2 * sizeof(float);
+  return std::max(
+      pixels * (sizeof(FilmPixel) + sizeof(Vec3f)) + network_filter_bytes(width, height),
+      pixels * (by_planes + sizeof(Vec3f) + kNoisy));
 }
 
 Image<Vec3f> denoised(Film film, const DenoiseSettings& settings, Isa isa, Host& host) {
@@ -238,8 +239,8 @@ Image<Vec3f> denoised(Film film, const DenoiseSettings& settings, Isa isa, Host&
     return filtered_on_planes(std::move(film), settings, isa, host);
   }
   const double exposure = quiet_exposure(film);
-  const Noisy noisy(film, host);
   Image<Vec3f> learned = filtered_by_network(film, settings, exposure, isa, host);
+  const Noisy noisy(film, host);  // Not beside the network, which takes most.
   rebalance(learned, noisy, host);
   Image<Vec3f> image = filtered_on_planes(std::move(film), settings, isa, host);
   mix(image, learned, noisy, float(kDark / exposure), host);

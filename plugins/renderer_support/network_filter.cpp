@@ -543,8 +543,13 @@ inline void TileFilter::finish(int block_row, Image<Vec3f>& image) {
 }  // namespace
 
 std::size_t network_filter_bytes(int width, int height) {
-  const auto seen = [](int size) { return std::size_t(aligned(std::min(size, kLargest))); };
-  return seen(width) * seen(height) * kTileBytesPerPixel;
+  std::size_t most = 0;
+  for (const Tile& tile : tiles_of(width, height)) {
+    const PixelBox& seen = tile.seen;
+    most = std::max(most, std::size_t(aligned(seen.x_max - seen.x_min)) *
+                              std::size_t(aligned(seen.y_max - seen.y_min)));
+  }
+  return most * kTileBytesPerPixel;
 }
 
 Image<Vec3f> filtered_by_network(const Film& film, const DenoiseSettings& settings, double exposure,

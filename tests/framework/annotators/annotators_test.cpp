@@ -126,6 +126,19 @@ TEST_CASE("visibility counts pixels inside and outside the image", "[annotators]
   CHECK(second.whole_box == PixelBox{6, -2, 8, -1});
   CHECK_FALSE(second.occlusion().has_value());
 
+  // One after the other.
+  frame.instances[0].visibility.reset();
+  frame.instances[1].visibility.reset();
+  VisibilityMeter meter(true, frame);
+  meter.add(std::span(masks).first(1));
+  CHECK(frame.instances[0].visibility->outside_pixels == 2);
+  CHECK(frame.instances[0].visibility->amodal_mask.bits.size() == 6);
+  CHECK_FALSE(frame.instances[1].visibility.has_value());
+  meter.add(std::span(masks).last(1));
+  CHECK(frame.instances[1].visibility->whole_box == PixelBox{6, -2, 8, -1});
+  CHECK_THROWS_WITH(meter.add(std::span(masks).first(1)),
+                    ContainsSubstring("more coverage masks than the 2 instances"));
+
   measure_visibility(masks, false, frame);
   CHECK(frame.instances[0].visibility->amodal_mask.bits.empty());
   CHECK_THROWS_WITH(measure_visibility(std::span(masks).first(1), false, frame),
@@ -175,6 +188,17 @@ TEST_CASE("occlusion order says in how many pixels one is in front of another", 
   // Column -1 is outside the image; in column 2 the picture decides between equals, in column 1
   // between 7 and 4 nothing does.
   const std::vector<Occlusion> expected{{7, 9, 1}, {9, 7, 2}, {9, 4, 1}};
+  CHECK(frame.occlusions == expected);
+
+  // What lies beside the image does not matter.
+  const Camera camera = Camera::from_lens(4, 1, 24.0, 20.955);
+  std::vector<CoverageMask> inside;
+  for (const CoverageMask& mask : masks) inside.push_back(inside_image(mask, camera));
+  CHECK(inside[0].box == PixelBox{0, 0, 4, 1});
+  CHECK(inside[0].distances == std::vector<float>{2.0f, 5.0f, 3.0f, kFar});
+  CHECK(inside[2].box == masks[2].box);
+  CHECK(inside_image({{-3, 0, -1, 1}, {1, 1}, {1.0f, 1.0f}}, camera).bits.empty());
+  order_occlusions(inside, frame);
   CHECK(frame.occlusions == expected);
 
   CHECK_THROWS_WITH(order_occlusions(std::span(masks).first(1), frame),
