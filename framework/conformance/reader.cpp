@@ -4,9 +4,12 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <exception>
 #include <fstream>
+#include <map>
 #include <memory>
 #include <span>
+#include <thread>
 
 #include "diorama/writer.h"
 #include "framework/conformance/fingerprint.h"
@@ -140,6 +143,77 @@ std::string difference(const StoredDataset& dataset, const std::vector<Capture>&
   return {};
 }
 
+/// The names of all files below a folder and what they hold.
+std::map<std::string, std::string> content_of(const fs::path& folder) {
+  std::map<std::string, std::string> content;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    if (!entry.is_regular_file()) continue;
+    std::ifstream in(entry.path(), std::ios::binary);
+    content[entry.path().string()].assign(std::istreambuf_iterator<char>(in), {});
+  }
+  return content;
+}
+
+std::string told(const StoredDataset& dataset, std::size_t i) {
+  return fingerprint(dataset.read(i, dataset.info().holds).capture);
+}
+
+/// A dataset that is read by several threads, in any order, while another one is open.
+void check_reading(const Reader& reader, const fs::path& folder,
+                   const std::map<std::string, std::string>& written) {
+  const auto dataset = reader.open(folder);
+  const std::size_t count = dataset->info().captures.size();
+  std::vector<std::string> in_order;
+  for (std::size_t i = 0; i < count; ++i) in_order.push_back(told(*dataset, i));
+  const auto again = reader.open(folder);
+  for (std::size_t i = count; i-- > 0;) {
+    require(told(*again, i) == in_order[i], "gives something else when captures come backwards");
+    require(told(*dataset, i) == in_order[i], "gives something else the second time");
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    const StoredCapture bare = dataset->read(i, {});
+    const StoredCapture whole = dataset->read(i, dataset->info().holds);
+    require(bare.capture.frames.size() == whole.capture.frames.size(),
+            "gives other frames when nothing is asked of them");
+    for (std::size_t k = 0; k < bare.capture.frames.size(); ++k) {
+      const Camera& camera = bare.capture.frames[k].camera;
+      const Camera& known = whole.capture.frames[k].camera;
+      require(camera.width == known.width && camera.height == known.height,
+              "gives no camera sizes when nothing is asked of a frame");
+    }
+  }
+  constexpr int kRounds = 20;
+  std::exception_ptr error;
+  bool is_same_there = true;
+  const auto read_many = [&](std::size_t first, bool& is_same) {
+    for (int round = 0; round < kRounds; ++round) {
+      for (std::size_t k = 0; k < count; ++k) {
+        const std::size_t i = (first + k) % count;
+        is_same = is_same && told(*dataset, i) == in_order[i];
+      }
+    }
+  };
+  std::thread other([&] {
+    try {
+      read_many(count / 2, is_same_there);
+    } catch (...) {
+      error = std::current_exception();
+    }
+  });
+  std::exception_ptr own_error;
+  bool is_same_here = true;
+  try {
+    read_many(0, is_same_here);
+  } catch (...) {
+    own_error = std::current_exception();
+  }
+  other.join();
+  if (own_error) std::rethrow_exception(own_error);
+  if (error) std::rethrow_exception(error);
+  require(is_same_here && is_same_there, "gives something else when several threads read at once");
+  require(content_of(folder) == written, "changes the dataset that it reads");
+}
+
 Subject writer_subject(const Subject& subject, const std::string& type) {
   return {subject.registry.entry(ComponentKind::Writer, type), subject.registry, subject.host,
           subject.single_threaded_host};
@@ -162,6 +236,7 @@ void check_round_trip(const CheckRun& run, const Subject& subject, const Reader&
   }
   const Folder folder("round_trip");
   write_dataset(*writer, captures, folder);
+  const auto written = content_of(folder.path());
   if (reader.recognise(folder.path()) == Recognition::No) {
     run.skip(name, "the reader does not know the folder");
     return;
@@ -174,6 +249,8 @@ void check_round_trip(const CheckRun& run, const Subject& subject, const Reader&
     const std::string found = difference(*reader.open(folder.path()), captures);
     require(found.empty(), found);
   });
+  run.check("what " + writer_type + " writes is read in any order, by several threads" + which,
+            [&] { check_reading(reader, folder.path(), written); });
 }
 
 }  // namespace

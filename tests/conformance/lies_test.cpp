@@ -21,6 +21,14 @@ constexpr const char* kLeftAsItWas = "the process is left as it was";
 constexpr const char* kStreams = "one node more leaves the draws of the others as they were";
 constexpr const char* kAtOnce = "several threads may write at once";
 constexpr const char* kFrame = "it sets what it provides and reads what it needs";
+constexpr const char* kSameNodes =
+    "the same asset gives the same nodes, and nothing else is touched";
+constexpr const char* kFalling = "bodies fall onto the floor, all else stays";
+constexpr const char* kFreeFall = "a body falls as gravity and its steps have it";
+constexpr const char* kReport = "its report says what the bodies do";
+constexpr const char* kRoundTrip = "what poses writes comes back as far as it is held";
+constexpr const char* kReadInAnyOrder =
+    "what poses writes is read in any order, by several threads";
 constexpr const char* kFirstCapture = "a frame that shows nothing is survived";
 
 /// Checks a plugin; every component is either honest or fails what is expected.
@@ -143,5 +151,57 @@ TEST_CASE("renderers that lie are found out", "[conformance]") {
           {"keeps_the_first_poses", kHistory},
           {"counts_pictures", kHistory},
           {"millimetre_distances", kRays}},
+         {"honest"});
+}
+
+TEST_CASE("loaders that lie are found out", "[conformance]") {
+  expect("lying_loaders", "loader",
+         {{"moves_the_neighbour", kSameNodes},
+          {"relabels_the_neighbour", kSameNodes},
+          {"spoils_and_fails", "a missing asset is an error that names it"},
+          {"grows", kSameNodes},
+          {"reads_its_name", kSameNodes},
+          {"counts_threads", kSameNodes},
+          {"second_is_broken", kSameNodes},
+          {"last_is_missing", kSameNodes},
+          {"black_hole", kSameNodes},
+          {"invents_files", "the files of its assets are there"},
+          {"other_assets", "its assets are the same each time"},
+          {"shares_a_counter", "two loaders at work at once give the same"},
+          {"of_this_process", kAnotherProcess}},
+         {"honest"});
+}
+
+TEST_CASE("physics that lies is found out", "[conformance]") {
+  expect("lying_physics", "physics",
+         {{"on_the_moon", kFreeFall},
+          {"says_other_steps", kFreeFall},
+          {"counts_calls", "steps add up, however many are taken at once"},
+          {"keeps_speeds", "a reset forgets all that was"},
+          {"hides_speeds", kFreeFall},
+          {"draws_all_down", "a body without gravity stays where it is"},
+          {"drifts", kFreeFall},
+          {"shrinks", kFalling},
+          {"relabels", kFalling},
+          {"reports_nothing", kReport},
+          {"reports_the_floor", kReport},
+          {"falls_through", kFalling},
+          {"by_threads", "the same scene gives the same bits, for any number of threads"},
+          {"by_the_clock", kAnotherProcess},
+          {"one_world", "two instances at work at once give the same bits"}},
+         {"honest"});
+}
+
+TEST_CASE("readers that lie are found out", "[conformance]") {
+  expect("lying_readers", "reader",
+         {{"in_order_only", kReadInAnyOrder},
+          {"first_of_all", kRoundTrip},
+          {"shares_its_buffer", kReadInAnyOrder},
+          {"leaves_a_note", kReadInAnyOrder},
+          {"no_sizes", kReadInAnyOrder},
+          {"swaps_cameras", kRoundTrip},
+          {"loses_the_last", kRoundTrip},
+          {"knows_everything", "an empty folder is refused by name"},
+          {"blames_the_program", "files that are not what their names say are survived"}},
          {"honest"});
 }
