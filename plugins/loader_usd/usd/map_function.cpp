@@ -112,4 +112,12 @@ bool MapFunction::is_identity() const {
          offset_.is_identity();
 }
 
+std::size_t MapFunction::bytes() const {
+  std::size_t bytes = sizeof(MapFunction);
+  for (const auto& [source, target] : pairs_) {
+    bytes += sizeof(Pairs::value_type) + source.capacity() + target.capacity();
+  }
+  return bytes;
+}
+
 }  // namespace diorama::usd

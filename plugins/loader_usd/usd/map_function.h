@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -30,6 +31,7 @@ class MapFunction {
   MapFunction inverse() const;
 
   bool is_identity() const;
+  std::size_t bytes() const;  ///< That it takes, about.
   const LayerOffset& offset() const { return offset_; }
   friend bool operator==(const MapFunction&, const MapFunction&) = default;
 

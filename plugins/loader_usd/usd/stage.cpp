@@ -149,9 +149,15 @@ bool Stage::is_plain_class(const Prim& parent, std::string_view name) const {
 
 // Arcs to arcs multiply: thirty small files can make as many prims as there are atoms in a room.
 void Stage::count_memory(const Prim& prim) {
-  std::size_t bytes = sizeof(Prim) + 2 * prim.path.size() + prim.opinions.size() * sizeof(Opinion);
+  std::size_t bytes =
+      sizeof(Prim) + 2 * prim.path.size() + prim.opinions.capacity() * sizeof(Opinion);
   for (const IndexNode& node : prim.index.nodes) {
-    bytes += sizeof(IndexNode) + node.path.size() + (node.children.size() + 1) * sizeof(int);
+    bytes +=
+        sizeof(IndexNode) + node.path.capacity() + (node.children.capacity() + 1) * sizeof(int);
+    // Maps that this prim's index made; it shares others with its parent's.
+    for (const auto* map : {&node.map_to_parent, &node.map_to_root}) {
+      if (map->use_count() == 1) bytes += (*map)->bytes();
+    }
   }
   composed_bytes_ += bytes;
   const std::uint64_t most =
@@ -170,6 +176,7 @@ const Prim* Stage::compose(const Prim& parent, std::string_view name) {
   prim->path = path;
   prim->parent = &parent;
   prim->index = indexer_.child_index(parent.index, name);
+  prim->index.nodes.shrink_to_fit();
   prim->order = prim->index.strength_order();
   collect_opinions(*prim);
   count_memory(*prim);
