@@ -15,6 +15,7 @@
 #include "diorama/rng.h"
 #include "framework/app/command_run.h"
 #include "framework/config/clean_text.h"
+#include "framework/host/regular_file.h"
 #include "framework/output/dataset_status.h"
 #include "framework/output/journal.h"
 
@@ -74,7 +75,7 @@ std::set<int> chosen_captures(const ReplayOptions& options, const DatasetStatus&
 }
 
 std::string digest_of_file(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
+  std::ifstream in = open_regular_file(path);
   if (!in) return {};
   Digest digest;
   std::vector<char> piece(std::size_t(1) << 20);

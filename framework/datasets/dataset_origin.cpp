@@ -10,6 +10,7 @@
 
 #include "framework/config/json_text.h"
 #include "framework/datasets/capture_sweep.h"
+#include "framework/host/regular_file.h"
 #include "framework/pipeline/view_report.h"
 
 namespace diorama {
@@ -19,11 +20,9 @@ namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
 std::string read_file(const fs::path& file) {
-  std::error_code failed;
-  if (!fs::is_regular_file(file, failed)) return {};
-  std::ifstream in(file, std::ios::binary);
+  std::ifstream in = open_regular_file(file);
   std::ostringstream text;
-  text << in.rdbuf();
+  if (in) text << in.rdbuf();
   return std::move(text).str();
 }
 

@@ -12,6 +12,7 @@
 #include "diorama/config.h"
 #include "diorama/error.h"
 #include "framework/config/json_text.h"
+#include "framework/host/regular_file.h"
 #include "framework/plugins/plugin_call.h"
 
 namespace diorama {
@@ -30,7 +31,7 @@ std::string who(const std::string& type) { return "reader '" + type + "'"; }
 /// Folders that the page of a run names, as far as they lie below it.
 std::set<fs::path> named_folders(const fs::path& run) {
   std::set<fs::path> folders;
-  std::ifstream in(run / "dataset.json", std::ios::binary);
+  std::ifstream in = open_regular_file(run / "dataset.json");
   std::ostringstream text;
   if (in) text << in.rdbuf();
   const auto json = parse_json_or_nothing(text.str());

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "framework/config/json_text.h"
+#include "framework/host/regular_file.h"
 
 namespace diorama {
 namespace {
@@ -92,7 +93,7 @@ void compare(const Json& page, const PlannedDataset& planned, const StoredInfo& 
 
 std::optional<PlannedDataset> check_page(const std::filesystem::path& folder,
                                          const StoredInfo& info, ReadLog& log) {
-  std::ifstream in(folder / kPage, std::ios::binary);
+  std::ifstream in = open_regular_file(folder / kPage);
   if (!in) return std::nullopt;
   std::ostringstream text;
   text << in.rdbuf();

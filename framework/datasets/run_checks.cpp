@@ -14,6 +14,7 @@
 #include "framework/config/json_text.h"
 #include "framework/datasets/capture_sweep.h"
 #include "framework/datasets/frame_checks.h"
+#include "framework/host/regular_file.h"
 
 namespace diorama {
 namespace {
@@ -39,7 +40,7 @@ struct RunPlan {
 };
 
 std::optional<RunPlan> read_plan(const std::filesystem::path& run, ReadLog& log) {
-  std::ifstream in(run / "dataset.json", std::ios::binary);
+  std::ifstream in = open_regular_file(run / "dataset.json");
   if (!in) return std::nullopt;
   std::ostringstream text;
   text << in.rdbuf();

@@ -11,6 +11,7 @@
 
 #include "framework/config/clean_text.h"
 #include "framework/host/node_content.h"
+#include "framework/host/regular_file.h"
 #include "framework/host/stoppable.h"
 #include "framework/plugins/plugin_call.h"
 
@@ -38,7 +39,7 @@ std::string node_name(std::string text) {
 std::vector<std::byte> read_bytes(const fs::path& file) {
   std::error_code failed;
   const std::uintmax_t size = fs::file_size(file, failed);
-  std::ifstream stream(file, std::ios::binary);
+  std::ifstream stream = open_regular_file(file);
   if (failed || !stream) {
     throw Error(ErrorKind::Asset, file.string() + ": the image cannot be read" +
                                       (failed ? ": " + failed.message() : std::string()));

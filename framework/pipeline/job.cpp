@@ -111,8 +111,17 @@ void require_unique(const std::vector<Entry>& list, std::string_view section, Na
   }
 }
 
+// Files are called after nodes and writers, with more before and behind it; file systems take 255.
+constexpr std::size_t kMostNameBytes = 200;
+
 void check_node_name(const std::string& name, const Value& map, const std::string& path,
                      Complaints& complaints) {
+  if (name.size() > kMostNameBytes) {
+    complaints.add(place_of(map, "name"), path + ".name: expected a name of up to " +
+                                              std::to_string(kMostNameBytes) + " bytes, found " +
+                                              std::to_string(name.size()));
+    return;
+  }
   if (name.find('/') == std::string::npos && is_clean_name(name)) return;
   complaints.add(place_of(map, "name"),
                  path + ".name: expected a name without '/' and control characters, found '" +
@@ -413,19 +422,39 @@ std::optional<std::filesystem::path> place_below_output(const Job& job, const st
   return place;
 }
 
+/// What is wrong with a writer's folder that lies below the output folder; empty: nothing.
+/// `writers` are the places of those before it.
+std::string flaw_of_place(const std::filesystem::path& place,
+                          const std::map<std::filesystem::path, std::string>& writers) {
+  if (*place.begin() == "." || *place.begin() == "dataset.json") {
+    return "the output folder's own files are there; name a folder below it";
+  }
+  for (const std::filesystem::path& part : place) {
+    if (part.native().size() <= kMostNameBytes) continue;
+    return "expected names of up to " + std::to_string(kMostNameBytes) + " bytes, found one of " +
+           std::to_string(part.native().size());
+  }
+  const auto other = writers.find(place);
+  if (other == writers.end()) return {};
+  return "writer '" + other->second + "' has the same folder; give each its own";
+}
+
 /// A job of somebody else must not write where nobody expects it.
 void check_folders(const Value& value, const Job& job, Complaints& complaints) {
   const std::string root = "the output folder '" + job.output.folder + "'";
   const std::string advice =
       "; name a folder below it, or choose one that holds both by '--output'";
-  for (std::size_t i = 0; i < job.writers.size(); ++i) {
-    const WriterEntry& writer = job.writers[i];
+  std::map<std::filesystem::path, std::string> places;
+  for (const WriterEntry& writer : job.writers) {
     const char* key = writer.output_dir ? "output_dir" : "name";
     const std::string& folder = writer.output_dir ? *writer.output_dir : writer.name;
-    if (place_below_output(job, folder)) continue;
-    complaints.add(place_of(writer.component.map, key), writer.component.path + "." + key +
-                                                            ": the folder '" + folder +
-                                                            "' is not below " + root + advice);
+    const auto place = place_below_output(job, folder);
+    const std::string flaw = place ? flaw_of_place(*place, places)
+                                   : "the folder '" + folder + "' is not below " + root + advice;
+    if (place) places.emplace(*place, writer.name);
+    if (flaw.empty()) continue;
+    complaints.add(place_of(writer.component.map, key),
+                   writer.component.path + "." + key + ": " + flaw);
   }
   if (place_below_output(job, job.output.records)) return;
   const Value* output = value.find("output");

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "diorama/error.h"
+#include "framework/host/regular_file.h"
 
 namespace diorama {
 
@@ -25,14 +26,14 @@ std::string Sha256::hex() {
 }
 
 std::string file_sha256(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
+  std::ifstream stream = open_regular_file(file);
   std::vector<char> block(std::size_t(1) << 18);
   Sha256 hash;
   while (stream.read(block.data(), std::streamsize(block.size())) || stream.gcount() > 0) {
     hash.add(std::as_bytes(std::span(block.data(), std::size_t(stream.gcount()))));
   }
   if (stream.bad() || !stream.eof()) {
-    throw Error(ErrorKind::Asset, file.string() + ": cannot be read");
+    throw Error(ErrorKind::Asset, file.string() + ": cannot be read as a regular file");
   }
   return hash.hex();
 }

@@ -12,6 +12,7 @@
 #include <system_error>
 
 #include "diorama/error.h"
+#include "framework/host/regular_file.h"
 
 namespace diorama {
 namespace {
@@ -59,7 +60,10 @@ class ElfFile {
  public:
   explicit ElfFile(const std::filesystem::path& file) : file_(file) {
     errno = 0;
-    stream_.open(file, std::ios::binary);
+    stream_ = open_regular_file(file);
+    if (!stream_ && errno == EINVAL) {
+      refuse("is no regular file; a plugin is an ELF file that ends in .so");
+    }
     if (!stream_) {
       const int reason = errno;
       refuse("cannot be opened: " + std::system_category().message(reason) +

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "loader_assimp/asset_files.h"
 
-#include <assimp/DefaultIOSystem.h>
 #include <assimp/material.h>
 #include <assimp/scene.h>
 
@@ -12,6 +11,7 @@
 #include <string_view>
 
 #include "diorama/error.h"
+#include "loader_assimp/regular_files.h"
 #include "loader_assimp/scene_file.h"
 #include "loader_assimp/texture_library.h"
 
@@ -25,13 +25,13 @@ constexpr std::string_view kAnswer = "files:\n";
 
 using Paths = std::set<std::string>;
 
-// Opens files as assimp does by itself, and keeps their names.
-class RecordingFiles final : public Assimp::DefaultIOSystem {
+// Keeps the names of the files that are opened.
+class RecordingFiles final : public RegularFiles {
  public:
   explicit RecordingFiles(Paths& opened) : opened_(opened) {}
-  using DefaultIOSystem::Open;
+  using RegularFiles::Open;
   Assimp::IOStream* Open(const char* file, const char* mode) override {
-    Assimp::IOStream* stream = DefaultIOSystem::Open(file, mode);
+    Assimp::IOStream* stream = RegularFiles::Open(file, mode);
     if (stream) opened_.insert(fs::path(file).lexically_normal().string());
     return stream;
   }

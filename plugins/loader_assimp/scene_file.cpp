@@ -11,6 +11,7 @@
 #include <filesystem>
 
 #include "loader_assimp/child_process.h"
+#include "loader_assimp/regular_files.h"
 
 namespace diorama::loader_assimp {
 namespace {
@@ -51,6 +52,7 @@ unsigned steps_for(Format format) {
 
 // Empty when the file was read.
 std::string read(Assimp::Importer& importer, const std::string& file, Format format) {
+  importer.SetIOHandler(new RegularFiles);
   importer.SetPropertyBool(AI_CONFIG_IMPORT_FBX_PRESERVE_PIVOTS, false);
   importer.SetPropertyBool(AI_CONFIG_IMPORT_NO_SKELETON_MESHES, true);
   importer.SetPropertyFloat(AI_CONFIG_PP_GSN_MAX_SMOOTHING_ANGLE, kSmoothingAngle);

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <sys/resource.h>
+#include <sys/stat.h>
+
 #include <cstdlib>
 
 #include "program.h"
@@ -251,4 +254,58 @@ TEST_CASE("A plan for a hundred million captures and a hundred thousand objects"
   CHECK_THAT(outcome.output, ContainsSubstring("visits (50000000)") &&
                                  ContainsSubstring("... 49999000 more in the same order"));
   CHECK(outcome.max_rss_kb < 400 * 1024);
+}
+
+TEST_CASE("names that no file system takes are refused before anything is made", "[errors]") {
+  const std::string name(201, 'n');
+  const std::string job = read_file(config_file("smoke.yaml"));
+  const std::string camera = "cameras[0].name: expected a name of up to 200 bytes, found 201";
+  expect_error(job, 3, camera, {"--set", "cameras[0].name=" + name});
+  const std::string writer = "writers[0].name: expected names of up to 200 bytes, found one of 201";
+  expect_error(job, 3, writer, {"--set", "writers[0].name=" + name});
+}
+
+TEST_CASE("writers that meet in one folder are refused before anything is made", "[errors]") {
+  const std::string own = "writers[0].output_dir: the output folder's own files are there";
+  expect_error(read_file(config_file("smoke.yaml")), 3, own, {"--set", "writers[0].output_dir=."});
+  const std::string job = job_with("writers:\n", "writers:\n  - {type: BasicWriter, name: a}\n");
+  expect_error(job, 3, "writers[1].output_dir: writer 'a' has the same folder; give each its own",
+               {"--set", "writers[1].output_dir=./b/../a/"});
+}
+
+TEST_CASE("pipes among the files of strangers are not waited for", "[errors]") {
+  const TemporaryFolder folder;
+  fs::create_directory(folder / "run");
+  REQUIRE(::mkfifo((folder / "run/dataset.json").c_str(), 0600) == 0);
+  for (const char* command : {"lint", "stats"}) {
+    const Outcome outcome = run({command, "run"}, folder.path());
+    INFO(outcome.errors);
+    CHECK(outcome.exit_code != 0);
+    CHECK_FALSE(outcome.errors.empty());
+  }
+  REQUIRE(::mkfifo((folder / "plugin.so").c_str(), 0600) == 0);
+  const Outcome checked = run({"plugins", "check", "plugin.so"}, folder.path());
+  CHECK(checked.exit_code == 4);
+  CHECK_THAT(checked.output, ContainsSubstring("is no regular file; a plugin is an ELF file"));
+  REQUIRE(::mkfifo((folder / "room").c_str(), 0600) == 0);
+  write_file(folder / "job.yaml",
+             job_with("{type: shapes, shapes: [cube, sphere]}", "{type: files, files: [room]}"));
+  const Outcome made = run({"run", "job.yaml"}, folder.path());
+  INFO(made.errors);
+  CHECK(made.exit_code == 5);
+  CHECK_THAT(made.errors, ContainsSubstring("room: cannot be read as a regular file"));
+}
+
+TEST_CASE("a limit on the size of files is an error with a message", "[errors]") {
+  const TemporaryFolder folder;
+  rlimit before{};
+  REQUIRE(::getrlimit(RLIMIT_FSIZE, &before) == 0);
+  rlimit small = before;
+  small.rlim_cur = 10000;
+  REQUIRE(::setrlimit(RLIMIT_FSIZE, &small) == 0);
+  const Outcome outcome = run({"run", config_file("smoke.yaml"), "--output", "out"}, folder.path());
+  REQUIRE(::setrlimit(RLIMIT_FSIZE, &before) == 0);
+  INFO(outcome.errors);
+  CHECK(outcome.exit_code == 6);
+  CHECK_THAT(outcome.errors, ContainsSubstring("File too large"));
 }

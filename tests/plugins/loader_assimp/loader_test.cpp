@@ -48,6 +48,15 @@ TEST_CASE("a missing texture is one warning that names file and texture", "[load
   CHECK_THROWS_WITH(LoadedFile(file, strict), line);
 }
 
+TEST_CASE("a material library that is a pipe is not waited for", "[loader_assimp]") {
+  const TemporaryFolder folder;
+  REQUIRE(::mkfifo(folder.path("a.mtl").c_str(), 0600) == 0);
+  const std::string file =
+      folder.write("a.obj", "mtllib a.mtl\n" + kTriangle + "o A\nusemtl A\nf 1/1 2/2 3/3\n");
+  const LoadedFile loaded(file);
+  CHECK(loaded.node("A").mesh != nullptr);
+}
+
 TEST_CASE("a model's files are its material library, buffers and pictures", "[loader_assimp]") {
   const TemporaryFolder folder;
   folder.write("textures/wood.png", "x");
