@@ -102,6 +102,11 @@ void add_global_options(CLI::App& app, CommandLine& line) {
       ->type_name("N")
       ->check(CLI::Range(1, 1 << 20))
       ->capture_default_str();
+  app.add_option("--asset-cache-mib", line.global.asset_cache_mib,
+                 "Memory for loaded assets that are kept for later captures")
+      ->type_name("N")
+      ->check(CLI::Range(0, 1 << 20))
+      ->capture_default_str();
   app.add_option("--plugin-dir", line.global.plugin_dirs,
                  "Folder with plugins, before all others (repeatable)")
       ->type_name("DIR")

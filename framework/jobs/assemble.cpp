@@ -58,6 +58,7 @@ std::unique_ptr<HostServices> make_host(Registry& registry, const GlobalOptions&
   host.assets_root = choose_assets_root(options.assets_root, std::getenv("DIORAMA_ASSETS_ROOT"),
                                         job_assets_root, sample_pack_folder(options.program));
   host.threads = options.threads > 0 ? options.threads : ThreadPool::available_threads();
+  host.asset_cache_bytes = std::size_t(options.asset_cache_mib) << 20;
   host.picture_bytes = std::uint64_t(options.picture_mib) << 20;
   return std::make_unique<HostServices>(registry, host, log);
 }

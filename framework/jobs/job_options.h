@@ -18,6 +18,7 @@ struct GlobalOptions {
   LogLevel log_level = LogLevel::Info;
   int threads = 0;  ///< 0: as many as the machine offers.
   int picture_mib = int(kPictureBudget >> 20);
+  int asset_cache_mib = 1024;
   std::vector<std::filesystem::path> plugin_dirs;
   bool allow_unsafe_plugin_dir = false;
   std::optional<std::filesystem::path> assets_root;

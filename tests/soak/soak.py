@@ -14,18 +14,21 @@ import time
 WARM_UP = 50  # captures until all caches are full
 MOST_GROWTH = 0.05
 SECONDS_PER_CAPTURE = 30  # a run that is slower hangs
+CACHE_MIB = 2  # for assets: less than the rooms take, so that they come and go
 
+USUAL = ("null", "path_traced", "real_time")
 RENDERERS = {
     "null": '{type: "null"}',
     "path_traced": "{type: embree, samples: 1}",
     "real_time": "{type: embree, mode: real_time, samples: 1}",
+    "vulkan": "{type: vulkan, samples: 1}",
 }
 
 JOB = """
 seed: 5
 total_captures: %(captures)d
 environments:
-  - {type: dining_room, first_seed: 1, count: 6}
+  - {type: dining_room, first_seed: 1, count: 4}
 environment:
   colliders: triangle_mesh
   working_area: TableDining
@@ -37,7 +40,7 @@ lights:
   - {type: sphere, name: lamp, count: 2, radius_m: 0.1}
   - {type: dome, name: sky}
 cameras:
-  - {type: pinhole, name: cam, count: 1, width: 96, height: 64}
+  - {type: pinhole, name: cam, count: 1, width: 48, height: 32}
 randomizers:
   - {type: scatter_poses, name: poses, on: [environment], nodes: "/Assets/*",
      offset: [[-0.5, 0.5], [-0.5, 0.5], [1.0, 1.5]], scale: [0.9, 1.2]}
@@ -51,9 +54,9 @@ randomizers:
 renderer: %(renderer)s
 timeline:
   - simulate: 4
-  - {capture: floating, count: 2}
-  - simulate: 20
-  - {capture: dropped, count: 2}
+  - {capture: floating, count: 8}
+  - simulate: 4
+  - {capture: dropped, count: 8}
 writers:
 %(writers)s
 output:
@@ -103,7 +106,8 @@ def watch(program, job, folder, captures):
     file = folder / "job.yaml"
     file.write_text(job)
     log = (folder / "log").open("w")
-    process = subprocess.Popen(program + ["run", str(file), "--output", str(folder / "out")],
+    process = subprocess.Popen(program + ["--asset-cache-mib", str(CACHE_MIB), "run", str(file),
+                                          "--output", str(folder / "out")],
                                stdout=log, stderr=log, cwd=folder)
     samples = []
     deadline = time.monotonic() + SECONDS_PER_CAPTURE * captures
@@ -149,7 +153,7 @@ def main():
     program = [str(build / "bin" / "diorama"), "--plugin-dir", str(build / "plugins")]
     writers = writer_lines(writer_types(program))
     is_flat = True
-    for name in options.renderer or RENDERERS:
+    for name in options.renderer or USUAL:
         folder = pathlib.Path(tempfile.mkdtemp(prefix="diorama-soak-"))
         try:
             job = JOB % {"captures": options.captures, "renderer": RENDERERS[name],
