@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "channels.h"
@@ -55,6 +56,8 @@ class PathRenderer : public Renderer {
     double trace_s = 0.0;  ///< Wall time.
     double denoise_s = 0.0;
     double channels_s = 0.0;
+    /// What the device that traced the paths was busy with, by its own clock, if it has one.
+    std::vector<std::pair<std::string, double>> device_s;
   };
   const Counts& last_counts() const { return counts_; }
 

@@ -1,20 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gpu_path_tracer.h"
 
-#include <kernels.h>  // made from shaders/
-
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cstddef>
+#include <cstring>
 
 #include "diorama/error.h"
 
 namespace diorama {
 namespace {
 
-/// Groups that every device can begin at once.
-constexpr std::uint32_t kMostGroups = 65535;
+/// More would save nothing: a device is busy with a few million paths.
+constexpr std::uint32_t kMostSlots = 1u << 17;
 /// Bytes that a path takes, but for its ray where the processor makes it.
 constexpr std::size_t kPathBytes =
     std::size_t(gpu::kColumnSize) *
@@ -23,79 +22,67 @@ constexpr std::size_t kPathBytes =
 /// More samples of a block in one pass would make a loop of gather.comp long.
 constexpr std::uint32_t kMostSamplesPerRange = 4096;
 
-template <class Value>
-std::span<const std::byte> bytes_of(const std::vector<Value>& values) {
-  return std::as_bytes(std::span(values));
-}
-
-/// Lavapipe of Mesa 22.3 ends all loops of a kernel's run after 65,535 rounds, without an error.
-std::uint32_t find_iteration_limit(const VulkanDevice& device) {
-  constexpr std::uint32_t kWanted = 200'000;
-  struct Constants {
-    gpu::Address counted;
-    std::uint32_t wanted = kWanted;
-    std::uint32_t pad = 0;
-  };
-  const VulkanKernel kernel(device, kernels::kLimits);
-  const VulkanBuffer counted(device, sizeof(std::uint32_t), VulkanBuffer::Place::Device, "a test");
-  device.run([&](VulkanCommands& commands) {
-    commands.constants(Constants{counted.address()});
-    commands.dispatch(kernel, 1);
-  });
-  std::uint32_t found = 0;
-  device.download(counted, 0, std::as_writable_bytes(std::span(&found, 1)));
-  constexpr std::uint32_t kSpare = 512;  // of a kernel's other loops
-  return found == kWanted ? 0xFFFFFFFFu : found - std::min(found, kSpare);
-}
+/// Where slots begin among the inputs of a pass.
+constexpr std::size_t kJobRoom = 512;
+static_assert(sizeof(gpu::Job) <= kJobRoom);
+/// Where the film begins in what comes back.
+constexpr std::size_t kCountersRoom = 256;
+static_assert(sizeof(gpu::Counters) <= kCountersRoom);
+// What resolve.comp writes.
+static_assert(sizeof(FilmPixel) == 19 * sizeof(float));
 
 }  // namespace
-
-PathKernels::PathKernels(const VulkanDevice& device)
-    : start(device, kernels::kStart),
-      arrange(device, kernels::kArrange),
-      intersect(device, kernels::kIntersect),
-      shade(device, kernels::kShade),
-      shadow(device, kernels::kShadow),
-      gather(device, kernels::kGather),
-      iteration_limit(find_iteration_limit(device)) {}
 
 GpuPathTracer::GpuPathTracer(const PathDevice& device, Host& host, std::uint32_t most_slots)
     : device_(device.device),
       kernels_(device.kernels),
       host_(host),
-      most_slots_(most_slots > 0 ? std::min(most_slots, kMostGroups) : slots_for_device()),
-      job_buffer_(device_, sizeof(gpu::Job), VulkanBuffer::Place::Device, "a picture"),
+      most_slots_(most_slots > 0 ? std::min(most_slots, device_.info().most_groups)
+                                 : slots_for_device()),
       counters_(device_, sizeof(gpu::Counters), VulkanBuffer::Place::Device, "a picture") {}
 
 std::uint32_t GpuPathTracer::slots_for_device() const {
-  // An eighth of the device; processors gain nothing from many paths.
+  // A part of the device, which several pictures share; processors gain nothing from many paths.
   const std::uint64_t share =
-      device_.info().is_processor ? std::uint64_t(64) << 20 : device_.info().memory / 8;
-  const std::uint64_t paths = share / kPathBytes;
-  return std::uint32_t(std::clamp<std::uint64_t>(paths / gpu::kGroup, 64, kMostGroups));
+      device_.info().is_processor ? std::uint64_t(64) << 20 : device_.info().memory / 32;
+  const std::uint64_t most = std::min(kMostSlots, device_.info().most_groups);
+  return std::uint32_t(std::clamp<std::uint64_t>(share / kPathBytes / gpu::kGroup, 64, most));
 }
 
 std::size_t GpuPathTracer::working_bytes() const {
-  return columns_.size() + camera_rays_.size() + sums_.size() + slots_.size();
+  return inputs_.size() + columns_.size() + camera_rays_.size() + sums_.size() + film_.size();
+}
+
+std::vector<std::pair<std::string, double>> GpuPathTracer::device_seconds() const {
+  if (!(device_.info().nanoseconds_per_tick > 0.0)) return {};
+  return {{"transfers", seconds_[kTransfers]},
+          {"begin", seconds_[kBegin]},
+          {"rays", seconds_[kRays]},
+          {"surfaces", seconds_[kSurfaces]},
+          {"rays to lights", seconds_[kShadowRays]},
+          {"sums", seconds_[kSums]}};
+}
+
+void GpuPathTracer::grow(VulkanBuffer& buffer, std::size_t size, const char* what,
+                         VulkanBuffer::Place place) const {
+  if (buffer.size() >= size) return;
+  buffer = VulkanBuffer();
+  buffer = VulkanBuffer(device_, size, place, what);
 }
 
 void GpuPathTracer::make_room(std::uint32_t slots) {
+  constexpr const char* kWhat = "light paths";
   const std::size_t paths = std::size_t(slots) * gpu::kGroup;
-  const auto grow = [&](VulkanBuffer& buffer, std::size_t size, const char* what) {
-    if (buffer.size() >= size) return;
-    buffer = VulkanBuffer();
-    buffer = VulkanBuffer(device_, size, VulkanBuffer::Place::Device, what);
-  };
-  grow(slots_, slots * sizeof(gpu::SampleSlot), "light paths");
-  grow(ranges_, slots * sizeof(gpu::SlotRange), "light paths");
+  const std::size_t inputs = kJobRoom + slots * (sizeof(gpu::SampleSlot) + sizeof(gpu::SlotRange));
+  grow(inputs_, inputs, kWhat);
+  grow(inputs_from_host_, inputs, kWhat, VulkanBuffer::Place::ToDevice);
+  grow(results_for_host_, kCountersRoom, kWhat, VulkanBuffer::Place::ToHost);
   if (job_.has_camera_rays != 0) {
-    grow(camera_rays_, paths * gpu::kCameraRaySize, "light paths");
+    grow(camera_rays_, paths * gpu::kCameraRaySize, kWhat);
     job_.camera_rays = camera_rays_.address();
   }
-  job_.slots = slots_.address();
-  job_.ranges = ranges_.address();
   if (columns_.size() >= paths * kPathBytes && job_.capacity >= paths) return;
-  grow(columns_, paths * kPathBytes, "light paths");
+  grow(columns_, paths * kPathBytes, kWhat);
   job_.capacity = std::uint32_t(paths);
   gpu::Address place = columns_.address();
   const auto take = [&](std::size_t bytes_per_path) {
@@ -135,16 +122,15 @@ void GpuPathTracer::begin(const View& view, const PathSettings& settings, gpu::A
     job_.near = pinhole->near;
     job_.far = std::min(pinhole->far, gpu::kInfinite);
   }
-  const std::size_t size =
-      sizeof(gpu::PixelSum) * std::size_t(view.camera().width) * std::size_t(view.camera().height);
-  if (sums_.size() < size) {
-    sums_ = VulkanBuffer();
-    sums_ = VulkanBuffer(device_, size, VulkanBuffer::Place::Device, "the sums of a picture");
-  }
+  const std::size_t pixels = std::size_t(view.camera().width) * std::size_t(view.camera().height);
+  grow(sums_, pixels * sizeof(gpu::PixelSum), "the sums of a picture");
+  grow(film_, pixels * sizeof(FilmPixel), "a picture");
   job_.sums = sums_.address();
-  device_.run([&](VulkanCommands& commands) { commands.zero(sums_, size); });
+  job_.film = film_.address();
+  job_.pixel_count = std::uint32_t(pixels);
+  has_sums_ = false;
+  seconds_ = {};
   push_.world = world;
-  push_.job = job_buffer_.address();
 }
 
 void GpuPathTracer::add(const TraceJob& job, std::uint32_t begin, std::uint32_t end,
@@ -155,8 +141,12 @@ void GpuPathTracer::add(const TraceJob& job, std::uint32_t begin, std::uint32_t 
   slot.columns = std::uint32_t(job.x_end - job.x_begin);
   slot.rows = std::uint32_t(job.y_end - job.y_begin);
   pass.ranges.push_back({std::uint32_t(pass.slots.size()), end - begin});
+  // Keys change where another sequence begins.
+  const std::uint32_t mask = (1u << job.order.sample_bits()) - 1u;
   for (std::uint32_t sample = begin; sample < end; ++sample) {
-    slot.key = job.order.place(job.x_begin, job.y_begin, sample).key;
+    if (sample == begin || (sample & mask) == 0) {
+      slot.key = job.order.place(job.x_begin, job.y_begin, sample).key;
+    }
     slot.sample_index = sample;
     pass.slots.push_back(slot);
     if (job_.has_camera_rays != 0) pass.orders.push_back(job.order);
@@ -173,7 +163,9 @@ GpuPathTracer::Counts GpuPathTracer::trace(std::span<const TraceJob> jobs) {
   constexpr std::uint32_t kMostWithRays = 4096;
   const std::uint32_t most_slots =
       job_.has_camera_rays != 0 ? std::min(most_slots_, kMostWithRays) : most_slots_;
-  const auto most = std::uint32_t(std::min<std::uint64_t>(all, most_slots));
+  // Passes of about the same size.
+  const std::uint64_t passes = (all + most_slots - 1) / most_slots;
+  const auto most = std::uint32_t((all + passes - 1) / passes);
   make_room(most);
   Pass pass;
   const auto finish_pass = [&] {
@@ -234,44 +226,66 @@ void GpuPathTracer::make_camera_rays(const Pass& pass) {
                                    {time, std::bit_cast<float>(dimension), 0.0f, 0.0f}};
     }
   });
-  device_.upload(bytes_of(rays), camera_rays_, 0);
+  device_.upload(std::as_bytes(std::span(rays)), camera_rays_, 0);
+}
+
+void GpuPathTracer::write_inputs(const Pass& pass) {
+  const std::size_t slots = pass.slots.size() * sizeof(gpu::SampleSlot);
+  job_.slot_count = std::uint32_t(pass.slots.size());
+  job_.slots = inputs_.address() + kJobRoom;
+  job_.ranges = job_.slots + slots;
+  push_.job = inputs_.address();
+  std::byte* to = inputs_from_host_.data();
+  std::memcpy(to, &job_, sizeof(job_));
+  std::memcpy(to + kJobRoom, pass.slots.data(), slots);
+  std::memcpy(to + kJobRoom + slots, pass.ranges.data(),
+              pass.ranges.size() * sizeof(gpu::SlotRange));
 }
 
 GpuPathTracer::Counts GpuPathTracer::trace(const Pass& pass) {
   // Beyond these steps paths only pass straight through something.
   constexpr std::uint32_t kFurtherSteps = 8;
-  job_.slot_count = std::uint32_t(pass.slots.size());
-  device_.upload(bytes_of(pass.slots), slots_, 0);
-  device_.upload(bytes_of(pass.ranges), ranges_, 0);
-  device_.upload(std::as_bytes(std::span(&job_, 1)), job_buffer_, 0);
+  write_inputs(pass);
   if (job_.has_camera_rays != 0) make_camera_rays(pass);
 
   std::uint32_t queue = 0;
-  const auto dispatch = [&](VulkanCommands& commands, const auto&... what) {
+  const auto dispatch = [&](VulkanCommands& commands, Work work, const auto&... what) {
     push_.queue = queue;
     commands.constants(push_);
     commands.dispatch(what...);
     commands.barrier();
+    commands.mark(work);
   };
   const auto steps = [&](VulkanCommands& commands, std::uint32_t count) {
+    constexpr std::size_t kPaths = offsetof(gpu::Counters, paths_groups);
+    constexpr std::size_t kShadows = offsetof(gpu::Counters, shadow_groups);
     for (std::uint32_t i = 0; i < count; ++i) {
-      dispatch(commands, kernels_.intersect, counters_, offsetof(gpu::Counters, paths_groups));
-      dispatch(commands, kernels_.shade, counters_, offsetof(gpu::Counters, paths_groups));
-      dispatch(commands, kernels_.arrange, 1u);
-      dispatch(commands, kernels_.shadow, counters_, offsetof(gpu::Counters, shadow_groups));
+      dispatch(commands, kRays, kernels_.intersect, counters_, kPaths);
+      dispatch(commands, kSurfaces, kernels_.shade, counters_, kPaths);
+      dispatch(commands, kSurfaces, kernels_.arrange, 1u);
+      dispatch(commands, kShadowRays, kernels_.shadow, counters_, kShadows);
       queue = 1 - queue;
     }
+    // Does nothing while paths are under way.
+    dispatch(commands, kSums, kernels_.gather, std::uint32_t(pass.ranges.size()));
+    commands.copy(counters_, 0, results_for_host_, 0, sizeof(gpu::Counters));
+    commands.mark(kTransfers);
   };
-  gpu::Counters counters;
-  device_.run([&](VulkanCommands& commands) {
+  const auto first_steps = [&](VulkanCommands& commands) {
+    commands.copy(inputs_from_host_, 0, inputs_, 0,
+                  kJobRoom + pass.slots.size() * sizeof(gpu::SampleSlot) +
+                      pass.ranges.size() * sizeof(gpu::SlotRange));
+    if (!has_sums_) commands.zero(sums_, job_.pixel_count * sizeof(gpu::PixelSum));
     commands.zero(counters_, sizeof(gpu::Counters));
     commands.barrier();
-    dispatch(commands, kernels_.start, job_.slot_count);
-    dispatch(commands, kernels_.arrange, 1u);
+    commands.mark(kTransfers);
+    dispatch(commands, kBegin, kernels_.start, job_.slot_count);
+    dispatch(commands, kBegin, kernels_.arrange, 1u);
     steps(commands, std::uint32_t(job_.max_bounces) + 2);
-  });
+  };
+  gpu::Counters counters;
   const auto read_counters = [&] {
-    device_.download(counters_, 0, std::as_writable_bytes(std::span(&counters, 1)));
+    std::memcpy(&counters, results_for_host_.data(), sizeof(counters));
     if (counters.is_over_limit != 0) {
       throw Error(ErrorKind::Plugin,
                   "the driver of " + device_.info().name + " ends loops after " +
@@ -280,14 +294,37 @@ GpuPathTracer::Counts GpuPathTracer::trace(const Pass& pass) {
                       "renderer embree");
     }
   };
+  device_.run(first_steps, seconds_);
+  has_sums_ = true;
   for (read_counters(); counters.path_count > 0; read_counters()) {
     host_.stop_if_asked();
-    device_.run([&](VulkanCommands& commands) { steps(commands, kFurtherSteps); });
+    device_.run([&](VulkanCommands& commands) { steps(commands, kFurtherSteps); }, seconds_);
   }
-  device_.run([&](VulkanCommands& commands) {
-    dispatch(commands, kernels_.gather, std::uint32_t(pass.ranges.size()));
-  });
   return {counters.rays, counters.shadow_rays};
+}
+
+Film GpuPathTracer::film() {
+  const int width = view_->camera().width;
+  const int height = view_->camera().height;
+  const std::size_t size = job_.pixel_count * sizeof(FilmPixel);
+  grow(results_for_host_, kCountersRoom + size, "a picture", VulkanBuffer::Place::ToHost);
+  const auto record = [&](VulkanCommands& commands) {
+    commands.constants(push_);
+    commands.dispatch(kernels_.resolve, std::min((job_.pixel_count + gpu::kGroup - 1) / gpu::kGroup,
+                                                 device_.info().most_groups));
+    commands.barrier();
+    commands.mark(kSums);
+    commands.copy(film_, 0, results_for_host_, kCountersRoom, size);
+    commands.mark(kTransfers);
+  };
+  device_.run(record, seconds_);
+  Film film(width, height);
+  const std::byte* from = results_for_host_.data() + kCountersRoom;
+  const std::size_t row_size = std::size_t(width) * sizeof(FilmPixel);
+  host_.parallel_for(std::size_t(height), [&](std::size_t row) {
+    std::memcpy(static_cast<void*>(&film.at(0, int(row))), from + row * row_size, row_size);
+  });
+  return film;
 }
 
 Image<PixelSum> GpuPathTracer::sums() {

@@ -1,43 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
-#include <memory>
 #include <span>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "diorama/host.h"
 #include "diorama/image.h"
 #include "gpu_world.h"
+#include "path_device.h"
 #include "renderer_support/film.h"
 #include "renderer_support/path_settings.h"
 #include "renderer_support/trace_job.h"
 #include "renderer_support/view.h"
-#include "vulkan_device.h"
 
 namespace diorama {
-
-/// What a device runs for light paths. Making it takes the driver a second or so.
-struct PathKernels {
-  explicit PathKernels(const VulkanDevice& device);
-
-  VulkanKernel start;
-  VulkanKernel arrange;
-  VulkanKernel intersect;
-  VulkanKernel shade;
-  VulkanKernel shadow;
-  VulkanKernel gather;
-  /// How often a kernel may loop here: some drivers end loops silently.
-  std::uint32_t iteration_limit;
-};
-
-/// A device that is ready to trace paths.
-struct PathDevice {
-  explicit PathDevice(int number) : device(number), kernels(device) {}
-
-  VulkanDevice device;
-  PathKernels kernels;
-};
 
 /// Light paths on a device. They advance together, kernel by kernel: rays, then what they met, then
 /// rays to lights. What a path carries waits in columns between kernels, so that none loops longer
@@ -59,11 +39,26 @@ class GpuPathTracer {
   Counts trace(std::span<const TraceJob> jobs);
   /// The pixels' sums until now.
   Image<PixelSum> sums();
+  /// Their means.
+  Film film();
 
+  /// What the device was busy with since begin(), in seconds by its clock; nothing, where it has
+  /// none.
+  std::vector<std::pair<std::string, double>> device_seconds() const;
   /// Bytes on the device beside the scene.
   std::size_t working_bytes() const;
 
  private:
+  /// What the device's clock is read for.
+  enum Work : std::uint32_t {
+    kTransfers,
+    kBegin,
+    kRays,
+    kSurfaces,
+    kShadowRays,
+    kSums,
+    kWorkCount
+  };
   /// Paths that are under way together.
   struct Pass {
     std::vector<gpu::SampleSlot> slots;
@@ -71,9 +66,12 @@ class GpuPathTracer {
     std::vector<SampleOrder> orders;  ///< Of the slots, where the processor makes the rays.
   };
   std::uint32_t slots_for_device() const;
+  void grow(VulkanBuffer& buffer, std::size_t size, const char* what,
+            VulkanBuffer::Place place = VulkanBuffer::Place::Device) const;
   void make_room(std::uint32_t slots);
   void add(const TraceJob& job, std::uint32_t begin, std::uint32_t end, Pass& pass) const;
   void make_camera_rays(const Pass& pass);
+  void write_inputs(const Pass& pass);
   Counts trace(const Pass& pass);
 
   const VulkanDevice& device_;
@@ -83,15 +81,18 @@ class GpuPathTracer {
 
   const View* view_ = nullptr;  ///< Of the picture under way.
   double window_ = 0.0;
+  bool has_sums_ = false;  ///< Of the picture under way.
   gpu::Job job_;
   gpu::Push push_;
-  VulkanBuffer job_buffer_;
+  std::array<double, kWorkCount> seconds_{};
   VulkanBuffer counters_;
-  VulkanBuffer slots_;
-  VulkanBuffer ranges_;
+  VulkanBuffer inputs_;   ///< The job, the slots and their ranges.
   VulkanBuffer columns_;  ///< State, results, hits, shadow rays and queues.
   VulkanBuffer camera_rays_;
   VulkanBuffer sums_;
+  VulkanBuffer film_;
+  VulkanBuffer inputs_from_host_;
+  VulkanBuffer results_for_host_;  ///< Counters, and the film.
 };
 
 }  // namespace diorama

@@ -234,10 +234,12 @@ struct Job {
   std::array<Address, 2> queues{};
   Address camera_rays = 0;
   Address sums = 0;
+  Address film = 0;
   std::uint32_t capacity = 0;
   std::uint32_t width = 0;
   std::uint32_t sample_bits = 0;
   std::uint32_t slot_count = 0;
+  std::uint32_t pixel_count = 0;
   std::uint32_t has_camera_rays = 0;
   std::uint32_t starts_at_centres = 0;
   std::uint32_t iteration_limit = 0;

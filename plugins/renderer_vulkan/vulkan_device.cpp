@@ -10,7 +10,9 @@
 namespace diorama {
 namespace {
 
-constexpr std::size_t kStagingSize = std::size_t(16) << 20;
+constexpr std::size_t kTransferSize = std::size_t(8) << 20;
+/// Of one submission.
+constexpr std::uint32_t kMostMarks = 1023;
 
 }  // namespace
 
@@ -107,6 +109,22 @@ VulkanKernel::~VulkanKernel() {
   device_.functions().vkDestroyPipeline(device_.handle(), pipeline_, nullptr);
 }
 
+VulkanCommands::VulkanCommands(const VulkanDevice& device, VkCommandBuffer commands,
+                               VkQueryPool clock)
+    : device_(device), commands_(commands), clock_(clock) {
+  if (clock_ == VK_NULL_HANDLE) return;
+  const VulkanDeviceFunctions& vk = device.functions();
+  vk.vkCmdResetQueryPool(commands_, clock_, 0, kMostMarks + 1);
+  vk.vkCmdWriteTimestamp(commands_, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, clock_, 0);
+}
+
+void VulkanCommands::mark(std::uint32_t what) {
+  if (clock_ == VK_NULL_HANDLE || marks_.size() == kMostMarks) return;
+  marks_.push_back(what);
+  device_.functions().vkCmdWriteTimestamp(commands_, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, clock_,
+                                          std::uint32_t(marks_.size()));
+}
+
 void VulkanCommands::push(const void* values, std::size_t size) {
   device_.functions().vkCmdPushConstants(commands_, device_.layout(), VK_SHADER_STAGE_COMPUTE_BIT,
                                          0, std::uint32_t(size), values);
@@ -146,7 +164,8 @@ void VulkanCommands::barrier() {
                                            0, 1, &memory, 0, nullptr, 0, nullptr);
 }
 
-VulkanDevice::VulkanDevice(int number) : info_(instance_.device(number)), number_(number) {
+VulkanDevice::VulkanDevice(int number)
+    : instance_(VulkanInstance::of_process()), info_(instance_.device(number)), number_(number) {
   const VulkanInstanceFunctions& vk = instance_.functions();
   vk.vkGetPhysicalDeviceMemoryProperties(info_.handle, &memory_);
   const float priority = 1.0f;
@@ -168,14 +187,15 @@ VulkanDevice::VulkanDevice(int number) : info_(instance_.device(number)), number
   DIORAMA_VULKAN_DEVICE_FUNCTIONS(DIORAMA_FIND)
 #undef DIORAMA_FIND
   try {
-    create_queue();
+    make_layout();
+    free_lanes_.push_back(make_lane());
   } catch (...) {
     destroy();
     throw;
   }
 }
 
-void VulkanDevice::create_queue() {
+void VulkanDevice::make_layout() {
   functions_.vkGetDeviceQueue(device_, info_.queue_family, 0, &queue_);
   VkPushConstantRange constants{VK_SHADER_STAGE_COMPUTE_BIT, 0, kMostConstants};
   auto layout =
@@ -183,31 +203,83 @@ void VulkanDevice::create_queue() {
   layout.pushConstantRangeCount = 1;
   layout.pPushConstantRanges = &constants;
   check(functions_.vkCreatePipelineLayout(device_, &layout, nullptr, &layout_), "open the device");
-  auto pool = vulkan_info<VkCommandPoolCreateInfo>(VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO);
-  pool.queueFamilyIndex = info_.queue_family;
-  check(functions_.vkCreateCommandPool(device_, &pool, nullptr, &pool_), "open the device");
-  auto commands =
-      vulkan_info<VkCommandBufferAllocateInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO);
-  commands.commandPool = pool_;
-  commands.level = VK_COMMAND_BUFFER_LEVEL_PRIMARY;
-  commands.commandBufferCount = 1;
-  check(functions_.vkAllocateCommandBuffers(device_, &commands, &commands_), "open the device");
-  auto fence = vulkan_info<VkFenceCreateInfo>(VK_STRUCTURE_TYPE_FENCE_CREATE_INFO);
-  check(functions_.vkCreateFence(device_, &fence, nullptr, &fence_), "open the device");
-  staging_ = std::make_unique<VulkanBuffer>(*this, kStagingSize, VulkanBuffer::Place::ToDevice,
-                                            "transfers");
-  returning_ =
-      std::make_unique<VulkanBuffer>(*this, kStagingSize, VulkanBuffer::Place::ToHost, "transfers");
 }
+
+std::unique_ptr<VulkanDevice::Lane> VulkanDevice::make_lane() const {
+  constexpr const char* kAction = "make room for commands";
+  auto lane = std::make_unique<Lane>();
+  try {
+    auto pool = vulkan_info<VkCommandPoolCreateInfo>(VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO);
+    pool.queueFamilyIndex = info_.queue_family;
+    check(functions_.vkCreateCommandPool(device_, &pool, nullptr, &lane->pool), kAction);
+    auto commands =
+        vulkan_info<VkCommandBufferAllocateInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO);
+    commands.commandPool = lane->pool;
+    commands.level = VK_COMMAND_BUFFER_LEVEL_PRIMARY;
+    commands.commandBufferCount = 1;
+    check(functions_.vkAllocateCommandBuffers(device_, &commands, &lane->commands), kAction);
+    auto fence = vulkan_info<VkFenceCreateInfo>(VK_STRUCTURE_TYPE_FENCE_CREATE_INFO);
+    check(functions_.vkCreateFence(device_, &fence, nullptr, &lane->fence), kAction);
+    if (info_.nanoseconds_per_tick > 0.0) {
+      auto clock = vulkan_info<VkQueryPoolCreateInfo>(VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO);
+      clock.queryType = VK_QUERY_TYPE_TIMESTAMP;
+      clock.queryCount = kMostMarks + 1;
+      check(functions_.vkCreateQueryPool(device_, &clock, nullptr, &lane->clock), kAction);
+    }
+  } catch (...) {
+    destroy(*lane);
+    throw;
+  }
+  return lane;
+}
+
+void VulkanDevice::destroy(Lane& lane) const {
+  functions_.vkDestroyQueryPool(device_, lane.clock, nullptr);
+  functions_.vkDestroyFence(device_, lane.fence, nullptr);
+  functions_.vkDestroyCommandPool(device_, lane.pool, nullptr);
+}
+
+/// Goes back to the device at the end of its life, also after an error.
+class VulkanDevice::TakenLane {
+ public:
+  explicit TakenLane(const VulkanDevice& device) : device_(device) {
+    {
+      const std::lock_guard lock(device.lanes_mutex_);
+      if (!device.free_lanes_.empty()) {
+        lane_ = std::move(device.free_lanes_.back());
+        device.free_lanes_.pop_back();
+      }
+    }
+    if (!lane_) lane_ = device.make_lane();
+  }
+  ~TakenLane() {
+    const std::lock_guard lock(device_.lanes_mutex_);
+    device_.free_lanes_.push_back(std::move(lane_));
+  }
+  TakenLane(const TakenLane&) = delete;
+  TakenLane& operator=(const TakenLane&) = delete;
+  Lane& operator*() const { return *lane_; }
+
+  /// Mapped memory for bytes on their way.
+  const VulkanBuffer& transfers() const {
+    if (lane_->transfers.size() == 0) {
+      lane_->transfers =
+          VulkanBuffer(device_, kTransferSize, VulkanBuffer::Place::ToHost, "transfers");
+    }
+    return lane_->transfers;
+  }
+
+ private:
+  const VulkanDevice& device_;
+  std::unique_ptr<Lane> lane_;
+};
 
 VulkanDevice::~VulkanDevice() { destroy(); }
 
 void VulkanDevice::destroy() {
   functions_.vkDeviceWaitIdle(device_);
-  staging_.reset();
-  returning_.reset();
-  functions_.vkDestroyFence(device_, fence_, nullptr);
-  functions_.vkDestroyCommandPool(device_, pool_, nullptr);
+  for (const auto& lane : free_lanes_) destroy(*lane);
+  free_lanes_.clear();
   functions_.vkDestroyPipelineLayout(device_, layout_, nullptr);
   functions_.vkDestroyDevice(device_, nullptr);
 }
@@ -249,22 +321,43 @@ void VulkanDevice::check(VkResult result, const char* action) const {
   throw Error(ErrorKind::Plugin, text);
 }
 
-void VulkanDevice::run(const std::function<void(VulkanCommands&)>& record) const {
-  check(functions_.vkResetCommandPool(device_, pool_, 0), "take commands");
+void VulkanDevice::run(const std::function<void(VulkanCommands&)>& record,
+                       std::span<double> seconds) const {
+  const TakenLane lane(*this);
+  run(*lane, record, seconds);
+}
+
+void VulkanDevice::run(Lane& lane, const std::function<void(VulkanCommands&)>& record,
+                       std::span<double> seconds) const {
+  check(functions_.vkResetCommandPool(device_, lane.pool, 0), "take commands");
   auto begin = vulkan_info<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
   begin.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
-  check(functions_.vkBeginCommandBuffer(commands_, &begin), "take commands");
-  VulkanCommands commands(*this, commands_);
+  check(functions_.vkBeginCommandBuffer(lane.commands, &begin), "take commands");
+  VulkanCommands commands(*this, lane.commands, seconds.empty() ? VK_NULL_HANDLE : lane.clock);
   record(commands);
   // For the processor, which reads next.
   commands.barrier();
-  check(functions_.vkEndCommandBuffer(commands_), "take commands");
-  check(functions_.vkResetFences(device_, 1, &fence_), "take commands");
+  check(functions_.vkEndCommandBuffer(lane.commands), "take commands");
+  check(functions_.vkResetFences(device_, 1, &lane.fence), "take commands");
   auto submit = vulkan_info<VkSubmitInfo>(VK_STRUCTURE_TYPE_SUBMIT_INFO);
   submit.commandBufferCount = 1;
-  submit.pCommandBuffers = &commands_;
-  check(functions_.vkQueueSubmit(queue_, 1, &submit, fence_), "run kernels");
-  check(functions_.vkWaitForFences(device_, 1, &fence_, VK_TRUE, ~std::uint64_t(0)), "run kernels");
+  submit.pCommandBuffers = &lane.commands;
+  {
+    const std::lock_guard lock(queue_mutex_);
+    check(functions_.vkQueueSubmit(queue_, 1, &submit, lane.fence), "run kernels");
+  }
+  check(functions_.vkWaitForFences(device_, 1, &lane.fence, VK_TRUE, ~std::uint64_t(0)),
+        "run kernels");
+  if (commands.marks().empty()) return;
+  std::vector<std::uint64_t> ticks(commands.marks().size() + 1);
+  check(functions_.vkGetQueryPoolResults(
+            device_, lane.clock, 0, std::uint32_t(ticks.size()), ticks.size() * sizeof(ticks[0]),
+            ticks.data(), sizeof(ticks[0]), VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT),
+        "read its clock");
+  for (std::size_t i = 0; i < commands.marks().size(); ++i) {
+    seconds[commands.marks()[i]] +=
+        1e-9 * info_.nanoseconds_per_tick * double(ticks[i + 1] - ticks[i]);
+  }
 }
 
 void VulkanDevice::upload(std::span<const Transfer> transfers) const {
@@ -274,23 +367,26 @@ void VulkanDevice::upload(std::span<const Transfer> transfers) const {
     std::size_t offset = 0;
     std::size_t size = 0;
   };
+  const TakenLane lane(*this);
+  const VulkanBuffer& buffer = lane.transfers();
   std::vector<Copy> copies;
   std::size_t filled = 0;
   const auto send = [&] {
     if (copies.empty()) return;
-    run([&](VulkanCommands& commands) {
+    const auto record = [&](VulkanCommands& commands) {
       for (const Copy& copy : copies) {
-        commands.copy(*staging_, copy.from, *copy.to, copy.offset, copy.size);
+        commands.copy(buffer, copy.from, *copy.to, copy.offset, copy.size);
       }
-    });
+    };
+    run(*lane, record, {});
     copies.clear();
     filled = 0;
   };
   for (const Transfer& transfer : transfers) {
     for (std::size_t done = 0; done < transfer.bytes.size();) {
-      if (filled == kStagingSize) send();
-      const std::size_t size = std::min(kStagingSize - filled, transfer.bytes.size() - done);
-      std::memcpy(staging_->data() + filled, transfer.bytes.data() + done, size);
+      if (filled == kTransferSize) send();
+      const std::size_t size = std::min(kTransferSize - filled, transfer.bytes.size() - done);
+      std::memcpy(buffer.data() + filled, transfer.bytes.data() + done, size);
       copies.push_back({filled, transfer.to, transfer.offset + done, size});
       filled += size;
       done += size;
@@ -301,12 +397,15 @@ void VulkanDevice::upload(std::span<const Transfer> transfers) const {
 
 void VulkanDevice::download(const VulkanBuffer& from, std::size_t offset,
                             std::span<std::byte> bytes) const {
-  for (std::size_t done = 0; done < bytes.size(); done += kStagingSize) {
-    const std::size_t size = std::min(kStagingSize, bytes.size() - done);
-    run([&](VulkanCommands& commands) {
-      commands.copy(from, offset + done, *returning_, 0, size);
-    });
-    std::memcpy(bytes.data() + done, returning_->data(), size);
+  const TakenLane lane(*this);
+  const VulkanBuffer& buffer = lane.transfers();
+  for (std::size_t done = 0; done < bytes.size(); done += kTransferSize) {
+    const std::size_t size = std::min(kTransferSize, bytes.size() - done);
+    const auto record = [&](VulkanCommands& commands) {
+      commands.copy(from, offset + done, buffer, 0, size);
+    };
+    run(*lane, record, {});
+    std::memcpy(bytes.data() + done, buffer.data(), size);
   }
 }
 

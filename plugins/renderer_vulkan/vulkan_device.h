@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <span>
 #include <string>
 #include <vector>
@@ -61,8 +63,8 @@ class VulkanKernel {
 /// Commands under way to the device.
 class VulkanCommands {
  public:
-  VulkanCommands(const VulkanDevice& device, VkCommandBuffer commands)
-      : device_(device), commands_(commands) {}
+  /// `clock`: null: none is wanted.
+  VulkanCommands(const VulkanDevice& device, VkCommandBuffer commands, VkQueryPool clock);
 
   /// Constants must fit VulkanDevice::kMostConstants.
   template <class Constants>
@@ -77,14 +79,20 @@ class VulkanCommands {
   void zero(const VulkanBuffer& buffer, std::size_t size);
   /// What comes after sees what came before.
   void barrier();
+  /// Counts the time since the last mark for `what`; see VulkanDevice::run().
+  void mark(std::uint32_t what);
+  /// What the marks were for, in their order.
+  const std::vector<std::uint32_t>& marks() const { return marks_; }
 
  private:
   void push(const void* values, std::size_t size);
   const VulkanDevice& device_;
   VkCommandBuffer commands_;
+  VkQueryPool clock_;
+  std::vector<std::uint32_t> marks_;
 };
 
-/// A device of the machine with its one queue. Used by one thread at a time.
+/// A device of the machine with one queue. Any thread may use it: each has a lane of its own.
 class VulkanDevice {
  public:
   static constexpr std::size_t kMostConstants = 128;
@@ -102,8 +110,10 @@ class VulkanDevice {
   /// Bytes that buffers hold now.
   std::uint64_t held() const { return held_; }
 
-  /// Records and runs commands, and waits until they are done.
-  void run(const std::function<void(VulkanCommands&)>& record) const;
+  /// Records and runs commands, and waits until they are done. `seconds`: by what was marked, the
+  /// time that it took is added; where the device has no clock, nothing is.
+  void run(const std::function<void(VulkanCommands&)>& record,
+           std::span<double> seconds = {}) const;
   /// Bytes for a buffer on the device.
   struct Transfer {
     std::span<const std::byte> bytes;
@@ -123,26 +133,37 @@ class VulkanDevice {
 
  private:
   friend class VulkanBuffer;
+  /// What a thread records and waits with; used by one at a time.
+  struct Lane {
+    VkCommandPool pool = VK_NULL_HANDLE;
+    VkCommandBuffer commands = VK_NULL_HANDLE;
+    VkFence fence = VK_NULL_HANDLE;
+    VkQueryPool clock = VK_NULL_HANDLE;
+    VulkanBuffer transfers;  ///< Made when first needed.
+  };
+  class TakenLane;
+  std::unique_ptr<Lane> make_lane() const;
+  void destroy(Lane& lane) const;
+  void run(Lane& lane, const std::function<void(VulkanCommands&)>& record,
+           std::span<double> seconds) const;
   std::uint32_t memory_type(std::uint32_t allowed, VkMemoryPropertyFlags wanted,
                             VkMemoryPropertyFlags liked) const;
   [[noreturn]] void fail_for_memory(std::size_t size, const char* what) const;
-  void create_queue();
+  void make_layout();
   void destroy();
 
-  VulkanInstance instance_;
+  const VulkanInstance& instance_;
   const VulkanDeviceInfo& info_;
   int number_;
   VulkanDeviceFunctions functions_;
   VkDevice device_ = VK_NULL_HANDLE;
   VkQueue queue_ = VK_NULL_HANDLE;
   VkPipelineLayout layout_ = VK_NULL_HANDLE;
-  VkCommandPool pool_ = VK_NULL_HANDLE;
-  VkCommandBuffer commands_ = VK_NULL_HANDLE;
-  VkFence fence_ = VK_NULL_HANDLE;
   VkPhysicalDeviceMemoryProperties memory_{};
-  mutable std::uint64_t held_ = 0;
-  std::unique_ptr<VulkanBuffer> staging_;
-  std::unique_ptr<VulkanBuffer> returning_;
+  mutable std::atomic<std::uint64_t> held_ = 0;
+  mutable std::mutex queue_mutex_;
+  mutable std::mutex lanes_mutex_;
+  mutable std::vector<std::unique_ptr<Lane>> free_lanes_;
 };
 
 }  // namespace diorama

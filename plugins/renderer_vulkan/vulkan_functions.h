@@ -53,7 +53,12 @@ namespace diorama {
   DO(vkCreateFence)                         \
   DO(vkDestroyFence)                        \
   DO(vkResetFences)                         \
-  DO(vkWaitForFences)
+  DO(vkWaitForFences)                       \
+  DO(vkCreateQueryPool)                     \
+  DO(vkDestroyQueryPool)                    \
+  DO(vkCmdResetQueryPool)                   \
+  DO(vkCmdWriteTimestamp)                   \
+  DO(vkGetQueryPoolResults)
 
 #define DIORAMA_DECLARE(NAME) PFN_##NAME NAME = nullptr;
 struct VulkanInstanceFunctions {

@@ -96,6 +96,11 @@ VulkanInstance::VulkanInstance() : library_(dlopen(kLoader, RTLD_NOW | RTLD_LOCA
   }
 }
 
+const VulkanInstance& VulkanInstance::of_process() {
+  static const VulkanInstance* const instance = new VulkanInstance();
+  return *instance;
+}
+
 VulkanInstance::~VulkanInstance() { functions_.vkDestroyInstance(instance_, nullptr); }
 
 VulkanDeviceInfo VulkanInstance::describe(VkPhysicalDevice handle) const {
@@ -113,6 +118,7 @@ VulkanDeviceInfo VulkanInstance::describe(VkPhysicalDevice handle) const {
   const VkPhysicalDeviceProperties& plain = properties.properties;
   info.name = plain.deviceName;
   info.api = version_text(plain.apiVersion);
+  info.most_groups = plain.limits.maxComputeWorkGroupCount[0];
   info.is_processor = plain.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
   const bool is_known = plain.apiVersion >= kApi;
   info.driver = is_known ? std::string(properties12.driverName) + " " + properties12.driverInfo
@@ -158,6 +164,9 @@ VulkanDeviceInfo VulkanInstance::describe(VkPhysicalDevice handle) const {
     info.missing.push_back("a queue for compute shaders");
   } else {
     info.queue_family = std::uint32_t(family - families.begin());
+    if (family->timestampValidBits == 64) {
+      info.nanoseconds_per_tick = double(plain.limits.timestampPeriod);
+    }
   }
   return info;
 }

@@ -14,10 +14,12 @@ namespace diorama {
 struct VulkanDeviceInfo {
   VkPhysicalDevice handle = VK_NULL_HANDLE;
   std::string name;
-  std::string driver;         ///< And its version.
-  std::string api;            ///< "1.3.230"
-  bool is_processor = false;  ///< A driver that computes on the machine's processor.
-  std::uint64_t memory = 0;   ///< Bytes of its largest heap of its own.
+  std::string driver;                 ///< And its version.
+  std::string api;                    ///< "1.3.230"
+  bool is_processor = false;          ///< A driver that computes on the machine's processor.
+  std::uint64_t memory = 0;           ///< Bytes of its largest heap of its own.
+  std::uint32_t most_groups = 0;      ///< Of one dispatch.
+  double nanoseconds_per_tick = 0.0;  ///< Of its clock; 0: it has none for kernels.
   std::uint32_t queue_family = 0;
   std::vector<std::string> missing;  ///< What path tracing needs and it does not have.
 };
@@ -25,6 +27,9 @@ struct VulkanDeviceInfo {
 /// The machine's Vulkan, found at run time.
 class VulkanInstance {
  public:
+  /// The one that all devices of the process come from; made when first asked for and never closed:
+  /// drivers that are loaded again and again run out of room for their threads' variables.
+  static const VulkanInstance& of_process();
   /// Throws Error(Plugin) where there is no loader or no driver.
   VulkanInstance();
   ~VulkanInstance();

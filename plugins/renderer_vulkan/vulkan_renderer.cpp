@@ -35,8 +35,6 @@ Film VulkanRenderer::trace(const View& view, const PathSettings& settings, Sampl
                 "a camera has exposure_time_s or readout_time_s, and the renderer vulkan shows no "
                 "motion as yet: use the renderer embree, or set both to 0");
   }
-  const int width = view.camera().width;
-  const int height = view.camera().height;
   const auto start = Clock::now();
   tracer_.begin(view, settings, scene_.world(), meshes().window());
   Image<PixelSum> sums;
@@ -48,13 +46,11 @@ Film VulkanRenderer::trace(const View& view, const PathSettings& settings, Sampl
     counts().rays += own.rays;
     counts().shadow_rays += own.shadow_rays;
     for (const TraceJob& job : jobs) counts().paths += job.path_count();
-    sums = tracer_.sums();
     if (plan.has_one_round()) break;
+    sums = tracer_.sums();
   }
-  Film film(width, height);
-  host().parallel_for(std::size_t(height), [&](std::size_t row) {
-    for (int x = 0; x < width; ++x) film.at(x, int(row)) = sums.at(x, int(row)).mean();
-  });
+  Film film = tracer_.film();
+  counts().device_s = tracer_.device_seconds();
   return film;
 }
 

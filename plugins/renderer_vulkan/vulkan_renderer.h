@@ -6,7 +6,7 @@
 #include "embree_support/path_renderer.h"
 #include "gpu_path_tracer.h"
 #include "gpu_scene.h"
-#include "vulkan_device.h"
+#include "path_device.h"
 
 namespace diorama {
 
@@ -20,7 +20,7 @@ class VulkanRenderer final : public PathRenderer {
   };
 
   VulkanRenderer(const Params& params, Host& host)
-      : VulkanRenderer(params, host, std::make_shared<const PathDevice>(params.device)) {}
+      : VulkanRenderer(params, host, shared_path_device(params.device)) {}
   /// On a device that is open already.
   VulkanRenderer(const Params& params, Host& host, std::shared_ptr<const PathDevice> device);
 
@@ -28,7 +28,7 @@ class VulkanRenderer final : public PathRenderer {
   void prepare_paths() override;
   Film trace(const View& view, const PathSettings& settings, SamplePlan& plan) override;
   bool traces_elsewhere() const override { return true; }
-  std::size_t traced_bytes_per_pixel() const override { return 2 * sizeof(PixelSum); }
+  std::size_t traced_bytes_per_pixel() const override { return sizeof(FilmPixel); }
 
   std::shared_ptr<const PathDevice> device_;
   GpuScene scene_;

@@ -172,6 +172,7 @@ void run(const Options& options) {
     line["shadow_rays_per_path"] = double(counts.shadow_rays) / double(counts.paths);
     line["mrays_per_cpu_s"] = 1e-6 * double(counts.rays + counts.shadow_rays) / cpu;
     line["mrays_per_wall_s"] = 1e-6 * double(counts.rays + counts.shadow_rays) / counts.trace_s;
+    for (const auto& [work, seconds] : counts.device_s) line["device_s"][work] = seconds;
     if (reference) {
       const auto error = bench::picture_error(frame.get(kColorHdr), *reference);
       line["rel_mse"] = error.trimmed_mse;

@@ -9,6 +9,8 @@ layout(local_size_x = 64) in;
 #include "sampling.glsl"
 
 void main() {
+  // Paths are still under way: they are gathered when all have ended.
+  if (job.counters.path_count > 0u) return;
   const SlotRange range = job.ranges.v[gl_WorkGroupID.x];
   const SampleSlot slot = job.slots.v[range.first];
   const uint column = gl_LocalInvocationIndex % 8u;

@@ -35,6 +35,20 @@ struct PixelSum {
 };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer PixelSums { PixelSum v[]; };
 
+// See FilmPixel of film.h.
+struct FilmPixel {
+  vec3 seen;
+  vec3 scattered;
+  vec3 albedo;
+  vec3 normal;
+  vec3 position;
+  float variance;
+  float brightest;
+  float count;
+  float surface_share;
+};
+layout(buffer_reference, scalar, buffer_reference_align = 4) writeonly buffer FilmPixels { FilmPixel v[]; };
+
 // Counts and the arguments of the next dispatches.
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Counters {
   uint paths_groups[3];
@@ -60,10 +74,12 @@ layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Job
   Queue queues[2];
   Columns camera_rays;  // three entries per path, where the lens is no pinhole
   PixelSums sums;
+  FilmPixels film;
   uint capacity;  // of the columns
   uint width;
   uint sample_bits;
   uint slot_count;
+  uint pixel_count;
   uint has_camera_rays;
   uint starts_at_centres;
   uint iteration_limit;

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
 #include <cstdlib>
+#include <future>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -60,17 +63,17 @@ TEST_CASE("a device that is not there is named with those that are", "[vulkan]")
   params.device = 77;
   const std::string text = error_of(params);
   CHECK(text.starts_with("device: there is no Vulkan device 77; this machine has 0: "));
-  CHECK(text.find(VulkanInstance().device(0).name) != std::string::npos);
+  CHECK(text.find(VulkanInstance::of_process().device(0).name) != std::string::npos);
 }
 
 TEST_CASE("a machine without a driver is told what to install", "[vulkan]") {
   if (!test::has_vulkan_device()) return;
   const Environment none("VK_ICD_FILENAMES", "/nowhere/no_icd.json");
   const Environment none_of_new("VK_DRIVER_FILES", "/nowhere/no_icd.json");
-  const std::string text = error_of({});
-  CAPTURE(text);
-  CHECK(text.starts_with("Vulkan "));
-  CHECK(text.find("install the driver of the device, or mesa-vulkan-drivers") != std::string::npos);
+  CHECK_THROWS_WITH(
+      VulkanInstance(),
+      Catch::StartsWith("Vulkan ") &&
+          Catch::Contains("install the driver of the device, or mesa-vulkan-drivers"));
 }
 
 TEST_CASE("too little memory is told with what was wanted and what there is", "[vulkan]") {
@@ -93,6 +96,55 @@ TEST_CASE("what is lost with a device is told", "[vulkan]") {
   CHECK_THROWS_WITH(device.check(VK_ERROR_DEVICE_LOST, "run kernels"),
                     Catch::Contains("failed to run kernels: the device was lost; the captures that "
                                     "were written stay: run the job again with --resume"));
+}
+
+TEST_CASE("a device is open once in a process, as long as it is used", "[vulkan]") {
+  if (!test::has_vulkan_device()) return;
+  CHECK(shared_path_device(0) == test::path_device());
+  CHECK_THROWS_WITH(shared_path_device(77), Catch::Contains("there is no Vulkan device 77"));
+  CHECK(&test::path_device()->device.instance() == &VulkanInstance::of_process());
+}
+
+TEST_CASE("several threads send bytes to one device and get their own back", "[vulkan]") {
+  if (!test::has_vulkan_device()) return;
+  const VulkanDevice& device = test::path_device()->device;
+  std::vector<std::future<bool>> threads;
+  for (std::uint32_t thread = 0; thread < 6; ++thread) {
+    threads.push_back(std::async(std::launch::async, [&device, thread] {
+      std::vector<std::uint32_t> words(100'003);
+      const VulkanBuffer buffer(device, words.size() * 4, VulkanBuffer::Place::Device, "a test");
+      bool is_same = true;
+      for (std::uint32_t round = 0; round < 20; ++round) {
+        for (std::uint32_t i = 0; i < words.size(); ++i)
+          words[i] = i * 7919u + thread * 31u + round;
+        device.upload(std::as_bytes(std::span(words)), buffer, 0);
+        std::vector<std::uint32_t> back(words.size());
+        device.download(buffer, 0, std::as_writable_bytes(std::span(back)));
+        is_same = is_same && back == words;
+      }
+      return is_same;
+    }));
+  }
+  for (auto& thread : threads) CHECK(thread.get());
+}
+
+TEST_CASE("a device with a clock says how long its work took", "[vulkan]") {
+  if (!test::has_vulkan_device()) return;
+  const VulkanDevice& device = test::path_device()->device;
+  if (!(device.info().nanoseconds_per_tick > 0.0)) return;
+  const VulkanBuffer buffer(device, std::size_t(16) << 20, VulkanBuffer::Place::Device, "a test");
+  std::array<double, 3> seconds{};
+  const auto record = [&](VulkanCommands& commands) {
+    for (const std::uint32_t what : {2u, 0u, 2u}) {
+      commands.zero(buffer, buffer.size());
+      commands.barrier();
+      commands.mark(what);
+    }
+  };
+  device.run(record, seconds);
+  CHECK(seconds[0] > 0.0);
+  CHECK(seconds[1] == 0.0);
+  CHECK(seconds[2] > 0.0);
 }
 
 TEST_CASE("bytes go to the device and come back", "[vulkan]") {

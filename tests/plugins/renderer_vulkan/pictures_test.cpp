@@ -561,7 +561,7 @@ TEST_CASE("sums do not depend on how many paths are under way", "[vulkan]") {
   EmbreeScene meshes(host, {"sse2", {}});
   meshes.take(world.scene);
   const PathDevice& device = *test::path_device();
-  GpuScene scene(device.device, host);
+  GpuScene scene(device, host);
   scene.take(meshes.render_scene());
   const View view(world.scene, camera);
   const auto sums = [&](std::uint32_t most_slots) {

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "diorama/error.h"
-#include "gpu_path_tracer.h"
+#include "path_device.h"
 #include "support/catch.h"
 
 namespace diorama::test {
@@ -13,7 +13,7 @@ namespace diorama::test {
 /// Says why where no device of this machine can trace paths; the tests that need one end there.
 inline bool has_vulkan_device() {
   try {
-    VulkanInstance().device(0);
+    VulkanInstance::of_process().device(0);
     return true;
   } catch (const Error& error) {
     WARN("skipped: " << error.what());
@@ -23,7 +23,7 @@ inline bool has_vulkan_device() {
 
 /// Opened once for all tests.
 inline std::shared_ptr<const PathDevice> path_device() {
-  static const auto device = std::make_shared<const PathDevice>(0);
+  static const auto device = shared_path_device(0);
   return device;
 }
 

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "path_device.h"
+
+#include <kernels.h>  // made from shaders/
+
+#include <algorithm>
+#include <map>
+#include <mutex>
+#include <span>
+
+#include "gpu_world.h"
+
+namespace diorama {
+namespace {
+
+/// Lavapipe of Mesa 22.3 ends all loops of a kernel's run after 65,535 rounds, without an error.
+std::uint32_t find_iteration_limit(const VulkanDevice& device) {
+  constexpr std::uint32_t kWanted = 200'000;
+  struct Constants {
+    gpu::Address counted;
+    std::uint32_t wanted = kWanted;
+    std::uint32_t pad = 0;
+  };
+  const VulkanKernel kernel(device, kernels::kLimits);
+  const VulkanBuffer counted(device, sizeof(std::uint32_t), VulkanBuffer::Place::Device, "a test");
+  device.run([&](VulkanCommands& commands) {
+    commands.constants(Constants{counted.address()});
+    commands.dispatch(kernel, 1);
+  });
+  std::uint32_t found = 0;
+  device.download(counted, 0, std::as_writable_bytes(std::span(&found, 1)));
+  constexpr std::uint32_t kSpare = 512;  // of a kernel's other loops
+  return found == kWanted ? 0xFFFFFFFFu : found - std::min(found, kSpare);
+}
+
+}  // namespace
+
+PathKernels::PathKernels(const VulkanDevice& device)
+    : start(device, kernels::kStart),
+      arrange(device, kernels::kArrange),
+      intersect(device, kernels::kIntersect),
+      shade(device, kernels::kShade),
+      shadow(device, kernels::kShadow),
+      gather(device, kernels::kGather),
+      resolve(device, kernels::kResolve),
+      iteration_limit(find_iteration_limit(device)) {}
+
+std::shared_ptr<const PathDevice> shared_path_device(int number) {
+  static std::mutex mutex;
+  static std::map<int, std::weak_ptr<const PathDevice>> opened;
+  const std::lock_guard lock(mutex);
+  std::shared_ptr<const PathDevice> device = opened[number].lock();
+  if (!device) {
+    device = std::make_shared<const PathDevice>(number);
+    opened[number] = device;
+  }
+  return device;
+}
+
+}  // namespace diorama

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "vulkan_device.h"
+
+namespace diorama {
+
+/// What a device runs for light paths. Making it takes the driver a second or so.
+struct PathKernels {
+  explicit PathKernels(const VulkanDevice& device);
+
+  VulkanKernel start;
+  VulkanKernel arrange;
+  VulkanKernel intersect;
+  VulkanKernel shade;
+  VulkanKernel shadow;
+  VulkanKernel gather;
+  VulkanKernel resolve;
+  /// How often a kernel may loop here: some drivers end loops silently.
+  std::uint32_t iteration_limit;
+};
+
+/// A device that is ready to trace paths. Any thread may use it.
+struct PathDevice {
+  explicit PathDevice(int number) : device(number), kernels(device) {}
+
+  VulkanDevice device;
+  PathKernels kernels;
+};
+
+/// The process's one of this number, for all who ask for it: opened for the first, closed after the
+/// last. From any thread.
+std::shared_ptr<const PathDevice> shared_path_device(int number);
+
+}  // namespace diorama
