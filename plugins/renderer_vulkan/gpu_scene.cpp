@@ -9,100 +9,10 @@
 #include <set>
 #include <utility>
 
+#include "gpu_bytes.h"
+
 namespace diorama {
 namespace {
-
-std::uint32_t bits(float value) { return std::bit_cast<std::uint32_t>(value); }
-
-void add_floats(std::vector<std::uint32_t>& words, std::span<const float> values) {
-  for (const float value : values) words.push_back(bits(value));
-}
-
-/// Numbers as kernels read them: three columns of four.
-struct TriangleColumns {
-  std::array<float, 4> corner;
-  std::array<float, 4> ab;
-  std::array<float, 4> ac;
-};
-TriangleColumns columns_of(const Vec3f& a, std::uint32_t number, const Vec3f& ab, float end_area,
-                           const Vec3f& ac) {
-  return {{a.x(), a.y(), a.z(), std::bit_cast<float>(number)},
-          {ab.x(), ab.y(), ab.z(), end_area},
-          {ac.x(), ac.y(), ac.z(), 0.0f}};
-}
-
-/// All of a mesh that kernels read, in parts that begin at multiples of 16 bytes.
-struct MeshBytes {
-  BoxTree tree;
-  std::vector<TriangleColumns> triangles;
-  std::vector<std::array<float, 6>> uvs;
-  std::vector<std::array<float, 9>> colors;
-};
-
-MeshBytes bytes_of(const ShadingMesh& mesh) {
-  const Mesh& source = mesh.source();
-  std::vector<TreeBox> boxes(mesh.number_end());
-  for (std::uint32_t t = 0; t < mesh.number_end(); ++t) {
-    if (mesh.is_repeated(t)) continue;
-    for (const std::uint32_t corner : mesh.corners(t)) boxes[t].add(source.positions[corner]);
-  }
-  MeshBytes bytes;
-  bytes.tree = tree_of_runs(boxes);
-  bytes.triangles.reserve(bytes.tree.order.size());
-  for (const std::uint32_t t : bytes.tree.order) {
-    const auto corners = mesh.corners(t);
-    const Vec3f& a = source.positions[corners[0]];
-    bytes.triangles.push_back(
-        columns_of(a, t, source.positions[corners[1]] - a, 0.0f, source.positions[corners[2]] - a));
-  }
-  for (std::uint32_t t = 0; mesh.has_uvs() && t < mesh.number_end(); ++t) {
-    const auto uvs = mesh.uvs(t);
-    bytes.uvs.push_back({uvs[0].x(), uvs[0].y(), uvs[1].x(), uvs[1].y(), uvs[2].x(), uvs[2].y()});
-  }
-  for (std::uint32_t t = 0; !source.colors.empty() && t < mesh.number_end(); ++t) {
-    auto& corners = bytes.colors.emplace_back();
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Vec3f& color = source.colors[mesh.corners(t)[k]];
-      std::copy_n(color.data(), 3, &corners[3 * k]);
-    }
-  }
-  return bytes;
-}
-
-/// Levels' offsets, then their texels.
-std::vector<std::uint32_t> words_of(const MipTexture& texture) {
-  std::vector<std::uint32_t> words(gpu::kMostLevels, 0);
-  std::uint32_t texels = 0;
-  const int levels = std::min(texture.level_count(), int(gpu::kMostLevels));
-  const bool has_bytes = !texture.bytes(0).empty();
-  for (int level = 0; level < levels; ++level) {
-    const int width = texture.level_width(level);
-    const int height = texture.level_height(level);
-    words[std::size_t(level)] = texels;
-    texels += std::uint32_t(width) * std::uint32_t(height);
-    if (!has_bytes) {
-      for (int y = 0; y < height; ++y) {
-        for (int x = 0; x < width; ++x) {
-          const Rgba texel = texture.texel(level, x, y);
-          add_floats(words, {texel.data(), 4});
-        }
-      }
-      continue;
-    }
-    const auto channels = std::size_t(texture.channels());
-    const std::span<const std::uint8_t> bytes = texture.bytes(level);
-    for (std::size_t at = 0; at < bytes.size(); at += channels) {
-      // Grey is repeated, alpha is 1; see MipTexture::texel().
-      const std::uint32_t red = bytes[at];
-      const std::uint32_t green = channels < 3 ? red : bytes[at + 1];
-      const std::uint32_t blue = channels < 3 ? red : bytes[at + 2];
-      const std::uint32_t alpha =
-          channels == 2 ? bytes[at + 1] : (channels == 4 ? bytes[at + 3] : 255u);
-      words.push_back(red | green << 8 | blue << 16 | alpha << 24);
-    }
-  }
-  return words;
-}
 
 /// See sample_dome() of lights.glsl.
 std::vector<std::uint32_t> words_of(const DomeTexture& dome) {
@@ -133,7 +43,7 @@ std::vector<std::uint32_t> words_of(const SkyGrid& grid) {
     cells *= std::uint32_t(count);
   }
   for (std::uint32_t cell = 0; cell < cells; ++cell) {
-    words.push_back(bits(grid.power(cell)));
+    words.push_back(std::bit_cast<std::uint32_t>(grid.power(cell)));
     add_floats(words, grid.borders(cell));
   }
   return words;
@@ -223,28 +133,6 @@ TreeBox placed(const TreeBox& box, const MeshInstance& instance, const TreeBox& 
 
 }  // namespace
 
-class GpuScene::Blob {
- public:
-  /// Where the values begin.
-  template <class Value>
-  std::size_t add(std::span<const Value> values) {
-    const std::size_t begin = (bytes_.size() + 15) / 16 * 16;
-    bytes_.resize(begin + values.size_bytes());
-    if (!values.empty()) {
-      std::memcpy(&bytes_[begin], static_cast<const void*>(values.data()), values.size_bytes());
-    }
-    return begin;
-  }
-  template <class Value>
-  std::size_t add(const std::vector<Value>& values) {
-    return add(std::span<const Value>(values));
-  }
-  std::span<const std::byte> bytes() const { return bytes_; }
-
- private:
-  std::vector<std::byte> bytes_;
-};
-
 struct GpuScene::Parts {
   gpu::Address base = 0;
   std::map<const LayerTable*, std::size_t> layers;
@@ -266,12 +154,6 @@ void GpuScene::take(const RenderScene& scene) {
   shape_revision_ = scene.shape_revision();
 }
 
-VulkanRange GpuScene::upload(std::span<const std::byte> bytes, const char* what) {
-  VulkanRange range = arena_.take(bytes.size(), what);
-  device_.upload(bytes, range.buffer(), range.offset());
-  return range;
-}
-
 void GpuScene::upload(std::span<const std::byte> bytes, VulkanBuffer& buffer,
                       const char* what) const {
   if (buffer.size() < bytes.size()) {
@@ -282,78 +164,31 @@ void GpuScene::upload(std::span<const std::byte> bytes, VulkanBuffer& buffer,
 }
 
 void GpuScene::take_meshes(const RenderScene& scene) {
-  std::set<const ShadingMesh*> used;
-  std::vector<std::shared_ptr<const ShadingMesh>> missing;
-  for (const RenderScene::UsedMesh& mesh : scene.meshes()) {
-    used.insert(mesh.shading.get());
-    if (!meshes_.contains(mesh.shading.get())) missing.push_back(mesh.shading);
-  }
-  std::erase_if(meshes_, [&](const auto& entry) { return !used.contains(entry.first); });
-  std::vector<MeshBytes> made(missing.size());
-  host_.parallel_for(missing.size(), [&](std::size_t i) { made[i] = bytes_of(*missing[i]); });
-  std::vector<Blob> blobs(missing.size());
-  constexpr int kTopLevels = 7;
-  std::vector<MeshOnDevice> placed;
-  std::vector<VulkanDevice::Transfer> transfers;
-  for (std::size_t i = 0; i < missing.size(); ++i) {
-    const ShadingMesh& mesh = *missing[i];
-    const MeshBytes bytes = std::move(made[i]);
-    Blob& blob = blobs[i];
-    const std::size_t nodes = blob.add(bytes.tree.nodes);
-    const std::size_t triangles = blob.add(bytes.triangles);
-    const std::size_t shading = blob.add(mesh.triangles());
-    const std::size_t uvs = blob.add(bytes.uvs);
-    const std::size_t colors = blob.add(bytes.colors);
-    MeshOnDevice on_device{missing[i],
-                           arena_.take(blob.bytes().size(), "a mesh and its tree"),
-                           {},
-                           bytes.tree.top(kTopLevels)};
-    transfers.push_back({blob.bytes(), &on_device.memory.buffer(), on_device.memory.offset()});
-    const gpu::Address base = on_device.memory.address();
-    gpu::Instance& parts = on_device.parts;
-    parts.nodes = base + nodes;
-    parts.triangles = base + triangles;
-    parts.shading = base + shading;
-    parts.uvs = base + uvs;
-    parts.colors = base + colors;
-    parts.flags = (mesh.has_normals() ? gpu::kHasNormals : 0u) |
-                  (bytes.uvs.empty() ? 0u : gpu::kHasUvs) |
-                  (bytes.colors.empty() ? 0u : gpu::kHasColors) |
-                  (mesh.source().is_double_sided ? gpu::kDoubleSided : 0u);
-    placed.push_back(std::move(on_device));
-  }
-  device_.upload(transfers);
-  for (MeshOnDevice& mesh : placed) meshes_.emplace(mesh.source.get(), std::move(mesh));
+  std::vector<std::shared_ptr<const ShadingMesh>> used;
+  for (const RenderScene::UsedMesh& mesh : scene.meshes()) used.push_back(mesh.shading);
+  const auto on_device = assets_.take(used, host_);
+  meshes_.clear();
+  for (std::size_t i = 0; i < used.size(); ++i) meshes_.emplace(used[i].get(), on_device[i]);
 }
 
 void GpuScene::take_textures(const RenderScene& scene) {
-  std::map<std::uint64_t, const MipTexture*> used;
+  std::map<std::uint64_t, TextureInScene> used;
+  const auto take = [&](const MipTexture& texture, const std::shared_ptr<const void>& owner) {
+    const auto [entry, is_new] = used.try_emplace(texture.number());
+    if (is_new) entry->second.on_device = assets_.take(owner, texture);
+  };
   for (const MeshInstance& instance : scene.instances()) {
     for (const ShadingMaterial* m : instance.materials) {
       for (const TextureSlot* slot :
            {&m->base_color, &m->metallic, &m->roughness, &m->normal, &m->opacity, &m->emission}) {
-        if (*slot) used.emplace(slot->texture->number(), slot->texture);
+        if (*slot) take(*slot->texture, slot->input->texture);
       }
     }
   }
   for (const LightTable::Record& light : scene.lights().records()) {
-    if (light.texture) used.emplace(light.texture->image().number(), &light.texture->image());
+    if (light.texture) take(light.texture->image(), light.texture);
   }
-  std::erase_if(textures_, [&](const auto& entry) { return !used.contains(entry.first); });
-  for (const auto& [number, texture] : used) {
-    if (textures_.contains(number)) continue;
-    const std::vector<std::uint32_t> words = words_of(*texture);
-    TextureOnDevice on_device{upload(std::as_bytes(std::span(words)), "a texture"), {}, 0};
-    on_device.record.texels = on_device.memory.address();
-    on_device.record.width = texture->width();
-    on_device.record.height = texture->height();
-    on_device.record.level_count =
-        std::min(std::uint32_t(texture->level_count()), gpu::kMostLevels);
-    on_device.record.kind = texture->bytes(0).empty() ? gpu::kFloats
-                            : texture->is_srgb()      ? gpu::kSrgbBytes
-                                                      : gpu::kLinearBytes;
-    textures_.emplace(number, std::move(on_device));
-  }
+  textures_ = std::move(used);
   std::uint32_t place = 0;
   for (auto& [number, texture] : textures_) texture.number = place++;
 }
@@ -365,7 +200,7 @@ void GpuScene::take_skies(const LightTable& lights) {
     if (skies_.contains(source.get())) return;
     const std::vector<std::uint32_t> words = words_of(*source);
     skies_.emplace(source.get(),
-                   WordsOnDevice{source, upload(std::as_bytes(std::span(words)), "a sky")});
+                   WordsOnDevice{source, assets_.upload(std::as_bytes(std::span(words)), "a sky")});
   };
   for (const LightTable::Record& light : lights.records()) {
     if (light.shape != LightShape::Dome) continue;
@@ -444,7 +279,7 @@ gpu::Material GpuScene::material_of(const ShadingMaterial& material, const Parts
 }
 
 gpu::Instance GpuScene::instance_of(const MeshInstance& instance, double window) const {
-  gpu::Instance result = meshes_.at(instance.shading).parts;
+  gpu::Instance result = meshes_.at(instance.shading)->parts;
   const Eigen::Matrix3f inverse = instance.linear.cast<double>().inverse().cast<float>();
   const Vec3f back =
       -(instance.linear.cast<double>().inverse() * instance.translation.cast<double>())
@@ -522,7 +357,7 @@ GpuScene::References GpuScene::references_of(const RenderScene& scene) const {
     largest.pop();
     const gpu::Reference part = result.parts[number];
     const MeshInstance& instance = scene.instances()[part.instance];
-    const auto& top = meshes_.at(instance.shading).top;
+    const auto& top = meshes_.at(instance.shading)->top;
     const auto node = top.find(part.child);
     if (instance.motion || node == top.end()) continue;
     const TreeBox whole = result.boxes[number];
@@ -553,7 +388,7 @@ void GpuScene::take_tables(const RenderScene& scene) {
   }
 
   // What the tables below point to.
-  Blob blob;
+  GpuBytes blob;
   Parts parts;
   for (const ShadingMaterial* m : used) {
     for (const SurfaceBsdf* s : {&m->sharp, &m->soft}) {
@@ -606,7 +441,7 @@ void GpuScene::take_tables(const RenderScene& scene) {
   std::vector<gpu::Material> materials;
   for (const ShadingMaterial* m : used) materials.push_back(material_of(*m, parts));
   std::vector<gpu::Texture> textures;
-  for (const auto& [number, texture] : textures_) textures.push_back(texture.record);
+  for (const auto& [number, texture] : textures_) textures.push_back(texture.on_device->record);
   std::vector<gpu::Light> lights;
   for (std::size_t i = 0; i < table.records().size(); ++i) {
     lights.push_back(light_of(table.records()[i]));
@@ -617,7 +452,7 @@ void GpuScene::take_tables(const RenderScene& scene) {
     places.insert(places.end(), {place.block, place.lane});
   }
 
-  Blob tables;
+  GpuBytes tables;
   gpu::World world;
   const References references = references_of(scene);
   world.tree = tables.add(tree_of_single(references.boxes).nodes);

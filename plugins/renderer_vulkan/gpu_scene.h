@@ -10,41 +10,32 @@
 
 #include "box_tree.h"
 #include "diorama/host.h"
+#include "gpu_assets.h"
 #include "gpu_world.h"
+#include "path_device.h"
 #include "renderer_support/render_scene.h"
-#include "vulkan_arena.h"
-#include "vulkan_device.h"
 
 namespace diorama {
 
-/// A scene in a device's memory. take() is called for every change and transfers what is new:
-/// meshes with their trees and textures stay as long as the scene uses them.
+/// A scene in a device's memory. take() is called for every change and transfers what is new.
 class GpuScene {
  public:
-  GpuScene(const VulkanDevice& device, Host& host) : device_(device), host_(host), arena_(device) {}
+  GpuScene(const PathDevice& device, Host& host)
+      : device_(device.device), assets_(*device.assets), host_(host) {}
 
   void take(const RenderScene& scene);
 
   gpu::Address world() const { return world_.address(); }
 
  private:
-  struct MeshOnDevice {
-    std::shared_ptr<const ShadingMesh> source;
-    VulkanRange memory;
-    gpu::Instance parts;                    ///< Addresses and flags of the mesh.
-    std::map<std::uint32_t, TreeNode> top;  ///< Of its tree.
-  };
-  struct TextureOnDevice {
-    VulkanRange memory;
-    gpu::Texture record;
+  struct TextureInScene {
+    std::shared_ptr<const TextureOnDevice> on_device;
     std::uint32_t number = 0;  ///< In the table of this scene.
   };
   struct WordsOnDevice {
     std::shared_ptr<const void> source;
     VulkanRange memory;
   };
-  /// Bytes that go to the device together.
-  class Blob;
   /// What the tree over the instances holds.
   struct References {
     std::vector<gpu::Reference> parts;
@@ -56,7 +47,6 @@ class GpuScene {
   void take_meshes(const RenderScene& scene);
   void take_textures(const RenderScene& scene);
   void take_skies(const LightTable& lights);
-  VulkanRange upload(std::span<const std::byte> bytes, const char* what);
   /// Into a buffer that is made anew only where it is too small.
   void upload(std::span<const std::byte> bytes, VulkanBuffer& buffer, const char* what) const;
   gpu::Slot slot_of(const TextureSlot& slot) const;
@@ -68,13 +58,13 @@ class GpuScene {
   void take_tables(const RenderScene& scene);
 
   const VulkanDevice& device_;
+  GpuAssets& assets_;
   Host& host_;
-  VulkanArena arena_;
   std::uint64_t pose_revision_ = 0;
   std::uint64_t shape_revision_ = 0;
-  std::map<const ShadingMesh*, MeshOnDevice> meshes_;
-  std::map<std::uint64_t, TextureOnDevice> textures_;  ///< By MipTexture::number().
-  std::map<const void*, WordsOnDevice> skies_;         ///< Domes' patches and their grids.
+  std::map<const ShadingMesh*, std::shared_ptr<const MeshOnDevice>> meshes_;
+  std::map<std::uint64_t, TextureInScene> textures_;  ///< By MipTexture::number().
+  std::map<const void*, WordsOnDevice> skies_;        ///< Domes' patches and their grids.
   VulkanBuffer parts_;
   VulkanBuffer tables_;
   VulkanBuffer world_;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 
+#include "gpu_assets.h"
 #include "vulkan_device.h"
 
 namespace diorama {
@@ -25,10 +26,12 @@ struct PathKernels {
 
 /// A device that is ready to trace paths. Any thread may use it.
 struct PathDevice {
-  explicit PathDevice(int number) : device(number), kernels(device) {}
+  explicit PathDevice(int number)
+      : device(number), kernels(device), assets(std::make_unique<GpuAssets>(device)) {}
 
   VulkanDevice device;
   PathKernels kernels;
+  const std::unique_ptr<GpuAssets> assets;
 };
 
 /// The process's one of this number, for all who ask for it: opened for the first, closed after the

@@ -25,7 +25,13 @@ VulkanRange& VulkanRange::operator=(VulkanRange&& other) noexcept {
   return *this;
 }
 
+std::size_t VulkanArena::buffer_count() const {
+  const std::lock_guard lock(mutex_);
+  return blocks_.size();
+}
+
 VulkanRange VulkanArena::take(std::size_t size, const char* what) {
+  const std::lock_guard lock(mutex_);
   VulkanRange range;
   range.size_ = (std::max<std::size_t>(size, 1) + kStep - 1) / kStep * kStep;
   const auto take_from = [&](Block& block) {
@@ -54,6 +60,7 @@ VulkanRange VulkanArena::take(std::size_t size, const char* what) {
 }
 
 void VulkanArena::give_back(const VulkanBuffer* buffer, std::size_t offset, std::size_t size) {
+  const std::lock_guard lock(mutex_);
   const auto found =
       std::ranges::find_if(blocks_, [&](const auto& block) { return &block->buffer == buffer; });
   auto& gaps = (*found)->gaps;

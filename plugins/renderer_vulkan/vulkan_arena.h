@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <vector>
 
 #include "vulkan_device.h"
@@ -33,7 +34,7 @@ class VulkanRange {
 };
 
 /// Memory on the device for many things of all sizes: drivers allow a few thousand allocations
-/// only.
+/// only. From any thread.
 class VulkanArena {
  public:
   explicit VulkanArena(const VulkanDevice& device) : device_(device) {}
@@ -43,7 +44,7 @@ class VulkanArena {
   /// Begins at a multiple of 16 bytes.
   VulkanRange take(std::size_t size, const char* what);
   /// Buffers that it holds.
-  std::size_t buffer_count() const { return blocks_.size(); }
+  std::size_t buffer_count() const;
 
  private:
   friend class VulkanRange;
@@ -54,6 +55,7 @@ class VulkanArena {
   void give_back(const VulkanBuffer* buffer, std::size_t offset, std::size_t size);
 
   const VulkanDevice& device_;
+  mutable std::mutex mutex_;
   std::vector<std::unique_ptr<Block>> blocks_;
 };
 

@@ -20,7 +20,7 @@ VulkanRenderer::VulkanRenderer(const Params& params, Host& host,
                                std::shared_ptr<const PathDevice> device)
     : PathRenderer(params, host),
       device_(std::move(device)),
-      scene_(device_->device, host),
+      scene_(*device_, host),
       tracer_(*device_, host) {
   host.log(LogLevel::Info, "paths are traced by Vulkan device " + std::to_string(params.device) +
                                " of " + device_->device.instance().list_of_devices());

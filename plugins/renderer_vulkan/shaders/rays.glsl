@@ -78,20 +78,11 @@ vec3 straight_share(uint instance, uint number, float u, float v, vec3 triangle_
   vec3 d = direction;                                                                             \
   vec3 inverse = inverse_of(d);                                                                   \
   uint node = world.instance_count > 0u ? 0u : kEnd;                                              \
+  const uint limit = job.iteration_limit;                                                         \
   uint iterations = 0u;                                                                           \
   while (node != kEnd) {                                                                          \
-    if (++iterations > job.iteration_limit) {                                                     \
-      job.counters.is_over_limit = 1u;                                                            \
-      break;                                                                                      \
-    }                                                                                             \
-    if (node == kReturn) {                                                                        \
-      nodes = world.tree;                                                                         \
-      instance = kNone;                                                                           \
-      o = origin;                                                                                 \
-      d = direction;                                                                              \
-      inverse = inverse_of(d);                                                                    \
-      node = top > 0u ? stack[--top] : kEnd;                                                      \
-    } else if (node < kLeaf) {                                                                    \
+    while (node < kLeaf && iterations <= limit) {                                                 \
+      ++iterations;                                                                               \
       const vec4 low_a = nodes.v[4u * node];                                                      \
       const vec4 high_a = nodes.v[4u * node + 1u];                                                \
       const vec4 low_b = nodes.v[4u * node + 2u];                                                 \
@@ -110,6 +101,20 @@ vec3 straight_share(uint instance, uint number, float u, float v, vec3 triangle_
       } else {                                                                                    \
         node = top > 0u ? stack[--top] : kEnd;                                                    \
       }                                                                                           \
+    }                                                                                             \
+    if (++iterations > limit) {                                                                   \
+      job.counters.is_over_limit = 1u;                                                            \
+      break;                                                                                      \
+    }                                                                                             \
+    if (node == kReturn) {                                                                        \
+      nodes = world.tree;                                                                         \
+      instance = kNone;                                                                           \
+      o = origin;                                                                                 \
+      d = direction;                                                                              \
+      inverse = inverse_of(d);                                                                    \
+      node = top > 0u ? stack[--top] : kEnd;                                                      \
+    } else if (node == kEnd) {                                                                    \
+      break;                                                                                      \
     } else if (instance == kNone) {                                                               \
       const uint reference = 2u * (node & 0x7FFFFFFFu);                                           \
       instance = world.references.v[reference];                                                   \
@@ -135,7 +140,7 @@ vec3 straight_share(uint instance, uint number, float u, float v, vec3 triangle_
     } else {                                                                                      \
       const uint first = (node & 0x7FFFFFFFu) >> 3;                                               \
       const uint end = first + (node & 7u) + 1u;                                                  \
-      Vec4s triangles = world.instances.v[instance].triangles;                              \
+      Vec4s triangles = world.instances.v[instance].triangles;                                    \
       for (uint triangle = first; triangle < end; ++triangle) {                                   \
         const vec4 corner = triangles.v[3u * triangle];                                           \
         const vec3 ab = triangles.v[3u * triangle + 1u].xyz;                                      \

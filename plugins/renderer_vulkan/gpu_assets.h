@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <vector>
+
+#include "box_tree.h"
+#include "diorama/host.h"
+#include "gpu_world.h"
+#include "renderer_support/mip_texture.h"
+#include "renderer_support/shading_mesh.h"
+#include "vulkan_arena.h"
+#include "vulkan_device.h"
+
+namespace diorama {
+
+/// A mesh with its tree in a device's memory.
+struct MeshOnDevice {
+  VulkanRange memory;
+  gpu::Instance parts;                    ///< Addresses and flags of the mesh.
+  std::map<std::uint32_t, TreeNode> top;  ///< Of its tree.
+};
+
+struct TextureOnDevice {
+  VulkanRange memory;
+  gpu::Texture record;
+};
+
+/// Meshes and textures in a device's memory, each once for all scenes. They stay as long as a scene
+/// uses them, or anybody, a scene or a cache of assets, keeps what they were made of. From any
+/// thread.
+class GpuAssets {
+ public:
+  explicit GpuAssets(const VulkanDevice& device) : device_(device), arena_(device) {}
+
+  /// In the order of `meshes`.
+  std::vector<std::shared_ptr<const MeshOnDevice>> take(
+      std::span<const std::shared_ptr<const ShadingMesh>> meshes, Host& host);
+  /// `owner`: of the image that the texture was made of.
+  std::shared_ptr<const TextureOnDevice> take(const std::shared_ptr<const void>& owner,
+                                              const MipTexture& texture);
+  /// Memory for what else a scene has.
+  VulkanRange upload(std::span<const std::byte> bytes, const char* what);
+
+  /// Counts of what is kept.
+  struct Kept {
+    std::size_t meshes = 0;
+    std::size_t textures = 0;
+  };
+  Kept kept() const;
+
+ private:
+  template <class OnDevice>
+  struct Entry {
+    std::weak_ptr<const void> owner;
+    std::shared_ptr<const OnDevice> on_device;
+  };
+  /// By the address of what they were made of, which is valid while the owner lives.
+  template <class OnDevice>
+  using Entries = std::map<const void*, Entry<OnDevice>>;
+  template <class OnDevice>
+  static void drop_unowned(Entries<OnDevice>& entries);
+
+  const VulkanDevice& device_;
+  VulkanArena arena_;
+  mutable std::mutex mutex_;  ///< Of all below; also held while they are made, so that one makes them.
+  Entries<MeshOnDevice> meshes_;
+  Entries<TextureOnDevice> textures_;
+};
+
+}  // namespace diorama
