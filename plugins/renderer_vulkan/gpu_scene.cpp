@@ -154,13 +154,13 @@ void GpuScene::take(const RenderScene& scene) {
   shape_revision_ = scene.shape_revision();
 }
 
-void GpuScene::upload(std::span<const std::byte> bytes, VulkanBuffer& buffer,
-                      const char* what) const {
+VulkanDevice::Transfer GpuScene::transfer_to(VulkanBuffer& buffer, std::span<const std::byte> bytes,
+                                             const char* what) const {
   if (buffer.size() < bytes.size()) {
     buffer = VulkanBuffer();
     buffer = VulkanBuffer(device_, bytes.size(), VulkanBuffer::Place::Device, what);
   }
-  device_.upload(bytes, buffer, 0);
+  return {bytes, &buffer, 0};
 }
 
 void GpuScene::take_meshes(const RenderScene& scene) {
@@ -338,20 +338,24 @@ gpu::Light GpuScene::light_of(const LightTable::Record& light) const {
 // part first, and the tree over the instances is built over the parts, so that rays enter what they
 // pass near (Benthin et al. 2017).
 GpuScene::References GpuScene::references_of(const RenderScene& scene) const {
-  constexpr std::size_t kPartsPerInstance = 4;
+  constexpr std::size_t kPartsPerInstance = 3;  // beside itself
   constexpr std::size_t kFurtherParts = 256;
+  constexpr std::size_t kMostParts = 1u << 16;  // more are only memory
+  constexpr float kWorthwhile = 2.0f;           // of the areas of four parts, in that of the whole
   References result;
   std::priority_queue<std::pair<float, std::uint32_t>> largest;  // area, number
   const auto add = [&](std::uint32_t instance, std::uint32_t child, const TreeBox& box) {
     const auto number = std::uint32_t(result.parts.size());
     result.parts.push_back({instance, child});
     result.boxes.push_back(box);
-    if ((child & TreeNode::kLeaf) == 0) largest.emplace(half_area(box), number);
+    if ((child & WideNode::kLeaf) == 0) largest.emplace(half_area(box), number);
   };
   for (std::uint32_t i = 0; i < scene.instances().size(); ++i) {
     add(i, 0, box_of(scene.instances()[i], scene.window()));
   }
-  const std::size_t most = kPartsPerInstance * result.parts.size() + kFurtherParts;
+  const std::size_t most =
+      result.parts.size() +
+      std::min(kPartsPerInstance * result.parts.size() + kFurtherParts, kMostParts);
   while (!largest.empty() && result.parts.size() < most) {
     const std::uint32_t number = largest.top().second;
     largest.pop();
@@ -361,15 +365,28 @@ GpuScene::References GpuScene::references_of(const RenderScene& scene) const {
     const auto node = top.find(part.child);
     if (instance.motion || node == top.end()) continue;
     const TreeBox whole = result.boxes[number];
-    const TreeBox a = placed({node->second.low_a, node->second.high_a}, instance, whole);
-    const TreeBox b = placed({node->second.low_b, node->second.high_b}, instance, whole);
+    const WideTree::Children& inner = node->second;
+    std::array<TreeBox, 4> boxes;
+    float sum = 0.0f;
+    for (std::size_t k = 0; k < boxes.size(); ++k) {
+      if (inner.children[k] == WideNode::kNothing) continue;
+      boxes[k] = placed(inner.boxes[k], instance, whole);
+      sum += half_area(boxes[k]);
+    }
     // Turned boxes may be no smaller than what they are part of.
-    if (half_area(a) + half_area(b) > 1.5f * half_area(whole)) continue;
-    if (is_empty(b)) continue;
-    result.parts[number].child = node->second.child_a;
-    result.boxes[number] = a;
-    if ((node->second.child_a & TreeNode::kLeaf) == 0) largest.emplace(half_area(a), number);
-    add(part.instance, node->second.child_b, b);
+    if (sum > kWorthwhile * half_area(whole)) continue;
+    bool is_first = true;
+    for (std::size_t k = 0; k < boxes.size(); ++k) {
+      if (inner.children[k] == WideNode::kNothing) continue;
+      if (!is_first) {
+        add(part.instance, inner.children[k], boxes[k]);
+        continue;
+      }
+      is_first = false;
+      result.parts[number].child = inner.children[k];
+      result.boxes[number] = boxes[k];
+      if ((inner.children[k] & WideNode::kLeaf) == 0) largest.emplace(half_area(boxes[k]), number);
+    }
   }
   return result;
 }
@@ -426,7 +443,7 @@ void GpuScene::take_tables(const RenderScene& scene) {
   for (int i = 0; i < 256; ++i)
     linear_from_srgb_bytes.push_back(linear_from_srgb(float(i) / 255.0f));
   const std::size_t linear = blob.add(linear_from_srgb_bytes);
-  upload(blob.bytes(), parts_, "tables of materials and lamps");
+  const auto parts_transfer = transfer_to(parts_, blob.bytes(), "tables of materials and lamps");
   parts.base = parts_.address();
 
   std::vector<gpu::Instance> instances;
@@ -455,7 +472,7 @@ void GpuScene::take_tables(const RenderScene& scene) {
   GpuBytes tables;
   gpu::World world;
   const References references = references_of(scene);
-  world.tree = tables.add(tree_of_single(references.boxes).nodes);
+  world.tree = tables.add(widened(tree_of_single(references.boxes), 0).nodes);
   world.references = tables.add(references.parts);
   world.instances = tables.add(instances);
   world.slot_materials = tables.add(slot_materials);
@@ -469,7 +486,7 @@ void GpuScene::take_tables(const RenderScene& scene) {
   world.surroundings = tables.add(table.surroundings());
   world.entry_lights = tables.add(table.entry_lights());
   world.light_shapes = tables.add(table.shapes());
-  upload(tables.bytes(), tables_, "tables of the scene");
+  const auto tables_transfer = transfer_to(tables_, tables.bytes(), "tables of the scene");
   for (gpu::Address* address :
        {&world.tree, &world.references, &world.instances, &world.slot_materials, &world.materials,
         &world.textures, &world.lights, &world.light_blocks, &world.light_places,
@@ -487,7 +504,9 @@ void GpuScene::take_tables(const RenderScene& scene) {
   world.block_count = std::uint32_t(table.tree().blocks().size());
   world.stacks_lobes = scene.stacks_lobes() ? 1 : 0;
   world.window = float(scene.window());
-  upload(std::as_bytes(std::span(&world, 1)), world_, "tables of the scene");
+  const auto world_transfer =
+      transfer_to(world_, std::as_bytes(std::span(&world, 1)), "tables of the scene");
+  device_.upload(std::array{parts_transfer, tables_transfer, world_transfer});
 }
 
 }  // namespace diorama

@@ -47,8 +47,9 @@ class GpuScene {
   void take_meshes(const RenderScene& scene);
   void take_textures(const RenderScene& scene);
   void take_skies(const LightTable& lights);
-  /// Into a buffer that is made anew only where it is too small.
-  void upload(std::span<const std::byte> bytes, VulkanBuffer& buffer, const char* what) const;
+  /// To a buffer that is made anew only where it is too small.
+  VulkanDevice::Transfer transfer_to(VulkanBuffer& buffer, std::span<const std::byte> bytes,
+                                     const char* what) const;
   gpu::Slot slot_of(const TextureSlot& slot) const;
   gpu::Surface surface_of(const SurfaceBsdf& surface, const Parts& parts) const;
   gpu::Material material_of(const ShadingMaterial& material, const Parts& parts) const;

@@ -45,10 +45,13 @@ PathKernels::PathKernels(const VulkanDevice& device)
       resolve(device, kernels::kResolve),
       iteration_limit(find_iteration_limit(device)) {}
 
-std::shared_ptr<const PathDevice> shared_path_device(int number) {
+std::shared_ptr<const PathDevice> shared_path_device(std::span<const int> numbers) {
   static std::mutex mutex;
   static std::map<int, std::weak_ptr<const PathDevice>> opened;
+  for (const int number : numbers) VulkanInstance::of_process().device(number);
   const std::lock_guard lock(mutex);
+  const int number = *std::ranges::min_element(
+      numbers, {}, [](int candidate) { return opened[candidate].use_count(); });
   std::shared_ptr<const PathDevice> device = opened[number].lock();
   if (!device) {
     device = std::make_shared<const PathDevice>(number);

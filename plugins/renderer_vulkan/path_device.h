@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 
 #include "gpu_assets.h"
 #include "vulkan_device.h"
@@ -34,8 +35,12 @@ struct PathDevice {
   const std::unique_ptr<GpuAssets> assets;
 };
 
-/// The process's one of this number, for all who ask for it: opened for the first, closed after the
-/// last. From any thread.
-std::shared_ptr<const PathDevice> shared_path_device(int number);
+/// The process's device of one of these numbers, that with the fewest users by now: opened for the
+/// first, closed after the last. Throws as VulkanInstance::device() does for any of the numbers.
+/// From any thread.
+std::shared_ptr<const PathDevice> shared_path_device(std::span<const int> numbers);
+inline std::shared_ptr<const PathDevice> shared_path_device(int number) {
+  return shared_path_device(std::span(&number, 1));
+}
 
 }  // namespace diorama

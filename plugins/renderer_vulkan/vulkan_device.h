@@ -105,6 +105,7 @@ class VulkanDevice {
   const VulkanInstance& instance() const { return instance_; }
   const VulkanDeviceInfo& info() const { return info_; }
   const VulkanDeviceFunctions& functions() const { return functions_; }
+  int number() const { return number_; }
   VkDevice handle() const { return device_; }
   VkPipelineLayout layout() const { return layout_; }
   /// Bytes that buffers hold now.

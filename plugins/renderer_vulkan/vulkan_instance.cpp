@@ -10,7 +10,6 @@
 namespace diorama {
 namespace {
 
-constexpr const char* kLoader = "libvulkan.so.1";
 constexpr std::uint32_t kApi = VK_API_VERSION_1_2;
 
 std::string version_text(std::uint32_t version) {
@@ -51,10 +50,11 @@ std::string description_of(const VulkanDeviceInfo& device) {
 
 void VulkanInstance::Unload::operator()(void* library) const { dlclose(library); }
 
-VulkanInstance::VulkanInstance() : library_(dlopen(kLoader, RTLD_NOW | RTLD_LOCAL)) {
+VulkanInstance::VulkanInstance(const char* loader)
+    : library_(dlopen(loader, RTLD_NOW | RTLD_LOCAL)) {
   if (!library_) {
     throw Error(ErrorKind::Plugin,
-                std::string("this machine has no Vulkan: ") + kLoader +
+                std::string("this machine has no Vulkan: ") + loader +
                     " is not there; install libvulkan1 and the driver of the device, or use the "
                     "renderer embree");
   }
@@ -63,7 +63,7 @@ VulkanInstance::VulkanInstance() : library_(dlopen(kLoader, RTLD_NOW | RTLD_LOCA
   const auto create =
       find ? reinterpret_cast<PFN_vkCreateInstance>(find(nullptr, "vkCreateInstance")) : nullptr;
   if (!create) {
-    throw Error(ErrorKind::Plugin, std::string(kLoader) +
+    throw Error(ErrorKind::Plugin, std::string(loader) +
                                        " is no Vulkan loader: it has no "
                                        "vkCreateInstance");
   }
@@ -177,6 +177,19 @@ std::string VulkanInstance::list_of_devices() const {
     text += (i == 0 ? "" : "; ") + std::to_string(i) + ": " + description_of(devices_[i]);
   }
   return text;
+}
+
+std::vector<int> VulkanInstance::able_devices() const {
+  for (const bool is_processor : {false, true}) {
+    std::vector<int> numbers;
+    for (std::size_t i = 0; i < devices_.size(); ++i) {
+      const VulkanDeviceInfo& device = devices_[i];
+      if (device.missing.empty() && device.is_processor == is_processor) numbers.push_back(int(i));
+    }
+    if (!numbers.empty()) return numbers;
+  }
+  throw Error(ErrorKind::Plugin,
+              "devices: none can trace paths; this machine has " + list_of_devices());
 }
 
 const VulkanDeviceInfo& VulkanInstance::device(int number) const {

@@ -30,8 +30,9 @@ class VulkanInstance {
   /// The one that all devices of the process come from; made when first asked for and never closed:
   /// drivers that are loaded again and again run out of room for their threads' variables.
   static const VulkanInstance& of_process();
+  static constexpr const char* kLoader = "libvulkan.so.1";
   /// Throws Error(Plugin) where there is no loader or no driver.
-  VulkanInstance();
+  explicit VulkanInstance(const char* loader = kLoader);
   ~VulkanInstance();
   VulkanInstance(const VulkanInstance&) = delete;
   VulkanInstance& operator=(const VulkanInstance&) = delete;
@@ -39,6 +40,8 @@ class VulkanInstance {
   const std::vector<VulkanDeviceInfo>& devices() const { return devices_; }
   /// Throws Error(Config) where there is no such device, Error(Plugin) where it lacks something.
   const VulkanDeviceInfo& device(int number) const;
+  /// Numbers of all that can trace paths; of processors only where there is nothing else.
+  std::vector<int> able_devices() const;
   /// "0: ...; 1: ...", see description_of().
   std::string list_of_devices() const;
   const VulkanInstanceFunctions& functions() const { return functions_; }

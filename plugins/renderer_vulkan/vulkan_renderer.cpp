@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "vulkan_renderer.h"
 
+#include <charconv>
 #include <chrono>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include "diorama/error.h"
@@ -13,7 +15,38 @@ void VulkanRenderer::Params::visit(ParamVisitor& v) {
   v.param("device", device,
           {"Which of the machine's Vulkan devices, counted from 0 as the driver lists them.", "", 0,
            1023});
+  v.param("devices", devices,
+          {"Several devices among which visits are shared, as a list such as [0, 1], or all: every "
+           "GPU; in place of device."});
   PictureParams::visit(v);
+}
+
+std::vector<int> VulkanRenderer::Params::device_numbers() const {
+  constexpr int kHighest = 1023;
+  if (devices.kind == Value::Kind::Null) return {device};
+  if (devices.kind == Value::Kind::Scalar && devices.scalar == "all") {
+    return VulkanInstance::of_process().able_devices();
+  }
+  const auto complain = [&](const Value& value) {
+    const std::string place = value.place.text();
+    throw Error(ErrorKind::Config, (place.empty() ? "" : place + ": ") +
+                                       "devices: expected a list of device numbers such as [0, 1], "
+                                       "or all, found " +
+                                       value.describe());
+  };
+  if (devices.kind != Value::Kind::List || devices.list.empty()) complain(devices);
+  std::vector<int> numbers;
+  for (const Value& value : devices.list) {
+    const std::string& text = value.scalar;
+    int number = -1;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+    const bool is_whole = error == std::errc() && end == text.data() + text.size();
+    if (value.kind != Value::Kind::Scalar || !is_whole || number < 0 || number > kHighest) {
+      complain(value);
+    }
+    numbers.push_back(number);
+  }
+  return numbers;
 }
 
 VulkanRenderer::VulkanRenderer(const Params& params, Host& host,
@@ -22,19 +55,15 @@ VulkanRenderer::VulkanRenderer(const Params& params, Host& host,
       device_(std::move(device)),
       scene_(*device_, host),
       tracer_(*device_, host) {
-  host.log(LogLevel::Info, "paths are traced by Vulkan device " + std::to_string(params.device) +
-                               " of " + device_->device.instance().list_of_devices());
+  host.log(LogLevel::Info, "paths are traced by Vulkan device " +
+                               std::to_string(device_->device.number()) + " of " +
+                               device_->device.instance().list_of_devices());
 }
 
 void VulkanRenderer::prepare_paths() { scene_.take(meshes().render_scene()); }
 
 Film VulkanRenderer::trace(const View& view, const PathSettings& settings, SamplePlan& plan) {
   using Clock = std::chrono::steady_clock;
-  if (view.has_shutter()) {
-    throw Error(ErrorKind::Config,
-                "a camera has exposure_time_s or readout_time_s, and the renderer vulkan shows no "
-                "motion as yet: use the renderer embree, or set both to 0");
-  }
   const auto start = Clock::now();
   tracer_.begin(view, settings, scene_.world(), meshes().window());
   Image<PixelSum> sums;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
 #include "embree_support/path_renderer.h"
 #include "gpu_path_tracer.h"
@@ -15,12 +16,15 @@ class VulkanRenderer final : public PathRenderer {
  public:
   struct Params : PictureParams {
     int device = 0;
+    Value devices;  ///< Null, `all` or a list of numbers.
 
     void visit(ParamVisitor& v);
+    /// Of the devices among which renderers are shared out. Throws Error(Config).
+    std::vector<int> device_numbers() const;
   };
 
   VulkanRenderer(const Params& params, Host& host)
-      : VulkanRenderer(params, host, shared_path_device(params.device)) {}
+      : VulkanRenderer(params, host, shared_path_device(params.device_numbers())) {}
   /// On a device that is open already.
   VulkanRenderer(const Params& params, Host& host, std::shared_ptr<const PathDevice> device);
 

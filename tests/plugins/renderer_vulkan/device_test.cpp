@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdlib>
 #include <future>
+#include <initializer_list>
 #include <span>
 #include <string>
 #include <utility>
@@ -66,6 +67,27 @@ TEST_CASE("a device that is not there is named with those that are", "[vulkan]")
   CHECK(text.find(VulkanInstance::of_process().device(0).name) != std::string::npos);
 }
 
+TEST_CASE("a machine without Vulkan is told what to install", "[vulkan_errors]") {
+  CHECK_THROWS_WITH(VulkanInstance("libno_vulkan_here.so.1"),
+                    "this machine has no Vulkan: libno_vulkan_here.so.1 is not there; install "
+                    "libvulkan1 and the driver of the device, or use the renderer embree");
+  CHECK_THROWS_WITH(VulkanInstance("libm.so.6"),
+                    "libm.so.6 is no Vulkan loader: it has no vkCreateInstance");
+}
+
+TEST_CASE("a device that cannot trace paths is told with what it lacks", "[vulkan_errors]") {
+  VulkanDeviceInfo device;
+  device.name = "Board";
+  device.driver = "driver 1";
+  device.api = "1.2.3";
+  device.memory = std::uint64_t(3) << 30;
+  CHECK(description_of(device) == "Board, driver 1, Vulkan 1.2.3, 3072 MiB");
+  device.missing = {"bufferDeviceAddress", "a queue for compute shaders"};
+  CHECK(description_of(device) ==
+        "Board, driver 1, Vulkan 1.2.3, 3072 MiB; lacks bufferDeviceAddress, a queue for compute "
+        "shaders");
+}
+
 TEST_CASE("a machine without a driver is told what to install", "[vulkan]") {
   if (!test::has_vulkan_device()) return;
   const Environment none("VK_ICD_FILENAMES", "/nowhere/no_icd.json");
@@ -103,6 +125,34 @@ TEST_CASE("a device is open once in a process, as long as it is used", "[vulkan]
   CHECK(shared_path_device(0) == test::path_device());
   CHECK_THROWS_WITH(shared_path_device(77), Catch::Contains("there is no Vulkan device 77"));
   CHECK(&test::path_device()->device.instance() == &VulkanInstance::of_process());
+}
+
+TEST_CASE("devices are numbers, or all", "[vulkan]") {
+  if (!test::has_vulkan_device()) return;
+  const auto numbers_of = [](const Value& devices) {
+    VulkanRenderer::Params params;
+    params.device = 3;
+    params.devices = devices;
+    return params.device_numbers();
+  };
+  const auto list_of = [](std::initializer_list<const char*> texts) {
+    Value list = Value::make_list();
+    for (const char* text : texts) list.list.push_back(Value::text(text));
+    return list;
+  };
+  CHECK(numbers_of({}) == std::vector<int>{3});
+  CHECK(numbers_of(list_of({"0", "0", "2"})) == std::vector<int>{0, 0, 2});
+  CHECK_FALSE(numbers_of(Value::text("all")).empty());
+  constexpr const char* kWanted =
+      "devices: expected a list of device numbers such as [0, 1], or all, found ";
+  CHECK_THROWS_WITH(numbers_of(Value::text("both")), Catch::StartsWith(kWanted));
+  CHECK_THROWS_WITH(numbers_of(list_of({})), Catch::StartsWith(kWanted));
+  for (const char* wrong : {"-1", "1.5", "1024", "99999999999", "", "one"}) {
+    CHECK_THROWS_WITH(numbers_of(list_of({"0", wrong})), Catch::StartsWith(kWanted));
+  }
+  VulkanRenderer::Params params;
+  params.devices = list_of({"0", "77"});
+  CHECK(error_of(params).starts_with("device: there is no Vulkan device 77; this machine has 0: "));
 }
 
 TEST_CASE("several threads send bytes to one device and get their own back", "[vulkan]") {
