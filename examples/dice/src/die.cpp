@@ -24,9 +24,11 @@ constexpr int kAtlasWidth = 3 * kTile;
 constexpr int kAtlasHeight = 2 * kTile;
 constexpr int kCells = 18;  ///< Squares along the edge of a face.
 
-/// Signed distance, all but exact near the surface, in half edges.
-double distance(const DieLook& look, const Vec3& p) {
-  const Vec3 q = p.cwiseAbs() - Vec3::Constant(1.0 - look.rounding);
+/// Signed distance, all but exact near the surface, in half edges; with a dome every face is a part
+/// of a large ball.
+double distance(const DieLook& look, const Vec3& p, double dome = 0.0) {
+  const Vec3 bulge = 0.5 * dome * (Vec3::Constant(p.squaredNorm()) - p.cwiseAbs2());
+  const Vec3 q = p.cwiseAbs() + bulge - Vec3::Constant(1.0 - look.rounding);
   const double box = q.cwiseMax(0.0).norm() + std::min(q.maxCoeff(), 0.0) - look.rounding;
   const double ball = p.norm() - look.ball;
   // The greater of both, with a small fillet between them.
@@ -35,12 +37,14 @@ double distance(const DieLook& look, const Vec3& p) {
   return std::max(box, ball) + 0.25 * h * h * kFillet;
 }
 
-Vec3 gradient(const DieLook& look, const Vec3& p) {
+/// Polished faces are not quite flat, and mirror lamps that flat ones would miss. Light shows that,
+/// outlines do not, so only normals know: dice rest on flat faces.
+Vec3 shading_normal(const DieLook& look, const Vec3& p) {
   constexpr double kStep = 1e-4;
   Vec3 slope;
   for (int axis = 0; axis < 3; ++axis) {
     const Vec3 step = kStep * Vec3::Unit(axis);
-    slope[axis] = distance(look, p + step) - distance(look, p - step);
+    slope[axis] = distance(look, p + step, look.dome) - distance(look, p - step, look.dome);
   }
   return slope.normalized();
 }
@@ -129,7 +133,7 @@ Color face_color(const DieLook& look, const std::array<Mat3, 6>& turns, int numb
   double share = pip_share(look, number, at, 0.012);
   if (look.wear > 0.0) {
     const double chip = noise(look.seed + 90, 5.0 * place, 3);
-    share *= 1.0 - 0.8 * smooth_step(0.1, 0.3, chip + look.wear - 0.7);
+    share *= 1.0 - 0.5 * smooth_step(0.1, 0.3, chip + look.wear - 0.7);
   }
   return mix(color, number == 1 ? look.one : look.pips, share);
 }
@@ -169,7 +173,7 @@ Color pip_color(Rng& rng, const Color& body, const Color& second) {
     if (kind > 0.80) color = from_hsv(0.98, 0.7 + 0.3 * shade, 0.6 + 0.35 * shade);
     if (kind > 0.90) color = from_hsv(shade, 0.7, 0.9);
     const double found = std::min(contrast(color, body), contrast(color, second));
-    if (found > 0.5) return color;
+    if (found > 0.6) return color;
     if (found > best_contrast) {
       best = color;
       best_contrast = found;
@@ -188,12 +192,13 @@ DieLook any_shape(Rng& rng) {
                               : 0.010 + 0.010 * any_size;
   look.rounding = rng.uniform(0.08, 0.34);
   look.ball = rng.chance(0.4) ? rng.uniform(1.28, 1.5) : 2.0;
+  look.dome = rng.chance(0.7) ? rng.uniform(0.02, 0.25) : 0.0;
   look.is_mirrored = rng.chance(0.5);
   for (bool& turned : look.is_turned) turned = rng.chance(0.5);
   look.pip_offset = rng.uniform(0.44, 0.58);
   look.pip_radius = std::min(rng.uniform(0.15, 0.25), 0.42 * look.pip_offset);
   look.dent = rng.chance(0.2) ? 0.0 : rng.uniform(0.2, 0.9);
-  look.first_pip = rng.chance(0.1) ? rng.uniform(1.2, 1.8) : 1.0;
+  look.first_pip = rng.chance(0.06) ? rng.uniform(1.2, 1.8) : 1.0;
   return look;
 }
 
@@ -234,10 +239,10 @@ std::vector<Vec2> pip_places(const DieLook& look, int number) {
 DieLook any_look(Rng rng) {
   DieLook look = any_shape(rng);
   const double kind = rng.uniform();
-  look.body = kind < 0.42   ? Body::Plain
-              : kind < 0.78 ? Body::Marbled
-              : kind < 0.85 ? Body::Speckled
-              : kind < 0.92 ? Body::Striped
+  look.body = kind < 0.45   ? Body::Plain
+              : kind < 0.84 ? Body::Marbled
+              : kind < 0.89 ? Body::Speckled
+              : kind < 0.94 ? Body::Striped
                             : Body::Clear;
   look.color = any_color(rng);
   look.second = any_color(rng);
@@ -247,9 +252,9 @@ DieLook any_look(Rng rng) {
   const bool is_one_color = look.body == Body::Plain || look.body == Body::Clear;
   look.pips = pip_color(rng, look.color, is_one_color ? look.color : look.second);
   look.one = rng.chance(0.08) ? Color(0.75f, 0.05f, 0.05f) : look.pips;
-  if (contrast(look.one, look.color) < 0.5) look.one = look.pips;
+  if (contrast(look.one, look.color) < 0.6) look.one = look.pips;
   look.pattern_scale = rng.uniform(0.5, 2.0);
-  look.wear = rng.chance(0.15) ? rng.uniform(0.2, 0.8) : 0.0;
+  look.wear = rng.chance(0.1) ? rng.uniform(0.2, 0.8) : 0.0;
   look.roughness = rng.chance(0.6) ? rng.uniform(0.03, 0.15) : rng.uniform(0.15, 0.4);
   look.clearcoat = rng.chance(0.6) ? rng.uniform(0.3, 1.0) : 0.0;
   if (look.body == Body::Clear) look.transmission = rng.uniform(0.3, 0.7);
@@ -283,7 +288,7 @@ std::shared_ptr<const Mesh> die_mesh(const DieLook& look) {
         const Vec3 on_face = turn.transpose() * p;
         const Vec2 pixel = atlas_point(number, on_face.head<2>());
         mesh->positions.push_back((half_m * p).cast<float>());
-        mesh->normals.push_back(gradient(look, p).cast<float>());
+        mesh->normals.push_back(shading_normal(look, p).cast<float>());
         mesh->uvs.emplace_back(float(pixel.x() / kAtlasWidth),
                                float(1.0 - pixel.y() / kAtlasHeight));
       }

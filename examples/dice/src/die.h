@@ -16,6 +16,7 @@ struct DieLook {
   double edge_m = 0.016;
   double rounding = 0.2;  ///< Radius of the edges.
   double ball = 2.0;      ///< Radius of the ball that cuts the corners; above 1.73 it cuts nothing.
+  double dome = 0.0;      ///< Faces shine as if they bulged with this curvature, per half edge.
   bool is_mirrored = false;  ///< 1, 2, 3 run clockwise round their corner.
   /// The two, three and six may lie either way on their faces.
   std::array<bool, 3> is_turned{};

@@ -150,10 +150,10 @@ MaterialPtr print(Rng& rng, double size_m, double repeat_m) {
 
 MaterialPtr any_surface(Rng& rng, double size_m) {
   const double kind = rng.uniform();
-  if (kind < 0.58) return sheet(rng, white(rng), size_m);
-  if (kind < 0.67) return sheet(rng, any_color(rng), size_m);
-  if (kind < 0.81) return wood(rng, size_m);
-  if (kind < 0.92) return cloth(rng, size_m);
+  if (kind < 0.70) return sheet(rng, white(rng), size_m);
+  if (kind < 0.78) return sheet(rng, any_color(rng), size_m);
+  if (kind < 0.88) return wood(rng, size_m);
+  if (kind < 0.95) return cloth(rng, size_m);
   return print(rng, size_m, rng.uniform(0.1, 0.5));
 }
 

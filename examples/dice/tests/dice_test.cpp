@@ -72,7 +72,8 @@ void label(Scene& scene) {
 }
 
 /// Counts what is painted on the part of a two-coloured die that faces upwards: vertices whose
-/// normal looks up tell which part of the picture that is, and spots in it are counted by filling.
+/// normal looks up (those of other faces are off by 42 degrees at least) tell which part of the
+/// picture that is, and spots in it are counted by filling.
 int spots_on_top(const Scene& scene, NodeId die) {
   const NodeId body = scene[die].children.front();
   const diorama::Mesh& mesh = *scene[body].mesh;
@@ -80,7 +81,7 @@ int spots_on_top(const Scene& scene, NodeId die) {
   const diorama::Mat3 turn = scene.world_from_node(body).linear();
   Eigen::AlignedBox2d seen;
   for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
-    if ((turn * mesh.normals[i].cast<double>()).z() > 0.9) seen.extend(mesh.uvs[i].cast<double>());
+    if ((turn * mesh.normals[i].cast<double>()).z() > 0.76) seen.extend(mesh.uvs[i].cast<double>());
   }
   const int x_min = int(std::lround(seen.min().x() * picture.width));
   const int x_max = int(std::lround(seen.max().x() * picture.width));
