@@ -60,7 +60,7 @@ std::vector<std::uint8_t> bytes_by_code(int largest_code) {
 }
 
 /// Gaussian blur; outside of the picture is its edge.
-Image<Vec3f> blurred(const Image<Vec3f>& picture, double sigma_px) {
+Image<Vec3f> blurred(const Image<Vec3f>& picture, double sigma_px, Host& host) {
   const int reach = std::max(1, int(std::ceil(3.0 * sigma_px)));
   std::vector<float> weights;
   float sum = 0.0f;
@@ -70,26 +70,31 @@ Image<Vec3f> blurred(const Image<Vec3f>& picture, double sigma_px) {
   }
   for (float& weight : weights) weight /= sum;
   const int width = picture.width(), height = picture.height();
-  const auto along = [&](const Image<Vec3f>& from, int step_x, int step_y) {
-    Image<Vec3f> to(width, height, Vec3f::Zero());
-    for (int y = 0; y < height; ++y) {
+  Image<Vec3f> lines(width, height, Vec3f::Zero());
+  Image<Vec3f> both(width, height, Vec3f::Zero());
+  host.parallel_for(std::size_t(height), [&](std::size_t y) {
+    const auto from = picture.row(int(y));
+    const auto to = lines.row(int(y));
+    for (int i = -reach; i <= reach; ++i) {
+      const float weight = weights[std::size_t(i + reach)];
       for (int x = 0; x < width; ++x) {
-        Vec3f mean = Vec3f::Zero();
-        for (int i = -reach; i <= reach; ++i) {
-          mean +=
-              weights[std::size_t(i + reach)] * from.at(std::clamp(x + i * step_x, 0, width - 1),
-                                                        std::clamp(y + i * step_y, 0, height - 1));
-        }
-        to.at(x, y) = mean;
+        to[std::size_t(x)] += weight * from[std::size_t(std::clamp(x + i, 0, width - 1))];
       }
     }
-    return to;
-  };
-  return along(along(picture, 1, 0), 0, 1);
+  });
+  host.parallel_for(std::size_t(height), [&](std::size_t y) {
+    const auto to = both.row(int(y));
+    for (int i = -reach; i <= reach; ++i) {
+      const float weight = weights[std::size_t(i + reach)];
+      const auto from = lines.row(std::clamp(int(y) + i, 0, height - 1));
+      for (std::size_t x = 0; x < to.size(); ++x) to[x] += weight * from[x];
+    }
+  });
+  return both;
 }
 
 /// What the software of a camera makes of an encoded picture: less noise, sharper edges.
-void finish(Image<Rgba8>& picture, double smoothing_px, double sharpening) {
+void finish(Image<Rgba8>& picture, double smoothing_px, double sharpening, Host& host) {
   constexpr double kSharpeningRadius_px = 1.0;
   if (smoothing_px <= 0.0 && sharpening <= 0.0) return;
   Image<Vec3f> smooth(picture.width(), picture.height(), Vec3f::Zero());
@@ -97,20 +102,20 @@ void finish(Image<Rgba8>& picture, double smoothing_px, double sharpening) {
     const Rgba8& pixel = picture.pixels()[i];
     smooth.pixels()[i] = Vec3f(pixel[0], pixel[1], pixel[2]);
   }
-  if (smoothing_px > 0.0) smooth = blurred(smooth, smoothing_px);
-  if (sharpening > 0.0) {
-    const Image<Vec3f> soft = blurred(smooth, kSharpeningRadius_px);
-    for (std::size_t i = 0; i < smooth.pixels().size(); ++i) {
-      Vec3f& pixel = smooth.pixels()[i];
-      pixel += float(sharpening) * (pixel - soft.pixels()[i]);
+  if (smoothing_px > 0.0) smooth = blurred(smooth, smoothing_px, host);
+  const Image<Vec3f> soft = sharpening > 0.0 ? blurred(smooth, kSharpeningRadius_px, host) : smooth;
+  host.parallel_for(std::size_t(picture.height()), [&](std::size_t y) {
+    const auto from = smooth.row(int(y));
+    const auto low = soft.row(int(y));
+    const auto to = picture.row(int(y));
+    for (std::size_t x = 0; x < to.size(); ++x) {
+      const Vec3f pixel = from[x] + float(sharpening) * (from[x] - low[x]);
+      for (std::size_t k = 0; k < 3; ++k) {
+        const float value = std::clamp(pixel[Eigen::Index(k)], 0.0f, 255.0f);
+        to[x][k] = std::uint8_t(std::lround(value));
+      }
     }
-  }
-  for (std::size_t i = 0; i < smooth.pixels().size(); ++i) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      const float value = std::clamp(smooth.pixels()[i][Eigen::Index(k)], 0.0f, 255.0f);
-      picture.pixels()[i][k] = std::uint8_t(std::lround(value));
-    }
-  }
+  });
 }
 
 }  // namespace
@@ -216,7 +221,7 @@ void CameraSensor::do_annotate(const Scene&, Frame& frame) const {
     }
   });
   finish(picture, drawn(params_.smoothing_px, "smoothing_px"),
-         drawn(params_.sharpening, "sharpening"));
+         drawn(params_.sharpening, "sharpening"), host_);
   frame.set(kColor, std::move(picture));
 }
 

@@ -158,22 +158,41 @@ std::shared_ptr<const diorama::Texture> dents(const DieLook& look) {
   return texture;
 }
 
-double contrast(const Color& a, const Color& b) { return double((a - b).norm()); }
+/// How far apart two paints look: light against dark tells most.
+double contrast(const Color& a, const Color& b) {
+  const auto lightness = [](const Color& c) {
+    return 0.3 * double(c.x()) + 0.59 * double(c.y()) + 0.11 * double(c.z());
+  };
+  const double light = lightness(a) - lightness(b);
+  return std::sqrt(light * light + 0.6 * double((a - b).squaredNorm()));
+}
 
-/// Paint for pips that can be told from both colours of a body.
-Color pip_color(Rng& rng, const Color& body, const Color& second) {
+/// Paint for pips, as common as it is sold.
+Color any_paint(Rng& rng) {
+  const double kind = rng.uniform();
+  const double shade = rng.uniform();
+  if (kind < 0.42) return from_hsv(0.13, 0.1 * shade, 0.85 + 0.15 * shade);
+  if (kind < 0.64) return from_hsv(0.6, 0.3 * shade, 0.03 + 0.1 * shade);
+  if (kind < 0.76)
+    return from_hsv(0.1 + 0.06 * shade, 0.6 + 0.35 * shade, 0.75 + 0.2 * shade);  // yellow, gold
+  if (kind < 0.94) return from_hsv(0.98, 0.7 + 0.3 * shade, 0.5 + 0.45 * shade);
+  return from_hsv(shade, 0.7, 0.9);
+}
+
+/// Paint for pips that can be told from all colours of a body: on some dice at a glance, on others
+/// (dark red on black) just so.
+Color pip_color(Rng& rng, const DieLook& look) {
+  const double wanted = rng.chance(0.3) ? rng.uniform(0.27, 0.5) : rng.uniform(0.5, 0.8);
+  const bool is_one_color = look.body == Body::Plain || look.body == Body::Clear;
   Color best = Color::Ones();
   double best_contrast = -1.0;
   for (int i = 0; i < 20; ++i) {
-    const double kind = rng.uniform();
-    const double shade = rng.uniform();
-    Color color = from_hsv(0.13, 0.1 * shade, 0.9 + 0.1 * shade);
-    if (kind > 0.46) color = from_hsv(0.6, 0.3 * shade, 0.03 + 0.1 * shade);
-    if (kind > 0.68) color = from_hsv(0.1 + 0.06 * shade, 0.6 + 0.35 * shade, 0.75 + 0.2 * shade);
-    if (kind > 0.80) color = from_hsv(0.98, 0.7 + 0.3 * shade, 0.6 + 0.35 * shade);
-    if (kind > 0.90) color = from_hsv(shade, 0.7, 0.9);
-    const double found = std::min(contrast(color, body), contrast(color, second));
-    if (found > 0.6) return color;
+    const Color color = any_paint(rng);
+    double found = contrast(color, look.color);
+    if (!is_one_color) {
+      found = std::min({found, contrast(color, look.second), contrast(color, look.third)});
+    }
+    if (found > wanted) return color;
     if (found > best_contrast) {
       best = color;
       best_contrast = found;
@@ -192,13 +211,13 @@ DieLook any_shape(Rng& rng) {
                               : 0.010 + 0.010 * any_size;
   look.rounding = rng.uniform(0.08, 0.34);
   look.ball = rng.chance(0.4) ? rng.uniform(1.28, 1.5) : 2.0;
-  look.dome = rng.chance(0.7) ? rng.uniform(0.02, 0.25) : 0.0;
+  look.dome = rng.chance(0.8) ? rng.uniform(0.02, 0.3) : 0.0;
   look.is_mirrored = rng.chance(0.5);
   for (bool& turned : look.is_turned) turned = rng.chance(0.5);
   look.pip_offset = rng.uniform(0.44, 0.58);
-  look.pip_radius = std::min(rng.uniform(0.15, 0.25), 0.42 * look.pip_offset);
+  look.pip_radius = std::min(rng.uniform(0.16, 0.27), 0.45 * look.pip_offset);
   look.dent = rng.chance(0.2) ? 0.0 : rng.uniform(0.2, 0.9);
-  look.first_pip = rng.chance(0.06) ? rng.uniform(1.2, 1.8) : 1.0;
+  look.first_pip = rng.chance(0.06) ? rng.uniform(1.2, 1.6) : 1.0;
   return look;
 }
 
@@ -239,25 +258,24 @@ std::vector<Vec2> pip_places(const DieLook& look, int number) {
 DieLook any_look(Rng rng) {
   DieLook look = any_shape(rng);
   const double kind = rng.uniform();
-  look.body = kind < 0.45   ? Body::Plain
-              : kind < 0.84 ? Body::Marbled
-              : kind < 0.89 ? Body::Speckled
-              : kind < 0.94 ? Body::Striped
+  look.body = kind < 0.46   ? Body::Plain
+              : kind < 0.90 ? Body::Marbled
+              : kind < 0.93 ? Body::Speckled
+              : kind < 0.97 ? Body::Striped
                             : Body::Clear;
   look.color = any_color(rng);
-  look.second = any_color(rng);
-  look.third = any_color(rng);
-  // Pearl is one colour in two depths as often as two colours.
-  if (rng.chance(0.5)) look.second = mix(look.color, Color::Zero(), rng.uniform(0.4, 0.9));
-  const bool is_one_color = look.body == Body::Plain || look.body == Body::Clear;
-  look.pips = pip_color(rng, look.color, is_one_color ? look.color : look.second);
+  // Pearl is one colour in two depths as often as two colours; veins are a little lighter or darker.
+  look.second = rng.chance(0.6) ? mix(look.color, Color::Zero(), rng.uniform(0.2, 0.8))
+                                : mix(look.color, any_color(rng), rng.uniform(0.4, 1.0));
+  look.third = mix(look.color, any_color(rng), rng.uniform(0.1, 0.6));
+  look.pips = pip_color(rng, look);
   look.one = rng.chance(0.08) ? Color(0.75f, 0.05f, 0.05f) : look.pips;
-  if (contrast(look.one, look.color) < 0.6) look.one = look.pips;
-  look.pattern_scale = rng.uniform(0.5, 2.0);
-  look.wear = rng.chance(0.1) ? rng.uniform(0.2, 0.8) : 0.0;
+  if (contrast(look.one, look.color) < 0.5) look.one = look.pips;
+  look.pattern_scale = rng.uniform(0.4, 1.6);
+  look.wear = rng.chance(0.08) ? rng.uniform(0.2, 0.6) : 0.0;
   look.roughness = rng.chance(0.6) ? rng.uniform(0.03, 0.15) : rng.uniform(0.15, 0.4);
   look.clearcoat = rng.chance(0.6) ? rng.uniform(0.3, 1.0) : 0.0;
-  if (look.body == Body::Clear) look.transmission = rng.uniform(0.3, 0.7);
+  if (look.body == Body::Clear) look.transmission = rng.uniform(0.15, 0.4);
   return look;
 }
 

@@ -222,6 +222,14 @@ void add_clutter(Rng& rng, Builder& builder, double x, double y, double floor) {
   }
 }
 
+/// Who takes the picture bends over the table: polished dice mirror a dark shape with light round it.
+void add_onlooker(Rng rng, Builder& builder) {
+  const Vec3 size(rng.uniform(0.1, 0.35), rng.uniform(0.08, 0.3), 0.02);
+  const Affine above = at(rng.uniform(-0.12, 0.12), rng.uniform(-0.12, 0.12),
+                          rng.uniform(0.54, 0.8), rng.uniform(0.0, diorama::kPi));
+  builder.box("onlooker", size, above, coated(from_hsv(0.0, 0.0, rng.uniform(0.05, 0.35)), 0.8));
+}
+
 void build_any(Rng rng, Builder& builder, double& half_x, double& half_y) {
   const bool has_tray = rng.chance(0.45);
   half_x = rng.uniform(0.11, 0.18);
@@ -244,6 +252,7 @@ void build_any(Rng rng, Builder& builder, double& half_x, double& half_y) {
   }
   builder.box("table", {kTable_m, kTable_m, 0.04}, at(0.0, 0.0, floor - 0.02),
               any_surface(rng, kTable_m));
+  if (rng.chance(0.6)) add_onlooker(rng.fork("onlooker"), builder);
   const int strips = rng.chance(0.4) ? 1 + int(rng.index(2)) : 0;
   for (int i = 0; i < strips; ++i) {
     const double turn = 0.5 * diorama::kPi * double(rng.index(4));
