@@ -264,7 +264,8 @@ DieLook any_look(Rng rng) {
               : kind < 0.97 ? Body::Striped
                             : Body::Clear;
   look.color = any_color(rng);
-  // Pearl is one colour in two depths as often as two colours; veins are a little lighter or darker.
+  // Pearl is one colour in two depths as often as two colours; veins are a little lighter or
+  // darker.
   look.second = rng.chance(0.6) ? mix(look.color, Color::Zero(), rng.uniform(0.2, 0.8))
                                 : mix(look.color, any_color(rng), rng.uniform(0.4, 1.0));
   look.third = mix(look.color, any_color(rng), rng.uniform(0.1, 0.6));

@@ -222,7 +222,8 @@ void add_clutter(Rng& rng, Builder& builder, double x, double y, double floor) {
   }
 }
 
-/// Who takes the picture bends over the table: polished dice mirror a dark shape with light round it.
+/// Who takes the picture bends over the table: polished dice mirror a dark shape with light round
+/// it.
 void add_onlooker(Rng rng, Builder& builder) {
   const Vec3 size(rng.uniform(0.1, 0.35), rng.uniform(0.08, 0.3), 0.02);
   const Affine above = at(rng.uniform(-0.12, 0.12), rng.uniform(-0.12, 0.12),
