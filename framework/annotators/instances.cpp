@@ -60,6 +60,28 @@ Aabb instance_bounds(const Scene& scene, const LabelledInstance& instance) {
   return box;
 }
 
+std::vector<Keypoint> instance_keypoints(const Scene& scene, NodeId labelled) {
+  std::vector<Keypoint> points;
+  const Affine node_from_world = scene.world_from_node(labelled).inverse();
+  std::vector<NodeId> waiting{labelled};
+  while (!waiting.empty()) {
+    const NodeId id = waiting.back();
+    waiting.pop_back();
+    const Node& node = scene[id];
+    for (const Keypoint& point : node.keypoints) {
+      if (std::ranges::find(points, point.name, &Keypoint::name) != points.end()) continue;
+      const Vec3 place = id == labelled
+                             ? point.position
+                             : Vec3(node_from_world * (scene.world_from_node(id) * point.position));
+      points.push_back({point.name, place});
+    }
+    for (auto child = node.children.rbegin(); child != node.children.rend(); ++child) {
+      if (scene[*child].labels.empty()) waiting.push_back(*child);
+    }
+  }
+  return points;
+}
+
 NameSet Instances::needs() const { return {std::string(kInstanceId.name)}; }
 NameSet Instances::provides() const { return {"instances"}; }
 
@@ -72,6 +94,7 @@ void Instances::do_annotate(const Scene& scene, Frame& frame) const {
     instance.labels = scene.effective_labels(labelled.node);
     instance.world_from_node = scene.world_from_node(labelled.node);
     instance.bounds_node = instance_bounds(scene, labelled);
+    instance.keypoints = instance_keypoints(scene, labelled.node);
     frame.instances.push_back(std::move(instance));
   }
   measure_tight_boxes(frame.get(kInstanceId), frame.instances);

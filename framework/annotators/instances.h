@@ -14,6 +14,9 @@ namespace diorama {
 /// instance of its own and does not widen the outer one.
 Aabb instance_bounds(const Scene& scene, const LabelledInstance& instance);
 
+/// Keypoints of a labelled node and of what below it belongs to it, in its space; each name once.
+std::vector<Keypoint> instance_keypoints(const Scene& scene, NodeId labelled);
+
 /// Sets Instance::tight_box of those that have pixels; `ids` is kInstanceId.
 void measure_tight_boxes(const Image<std::uint32_t>& ids, std::vector<Instance>& instances);
 

@@ -113,6 +113,7 @@ class Bytes {
     add_all(instance.id, instance.node_path, instance.labels, instance.world_from_node,
             instance.bounds_node.min, instance.bounds_node.max, instance.tight_box,
             instance.visibility);
+    for (const Keypoint& point : instance.keypoints) add_all(point.name, point.position);
   }
   void add(const AnyImage& any) {
     std::visit(

@@ -154,6 +154,12 @@ void AssetPrefix::visit(ParamVisitor& v) {
           {"Folder below the assets root in which the rest of such a name is looked up."});
 }
 
+fs::path keypoints_file(std::string_view asset) {
+  if (has_scheme(asset)) return {};
+  fs::path file(split_variants(asset).first);
+  return file.replace_extension(".keypoints.yaml");
+}
+
 std::pair<std::string_view, std::string_view> split_variants(std::string_view asset) {
   if (!asset.ends_with('}') || is_there(asset)) return {asset, {}};
   const std::size_t slash = asset.rfind('/');

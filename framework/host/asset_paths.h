@@ -59,6 +59,10 @@ std::optional<std::filesystem::path> choose_assets_root(
     const std::optional<std::filesystem::path>& job,
     const std::optional<std::filesystem::path>& sample_pack);
 
+/// The file beside an asset that says its keypoints: mug.keypoints.yaml for mug.usd. Empty for
+/// what is no file.
+std::filesystem::path keypoints_file(std::string_view asset);
+
 /// A name without the variants behind it, and these: "mug.usd" and "{look=red}{size=big}". A file
 /// that is really called so has none.
 std::pair<std::string_view, std::string_view> split_variants(std::string_view asset);

@@ -227,8 +227,12 @@ std::vector<fs::path> HostServices::files_of(std::string_view asset) {
   const std::optional<Source> source = claimed_source(asset);
   if (!source) return {paths_.resolve(asset)};
   Loader& reader = loader(source->loader);
-  return call_component("loader '" + source->loader + "'",
-                        [&] { return reader.files(source->asset); });
+  std::vector<fs::path> files = call_component("loader '" + source->loader + "'",
+                                               [&] { return reader.files(source->asset); });
+  const fs::path points = keypoints_file(source->asset);
+  std::error_code error;
+  if (!points.empty() && fs::is_regular_file(points, error)) files.push_back(points);
+  return files;
 }
 
 NodeId HostServices::load_asset(std::string_view asset, Scene& scene, NodeId parent) {

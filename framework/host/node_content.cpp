@@ -10,6 +10,7 @@ namespace diorama {
 void copy_content(const Node& from, Node& to) {
   to.is_visible = from.is_visible;
   to.labels = from.labels;
+  to.keypoints = from.keypoints;
   to.mesh = from.mesh;
   to.materials = from.materials;
   to.light = from.light;

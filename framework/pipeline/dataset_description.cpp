@@ -249,10 +249,17 @@ DatasetInfo describe_dataset(const Job& job, const CapturePlan& plan, std::strin
   info.capture_count = plan.capture_count();
   info.camera_names = job.camera_names();
   std::set<Labels> labels;
+  std::map<Labels, std::vector<std::string>> keypoints;
   visit_planned_objects(job, plan, [&](const PlannedObject& object) {
-    if (!object.labels.empty()) labels.insert(object.labels);
+    if (object.labels.empty()) return;
+    labels.insert(object.labels);
+    for (const std::string& name : job.objects[object.group].keypoints) {
+      std::vector<std::string>& names = keypoints[object.labels];
+      if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+    }
   });
   info.labels.assign(labels.begin(), labels.end());
+  info.keypoints.assign(keypoints.begin(), keypoints.end());
   info.resolved_job = std::move(resolved);
   info.program_version = std::move(program_version);
   info.plugin_versions = std::move(plugin_versions);

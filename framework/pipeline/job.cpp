@@ -644,6 +644,10 @@ void ObjectGroup::visit(ParamVisitor& v) {
   v.param("label_replacement", label_replacement,
           {"What a match of label_pattern becomes; `$1` is its first group."});
   v.param("taxonomy", taxonomy, {"Taxonomy of the label."});
+  v.param(
+      "keypoints", keypoints,
+      {"Names of keypoints, in their order, that labels tell of these objects: of those that the "
+       "assets bring along, or of FILE.keypoints.yaml beside them."});
   v.param("variants", variants,
           {"Variants of the assets to choose from, by set: {lookVariant: [red, blue]}. Drawn for "
            "each object; null: what the asset itself selects."});

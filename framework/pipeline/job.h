@@ -55,6 +55,7 @@ struct ObjectGroup {
   std::optional<std::string> label_pattern;
   std::string label_replacement;
   std::string taxonomy = "class";
+  std::vector<std::string> keypoints;
   Value variants;  ///< As given.
   /// Variant set and what is chosen from, in the job's order.
   std::vector<std::pair<std::string, std::vector<std::string>>> variant_sets;

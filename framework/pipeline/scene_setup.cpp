@@ -9,6 +9,7 @@
 #include "framework/config/clean_text.h"
 #include "framework/host/node_content.h"
 #include "framework/pipeline/camera_rig.h"
+#include "framework/pipeline/keypoints.h"
 #include "framework/pipeline/lamps.h"
 #include "framework/plugins/plugin_call.h"
 
@@ -132,7 +133,8 @@ NodeId spawn(const PlannedObject& planned, const ObjectGroup& group, Scene& scen
   if (scene.path(object) != planned.path) {
     throw Error(ErrorKind::Internal, "object " + planned.path + " became " + scene.path(object));
   }
-  host.load_asset(planned.asset, scene, object);
+  const NodeId root = host.load_asset(planned.asset, scene, object);
+  keep_keypoints(scene, object, root, planned.asset, group.keypoints);
   for (const NodeId node : scene.subtree(object)) {
     if (!scene[node].labels.empty()) scene.edit(node).labels.clear();
   }

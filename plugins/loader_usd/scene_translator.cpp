@@ -218,6 +218,9 @@ void SceneTranslator::translate_prim(const Prim& prim, const Place& parent, cons
   if (prim.type_name == "Camera") add_camera(prim, place);
   if (prim.traits.is_light) add_light(prim, place);
   add_labels(prim, place.node);
+  if (const auto name = usd::token_or(stage_, prim, "diorama:keypoint", ""); !name.empty()) {
+    scene_.edit(place.node).keypoints = {{name, Vec3::Zero()}};
+  }
   if (prim.type_name == "PointInstancer") {
     add_instances(prim, place);
   } else {

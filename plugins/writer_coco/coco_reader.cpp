@@ -368,6 +368,10 @@ class CocoImageReading : private FrameReading {
     const auto numbers = json.at("keypoints").get<std::vector<double>>();
     files_.check(numbers.size() % 3 == 0, kReadable, part_.file, who,
                  "its keypoints are not threes of numbers");
+    files_.check(category.keypoint_count == 0 || numbers.size() == 3 * category.keypoint_count,
+                 kCounts, part_.file, who,
+                 "has " + std::to_string(numbers.size() / 3) + " keypoints",
+                 std::to_string(category.keypoint_count) + ", as its category names");
     int count = 0;
     Eigen::AlignedBox2d extent;
     for (std::size_t i = 0; i + 2 < numbers.size(); i += 3) {

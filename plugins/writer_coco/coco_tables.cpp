@@ -143,6 +143,7 @@ class TableReader {
     category.name = json.at("name").get<std::string>();
     category.is_thing = json.value("isthing", 1) != 0;
     if (const auto points = json.find("keypoints"); points != json.end() && points->is_array()) {
+      category.keypoint_count = points->size();
       category.has_cuboid_keypoints =
           points->size() == 9 && points->at(0) == "Center" && points->at(1) == "LDB";
     }

@@ -15,7 +15,8 @@ namespace diorama {
 /// A category as annotation files list it.
 struct StoredCategory {
   std::string name;
-  bool is_thing = true;               ///< Something that is counted; else a region.
+  bool is_thing = true;  ///< Something that is counted; else a region.
+  std::size_t keypoint_count = 0;
   bool has_cuboid_keypoints = false;  ///< Middle and corners of a 3-D box, as our writer has them.
 };
 

@@ -23,16 +23,22 @@ constexpr const char* kSegmentations[] = {"rle", "polygon"};
 
 Json box_json(const PixelBox& box) { return {box.x_min, box.y_min, box.width(), box.height()}; }
 
-/// Flat x, y, v: 0 not in the image, 1 hidden, 2 visible.
-Json keypoints_json(const Frame& frame, const Instance& instance, int& count) {
+/// Flat x, y, v: 0 not in the image, 1 hidden, 2 visible. Of the named ones, if there are any, or
+/// of the box.
+Json keypoints_json(const Frame& frame, const Instance& instance,
+                    const std::vector<std::string>& names, int& count) {
   Json list = Json::array();
-  for (const Keypoint& keypoint : kCuboidKeypoints) {
-    const ImagePoint point = image_point(
-        frame, instance.world_from_node * keypoint_in_box(instance.bounds_node, keypoint));
+  const auto add = [&](const ImagePoint& point) {
     if (point.state != ImagePoint::State::Outside) ++count;
     list.push_back(python_round(point.pixel.x(), 3));
     list.push_back(python_round(point.pixel.y(), 3));
     list.push_back(int(point.state));
+  };
+  for (const std::string& name : names) add(named_point(frame, instance, name));
+  if (!names.empty()) return list;
+  for (const CuboidPoint& keypoint : kCuboidKeypoints) {
+    add(image_point(frame,
+                    instance.world_from_node * keypoint_in_box(instance.bounds_node, keypoint)));
   }
   return list;
 }
@@ -204,7 +210,9 @@ TrainingParams with_categories(TrainingParams params, const std::vector<CocoCate
 
 void CocoWriter::Params::visit(ParamVisitor& v) {
   training.visit(v);
-  v.param("keypoints", keypoints, {"Box centre and corners as keypoints."});
+  v.param("keypoints", keypoints,
+          {"Keypoints: those that the job names for the objects of a class, else box centre and "
+           "corners."});
   v.param("amodal", amodal,
           {"Mask, box and area of the whole object, and who hides it, under \"amodal\"."});
   v.param("panoptic", panoptic, {"Panoptic pictures and annotations."});
@@ -271,9 +279,16 @@ Json CocoWriter::categories() const {
                   {"isthing", own.is_thing ? 1 : 0}};
     if (own.has_color) category["color"] = own.color;
     if (params_.keypoints) {
-      for (const Keypoint& point : kCuboidKeypoints) category["keypoints"].push_back(point.name);
-      category["skeleton"] = {{2, 3}, {3, 5}, {5, 4}, {4, 2}, {6, 7}, {7, 9},
-                              {9, 8}, {8, 6}, {2, 6}, {3, 7}, {4, 8}, {5, 9}};
+      if (const auto& names = keypoints_.of_class(int(i)); !names.empty()) {
+        category["keypoints"] = names;
+        category["skeleton"] = Json::array();
+      } else {
+        for (const CuboidPoint& point : kCuboidKeypoints) {
+          category["keypoints"].push_back(point.name);
+        }
+        category["skeleton"] = {{2, 3}, {3, 5}, {5, 4}, {4, 2}, {6, 7}, {7, 9},
+                                {9, 8}, {8, 6}, {2, 6}, {3, 7}, {4, 8}, {5, 9}};
+      }
     }
     list.push_back(std::move(category));
   }
@@ -282,6 +297,7 @@ Json CocoWriter::categories() const {
 
 void CocoWriter::begin(const DatasetInfo& dataset, DatasetFiles& files) {
   training_.begin(dataset);
+  keypoints_.begin(dataset, training_);
   files.add_text("categories.json", python_json(categories(), 2) + "\n");
   training_.add_dataset_page(
       "COCO",
@@ -311,7 +327,8 @@ Json CocoWriter::annotation(const Frame& frame, const TrainingObject& object, in
       {"node", instance.node_path}};
   if (params_.keypoints) {
     int count = 0;
-    json["keypoints"] = keypoints_json(frame, instance, count);
+    json["keypoints"] =
+        keypoints_json(frame, instance, keypoints_.of_class(object.class_index), count);
     json["num_keypoints"] = count;
   }
   if (params_.amodal && instance.visibility && instance.visibility->amodal_box) {

@@ -10,6 +10,7 @@
 #include "diorama/writer.h"
 #include "writer_coco/coco_categories.h"
 #include "writer_support/class_choice.h"
+#include "writer_support/named_keypoints.h"
 #include "writer_support/replicator.h"
 #include "writer_support/training_data.h"
 
@@ -73,6 +74,7 @@ class CocoWriter final : public Writer {
   std::vector<CocoCategory> categories_;  ///< Of coco_categories; empty: classes count from 1.
   Json licenses_;
   TrainingData training_;
+  NamedKeypoints keypoints_;
 };
 
 }  // namespace diorama

@@ -23,7 +23,7 @@ constexpr std::array<Rgba8, kKeypointCount> kPointColors{{{255, 255, 255, 255},
                                                           {128, 0, 128, 255}}};
 
 /// The colour of the edge between two keypoints; transparent when they share no edge.
-Rgba8 edge_color(const Keypoint& a, const Keypoint& b) {
+Rgba8 edge_color(const CuboidPoint& a, const CuboidPoint& b) {
   int differences = 0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (a.side[axis] == 0 || b.side[axis] == 0) return {};
@@ -54,7 +54,7 @@ void draw_local_axes(Image<Rgba8>& picture, const Frame& frame, const ObjectPose
                      PoseLayout layout) {
   const auto& order = keypoint_order(layout);
   const auto centre = std::ranges::find_if(
-      order, [](const Keypoint& keypoint) { return keypoint.side == std::array<int, 3>{}; });
+      order, [](const CuboidPoint& keypoint) { return keypoint.side == std::array<int, 3>{}; });
   const Vec3 origin = object.world_points[std::size_t(centre - order.begin())];
   const double length = 0.25 * object.size.mean();
   for (int axis = 0; axis < 3; ++axis) {

@@ -63,6 +63,13 @@ ObjectPose pose_of(const Frame& frame, const Instance& instance, const PoseForma
     pose.camera_points[i] = mapped(view, pose.world_points[i]);
     pose.pixels[i] = pixel_of(frame.camera, pose.camera_points[i], format.is_replicator);
   }
+  if (format.has_named_keypoints) {
+    const Affine camera_from_world = frame.world_from_camera.inverse();
+    for (const Keypoint& point : instance.keypoints) {
+      const Vec3 world = instance.world_from_node * point.position;
+      pose.named.push_back({point.name, camera_from_world * world, image_point(frame, world)});
+    }
+  }
   pose.truncation = truncation_of(pose.pixels, frame.camera);
   return pose;
 }

@@ -18,6 +18,7 @@ enum class PoseLayout : std::uint8_t { Full, Dope, CenterPose };
 struct PoseFormat {
   PoseLayout layout = PoseLayout::Full;
   bool is_replicator = false;  ///< Repeat the reference's known errors.
+  bool has_named_keypoints = false;
 };
 
 const KeypointOrder& keypoint_order(PoseLayout layout);
@@ -35,6 +36,13 @@ struct ObjectPose {
   std::array<Vec3, kKeypointCount> world_points;
   std::array<Vec3, kKeypointCount> camera_points;
   std::array<Vec2, kKeypointCount> pixels;  ///< Whole numbers.
+  /// Named ones of the asset: place in the camera frame, and in the image.
+  struct Named {
+    std::string name;
+    Vec3 camera_point;
+    ImagePoint image;
+  };
+  std::vector<Named> named;
   /// Share of the pixels' box that lies outside the image; nothing when that box has no area.
   std::optional<double> truncation;
 };

@@ -76,12 +76,31 @@ StoredOptics optics_of(const Json& data) {
           finite(data.at("meters_per_scene_unit").get<double>())};
 }
 
+std::vector<ObjectPose::Named> named_of(const Json& json) {
+  std::vector<ObjectPose::Named> points;
+  if (!json.contains("named_keypoints")) return points;
+  for (const Json& entry : json.at("named_keypoints")) {
+    ObjectPose::Named point;
+    point.name = entry.at("name").get<std::string>();
+    point.camera_point = vector_of_json(entry.at("location_camera_frame"));
+    const Json& pixel = entry.at("projected");
+    point.image.pixel = {finite(pixel.at(0).get<double>()), finite(pixel.at(1).get<double>())};
+    const int state = entry.at("visibility").get<int>();
+    if (state < 0 || state > 2)
+      throw std::runtime_error("a keypoint's visibility is not 0, 1 or 2");
+    point.image.state = ImagePoint::State(state);
+    points.push_back(std::move(point));
+  }
+  return points;
+}
+
 StoredPose pose_of(const Json& json, StoredPoseFile& file) {
   StoredPose pose;
   const std::size_t count = file.sides.size();
   pose.label = json.at(json.contains("label") ? "label" : "class").get<std::string>();
   pose.path = json.at("prim_path").get<std::string>();
   pose.visibility = finite(json.at("visibility").get<double>());
+  pose.named = named_of(json);
   if (json.contains("truncation_ratio")) {
     pose.truncation = finite(json.at("truncation_ratio").get<double>());
   }

@@ -29,6 +29,7 @@ struct StoredPose {
   Quat world_rotation = Quat::Identity();
   Mat3 world_matrix = Mat3::Identity();
   Mat3 camera_matrix = Mat3::Identity();
+  std::vector<ObjectPose::Named> named;  ///< Any layout.
 };
 
 /// Numbers beside the intrinsics that say the same, in millimetres.

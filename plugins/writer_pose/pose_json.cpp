@@ -118,6 +118,14 @@ Json object_json(const ObjectPose& object, PoseLayout layout) {
   } else {
     add_trained_formats(json, object, layout);
   }
+  for (const ObjectPose::Named& point : object.named) {
+    json["named_keypoints"].push_back(
+        {{"name", point.name},
+         {"location_camera_frame", flat_list(point.camera_point.transpose())},
+         {"projected",
+          {python_round(point.image.pixel.x(), 3), python_round(point.image.pixel.y(), 3)}},
+         {"visibility", int(point.image.state)}});
+  }
   // The reference prints the integer 1 for a box without area.
   json["truncation_ratio"] = object.truncation ? Json(*object.truncation) : Json(1);
   return json;
@@ -130,7 +138,7 @@ Json pose_json(const Frame& frame, const std::vector<ObjectPose>& objects,
   Json json = Json::object();
   json["camera_data"] = camera_json(frame, format);
   json["keypoint_order"] = Json::array();
-  for (const Keypoint& keypoint : keypoint_order(format.layout)) {
+  for (const CuboidPoint& keypoint : keypoint_order(format.layout)) {
     json["keypoint_order"].push_back(keypoint.name);
   }
   json["objects"] = Json::array();

@@ -489,6 +489,7 @@ class PoseFrameReading : private FrameReading {
                  "its visibility is " + std::to_string(object.visibility), "0 to 1");
     check_truncation(object);
     check_pixels(object);
+    check_named(object);
     check_world(object);
     check_camera_pose(object);
     Instance instance;
@@ -577,6 +578,32 @@ class PoseFrameReading : private FrameReading {
                        ", " + std::to_string(found.y()),
                    std::to_string(expected->x()) + ", " + std::to_string(expected->y()) +
                        ", where its camera-frame point projects to");
+    }
+  }
+
+  /// Seen or hidden, a named point is where its place projects to; no other one is in the image.
+  void check_named(const StoredPose& object) {
+    const Camera& camera = frame_.camera;
+    for (const ObjectPose::Named& point : object.named) {
+      const auto expected = project(camera, point.camera_point);
+      const Vec2 size(camera.width, camera.height);
+      const bool is_inside =
+          expected && (expected->array() >= 0.0).all() && (expected->array() < size.array()).all();
+      const bool is_said = point.image.state != ImagePoint::State::Outside;
+      constexpr double kEdge = 1e-3;  // numbers are rounded
+      const bool is_at_edge = expected && (expected->cwiseAbs().minCoeff() < kEdge ||
+                                           (*expected - size).cwiseAbs().minCoeff() < kEdge);
+      files_.check(is_inside == is_said || is_at_edge, kProject, table_, object.path,
+                   "its point '" + point.name + "' is said to be " +
+                       (is_said ? "in the image" : "outside of the image"),
+                   is_inside ? "in the image" : "outside of the image");
+      if (!is_inside || !is_said) continue;
+      files_.check((*expected - point.image.pixel).cwiseAbs().maxCoeff() <= 0.01, kProject, table_,
+                   object.path,
+                   "its point '" + point.name + "' is at " + std::to_string(point.image.pixel.x()) +
+                       ", " + std::to_string(point.image.pixel.y()),
+                   std::to_string(expected->x()) + ", " + std::to_string(expected->y()) +
+                       ", where its camera-frame place projects to");
     }
   }
 

@@ -37,6 +37,8 @@ void PoseWriter::Params::visit(ParamVisitor& v) {
   v.choice("image_output_format", image_output_format, kImageEndings, {"Format of the pictures."});
   v.choice("compat", compat, kCompatWords,
            {"replicator repeats the reference's swapped camera pose and undistorted pixels."});
+  v.param("named_keypoints", named_keypoints,
+          {"Adds the keypoints that the job names for its objects, seen or not."});
   v.param("use_s3", use_s3, {"Accepted as false only: files go to the output folder."});
   v.param("s3_endpoint_url", s3_endpoint_url,
           {"Accepted as null only: files go to the output folder."});
@@ -46,7 +48,7 @@ void PoseWriter::Params::visit(ParamVisitor& v) {
 PoseWriter::PoseWriter(Params params, Host& host)
     : params_(std::move(params)),
       host_(host),
-      format_{read_layout(params_.format), params_.compat == "replicator"},
+      format_{read_layout(params_.format), params_.compat == "replicator", params_.named_keypoints},
       filter_(SemanticFilter::parse("class:*")),
       frame_padding_(params_.frame_padding) {
   params_.remote.check();
@@ -58,6 +60,7 @@ PoseWriter::PoseWriter(Params params, Host& host)
 
 NameSet PoseWriter::needs() const {
   NameSet names{"instances", "visibility", std::string(kInstanceId.name)};
+  if (params_.named_keypoints) names.emplace(kDistanceToCamera.name);
   if (params_.image_output_format == "exr") {
     names.emplace(kColorHdr.name);
     if (params_.write_debug_images) names.emplace(kColor.name);

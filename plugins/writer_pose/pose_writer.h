@@ -17,7 +17,9 @@ namespace diorama {
 /// Camera-frame poses are right by default; `compat: replicator` repeats the reference's swapped
 /// matrix product, its pixel formulas (no lens distortion) and its principal point. Lenses other
 /// than pinholes have an entry of ours, `lens`, in camera_data, which the reference leaves out; so
-/// do the names of cameras that take turns in one folder, `cameras`, in metadata.txt.
+/// do the names of cameras that take turns in one folder, `cameras`, in metadata.txt, and with
+/// `named_keypoints` each object's `named_keypoints`: name, place in the camera frame and in the
+/// image, and visibility (0 outside, 1 hidden, 2 visible).
 class PoseWriter final : public Writer {
  public:
   struct Params {
@@ -29,6 +31,7 @@ class PoseWriter final : public Writer {
     std::optional<std::string> format;
     std::string image_output_format = "png";
     std::string compat = "none";
+    bool named_keypoints = false;
     bool use_s3 = false;
     std::optional<std::string> s3_endpoint_url;
     RemoteOutput remote;

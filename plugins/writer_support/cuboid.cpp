@@ -5,7 +5,7 @@
 
 namespace diorama {
 
-Vec3 keypoint_in_box(const Aabb& box, const Keypoint& keypoint) {
+Vec3 keypoint_in_box(const Aabb& box, const CuboidPoint& keypoint) {
   Vec3 point = box.centre();
   for (int axis = 0; axis < 3; ++axis) {
     if (keypoint.side[std::size_t(axis)] < 0) point[axis] = box.min[axis];

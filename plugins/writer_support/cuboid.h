@@ -9,13 +9,13 @@ namespace diorama {
 
 /// A named point of a box: L/R is min/max x, D/U min/max y, B/F min/max z in node space; "Center"
 /// is the middle.
-struct Keypoint {
+struct CuboidPoint {
   const char* name;
   std::array<int, 3> side;  ///< -1 min, 0 middle, 1 max.
 };
 
 inline constexpr int kKeypointCount = 9;
-using KeypointOrder = std::array<Keypoint, kKeypointCount>;
+using KeypointOrder = std::array<CuboidPoint, kKeypointCount>;
 
 /// Center, LDB, LDF, LUB, LUF, RDB, RDF, RUB, RUF.
 inline constexpr KeypointOrder kCuboidKeypoints{{{"Center", {0, 0, 0}},
@@ -28,7 +28,7 @@ inline constexpr KeypointOrder kCuboidKeypoints{{{"Center", {0, 0, 0}},
                                                  {"RUB", {1, 1, -1}},
                                                  {"RUF", {1, 1, 1}}}};
 
-Vec3 keypoint_in_box(const Aabb& box, const Keypoint& keypoint);
+Vec3 keypoint_in_box(const Aabb& box, const CuboidPoint& keypoint);
 
 /// Where a keypoint lies in the image, and whether something (the object itself included) is in
 /// front of it by more than a hundredth of its distance.

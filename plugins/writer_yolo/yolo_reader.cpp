@@ -214,12 +214,16 @@ class YoloDataset final : public StoredDataset {
                   "is no number of points and of values each",
                   page_ ? "[9, 3]" : "for instance [17, 3]");
       if (!is_shape) yaml_.kpt_shape = {int(kCuboidPoints), 3};
-      has_cuboid_points_ = page_.has_value() && page_->conventions.contains("keypoints");
-      if (has_cuboid_points_) {
-        files.check(yaml_.kpt_shape == std::vector<int>{int(kCuboidPoints), 3}, kCounts, yaml_file_,
-                    "kpt_shape", "is " + std::to_string(yaml_.kpt_shape[0]) + " points",
-                    "the nine that dataset.json names");
-        yaml_.kpt_shape = {int(kCuboidPoints), 3};
+      const Json names =
+          page_ ? page_->conventions.value("keypoints", Json::array()) : Json::array();
+      has_named_points_ = names.is_array() && !names.empty();
+      if (has_named_points_) {
+        has_cuboid_points_ = names.size() == kCuboidPoints && names[0] == "Center";
+        const std::vector<int> shape{int(names.size()), 3};
+        files.check(yaml_.kpt_shape == shape, kCounts, yaml_file_, "kpt_shape",
+                    "is " + std::to_string(yaml_.kpt_shape[0]) + " points",
+                    "the " + std::to_string(names.size()) + " that dataset.json names");
+        yaml_.kpt_shape = shape;
       }
       return;
     }
@@ -280,7 +284,8 @@ class YoloDataset final : public StoredDataset {
   std::vector<ListedPicture> listed_;
   PictureList pictures_;
   Task task_ = Task::Boxes;
-  bool has_cuboid_points_ = false;
+  bool has_named_points_ = false;   ///< dataset.json names the keypoints.
+  bool has_cuboid_points_ = false;  ///< Middle and corners of a 3-D box.
   StoredInfo info_;
   ReadLog log_;
 };
@@ -347,7 +352,7 @@ class YoloPictureReading : private FrameReading {
     Instance instance = next_instance(is_known ? name->second : std::to_string(id));
     if (numbers.size() == 4 || dataset_.task_ == Task::Keypoints) {
       instance.tight_box = box_of(numbers, who);
-      if (dataset_.task_ == Task::Keypoints && dataset_.has_cuboid_points_) {
+      if (dataset_.task_ == Task::Keypoints && dataset_.has_named_points_) {
         check_keypoints(numbers, who);
       }
       masks_.emplace_back();
@@ -482,11 +487,10 @@ class YoloPictureReading : private FrameReading {
     return Vec2(numbers[at] * frame_.camera.width, numbers[at + 1] * frame_.camera.height);
   }
 
-  /// Middle and corners of a 3-D box.
   void check_keypoints(const std::vector<double>& numbers, const std::string& who) {
     Eigen::AlignedBox2d corners;
     std::size_t seen = 0;
-    for (std::size_t i = 0; i < kCuboidPoints; ++i) {
+    for (std::size_t i = 0; i < std::size_t(dataset_.yaml_.kpt_shape[0]); ++i) {
       const double flag = numbers[4 + 3 * i + 2];
       const bool is_known = flag == 0.0 || flag == 1.0 || flag == 2.0;
       const bool has_place = numbers[4 + 3 * i] != 0.0 || numbers[4 + 3 * i + 1] != 0.0;
@@ -498,6 +502,7 @@ class YoloPictureReading : private FrameReading {
         ++seen;
       }
     }
+    if (!dataset_.has_cuboid_points_) return;
     if (seen == kCuboidPoints) check_surrounded(numbers, corners, who);
     check_diagonals(numbers, who);
   }

@@ -38,12 +38,18 @@ void append_box(std::string& line, const Frame& frame, const PixelBox& box) {
   append_point(line, frame, {double(box.width()), double(box.height())});
 }
 
-void append_keypoints(std::string& line, const Frame& frame, const Instance& instance) {
-  for (const Keypoint& keypoint : kCuboidKeypoints) {
-    const ImagePoint point = image_point(
-        frame, instance.world_from_node * keypoint_in_box(instance.bounds_node, keypoint));
+/// The named ones, if there are any, or those of the box.
+void append_keypoints(std::string& line, const Frame& frame, const Instance& instance,
+                      const std::vector<std::string>& names) {
+  const auto append = [&](const ImagePoint& point) {
     append_point(line, frame, point.pixel);
     line += " " + std::to_string(int(point.state));
+  };
+  for (const std::string& name : names) append(named_point(frame, instance, name));
+  if (!names.empty()) return;
+  for (const CuboidPoint& keypoint : kCuboidKeypoints) {
+    append(image_point(frame,
+                       instance.world_from_node * keypoint_in_box(instance.bounds_node, keypoint)));
   }
 }
 
@@ -70,12 +76,15 @@ NameSet YoloWriter::needs() const {
 
 void YoloWriter::begin(const DatasetInfo& dataset, DatasetFiles& files) {
   training_.begin(dataset);
+  keypoints_.begin(dataset, training_);
   // Trainers insist on a validation folder.
   const std::string val = training_.splits().back();
   // Without `path`, which trainers would resolve against their own folder, splits lie beside it.
   std::string yaml = "train: images/train\nval: images/" + val + "\n";
   if (params_.task == "pose") {
-    yaml += "kpt_shape: [" + std::to_string(kKeypointCount) + ", 3]\n";
+    const std::size_t count =
+        keypoints_.is_empty() ? std::size_t(kKeypointCount) : keypoints_.all().size();
+    yaml += "kpt_shape: [" + std::to_string(count) + ", 3]\n";
   }
   yaml += "names:\n";
   for (std::size_t i = 0; i < training_.classes().size(); ++i) {
@@ -85,7 +94,11 @@ void YoloWriter::begin(const DatasetInfo& dataset, DatasetFiles& files) {
   Json more{{"task", params_.task}, {"labels", "shares of the image's width and height"}};
   if (params_.box_margin > 0.0) more["box_margin"] = params_.box_margin;
   if (params_.task == "pose") {
-    for (const Keypoint& point : kCuboidKeypoints) more["keypoints"].push_back(point.name);
+    if (keypoints_.is_empty()) {
+      for (const CuboidPoint& point : kCuboidKeypoints) more["keypoints"].push_back(point.name);
+    } else {
+      more["keypoints"] = keypoints_.all();
+    }
     more["keypoint_visibility"] = "0 outside the image, 1 hidden, 2 visible";
   }
   training_.add_dataset_page("YOLO", std::move(more), dataset, files);
@@ -96,7 +109,7 @@ std::string YoloWriter::line(const Frame& frame, const TrainingObject& object) c
   std::string text = std::to_string(object.class_index);
   if (params_.task == "detect" || params_.task == "pose") {
     append_box(text, frame, with_margin(*instance.tight_box, params_.box_margin, frame.camera));
-    if (params_.task == "pose") append_keypoints(text, frame, instance);
+    if (params_.task == "pose") append_keypoints(text, frame, instance, keypoints_.all());
     return text;
   }
   const auto parts = outlines(frame.get(kInstanceId), instance.id, *instance.tight_box);

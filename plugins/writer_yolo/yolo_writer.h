@@ -6,6 +6,7 @@
 #include "diorama/host.h"
 #include "diorama/params.h"
 #include "diorama/writer.h"
+#include "writer_support/named_keypoints.h"
 #include "writer_support/training_data.h"
 
 namespace diorama {
@@ -18,8 +19,9 @@ namespace diorama {
 ///
 /// One line per object, the class index first, all coordinates as shares of the image's size:
 /// detect: box centre and size, of what is seen and a margin round it; segment: a polygon of the
-/// visible pixels; pose: box, then x y v of nine cuboid points; obb: the four corners of the least
-/// rectangle. A picture without objects has an empty label file.
+/// visible pixels; pose: box, then x y v of the keypoints that the job names, of all classes, or
+/// else of nine cuboid points; obb: the four corners of the least rectangle. A picture without
+/// objects has an empty label file.
 class YoloWriter final : public Writer {
  public:
   struct Params {
@@ -42,6 +44,7 @@ class YoloWriter final : public Writer {
   Params params_;
   Host& host_;
   TrainingData training_;
+  NamedKeypoints keypoints_;
 };
 
 }  // namespace diorama

@@ -115,6 +115,8 @@ struct Instance {
   /// Extent of its pixels in kInstanceId; absent when none is visible.
   std::optional<PixelBox> tight_box;
   std::optional<Visibility> visibility;  ///< Filled when "visibility" was demanded.
+  /// Of all its parts, in its own space, before world_from_node; each name once.
+  std::vector<Keypoint> keypoints;
 };
 
 /// Two instances that cover some of the same pixels of the image, seen or hidden by a third.

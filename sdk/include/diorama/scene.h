@@ -32,6 +32,12 @@ struct NodeId {
 /// Taxonomy to label: {"class": "banana"}.
 using Labels = std::map<std::string, std::string, std::less<>>;
 
+/// A named point of a thing, such as the tip of a pen.
+struct Keypoint {
+  std::string name;
+  Vec3 position = Vec3::Zero();  ///< Metres, in the space of the node that has it.
+};
+
 struct Node {
   std::string name;
   NodeId parent;
@@ -46,6 +52,7 @@ struct Node {
   std::optional<Camera> camera;
   std::optional<Collider> collider;
   std::optional<RigidBody> rigid_body;
+  std::vector<Keypoint> keypoints;
 };
 
 /// Everything that can be seen and simulated: a tree of named nodes. A concrete class on purpose:

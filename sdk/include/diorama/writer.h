@@ -8,6 +8,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "diorama/component.h"
@@ -32,6 +33,9 @@ struct DatasetInfo {
   std::vector<std::string> camera_names;
   /// Every distinct label set that the job's objects carry, sorted; environments may add more.
   std::vector<Labels> labels;
+  /// Names of the keypoints that objects with these labels are to have, in the job's order; label
+  /// sets without keypoints are left out.
+  std::vector<std::pair<Labels, std::vector<std::string>>> keypoints;
   std::string resolved_job;  ///< YAML text; running it gives the same dataset.
   std::string program_version;
   std::vector<std::pair<std::string, std::string>> plugin_versions;

@@ -276,6 +276,37 @@ def Material "Mat"
   CHECK_THROWS_WITH(Loaded(file, strict), file + ": " + missing);
 }
 
+TEST_CASE("prims that are keypoints name their nodes", "[loader_usd]") {
+  const TemporaryFolder folder;
+  Loaded loaded(folder.write("a.usda", R"(#usda 1.0
+(
+    metersPerUnit = 0.01
+    upAxis = "Z"
+)
+def Xform "Pen"
+{
+    def Xform "Tip"
+    {
+        custom string diorama:keypoint = "tip"
+        double3 xformOp:translate = (10, 0, 2)
+        uniform token[] xformOpOrder = ["xformOp:translate"]
+    }
+    def Xform "Other"
+    {
+        custom token diorama:keypoint = "end"
+    }
+}
+)"));
+  const Node& tip = loaded.node("Pen/Tip");
+  REQUIRE(tip.keypoints.size() == 1);
+  CHECK(tip.keypoints[0].name == "tip");
+  const Vec3 place = loaded.scene.world_from_node(loaded.scene.require("/asset/Pen/Tip")) *
+                     tip.keypoints[0].position;
+  CHECK((place - Vec3(0.1, 0, 0.02)).norm() < 1e-12);
+  CHECK(loaded.node("Pen/Other").keypoints.at(0).name == "end");
+  CHECK(loaded.node("Pen").keypoints.empty());
+}
+
 TEST_CASE("instances and instancers share meshes", "[loader_usd]") {
   const TemporaryFolder folder;
   Loaded loaded(folder.write("a.usda", R"(#usda 1.0

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "writer_coco/coco_writer.h"
 
+#include "plugins/writer_support/keypoint_sample.h"
 #include "plugins/writer_support/sample_dataset.h"
 #include "support/catch.h"
 #include "writer_support/run_length.h"
@@ -151,6 +152,43 @@ TEST_CASE("keypoints tell hidden from visible from outside", "[writers]") {
     }
   }
   CHECK(states == std::set<int>{0, 1, 2});
+}
+
+TEST_CASE("keypoints that a job names take the place of the box's", "[writers]") {
+  const test::KeypointSample named;
+  test::FakeHost host;
+  CocoWriter writer({}, host);
+  const MemoryFiles files = test::write_dataset(writer, named.dataset, {&named.capture});
+  const Json json =
+      Json::parse(files.text("annotations/instances_" + test::split_of(files, 0) + ".json"));
+  std::map<int, std::string> names;
+  for (const Json& category : json.at("categories")) {
+    names[category["id"]] = category["name"];
+    if (category["name"] != "crate") {
+      CHECK(category["keypoints"][0] == "Center");
+      continue;
+    }
+    CHECK(category["keypoints"] == Json::array({"outside", "seen", "gone", "hidden"}));
+    CHECK(category["skeleton"].empty());
+  }
+  int crates = 0;
+  for (const Json& annotation : json.at("annotations")) {
+    const bool is_crate = names.at(annotation["category_id"]) == "crate";
+    CHECK(annotation["keypoints"].size() == (is_crate ? 12u : 27u));
+    if (annotation["node"] != "/Assets/crate" || annotation["image_id"] != 1) continue;
+    ++crates;
+    const Json& points = annotation["keypoints"];
+    CHECK(annotation["num_keypoints"] == 2);
+    CHECK(points[2] == 0);
+    CHECK(points[5] == 2);
+    CHECK(points[8] == 0);
+    CHECK(points[11] == 1);
+    for (const std::size_t at : {3u, 9u}) {
+      CHECK(points[at].get<double>() == Approx(named.pixel.x()).margin(2e-3));
+      CHECK(points[at + 1].get<double>() == Approx(named.pixel.y()).margin(2e-3));
+    }
+  }
+  CHECK(crates == 1);
 }
 
 TEST_CASE("small objects become crowd, unlisted classes are left out", "[writers]") {

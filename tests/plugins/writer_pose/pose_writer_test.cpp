@@ -2,6 +2,7 @@
 #include "writer_pose/pose_writer.h"
 
 #include "plugins/writer_support/fake_host.h"
+#include "plugins/writer_support/keypoint_sample.h"
 #include "plugins/writer_support/memory_files.h"
 #include "plugins/writer_support/sample_capture.h"
 #include "support/catch.h"
@@ -82,4 +83,45 @@ TEST_CASE("an unknown format is refused", "[writers]") {
   params.format = "yolo";
   CHECK_THROWS_WITH(PoseWriter(params, host),
                     ContainsSubstring("expected null, dope or centerpose, found 'yolo'"));
+}
+
+TEST_CASE("named keypoints are told on demand, where the camera has them", "[writers]") {
+  const test::KeypointSample named;
+  FakeHost host;
+  PoseWriter::Params params;
+  for (const char* format : {"none", "dope", "centerpose"}) {
+    params.format = format;
+    params.named_keypoints = false;
+    PoseWriter plain(params, host);
+    const auto without = test::write_dataset(plain, named.dataset, {&named.capture});
+    CHECK(without.text("000000.json").find("named_keypoints") == std::string::npos);
+    params.named_keypoints = true;
+    PoseWriter writer(params, host);
+    CHECK(writer.needs().contains(kDistanceToCamera.name));
+    const auto files = test::write_dataset(writer, named.dataset, {&named.capture});
+    int crates = 0;
+    for (const Json& object : Json::parse(files.text("000000.json"))["objects"]) {
+      if (object["prim_path"] != "/Assets/crate") {
+        CHECK_FALSE(object.contains("named_keypoints"));
+        continue;
+      }
+      ++crates;
+      const Json& points = object["named_keypoints"];
+      REQUIRE(points.size() == 3);
+      CHECK(points[0]["name"] == "hidden");
+      CHECK(points[0]["visibility"] == 1);
+      CHECK(points[1]["visibility"] == 2);
+      CHECK(points[2]["visibility"] == 0);
+      CHECK(points[1]["projected"][0].get<double>() == Approx(named.pixel.x()).margin(2e-3));
+      // Both lie on one ray, which begins at the camera.
+      const auto place = [&](std::size_t i) {
+        const Json& list = points[i]["location_camera_frame"];
+        return Vec3(list[0].get<double>(), list[1].get<double>(), list[2].get<double>());
+      };
+      CHECK(place(0).norm() - place(1).norm() == Approx(0.05).margin(1e-5));
+      CHECK(place(0).cross(place(1)).norm() < 1e-5);
+      CHECK(place(1).z() < 0.0);
+    }
+    CHECK(crates == 1);
+  }
 }

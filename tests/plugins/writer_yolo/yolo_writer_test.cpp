@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "opencv_support/contours.h"
+#include "plugins/writer_support/keypoint_sample.h"
 #include "plugins/writer_support/sample_dataset.h"
 #include "support/catch.h"
 
@@ -131,4 +132,31 @@ TEST_CASE("pose lines and data.yaml agree on nine keypoints", "[writers]") {
   for (const auto& line : numbers_of(files.text(label_file(files, 1, "cam_1")))) {
     CHECK(line.size() == 1 + 4 + 27);
   }
+}
+
+TEST_CASE("pose lines hold the keypoints that a job names, for all classes alike", "[writers]") {
+  const test::KeypointSample named;
+  test::FakeHost host;
+  YoloWriter::Params params;
+  params.task = "pose";
+  YoloWriter writer(params, host);
+  const MemoryFiles files = test::write_dataset(writer, named.dataset, {&named.capture});
+  CHECK_THAT(files.text("data.yaml"), ContainsSubstring("kpt_shape: [4, 3]\n"));
+  CHECK_THAT(files.text("dataset.json"),
+             ContainsSubstring("\"outside\",") && ContainsSubstring("\"gone\","));
+  bool has_crate = false;
+  for (const auto& line : numbers_of(files.text(label_file(files, 0, "cam_0")))) {
+    REQUIRE(line.size() == 1 + 4 + 12);
+    const bool is_crate = line[0] == 1;
+    // Outside, seen, gone, hidden.
+    for (std::size_t i = 0; i < 4; ++i) {
+      const double expected = !is_crate ? 0.0 : i == 1 ? 2.0 : i == 3 ? 1.0 : 0.0;
+      CHECK(line[5 + 3 * i + 2] == expected);
+      const bool is_there = expected > 0.0;
+      CHECK(line[5 + 3 * i] == Approx(is_there ? named.pixel.x() / 48.0 : 0.0).margin(1e-4));
+      CHECK(line[5 + 3 * i + 1] == Approx(is_there ? named.pixel.y() / 32.0 : 0.0).margin(1e-4));
+    }
+    has_crate |= is_crate;
+  }
+  CHECK(has_crate);
 }
