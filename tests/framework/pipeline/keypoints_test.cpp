@@ -77,7 +77,7 @@ TEST_CASE("Objects without wanted keypoints keep none, and wanted ones have to b
   Pen made;
   made.scene.edit(made.cap).keypoints.clear();
   CHECK_THROWS_WITH(keep_keypoints(made.scene, made.object, made.root, "shape:cube", {"tip"}),
-                    "shape:cube: has no keypoint 'tip', only none");
+                    "shape:cube: has no keypoint 'tip', nor any other");
 }
 
 TEST_CASE("A wrong file of keypoints says where and what", "[spawn]") {
