@@ -456,6 +456,8 @@ void add_lint(CLI::App& app, CommandLine& line) {
       ->required()
       ->type_name("FOLDER");
   command->add_flag("--json", line.lint.as_json, "All findings as JSON");
+  command->add_flag("--scenes", line.lint.looks_at_scenes,
+                    "Also set up the scenes of a run anew and name what moves, hangs or is stuck");
   command->add_option("--reader", line.lint.reader, "Reader to use; default: the one that knows it")
       ->type_name("TYPE");
   command->callback([&line] {

@@ -17,6 +17,7 @@ struct LintOptions {
   std::string dataset;  ///< A writer's folder, or the output folder of a run.
   std::string reader;   ///< Type; empty: the one that knows the folder.
   bool as_json = false;
+  bool looks_at_scenes = false;  ///< Sets the scenes of a run up anew and looks at what holds what.
 };
 
 /// `diorama lint DATASET`: reads a dataset back and says where its files contradict each other.

@@ -55,6 +55,36 @@ nlohmann::ordered_json as_json(const std::vector<Incident>& incidents, const cha
   return list;
 }
 
+nlohmann::ordered_json as_json(const ObjectAtEnd& object) {
+  nlohmann::ordered_json json{{"object", object.path}, {"falls", object.falls}};
+  if (const auto& place = object.before_last_step) {
+    json["before_last_step"] = {place->x(), place->y(), place->z()};
+  }
+  return json;
+}
+
+nlohmann::ordered_json as_json(const PlacedNode& node) {
+  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 4; ++column) {
+      rows.push_back(node.parent_from_node.matrix()(row, column));
+    }
+  }
+  return {{"node", node.path}, {"parent_from_node", rows}, {"visible", node.is_visible}};
+}
+
+/// Nodes with a mesh at or below them.
+std::set<NodeId> nodes_with_shape(const Scene& scene) {
+  std::set<NodeId> shaped;
+  for (const NodeId id : scene.subtree(scene.root())) {
+    if (!scene[id].mesh) continue;
+    for (NodeId node = id; node != scene.root() && shaped.insert(node).second;) {
+      node = scene[node].parent;
+    }
+  }
+  return shaped;
+}
+
 }  // namespace
 
 std::string settle_text(const std::vector<VisitReport>& visits) {
@@ -112,6 +142,11 @@ std::string settle_json(const VisitReport& report) {
   json["dropped"] = as_json(report.dropped, "object");
   json["unsettled"] = as_json(report.unsettled, "object");
   json["blocked_cameras"] = as_json(report.cameras, "camera");
+  json["step_seconds"] = report.step_s;
+  json["objects"] = nlohmann::ordered_json::array();
+  for (const ObjectAtEnd& object : report.objects) json["objects"].push_back(as_json(object));
+  json["placed"] = nlohmann::ordered_json::array();
+  for (const PlacedNode& node : report.placed) json["placed"].push_back(as_json(node));
   return json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
@@ -138,6 +173,28 @@ double fastest_falling(const Scene& scene, const Room& room, const std::vector<N
     fastest = std::max(fastest, body->linear_velocity.norm());
   }
   return fastest;
+}
+
+SceneAsSetUp::SceneAsSetUp(const Scene& scene) {
+  for (const NodeId node : nodes_with_shape(scene)) {
+    nodes_.emplace(node, std::pair(scene[node].parent_from_node.matrix(), scene[node].is_visible));
+  }
+}
+
+std::vector<PlacedNode> SceneAsSetUp::placed_since(const Scene& scene) const {
+  const std::set<NodeId> shaped = nodes_with_shape(scene);
+  std::vector<PlacedNode> placed;
+  for (const NodeId id : scene.subtree(scene.root())) {
+    if (!shaped.contains(id)) continue;
+    const Node& node = scene[id];
+    const auto known = nodes_.find(id);
+    if (known != nodes_.end() && known->second.first == node.parent_from_node.matrix() &&
+        known->second.second == node.is_visible) {
+      continue;
+    }
+    placed.push_back({scene.path(id), node.parent_from_node, node.is_visible});
+  }
+  return placed;
 }
 
 SavedNodes::SavedNodes(const Scene& scene, const std::vector<NodeId>& without) {

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "diorama/math.h"
 #include "diorama/scene.h"
 
 /// How the objects of a visit come to rest, and what becomes of those that do not stay in the room.
@@ -14,6 +17,21 @@ namespace diorama {
 struct Incident {
   std::string path;
   std::string why;  ///< Follows the path: "left the room", "hangs in the air".
+};
+
+/// An object as the last captures of a visit show it.
+struct ObjectAtEnd {
+  std::string path;
+  bool falls = false;  ///< Gravity acts on it.
+  /// Where it was one step of the simulation earlier, world; nothing: it was placed since.
+  std::optional<Vec3> before_last_step;
+};
+
+/// A node that is not as loading the environment and the objects leaves it.
+struct PlacedNode {
+  std::string path;
+  Affine parent_from_node = Affine::Identity();
+  bool is_visible = true;
 };
 
 /// How the objects of one visit ended.
@@ -34,6 +52,9 @@ struct VisitReport {
   std::vector<Incident> dropped;       ///< Objects that were taken out.
   std::vector<Incident> unsettled;     ///< Objects that the last captures show all the same.
   std::vector<Incident> cameras;       ///< Blocked ones, once per capture.
+  double step_s = 0.0;                 ///< Of the simulation; 0 without one.
+  std::vector<ObjectAtEnd> objects;    ///< Those that are there.
+  std::vector<PlacedNode> placed;      ///< What has a mesh, or stands above one.
 };
 
 /// As JSON text with a newline at its end.
@@ -56,6 +77,18 @@ class Room {
 
 /// Highest speed, in m/s, of those objects in the room that gravity acts on; 0 without any.
 double fastest_falling(const Scene& scene, const Room& room, const std::vector<NodeId>& objects);
+
+/// Where everything with a mesh stood, and whether it was visible, when a visit had been set up.
+class SceneAsSetUp {
+ public:
+  SceneAsSetUp() = default;
+  explicit SceneAsSetUp(const Scene& scene);
+  /// What differs now, and what has come, in the order of the tree.
+  std::vector<PlacedNode> placed_since(const Scene& scene) const;
+
+ private:
+  std::map<NodeId, std::pair<Mat4, bool>> nodes_;
+};
 
 /// What every node but some was like at one moment.
 class SavedNodes {

@@ -98,6 +98,7 @@ void VisitRun::set_up() {
       apply_environment_rules(job_.environment, job_.debug, environment_, scene_, host_);
   objects_ = spawn_objects(plan_objects(job_, setting_.plan.object_assets, planned_.index), job_,
                            scene_, host_);
+  as_set_up_ = SceneAsSetUp(scene_);
   create_lights(job_.lights, scene_, host_);
   cameras_ = create_cameras(job_.cameras, scene_);
   small_cameras_ = create_small_cameras(job_, cameras_, scene_);
@@ -214,8 +215,9 @@ void VisitRun::advance(const TimelineStep& step) {
     setting_.stop_if_asked();
     const int now = std::min(kStepsAtOnce, step.steps - taken);
     const bool may_be_last = step.until_rest || taken + now == step.steps;
-    // The last step goes by itself: what it moves is the motion that captures show.
-    if (may_be_last && setting_.shared.demand.motion) {
+    // The last step goes by itself: what it moves is the motion that captures show, and how fast
+    // objects are.
+    if (may_be_last) {
       take(now - 1);
       before_last_step_ = body_poses(scene_);
       take(1);
@@ -417,9 +419,17 @@ VisitReport VisitRun::report() const {
          report.unsettled);
   }
   report.max_speed = fastest_falling(scene_, room, objects_);
+  if (components_.physics) report.step_s = components_.physics->step_seconds();
+  report.placed = as_set_up_.placed_since(scene_);
   for (const NodeId object : objects_) {
     const auto& body = scene_[object].rigid_body;
-    if (body && body->has_gravity) ++report.falling_objects;
+    ObjectAtEnd& end = report.objects.emplace_back();
+    end.path = scene_.path(object);
+    end.falls = body && body->has_gravity;
+    if (end.falls) ++report.falling_objects;
+    if (const auto before = before_last_step_.find(object); before != before_last_step_.end()) {
+      end.before_last_step = before->second.translation();
+    }
     if (!room.holds(scene_, object)) report.left_room.push_back(scene_.path(object));
   }
   return report;

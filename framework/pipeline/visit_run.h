@@ -96,6 +96,7 @@ class VisitRun {
   Vec3 working_area_world_ = Vec3::Zero();
   std::vector<NodeId> objects_;
   std::vector<NodeId> cameras_;
+  SceneAsSetUp as_set_up_;
   BodyPoses before_last_step_;  ///< Empty when nothing moved by itself since it was placed.
   NodeId overview_;             ///< Null unless this visit makes an overview picture.
   std::map<NodeId, NodeId> small_cameras_;  ///< For the brightness of views; by camera.

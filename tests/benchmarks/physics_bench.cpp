@@ -16,10 +16,10 @@
 #include "framework/pipeline/scene_setup.h"
 #include "framework/pipeline/settling.h"
 #include "loader_dining_room/dining_room.h"
-#include "loader_samples/samples_loader.h"
 #include "physics_bullet/body_builder.h"
 #include "physics_bullet/bullet_backend.h"
 #include "support/plain_host.h"
+#include "support/sample_meshes.h"
 
 using namespace diorama;
 using bench::cpu_seconds;
@@ -67,22 +67,6 @@ struct Visit {
   std::vector<NodeId> things;
   std::vector<Affine> starts;
 };
-
-std::vector<std::shared_ptr<const Mesh>> sample_meshes(Host& host) {
-  std::vector<std::shared_ptr<const Mesh>> meshes;
-  for (const char* set : {"objects", "props"}) {
-    samples::SamplesLoader loader({.set = set}, host);
-    for (const std::string& asset : loader.assets()) {
-      Scene scene;
-      const NodeId root = scene.create(scene.root(), "asset");
-      loader.load(asset, scene, root);
-      for (const NodeId id : scene.subtree(root)) {
-        if (scene[id].mesh) meshes.push_back(scene[id].mesh);
-      }
-    }
-  }
-  return meshes;
-}
 
 using Times = std::map<std::string, double>;
 
@@ -147,7 +131,7 @@ int main(int argc, char** argv) {
 
   test::PlainHost host;
   const BulletBackend::Params params;
-  const auto meshes = sample_meshes(host);
+  const auto meshes = test::sample_meshes(host);
   Times times;
   for (int room = 1; room <= rooms; ++room) {
     BulletBackend physics(params, host);

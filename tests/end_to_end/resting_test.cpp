@@ -7,40 +7,18 @@
 #include "diorama/rng.h"
 #include "framework/pipeline/scene_setup.h"
 #include "loader_dining_room/dining_room.h"
-#include "loader_samples/samples_loader.h"
 #include "physics_bullet/bullet_backend.h"
 #include "support/catch.h"
 #include "support/exact_bounds.h"
 #include "support/plain_host.h"
+#include "support/sample_meshes.h"
 
 /// The rooms and objects of the sample pack with the physics of the default job, many objects each.
 using namespace diorama;
 
 namespace {
 
-/// Each asset once, as scenes share what they load.
-class Shelf {
- public:
-  explicit Shelf(Host& host) {
-    for (const char* set : {"objects", "props"}) {
-      samples::SamplesLoader loader({.set = set}, host);
-      for (const std::string& asset : loader.assets()) {
-        Scene scene;
-        const NodeId root = scene.create(scene.root(), "asset");
-        loader.load(asset, scene, root);
-        for (const NodeId id : scene.subtree(root)) {
-          if (scene[id].mesh) meshes_.push_back(scene[id].mesh);
-        }
-      }
-    }
-  }
-  const std::shared_ptr<const Mesh>& pick(Rng& rng) const {
-    return meshes_[rng.index(meshes_.size())];
-  }
-
- private:
-  std::vector<std::shared_ptr<const Mesh>> meshes_;
-};
+using Meshes = std::vector<std::shared_ptr<const Mesh>>;
 
 struct Room {
   Room(std::uint64_t seed, test::PlainHost& host) {
@@ -58,11 +36,11 @@ struct Room {
     }
   }
 
-  void drop(const Shelf& shelf, int count, Rng rng) {
+  void drop(const Meshes& meshes, int count, Rng rng) {
     const Aabb above{Vec3(-0.9, -0.9, 1.0), Vec3(0.9, 0.9, 1.6)};
     for (int i = 0; i < count; ++i) {
       const NodeId id = scene.create(scene.root(), "thing_" + std::to_string(i));
-      scene.edit(id).mesh = shelf.pick(rng);
+      scene.edit(id).mesh = meshes[rng.index(meshes.size())];
       scene.edit(id).collider = Collider{};
       scene.edit(id).collider->shape = ColliderShape::ConvexHull;
       scene.edit(id).rigid_body = RigidBody{};
@@ -93,11 +71,11 @@ bool is_in_table(const Room& room, const Vec3& middle) {
 TEST_CASE("In each of the ten sample rooms forty things come to rest, none through floor or table",
           "[run][slow]") {
   test::PlainHost host;
-  const Shelf shelf(host);
+  const Meshes meshes = test::sample_meshes(host);
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     Room room(seed, host);
     REQUIRE_FALSE(room.table.is_empty());
-    room.drop(shelf, 40, Rng(seed));
+    room.drop(meshes, 40, Rng(seed));
     BulletBackend physics({}, host);
     physics.reset(room.scene);
     physics.advance(room.scene, 204);

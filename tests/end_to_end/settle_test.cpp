@@ -197,3 +197,75 @@ TEST_CASE("Objects picked per visit are the same in every shard, and left out on
       start("few", {"--set", "objects.targets.pick=per_job", "--set", "objects.targets.count=1"}),
       ContainsSubstring("objects 'targets': 4 of 5 assets are left out"));
 }
+
+TEST_CASE("Lint sets scenes up anew and finds what was lifted, pushed into something or moves",
+          "[run][settle]") {
+  const TemporaryFolder folder;
+  write_file(folder / "job.yaml", R"(
+seed: 3
+total_captures: 2
+environments: [{type: shapes, shapes: [cube]}]
+objects: [{type: shapes, shapes: [cube], name: things, under: /Assets, label: thing, count: 4}]
+cameras: [{type: pinhole, name: cam, width: 64, height: 48}]
+lights: [{type: dome, name: sky}]
+randomizers:
+  - {type: scatter_poses, name: poses, on: [environment], nodes: "/Assets/*",
+     offset: [[-0.35, 0.35], [-0.35, 0.35], [1.2, 1.6]], scale: 0.12}
+  - {type: orbit_cameras, name: view, on: [dropped], nodes: "/Cameras/*", targets: "/Assets/*",
+     distance: 2, polar_angle_deg: 50}
+renderer: {type: "null"}
+timeline: [{simulate: {until: rest, at_most: 800}}, {capture: dropped}]
+writers: [{type: PoseWriter, name: pose}]
+)");
+  const Outcome outcome = run({"run", "job.yaml", "--output", "out"}, folder.path());
+  INFO(outcome.errors);
+  REQUIRE(outcome.exit_code == 0);
+  const Outcome clean = run({"lint", "--scenes", "out"}, folder.path());
+  INFO(clean.output << clean.errors);
+  REQUIRE(clean.exit_code == 0);
+  CHECK_THAT(clean.output, ContainsSubstring("settle: scenes, 2 files,"));
+
+  const fs::path file = fs::directory_iterator(folder / "out/settle")->path();
+  const std::string before = read_file(file);
+  const auto lint_with = [&](const auto& change) {
+    nlohmann::json json = nlohmann::json::parse(before);
+    change(json);
+    write_file(file, json.dump(1));
+    const Outcome lint = run({"lint", "--scenes", "out"}, folder.path());
+    CHECK(lint.exit_code == 7);
+    return lint.output;
+  };
+  const auto pose_of = [](nlohmann::json& json, std::size_t object) -> nlohmann::json& {
+    for (auto& placed : json["placed"]) {
+      if (placed["node"] == json["objects"][object]["object"]) return placed["parent_from_node"];
+    }
+    throw std::runtime_error("the object was never placed");
+  };
+  const auto lift = [&](nlohmann::json& json, double by) {
+    json["objects"][0].erase("before_last_step");
+    auto& pose = pose_of(json, 0);
+    pose[11] = pose[11].template get<double>() + by;
+  };
+  CHECK_THAT(lint_with([&](auto& json) { lift(json, 0.03); }),
+             ContainsSubstring(": hangs in the air"));
+  CHECK_THAT(lint_with([&](auto& json) {
+               json["objects"][0].erase("before_last_step");
+               for (const int i : {3, 7, 11}) {
+                 pose_of(json, 0)[i] = pose_of(json, 1)[i].template get<double>() + 0.02;
+               }
+             }),
+             ContainsSubstring(": is stuck in /Assets/"));
+  CHECK_THAT(lint_with([&](auto& json) {
+               auto& place = json["objects"][0]["before_last_step"];
+               place[0] = place[0].template get<double>() + 0.002;
+             }),
+             ContainsSubstring(": moves at 0.12 m/s; right would be: at most 0.05 m/s"));
+  CHECK_THAT(lint_with([&](auto& json) { json["visit"] = 9; }),
+             ContainsSubstring("is of visit 9; right would be: the job has visits 0 to"));
+  CHECK_THAT(lint_with([&](auto& json) { json["objects"][1]["object"] = "/Assets/nothing"; }),
+             ContainsSubstring("/Assets/nothing: is no object of the visit"));
+  CHECK_THAT(lint_with([&](auto& json) {
+               json["placed"][0]["parent_from_node"] = {1, 2};
+             }),
+             ContainsSubstring("parent_from_node is no list of 12 numbers"));
+}

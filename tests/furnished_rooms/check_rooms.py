@@ -3,7 +3,8 @@
 """Runs the default job and the tutorial's in rooms that others furnished, in small pictures, and says what
 went wrong in them: objects that begin inside something, that leave the room, that are photographed as settled
 while they move, hang in the air or are stuck, and cameras inside of things or too near to them. `diorama
-lint` looks at the labels. The datasets stay where --output says, for looking at the pictures.
+lint --scenes` looks at the labels, and at what holds what in scenes that it sets up anew. The datasets stay
+where --output says, for looking at the pictures.
 
     tests/furnished_rooms/check_rooms.py --assets-root FOLDER [--visits 10] [--output FOLDER] [--build FOLDER]
 
@@ -63,7 +64,8 @@ def main():
                 counts[flaw] += len(visit[flaw])
                 for found in visit[flaw]:
                     print(f"{job}, visit {visit['visit'] + 1}: {flaw}: {found}")
-        lint = subprocess.run([options.build / "bin" / "diorama", "lint", top / job], stdout=subprocess.PIPE,
+        lint = subprocess.run([options.build / "bin" / "diorama", "lint", "--scenes", top / job,
+                               "--assets-root", options.assets_root], stdout=subprocess.PIPE,
                               stderr=subprocess.STDOUT, text=True)
         if lint.returncode != 0:
             print(lint.stdout[-2000:])

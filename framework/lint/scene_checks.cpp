@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/lint/scene_checks.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "framework/config/json_text.h"
+#include "framework/lint/support_check.h"
+#include "framework/pipeline/scene_setup.h"
+#include "framework/pipeline/settling.h"
+
+namespace diorama {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+constexpr const char* kReadable = "every file can be read";
+constexpr const char* kAgrees = "settle/ agrees with the job";
+constexpr const char* kRests = "objects at rest rest on something";
+
+/// Metres; no room is as large.
+constexpr double kFarthest = 1e6;
+
+/// What settle/ says of one visit.
+struct VisitRecord {
+  int visit = 0;
+  double simulated_s = 0.0;
+  double step_s = 0.0;
+  std::vector<ObjectAtEnd> objects;
+  std::vector<PlacedNode> placed;
+};
+
+double number(const Json& json) {
+  const double value = json.get<double>();
+  if (!(std::abs(value) <= kFarthest)) {
+    throw std::runtime_error(json.dump() + " is not a number of at most 1e6");
+  }
+  return value;
+}
+
+template <std::size_t kCount>
+std::array<double, kCount> numbers(const Json& json, const char* key) {
+  if (!json.is_array() || json.size() != kCount) {
+    throw std::runtime_error(std::string(key) + " is no list of " + std::to_string(kCount) +
+                             " numbers");
+  }
+  std::array<double, kCount> values;
+  for (std::size_t i = 0; i < kCount; ++i) values[i] = number(json[i]);
+  return values;
+}
+
+/// Nothing when the file is of a program that did not write where things stood.
+std::optional<VisitRecord> read_record(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  const Json json = parse_json(text.str());
+  if (!json.contains("objects")) return std::nullopt;
+  VisitRecord record;
+  record.visit = json.at("visit").get<int>();
+  record.simulated_s = number(json.at("simulated_s"));
+  record.step_s = number(json.at("step_seconds"));
+  for (const Json& entry : json.at("objects")) {
+    ObjectAtEnd& object = record.objects.emplace_back();
+    object.path = entry.at("object").get<std::string>();
+    object.falls = entry.at("falls").get<bool>();
+    if (!entry.contains("before_last_step")) continue;
+    const auto place = numbers<3>(entry["before_last_step"], "before_last_step");
+    object.before_last_step = Vec3(place[0], place[1], place[2]);
+  }
+  for (const Json& entry : json.at("placed")) {
+    PlacedNode& node = record.placed.emplace_back();
+    node.path = entry.at("node").get<std::string>();
+    node.is_visible = entry.at("visible").get<bool>();
+    const auto rows = numbers<12>(entry.at("parent_from_node"), "parent_from_node");
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      node.parent_from_node.matrix()(Eigen::Index(i / 4), Eigen::Index(i % 4)) = rows[i];
+    }
+  }
+  return record;
+}
+
+class SceneLint {
+ public:
+  SceneLint(const Job& job, const CapturePlan& plan, VisitComponents& components, Host& host,
+            LintReport& report)
+      : job_(job), plan_(plan), components_(components), host_(host), report_(report) {}
+
+  void check(const VisitRecord& record, const std::string& file) {
+    file_ = file;
+    if (record.visit < 0 || record.visit >= plan_.visit_count()) {
+      complain(kAgrees, "", "is of visit " + std::to_string(record.visit),
+               "the job has visits 0 to " + std::to_string(plan_.visit_count() - 1));
+      return;
+    }
+    // Without a simulation objects float where they were placed.
+    if (record.step_s <= 0.0 || record.simulated_s <= 0.0) return;
+    Scene scene;
+    const PlannedVisit planned = plan_.visit(record.visit);
+    const NodeId environment = set_up(planned, scene);
+    if (!place(record, scene)) return;
+    std::vector<JudgedObject> judged;
+    for (const ObjectAtEnd& object : record.objects) {
+      const NodeId node = scene.find(object.path);
+      ++report_.checks;
+      if (!check_speed(object, scene, node, record.step_s)) {
+        judged.push_back({node, object.falls});
+      }
+    }
+    const int last = planned.first_capture + planned.capture_count - 1;
+    for (const Flaw& flaw : find_unheld(scene, environment, judged)) {
+      complain(kRests, scene.path(flaw.node), flaw.why, "", last);
+    }
+  }
+
+ private:
+  void complain(const char* check, const std::string& object, const std::string& found,
+                const std::string& expected, std::optional<int> capture = std::nullopt) {
+    report_.findings.push_back(lint_finding({check, file_, capture, "", object, found, expected}));
+  }
+
+  NodeId set_up(const PlannedVisit& planned, Scene& scene) {
+    const EnvironmentChoice& choice = plan_.environments[planned.environment];
+    const NodeId environment =
+        load_environment(choice.asset, job_.environments[choice.entry],
+                         *components_.environments[choice.entry], scene, host_);
+    apply_environment_rules(job_.environment, job_.debug, environment, scene, host_);
+    spawn_objects(plan_objects(job_, plan_.object_assets, planned.index), job_, scene, host_);
+    return environment;
+  }
+
+  /// Takes out what the run took out, and puts the rest where it stood. False: the record is of
+  /// another job.
+  bool place(const VisitRecord& record, Scene& scene) {
+    std::set<NodeId> there;
+    for (const ObjectAtEnd& object : record.objects) {
+      const NodeId node = scene.find(object.path);
+      if (!node) {
+        complain(kAgrees, object.path, "is no object of the visit", "");
+        return false;
+      }
+      there.insert(node);
+    }
+    for (const PlannedObject& object : plan_objects(job_, plan_.object_assets, record.visit)) {
+      const NodeId node = scene.find(object.path);
+      if (node && !there.contains(node)) scene.erase(node);
+    }
+    for (const PlacedNode& placed : record.placed) {
+      const NodeId node = scene.find(placed.path);
+      if (!node) {
+        // What a randomizer of others has made cannot be made here.
+        host_.log(LogLevel::Warning, file_ + ": " + placed.path +
+                                         " came after loading; this visit is not looked at");
+        return false;
+      }
+      scene.set_pose(node, placed.parent_from_node);
+      if (scene[node].is_visible != placed.is_visible) {
+        scene.edit(node).is_visible = placed.is_visible;
+      }
+    }
+    return true;
+  }
+
+  bool check_speed(const ObjectAtEnd& object, const Scene& scene, NodeId node, double step_s) {
+    if (!object.falls || !object.before_last_step) return false;
+    const double speed =
+        (scene.world_from_node(node).translation() - *object.before_last_step).norm() / step_s;
+    if (speed <= job_.settle.rest_speed) return false;
+    char text[64];
+    std::snprintf(text, sizeof text, "moves at %.2f m/s", speed);
+    char limit[64];
+    std::snprintf(limit, sizeof limit, "at most %g m/s", job_.settle.rest_speed);
+    complain(kRests, object.path, text, limit);
+    return true;
+  }
+
+  const Job& job_;
+  const CapturePlan& plan_;
+  VisitComponents& components_;
+  Host& host_;
+  LintReport& report_;
+  std::string file_;
+};
+
+}  // namespace
+
+LintReport lint_scenes(const fs::path& run, const Job& job, const CapturePlan& plan,
+                       VisitComponents& components, Host& host) {
+  LintReport report;
+  report.dataset = (run / "settle").string();
+  report.format = "scenes";
+  std::vector<fs::path> files;
+  std::error_code error;
+  for (fs::directory_iterator entry(run / "settle", error), end; !error && entry != end;
+       entry.increment(error)) {
+    if (entry->path().extension() == ".json") files.push_back(entry->path());
+  }
+  std::sort(files.begin(), files.end());
+  SceneLint lint(job, plan, components, host, report);
+  for (const fs::path& file : files) {
+    ++report.files;
+    ++report.checks;
+    std::optional<VisitRecord> record;
+    try {
+      record = read_record(file);
+    } catch (const std::exception& wrong) {
+      report.findings.push_back(lint_finding(
+          {kReadable, file.filename().string(), std::nullopt, "", "", wrong.what(), ""}));
+    }
+    if (record) lint.check(*record, file.filename().string());
+  }
+  return report;
+}
+
+}  // namespace diorama
