@@ -64,6 +64,19 @@ void draw_local_axes(Image<Rgba8>& picture, const Frame& frame, const ObjectPose
   }
 }
 
+/// Yellow where they are seen, grey where something hides them, with a black rim.
+void draw_named_points(Image<Rgba8>& picture, const ObjectPose& object) {
+  constexpr Rgba8 kRim{0, 0, 0, 255};
+  constexpr Rgba8 kSeen{255, 230, 0, 255};
+  constexpr Rgba8 kHidden{128, 128, 128, 255};
+  for (const ObjectPose::Named& point : object.named) {
+    if (point.image.state == ImagePoint::State::Outside) continue;
+    const bool is_seen = point.image.state == ImagePoint::State::Visible;
+    fill_circle(picture, point.image.pixel, 5.0, kRim);
+    fill_circle(picture, point.image.pixel, 3.5, is_seen ? kSeen : kHidden);
+  }
+}
+
 /// As they look one metre ahead of the camera, moved to the corner.
 void draw_world_axes(Image<Rgba8>& picture, const Frame& frame) {
   constexpr double kLength = 0.03;
@@ -99,6 +112,7 @@ Image<Rgba8> draw_overlay(const Frame& frame, const std::vector<ObjectPose>& obj
     draw_cuboid(picture, frame, object, layout);
     draw_local_axes(picture, frame, object, layout);
   }
+  for (const ObjectPose& object : objects) draw_named_points(picture, object);
   draw_world_axes(picture, frame);
   return picture;
 }
