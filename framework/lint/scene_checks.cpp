@@ -160,8 +160,8 @@ class SceneLint {
       const NodeId node = scene.find(placed.path);
       if (!node) {
         // What a randomizer of others has made cannot be made here.
-        host_.log(LogLevel::Warning, file_ + ": " + placed.path +
-                                         " came after loading; this visit is not looked at");
+        host_.log(LogLevel::Warning,
+                  file_ + ": " + placed.path + " came after loading; this visit is not looked at");
         return false;
       }
       scene.set_pose(node, placed.parent_from_node);
