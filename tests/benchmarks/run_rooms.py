@@ -3,7 +3,6 @@
 """Compares two builds of a renderer in rooms that are hard to light: relative variance of a pixel, CPU
 seconds, and efficiency (1 / (variance x CPU seconds)), all in one run, the two in turns.
 
-usage: run_rooms.py --assets SAMPLES [--data ASSETS_ROOT] --now PLUGINS --before PLUGINS [options]
   --program    default: build/release/bin/diorama
   --loaders    folder with loader_usd.so, if not beside the program
   --assets     folder with Isaac/ and NVIDIA/ of the sample pack (build/release/share/diorama/assets)
@@ -191,7 +190,7 @@ def judge(pairs, reference):
 
 
 def main():
-    parser = argparse.ArgumentParser(usage=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     here = os.path.dirname(os.path.abspath(__file__))
     parser.add_argument("--program", default=os.path.join(here, "../../build/release/bin/diorama"))
     parser.add_argument("--loaders")
