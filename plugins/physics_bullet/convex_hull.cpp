@@ -31,8 +31,12 @@ std::vector<Plane> face_planes(const ConvexHull& hull) {
 
 std::size_t farthest(std::span<const Vec3> points, const Vec3& direction) {
   std::size_t best = 0;
+  double best_reach = points[0].dot(direction);
   for (std::size_t i = 1; i < points.size(); ++i) {
-    if (points[i].dot(direction) > points[best].dot(direction)) best = i;
+    const double reach = points[i].dot(direction);
+    if (!(reach > best_reach)) continue;
+    best = i;
+    best_reach = reach;
   }
   return best;
 }
