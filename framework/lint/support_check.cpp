@@ -69,70 +69,63 @@ void spread(const Corners& triangle, double spacing, Body&& body) {
   }
 }
 
-/// The part of a triangle in a box, as a polygon; empty when there is none.
-std::vector<Vec3> clipped(const Corners& triangle, const Aabb& box) {
-  std::vector<Vec3> polygon(triangle.begin(), triangle.end());
-  for (int plane = 0; plane < 6 && !polygon.empty(); ++plane) {
-    const int axis = plane / 2;
-    const double sign = plane % 2 == 0 ? 1.0 : -1.0;
-    const double limit = plane % 2 == 0 ? box.max[axis] : -box.min[axis];
-    std::vector<Vec3> kept;
-    for (std::size_t i = 0; i < polygon.size(); ++i) {
-      const Vec3& from = polygon[i];
-      const Vec3& to = polygon[(i + 1) % polygon.size()];
-      const double before = limit - sign * from[axis];
-      const double after = limit - sign * to[axis];
-      if (before >= 0.0) kept.push_back(from);
-      if ((before >= 0.0) != (after >= 0.0)) {
-        kept.push_back(from + before / (before - after) * (to - from));
-      }
-    }
-    polygon = std::move(kept);
-  }
-  return polygon;
-}
+/// A point of a surface.
+struct SurfacePoint {
+  Vec3 place;
+  bool is_on_wall = false;  ///< The surface is upright there, and nothing can push it up.
+};
 
 /// Points to find near others.
 class PointGrid {
  public:
-  explicit PointGrid(double reach) : reach_(reach) {}
+  explicit PointGrid(double cell_m) : cell_m_(cell_m) {}
 
-  void add(const Vec3& point) {
-    cells_[key(cell_of(point))].push_back(point);
+  void add(const SurfacePoint& point) {
+    cells_[key(cell_of(point.place))].push_back(points_.size());
     points_.push_back(point);
   }
-  bool has_near(const Vec3& point) const {
-    const Cell cell = cell_of(point);
-    for (std::int64_t i = 0; i < 27; ++i) {
-      const auto found = cells_.find(key({cell[0] + i % 3 - 1, cell[1] + i / 3 % 3 - 1,
-                                          cell[2] + i / 9 - 1}));
-      if (found == cells_.end()) continue;
-      for (const Vec3& other : found->second) {
-        if ((other - point).squaredNorm() <= reach_ * reach_) return true;
+  /// Calls body(index) for at least the points in the box.
+  template <class Body>
+  void visit_near(const Aabb& box, Body&& body) const {
+    const Cell low = cell_of(box.min);
+    const Cell high = cell_of(box.max);
+    double cells = 1.0;
+    for (std::size_t i = 0; i < 3; ++i) cells *= double(high[i] - low[i] + 1);
+    if (cells > double(points_.size())) {
+      for (std::size_t i = 0; i < points_.size(); ++i) body(i);
+      return;
+    }
+    Cell cell = low;
+    for (cell[0] = low[0]; cell[0] <= high[0]; ++cell[0]) {
+      for (cell[1] = low[1]; cell[1] <= high[1]; ++cell[1]) {
+        for (cell[2] = low[2]; cell[2] <= high[2]; ++cell[2]) {
+          const auto found = cells_.find(key(cell));
+          if (found == cells_.end()) continue;
+          for (const std::size_t i : found->second) body(i);
+        }
       }
     }
-    return false;
   }
-  const std::vector<Vec3>& points() const { return points_; }
+  const std::vector<SurfacePoint>& points() const { return points_; }
 
  private:
   using Cell = std::array<std::int64_t, 3>;
 
   Cell cell_of(const Vec3& point) const {
-    return {std::int64_t(std::floor(point.x() / reach_)),
-            std::int64_t(std::floor(point.y() / reach_)),
-            std::int64_t(std::floor(point.z() / reach_))};
+    return {std::int64_t(std::floor(point.x() / cell_m_)),
+            std::int64_t(std::floor(point.y() / cell_m_)),
+            std::int64_t(std::floor(point.z() / cell_m_))};
   }
-  /// Cells that share a key are told apart by the distances of their points.
+  /// Cells may share a key.
   static std::uint64_t key(const Cell& cell) {
     std::uint64_t packed = 0;
     for (const std::int64_t index : cell) packed = packed << 21 ^ (std::uint64_t(index) & 0x1fffff);
     return packed;
   }
 
-  double reach_;
-  std::unordered_map<std::uint64_t, std::vector<Vec3>> cells_;
-  std::vector<Vec3> points_;
+  double cell_m_;
+  std::unordered_map<std::uint64_t, std::vector<std::size_t>> cells_;  ///< Indices.
+  std::vector<SurfacePoint> points_;
 };
 
 double area_of(const Corners& triangle) {
@@ -144,10 +137,11 @@ double longest_edge(const Corners& triangle) {
                    (triangle[0] - triangle[2]).norm()});
 }
 
-double squared_distance(const Vec3& point, const Corners& triangle) {
+/// The way to the point from where the triangle is nearest to it.
+Vec3 way_from(const Corners& triangle, const Vec3& point) {
   const Vec3 normal = (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]);
   bool is_above = normal.squaredNorm() > 0.0;
-  double nearest = kInfinity;
+  Vec3 shortest = point - triangle[0];
   for (std::size_t i = 0; i < 3; ++i) {
     const Vec3& start = triangle[i];
     const Vec3 along = triangle[(i + 1) % 3] - start;
@@ -155,11 +149,11 @@ double squared_distance(const Vec3& point, const Corners& triangle) {
     if (normal.cross(along).dot(way) < 0.0) is_above = false;
     const double length = along.squaredNorm();
     const double share = length > 0.0 ? std::clamp(way.dot(along) / length, 0.0, 1.0) : 0.0;
-    nearest = std::min(nearest, (way - share * along).squaredNorm());
+    const Vec3 from_edge = way - share * along;
+    if (from_edge.squaredNorm() < shortest.squaredNorm()) shortest = from_edge;
   }
-  if (!is_above) return nearest;
-  const double height = normal.dot(point - triangle[0]);
-  return std::min(nearest, height * height / normal.squaredNorm());
+  if (!is_above) return shortest;
+  return normal.dot(point - triangle[0]) / normal.squaredNorm() * normal;
 }
 
 /// 1 where the ray leaves through the triangle's front, -1 where it enters there, else 0.
@@ -183,16 +177,16 @@ int crossing(const Vec3& start, const Vec3& direction, const Corners& triangle) 
 /// direction, so that a bowl without thickness holds nothing inside.
 bool is_deep_inside(const Vec3& point, const Surface& solid, double depth) {
   // Askew, so that rays do not run along what is built straight.
-  static const std::array<Vec3, 6> kDirections{
-      Vec3(0.9, 0.31, 0.17),   Vec3(-0.88, -0.29, 0.23), Vec3(0.27, 0.93, -0.19),
-      Vec3(-0.33, -0.91, 0.1), Vec3(0.21, -0.13, 0.95),  Vec3(0.12, 0.26, -0.94)};
+  static const std::array<Vec3, 6> kDirections{Vec3(0.9, 0.31, 0.17),   Vec3(-0.88, -0.29, 0.23),
+                                               Vec3(0.27, 0.93, -0.19), Vec3(-0.33, -0.91, 0.1),
+                                               Vec3(0.21, -0.13, 0.95), Vec3(0.12, 0.26, -0.94)};
   for (const Vec3& direction : kDirections) {
     int left = 0;
     for (const Corners& triangle : solid.triangles) left += crossing(point, direction, triangle);
     if (left <= 0) return false;
   }
   return std::none_of(solid.triangles.begin(), solid.triangles.end(), [&](const auto& triangle) {
-    return squared_distance(point, triangle) < depth * depth;
+    return way_from(triangle, point).squaredNorm() < depth * depth;
   });
 }
 
@@ -264,27 +258,38 @@ class Surfaces {
   std::vector<Surface> all_;
 };
 
-/// What one object touches and what it is stuck in.
+/// What may hold one object, and what it is stuck in.
 struct Neighbours {
-  std::set<NodeId> touched;
+  std::set<NodeId> holders;
   NodeId stuck_in;
 };
 
-bool touches(const PointGrid& own, const Surface& other, const Aabb& box, double spacing) {
-  bool is_near = false;
+/// Whether the other could hold what the points are of: nearer than this to one of them, and not
+/// beside or above it, unless too near to tell.
+bool may_hold(const Surface& other, const PointGrid& own, const Aabb& box, double reach) {
+  constexpr double kTooNear = 0.004;    // metres; points are 5 mm apart
+  constexpr double kBelow = 0.25;       // sine of the way's angle to the level
+  std::map<std::size_t, Vec3> nearest;  // by point
   for (const Corners& triangle : other.triangles) {
-    if (!overlap(box_of(triangle), box)) continue;
-    const std::vector<Vec3> part = clipped(triangle, box);
-    for (std::size_t i = 2; i < part.size() && !is_near; ++i) {
-      spread({part[0], part[i - 1], part[i]}, spacing,
-             [&](const Vec3& point) { is_near = is_near || own.has_near(point); });
-    }
-    if (is_near) return true;
+    const Aabb around = grown(box_of(triangle), reach);
+    if (!overlap(around, box)) continue;
+    const Aabb both{around.min.cwiseMax(box.min), around.max.cwiseMin(box.max)};
+    own.visit_near(both, [&](std::size_t point) {
+      const Vec3 way = way_from(triangle, own.points()[point].place);
+      if (way.squaredNorm() > reach * reach) return;
+      const auto [known, is_new] = nearest.emplace(point, way);
+      if (!is_new && way.squaredNorm() < known->second.squaredNorm()) known->second = way;
+    });
   }
-  return false;
+  return std::ranges::any_of(nearest, [&](const auto& entry) {
+    const auto& [point, way] = entry;
+    const double distance = way.norm();
+    if (distance <= kTooNear) return true;
+    return !own.points()[point].is_on_wall && way.z() >= kBelow * distance;
+  });
 }
 
-bool is_stuck(const std::vector<Vec3>& points, const Surface& other, double depth) {
+bool is_stuck(const std::vector<SurfacePoint>& points, const Surface& other, double depth) {
   constexpr std::size_t kProbes = 256;
   constexpr int kWitnesses = 2;
   const Aabb core = grown(other.box, -depth);
@@ -292,8 +297,9 @@ bool is_stuck(const std::vector<Vec3>& points, const Surface& other, double dept
   int deep = 0;
   const std::size_t stride = std::max<std::size_t>(1, points.size() / kProbes);
   for (std::size_t i = stride / 2; i < points.size(); i += stride) {
-    if (!overlap({points[i], points[i]}, core)) continue;
-    if (is_deep_inside(points[i], other, depth) && ++deep == kWitnesses) return true;
+    const Vec3& place = points[i].place;
+    if (!overlap({place, place}, core)) continue;
+    if (is_deep_inside(place, other, depth) && ++deep == kWitnesses) return true;
   }
   return false;
 }
@@ -318,13 +324,15 @@ Neighbours neighbours_of(NodeId object, Surfaces& surfaces, const SupportLimits&
   PointGrid points(reach);
   for (const Surface* part : own) {
     for (const Corners& triangle : part->triangles) {
-      spread(triangle, spacing, [&](const Vec3& point) { points.add(point); });
+      const Vec3 normal = (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]);
+      const bool is_on_wall = std::abs(normal.z()) < 0.1 * normal.norm();
+      spread(triangle, spacing, [&](const Vec3& place) { points.add({place, is_on_wall}); });
     }
   }
   const Aabb box = grown(surfaces.box_of_owner(object), reach);
   for (const Surface* other : surfaces.near(box, object)) {
-    if (!found.touched.contains(other->owner) && touches(points, *other, box, spacing)) {
-      found.touched.insert(other->owner);
+    if (!found.holders.contains(other->owner) && may_hold(*other, points, box, reach)) {
+      found.holders.insert(other->owner);
     }
     if (!found.stuck_in && is_stuck(points.points(), *other, limits.depth_m)) {
       found.stuck_in = other->owner;
@@ -344,7 +352,7 @@ std::vector<Flaw> find_unheld(const Scene& scene, NodeId environment,
     if (object.falls) falling.insert(object.node);
   }
   std::map<NodeId, NodeId> stuck;
-  std::map<NodeId, std::vector<NodeId>> touched_by;
+  std::map<NodeId, std::vector<NodeId>> held_by;
   std::set<NodeId> seen, held;
   std::vector<NodeId> ready;
   for (const JudgedObject& object : objects) {
@@ -352,8 +360,8 @@ std::vector<Flaw> find_unheld(const Scene& scene, NodeId environment,
     seen.insert(object.node);
     const Neighbours neighbours = neighbours_of(object.node, surfaces, limits);
     if (neighbours.stuck_in) stuck[object.node] = neighbours.stuck_in;
-    for (const NodeId other : neighbours.touched) {
-      touched_by[other].push_back(object.node);
+    for (const NodeId other : neighbours.holders) {
+      held_by[other].push_back(object.node);
       if (!falling.contains(other) && held.insert(object.node).second) {
         ready.push_back(object.node);
       }
@@ -362,7 +370,7 @@ std::vector<Flaw> find_unheld(const Scene& scene, NodeId environment,
   while (!ready.empty()) {
     const NodeId holder = ready.back();
     ready.pop_back();
-    for (const NodeId object : touched_by[holder]) {
+    for (const NodeId object : held_by[holder]) {
       if (held.insert(object).second) ready.push_back(object);
     }
   }

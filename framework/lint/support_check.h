@@ -11,7 +11,7 @@
 namespace diorama {
 
 struct SupportLimits {
-  double reach_m = 0.015;  ///< Points of two surfaces nearer than this touch.
+  double reach_m = 0.011;  ///< What is farther from an object's points does not hold it.
   double depth_m = 0.012;  ///< Points deeper than this inside of another thing are stuck.
 };
 

@@ -27,7 +27,7 @@ std::vector<Keypoint> read_keypoints(const fs::path& file) {
     ParamReader reader(*map, "keypoints", complaints);
     for (const auto& [name, value] : map->map) {
       points.push_back({name, Vec3::Zero()});
-      reader.param(name.c_str(), points.back().position, {"Its place.", "m"});
+      reader.param(name.c_str(), points.back().position, {"Its place.", "m", -1e4, 1e4});
     }
     reader.finish();
   }

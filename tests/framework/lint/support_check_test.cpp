@@ -79,8 +79,8 @@ TEST_CASE("What lies, leans, is stacked or floats by design is held", "[support]
   stage.add_object("floats", kBox, at(1, 1, 2), false);
   stage.add_object("on_floating", make_sphere(0.05), at(1, 1, 2.1));
   // Mirrored, and a skin of 5 mm away.
-  stage.add_object("mirrored", kBox, Affine(at(-0.3, -0.2, kOnTable + 0.055) *
-                                            Eigen::Scaling(Vec3(-1, 1, 1))));
+  stage.add_object("mirrored", kBox,
+                   Affine(at(-0.3, -0.2, kOnTable + 0.055) * Eigen::Scaling(Vec3(-1, 1, 1))));
   stage.add_object("bowl", open_bowl(0.15), at(-2, -1, 0.15));
   stage.add_object("in_bowl", make_sphere(0.03), at(-2, -1, 0.032));
   CHECK(stage.unheld() == Texts{});
@@ -91,10 +91,12 @@ TEST_CASE("What is lifted by three centimetres hangs, and what lies on it as wel
   stage.add_object("lifted", kBox, at(0.3, 0.1, kOnTable + 0.08));
   stage.add_object("on_lifted", kBox, at(0.3, 0.1, kOnTable + 0.18));
   stage.add_object("on_table", kBox, at(-0.3, 0.1, kOnTable + 0.05));
+  // 6 mm beside the one on the table.
+  stage.add_object("neighbour", kBox, at(-0.3, 0.226, kOnTable + 0.08));
   // Its box is on the table, its own surface beside the edge.
   stage.add_object("beside", make_sphere(0.1), at(0.7, 0.5, 0.72));
-  CHECK(stage.unheld() ==
-        Texts{"lifted: hangs in the air", "on_lifted: hangs in the air", "beside: hangs in the air"});
+  CHECK(stage.unheld() == Texts{"lifted: hangs in the air", "on_lifted: hangs in the air",
+                                "neighbour: hangs in the air", "beside: hangs in the air"});
 }
 
 TEST_CASE("What is inside a table or another object is stuck there", "[support]") {
