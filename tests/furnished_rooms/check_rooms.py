@@ -64,7 +64,9 @@ def main():
                 counts[flaw] += len(visit[flaw])
                 for found in visit[flaw]:
                     print(f"{job}, visit {visit['visit'] + 1}: {flaw}: {found}")
-        lint = subprocess.run([options.build / "bin" / "diorama", "lint", "--scenes", top / job,
+        if not reports:
+            sys.exit(f"{job}: wrote no settle/")
+        lint = subprocess.run([options.build / "bin" / "diorama", "lint", "--scenes", reports[0].parents[1],
                                "--assets-root", options.assets_root], stdout=subprocess.PIPE,
                               stderr=subprocess.STDOUT, text=True)
         if lint.returncode != 0:

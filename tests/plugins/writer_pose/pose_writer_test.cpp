@@ -100,7 +100,8 @@ TEST_CASE("named keypoints are told on demand, where the camera has them", "[wri
     CHECK(writer.needs().contains(kDistanceToCamera.name));
     const auto files = test::write_dataset(writer, named.dataset, {&named.capture});
     int crates = 0;
-    for (const Json& object : Json::parse(files.text("000000.json"))["objects"]) {
+    const Json json = Json::parse(files.text("000000.json"));
+    for (const Json& object : json["objects"]) {
       if (object["prim_path"] != "/Assets/crate") {
         CHECK_FALSE(object.contains("named_keypoints"));
         continue;
