@@ -22,7 +22,7 @@ void* on_demand_function(const std::string& name, const char* function) {
   const char* const reason = dlerror();
   throw Error(ErrorKind::Plugin, file.string() + ": cannot be loaded: " +
                                      (reason ? reason : "it is not what it should be") +
-                                     "; install Diorama again, of one version");
+                                     "; install all packages of Diorama that are needed, of one version");
 }
 
 }  // namespace diorama
