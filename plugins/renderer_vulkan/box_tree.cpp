@@ -184,6 +184,23 @@ class Builder {
 
 }  // namespace
 
+std::map<std::uint32_t, TreeNode> BoxTree::top(int levels) const {
+  std::map<std::uint32_t, TreeNode> found;
+  std::vector<std::uint32_t> level{0};
+  for (int i = 0; i < levels; ++i) {
+    std::vector<std::uint32_t> next;
+    for (const std::uint32_t number : level) {
+      const TreeNode& node = nodes[number];
+      found.emplace(number, node);
+      for (const std::uint32_t child : {node.child_a, node.child_b}) {
+        if ((child & TreeNode::kLeaf) == 0) next.push_back(child);
+      }
+    }
+    level = std::move(next);
+  }
+  return found;
+}
+
 BoxTree tree_of_runs(std::span<const TreeBox> boxes) { return Builder(boxes, true).build(); }
 
 BoxTree tree_of_single(std::span<const TreeBox> boxes) { return Builder(boxes, false).build(); }

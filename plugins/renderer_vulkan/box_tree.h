@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <span>
 #include <vector>
 
@@ -24,17 +25,20 @@ struct TreeBox {
   }
 };
 
-/// Two children. Children are nodes, or leaves: kLeaf with what stands there.
+/// Two children, as kernels read them. Children are nodes, or leaves: kLeaf with what stands there.
 struct TreeNode {
   static constexpr std::uint32_t kLeaf = 0x80000000u;
 
   Vec3f low_a = TreeBox().low;
   std::uint32_t child_a = kLeaf;
   Vec3f high_a = TreeBox().high;
+  std::uint32_t pad_a = 0;
   Vec3f low_b = TreeBox().low;
   std::uint32_t child_b = kLeaf;
   Vec3f high_b = TreeBox().high;
+  std::uint32_t pad_b = 0;
 };
+static_assert(sizeof(TreeNode) == 64);
 
 /// A tree of boxes that rays pass fast: split where the surface area heuristic says so, among bins
 /// (Wald 2007), and not too deep for the kernels' stacks.
@@ -46,6 +50,9 @@ struct BoxTree {
 
   std::vector<TreeNode> nodes;       ///< The root first; there is always one.
   std::vector<std::uint32_t> order;  ///< Of the boxes as leaves hold them, without the empty ones.
+
+  /// The nodes of the first levels, by their numbers.
+  std::map<std::uint32_t, TreeNode> top(int levels) const;
 };
 
 /// Leaves hold a run of `order`: kLeaf | first << 3 | count - 1.

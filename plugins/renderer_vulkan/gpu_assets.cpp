@@ -13,7 +13,7 @@ namespace {
 
 /// All of a mesh that kernels read, in parts that begin at multiples of 16 bytes.
 struct MeshBytes {
-  WideTree tree;
+  BoxTree tree;
   std::vector<TriangleColumns> triangles;
   std::vector<std::array<float, 6>> uvs;
   std::vector<std::array<float, 9>> colors;
@@ -27,12 +27,9 @@ MeshBytes bytes_of(const ShadingMesh& mesh) {
     for (const std::uint32_t corner : mesh.corners(t)) boxes[t].add(source.positions[corner]);
   }
   MeshBytes bytes;
-  // As deep as trees over the instances may open it.
-  constexpr int kTopLevels = 4;
-  const BoxTree tree = tree_of_runs(boxes);
-  bytes.tree = widened(tree, kTopLevels);
-  bytes.triangles.reserve(tree.order.size());
-  for (const std::uint32_t t : tree.order) {
+  bytes.tree = tree_of_runs(boxes);
+  bytes.triangles.reserve(bytes.tree.order.size());
+  for (const std::uint32_t t : bytes.tree.order) {
     const auto corners = mesh.corners(t);
     const Vec3f& a = source.positions[corners[0]];
     bytes.triangles.push_back(
@@ -106,12 +103,13 @@ std::vector<std::shared_ptr<const MeshOnDevice>> GpuAssets::take(
   }
   std::vector<MeshBytes> made(missing.size());
   host.parallel_for(missing.size(), [&](std::size_t i) { made[i] = bytes_of(*missing[i]); });
+  constexpr int kTopLevels = 7;
   std::vector<GpuBytes> blobs(missing.size());
   std::vector<std::shared_ptr<MeshOnDevice>> placed;
   std::vector<VulkanDevice::Transfer> transfers;
   for (std::size_t i = 0; i < missing.size(); ++i) {
     const ShadingMesh& mesh = *missing[i];
-    MeshBytes bytes = std::move(made[i]);
+    const MeshBytes bytes = std::move(made[i]);
     GpuBytes& blob = blobs[i];
     const std::size_t nodes = blob.add(bytes.tree.nodes);
     const std::size_t triangles = blob.add(bytes.triangles);
@@ -120,7 +118,7 @@ std::vector<std::shared_ptr<const MeshOnDevice>> GpuAssets::take(
     const std::size_t colors = blob.add(bytes.colors);
     auto on_device = std::make_shared<MeshOnDevice>();
     on_device->memory = arena_.take(blob.bytes().size(), "a mesh and its tree");
-    on_device->top = std::move(bytes.tree.top);
+    on_device->top = bytes.tree.top(kTopLevels);
     transfers.push_back({blob.bytes(), &on_device->memory.buffer(), on_device->memory.offset()});
     const gpu::Address base = on_device->memory.address();
     gpu::Instance& parts = on_device->parts;

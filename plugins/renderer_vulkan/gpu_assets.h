@@ -9,21 +9,21 @@
 #include <span>
 #include <vector>
 
+#include "box_tree.h"
 #include "diorama/host.h"
 #include "gpu_world.h"
 #include "renderer_support/mip_texture.h"
 #include "renderer_support/shading_mesh.h"
 #include "vulkan_arena.h"
 #include "vulkan_device.h"
-#include "wide_tree.h"
 
 namespace diorama {
 
 /// A mesh with its tree in a device's memory.
 struct MeshOnDevice {
   VulkanRange memory;
-  gpu::Instance parts;                              ///< Addresses and flags of the mesh.
-  std::map<std::uint32_t, WideTree::Children> top;  ///< Of its tree.
+  gpu::Instance parts;                    ///< Addresses and flags of the mesh.
+  std::map<std::uint32_t, TreeNode> top;  ///< Of its tree.
 };
 
 struct TextureOnDevice {

@@ -348,7 +348,7 @@ GpuScene::References GpuScene::references_of(const RenderScene& scene) const {
     const auto number = std::uint32_t(result.parts.size());
     result.parts.push_back({instance, child});
     result.boxes.push_back(box);
-    if ((child & WideNode::kLeaf) == 0) largest.emplace(half_area(box), number);
+    if ((child & TreeNode::kLeaf) == 0) largest.emplace(half_area(box), number);
   };
   for (std::uint32_t i = 0; i < scene.instances().size(); ++i) {
     add(i, 0, box_of(scene.instances()[i], scene.window()));
@@ -365,28 +365,15 @@ GpuScene::References GpuScene::references_of(const RenderScene& scene) const {
     const auto node = top.find(part.child);
     if (instance.motion || node == top.end()) continue;
     const TreeBox whole = result.boxes[number];
-    const WideTree::Children& inner = node->second;
-    std::array<TreeBox, 4> boxes;
-    float sum = 0.0f;
-    for (std::size_t k = 0; k < boxes.size(); ++k) {
-      if (inner.children[k] == WideNode::kNothing) continue;
-      boxes[k] = placed(inner.boxes[k], instance, whole);
-      sum += half_area(boxes[k]);
-    }
+    const TreeBox a = placed({node->second.low_a, node->second.high_a}, instance, whole);
+    const TreeBox b = placed({node->second.low_b, node->second.high_b}, instance, whole);
     // Turned boxes may be no smaller than what they are part of.
-    if (sum > kWorthwhile * half_area(whole)) continue;
-    bool is_first = true;
-    for (std::size_t k = 0; k < boxes.size(); ++k) {
-      if (inner.children[k] == WideNode::kNothing) continue;
-      if (!is_first) {
-        add(part.instance, inner.children[k], boxes[k]);
-        continue;
-      }
-      is_first = false;
-      result.parts[number].child = inner.children[k];
-      result.boxes[number] = boxes[k];
-      if ((inner.children[k] & WideNode::kLeaf) == 0) largest.emplace(half_area(boxes[k]), number);
-    }
+    if (half_area(a) + half_area(b) > 1.5f * half_area(whole)) continue;
+    if (is_empty(b)) continue;
+    result.parts[number].child = node->second.child_a;
+    result.boxes[number] = a;
+    if ((node->second.child_a & TreeNode::kLeaf) == 0) largest.emplace(half_area(a), number);
+    add(part.instance, node->second.child_b, b);
   }
   return result;
 }
@@ -472,7 +459,7 @@ void GpuScene::take_tables(const RenderScene& scene) {
   GpuBytes tables;
   gpu::World world;
   const References references = references_of(scene);
-  world.tree = tables.add(widened(tree_of_single(references.boxes), 0).nodes);
+  world.tree = tables.add(tree_of_single(references.boxes).nodes);
   world.references = tables.add(references.parts);
   world.instances = tables.add(instances);
   world.slot_materials = tables.add(slot_materials);

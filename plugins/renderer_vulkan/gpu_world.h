@@ -151,7 +151,7 @@ static_assert(sizeof(Light) == 168);
 /// A part of an instance's tree, as leaves of the tree over the instances name them.
 struct Reference {
   std::uint32_t instance = 0;
-  std::uint32_t child = 0;  ///< As in WideNode.
+  std::uint32_t child = 0;  ///< As in TreeNode.
 };
 
 struct World {

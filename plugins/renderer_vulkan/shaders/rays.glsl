@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Trees of boxes with four children each, over the instances and within meshes; see wide_tree.h. A
-// child is a node, or a leaf: a part of an instance, or up to eight triangles in a row.
+// Trees of boxes with two children each, over the instances and within meshes. A child is a node, or
+// a leaf: a part of an instance, or up to eight triangles in a row.
 const uint kLeaf = 0x80000000u;
 const uint kReturn = 0xFFFFFFFEu;  // from a mesh to the tree of the instances
-const uint kEnd = 0xFFFFFFFFu;     // also: no child
-// WideTree::kMostWaiting for each of two levels, and the way back between them.
-const uint kStackSize = 144u;
+const uint kEnd = 0xFFFFFFFFu;
+const uint kStackSize = 96u;
 
 struct Hit {
   float t;
@@ -22,42 +21,16 @@ vec3 inverse_of(vec3 d) {
                     abs(d.z) < kLeast ? (d.z < 0.0 ? -kLeast : kLeast) : d.z);
 }
 
-vec4 bytes_of(uint word) {
-  // Added to 2^23 as whole numbers: several times as fast as a conversion on most devices.
-  const uvec4 bytes = uvec4(word, word >> 8, word >> 16, word >> 24) & 255u;
-  return uintBitsToFloat(bytes | 0x4B000000u) - 8388608.0;
+// Where a ray enters a box; kInfinite: it does not.
+float entry_of(vec3 low, vec3 high, vec3 origin, vec3 inverse, float t_min, float t_max) {
+  const vec3 a = (low - origin) * inverse;
+  const vec3 b = (high - origin) * inverse;
+  const vec3 near = min(a, b);
+  const vec3 far = max(a, b);
+  const float enters = max(max(near.x, near.y), max(near.z, t_min));
+  const float leaves = min(min(far.x, far.y), min(far.z, t_max)) * 1.0000004;
+  return enters <= leaves ? enters : kInfinite;
 }
-
-// Where a ray enters the boxes of a node's children; kInfinite: it does not.
-vec4 entries_of(uvec4 head, uvec4 low_and_high, uvec2 rest_of_high, vec3 origin, vec3 inverse,
-                float t_min, float t_max) {
-  const vec3 size = uintBitsToFloat((uvec3(head.w, head.w >> 8, head.w >> 16) & 255u) << 23);
-  const vec3 base = (uintBitsToFloat(head.xyz) - origin) * inverse;
-  const vec3 per_step = size * inverse;
-  const bvec3 is_back = lessThan(inverse, vec3(0.0));
-  const uvec3 low = low_and_high.xyz;
-  const uvec3 high = uvec3(low_and_high.w, rest_of_high);
-  const uvec3 near = mix(low, high, is_back);
-  const uvec3 far = mix(high, low, is_back);
-  const vec4 enters = max(max(bytes_of(near.x) * per_step.x + base.x,
-                              bytes_of(near.y) * per_step.y + base.y),
-                          max(bytes_of(near.z) * per_step.z + base.z, vec4(t_min)));
-  const vec4 leaves = min(min(bytes_of(far.x) * per_step.x + base.x,
-                              bytes_of(far.y) * per_step.y + base.y),
-                          min(bytes_of(far.z) * per_step.z + base.z, vec4(t_max)));
-  return mix(vec4(kInfinite), enters, lessThanEqual(enters, leaves * 1.000001));
-}
-
-#define IN_ORDER(t, children, I, J)                  \
-  if (t[J] < t[I]) {                                 \
-    t = vec4(t).SWAP_##I##J;                         \
-    children = uvec4(children).SWAP_##I##J;          \
-  }
-#define SWAP_01 yxzw
-#define SWAP_23 xywz
-#define SWAP_02 zyxw
-#define SWAP_13 xwzy
-#define SWAP_12 xzyw
 
 // Says whether a surface is not there.
 bool is_absent(uint instance, uint number, float u, float v) {
@@ -98,7 +71,7 @@ vec3 straight_share(uint instance, uint number, float u, float v, vec3 triangle_
 #define TRAVERSE(ON_HIT)                                                                          \
   uint stack[kStackSize];                                                                         \
   uint top = 0u;                                                                                  \
-  Uvec4s nodes = world.tree;                                                                       \
+  Vec4s nodes = world.tree;                                                                       \
   uint instance = kNone;                                                                          \
   uint flags = 0u;                                                                                \
   vec3 o = origin;                                                                                \
@@ -110,21 +83,21 @@ vec3 straight_share(uint instance, uint number, float u, float v, vec3 triangle_
   while (node != kEnd) {                                                                          \
     while (node < kLeaf && iterations <= limit) {                                                 \
       ++iterations;                                                                               \
-      const uvec4 head = nodes.v[4u * node];                                                      \
-      uvec4 children = nodes.v[4u * node + 1u];                                                   \
-      vec4 t = entries_of(head, nodes.v[4u * node + 2u], nodes.v[4u * node + 3u].xy, o, inverse,  \
-                          t_min, t_max);                                                          \
-      t = mix(t, vec4(kInfinite), equal(children, uvec4(kEnd)));                                  \
-      IN_ORDER(t, children, 0, 1)                                                                 \
-      IN_ORDER(t, children, 2, 3)                                                                 \
-      IN_ORDER(t, children, 0, 2)                                                                 \
-      IN_ORDER(t, children, 1, 3)                                                                 \
-      IN_ORDER(t, children, 1, 2)                                                                 \
-      if (t.w < kInfinite) stack[top++] = children.w;                                             \
-      if (t.z < kInfinite) stack[top++] = children.z;                                             \
-      if (t.y < kInfinite) stack[top++] = children.y;                                             \
-      if (t.x < kInfinite) {                                                                      \
-        node = children.x;                                                                        \
+      const vec4 low_a = nodes.v[4u * node];                                                      \
+      const vec4 high_a = nodes.v[4u * node + 1u];                                                \
+      const vec4 low_b = nodes.v[4u * node + 2u];                                                 \
+      const vec4 high_b = nodes.v[4u * node + 3u];                                                \
+      const float a = entry_of(low_a.xyz, high_a.xyz, o, inverse, t_min, t_max);                  \
+      const float b = entry_of(low_b.xyz, high_b.xyz, o, inverse, t_min, t_max);                  \
+      const uint child_a = floatBitsToUint(low_a.w);                                              \
+      const uint child_b = floatBitsToUint(low_b.w);                                              \
+      if (a < kInfinite && b < kInfinite) {                                                       \
+        node = a <= b ? child_a : child_b;                                                        \
+        stack[top++] = a <= b ? child_b : child_a;                                                \
+      } else if (a < kInfinite) {                                                                 \
+        node = child_a;                                                                           \
+      } else if (b < kInfinite) {                                                                 \
+        node = child_b;                                                                           \
       } else {                                                                                    \
         node = top > 0u ? stack[--top] : kEnd;                                                    \
       }                                                                                           \

@@ -149,13 +149,13 @@ void collect_lights(inout Path path, float distance) {
   const vec3 from = path.origin - passed * path.direction;
   const bool is_open = distance >= kInfinite;
   const float end = is_open ? kInfinite : passed + distance;
-  for (uint k = 0u; k < world.shape_count; ++k) {
-    const uint light = world.light_shapes.v[k];
-    if (is_near(light, from, path.direction)) collect_light(path, light, from, passed, end);
-  }
-  if (!is_open) return;
-  for (uint k = 0u; k < world.surroundings_count; ++k) {
-    collect_light(path, world.surroundings.v[k], from, passed, end);
+  const uint count = world.shape_count + (is_open ? world.surroundings_count : 0u);
+  [[dont_unroll]] for (uint k = 0u; k < count; ++k) {
+    const bool is_shape = k < world.shape_count;
+    const uint light =
+        is_shape ? world.light_shapes.v[k] : world.surroundings.v[k - world.shape_count];
+    if (is_shape && !is_near(light, from, path.direction)) continue;
+    collect_light(path, light, from, passed, end);
   }
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // See mip_texture.h of renderer_support.
+#extension GL_EXT_control_flow_attributes : require
 const uint kRepeat = 0u;
 const uint kClamp = 1u;
 const uint kMirror = 2u;
@@ -54,23 +55,33 @@ vec4 bilinear(uint texture, uint level, vec2 uv, uint wrap_u, uint wrap_v) {
   const int x1 = wrapped(left + 1, width, wrap_u);
   const int y0 = wrapped(above, height, wrap_v);
   const int y1 = wrapped(above + 1, height, wrap_v);
-  const vec4 top = texel(texture, offset, width, x0, y0) * (1.0 - fx) +
-                   texel(texture, offset, width, x1, y0) * fx;
-  const vec4 bottom = texel(texture, offset, width, x0, y1) * (1.0 - fx) +
-                      texel(texture, offset, width, x1, y1) * fx;
-  return top * (1.0 - fy) + bottom * fy;
+  // Loops, as kernels hold many lookups: code that does not fit caches costs more than rounds.
+  vec4 sum = vec4(0.0);
+  [[dont_unroll]] for (int row = 0; row < 2; ++row) {
+    vec4 line = vec4(0.0);
+    [[dont_unroll]] for (int column = 0; column < 2; ++column) {
+      line += texel(texture, offset, width, column == 0 ? x0 : x1, row == 0 ? y0 : y1) *
+              (column == 0 ? 1.0 - fx : fx);
+    }
+    sum += line * (row == 0 ? 1.0 - fy : fy);
+  }
+  return sum;
 }
 
 vec4 lookup(uint texture, vec2 uv, float footprint, uint wrap_u, uint wrap_v) {
   const float texels =
       footprint * float(max(world.textures.v[texture].width, world.textures.v[texture].height));
-  if (!(texels > 1.0)) return bilinear(texture, 0u, uv, wrap_u, wrap_v);
-  const float level = min(log2(texels), float(world.textures.v[texture].level_count - 1u));
+  const bool is_fine = !(texels > 1.0);
+  const float level =
+      is_fine ? 0.0 : min(log2(texels), float(world.textures.v[texture].level_count - 1u));
   const uint low = uint(level);
   const float rest = level - float(low);
-  const vec4 fine = bilinear(texture, low, uv, wrap_u, wrap_v);
-  if (rest == 0.0) return fine;
-  return fine * (1.0 - rest) + bilinear(texture, low + 1u, uv, wrap_u, wrap_v) * rest;
+  vec4 sum = vec4(0.0);
+  const uint count = rest == 0.0 ? 1u : 2u;
+  [[dont_unroll]] for (uint i = 0u; i < count; ++i) {
+    sum += bilinear(texture, low + i, uv, wrap_u, wrap_v) * (i == 0u ? 1.0 - rest : rest);
+  }
+  return sum;
 }
 
 bool has_texture(uint material, uint slot) {

@@ -4,7 +4,6 @@
 #extension GL_EXT_scalar_block_layout : require
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Vec4s { vec4 v[]; };
-layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Uvec4s { uvec4 v[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Floats { float v[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Uints { uint v[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Ints { int v[]; };
@@ -83,7 +82,7 @@ const uint kHasLights = 128u;
 const uint kMoves = 256u;
 
 struct Instance {
-  Uvec4s nodes;      // see wide_tree.h
+  Vec4s nodes;
   Vec4s triangles;  // three each: corner and number, two edges
   Uints shading;    // five words per number: normals and material slot
   Floats uvs;       // six per number
@@ -157,7 +156,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Tex
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Lights { Light v[]; };
 
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer World {
-  Uvec4s tree;      // over parts of the instances
+  Vec4s tree;       // over parts of the instances
   Uints references;  // of its leaves: an instance and a child in its tree
   Instances instances;
   Uints slot_materials;

@@ -65,6 +65,19 @@ std::vector<TreeBox> random_boxes(std::uint32_t count) {
 
 }  // namespace
 
+TEST_CASE("the first levels of a tree are what the tree has there", "[box_tree]") {
+  const BoxTree tree = tree_of_runs(random_boxes(500));
+  CHECK(tree.top(0).empty());
+  CHECK(tree.top(1).size() == 1);
+  const auto top = tree.top(4);
+  CHECK(top.size() > 4);
+  CHECK(top.size() <= 15);
+  for (const auto& [number, node] : top) {
+    CHECK(node.child_a == tree.nodes[number].child_a);
+    CHECK(node.low_b == tree.nodes[number].low_b);
+  }
+}
+
 TEST_CASE("every box is in one leaf, and within all boxes above it", "[box_tree]") {
   for (const std::uint32_t count : {0u, 1u, 2u, 5u, 37u, 3000u}) {
     std::vector<TreeBox> boxes = random_boxes(count);
