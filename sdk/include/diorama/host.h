@@ -65,8 +65,9 @@ class DIORAMA_SDK_API Host {
   /// shares meshes, materials and textures.
   virtual NodeId load_asset(std::string_view asset, Scene& scene, NodeId parent) = 0;
 
-  /// Decodes PNG, JPEG, HDR (RGBE), EXR, TGA or BMP. 8-bit images with three or four channels are
-  /// marked Srgb, everything else Linear; `name` is for messages. Throws Error(Asset).
+  /// Decodes PNG, JPEG, HDR (RGBE), EXR, TGA, BMP, TIFF, WebP or JPEG 2000. 8-bit images with three
+  /// or four channels are marked Srgb, everything else Linear; `name` is for messages. Throws
+  /// Error(Asset).
   virtual std::shared_ptr<const Texture> decode_texture(std::span<const std::byte> bytes,
                                                         std::string_view name) const = 0;
   virtual std::shared_ptr<const Texture> read_texture(const std::filesystem::path& file) const = 0;
