@@ -398,7 +398,7 @@ TEST_CASE("cuboid keypoints lie within a hundredth of a pixel, through every len
   for (const NodeId camera : world.cameras) {
     const Frame frame = render(*renderer, world, camera);
     const auto box = std::ranges::find(frame.instances, world.nodes[kBox].index, &Instance::id);
-    for (const Keypoint& keypoint : kCuboidKeypoints) {
+    for (const CuboidPoint& keypoint : kCuboidKeypoints) {
       const Vec3 half(0.5 * kBoxX, 0.5 * kBoxY, 0.5 * kBoxZ);
       const Vec3 corner(keypoint.side[0] * half.x(), keypoint.side[1] * half.y(),
                         keypoint.side[2] * half.z());
