@@ -341,7 +341,6 @@ GpuScene::References GpuScene::references_of(const RenderScene& scene) const {
   constexpr std::size_t kPartsPerInstance = 3;  // beside itself
   constexpr std::size_t kFurtherParts = 256;
   constexpr std::size_t kMostParts = 1u << 16;  // more are only memory
-  constexpr float kWorthwhile = 2.0f;           // of the areas of four parts, in that of the whole
   References result;
   std::priority_queue<std::pair<float, std::uint32_t>> largest;  // area, number
   const auto add = [&](std::uint32_t instance, std::uint32_t child, const TreeBox& box) {
