@@ -109,8 +109,8 @@ Declared declared_by_tiff(const Source& source) {
   if (declared.width == 0 || declared.height == 0) header.refuse("it does not say its size");
   source.check_size(declared.width, declared.height);
   if (samples < 1 || samples > 4 || bits > 64) {
-    header.refuse("pixels of " + std::to_string(samples) + " samples with " +
-                  std::to_string(bits) + " bits are not read");
+    header.refuse("pixels of " + std::to_string(samples) + " samples with " + std::to_string(bits) +
+                  " bits are not read");
   }
   const std::uint64_t stored = std::max<std::uint64_t>(1, bits / 8);
   const std::uint64_t kept = stored == 1 ? 1 : 4;
@@ -189,7 +189,8 @@ Texture decode(const Source& source, const Declared& declared, const char* forma
   } catch (const std::runtime_error& error) {
     source.refuse(std::string("damaged ") + format + ": " + error.what());
   }
-  source.refuse(std::string("damaged ") + format + ": its header says another size than its pixels");
+  source.refuse(std::string("damaged ") + format +
+                ": its header says another size than its pixels");
 }
 
 }  // namespace

@@ -7,8 +7,8 @@
 
 namespace diorama {
 
-/// Runs a job whose files are kept in memory and go with the call: what its writers do with captures
-/// is what is left. Throws as Pipeline::run() does.
+/// Runs a job whose files are kept in memory and go with the call: what its writers do with
+/// captures is what is left. Throws as Pipeline::run() does.
 RunSummary run_in_memory(JobAssembly& assembly, HostServices& host, const RunOptions& options);
 
 }  // namespace diorama

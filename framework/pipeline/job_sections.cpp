@@ -138,8 +138,8 @@ constexpr JobSection kSections[] = {
 std::span<const JobSection> job_sections() { return kSections; }
 
 const JobSection* job_section(std::string_view key) {
-  const auto found =
-      std::ranges::find_if(kSections, [&](const JobSection& section) { return section.key == key; });
+  const auto found = std::ranges::find_if(
+      kSections, [&](const JobSection& section) { return section.key == key; });
   return found == std::end(kSections) ? nullptr : &*found;
 }
 

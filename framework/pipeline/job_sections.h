@@ -12,8 +12,8 @@
 namespace diorama {
 
 /// A key of the job file that has keys or entries of its own. From this table, and the plain keys
-/// (JobHead in job_keys.h), follow: which keys are known, what the host reads of an entry that names
-/// a component, the job with all defaults, the reference, the schema and the completion.
+/// (JobHead in job_keys.h), follow: which keys are known, what the host reads of an entry that
+/// names a component, the job with all defaults, the reference, the schema and the completion.
 struct JobSection {
   const char* key;
   ParamType type;  ///< Group, or List of entries.

@@ -20,9 +20,10 @@ void* on_demand_function(const std::string& name, const char* function) {
   void* const found = library ? dlsym(library, function) : nullptr;
   if (found) return found;
   const char* const reason = dlerror();
-  throw Error(ErrorKind::Plugin, file.string() + ": cannot be loaded: " +
-                                     (reason ? reason : "it is not what it should be") +
-                                     "; install all packages of Diorama that are needed, of one version");
+  throw Error(ErrorKind::Plugin,
+              file.string() +
+                  ": cannot be loaded: " + (reason ? reason : "it is not what it should be") +
+                  "; install all packages of Diorama that are needed, of one version");
 }
 
 }  // namespace diorama

@@ -7,8 +7,8 @@
 
 #include "diorama/reader.h"
 
-/// Captures as dictionaries and views of pixels, of which diorama/__init__.py makes its classes. With
-/// the interpreter's lock held, except where said otherwise.
+/// Captures as dictionaries and views of pixels, of which diorama/__init__.py makes its classes.
+/// With the interpreter's lock held, except where said otherwise.
 namespace diorama {
 
 pybind11::list findings_of(const ReadLog& log);

@@ -148,8 +148,7 @@ void bind_node(py::module_& module) {
           &set_position)
       .def_property_readonly("world_bounds", &bounds_of)
       .def_property_readonly("has_mesh", [](const PyNode& n) { return n.node().mesh != nullptr; })
-      .def_property_readonly("is_light",
-                             [](const PyNode& n) { return n.node().light.has_value(); })
+      .def_property_readonly("is_light", [](const PyNode& n) { return n.node().light.has_value(); })
       .def_property_readonly("is_camera",
                              [](const PyNode& n) { return n.node().camera.has_value(); })
       .def_property(
@@ -175,57 +174,67 @@ void bind_node(py::module_& module) {
 
 void bind_scene(py::module_& module) {
   py::class_<PyScene>(module, "Scene")
-      .def_property_readonly("root", [](const PyScene& s) { return s.wrap(s.access->get().root()); })
-      .def("match",
-           [](const PyScene& s, const std::string& pattern) {
-             std::vector<PyNode> all;
-             for (const NodeId id : s.access->get().match(pattern)) all.push_back(s.wrap(id));
-             return all;
-           },
-           py::arg("pattern"))
-      .def("find",
-           [](const PyScene& s, const std::string& path) -> std::optional<PyNode> {
-             const NodeId id = s.access->get().find(path);
-             if (!id) return std::nullopt;
-             return s.wrap(id);
-           },
-           py::arg("path"))
-      .def("create",
-           [](const PyScene& s, const PyNode& parent, const std::string& name) {
-             return s.wrap(s.access->get().create(parent.id, name));
-           },
-           py::arg("parent"), py::arg("name"))
-      .def("erase", [](const PyScene& s, const PyNode& node) { s.access->get().erase(node.id); },
-           py::arg("node"))
-      .def("load",
-           [](const PyScene& s, const std::string& asset, const PyNode& parent) {
-             Scene& scene = s.access->get();
-             return s.wrap(s.access->host->load_asset(asset, scene, parent.id));
-           },
-           py::arg("asset"), py::arg("parent"))
+      .def_property_readonly("root",
+                             [](const PyScene& s) { return s.wrap(s.access->get().root()); })
+      .def(
+          "match",
+          [](const PyScene& s, const std::string& pattern) {
+            std::vector<PyNode> all;
+            for (const NodeId id : s.access->get().match(pattern)) all.push_back(s.wrap(id));
+            return all;
+          },
+          py::arg("pattern"))
+      .def(
+          "find",
+          [](const PyScene& s, const std::string& path) -> std::optional<PyNode> {
+            const NodeId id = s.access->get().find(path);
+            if (!id) return std::nullopt;
+            return s.wrap(id);
+          },
+          py::arg("path"))
+      .def(
+          "create",
+          [](const PyScene& s, const PyNode& parent, const std::string& name) {
+            return s.wrap(s.access->get().create(parent.id, name));
+          },
+          py::arg("parent"), py::arg("name"))
+      .def(
+          "erase", [](const PyScene& s, const PyNode& node) { s.access->get().erase(node.id); },
+          py::arg("node"))
+      .def(
+          "load",
+          [](const PyScene& s, const std::string& asset, const PyNode& parent) {
+            Scene& scene = s.access->get();
+            return s.wrap(s.access->host->load_asset(asset, scene, parent.id));
+          },
+          py::arg("asset"), py::arg("parent"))
       .def("_end", [](const PyScene& s) { *s.access = {}; });
 }
 
 void bind_rng(py::module_& module) {
   py::class_<Rng>(module, "Rng")
       .def(py::init<std::uint64_t>(), py::arg("seed"))
-      .def("fork",
-           [](const Rng& rng, const std::variant<std::uint64_t, std::string>& key) {
-             return std::visit([&](const auto& each) { return rng.fork(each); }, key);
-           },
-           py::arg("key"))
+      .def(
+          "fork",
+          [](const Rng& rng, const std::variant<std::uint64_t, std::string>& key) {
+            return std::visit([&](const auto& each) { return rng.fork(each); }, key);
+          },
+          py::arg("key"))
       .def("bits", &Rng::bits)
-      .def("uniform", [](Rng& rng, double low, double high) { return rng.uniform(low, high); },
-           py::arg("low") = 0.0, py::arg("high") = 1.0)
-      .def("normal",
-           [](Rng& rng, double mean, double deviation) { return mean + deviation * rng.normal(); },
-           py::arg("mean") = 0.0, py::arg("deviation") = 1.0)
-      .def("index",
-           [](Rng& rng, std::size_t count) {
-             if (count == 0) throw Error(ErrorKind::Plugin, "there is nothing to choose from");
-             return rng.index(count);
-           },
-           py::arg("count"))
+      .def(
+          "uniform", [](Rng& rng, double low, double high) { return rng.uniform(low, high); },
+          py::arg("low") = 0.0, py::arg("high") = 1.0)
+      .def(
+          "normal",
+          [](Rng& rng, double mean, double deviation) { return mean + deviation * rng.normal(); },
+          py::arg("mean") = 0.0, py::arg("deviation") = 1.0)
+      .def(
+          "index",
+          [](Rng& rng, std::size_t count) {
+            if (count == 0) throw Error(ErrorKind::Plugin, "there is nothing to choose from");
+            return rng.index(count);
+          },
+          py::arg("count"))
       .def("chance", &Rng::chance, py::arg("probability"))
       .def("unit_vector", &Rng::unit_vector)
       .def("rotation",
@@ -243,7 +252,8 @@ void bind_scenes(py::module_& module) {
     return PyScene{std::make_shared<Access>(
         Access{held<Scene>(scene, "diorama::Scene"), held<Host>(host, "diorama::Host")})};
   });
-  module.def("rng_of", [](const py::capsule& rng) { return *held<const Rng>(rng, "diorama::Rng"); });
+  module.def("rng_of",
+             [](const py::capsule& rng) { return *held<const Rng>(rng, "diorama::Rng"); });
 }
 
 }  // namespace diorama

@@ -31,10 +31,10 @@ class PythonRandomizer final : public Randomizer {
 
   void randomize(Scene& scene, const RandomizeContext& context, const Rng& rng) override {
     script_.call([&](const py::object& object) {
-      plugins_module().attr("_randomize")(
-          object, capsule_of(scene, "diorama::Scene"), capsule_of(host_, "diorama::Host"),
-          context.moment, context.capture, context.working_area_world, context.occurrence,
-          capsule_of(rng, "diorama::Rng"));
+      plugins_module().attr("_randomize")(object, capsule_of(scene, "diorama::Scene"),
+                                          capsule_of(host_, "diorama::Host"), context.moment,
+                                          context.capture, context.working_area_world,
+                                          context.occurrence, capsule_of(rng, "diorama::Rng"));
     });
   }
 

@@ -64,10 +64,11 @@ std::string find_script(const std::string& name) {
     }
     return file.string();
   }
-  throw Error(ErrorKind::Config,
-              std::string("file: expected a Python file in a folder that the environment variable ") +
-                  kFolders + " lists (" + (looked.empty() ? "it lists none" : looked) +
-                  "), found \"" + name + "\"");
+  throw Error(
+      ErrorKind::Config,
+      std::string("file: expected a Python file in a folder that the environment variable ") +
+          kFolders + " lists (" + (looked.empty() ? "it lists none" : looked) + "), found \"" +
+          name + "\"");
 }
 
 /// Fields that stay where they are while a reader fills them.
@@ -100,7 +101,8 @@ py::dict read_params(const py::object& type, const Value& map) {
   ParamReader reader(map, "params", complaints);
   for (const py::handle each : plugins_module().attr("_params_of")(type)) {
     const auto [key, kind, spec] = each.cast<std::tuple<std::string, std::string, py::object>>();
-    all.push_back({key, spec.attr("help").cast<std::string>(), spec.attr("unit").cast<std::string>(),
+    all.push_back({key, spec.attr("help").cast<std::string>(),
+                   spec.attr("unit").cast<std::string>(),
                    spec.attr("choices").cast<std::vector<std::string>>(),
                    field_of(kind, spec.attr("default"))});
     Declared& one = all.back();
@@ -118,7 +120,8 @@ py::dict read_params(const py::object& type, const Value& map) {
   complaints.raise();
   py::dict values;
   for (const Declared& one : all) {
-    values[py::str(one.key)] = std::visit([](const auto& field) { return py::cast(field); }, one.field);
+    values[py::str(one.key)] =
+        std::visit([](const auto& field) { return py::cast(field); }, one.field);
   }
   return values;
 }

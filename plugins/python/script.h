@@ -26,8 +26,8 @@ struct ScriptParams {
 class Script {
  public:
   /// Finds and runs the file, checks `params` by what the class declares and makes the object.
-  /// `kind`: "randomizer" or "writer". Throws Error(Config) when the job is wrong, Error(Plugin) when
-  /// Python or the class's constructor fails.
+  /// `kind`: "randomizer" or "writer". Throws Error(Config) when the job is wrong, Error(Plugin)
+  /// when Python or the class's constructor fails.
   Script(const ScriptParams& params, const char* kind, Host& host);
 
   /// Calls with the object, as call_python() does.
