@@ -202,7 +202,7 @@ class ListenerWriter final : public Writer {
 };
 
 void register_listener(Registrar& registrar) {
-  add<ListenerWriter>(registrar, "python", "Hands captures to a Python function.");
+  add<ListenerWriter>(registrar, "on_capture", "Hands captures to a Python function.");
 }
 
 /// Of a file, or of its text when that is not empty.
@@ -225,7 +225,7 @@ void listen(const std::string& program, const Value& given, const py::object& on
   options.threads = threads;
   Value job = given;
   Value writer = Value::make_map();
-  writer.set("type", Value::text("python"));
+  writer.set("type", Value::text("on_capture"));
   Value writers = Value::make_list();
   writers.list.push_back(std::move(writer));
   job.set("writers", std::move(writers));

@@ -23,6 +23,9 @@ class Files final : public diorama::CaptureFiles {
   void append(std::string_view path, std::span<const std::byte> bytes) override {
     texts[std::string(path)].append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   }
+  // Content of files that captures share: not used here.
+  void keep(std::span<const std::byte>) override {}
+  void append_kept(std::string_view, int) override {}
   void record(std::string_view line) override { records.emplace_back(line); }
 };
 

@@ -22,6 +22,9 @@ class Files final : public diorama::CaptureFiles {
     std::ofstream out(folder_ / path, std::ios::binary | std::ios::app);
     out.write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
   }
+  // Content of files that captures share: not used here.
+  void keep(std::span<const std::byte>) override {}
+  void append_kept(std::string_view, int) override {}
   void record(std::string_view) override {}
 
  private:

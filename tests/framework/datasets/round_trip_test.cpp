@@ -65,7 +65,7 @@ TEST_CASE("Every format that has a reader comes back", "[readers]") {
       }
     }
   }
-  CHECK(formats == 19);
+  CHECK(formats == 20);
 }
 
 TEST_CASE("Cameras that take turns in one folder are told by metadata or the run's page",

@@ -169,7 +169,7 @@ TEST_CASE("Writers stay below the output folder, and out of its bookkeeping", "[
     CHECK_THAT(complaints("name: basic, output_dir: " + std::string(folder)),
                ContainsSubstring("is not below the output folder"));
   }
-  for (const char* folder : {".", "a", "a/b/", "a/../b", "../out/c", "..."}) {
+  for (const char* folder : {"a", "a/b/", "a/../b", "../out/c", "..."}) {
     INFO(folder);
     CHECK(complaints("name: basic, output_dir: " + std::string(folder)).empty());
   }

@@ -384,7 +384,7 @@ TEST_CASE("What fails first in order is reported, and nothing behind it is publi
       std::atomic<int> pushed = 0;
       script.at = [&](const std::string& who, int visit) {
         dawdle(who, visit);
-        if (who == "physics" && visit == 3 && ++pushed > 1) {
+        if (who == "physics" && visit == 3 && ++pushed > 2) {
           pause(5);
           throw Error(ErrorKind::Asset, "a thing of visit 3 exploded");
         }
