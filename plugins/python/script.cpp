@@ -67,8 +67,8 @@ std::string find_script(const std::string& name) {
   throw Error(
       ErrorKind::Config,
       std::string("file: expected a Python file in a folder that the environment variable ") +
-          kFolders + " lists (" + (looked.empty() ? "it lists none" : looked) + "), found \"" +
-          name + "\"");
+          kFolders + " lists (" + (looked.empty() ? "it lists none" : looked) + "), found " +
+          Value::text(name).describe());
 }
 
 /// Fields that stay where they are while a reader fills them.
