@@ -20,7 +20,7 @@
 namespace diorama {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 
 /// Wall and CPU time of one step.
 struct StepTime {
@@ -125,10 +125,12 @@ double median(const std::vector<BenchRun>& runs, const Value& value) {
   return values[values.size() / 2];
 }
 
-Json step_json(const StepTime& time) { return {{"wall_s", time.wall_s}, {"cpu_s", time.cpu_s}}; }
+OrderedJson step_json(const StepTime& time) {
+  return {{"wall_s", time.wall_s}, {"cpu_s", time.cpu_s}};
+}
 
-Json run_json(const BenchRun& run) {
-  Json json;
+OrderedJson run_json(const BenchRun& run) {
+  OrderedJson json;
   json["render"] = step_json(run.render);
   json["encode"] = step_json(run.encode);
   for (const auto& [phase, seconds] : run.report.seconds) json["render_phases_s"][phase] = seconds;
@@ -148,7 +150,7 @@ Json run_json(const BenchRun& run) {
 }
 
 std::string result_json(const BenchOptions& options, const BenchResult& result) {
-  Json json;
+  OrderedJson json;
   json["scene"] = options.picture.asset;
   json["renderer"] = options.picture.renderer;
   json["parameters"] = options.picture.sets;
@@ -159,7 +161,7 @@ std::string result_json(const BenchOptions& options, const BenchResult& result) 
   for (const auto& [phase, seconds] : result.prepare_phases) {
     json["prepare_phases_s"][phase] = seconds;
   }
-  json["runs"] = Json::array();
+  json["runs"] = OrderedJson::array();
   for (const BenchRun& run : result.runs) json["runs"].push_back(run_json(run));
   return json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }

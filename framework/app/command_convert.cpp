@@ -96,14 +96,14 @@ ConversionSource open_source(const fs::path& folder, const ConvertOptions& optio
 /// That of the run which the only source comes from, where there is one; else what readers know.
 std::string page_text(const std::vector<fs::path>& sources, const std::vector<std::string>& formats,
                       const DatasetInfo& info, nlohmann::ordered_json writers) {
-  using Json = nlohmann::ordered_json;
-  Json page;
-  if (sources.size() == 1) page = parse_json_or_nothing<Json>(page_of_run(sources[0]));
+  using OrderedJson = nlohmann::ordered_json;
+  OrderedJson page;
+  if (sources.size() == 1) page = parse_json_or_nothing<OrderedJson>(page_of_run(sources[0]));
   if (!page.is_object()) {
-    page = Json::object();
+    page = OrderedJson::object();
     page["format"] = "diorama dataset 1";
     page["job"] = info.resolved_job;
-    page["labels"] = Json::array();
+    page["labels"] = OrderedJson::array();
     for (const Labels& labels : info.labels) page["labels"].push_back(labels);
   }
   page["diorama"] = info.program_version;
@@ -112,7 +112,7 @@ std::string page_text(const std::vector<fs::path>& sources, const std::vector<st
   page["cameras"] = info.camera_names;
   page["writers"] = std::move(writers);
   page["converted_from"] = formats;
-  return page.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+  return page.dump(1, ' ', false, OrderedJson::error_handler_t::replace) + "\n";
 }
 
 }  // namespace

@@ -22,15 +22,15 @@ namespace {
 namespace fs = std::filesystem;
 
 /// A kind of which a job usually needs one, and the package that brings it.
-struct Need {
+struct NeededPlugin {
   ComponentKind kind;
   const char* package;
 };
-constexpr std::array kNeeds{Need{ComponentKind::Loader, "diorama-plugin-usd"},
-                            Need{ComponentKind::Physics, "diorama-plugin-bullet"},
-                            Need{ComponentKind::Randomizer, "diorama-plugins-core"},
-                            Need{ComponentKind::Renderer, "diorama-plugin-embree"},
-                            Need{ComponentKind::Writer, "diorama-plugins-writers"}};
+constexpr std::array kNeededPlugins{NeededPlugin{ComponentKind::Loader, "diorama-plugin-usd"},
+                                    NeededPlugin{ComponentKind::Physics, "diorama-plugin-bullet"},
+                                    NeededPlugin{ComponentKind::Randomizer, "diorama-plugins-core"},
+                                    NeededPlugin{ComponentKind::Renderer, "diorama-plugin-embree"},
+                                    NeededPlugin{ComponentKind::Writer, "diorama-plugins-writers"}};
 
 std::string line_of(const char* file, const std::string& key) {
   std::ifstream stream(file);
@@ -106,7 +106,7 @@ class Doctor {
     std::cout << "plugins\n";
     std::set<std::string> seen;
     for (const ComponentEntry& entry : registry_->components()) load(entry, seen);
-    for (const Need& need : kNeeds) {
+    for (const NeededPlugin& need : kNeededPlugins) {
       if (has_plugin(need.kind)) continue;
       problem("no " + std::string(kind_name(need.kind)) + " plugin; install " + need.package +
               " or name its folder with --plugin-dir");

@@ -26,13 +26,13 @@ struct Kind {
   const char* name;
   const char* class_suffix;
 };
-constexpr std::array kKinds{Kind{"loader", "Loader"},
-                            Kind{"physics", "Physics"},
-                            Kind{"randomizer", "Randomizer"},
-                            Kind{"renderer", "Renderer"},
-                            Kind{"annotator", "Annotator"},
-                            Kind{"writer", "Writer"},
-                            Kind{"format", ""}};
+constexpr std::array kTemplateKinds{Kind{"loader", "Loader"},
+                                    Kind{"physics", "Physics"},
+                                    Kind{"randomizer", "Randomizer"},
+                                    Kind{"renderer", "Renderer"},
+                                    Kind{"annotator", "Annotator"},
+                                    Kind{"writer", "Writer"},
+                                    Kind{"format", ""}};
 
 [[noreturn]] void refuse(const std::string& text) {
   throw Error(ErrorKind::Usage, "new-plugin: " + text);
@@ -46,7 +46,7 @@ std::string listed(const std::vector<std::string>& words) {
 
 const Kind& kind_called(const std::string& name) {
   std::vector<std::string> names;
-  for (const Kind& kind : kKinds) {
+  for (const Kind& kind : kTemplateKinds) {
     if (name == kind.name) return kind;
     names.emplace_back(kind.name);
   }

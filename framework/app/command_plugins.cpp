@@ -17,10 +17,10 @@ namespace {
 using conformance::CheckResult;
 using conformance::Outcome;
 
-constexpr std::array kKinds{ComponentKind::Loader,     ComponentKind::Physics,
-                            ComponentKind::Randomizer, ComponentKind::Renderer,
-                            ComponentKind::Annotator,  ComponentKind::Writer,
-                            ComponentKind::Reader};
+constexpr std::array kComponentKinds{ComponentKind::Loader,     ComponentKind::Physics,
+                                     ComponentKind::Randomizer, ComponentKind::Renderer,
+                                     ComponentKind::Annotator,  ComponentKind::Writer,
+                                     ComponentKind::Reader};
 
 std::string padded(std::string text, std::size_t width) {
   if (text.size() < width) text.resize(width, ' ');
@@ -77,7 +77,7 @@ void print_list(const Registry& registry) {
   for (const ComponentEntry& entry : entries) {
     type_width = std::max(type_width, entry.type.size());
   }
-  for (const ComponentKind kind : kKinds) {
+  for (const ComponentKind kind : kComponentKinds) {
     bool is_first = true;
     for (const ComponentEntry& entry : entries) {
       if (entry.kind != kind) continue;

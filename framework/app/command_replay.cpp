@@ -25,18 +25,18 @@ namespace {
 namespace fs = std::filesystem;
 
 /// A folder of its own, removed with the object unless the user named it.
-class Place {
+class ReplayFolder {
  public:
-  explicit Place(const std::optional<fs::path>& wanted)
+  explicit ReplayFolder(const std::optional<fs::path>& wanted)
       : path_(wanted.value_or(fs::temp_directory_path() /
                               ("diorama_replay_" + std::to_string(getpid())))),
         is_kept_(wanted.has_value()) {}
-  ~Place() {
+  ~ReplayFolder() {
     std::error_code ignored;
     if (!is_kept_) fs::remove_all(path_, ignored);
   }
-  Place(const Place&) = delete;
-  Place& operator=(const Place&) = delete;
+  ReplayFolder(const ReplayFolder&) = delete;
+  ReplayFolder& operator=(const ReplayFolder&) = delete;
   const fs::path& path() const { return path_; }
 
  private:
@@ -136,7 +136,7 @@ int command_replay(const GlobalOptions& global, const ReplayOptions& options, Co
   LocalFileSystem file_system;
   const DatasetStatus status = read_status(file_system, options.dataset, false);
   const std::set<int> captures = chosen_captures(options, status);
-  const Place place(options.output);
+  const ReplayFolder place(options.output);
   const fs::path records =
       make_captures_again(global, status, place.path(), captures, options.sets, log);
   const Comparison result =

@@ -5,6 +5,8 @@
 #include <map>
 #include <string_view>
 
+#include "framework/config/joined.h"
+
 namespace diorama {
 namespace {
 
@@ -63,12 +65,6 @@ std::vector<const CommandPage*> commands_below(const CommandPage& parent,
     if (is_below(command, parent)) below.push_back(&command);
   }
   return below;
-}
-
-std::string joined(const std::vector<std::string>& words, const char* between) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : between) + word;
-  return text;
 }
 
 /// Branches of a `case` with the same body under one pattern, in order of their bodies.

@@ -98,9 +98,9 @@ void check_ids(const Subject& subject) {
 
 /// Compares one channel with what exact rays meet, where that is decided. A few pixels may differ
 /// by rounding; what is wrong on purpose or by mistake differs in many.
-class Comparison {
+class RendererComparison {
  public:
-  Comparison(const ReferenceView& view, const Frame& frame) : view_(view), frame_(frame) {
+  RendererComparison(const ReferenceView& view, const Frame& frame) : view_(view), frame_(frame) {
     const ReferenceEye eye(view.scene, view.camera);
     for (int y = 0; y < frame.camera.height; ++y) {
       for (int x = 0; x < frame.camera.width; ++x) pixels_.push_back(eye.look(x, y));
@@ -228,7 +228,7 @@ void compare_with_rays(const Subject& subject) {
     const auto renderer = subject.make<Renderer>();
     renderer->prepare(view.scene);
     const Frame frame = rendered(*renderer, view.camera);
-    const Comparison comparison(view, frame);
+    const RendererComparison comparison(view, frame);
     comparison.check_all();
     comparison.check_orientation(kColor, [](const Rgba8& c) { return Vec3(c[0], c[1], c[2]); });
     // Bright pixels would outweigh all others.

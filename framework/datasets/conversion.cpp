@@ -10,16 +10,12 @@
 #include <utility>
 
 #include "diorama/error.h"
+#include "framework/config/joined.h"
 #include "framework/datasets/capture_sweep.h"
+#include "framework/datasets/check_names.h"
 
 namespace diorama {
 namespace {
-
-std::string joined(const NameSet& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
-}
 
 /// Each of the two kinds of distance follows from the other one and the lens.
 std::string_view twin_of(std::string_view channel) {
@@ -260,9 +256,9 @@ void refuse_capture(const std::filesystem::path& folder, const StoredCapture& st
                     const std::string& camera) {
   const Finding* reason = nullptr;
   for (const Finding& finding : stored.log.findings) {
-    const bool is_missing = finding.check == "nothing is missing";
+    const bool is_missing = finding.check == kNothingIsMissing;
     if (!finding.camera.empty() && !camera.empty() && finding.camera != camera) continue;
-    if (!reason || (reason->check == "nothing is missing" && !is_missing)) reason = &finding;
+    if (!reason || (reason->check == kNothingIsMissing && !is_missing)) reason = &finding;
   }
   const std::string where = (folder / (reason ? reason->file : ".")).string();
   throw Error(ErrorKind::Asset,

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t kMostQueueBytes = std::size_t(256) << 20;
 
-std::string who(const std::string& name) { return "writer '" + name + "'"; }
+std::string writer_name(const std::string& name) { return "writer '" + name + "'"; }
 
 OutputStore::Options store_options(bool overwrite) {
   OutputStore::Options options;
@@ -43,7 +43,7 @@ void DatasetOutput::open(const DatasetInfo& info, const std::string& dataset_jso
   Transaction transaction = store_.begin_transaction();
   for (std::size_t i = 0; i < writers_.size(); ++i) {
     CollectedFiles files(transaction, i, writers_[i].name);
-    call_component(who(writers_[i].name), [&] { writers_[i].writer->begin(info, files); });
+    call_component(writer_name(writers_[i].name), [&] { writers_[i].writer->begin(info, files); });
   }
   store_.commit_begin(transaction);
 }
@@ -76,7 +76,8 @@ Transaction DatasetOutput::encode(const Capture& capture) {
   Transaction transaction = store_.capture_transaction(capture.index);
   for (std::size_t i = 0; i < writers_.size(); ++i) {
     CollectedFiles files(transaction, i, writers_[i].name);
-    call_component(who(writers_[i].name), [&] { writers_[i].writer->write(capture, files); });
+    call_component(writer_name(writers_[i].name),
+                   [&] { writers_[i].writer->write(capture, files); });
   }
   return transaction;
 }
@@ -87,7 +88,8 @@ void DatasetOutput::finish() {
   for (std::size_t i = 0; i < writers_.size(); ++i) {
     CollectedFiles files(transaction, i, writers_[i].name);
     const RecordReader records = [&](const RecordVisitor& visit) { store_.read_records(i, visit); };
-    call_component(who(writers_[i].name), [&] { writers_[i].writer->finish(records, files); });
+    call_component(writer_name(writers_[i].name),
+                   [&] { writers_[i].writer->finish(records, files); });
   }
   store_.commit_finish(transaction);
 }

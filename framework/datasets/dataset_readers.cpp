@@ -11,6 +11,7 @@
 
 #include "diorama/config.h"
 #include "diorama/error.h"
+#include "framework/config/joined.h"
 #include "framework/config/json_text.h"
 #include "framework/host/regular_file.h"
 #include "framework/plugins/plugin_call.h"
@@ -20,13 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-  return text;
-}
-
-std::string who(const std::string& type) { return "reader '" + type + "'"; }
+std::string reader_name(const std::string& type) { return "reader '" + type + "'"; }
 
 /// Folders that the page of a run names, as far as they lie below it.
 std::set<fs::path> named_folders(const fs::path& run) {
@@ -86,7 +81,7 @@ DatasetReaders::DatasetReaders(Registry& registry, Host& host) {
       Value map = Value::make_map();
       map.set("type", Value::text(type));
       Complaints complaints;
-      auto made = registry.make<Reader>(map, who(type), {}, complaints, host);
+      auto made = registry.make<Reader>(map, reader_name(type), {}, complaints, host);
       complaints.raise();
       return made;
     };
@@ -96,7 +91,7 @@ DatasetReaders::DatasetReaders(Registry& registry, Host& host) {
     entries_.push_back({type, entry.claims, maker(type)});
     if (!entry.claims_are_listed) {
       entries_.back().patterns =
-          call_component(who(type), [&] { return reader(entries_.back()).patterns(); });
+          call_component(reader_name(type), [&] { return reader(entries_.back()).patterns(); });
     }
   }
 }
@@ -115,7 +110,7 @@ std::string DatasetReaders::recognise(const fs::path& folder) {
         entry.patterns, [&](const std::string& pattern) { return has_file_like(folder, pattern); });
     if (!may_be) continue;
     const Recognition said =
-        call_component(who(entry.type), [&] { return reader(entry).recognise(folder); });
+        call_component(reader_name(entry.type), [&] { return reader(entry).recognise(folder); });
     if (said == Recognition::No || said < best) continue;
     if (said > best) found.clear();
     best = said;
@@ -133,12 +128,12 @@ std::unique_ptr<const StoredDataset> DatasetReaders::open(const fs::path& folder
   const auto entry = std::ranges::find(entries_, type, &Entry::type);
   if (entry == entries_.end()) {
     const std::string near = nearest_name(type, types());
-    throw Error(ErrorKind::Usage, "unknown " + who(type) +
+    throw Error(ErrorKind::Usage, "unknown " + reader_name(type) +
                                       (near.empty() ? "" : "; did you mean '" + near + "'?") +
                                       " Known: " + joined(types()));
   }
-  auto opened = call_component(who(type), [&] { return reader(*entry).open(folder); });
-  if (!opened) throw Error(ErrorKind::Plugin, who(type) + ": opened nothing");
+  auto opened = call_component(reader_name(type), [&] { return reader(*entry).open(folder); });
+  if (!opened) throw Error(ErrorKind::Plugin, reader_name(type) + ": opened nothing");
   return opened;
 }
 

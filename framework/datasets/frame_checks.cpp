@@ -5,13 +5,13 @@
 #include <cmath>
 #include <optional>
 
+#include "framework/datasets/check_names.h"
 #include "framework/lint/lens.h"
 #include "framework/lint/object_checks.h"
 
 namespace diorama {
 namespace {
 
-constexpr const char* kCounts = "counts agree between files";
 constexpr const char* kFinite = "numbers are finite";
 constexpr const char* kIds = "ids within the label map";
 constexpr const char* kBox = "box = extent of mask";
@@ -104,7 +104,7 @@ class FrameChecks {
                      frame_.image_named(name));
       const bool fits = size == std::pair(frame_.camera.width, frame_.camera.height);
       is_good = is_good && fits;
-      check(fits, kCounts, name, "",
+      check(fits, kCountsAgree, name, "",
             name + " has " + std::to_string(size.first) + " x " + std::to_string(size.second) +
                 " pixels",
             "the camera has " + std::to_string(frame_.camera.width) + " x " +

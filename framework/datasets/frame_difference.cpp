@@ -44,9 +44,9 @@ bool is_near(const Affine& a, const Affine& b, double step) {
       .all();
 }
 
-class Comparison {
+class FrameComparison {
  public:
-  Comparison(const StoredInfo& info, const Frame& written, const Frame& read)
+  FrameComparison(const StoredInfo& info, const Frame& written, const Frame& read)
       : info_(info), written_(written), read_(read) {}
 
   std::vector<std::string> run() {
@@ -244,7 +244,7 @@ class Comparison {
 
 std::vector<std::string> frame_differences(const StoredInfo& info, const Frame& written,
                                            const Frame& read) {
-  return Comparison(info, written, read).run();
+  return FrameComparison(info, written, read).run();
 }
 
 }  // namespace diorama

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "framework/config/json_text.h"
+#include "framework/datasets/check_names.h"
 #include "framework/host/regular_file.h"
 
 namespace diorama {
@@ -18,8 +19,6 @@ using Json = nlohmann::json;
 constexpr const char* kPage = "dataset.json";
 constexpr const char* kStated = "conventions and origin are stated";
 constexpr const char* kSplit = "each capture is in one split";
-constexpr const char* kMissing = "nothing is missing";
-constexpr const char* kCounts = "counts agree between files";
 constexpr int kMostCaptures = 100'000'000;
 
 Finding about_page(const char* rule, const std::string& found, const std::string& expected = {}) {
@@ -75,12 +74,12 @@ void compare(const Json& page, const PlannedDataset& planned, const StoredInfo& 
   for (int capture = 0; capture < planned.captures; ++capture) {
     if (!std::ranges::binary_search(info.captures, capture)) ++missing;
   }
-  log.check(missing == 0, {kMissing, ".", std::nullopt, "", "",
+  log.check(missing == 0, {kNothingIsMissing, ".", std::nullopt, "", "",
                            std::to_string(missing) + " captures are not there",
                            "the " + std::to_string(planned.captures) + " of dataset.json"});
   const bool is_beyond = !info.captures.empty() && info.captures.back() >= planned.captures;
   log.check(!is_beyond,
-            {kCounts, ".", std::nullopt, "", "",
+            {kCountsAgree, ".", std::nullopt, "", "",
              "there is a capture " + (is_beyond ? std::to_string(info.captures.back()) : ""),
              "dataset.json plans " + std::to_string(planned.captures)});
   const auto classes = page.at("classes").get<std::vector<std::string>>();
@@ -117,7 +116,8 @@ void check_planned(const PlannedDataset& planned, const StoredCapture& stored, R
   for (const std::string& camera : planned.cameras) {
     const bool is_there = std::ranges::any_of(
         stored.capture.frames, [&](const Frame& frame) { return frame.camera_name == camera; });
-    log.check(is_there, {kMissing, ".", capture, camera, "", "the picture is missing", ""});
+    log.check(is_there,
+              {kNothingIsMissing, ".", capture, camera, "", "the picture is missing", ""});
   }
   const auto split = planned.split_of_capture.find(capture);
   if (stored.split.empty() || split == planned.split_of_capture.end()) return;

@@ -13,6 +13,7 @@
 
 #include "framework/config/json_text.h"
 #include "framework/datasets/capture_sweep.h"
+#include "framework/datasets/check_names.h"
 #include "framework/datasets/frame_checks.h"
 #include "framework/host/regular_file.h"
 
@@ -21,7 +22,6 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr const char* kMissing = "nothing is missing";
 constexpr const char* kReadable = "every file can be read";
 constexpr const char* kBetween = "writers of one run agree";
 
@@ -31,7 +31,7 @@ constexpr double kLossyMean = 12.0;
 constexpr double kRare = 0.2;
 constexpr std::size_t kMostExamples = 100;
 /// Boxes that are rounded to more do not tell objects apart.
-constexpr int kTellingStep = 16;
+constexpr int kTellingPixels = 16;
 
 /// What the page of the run plans; nothing when there is none.
 struct RunPlan {
@@ -60,14 +60,14 @@ void check_plan(const RunPlan& plan, const RunDataset& dataset, ReadLog& log) {
   // What holds no pictures may leave captures out.
   const bool is_whole = info.holds.contains(kColor.name) || info.holds.contains(kColorHdr.name);
   log.check(!is_whole || int(info.captures.size()) == plan.captures,
-            {kMissing, dataset.name, std::nullopt, "", "",
+            {kNothingIsMissing, dataset.name, std::nullopt, "", "",
              "holds " + std::to_string(info.captures.size()) + " captures",
              "dataset.json plans " + std::to_string(plan.captures)});
   const bool has_names = info.camera_names != std::vector<std::string>{"camera"};
   for (const std::string& camera : plan.cameras) {
-    log.check(
-        !has_names || std::ranges::find(info.camera_names, camera) != info.camera_names.end(),
-        {kMissing, dataset.name, std::nullopt, camera, "", "has no pictures of this camera", ""});
+    log.check(!has_names || std::ranges::find(info.camera_names, camera) != info.camera_names.end(),
+              {kNothingIsMissing, dataset.name, std::nullopt, camera, "",
+               "has no pictures of this camera", ""});
   }
 }
 
@@ -78,9 +78,9 @@ struct Example {
 };
 
 /// Compares a dataset with the one that holds most.
-class Comparison {
+class RunComparison {
  public:
-  Comparison(const RunDataset& reference, const RunDataset& other)
+  RunComparison(const RunDataset& reference, const RunDataset& other)
       : reference_(reference), other_(other), a_(reference.data->info()), b_(other.data->info()) {}
 
   NameSet wanted() const {
@@ -205,7 +205,7 @@ class Comparison {
   void compare_objects(const Frame& one, const StoredCapture& b, std::size_t k,
                        const std::string& in_reference, ReadLog& log) {
     const int slack = int(std::ceil(step_of(a_, kHoldsTightBoxes) + step_of(b_, kHoldsTightBoxes)));
-    if (slack >= kTellingStep) return;
+    if (slack >= kTellingPixels) return;
     for (const Instance& object : b.capture.frames[k].instances) {
       if (!object.tight_box) continue;
       ++objects_;
@@ -328,7 +328,7 @@ class Comparison {
 
 void compare_datasets(const RunDataset& reference, const RunDataset& other, Host& host,
                       ReadLog& log) {
-  Comparison comparison(reference, other);
+  RunComparison comparison(reference, other);
   const NameSet wanted = comparison.wanted();
   if (wanted.empty()) return;
   const std::vector<int>& captures = reference.data->info().captures;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <string_view>
 
 #include "framework/datasets/dataset_stats.h"
+#include "framework/datasets/decimal.h"
 #include "framework/pipeline/view_report.h"
 
 namespace diorama {
@@ -50,12 +50,6 @@ std::string escaped(std::string_view text) {
   return safe;
 }
 
-std::string number(double value, int digits) {
-  char text[64];
-  std::snprintf(text, sizeof text, "%.*f", digits, value);
-  return text;
-}
-
 std::string figure(const std::string& caption, int width, int height, const std::string& drawing) {
   const std::string size = std::to_string(width) + "' height='" + std::to_string(height);
   return "<figure><svg width='" + size + "' role='img'>" + drawing + "</svg><figcaption>" +
@@ -64,13 +58,13 @@ std::string figure(const std::string& caption, int width, int height, const std:
 
 std::string rectangle(double x, double y, double width, double height, const std::string& style,
                       const std::string& title) {
-  return "<rect x='" + number(x, 1) + "' y='" + number(y, 1) + "' width='" + number(width, 1) +
-         "' height='" + number(height, 1) + "' " + style + "><title>" + escaped(title) +
+  return "<rect x='" + decimal(x, 1) + "' y='" + decimal(y, 1) + "' width='" + decimal(width, 1) +
+         "' height='" + decimal(height, 1) + "' " + style + "><title>" + escaped(title) +
          "</title></rect>";
 }
 
 std::string label(double x, double y, const std::string& text) {
-  return "<text class='axis' x='" + number(x, 1) + "' y='" + number(y, 1) + "'>" + escaped(text) +
+  return "<text class='axis' x='" + decimal(x, 1) + "' y='" + decimal(y, 1) + "'>" + escaped(text) +
          "</text>";
 }
 
@@ -90,12 +84,12 @@ std::string bars(const std::string& caption, const Histogram& values, double uni
     const double from = (values.low() + double(i) * step) * unit;
     drawing +=
         rectangle(double(i) * width, kHeight - 12 - height, width - 1.0, height, "class='bar'",
-                  number(from, digits) + " to " + number(from + step * unit, digits) + ": " +
+                  decimal(from, digits) + " to " + decimal(from + step * unit, digits) + ": " +
                       std::to_string(count));
   }
-  drawing += label(0, kHeight - 1, number(values.low() * unit, digits)) +
-             label(kWidth - 24, kHeight - 1, number(values.high() * unit, digits));
-  return figure(caption + ", mean " + number(values.mean() * unit, digits + 1), kWidth, kHeight,
+  drawing += label(0, kHeight - 1, decimal(values.low() * unit, digits)) +
+             label(kWidth - 24, kHeight - 1, decimal(values.high() * unit, digits));
+  return figure(caption + ", mean " + decimal(values.mean() * unit, digits + 1), kWidth, kHeight,
                 drawing);
 }
 
@@ -139,9 +133,9 @@ std::string counts(const char* title, const std::map<std::string, std::int64_t>&
 
 std::string name_of(const std::string& name) { return name.empty() ? "(no label)" : name; }
 
-std::string class_table(const DatasetStats& stats) {
+std::string html_class_table(const DatasetStats& stats) {
   const auto mean = [](const Histogram& values, int digits) {
-    return values.total() == 0 ? std::string("-") : number(values.mean(), digits);
+    return values.total() == 0 ? std::string("-") : decimal(values.mean(), digits);
   };
   std::string text =
       "<table>" +
@@ -189,7 +183,7 @@ std::string stats_html(const DatasetStats& stats, const std::string& title) {
           " captures, " + std::to_string(stats.pictures) + " pictures</p>\n";
   text += counts("camera", stats.pictures_by_camera) + counts("split", stats.pictures_by_split) +
           counts("size", stats.pictures_by_size);
-  text += "<h2>Classes</h2>\n" + class_table(stats);
+  text += "<h2>Classes</h2>\n" + html_class_table(stats);
   text += "<h2>Pictures</h2>\n" + bars("objects in a picture", stats.objects_per_picture, 1.0, 0) +
           bars("brightness, percent", stats.brightness, 100.0, 0);
   text += "<h2>Pictures to look at</h2>\n" + suspicious_list(stats);

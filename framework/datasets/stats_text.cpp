@@ -1,31 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "framework/datasets/dataset_stats.h"
+#include "framework/datasets/decimal.h"
 #include "framework/pipeline/view_report.h"
 
 namespace diorama {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 
 /// From nothing to most, of one character.
 constexpr const char* kShades = " .:-=+*#%@";
-
-std::string number(double value, int digits) {
-  char text[64];
-  std::snprintf(text, sizeof text, "%.*f", digits, value);
-  return text;
-}
 
 std::string cell(const std::string& text, std::size_t width) {
   return text.size() < width ? std::string(width - text.size(), ' ') + text : text;
 }
 
 std::string mean_of(const Histogram& values, int digits) {
-  return values.total() == 0 ? "-" : number(values.mean(), digits);
+  return values.total() == 0 ? "-" : decimal(values.mean(), digits);
 }
 
 template <std::size_t Columns, std::size_t Rows>
@@ -79,13 +73,13 @@ std::string bars(const Histogram& values, double unit, const char* name) {
     const std::int64_t count = values.counts()[i];
     if (count == 0) continue;
     const double from = (values.low() + double(i) * width) * unit;
-    text += "  " + cell(number(from, 0), 6) + name + cell(std::to_string(count), 9) + "  " +
+    text += "  " + cell(decimal(from, 0), 6) + name + cell(std::to_string(count), 9) + "  " +
             std::string(std::size_t(1 + 40 * count / most), '#') + "\n";
   }
   return text;
 }
 
-std::string class_table(const DatasetStats& stats) {
+std::string text_class_table(const DatasetStats& stats) {
   std::size_t width = 5;
   for (const auto& [name, own] : stats.classes) width = std::max(width, name.size());
   std::string text = std::string("class") + std::string(width - 5, ' ') +
@@ -99,7 +93,7 @@ std::string class_table(const DatasetStats& stats) {
   return text;
 }
 
-Json histogram_json(const Histogram& values) {
+OrderedJson histogram_json(const Histogram& values) {
   if (values.total() == 0) return nullptr;
   return {{"low", values.low()},    {"high", values.high()},   {"counts", values.counts()},
           {"mean", values.mean()},  {"least", values.least()}, {"most", values.most()},
@@ -114,11 +108,11 @@ std::string stats_text(const DatasetStats& stats) {
   text += counts_text("cameras", stats.pictures_by_camera);
   text += counts_text("splits", stats.pictures_by_split);
   text += counts_text("sizes", stats.pictures_by_size);
-  text += "\n" + class_table(stats);
+  text += "\n" + text_class_table(stats);
   if (stats.objects_per_picture.total() > 0) {
-    text += "\nobjects in a picture: " + number(stats.objects_per_picture.mean(), 2) + " (" +
-            number(stats.objects_per_picture.least(), 0) + " to " +
-            number(stats.objects_per_picture.most(), 0) + ")\n" +
+    text += "\nobjects in a picture: " + decimal(stats.objects_per_picture.mean(), 2) + " (" +
+            decimal(stats.objects_per_picture.least(), 0) + " to " +
+            decimal(stats.objects_per_picture.most(), 0) + ")\n" +
             bars(stats.objects_per_picture, 1.0, "");
   }
   if (stats.brightness.total() > 0) {
@@ -154,36 +148,36 @@ std::string stats_text(const DatasetStats& stats) {
 }
 
 std::string stats_json(const DatasetStats& stats) {
-  Json classes = Json::object();
+  OrderedJson classes = OrderedJson::object();
   for (const auto& [name, own] : stats.classes) {
-    Json entry{{"objects", own.objects},
-               {"pictures", own.pictures},
-               {"box_side", histogram_json(own.box_side)},
-               {"visible", histogram_json(own.visible)},
-               {"truncation", histogram_json(own.truncation)},
-               {"distance_m", histogram_json(own.distance_m)},
-               {"places", own.places}};
-    entry["views"] = sum_of(own.views) == 0 ? Json(nullptr) : Json(own.views);
+    OrderedJson entry{{"objects", own.objects},
+                      {"pictures", own.pictures},
+                      {"box_side", histogram_json(own.box_side)},
+                      {"visible", histogram_json(own.visible)},
+                      {"truncation", histogram_json(own.truncation)},
+                      {"distance_m", histogram_json(own.distance_m)},
+                      {"places", own.places}};
+    entry["views"] = sum_of(own.views) == 0 ? OrderedJson(nullptr) : OrderedJson(own.views);
     classes[name] = std::move(entry);
   }
-  Json suspicious = Json::object();
+  OrderedJson suspicious = OrderedJson::object();
   for (const auto& [what, list] : stats.suspicious) {
     suspicious[what] = {{"count", list.count}, {"first", list.names}};
   }
-  Json json{{"format", stats.format},
-            {"holds", stats.holds},
-            {"captures", stats.captures},
-            {"pictures", stats.pictures},
-            {"cameras", stats.pictures_by_camera},
-            {"splits", stats.pictures_by_split},
-            {"sizes", stats.pictures_by_size},
-            {"classes", std::move(classes)},
-            {"objects_per_picture", histogram_json(stats.objects_per_picture)},
-            {"brightness", histogram_json(stats.brightness)},
-            {"suspicious", std::move(suspicious)},
-            {"findings", stats.findings}};
-  if (!stats.views.empty()) json["views"] = Json::parse(stats.views, nullptr, false);
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  OrderedJson json{{"format", stats.format},
+                   {"holds", stats.holds},
+                   {"captures", stats.captures},
+                   {"pictures", stats.pictures},
+                   {"cameras", stats.pictures_by_camera},
+                   {"splits", stats.pictures_by_split},
+                   {"sizes", stats.pictures_by_size},
+                   {"classes", std::move(classes)},
+                   {"objects_per_picture", histogram_json(stats.objects_per_picture)},
+                   {"brightness", histogram_json(stats.brightness)},
+                   {"suspicious", std::move(suspicious)},
+                   {"findings", stats.findings}};
+  if (!stats.views.empty()) json["views"] = OrderedJson::parse(stats.views, nullptr, false);
+  return json.dump(2, ' ', false, OrderedJson::error_handler_t::replace) + "\n";
 }
 
 }  // namespace diorama

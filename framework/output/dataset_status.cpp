@@ -14,13 +14,13 @@ namespace diorama {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 
 void read_description(FileSystem& file_system, const fs::path& file, DatasetStatus& status) {
   if (!file_system.exists(file)) {
     throw Error(ErrorKind::Output, file.string() + ": no dataset here: no such file");
   }
-  const Json json = parse_json_or_nothing<Json>(file_system.read(file));
+  const OrderedJson json = parse_json_or_nothing<OrderedJson>(file_system.read(file));
   const bool is_dataset = json.is_object() && json.contains("captures") &&
                           json["captures"].is_number_integer() && json.contains("job") &&
                           json["job"].is_string();
@@ -149,9 +149,9 @@ std::string status_text(const DatasetStatus& status, const fs::path& folder) {
 }
 
 std::string status_json(const DatasetStatus& status) {
-  Json json{{"captures", status.captures},    {"done", status.done},
-            {"finished", status.is_finished}, {"missing", Json::array()},
-            {"workers", Json::array()},       {"faults", status.faults}};
+  OrderedJson json{{"captures", status.captures},     {"done", status.done},
+                   {"finished", status.is_finished},  {"missing", OrderedJson::array()},
+                   {"workers", OrderedJson::array()}, {"faults", status.faults}};
   for (const auto& [first, last] : status.missing) json["missing"].push_back({first, last});
   for (const DatasetStatus::Worker& worker : status.workers) {
     const char* const state = worker.role.empty() ? "ended" : worker.is_alive ? "alive" : "dead";
@@ -161,7 +161,7 @@ std::string status_json(const DatasetStatus& status) {
                                {"description", worker.description},
                                {"captures", worker.captures}});
   }
-  return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+  return json.dump(1, ' ', false, OrderedJson::error_handler_t::replace) + "\n";
 }
 
 }  // namespace diorama

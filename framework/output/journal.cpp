@@ -16,7 +16,7 @@ namespace diorama {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 
 constexpr int kFormat = 1;
 constexpr std::string_view kIndexEnding = ".index";
@@ -60,22 +60,22 @@ std::vector<std::string_view> words_of(std::string_view line) {
 }
 
 std::string to_text(const JournalledFiles& content) {
-  Json json;
-  json["files"] = Json::array();
+  OrderedJson json;
+  json["files"] = OrderedJson::array();
   for (const JournalledFile& file : content.files) {
     json["files"].push_back({file.path, file.size, file.digest});
   }
-  json["records"] = Json::object();
+  json["records"] = OrderedJson::object();
   for (const auto& [writer, line] : content.records) json["records"][writer] = line;
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+  return json.dump(-1, ' ', false, OrderedJson::error_handler_t::replace) + "\n";
 }
 
 /// Nothing but what to_text() writes; std::nullopt otherwise.
 std::optional<JournalledFiles> from_text(std::string_view text) {
-  const Json json = parse_json_or_nothing<Json>(text);
+  const OrderedJson json = parse_json_or_nothing<OrderedJson>(text);
   if (!json.is_object() || !json.contains("files") || !json["files"].is_array()) return {};
   JournalledFiles content;
-  for (const Json& file : json["files"]) {
+  for (const OrderedJson& file : json["files"]) {
     const bool is_well_typed = file.is_array() && file.size() == 3 && file[0].is_string() &&
                                file[1].is_number_unsigned() && file[2].is_string();
     if (!is_well_typed) return {};
@@ -175,8 +175,9 @@ void JournalWriter::start() {
   };
   entries_ = open(kEntriesEnding);
   index_ = open(kIndexEnding);
-  const Json header{{"format", kFormat}, {"records", records_}};
-  add_line("h " + add_entry(header.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n"));
+  const OrderedJson header{{"format", kFormat}, {"records", records_}};
+  add_line("h " +
+           add_entry(header.dump(-1, ' ', false, OrderedJson::error_handler_t::replace) + "\n"));
   file_system_.sync_folder(folder_);
   file_system_.sync_folder(folder_.parent_path());
 }
@@ -507,7 +508,7 @@ std::optional<std::string> Journals::records_folder() const {
     const std::string text =
         file_system_.read_part(entries_file(worker), index.header.offset, index.header.length);
     if (digest_of(text) != index.header.digest) continue;
-    const Json json = parse_json_or_nothing<Json>(text);
+    const OrderedJson json = parse_json_or_nothing<OrderedJson>(text);
     if (!json.is_object() || !json.contains("records") || !json["records"].is_string()) continue;
     std::string records = json["records"].get<std::string>();
     if (records == "." || is_plain_relative(records)) return records;

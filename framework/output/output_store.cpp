@@ -13,7 +13,7 @@ namespace diorama {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 
 constexpr int kCommitsPerCheckpoint = 64;
 constexpr int kVisitsPerClaimFolder = 256;
@@ -23,8 +23,8 @@ std::span<const std::byte> bytes_of(const std::string& text) {
 }
 
 std::string keys_that_differ(const std::string& before, const std::string& now) {
-  const Json old_json = parse_json_or_nothing<Json>(before);
-  const Json new_json = parse_json_or_nothing<Json>(now);
+  const OrderedJson old_json = parse_json_or_nothing<OrderedJson>(before);
+  const OrderedJson new_json = parse_json_or_nothing<OrderedJson>(now);
   std::string keys;
   for (const auto& [key, value] : new_json.items()) {
     const bool is_same = old_json.is_object() && old_json.contains(key) && old_json[key] == value;

@@ -17,7 +17,7 @@ namespace diorama {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 
 /// Of a claim's file, before it gets its name.
 const std::string kDraft = "draft-";
@@ -92,8 +92,10 @@ fs::path Workers::lease_file(const Lease& lease) const {
 
 void Workers::join(const std::string& role) {
   lease_ = Lease{role, self_.name};
-  const Json content{{"host", self_.host}, {"process", self_.process}, {"machine", self_.machine}};
-  const std::string text = content.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+  const OrderedJson content{
+      {"host", self_.host}, {"process", self_.process}, {"machine", self_.machine}};
+  const std::string text =
+      content.dump(-1, ' ', false, OrderedJson::error_handler_t::replace) + "\n";
   const fs::path file = lease_file(*lease_);
   in_folder(file_system_, file.parent_path(),
             [&] { file_system_.write(file, std::as_bytes(std::span(text))); });
@@ -149,16 +151,16 @@ bool Workers::is_alive(const Lease& lease) {
   if (!found || found->kind != FileStatus::Kind::File) return false;
   if (file_system_.is_locked(file)) return true;
   const std::string text = file_system_.read_part(file, 0, 4096);
-  const Json content = parse_json_or_nothing<Json>(text);
+  const OrderedJson content = parse_json_or_nothing<OrderedJson>(text);
   // Within one machine locks are certain, and nobody holds this one.
-  if (content.is_object() && content.value("machine", Json()) == self_.machine) return false;
+  if (content.is_object() && content.value("machine", OrderedJson()) == self_.machine) return false;
   const auto age = age_ns(lease);
   return age && *age <= std::int64_t(timeout_.count()) * 1'000'000'000;
 }
 
 std::string Workers::describe(const Lease& lease) {
   const std::string text = file_system_.read_part(lease_file(lease), 0, 4096);
-  const Json content = parse_json_or_nothing<Json>(text);
+  const OrderedJson content = parse_json_or_nothing<OrderedJson>(text);
   std::string who = "worker " + lease.worker;
   if (content.is_object() && content.contains("host") && content["host"].is_string() &&
       content.contains("process") && content["process"].is_number_integer()) {

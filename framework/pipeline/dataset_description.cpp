@@ -18,9 +18,9 @@ namespace diorama {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 
-Json conventions() {
+OrderedJson conventions() {
   return {{"length_unit", "m"},
           {"world_axes", "right-handed, z up"},
           {"camera_axes", "x right, y up, looking along -z"},
@@ -222,11 +222,11 @@ void add_writers(std::string& text, const Job& job) {
   }
 }
 
-Json rigs_json(const Job& job) {
-  Json rigs = Json::object();
+OrderedJson rigs_json(const Job& job) {
+  OrderedJson rigs = OrderedJson::object();
   for (const PlannedCamera& camera : planned_cameras(job.cameras)) {
     if (camera.rig.empty()) continue;
-    Json rows = Json::array();
+    OrderedJson rows = OrderedJson::array();
     const Mat4 matrix = camera.rig_from_camera.matrix();
     for (int row = 0; row < 4; ++row) {
       rows.push_back({matrix(row, 0), matrix(row, 1), matrix(row, 2), matrix(row, 3)});
@@ -268,22 +268,22 @@ DatasetInfo describe_dataset(const Job& job, const CapturePlan& plan, std::strin
 }
 
 std::string dataset_json(const DatasetInfo& info, const Job& job) {
-  Json json;
+  OrderedJson json;
   json["format"] = "diorama dataset 1";
   json["diorama"] = info.program_version;
-  json["plugins"] = Json::object();
+  json["plugins"] = OrderedJson::object();
   for (const auto& [name, version] : info.plugin_versions) json["plugins"][name] = version;
   json["seed"] = info.seed;
   json["captures"] = info.capture_count;
   json["cameras"] = info.camera_names;
-  if (const Json rigs = rigs_json(job); !rigs.empty()) json["rigs"] = rigs;
-  json["labels"] = Json::array();
+  if (const OrderedJson rigs = rigs_json(job); !rigs.empty()) json["rigs"] = rigs;
+  json["labels"] = OrderedJson::array();
   for (const Labels& labels : info.labels) {
-    Json entry = Json::object();
+    OrderedJson entry = OrderedJson::object();
     for (const auto& [taxonomy, label] : labels) entry[taxonomy] = label;
     json["labels"].push_back(entry);
   }
-  json["writers"] = Json::array();
+  json["writers"] = OrderedJson::array();
   for (const WriterEntry& writer : job.writers) {
     json["writers"].push_back({{"name", writer.name},
                                {"type", writer.type},
@@ -291,16 +291,16 @@ std::string dataset_json(const DatasetInfo& info, const Job& job) {
   }
   if (!job.views.empty()) json["views"] = kViewsFile;
   json["conventions"] = conventions();
-  json["assets"] = Json::array();
+  json["assets"] = OrderedJson::array();
   for (const DatasetAsset& asset : info.assets) {
-    Json files = Json::array();
+    OrderedJson files = OrderedJson::array();
     for (const auto& [name, hash] : asset.files) {
       files.push_back({{"file", name}, {"sha256", hash}});
     }
     json["assets"].push_back({{"asset", asset.asset}, {"files", std::move(files)}});
   }
   json["job"] = info.resolved_job;
-  return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+  return json.dump(1, ' ', false, OrderedJson::error_handler_t::replace) + "\n";
 }
 
 std::string asset_name(std::string_view asset, const std::optional<fs::path>& assets_root) {

@@ -6,17 +6,18 @@
 #include <nlohmann/json.hpp>
 
 #include "diorama/error.h"
+#include "framework/config/joined.h"
 
 namespace diorama {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 
-std::string dumped(const Json& json, int indent) {
-  return json.dump(indent, ' ', false, Json::error_handler_t::replace);
+std::string dumped(const OrderedJson& json, int indent) {
+  return json.dump(indent, ' ', false, OrderedJson::error_handler_t::replace);
 }
 
-ViewCounts counts_from(const Json& json) {
+ViewCounts counts_from(const OrderedJson& json) {
   ViewCounts counts;
   counts.views = json.at("views").get<std::int64_t>();
   counts.draws = json.at("draws").get<std::int64_t>();
@@ -28,17 +29,11 @@ ViewCounts counts_from(const Json& json) {
       counts.parts[quota][part] = count.get<std::int64_t>();
     }
   }
-  for (const Json& one : json.at("unmet")) {
+  for (const OrderedJson& one : json.at("unmet")) {
     counts.unmet.push_back({one.at("capture").get<int>(), one.at("camera").get<std::string>(),
                             one.at("conditions").get<std::vector<std::string>>()});
   }
   return counts;
-}
-
-std::string joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-  return text;
 }
 
 }  // namespace
@@ -57,7 +52,7 @@ void ViewCounts::add(int capture, const std::vector<ViewOutcome>& outcomes) {
 }
 
 std::string outcomes_json(const std::vector<ViewOutcome>& outcomes) {
-  Json list = Json::array();
+  OrderedJson list = OrderedJson::array();
   for (const ViewOutcome& outcome : outcomes) {
     list.push_back({{"camera", outcome.camera},
                     {"draws", outcome.draws},
@@ -71,30 +66,30 @@ std::string outcomes_json(const std::vector<ViewOutcome>& outcomes) {
 std::vector<ViewOutcome> outcomes_from_json(std::string_view text) {
   try {
     std::vector<ViewOutcome> outcomes;
-    for (const Json& one : Json::parse(text)) {
+    for (const OrderedJson& one : OrderedJson::parse(text)) {
       outcomes.push_back({one.at("camera").get<std::string>(), one.at("draws").get<int>(),
                           one.at("refused").get<std::map<std::string, int>>(),
                           one.at("unmet").get<std::vector<std::string>>(),
                           one.at("quotas").get<std::map<std::string, std::string>>()});
     }
     return outcomes;
-  } catch (const Json::exception& error) {
+  } catch (const OrderedJson::exception& error) {
     throw Error(ErrorKind::Output,
                 std::string("the journal's record of views cannot be read: ") + error.what());
   }
 }
 
 std::string views_json(const ViewCounts& counts) {
-  Json json;
+  OrderedJson json;
   json["views"] = counts.views;
   json["draws"] = counts.draws;
-  json["refused"] = Json::object();
+  json["refused"] = OrderedJson::object();
   for (const auto& [condition, count] : counts.refused) json["refused"][condition] = count;
-  json["quotas"] = Json::object();
+  json["quotas"] = OrderedJson::object();
   for (const auto& [quota, parts] : counts.parts) {
     for (const auto& [part, count] : parts) json["quotas"][quota][part] = count;
   }
-  json["unmet"] = Json::array();
+  json["unmet"] = OrderedJson::array();
   for (const auto& one : counts.unmet) {
     json["unmet"].push_back(
         {{"capture", one.capture}, {"camera", one.camera}, {"conditions", one.conditions}});
@@ -103,11 +98,11 @@ std::string views_json(const ViewCounts& counts) {
 }
 
 std::string views_text(std::string_view json) {
-  const Json parsed = Json::parse(json, nullptr, false);
+  const OrderedJson parsed = OrderedJson::parse(json, nullptr, false);
   if (!parsed.is_object()) return {};
   try {
     return views_text(counts_from(parsed));
-  } catch (const Json::exception&) {
+  } catch (const OrderedJson::exception&) {
     return {};  // somebody else's file of that name
   }
 }

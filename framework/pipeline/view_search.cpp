@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "diorama/error.h"
+#include "framework/config/joined.h"
 #include "framework/plugins/plugin_call.h"
 
 namespace diorama {
@@ -69,12 +70,6 @@ std::string limit_text(const std::map<std::string, int>& refused, int draws) {
   if (most == refused.end()) return {};
   return "; most failed: " + most->first + " (" + std::to_string(most->second) + " of " +
          std::to_string(draws) + ")";
-}
-
-std::string joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-  return text;
 }
 
 }  // namespace

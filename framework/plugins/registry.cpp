@@ -6,17 +6,13 @@
 #include <set>
 #include <tuple>
 
+#include "framework/config/joined.h"
+
 namespace diorama {
 namespace {
 
 std::string titled(ComponentKind kind, std::string_view type) {
   return std::string(kind_name(kind)) + " '" + std::string(type) + "'";
-}
-
-std::string joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-  return text;
 }
 
 /// Collects the components of the program itself.

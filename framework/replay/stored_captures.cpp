@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "diorama/error.h"
+#include "framework/config/joined.h"
 #include "framework/config/json_text.h"
 #include "framework/config/yaml_config.h"
 #include "framework/datasets/conversion.h"
@@ -17,12 +18,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
-
-std::string joined(const NameSet& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
-}
 
 /// What `holds` lacks of what sensors need.
 NameSet lacking(const NameSet& channels, const NameSet& holds) {

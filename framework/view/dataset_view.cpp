@@ -22,7 +22,7 @@ namespace diorama {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 
 constexpr const char* kJson = "application/json";
 /// How often a run that goes on is looked at.
@@ -32,11 +32,11 @@ HttpAnswer answer_of(std::string type, std::string body) {
   return {200, std::move(type), std::make_shared<const std::string>(std::move(body))};
 }
 
-std::string json_text(const Json& json) {
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+std::string json_text(const OrderedJson& json) {
+  return json.dump(-1, ' ', false, OrderedJson::error_handler_t::replace);
 }
 
-HttpAnswer json_answer(const Json& json, int status = 200) {
+HttpAnswer json_answer(const OrderedJson& json, int status = 200) {
   HttpAnswer answer = answer_of(kJson, json_text(json));
   answer.status = status;
   return answer;
@@ -300,7 +300,7 @@ bool DatasetView::work() {
 }
 
 HttpAnswer DatasetView::state() const {
-  Json json;
+  OrderedJson json;
   fs::path folder = fs::absolute(options_.folder).lexically_normal();
   json["folder"] = folder.string();
   {
@@ -308,7 +308,7 @@ HttpAnswer DatasetView::state() const {
     json["generation"] = generation_;
     json["is_finished"] = is_finished_;
   }
-  json["datasets"] = Json::array();
+  json["datasets"] = OrderedJson::array();
   for (const auto& opened : *datasets()) {
     const StoredInfo& info = opened->shown->info();
     json["datasets"].push_back({{"name", opened->name},
@@ -323,8 +323,8 @@ HttpAnswer DatasetView::state() const {
 }
 
 HttpAnswer DatasetView::run_answer() const {
-  Json json = Json::object();
-  const Json page = parse_json_or_nothing<Json>(page_of_run(options_.folder));
+  OrderedJson json = OrderedJson::object();
+  const OrderedJson page = parse_json_or_nothing<OrderedJson>(page_of_run(options_.folder));
   if (page.is_object()) {
     json["folder"] = folder_of_run(options_.folder).string();
     for (const char* key : {"seed", "version", "job", "plugins"}) {
@@ -335,7 +335,7 @@ HttpAnswer DatasetView::run_answer() const {
     json["captures"] = status->captures;
     json["done"] = status->done;
     json["is_finished"] = status->is_finished;
-    json["workers"] = Json::array();
+    json["workers"] = OrderedJson::array();
     for (const DatasetStatus::Worker& worker : status->workers) {
       json["workers"].push_back({{"name", worker.name},
                                  {"role", worker.role},

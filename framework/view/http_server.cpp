@@ -152,12 +152,12 @@ struct HttpServer::State {
 namespace {
 
 /// Counts itself while it lives.
-class Place {
+class ConnectionCount {
  public:
-  explicit Place(std::atomic<std::size_t>& count) : count_(count) { ++count_; }
-  ~Place() { --count_; }
-  Place(const Place&) = delete;
-  Place& operator=(const Place&) = delete;
+  explicit ConnectionCount(std::atomic<std::size_t>& count) : count_(count) { ++count_; }
+  ~ConnectionCount() { --count_; }
+  ConnectionCount(const ConnectionCount&) = delete;
+  ConnectionCount& operator=(const ConnectionCount&) = delete;
 
  private:
   std::atomic<std::size_t>& count_;
@@ -168,7 +168,7 @@ template <class State>
 class Connection : public std::enable_shared_from_this<Connection<State>> {
  public:
   Connection(tcp::socket socket, State& state)
-      : place_(state.connections), stream_(std::move(socket)), state_(state) {}
+      : counted_(state.connections), stream_(std::move(socket)), state_(state) {}
 
   void read(std::chrono::seconds time) {
     parser_.emplace();
@@ -218,7 +218,7 @@ class Connection : public std::enable_shared_from_this<Connection<State>> {
     stream_.close();
   }
 
-  Place place_;
+  ConnectionCount counted_;
   beast::tcp_stream stream_;
   State& state_;
   beast::flat_buffer buffer_{2 * kMostHeaderBytes};
