@@ -25,7 +25,7 @@ std::string short_number(double value) {
   return text;
 }
 
-const Place& place_of(const Value& map, const std::string& key) {
+const Place& place_of_key(const Value& map, const std::string& key) {
   const Value* value = map.find(key);
   return value ? value->place : map.place;
 }
@@ -235,14 +235,14 @@ void check_view_rule(const ViewRule& rule, const std::vector<std::string>& serie
     const std::string near = nearest_name(name, series);
     std::string known;
     for (const std::string& one : series) known += (known.empty() ? "" : ", ") + one;
-    complaints.add(place_of(rule.map, "on"),
+    complaints.add(place_of_key(rule.map, "on"),
                    rule.path + ".on: unknown capture series '" + name + "'" +
                        (near.empty() ? "" : "; did you mean '" + near + "'?") +
                        " (known: " + known + ")");
   }
   for (const auto& [key, limits] : limits_of(rule)) {
     if (!limits->min || !limits->max || *limits->min <= *limits->max) continue;
-    complaints.add(place_of(rule.map, key),
+    complaints.add(place_of_key(rule.map, key),
                    rule.path + "." + key + ": min (" + short_number(*limits->min) +
                        ") is greater than max (" + short_number(*limits->max) + ")");
   }

@@ -8,7 +8,7 @@ namespace diorama {
 namespace {
 
 constexpr const char* kPage = "dataset.json";
-constexpr std::uintmax_t kMostBytes = std::uintmax_t(256) << 20;
+constexpr std::uintmax_t kMostPageBytes = std::uintmax_t(256) << 20;
 constexpr int kMostCaptures = 100'000'000;
 
 /// An empty object when there is none to be read.
@@ -22,7 +22,7 @@ Json object_in(const std::filesystem::path& file, std::uintmax_t most_bytes) {
 }
 
 Json parsed_page(const std::filesystem::path& folder) {
-  return object_in(folder / kPage, kMostBytes);
+  return object_in(folder / kPage, kMostPageBytes);
 }
 
 }  // namespace

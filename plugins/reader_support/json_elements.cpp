@@ -10,7 +10,7 @@ namespace diorama {
 namespace {
 
 constexpr std::size_t kBlock = std::size_t(1) << 20;
-constexpr std::size_t kMostBytes = std::size_t(1) << 30;
+constexpr std::size_t kMostValueBytes = std::size_t(1) << 30;
 
 /// The characters of a file, one after the other.
 class Characters {
@@ -113,7 +113,8 @@ class Walker {
 
   void keep(int c) {
     if (c < 0) throw std::runtime_error("is cut short" + place());
-    if (text_.size() >= kMostBytes) throw std::runtime_error("holds a value above 1 GiB" + place());
+    if (text_.size() >= kMostValueBytes)
+      throw std::runtime_error("holds a value above 1 GiB" + place());
     text_.push_back(char(c));
   }
 

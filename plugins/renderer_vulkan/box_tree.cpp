@@ -17,8 +17,6 @@ float area(const TreeBox& box) {
   return size.x() * size.y() + size.y() * size.z() + size.z() * size.x();
 }
 
-bool is_empty(const TreeBox& box) { return !(box.low.array() <= box.high.array()).all(); }
-
 struct Split {
   float cost = 3e38f;
   int axis = -1;
@@ -29,7 +27,7 @@ class Builder {
  public:
   Builder(std::span<const TreeBox> boxes, bool has_runs) : boxes_(boxes), has_runs_(has_runs) {
     for (std::uint32_t i = 0; i < boxes.size(); ++i) {
-      if (is_empty(boxes[i])) continue;
+      if (boxes[i].is_empty()) continue;
       tree_.order.push_back(i);
     }
     centres_.reserve(boxes.size());

@@ -15,6 +15,7 @@ struct TreeBox {
   Vec3f low = Vec3f::Constant(3e38f);
   Vec3f high = Vec3f::Constant(-3e38f);
 
+  bool is_empty() const { return !(low.array() <= high.array()).all(); }
   void add(const Vec3f& point) {
     low = low.cwiseMin(point);
     high = high.cwiseMax(point);

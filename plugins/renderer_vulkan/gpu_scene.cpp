@@ -113,11 +113,9 @@ float half_area(const TreeBox& box) {
   return size.x() * size.y() + size.y() * size.z() + size.z() * size.x();
 }
 
-bool is_empty(const TreeBox& box) { return !(box.low.array() <= box.high.array()).all(); }
-
 /// A box in the space of an instance's mesh, in the world, as far as it reaches into another.
 TreeBox placed(const TreeBox& box, const MeshInstance& instance, const TreeBox& within) {
-  if (is_empty(box)) return box;
+  if (box.is_empty()) return box;
   TreeBox result;
   for (int i = 0; i < 8; ++i) {
     const Vec3f corner((i & 1) != 0 ? box.high.x() : box.low.x(),
@@ -368,7 +366,7 @@ GpuScene::References GpuScene::references_of(const RenderScene& scene) const {
     const TreeBox b = placed({node->second.low_b, node->second.high_b}, instance, whole);
     // Turned boxes may be no smaller than what they are part of.
     if (half_area(a) + half_area(b) > 1.5f * half_area(whole)) continue;
-    if (is_empty(b)) continue;
+    if (b.is_empty()) continue;
     result.parts[number].child = node->second.child_a;
     result.boxes[number] = a;
     if ((node->second.child_a & TreeNode::kLeaf) == 0) largest.emplace(half_area(a), number);

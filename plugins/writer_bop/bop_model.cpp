@@ -8,12 +8,11 @@
 #include <utility>
 
 #include "diorama/image.h"
+#include "writer_bop/bop_format.h"
 #include "writer_bop/point_diameter.h"
 
 namespace diorama {
 namespace {
-
-constexpr float kMillimetres = 1000.0f;
 
 /// The pixel at a uv, rows from the top, the texture repeated; linear.
 Vec3f texel(const TextureInput& input, const Vec2f& mesh_uv) {
@@ -74,7 +73,7 @@ void add_mesh(const Node& node, const Affine& root_from_node, BopModel& model) {
   const std::vector<std::uint16_t> slots = slots_of_vertices(mesh);
   for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
     const Vec3 position = root_from_node * mesh.positions[i].cast<double>();
-    model.positions.push_back(kMillimetres * position.cast<float>());
+    model.positions.push_back(float(kMillimetres) * position.cast<float>());
     model.normals.push_back((turn * normals[i].cast<double>()).normalized().cast<float>());
     model.colors.push_back(vertex_color(node, mesh, i, slots[i]));
   }

@@ -15,6 +15,7 @@
 #include "reader_support/frame_reading.h"
 #include "reader_support/object_masks.h"
 #include "reader_support/picture_list.h"
+#include "writer_bop/bop_format.h"
 #include "writer_bop/bop_model_info.h"
 #include "writer_bop/bop_scenes.h"
 
@@ -27,8 +28,6 @@ constexpr const char* kFormat = "BOP";
 constexpr const char* kArea = "area = count";
 constexpr const char* kPose = "pose agrees with the keypoints";
 constexpr double kMetres = 0.001;
-/// Of the benchmark's targets.
-constexpr double kLeastVisibleTarget = 0.1;
 
 /// Our camera axes from BOP's: y and z change sign.
 Affine camera_from_bop() {

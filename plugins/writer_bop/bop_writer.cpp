@@ -9,6 +9,7 @@
 #include <map>
 
 #include "diorama/error.h"
+#include "writer_bop/bop_format.h"
 #include "writer_bop/bop_model.h"
 #include "writer_bop/model_symmetries.h"
 #include "writer_support/image_files.h"
@@ -18,8 +19,6 @@
 namespace diorama {
 namespace {
 
-constexpr double kMillimetres = 1000.0;
-
 /// BOP's camera axes from ours: y and z change sign.
 Affine bop_from_camera() {
   Affine map = Affine::Identity();
@@ -28,9 +27,6 @@ Affine bop_from_camera() {
 }
 
 constexpr const char* kLayouts[] = {"scenes", "cameras"};
-
-/// Targets of the benchmark are at least this visible.
-constexpr double kLeastVisibleTarget = 0.1;
 
 Json camera_json(const Frame& frame, double depth_scale) {
   const Affine camera_from_world = bop_from_camera() * frame.world_from_camera.inverse();

@@ -99,9 +99,9 @@ Json image_json(const Capture& capture, const Frame& frame, int id, const std::s
 // A record is the split's name and the JSON texts that the capture adds to the annotation files,
 // each behind a tab and the letter of its list: no JSON text holds a tab. So finish() need not
 // parse them.
-constexpr char kImage = 'i';
-constexpr char kAnnotation = 'a';
-constexpr char kPanoptic = 'p';
+constexpr char kImageRecord = 'i';
+constexpr char kAnnotationRecord = 'a';
+constexpr char kPanopticRecord = 'p';
 
 void add_to(std::string& record, char kind, const std::string& text) {
   record += '\t';
@@ -374,13 +374,13 @@ void CocoWriter::write(const Capture& capture, CaptureFiles& files) const {
     const std::string stem = training_.image_stem(capture, frame);
     const std::string file = stem + "." + training_.image_format();
     files.add(std::string("images/") + split + "/" + file, training_.image_file(host_, frame));
-    add_to(record, kImage, python_json(image_json(capture, frame, id, file, licenses_)));
+    add_to(record, kImageRecord, python_json(image_json(capture, frame, id, file, licenses_)));
     const auto objects = training_.objects(frame);
     for (const TrainingObject& object : objects) {
-      add_to(record, kAnnotation, python_json(annotation(frame, object, id)));
+      add_to(record, kAnnotationRecord, python_json(annotation(frame, object, id)));
     }
     if (params_.panoptic) {
-      add_to(record, kPanoptic,
+      add_to(record, kPanopticRecord,
              python_json(panoptic_annotation(frame, objects, id, stem, split, files)));
     }
   }
@@ -399,7 +399,7 @@ void CocoWriter::finish(const RecordReader& records, DatasetFiles& files) {
   }
   // Pictures come before annotations, so the records are read twice: little of them is in memory.
   for_each_part(records, [&](const std::string& split, char kind, std::string_view text) {
-    if (kind != kImage) return;
+    if (kind != kImageRecord) return;
     instances.at(split).add(text);
     if (params_.panoptic) panoptic.at(split).add(text);
   });
@@ -407,8 +407,8 @@ void CocoWriter::finish(const RecordReader& records, DatasetFiles& files) {
     for (auto& [split, file] : *all) file.begin_annotations();
   }
   for_each_part(records, [&](const std::string& split, char kind, std::string_view text) {
-    if (kind == kAnnotation) instances.at(split).add_numbered(text);
-    if (kind == kPanoptic) panoptic.at(split).add(text);
+    if (kind == kAnnotationRecord) instances.at(split).add_numbered(text);
+    if (kind == kPanopticRecord) panoptic.at(split).add(text);
   });
   for (auto* all : {&instances, &panoptic}) {
     for (auto& [split, file] : *all) file.end(categories());

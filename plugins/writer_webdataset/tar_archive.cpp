@@ -8,15 +8,14 @@
 #include <vector>
 
 #include "diorama/error.h"
+#include "writer_webdataset/tar_walk.h"
 
 namespace diorama {
 namespace {
 
-constexpr std::size_t kBlock = 512;
-
 /// Places of the header's fields (IEEE Std 1003.1, pax, "ustar Interchange Format").
-std::array<char, kBlock> make_header(std::string_view name, std::size_t size) {
-  std::array<char, kBlock> header{};
+std::array<char, kTarBlock> make_header(std::string_view name, std::size_t size) {
+  std::array<char, kTarBlock> header{};
   const auto octal = [&header](std::size_t at, int digits, std::size_t value) {
     std::snprintf(&header[at], std::size_t(digits) + 1, "%0*zo", digits, value);
   };
@@ -47,7 +46,7 @@ void TarArchive::add(std::string_view name, std::span<const std::span<const std:
   const auto header = make_header(name, size);
   put(std::as_bytes(std::span(header)));
   for (const auto part : parts) put(part);
-  put(std::vector<std::byte>((kBlock - size % kBlock) % kBlock));
+  put(std::vector<std::byte>((kTarBlock - size % kTarBlock) % kTarBlock));
 }
 
 void TarArchive::add(std::string_view name, std::span<const std::byte> content) {
@@ -58,7 +57,7 @@ void TarArchive::add(std::string_view name, std::string_view content) {
   add(name, std::as_bytes(std::span(content.data(), content.size())));
 }
 
-void TarArchive::end() { put(std::vector<std::byte>(2 * kBlock)); }
+void TarArchive::end() { put(std::vector<std::byte>(2 * kTarBlock)); }
 
 void TarArchive::put(std::span<const std::byte> bytes) {
   out_(bytes);

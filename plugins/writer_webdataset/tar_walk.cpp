@@ -9,7 +9,6 @@
 namespace diorama {
 namespace {
 
-constexpr std::uint64_t kBlock = 512;
 constexpr std::uint64_t kMostName = 1 << 16;
 constexpr std::uint64_t kMostContent = std::uint64_t(1) << 30;
 
@@ -92,10 +91,10 @@ void TarWalk::read_pax(const std::string& records) {
 std::optional<TarMember> TarWalk::next() {
   std::uint64_t first = at_;
   while (true) {
-    if (at_ > size_ || size_ - at_ < kBlock) {
+    if (at_ > size_ || size_ - at_ < kTarBlock) {
       throw std::runtime_error("the end of the archive is missing");
     }
-    const std::string header = bytes(at_, kBlock);
+    const std::string header = bytes(at_, kTarBlock);
     const std::string_view view = header;
     if (header.find_first_not_of('\0') == std::string::npos) return std::nullopt;
     if (!has_right_sum(view, at_)) damaged(at_);
@@ -111,9 +110,9 @@ std::optional<TarMember> TarWalk::next() {
       if (!front.empty()) name = front + "/" + name;
     }
     if (!is_extra && !long_name_.empty()) name = long_name_;
-    const std::uint64_t begin = at_ + kBlock;
+    const std::uint64_t begin = at_ + kTarBlock;
     if (size > size_ - begin) throw std::runtime_error(name + " is cut short");
-    at_ = begin + (size + kBlock - 1) / kBlock * kBlock;
+    at_ = begin + (size + kTarBlock - 1) / kTarBlock * kTarBlock;
     if (is_extra) {
       if (size > kMostName)
         throw std::runtime_error("a name has " + std::to_string(size) + " bytes");

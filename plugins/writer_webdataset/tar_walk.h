@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <istream>
 #include <optional>
 #include <string>
 
 namespace diorama {
+
+/// Headers and contents fill whole blocks of so many bytes.
+inline constexpr std::size_t kTarBlock = 512;
 
 /// A plain file in a tar archive.
 struct TarMember {

@@ -14,7 +14,7 @@ constexpr std::uint64_t kArrayEditBit = std::uint64_t{1} << 60;
 constexpr std::uint64_t kPayloadMask = (std::uint64_t{1} << 48) - 1;
 // Arrays shorter than this are stored as they are although marked as compressed.
 constexpr std::uint64_t kMinCompressedArray = 16;
-constexpr int kMaxNesting = 64;
+constexpr int kMaxValueNesting = 64;
 
 struct Representation {
   std::uint64_t bits;
@@ -162,7 +162,7 @@ bool CrateValues::may_hold_array(std::uint64_t representation) const {
 }
 
 Value CrateValues::Decoder::decode(Representation rep) {
-  if (budget_ == 0 || nesting_ >= kMaxNesting) {
+  if (budget_ == 0 || nesting_ >= kMaxValueNesting) {
     crate_.cursor(0).fail_at("values are nested without end", rep.payload());
   }
   --budget_;

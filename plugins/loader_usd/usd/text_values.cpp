@@ -10,7 +10,7 @@
 namespace diorama::usd {
 namespace {
 
-constexpr int kMaxNesting = 64;
+constexpr int kMaxTextNesting = 64;
 
 bool is_quaternion(Type type) {
   return type == Type::Quatd || type == Type::Quatf || type == Type::Quath;
@@ -64,7 +64,7 @@ Value ValueReader::read() {
 }
 
 void ValueReader::read_list(int nesting) {
-  if (nesting > kMaxNesting) scanner_.fail("lists are nested too deeply");
+  if (nesting > kMaxTextNesting) scanner_.fail("lists are nested too deeply");
   scanner_.expect('[', "before a list");
   const std::size_t start = scanner_.position();
   scanner_.skip_inline();
@@ -107,7 +107,7 @@ void ValueReader::read_element() {
 }
 
 void ValueReader::read_tuple(int nesting) {
-  if (nesting > kMaxNesting) scanner_.fail("tuples are nested too deeply");
+  if (nesting > kMaxTextNesting) scanner_.fail("tuples are nested too deeply");
   scanner_.expect('(', "before a tuple");
   scanner_.skip_lines();
   do {
@@ -238,7 +238,7 @@ Value ValueReader::finish() {
 }
 
 void skip_any(TextScanner& scanner, int nesting) {
-  if (nesting > kMaxNesting) scanner.fail("values are nested too deeply");
+  if (nesting > kMaxTextNesting) scanner.fail("values are nested too deeply");
   const char c = scanner.peek();
   if (c == '"' || c == '\'') {
     scanner.read_string();
@@ -318,7 +318,7 @@ void read_dictionary_item(TextScanner& scanner, Dictionary& dictionary, int nest
 }
 
 std::shared_ptr<const Dictionary> read_dictionary(TextScanner& scanner, int nesting) {
-  if (nesting > kMaxNesting) scanner.fail("dictionaries are nested too deeply");
+  if (nesting > kMaxTextNesting) scanner.fail("dictionaries are nested too deeply");
   auto dictionary = std::make_shared<Dictionary>();
   scanner.expect('{', "before a dictionary");
   scanner.skip_lines();

@@ -10,7 +10,7 @@
 namespace diorama::usd {
 namespace {
 
-constexpr int kMaxNesting = 32;
+constexpr int kMaxExpressionNesting = 32;
 
 struct Term;
 using Terms = std::vector<Term>;
@@ -27,7 +27,7 @@ class Evaluator {
  public:
   Evaluator(std::string_view text, const Dictionary& variables, int nesting)
       : text_(text), variables_(variables), nesting_(nesting) {
-    if (nesting > kMaxNesting) throw Failure{};
+    if (nesting > kMaxExpressionNesting) throw Failure{};
   }
 
   Term evaluate() {
@@ -115,7 +115,7 @@ Terms Evaluator::list(char close) {
 
 Term Evaluator::term() {
   skip_spaces();
-  if (++nesting_ > kMaxNesting) throw Failure{};
+  if (++nesting_ > kMaxExpressionNesting) throw Failure{};
   for (const char quote : {'"', '\''}) {
     if (accept(quote)) return --nesting_, quoted(quote);
   }
