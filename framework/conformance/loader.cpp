@@ -6,12 +6,11 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <exception>
 #include <fstream>
-#include <thread>
 
 #include "framework/conformance/fingerprint.h"
 #include "framework/conformance/kinds.h"
+#include "framework/conformance/run_together.h"
 
 namespace diorama::conformance {
 namespace {
@@ -140,25 +139,13 @@ void check_two_loaders_at_once(const Subject& subject, const std::string& asset)
   const std::string alone = loaded(*subject.make<Loader>(), asset);
   const auto first = subject.make<Loader>();
   const auto second = subject.make<Loader>();
-  std::exception_ptr error;
-  std::string by_second;
-  std::thread other([&] {
-    try {
-      for (int i = 0; i < 5; ++i) by_second = loaded(*second, asset);
-    } catch (...) {
-      error = std::current_exception();
-    }
-  });
   std::string by_first;
-  std::exception_ptr own_error;
-  try {
-    for (int i = 0; i < 5; ++i) by_first = loaded(*first, asset);
-  } catch (...) {
-    own_error = std::current_exception();
-  }
-  other.join();
-  if (own_error) std::rethrow_exception(own_error);
-  if (error) std::rethrow_exception(error);
+  std::string by_second;
+  run_together(2, [&](int thread) {
+    Loader& loader = thread == 0 ? *first : *second;
+    std::string& by_this = thread == 0 ? by_first : by_second;
+    for (int i = 0; i < 5; ++i) by_this = loaded(loader, asset);
+  });
   require(by_first == alone && by_second == alone,
           asset + " differs while another loader is at work");
 }

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
-#include <exception>
 #include <set>
 #include <string>
-#include <thread>
 
 #include "diorama/physics_backend.h"
 #include "framework/conformance/fingerprint.h"
 #include "framework/conformance/kinds.h"
+#include "framework/conformance/run_together.h"
 #include "framework/conformance/sample_scene.h"
 
 namespace diorama::conformance {
@@ -36,23 +35,11 @@ void check_two_at_once(const Subject& subject) {
   const Scene alone = simulated(subject, subject.host);
   const auto first = subject.make<PhysicsBackend>();
   const auto second = subject.make<PhysicsBackend>();
-  std::exception_ptr error;
-  Scene by_second;
-  std::thread other([&] {
-    try {
-      by_second = simulated(*second);
-    } catch (...) {
-      error = std::current_exception();
-    }
-  });
   Scene by_first;
-  try {
-    by_first = simulated(*first);
-  } catch (...) {
-    error = std::current_exception();
-  }
-  other.join();
-  if (error) std::rethrow_exception(error);
+  Scene by_second;
+  run_together(2, [&](int thread) {
+    (thread == 0 ? by_first : by_second) = simulated(thread == 0 ? *first : *second);
+  });
   require_same(alone, by_first, "differs while another instance is at work");
   require_same(alone, by_second, "differs while another instance is at work");
 }

@@ -4,16 +4,14 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <exception>
 #include <filesystem>
 #include <map>
-#include <mutex>
 #include <set>
 #include <span>
-#include <thread>
 
 #include "framework/conformance/fingerprint.h"
 #include "framework/conformance/kinds.h"
+#include "framework/conformance/run_together.h"
 #include "framework/conformance/sample_scene.h"
 
 namespace diorama::conformance {
@@ -120,22 +118,11 @@ Dataset write_in_order(Writer& writer, const std::vector<Capture>& captures) {
 /// Two threads, the last captures first.
 Dataset write_on_two_threads(Writer& writer, const std::vector<Capture>& captures) {
   Dataset dataset = begun(writer, captures);
-  std::exception_ptr failures[2];
-  const auto write_half = [&](std::size_t half) {
-    try {
-      for (std::size_t i = captures.size(); i-- > 0;) {
-        if (i % 2 == half) writer.write(captures[i], dataset.captures[i]);
-      }
-    } catch (...) {
-      failures[half] = std::current_exception();
+  run_together(2, [&](int half) {
+    for (std::size_t i = captures.size(); i-- > 0;) {
+      if (int(i % 2) == half) writer.write(captures[i], dataset.captures[i]);
     }
-  };
-  std::thread other(write_half, 1);
-  write_half(0);
-  other.join();
-  for (const std::exception_ptr& failure : failures) {
-    if (failure) std::rethrow_exception(failure);
-  }
+  });
   finish(writer, dataset);
   return dataset;
 }
@@ -148,28 +135,14 @@ void write_all_at_once(Writer& writer, const std::vector<Capture>& captures,
   constexpr int kRounds = 12;
   begun(writer, captures);
   std::atomic<bool> differs = false;
-  std::atomic<int> waiting = kThreads;
-  std::mutex mutex;
-  std::exception_ptr failure;
-  const auto work = [&](int thread) {
-    --waiting;
-    while (waiting > 0) std::this_thread::yield();
-    try {
-      for (int round = 0; round < kRounds && !differs; ++round) {
-        const std::size_t i = std::size_t(thread + round) % captures.size();
-        MemoryFiles files(true);
-        writer.write(captures[i], files);
-        if (!(files == expected.captures[i])) differs = true;
-      }
-    } catch (...) {
-      const std::lock_guard lock(mutex);
-      failure = std::current_exception();
+  run_together(kThreads, [&](int thread) {
+    for (int round = 0; round < kRounds && !differs; ++round) {
+      const std::size_t i = std::size_t(thread + round) % captures.size();
+      MemoryFiles files(true);
+      writer.write(captures[i], files);
+      if (!(files == expected.captures[i])) differs = true;
     }
-  };
-  std::vector<std::thread> threads;
-  for (int thread = 0; thread < kThreads; ++thread) threads.emplace_back(work, thread);
-  for (std::thread& thread : threads) thread.join();
-  if (failure) std::rethrow_exception(failure);
+  });
   require(!differs, "writes something else when several threads write at once");
 }
 

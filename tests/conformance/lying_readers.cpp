@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // A writer of camera poses, and readers of them that break one promise each.
+#include <atomic>
+#include <chrono>
 #include <cstdio>
 #include <fstream>
 #include <map>
 #include <memory>
 #include <sstream>
+#include <thread>
 #include <utility>
 
 #include "diorama/error.h"
@@ -123,12 +126,11 @@ struct FirstOfAll : Poses {
 /// What is read lies in a place that all threads share.
 struct SharesItsBuffer : Poses {
   using Poses::Poses;
-  mutable volatile int place = 0;
+  mutable std::atomic<int> place = 0;
   StoredCapture read(std::size_t i, const NameSet& wanted) const override {
     place = int(i);
-    for (int k = 0; k < 200000; ++k) {
-      if (place != int(i)) break;
-    }
+    // However few processors there are, others have a turn here.
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
     return Poses::read(std::size_t(place), wanted);
   }
 };

@@ -110,6 +110,8 @@ struct SharesItsBuffer : Honest {
   void write(const Capture& capture, CaptureFiles& files) const override {
     buffer = capture.phase;
     files.add_text(std::to_string(capture.index) + "_size.txt", "1");
+    // However few processors there are, others have a turn here.
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
     buffer += std::to_string(capture.index);
     files.add_text(std::to_string(capture.index) + ".txt", buffer);
   }
