@@ -11,6 +11,10 @@ elseif(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
   # GCC 13 takes a reference that a function returns for one into its temporary arguments (107532).
   target_compile_options(diorama_build_flags INTERFACE -Wno-dangling-reference)
 endif()
+if(CMAKE_CXX_COMPILER_ID STREQUAL GNU AND CMAKE_UNITY_BUILD)
+  # A class of one source file looks like one of a header where files are compiled together.
+  target_compile_options(diorama_build_flags INTERFACE -Wno-subobject-linkage)
+endif()
 if(DIORAMA_WARNINGS_AS_ERRORS)
   target_compile_options(diorama_build_flags INTERFACE -Werror)
 endif()

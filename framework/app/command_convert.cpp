@@ -23,6 +23,7 @@ namespace diorama {
 namespace {
 
 namespace fs = std::filesystem;
+using OrderedJson = nlohmann::ordered_json;
 
 /// A writer as the command line names it: "TYPE key=value ...", or a YAML mapping like in a job.
 Value writer_entry(const std::string& text) {
@@ -58,7 +59,7 @@ std::string free_name(const std::string& wanted, const std::vector<NamedWriter>&
 struct ChosenWriters {
   std::vector<NamedWriter> writers;
   NameSet needs;
-  nlohmann::ordered_json pages = nlohmann::ordered_json::array();  ///< For dataset.json.
+  OrderedJson pages = OrderedJson::array();  ///< For dataset.json.
 };
 
 ChosenWriters make_writers(const std::vector<std::string>& texts, Registry& registry, Host& host) {
@@ -95,8 +96,7 @@ ConversionSource open_source(const fs::path& folder, const ConvertOptions& optio
 
 /// That of the run which the only source comes from, where there is one; else what readers know.
 std::string page_text(const std::vector<fs::path>& sources, const std::vector<std::string>& formats,
-                      const DatasetInfo& info, nlohmann::ordered_json writers) {
-  using OrderedJson = nlohmann::ordered_json;
+                      const DatasetInfo& info, OrderedJson writers) {
   OrderedJson page;
   if (sources.size() == 1) page = parse_json_or_nothing<OrderedJson>(page_of_run(sources[0]));
   if (!page.is_object()) {

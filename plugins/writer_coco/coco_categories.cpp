@@ -12,12 +12,12 @@
 namespace diorama {
 namespace {
 
-constexpr const char* kKey = "coco_categories";
+constexpr const char* kCategoriesKey = "coco_categories";
 // Replicator's own id for what is in no category.
 constexpr int kOtherId = 201;
 
 [[noreturn]] void complain(const Value& value, const std::string& what) {
-  throw Error(ErrorKind::Config, complaint_about(value, kKey) + what);
+  throw Error(ErrorKind::Config, complaint_about(value, kCategoriesKey) + what);
 }
 
 std::optional<int> integer(const Value* value) {

@@ -158,13 +158,13 @@ class AnnotationFile {
 
 /// Replicator's list of licences: id, name and url each. Without one, that nothing is said.
 Json licenses_json(const Value& value) {
-  constexpr const char* kKey = "coco_license_info";
+  constexpr const char* kLicensesKey = "coco_license_info";
   const bool is_empty = value.kind == Value::Kind::List && value.list.empty();
   if (value.kind == Value::Kind::Null || is_empty) {
     return Json::array({{{"id", 1}, {"name", "unspecified"}, {"url", ""}}});
   }
   const auto complain = [&](const Value& at, const std::string& what) {
-    throw Error(ErrorKind::Config, complaint_about(at, kKey) + what);
+    throw Error(ErrorKind::Config, complaint_about(at, kLicensesKey) + what);
   };
   if (value.kind != Value::Kind::List) {
     complain(value, "expected a list of {id, name, url} or null, found " + value.describe());
