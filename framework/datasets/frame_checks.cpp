@@ -6,8 +6,8 @@
 #include <optional>
 
 #include "framework/datasets/check_names.h"
-#include "framework/lint/lens.h"
-#include "framework/lint/object_checks.h"
+#include "framework/datasets/lens.h"
+#include "framework/datasets/object_checks.h"
 
 namespace diorama {
 namespace {

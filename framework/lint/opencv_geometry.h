@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "framework/lint/lens.h"
+#include "framework/datasets/lens.h"
 
 namespace diorama::lint {
 

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "framework/datasets/frame_checks.h"
-#include "framework/lint/lens.h"
-#include "framework/lint/object_checks.h"
+#include "framework/datasets/lens.h"
+#include "framework/datasets/object_checks.h"
 #include "framework/lint/opencv_geometry.h"
 #include "framework/plugins/on_demand_library.h"
 

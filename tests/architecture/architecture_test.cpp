@@ -187,6 +187,21 @@ TEST_CASE("The framework includes the SDK and itself, no plugin", "[architecture
   CHECK(offending_includes("framework", is_allowed) == None{});
 }
 
+TEST_CASE("The engine includes nothing of the program", "[architecture]") {
+  const std::vector<std::string> program = {"app",  "bench",  "conformance", "inspect",
+                                            "lint", "replay", "view"};
+  const auto is_allowed = [&](const Source&, const Include& include) {
+    return std::ranges::none_of(program, [&](const std::string& folder) {
+      return include.file.starts_with("framework/" + folder + "/");
+    });
+  };
+  for (const char* folder : {"annotators", "config", "datasets", "export", "host", "images", "jobs",
+                             "output", "pipeline", "plugins", "python", "replicator"}) {
+    CHECK(offending_includes(std::string("framework/") + folder, is_allowed) == None{});
+  }
+  CHECK_FALSE(offending_includes("framework/app", is_allowed).empty());
+}
+
 TEST_CASE("A plugin includes the SDK, its engine, itself and shared libraries", "[architecture]") {
   const std::set<std::string> plugins = plugin_folders();
   CHECK(plugins.contains("renderer_embree"));

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "framework/lint/lens.h"
-#include "framework/lint/object_checks.h"
+#include "framework/datasets/lens.h"
+#include "framework/datasets/object_checks.h"
 #include "numpy_files.h"
 
 /// A second reader of camera_params files, for tests.

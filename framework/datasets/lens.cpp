@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "framework/lint/lens.h"
+#include "framework/datasets/lens.h"
 
 #include <cmath>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "framework/lint/object_checks.h"
+#include "framework/datasets/object_checks.h"
 
 namespace diorama::lint {
 namespace {

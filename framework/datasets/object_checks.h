@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "framework/lint/lens.h"
+#include "framework/datasets/lens.h"
 
 /// What pose, bounds, mask and depth of one object must have in common, in every format.
 namespace diorama::lint {
