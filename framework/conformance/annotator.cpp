@@ -6,35 +6,24 @@
 #include "framework/conformance/fingerprint.h"
 #include "framework/conformance/kinds.h"
 #include "framework/conformance/sample_scene.h"
+#include "framework/datasets/frame_copy.h"
 
 namespace diorama::conformance {
 namespace {
 
 /// The frame without the channels and annotations that are not among `names`.
 Frame reduced(const Frame& frame, const NameSet& names) {
-  Frame less;
-  less.camera_name = frame.camera_name;
-  less.camera_path = frame.camera_path;
-  less.camera = frame.camera;
-  less.world_from_camera = frame.world_from_camera;
-  less.leaf_paths = frame.leaf_paths;
+  Frame less = copy_of(frame, names);
   // Whoever makes the picture says how it was exposed.
-  if (names.contains(kColor.name)) less.exposure = frame.exposure;
-  less.seed = frame.seed;
-  for (const std::string& name : frame.channels()) {
-    if (!names.contains(name)) continue;
-    std::visit(
-        [&]<class Pixel>(const Image<Pixel>& image) { less.set(Channel<Pixel>{name}, image); },
-        frame.image_named(name));
-  }
-  if (names.contains("instances")) less.instances = frame.instances;
+  if (!names.contains(kColor.name)) less.exposure = Frame().exposure;
+  if (!names.contains("instances")) less.instances.clear();
   for (Instance& instance : less.instances) {
     if (!names.contains("visibility")) instance.visibility.reset();
     if (instance.visibility && !names.contains("amodal_mask")) {
       instance.visibility->amodal_mask = {};
     }
   }
-  if (names.contains("occlusion_order")) less.occlusions = frame.occlusions;
+  if (!names.contains("occlusion_order")) less.occlusions.clear();
   return less;
 }
 

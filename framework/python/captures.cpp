@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "diorama/writer.h"
+#include "framework/datasets/frame_copy.h"
 #include "framework/python/capsule.h"
 
 namespace py = pybind11;
@@ -172,33 +173,6 @@ py::dict capture_of(std::shared_ptr<const StoredCapture> stored, const NameSet& 
   result["findings"] = findings_of(stored->log);
   return result;
 }
-
-namespace {
-
-Frame copy_of(const Frame& frame, const NameSet& needs) {
-  Frame copy;
-  copy.camera_name = frame.camera_name;
-  copy.camera_path = frame.camera_path;
-  copy.camera = frame.camera;
-  copy.world_from_camera = frame.world_from_camera;
-  copy.instances = frame.instances;
-  copy.occlusions = frame.occlusions;
-  copy.leaf_paths = frame.leaf_paths;
-  copy.exposure = frame.exposure;
-  copy.seed = frame.seed;
-  for (const std::string& name : frame.channels()) {
-    if (!needs.contains(name)) continue;
-    std::visit(
-        [&](const auto& image) {
-          using Pixel = typename std::decay_t<decltype(image)>::PixelType;
-          copy.set(Channel<Pixel>{name}, image);
-        },
-        frame.image_named(name));
-  }
-  return copy;
-}
-
-}  // namespace
 
 std::shared_ptr<const StoredCapture> copy_of(const Capture& capture, const NameSet& needs) {
   auto stored = std::make_shared<StoredCapture>();

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "diorama/error.h"
+#include "framework/datasets/frame_copy.h"
 #include "framework/lint/dataset_on_disk.h"
 #include "framework/lint/encoding_host.h"
 #include "framework/lint/every_format.h"
@@ -19,23 +20,6 @@ using test::DatasetOnDisk;
 using Json = nlohmann::ordered_json;
 
 namespace {
-
-Frame copy_of(const Frame& frame) {
-  Frame copy;
-  copy.camera_name = frame.camera_name;
-  copy.camera_path = frame.camera_path;
-  copy.camera = frame.camera;
-  copy.world_from_camera = frame.world_from_camera;
-  copy.instances = frame.instances;
-  copy.occlusions = frame.occlusions;
-  copy.leaf_paths = frame.leaf_paths;
-  for (const std::string& name : frame.channels()) {
-    std::visit(
-        [&]<class Pixel>(const Image<Pixel>& image) { copy.set(Channel<Pixel>{name}, image); },
-        frame.image_named(name));
-  }
-  return copy;
-}
 
 Capture copy_of(const Capture& capture) {
   Capture copy;
