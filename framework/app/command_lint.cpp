@@ -18,12 +18,14 @@
 namespace diorama {
 namespace {
 
-/// With the job and the assets of the run.
-LintReport lint_scenes_of(const GlobalOptions& global, const std::string& run, ConsoleLog& log) {
+/// The job that a run was made of.
+Value job_of(const std::string& run) {
   LocalFileSystem file_system;
-  const DatasetStatus status = read_status(file_system, run, false);
-  const Value job = parse_yaml(status.job, run + "/dataset.json: job");
-  const JobServices services = make_job_services(global, job, log.sink());
+  return parse_yaml(read_status(file_system, run, false).job, run + "/dataset.json: job");
+}
+
+/// With the job and the assets of the run.
+LintReport lint_scenes_of(const std::string& run, const Value& job, const JobServices& services) {
   JobAssembly assembly = assemble_job(job, *services.registry, *services.host, services.assets_root,
                                       program_version(), AssembleFor::Plan, 1);
   return lint_scenes(run, assembly.job, assembly.plan, assembly.components.sets.front(),
@@ -33,11 +35,12 @@ LintReport lint_scenes_of(const GlobalOptions& global, const std::string& run, C
 }  // namespace
 
 int command_lint(const GlobalOptions& global, const LintOptions& options, ConsoleLog& log) {
-  const JobServices services = make_services(global, log.sink());
+  const Value job = options.looks_at_scenes ? job_of(options.dataset) : Value();
+  const JobServices services = make_job_services(global, job, log.sink());
   DatasetReaders readers(*services.registry, *services.host);
   std::vector<LintReport> reports =
       lint_datasets(options.dataset, readers, *services.host, options.reader);
-  if (options.looks_at_scenes) reports.push_back(lint_scenes_of(global, options.dataset, log));
+  if (options.looks_at_scenes) reports.push_back(lint_scenes_of(options.dataset, job, services));
   return print_lint(reports, options.as_json);
 }
 
