@@ -40,6 +40,7 @@
 #include "framework/app/options.h"
 #include "framework/config/clean_text.h"
 #include "framework/host/console_log.h"
+#include "framework/host/standard_streams.h"
 #include "framework/host/terminal.h"
 #include "framework/jobs/assemble.h"
 #include "framework/output/workers.h"
@@ -837,6 +838,21 @@ std::string usage_message(const CLI::App& app, const CLI::ParseError& error) {
   return not_known("command", first, commands) + advice;
 }
 
+int parse_and_run(CLI::App& app, CommandLine& line, int argc, const char* const* argv) {
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() != 0) throw;
+    // Help and version are no errors, they go to stdout.
+    std::ostringstream text;
+    app.exit(error, text);
+    const bool is_terminal = isatty(STDOUT_FILENO) == 1;
+    std::cout << (is_terminal ? wrapped(text.str(), terminal_columns(STDOUT_FILENO)) : text.str());
+    return 0;
+  }
+  return run_command(line);
+}
+
 int report(const std::string& message, int code) {
   std::cout.flush();
   std::fprintf(stderr, "error: %s\n", printable(message).c_str());
@@ -854,26 +870,13 @@ int run_program(int argc, const char* const* argv) {
       "labels.",
       "diorama");
   try {
+    StandardOutput output;
     add_all(app, line);
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    // Help and version are no errors, they go to stdout.
-    if (error.get_exit_code() == 0) {
-      std::ostringstream text;
-      app.exit(error, text);
-      const bool is_terminal = isatty(STDOUT_FILENO) == 1;
-      std::cout << (is_terminal ? wrapped(text.str(), terminal_columns(STDOUT_FILENO))
-                                : text.str());
-      return 0;
-    }
-    return report(usage_message(app, error), exit_code(ErrorKind::Usage));
-  }
-  try {
-    const int code = run_command(line);
-    std::cout.flush();
-    if (!std::cout)
-      return report("standard output cannot be written", exit_code(ErrorKind::Output));
+    const int code = parse_and_run(app, line, argc, argv);
+    output.finish();
     return code;
+  } catch (const CLI::ParseError& error) {
+    return report(usage_message(app, error), exit_code(ErrorKind::Usage));
   } catch (const Error& error) {
     return report(error.what(), exit_code(error.kind()));
   } catch (const Busy& busy) {

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "framework/app/command_replay.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <fstream>
 #include <functional>
@@ -16,6 +14,7 @@
 #include "framework/app/command_run.h"
 #include "framework/config/clean_text.h"
 #include "framework/host/regular_file.h"
+#include "framework/host/scratch_folder.h"
 #include "framework/output/dataset_status.h"
 #include "framework/output/journal.h"
 
@@ -23,26 +22,6 @@ namespace diorama {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// A folder of its own, removed with the object unless the user named it.
-class ReplayFolder {
- public:
-  explicit ReplayFolder(const std::optional<fs::path>& wanted)
-      : path_(wanted.value_or(fs::temp_directory_path() /
-                              ("diorama_replay_" + std::to_string(getpid())))),
-        is_kept_(wanted.has_value()) {}
-  ~ReplayFolder() {
-    std::error_code ignored;
-    if (!is_kept_) fs::remove_all(path_, ignored);
-  }
-  ReplayFolder(const ReplayFolder&) = delete;
-  ReplayFolder& operator=(const ReplayFolder&) = delete;
-  const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-  bool is_kept_;
-};
 
 bool is_missing(const DatasetStatus& status, int capture) {
   return std::ranges::any_of(status.missing, [&](const auto& range) {
@@ -136,9 +115,10 @@ int command_replay(const GlobalOptions& global, const ReplayOptions& options, Co
   LocalFileSystem file_system;
   const DatasetStatus status = read_status(file_system, options.dataset, false);
   const std::set<int> captures = chosen_captures(options, status);
-  const ReplayFolder place(options.output);
-  const fs::path records =
-      make_captures_again(global, status, place.path(), captures, options.sets, log);
+  std::optional<ScratchFolder> scratch;
+  if (!options.output) scratch.emplace("replay");
+  const fs::path records = make_captures_again(
+      global, status, scratch ? scratch->path() : *options.output, captures, options.sets, log);
   const Comparison result =
       compare(records, read_status(file_system, records, false), options.dataset, status, captures);
   for (const std::string& difference : result.differences) {

@@ -18,6 +18,7 @@
 #include "diorama/error.h"
 #include "framework/config/clean_text.h"
 #include "framework/datasets/dataset_readers.h"
+#include "framework/host/scratch_folder.h"
 #include "framework/jobs/assemble.h"
 #include "framework/view/dataset_view.h"
 #include "framework/view/http_server.h"
@@ -25,8 +26,6 @@
 
 namespace diorama {
 namespace {
-
-namespace fs = std::filesystem;
 
 std::atomic<bool> view_is_to_end = false;
 static_assert(std::atomic<bool>::is_always_lock_free);
@@ -43,22 +42,17 @@ class BrowserStart {
  public:
   explicit BrowserStart(const std::string& address) {
     if (std::getenv("DISPLAY") == nullptr && std::getenv("WAYLAND_DISPLAY") == nullptr) return;
-    std::error_code failed;
-    std::string pattern = (fs::temp_directory_path(failed) / "diorama_view_XXXXXX").string();
-    if (failed || mkdtemp(pattern.data()) == nullptr) return;
-    folder_ = pattern;
-    const std::string page = (folder_ / "open.html").string();
+    try {
+      folder_.emplace("view");
+    } catch (const Error&) {
+      return;  // the address is printed, too
+    }
+    const std::string page = (folder_->path() / "open.html").string();
     std::ofstream(page) << "<!DOCTYPE html><meta charset='utf-8'><meta name='referrer' "
                            "content='no-referrer'><meta http-equiv='refresh' content='0;url="
                         << address << "'><title>diorama view</title>\n";
     start(page);
   }
-  ~BrowserStart() {
-    std::error_code ignored;
-    if (!folder_.empty()) fs::remove_all(folder_, ignored);
-  }
-  BrowserStart(const BrowserStart&) = delete;
-  BrowserStart& operator=(const BrowserStart&) = delete;
 
  private:
   static void start(const std::string& page) {
@@ -75,7 +69,7 @@ class BrowserStart {
     posix_spawn_file_actions_destroy(&files);
   }
 
-  fs::path folder_;
+  std::optional<ScratchFolder> folder_;
 };
 
 }  // namespace

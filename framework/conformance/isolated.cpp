@@ -27,6 +27,7 @@
 #include <utility>
 
 #include "diorama/error.h"
+#include "framework/host/scratch_folder.h"
 
 namespace diorama::conformance {
 namespace {
@@ -37,27 +38,15 @@ namespace fs = std::filesystem;
   throw Error(ErrorKind::Internal, what + ": " + std::system_category().message(errno));
 }
 
-/// A folder that goes away with its owner.
+/// What a child may fill, and what it prints.
 class Scratch {
  public:
-  Scratch() {
-    std::string pattern = (fs::temp_directory_path() / "diorama_check_XXXXXX").string();
-    if (!mkdtemp(pattern.data())) fail(pattern);
-    path_ = pattern;
-    fs::create_directory(work());
-  }
-  ~Scratch() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  Scratch(const Scratch&) = delete;
-  Scratch& operator=(const Scratch&) = delete;
-
-  fs::path work() const { return path_ / "work"; }
-  fs::path printed() const { return path_ / "printed"; }
+  Scratch() { fs::create_directory(work()); }
+  fs::path work() const { return folder_.path() / "work"; }
+  fs::path printed() const { return folder_.path() / "printed"; }
 
  private:
-  fs::path path_;
+  ScratchFolder folder_{"check"};
 };
 
 /// Sends what happens to the parent: four texts that end with NUL each.

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "diorama/loader.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <cctype>
 #include <cmath>
@@ -10,7 +8,11 @@
 
 #include "framework/conformance/fingerprint.h"
 #include "framework/conformance/kinds.h"
+<<<<<<< HEAD
 #include "framework/conformance/run_together.h"
+=======
+#include "framework/host/scratch_folder.h"
+>>>>>>> 770f84f (What cannot be printed is an error of every command, and temporary files without a place one that says so)
 
 namespace diorama::conformance {
 namespace {
@@ -154,8 +156,8 @@ void check_two_loaders_at_once(const Subject& subject, const std::string& asset)
 void refuse_broken_files(Loader& loader, const std::string& ending) {
   const std::vector<std::string> contents{"", "<<< this is no model >>>\n", std::string(64, '\0'),
                                           std::string(5000, '\xff')};
-  const fs::path file =
-      fs::temp_directory_path() / ("diorama_broken_" + std::to_string(getpid()) + ending);
+  const ScratchFolder folder("broken");
+  const fs::path file = folder.path() / ("broken" + ending);
   for (const std::string& content : contents) {
     std::ofstream(file, std::ios::binary) << content;
     std::string failure;

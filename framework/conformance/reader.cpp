@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "diorama/reader.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <atomic>
 #include <fstream>
@@ -16,6 +14,7 @@
 #include "framework/conformance/run_together.h"
 #include "framework/conformance/sample_scene.h"
 #include "framework/datasets/frame_difference.h"
+#include "framework/host/scratch_folder.h"
 
 namespace diorama::conformance {
 namespace {
@@ -24,33 +23,27 @@ namespace fs = std::filesystem;
 
 constexpr int kCaptures = 3;
 
-/// Removed with the object.
 class Folder {
  public:
-  explicit Folder(const std::string& name)
-      : path_(fs::temp_directory_path() /
-              ("diorama_check_" + std::to_string(getpid()) + "_" + name)) {
-    fs::remove_all(path_);
-    fs::create_directories(path_);
-  }
-  ~Folder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  const fs::path& path() const { return path_; }
+  explicit Folder(const std::string& name) : scratch_(name) {}
+  const fs::path& path() const { return scratch_.path(); }
   void append(const std::string& file, std::span<const std::byte> bytes) const {
-    fs::create_directories((path_ / file).parent_path());
-    std::ofstream out(path_ / file, std::ios::binary | std::ios::app);
-    out.write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
+    put(file, bytes.data(), bytes.size(), std::ios::app);
   }
   void write(const std::string& file, const void* data, std::size_t size) const {
-    fs::create_directories((path_ / file).parent_path());
-    std::ofstream out(path_ / file, std::ios::binary);
-    out.write(static_cast<const char*>(data), std::streamsize(size));
+    put(file, data, size, std::ios::out);
   }
 
  private:
-  fs::path path_;
+  void put(const std::string& file, const void* data, std::size_t size,
+           std::ios::openmode mode) const {
+    fs::create_directories((path() / file).parent_path());
+    std::ofstream out(path() / file, std::ios::binary | mode);
+    out.write(static_cast<const char*>(data), std::streamsize(size));
+    if (!out.flush())
+      throw Error(ErrorKind::Output, (path() / file).string() + ": cannot be written");
+  }
+  ScratchFolder scratch_;
 };
 
 /// A writer's files on disk, records kept for finish().
