@@ -3,6 +3,8 @@
 #include <sys/stat.h>
 
 #include <cstdlib>
+#include <string>
+#include <utility>
 
 #include "program.h"
 #include "support/catch.h"
@@ -308,4 +310,54 @@ TEST_CASE("a limit on the size of files is an error with a message", "[errors]")
   INFO(outcome.errors);
   CHECK(outcome.exit_code == 6);
   CHECK_THAT(outcome.errors, ContainsSubstring("File too large"));
+}
+
+TEST_CASE("what cannot be printed is an error of every command", "[errors][streams]") {
+  const TemporaryFolder folder;
+  for (const char* seed : {"1", "2"}) {
+    const Outcome made =
+        run({"run", config_file("smoke.yaml"), "--seed", seed, "--output", seed}, folder.path());
+    INFO(made.errors);
+    REQUIRE(made.exit_code == 0);
+  }
+  const std::string program = "cd '" + folder.path().string() +
+                              "' && '" DIORAMA_PROGRAM
+                              "' --log-level error --plugin-dir '" DIORAMA_PLUGIN_DIR "' ";
+  for (const std::string command :
+       {"--help", "--version", "run --help", "plugins", "plugins --json", "plugins describe cube",
+        "plugins describe BasicWriter", "inspect shape:cube", "inspect shape:cube --json",
+        "stats 1", "stats 1 --json", "lint 1", "lint 1 --json", "diff 1 2", "schema", "status 1"}) {
+    INFO(command);
+    const int status = std::system((program + command + " >/dev/full 2>errors").c_str());
+    const std::string errors = read_file(folder / "errors");
+    if (command == "plugins describe cube") {  // no such component: one error, not two
+      CHECK(WEXITSTATUS(status) == 4);
+      CHECK(errors.starts_with("error: no component is called 'cube'"));
+      continue;
+    }
+    CHECK(WEXITSTATUS(status) == 6);
+    CHECK(errors == "error: cannot write to standard output: No space left on device\n");
+  }
+}
+
+TEST_CASE("temporary files without a place are one error", "[errors]") {
+  const TemporaryFolder folder;
+  REQUIRE(run({"run", config_file("smoke.yaml"), "--output", "made"}, folder.path()).exit_code ==
+          0);
+  write_file(folder / "file", "");
+  for (const auto& [place, reason] :
+       {std::pair{"none", "No such file or directory"}, std::pair{"file", "Not a directory"}}) {
+    const std::string chosen = (folder / place).string();
+    for (const std::string command :
+         {"verify made", "plugins check " DIORAMA_PLUGIN_DIR "/renderer_null.so"}) {
+      INFO(command);
+      const std::string line = "cd '" + folder.path().string() + "' && TMPDIR='" + chosen +
+                               "' '" DIORAMA_PROGRAM "' --log-level error --plugin-dir '" +
+                               DIORAMA_PLUGIN_DIR "' " + command + " >/dev/null 2>errors";
+      CHECK(WEXITSTATUS(std::system(line.c_str())) == 6);
+      CHECK(read_file(folder / "errors") ==
+            "error: " + chosen + ": cannot hold temporary files: " + reason +
+                "; set TMPDIR to a folder with space that you may write\n");
+    }
+  }
 }
