@@ -8,11 +8,8 @@
 
 #include "framework/conformance/fingerprint.h"
 #include "framework/conformance/kinds.h"
-<<<<<<< HEAD
 #include "framework/conformance/run_together.h"
-=======
 #include "framework/host/scratch_folder.h"
->>>>>>> 770f84f (What cannot be printed is an error of every command, and temporary files without a place one that says so)
 
 namespace diorama::conformance {
 namespace {
