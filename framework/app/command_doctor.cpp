@@ -13,6 +13,7 @@
 
 #include "diorama/renderer.h"
 #include "framework/app/cli.h"
+#include "framework/config/clean_text.h"
 #include "framework/host/machine_limits.h"
 #include "framework/jobs/assemble.h"
 
@@ -70,15 +71,15 @@ class Doctor {
 
  private:
   void problem(const std::string& text) {
-    std::cout << "  ! " << text << "\n";
+    std::cout << "  ! " << printable(text) << "\n";
     ++problems_;
   }
 
   void show_program() const {
     std::cout << "program\n  version " << program_version() << "\n  file "
-              << global_.program.string() << "\n  plugin ABI " << DIORAMA_SDK_ABI << "\n  ABI tag "
-              << DIORAMA_ABI_TAG << "\n  layout digest " << abi::kLayout << "\n  compiler g++ "
-              << __VERSION__ << "\n";
+              << printable(global_.program.string()) << "\n  plugin ABI " << DIORAMA_SDK_ABI
+              << "\n  ABI tag " << DIORAMA_ABI_TAG << "\n  layout digest " << abi::kLayout
+              << "\n  compiler g++ " << __VERSION__ << "\n";
   }
 
   void show_machine() const {
@@ -98,7 +99,7 @@ class Doctor {
     for (const SearchLevel& level : registry_->levels()) {
       for (const fs::path& folder : level.folders) {
         std::error_code failed;
-        std::cout << "  " << folder.string() << " (" << level.name
+        std::cout << "  " << printable(folder.string()) << " (" << level.name
                   << (fs::is_directory(folder, failed) ? ")\n" : ", not there)\n");
       }
     }
@@ -117,7 +118,8 @@ class Doctor {
     if (entry.file.empty() || !seen.insert(entry.file.string()).second) return;
     try {
       registry_->describe(entry.kind, entry.type);
-      std::cout << "  " << entry.plugin << " " << entry.version << ", " << entry.file.string()
+      std::cout << "  "
+                << printable(entry.plugin + " " + entry.version + ", " + entry.file.string())
                 << "\n";
     } catch (const Error& error) {
       problem(error.what());
@@ -149,10 +151,10 @@ class Doctor {
         const auto renderer =
             registry_->make<Renderer>(parameters, "renderer", known, complaints, *host);
         complaints.raise();
-        std::cout << "  " << type << " starts" << said << "\n";
+        std::cout << "  " << printable(type + " starts" + said) << "\n";
         ++started;
       } catch (const Error& error) {
-        std::cout << "  " << type << " does not start: " << error.what() << "\n";
+        std::cout << "  " << printable(type + " does not start: " + error.what()) << "\n";
       }
     }
     if (started == 0) problem("no renderer starts on this machine");
@@ -172,7 +174,7 @@ class Doctor {
       const std::optional<fs::path> root = choose_assets_root(
           global_.assets_root, std::getenv("DIORAMA_ASSETS_ROOT"), std::nullopt, samples);
       if (root) {
-        std::cout << "  root " << root->string() << "\n";
+        std::cout << "  root " << printable(root->string()) << "\n";
         return;
       }
       problem("no assets root: the sample pack is not at " + samples.string() +

@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <iostream>
+#include <sstream>
 
 #include "framework/app/cli.h"
 #include "framework/app/param_text.h"
+#include "framework/config/clean_text.h"
 #include "framework/config/value_text.h"
 #include "framework/conformance/conformance.h"
 #include "framework/jobs/assemble.h"
@@ -72,6 +74,7 @@ void print_list_json(const Registry& registry) {
 }
 
 void print_list(const Registry& registry) {
+  std::ostringstream text;
   const std::vector<ComponentEntry> entries = registry.components();
   std::size_t type_width = 0;
   for (const ComponentEntry& entry : entries) {
@@ -81,22 +84,23 @@ void print_list(const Registry& registry) {
     bool is_first = true;
     for (const ComponentEntry& entry : entries) {
       if (entry.kind != kind) continue;
-      if (is_first) std::cout << kind_name(kind) << "\n";
+      if (is_first) text << kind_name(kind) << "\n";
       is_first = false;
-      std::cout << "  " << padded(entry.type, type_width) << "  " << entry.help << "  ["
-                << entry.plugin << " " << entry.version << "]\n";
+      text << "  " << padded(entry.type, type_width) << "  " << entry.help << "  [" << entry.plugin
+           << " " << entry.version << "]\n";
     }
   }
-  std::cout << (entries.empty() ? "no components\n" : "") << "searched\n";
+  text << (entries.empty() ? "no components\n" : "") << "searched\n";
   for (const SearchLevel& level : registry.levels()) {
     for (const auto& folder : level.folders) {
-      std::cout << "  " << folder.string() << " (" << level.name << ")\n";
+      text << "  " << folder.string() << " (" << level.name << ")\n";
     }
   }
-  if (!registry.rejected().empty()) std::cout << "refused\n";
+  if (!registry.rejected().empty()) text << "refused\n";
   for (const RejectedPlugin& rejected : registry.rejected()) {
-    std::cout << "  " << rejected.reason << "\n";
+    text << "  " << rejected.reason << "\n";
   }
+  std::cout << printable(text.str());
 }
 
 /// The entries that "type" or "kind/type" means.
@@ -111,30 +115,31 @@ std::vector<ComponentEntry> entries_called(const Registry& registry, const std::
   if (!found.empty()) return found;
   const std::string near = nearest_name(name, names);
   throw Error(ErrorKind::Plugin, "no component is called '" + name + "'" +
-                                     (near.empty() ? "" : ", did you mean '" + near + "'?") +
-                                     " 'diorama plugins' lists them all");
+                                     (near.empty() ? "" : "; did you mean '" + near + "'?") +
+                                     "; 'diorama plugins' lists them all");
 }
 
 void print_description(const ComponentEntry& entry, const std::vector<ParamSpec>& specs) {
-  std::cout << kind_name(entry.kind) << " " << entry.type << ": " << entry.help << "\n";
-  std::cout << "plugin " << entry.plugin << " " << entry.version;
-  if (!entry.file.empty()) std::cout << ", " << entry.file.string();
-  std::cout << "\n";
+  std::ostringstream text;
+  text << kind_name(entry.kind) << " " << entry.type << ": " << entry.help << "\n";
+  text << "plugin " << entry.plugin << " " << entry.version;
+  if (!entry.file.empty()) text << ", " << entry.file.string();
+  text << "\n";
   for (const std::string& claim : entry.claims) {
     const bool is_beginning = claim.starts_with('=');
-    std::cout << "reads "
-              << (is_beginning ? "files without an ending that begin with " + claim.substr(1)
-                               : claim)
-              << "\n";
+    text << "reads "
+         << (is_beginning ? "files without an ending that begin with " + claim.substr(1) : claim)
+         << "\n";
   }
-  if (specs.empty()) std::cout << "no parameters\n";
+  if (specs.empty()) text << "no parameters\n";
   for (const ParamRow& row : param_rows(specs)) {
-    std::cout << "\n" << row.key << ": " << row.type;
-    if (!row.default_value.empty()) std::cout << ", default " << row.default_value;
-    if (!row.unit.empty()) std::cout << " " << row.unit;
-    if (!row.range.empty()) std::cout << ", " << row.range;
-    std::cout << "\n    " << row.help << "\n";
+    text << "\n" << row.key << ": " << row.type;
+    if (!row.default_value.empty()) text << ", default " << row.default_value;
+    if (!row.unit.empty()) text << " " << row.unit;
+    if (!row.range.empty()) text << ", " << row.range;
+    text << "\n    " << row.help << "\n";
   }
+  std::cout << printable(text.str());
 }
 
 std::ptrdiff_t count(const std::vector<CheckResult>& results, Outcome outcome) {
@@ -142,12 +147,14 @@ std::ptrdiff_t count(const std::vector<CheckResult>& results, Outcome outcome) {
 }
 
 void print_checks(const std::vector<CheckResult>& results) {
+  std::ostringstream text;
   for (const CheckResult& result : results) {
-    std::cout << padded(outcome_name(result.outcome), 8) << result.subject << ": " << result.check
-              << (result.message.empty() ? "" : ": " + result.message) << "\n";
+    text << padded(outcome_name(result.outcome), 8) << result.subject << ": " << result.check
+         << (result.message.empty() ? "" : ": " + result.message) << "\n";
   }
-  std::cout << results.size() << " checks, " << count(results, Outcome::Failed) << " failed, "
-            << count(results, Outcome::Skipped) << " skipped\n";
+  text << results.size() << " checks, " << count(results, Outcome::Failed) << " failed, "
+       << count(results, Outcome::Skipped) << " skipped\n";
+  std::cout << printable(text.str());
 }
 
 void print_checks_json(const std::vector<CheckResult>& results) {

@@ -53,7 +53,8 @@ Value& list_entry(Value& list, const std::string& part, std::string_view assignm
   if (failed == std::errc() && stop == end) {
     if (index < list.list.size()) return list.list[index];
     refuse(assignment, path + " has " + std::to_string(list.list.size()) +
-                           " entries, counted from 0; there is no entry " + part);
+                           (list.list.size() == 1 ? " entry" : " entries") +
+                           ", counted from 0; there is no entry " + part);
   }
   Value* found = nullptr;
   std::vector<std::string> names;

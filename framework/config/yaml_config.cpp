@@ -169,6 +169,9 @@ class TreeBuilder final : public YAML::EventHandler {
     check_depth(levels_.size() + 1, place(mark));
     if (!levels_.empty() && levels_.back().value.kind == Value::Kind::Map &&
         !levels_.back().has_key) {
+      if (const auto fault = unclosed_bracket(text_)) {
+        refuse({file_, fault->line, fault->column}, "YAML syntax error: " + fault->message);
+      }
       refuse(place(mark), "a key must be a text, found " +
                               std::string(kind == Value::Kind::Map ? "a mapping" : "a list"));
     }

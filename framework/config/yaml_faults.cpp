@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <optional>
 #include <utility>
 #include <vector>
 
@@ -218,6 +217,13 @@ YamlFault explain_yaml_fault(std::string_view text, int line_from_1, int column_
   }
   if (message == "illegal map value") return misplaced_key(lines, line, column);
   return {line_from_1, column_from_1, plain_words(message)};
+}
+
+std::optional<YamlFault> unclosed_bracket(std::string_view text) {
+  const Lines lines = lines_of(text);
+  const std::size_t last = lines.size() - 1;
+  if (!open_bracket(lines, last, lines[last].size())) return std::nullopt;
+  return unclosed(lines, last, lines[last].size());
 }
 
 }  // namespace diorama

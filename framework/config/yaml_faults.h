@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -15,5 +16,8 @@ struct YamlFault {
 
 /// `message` is the parser's, for the place where it gave up; `text` is the whole document.
 YamlFault explain_yaml_fault(std::string_view text, int line, int column, std::string_view message);
+
+/// The bracket that is still open at the end of a document, which the parser may take for a key.
+std::optional<YamlFault> unclosed_bracket(std::string_view text);
 
 }  // namespace diorama

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <climits>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
@@ -135,7 +136,8 @@ std::string digest_of(FileSystem& file_system, const fs::path& file) {
 }
 
 bool is_plain_relative(std::string_view path) {
-  if (path.empty() || path.front() == '/' || path.back() == '/') return false;
+  if (path.empty() || path.size() >= PATH_MAX) return false;
+  if (path.front() == '/' || path.back() == '/') return false;
   if (path.find('\\') != std::string_view::npos || path.find('\0') != std::string_view::npos) {
     return false;
   }
@@ -497,7 +499,8 @@ std::optional<JournalledFiles> Journals::files_of(const std::string& worker,
     throw Error(ErrorKind::Output, file.string() + ": byte " + std::to_string(place.offset) +
                                        ": expected the files of " + entry_name(place.entry) +
                                        " with relative paths, sizes and digests, found '" +
-                                       text.substr(0, 80) + "'");
+                                       text.substr(0, std::min<std::size_t>(text.find('\n'), 80)) +
+                                       "'");
   }
   return content;
 }

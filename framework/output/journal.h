@@ -75,7 +75,8 @@ class Digest {
   std::unique_ptr<State> state_;
 };
 
-/// Relative, without `..` and the like: what may stand in a journal and what writers may ask for.
+/// Relative, no longer than the system takes, without `..` and the like: what may stand in a
+/// journal and what writers may ask for.
 bool is_plain_relative(std::string_view path);
 /// Below the folder of dataset.json: what captures keep until the dataset is finished.
 inline constexpr const char* kKeptFolder = ".diorama/kept";

@@ -291,7 +291,18 @@ void OutputStore::probe(const fs::path& target) {
   }
   if (existing.filename().empty() && existing.has_parent_path()) existing = existing.parent_path();
   const fs::path trial = existing / (".diorama-write-test-" + options_.self.name);
-  file_system_.make_folders(trial);
+  try {
+    file_system_.make_folders(trial);
+  } catch (const Error& error) {
+    // Nobody asked for the trial: the message is about the folder that was asked for.
+    const std::string text = error.what();
+    const std::size_t at = text.find(trial.string());
+    if (at == text.npos) throw;
+    const bool is_there = existing == fs::absolute(target).lexically_normal();
+    throw Error(error.kind(),
+                (is_there ? "cannot write into the folder " : "cannot create the folder ") +
+                    target.string() + text.substr(at + trial.string().size()));
+  }
   file_system_.remove_if_empty(trial);
 }
 

@@ -128,6 +128,8 @@ TEST_CASE("syntax errors name line and column", "[config]") {
   };
   CHECK(fault_of("a: [1, 2\nb: 3\n") ==
         "1:4 the '[' that opens here is not closed, or a comma is missing, before 2:2");
+  CHECK(fault_of("a: [[[\n") ==
+        "1:6 the '[' that opens here is not closed, or a comma is missing, before 2:1");
   CHECK(fault_of("a: {b: \"]\", c: [\n  1, 2\n") ==
         "1:16 the '[' that opens here is not closed, or a comma is missing, before 3:1");
   CHECK(fault_of("a: {b: 1 c: 2}\n") ==
