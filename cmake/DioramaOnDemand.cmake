@@ -8,5 +8,5 @@ function(diorama_add_on_demand_library name)
   set_target_properties(${name} PROPERTIES PREFIX "" LIBRARY_OUTPUT_DIRECTORY
                                                      ${PROJECT_BINARY_DIR}/on_demand)
   install(TARGETS ${name} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/diorama)
-  add_dependencies(diorama_framework ${name})
+  add_dependencies(diorama_engine ${name})
 endfunction()

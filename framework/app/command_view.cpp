@@ -22,6 +22,7 @@
 #include "framework/jobs/assemble.h"
 #include "framework/view/dataset_view.h"
 #include "framework/view/http_server.h"
+#include "framework/view/index_cache.h"
 #include "framework/view/report.h"
 
 namespace diorama {
@@ -80,7 +81,8 @@ int command_view(const GlobalOptions& global, const ViewOptions& options, Consol
   DatasetView view({.folder = options.dataset,
                     .other = options.other,
                     .tolerance = options.tolerance,
-                    .reader = options.reader},
+                    .reader = options.reader,
+                    .cache = index_cache_folder()},
                    readers, *services.host);
 
   view_is_to_end = false;

@@ -45,12 +45,12 @@ std::uint64_t rep(Type type, std::uint64_t payload) { return std::uint64_t(type)
 std::uint64_t inlined(Type type, std::uint32_t bits) { return rep(type, bits) | kIsInlined; }
 
 template <class Plain>
-void append(Bytes& bytes, const Plain& value) {
+void append_plain(Bytes& bytes, const Plain& value) {
   // Eigen's vectors are plain numbers, but do not say so to the language: byte by byte, then.
   const auto* const begin = reinterpret_cast<const Bytes::value_type*>(&value);
   bytes.insert(bytes.end(), begin, begin + sizeof value);
 }
-void append(Bytes& bytes, const Bytes& more) {
+void append_plain(Bytes& bytes, const Bytes& more) {
   bytes.insert(bytes.end(), more.begin(), more.end());
 }
 
@@ -71,17 +71,17 @@ class CrateWriter {
     sections.emplace_back("PATHS", paths_section());
     sections.emplace_back("SPECS", specs_section());
     Bytes contents;
-    append(contents, std::uint64_t(sections.size()));
+    append_plain(contents, std::uint64_t(sections.size()));
     for (const auto& [name, bytes] : sections) {
       std::array<char, 16> label{};
       std::strncpy(label.data(), name, label.size() - 1);
-      append(contents, label);
-      append(contents, std::int64_t(file_.size()));
-      append(contents, std::int64_t(bytes.size()));
-      append(file_, bytes);
+      append_plain(contents, label);
+      append_plain(contents, std::int64_t(file_.size()));
+      append_plain(contents, std::int64_t(bytes.size()));
+      append_plain(file_, bytes);
     }
     const auto contents_at = std::int64_t(file_.size());
-    append(file_, contents);
+    append_plain(file_, contents);
     const std::array<char, 16> start{'P', 'X', 'R', '-', 'U', 'S', 'D', 'C', 0, 8, 0};
     std::memcpy(file_.data(), start.data(), start.size());
     std::memcpy(file_.data() + 16, &contents_at, sizeof contents_at);
@@ -114,21 +114,21 @@ class CrateWriter {
     }
     file_.resize((file_.size() + 7) / 8 * 8);
     known.emplace_back(file_.size(), bytes.size());
-    append(file_, bytes);
+    append_plain(file_, bytes);
     return known.back().first;
   }
   template <class Plain>
   std::uint64_t placed(Type type, const Plain& value) {
     Bytes bytes;
-    append(bytes, value);
+    append_plain(bytes, value);
     return rep(type, place(bytes));
   }
   template <class Item>
   std::uint64_t placed_array(Type type, const std::vector<Item>& items) {
     if (items.empty()) return rep(type, 0) | kIsArray;
     Bytes bytes;
-    append(bytes, std::uint64_t(items.size()));
-    for (const Item& item : items) append(bytes, item);
+    append_plain(bytes, std::uint64_t(items.size()));
+    for (const Item& item : items) append_plain(bytes, item);
     return rep(type, place(bytes)) | kIsArray;
   }
 
@@ -169,29 +169,29 @@ class CrateWriter {
     if (v.size() < kLeastCompressed) return placed_array(Type::Int, v);
     const Bytes coded = code_integers(v);
     Bytes bytes;
-    append(bytes, std::uint64_t(v.size()));
-    append(bytes, std::uint64_t(coded.size()));
-    append(bytes, coded);
+    append_plain(bytes, std::uint64_t(v.size()));
+    append_plain(bytes, std::uint64_t(coded.size()));
+    append_plain(bytes, coded);
     return rep(Type::Int, place(bytes)) | kIsArray | kIsCompressed;
   }
   std::uint64_t token_vector(const std::vector<std::string>& names) {
     Bytes bytes;
-    append(bytes, std::uint64_t(names.size()));
-    for (const std::string& name : names) append(bytes, token(name));
+    append_plain(bytes, std::uint64_t(names.size()));
+    for (const std::string& name : names) append_plain(bytes, token(name));
     return rep(Type::TokenVector, place(bytes));
   }
   std::uint64_t prepended_tokens(const std::vector<std::string>& names) {
     Bytes bytes;
-    append(bytes, kListHasPrepended);
-    append(bytes, std::uint64_t(names.size()));
-    for (const std::string& name : names) append(bytes, token(name));
+    append_plain(bytes, kListHasPrepended);
+    append_plain(bytes, std::uint64_t(names.size()));
+    for (const std::string& name : names) append_plain(bytes, token(name));
     return rep(Type::TokenListOp, place(bytes));
   }
   std::uint64_t explicit_paths(const std::vector<std::string>& paths) {
     Bytes bytes;
-    append(bytes, std::uint8_t(kListIsExplicit | kListHasExplicit));
-    append(bytes, std::uint64_t(paths.size()));
-    for (const std::string& path : paths) append(bytes, path_of_.at(path));
+    append_plain(bytes, std::uint8_t(kListIsExplicit | kListHasExplicit));
+    append_plain(bytes, std::uint64_t(paths.size()));
+    for (const std::string& path : paths) append_plain(bytes, path_of_.at(path));
     return rep(Type::PathListOp, place(bytes));
   }
 
@@ -307,8 +307,8 @@ class CrateWriter {
   }
 
   static void append_compressed(Bytes& bytes, const Bytes& compressed) {
-    append(bytes, std::uint64_t(compressed.size()));
-    append(bytes, compressed);
+    append_plain(bytes, std::uint64_t(compressed.size()));
+    append_plain(bytes, compressed);
   }
   Bytes tokens_section() const {
     Bytes raw;
@@ -317,15 +317,15 @@ class CrateWriter {
       raw.insert(raw.end(), begin, begin + text.size() + 1);
     }
     Bytes bytes;
-    append(bytes, std::uint64_t(tokens_.size()));
-    append(bytes, std::uint64_t(raw.size()));
+    append_plain(bytes, std::uint64_t(tokens_.size()));
+    append_plain(bytes, std::uint64_t(raw.size()));
     append_compressed(bytes, compress(raw));
     return bytes;
   }
   Bytes strings_section() const {
     Bytes bytes;
-    append(bytes, std::uint64_t(strings_.size()));
-    for (const std::int32_t index : strings_) append(bytes, index);
+    append_plain(bytes, std::uint64_t(strings_.size()));
+    for (const std::int32_t index : strings_) append_plain(bytes, index);
     return bytes;
   }
   Bytes fields_section() const {
@@ -333,7 +333,7 @@ class CrateWriter {
     Bytes values;
     for (const auto& [name, field_value] : fields_) {
       names.push_back(name);
-      append(values, field_value);
+      append_plain(values, field_value);
     }
     Bytes bytes = integers_section(names);
     append_compressed(bytes, compress(values));
@@ -341,7 +341,7 @@ class CrateWriter {
   }
   static Bytes integers_section(const std::vector<std::int32_t>& list) {
     Bytes bytes;
-    append(bytes, std::uint64_t(list.size()));
+    append_plain(bytes, std::uint64_t(list.size()));
     append_compressed(bytes, code_integers(list));
     return bytes;
   }
@@ -349,8 +349,8 @@ class CrateWriter {
     std::vector<std::int32_t> numbers(elements_.size());
     for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i] = std::int32_t(i);
     Bytes bytes;
-    append(bytes, std::uint64_t(elements_.size()));
-    append(bytes, std::uint64_t(elements_.size()));
+    append_plain(bytes, std::uint64_t(elements_.size()));
+    append_plain(bytes, std::uint64_t(elements_.size()));
     for (const std::vector<std::int32_t>* list :
          {static_cast<const std::vector<std::int32_t>*>(&numbers), &elements_, &jumps_})
       append_compressed(bytes, code_integers(*list));
@@ -358,7 +358,7 @@ class CrateWriter {
   }
   Bytes specs_section() const {
     Bytes bytes;
-    append(bytes, std::uint64_t(spec_paths_.size()));
+    append_plain(bytes, std::uint64_t(spec_paths_.size()));
     for (const auto* list : {&spec_paths_, &spec_sets_, &spec_types_})
       append_compressed(bytes, code_integers(*list));
     return bytes;

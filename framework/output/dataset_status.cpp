@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "framework/output/dataset_status.h"
 
+#include <unistd.h>
+
 #include <algorithm>
+#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <system_error>
 
 #include "diorama/error.h"
 #include "framework/config/json_text.h"
@@ -44,6 +48,30 @@ fs::path base_of(const fs::path& folder, const std::string& records) {
   return base;
 }
 
+/// Resident memory of the process that holds a lease. Its number alone may be that of another one,
+/// in a container or on another machine: the lease must be among the files that it has open.
+std::uint64_t memory_of_holder(FileSystem& file_system, const fs::path& lease) {
+  const Json content = parse_json_or_nothing<Json>(file_system.read_part(lease, 0, 4096));
+  if (!content.is_object() || !content.contains("process") ||
+      !content["process"].is_number_integer()) {
+    return 0;
+  }
+  const fs::path process = fs::path("/proc") / std::to_string(content["process"].get<int>());
+  std::error_code error;
+  const fs::path file = fs::canonical(lease, error);
+  bool is_holder = false;
+  for (fs::directory_iterator at(process / "fd", error), end; !error && at != end && !is_holder;
+       at.increment(error)) {
+    std::error_code ignored;
+    is_holder = fs::read_symlink(at->path(), ignored) == file;
+  }
+  std::ifstream statm(process / "statm");
+  std::uint64_t size = 0;
+  std::uint64_t resident = 0;
+  if (!is_holder || !(statm >> size >> resident)) return 0;
+  return resident * std::uint64_t(::sysconf(_SC_PAGESIZE));
+}
+
 void add_workers(FileSystem& file_system, const fs::path& folder, const Journals& journals,
                  DatasetStatus& status) {
   // A reader takes no part: it has no lease, and no role.
@@ -58,6 +86,9 @@ void add_workers(FileSystem& file_system, const fs::path& folder, const Journals
     worker.role = lease.role;
     worker.description = leases.describe(lease);
     worker.is_alive = leases.is_alive(lease);
+    if (worker.is_alive) {
+      worker.memory_bytes = memory_of_holder(file_system, folder / "workers" / lease.file_name());
+    }
   }
   for (auto& [name, worker] : workers) status.workers.push_back(std::move(worker));
 }

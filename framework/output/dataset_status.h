@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <utility>
@@ -17,7 +18,8 @@ struct DatasetStatus {
     std::string role;         ///< "shard-3-of-16", "auto", "overwrite"; empty when it has ended.
     std::string description;  ///< Host, process, last sign of life.
     bool is_alive = false;
-    int captures = 0;  ///< That it has made.
+    int captures = 0;                ///< That it has made.
+    std::uint64_t memory_bytes = 0;  ///< Resident; 0: not known, as of one on another machine.
   };
   int captures = 0;  ///< Of the job.
   int done = 0;

@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <initializer_list>
 #include <nlohmann/json.hpp>
+#include <span>
 
 #include "framework/datasets/dataset_stats.h"
 
@@ -39,6 +42,34 @@ std::vector<std::size_t> counts(const std::vector<std::size_t>& firsts, std::siz
   return made;
 }
 
+/// Elements behind their number.
+template <class Elements>
+void put(std::string& bytes, const Elements& elements) {
+  const std::uint64_t count = elements.size();
+  bytes.append(reinterpret_cast<const char*>(&count), sizeof count);
+  bytes.append(reinterpret_cast<const char*>(elements.data()), count * sizeof(elements[0]));
+}
+
+/// False when there are not as many as it says.
+template <class Elements>
+bool take(std::string_view& bytes, Elements& elements) {
+  std::uint64_t count = 0;
+  if (bytes.size() < sizeof count) return false;
+  std::memcpy(&count, bytes.data(), sizeof count);
+  bytes.remove_prefix(sizeof count);
+  if (count > bytes.size() / sizeof(elements[0])) return false;
+  elements.resize(count);
+  if (count > 0) std::memcpy(elements.data(), bytes.data(), count * sizeof(elements[0]));
+  bytes.remove_prefix(count * sizeof(elements[0]));
+  return true;
+}
+
+/// Begins of parts of something that has so many elements, and its end.
+bool are_begins(const std::vector<std::size_t>& firsts, std::size_t count) {
+  return !firsts.empty() && firsts.front() == 0 && firsts.back() == count &&
+         std::ranges::is_sorted(firsts);
+}
+
 CaptureIndex::Object object_of(const StoredInfo& info, const Frame& frame,
                                const Instance& instance) {
   const auto holds = [&](std::string_view name) { return info.holds.contains(name); };
@@ -69,13 +100,15 @@ CaptureIndex::Object object_of(const StoredInfo& info, const Frame& frame,
 NameSet CaptureIndex::wanted(const StoredInfo& info) {
   NameSet names;
   for (const std::string_view name :
-       {kHoldsInstances, kHoldsLabels, kHoldsTightBoxes, kHoldsPoses, kHoldsBounds, kHoldsBoxes3d,
-        kHoldsOcclusion, kHoldsTruncation, kHoldsCamera, kHoldsCameraPose,
-        std::string_view("visibility")}) {
+       {kHoldsLabels, kHoldsTightBoxes, kHoldsPoses, kHoldsBounds, kHoldsBoxes3d, kHoldsOcclusion,
+        kHoldsTruncation, kHoldsCamera, kHoldsCameraPose, std::string_view("visibility")}) {
     if (info.holds.contains(name)) names.emplace(name);
   }
-  // Boxes may follow from pixels alone.
-  if (!names.contains(kHoldsTightBoxes)) names.emplace(kInstanceId.name);
+  // Boxes may follow from pixels alone. Where they stand in tables, the list of objects is not
+  // asked for: formats that have it in pictures would decode one of each capture.
+  if (!names.contains(kHoldsTightBoxes)) {
+    for (const std::string_view name : {kInstanceId.name, kHoldsInstances}) names.emplace(name);
+  }
   return names;
 }
 
@@ -195,6 +228,87 @@ std::string CaptureIndex::brightness_json(std::size_t from, std::size_t most) co
   std::ranges::replace(text, '\'', '"');
   return text + ",\"from\":" + std::to_string(from) + ",\"captures\":" + std::to_string(to - from) +
          "}";
+}
+
+bool CaptureIndex::Names::has(const Column& numbers) const {
+  return std::ranges::all_of(numbers, [this](std::int32_t number) {
+    return number >= 0 && std::size_t(number) < list_.size();
+  });
+}
+
+template <class Self, class Act>
+void CaptureIndex::each_names(Self& self, Act&& act) {
+  for (auto* names : {&self.classes_, &self.phases_, &self.environments_, &self.splits_}) {
+    act(*names);
+  }
+}
+
+template <class Self, class Act>
+void CaptureIndex::each_column(Self& self, Act&& act) {
+  for (auto* column :
+       {&self.visit_, &self.phase_, &self.environment_, &self.split_, &self.findings_,
+        &self.camera_, &self.width_, &self.height_, &self.brightness_, &self.class_, &self.visible_,
+        &self.truncation_, &self.box_side_, &self.distance_, &self.elevation_, &self.azimuth_}) {
+    act(*column);
+  }
+  for (auto* firsts : {&self.first_picture_, &self.first_object_, &self.first_bright_}) {
+    act(*firsts);
+  }
+}
+
+std::string CaptureIndex::bytes() const {
+  const std::lock_guard lock(mutex_);
+  std::string bytes;
+  each_names(*this, [&](const Names& names) {
+    bytes += std::to_string(names.list().size()) + "\n";
+    for (const std::string& name : names.list()) put(bytes, name);
+  });
+  each_column(*this, [&](const auto& column) { put(bytes, column); });
+  return bytes;
+}
+
+bool CaptureIndex::take_bytes(std::string_view bytes, std::size_t captures) {
+  const std::lock_guard lock(mutex_);
+  bool is_whole = true;
+  each_names(*this, [&](Names& names) {
+    std::string count;
+    while (is_whole && !bytes.empty() && bytes.front() != '\n' && count.size() < 9) {
+      count += bytes.front();
+      bytes.remove_prefix(1);
+    }
+    is_whole = is_whole && bytes.starts_with('\n') && !count.empty() &&
+               count.find_first_not_of("0123456789") == count.npos;
+    if (!is_whole) return;
+    bytes.remove_prefix(1);
+    const int most = std::stoi(count);
+    std::string name;
+    for (int i = 0; i < most && is_whole; ++i) {
+      is_whole = take(bytes, name) && names.number(name) == i;
+    }
+  });
+  each_column(*this, [&](auto& column) { is_whole = is_whole && take(bytes, column); });
+  if (is_whole && bytes.empty() && fits_together(captures)) return true;
+  each_names(*this, [](Names& names) { names = {}; });
+  each_column(*this, [](auto& column) { column.clear(); });
+  for (auto* firsts : {&first_picture_, &first_object_, &first_bright_}) firsts->assign(1, 0);
+  return false;
+}
+
+bool CaptureIndex::fits_together(std::size_t captures) const {
+  const auto have = [](std::size_t count, std::initializer_list<const Column*> columns) {
+    return std::ranges::all_of(columns,
+                               [count](const Column* column) { return column->size() == count; });
+  };
+  return have(captures, {&visit_, &phase_, &environment_, &split_, &findings_}) &&
+         first_picture_.size() == captures + 1 && are_begins(first_picture_, camera_.size()) &&
+         have(camera_.size(), {&width_, &height_}) && first_object_.size() == camera_.size() + 1 &&
+         are_begins(first_object_, class_.size()) &&
+         have(class_.size(),
+              {&visible_, &truncation_, &box_side_, &distance_, &elevation_, &azimuth_}) &&
+         first_bright_.size() <= captures + 1 && are_begins(first_bright_, brightness_.size()) &&
+         std::ranges::equal(first_bright_, std::span(first_picture_).first(first_bright_.size())) &&
+         classes_.has(class_) && phases_.has(phase_) && environments_.has(environment_) &&
+         splits_.has(split_);
 }
 
 }  // namespace diorama

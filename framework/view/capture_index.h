@@ -6,6 +6,7 @@
 #include <map>
 #include <mutex>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "diorama/reader.h"
@@ -58,6 +59,12 @@ class CaptureIndex {
   /// The same of the pictures' brightness, which takes longer to find.
   std::string brightness_json(std::size_t from, std::size_t most) const;
 
+  /// All that it holds, for another object of the same build on this machine.
+  std::string bytes() const;
+  /// Becomes the index whose bytes() these are, of so many captures; false, and it stays empty,
+  /// when they are not. Must be empty.
+  bool take_bytes(std::string_view bytes, std::size_t captures);
+
  private:
   using Column = std::vector<std::int32_t>;
   /// Texts that occur, by number.
@@ -65,11 +72,18 @@ class CaptureIndex {
    public:
     std::int32_t number(const std::string& name);
     const std::vector<std::string>& list() const { return list_; }
+    bool has(const Column& numbers) const;
 
    private:
     std::map<std::string, std::int32_t> numbers_;
     std::vector<std::string> list_;
   };
+
+  template <class Self, class Act>
+  static void each_names(Self& self, Act&& act);
+  template <class Self, class Act>
+  static void each_column(Self& self, Act&& act);
+  bool fits_together(std::size_t captures) const;
 
   mutable std::mutex mutex_;
   Names classes_, phases_, environments_, splits_;

@@ -110,20 +110,29 @@ struct DatasetView::Opened {
   std::shared_ptr<const StoredDataset> whole;
   std::shared_ptr<const StoredDataset> shown;
   CaptureIndex index;
+  bool is_looked_up = false;               ///< Whether the index was looked for among kept ones.
+  std::optional<IndexCache::Key> key;      ///< When it was made; nothing: it is not kept.
+  std::optional<std::size_t> kept_bright;  ///< Captures with brightness in the index kept.
   std::atomic<bool> wants_stats{false};
   std::mutex mutex;
   std::shared_ptr<const std::string> stats;  ///< JSON; null until they were counted.
 };
 
 DatasetView::DatasetView(Options options, DatasetReaders& readers, Host& host)
-    : options_(std::move(options)), readers_(readers), host_(host), datasets_(open()) {
+    : options_(std::move(options)),
+      readers_(readers),
+      host_(host),
+      indexes_(options_.cache),
+      datasets_(open()) {
   if (const auto status = status_of_run(options_.folder)) {
     done_ = status->done;
     is_finished_ = status->is_finished;
   }
 }
 
-DatasetView::~DatasetView() = default;
+DatasetView::~DatasetView() {
+  for (const auto& opened : *datasets_) keep_index(*opened);
+}
 
 void DatasetView::open_below(const fs::path& folder, bool is_other, Datasets& all) const {
   const std::ptrdiff_t before = std::ssize(all);
@@ -173,7 +182,33 @@ std::vector<DatasetView::Shown> DatasetView::shown() const {
   return all;
 }
 
+/// What is still being written has no index that stays.
+bool DatasetView::look_up_index(Opened& opened) {
+  if (opened.is_looked_up) return false;
+  opened.is_looked_up = true;
+  if (!is_finished_ || opened.shown != opened.whole) return true;
+  const StoredInfo& info = opened.shown->info();
+  opened.key = indexes_.key_of(opened.folder, info);
+  if (opened.key && indexes_.find(*opened.key, info.captures.size(), opened.index)) {
+    opened.kept_bright = opened.index.brightness_size();
+  }
+  return true;
+}
+
+/// Nothing happens while it is not whole, and when nothing has come to it since.
+void DatasetView::keep_index(Opened& opened) const {
+  const StoredInfo& info = opened.shown->info();
+  const std::size_t bright = opened.index.brightness_size();
+  if (!opened.key || opened.index.size() < info.captures.size() || opened.kept_bright == bright) {
+    return;
+  }
+  opened.kept_bright = bright;
+  // What was changed meanwhile was read half old and half new.
+  if (indexes_.key_of(opened.folder, info) == opened.key) indexes_.keep(*opened.key, opened.index);
+}
+
 bool DatasetView::index_some(Opened& opened) {
+  if (look_up_index(opened)) return true;
   const StoredDataset& data = *opened.shown;
   const std::size_t first = opened.index.size();
   const std::size_t count = data.info().captures.size();
@@ -187,6 +222,7 @@ bool DatasetView::index_some(Opened& opened) {
                                     [&] { return data.read(first + i, wanted); }));
   });
   for (const CaptureIndex::Entry& entry : entries) opened.index.add(entry);
+  if (opened.index.size() == count) keep_index(opened);
   return true;
 }
 
@@ -209,6 +245,7 @@ bool DatasetView::brighten_some(Opened& opened) {
     }
   });
   for (const auto& pictures : found) opened.index.add_brightness(pictures);
+  if (opened.index.brightness_size() == count) keep_index(opened);
   return true;
 }
 
@@ -322,7 +359,7 @@ HttpAnswer DatasetView::state() const {
   return json_answer(json);
 }
 
-HttpAnswer DatasetView::run_answer() const {
+HttpAnswer DatasetView::run_answer() {
   OrderedJson json = OrderedJson::object();
   const OrderedJson page = parse_json_or_nothing<OrderedJson>(page_of_run(options_.folder));
   if (page.is_object()) {
@@ -341,8 +378,18 @@ HttpAnswer DatasetView::run_answer() const {
                                  {"role", worker.role},
                                  {"description", worker.description},
                                  {"is_alive", worker.is_alive},
+                                 {"memory_bytes", worker.memory_bytes},
                                  {"captures", worker.captures}});
     }
+    const std::lock_guard lock(records_mutex_);
+    if (!records_) records_.emplace(folder_of_run(options_.folder));
+    try {
+      records_->refresh(status->captures, page.is_object() && page.contains("views"));
+    } catch (const Error& error) {
+      // What was read until then is true all the same.
+      host_.log(LogLevel::Debug, error.what());
+    }
+    json.update(records_->json());
   }
   return json_answer(json);
 }

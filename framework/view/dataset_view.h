@@ -21,6 +21,8 @@
 #include "framework/view/byte_cache.h"
 #include "framework/view/capture_index.h"
 #include "framework/view/http_server.h"
+#include "framework/view/index_cache.h"
+#include "framework/view/run_records.h"
 
 namespace diorama {
 
@@ -51,6 +53,8 @@ class DatasetView {
     std::string reader = {};  ///< Type; empty: the one that knows the folder.
     /// Show no more captures than this, spread over the dataset; statistics are of all.
     std::optional<std::size_t> most_captures = {};
+    /// Of IndexCache; empty: none.
+    std::filesystem::path cache = {};
   };
 
   /// Throws Error(Usage) when there is no dataset. Readers and host must outlive the object.
@@ -79,6 +83,8 @@ class DatasetView {
   std::shared_ptr<const Datasets> open() const;
   void open_below(const std::filesystem::path& folder, bool is_other, Datasets& all) const;
   std::shared_ptr<const Datasets> datasets() const;
+  bool look_up_index(Opened& opened);
+  void keep_index(Opened& opened) const;
   bool index_some(Opened& opened);
   bool brighten_some(Opened& opened);
   bool make_stats(Opened& opened);
@@ -88,7 +94,7 @@ class DatasetView {
 
   using Words = std::span<const std::string_view>;
   HttpAnswer state() const;
-  HttpAnswer run_answer() const;
+  HttpAnswer run_answer();
   HttpAnswer lint_answer();
   HttpAnswer compare_answer(const Datasets& all, std::size_t first, Words words);
   HttpAnswer dataset_answer(Opened& opened, Words words);
@@ -97,6 +103,7 @@ class DatasetView {
   Options options_;
   DatasetReaders& readers_;
   Host& host_;
+  IndexCache indexes_;
   mutable std::mutex mutex_;
   std::shared_ptr<const Datasets> datasets_;
   int generation_ = 0;                 ///< Counts how often the datasets were opened.
@@ -106,6 +113,8 @@ class DatasetView {
   using Pair = std::pair<std::size_t, std::size_t>;
   std::map<Pair, std::shared_ptr<const std::string>> comparisons_;  ///< JSON; null: asked for.
   ByteCache<HttpAnswer> cache_{kCacheBytes};
+  std::mutex records_mutex_;
+  std::optional<RunRecords> records_;
   // Of the run that is followed.
   int done_ = 0;
   bool is_finished_ = true;

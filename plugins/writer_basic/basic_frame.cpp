@@ -456,7 +456,7 @@ Instance& BasicFrameReading::instance(const std::string& node_path) {
 }
 
 void BasicFrameReading::read_instances() {
-  if (!wants(kInstanceId.name) && !wants(kHoldsInstances)) return;
+  if (!wants_pixels_of_objects()) return;
   instances_ = read_segmentation("instance_segmentation.png", "instance_segmentation_mapping.json");
   if (!instances_) return;
   const std::string file = path("instance_segmentation_mapping.json");
@@ -524,7 +524,7 @@ void BasicFrameReading::read_leaves() {
 
 /// Each instance has one label set, and the semantic picture shows it wherever the instance is.
 void BasicFrameReading::check_semantics() {
-  if (!wants(kHoldsLabels)) return;
+  if (!wants(kHoldsLabels) || !wants_pixels_of_objects()) return;
   const auto semantics =
       read_segmentation("semantic_segmentation.png", "semantic_segmentation_labels.json");
   if (!semantics || !instances_) return;
@@ -620,7 +620,7 @@ void BasicFrameReading::take_row(const BoxRows& rows, std::size_t row, const std
 }
 
 void BasicFrameReading::read_boxes() {
-  if (!wants(kHoldsInstances) && !wants(kHoldsOcclusion)) return;
+  if (!wants(kHoldsInstances) && !wants(kHoldsTightBoxes) && !wants(kHoldsOcclusion)) return;
   read_3d();
   read_tight();
   read_loose();

@@ -39,6 +39,8 @@ class BasicFrameReading {
   };
 
   bool wants(std::string_view name) const { return wanted_.contains(name); }
+  /// Tables alone tell boxes and labels, of what has a box.
+  bool wants_pixels_of_objects() const { return wants(kInstanceId.name) || wants(kHoldsInstances); }
   std::string path(std::string_view kind) const { return names_.path(product_, number_, kind); }
   /// The first file that tells a size tells that of the frame; false for another one.
   bool note_size(int width, int height, const std::string& file);

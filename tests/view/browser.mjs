@@ -47,11 +47,13 @@ try {
   await page.waitForSelector('.card img');
   await page.waitForFunction(() => document.querySelector('.card img')?.naturalWidth > 0);
   console.log(`       first card after ${Math.round(performance.now() - began)} ms`);
+  const atOnce = await page.textContent('.total');
   await page.waitForFunction(() => document.querySelector('.status')?.hidden, null, { timeout: 120000 });
   console.log(`       all labels read after ${Math.round(performance.now() - began)} ms`);
   check(!page.url().includes('token'), 'the token leaves the address');
   const total = await page.textContent('.total b');
   check(Number(total.replaceAll(',', '')) > 0, `the grid counts captures (${total})`);
+  check(atOnce.startsWith(`${total} of`), `and has them all before labels are read (${atOnce})`);
   await page.waitForTimeout(800);
   await page.screenshot({ path: `${pictures}/grid.png` });
   for (const key of ['c', 'l']) await page.keyboard.press(key);

@@ -2,6 +2,8 @@
 // What the page asks for, over a dataset whose every text is hostile.
 #include "framework/view/dataset_view.h"
 
+#include <atomic>
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -13,6 +15,7 @@
 #include "diorama/error.h"
 #include "framework/lint/encoding_host.h"
 #include "framework/view/byte_cache.h"
+#include "framework/view/index_cache.h"
 #include "framework/view/report.h"
 #include "support/catch.h"
 #include "support/temporary_folder.h"
@@ -43,6 +46,7 @@ class HostileDataset final : public StoredDataset {
   const StoredInfo& info() const override { return info_; }
   const ReadLog& log() const override { return log_; }
   StoredCapture read(std::size_t i, const NameSet& wanted) const override {
+    ++reads;
     StoredCapture stored;
     stored.capture.index = info_.captures[i];
     stored.capture.phase = kHostile;
@@ -86,6 +90,8 @@ class HostileDataset final : public StoredDataset {
     return stored;
   }
 
+  static inline std::atomic<int> reads = 0;
+
  private:
   bool is_changed_;
   StoredInfo info_;
@@ -106,9 +112,19 @@ struct Viewed {
   explicit Viewed(std::optional<std::size_t> most = {}, bool compares = false) {
     folder.write("<img src=x>/mark.txt", "");
     folder.write("changed/mark.txt", "changed");
-    DatasetView::Options options{.folder = folder.path("<img src=x>"), .most_captures = most};
+    options = {.folder = folder.path("<img src=x>"), .most_captures = most};
     if (compares) options.other = folder.path("changed");
     view.emplace(options, readers, host);
+  }
+  /// Views the folder anew until all is done; how many captures were read for it.
+  int reads_with_cache(const std::filesystem::path& cache) {
+    view.reset();
+    options.cache = cache;
+    HostileDataset::reads = 0;
+    view.emplace(options, readers, host);
+    while (view->work()) {
+    }
+    return HostileDataset::reads;
   }
   HttpAnswer answer(const std::string& path) { return view->answer(path); }
   Json json(const std::string& path) {
@@ -131,8 +147,20 @@ struct Viewed {
   test::EncodingHost host;
   DatasetReaders readers{
       {{"hostile", {"mark.txt"}, [] { return std::make_unique<HostileReader>(); }}}};
+  DatasetView::Options options;
   std::optional<DatasetView> view;
 };
+
+std::vector<std::filesystem::path> files_in(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) files.push_back(entry);
+  return files;
+}
+
+std::string content_of(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return std::string(std::istreambuf_iterator<char>(stream), {});
+}
 
 }  // namespace
 
@@ -223,6 +251,119 @@ TEST_CASE("The index grows by work, statistics come when they were asked for", "
   CHECK(index["names"]["splits"] == Json({"val", "train"}));
   CHECK(index["names"]["classes"] == Json({kHostile}));
   CHECK(viewed.json("/api/0/stats")["pictures"] == 3);
+}
+
+TEST_CASE("An index is kept for as long as no file of its dataset changes", "[view]") {
+  Viewed viewed;
+  const std::filesystem::path cache = viewed.folder.path("cache/view");
+  // Labels of three captures, then the pixels of each.
+  CHECK(viewed.reads_with_cache({}) == 6);
+  CHECK(viewed.reads_with_cache(cache) == 6);
+  const Json index = viewed.json("/api/0/index/0");
+  const Json bright = viewed.json("/api/0/brightness/0");
+  CHECK(viewed.reads_with_cache(cache) == 0);
+  CHECK(viewed.json("/api/0/index/0") == index);
+  CHECK(viewed.json("/api/0/brightness/0") == bright);
+  REQUIRE(files_in(cache).size() == 1);
+  namespace fs = std::filesystem;
+  CHECK((fs::status(cache).permissions() & (fs::perms::group_all | fs::perms::others_all)) ==
+        fs::perms::none);
+
+  SECTION("a file that comes is a change") {
+    viewed.folder.write("<img src=x>/labels/a.txt", "a");
+    CHECK(viewed.reads_with_cache(cache) == 6);
+    CHECK(viewed.reads_with_cache(cache) == 0);
+    SECTION("and its time") {
+      const fs::path file = viewed.folder.path("<img src=x>/labels/a.txt");
+      fs::last_write_time(file, fs::last_write_time(file) + std::chrono::seconds(1));
+      CHECK(viewed.reads_with_cache(cache) == 6);
+    }
+    SECTION("and another file in its place") {
+      const fs::path file = viewed.folder.path("<img src=x>/labels/a.txt");
+      const fs::path other = viewed.folder.write("b.txt", "b");
+      fs::last_write_time(other, fs::last_write_time(file));
+      fs::rename(other, file);
+      CHECK(viewed.reads_with_cache(cache) == 6);
+    }
+    SECTION("and the page of its run") {
+      viewed.folder.write("dataset.json", "{}");
+      CHECK(viewed.reads_with_cache(cache) == 6);
+    }
+    CHECK(files_in(cache).size() == 1);
+  }
+  SECTION("what was damaged is made anew") {
+    const fs::path file = files_in(cache).front();
+    const std::string whole = content_of(file);
+    std::string flipped = whole;
+    flipped.back() = char(flipped.back() ^ 1);
+    for (const std::string& bad :
+         {std::string(), whole.substr(0, 20), whole.substr(0, whole.size() - 1), flipped,
+          std::string("x") + whole}) {
+      std::ofstream(file, std::ios::binary | std::ios::trunc) << bad;
+      INFO(bad.size());
+      CHECK(viewed.reads_with_cache(cache) == 6);
+      CHECK(viewed.json("/api/0/index/0") == index);
+    }
+    CHECK(viewed.reads_with_cache(cache) == 0);
+  }
+  SECTION("behind linked folders changes would not be seen") {
+    fs::create_directory(viewed.folder.path("elsewhere"));
+    fs::create_directory_symlink("../elsewhere", viewed.folder.path("<img src=x>/linked"));
+    CHECK(viewed.reads_with_cache(cache) == 6);
+    CHECK(viewed.reads_with_cache(cache) == 6);
+  }
+  SECTION("a cache that cannot be written is none") {
+    viewed.folder.write("file", "");
+    CHECK(viewed.reads_with_cache(viewed.folder.path("file/view")) == 6);
+  }
+  SECTION("the oldest files leave") {
+    CaptureIndex empty;
+    const IndexCache small(cache, empty.bytes().size() + 300);
+    small.keep({"b", "content"}, empty);
+    REQUIRE(files_in(cache).size() == 1);
+    CHECK(files_in(cache).front().filename() == "b.index");
+    CaptureIndex found;
+    CHECK(small.find({"b", "content"}, 0, found));
+    CHECK_FALSE(small.find({"b", "other"}, 0, found));
+  }
+}
+
+TEST_CASE("An index is taken from its own bytes alone", "[view]") {
+  CaptureIndex index;
+  CaptureIndex::Entry entry;
+  entry.phase = kHostile;
+  entry.pictures.resize(2);
+  entry.pictures[1].objects.resize(3);
+  entry.pictures[1].objects[2].name = kHostile;
+  for (int i = 0; i < 2; ++i) index.add(entry);
+  index.add_brightness({5, CaptureIndex::kUnknown});
+  const std::string bytes = index.bytes();
+  CaptureIndex same;
+  REQUIRE(same.take_bytes(bytes, 2));
+  CHECK(same.json(0, 9) == index.json(0, 9));
+  CHECK(same.brightness_json(0, 9) == index.brightness_json(0, 9));
+  same.add_brightness({1, 2});
+  CHECK(same.brightness_size() == 2);
+
+  const auto refuses = [](const std::string& other, std::size_t captures) {
+    CaptureIndex taken;
+    const bool is_refused = !taken.take_bytes(other, captures) && taken.size() == 0;
+    taken.add({});
+    return is_refused && taken.json(0, 1).starts_with("{\"from\":0");
+  };
+  CHECK(refuses(bytes, 1));
+  CHECK(refuses(bytes, 3));
+  CHECK(refuses(bytes + "x", 2));
+  for (std::size_t cut = 0; cut < bytes.size(); ++cut) {
+    if (!refuses(bytes.substr(0, cut), 2)) FAIL(cut);
+  }
+  // Any byte: numbers of names and of elements must fit; other numbers may be others.
+  for (std::size_t at = 0; at < bytes.size(); ++at) {
+    std::string changed = bytes;
+    changed[at] = char(~changed[at]);
+    CaptureIndex taken;
+    if (taken.take_bytes(changed, 2)) CHECK(taken.json(0, 9).starts_with("{\"from\":0"));
+  }
 }
 
 TEST_CASE("Two datasets are compared as a whole and capture by capture", "[view]") {

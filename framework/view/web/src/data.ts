@@ -91,7 +91,15 @@ export interface RunState {
   captures?: number;
   done?: number;
   is_finished?: boolean;
-  workers?: { name: string; role: string; description: string; is_alive: boolean; captures: number }[];
+  workers?: { name: string; role: string; description: string; is_alive: boolean; memory_bytes: number; captures: number }[];
+  views?: { views: number; draws: number; refused: { [condition: string]: number }; unmet: number };
+  settle?: {
+    visits: number;
+    at_rest: number;
+    falling_objects: number;
+    longest_rest_s: number | null;
+    verdicts: { kind: string; why: string; count: number; first: string }[];
+  };
 }
 
 /** What all captures of two datasets differ in, as lines, and which ones do. */

@@ -19,7 +19,7 @@ export class FacetBar {
     const { table, filtered } = app;
     this.element.append(el('div', { class: 'total', 'aria-live': 'polite' },
       el('b', {}, filtered.places.length.toLocaleString('en')),
-      ` of ${plural(table.captures, 'capture')}`,
+      ` of ${plural(app.info.captures.length, 'capture')}`,
       el('small', {}, plural(filtered.objects, 'object'))));
     if (app.state.facets.size > 0) {
       this.element.append(button('Clear all filters', 'Show everything', () => app.go({ facets: new Map() }), { class: 'wide' }));

@@ -68,7 +68,8 @@ function highOf(facet: Facet, table: CaptureTable): number {
   return isDistance ? Math.max(100, Math.ceil(most / 100) * 100) : Math.ceil((most + 1) / kVisitBins) * kVisitBins;
 }
 
-export function filter(table: CaptureTable, cameras: string[], facets: Map<string, string>): Filtered {
+/** `captures`: of the dataset. Those that the table has not yet fit as long as nothing is filtered by. */
+export function filter(table: CaptureTable, cameras: string[], facets: Map<string, string>, captures: number): Filtered {
   const counts = new Map<string, number[]>();
   const highs = new Map<string, number>();
   const tests = kFacets.map((facet, bit) => {
@@ -146,6 +147,9 @@ export function filter(table: CaptureTable, cameras: string[], facets: Map<strin
     if (!stays) continue;
     tally(captureTests, capture, captureBits);
     if (captureBits === 0) places.push(capture);
+  }
+  if (!tests.some((test) => test.isActive)) {
+    for (let capture = table.captures; capture < captures; ++capture) places.push(capture);
   }
   return { places: Int32Array.from(places), objects: fitting, counts, highs };
 }

@@ -10,7 +10,8 @@ const kHead = 26;
 
 interface Card {
   element: HTMLElement;
-  redraw: () => void;
+  pictures: number;
+  isDescribed: boolean;  ///< The labels of its capture were read when it was made.
 }
 
 export class Grid {
@@ -74,6 +75,9 @@ export class Grid {
       const place = places[i];
       wanted.add(place);
       let card = this.cards.get(place);
+      if (card && !card.isDescribed && place < this.app.table.captures) {
+        card = this.describe(place, card);
+      }
       if (!card) {
         card = this.make(place);
         this.cards.set(place, card);
@@ -92,21 +96,43 @@ export class Grid {
     }
   }
 
+  private picturesOf(place: number): number {
+    const { table, info } = this.app;
+    return place < table.captures ? table.of('pictures')[place] : Math.max(1, info.cameras.length);
+  }
+
+  /** What the index says of a card that was there before it; nothing when it shows other pictures. */
+  private describe(place: number, card: Card): Card | undefined {
+    if (card.pictures !== this.picturesOf(place)) {
+      card.element.remove();
+      return undefined;
+    }
+    card.element.querySelector('.head')!.replaceWith(this.head(place, card.element));
+    card.isDescribed = true;
+    return card;
+  }
+
+  private head(place: number, card: HTMLElement): HTMLElement {
+    const { table, info } = this.app;
+    const number = el('b', {}, `#${info.captures[place]}`);
+    if (place >= table.captures) return el('div', { class: 'head' }, number);
+    const phase = table.names.phases[table.of('phase')[place]] ?? '';
+    const split = table.names.splits[table.of('split')[place]] ?? '';
+    const words = [phase, split].filter((word) => word !== '').join(' · ');
+    card.title = table.names.environments[table.of('environment')[place]] ?? '';
+    return el('div', { class: 'head' }, number, el('span', {}, words),
+      table.of('findings')[place] > 0 && el('span', { class: 'bad', title: 'The reader found faults in its files' }, '⚠'));
+  }
+
   private make(place: number): Card {
     const { app } = this;
     const { table, state } = app;
     const capture = app.info.captures[place];
-    const phase = table.names.phases[table.of('phase')[place]] ?? '';
-    const environment = table.names.environments[table.of('environment')[place]] ?? '';
-    const split = table.names.splits[table.of('split')[place]] ?? '';
-    const words = [phase, split].filter((word) => word !== '').join(' · ');
-    const count = table.of('pictures')[place];
-    const element = el('div', { class: 'card', role: 'row', title: environment },
-      el('div', { class: 'head' }, el('b', {}, `#${capture}`), el('span', {}, words),
-        table.of('findings')[place] > 0 && el('span', { class: 'bad', title: 'The reader found faults in its files' }, '⚠')));
+    const count = this.picturesOf(place);
+    const element = el('div', { class: 'card', role: 'row' });
+    element.append(this.head(place, element));
     element.style.width = `${this.cardWidth}px`;
     element.style.height = `${this.cardHeight}px`;
-    const draws: (() => void)[] = [];
     const row = el('div', { class: 'pictures' });
     for (let frame = 0; frame < count; ++frame) {
       const link = on(el('a', { href: '#', class: 'picture', role: 'gridcell', tabindex: '-1',
@@ -129,16 +155,14 @@ export class Grid {
       }
       link.append(canvas);
       row.append(link);
-      draws.push(this.drawer(capture, frame, canvas, element));
+      this.draw(capture, frame, canvas, element);
     }
     element.append(row);
-    const redraw = () => draws.forEach((draw) => draw());
-    redraw();
-    return { element, redraw };
+    return { element, pictures: count, isDescribed: place < table.captures };
   }
 
   /** Overlays of one picture of a card. */
-  private drawer(capture: number, frame: number, canvas: HTMLCanvasElement, card: HTMLElement): () => void {
+  private draw(capture: number, frame: number, canvas: HTMLCanvasElement, card: HTMLElement): void {
     const { app } = this;
     const { state } = app;
     const pixels = new FramePixels(state.dataset, capture, frame);
@@ -157,7 +181,7 @@ export class Grid {
       context.globalAlpha = 1;
       drawLines(context, labels, { scale: canvas.width / labels.width, x: 0, y: 0 }, state, app.palette, 0.9 * ratio, 0);
     };
-    return () => requestAnimationFrame(() => void draw());
+    requestAnimationFrame(() => void draw());
   }
 
   private press(event: KeyboardEvent): void {

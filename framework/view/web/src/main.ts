@@ -69,7 +69,7 @@ class Site {
     const table = new CaptureTable();
     this.app = {
       state, site, info, table, holds: new Set(info.holds), palette: new Palette(info.classes),
-      filtered: filter(table, info.cameras, state.facets),
+      filtered: filter(table, info.cameras, state.facets, info.captures.length),
       go: (change, replaces) => this.go(change, replaces),
       labels: (capture, dataset = state.dataset) => this.labels(capture, dataset),
     };
@@ -133,7 +133,8 @@ class Site {
   }
 
   private refilter(): void {
-    this.app.filtered = filter(this.app.table, this.app.info.cameras, this.app.state.facets);
+    const { table, info, state } = this.app;
+    this.app.filtered = filter(table, info.cameras, state.facets, info.captures.length);
   }
 
   private go(change: Partial<State>, replaces = false): void {

@@ -247,6 +247,18 @@ export class FindingsPage {
   }
 }
 
+/** Kinds of verdicts of settle/, worst first. */
+const kVerdicts: [string, string][] = [['unsettled', 'shown all the same'], ['dropped', 'taken out'], ['respawned', 'placed anew'],
+  ['born_inside', 'placed inside something'], ['blocked_cameras', 'camera blocked']];
+
+function table(heads: string[], rows: string[][]): HTMLElement {
+  const body = el('tbody');
+  for (const [first, ...others] of rows) {
+    body.append(el('tr', {}, el('th', { scope: 'row' }, first), ...others.map((word) => el('td', {}, word))));
+  }
+  return el('table', {}, el('thead', {}, el('tr', {}, ...heads.map((word) => el('th', { scope: 'col' }, word)))), body);
+}
+
 export class RunPage {
   readonly element = el('main', { class: 'page' });
   private readonly run = new Awaited();
@@ -271,19 +283,42 @@ export class RunPage {
     if (run.captures !== undefined) add('captures', `${(run.done ?? 0).toLocaleString('en')} of ${run.captures.toLocaleString('en')}`);
     this.element.append(facts);
     if (run.captures !== undefined && !run.is_finished) this.showProgress(run);
+    this.showWorkers(run);
+    this.showViews(run);
+    this.showSettling(run);
     const capture = app.state.capture || app.info.captures[0] || 0;
     this.element.append(el('h2', {}, 'Make a capture again'),
       el('pre', {}, `diorama replay '${run.folder.replaceAll("'", "'\\''")}' --capture ${capture}`));
-    if (run.workers && run.workers.length > 0) {
-      const body = el('tbody');
-      for (const worker of run.workers) {
-        body.append(el('tr', {}, el('th', { scope: 'row' }, worker.name), el('td', {}, worker.role || 'ended'),
-          el('td', {}, worker.is_alive ? 'alive' : ''), el('td', {}, String(worker.captures)), el('td', {}, worker.description)));
-      }
-      this.element.append(el('h2', {}, 'Workers'), el('table', {}, el('thead', {}, el('tr', {},
-        ...['Name', 'Role', 'State', 'Captures', ''].map((word) => el('th', {}, word)))), body));
-    }
     if (run.job) this.element.append(el('h2', {}, 'Job'), el('pre', { class: 'job', tabindex: '0' }, run.job));
+  }
+
+  private showWorkers(run: RunState): void {
+    const rows = (run.workers ?? []).map((worker) => [worker.name, worker.role || 'ended', worker.is_alive ? 'alive' : '',
+      worker.captures.toLocaleString('en'), worker.memory_bytes > 0 ? `${(worker.memory_bytes / 2 ** 20).toFixed(0)} MiB` : '', worker.description]);
+    if (rows.length > 0) this.element.append(el('h2', {}, 'Workers'), table(['Name', 'Role', 'State', 'Captures', 'Memory', ''], rows));
+  }
+
+  /** Which conditions the views that were drawn did not hold. */
+  private showViews(run: RunState): void {
+    if (!run.views) return;
+    const { views, draws, refused, unmet } = run.views;
+    const rows = Object.entries(refused).sort((a, b) => b[1] - a[1])
+      .map(([condition, count]) => [condition, count.toLocaleString('en'), `${((100 * count) / Math.max(1, draws)).toFixed(1)} %`]);
+    this.element.append(el('h2', {}, 'Views'), el('p', { class: unmet > 0 ? 'bad' : '' },
+      `${plural(views, 'view')} of ${plural(draws, 'draw')}` + (unmet > 0 ? `; ${unmet.toLocaleString('en')} hold not all that was asked for` : '')));
+    if (rows.length > 0) this.element.append(table(['Refused for', 'Draws', 'Share'], rows));
+  }
+
+  private showSettling(run: RunState): void {
+    if (!run.settle) return;
+    const { visits, at_rest, falling_objects, longest_rest_s, verdicts } = run.settle;
+    this.element.append(el('h2', {}, 'How objects came to rest'), el('p', {},
+      `${plural(visits, 'visit')} with ${plural(falling_objects, 'falling object')}; at rest at the end of ${at_rest.toLocaleString('en')}` +
+      (longest_rest_s === null ? '' : `, after ${longest_rest_s.toFixed(1)} s at most`)));
+    const rows = kVerdicts.flatMap(([kind, title]) => verdicts.filter((verdict) => verdict.kind === kind)
+      .sort((a, b) => b.count - a.count)
+      .map((verdict) => [title, verdict.why, verdict.count.toLocaleString('en'), verdict.first]));
+    if (rows.length > 0) this.element.append(table(['What became of them', 'Why', 'Times', 'First'], rows));
   }
 
   private showProgress(run: RunState): void {

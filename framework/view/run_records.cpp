@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/view/run_records.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "diorama/error.h"
+#include "framework/config/json_text.h"
+#include "framework/output/file_system.h"
+#include "framework/output/journal.h"
+
+namespace diorama {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+/// The run's own records are those of no writer.
+constexpr const char* kOfTheRun = "";
+/// Larger files in the folder settle/ are not the run's.
+constexpr std::uint64_t kMostBytes = std::uint64_t(64) << 20;
+
+}  // namespace
+
+void RunRecords::refresh(int captures, bool has_views) {
+  if (has_views) read_views(captures);
+  read_settling();
+}
+
+void RunRecords::read_views(int captures) {
+  LocalFileSystem file_system;
+  Journals journals(file_system, folder_ / ".diorama" / "journal", captures);
+  journals.refresh();
+  journals.visit_entries([&](const std::string& worker, const EntryPlace& place) {
+    const bool is_new = place.is_published && place.entry >= 0 && place.entry < captures &&
+                        !counted_.contains(place.entry);
+    if (!is_new) return;
+    const auto content = journals.files_of(worker, place);
+    if (!content) return;
+    counted_.insert(place.entry);
+    for (const auto& [writer, line] : content->records) {
+      if (writer == kOfTheRun) views_.add(place.entry, outcomes_from_json(line));
+    }
+  });
+}
+
+void RunRecords::read_settling() {
+  LocalFileSystem file_system;
+  const fs::path folder = folder_ / "settle";
+  for (const std::string& name : file_system.list(folder)) {
+    if (!name.ends_with(".json") || visits_.contains(name)) continue;
+    const auto found = file_system.status(folder / name);
+    if (!found || found->kind != FileStatus::Kind::File || found->size > kMostBytes) continue;
+    const Json visit = parse_json_or_nothing<Json>(file_system.read(folder / name));
+    try {
+      add_visit(visit);
+      visits_.insert(name);
+    } catch (const Json::exception&) {
+      // Somebody else's file.
+    }
+  }
+}
+
+void RunRecords::add_visit(const Json& visit) {
+  const std::string at = "visit " + std::to_string(visit.at("visit").get<int>()) + ": ";
+  const int falling = visit.at("falling_objects").get<int>();
+  std::optional<double> rest_s;
+  if (!visit.at("rest_after_s").is_null()) rest_s = visit.at("rest_after_s").get<double>();
+  std::vector<std::pair<const char*, std::pair<std::string, std::string>>> found;
+  for (const char* kind : {"unsettled", "dropped", "respawned", "born_inside", "blocked_cameras"}) {
+    const char* const who = std::string_view(kind) == "blocked_cameras" ? "camera" : "object";
+    for (const Json& one : visit.at(kind)) {
+      found.push_back(
+          {kind, {one.at("why").get<std::string>(), one.at(who).get<std::string>()}});
+    }
+  }
+  falling_objects_ += falling;
+  if (rest_s) {
+    ++resting_visits_;
+    longest_rest_s_ = std::max(longest_rest_s_.value_or(0.0), *rest_s);
+  }
+  for (const auto& [kind, incident] : found) {
+    Verdict& verdict = verdicts_[kind][incident.first];
+    if (verdict.count++ == 0) verdict.first = at + incident.second;
+  }
+}
+
+Json RunRecords::json() const {
+  Json json = Json::object();
+  if (views_.views > 0) {
+    json["views"] = {{"views", views_.views},
+                     {"draws", views_.draws},
+                     {"refused", views_.refused},
+                     {"unmet", views_.unmet.size()}};
+  }
+  if (visits_.empty()) return json;
+  Json& settle = json["settle"];
+  settle = {{"visits", visits_.size()},
+            {"at_rest", resting_visits_},
+            {"falling_objects", falling_objects_},
+            {"longest_rest_s", nullptr},
+            {"verdicts", Json::array()}};
+  if (longest_rest_s_) settle["longest_rest_s"] = *longest_rest_s_;
+  for (const auto& [kind, reasons] : verdicts_) {
+    for (const auto& [why, verdict] : reasons) {
+      settle["verdicts"].push_back(
+          {{"kind", kind}, {"why", why}, {"count", verdict.count}, {"first", verdict.first}});
+    }
+  }
+  return json;
+}
+
+}  // namespace diorama
