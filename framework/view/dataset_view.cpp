@@ -83,12 +83,11 @@ class PartOfDataset final : public StoredDataset {
   std::vector<std::size_t> places_;
 };
 
-/// The folder of the run's dataset.json: this one or the one above.
+/// This one or the one above; formats may have a page dataset.json of their own.
 fs::path folder_of_run(const fs::path& folder) {
   fs::path plain = fs::absolute(folder).lexically_normal();
   if (!plain.has_filename()) plain = plain.parent_path();
-  std::error_code ignored;
-  return fs::is_regular_file(plain / "dataset.json", ignored) ? plain : plain.parent_path();
+  return run_of(plain).value_or(plain);
 }
 
 std::optional<DatasetStatus> status_of_run(const fs::path& folder) {

@@ -24,6 +24,18 @@ constexpr const char* kOfTheRun = "";
 /// Larger files in the folder settle/ are not the run's.
 constexpr std::uint64_t kMostBytes = std::uint64_t(64) << 20;
 
+/// "moves at 0.65 m/s" and the same at another speed are one reason.
+std::string without_numbers(std::string_view why) {
+  std::string text;
+  for (std::size_t i = 0; i < why.size();) {
+    const std::size_t end = std::min(why.find_first_not_of("0123456789.", i), why.size());
+    const bool is_number = end > i && why.find_first_of("0123456789", i) < end;
+    text += is_number ? "…" : std::string(why.substr(i, std::max(end, i + 1) - i));
+    i = std::max(end, i + 1);
+  }
+  return text;
+}
+
 }  // namespace
 
 void RunRecords::refresh(int captures, bool has_views) {
@@ -74,8 +86,7 @@ void RunRecords::add_visit(const Json& visit) {
   for (const char* kind : {"unsettled", "dropped", "respawned", "born_inside", "blocked_cameras"}) {
     const char* const who = std::string_view(kind) == "blocked_cameras" ? "camera" : "object";
     for (const Json& one : visit.at(kind)) {
-      found.push_back(
-          {kind, {one.at("why").get<std::string>(), one.at(who).get<std::string>()}});
+      found.push_back({kind, {one.at("why").get<std::string>(), one.at(who).get<std::string>()}});
     }
   }
   falling_objects_ += falling;
@@ -84,8 +95,9 @@ void RunRecords::add_visit(const Json& visit) {
     longest_rest_s_ = std::max(longest_rest_s_.value_or(0.0), *rest_s);
   }
   for (const auto& [kind, incident] : found) {
-    Verdict& verdict = verdicts_[kind][incident.first];
-    if (verdict.count++ == 0) verdict.first = at + incident.second;
+    const auto& [why, who] = incident;
+    Verdict& verdict = verdicts_[kind][without_numbers(why)];
+    if (verdict.count++ == 0) verdict.first = at + who + " " + why;
   }
 }
 

@@ -62,7 +62,7 @@ TEST_CASE("Verdicts of settling are counted by reason, other files passed over",
   report.visit = 4;
   report.falling_objects = 7;
   report.rest_after_s = 1.5;
-  report.respawned = {{"/Assets/a", "left the room"}, {"/Assets/b", "left the room"}};
+  report.respawned = {{"/Assets/a", "moves at 0.65 m/s."}, {"/Assets/b", "moves at 12 m/s."}};
   report.cameras = {{"/Cameras/c", "is inside of something"}};
   folder.write("settle/4_room.json", settle_json(report));
   for (const char* text : {"", "{", "[]", "{\"visit\":1}", "{\"visit\":\"x\"}"}) {
@@ -74,10 +74,10 @@ TEST_CASE("Verdicts of settling are counted by reason, other files passed over",
     CHECK(settle["at_rest"] == 1);
     CHECK(settle["longest_rest_s"] == 1.5);
     REQUIRE(settle["verdicts"].size() == 2);
-    CHECK(settle["verdicts"][0]["first"] == "visit 4: /Cameras/c");
+    CHECK(settle["verdicts"][0]["first"] == "visit 4: /Cameras/c is inside of something");
     CHECK(settle["verdicts"][1] ==
-          Json::parse(R"({"kind":"respawned","why":"left the room","count":2,)"
-                      R"("first":"visit 4: /Assets/a"})"));
+          Json::parse(R"({"kind":"respawned","why":"moves at … m/s.","count":2,)"
+                      R"("first":"visit 4: /Assets/a moves at 0.65 m/s."})"));
     report.visit = 5;
     report.rest_after_s.reset();
     folder.write("settle/5_room.json", settle_json(report));
