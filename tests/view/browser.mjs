@@ -57,7 +57,8 @@ try {
   await page.waitForTimeout(800);
   await page.screenshot({ path: `${pictures}/grid.png` });
   for (const key of ['c', 'l']) await page.keyboard.press(key);
-  check(page.url().includes('layers='), 'overlays stand in the address');
+  // The page itself knows its address at once; what watches it may hear later.
+  check((await page.evaluate(() => location.hash)).includes('layers='), 'overlays stand in the address');
   await page.waitForTimeout(800);
   await page.screenshot({ path: `${pictures}/grid_overlays.png` });
 

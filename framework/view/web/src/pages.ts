@@ -256,7 +256,7 @@ function table(heads: string[], rows: string[][]): HTMLElement {
   for (const [first, ...others] of rows) {
     body.append(el('tr', {}, el('th', { scope: 'row' }, first), ...others.map((word) => el('td', {}, word))));
   }
-  return el('table', { class: 'words' }, el('thead', {}, el('tr', {}, ...heads.map((word) => el('th', { scope: 'col' }, word)))), body);
+  return el('table', { class: 'texts' }, el('thead', {}, el('tr', {}, ...heads.map((word) => el('th', { scope: 'col' }, word)))), body);
 }
 
 export class RunPage {
