@@ -53,7 +53,7 @@ export class Grid {
       this.empty.append(isReading ? 'Reading labels …' : 'No capture fits these filters. ');
       if (!isReading) this.empty.append(button('Clear all filters', '', () => app.go({ facets: new Map() })));
     }
-    const key = JSON.stringify([state.dataset, app.site.generation, [...state.layers].sort(), state.colour, state.opacity,
+    const key = JSON.stringify([state.dataset, app.site.generation, table.captures > 0, [...state.layers].sort(), state.colour, state.opacity,
       state.card, this.columns, this.cardWidth, this.cardHeight]);
     if (key !== this.key) {
       this.key = key;
@@ -167,7 +167,8 @@ export class Grid {
     const { state } = app;
     const pixels = new FramePixels(state.dataset, capture, frame);
     const draw = async (): Promise<void> => {
-      if (state.layers.size === 0) return;
+      // Classes get their colours in the order of the index, so that they are the same every time.
+      if (state.layers.size === 0 || app.table.captures === 0) return;
       const labels = (await app.labels(capture).catch(() => null))?.frames[frame];
       if (!labels || !card.isConnected) return;
       const ratio = Math.min(2, window.devicePixelRatio || 1);
