@@ -77,6 +77,27 @@ struct Example {
   std::int64_t count = 0;
 };
 
+Affine camera_from_object(const Frame& frame, const Instance& object) {
+  return frame.world_from_camera.inverse() * object.world_from_node;
+}
+
+bool has_box_3d(const Frame& frame, const Instance& object) {
+  const Affine pose = camera_from_object(frame, object);
+  return !object.bounds_node.is_empty() && pose.matrix().allFinite() &&
+         std::abs(pose.linear().determinant()) > 0.0;
+}
+
+/// How far, in metres, the least box along the axes of `box` that holds the other's corners is from
+/// `box`: 0 for equal boxes, and for an upright box around a tilted one.
+double misfit(const Affine& camera_from_box, const Aabb& box, const Affine& camera_from_other,
+              const Aabb& other) {
+  const Affine box_from_other = camera_from_box.inverse() * camera_from_other;
+  Aabb extent;
+  for (int i = 0; i < 8; ++i) extent.add(box_from_other * other.corner(i));
+  const Vec3 off = (extent.min - box.min).cwiseAbs().cwiseMax((extent.max - box.max).cwiseAbs());
+  return off.cwiseProduct(camera_from_box.linear().colwise().norm().transpose()).maxCoeff();
+}
+
 /// Compares a dataset with the one that holds most.
 class RunComparison {
  public:
@@ -114,6 +135,12 @@ class RunComparison {
         double(unmatched_) > kRare * double(std::max<std::int64_t>(objects_, 1));
     if (!is_other_choice) {
       for (Finding& finding : unmatched_examples_) log.findings.push_back(std::move(finding));
+    }
+    for (auto& [labels, boxes] : boxes_of_labels_) {
+      ++log.checks;
+      const double rare = std::max(1.0, kRare * double(boxes.count));
+      if (boxes.count < 2 || double(boxes.wrong_count) > rare) continue;
+      for (Finding& finding : boxes.wrong) log.findings.push_back(std::move(finding));
     }
     for (auto& [labels, classes] : classes_of_labels_) {
       std::int64_t all = 0;
@@ -226,7 +253,9 @@ class RunComparison {
         continue;
       }
       // Of several in one place, none says which is meant.
-      if (partners.size() == 1) remember_class(*partners.front(), object, b, k, in_reference);
+      if (partners.size() != 1) continue;
+      remember_class(*partners.front(), object, b, k, in_reference);
+      remember_box(one, *partners.front(), b, k, object, in_reference);
     }
     if (knows_sights()) remember_choice(one, b, k, in_reference, slack);
   }
@@ -308,6 +337,33 @@ class RunComparison {
                             text_of(partner.labels) + ", by " + in_reference);
   }
 
+  /// Formats have boxes along an object's own axes or upright ones. What is wrong with all objects
+  /// of a kind is a format's way of measuring it.
+  void remember_box(const Frame& one, const Instance& partner, const StoredCapture& b,
+                    std::size_t k, const Instance& object, const std::string& in_reference) {
+    if (!a_.holds.contains(kHoldsBoxes3d) || !b_.holds.contains(kHoldsBoxes3d)) return;
+    const Frame& other = b.capture.frames[k];
+    if (!has_box_3d(one, partner) || !has_box_3d(other, object)) return;
+    const Affine first = camera_from_object(one, partner);
+    const Affine second = camera_from_object(other, object);
+    const double off = std::min(misfit(first, partner.bounds_node, second, object.bounds_node),
+                                misfit(second, object.bounds_node, first, partner.bounds_node));
+    const auto step = [](const StoredInfo& info) {
+      return std::max(step_of(info, kHoldsPoses), step_of(info, kHoldsBoxes3d));
+    };
+    const double size = (first.linear() * partner.bounds_node.size()).norm();
+    const double slack =
+        2.0 * (step(a_) + step(b_)) + 1e-3 * (size + 0.1 * first.translation().norm());
+    Boxes& boxes = boxes_of_labels_[text_of(partner.labels)];
+    ++boxes.count;
+    if (off <= slack) return;
+    ++boxes.wrong_count;
+    if (boxes.wrong.size() >= kMostExamples) return;
+    boxes.wrong.push_back(about(b, k, kHoldsBoxes3d, object.node_path,
+                                "its 3-D box is off by " + std::to_string(off) + " m",
+                                "the place, size and turn that it has in " + in_reference));
+  }
+
   const RunDataset& reference_;
   const RunDataset& other_;
   const StoredInfo& a_;
@@ -322,6 +378,12 @@ class RunComparison {
     std::vector<std::pair<Sight, Finding>> missing;
   };
   std::map<std::string, Choice> choices_;  ///< By labels in the reference.
+  struct Boxes {
+    std::int64_t count = 0;
+    std::int64_t wrong_count = 0;
+    std::vector<Finding> wrong;
+  };
+  std::map<std::string, Boxes> boxes_of_labels_;  ///< By labels in the reference.
   /// Labels in the reference, then classes in the other dataset.
   std::map<std::string, std::map<std::string, Example>> classes_of_labels_;
 };

@@ -580,3 +580,43 @@ TEST_CASE("lint finds what one writer's folder says against another's of the run
   // A drawing's block is lost in the noise of a JPEG file; a writer may leave objects out.
   CHECK(found >= all - 2);
 }
+
+TEST_CASE("3-D boxes are held against those of another writer of the run", "[lint]") {
+  const DatasetOnDisk run = run_on_disk({"basic", "kitti"});
+  REQUIRE_FALSE(is_found(run));
+  const std::string file = "kitti/training/label_2/000004.txt";
+  const std::vector<std::string> lines = pieces(run.read(file), '\n');
+  using Words = std::vector<std::string>;
+  const auto add = [](std::string& word, double more) {
+    word = std::to_string(std::stod(word) + more);
+  };
+  const std::vector<std::pair<std::string, std::function<void(Words&)>>> faults = {
+      {"alpha", [&](Words& words) { add(words[3], 0.05); }},
+      {"occlusion", [](Words& words) { words[2] = "7"; }},
+      {"class", [](Words& words) { words[0] = "unheard_of"; }},
+      {"both angles",
+       [&](Words& words) {
+         add(words[3], 0.1);
+         add(words[14], 0.1);
+       }},
+      {"width and length", [](Words& words) { std::swap(words[9], words[10]); }},
+      {"three centimetres in depth", [&](Words& words) { add(words[13], 0.03); }},
+      {"a box that begins too low", [&](Words& words) { add(words[5], 1.0); }},
+      {"height", [&](Words& words) { add(words[8], 1.0); }},
+      {"width", [&](Words& words) { add(words[9], 1.0); }},
+      {"length", [&](Words& words) { add(words[10], 1.0); }}};
+  const auto line = std::ranges::find_if(lines, [](const std::string& each) {
+    const Words words = pieces(each, ' ');
+    return std::abs(std::stod(words[9]) - std::stod(words[10])) > 0.02;
+  });
+  REQUIRE(line != lines.end());
+  for (const auto& [what, spoil] : faults) {
+    Words words = pieces(*line, ' ');
+    spoil(words);
+    auto changed = lines;
+    changed[std::size_t(line - lines.begin())] = put_together(words, ' ', false);
+    run.write(file, put_together(changed, '\n', true));
+    INFO(*line << ": " << what);
+    CHECK(is_found(run));
+  }
+}
