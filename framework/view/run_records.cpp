@@ -17,7 +17,7 @@ namespace diorama {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 
 /// The run's own records are those of no writer.
 constexpr const char* kOfTheRun = "";
@@ -67,17 +67,17 @@ void RunRecords::read_settling() {
     if (!name.ends_with(".json") || visits_.contains(name)) continue;
     const auto found = file_system.status(folder / name);
     if (!found || found->kind != FileStatus::Kind::File || found->size > kMostBytes) continue;
-    const Json visit = parse_json_or_nothing<Json>(file_system.read(folder / name));
+    const OrderedJson visit = parse_json_or_nothing<OrderedJson>(file_system.read(folder / name));
     try {
       add_visit(visit);
       visits_.insert(name);
-    } catch (const Json::exception&) {
+    } catch (const OrderedJson::exception&) {
       // Somebody else's file.
     }
   }
 }
 
-void RunRecords::add_visit(const Json& visit) {
+void RunRecords::add_visit(const OrderedJson& visit) {
   const std::string at = "visit " + std::to_string(visit.at("visit").get<int>()) + ": ";
   const int falling = visit.at("falling_objects").get<int>();
   std::optional<double> rest_s;
@@ -85,7 +85,7 @@ void RunRecords::add_visit(const Json& visit) {
   std::vector<std::pair<const char*, std::pair<std::string, std::string>>> found;
   for (const char* kind : {"unsettled", "dropped", "respawned", "born_inside", "blocked_cameras"}) {
     const char* const who = std::string_view(kind) == "blocked_cameras" ? "camera" : "object";
-    for (const Json& one : visit.at(kind)) {
+    for (const OrderedJson& one : visit.at(kind)) {
       found.push_back({kind, {one.at("why").get<std::string>(), one.at(who).get<std::string>()}});
     }
   }
@@ -101,8 +101,8 @@ void RunRecords::add_visit(const Json& visit) {
   }
 }
 
-Json RunRecords::json() const {
-  Json json = Json::object();
+OrderedJson RunRecords::json() const {
+  OrderedJson json = OrderedJson::object();
   if (views_.views > 0) {
     json["views"] = {{"views", views_.views},
                      {"draws", views_.draws},
@@ -110,12 +110,12 @@ Json RunRecords::json() const {
                      {"unmet", views_.unmet.size()}};
   }
   if (visits_.empty()) return json;
-  Json& settle = json["settle"];
+  OrderedJson& settle = json["settle"];
   settle = {{"visits", visits_.size()},
             {"at_rest", resting_visits_},
             {"falling_objects", falling_objects_},
             {"longest_rest_s", nullptr},
-            {"verdicts", Json::array()}};
+            {"verdicts", OrderedJson::array()}};
   if (longest_rest_s_) settle["longest_rest_s"] = *longest_rest_s_;
   for (const auto& [kind, reasons] : verdicts_) {
     for (const auto& [why, verdict] : reasons) {
