@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "framework/host/regular_file.h"
+#include "framework/jobs/assemble.h"
 #include "framework/output/journal.h"
 
 namespace diorama {
@@ -23,7 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Changes whenever CaptureIndex::bytes() or what is counted does.
-constexpr std::string_view kHead = "diorama index 1, version " DIORAMA_VERSION "\n";
+std::string index_head() { return "diorama index 1, version " + program_version() + "\n"; }
 
 void add_text(std::string_view text, Digest& digest) {
   const std::uint64_t length = text.size();
@@ -93,7 +94,7 @@ bool IndexCache::find(const Key& key, std::size_t captures, CaptureIndex& index)
   if (error || size > most_bytes_) return false;
   std::string text(std::size_t(size), '\0');
   open_regular_file(file).read(text.data(), std::streamsize(size));
-  const std::string head = std::string(kHead) + key.content + "\n";
+  const std::string head = index_head() + key.content + "\n";
   if (!text.starts_with(head)) return false;
   std::string_view rest = std::string_view(text).substr(head.size());
   const std::size_t cut = rest.find('\n');
@@ -113,7 +114,7 @@ void IndexCache::keep(const Key& key, const CaptureIndex& index) const {
   const fs::path draft = folder_ / (key.place + "." + std::to_string(::getpid()) + ".draft");
   {
     std::ofstream out(draft, std::ios::binary);
-    out << kHead << key.content << '\n' << digest_of(bytes) << '\n' << bytes;
+    out << index_head() << key.content << '\n' << digest_of(bytes) << '\n' << bytes;
     out.close();
     if (!out) {
       fs::remove(draft, error);
