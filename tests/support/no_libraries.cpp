@@ -4,8 +4,8 @@
 
 namespace diorama {
 
-// For fuzzers and tests of renderers, which have the codecs of the project alone: headers are
-// looked at, OpenCV is not asked.
+// For fuzzers, which have the codecs of the project alone: headers are looked at, OpenCV is not
+// asked.
 void* on_demand_function(const std::string& name, const char*) {
   throw Error(ErrorKind::Plugin, name + ".so: is no part of this program");
 }
