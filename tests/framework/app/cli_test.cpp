@@ -157,7 +157,7 @@ TEST_CASE("a component is described with types, defaults, ranges and units", "[c
   CHECK(size.find("unit")->scalar == "m");
   const auto unknown = run_program("plugins describe shape");
   CHECK(unknown.code == 4);
-  CHECK(has(unknown.err, "no component is called 'shape', did you mean 'shapes'?"));
+  CHECK(has(unknown.err, "no component is called 'shape'; did you mean 'shapes'?"));
 }
 
 TEST_CASE("a job that names a broken component ends with code 4", "[cli]") {
