@@ -51,7 +51,8 @@ fs::path base_of(const fs::path& folder, const std::string& records) {
 /// Resident memory of the process that holds a lease. Its number alone may be that of another one,
 /// in a container or on another machine: the lease must be among the files that it has open.
 std::uint64_t memory_of_holder(FileSystem& file_system, const fs::path& lease) {
-  const OrderedJson content = parse_json_or_nothing<OrderedJson>(file_system.read_part(lease, 0, 4096));
+  const OrderedJson content =
+      parse_json_or_nothing<OrderedJson>(file_system.read_part(lease, 0, 4096));
   if (!content.is_object() || !content.contains("process") ||
       !content["process"].is_number_integer()) {
     return 0;
