@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <sstream>
 
 #include <cstdlib>
 #include <string>
@@ -32,14 +33,9 @@ void expect_error(const std::string& job, int exit_code, const std::string& mess
   INFO(outcome.errors);
   CHECK(outcome.exit_code == exit_code);
   CHECK_THAT(outcome.errors, ContainsSubstring(message));
-  const std::size_t errors = [&] {
-    std::size_t count = 0;
-    for (std::size_t at = outcome.errors.find("error: "); at != std::string::npos;
-         at = outcome.errors.find("error: ", at + 1)) {
-      ++count;
-    }
-    return count;
-  }();
+  std::size_t errors = 0;
+  std::istringstream lines(outcome.errors);
+  for (std::string line; std::getline(lines, line);) errors += line.starts_with("error: ") ? 1 : 0;
   CHECK(errors == 1);
   const auto left = tree(folder.path());
   CHECK(left.size() == 1);
