@@ -117,7 +117,7 @@ bool has(const std::vector<Finding>& findings, const char* check) {
 }  // namespace
 
 TEST_CASE("OpenCV and the formulas of lint and of the SDK see points at the same pixels",
-          "[lint]") {
+          "[lint][opinion]") {
   const LensModel model =
       GENERATE(LensModel::Pinhole, LensModel::OpencvPinhole, LensModel::FisheyePolynomial);
   const Camera camera = camera_with(model);
@@ -138,7 +138,7 @@ TEST_CASE("OpenCV and the formulas of lint and of the SDK see points at the same
   CHECK_FALSE(lint::opencv_geometry().project(lens, std::array{Vec3(0.1, 0.2, -1.0)})[0]);
 }
 
-TEST_CASE("a pose is found from points and their pixels", "[lint]") {
+TEST_CASE("a pose is found from points and their pixels", "[lint][opinion]") {
   const LensModel model =
       GENERATE(LensModel::Pinhole, LensModel::OpencvPinhole, LensModel::FisheyePolynomial);
   const lint::Lens lens = lint::lens_of(camera_with(model));
@@ -160,7 +160,7 @@ TEST_CASE("a pose is found from points and their pixels", "[lint]") {
                                                  std::span(pixels).first(5)));
 }
 
-TEST_CASE("lenses that OpenCV's model cannot follow get no opinion", "[lint]") {
+TEST_CASE("lenses that OpenCV's model cannot follow get no opinion", "[lint][opinion]") {
   lint::Lens lens = lint::lens_of(camera_with(LensModel::FisheyePolynomial));
   lens.polynomial = {0.1, 0.004, 0.0, 0.0, 0.0, 0.0};
   CHECK_FALSE(lint::opencv_geometry().project(lens, std::array{Vec3(0.0, 0.1, 1.0)})[0]);
@@ -170,7 +170,7 @@ TEST_CASE("lenses that OpenCV's model cannot follow get no opinion", "[lint]") {
   CHECK_FALSE(lint::opencv_geometry().project(lens, std::array{Vec3(0.0, 0.1, 1.0)})[0]);
 }
 
-TEST_CASE("right poses have no second opinion against them, through any lens", "[lint]") {
+TEST_CASE("right poses have no second opinion against them, through any lens", "[lint][opinion]") {
   const LensModel lens =
       GENERATE(LensModel::Pinhole, LensModel::OpencvPinhole, LensModel::FisheyePolynomial);
   for (const Finding& finding : found_in(lens, [](Frame&) {})) {
@@ -178,7 +178,8 @@ TEST_CASE("right poses have no second opinion against them, through any lens", "
   }
 }
 
-TEST_CASE("wrong poses that other checks pass are found by OpenCV's projection", "[lint]") {
+TEST_CASE("wrong poses that other checks pass are found by OpenCV's projection",
+          "[lint][opinion]") {
   const LensModel lens =
       GENERATE(LensModel::Pinhole, LensModel::OpencvPinhole, LensModel::FisheyePolynomial);
   CAPTURE(int(lens));
@@ -213,7 +214,8 @@ TEST_CASE("wrong poses that other checks pass are found by OpenCV's projection",
   }
 }
 
-TEST_CASE("poses are checked in files that hold positions and object coordinates", "[lint]") {
+TEST_CASE("poses are checked in files that hold positions and object coordinates",
+          "[lint][opinion]") {
   WebDatasetWriter::Params web;
   web.channels.names = {std::string(kPosition.name), std::string(kObjectCoordinates.name)};
   web.depth = web.instances = true;
@@ -237,7 +239,7 @@ TEST_CASE("poses are checked in files that hold positions and object coordinates
   }
 }
 
-TEST_CASE("3-D boxes that are too large are found in files that hold them", "[lint]") {
+TEST_CASE("3-D boxes that are too large are found in files that hold them", "[lint][opinion]") {
   // Along its y axis the crate's box grows within the slack, or out of the picture.
   for (const int axis : {0, 2}) {
     CAPTURE(axis);
