@@ -168,11 +168,12 @@ void add_run(CLI::App& app, CommandLine& line) {
   CLI::App* command = app.add_subcommand("run", "Make the dataset that a job describes");
   add_job_options(*command, line.run.job);
   command
-      ->add_option("--queue-mib", line.run.queue_mib,
-                   "Memory for captures that wait to be written; a full queue holds up rendering")
+      ->add_option(
+          "--queue-mib", line.run.queue_mib,
+          "Memory for captures that wait to be written; a full queue holds up rendering. By "
+          "default as much as threads and memory suggest, at least 256")
       ->check(CLI::Range(1, 1 << 20))
-      ->type_name("N")
-      ->capture_default_str();
+      ->type_name("N");
   command
       ->add_option(
           "--visits-in-flight", line.run.visits_in_flight,

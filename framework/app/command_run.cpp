@@ -16,6 +16,7 @@
 #include "framework/config/clean_text.h"
 #include "framework/config/job_overrides.h"
 #include "framework/config/yaml_config.h"
+#include "framework/host/machine_limits.h"
 #include "framework/host/progress_bar.h"
 #include "framework/host/progress_lines.h"
 #include "framework/jobs/assemble.h"
@@ -99,7 +100,10 @@ RunSummary run_job(JobAssembly& assembly, HostServices& host, const RunCommandOp
   run.shard = options.shard;
   run.shards = options.shards;
   run.takes_visits = options.takes_visits;
-  run.queue_bytes = std::size_t(options.queue_mib) << 20;
+  run.queue_bytes =
+      options.queue_mib > 0
+          ? std::size_t(options.queue_mib) << 20
+          : default_queue_bytes(host.thread_count(), available_memory(), memory_of(assembly));
   run.stop = &stop_requested;
   run.only_finishes = options.only_finishes;
   run.only = options.only;

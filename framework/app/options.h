@@ -21,7 +21,7 @@ struct RunCommandOptions {
   int stopped_exit_code = 130;
   enum class Progress : std::uint8_t { Bar, Json, OpenJd };
   Progress progress = Progress::Bar;
-  int queue_mib = 256;
+  int queue_mib = 0;         ///< 0: as threads and memory suggest.
   int visits_in_flight = 0;  ///< 0: see default_visits_in_flight().
   bool overwrite = false;
   bool only_finishes = false;  ///< See RunOptions.

@@ -59,6 +59,14 @@ int default_visits_in_flight(int threads, std::uint64_t available_bytes,
   return int(std::clamp<std::uint64_t>(available_bytes / 2 / each, 1, std::uint64_t(wanted)));
 }
 
+std::size_t default_queue_bytes(int threads, std::uint64_t available_bytes,
+                                const CaptureMemory& memory) {
+  constexpr std::uint64_t kLeast = std::uint64_t(256) << 20;
+  // Turns that are not let through yet share half of the queue (see WriterQueue).
+  const std::uint64_t wanted = 4 * std::uint64_t(threads) * memory.capture;
+  return std::size_t(std::max(kLeast, std::min(wanted, available_bytes / 4)));
+}
+
 std::string memory_text(const CaptureMemory& memory) {
   return "memory beside the scene: " + mib_text(memory.capture) + " for each capture, " +
          mib_text(memory.picture) + " more while a picture is rendered\n";

@@ -26,6 +26,11 @@ CaptureMemory capture_memory(const std::vector<Camera>& cameras, const NameSet& 
 int default_visits_in_flight(int threads, std::uint64_t available_bytes,
                              const CaptureMemory& memory);
 
+/// Memory for captures that wait to be written: enough for every thread to encode one while another
+/// waits for it, as far as a quarter of the memory allows, and never below 256 MiB.
+std::size_t default_queue_bytes(int threads, std::uint64_t available_bytes,
+                                const CaptureMemory& memory);
+
 /// One line for the dry run.
 std::string memory_text(const CaptureMemory& memory);
 

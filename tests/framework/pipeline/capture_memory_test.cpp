@@ -18,3 +18,13 @@ TEST_CASE("Visits in flight follow from threads as long as there is memory for t
   const CaptureMemory large{std::size_t(7) << 30, std::size_t(768) << 20};  // 8 GiB a visit
   CHECK(default_visits_in_flight(16, 100 * kGiB, large) == 6);
 }
+
+TEST_CASE("Captures that wait may fill what threads keep busy, and no more than a quarter",
+          "[memory]") {
+  constexpr std::uint64_t kMiB = std::uint64_t(1) << 20;
+  const CaptureMemory four_cameras{100 * kMiB, 156 * kMiB};
+  CHECK(default_queue_bytes(16, 100 * 1024 * kMiB, four_cameras) == 6400 * kMiB);
+  CHECK(default_queue_bytes(16, 8 * 1024 * kMiB, four_cameras) == 2048 * kMiB);
+  CHECK(default_queue_bytes(2, 100 * 1024 * kMiB, {kMiB, kMiB}) == 256 * kMiB);
+  CHECK(default_queue_bytes(16, 0, four_cameras) == 256 * kMiB);
+}
