@@ -93,23 +93,47 @@ Image<Vec3f> blurred(const Image<Vec3f>& picture, double sigma_px, Host& host) {
   return both;
 }
 
-/// What the software of a camera makes of an encoded picture: less noise, sharper edges.
-void finish(Image<Rgba8>& picture, double smoothing_px, double sharpening, Host& host) {
+/// What the software of a camera does to encoded pictures.
+struct Software {
+  double smoothing_px = 0.0;
+  double contrast = 0.0;
+  double saturation = 1.0;
+  double sharpening = 0.0;
+
+  bool does_nothing() const {
+    return smoothing_px <= 0.0 && contrast == 0.0 && saturation == 1.0 && sharpening <= 0.0;
+  }
+};
+
+/// An S-shaped curve that holds black, white and the middle: darker below, brighter above.
+Vec3f toned(const Vec3f& encoded, const Software& software) {
+  const Vec3f v = (encoded / 255.0f).cwiseMax(0.0f).cwiseMin(1.0f);
+  const Vec3f curve = v.cwiseProduct(v).cwiseProduct(Vec3f::Constant(3.0f) - 2.0f * v);
+  const Vec3f bent = v + float(software.contrast) * (curve - v);
+  const Vec3f grey = Vec3f::Constant(float(luminance(bent)));
+  return 255.0f * (grey + float(software.saturation) * (bent - grey));
+}
+
+void finish(Image<Rgba8>& picture, const Software& software, Host& host) {
   constexpr double kSharpeningRadius_px = 1.0;
-  if (smoothing_px <= 0.0 && sharpening <= 0.0) return;
+  if (software.does_nothing()) return;
   Image<Vec3f> smooth(picture.width(), picture.height(), Vec3f::Zero());
   for (std::size_t i = 0; i < smooth.pixels().size(); ++i) {
     const Rgba8& pixel = picture.pixels()[i];
     smooth.pixels()[i] = Vec3f(pixel[0], pixel[1], pixel[2]);
   }
-  if (smoothing_px > 0.0) smooth = blurred(smooth, smoothing_px, host);
-  const Image<Vec3f> soft = sharpening > 0.0 ? blurred(smooth, kSharpeningRadius_px, host) : smooth;
+  if (software.smoothing_px > 0.0) smooth = blurred(smooth, software.smoothing_px, host);
+  if (software.contrast != 0.0 || software.saturation != 1.0) {
+    for (Vec3f& pixel : smooth.pixels()) pixel = toned(pixel, software);
+  }
+  const bool sharpens = software.sharpening > 0.0;
+  const Image<Vec3f> soft = sharpens ? blurred(smooth, kSharpeningRadius_px, host) : smooth;
   host.parallel_for(std::size_t(picture.height()), [&](std::size_t y) {
     const auto from = smooth.row(int(y));
     const auto low = soft.row(int(y));
     const auto to = picture.row(int(y));
     for (std::size_t x = 0; x < to.size(); ++x) {
-      const Vec3f pixel = from[x] + float(sharpening) * (from[x] - low[x]);
+      const Vec3f pixel = from[x] + float(software.sharpening) * (from[x] - low[x]);
       for (std::size_t k = 0; k < 3; ++k) {
         const float value = std::clamp(pixel[Eigen::Index(k)], 0.0f, 255.0f);
         to[x][k] = std::uint8_t(std::lround(value));
@@ -166,6 +190,11 @@ void CameraSensor::Params::visit(ParamVisitor& v) {
   v.param("bits", bits, {"Of the numbers that the sensor gives.", "", 1, 16});
   v.param("smoothing_px", smoothing_px,
           {"Noise reduction: standard deviation of a blur of the encoded picture.", "px", 0, 20});
+  v.param("contrast", contrast,
+          {"Share of an S-shaped curve, 3 v^2 - 2 v^3 of the encoded picture, that replaces it.",
+           "", 0, 1.5});
+  v.param("saturation", saturation,
+          {"Factor of the difference from grey of the encoded picture.", "", 0, 4});
   v.param("sharpening", sharpening,
           {"Share of the difference from a blur of 1 px that is added to the encoded picture.", "",
            0, 10});
@@ -220,8 +249,10 @@ void CameraSensor::do_annotate(const Scene&, Frame& frame) const {
       }
     }
   });
-  finish(picture, drawn(params_.smoothing_px, "smoothing_px"),
-         drawn(params_.sharpening, "sharpening"), host_);
+  const Software software{
+      drawn(params_.smoothing_px, "smoothing_px"), drawn(params_.contrast, "contrast"),
+      drawn(params_.saturation, "saturation"), drawn(params_.sharpening, "sharpening")};
+  finish(picture, software, host_);
   frame.set(kColor, std::move(picture));
 }
 

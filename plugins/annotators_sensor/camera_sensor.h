@@ -42,6 +42,8 @@ class CameraSensor final : public Annotator {
     double read_noise_electrons = 3.0;
     int bits = 12;
     Distribution smoothing_px = 0.0;
+    Distribution contrast = 0.0;
+    Distribution saturation = 1.0;
     Distribution sharpening = 0.0;
 
     void visit(ParamVisitor& v);

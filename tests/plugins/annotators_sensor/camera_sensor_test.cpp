@@ -215,6 +215,28 @@ TEST_CASE("software takes noise away and sharpens edges", "[camera_sensor]") {
   CHECK(int(sharp.at(25, 9)[0]) == dark);
 }
 
+TEST_CASE("software darkens what is dark and makes colours stronger", "[camera_sensor]") {
+  CameraSensor::Params params = plain_params();
+  params.warmth_ev = 0.5;  // 138, 118, 100 before
+  params.contrast = 1.0;
+  const Rgba8 bent = picture_of(params, grey_frame(1.0f)).at(3, 3);
+  CHECK(int(bent[0]) == Approx(143.2).margin(0.6));  // 3 v^2 - 2 v^3 of 138 / 255 ...
+  CHECK(int(bent[1]) == Approx(113.1).margin(0.6));
+  CHECK(int(bent[2]) == Approx(86.9).margin(0.6));
+  params.contrast = 0.5;
+  CHECK(int(picture_of(params, grey_frame(1.0f)).at(3, 3)[2]) == Approx(93.4).margin(0.6));
+
+  params.contrast = 0.0;
+  params.saturation = 2.0;  // grey is 0.2126 * 138 + 0.7152 * 118 + 0.0722 * 100 = 120.95
+  const Rgba8 strong = picture_of(params, grey_frame(1.0f)).at(3, 3);
+  CHECK(int(strong[0]) == Approx(155.0).margin(1.0));
+  CHECK(int(strong[2]) == Approx(79.0).margin(1.0));
+  params.saturation = 0.0;
+  const Rgba8 grey = picture_of(params, grey_frame(1.0f)).at(3, 3);
+  CHECK(grey[0] == grey[2]);
+  CHECK(int(grey[1]) == 121);
+}
+
 TEST_CASE("noise doubles with four times the ISO", "[camera_sensor]") {
   CameraSensor::Params params = plain_params();
   params.shot_noise = true;
