@@ -201,6 +201,24 @@ Color pip_color(Rng& rng, const DieLook& look) {
   return best;
 }
 
+/// Red pips on a dark body: told from it by their hue alone. Detectors learn them last, so there
+/// are more of them than in shops.
+void make_red_on_dark(Rng& rng, DieLook& look) {
+  const bool is_grey = rng.chance(0.6);
+  const double hue = rng.uniform();
+  const double a = rng.uniform();
+  const double b = rng.uniform();
+  look.color = is_grey ? from_hsv(hue, 0.35 * a, 0.08 + 0.24 * b)
+                       : from_hsv(0.54 + 0.26 * hue, 0.6 + 0.4 * a, 0.25 + 0.5 * b);
+  look.second = mix(look.color, Color::Zero(), rng.uniform(0.3, 0.95));
+  look.third = mix(look.color, Color::Ones(), rng.uniform(0.0, 0.25));
+  if (look.body == Body::Clear) look.body = Body::Marbled;
+  const double red = rng.uniform(0.92, 1.0);
+  const double depth = rng.uniform(0.65, 1.0);
+  look.pips = from_hsv(red, depth, rng.uniform(0.45, 0.85));
+  look.one = look.pips;
+}
+
 DieLook any_shape(Rng& rng) {
   DieLook look;
   look.seed = rng.bits();
@@ -276,6 +294,7 @@ DieLook any_look(Rng rng) {
   look.wear = rng.chance(0.08) ? rng.uniform(0.2, 0.6) : 0.0;
   look.roughness = rng.chance(0.6) ? rng.uniform(0.03, 0.15) : rng.uniform(0.15, 0.4);
   look.clearcoat = rng.chance(0.6) ? rng.uniform(0.3, 1.0) : 0.0;
+  if (rng.chance(0.16)) make_red_on_dark(rng, look);
   if (look.body == Body::Clear) look.transmission = rng.uniform(0.15, 0.4);
   return look;
 }
