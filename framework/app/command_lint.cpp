@@ -25,10 +25,11 @@ Value job_of(const std::string& run) {
 }
 
 /// With the job and the assets of the run.
-LintReport lint_scenes_of(const std::string& run, const Value& job, const JobServices& services) {
+LintReport lint_scenes_of(const std::string& run, const Value& job, const JobServices& services,
+                          DatasetReaders& readers) {
   JobAssembly assembly = assemble_job(job, *services.registry, *services.host, services.assets_root,
                                       program_version(), AssembleFor::Plan, 1);
-  return lint_scenes(run, assembly.job, assembly.plan, assembly.components.sets.front(),
+  return lint_scenes(run, assembly.job, assembly.plan, assembly.components.sets.front(), readers,
                      *services.host);
 }
 
@@ -40,7 +41,9 @@ int command_lint(const GlobalOptions& global, const LintOptions& options, Consol
   DatasetReaders readers(*services.registry, *services.host);
   std::vector<LintReport> reports =
       lint_datasets(options.dataset, readers, *services.host, options.reader);
-  if (options.looks_at_scenes) reports.push_back(lint_scenes_of(options.dataset, job, services));
+  if (options.looks_at_scenes) {
+    reports.push_back(lint_scenes_of(options.dataset, job, services, readers));
+  }
   return print_lint(reports, options.as_json);
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
@@ -15,6 +16,7 @@
 #include <vector>
 
 #include "framework/config/json_text.h"
+#include "framework/datasets/capture_sweep.h"
 #include "framework/lint/support_check.h"
 #include "framework/pipeline/scene_setup.h"
 #include "framework/pipeline/settling.h"
@@ -28,6 +30,8 @@ using Json = nlohmann::json;
 constexpr const char* kReadable = "every file can be read";
 constexpr const char* kAgrees = "settle/ agrees with the job";
 constexpr const char* kRests = "objects at rest rest on something";
+constexpr const char* kBegins = "objects begin clear of everything";
+constexpr const char* kSees = "cameras stand clear of everything";
 
 /// Metres; no room is as large.
 constexpr double kFarthest = 1e6;
@@ -38,8 +42,18 @@ struct VisitRecord {
   double simulated_s = 0.0;
   double step_s = 0.0;
   std::vector<ObjectAtEnd> objects;
+  std::vector<PlacedNode> born;
   std::vector<PlacedNode> placed;
 };
+
+/// Where a camera was in one capture.
+struct RecordedCamera {
+  std::string name;
+  Vec3 place = Vec3::Zero();  ///< World.
+};
+
+/// By capture, as the first dataset of the run tells it that knows where cameras are.
+using RecordedCameras = std::map<int, std::vector<RecordedCamera>>;
 
 double number(const Json& json) {
   const double value = json.get<double>();
@@ -58,6 +72,20 @@ std::array<double, kCount> numbers(const Json& json, const char* key) {
   std::array<double, kCount> values;
   for (std::size_t i = 0; i < kCount; ++i) values[i] = number(json[i]);
   return values;
+}
+
+std::vector<PlacedNode> placed_nodes(const Json& list) {
+  std::vector<PlacedNode> nodes;
+  for (const Json& entry : list) {
+    PlacedNode& node = nodes.emplace_back();
+    node.path = entry.at("node").get<std::string>();
+    node.is_visible = entry.at("visible").get<bool>();
+    const auto rows = numbers<12>(entry.at("parent_from_node"), "parent_from_node");
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      node.parent_from_node.matrix()(Eigen::Index(i / 4), Eigen::Index(i % 4)) = rows[i];
+    }
+  }
+  return nodes;
 }
 
 /// Nothing when the file is of a program that did not write where things stood.
@@ -79,23 +107,51 @@ std::optional<VisitRecord> read_record(const fs::path& file) {
     const auto place = numbers<3>(entry["before_last_step"], "before_last_step");
     object.before_last_step = Vec3(place[0], place[1], place[2]);
   }
-  for (const Json& entry : json.at("placed")) {
-    PlacedNode& node = record.placed.emplace_back();
-    node.path = entry.at("node").get<std::string>();
-    node.is_visible = entry.at("visible").get<bool>();
-    const auto rows = numbers<12>(entry.at("parent_from_node"), "parent_from_node");
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      node.parent_from_node.matrix()(Eigen::Index(i / 4), Eigen::Index(i % 4)) = rows[i];
-    }
-  }
+  if (json.contains("born")) record.born = placed_nodes(json["born"]);
+  record.placed = placed_nodes(json.at("placed"));
   return record;
+}
+
+RecordedCameras recorded_cameras(const fs::path& run, DatasetReaders& readers, Host& host) {
+  RecordedCameras cameras;
+  const NameSet wanted{std::string(kHoldsCamera), std::string(kHoldsCameraPose)};
+  for (const FoundDataset& found : find_datasets(run, readers, "")) {
+    const auto dataset = readers.open(found.folder, found.reader);
+    if (!dataset->info().holds.contains(kHoldsCameraPose)) continue;
+    sweep_captures<StoredCapture>(
+        *dataset, wanted, host, [](StoredCapture stored) { return stored; },
+        [&](StoredCapture stored) {
+          for (const Frame& frame : stored.capture.frames) {
+            cameras[stored.capture.index].push_back(
+                {frame.camera_path, frame.world_from_camera.translation()});
+          }
+        });
+    return cameras;
+  }
+  return cameras;
+}
+
+/// After how many captures of a visit objects are where they stay.
+int captures_in_motion(const Job& job) {
+  int captures = 0;
+  int before_last = 0;
+  for (const TimelineStep& step : job.timeline) {
+    if (step.kind == TimelineStep::Kind::Capture) captures += step.count;
+    if (step.kind != TimelineStep::Kind::Capture) before_last = captures;
+  }
+  return before_last;
 }
 
 class SceneLint {
  public:
-  SceneLint(const Job& job, const CapturePlan& plan, VisitComponents& components, Host& host,
-            LintReport& report)
-      : job_(job), plan_(plan), components_(components), host_(host), report_(report) {}
+  SceneLint(const Job& job, const CapturePlan& plan, VisitComponents& components,
+            RecordedCameras cameras, Host& host, LintReport& report)
+      : job_(job),
+        plan_(plan),
+        components_(components),
+        cameras_(std::move(cameras)),
+        host_(host),
+        report_(report) {}
 
   void check(const VisitRecord& record, const std::string& file) {
     file_ = file;
@@ -104,24 +160,13 @@ class SceneLint {
                "the job has visits 0 to " + std::to_string(plan_.visit_count() - 1));
       return;
     }
-    // Without a simulation objects float where they were placed.
-    if (record.step_s <= 0.0 || record.simulated_s <= 0.0) return;
     Scene scene;
     const PlannedVisit planned = plan_.visit(record.visit);
     const NodeId environment = set_up(planned, scene);
+    check_births(record, planned, scene, environment);
     if (!place(record, scene)) return;
-    std::vector<JudgedObject> judged;
-    for (const ObjectAtEnd& object : record.objects) {
-      const NodeId node = scene.find(object.path);
-      ++report_.checks;
-      if (!check_speed(object, scene, node, record.step_s)) {
-        judged.push_back({node, object.falls});
-      }
-    }
-    const int last = planned.first_capture + planned.capture_count - 1;
-    for (const Flaw& flaw : find_unheld(scene, environment, judged)) {
-      complain(kRests, scene.path(flaw.node), flaw.why, "", last);
-    }
+    check_rest(record, planned, scene, environment);
+    check_cameras(planned, scene, environment);
   }
 
  private:
@@ -140,6 +185,68 @@ class SceneLint {
     return environment;
   }
 
+  void check_births(const VisitRecord& record, const PlannedVisit& planned, Scene& scene,
+                    NodeId environment) {
+    const SavedNodes as_set_up(scene, {});
+    if (record.born.empty() || !put(record.born, scene)) return;
+    std::vector<JudgedObject> judged;
+    for (const PlannedObject& object : plan_objects(job_, plan_.object_assets, record.visit)) {
+      if (const NodeId node = scene.find(object.path)) judged.push_back({node, false});
+    }
+    report_.checks += judged.size();
+    for (const Flaw& flaw : find_unheld(scene, environment, judged)) {
+      complain(kBegins, scene.path(flaw.node), flaw.why, "", planned.first_capture);
+    }
+    as_set_up.restore(scene);
+  }
+
+  void check_rest(const VisitRecord& record, const PlannedVisit& planned, const Scene& scene,
+                  NodeId environment) {
+    // Without a simulation objects float where they were placed.
+    if (record.step_s <= 0.0 || record.simulated_s <= 0.0) return;
+    std::vector<JudgedObject> judged;
+    for (const ObjectAtEnd& object : record.objects) {
+      const NodeId node = scene.find(object.path);
+      ++report_.checks;
+      if (!check_speed(object, scene, node, record.step_s)) {
+        judged.push_back({node, object.falls});
+      }
+    }
+    const int last = planned.first_capture + planned.capture_count - 1;
+    for (const Flaw& flaw : find_unheld(scene, environment, judged)) {
+      complain(kRests, scene.path(flaw.node), flaw.why, "", last);
+    }
+  }
+
+  void check_cameras(const PlannedVisit& planned, Scene& scene, NodeId environment) {
+    const int at_rest = planned.first_capture + captures_in_motion(job_);
+    const int end = planned.first_capture + planned.capture_count;
+    check_cameras(at_rest, end, scene, environment);
+    for (const PlannedObject& object : plan_objects(job_, plan_.object_assets, planned.index)) {
+      if (const NodeId node = scene.find(object.path)) scene.edit(node).is_visible = false;
+    }
+    check_cameras(planned.first_capture, std::min(at_rest, end), scene, environment);
+  }
+
+  void check_cameras(int begin, int end, const Scene& scene, NodeId environment) {
+    double near_m = kInfinity;
+    for (const CameraGroup& group : job_.cameras) near_m = std::min(near_m, group.near_m);
+    std::vector<JudgedCamera> judged;
+    std::vector<std::pair<int, std::string>> names;
+    for (auto it = cameras_.lower_bound(begin); it != cameras_.end() && it->first < end; ++it) {
+      for (const RecordedCamera& camera : it->second) {
+        judged.push_back({camera.place, near_m});
+        names.emplace_back(it->first, camera.name);
+      }
+    }
+    report_.checks += judged.size();
+    const std::vector<std::string> reasons = find_blocked(scene, environment, judged);
+    for (std::size_t i = 0; i < reasons.size(); ++i) {
+      if (reasons[i].empty()) continue;
+      complain(kSees, names[i].second, reasons[i], "", names[i].first);
+    }
+  }
+
   /// Takes out what the run took out, and puts the rest where it stood. False: the record is of
   /// another job.
   bool place(const VisitRecord& record, Scene& scene) {
@@ -156,7 +263,11 @@ class SceneLint {
       const NodeId node = scene.find(object.path);
       if (node && !there.contains(node)) scene.erase(node);
     }
-    for (const PlacedNode& placed : record.placed) {
+    return put(record.placed, scene);
+  }
+
+  bool put(const std::vector<PlacedNode>& nodes, Scene& scene) {
+    for (const PlacedNode& placed : nodes) {
       const NodeId node = scene.find(placed.path);
       if (!node) {
         // What a randomizer of others has made cannot be made here.
@@ -188,6 +299,7 @@ class SceneLint {
   const Job& job_;
   const CapturePlan& plan_;
   VisitComponents& components_;
+  RecordedCameras cameras_;
   Host& host_;
   LintReport& report_;
   std::string file_;
@@ -196,7 +308,7 @@ class SceneLint {
 }  // namespace
 
 LintReport lint_scenes(const fs::path& run, const Job& job, const CapturePlan& plan,
-                       VisitComponents& components, Host& host) {
+                       VisitComponents& components, DatasetReaders& readers, Host& host) {
   LintReport report;
   report.dataset = (run / "settle").string();
   report.format = "scenes";
@@ -207,7 +319,7 @@ LintReport lint_scenes(const fs::path& run, const Job& job, const CapturePlan& p
     if (entry->path().extension() == ".json") files.push_back(entry->path());
   }
   std::sort(files.begin(), files.end());
-  SceneLint lint(job, plan, components, host, report);
+  SceneLint lint(job, plan, components, recorded_cameras(run, readers, host), host, report);
   for (const fs::path& file : files) {
     ++report.files;
     ++report.checks;

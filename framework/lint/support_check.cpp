@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstdio>
 #include <map>
 #include <set>
 #include <unordered_map>
@@ -37,17 +38,19 @@ struct Surface {
   NodeId owner;  ///< The object that it belongs to, or itself.
   Aabb box;
   bool is_room = false;
+  bool is_of_object = false;
   std::vector<Corners> triangles;  ///< World; empty until somebody is near.
 };
 
-/// Calls body(point) for points so dense that none of the triangle is farther than two thirds of
-/// `spacing` from one of them.
+/// Calls body(point) for points so dense that none of the triangle, as far as it lies in the box,
+/// is farther than two thirds of `spacing` from one of them.
 template <class Body>
-void spread(const Corners& triangle, double spacing, Body&& body) {
+void spread(const Corners& triangle, const Aabb& within, double spacing, Body&& body) {
   std::vector<Corners> waiting{triangle};
   while (!waiting.empty()) {
     const Corners now = waiting.back();
     waiting.pop_back();
+    if (!overlap(box_of(now), within)) continue;
     std::size_t longest = 0;
     double length = 0.0;
     for (std::size_t i = 0; i < 3; ++i) {
@@ -174,16 +177,21 @@ int crossing(const Vec3& start, const Vec3& direction, const Corners& triangle) 
 }
 
 /// Whether a closed surface is around the point, `depth` away or farther: out of it in every
-/// direction, so that a bowl without thickness holds nothing inside.
+/// direction, so that a bowl without thickness holds nothing inside. Furniture often has no
+/// underside: what stands fast may be open there.
 bool is_deep_inside(const Vec3& point, const Surface& solid, double depth) {
+  constexpr double kDown = -0.5;
   // Askew, so that rays do not run along what is built straight.
   static const std::array<Vec3, 6> kDirections{Vec3(0.9, 0.31, 0.17),   Vec3(-0.88, -0.29, 0.23),
                                                Vec3(0.27, 0.93, -0.19), Vec3(-0.33, -0.91, 0.1),
                                                Vec3(0.21, -0.13, 0.95), Vec3(0.12, 0.26, -0.94)};
+  int sense = 0;  // of the faces: some things are inside out
   for (const Vec3& direction : kDirections) {
     int left = 0;
     for (const Corners& triangle : solid.triangles) left += crossing(point, direction, triangle);
-    if (left <= 0) return false;
+    if (left == 0 && direction.z() < kDown && !solid.is_of_object) continue;
+    if (left == 0 || left * sense < 0) return false;
+    sense = left;
   }
   return std::none_of(solid.triangles.begin(), solid.triangles.end(), [&](const auto& triangle) {
     return way_from(triangle, point).squaredNorm() < depth * depth;
@@ -204,7 +212,8 @@ class Surfaces {
       const auto& mesh = scene[node].mesh;
       if (!mesh || mesh->triangles.empty() || !scene.is_visible(node)) continue;
       const auto owner = owners.find(node);
-      Surface surface{node, owner == owners.end() ? node : owner->second, {}, false, {}};
+      const bool is_of_object = owner != owners.end();
+      Surface surface{node, is_of_object ? owner->second : node, {}, false, is_of_object, {}};
       const Affine world_from_mesh = scene.world_from_node(node);
       for (const auto& position : mesh->positions) {
         surface.box.add(Vec3(world_from_mesh * position.cast<double>()));
@@ -264,44 +273,100 @@ struct Neighbours {
   NodeId stuck_in;
 };
 
-/// Whether the other could hold what the points are of: nearer than this to one of them, and not
-/// beside or above it, unless too near to tell.
-bool may_hold(const Surface& other, const PointGrid& own, const Aabb& box, double reach) {
-  constexpr double kTooNear = 0.004;    // metres; points are 5 mm apart
-  constexpr double kBelow = 0.25;       // sine of the way's angle to the level
-  std::map<std::size_t, Vec3> nearest;  // by point
+double lean_of(const Corners& triangle) {
+  const Vec3 normal = (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]);
+  return normal.squaredNorm() > 0.0 ? std::abs(normal.z()) / normal.norm() : 0.0;
+}
+
+/// Whether the thing lies below the point of its surface and not above it: nothing can push it up
+/// there. Sheets lie neither below nor above.
+bool is_on_top(const Vec3& point, const std::vector<const Surface*>& own) {
+  // Askew, and off the surface that the point is on.
+  static const Vec3 kUp = Vec3(0.013, 0.007, 1.0).normalized();
+  constexpr double kSkin = 1e-4;  // metres
+  const auto is_crossed = [&](const Vec3& direction) {
+    return std::ranges::any_of(own, [&](const Surface* part) {
+      return std::ranges::any_of(part->triangles, [&](const Corners& triangle) {
+        return crossing(point + kSkin * direction, direction, triangle) != 0;
+      });
+    });
+  };
+  return !is_crossed(kUp) && is_crossed(-kUp);
+}
+
+/// Whether the other could hold what the points are of: nearer than this to one that it could push
+/// up, below it, or no wall and sunk into or too near to tell.
+bool may_hold(const Surface& other, const PointGrid& points, const std::vector<const Surface*>& own,
+              const Aabb& box, double reach) {
+  constexpr double kTooNear = 0.004;  // metres; points are 5 mm apart
+  constexpr double kBelow = 0.25;     // sine of the angle to the level: of ways and of surfaces
+  struct Nearest {
+    Vec3 way;
+    double lean = 0.0;  ///< Of the triangle; 0: upright.
+  };
+  std::map<std::size_t, Nearest> nearest;  // by point
   for (const Corners& triangle : other.triangles) {
     const Aabb around = grown(box_of(triangle), reach);
     if (!overlap(around, box)) continue;
+    const double lean = lean_of(triangle);
     const Aabb both{around.min.cwiseMax(box.min), around.max.cwiseMin(box.max)};
-    own.visit_near(both, [&](std::size_t point) {
-      const Vec3 way = way_from(triangle, own.points()[point].place);
+    points.visit_near(both, [&](std::size_t point) {
+      if (points.points()[point].is_on_wall) return;
+      const Vec3 way = way_from(triangle, points.points()[point].place);
       if (way.squaredNorm() > reach * reach) return;
-      const auto [known, is_new] = nearest.emplace(point, way);
-      if (!is_new && way.squaredNorm() < known->second.squaredNorm()) known->second = way;
+      const auto [known, is_new] = nearest.emplace(point, Nearest{way, lean});
+      if (!is_new && way.squaredNorm() < known->second.way.squaredNorm()) {
+        known->second = {way, lean};
+      }
     });
   }
   return std::ranges::any_of(nearest, [&](const auto& entry) {
-    const auto& [point, way] = entry;
-    const double distance = way.norm();
-    if (distance <= kTooNear) return true;
-    return !own.points()[point].is_on_wall && way.z() >= kBelow * distance;
+    const auto& [point, found] = entry;
+    const double distance = found.way.norm();
+    const bool is_under = found.way.z() >= kBelow * distance && distance > 0.0;
+    const bool is_dented = found.way.z() < 0.0 || distance <= kTooNear;
+    return (is_under || (is_dented && found.lean >= kBelow)) &&
+           !is_on_top(points.points()[point].place, own);
   });
 }
 
-bool is_stuck(const std::vector<SurfacePoint>& points, const Surface& other, double depth) {
+/// Whether points are deep inside of a solid thing.
+bool is_any_deep(const std::vector<Vec3>& points, const Surface& solid, double depth) {
   constexpr std::size_t kProbes = 256;
   constexpr int kWitnesses = 2;
-  const Aabb core = grown(other.box, -depth);
-  if (other.is_room || core.is_empty()) return false;
   int deep = 0;
   const std::size_t stride = std::max<std::size_t>(1, points.size() / kProbes);
   for (std::size_t i = stride / 2; i < points.size(); i += stride) {
-    const Vec3& place = points[i].place;
-    if (!overlap({place, place}, core)) continue;
-    if (is_deep_inside(place, other, depth) && ++deep == kWitnesses) return true;
+    if (is_deep_inside(points[i], solid, depth) && ++deep == kWitnesses) return true;
   }
   return false;
+}
+
+/// Whether one is deep inside of the other, or the other, thin as it may be, goes through it.
+bool is_stuck(const std::vector<SurfacePoint>& points, const std::vector<const Surface*>& own,
+              const Surface& other, double spacing, double depth) {
+  if (other.is_room) return false;
+  std::vector<Vec3> reaching;
+  const Aabb core = grown(other.box, -depth);
+  for (const SurfacePoint& point : points) {
+    if (!core.is_empty() && overlap({point.place, point.place}, core)) {
+      reaching.push_back(point.place);
+    }
+  }
+  if (is_any_deep(reaching, other, depth)) return true;
+  // Of two objects, the other one is asked as well.
+  if (other.is_of_object) return false;
+  return std::ranges::any_of(own, [&](const Surface* part) {
+    const Aabb inner = grown(part->box, -depth);
+    if (inner.is_empty() || !overlap(inner, other.box)) return false;
+    std::vector<Vec3> through;
+    for (const Corners& triangle : other.triangles) {
+      spread(triangle, inner, spacing, [&](const Vec3& place) {
+        if (overlap({place, place}, inner)) through.push_back(place);
+      });
+    }
+    return is_any_deep(through, *part, depth);
+  });
 }
 
 Neighbours neighbours_of(NodeId object, Surfaces& surfaces, const SupportLimits& limits) {
@@ -326,22 +391,76 @@ Neighbours neighbours_of(NodeId object, Surfaces& surfaces, const SupportLimits&
     for (const Corners& triangle : part->triangles) {
       const Vec3 normal = (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]);
       const bool is_on_wall = std::abs(normal.z()) < 0.1 * normal.norm();
-      spread(triangle, spacing, [&](const Vec3& place) { points.add({place, is_on_wall}); });
+      spread(triangle, part->box, spacing, [&](const Vec3& place) {
+        points.add({place, is_on_wall});
+      });
     }
   }
   const Aabb box = grown(surfaces.box_of_owner(object), reach);
   for (const Surface* other : surfaces.near(box, object)) {
-    if (!found.holders.contains(other->owner) && may_hold(*other, points, box, reach)) {
+    if (!found.holders.contains(other->owner) && may_hold(*other, points, own, box, reach)) {
       found.holders.insert(other->owner);
     }
-    if (!found.stuck_in && is_stuck(points.points(), *other, limits.depth_m)) {
+    if (!found.stuck_in && is_stuck(points.points(), own, *other, spacing, limits.depth_m)) {
       found.stuck_in = other->owner;
     }
   }
   return found;
 }
 
+/// The share of all directions in which the surface is seen from the point.
+double share_around(const Vec3& point, const Surface& surface) {
+  constexpr int kRays = 96;
+  const double turn = kPi * (3.0 - std::sqrt(5.0));
+  int met = 0;
+  for (int i = 0; i < kRays; ++i) {
+    const double z = 1.0 - (2.0 * i + 1.0) / kRays;
+    const double flat = std::sqrt(1.0 - z * z);
+    const Vec3 direction(flat * std::cos(turn * i), flat * std::sin(turn * i), z);
+    met += std::ranges::any_of(surface.triangles, [&](const Corners& triangle) {
+      return crossing(point, direction, triangle) != 0;
+    });
+  }
+  return double(met) / kRays;
+}
+
+std::string why_blocked(const Scene& scene, const JudgedCamera& camera,
+                        const std::vector<const Surface*>& near) {
+  // A shade that is open at both ends fills about two thirds, a shelf five sixths; a table top over
+  // a camera less than half.
+  constexpr double kInside = 0.6;
+  double nearest = camera.near_m;
+  const Surface* too_near = nullptr;
+  for (const Surface* surface : near) {
+    const bool is_within = !surface->is_room && overlap({camera.place, camera.place}, surface->box);
+    if (is_within && share_around(camera.place, *surface) >= kInside) {
+      return "stands in " + scene.path(surface->node);
+    }
+    for (const Corners& triangle : surface->triangles) {
+      const double distance = way_from(triangle, camera.place).norm();
+      if (distance >= nearest) continue;
+      nearest = distance;
+      too_near = surface;
+    }
+  }
+  if (!too_near) return "";
+  char text[48];
+  std::snprintf(text, sizeof text, "is %.3f m from ", nearest);
+  return text + scene.path(too_near->node);
+}
+
 }  // namespace
+
+std::vector<std::string> find_blocked(const Scene& scene, NodeId environment,
+                                      const std::vector<JudgedCamera>& cameras) {
+  Surfaces surfaces(scene, environment, {});
+  std::vector<std::string> reasons;
+  for (const JudgedCamera& camera : cameras) {
+    const Aabb around = grown({camera.place, camera.place}, camera.near_m);
+    reasons.push_back(why_blocked(scene, camera, surfaces.near(around, {})));
+  }
+  return reasons;
+}
 
 std::vector<Flaw> find_unheld(const Scene& scene, NodeId environment,
                               const std::vector<JudgedObject>& objects,

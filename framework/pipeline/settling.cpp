@@ -73,6 +73,12 @@ nlohmann::ordered_json as_json(const PlacedNode& node) {
   return {{"node", node.path}, {"parent_from_node", rows}, {"visible", node.is_visible}};
 }
 
+nlohmann::ordered_json as_json(const std::vector<PlacedNode>& nodes) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const PlacedNode& node : nodes) list.push_back(as_json(node));
+  return list;
+}
+
 /// Nodes with a mesh at or below them.
 std::set<NodeId> nodes_with_shape(const Scene& scene) {
   std::set<NodeId> shaped;
@@ -145,8 +151,8 @@ std::string settle_json(const VisitReport& report) {
   json["step_seconds"] = report.step_s;
   json["objects"] = nlohmann::ordered_json::array();
   for (const ObjectAtEnd& object : report.objects) json["objects"].push_back(as_json(object));
-  json["placed"] = nlohmann::ordered_json::array();
-  for (const PlacedNode& node : report.placed) json["placed"].push_back(as_json(node));
+  json["born"] = as_json(report.born);
+  json["placed"] = as_json(report.placed);
   return json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 

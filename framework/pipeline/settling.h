@@ -54,7 +54,8 @@ struct VisitReport {
   std::vector<Incident> cameras;       ///< Blocked ones, once per capture.
   double step_s = 0.0;                 ///< Of the simulation; 0 without one.
   std::vector<ObjectAtEnd> objects;    ///< Those that are there.
-  std::vector<PlacedNode> placed;      ///< What has a mesh, or stands above one.
+  std::vector<PlacedNode> born;        ///< Where the moment "environment" put things.
+  std::vector<PlacedNode> placed;      ///< At the end: what has a mesh, or stands above one.
 };
 
 /// As JSON text with a newline at its end.

@@ -66,6 +66,7 @@ VisitResult VisitRun::run() {
   set_up();
   randomize("environment", 0, -1);
   note(scene_, find_born_inside(scene_, objects_), report_.born_inside);
+  report_.born = as_set_up_.placed_since(scene_);
   reset_physics();
   for (const TimelineStep& step : job_.timeline) {
     if (next_capture_ == planned_.capture_count) break;

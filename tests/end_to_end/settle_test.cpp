@@ -235,8 +235,9 @@ writers: [{type: PoseWriter, name: pose}]
     CHECK(lint.exit_code == 7);
     return lint.output;
   };
-  const auto pose_of = [](nlohmann::json& json, std::size_t object) -> nlohmann::json& {
-    for (auto& placed : json["placed"]) {
+  const auto pose_of = [](nlohmann::json& json, std::size_t object,
+                          const char* list = "placed") -> nlohmann::json& {
+    for (auto& placed : json[list]) {
       if (placed["node"] == json["objects"][object]["object"]) return placed["parent_from_node"];
     }
     throw std::runtime_error("the object was never placed");
@@ -256,6 +257,13 @@ writers: [{type: PoseWriter, name: pose}]
              }),
              ContainsSubstring(": is stuck in /Assets/"));
   CHECK_THAT(lint_with([&](auto& json) {
+               for (const int i : {3, 7, 11}) {
+                 pose_of(json, 0, "born")[i] =
+                     pose_of(json, 1, "born")[i].template get<double>() + 0.02;
+               }
+             }),
+             ContainsSubstring("objects begin clear of everything"));
+  CHECK_THAT(lint_with([&](auto& json) {
                auto& place = json["objects"][0]["before_last_step"];
                place[0] = place[0].template get<double>() + 0.002;
              }),
@@ -268,4 +276,13 @@ writers: [{type: PoseWriter, name: pose}]
                json["placed"][0]["parent_from_node"] = {1, 2};
              }),
              ContainsSubstring("parent_from_node is no list of 12 numbers"));
+  const Outcome inside =
+      run({"run", "job.yaml", "--output", "inside", "--set", "randomizers.view.distance=0.01",
+           "--set", "randomizers.view.avoid_obstacles=false"},
+          folder.path());
+  REQUIRE(inside.exit_code == 0);
+  const Outcome cameras = run({"lint", "--scenes", "inside"}, folder.path());
+  CHECK(cameras.exit_code == 7);
+  CHECK_THAT(cameras.output, ContainsSubstring("cameras stand clear of everything"));
+  CHECK_THAT(cameras.output, ContainsSubstring(": stands in /Assets/"));
 }

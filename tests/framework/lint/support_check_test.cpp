@@ -111,3 +111,131 @@ TEST_CASE("What is inside a table or another object is stuck there", "[support]"
                                 "spoon: is stuck in /Environment/table",
                                 "small: is stuck in /Assets/big"});
 }
+
+namespace {
+
+Mesh flipped(Mesh mesh) {
+  for (auto& [a, b, c] : mesh.triangles) std::swap(b, c);
+  return mesh;
+}
+
+/// A box without those of its faces whose middles lie there.
+template <class Lies>
+Mesh box_without(const Vec3& size, Lies&& lies) {
+  Mesh box = make_box(size);
+  std::erase_if(box.triangles, [&](const auto& triangle) {
+    Vec3f middle = Vec3f::Zero();
+    for (const auto corner : triangle) middle += box.positions[corner] / 3.0F;
+    return lies(middle);
+  });
+  return box;
+}
+
+Mesh sheet(double x, double y) {
+  Mesh flat;
+  for (const auto& [u, v] : {std::pair{-0.5, -0.5}, {0.5, -0.5}, {0.5, 0.5}, {-0.5, 0.5}}) {
+    flat.positions.push_back(Vec3f(float(u * x), float(v * y), 0.0F));
+  }
+  flat.triangles = {{0, 1, 2}, {0, 2, 3}};
+  return flat;
+}
+
+Affine upright(double x, double y, double z) {
+  return at(x, y, z) * Eigen::AngleAxisd(kPi / 2, Vec3::UnitY());
+}
+
+/// Furniture as others model it.
+struct FurnishedStage : Stage {
+  FurnishedStage() {
+    const auto is_low = [](const Vec3f& middle) { return middle.z() < -0.19F; };
+    const auto is_front = [](const Vec3f& middle) { return middle.x() > 0.24F; };
+    const auto is_end = [](const Vec3f& middle) { return std::abs(middle.z()) > 0.19F; };
+    add(environment, "sofa", box_without(Vec3(1.6, 0.9, 0.4), is_low), at(1.8, -1.4, 0.2));
+    add(environment, "chest", flipped(make_box(Vec3(0.8, 0.6, 0.5))), at(-2.2, 1.4, 0.25));
+    add(environment, "shelf", box_without(Vec3(0.5, 0.9, 0.5), is_front), at(-2.6, -1.2, 1.2));
+    add(environment, "screen", make_box(Vec3(0.008, 1.0, 1.2)), at(1, 1.2, 0.6));
+    add(environment, "shade", box_without(Vec3(0.4, 0.4, 0.4), is_end), at(0, 0, 2));
+    add(environment, "globe", make_sphere(0.15), at(-1, 0, 2.2));
+    add(environment, "cloth", sheet(0.5, 0.5), at(2, 1.2, 0.9));
+    // Nothing hangs in these, as far as they stand.
+    add_object("box", kBox, at(0.3, 0.1, kOnTable + 0.05));
+    add_object("drifts", kBox, at(1.8, 0.4, 1.5), false);
+  }
+};
+
+}  // namespace
+
+TEST_CASE("Each of ten seeded things in mid-air is named", "[support]") {
+  const Mesh paper = sheet(0.2, 0.3);
+  const Mesh ball = make_sphere(0.05);
+  const std::vector<std::pair<Mesh, Affine>> seeded{
+      {kBox, at(-0.3, 0.1, kOnTable + 0.08)},   // 3 cm over the table
+      {kBox, at(0.3, 0.222, kOnTable + 0.15)},  // beside a box, 2 mm away
+      {kBox, at(2.898, 1, 1)},                  // at the wall
+      {ball, at(2.95, -0.5, 1.2)},              // touches the wall
+      {kBox, at(0.2, 0.1, 0.628)},              // under the table, 2 mm away
+      {kBox, at(1.8, 0.521, 1.5)},              // beside one that drifts
+      {ball, at(-2.6, -1.2, 0.899)},            // under the shelf
+      {kBox, at(1.106, 1.2, 0.7)},              // at a screen, 2 mm away
+      {paper, upright(2.998, -1, 1)},           // a sheet along the wall
+      {paper, at(-1, 1, 0.03)},                 // a sheet over the floor
+  };
+  for (std::size_t i = 0; i < seeded.size(); ++i) {
+    FurnishedStage stage;
+    stage.add_object("seeded", seeded[i].first, seeded[i].second);
+    INFO("number " << i + 1);
+    CHECK(stage.unheld() == Texts{"seeded: hangs in the air"});
+  }
+}
+
+TEST_CASE("Each of nine seeded things inside of others is named", "[support]") {
+  struct Seed {
+    Mesh mesh;
+    Affine pose;
+    std::string in;
+  };
+  const std::vector<Seed> seeded{
+      {kBox, at(-0.3, 0.1, 0.7), "Environment/table"},
+      {make_box(Vec3(0.01, 0.005, 0.2)), at(-0.3, 0.1, 0.7), "Environment/table"},
+      {kBox, at(1.8, -1.4, 0.05), "Environment/sofa"},  // on the floor, below an open one
+      {kBox, at(1.8, -1.4, 0.4), "Environment/sofa"},   // half sunk into its top
+      {kBox, at(-2.2, 1.4, 0.2), "Environment/chest"},  // faces look inwards
+      {kBox, at(1, 1.2, 0.05), "Environment/screen"},   // thinner than any depth
+      {kBox, at(2, 1.2, 0.91), "Environment/cloth"},    // no thickness at all
+      {make_sphere(0.04), at(-1, 0.02, 2.2), "Environment/globe"},
+      {kBox, at(0.38, 0.12, kOnTable + 0.06), "Assets/box"},
+  };
+  for (std::size_t i = 0; i < seeded.size(); ++i) {
+    FurnishedStage stage;
+    stage.add_object("seeded", seeded[i].mesh, seeded[i].pose);
+    INFO("number " << i + 1);
+    CHECK_THAT(stage.unheld(), Catch::VectorContains("seeded: is stuck in /" + seeded[i].in));
+  }
+}
+
+TEST_CASE("Each of nine seeded cameras in things is named, and free ones are not", "[support]") {
+  FurnishedStage stage;
+  stage.add_object("vase", make_sphere(0.2), at(-0.3, 0, kOnTable + 0.2));
+  const std::vector<std::pair<Vec3, std::string>> seeded{
+      {Vec3(-1, 0, 2.2), "stands in /Environment/globe"},
+      {Vec3(0.02, -0.03, 2.02), "stands in /Environment/shade"},
+      {Vec3(1.8, -1.4, 0.2), "stands in /Environment/sofa"},
+      {Vec3(-2.2, 1.4, 0.25), "stands in /Environment/chest"},
+      {Vec3(-2.62, -1.2, 1.2), "stands in /Environment/shelf"},
+      {Vec3(-0.3, 0, kOnTable + 0.2), "stands in /Assets/vase"},
+      {Vec3(2.96, 0.5, 1), "is 0.040 m from /Environment/walls"},
+      {Vec3(2, 1.2, 0.95), "is 0.050 m from /Environment/cloth"},
+      {Vec3(1.014, 1, 1), "is 0.010 m from /Environment/screen"},
+  };
+  std::vector<JudgedCamera> cameras;
+  for (const auto& seed : seeded) cameras.push_back({seed.first, 0.1});
+  const auto reasons = find_blocked(stage.scene, stage.environment, cameras);
+  for (std::size_t i = 0; i < seeded.size(); ++i) CHECK(reasons[i] == seeded[i].second);
+  // Under the table, in a corner, over the vase, before the shelf, between sofa and screen.
+  const std::vector<JudgedCamera> free{{Vec3(0.1, 0.1, 0.4), 0.1},
+                                       {Vec3(2.8, 1.8, 0.2), 0.1},
+                                       {Vec3(-0.3, 0, kOnTable + 0.55), 0.1},
+                                       {Vec3(-2.2, -1.2, 1.2), 0.1},
+                                       {Vec3(1.3, 0.3, 0.4), 0.1}};
+  CHECK(find_blocked(stage.scene, stage.environment, free) == Texts(free.size(), ""));
+}
