@@ -17,6 +17,9 @@ namespace diorama {
 /// - A body deep in a box leaves it by the face that it clears soonest. Bullet's search often fails
 ///   for small hulls in large boxes.
 /// - A lying capsule stands on both ends.
+/// - Faces that have lain on others for some steps are held from the start of a step by all of the
+///   last one's impulses, other contacts begin with the share that Bullet gives: with that share
+///   alone, stacks creep; without it, things are pressed into each other when others fall on them.
 /// - Continuous detection works for compound bodies as well; Bullet leaves them out.
 ///
 /// Static objects of triangles must carry their StaticMesh as user pointer, all others none. The
@@ -34,6 +37,7 @@ class GentleWorld final : public btDiscreteDynamicsWorld {
 
  private:
   void mend_contacts(btPersistentManifold& manifold, double lowest_distance);
+  void keep_steady_impulses(btPersistentManifold& manifold);
 
   double max_depenetration_speed_;
   btSphereShape stand_in_{0.01};

@@ -89,7 +89,7 @@ TEST_CASE("a stack of boxes stays upright and falls asleep", "[physics]") {
   }
   world.run(400);
   for (int i = 0; i < 6; ++i) {
-    CHECK((world.position(boxes[std::size_t(i)]) - Vec3(0.3, -0.4, 0.05 + 0.1 * i)).norm() < 0.015);
+    CHECK((world.position(boxes[std::size_t(i)]) - Vec3(0.3, -0.4, 0.05 + 0.1 * i)).norm() < 0.001);
   }
   const PhysicsReport report = world.backend.report();
   CHECK(report.moving_bodies == 6);
