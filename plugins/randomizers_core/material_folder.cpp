@@ -19,6 +19,8 @@ constexpr std::pair<std::string_view, MapRole> kRoles[] = {
     {"color", MapRole::Color},
     {"basecolor", MapRole::Color},
     {"col", MapRole::Color},
+    {"col1", MapRole::Color},  // the first of several colourings
+    {"col01", MapRole::Color},
     {"diff", MapRole::Color},
     {"diffuse", MapRole::Color},
     {"albedo", MapRole::Color},
@@ -44,8 +46,8 @@ constexpr std::pair<std::string_view, MapRole> kRoles[] = {
     {"disp", MapRole::Ignored},
     {"height", MapRole::Ignored},
 };
-constexpr std::string_view kPictureEndings[] = {".png", ".jpg", ".jpeg", ".exr",
-                                                ".hdr", ".tga", ".bmp"};
+constexpr std::string_view kPictureEndings[] = {".png", ".jpg", ".jpeg", ".exr",  ".hdr", ".tga",
+                                                ".bmp", ".tif", ".tiff", ".webp", ".jp2"};
 
 std::string lower(std::string_view text) {
   std::string out(text);
@@ -70,7 +72,8 @@ bool is_size(std::string_view word) {
 }
 
 bool is_format(std::string_view word) {
-  return word == "jpg" || word == "jpeg" || word == "png" || word == "exr" || word == "hdr";
+  return word == "jpg" || word == "jpeg" || word == "png" || word == "exr" || word == "hdr" ||
+         word == "tif";
 }
 
 std::vector<std::string> words_of(const std::string& text) {

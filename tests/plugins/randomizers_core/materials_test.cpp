@@ -77,6 +77,9 @@ TEST_CASE("names of pictures are taken apart as their collections put them toget
   CHECK(is("rusty_metal_metal_1k.png", "rusty_metal", MapRole::Metalness));
   CHECK(is("metal_plate_rough_1k.png", "metal_plate", MapRole::Roughness));
   CHECK(is("oak-base_color.tga", "oak", MapRole::Color));
+  CHECK(is("fabric_pattern_05_col_01_1k.png", "fabric_pattern_05", MapRole::Color));
+  CHECK(is("Bricks_4K-TIF_Roughness.tif", "bricks", MapRole::Roughness));
+  CHECK(is("oak_Color.webp", "oak", MapRole::Color));
   for (const char* other : {"Wood051.png", "color.png", "wood_color.txt", "wood_colorful.png",
                             "Wood051_1K.png", "_1K_.png", ".png", ""}) {
     CAPTURE(other);
