@@ -6,9 +6,11 @@ while they move, hang in the air or are stuck, and cameras inside of things or t
 lint --scenes` looks at the labels, and at what holds what in scenes that it sets up anew. The datasets stay
 where --output says, for looking at the pictures.
 
-    tests/furnished_rooms/check_rooms.py --assets-root FOLDER [--visits 10] [--output FOLDER] [--build FOLDER]
+    tests/furnished_rooms/check_rooms.py --assets-root FOLDER [--visits 10] [--seed N] [--job NAME] [--tiny]
+                                         [--output FOLDER] [--build FOLDER]
 
-FOLDER is an assets root with /Isaac/Samples/Replicator/Infinigen/dining_rooms/ and the props of the jobs.
+FOLDER is an assets root with /Isaac/Samples/Replicator/Infinigen/dining_rooms/ and the props of the jobs. `--tiny`
+makes pictures of one path and few pixels: what stands where is the same. Other seeds fill rooms otherwise.
 Ends with a table, and with 1 when anything was found.
 """
 import argparse
@@ -21,21 +23,27 @@ import tempfile
 import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-CAPTURES_PER_VISIT = 4
-JOBS = {
-    "dining_room": ["total_captures={captures}", "cameras[0].count=1", "cameras[0].width=320",
-                    "cameras[0].height=240", "renderer.samples=4"],
-    "infinigen_default": ["capture.total_captures={captures}", "capture.num_cameras=1",
-                          "capture.resolution=[360, 240]", "capture.rt_subframes=4"],
+TUTORIAL = ["capture.total_captures={captures}", "capture.num_cameras=1", "capture.resolution=[{width}, {height}]",
+            "capture.rt_subframes={paths}", "capture.path_tracing=false"]
+JOBS = {  # captures of a visit, settings
+    "dining_room": (4, ["total_captures={captures}", "cameras[0].count=1", "cameras[0].width={width}",
+                        "cameras[0].height={height}", "renderer.samples={paths}"]),
+    "infinigen_default": (4, TUTORIAL),
+    "infinigen_multi_writers_pt": (5, TUTORIAL),
 }
+FULL = {"width": 320, "height": 240, "paths": 4}
+TINY = {"width": 96, "height": 72, "paths": 1}
 FLAWS = ["born_inside", "left_room", "unsettled", "blocked_cameras"]
 
 
 def run(options, job, output):
     command = [options.build / "bin" / "diorama", "run", ROOT / "configs" / f"{job}.yaml", "--assets-root",
                options.assets_root, "--output", output]
-    for setting in JOBS[job]:
-        command += ["--set", setting.format(captures=options.visits * CAPTURES_PER_VISIT)]
+    if options.seed is not None:
+        command += ["--seed", str(options.seed)]
+    per_visit, settings = JOBS[job]
+    for setting in settings:
+        command += ["--set", setting.format(captures=options.visits * per_visit, **(TINY if options.tiny else FULL))]
     begin = time.monotonic()
     ended = subprocess.run(command, stderr=subprocess.PIPE, text=True)
     if ended.returncode != 0:
@@ -47,12 +55,15 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("--assets-root", type=pathlib.Path, required=True)
     parser.add_argument("--visits", type=int, default=10)
+    parser.add_argument("--seed", type=int, help="instead of the jobs'")
+    parser.add_argument("--job", choices=JOBS, action="append", help="all of them when absent")
+    parser.add_argument("--tiny", action="store_true")
     parser.add_argument("--output", type=pathlib.Path)
     parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build" / "release")
     options = parser.parse_args()
     top = options.output or pathlib.Path(tempfile.mkdtemp(prefix="diorama-rooms-"))
     failed = False
-    for job in JOBS:
+    for job in options.job or JOBS:
         seconds = run(options, job, top / job)
         counts = collections.Counter()
         reports = sorted((top / job).rglob("settle/*.json"))
