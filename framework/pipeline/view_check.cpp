@@ -254,6 +254,20 @@ std::size_t count_holding(const std::vector<Scored>& scored) {
                                    [](const Scored& one) { return !one.score.failed; }));
 }
 
+/// How short those are that fail by their coverage alone, the nearest `missing` of them; infinity
+/// when there are fewer. `uncovered`: the same targets before.
+double shortfall_of_missing(const std::vector<Scored>& covered,
+                            const std::vector<Scored>& uncovered, double missing) {
+  std::vector<double> shortfalls;
+  for (std::size_t i = 0; i < covered.size(); ++i) {
+    const bool fails_by_coverage = covered[i].score.failed && !uncovered[i].score.failed;
+    if (fails_by_coverage) shortfalls.push_back(covered[i].score.shortfall);
+  }
+  if (double(shortfalls.size()) < missing) return kInfinity;
+  std::sort(shortfalls.begin(), shortfalls.end());
+  return shortfalls[std::size_t(std::ceil(missing)) - 1];
+}
+
 /// Whether the target lies in the wanted bins; the first one that it misses.
 const Quota* missed_quota(const WantedView& wanted, const Scored& scored, bool only_of_place) {
   for (std::size_t i = 0; i < wanted.bins.size(); ++i) {
@@ -485,8 +499,8 @@ ViewVerdict ViewCheck::by_labels(const Scene& scene, NodeId camera,
       verdict.add(judge(one, scored));
       continue;
     }
-    // Coverage is dear: that of targets which cannot hold any more counts only for what is
-    // nearest to holding, or where every target counts.
+    // Coverage is dear: that of targets which cannot hold any more counts only where too few hold,
+    // for what is nearest to holding, or where every target counts.
     std::vector<Scored> judged = scored;
     const auto add_coverage = [&](Scored& target) {
       seen.measure_coverage(target);
@@ -496,13 +510,23 @@ ViewVerdict ViewCheck::by_labels(const Scene& scene, NodeId camera,
     for (Scored& target : judged) {
       if (rule.every_target || !target.score.failed) add_coverage(target);
     }
-    ViewVerdict own = judge(one, judged);
-    if (!own.holds() && !rule.every_target) {
-      seen.cover(scored, false, labels.cover);
-      for (Scored& target : scored) add_coverage(target);
-      own = judge(one, scored);
+    const std::size_t holding = count_holding(judged);
+    const bool lacks_targets = rule.count.min && double(holding) < *rule.count.min;
+    if (lacks_targets && !rule.every_target) {
+      // Coverage takes a target only farther from holding.
+      const double nearest =
+          shortfall_of_missing(judged, scored, *rule.count.min - double(holding));
+      std::vector<Scored> nearer;
+      for (const Scored& target : scored) {
+        if (target.score.shortfall <= nearest) nearer.push_back(target);
+      }
+      seen.cover(nearer, false, labels.cover);
+      for (std::size_t i = 0; i < scored.size(); ++i) {
+        const bool is_new = scored[i].score.failed && scored[i].score.shortfall <= nearest;
+        if (is_new) add_coverage(judged[i]);
+      }
     }
-    verdict.add(own);
+    verdict.add(judge(one, judged));
   }
   return verdict;
 }
