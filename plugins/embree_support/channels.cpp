@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "diorama/renderer.h"
 #include "renderer_support/ray_blocks.h"
 #include "renderer_support/silhouette.h"
 
@@ -279,6 +280,35 @@ std::vector<CoverageMask> coverage(const EmbreeScene& meshes, const View& view,
     masks[i] = coverage_of(meshes, view, blocks, seen, instances[i], with_distances, isa, host);
   });
   return masks;
+}
+
+std::vector<std::uint8_t> seen_points(const EmbreeScene& meshes, const Vec3& centre,
+                                      std::span<const Vec3> points_world, Host& host) {
+  std::vector<std::uint8_t> seen(points_world.size(), 1);
+  const std::size_t batches = (points_world.size() + kBatch - 1) / kBatch;
+  host.parallel_for(batches, [&](std::size_t batch) {
+    const std::size_t begin = batch * kBatch;
+    const std::size_t end = std::min(begin + kBatch, points_world.size());
+    std::array<std::size_t, kBatch> point_of_ray;
+    BatchRays rays;
+    rays.is_coherent = true;
+    rays.count = 0;
+    for (std::size_t i = begin; i < end; ++i) {
+      const Vec3 towards = points_world[i] - centre;
+      const double distance = towards.norm();
+      const double reach = distance - sight_margin(distance);
+      if (reach <= 0.0) continue;
+      point_of_ray[rays.count] = i;
+      rays.add(centre.cast<float>(), Vec3(towards / distance).cast<float>(), 0.0f, float(reach),
+               kMoment);
+    }
+    BatchHits hits;
+    meshes.intersect_now(rays, hits);
+    for (std::size_t i = 0; i < rays.count; ++i) {
+      if (hits.instance[i]) seen[point_of_ray[i]] = 0;
+    }
+  });
+  return seen;
 }
 
 }  // namespace diorama

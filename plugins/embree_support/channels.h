@@ -39,4 +39,8 @@ std::vector<CoverageMask> coverage(const EmbreeScene& meshes, const View& view,
                                    std::span<const LabelledInstance> instances, bool with_distances,
                                    Isa isa, Host& host);
 
+/// See Renderer::sees; `centre` is the camera's.
+std::vector<std::uint8_t> seen_points(const EmbreeScene& meshes, const Vec3& centre,
+                                      std::span<const Vec3> points_world, Host& host);
+
 }  // namespace diorama

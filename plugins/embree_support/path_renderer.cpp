@@ -258,4 +258,9 @@ std::vector<CoverageMask> PathRenderer::do_cover(const Scene& scene, NodeId came
   return coverage(meshes_, view, seen(view, camera), instances, with_distances, isa_, host_);
 }
 
+std::vector<std::uint8_t> PathRenderer::do_see(const Scene& scene, NodeId camera,
+                                               std::span<const Vec3> points_world) {
+  return seen_points(meshes_, scene.world_from_node(camera).translation(), points_world, host_);
+}
+
 }  // namespace diorama

@@ -88,6 +88,8 @@ class PathRenderer : public Renderer {
   std::vector<CoverageMask> do_cover(const Scene& scene, NodeId camera,
                                      std::span<const LabelledInstance> instances,
                                      bool with_distances) override;
+  std::vector<std::uint8_t> do_see(const Scene& scene, NodeId camera,
+                                   std::span<const Vec3> points_world) override;
   std::size_t working_bytes(const Camera& camera, const NameSet& channels) const override;
   const SeenMeshes& seen(const View& view, NodeId camera);
   bool starts_at_centres(const View& view) const;

@@ -139,9 +139,12 @@ void BulletBackend::do_reset(const Scene& scene) {
                                  std::to_string(world.bodies.moving.size()) + " moving bodies");
 }
 
-void BulletBackend::do_advance(int steps) {
-  const double seconds = params_.step_seconds / params_.sub_steps;
+void BulletBackend::do_advance(int steps) { do_advance_by(steps, params_.step_seconds); }
+
+bool BulletBackend::do_advance_by(int steps, double step_s) {
+  const double seconds = step_s / params_.sub_steps;
   for (int i = 0; i < steps * params_.sub_steps; ++i) world_->dynamics.stepSimulation(seconds, 0);
+  return true;
 }
 
 void BulletBackend::do_write_poses(Scene& scene) const {
@@ -159,9 +162,7 @@ void BulletBackend::do_write_poses(Scene& scene) const {
     const Vec3 velocity = from_bullet(moving.body->getLinearVelocity()) + spin.cross(arm);
     const RigidBody& known = *scene[moving.node].rigid_body;
     if (known.linear_velocity == velocity && known.angular_velocity == spin) continue;
-    RigidBody& written = *scene.edit(moving.node).rigid_body;
-    written.linear_velocity = velocity;
-    written.angular_velocity = spin;
+    scene.set_velocity(moving.node, velocity, spin);
   }
 }
 

@@ -45,6 +45,7 @@ class BulletBackend final : public PhysicsBackend {
 
   void do_reset(const Scene& scene) override;
   void do_advance(int steps) override;
+  bool do_advance_by(int steps, double step_s) override;
   void do_write_poses(Scene& scene) const override;
 
   Params params_;

@@ -207,4 +207,23 @@ std::vector<CoverageMask> NullRenderer::do_cover(const Scene& scene, NodeId came
   return masks;
 }
 
+std::vector<std::uint8_t> NullRenderer::do_see(const Scene& scene, NodeId camera,
+                                               std::span<const Vec3> points_world) {
+  const Vec3 centre = scene.world_from_node(camera).translation();
+  std::vector<std::uint8_t> seen(points_world.size(), 1);
+  constexpr std::size_t kAtOnce = 256;
+  host_.parallel_for((points_world.size() + kAtOnce - 1) / kAtOnce, [&](std::size_t part) {
+    const std::size_t end = std::min((part + 1) * kAtOnce, points_world.size());
+    for (std::size_t i = part * kAtOnce; i < end; ++i) {
+      const Vec3 towards = points_world[i] - centre;
+      const double distance = towards.norm();
+      const double reach = distance - sight_margin(distance);
+      if (reach <= 0.0) continue;
+      const Segment segment{centre, towards / distance, 0.0, reach};
+      seen[i] = meshes_.first_hit(segment).node ? 0 : 1;
+    }
+  });
+  return seen;
+}
+
 }  // namespace diorama

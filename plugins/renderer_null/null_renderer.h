@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
+#include <span>
 #include <vector>
 
 #include "diorama/host.h"
@@ -27,6 +29,8 @@ class NullRenderer final : public Renderer {
   std::vector<CoverageMask> do_cover(const Scene& scene, NodeId camera,
                                      std::span<const LabelledInstance> instances,
                                      bool with_distances) override;
+  std::vector<std::uint8_t> do_see(const Scene& scene, NodeId camera,
+                                   std::span<const Vec3> points_world) override;
 
   Host& host_;
   NullScene meshes_;

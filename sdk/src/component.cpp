@@ -32,6 +32,7 @@ std::string_view kind_name(ComponentKind kind) {
 Component::~Component() = default;
 Loader::~Loader() = default;
 Randomizer::~Randomizer() = default;
+void Randomizer::play(Scene&, const ClipFrame&) {}
 Registrar::~Registrar() = default;
 
 std::vector<std::string> Loader::assets() const { return {}; }

@@ -94,7 +94,7 @@ void Frame::check_channel(std::string_view channel) const {
   std::visit(check_size, image_named(channel));
   check_type(*this, channel, kColor, kColorHdr, kDistanceToCamera, kDistanceToImagePlane, kNormals,
              kLeafId, kInstanceId, kPosition, kUv, kAlbedo, kObjectCoordinates, kMotion,
-             kSensorDepth);
+             kSensorDepth, kFlowForward, kFlowBackward, kFlowForwardState, kFlowBackwardState);
 }
 
 void Frame::set_image(std::string_view channel, AnyImage image) {

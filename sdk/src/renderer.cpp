@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "diorama/renderer.h"
 
+#include <algorithm>
+
 #include "diorama/error.h"
+#include "diorama/obstacles.h"
 
 namespace diorama {
 
@@ -108,6 +111,30 @@ std::vector<CoverageMask> Renderer::cover(NodeId camera,
     check_mask(lens, masks[i], with_distances, scene_->path(instances[i].node));
   }
   return masks;
+}
+
+std::vector<std::uint8_t> Renderer::sees(NodeId camera, std::span<const Vec3> points_world) {
+  checked_camera(scene_, camera);
+  std::vector<std::uint8_t> seen = do_see(*scene_, camera, points_world);
+  if (seen.size() == points_world.size()) return seen;
+  fail("Renderer: expected " + std::to_string(points_world.size()) + " answers, found " +
+       std::to_string(seen.size()));
+}
+
+std::vector<std::uint8_t> Renderer::do_see(const Scene& scene, NodeId camera,
+                                           std::span<const Vec3> points_world) {
+  const NodeId root = scene.root();
+  const Obstacles obstacles(scene, {&root, 1}, Obstacles::Hidden::LeaveOut);
+  const Vec3 centre = scene.world_from_node(camera).translation();
+  std::vector<std::uint8_t> seen;
+  seen.reserve(points_world.size());
+  for (const Vec3& point : points_world) {
+    const double distance = (point - centre).norm();
+    const double share = std::max(0.0, 1.0 - sight_margin(distance) / distance);
+    seen.push_back(distance == 0.0 ||
+                   !obstacles.is_between(centre, centre + share * (point - centre)));
+  }
+  return seen;
 }
 
 }  // namespace diorama

@@ -311,6 +311,16 @@ void Scene::set_pose(NodeId node, const Transform& parent_from_node) {
   set_pose(node, parent_from_node.affine());
 }
 
+void Scene::set_velocity(NodeId node, const Vec3& linear, const Vec3& angular) {
+  Slot& slot = state_->at(node);
+  if (!slot.node.rigid_body) {
+    throw Error(ErrorKind::Internal, path(node) + ": only rigid bodies have a velocity");
+  }
+  slot.node.rigid_body->linear_velocity = linear;
+  slot.node.rigid_body->angular_velocity = angular;
+  state_->pose_revision = next_revision();
+}
+
 Node& Scene::edit(NodeId node) {
   Slot& slot = state_->at(node);
   state_->shape_revision = next_revision();

@@ -45,10 +45,10 @@ consteval std::uint64_t layout_of() {
 inline constexpr std::uint64_t kLayout =
     layout_of<Vec2, Vec3, Vec3f, Quat, Mat4, Affine, Transform, Aabb, Rng, Image<Rgba8>, AnyImage,
               PixelBox, Mesh, Texture, TextureInput, Material, Light, Camera, Collider, RigidBody,
-              NodeId, Node, Scene, LabelledInstance, CoverageMask, Visibility, Instance, Frame,
-              Capture, Place, Value, Complaints, Range, ParamDoc, ParamSpec, ParamReader,
-              ParamLister, Distribution, TextDistribution, Component, Host, ImageView, Loader,
-              PhysicsReport, PhysicsBackend, RandomizeContext, Randomizer, RenderRequest,
+              NodeId, Node, Scene, LabelledInstance, CoverageMask, Visibility, Velocity, Instance,
+              Frame, ClipFrame, Capture, Place, Value, Complaints, Range, ParamDoc, ParamSpec,
+              ParamReader, ParamLister, Distribution, TextDistribution, Component, Host, ImageView,
+              Loader, PhysicsReport, PhysicsBackend, RandomizeContext, Randomizer, RenderRequest,
               RenderReport, Renderer, Annotator, DatasetInfo, DatasetFiles, CaptureFiles, Writer,
               Finding, ReadLog, StoredInfo, StoredCapture, StoredDataset, Reader, Error>();
 

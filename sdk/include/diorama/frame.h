@@ -52,11 +52,28 @@ inline constexpr Channel<Vec3f> kAlbedo{"albedo"};
 /// for unlabelled pixels. Derived by the host.
 inline constexpr Channel<Vec3f> kObjectCoordinates{"object_coordinates"};
 /// Pixels that the surface point moved since the previous time step, image x right, y down; zero
-/// where nothing was hit. Derived by the host.
+/// where nothing was hit. In a clip: since the previous frame, zero in the first one. Derived by
+/// the host.
 inline constexpr Channel<Vec2f> kMotion{"motion"};
+/// Where the surface point in a pixel's centre is in the picture of the clip's next (forward) or
+/// previous (backward) frame, less where it is here; pixels, image x right, y down. Zero where the
+/// lens images the point nowhere, and where the state is Unknown. Derived by the host.
+inline constexpr Channel<Vec2f> kFlowForward{"flow_forward"};
+inline constexpr Channel<Vec2f> kFlowBackward{"flow_backward"};
+/// What becomes of these points there: values of FlowState.
+inline constexpr Channel<std::uint32_t> kFlowForwardState{"flow_forward_state"};
+inline constexpr Channel<std::uint32_t> kFlowBackwardState{"flow_backward_state"};
 /// Metres along the viewing axis as a depth camera measures them; 0 where it measures nothing.
 /// Made by annotators, not a label.
 inline constexpr Channel<float> kSensorDepth{"sensor_depth"};
+
+/// What the other frame of a flow shows of a point.
+enum class FlowState : std::uint32_t {
+  Seen = 0,     ///< The point itself.
+  Hidden = 1,   ///< Something in front of it.
+  Outside = 2,  ///< Nothing: it is out of the picture, or too near or far.
+  Unknown = 3,  ///< There is no such point (nothing was hit), or no such frame.
+};
 
 /// True for names that stand for fields of a frame instead of channels: "instances", "visibility",
 /// "amodal_mask", "occlusion_order".
@@ -105,6 +122,12 @@ struct Visibility {
   }
 };
 
+/// How a node's origin moves and how the node turns.
+struct Velocity {
+  Vec3 linear = Vec3::Zero();   ///< m/s, world.
+  Vec3 angular = Vec3::Zero();  ///< rad/s, world axes.
+};
+
 /// A labelled node as one camera sees it.
 struct Instance {
   std::uint32_t id = 0;  ///< Value in kInstanceId.
@@ -117,6 +140,8 @@ struct Instance {
   std::optional<Visibility> visibility;  ///< Filled when "visibility" was demanded.
   /// Of all its parts, in its own space, before world_from_node; each name once.
   std::vector<Keypoint> keypoints;
+  /// As the simulation left it; absent for what is no part of a rigid body.
+  std::optional<Velocity> velocity;
 };
 
 /// Two instances that cover some of the same pixels of the image, seen or hidden by a third.
@@ -185,13 +210,25 @@ class DIORAMA_SDK_API Frame {
   const Access* access_ = nullptr;  ///< Null: everything.
 };
 
+/// The place of a capture in a clip: captures of one scene in which time goes on. Instance ids and
+/// node paths are those of the same things in all frames of a clip.
+struct ClipFrame {
+  int clip = 0;                                  ///< 0-based in the whole job.
+  int frame = 0;                                 ///< 0-based in the clip.
+  int frame_count = 1;                           ///< Of the clip.
+  double fps = 30.0;                             ///< Frames per second.
+  double time_s() const { return frame / fps; }  ///< Since the clip's first frame.
+  friend bool operator==(const ClipFrame&, const ClipFrame&) = default;
+};
+
 /// One moment of the scene seen by all cameras.
 struct Capture {
   int index = 0;      ///< 0-based in the whole job, the same in every shard.
   int visit = 0;      ///< Which pass through an environment.
   std::string phase;  ///< Name of the capture series: "floating", "dropped".
   std::string environment;
-  std::vector<Frame> frames;  ///< One per camera, in camera order.
+  std::vector<Frame> frames;      ///< One per camera, in camera order.
+  std::optional<ClipFrame> clip;  ///< Absent for captures that stand alone.
 };
 
 }  // namespace diorama

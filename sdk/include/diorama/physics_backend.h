@@ -31,12 +31,16 @@ class DIORAMA_SDK_API PhysicsBackend : public Component {
   /// Takes `steps` fixed steps (0 or more), then writes poses and velocities of moving bodies.
   /// Throws Error naming the node when a pose is not finite.
   void advance(Scene& scene, int steps);
+  /// The same in steps of another length, in seconds above 0. Throws Error(Config) when the backend
+  /// knows no length but its own.
+  void advance(Scene& scene, int steps, double step_s);
   virtual double step_seconds() const = 0;
   virtual PhysicsReport report() const = 0;
 
  private:
   virtual void do_reset(const Scene& scene) = 0;
-  virtual void do_advance(int steps) = 0;  // steps > 0
+  virtual void do_advance(int steps) = 0;                // steps > 0
+  virtual bool do_advance_by(int steps, double step_s);  // false: takes none
   virtual void do_write_poses(Scene& scene) const = 0;
 };
 

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "diorama/component.h"
+#include "diorama/frame.h"
 #include "diorama/rng.h"
 #include "diorama/scene.h"
 
@@ -17,6 +19,8 @@ struct RandomizeContext {
   /// How many times this randomizer acted at this moment before, in all earlier visits and in this
   /// one, whether or not this run made them. What a `sequence` goes by.
   int occurrence = 0;
+  /// The first frame of the clip that begins, at the moments of clips.
+  std::optional<ClipFrame> clip;
 };
 
 /// Changes poses, lights, materials, cameras. Called by one thread at a time.
@@ -29,6 +33,11 @@ class DIORAMA_SDK_API Randomizer : public Component {
   /// All chance comes from `rng`, which is keyed by visit, capture and this randomizer's name. Fork
   /// it per node path, so that one more node leaves the draws of the others as they were.
   virtual void randomize(Scene& scene, const RandomizeContext& context, const Rng& rng) = 0;
+
+  /// Of randomizers that acted when a clip began: sets poses for one of its frames. Called for all
+  /// of them in order, the first one too, once physics has moved its bodies. Only poses may change
+  /// (Scene::set_pose), none of rigid bodies. Nothing moves unless a randomizer does more.
+  virtual void play(Scene& scene, const ClipFrame& frame);
 };
 
 }  // namespace diorama

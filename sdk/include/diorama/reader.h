@@ -40,7 +40,9 @@ inline constexpr std::string_view kHoldsAmodalBoxes = "amodal_boxes";
 inline constexpr std::string_view kHoldsCamera =
     "camera";  ///< Intrinsics and lens, not size alone.
 inline constexpr std::string_view kHoldsCameraPose = "camera_pose";
-inline constexpr std::string_view kHoldsLeafPaths = "leaf_paths";  ///< Frame::leaf_paths.
+inline constexpr std::string_view kHoldsClips = "clips";            ///< Capture::clip.
+inline constexpr std::string_view kHoldsVelocities = "velocities";  ///< Instance::velocity.
+inline constexpr std::string_view kHoldsLeafPaths = "leaf_paths";   ///< Frame::leaf_paths.
 
 /// Something about a dataset that cannot be right.
 struct Finding {

@@ -28,6 +28,9 @@ struct RenderReport {
   std::vector<std::pair<std::string, double>> seconds;
 };
 
+/// Points of surfaces, in single precision, lie so far off these: metres at a distance of so many.
+inline double sight_margin(double distance_m) { return 1e-4 + 2e-4 * distance_m; }
+
 /// Turns a scene into channels. Called by one thread at a time; may use Host::parallel_for.
 class DIORAMA_SDK_API Renderer : public Component {
  public:
@@ -57,12 +60,20 @@ class DIORAMA_SDK_API Renderer : public Component {
   std::vector<CoverageMask> cover(NodeId camera, std::span<const LabelledInstance> instances,
                                   bool with_distances = false);
 
+  /// 1 for points of the world from which nothing stands between them and the camera's centre that
+  /// label channels show, 0 for others. How near and far the camera sees is not asked.
+  std::vector<std::uint8_t> sees(NodeId camera, std::span<const Vec3> points_world);
+
  private:
   virtual void do_prepare(const Scene& scene) = 0;
   virtual Frame do_render(const Scene& scene, const RenderRequest& request) = 0;
   virtual std::vector<CoverageMask> do_cover(const Scene& scene, NodeId camera,
                                              std::span<const LabelledInstance> instances,
                                              bool with_distances) = 0;
+  /// By triangles alone, whatever their opacity, unless a renderer does better. What is nearer to a
+  /// point than sight_margin() does not hide it.
+  virtual std::vector<std::uint8_t> do_see(const Scene& scene, NodeId camera,
+                                           std::span<const Vec3> points_world);
   const Scene* scene_ = nullptr;
 };
 
