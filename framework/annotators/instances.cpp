@@ -82,6 +82,17 @@ std::vector<Keypoint> instance_keypoints(const Scene& scene, NodeId labelled) {
   return points;
 }
 
+std::optional<Velocity> instance_velocity(const Scene& scene, NodeId labelled) {
+  NodeId body = labelled;
+  while (body && !scene[body].rigid_body) body = scene[body].parent;
+  if (!body) return std::nullopt;
+  const RigidBody& moving = *scene[body].rigid_body;
+  const Vec3 arm =
+      scene.world_from_node(labelled).translation() - scene.world_from_node(body).translation();
+  return Velocity{moving.linear_velocity + moving.angular_velocity.cross(arm),
+                  moving.angular_velocity};
+}
+
 NameSet Instances::needs() const { return {std::string(kInstanceId.name)}; }
 NameSet Instances::provides() const { return {"instances"}; }
 
@@ -95,6 +106,7 @@ void Instances::do_annotate(const Scene& scene, Frame& frame) const {
     instance.world_from_node = scene.world_from_node(labelled.node);
     instance.bounds_node = instance_bounds(scene, labelled);
     instance.keypoints = instance_keypoints(scene, labelled.node);
+    instance.velocity = instance_velocity(scene, labelled.node);
     frame.instances.push_back(std::move(instance));
   }
   measure_tight_boxes(frame.get(kInstanceId), frame.instances);

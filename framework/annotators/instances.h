@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "diorama/annotator.h"
@@ -16,6 +17,10 @@ Aabb instance_bounds(const Scene& scene, const LabelledInstance& instance);
 
 /// Keypoints of a labelled node and of what below it belongs to it, in its space; each name once.
 std::vector<Keypoint> instance_keypoints(const Scene& scene, NodeId labelled);
+
+/// Of the rigid body at or nearest above a labelled node, at the node's origin; nothing without
+/// one.
+std::optional<Velocity> instance_velocity(const Scene& scene, NodeId labelled);
 
 /// Sets Instance::tight_box of those that have pixels; `ids` is kInstanceId.
 void measure_tight_boxes(const Image<std::uint32_t>& ids, std::vector<Instance>& instances);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdio>
 
 #include "framework/config/clean_text.h"
 
@@ -148,6 +149,12 @@ void json(const Value& value, int indent, int depth, std::string& text) {
 }
 
 }  // namespace
+
+std::string short_number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%g", value);
+  return text;
+}
 
 bool is_json_number(std::string_view text) {
   std::size_t i = 0;

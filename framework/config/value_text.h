@@ -20,6 +20,9 @@ std::string to_json(const Value& value, int indent);
 /// The text as a JSON string literal with quotes. Bytes that are not UTF-8 become U+FFFD.
 std::string json_quoted(std::string_view text);
 
+/// "0.5", "30", "1e+06": six digits at most.
+std::string short_number(double value);
+
 /// True when a plain scalar reads as a JSON number: `-1.5e3`, not `012`, `.5`, `0x10` or `nan`.
 bool is_json_number(std::string_view text);
 

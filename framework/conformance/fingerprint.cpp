@@ -114,6 +114,7 @@ class Bytes {
             instance.bounds_node.min, instance.bounds_node.max, instance.tight_box,
             instance.visibility);
     for (const Keypoint& point : instance.keypoints) add_all(point.name, point.position);
+    if (instance.velocity) add_all(instance.velocity->linear, instance.velocity->angular);
   }
   void add(const AnyImage& any) {
     std::visit(
@@ -154,6 +155,10 @@ std::string fingerprint(const Frame& frame) {
 std::string fingerprint(const Capture& capture) {
   Bytes bytes;
   bytes.add_all(capture.index, capture.visit, capture.phase, capture.environment);
+  if (capture.clip) {
+    bytes.add_all(capture.clip->clip, capture.clip->frame, capture.clip->frame_count,
+                  capture.clip->fps);
+  }
   for (const Frame& frame : capture.frames) bytes.add(fingerprint(frame));
   return bytes.text;
 }

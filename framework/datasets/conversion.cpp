@@ -177,6 +177,7 @@ void Conversion::unite_infos() {
   info_.classes.clear();
   info_.resolved_job.clear();
   info_.validation.reset();
+  info_.clips.clear();
   std::set<Labels> labels;
   std::map<std::string, DatasetAsset> assets;
   const bool have_classes = std::ranges::all_of(
@@ -201,6 +202,10 @@ void Conversion::unite_infos() {
       for (const int capture : *each.validation) {
         info_.validation->push_back(info_.capture_count + capture);
       }
+    }
+    for (DatasetClip clip : each.clips) {
+      clip.first += info_.capture_count;
+      info_.clips.push_back(clip);
     }
     info_.capture_count += each.capture_count;
   }
@@ -227,6 +232,7 @@ void Conversion::run(Host& host, const std::function<void(Capture)>& take) const
         [&](StoredCapture stored) { return converted(source, std::move(stored)); },
         [&](Capture capture) {
           capture.index = number++;
+          capture.clip = clip_frame(info_.clips, capture.index);
           take(std::move(capture));
         });
   }

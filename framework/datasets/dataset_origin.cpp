@@ -87,7 +87,19 @@ void add_making_of(const std::string& text, DatasetInfo& info) {
 struct Front {
   std::set<Labels> labels;
   std::string split;
+  std::optional<ClipFrame> clip;
 };
+
+/// Frames that are not there end a clip, and another one begins.
+void add_clip_frame(const std::optional<ClipFrame>& at, int place,
+                    std::vector<DatasetClip>& clips) {
+  if (!at) return;
+  const bool goes_on = at->frame > 0 && !clips.empty() &&
+                       clips.back().first + clips.back().count == place &&
+                       clips.back().fps == at->fps && clips.back().count == at->frame;
+  if (!goes_on) clips.push_back({place, 0, at->fps});
+  ++clips.back().count;
+}
 
 void add_from_captures(const StoredDataset& dataset, bool wants_labels, DatasetInfo& info,
                        Host& host) {
@@ -96,14 +108,15 @@ void add_from_captures(const StoredDataset& dataset, bool wants_labels, DatasetI
   const NameSet wanted =
       wants_labels ? NameSet{std::string(kHoldsInstances), std::string(kHoldsLabels)} : NameSet{};
   const bool has_splits = !dataset.read(0, {}).split.empty();
-  if (!has_splits && !wants_labels) return;
+  const bool has_clips = stored.holds.contains(kHoldsClips);
+  if (!has_splits && !wants_labels && !has_clips) return;
   std::set<Labels> labels;
   std::vector<int> validation;
   int place = 0;
   sweep_captures<Front>(
       dataset, wanted, host,
       [](const StoredCapture& capture) {
-        Front front{{}, capture.split};
+        Front front{{}, capture.split, capture.capture.clip};
         for (const Frame& frame : capture.capture.frames) {
           for (const Instance& instance : frame.instances) front.labels.insert(instance.labels);
         }
@@ -113,6 +126,7 @@ void add_from_captures(const StoredDataset& dataset, bool wants_labels, DatasetI
         labels.merge(front.labels);
         // Whatever is not for training is for validation: "val", "test", "valid".
         if (!front.split.empty() && !front.split.starts_with("train")) validation.push_back(place);
+        add_clip_frame(front.clip, place, info.clips);
         ++place;
       });
   labels.erase(Labels());

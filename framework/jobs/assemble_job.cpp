@@ -319,6 +319,14 @@ CaptureMemory memory_of(const JobAssembly& assembly) {
   NameSet channels = parts.demand.channels;
   for (const auto& named : set.annotators) channels.merge(named.annotator->provides());
   if (parts.demand.motion) channels.emplace(kMotion.name);
+  if (parts.demand.flow_forward) {
+    channels.emplace(kFlowForward.name);
+    channels.emplace(kFlowForwardState.name);
+  }
+  if (parts.demand.flow_backward) {
+    channels.emplace(kFlowBackward.name);
+    channels.emplace(kFlowBackwardState.name);
+  }
   return capture_memory(cameras, channels, *set.renderer);
 }
 

@@ -138,7 +138,7 @@ int moments_per_visit(const Job& job, const std::string& moment) {
   int count = 0;
   for (const TimelineStep& step : job.timeline) {
     if (step.name != moment) continue;
-    count += step.kind == TimelineStep::Kind::Capture ? step.count : 1;
+    count += step.kind == TimelineStep::Kind::Capture ? step.count : 1;  // a clip is one moment
   }
   return count;
 }
@@ -150,9 +150,12 @@ CapturePlan::CapturePlan(const Job& job, std::vector<EnvironmentChoice> choices)
   std::map<std::string, std::int64_t> taken_of_series;
   for (const TimelineStep& step : job.timeline) {
     if (step.count == 0) continue;
+    const bool is_clip = step.kind == TimelineStep::Kind::Record;
     std::int64_t& taken = taken_of_series[step.name];
-    steps_.push_back({step.name, captures_per_visit_, step.count, taken});
-    taken += step.count;
+    steps_.push_back(
+        {step.name, captures_per_visit_, step.count, taken, step.fps, clips_per_visit_});
+    taken += is_clip ? 1 : step.count;
+    clips_per_visit_ += is_clip ? 1 : 0;
     captures_per_visit_ += step.count;
   }
   if (captures_per_visit_ > 0 || capture_count_ == 0) return;
@@ -179,7 +182,17 @@ PlannedCapture CapturePlan::capture(int index) const {
   const auto behind = std::upper_bound(steps_.begin(), steps_.end(), place,
                                        [](auto at, const Step& step) { return at < step.first; });
   const Step& step = *std::prev(behind);
-  return {index, step.phase, int(step.first_number + place - step.first)};
+  const std::int64_t number = place - step.first;
+  if (step.fps == 0.0) return {index, step.phase, int(step.first_number + number), {}};
+  const std::int64_t visit = index / captures_per_visit_;
+  // The last clip of a job may be cut short.
+  const std::int64_t left = capture_count_ - (index - number);
+  ClipFrame clip;
+  clip.clip = int(visit * clips_per_visit_ + step.clip);
+  clip.frame = int(number);
+  clip.frame_count = int(std::min(step.count, left));
+  clip.fps = step.fps;
+  return {index, step.phase, int(step.first_number), clip};
 }
 
 std::vector<PlannedSeries> CapturePlan::series(const PlannedVisit& visit) const {
@@ -187,8 +200,24 @@ std::vector<PlannedSeries> CapturePlan::series(const PlannedVisit& visit) const 
   for (const Step& step : steps_) {
     if (step.first >= visit.capture_count) break;
     const int count = int(std::min(step.count, visit.capture_count - step.first));
-    if (list.empty() || list.back().phase != step.phase) list.push_back({step.phase, 0});
+    if (step.fps > 0.0 || list.empty() || list.back().phase != step.phase) {
+      list.push_back({step.phase, 0, step.fps});
+    }
     list.back().count += count;
+  }
+  return list;
+}
+
+std::vector<DatasetClip> CapturePlan::clips() const {
+  std::vector<DatasetClip> list;
+  if (clips_per_visit_ == 0) return list;
+  for (std::int64_t begin = 0; begin < capture_count_; begin += captures_per_visit_) {
+    for (const Step& step : steps_) {
+      const std::int64_t first = begin + step.first;
+      if (step.fps == 0.0 || first >= capture_count_) continue;
+      const auto count = std::min<std::int64_t>(step.count, capture_count_ - first);
+      list.push_back({int(first), int(count), step.fps});
+    }
   }
   return list;
 }

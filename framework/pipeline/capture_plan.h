@@ -9,8 +9,10 @@
 #include <string_view>
 #include <vector>
 
+#include "diorama/frame.h"
 #include "diorama/rng.h"
 #include "diorama/scene.h"
+#include "diorama/writer.h"
 #include "framework/pipeline/job.h"
 
 namespace diorama {
@@ -37,7 +39,8 @@ struct PlannedObject {
 struct PlannedCapture {
   int index = 0;  ///< Capture::index.
   std::string phase;
-  int number = 0;  ///< From 0 within its series and visit.
+  int number = 0;  ///< From 0 within its series and visit; of a clip's frames that of the clip.
+  std::optional<ClipFrame> clip;
 };
 
 struct PlannedVisit {
@@ -51,6 +54,7 @@ struct PlannedVisit {
 struct PlannedSeries {
   std::string phase;
   int count = 0;
+  double fps = 0.0;  ///< Above 0: the frames of one clip.
 };
 
 /// Visits and captures follow from the timeline by a formula, so a plan takes the same memory for
@@ -70,6 +74,8 @@ class CapturePlan {
   PlannedVisit visit(int index) const;
   PlannedCapture capture(int index) const;
   std::vector<PlannedSeries> series(const PlannedVisit& visit) const;
+  /// Of all visits.
+  std::vector<DatasetClip> clips() const;
 
  private:
   /// A step of the timeline that takes captures.
@@ -78,9 +84,12 @@ class CapturePlan {
     std::int64_t first = 0;  // of the visit's captures
     std::int64_t count = 0;
     std::int64_t first_number = 0;
+    double fps = 0.0;       // of a clip; 0: single captures
+    std::int64_t clip = 0;  // of the visit's
   };
   std::vector<Step> steps_;
   std::int64_t captures_per_visit_ = 0;
+  std::int64_t clips_per_visit_ = 0;
   int capture_count_ = 0;
 };
 

@@ -115,6 +115,10 @@ std::string timeline_text(const Job& job) {
       case TimelineStep::Kind::Capture:
         text += "capture " + step.name + " x " + std::to_string(step.count);
         break;
+      case TimelineStep::Kind::Record:
+        text += "record " + step.name + " x " + std::to_string(step.count) + " at " +
+                short_number(step.fps) + "/s";
+        break;
       case TimelineStep::Kind::Event:
         text += "event " + step.name;
         break;
@@ -248,6 +252,7 @@ DatasetInfo describe_dataset(const Job& job, const CapturePlan& plan, std::strin
   info.seed = job.seed;
   info.capture_count = plan.capture_count();
   info.camera_names = job.camera_names();
+  info.clips = plan.clips();
   std::set<Labels> labels;
   std::map<Labels, std::vector<std::string>> keypoints;
   visit_planned_objects(job, plan, [&](const PlannedObject& object) {
@@ -275,6 +280,10 @@ std::string dataset_json(const DatasetInfo& info, const Job& job) {
   for (const auto& [name, version] : info.plugin_versions) json["plugins"][name] = version;
   json["seed"] = info.seed;
   json["captures"] = info.capture_count;
+  for (const DatasetClip& clip : info.clips) {
+    json["clips"].push_back(
+        {{"first_capture", clip.first}, {"frame_count", clip.count}, {"fps", clip.fps}});
+  }
   json["cameras"] = info.camera_names;
   if (const OrderedJson rigs = rigs_json(job); !rigs.empty()) json["rigs"] = rigs;
   json["labels"] = OrderedJson::array();

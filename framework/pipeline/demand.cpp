@@ -36,6 +36,13 @@ class Resolution {
       demand_.motion = true;
       return;
     }
+    const bool is_forward = name == kFlowForward.name || name == kFlowForwardState.name;
+    if (is_forward || name == kFlowBackward.name || name == kFlowBackwardState.name) {
+      want(who, std::string(kLeafId.name));
+      want(who, std::string(kPosition.name));
+      (is_forward ? demand_.flow_forward : demand_.flow_backward) = true;
+      return;
+    }
     const auto offer = offer_of(name, false);
     if (!offer) refuse(who, name);
     use(who, *offer);
@@ -76,7 +83,10 @@ class Resolution {
     known.emplace_back(kVisibility);
     known.emplace_back(kAmodalMask);
     known.emplace_back(kOcclusionOrder);
-    known.emplace_back(kMotion.name);
+    for (const auto& name : {kMotion.name, kFlowForward.name, kFlowBackward.name,
+                             kFlowForwardState.name, kFlowBackwardState.name}) {
+      known.emplace_back(name);
+    }
     std::sort(known.begin(), known.end());
     std::string list;
     for (const std::string& word : known) list += (list.empty() ? "" : ", ") + word;

@@ -32,6 +32,8 @@ struct Demand {
   bool amodal_mask = false;             ///< ... with masks.
   bool occlusion_order = false;         ///< Frame::occlusions.
   bool motion = false;                  ///< kMotion, when the renderer does not provide it.
+  bool flow_forward = false;            ///< kFlowForward and its states.
+  bool flow_backward = false;           ///< kFlowBackward and its states.
 };
 
 /// Annotations that the pipeline itself makes, with Renderer::cover().

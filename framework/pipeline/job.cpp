@@ -9,6 +9,7 @@
 #include <set>
 
 #include "framework/config/clean_text.h"
+#include "framework/config/value_text.h"
 #include "framework/pipeline/camera_rig.h"
 #include "framework/pipeline/job_keys.h"
 #include "framework/pipeline/job_sections.h"
@@ -20,6 +21,7 @@ namespace {
 using detail::EngineHead;
 using detail::EntryHead;
 using detail::JobHead;
+using detail::RecordKeys;
 using detail::RestKeys;
 using detail::StepKeys;
 using detail::StepsKeys;
@@ -392,6 +394,16 @@ void read_writers(const Value& value, Job& job, Complaints& complaints) {
       [](const WriterEntry& e) -> const Value& { return e.component.map; }, complaints);
 }
 
+/// What a clip shows is decided at its start, by its randomizers.
+void check_no_clips(const ViewRule& rule, const Job& job, Complaints& complaints) {
+  for (const TimelineStep& step : job.timeline) {
+    if (step.kind != TimelineStep::Kind::Record || !rule.is_on(step.name)) continue;
+    complaints.add(rule.map.place, rule.path + ": conditions hold for single captures, and '" +
+                                       step.name + "' is recorded; name capture series in 'on'");
+    return;
+  }
+}
+
 void read_views(const Value& value, Job& job, Complaints& complaints) {
   for (auto& [path, map] : entries(value, "views", complaints)) {
     ViewRule rule;
@@ -400,6 +412,7 @@ void read_views(const Value& value, Job& job, Complaints& complaints) {
     rule.map = std::move(map);
     rule.path = path;
     check_view_rule(rule, job.series(), complaints);
+    check_no_clips(rule, job, complaints);
     job.views.push_back(std::move(rule));
   }
   require_unique(
@@ -513,6 +526,35 @@ std::optional<TimelineStep> read_simulation(const Value& map, const std::string&
   return step;
 }
 
+/// `record: {fps: 30, seconds: 2}`.
+std::optional<TimelineStep> read_recording(const Value& map, const std::string& path,
+                                           Complaints& complaints) {
+  const std::size_t before = complaints.messages().size();
+  const Value& value = *map.find("record");
+  RecordKeys keys;
+  if (value.kind != Value::Kind::Map) {
+    complaints.add(value.place, path +
+                                    ".record: expected a mapping such as {fps: 30, seconds: 2}, "
+                                    "found " +
+                                    value.describe());
+    return std::nullopt;
+  }
+  read_all_keys(value, path + ".record", keys, complaints);
+  if (complaints.messages().size() != before) return std::nullopt;
+  const double frames = keys.fps * keys.seconds;
+  const double count = std::round(frames);
+  if (count < 1.0 || count > 1e6 || std::abs(frames - count) > 1e-6 * count) {
+    complaints.add(value.place, path +
+                                    ".record: expected fps x seconds to be a whole number of "
+                                    "frames from 1 to 1000000, found " +
+                                    short_number(frames));
+    return std::nullopt;
+  }
+  TimelineStep step{TimelineStep::Kind::Record, 0, keys.name, int(count)};
+  step.fps = keys.fps;
+  return step;
+}
+
 std::optional<TimelineStep> read_step(const Value& map, const std::string& path,
                                       Complaints& complaints) {
   StepKeys keys;
@@ -520,20 +562,45 @@ std::optional<TimelineStep> read_step(const Value& map, const std::string& path,
   read_all_keys(map, path, keys, complaints);
   if (complaints.messages().size() != before) return std::nullopt;
   const bool simulates = keys.simulate.kind != Value::Kind::Null;
-  if (int(simulates) + int(keys.capture.has_value()) + int(keys.event.has_value()) != 1) {
+  const bool records = keys.record.kind != Value::Kind::Null;
+  if (int(simulates) + int(records) + int(keys.capture.has_value()) + int(keys.event.has_value()) !=
+      1) {
     complaints.add(map.place, path +
                                   ": expected one of 'simulate: STEPS', 'capture: NAME' (with "
-                                  "'count') and 'event: NAME'");
+                                  "'count'), 'record: {fps: 30, seconds: 2}' and 'event: NAME'");
     return std::nullopt;
   }
   if (simulates) return read_simulation(map, path, complaints);
-  const std::string& name = keys.capture ? *keys.capture : *keys.event;
+  std::optional<TimelineStep> recording;
+  if (records) {
+    recording = read_recording(map, path, complaints);
+    if (!recording) return std::nullopt;
+  }
+  const std::string& name = recording      ? recording->name
+                            : keys.capture ? *keys.capture
+                                           : *keys.event;
   if (name.empty() || name == "environment") {
     complaints.add(map.place, path + ": a moment needs a name of its own, found '" + name + "'");
     return std::nullopt;
   }
+  if (recording) return recording;
   if (keys.capture) return TimelineStep{TimelineStep::Kind::Capture, 0, name, keys.count};
   return TimelineStep{TimelineStep::Kind::Event, 0, name, 0};
+}
+
+/// What is called once per clip and what is called once per capture are moments of their own.
+void check_clip_names(const Job& job, const Place& place, Complaints& complaints) {
+  for (const TimelineStep& step : job.timeline) {
+    if (step.kind != TimelineStep::Kind::Record) continue;
+    const bool is_taken = std::ranges::any_of(job.timeline, [&](const TimelineStep& other) {
+      return other.kind != TimelineStep::Kind::Record && other.name == step.name;
+    });
+    if (!is_taken) continue;
+    complaints.add(place, "timeline: '" + step.name +
+                              "' is the name of clips and of another moment; give 'record' a "
+                              "'name' of its own");
+    return;
+  }
 }
 
 void read_timeline(const Value& value, Job& job, Complaints& complaints) {
@@ -546,6 +613,7 @@ void read_timeline(const Value& value, Job& job, Complaints& complaints) {
   for (const auto& [path, map] : entries(value, "timeline", complaints)) {
     if (auto step = read_step(map, path, complaints)) job.timeline.push_back(*step);
   }
+  check_clip_names(job, list->place, complaints);
   if (complaints.messages().size() != before) return;
   std::int64_t captures_per_visit = 0;
   for (const TimelineStep& step : job.timeline) captures_per_visit += step.count;

@@ -146,15 +146,16 @@ struct WriterEntry {
   void visit(ParamVisitor& v);
 };
 
-/// One step of a visit; exactly one of the three is meant.
+/// One step of a visit; exactly one of the four is meant.
 struct TimelineStep {
-  enum class Kind : std::uint8_t { Simulate, Capture, Event };
+  enum class Kind : std::uint8_t { Simulate, Capture, Event, Record };
   Kind kind = Kind::Simulate;
   int steps = 0;     ///< Simulate; until rest: at most.
-  std::string name;  ///< Capture: the series. Event: the moment that randomizers are called at.
-  int count = 0;     ///< Capture: captures of the series per visit.
+  std::string name;  ///< Capture, Record: the series. Event: the moment that randomizers name.
+  int count = 0;     ///< Capture: captures of the series per visit. Record: frames.
   bool until_rest = false;  ///< Simulate: ends when everything is at rest.
   int at_least = 0;         ///< Simulate until rest: steps that are taken in any case.
+  double fps = 0.0;         ///< Record: frames per second.
 };
 
 /// What becomes of objects that are outside the environment's box after a simulation, or not
@@ -195,7 +196,7 @@ struct Job {
   std::vector<WriterEntry> writers;
   OutputSection output;
 
-  /// Names of the capture series in timeline order, each once.
+  /// Names of the capture series in timeline order, each once; clips are none of them.
   std::vector<std::string> series() const;
   /// "cam_0", "stereo_0_left" ... in job order.
   std::vector<std::string> camera_names() const;

@@ -73,11 +73,24 @@ struct RestKeys {
   }
 };
 
+/// `record: {fps: 30, seconds: 2}`.
+struct RecordKeys {
+  std::string name = "clip";
+  double fps = 30.0;
+  double seconds = 1.0;
+  void visit(ParamVisitor& v) {
+    v.param("name", name, {"Name of the clips: the moment that randomizers name in `on`."});
+    v.param("fps", fps, {"Frames per second.", "1/s", 0.1, 1000});
+    v.param("seconds", seconds, {"Length; a whole number of frames.", "s", 0.001, 36000});
+  }
+};
+
 /// All forms of a timeline step, for reading and for the reference.
 struct StepKeys {
   Value simulate;
   std::optional<std::string> capture;
   int count = 1;
+  Value record;
   std::optional<std::string> event;
   void visit(ParamVisitor& v) {
     v.param("simulate", simulate,
@@ -86,6 +99,10 @@ struct StepKeys {
              "`settle.policy` says."});
     v.param("capture", capture, {"Name of a capture series, whose captures are taken here."});
     v.param("count", count, {"Captures of the series per visit.", "", 0, 1e6});
+    v.param(
+        "record", record,
+        {"`{fps: 30, seconds: 2, name: clip}`: a capture every 1/fps seconds while physics goes "
+         "on and cameras follow their paths; each counts among total_captures."});
     v.param("event", event, {"Calls the randomizers that name this moment."});
   }
 };

@@ -3,11 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <set>
 #include <span>
 
 #include "diorama/node_pattern.h"
+#include "framework/config/value_text.h"
 
 namespace diorama {
 namespace {
@@ -18,12 +18,6 @@ constexpr const char* kQuotaWords[] = {
     "label",         "direction", "distance_m", "azimuth_deg", "elevation_deg", "visible_pixels",
     "visible_share", "occlusion", "truncation", "size_px",     "size_share",    "occluders"};
 constexpr double kMostShares = 100000.0;
-
-std::string short_number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%g", value);
-  return text;
-}
 
 const Place& place_of_key(const Value& map, const std::string& key) {
   const Value* value = map.find(key);

@@ -2,9 +2,11 @@
 #include "framework/pipeline/visit_run.h"
 
 #include <algorithm>
+#include <cmath>
 #include <span>
 #include <utility>
 
+#include "diorama/error.h"
 #include "framework/annotators/occlusion_order.h"
 #include "framework/annotators/visibility.h"
 #include "framework/config/clean_text.h"
@@ -78,6 +80,10 @@ VisitResult VisitRun::run() {
       case TimelineStep::Kind::Capture:
         take_captures(step);
         break;
+      case TimelineStep::Kind::Record:
+        --simulations_to_come_;
+        record(step);
+        break;
       case TimelineStep::Kind::Event:
         randomize(step.name, events_[step.name]++, -1);
         break;
@@ -105,7 +111,7 @@ void VisitRun::set_up() {
   small_cameras_ = create_small_cameras(job_, cameras_, scene_);
   simulations_to_come_ =
       int(std::count_if(job_.timeline.begin(), job_.timeline.end(), [](const TimelineStep& step) {
-        return step.kind == TimelineStep::Kind::Simulate;
+        return step.kind == TimelineStep::Kind::Simulate || step.kind == TimelineStep::Kind::Record;
       }));
   for (const EnvironmentPattern& pattern : setting_.shared.environment_patterns) {
     if (!scene_.match(pattern.text).empty()) continue;
@@ -118,11 +124,12 @@ void VisitRun::set_up() {
   }
 }
 
-void VisitRun::randomize(const std::string& moment, int number, int capture) {
+void VisitRun::randomize(const std::string& moment, int number, int capture,
+                         const std::optional<ClipFrame>& clip) {
   const Stopwatch watch(result_.seconds["randomizing"]);
   const PhysicsView before(scene_);
   const std::vector<Mat4> poses = object_poses(scene_, objects_);
-  camera_randomizers_ = call_randomizers(moment, number, capture, {});
+  camera_randomizers_ = call_randomizers(moment, number, capture, {}, clip);
   if (moment == "environment" || before.is_of(scene_)) return;
   if (object_poses(scene_, objects_) != poses) before_last_step_.clear();
   // The engine holds everything as it was, and what sleeps there rests on what may be gone.
@@ -131,8 +138,10 @@ void VisitRun::randomize(const std::string& moment, int number, int capture) {
 
 /// Returns those that moved cameras or changed their lenses.
 std::vector<std::size_t> VisitRun::call_randomizers(const std::string& moment, int number,
-                                                    int capture, const Draw& draw) {
+                                                    int capture, const Draw& draw,
+                                                    const std::optional<ClipFrame>& clip) {
   RandomizeContext context;
+  context.clip = clip;
   context.moment = moment;
   context.capture = capture;
   context.working_area_world = working_area_world_;
@@ -222,6 +231,7 @@ void VisitRun::advance(const TimelineStep& step) {
       take(now - 1);
       before_last_step_ = body_poses(scene_);
       take(1);
+      if (components_.physics) last_step_s_ = components_.physics->step_seconds();
     } else {
       take(now);
     }
@@ -274,6 +284,68 @@ void VisitRun::take_captures(const TimelineStep& step) {
   }
 }
 
+/// The whole clip is played first, which is cheap; its frames are then shown one by one, so that
+/// each knows what comes before and after it.
+void VisitRun::record(const TimelineStep& step) {
+  const PlannedCapture first = setting_.plan.capture(planned_.first_capture + next_capture_);
+  randomize(first.phase, first.number, first.index, first.clip);
+  play(first, 1.0 / step.fps);
+  for (int frame = 0; frame < track_.size(); ++frame) {
+    const PlannedCapture planned = setting_.plan.capture(planned_.first_capture + next_capture_++);
+    if (!setting_.is_needed(planned.index)) continue;
+    track_.show(frame, scene_);
+    take(planned);
+  }
+  track_.show(track_.size() - 1, scene_);
+}
+
+/// Fills the track; the scene is then that of the last frame.
+void VisitRun::play(const PlannedCapture& first, double seconds) {
+  const Stopwatch watch(result_.seconds["simulating"]);
+  const Room room(scene_, environment_);
+  std::vector<std::size_t> players;
+  for (std::size_t i = 0; i < job_.randomizers.size(); ++i) {
+    const auto call =
+        randomizer_call(job_, job_.randomizers[i], first.phase, planned_.index, first.number);
+    if (call) players.push_back(i);
+  }
+  int steps = 0;
+  double step_s = 0.0;
+  if (components_.physics) {
+    // As many as the job's steps, or a little shorter ones.
+    steps = int(std::ceil(seconds / components_.physics->step_seconds() - 1e-9));
+    step_s = seconds / steps;
+  }
+  const auto take_steps = [&](int count) {
+    call_component("physics '" + job_.physics.type + "'",
+                   [&] { components_.physics->advance(scene_, count, step_s); });
+  };
+  track_ = {};
+  ClipFrame at = *first.clip;
+  for (at.frame = 0; at.frame < at.frame_count; ++at.frame) {
+    setting_.stop_if_asked();
+    if (components_.physics && at.frame > 0) {
+      take_steps(steps - 1);
+      before_last_step_ = body_poses(scene_);
+      take_steps(1);
+      last_step_s_ = step_s;
+      simulated_s_ += seconds;
+      if (fastest_falling(scene_, room, objects_) > job_.settle.rest_speed) {
+        moving_until_s_ = simulated_s_;
+      }
+    }
+    const std::uint64_t shapes = scene_.shape_revision();
+    for (const std::size_t i : players) {
+      call_component("randomizer '" + job_.randomizers[i].name + "'", [&] {
+        components_.randomizers[i]->play(scene_, at);
+        if (scene_.shape_revision() == shapes) return;
+        throw Error(ErrorKind::Plugin, "changes more than poses while a clip plays");
+      });
+    }
+    track_.add(scene_);
+  }
+}
+
 void VisitRun::take(const PlannedCapture& planned) {
   setting_.stop_if_asked();
   setting_.before_capture();
@@ -283,6 +355,7 @@ void VisitRun::take(const PlannedCapture& planned) {
   capture.index = planned.index;
   capture.visit = planned_.index;
   capture.phase = planned.phase;
+  capture.clip = planned.clip;
   capture.environment = clean_name(setting_.plan.environments[planned_.environment].asset);
   const SavedView drawn(scene_, camera_tops(scene_));
   const std::vector<ViewOutcome> views = take_frames(planned, capture.frames);
@@ -329,24 +402,79 @@ std::vector<ViewOutcome> VisitRun::take_frames(const PlannedCapture& planned,
   prepare_renderer();
   for (std::size_t i = 0; i < cameras_.size(); ++i) {
     setting_.stop_if_asked();
-    frames.push_back(make_frame(i, planned.index));
+    frames.push_back(make_frame(i, planned));
   }
   for (auto refused = search.refuse_pictures(frames); !refused.empty();) {
     choose_views();
     prepare_renderer();
-    for (const std::size_t i : refused) frames[i] = make_frame(i, planned.index);
+    for (const std::size_t i : refused) frames[i] = make_frame(i, planned);
     refused = search.refuse_pictures(frames);
   }
+  measure_flows(planned.clip, frames);
   return search.outcomes();
 }
 
-Frame VisitRun::make_frame(std::size_t camera, int capture) {
+/// Last of all: it shows the renderer the frames beside this one.
+void VisitRun::measure_flows(const std::optional<ClipFrame>& clip, std::vector<Frame>& frames) {
+  const Demand& demand = setting_.shared.demand;
+  if (!demand.flow_forward && !demand.flow_backward) return;
+  const Stopwatch watch(result_.seconds["annotating"]);
+  const int frame = clip ? clip->frame : 0;
+  const auto measure = [&](int other, const Channel<Vec2f>& flow,
+                           const Channel<std::uint32_t>& states) {
+    if (!clip || other < 0 || other >= track_.size()) {
+      for (Frame& each : frames) {
+        const int width = each.camera.width;
+        const int height = each.camera.height;
+        each.set(flow, Image<Vec2f>(width, height, Vec2f::Zero()));
+        each.set(states, Image<std::uint32_t>(width, height, std::uint32_t(FlowState::Unknown)));
+      }
+      return;
+    }
+    std::vector<FlowMeter> meters;
+    for (const Frame& each : frames) meters.emplace_back(scene_, each, world_in(other));
+    track_.show(other, scene_);
+    prepare_renderer();
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      meters[i].set_seen(call_component("renderer '" + job_.renderer.type + "'", [&] {
+        return components_.renderer->sees(cameras_[i], meters[i].points());
+      }));
+      frames[i].set(flow, meters[i].flow());
+      frames[i].set(states, meters[i].states());
+    }
+    track_.show(frame, scene_);
+  };
+  if (demand.flow_forward) measure(frame + 1, kFlowForward, kFlowForwardState);
+  if (demand.flow_backward) measure(frame - 1, kFlowBackward, kFlowBackwardState);
+  if (clip) prepare_renderer();
+}
+
+/// Where nodes are in another frame of the clip.
+FlowMeter::WorldThere VisitRun::world_in(int frame) const {
+  return [this, frame](NodeId node) { return track_.world_from_node(scene_, node, frame); };
+}
+
+/// How far things moved since the last frame of a clip, or the last step of the simulation.
+void VisitRun::set_motion(const std::optional<ClipFrame>& clip, Frame& frame) {
+  if (!clip) {
+    measure_motion(scene_, before_last_step_, frame);
+    return;
+  }
+  Image<Vec2f> motion(frame.camera.width, frame.camera.height, Vec2f::Zero());
+  if (clip->frame > 0) {
+    motion = FlowMeter(scene_, frame, world_in(clip->frame - 1)).flow();
+    for (Vec2f& pixel : motion.pixels()) pixel = Vec2f::Zero() - pixel;
+  }
+  frame.set(kMotion, std::move(motion));
+}
+
+Frame VisitRun::make_frame(std::size_t camera, const PlannedCapture& planned) {
   const NodeId node = cameras_[camera];
   const std::string who = "renderer '" + job_.renderer.type + "'";
   RenderRequest request;
   request.camera = node;
   request.channels = setting_.shared.demand.channels;
-  request.seed = setting_.streams.render_seed(capture, scene_[node].name);
+  request.seed = setting_.streams.render_seed(planned.index, scene_[node].name);
   Frame frame;
   {
     const Stopwatch watch(result_.seconds["rendering"]);
@@ -360,7 +488,7 @@ Frame VisitRun::make_frame(std::size_t camera, int capture) {
   if (setting_.shared.demand.visibility) {
     measure_coverage(node, frame);
   }
-  if (setting_.shared.demand.motion) measure_motion(scene_, before_last_step_, frame);
+  if (setting_.shared.demand.motion) set_motion(planned.clip, frame);
   return frame;
 }
 
@@ -420,7 +548,9 @@ VisitReport VisitRun::report() const {
          report.unsettled);
   }
   report.max_speed = fastest_falling(scene_, room, objects_);
-  if (components_.physics) report.step_s = components_.physics->step_seconds();
+  if (components_.physics) {
+    report.step_s = last_step_s_ > 0.0 ? last_step_s_ : components_.physics->step_seconds();
+  }
   report.placed = as_set_up_.placed_since(scene_);
   for (const NodeId object : objects_) {
     const auto& body = scene_[object].rigid_body;

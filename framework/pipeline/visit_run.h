@@ -5,14 +5,17 @@
 #include <exception>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "diorama/host.h"
 #include "diorama/scene.h"
+#include "framework/annotators/flow.h"
 #include "framework/annotators/motion.h"
 #include "framework/pipeline/capture_plan.h"
+#include "framework/pipeline/clip_track.h"
 #include "framework/pipeline/job.h"
 #include "framework/pipeline/job_components.h"
 #include "framework/pipeline/settle_check.h"
@@ -66,9 +69,11 @@ class VisitRun {
  private:
   struct Draw;
   void set_up();
-  void randomize(const std::string& moment, int number, int capture);
+  void randomize(const std::string& moment, int number, int capture,
+                 const std::optional<ClipFrame>& clip = {});
   std::vector<std::size_t> call_randomizers(const std::string& moment, int number, int capture,
-                                            const Draw& draw);
+                                            const Draw& draw,
+                                            const std::optional<ClipFrame>& clip = {});
   void simulate(const TimelineStep& step);
   void advance(const TimelineStep& step);
   std::vector<Flaw> unsettled(const TimelineStep& step) const;
@@ -76,10 +81,15 @@ class VisitRun {
   void drop(const std::vector<Flaw>& flaws);
   void reset_physics();
   void take_captures(const TimelineStep& step);
+  void record(const TimelineStep& step);
+  void play(const PlannedCapture& first, double seconds);
+  void measure_flows(const std::optional<ClipFrame>& clip, std::vector<Frame>& frames);
+  FlowMeter::WorldThere world_in(int frame) const;
+  void set_motion(const std::optional<ClipFrame>& clip, Frame& frame);
   void take(const PlannedCapture& planned);
   std::vector<ViewOutcome> take_frames(const PlannedCapture& planned, std::vector<Frame>& frames);
   void prepare_renderer();
-  Frame make_frame(std::size_t camera, int capture);
+  Frame make_frame(std::size_t camera, const PlannedCapture& planned);
   void measure_coverage(NodeId camera, Frame& frame);
   Image<Rgba8> make_overview(int capture);
   VisitReport report() const;
@@ -98,6 +108,8 @@ class VisitRun {
   std::vector<NodeId> cameras_;
   SceneAsSetUp as_set_up_;
   BodyPoses before_last_step_;  ///< Empty when nothing moved by itself since it was placed.
+  double last_step_s_ = 0.0;    ///< Length of that step; 0: none was taken.
+  ClipTrack track_;             ///< Of the clip that is being taken.
   NodeId overview_;             ///< Null unless this visit makes an overview picture.
   std::map<NodeId, NodeId> small_cameras_;  ///< For the brightness of views; by camera.
   /// Randomizers that placed cameras at the last moment.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "camera_lens.h"
 #include "camera_motion.h"
+#include "camera_path.h"
 #include "camera_relative_pose.h"
 #include "diorama/plugin.h"
 #include "dome_light.h"
@@ -37,4 +38,6 @@ DIORAMA_PLUGIN("randomizers_core", "0.1.0", "Apache-2.0") {
   DIORAMA_ADD(diorama::CameraLens, "camera_lens", "Draws focal length and focus of cameras.");
   DIORAMA_ADD(diorama::CameraMotion, "camera_motion",
               "Draws how cameras move while the shutter is open.");
+  DIORAMA_ADD(diorama::CameraPath, "camera_path",
+              "Moves cameras through clips: by keys, round or after targets, through free space.");
 }

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "reader_support/clip_list.h"
+
 namespace diorama {
 namespace {
 
@@ -64,10 +66,22 @@ std::optional<DatasetPage> read_dataset_page(const std::filesystem::path& folder
         if (index >= 0 && index < page.captures) page.split_of_capture.emplace(index, split);
       }
     }
+    if (json.contains("clips")) page.clips = clips_of_json(json.at("clips"));
     return page;
+  } catch (const std::runtime_error&) {
+    return std::nullopt;
   } catch (const Json::exception&) {
     return std::nullopt;
   }
+}
+
+void note_clips(const std::optional<DatasetPage>& page, StoredInfo& info) {
+  if (page && !page->clips.empty()) info.holds.emplace(kHoldsClips);
+}
+
+StoredCapture in_clip(const std::optional<DatasetPage>& page, StoredCapture stored) {
+  if (page) stored.capture.clip = clip_frame(page->clips, stored.capture.index);
+  return stored;
 }
 
 Recognition recognise_page(const std::filesystem::path& folder, const std::string& format) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "diorama/reader.h"
+#include "diorama/writer.h"
 #include "reader_support/stored_files.h"
 
 namespace diorama {
@@ -19,6 +20,7 @@ struct DatasetPage {
   std::vector<std::string> classes;
   std::map<int, std::string> split_of_capture;
   Json conventions = Json::object();
+  std::vector<DatasetClip> clips;
 
   /// One picture per capture and camera.
   std::size_t picture_count() const { return std::size_t(captures) * cameras.size(); }
@@ -29,6 +31,10 @@ struct DatasetPage {
 /// Nothing when there is no such page, or one that cannot be read: such a dataset is read by the
 /// format's rules alone.
 std::optional<DatasetPage> read_dataset_page(const std::filesystem::path& folder);
+
+/// Clips that the page lists: what the dataset holds, and the place of a capture in them.
+void note_clips(const std::optional<DatasetPage>& page, StoredInfo& info);
+StoredCapture in_clip(const std::optional<DatasetPage>& page, StoredCapture stored);
 
 /// ByName when the page says this format.
 Recognition recognise_page(const std::filesystem::path& folder, const std::string& format);

@@ -101,11 +101,13 @@ std::optional<Frame> BasicFrameReading::read(const std::string& camera, FrameSou
   read_distances();
   read_normals();
   read_motion();
+  read_flows();
   read_instances();
   read_leaves();
   check_semantics();
   read_boxes();
   set_visibility();
+  read_velocities();
   read_points();
   if (!has_size_) return std::nullopt;
   sources = std::move(sources_);
@@ -275,7 +277,7 @@ void BasicFrameReading::read_color() {
 
 /// Floats by row and column; nothing when it is something else.
 std::optional<StoredArray> BasicFrameReading::pixel_array(const std::string& file,
-                                                          std::size_t values) {
+                                                          std::size_t values, const char* type) {
   const auto text = files_.text(file);
   if (!text) return std::nullopt;
   std::optional<StoredArray> array;
@@ -283,7 +285,7 @@ std::optional<StoredArray> BasicFrameReading::pixel_array(const std::string& fil
     StoredArray parsed = parse_array(*text);
     const std::size_t dimensions = parsed.shape.size();
     const bool fits =
-        parsed.is_plain("<f4") &&
+        parsed.is_plain(type) &&
         ((values == 1 && dimensions == 2) || (dimensions == 3 && parsed.shape[2] == values)) &&
         parsed.shape[0] < 65536 && parsed.shape[1] < 65536;
     if (!fits) throw std::runtime_error("is no array of 32-bit numbers by row and column");
@@ -382,6 +384,54 @@ void BasicFrameReading::read_motion() {
   }
   frame_.set(kMotion, std::move(motion));
   sources_.emplace(kMotion.name, file);
+}
+
+void BasicFrameReading::read_flows() {
+  for (const auto& [flow, states] :
+       {std::pair(kFlowForward, kFlowForwardState), std::pair(kFlowBackward, kFlowBackwardState)}) {
+    const std::string file = path(std::string(flow.name) + ".npy");
+    if (!file.empty() && wants(flow.name)) {
+      if (const auto array = pixel_array(file, 2)) {
+        Image<Vec2f> image(int(array->shape[1]), int(array->shape[0]), Vec2f::Zero());
+        for (std::size_t i = 0; i < image.pixels().size(); ++i) {
+          std::array<float, 2> v{};
+          std::memcpy(v.data(), array->data.data() + i * sizeof v, sizeof v);
+          image.pixels()[i] = Vec2f(v[0], v[1]);
+        }
+        frame_.set(flow, std::move(image));
+        sources_.emplace(flow.name, file);
+      }
+    }
+    const std::string state_file = path(std::string(states.name) + ".npy");
+    if (state_file.empty() || !wants(states.name)) continue;
+    const auto array = pixel_array(state_file, 1, "<u4");
+    if (!array) continue;
+    Image<std::uint32_t> image(int(array->shape[1]), int(array->shape[0]), 0u);
+    std::memcpy(image.pixels().data(), array->data.data(), array->data.size());
+    std::uint32_t highest = 0;
+    for (const std::uint32_t state : image.pixels()) highest = std::max(highest, state);
+    files_.check(highest <= std::uint32_t(FlowState::Unknown), kIds, state_file, "",
+                 "has the state " + std::to_string(highest), "0 to 3");
+    frame_.set(states, std::move(image));
+    sources_.emplace(states.name, state_file);
+  }
+}
+
+void BasicFrameReading::read_velocities() {
+  const std::string file = path("velocities.json");
+  if (file.empty() || !wants(kHoldsVelocities)) return;
+  const auto json = files_.json(file);
+  if (!json) return;
+  files_.reading(file, [&] {
+    for (const auto& [node_path, entry] : json->items()) {
+      const Velocity velocity{vector_of_json(entry.at("linear")),
+                              vector_of_json(entry.at("angular"))};
+      // What no other file tells of is out of the picture.
+      const auto place = place_of_path_.find(node_path);
+      if (place != place_of_path_.end()) frame_.instances[place->second].velocity = velocity;
+    }
+  });
+  sources_.emplace(kHoldsVelocities, file);
 }
 
 std::vector<std::pair<std::uint32_t, Json>> BasicFrameReading::read_keys(const std::string& file) {

@@ -53,7 +53,10 @@ class BasicFrameReading {
                    const std::string& file);
   void read_normals();
   void read_motion();
-  std::optional<StoredArray> pixel_array(const std::string& file, std::size_t values);
+  void read_flows();
+  void read_velocities();
+  std::optional<StoredArray> pixel_array(const std::string& file, std::size_t values,
+                                         const char* type = "<f4");
 
   std::optional<Segmentation> read_segmentation(std::string_view picture, std::string_view mapping);
   /// In the file's order.

@@ -5,6 +5,7 @@
 
 #include "diorama/error.h"
 #include "reader_support/capture_rows.h"
+#include "reader_support/clip_list.h"
 #include "reader_support/dataset_page.h"
 #include "reader_support/stored_files.h"
 #include "writer_basic/basic_files.h"
@@ -31,6 +32,7 @@ class BasicDataset final : public StoredDataset {
       throw Error(ErrorKind::Asset, folder_.string() + ": holds no files of BasicWriter");
     }
     check_numbers();
+    read_clips();
     describe();
   }
 
@@ -39,7 +41,7 @@ class BasicDataset final : public StoredDataset {
 
   StoredCapture read(std::size_t i, const NameSet& wanted) const override {
     const int number = info_.captures.at(i);
-    return read_frames(
+    StoredCapture read = read_frames(
         number, names_.products(),
         [&](const std::string& product, StoredCapture& stored, FrameSources& sources) {
           const std::string camera = camera_of(product);
@@ -47,6 +49,8 @@ class BasicDataset final : public StoredDataset {
           check_complete(product, number, files);
           return BasicFrameReading(names_, product, number, wanted, files).read(camera, sources);
         });
+    read.capture.clip = clip_frame(clips_, number);
+    return read;
   }
 
  private:
@@ -64,6 +68,24 @@ class BasicDataset final : public StoredDataset {
     files.check(numbers.size() == std::size_t(numbers.back()) + 1, kMissing, ".", "",
                 "there are " + std::to_string(numbers.size()) + " frames",
                 "their numbers end with " + std::to_string(numbers.back()));
+  }
+
+  void read_clips() {
+    constexpr const char* kFile = "clips.json";
+    StoredFiles files(folder_, host_, log_);
+    if (!files.has(kFile)) return;
+    const auto json = files.json(kFile);
+    if (!json) return;
+    files.reading(kFile, [&] {
+      clips_ = clips_of_json(json->at("clips"));
+      const std::vector<int> numbers = names_.numbers();
+      const int end = numbers.empty() ? 0 : numbers.back() + 1;
+      for (const DatasetClip& clip : clips_) {
+        files.check(clip.first + clip.count <= end, kCounts, kFile, "",
+                    "a clip ends with capture " + std::to_string(clip.first + clip.count - 1),
+                    "the last capture is " + std::to_string(end - 1));
+      }
+    });
   }
 
   /// What other frames have.
@@ -91,6 +113,12 @@ class BasicDataset final : public StoredDataset {
     hold("distance_to_image_plane.npy", {kDistanceToImagePlane.name});
     hold("sensor_depth.npy", {kSensorDepth.name});
     hold("motion_vectors.npy", {kMotion.name});
+    for (const std::string_view flow :
+         {kFlowForward.name, kFlowBackward.name, kFlowForwardState.name, kFlowBackwardState.name}) {
+      hold(std::string(flow) + ".npy", {flow});
+    }
+    hold("velocities.json", {kHoldsVelocities});
+    if (!clips_.empty()) info_.holds.emplace(kHoldsClips);
     hold("camera_params.json", {kHoldsCamera, kHoldsCameraPose});
     hold("instance_segmentation.png",
          {kInstanceId.name, kHoldsInstances, kHoldsLabels, kHoldsNodePaths});
@@ -113,6 +141,7 @@ class BasicDataset final : public StoredDataset {
   const Host& host_;
   BasicFiles names_;
   StoredInfo info_;
+  std::vector<DatasetClip> clips_;
   ReadLog log_;
 };
 

@@ -14,6 +14,7 @@
 #include "writer_basic/frame_output.h"
 #include "writer_basic/point_cloud_files.h"
 #include "writer_basic/segmentation_files.h"
+#include "writer_support/clips_json.h"
 #include "writer_support/image_files.h"
 #include "writer_support/npy.h"
 #include "writer_support/value_place.h"
@@ -60,6 +61,18 @@ void write_motion_vectors(const FrameOutput& output) {
   }
 }
 
+/// By path; what is no part of a rigid body has no velocity.
+void write_velocities(const FrameOutput& output) {
+  Json velocities = Json::object();
+  for (const FilteredInstance& filtered : output.instances) {
+    const Instance& instance = *filtered.instance;
+    if (!instance.velocity) continue;
+    velocities[instance.node_path] = {{"linear", flat_list(instance.velocity->linear)},
+                                      {"angular", flat_list(instance.velocity->angular)}};
+  }
+  output.files.add_text(output.path("velocities", "velocities", ".json"), python_json(velocities));
+}
+
 void write_unlabelled_files(const BasicWriter::Params& params, const FrameOutput& output) {
   if (params.rgb) write_rgb(output, params.image_output_format);
   if (params.sensor_depth) write_distance(output, kSensorDepth, params.colorize_depth);
@@ -99,6 +112,7 @@ void write_labelled_files(const BasicWriter::Params& params, const FrameOutput& 
   if (params.bounding_box_2d_loose) write_bounding_box_2d_loose(output);
   if (params.bounding_box_3d) write_bounding_box_3d(output);
   if (params.occlusion) write_occlusion(output);
+  if (params.velocities) write_velocities(output);
 }
 
 }  // namespace
@@ -126,6 +140,7 @@ void BasicWriter::Params::visit(ParamVisitor& v) {
           {"Points of unlabelled surfaces too."});
   v.param("sensor_depth", sensor_depth,
           {"Depth as the annotator depth_sensor measures it, 0 where it measures nothing."});
+  v.param("velocities", velocities, {"How objects move and turn, m/s and rad/s in the world."});
   channels.visit(v);
   v.choice("image_output_format", image_output_format, kImageEndings,
            {"Format of the rgb files; all other pictures are PNG."});
@@ -192,6 +207,8 @@ void BasicWriter::begin(const DatasetInfo& dataset, DatasetFiles& files) {
   frame_padding_ = grown_padding(params_.frame_padding, dataset.capture_count);
   known_labels_ = dataset.labels;
   add_replicator_metadata("BasicWriter", "0.0.2", dataset, files);
+  if (dataset.clips.empty()) return;
+  files.add_text("clips.json", python_json({{"clips", clips_json(dataset.clips)}}, 1) + "\n");
 }
 
 void BasicWriter::write(const Capture& capture, CaptureFiles& files) const {

@@ -15,7 +15,8 @@
 namespace diorama {
 
 /// Files as Omniverse Replicator's BasicWriter 0.0.2 writes them: names, folders, types, JSON text.
-/// Beyond it, `channels` are written as arrays: disparity_0007.npy.
+/// Beyond it, `channels` are written as arrays: disparity_0007.npy; `velocities` as JSON; and of
+/// clips clips.json says which frames they have.
 class BasicWriter final : public Writer {
  public:
   struct Params {
@@ -36,6 +37,7 @@ class BasicWriter final : public Writer {
     bool skeleton_data = false;
     bool pointcloud_include_unlabelled = false;
     bool sensor_depth = false;
+    bool velocities = false;
     ChannelList channels;
     std::string image_output_format = "png";
     bool colorize_semantic_segmentation = true;

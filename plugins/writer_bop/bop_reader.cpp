@@ -82,6 +82,7 @@ class BopDataset final : public StoredDataset {
     group(files);
     if (page_) check_own_files(files, targets);
     describe();
+    note_clips(page_, info_);
   }
 
   const StoredInfo& info() const override { return info_; }
@@ -705,13 +706,14 @@ class BopImageReading : private FrameReading {
 };
 
 StoredCapture BopDataset::read(std::size_t i, const NameSet& wanted) const {
-  return read_frames(info_.captures.at(i), rows_.of(i),
-                     [&](const BopImage& image, StoredCapture& stored, FrameSources& sources) {
-                       const std::string& split = scenes_[image.scene].split;
-                       // Our writer's validation captures are what the benchmark tests on.
-                       stored.split = page_ && split == "test" ? "val" : split;
-                       return BopImageReading(*this, image, wanted, stored.log).read(sources);
-                     });
+  return in_clip(
+      page_, read_frames(info_.captures.at(i), rows_.of(i),
+                         [&](const BopImage& image, StoredCapture& stored, FrameSources& sources) {
+                           const std::string& split = scenes_[image.scene].split;
+                           // Our writer's validation captures are what the benchmark tests on.
+                           stored.split = page_ && split == "test" ? "val" : split;
+                           return BopImageReading(*this, image, wanted, stored.log).read(sources);
+                         }));
 }
 
 }  // namespace

@@ -136,6 +136,7 @@ class CocoDataset final : public StoredDataset {
     hold(tables_.has_cameras, {kHoldsCamera, kHoldsCameraPose});
     hold(tables_.has_amodal,
          {"amodal_mask", "occlusion_order", kHoldsOcclusion, kHoldsTruncation, kHoldsAmodalBoxes});
+    note_clips(page_, info_);
     // Boxes that people drew, and polygons, do not end at pixels.
     info_.steps[std::string(kHoldsTightBoxes)] = page_ ? 0.0 : 2.0;
     info_.steps[std::string(kHoldsTruncation)] = 1e-6;
@@ -259,6 +260,14 @@ class CocoImageReading : private FrameReading {
     files_.check(category != part_.categories.end(), kIds, part_.file, who,
                  "has the unknown category " + json.at("category_id").dump());
     if (category != part_.categories.end()) instance.labels["class"] = category->second.name;
+    if (const auto track = json.find("track_id"); track != json.end()) {
+      instance.id = track->get<std::uint32_t>();
+      const bool is_again =
+          std::ranges::find(frame_.instances, instance.id, &Instance::id) != frame_.instances.end();
+      files_.check(instance.id > 0 && !is_again, kOnce, part_.file, who,
+                   "its track " + track->dump() + " is in the picture twice, or 0");
+      if (instance.id == 0 || is_again) return;
+    }
     instance.tight_box = box_of_json(json.at("bbox"));
     check_box_inside(who, *instance.tight_box);
     CoverageMask mask;
@@ -585,12 +594,13 @@ class CocoImageReading : private FrameReading {
 StoredCapture CocoDataset::read(std::size_t i, const NameSet& wanted) const {
   const auto images = std::span(tables_.images)
                           .subspan(first_image_.at(i), first_image_.at(i + 1) - first_image_[i]);
-  return read_frames(
-      info_.captures.at(i), images,
-      [&](const CocoImageEntry& entry, StoredCapture& stored, FrameSources& sources) {
-        stored.split = tables_.parts[entry.part].split;
-        return CocoImageReading(*this, entry, wanted, stored.log).read(sources);
-      });
+  return in_clip(
+      page_,
+      read_frames(info_.captures.at(i), images,
+                  [&](const CocoImageEntry& entry, StoredCapture& stored, FrameSources& sources) {
+                    stored.split = tables_.parts[entry.part].split;
+                    return CocoImageReading(*this, entry, wanted, stored.log).read(sources);
+                  }));
 }
 
 }  // namespace

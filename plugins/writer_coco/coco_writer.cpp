@@ -81,19 +81,35 @@ Json polygons_json(const Image<std::uint32_t>& ids, const Instance& instance) {
   return list;
 }
 
-Json image_json(const Capture& capture, const Frame& frame, int id, const std::string& file,
+/// Each camera of a clip is a video; they count from 1.
+int video_id(const Capture& capture, std::size_t camera) {
+  return capture.clip->clip * int(capture.frames.size()) + int(camera) + 1;
+}
+
+Json rle_json(const Frame& frame, const Instance& instance) {
+  return coco_rle(run_length(frame.get(kInstanceId), instance.id, *instance.tight_box));
+}
+
+Json image_json(const Capture& capture, std::size_t camera_index, int id, const std::string& file,
                 const Json& licenses) {
+  const Frame& frame = capture.frames[camera_index];
   const Camera& camera = frame.camera;
-  return {{"id", id},
-          {"file_name", file},
-          {"width", camera.width},
-          {"height", camera.height},
-          {"license", licenses.at(0).at("id")},
-          {"capture", capture.index},
-          {"camera", frame.camera_name},
-          {"intrinsics", intrinsics_json(camera)},
-          {"lens", lens_json(camera)},
-          {"world_from_camera", nested_list(frame.world_from_camera.matrix())}};
+  Json json{{"id", id},
+            {"file_name", file},
+            {"width", camera.width},
+            {"height", camera.height},
+            {"license", licenses.at(0).at("id")},
+            {"capture", capture.index},
+            {"camera", frame.camera_name},
+            {"intrinsics", intrinsics_json(camera)},
+            {"lens", lens_json(camera)},
+            {"world_from_camera", nested_list(frame.world_from_camera.matrix())}};
+  if (capture.clip) {
+    json["video_id"] = video_id(capture, camera_index);
+    json["frame_index"] = capture.clip->frame;
+    json["time_s"] = python_round(capture.clip->time_s(), 9);
+  }
+  return json;
 }
 
 // A record is the split's name and the JSON texts that the capture adds to the annotation files,
@@ -102,6 +118,7 @@ Json image_json(const Capture& capture, const Frame& frame, int id, const std::s
 constexpr char kImageRecord = 'i';
 constexpr char kAnnotationRecord = 'a';
 constexpr char kPanopticRecord = 'p';
+constexpr char kVideoRecord = 'v';
 
 void add_to(std::string& record, char kind, const std::string& text) {
   record += '\t';
@@ -125,11 +142,12 @@ void for_each_part(const RecordReader& records, const Visit& visit) {
 /// One of the files below annotations/, which grows from its beginning to its end.
 class AnnotationFile {
  public:
-  AnnotationFile(DatasetFiles& files, std::string path, const char* what, const Json& licenses)
+  AnnotationFile(DatasetFiles& files, std::string path, const char* what, const Json& licenses,
+                 const char* list = "images")
       : files_(files), path_(std::move(path)) {
     const Json info{{"description", what}, {"version", "1.0"}, {"contributor", "diorama"}};
-    put("{\"info\": " + python_json(info) + ", \"licenses\": " + python_json(licenses) +
-        ", \"images\": [");
+    put("{\"info\": " + python_json(info) + ", \"licenses\": " + python_json(licenses) + ", \"" +
+        list + "\": [");
   }
   /// The next element of the list.
   void add(std::string_view text) {
@@ -216,6 +234,9 @@ void CocoWriter::Params::visit(ParamVisitor& v) {
   v.param("amodal", amodal,
           {"Mask, box and area of the whole object, and who hides it, under \"amodal\"."});
   v.param("panoptic", panoptic, {"Panoptic pictures and annotations."});
+  v.param("youtube_vis", youtube_vis,
+          {"Of clips also youtube_vis/{train,val}.json: videos and tracks with a mask per "
+           "frame, as YouTube-VIS has them."});
   v.choice("segmentation", segmentation, kSegmentations,
            {"Masks as compressed run lengths, exact, or as polygons along pixel edges."});
   v.param("crowd_below_px", crowd_below_px,
@@ -296,6 +317,7 @@ Json CocoWriter::categories() const {
 }
 
 void CocoWriter::begin(const DatasetInfo& dataset, DatasetFiles& files) {
+  has_clips_ = !dataset.clips.empty();
   training_.begin(dataset);
   keypoints_.begin(dataset, training_);
   files.add_text("categories.json", python_json(categories(), 2) + "\n");
@@ -312,9 +334,10 @@ void CocoWriter::begin(const DatasetInfo& dataset, DatasetFiles& files) {
 /// Crowds are run lengths in any case, as evaluations expect them.
 Json CocoWriter::segmentation_json(const Frame& frame, const Instance& instance,
                                    bool is_crowd) const {
-  const auto& ids = frame.get(kInstanceId);
-  if (params_.segmentation == "polygon" && !is_crowd) return polygons_json(ids, instance);
-  return coco_rle(run_length(ids, instance.id, *instance.tight_box));
+  if (params_.segmentation == "polygon" && !is_crowd) {
+    return polygons_json(frame.get(kInstanceId), instance);
+  }
+  return rle_json(frame, instance);
 }
 
 Json CocoWriter::annotation(const Frame& frame, const TrainingObject& object, int image_id) const {
@@ -374,10 +397,15 @@ void CocoWriter::write(const Capture& capture, CaptureFiles& files) const {
     const std::string stem = training_.image_stem(capture, frame);
     const std::string file = stem + "." + training_.image_format();
     files.add(std::string("images/") + split + "/" + file, training_.image_file(host_, frame));
-    add_to(record, kImageRecord, python_json(image_json(capture, frame, id, file, licenses_)));
+    add_to(record, kImageRecord, python_json(image_json(capture, camera, id, file, licenses_)));
     const auto objects = training_.objects(frame);
     for (const TrainingObject& object : objects) {
-      add_to(record, kAnnotationRecord, python_json(annotation(frame, object, id)));
+      Json json = annotation(frame, object, id);
+      if (capture.clip) json["track_id"] = object.instance->id;
+      add_to(record, kAnnotationRecord, python_json(json));
+    }
+    if (capture.clip && params_.youtube_vis) {
+      add_to(record, kVideoRecord, python_json(video_frame(capture, camera, file, objects)));
     }
     if (params_.panoptic) {
       add_to(record, kPanopticRecord,
@@ -387,7 +415,88 @@ void CocoWriter::write(const Capture& capture, CaptureFiles& files) const {
   files.record(record);
 }
 
+/// What YouTube-VIS needs of one picture: masks are those of the annotations, always as run
+/// lengths.
+Json CocoWriter::video_frame(const Capture& capture, std::size_t camera, const std::string& file,
+                             const std::vector<TrainingObject>& objects) const {
+  const Frame& frame = capture.frames[camera];
+  Json json{{"video", video_id(capture, camera)}, {"file", file},
+            {"width", frame.camera.width},        {"height", frame.camera.height},
+            {"frame", capture.clip->frame},       {"length", capture.clip->frame_count},
+            {"fps", capture.clip->fps},           {"objects", Json::array()}};
+  for (const TrainingObject& object : objects) {
+    json["objects"].push_back({{"track", object.instance->id},
+                               {"category_id", category_id(object.class_index)},
+                               {"segmentation", rle_json(frame, *object.instance)},
+                               {"bbox", box_json(*object.instance->tight_box)},
+                               {"area", object.visible_px}});
+  }
+  return json;
+}
+
+/// Tracks of one clip are in memory at a time.
+void CocoWriter::write_videos(const RecordReader& records, DatasetFiles& files) {
+  std::map<std::string, AnnotationFile> lists;
+  for (const std::string& split : training_.splits()) {
+    const std::string path = "youtube_vis/" + split + ".json";
+    lists.emplace(split, AnnotationFile(files, path, "Video instances", licenses_, "videos"));
+  }
+  const auto for_each_video_frame = [&](const auto& visit) {
+    for_each_part(records, [&](const std::string& split, char kind, std::string_view text) {
+      if (kind == kVideoRecord) visit(split, Json::parse(text));
+    });
+  };
+  std::map<int, Json> open;  // by video
+  for_each_video_frame([&](const std::string& split, const Json& frame) {
+    const int video = frame.at("video").get<int>();
+    Json& entry = open[video];
+    if (entry.is_null()) {
+      entry = {{"id", video},
+               {"width", frame.at("width")},
+               {"height", frame.at("height")},
+               {"length", frame.at("length")},
+               {"fps", frame.at("fps")},
+               {"file_names", Json::array()}};
+    }
+    entry["file_names"].push_back(frame.at("file"));
+    if (entry["file_names"].size() < frame.at("length").get<std::size_t>()) return;
+    lists.at(split).add(python_json(entry));
+    open.erase(video);
+  });
+  for (auto& [split, list] : lists) list.begin_annotations();
+  std::map<int, std::map<std::uint32_t, Json>> tracks;  // by video
+  for_each_video_frame([&](const std::string& split, const Json& frame) {
+    const int video = frame.at("video").get<int>();
+    const auto length = frame.at("length").get<std::size_t>();
+    for (const Json& object : frame.at("objects")) {
+      Json& track = tracks[video][object.at("track").get<std::uint32_t>()];
+      if (track.is_null()) {
+        const Json nothing(std::vector<Json>(length, nullptr));
+        track = {{"video_id", video},
+                 {"track_id", object.at("track")},
+                 {"category_id", object.at("category_id")},
+                 {"iscrowd", 0},
+                 {"width", frame.at("width")},
+                 {"height", frame.at("height")},
+                 {"length", 1},
+                 {"segmentations", nothing},
+                 {"bboxes", nothing},
+                 {"areas", nothing}};
+      }
+      const auto at = frame.at("frame").get<std::size_t>();
+      track["segmentations"][at] = object.at("segmentation");
+      track["bboxes"][at] = object.at("bbox");
+      track["areas"][at] = object.at("area");
+    }
+    if (frame.at("frame").get<std::size_t>() + 1 < length) return;
+    for (const auto& [id, track] : tracks[video]) lists.at(split).add_numbered(python_json(track));
+    tracks.erase(video);
+  });
+  for (auto& [split, list] : lists) list.end(categories());
+}
+
 void CocoWriter::finish(const RecordReader& records, DatasetFiles& files) {
+  if (params_.youtube_vis && has_clips_) write_videos(records, files);
   std::map<std::string, AnnotationFile> instances, panoptic;
   for (const std::string& split : training_.splits()) {
     const auto begin = [&](const char* kind, const char* what, auto& all) {

@@ -30,6 +30,11 @@ namespace diorama {
 /// `crowd_below_px` are marked iscrowd, so that an evaluation ignores them instead of punishing a
 /// detector for either answer.
 ///
+/// Of clips, images have video_id, frame_index and time_s, and annotations a track_id, which is
+/// that of the same object in all frames of a clip. With `youtube_vis` youtube_vis/{train,val}.json
+/// lists videos, one per clip and camera, and tracks with a mask per frame; its pictures are those
+/// in images/{train,val}.
+///
 /// The keywords of Replicator's writer of the same name are understood: the categories, the choice
 /// of labels, the licences and the format of pictures. What stands for names and places of files
 /// there has no effect and is named in the log.
@@ -40,6 +45,7 @@ class CocoWriter final : public Writer {
     bool keypoints = true;
     bool amodal = true;
     bool panoptic = true;
+    bool youtube_vis = false;
     std::string segmentation = "rle";
     int crowd_below_px = 0;
     Value coco_categories;    ///< See read_coco_categories().
@@ -69,8 +75,13 @@ class CocoWriter final : public Writer {
                            int image_id, const std::string& stem, const char* split,
                            CaptureFiles& files) const;
 
+  Json video_frame(const Capture& capture, std::size_t camera, const std::string& file,
+                   const std::vector<TrainingObject>& objects) const;
+  void write_videos(const RecordReader& records, DatasetFiles& files);
+
   Params params_;
   Host& host_;
+  bool has_clips_ = false;
   std::vector<CocoCategory> categories_;  ///< Of coco_categories; empty: classes count from 1.
   Json licenses_;
   TrainingData training_;

@@ -24,8 +24,11 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kFormat = "KITTI";
+constexpr const char* kTrackingFormat = "KITTI tracking";
 constexpr const char* kBackProject = "depth back-projects";
 constexpr const char* kAngles = "angles agree";
+/// Of the tracking benchmark.
+constexpr double kTrackingFps = 10.0;
 
 /// The fields of a label line but the class.
 struct KittiLabel {
@@ -73,6 +76,16 @@ class KittiDataset final : public StoredDataset {
     page_ = read_dataset_page(folder_);
     StoredFiles files(folder_, host_, log_);
     front_ = fs::is_directory(folder_ / "training") || page_ ? "training/" : "";
+    is_tracking_ = recognise_page(folder_, kTrackingFormat) == Recognition::ByName ||
+                   (!fs::is_directory(folder_ / front_ / "label_2") &&
+                    fs::is_directory(folder_ / front_ / "label_02"));
+    if (is_tracking_) {
+      read_sequences(files);
+      has_depth_ = fs::is_directory(folder_ / front_ / "depth_02");
+      has_calibration_ = fs::is_directory(folder_ / front_ / "calib");
+      describe();
+      return;
+    }
     std::vector<ListedPicture> listed;
     for (const std::string& name : names_in(folder_ / front_ / "label_2")) {
       if (name.ends_with(".txt")) listed.push_back({name.substr(0, name.size() - 4), "", 0, 0, 0});
@@ -139,14 +152,95 @@ class KittiDataset final : public StoredDataset {
     }
   }
 
+  /// Sequences of the tracking benchmark: each frame is one of its pictures, and its labels are
+  /// lines of one file.
+  void read_sequences(StoredFiles& files) {
+    std::vector<ListedPicture> listed;
+    for (const std::string& name : names_in(folder_ / front_ / "label_02")) {
+      if (!name.ends_with(".txt")) continue;
+      const std::string sequence = name.substr(0, name.size() - 4);
+      const std::string file = front_ + "label_02/" + name;
+      const auto pictures = pictures_in(folder_ / front_ / "image_02" / sequence, 0);
+      files.check(!pictures.empty(), kMissing, front_ + "image_02/" + sequence, "",
+                  "there are no pictures", "those of " + file);
+      if (!page_ && !pictures.empty()) {
+        clips_.push_back({int(listed.size()), int(pictures.size()), kTrackingFps});
+      }
+      for (const ListedPicture& picture : pictures) {
+        listed.push_back({sequence + "/" + picture.stem, picture.ending, 0, 0, 0});
+      }
+      read_tracks(sequence, file, pictures, files);
+    }
+    if (listed.empty()) {
+      throw Error(ErrorKind::Asset, folder_.string() + ": holds no sequences of KITTI");
+    }
+    if (page_) clips_ = page_->clips;
+    pictures_.set(
+        std::move(listed), page_, [&](const std::string& stem) { return frame_of_sequence(stem); },
+        {front_ + "image_02/"}, files);
+    const std::size_t expected = page_ ? page_->picture_count() : pictures_.all().size();
+    files.check(pictures_.all().size() == expected, kMissing, front_ + "image_02", "",
+                "there are " + std::to_string(pictures_.all().size()) + " pictures",
+                std::to_string(expected) + " by dataset.json");
+  }
+
+  /// Capture and camera.
+  std::optional<std::pair<int, int>> frame_of_sequence(const std::string& stem) const {
+    const std::string sequence = stem.substr(0, stem.find('/'));
+    const std::string frame = stem.substr(std::min(sequence.size() + 1, stem.size()));
+    const auto is_number = [](const std::string& text) {
+      return !text.empty() && text.size() <= 9 && text.find_first_not_of("0123456789") == text.npos;
+    };
+    if (!is_number(sequence) || !is_number(frame) || page_->cameras.empty()) return std::nullopt;
+    const std::size_t number = std::stoul(sequence);
+    const std::size_t clip = number / page_->cameras.size();
+    if (clip >= page_->clips.size()) return std::nullopt;
+    const int at = std::stoi(frame);
+    if (at >= page_->clips[clip].count) return std::nullopt;
+    return std::pair(page_->clips[clip].first + at, int(number % page_->cameras.size()));
+  }
+
+  /// Lines by picture, without frame and track, which stand beside them.
+  void read_tracks(const std::string& sequence, const std::string& file,
+                   const std::vector<ListedPicture>& pictures, StoredFiles& files) {
+    std::set<int> frames;
+    for (const ListedPicture& picture : pictures) {
+      try {
+        frames.insert(integer_of(picture.stem));
+      } catch (const std::runtime_error&) {
+        files.find(kIds, front_ + "image_02/" + sequence + "/" + picture.stem, "",
+                   "its name is no number");
+      }
+    }
+    const auto text = files.text(file);
+    if (!text) return;
+    std::size_t number = 0;
+    for (const std::string& line : text_lines(*text)) {
+      ++number;
+      files.reading(file, [&] {
+        const std::vector<std::string> words = text_words(line);
+        if (words.empty()) return;
+        if (words.size() < 3) throw std::runtime_error("a line of fewer than three fields");
+        const int frame = integer_of(words[0]);
+        const int track = integer_of(words[1]);
+        files.check(frames.contains(frame), kMissing, file, "line " + std::to_string(number),
+                    "is of frame " + words[0], "one that has a picture");
+        std::string rest = words[2];
+        for (std::size_t i = 3; i < words.size(); ++i) rest += " " + words[i];
+        tracks_[sequence + "/" + zero_padded(frame, 6)].push_back({track, rest});
+      });
+    }
+  }
+
   void describe() {
-    info_.format = kFormat;
+    info_.format = is_tracking_ ? kTrackingFormat : kFormat;
+    if (!clips_.empty()) info_.holds.emplace(kHoldsClips);
     info_.camera_names = pictures_.cameras();
     info_.captures = pictures_.captures();
     if (page_) info_.classes = page_->classes;
-    info_.holds = {std::string(kColor.name), std::string(kHoldsInstances),
-                   std::string(kHoldsLabels), std::string(kHoldsTightBoxes),
-                   std::string(kHoldsBoxes3d)};
+    info_.holds.insert({std::string(kColor.name), std::string(kHoldsInstances),
+                        std::string(kHoldsLabels), std::string(kHoldsTightBoxes),
+                        std::string(kHoldsBoxes3d)});
     if (has_calibration_) info_.holds.emplace(kHoldsCamera);
     if (has_depth_) info_.holds.emplace(kDistanceToImagePlane.name);
     info_.steps[std::string(kDistanceToImagePlane.name)] = 0.5 / 256.0;
@@ -154,8 +248,10 @@ class KittiDataset final : public StoredDataset {
     info_.steps[std::string(kHoldsTightBoxes)] = page_ ? 0.0 : 3.0;
     info_.steps[std::string(kHoldsBoxes3d)] = page_ ? 5e-4 : 0.5;
     const auto pictures = names_in(folder_ / front_ / "image_2");
-    const bool is_lossy = std::ranges::any_of(
-        pictures, [](const std::string& name) { return !name.ends_with(".png"); });
+    const auto is_no_png = [](const std::string& name) { return !name.ends_with(".png"); };
+    const bool is_lossy =
+        is_tracking_ ? std::ranges::any_of(pictures_.all(), is_no_png, &ListedPicture::ending)
+                     : std::ranges::any_of(pictures, is_no_png);
     if (is_lossy) info_.steps[std::string(kColor.name)] = 16.0;
   }
 
@@ -170,8 +266,27 @@ class KittiDataset final : public StoredDataset {
   bool has_depth_ = false;
   bool has_calibration_ = false;
   bool is_stereo_ = false;
+  bool is_tracking_ = false;
+  std::vector<DatasetClip> clips_;
+  /// By "0003/000024": tracks, and the rest of their lines.
+  std::map<std::string, std::vector<std::pair<int, std::string>>> tracks_;
   StoredInfo info_;
   ReadLog log_;
+};
+
+/// Where the files of a frame lie.
+struct KittiPaths {
+  KittiPaths(const std::string& front, const std::string& stem, bool is_tracking)
+      : pictures(front + (is_tracking ? "image_02/" : "image_2/") + stem),
+        depth(front + (is_tracking ? "depth_02/" : "depth_2/") + stem + ".png") {
+    const std::string own = is_tracking ? stem.substr(0, stem.find('/')) : stem;
+    labels = front + (is_tracking ? "label_02/" : "label_2/") + own + ".txt";
+    calibration = front + "calib/" + own + ".txt";
+  }
+  std::string pictures;  ///< Without its ending.
+  std::string depth;
+  std::string labels;
+  std::string calibration;
 };
 
 /// Makes one frame of the files of one number.
@@ -183,12 +298,12 @@ class KittiPictureReading : private FrameReading {
                      dataset.pictures_.cameras()[picture.camera], wanted, log),
         dataset_(dataset),
         stem_(picture.stem),
-        labels_(dataset.front_ + "label_2/" + stem_ + ".txt") {}
+        paths_(dataset.front_, stem_, dataset.is_tracking_),
+        labels_(paths_.labels) {}
 
   std::optional<Frame> read(FrameSources& sources) {
     const std::string file = picture_file();
-    files_.check(!file.empty(), kMissing, dataset_.front_ + "image_2/" + stem_, "",
-                 "the picture is missing");
+    files_.check(!file.empty(), kMissing, paths_.pictures, "", "the picture is missing");
     if (file.empty()) return std::nullopt;
     const auto picture = files_.picture(file);
     if (!picture) return std::nullopt;
@@ -201,14 +316,18 @@ class KittiPictureReading : private FrameReading {
     if (dataset_.is_stereo_) check_right_picture(file);
     if (dataset_.has_depth_ && wanted_.contains(kDistanceToImagePlane.name)) read_depth(sources);
     sources.emplace(kHoldsInstances, labels_);
-    if (const auto text = files_.text(labels_)) read_labels(*text);
+    if (dataset_.is_tracking_) {
+      read_track_labels();
+    } else if (const auto text = files_.text(labels_)) {
+      read_labels(*text);
+    }
     return std::move(frame_);
   }
 
  private:
   std::string picture_file() const {
     for (const char* ending : {".png", ".jpg", ".jpeg"}) {
-      const std::string file = dataset_.front_ + "image_2/" + stem_ + ending;
+      const std::string file = paths_.pictures + ending;
       if (files_.has(file)) return file;
     }
     return {};
@@ -223,7 +342,7 @@ class KittiPictureReading : private FrameReading {
   }
 
   void read_calibration(FrameSources& sources) {
-    const std::string file = dataset_.front_ + "calib/" + stem_ + ".txt";
+    const std::string& file = paths_.calibration;
     const auto text = files_.text(file);
     if (!text) return;
     sources.emplace(kHoldsCamera, file);
@@ -289,7 +408,7 @@ class KittiPictureReading : private FrameReading {
   }
 
   void read_depth(FrameSources& sources) {
-    const std::string file = dataset_.front_ + "depth_2/" + stem_ + ".png";
+    const std::string& file = paths_.depth;
     if (!dataset_.page_ && !files_.has(file)) return;
     const auto picture =
         files_.picture_of_size(file, frame_.camera.width, frame_.camera.height, "the picture");
@@ -303,6 +422,32 @@ class KittiPictureReading : private FrameReading {
     }
     frame_.set(kDistanceToImagePlane, std::move(depth));
     sources.emplace(kDistanceToImagePlane.name, file);
+  }
+
+  void read_track_labels() {
+    const auto lines = dataset_.tracks_.find(stem_);
+    if (lines == dataset_.tracks_.end()) return;
+    std::set<int> known;
+    for (const auto& [track, line] : lines->second) {
+      const std::string who = "frame " + stem_ + ", track " + std::to_string(track);
+      files_.reading(labels_, [&, track = track, &line = line] {
+        KittiLabel label = label_of(text_words(line));
+        if (label.name == "DontCare") return;
+        files_.check(track >= 0 && known.insert(track).second, kOnce, labels_, who,
+                     "is there twice, or below 0");
+        files_.check(label.truncation == 0.0 || label.truncation == 1.0 || label.truncation == 2.0,
+                     kAmodal, labels_, who, "its truncation is " + std::to_string(label.truncation),
+                     "0, 1 or 2");
+        label.truncation = 0.0;  // a level, not a share
+        const std::size_t before = frame_.instances.size();
+        add_object(label, who);
+        if (frame_.instances.size() == before || track < 0) return;
+        // The benchmark counts tracks from 0, which is no id.
+        Instance& instance = frame_.instances.back();
+        instance.id = std::uint32_t(track) + (dataset_.page_ ? 0 : 1);
+        instance.node_path = "/Assets/track_" + std::to_string(track);
+      });
+    }
   }
 
   void read_labels(const std::string& text) {
@@ -417,31 +562,39 @@ class KittiPictureReading : private FrameReading {
 
   const KittiDataset& dataset_;
   std::string stem_;
+  KittiPaths paths_;
   std::string labels_;
   Vec3 offset_ = Vec3::Zero();  ///< Of camera 0 in the space of camera 2.
   double shift_ = 0.0;          ///< Of P3: -fx x baseline.
 };
 
 StoredCapture KittiDataset::read(std::size_t i, const NameSet& wanted) const {
-  return read_frames(
-      info_.captures.at(i), pictures_.pictures(i),
-      [&](const ListedPicture& picture, StoredCapture& stored, FrameSources& sources) {
-        const auto split = split_of_.find(picture.stem);
-        if (split != split_of_.end()) stored.split = split->second;
-        return KittiPictureReading(*this, picture, wanted, stored.log).read(sources);
-      });
+  StoredCapture read =
+      read_frames(info_.captures.at(i), pictures_.pictures(i),
+                  [&](const ListedPicture& picture, StoredCapture& stored, FrameSources& sources) {
+                    const auto split = split_of_.find(picture.stem);
+                    if (split != split_of_.end()) stored.split = split->second;
+                    return KittiPictureReading(*this, picture, wanted, stored.log).read(sources);
+                  });
+  read.capture.clip = clip_frame(clips_, read.capture.index);
+  if (!is_tracking_ || !page_) return read;
+  const auto split = page_->split_of_capture.find(read.capture.index);
+  if (split != page_->split_of_capture.end()) read.split = split->second;
+  return read;
 }
 
 }  // namespace
 
 std::vector<std::string> KittiReader::patterns() const {
-  return {"training/label_2/*.txt", "label_2/*.txt"};
+  return {"training/label_2/*.txt", "label_2/*.txt", "training/label_02/*.txt", "label_02/*.txt"};
 }
 
 Recognition KittiReader::recognise(const fs::path& folder) const {
-  if (recognise_page(folder, kFormat) == Recognition::ByName) return Recognition::ByName;
-  for (const char* front : {"training", "."}) {
-    const auto names = names_in(folder / front / "label_2");
+  for (const char* format : {kFormat, kTrackingFormat}) {
+    if (recognise_page(folder, format) == Recognition::ByName) return Recognition::ByName;
+  }
+  for (const char* place : {"training/label_2", "label_2", "training/label_02", "label_02"}) {
+    const auto names = names_in(folder / place);
     if (std::ranges::any_of(names, [](const std::string& n) { return n.ends_with(".txt"); })) {
       return Recognition::ByFiles;
     }

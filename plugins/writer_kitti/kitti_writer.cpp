@@ -14,7 +14,7 @@
 namespace diorama {
 namespace {
 
-constexpr const char* kLayouts[] = {"mono", "stereo"};
+constexpr const char* kLayouts[] = {"mono", "stereo", "tracking"};
 
 /// KITTI's camera axes from ours: y and z change sign.
 Vec3 kitti_from_camera(const Vec3& p) { return {p.x(), -p.y(), -p.z()}; }
@@ -57,8 +57,20 @@ int occlusion_level(const Instance& instance, const KittiWriter::Params& limits)
   return visible >= limits.partly_occluded_threshold ? 1 : 2;
 }
 
-std::string label_line(const Frame& frame, const TrainingObject& object, const std::string& name,
-                       const KittiWriter::Params& limits) {
+/// 0 none, 1 up to half, 2 more of it is outside of the picture.
+int truncation_level(const Instance& instance) {
+  const double truncation = instance.visibility ? instance.visibility->truncation() : 0.0;
+  return truncation <= 0.0 ? 0 : truncation <= 0.5 ? 1 : 2;
+}
+
+/// The class, and the fields behind the truncation.
+struct LabelText {
+  std::string name;
+  std::string fields;
+};
+
+LabelText label_text(const Frame& frame, const TrainingObject& object, const std::string& name,
+                     const KittiWriter::Params& limits) {
   const Instance& instance = *object.instance;
   const UprightBox box = upright_box(frame, instance);
   const double bearing = std::atan2(box.location.x(), box.location.z());
@@ -66,15 +78,31 @@ std::string label_line(const Frame& frame, const TrainingObject& object, const s
   const PixelBox& pixels = *instance.tight_box;
   std::array<char, 512> text{};
   std::snprintf(text.data(), text.size(),
-                " %.2f %d %.2f %d.00 %d.00 %d.00 %d.00 %.4f %.4f %.4f %.4f %.4f %.4f %.4f\n",
-                instance.visibility ? instance.visibility->truncation() : 0.0,
+                " %d %.2f %d.00 %d.00 %d.00 %d.00 %.4f %.4f %.4f %.4f %.4f %.4f %.4f\n",
                 occlusion_level(instance, limits), alpha, pixels.x_min, pixels.y_min, pixels.x_max,
                 pixels.y_max, box.size.y(), box.size.z(), box.size.x(), box.location.x(),
                 box.location.y(), box.location.z(), box.rotation_y);
   // Fields are separated by spaces.
   std::string word = name;
   std::ranges::replace(word, ' ', '_');
-  return word + text.data();
+  return {word, text.data()};
+}
+
+std::string label_line(const Frame& frame, const TrainingObject& object, const std::string& name,
+                       const KittiWriter::Params& limits) {
+  const LabelText label = label_text(frame, object, name, limits);
+  const auto& visibility = object.instance->visibility;
+  std::array<char, 32> truncation{};
+  std::snprintf(truncation.data(), truncation.size(), " %.2f",
+                visibility ? visibility->truncation() : 0.0);
+  return label.name + truncation.data() + label.fields;
+}
+
+std::string track_line(const Frame& frame, int number, const TrainingObject& object,
+                       const std::string& name, const KittiWriter::Params& limits) {
+  const LabelText label = label_text(frame, object, name, limits);
+  return std::to_string(number) + " " + std::to_string(object.instance->id) + " " + label.name +
+         " " + std::to_string(truncation_level(*object.instance)) + label.fields;
 }
 
 /// From the left camera to the right one, in metres. Pictures are rectified: rows of both show the
@@ -156,7 +184,8 @@ void KittiWriter::Params::visit(ParamVisitor& v) {
   v.choice(
       "layout", layout, kLayouts,
       {"mono: each camera's pictures are image_2; stereo: cameras go by twos, left before right, "
-       "and the right one's picture is image_3."});
+       "and the right one's picture is image_3; tracking: of clips, each camera's a sequence of "
+       "the tracking benchmark."});
   v.param("bbox_height_threshold", bbox_height_threshold,
           {"Objects whose 2-D box is lower are left out.", "px", 0});
   v.param("fully_visible_threshold", fully_visible_threshold,
@@ -213,6 +242,25 @@ void KittiWriter::begin(const DatasetInfo& all, DatasetFiles& files) {
   DatasetInfo dataset = all;
   if (is_stereo()) dataset.camera_names = left_cameras(all);
   training_.begin(dataset);
+  if (is_tracking()) {
+    for (int i = 0; i < dataset.capture_count; ++i) {
+      if (clip_frame(dataset.clips, i)) continue;
+      throw Error(ErrorKind::Config, "layout: tracking: capture " + std::to_string(i) +
+                                         " is in no clip; only a step 'record' of the timeline "
+                                         "makes sequences");
+    }
+    training_.add_dataset_page(
+        "KITTI tracking",
+        {{"camera_axes", "x right, y down, z forward"},
+         {"rotations", "rotation_y about the camera's y axis, radians; there are no quaternions"},
+         {"dimensions", "height, width, length in metres; length along the object's x axis"},
+         {"location", "middle of the bottom face in the camera's space"},
+         {"sequence", "clip x cameras + camera"},
+         {"track", "the number of the object's node, the same in all frames of a clip"},
+         {"depth", "along the viewing axis, metres x 256 in 16 bit, 0: nothing"}},
+        dataset, files);
+    return;
+  }
   padding_ = grown_padding(6, dataset.capture_count * training_.camera_count());
   std::string train, val, both;
   for (int capture = 0; capture < dataset.capture_count; ++capture) {
@@ -238,7 +286,46 @@ void KittiWriter::begin(const DatasetInfo& all, DatasetFiles& files) {
   training_.add_dataset_page("KITTI", std::move(conventions), dataset, files);
 }
 
+void KittiWriter::write_clip_frame(const Capture& capture, CaptureFiles& files) const {
+  const ClipFrame clip = capture.clip.value();
+  Json record = Json::object();
+  for (std::size_t i = 0; i < capture.frames.size(); ++i) {
+    const Frame& frame = capture.frames[i];
+    const std::string sequence = padded(clip.clip * training_.camera_count() + int(i), 4);
+    const std::string name = sequence + "/" + padded(clip.frame, 6);
+    files.add("training/image_02/" + name + "." + training_.image_format(),
+              training_.image_file(host_, frame));
+    std::string labels;
+    for (const TrainingObject& object : training_.objects(frame)) {
+      if (object.instance->tight_box->height() < params_.bbox_height_threshold) continue;
+      labels += track_line(frame, clip.frame, object,
+                           training_.classes()[std::size_t(object.class_index)], params_);
+    }
+    record[sequence] = {{"labels", labels}};
+    if (clip.frame == 0) record[sequence]["calib"] = calibration(frame.camera, 0.0);
+    if (params_.depth) {
+      const std::string path = "training/depth_02/" + name + ".png";
+      files.add(path, png_file(host_, depth_picture(frame.get(kDistanceToImagePlane)), path));
+    }
+  }
+  files.record(record.dump());
+}
+
+void KittiWriter::finish(const RecordReader& records, DatasetFiles& files) {
+  if (!is_tracking()) return;
+  records([&](int, std::string_view line) {
+    const Json record = Json::parse(line);
+    for (const auto& [sequence, entry] : record.items()) {
+      files.append_text("training/label_02/" + sequence + ".txt",
+                        entry.at("labels").get<std::string>());
+      if (!entry.contains("calib")) continue;
+      files.add_text("training/calib/" + sequence + ".txt", entry.at("calib").get<std::string>());
+    }
+  });
+}
+
 void KittiWriter::write(const Capture& capture, CaptureFiles& files) const {
+  if (is_tracking()) return write_clip_frame(capture, files);
   const std::size_t step = is_stereo() ? 2 : 1;
   for (std::size_t i = 0; i + step <= capture.frames.size(); i += step) {
     const Frame& frame = capture.frames[i];

@@ -27,6 +27,15 @@ namespace diorama {
 /// or beyond 255.99 m. KITTI's pictures are rectified: for another lens than a pinhole the
 /// calibration has a line of ours, `lens_2`, with JSON text.
 ///
+/// With the layout `tracking` it is the tracking benchmark, whose sequences are the clips of each
+/// camera; number = clip x cameras + camera, and the files of a sequence's frames count from 0:
+///
+///     training/image_02/0003/000024.png  label_02/0003.txt  calib/0003.txt
+///     depth_02/0003/000024.png
+///
+/// Lines of label_02 begin with frame and track, which is the number of the object's node;
+/// truncation is 0 (none), 1 or 2 (more than half).
+///
 /// The keywords of Replicator's writer of the same name are understood: the choice of labels and
 /// the thresholds. What it says of segmentation pictures and names of folders has no effect and is
 /// named in the log.
@@ -56,9 +65,12 @@ class KittiWriter final : public Writer {
   NameSet needs() const override;
   void begin(const DatasetInfo& all, DatasetFiles& files) override;
   void write(const Capture& capture, CaptureFiles& files) const override;
+  void finish(const RecordReader& records, DatasetFiles& files) override;
 
  private:
   bool is_stereo() const { return params_.layout == "stereo"; }
+  bool is_tracking() const { return params_.layout == "tracking"; }
+  void write_clip_frame(const Capture& capture, CaptureFiles& files) const;
   std::string stem(int capture, int camera) const;
   void notice_idle_keywords() const;
 

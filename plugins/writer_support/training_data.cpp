@@ -7,6 +7,7 @@
 #include <set>
 
 #include "diorama/rng.h"
+#include "writer_support/clips_json.h"
 #include "writer_support/image_files.h"
 #include "writer_support/replicator.h"
 
@@ -25,6 +26,21 @@ std::vector<bool> choose_validation(int count, double share, std::uint64_t seed)
   }
   std::ranges::sort(order);
   for (long i = 0; i < wanted; ++i) is_val[order[std::size_t(i)].second] = true;
+  return is_val;
+}
+
+/// Frames of a clip, which show nearly the same, stay together.
+std::vector<bool> choose_validation(const DatasetInfo& dataset, double share) {
+  std::vector<std::size_t> unit_of_capture;
+  int units = 0;
+  for (int i = 0; i < dataset.capture_count; ++i) {
+    const auto clip = clip_frame(dataset.clips, i);
+    if (!clip || clip->frame == 0) ++units;
+    unit_of_capture.push_back(std::size_t(units - 1));
+  }
+  const std::vector<bool> is_val_unit = choose_validation(units, share, dataset.seed);
+  std::vector<bool> is_val;
+  for (const std::size_t unit : unit_of_capture) is_val.push_back(is_val_unit[unit]);
   return is_val;
 }
 
@@ -84,9 +100,8 @@ void TrainingData::begin(const DatasetInfo& dataset) {
     }
     classes_.assign(names.begin(), names.end());
   }
-  is_val_ = dataset.validation
-                ? as_flags(dataset.capture_count, *dataset.validation)
-                : choose_validation(dataset.capture_count, params_.val_share, dataset.seed);
+  is_val_ = dataset.validation ? as_flags(dataset.capture_count, *dataset.validation)
+                               : choose_validation(dataset, params_.val_share);
   padding_ = grown_padding(6, dataset.capture_count);
   camera_count_ = int(dataset.camera_names.size());
 }
@@ -149,6 +164,7 @@ void TrainingData::add_dataset_page(const std::string& format, Json more,
   for (const std::string& name : splits()) split[name] = Json::array();
   for (int i = 0; i < capture_count(); ++i) split[this->split(i)].push_back(i);
   page["split"] = std::move(split);
+  if (!dataset.clips.empty()) page["clips"] = clips_json(dataset.clips);
   page["conventions"] = {
       {"units", "metres, radians"},
       {"world_axes", "right-handed, z up"},

@@ -1,9 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "diorama/writer.h"
 
+#include <algorithm>
 #include <cstring>
+#include <iterator>
 
 namespace diorama {
+
+std::optional<ClipFrame> clip_frame(std::span<const DatasetClip> clips, int capture) {
+  const auto behind = std::ranges::upper_bound(clips, capture, {}, &DatasetClip::first);
+  if (behind == clips.begin()) return std::nullopt;
+  const DatasetClip& clip = *std::prev(behind);
+  const int frame = capture - clip.first;
+  if (frame >= clip.count) return std::nullopt;
+  return ClipFrame{int(behind - clips.begin()) - 1, frame, clip.count, clip.fps};
+}
 
 DatasetFiles::~DatasetFiles() = default;
 CaptureFiles::~CaptureFiles() = default;

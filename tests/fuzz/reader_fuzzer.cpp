@@ -26,6 +26,7 @@
 #include "writer_hdf5/hdf5_reader.h"
 #include "writer_imagefolder/image_folder_reader.h"
 #include "writer_kitti/kitti_reader.h"
+#include "writer_mot/mot_reader.h"
 #include "writer_pose/pose_reader.h"
 #include "writer_voc/voc_reader.h"
 #include "writer_webdataset/webdataset_reader.h"
@@ -66,10 +67,10 @@ std::unique_ptr<Reader> make(Host& host) {
 
 // Seeds begin with places in this list.
 constexpr std::array kReaders{
-    &make<BasicReader>, &make<CocoReader>,       &make<DataVisualizationReader>,
-    &make<KittiReader>, &make<VocReader>,        &make<YoloReader>,
-    &make<PoseReader>,  &make<BopReader>,        &make<WebDatasetReader>,
-    &make<Hdf5Reader>,  &make<ImageFolderReader>};
+    &make<BasicReader>, &make<CocoReader>,        &make<DataVisualizationReader>,
+    &make<KittiReader>, &make<VocReader>,         &make<YoloReader>,
+    &make<PoseReader>,  &make<BopReader>,         &make<WebDatasetReader>,
+    &make<Hdf5Reader>,  &make<ImageFolderReader>, &make<MotReader>};
 
 /// One folder for all inputs of this process.
 const fs::path& scratch() {

@@ -54,3 +54,17 @@ TEST_CASE("A simulation that breaks down names the node", "[physics]") {
   CHECK(test::error_text([&] { lift.advance(scene, 1); }) ==
         "the simulation of /cup broke down: its pose or velocity is not finite");
 }
+
+TEST_CASE("Steps of another length are taken where the backend can, and refused elsewhere",
+          "[physics]") {
+  Scene scene;
+  scene.edit(scene.create(scene.root(), "cup")).rigid_body = RigidBody{};
+  Lift lift;
+  lift.reset(scene);
+  // The same length, come to by another way.
+  lift.advance(scene, 2, 0.3 / 3.0);
+  CHECK(lift.steps_taken == 2);
+  CHECK(test::error_text([&] { lift.advance(scene, 1, 0.05); }) ==
+        "steps of 0.050000 s are wanted, but this physics takes steps of 0.100000 s only");
+  CHECK(lift.steps_taken == 2);
+}

@@ -3,6 +3,7 @@
 
 #include <functional>
 
+#include "diorama/geometry.h"
 #include "error_text.h"
 #include "support/catch.h"
 
@@ -123,4 +124,19 @@ TEST_CASE("Coverage masks are checked", "[renderer]") {
   s.renderer.masks = {CoverageMask{{0, 0, 2, 1}, {1, 0}, {0.5f, 7.0f}}};
   CHECK(s.cover_error(true) == "(no error)");
   CHECK(s.cover_error() == "/cup: its coverage mask has 2 distances, expected none");
+}
+
+TEST_CASE("A renderer that cannot trace tells by triangles which points are seen", "[renderer]") {
+  Studio studio;
+  // Between the camera at (1, 2, 3) and half of the points.
+  studio.scene.edit(studio.cup).mesh = std::make_shared<const Mesh>(make_box(Vec3(1, 1, 0.2)));
+  studio.scene.set_pose(studio.cup, Affine(Eigen::Translation3d(1.5, 2, 2)));
+  studio.renderer.prepare(studio.scene);
+  const std::vector<Vec3> points{{1.2, 2, 0}, {0.2, 2, 0}, {1.5, 2, 2.1}, {1.5, 2, 1.9}, {1, 2, 3}};
+  CHECK(studio.renderer.sees(studio.camera, points) == std::vector<std::uint8_t>{0, 1, 1, 0, 1});
+  studio.scene.edit(studio.cup).is_visible = false;
+  studio.renderer.prepare(studio.scene);
+  CHECK(studio.renderer.sees(studio.camera, points) == std::vector<std::uint8_t>{1, 1, 1, 1, 1});
+  CHECK(test::error_text([&] { studio.renderer.sees(studio.cup, points); }) ==
+        "/cup: the node has no camera");
 }

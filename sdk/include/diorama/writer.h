@@ -26,6 +26,16 @@ struct DatasetAsset {
   std::vector<std::pair<std::string, std::string>> files;
 };
 
+/// Captures in a row that are the frames of a clip.
+struct DatasetClip {
+  int first = 0;  ///< Capture::index of its first frame.
+  int count = 0;
+  double fps = 30.0;
+};
+/// The place of a capture in one of the clips, which ascend.
+DIORAMA_SDK_API std::optional<ClipFrame> clip_frame(std::span<const DatasetClip> clips,
+                                                    int capture);
+
 /// What a writer knows of the whole dataset before the first capture. Equal in every shard.
 struct DatasetInfo {
   std::uint64_t seed = 0;
@@ -40,6 +50,7 @@ struct DatasetInfo {
   std::string program_version;
   std::vector<std::pair<std::string, std::string>> plugin_versions;
   std::vector<DatasetAsset> assets;  ///< Sorted by name.
+  std::vector<DatasetClip> clips;    ///< By ClipFrame::clip; captures may be in none of them.
   // Of data that were a dataset before: what writers would otherwise choose themselves.
   std::vector<std::string> classes;            ///< Class list in its order; empty: not settled.
   std::optional<std::vector<int>> validation;  ///< Captures kept for validation, ascending.

@@ -360,6 +360,28 @@ TEST_CASE("One series in several steps of a visit counts on", "[plan]") {
   CHECK(plan.series(plan.visit(0)).size() == 4);
 }
 
+TEST_CASE("Clips are numbered over the job, their frames count, and the last one may be short",
+          "[plan]") {
+  std::string yaml = with(good_job(), "{simulate: 200}",
+                          "{record: {fps: 10, seconds: 0.2, name: pan}}, "
+                          "{record: {fps: 20, seconds: 0.1, name: pan}}");
+  const CapturePlan plan = plan_of(job_from(with(yaml, "total_captures: 7", "total_captures: 12")));
+  CHECK_FALSE(plan.capture(1).clip);
+  CHECK(plan.capture(3).clip == ClipFrame{0, 1, 2, 10.0});
+  CHECK(plan.capture(3).number == 0);
+  CHECK(plan.capture(5).clip == ClipFrame{1, 1, 2, 20.0});
+  CHECK(plan.capture(5).number == 1);
+  CHECK_FALSE(plan.capture(6).clip);
+  CHECK(plan.capture(9).clip == ClipFrame{2, 0, 2, 10.0});
+  CHECK(plan.capture(11).clip == ClipFrame{3, 0, 1, 20.0});
+  std::string text;
+  for (const DatasetClip& clip : plan.clips()) {
+    text += std::to_string(clip.first) + "+" + std::to_string(clip.count) + " ";
+  }
+  CHECK(text == "2+2 4+2 9+2 11+1 ");
+  for (int i = 0; i < 12; ++i) CHECK(clip_frame(plan.clips(), i) == plan.capture(i).clip);
+}
+
 TEST_CASE("A plan of a hundred million captures is small, and each can be asked for", "[plan]") {
   const long before = resident_kb();
   const CapturePlan plan =

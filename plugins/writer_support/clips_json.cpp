@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "writer_support/clips_json.h"
+
+namespace diorama {
+
+Json clips_json(std::span<const DatasetClip> clips) {
+  Json list = Json::array();
+  for (const DatasetClip& clip : clips) {
+    list.push_back({{"clip", list.size()},
+                    {"first_capture", clip.first},
+                    {"frame_count", clip.count},
+                    {"fps", clip.fps}});
+  }
+  return list;
+}
+
+}  // namespace diorama
