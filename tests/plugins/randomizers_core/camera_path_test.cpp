@@ -90,8 +90,8 @@ TEST_CASE("keys are met exactly, and between them speed and turning have no jump
     return (curve.pose(t + kStep).translation() - curve.pose(t).translation()) / kStep;
   };
   const auto turning = [&](double t) -> Vec3 {
-    const Eigen::AngleAxisd turn(Mat3(curve.pose(t + kStep).rotation() *
-                                      curve.pose(t).rotation().transpose()));
+    const Eigen::AngleAxisd turn(
+        Mat3(curve.pose(t + kStep).rotation() * curve.pose(t).rotation().transpose()));
     return turn.angle() / kStep * turn.axis();
   };
   for (const double t : {0.5, 2.0}) {
