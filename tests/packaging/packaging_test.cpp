@@ -90,7 +90,7 @@ TEST_CASE("nobody needs what few use", "[packaging]") {
   for (const std::string& package : all(wanted, "(diorama-plugins?-[a-z0-9]+) ?")) {
     if (!fs::exists(kRoot / "packaging/debian" / (package + ".install"))) continue;
     INFO(package);
-    for (const char* heavy : {"placement_fcl", "writer_hdf5"}) {
+    for (const char* heavy : {"placement_fcl", "writer_hdf5", "writer_video"}) {
       for (const std::string& pattern :
            all(debian(package + ".install"), "plugins-\\*/(\\S+)\\.so")) {
         CHECK_FALSE(names(pattern, heavy));
