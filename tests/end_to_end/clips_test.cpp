@@ -141,6 +141,8 @@ void follow(const StoredView& from, const StoredView& to, bool forward, FlowErro
       }
       const std::string path = from.path_at(x, y);
       Vec3 point = from.point_at(x, y);
+      // Who has left the picture is in none of its files.
+      if (!path.empty() && !to.poses.contains(path)) continue;
       if (!path.empty()) point = to.poses.at(path) * (from.poses.at(path).inverse() * point);
       const Vec3 in_camera = to.lens.camera_from_world * point;
       const auto pixel = to.lens.lens.pixel(in_camera);
@@ -433,6 +435,56 @@ TEST_CASE("Formats with tracks call one object the same in every frame, and are 
   CHECK_THAT(finding("1,2,3\n" + gt), ContainsSubstring("line 1 has 3 fields, not 9"));
   fs::remove(folder / (broken + "/img1/000003.png"));
   CHECK(run({"lint", "out/mot"}, folder.path()).exit_code != 0);
+}
+
+TEST_CASE("Tracking folders of others are read, and what is wrong with them is said", "[run]") {
+  const TemporaryFolder folder;
+  std::string job = clip_job("{fps: 24, seconds: 0.25}", "6");
+  job.insert(job.find("output:"), R"(  - {type: MotWriter, name: mot, val_share: 0}
+  - {type: KittiWriter, name: kitti, layout: tracking, val_share: 0}
+)");
+  write_file(folder / "job.yaml", job);
+  REQUIRE(run({"run", "job.yaml"}, folder.path()).exit_code == 0);
+  const auto lint = [&](const char* dataset) {
+    const Outcome outcome = run({"lint", dataset}, folder.path());
+    return std::to_string(outcome.exit_code) + " " + outcome.output;
+  };
+  // Without our page, and with things that ours does not have.
+  fs::create_directories(folder / "theirs/kitti");
+  fs::copy(folder / "out/kitti/training", folder / "theirs/kitti/training",
+           fs::copy_options::recursive);
+  const fs::path labels = folder / "theirs/kitti/training/label_02/0000.txt";
+  write_file(labels, "0 -1 DontCare -1 -1 -10 1 2 9 9 -1 -1 -1 -1000 -1000 -1000 -10\n" +
+                         read_file(labels));
+  CHECK_THAT(lint("theirs/kitti"),
+             Catch::Matchers::StartsWith("0 ") && ContainsSubstring("KITTI tracking"));
+  const std::string ours = "out/mot/train/clip_0000_eyes_0_left/";
+  const std::string theirs = "theirs/MOT17/train/MOT17-02/";
+  fs::create_directories(folder / theirs);
+  fs::copy(folder / (ours + "img1"), folder / (theirs + "img1"), fs::copy_options::recursive);
+  const std::string page =
+      "[Sequence]\r\nname=MOT17-02\r\nimDir=img1\r\nframeRate=30\r\n"
+      "seqLength=6\r\nimWidth=96\r\nimHeight=72\r\nimExt=.png\r\n";
+  write_file(folder / (theirs + "seqinfo.ini"), page);
+  const fs::path gt = folder / (theirs + "gt/gt.txt");
+  write_file(gt,
+             "1,1,10.5,20,30,40,1,1,0.5\r\n1,2,-5,3,20,20,0,7,1\n2,1,11.5,20,30.2,40,1,1,0.5\n");
+  CHECK_THAT(lint("theirs/MOT17"),
+             Catch::Matchers::StartsWith("0 ") && ContainsSubstring("MOT Challenge"));
+  const Outcome stats = run({"stats", "theirs/MOT17"}, folder.path());
+  CHECK_THAT(stats.output, ContainsSubstring("6 captures") && ContainsSubstring("class 1"));
+
+  write_file(gt, "9,1,1,1,1,1,1,1,1\n1,-3,1,1,1,1,1,1,1\n1,1,1e300,2,3,4,1,1,1\nx,y\n");
+  const std::string found = lint("theirs/MOT17");
+  CHECK_THAT(found, ContainsSubstring("line 1: is of frame 9; right would be: 1 to 6"));
+  CHECK_THAT(found, ContainsSubstring("line 2: its track is -3; right would be: 1 or more"));
+  CHECK_THAT(found, ContainsSubstring("line 3: its box is beyond reason"));
+  CHECK_THAT(found, ContainsSubstring("line 4 has 2 fields, not 9"));
+  // Nothing outside of the sequence is read.
+  std::string climbing = page;
+  climbing.replace(climbing.find("img1"), 4, "../../../../out/mot");
+  write_file(folder / (theirs + "seqinfo.ini"), climbing);
+  CHECK_THAT(lint("theirs/MOT17"), ContainsSubstring("imDir is no name"));
 }
 
 TEST_CASE("A video has one sample per frame, where its index says", "[run]") {
