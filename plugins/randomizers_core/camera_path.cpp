@@ -56,9 +56,10 @@ struct CameraPath::Orbit final : Path {
     const double angle = azimuth + turn_s * time_s;
     const Vec3 direction(std::sin(polar) * std::cos(angle), std::sin(polar) * std::sin(angle),
                          std::cos(polar));
-    return looking(centre + distance * direction, centre);
+    return looking(centre + distance * direction, look_at);
   }
   Vec3 centre = Vec3::Zero();
+  Vec3 look_at = Vec3::Zero();
   double distance = 1.0, polar = 0.0, azimuth = 0.0, turn_s = 0.0;  // radians
 };
 
@@ -122,6 +123,8 @@ void CameraPath::Params::visit(ParamVisitor& v) {
           {"Orbit: where it begins, round the vertical.", "deg", -360, 360});
   v.param("turn_deg_s", turn_deg_s,
           {"Orbit: how fast it goes round; below 0 clockwise.", "deg/s", -3600, 3600});
+  v.param("look_at_offset", look_at_offset,
+          {"Orbit: point looked at, from the target's centre.", "m"}, 3);
   v.param("offset", offset,
           {"Follow: place, from the target's centre along the world's axes.", "m"}, 3);
   v.param("lag_s", lag_s,
@@ -214,6 +217,7 @@ std::unique_ptr<CameraPath::Path> CameraPath::draw_path(const Scene& scene, Node
   }
   auto orbit = std::make_unique<Orbit>();
   orbit->centre = centre;
+  orbit->look_at = centre + draws.vector(params_.look_at_offset);
   orbit->distance = draws.number(params_.distance);
   orbit->polar = radians(draws.number(params_.polar_angle_deg));
   orbit->azimuth = radians(draws.number(params_.azimuth_deg));

@@ -34,6 +34,7 @@ class CameraPath final : public Randomizer {
     Distribution polar_angle_deg = Range{45.0, 75.0};
     Distribution azimuth_deg = Range{0.0, 360.0};
     Distribution turn_deg_s = Range{15.0, 30.0};
+    Distribution look_at_offset = Vec3(Vec3::Zero());
     Distribution offset = Distribution::between(Vec3(-1.5, -1.5, 0.5), Vec3(1.5, 1.5, 1.0));
     double lag_s = 0.3;
     Distribution area = Distribution::between(Vec3(-1.5, -1.5, 1.2), Vec3(1.5, 1.5, 1.6));

@@ -11,6 +11,8 @@ namespace {
 // Shorter ones make a walk of corners, longer ones seldom fit.
 constexpr double kShortestLine = 0.3;
 constexpr double kLongestLine = 2.0;
+// Cosine of the sharpest turn, about 75 degrees: nobody turns on his heel.
+constexpr double kSharpest = 0.25;
 
 std::vector<Aabb> columns_of_falling(const Scene& scene) {
   std::vector<Aabb> columns;
@@ -68,7 +70,9 @@ std::vector<Vec3> plan_walk(const WalkSpace& space, const std::function<Vec3(Rng
     const double line_m = (next - last).norm();
     if (line_m < kShortestLine || line_m > kLongestLine || !space.holds(last, next)) return false;
     if (places.size() < 2) return true;
-    const auto bend = WalkCurve::corner(places[places.size() - 2], last, next);
+    const Vec3& before = places[places.size() - 2];
+    if ((next - last).normalized().dot((last - before).normalized()) < kSharpest) return false;
+    const auto bend = WalkCurve::corner(before, last, next);
     return std::adjacent_find(bend.begin(), bend.end(), [&](const Vec3& a, const Vec3& b) {
              return !space.holds(a, b);
            }) == bend.end();
