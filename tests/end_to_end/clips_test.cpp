@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
+#include <stdexcept>
 
 #include "numpy_files.h"
 #include "program.h"
@@ -57,6 +58,11 @@ std::map<std::string, std::string> clip_dataset(const std::vector<std::string>& 
   INFO(outcome.errors);
   REQUIRE(outcome.exit_code == 0);
   return tree(folder / "out");
+}
+
+const std::map<std::string, std::string>& whole_dataset() {
+  static const auto files = clip_dataset({"--threads", "1"});
+  return files;
 }
 
 /// What is known of one camera's frame, read without the program.
@@ -125,7 +131,7 @@ struct StoredView {
 
 struct FlowErrors {
   std::vector<double> off;  ///< Pixels between the flow's end and where the point is.
-  int seen = 0, hidden = 0, outside = 0, wrong_ids = 0, wrongly_hidden = 0;
+  int seen = 0, hidden = 0, outside = 0, wrong_ids = 0, wrongly_hidden = 0, wrong_states = 0;
 };
 
 /// Follows every pixel of `from` into `to`.
@@ -136,7 +142,7 @@ void follow(const StoredView& from, const StoredView& to, bool forward, FlowErro
     for (int x = 0; x < kWidth; ++x) {
       const std::uint32_t state = StoredView::state(states, x, y);
       if (!std::isfinite(from.distance_at(x, y))) {
-        CHECK(state == 3);
+        errors.wrong_states += state == 3 ? 0 : 1;
         continue;
       }
       const std::string path = from.path_at(x, y);
@@ -146,13 +152,13 @@ void follow(const StoredView& from, const StoredView& to, bool forward, FlowErro
       if (!path.empty()) point = to.poses.at(path) * (from.poses.at(path).inverse() * point);
       const Vec3 in_camera = to.lens.camera_from_world * point;
       const auto pixel = to.lens.lens.pixel(in_camera);
-      REQUIRE(pixel);
+      if (!pixel) throw std::runtime_error("a point behind the camera");
       const Vec2 found = Vec2(x + 0.5, y + 0.5) + from.flow(flows, x, y);
       errors.off.push_back((found - *pixel).norm());
       const int there_x = int(std::floor(found.x()));
       const int there_y = int(std::floor(found.y()));
       const bool is_inside = there_x >= 0 && there_y >= 0 && there_x < kWidth && there_y < kHeight;
-      CHECK(is_inside == (state != 2));
+      errors.wrong_states += is_inside == (state != 2) ? 0 : 1;
       if (state == 2) ++errors.outside;
       if (state == 0) {
         ++errors.seen;
@@ -178,7 +184,7 @@ void follow(const StoredView& from, const StoredView& to, bool forward, FlowErro
 }  // namespace
 
 TEST_CASE("Flow leads to where the same points are in the next and the last frame", "[run]") {
-  const auto files = clip_dataset({});
+  const auto& files = whole_dataset();
   for (const bool forward : {true, false}) {
     FlowErrors errors;
     for (const char* camera : {"eyes_0_left", "eyes_0_right"}) {
@@ -196,6 +202,7 @@ TEST_CASE("Flow leads to where the same points are in the next and the last fram
     std::ranges::sort(errors.off);
     CAPTURE(forward, errors.seen, errors.hidden, errors.outside, errors.wrong_ids);
     CHECK(errors.seen > 20000);
+    CHECK(errors.wrong_states == 0);
     CHECK(errors.hidden > 100);
     CHECK(errors.outside > 100);
     CHECK(errors.off[errors.off.size() / 2] < 0.01);
@@ -207,7 +214,7 @@ TEST_CASE("Flow leads to where the same points are in the next and the last fram
 }
 
 TEST_CASE("A clip says which frames it has, and has none before or behind it", "[run]") {
-  const auto files = clip_dataset({});
+  const auto& files = whole_dataset();
   const Json clips = Json::parse(files.at("basic/clips.json")).at("clips");
   REQUIRE(clips.size() == 2);
   CHECK(clips[1].at("first_capture") == 6);
@@ -216,18 +223,20 @@ TEST_CASE("A clip says which frames it has, and has none before or behind it", "
   for (const int first : {0, 6}) {
     const StoredView begin(files, "eyes_0_left", first);
     const StoredView end(files, "eyes_0_left", first + 5);
+    int known = 0;
     for (int y = 0; y < kHeight; ++y) {
       for (int x = 0; x < kWidth; ++x) {
-        CHECK(StoredView::state(begin.backward_state, x, y) == 3);
-        CHECK(StoredView::state(end.forward_state, x, y) == 3);
-        CHECK(begin.flow(begin.backward, x, y).isZero());
+        known += StoredView::state(begin.backward_state, x, y) == 3 ? 0 : 1;
+        known += StoredView::state(end.forward_state, x, y) == 3 ? 0 : 1;
+        known += begin.flow(begin.backward, x, y).isZero() ? 0 : 1;
       }
     }
+    CHECK(known == 0);
   }
 }
 
 TEST_CASE("Between frames things fall for just as long as the frame rate says", "[run]") {
-  const auto files = clip_dataset({});
+  const auto& files = whole_dataset();
   int falling = 0;
   for (int i = 0; i < 5; ++i) {
     const StoredView a(files, "eyes_0_left", i);
@@ -252,7 +261,7 @@ TEST_CASE("Between frames things fall for just as long as the frame rate says", 
 }
 
 TEST_CASE("A path is drawn once per clip, and objects keep their places in between", "[run]") {
-  const auto files = clip_dataset({});
+  const auto& files = whole_dataset();
   const auto centre = [&](int index) {
     const StoredView view(files, "eyes_0_left", index);
     return Vec3(view.lens.camera_from_world.inverse().translation());
@@ -274,7 +283,7 @@ TEST_CASE("A path is drawn once per clip, and objects keep their places in betwe
 
 TEST_CASE("Clips are the same bytes for any threads, visits in flight, shards and after kills",
           "[run]") {
-  const auto expected = clip_dataset({"--threads", "1"});
+  const auto& expected = whole_dataset();
   CHECK(difference(expected, clip_dataset({"--threads", "3", "--visits-in-flight", "2"})) == "");
   {
     const TemporaryFolder folder;
@@ -547,7 +556,7 @@ TEST_CASE("A plan counts the frames of clips, and the last one may be cut short"
   const auto files = tree(folder / "out");
   CHECK(Json::parse(files.at("basic/clips.json")).at("clips")[1].at("frame_count") == 2);
   // What is there of it is as in the whole clip, but for where the last frame leads.
-  const auto whole = clip_dataset({});
+  const auto& whole = whole_dataset();
   const std::string name = "basic/rp_eyes_0_left/flow_forward/flow_forward_0006.npy";
   CHECK(files.at(name) == whole.at(name));
 }
