@@ -6,6 +6,8 @@
 #include <map>
 #include <vector>
 
+#include "diorama/joints.h"
+
 namespace diorama {
 namespace {
 
@@ -109,6 +111,7 @@ void Instances::do_annotate(const Scene& scene, Frame& frame) const {
     instance.velocity = instance_velocity(scene, labelled.node);
     frame.instances.push_back(std::move(instance));
   }
+  frame.joints = joint_states(scene);
   measure_tight_boxes(frame.get(kInstanceId), frame.instances);
 }
 

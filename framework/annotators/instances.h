@@ -26,7 +26,7 @@ std::optional<Velocity> instance_velocity(const Scene& scene, NodeId labelled);
 void measure_tight_boxes(const Image<std::uint32_t>& ids, std::vector<Instance>& instances);
 
 /// Fills Frame::instances: one entry per labelled instance of the scene, in the order of
-/// labelled_instances(), everything but `visibility` (see visibility.h).
+/// labelled_instances(), everything but `visibility` (see visibility.h); and Frame::joints.
 class Instances final : public Annotator {
  public:
   struct Params {

@@ -95,9 +95,23 @@ class Bytes {
   void add(const RigidBody& body) {
     add_all(body.mass_kg, body.has_gravity, body.linear_velocity, body.angular_velocity);
   }
+  void add(const Joint& joint) {
+    add_all(joint.kind, joint.parent_body.index, joint.child_body.index, joint.parent_from_joint,
+            joint.child_from_joint, joint.axis, joint.lower, joint.upper, joint.mimic.has_value());
+    if (joint.mimic) {
+      add_all(joint.mimic->joint.index, joint.mimic->multiplier, joint.mimic->offset);
+    }
+  }
+  void add(const Animation& animation) {
+    add_all(animation.asset, animation.start_s, animation.end_s);
+  }
+  void add(const JointState& state) {
+    add_all(state.path, state.kind, state.parent_path, state.child_path, state.position,
+            state.lower, state.upper);
+  }
   void add(const Node& node) {
     add_all(node.parent_from_node, node.is_visible, node.labels, node.mesh, node.materials,
-            node.light, node.camera, node.collider, node.rigid_body);
+            node.light, node.camera, node.collider, node.rigid_body, node.joint, node.animation);
   }
 
   void add(const PixelBox& box) { add_all(box.x_min, box.y_min, box.x_max, box.y_max); }
@@ -145,7 +159,7 @@ std::string fingerprint(const Node& node) {
 std::string fingerprint(const Frame& frame) {
   Bytes bytes;
   bytes.add_all(frame.camera_name, frame.camera_path, frame.camera, frame.world_from_camera,
-                frame.instances, frame.occlusions, frame.leaf_paths, frame.exposure);
+                frame.instances, frame.occlusions, frame.joints, frame.leaf_paths, frame.exposure);
   for (const std::string& channel : frame.channels()) {
     bytes.add_all(channel, frame.image_named(channel));
   }

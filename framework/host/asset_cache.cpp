@@ -101,6 +101,28 @@ NodeId instantiate(const Scene& from, NodeId source, Scene& to, NodeId parent,
     copy_content(original, to.edit(copy));
     if (!original.labels.empty()) clean_labels(to.edit(copy));
   }
+  // Joints hold the copies of what they held.
+  for (const auto& [node, copy] : copies) {
+    if (!from[node].joint) continue;
+    Joint joint = *from[node].joint;
+    const auto parent_body = copies.find(joint.parent_body);
+    const auto child_body = copies.find(joint.child_body);
+    if (parent_body == copies.end() || child_body == copies.end()) {
+      to.edit(copy).joint.reset();
+      continue;
+    }
+    joint.parent_body = parent_body->second;
+    joint.child_body = child_body->second;
+    if (joint.mimic) {
+      const auto leader = copies.find(joint.mimic->joint);
+      if (leader == copies.end()) {
+        joint.mimic.reset();
+      } else {
+        joint.mimic->joint = leader->second;
+      }
+    }
+    to.edit(copy).joint = joint;
+  }
   return top;
 }
 

@@ -17,6 +17,8 @@ void copy_content(const Node& from, Node& to) {
   to.camera = from.camera;
   to.collider = from.collider;
   to.rigid_body = from.rigid_body;
+  to.joint = from.joint;
+  to.animation = from.animation;
 }
 
 std::string first_unclean_word(const Scene& scene, NodeId top) {

@@ -7,8 +7,9 @@
 
 namespace diorama {
 
-/// Copies what a node holds: visibility, labels, mesh, materials, light, camera, collider, body and
-/// keypoints, but neither its name nor its place in the tree or in space. Shared data stays shared.
+/// Copies what a node holds: visibility, labels, mesh, materials, light, camera, collider, body,
+/// keypoints, joint and animation, but neither its name nor its place in the tree or in space.
+/// Shared data stays shared; the joint leads to the same ids.
 void copy_content(const Node& from, Node& to);
 
 /// The first name or label at and below `top` that datasets cannot hold as it is, see

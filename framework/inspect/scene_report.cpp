@@ -32,6 +32,18 @@ const char* light_kind_name(LightKind kind) {
   return "unknown";
 }
 
+const char* joint_kind_name(JointKind kind) {
+  switch (kind) {
+    case JointKind::Fixed:
+      return "fixed";
+    case JointKind::Revolute:
+      return "revolute";
+    case JointKind::Prismatic:
+      return "prismatic";
+  }
+  return "unknown";
+}
+
 std::string describe_node(const Node& node) {
   std::vector<std::string> parts;
   if (node.mesh) {
@@ -42,6 +54,11 @@ std::string describe_node(const Node& node) {
     parts.push_back(fmt::format("camera {}x{}", node.camera->width, node.camera->height));
   }
   if (node.rigid_body) parts.push_back(fmt::format("body {:g} kg", node.rigid_body->mass_kg));
+  if (node.joint) parts.push_back(fmt::format("{} joint", joint_kind_name(node.joint->kind)));
+  if (node.animation) {
+    parts.push_back(
+        fmt::format("moves from {:g} to {:g} s", node.animation->start_s, node.animation->end_s));
+  }
   for (const auto& [taxonomy, label] : node.labels) {
     parts.push_back(fmt::format("{}={}", taxonomy, label));
   }

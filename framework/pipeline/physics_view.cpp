@@ -18,6 +18,14 @@ bool are_equal(const std::optional<RigidBody>& a, const std::optional<RigidBody>
   return a->mass_kg == b->mass_kg && a->has_gravity == b->has_gravity;
 }
 
+bool are_equal(const std::optional<Joint>& a, const std::optional<Joint>& b) {
+  if (!a || !b) return a.has_value() == b.has_value();
+  return a->kind == b->kind && a->parent_body == b->parent_body && a->child_body == b->child_body &&
+         a->parent_from_joint.matrix() == b->parent_from_joint.matrix() &&
+         a->child_from_joint.matrix() == b->child_from_joint.matrix() && a->axis == b->axis &&
+         a->lower == b->lower && a->upper == b->upper;
+}
+
 }  // namespace
 
 PhysicsView::PhysicsView(const Scene& scene)
@@ -29,9 +37,9 @@ std::vector<PhysicsView::Part> PhysicsView::parts_of(const Scene& scene) {
   std::vector<Part> parts;
   for (const NodeId id : scene.subtree(scene.root())) {
     const Node& node = scene[id];
-    if (!node.collider && !node.rigid_body) continue;
+    if (!node.collider && !node.rigid_body && !node.joint) continue;
     parts.push_back({id, scene.world_from_node(id).matrix(), node.mesh, node.collider,
-                     node.rigid_body, scene.is_visible(id)});
+                     node.rigid_body, node.joint, scene.is_visible(id)});
   }
   return parts;
 }
@@ -39,7 +47,7 @@ std::vector<PhysicsView::Part> PhysicsView::parts_of(const Scene& scene) {
 bool PhysicsView::are_equal(const Part& a, const Part& b) {
   return a.node == b.node && a.world_from_node == b.world_from_node && a.mesh == b.mesh &&
          diorama::are_equal(a.collider, b.collider) && diorama::are_equal(a.body, b.body) &&
-         a.is_visible == b.is_visible;
+         diorama::are_equal(a.joint, b.joint) && a.is_visible == b.is_visible;
 }
 
 bool PhysicsView::is_of(const Scene& scene) const {

@@ -27,6 +27,7 @@ class PhysicsView {
     std::shared_ptr<const Mesh> mesh;
     std::optional<Collider> collider;
     std::optional<RigidBody> body;  ///< Its velocities do not count.
+    std::optional<Joint> joint;
     bool is_visible = true;
   };
   static std::vector<Part> parts_of(const Scene& scene);

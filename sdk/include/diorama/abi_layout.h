@@ -11,6 +11,7 @@
 #include "diorama/frame.h"
 #include "diorama/headers_digest.h"
 #include "diorama/host.h"
+#include "diorama/joints.h"
 #include "diorama/loader.h"
 #include "diorama/params.h"
 #include "diorama/physics_backend.h"
@@ -45,11 +46,12 @@ consteval std::uint64_t layout_of() {
 inline constexpr std::uint64_t kLayout =
     layout_of<Vec2, Vec3, Vec3f, Quat, Mat4, Affine, Transform, Aabb, Rng, Image<Rgba8>, AnyImage,
               PixelBox, Mesh, Texture, TextureInput, Material, Light, Camera, Collider, RigidBody,
-              NodeId, Node, Scene, LabelledInstance, CoverageMask, Visibility, Velocity, Instance,
-              Frame, ClipFrame, Capture, Place, Value, Complaints, Range, ParamDoc, ParamSpec,
-              ParamReader, ParamLister, Distribution, TextDistribution, Component, Host, ImageView,
-              Loader, PhysicsReport, PhysicsBackend, RandomizeContext, Randomizer, RenderRequest,
-              RenderReport, Renderer, Annotator, DatasetInfo, DatasetFiles, CaptureFiles, Writer,
-              Finding, ReadLog, StoredInfo, StoredCapture, StoredDataset, Reader, Error>();
+              NodeId, Joint, Animation, Node, Scene, LabelledInstance, CoverageMask, Visibility,
+              Velocity, Instance, JointState, JointTarget, Frame, ClipFrame, Capture, Place, Value,
+              Complaints, Range, ParamDoc, ParamSpec, ParamReader, ParamLister, Distribution,
+              TextDistribution, Component, Host, ImageView, Loader, PhysicsReport, PhysicsBackend,
+              RandomizeContext, Randomizer, RenderRequest, RenderReport, Renderer, Annotator,
+              DatasetInfo, DatasetFiles, CaptureFiles, Writer, Finding, ReadLog, StoredInfo,
+              StoredCapture, StoredDataset, Reader, Error>();
 
 }  // namespace diorama::abi

@@ -152,6 +152,17 @@ struct Occlusion {
   friend bool operator==(const Occlusion&, const Occlusion&) = default;
 };
 
+/// A joint at the moment of a capture.
+struct JointState {
+  std::string path;  ///< Of the joint's node.
+  JointKind kind = JointKind::Fixed;
+  std::string parent_path;  ///< Of the bodies' nodes.
+  std::string child_path;
+  double position = 0.0;  ///< Radians or metres, see joint_position(); 0 when fixed.
+  double lower = -kInfinity;
+  double upper = kInfinity;
+};
+
 /// One camera's data in one capture.
 class DIORAMA_SDK_API Frame {
  public:
@@ -170,6 +181,8 @@ class DIORAMA_SDK_API Frame {
   /// Who is in front of whom, in the order of `instances` by `front`, then by `behind`. Things that
   /// reach around each other occur both ways. Filled when "occlusion_order" was demanded.
   std::vector<Occlusion> occlusions;
+  /// Every joint of the scene in creation order. Filled when "instances" was demanded.
+  std::vector<JointState> joints;
   /// Path of every leaf id that occurs in kLeafId.
   std::map<std::uint32_t, std::string> leaf_paths;
   double exposure = 1.0;  ///< Factor from kColorHdr to the view transform's input.

@@ -34,8 +34,9 @@ class DIORAMA_SDK_API Loader : public Component {
 
   /// Fills the empty node `root` (pose, mesh, children ...) in metres, Z up. `asset` is a path that
   /// exists or one of its own schemes; the variants of a file may follow it, "mug.usd{look=red}",
-  /// for loaders that know such. Throws Error(Asset) that begins with the asset's name; what
-  /// it added so far is then erased by the host. Same asset and parameters, same result.
+  /// and the second at which it is taken, "walker.usd{time=1.5}", for loaders that know such.
+  /// Throws Error(Asset) that begins with the asset's name; what it added so far is then erased by
+  /// the host. Same asset and parameters, same result.
   virtual void load(std::string_view asset, Scene& scene, NodeId root) = 0;
 };
 

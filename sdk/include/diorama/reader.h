@@ -42,6 +42,7 @@ inline constexpr std::string_view kHoldsCamera =
 inline constexpr std::string_view kHoldsCameraPose = "camera_pose";
 inline constexpr std::string_view kHoldsClips = "clips";            ///< Capture::clip.
 inline constexpr std::string_view kHoldsVelocities = "velocities";  ///< Instance::velocity.
+inline constexpr std::string_view kHoldsJoints = "joints";          ///< Frame::joints.
 inline constexpr std::string_view kHoldsLeafPaths = "leaf_paths";   ///< Frame::leaf_paths.
 
 /// Something about a dataset that cannot be right.

@@ -38,6 +38,42 @@ struct Keypoint {
   Vec3 position = Vec3::Zero();  ///< Metres, in the space of the node that has it.
 };
 
+enum class JointKind : std::uint8_t { Fixed, Revolute, Prismatic };
+
+/// Says how two nodes, its bodies, may move against each other; its own node stands for the joint
+/// and has its name. Joint space is where the joint is, seen from either body:
+///
+///     world_from_parent * parent_from_joint * motion = world_from_child * child_from_joint
+///
+/// with `motion` a turn about, or a shift along, `axis` by the joint's position. It is in metres
+/// where the asset has its own size, and grows with the asset. The poses of the bodies are the
+/// truth; joints.h reads positions from them and poses bodies by positions.
+struct Joint {
+  JointKind kind = JointKind::Fixed;
+  NodeId parent_body;  ///< Any node; what has no RigidBody at or above it stands still.
+  NodeId child_body;
+  Affine parent_from_joint = Affine::Identity();
+  Affine child_from_joint = Affine::Identity();
+  Vec3 axis = Vec3::UnitX();  ///< In joint space, unit length.
+  double lower = -kInfinity;  ///< Radians or metres, at most `upper`; -infinity: no limit.
+  double upper = kInfinity;
+  /// Its position follows that of another joint: multiplier * position + offset.
+  struct Mimic {
+    NodeId joint;
+    double multiplier = 1.0;
+    double offset = 0.0;
+  };
+  std::optional<Mimic> mimic;
+};
+
+/// The time in which the file of an asset moves. At another time it is another asset with the same
+/// nodes, "walker.usd{time=1.5}", see Loader::load.
+struct Animation {
+  std::string asset;  ///< What was loaded, without a time.
+  double start_s = 0.0;
+  double end_s = 0.0;  ///< At least `start_s`.
+};
+
 struct Node {
   std::string name;
   NodeId parent;
@@ -53,6 +89,10 @@ struct Node {
   std::optional<Collider> collider;
   std::optional<RigidBody> rigid_body;
   std::vector<Keypoint> keypoints;
+  /// Both bodies are nodes of the same scene. When an asset is copied, joints that lead out of it
+  /// stay behind.
+  std::optional<Joint> joint;
+  std::optional<Animation> animation;  ///< Of the top node of an asset.
 };
 
 /// Everything that can be seen and simulated: a tree of named nodes. A concrete class on purpose:

@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <fstream>
 
+#include "framework/host/asset_cache.h"
 #include "support/catch.h"
 
 using namespace diorama;
@@ -201,4 +202,34 @@ TEST_CASE("image files that cannot be read say so", "[host]") {
                     (shop.folder / "none.png").string() +
                         ": the image cannot be read: No such file or directory");
   CHECK(shop.host->thread_count() == 2);
+}
+
+TEST_CASE("Copies of an asset have joints of their own, but for those that lead out of it",
+          "[host]") {
+  Scene from;
+  const NodeId top = from.create(from.root(), "chest");
+  const NodeId body = from.create(top, "body");
+  const NodeId drawer = from.create(top, "drawer");
+  const NodeId slide = from.create(top, "slide");
+  const NodeId outer = from.create(top, "outer");
+  Joint joint;
+  joint.parent_body = body;
+  joint.child_body = drawer;
+  joint.upper = 0.3;
+  joint.mimic = Joint::Mimic{slide, 2.0, 0.0};
+  from.edit(slide).joint = joint;
+  joint.parent_body = from.root();
+  from.edit(outer).joint = joint;
+  Scene to;
+  to.create(to.root(), "else");
+  for (const char* name : {"/one", "/two"}) {
+    instantiate(from, top, to, to.root(), name + 1);
+    const std::string path = name;
+    const Joint& copy = *to[to.require(path + "/slide")].joint;
+    CHECK(copy.parent_body == to.require(path + "/body"));
+    CHECK(copy.child_body == to.require(path + "/drawer"));
+    CHECK(copy.mimic->joint == to.require(path + "/slide"));
+    CHECK(copy.upper == 0.3);
+    CHECK_FALSE(to[to.require(path + "/outer")].joint);
+  }
 }
