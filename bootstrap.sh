@@ -16,7 +16,8 @@ export CMAKE_GENERATOR=Ninja  # also of the projects that tests build
 build_packages=(
   g++ cmake ninja-build pkgconf git
   libboost-dev libboost-filesystem-dev libbullet-dev libfcl-dev libembree-dev libeigen3-dev libassimp-dev
-  libavcodec-dev libavutil-dev libyaml-cpp-dev libcli11-dev libspdlog-dev libfmt-dev nlohmann-json3-dev
+  libavcodec-dev libavutil-dev liburdfdom-dev libconsole-bridge-dev
+  libyaml-cpp-dev libcli11-dev libspdlog-dev libfmt-dev nlohmann-json3-dev
   libre2-dev libhdf5-dev liblz4-dev libdeflate-dev libpng-dev libjpeg-dev libopenexr-dev libtbb-dev
   libvulkan-dev glslang-tools spirv-tools
   libxxhash-dev nettle-dev libopencv-core-dev libopencv-imgproc-dev libopencv-calib3d-dev libopencv-imgcodecs-dev

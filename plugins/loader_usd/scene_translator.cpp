@@ -103,6 +103,7 @@ void SceneTranslator::translate(NodeId root) {
   for (const Prim* prim : stage_.visible_children(stage_.root())) {
     if (is_drawn(*prim)) translate_prim(*prim, place, root_from_stage_ * local_pose(*prim, place));
   }
+  add_joints(root);
   stage_.assets().release_pages();
   materials_.read_textures();
   finish_materials();
@@ -153,6 +154,10 @@ bool SceneTranslator::is_drawn(const Prim& prim) {
   bool result = prim.traits.is_xformable;
   // Skeletons move points, which the reader does not do; their prims draw nothing.
   if (prim.type_name == "Skeleton") result = false;
+  if (is_joint(prim.type_name)) result = true;
+  if (is_foreign_joint(prim.type_name)) {
+    note(prim, "is of type " + prim.type_name + ", which does not hold bodies together");
+  }
   if (is_group) {
     for (const Prim* child : drawn_children(prim)) result |= is_drawn(*child);
   }
@@ -210,6 +215,8 @@ void SceneTranslator::translate_prim(const Prim& prim, const Place& parent, cons
   place.node = scene_.create(parent.node, usd::path::name(prim.path));
   place.root_from_node = parent.root_from_node * pose;
   scene_.set_pose(place.node, pose);
+  if (instancer_depth_ == 0) nodes_[&prim] = place.node;
+  if (is_joint(prim.type_name)) joints_.emplace_back(&prim, place.node);
   const bool is_hidden = prim.traits.is_imageable &&
                          usd::token_or(stage_, prim, "visibility", "inherited") == "invisible";
   if (is_hidden) scene_.edit(place.node).is_visible = false;
@@ -432,6 +439,26 @@ void SceneTranslator::add_labels(const Prim& prim, NodeId node) {
     std::string joined;
     for (const std::string& label : labels) joined += (joined.empty() ? "" : ",") + label;
     if (!joined.empty()) scene_.edit(node).labels[type] = std::move(joined);
+  }
+}
+
+// --- Joints -----------------------------------------------------------------------------------
+
+void SceneTranslator::add_joints(NodeId root) {
+  JointTranslator translator(stage_, scene_, root, root_from_stage_, nodes_,
+                             [this](const Prim& prim, const std::string& what,
+                                    const std::string& detail) { note(prim, what, detail); });
+  for (const auto& [prim, node] : joints_) {
+    if (!nodes_.contains(prim)) {
+      note(*prim, "is a joint in an instancer, and holds nothing");
+      continue;
+    }
+    // Assets in other units than the stage's say their limits in these.
+    double unit = meters_per_unit_;
+    for (const Prim* at = prim; at && at->parent; at = at->parent) {
+      unit *= std::cbrt(std::abs(unit_correction(*at).linear().determinant()));
+    }
+    translator.translate(*prim, node, unit);
   }
 }
 

@@ -9,6 +9,7 @@
 
 #include "diorama/host.h"
 #include "diorama/scene.h"
+#include "loader_usd/joint_translator.h"
 #include "loader_usd/light_translator.h"
 #include "loader_usd/material_translator.h"
 #include "loader_usd/mesh_translator.h"
@@ -19,7 +20,8 @@
 namespace diorama::loader_usd {
 
 /// Turns a composed stage into nodes, in metres and Z up. One node per prim that can be placed or
-/// holds something that is drawn; what is not drawn (materials, skeletons, joints) gets none.
+/// holds something that is drawn or is a joint; what else is not drawn (materials, skeletons) gets
+/// none.
 class SceneTranslator {
  public:
   SceneTranslator(usd::Stage& stage, Host& host, Scene& scene);
@@ -57,6 +59,7 @@ class SceneTranslator {
   double stage_scale(const Place& place) const;
   bool has_z_pole(const usd::Prim& dome) const;
   void add_labels(const usd::Prim& prim, NodeId node);
+  void add_joints(NodeId root);
   void add_instances(const usd::Prim& prim, const Place& place);
   void note(const usd::Prim& prim, const std::string& what, const std::string& detail = {});
   void note_undrawn(const usd::Prim& prim, const std::string& type);
@@ -89,6 +92,8 @@ class SceneTranslator {
     std::size_t count = 0;
   };
   std::map<std::string, Noted> notes_;  ///< By what is said of them.
+  JointTranslator::Nodes nodes_;        ///< Of prims outside of instancers.
+  std::vector<std::pair<const usd::Prim*, NodeId>> joints_;
   int instancer_depth_ = 0;
   std::size_t node_count_ = 0;
 };

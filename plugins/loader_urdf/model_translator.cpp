@@ -1,0 +1,301 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "loader_urdf/model_translator.h"
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <filesystem>
+#include <optional>
+#include <utility>
+
+#include "diorama/error.h"
+
+namespace diorama::loader_urdf {
+namespace {
+
+constexpr std::size_t kMaxWarnings = 20;
+
+std::string node_name(const std::string& name, const char* fallback) {
+  std::string result = name.empty() ? fallback : name.substr(0, 200);
+  std::replace(result.begin(), result.end(), '/', '_');
+  return result;
+}
+
+Vec3 to_vec3(const urdf::Vector3& v) { return {v.x, v.y, v.z}; }
+
+bool is_length(double number) { return number > 0.0 && number < 1e6; }
+
+PrimitiveShape primitive_of(const urdf::Geometry& geometry) {
+  if (geometry.type == urdf::Geometry::BOX) return PrimitiveShape::Box;
+  if (geometry.type == urdf::Geometry::SPHERE) return PrimitiveShape::Sphere;
+  if (geometry.type == urdf::Geometry::CYLINDER) return PrimitiveShape::Cylinder;
+  return PrimitiveShape::None;
+}
+
+/// Nothing for a shape without a size.
+std::optional<Mesh> mesh_of(const urdf::Geometry& geometry) {
+  if (geometry.type == urdf::Geometry::BOX) {
+    const Vec3 size = to_vec3(static_cast<const urdf::Box&>(geometry).dim);
+    if (!is_length(size.x()) || !is_length(size.y()) || !is_length(size.z())) return std::nullopt;
+    return make_box(size);
+  }
+  if (geometry.type == urdf::Geometry::SPHERE) {
+    const double radius = static_cast<const urdf::Sphere&>(geometry).radius;
+    if (!is_length(radius)) return std::nullopt;
+    return make_sphere(radius);
+  }
+  if (geometry.type == urdf::Geometry::CYLINDER) {
+    const auto& cylinder = static_cast<const urdf::Cylinder&>(geometry);
+    if (!is_length(cylinder.radius) || !is_length(cylinder.length)) return std::nullopt;
+    return make_cylinder(cylinder.radius, cylinder.length);
+  }
+  return std::nullopt;
+}
+
+bool are_equal(const urdf::Pose& a, const urdf::Pose& b) {
+  return a.position.x == b.position.x && a.position.y == b.position.y &&
+         a.position.z == b.position.z && a.rotation.x == b.rotation.x &&
+         a.rotation.y == b.rotation.y && a.rotation.z == b.rotation.z &&
+         a.rotation.w == b.rotation.w;
+}
+
+bool are_equal(const urdf::Geometry& a, const urdf::Geometry& b) {
+  if (a.type != b.type) return false;
+  if (a.type == urdf::Geometry::BOX) {
+    return to_vec3(static_cast<const urdf::Box&>(a).dim) ==
+           to_vec3(static_cast<const urdf::Box&>(b).dim);
+  }
+  if (a.type == urdf::Geometry::SPHERE) {
+    return static_cast<const urdf::Sphere&>(a).radius == static_cast<const urdf::Sphere&>(b).radius;
+  }
+  if (a.type == urdf::Geometry::CYLINDER) {
+    const auto& one = static_cast<const urdf::Cylinder&>(a);
+    const auto& other = static_cast<const urdf::Cylinder&>(b);
+    return one.radius == other.radius && one.length == other.length;
+  }
+  const auto& one = static_cast<const urdf::Mesh&>(a);
+  const auto& other = static_cast<const urdf::Mesh&>(b);
+  return one.filename == other.filename && to_vec3(one.scale) == to_vec3(other.scale);
+}
+
+float linear_of_srgb(float value) {
+  const float clamped = std::isfinite(value) ? std::clamp(value, 0.0f, 1.0f) : 0.5f;
+  return clamped <= 0.04045f ? clamped / 12.92f : std::pow((clamped + 0.055f) / 1.055f, 2.4f);
+}
+
+}  // namespace
+
+void ModelTranslator::warn(const std::string& text) {
+  if (warnings_.size() < kMaxWarnings) warnings_.push_back(text);
+}
+
+Affine ModelTranslator::pose_of(const urdf::Pose& pose, const std::string& where) {
+  const Vec3 place(pose.position.x, pose.position.y, pose.position.z);
+  const Quat turn(pose.rotation.w, pose.rotation.x, pose.rotation.y, pose.rotation.z);
+  Affine result = Affine::Identity();
+  if (!place.allFinite() || !turn.coeffs().allFinite() || turn.norm() < 1e-9) {
+    warn(where + " has an origin that is no number; it counts as zero");
+    return result;
+  }
+  result.translation() = place;
+  result.linear() = turn.normalized().toRotationMatrix();
+  return result;
+}
+
+void ModelTranslator::translate(NodeId root) {
+  // Links in the order of the tree, each once, whatever joints say; then what holds them together.
+  std::deque<std::pair<const urdf::Link*, Affine>> waiting;
+  std::vector<const urdf::Joint*> joints;
+  waiting.emplace_back(model_.root_link_.get(), Affine::Identity());
+  while (!waiting.empty()) {
+    const auto [link, root_from_link] = waiting.front();
+    waiting.pop_front();
+    if (links_.contains(link->name)) continue;
+    add_link(*link, root, root_from_link);
+    for (const auto& joint : link->child_joints) {
+      const auto child = model_.links_.find(joint->child_link_name);
+      if (child == model_.links_.end()) continue;
+      joints.push_back(joint.get());
+      const Affine link_from_joint =
+          pose_of(joint->parent_to_joint_origin_transform, "joint '" + joint->name + "'");
+      waiting.emplace_back(child->second.get(), root_from_link * link_from_joint);
+    }
+  }
+  if (joints.empty()) return;
+  const NodeId above = scene_.create(root, "joints");
+  for (const urdf::Joint* joint : joints) add_joint(*joint, above);
+  for (const urdf::Joint* joint : joints) {
+    const auto node = joints_.find(joint->name);
+    if (!joint->mimic || node == joints_.end()) continue;
+    const auto leader = joints_.find(joint->mimic->joint_name);
+    const bool is_sound = leader != joints_.end() && leader != node &&
+                          std::isfinite(joint->mimic->multiplier) &&
+                          std::isfinite(joint->mimic->offset);
+    if (!is_sound) {
+      warn("joint '" + joint->name + "' mimics no joint of the model; it moves freely");
+      continue;
+    }
+    scene_.edit(node->second).joint->mimic =
+        Joint::Mimic{leader->second, joint->mimic->multiplier, joint->mimic->offset};
+  }
+}
+
+void ModelTranslator::add_link(const urdf::Link& link, NodeId root, const Affine& root_from_link) {
+  const NodeId node = scene_.create(root, node_name(link.name, "link"));
+  links_[link.name] = node;
+  if (root_from_link.matrix().allFinite()) scene_.set_pose(node, root_from_link);
+  std::vector<std::pair<const urdf::Visual*, NodeId>> seen;
+  for (const auto& visual : link.visual_array) {
+    if (!visual || !visual->geometry) continue;
+    const NodeId shape = add_geometry(*visual->geometry, visual->origin,
+                                      node_name(visual->name, "visual"), node, false);
+    if (!shape) continue;
+    seen.emplace_back(visual.get(), shape);
+    if (const auto material = material_of(*visual)) {
+      for (const NodeId below : scene_.subtree(shape)) {
+        // Meshes have materials of their own.
+        if (scene_[below].mesh && scene_[below].materials.empty()) {
+          scene_.edit(below).materials = {material};
+        }
+      }
+    }
+  }
+  bool collides = false;
+  for (const auto& collision : link.collision_array) {
+    if (!collision || !collision->geometry) continue;
+    // What is seen as it collides is one shape.
+    const auto same = std::find_if(seen.begin(), seen.end(), [&](const auto& entry) {
+      return are_equal(*entry.first->geometry, *collision->geometry) &&
+             are_equal(entry.first->origin, collision->origin);
+    });
+    NodeId shape = same == seen.end() ? NodeId{} : same->second;
+    if (!shape) {
+      shape = add_geometry(*collision->geometry, collision->origin,
+                           node_name(collision->name, "collision"), node, true);
+    }
+    if (!shape) continue;
+    for (const NodeId below : scene_.subtree(shape)) {
+      if (!scene_[below].mesh) continue;
+      Collider collider;
+      collider.primitive = primitive_of(*collision->geometry);
+      if (collider.primitive != PrimitiveShape::None) {
+        collider.shape = ColliderShape::Primitive;
+        collider.primitive_size = scene_[below].mesh->bounds().size();
+      }
+      scene_.edit(below).collider = collider;
+      collides = true;
+    }
+  }
+  if (!collides) return;
+  RigidBody body;
+  if (link.inertial) {
+    if (is_length(link.inertial->mass)) {
+      body.mass_kg = link.inertial->mass;
+    } else {
+      warn("link '" + link.name + "' has a mass that is not above 0; it weighs 1 kg");
+    }
+  }
+  scene_.edit(node).rigid_body = body;
+}
+
+NodeId ModelTranslator::add_geometry(const urdf::Geometry& geometry, const urdf::Pose& pose,
+                                     const std::string& name, NodeId link, bool is_collision) {
+  const std::string where = "link '" + scene_[link].name + "'";
+  Affine link_from_shape = pose_of(pose, where);
+  if (geometry.type != urdf::Geometry::MESH) {
+    auto shape = mesh_of(geometry);
+    if (!shape) {
+      warn(where + " has a shape without a size; it is left out");
+      return {};
+    }
+    const NodeId node = scene_.create(link, name);
+    scene_.set_pose(node, link_from_shape);
+    Node& content = scene_.edit(node);
+    content.mesh = std::make_shared<const Mesh>(std::move(*shape));
+    content.is_visible = !is_collision;
+    return node;
+  }
+  const auto& mesh = static_cast<const urdf::Mesh&>(geometry);
+  const auto file = meshes_.find(mesh.filename);
+  if (!file) {
+    missing_.push_back(where + ": there is no file " + mesh.filename);
+    return {};
+  }
+  if (file->extension() == ".urdf") {
+    warn(where + " names a model as a mesh; it is left out");
+    return {};
+  }
+  const Vec3 scale = to_vec3(mesh.scale);
+  if (!scale.allFinite() || (scale.array() == 0.0).any()) {
+    warn(where + " has a mesh without a size; it is left out");
+    return {};
+  }
+  const NodeId node = scene_.create(link, name);
+  link_from_shape.linear() *= scale.asDiagonal();
+  scene_.set_pose(node, link_from_shape);
+  if (is_collision) scene_.edit(node).is_visible = false;
+  host_.load_asset(file->string(), scene_, node);
+  return node;
+}
+
+std::shared_ptr<const Material> ModelTranslator::material_of(const urdf::Visual& visual) {
+  if (!visual.material) return nullptr;
+  const urdf::Material& said = *visual.material;
+  auto material = std::make_shared<Material>();
+  material->name = said.name;
+  material->base_color = Vec3f(linear_of_srgb(said.color.r), linear_of_srgb(said.color.g),
+                               linear_of_srgb(said.color.b));
+  if (std::isfinite(said.color.a)) material->opacity = std::clamp(said.color.a, 0.0f, 1.0f);
+  if (!said.texture_filename.empty()) {
+    if (const auto file = meshes_.find(said.texture_filename)) {
+      material->base_color_texture.texture = host_.read_texture(*file);
+      material->base_color = Vec3f::Ones();
+      material->opacity = 1.0f;
+    } else {
+      missing_.push_back("material '" + said.name + "': there is no file " + said.texture_filename);
+    }
+  }
+  // Names stand for one material each; without a name each is its own.
+  if (said.name.empty()) return material;
+  return materials_.try_emplace(said.name, std::move(material)).first->second;
+}
+
+void ModelTranslator::add_joint(const urdf::Joint& said, NodeId above) {
+  const std::string where = "joint '" + said.name + "'";
+  const NodeId parent = links_.at(said.parent_link_name);
+  const NodeId child = links_.at(said.child_link_name);
+  Joint joint;
+  if (said.type == urdf::Joint::REVOLUTE || said.type == urdf::Joint::CONTINUOUS) {
+    joint.kind = JointKind::Revolute;
+  } else if (said.type == urdf::Joint::PRISMATIC) {
+    joint.kind = JointKind::Prismatic;
+  } else if (said.type != urdf::Joint::FIXED) {
+    warn(where + " is of a type that does not hold (floating or planar)");
+    return;
+  }
+  joint.parent_body = parent;
+  joint.child_body = child;
+  joint.parent_from_joint = pose_of(said.parent_to_joint_origin_transform, where);
+  if (joint.kind != JointKind::Fixed) {
+    const Vec3 axis = to_vec3(said.axis);
+    if (axis.allFinite() && axis.norm() > 1e-9) {
+      joint.axis = axis.normalized();
+    } else {
+      warn(where + " has no axis; it is x");
+    }
+  }
+  if (said.limits && joint.kind != JointKind::Fixed && said.type != urdf::Joint::CONTINUOUS) {
+    const auto [lower, upper] = std::pair(said.limits->lower, said.limits->upper);
+    if (lower <= upper) {
+      joint.lower = lower;
+      joint.upper = upper;
+    } else {
+      warn(where + " has limits that are no interval; it has none");
+    }
+  }
+  const NodeId node = scene_.create(above, node_name(said.name, "joint"));
+  joints_[said.name] = node;
+  scene_.edit(node).joint = joint;
+}
+
+}  // namespace diorama::loader_urdf

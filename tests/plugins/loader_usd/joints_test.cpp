@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "diorama/joints.h"
+
+#include <filesystem>
+
+#include "plugins/loader_usd/loaded_stage.h"
+#include "support/catch.h"
+#include "support/shared_data.h"
+#include "support/temporary_folder.h"
+
+namespace diorama::loader_usd {
+
+using test::LoadedStage;
+using test::TemporaryFolder;
+
+namespace {
+
+/// A lid on a box in centimetres and y up, hinged 10 cm above the box's middle.
+std::string lid(const std::string& words) {
+  return R"(#usda 1.0
+(
+    metersPerUnit = 0.01
+    upAxis = "Y"
+)
+def Xform "Chest"
+{
+    double3 xformOp:translate = (30, 0, 0)
+    uniform token[] xformOpOrder = ["xformOp:translate"]
+    def Xform "box" ( prepend apiSchemas = ["PhysicsRigidBodyAPI"] )
+    {
+        double3 xformOp:translate = (0, 5, 0)
+        double3 xformOp:scale = (20, 10, 4)
+        uniform token[] xformOpOrder = ["xformOp:translate", "xformOp:scale"]
+        def Cube "shape"
+        {
+            double size = 1
+        }
+    }
+    def Xform "lid" ( prepend apiSchemas = ["PhysicsRigidBodyAPI"] )
+    {
+        double3 xformOp:translate = (10, 16, 0)
+        uniform token[] xformOpOrder = ["xformOp:translate"]
+        def Cube "shape"
+        {
+            double size = 2
+        }
+    }
+    def PhysicsRevoluteJoint "hinge"
+    {
+        uniform token physics:axis = "Z"
+        rel physics:body0 = </Chest/box>
+        rel physics:body1 = </Chest/lid/shape>
+        point3f physics:localPos0 = (0, 1.1, 0)
+        point3f physics:localPos1 = (-10, 0, 0)
+)" + words +
+         "    }\n}\n";
+}
+
+std::string warnings(LoadedStage& loaded) {
+  std::string all;
+  for (const std::string& line : loaded.host.warnings) all += line + "\n";
+  return all;
+}
+
+}  // namespace
+
+TEST_CASE("a UsdPhysics joint turns its child where it says, in metres and z up", "[loader_usd]") {
+  const TemporaryFolder folder;
+  LoadedStage loaded(folder.write(
+      "a.usda", lid("float physics:lowerLimit = -30\nfloat physics:upperLimit = 90\n")));
+  const NodeId hinge = loaded.scene.require("/asset/Chest/hinge");
+  const Joint& joint = *loaded.scene[hinge].joint;
+  CHECK(joint.kind == JointKind::Revolute);
+  CHECK(loaded.scene.path(joint.parent_body) == "/asset/Chest/box");
+  // The shape belongs to the body above it.
+  CHECK(loaded.scene.path(joint.child_body) == "/asset/Chest/lid");
+  CHECK(joint.lower == Approx(-kPi / 6.0));
+  CHECK(joint.upper == Approx(kPi / 2.0));
+  CHECK(joint_position(loaded.scene, hinge) == Approx(0.0).margin(1e-12));
+  // Up by 10 cm where it was 10 cm beside the hinge: stage z is the world's -y, stage y its z.
+  pose_joints(loaded.scene, std::vector<JointTarget>{{hinge, 0.5 * kPi}});
+  const Vec3 place =
+      loaded.scene.world_from_node(loaded.scene.require("/asset/Chest/lid")).translation();
+  CHECK((place - Vec3(0.30, 0.0, 0.26)).norm() < 1e-7);
+  CHECK(joint_position(loaded.scene, hinge) == Approx(0.5 * kPi));
+  CHECK(warnings(loaded).empty());
+}
+
+TEST_CASE("joints with words that cannot be hold nothing or have no limit", "[loader_usd]") {
+  const TemporaryFolder folder;
+  const auto load = [&](const std::string& words, bool is_held, const std::string& warning) {
+    INFO(words);
+    LoadedStage loaded(folder.write("a.usda", lid(words)));
+    const auto& joint = loaded.node("Chest/hinge").joint;
+    CHECK(joint.has_value() == is_held);
+    CHECK(warnings(loaded).find(warning) != std::string::npos);
+    if (!joint) return;
+    CHECK(joint->lower == -kInfinity);
+    CHECK(joint->upper == kInfinity);
+    CHECK(joint->parent_from_joint.matrix().allFinite());
+  };
+  load("float physics:lowerLimit = nan\n", true, "a limit that is no number");
+  load("float physics:lowerLimit = 5\nfloat physics:upperLimit = 4\n", true,
+       "a lower limit above the upper one");
+  load("quatf physics:localRot0 = (nan, 0, 0, 0)\n", true, "whose place is no number");
+  load("quatf physics:localRot1 = (0, 0, 0, 0)\n", true, "whose place is no number");
+  load("bool physics:jointEnabled = 0\n", false, "");
+}
+
+TEST_CASE("joints of bodies that are not there are one warning", "[loader_usd]") {
+  const TemporaryFolder folder;
+  LoadedStage loaded(folder.write("a.usda", R"(#usda 1.0
+def Xform "A" ( prepend apiSchemas = ["PhysicsRigidBodyAPI"] )
+{
+}
+def PhysicsFixedJoint "lost"
+{
+    rel physics:body0 = </A>
+    rel physics:body1 = </B>
+}
+def PhysicsFixedJoint "self"
+{
+    rel physics:body0 = </A>
+    rel physics:body1 = </A>
+}
+def PhysicsFixedJoint "none"
+{
+}
+def PhysicsFixedJoint "held"
+{
+    rel physics:body0 = </A>
+}
+def PhysicsSphericalJoint "ball"
+{
+    rel physics:body0 = </A>
+}
+)"));
+  for (const char* name : {"lost", "self", "none"}) CHECK_FALSE(loaded.node(name).joint);
+  CHECK(loaded.scene.path(loaded.node("held").joint->parent_body) == "/asset");
+  const std::string all = warnings(loaded);
+  CHECK(all.find("<lost> is a joint of a body that is not there") == std::string::npos);
+  CHECK(all.find("</lost> is a joint of a body that is not there, and holds nothing (</B>)") !=
+        std::string::npos);
+  CHECK(all.find("is a joint of a body with itself, and holds nothing, like 1 more of them") !=
+        std::string::npos);
+  CHECK(all.find("is of type PhysicsSphericalJoint, which does not hold bodies together") !=
+        std::string::npos);
+}
+
+TEST_CASE("foreign articulations are read and can be posed within their limits",
+          "[loader_usd][shared]") {
+  const auto shared = test::shared_folder();
+  if (!shared) {
+    WARN("the shared files are not there");
+    return;
+  }
+  const std::filesystem::path folder = *shared / "data/usd/newton/newton";
+  struct Known {
+    const char* file;
+    std::size_t joints;
+  };
+  for (const auto& [file, count] :
+       {Known{"examples/assets/cartpole.usda", 4}, Known{"examples/assets/boxes_fourbar.usda", 4},
+        Known{"tests/assets/revolute_articulation.usda", 2}}) {
+    INFO(file);
+    LoadedStage loaded((folder / file).string());
+    const std::vector<NodeId> joints = joints_of(loaded.scene);
+    CHECK(joints.size() == count);
+    for (const NodeId id : joints) {
+      if (loaded.scene[id].joint->kind == JointKind::Fixed) continue;
+      pose_joints(loaded.scene, std::vector<JointTarget>{{id, 0.1}});
+    }
+  }
+}
+
+}  // namespace diorama::loader_usd
