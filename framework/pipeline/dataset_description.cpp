@@ -256,6 +256,12 @@ DatasetInfo describe_dataset(const Job& job, const CapturePlan& plan, std::strin
   std::set<Labels> labels;
   std::map<Labels, std::vector<std::string>> keypoints;
   visit_planned_objects(job, plan, [&](const PlannedObject& object) {
+    const ObjectGroup& group = job.objects[object.group];
+    for (const auto& [pattern, label] : group.part_labels) {
+      Labels of_part;
+      of_part.emplace(group.taxonomy, label);
+      labels.insert(std::move(of_part));
+    }
     if (object.labels.empty()) return;
     labels.insert(object.labels);
     for (const std::string& name : job.objects[object.group].keypoints) {

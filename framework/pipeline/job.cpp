@@ -28,6 +28,7 @@ using detail::StepsKeys;
 
 constexpr const char* kColliderWords[] = {"none", "triangle_mesh", "convex_hull", "bounding_box",
                                           "bounding_sphere"};
+constexpr const char* kJointWords[] = {"held", "free"};
 constexpr const char* kEnvironmentColliderWords[] = {"none", "triangle_mesh", "convex_hull",
                                                      "bounding_box"};
 constexpr const char* kPickWords[] = {"per_job", "per_visit"};
@@ -213,6 +214,29 @@ void read_variants(ObjectGroup& group, const std::string& path, Complaints& comp
   }
 }
 
+void read_parts(ObjectGroup& group, const std::string& path, Complaints& complaints) {
+  const Value& given = group.parts;
+  if (given.kind == Value::Kind::Null) return;
+  const std::string key = path + ".parts";
+  if (given.kind != Value::Kind::Map) {
+    complaints.add(given.place, key + ": expected labels by name, {drawer_*: drawer}, found " +
+                                    given.describe());
+    return;
+  }
+  for (const auto& [pattern, label] : given.map) {
+    const bool is_label = label.kind == Value::Kind::Scalar && !label.scalar.empty();
+    if (!is_label) {
+      complaints.add(label.place,
+                     key + "." + pattern + ": expected a label, found " + label.describe());
+    } else if (pattern.empty() || pattern.find('/') != std::string::npos) {
+      complaints.add(label.place, key + ": expected names in which * stands for anything, found '" +
+                                      pattern + "'");
+    } else {
+      group.part_labels.emplace_back(pattern, clean_name(label.scalar));
+    }
+  }
+}
+
 void check_fewer(const ObjectGroup& group, const Value& map, const std::string& path,
                  Complaints& complaints) {
   if (group.fewer > group.count) {
@@ -233,6 +257,7 @@ void read_objects(const Value& value, Job& job, Complaints& complaints) {
     name_after_type(group);
     check_pattern(group, map, path, complaints);
     read_variants(group, path, complaints);
+    read_parts(group, path, complaints);
     check_node_name(group.name, map, path, complaints);
     if (group.under.size() < 2 || group.under.front() != '/' || group.under.back() == '/') {
       complaints.add(place_of(map, "under"),
@@ -690,6 +715,9 @@ void EnvironmentRules::visit(ParamVisitor& v) {
           {"Lamps of the environment that light a surface 2 m away with more are dimmed to this; "
            "null: they stay as they are.",
            "lux", 1e-3, 1e12});
+  v.choice("joints", joints, kJointWords,
+           {"held: what joints hold together stands still as it is posed; free: it moves as its "
+            "joints allow."});
 }
 
 void ObjectGroup::visit(ParamVisitor& v) {
@@ -723,6 +751,13 @@ void ObjectGroup::visit(ParamVisitor& v) {
           {"Share of the objects that float.", "", 0, 1});
   v.choice("collider", collider, kColliderWords, {"Collider of every mesh of the object."});
   v.param("mass_kg", mass_kg, {"Mass where the asset says nothing.", "kg", 1e-6, 1e6});
+  v.choice("joints", joints, kJointWords,
+           {"held: an object moves as one, as its joints are posed; free: its parts move as its "
+            "joints allow."});
+  v.param("parts", parts,
+          {"Labels of parts by the names of their nodes, in which * stands for anything: "
+           "{drawer_*: drawer}. Parts are instances of their own; the first name that fits counts; "
+           "null: the object is one."});
 }
 
 void LightGroup::visit(ParamVisitor& v) {

@@ -38,6 +38,7 @@ struct EnvironmentRules {
   std::vector<std::string> box_colliders;
   std::optional<std::string> working_area;
   std::optional<double> max_lamp_lux;  ///< At kLampDistance.
+  std::string joints = "held";
   void visit(ParamVisitor& v);
 };
 
@@ -62,6 +63,10 @@ struct ObjectGroup {
   double gravity_disabled_chance = 0.0;
   std::string collider = "convex_hull";
   double mass_kg = 1.0;
+  std::string joints = "held";
+  Value parts;  ///< As given.
+  /// Patterns of names and the labels of what has such a name, in the job's order.
+  std::vector<std::pair<std::string, std::string>> part_labels;
   void visit(ParamVisitor& v);
 };
 

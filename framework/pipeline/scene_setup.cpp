@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <set>
 #include <string_view>
 
 #include "diorama/error.h"
@@ -97,11 +98,23 @@ NodeId node_at(Scene& scene, std::string_view path) {
   return node;
 }
 
-/// The object moves as one: bodies inside an asset become part of it. Returns their mass, if any.
-std::optional<double> take_over_bodies(Scene& scene, const std::vector<NodeId>& nodes) {
+/// What the joints below some nodes move, as far as it is a body of its own.
+std::set<NodeId> jointed_bodies(const Scene& scene, const std::vector<NodeId>& nodes) {
+  std::set<NodeId> bodies;
+  for (const NodeId node : nodes) {
+    const auto& joint = scene[node].joint;
+    if (joint && scene[joint->child_body].rigid_body) bodies.insert(joint->child_body);
+  }
+  return bodies;
+}
+
+/// The object moves as one: bodies inside an asset become part of it, but for those to keep.
+/// Returns their mass, if any.
+std::optional<double> take_over_bodies(Scene& scene, const std::vector<NodeId>& nodes,
+                                       const std::set<NodeId>& kept) {
   std::optional<double> mass_kg;
   for (const NodeId node : nodes) {
-    if (!scene[node].rigid_body) continue;
+    if (!scene[node].rigid_body || kept.contains(node)) continue;
     mass_kg = mass_kg.value_or(0.0) + scene[node].rigid_body->mass_kg;
     scene.edit(node).rigid_body.reset();
   }
@@ -110,7 +123,10 @@ std::optional<double> take_over_bodies(Scene& scene, const std::vector<NodeId>& 
 
 void make_physical(Scene& scene, NodeId object, const ObjectGroup& group, bool floats) {
   const std::vector<NodeId> nodes = scene.subtree(object);
-  const std::optional<double> mass_kg = take_over_bodies(scene, nodes);
+  std::set<NodeId> kept;
+  if (group.joints == "free") kept = jointed_bodies(scene, nodes);
+  for (const NodeId part : kept) scene.edit(part).rigid_body->has_gravity = !floats;
+  const std::optional<double> mass_kg = take_over_bodies(scene, nodes, kept);
   const std::optional<ColliderShape> shape = collider_shape(group.collider);
   for (const NodeId node : nodes) {
     if (!scene[node].mesh) continue;
@@ -128,6 +144,15 @@ void make_physical(Scene& scene, NodeId object, const ObjectGroup& group, bool f
   scene.edit(object).rigid_body = body;
 }
 
+void label_parts(Scene& scene, NodeId object, const ObjectGroup& group) {
+  for (const auto& [pattern, label] : group.part_labels) {
+    for (const NodeId part : scene.match(scene.path(object) + "/**/" + pattern)) {
+      if (scene[part].joint || !scene[part].labels.empty()) continue;
+      scene.edit(part).labels.emplace(group.taxonomy, label);
+    }
+  }
+}
+
 NodeId spawn(const PlannedObject& planned, const ObjectGroup& group, Scene& scene, Host& host) {
   const NodeId object = scene.create(node_at(scene, group.under), planned.name);
   if (scene.path(object) != planned.path) {
@@ -139,6 +164,7 @@ NodeId spawn(const PlannedObject& planned, const ObjectGroup& group, Scene& scen
     if (!scene[node].labels.empty()) scene.edit(node).labels.clear();
   }
   scene.edit(object).labels = planned.labels;
+  label_parts(scene, object, group);
   make_physical(scene, object, group, planned.floats);
   return object;
 }
@@ -211,6 +237,15 @@ Vec3 apply_environment_rules(const EnvironmentRules& rules, bool debug, NodeId e
   if (const auto shape = collider_shape(rules.colliders)) {
     for (const NodeId node : scene.subtree(environment)) {
       if (scene[node].mesh) set_collider(scene, node, *shape);
+    }
+  }
+  if (rules.joints == "held") {
+    const std::vector<NodeId> nodes = scene.subtree(environment);
+    for (const NodeId node : nodes) {
+      if (!scene[node].joint) continue;
+      for (const NodeId body : {scene[node].joint->parent_body, scene[node].joint->child_body}) {
+        if (scene[body].rigid_body) scene.edit(body).rigid_body.reset();
+      }
     }
   }
   for (const std::string& text : rules.box_colliders) {

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "animation_time.h"
 #include "camera_lens.h"
 #include "camera_motion.h"
 #include "camera_path.h"
 #include "camera_relative_pose.h"
 #include "diorama/plugin.h"
 #include "dome_light.h"
+#include "joint_positions.h"
 #include "look_at.h"
 #include "orbit_cameras.h"
 #include "random_colors.h"
@@ -30,9 +32,13 @@ DIORAMA_PLUGIN("randomizers_core", "0.1.0", "Apache-2.0") {
   DIORAMA_ADD(diorama::RandomVariant, "random_variant",
               "Gives objects the looks of a variant of their asset.");
   DIORAMA_ADD(diorama::RandomVisibility, "random_visibility", "Shows or hides nodes by chance.");
+  DIORAMA_ADD(diorama::JointPositions, "joint_states",
+              "Opens doors and drawers: draws positions of joints within their limits.");
   DIORAMA_ADD(diorama::OrbitCameras, "orbit_cameras",
               "Places cameras round random targets and looks at them.");
   DIORAMA_ADD(diorama::LookAt, "look_at", "Turns nodes towards random targets.");
+  DIORAMA_ADD(diorama::AnimationTime, "animation_time",
+              "Shows animated assets as they are at a time that is drawn.");
   DIORAMA_ADD(diorama::CameraRelativePose, "camera_relative_pose",
               "Places nodes in a camera's picture, at a distance from it.");
   DIORAMA_ADD(diorama::CameraLens, "camera_lens", "Draws focal length and focus of cameras.");

@@ -58,6 +58,7 @@ constexpr std::array kKinds{
     Kind{"flow_backward_state", "flow_backward_state", ".npy"},
     Kind{"velocities", "velocities", ".json"},
     Kind{"camera_params", "camera_params", ".json"},
+    Kind{"joint_states", "joint_states", ".json"},
     Kind{"pointcloud", "pointcloud", ".npy"},
     Kind{"pointcloud", "pointcloud_rgb", ".npy"},
     Kind{"pointcloud", "pointcloud_normals", ".npy"},

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "reader_support/camera_json.h"
+#include "writer_basic/joint_states.h"
 
 namespace diorama {
 namespace {
@@ -97,6 +98,7 @@ std::optional<Frame> BasicFrameReading::read(const std::string& camera, FrameSou
   frame_.camera_name = camera;
   frame_.camera_path = "/Cameras/" + camera;
   read_camera();
+  read_joints();
   read_color();
   read_distances();
   read_normals();
@@ -128,6 +130,15 @@ bool BasicFrameReading::note_size(int width, int height, const std::string& file
   size_file_ = file;
   has_size_ = true;
   return true;
+}
+
+void BasicFrameReading::read_joints() {
+  const std::string file = path("joint_states.json");
+  if (file.empty() || !wants(kHoldsJoints)) return;
+  const auto json = files_.json(file);
+  if (!json) return;
+  files_.reading(file, [&] { frame_.joints = joint_states_from(*json); });
+  sources_.emplace(kHoldsJoints, file);
 }
 
 void BasicFrameReading::read_camera() {

@@ -47,6 +47,7 @@ class BasicFrameReading {
 
   void read_camera();
   void check_camera(const Json& json, const Mat4& clip_from_camera, const std::string& file);
+  void read_joints();
   void read_color();
   void read_distances();
   void check_drawn(const StoredPicture& drawn, const Image<float>& distances,

@@ -120,6 +120,7 @@ class BasicDataset final : public StoredDataset {
     hold("velocities.json", {kHoldsVelocities});
     if (!clips_.empty()) info_.holds.emplace(kHoldsClips);
     hold("camera_params.json", {kHoldsCamera, kHoldsCameraPose});
+    hold("joint_states.json", {kHoldsJoints});
     hold("instance_segmentation.png",
          {kInstanceId.name, kHoldsInstances, kHoldsLabels, kHoldsNodePaths});
     hold("instance_id_segmentation.png", {kLeafId.name, kHoldsLeafPaths});

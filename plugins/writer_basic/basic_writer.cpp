@@ -12,6 +12,7 @@
 #include "writer_basic/box_files.h"
 #include "writer_basic/camera_params.h"
 #include "writer_basic/frame_output.h"
+#include "writer_basic/joint_states.h"
 #include "writer_basic/point_cloud_files.h"
 #include "writer_basic/segmentation_files.h"
 #include "writer_support/clips_json.h"
@@ -95,6 +96,10 @@ void write_unlabelled_files(const BasicWriter::Params& params, const FrameOutput
     output.files.add_text(output.path("camera_params", "camera_params", ".json"),
                           python_json(camera_params_json(output.frame)));
   }
+  if (params.joint_states) {
+    output.files.add_text(output.path("joint_states", "joint_states", ".json"),
+                          python_json(joint_states_json(output.frame)));
+  }
   if (params.pointcloud) write_point_cloud(output, params.pointcloud_include_unlabelled);
   for (const std::string& channel : params.channels.names) {
     add_npy(output.files, output.path(channel, channel, ".npy"), output.frame.image_named(channel));
@@ -133,6 +138,8 @@ void BasicWriter::Params::visit(ParamVisitor& v) {
   v.param("normals", normals, {"World normals as a picture."});
   v.param("motion_vectors", motion_vectors, {"Pixel motion since the previous time step."});
   v.param("camera_params", camera_params, {"Lens, sensor, projection and pose."});
+  v.param("joint_states", joint_states,
+          {"Joints: kind, bodies, position and limits, in radians and metres."});
   v.param("pointcloud", pointcloud, {"World points of the pixels with colours, normals and ids."});
   v.param("skeleton_data", skeleton_data,
           {"Accepted; scenes hold no skeletons, so no file is written."});

@@ -33,6 +33,7 @@ class BasicWriter final : public Writer {
     bool normals = false;
     bool motion_vectors = false;
     bool camera_params = false;
+    bool joint_states = false;
     bool pointcloud = false;
     bool skeleton_data = false;
     bool pointcloud_include_unlabelled = false;

@@ -173,6 +173,81 @@ objects:
   CHECK_FALSE(box.rigid_body->has_gravity);
 }
 
+namespace {
+
+/// A chest and its drawer, side by side, with a joint between them.
+void build_chest(Scene& scene, NodeId root) {
+  const NodeId body = add_mesh(scene, root, "body", Vec3::Zero());
+  const NodeId drawer = add_mesh(scene, root, "drawer_1", Vec3(0, 0, 0.1));
+  scene.edit(body).rigid_body = RigidBody{8.0};
+  scene.edit(drawer).rigid_body = RigidBody{2.0};
+  const NodeId slide = scene.create(root, "drawer_slide");
+  Joint joint;
+  joint.kind = JointKind::Prismatic;
+  joint.parent_body = body;
+  joint.child_body = drawer;
+  scene.edit(slide).joint = joint;
+}
+
+Job chest_job(const std::string& words) {
+  return job_from(R"(
+environments: [{type: files}]
+cameras: [{type: pinhole}]
+objects:
+  - {type: files, name: chests, under: /Assets, label: chest, )" +
+                  words + "}\n");
+}
+
+}  // namespace
+
+TEST_CASE("Parts get labels by name; joints hold as the job says", "[spawn]") {
+  FakeHost host;
+  host.assets["chest"] = build_chest;
+  for (const bool is_free : {false, true}) {
+    const Job job =
+        chest_job(std::string("parts: {drawer_*: drawer}, joints: ") + (is_free ? "free" : "held"));
+    const CapturePlan plan = plan_captures(job, {{"room", 0}}, {{"chest"}});
+    Scene scene;
+    const NodeId object = spawn_objects(plan.objects, job, scene, host).front();
+    const std::string path = scene.path(object) + "/loaded/";
+    CHECK(scene[object].labels == Labels{{"class", "chest"}});
+    CHECK(scene[scene.require(path + "drawer_1")].labels == Labels{{"class", "drawer"}});
+    CHECK(scene[scene.require(path + "body")].labels.empty());
+    CHECK(scene[scene.require(path + "drawer_slide")].labels.empty());
+    // The body that nothing holds is the object's own.
+    CHECK(scene[object].rigid_body->mass_kg == (is_free ? 8.0 : 10.0));
+    CHECK_FALSE(scene[scene.require(path + "body")].rigid_body);
+    CHECK(scene[scene.require(path + "drawer_1")].rigid_body.has_value() == is_free);
+  }
+}
+
+TEST_CASE("Articulated furniture of the environment stands still unless joints are free",
+          "[environment]") {
+  for (const bool is_free : {false, true}) {
+    FakeHost host;
+    Scene scene;
+    const NodeId environment = scene.create(scene.root(), "Environment");
+    build_chest(scene, environment);
+    const NodeId ball = add_mesh(scene, environment, "ball", Vec3(0, 0, 2));
+    scene.edit(ball).rigid_body = RigidBody{};
+    EnvironmentRules rules;
+    rules.joints = is_free ? "free" : "held";
+    apply_environment_rules(rules, false, environment, scene, host);
+    CHECK(scene[scene.require("/Environment/body")].rigid_body.has_value() == is_free);
+    CHECK(scene[scene.require("/Environment/drawer_1")].rigid_body.has_value() == is_free);
+    CHECK(scene[ball].rigid_body);
+  }
+}
+
+TEST_CASE("Labels of parts that are none are named", "[spawn]") {
+  CHECK_THROWS_WITH(chest_job("parts: [drawer]"),
+                    ContainsSubstring("parts: expected labels by name, {drawer_*: drawer}, found"));
+  CHECK_THROWS_WITH(chest_job("parts: {drawer: [a]}"),
+                    ContainsSubstring("parts.drawer: expected a label, found"));
+  CHECK_THROWS_WITH(chest_job("parts: {a/b: c}"),
+                    ContainsSubstring("parts: expected names in which * stands for anything"));
+}
+
 TEST_CASE("Lights and cameras stand where the job says", "[spawn]") {
   FakeHost host;
   const Job job = job_from(R"(
