@@ -7,6 +7,7 @@
 #include <map>
 
 #include "diorama/error.h"
+#include "joint_builder.h"
 
 namespace diorama {
 namespace {
@@ -92,6 +93,7 @@ void add_static(const Scene& scene, NodeId id, const BulletBackend::Params& para
   const Node& node = scene[id];
   const RigidStretch split = split_rigid(scene.world_from_node(id));
   StaticObject made;
+  made.node = id;
   made.path = scene.path(id);
   Rigid place = split.rigid;
   if (node.collider->shape == ColliderShape::TriangleMesh && node.mesh) {
@@ -246,6 +248,7 @@ Bodies build_bodies(const Scene& scene, const BulletBackend::Params& params, Sha
     for (const NodeId collider : group.colliders) check_collider(scene, collider);
     add_moving(scene, id, group, params, cache, bodies);
   }
+  add_joints(scene, bodies);
   return bodies;
 }
 

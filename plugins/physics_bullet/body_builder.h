@@ -25,6 +25,7 @@ struct OwnedShapes {
 };
 
 struct StaticObject {
+  NodeId node;
   std::string path;
   OwnedShapes shapes;
   std::unique_ptr<btCollisionObject> object;
@@ -41,10 +42,19 @@ struct MovingBody {
   btTransform start;  ///< Where it was at the last reset.
 };
 
+/// A joint between two moving bodies, or between one and what stands still.
+struct HeldJoint {
+  std::string path;
+  std::unique_ptr<btTypedConstraint> constraint;
+};
+
 /// What a scene holds for physics, in creation order of the nodes.
 struct Bodies {
   std::vector<StaticObject> statics;
   std::vector<MovingBody> moving;
+  /// What stands still, to joints: a body without mass that is in no world.
+  std::unique_ptr<btRigidBody> anchor;
+  std::vector<HeldJoint> joints;
   std::vector<std::string> shapeless;  ///< Rigid bodies without anything that collides.
 };
 

@@ -88,6 +88,7 @@ struct BulletBackend::World {
   GentleWorld dynamics;
 
   ~World() {
+    for (const HeldJoint& held : bodies.joints) dynamics.removeConstraint(held.constraint.get());
     for (const MovingBody& moving : bodies.moving) dynamics.removeRigidBody(moving.body.get());
     for (const StaticObject& fixed : bodies.statics) {
       dynamics.removeCollisionObject(fixed.object.get());
@@ -131,12 +132,17 @@ void BulletBackend::do_reset(const Scene& scene) {
     world.bodies.moving[i].body->setUserIndex(int(i));
     world.dynamics.addRigidBody(world.bodies.moving[i].body.get());
   }
+  // Bodies that a joint holds together do not collide with each other.
+  for (const HeldJoint& held : world.bodies.joints) {
+    world.dynamics.addConstraint(held.constraint.get(), true);
+  }
   for (const std::string& path : world.bodies.shapeless) {
     host_.log(LogLevel::Warning, path + ": a rigid body without colliders stays where it is");
   }
   host_.log(LogLevel::Debug, "physics: " + std::to_string(world.bodies.statics.size()) +
                                  " static colliders, " +
-                                 std::to_string(world.bodies.moving.size()) + " moving bodies");
+                                 std::to_string(world.bodies.moving.size()) + " moving bodies, " +
+                                 std::to_string(world.bodies.joints.size()) + " joints");
 }
 
 void BulletBackend::do_advance(int steps) { do_advance_by(steps, params_.step_seconds); }

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "joint_builder.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "diorama/error.h"
+#include "diorama/joints.h"
+
+namespace diorama {
+namespace {
+
+constexpr double kFar = 1e6;  // metres: no limit
+
+btTransform bullet_transform(const Rigid& rigid) {
+  const Quat rotation(rigid.linear());
+  const Vec3 position = rigid.translation();
+  return btTransform(btQuaternion(rotation.x(), rotation.y(), rotation.z(), rotation.w()),
+                     btVector3(position.x(), position.y(), position.z()));
+}
+
+using MovingBodies = std::map<NodeId, std::size_t>;
+
+/// The moving body that the node is part of; nothing where it stands still.
+const MovingBody* body_above(const Scene& scene, NodeId node, const MovingBodies& moving,
+                             const Bodies& bodies) {
+  for (; node; node = scene[node].parent) {
+    const auto found = moving.find(node);
+    if (found != moving.end()) return &bodies.moving[found->second];
+    if (scene[node].rigid_body) return nullptr;
+  }
+  return nullptr;
+}
+
+/// Joint space with the axis along x (sliders) or z (hinges).
+Rigid turned_to_axis(const Affine& world_from_joint, const Joint& joint) {
+  Rigid frame = split_rigid(world_from_joint).rigid;
+  const Vec3 own = joint.kind == JointKind::Prismatic ? Vec3::UnitX() : Vec3::UnitZ();
+  frame.linear() =
+      frame.linear() * Quat::FromTwoVectors(own, joint.axis).normalized().toRotationMatrix();
+  return frame;
+}
+
+btTransform frame_in(const MovingBody* body, const Rigid& world_from_joint) {
+  const btTransform world = bullet_transform(world_from_joint);
+  return body ? body->start.inverse() * world : world;
+}
+
+std::unique_ptr<btTypedConstraint> make_hinge(const Joint& joint, btRigidBody& parent,
+                                              btRigidBody& child, const btTransform& in_parent,
+                                              const btTransform& in_child) {
+  // By the parent's frame angles count as the scene's do.
+  auto hinge = std::make_unique<btHingeConstraint>(parent, child, in_parent, in_child, true);
+  const double range = joint.upper - joint.lower;
+  // Bullet knows angles within one turn only.
+  if (range < 2.0 * kPi) hinge->setLimit(joint.lower, joint.upper, 0.9, 0.3, 0.0);
+  return hinge;
+}
+
+std::unique_ptr<btTypedConstraint> make_slider(const Joint& joint, double scale,
+                                               btRigidBody& parent, btRigidBody& child,
+                                               const btTransform& in_parent,
+                                               const btTransform& in_child) {
+  auto slider = std::make_unique<btSliderConstraint>(parent, child, in_parent, in_child, true);
+  slider->setLowerLinLimit(std::max(scale * joint.lower, -kFar));
+  slider->setUpperLinLimit(std::min(scale * joint.upper, kFar));
+  slider->setLowerAngLimit(0.0);
+  slider->setUpperAngLimit(0.0);
+  slider->setRestitutionLimLin(0.0);
+  return slider;
+}
+
+bool is_below(const Scene& scene, NodeId node, NodeId top) {
+  for (; node; node = scene[node].parent) {
+    if (node == top) return true;
+  }
+  return false;
+}
+
+void check_joint(const Scene& scene, NodeId id) {
+  const Joint& joint = *scene[id].joint;
+  const bool is_sound = joint.parent_from_joint.matrix().allFinite() &&
+                        joint.child_from_joint.matrix().allFinite() &&
+                        std::abs(joint.axis.norm() - 1.0) < 1e-6 && joint.lower <= joint.upper;
+  if (is_sound) return;
+  throw Error(ErrorKind::Asset, scene.path(id) +
+                                    ": its joint needs finite frames, an axis of unit length and "
+                                    "a lower limit that is not above the upper one");
+}
+
+}  // namespace
+
+void add_joints(const Scene& scene, Bodies& bodies) {
+  MovingBodies moving;
+  for (std::size_t i = 0; i < bodies.moving.size(); ++i) moving[bodies.moving[i].node] = i;
+  if (moving.empty()) return;
+  for (const NodeId id : joints_of(scene)) {
+    const Joint& joint = *scene[id].joint;
+    const MovingBody* parent = body_above(scene, joint.parent_body, moving, bodies);
+    const MovingBody* child = body_above(scene, joint.child_body, moving, bodies);
+    if (parent == child) continue;
+    check_joint(scene, id);
+    if (!bodies.anchor) {
+      bodies.anchor = std::make_unique<btRigidBody>(
+          btRigidBody::btRigidBodyConstructionInfo(0.0, nullptr, nullptr));
+    }
+    const Affine world_from_joint =
+        scene.world_from_node(joint.parent_body) * joint.parent_from_joint;
+    const btTransform in_parent = frame_in(parent, turned_to_axis(world_from_joint, joint));
+    const btTransform in_child = frame_in(
+        child,
+        turned_to_axis(scene.world_from_node(joint.child_body) * joint.child_from_joint, joint));
+    btRigidBody& parent_body = parent ? *parent->body : *bodies.anchor;
+    btRigidBody& child_body = child ? *child->body : *bodies.anchor;
+    HeldJoint held;
+    held.path = scene.path(id);
+    if (joint.kind == JointKind::Revolute) {
+      held.constraint = make_hinge(joint, parent_body, child_body, in_parent, in_child);
+    } else if (joint.kind == JointKind::Prismatic) {
+      const double scale = (world_from_joint.linear() * joint.axis).norm();
+      held.constraint = make_slider(joint, scale, parent_body, child_body, in_parent, in_child);
+    } else {
+      held.constraint =
+          std::make_unique<btFixedConstraint>(parent_body, child_body, in_parent, in_child);
+    }
+    bodies.joints.push_back(std::move(held));
+    if (parent && child) continue;
+    const NodeId still = parent ? joint.child_body : joint.parent_body;
+    btRigidBody& body = parent ? parent_body : child_body;
+    for (const StaticObject& fixed : bodies.statics) {
+      if (is_below(scene, fixed.node, still))
+        body.setIgnoreCollisionCheck(fixed.object.get(), true);
+    }
+  }
+}
+
+}  // namespace diorama

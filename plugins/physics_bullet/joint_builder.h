@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "body_builder.h"
+#include "diorama/scene.h"
+
+namespace diorama {
+
+/// Fills Bodies::joints from the scene: of joints whose bodies move as two, or of which one moves.
+/// What a body is held to while it stands still does not collide with it.
+void add_joints(const Scene& scene, Bodies& bodies);
+
+}  // namespace diorama
