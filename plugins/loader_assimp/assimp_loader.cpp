@@ -5,8 +5,10 @@
 
 #include "diorama/error.h"
 #include "loader_assimp/asset_files.h"
+#include "loader_assimp/posing.h"
 #include "loader_assimp/scene_file.h"
 #include "loader_assimp/scene_translator.h"
+#include "loader_support/asset_time.h"
 
 namespace diorama::loader_assimp {
 
@@ -28,15 +30,18 @@ std::vector<std::string> AssimpLoader::claims() const {
 }
 
 std::vector<std::filesystem::path> AssimpLoader::files(std::string_view asset) const {
-  return files_of(std::string(asset));
+  return files_of(loader_support::split_time(asset).file);
 }
 
 void AssimpLoader::load(std::string_view asset, Scene& scene, NodeId root) {
-  const std::string name(asset);
-  const SceneFile file(name, host_);
+  const auto [name, seconds] = loader_support::split_time(asset);
+  const SceneFile file(name, host_, seconds);
   host_.log(LogLevel::Debug, describe_units(file, params_.unstated));
   SceneTranslator translator(file, params_.unstated, host_, scene);
   translator.translate(root);
+  if (const auto length = animation_seconds(file.scene())) {
+    scene.edit(root).animation = Animation{name, 0.0, *length};
+  }
   const std::vector<std::string> missing = translator.missing();
   if (params_.missing_assets_are_errors && !missing.empty()) {
     throw Error(ErrorKind::Asset, missing.front());

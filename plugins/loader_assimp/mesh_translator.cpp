@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <vector>
 
 #include "diorama/error.h"
 #include "diorama/image.h"
@@ -23,7 +24,7 @@ Affine root_from(const aiNode& node) {
   return result;
 }
 
-// Where bones move the points of a mesh, they take their places at rest.
+// Where bones move the points of a mesh, they take the places that the bones have.
 class Skin {
  public:
   Skin(const aiMesh& mesh, const aiNode& node, const aiNode& scene_root)
@@ -53,6 +54,42 @@ class Skin {
  private:
   std::vector<Mat4> maps_;
   std::vector<double> weights_;
+};
+
+// What the weights of morph targets make of a mesh, in glTF alone: other importers leave weights
+// of their own behind.
+class MorphTargets {
+ public:
+  MorphTargets(const aiMesh& mesh, Format format) : mesh_(mesh) {
+    for (unsigned i = 0; i < mesh.mNumAnimMeshes; ++i) {
+      const aiAnimMesh& target = *mesh.mAnimMeshes[i];
+      const bool counts = format == Format::Gltf && std::isfinite(target.mWeight) &&
+                          target.mWeight != 0.0f && target.mNumVertices == mesh.mNumVertices;
+      if (counts) targets_.push_back(&target);
+    }
+  }
+  Vec3 position(std::size_t vertex) const {
+    Vec3 result = to_vec3(mesh_.mVertices[vertex]);
+    for (const aiAnimMesh* target : targets_) {
+      if (!target->mVertices) continue;
+      result +=
+          double(target->mWeight) * to_vec3(target->mVertices[vertex] - mesh_.mVertices[vertex]);
+    }
+    return result;
+  }
+  Vec3 normal(std::size_t vertex) const {
+    Vec3 result = to_vec3(mesh_.mNormals[vertex]);
+    for (const aiAnimMesh* target : targets_) {
+      if (!target->mNormals) continue;
+      result +=
+          double(target->mWeight) * to_vec3(target->mNormals[vertex] - mesh_.mNormals[vertex]);
+    }
+    return result;
+  }
+
+ private:
+  const aiMesh& mesh_;
+  std::vector<const aiAnimMesh*> targets_;
 };
 
 Vec3f direction(const Vec3& v) {
@@ -112,14 +149,15 @@ void MeshTranslator::append(const aiMesh& source, const aiNode& node, std::uint1
 
   std::optional<Skin> skin;
   if (source.HasBones()) skin.emplace(source, node, *file_.scene().mRootNode);
+  const MorphTargets targets(source, file_.format());
   const bool is_encoded = file_.format() != Format::Gltf;
   mesh.positions.reserve(first + count);
   for (std::size_t i = 0; i < count; ++i) {
     const Affine map = skin ? skin->map(i) : Affine::Identity();
-    const Vec3f position = (map * to_vec3(source.mVertices[i])).cast<float>();
+    const Vec3f position = (map * targets.position(i)).cast<float>();
     mesh.positions.push_back(position.allFinite() ? position : Vec3f::Zero());
     if (source.HasNormals()) {
-      mesh.normals.push_back(direction(map.linear() * to_vec3(source.mNormals[i])));
+      mesh.normals.push_back(direction(map.linear() * targets.normal(i)));
     }
     if (has_uvs) {
       const aiVector3D& uv = source.mTextureCoords[uv_set][i];

@@ -11,6 +11,7 @@
 #include <filesystem>
 
 #include "loader_assimp/child_process.h"
+#include "loader_assimp/posing.h"
 #include "loader_assimp/regular_files.h"
 
 namespace diorama::loader_assimp {
@@ -58,8 +59,7 @@ std::string read(Assimp::Importer& importer, const std::string& file, Format for
   importer.SetPropertyFloat(AI_CONFIG_PP_GSN_MAX_SMOOTHING_ANGLE, kSmoothingAngle);
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE,
                               aiPrimitiveType_POINT | aiPrimitiveType_LINE);
-  importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS,
-                              aiComponent_ANIMATIONS | aiComponent_TANGENTS_AND_BITANGENTS);
+  importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS, aiComponent_TANGENTS_AND_BITANGENTS);
   const aiScene* scene = importer.ReadFile(file, steps_for(format));
   if (!scene || !scene->mRootNode) {
     const std::string why = importer.GetErrorString();
@@ -130,7 +130,8 @@ Error unreadable(const std::string& file, const std::string& why) {
   return Error(ErrorKind::Asset, file + ": assimp cannot read it: " + why);
 }
 
-SceneFile::SceneFile(const std::string& file, Host& host) : name_(file), format_(format_of(file)) {
+SceneFile::SceneFile(const std::string& file, Host& host, std::optional<double> seconds)
+    : name_(file), format_(format_of(file)) {
   const std::string trial = read_in_child(file, [&] {
     Assimp::Importer importer;
     return read(importer, file, format_);
@@ -142,6 +143,8 @@ SceneFile::SceneFile(const std::string& file, Host& host) : name_(file), format_
     const std::string why = read(importer_, file, format_);
     if (!why.empty()) throw unreadable(file, why);
   }
+  // The importer's scene is nobody else's.
+  if (seconds) pose_at(const_cast<aiScene&>(*importer_.GetScene()), *seconds);
   for (const std::string& line : complaints) {
     host.log(LogLevel::Warning, file + ": assimp: " + line);
   }

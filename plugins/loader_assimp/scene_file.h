@@ -5,6 +5,7 @@
 
 #include <assimp/Importer.hpp>
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "diorama/error.h"
@@ -28,14 +29,15 @@ std::string read_in_child(const std::string& file, const std::function<std::stri
 /// "FILE: assimp cannot read it: WHY".
 Error unreadable(const std::string& file, const std::string& why);
 
-/// A file as assimp reads it: triangles only, without animations.
+/// A file as assimp reads it: triangles only, and its nodes where its first animation has them at a
+/// time, or at rest.
 class SceneFile {
  public:
   /// Some files make assimp crash, hang or take all memory. So the file is read in a child process
   /// first, whose time and memory are limited, and here only when that went well. Throws
   /// Error(Asset) that begins with the file's name. What assimp complains about and survives
   /// becomes a warning.
-  SceneFile(const std::string& file, Host& host);
+  SceneFile(const std::string& file, Host& host, std::optional<double> seconds = {});
 
   const std::string& name() const { return name_; }
   Format format() const { return format_; }

@@ -206,7 +206,10 @@ TranslatedMesh MeshTranslator::translate_mesh(const Prim& prim, const Primvars& 
   add_primvar(key, uv_owner, uv);
   add_primvar(key, color_owner, kDisplayColor);
   for (const Prim* subset : subsets) key.push_back(stage_.value_spec(*subset, "indices"));
-  Made& known = meshes_[{key, uv_name}];
+  // What bends a mesh is not all in its own specs.
+  const bool is_bent = skinning_.applies_to(prim);
+  Made own;
+  Made& known = is_bent ? own : meshes_[{key, uv_name}];
   if (known.mesh) {
     result.mesh = known.mesh;
     result.losses = known.losses;
@@ -235,6 +238,7 @@ TranslatedMesh MeshTranslator::translate_mesh(const Prim& prim, const Primvars& 
   sources.slot_of_face = slots_of_faces(stage_, subsets, sources.counts.span.size(), result.losses);
   sources.is_smooth = usd::token_or(stage_, prim, "subdivisionScheme", "catmullClark") != "none";
   check_values(sources, result.losses);
+  if (is_bent) skinning_.apply(prim, sources, result.losses);
   corners_read_ += sources.indices.span.size();
   if (corners_read_ > kCornersBetweenReleases) {
     stage_.assets().release_pages();

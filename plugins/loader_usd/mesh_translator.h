@@ -10,6 +10,7 @@
 #include "diorama/geometry.h"
 #include "loader_support/mesh_pool.h"
 #include "loader_usd/losses.h"
+#include "loader_usd/skinning.h"
 #include "loader_usd/usd/geometry.h"
 #include "loader_usd/usd/stage.h"
 
@@ -26,10 +27,11 @@ struct TranslatedMesh {
 
 /// Makes meshes out of Mesh prims, shapes, points and curves. The same data give the same mesh, be
 /// they seen through instances and references or written several times. Subdivision surfaces are
-/// drawn as their cage, with smooth normals.
+/// drawn as their cage, with smooth normals. What hangs on a skeleton is a mesh of its own.
 class MeshTranslator {
  public:
-  MeshTranslator(usd::Stage& stage, usd::Geometry& geometry) : stage_(stage), geometry_(geometry) {}
+  MeshTranslator(usd::Stage& stage, usd::Geometry& geometry)
+      : stage_(stage), geometry_(geometry), skinning_(stage, geometry) {}
 
   using Prims = std::vector<const usd::Prim*>;
 
@@ -54,6 +56,7 @@ class MeshTranslator {
 
   usd::Stage& stage_;
   usd::Geometry& geometry_;
+  Skinning skinning_;
   struct Made {
     std::shared_ptr<const Mesh> mesh;
     Losses losses;

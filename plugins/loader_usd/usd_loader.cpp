@@ -3,10 +3,13 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <set>
+#include <string_view>
 #include <system_error>
 
 #include "diorama/error.h"
+#include "loader_support/asset_time.h"
 #include "loader_usd/scene_translator.h"
 #include "loader_usd/texture_library.h"
 #include "loader_usd/usd/error.h"
@@ -36,11 +39,18 @@ usd::AssetLibrary::LookUp look_up_by(const Host& host) {
   };
 }
 
-/// A file, and the variants that are chosen by set: "mug.usd{look=red}{size=big}".
+/// A file, the variants that are chosen by set, and a time: "mug.usd{look=red}{time=1.5}".
 struct NamedAsset {
   std::string file;
   std::map<std::string, std::string> variants;
+  std::optional<double> seconds;  ///< "{time=1.5}"
 
+  /// The name without a time.
+  std::string timeless() const {
+    std::string name = file;
+    for (const auto& [set, variant] : variants) name += "{" + set + "=" + variant + "}";
+    return name;
+  }
   explicit NamedAsset(std::string_view name) {
     file = name;
     std::error_code error;
@@ -56,7 +66,12 @@ struct NamedAsset {
         throw Error(ErrorKind::Asset, std::string(name) + ": found '" + std::string(rest) +
                                           "', expected variants as {set=variant}");
       }
-      variants[std::string(rest.substr(1, equals - 1))] = rest.substr(equals + 1, end - equals - 1);
+      const std::string_view word = rest.substr(equals + 1, end - equals - 1);
+      if (rest.substr(1, equals - 1) == "time") {
+        seconds = loader_support::parse_time(word, name);
+      } else {
+        variants[std::string(rest.substr(1, equals - 1))] = word;
+      }
       rest.remove_prefix(end + 1);
     }
   }
@@ -140,11 +155,15 @@ void UsdLoader::load(std::string_view asset, Scene& scene, NodeId root) {
   const NamedAsset named(asset);
   try {
     usd::Stage stage(named.file, usd::Sampling::OrFirstSample,
-                     std::uint64_t(params_.max_prims_mib) << 20, look_up_by(host_), named.variants);
+                     std::uint64_t(params_.max_prims_mib) << 20, look_up_by(host_), named.variants,
+                     named.seconds);
     check_variants(stage, named);
     SceneTranslator translator(stage, host_, scene);
     host_.log(LogLevel::Debug, translator.describe_units());
     translator.translate(root);
+    if (const auto range = stage.animation()) {
+      scene.edit(root).animation = Animation{named.timeless(), range->first, range->second};
+    }
     const auto& missing = stage.diagnostics().missing_assets();
     if (params_.missing_assets_are_errors && !missing.empty()) {
       throw Error(ErrorKind::Asset, std::string(asset) + ": " + missing.front());

@@ -14,7 +14,7 @@ namespace diorama::loader_usd {
 
 /// Loads USD scenes: text, crate and packages, composed with all payloads and default variants, at
 /// the default time or, where an attribute has time samples only, at the first one. Names may
-/// choose variants of the root prims: "mug.usd{look=red}".
+/// choose variants of the root prims and a time in seconds: "mug.usd{look=red}{time=1.5}".
 class UsdLoader final : public Loader {
  public:
   struct Params {

@@ -2,6 +2,7 @@
 #include "stage.h"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <iterator>
 
@@ -35,7 +36,8 @@ void collect_opinions(Prim& prim) {
 }  // namespace
 
 Stage::Stage(const std::string& file, Sampling sampling, std::uint64_t most_composed_bytes,
-             AssetLibrary::LookUp look_up, std::map<std::string, std::string> selections)
+             AssetLibrary::LookUp look_up, std::map<std::string, std::string> selections,
+             std::optional<double> seconds)
     : sampling_(sampling),
       most_composed_bytes_(most_composed_bytes),
       assets_(std::move(look_up)),
@@ -43,7 +45,9 @@ Stage::Stage(const std::string& file, Sampling sampling, std::uint64_t most_comp
       root_stack_(
           &stacks_.open(std::filesystem::absolute(file).lexically_normal().generic_string(), {})),
       indexer_(stacks_, *root_stack_, std::move(selections)),
-      clips_(std::make_unique<ValueClips>(assets_, stacks_, diagnostics_, root_stack_->root())) {
+      time_(seconds ? std::optional(*seconds * codes_per_second()) : std::nullopt),
+      clips_(std::make_unique<ValueClips>(assets_, stacks_, diagnostics_, root_stack_->root(),
+                                          time_)) {
   auto root = std::make_unique<Prim>();
   root->path = "/";
   root->index = indexer_.root_index();
@@ -66,6 +70,41 @@ double Stage::meters_per_unit() const {
   // OpenUSD asks for a double and takes its fallback for a value of another type.
   if (unit.type() != Type::Double) return 0.01;
   return *unit.as_number();
+}
+
+double Stage::codes_per_second() const {
+  const Layer& layer = root_layer();
+  for (const char* field : {"timeCodesPerSecond", "framesPerSecond"}) {
+    const auto number = layer.get(layer.root(), field).as_number();
+    if (number && *number > 0.0 && std::isfinite(*number)) return *number;
+  }
+  return 24.0;
+}
+
+std::optional<std::pair<double, double>> Stage::animation() const {
+  if (!has_samples_) return std::nullopt;
+  const Layer& layer = root_layer();
+  const auto start = layer.get(layer.root(), "startTimeCode").as_number();
+  const auto end = layer.get(layer.root(), "endTimeCode").as_number();
+  double first = INFINITY;
+  double last = -INFINITY;
+  if (start && end && *start <= *end) {
+    first = *start;
+    last = *end;
+  } else {
+    for (const auto& [path, prim] : layer.prims()) {
+      for (const PropertySpec& property : prim.properties) {
+        if (!layer.has(property.fields, "timeSamples")) continue;
+        const Value value = layer.get(property.fields, "timeSamples");
+        const TimeSamples* samples = value.as_time_samples();
+        if (!samples || samples->times.empty()) continue;
+        first = std::min(first, samples->times.front());
+        last = std::max(last, samples->times.back());
+      }
+    }
+  }
+  if (!std::isfinite(first) || !std::isfinite(last) || first > last) return std::nullopt;
+  return std::pair(first / codes_per_second(), last / codes_per_second());
 }
 
 std::string Stage::default_prim() {
@@ -317,7 +356,65 @@ std::vector<std::int64_t> Stage::metadata_integers(const Prim& prim, std::string
   return result;
 }
 
+// The strongest opinion at the stage's time.
+FoundValue Stage::timed_value(const Prim& prim, std::string_view name) const {
+  FoundValue result;
+  bool is_found = false;
+  for_each_spec(prim, [&](const IndexNode& node, const LayerStack::Entry& entry,
+                          const PrimSpec& spec) {
+    const PropertySpec* property = spec.property(name);
+    if (!property) return true;
+    result.layer = entry.layer.get();
+    result.stack = node.stack;
+    result.spec = property;
+    const Value samples = entry.layer->get(property->fields, "timeSamples");
+    const TimeSamples* list = samples.as_time_samples();
+    if (list && !list->times.empty()) {
+      has_samples_ = true;
+      const LayerOffset offset = node.map_to_root->offset().compose(entry.offset);
+      const double time = offset.scale == 0.0 ? *time_ : (*time_ - offset.offset) / offset.scale;
+      result.value = value_at(*list, time);
+      auto& known = timed_[{property, time}];
+      if (!known) known = std::make_unique<PropertySpec>(*property);
+      result.spec = known.get();
+      is_found = true;
+      return false;
+    }
+    result.value = entry.layer->get(property->fields, "default");
+    is_found = bool(result);
+    return !is_found;
+  });
+  if (!is_found && prim.has_clips) {
+    has_samples_ = true;
+    return clips_->find(prim, name);
+  }
+  return !is_found || result.value.is_block() ? FoundValue() : result;
+}
+
+// The same without reading any number.
+const PropertySpec* Stage::timed_spec(const Prim& prim, std::string_view name) const {
+  const PropertySpec* result = nullptr;
+  for_each_spec(prim, [&](const IndexNode& node, const LayerStack::Entry& entry,
+                          const PrimSpec& spec) {
+    const PropertySpec* property = spec.property(name);
+    if (!property) return true;
+    if (entry.layer->has(property->fields, "timeSamples")) {
+      const LayerOffset offset = node.map_to_root->offset().compose(entry.offset);
+      const double time = offset.scale == 0.0 ? *time_ : (*time_ - offset.offset) / offset.scale;
+      auto& known = timed_[{property, time}];
+      if (!known) known = std::make_unique<PropertySpec>(*property);
+      result = known.get();
+      return false;
+    }
+    if (entry.layer->has(property->fields, "default")) result = property;
+    return !result;
+  });
+  if (!result && prim.has_clips) return clips_->find(prim, name).spec;
+  return result;
+}
+
 FoundValue Stage::find_value(const Prim& prim, std::string_view name) const {
+  if (time_) return timed_value(prim, name);
   FoundValue first_default;
   FoundValue first_sample;
   for_each_spec(
@@ -327,6 +424,7 @@ FoundValue Stage::find_value(const Prim& prim, std::string_view name) const {
         const auto found = [&](Value value) {
           return FoundValue{std::move(value), entry.layer.get(), node.stack, property};
         };
+        has_samples_ = has_samples_ || entry.layer->has(property->fields, "timeSamples");
         first_default = found(entry.layer->get(property->fields, "default"));
         if (first_default && !first_default.value.is_block()) return false;
         if (!first_sample && sampling_ == Sampling::OrFirstSample) {
@@ -343,12 +441,14 @@ FoundValue Stage::find_value(const Prim& prim, std::string_view name) const {
   const bool has_default = first_default && !first_default.value.is_block();
   FoundValue result = has_default ? first_default : first_sample;
   if (!result && prim.has_clips && sampling_ == Sampling::OrFirstSample) {
+    has_samples_ = true;
     result = clips_->find(prim, name);
   }
   return result.value.is_block() ? FoundValue() : result;
 }
 
 const PropertySpec* Stage::value_spec(const Prim& prim, std::string_view name) const {
+  if (time_) return timed_spec(prim, name);
   const PropertySpec* with_default = nullptr;
   const PropertySpec* with_samples = nullptr;
   for_each_spec(prim, [&](const IndexNode&, const LayerStack::Entry& entry, const PrimSpec& spec) {

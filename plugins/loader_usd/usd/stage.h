@@ -10,6 +10,7 @@
 #include <string_view>
 #include <unordered_map>
 #include <unordered_set>
+#include <utility>
 #include <vector>
 
 #include "asset_library.h"
@@ -72,11 +73,14 @@ class Stage {
   static constexpr std::uint64_t kComposedBytes = std::uint64_t{512} << 20;
 
   /// Throws FormatError when the layer cannot be read. What its arcs cannot reach becomes warnings.
-  /// `selections` choose variants of the root prims, by set, whatever layers say.
+  /// `selections` choose variants of the root prims, by set, whatever layers say. With `seconds`
+  /// values are those of that time: samples come before the default of the same layer, and between
+  /// two of them numbers are blended.
   explicit Stage(const std::string& file, Sampling sampling = Sampling::DefaultTime,
                  std::uint64_t most_composed_bytes = kComposedBytes,
                  AssetLibrary::LookUp look_up = {},
-                 std::map<std::string, std::string> selections = {});
+                 std::map<std::string, std::string> selections = {},
+                 std::optional<double> seconds = {});
   ~Stage();
 
   const Layer& root_layer() const { return root_stack_->root(); }
@@ -89,6 +93,9 @@ class Stage {
   bool is_z_up() const { return up_axis() == "Z"; }
   /// What the layer says, be it a length or not; 0.01 where nothing is authored.
   double meters_per_unit() const;
+  /// When the stage starts and ends, in seconds: what its root layer says, else the samples of that
+  /// layer; nothing when no value that was asked for so far has samples.
+  std::optional<std::pair<double, double>> animation() const;
   /// Path of the default prim if there is such a prim; empty otherwise.
   std::string default_prim();
   /// The variants, by set, that the root prims have.
@@ -144,6 +151,10 @@ class Stage {
   Strings compose_paths(const Prim& prim, std::string_view name, std::string_view field,
                         std::string* lost) const;
 
+  FoundValue timed_value(const Prim& prim, std::string_view name) const;
+  const PropertySpec* timed_spec(const Prim& prim, std::string_view name) const;
+  double codes_per_second() const;
+
   Sampling sampling_;
   std::uint64_t most_composed_bytes_;
   AssetLibrary assets_;
@@ -154,7 +165,11 @@ class Stage {
   std::unordered_map<std::string, std::unique_ptr<Prim>, StringHash, std::equal_to<>> prims_;
   std::unordered_map<const Prim*, std::unordered_set<std::string>> listed_;  ///< For find().
   std::uint64_t composed_bytes_ = 0;
+  std::optional<double> time_;  ///< In time codes.
   std::unique_ptr<ValueClips> clips_;
+  mutable bool has_samples_ = false;
+  /// Stand for a spec at a time: arcs may take the same one at several.
+  mutable std::map<std::pair<const PropertySpec*, double>, std::unique_ptr<PropertySpec>> timed_;
   const Prim* root_ = nullptr;
 };
 

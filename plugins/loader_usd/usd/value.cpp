@@ -2,6 +2,7 @@
 #include "value.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <limits>
 
@@ -224,6 +225,88 @@ double Value::component(std::size_t index) const {
   const std::size_t offset = index * layout.component_size;
   if (layout.count == 0 || offset + layout.component_size > bytes().size()) return 0.0;
   return component_at(layout.component, bytes().data() + offset);
+}
+
+namespace {
+
+void store(Type component, double value, std::byte* at) {
+  if (component == Type::Double) {
+    std::memcpy(at, &value, sizeof value);
+  } else if (component == Type::Float) {
+    const auto number = static_cast<float>(value);
+    std::memcpy(at, &number, sizeof number);
+  } else {
+    const std::uint16_t half = float_to_half(static_cast<float>(value));
+    std::memcpy(at, &half, sizeof half);
+  }
+}
+
+// The shorter way between two rotations, of unit length where both are.
+std::array<double, 4> blend_turns(const std::array<double, 4>& a, std::array<double, 4> b,
+                                  double share) {
+  double cosine = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
+  if (cosine < 0.0) {
+    for (double& part : b) part = -part;
+    cosine = -cosine;
+  }
+  double of_a = 1.0 - share;
+  double of_b = share;
+  if (cosine < 0.9995) {
+    const double angle = std::acos(std::min(cosine, 1.0));
+    of_a = std::sin((1.0 - share) * angle) / std::sin(angle);
+    of_b = std::sin(share * angle) / std::sin(angle);
+  }
+  std::array<double, 4> result{};
+  for (std::size_t i = 0; i < 4; ++i) result[i] = of_a * a[i] + of_b * b[i];
+  return result;
+}
+
+bool is_blended(const Value& a, const Value& b) {
+  const Type component = numeric_layout(a.type()).component;
+  return a.type() == b.type() && a.is_array() == b.is_array() && !a.bytes().empty() &&
+         a.bytes().size() == b.bytes().size() && numeric_layout(a.type()).count > 0 &&
+         (component == Type::Half || component == Type::Float || component == Type::Double);
+}
+
+Value blend(const Value& a, const Value& b, double share) {
+  const NumericLayout layout = numeric_layout(a.type());
+  const bool are_turns =
+      a.type() == Type::Quatd || a.type() == Type::Quatf || a.type() == Type::Quath;
+  auto bytes = std::make_shared<std::vector<std::byte>>(a.bytes().size());
+  const std::size_t count = bytes->size() / layout.component_size;
+  const auto put = [&](std::size_t i, double value) {
+    store(layout.component, value, bytes->data() + i * layout.component_size);
+  };
+  for (std::size_t i = 0; i + (are_turns ? 3 : 0) < count; i += are_turns ? 4 : 1) {
+    if (!are_turns) {
+      put(i, (1.0 - share) * a.component(i) + share * b.component(i));
+      continue;
+    }
+    std::array<double, 4> turn_a{}, turn_b{};
+    for (std::size_t k = 0; k < 4; ++k) {
+      turn_a[k] = a.component(i + k);
+      turn_b[k] = b.component(i + k);
+    }
+    const auto turn = blend_turns(turn_a, turn_b, share);
+    for (std::size_t k = 0; k < 4; ++k) put(i + k, turn[k]);
+  }
+  if (!a.is_array()) return Value::scalar(a.type(), bytes->data());
+  return Value::array(a.type(), Buffer{bytes, bytes->data(), bytes->size()});
+}
+
+}  // namespace
+
+Value value_at(const TimeSamples& samples, double time) {
+  const auto& times = samples.times;
+  const auto later = std::upper_bound(times.begin(), times.end(), time);
+  if (later == times.begin()) return samples.value(0);
+  const auto before = static_cast<std::size_t>(later - times.begin()) - 1;
+  const Value earlier = samples.value(before);
+  if (later == times.end() || times[before] == time) return earlier;
+  const Value next = samples.value(before + 1);
+  const double length = times[before + 1] - times[before];
+  if (!(length > 0.0) || !is_blended(earlier, next)) return earlier;
+  return blend(earlier, next, (time - times[before]) / length);
 }
 
 template <class T>

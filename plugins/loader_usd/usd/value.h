@@ -87,6 +87,11 @@ struct TimeSamples {
   Value value(std::size_t index) const;
 };
 
+/// The value at a time: between two samples numbers and quaternions are blended as OpenUSD does it,
+/// where both are of one kind and size; else the earlier one holds. Before the first and after the
+/// last sample these hold.
+Value value_at(const TimeSamples& samples, double time);
+
 /// A run of numbers in memory that the value keeps alive: a part of the mapped file where that is
 /// possible, a buffer otherwise.
 struct Buffer {

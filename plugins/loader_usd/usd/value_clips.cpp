@@ -112,9 +112,10 @@ struct ValueClips::ClipSet {
 
 namespace {
 
-// When the stage starts, in the time of a layer.
-std::optional<double> start_time(const Layer& root, const LayerOffset& to_stage) {
-  const auto start = root.get(root.root(), "startTimeCode").as_number();
+// The time that counts, or when the stage starts, in the time of a layer.
+std::optional<double> start_time(const Layer& root, const LayerOffset& to_stage,
+                                 std::optional<double> time) {
+  const auto start = time ? time : root.get(root.root(), "startTimeCode").as_number();
   if (!start || !std::isfinite(*start) || to_stage.scale == 0.0) return std::nullopt;
   return (*start - to_stage.offset) / to_stage.scale;
 }
@@ -122,8 +123,8 @@ std::optional<double> start_time(const Layer& root, const LayerOffset& to_stage)
 }  // namespace
 
 ValueClips::ValueClips(AssetLibrary& assets, const LayerStacks& stacks, Diagnostics& diagnostics,
-                       const Layer& root)
-    : assets_(assets), stacks_(stacks), diagnostics_(diagnostics), root_(root) {}
+                       const Layer& root, std::optional<double> time)
+    : assets_(assets), stacks_(stacks), diagnostics_(diagnostics), root_(root), time_(time) {}
 
 ValueClips::~ValueClips() = default;
 
@@ -133,7 +134,7 @@ void ValueClips::read_explicit(ClipSet& set, const Dictionary& fields) {
   const TimePairs times = pairs_of(fields, "times");
   double time = 0.0;
   if (!active.empty()) time = active.front().first;
-  time = start_time(root_, set.to_stage).value_or(time);
+  time = start_time(root_, set.to_stage, time_).value_or(time);
   const double number = active.empty() ? 0.0 : pair_at(active, time)->second;
   const Strings& names = *assets->as_strings();
   if (number >= 0.0 && number < static_cast<double>(names.size())) {
@@ -153,7 +154,7 @@ bool ValueClips::read_template(ClipSet& set, const Dictionary& fields) {
                         (last - first) / stride < kMostClips;
   if (!is_sound) return false;
   const double offset = number_or(fields, "templateActiveOffset", 0.0);
-  const double time = start_time(root_, set.to_stage).value_or(first);
+  const double time = start_time(root_, set.to_stage, time_).value_or(first);
   const double most = std::floor((last - first) / stride + 1e-9);
   const double wanted = std::clamp(std::floor((time - offset - first) / stride), 0.0, most);
   const auto asset_at = [&](double number) {

@@ -3,6 +3,7 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -15,14 +16,15 @@ namespace diorama::usd {
 struct Prim;
 struct FoundValue;
 
-/// Reads values that stand in the layers of value clips, as they are at the stage's start time, or
-/// where the stage has none at the first time of the clips. Between two samples the earlier one
-/// holds. Belongs to one stage.
+/// Reads values that stand in the layers of value clips, as they are at the stage's time, else at
+/// its start, or where it has none at the first time of the clips. Between two samples the earlier
+/// one holds. Belongs to one stage.
 class ValueClips {
  public:
-  /// `root` says when the stage starts. All must outlive it.
+  /// `root` says when the stage starts, which counts as long as there is no `time` (of the stage).
+  /// All must outlive it.
   ValueClips(AssetLibrary& assets, const LayerStacks& stacks, Diagnostics& diagnostics,
-             const Layer& root);
+             const Layer& root, std::optional<double> time = {});
   ~ValueClips();
 
   /// What clips of the prim or of its ancestors say of the attribute; the nearest clips count. Its
@@ -42,6 +44,7 @@ class ValueClips {
   const LayerStacks& stacks_;
   Diagnostics& diagnostics_;
   const Layer& root_;
+  std::optional<double> time_;
   std::map<const Prim*, std::vector<ClipSet>> sets_;
   std::map<std::pair<const PropertySpec*, std::size_t>, std::unique_ptr<PropertySpec>> samples_;
 };

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "loader_assimp/posing.h"
+
+#include <assimp/anim.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace diorama::loader_assimp {
+namespace {
+
+double ticks_per_second(const aiAnimation& animation) {
+  const double ticks = animation.mTicksPerSecond;
+  return ticks > 0.0 && std::isfinite(ticks) ? ticks : 25.0;
+}
+
+/// The two keys about a time, and where between them it is.
+struct Between {
+  unsigned before = 0;
+  unsigned after = 0;
+  double share = 0.0;
+};
+
+template <class Key>
+Between keys_about(const Key* keys, unsigned count, double time) {
+  const Key* later = std::upper_bound(keys, keys + count, time,
+                                      [](double t, const Key& key) { return t < key.mTime; });
+  Between result;
+  result.after = std::min(static_cast<unsigned>(later - keys), count - 1);
+  result.before = later == keys ? 0 : static_cast<unsigned>(later - keys) - 1;
+  const double length = keys[result.after].mTime - keys[result.before].mTime;
+  if (length > 0.0) {
+    result.share = std::clamp((time - keys[result.before].mTime) / length, 0.0, 1.0);
+  }
+  return result;
+}
+
+aiVector3D vector_at(const aiVectorKey* keys, unsigned count, double time) {
+  const Between at = keys_about(keys, count, time);
+  const aiVector3D& a = keys[at.before].mValue;
+  return a + (keys[at.after].mValue - a) * static_cast<ai_real>(at.share);
+}
+
+aiQuaternion turn_at(const aiQuatKey* keys, unsigned count, double time) {
+  const Between at = keys_about(keys, count, time);
+  aiQuaternion turn;
+  aiQuaternion::Interpolate(turn, keys[at.before].mValue, keys[at.after].mValue,
+                            static_cast<ai_real>(at.share));
+  return turn.Normalize();
+}
+
+bool is_finite(const aiMatrix4x4& matrix) {
+  for (unsigned row = 0; row < 4; ++row) {
+    for (unsigned column = 0; column < 4; ++column) {
+      if (!std::isfinite(matrix[row][column])) return false;
+    }
+  }
+  return true;
+}
+
+void pose_node(aiNode& node, const aiNodeAnim& channel, double time) {
+  aiVector3D size, place;
+  aiQuaternion turn;
+  node.mTransformation.Decompose(size, turn, place);
+  if (channel.mNumPositionKeys > 0) {
+    place = vector_at(channel.mPositionKeys, channel.mNumPositionKeys, time);
+  }
+  if (channel.mNumScalingKeys > 0) {
+    size = vector_at(channel.mScalingKeys, channel.mNumScalingKeys, time);
+  }
+  if (channel.mNumRotationKeys > 0) {
+    turn = turn_at(channel.mRotationKeys, channel.mNumRotationKeys, time);
+  }
+  const aiMatrix4x4 pose(size, turn, place);
+  if (is_finite(pose)) node.mTransformation = pose;
+}
+
+void weigh_targets(aiScene& scene, const aiNode& node, const aiMeshMorphAnim& channel,
+                   double time) {
+  if (channel.mNumKeys == 0) return;
+  const Between at = keys_about(channel.mKeys, channel.mNumKeys, time);
+  for (unsigned m = 0; m < node.mNumMeshes; ++m) {
+    if (node.mMeshes[m] >= scene.mNumMeshes) continue;
+    aiMesh& mesh = *scene.mMeshes[node.mMeshes[m]];
+    for (unsigned i = 0; i < mesh.mNumAnimMeshes; ++i) mesh.mAnimMeshes[i]->mWeight = 0.0f;
+    const auto add = [&](const aiMeshMorphKey& key, double share) {
+      for (unsigned i = 0; i < key.mNumValuesAndWeights; ++i) {
+        const double weight = share * key.mWeights[i];
+        if (key.mValues[i] < mesh.mNumAnimMeshes && std::isfinite(weight)) {
+          mesh.mAnimMeshes[key.mValues[i]]->mWeight += static_cast<float>(weight);
+        }
+      }
+    };
+    add(channel.mKeys[at.before], 1.0 - at.share);
+    add(channel.mKeys[at.after], at.share);
+  }
+}
+
+}  // namespace
+
+std::optional<double> animation_seconds(const aiScene& scene) {
+  if (scene.mNumAnimations == 0) return std::nullopt;
+  const aiAnimation& animation = *scene.mAnimations[0];
+  const double seconds = animation.mDuration / ticks_per_second(animation);
+  const bool moves = animation.mNumChannels > 0 || animation.mNumMorphMeshChannels > 0;
+  if (!moves || !(seconds > 0.0) || !std::isfinite(seconds)) return std::nullopt;
+  return seconds;
+}
+
+void pose_at(aiScene& scene, double seconds) {
+  if (!animation_seconds(scene)) return;
+  const aiAnimation& animation = *scene.mAnimations[0];
+  const double time = seconds * ticks_per_second(animation);
+  for (unsigned i = 0; i < animation.mNumChannels; ++i) {
+    const aiNodeAnim& channel = *animation.mChannels[i];
+    if (aiNode* node = scene.mRootNode->FindNode(channel.mNodeName)) {
+      pose_node(*node, channel, time);
+    }
+  }
+  for (unsigned i = 0; i < animation.mNumMorphMeshChannels; ++i) {
+    const aiMeshMorphAnim& channel = *animation.mMorphMeshChannels[i];
+    if (const aiNode* node = scene.mRootNode->FindNode(channel.mName)) {
+      weigh_targets(scene, *node, channel, time);
+    }
+  }
+}
+
+}  // namespace diorama::loader_assimp

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace diorama::loader_support {
+
+/// The number of "{time=1.5}". Throws Error(Asset) that begins with the asset's name.
+double parse_time(std::string_view word, std::string_view asset);
+
+struct TimedAsset {
+  std::string file;
+  std::optional<double> seconds;
+};
+
+/// "walker.glb{time=1.5}" in its parts. A file that has such a name is a file.
+TimedAsset split_time(std::string_view asset);
+
+}  // namespace diorama::loader_support

@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "diorama/error.h"
+#include "plugins/loader_assimp/loaded_file.h"
+#include "support/catch.h"
+#include "support/temporary_folder.h"
+
+namespace diorama::loader_assimp {
+
+using test::LoadedFile;
+using test::TemporaryFolder;
+
+namespace {
+
+/// Views and accessors of a glTF file, one for each list that is added.
+class Buffer {
+ public:
+  int add(const std::string& bytes, int type, const std::string& shape, std::size_t count,
+          const std::string& more = "") {
+    views_ += (views_.empty() ? "" : ",") + std::string("{\"buffer\":0,\"byteOffset\":") +
+              std::to_string(bytes_.size()) + ",\"byteLength\":" + std::to_string(bytes.size()) +
+              "}";
+    accessors_ += (accessors_.empty() ? "" : ",") + std::string("{\"bufferView\":") +
+                  std::to_string(number_) + ",\"componentType\":" + std::to_string(type) +
+                  ",\"count\":" + std::to_string(count) + ",\"type\":\"" + shape + "\"" + more +
+                  "}";
+    bytes_ += bytes;
+    bytes_.resize((bytes_.size() + 3) / 4 * 4, '\0');
+    return number_++;
+  }
+  std::string gltf(const std::string& rest) const {
+    return R"({"asset": {"version": "2.0"}, "scene": 0, "buffers": [{"byteLength": )" +
+           std::to_string(bytes_.size()) + R"(, "uri": "data:application/octet-stream;base64,)" +
+           test::base64(bytes_) + R"("}], "bufferViews": [)" + views_ + R"(], "accessors": [)" +
+           accessors_ + "], " + rest + "}";
+  }
+
+ private:
+  std::string bytes_, views_, accessors_;
+  int number_ = 0;
+};
+
+constexpr int kFloat = 5126;
+constexpr int kShort = 5123;
+constexpr int kByte = 5121;
+
+/// Two bones along x, the elbow at x = 1, which bends by 90 degrees about z in two seconds.
+std::string arm() {
+  const float half = std::sqrt(0.5f);
+  Buffer b;
+  b.add(test::bytes_of<float>({0, 0, 0, 1, 0.25f, 0, 2, 0, 0}), kFloat, "VEC3", 3,
+        R"(,"min":[0,0,0],"max":[2,0.25,0])");
+  b.add(test::bytes_of<std::uint16_t>({0, 1, 2}), kShort, "SCALAR", 3);
+  b.add(test::bytes_of<std::uint8_t>({0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0}), kByte, "VEC4", 3);
+  b.add(test::bytes_of<float>({1, 0, 0, 0, 0.5f, 0.5f, 0, 0, 0, 1, 0, 0}), kFloat, "VEC4", 3);
+  b.add(test::bytes_of<float>({1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0,  0, 0, 1,
+                               1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -1, 0, 0, 1}),
+        kFloat, "MAT4", 2);
+  b.add(test::bytes_of<float>({0, 2}), kFloat, "SCALAR", 2, R"(,"min":[0],"max":[2])");
+  b.add(test::bytes_of<float>({0, 0, 0, 1, 0, 0, half, half}), kFloat, "VEC4", 2);
+  return b.gltf(R"(
+    "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "JOINTS_0": 2, "WEIGHTS_0": 3},
+                                "indices": 1}]}],
+    "skins": [{"joints": [1, 2], "inverseBindMatrices": 4}],
+    "nodes": [{"name": "Skin", "mesh": 0, "skin": 0},
+              {"name": "upper", "children": [2]}, {"name": "fore", "translation": [1, 0, 0]}],
+    "animations": [{"channels": [{"sampler": 0, "target": {"node": 2, "path": "rotation"}}],
+                    "samplers": [{"input": 5, "output": 6}]}],
+    "scenes": [{"nodes": [0, 1]}])");
+}
+
+/// In metres and z up, as glTF's (x, y, z) becomes (x, -z, y).
+bool has_point(const LoadedFile& loaded, const std::string& path, const Vec3& place) {
+  const Affine world_from_node = loaded.scene.world_from_node(loaded.id(path));
+  for (const Vec3f& point : loaded.node(path).mesh->positions) {
+    if ((world_from_node * point.cast<double>() - place).norm() < 1e-5) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+TEST_CASE("glTF: an arm bends as its animation says at the time", "[loader_assimp]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("arm.gltf", arm());
+  const LoadedFile rest(file);
+  CHECK(has_point(rest, "Skin", {2, 0, 0}));
+  const Animation& range = *rest.scene[rest.root].animation;
+  CHECK(range.start_s == 0.0);
+  CHECK(range.end_s == Approx(2.0));
+  CHECK(range.asset == file);
+  const LoadedFile bent(file + "{time=2}");
+  CHECK(has_point(bent, "Skin", {0, 0, 0}));
+  CHECK(has_point(bent, "Skin", {1, 0, 1}));
+  CHECK(has_point(bent, "Skin", {0.875, 0, 0.125}));
+  const LoadedFile between(file + "{time=1}");
+  CHECK(has_point(between, "Skin", {1 + std::sqrt(0.5), 0, std::sqrt(0.5)}));
+  CHECK_THROWS_WITH(LoadedFile(file + "{time=x}"), ContainsSubstring("expected seconds"));
+}
+
+TEST_CASE("glTF: morph targets move points by their weights", "[loader_assimp]") {
+  Buffer b;
+  b.add(test::bytes_of<float>({0, 0, 0, 1, 0, 0, 0, 1, 0}), kFloat, "VEC3", 3,
+        R"(,"min":[0,0,0],"max":[1,1,0])");
+  b.add(test::bytes_of<std::uint16_t>({0, 1, 2}), kShort, "SCALAR", 3);
+  b.add(test::bytes_of<float>({0, 0, 0, 0, 0, 0, 0, 0, 2}), kFloat, "VEC3", 3,
+        R"(,"min":[0,0,0],"max":[0,0,2])");
+  b.add(test::bytes_of<float>({0, 1}), kFloat, "SCALAR", 2, R"(,"min":[0],"max":[1])");
+  b.add(test::bytes_of<float>({0, 1}), kFloat, "SCALAR", 2);
+  const TemporaryFolder folder;
+  const std::string file = folder.write("face.gltf", b.gltf(R"(
+    "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1,
+                                "targets": [{"POSITION": 2}]}], "weights": [0.25]}],
+    "nodes": [{"name": "Face", "mesh": 0}],
+    "animations": [{"channels": [{"sampler": 0, "target": {"node": 0, "path": "weights"}}],
+                    "samplers": [{"input": 3, "output": 4}]}],
+    "scenes": [{"nodes": [0]}])"));
+  CHECK(has_point(LoadedFile(file), "Face", {0, -0.5, 1}));
+  CHECK(has_point(LoadedFile(file + "{time=0.5}"), "Face", {0, -1, 1}));
+  CHECK(has_point(LoadedFile(file + "{time=1}"), "Face", {0, -2, 1}));
+}
+
+}  // namespace diorama::loader_assimp

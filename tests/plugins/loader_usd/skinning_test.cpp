@@ -1,0 +1,248 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+#include <string>
+
+#include "plugins/loader_usd/loaded_stage.h"
+#include "support/catch.h"
+#include "support/shared_data.h"
+#include "support/temporary_folder.h"
+
+namespace diorama::loader_usd {
+
+using test::LoadedStage;
+using test::TemporaryFolder;
+
+namespace {
+
+/// Two bones along x, the elbow at x = 1: it is stretched at second 0 and bent about z at second 1.
+std::string arm(const std::string& mesh_words = "", const std::string& bind_words = "",
+                const std::string& weights = "1, 0, 0.5, 0.5, 0, 1, 0, 1") {
+  return R"(#usda 1.0
+(
+    metersPerUnit = 1
+    upAxis = "Z"
+    timeCodesPerSecond = 24
+    startTimeCode = 0
+    endTimeCode = 24
+)
+def SkelRoot "Arm"
+{
+    def Skeleton "Bones" ( prepend apiSchemas = ["SkelBindingAPI"] )
+    {
+        uniform token[] joints = ["upper", "upper/fore"]
+        uniform matrix4d[] bindTransforms = [((1,0,0,0),(0,1,0,0),(0,0,1,0),(0,0,0,1)),
+                                             ((1,0,0,0),(0,1,0,0),(0,0,1,0),(1,0,0,1))]
+        uniform matrix4d[] restTransforms = [((1,0,0,0),(0,1,0,0),(0,0,1,0),(0,0,0,1)),
+                                             ((1,0,0,0),(0,1,0,0),(0,0,1,0),(1,0,0,1))]
+        rel skel:animationSource = </Arm/Moves>
+    )" + bind_words +
+         R"(}
+    def SkelAnimation "Moves"
+    {
+        uniform token[] joints = ["upper/fore"]
+        float3[] translations = [(1, 0, 0)]
+        half3[] scales = [(1, 1, 1)]
+        quatf[] rotations.timeSamples = { 0: [(1, 0, 0, 0)], 24: [(0.70710678, 0, 0, 0.70710678)] }
+        uniform token[] blendShapes = ["swell"]
+        float[] blendShapeWeights.timeSamples = { 0: [0], 24: [0.5] }
+    }
+    def Mesh "Skin" ( prepend apiSchemas = ["SkelBindingAPI"] )
+    {
+        rel skel:skeleton = </Arm/Bones>
+        uniform token subdivisionScheme = "none"
+        int[] faceVertexCounts = [4]
+        int[] faceVertexIndices = [0, 1, 2, 3]
+        point3f[] points = [(0, 0, 0), (1, 0.2, 0), (2, 0, 0), (1.5, -0.2, 0)]
+        int[] primvars:skel:jointIndices = [0, 1, 0, 1, 0, 1, 0, 1] (
+            elementSize = 2
+            interpolation = "vertex"
+        )
+        float[] primvars:skel:jointWeights = [)" +
+         weights + R"(] (
+            elementSize = 2
+            interpolation = "vertex"
+        )
+    )" + mesh_words +
+         "}\n}\n";
+}
+
+bool has_point(const Mesh& mesh, const Vec3f& place) {
+  for (const Vec3f& point : mesh.positions) {
+    if ((point - place).norm() < 1e-5f) return true;
+  }
+  return false;
+}
+
+std::string all_warnings(const LoadedStage& loaded) {
+  std::string all;
+  for (const std::string& line : loaded.host.warnings) all += line + "\n";
+  return all;
+}
+
+}  // namespace
+
+TEST_CASE("an arm bent by 90 degrees is where its weights put it", "[loader_usd]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("arm.usda", arm());
+  LoadedStage straight(file);
+  const Mesh& rest = *straight.node("Arm/Skin").mesh;
+  CHECK(has_point(rest, {2, 0, 0}));
+  CHECK(has_point(rest, {1, 0.2f, 0}));
+  const Animation& range = *straight.node("").animation;
+  CHECK(range.start_s == 0.0);
+  CHECK(range.end_s == 1.0);
+  CHECK(range.asset == file);
+
+  LoadedStage bent(file + "{time=1}");
+  const Mesh& skin = *bent.node("Arm/Skin").mesh;
+  CHECK(has_point(skin, {0, 0, 0}));
+  CHECK(has_point(skin, {1, 1, 0}));
+  CHECK(has_point(skin, {1.2f, 0.5f, 0}));
+  // Half as it stands, half about the elbow: linear blend skinning, candy wrapper and all.
+  CHECK(has_point(skin, {0.9f, 0.1f, 0}));
+  CHECK(bent.node("").animation->asset == file);
+
+  LoadedStage between(file + "{time=0.5}");
+  const float half = std::sqrt(0.5f);
+  CHECK(has_point(*between.node("Arm/Skin").mesh, {1 + half, half, 0}));
+  // The last sample holds.
+  CHECK(has_point(*LoadedStage(file + "{time=7}").node("Arm/Skin").mesh, {1, 1, 0}));
+}
+
+TEST_CASE("a blend shape at half of its weight moves points by half", "[loader_usd]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("arm.usda", arm(R"(
+        uniform token[] skel:blendShapes = ["swell"]
+        rel skel:blendShapeTargets = </Arm/Skin/swell>
+        def BlendShape "swell"
+        {
+            uniform vector3f[] offsets = [(0, 0, 1), (0, 0, 0.4)]
+            uniform int[] pointIndices = [0, 2]
+        }
+    )"));
+  CHECK(has_point(*LoadedStage(file).node("Arm/Skin").mesh, {2, 0, 0}));
+  LoadedStage bent(file + "{time=1}");
+  CHECK(has_point(*bent.node("Arm/Skin").mesh, {0, 0, 0.5f}));
+  // First the shape, then the bones.
+  CHECK(has_point(*bent.node("Arm/Skin").mesh, {1, 1, 0.2f}));
+}
+
+TEST_CASE("normals turn with the skin", "[loader_usd]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("arm.usda", arm(R"(
+        normal3f[] normals = [(0, 1, 0), (0, 1, 0), (0, 1, 0), (0, 1, 0)] (
+            interpolation = "vertex"
+        )
+    )"));
+  LoadedStage bent(file + "{time=1}");
+  const Mesh& skin = *bent.node("Arm/Skin").mesh;
+  for (std::size_t i = 0; i < skin.positions.size(); ++i) {
+    if ((skin.positions[i] - Vec3f(1, 1, 0)).norm() > 1e-5f) continue;
+    CHECK((skin.normals[i] - Vec3f(-1, 0, 0)).norm() < 1e-5f);
+  }
+}
+
+TEST_CASE("poses and points are those of the time that is asked for", "[loader_usd]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("fan.usda", R"(#usda 1.0
+(
+    metersPerUnit = 1
+    upAxis = "Z"
+    timeCodesPerSecond = 10
+)
+def Xform "Fan"
+{
+    double3 xformOp:translate.timeSamples = { 0: (0, 0, 0), 10: (2, 0, 4) }
+    uniform token[] xformOpOrder = ["xformOp:translate"]
+    def Mesh "Blade"
+    {
+        int[] faceVertexCounts = [3]
+        int[] faceVertexIndices = [0, 1, 2]
+        point3f[] points = [(9, 9, 9), (1, 0, 0), (0, 1, 0)]
+        point3f[] points.timeSamples = { 5: [(0, 0, 0), (1, 0, 0), (0, 1, 0)],
+                                        20: [(0, 0, 3), (1, 0, 0), (0, 1, 0)] }
+    }
+}
+)");
+  LoadedStage still(file);
+  CHECK(still.node("").animation->start_s == Approx(0.0));
+  CHECK(still.node("").animation->end_s == Approx(2.0));
+  CHECK(has_point(*still.node("Fan/Blade").mesh, {9, 9, 9}));
+  LoadedStage moved(file + "{time=0.75}");
+  CHECK((moved.node("Fan").parent_from_node.translation() - Vec3(1.5, 0, 3)).norm() < 1e-12);
+  CHECK(has_point(*moved.node("Fan/Blade").mesh, {0, 0, 0.5f}));
+  CHECK_THROWS_WITH(LoadedStage(file + "{time=soon}"),
+                    ContainsSubstring("found the time 'soon', expected seconds as {time=1.5}"));
+  CHECK_THROWS_WITH(LoadedStage(file + "{time=nan}"), ContainsSubstring("expected seconds"));
+  // What does not move says so.
+  LoadedStage dull(folder.write("dull.usda",
+                                "#usda 1.0\n(\n startTimeCode = 0\n endTimeCode = 9\n)"
+                                "\ndef Cube \"A\"\n{\n}\n"));
+  CHECK_FALSE(dull.node("").animation);
+}
+
+TEST_CASE("skins with words that cannot be stay as they are bound", "[loader_usd]") {
+  const TemporaryFolder folder;
+  const auto check = [&](const std::string& text, const std::string& warning, bool is_bent) {
+    INFO(warning);
+    LoadedStage loaded(folder.write("arm.usda", text) + "{time=1}");
+    const Mesh& skin = *loaded.node("Arm/Skin").mesh;
+    CHECK_NOTHROW(skin.validate("skin"));
+    CHECK(has_point(skin, {2, 0, 0}) == !is_bent);
+    CHECK(all_warnings(loaded).find(warning) != std::string::npos);
+  };
+  check(arm("", "", "1, 0, 0.5, 0.5, 0, 1, 0"), "influences of joints that do not fit", false);
+  check(arm("", "", "1, 0, 0.5, 0.5, 0, nan, 0, 1"), "joints that do not exist or weigh less",
+        false);
+  check(arm("", "", "1, -3, 0.5, 0.5, 0, 2, 0, 1"), "joints that do not exist or weigh less", true);
+  const auto changed = [&](const std::string& from, const std::string& to) {
+    std::string text = arm();
+    text.replace(text.find(from), from.size(), to);
+    return text;
+  };
+  check(changed("[0, 1, 0, 1, 0, 1, 0, 1]", "[0, 1, 0, 1, 7, -1, 0, 1]"),
+        "joints that do not exist or weigh less", false);
+  check(changed("[\"upper\", \"upper/fore\"]", "[\"upper\", \"upper\"]"),
+        "whose joints and matrices do not fit", false);
+  check(changed("[\"upper\", \"upper/fore\"]", "[\"upper\"]"),
+        "whose joints and matrices do not fit", false);
+  check(changed("((1,0,0,0),(0,1,0,0),(0,0,1,0),(0,0,0,1))",
+                "((0,0,0,0),(0,0,0,0),(0,0,0,0),(0,0,0,0))"),
+        "poses that are no numbers", false);
+  check(changed("rel skel:skeleton = </Arm/Bones>", "rel skel:skeleton = </Arm/Skin>"), "", false);
+}
+
+TEST_CASE("a foreign walker walks", "[loader_usd][shared]") {
+  const auto shared = test::shared_folder();
+  if (!shared) {
+    WARN("the shared files are not there");
+    return;
+  }
+  const std::string file =
+      (*shared / "data/usd/usd-wg/test_assets/USDZ/CesiumMan/CesiumMan.usdz").string();
+  LoadedStage first(file);
+  const Animation range = *first.scene[first.root].animation;
+  CHECK(range.end_s > range.start_s + 1.0);
+  const double middle = 0.4 * range.start_s + 0.6 * range.end_s;
+  LoadedStage second(file + "{time=" + std::to_string(middle) + "}");
+  const std::vector<NodeId> nodes = first.scene.subtree(first.root);
+  int moved = 0;
+  for (const NodeId node : nodes) {
+    const auto& mesh = first.scene[node].mesh;
+    if (!mesh) continue;
+    const Mesh& other = *second.scene[second.scene.require(first.scene.path(node))].mesh;
+    REQUIRE(other.positions.size() == mesh->positions.size());
+    float farthest = 0.0f;
+    for (std::size_t i = 0; i < other.positions.size(); ++i) {
+      farthest = std::max(farthest, (other.positions[i] - mesh->positions[i]).norm());
+    }
+    // Limbs swing by parts of the body's size, no farther.
+    const double size = mesh->bounds().size().norm();
+    moved += farthest > 0.05 * size && farthest < size;
+    CHECK(second.scene.world_bounds(second.root).size().z() ==
+          Approx(first.scene.world_bounds(first.root).size().z()).epsilon(0.15));
+  }
+  CHECK(moved > 0);
+}
+
+}  // namespace diorama::loader_usd
