@@ -50,7 +50,7 @@ def tube(points, faces, weights, line, radii, joints, flat=(1.0, 1.0)):
         along = [y - x for x, y in zip(a, b)]
         length = math.sqrt(sum(x * x for x in along)) or 1.0
         along = [x / length for x in along]
-        side = (0, 1, 0)
+        side = (0, 1, 0) if abs(along[1]) < 0.7 else (1, 0, 0)
         up = (along[1] * side[2] - along[2] * side[1], along[2] * side[0] - along[0] * side[2],
               along[0] * side[1] - along[1] * side[0])
         for k in range(SEGMENTS):

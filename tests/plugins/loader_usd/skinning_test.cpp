@@ -88,7 +88,7 @@ TEST_CASE("an arm bent by 90 degrees is where its weights put it", "[loader_usd]
   const Mesh& rest = *straight.node("Arm/Skin").mesh;
   CHECK(has_point(rest, {2, 0, 0}));
   CHECK(has_point(rest, {1, 0.2f, 0}));
-  const Animation& range = *straight.node("").animation;
+  const Animation& range = *straight.scene[straight.root].animation;
   CHECK(range.start_s == 0.0);
   CHECK(range.end_s == 1.0);
   CHECK(range.asset == file);
@@ -100,7 +100,7 @@ TEST_CASE("an arm bent by 90 degrees is where its weights put it", "[loader_usd]
   CHECK(has_point(skin, {1.2f, 0.5f, 0}));
   // Half as it stands, half about the elbow: linear blend skinning, candy wrapper and all.
   CHECK(has_point(skin, {0.9f, 0.1f, 0}));
-  CHECK(bent.node("").animation->asset == file);
+  CHECK(bent.scene[bent.root].animation->asset == file);
 
   LoadedStage between(file + "{time=0.5}");
   const float half = std::sqrt(0.5f);
@@ -165,8 +165,8 @@ def Xform "Fan"
 }
 )");
   LoadedStage still(file);
-  CHECK(still.node("").animation->start_s == Approx(0.0));
-  CHECK(still.node("").animation->end_s == Approx(2.0));
+  CHECK(still.scene[still.root].animation->start_s == Approx(0.0));
+  CHECK(still.scene[still.root].animation->end_s == Approx(2.0));
   CHECK(has_point(*still.node("Fan/Blade").mesh, {9, 9, 9}));
   LoadedStage moved(file + "{time=0.75}");
   CHECK((moved.node("Fan").parent_from_node.translation() - Vec3(1.5, 0, 3)).norm() < 1e-12);
@@ -178,7 +178,7 @@ def Xform "Fan"
   LoadedStage dull(folder.write("dull.usda",
                                 "#usda 1.0\n(\n startTimeCode = 0\n endTimeCode = 9\n)"
                                 "\ndef Cube \"A\"\n{\n}\n"));
-  CHECK_FALSE(dull.node("").animation);
+  CHECK_FALSE(dull.scene[dull.root].animation);
 }
 
 TEST_CASE("skins with words that cannot be stay as they are bound", "[loader_usd]") {
