@@ -105,6 +105,25 @@ void check_free_fall(const Subject& subject) {
               std::to_string(kGravity * seconds));
 }
 
+/// A randomizer may throw things, and what falls goes on falling when the world is built anew.
+void check_initial_velocity(const Subject& subject) {
+  const auto physics = subject.make<PhysicsBackend>();
+  const int steps = steps_in_the_air(*physics);
+  const double seconds = steps * physics->step_seconds();
+  constexpr double kSpeed = 1.0;
+  Scene scene = sample_scene();
+  const double before = height(scene, kBox);
+  scene.edit(scene.require(kBox)).rigid_body->linear_velocity = Vec3(0, 0, kSpeed);
+  physics->reset(scene);
+  physics->advance(scene, steps);
+  const double expected = kSpeed * seconds - 0.5 * kGravity * seconds * seconds;
+  const double slack = 0.5 * kGravity * seconds * seconds / steps + 0.05 * kSpeed * seconds;
+  require(std::abs(height(scene, kBox) - before - expected) <= slack,
+          "a body whose velocity the scene says rises by " +
+              std::to_string(height(scene, kBox) - before) + " m in " + std::to_string(seconds) +
+              " s, expected about " + std::to_string(expected));
+}
+
 /// Up to rounding: poses may go through other numbers on the way into the scene.
 void check_steps_add_up(const Subject& subject) {
   const auto physics = subject.make<PhysicsBackend>();
@@ -191,6 +210,8 @@ void check_physics(const CheckRun& run, const Subject& subject) {
   run.check("two instances at work at once give the same bits",
             [&] { check_two_at_once(subject); });
   run.check("a body falls as gravity and its steps have it", [&] { check_free_fall(subject); });
+  run.check("a body starts with the velocity that the scene says",
+            [&] { check_initial_velocity(subject); });
   run.check("steps add up, however many are taken at once", [&] { check_steps_add_up(subject); });
   run.check("a body without gravity stays where it is", [&] { check_floating(subject); });
   run.check("its report says what the bodies do", [&] { check_report(subject); });

@@ -15,7 +15,8 @@ bool are_equal(const std::optional<Collider>& a, const std::optional<Collider>& 
 
 bool are_equal(const std::optional<RigidBody>& a, const std::optional<RigidBody>& b) {
   if (!a || !b) return a.has_value() == b.has_value();
-  return a->mass_kg == b->mass_kg && a->has_gravity == b->has_gravity;
+  return a->mass_kg == b->mass_kg && a->has_gravity == b->has_gravity &&
+         a->linear_velocity == b->linear_velocity && a->angular_velocity == b->angular_velocity;
 }
 
 bool are_equal(const std::optional<Joint>& a, const std::optional<Joint>& b) {

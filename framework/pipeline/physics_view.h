@@ -10,8 +10,9 @@
 
 namespace diorama {
 
-/// What a physics engine holds of a scene: everything that collides or moves, and where it is. Two
-/// that differ mean that the engine must look at the scene anew, or things rest on what has gone.
+/// What a physics engine holds of a scene: everything that collides or moves, where it is and how
+/// fast. Two that differ mean that the engine must look at the scene anew, or things rest on what
+/// has gone.
 class PhysicsView {
  public:
   explicit PhysicsView(const Scene& scene);
@@ -26,7 +27,7 @@ class PhysicsView {
     Mat4 world_from_node;
     std::shared_ptr<const Mesh> mesh;
     std::optional<Collider> collider;
-    std::optional<RigidBody> body;  ///< Its velocities do not count.
+    std::optional<RigidBody> body;
     std::optional<Joint> joint;
     bool is_visible = true;
   };

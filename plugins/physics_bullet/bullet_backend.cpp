@@ -13,6 +13,8 @@ namespace {
 
 Vec3 from_bullet(const btVector3& vector) { return {vector.x(), vector.y(), vector.z()}; }
 
+btVector3 to_bullet(const Vec3& vector) { return {vector.x(), vector.y(), vector.z()}; }
+
 Rigid from_bullet(const btTransform& transform) {
   const btQuaternion rotation = transform.getRotation();
   Rigid rigid = Rigid::Identity();
@@ -20,6 +22,18 @@ Rigid from_bullet(const btTransform& transform) {
       Quat(rotation.w(), rotation.x(), rotation.y(), rotation.z()).normalized().toRotationMatrix();
   rigid.translation() = from_bullet(transform.getOrigin());
   return rigid;
+}
+
+/// The body goes on as its node does. The scene has the velocity of the node's origin, Bullet that
+/// of the centre of mass.
+void set_velocities(const Scene& scene, const MovingBody& moving) {
+  const RigidBody& known = *scene[moving.node].rigid_body;
+  if (known.linear_velocity.isZero(0.0) && known.angular_velocity.isZero(0.0)) return;
+  const Vec3 arm = from_bullet(moving.start.getOrigin()) -
+                   Vec3(scene.world_from_node(moving.node).translation());
+  moving.body->setLinearVelocity(
+      to_bullet(known.linear_velocity + known.angular_velocity.cross(arm)));
+  moving.body->setAngularVelocity(to_bullet(known.angular_velocity));
 }
 
 double outer_margin(const btCollisionObject& object, const Bodies& bodies) {
@@ -131,6 +145,7 @@ void BulletBackend::do_reset(const Scene& scene) {
   for (std::size_t i = 0; i < world.bodies.moving.size(); ++i) {
     world.bodies.moving[i].body->setUserIndex(int(i));
     world.dynamics.addRigidBody(world.bodies.moving[i].body.get());
+    set_velocities(scene, world.bodies.moving[i]);
   }
   // Bodies that a joint holds together do not collide with each other.
   for (const HeldJoint& held : world.bodies.joints) {

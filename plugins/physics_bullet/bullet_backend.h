@@ -12,7 +12,8 @@ namespace diorama {
 /// Rigid bodies by Bullet. Friction and restitution of two touching bodies are the geometric mean
 /// of theirs; a body of several colliders takes the surface of the first. Masses are spread evenly
 /// over the volume of the colliders, so the centre of mass is theirs, not the node's origin. Bodies
-/// start at rest; bodies that overlap are pushed apart without gaining speed.
+/// start with the velocities that the scene says; bodies that overlap are pushed apart without
+/// gaining speed.
 class BulletBackend final : public PhysicsBackend {
  public:
   struct Params {

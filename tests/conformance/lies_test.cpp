@@ -178,6 +178,7 @@ TEST_CASE("physics that lies is found out", "[conformance]") {
           {"says_other_steps", kFreeFall},
           {"counts_calls", "steps add up, however many are taken at once"},
           {"keeps_speeds", "a reset forgets all that was"},
+          {"starts_at_rest", "a body starts with the velocity that the scene says"},
           {"hides_speeds", kFreeFall},
           {"draws_all_down", "a body without gravity stays where it is"},
           {"drifts", kFreeFall},

@@ -47,8 +47,9 @@ struct Falls : PhysicsBackend {
     bodies.clear();
     for (const NodeId id : scene.subtree(scene.root())) {
       if (!scene[id].rigid_body) continue;
-      bodies.push_back({id, scene.world_from_node(id), scene.world_bounds(id).min.z(), 0.0,
-                        scene[id].rigid_body->has_gravity});
+      const RigidBody& body = *scene[id].rigid_body;
+      bodies.push_back({id, scene.world_from_node(id), scene.world_bounds(id).min.z(),
+                        body.has_gravity ? body.linear_velocity.z() : 0.0, body.has_gravity});
     }
   }
   void do_advance(int steps) override {
@@ -106,6 +107,13 @@ struct KeepsSpeeds : Falls {
     for (std::size_t i = 0; i < std::min(before.size(), bodies.size()); ++i) {
       bodies[i].speed = before[i].speed - 0.1;
     }
+  }
+};
+struct StartsAtRest : Falls {
+  using Falls::Falls;
+  void do_reset(const Scene& scene) override {
+    Falls::do_reset(scene);
+    for (Body& body : bodies) body.speed = 0.0;
   }
 };
 struct ForgetsToSayHowFast : Falls {
@@ -209,6 +217,7 @@ DIORAMA_PLUGIN("lying_physics", "1.0.0", "MIT") {
   DIORAMA_ADD(SaysOtherSteps, "says_other_steps", "Steps too short.");
   DIORAMA_ADD(OneStepPerCall, "counts_calls", "Moves things by calls.");
   DIORAMA_ADD(KeepsSpeeds, "keeps_speeds", "Remembers speeds.");
+  DIORAMA_ADD(StartsAtRest, "starts_at_rest", "Forgets what was thrown.");
   DIORAMA_ADD(ForgetsToSayHowFast, "hides_speeds", "Writes no speeds.");
   DIORAMA_ADD(DrawsEverythingDown, "draws_all_down", "Knows no floating.");
   DIORAMA_ADD(Drifts, "drifts", "Pushes sideways.");

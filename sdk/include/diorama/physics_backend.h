@@ -25,8 +25,8 @@ class DIORAMA_SDK_API PhysicsBackend : public Component {
 
   ~PhysicsBackend() override;
 
-  /// Builds the engine's world anew from every node with a collider, hidden ones too; all
-  /// velocities are zero afterwards.
+  /// Builds the engine's world anew from every node with a collider, hidden ones too. Bodies go on
+  /// with the velocities that the scene says.
   void reset(const Scene& scene);
   /// Takes `steps` fixed steps (0 or more), then writes poses and velocities of moving bodies.
   /// Throws Error naming the node when a pose is not finite.

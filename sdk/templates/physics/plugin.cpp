@@ -59,14 +59,15 @@ class @CLASS@ final : public diorama::PhysicsBackend {
     return bounds;
   }
 
-  // The world is built anew from the scene; velocities begin at zero.
+  // The world is built anew from the scene, with the velocities that it says.
   void do_reset(const diorama::Scene& scene) override {
     bodies_.clear();
     for (const diorama::NodeId id : scene.subtree(scene.root())) {
       if (!scene[id].rigid_body || !scene[id].rigid_body->has_gravity) continue;
       const diorama::Aabb bounds = bounds_of(scene, id);
       if (bounds.is_empty()) continue;
-      bodies_.push_back({id, scene.world_from_node(id), bounds.min.z()});
+      bodies_.push_back({id, scene.world_from_node(id), bounds.min.z(),
+                         scene[id].rigid_body->linear_velocity.z()});
     }
   }
 

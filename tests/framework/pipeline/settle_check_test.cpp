@@ -140,11 +140,19 @@ TEST_CASE("Physics looks anew when anything that collides changed, and only then
   const NodeId lamp = stage.scene.create(stage.scene.root(), "Lamp");
   const PhysicsView before(stage.scene);
   CHECK(before.is_of(stage.scene));
-  // Lamps, colours and speeds are not its business.
+  // Lamps and colours are not its business.
   stage.scene.set_pose(lamp, at(1, 2, 3));
   stage.scene.edit(mug).labels["class"] = "cup";
-  stage.scene.edit(mug).rigid_body->linear_velocity = Vec3(1, 0, 0);
   CHECK(before.is_of(stage.scene));
+
+  SECTION("how fast something goes") {
+    stage.scene.edit(mug).rigid_body->linear_velocity = Vec3(1, 0, 0);
+    CHECK_FALSE(before.is_of(stage.scene));
+  }
+  SECTION("how fast something turns") {
+    stage.scene.edit(mug).rigid_body->angular_velocity = Vec3(0, 1, 0);
+    CHECK_FALSE(before.is_of(stage.scene));
+  }
 
   SECTION("the table moves with what it stands on") {
     stage.scene.set_pose(stage.environment, at(0, 0, 0.1));

@@ -32,6 +32,33 @@ TEST_CASE("free fall follows the closed form", "[physics]") {
   CHECK(world.backend.report().max_speed == Approx(9.81).epsilon(1e-9));
 }
 
+TEST_CASE("a body starts with the velocity that the scene says, and goes on with it after a reset",
+          "[physics]") {
+  BulletBackend::Params params;
+  params.floating_damping = 0.0;
+  PhysicsWorld world(params);
+  // The centre of mass is off the node's origin, which moves in a circle about it.
+  const NodeId body = world.scene.create(world.scene.root(), "body");
+  world.scene.set_pose(body, at(1, -2, 30));
+  const NodeId arm = world.scene.create(body, "arm");
+  world.scene.set_pose(arm, at(0.5, 0, 0));
+  Collider& collider = world.scene.edit(arm).collider.emplace();
+  collider.shape = ColliderShape::Primitive;
+  collider.primitive = PrimitiveShape::Box;
+  collider.primitive_size = Vec3(0.2, 0.1, 0.1);
+  RigidBody& moving = world.scene.edit(body).rigid_body.emplace();
+  moving.has_gravity = false;
+  moving.angular_velocity = Vec3(0, 0, kPi);
+  // That of the origin; the centre of mass then moves along z alone.
+  moving.linear_velocity = Vec3(0, -0.5 * kPi, 2.0);
+  world.backend.reset(world.scene);
+  world.backend.advance(world.scene, 30);
+  CHECK((world.position(body) - Vec3(1.5, -2.5, 31)).norm() < 0.01);
+  world.backend.reset(world.scene);
+  world.backend.advance(world.scene, 30);
+  CHECK((world.position(body) - Vec3(2, -2, 32)).norm() < 0.02);
+}
+
 TEST_CASE("restitution sends a ball back to its square of the height", "[physics]") {
   for (const double restitution : {0.0, 0.5, 0.8}) {
     PhysicsWorld world;
