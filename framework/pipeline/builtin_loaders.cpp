@@ -107,6 +107,7 @@ void ShapesLoader::load(std::string_view asset, Scene& scene, NodeId root) {
 
 void register_builtin_loaders(Registrar& registrar) {
   add<FilesLoader>(registrar, "files", "Names files and folders of files.");
+  add<EmptyLoader>(registrar, "empty", "Empty space, as an environment.");
   add<ShapesLoader>(registrar, "shapes", "Makes capsules, cones, cylinders, spheres and cubes.");
 }
 

@@ -29,6 +29,19 @@ class FilesLoader final : public Loader {
   Host& host_;
 };
 
+/// Nothing at all, for objects in empty space: `{type: empty}` under environments.
+class EmptyLoader final : public Loader {
+ public:
+  struct Params {
+    void visit(ParamVisitor&) {}
+  };
+  EmptyLoader(Params, Host&) {}
+
+  std::vector<std::string> claims() const override { return {"empty:"}; }
+  std::vector<std::string> assets() const override { return {"empty:space"}; }
+  void load(std::string_view, Scene&, NodeId) override {}
+};
+
 /// Makes "shape:cube" and its like: primitives of USD's default sizes (a cube of edge 2 m, a sphere
 /// of radius 1 m), meant to be scaled, with exact colliders.
 class ShapesLoader final : public Loader {

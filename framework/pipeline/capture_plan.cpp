@@ -133,13 +133,18 @@ void plan_group(const Job& job, std::size_t index, const std::vector<std::string
   }
 }
 
-/// Captures or events of that name in a visit that is not cut short.
+/// Captures, events or steps of that name in a visit that is not cut short; of a simulation until
+/// rest as many steps as there may be.
 int moments_per_visit(const Job& job, const std::string& moment) {
   int count = 0;
-  for (const TimelineStep& step : job.timeline) {
-    if (step.name != moment) continue;
-    count += step.kind == TimelineStep::Kind::Capture ? step.count : 1;  // a clip is one moment
-  }
+  for_each_step(job.timeline, [&](const TimelineStep& step) {
+    if (step.kind == TimelineStep::Kind::Simulate) {
+      if (step.each_step == moment) count += step.steps;
+    } else if (step.name == moment) {
+      count += step.kind == TimelineStep::Kind::Capture ? step.count : 1;  // a clip is one moment
+    }
+    return true;
+  });
   return count;
 }
 
@@ -148,16 +153,21 @@ int moments_per_visit(const Job& job, const std::string& moment) {
 CapturePlan::CapturePlan(const Job& job, std::vector<EnvironmentChoice> choices)
     : environments(std::move(choices)), capture_count_(job.total_captures) {
   std::map<std::string, std::int64_t> taken_of_series;
-  for (const TimelineStep& step : job.timeline) {
-    if (step.count == 0) continue;
+  for_each_step(job.timeline, [&](const TimelineStep& step) {
+    if (step.count == 0) return true;
     const bool is_clip = step.kind == TimelineStep::Kind::Record;
     std::int64_t& taken = taken_of_series[step.name];
-    steps_.push_back(
-        {step.name, captures_per_visit_, step.count, taken, step.fps, clips_per_visit_});
+    if (!is_clip && !steps_.empty() && steps_.back().phase == step.name) {
+      steps_.back().count += step.count;
+    } else {
+      steps_.push_back(
+          {step.name, captures_per_visit_, step.count, taken, step.fps, clips_per_visit_});
+    }
     taken += is_clip ? 1 : step.count;
     clips_per_visit_ += is_clip ? 1 : 0;
     captures_per_visit_ += step.count;
-  }
+    return true;
+  });
   if (captures_per_visit_ > 0 || capture_count_ == 0) return;
   throw Error(ErrorKind::Config, "timeline: no captures, so total_captures is never reached");
 }

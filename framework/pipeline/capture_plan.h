@@ -78,7 +78,7 @@ class CapturePlan {
   std::vector<DatasetClip> clips() const;
 
  private:
-  /// A step of the timeline that takes captures.
+  /// Captures of one series that follow each other in the timeline.
   struct Step {
     std::string phase;
     std::int64_t first = 0;  // of the visit's captures

@@ -104,13 +104,19 @@ std::string simulation_text(const TimelineStep& step) {
   return "until rest, " + std::to_string(step.at_least) + " to " + std::to_string(step.steps);
 }
 
-std::string timeline_text(const Job& job) {
+std::string timeline_text(const std::vector<TimelineStep>& timeline) {
   std::string text;
-  for (const TimelineStep& step : job.timeline) {
+  for (const TimelineStep& step : timeline) {
     text += text.empty() ? "" : " -> ";
+    if (step.every > 1) text += "every " + std::to_string(step.every) + ": ";
     switch (step.kind) {
       case TimelineStep::Kind::Simulate:
         text += "simulate " + simulation_text(step);
+        if (step.camera_radius_m > 0.0) text += ", pushed by cameras";
+        if (!step.each_step.empty()) text += ", each step " + step.each_step;
+        break;
+      case TimelineStep::Kind::Repeat:
+        text += std::to_string(step.rounds) + " x (" + timeline_text(step.steps_of_round) + ")";
         break;
       case TimelineStep::Kind::Capture:
         text += "capture " + step.name + " x " + std::to_string(step.count);
@@ -333,7 +339,7 @@ std::string plan_text(const CapturePlan& plan, const Job& job,
       std::to_string(plan.capture_count()) + " captures x " + std::to_string(cameras) +
       " cameras = " + std::to_string(std::size_t(plan.capture_count()) * cameras) +
       " frames, seed " + std::to_string(job.seed) + (job.debug ? ", debug" : "") + "\n";
-  text += "timeline: " + timeline_text(job) + "\n";
+  text += "timeline: " + timeline_text(job.timeline) + "\n";
   text += "environments (" + std::to_string(plan.environments.size()) + ")\n";
   for (const EnvironmentChoice& choice : plan.environments) {
     text += "  " + asset_name(choice.asset, assets_root) + "\n";

@@ -67,10 +67,9 @@ void read_all_keys(const Value& map, const std::string& path, Keys& keys, Compla
 }
 
 /// The maps of a list section; complains about other things and leaves them out.
-std::vector<std::pair<std::string, Value>> entries(const Value& job, std::string_view section,
+std::vector<std::pair<std::string, Value>> entries(const Value* list, std::string_view section,
                                                    Complaints& complaints) {
   std::vector<std::pair<std::string, Value>> result;
-  const Value* list = job.find(section);
   if (!list || list->kind == Value::Kind::Null) return result;
   if (list->kind != Value::Kind::List) {
     complaints.add(list->place, std::string(section) + ": expected a list of mappings, found " +
@@ -87,6 +86,11 @@ std::vector<std::pair<std::string, Value>> entries(const Value& job, std::string
     }
   }
   return result;
+}
+
+std::vector<std::pair<std::string, Value>> entries(const Value& job, std::string_view section,
+                                                   Complaints& complaints) {
+  return entries(job.find(section), section, complaints);
 }
 
 const Place& place_of(const Value& map, std::string_view key) {
@@ -384,12 +388,14 @@ void check_moments(const RandomizerEntry& entry, const std::vector<std::string>&
 
 void read_randomizers(const Value& value, Job& job, Complaints& complaints) {
   std::vector<std::string> moments{"environment"};
-  for (const TimelineStep& step : job.timeline) {
-    const bool is_moment = step.kind != TimelineStep::Kind::Simulate;
-    if (is_moment && std::find(moments.begin(), moments.end(), step.name) == moments.end()) {
-      moments.push_back(step.name);
+  for_each_step(job.timeline, [&](const TimelineStep& step) {
+    const bool simulates = step.kind == TimelineStep::Kind::Simulate;
+    const std::string& moment = simulates ? step.each_step : step.name;
+    if (!moment.empty() && std::find(moments.begin(), moments.end(), moment) == moments.end()) {
+      moments.push_back(moment);
     }
-  }
+    return true;
+  });
   for (auto& [path, map] : entries(value, "randomizers", complaints)) {
     RandomizerEntry entry;
     read_keys(map, path, entry, complaints);
@@ -521,6 +527,19 @@ ComponentConfig read_engine(const Value& value, std::string_view section, const 
   return entry;
 }
 
+/// The number of `simulate: 200`, whatever stands beside it.
+int read_steps(const Value& value, const std::string& path, Complaints& complaints) {
+  Value alone = Value::make_map();
+  alone.place = value.place;
+  alone.set("simulate", value);
+  StepsKeys keys;
+  read_all_keys(alone, path, keys, complaints);
+  if (keys.simulate != std::floor(keys.simulate)) {
+    complaints.add(value.place, path + ".simulate: expected a whole number");
+  }
+  return int(keys.simulate);
+}
+
 /// `simulate: 200` or `simulate: {until: rest, ...}`.
 std::optional<TimelineStep> read_simulation(const Value& map, const std::string& path,
                                             Complaints& complaints) {
@@ -540,12 +559,7 @@ std::optional<TimelineStep> read_simulation(const Value& map, const std::string&
     step.steps = keys.at_most;
     step.at_least = keys.at_least;
   } else {
-    StepsKeys keys;
-    read_all_keys(map, path, keys, complaints);
-    if (keys.simulate != std::floor(keys.simulate)) {
-      complaints.add(value.place, path + ".simulate: expected a whole number");
-    }
-    step.steps = int(keys.simulate);
+    step.steps = read_steps(value, path, complaints);
   }
   if (complaints.messages().size() != before) return std::nullopt;
   return step;
@@ -580,7 +594,43 @@ std::optional<TimelineStep> read_recording(const Value& map, const std::string& 
   return step;
 }
 
-std::optional<TimelineStep> read_step(const Value& map, const std::string& path,
+std::vector<TimelineStep> read_steps_of(const Value* list, const std::string& path, bool is_round,
+                                        Complaints& complaints);
+
+bool is_moment_name(const std::string& name) { return !name.empty() && name != "environment"; }
+
+/// What stands beside a step must belong to it.
+void check_companions(const StepKeys& keys, const Value& map, const std::string& path,
+                      bool is_round, Complaints& complaints) {
+  const auto complain = [&](const char* key, const std::string& where) {
+    complaints.add(place_of(map, key), path + "." + key + ": has a meaning only " + where);
+  };
+  const bool simulates = keys.simulate.kind != Value::Kind::Null;
+  if (map.find("each_step") && !simulates) complain("each_step", "beside 'simulate'");
+  if (map.find("camera_radius_m") && !simulates) complain("camera_radius_m", "beside 'simulate'");
+  if (map.find("steps") && !keys.repeat) complain("steps", "beside 'repeat'");
+  if (map.find("every") && !is_round) complain("every", "within the 'steps' of a 'repeat'");
+  if (keys.each_step && !is_moment_name(*keys.each_step)) {
+    complaints.add(place_of(map, "each_step"), path +
+                                                   ".each_step: a moment needs a name of its own, "
+                                                   "found '" +
+                                                   *keys.each_step + "'");
+  }
+}
+
+TimelineStep read_repetition(const StepKeys& keys, const Value& map, const std::string& path,
+                             Complaints& complaints) {
+  TimelineStep step;
+  step.kind = TimelineStep::Kind::Repeat;
+  step.rounds = int(*keys.repeat);
+  if (*keys.repeat != std::floor(*keys.repeat)) {
+    complaints.add(place_of(map, "repeat"), path + ".repeat: expected a whole number");
+  }
+  step.steps_of_round = read_steps_of(map.find("steps"), path + ".steps", true, complaints);
+  return step;
+}
+
+std::optional<TimelineStep> read_step(const Value& map, const std::string& path, bool is_round,
                                       Complaints& complaints) {
   StepKeys keys;
   const std::size_t before = complaints.messages().size();
@@ -588,40 +638,73 @@ std::optional<TimelineStep> read_step(const Value& map, const std::string& path,
   if (complaints.messages().size() != before) return std::nullopt;
   const bool simulates = keys.simulate.kind != Value::Kind::Null;
   const bool records = keys.record.kind != Value::Kind::Null;
-  if (int(simulates) + int(records) + int(keys.capture.has_value()) + int(keys.event.has_value()) !=
+  if (int(simulates) + int(records) + int(keys.capture.has_value()) + int(keys.event.has_value()) +
+          int(keys.repeat.has_value()) !=
       1) {
     complaints.add(map.place, path +
                                   ": expected one of 'simulate: STEPS', 'capture: NAME' (with "
-                                  "'count'), 'record: {fps: 30, seconds: 2}' and 'event: NAME'");
+                                  "'count'), 'record: {fps: 30, seconds: 2}', 'event: NAME' and "
+                                  "'repeat: TIMES' (with 'steps')");
     return std::nullopt;
   }
-  if (simulates) return read_simulation(map, path, complaints);
-  std::optional<TimelineStep> recording;
-  if (records) {
-    recording = read_recording(map, path, complaints);
-    if (!recording) return std::nullopt;
+  check_companions(keys, map, path, is_round, complaints);
+  std::optional<TimelineStep> step;
+  if (simulates) {
+    step = read_simulation(map, path, complaints);
+  } else if (keys.repeat) {
+    step = read_repetition(keys, map, path, complaints);
+  } else if (records) {
+    step = read_recording(map, path, complaints);
+    if (step && !is_moment_name(step->name)) {
+      complaints.add(map.place,
+                     path + ": a moment needs a name of its own, found '" + step->name + "'");
+    }
+  } else {
+    const std::string& name = keys.capture ? *keys.capture : *keys.event;
+    if (!is_moment_name(name)) {
+      complaints.add(map.place, path + ": a moment needs a name of its own, found '" + name + "'");
+    }
+    step = keys.capture ? TimelineStep{TimelineStep::Kind::Capture, 0, name, keys.count}
+                        : TimelineStep{TimelineStep::Kind::Event, 0, name, 0};
   }
-  const std::string& name = recording      ? recording->name
-                            : keys.capture ? *keys.capture
-                                           : *keys.event;
-  if (name.empty() || name == "environment") {
-    complaints.add(map.place, path + ": a moment needs a name of its own, found '" + name + "'");
-    return std::nullopt;
+  if (complaints.messages().size() != before) return std::nullopt;
+  step->every = keys.every;
+  step->camera_radius_m = keys.camera_radius_m;
+  step->each_step = keys.each_step.value_or("");
+  return step;
+}
+
+std::vector<TimelineStep> read_steps_of(const Value* list, const std::string& path, bool is_round,
+                                        Complaints& complaints) {
+  std::vector<TimelineStep> steps;
+  for (const auto& [item, map] : entries(list, path, complaints)) {
+    if (auto step = read_step(map, item, is_round, complaints)) steps.push_back(std::move(*step));
   }
-  if (recording) return recording;
-  if (keys.capture) return TimelineStep{TimelineStep::Kind::Capture, 0, name, keys.count};
-  return TimelineStep{TimelineStep::Kind::Event, 0, name, 0};
+  return steps;
+}
+
+/// Rounds within rounds must not go on for ever.
+std::int64_t steps_in_all(const std::vector<TimelineStep>& timeline) {
+  constexpr std::int64_t kEnough = 1'000'000'000;
+  std::int64_t count = 0;
+  for (const TimelineStep& step : timeline) {
+    count += 1 + std::int64_t(step.rounds) * steps_in_all(step.steps_of_round);
+    if (count >= kEnough) return kEnough;
+  }
+  return count;
 }
 
 /// What is called once per clip and what is called once per capture are moments of their own.
 void check_clip_names(const Job& job, const Place& place, Complaints& complaints) {
-  for (const TimelineStep& step : job.timeline) {
-    if (step.kind != TimelineStep::Kind::Record) continue;
-    const bool is_taken = std::ranges::any_of(job.timeline, [&](const TimelineStep& other) {
-      return other.kind != TimelineStep::Kind::Record && other.name == step.name;
-    });
-    if (!is_taken) continue;
-    complaints.add(place, "timeline: '" + step.name +
+  std::set<std::string> clips;
+  std::set<std::string> others;
+  for_each_step(job.timeline, [&](const TimelineStep& step) {
+    (step.kind == TimelineStep::Kind::Record ? clips : others).insert(step.name);
+    return true;
+  });
+  for (const std::string& name : clips) {
+    if (!others.contains(name)) continue;
+    complaints.add(place, "timeline: '" + name +
                               "' is the name of clips and of another moment; give 'record' a "
                               "'name' of its own");
     return;
@@ -635,13 +718,20 @@ void read_timeline(const Value& value, Job& job, Complaints& complaints) {
     return;
   }
   const std::size_t before = complaints.messages().size();
-  for (const auto& [path, map] : entries(value, "timeline", complaints)) {
-    if (auto step = read_step(map, path, complaints)) job.timeline.push_back(*step);
+  job.timeline = read_steps_of(list, "timeline", false, complaints);
+  constexpr std::int64_t kMostSteps = 10'000'000;
+  if (steps_in_all(job.timeline) > kMostSteps) {
+    complaints.add(list->place, "timeline: expected at most " + std::to_string(kMostSteps) +
+                                    " steps per visit in all rounds; take fewer");
+    job.timeline.clear();
   }
   check_clip_names(job, list->place, complaints);
   if (complaints.messages().size() != before) return;
   std::int64_t captures_per_visit = 0;
-  for (const TimelineStep& step : job.timeline) captures_per_visit += step.count;
+  for_each_step(job.timeline, [&](const TimelineStep& step) {
+    captures_per_visit += step.count;
+    return true;
+  });
   if (captures_per_visit == 0 && job.total_captures > 0) {
     complaints.add(list->place,
                    "timeline: the capture series have no captures in all, so "
@@ -711,6 +801,10 @@ void EnvironmentRules::visit(ParamVisitor& v) {
   v.param("working_area", working_area,
           {"The first node whose path holds this text is the centre of the working area; null: the "
            "origin."});
+  v.param("walls", walls,
+          {"Width, depth and height of a box round the working area, along x, y and z: invisible "
+           "walls round it keep objects in. Empty: none.",
+           "m", 0.01, 1e5});
   v.param("max_lamp_lux", max_lamp_lux,
           {"Lamps of the environment that light a surface 2 m away with more are dimmed to this; "
            "null: they stay as they are.",
@@ -873,10 +967,13 @@ std::vector<ComponentConfig> read_annotators(const Value& job, Complaints& compl
 
 std::vector<std::string> Job::series() const {
   std::vector<std::string> names;
-  for (const TimelineStep& step : timeline) {
-    if (step.kind != TimelineStep::Kind::Capture) continue;
-    if (std::find(names.begin(), names.end(), step.name) == names.end()) names.push_back(step.name);
-  }
+  for_each_step(timeline, [&](const TimelineStep& step) {
+    const bool captures = step.kind == TimelineStep::Kind::Capture;
+    if (captures && std::find(names.begin(), names.end(), step.name) == names.end()) {
+      names.push_back(step.name);
+    }
+    return true;
+  });
   return names;
 }
 
@@ -884,6 +981,31 @@ std::vector<std::string> Job::camera_names() const {
   std::vector<std::string> names;
   for (const PlannedCamera& camera : planned_cameras(cameras)) names.push_back(camera.name);
   return names;
+}
+
+namespace {
+
+/// False: the body wants no more.
+bool go_through(const std::vector<TimelineStep>& timeline, int round,
+                const std::function<bool(const TimelineStep&)>& body) {
+  for (const TimelineStep& step : timeline) {
+    if (round % step.every != 0) continue;
+    if (step.kind != TimelineStep::Kind::Repeat) {
+      if (!body(step)) return false;
+      continue;
+    }
+    for (int i = 0; i < step.rounds; ++i) {
+      if (!go_through(step.steps_of_round, i, body)) return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+void for_each_step(const std::vector<TimelineStep>& timeline,
+                   const std::function<bool(const TimelineStep&)>& body) {
+  go_through(timeline, 0, body);
 }
 
 std::vector<TimelineStep> default_timeline() {
@@ -913,6 +1035,10 @@ Job read_job(const Value& value, Complaints& complaints) {
       read_parameters(value, "loaders", "each loader reads its files in one way", complaints);
   read_environments(value, job, complaints);
   read_section(value, "environment", job.environment, complaints);
+  if (!job.environment.walls.empty() && job.environment.walls.size() != 3) {
+    complaints.add(place_of(*value.find("environment"), "walls"),
+                   "environment.walls: expected [width, depth, height] in metres, or []");
+  }
   read_objects(value, job, complaints);
   read_lights(value, job, complaints);
   read_cameras(value, job, complaints);

@@ -39,6 +39,7 @@ struct EnvironmentRules {
   std::optional<std::string> working_area;
   std::optional<double> max_lamp_lux;  ///< At kLampDistance.
   std::string joints = "held";
+  std::vector<double> walls;           ///< Size of the box that they enclose, or empty: none.
   void visit(ParamVisitor& v);
 };
 
@@ -151,9 +152,9 @@ struct WriterEntry {
   void visit(ParamVisitor& v);
 };
 
-/// One step of a visit; exactly one of the four is meant.
+/// One step of a visit; exactly one of the kinds is meant.
 struct TimelineStep {
-  enum class Kind : std::uint8_t { Simulate, Capture, Event, Record };
+  enum class Kind : std::uint8_t { Simulate, Capture, Event, Record, Repeat };
   Kind kind = Kind::Simulate;
   int steps = 0;     ///< Simulate; until rest: at most.
   std::string name;  ///< Capture, Record: the series. Event: the moment that randomizers name.
@@ -161,7 +162,18 @@ struct TimelineStep {
   bool until_rest = false;  ///< Simulate: ends when everything is at rest.
   int at_least = 0;         ///< Simulate until rest: steps that are taken in any case.
   double fps = 0.0;         ///< Record: frames per second.
+  /// Simulate: radius of spheres round the cameras that push objects away meanwhile; 0: none.
+  double camera_radius_m = 0.0;
+  std::string each_step = {};  ///< Simulate: moment after every step, for randomizers.
+  int every = 1;   ///< In a repetition: taken in the first round and in every so many.
+  int rounds = 0;  ///< Repeat.
+  std::vector<TimelineStep> steps_of_round = {};  ///< Repeat.
 };
+
+/// Calls body(step) for each step but repetitions, as often and in the order as they happen, until
+/// it returns false.
+void for_each_step(const std::vector<TimelineStep>& timeline,
+                   const std::function<bool(const TimelineStep&)>& body);
 
 /// What becomes of objects that are outside the environment's box after a simulation, or not
 /// settled after one that goes on until rest.

@@ -92,6 +92,11 @@ struct StepKeys {
   int count = 1;
   Value record;
   std::optional<std::string> event;
+  std::optional<std::string> each_step;
+  double camera_radius_m = 0.0;
+  std::optional<double> repeat;
+  Value steps;
+  int every = 1;
   void visit(ParamVisitor& v) {
     v.param("simulate", simulate,
             {"Fixed physics steps to take; or `{until: rest, at_least: 0, at_most: 800}`: until "
@@ -104,6 +109,17 @@ struct StepKeys {
         {"`{fps: 30, seconds: 2, name: clip}`: a capture every 1/fps seconds while physics goes "
          "on and cameras follow their paths; each counts among total_captures."});
     v.param("event", event, {"Calls the randomizers that name this moment."});
+    v.param("each_step", each_step,
+            {"Beside `simulate`: moment after each of its steps; randomizers that name it act."});
+    v.param("camera_radius_m", camera_radius_m,
+            {"Beside `simulate`: spheres of this radius round the cameras push objects away "
+             "meanwhile; 0: none.",
+             "m", 0, 1e3});
+    v.param("repeat", repeat, {"Takes the `steps` of the entry so many times.", "", 0, 1e6});
+    v.param("steps", steps, {"Beside `repeat`: a timeline."});
+    v.param(
+        "every", every,
+        {"Within `steps`: taken in every so-manieth round only, from the first on.", "", 1, 1e6});
   }
 };
 

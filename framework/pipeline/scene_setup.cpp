@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <memory>
 #include <set>
 #include <string_view>
 
 #include "diorama/error.h"
+#include "diorama/geometry.h"
 #include "framework/config/clean_text.h"
 #include "framework/host/node_content.h"
 #include "framework/pipeline/camera_rig.h"
@@ -194,6 +196,33 @@ Light light_of(const LightGroup& group, Host& host) {
   return light;
 }
 
+/// Hidden boxes round the inside of a box, so that nothing leaves it.
+void build_walls(const Vec3& size, const Vec3& centre_world, Scene& scene) {
+  constexpr double kThicknessM = 0.5;
+  constexpr const char* kNames[3][2] = {{"left", "right"}, {"back", "front"}, {"floor", "ceiling"}};
+  const NodeId parent = node_at(scene, "/Walls");
+  scene.edit(parent).is_visible = false;
+  for (int axis = 0; axis < 3; ++axis) {
+    // The corners as well: walls of later axes reach over those of earlier ones.
+    Vec3 wall_size = size;
+    for (int before = 0; before < axis; ++before) wall_size[before] += 2.0 * kThicknessM;
+    wall_size[axis] = kThicknessM;
+    const auto mesh = std::make_shared<const Mesh>(make_box(wall_size));
+    for (int side = 0; side < 2; ++side) {
+      const NodeId wall = scene.create(parent, kNames[axis][side]);
+      Vec3 place = centre_world;
+      place[axis] += (side == 0 ? -0.5 : 0.5) * (size[axis] + kThicknessM);
+      scene.set_pose(wall, Transform{place});
+      Collider collider;
+      collider.shape = ColliderShape::Primitive;
+      collider.primitive = PrimitiveShape::Box;
+      collider.primitive_size = wall_size;
+      scene.edit(wall).mesh = mesh;
+      scene.edit(wall).collider = collider;
+    }
+  }
+}
+
 void dim_environment(double most_lux, NodeId environment, Scene& scene, Host& host) {
   const DimmedLamps dimmed = dim_lamps(scene, environment, most_lux);
   if (dimmed.count == 0) return;
@@ -260,13 +289,20 @@ Vec3 apply_environment_rules(const EnvironmentRules& rules, bool debug, NodeId e
     }
   }
   if (rules.max_lamp_lux) dim_environment(*rules.max_lamp_lux, environment, scene, host);
-  if (!rules.working_area) return Vec3::Zero();
-  const NodeId match = paths.first_with(*rules.working_area);
-  if (match) return scene.world_from_node(match).translation();
-  host.log(LogLevel::Warning, scene.path(environment) + ": no node's path holds '" +
-                                  *rules.working_area +
-                                  "', so the working area is centred on the origin");
-  return Vec3::Zero();
+  Vec3 working_area_world = Vec3::Zero();
+  if (rules.working_area) {
+    if (const NodeId match = paths.first_with(*rules.working_area)) {
+      working_area_world = scene.world_from_node(match).translation();
+    } else {
+      host.log(LogLevel::Warning, scene.path(environment) + ": no node's path holds '" +
+                                      *rules.working_area +
+                                      "', so the working area is centred on the origin");
+    }
+  }
+  if (rules.walls.size() == 3) {
+    build_walls({rules.walls[0], rules.walls[1], rules.walls[2]}, working_area_world, scene);
+  }
+  return working_area_world;
 }
 
 std::vector<NodeId> spawn_objects(const std::vector<PlannedObject>& objects, const Job& job,
@@ -316,6 +352,21 @@ std::vector<NodeId> create_cameras(const std::vector<CameraGroup>& groups, Scene
     }
   }
   return nodes;
+}
+
+std::vector<NodeId> create_camera_spheres(const std::vector<NodeId>& cameras, double radius_m,
+                                          Scene& scene) {
+  std::vector<NodeId> spheres;
+  for (const NodeId camera : cameras) {
+    const NodeId sphere = scene.create(camera, "Sphere");
+    Collider collider;
+    collider.shape = ColliderShape::Primitive;
+    collider.primitive = PrimitiveShape::Sphere;
+    collider.primitive_size = Vec3::Constant(2.0 * radius_m);
+    scene.edit(sphere).collider = collider;
+    spheres.push_back(sphere);
+  }
+  return spheres;
 }
 
 NodeId create_overview_camera(const Vec3& working_area_world, Scene& scene) {

@@ -20,9 +20,9 @@ namespace diorama {
 NodeId load_environment(const std::string& asset, const ComponentConfig& entry, Loader& loader,
                         Scene& scene, Host& host);
 
-/// Hides, adds colliders and finds the working area. A rule whose text matches nothing gives a
-/// warning where the result would surprise (working area, box colliders). Returns the centre of the
-/// working area in the world; the origin when there is none.
+/// Hides, adds colliders, finds the working area and builds the walls round it. A rule whose text
+/// matches nothing gives a warning where the result would surprise (working area, box colliders).
+/// Returns the centre of the working area in the world; the origin when there is none.
 Vec3 apply_environment_rules(const EnvironmentRules& rules, bool debug, NodeId environment,
                              Scene& scene, Host& host);
 
@@ -35,6 +35,10 @@ void create_lights(const std::vector<LightGroup>& groups, Scene& scene, Host& ho
 
 /// Returns the cameras in job order, members of rigs below the nodes of these.
 std::vector<NodeId> create_cameras(const std::vector<CameraGroup>& groups, Scene& scene);
+
+/// Hidden spheres round cameras, for the physics alone; they stay until somebody erases them.
+std::vector<NodeId> create_camera_spheres(const std::vector<NodeId>& cameras, double radius_m,
+                                          Scene& scene);
 
 /// A camera straight above the working area, looking down, +y of the world up in the picture.
 NodeId create_overview_camera(const Vec3& working_area_world, Scene& scene);

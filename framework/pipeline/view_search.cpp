@@ -104,18 +104,19 @@ std::uint64_t view_number(const Job& job, const ViewRule& rule, int capture, std
                           std::size_t cameras) {
   std::int64_t per_visit = 0;  // captures
   std::int64_t own_per_visit = 0;
-  for (const TimelineStep& step : job.timeline) {
+  for_each_step(job.timeline, [&](const TimelineStep& step) {
     per_visit += step.count;
     if (step.count > 0 && rule.is_on(step.name)) own_per_visit += step.count;
-  }
+    return true;
+  });
   std::int64_t place = capture % per_visit;
   std::int64_t number = capture / per_visit * own_per_visit;
-  for (const TimelineStep& step : job.timeline) {
+  for_each_step(job.timeline, [&](const TimelineStep& step) {
     const std::int64_t before = std::min<std::int64_t>(place, step.count);
     if (step.count > 0 && rule.is_on(step.name)) number += before;
     place -= before;
-    if (place == 0 && before < step.count) break;
-  }
+    return place > 0 || before == step.count;
+  });
   return std::uint64_t(number) * cameras + camera;
 }
 

@@ -35,6 +35,40 @@ std::vector<Mat4> object_poses(const Scene& scene, const std::vector<NodeId>& ob
   return poses;
 }
 
+/// How objects moved before randomizers placed some of them anew.
+class ObjectMotion {
+ public:
+  ObjectMotion(const Scene& scene, const std::vector<NodeId>& objects) {
+    for (const NodeId object : objects) {
+      const auto& body = scene[object].rigid_body;
+      if (body) known_.push_back({object, scene.world_from_node(object).matrix(), *body});
+    }
+  }
+  /// What was carried elsewhere starts there at rest, unless a velocity was drawn as well.
+  void stop_what_was_placed(Scene& scene) const {
+    for (const Known& known : known_) {
+      const auto& body = scene[known.object].rigid_body;
+      if (!body || body->linear_velocity != known.body.linear_velocity ||
+          body->angular_velocity != known.body.angular_velocity ||
+          scene.world_from_node(known.object).matrix() == known.world_from_object) {
+        continue;
+      }
+      if (body->linear_velocity.isZero(0.0) && body->angular_velocity.isZero(0.0)) continue;
+      RigidBody& stopped = *scene.edit(known.object).rigid_body;
+      stopped.linear_velocity.setZero();
+      stopped.angular_velocity.setZero();
+    }
+  }
+
+ private:
+  struct Known {
+    NodeId object;
+    Mat4 world_from_object;
+    RigidBody body;
+  };
+  std::vector<Known> known_;
+};
+
 /// Cameras and rigs.
 std::vector<NodeId> camera_tops(const Scene& scene) {
   const NodeId parent = scene.find("/Cameras");
@@ -70,8 +104,8 @@ VisitResult VisitRun::run() {
   note(scene_, find_born_inside(scene_, objects_), report_.born_inside);
   report_.born = as_set_up_.placed_since(scene_);
   reset_physics();
-  for (const TimelineStep& step : job_.timeline) {
-    if (next_capture_ == planned_.capture_count) break;
+  for_each_step(job_.timeline, [&](const TimelineStep& step) {
+    if (next_capture_ == planned_.capture_count) return false;
     switch (step.kind) {
       case TimelineStep::Kind::Simulate:
         --simulations_to_come_;
@@ -87,8 +121,11 @@ VisitResult VisitRun::run() {
       case TimelineStep::Kind::Event:
         randomize(step.name, events_[step.name]++, -1);
         break;
+      case TimelineStep::Kind::Repeat:
+        break;
     }
-  }
+    return true;
+  });
   result_.respawned = int(report_.respawned.size());
   return std::move(result_);
 }
@@ -109,10 +146,11 @@ void VisitRun::set_up() {
   create_lights(job_.lights, scene_, host_);
   cameras_ = create_cameras(job_.cameras, scene_);
   small_cameras_ = create_small_cameras(job_, cameras_, scene_);
-  simulations_to_come_ =
-      int(std::count_if(job_.timeline.begin(), job_.timeline.end(), [](const TimelineStep& step) {
-        return step.kind == TimelineStep::Kind::Simulate || step.kind == TimelineStep::Kind::Record;
-      }));
+  for_each_step(job_.timeline, [&](const TimelineStep& step) {
+    simulations_to_come_ += int(step.kind == TimelineStep::Kind::Simulate ||
+                                step.kind == TimelineStep::Kind::Record);
+    return true;
+  });
   for (const EnvironmentPattern& pattern : setting_.shared.environment_patterns) {
     if (!scene_.match(pattern.text).empty()) continue;
     host_.log(LogLevel::Warning,
@@ -129,8 +167,10 @@ void VisitRun::randomize(const std::string& moment, int number, int capture,
   const Stopwatch watch(result_.seconds["randomizing"]);
   const PhysicsView before(scene_);
   const std::vector<Mat4> poses = object_poses(scene_, objects_);
+  const ObjectMotion motion(scene_, objects_);
   camera_randomizers_ = call_randomizers(moment, number, capture, {}, clip);
   if (moment == "environment" || before.is_of(scene_)) return;
+  motion.stop_what_was_placed(scene_);
   if (object_poses(scene_, objects_) != poses) before_last_step_.clear();
   // The engine holds everything as it was, and what sleeps there rests on what may be gone.
   reset_physics();
@@ -171,7 +211,16 @@ void VisitRun::reset_physics() {
 
 /// Takes the steps, and deals with what has not settled afterwards.
 void VisitRun::simulate(const TimelineStep& step) {
-  advance(step);
+  if (step.camera_radius_m > 0.0) {
+    const std::vector<NodeId> spheres =
+        create_camera_spheres(cameras_, step.camera_radius_m, scene_);
+    reset_physics();
+    advance(step);
+    for (const NodeId sphere : spheres) scene_.erase(sphere);
+    reset_physics();
+  } else {
+    advance(step);
+  }
   if (job_.settle.policy == "keep") return;
   std::vector<Flaw> flaws = unsettled(step);
   if (job_.settle.policy == "respawn") {
@@ -223,7 +272,7 @@ void VisitRun::advance(const TimelineStep& step) {
   };
   for (int taken = 0; taken < step.steps;) {
     setting_.stop_if_asked();
-    const int now = std::min(kStepsAtOnce, step.steps - taken);
+    const int now = step.each_step.empty() ? std::min(kStepsAtOnce, step.steps - taken) : 1;
     const bool may_be_last = step.until_rest || taken + now == step.steps;
     // The last step goes by itself: what it moves is the motion that captures show, and how fast
     // objects are.
@@ -236,6 +285,7 @@ void VisitRun::advance(const TimelineStep& step) {
       take(now);
     }
     taken += now;
+    if (!step.each_step.empty()) randomize(step.each_step, events_[step.each_step]++, -1);
     if (fastest_falling(scene_, room, objects_) > job_.settle.rest_speed) {
       moving_until_s_ = simulated_s_;
     }
@@ -251,6 +301,7 @@ void VisitRun::respawn(const std::vector<Flaw>& flaws) {
   // The randomizers place all objects, and clear of each other; those that stay are elsewhere.
   constexpr int kDraws = 16;
   note(scene_, flaws, report_.respawned);
+  const ObjectMotion motion(scene_, objects_);
   std::vector<NodeId> to_place = nodes_of(flaws);
   for (int i = 0; i < kDraws && !to_place.empty(); ++i) {
     const SavedNodes others(scene_, to_place);
@@ -261,6 +312,7 @@ void VisitRun::respawn(const std::vector<Flaw>& flaws) {
       return std::find(inside.begin(), inside.end(), object) == inside.end();
     });
   }
+  motion.stop_what_was_placed(scene_);
   before_last_step_.clear();
   reset_physics();
 }

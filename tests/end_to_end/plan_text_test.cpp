@@ -21,8 +21,8 @@ void make_assets_root(const fs::path& root) {
   }
   write_file(root / "Isaac/Props/YCB/Axis_Aligned/Materials/skipped.usd", "");
   write_file(root / "Isaac/Props/YCB/Axis_Aligned_Physics/006_mustard_bottle.usd", "");
-  for (const char* name :
-       {"SM_CardBoxD_04_1847", "SM_CardBoxA_01_414", "S_TrafficCone", "S_WetFloorSign"}) {
+  for (const char* name : {"SM_CardBoxD_04_1847", "SM_CardBoxA_01_414", "S_TrafficCone",
+                           "S_WetFloorSign", "SM_BarelPlastic_B_03"}) {
     write_file(root / "Isaac/Environments/Simple_Warehouse/Props" / (std::string(name) + ".usd"),
                "");
   }
@@ -38,9 +38,24 @@ void make_assets_root(const fs::path& root) {
   }
 }
 
-std::string dry_run(const std::vector<std::string>& job) {
+/// What the object-based example has beyond the tutorial's jobs, which would find it in folders.
+void add_object_based_assets(const fs::path& root) {
+  for (const char* name :
+       {"Board", "Book_03", "Book_34", "BookOpen_01", "Briefcase", "Extinguisher"}) {
+    write_file(root / "Isaac/Environments/Office/Props" / ("SM_" + std::string(name) + ".usd"), "");
+  }
+  for (const char* name : {"SM_GasCart_01b", "SM_Toweldispenser_01a"}) {
+    write_file(root / "Isaac/Environments/Hospital/Props" / (std::string(name) + ".usd"), "");
+  }
+  for (const char* name : {"autoshop_01", "carpentry_shop_01", "hotel_room", "wooden_lounge"}) {
+    write_file(root / "NVIDIA/Assets/Skies/Indoor" / (std::string(name) + "_4k.hdr"), "");
+  }
+}
+
+std::string dry_run(const std::vector<std::string>& job, bool is_object_based = false) {
   const TemporaryFolder folder;
   make_assets_root(folder / "root");
+  if (is_object_based) add_object_based_assets(folder / "root");
   std::vector<std::string> arguments{"--assets-root", (folder / "root").string(), "run", "--plan"};
   arguments.insert(arguments.end(), job.begin(), job.end());
   const Outcome outcome = run(arguments, folder.path());
@@ -107,4 +122,33 @@ TEST_CASE("The plan of the tutorial's multi-writer job is what the tutorial pres
   CHECK_THAT(text, ContainsSubstring("to _out_infinigen_dataviswriter_pt"));
   CHECK_THAT(text, ContainsSubstring("\"mode\": \"path_traced\""));
   check_golden("infinigen_multi_writers_pt.txt", text);
+}
+
+TEST_CASE("The plans of the object-based jobs are what the example prescribes", "[plan]") {
+  const std::string basic = dry_run({config_file("object_based_sdg_config.yaml")}, true);
+  CHECK_THAT(basic, ContainsSubstring("10 captures x 2 cameras = 20 frames, seed 42"));
+  CHECK_THAT(basic, ContainsSubstring("timeline: simulate 1, each step bounce -> 10 x (every 3: "
+                                      "event cameras -> every 3: simulate 4, pushed by cameras, "
+                                      "each step bounce -> capture frame x 1 -> every 5: simulate "
+                                      "2, each step bounce -> simulate 1, each step bounce)"));
+  CHECK_THAT(basic, ContainsSubstring("objects (447)"));
+  CHECK_THAT(basic, ContainsSubstring("banana: 10 below /Assets/banana, 0 floating"));
+  CHECK_THAT(basic, ContainsSubstring("mustard_bottle: 7 below /Assets/mustard_bottle, 7 "));
+  CHECK_THAT(basic, ContainsSubstring("shape_distractors: 350 below"));
+  CHECK_THAT(basic, ContainsSubstring("mesh_distractors: 75 below"));
+  CHECK_THAT(basic,
+             ContainsSubstring("BasicWriter (BasicWriter) to _out_obj_based_sdg_basic_writer"));
+  check_golden("object_based_sdg_config.txt", basic);
+
+  const std::string dope = dry_run({config_file("object_based_sdg_dope_config.yaml")}, true);
+  CHECK_THAT(dope, ContainsSubstring("4 captures x 2 cameras = 8 frames, seed 42"));
+  CHECK_THAT(dope, ContainsSubstring("to _out_obj_based_sdg_pose_writer_dope"));
+  CHECK_THAT(dope, ContainsSubstring("\"format\": \"dope\""));
+  check_golden("object_based_sdg_dope_config.txt", dope);
+  // The other differs in its writer alone.
+  std::string other = dry_run({config_file("object_based_sdg_centerpose_config.yaml")}, true);
+  for (std::size_t place; (place = other.find("centerpose")) != other.npos;) {
+    other.replace(place, 10, "dope");
+  }
+  CHECK(other == dope);
 }

@@ -415,3 +415,18 @@ TEST_CASE("Names of files that are no UTF-8 become labels that are, and stay dif
   }
   CHECK(labels == std::set<std::string>{"caf\\xE8", "caf\\xE9"});
 }
+
+TEST_CASE("Captures of rounds are numbered through", "[plan]") {
+  const CapturePlan plan =
+      plan_of(job_from(with(with(good_job(), "{simulate: 200}",
+                                 "{repeat: 3, steps: [{simulate: 1}, {capture: round, count: 2}]}"),
+                            "total_captures: 7", "total_captures: 12")));
+  // Per visit 2 floating, 6 of rounds, 1 dropped.
+  CHECK(plan.visit_count() == 2);
+  CHECK(plan.capture(2).phase == "round");
+  CHECK(plan.capture(2).number == 0);
+  CHECK(plan.capture(7).number == 5);
+  CHECK(plan.capture(8).phase == "dropped");
+  CHECK(plan.capture(11).phase == "round");
+  CHECK(plan.capture(11).number == 0);
+}

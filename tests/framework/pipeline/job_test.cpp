@@ -209,3 +209,60 @@ TEST_CASE("A simulation takes steps or goes on until rest", "[job]") {
   CHECK_THAT(complaints_about(with(good, "{simulate: 200}", "{simulate: -1}")),
              ContainsSubstring("timeline[2].simulate"));
 }
+
+TEST_CASE("Steps are repeated, some of them in every so-manieth round only", "[job]") {
+  const std::string good = good_job();
+  const Job job = job_from(
+      with(good, "{simulate: 200}",
+           "{repeat: 5, steps: [{event: shake, every: 3}, {simulate: 2, each_step: bounce, "
+           "camera_radius_m: 0.5}, {capture: dropped}]}"));
+  std::string text;
+  for_each_step(job.timeline, [&](const TimelineStep& step) {
+    if (step.kind == TimelineStep::Kind::Simulate) {
+      text += std::to_string(step.steps) + step.each_step + " ";
+    } else {
+      text += step.name + " ";
+    }
+    return true;
+  });
+  CHECK(text ==
+        "4 floating shake 2bounce dropped 2bounce dropped 2bounce dropped shake 2bounce dropped "
+        "2bounce dropped dropped ");
+  CHECK(job.timeline[2].steps_of_round[1].camera_radius_m == 0.5);
+  int seen = 0;
+  for_each_step(job.timeline, [&](const TimelineStep&) { return ++seen < 4; });
+  CHECK(seen == 4);
+  CHECK(job.series() == std::vector<std::string>{"floating", "dropped"});
+}
+
+TEST_CASE("What stands beside a step of the timeline must belong to it", "[job]") {
+  const auto complaint = [](const std::string& step) {
+    return complaints_about(with(good_job(), "{simulate: 200}", step));
+  };
+  CHECK_THAT(complaint("{event: e, each_step: bounce}"),
+             ContainsSubstring("timeline[2].each_step: has a meaning only beside 'simulate'"));
+  CHECK_THAT(complaint("{capture: c, camera_radius_m: 1}"),
+             ContainsSubstring("camera_radius_m: has a meaning only beside 'simulate'"));
+  CHECK_THAT(complaint("{simulate: 1, every: 2}"),
+             ContainsSubstring("every: has a meaning only within the 'steps' of a 'repeat'"));
+  CHECK_THAT(complaint("{simulate: 1, steps: []}"),
+             ContainsSubstring("steps: has a meaning only beside 'repeat'"));
+  CHECK_THAT(complaint("{simulate: 1, each_step: environment}"),
+             ContainsSubstring("a moment needs a name of its own, found 'environment'"));
+  CHECK_THAT(complaint("{repeat: 2, steps: [{simulate: 1, evry: 2}]}"),
+             ContainsSubstring("timeline[2].steps[0]: unknown key 'evry'; did you mean 'every'?"));
+  CHECK_THAT(complaint("{repeat: 2, simulate: 1}"), ContainsSubstring("expected one of"));
+  CHECK_THAT(complaint("{repeat: 1.5, steps: []}"), ContainsSubstring("expected a whole number"));
+  CHECK_THAT(
+      complaint("{repeat: 1000000, steps: [{repeat: 1000000, steps: [{simulate: 1}]}]}"),
+      ContainsSubstring("timeline: expected at most 10000000 steps per visit in all rounds"));
+}
+
+TEST_CASE("Walls have three sizes or none", "[job]") {
+  const std::string walls = "environment: {walls: [4, 5, 3]}\nobjects:";
+  CHECK(job_from(with(good_job(), "objects:", walls)).environment.walls ==
+        std::vector<double>{4, 5, 3});
+  CHECK_THAT(
+      complaints_about(with(good_job(), "objects:", "environment: {walls: [4, 5]}\nobjects:")),
+      ContainsSubstring("environment.walls: expected [width, depth, height] in metres"));
+}

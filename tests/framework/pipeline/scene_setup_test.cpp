@@ -55,6 +55,53 @@ struct Room {
 
 }  // namespace
 
+TEST_CASE("Walls stand hidden round the working area and leave the inside free", "[environment]") {
+  Room room;
+  EnvironmentRules rules;
+  rules.working_area = "TableDiningFactory_1";
+  rules.walls = {4, 6, 3};
+  const Vec3 centre =
+      apply_environment_rules(rules, false, room.environment, room.scene, room.host);
+  CHECK(centre == Vec3(11, 22, 0.5));
+  const NodeId walls = room.scene.require("/Walls");
+  REQUIRE(room.scene[walls].children.size() == 6);
+  Aabb inside;
+  inside.min = Vec3::Constant(-kInfinity);
+  inside.max = Vec3::Constant(kInfinity);
+  Aabb outside;
+  for (const NodeId wall : room.scene[walls].children) {
+    CHECK_FALSE(room.scene.is_visible(wall));
+    REQUIRE(room.scene[wall].collider);
+    CHECK(room.scene[wall].collider->primitive == PrimitiveShape::Box);
+    const Vec3 middle = room.scene.world_from_node(wall).translation();
+    Aabb box;
+    box.add(middle - 0.5 * room.scene[wall].collider->primitive_size);
+    box.add(middle + 0.5 * room.scene[wall].collider->primitive_size);
+    CHECK(room.scene[wall].mesh->bounds().size().isApprox(box.size(), 1e-6));
+    outside.add(box);
+    for (int axis = 0; axis < 3; ++axis) {
+      if (box.max[axis] <= centre[axis])
+        inside.min[axis] = std::max(inside.min[axis], box.max[axis]);
+      if (box.min[axis] >= centre[axis])
+        inside.max[axis] = std::min(inside.max[axis], box.min[axis]);
+    }
+  }
+  CHECK(inside.min.isApprox(centre - Vec3(2, 3, 1.5), 1e-9));
+  CHECK(inside.max.isApprox(centre + Vec3(2, 3, 1.5), 1e-9));
+  CHECK(outside.size().isApprox(Vec3(5, 7, 4), 1e-9));
+}
+
+TEST_CASE("Spheres round cameras collide and are not seen", "[environment]") {
+  Room room;
+  const auto cameras = create_cameras(job_from(good_job()).cameras, room.scene);
+  const auto spheres = create_camera_spheres(cameras, 0.3, room.scene);
+  REQUIRE(spheres.size() == 2);
+  CHECK(room.scene[spheres[1]].parent == cameras[1]);
+  CHECK_FALSE(room.scene[spheres[1]].mesh);
+  CHECK(room.scene[spheres[1]].collider->primitive == PrimitiveShape::Sphere);
+  CHECK(room.scene[spheres[1]].collider->primitive_size == Vec3::Constant(0.6));
+}
+
 TEST_CASE("Rules hide by part of the path and find the working area in the world",
           "[environment]") {
   Room room;
