@@ -135,10 +135,11 @@ RecordedCameras recorded_cameras(const fs::path& run, DatasetReaders& readers, H
 int captures_in_motion(const Job& job) {
   int captures = 0;
   int before_last = 0;
-  for (const TimelineStep& step : job.timeline) {
-    if (step.kind == TimelineStep::Kind::Capture) captures += step.count;
+  for_each_step(job.timeline, [&](const TimelineStep& step) {
+    captures += step.count;
     if (step.kind != TimelineStep::Kind::Capture) before_last = captures;
-  }
+    return true;
+  });
   return before_last;
 }
 

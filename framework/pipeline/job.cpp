@@ -427,12 +427,12 @@ void read_writers(const Value& value, Job& job, Complaints& complaints) {
 
 /// What a clip shows is decided at its start, by its randomizers.
 void check_no_clips(const ViewRule& rule, const Job& job, Complaints& complaints) {
-  for (const TimelineStep& step : job.timeline) {
-    if (step.kind != TimelineStep::Kind::Record || !rule.is_on(step.name)) continue;
+  for_each_step(job.timeline, [&](const TimelineStep& step) {
+    if (step.kind != TimelineStep::Kind::Record || !rule.is_on(step.name)) return true;
     complaints.add(rule.map.place, rule.path + ": conditions hold for single captures, and '" +
                                        step.name + "' is recorded; name capture series in 'on'");
-    return;
-  }
+    return false;
+  });
 }
 
 void read_views(const Value& value, Job& job, Complaints& complaints) {

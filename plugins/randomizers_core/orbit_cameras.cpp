@@ -54,6 +54,10 @@ void OrbitCameras::Params::visit(ParamVisitor& v) {
   v.param("distance", distance, {"Distance from the target's centre.", "m", 1e-3, 1e5});
   v.param("polar_angle_deg", polar_angle_deg,
           {"Angle off the vertical: 0 looks straight down, 90 level.", "deg", 0, 180});
+  v.param("cos_polar_angle", cos_polar_angle,
+          {"Cosine of that angle instead: drawn evenly, every direction is as likely. null: "
+           "polar_angle_deg.",
+           "", -1, 1});
   v.param("azimuth_deg", azimuth_deg, {"Direction round the vertical.", "deg", -360, 360});
   v.param("look_at_offset", look_at_offset,
           {"Point looked at, from the target's centre; a number is drawn per axis.", "m"}, 3);
@@ -99,7 +103,10 @@ OrbitCameras::View OrbitCameras::draw_view(const std::vector<Vec3>& targets,
   View view;
   view.target = targets[draws.rng.index(targets.size())];
   const double distance = draws.number(params_.distance);
-  const double polar = radians(draws.number(params_.polar_angle_deg));
+  const double polar =
+      params_.cos_polar_angle
+          ? std::acos(std::clamp(draws.number(*params_.cos_polar_angle), -1.0, 1.0))
+          : radians(draws.number(params_.polar_angle_deg));
   const double azimuth = radians(draws.number(params_.azimuth_deg));
   const Vec3 direction(std::sin(polar) * std::cos(azimuth), std::sin(polar) * std::sin(azimuth),
                        std::cos(polar));

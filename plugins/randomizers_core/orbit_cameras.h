@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,6 +30,7 @@ class OrbitCameras final : public Randomizer {
     std::string targets = "/Assets/*";
     Distribution distance = Range{1.05, 1.25};
     Distribution polar_angle_deg = Range{0.0, 75.0};
+    std::optional<Distribution> cos_polar_angle;
     Distribution azimuth_deg = Range{0.0, 360.0};
     Distribution look_at_offset = Range{-0.1, 0.1};
     std::string roll = "level";

@@ -9,11 +9,13 @@
 #include "joint_positions.h"
 #include "look_at.h"
 #include "orbit_cameras.h"
+#include "pull_together.h"
 #include "random_colors.h"
 #include "random_labels.h"
 #include "random_material.h"
 #include "random_texture.h"
 #include "random_variant.h"
+#include "random_velocities.h"
 #include "random_visibility.h"
 #include "scatter_lights.h"
 #include "scatter_poses.h"
@@ -31,6 +33,10 @@ DIORAMA_PLUGIN("randomizers_core", "0.1.0", "Apache-2.0") {
   DIORAMA_ADD(diorama::RandomLabels, "random_labels", "Draws, adds or clears the labels of nodes.");
   DIORAMA_ADD(diorama::RandomVariant, "random_variant",
               "Gives objects the looks of a variant of their asset.");
+  DIORAMA_ADD(diorama::RandomVelocities, "random_velocities",
+              "Throws objects: draws how fast they move and turn, all or those in a box.");
+  DIORAMA_ADD(diorama::PullTogether, "pull_together",
+              "Sends objects towards the working area, the farther the faster.");
   DIORAMA_ADD(diorama::RandomVisibility, "random_visibility", "Shows or hides nodes by chance.");
   DIORAMA_ADD(diorama::JointPositions, "joint_states",
               "Opens doors and drawers: draws positions of joints within their limits.");

@@ -16,6 +16,32 @@ bool is_placeable(const Node& node) {
          node.light->kind != LightKind::Distant;
 }
 
+/// Linear RGB of a black body, of luminance 1; 6500 K is white, as UsdLux has it. Places on the
+/// Planckian locus by Kim et al. (US patent 7024034), good from 1667 to 25000 K.
+Vec3 planckian_rgb(double kelvin) {
+  const double t = 1000.0 / kelvin;
+  const double x = kelvin < 4000.0 ? 0.179910 + t * (0.8776956 + t * (-0.2343589 - t * 0.2661239))
+                                   : 0.240390 + t * (0.2226347 + t * (2.1070379 - t * 3.0258469));
+  double y = 0.0;
+  if (kelvin < 2222.0) {
+    y = -0.20219683 + x * (2.18555832 + x * (-1.34811020 - x * 1.1063814));
+  } else if (kelvin < 4000.0) {
+    y = -0.16748867 + x * (2.09137015 + x * (-1.37418593 - x * 0.9549476));
+  } else {
+    y = -0.37001483 + x * (3.75112997 + x * (-5.87338670 + x * 3.0817580));
+  }
+  const Vec3 xyz(x / y, 1.0, (1.0 - x - y) / y);
+  Mat3 rgb_from_xyz;
+  rgb_from_xyz << 3.2404542, -1.5371385, -0.4985314, -0.9692660, 1.8760108, 0.0415560, 0.0556434,
+      -0.2040259, 1.0572252;
+  return (rgb_from_xyz * xyz).cwiseMax(0.0);
+}
+
+Vec3 blackbody_color(double kelvin) {
+  const Vec3 color = planckian_rgb(kelvin).cwiseQuotient(planckian_rgb(6500.0));
+  return color / color.dot(Vec3(0.2126, 0.7152, 0.0722));
+}
+
 /// How far the light reaches from its middle.
 double reach_of(const Light& light) {
   if (light.kind == LightKind::Rect) return 0.5 * std::hypot(light.width_m, light.height_m);
@@ -49,6 +75,9 @@ void ScatterLights::Params::visit(ParamVisitor& v) {
   v.param("color", color, {"Red, green and blue, linear.", "", 0, 1}, 3);
   v.param("intensity", intensity,
           {"Luminance of the light's surface for white, as in Replicator.", "nit", 0, 1e9});
+  v.param("temperature_k", temperature_k,
+          {"Colour temperature that tints the colour: 6500 is white, less is warmer; null: none.",
+           "K", 1667, 25000});
   v.param("radius_m", radius_m,
           {"Radius of sphere and disk lights; null keeps what they have.", "m", 0, 1000});
   v.param("clearance_m", clearance_m,
@@ -73,6 +102,10 @@ void ScatterLights::randomize(Scene& scene, const RandomizeContext& context, con
     Light& light = *scene.edit(node).light;
     const Vec3 color = draws.vector(params_.color);
     light.color = (draws.number(params_.intensity) * color).cast<float>();
+    if (params_.temperature_k) {
+      const Vec3 tint = blackbody_color(draws.number(*params_.temperature_k));
+      light.color = light.color.cwiseProduct(tint.cast<float>());
+    }
     if (params_.radius_m) light.radius_m = draws.number(*params_.radius_m);
     if (is_choosy) {
       const double wanted_m = params_.clearance_m + reach_of(light);

@@ -24,6 +24,7 @@ class ScatterLights final : public Randomizer {
     Distribution offset = Distribution::between({-2.0, -2.0, 1.0}, {2.0, 2.0, 3.0});
     Distribution color = Distribution::between(Vec3::Constant(0.1), Vec3::Constant(0.9));
     Distribution intensity = Range{500.0, 2500.0};
+    std::optional<Distribution> temperature_k;
     std::optional<Distribution> radius_m;
     double clearance_m = 0.3;
     int max_tries = 100;
