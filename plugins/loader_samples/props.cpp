@@ -631,6 +631,207 @@ Model clipboard(Host& host, Rng rng) {
                           make_plain("clip_steel", color(0xc3c6c9), 0.25, 1.0)});
 }
 
+Model green_barrel(Host&, Rng) {
+  MeshBuilder builder;
+  std::vector<ProfilePoint> profile{{0, 0}, {0.118, 0}, {0.126, 0.008}};
+  for (int i = 0; i <= 40; ++i) {
+    const double t = i / 40.0;
+    profile.push_back({0.126 + 0.022 * std::sin(kPi * t), 0.010 + 0.340 * t});
+  }
+  for (const ProfilePoint& p : {ProfilePoint{0.118, 0.360}, ProfilePoint{0, 0.360}}) {
+    profile.push_back(p);
+  }
+  builder.begin(Affine::Identity(), {0, 1.0});
+  add_lathe(builder, profile, 64, 0.7);
+  const std::array<ProfilePoint, 6> lid{
+      {{0, 0.355}, {0.129, 0.355}, {0.132, 0.362}, {0.128, 0.382}, {0.112, 0.388}, {0, 0.388}}};
+  builder.begin(Affine::Identity(), {1, 1.0});
+  add_lathe(builder, lid, 64, 0.6);
+  for (const double side : {-1.0, 1.0}) {
+    builder.begin(at(side * 0.150, 0, 0.250), {1, 1.0});
+    add_box(builder, Vec3(0.020, 0.090, 0.028), 0.006, Axis::Y, 3);
+  }
+  return finish(builder, {make_plain("green_hdpe", color(0x2f6b43), 0.42),
+                          make_plain("black_lid", color(0x232427), 0.5)});
+}
+
+Model white_board(Host&, Rng) {
+  Canvas c(1024, 640, color(0xf6f7f7));
+  c.centred_text(360, 90, 60, "PLAN", color(0x22478f), 0.12);
+  c.line({120, 180}, {420, 360}, 6, color(0xb02a2a));
+  c.line({420, 360}, {620, 250}, 6, color(0xb02a2a));
+  c.line({620, 250}, {900, 480}, 6, color(0xb02a2a));
+  c.rectangle(700, 110, 200, 120, color(0xbfd9ea), 8);
+  c.small_print(120, 420, 360, 150, 5, color(0x2a2f36), 12);
+  MeshBuilder builder;
+  const UvRect plain{Vec2(0.01, 0.01), Vec2(0.02, 0.02)};
+  builder.begin(at(0, 0, 0.15), {0, 1.0});
+  add_printed_box(builder, Vec3(0.44, 0.010, 0.275), 0.001,
+                  {plain, plain, UvRect{}, plain, plain, plain});
+  for (const double z : {0.0055, 0.2945}) {
+    builder.begin(at(0, 0, z), {1, 1.0});
+    add_box(builder, Vec3(0.47, 0.018, 0.014), 0.003, Axis::X, 2);
+  }
+  for (const double x : {-0.2275, 0.2275}) {
+    builder.begin(at(x, 0, 0.15), {1, 1.0});
+    add_box(builder, Vec3(0.015, 0.0178, 0.275), 0.003, Axis::Z, 2);
+  }
+  builder.begin(at(0.02, -0.022, 0.004), {1, 1.0});
+  add_box(builder, Vec3(0.28, 0.036, 0.006), 0.002, Axis::X, 2);
+  return finish(builder, {make_picture_material("writing", c.texture("white_board"), 0.2),
+                          make_plain("aluminium_rail", color(0xb4b7ba), 0.35, 1.0)});
+}
+
+/// A bound book that lies on its back.
+Model bound_book(const char* title, const Vec3& size, std::uint32_t cloth, std::uint32_t ink,
+                 std::uint64_t seed) {
+  Canvas c(512, 720, color(cloth));
+  c.rectangle(34, 34, 444, 652, color(ink), 6);
+  c.rectangle(42, 42, 428, 636, color(cloth), 5);
+  c.centred_text(256, 210, 64, title, color(ink), 0.16);
+  c.ellipse(256, 400, 90, 90, color(ink));
+  c.ellipse(256, 400, 72, 72, color(cloth));
+  c.small_print(130, 560, 252, 60, 3, color(ink), seed);
+  constexpr double kCover = 0.003;
+  const UvRect plain{Vec2(0.01, 0.01), Vec2(0.03, 0.03)};
+  MeshBuilder builder;
+  builder.begin(at(0, 0, kCover / 2), {0, 1.0});
+  add_printed_box(builder, Vec3(size.x(), size.y(), kCover), 0.0008,
+                  {plain, plain, plain, plain, plain, plain});
+  builder.begin(at(0, 0, size.z() - kCover / 2), {0, 1.0});
+  add_printed_box(builder, Vec3(size.x(), size.y(), kCover), 0.0008,
+                  {plain, plain, plain, plain, plain, UvRect{}});
+  builder.begin(at(-size.x() / 2 + kCover / 2, 0, size.z() / 2), {0, 1.0});
+  add_printed_box(builder, Vec3(kCover, size.y(), size.z() - 2 * kCover), 0.0008,
+                  {plain, plain, plain, plain, plain, plain});
+  builder.begin(at(0.0005, 0, size.z() / 2), {1, 1.0});
+  add_box(builder, Vec3(size.x() - 0.009, size.y() - 0.008, size.z() - 2 * kCover), 0.0006,
+          Axis::Y);
+  return finish(builder, {make_picture_material("binding", c.texture("book"), 0.6),
+                          make_plain("book_paper", color(0xeae1cd), 0.9)});
+}
+
+Model book_red(Host&, Rng) {
+  return bound_book("ATLAS", {0.172, 0.240, 0.034}, 0x8a2a2c, 0xd9bd73, 31);
+}
+
+Model book_blue(Host&, Rng) {
+  return bound_book("TIDES", {0.135, 0.205, 0.026}, 0x24496e, 0xe6e2d4, 47);
+}
+
+Model open_book(Host&, Rng) {
+  Canvas c(1024, 720, color(0xf4efe1));
+  for (const double x : {60.0, 560.0}) {
+    c.centred_text(x + 200, 70, 30, x < 500 ? "XII" : "XIII", color(0x33302a), 0.16);
+    c.small_print(x, 110, 400, x < 500 ? 540 : 250, x < 500 ? 20 : 9, color(0x3a3731),
+                  std::uint64_t(x));
+  }
+  c.rectangle(590, 400, 340, 240, color(0x9db4a4), 4);
+  c.ellipse(760, 510, 80, 60, color(0xe4d9b8));
+  const UvRect plain{Vec2(0.005, 0.005), Vec2(0.01, 0.01)};
+  MeshBuilder builder;
+  for (const double side : {-1.0, 1.0}) {
+    const Affine half = at(side * 0.088, 0, 0.014) * turned_y(side * 0.06);
+    const UvRect page =
+        side < 0 ? UvRect{Vec2(0, 0), Vec2(0.5, 1)} : UvRect{Vec2(0.5, 0), Vec2(1, 1)};
+    builder.begin(half, {0, 1.0});
+    add_printed_box(builder, Vec3(0.168, 0.238, 0.016), 0.003,
+                    {plain, plain, plain, plain, plain, page}, 2);
+    builder.begin(half * at(0, 0, -0.0100), {1, 1.0});
+    add_box(builder, Vec3(0.178, 0.250, 0.004), 0.001, Axis::Y);
+  }
+  builder.begin(at(0, 0, 0.010), {1, 1.0});
+  add_box(builder, Vec3(0.020, 0.250, 0.006), 0.002, Axis::Y, 2);
+  return finish(builder, {make_picture_material("pages", c.texture("open_book"), 0.85),
+                          make_plain("green_cloth", color(0x2f4a3a), 0.7)});
+}
+
+Model briefcase(Host& host, Rng rng) {
+  const TextureSet leather = make_leather(host, color(0x5a3722), rng.bits(), 256);
+  MeshBuilder builder;
+  builder.begin(at(0, 0, 0.155), {0, 1 / leather.size_m});
+  add_box(builder, Vec3(0.42, 0.105, 0.30), 0.016, Axis::X, 4);
+  builder.begin(at(0, 0, 0.245), {1, 1.0});
+  add_box(builder, Vec3(0.4225, 0.1075, 0.006), 0.002, Axis::X);
+  for (const double x : {-0.12, 0.12}) {
+    builder.begin(at(x, -0.0550, 0.240), {2, 1.0});
+    add_box(builder, Vec3(0.044, 0.008, 0.034), 0.002, Axis::X, 2);
+    builder.begin(at(x * 0.6, 0, 0.310), {2, 1.0});
+    add_box(builder, Vec3(0.022, 0.018, 0.018), 0.003, Axis::X, 2);
+  }
+  std::vector<PathPoint> handle;
+  const std::array<Vec3, 5> knots{Vec3(-0.072, 0, 0.312), Vec3(-0.064, 0, 0.342), Vec3(0, 0, 0.352),
+                                  Vec3(0.064, 0, 0.342), Vec3(0.072, 0, 0.312)};
+  for (const Vec3& p : smooth_path(knots, 6)) handle.push_back({p, 0.011, 0.007});
+  builder.begin(Affine::Identity(), {1, 1.0});
+  add_sweep(builder, handle, 18, Vec3::UnitY(), 3.0);
+  return finish(builder, {make_textured("brown_leather", leather, 0.5),
+                          make_plain("dark_seam", color(0x2c1b12), 0.5),
+                          make_plain("brass_lock", color(0xc29a4e), 0.3, 1.0)});
+}
+
+Model gas_cart(Host&, Rng) {
+  MeshBuilder builder;
+  for (const double x : {-0.062, 0.062}) {
+    const std::array<ProfilePoint, 8> cylinder{{{0, 0.030},
+                                                {0.050, 0.030},
+                                                {0.054, 0.036},
+                                                {0.054, 0.290},
+                                                {0.044, 0.325},
+                                                {0.020, 0.340},
+                                                {0.014, 0.362},
+                                                {0, 0.362}}};
+    builder.begin(at(x, 0, 0), {std::uint16_t(x < 0 ? 0 : 1), 1.0});
+    add_lathe(builder, cylinder, 48, 0.6);
+    const std::array<ProfilePoint, 4> valve{{{0, 0}, {0.016, 0}, {0.016, 0.016}, {0, 0.016}}};
+    builder.begin(at(x, 0, 0.360), {2, 1.0});
+    add_lathe(builder, valve, 24, 0.5);
+    const std::array<ProfilePoint, 6> wheel{{{0, -0.012},
+                                             {0.036, -0.012},
+                                             {0.042, -0.006},
+                                             {0.042, 0.006},
+                                             {0.036, 0.012},
+                                             {0, 0.012}}};
+    builder.begin(at(x < 0 ? -0.130 : 0.130, 0.055, 0.042) * turned_y(kPi / 2), {3, 1.0});
+    add_lathe(builder, wheel, 36, 0.6);
+    const std::array<Vec3, 2> post{Vec3(x < 0 ? -0.112 : 0.112, 0.060, 0.030),
+                                   Vec3(x < 0 ? -0.112 : 0.112, 0.060, 0.450)};
+    builder.begin(Affine::Identity(), {2, 1.0});
+    add_tube(builder, post, 0.0085, 16);
+  }
+  builder.begin(at(0, 0, 0.024), {2, 1.0});
+  add_box(builder, Vec3(0.250, 0.130, 0.010), 0.003, Axis::X, 2);
+  for (const double z : {0.180, 0.446}) {
+    builder.begin(at(0, 0.062, z), {2, 1.0});
+    add_box(builder, Vec3(0.232, 0.010, 0.018), 0.003, Axis::X, 2);
+  }
+  return finish(builder, {make_plain("oxygen_white", color(0xe8e9e6), 0.35),
+                          make_plain("air_grey", color(0x4f5b66), 0.35),
+                          make_plain("cart_steel", color(0xb9bcc0), 0.3, 1.0),
+                          make_plain("rubber_tyre", color(0x1d1d1f), 0.7)});
+}
+
+Model towel_dispenser(Host&, Rng) {
+  MeshBuilder builder;
+  std::vector<Vec2> outline{Vec2(-0.14, 0.05), Vec2(-0.14, -0.05)};
+  for (int i = 1; i < 12; ++i) {
+    const double a = kPi * i / 12;
+    outline.push_back({-0.14 * std::cos(a), -0.05 - 0.055 * std::sin(a)});
+  }
+  for (const Vec2& p : {Vec2(0.14, -0.05), Vec2(0.14, 0.05)}) outline.push_back(p);
+  builder.begin(at(0, 0, 0.04), {0, 1.0});
+  add_prism(builder, outline, 0.30, 0.006);
+  builder.begin(at(0, -0.050, 0.038), {1, 1.0});
+  add_box(builder, Vec3(0.235, 0.070, 0.014), 0.003, Axis::X, 2);
+  builder.begin(at(0, -0.058, 0.018), {2, 1.0});
+  add_box(builder, Vec3(0.200, 0.003, 0.046), 0.001, Axis::X);
+  builder.begin(at(0, -0.104, 0.250), {1, 1.0});
+  add_box(builder, Vec3(0.036, 0.012, 0.020), 0.003, Axis::X, 2);
+  return finish(builder, {make_plain("white_abs", color(0xe9ebeb), 0.3),
+                          make_plain("smoke_grey", color(0x4b5157), 0.3),
+                          make_plain("paper_towel", color(0xf5f4ef), 0.95)});
+}
+
 constexpr ModelKind kProps[] = {
     {"SM_CardBoxA_01_414", 0.60, card_box_a},
     {"SM_CardBoxD_04_1847", 0.45, card_box_d},
@@ -652,6 +853,15 @@ constexpr ModelKind kProps[] = {
     {"SM_MedicalBag_01a", 1.40, medical_bag},
     {"SM_MedicalBox_01g", 1.20, medical_box},
     {"SM_PillBottle_01", 0.09, pill_bottle},
+    {"SM_BarelPlastic_B_03", 1.30, green_barrel},
+    {"SM_Board", 0.90, white_board},
+    {"SM_Book_03", 0.75, book_red},
+    {"SM_Book_34", 0.38, book_blue},
+    {"SM_BookOpen_01", 0.80, open_book},
+    {"SM_Briefcase", 2.10, briefcase},
+    {"SM_Extinguisher", 3.20, fire_extinguisher},
+    {"SM_GasCart_01b", 4.50, gas_cart},
+    {"SM_Toweldispenser_01a", 1.20, towel_dispenser},
 };
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "diorama/rng.h"
+#include "loader_samples/indoor.h"
 #include "modelling/noise.h"
 
 namespace diorama::samples {
@@ -268,6 +269,18 @@ void paint_land(Pixels& image, const Painter& painter, const Vec3& irradiance, H
   });
 }
 
+void paint_outdoors(Pixels& image, const SkyLook& look, Host& host) {
+  const Painter painter(look);
+  paint_sky(image, painter, look.mean_luminance, host);
+  Vec3 irradiance = sky_irradiance(image);
+  // A clear noon's direct light is some five times that of the sky, less through a long path of
+  // air.
+  const double direct = 5.0 * look.sun_strength * look.mean_luminance * kPi *
+                        (look.is_night ? 0.4 : smooth_step(-2, 35, look.sun_elevation_deg));
+  irradiance += paint_sun(image, painter, direct);
+  paint_land(image, painter, irradiance, host);
+}
+
 constexpr SkyLook kSkies[] = {
     {"Cloudy/champagne_castle_1_4k", 38, 55, 3.2, 0.62, 0.75, 0.35, false, Ground::Heath},
     {"Cloudy/kloofendal_48d_partly_cloudy_4k", 48, -35, 2.6, 0.42, 0.80, 0.8, false, Ground::Heath},
@@ -278,6 +291,10 @@ constexpr SkyLook kSkies[] = {
     {"Evening/evening_road_01_4k", 7, 160, 4.0, 0.30, 0.22, 0.6, false, Ground::Road},
     {"Night/kloppenheim_02_4k", 34, 60, 3.0, 0.30, 0.004, 0.5, true, Ground::Grass},
     {"Night/moonlit_golf_4k", 48, -70, 3.0, 0.10, 0.006, 1.0, true, Ground::Grass},
+    {.name = "Indoor/autoshop_01_4k", .is_indoor = true},
+    {.name = "Indoor/carpentry_shop_01_4k", .is_indoor = true},
+    {.name = "Indoor/hotel_room_4k", .is_indoor = true},
+    {.name = "Indoor/wooden_lounge_4k", .is_indoor = true},
 };
 
 }  // namespace
@@ -285,16 +302,17 @@ constexpr SkyLook kSkies[] = {
 std::span<const SkyLook> skies() { return kSkies; }
 
 std::shared_ptr<const Texture> make_sky(const SkyLook& look, Host& host) {
-  const Painter painter(look);
   Pixels image(std::size_t(kWidth) * kHeight, Vec3::Zero());
-  paint_sky(image, painter, look.mean_luminance, host);
-  Vec3 irradiance = sky_irradiance(image);
-  // A clear noon's direct light is some five times that of the sky, less through a long path of
-  // air.
-  const double direct = 5.0 * look.sun_strength * look.mean_luminance * kPi *
-                        (look.is_night ? 0.4 : smooth_step(-2, 35, look.sun_elevation_deg));
-  irradiance += paint_sun(image, painter, direct);
-  paint_land(image, painter, irradiance, host);
+  if (look.is_indoor) {
+    const RoomView room(look.name);
+    host.parallel_for(kHeight, [&](std::size_t row) {
+      for (int x = 0; x < kWidth; ++x) {
+        image[row * kWidth + std::size_t(x)] = room.radiance(direction(x, int(row)));
+      }
+    });
+  } else {
+    paint_outdoors(image, look, host);
+  }
   Texture texture;
   texture.name = std::string(look.name);
   texture.width = kWidth;

@@ -23,11 +23,13 @@ struct SkyLook {
   double sun_strength = 1.0;    ///< 0 behind clouds.
   bool is_night = false;
   Ground ground = Ground::Grass;
+  bool is_indoor = false;  ///< Of what stands above only the name counts; see indoor.h.
 };
 std::span<const SkyLook> skies();
 
 /// An equirectangular image, 1024 x 512, linear: the sky by Preetham, Shirley and Smits (1999) with
-/// sun, clouds or stars, hills along the horizon and ground below. Top row up, centre column +x.
+/// sun, clouds or stars, hills along the horizon and ground below; or a room. Top row up, centre
+/// column +x.
 std::shared_ptr<const Texture> make_sky(const SkyLook& look, Host& host);
 
 }  // namespace diorama::samples

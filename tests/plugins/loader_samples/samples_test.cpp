@@ -109,6 +109,33 @@ TEST_CASE("skies are finite, bright where the sun is, and differ", "[samples][sl
   CHECK(sky.scene[sky.root].light->kind == LightKind::Dome);
 }
 
+TEST_CASE("rooms seen from inside are lit by their lamps", "[samples]") {
+  test::PlainHost host;
+  std::map<double, std::string> by_mean;
+  for (const SkyLook& look : skies()) {
+    if (!look.is_indoor) continue;
+    INFO(look.name);
+    const auto image = make_sky(look, host);
+    const auto size = std::size_t(image->width) * std::size_t(image->height) * 3;
+    REQUIRE(image->floats.size() == size);
+    double sum = 0;
+    float lowest = image->floats[0];
+    std::size_t brightest = 0;
+    for (std::size_t i = 0; i < size; ++i) {
+      REQUIRE(std::isfinite(image->floats[i]));
+      lowest = std::min(lowest, image->floats[i]);
+      sum += double(image->floats[i]);
+      if (image->floats[i] > image->floats[brightest]) brightest = i;
+    }
+    CHECK(lowest > 0);
+    CHECK(brightest < size / 2);
+    CHECK(sum / double(size) > 0.02);
+    CHECK(sum / double(size) < 1.0);
+    by_mean.emplace(sum, look.name);
+  }
+  CHECK(by_mean.size() == 4);
+}
+
 TEST_CASE("names that do not exist get a suggestion", "[samples]") {
   CHECK_THROWS_WITH(
       Loaded("sample:011_bananas"),
@@ -119,7 +146,7 @@ TEST_CASE("names that do not exist get a suggestion", "[samples]") {
 }
 
 TEST_CASE("lists follow the chosen set", "[samples]") {
-  CHECK(list("skies").size() == 9);
+  CHECK(list("skies").size() == 13);
   CHECK(list("props")[0].starts_with("prop:"));
   CHECK(list("objects")[0] == "sample:002_master_chef_can");
 }
