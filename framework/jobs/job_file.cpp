@@ -15,9 +15,7 @@ Value from_command_line(Value value, const char* option) {
 
 /// Keys of the Replicator dialect are set before the translation, all others after it.
 bool is_replicator_key(const std::string& assignment) {
-  const std::string section = assignment.substr(0, assignment.find_first_of(".[="));
-  return section == "capture" || section == "labeled_assets" || section == "distractors" ||
-         section == "debug_mode";
+  return is_replicator_section(assignment.substr(0, assignment.find_first_of(".[=")));
 }
 
 Value translated(const Value& job, const Log& log) {

@@ -8,10 +8,16 @@
 #include <optional>
 
 #include "diorama/params.h"
-#include "framework/config/yaml_config.h"
+#include "framework/replicator/object_based.h"
+#include "framework/replicator/translator.h"
 
 namespace diorama {
 namespace {
+
+using replicator::native;
+using replicator::numbered;
+using replicator::numbers;
+using replicator::texts;
 
 // Each struct holds a block of the file with the fallbacks that the reference's program uses when
 // the block lacks a key.
@@ -138,21 +144,6 @@ constexpr const char* kSkies[] = {"/NVIDIA/Assets/Skies/Cloudy/champagne_castle_
 
 constexpr std::int64_t kReferenceSeed = 12;
 
-/// A constant piece of the native job.
-Value native(std::string_view yaml) { return parse_yaml(yaml, "built-in"); }
-
-Value texts(const std::vector<std::string>& words) {
-  Value list = Value::make_list();
-  for (const std::string& word : words) list.list.push_back(Value::text(word));
-  return list;
-}
-
-Value numbers(double lo, double hi) {
-  Value list = Value::make_list();
-  list.list = {Value::number(lo), Value::number(hi)};
-  return list;
-}
-
 /// "\1" of Python becomes "$1", "\g<name>" "${name}"; a '$' stands for itself there.
 std::string ecmascript_replacement(const std::string& python) {
   std::string text;
@@ -174,17 +165,17 @@ std::string ecmascript_replacement(const std::string& python) {
   return text;
 }
 
-class Translator {
+class InfinigenTranslator : private replicator::Translator {
  public:
-  Translator(const Value& job, Complaints& complaints) : complaints_(complaints) {
-    given_ = &job;
-    defaults_ = parse_yaml(builtin_replicator_job(), "infinigen_default.yaml");
-  }
+  InfinigenTranslator(const Value& job, Complaints& complaints)
+      : Translator(job, builtin_replicator_job(), "infinigen_default.yaml", complaints) {}
 
   ReplicatorTranslation translate() {
     complain_about_unknown_sections();
     const CaptureBlock capture = block<CaptureBlock>(section("capture"), "capture");
-    check_resolution(capture);
+    const Value* resolution = section("capture").find("resolution");
+    check_resolution(capture.resolution, resolution ? resolution->place : section("capture").place,
+                     "capture.resolution");
     set("seed", Value::integer(kReferenceSeed));
     set("debug", section("debug_mode"));
     set("total_captures", Value::integer(capture.total_captures));
@@ -205,29 +196,6 @@ class Translator {
   }
 
  private:
-  void set(std::string_view key, Value value) { result_.job.set(key, std::move(value)); }
-
-  /// The file's, else the built-in one as a whole.
-  const Value& section(std::string_view key) const {
-    if (const Value* given = given_->find(key)) return *given;
-    const Value* built_in = defaults_.find(key);
-    return built_in ? *built_in : nothing_;
-  }
-
-  template <class Block>
-  Block block(const Value& map, const std::string& path) {
-    Block result;
-    if (map.kind == Value::Kind::Null) return result;
-    if (map.kind != Value::Kind::Map) {
-      complaints_.add(map.place, path + ": expected a mapping, found " + map.describe());
-      return result;
-    }
-    ParamReader reader(map, path, complaints_);
-    result.visit(reader);
-    reader.finish();
-    return result;
-  }
-
   /// A mapping, or a list of mappings.
   std::vector<std::pair<std::string, const Value*>> items(const Value* value,
                                                           const std::string& path) {
@@ -257,29 +225,7 @@ class Translator {
     return map.find(key);
   }
 
-  void complain_about_unknown(const Value& map, const std::string& path,
-                              const std::vector<std::string>& known) {
-    for (const auto& [key, value] : map.map) {
-      if (std::find(known.begin(), known.end(), key) != known.end()) continue;
-      const std::string near = nearest_name(key, known);
-      complaints_.add(value.key_place, (path.empty() ? "" : path + ": ") + "unknown key '" + key +
-                                           "'" +
-                                           (near.empty() ? "" : "; did you mean '" + near + "'?"));
-    }
-  }
-
   void complain_about_unknown_sections() { complain_about_unknown(*given_, "", kSections); }
-
-  void check_resolution(const CaptureBlock& capture) {
-    const bool is_fine =
-        capture.resolution.size() == 2 &&
-        std::all_of(capture.resolution.begin(), capture.resolution.end(),
-                    [](double number) { return number >= 1 && number == std::floor(number); });
-    if (is_fine) return;
-    const Value* value = section("capture").find("resolution");
-    complaints_.add(value ? value->place : section("capture").place,
-                    "capture.resolution: expected [width, height] in whole pixels");
-  }
 
   void add_environments() {
     const auto keys = block<EnvironmentsBlock>(section("environments"), "environments");
@@ -300,18 +246,6 @@ class Translator {
                               "hide_in_debug: [_exterior, _ceiling], "
                               "colliders: triangle_mesh, box_colliders: [TableDining], "
                               "working_area: TableDining}"));
-  }
-
-  Value object_entry(const Value& source, const char* type, const std::string& name,
-                     const char* under, int count, double gravity_disabled_chance) {
-    Value entry = Value::make_map();
-    entry.place = source.place;
-    entry.set("type", Value::text(type));
-    entry.set("name", Value::text(name));
-    entry.set("under", Value::text(under));
-    entry.set("count", Value::integer(count));
-    entry.set("gravity_disabled_chance", Value::number(gravity_disabled_chance));
-    return entry;
   }
 
   void add_auto_labelled(Value& objects) {
@@ -438,8 +372,8 @@ class Translator {
       if (type == "dome_light")
         entry.set("textures", texts({std::begin(kSkies), std::end(kSkies)}));
       if (type != "orbit_cameras") continue;
-      entry.set("distance", numbers(capture.distance.lo, capture.distance.hi));
-      entry.set("look_at_offset", numbers(-capture.look_at_offset, capture.look_at_offset));
+      entry.set("distance", numbers({capture.distance.lo, capture.distance.hi}));
+      entry.set("look_at_offset", numbers({-capture.look_at_offset, capture.look_at_offset}));
     }
     // Of distractors that the file does not have there is nothing to randomize.
     std::erase_if(list.list, [&](const Value& entry) {
@@ -485,66 +419,25 @@ class Translator {
     Value list = Value::make_list();
     const Value& given = section("writers");
     list.place = given.place;
-    std::string records;
-    std::map<std::string, int> uses;
     for (const auto& [path, map] : items(&given, "writers")) {
-      Value entry = writer_entry(*map, path, uses);
-      if (const Value* folder = entry.find("output_dir"); folder && records.empty()) {
-        records = folder->scalar;
-      }
-      list.list.push_back(std::move(entry));
+      if (auto entry = writer(*map, path)) list.list.push_back(std::move(*entry));
     }
-    set("writers", std::move(list));
-    Value output = native("{folder: .}");
-    output.set("records", Value::text(records.empty() ? "_out_diorama" : records));
-    set("output", std::move(output));
+    set_writers(std::move(list));
   }
 
-  /// The kwargs become the entry's own keys.
-  Value writer_entry(const Value& map, const std::string& path, std::map<std::string, int>& uses) {
-    Value entry = Value::make_map();
-    entry.place = map.place;
+  std::optional<Value> writer(const Value& map, const std::string& path) {
     if (map.kind != Value::Kind::Map) {
       complaints_.add(map.place, path + ": expected a mapping, found " + map.describe());
-      return entry;
+      return std::nullopt;
     }
     complain_about_unknown(map, path, {"type", "kwargs"});
     const Value* type = map.find("type");
     if (!type || type->kind != Value::Kind::Scalar) {
       complaints_.add(map.place, path + ": 'type' is missing");
-      return entry;
+      return std::nullopt;
     }
-    entry.set("type", *type);
-    entry.set("name", Value::text(type->scalar + numbered(uses[type->scalar]++)));
-    entry.set("output_dir", Value::text("_out_" + entry.find("name")->scalar));
-    const Value* kwargs = map.find("kwargs");
-    if (!kwargs || kwargs->kind == Value::Kind::Null) return entry;
-    if (kwargs->kind != Value::Kind::Map) {
-      complaints_.add(kwargs->place,
-                      path + ".kwargs: expected a mapping, found " + kwargs->describe());
-      return entry;
-    }
-    for (const auto& [key, value] : kwargs->map) {
-      const bool is_own_name = key == "type" || key == "name";
-      if (is_own_name) {
-        complaints_.add(value.key_place, path + ".kwargs: unknown key '" + key + "'");
-      } else if (key != "output_dir" || value.kind != Value::Kind::Null) {
-        entry.set(key, value);
-      }
-    }
-    return entry;
+    return writer_entry(*type, map.find("kwargs"), map.place, path + ".kwargs");
   }
-
-  /// "", "_2", "_3" ...
-  static std::string numbered(int number) {
-    return number == 0 ? "" : "_" + std::to_string(number + 1);
-  }
-
-  Complaints& complaints_;
-  const Value* given_ = nullptr;
-  Value defaults_;
-  Value nothing_;
-  ReplicatorTranslation result_;
 };
 
 bool has_kwargs(const Value* writers) {
@@ -560,6 +453,7 @@ bool has_gpu_key(const Value* physics) {
 }  // namespace
 
 bool is_replicator_job(const Value& job) {
+  if (is_object_based_job(job)) return true;
   for (const char* key : {"capture", "labeled_assets", "distractors", "debug_mode"}) {
     if (job.find(key)) return true;
   }
@@ -568,8 +462,14 @@ bool is_replicator_job(const Value& job) {
   return has_kwargs(job.find("writers")) || has_gpu_key(job.find("physics"));
 }
 
+bool is_replicator_section(std::string_view key) {
+  return key == "capture" || key == "labeled_assets" || key == "distractors" ||
+         key == "debug_mode" || is_object_based_key(key);
+}
+
 ReplicatorTranslation translate_replicator_job(const Value& job, Complaints& complaints) {
-  return Translator(job, complaints).translate();
+  if (is_object_based_job(job)) return translate_object_based_job(job, complaints);
+  return InfinigenTranslator(job, complaints).translate();
 }
 
 }  // namespace diorama

@@ -2,18 +2,23 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "diorama/config.h"
 
-/// The second dialect of jobs: the keys of NVIDIA's tutorial on synthetic data with Infinigen rooms
-/// (`environments, capture, writers, labeled_assets, distractors, physics, debug_mode`). It is
-/// translated into the native job before anything else sees it. framework/docs/
-/// replicator_compatibility.md says what each key becomes and what is done differently.
+/// The second dialect of jobs: files of NVIDIA's examples. Those of the tutorial on synthetic data
+/// with Infinigen rooms (`environments, capture, writers, labeled_assets, distractors, physics,
+/// debug_mode`), and those of object-based data generation (object_based.h). They are translated
+/// into the native job before anything else sees them. framework/docs/replicator_compatibility.md
+/// says what each key becomes and what is done differently.
 namespace diorama {
 
 /// True when the job has keys that only this dialect knows.
 bool is_replicator_job(const Value& job);
+
+/// True for top-level keys that native jobs do not have.
+bool is_replicator_section(std::string_view key);
 
 struct ReplicatorTranslation {
   Value job;  ///< Native. Values keep their places in the file.
