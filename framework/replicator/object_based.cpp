@@ -390,9 +390,11 @@ class ObjectBasedTranslator : private replicator::Translator {
     const std::vector<double>& size = keys_.working_area_size;
     const double middle = -0.5 * size[2] + 0.5 * kSlabM;
     const double half = 0.5 * kSlabM * kShare;
-    entry.set("box_min",
-              numbers({-0.5 * size[0] * kShare, -0.5 * size[1] * kShare, middle - half}));
-    entry.set("box_max", numbers({0.5 * size[0] * kShare, 0.5 * size[1] * kShare, middle + half}));
+    const auto micrometres = [](double metres) { return std::round(metres * 1e6) / 1e6; };
+    const double x = micrometres(0.5 * size[0] * kShare);
+    const double y = micrometres(0.5 * size[1] * kShare);
+    entry.set("box_min", numbers({-x, -y, micrometres(middle - half)}));
+    entry.set("box_max", numbers({x, y, micrometres(middle + half)}));
     return entry;
   }
 
@@ -489,7 +491,7 @@ class ObjectBasedTranslator : private replicator::Translator {
         if (key == "renderer") {
           mode = value.scalar;
           check_mode(value);
-        } else {
+        } else if (given_->find("launch_config")) {
           result_.without_effect.push_back("launch_config." + key +
                                            " (there is no window and no Kit application)");
         }

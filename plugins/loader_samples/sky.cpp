@@ -185,7 +185,8 @@ class Painter {
   Vec3 sun_, sunlight_;
 };
 
-Vec3 direction(int column, int row) {
+/// Of a pixel's centre, or beside it.
+Vec3 direction(double column, double row) {
   // Column centre +x, the right half towards -y.
   const double azimuth = -((column + 0.5) / kWidth - 0.5) * 2 * kPi;
   const double elevation = (0.5 - (row + 0.5) / kHeight) * kPi;
@@ -307,7 +308,14 @@ std::shared_ptr<const Texture> make_sky(const SkyLook& look, Host& host) {
     const RoomView room(look.name);
     host.parallel_for(kHeight, [&](std::size_t row) {
       for (int x = 0; x < kWidth; ++x) {
-        image[row * kWidth + std::size_t(x)] = room.radiance(direction(x, int(row)));
+        // Edges are sharp, so pixels are means.
+        constexpr int kSide = 3;
+        Vec3 sum = Vec3::Zero();
+        for (int i = 0; i < kSide * kSide; ++i) {
+          sum += room.radiance(direction(x + (i % kSide + 0.5) / kSide - 0.5,
+                                         int(row) + (i / kSide + 0.5) / kSide - 0.5));
+        }
+        image[row * kWidth + std::size_t(x)] = sum / (kSide * kSide);
       }
     });
   } else {

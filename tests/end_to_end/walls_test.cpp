@@ -37,7 +37,7 @@ timeline:
       - {simulate: 9, each_step: bounce}
       - {capture: frame}
 settle: {policy: keep}
-writers: [{type: PoseWriter, name: poses, skip_empty_frames: false}]
+writers: [{type: BasicWriter, name: basic, rgb: true}]
 output: {folder: out}
 )";
 
@@ -96,4 +96,43 @@ TEST_CASE("What is thrown about within walls stays there and comes up again", "[
   files_of("still", {"--set", "randomizers[2].velocity=[0, 0, 0]"});
   CHECK(mean_height("still") < -0.2);
   CHECK(bouncing > mean_height("still") + 0.1);
+}
+
+TEST_CASE("Spheres round cameras push away what is near, and are gone afterwards", "[run][walls]") {
+  // A small ball 0.2 m in front of the camera, and one out of its reach.
+  constexpr const char* kPush = R"(
+total_captures: 1
+environments: [{type: empty}]
+objects:
+  - {type: shapes, name: near, under: /Near, count: 1, shapes: [sphere], gravity_disabled_chance: 1}
+  - {type: shapes, name: far, under: /Far, count: 1, shapes: [sphere], gravity_disabled_chance: 1}
+cameras: [{type: pinhole, name: cam, width: 64, height: 48, near_m: 0.01, position: [1, 2, 3], look_at: [1, 3, 3]}]
+randomizers:
+  - {type: scatter_poses, name: near, on: [environment], nodes: "/Near/*", offset: [1, 2.2, 3], scale: 0.05}
+  - {type: scatter_poses, name: far, on: [environment], nodes: "/Far/*", offset: [1, 4, 3], scale: 0.05}
+renderer: {type: "null"}
+timeline: [{simulate: 60, camera_radius_m: 0.5}, {capture: frame}]
+settle: {policy: keep}
+writers: [{type: BasicWriter, name: basic, rgb: true}]
+output: {folder: out}
+)";
+  const TemporaryFolder folder;
+  write_file(folder / "job.yaml", kPush);
+  const Outcome outcome = run({"run", "job.yaml"}, folder.path());
+  INFO(outcome.errors);
+  REQUIRE(outcome.exit_code == 0);
+  std::map<std::string, double> distance;
+  for (const auto& [name, text] : tree(folder / "out")) {
+    if (!name.starts_with("settle/")) continue;
+    for (const auto& node : nlohmann::json::parse(text)["placed"]) {
+      const auto& rows = node["parent_from_node"];
+      const double x = rows[3].get<double>() - 1.0, y = rows[7].get<double>() - 2.0;
+      const double z = rows[11].get<double>() - 3.0;
+      distance[node["node"].get<std::string>().substr(0, 5)] = std::sqrt(x * x + y * y + z * z);
+    }
+  }
+  REQUIRE(distance.size() == 2);
+  CHECK(distance["/Near"] > 0.54);
+  CHECK(distance["/Near"] < 0.7);
+  CHECK(distance["/Far/"] == Approx(2.0).margin(1e-6));
 }
