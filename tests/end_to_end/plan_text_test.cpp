@@ -21,8 +21,8 @@ void make_assets_root(const fs::path& root) {
   }
   write_file(root / "Isaac/Props/YCB/Axis_Aligned/Materials/skipped.usd", "");
   write_file(root / "Isaac/Props/YCB/Axis_Aligned_Physics/006_mustard_bottle.usd", "");
-  for (const char* name : {"SM_CardBoxD_04_1847", "SM_CardBoxA_01_414", "S_TrafficCone",
-                           "S_WetFloorSign", "SM_BarelPlastic_B_03"}) {
+  for (const char* name :
+       {"SM_CardBoxD_04_1847", "SM_CardBoxA_01_414", "S_TrafficCone", "S_WetFloorSign"}) {
     write_file(root / "Isaac/Environments/Simple_Warehouse/Props" / (std::string(name) + ".usd"),
                "");
   }
@@ -40,6 +40,7 @@ void make_assets_root(const fs::path& root) {
 
 /// What the object-based example has beyond the tutorial's jobs, which would find it in folders.
 void add_object_based_assets(const fs::path& root) {
+  write_file(root / "Isaac/Environments/Simple_Warehouse/Props/SM_BarelPlastic_B_03.usd", "");
   for (const char* name :
        {"Board", "Book_03", "Book_34", "BookOpen_01", "Briefcase", "Extinguisher"}) {
     write_file(root / "Isaac/Environments/Office/Props" / ("SM_" + std::string(name) + ".usd"), "");

@@ -59,7 +59,8 @@ TEST_CASE("What is thrown about within walls stays there and comes up again", "[
   std::map<std::string, std::vector<std::array<double, 3>>> ways;
   for (const auto& [name, text] : files) {
     if (!name.starts_with("settle/")) continue;
-    for (const auto& node : nlohmann::json::parse(text)["placed"]) {
+    const auto report = nlohmann::json::parse(text);
+    for (const auto& node : report["placed"]) {
       const auto& rows = node["parent_from_node"];
       const std::string path = node["node"];
       if (path.starts_with("/Assets/")) {
@@ -83,7 +84,8 @@ TEST_CASE("What is thrown about within walls stays there and comes up again", "[
     int count = 0;
     for (const auto& [name, text] : tree(folder / output)) {
       if (!name.starts_with("settle/")) continue;
-      for (const auto& node : nlohmann::json::parse(text)["placed"]) {
+      const auto report = nlohmann::json::parse(text);
+      for (const auto& node : report["placed"]) {
         if (!node["node"].get<std::string>().starts_with("/Assets/falling_")) continue;
         sum += node["parent_from_node"][11].get<double>();
         ++count;
@@ -124,7 +126,8 @@ output: {folder: out}
   std::map<std::string, double> distance;
   for (const auto& [name, text] : tree(folder / "out")) {
     if (!name.starts_with("settle/")) continue;
-    for (const auto& node : nlohmann::json::parse(text)["placed"]) {
+    const auto report = nlohmann::json::parse(text);
+    for (const auto& node : report["placed"]) {
       const auto& rows = node["parent_from_node"];
       const double x = rows[3].get<double>() - 1.0, y = rows[7].get<double>() - 2.0;
       const double z = rows[11].get<double>() - 3.0;

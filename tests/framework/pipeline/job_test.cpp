@@ -251,7 +251,7 @@ TEST_CASE("What stands beside a step of the timeline must belong to it", "[job]"
              ContainsSubstring("a moment needs a name of its own, found 'environment'"));
   CHECK_THAT(complaint("{repeat: 2, steps: [{simulate: 1, evry: 2}]}"),
              ContainsSubstring("timeline[2].steps[0]") &&
-                 ContainsSubstring("unknown key 'evry'; did you mean 'every'?"));
+                 ContainsSubstring("unknown key 'evry', did you mean 'every'?"));
   CHECK_THAT(complaint("{repeat: 2, simulate: 1}"), ContainsSubstring("expected one of"));
   CHECK_THAT(complaint("{repeat: 1.5, steps: []}"), ContainsSubstring("expected a whole number"));
   CHECK_THAT(
