@@ -217,11 +217,11 @@ std::unique_ptr<CameraPath::Path> CameraPath::draw_path(const Scene& scene, Node
   }
   auto orbit = std::make_unique<Orbit>();
   orbit->centre = centre;
-  orbit->look_at = centre + draws.vector(params_.look_at_offset);
   orbit->distance = draws.number(params_.distance);
   orbit->polar = radians(draws.number(params_.polar_angle_deg));
   orbit->azimuth = radians(draws.number(params_.azimuth_deg));
   orbit->turn_s = radians(draws.number(params_.turn_deg_s));
+  orbit->look_at = centre + draws.vector(params_.look_at_offset);
   return orbit;
 }
 
