@@ -12,9 +12,9 @@ namespace {
 
 void randomize_all_moments(Randomizer& randomizer, Scene& scene) {
   const Vec3 area(0.1, 0.0, 0.4);
-  randomizer.randomize(scene, {"environment", -1, area}, Rng(1).fork("environment"));
-  randomizer.randomize(scene, {"floating", 0, area}, Rng(1).fork("floating"));
-  randomizer.randomize(scene, {"dropped", 1, area}, Rng(1).fork("dropped"));
+  randomizer.randomize(scene, {"environment", -1, area, 0, {}}, Rng(1).fork("environment"));
+  randomizer.randomize(scene, {"floating", 0, area, 0, {}}, Rng(1).fork("floating"));
+  randomizer.randomize(scene, {"dropped", 1, area, 0, {}}, Rng(1).fork("dropped"));
 }
 
 Scene randomized(const Subject& subject, Host& host) {
@@ -94,7 +94,7 @@ void check_randomizer(const CheckRun& run, const Subject& subject) {
     const auto used = subject.make<Randomizer>();
     Scene earlier = sample_scene(), one = sample_scene(), other = sample_scene();
     randomize_all_moments(*used, earlier);
-    const RandomizeContext context{"floating", 5, Vec3::Zero()};
+    const RandomizeContext context{"floating", 5, Vec3::Zero(), 0, {}};
     used->randomize(one, context, Rng(3));
     subject.make<Randomizer>()->randomize(other, context, Rng(3));
     require_same(one, other, "remembers earlier calls");

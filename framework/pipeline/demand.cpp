@@ -83,9 +83,9 @@ class Resolution {
     known.emplace_back(kVisibility);
     known.emplace_back(kAmodalMask);
     known.emplace_back(kOcclusionOrder);
-    for (const auto& name : {kMotion.name, kFlowForward.name, kFlowBackward.name,
+    for (const auto& derived : {kMotion.name, kFlowForward.name, kFlowBackward.name,
                              kFlowForwardState.name, kFlowBackwardState.name}) {
-      known.emplace_back(name);
+      known.emplace_back(derived);
     }
     std::sort(known.begin(), known.end());
     std::string list;

@@ -14,7 +14,7 @@ namespace {
 struct Stage {
   FakeHost host;
   Scene scene;
-  RandomizeContext context{"environment", -1, Vec3(3.0, -2.0, 0.5)};
+  RandomizeContext context{"environment", -1, Vec3(3.0, -2.0, 0.5), 0, {}};
   NodeId group(const std::string& name) { return scene.create(scene.root(), name); }
 };
 
