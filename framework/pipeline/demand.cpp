@@ -84,7 +84,7 @@ class Resolution {
     known.emplace_back(kAmodalMask);
     known.emplace_back(kOcclusionOrder);
     for (const auto& derived : {kMotion.name, kFlowForward.name, kFlowBackward.name,
-                             kFlowForwardState.name, kFlowBackwardState.name}) {
+                                kFlowForwardState.name, kFlowBackwardState.name}) {
       known.emplace_back(derived);
     }
     std::sort(known.begin(), known.end());

@@ -39,7 +39,7 @@ struct EnvironmentRules {
   std::optional<std::string> working_area;
   std::optional<double> max_lamp_lux;  ///< At kLampDistance.
   std::string joints = "held";
-  std::vector<double> walls;           ///< Size of the box that they enclose, or empty: none.
+  std::vector<double> walls;  ///< Size of the box that they enclose, or empty: none.
   void visit(ParamVisitor& v);
 };
 
@@ -165,8 +165,8 @@ struct TimelineStep {
   /// Simulate: radius of spheres round the cameras that push objects away meanwhile; 0: none.
   double camera_radius_m = 0.0;
   std::string each_step = {};  ///< Simulate: moment after every step, for randomizers.
-  int every = 1;   ///< In a repetition: taken in the first round and in every so many.
-  int rounds = 0;  ///< Repeat.
+  int every = 1;               ///< In a repetition: taken in the first round and in every so many.
+  int rounds = 0;              ///< Repeat.
   std::vector<TimelineStep> steps_of_round = {};  ///< Repeat.
 };
 

@@ -147,8 +147,8 @@ void VisitRun::set_up() {
   cameras_ = create_cameras(job_.cameras, scene_);
   small_cameras_ = create_small_cameras(job_, cameras_, scene_);
   for_each_step(job_.timeline, [&](const TimelineStep& step) {
-    simulations_to_come_ += int(step.kind == TimelineStep::Kind::Simulate ||
-                                step.kind == TimelineStep::Kind::Record);
+    simulations_to_come_ +=
+        int(step.kind == TimelineStep::Kind::Simulate || step.kind == TimelineStep::Kind::Record);
     return true;
   });
   for (const EnvironmentPattern& pattern : setting_.shared.environment_patterns) {
