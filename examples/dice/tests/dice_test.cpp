@@ -68,7 +68,7 @@ NodeId add_die(Scene& scene, const std::string& asset) {
 }
 
 void label(Scene& scene) {
-  dice::NumberOnTop({}, host).randomize(scene, {"landed", 0, Vec3::Zero()}, Rng(1));
+  dice::NumberOnTop({}, host).randomize(scene, {"landed", 0, Vec3::Zero(), 0, {}}, Rng(1));
 }
 
 /// Counts what is painted on the part of a two-coloured die that faces upwards: vertices whose
@@ -194,7 +194,7 @@ void throws_start_apart_and_within() {
                                      scene.create(scene.create(scene.root(), "Environment"), "t"));
     std::vector<NodeId> thrown;
     for (int i = 1; i <= 12; ++i) thrown.push_back(add_die(scene, "die:" + std::to_string(i)));
-    dice::ThrowDice({}, host).randomize(scene, {"environment", -1, Vec3::Zero()}, Rng(seed));
+    dice::ThrowDice({}, host).randomize(scene, {"environment", -1, Vec3::Zero(), 0, {}}, Rng(seed));
     const NodeId area = scene.require("/Environment/t/area");
     for (const NodeId die : thrown) {
       const Vec3 at = scene.world_from_node(die).translation();
