@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <iterator>
+#include <limits>
 #include <map>
 #include <numeric>
 #include <set>
@@ -135,16 +136,20 @@ void plan_group(const Job& job, std::size_t index, const std::vector<std::string
 
 /// Captures, events or steps of that name in a visit that is not cut short; of a simulation until
 /// rest as many steps as there may be.
-int moments_per_visit(const Job& job, const std::string& moment) {
-  int count = 0;
-  for_each_step(job.timeline, [&](const TimelineStep& step) {
-    if (step.kind == TimelineStep::Kind::Simulate) {
-      if (step.each_step == moment) count += step.steps;
+std::int64_t moments_in(const std::vector<TimelineStep>& timeline, int rounds,
+                        const std::string& moment) {
+  std::int64_t count = 0;
+  for (const TimelineStep& step : timeline) {
+    const std::int64_t times = (std::int64_t(rounds) + step.every - 1) / step.every;
+    if (step.kind == TimelineStep::Kind::Repeat) {
+      count += times * moments_in(step.steps_of_round, step.rounds, moment);
+    } else if (step.kind == TimelineStep::Kind::Simulate) {
+      if (step.each_step == moment) count += times * step.steps;
     } else if (step.name == moment) {
-      count += step.kind == TimelineStep::Kind::Capture ? step.count : 1;  // a clip is one moment
+      // A clip is one moment.
+      count += times * (step.kind == TimelineStep::Kind::Capture ? step.count : 1);
     }
-    return true;
-  });
+  }
   return count;
 }
 
@@ -293,8 +298,13 @@ std::optional<RandomizerCall> randomizer_call(const Job& job, const RandomizerEn
     return RandomizerCall{visit - visit % entry.every, visit / entry.every};
   }
   if (number % entry.every != 0) return std::nullopt;
-  const int calls_per_visit = (moments_per_visit(job, moment) + entry.every - 1) / entry.every;
-  return RandomizerCall{visit, visit * calls_per_visit + number / entry.every};
+  // Of more than fit, which no run gets to, the highest: nothing overflows.
+  constexpr std::int64_t kMost = std::numeric_limits<int>::max();
+  const std::int64_t moments = moments_in(job.timeline, 1, moment);
+  const std::int64_t calls_per_visit =
+      std::min(kMost, moments / entry.every + (moments % entry.every != 0));
+  const std::int64_t occurrence = visit * calls_per_visit + number / entry.every;
+  return RandomizerCall{visit, int(std::min(kMost, occurrence))};
 }
 
 std::string asset_stem(std::string_view asset) {
