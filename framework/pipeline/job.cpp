@@ -609,6 +609,9 @@ void check_companions(const StepKeys& keys, const Value& map, const std::string&
   if (map.find("each_step") && !simulates) complain("each_step", "beside 'simulate'");
   if (map.find("camera_radius_m") && !simulates) complain("camera_radius_m", "beside 'simulate'");
   if (map.find("steps") && !keys.repeat) complain("steps", "beside 'repeat'");
+  if (keys.repeat && !map.find("steps")) {
+    complaints.add(map.place, path + ": 'steps' is missing, the timeline that 'repeat' repeats");
+  }
   if (map.find("every") && !is_round) complain("every", "within the 'steps' of a 'repeat'");
   if (keys.each_step && !is_moment_name(*keys.each_step)) {
     complaints.add(place_of(map, "each_step"), path +
@@ -688,7 +691,8 @@ std::int64_t steps_in_all(const std::vector<TimelineStep>& timeline) {
   constexpr std::int64_t kEnough = 1'000'000'000;
   std::int64_t count = 0;
   for (const TimelineStep& step : timeline) {
-    count += 1 + std::int64_t(step.rounds) * steps_in_all(step.steps_of_round);
+    // Rounds of nothing take their time as well.
+    count += 1 + step.rounds * std::max<std::int64_t>(1, steps_in_all(step.steps_of_round));
     if (count >= kEnough) return kEnough;
   }
   return count;
@@ -699,7 +703,9 @@ void check_clip_names(const Job& job, const Place& place, Complaints& complaints
   std::set<std::string> clips;
   std::set<std::string> others;
   for_each_step(job.timeline, [&](const TimelineStep& step) {
-    (step.kind == TimelineStep::Kind::Record ? clips : others).insert(step.name);
+    const bool simulates = step.kind == TimelineStep::Kind::Simulate;
+    const std::string& moment = simulates ? step.each_step : step.name;
+    (step.kind == TimelineStep::Kind::Record ? clips : others).insert(moment);
     return true;
   });
   for (const std::string& name : clips) {
