@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <fstream>
 #include <map>
@@ -132,9 +133,9 @@ RecordedCameras recorded_cameras(const fs::path& run, DatasetReaders& readers, H
 }
 
 /// After how many captures of a visit objects are where they stay.
-int captures_in_motion(const Job& job) {
-  int captures = 0;
-  int before_last = 0;
+std::int64_t captures_in_motion(const Job& job) {
+  std::int64_t captures = 0;
+  std::int64_t before_last = 0;
   for_each_step(job.timeline, [&](const TimelineStep& step) {
     captures += step.count;
     if (step.kind != TimelineStep::Kind::Capture) before_last = captures;
@@ -220,13 +221,14 @@ class SceneLint {
   }
 
   void check_cameras(const PlannedVisit& planned, Scene& scene, NodeId environment) {
-    const int at_rest = planned.first_capture + captures_in_motion(job_);
     const int end = planned.first_capture + planned.capture_count;
+    const int at_rest =
+        int(std::min<std::int64_t>(planned.first_capture + captures_in_motion(job_), end));
     check_cameras(at_rest, end, scene, environment);
     for (const PlannedObject& object : plan_objects(job_, plan_.object_assets, planned.index)) {
       if (const NodeId node = scene.find(object.path)) scene.edit(node).is_visible = false;
     }
-    check_cameras(planned.first_capture, std::min(at_rest, end), scene, environment);
+    check_cameras(planned.first_capture, at_rest, scene, environment);
   }
 
   void check_cameras(int begin, int end, const Scene& scene, NodeId environment) {
