@@ -54,9 +54,7 @@ class ObjectMotion {
         continue;
       }
       if (body->linear_velocity.isZero(0.0) && body->angular_velocity.isZero(0.0)) continue;
-      RigidBody& stopped = *scene.edit(known.object).rigid_body;
-      stopped.linear_velocity.setZero();
-      stopped.angular_velocity.setZero();
+      scene.set_velocity(known.object, Vec3::Zero(), Vec3::Zero());
     }
   }
 
@@ -211,22 +209,22 @@ void VisitRun::reset_physics() {
 
 /// Takes the steps, and deals with what has not settled afterwards.
 void VisitRun::simulate(const TimelineStep& step) {
-  if (step.camera_radius_m > 0.0) {
+  const auto take_steps = [&] {
+    if (step.camera_radius_m <= 0.0) return advance(step);
     const std::vector<NodeId> spheres =
         create_camera_spheres(cameras_, step.camera_radius_m, scene_);
     reset_physics();
     advance(step);
     for (const NodeId sphere : spheres) scene_.erase(sphere);
     reset_physics();
-  } else {
-    advance(step);
-  }
+  };
+  take_steps();
   if (job_.settle.policy == "keep") return;
   std::vector<Flaw> flaws = unsettled(step);
   if (job_.settle.policy == "respawn") {
     for (int i = 0; i < job_.settle.max_respawns && !flaws.empty(); ++i) {
       respawn(flaws);
-      advance(step);
+      take_steps();
       flaws = unsettled(step);
     }
   }
@@ -234,7 +232,7 @@ void VisitRun::simulate(const TimelineStep& step) {
     drop(flaws);
     // What lay on them falls.
     if (!step.until_rest) return;
-    advance(step);
+    take_steps();
     flaws = unsettled(step);
   }
 }
