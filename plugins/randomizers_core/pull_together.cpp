@@ -18,7 +18,8 @@ PullTogether::PullTogether(Params params, Host&) : params_(std::move(params)) {}
 void PullTogether::randomize(Scene& scene, const RandomizeContext& context, const Rng& rng) {
   const auto change = [&](NodeId node, NodeDraws& draws) {
     const Vec3 way = context.working_area_world - scene.world_from_node(node).translation();
-    scene.edit(node).rigid_body->linear_velocity = draws.number(params_.strength) * way;
+    const Vec3 linear = draws.number(params_.strength) * way;
+    scene.set_velocity(node, linear, scene[node].rigid_body->angular_velocity);
   };
   const auto is_body = [](const Node& node) { return node.rigid_body.has_value(); };
   draw_for_each(scene, match_if(scene, params_.nodes, is_body), context, rng, change);

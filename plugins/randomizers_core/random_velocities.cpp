@@ -52,11 +52,13 @@ void RandomVelocities::randomize(Scene& scene, const RandomizeContext& context, 
   };
   const auto change = [&](NodeId node, NodeDraws& draws) {
     if (!is_thrown(node)) return;
-    RigidBody& body = *scene.edit(node).rigid_body;
-    if (params_.velocity) body.linear_velocity = draws.vector(*params_.velocity);
+    Vec3 linear = scene[node].rigid_body->linear_velocity;
+    Vec3 angular = scene[node].rigid_body->angular_velocity;
+    if (params_.velocity) linear = draws.vector(*params_.velocity);
     if (params_.angular_velocity_deg) {
-      body.angular_velocity = draws.vector(*params_.angular_velocity_deg) * radians(1.0);
+      angular = draws.vector(*params_.angular_velocity_deg) * radians(1.0);
     }
+    scene.set_velocity(node, linear, angular);
   };
   const auto is_body = [](const Node& node) { return node.rigid_body.has_value(); };
   draw_for_each(scene, match_if(scene, params_.nodes, is_body), context, rng, change);
