@@ -186,6 +186,18 @@ class MotDataset final : public StoredDataset {
     }
   }
 
+  /// Pages of a few bytes may tell of frames without end.
+  void add_rows(int first, int count, std::uint32_t camera, std::size_t sequence,
+                std::vector<Row>& rows) const {
+    if (rows.size() + std::size_t(count) > std::size_t(kMostFrames)) {
+      throw Error(ErrorKind::Asset, folder_.string() + ": its sequences have more than " +
+                                        std::to_string(kMostFrames) + " frames in all");
+    }
+    for (int i = 0; i < count; ++i) {
+      rows.push_back({first + i, camera, std::uint32_t(sequence), i + 1});
+    }
+  }
+
   /// The names of our own sequences say clip, or capture, and camera.
   void number_own(StoredFiles& files) {
     clips_ = page_->clips;
@@ -221,9 +233,7 @@ class MotDataset final : public StoredDataset {
         files.check(split->second == sequence.split, kCounts, sequence.folder, "",
                     "lies in " + sequence.split, split->second + ", as dataset.json says");
       }
-      for (int i = 0; i < count; ++i) {
-        rows.push_back({first + i, camera, std::uint32_t(s), i + 1});
-      }
+      add_rows(first, std::min(count, sequence.length), camera, s, rows);
     }
     rows_.set(std::move(rows), [&](const Row& row, const Row* known) {
       files.check(!known, kOnce, sequences_[row.sequence].folder, "", "is there twice");
@@ -237,13 +247,11 @@ class MotDataset final : public StoredDataset {
   void number_foreign() {
     cameras_ = {"camera"};
     std::vector<Row> rows;
-    int capture = 0;
     for (std::size_t s = 0; s < sequences_.size(); ++s) {
       if (sequences_[s].length < 1) continue;
-      clips_.push_back({capture, sequences_[s].length, sequences_[s].fps});
-      for (int i = 1; i <= sequences_[s].length; ++i) {
-        rows.push_back({capture++, 0, std::uint32_t(s), i});
-      }
+      const int first = int(rows.size());
+      add_rows(first, sequences_[s].length, 0, s, rows);
+      clips_.push_back({first, sequences_[s].length, sequences_[s].fps});
     }
     rows_.set(std::move(rows), [](const Row&, const Row*) {});
   }
