@@ -203,10 +203,10 @@ class KittiDataset final : public StoredDataset {
   /// Lines by picture, without frame and track, which stand beside them.
   void read_tracks(const std::string& sequence, const std::string& file,
                    const std::vector<ListedPicture>& pictures, StoredFiles& files) {
-    std::set<int> frames;
+    std::map<int, std::string> frames;  // names of pictures, with as many digits as they have
     for (const ListedPicture& picture : pictures) {
       try {
-        frames.insert(integer_of(picture.stem));
+        frames.emplace(integer_of(picture.stem), picture.stem);
       } catch (const std::runtime_error&) {
         files.find(kIds, front_ + "image_02/" + sequence + "/" + picture.stem, "",
                    "its name is no number");
@@ -223,11 +223,13 @@ class KittiDataset final : public StoredDataset {
         if (words.size() < 3) throw std::runtime_error("a line of fewer than three fields");
         const int frame = integer_of(words[0]);
         const int track = integer_of(words[1]);
-        files.check(frames.contains(frame), kMissing, file, "line " + std::to_string(number),
+        const auto picture = frames.find(frame);
+        files.check(picture != frames.end(), kMissing, file, "line " + std::to_string(number),
                     "is of frame " + words[0], "one that has a picture");
+        if (picture == frames.end()) return;
         std::string rest = words[2];
         for (std::size_t i = 3; i < words.size(); ++i) rest += " " + words[i];
-        tracks_[sequence + "/" + zero_padded(frame, 6)].push_back({track, rest});
+        tracks_[sequence + "/" + picture->second].push_back({track, rest});
       });
     }
   }
