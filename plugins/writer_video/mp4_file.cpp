@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "writer_video/mp4_file.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <string_view>
@@ -49,7 +50,8 @@ class Boxes {
 };
 
 std::uint32_t ticks_per_second(const Mp4Track& track) {
-  return std::uint32_t(std::lround(track.fps * kTicksPerFrame));
+  // Converted datasets may say any rate.
+  return std::uint32_t(std::clamp(std::round(track.fps * kTicksPerFrame), 1.0, 4294967295.0));
 }
 
 std::uint64_t data_size(const Mp4Track& track) {
