@@ -260,8 +260,11 @@ class CocoImageReading : private FrameReading {
     files_.check(category != part_.categories.end(), kIds, part_.file, who,
                  "has the unknown category " + json.at("category_id").dump());
     if (category != part_.categories.end()) instance.labels["class"] = category->second.name;
-    if (const auto track = json.find("track_id"); track != json.end()) {
-      instance.id = track->get<std::uint32_t>();
+    const auto track = json.find("track_id");
+    const bool has_page = dataset_.page_.has_value();
+    if (track != json.end() && (has_page || track->is_number_unsigned())) {
+      // Others may count tracks from 0, which is no id, or have none where they write -1 or null.
+      instance.id = track->get<std::uint32_t>() + (has_page ? 0 : 1);
       const bool is_again =
           std::ranges::find(frame_.instances, instance.id, &Instance::id) != frame_.instances.end();
       files_.check(instance.id > 0 && !is_again, kOnce, part_.file, who,
