@@ -164,7 +164,11 @@ RoomView::RoomView(std::string_view name) : seed_(stable_hash(name)) {
   for (int i = 0; i < look->pieces; ++i) {
     // Along the walls, turned to them.
     const bool is_long = rng.chance(0.6);
-    const Vec3 size(rng.uniform(0.5, 1.6), rng.uniform(0.3, 0.7), rng.uniform(0.4, 0.7 * height_));
+    // One draw a line: arguments are evaluated in whatever order a compiler likes.
+    const double high = rng.uniform(0.4, 0.7 * height_);
+    const double deep = rng.uniform(0.3, 0.7);
+    const double wide = rng.uniform(0.5, 1.6);
+    const Vec3 size(wide, deep, high);
     const double side = rng.chance(0.5) ? 1.0 : -1.0;
     Vec3 low;
     Vec3 extent = size;
@@ -177,8 +181,10 @@ RoomView::RoomView(std::string_view name) : seed_(stable_hash(name)) {
                  rng.uniform(-half_.y(), half_.y() - size.x()), 0.0);
     }
     const double tone = rng.uniform(0.12, 0.55);
-    const Vec3 hue(rng.uniform(0.6, 1.0), rng.uniform(0.5, 0.95), rng.uniform(0.4, 0.9));
-    furniture_.push_back({low, low + extent, tone * hue});
+    const double blue = rng.uniform(0.4, 0.9);
+    const double green = rng.uniform(0.5, 0.95);
+    const double red = rng.uniform(0.6, 1.0);
+    furniture_.push_back({low, low + extent, tone * Vec3(red, green, blue)});
   }
 }
 
