@@ -160,10 +160,11 @@ void Conversion::note_differences(const ConversionSource& source) {
   }
   NameSet left;
   for (const std::string& name : holds) {
-    const bool is_channel =
-        name == kInstanceId.name || name == kLeafId.name || name.starts_with("distance_") ||
-        name == kNormals.name || name == kMotion.name || name == kColorHdr.name ||
-        name == kSensorDepth.name || name == "pointcloud" || is_annotation(name);
+    const bool is_channel = name == kInstanceId.name || name == kLeafId.name ||
+                            name.starts_with("distance_") || name == kNormals.name ||
+                            name == kMotion.name || name.starts_with("flow_") ||
+                            name == kColorHdr.name || name == kSensorDepth.name ||
+                            name == "pointcloud" || is_annotation(name);
     if (is_channel && !needs_.contains(name)) left.insert(name);
   }
   if (!left.empty()) notes_.push_back(who + ": no writer takes " + joined(left));
@@ -223,8 +224,10 @@ void Conversion::run(Host& host, const std::function<void(Capture)>& take) const
           needs_.contains(channel->name) || needs_.contains(twin_of(channel->name));
       if (!is_used) wanted.erase(std::string(channel->name));
     }
-    for (const std::string_view name : {kNormals.name, kMotion.name, kColorHdr.name,
-                                        kSensorDepth.name, std::string_view("pointcloud")}) {
+    for (const std::string_view name :
+         {kNormals.name, kMotion.name, kFlowForward.name, kFlowForwardState.name,
+          kFlowBackward.name, kFlowBackwardState.name, kColorHdr.name, kSensorDepth.name,
+          std::string_view("pointcloud")}) {
       if (!needs_.contains(name)) wanted.erase(std::string(name));
     }
     sweep_captures<Capture>(

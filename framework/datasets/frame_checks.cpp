@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "framework/datasets/check_names.h"
 #include "framework/datasets/lens.h"
@@ -131,8 +132,12 @@ class FrameChecks {
     check_pixels(kDistanceToImagePlane, kFinite, "are no distance above 0", is_distance);
     check_pixels(kSensorDepth, kFinite, "are neither a depth nor 0 for none",
                  [](float z) { return z >= 0.0f && std::isfinite(z); });
-    check_pixels(kMotion, kFinite, "have a motion that is not finite",
-                 [](const Vec2f& v) { return v.allFinite(); });
+    for (const auto& [channel, found] :
+         {std::pair(kMotion, "have a motion that is not finite"),
+          std::pair(kFlowForward, "have a flow that is not finite"),
+          std::pair(kFlowBackward, "have a flow that is not finite")}) {
+      check_pixels(channel, kFinite, found, [](const Vec2f& v) { return v.allFinite(); });
+    }
     check_pixels(kPosition, kFinite, "have a position that is not finite",
                  [](const Vec3f& v) { return v.allFinite(); });
     check_pixels(kColorHdr, kFinite, "have a radiance that is none",
