@@ -222,8 +222,17 @@ void SavedNodes::restore(Scene& scene) const {
 
 void SavedNodes::restore_poses(Scene& scene) const {
   for (const auto& [node, saved] : nodes_) {
-    if (scene[node].parent_from_node.matrix() == saved.parent_from_node.matrix()) continue;
-    scene.set_pose(node, saved.parent_from_node);
+    if (scene[node].parent_from_node.matrix() != saved.parent_from_node.matrix()) {
+      scene.set_pose(node, saved.parent_from_node);
+    }
+    const auto& was = saved.rigid_body;
+    const auto& body = scene[node].rigid_body;
+    if (!was || !body) continue;
+    if (body->linear_velocity == was->linear_velocity &&
+        body->angular_velocity == was->angular_velocity) {
+      continue;
+    }
+    scene.set_velocity(node, was->linear_velocity, was->angular_velocity);
   }
 }
 
