@@ -26,6 +26,10 @@ std::size_t bytes_per_pixel(const NameSet& channels) {
   add(kAlbedo);
   add(kObjectCoordinates);
   add(kMotion);
+  add(kFlowForward);
+  add(kFlowForwardState);
+  add(kFlowBackward);
+  add(kFlowBackwardState);
   add(kSensorDepth);
   return bytes;
 }
