@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <limits>
 #include <map>
 #include <set>
 
@@ -322,6 +323,27 @@ TEST_CASE("A randomizer acts at its moments, at every so many of them", "[plan]"
   CHECK(randomizer_call(job, entry, "floating", 2, 4)->occurrence == 8);
   CHECK(randomizer_call(job, entry, "floating", 2, 4)->visit == 2);
   CHECK(randomizer_call(job, entry, "shuffle", 7, 0)->occurrence == 7);
+}
+
+TEST_CASE("Steps and captures of rounds are moments, however many", "[plan]") {
+  const auto occurrence = [](const std::string& step, const std::string& moment, int visit,
+                             int number) {
+    const Job job = job_from(with(good_job(), "{simulate: 200}", step));
+    RandomizerEntry entry;
+    entry.on = {moment};
+    return randomizer_call(job, entry, moment, visit, number)->occurrence;
+  };
+  // Rounds 0, 2 and 4 of 5, four steps each; one step before them.
+  const std::string rounds =
+      "{simulate: 1, each_step: bounce}, {repeat: 5, steps: [{simulate: 4, each_step: bounce, "
+      "every: 2}, {repeat: 2, steps: [{capture: round}]}, {record: {fps: 2, name: pan}, every: "
+      "4}]}";
+  CHECK(occurrence(rounds, "bounce", 2, 5) == 2 * 13 + 5);
+  CHECK(occurrence(rounds, "round", 1, 3) == 10 + 3);
+  CHECK(occurrence(rounds, "pan", 3, 1) == 3 * 2 + 1);
+  const std::string many =
+      "{repeat: 1000, steps: [{simulate: 10000000, each_step: bounce}]}";  // 10^10 steps
+  CHECK(occurrence(many, "bounce", 3, 5) == std::numeric_limits<int>::max());
 }
 
 TEST_CASE("Between its turns a randomizer repeats what it drew for the visit", "[plan]") {

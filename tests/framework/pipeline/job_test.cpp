@@ -254,9 +254,16 @@ TEST_CASE("What stands beside a step of the timeline must belong to it", "[job]"
                  ContainsSubstring("unknown key 'evry', did you mean 'every'?"));
   CHECK_THAT(complaint("{repeat: 2, simulate: 1}"), ContainsSubstring("expected one of"));
   CHECK_THAT(complaint("{repeat: 1.5, steps: []}"), ContainsSubstring("expected a whole number"));
-  CHECK_THAT(
-      complaint("{repeat: 1000000, steps: [{repeat: 1000000, steps: [{simulate: 1}]}]}"),
-      ContainsSubstring("timeline: expected at most 10000000 steps per visit in all rounds"));
+  CHECK_THAT(complaint("{repeat: 2}"), ContainsSubstring("timeline[2]: 'steps' is missing"));
+  CHECK_THAT(complaint("{simulate: 1, each_step: pan}, {record: {name: pan}}"),
+             ContainsSubstring("'pan' is the name of clips and of another moment"));
+  for (const char* steps : {"[{simulate: 1}]", "[]"}) {
+    INFO(steps);
+    CHECK_THAT(
+        complaint("{repeat: 1000000, steps: [{repeat: 1000000, steps: " + std::string(steps) +
+                  "}]}"),
+        ContainsSubstring("timeline: expected at most 10000000 steps per visit in all rounds"));
+  }
 }
 
 TEST_CASE("Walls have three sizes or none", "[job]") {
