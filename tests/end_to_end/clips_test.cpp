@@ -467,6 +467,8 @@ TEST_CASE("Tracking folders of others are read, and what is wrong with them is s
                          read_file(labels));
   CHECK_THAT(lint("theirs/kitti"),
              Catch::Matchers::StartsWith("0 ") && ContainsSubstring("KITTI tracking"));
+  fs::remove_all(folder / "theirs/kitti/training/depth_02");
+  const Outcome with_six_digits = run({"stats", "theirs/kitti"}, folder.path());
   const std::string ours = "out/mot/train/clip_0000_eyes_0_left/";
   const std::string theirs = "theirs/MOT17/train/MOT17-02/";
   fs::create_directories(folder / theirs);
@@ -494,6 +496,22 @@ TEST_CASE("Tracking folders of others are read, and what is wrong with them is s
   climbing.replace(climbing.find("img1"), 4, "../../../../out/mot");
   write_file(folder / (theirs + "seqinfo.ini"), climbing);
   CHECK_THAT(lint("theirs/MOT17"), ContainsSubstring("imDir is no name"));
+
+  // Pages of a few bytes that ask for a lot of memory.
+  const std::string endless = "[Sequence]\nseqLength=9000000\nimExt=.png\n";
+  write_file(folder / "theirs/endless/a/seqinfo.ini", endless);
+  write_file(folder / "theirs/endless/b/seqinfo.ini", endless);
+  const Outcome refused = run({"lint", "theirs/endless"}, folder.path());
+  CHECK(refused.exit_code != 0);
+  CHECK_THAT(refused.errors, ContainsSubstring("more than 10000000 frames in all"));
+  // Pictures whose names have other than six digits.
+  const fs::path pictures = folder / "theirs/kitti/training/image_02/0000";
+  for (int i = 0; i < 6; ++i) {
+    const std::string digits = "00000" + std::to_string(i);
+    fs::rename(pictures / (digits + ".png"), pictures / ("0000" + digits + ".png"));
+  }
+  const Outcome tracks = run({"stats", "theirs/kitti"}, folder.path());
+  CHECK(tracks.output == with_six_digits.output);
 }
 
 TEST_CASE("A video has one sample per frame, where its index says", "[run]") {
