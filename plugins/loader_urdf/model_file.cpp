@@ -19,11 +19,25 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// The library takes words of the file for printf formats when it complains about them; a percent
+/// sign may be written as a number, too.
+bool may_be_format(std::string_view text) {
+  return text.find('%') != std::string_view::npos || text.find("&#") != std::string_view::npos;
+}
+
 /// Keeps what the library would print. There is one place for that in the process.
 class KeptMessages final : public console_bridge::OutputHandler {
  public:
-  KeptMessages() : lock_(mutex()) { console_bridge::useOutputHandler(this); }
-  ~KeptMessages() override { console_bridge::restorePreviousOutputHandler(); }
+  explicit KeptMessages(std::string_view text)
+      : lock_(mutex()), level_before_(console_bridge::getLogLevel()) {
+    console_bridge::useOutputHandler(this);
+    // Formats nothing at all.
+    if (may_be_format(text)) console_bridge::setLogLevel(console_bridge::CONSOLE_BRIDGE_LOG_NONE);
+  }
+  ~KeptMessages() override {
+    console_bridge::setLogLevel(level_before_);
+    console_bridge::restorePreviousOutputHandler();
+  }
 
   void log(const std::string& text, console_bridge::LogLevel level, const char*, int) override {
     if (level >= console_bridge::CONSOLE_BRIDGE_LOG_ERROR && first_error.empty()) {
@@ -38,6 +52,7 @@ class KeptMessages final : public console_bridge::OutputHandler {
     return one;
   }
   std::lock_guard<std::mutex> lock_;
+  console_bridge::LogLevel level_before_;
 };
 
 bool is_file(const fs::path& path) {
@@ -55,7 +70,7 @@ std::string plain(std::string text) {
 
 }  // namespace
 
-urdf::ModelInterfaceSharedPtr read_model(const std::string& file) {
+urdf::ModelInterfaceSharedPtr read_model(const std::string& file, std::string* complaint) {
   if (!is_file(file)) throw Error(ErrorKind::Asset, file + ": is no regular file");
   std::error_code error;
   const auto bytes = fs::file_size(file, error);
@@ -68,14 +83,17 @@ urdf::ModelInterfaceSharedPtr read_model(const std::string& file) {
                          std::istreambuf_iterator<char>());
   if (!stream) throw Error(ErrorKind::Asset, file + ": cannot be read");
   check_xml(file, text);
-  KeptMessages messages;
+  KeptMessages messages(text);
   urdf::ModelInterfaceSharedPtr model;
   try {
     model = urdf::parseURDF(text);
   } catch (const std::exception& problem) {
     throw Error(ErrorKind::Asset, file + ": is no URDF model: " + plain(problem.what()));
   }
-  if (model && model->getRoot()) return model;
+  if (model && model->getRoot()) {
+    if (complaint) *complaint = plain(messages.first_error);
+    return model;
+  }
   throw Error(
       ErrorKind::Asset,
       file + ": is no URDF model" +

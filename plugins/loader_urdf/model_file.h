@@ -13,8 +13,9 @@
 
 namespace diorama::loader_urdf {
 
-/// A model as the library reads it. Throws Error(Asset) that begins with the file.
-urdf::ModelInterfaceSharedPtr read_model(const std::string& file);
+/// A model as the library reads it. Throws Error(Asset) that begins with the file. `complaint`:
+/// what the library says of the first thing that it left out; empty: nothing.
+urdf::ModelInterfaceSharedPtr read_model(const std::string& file, std::string* complaint = nullptr);
 
 /// Finds meshes and textures: paths beside the model, file://, and package:// (model:// likewise)
 /// in folders of that name: `packages`, those above the model and those beside these. Nothing when

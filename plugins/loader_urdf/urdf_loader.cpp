@@ -49,7 +49,11 @@ std::vector<std::filesystem::path> UrdfLoader::files(std::string_view asset) con
 
 void UrdfLoader::load(std::string_view asset, Scene& scene, NodeId root) {
   const std::string name(asset);
-  const auto model = read_model(name);
+  std::string complaint;
+  const auto model = read_model(name, &complaint);
+  if (!complaint.empty()) {
+    host_.log(LogLevel::Warning, name + ": a part of it cannot be read: " + complaint);
+  }
   const MeshFinder finder(name, params_.packages, host_);
   ModelTranslator translator(*model, finder, host_, scene);
   try {

@@ -177,6 +177,11 @@ TEST_CASE("models with words that cannot be are one message", "[loader_urdf]") {
   refused(robot(kTwo + joint("fixed", "") +
                 "<joint name=\"k\" type=\"fixed\"><parent link=\"b\"/><child link=\"a\"/></joint>"),
           "is no URDF model");
+  // What the library would take for a format when it complains.
+  for (const char* number : {"%n%n%n", "&#37;n", "&#x25;s%s%s%s%s%s%s%s%s%s"}) {
+    refused(robot(kTwo + joint("fixed", "<origin xyz=\"" + std::string(number) + " 0 0\"/>")),
+            "is no URDF model");
+  }
   std::string deep;
   for (int i = 0; i < 100; ++i) deep += "<a>";
   refused(robot(deep), "elements in more than 64 others");
@@ -211,6 +216,8 @@ TEST_CASE("numbers that cannot be are warnings, and what they are of is left out
   warned(
       "<link name=\"a\"><visual><geometry><mesh filename=\"r.urdf\"/></geometry></visual></link>",
       "names a model as a mesh");
+  warned("<link name=\"a\"><visual><geometry><capsule/></geometry></visual></link>",
+         "a part of it cannot be read: Unknown geometry type 'capsule'");
 }
 
 }  // namespace diorama::loader_urdf
