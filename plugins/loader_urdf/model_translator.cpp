@@ -2,6 +2,7 @@
 #include "loader_urdf/model_translator.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <deque>
 #include <filesystem>
@@ -78,6 +79,14 @@ bool are_equal(const urdf::Geometry& a, const urdf::Geometry& b) {
   return one.filename == other.filename && to_vec3(one.scale) == to_vec3(other.scale);
 }
 
+/// Models do not hold models: they might hold themselves. Loaders ask for no case, and variants may
+/// follow a name.
+bool is_model(const std::filesystem::path& file) {
+  std::string name = file.filename().string();
+  for (char& c : name) c = char(std::tolower(static_cast<unsigned char>(c)));
+  return name.find(".urdf") != std::string::npos;
+}
+
 float linear_of_srgb(float value) {
   const float clamped = std::isfinite(value) ? std::clamp(value, 0.0f, 1.0f) : 0.5f;
   return clamped <= 0.04045f ? clamped / 12.92f : std::pow((clamped + 0.055f) / 1.055f, 2.4f);
@@ -119,6 +128,11 @@ void ModelTranslator::translate(NodeId root) {
       const Affine link_from_joint =
           pose_of(joint->parent_to_joint_origin_transform, "joint '" + joint->name + "'");
       waiting.emplace_back(child->second.get(), root_from_link * link_from_joint);
+    }
+  }
+  for (const auto& [name, link] : model_.links_) {
+    if (!links_.contains(name)) {
+      warn("link '" + name + "' hangs on a loop of joints, not on the root; it is left out");
     }
   }
   if (joints.empty()) return;
@@ -221,7 +235,7 @@ NodeId ModelTranslator::add_geometry(const urdf::Geometry& geometry, const urdf:
     missing_.push_back(where + ": there is no file " + mesh.filename);
     return {};
   }
-  if (file->extension() == ".urdf") {
+  if (is_model(*file)) {
     warn(where + " names a model as a mesh; it is left out");
     return {};
   }
@@ -241,6 +255,9 @@ NodeId ModelTranslator::add_geometry(const urdf::Geometry& geometry, const urdf:
 std::shared_ptr<const Material> ModelTranslator::material_of(const urdf::Visual& visual) {
   if (!visual.material) return nullptr;
   const urdf::Material& said = *visual.material;
+  // Names stand for one material each; without a name each is its own.
+  const auto known = materials_.find(said.name);
+  if (known != materials_.end()) return known->second;
   auto material = std::make_shared<Material>();
   material->name = said.name;
   material->base_color = Vec3f(linear_of_srgb(said.color.r), linear_of_srgb(said.color.g),
@@ -248,16 +265,17 @@ std::shared_ptr<const Material> ModelTranslator::material_of(const urdf::Visual&
   if (std::isfinite(said.color.a)) material->opacity = std::clamp(said.color.a, 0.0f, 1.0f);
   if (!said.texture_filename.empty()) {
     if (const auto file = meshes_.find(said.texture_filename)) {
-      material->base_color_texture.texture = host_.read_texture(*file);
+      auto& texture = textures_[*file];
+      if (!texture) texture = host_.read_texture(*file);
+      material->base_color_texture.texture = texture;
       material->base_color = Vec3f::Ones();
       material->opacity = 1.0f;
     } else {
       missing_.push_back("material '" + said.name + "': there is no file " + said.texture_filename);
     }
   }
-  // Names stand for one material each; without a name each is its own.
-  if (said.name.empty()) return material;
-  return materials_.try_emplace(said.name, std::move(material)).first->second;
+  if (!said.name.empty()) materials_.emplace(said.name, material);
+  return material;
 }
 
 void ModelTranslator::add_joint(const urdf::Joint& said, NodeId above) {

@@ -3,6 +3,7 @@
 
 #include <urdf_model/model.h>
 
+#include <filesystem>
 #include <map>
 #include <memory>
 #include <string>
@@ -43,6 +44,7 @@ class ModelTranslator {
   std::map<std::string, NodeId> links_;
   std::map<std::string, NodeId> joints_;
   std::map<std::string, std::shared_ptr<const Material>> materials_;
+  std::map<std::filesystem::path, std::shared_ptr<const Texture>> textures_;
   std::vector<std::string> warnings_;
   std::vector<std::string> missing_;
 };

@@ -96,10 +96,13 @@ class XmlCheck {
     if (name == "link" && ++links_ > kMaxLinks) {
       fail("more than " + std::to_string(kMaxLinks) + " links", "less");
     }
+    if (name == "geometry" && ++shapes_ > kMaxShapes) {
+      fail("more than " + std::to_string(kMaxShapes) + " shapes", "less");
+    }
     if (open_.size() >= std::size_t(kMaxXmlDepth)) {
       fail("elements in more than " + std::to_string(kMaxXmlDepth) + " others", "less");
     }
-    while (true) {
+    for (int attributes = 0;; ++attributes) {
       skip_spaces();
       if (begins("/>")) {
         at_ += 2;
@@ -110,6 +113,9 @@ class XmlCheck {
         if (name.size() > 60) fail("a name of more than 60 letters", "a shorter one");
         open_.push_back(name);
         return;
+      }
+      if (attributes == kMaxAttributes) {
+        fail("more than " + std::to_string(kMaxAttributes) + " attributes", "less");
       }
       read_name();
       skip_spaces();
@@ -133,6 +139,7 @@ class XmlCheck {
   std::size_t at_ = 0;
   std::size_t elements_ = 0;
   std::size_t links_ = 0;
+  std::size_t shapes_ = 0;
   std::vector<std::string_view> open_;
 };
 

@@ -188,6 +188,12 @@ TEST_CASE("models with words that cannot be are one message", "[loader_urdf]") {
   std::string many;
   for (int i = 0; i < 10'001; ++i) many += "<link name=\"l" + std::to_string(i) + "\"/>";
   refused(robot(many), "more than 10000 links");
+  many.clear();
+  for (int i = 0; i < 10'001; ++i) many += "<geometry/>";
+  refused(robot(many), "more than 10000 shapes");
+  many.clear();
+  for (int i = 0; i < 101; ++i) many += " a" + std::to_string(i) + "=''";
+  refused(robot("<link" + many + "/>"), "more than 100 attributes");
 }
 
 TEST_CASE("numbers that cannot be are warnings, and what they are of is left out",
@@ -216,6 +222,15 @@ TEST_CASE("numbers that cannot be are warnings, and what they are of is left out
   warned(
       "<link name=\"a\"><visual><geometry><mesh filename=\"r.urdf\"/></geometry></visual></link>",
       "names a model as a mesh");
+  folder.write("R.URDF", "<robot/>");
+  warned(
+      "<link name=\"a\"><visual><geometry><mesh filename=\"R.URDF\"/></geometry></visual></link>",
+      "names a model as a mesh");
+  warned(kTwo + joint("fixed", "") +
+             "<link name=\"c\"/><link name=\"d\"/><joint name=\"k\" type=\"fixed\">"
+             "<parent link=\"c\"/><child link=\"d\"/></joint><joint name=\"l\" type=\"fixed\">"
+             "<parent link=\"d\"/><child link=\"c\"/></joint>",
+         "link 'c' hangs on a loop of joints");
   warned("<link name=\"a\"><visual><geometry><capsule/></geometry></visual></link>",
          "a part of it cannot be read: Unknown geometry type 'capsule'");
 }
