@@ -112,8 +112,9 @@ void JointTranslator::translate(const Prim& prim, NodeId node, double meters_per
     const double unit = joint.kind == JointKind::Revolute ? kPi / 180.0 : meters_per_unit;
     joint.lower = unit * limit(prim, "physics:lowerLimit", -kInfinity);
     joint.upper = unit * limit(prim, "physics:upperLimit", kInfinity);
-    if (joint.lower > joint.upper) {
-      note_(prim, "is a joint with a lower limit above the upper one; it has none", {});
+    // In units of no length they are no numbers.
+    if (!(joint.lower <= joint.upper)) {
+      note_(prim, "is a joint with limits that are no interval; it has none", {});
       joint.lower = -kInfinity;
       joint.upper = kInfinity;
     }

@@ -215,8 +215,12 @@ void SceneTranslator::translate_prim(const Prim& prim, const Place& parent, cons
   place.node = scene_.create(parent.node, usd::path::name(prim.path));
   place.root_from_node = parent.root_from_node * pose;
   scene_.set_pose(place.node, pose);
-  if (instancer_depth_ == 0) nodes_[&prim] = place.node;
-  if (is_joint(prim.type_name)) joints_.emplace_back(&prim, place.node);
+  if (instancer_depth_ == 0) {
+    nodes_[&prim] = place.node;
+    if (is_joint(prim.type_name)) joints_.emplace_back(&prim, place.node);
+  } else if (is_joint(prim.type_name)) {
+    note(prim, "is a joint in an instancer, and holds nothing");
+  }
   const bool is_hidden = prim.traits.is_imageable &&
                          usd::token_or(stage_, prim, "visibility", "inherited") == "invisible";
   if (is_hidden) scene_.edit(place.node).is_visible = false;
@@ -449,10 +453,6 @@ void SceneTranslator::add_joints(NodeId root) {
                              [this](const Prim& prim, const std::string& what,
                                     const std::string& detail) { note(prim, what, detail); });
   for (const auto& [prim, node] : joints_) {
-    if (!nodes_.contains(prim)) {
-      note(*prim, "is a joint in an instancer, and holds nothing");
-      continue;
-    }
     // Assets in other units than the stage's say their limits in these.
     double unit = meters_per_unit_;
     for (const Prim* at = prim; at && at->parent; at = at->parent) {

@@ -101,7 +101,7 @@ TEST_CASE("joints with words that cannot be hold nothing or have no limit", "[lo
   };
   load("float physics:lowerLimit = nan\n", true, "a limit that is no number");
   load("float physics:lowerLimit = 5\nfloat physics:upperLimit = 4\n", true,
-       "a lower limit above the upper one");
+       "limits that are no interval");
   load("quatf physics:localRot0 = (nan, 0, 0, 0)\n", true, "whose place is no number");
   load("quatf physics:localRot1 = (0, 0, 0, 0)\n", true, "whose place is no number");
   load("bool physics:jointEnabled = 0\n", false, "");
