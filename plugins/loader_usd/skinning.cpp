@@ -16,15 +16,22 @@ using usd::Prim;
 
 constexpr std::size_t kMaxJoints = 100'000;
 constexpr std::size_t kMaxInfluences = 1'000;
+// Of a joint's path: each part of it is looked up.
+constexpr std::size_t kMaxPathLetters = 4'096;
 
 usd::Strings texts(const usd::Value& value) {
   return value.as_strings() ? *value.as_strings() : usd::Strings{};
 }
 
 // The place of each joint's parent, -1 for roots: `hip/knee` hangs on `hip`. Parents that are left
-// out are skipped. Empty when a joint stands before its parent or occurs twice.
+// out are skipped. Empty when a joint stands before its parent, occurs twice or has a path without
+// end.
 std::optional<std::vector<int>> parents_of(const usd::Strings& joints) {
   std::map<std::string, int, std::less<>> place;
+  for (std::size_t i = 0; i < joints.size(); ++i) {
+    const bool is_new = place.emplace(joints[i], static_cast<int>(i)).second;
+    if (!is_new || joints[i].size() > kMaxPathLetters) return std::nullopt;
+  }
   std::vector<int> parents;
   for (std::size_t i = 0; i < joints.size(); ++i) {
     int parent = -1;
@@ -35,8 +42,8 @@ std::optional<std::vector<int>> parents_of(const usd::Strings& joints) {
       const auto found = place.find(up);
       if (found != place.end()) parent = found->second;
     }
+    if (parent > static_cast<int>(i)) return std::nullopt;
     parents.push_back(parent);
-    if (!place.emplace(joints[i], static_cast<int>(i)).second) return std::nullopt;
   }
   return parents;
 }
@@ -146,6 +153,7 @@ Skinning::Animation Skinning::read_animation(const Prim& prim) {
   const bool is_sound = places && turns && count <= kMaxJoints &&
                         places->span.size() == 3 * count && turns->span.size() == 4 * count &&
                         (!sizes || sizes->span.empty() || sizes->span.size() == 3 * count);
+  result.is_broken = count > 0 && !is_sound;
   for (std::size_t i = 0; is_sound && i < count; ++i) {
     const auto t = places->span.subspan(3 * i, 3);
     const auto q = turns->span.subspan(4 * i, 4);  // i, j, k, real
@@ -289,6 +297,9 @@ void Skinning::apply(const Prim& prim, MeshSources& sources, Losses& losses) {
   }
   if (!bones) return;
   if (!bones->problem.empty()) losses.insert(bones->problem);
+  if (moves && moves->is_broken) {
+    losses.insert("has an animation whose joints and poses do not fit; they stay at rest");
+  }
   if (bones->skeleton_from_bound.empty()) return;
 
   const auto joints =

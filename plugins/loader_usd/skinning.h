@@ -31,6 +31,7 @@ class Skinning {
     usd::Strings joints;
     std::vector<Affine> poses;  ///< Of `joints`; empty: none.
     std::map<std::string, double> weights;
+    bool is_broken = false;  ///< It says joints, but no pose of each.
   };
   struct Skeleton {
     usd::Strings joints;

@@ -206,6 +206,13 @@ TEST_CASE("skins with words that cannot be stay as they are bound", "[loader_usd
         "whose joints and matrices do not fit", false);
   check(changed("[\"upper\", \"upper/fore\"]", "[\"upper\"]"),
         "whose joints and matrices do not fit", false);
+  check(changed("[\"upper\", \"upper/fore\"]", "[\"upper/fore\", \"upper\"]"),
+        "whose joints and matrices do not fit", false);
+  check(changed("[\"upper\", \"upper/fore\"]",
+                "[\"upper\", \"upper" + std::string(5000, '/') + "fore\"]"),
+        "whose joints and matrices do not fit", false);
+  check(changed("float3[] translations = [(1, 0, 0)]", "float3[] translations = []"),
+        "an animation whose joints and poses do not fit", false);
   check(changed("((1,0,0,0),(0,1,0,0),(0,0,1,0),(0,0,0,1))",
                 "((0,0,0,0),(0,0,0,0),(0,0,0,0),(0,0,0,0))"),
         "poses that are no numbers", false);
