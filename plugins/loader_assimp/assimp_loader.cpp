@@ -39,7 +39,8 @@ void AssimpLoader::load(std::string_view asset, Scene& scene, NodeId root) {
   host_.log(LogLevel::Debug, describe_units(file, params_.unstated));
   SceneTranslator translator(file, params_.unstated, host_, scene);
   translator.translate(root);
-  if (const auto length = animation_seconds(file.scene())) {
+  const auto length = animation_seconds(file.scene());
+  if (length && loader_support::is_time(*length)) {
     scene.edit(root).animation = Animation{name, 0.0, *length};
   }
   const std::vector<std::string> missing = translator.missing();

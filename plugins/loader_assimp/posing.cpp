@@ -5,6 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
+#include <unordered_map>
+#include <vector>
 
 namespace diorama::loader_assimp {
 namespace {
@@ -75,6 +78,23 @@ void pose_node(aiNode& node, const aiNodeAnim& channel, double time) {
   if (is_finite(pose)) node.mTransformation = pose;
 }
 
+using FirstNodes = std::unordered_map<std::string_view, aiNode*>;
+
+std::string_view text_of(const aiString& name) { return {name.data, name.length}; }
+
+/// Of a name the node that aiNode::FindNode() finds, which looks at all of them each time.
+FirstNodes first_nodes_by_name(aiNode& root) {
+  FirstNodes nodes;
+  std::vector<aiNode*> waiting{&root};
+  while (!waiting.empty()) {
+    aiNode* const node = waiting.back();
+    waiting.pop_back();
+    nodes.emplace(text_of(node->mName), node);
+    for (unsigned i = node->mNumChildren; i > 0; --i) waiting.push_back(node->mChildren[i - 1]);
+  }
+  return nodes;
+}
+
 void weigh_targets(aiScene& scene, const aiNode& node, const aiMeshMorphAnim& channel,
                    double time) {
   if (channel.mNumKeys == 0) return;
@@ -111,17 +131,16 @@ void pose_at(aiScene& scene, double seconds) {
   if (!animation_seconds(scene)) return;
   const aiAnimation& animation = *scene.mAnimations[0];
   const double time = seconds * ticks_per_second(animation);
+  const FirstNodes nodes = first_nodes_by_name(*scene.mRootNode);
   for (unsigned i = 0; i < animation.mNumChannels; ++i) {
     const aiNodeAnim& channel = *animation.mChannels[i];
-    if (aiNode* node = scene.mRootNode->FindNode(channel.mNodeName)) {
-      pose_node(*node, channel, time);
-    }
+    const auto node = nodes.find(text_of(channel.mNodeName));
+    if (node != nodes.end()) pose_node(*node->second, channel, time);
   }
   for (unsigned i = 0; i < animation.mNumMorphMeshChannels; ++i) {
     const aiMeshMorphAnim& channel = *animation.mMorphMeshChannels[i];
-    if (const aiNode* node = scene.mRootNode->FindNode(channel.mName)) {
-      weigh_targets(scene, *node, channel, time);
-    }
+    const auto node = nodes.find(text_of(channel.mName));
+    if (node != nodes.end()) weigh_targets(scene, *node->second, channel, time);
   }
 }
 

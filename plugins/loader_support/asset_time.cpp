@@ -10,11 +10,13 @@
 
 namespace diorama::loader_support {
 
+bool is_time(double seconds) { return std::abs(seconds) < 1e9; }
+
 double parse_time(std::string_view word, std::string_view asset) {
   double seconds = 0.0;
   const auto parsed = std::from_chars(word.data(), word.data() + word.size(), seconds);
   const bool is_number = parsed.ec == std::errc() && parsed.ptr == word.data() + word.size();
-  if (is_number && std::abs(seconds) < 1e9) return seconds;
+  if (is_number && is_time(seconds)) return seconds;
   throw Error(ErrorKind::Asset, std::string(asset) + ": found the time '" + std::string(word) +
                                     "', expected seconds as {time=1.5}");
 }

@@ -7,6 +7,9 @@
 
 namespace diorama::loader_support {
 
+/// Whether a time is one that names of assets may ask for: a number below 1e9 s, to either side.
+bool is_time(double seconds);
+
 /// The number of "{time=1.5}". Throws Error(Asset) that begins with the asset's name.
 double parse_time(std::string_view word, std::string_view asset);
 

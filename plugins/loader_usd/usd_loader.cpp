@@ -161,7 +161,8 @@ void UsdLoader::load(std::string_view asset, Scene& scene, NodeId root) {
     SceneTranslator translator(stage, host_, scene);
     host_.log(LogLevel::Debug, translator.describe_units());
     translator.translate(root);
-    if (const auto range = stage.animation()) {
+    const auto range = stage.animation();
+    if (range && loader_support::is_time(range->first) && loader_support::is_time(range->second)) {
       scene.edit(root).animation = Animation{named.timeless(), range->first, range->second};
     }
     const auto& missing = stage.diagnostics().missing_assets();

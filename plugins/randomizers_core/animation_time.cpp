@@ -34,7 +34,7 @@ std::string AnimationTime::draw_name(const Animation& animation, NodeDraws& draw
   const double frame = std::round((time - animation.start_s) * params_.frames_per_second);
   time = std::clamp(animation.start_s + frame / params_.frames_per_second, animation.start_s,
                     animation.end_s);
-  std::array<char, 64> digits{};
+  std::array<char, 512> digits{};  // enough for every number
   const auto end =
       std::to_chars(digits.data(), digits.data() + digits.size(), time, std::chars_format::fixed)
           .ptr;
