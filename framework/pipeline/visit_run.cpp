@@ -35,33 +35,35 @@ std::vector<Mat4> object_poses(const Scene& scene, const std::vector<NodeId>& ob
   return poses;
 }
 
-/// How objects moved before randomizers placed some of them anew.
+/// How objects and their parts moved before randomizers placed some of them anew.
 class ObjectMotion {
  public:
   ObjectMotion(const Scene& scene, const std::vector<NodeId>& objects) {
     for (const NodeId object : objects) {
-      const auto& body = scene[object].rigid_body;
-      if (body) known_.push_back({object, scene.world_from_node(object).matrix(), *body});
+      for (const NodeId part : scene.subtree(object)) {
+        const auto& body = scene[part].rigid_body;
+        if (body) known_.push_back({part, scene.world_from_node(part).matrix(), *body});
+      }
     }
   }
   /// What was carried elsewhere starts there at rest, unless a velocity was drawn as well.
   void stop_what_was_placed(Scene& scene) const {
     for (const Known& known : known_) {
-      const auto& body = scene[known.object].rigid_body;
+      const auto& body = scene[known.node].rigid_body;
       if (!body || body->linear_velocity != known.body.linear_velocity ||
           body->angular_velocity != known.body.angular_velocity ||
-          scene.world_from_node(known.object).matrix() == known.world_from_object) {
+          scene.world_from_node(known.node).matrix() == known.world_from_node) {
         continue;
       }
       if (body->linear_velocity.isZero(0.0) && body->angular_velocity.isZero(0.0)) continue;
-      scene.set_velocity(known.object, Vec3::Zero(), Vec3::Zero());
+      scene.set_velocity(known.node, Vec3::Zero(), Vec3::Zero());
     }
   }
 
  private:
   struct Known {
-    NodeId object;
-    Mat4 world_from_object;
+    NodeId node;
+    Mat4 world_from_node;
     RigidBody body;
   };
   std::vector<Known> known_;
