@@ -152,7 +152,7 @@ bool SceneTranslator::is_drawn(const Prim& prim) {
   const bool is_group =
       prim.type_name.empty() || prim.type_name == "Scope" || !prim.traits.is_known;
   bool result = prim.traits.is_xformable;
-  // Skeletons move points, which the reader does not do; their prims draw nothing.
+  // Skeletons move points of others.
   if (prim.type_name == "Skeleton") result = false;
   if (is_joint(prim.type_name)) result = true;
   if (is_foreign_joint(prim.type_name)) {

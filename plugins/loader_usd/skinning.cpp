@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "loader_usd/conversion.h"
@@ -16,6 +17,7 @@ using usd::Prim;
 
 constexpr std::size_t kMaxJoints = 100'000;
 constexpr std::size_t kMaxInfluences = 1'000;
+constexpr std::size_t kMaxShapes = 10'000;
 // Of a joint's path: each part of it is looked up.
 constexpr std::size_t kMaxPathLetters = 4'096;
 
@@ -245,6 +247,11 @@ void Skinning::blend_shapes(const Prim& prim, const Animation& animation, std::v
     losses.insert("has blend shapes whose names and targets do not fit, which are left out");
     return;
   }
+  if (names.size() > kMaxShapes) {
+    losses.insert("has more than " + std::to_string(kMaxShapes) +
+                  " blend shapes, which are left out");
+    return;
+  }
   for (std::size_t i = 0; i < names.size(); ++i) {
     const auto weight = animation.weights.find(names[i]);
     const Prim* shape = stage_.find(targets[i]);
@@ -346,12 +353,15 @@ void Skinning::apply(const Prim& prim, MeshSources& sources, Losses& losses) {
   }
   bool is_sound = true;
   std::vector<Mat3> turns(count);
+  Affine moved = Affine::Identity();
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t first = is_rigid ? 0 : influences * i;
-    const Affine moved = mesh_from_skeleton *
-                         linear_blend(bones->skeleton_from_bound, joints->span.data() + first,
-                                      weights->span.data() + first, influences, places, is_sound) *
-                         skeleton_from_mesh;
+    if (!is_rigid || i == 0) {
+      moved = mesh_from_skeleton *
+              linear_blend(bones->skeleton_from_bound, joints->span.data() + first,
+                           weights->span.data() + first, influences, places, is_sound) *
+              skeleton_from_mesh;
+    }
     points[i] = moved * points[i];
     turns[i] = moved.linear().inverse().transpose();
     if (!turns[i].allFinite()) turns[i] = Mat3::Identity();

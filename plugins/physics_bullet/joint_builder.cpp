@@ -85,7 +85,7 @@ void check_joint(const Scene& scene, NodeId id) {
                         std::abs(joint.axis.norm() - 1.0) < 1e-6 && joint.lower <= joint.upper;
   if (is_sound) return;
   throw Error(ErrorKind::Asset, scene.path(id) +
-                                    ": its joint needs finite frames, an axis of unit length and "
+                                    ": its joint needs finite places, an axis of unit length and "
                                     "a lower limit that is not above the upper one");
 }
 

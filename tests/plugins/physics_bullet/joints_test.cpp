@@ -169,7 +169,7 @@ TEST_CASE("a joint with numbers that cannot be is named", "[physics_bullet]") {
   const NodeId b = world.add_primitive("b", PrimitiveShape::Box, Vec3(0.2, 0.2, 0.2), at(1, 0, 1));
   world.make_body(b);
   join(world, JointKind::Revolute, a, b, at(0.5, 0, 1), Vec3::UnitX(), 2.0, 1.0);
-  CHECK_THROWS_WITH(world.run(1), ContainsSubstring("/joint: its joint needs finite frames"));
+  CHECK_THROWS_WITH(world.run(1), ContainsSubstring("/joint: its joint needs finite places"));
 }
 
 }  // namespace diorama
