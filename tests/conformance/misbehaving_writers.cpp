@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Writers that break one promise each.
+#include <atomic>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
+#include <string>
 
 #include "diorama/plugin.h"
 #include "diorama/writer.h"
@@ -23,10 +25,10 @@ class Base : public Writer {
 
 struct CountsInstead : Base {
   using Base::Base;
-  mutable int count = 0;
+  mutable std::atomic<int> count = 0;  // one name for two captures would be another fault
   void write(const Capture&, CaptureFiles& files) const override {
-    files.add_text(std::to_string(count) + ".txt", std::to_string(count));
-    ++count;
+    const std::string number = std::to_string(count++);
+    files.add_text(number + ".txt", number);
   }
 };
 
