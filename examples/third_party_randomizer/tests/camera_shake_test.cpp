@@ -17,7 +17,10 @@ Affine shaken(diorama::Randomizer& shake, std::uint64_t seed, const char* name, 
   for (int i = 0; i < count; ++i) {
     scene.create(cameras, "cam_" + std::to_string(i));
   }
-  shake.randomize(scene, {"floating", 0, Vec3::Zero()}, diorama::Rng(seed));
+  diorama::RandomizeContext context;
+  context.moment = "floating";
+  context.capture = 0;
+  shake.randomize(scene, context, diorama::Rng(seed));
   return scene.world_from_node(scene.require(name));
 }
 

@@ -14,7 +14,9 @@ diorama::Affine randomized(diorama::Randomizer& randomizer, const char* name, in
   for (int i = 0; i < count; ++i) scene.create(assets, "cup");
   const diorama::NodeId node = scene.require(name);
   scene.set_pose(node, diorama::Affine(Eigen::Translation3d(1, 2, 3)));
-  randomizer.randomize(scene, {"environment", -1, Vec3::Zero()}, diorama::Rng(5));
+  diorama::RandomizeContext context;
+  context.moment = "environment";
+  randomizer.randomize(scene, context, diorama::Rng(5));
   return scene.world_from_node(node);
 }
 
