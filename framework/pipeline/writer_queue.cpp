@@ -11,7 +11,6 @@
 #include <optional>
 #include <thread>
 #include <utility>
-#include <variant>
 #include <vector>
 
 #include "framework/plugins/fatal_end.h"
@@ -201,12 +200,12 @@ struct WriterQueue::State {
 };
 
 std::size_t capture_bytes(const PendingCapture& pending) {
+  // Too much for most channels: that covers what else a capture holds and what encoding needs.
+  constexpr std::size_t kWidestPixel = sizeof(Vec3f);
   std::size_t bytes = pending.overview.pixels().size_bytes();
   for (const Frame& frame : pending.capture.frames) {
-    for (const std::string& channel : frame.channels()) {
-      bytes += std::visit([](const auto& image) { return image.pixels().size_bytes(); },
-                          frame.image_named(channel));
-    }
+    const std::size_t pixels = std::size_t(frame.camera.width) * std::size_t(frame.camera.height);
+    bytes += pixels * frame.channels().size() * kWidestPixel;
     for (const Instance& instance : frame.instances) {
       if (instance.visibility) bytes += instance.visibility->amodal_mask.bits.size();
     }

@@ -503,7 +503,7 @@ TEST_CASE("Tracking folders of others are read, and what is wrong with them is s
   write_file(folder / "theirs/endless/b/seqinfo.ini", endless);
   const Outcome refused = run({"lint", "theirs/endless"}, folder.path());
   CHECK(refused.exit_code != 0);
-  CHECK_THAT(refused.errors, ContainsSubstring("more than 10000000 frames in all"));
+  CHECK_THAT(refused.output, ContainsSubstring("more than 10000000 frames in all"));
   // Pictures whose names have other than six digits.
   const fs::path pictures = folder / "theirs/kitti/training/image_02/0000";
   for (int i = 0; i < 6; ++i) {
