@@ -35,7 +35,7 @@ foreign_bytes=(
 )
 by_night=(
   replicator_test plugin_search_test framework_inspect_test loader_usd_expected loader_assimp_test
-  renderer_embree_test renderer_support_test
+  renderer_embree_test renderer_support_test loader_urdf_test
 )
 threads=(host_test pipeline_test output_test)
 mapfile -t writers < <(cd plugins && ls -d writer_*/ | sed '/^writer_support/d; s,/,,')
