@@ -10,14 +10,15 @@
 #include "joint_builder.h"
 
 namespace diorama {
-namespace {
 
-btTransform to_bullet(const Rigid& rigid) {
+btTransform bullet_transform(const Rigid& rigid) {
   const Quat rotation(rigid.linear());
   const Vec3 position = rigid.translation();
   return btTransform(btQuaternion(rotation.x(), rotation.y(), rotation.z(), rotation.w()),
                      btVector3(position.x(), position.y(), position.z()));
 }
+
+namespace {
 
 /// The colliders that move as one.
 struct Group {
@@ -75,7 +76,8 @@ OwnedShapes own_shapes(const std::vector<ConvexPart>& parts, const Rigid& body_f
     PlacedShape placed = make_shape(part, body_from_frame, margin_m);
     const bool is_identity = placed.body_from_shape.matrix().isIdentity(1e-9);
     is_placed = is_placed || !is_identity;
-    places.push_back(is_identity ? btTransform::getIdentity() : to_bullet(placed.body_from_shape));
+    places.push_back(is_identity ? btTransform::getIdentity()
+                                 : bullet_transform(placed.body_from_shape));
     owned.outer_margin_m = std::min(owned.outer_margin_m, placed.outer_margin_m);
     owned.parts.push_back(std::move(placed.shape));
   }
@@ -108,7 +110,7 @@ void add_static(const Scene& scene, NodeId id, const BulletBackend::Params& para
   }
   made.object = std::make_unique<btCollisionObject>();
   made.object->setCollisionShape(made.shapes.shape());
-  made.object->setWorldTransform(to_bullet(place));
+  made.object->setWorldTransform(bullet_transform(place));
   made.object->setUserPointer(const_cast<StaticMesh*>(made.shapes.mesh.get()));
   set_surface(*made.object, *node.collider);
   statics.push_back(std::move(made));
@@ -216,7 +218,7 @@ void add_moving(const Scene& scene, NodeId id, const Group& group,
   moving.is_nested = has_body_above(scene, id);
   moving.has_gravity = scene[id].rigid_body->has_gravity;
   moving.shapes = own_shapes(parts, balance.frame_from_body.inverse(), params.margin_m);
-  moving.start = to_bullet(balance.frame_from_body);
+  moving.start = bullet_transform(balance.frame_from_body);
   moving.body_from_node = Affine(balance.frame_from_body.inverse()) * scene.world_from_node(id);
   btRigidBody::btRigidBodyConstructionInfo info(
       mass_kg, nullptr, moving.shapes.shape(),

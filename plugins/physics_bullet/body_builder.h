@@ -58,6 +58,8 @@ struct Bodies {
   std::vector<std::string> shapeless;  ///< Rigid bodies without anything that collides.
 };
 
+btTransform bullet_transform(const Rigid& rigid);
+
 Bodies build_bodies(const Scene& scene, const BulletBackend::Params& params, ShapeCache& cache);
 
 }  // namespace diorama

@@ -13,13 +13,6 @@ namespace {
 
 constexpr double kFar = 1e6;  // metres: no limit
 
-btTransform bullet_transform(const Rigid& rigid) {
-  const Quat rotation(rigid.linear());
-  const Vec3 position = rigid.translation();
-  return btTransform(btQuaternion(rotation.x(), rotation.y(), rotation.z(), rotation.w()),
-                     btVector3(position.x(), position.y(), position.z()));
-}
-
 using MovingBodies = std::map<NodeId, std::size_t>;
 
 /// The moving body that the node is part of; nothing where it stands still.

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "diorama/reader.h"
+#include "diorama/writer.h"
 #include "reader_support/frame_reading.h"
 
 namespace diorama {
@@ -63,11 +64,13 @@ class CaptureRows {
 };
 
 /// Reads the frames of a capture's rows with `read_frame(row, stored, sources)`; one that gives
-/// nothing is left out.
+/// nothing is left out. `clips`: those of the dataset.
 template <class Rows, class ReadFrame>
-StoredCapture read_frames(int capture, const Rows& rows, ReadFrame&& read_frame) {
+StoredCapture read_frames(int capture, std::span<const DatasetClip> clips, const Rows& rows,
+                          ReadFrame&& read_frame) {
   StoredCapture stored;
   stored.capture.index = capture;
+  stored.capture.clip = clip_frame(clips, capture);
   for (const auto& row : rows) {
     FrameSources sources;
     std::optional<Frame> frame = read_frame(row, stored, sources);

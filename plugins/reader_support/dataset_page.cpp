@@ -75,13 +75,12 @@ std::optional<DatasetPage> read_dataset_page(const std::filesystem::path& folder
   }
 }
 
-void note_clips(const std::optional<DatasetPage>& page, StoredInfo& info) {
-  if (page && !page->clips.empty()) info.holds.emplace(kHoldsClips);
+std::span<const DatasetClip> clips_of(const std::optional<DatasetPage>& page) {
+  return page ? std::span<const DatasetClip>(page->clips) : std::span<const DatasetClip>();
 }
 
-StoredCapture in_clip(const std::optional<DatasetPage>& page, StoredCapture stored) {
-  if (page) stored.capture.clip = clip_frame(page->clips, stored.capture.index);
-  return stored;
+void note_clips(std::span<const DatasetClip> clips, StoredInfo& info) {
+  if (!clips.empty()) info.holds.emplace(kHoldsClips);
 }
 
 Recognition recognise_page(const std::filesystem::path& folder, const std::string& format) {

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -32,9 +33,10 @@ struct DatasetPage {
 /// format's rules alone.
 std::optional<DatasetPage> read_dataset_page(const std::filesystem::path& folder);
 
-/// Clips that the page lists: what the dataset holds, and the place of a capture in them.
-void note_clips(const std::optional<DatasetPage>& page, StoredInfo& info);
-StoredCapture in_clip(const std::optional<DatasetPage>& page, StoredCapture stored);
+/// Clips that the page lists; none without a page.
+std::span<const DatasetClip> clips_of(const std::optional<DatasetPage>& page);
+/// What a dataset with such clips holds.
+void note_clips(std::span<const DatasetClip> clips, StoredInfo& info);
 
 /// ByName when the page says this format.
 Recognition recognise_page(const std::filesystem::path& folder, const std::string& format);

@@ -41,16 +41,14 @@ class BasicDataset final : public StoredDataset {
 
   StoredCapture read(std::size_t i, const NameSet& wanted) const override {
     const int number = info_.captures.at(i);
-    StoredCapture read = read_frames(
-        number, names_.products(),
+    return read_frames(
+        number, clips_, names_.products(),
         [&](const std::string& product, StoredCapture& stored, FrameSources& sources) {
           const std::string camera = camera_of(product);
           StoredFiles files(folder_, host_, stored.log, number, camera);
           check_complete(product, number, files);
           return BasicFrameReading(names_, product, number, wanted, files).read(camera, sources);
         });
-    read.capture.clip = clip_frame(clips_, number);
-    return read;
   }
 
  private:
@@ -118,7 +116,7 @@ class BasicDataset final : public StoredDataset {
       hold(std::string(flow) + ".npy", {flow});
     }
     hold("velocities.json", {kHoldsVelocities});
-    if (!clips_.empty()) info_.holds.emplace(kHoldsClips);
+    note_clips(clips_, info_);
     hold("camera_params.json", {kHoldsCamera, kHoldsCameraPose});
     hold("joint_states.json", {kHoldsJoints});
     hold("instance_segmentation.png",

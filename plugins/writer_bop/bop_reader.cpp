@@ -82,7 +82,7 @@ class BopDataset final : public StoredDataset {
     group(files);
     if (page_) check_own_files(files, targets);
     describe();
-    note_clips(page_, info_);
+    note_clips(clips_of(page_), info_);
   }
 
   const StoredInfo& info() const override { return info_; }
@@ -706,14 +706,13 @@ class BopImageReading : private FrameReading {
 };
 
 StoredCapture BopDataset::read(std::size_t i, const NameSet& wanted) const {
-  return in_clip(
-      page_, read_frames(info_.captures.at(i), rows_.of(i),
-                         [&](const BopImage& image, StoredCapture& stored, FrameSources& sources) {
-                           const std::string& split = scenes_[image.scene].split;
-                           // Our writer's validation captures are what the benchmark tests on.
-                           stored.split = page_ && split == "test" ? "val" : split;
-                           return BopImageReading(*this, image, wanted, stored.log).read(sources);
-                         }));
+  return read_frames(info_.captures.at(i), clips_of(page_), rows_.of(i),
+                     [&](const BopImage& image, StoredCapture& stored, FrameSources& sources) {
+                       const std::string& split = scenes_[image.scene].split;
+                       // Our writer's validation captures are what the benchmark tests on.
+                       stored.split = page_ && split == "test" ? "val" : split;
+                       return BopImageReading(*this, image, wanted, stored.log).read(sources);
+                     });
 }
 
 }  // namespace

@@ -136,7 +136,7 @@ class CocoDataset final : public StoredDataset {
     hold(tables_.has_cameras, {kHoldsCamera, kHoldsCameraPose});
     hold(tables_.has_amodal,
          {"amodal_mask", "occlusion_order", kHoldsOcclusion, kHoldsTruncation, kHoldsAmodalBoxes});
-    note_clips(page_, info_);
+    note_clips(clips_of(page_), info_);
     // Boxes that people drew, and polygons, do not end at pixels.
     info_.steps[std::string(kHoldsTightBoxes)] = page_ ? 0.0 : 2.0;
     info_.steps[std::string(kHoldsTruncation)] = 1e-6;
@@ -597,13 +597,12 @@ class CocoImageReading : private FrameReading {
 StoredCapture CocoDataset::read(std::size_t i, const NameSet& wanted) const {
   const auto images = std::span(tables_.images)
                           .subspan(first_image_.at(i), first_image_.at(i + 1) - first_image_[i]);
-  return in_clip(
-      page_,
-      read_frames(info_.captures.at(i), images,
-                  [&](const CocoImageEntry& entry, StoredCapture& stored, FrameSources& sources) {
-                    stored.split = tables_.parts[entry.part].split;
-                    return CocoImageReading(*this, entry, wanted, stored.log).read(sources);
-                  }));
+  return read_frames(
+      info_.captures.at(i), clips_of(page_), images,
+      [&](const CocoImageEntry& entry, StoredCapture& stored, FrameSources& sources) {
+        stored.split = tables_.parts[entry.part].split;
+        return CocoImageReading(*this, entry, wanted, stored.log).read(sources);
+      });
 }
 
 }  // namespace

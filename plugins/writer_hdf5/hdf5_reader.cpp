@@ -81,7 +81,7 @@ class Hdf5Dataset final : public StoredDataset {
         std::move(listed), page_,
         [&](const std::string& stem) { return capture_and_camera(*page_, stem); }, folders_, files);
     describe(files);
-    note_clips(page_, info_);
+    note_clips(clips_of(page_), info_);
   }
 
   const StoredInfo& info() const override { return info_; }
@@ -469,14 +469,13 @@ class Hdf5PictureReading : private FrameReading {
 };
 
 StoredCapture Hdf5Dataset::read(std::size_t i, const NameSet& wanted) const {
-  return in_clip(
-      page_,
-      read_frames(info_.captures.at(i), pictures_.pictures(i),
-                  [&](const ListedPicture& picture, StoredCapture& stored, FrameSources& sources) {
-                    const std::string& folder = folders_[picture.folder];
-                    stored.split = folder.empty() ? "" : folder.substr(0, folder.size() - 1);
-                    return Hdf5PictureReading(*this, picture, wanted, stored.log).read(sources);
-                  }));
+  return read_frames(
+      info_.captures.at(i), clips_of(page_), pictures_.pictures(i),
+      [&](const ListedPicture& picture, StoredCapture& stored, FrameSources& sources) {
+        const std::string& folder = folders_[picture.folder];
+        stored.split = folder.empty() ? "" : folder.substr(0, folder.size() - 1);
+        return Hdf5PictureReading(*this, picture, wanted, stored.log).read(sources);
+      });
 }
 
 }  // namespace

@@ -243,7 +243,7 @@ class ImageFolder final : public StoredDataset {
     if (is_lossy) info_.steps[std::string(kColor.name)] = 16.0;
     info_.steps[std::string(kHoldsTightBoxes)] = page_ ? 0.0 : 2.0;
     info_.steps[std::string(kHoldsOcclusion)] = 1e-6;
-    note_clips(page_, info_);
+    note_clips(clips_of(page_), info_);
   }
 
   void look_at(const Entry& entry, bool& is_lossy) {
@@ -422,13 +422,11 @@ class ImageFolderReading : private FrameReading {
 };
 
 StoredCapture ImageFolder::read(std::size_t i, const NameSet& wanted) const {
-  return in_clip(
-      page_,
-      read_frames(info_.captures.at(i), rows_.of(i),
-                  [&](const Entry& entry, StoredCapture& stored, FrameSources& sources) {
-                    stored.split = tables_[entry.table].split;
-                    return ImageFolderReading(*this, entry, wanted, stored.log).read(sources);
-                  }));
+  return read_frames(info_.captures.at(i), clips_of(page_), rows_.of(i),
+                     [&](const Entry& entry, StoredCapture& stored, FrameSources& sources) {
+                       stored.split = tables_[entry.table].split;
+                       return ImageFolderReading(*this, entry, wanted, stored.log).read(sources);
+                     });
 }
 
 }  // namespace

@@ -236,7 +236,7 @@ class KittiDataset final : public StoredDataset {
 
   void describe() {
     info_.format = is_tracking_ ? kTrackingFormat : kFormat;
-    if (!clips_.empty()) info_.holds.emplace(kHoldsClips);
+    note_clips(clips_, info_);
     info_.camera_names = pictures_.cameras();
     info_.captures = pictures_.captures();
     if (page_) info_.classes = page_->classes;
@@ -572,13 +572,12 @@ class KittiPictureReading : private FrameReading {
 
 StoredCapture KittiDataset::read(std::size_t i, const NameSet& wanted) const {
   StoredCapture read =
-      read_frames(info_.captures.at(i), pictures_.pictures(i),
+      read_frames(info_.captures.at(i), clips_, pictures_.pictures(i),
                   [&](const ListedPicture& picture, StoredCapture& stored, FrameSources& sources) {
                     const auto split = split_of_.find(picture.stem);
                     if (split != split_of_.end()) stored.split = split->second;
                     return KittiPictureReading(*this, picture, wanted, stored.log).read(sources);
                   });
-  read.capture.clip = clip_frame(clips_, read.capture.index);
   if (!is_tracking_ || !page_) return read;
   const auto split = page_->split_of_capture.find(read.capture.index);
   if (split != page_->split_of_capture.end()) read.split = split->second;

@@ -84,14 +84,11 @@ class MotDataset final : public StoredDataset {
   const ReadLog& log() const override { return log_; }
 
   StoredCapture read(std::size_t i, const NameSet& wanted) const override {
-    const int capture = info_.captures.at(i);
-    StoredCapture stored = read_frames(
-        capture, rows_.of(i), [&](const Row& row, StoredCapture& into, FrameSources& sources) {
-          into.split = sequences_[row.sequence].split;
-          return read_frame(row, wanted, into.log, sources);
-        });
-    stored.capture.clip = clip_frame(clips_, capture);
-    return stored;
+    return read_frames(info_.captures.at(i), clips_, rows_.of(i),
+                       [&](const Row& row, StoredCapture& into, FrameSources& sources) {
+                         into.split = sequences_[row.sequence].split;
+                         return read_frame(row, wanted, into.log, sources);
+                       });
   }
 
  private:
@@ -263,7 +260,7 @@ class MotDataset final : public StoredDataset {
     if (page_) info_.classes = page_->classes;
     info_.holds = {std::string(kColor.name), std::string(kHoldsInstances),
                    std::string(kHoldsLabels), std::string(kHoldsTightBoxes)};
-    if (!clips_.empty()) info_.holds.emplace(kHoldsClips);
+    note_clips(clips_, info_);
     // The challenge's boxes were drawn round whole people.
     info_.steps[std::string(kHoldsTightBoxes)] = page_ ? 0.0 : 1e4;
     const bool is_lossy = std::ranges::any_of(

@@ -725,7 +725,7 @@ class PoseFrameReading : private FrameReading {
 StoredCapture PoseDataset::read(std::size_t i, const NameSet& wanted) const {
   const auto frames = std::span(frames_).subspan(first_.at(i), first_.at(i + 1) - first_[i]);
   SeenLocations locations;
-  return read_frames(info_.captures.at(i), frames,
+  return read_frames(info_.captures.at(i), {}, frames,
                      [&](const PoseFrame& frame, StoredCapture& stored, FrameSources& sources) {
                        PoseFrameReading reading(*this, frame, wanted, stored.log);
                        auto result = reading.read(sources);

@@ -3,13 +3,15 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <variant>
+#include <vector>
 
 #include "diorama/error.h"
-#include "diorama/rng.h"
 #include "opencv_support/color_maps.h"
 #include "writer_support/python_json.h"
 #include "writer_support/replicator.h"
+#include "writer_support/segmentation_colors.h"
 #include "writer_video/h264_encoder.h"
 #include "writer_video/mp4_file.h"
 
@@ -18,30 +20,6 @@ namespace {
 
 constexpr std::array kShown{kColor.name, kInstanceId.name, kMotion.name, kFlowForward.name,
                             kFlowBackward.name};
-
-Rgba8 color_of_id(std::uint32_t id) {
-  if (id == 0) return {24, 24, 24, 255};
-  const Vec3 color = Rng(id).uniform_in(Aabb{Vec3::Constant(64.0), Vec3::Constant(255.0)});
-  return {std::uint8_t(color.x()), std::uint8_t(color.y()), std::uint8_t(color.z()), 255};
-}
-
-std::string hex_of(const std::vector<std::byte>& bytes) {
-  constexpr std::string_view kDigits = "0123456789abcdef";
-  std::string text;
-  for (const std::byte byte : bytes) {
-    text += kDigits[std::size_t(byte) >> 4];
-    text += kDigits[std::size_t(byte) & 15];
-  }
-  return text;
-}
-
-std::vector<std::byte> bytes_of_hex(const std::string& text) {
-  std::vector<std::byte> bytes;
-  for (std::size_t i = 0; i + 1 < text.size(); i += 2) {
-    bytes.push_back(std::byte(std::stoi(text.substr(i, 2), nullptr, 16)));
-  }
-  return bytes;
-}
 
 void draw(const Image<Rgba8>& from, int left, int top, Image<Rgba8>& into) {
   for (int y = 0; y < from.height(); ++y) {
@@ -91,7 +69,7 @@ Image<Rgba8> VideoWriter::shown(const Frame& frame, const std::string& channel) 
   }
   const auto& ids = frame.get(kInstanceId);
   Image<Rgba8> picture(ids.width(), ids.height(), Rgba8{});
-  std::ranges::transform(ids.pixels(), picture.pixels().begin(), color_of_id);
+  std::ranges::transform(ids.pixels(), picture.pixels().begin(), segmentation_color);
   return picture;
 }
 
@@ -124,7 +102,7 @@ void VideoWriter::write(const Capture& capture, CaptureFiles& files) const {
   if (capture.clip->frame == 0) {
     record["width"] = picture.width();
     record["height"] = picture.height();
-    record["config"] = hex_of(encoded.config);
+    record["config"] = encoded.config;
   }
   files.record(record.dump());
 }
@@ -141,7 +119,7 @@ void VideoWriter::finish(const RecordReader& records, DatasetFiles& files) {
     track.width = record.at("width").get<int>();
     track.height = record.at("height").get<int>();
     track.fps = at->fps;
-    track.config = bytes_of_hex(record.at("config").get<std::string>());
+    track.config = record.at("config").get<std::vector<std::byte>>();
   });
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     if (tracks[i].config.empty()) continue;

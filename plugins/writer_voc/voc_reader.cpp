@@ -89,7 +89,7 @@ class VocDataset final : public StoredDataset {
     if (page_) check_own_lists(files);
     check_strays(files);
     describe();
-    note_clips(page_, info_);
+    note_clips(clips_of(page_), info_);
   }
 
   const StoredInfo& info() const override { return info_; }
@@ -416,14 +416,13 @@ class VocPictureReading : private FrameReading {
 };
 
 StoredCapture VocDataset::read(std::size_t i, const NameSet& wanted) const {
-  return in_clip(
-      page_,
-      read_frames(info_.captures.at(i), pictures_.pictures(i),
-                  [&](const ListedPicture& picture, StoredCapture& stored, FrameSources& sources) {
-                    const auto split = split_of_.find(picture.stem);
-                    if (split != split_of_.end()) stored.split = split->second;
-                    return VocPictureReading(*this, picture, wanted, stored.log).read(sources);
-                  }));
+  return read_frames(
+      info_.captures.at(i), clips_of(page_), pictures_.pictures(i),
+      [&](const ListedPicture& picture, StoredCapture& stored, FrameSources& sources) {
+        const auto split = split_of_.find(picture.stem);
+        if (split != split_of_.end()) stored.split = split->second;
+        return VocPictureReading(*this, picture, wanted, stored.log).read(sources);
+      });
 }
 
 }  // namespace

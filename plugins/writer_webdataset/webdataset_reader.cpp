@@ -108,7 +108,7 @@ class WebDataset final : public StoredDataset {
     read_lists(files);
     group(files);
     describe();
-    note_clips(page_, info_);
+    note_clips(clips_of(page_), info_);
   }
 
   const StoredInfo& info() const override { return info_; }
@@ -658,12 +658,11 @@ class SampleReading : private FrameReading {
 };
 
 StoredCapture WebDataset::read(std::size_t i, const NameSet& wanted) const {
-  return in_clip(
-      page_, read_frames(info_.captures.at(i), rows_.of(i),
-                         [&](const Sample& sample, StoredCapture& stored, FrameSources& sources) {
-                           stored.split = splits_[sample.shard];
-                           return SampleReading(*this, sample, wanted, stored.log).read(sources);
-                         }));
+  return read_frames(info_.captures.at(i), clips_of(page_), rows_.of(i),
+                     [&](const Sample& sample, StoredCapture& stored, FrameSources& sources) {
+                       stored.split = splits_[sample.shard];
+                       return SampleReading(*this, sample, wanted, stored.log).read(sources);
+                     });
 }
 
 }  // namespace

@@ -68,7 +68,7 @@ class YoloDataset final : public StoredDataset {
     }
     choose_task(files);
     describe();
-    note_clips(page_, info_);
+    note_clips(clips_of(page_), info_);
   }
 
   const StoredInfo& info() const override { return info_; }
@@ -567,13 +567,12 @@ class YoloPictureReading : private FrameReading {
 };
 
 StoredCapture YoloDataset::read(std::size_t i, const NameSet& wanted) const {
-  return in_clip(
-      page_,
-      read_frames(info_.captures.at(i), pictures_.pictures(i),
-                  [&](const ListedPicture& picture, StoredCapture& stored, FrameSources& sources) {
-                    stored.split = folders_[picture.folder].split;
-                    return YoloPictureReading(*this, picture, wanted, stored.log).read(sources);
-                  }));
+  return read_frames(
+      info_.captures.at(i), clips_of(page_), pictures_.pictures(i),
+      [&](const ListedPicture& picture, StoredCapture& stored, FrameSources& sources) {
+        stored.split = folders_[picture.folder].split;
+        return YoloPictureReading(*this, picture, wanted, stored.log).read(sources);
+      });
 }
 
 }  // namespace

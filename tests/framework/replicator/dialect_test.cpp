@@ -5,9 +5,11 @@
 #include "framework/config/value_text.h"
 #include "framework/config/yaml_config.h"
 #include "framework/pipeline/job.h"
+#include "replicator_complaints.h"
 #include "support/catch.h"
 
 using namespace diorama;
+using diorama::test::complaints_about;
 
 namespace {
 
@@ -18,16 +20,6 @@ Job native_job(const std::string& yaml) {
   Job job = read_job(translation.job, complaints);
   complaints.raise();
   return job;
-}
-
-std::string complaints_about(const std::string& yaml) {
-  Complaints complaints;
-  const ReplicatorTranslation translation =
-      translate_replicator_job(parse_yaml(yaml, "job.yaml"), complaints);
-  if (complaints.is_empty()) read_job(translation.job, complaints);
-  std::string text;
-  for (const std::string& message : complaints.messages()) text += message + "\n";
-  return text;
 }
 
 std::string text_of(const Value& value) { return to_json(value, 0); }

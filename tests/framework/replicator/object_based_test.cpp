@@ -5,9 +5,11 @@
 #include "framework/config/value_text.h"
 #include "framework/config/yaml_config.h"
 #include "framework/pipeline/job.h"
+#include "replicator_complaints.h"
 #include "support/catch.h"
 
 using namespace diorama;
+using diorama::test::complaints_about;
 
 namespace {
 
@@ -27,16 +29,6 @@ Translated translated(const std::string& yaml) {
   result.native = std::move(translation.job);
   for (const std::string& key : translation.without_effect) result.without_effect += key + "\n";
   return result;
-}
-
-std::string object_based_complaints(const std::string& yaml) {
-  Complaints complaints;
-  const ReplicatorTranslation translation =
-      translate_replicator_job(parse_yaml(yaml, "job.yaml"), complaints);
-  if (complaints.is_empty()) read_job(translation.job, complaints);
-  std::string text;
-  for (const std::string& message : complaints.messages()) text += message + "\n";
-  return text;
 }
 
 const RandomizerEntry& randomizer(const Job& job, const std::string& name) {
@@ -214,28 +206,27 @@ TEST_CASE("What has no effect is named, what is unknown is refused", "[replicato
   CHECK_THAT(names, ContainsSubstring("disable_render_products_between_captures (nothing"));
   CHECK_THAT(names, ContainsSubstring("camera_properties_kwargs.verticalAperture (pixels are"));
 
-  CHECK_THAT(object_based_complaints("{num_frames: 3, num_camera: 2}"),
+  CHECK_THAT(complaints_about("{num_frames: 3, num_camera: 2}"),
              ContainsSubstring("unknown key 'num_camera'; did you mean 'num_cameras'?"));
-  CHECK_THAT(object_based_complaints("launch_config: {headles: true}"),
+  CHECK_THAT(complaints_about("launch_config: {headles: true}"),
              ContainsSubstring("unknown key 'headles'; did you mean 'headless'?"));
-  CHECK_THAT(object_based_complaints("launch_config: {renderer: PathTracng}"),
+  CHECK_THAT(complaints_about("launch_config: {renderer: PathTracng}"),
              ContainsSubstring("found 'PathTracng'; did you mean 'PathTracing'?"));
-  CHECK_THAT(object_based_complaints("camera_properties_kwargs: {focal_lenght: 3}"),
+  CHECK_THAT(complaints_about("camera_properties_kwargs: {focal_lenght: 3}"),
              ContainsSubstring("focal_lenght"));
-  CHECK_THAT(object_based_complaints("labeled_assets_and_properties: [{label: cup}]"),
+  CHECK_THAT(complaints_about("labeled_assets_and_properties: [{label: cup}]"),
              ContainsSubstring("labeled_assets_and_properties[0]: 'url' is missing"));
-  CHECK_THAT(
-      object_based_complaints("labeled_assets_and_properties: [{url: a, scale_minmax: [1, 2]}]"),
-      ContainsSubstring("did you mean 'scale_min_max'?"));
-  CHECK_THAT(object_based_complaints("labeled_assets_and_properties: {url: a}"),
+  CHECK_THAT(complaints_about("labeled_assets_and_properties: [{url: a, scale_minmax: [1, 2]}]"),
+             ContainsSubstring("did you mean 'scale_min_max'?"));
+  CHECK_THAT(complaints_about("labeled_assets_and_properties: {url: a}"),
              ContainsSubstring("expected a list of mappings"));
-  CHECK_THAT(object_based_complaints("working_area_size: [4, 4]"),
+  CHECK_THAT(complaints_about("working_area_size: [4, 4]"),
              ContainsSubstring("working_area_size: expected [width, depth, height] in metres"));
-  CHECK_THAT(object_based_complaints("resolution: [640.5, 480]"),
+  CHECK_THAT(complaints_about("resolution: [640.5, 480]"),
              ContainsSubstring("resolution: expected [width, height] in whole pixels"));
-  CHECK_THAT(object_based_complaints("num_frames: many"), ContainsSubstring("num_frames"));
-  CHECK_THAT(object_based_complaints("writer_type: [a]"),
+  CHECK_THAT(complaints_about("num_frames: many"), ContainsSubstring("num_frames"));
+  CHECK_THAT(complaints_about("writer_type: [a]"),
              ContainsSubstring("writer_type: expected a name"));
-  CHECK_THAT(object_based_complaints("{num_frames: 3, capture: {}}"),
+  CHECK_THAT(complaints_about("{num_frames: 3, capture: {}}"),
              ContainsSubstring("unknown key 'capture'"));
 }
