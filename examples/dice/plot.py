@@ -9,7 +9,7 @@ import csv
 import sys
 from xml.sax.saxutils import escape
 
-LEFT, ROW, WIDTH, TOP = 440, 22, 420, 46
+LEFT, ROW, WIDTH, TOP = 480, 22, 420, 46
 COLORS = {"AP50": "#1f6f8b", "AP": "#c2571a"}
 
 
