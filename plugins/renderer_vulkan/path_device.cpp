@@ -46,17 +46,19 @@ PathKernels::PathKernels(const VulkanDevice& device)
       iteration_limit(find_iteration_limit(device)) {}
 
 std::shared_ptr<const PathDevice> shared_path_device(std::span<const int> numbers) {
+  using Opened = std::map<int, std::shared_ptr<const PathDevice>>;
   static std::mutex mutex;
-  static std::map<int, std::weak_ptr<const PathDevice>> opened;
+  // Never destroyed: at the end of the process drivers may be gone before.
+  static Opened& opened = *new Opened;
   for (const int number : numbers) VulkanInstance::of_process().device(number);
   const std::lock_guard lock(mutex);
-  const int number = *std::ranges::min_element(
-      numbers, {}, [](int candidate) { return opened[candidate].use_count(); });
-  std::shared_ptr<const PathDevice> device = opened[number].lock();
-  if (!device) {
-    device = std::make_shared<const PathDevice>(number);
-    opened[number] = device;
-  }
+  const auto users = [](int number) {
+    const std::shared_ptr<const PathDevice>& device = opened[number];
+    return device ? device.use_count() - 1 : 0;
+  };
+  const int number = *std::ranges::min_element(numbers, {}, users);
+  std::shared_ptr<const PathDevice>& device = opened[number];
+  if (!device || device->device.is_lost()) device = std::make_shared<const PathDevice>(number);
   return device;
 }
 

@@ -35,9 +35,9 @@ struct PathDevice {
   const std::unique_ptr<GpuAssets> assets;
 };
 
-/// The process's device of one of these numbers, that with the fewest users by now: opened for the
-/// first, closed after the last. Throws as VulkanInstance::device() does for any of the numbers.
-/// From any thread.
+/// The process's device of one of these numbers, that with the fewest users by now. It stays open
+/// for users to come, unless it is lost. Throws as VulkanInstance::device() does for any of the
+/// numbers. From any thread.
 std::shared_ptr<const PathDevice> shared_path_device(std::span<const int> numbers);
 inline std::shared_ptr<const PathDevice> shared_path_device(int number) {
   return shared_path_device(std::span(&number, 1));

@@ -316,6 +316,7 @@ void VulkanDevice::check(VkResult result, const char* action) const {
   std::string text = "Vulkan device " + std::to_string(number_) + " (" + info_.name +
                      ") failed to " + action + ": " + words_for(result);
   if (result == VK_ERROR_DEVICE_LOST) {
+    is_lost_ = true;
     text += "; the captures that were written stay: run the job again with --resume";
   }
   throw Error(ErrorKind::Plugin, text);

@@ -108,6 +108,8 @@ class VulkanDevice {
   int number() const { return number_; }
   VkDevice handle() const { return device_; }
   VkPipelineLayout layout() const { return layout_; }
+  /// Some call found that the device is lost: nothing that is on it can be used any more.
+  bool is_lost() const { return is_lost_; }
   /// Bytes that buffers hold now.
   std::uint64_t held() const { return held_; }
 
@@ -162,6 +164,7 @@ class VulkanDevice {
   VkPipelineLayout layout_ = VK_NULL_HANDLE;
   VkPhysicalDeviceMemoryProperties memory_{};
   mutable std::atomic<std::uint64_t> held_ = 0;
+  mutable std::atomic<bool> is_lost_ = false;
   mutable std::mutex queue_mutex_;
   mutable std::mutex lanes_mutex_;
   mutable std::vector<std::unique_ptr<Lane>> free_lanes_;

@@ -115,13 +115,17 @@ TEST_CASE("too little memory is told with what was wanted and what there is", "[
 TEST_CASE("what is lost with a device is told", "[vulkan]") {
   if (!test::has_vulkan_device()) return;
   const VulkanDevice device(0);
+  CHECK(!device.is_lost());
   CHECK_THROWS_WITH(device.check(VK_ERROR_DEVICE_LOST, "run kernels"),
                     Catch::Contains("failed to run kernels: the device was lost; the captures that "
                                     "were written stay: run the job again with --resume"));
+  CHECK(device.is_lost());
 }
 
-TEST_CASE("a device is open once in a process, as long as it is used", "[vulkan]") {
+TEST_CASE("a device is open once in a process, and stays so", "[vulkan]") {
   if (!test::has_vulkan_device()) return;
+  std::weak_ptr<const PathDevice> left = shared_path_device(0);
+  CHECK(!left.expired());
   CHECK(shared_path_device(0) == test::path_device());
   CHECK_THROWS_WITH(shared_path_device(77), Catch::Contains("there is no Vulkan device 77"));
   CHECK(&test::path_device()->device.instance() == &VulkanInstance::of_process());

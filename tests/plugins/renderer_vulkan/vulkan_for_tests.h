@@ -21,10 +21,6 @@ inline bool has_vulkan_device() {
   }
 }
 
-/// Opened once for all tests.
-inline std::shared_ptr<const PathDevice> path_device() {
-  static const auto device = shared_path_device(0);
-  return device;
-}
+inline std::shared_ptr<const PathDevice> path_device() { return shared_path_device(0); }
 
 }  // namespace diorama::test
