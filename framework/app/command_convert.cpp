@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "diorama/writer.h"
-#include "framework/app/output_check.h"
 #include "framework/config/json_text.h"
 #include "framework/config/yaml_config.h"
 #include "framework/datasets/conversion.h"
@@ -18,6 +17,7 @@
 #include "framework/datasets/dataset_readers.h"
 #include "framework/host/progress_bar.h"
 #include "framework/jobs/assemble.h"
+#include "framework/output/free_folders.h"
 
 namespace diorama {
 namespace {

@@ -95,7 +95,9 @@ void complete_instances(Frame& frame, const NameSet& needs) {
     if (!visibility.amodal_box) visibility.amodal_box = found->second.box;
     if (!visibility.whole_box) visibility.whole_box = visibility.amodal_box;
     if (needs.contains("amodal_mask") && visibility.amodal_mask.bits.empty()) {
-      visibility.amodal_mask = visible_mask(ids, instance.id, found->second.box);
+      // Counts and boxes of a whole object that nobody knows the shape of would contradict it.
+      const PixelBox& box = found->second.box;
+      visibility = {pixels, pixels, 0, box, box, visible_mask(ids, instance.id, box)};
     }
   }
 }
@@ -257,6 +259,13 @@ Capture Conversion::converted(const ConversionSource& source, StoredCapture stor
     }
     if (frame.camera_path.empty()) frame.camera_path = "/Cameras/" + frame.camera_name;
     if (needs_.contains("instances")) complete_instances(frame, needs_);
+    if (source.data->info().holds.contains(kHoldsBounds)) continue;
+    if (source.data->info().holds.contains(kHoldsBoxes3d)) continue;
+    // What means nothing is a point, a number that every format can write; empty boxes are
+    // infinite.
+    for (Instance& instance : frame.instances) {
+      if (instance.bounds_node.is_empty()) instance.bounds_node.add(Vec3::Zero());
+    }
   }
   return std::move(stored.capture);
 }

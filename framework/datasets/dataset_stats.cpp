@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <optional>
 #include <set>
+#include <string_view>
 
 #include "framework/datasets/capture_sweep.h"
 
@@ -151,6 +153,25 @@ class Measurement {
   const StoredInfo& info_;
 };
 
+/// What is counted: of pixels only what nothing smaller tells.
+NameSet wanted_of(const StoredInfo& info) {
+  NameSet wanted = info.holds;
+  const auto leave_out = [&](std::initializer_list<std::string_view> names) {
+    for (const std::string_view name : names) {
+      if (const auto found = wanted.find(name); found != wanted.end()) wanted.erase(found);
+    }
+  };
+  leave_out({"amodal_mask", "occlusion_order", "pointcloud", kColorHdr.name, kNormals.name,
+             kPosition.name, kLeafId.name, kFlowForward.name, kFlowForwardState.name,
+             kFlowBackward.name, kFlowBackwardState.name, kSensorDepth.name});
+  // One of the two says what is close.
+  if (wanted.contains(kDistanceToImagePlane.name)) leave_out({kDistanceToCamera.name});
+  // Which pixels move, or where objects are that have no boxes.
+  const bool needs_ids = wanted.contains(kMotion.name) || !wanted.contains(kHoldsTightBoxes);
+  if (!needs_ids) leave_out({kInstanceId.name});
+  return wanted;
+}
+
 void add(const SeenObject& object, ClassStats& own) {
   ++own.objects;
   own.box_side.add(object.box_side);
@@ -234,15 +255,9 @@ DatasetStats dataset_stats(const StoredDataset& dataset, Host& host) {
   stats.findings = std::int64_t(dataset.log().findings.size());
   // Classes without an object are worth knowing.
   for (const std::string& name : info.classes) stats.classes.try_emplace(name);
-  NameSet wanted = info.holds;
-  // Masks are the largest of what is not counted; boxes and counts do.
-  for (const std::string_view name : {std::string_view("amodal_mask"), kColorHdr.name,
-                                      kNormals.name, kPosition.name, kLeafId.name}) {
-    if (const auto found = wanted.find(name); found != wanted.end()) wanted.erase(found);
-  }
   const Measurement measurement(info);
   sweep_captures<SeenCapture>(
-      dataset, wanted, host,
+      dataset, wanted_of(info), host,
       [&](const StoredCapture& stored) { return measurement.measure(stored); },
       [&](const SeenCapture& capture) { add(capture, stats); });
   return stats;

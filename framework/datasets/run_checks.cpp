@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -30,6 +31,10 @@ constexpr double kLossyMean = 12.0;
 /// What is as frequent as this is another choice of objects or classes, not a fault.
 constexpr double kRare = 0.2;
 constexpr std::size_t kMostExamples = 100;
+/// A box that is so much larger than another one's has as many pixels, whatever its shape.
+constexpr double kMuchLarger = 5.0;
+/// Shares are quotients of pixel counts, which formats round.
+constexpr double kShareSlack = 1e-3;
 /// Boxes that are rounded to more do not tell objects apart.
 constexpr int kTellingPixels = 16;
 
@@ -133,8 +138,16 @@ class RunComparison {
     find_lost(log);
     const bool is_other_choice =
         double(unmatched_) > kRare * double(std::max<std::int64_t>(objects_, 1));
-    if (!is_other_choice) {
-      for (Finding& finding : unmatched_examples_) log.findings.push_back(std::move(finding));
+    for (Unmatched& object : unmatched_examples_) {
+      // The reference may leave out what is small.
+      const bool is_small = !object.is_over_some && object.area < kMuchLarger * least_area_;
+      if (!is_other_choice && !is_small) log.findings.push_back(std::move(object.finding));
+    }
+    for (auto& [held, shares] : shares_) {
+      ++log.checks;
+      const double rare = std::max(1.0, kRare * double(shares.count));
+      if (shares.count < 2 || double(shares.wrong_count) > rare) continue;
+      for (Finding& finding : shares.wrong) log.findings.push_back(std::move(finding));
     }
     for (auto& [labels, boxes] : boxes_of_labels_) {
       ++log.checks;
@@ -246,9 +259,10 @@ class RunComparison {
       if (partners.empty()) {
         ++unmatched_;
         if (unmatched_examples_.size() < kMostExamples) {
-          unmatched_examples_.push_back(about(b, k, kHoldsTightBoxes, object.node_path,
-                                              "lies where no object is",
-                                              "the place of an object in " + in_reference));
+          unmatched_examples_.push_back(
+              {about(b, k, kHoldsTightBoxes, object.node_path, "lies where no object is",
+                     "the place of an object in " + in_reference),
+               area_of(*object.tight_box), is_over_some(one, *object.tight_box)});
         }
         continue;
       }
@@ -256,8 +270,51 @@ class RunComparison {
       if (partners.size() != 1) continue;
       remember_class(*partners.front(), object, b, k, in_reference);
       remember_box(one, *partners.front(), b, k, object, in_reference);
+      remember_shares(*partners.front(), b, k, object, in_reference);
     }
+    remember_areas(one);
     if (knows_sights()) remember_choice(one, b, k, in_reference, slack);
+  }
+
+  static double area_of(const PixelBox& box) {
+    return (double(box.x_max) - box.x_min) * (double(box.y_max) - box.y_min);
+  }
+
+  /// Whether the reference has an object in about the same place.
+  static bool is_over_some(const Frame& one, const PixelBox& box) {
+    return std::ranges::any_of(one.instances, [&](const Instance& other) {
+      if (!other.tight_box) return false;
+      const PixelBox& at = *other.tight_box;
+      const PixelBox both{std::max(at.x_min, box.x_min), std::max(at.y_min, box.y_min),
+                          std::min(at.x_max, box.x_max), std::min(at.y_max, box.y_max)};
+      return !both.is_empty() && 2.0 * area_of(both) > std::max(area_of(at), area_of(box));
+    });
+  }
+
+  void remember_areas(const Frame& one) {
+    for (const Instance& object : one.instances) {
+      if (object.tight_box) least_area_ = std::min(least_area_, area_of(*object.tight_box));
+    }
+  }
+
+  /// Hidden and cut off shares. Where most differ, a format measures them in its own way.
+  void remember_shares(const Instance& partner, const StoredCapture& b, std::size_t k,
+                       const Instance& object, const std::string& in_reference) {
+    if (!partner.visibility || !object.visibility) return;
+    const auto compare = [&](std::string_view held, std::optional<double> first,
+                             std::optional<double> second) {
+      if (!a_.holds.contains(held) || !b_.holds.contains(held) || !first || !second) return;
+      Boxes& shares = shares_[std::string(held)];
+      ++shares.count;
+      if (std::abs(*first - *second) <= step_of(a_, held) + step_of(b_, held) + kShareSlack) return;
+      ++shares.wrong_count;
+      if (shares.wrong.size() >= kMostExamples) return;
+      shares.wrong.push_back(about(b, k, held, object.node_path,
+                                   "its " + std::string(held) + " is " + std::to_string(*second),
+                                   std::to_string(*first) + ", as in " + in_reference));
+    };
+    compare(kHoldsOcclusion, partner.visibility->occlusion(), object.visibility->occlusion());
+    compare(kHoldsTruncation, partner.visibility->truncation(), object.visibility->truncation());
   }
 
   /// What is seen of an object, by which writers leave some out.
@@ -292,23 +349,23 @@ class RunComparison {
       const Sight sight{pixels[object.id], 1.0 - *occlusion};
       Choice& choice = choices_[text_of(object.labels)];
       ++(is_there ? choice.kept_count : choice.missing_count);
-      if (is_there && choice.kept.size() < kMostExamples) choice.kept.push_back(sight);
+      if (is_there && kept_.size() < kMostExamples) kept_.push_back(sight);
       if (is_there || choice.missing.size() >= kMostExamples) continue;
       choice.missing.emplace_back(sight, about(b, k, kHoldsTightBoxes, object.node_path,
                                                "is not there", "an object as in " + in_reference));
     }
   }
 
-  /// An object that is not there while one of its kind is of which less was seen has been lost, if
-  /// that is rare.
+  /// An object that is not there while another one is of which less was seen has been lost, if that
+  /// is rare among its kind: a class may be left out as a whole.
   void find_lost(ReadLog& log) {
     for (auto& [labels, choice] : choices_) {
       ++log.checks;
       const double rare = std::max(1.0, kRare * double(choice.kept_count));
       if (double(choice.missing_count) > rare) continue;
       for (auto& [sight, finding] : choice.missing) {
-        const bool is_lost = std::ranges::any_of(
-            choice.kept, [&](const Sight& kept) { return sight.is_at_least(kept); });
+        const bool is_lost =
+            std::ranges::any_of(kept_, [&](const Sight& kept) { return sight.is_at_least(kept); });
         if (is_lost) log.findings.push_back(std::move(finding));
       }
     }
@@ -370,20 +427,27 @@ class RunComparison {
   const StoredInfo& b_;
   std::int64_t objects_ = 0;
   std::int64_t unmatched_ = 0;
-  std::vector<Finding> unmatched_examples_;
+  struct Unmatched {
+    Finding finding;
+    double area = 0.0;          ///< Of its box, pixels.
+    bool is_over_some = false;  ///< See is_over_some().
+  };
+  std::vector<Unmatched> unmatched_examples_;
+  double least_area_ = std::numeric_limits<double>::infinity();  ///< In the reference.
   struct Choice {
     std::int64_t kept_count = 0;
     std::int64_t missing_count = 0;
-    std::vector<Sight> kept;
     std::vector<std::pair<Sight, Finding>> missing;
   };
   std::map<std::string, Choice> choices_;  ///< By labels in the reference.
+  std::vector<Sight> kept_;                ///< Of all of them.
   struct Boxes {
     std::int64_t count = 0;
     std::int64_t wrong_count = 0;
     std::vector<Finding> wrong;
   };
   std::map<std::string, Boxes> boxes_of_labels_;  ///< By labels in the reference.
+  std::map<std::string, Boxes> shares_;           ///< By what is held.
   /// Labels in the reference, then classes in the other dataset.
   std::map<std::string, std::map<std::string, Example>> classes_of_labels_;
 };

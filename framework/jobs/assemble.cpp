@@ -5,12 +5,14 @@
 
 #include "framework/annotators/builtin_annotators.h"
 #include "framework/pipeline/builtin_loaders.h"
+#include "framework/plugins/on_demand_library.h"
 
 namespace diorama {
 
 std::string program_version() { return DIORAMA_VERSION; }
 
 std::unique_ptr<Registry> make_registry(const GlobalOptions& options, const Log& log) {
+  use_on_demand_libraries_of(options.program);
   const Environment environment = [](const char* name) -> const char* {
     return secure_getenv(name);
   };

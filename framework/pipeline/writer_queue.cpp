@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "framework/pipeline/writer_queue.h"
 
+#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
@@ -20,6 +21,10 @@ namespace {
 
 // Before all visits: what is written frees memory.
 constexpr int kSeatRank = 0;
+
+// Captures, and some for each thread: more under way serve nobody, and where they are small memory
+// would grow for thousands of them before the limit in bytes is met.
+constexpr int kMostWaiting = 64;
 
 /// What a transaction holds that is not on disk yet.
 std::size_t transaction_bytes(const Transaction& transaction) {
@@ -43,7 +48,10 @@ struct WriterQueue::State {
     Transaction transaction;
   };
 
-  State(const Options& given, Work consume) : options(given), work(std::move(consume)) {}
+  State(const Options& given, Work consume)
+      : options(given),
+        work(std::move(consume)),
+        least_bytes(given.max_bytes / std::size_t(kMostWaiting + 8 * given.threads)) {}
 
   void run() {
     std::unique_lock lock(mutex);
@@ -60,6 +68,14 @@ struct WriterQueue::State {
   }
 
   // All of these are called, and return, with the mutex held.
+
+  /// What a capture is counted for, waiting or encoded.
+  std::size_t counted(const PendingCapture& pending) const {
+    return std::max(capture_bytes(pending), least_bytes);
+  }
+  std::size_t counted(const Transaction& transaction) const {
+    return std::max(transaction_bytes(transaction), least_bytes);
+  }
 
   bool is_let_through(const Place& place) const { return place.turn <= open_turn; }
   bool can_commit() const { return !encoded.empty() && is_let_through(encoded.begin()->first); }
@@ -79,7 +95,7 @@ struct WriterQueue::State {
     }
     auto node = waiting.extract(waiting.begin());
     PendingCapture pending = std::move(node.mapped());
-    const std::size_t bytes = capture_bytes(pending);
+    const std::size_t bytes = counted(pending);
     Encoded made{pending.capture.index, {}};
     ++in_work;
     ++encoding;
@@ -95,7 +111,7 @@ struct WriterQueue::State {
     if (error) {
       keep_error(made.capture, error);
     } else if (errors.empty()) {
-      bytes_under_way += transaction_bytes(made.transaction);
+      bytes_under_way += counted(made.transaction);
       encoded.emplace(node.key(), std::move(made));
     }
     count_out_if_gone(node.key());
@@ -105,7 +121,7 @@ struct WriterQueue::State {
   void commit_first(std::unique_lock<std::mutex>& lock) {
     auto node = encoded.extract(encoded.begin());
     Encoded& made = node.mapped();
-    const std::size_t bytes = transaction_bytes(made.transaction);
+    const std::size_t bytes = counted(made.transaction);
     ++in_work;
     lock.unlock();
     const std::exception_ptr error =
@@ -144,12 +160,12 @@ struct WriterQueue::State {
   void drop_after(int turn) {
     const Place first{turn + 1, 0};
     for (auto at = waiting.lower_bound(first); at != waiting.end(); at = waiting.erase(at)) {
-      bytes_under_way -= capture_bytes(at->second);
+      bytes_under_way -= counted(at->second);
       count_out_if_gone(at->first);
     }
     while (!encoded.empty() && std::prev(encoded.end())->first >= first) {
       const auto node = encoded.extract(std::prev(encoded.end()));
-      bytes_under_way -= transaction_bytes(node.mapped().transaction);
+      bytes_under_way -= counted(node.mapped().transaction);
       count_out_if_gone(node.key());
     }
     changed.notify_all();
@@ -184,6 +200,7 @@ struct WriterQueue::State {
 
   const Options options;
   const Work work;
+  const std::size_t least_bytes;  // of a capture, however small
   std::mutex mutex;
   std::condition_variable changed;
   int open_turn = 0;
@@ -206,6 +223,7 @@ std::size_t capture_bytes(const PendingCapture& pending) {
   for (const Frame& frame : pending.capture.frames) {
     const std::size_t pixels = std::size_t(frame.camera.width) * std::size_t(frame.camera.height);
     bytes += pixels * frame.channels().size() * kWidestPixel;
+    bytes += frame.instances.size() * sizeof(Instance);
     for (const Instance& instance : frame.instances) {
       if (instance.visibility) bytes += instance.visibility->amodal_mask.bits.size();
     }
@@ -236,7 +254,7 @@ bool WriterQueue::push(PendingCapture pending, const HasToStop& has_to_stop) {
   // Writers that wait for a seat get this one.
   std::optional<ThreadPool::Rest> rest;
   if (state_->options.pool) rest.emplace(*state_->options.pool);
-  const std::size_t bytes = capture_bytes(pending);
+  const std::size_t bytes = state_->counted(pending);
   const int turn = pending.turn;
   std::unique_lock lock(state_->mutex);
   const auto has_room = [&] { return state_->has_room(turn, bytes); };

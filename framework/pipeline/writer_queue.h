@@ -25,8 +25,8 @@ struct PendingCapture {
 std::size_t capture_bytes(const PendingCapture& pending);
 
 /// Hands captures to threads that encode and write them while the next one is rendered. push()
-/// waits while more than a number of bytes is under way, so memory stays bounded whatever the speed
-/// of the disk.
+/// waits while more than a number of bytes, or of captures, is under way, so memory stays bounded
+/// whatever the speed of the disk.
 ///
 /// Captures of later turns may come before those of earlier ones. Nothing of a turn is written
 /// before it is let through, so that the dataset never holds what an error before it would have

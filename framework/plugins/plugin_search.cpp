@@ -160,6 +160,13 @@ fs::path sample_pack_folder(const fs::path& program) {
   return program.parent_path().parent_path() / "share/diorama/assets";
 }
 
+fs::path program_beside(const fs::path& library) {
+  const fs::path folder = library.parent_path();
+  // Build trees have programs and libraries side by side.
+  if (is_build_tree(library)) return folder.parent_path() / "bin/diorama";
+  return (folder / DIORAMA_BIN_FROM_LIB / "diorama").lexically_normal();
+}
+
 fs::path program_file() {
   std::error_code failed;
   fs::path program = fs::read_symlink("/proc/self/exe", failed);

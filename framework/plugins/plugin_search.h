@@ -61,6 +61,9 @@ std::optional<std::filesystem::path> local_plugin_folder(const std::filesystem::
 /// The sample pack that belongs to this program, in a build tree or installed; may not exist.
 std::filesystem::path sample_pack_folder(const std::filesystem::path& program);
 
+/// Where the program lies that was installed, or built, with this library.
+std::filesystem::path program_beside(const std::filesystem::path& library);
+
 /// The running program, links resolved.
 std::filesystem::path program_file();
 

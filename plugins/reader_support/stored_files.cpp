@@ -60,6 +60,14 @@ std::uint32_t StoredPicture::at(int x, int y, int c) const {
 Image<Rgba8> StoredPicture::color() const {
   Image<Rgba8> image(width(), height(), {0, 0, 0, 255});
   const int used = std::min(channels(), 4);
+  if (used >= 3 && texture->floats.empty()) {  // as nearly all are
+    const std::uint8_t* from = texture->bytes.data();
+    for (Rgba8& pixel : image.pixels()) {
+      for (std::size_t c = 0; c < std::size_t(used); ++c) pixel[c] = from[c];
+      from += channels();
+    }
+    return image;
+  }
   for (int y = 0; y < height(); ++y) {
     for (int x = 0; x < width(); ++x) {
       Rgba8& pixel = image.at(x, y);

@@ -5,10 +5,12 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <optional>
 #include <stdexcept>
 #include <vector>
 
 #include "reader_support/dataset_page.h"
+#include "writer_bop/point_diameter.h"
 
 namespace diorama {
 namespace {
@@ -26,9 +28,16 @@ std::size_t ply_count(const std::string& header, const std::string& element) {
   return count;
 }
 
-/// The extent of a model of our writer's: vertices begin with three floats and take 27 bytes each,
-/// faces 13.
-Aabb ply_extent(const std::filesystem::path& file) {
+/// Of more vertices the diameter is not looked at: that would take seconds.
+constexpr std::size_t kMostMeasured = 100'000;
+
+struct PlyMeasures {
+  Aabb box;
+  std::optional<double> diameter;
+};
+
+/// Of a model of our writer's: vertices begin with three floats and take 27 bytes each, faces 13.
+PlyMeasures measure_ply(const std::filesystem::path& file) {
   constexpr std::string_view kEnd = "\nend_header\n";
   constexpr std::size_t kVertex = 27;
   constexpr std::size_t kFace = 13;
@@ -50,7 +59,9 @@ Aabb ply_extent(const std::filesystem::path& file) {
   }
   in.clear();
   in.seekg(std::streamoff(data));
-  Aabb box;
+  PlyMeasures measures;
+  bool is_measured = vertices > 0 && vertices <= kMostMeasured;
+  std::vector<Vec3f> points;
   std::vector<char> block(kVertex * 4096);
   for (std::size_t left = vertices; left > 0;) {
     const std::size_t now = std::min<std::size_t>(left, 4096);
@@ -59,11 +70,14 @@ Aabb ply_extent(const std::filesystem::path& file) {
     for (std::size_t i = 0; i < now; ++i) {
       Vec3f position;
       std::memcpy(position.data(), block.data() + kVertex * i, 12);
-      box.add(position.cast<double>());
+      measures.box.add(position.cast<double>());
+      is_measured = is_measured && position.allFinite();
+      if (is_measured) points.push_back(position);
     }
     left -= now;
   }
-  return box;
+  if (is_measured) measures.diameter = point_diameter(points);
+  return measures;
 }
 
 }  // namespace
@@ -113,8 +127,11 @@ BopModelBoxes read_bop_models(StoredFiles& files, bool is_own) {
         continue;
       }
       files.reading(file, [&] {
-        const Aabb extent = ply_extent(files.root() / file);
+        const auto [extent, measured] = measure_ply(files.root() / file);
         const double near = 1e-5 * size.norm();
+        files.check(!measured || std::abs(*measured - diameter) <= near, kCounts, page, who,
+                    "its diameter is " + std::to_string(diameter),
+                    std::to_string(measured.value_or(0.0)) + ", of the vertices of " + file);
         files.check((extent.min - box.min).norm() <= near && (extent.max - box.max).norm() <= near,
                     kCounts, file, "", "is not as large as " + page + " says");
       });

@@ -140,6 +140,7 @@ class CocoDataset final : public StoredDataset {
     // Boxes that people drew, and polygons, do not end at pixels.
     info_.steps[std::string(kHoldsTightBoxes)] = page_ ? 0.0 : 2.0;
     info_.steps[std::string(kHoldsTruncation)] = 1e-6;
+    if (tables_.has_lossy_pictures) info_.steps[std::string(kColor.name)] = 16.0;
   }
 
   /// The file of a picture, as COCO folders have it; the likeliest name when there is none.
@@ -277,9 +278,11 @@ class CocoImageReading : private FrameReading {
     if (wants_masks && json.contains("segmentation")) {
       mask = read_mask(json, who);
       read_amodal(json, who, mask, instance);
+    } else if (wanted_.contains(kHoldsOcclusion) || wanted_.contains(kHoldsTruncation)) {
+      read_shares(json, instance);
     }
     if (category != part_.categories.end()) check_keypoints(json, who, category->second);
-    check_crowd(json, part_.file, who);
+    check_crowd(json, part_.file, who, crowd_below_px());
     whos_.push_back(who);
     categories_.push_back(json.at("category_id").get<std::int64_t>());
     masks_.push_back(std::move(mask));
@@ -287,13 +290,27 @@ class CocoImageReading : private FrameReading {
     frame_.instances.push_back(std::move(instance));
   }
 
-  /// Our writer has no crowds.
-  void check_crowd(const Json& json, const std::string& file, const std::string& who) {
+  /// The crowds of our writer are objects of few pixels, where it was asked for them.
+  std::int64_t crowd_below_px() const {
+    if (!dataset_.page_) return 0;
+    const auto below = dataset_.page_->conventions.find("crowd_below_px");
+    const bool is_there = below != dataset_.page_->conventions.end() && below->is_number_integer();
+    return is_there ? below->get<std::int64_t>() : 0;
+  }
+
+  /// `below_px`: see crowd_below_px(); 0 where there are none.
+  void check_crowd(const Json& json, const std::string& file, const std::string& who,
+                   std::int64_t below_px) {
     const auto crowd = json.find("iscrowd");
     if (crowd == json.end()) return;
-    const bool is_flag = *crowd == 0 || (*crowd == 1 && !dataset_.page_);
-    files_.check(is_flag, kIds, file, who, "its iscrowd is " + crowd->dump(),
-                 dataset_.page_ ? "0" : "0 or 1");
+    const bool is_flag = *crowd == 0 || *crowd == 1;
+    if (!dataset_.page_) {
+      files_.check(is_flag, kIds, file, who, "its iscrowd is " + crowd->dump(), "0 or 1");
+      return;
+    }
+    const bool is_small = json.at("area").get<double>() < double(below_px);
+    files_.check(is_flag && (*crowd == 1) == is_small, kIds, file, who,
+                 "its iscrowd is " + crowd->dump(), is_small ? "1" : "0");
   }
 
   void check_box_inside(const std::string& who, const PixelBox& box) {
@@ -364,14 +381,29 @@ class CocoImageReading : private FrameReading {
     const double truncation = entry->at("truncation").get<double>();
     files_.check(truncation >= 0.0 && truncation < 1.0, kAmodal, part_.file, who,
                  "its truncation is " + std::to_string(truncation), "a share below 1");
-    if (truncation > 0.0 && truncation < 1.0) {
-      visibility.outside_pixels = std::llround(
-          std::min(double(visibility.amodal_pixels) * truncation / (1.0 - truncation), 1e15));
-    }
+    cut_off(truncation, visibility);
     for (const Json& front : entry->at("occluded_by")) {
       occluded_by_.push_back({front.at("node").get<std::string>(), instance.id,
                               front.at("pixels").get<std::int64_t>()});
     }
+    instance.visibility = std::move(visibility);
+  }
+
+  static void cut_off(double truncation, Visibility& visibility) {
+    if (truncation <= 0.0 || truncation >= 1.0) return;
+    visibility.outside_pixels = std::llround(
+        std::min(double(visibility.amodal_pixels) * truncation / (1.0 - truncation), 1e15));
+  }
+
+  /// What the entry says of the whole object, where nobody wants masks.
+  static void read_shares(const Json& json, Instance& instance) {
+    const auto entry = json.find("amodal");
+    if (entry == json.end()) return;
+    Visibility visibility;
+    visibility.visible_pixels = json.at("area").get<std::int64_t>();
+    visibility.amodal_pixels = entry->at("area").get<std::int64_t>();
+    visibility.amodal_box = box_of_json(entry->at("bbox"));
+    cut_off(entry->at("truncation").get<double>(), visibility);
     instance.visibility = std::move(visibility);
   }
 
@@ -528,7 +560,7 @@ class CocoImageReading : private FrameReading {
       const auto category = entry.at("category_id").get<std::int64_t>();
       files_.check(part_.categories.contains(category), kIds, part_.panoptic, who,
                    "has an unknown category");
-      check_crowd(entry, part_.panoptic, who);
+      check_crowd(entry, part_.panoptic, who, 0);
       if (found == segments.end()) continue;
       const Segment& segment = found->second;
       files_.check(entry.at("area").get<std::int64_t>() == segment.count, kArea, file, who,

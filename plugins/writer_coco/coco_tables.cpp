@@ -115,7 +115,9 @@ class TableReader {
     entry.capture = says_capture ? json.at("capture").get<std::int32_t>() : -1;
     if (says_capture) entry.camera = camera_number(json.at("camera").get<std::string>());
     tables_.has_cameras = tables_.has_cameras || json.contains("intrinsics");
-    names_.push_back(tables_.parts[part].file + "\n" + json.at("file_name").get<std::string>());
+    const auto& name = json.at("file_name").get_ref<const std::string&>();
+    tables_.has_lossy_pictures = tables_.has_lossy_pictures || !name.ends_with(".png");
+    names_.push_back(tables_.parts[part].file + "\n" + name);
     images_.push_back(entry);
   }
 

@@ -49,6 +49,7 @@ struct CocoTables {
   std::vector<std::string> classes;
   bool has_captures = false;  ///< Images name capture and camera.
   bool has_cameras = false;   ///< Images have intrinsics and poses.
+  bool has_lossy_pictures = false;
   bool has_masks = false;
   bool has_amodal = false;
   bool has_nodes = false;

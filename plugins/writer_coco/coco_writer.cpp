@@ -321,14 +321,14 @@ void CocoWriter::begin(const DatasetInfo& dataset, DatasetFiles& files) {
   training_.begin(dataset);
   keypoints_.begin(dataset, training_);
   files.add_text("categories.json", python_json(categories(), 2) + "\n");
-  training_.add_dataset_page(
-      "COCO",
-      {{"bbox", "x, y, width, height in pixels, of the visible pixels"},
-       {"segmentation", "compressed run lengths of the visible pixels, column by column"},
-       {"amodal.occluded_by",
-        "objects nearer to the camera in pixels that both cover, seen or not, and how many pixels"},
-       {"keypoint_visibility", "0 outside the image, 1 hidden, 2 visible"}},
-      dataset, files);
+  nlohmann::ordered_json conventions{
+      {"bbox", "x, y, width, height in pixels, of the visible pixels"},
+      {"segmentation", "compressed run lengths of the visible pixels, column by column"},
+      {"amodal.occluded_by",
+       "objects nearer to the camera in pixels that both cover, seen or not, and how many pixels"},
+      {"keypoint_visibility", "0 outside the image, 1 hidden, 2 visible"}};
+  if (params_.crowd_below_px > 0) conventions["crowd_below_px"] = params_.crowd_below_px;
+  training_.add_dataset_page("COCO", std::move(conventions), dataset, files);
 }
 
 /// Crowds are run lengths in any case, as evaluations expect them.

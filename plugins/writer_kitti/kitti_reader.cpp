@@ -509,10 +509,14 @@ class KittiPictureReading : private FrameReading {
   }
 
   void check_numbers(const KittiLabel& label, const std::string& who) {
-    files_.check(label.truncation >= 0.0 && label.truncation <= 1.0 &&
-                     !(dataset_.page_ && label.truncation == 1.0),
-                 kAmodal, labels_, who, "its truncation is " + std::to_string(label.truncation),
-                 "0 to 1");
+    files_.check(label.truncation >= 0.0 && label.truncation <= 1.0, kAmodal, labels_, who,
+                 "its truncation is " + std::to_string(label.truncation), "0 to 1");
+    // To two digits, also where a last pixel is left in a corner.
+    const bool is_at_border = label.box[0] <= 0.0 || label.box[1] <= 0.0 ||
+                              label.box[2] >= frame_.camera.width ||
+                              label.box[3] >= frame_.camera.height;
+    files_.check(!dataset_.page_ || label.truncation < 1.0 || is_at_border, kAmodal, labels_, who,
+                 "nothing of it is inside the image, and its box does not touch the border");
     const bool is_level = label.occlusion == 0.0 || label.occlusion == 1.0 ||
                           label.occlusion == 2.0 || label.occlusion == 3.0;
     files_.check(is_level && !(dataset_.page_ && label.occlusion == 3.0), kAmodal, labels_, who,

@@ -196,7 +196,7 @@ TEST_CASE("The engine includes nothing of the program", "[architecture]") {
     });
   };
   for (const char* folder : {"annotators", "config", "datasets", "export", "host", "images", "jobs",
-                             "output", "pipeline", "plugins", "python", "replicator"}) {
+                             "library", "output", "pipeline", "plugins", "python", "replicator"}) {
     CHECK(offending_includes(std::string("framework/") + folder, is_allowed) == None{});
   }
   CHECK_FALSE(offending_includes("framework/app", is_allowed).empty());
@@ -278,7 +278,9 @@ TEST_CASE("Chance comes from diorama::Rng alone", "[architecture]") {
 
 TEST_CASE("The framework knows no format's name", "[architecture]") {
   // Types of writers and readers, as the plugins register them.
-  std::set<std::string> names{"BOP", "COCO", "HDF5", "KITTI", "VOC", "WebDataset", "YOLO"};
+  std::set<std::string> names{"BOP",  "COCO", "HDF5",  "Hugging Face", "KITTI",      "MOT",
+                              "MOTS", "VOC",  "YOLO",  "YouTube",      "WebDataset", "bop",
+                              "coco", "hdf5", "kitti", "voc",          "webdataset", "yolo"};
   static const std::regex kType(
       R"re(DIORAMA_ADD(?:_READER)?\([\w:]*(?:Writer|Reader),\s*"(\w+)")re");
   for (const Source& source : sources()) {

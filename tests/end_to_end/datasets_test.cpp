@@ -108,6 +108,16 @@ TEST_CASE("a converted dataset is the one that the run would have written", "[co
           folder);
   expect_same_tree(tree(folder / "out" / "YoloWriter"), tree(folder / "yolo" / "YoloWriter"));
   succeed({"lint", "yolo"}, folder);
+  // What the source does not hold is made up so that it agrees with the rest, and is a number.
+  succeed({"convert", "out/basic", "--writer", "CocoWriter", "-o", "amodal"}, folder);
+  succeed({"lint", "amodal"}, folder);
+  succeed({"convert", "coco", "--writer", "PoseWriter", "-o", "pose"}, folder);
+  for (const auto& [file, text] : tree(folder / "pose" / "PoseWriter")) {
+    if (!file.ends_with(".json")) continue;
+    INFO(file);
+    CHECK(text.find("NaN") == std::string::npos);
+    CHECK(text.find("Infinity") == std::string::npos);
+  }
 }
 
 TEST_CASE("what writers need and a dataset does not hold is said before anything is written",

@@ -8,6 +8,8 @@ foreach(file IN ITEMS
     include/diorama/scene.h ${LIBDIR}/libdiorama_sdk.so ${LIBDIR}/libdiorama_sdk.so.${ABI}
     ${LIBDIR}/libdiorama_sdk.so.${VERSION} ${LIBDIR}/cmake/diorama_sdk/diorama_sdk-config.cmake
     ${DOCDIR}/LICENSE include/diorama/headers_digest.h
+    include/diorama/engine.h include/diorama/engine_digest.h ${LIBDIR}/libdiorama.so ${LIBDIR}/libdiorama.so.${ABI}
+    ${LIBDIR}/libdiorama.so.${VERSION} ${LIBDIR}/cmake/diorama/diorama-config.cmake ${LIBDIR}/pkgconfig/diorama.pc
     ${LIBDIR}/pkgconfig/diorama_sdk.pc share/diorama/templates/common/CMakeLists.txt
     share/man/man1/diorama.1 share/man/man5/diorama-job.5 share/bash-completion/completions/diorama
     share/zsh/vendor-completions/_diorama share/fish/vendor_completions.d/diorama.fish)

@@ -48,7 +48,11 @@ TEST_CASE("packages carry the number of the plugin interface", "[packaging]") {
   CHECK(all(control, "libdiorama-sdk(\\d+)") == std::set<std::string>{kAbi});
   CHECK(all(control, "diorama-plugin-abi-(\\d+)") == std::set<std::string>{kAbi});
   CHECK(all(debian("rules"), "libdiorama-sdk(\\d+)") == std::set<std::string>{kAbi});
-  CHECK(fs::exists(kRoot / "packaging/debian" / ("libdiorama-sdk" + kAbi + ".install")));
+  for (const char* library : {"libdiorama-sdk", "libdiorama"}) {
+    CHECK(fs::exists(kRoot / "packaging/debian" / (library + kAbi + ".install")));
+  }
+  CHECK(all(control, "libdiorama(\\d+)") == std::set<std::string>{kAbi});
+  CHECK(all(debian("rules"), "libdiorama(\\d+)") == std::set<std::string>{kAbi});
 }
 
 TEST_CASE("packages carry the version of the project", "[packaging]") {

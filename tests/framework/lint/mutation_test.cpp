@@ -626,3 +626,29 @@ TEST_CASE("3-D boxes are held against those of another writer of the run", "[lin
     CHECK(is_found(run));
   }
 }
+
+TEST_CASE("hidden shares are held against those of another writer of the run", "[lint]") {
+  const DatasetOnDisk run = run_on_disk({"basic", "imagefolder"});
+  REQUIRE_FALSE(is_found(run));
+  const std::string file = "imagefolder/train/metadata.jsonl";
+  std::string text = run.read(file);
+  const std::string key = "\"visible_share\": [";
+  const std::size_t at = text.find(key);
+  REQUIRE(at != std::string::npos);
+  const std::size_t begin = at + key.size();
+  text.replace(begin, text.find_first_of(",]", begin) - begin, "0.123");
+  run.write(file, text);
+  CHECK(is_found(run));
+}
+
+TEST_CASE("a model's diameter is that of its vertices", "[lint]") {
+  const DatasetOnDisk run = run_on_disk({"bop"});
+  REQUIRE_FALSE(is_found(run));
+  const std::string file = "bop/models/models_info.json";
+  auto page = nlohmann::json::parse(run.read(file));
+  nlohmann::json& model = page.begin().value();
+  // Still no less than its longest side.
+  model["diameter"] = 0.5 * (model["diameter"].get<double>() + model["size_x"].get<double>());
+  run.write(file, page.dump());
+  CHECK(is_found(run));
+}

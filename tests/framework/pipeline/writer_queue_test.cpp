@@ -99,6 +99,19 @@ TEST_CASE("No more bytes are under way than allowed, but one capture always is",
   CHECK(most <= 3);
 }
 
+TEST_CASE("However small captures are, not many of them wait", "[queue]") {
+  std::atomic<bool> may_encode = false;
+  WriterQueue queue(with(2, std::size_t(1) << 30), encoding([&](const PendingCapture&) {
+                      while (!may_encode) std::this_thread::yield();
+                    }));
+  int pushed = 0;
+  while (pushed < 1000 && queue.push(capture_of(pushed, 1), [] { return true; })) ++pushed;
+  CHECK(pushed >= 64);
+  CHECK(pushed <= 100);
+  may_encode = true;
+  CHECK(queue.drain());
+}
+
 TEST_CASE("An error in the work comes out of the queue and ends it", "[queue]") {
   std::atomic<int> worked = 0;
   WriterQueue queue(with(2, 1 << 20), encoding([&](const PendingCapture& pending) {

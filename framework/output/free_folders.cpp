@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "framework/app/output_check.h"
+#include "framework/output/free_folders.h"
 
 #include <algorithm>
 #include <set>
