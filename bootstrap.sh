@@ -20,11 +20,12 @@ build_packages=(
   libyaml-cpp-dev libcli11-dev libspdlog-dev libfmt-dev nlohmann-json3-dev
   libre2-dev libhdf5-dev liblz4-dev libdeflate-dev libpng-dev libjpeg-dev libopenexr-dev libtbb-dev
   libvulkan-dev glslang-tools spirv-tools
+  pybind11-dev python3-dev python3-minimal python3-numpy
   libxxhash-dev nettle-dev libopencv-core-dev libopencv-imgproc-dev libopencv-calib3d-dev libopencv-imgcodecs-dev
 )
 test_packages=(
   catch2 binutils clang libclang-rt-14-dev mesa-vulkan-drivers
-  pybind11-dev python3-dev python3-minimal python3-h5py python3-jsonschema python3-numpy python3-opencv
+  python3-h5py python3-jsonschema python3-opencv mypy
 )
 
 check_packages=(clang-format-14 clang-tidy-19)

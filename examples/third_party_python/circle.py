@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A randomizer and a writer in Python; see README.md."""
-import csv
-import io
+"""A randomizer in Python; see README.md."""
 import math
 
-from diorama.plugins import Randomizer, Writer, param
+from diorama.plugins import Randomizer, param
 
 
 class Circle(Randomizer):
@@ -22,26 +20,3 @@ class Circle(Randomizer):
             radius = self.radius_m + own.normal(0.0, self.jitter_m)
             angle = 2.0 * math.pi * (i + own.uniform()) / len(nodes)
             node.position = context.working_area + [radius * math.cos(angle), radius * math.sin(angle), self.height_m]
-
-
-class Table(Writer):
-    """One line of text per object and picture, and all of them together in objects.csv."""
-
-    needs = ["instances", "visibility"]
-    taxonomy = param("class", "Labels to write.")
-
-    def write(self, capture, files):
-        lines = io.StringIO()
-        table = csv.writer(lines, lineterminator="\n")
-        for frame in capture.frames:
-            for instance in frame.instances:
-                if instance.box is not None:
-                    table.writerow([capture.index, frame.camera_name, instance.labels.get(self.taxonomy, ""), *instance.box,
-                                    instance.visibility.visible_pixels])
-        files.add(f"{capture.index:06d}.csv", lines.getvalue())
-        files.record(str(lines.getvalue().count("\n")))
-
-    def finish(self, records, files):
-        counts = []
-        records(lambda capture, line: counts.append((capture, int(line))))
-        files.add("objects.csv", "capture,objects\n" + "".join(f"{capture},{count}\n" for capture, count in counts))

@@ -50,7 +50,11 @@ void add_needs(const Annotator& annotator, const std::string& type, Effects& eff
     }
     effects.needs.insert(name);
   }
-  effects.provides.merge(annotator.provides());
+  for (const std::string& name : annotator.provides()) {
+    if (effects.provides.insert(name).second) continue;
+    throw Error(ErrorKind::Config,
+                "annotators: " + type + " makes '" + name + "', which another entry makes already");
+  }
 }
 
 Effects make_effects(const fs::path& file, Registry& registry, Host& host) {

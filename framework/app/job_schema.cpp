@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "framework/pipeline/job_sections.h"
+#include "framework/pipeline/param_variants.h"
 
 namespace diorama {
 namespace {
@@ -168,6 +169,8 @@ class Schemas {
  public:
   Value of(const ParamSpec& spec);
   Value properties(const std::vector<ParamSpec>& specs);
+  /// Rules for parameters whose keys depend on their neighbours; an empty list when there are none.
+  Value variants(const std::vector<ParamSpec>& specs);
   Value definitions() { return distributions_.take(); }
 
  private:
@@ -245,6 +248,35 @@ Value Schemas::properties(const std::vector<ParamSpec>& specs) {
   return properties;
 }
 
+Value Schemas::variants(const std::vector<ParamSpec>& specs) {
+  Value rules = Value::make_list();
+  for (const ParamSpec& spec : specs) {
+    if (spec.type != ParamType::Any) continue;
+    for (const ParamSpec& variant : spec.children) {
+      Value values = Value::make_map();
+      Value keys = Value::make_list();
+      for (const auto& [key, value] : conditions_of(variant)) {
+        Value constant = Value::make_map();
+        constant.set("const", Value::text(value));
+        values.set(key, std::move(constant));
+        keys.list.push_back(Value::text(key));
+      }
+      Value condition = Value::make_map();
+      condition.set("properties", std::move(values));
+      condition.set("required", std::move(keys));
+      Value meant = Value::make_map();
+      meant.set(spec.key, of(variant));
+      Value then = Value::make_map();
+      then.set("properties", std::move(meant));
+      Value rule = Value::make_map();
+      rule.set("if", std::move(condition));
+      rule.set("then", std::move(then));
+      rules.list.push_back(std::move(rule));
+    }
+  }
+  return rules;
+}
+
 /// `type: null` is what people write for the renderer called "null".
 Value type_is(const std::string& type) {
   Value schema = Value::make_map();
@@ -281,6 +313,8 @@ Value rule_for(const JobSection& section, const std::vector<ParamSpec>& host,
   keys.set("description", Value::text(component.help));
   keys.set("properties", std::move(properties));
   keys.set("additionalProperties", Value::boolean(false));
+  Value variants = schemas.variants(component.params);
+  if (!variants.list.empty()) keys.set("allOf", std::move(variants));
 
   Value rule = Value::make_map();
   rule.set("if", std::move(condition));

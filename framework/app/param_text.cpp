@@ -23,6 +23,13 @@ void add_rows(const std::vector<ParamSpec>& specs, const std::string& front,
     const std::string text = has_children ? std::string() : default_text(spec.default_value);
     const std::string key = front + spec.key;
     rows.push_back({key, type_text(spec), text, range_text(spec), spec.unit, spec.help});
+    if (spec.type == ParamType::Any) {
+      for (const ParamSpec& variant : spec.children) {
+        rows.push_back({key + " of " + variant.key, type_text(variant), {}, {}, {}, variant.help});
+        add_rows(variant.children, key + ".", rows);
+      }
+      continue;
+    }
     add_rows(spec.children, key + (spec.type == ParamType::List ? "[]." : "."), rows);
   }
 }

@@ -90,6 +90,7 @@ std::vector<Slot> slots_of(const std::vector<ParamSpec>& specs,
   std::vector<Slot> slots;
   for (const ParamSpec& spec : specs) {
     slots.push_back({spec, groups});
+    if (spec.type == ParamType::Any) continue;  // its keys depend on its neighbours
     std::vector<const ParamSpec*> inner = groups;
     inner.push_back(&spec);
     for (Slot& slot : slots_of(spec.children, inner)) slots.push_back(std::move(slot));
@@ -111,7 +112,7 @@ void refuse_unknown_keys(const Subject& subject, const std::vector<Slot>& slots)
   unknown.key = kUnknown;
   require_complaint(subject, Slot{unknown, {}}.in_job(subject, Value::integer(1)), kUnknown);
   for (const Slot& slot : slots) {
-    if (slot.spec.children.empty()) continue;
+    if (slot.spec.children.empty() || slot.spec.type == ParamType::Any) continue;
     std::vector<const ParamSpec*> groups = slot.groups;
     groups.push_back(&slot.spec);
     require_complaint(subject, Slot{unknown, groups}.in_job(subject, Value::integer(1)), kUnknown);

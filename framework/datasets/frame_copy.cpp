@@ -14,6 +14,7 @@ Frame copy_of(const Frame& frame, const NameSet& channels) {
   copy.world_from_camera = frame.world_from_camera;
   copy.instances = frame.instances;
   copy.occlusions = frame.occlusions;
+  copy.joints = frame.joints;
   copy.leaf_paths = frame.leaf_paths;
   copy.exposure = frame.exposure;
   copy.seed = frame.seed;

@@ -18,6 +18,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// Instead of what it provides: an annotator that makes what its parameters say, and is therefore
+/// of use only where a job lists it.
+constexpr const char* kAsListed = "*";
+
 /// Makes components and remembers which plugins they came from.
 class Assembler {
  public:
@@ -156,13 +160,13 @@ void make_engines_and_writers(Assembler& assembler, JobAssembly& assembly) {
   }
 }
 
-/// Those that the job lists, by type.
-using ListedAnnotators = std::map<std::string, std::unique_ptr<Annotator>>;
+/// Those that the job lists, in its order.
+using ListedAnnotators = std::vector<std::unique_ptr<Annotator>>;
 
 ListedAnnotators make_annotators(Assembler& assembler, const Job& job) {
   ListedAnnotators listed;
   for (const ComponentConfig& config : job.annotators) {
-    listed[config.type] = assembler.make<Annotator>(config, "annotators");
+    listed.push_back(assembler.make<Annotator>(config, "annotators"));
   }
   return listed;
 }
@@ -233,19 +237,27 @@ std::vector<Need> needs_of(const JobAssembly& assembly) {
 /// say of them. Only what is chosen is made.
 void resolve_needs(Assembler& assembler, ListedAnnotators listed, JobAssembly& assembly) {
   std::vector<AnnotatorOffer> offers;
+  std::vector<std::optional<std::size_t>> entries;  // of the job, by offer
   for (const std::string& type : assembler.annotator_types()) {
-    if (const auto own = listed.find(type); own != listed.end()) {
-      const Annotator& annotator = *own->second;
+    const std::size_t before = offers.size();
+    for (std::size_t i = 0; i < listed.size(); ++i) {
+      const ComponentConfig& config = assembly.job.annotators[i];
+      if (config.type != type) continue;
       call_component("annotator '" + type + "'", [&] {
-        offers.push_back({type, annotator.needs(), annotator.provides(), true});
+        offers.push_back({type, listed[i]->needs(), listed[i]->provides(), true,
+                          config.map.place.text() + ": " + config.path});
       });
-    } else {
-      const ComponentEntry& entry = assembler.annotator_entry(type);
-      offers.push_back({type,
-                        {entry.needs.begin(), entry.needs.end()},
-                        {entry.provides.begin(), entry.provides.end()},
-                        false});
+      entries.emplace_back(i);
     }
+    if (offers.size() > before) continue;
+    const ComponentEntry& entry = assembler.annotator_entry(type);
+    if (entry.provides == std::vector<std::string>{kAsListed}) continue;
+    offers.push_back({type,
+                      {entry.needs.begin(), entry.needs.end()},
+                      {entry.provides.begin(), entry.provides.end()},
+                      false,
+                      {}});
+    entries.emplace_back();
   }
   JobComponents& parts = assembly.components;
   VisitComponents& set = parts.sets.front();
@@ -253,13 +265,14 @@ void resolve_needs(Assembler& assembler, ListedAnnotators listed, JobAssembly& a
                                 "renderer '" + assembly.job.renderer.type + "'", offers);
   for (const std::size_t index : parts.demand.annotators) {
     const AnnotatorOffer& offer = offers[index];
+    const std::optional<std::size_t> entry = entries[index];
     assembler.note_annotator(offer.type);
-    auto annotator = offer.is_listed ? std::move(listed.at(offer.type))
-                                     : assembler.make_default_annotator(offer.type);
-    set.annotators.push_back({offer.type, std::move(annotator)});
+    set.annotators.push_back(
+        {offer.type, entry,
+         entry ? std::move(listed[*entry]) : assembler.make_default_annotator(offer.type)});
   }
-  for (const AnnotatorOffer& offer : offers) {
-    if (offer.is_listed && listed.at(offer.type)) assembler.warn_of_idle(offer);
+  for (std::size_t i = 0; i < offers.size(); ++i) {
+    if (entries[i] && listed[*entries[i]]) assembler.warn_of_idle(offers[i]);
   }
 }
 
@@ -278,10 +291,9 @@ void add_set(Assembler& assembler, JobAssembly& assembly) {
   }
   set.renderer = assembler.make<Renderer>(job.renderer, "renderer");
   ListedAnnotators listed = make_annotators(assembler, job);
-  for (const auto& [type, first] : assembly.components.sets.front().annotators) {
-    const auto own = listed.find(type);
-    set.annotators.push_back({type, own != listed.end() ? std::move(own->second)
-                                                        : assembler.make_default_annotator(type)});
+  for (const auto& [type, entry, first] : assembly.components.sets.front().annotators) {
+    set.annotators.push_back(
+        {type, entry, entry ? std::move(listed[*entry]) : assembler.make_default_annotator(type)});
   }
   assembler.complaints().raise();
   assembly.components.sets.push_back(std::move(set));

@@ -2,6 +2,7 @@
 #include "framework/pipeline/demand.h"
 
 #include <algorithm>
+#include <map>
 #include <optional>
 
 #include "diorama/config.h"
@@ -101,10 +102,25 @@ class Resolution {
   Demand demand_;
 };
 
+void refuse_twins(std::span<const AnnotatorOffer> offers) {
+  std::map<std::string, std::string> makers;
+  for (const AnnotatorOffer& offer : offers) {
+    if (!offer.is_listed) continue;
+    for (const std::string& name : offer.provides) {
+      const auto [first, is_new] = makers.emplace(name, offer.where);
+      if (is_new) continue;
+      throw Error(ErrorKind::Config, offer.where + ": " + offer.type + " makes '" + name +
+                                         "', which another entry of 'annotators' (" +
+                                         first->second + ") makes already");
+    }
+  }
+}
+
 }  // namespace
 
 Demand resolve_demand(std::span<const Need> needs, const NameSet& renderer_provides,
                       const std::string& renderer, std::span<const AnnotatorOffer> offers) {
+  refuse_twins(offers);
   Resolution resolution(renderer_provides, renderer, offers);
   for (const Need& need : needs) {
     for (const std::string& name : need.names) resolution.want(need.who, name);

@@ -22,6 +22,7 @@ struct AnnotatorOffer {
   NameSet needs;
   NameSet provides;
   bool is_listed = false;  ///< By the job: its channels come before those of the renderer.
+  std::string where = {};  ///< In the job, when it is listed there.
 };
 
 /// What has to be made so that every need is met.
@@ -42,7 +43,8 @@ inline constexpr std::string_view kAmodalMask = "amodal_mask";
 inline constexpr std::string_view kOcclusionOrder = "occlusion_order";
 inline constexpr std::string_view kInstances = "instances";
 
-/// Throws Error(Config) that names the first writer whose need nothing provides, and what would.
+/// Throws Error(Config) that names the first writer whose need nothing provides, and what would,
+/// and when two listed offers provide the same.
 Demand resolve_demand(std::span<const Need> needs, const NameSet& renderer_provides,
                       const std::string& renderer, std::span<const AnnotatorOffer> offers);
 

@@ -968,7 +968,11 @@ void OutputSection::visit(ParamVisitor& v) {
 }
 
 std::vector<ComponentConfig> read_annotators(const Value& job, Complaints& complaints) {
-  return read_parameters(job, "annotators", "each annotator works once on a frame", complaints);
+  std::vector<ComponentConfig> list;
+  for (auto& [path, map] : entries(job, "annotators", complaints)) {
+    list.push_back(read_entry(path, std::move(map), complaints));
+  }
+  return list;
 }
 
 std::vector<std::string> Job::series() const {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,8 @@ struct VisitComponents {
   std::vector<std::unique_ptr<Randomizer>> randomizers;
   struct NamedAnnotator {
     std::string type;
+    std::optional<std::size_t>
+        entry;  ///< Of Job::annotators; absent when the job does not list it.
     std::unique_ptr<Annotator> annotator;
   };
   /// Those that the writers' needs ask for, in working order.

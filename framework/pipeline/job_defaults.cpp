@@ -4,6 +4,7 @@
 
 #include "framework/pipeline/job.h"
 #include "framework/pipeline/job_sections.h"
+#include "framework/pipeline/param_variants.h"
 
 namespace diorama {
 namespace {
@@ -27,7 +28,8 @@ Value with_defaults(const Value& given, const std::vector<ParamSpec>& specs) {
   if (given.kind != Value::Kind::Map) return given;
   Value result = Value::make_map();
   for (const ParamSpec& spec : specs) {
-    result.set(spec.key, value_or_default(given.find(spec.key), spec));
+    const ParamSpec* variant = variant_of(spec, given);
+    result.set(spec.key, value_or_default(given.find(spec.key), variant ? *variant : spec));
   }
   for (const auto& [key, value] : given.map) {
     if (!result.find(key)) result.set(key, value);

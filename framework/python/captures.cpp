@@ -55,11 +55,10 @@ py::object box_of(const std::optional<PixelBox>& box) {
 }
 
 py::dict camera_of(const Camera& camera) {
-  constexpr const char* kLenses[]{"pinhole", "opencv_pinhole", "fisheye_polynomial"};
   py::dict result;
   result["width"] = camera.width;
   result["height"] = camera.height;
-  result["lens"] = kLenses[std::size_t(camera.lens)];
+  result["lens"] = kLensNames[std::size_t(camera.lens)];
   result["fx"] = camera.fx;
   result["fy"] = camera.fy;
   result["cx"] = camera.cx;
@@ -90,6 +89,41 @@ py::object visibility_of(const std::optional<Visibility>& seen, const py::capsul
   return result;
 }
 
+py::object velocity_of(const std::optional<Velocity>& velocity) {
+  if (!velocity) return py::none();
+  py::dict result;
+  result["linear"] = velocity->linear;
+  result["angular"] = velocity->angular;
+  return result;
+}
+
+py::list joints_of(const std::vector<JointState>& joints) {
+  constexpr const char* kKinds[]{"fixed", "revolute", "prismatic"};
+  py::list result;
+  for (const JointState& joint : joints) {
+    py::dict each;
+    each["path"] = joint.path;
+    each["kind"] = kKinds[std::size_t(joint.kind)];
+    each["parent_path"] = joint.parent_path;
+    each["child_path"] = joint.child_path;
+    each["position"] = joint.position;
+    each["lower"] = joint.lower;
+    each["upper"] = joint.upper;
+    result.append(each);
+  }
+  return result;
+}
+
+py::object clip_of(const std::optional<ClipFrame>& clip) {
+  if (!clip) return py::none();
+  py::dict result;
+  result["clip"] = clip->clip;
+  result["frame"] = clip->frame;
+  result["frame_count"] = clip->frame_count;
+  result["fps"] = clip->fps;
+  return result;
+}
+
 py::dict instance_of(const Instance& instance, const NameSet& holds, const py::capsule& owner) {
   py::dict result;
   result["id"] = instance.id;
@@ -108,6 +142,12 @@ py::dict instance_of(const Instance& instance, const NameSet& holds, const py::c
   });
   result["box"] = box_of(instance.tight_box);
   result["visibility"] = visibility_of(instance.visibility, owner);
+  py::dict keypoints;
+  for (const Keypoint& point : instance.keypoints) {
+    keypoints[py::str(point.name)] = point.position;
+  }
+  result["keypoints"] = keypoints;
+  result["velocity"] = velocity_of(instance.velocity);
   return result;
 }
 
@@ -128,6 +168,9 @@ py::dict frame_of(const Frame& frame, const NameSet& holds, const py::capsule& o
     occlusions.append(py::make_tuple(occlusion.front, occlusion.behind, occlusion.pixels));
   }
   result["occlusions"] = occlusions;
+  result["joints"] = joints_of(frame.joints);
+  result["leaf_paths"] = frame.leaf_paths;
+  result["exposure"] = frame.exposure;
   py::dict channels;
   for (const std::string& name : frame.channels()) {
     channels[py::str(name)] = image_view(frame.image_named(name), owner);
@@ -166,6 +209,7 @@ py::dict capture_of(std::shared_ptr<const StoredCapture> stored, const NameSet& 
   result["visit"] = stored->capture.visit;
   result["phase"] = stored->capture.phase;
   result["environment"] = stored->capture.environment;
+  result["clip"] = clip_of(stored->capture.clip);
   result["split"] = stored->split;
   py::list frames;
   for (const Frame& frame : stored->capture.frames) frames.append(frame_of(frame, holds, owner));
@@ -180,6 +224,7 @@ std::shared_ptr<const StoredCapture> copy_of(const Capture& capture, const NameS
   stored->capture.visit = capture.visit;
   stored->capture.phase = capture.phase;
   stored->capture.environment = capture.environment;
+  stored->capture.clip = capture.clip;
   for (const Frame& frame : capture.frames) stored->capture.frames.push_back(copy_of(frame, needs));
   return stored;
 }

@@ -11,6 +11,9 @@
 /// With the interpreter's lock held, except where said otherwise.
 namespace diorama {
 
+/// By LensModel.
+inline constexpr const char* kLensNames[]{"pinhole", "opencv_pinhole", "fisheye_polynomial"};
+
 pybind11::list findings_of(const ReadLog& log);
 
 /// `holds` says what is None; arrays keep `stored` alive.

@@ -24,6 +24,7 @@
 #include "framework/jobs/run_in_memory.h"
 #include "framework/plugins/plugin_search.h"
 #include "framework/python/captures.h"
+#include "framework/python/given.h"
 #include "framework/python/scenes.h"
 
 namespace py = pybind11;
@@ -48,11 +49,19 @@ class Services {
   explicit Services(const GlobalOptions& options)
       : services_(make_services(options, log_to_python)),
         readers_(*services_.registry, *services_.host) {}
-  DatasetReaders& readers() { return readers_; }
+  /// Calls with the readers, one thread at a time and without the interpreter's lock: opening a
+  /// large dataset takes seconds, in which Python goes on.
+  template <class Call>
+  auto with_readers(Call&& call) {
+    const py::gil_scoped_release unlocked;
+    const std::lock_guard alone(mutex_);  // a reader in Python may open others itself
+    return std::forward<Call>(call)(readers_);
+  }
 
  private:
   JobServices services_;
   DatasetReaders readers_;
+  std::recursive_mutex mutex_;
 };
 
 class OpenDataset {
@@ -107,19 +116,22 @@ Services& services_of(const std::string& program) {
 
 std::unique_ptr<OpenDataset> open_dataset(const std::string& program, const std::string& folder,
                                           const std::string& reader) {
-  DatasetReaders& readers = services_of(program).readers();
-  FoundDataset found = find_dataset(folder, readers, reader);
-  auto dataset = readers.open(found.folder, found.reader);
-  return std::make_unique<OpenDataset>(std::move(found), std::move(dataset));
+  return services_of(program).with_readers([&](DatasetReaders& readers) {
+    FoundDataset found = find_dataset(folder, readers, reader);
+    auto dataset = readers.open(found.folder, found.reader);
+    return std::make_unique<OpenDataset>(std::move(found), std::move(dataset));
+  });
 }
 
 std::vector<std::pair<std::string, std::string>> find_in(const std::string& program,
                                                          const std::string& folder) {
-  std::vector<std::pair<std::string, std::string>> all;
-  for (const FoundDataset& found : find_datasets(folder, services_of(program).readers())) {
-    all.emplace_back(found.folder.string(), found.reader);
-  }
-  return all;
+  return services_of(program).with_readers([&](DatasetReaders& readers) {
+    std::vector<std::pair<std::string, std::string>> all;
+    for (const FoundDataset& found : find_datasets(folder, readers)) {
+      all.emplace_back(found.folder.string(), found.reader);
+    }
+    return all;
+  });
 }
 
 /// Hands captures to a Python function, in their order, one at a time.
@@ -290,5 +302,6 @@ PYBIND11_MODULE(_diorama, module) {
       py::arg("on_capture"), py::arg("needs"), py::arg("threads"));
   bind_scenes(module);
   bind_captures(module);
+  bind_given(module);
   module.def("find_datasets", &find_in, py::arg("program"), py::arg("folder"));
 }

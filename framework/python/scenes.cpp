@@ -50,16 +50,6 @@ struct PyScene {
   PyNode wrap(NodeId id) const { return {access, id}; }
 };
 
-/// Rows of other than 0 0 0 1 at the end would be lost.
-Affine affine_of(const Mat4& matrix) {
-  if (!matrix.row(3).isApprox(Eigen::RowVector4d(0, 0, 0, 1))) {
-    throw Error(ErrorKind::Plugin, "a pose is a 4 x 4 matrix whose last row is 0 0 0 1");
-  }
-  Affine pose;
-  pose.matrix() = matrix;
-  return pose;
-}
-
 Affine world_from_parent(const PyNode& node) {
   const NodeId parent = node.node().parent;
   return parent ? node.scene().world_from_node(parent) : Affine::Identity();
@@ -242,6 +232,15 @@ void bind_rng(py::module_& module) {
 }
 
 }  // namespace
+
+Affine affine_of(const Mat4& matrix) {
+  if (!matrix.row(3).isApprox(Eigen::RowVector4d(0, 0, 0, 1))) {
+    throw Error(ErrorKind::Plugin, "a pose is a 4 x 4 matrix whose last row is 0 0 0 1");
+  }
+  Affine pose;
+  pose.matrix() = matrix;
+  return pose;
+}
 
 void bind_scenes(py::module_& module) {
   module.attr("HEADERS") = std::uint64_t(DIORAMA_HEADERS_DIGEST);

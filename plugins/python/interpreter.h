@@ -20,6 +20,13 @@ pybind11::module_ plugins_module();
 /// "stack.py:31: ZeroDivisionError: division by zero". With the lock held.
 std::string message_of(const pybind11::error_already_set& error, const std::string& file);
 
+/// What the package `diorama` takes out by held() of framework/python/capsule.h. With the lock
+/// held.
+template <class T>
+pybind11::capsule capsule_of(T& object, const char* name) {
+  return pybind11::capsule(static_cast<const void*>(&object), name);
+}
+
 /// Calls with the lock held. What Python throws becomes Error(Plugin) with file and line; Stopped
 /// passes as such.
 template <class Call>

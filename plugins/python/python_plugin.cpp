@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Randomizers and writers that are classes in Python files; framework/docs/python.md says how to
-// write them. Their base classes stand in framework/python/diorama/plugins.py.
+// Components that are classes in Python files; framework/docs/python.md says how to write them.
+// Their base classes stand in framework/python/diorama/plugins.py.
 #include <pybind11/eigen.h>
 #include <pybind11/functional.h>
 #include <pybind11/stl.h>
@@ -8,9 +8,11 @@
 #include <string>
 #include <vector>
 
+#include "diorama/annotator.h"
 #include "diorama/plugin.h"
 #include "diorama/randomizer.h"
 #include "diorama/writer.h"
+#include "python/python_reader.h"
 #include "python/script.h"
 
 namespace py = pybind11;
@@ -18,16 +20,12 @@ namespace py = pybind11;
 namespace diorama {
 namespace {
 
-template <class T>
-py::capsule capsule_of(T& object, const char* name) {
-  return py::capsule(static_cast<const void*>(&object), name);
-}
-
 class PythonRandomizer final : public Randomizer {
  public:
+  static constexpr const char* kScriptKind = "randomizer";
   using Params = ScriptParams;
   PythonRandomizer(const Params& params, Host& host)
-      : script_(params, "randomizer", host), host_(host) {}
+      : script_(params, kScriptKind, host), host_(host) {}
 
   void randomize(Scene& scene, const RandomizeContext& context, const Rng& rng) override {
     script_.call([&](const py::object& object) {
@@ -43,10 +41,46 @@ class PythonRandomizer final : public Randomizer {
   Host& host_;
 };
 
+class PythonAnnotator final : public Annotator {
+ public:
+  static constexpr const char* kScriptKind = "annotator";
+  using Params = ScriptParams;
+  PythonAnnotator(const Params& params, Host& host) : script_(params, kScriptKind, host) {
+    script_.call([&](const py::object& object) {
+      needs_ = object.attr("needs").cast<std::vector<std::string>>();
+      provides_ = object.attr("provides").cast<std::vector<std::string>>();
+    });
+    if (provides_.empty()) refuse("provides nothing; list the channels that annotate() makes");
+    for (const std::string& name : provides_) {
+      if (is_annotation(name)) refuse("provides '" + name + "', which is no channel");
+      if (needs().contains(name)) refuse("needs '" + name + "', which it provides itself");
+    }
+  }
+
+  NameSet needs() const override { return {needs_.begin(), needs_.end()}; }
+  NameSet provides() const override { return {provides_.begin(), provides_.end()}; }
+
+ private:
+  [[noreturn]] void refuse(const std::string& why) const {
+    throw Error(ErrorKind::Plugin, script_.title() + " " + why);
+  }
+  void do_annotate(const Scene&, Frame& frame) const override {
+    script_.call([&](const py::object& object) {
+      plugins_module().attr("_annotate")(object, capsule_of(frame, "diorama::Frame"), needs_,
+                                         provides_);
+    });
+  }
+
+  Script script_;
+  std::vector<std::string> needs_;
+  std::vector<std::string> provides_;
+};
+
 class PythonWriter final : public Writer {
  public:
+  static constexpr const char* kScriptKind = "writer";
   using Params = ScriptParams;
-  PythonWriter(const Params& params, Host& host) : script_(params, "writer", host) {
+  PythonWriter(const Params& params, Host& host) : script_(params, kScriptKind, host) {
     script_.call([&](const py::object& object) {
       needs_ = object.attr("needs").cast<std::vector<std::string>>();
     });
@@ -79,11 +113,30 @@ class PythonWriter final : public Writer {
   std::vector<std::string> needs_;
 };
 
+/// As diorama::add(), with the parameters of the classes that the user's folders hold.
+template <class T>
+void add_script(Registrar& registrar, const char* help, const Listing& listing) {
+  ComponentInfo info = detail::info_of<T>("python", help, listing, nullptr,
+                                          [](const void*) { return ScriptParams(); });
+  info.describe = [](const void*) { return describe_scripts(T::kScriptKind); };
+  registrar.add(info);
+}
+
 }  // namespace
 }  // namespace diorama
 
-DIORAMA_PLUGIN("python", "1.0.0", "Apache-2.0") {
-  DIORAMA_ADD(diorama::PythonRandomizer, "python",
-              "Changes the scene by a class in a Python file.");
-  DIORAMA_ADD(diorama::PythonWriter, "python", "Writes files by a class in a Python file.");
+#define DIORAMA_ADD_SCRIPT(T, HELP, PROVIDES)                                       \
+  do {                                                                              \
+    DIORAMA_DETAIL_LIST(std::uint32_t(T::kKind), "python", HELP, "", "", PROVIDES); \
+    diorama::add_script<T>(registrar, HELP, {"", "", PROVIDES});                    \
+  } while (false)
+
+DIORAMA_PLUGIN("python", "1.1.0", "Apache-2.0") {
+  DIORAMA_ADD_SCRIPT(diorama::PythonRandomizer, "Changes the scene by a class in a Python file.",
+                     "");
+  // What it makes depends on its class: it works where a job lists it.
+  DIORAMA_ADD_SCRIPT(diorama::PythonAnnotator, "Makes channels by a class in a Python file.", "*");
+  DIORAMA_ADD_SCRIPT(diorama::PythonWriter, "Writes files by a class in a Python file.", "");
+  DIORAMA_ADD_READER(diorama::PythonReader, "python",
+                     "Opens datasets by classes in Python files of the user's folders.", "*.* */*");
 }

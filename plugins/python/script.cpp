@@ -10,6 +10,10 @@
 #include <cstdlib>
 #include <deque>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <string_view>
 #include <tuple>
 #include <utility>
 #include <variant>
@@ -45,24 +49,35 @@ bool is_below(const fs::path& file, const fs::path& folder) {
          folder.end();
 }
 
+/// The file that is meant, if it lies in one of the folders, links followed.
+std::optional<fs::path> file_in(const std::vector<fs::path>& folders, const fs::path& place) {
+  std::error_code failed;
+  fs::path file = fs::canonical(place, failed);
+  if (failed || !fs::is_regular_file(file, failed)) return std::nullopt;
+  if (std::ranges::none_of(folders, [&](const fs::path& f) { return is_below(file, f); })) {
+    return std::nullopt;
+  }
+  return file;
+}
+
+bool may_be_written_by_all(const fs::path& file) {
+  struct stat status {};
+  return ::stat(file.c_str(), &status) == 0 && (status.st_mode & S_IWOTH) != 0;
+}
+
 /// A job alone must not run code: it may come from anyone. Folders are chosen by the user.
 std::string find_script(const std::string& name) {
   const std::vector<fs::path> folders = allowed_folders();
   std::string looked;
   for (const fs::path& folder : folders) {
     looked += (looked.empty() ? "" : ", ") + folder.string();
-    std::error_code failed;
-    const fs::path file = fs::canonical(folder / name, failed);
-    if (failed || !fs::is_regular_file(file, failed)) continue;
-    if (std::ranges::none_of(folders, [&](const fs::path& f) { return is_below(file, f); })) {
-      continue;
-    }
-    struct stat status {};
-    if (::stat(file.c_str(), &status) == 0 && (status.st_mode & S_IWOTH) != 0) {
-      throw Error(ErrorKind::Config, "file: " + file.string() +
+    const std::optional<fs::path> file = file_in(folders, folder / name);
+    if (!file) continue;
+    if (may_be_written_by_all(*file)) {
+      throw Error(ErrorKind::Config, "file: " + file->string() +
                                          ": everybody may write it, so it is not run (chmod o-w)");
     }
-    return file.string();
+    return file->string();
   }
   throw Error(
       ErrorKind::Config,
@@ -88,17 +103,17 @@ Field field_of(const std::string& type, const py::object& value) {
   return value.cast<std::string>();
 }
 
-py::dict read_params(const py::object& type, const Value& map) {
-  struct Declared {
-    std::string key;
-    std::string help;
-    std::string unit;
-    std::vector<std::string> choices;
-    Field field;
-  };
+struct Declared {
+  std::string key;
+  std::string help;
+  std::string unit;
+  std::vector<std::string> choices;
+  Field field;
+};
+
+/// What the class declares, shown to the visitor one by one.
+std::deque<Declared> visit_declared(const py::object& type, ParamVisitor& visitor) {
   std::deque<Declared> all;
-  Complaints complaints;
-  ParamReader reader(map, "params", complaints);
   for (const py::handle each : plugins_module().attr("_params_of")(type)) {
     const auto [key, kind, spec] = each.cast<std::tuple<std::string, std::string, py::object>>();
     all.push_back({key, spec.attr("help").cast<std::string>(),
@@ -111,11 +126,18 @@ py::dict read_params(const py::object& type, const Value& map) {
     if (!one.choices.empty()) {
       std::vector<const char*> words;
       for (const std::string& word : one.choices) words.push_back(word.c_str());
-      reader.choice(one.key.c_str(), std::get<std::string>(one.field), words, doc);
+      visitor.choice(one.key.c_str(), std::get<std::string>(one.field), words, doc);
     } else {
-      std::visit([&](auto& field) { reader.param(one.key.c_str(), field, doc); }, one.field);
+      std::visit([&](auto& field) { visitor.param(one.key.c_str(), field, doc); }, one.field);
     }
   }
+  return all;
+}
+
+py::dict read_params(const py::object& type, const Value& map) {
+  Complaints complaints;
+  ParamReader reader(map, "params", complaints);
+  const std::deque<Declared> all = visit_declared(type, reader);
   reader.finish();
   complaints.raise();
   py::dict values;
@@ -126,9 +148,73 @@ py::dict read_params(const py::object& type, const Value& map) {
   return values;
 }
 
+/// The parameters of a class as one of the things that `params` may be.
+ParamSpec variant_for(const std::string& file, const std::string& name, const std::string& help,
+                      const py::object& type) {
+  ParamLister lister;
+  visit_declared(type, lister);
+  ParamSpec spec;
+  spec.key = name + " of " + file;
+  spec.type = ParamType::Group;
+  spec.help = help;
+  spec.default_value = Value::make_map();
+  spec.choices = {"file=" + file, "class=" + name};
+  spec.children = lister.take();
+  return spec;
+}
+
 }  // namespace
 
-Script::Script(const ScriptParams& params, const char* kind, Host& host) : host_(host) {
+std::vector<ScriptFile> script_files(std::string_view word) {
+  const std::vector<fs::path> folders = allowed_folders();
+  std::vector<ScriptFile> files;
+  for (const fs::path& folder : folders) {
+    std::vector<ScriptFile> here;
+    std::error_code failed;
+    for (fs::directory_iterator at(folder, failed), end; !failed && at != end;
+         at.increment(failed)) {
+      const std::string name = at->path().filename().string();
+      const bool is_taken =
+          std::ranges::find(files, name, &ScriptFile::name) != files.end();  // as find_script()
+      if (at->path().extension() != ".py" || is_taken) continue;
+      const std::optional<fs::path> file = file_in(folders, at->path());
+      if (!file || may_be_written_by_all(*file)) continue;
+      std::ifstream in(*file);
+      const std::string text{std::istreambuf_iterator<char>(in), {}};
+      if (text.find("diorama.plugins") == text.npos || text.find(word) == text.npos) continue;
+      here.push_back({name, file->string()});
+    }
+    std::ranges::sort(here, {}, &ScriptFile::name);
+    files.insert(files.end(), here.begin(), here.end());
+  }
+  return files;
+}
+
+std::vector<ParamSpec> describe_scripts(const char* kind) {
+  ScriptParams params;
+  ParamLister lister;
+  params.visit(lister);
+  std::vector<ParamSpec> specs = lister.take();
+  const std::vector<ScriptFile> files = script_files("");
+  if (files.empty()) return specs;
+  start_python();
+  const py::gil_scoped_acquire lock;
+  try {
+    py::list given;
+    for (const ScriptFile& file : files) given.append(py::make_tuple(file.name, file.path));
+    for (const py::handle each : plugins_module().attr("_classes")(kind, given)) {
+      const auto [file, name, help, type] =
+          each.cast<std::tuple<std::string, std::string, std::string, py::object>>();
+      specs.back().children.push_back(variant_for(file, name, help, type));
+    }
+  } catch (const py::error_already_set& error) {
+    throw Error(ErrorKind::Plugin, message_of(error, "diorama.plugins"));
+  }
+  return specs;
+}
+
+Script::Script(const ScriptParams& params, const char* kind, Host& host)
+    : host_(host), class_name_(params.class_name) {
   file_ = find_script(params.file);
   start_python();
   call_python(file_, host, [&] {

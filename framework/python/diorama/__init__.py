@@ -15,6 +15,7 @@ What a format does not hold is None or not there (`Dataset.holds`). Messages go 
 from __future__ import annotations
 
 import dataclasses
+import enum
 import json
 import os
 import pathlib
@@ -27,9 +28,10 @@ import numpy as np
 from . import _diorama
 from ._diorama import Error, __version__
 
-__all__ = ["Camera", "Capture", "Dataset", "Error", "Finding", "Frame", "Instance", "Visibility", "find", "open",
-           "run", "__version__"]
+__all__ = ["Camera", "Capture", "ClipFrame", "Dataset", "Error", "Finding", "FlowState", "Frame", "Instance", "JointState",
+           "Velocity", "Visibility", "find", "open", "run", "__version__"]
 
+Array = np.ndarray[Any, np.dtype[Any]]
 Box = tuple[int, int, int, int]
 
 
@@ -39,19 +41,19 @@ class Camera:
 
     width: int
     height: int
-    lens: str  #: "pinhole", "opencv_pinhole" or "fisheye_polynomial"
-    fx: float
-    fy: float
-    cx: float
-    cy: float
-    distortion: tuple[float, ...]  #: k1 k2 p1 p2 k3 k4 k5 k6 of OpenCV
-    fisheye_polynomial: tuple[float, ...]  #: angle = a + b r + c r^2 ..., r in pixels
-    near_m: float
-    far_m: float
+    lens: str = "pinhole"  #: "pinhole", "opencv_pinhole" or "fisheye_polynomial"
+    fx: float = 600.0
+    fy: float = 600.0
+    cx: float = 320.0
+    cy: float = 240.0
+    distortion: tuple[float, ...] = ()  #: k1 k2 p1 p2 k3 k4 k5 k6 of OpenCV
+    fisheye_polynomial: tuple[float, ...] = ()  #: angle = a + b r + c r^2 ..., r in pixels
+    near_m: float = 0.25
+    far_m: float = 1000.0
 
     @property
-    def matrix(self) -> np.ndarray:
-        """3 x 3, for axes x right, y down, z forward as OpenCV has them."""
+    def matrix(self) -> Array:
+        """float64, 3 x 3, pixels: for axes x right, y down, z forward as OpenCV has them."""
         return np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
 
 
@@ -65,52 +67,126 @@ class Visibility:
     occlusion: float | None  #: 1 - visible / amodal; None when nothing is inside
     truncation: float  #: share outside of the picture
     amodal_box: Box | None
-    amodal_mask: tuple[Box, np.ndarray] | None  #: where it lies, and 0 or 1 per pixel of that
+    #: Where it lies, and 0 or 1 per pixel of that: uint8, height x width of the box.
+    amodal_mask: tuple[Box, Array] | None
+
+
+class FlowState(enum.IntEnum):
+    """What the other frame of a flow shows of the point in a pixel: values of "flow_forward_state" and
+    "flow_backward_state"."""
+
+    SEEN = 0  #: the point itself
+    HIDDEN = 1  #: something in front of it
+    OUTSIDE = 2  #: nothing: it is out of the picture, or too near or far
+    UNKNOWN = 3  #: there is no such point (nothing was hit), or no such frame
+
+
+@dataclasses.dataclass(frozen=True)
+class Velocity:
+    """How an object's origin moves and how the object turns."""
+
+    linear: Array  #: float64, 3: m/s, world
+    angular: Array  #: float64, 3: rad/s, world axes
 
 
 @dataclasses.dataclass(frozen=True)
 class Instance:
-    """An object in a picture. `id` is its value in the channel "instance_id"."""
+    """An object in a picture. `id` is its value in the channel "instance_id"; in a clip the same object has the same
+    id in all frames."""
 
     id: int
     path: str
-    labels: dict[str, str]
-    world_from_object: np.ndarray | None  #: 4 x 4
-    bounds: tuple[np.ndarray, np.ndarray] | None  #: least and greatest corner in the object's own space, metres
-    box: Box | None  #: of its visible pixels
-    visibility: Visibility | None
+    labels: dict[str, str] = dataclasses.field(default_factory=dict)  #: taxonomy to label: {"class": "mug"}
+    world_from_object: Array | None = None  #: float64, 4 x 4, metres
+    #: Least and greatest corner in the object's own space: float64, 3 each, metres.
+    bounds: tuple[Array, Array] | None = None
+    box: Box | None = None  #: of its visible pixels
+    visibility: Visibility | None = None
+    #: By name: float64, 3, metres in the object's own space. Only what is made has them, not what is read.
+    keypoints: dict[str, Array] = dataclasses.field(default_factory=dict)
+    velocity: Velocity | None = None  #: of rigid bodies, where "velocities" are held
+
+    @property
+    def keypoints_world(self) -> dict[str, Array]:
+        """The same in the world. Needs `world_from_object`."""
+        if self.world_from_object is None:
+            return {}
+        return {name: self.world_from_object[:3, :3] @ point + self.world_from_object[:3, 3]
+                for name, point in self.keypoints.items()}
+
+
+@dataclasses.dataclass(frozen=True)
+class JointState:
+    """A joint of the scene at the moment of a capture."""
+
+    path: str
+    kind: str  #: "fixed", "revolute" or "prismatic"
+    parent_path: str  #: of the bodies that it joins
+    child_path: str
+    position: float  #: radians or metres; 0 when fixed
+    lower: float  #: least position; -inf: none
+    upper: float
 
 
 @dataclasses.dataclass(frozen=True)
 class Frame:
-    """What one camera sees in one capture."""
+    """What one camera sees in one capture.
+
+    Channels, each height x width or height x width x parts, of which a dataset or run has some:
+
+    - "color": uint8 x 4, sRGB and alpha; "color_hdr": float32 x 3, linear radiance before `exposure`
+    - "distance_to_image_plane", "distance_to_camera": float32, metres along the viewing axis or the ray, +inf where
+      nothing was hit; "sensor_depth": float32, metres as a depth camera measures them, 0 where it measures nothing
+    - "normals": float32 x 3, unit vectors in the world, 0 where nothing was hit; "position": float32 x 3, metres, world
+    - "instance_id", "leaf_id": uint32, 0 where nothing is; see `instances` and `leaf_paths`
+    - "object_coordinates": float32 x 3, place in the object's box from 0 to 1 (NOCS); "uv": float32 x 2; "albedo": float32 x 3
+    - "motion", "flow_forward", "flow_backward": float32 x 2, pixels to the right and down, since the last step of
+      physics, to the clip's next and its previous frame; "flow_forward_state", "flow_backward_state": uint32, `FlowState`
+
+    They are views that cannot be written to and keep the capture's pixels in memory: copy what you keep for long."""
 
     camera_name: str
     camera: Camera
-    world_from_camera: np.ndarray | None  #: 4 x 4
-    instances: list[Instance]
-    occlusions: list[tuple[int, int, int]]  #: (front id, behind id, pixels)
-    #: By name, height x width or height x width x parts: "color" (uint8, RGBA), "distance_to_image_plane" (float32,
-    #: metres, infinite where nothing is), "normals" (float32, world), "instance_id" (uint32) ... Views that cannot
-    #: be written to and keep the capture's pixels in memory: copy what you keep for long.
-    channels: dict[str, np.ndarray]
+    world_from_camera: Array | None = None  #: float64, 4 x 4, metres; the camera looks along -z, y is up
+    instances: list[Instance] = dataclasses.field(default_factory=list)
+    occlusions: list[tuple[int, int, int]] = dataclasses.field(default_factory=list)  #: (front id, behind id, pixels)
+    joints: list[JointState] = dataclasses.field(default_factory=list)  #: of the whole scene, the same for all cameras
+    leaf_paths: dict[int, str] = dataclasses.field(default_factory=dict)  #: of the ids in "leaf_id"
+    exposure: float = 1.0  #: factor from "color_hdr" to what is seen
+    channels: dict[str, Array] = dataclasses.field(default_factory=dict)  #: see above
 
-    def mask(self, instance: Instance) -> np.ndarray:
-        """True where the instance is seen, height x width. Needs the channel "instance_id"."""
-        return self.channels["instance_id"] == instance.id
+    def mask(self, instance: Instance) -> Array:
+        """bool, height x width: where the instance is seen. Needs the channel "instance_id"."""
+        mask: Array = self.channels["instance_id"] == instance.id
+        return mask
 
 
 @dataclasses.dataclass(frozen=True)
 class Finding:
     """Something in the files that cannot be right; see `diorama lint`."""
 
-    check: str
-    file: str
-    capture: int | None
-    camera: str
-    object: str
-    found: str
-    expected: str
+    check: str  #: the rule that is broken
+    file: str  #: relative to the dataset
+    capture: int | None = None
+    camera: str = ""
+    object: str = ""
+    found: str = ""
+    expected: str = ""
+
+
+@dataclasses.dataclass(frozen=True)
+class ClipFrame:
+    """The place of a capture in a clip: captures of one scene in which time goes on."""
+
+    clip: int  #: from 0 in the whole job
+    frame: int  #: from 0 in the clip
+    frame_count: int  #: of the clip
+    fps: float  #: frames per second
+
+    @property
+    def time_s(self) -> float:
+        """Seconds since the clip's first frame."""
+        return self.frame / self.fps
 
 
 @dataclasses.dataclass(frozen=True)
@@ -118,12 +194,13 @@ class Capture:
     """One moment, seen by all cameras."""
 
     index: int  #: in the job that made it
-    visit: int
-    phase: str
-    environment: str
-    split: str  #: "train", "val" ...; empty when the format has none
-    frames: list[Frame]
-    findings: list[Finding]
+    visit: int = 0
+    phase: str = ""
+    environment: str = ""
+    clip: ClipFrame | None = None  #: None for captures that stand alone
+    split: str = ""  #: "train", "val" ...; empty when the format has none
+    frames: list[Frame] = dataclasses.field(default_factory=list)  #: one per camera
+    findings: list[Finding] = dataclasses.field(default_factory=list)
 
 
 def _frame(values: dict[str, Any]) -> Frame:
@@ -132,13 +209,16 @@ def _frame(values: dict[str, Any]) -> Frame:
         camera[key] = tuple(camera[key])
     instances = []
     for instance in values.pop("instances"):
-        seen = instance.pop("visibility")
-        instances.append(Instance(**instance, visibility=seen and Visibility(**seen)))
-    return Frame(camera=Camera(**camera), instances=instances, **values)
+        seen, velocity = instance.pop("visibility"), instance.pop("velocity")
+        instances.append(Instance(**instance, visibility=seen and Visibility(**seen),
+                                  velocity=velocity and Velocity(**velocity)))
+    joints = [JointState(**joint) for joint in values.pop("joints")]
+    return Frame(camera=Camera(**camera), instances=instances, joints=joints, **values)
 
 
 def _capture(values: dict[str, Any]) -> Capture:
     values["frames"] = [_frame(frame) for frame in values["frames"]]
+    values["clip"] = values["clip"] and ClipFrame(**values["clip"])
     values["findings"] = [Finding(**finding) for finding in values["findings"]]
     return Capture(**values)
 
@@ -198,7 +278,7 @@ class Dataset(Sequence[Capture]):
     def __getitem__(self, place: int) -> Capture: ...
     @overload
     def __getitem__(self, place: slice) -> list[Capture]: ...
-    def __getitem__(self, place):
+    def __getitem__(self, place: int | slice) -> Capture | list[Capture]:
         if isinstance(place, slice):
             return [self[i] for i in range(*place.indices(len(self)))]
         place = range(len(self))[place]  # negative ones count from the end; others raise IndexError
@@ -209,7 +289,7 @@ class Dataset(Sequence[Capture]):
     def __iter__(self) -> Iterator[Capture]:
         return (self[i] for i in range(len(self)))
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple[type[Dataset], tuple[str, str, list[str] | None]]:
         return Dataset, (*self._asked, self._wanted)
 
     def __repr__(self) -> str:
@@ -246,7 +326,7 @@ class Dataset(Sequence[Capture]):
         return {"images": images, "annotations": annotations, "categories": categories}
 
 
-def _run_lengths(mask: np.ndarray) -> dict[str, Any]:
+def _run_lengths(mask: Array) -> dict[str, Any]:
     """COCO's: down the columns, beginning with a run of zeros."""
     flat = np.concatenate([[0], mask.T.ravel().astype(np.int8), [1 - int(mask[-1, -1])]])
     ends = np.flatnonzero(np.diff(flat))

@@ -1,13 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+_Array = np.ndarray[Any, np.dtype[Any]]
+
 __version__: str
+HEADERS: int  #: digest of the SDK's headers, which the plugin `python` compares
 
 class Error(RuntimeError):
-    kind: str
+    """Something that Diorama refuses."""
+
+    kind: str  #: "usage", "config", "plugin", "asset", "output" or "internal"
 
 class OpenDataset:
     def info(self) -> dict[str, Any]: ...
@@ -21,27 +26,38 @@ def listen(program: str, file: str, text: str, sets: list[str], seed: int | None
 # What the plugin `python` hands to components of diorama.plugins, each for one call.
 
 class Node:
-    """A node of the scene's tree. Poses are 4 x 4 in metres; what is set holds for all below it."""
+    """A node of the scene's tree. Poses are float64, 4 x 4, in metres; what is set holds for all below it."""
 
-    name: str
-    path: str  #: "/Assets/mug_01"
-    parent: Node | None
-    children: list[Node]
+    @property
+    def name(self) -> str: ...
+    @property
+    def path(self) -> str:
+        """"/Assets/mug_01"."""
+    @property
+    def parent(self) -> Node | None: ...
+    @property
+    def children(self) -> list[Node]: ...
     labels: dict[str, str]  #: taxonomy to label, of this node alone; set it as a whole
     is_visible: bool  #: False hides all below it from cameras, not from physics
-    parent_from_node: np.ndarray
-    world_from_node: np.ndarray
-    position: np.ndarray  #: of its origin in the world; setting it keeps rotation and scale
-    world_bounds: tuple[np.ndarray, np.ndarray] | None  #: of the visible meshes at and below it
-    has_mesh: bool
-    is_light: bool
-    is_camera: bool
-    light_color: np.ndarray | None  #: nits; lux of a distant light
-    def set_base_color(self, color: Sequence[float]) -> None:
+    parent_from_node: Any  #: float64, 4 x 4
+    world_from_node: Any  #: float64, 4 x 4
+    position: Any  #: float64, 3: of its origin in the world; setting it keeps rotation and scale
+    @property
+    def world_bounds(self) -> tuple[_Array, _Array] | None:
+        """Least and greatest corner, float64, 3 each, of the visible meshes at and below it."""
+    @property
+    def has_mesh(self) -> bool: ...
+    @property
+    def is_light(self) -> bool: ...
+    @property
+    def is_camera(self) -> bool: ...
+    light_color: Any  #: float32, 3, or None: nits; lux of a distant light
+    def set_base_color(self, color: Sequence[float] | _Array) -> None:
         """Linear red, green, blue of all materials at and below it, instead of their textures."""
 
 class Scene:
-    root: Node
+    @property
+    def root(self) -> Node: ...
     def match(self, pattern: str) -> list[Node]:
         """Nodes by path in creation order: '*' is any text without '/', '**' any text."""
     def find(self, path: str) -> Node | None: ...
@@ -51,6 +67,7 @@ class Scene:
         """With all below it."""
     def load(self, asset: str, parent: Node) -> Node:
         """An asset by the job's path rules, as a new node."""
+    def _end(self) -> None: ...
 
 class Rng:
     def __init__(self, seed: int) -> None: ...
@@ -60,8 +77,8 @@ class Rng:
     def normal(self, mean: float = 0.0, deviation: float = 1.0) -> float: ...
     def index(self, count: int) -> int: ...
     def chance(self, probability: float) -> bool: ...
-    def unit_vector(self) -> np.ndarray: ...
-    def rotation(self) -> np.ndarray: ...
+    def unit_vector(self) -> _Array: ...
+    def rotation(self) -> _Array: ...
 
 class Files:
     """Paths are relative to the writer's folder, with '/'."""
@@ -71,3 +88,16 @@ class Files:
         """Puts content at the end of a file that begins empty."""
     def record(self, line: str) -> None:
         """In write() alone: a line that finish() gets."""
+    def _end(self) -> None: ...
+
+# Between the plugin and diorama.plugins alone; capsules hold addresses of the SDK's objects.
+
+def scene_of(scene: Any, host: Any) -> Scene: ...
+def rng_of(rng: Any) -> Rng: ...
+def files_of(files: Any) -> Files: ...
+def capture_files_of(files: Any) -> Files: ...
+def dataset_of(info: Any) -> dict[str, Any]: ...
+def capture_copy(capture: Any, needs: list[str]) -> dict[str, Any]: ...
+def frame_copy(frame: Any, needs: list[str]) -> tuple[dict[str, Any], int]: ...
+def set_channels(frame: Any, channels: Mapping[str, _Array]) -> None: ...
+def store_capture(stored: Any, capture: Any) -> None: ...

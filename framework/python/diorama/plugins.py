@@ -24,19 +24,22 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import importlib.util
+import logging
 import math
 import pathlib
 import sys
 import traceback
-from collections.abc import Callable, Sequence
+import types
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from . import Capture, _capture, _diorama
+from . import Array, Camera, Capture, Finding, Frame, Instance, Visibility, _capture, _diorama, _frame
 from ._diorama import Error, Files, Node, Scene
 
-__all__ = ["Capture", "Context", "DatasetInfo", "Error", "Files", "Node", "Parameter", "Randomizer", "Rng", "Scene", "Writer", "param"]
+__all__ = ["Annotator", "Camera", "Capture", "Context", "DatasetInfo", "Error", "Files", "Finding", "Frame", "Instance", "Node",
+           "Parameter", "Randomizer", "Reader", "Rng", "Scene", "Stored", "Visibility", "Writer", "param"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -66,7 +69,7 @@ class Context:
 
     moment: str  #: "environment" once per visit, before physics; or the name of a capture series
     capture: int  #: `Capture.index`; -1 at "environment"
-    working_area: np.ndarray  #: centre, in the world
+    working_area: Array  #: float64, 3: its centre in the world, metres
     occurrence: int  #: how often it acted at this moment before, over the whole job
 
 
@@ -99,12 +102,12 @@ class Rng:
     def chance(self, probability: float) -> bool:
         return self._stream.chance(probability)
 
-    def unit_vector(self) -> np.ndarray:
-        """Uniform on the sphere."""
+    def unit_vector(self) -> Array:
+        """float64, 3: uniform on the sphere."""
         return self._stream.unit_vector()
 
-    def rotation(self) -> np.ndarray:
-        """3 x 3, uniform over all rotations."""
+    def rotation(self) -> Array:
+        """float64, 3 x 3: uniform over all rotations."""
         return self._stream.rotation()
 
     def generator(self) -> np.random.Generator:
@@ -152,34 +155,138 @@ class Writer:
         """Once all captures of the job are there: `records(visit)` calls visit(capture, line) for each record."""
 
 
-_KINDS = {"randomizer": Randomizer, "writer": Writer}
+class Annotator:
+    """Makes channels from what was rendered: `provides` lists them, `needs` the channels and annotations that
+    annotate() reads ("color", "instance_id", "distance_to_image_plane", "instances" ...). It works where a job lists
+    it and a writer needs what it makes, in front of the renderer's channel of that name."""
+
+    needs: Sequence[str] = ()
+    provides: Sequence[str] = ()
+
+    def annotate(self, frame: Frame, rng: Rng) -> Mapping[str, Array]:
+        """The channels of `provides` by name, as large as the picture: float32 (height, width), (height, width, 2)
+        or (height, width, 3), uint32 (height, width), or uint8 (height, width, 4). `frame` holds what `needs` lists;
+        `rng` is one stream per picture. One thread at a time; keep nothing from one call to the next."""
+        raise NotImplementedError
+
+
+class Stored:
+    """A dataset that a Reader opened. Set the attributes, write read()."""
+
+    format: str = ""  #: for people: "my tables"
+    #: What captures may have: names of channels, "instances", "labels", "tight_boxes", "poses", "bounds", "camera",
+    #: "camera_pose", "visibility" ... (diorama/reader.h lists them with what each means)
+    holds: Sequence[str] = ()
+    cameras: Sequence[str] = ()  #: names
+    captures: Sequence[int] = ()  #: `Capture.index` of each, ascending
+    classes: Sequence[str] = ()  #: the format's class list, in its order
+    steps: Mapping[str, float] = types.MappingProxyType({})  #: to what it rounds, by what is held: metres, pixels
+
+    def read(self, place: int, wanted: frozenset[str]) -> Capture:
+        """The capture at a place of `captures`. What `wanted` does not name may be left out; sizes of cameras are
+        always there. Several threads may call it. What a damaged file raises (OSError, ValueError) becomes a finding of
+        `diorama lint`."""
+        raise NotImplementedError
+
+
+class Reader:
+    """Opens folders of a format of your own, for diorama.open(), lint, stats, view, convert and all else that reads
+    datasets. It is found in the folders of DIORAMA_PYTHON_PATH; its parameters have their defaults."""
+
+    #: Files of which such a folder has one at least, "*" for any text inside one name: ("objects.csv", "boxes/*.txt").
+    #: Some file must lie right in the folder, with an ending, or in a folder right below.
+    patterns: Sequence[str] = ()
+
+    def recognise(self, folder: pathlib.Path) -> bool:
+        """Whether a folder with such a file is really of this format; look at small files alone."""
+        return True
+
+    def open(self, folder: pathlib.Path) -> Stored:
+        """Raises OSError or ValueError when there is nothing that it could read."""
+        raise NotImplementedError
+
+
+_KINDS: dict[str, type[Any]] = {"annotator": Annotator, "randomizer": Randomizer, "reader": Reader, "writer": Writer}
+_LOG = logging.getLogger("diorama")
 
 
 class NoSuchClass(LookupError):
     """A job names a class that its file does not have."""
 
 
-def _load(file: str, name: str, kind: str) -> type:
-    """The class; a file is run once per process."""
-    path = pathlib.Path(file)
-    module_name = "_diorama_script_" + hashlib.sha256(file.encode()).hexdigest()[:16]
-    module = sys.modules.get(module_name)
+def _module_name(file: str) -> str:
+    return "_diorama_script_" + hashlib.sha256(file.encode()).hexdigest()[:16]
+
+
+def _module(file: str) -> types.ModuleType:
+    """A file is run once per process."""
+    name = _module_name(file)
+    module = sys.modules.get(name)
     if module is None:
-        spec = importlib.util.spec_from_file_location(module_name, path)
+        spec = importlib.util.spec_from_file_location(name, pathlib.Path(file))
+        assert spec is not None and spec.loader is not None
         module = importlib.util.module_from_spec(spec)
-        sys.modules[module_name] = module
+        sys.modules[name] = module
         try:
             spec.loader.exec_module(module)
         except BaseException:
-            del sys.modules[module_name]
+            del sys.modules[name]
             raise
+    return module
+
+
+def _classes_in(module: types.ModuleType, kind: str) -> dict[str, type[Any]]:
     base = _KINDS[kind]
-    found = sorted(key for key, value in vars(module).items()
-                   if isinstance(value, type) and issubclass(value, base) and value is not base)
+    return {key: value for key, value in sorted(vars(module).items())
+            if isinstance(value, type) and issubclass(value, base) and value is not base}
+
+
+def _load(file: str, name: str, kind: str) -> type[Any]:
+    found = _classes_in(_module(file), kind)
     if name not in found:
         raise NoSuchClass(f"there is no {kind} '{name}'; it has {', '.join(found) or 'none'}"
-                          f" (classes that are derived from diorama.plugins.{base.__name__})")
-    return getattr(module, name)
+                          f" (classes that are derived from diorama.plugins.{_KINDS[kind].__name__})")
+    return found[name]
+
+
+def _each_class(kind: str, files: Sequence[tuple[str, str]]) -> Iterator[tuple[str, str, str, type[Any]]]:
+    """File's name and path, class's name and class. Files that cannot be run are told and left out."""
+    for name, path in files:
+        try:
+            module = _module(path)
+        except (Exception, SystemExit) as error:
+            _LOG.warning("%s (the file is left out)", _say(error, path))
+            continue
+        for key, cls in _classes_in(module, kind).items():
+            if cls.__module__ == module.__name__:  # not those that it imports
+                yield name, path, key, cls
+
+
+def _classes(kind: str, files: Sequence[tuple[str, str]]) -> list[tuple[str, str, str, type[Any]]]:
+    """File, class, help and the class itself, to describe them. Who has begun to run files has run those that the job
+    names; others are then none of its business."""
+    begun = [each for each in files if _module_name(each[1]) in sys.modules]
+    found = []
+    for file, path, name, cls in _each_class(kind, begun or files):
+        text = (cls.__doc__ or "").strip().split("\n\n")[0].replace("\n", " ")
+        help = " ".join(text.split()) or f"Parameters of {name}."
+        try:
+            _params_of(cls)
+        except TypeError as error:
+            _LOG.warning("%s: %s: %s (the class is left out)", path, name, error)
+            continue
+        found.append((file, name, help if help.endswith(".") else help + ".", cls))
+    return found
+
+
+def _readers_of(files: Sequence[tuple[str, str]], folder: str) -> list[tuple[str, str, type[Any]]]:
+    """Path, title and class of each reader that knows the folder."""
+    found = []
+    root = pathlib.Path(folder)
+    for name, path, key, cls in _each_class("reader", files):
+        if any(next(root.glob(pattern), None) is not None for pattern in cls.patterns) and _with_defaults(cls).recognise(root):
+            found.append((path, f"{name}: {key}", cls))
+    return found
 
 
 def _type_of(default: Any, choices: tuple[str, ...]) -> str:
@@ -200,7 +307,7 @@ def _type_of(default: Any, choices: tuple[str, ...]) -> str:
     raise TypeError(f"a parameter is a bool, int, float, str, a list of str or of float, or three floats, not {default!r}")
 
 
-def _params_of(cls: type) -> list[tuple[str, str, Parameter]]:
+def _params_of(cls: type[Any]) -> list[tuple[str, str, Parameter]]:
     """Key, type and declaration of each, those of base classes first."""
     all_of: dict[str, Parameter] = {}
     for each in reversed(cls.__mro__):
@@ -208,8 +315,12 @@ def _params_of(cls: type) -> list[tuple[str, str, Parameter]]:
     return [(key, _type_of(value.default, value.choices), value) for key, value in all_of.items()]
 
 
-def _make(cls: type, values: dict[str, Any]) -> Any:
-    component = cls.__new__(cls)
+def _with_defaults(cls: type[Any]) -> Any:
+    return _make(cls, {key: value.default for key, _, value in _params_of(cls)})
+
+
+def _make(cls: type[Any], values: dict[str, Any]) -> Any:
+    component: Any = object.__new__(cls)
     for key, value in values.items():
         setattr(component, key, value)
     component.__init__()
@@ -248,6 +359,44 @@ def _write(component: Writer, capture: Any, needs: list[str], files: Any) -> Non
         component.write(_capture(_diorama.capture_copy(capture, needs)), given)
     finally:
         given._end()
+
+
+def _annotate(component: Annotator, frame: Any, needs: list[str], provides: list[str]) -> None:
+    values, seed = _diorama.frame_copy(frame, needs)
+    rng = Rng(_diorama.Rng(seed).fork(type(component).__name__))
+    made = component.annotate(_frame(values), rng)
+    if not isinstance(made, Mapping) or set(made) != set(provides):
+        found = ", ".join(sorted(made)) if isinstance(made, Mapping) else repr(type(made))
+        raise TypeError(f"annotate() gives the channels {', '.join(sorted(provides))} by name, not {found or 'none'}")
+    _diorama.set_channels(frame, {name: np.asarray(channel) for name, channel in made.items()})
+
+
+def _open(cls: type[Any], file: str, folder: str) -> tuple[Stored | None, str | None, dict[str, Any]]:
+    """What was opened, or what is wrong with the folder; and what all its captures share."""
+    try:
+        stored = _with_defaults(cls).open(pathlib.Path(folder))
+    except (OSError, ValueError) as error:
+        return None, _say(error, file), {}
+    if not isinstance(stored, Stored):
+        raise TypeError(f"{cls.__name__}.open() returns a diorama.plugins.Stored, not {type(stored).__name__}")
+    captures = [int(index) for index in stored.captures]
+    info = {"format": stored.format or cls.__name__, "holds": list(stored.holds), "cameras": list(stored.cameras),
+            "captures": captures, "classes": list(stored.classes), "steps": dict(stored.steps)}
+    if captures != sorted(set(captures)):
+        raise TypeError(f"{cls.__name__}: captures ascend")
+    return stored, None, info
+
+
+def _read(stored: Stored, file: str, place: int, wanted: set[str], into: Any) -> None:
+    index = stored.captures[place]
+    try:
+        capture = stored.read(place, frozenset(wanted))
+    except (OSError, ValueError) as error:
+        where = getattr(error, "filename", None)
+        capture = Capture(int(index), findings=[Finding("files can be read", str(where or "."), int(index), found=_say(error, file))])
+    if not isinstance(capture, Capture) or capture.index != index:
+        raise TypeError(f"read({place}) returns the diorama.Capture with index {index}")
+    _diorama.store_capture(into, capture)
 
 
 def _finish(component: Writer, records: Any, files: Any) -> None:

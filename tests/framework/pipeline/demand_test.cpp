@@ -93,3 +93,12 @@ TEST_CASE("What the job lists comes before the renderer's own", "[demand]") {
 TEST_CASE("Annotators that wait for each other are refused", "[demand]") {
   CHECK_THROWS_WITH(demand_for({"a"}), ContainsSubstring("needs its own output"));
 }
+
+TEST_CASE("Listed annotators that make the same are refused", "[demand]") {
+  const std::vector<AnnotatorOffer> offers{
+      {"python", {}, {"edges"}, true, "job.yaml:3: annotators[0]"},
+      {"python", {}, {"edges", "more"}, true, "job.yaml:4: annotators[1]"}};
+  CHECK_THROWS_WITH(resolve_demand({}, {}, "renderer 'r'", offers),
+                    "job.yaml:4: annotators[1]: python makes 'edges', which another entry of "
+                    "'annotators' (job.yaml:3: annotators[0]) makes already");
+}

@@ -3,8 +3,10 @@
 import gc
 import json
 import multiprocessing
+import os
 import pathlib
 import pickle
+import shutil
 import signal
 import subprocess
 import sys
@@ -20,6 +22,7 @@ except ImportError as missing:
     print(f"skipped: {missing}")
     sys.exit(77)
 import diorama
+import diorama.plugins
 
 PROGRAM, JOB = sys.argv[1:3]
 FOLDERS = ["basic", "bop", "coco", "hdf5", "image_folder", "kitti", "pose", "voc", "webdataset", "yolo"]
@@ -142,6 +145,31 @@ class Open(unittest.TestCase):
         self.assertTrue(any("0003.png" in finding.file for finding in findings), findings)
 
 
+class Types(unittest.TestCase):
+    def test_stubs_and_annotations(self):
+        if shutil.which("mypy") is None:
+            self.skipTest("mypy is not there")  # other versions than Debian 12's find other things
+        package = pathlib.Path(diorama.__file__).parent
+        cache = f"--cache-dir={temporary.name}/mypy"
+        checked = subprocess.run(["mypy", "--strict", cache, package], capture_output=True, text=True)
+        self.assertEqual(checked.returncode, 0, checked.stdout)
+        # What pybind11 makes is a bit different from what a stub can say; what collections.abc is, mypy knows itself.
+        settings = pathlib.Path(temporary.name) / "allowed"
+        settings.write_text("diorama\\.(plugins\\.)?(Callable|Iterable|Iterator|Mapping|Sequence)\\b.*\n"
+                            "diorama\\.(_diorama|plugins)\\.(Files|Node|OpenDataset|Rng|Scene)\n"
+                            "diorama\\.(_diorama|plugins)\\.\\w+\\.__(init|eq|hash|repr)__\n")
+        checked = subprocess.run(["stubtest", "--concise", "--ignore-unused-allowlist", "--allowlist", settings, "diorama"], capture_output=True, text=True,
+                                 cwd=temporary.name, env={**os.environ, "MYPYPATH": str(package.parent)})
+        self.assertEqual(checked.returncode, 0, checked.stdout + checked.stderr)
+
+    def test_everything_is_documented(self):
+        for module in (diorama, diorama.plugins):
+            for name in module.__all__:
+                each = getattr(module, name)
+                if isinstance(each, type) and each.__module__ == module.__name__:
+                    self.assertTrue(each.__doc__ and not each.__doc__.startswith(name + "("), name)
+
+
 def sum_in_another_process(dataset, place):
     return int(dataset[place].frames[0].channels["color"].sum())
 
@@ -178,12 +206,155 @@ class Workers(unittest.TestCase):
             thread.join()
         self.assertEqual(sums, self.expected)
 
+    def test_threads_that_open(self):
+        lengths = []
+
+        def opened(name):
+            lengths.append((name, len(diorama.open(run / name)), len(diorama.find(run))))
+
+        threads = [threading.Thread(target=opened, args=(name,)) for name in FOLDERS]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        self.assertEqual(sorted(lengths), [(name, 24, len(FOLDERS) + 1) for name in FOLDERS])
+
     def test_pickled(self):
         again = pickle.loads(pickle.dumps(diorama.open(run / "basic", wanted=["color"])))
         self.assertEqual(set(again[0].frames[0].channels), {"color"})
 
 
+class Moving(unittest.TestCase):
+    """What stands beside the pixels of frames that were made: clips, velocities, keypoints, joints."""
+
+    def made(self, job, **arguments):
+        seen = []
+        diorama.run(job, seen.append, **arguments)
+        return seen
+
+    def test_a_clip(self):
+        folder = pathlib.Path(temporary.name)
+        (folder / "box.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+        (folder / "box.keypoints.yaml").write_text("keypoints: {tip: [0, 0, 1]}\n")
+        job = {"seed": 3, "total_captures": 4, "environments": [{"type": "shapes", "shapes": ["cube"]}],
+               "objects": [{"type": "files", "name": "boxes", "files": [str(folder / "box.obj")], "under": "/Assets", "label": "box",
+                            "keypoints": ["tip"], "gravity_disabled_chance": 0.0}],
+               "cameras": [{"type": "pinhole", "name": "cam", "width": 40, "height": 30, "position": [6, 0, 4], "look_at": [0, 0, 3]}],
+               "randomizers": [{"type": "scatter_poses", "name": "poses", "on": ["environment"], "nodes": "/Assets/*", "offset": [0, 0, [3, 4]]}],
+               "renderer": {"type": "null"}, "timeline": [{"record": {"fps": 10, "seconds": 0.4}}],
+               "writers": [{"type": "BasicWriter", "name": "basic", "rgb": True, "instance_segmentation": True, "camera_params": True,
+                            "colorize_instance_segmentation": False, "bounding_box_3d": True, "velocities": True, "channels": ["flow_forward"]}]}
+        seen = self.made(job, wanted=["color", "instances", "flow_forward", "flow_forward_state"])
+        self.assertEqual([(c.clip.clip, c.clip.frame, c.clip.frame_count, c.clip.fps) for c in seen], [(0, i, 4, 10.0) for i in range(4)])
+        self.assertAlmostEqual(seen[3].clip.time_s, 0.3)
+        boxes = [capture.frames[0].instances[-1] for capture in seen]
+        self.assertEqual(len({box.id for box in boxes}), 1)
+        for before, box, capture in zip(boxes, boxes[1:], seen):
+            fallen = before.world_from_object[2, 3] - box.world_from_object[2, 3]
+            self.assertAlmostEqual(fallen, -0.05 * (before.velocity.linear + box.velocity.linear)[2], delta=0.01)
+            flow = capture.frames[0].channels["flow_forward"]
+            state = capture.frames[0].channels["flow_forward_state"]
+            self.assertEqual((flow.dtype, flow.shape, state.shape), (np.float32, (30, 40, 2), (30, 40)))
+            self.assertLessEqual(set(np.unique(state)), {int(each) for each in diorama.FlowState})
+        point, = boxes[0].keypoints_world.values()
+        np.testing.assert_allclose(point, (boxes[0].world_from_object @ [0, 0, 1, 1])[:3])
+        np.testing.assert_allclose(boxes[0].keypoints["tip"], [0, 0, 1], atol=1e-12)
+
+        (folder / "clip.json").write_text(json.dumps(job))
+        subprocess.run([PROGRAM, "--log-level", "error", "run", folder / "clip.json", "--output", folder / "clip"], check=True, capture_output=True)
+        stored = diorama.open(folder / "clip")
+        self.assertLessEqual({"clips", "velocities"}, set(stored.holds))
+        for ours, theirs, box in zip(seen, stored, boxes):
+            self.assertEqual(ours.clip, theirs.clip)
+            velocity, = (i.velocity for i in theirs.frames[0].instances if i.path == box.path)
+            np.testing.assert_allclose(velocity.linear, box.velocity.linear, atol=1e-5)
+            np.testing.assert_array_equal(theirs.frames[0].channels["flow_forward"], ours.frames[0].channels["flow_forward"])
+
+    def test_joints(self):
+        cabinet = pathlib.Path(__file__).resolve().parents[3] / "examples/articulated/cabinet.usda"
+        job = {"total_captures": 1, "environments": [{"type": "shapes", "shapes": ["cube"]}], "physics": {"type": "none"},
+               "objects": [{"type": "files", "name": "chest", "files": [str(cabinet)], "under": "/Assets", "label": "cabinet", "collider": "none"}],
+               "cameras": [{"type": "pinhole", "name": "cam", "width": 8, "height": 6}], "renderer": {"type": "null"},
+               "randomizers": [{"type": "joint_states", "name": "open", "on": ["environment"], "joints": ["/Assets/**"], "moved_chance": 1.0}],
+               "timeline": [{"capture": "still", "count": 1}]}
+        frame = self.made(job)[0].frames[0]
+        moved = [joint for joint in frame.joints if joint.kind != "fixed"]
+        self.assertGreaterEqual({joint.kind for joint in moved}, {"prismatic"})
+        for joint in moved:
+            self.assertTrue(joint.lower <= joint.position <= joint.upper and joint.position != 0.0, joint)
+            self.assertTrue(joint.path.startswith("/Assets/") and joint.child_path.startswith("/Assets/"), joint)
+
+
+class Memory(unittest.TestCase):
+    def test_views_live_as_long_as_anything_refers_to_them(self):
+        dataset = diorama.open(run / "basic")
+        expected = [dataset[i].frames[0].channels["color"].copy() for i in range(8)]
+        kept = []
+        threshold = gc.get_threshold()
+        gc.set_threshold(1)
+        try:
+            for i in range(8):
+                channels = dataset[i].frames[0].channels
+                kept.append(channels["color"][3:, ::2].reshape(-1, 4).view(np.uint32))  # a view of a copy, and of the pixels:
+                kept.append(channels["color"][1:][::2])
+                del channels
+                gc.collect()
+        finally:
+            gc.set_threshold(*threshold)
+        del dataset
+        gc.collect()
+        for color, part in zip(expected, kept[1::2]):
+            np.testing.assert_array_equal(part, color[1:][::2])
+
+    def test_nothing_is_left_behind(self):
+        def resident_kb():
+            lines = pathlib.Path("/proc/self/status").read_text().splitlines()
+            return int(next(line.split()[1] for line in lines if line.startswith("VmRSS")))
+
+        dataset = diorama.open(run / "basic")
+        for capture in dataset:
+            pass
+        gc.collect()
+        before = resident_kb()
+        for _ in range(12):
+            for capture in dataset:
+                pass
+        self.assertLess(resident_kb() - before, 20_000)
+
+    def test_the_run_waits_for_whoever_is_slow(self):
+        code = """if True:
+            import resource, time, diorama
+            job = {"total_captures": 160, "environments": [{"type": "shapes", "shapes": ["cube"]}], "physics": {"type": "none"},
+                   "cameras": [{"type": "pinhole", "name": "cam", "width": 1280, "height": 960}], "renderer": {"type": "null"},
+                   "timeline": [{"capture": "still", "count": 160}]}
+            began = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+            def slow(capture):
+                time.sleep(1.5)
+                return False
+            diorama.run(job, slow, wanted=["color", "normals", "position"])
+            print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - began)
+        """
+        told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+        self.assertLess(int(told.stdout), 700_000, "kB; all captures would take 5.5 GB")
+
+
 class Run(unittest.TestCase):
+    def test_threads_of_python_go_on(self):
+        beats = []
+        done = threading.Event()
+
+        def beat():
+            while not done.wait(0.001):
+                beats.append(len(seen))
+
+        seen = []
+        other = threading.Thread(target=beat)
+        other.start()
+        diorama.run(JOB, seen.append)
+        done.set()
+        other.join()
+        self.assertGreater(len(set(beats)), 1)
+
     def test_the_pixels_and_labels_of_a_dataset(self):
         seen = []
         diorama.run(JOB, seen.append, wanted=["color", "instance_id", "instances", "normals"], threads=3)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Components in Python files, by the program: python_plugin_test.py PROGRAM SOURCE"""
+import json
 import os
 import pathlib
 import subprocess
@@ -7,10 +8,18 @@ import sys
 import tempfile
 import unittest
 
+import numpy as np
+
+try:
+    import jsonschema
+except ImportError:
+    jsonschema = None
+
 PROGRAM, SOURCE = sys.argv[1], pathlib.Path(sys.argv[2])
 EXAMPLE = SOURCE / "examples/third_party_python"
 
 SCRIPT = '''
+import numpy as np
 import diorama.plugins as dp
 
 class Move(dp.Randomizer):
@@ -48,6 +57,55 @@ class Leaves(dp.Writer):
     needs = ["color"]
     def write(self, capture, files):
         files.add("../../escaped.txt", "x")
+
+class Nearness(dp.Annotator):
+    """Near things are bright.
+
+    This is not shown."""
+    needs = ["distance_to_image_plane"]
+    provides = ["nearness"]
+    reach_m = dp.param(1.0, "Distance at which it has fallen to 37 %.", unit="m", least=0.01, most=100.0)
+    def annotate(self, frame, rng):
+        if frame.instances or set(frame.channels) != set(self.needs):
+            raise RuntimeError("it was given more than it needs")
+        return {"nearness": np.exp(-frame.channels["distance_to_image_plane"] / np.float32(self.reach_m))}
+
+class Noise(dp.Annotator):
+    provides = ["noise"]
+    def annotate(self, frame, rng):
+        return {"noise": rng.generator().random((frame.camera.height, frame.camera.width), np.float32)}
+
+class Doubles(Noise):
+    def annotate(self, frame, rng):
+        return {"noise": super().annotate(frame, rng)["noise"].astype(float)}
+
+class Small(Noise):
+    def annotate(self, frame, rng):
+        return {"noise": super().annotate(frame, rng)["noise"][1:]}
+
+class Less(Noise):
+    def annotate(self, frame, rng):
+        return {}
+
+class Color(Noise):
+    provides = ["color"]
+    def annotate(self, frame, rng):
+        return {"color": np.zeros((frame.camera.height, frame.camera.width), np.float32)}
+
+class Nothing(Noise):
+    provides = []
+
+class Channels(dp.Writer):
+    needs = ["nearness", "noise"]
+    def write(self, capture, files):
+        for frame in capture.frames:
+            files.add(f"{capture.index}_{frame.camera_name}", b"".join(frame.channels[name].tobytes() for name in self.needs))
+
+class NeedsNoise(Channels):
+    needs = ["noise"]
+
+class NeedsColor(Channels):
+    needs = ["color"]
 
 class Colors(dp.Writer):
     needs = ["color", "instances"]
@@ -115,14 +173,139 @@ class Runs(unittest.TestCase):
     def test_example(self):
         result = self.run_job(
             "randomizers.poses={type: python, name: poses, on: [environment], file: circle.py, class: Circle, params: {radius_m: 0.4}}",
-            "writers=[{type: python, name: table, file: circle.py, class: Table}]", path=str(EXAMPLE))
+            "annotators=[{type: python, file: edges.py, class: Edges}]",
+            "writers=[{type: python, name: table, file: table.py, class: Table}, {type: BasicWriter, name: basic, rgb: true}]",
+            path=str(EXAMPLE))
         self.assertEqual(result.returncode, 0, result.stderr)
         files = self.files("out")
-        self.assertEqual(len(files["table/objects.csv"].splitlines()), 5)
-        rows = [line.split(b",") for name, text in files.items() if name.startswith("table/0") for line in text.splitlines()]
-        self.assertTrue(rows)
-        counts = sum(int(line.split(b",")[1]) for line in files["table/objects.csv"].splitlines()[1:])
-        self.assertEqual(counts, len(rows))
+        self.assertEqual(files["table/table.csv"], b"0,cam_0,cam_1\n1,cam_0,cam_1\n2,cam_0,cam_1\n3,cam_0,cam_1\n")
+        environment = {**os.environ, "DIORAMA_PYTHON_PATH": str(EXAMPLE)}
+        lint = subprocess.run([PROGRAM, "lint", self.folder / "out"], capture_output=True, text=True, env=environment)
+        self.assertEqual(lint.returncode, 0, lint.stdout + lint.stderr)
+        self.assertIn("table: table", lint.stdout)
+
+    def annotators(self, *names):
+        return "annotators=[" + ", ".join(f"{{type: python, file: mine.py, class: {name}}}" for name in names) + "]"
+
+    def test_annotators(self):
+        sets = [self.annotators("Noise", "Nearness"), self.writer("Channels")]
+        one = self.run_job(*sets, output="one", options=["--threads", "1"])
+        self.assertEqual(one.returncode, 0, one.stderr)
+        files = self.files("one")
+        pictures = {name: np.frombuffer(content, np.float32) for name, content in files.items() if name.startswith("own/")}
+        self.assertEqual(len(pictures), 8)
+        self.assertEqual(len({content.tobytes() for content in pictures.values()}), 8)
+        for values in pictures.values():
+            near, noise = np.split(values, 2)
+            self.assertTrue(near.size == 48 * 64 and 0.0 < near.max() < 1.0 and abs(noise.mean() - 0.5) < 0.05)
+        three = self.run_job(*sets, output="three", options=["--threads", "3", "--visits-in-flight", "2"])
+        self.assertEqual(three.returncode, 0, three.stderr)
+        self.assertEqual(self.files("three"), files)
+
+    def test_annotators_that_are_wrong(self):
+        needs = self.writer("NeedsNoise")
+        for name, code, words in [
+            ("Doubles", 4, ["mine.py", "'noise'", "float64 (48, 64)", "float32 (48, 64)"]), ("Small", 4, ["mine.py", "float32 (47, 64)"]),
+            ("Less", 4, ["mine.py", "gives the channels noise by name, not none"]), ("Nothing", 4, ["mine.py: Nothing provides nothing"]),
+        ]:
+            with self.subTest(name):
+                self.check_refused(self.run_job(self.annotators(name), needs, output=name[:5]), code, *words)
+        self.check_refused(self.run_job(self.annotators("Color"), self.writer("NeedsColor"), output="color"), 4, "'color'", "another type")
+        self.check_refused(self.run_job(self.annotators("Noise", "Noise"), needs), 3, "annotators[1]", "makes 'noise'", "annotators[0]")
+        self.check_refused(self.run_job(needs), 3, "needs 'noise'")
+
+    def reader(self, body):
+        (self.scripts / "reader.py").write_text(
+            "import numpy as np\nfrom diorama.plugins import *\n\n\nclass Arrays(Reader):\n    patterns = ['*.npy']\n\n"
+            "    def open(self, folder):\n        stored = Stored()\n        stored.__class__ = Opened\n        stored.folder = folder\n"
+            "        stored.files = sorted(folder.glob('*.npy'))\n        stored.captures = range(len(stored.files))\n"
+            "        stored.cameras, stored.holds = ['eye'], ['color', 'tight_boxes', 'instances', 'instance_id']\n        return stored\n\n\n"
+            f"class Opened(Stored):\n    def read(self, place, wanted):\n        {body}\n")
+        data = self.folder / "data"
+        data.mkdir(exist_ok=True)
+        for i in range(3):
+            np.save(data / f"{i}.npy", np.full((4, 6, 4), 10 * i + 5, np.uint8))
+        return data
+
+    GOOD = ("color = np.load(self.files[place], allow_pickle=False); ids = np.zeros(color.shape[:2], np.uint32); ids[1:3, 2:5] = 7; "
+            "return Capture(place, frames=[Frame('eye', Camera(color.shape[1], color.shape[0]), instances=[Instance(7, '/a', {'class': 'a'}, "
+            "box=(2, 1, 5, 3))], channels={'color': color, 'instance_id': ids})])")
+
+    def call(self, *arguments, path=None):
+        environment = {**os.environ, "DIORAMA_PYTHON_PATH": str(self.scripts) if path is None else path}
+        return subprocess.run([*arguments], capture_output=True, text=True, env=environment, cwd=self.folder, timeout=120)
+
+    def test_a_reader(self):
+        data = self.reader(self.GOOD)
+        lint = self.call(PROGRAM, "lint", data)
+        self.assertEqual(lint.returncode, 0, lint.stdout + lint.stderr)
+        told = self.call(sys.executable, "-c", "import sys, diorama; d = diorama.open(sys.argv[1]); print(d, d.reader, d[2].frames[0].channels['color'].mean(), "
+                         "d[1].frames[0].instances[0].box, len(d.to_coco()['annotations']))", data)
+        self.assertEqual(told.stdout, f"<diorama.Dataset {data}: Arrays, 3 captures, 1 cameras> python 25.0 (2, 1, 5, 3) 3\n", told.stderr)
+        made = self.call(PROGRAM, "convert", data, "--writer", "YoloWriter", "-o", "coco")
+        self.assertEqual(made.returncode, 0, made.stdout + made.stderr)
+        unknown = self.call(PROGRAM, "lint", data, path="")
+        self.assertNotEqual(unknown.returncode, 0)
+
+    def test_readers_that_are_wrong(self):
+        data = self.reader(self.GOOD)
+        np.save(data / "1.npy", np.zeros((4, 6, 4), np.uint8))
+        (data / "1.npy").write_bytes(b"no array")
+        lint = self.call(PROGRAM, "lint", data)
+        self.assertEqual(lint.returncode, 7, lint.stdout + lint.stderr)
+        self.assertIn("reader.py:", lint.stdout + lint.stderr)
+        for body, words in {
+            "1 / 0": ["reader.py:", "ZeroDivisionError"],
+            "return Capture(place + 1)": ["returns the diorama.Capture with index"],
+            "return Capture(place, frames=[Frame('eye', Camera(6, 4), channels={'color': np.zeros((4, 6, 3), np.uint8)})])": ["uint8 (4, 6, 3)"],
+            "return Capture(place, frames=[Frame('eye', Camera(0, 4))])": ["width and height"],
+        }.items():
+            with self.subTest(body):
+                self.check_refused(self.call(PROGRAM, "lint", self.reader(body)), 4, *words)
+        (self.scripts / "twin.py").write_text((self.scripts / "reader.py").read_text())
+        self.check_refused(self.call(PROGRAM, "lint", data), 2, "several classes", "reader.py: Arrays", "twin.py: Arrays")
+        (self.scripts / "twin.py").write_text("from diorama.plugins import Reader\n1 / 0\n")
+        told = self.call(PROGRAM, "lint", self.reader(self.GOOD))
+        self.assertEqual(told.returncode, 0, told.stderr)
+        self.assertIn("twin.py:2: ZeroDivisionError", told.stderr)
+
+    def test_parameters_are_in_the_schema(self):
+        told = self.call(PROGRAM, "plugins", "describe", "annotator/python")
+        for words in ("params of Nearness of mine.py", "Near things are bright.", "params.reach_m: number, default 1 m, 0.01 to 100"):
+            self.assertIn(words, told.stdout)
+        self.assertNotIn("This is not shown", told.stdout)
+        written = self.call(PROGRAM, "config", SOURCE / "configs/smoke.yaml", "--set", self.randomizer("Move", "height_m: 2"))
+        self.assertEqual(written.returncode, 0, written.stderr)
+        for words in ("height_m: 2", "mode: up", "times: 1"):
+            self.assertIn(words, written.stdout)
+        if jsonschema is None:
+            self.skipTest("python3-jsonschema is not there")
+        schema = json.loads(self.call(PROGRAM, "schema").stdout)
+        jsonschema.Draft202012Validator.check_schema(schema)
+        validator = jsonschema.Draft202012Validator(schema)
+
+        def fits(params, name="Move", file="mine.py"):
+            return validator.is_valid({"environments": [{"type": "shapes"}], "randomizers": [
+                {"type": "python", "name": "move", "on": ["environment"], "file": file, "class": name, "params": params}]})
+
+        for params in ({}, {"height_m": 5.0, "times": 2, "mode": "down", "offset": [1, 2, 3], "names": ["x"], "flag": True}):
+            self.assertTrue(fits(params), params)
+        for params in ({"heigth_m": 1}, {"height_m": 9}, {"times": 1.5}, {"mode": "left"}, {"offset": [1, 2]}, {"names": 7}, {"flag": "maybe"}, 3):
+            self.assertFalse(fits(params), params)
+        self.assertTrue(fits({"anything": 1}, file="elsewhere.py"))
+        self.assertFalse(fits({"height_m": 1.0}, name="Divides"))
+
+    def test_in_a_process_of_python(self):
+        code = ("import sys, diorama; seen = []; sets = {'total_captures': 8, 'randomizers.poses': {'type': 'python', 'name': 'poses', 'on': ['environment'], "
+                "'file': 'mine.py', 'class': sys.argv[2]}}\n"
+                "try: diorama.run(sys.argv[1], seen.append, settings=sets, threads=3)\n"
+                "except diorama.Error as error: print(error.kind, error)\n"
+                "print([c.index for c in seen])")
+        job = str(SOURCE / "configs/smoke.yaml")
+        told = self.call(sys.executable, "-c", code, job, "Move")
+        self.assertEqual(told.stdout, "[0, 1, 2, 3, 4, 5, 6, 7]\n", told.stderr)
+        failed = self.call(sys.executable, "-c", code, job, "Divides")
+        self.assertRegex(failed.stdout, r"plugin .*mine\.py:\d+: ZeroDivisionError")
 
     def test_a_job_alone_runs_no_code(self):
         for path in ("", "/nowhere", str(self.folder / "other")):

@@ -1,0 +1,257 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "framework/python/given.h"
+
+#include <pybind11/eigen.h>
+#include <pybind11/numpy.h>
+#include <pybind11/stl.h>
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "diorama/reader.h"
+#include "framework/datasets/frame_copy.h"
+#include "framework/python/capsule.h"
+#include "framework/python/captures.h"
+#include "framework/python/scenes.h"
+
+namespace py = pybind11;
+
+namespace diorama {
+namespace {
+
+std::string shape_of(const py::array& array) {
+  return py::str(array.dtype()).cast<std::string>() + " " +
+         py::str(py::tuple(array.attr("shape"))).cast<std::string>();
+}
+
+template <class Pixel, class Element>
+AnyImage image_of(const py::array& array, int width, int height) {
+  const auto dense = py::array_t<Element, py::array::c_style>(array);
+  Image<Pixel> image(width, height, Pixel{});
+  std::memcpy(static_cast<void*>(image.pixels().data()), dense.data(), image.pixels().size_bytes());
+  return image;
+}
+
+/// Copied. Types are not converted: who gives float64 has most often forgotten something.
+AnyImage any_image(const std::string& name, const py::array& array, const Camera& camera) {
+  const int width = camera.width, height = camera.height;
+  const bool fits = array.ndim() >= 2 && array.shape(0) == height && array.shape(1) == width;
+  const py::ssize_t parts = array.ndim() == 3 ? array.shape(2) : array.ndim() == 2 ? 1 : 0;
+  if (fits) {
+    if (py::isinstance<py::array_t<std::uint8_t>>(array) && parts == 4) {
+      return image_of<Rgba8, std::uint8_t>(array, width, height);
+    }
+    if (py::isinstance<py::array_t<std::uint32_t>>(array) && parts == 1) {
+      return image_of<std::uint32_t, std::uint32_t>(array, width, height);
+    }
+    if (py::isinstance<py::array_t<float>>(array)) {
+      if (parts == 1) return image_of<float, float>(array, width, height);
+      if (parts == 2) return image_of<Vec2f, float>(array, width, height);
+      if (parts == 3) return image_of<Vec3f, float>(array, width, height);
+    }
+  }
+  const std::string size = std::to_string(height) + ", " + std::to_string(width);
+  throw Error(ErrorKind::Plugin, "channel '" + name + "': expected uint8 (" + size +
+                                     ", 4), uint32 (" + size + ") or float32 (" + size + "), (" +
+                                     size + ", 2), (" + size + ", 3), found " + shape_of(array));
+}
+
+void set_channels(Frame& frame, const std::map<std::string, py::array>& channels) {
+  for (const auto& [name, array] : channels) {
+    std::visit([&, &known = name]<class Pixel>(
+                   Image<Pixel>&& image) { frame.set(Channel<Pixel>{known}, std::move(image)); },
+               any_image(name, array, frame.camera));
+    try {
+      frame.check_channel(name);
+    } catch (const Error&) {
+      throw Error(ErrorKind::Plugin, "channel '" + name +
+                                         "': has another type of pixels than this channel has, "
+                                         "found " +
+                                         shape_of(array));
+    }
+  }
+}
+
+template <class T>
+std::optional<T> optional_of(const py::object& given, const char* name) {
+  return given.attr(name).cast<std::optional<T>>();
+}
+
+std::optional<PixelBox> pixel_box(const py::object& value) {
+  if (value.is_none()) return std::nullopt;
+  const auto box = value.cast<std::array<int, 4>>();
+  return PixelBox{box[0], box[1], box[2], box[3]};
+}
+
+Camera camera_given(const py::object& given) {
+  Camera camera;
+  camera.width = given.attr("width").cast<int>();
+  camera.height = given.attr("height").cast<int>();
+  if (camera.width < 1 || camera.height < 1) {
+    throw Error(ErrorKind::Plugin, "a camera's width and height are at least 1");
+  }
+  const auto lens = given.attr("lens").cast<std::string>();
+  const auto known = std::ranges::find(kLensNames, lens);
+  if (known == std::end(kLensNames)) {
+    throw Error(ErrorKind::Plugin, "there is no lens '" + lens + "'");
+  }
+  camera.lens = LensModel(known - std::begin(kLensNames));
+  camera.fx = given.attr("fx").cast<double>();
+  camera.fy = given.attr("fy").cast<double>();
+  camera.cx = given.attr("cx").cast<double>();
+  camera.cy = given.attr("cy").cast<double>();
+  const auto copy = [&](const char* name, auto& to) {
+    const auto values = given.attr(name).cast<std::vector<double>>();
+    if (values.size() > to.size()) {
+      throw Error(ErrorKind::Plugin,
+                  std::string(name) + " has at most " + std::to_string(to.size()) + " numbers");
+    }
+    std::ranges::copy(values, to.begin());
+  };
+  copy("distortion", camera.distortion);
+  copy("fisheye_polynomial", camera.fisheye_polynomial);
+  camera.near_m = given.attr("near_m").cast<double>();
+  camera.far_m = given.attr("far_m").cast<double>();
+  return camera;
+}
+
+CoverageMask mask_given(const py::object& given) {
+  CoverageMask mask;
+  if (given.is_none()) return mask;
+  const auto [box, bits] = given.cast<std::pair<py::object, py::array_t<std::uint8_t>>>();
+  mask.box = *pixel_box(box);
+  if (bits.ndim() != 2 || bits.shape(0) != mask.box.height() || bits.shape(1) != mask.box.width()) {
+    throw Error(ErrorKind::Plugin, "an amodal mask has the size of its box");
+  }
+  const auto dense = py::array_t<std::uint8_t, py::array::c_style>(bits);
+  mask.bits.assign(dense.data(), dense.data() + dense.size());
+  return mask;
+}
+
+Visibility visibility_given(const py::object& given) {
+  Visibility seen;
+  seen.visible_pixels = given.attr("visible_pixels").cast<std::int64_t>();
+  seen.amodal_pixels = given.attr("amodal_pixels").cast<std::int64_t>();
+  seen.outside_pixels = given.attr("outside_pixels").cast<std::int64_t>();
+  seen.amodal_box = pixel_box(given.attr("amodal_box"));
+  seen.amodal_mask = mask_given(given.attr("amodal_mask"));
+  return seen;
+}
+
+Instance instance_given(const py::object& given) {
+  Instance instance;
+  instance.id = given.attr("id").cast<std::uint32_t>();
+  instance.node_path = given.attr("path").cast<std::string>();
+  const auto labels = given.attr("labels").cast<std::map<std::string, std::string>>();
+  instance.labels = Labels(labels.begin(), labels.end());
+  if (const auto pose = optional_of<Mat4>(given, "world_from_object")) {
+    instance.world_from_node = affine_of(*pose);
+  }
+  if (const auto bounds = optional_of<std::pair<Vec3, Vec3>>(given, "bounds")) {
+    instance.bounds_node = Aabb{bounds->first, bounds->second};
+  }
+  instance.tight_box = pixel_box(given.attr("box"));
+  if (const py::object seen = given.attr("visibility"); !seen.is_none()) {
+    instance.visibility = visibility_given(seen);
+  }
+  for (const auto& [name, position] : given.attr("keypoints").cast<std::map<std::string, Vec3>>()) {
+    instance.keypoints.push_back({name, position});
+  }
+  if (const py::object velocity = given.attr("velocity"); !velocity.is_none()) {
+    instance.velocity =
+        Velocity{velocity.attr("linear").cast<Vec3>(), velocity.attr("angular").cast<Vec3>()};
+  }
+  return instance;
+}
+
+Frame frame_given(const py::object& given) {
+  Frame frame;
+  frame.camera_name = given.attr("camera_name").cast<std::string>();
+  frame.camera_path = frame.camera_name;
+  frame.camera = camera_given(given.attr("camera"));
+  if (const auto pose = optional_of<Mat4>(given, "world_from_camera")) {
+    frame.world_from_camera = affine_of(*pose);
+  }
+  for (const py::handle each : given.attr("instances")) {
+    frame.instances.push_back(instance_given(py::reinterpret_borrow<py::object>(each)));
+  }
+  for (const auto& [front, behind, pixels] :
+       given.attr("occlusions")
+           .cast<std::vector<std::tuple<std::uint32_t, std::uint32_t, std::int64_t>>>()) {
+    frame.occlusions.push_back({front, behind, pixels});
+  }
+  frame.leaf_paths = given.attr("leaf_paths").cast<std::map<std::uint32_t, std::string>>();
+  set_channels(frame, given.attr("channels").cast<std::map<std::string, py::array>>());
+  return frame;
+}
+
+Finding finding_given(const py::object& given) {
+  Finding finding;
+  finding.check = given.attr("check").cast<std::string>();
+  finding.file = given.attr("file").cast<std::string>();
+  finding.capture = optional_of<int>(given, "capture");
+  finding.camera = given.attr("camera").cast<std::string>();
+  finding.object = given.attr("object").cast<std::string>();
+  finding.found = given.attr("found").cast<std::string>();
+  finding.expected = given.attr("expected").cast<std::string>();
+  return finding;
+}
+
+void store_capture(StoredCapture& stored, const py::object& given) {
+  Capture& capture = stored.capture;
+  capture.index = given.attr("index").cast<int>();
+  capture.visit = given.attr("visit").cast<int>();
+  capture.phase = given.attr("phase").cast<std::string>();
+  capture.environment = given.attr("environment").cast<std::string>();
+  stored.split = given.attr("split").cast<std::string>();
+  if (const py::object clip = given.attr("clip"); !clip.is_none()) {
+    capture.clip = ClipFrame{clip.attr("clip").cast<int>(), clip.attr("frame").cast<int>(),
+                             clip.attr("frame_count").cast<int>(), clip.attr("fps").cast<double>()};
+  }
+  for (const py::handle frame : given.attr("frames")) {
+    capture.frames.push_back(frame_given(py::reinterpret_borrow<py::object>(frame)));
+  }
+  stored.files.resize(capture.frames.size());
+  for (const py::handle finding : given.attr("findings")) {
+    stored.log.findings.push_back(finding_given(py::reinterpret_borrow<py::object>(finding)));
+  }
+}
+
+/// With what it asked for and no more, so that nothing depends on what others asked for.
+py::dict frame_copy(const Frame& frame, const NameSet& needs) {
+  auto stored = std::make_shared<StoredCapture>();
+  Frame& copy = stored->capture.frames.emplace_back(copy_of(frame, needs));
+  if (!needs.contains(kHoldsInstances)) {
+    copy.instances.clear();
+    copy.joints.clear();
+  }
+  for (Instance& instance : copy.instances) {
+    if (!needs.contains("visibility")) instance.visibility.reset();
+  }
+  if (!needs.contains("occlusion_order")) copy.occlusions.clear();
+  return py::list(capture_of(std::move(stored), made_holds())["frames"])[0];
+}
+
+}  // namespace
+
+void bind_given(py::module_& module) {
+  module.def("frame_copy", [](const py::capsule& frame, const std::vector<std::string>& needs) {
+    const Frame& given = *held<const Frame>(frame, "diorama::Frame");
+    return std::pair(frame_copy(given, NameSet(needs.begin(), needs.end())), given.seed);
+  });
+  module.def("set_channels",
+             [](const py::capsule& frame, const std::map<std::string, py::array>& channels) {
+               set_channels(*held<Frame>(frame, "diorama::Frame"), channels);
+             });
+  module.def("store_capture", [](const py::capsule& stored, const py::object& capture) {
+    store_capture(*held<StoredCapture>(stored, "diorama::StoredCapture"), capture);
+  });
+}
+
+}  // namespace diorama
