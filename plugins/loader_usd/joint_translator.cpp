@@ -47,6 +47,12 @@ NodeId JointTranslator::body_at_or_above(const Prim& prim) const {
   return node == nodes_.end() ? NodeId{} : node->second;
 }
 
+// Nothing lies below it: what is held to the world collides with everything there.
+NodeId JointTranslator::world_body() {
+  if (!world_body_) world_body_ = scene_.create(world_, "world");
+  return world_body_;
+}
+
 // Where the joint is by the words about one of its bodies.
 JointTranslator::Side JointTranslator::side(const Prim& prim, char number) {
   Side result;
@@ -61,7 +67,7 @@ JointTranslator::Side JointTranslator::side(const Prim& prim, char number) {
           "<" + bodies.front() + ">");
     return result;
   }
-  result.body = result.is_world ? world_ : body_at_or_above(*target);
+  if (!result.is_world) result.body = body_at_or_above(*target);
   const Affine world_from_body = result.is_world
                                      ? scene_.world_from_node(world_) * world_from_stage_
                                      : scene_.world_from_node(node->second);
@@ -108,6 +114,7 @@ void JointTranslator::translate(const Prim& prim, NodeId node, double meters_per
     note_(prim, "is a joint of a body with itself, and holds nothing", {});
     return;
   }
+  if (first.is_world) first.body = world_body();
   if (joint.kind != JointKind::Fixed) {
     const double unit = joint.kind == JointKind::Revolute ? kPi / 180.0 : meters_per_unit;
     joint.lower = unit * limit(prim, "physics:lowerLimit", -kInfinity);

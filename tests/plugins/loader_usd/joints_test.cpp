@@ -136,7 +136,7 @@ def PhysicsSphericalJoint "ball"
 }
 )"));
   for (const char* name : {"lost", "self", "none"}) CHECK_FALSE(loaded.node(name).joint);
-  CHECK(loaded.scene.path(loaded.node("held").joint->parent_body) == "/asset");
+  CHECK(loaded.scene.path(loaded.node("held").joint->parent_body) == "/asset/world");
   const std::string all = warnings(loaded);
   CHECK(all.find("<lost> is a joint of a body that is not there") == std::string::npos);
   CHECK(all.find("</lost> is a joint of a body that is not there, and holds nothing (</B>)") !=
