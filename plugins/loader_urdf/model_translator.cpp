@@ -7,7 +7,6 @@
 #include <deque>
 #include <filesystem>
 #include <optional>
-#include <ranges>
 #include <set>
 #include <utility>
 
@@ -179,13 +178,12 @@ void ModelTranslator::add_links(const std::vector<PlacedLink>& order,
     if (found != carriers.end()) carriers.try_emplace(link, found->second);
   };
   // Up from the leaves, then down to them: joints are in the order of the tree.
-  const auto is_fixed = [](const urdf::Joint* joint) { return joint->type == urdf::Joint::FIXED; };
-  for (const urdf::Joint* joint : joints | std::views::reverse | std::views::filter(is_fixed)) {
-    carry(joint->parent_link_name, joint->child_link_name);
+  std::vector<const urdf::Joint*> fixed = joints;
+  std::erase_if(fixed, [](const urdf::Joint* joint) { return joint->type != urdf::Joint::FIXED; });
+  for (auto joint = fixed.rbegin(); joint != fixed.rend(); ++joint) {
+    carry((*joint)->parent_link_name, (*joint)->child_link_name);
   }
-  for (const urdf::Joint* joint : joints | std::views::filter(is_fixed)) {
-    carry(joint->child_link_name, joint->parent_link_name);
-  }
+  for (const urdf::Joint* joint : fixed) carry(joint->child_link_name, joint->parent_link_name);
   std::map<std::string, Affine> poses;
   std::vector<const PlacedLink*> carried;
   for (const PlacedLink& placed : order) {
