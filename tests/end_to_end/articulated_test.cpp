@@ -126,7 +126,7 @@ objects:
 lights: [{type: dome, name: sky}]
 cameras: [{type: pinhole, name: cam, width: 160, height: 120, position: [0, -5, 2.5], look_at: [0, 0, 1.5]}]
 randomizers:
-  - {type: joint_states, name: openings, on: [environment], joints: "/Assets/**"}
+  - {type: joint_states, name: openings, on: [environment], joints: ["/Assets/**"]}
   - {type: scatter_poses, name: place, on: [environment], nodes: "/Assets/*", offset: [0, 0, 2.2], rotation: none,
      avoid_overlap: false}
 settle: {policy: keep}
