@@ -5,6 +5,13 @@
 
 namespace diorama {
 
+namespace {
+
+/// A frame and its neighbours.
+constexpr std::size_t kMostKept = 3;
+
+}  // namespace
+
 bool ClipTrack::State::operator==(const State& other) const {
   return parent_from_node.matrix() == other.parent_from_node.matrix() &&
          linear_velocity == other.linear_velocity && angular_velocity == other.angular_velocity;
@@ -20,29 +27,32 @@ ClipTrack::State ClipTrack::state_of(const Node& node) {
 }
 
 void ClipTrack::add(const Scene& scene) {
-  auto& changed = changed_.emplace_back();
-  for (const NodeId node : scene.subtree(scene.root())) {
-    const State state = state_of(scene[node]);
-    if (changed_.size() == 1) {
-      first_.emplace(node, state);
-      continue;
-    }
-    if (state == first_.at(node)) continue;
-    changed.emplace(node, state);
-    const auto place = std::ranges::lower_bound(moving_, node);
-    if (place == moving_.end() || *place != node) moving_.insert(place, node);
+  if (added_ == 0) {
+    nodes_ = scene.subtree(scene.root());
+    std::ranges::sort(nodes_);
+    has_moved_.assign(nodes_.size(), 0);
   }
+  std::vector<State> now;
+  now.reserve(nodes_.size());
+  for (const NodeId node : nodes_) now.push_back(state_of(scene[node]));
+  for (std::size_t i = 0; added_ > 0 && i < nodes_.size(); ++i) {
+    if (has_moved_[i] == 0 && !(now[i] == kept_.back()[i])) has_moved_[i] = 1;
+  }
+  if (kept_.size() == kMostKept) kept_.pop_front();
+  kept_.push_back(std::move(now));
+  ++added_;
 }
 
-const ClipTrack::State& ClipTrack::at(NodeId node, int frame) const {
-  const auto& changed = changed_[std::size_t(frame)];
-  const auto found = changed.find(node);
-  return found != changed.end() ? found->second : first_.at(node);
+const std::vector<ClipTrack::State>& ClipTrack::states(int frame) const {
+  return kept_.at(kept_.size() - std::size_t(added_ - frame));
 }
 
 void ClipTrack::show(int frame, Scene& scene) const {
-  for (const NodeId node : moving_) {
-    const State& wanted = at(node, frame);
+  const std::vector<State>& all = states(frame);
+  for (std::size_t i = 0; i < nodes_.size(); ++i) {
+    if (has_moved_[i] == 0) continue;
+    const NodeId node = nodes_[i];
+    const State& wanted = all[i];
     const State now = state_of(scene[node]);
     if (now == wanted) continue;
     if (now.parent_from_node.matrix() != wanted.parent_from_node.matrix()) {
@@ -54,9 +64,11 @@ void ClipTrack::show(int frame, Scene& scene) const {
 }
 
 Affine ClipTrack::world_from_node(const Scene& scene, NodeId node, int frame) const {
+  const std::vector<State>& all = states(frame);
   Affine world_from_node = Affine::Identity();
   for (NodeId id = node; id; id = scene[id].parent) {
-    world_from_node = at(id, frame).parent_from_node * world_from_node;
+    const auto place = std::ranges::lower_bound(nodes_, id) - nodes_.begin();
+    world_from_node = all[std::size_t(place)].parent_from_node * world_from_node;
   }
   return world_from_node;
 }

@@ -1,23 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <map>
+#include <cstddef>
+#include <deque>
 #include <vector>
 
 #include "diorama/scene.h"
 
 namespace diorama {
 
-/// Where everything in a scene is in every frame of a clip.
+/// Where everything in a scene is in the last frames of a clip: as many as one frame and those
+/// beside it need, so that a clip takes the same memory whatever its length.
 class ClipTrack {
  public:
-  /// Adds the scene as it is now as the next frame. Its nodes are those of the first frame.
+  /// Adds the scene as it is now as the next frame. Its nodes are those of the first frame. Of what
+  /// was added before, the last two frames are kept.
   void add(const Scene& scene);
-  int size() const { return int(changed_.size()); }
+  /// Frames added so far.
+  int size() const { return added_; }
 
-  /// Puts everything where it is in a frame; touches only what is elsewhere.
+  /// Puts everything where it is in one of the frames kept; touches only what is elsewhere.
   void show(int frame, Scene& scene) const;
-  /// Where a node is in the world in a frame, whichever frame the scene shows.
+  /// Where a node is in the world in one of the frames kept, whichever frame the scene shows.
   Affine world_from_node(const Scene& scene, NodeId node, int frame) const;
 
  private:
@@ -28,11 +32,12 @@ class ClipTrack {
     bool operator==(const State& other) const;
   };
   static State state_of(const Node& node);
-  const State& at(NodeId node, int frame) const;
+  const std::vector<State>& states(int frame) const;
 
-  std::map<NodeId, State> first_;                 ///< Of every node, in the first frame.
-  std::vector<std::map<NodeId, State>> changed_;  ///< By frame: what differs from the first one.
-  std::vector<NodeId> moving_;                    ///< Nodes that differ in some frame.
+  std::vector<NodeId> nodes_;            ///< Ascending.
+  std::deque<std::vector<State>> kept_;  ///< By frame, then as `nodes_`; ends with the last one.
+  std::vector<std::uint8_t> has_moved_;  ///< As `nodes_`: since the first frame.
+  int added_ = 0;
 };
 
 }  // namespace diorama

@@ -19,12 +19,17 @@ bool are_equal(const std::optional<RigidBody>& a, const std::optional<RigidBody>
          a->linear_velocity == b->linear_velocity && a->angular_velocity == b->angular_velocity;
 }
 
+bool are_equal(const std::optional<Joint::Mimic>& a, const std::optional<Joint::Mimic>& b) {
+  if (!a || !b) return a.has_value() == b.has_value();
+  return a->joint == b->joint && a->multiplier == b->multiplier && a->offset == b->offset;
+}
+
 bool are_equal(const std::optional<Joint>& a, const std::optional<Joint>& b) {
   if (!a || !b) return a.has_value() == b.has_value();
   return a->kind == b->kind && a->parent_body == b->parent_body && a->child_body == b->child_body &&
          a->parent_from_joint.matrix() == b->parent_from_joint.matrix() &&
          a->child_from_joint.matrix() == b->child_from_joint.matrix() && a->axis == b->axis &&
-         a->lower == b->lower && a->upper == b->upper;
+         a->lower == b->lower && a->upper == b->upper && are_equal(a->mimic, b->mimic);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <map>
 #include <memory>
 #include <set>
 #include <string_view>
@@ -100,14 +101,30 @@ NodeId node_at(Scene& scene, std::string_view path) {
   return node;
 }
 
-/// What the joints below some nodes move, as far as it is a body of its own.
+/// What the joints below some nodes move, as far as it is a body of its own. What they fix to where
+/// they begin is none.
 std::set<NodeId> jointed_bodies(const Scene& scene, const std::vector<NodeId>& nodes) {
-  std::set<NodeId> bodies;
+  std::set<NodeId> moved;
+  std::multimap<NodeId, NodeId> fixed;  // by parent
   for (const NodeId node : nodes) {
     const auto& joint = scene[node].joint;
-    if (joint && scene[joint->child_body].rigid_body) bodies.insert(joint->child_body);
+    if (!joint) continue;
+    moved.insert(joint->child_body);
+    if (joint->kind == JointKind::Fixed) fixed.emplace(joint->parent_body, joint->child_body);
   }
-  return bodies;
+  std::vector<NodeId> still;
+  for (const auto& [parent, child] : fixed) {
+    if (!moved.contains(parent)) still.push_back(parent);
+  }
+  while (!still.empty()) {
+    const auto [first, last] = fixed.equal_range(still.back());
+    still.pop_back();
+    for (auto held = first; held != last; ++held) {
+      if (moved.erase(held->second) > 0) still.push_back(held->second);
+    }
+  }
+  std::erase_if(moved, [&](NodeId body) { return !scene[body].rigid_body; });
+  return moved;
 }
 
 /// The object moves as one: bodies inside an asset become part of it, but for those to keep.

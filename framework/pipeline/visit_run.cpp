@@ -69,6 +69,58 @@ class ObjectMotion {
   std::vector<Known> known_;
 };
 
+bool are_equal(const BodyPoses& a, const BodyPoses& b) {
+  return std::ranges::equal(a, b, [](const auto& one, const auto& other) {
+    return one.first == other.first && one.second.matrix() == other.second.matrix();
+  });
+}
+
+/// Cameras whose pictures show how they move along their paths. Those that ride on a body move as
+/// it does anyway.
+class OpenShutters {
+ public:
+  OpenShutters(const Scene& scene, const std::vector<NodeId>& cameras) {
+    for (const NodeId node : cameras) {
+      const Camera& camera = *scene[node].camera;
+      if (camera.exposure_time_s + camera.readout_time_s <= 0.0 || is_on_body(scene, node))
+        continue;
+      cameras_.push_back({node, camera.linear_velocity, camera.angular_velocity});
+    }
+  }
+  /// Gives them the velocities of their paths, on top of what a randomizer drew.
+  void move(Scene& scene, const ClipTrack& track, int frame, double fps) const {
+    const int before = std::max(frame - 1, 0);
+    const int after = std::min(frame + 1, track.size() - 1);
+    if (before == after) return;
+    const double per_s = fps / (after - before);
+    for (const Open& open : cameras_) {
+      const Affine from = track.world_from_node(scene, open.node, before);
+      const Affine to = track.world_from_node(scene, open.node, after);
+      const Eigen::AngleAxisd turn(Mat3(to.rotation() * from.rotation().transpose()));
+      scene.set_velocity(open.node,
+                         open.linear_velocity + per_s * (to.translation() - from.translation()),
+                         open.angular_velocity + per_s * turn.angle() * turn.axis());
+    }
+  }
+  void restore(Scene& scene) const {
+    for (const Open& open : cameras_) {
+      scene.set_velocity(open.node, open.linear_velocity, open.angular_velocity);
+    }
+  }
+
+ private:
+  struct Open {
+    NodeId node;
+    Vec3 linear_velocity;
+    Vec3 angular_velocity;
+  };
+  static bool is_on_body(const Scene& scene, NodeId node) {
+    while (node && !scene[node].rigid_body) node = scene[node].parent;
+    return bool(node);
+  }
+  std::vector<Open> cameras_;
+};
+
 /// Cameras and rigs.
 std::vector<NodeId> camera_tops(const Scene& scene) {
   const NodeId parent = scene.find("/Cameras");
@@ -115,7 +167,6 @@ VisitResult VisitRun::run() {
         take_captures(step);
         break;
       case TimelineStep::Kind::Record:
-        --simulations_to_come_;
         record(step);
         break;
       case TimelineStep::Kind::Event:
@@ -332,70 +383,84 @@ void VisitRun::take_captures(const TimelineStep& step) {
     if (next_capture_ == planned_.capture_count) return;
     const PlannedCapture planned = setting_.plan.capture(planned_.first_capture + next_capture_++);
     randomize(planned.phase, planned.number, planned.index);
-    if (setting_.is_needed(planned.index)) take(planned);
+    if (setting_.is_needed(planned.index)) {
+      take(planned);
+    } else if (job_.views.empty()) {
+      // The visit's report tells of all captures. Where rules choose views, only making the capture
+      // would say which it has.
+      note_blocked_cameras();
+    }
   }
 }
 
-/// The whole clip is played first, which is cheap; its frames are then shown one by one, so that
-/// each knows what comes before and after it.
+/// A clip is played one frame ahead of those that are shown, so that each knows what comes before
+/// and after it. What the end of the job leaves of a clip is what the whole clip begins with.
 void VisitRun::record(const TimelineStep& step) {
   const PlannedCapture first = setting_.plan.capture(planned_.first_capture + next_capture_);
-  randomize(first.phase, first.number, first.index, first.clip);
-  play(first, 1.0 / step.fps);
-  for (int frame = 0; frame < track_.size(); ++frame) {
-    const PlannedCapture planned = setting_.plan.capture(planned_.first_capture + next_capture_++);
-    if (!setting_.is_needed(planned.index)) continue;
+  const int frames = first.clip->frame_count;
+  if (frames == step.count) --simulations_to_come_;
+  ClipFrame at = *first.clip;
+  at.frame_count = step.count;
+  randomize(first.phase, first.number, first.index, at);
+  const OpenShutters shutters(scene_, cameras_);
+  track_ = {};
+  for (int frame = 0; frame < frames; ++frame) {
+    const int ahead = std::min(frame + 1, step.count - 1);
+    while (track_.size() <= ahead) {
+      if (track_.size() > 0) track_.show(track_.size() - 1, scene_);
+      at.frame = track_.size();
+      play(first, at);
+    }
     track_.show(frame, scene_);
-    take(planned);
+    const PlannedCapture planned = setting_.plan.capture(planned_.first_capture + next_capture_++);
+    if (setting_.is_needed(planned.index)) {
+      shutters.move(scene_, track_, frame, step.fps);
+      take(planned);
+    } else {
+      note_blocked_cameras();
+    }
   }
-  track_.show(track_.size() - 1, scene_);
+  shutters.restore(scene_);
 }
 
-/// Fills the track; the scene is then that of the last frame.
-void VisitRun::play(const PlannedCapture& first, double seconds) {
+/// Lets the time between two frames go by, and adds the later one to the track.
+void VisitRun::play(const PlannedCapture& first, const ClipFrame& at) {
   const Stopwatch watch(result_.seconds["simulating"]);
-  const Room room(scene_, environment_);
-  std::vector<std::size_t> players;
-  for (std::size_t i = 0; i < job_.randomizers.size(); ++i) {
-    const auto call =
-        randomizer_call(job_, job_.randomizers[i], first.phase, planned_.index, first.number);
-    if (call) players.push_back(i);
-  }
-  int steps = 0;
-  double step_s = 0.0;
-  if (components_.physics) {
+  setting_.stop_if_asked();
+  if (components_.physics && at.frame > 0) {
+    const double seconds = 1.0 / at.fps;
     // As many as the job's steps, or a little shorter ones.
-    steps = int(std::ceil(seconds / components_.physics->step_seconds() - 1e-9));
-    step_s = seconds / steps;
-  }
-  const auto take_steps = [&](int count) {
-    call_component("physics '" + job_.physics.type + "'",
-                   [&] { components_.physics->advance(scene_, count, step_s); });
-  };
-  track_ = {};
-  ClipFrame at = *first.clip;
-  for (at.frame = 0; at.frame < at.frame_count; ++at.frame) {
-    setting_.stop_if_asked();
-    if (components_.physics && at.frame > 0) {
-      take_steps(steps - 1);
-      before_last_step_ = body_poses(scene_);
-      take_steps(1);
-      last_step_s_ = step_s;
-      simulated_s_ += seconds;
-      if (fastest_falling(scene_, room, objects_) > job_.settle.rest_speed) {
-        moving_until_s_ = simulated_s_;
-      }
+    const int steps = int(std::ceil(seconds / components_.physics->step_seconds() - 1e-9));
+    last_step_s_ = seconds / steps;
+    const auto take_steps = [&](int count) {
+      call_component("physics '" + job_.physics.type + "'",
+                     [&] { components_.physics->advance(scene_, count, last_step_s_); });
+    };
+    take_steps(steps - 1);
+    before_last_step_ = body_poses(scene_);
+    take_steps(1);
+    simulated_s_ += seconds;
+    const Room room(scene_, environment_);
+    if (fastest_falling(scene_, room, objects_) > job_.settle.rest_speed) {
+      moving_until_s_ = simulated_s_;
     }
-    const std::uint64_t shapes = scene_.shape_revision();
-    for (const std::size_t i : players) {
-      call_component("randomizer '" + job_.randomizers[i].name + "'", [&] {
-        components_.randomizers[i]->play(scene_, at);
-        if (scene_.shape_revision() == shapes) return;
+  }
+  const std::uint64_t shapes = scene_.shape_revision();
+  const BodyPoses bodies = body_poses(scene_);
+  for (std::size_t i = 0; i < job_.randomizers.size(); ++i) {
+    const RandomizerEntry& entry = job_.randomizers[i];
+    if (!randomizer_call(job_, entry, first.phase, planned_.index, first.number)) continue;
+    call_component("randomizer '" + entry.name + "'", [&] {
+      components_.randomizers[i]->play(scene_, at);
+      if (scene_.shape_revision() != shapes) {
         throw Error(ErrorKind::Plugin, "changes more than poses while a clip plays");
-      });
-    }
-    track_.add(scene_);
+      }
+      if (!are_equal(body_poses(scene_), bodies)) {
+        throw Error(ErrorKind::Plugin, "moves rigid bodies while a clip plays");
+      }
+    });
   }
+  track_.add(scene_);
 }
 
 void VisitRun::take(const PlannedCapture& planned) {
@@ -431,6 +496,10 @@ void VisitRun::take(const PlannedCapture& planned) {
   setting_.hand_over(std::move(pending), result_);
 }
 
+void VisitRun::note_blocked_cameras() {
+  note(scene_, find_blocked_cameras(scene_, cameras_), report_.cameras);
+}
+
 void VisitRun::prepare_renderer() {
   const Stopwatch watch(result_.seconds["preparing renderer"]);
   call_component("renderer '" + job_.renderer.type + "'",
@@ -450,7 +519,7 @@ std::vector<ViewOutcome> VisitRun::take_frames(const PlannedCapture& planned,
     search.run();
   };
   choose_views();
-  note(scene_, find_blocked_cameras(scene_, cameras_), report_.cameras);
+  note_blocked_cameras();
   prepare_renderer();
   for (std::size_t i = 0; i < cameras_.size(); ++i) {
     setting_.stop_if_asked();
@@ -474,7 +543,7 @@ void VisitRun::measure_flows(const std::optional<ClipFrame>& clip, std::vector<F
   const int frame = clip ? clip->frame : 0;
   const auto measure = [&](int other, const Channel<Vec2f>& flow,
                            const Channel<std::uint32_t>& states) {
-    if (!clip || other < 0 || other >= track_.size()) {
+    if (!clip || other < 0 || other >= clip->frame_count) {
       for (Frame& each : frames) {
         const int width = each.camera.width;
         const int height = each.camera.height;

@@ -82,12 +82,13 @@ class VisitRun {
   void reset_physics();
   void take_captures(const TimelineStep& step);
   void record(const TimelineStep& step);
-  void play(const PlannedCapture& first, double seconds);
+  void play(const PlannedCapture& first, const ClipFrame& at);
   void measure_flows(const std::optional<ClipFrame>& clip, std::vector<Frame>& frames);
   FlowMeter::WorldThere world_in(int frame) const;
   void set_motion(const std::optional<ClipFrame>& clip, Frame& frame);
   void take(const PlannedCapture& planned);
   std::vector<ViewOutcome> take_frames(const PlannedCapture& planned, std::vector<Frame>& frames);
+  void note_blocked_cameras();
   void prepare_renderer();
   Frame make_frame(std::size_t camera, const PlannedCapture& planned);
   void measure_coverage(NodeId camera, Frame& frame);

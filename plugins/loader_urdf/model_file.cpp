@@ -92,7 +92,13 @@ urdf::ModelInterfaceSharedPtr read_model(const std::string& file, std::string* c
   }
   if (model && model->getRoot()) {
     if (complaint) *complaint = plain(messages.first_error);
-    return model;
+    // Links own the links below them, so those in a loop of joints would live for ever.
+    return {model.get(), [model](urdf::ModelInterface*) {
+              for (const auto& [name, link] : model->links_) {
+                link->child_links.clear();
+                link->child_joints.clear();
+              }
+            }};
   }
   throw Error(
       ErrorKind::Asset,

@@ -7,6 +7,7 @@
 #include <deque>
 #include <filesystem>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "diorama/error.h"
@@ -15,6 +16,13 @@ namespace diorama::loader_urdf {
 namespace {
 
 constexpr std::size_t kMaxWarnings = 20;
+/// Of a link without a shape and a mass of its own. Lighter ones strain joints between heavy ones.
+constexpr double kLightBody = 0.1;  // kg
+
+bool has_collision(const urdf::Link& link) {
+  return std::ranges::any_of(link.collision_array,
+                             [](const auto& shape) { return shape && shape->geometry; });
+}
 
 std::string node_name(const std::string& name, const char* fallback) {
   std::string result = name.empty() ? fallback : name.substr(0, 200);
@@ -113,23 +121,25 @@ Affine ModelTranslator::pose_of(const urdf::Pose& pose, const std::string& where
 
 void ModelTranslator::translate(NodeId root) {
   // Links in the order of the tree, each once, whatever joints say; then what holds them together.
-  std::deque<std::pair<const urdf::Link*, Affine>> waiting;
+  std::vector<PlacedLink> order;
   std::vector<const urdf::Joint*> joints;
-  waiting.emplace_back(model_.root_link_.get(), Affine::Identity());
+  std::set<std::string> seen;
+  std::deque<PlacedLink> waiting{{model_.root_link_.get(), Affine::Identity()}};
   while (!waiting.empty()) {
-    const auto [link, root_from_link] = waiting.front();
+    const PlacedLink placed = waiting.front();
     waiting.pop_front();
-    if (links_.contains(link->name)) continue;
-    add_link(*link, root, root_from_link);
-    for (const auto& joint : link->child_joints) {
+    if (!seen.insert(placed.link->name).second) continue;
+    order.push_back(placed);
+    for (const auto& joint : placed.link->child_joints) {
       const auto child = model_.links_.find(joint->child_link_name);
       if (child == model_.links_.end()) continue;
       joints.push_back(joint.get());
       const Affine link_from_joint =
           pose_of(joint->parent_to_joint_origin_transform, "joint '" + joint->name + "'");
-      waiting.emplace_back(child->second.get(), root_from_link * link_from_joint);
+      waiting.push_back({child->second.get(), placed.root_from_link * link_from_joint});
     }
   }
+  add_links(order, joints, root);
   for (const auto& [name, link] : model_.links_) {
     if (!links_.contains(name)) {
       warn("link '" + name + "' hangs on a loop of joints, not on the root; it is left out");
@@ -154,10 +164,54 @@ void ModelTranslator::translate(NodeId root) {
   }
 }
 
-void ModelTranslator::add_link(const urdf::Link& link, NodeId root, const Affine& root_from_link) {
-  const NodeId node = scene_.create(root, node_name(link.name, "link"));
+/// Links that nothing can touch are no bodies, and would stay where they are while bodies move:
+/// what is fixed to a body lies below it, and what moves between bodies is a light one.
+void ModelTranslator::add_links(const std::vector<PlacedLink>& order,
+                                const std::vector<const urdf::Joint*>& joints, NodeId root) {
+  std::map<std::string, std::string> carriers;  // of each link that is or rides on a body
+  for (const PlacedLink& placed : order) {
+    if (has_collision(*placed.link)) carriers.emplace(placed.link->name, placed.link->name);
+  }
+  const bool has_bodies = !carriers.empty();
+  const auto carry = [&](const std::string& link, const std::string& by) {
+    const auto found = carriers.find(by);
+    if (found != carriers.end()) carriers.try_emplace(link, found->second);
+  };
+  // Up from the leaves, then down to them: joints are in the order of the tree.
+  std::vector<const urdf::Joint*> fixed = joints;
+  std::erase_if(fixed, [](const urdf::Joint* joint) { return joint->type != urdf::Joint::FIXED; });
+  for (auto joint = fixed.rbegin(); joint != fixed.rend(); ++joint) {
+    carry((*joint)->parent_link_name, (*joint)->child_link_name);
+  }
+  for (const urdf::Joint* joint : fixed) carry(joint->child_link_name, joint->parent_link_name);
+  std::map<std::string, Affine> poses;
+  std::vector<const PlacedLink*> carried;
+  for (const PlacedLink& placed : order) {
+    poses.emplace(placed.link->name, placed.root_from_link);
+    const auto carrier = carriers.find(placed.link->name);
+    if (carrier != carriers.end() && carrier->second != placed.link->name) {
+      carried.push_back(&placed);
+      continue;
+    }
+    const NodeId node = add_link(*placed.link, root, placed.root_from_link);
+    // By convention, what is called "world" stands still.
+    const bool is_world = placed.link == model_.root_link_.get() && placed.link->name == "world";
+    if (has_bodies && carrier == carriers.end() && !is_world && !joints.empty()) {
+      make_body(*placed.link, node, kLightBody);
+    }
+  }
+  for (const PlacedLink* placed : carried) {
+    const std::string& carrier = carriers.at(placed->link->name);
+    add_link(*placed->link, links_.at(carrier),
+             poses.at(carrier).inverse() * placed->root_from_link);
+  }
+}
+
+NodeId ModelTranslator::add_link(const urdf::Link& link, NodeId above,
+                                 const Affine& above_from_link) {
+  const NodeId node = scene_.create(above, node_name(link.name, "link"));
   links_[link.name] = node;
-  if (root_from_link.matrix().allFinite()) scene_.set_pose(node, root_from_link);
+  if (above_from_link.matrix().allFinite()) scene_.set_pose(node, above_from_link);
   std::vector<std::pair<const urdf::Visual*, NodeId>> seen;
   for (const auto& visual : link.visual_array) {
     if (!visual || !visual->geometry) continue;
@@ -200,13 +254,19 @@ void ModelTranslator::add_link(const urdf::Link& link, NodeId root, const Affine
       collides = true;
     }
   }
-  if (!collides) return;
+  if (collides) make_body(link, node, RigidBody().mass_kg);
+  return node;
+}
+
+void ModelTranslator::make_body(const urdf::Link& link, NodeId node, double unsaid_mass_kg) {
   RigidBody body;
+  body.mass_kg = unsaid_mass_kg;
   if (link.inertial) {
     if (is_length(link.inertial->mass)) {
       body.mass_kg = link.inertial->mass;
     } else {
-      warn("link '" + link.name + "' has a mass that is not above 0; it weighs 1 kg");
+      warn("link '" + link.name + "' has a mass that is not above 0; it weighs " +
+           (unsaid_mass_kg < 1.0 ? "0.1 kg" : "1 kg"));
     }
   }
   scene_.edit(node).rigid_body = body;

@@ -28,7 +28,14 @@ class ModelTranslator {
   const std::vector<std::string>& missing() const { return missing_; }
 
  private:
-  void add_link(const urdf::Link& link, NodeId root, const Affine& root_from_link);
+  struct PlacedLink {
+    const urdf::Link* link;
+    Affine root_from_link;
+  };
+  void add_links(const std::vector<PlacedLink>& order,
+                 const std::vector<const urdf::Joint*>& joints, NodeId root);
+  NodeId add_link(const urdf::Link& link, NodeId above, const Affine& above_from_link);
+  void make_body(const urdf::Link& link, NodeId node, double unsaid_mass_kg);
   void add_joint(const urdf::Joint& joint, NodeId above);
   /// The node of a shape; null when it cannot be made.
   NodeId add_geometry(const urdf::Geometry& geometry, const urdf::Pose& pose,

@@ -18,23 +18,53 @@ Vec3 axis_named(const std::string& word) {
   return Vec3::UnitX();
 }
 
-JointKind joint_kind(const std::string& type) {
-  if (type == "PhysicsRevoluteJoint") return JointKind::Revolute;
-  if (type == "PhysicsPrismaticJoint") return JointKind::Prismatic;
-  return JointKind::Fixed;
+/// What a joint leaves free, and where its limits are said.
+struct Freedom {
+  JointKind kind = JointKind::Fixed;
+  std::string axis;
+  std::string lower, upper;
+  std::size_t turns = 0, slides = 0;  ///< Axes that are free.
+};
+
+/// Joints without a kind of their own are free along and about every axis but those whose limits
+/// are turned round.
+Freedom freedom_of(usd::Stage& stage, const Prim& prim) {
+  if (prim.type_name != "PhysicsJoint") {
+    Freedom one{JointKind::Fixed, usd::token_or(stage, prim, "physics:axis", "X"),
+                "physics:lowerLimit", "physics:upperLimit"};
+    if (prim.type_name == "PhysicsRevoluteJoint") one.kind = JointKind::Revolute;
+    if (prim.type_name == "PhysicsPrismaticJoint") one.kind = JointKind::Prismatic;
+    if (prim.type_name == "PhysicsSphericalJoint") one.turns = 3;
+    return one;
+  }
+  Freedom found;
+  for (const char* word : {"transX", "transY", "transZ", "rotX", "rotY", "rotZ"}) {
+    const std::string name(word);
+    const std::string lower = "limit:" + name + ":physics:low";
+    const std::string upper = "limit:" + name + ":physics:high";
+    if (usd::number_or(stage, prim, lower.c_str(), -kInfinity) >
+        usd::number_or(stage, prim, upper.c_str(), kInfinity)) {
+      continue;
+    }
+    const bool turns = name.starts_with("rot");
+    ++(turns ? found.turns : found.slides);
+    found.kind = turns ? JointKind::Revolute : JointKind::Prismatic;
+    found.axis = name.substr(name.size() - 1);
+    found.lower = lower;
+    found.upper = upper;
+  }
+  if (found.turns + found.slides != 1) found.kind = JointKind::Fixed;
+  return found;
 }
 
 }  // namespace
 
 bool is_joint(const std::string& type) {
   return type == "PhysicsRevoluteJoint" || type == "PhysicsPrismaticJoint" ||
-         type == "PhysicsFixedJoint";
+         type == "PhysicsFixedJoint" || type == "PhysicsSphericalJoint" || type == "PhysicsJoint";
 }
 
-bool is_foreign_joint(const std::string& type) {
-  return type == "PhysicsSphericalJoint" || type == "PhysicsDistanceJoint" ||
-         type == "PhysicsJoint";
-}
+bool is_foreign_joint(const std::string& type) { return type == "PhysicsDistanceJoint"; }
 
 NodeId JointTranslator::body_at_or_above(const Prim& prim) const {
   for (const Prim* at = &prim; at; at = at->parent) {
@@ -45,6 +75,12 @@ NodeId JointTranslator::body_at_or_above(const Prim& prim) const {
   }
   const auto node = nodes_.find(&prim);
   return node == nodes_.end() ? NodeId{} : node->second;
+}
+
+// Nothing lies below it: what is held to the world collides with everything there.
+NodeId JointTranslator::world_body() {
+  if (!world_body_) world_body_ = scene_.create(world_, "world");
+  return world_body_;
 }
 
 // Where the joint is by the words about one of its bodies.
@@ -61,7 +97,7 @@ JointTranslator::Side JointTranslator::side(const Prim& prim, char number) {
           "<" + bodies.front() + ">");
     return result;
   }
-  result.body = result.is_world ? world_ : body_at_or_above(*target);
+  if (!result.is_world) result.body = body_at_or_above(*target);
   const Affine world_from_body = result.is_world
                                      ? scene_.world_from_node(world_) * world_from_stage_
                                      : scene_.world_from_node(node->second);
@@ -98,8 +134,9 @@ void JointTranslator::translate(const Prim& prim, NodeId node, double meters_per
   Side second = side(prim, '1');
   if (!first.is_known || !second.is_known) return;
   Joint joint;
-  joint.kind = joint_kind(prim.type_name);
-  joint.axis = axis_named(usd::token_or(stage_, prim, "physics:axis", "X"));
+  const Freedom freedom = freedom_of(stage_, prim);
+  joint.kind = freedom.kind;
+  joint.axis = axis_named(freedom.axis);
   if (second.is_world) {
     std::swap(first, second);
     joint.axis = -joint.axis;
@@ -108,10 +145,24 @@ void JointTranslator::translate(const Prim& prim, NodeId node, double meters_per
     note_(prim, "is a joint of a body with itself, and holds nothing", {});
     return;
   }
+  if (freedom.slides + freedom.turns > 1) {
+    if (freedom.slides > 0) {
+      note_(prim,
+            "is a joint that lets its bodies slide along or beside several axes, and holds "
+            "nothing",
+            {});
+      return;
+    }
+    note_(prim,
+          "is a joint that turns about several axes, which it does not here: it holds its "
+          "bodies as they stand",
+          {});
+  }
+  if (first.is_world) first.body = world_body();
   if (joint.kind != JointKind::Fixed) {
     const double unit = joint.kind == JointKind::Revolute ? kPi / 180.0 : meters_per_unit;
-    joint.lower = unit * limit(prim, "physics:lowerLimit", -kInfinity);
-    joint.upper = unit * limit(prim, "physics:upperLimit", kInfinity);
+    joint.lower = unit * limit(prim, freedom.lower.c_str(), -kInfinity);
+    joint.upper = unit * limit(prim, freedom.upper.c_str(), kInfinity);
     // In units of no length they are no numbers.
     if (!(joint.lower <= joint.upper)) {
       note_(prim, "is a joint with limits that are no interval; it has none", {});

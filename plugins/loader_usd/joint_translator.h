@@ -21,8 +21,8 @@ class JointTranslator {
   using Note = std::function<void(const usd::Prim&, const std::string& what, const std::string&)>;
   using Nodes = std::map<const usd::Prim*, NodeId>;
 
-  /// `world`: the node that stands for what is no body, in which the stage is `world_from_stage`.
-  /// `stage`, `scene` and `nodes` must outlive it.
+  /// `world`: the node of the asset, which stays where it is put, and in which the stage is
+  /// `world_from_stage`. `stage`, `scene` and `nodes` must outlive it.
   JointTranslator(usd::Stage& stage, Scene& scene, NodeId world, const Affine& world_from_stage,
                   const Nodes& nodes, Note note)
       : stage_(stage),
@@ -44,12 +44,14 @@ class JointTranslator {
   };
 
   Side side(const usd::Prim& prim, char number);
+  NodeId world_body();
   NodeId body_at_or_above(const usd::Prim& prim) const;
   double limit(const usd::Prim& prim, const char* name, double fallback);
 
   usd::Stage& stage_;
   Scene& scene_;
   NodeId world_;
+  NodeId world_body_;  ///< Null: no joint is held to the world so far.
   Affine world_from_stage_;
   const Nodes& nodes_;
   Note note_;

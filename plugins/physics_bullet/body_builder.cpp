@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 
 #include "diorama/error.h"
+#include "diorama/joints.h"
 #include "joint_builder.h"
 
 namespace diorama {
@@ -196,10 +198,47 @@ double checked_mass(const Scene& scene, NodeId id) {
                                     std::to_string(mass_kg) + " kg; it must be above 0");
 }
 
+/// Bodies that joints hold, which therefore move even where nothing can touch them.
+std::set<NodeId> jointed_bodies(const Scene& scene) {
+  std::set<NodeId> bodies;
+  for (const NodeId joint : joints_of(scene)) {
+    for (NodeId node : {scene[joint].joint->parent_body, scene[joint].joint->child_body}) {
+      while (node && !scene[node].rigid_body) node = scene[node].parent;
+      if (node) bodies.insert(node);
+    }
+  }
+  return bodies;
+}
+
+/// Moves by its joints and weight alone.
+void add_untouchable(const Scene& scene, NodeId id, double mass_kg,
+                     const BulletBackend::Params& params, Bodies& bodies) {
+  constexpr double kRadius = 0.05;  // metres: how hard it is to turn
+  MovingBody moving;
+  moving.node = id;
+  moving.path = scene.path(id);
+  moving.is_nested = has_body_above(scene, id);
+  moving.has_gravity = scene[id].rigid_body->has_gravity;
+  moving.collides = false;
+  moving.shapes.parts.push_back(std::make_unique<btSphereShape>(kRadius));
+  const Rigid place = split_rigid(scene.world_from_node(id)).rigid;
+  moving.start = bullet_transform(place);
+  moving.body_from_node = Affine(place.inverse()) * scene.world_from_node(id);
+  btRigidBody::btRigidBodyConstructionInfo info(
+      mass_kg, nullptr, moving.shapes.shape(),
+      btVector3(1, 1, 1) * (0.4 * mass_kg * kRadius * kRadius));
+  info.m_startWorldTransform = moving.start;
+  moving.body = std::make_unique<btRigidBody>(info);
+  set_motion(moving, 0.0, params);
+  bodies.moving.push_back(std::move(moving));
+}
+
 void add_moving(const Scene& scene, NodeId id, const Group& group,
-                const BulletBackend::Params& params, ShapeCache& cache, Bodies& bodies) {
+                const BulletBackend::Params& params, ShapeCache& cache, bool is_jointed,
+                Bodies& bodies) {
   const double mass_kg = checked_mass(scene, id);
   const std::vector<ConvexPart> parts = parts_of(scene, group, params, cache);
+  if (parts.empty() && is_jointed) return add_untouchable(scene, id, mass_kg, params, bodies);
   if (parts.empty()) {
     bodies.shapeless.push_back(scene.path(id));
     return;
@@ -246,9 +285,10 @@ Bodies build_bodies(const Scene& scene, const BulletBackend::Params& params, Sha
     check_collider(scene, id);
     add_static(scene, id, params, cache, bodies.statics);
   }
+  const std::set<NodeId> jointed = jointed_bodies(scene);
   for (const auto& [id, group] : census.groups) {
     for (const NodeId collider : group.colliders) check_collider(scene, collider);
-    add_moving(scene, id, group, params, cache, bodies);
+    add_moving(scene, id, group, params, cache, jointed.contains(id), bodies);
   }
   add_joints(scene, bodies);
   return bodies;

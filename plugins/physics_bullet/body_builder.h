@@ -3,7 +3,9 @@
 
 #include <btBulletDynamicsCommon.h>
 
+#include <cstddef>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -35,6 +37,7 @@ struct MovingBody {
   NodeId node;
   std::string path;
   bool has_gravity = true;
+  bool collides = true;
   bool is_nested = false;  ///< Below another moving body: its pose in its parent changes anyway.
   OwnedShapes shapes;
   std::unique_ptr<btRigidBody> body;
@@ -46,6 +49,19 @@ struct MovingBody {
 struct HeldJoint {
   std::string path;
   std::unique_ptr<btTypedConstraint> constraint;
+  NodeId node;
+  JointKind kind = JointKind::Fixed;
+  double scale = 1.0;  ///< World metres per metre of a slider.
+};
+
+/// A joint that follows another one by a motor of its own: what hinders it does not hinder the
+/// other.
+struct Follower {
+  std::size_t joint = 0;              ///< Index into Bodies::joints.
+  std::optional<std::size_t> leader;  ///< Likewise; nothing: the leader stands still.
+  double multiplier = 1.0;
+  double offset = 0.0;
+  double leader_position = 0.0;  ///< When it was last asked; turns count on.
 };
 
 /// What a scene holds for physics, in creation order of the nodes.
@@ -55,6 +71,7 @@ struct Bodies {
   /// What stands still, to joints: a body without mass that is in no world.
   std::unique_ptr<btRigidBody> anchor;
   std::vector<HeldJoint> joints;
+  std::vector<Follower> followers;  ///< In an order in which leaders come before their followers.
   std::vector<std::string> shapeless;  ///< Rigid bodies without anything that collides.
 };
 

@@ -7,6 +7,7 @@
 #include "body_builder.h"
 #include "diorama/error.h"
 #include "gentle_world.h"
+#include "joint_builder.h"
 
 namespace diorama {
 namespace {
@@ -144,7 +145,12 @@ void BulletBackend::do_reset(const Scene& scene) {
   }
   for (std::size_t i = 0; i < world.bodies.moving.size(); ++i) {
     world.bodies.moving[i].body->setUserIndex(int(i));
-    world.dynamics.addRigidBody(world.bodies.moving[i].body.get());
+    btRigidBody* const body = world.bodies.moving[i].body.get();
+    if (world.bodies.moving[i].collides) {
+      world.dynamics.addRigidBody(body);
+    } else {
+      world.dynamics.addRigidBody(body, btBroadphaseProxy::DefaultFilter, 0);
+    }
     set_velocities(scene, world.bodies.moving[i]);
   }
   // Bodies that a joint holds together do not collide with each other.
@@ -164,7 +170,10 @@ void BulletBackend::do_advance(int steps) { do_advance_by(steps, params_.step_se
 
 bool BulletBackend::do_advance_by(int steps, double step_s) {
   const double seconds = step_s / params_.sub_steps;
-  for (int i = 0; i < steps * params_.sub_steps; ++i) world_->dynamics.stepSimulation(seconds, 0);
+  for (int i = 0; i < steps * params_.sub_steps; ++i) {
+    drive_followers(world_->bodies, seconds);
+    world_->dynamics.stepSimulation(seconds, 0);
+  }
   return true;
 }
 

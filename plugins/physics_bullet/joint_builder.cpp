@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
+#include <set>
 
 #include "diorama/error.h"
 #include "diorama/joints.h"
@@ -47,7 +49,7 @@ std::unique_ptr<btTypedConstraint> make_hinge(const Joint& joint, btRigidBody& p
   auto hinge = std::make_unique<btHingeConstraint>(parent, child, in_parent, in_child, true);
   const double range = joint.upper - joint.lower;
   // Bullet knows angles within one turn only.
-  if (range < 2.0 * kPi) hinge->setLimit(joint.lower, joint.upper, 0.9, 0.3, 0.0);
+  if (range < 2.0 * kPi && !joint.mimic) hinge->setLimit(joint.lower, joint.upper, 0.9, 0.3, 0.0);
   return hinge;
 }
 
@@ -56,8 +58,8 @@ std::unique_ptr<btTypedConstraint> make_slider(const Joint& joint, double scale,
                                                const btTransform& in_parent,
                                                const btTransform& in_child) {
   auto slider = std::make_unique<btSliderConstraint>(parent, child, in_parent, in_child, true);
-  slider->setLowerLinLimit(std::max(scale * joint.lower, -kFar));
-  slider->setUpperLinLimit(std::min(scale * joint.upper, kFar));
+  slider->setLowerLinLimit(joint.mimic ? -kFar : std::max(scale * joint.lower, -kFar));
+  slider->setUpperLinLimit(joint.mimic ? kFar : std::min(scale * joint.upper, kFar));
   slider->setLowerAngLimit(0.0);
   slider->setUpperAngLimit(0.0);
   slider->setRestitutionLimLin(0.0);
@@ -82,7 +84,99 @@ void check_joint(const Scene& scene, NodeId id) {
                                     "a lower limit that is not above the upper one");
 }
 
+/// Where a joint is, and how fast, in radians or metres of its own.
+struct Motion {
+  double position = 0.0;
+  double speed = 0.0;
+};
+
+Motion motion_of(HeldJoint& held) {
+  btRigidBody& parent = held.constraint->getRigidBodyA();
+  btRigidBody& child = held.constraint->getRigidBodyB();
+  if (held.kind == JointKind::Prismatic) {
+    // What the slider itself says of its position is that of the last step.
+    auto& slider = static_cast<btSliderConstraint&>(*held.constraint);
+    const btTransform rail = parent.getCenterOfMassTransform() * slider.getFrameOffsetA();
+    const btVector3 axis = rail.getBasis().getColumn(0);
+    const btVector3 place =
+        (child.getCenterOfMassTransform() * slider.getFrameOffsetB()).getOrigin();
+    const btVector3 speed =
+        child.getVelocityInLocalPoint(place - child.getCenterOfMassPosition()) -
+        parent.getVelocityInLocalPoint(place - parent.getCenterOfMassPosition());
+    return {axis.dot(place - rail.getOrigin()) / held.scale, axis.dot(speed) / held.scale};
+  }
+  auto& hinge = static_cast<btHingeConstraint&>(*held.constraint);
+  const btVector3 axis =
+      (parent.getCenterOfMassTransform() * hinge.getAFrame()).getBasis().getColumn(2);
+  return {hinge.getHingeAngle(),
+          axis.dot(child.getAngularVelocity() - parent.getAngularVelocity())};
+}
+
+/// Those that lead nowhere but to each other are left out, and move freely.
+void add_followers(const Scene& scene, Bodies& bodies) {
+  std::map<NodeId, std::size_t> held;
+  std::vector<std::size_t> waiting;
+  for (std::size_t i = 0; i < bodies.joints.size(); ++i) {
+    const HeldJoint& joint = bodies.joints[i];
+    if (joint.kind == JointKind::Fixed) continue;
+    held.emplace(joint.node, i);
+    if (scene[joint.node].joint->mimic) waiting.push_back(i);
+  }
+  std::set<NodeId> unknown;  // followers whose leaders were not dealt with as yet
+  for (const std::size_t i : waiting) unknown.insert(bodies.joints[i].node);
+  for (bool is_news = true; is_news;) {
+    is_news = false;
+    for (const std::size_t i : waiting) {
+      const NodeId node = bodies.joints[i].node;
+      const Joint::Mimic& mimic = *scene[node].joint->mimic;
+      if (!unknown.contains(node) || unknown.contains(mimic.joint)) continue;
+      if (!scene.contains(mimic.joint) || !scene[mimic.joint].joint) continue;
+      Follower follower{i, std::nullopt, mimic.multiplier, mimic.offset, 0.0};
+      const auto leader = held.find(mimic.joint);
+      if (leader != held.end()) follower.leader = leader->second;
+      follower.leader_position = joint_position(scene, mimic.joint);
+      bodies.followers.push_back(follower);
+      unknown.erase(node);
+      is_news = true;
+    }
+  }
+}
+
 }  // namespace
+
+void drive_followers(Bodies& bodies, double seconds) {
+  constexpr double kStrong = 1e9;     // N or N s: whatever it takes
+  constexpr double kStill = 1e-5;     // rad/s, m/s: sleeping bodies stay asleep
+  constexpr double kCorrected = 0.5;  // of what is off, in one step
+  for (Follower& follower : bodies.followers) {
+    double speed = 0.0;
+    if (follower.leader) {
+      HeldJoint& leader = bodies.joints[*follower.leader];
+      const Motion motion = motion_of(leader);
+      const double moved = motion.position - follower.leader_position;
+      follower.leader_position +=
+          leader.kind == JointKind::Revolute ? std::remainder(moved, 2.0 * kPi) : moved;
+      speed = follower.multiplier * motion.speed;
+    }
+    HeldJoint& held = bodies.joints[follower.joint];
+    const double wanted = follower.multiplier * follower.leader_position + follower.offset;
+    double off = wanted - motion_of(held).position;
+    if (held.kind == JointKind::Revolute) off = std::remainder(off, 2.0 * kPi);
+    speed += kCorrected * off / seconds;
+    if (std::abs(speed) > kStill) {
+      held.constraint->getRigidBodyA().activate();
+      held.constraint->getRigidBodyB().activate();
+    }
+    if (held.kind == JointKind::Prismatic) {
+      auto& slider = static_cast<btSliderConstraint&>(*held.constraint);
+      slider.setPoweredLinMotor(true);
+      slider.setMaxLinMotorForce(kStrong);
+      slider.setTargetLinMotorVelocity(speed * held.scale);
+    } else {
+      static_cast<btHingeConstraint&>(*held.constraint).enableAngularMotor(true, speed, kStrong);
+    }
+  }
+}
 
 void add_joints(const Scene& scene, Bodies& bodies) {
   MovingBodies moving;
@@ -108,11 +202,14 @@ void add_joints(const Scene& scene, Bodies& bodies) {
     btRigidBody& child_body = child ? *child->body : *bodies.anchor;
     HeldJoint held;
     held.path = scene.path(id);
+    held.node = id;
+    held.kind = joint.kind;
     if (joint.kind == JointKind::Revolute) {
       held.constraint = make_hinge(joint, parent_body, child_body, in_parent, in_child);
     } else if (joint.kind == JointKind::Prismatic) {
-      const double scale = (world_from_joint.linear() * joint.axis).norm();
-      held.constraint = make_slider(joint, scale, parent_body, child_body, in_parent, in_child);
+      held.scale = (world_from_joint.linear() * joint.axis).norm();
+      held.constraint =
+          make_slider(joint, held.scale, parent_body, child_body, in_parent, in_child);
     } else {
       held.constraint =
           std::make_unique<btFixedConstraint>(parent_body, child_body, in_parent, in_child);
@@ -126,6 +223,7 @@ void add_joints(const Scene& scene, Bodies& bodies) {
         body.setIgnoreCollisionCheck(fixed.object.get(), true);
     }
   }
+  add_followers(scene, bodies);
 }
 
 }  // namespace diorama

@@ -10,4 +10,8 @@ namespace diorama {
 /// What a body is held to while it stands still does not collide with it.
 void add_joints(const Scene& scene, Bodies& bodies);
 
+/// Sets the motors of joints that mimic others so that they are where they belong after a step of
+/// the engine of that length.
+void drive_followers(Bodies& bodies, double seconds);
+
 }  // namespace diorama

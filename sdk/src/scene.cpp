@@ -312,12 +312,17 @@ void Scene::set_pose(NodeId node, const Transform& parent_from_node) {
 }
 
 void Scene::set_velocity(NodeId node, const Vec3& linear, const Vec3& angular) {
-  Slot& slot = state_->at(node);
-  if (!slot.node.rigid_body) {
-    throw Error(ErrorKind::Internal, path(node) + ": only rigid bodies have a velocity");
+  Node& moving = state_->at(node).node;
+  if (moving.rigid_body) {
+    moving.rigid_body->linear_velocity = linear;
+    moving.rigid_body->angular_velocity = angular;
+  } else if (moving.camera) {
+    moving.camera->linear_velocity = linear;
+    moving.camera->angular_velocity = angular;
+  } else {
+    throw Error(ErrorKind::Internal,
+                path(node) + ": only rigid bodies and cameras have a velocity");
   }
-  slot.node.rigid_body->linear_velocity = linear;
-  slot.node.rigid_body->angular_velocity = angular;
   state_->pose_revision = next_revision();
 }
 

@@ -7,6 +7,7 @@
 #include "framework/pipeline/fake_host.h"
 #include "program.h"
 #include "support/catch.h"
+#include "support/shared_data.h"
 #include "writer_basic/basic_reader.h"
 
 using namespace diorama::test;
@@ -101,6 +102,66 @@ TEST_CASE("Drawers are open at random, labelled by part, and told in the labels"
     CHECK(state.position == first["joints"][i]["position"]);
     CHECK(state.upper == first["joints"][i]["upper_limit"]);
   }
+}
+
+TEST_CASE("A foreign articulation is posed, labelled by part and falls in one piece",
+          "[run][shared]") {
+  const auto shared = diorama::test::shared_folder();
+  if (!shared) {
+    WARN("the shared files are not there");
+    return;
+  }
+  const std::string figure =
+      (*shared / "data/usd/newton/newton/examples/assets/humanoid.usda").string();
+  const TemporaryFolder folder;
+  write_file(folder / "job.yaml", R"(
+seed: 4
+total_captures: 2
+environments: [{type: shapes, shapes: [cube]}]
+environment: {colliders: triangle_mesh}
+objects:
+  - {type: files, name: figure, files: [")" +
+                                      figure + R"("], under: /Assets, label: figure, joints: free,
+     parts: {"*shin*": shin, "*foot*": foot}}
+lights: [{type: dome, name: sky}]
+cameras: [{type: pinhole, name: cam, width: 160, height: 120, position: [0, -5, 2.5], look_at: [0, 0, 1.5]}]
+randomizers:
+  - {type: joint_states, name: openings, on: [environment], joints: ["/Assets/**"]}
+  - {type: scatter_poses, name: place, on: [environment], nodes: "/Assets/*", offset: [0, 0, 2.2], rotation: none,
+     avoid_overlap: false}
+settle: {policy: keep}
+timeline: [{capture: posed}, {simulate: 60}, {capture: fallen}]
+renderer: {type: "null"}
+writers:
+  - {type: BasicWriter, name: basic, semantic_segmentation: true, bounding_box_3d: true, joint_states: true}
+output: {folder: out}
+)");
+  const Outcome outcome = run({"run", "job.yaml"}, folder.path());
+  INFO(outcome.errors);
+  REQUIRE(outcome.exit_code == 0);
+  std::set<double> knees;
+  for (const char* number : {"_0000", "_0001"}) {
+    const Json states =
+        Json::parse(read_file(folder / ("out/basic/joint_states" + std::string(number) + ".json")));
+    REQUIRE(states["joints"].size() == 15);
+    for (const Json& joint : states["joints"]) {
+      const double position = joint["position"];
+      // The engine holds limits to some hundredths of a radian.
+      if (joint["kind"] == "fixed") continue;
+      CHECK(position >= joint["lower_limit"].get<double>() - 0.1);
+      CHECK(position <= joint["upper_limit"].get<double>() + 0.1);
+      if (joint["name"] == "left_knee") knees.insert(position);
+    }
+    const std::string labels =
+        read_file(folder / ("out/basic/bounding_box_3d_labels" + std::string(number) + ".json"));
+    for (const char* part : {"\"figure\"", "\"shin\"", "\"foot\""}) {
+      CHECK(labels.find(part) != std::string::npos);
+    }
+  }
+  CHECK(knees.size() == 2);
+  const Outcome lint = run({"lint", "out"}, folder.path());
+  INFO(lint.output);
+  CHECK(lint.exit_code == 0);
 }
 
 TEST_CASE("Joint states that cannot be are found", "[run]") {

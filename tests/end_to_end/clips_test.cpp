@@ -302,6 +302,65 @@ TEST_CASE("Clips are the same bytes for any threads, visits in flight, shards an
   CHECK(difference(expected, tree(folder / "out")) == "");
 }
 
+TEST_CASE("Paths of every kind go on after kills, and so does what a visit reports", "[run]") {
+  const std::string job = R"(
+seed: 3
+total_captures: 10
+environments: [{type: shapes, shapes: [cube]}]
+environment: {colliders: triangle_mesh}
+objects:
+  - {type: shapes, name: things, under: /Assets, count: 4, label_pattern: "^", gravity_disabled_chance: 0.3}
+lights: [{type: dome, name: sky}]
+cameras:
+  - {type: pinhole, name: orbit, width: 48, height: 36}
+  - {type: pinhole, name: follow, width: 48, height: 36, exposure_time_s: 0.01}
+  - {type: pinhole, name: walk, width: 48, height: 36}
+  - {type: pinhole, name: keys, width: 48, height: 36}
+randomizers:
+  - {type: scatter_poses, name: poses, on: [environment], nodes: "/Assets/*",
+     offset: [[-0.6, 0.6], [-0.6, 0.6], [1.4, 2.0]], scale: [0.1, 0.2]}
+  - {type: camera_path, name: a, on: [clip], nodes: "/Cameras/orbit_0", kind: orbit, targets: "/Environment",
+     distance: 3.0, turn_deg_s: 40, jitter_m: 0.01, jitter_deg: 0.5}
+  - {type: camera_path, name: b, on: [clip], nodes: "/Cameras/follow_0", kind: follow, offset: [0.2, 0, 0],
+     jitter_m: 0.01}
+  - {type: camera_path, name: c, on: [clip], nodes: "/Cameras/walk_0", kind: walk, area: [[-3, 3], [-3, 3], 1.2],
+     look: ahead}
+  - {type: camera_path, name: d, on: [clip], nodes: "/Cameras/keys_0", kind: keys, keys: [
+     {time_s: 0, position: [[2, 3], 0, 1]}, {time_s: 0.1, position: [0, 3, 2]}, {time_s: 0.3, position: [-3, 0, 1]}]}
+settle: {policy: keep}
+renderer: {type: "null"}
+timeline: [{simulate: 14}, {record: {fps: 20, seconds: 0.25}}]
+writers:
+  - {type: BasicWriter, name: basic, camera_params: true, distance_to_camera: true, motion_vectors: true,
+     velocities: true, channels: [flow_forward, flow_backward]}
+output: {folder: out}
+)";
+  const TemporaryFolder folder;
+  write_file(folder / "whole/job.yaml", job);
+  const Outcome outcome = run({"run", "job.yaml"}, folder / "whole");
+  INFO(outcome.errors);
+  REQUIRE(outcome.exit_code == 0);
+  const auto expected = tree(folder / "whole/out");
+  // What the camera that follows is too near to is told of each frame, whoever made it.
+  const Json report = Json::parse(expected.at("settle/0_cube.json"));
+  CHECK(report.at("blocked_cameras").size() >= 3);
+  write_file(folder / "job.yaml", job);
+  const std::vector<std::string> arguments{"run", "job.yaml", "--resume"};
+  REQUIRE(run_and_kill(arguments, folder.path(), folder / "out", {2, 4}));
+  CHECK(run(arguments, folder.path()).exit_code == 0);
+  CHECK(difference(expected, tree(folder / "out")) == "");
+  // The way through the room is that of the whole clip, however much of it is recorded.
+  write_file(folder / "cut/job.yaml", job);
+  REQUIRE(run({"run", "job.yaml", "--set", "total_captures=8"}, folder / "cut").exit_code == 0);
+  auto cut = tree(folder / "cut/out");
+  CHECK_FALSE(cut.contains("settle/1_cube.json"));
+  for (const char* camera : {"orbit", "follow", "walk", "keys"}) {
+    const std::string name =
+        "basic/rp_" + std::string(camera) + "_0/camera_params/camera_params_0007.json";
+    CHECK(cut.at(name) == expected.at(name));
+  }
+}
+
 TEST_CASE("Formats with tracks call one object the same in every frame, and are read back",
           "[run]") {
   const TemporaryFolder folder;

@@ -136,7 +136,8 @@ class DIORAMA_SDK_API Scene {
   /// Counts as a pose change. Throws when a number is not finite.
   void set_pose(NodeId node, const Affine& parent_from_node);
   void set_pose(NodeId node, const Transform& parent_from_node);
-  /// Of a node with a rigid body (Error otherwise), m/s and rad/s, world. Counts as a pose change.
+  /// Of a node's rigid body, else of its camera (Error without either), m/s and rad/s, world.
+  /// Counts as a pose change.
   void set_velocity(NodeId node, const Vec3& linear, const Vec3& angular);
   /// Anything but the pose, the name and the tree. Counts as a shape change. The reference is valid
   /// until the next create() or erase().

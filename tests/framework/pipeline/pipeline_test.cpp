@@ -28,6 +28,9 @@ namespace {
 struct Script {
   /// Called by each component with its name and the visit that it is at; may throw or wait.
   std::function<void(const std::string& who, int visit)> at = [](const std::string&, int) {};
+  /// What the randomizer does to a frame of a clip.
+  std::function<void(Scene& scene, const ClipFrame& frame)> play = [](Scene&, const ClipFrame&) {};
+  bool has_bodies = false;  ///< Rooms are rigid bodies.
   std::mutex mutex;
   std::vector<std::string> faults;
   std::map<int, std::set<const void*>> sets;  ///< By visit, the physics that simulated it.
@@ -69,6 +72,7 @@ class Rooms final : public Loader {
     const int visit = std::stoi(std::string(asset.substr(5)));
     script_.at("loader", visit);
     // One label per visit number tells the other components where they are.
+    if (script_.has_bodies) scene.edit(root).rigid_body = RigidBody{};
     for (int i = 0; i < visit; ++i) scene.edit(root).labels["room" + std::to_string(i)] = "x";
   }
 
@@ -91,6 +95,7 @@ class Movers final : public Randomizer {
       scene.set_pose(camera, Transform{{own.uniform(-1, 1), own.uniform(-1, 1), 2.0}});
     }
   }
+  void play(Scene& scene, const ClipFrame& frame) override { script_.play(scene, frame); }
 
  private:
   Script& script_;
@@ -188,6 +193,10 @@ class Pictures final : public Writer {
     script_.at("writer", capture.visit);
     std::string text = capture.phase + " of " + capture.environment + "\n";
     for (const Frame& frame : capture.frames) {
+      const Vec3 place = frame.world_from_camera.translation();
+      const Vec3& velocity = frame.camera.linear_velocity;
+      text += std::to_string(place.x()) + " at " + std::to_string(velocity.x()) + " m/s, turning " +
+              std::to_string(frame.camera.angular_velocity.z()) + "\n";
       const auto pixels = frame.get(kColor).pixels();
       text.append(reinterpret_cast<const char*>(pixels.data()), pixels.size_bytes());
     }
@@ -220,10 +229,35 @@ output: {folder: /out}
 )";
 constexpr int kVisits = 8;  // the last with two captures
 
+const char* const kClipJob = R"(seed: 8
+total_captures: 12
+environments: [{type: rooms}]
+lights: [{type: sphere, name: lamp, radius_m: 0.1}]
+cameras:
+  - {type: pinhole, name: cam, count: 2, width: 24, height: 16, exposure_time_s: 0.02}
+randomizers: [{type: movers, name: poses, on: [environment, clip, late]}]
+physics: {type: pusher}
+renderer: {type: painter}
+timeline: [{record: {fps: 10, seconds: 0.4}}, {simulate: 2}, {capture: late, count: 1}]
+settle: {policy: keep}
+writers: [{type: pictures, name: pictures}]
+output: {folder: /out}
+)";
+
+/// The first camera goes along x, ever faster, and turns; each step depends on the one before.
+void go_along(Scene& scene, const ClipFrame& frame) {
+  const NodeId camera = scene.require("/Cameras/cam_0");
+  const double x = scene.world_from_node(camera).translation().x();
+  Affine pose = Affine::Identity();
+  pose.translation() = Vec3(frame.frame == 0 ? 0.0 : x + 0.1 * frame.frame, 0, 2);
+  pose.linear() = Eigen::AngleAxisd(0.2 * frame.frame, Vec3::UnitZ()).toRotationMatrix();
+  scene.set_pose(camera, pose);
+}
+
 struct Run {
-  explicit Run(Script& with, int visits_in_flight = 1, int threads = 1)
+  explicit Run(Script& with, int visits_in_flight = 1, int threads = 1, const char* text = kJob)
       : script(with), host(registry, host_options(threads), [](LogLevel, std::string_view) {}) {
-    job = job_from(kJob);
+    job = job_from(text);
     std::vector<EnvironmentChoice> environments;
     for (int i = 0; i < kVisits; ++i) environments.push_back({"room:" + std::to_string(i), 0});
     plan = plan_captures(job, environments, {});
@@ -512,4 +546,89 @@ TEST_CASE("Writers that want it get captures in their order", "[pipeline]") {
       CHECK(std::abs(script.encoded[i] - int(i)) < threads);
     }
   }
+}
+
+TEST_CASE("A clip that is broken off anywhere goes on as it would have gone", "[pipeline]") {
+  Script script;
+  script.play = go_along;
+  Run whole(script, 1, 1, kClipJob);
+  whole.go();
+  const auto expected = whole.files();
+  REQUIRE(whole.captures() == first_captures(12));
+  for (int made = 1; made < 12; ++made) {
+    CAPTURE(made);
+    Run part(script, 1, 1, kClipJob);
+    part.options.only = first_captures(made);
+    part.go();
+    REQUIRE(part.captures() == first_captures(made));
+    part.options.only.reset();
+    part.go();
+    CHECK(part.files() == expected);
+  }
+}
+
+TEST_CASE("Cameras with open shutters move as their clips do", "[pipeline]") {
+  Script script;
+  script.play = go_along;
+  Run run(script, 1, 1, kClipJob);
+  run.go();
+  const auto files = run.files();
+  const auto line = [&](int capture, std::size_t camera) {
+    const std::string& text = files.at("/out/pictures/capture_" + std::to_string(capture) + ".bin");
+    const std::size_t start = text.find('\n') + 1;
+    if (camera == 0) return text.substr(start, text.find('\n', start) - start);
+    const std::size_t end = text.rfind(" at ");
+    return text.substr(end, text.find('\n', end) - end);
+  };
+  // 0, 0.1, 0.3, 0.6 m, ten frames a second; by the frames beside each, as far as there are some.
+  CHECK(line(0, 0) == "0.000000 at 1.000000 m/s, turning 2.000000");
+  CHECK(line(1, 0) == "0.100000 at 1.500000 m/s, turning 2.000000");
+  CHECK(line(2, 0) == "0.300000 at 2.500000 m/s, turning 2.000000");
+  CHECK(line(3, 0) == "0.600000 at 3.000000 m/s, turning 2.000000");
+  // What stands still does not, nor does a capture that stands alone.
+  CHECK(line(2, 1) == " at 0.000000 m/s, turning 0.000000");
+  CHECK_THAT(line(4, 0), ContainsSubstring(" at 0.000000 m/s, turning 0.000000"));
+}
+
+TEST_CASE("A clip that the job's end cuts short begins as the whole one", "[pipeline]") {
+  Script script;
+  script.play = go_along;
+  Run whole(script, 1, 1, kClipJob);
+  whole.go();
+  Run cut(script, 1, 1, kClipJob);
+  cut.job.total_captures = 7;
+  cut.plan = plan_captures(cut.job, whole.plan.environments, {});
+  cut.go();
+  const auto expected = whole.files();
+  const auto files = cut.files();
+  int same = 0;
+  bool has_first = false;
+  for (const auto& [name, text] : files) {
+    if (name.find("capture_") != std::string::npos) {
+      CHECK(text == expected.at(name));
+      ++same;
+    }
+    // It ends with things in the air, which is nothing to report.
+    CHECK(name.find("settle/1_") == std::string::npos);
+    has_first |= name.find("settle/0_") != std::string::npos;
+  }
+  CHECK(same == 7);
+  CHECK(has_first);
+}
+
+TEST_CASE("Who plays a clip may move neither bodies nor shapes", "[pipeline]") {
+  Script script;
+  Run run(script, 1, 1, kClipJob);
+  script.play = [](Scene& scene, const ClipFrame& frame) {
+    if (frame.frame == 2) scene.set_pose(scene.require("/Environment"), Transform{{0, 0, 1}});
+  };
+  CHECK_NOTHROW(run.go());
+  script.has_bodies = true;
+  Run with_body(script, 1, 1, kClipJob);
+  CHECK_THROWS_WITH(with_body.go(), ContainsSubstring("moves rigid bodies while a clip plays"));
+  script.play = [](Scene& scene, const ClipFrame& frame) {
+    if (frame.frame == 1) scene.create(scene.root(), "more");
+  };
+  Run with_more(script, 1, 1, kClipJob);
+  CHECK_THROWS_WITH(with_more.go(), ContainsSubstring("changes more than poses"));
 }

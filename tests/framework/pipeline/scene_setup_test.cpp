@@ -268,6 +268,28 @@ TEST_CASE("Parts get labels by name; joints hold as the job says", "[spawn]") {
   }
 }
 
+TEST_CASE("What is fixed to where an object begins is the object", "[spawn]") {
+  FakeHost host;
+  host.assets["chest"] = [](Scene& scene, NodeId root) {
+    build_chest(scene, root);
+    // As models begin: an empty node, and what is fixed to it.
+    const NodeId base = scene.create(root, "base");
+    const NodeId holder = scene.create(root, "base_fixed");
+    Joint joint;
+    joint.parent_body = base;
+    joint.child_body = scene.find(scene.path(root) + "/body");
+    scene.edit(holder).joint = joint;
+  };
+  const Job job = chest_job("joints: free");
+  const CapturePlan plan = plan_captures(job, {{"room", 0}}, {{"chest"}});
+  Scene scene;
+  const NodeId object = spawn_objects(plan.objects, job, scene, host).front();
+  const std::string path = scene.path(object) + "/loaded/";
+  CHECK(scene[object].rigid_body->mass_kg == 8.0);
+  CHECK_FALSE(scene[scene.require(path + "body")].rigid_body);
+  CHECK(scene[scene.require(path + "drawer_1")].rigid_body);
+}
+
 TEST_CASE("Articulated furniture of the environment stands still unless joints are free",
           "[environment]") {
   for (const bool is_free : {false, true}) {

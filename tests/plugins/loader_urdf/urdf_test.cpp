@@ -157,6 +157,57 @@ TEST_CASE("joints turn about their axis behind their origin, and mimic", "[loade
         Approx(std::remainder(-kPi + 0.5, 2 * kPi)).epsilon(1e-9));
 }
 
+TEST_CASE("links that nothing can touch go with the bodies that they are fixed to",
+          "[loader_urdf]") {
+  const TemporaryFolder folder;
+  const auto joined = [](const char* name, const char* type, const char* parent,
+                         const char* child) {
+    return std::string("<joint name=\"") + name + "\" type=\"" + type + "\"><parent link=\"" +
+           parent + "\"/><child link=\"" + child +
+           "\"/><origin xyz=\"0 0 1\"/><axis xyz=\"0 0 1\"/></joint>";
+  };
+  const auto solid = [](const char* name) {
+    return std::string("<link name=\"") + name +
+           "\"><collision><geometry><box size=\"1 1 1\"/></geometry></collision></link>";
+  };
+  const auto model_with_root = [&](const std::string& name) {
+    return robot(
+        "<link name=\"" + name + "\"/><link name=\"plate\"/>" + solid("base") + solid("arm") +
+        "<link name=\"cross\"><inertial><mass value=\"0.3\"/><inertia ixx=\"1\" ixy=\"0\" "
+        "ixz=\"0\" iyy=\"1\" iyz=\"0\" izz=\"1\"/></inertial></link>"
+        "<link name=\"gap\"/><link name=\"tool\"><visual><geometry><sphere radius=\"1\"/>"
+        "</geometry></visual></link>" +
+        joined("a", "fixed", name.c_str(), "plate") + joined("b", "fixed", "plate", "base") +
+        joined("c", "continuous", "base", "cross") + joined("d", "continuous", "cross", "gap") +
+        joined("e", "continuous", "gap", "arm") + joined("f", "fixed", "arm", "tool"));
+  };
+  LoadedModel model(folder.write("r.urdf", model_with_root("footprint")));
+  // Two lie below the body above them, which they began with, and one below that before it.
+  for (const auto& [path, height] : {std::pair<std::string, double>{"base/footprint", 0.0},
+                                     {"base/plate", 1.0},
+                                     {"base", 2.0},
+                                     {"cross", 3.0},
+                                     {"gap", 4.0},
+                                     {"arm", 5.0},
+                                     {"arm/tool", 6.0}}) {
+    INFO(path);
+    const NodeId node = model.scene.require("/asset/" + path);
+    CHECK((model.scene.world_from_node(node).translation() - Vec3(0, 0, height)).norm() < 1e-12);
+    CHECK(model.scene[node].rigid_body.has_value() == (path.find('/') == std::string::npos));
+  }
+  CHECK(model.node("cross").rigid_body->mass_kg == 0.3);
+  CHECK(model.node("gap").rigid_body->mass_kg == 0.1);
+  // It turns with what holds it.
+  pose_joints(model.scene,
+              std::vector<JointTarget>{{model.scene.require("/asset/joints/e"), 0.5 * kPi}});
+  const NodeId tool = model.scene.require("/asset/arm/tool");
+  CHECK((model.scene.world_from_node(tool) * Vec3::UnitX() - Vec3(0, 1, 6)).norm() < 1e-12);
+  // What begins with the world is held by it.
+  LoadedModel held(folder.write("held.urdf", robot("<link name=\"world\"/>" + solid("base") +
+                                                   joined("a", "continuous", "world", "base"))));
+  CHECK_FALSE(held.node("world").rigid_body);
+}
+
 TEST_CASE("models with words that cannot be are one message", "[loader_urdf]") {
   const TemporaryFolder folder;
   const auto refused = [&](const std::string& text, const std::string& message) {

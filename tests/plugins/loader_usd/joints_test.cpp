@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "diorama/joints.h"
 
+#include <algorithm>
 #include <filesystem>
 
 #include "plugins/loader_usd/loaded_stage.h"
@@ -130,21 +131,73 @@ def PhysicsFixedJoint "held"
 {
     rel physics:body0 = </A>
 }
-def PhysicsSphericalJoint "ball"
+def PhysicsDistanceJoint "rope"
 {
     rel physics:body0 = </A>
 }
 )"));
   for (const char* name : {"lost", "self", "none"}) CHECK_FALSE(loaded.node(name).joint);
-  CHECK(loaded.scene.path(loaded.node("held").joint->parent_body) == "/asset");
+  CHECK(loaded.scene.path(loaded.node("held").joint->parent_body) == "/asset/world");
   const std::string all = warnings(loaded);
   CHECK(all.find("<lost> is a joint of a body that is not there") == std::string::npos);
   CHECK(all.find("</lost> is a joint of a body that is not there, and holds nothing (</B>)") !=
         std::string::npos);
   CHECK(all.find("is a joint of a body with itself, and holds nothing, like 1 more of them") !=
         std::string::npos);
-  CHECK(all.find("is of type PhysicsSphericalJoint, which does not hold bodies together") !=
+  CHECK(all.find("is of type PhysicsDistanceJoint, which does not hold bodies together") !=
         std::string::npos);
+}
+
+TEST_CASE("joints of any freedom are what is left of it", "[loader_usd]") {
+  const auto limits = [](const std::string& free) {
+    std::string text;
+    for (const char* word : {"transX", "transY", "transZ", "rotX", "rotY", "rotZ"}) {
+      if (free.find(word) != std::string::npos) continue;
+      text += "    float limit:" + std::string(word) +
+              ":physics:low = 1\n    float limit:" + std::string(word) + ":physics:high = -1\n";
+    }
+    return text;
+  };
+  const std::string bodies = "    rel physics:body0 = </A>\n    rel physics:body1 = </B>\n";
+  const TemporaryFolder folder;
+  LoadedStage loaded(folder.write(
+      "a.usda",
+      "#usda 1.0\n"
+      "def Cube \"A\" (prepend apiSchemas = [\"PhysicsRigidBodyAPI\"])\n{\n}\n"
+      "def Cube \"B\" (prepend apiSchemas = [\"PhysicsRigidBodyAPI\"])\n{\n}\n"
+      "def PhysicsJoint \"turn\"\n{\n" +
+          bodies + limits("rotY") +
+          "    float limit:rotY:physics:low = -30\n    float limit:rotY:physics:high = 90\n}\n"
+          "def PhysicsJoint \"slide\"\n{\n" +
+          bodies + limits("transZ") +
+          "}\n"
+          "def PhysicsJoint \"none\"\n{\n" +
+          bodies + limits("") +
+          "}\n"
+          "def PhysicsJoint \"hip\"\n{\n" +
+          bodies + limits("rotX rotY") +
+          "}\n"
+          "def PhysicsSphericalJoint \"ball\"\n{\n" +
+          bodies +
+          "}\n"
+          "def PhysicsJoint \"loose\"\n{\n" +
+          bodies + "}\n"));
+  const Joint& turn = *loaded.node("turn").joint;
+  CHECK(turn.kind == JointKind::Revolute);
+  CHECK(turn.axis == Vec3::UnitY());
+  CHECK(turn.lower == Approx(-kPi / 6.0));
+  CHECK(turn.upper == Approx(kPi / 2.0));
+  CHECK(loaded.node("slide").joint->kind == JointKind::Prismatic);
+  CHECK(loaded.node("slide").joint->axis == Vec3::UnitZ());
+  CHECK(loaded.node("slide").joint->upper == kInfinity);
+  for (const char* name : {"none", "hip", "ball"}) {
+    CHECK(loaded.node(name).joint->kind == JointKind::Fixed);
+  }
+  CHECK_FALSE(loaded.node("loose").joint);
+  const std::string all = warnings(loaded);
+  CHECK(all.find("</hip> is a joint that turns about several axes, which it does not here: it "
+                 "holds its bodies as they stand, like 1 more of them") != std::string::npos);
+  CHECK(all.find("</loose> is a joint that lets its bodies slide") != std::string::npos);
 }
 
 TEST_CASE("foreign articulations are read and can be posed within their limits",
@@ -161,14 +214,31 @@ TEST_CASE("foreign articulations are read and can be posed within their limits",
   };
   for (const auto& [file, count] :
        {Known{"examples/assets/cartpole.usda", 4}, Known{"examples/assets/boxes_fourbar.usda", 4},
-        Known{"tests/assets/revolute_articulation.usda", 2}}) {
+        Known{"tests/assets/revolute_articulation.usda", 2}, Known{"examples/assets/ant.usda", 8},
+        Known{"examples/assets/humanoid.usda", 15}}) {
     INFO(file);
     LoadedStage loaded((folder / file).string());
     const std::vector<NodeId> joints = joints_of(loaded.scene);
     CHECK(joints.size() == count);
+    std::vector<JointTarget> targets;
     for (const NodeId id : joints) {
-      if (loaded.scene[id].joint->kind == JointKind::Fixed) continue;
-      pose_joints(loaded.scene, std::vector<JointTarget>{{id, 0.1}});
+      const Joint& joint = *loaded.scene[id].joint;
+      if (joint.kind == JointKind::Fixed) continue;
+      targets.push_back(
+          {id, std::clamp(0.7 * std::clamp(joint.upper, -1.0, 1.0), joint.lower, joint.upper)});
+    }
+    pose_joints(loaded.scene, targets);
+    if (std::string(file).find("fourbar") != std::string::npos) continue;
+    // No part stays behind: hinges and what is fixed meet where they are joined.
+    for (const NodeId id : joints) {
+      const Joint& joint = *loaded.scene[id].joint;
+      if (joint.kind == JointKind::Prismatic) continue;
+      INFO(loaded.scene.path(id));
+      const Vec3 one =
+          (loaded.scene.world_from_node(joint.parent_body) * joint.parent_from_joint).translation();
+      const Vec3 other =
+          (loaded.scene.world_from_node(joint.child_body) * joint.child_from_joint).translation();
+      CHECK((one - other).norm() < 1e-4);
     }
   }
 }
