@@ -7,6 +7,7 @@
 #include <set>
 
 #include "framework/datasets/capture_sweep.h"
+#include "framework/datasets/pixel_boxes.h"
 
 namespace diorama {
 namespace {
@@ -243,7 +244,10 @@ DatasetStats dataset_stats(const StoredDataset& dataset, Host& host) {
   const Measurement measurement(info);
   sweep_captures<SeenCapture>(
       dataset, wanted, host,
-      [&](const StoredCapture& stored) { return measurement.measure(stored); },
+      [&](StoredCapture stored) {
+        for (Frame& frame : stored.capture.frames) complete_boxes(frame);
+        return measurement.measure(stored);
+      },
       [&](const SeenCapture& capture) { add(capture, stats); });
   return stats;
 }
