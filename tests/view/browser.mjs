@@ -88,12 +88,12 @@ async function tryClip(page, drawn) {
     return frame - 1;
   };
   await passed(2500);
-  const usual = await passed(1000);
+  const usual = await passed(600);
   await page.keyboard.press('<');
   await page.keyboard.press('<');
   check((await hashOf(page)).includes('speed=0.25'), 'the speed stands in the address');
-  const slow = await passed(1000);
-  check(slow > 0 && slow < usual * 0.5, `a second is ${usual} frames, at a quarter of the speed ${slow}`);
+  const slow = await passed(600);
+  check(slow > 0 && slow < usual * 0.5, `0.6 s are ${usual} frames, at a quarter of the speed ${slow}`);
   await page.selectOption('.player select', '2');
   check((await hashOf(page)).includes('speed=2'), 'and is chosen from a list');
   await page.selectOption('.player select', '1');

@@ -427,7 +427,7 @@ TEST_CASE("A run that goes on is shown before it has anything that could be read
   DatasetReaders readers{
       {{"hostile", {"mark.txt"}, [] { return std::make_unique<HostileReader>(); }}}};
   CHECK_THROWS_AS(DatasetView({.folder = folder.path("")}, readers, host), Error);
-  folder.write("dataset.json", R"({"captures": 3, "job": "", "datasets": []})");
+  folder.write("dataset.json", R"({"captures": 3, "job": "", "writers": []})");
   DatasetView view({.folder = folder.path("")}, readers, host);
   const auto json = [&](const std::string& path) { return Json::parse(*view.answer(path).body); };
   CHECK(json("/api/state")["datasets"].empty());

@@ -26,6 +26,7 @@ export class CapturePage {
   private readonly canvas = el('canvas', { class: 'big', tabindex: '0', role: 'img' });
   private readonly probe = el('div', { class: 'probe', 'aria-live': 'off' });
   private readonly head = el('div', { class: 'bar' });
+  private readonly title = el('b');
   private readonly panel = el('aside', { class: 'objects', 'aria-label': 'Objects' });
   private readonly space = new SpaceView((frame, object) => {
     this.app.go(frame !== null ? { frame } : { object: object ?? 0 });
@@ -137,6 +138,7 @@ export class CapturePage {
     this.capture = shot.labels ?? this.capture;
     this.frame = shot.labels?.frames[this.app.state.frame] ?? this.frame;
     this.app.seek(capture);
+    this.title.textContent = `Capture ${capture}`;
     this.draw();
     this.showSpace();
     this.showProbe();
@@ -162,10 +164,11 @@ export class CapturePage {
     const { app } = this;
     const { state } = app;
     clear(this.head);
+    this.title.textContent = `Capture ${state.capture}`;
     this.head.append(
       button('← Grid', 'Back to all captures (Escape)', () => app.go({ page: 'grid' })),
       button('‹', 'Capture before (arrow left)', () => this.step(-1)),
-      el('b', {}, `Capture ${state.capture}`),
+      this.title,
       button('›', 'Next capture (arrow right)', () => this.step(1)));
     const cameras = el('span', { class: 'tabs', role: 'tablist', 'aria-label': 'Cameras' });
     this.capture?.frames.forEach((frame, i) => {

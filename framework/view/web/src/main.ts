@@ -62,11 +62,12 @@ class Site {
       this.stats.element, this.findings.element, this.run.element, this.status, this.help);
     this.makeHelp();
     this.setTheme(this.keptTheme());
-    await this.load(readState(location.hash));
-    window.addEventListener('hashchange', () => void this.follow(readState(location.hash)));
+    window.addEventListener('hashchange', () => void (this.app && this.follow(readState(location.hash))));
     document.addEventListener('keydown', (event) => this.press(event));
     document.addEventListener('keydown', (event) => (this.tabs ||= event.key === 'Tab'), true);
     document.addEventListener('pointerdown', () => (this.tabs = false), true);
+    // Returns when all labels are read; the page is there before.
+    await this.load(readState(location.hash));
     if (!isReport) this.watch();
   }
 

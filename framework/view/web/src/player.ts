@@ -172,7 +172,7 @@ export class Player {
     this.words.textContent = text;
     this.scrub.setAttribute('aria-valuetext', text);
     this.speedChoice.value = String(this.speed);
-    this.play.textContent = this.plays ? '⏸' : '▶';
+    this.play.textContent = this.plays ? '‖' : '▶';
     this.play.title = this.plays ? 'Pause (space)' : 'Play (space)';
     this.play.setAttribute('aria-label', this.plays ? 'Pause' : 'Play');
   }
