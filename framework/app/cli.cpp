@@ -539,6 +539,8 @@ void add_report(CLI::App& app, CommandLine& line) {
   command
       ->add_option("--reader", line.report.reader, "Reader to use; default: the one that knows it")
       ->type_name("TYPE");
+  command->add_flag("--all-overlays", line.report.has_all_overlays,
+                    "Also depth, normals and flow, which make it several times as large");
   command->callback([&line] {
     line.command = [&line](ConsoleLog& log) {
       return command_report(line.global, line.report, log);

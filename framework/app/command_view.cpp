@@ -124,7 +124,7 @@ int command_report(const GlobalOptions& global, const ReportOptions& options, Co
   DatasetView view(
       {.folder = options.dataset, .reader = options.reader, .most_captures = options.captures},
       readers, *services.host);
-  const ReportSize size = write_report(view, options.output);
+  const ReportSize size = write_report(view, options.output, options.has_all_overlays);
   log.write(LogLevel::Info, "wrote " + (options.output / "index.html").string() + ": " +
                                 std::to_string(size.captures) + " captures, " +
                                 std::to_string((size.bytes + (1U << 20) - 1) >> 20) + " MiB");

@@ -30,6 +30,7 @@ struct ReportOptions {
   std::string reader;
   std::filesystem::path output;
   std::size_t captures = 100;  ///< At most, spread over the dataset.
+  bool has_all_overlays = false;
 };
 
 /// `diorama report DATASET -o DIR`: the same page as files.

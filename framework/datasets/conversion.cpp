@@ -13,6 +13,7 @@
 #include "framework/config/joined.h"
 #include "framework/datasets/capture_sweep.h"
 #include "framework/datasets/check_names.h"
+#include "framework/datasets/pixel_boxes.h"
 
 namespace diorama {
 namespace {
@@ -45,26 +46,6 @@ void derive_distance(std::string_view channel, Frame& frame) {
   frame.set(is_plane ? kDistanceToImagePlane : kDistanceToCamera, std::move(to));
 }
 
-struct Seen {
-  PixelBox box{1 << 30, 1 << 30, 0, 0};
-  std::int64_t pixels = 0;
-};
-
-std::map<std::uint32_t, Seen> seen_in(const Image<std::uint32_t>& ids) {
-  std::map<std::uint32_t, Seen> seen;
-  for (int y = 0; y < ids.height(); ++y) {
-    for (int x = 0; x < ids.width(); ++x) {
-      Seen& each = seen[ids.at(x, y)];
-      PixelBox& box = each.box;
-      box = {std::min(box.x_min, x), std::min(box.y_min, y), std::max(box.x_max, x + 1),
-             std::max(box.y_max, y + 1)};
-      ++each.pixels;
-    }
-  }
-  seen.erase(0);
-  return seen;
-}
-
 /// The visible pixels alone.
 CoverageMask visible_mask(const Image<std::uint32_t>& ids, std::uint32_t id, const PixelBox& box) {
   CoverageMask mask;
@@ -79,13 +60,13 @@ CoverageMask visible_mask(const Image<std::uint32_t>& ids, std::uint32_t id, con
 /// Boxes of pixels, and visibility as if nothing were hidden or cut off, where they are missing.
 void complete_instances(Frame& frame, const NameSet& needs) {
   if (!frame.has(kInstanceId.name)) return;
+  complete_boxes(frame);
+  if (!needs.contains("visibility")) return;
   const Image<std::uint32_t>& ids = frame.get(kInstanceId);
-  const auto seen = seen_in(ids);
+  const auto seen = pixel_extents(ids);
   for (Instance& instance : frame.instances) {
     const auto found = seen.find(instance.id);
     const std::int64_t pixels = found == seen.end() ? 0 : found->second.pixels;
-    if (!instance.tight_box && pixels > 0) instance.tight_box = found->second.box;
-    if (!needs.contains("visibility")) continue;
     if (!instance.visibility) {
       instance.visibility.emplace();
       instance.visibility->visible_pixels = instance.visibility->amodal_pixels = pixels;

@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "framework/datasets/capture_sweep.h"
+#include "framework/datasets/pixel_boxes.h"
 
 namespace diorama {
 namespace {
@@ -258,7 +259,10 @@ DatasetStats dataset_stats(const StoredDataset& dataset, Host& host) {
   const Measurement measurement(info);
   sweep_captures<SeenCapture>(
       dataset, wanted_of(info), host,
-      [&](const StoredCapture& stored) { return measurement.measure(stored); },
+      [&](StoredCapture stored) {
+        for (Frame& frame : stored.capture.frames) complete_boxes(frame);
+        return measurement.measure(stored);
+      },
       [&](const SeenCapture& capture) { add(capture, stats); });
   return stats;
 }

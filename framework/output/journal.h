@@ -78,6 +78,8 @@ class Digest {
 /// Relative, no longer than the system takes, without `..` and the like: what may stand in a
 /// journal and what writers may ask for.
 bool is_plain_relative(std::string_view path);
+/// In the stage of a worker that lives: stages of the work and their seconds, as JSON.
+inline constexpr const char* kTimesFile = "times.json";
 /// Below the folder of dataset.json: what captures keep until the dataset is finished.
 inline constexpr const char* kKeptFolder = ".diorama/kept";
 /// Whether a path below the output folder leads there; `records` is the folder of dataset.json.

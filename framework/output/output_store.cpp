@@ -421,6 +421,9 @@ void OutputStore::leave() {
     heart_.join();
   }
   // What is staged for good stays for who comes next.
+  if (next_times_ != std::chrono::steady_clock::time_point{}) {
+    file_system_.remove_file(stage(options_.self.name) / kTimesFile);
+  }
   file_system_.remove_if_empty(stage(options_.self.name));
   file_system_.remove_if_empty(diorama_folder() / "stage");
   if (is_finished() && has_durable_end() && !is_lost_) remove_kept();
@@ -470,6 +473,18 @@ bool OutputStore::is_finished() const {
 }
 
 void OutputStore::refresh() { journals_.refresh(); }
+
+void OutputStore::tell_times(const std::map<std::string, double>& seconds) {
+  const auto now = std::chrono::steady_clock::now();
+  if (!has_opened_ || now < next_times_) return;
+  next_times_ = now + std::chrono::seconds(2);
+  try {
+    file_system_.write(stage(options_.self.name) / kTimesFile,
+                       bytes_of(nlohmann::json(seconds).dump()));
+  } catch (const Error&) {
+    // Nothing depends on it; what does will say it better.
+  }
+}
 
 OutputStore::FileState OutputStore::state_of(const fs::path& path, const JournalledFile& file) {
   const auto status = file_system_.status(path);

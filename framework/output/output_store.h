@@ -178,6 +178,10 @@ class OutputStore {
   /// is none.
   std::optional<int> claim_visit(int visit_count, const std::function<bool(int)>& needs_work);
 
+  /// Tells who looks on in which stages of the work this process's time has gone so far; a file of
+  /// its stage, gone when it leaves. Seldom written, and passed over when it cannot be.
+  void tell_times(const std::map<std::string, double>& seconds);
+
   /// Looks again for captures that other workers have finished meanwhile.
   void refresh();
   /// Records of one writer, or of the run itself (kRecordsFolder), in capture order.
@@ -263,6 +267,7 @@ class OutputStore {
   std::mutex heart_mutex_;
   std::condition_variable heart_stops_;
   bool stops_beating_ = false;
+  std::chrono::steady_clock::time_point next_times_{};
   std::thread heart_;
 };
 

@@ -53,6 +53,7 @@ struct Pipeline::Flight {
     std::atomic<bool> is_cancelled = false;
     int captures = 0;
     int respawned = 0;
+    std::map<std::string, double> seconds;
   };
   struct Call {
     const std::function<void()>* function = nullptr;
@@ -302,18 +303,23 @@ void Pipeline::hand_over(const Turn& turn, PendingCapture pending, const VisitRe
   if (!queue_->push(std::move(pending), [&] { return has_to_stop(turn); })) throw Interrupted();
   call_on_main_thread([&] {
     RunProgress progress;
+    std::map<std::string, double> seconds;
     {
       const std::lock_guard lock(flight_->mutex);
       Flight::Begun& own = flight_->begun[turn.number];
       own.captures = result.captures;
       own.respawned = result.respawned;
+      own.seconds = result.seconds;
+      seconds = summary_.seconds;
       progress = {summary_.resumed + summary_.captures, total_, summary_.resumed,
                   summary_.respawned};
       for (const auto& [number, begun] : flight_->begun) {
         progress.done += begun.captures;
         progress.respawned += begun.respawned;
+        for (const auto& [stage, time] : begun.seconds) seconds[stage] += time;
       }
     }
+    store_.tell_times(seconds);
     if (options_.progress) options_.progress(progress);
   });
 }

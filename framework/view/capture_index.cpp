@@ -119,6 +119,7 @@ CaptureIndex::Entry CaptureIndex::entry_of(const StoredInfo& info, const StoredC
   entry.environment = stored.capture.environment;
   entry.split = stored.split;
   entry.findings = std::int32_t(stored.log.findings.size());
+  if (stored.capture.clip) entry.clip = stored.capture.clip->clip;
   for (const Frame& frame : stored.capture.frames) {
     Picture picture;
     const auto name = std::ranges::find(info.camera_names, frame.camera_name);
@@ -146,6 +147,7 @@ void CaptureIndex::add(const Entry& entry) {
   environment_.push_back(environments_.number(entry.environment));
   split_.push_back(splits_.number(entry.split));
   findings_.push_back(entry.findings);
+  clip_.push_back(entry.clip);
   for (const Picture& picture : entry.pictures) {
     camera_.push_back(picture.camera);
     width_.push_back(picture.width);
@@ -196,6 +198,7 @@ std::string CaptureIndex::json(std::size_t from, std::size_t most) const {
   add_column(text, "environment", environment_, from, to);
   add_column(text, "split", split_, from, to);
   add_column(text, "findings", findings_, from, to);
+  add_column(text, "clip", clip_, from, to);
   add_column(text, "pictures", counts(first_picture_, from, to), 0, to - from);
   add_column(text, "camera", camera_, pictures, pictures_end);
   add_column(text, "width", width_, pictures, pictures_end);
@@ -246,7 +249,7 @@ void CaptureIndex::each_names(Self& self, Act&& act) {
 template <class Self, class Act>
 void CaptureIndex::each_column(Self& self, Act&& act) {
   for (auto* column :
-       {&self.visit_, &self.phase_, &self.environment_, &self.split_, &self.findings_,
+       {&self.visit_, &self.phase_, &self.environment_, &self.split_, &self.findings_, &self.clip_,
         &self.camera_, &self.width_, &self.height_, &self.brightness_, &self.class_, &self.visible_,
         &self.truncation_, &self.box_side_, &self.distance_, &self.elevation_, &self.azimuth_}) {
     act(*column);
@@ -299,7 +302,7 @@ bool CaptureIndex::fits_together(std::size_t captures) const {
     return std::ranges::all_of(columns,
                                [count](const Column* column) { return column->size() == count; });
   };
-  return have(captures, {&visit_, &phase_, &environment_, &split_, &findings_}) &&
+  return have(captures, {&visit_, &phase_, &environment_, &split_, &findings_, &clip_}) &&
          first_picture_.size() == captures + 1 && are_begins(first_picture_, camera_.size()) &&
          have(camera_.size(), {&width_, &height_}) && first_object_.size() == camera_.size() + 1 &&
          are_begins(first_object_, class_.size()) &&

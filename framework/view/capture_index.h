@@ -39,7 +39,8 @@ class CaptureIndex {
     std::string phase;
     std::string environment;
     std::string split;
-    std::int32_t findings = 0;  ///< Of the reader.
+    std::int32_t findings = 0;     ///< Of the reader.
+    std::int32_t clip = kUnknown;  ///< ClipFrame::clip.
     std::vector<Picture> pictures;
   };
 
@@ -87,12 +88,12 @@ class CaptureIndex {
 
   mutable std::mutex mutex_;
   Names classes_, phases_, environments_, splits_;
-  Column visit_, phase_, environment_, split_, findings_;  ///< Per capture.
-  std::vector<std::size_t> first_picture_{0};              ///< Per capture, and the end.
-  Column camera_, width_, height_;                         ///< Per picture.
-  std::vector<std::size_t> first_object_{0};               ///< Per picture, and the end.
-  Column brightness_;                                      ///< Per picture, of the first captures.
-  std::vector<std::size_t> first_bright_{0};               ///< Per capture in it, and the end.
+  Column visit_, phase_, environment_, split_, findings_, clip_;  ///< Per capture.
+  std::vector<std::size_t> first_picture_{0};                     ///< Per capture, and the end.
+  Column camera_, width_, height_;                                ///< Per picture.
+  std::vector<std::size_t> first_object_{0};                      ///< Per picture, and the end.
+  Column brightness_;                         ///< Per picture, of the first captures.
+  std::vector<std::size_t> first_bright_{0};  ///< Per capture in it, and the end.
   Column class_, visible_, truncation_, box_side_, distance_, elevation_,
       azimuth_;  ///< Per object.
 };

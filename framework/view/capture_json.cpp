@@ -83,6 +83,17 @@ Json edges_json(const Frame& frame, const Instance& instance) {
   return lines;
 }
 
+/// A list of x, y, sight.
+Json keypoints_json(const std::vector<StoredKeypoint>& keypoints) {
+  Json list = Json::array();
+  for (const StoredKeypoint& point : keypoints) {
+    const bool is_told = point.sight != StoredKeypoint::Sight::NotTold;
+    list.push_back({rounded(is_told ? point.pixel.x() : 0.0, 0.01),
+                    rounded(is_told ? point.pixel.y() : 0.0, 0.01), int(point.sight)});
+  }
+  return list;
+}
+
 Json object_json(const StoredInfo& info, const Frame& frame, const Instance& instance) {
   const auto holds = [&](std::string_view name) { return info.holds.contains(name); };
   Json object{{"id", instance.id},
@@ -141,7 +152,8 @@ NameSet wanted_for_labels(const StoredInfo& info) {
   for (const std::string_view pixels :
        {kColor.name, kColorHdr.name, kDistanceToCamera.name, kDistanceToImagePlane.name,
         kNormals.name, kLeafId.name, kPosition.name, kUv.name, kAlbedo.name,
-        kObjectCoordinates.name, kMotion.name, kSensorDepth.name,
+        kObjectCoordinates.name, kMotion.name, kFlowForward.name, kFlowBackward.name,
+        kFlowForwardState.name, kFlowBackwardState.name, kSensorDepth.name,
         std::string_view("amodal_mask")}) {
     names.erase(std::string(pixels));
   }
@@ -156,8 +168,20 @@ std::string capture_json(const StoredInfo& info, const StoredCapture& stored) {
             {"phase", capture.phase},
             {"environment", capture.environment},
             {"split", stored.split}};
+  if (const auto& clip = capture.clip) {
+    json["clip"] = {{"clip", clip->clip},
+                    {"frame", clip->frame},
+                    {"frames", clip->frame_count},
+                    {"fps", clip->fps}};
+  }
   json["frames"] = Json::array();
   for (const Frame& frame : capture.frames) json["frames"].push_back(frame_json(info, frame));
+  for (std::size_t i = 0; i < stored.keypoints.size() && i < json["frames"].size(); ++i) {
+    for (Json& object : json["frames"][i]["objects"]) {
+      const auto found = stored.keypoints[i].find(object["id"].get<std::uint32_t>());
+      if (found != stored.keypoints[i].end()) object["keypoints"] = keypoints_json(found->second);
+    }
+  }
   for (std::size_t i = 0; i < stored.files.size() && i < json["frames"].size(); ++i) {
     json["frames"][i]["files"] = stored.files[i];
   }

@@ -11,6 +11,7 @@
 #include "framework/datasets/dataset_difference.h"
 #include "framework/datasets/dataset_origin.h"
 #include "framework/datasets/dataset_stats.h"
+#include "framework/datasets/pixel_boxes.h"
 #include "framework/lint/lint_dataset.h"
 #include "framework/output/dataset_status.h"
 #include "framework/plugins/plugin_call.h"
@@ -56,6 +57,14 @@ std::optional<std::size_t> whole_number(std::string_view word) {
   const bool is_plain = word.size() == 1 || !word.starts_with('0');
   if (failed != std::errc() || rest != end || !is_plain) return std::nullopt;
   return value;
+}
+
+OrderedJson skeletons_json(const StoredInfo& info) {
+  OrderedJson json = OrderedJson::object();
+  for (const auto& [name, skeleton] : info.skeletons) {
+    json[name] = {{"names", skeleton.names}, {"lines", skeleton.lines}};
+  }
+  return json;
 }
 
 /// Some captures of a dataset, evenly spread.
@@ -135,13 +144,31 @@ DatasetView::~DatasetView() {
 
 void DatasetView::open_below(const fs::path& folder, bool is_other, Datasets& all) const {
   const std::ptrdiff_t before = std::ssize(all);
-  for (const FoundDataset& each : find_datasets(folder, readers_, options_.reader)) {
+  const auto status = status_of_run(folder);
+  const bool goes_on = status && !status->is_finished;
+  // Formats may have nothing to read before a run's end; the others show how it goes.
+  const auto forgive = [&](const Error& error) {
+    if (!goes_on) throw;
+    host_.log(LogLevel::Debug, error.what());
+  };
+  std::vector<FoundDataset> found;
+  try {
+    found = find_datasets(folder, readers_, options_.reader);
+  } catch (const Error& error) {
+    forgive(error);
+  }
+  for (const FoundDataset& each : found) {
     auto dataset = std::make_shared<Opened>();
     dataset->folder = each.folder;
     dataset->is_other = is_other;
     dataset->name = each.folder.filename().empty() ? each.folder.parent_path().filename().string()
                                                    : each.folder.filename().string();
-    dataset->whole = readers_.open(each.folder, each.reader);
+    try {
+      dataset->whole = readers_.open(each.folder, each.reader);
+    } catch (const Error& error) {
+      forgive(error);
+      continue;
+    }
     dataset->shown = dataset->whole;
     const std::size_t count = dataset->whole->info().captures.size();
     if (options_.most_captures && *options_.most_captures < count) {
@@ -150,7 +177,7 @@ void DatasetView::open_below(const fs::path& folder, bool is_other, Datasets& al
     }
     all.push_back(std::move(dataset));
   }
-  if (std::ssize(all) == before) find_dataset(folder, readers_, options_.reader);
+  if (std::ssize(all) == before && !goes_on) find_dataset(folder, readers_, options_.reader);
   // Those that hold most come first: what the page shows unless asked.
   std::stable_sort(all.begin() + before, all.end(), [](const auto& a, const auto& b) {
     const auto rank = [](const StoredInfo& info) {
@@ -216,9 +243,10 @@ bool DatasetView::index_some(Opened& opened) {
   std::vector<CaptureIndex::Entry> entries(std::min(at_once, count - first));
   const NameSet wanted = CaptureIndex::wanted(data.info());
   host_.parallel_for(entries.size(), [&](std::size_t i) {
-    entries[i] = CaptureIndex::entry_of(
-        data.info(), call_component("reader of " + data.info().format,
-                                    [&] { return data.read(first + i, wanted); }));
+    StoredCapture stored = call_component("reader of " + data.info().format,
+                                          [&] { return data.read(first + i, wanted); });
+    for (Frame& frame : stored.capture.frames) complete_boxes(frame);
+    entries[i] = CaptureIndex::entry_of(data.info(), stored);
   });
   for (const CaptureIndex::Entry& entry : entries) opened.index.add(entry);
   if (opened.index.size() == count) keep_index(opened);
@@ -343,6 +371,7 @@ HttpAnswer DatasetView::state() const {
     const std::lock_guard lock(mutex_);
     json["generation"] = generation_;
     json["is_finished"] = is_finished_;
+    json["is_linted"] = findings_ != nullptr;
   }
   json["datasets"] = OrderedJson::array();
   for (const auto& opened : *datasets()) {
@@ -428,7 +457,9 @@ HttpAnswer DatasetView::capture_answer(const Opened& opened, Words words) {
     });
   };
   if (words.size() == 1) {
-    return answer_of(kJson, capture_json(info, read(wanted_for_labels(info))));
+    StoredCapture stored = read(wanted_for_labels(info));
+    for (Frame& frame : stored.capture.frames) complete_boxes(frame);
+    return answer_of(kJson, capture_json(info, stored));
   }
   if (words.size() != 3) return not_there();
   const auto place = whole_number(words[1]);
@@ -453,7 +484,8 @@ HttpAnswer DatasetView::dataset_answer(Opened& opened, Words words) {
                         {"holds", info.holds},
                         {"cameras", info.camera_names},
                         {"classes", info.classes},
-                        {"captures", info.captures}});
+                        {"captures", info.captures},
+                        {"skeletons", skeletons_json(info)}});
   }
   if (words[0] == "stats" && words.size() == 1) {
     const std::lock_guard lock(opened.mutex);

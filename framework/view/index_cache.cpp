@@ -24,7 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Changes whenever CaptureIndex::bytes() or what is counted does.
-std::string index_head() { return "diorama index 1, version " + program_version() + "\n"; }
+std::string index_head() { return "diorama index 2, version " + program_version() + "\n"; }
 
 void add_text(std::string_view text, Digest& digest) {
   const std::uint64_t length = text.size();

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <tuple>
 #include <vector>
 
 namespace diorama {
@@ -49,12 +50,22 @@ Rgb packed_normal(const Vec3f& normal) {
   return bytes;
 }
 
-Rgb packed_motion(const Vec2f& pixels) {
-  const auto twelve = [](float value) {
-    const double steps = std::isfinite(value) ? (double(value) + 128.0) * 16.0 : 2048.0;
-    return std::uint32_t(std::clamp(std::round(steps), 0.0, 4095.0));
+/// See PictureKind::Motion. `states` may be null: everything is seen.
+PictureFile packed_motion(const Image<Vec2f>& motion, const Image<std::uint32_t>* states,
+                          const Host& host) {
+  constexpr double kMost = 8192.0;  // what 22 bits hold
+  const auto steps = [](float value) {
+    const double finite = std::isfinite(value) ? double(value) : 0.0;
+    return std::uint32_t(std::clamp(std::round((finite + kMost) * 256.0), 0.0, 4194303.0));
   };
-  return packed(twelve(pixels.x()) | twelve(pixels.y()) << 12);
+  const std::size_t count = motion.pixels().size();
+  std::vector<Rgb> pixels(2 * count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::uint32_t state = states ? std::min(states->pixels()[i], 3U) : 0U;
+    pixels[i] = packed(steps(motion.pixels()[i].x()) | state << 22);
+    pixels[count + i] = packed(steps(motion.pixels()[i].y()));
+  }
+  return encoded(pixels, motion.width(), 2 * motion.height(), ImageFormat::Png, host);
 }
 
 /// Means over the pixels that fall into each one.
@@ -100,6 +111,8 @@ std::optional<PictureKind> picture_kind(std::string_view name) {
   if (name == "depth") return PictureKind::Depth;
   if (name == "normals") return PictureKind::Normals;
   if (name == "motion") return PictureKind::Motion;
+  if (name == "flow_forward") return PictureKind::FlowForward;
+  if (name == "flow_backward") return PictureKind::FlowBackward;
   return std::nullopt;
 }
 
@@ -119,6 +132,10 @@ NameSet channels_of(PictureKind kind) {
       return names({kNormals.name});
     case PictureKind::Motion:
       return names({kMotion.name});
+    case PictureKind::FlowForward:
+      return names({kFlowForward.name, kFlowForwardState.name});
+    case PictureKind::FlowBackward:
+      return names({kFlowBackward.name, kFlowBackwardState.name});
   }
   return {};
 }
@@ -145,8 +162,14 @@ std::optional<PictureFile> make_picture(const Frame& frame, PictureKind kind, co
     }
   }
   if (kind == PictureKind::Motion) {
-    if (const auto* motion = image_of(frame, kMotion)) {
-      return picture_of(*motion, host, packed_motion);
+    if (const auto* motion = image_of(frame, kMotion)) return packed_motion(*motion, nullptr, host);
+  }
+  for (const auto& [flow, channel, state] :
+       {std::tuple{PictureKind::FlowForward, kFlowForward, kFlowForwardState},
+        std::tuple{PictureKind::FlowBackward, kFlowBackward, kFlowBackwardState}}) {
+    if (kind != flow) continue;
+    if (const auto* motion = image_of(frame, channel)) {
+      return packed_motion(*motion, image_of(frame, state), host);
     }
   }
   return std::nullopt;

@@ -19,12 +19,14 @@ struct PictureFile {
 /// What of a frame the page can ask for as a picture, by the name in the address. Numbers stand in
 /// the three bytes of a pixel, red lowest, so that the page can read them back exactly.
 enum class PictureKind {
-  Color,      ///< "color": as it is.
-  Thumbnail,  ///< "thumbnail": at most kThumbnailWidth wide, JPEG.
-  Ids,        ///< "ids": instance ids, their lower 24 bits.
-  Depth,      ///< "depth": tenths of millimetres, 0 where nothing is.
-  Normals,    ///< "normals": -1 to 1 as 0 to 255, black where nothing is.
-  Motion,     ///< "motion": x and y in 1/16 pixels from -128, 12 bits each.
+  Color,         ///< "color": as it is.
+  Thumbnail,     ///< "thumbnail": at most kThumbnailWidth wide, JPEG.
+  Ids,           ///< "ids": instance ids, their lower 24 bits.
+  Depth,         ///< "depth": tenths of millimetres, 0 where nothing is.
+  Normals,       ///< "normals": -1 to 1 as 0 to 255, black where nothing is.
+  Motion,        ///< "motion": twice as high, x above and y below, in 1/256 pixels from -8192.
+  FlowForward,   ///< "flow_forward": the same, with the FlowState of x in the highest two bits.
+  FlowBackward,  ///< "flow_backward"
 };
 inline constexpr int kThumbnailWidth = 320;
 

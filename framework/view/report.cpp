@@ -2,9 +2,14 @@
 #include "framework/view/report.h"
 
 #include <algorithm>
+#include <array>
 #include <fstream>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <set>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "diorama/error.h"
@@ -14,10 +19,20 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// What is held, and the word for it in addresses: of many bits per pixel.
+constexpr std::array<std::pair<std::string_view, const char*>, 6> kLargeOverlays{
+    {{kDistanceToImagePlane.name, "depth"},
+     {kDistanceToCamera.name, "depth"},
+     {kNormals.name, "normals"},
+     {kMotion.name, "motion"},
+     {kFlowForward.name, "flow_forward"},
+     {kFlowBackward.name, "flow_backward"}}};
+
 /// Pages from files may not ask for files, but run scripts and show pictures: data is scripts.
 class ReportWriter {
  public:
-  ReportWriter(DatasetView& view, fs::path folder) : view_(view), folder_(std::move(folder)) {}
+  ReportWriter(DatasetView& view, fs::path folder, bool has_all_overlays)
+      : view_(view), folder_(std::move(folder)), has_all_overlays_(has_all_overlays) {}
 
   ReportSize write() {
     make_folder(folder_ / "data");
@@ -77,13 +92,14 @@ class ReportWriter {
   }
 
   /// False when there is nothing at this address.
-  bool add_data(const std::string& path) {
+  bool add_data(const std::string& path,
+                const std::function<std::string(const std::string&)>& adapt = {}) {
     const HttpAnswer answer = view_.answer(path);
     if (answer.status == 404) return false;
     const bool is_json = answer.type == "application/json";
     std::string script = "diorama_data('" + path + "',";
     if (is_json) {
-      script += *answer.body;
+      script += adapt ? adapt(*answer.body) : *answer.body;
     } else {
       script += "'data:" + answer.type + ";base64," + base64(*answer.body) + "'";
     }
@@ -96,12 +112,27 @@ class ReportWriter {
     if (answer.status == 200) put(file_name(path), *answer.body);
   }
 
+  /// What the report lacks, its page need not ask for.
+  std::string info_of_report(const std::string& text) const {
+    nlohmann::json info = nlohmann::json::parse(text);
+    if (!has_all_overlays_) {
+      NameSet holds = info["holds"].get<NameSet>();
+      for (const auto& [held, kind] : kLargeOverlays) holds.erase(std::string(held));
+      info["holds"] = holds;
+    }
+    return info.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  }
+
   void write_dataset(const std::string& at, const DatasetView::Shown& shown) {
-    add_data(at + "/info");
+    add_data(at + "/info", [this](const std::string& text) { return info_of_report(text); });
     add_data(at + "/stats");
     for (std::size_t i = 0; i == 0 || i < shown.captures.size(); i += DatasetView::kIndexPart) {
       add_data(at + "/index/" + std::to_string(i));
       add_data(at + "/brightness/" + std::to_string(i));
+    }
+    std::set<std::string> kinds;
+    for (const auto& [held, kind] : kLargeOverlays) {
+      if (has_all_overlays_ && shown.holds.contains(held)) kinds.insert(kind);
     }
     for (const int capture : shown.captures) {
       const std::string address = at + "/capture/" + std::to_string(capture);
@@ -112,6 +143,7 @@ class ReportWriter {
         add_picture(frame + "/thumbnail");
         if (shown.holds.contains(kInstanceId.name)) add_data(frame + "/ids");
         if (shown.holds.contains("amodal_mask")) add_data(frame + "/amodal");
+        for (const std::string& kind : kinds) add_data(frame + "/" + kind);
       }
       ++size_.captures;
     }
@@ -136,18 +168,19 @@ class ReportWriter {
 
   DatasetView& view_;
   fs::path folder_;
+  bool has_all_overlays_;
   ReportSize size_;
 };
 
 }  // namespace
 
-ReportSize write_report(DatasetView& view, const fs::path& folder) {
+ReportSize write_report(DatasetView& view, const fs::path& folder, bool has_all_overlays) {
   std::error_code ignored;
   if (fs::exists(folder, ignored) && !fs::is_empty(folder, ignored)) {
     throw Error(ErrorKind::Output,
                 folder.string() + ": is not empty; name a folder that is not there yet");
   }
-  return ReportWriter(view, folder).write();
+  return ReportWriter(view, folder, has_all_overlays).write();
 }
 
 }  // namespace diorama

@@ -16,7 +16,9 @@ struct ReportSize {
 };
 
 /// Writes the page of a view, with what it shows, as files that a browser opens without a server.
-/// The folder must be free. Throws Error(Output).
-ReportSize write_report(DatasetView& view, const std::filesystem::path& folder);
+/// The folder must be free. Depth, normals and flow are several times as large as all the rest, and
+/// only there with `has_all_overlays`. Throws Error(Output).
+ReportSize write_report(DatasetView& view, const std::filesystem::path& folder,
+                        bool has_all_overlays);
 
 }  // namespace diorama

@@ -21,8 +21,10 @@ using OrderedJson = nlohmann::ordered_json;
 
 /// The run's own records are those of no writer.
 constexpr const char* kOfTheRun = "";
-/// Larger files in the folder settle/ are not the run's.
+/// Larger files are not the run's.
 constexpr std::uint64_t kMostBytes = std::uint64_t(64) << 20;
+/// Captures that are shown as the last ones.
+constexpr std::size_t kMostLast = 8;
 
 /// "moves at 0.65 m/s" and the same at another speed are one reason.
 std::string without_numbers(std::string_view why) {
@@ -39,18 +41,21 @@ std::string without_numbers(std::string_view why) {
 }  // namespace
 
 void RunRecords::refresh(int captures, bool has_views) {
-  if (has_views) read_views(captures);
+  read_journals(captures, has_views);
   read_settling();
+  read_times();
 }
 
-void RunRecords::read_views(int captures) {
+void RunRecords::read_journals(int captures, bool has_views) {
   LocalFileSystem file_system;
   Journals journals(file_system, folder_ / ".diorama" / "journal", captures);
   journals.refresh();
+  std::map<std::string, std::vector<int>> made;  // by worker, in the order of its journal
   journals.visit_entries([&](const std::string& worker, const EntryPlace& place) {
-    const bool is_new = place.is_published && place.entry >= 0 && place.entry < captures &&
-                        !counted_.contains(place.entry);
-    if (!is_new) return;
+    const bool is_capture = place.is_published && place.entry >= 0 && place.entry < captures;
+    if (!is_capture) return;
+    made[worker].push_back(place.entry);
+    if (!has_views || counted_.contains(place.entry)) return;
     const auto content = journals.files_of(worker, place);
     if (!content) return;
     counted_.insert(place.entry);
@@ -58,6 +63,31 @@ void RunRecords::read_views(int captures) {
       if (writer == kOfTheRun) views_.add(place.entry, outcomes_from_json(line));
     }
   });
+  // Journals say no times: the last ones of each worker, in turn.
+  last_.clear();
+  for (std::size_t i = 0; i < kMostLast && last_.size() < kMostLast; ++i) {
+    for (const auto& [worker, entries] : made) {
+      if (i < entries.size() && last_.size() < kMostLast) {
+        last_.push_back(entries[entries.size() - 1 - i]);
+      }
+    }
+  }
+}
+
+void RunRecords::read_times() {
+  LocalFileSystem file_system;
+  const fs::path stages = folder_ / ".diorama" / "stage";
+  stages_.clear();
+  for (const std::string& worker : file_system.list(stages)) {
+    const fs::path file = stages / worker / kTimesFile;
+    const auto found = file_system.status(file);
+    if (!found || found->kind != FileStatus::Kind::File || found->size > kMostBytes) continue;
+    const OrderedJson times = parse_json_or_nothing<OrderedJson>(file_system.read(file));
+    if (!times.is_object()) continue;
+    for (const auto& [stage, seconds] : times.items()) {
+      if (seconds.is_number()) stages_[stage] += seconds.get<double>();
+    }
+  }
 }
 
 void RunRecords::read_settling() {
@@ -109,6 +139,8 @@ OrderedJson RunRecords::json() const {
                      {"refused", views_.refused},
                      {"unmet", views_.unmet.size()}};
   }
+  if (!stages_.empty()) json["stages"] = stages_;
+  if (!last_.empty()) json["last"] = last_;
   if (visits_.empty()) return json;
   OrderedJson& settle = json["settle"];
   settle = {{"visits", visits_.size()},

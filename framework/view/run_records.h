@@ -8,6 +8,7 @@
 #include <set>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "framework/pipeline/view_report.h"
 
@@ -23,7 +24,8 @@ class RunRecords {
 
   /// Reads what is new. `captures` of the job; `has_views`: its section `views` asks for something.
   void refresh(int captures, bool has_views);
-  /// Members `views` and `settle`, each as far as there is something.
+  /// Members `views`, `settle`, `stages` (seconds of all workers that live) and `last` (captures
+  /// that came last), each as far as there is something.
   nlohmann::ordered_json json() const;
 
  private:
@@ -32,13 +34,16 @@ class RunRecords {
     int count = 0;
     std::string first;  ///< "visit 3: /Assets/cup_2 moves at 0.6 m/s"
   };
-  void read_views(int captures);
+  void read_journals(int captures, bool has_views);
+  void read_times();
   void read_settling();
   void add_visit(const nlohmann::ordered_json& visit);
 
   std::filesystem::path folder_;
   std::set<int> counted_;  ///< Captures.
   ViewCounts views_;
+  std::map<std::string, double> stages_;
+  std::vector<int> last_;         ///< Captures, the last one first.
   std::set<std::string> visits_;  ///< Names of files.
   int resting_visits_ = 0;
   int falling_objects_ = 0;

@@ -136,6 +136,12 @@ class CocoDataset final : public StoredDataset {
     hold(tables_.has_cameras, {kHoldsCamera, kHoldsCameraPose});
     hold(tables_.has_amodal,
          {"amodal_mask", "occlusion_order", kHoldsOcclusion, kHoldsTruncation, kHoldsAmodalBoxes});
+    hold(tables_.has_keypoints, {kHoldsKeypoints});
+    for (const CocoPart& part : tables_.parts) {
+      for (const auto& [id, category] : part.categories) {
+        if (category.keypoint_count > 0) info_.skeletons.emplace(category.name, category.skeleton);
+      }
+    }
     note_clips(clips_of(page_), info_);
     // Boxes that people drew, and polygons, do not end at pixels.
     info_.steps[std::string(kHoldsTightBoxes)] = page_ ? 0.0 : 2.0;
@@ -202,6 +208,11 @@ class CocoImageReading : private FrameReading {
     finish(sources);
     if (entry_.panoptic.length > 0 && wanted_.contains(kInstanceId.name)) read_panoptic();
     return std::move(frame_);
+  }
+
+  /// By id of the object; what read() has found.
+  std::map<std::uint32_t, std::vector<StoredKeypoint>> take_keypoints() {
+    return std::move(keypoints_);
   }
 
  private:
@@ -281,7 +292,9 @@ class CocoImageReading : private FrameReading {
     } else if (wanted_.contains(kHoldsOcclusion) || wanted_.contains(kHoldsTruncation)) {
       read_shares(json, instance);
     }
-    if (category != part_.categories.end()) check_keypoints(json, who, category->second);
+    if (category != part_.categories.end()) {
+      read_keypoints(json, who, category->second, instance.id);
+    }
     check_crowd(json, part_.file, who, crowd_below_px());
     whos_.push_back(who);
     categories_.push_back(json.at("category_id").get<std::int64_t>());
@@ -407,7 +420,8 @@ class CocoImageReading : private FrameReading {
     instance.visibility = std::move(visibility);
   }
 
-  void check_keypoints(const Json& json, const std::string& who, const StoredCategory& category) {
+  void read_keypoints(const Json& json, const std::string& who, const StoredCategory& category,
+                      std::uint32_t id) {
     if (!json.contains("keypoints")) return;
     const auto numbers = json.at("keypoints").get<std::vector<double>>();
     files_.check(numbers.size() % 3 == 0, kReadable, part_.file, who,
@@ -422,6 +436,14 @@ class CocoImageReading : private FrameReading {
       const double flag = numbers[i + 2];
       files_.check(flag == 0.0 || flag == 1.0 || flag == 2.0, kKeypoints, part_.file, who,
                    "a keypoint's visibility is " + std::to_string(flag), "0, 1 or 2");
+      if (wanted_.contains(kHoldsKeypoints)) {
+        const Vec2 pixel(numbers[i], numbers[i + 1]);
+        const auto sight = flag == 2.0   ? StoredKeypoint::Sight::Seen
+                           : flag == 1.0 ? StoredKeypoint::Sight::Hidden
+                                         : StoredKeypoint::Sight::NotTold;
+        keypoints_[id].push_back(
+            {pixel, pixel.allFinite() ? sight : StoredKeypoint::Sight::NotTold});
+      }
       if (flag == 0.0) continue;
       ++count;
       extent.extend(Vec2(numbers[i], numbers[i + 1]));
@@ -624,6 +646,7 @@ class CocoImageReading : private FrameReading {
   std::vector<CoverageMask> masks_;
   std::vector<bool> has_mask_;
   std::vector<OccludedBy> occluded_by_;
+  std::map<std::uint32_t, std::vector<StoredKeypoint>> keypoints_;
 };
 
 StoredCapture CocoDataset::read(std::size_t i, const NameSet& wanted) const {
@@ -633,7 +656,11 @@ StoredCapture CocoDataset::read(std::size_t i, const NameSet& wanted) const {
       info_.captures.at(i), clips_of(page_), images,
       [&](const CocoImageEntry& entry, StoredCapture& stored, FrameSources& sources) {
         stored.split = tables_.parts[entry.part].split;
-        return CocoImageReading(*this, entry, wanted, stored.log).read(sources);
+        CocoImageReading reading(*this, entry, wanted, stored.log);
+        std::optional<Frame> frame = reading.read(sources);
+        const bool has_keypoints = wanted.contains(kHoldsKeypoints) && tables_.has_keypoints;
+        if (frame && has_keypoints) stored.keypoints.push_back(reading.take_keypoints());
+        return frame;
       });
 }
 

@@ -148,6 +148,7 @@ class TableReader {
       category.keypoint_count = points->size();
       category.has_cuboid_keypoints =
           points->size() == 9 && points->at(0) == "Center" && points->at(1) == "LDB";
+      category.skeleton = skeleton_of(json);
     }
     const std::int64_t id = json.at("id").get<std::int64_t>();
     const bool has_group = json.contains("supercategory") && json.at("supercategory") != "object";
@@ -158,6 +159,27 @@ class TableReader {
     }
     const bool is_new = part.categories.emplace(id, std::move(category)).second;
     files_.check(is_new, kOnce, part.file, "category " + std::to_string(id), "is listed twice");
+  }
+
+  /// Names that are none, and lines to points that are not there, are nobody's fault but left out.
+  static StoredSkeleton skeleton_of(const Json& category) {
+    StoredSkeleton skeleton;
+    for (const Json& name : category.at("keypoints")) {
+      skeleton.names.push_back(name.is_string() ? name.get<std::string>() : name.dump());
+    }
+    const auto count = std::int64_t(skeleton.names.size());
+    const Json lines = category.value("skeleton", Json::array());
+    const auto place = [&](const Json& number) {  // from 1
+      const bool is_one = number.is_number_integer() && number.get<std::int64_t>() >= 1 &&
+                          number.get<std::int64_t>() <= count;
+      return is_one ? number.get<int>() - 1 : -1;
+    };
+    for (const Json& line : lines) {
+      if (!line.is_array() || line.size() != 2) continue;
+      const std::pair ends(place(line[0]), place(line[1]));
+      if (ends.first >= 0 && ends.second >= 0) skeleton.lines.push_back(ends);
+    }
+    return skeleton;
   }
 
   void check_ids(const CocoPart& part) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "diorama/reader.h"
 #include "reader_support/dataset_page.h"
 #include "reader_support/json_elements.h"
 #include "reader_support/stored_files.h"
@@ -17,6 +18,7 @@ struct StoredCategory {
   std::string name;
   bool is_thing = true;  ///< Something that is counted; else a region.
   std::size_t keypoint_count = 0;
+  StoredSkeleton skeleton;
   bool has_cuboid_keypoints = false;  ///< Middle and corners of a 3-D box, as our writer has them.
 };
 

@@ -2,6 +2,7 @@
 #include "writer_yolo/yolo_reader.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <set>
 
@@ -11,6 +12,7 @@
 #include "reader_support/label_text.h"
 #include "reader_support/object_masks.h"
 #include "reader_support/picture_list.h"
+#include "writer_support/cuboid.h"
 #include "writer_yolo/data_yaml.h"
 #include "writer_yolo/polygon_parts.h"
 
@@ -21,7 +23,6 @@ namespace fs = std::filesystem;
 
 constexpr const char* kFormat = "YOLO";
 constexpr const char* kReproject = "pose and camera reproject onto the mask";
-constexpr std::size_t kCuboidPoints = 9;
 /// How many label files are looked at to tell rotated boxes from polygons of four points.
 constexpr std::size_t kSampledFiles = 64;
 /// Rounding of boxes that lie round objects, but not along their pixels.
@@ -214,12 +215,12 @@ class YoloDataset final : public StoredDataset {
       files.check(is_shape, kReadable, yaml_file_.empty() ? "data.yaml" : yaml_file_, "kpt_shape",
                   "is no number of points and of values each",
                   page_ ? "[9, 3]" : "for instance [17, 3]");
-      if (!is_shape) yaml_.kpt_shape = {int(kCuboidPoints), 3};
+      if (!is_shape) yaml_.kpt_shape = {kKeypointCount, 3};
       const Json names =
           page_ ? page_->conventions.value("keypoints", Json::array()) : Json::array();
       has_named_points_ = names.is_array() && !names.empty();
       if (has_named_points_) {
-        has_cuboid_points_ = names.size() == kCuboidPoints && names[0] == "Center";
+        has_cuboid_points_ = names.size() == std::size_t(kKeypointCount) && names[0] == "Center";
         const std::vector<int> shape{int(names.size()), 3};
         files.check(yaml_.kpt_shape == shape, kCounts, yaml_file_, "kpt_shape",
                     "is " + std::to_string(yaml_.kpt_shape[0]) + " points",
@@ -261,6 +262,10 @@ class YoloDataset final : public StoredDataset {
     info_.holds = {std::string(kColor.name), std::string(kHoldsInstances),
                    std::string(kHoldsLabels), std::string(kHoldsTightBoxes)};
     if (task_ == Task::Polygons) info_.holds.emplace(kInstanceId.name);
+    if (task_ == Task::Keypoints) {
+      info_.holds.emplace(kHoldsKeypoints);
+      info_.skeletons.emplace("", skeleton());
+    }
     // The extent of a rotated box reaches further than the pixels, a margin as far as one likes,
     // and people do not draw boxes along pixels.
     const bool is_loose = page_ && page_->conventions.value("box_margin", 0.0) > 0.0;
@@ -271,6 +276,26 @@ class YoloDataset final : public StoredDataset {
     const bool is_lossy = std::ranges::any_of(
         pictures_.all(), [](const ListedPicture& picture) { return picture.ending != ".png"; });
     if (is_lossy) info_.steps[std::string(kColor.name)] = 16.0;
+  }
+
+  /// The format has no lines; those of a box are known.
+  StoredSkeleton skeleton() const {
+    StoredSkeleton made;
+    const Json names = page_ ? page_->conventions.value("keypoints", Json::array()) : Json::array();
+    for (const Json& name : names) {
+      made.names.push_back(name.is_string() ? name.get<std::string>() : name.dump());
+    }
+    for (int a = 1; has_cuboid_points_ && a < kKeypointCount; ++a) {
+      for (int b = a + 1; b < kKeypointCount; ++b) {
+        const auto& one = kCuboidKeypoints[std::size_t(a)].side;
+        const auto& other = kCuboidKeypoints[std::size_t(b)].side;
+        const int same = int(std::ranges::count_if(std::array{0, 1, 2}, [&](int axis) {
+          return one[std::size_t(axis)] == other[std::size_t(axis)];
+        }));
+        if (same == 2) made.lines.emplace_back(a, b);
+      }
+    }
+    return made;
   }
 
   friend class YoloPictureReading;
@@ -321,6 +346,11 @@ class YoloPictureReading : private FrameReading {
     return std::move(frame_);
   }
 
+  /// By id of the object; what read() has found.
+  std::map<std::uint32_t, std::vector<StoredKeypoint>> take_keypoints() {
+    return std::move(keypoints_);
+  }
+
  private:
   void read_lines(const std::string& text) {
     if (dataset_.page_ && !text.empty()) {
@@ -356,6 +386,7 @@ class YoloPictureReading : private FrameReading {
       if (dataset_.task_ == Task::Keypoints && dataset_.has_named_points_) {
         check_keypoints(numbers, who);
       }
+      if (wants(kHoldsKeypoints)) keypoints_[instance.id] = keypoints_of(numbers);
       masks_.emplace_back();
     } else {
       add_polygon(numbers, who, instance);
@@ -488,6 +519,24 @@ class YoloPictureReading : private FrameReading {
     return Vec2(numbers[at] * frame_.camera.width, numbers[at + 1] * frame_.camera.height);
   }
 
+  /// Two numbers of a point are a place alone; 0, 0 is nowhere.
+  std::vector<StoredKeypoint> keypoints_of(const std::vector<double>& numbers) const {
+    using Sight = StoredKeypoint::Sight;
+    const std::size_t values = std::size_t(dataset_.yaml_.kpt_shape[1]);
+    std::vector<StoredKeypoint> points;
+    for (std::size_t at = 4; at + values <= numbers.size(); at += values) {
+      const Vec2 share(numbers[at], numbers[at + 1]);
+      Sight sight = share.isZero() ? Sight::NotTold : Sight::Seen;
+      if (values == 3) {
+        const double flag = numbers[at + 2];
+        sight = flag == 2.0 ? Sight::Seen : flag == 1.0 ? Sight::Hidden : Sight::NotTold;
+      }
+      points.push_back(
+          {share.cwiseProduct(Vec2(frame_.camera.width, frame_.camera.height)), sight});
+    }
+    return points;
+  }
+
   void check_keypoints(const std::vector<double>& numbers, const std::string& who) {
     Eigen::AlignedBox2d corners;
     std::size_t seen = 0;
@@ -504,7 +553,7 @@ class YoloPictureReading : private FrameReading {
       }
     }
     if (!dataset_.has_cuboid_points_) return;
-    if (seen == kCuboidPoints) check_surrounded(numbers, corners, who);
+    if (seen == std::size_t(kKeypointCount)) check_surrounded(numbers, corners, who);
     check_diagonals(numbers, who);
   }
 
@@ -564,6 +613,7 @@ class YoloPictureReading : private FrameReading {
   const PictureFolder& folder_;
   std::string labels_;
   std::vector<CoverageMask> masks_;  ///< Of each instance; without bits for boxes.
+  std::map<std::uint32_t, std::vector<StoredKeypoint>> keypoints_;
 };
 
 StoredCapture YoloDataset::read(std::size_t i, const NameSet& wanted) const {
@@ -571,7 +621,12 @@ StoredCapture YoloDataset::read(std::size_t i, const NameSet& wanted) const {
       info_.captures.at(i), clips_of(page_), pictures_.pictures(i),
       [&](const ListedPicture& picture, StoredCapture& stored, FrameSources& sources) {
         stored.split = folders_[picture.folder].split;
-        return YoloPictureReading(*this, picture, wanted, stored.log).read(sources);
+        YoloPictureReading reading(*this, picture, wanted, stored.log);
+        std::optional<Frame> frame = reading.read(sources);
+        const bool has_keypoints =
+            wanted.contains(kHoldsKeypoints) && info_.holds.contains(kHoldsKeypoints);
+        if (frame && has_keypoints) stored.keypoints.push_back(reading.take_keypoints());
+        return frame;
       });
 }
 

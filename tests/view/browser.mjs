@@ -22,6 +22,10 @@ const address = await new Promise((resolve, reject) => {
   });
   server.on('exit', (code) => reject(new Error(`view ended with ${code}`)));
 });
+// Nobody asks this one.
+const idle = spawn(program, [...(process.env.DIORAMA_OPTIONS ?? '').split(' ').filter(Boolean), 'view', dataset, '--no-browser', '--idle-minutes', '1'],
+  { stdio: 'ignore' });
+const idleEnd = new Promise((resolve) => idle.on('exit', resolve));
 const browser = await chromium.launch({ executablePath: '/usr/bin/chromium', args: ['--no-sandbox'] });
 const faults = [];
 async function newPage(scheme = 'light') {
@@ -38,6 +42,79 @@ async function newPage(scheme = 'light') {
     void dialog.dismiss();
   });
   return page;
+}
+
+const hashOf = (page) => page.evaluate(() => location.hash);
+const captureOf = async (page) => Number(/#\/capture\/(\d+)/.exec(await hashOf(page))[1]);
+
+/** Clips play, by key and button, at speeds, and stand in the address. */
+async function tryClip(page, drawn) {
+  const time = () => page.textContent('.player .time');
+  const frameNow = async () => Number(/frame (\d+) of/.exec(await time())[1]);
+  await page.keyboard.press('Home');
+  await page.waitForTimeout(300);
+  check((await frameNow()) === 1, 'home is the first frame of the clip');
+  const still = await drawn();
+  await page.keyboard.press(' ');
+  await page.waitForTimeout(2500);
+  check((await hashOf(page)).includes('play=1'), 'playing stands in the address');
+  const moving = await frameNow();
+  await page.screenshot({ path: `${pictures}/clip_playing.png` });
+  await page.keyboard.press(' ');
+  const stopped = await frameNow();
+  check(moving > 1 && stopped > 1 && (await drawn()) !== still, `space plays (frame ${moving}) and stops (frame ${stopped})`);
+  check(!(await hashOf(page)).includes('play=1') && (await captureOf(page)) > 0, 'a clip that has stopped stands in the address with its frame');
+  await page.waitForTimeout(400);
+  check((await frameNow()) === stopped, 'and stays there');
+  await page.keyboard.press(',');
+  await page.waitForTimeout(200);
+  check((await frameNow()) === stopped - 1, 'comma goes one frame back');
+  await page.keyboard.press('.');
+  await page.waitForTimeout(200);
+  check((await frameNow()) === stopped, 'the full stop one on');
+  await page.click('.player button[aria-label=Play]');
+  await page.waitForTimeout(600);
+  await page.click('.player button[aria-label=Pause]');
+  check((await frameNow()) !== stopped, 'the buttons play and stop it, too');
+  // The second time it comes from the page's own store, at the speed of the clip.
+  const passed = async (ms) => {
+    await page.keyboard.press('Home');
+    await page.waitForTimeout(200);
+    await page.keyboard.press(' ');
+    await page.waitForTimeout(ms);
+    const frame = await frameNow();
+    await page.keyboard.press(' ');
+    await page.waitForTimeout(150);
+    return frame - 1;
+  };
+  await passed(2500);
+  const usual = await passed(600);
+  await page.keyboard.press('<');
+  await page.keyboard.press('<');
+  check((await hashOf(page)).includes('speed=0.25'), 'the speed stands in the address');
+  const slow = await passed(600);
+  check(slow > 0 && slow < usual * 0.5, `0.6 s are ${usual} frames, at a quarter of the speed ${slow}`);
+  await page.selectOption('.player select', '2');
+  check((await hashOf(page)).includes('speed=2'), 'and is chosen from a list');
+  await page.selectOption('.player select', '1');
+  await page.locator('.player input[type=range]').evaluate((input) => {
+    input.value = '2';
+    input.dispatchEvent(new Event('input'));
+  });
+  await page.waitForTimeout(300);
+  check((await frameNow()) === 3, 'the slider goes to a frame');
+  await page.screenshot({ path: `${pictures}/clip.png` });
+  const address = page.url();
+  await page.reload();
+  await page.waitForSelector('.player:not([hidden])');
+  await page.waitForTimeout(400);
+  check((await frameNow()) === 3 && page.url() === address, 'its address opens at that frame');
+  await page.goto(address + (address.includes('?') ? '&' : '?') + 'play=1');
+  await page.waitForTimeout(1200);
+  check((await frameNow()) !== 3, 'an address that plays begins to play');
+  await page.keyboard.press(' ');
+  await page.keyboard.press('Home');
+  await page.waitForTimeout(300);
 }
 
 try {
@@ -79,6 +156,32 @@ try {
   await same.close();
   await page.screenshot({ path: `${pictures}/grid_filtered.png` });
   await page.getByRole('button', { name: 'Clear all filters' }).first().click();
+  const titles = await page.locator('.facets section h3').evaluateAll((heads) => heads.map((head) => head.firstChild.textContent));
+  console.log(`       facets: ${titles.join(', ')}`);
+  const number = async () => Number((await page.textContent('.total b')).replaceAll(',', ''));
+  for (const section of await page.locator('.facets section:has(svg.bars)').all()) {
+    const title = await section.locator('h3').evaluate((head) => head.firstChild.textContent);
+    const bars = await section.locator('svg.bars').boundingBox();
+    await section.scrollIntoViewIfNeeded();
+    const place = await section.locator('svg.bars').boundingBox();
+    await page.mouse.move(place.x + 2, place.y + bars.height / 2);
+    await page.mouse.down();
+    await page.mouse.move(place.x + bars.width * 0.45, place.y + bars.height / 2, { steps: 4 });
+    await page.mouse.up();
+    const left = await number();
+    check((await hashOf(page)).includes('f.') && left <= Number(total.replaceAll(',', '')), `dragging filters by "${title}" (${left})`);
+    await page.getByRole('button', { name: 'Clear all filters' }).first().click();
+  }
+  if (process.env.DIORAMA_VIEW_LINT !== 'no') {
+    const lint = page.locator('.facets section', { hasText: 'Findings of lint' });
+    await lint.getByRole('button', { name: 'Check the dataset' }).click();
+    await lint.locator('.name').first().waitFor({ timeout: 300000 });
+    const most = await lint.locator('.name').count();
+    await lint.locator('.name').nth(most - 1).click();
+    check((await hashOf(page)).includes('f.lint') && (await number()) > 0, `findings of lint filter (${await number()})`);
+    await page.screenshot({ path: `${pictures}/grid_lint.png` });
+    await page.getByRole('button', { name: 'Clear all filters' }).first().click();
+  }
 
   await page.locator('.card a.picture').first().click();
   await page.waitForSelector('.capture .objects .object');
@@ -91,6 +194,11 @@ try {
   await page.waitForTimeout(300);
   const probe = await page.textContent('.capture:not([hidden]) .probe');
   check(/pixel \d+, \d+/.test(probe), `the probe speaks: ${probe}`);
+  await page.locator('.capture:not([hidden]) canvas.big').focus();
+  await page.mouse.wheel(0, -2400);
+  await page.waitForTimeout(300);
+  await page.screenshot({ path: `${pictures}/capture_pixels.png` });
+  await page.keyboard.press('0');
   await page.screenshot({ path: `${pictures}/capture.png` });
   await page.keyboard.press('m');
   await page.waitForTimeout(500);
@@ -104,6 +212,44 @@ try {
   await page.waitForTimeout(600);
   await page.screenshot({ path: `${pictures}/capture_depth.png` });
   await page.keyboard.press('d');
+  // Every overlay that the dataset has changes the picture, by its key and by its button.
+  const canvas = page.locator('.capture:not([hidden]) canvas.big');
+  const drawn = async () => {
+    await page.waitForTimeout(350);
+    return canvas.evaluate((element) => element.toDataURL());
+  };
+  await page.keyboard.press('Escape');
+  // The first frame of a clip has no flow back.
+  await page.keyboard.press('ArrowRight');
+  await page.waitForTimeout(300);
+  const layers = await page.locator('.tools button[data-tool]:not([data-tool=colour])').evaluateAll((buttons) =>
+    buttons.map((button) => ({ layer: button.dataset.tool, key: button.querySelector('kbd').textContent })));
+  for (const { layer, key } of layers) {
+    if ((await page.getAttribute(`[data-tool="${layer}"]`, 'aria-pressed')) === 'true') await page.keyboard.press(key);
+  }
+  const bare = await drawn();
+  for (const { layer, key } of layers) {
+    await page.keyboard.press(key);
+    let over = await drawn();
+    for (let wait = 0; over === bare && wait < 12; ++wait) over = await drawn();
+    await page.screenshot({ path: `${pictures}/layer_${layer}.png` });
+    await page.click(`[data-tool="${layer}"]`);
+    check(over !== bare && (await drawn()) === bare, `overlay ${layer}: by key ${key} and by button`);
+  }
+  await page.keyboard.press('b');
+  const byClass = await drawn();
+  await page.keyboard.press('i');
+  check((await drawn()) !== byClass && (await page.evaluate(() => location.hash)).includes('colour=instance'), 'colours by instance');
+  await page.keyboard.press('i');
+  if (layers.some(({ layer }) => layer === 'mask')) {
+    await page.keyboard.press('m');
+    const strong = await drawn();
+    for (let i = 0; i < 4; ++i) await page.keyboard.press('[');
+    check((await drawn()) !== strong && (await page.evaluate(() => location.hash)).includes('opacity=20'), 'opacity');
+    for (let i = 0; i < 4; ++i) await page.keyboard.press(']');
+    await page.keyboard.press('m');
+  }
+  if (await page.locator('.player:not([hidden])').count()) await tryClip(page, drawn);
   const before = page.url();
   await page.keyboard.press('ArrowRight');
   await page.waitForTimeout(400);
@@ -119,6 +265,18 @@ try {
     await page.waitForTimeout(700);
     await page.screenshot({ path: `${pictures}/space.png` });
     check(await page.locator('canvas.space').isVisible(), 'the 3-D view opens');
+    check((await hashOf(page)).includes('space=1'), 'and stands in the address');
+    // From a place in space back to the object, or the camera, that lies there.
+    const space = await page.locator('canvas.space').boundingBox();
+    const here = await hashOf(page);
+    let jumped = false;
+    for (let y = 1; y < 12 && !jumped; ++y) {
+      for (let x = 1; x < 12 && !jumped; ++x) {
+        await page.mouse.click(space.x + (space.width * x) / 12, space.y + (space.height * y) / 12);
+        jumped = (await hashOf(page)) !== here;
+      }
+    }
+    check(jumped, 'a click in space goes to what is there');
     await page.keyboard.press('s');
   }
   await page.keyboard.press('?');
@@ -133,8 +291,7 @@ try {
   await page.screenshot({ path: `${pictures}/stats.png` });
   await page.screenshot({ path: `${pictures}/stats_full.png`, fullPage: true });
   if (process.env.DIORAMA_VIEW_LINT !== 'no') {
-    await page.getByRole('button', { name: 'Findings' }).click();
-    await page.getByRole('button', { name: 'Check the dataset' }).click();
+    await page.getByRole('button', { name: 'Findings', exact: true }).click();
     await page.waitForSelector('.page:not([hidden]) .good, .page:not([hidden]) .bad', { timeout: 300000 });
     await page.screenshot({ path: `${pictures}/findings.png` });
   }
@@ -203,10 +360,25 @@ try {
     await files.keyboard.press('m');
     await files.waitForTimeout(700);
     await files.screenshot({ path: `${pictures}/report.png` });
+    if (await files.locator('.player:not([hidden])').count()) {
+      const time = () => files.textContent('.player .time');
+      const before = await time();
+      await files.keyboard.press(' ');
+      await files.waitForTimeout(1500);
+      check((await time()) !== before, 'clips play in a report');
+      await files.keyboard.press(' ');
+    }
+    if (await files.locator('[data-tool=point]').count()) {
+      await files.keyboard.press('k');
+      await files.waitForTimeout(300);
+      await files.screenshot({ path: `${pictures}/report_keypoints.png` });
+    }
     await files.getByRole('button', { name: 'Statistics' }).click();
     await files.waitForSelector('.page table');
     check(true, 'a report opens without a server');
   }
+  const code = await Promise.race([idleEnd, new Promise((resolve) => setTimeout(() => resolve('none'), 70000))]);
+  check(code === 0, `what nobody asks ends by itself (exit code ${code})`);
   check(faults.length === 0, 'no fault in the page' + (faults.length ? ': ' + [...new Set(faults)].join(' | ') : ''));
 } catch (error) {
   check(false, error.message);
@@ -215,5 +387,6 @@ try {
   await browser.close();
   server.removeAllListeners('exit');
   server.kill('SIGTERM');
+  idle.kill('SIGTERM');
 }
 process.exit(failures === 0 ? 0 : 1);

@@ -2,14 +2,23 @@
 # SPDX-License-Identifier: Apache-2.0
 # Tries the page of `diorama view` in Chromium (Debian's, with Playwright from npm), and leaves pictures to
 # look at: tests/view/browser.sh PROGRAM DATASET PICTURES [OTHER], which is compared with it. Not part of the tests that ctest runs.
+# tests/view/browser.sh --speed PROGRAM DATASET measures instead; make_coco.py makes large datasets.
+# tests/view/browser.sh --run PROGRAM JOB PICTURES watches a run that goes on.
 set -euo pipefail
-program=$(realpath "$1") dataset=$(realpath "$2") pictures=$(realpath -m "$3")
+script=browser
+case $1 in --speed) script=speed ;; --run) script=live ;; esac
+if [[ $script != browser ]]; then shift; fi
+program=$(realpath "$1") dataset=$(realpath "$2") pictures=$(realpath -m "${3:-.}")
 other=${4:+$(realpath "$4")}
 here=$(cd "$(dirname "$0")" && pwd)
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-cp "$here/browser.mjs" "$work"
+cp "$here/$script.mjs" "$work"
 (cd "$work" && npm init --yes >npm.log && npm install playwright-core@1 >>npm.log 2>&1) || { cat "$work/npm.log"; exit 1; }
-# shellcheck disable=SC2086
-"$program" ${DIORAMA_OPTIONS:-} report "$dataset" -o "$work/report" --captures 5
-node "$work/browser.mjs" "$program" "$dataset" "$pictures" "$work/report" ${other:+"$other"}
+if [[ $script == browser ]]; then
+  # shellcheck disable=SC2086
+  "$program" ${DIORAMA_OPTIONS:-} report "$dataset" -o "$work/report" --captures 20
+  node "$work/browser.mjs" "$program" "$dataset" "$pictures" "$work/report" ${other:+"$other"}
+else
+  node "$work/$script.mjs" "$program" "$dataset" "$pictures" "$work"
+fi

@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "diorama/component.h"
@@ -44,6 +45,7 @@ inline constexpr std::string_view kHoldsClips = "clips";            ///< Capture
 inline constexpr std::string_view kHoldsVelocities = "velocities";  ///< Instance::velocity.
 inline constexpr std::string_view kHoldsJoints = "joints";          ///< Frame::joints.
 inline constexpr std::string_view kHoldsLeafPaths = "leaf_paths";   ///< Frame::leaf_paths.
+inline constexpr std::string_view kHoldsKeypoints = "keypoints";    ///< StoredCapture::keypoints.
 
 /// Something about a dataset that cannot be right.
 struct Finding {
@@ -67,6 +69,19 @@ struct DIORAMA_SDK_API ReadLog {
   void add(ReadLog&& more);
 };
 
+/// A keypoint in a picture.
+struct StoredKeypoint {
+  enum class Sight : std::uint8_t { NotTold, Hidden, Seen };
+  Vec2 pixel = Vec2::Zero();  ///< From the picture's upper left corner; x right, y down.
+  Sight sight = Sight::NotTold;
+};
+
+/// The keypoints that objects of a class have.
+struct StoredSkeleton {
+  std::vector<std::string> names;          ///< In the format's order; empty: it names none.
+  std::vector<std::pair<int, int>> lines;  ///< Places of keypoints that a line joins.
+};
+
 /// What is the same for all captures of a stored dataset.
 struct StoredInfo {
   std::string format;  ///< For people: "COCO".
@@ -79,6 +94,8 @@ struct StoredInfo {
   /// To what the format rounds, by name of what is held: metres, pixels, shares; 0 when absent. Of
   /// pictures with loss: how far they may be off in the mean, of 255.
   std::map<std::string, double, std::less<>> steps;
+  /// By label "class"; "" is for those of all others.
+  std::map<std::string, StoredSkeleton, std::less<>> skeletons;
 };
 
 /// A capture as it was read.
@@ -88,6 +105,8 @@ struct StoredCapture {
   std::string split;  ///< "train", "val" ...; empty: the format has none.
   /// Per frame: the file in which each thing that it holds stands.
   std::vector<std::map<std::string, std::string, std::less<>>> files;
+  /// Per frame, by Instance::id, in the order of the skeleton; empty when there are none.
+  std::vector<std::map<std::uint32_t, std::vector<StoredKeypoint>>> keypoints;
   ReadLog log;
 };
 

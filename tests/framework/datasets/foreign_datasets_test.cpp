@@ -75,6 +75,49 @@ TEST_CASE("COCO as its own tools have it: polygons, crowds, overlaps, split fold
   CHECK(opened.read(1).capture.frames.at(0).instances.empty());
 }
 
+TEST_CASE("Keypoints of COCO and YOLO, with the lines between them", "[readers]") {
+  using Sight = StoredKeypoint::Sight;
+  const NameSet wanted{std::string(kHoldsKeypoints)};
+  const test::TemporaryFolder coco;
+  coco.write("images/a.png", picture(20, 20, 9, ImageFormat::Png));
+  coco.write("annotations/instances_val.json", R"({
+    "images": [{"id": 1, "file_name": "a.png", "width": 20, "height": 20}],
+    "annotations": [{"id": 5, "image_id": 1, "category_id": 1, "bbox": [2, 2, 9, 9], "area": 81, "iscrowd": 0,
+                     "keypoints": [3.5, 4, 2, 9, 10, 1, 0, 0, 0], "num_keypoints": 2}],
+    "categories": [{"id": 1, "name": "person", "keypoints": ["nose", "hand", "foot"],
+                    "skeleton": [[1, 2], [2, 3], [3, 4], [0, 1], "x", [1]]}]})");
+  {
+    const Opened opened(coco, "CocoReader");
+    CHECK(opened.holds(kHoldsKeypoints));
+    const StoredSkeleton& skeleton = opened.dataset->info().skeletons.at("person");
+    CHECK(skeleton.names == std::vector<std::string>{"nose", "hand", "foot"});
+    // Points are counted from 1; what is no line is left out.
+    CHECK(skeleton.lines == std::vector<std::pair<int, int>>{{0, 1}, {1, 2}});
+    const StoredCapture capture = opened.dataset->read(0, wanted);
+    const auto& points =
+        capture.keypoints.at(0).at(capture.capture.frames.at(0).instances.at(0).id);
+    REQUIRE(points.size() == 3);
+    CHECK(points[0].pixel == Vec2(3.5, 4.0));
+    CHECK(points[0].sight == Sight::Seen);
+    CHECK(points[1].sight == Sight::Hidden);
+    CHECK(points[2].sight == Sight::NotTold);
+    CHECK(opened.dataset->read(0, {}).keypoints.empty());
+  }
+  const test::TemporaryFolder yolo;
+  yolo.write("data.yaml", "train: images/train\nnames: [person]\nkpt_shape: [2, 2]\n");
+  yolo.write("images/train/a.png", picture(20, 10, 9, ImageFormat::Png));
+  yolo.write("labels/train/a.txt", "0 0.5 0.5 0.4 0.4 0.5 0.6 0 0\n");
+  const Opened opened(yolo, "YoloReader");
+  CHECK(opened.holds(kHoldsKeypoints));
+  CHECK(opened.dataset->info().skeletons.at("").lines.empty());
+  const StoredCapture capture = opened.dataset->read(0, wanted);
+  const auto& points = capture.keypoints.at(0).begin()->second;
+  REQUIRE(points.size() == 2);
+  CHECK(points[0].pixel.isApprox(Vec2(10.0, 6.0)));
+  CHECK(points[0].sight == Sight::Seen);
+  CHECK(points[1].sight == Sight::NotTold);
+}
+
 TEST_CASE("COCO masks that overlap are boxes still, but no picture of ids", "[readers]") {
   const test::TemporaryFolder folder;
   folder.write("images/a.png", picture(20, 20, 9, ImageFormat::Png));

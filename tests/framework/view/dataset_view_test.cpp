@@ -14,6 +14,7 @@
 
 #include "diorama/error.h"
 #include "framework/lint/encoding_host.h"
+#include "framework/output/journal.h"
 #include "framework/view/byte_cache.h"
 #include "framework/view/index_cache.h"
 #include "framework/view/report.h"
@@ -37,11 +38,13 @@ class HostileDataset final : public StoredDataset {
     info_.camera_names = {kHostile};
     info_.captures = {3, 7, is_changed ? 11 : 9};
     for (const std::string_view name :
-         {kColor.name, kInstanceId.name, kDistanceToImagePlane.name, kNormals.name, kHoldsInstances,
+         {kColor.name, kInstanceId.name, kDistanceToImagePlane.name, kNormals.name,
+          kFlowForward.name, kFlowForwardState.name, kHoldsKeypoints, kHoldsClips, kHoldsInstances,
           kHoldsLabels, kHoldsTightBoxes, kHoldsPoses, kHoldsBoxes3d, kHoldsOcclusion, kHoldsCamera,
           kHoldsCameraPose}) {
       info_.holds.emplace(name);
     }
+    info_.skeletons[kHostile] = {{kHostile, "tip"}, {{0, 1}}};
   }
   const StoredInfo& info() const override { return info_; }
   const ReadLog& log() const override { return log_; }
@@ -51,6 +54,7 @@ class HostileDataset final : public StoredDataset {
     stored.capture.index = info_.captures[i];
     stored.capture.phase = kHostile;
     stored.split = i == 0 ? "val" : "train";
+    if (i > 0) stored.capture.clip = ClipFrame{5, int(i) - 1, 2, 25.0};
     Frame frame;
     frame.camera_name = kHostile;
     frame.camera.width = 6;
@@ -86,7 +90,22 @@ class HostileDataset final : public StoredDataset {
       depth.at(0, 0) = std::numeric_limits<float>::infinity();
       frame.set(kDistanceToImagePlane, std::move(depth));
     }
+    if (wanted.contains(kFlowForward.name)) {
+      Image<Vec2f> flow(6, 4, Vec2f(-300.5F, 0.25F));
+      flow.at(1, 0) = Vec2f(-1e9F, 1e9F);
+      frame.set(kFlowForward, std::move(flow));
+      Image<std::uint32_t> states(6, 4, std::uint32_t(FlowState::Seen));
+      states.at(2, 0) = std::uint32_t(FlowState::Hidden);
+      frame.set(kFlowForwardState, std::move(states));
+    }
     stored.capture.frames.push_back(std::move(frame));
+    if (wanted.contains(kHoldsKeypoints)) {
+      using Sight = StoredKeypoint::Sight;
+      stored.keypoints.push_back({{0x123456U,
+                                   {{Vec2(1.256, 2.0), Sight::Seen},
+                                    {Vec2(5.0, 3.0), Sight::Hidden},
+                                    {Vec2(std::nan(""), 9.0), Sight::NotTold}}}});
+    }
     return stored;
   }
 
@@ -402,10 +421,61 @@ TEST_CASE("Two datasets are compared as a whole and capture by capture", "[view]
   }
 }
 
+TEST_CASE("A run that goes on is shown before it has anything that could be read", "[view]") {
+  test::TemporaryFolder folder;
+  test::EncodingHost host;
+  DatasetReaders readers{
+      {{"hostile", {"mark.txt"}, [] { return std::make_unique<HostileReader>(); }}}};
+  CHECK_THROWS_AS(DatasetView({.folder = folder.path("")}, readers, host), Error);
+  folder.write("dataset.json", R"({"captures": 3, "job": "", "writers": []})");
+  DatasetView view({.folder = folder.path("")}, readers, host);
+  const auto json = [&](const std::string& path) { return Json::parse(*view.answer(path).body); };
+  CHECK(json("/api/state")["datasets"].empty());
+  CHECK(json("/api/state")["is_finished"] == false);
+  CHECK(json("/api/run")["captures"] == 3);
+  CHECK(view.answer("/api/0/info").status == 404);
+  folder.write("hostile/mark.txt", "");
+  LocalFileSystem file_system;
+  file_system.make_folders(folder.path(".diorama/journal"));
+  JournalWriter writer(file_system, folder.path(".diorama/journal"), "one", ".");
+  writer.commit(0, {});
+  writer.published(0);
+  view.work();
+  CHECK(json("/api/state")["datasets"].size() == 1);
+  CHECK(json("/api/state")["generation"] == 1);
+  CHECK(json("/api/run")["last"] == Json({0}));
+}
+
+TEST_CASE("Clips, keypoints and flow reach the page", "[view]") {
+  Viewed viewed;
+  const Json info = viewed.json("/api/0/info");
+  CHECK(info["skeletons"][kHostile] == Json({{"names", {kHostile, "tip"}}, {"lines", {{0, 1}}}}));
+  CHECK_FALSE(viewed.json("/api/0/capture/3").contains("clip"));
+  const Json capture = viewed.json("/api/0/capture/9");
+  CHECK(capture["clip"] == Json({{"clip", 5}, {"frame", 1}, {"frames", 2}, {"fps", 25.0}}));
+  CHECK(capture["frames"][0]["objects"][0]["keypoints"] ==
+        Json::parse("[[1.26, 2.0, 2], [5.0, 3.0, 1], [0.0, 0.0, 0]]"));
+  while (viewed.view->work()) {
+  }
+  CHECK(viewed.json("/api/0/index/0")["columns"]["clip"] == Json({CaptureIndex::kUnknown, 5, 5}));
+
+  // x above and y below in steps of 1/256 from -8192, the state in the highest bits of x.
+  const auto number = [&](int x, int y) {
+    const Rgba8 rgb = viewed.pixel("/api/0/capture/3/0/flow_forward", x, y);
+    return unsigned(rgb[0]) | unsigned(rgb[1]) << 8 | unsigned(rgb[2]) << 16;
+  };
+  CHECK(number(0, 0) == unsigned((8192.0 - 300.5) * 256));
+  CHECK(number(0, 4) == unsigned((8192.0 + 0.25) * 256));
+  CHECK(number(2, 0) == (unsigned((8192.0 - 300.5) * 256) | 1U << 22));
+  CHECK(number(1, 0) == 0);
+  CHECK(number(1, 4) == 4194303U);
+  CHECK(viewed.answer("/api/0/capture/3/0/flow_backward").status == 404);
+}
+
 TEST_CASE("A report is the same as files, whose names no text of the dataset makes", "[view]") {
   Viewed viewed(2);
   const std::filesystem::path out = viewed.folder.path("report");
-  const ReportSize size = write_report(*viewed.view, out);
+  const ReportSize size = write_report(*viewed.view, out, false);
   CHECK(size.captures == 2);
   const auto read = [&](const std::string& name) {
     std::ifstream stream(out / name, std::ios::binary);
@@ -416,13 +486,28 @@ TEST_CASE("A report is the same as files, whose names no text of the dataset mak
   CHECK(capture.starts_with("diorama_data('/api/0/capture/3',{"));
   CHECK(read("data/0_capture_3_0_ids.js").find("'data:image/png;base64,iVBOR") !=
         std::string::npos);
+  // What it lacks its page does not ask for.
+  const auto holds = [&](const std::filesystem::path& report, const char* name) {
+    std::ifstream stream(report / "data" / "0_info.js", std::ios::binary);
+    const std::string text(std::istreambuf_iterator<char>(stream), {});
+    return text.find("\"" + std::string(name) + "\"") != text.npos;
+  };
+  CHECK(holds(out, "instance_id"));
+  CHECK_FALSE(holds(out, "distance_to_image_plane"));
+  CHECK_FALSE(std::filesystem::exists(out / "data" / "0_capture_3_0_depth.js"));
+  const std::filesystem::path whole = viewed.folder.path("whole");
+  write_report(*viewed.view, whole, true);
+  CHECK(holds(whole, "flow_forward"));
+  for (const char* kind : {"depth", "flow_forward"}) {
+    CHECK(std::filesystem::exists(whole / "data" / ("0_capture_3_0_" + std::string(kind) + ".js")));
+  }
   CHECK(read("data/0_stats.js").find("\"captures\": 3") != std::string::npos);
   for (const auto& entry : std::filesystem::recursive_directory_iterator(out)) {
     const std::string name = entry.path().filename().string();
     INFO(name);
     CHECK(name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_.") == name.npos);
   }
-  CHECK_THROWS_WITH(write_report(*viewed.view, out), ContainsSubstring("is not empty"));
+  CHECK_THROWS_WITH(write_report(*viewed.view, out, false), ContainsSubstring("is not empty"));
 }
 
 TEST_CASE("What was not asked for the longest leaves a full cache", "[view]") {

@@ -24,14 +24,21 @@ namespace {
 /// A connection that says what it likes.
 class RawSocket {
  public:
-  explicit RawSocket(int port) : socket_(socket(AF_INET, SOCK_STREAM, 0)) {
+  explicit RawSocket(int port) : RawSocket(Family{AF_INET}) {
     sockaddr_in address{};
     address.sin_family = AF_INET;
     address.sin_port = htons(static_cast<std::uint16_t>(port));
     address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    const timeval patience{20, 0};
-    setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
-    REQUIRE(connect(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0);
+    REQUIRE(connect_to(&address, sizeof address));
+  }
+  /// By ::1; empty on machines without IPv6.
+  static std::unique_ptr<RawSocket> by_ipv6(int port) {
+    std::unique_ptr<RawSocket> made(new RawSocket(Family{AF_INET6}));
+    sockaddr_in6 address{};
+    address.sin6_family = AF_INET6;
+    address.sin6_port = htons(static_cast<std::uint16_t>(port));
+    address.sin6_addr = in6addr_loopback;
+    return made->connect_to(&address, sizeof address) ? std::move(made) : nullptr;
   }
   ~RawSocket() { close(socket_); }
   RawSocket(const RawSocket&) = delete;
@@ -60,6 +67,17 @@ class RawSocket {
   }
 
  private:
+  struct Family {
+    int number;
+  };
+  explicit RawSocket(Family family) : socket_(socket(family.number, SOCK_STREAM, 0)) {
+    const timeval patience{20, 0};
+    setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+  }
+  bool connect_to(const void* address, socklen_t size) const {
+    return connect(socket_, static_cast<const sockaddr*>(address), size) == 0;
+  }
+
   int socket_;
 };
 
@@ -250,6 +268,14 @@ TEST_CASE("It listens on loopback addresses and nowhere else", "[view]") {
     }
   }
   CHECK(listening >= 1);
+  // Browsers may take ::1 for localhost: the same rules hold there.
+  for (const auto& [headers, status] : {std::pair(std::string(), 403), {served.cookie, 200}}) {
+    const auto by_ipv6 = RawSocket::by_ipv6(served.server.port());
+    CHECK((listening == 2) == (by_ipv6 != nullptr));
+    if (!by_ipv6) break;
+    by_ipv6->send("GET /a HTTP/1.1\r\nHost: [::1]\r\n" + headers + "\r\n");
+    CHECK(has_status(by_ipv6->read_header(), status));
+  }
   HttpServer::Options taken;
   taken.port = served.server.port();
   CHECK_THROWS_WITH(HttpServer(taken, [](std::string_view) { return HttpAnswer(); }),

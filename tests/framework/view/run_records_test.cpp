@@ -56,6 +56,28 @@ TEST_CASE("Refused views are counted once per capture, as captures come", "[view
                     R"("unmet":1})"));
 }
 
+TEST_CASE("The last captures of all workers, and where their time goes", "[view]") {
+  test::TemporaryFolder folder;
+  LocalFileSystem file_system;
+  file_system.make_folders(folder.path(".diorama/journal"));
+  JournalWriter one(file_system, folder.path(".diorama/journal"), "one", ".");
+  JournalWriter two(file_system, folder.path(".diorama/journal"), "two", ".");
+  for (const int capture : {0, 1, 2}) {
+    one.commit(capture, {});
+    one.published(capture);
+  }
+  two.commit(7, {});
+  two.published(7);
+  two.commit(8, {});
+  folder.write(".diorama/stage/one/times.json", R"({"rendering": 2.5, "loading": 1})");
+  folder.write(".diorama/stage/two/times.json", R"({"rendering": 0.5, "x": "y"})");
+  folder.write(".diorama/stage/three/times.json", R"({"rendering": )");
+  RunRecords records(folder.path(""));
+  records.refresh(10, false);
+  CHECK(records.json()["last"] == Json({2, 7, 1, 0}));
+  CHECK(records.json()["stages"] == Json::parse(R"({"loading":1.0,"rendering":3.0})"));
+}
+
 TEST_CASE("Verdicts of settling are counted by reason, other files passed over", "[view]") {
   test::TemporaryFolder folder;
   VisitReport report;

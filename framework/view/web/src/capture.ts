@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // One picture in full: zoom to its pixels, a probe, its objects.
 import { App } from './app';
-import { CaptureLabels, FrameLabels, ObjectLabels, isReport, pictureAddress } from './data';
+import { CaptureLabels, FrameLabels, ObjectLabels, RunState, get, pictureAddress } from './data';
 import { button, clear, el } from './dom';
-import { FramePixels, Numbers, View, css, drawLines, drawPicture, kLayers, motionOf, overlays } from './layers';
+import { FramePixels, Motions, Numbers, View, css, drawKeypoints, drawLines, drawPicture, kLayers, overlays, skeletonOf } from './layers';
+import { replayCommand } from './pages';
+import { Player, Shot } from './player';
 import { SpaceView } from './scene';
 import { Zoom } from './zoom';
 
@@ -15,18 +17,30 @@ function metres(value: number | null | undefined): string {
   return value === null || value === undefined ? '–' : `${value.toFixed(value < 10 ? 3 : 2)} m`;
 }
 
+/** What the other frame shows of a point: FlowState. */
+const kFlowStates = ['', ' (hidden there)', ' (out of the picture there)', ''];
+const kSights = ['not told', 'hidden', 'seen'];
+
 export class CapturePage {
   readonly element = el('main', { class: 'capture' });
   private readonly canvas = el('canvas', { class: 'big', tabindex: '0', role: 'img' });
   private readonly probe = el('div', { class: 'probe', 'aria-live': 'off' });
   private readonly head = el('div', { class: 'bar' });
+  private readonly title = el('b');
   private readonly panel = el('aside', { class: 'objects', 'aria-label': 'Objects' });
   private readonly space = new SpaceView((frame, object) => {
     this.app.go(frame !== null ? { frame } : { object: object ?? 0 });
   });
+  private readonly player = new Player({
+    shot: (capture) => this.shot(capture),
+    shows: (capture, shot) => this.showShot(capture, shot),
+    go: (change) => this.app.go(change.capture === this.app.state.capture ? { ...change } : { ...change, object: 0 }, true),
+  });
   private readonly stage = el('div', { class: 'stage' }, this.canvas, this.probe);
   private app!: App;
   private key = '';
+  private shown = -1;  ///< Number of the capture.
+  private run: RunState | null = null;  ///< That made it.
   private capture: CaptureLabels | null = null;
   private frame: FrameLabels | null = null;
   private pixels: FramePixels | null = null;
@@ -42,61 +56,119 @@ export class CapturePage {
   });
 
   constructor() {
-    this.element.append(this.head, el('div', { class: 'parts' }, this.stage, this.space.canvas, this.panel));
+    this.element.append(this.head, el('div', { class: 'parts' },
+      el('div', { class: 'screen' }, this.stage, this.player.element), this.space.canvas, this.panel));
     new ResizeObserver(() => this.draw()).observe(this.stage);
   }
 
   async show(app: App): Promise<void> {
     this.app = app;
     const { state } = app;
-    const key = JSON.stringify([app.site.generation, state.dataset, state.capture, state.frame]);
+    const key = JSON.stringify([app.site.generation, state.dataset, state.frame]);
     if (key !== this.key) {
       this.key = key;
-      this.frame = null;
-      this.zoom.reset();
-      this.pixels = new FramePixels(state.dataset, state.capture, state.frame);
-      this.pointer = null;
-      try {
-        const capture = await app.labels(state.capture);
-        if (key !== this.key) return;
-        this.capture = capture;
-        this.frame = capture.frames[state.frame] ?? null;
-      } catch (error) {
-        if (key !== this.key) return;
-        this.capture = null;
+      this.shown = -1;
+      this.player.forget();
+      get('/api/run').then((run) => {
+        this.run = run as RunState;
+        if (this.capture && !this.app.state.plays) this.showPanel();
+      }, () => undefined);
+    }
+    if (state.capture !== this.shown) {
+      // Within a clip the place that is looked at stays, and what is there until the next is.
+      const isOfClip = this.player.has(state.capture);
+      this.shown = state.capture;
+      const shot = this.player.shot(state.capture);
+      if (!isOfClip) {
+        this.zoom.reset();
+        this.frame = null;
+        this.pointer = null;
+      }
+      const labels = await app.labels(state.capture).catch((error: Error) => error);
+      if (key !== this.key || this.shown !== state.capture) return;
+      if (labels instanceof Error) {
+        this.capture = this.frame = null;
+        this.player.show(null, [], false, 1, 1);
         this.showHead();
         clear(this.panel);
-        this.panel.append(el('p', { class: 'bad' }, `Capture ${state.capture}: ${(error as Error).message}`));
+        this.panel.append(el('p', { class: 'bad' }, `Capture ${state.capture}: ${labels.message}`));
         this.draw();
         return;
       }
-      if (app.holds.has('color')) this.pixels.picture('color').then(() => this.draw(), () => this.draw());
-      for (const [held, kind] of [['instance_id', 'ids'], ['distance_to_image_plane', 'depth'], ['distance_to_camera', 'depth']]) {
-        // Reports are small: they have ids alone.
-        if (app.holds.has(held) && !(isReport && kind === 'depth')) this.pixels.numbers(kind).then(() => this.showProbe(), () => undefined);
-      }
+      this.pixels = shot.pixels;
+      this.capture = labels;
+      this.frame = labels.frames[state.frame] ?? null;
     }
     if (!this.capture) return;
+    this.player.show(this.capture, app.info.captures, app.state.plays, app.state.speed,
+      (this.frame?.width ?? 1) * (this.frame?.height ?? 1));
+    if (!app.state.plays) this.wantNumbers();
     this.showHead();
     this.showPanel();
-    const canSpace = this.capture.frames.some((frame) => frame.world_from_camera);
-    this.space.canvas.hidden = !app.state.space || !canSpace;
-    if (!this.space.canvas.hidden) {
-      this.space.show(this.capture, app.state, app.palette, (frame) =>
-        app.holds.has('color') ? pictureAddress(app.state.dataset, app.state.capture, frame, 'thumbnail') : null);
-    }
+    this.showSpace();
     this.draw();
     this.showProbe();
+  }
+
+  /** Where the page is not looked at. */
+  rest(): void {
+    this.player.stop();
+  }
+
+  /** Fetches a picture of this dataset and camera, with what is to lie over it. */
+  private shot(capture: number): Shot {
+    const { app } = this;
+    const shot: Shot = { labels: null, pixels: new FramePixels(app.state.dataset, capture, app.state.frame), hasLabels: false };
+    const changed = () => {
+      if (this.pixels === shot.pixels) this.draw();
+    };
+    if (app.holds.has('color')) shot.pixels.picture('color').then(changed, changed);
+    app.labels(capture).then((labels) => {
+      shot.labels = labels;
+      const frame = labels.frames[app.state.frame];
+      if (frame) overlays(shot.pixels, frame, this.app.state, this.app.palette, this.app.holds, changed);
+    }, () => undefined).finally(() => (shot.hasLabels = true));
+    return shot;
+  }
+
+  /** A frame of the clip that plays: what is a drawing follows at once, texts when it stops. */
+  private showShot(capture: number, shot: Shot): void {
+    this.shown = capture;
+    this.pixels = shot.pixels;
+    this.capture = shot.labels ?? this.capture;
+    this.frame = shot.labels?.frames[this.app.state.frame] ?? this.frame;
+    this.app.seek(capture);
+    this.title.textContent = `Capture ${capture}`;
+    this.draw();
+    this.showSpace();
+    this.showProbe();
+  }
+
+  /** What the probe reads. */
+  private wantNumbers(): void {
+    const { holds } = this.app;
+    const changed = () => this.showProbe();
+    if (holds.has('instance_id')) this.pixels?.numbers('ids').then(changed, changed);
+    if (holds.has('distance_to_image_plane') || holds.has('distance_to_camera')) this.pixels?.numbers('depth').then(changed, changed);
+  }
+
+  private showSpace(): void {
+    const { app } = this;
+    this.space.canvas.hidden = !app.state.space || !this.capture!.frames.some((frame) => frame.world_from_camera);
+    if (this.space.canvas.hidden) return;
+    this.space.show(this.capture!, app.state, app.palette, (frame) =>
+      app.holds.has('color') ? pictureAddress(app.state.dataset, app.state.capture, frame, 'thumbnail') : null);
   }
 
   private showHead(): void {
     const { app } = this;
     const { state } = app;
     clear(this.head);
+    this.title.textContent = `Capture ${state.capture}`;
     this.head.append(
       button('← Grid', 'Back to all captures (Escape)', () => app.go({ page: 'grid' })),
       button('‹', 'Capture before (arrow left)', () => this.step(-1)),
-      el('b', {}, `Capture ${state.capture}`),
+      this.title,
       button('›', 'Next capture (arrow right)', () => this.step(1)));
     const cameras = el('span', { class: 'tabs', role: 'tablist', 'aria-label': 'Cameras' });
     this.capture?.frames.forEach((frame, i) => {
@@ -120,13 +192,15 @@ export class CapturePage {
     let at = list.indexOf(state.capture);
     if (at < 0) at = list.findIndex((number) => number > state.capture) - (by > 0 ? 1 : 0);
     const next = list[at + by];
-    if (next !== undefined) this.app.go({ capture: next, object: 0 });
+    if (next !== undefined) this.app.go({ capture: next, object: 0, plays: false });
   }
 
   private showPanel(): void {
     const { app, frame } = this;
     const scroll = this.panel.scrollTop;
     clear(this.panel);
+    // Numbers of a frame that has passed are nobody's to choose from.
+    this.panel.inert = app.state.plays;
     if (!frame) return;
     const seen = frame.objects.filter((object) => object.box);
     this.panel.append(el('h3', {}, 'Objects', el('small', {}, `${seen.length} in the picture, ${frame.objects.length} in all`)));
@@ -148,17 +222,21 @@ export class CapturePage {
     const eye = frame.world_from_camera;
     if (eye) add('Stands at', `${eye[3].toFixed(2)}, ${eye[7].toFixed(2)}, ${eye[11].toFixed(2)} m`);
     add('Visit', String(this.capture!.visit));
+    if (this.run?.seed !== undefined) add('Seed', String(this.run.seed));
     this.panel.append(el('h3', {}, 'Picture'), about);
+    if (this.run?.folder) this.panel.append(el('small', {}, 'Make it again:'), el('pre', { class: 'replay' }, replayCommand(this.run.folder, app.state.capture)));
     const files = Object.entries(frame.files ?? {});
     if (files.length > 0) {
       const list = el('dl', { class: 'files' });
       for (const [held, file] of files) list.append(el('dt', {}, held), el('dd', {}, file));
       this.panel.append(el('details', {}, el('summary', {}, 'Files'), list));
     }
-    if (this.capture!.findings.length > 0) {
+    const linted = (app.lint.findingsOf(app.site, app.state.dataset) ?? []).filter((finding) => finding.capture === app.state.capture);
+    if (linted.length + this.capture!.findings.length > 0) {
       this.panel.append(el('h3', { class: 'bad' }, 'Faults'));
-      for (const finding of this.capture!.findings) {
-        this.panel.append(el('p', { class: 'bad' }, `${finding.check}: ${finding.found ?? ''}`));
+      // What lint has found holds what the reader has.
+      for (const finding of linted.length > 0 ? linted : this.capture!.findings) {
+        this.panel.append(el('p', { class: 'bad' }, `${finding.check}: ${finding.message ?? finding.found ?? ''}`));
       }
     }
     this.panel.scrollTop = scroll;
@@ -174,6 +252,8 @@ export class CapturePage {
     if (object.visible_pixels !== undefined) add('Pixels', object.visible_pixels.toLocaleString('en'));
     if (object.distance_m !== undefined) add('Distance', metres(object.distance_m));
     add('Box', object.box!.join(', '));
+    const points = (object.keypoints ?? []).filter((point) => point[2] > 0);
+    if (object.keypoints) add('Keypoints', `${points.length} of ${object.keypoints.length}, ${points.filter((point) => point[2] === 2).length} seen`);
     if (object.bounds) {
       const [low, high] = object.bounds;
       add('Size', high.map((value, i) => (value - low[i]).toFixed(3)).join(' × ') + ' m');
@@ -201,6 +281,7 @@ export class CapturePage {
     drawPicture(context, frame, view, pixels, overlays(pixels, frame, state, palette, holds, () => this.draw()), state);
     if (view.scale >= 16) this.drawGrid(context, view);
     drawLines(context, frame, view, state, palette, 1, state.object);
+    drawKeypoints(context, frame, view, state, palette, this.app.info.skeletons, 1);
     this.canvas.setAttribute('aria-label', `Capture ${state.capture}, ${frame.camera}: ` +
       frame.objects.filter((object) => object.box).map((object) => object.class).join(', '));
   }
@@ -244,10 +325,14 @@ export class CapturePage {
     word('pixel', `${x}, ${y}`);
     const depth = this.pixels.now<Numbers>('depth')?.at(x, y);
     if (depth !== null && depth !== undefined) word('depth', depth === 0 ? 'nothing' : metres(depth / 1e4));
-    const motion = this.pixels.now<Numbers>('motion')?.at(x, y);
-    if (motion !== null && motion !== undefined) word('motion', motionOf(motion).map((value) => value.toFixed(2)).join(', ') + ' px');
+    for (const [kind, name] of [['motion', 'motion'], ['flow_forward', 'flow forward'], ['flow_backward', 'flow backward']]) {
+      const motion = this.pixels.now<Motions>('motions ' + kind)?.at(x, y);
+      if (motion) word(name, motion.state === 3 ? 'none' : `${motion.x.toFixed(2)}, ${motion.y.toFixed(2)} px${kFlowStates[motion.state]}`);
+    }
     const normal = this.pixels.now<Numbers>('normals')?.at(x, y);
     if (normal) word('normal', [normal & 255, (normal >> 8) & 255, normal >> 16].map((value) => (value / 127.5 - 1).toFixed(2)).join(', '));
+    const point = this.keypointAt(x, y);
+    if (point) word('keypoint', point);
     const [object, ...others] = this.objectsAt(x, y);
     if (!object) return word('object', 'none');
     word('object', object.class === '' ? object.path : object.class);
@@ -256,6 +341,22 @@ export class CapturePage {
     if (object.truncation) word('outside', percent(object.truncation));
     if (object.distance_m) word('distance', metres(object.distance_m));
     if (others.length > 0) word('below', others.map((other) => other.class).join(', '));
+  }
+
+  /** The nearest one under the pointer, while they are shown. */
+  private keypointAt(x: number, y: number): string | null {
+    if (!this.app.state.layers.has('point')) return null;
+    let nearest = Math.max(1.5, 7 / this.zoom.scale);
+    let found: string | null = null;
+    for (const object of this.frame!.objects) {
+      (object.keypoints ?? []).forEach((point, i) => {
+        const off = Math.hypot(point[0] - x - 0.5, point[1] - y - 0.5);
+        if (point[2] === 0 || off > nearest) return;
+        nearest = off;
+        found = `${skeletonOf(this.app.info.skeletons, object).names[i] ?? i + 1} (${kSights[point[2]]})`;
+      });
+    }
+    return found;
   }
 
   /** Clicks at one place go through what lies there. */
@@ -288,6 +389,7 @@ export class CapturePage {
     else if (event.key === 'ArrowDown') this.cycle(1);
     else if (event.key === 'z') this.zoomToObject();
     else if (event.key === 's') app.go({ space: !app.state.space });
+    else if (this.player.press(event.key)) return true;
     else if (event.key === 'Escape') app.go(app.state.object !== 0 ? { object: 0 } : { page: 'grid' });
     else return this.zoom.press(event.key);
     return true;
@@ -303,6 +405,10 @@ export const kKeys: [string, string][] = [
   ['1 … 9', 'Camera'],
   ['+ −  wheel', 'Zoom'],
   ['0', 'Whole picture'],
+  ['space', 'Plays a clip, or stops it'],
+  [',  .', 'Frame of a clip before, next one'],
+  ['<  >', 'Plays slower, faster'],
+  ['Home End', 'First and last frame of a clip'],
   ['z', 'Zoom to the chosen object'],
   ['s', '3-D view'],
   ['g', 'Grid'],

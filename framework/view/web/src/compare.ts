@@ -3,7 +3,7 @@
 import { App } from './app';
 import { CaptureLabels, DatasetInfo, Difference, FrameLabels, get } from './data';
 import { button, clear, el, on, plural } from './dom';
-import { FramePixels, Numbers, View, differenceDrawing, drawLines, drawPicture, overlays } from './layers';
+import { FramePixels, Numbers, View, differenceDrawing, drawKeypoints, drawLines, drawPicture, overlays } from './layers';
 import { Awaited, waitingFor } from './pages';
 import { CompareMode } from './state';
 import { Zoom } from './zoom';
@@ -294,7 +294,9 @@ export class ComparePage {
   }
 
   private drawBoxes(context: CanvasRenderingContext2D, side: Side, view: View): void {
-    if (side.frame) drawLines(context, side.frame, view, this.app.state, this.app.palette, 1, 0);
+    if (!side.frame) return;
+    drawLines(context, side.frame, view, this.app.state, this.app.palette, 1, 0);
+    drawKeypoints(context, side.frame, view, this.app.state, this.app.palette, side.info.skeletons, 1);
   }
 
   /** True when the key means something here. */

@@ -15,6 +15,7 @@ export interface SiteState {
   folder: string;
   generation: number;
   is_finished: boolean;
+  is_linted: boolean;  ///< The findings are known, and cost nothing.
   datasets: DatasetState[];
 }
 
@@ -26,6 +27,12 @@ export interface DatasetInfo {
   cameras: string[];
   classes: string[];
   captures: number[];
+  skeletons: { [name: string]: Skeleton };  ///< By class; '' is for those of all others.
+}
+
+export interface Skeleton {
+  names: string[];
+  lines: [number, number][];
 }
 
 export type Box = [number, number, number, number];
@@ -44,7 +51,11 @@ export interface ObjectLabels {
   world_from_node?: number[];
   bounds?: [number[], number[]];
   edges?: number[][];
+  keypoints?: Keypoint[];
 }
+
+/** x, y, and 0: not told, 1: hidden, 2: seen. */
+export type Keypoint = [number, number, 0 | 1 | 2];
 
 export interface FrameLabels {
   camera: string;
@@ -69,12 +80,21 @@ export interface Finding {
   expected?: string;
 }
 
+/** The place of a capture in a clip, whose captures follow each other. */
+export interface Clip {
+  clip: number;
+  frame: number;
+  frames: number;
+  fps: number;
+}
+
 export interface CaptureLabels {
   capture: number;
   visit: number;
   phase: string;
   environment: string;
   split: string;
+  clip?: Clip;
   frames: FrameLabels[];
   findings: Finding[];
 }
@@ -92,6 +112,8 @@ export interface RunState {
   done?: number;
   is_finished?: boolean;
   workers?: { name: string; role: string; description: string; is_alive: boolean; memory_bytes: number; captures: number }[];
+  stages?: { [name: string]: number };  ///< Seconds, of all workers.
+  last?: number[];  ///< Captures, the last one first.
   views?: { views: number; draws: number; refused: { [condition: string]: number }; unmet: number };
   settle?: {
     visits: number;
@@ -100,6 +122,15 @@ export interface RunState {
     longest_rest_s: number | null;
     verdicts: { kind: string; why: string; count: number; first: string }[];
   };
+}
+
+/** What "diorama lint" has found in one dataset. */
+export interface LintReport {
+  dataset: string;
+  format: string;
+  files: number;
+  checks: number;
+  findings: Finding[];
 }
 
 /** What all captures of two datasets differ in, as lines, and which ones do. */
@@ -203,6 +234,7 @@ class Column {
 }
 
 export const kUnknown = -1000;
+const kNothingFound = [0];
 
 /** All captures as columns: see capture_index.h. */
 export class CaptureTable {
@@ -213,9 +245,12 @@ export class CaptureTable {
   objects = 0;
   brightCaptures = 0;  ///< The first so many have their brightness.
   private brightPictures = 0;
+  /** Rules that lint has found broken, behind 'nothing found'; null before it has looked. */
+  checks: string[] | null = null;
+  private readonly checksOfPlace = new Map<number, number[]>();
 
   constructor() {
-    for (const name of ['visit', 'phase', 'environment', 'split', 'findings', 'pictures', 'camera', 'width',
+    for (const name of ['visit', 'phase', 'environment', 'split', 'findings', 'clip', 'pictures', 'camera', 'width',
       'height', 'objects', 'class', 'visible', 'truncation', 'box_side', 'distance', 'elevation', 'azimuth',
       'brightness']) {
       this.columns[name] = new Column();
@@ -234,6 +269,28 @@ export class CaptureTable {
     this.captures += part.columns.visit.length;
     this.pictures += part.columns.camera.length;
     this.objects += part.columns.class.length;
+  }
+
+  /** Places in `checks`, of a capture's findings. */
+  checksOf(place: number): number[] {
+    return this.checksOfPlace.get(place) ?? kNothingFound;
+  }
+
+  /** `captures`: their numbers. */
+  setFindings(findings: Finding[], captures: number[]): void {
+    this.checks = ['nothing found'];
+    this.checksOfPlace.clear();
+    const places = new Map(captures.map((capture, place) => [capture, place]));
+    const names = [...new Set(findings.map((finding) => finding.check))].sort();
+    this.checks.push(...names);
+    for (const { capture, check } of findings) {
+      const place = capture === undefined ? undefined : places.get(capture);
+      if (place === undefined) continue;
+      const number = names.indexOf(check) + 1;
+      const known = this.checksOfPlace.get(place);
+      if (!known) this.checksOfPlace.set(place, [number]);
+      else if (!known.includes(number)) known.push(number);
+    }
   }
 
   addBrightness(part: BrightnessPart): void {

@@ -34,10 +34,22 @@ export class FacetBar {
       }
       const names = facet.names!(table, app.info.cameras);
       const told = names.filter((name) => name !== '');
+      if (facet.key === 'lint' && names.length === 0) {
+        this.element.append(this.askForLint(app, facet));
+        continue;
+      }
       const saysNothing = facet.key === 'findings' ? !chosen && counts[1] === 0 : told.length === 0;
       if (!saysNothing) this.element.append(this.nameFacet(app, facet, names, counts, chosen));
     }
     if (focus) this.element.querySelector<HTMLElement>(`[data-focus="${CSS.escape(focus)}"]`)?.focus();
+  }
+
+  /** What lint finds takes as long as reading every file. */
+  private askForLint(app: App, facet: Facet): HTMLElement {
+    const section = this.section(app, facet, this.chosenOf(app, facet), '');
+    if (app.lint.isAsked) section.append(el('p', { role: 'status' }, app.lint.fault === '' ? 'Every file is read and checked …' : app.lint.fault));
+    else section.append(button('Check the dataset', 'As "diorama lint" does', () => app.lint.ask(), { 'data-focus': 'lint' }));
+    return section;
   }
 
   private chosenOf(app: App, facet: Facet): Chosen | null {

@@ -30,6 +30,8 @@ export const kFacets: Facet[] = [
   { key: 'phase', title: 'Phase', of: 'capture', column: 'phase', names: (t) => t.names.phases },
   { key: 'environment', title: 'Environment', of: 'capture', column: 'environment', names: (t) => t.names.environments },
   { key: 'split', title: 'Split', of: 'capture', column: 'split', names: (t) => t.names.splits },
+  { key: 'clip', title: 'Clip', of: 'capture', column: 'clip', range: { low: 0, high: 0, bins: kVisitBins, unit: '', scale: 1, isWhole: true } },
+  { key: 'lint', title: 'Findings of lint', of: 'capture', column: '', names: (t) => t.checks ?? [] },
   { key: 'findings', title: 'Reader', of: 'capture', column: 'findings', names: () => ['read without fault', 'files with faults'] },
 ];
 
@@ -57,10 +59,10 @@ export interface Filtered {
   highs: Map<string, number>;  ///< Upper ends of ranges.
 }
 
-/** Distances and visits have no end of their own. */
+/** Distances, visits and clips have no end of their own. */
 function highOf(facet: Facet, table: CaptureTable): number {
   const isDistance = facet.key === 'distance';
-  if (!isDistance && facet.key !== 'visit') return facet.range!.high;
+  if (!isDistance && !facet.range!.isWhole) return facet.range!.high;
   const values = table.of(facet.column);
   const count = isDistance ? table.objects : table.captures;
   let most = 0;
@@ -75,7 +77,8 @@ export function filter(table: CaptureTable, cameras: string[], facets: Map<strin
   const tests = kFacets.map((facet, bit) => {
     let chosen: Chosen | null = null;
     try {
-      chosen = readChosen(facet, facets.get(facet.key));
+      // Nothing is filtered by what is not known yet.
+      if (facet.key !== 'lint' || table.checks) chosen = readChosen(facet, facets.get(facet.key));
     } catch {
       // An address that somebody has changed.
     }
@@ -84,17 +87,22 @@ export function filter(table: CaptureTable, cameras: string[], facets: Map<strin
     if (facet.range) highs.set(facet.key, high);
     const count = new Array<number>(facet.range ? facet.range.bins : names.length).fill(0);
     counts.set(facet.key, count);
-    const values = table.of(facet.column);
+    const values = facet.column === '' ? new Int32Array() : table.of(facet.column);
     const allowed = chosen?.names ? names.map((name) => chosen!.names!.has(name)) : null;
     const range = chosen?.range ?? null;
     const valueOf = (i: number) => facet.key === 'findings' ? Math.min(1, values[i]) : values[i];
     const fits = (i: number): boolean => {
+      if (allowed && facet.key === 'lint') return table.checksOf(i).some((check) => allowed[check]);
       if (allowed) return allowed[valueOf(i)] === true;
       return !range || (values[i] !== kUnknown && values[i] >= range[0] && values[i] <= range[1]);
     };
     const low = facet.range?.low ?? 0;
     const bins = facet.range?.bins ?? 0;
     const add = (i: number): void => {
+      if (facet.key === 'lint') {
+        for (const check of table.checks ? table.checksOf(i) : []) ++count[check];
+        return;
+      }
       const value = valueOf(i);
       if (!facet.range) {
         ++count[value];

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // One card per capture with its cameras. Only cards that are in sight exist.
 import { App } from './app';
-import { pictureAddress } from './data';
+import { kUnknown, pictureAddress } from './data';
 import { button, clear, el, on } from './dom';
-import { FramePixels, drawLines, overlays } from './layers';
+import { FramePixels, drawKeypoints, drawLines, overlays } from './layers';
 
 const kGap = 12;
 const kHead = 26;
+/** Browsers end elements at some 33 million pixels, silently; what is higher scrolls faster. */
+const kMostHeight = 16e6;
 
 interface Card {
   element: HTMLElement;
@@ -25,6 +27,7 @@ export class Grid {
   private cardWidth = 1;
   private cardHeight = 1;
   private chosen = 0;
+  private height = 0;  ///< Of all cards.
 
   constructor() {
     this.element.append(this.empty, this.field);
@@ -45,13 +48,15 @@ export class Grid {
     this.cardHeight = kHead + rows * (Math.round(state.card * aspect) + 2);
     this.columns = Math.max(1, Math.floor((inside + kGap) / (this.cardWidth + kGap)));
     const lines = Math.ceil(app.filtered.places.length / this.columns);
-    this.field.style.height = `${lines * (this.cardHeight + kGap) + kGap}px`;
+    this.height = lines * (this.cardHeight + kGap) + kGap;
+    this.field.style.height = `${Math.min(this.height, kMostHeight)}px`;
     this.empty.hidden = app.filtered.places.length > 0;
     if (!this.empty.hidden) {
       clear(this.empty);
       const isReading = table.captures < app.info.captures.length;
-      this.empty.append(isReading ? 'Reading labels …' : 'No capture fits these filters. ');
-      if (!isReading) this.empty.append(button('Clear all filters', '', () => app.go({ facets: new Map() })));
+      if (app.info.captures.length === 0) this.empty.append('No capture is there yet.');
+      else this.empty.append(isReading ? 'Reading labels …' : 'No capture fits these filters. ');
+      if (!isReading && app.info.captures.length > 0) this.empty.append(button('Clear all filters', '', () => app.go({ facets: new Map() })));
     }
     const key = JSON.stringify([state.dataset, app.site.generation, table.captures > 0, [...state.layers].sort(), state.colour, state.opacity,
       state.card, this.columns, this.cardWidth, this.cardHeight]);
@@ -63,10 +68,18 @@ export class Grid {
     this.fill();
   }
 
+  /** Pixels of all cards per pixel that is scrolled. */
+  private get stretch(): number {
+    const inside = this.element.clientHeight;
+    return this.height > kMostHeight ? (this.height - inside) / (kMostHeight - inside) : 1;
+  }
+
   private fill(): void {
     if (!this.app || this.element.clientHeight === 0) return;
     const pitch = this.cardHeight + kGap;
-    const first = Math.max(0, Math.floor(this.element.scrollTop / pitch) - 1) * this.columns;
+    const top = this.element.scrollTop * this.stretch;
+    const shift = this.element.scrollTop - top;
+    const first = Math.max(0, Math.floor(top / pitch) - 1) * this.columns;
     const lines = Math.ceil(this.element.clientHeight / pitch) + 3;
     const places = this.app.filtered.places;
     const last = Math.min(places.length, first + lines * this.columns);
@@ -85,7 +98,7 @@ export class Grid {
       }
       const column = i % this.columns;
       const line = Math.floor(i / this.columns);
-      card.element.style.transform = `translate(${kGap + column * (this.cardWidth + kGap)}px, ${kGap + line * pitch}px)`;
+      card.element.style.transform = `translate(${kGap + column * (this.cardWidth + kGap)}px, ${kGap + line * pitch + shift}px)`;
       card.element.dataset.at = String(i);
       card.element.classList.toggle('chosen', i === this.chosen);
     }
@@ -118,7 +131,8 @@ export class Grid {
     if (place >= table.captures) return el('div', { class: 'head' }, number);
     const phase = table.names.phases[table.of('phase')[place]] ?? '';
     const split = table.names.splits[table.of('split')[place]] ?? '';
-    const words = [phase, split].filter((word) => word !== '').join(' · ');
+    const clip = table.of('clip')[place];
+    const words = [clip === kUnknown ? '' : `clip ${clip}`, phase, split].filter((word) => word !== '').join(' · ');
     card.title = table.names.environments[table.of('environment')[place]] ?? '';
     return el('div', { class: 'head' }, number, el('span', {}, words),
       table.of('findings')[place] > 0 && el('span', { class: 'bad', title: 'The reader found faults in its files' }, '⚠'));
@@ -180,7 +194,9 @@ export class Grid {
         context.drawImage(layer, 0, 0, canvas.width, canvas.height);
       }
       context.globalAlpha = 1;
-      drawLines(context, labels, { scale: canvas.width / labels.width, x: 0, y: 0 }, state, app.palette, 0.9 * ratio, 0);
+      const view = { scale: canvas.width / labels.width, x: 0, y: 0 };
+      drawLines(context, labels, view, state, app.palette, 0.9 * ratio, 0);
+      drawKeypoints(context, labels, view, state, app.palette, app.info.skeletons, 0.6 * ratio);
     };
     requestAnimationFrame(() => void draw());
   }
@@ -197,9 +213,10 @@ export class Grid {
       this.chosen = Math.max(0, Math.min(places.length - 1, this.chosen + steps[event.key]));
       const top = Math.floor(this.chosen / this.columns) * (this.cardHeight + kGap);
       const bottom = top + this.cardHeight + 2 * kGap;
-      if (top < this.element.scrollTop) this.element.scrollTop = top;
-      if (bottom > this.element.scrollTop + this.element.clientHeight) {
-        this.element.scrollTop = bottom - this.element.clientHeight;
+      const seen = this.element.scrollTop * this.stretch;
+      if (top < seen) this.element.scrollTop = top / this.stretch;
+      if (bottom > seen + this.element.clientHeight) {
+        this.element.scrollTop = (bottom - this.element.clientHeight) / this.stretch;
       }
       this.fill();
     } else {

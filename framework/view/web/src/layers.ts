@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What is drawn over a picture: exact labels where they are few numbers, pictures of numbers where they
 // are many.
-import { AmodalMasks, FrameLabels, ObjectLabels, get, loadPicture } from './data';
+import { AmodalMasks, FrameLabels, Keypoint, ObjectLabels, Skeleton, get, loadPicture } from './data';
 import { State } from './state';
 
 export interface Layer {
@@ -16,11 +16,15 @@ export const kLayers: Layer[] = [
   { key: 'cube', title: '3-D boxes', hotkey: 'c', held: ['boxes_3d'] },
   { key: 'mask', title: 'Masks', hotkey: 'm', held: ['instance_id'] },
   { key: 'amodal', title: 'Amodal masks', hotkey: 'a', held: ['amodal_mask'] },
+  { key: 'point', title: 'Keypoints', hotkey: 'k', held: ['keypoints'] },
   { key: 'name', title: 'Names', hotkey: 'l', held: ['labels'] },
   { key: 'depth', title: 'Depth', hotkey: 'd', held: ['distance_to_image_plane', 'distance_to_camera'] },
   { key: 'normals', title: 'Normals', hotkey: 'n', held: ['normals'] },
-  { key: 'motion', title: 'Motion', hotkey: 'f', held: ['motion'] },
+  { key: 'motion', title: 'Motion', hotkey: 'v', held: ['motion'] },
+  { key: 'flow_forward', title: 'Flow forward', hotkey: 'f', held: ['flow_forward'] },
+  { key: 'flow_backward', title: 'Flow backward', hotkey: 'r', held: ['flow_backward'] },
 ];
+const kMotions = ['motion', 'flow_forward', 'flow_backward'];
 
 export type Rgb = [number, number, number];
 
@@ -117,19 +121,51 @@ function heat(share: number): Rgb {
   return [0, 1, 2].map((i) => Math.round(low[i] + (high[i] - low[i]) * part)) as Rgb;
 }
 
-export function motionOf(value: number): [number, number] {
-  return [(value & 4095) / 16 - 128, (value >> 12) / 16 - 128];
+/** Where a point goes. State: 0 it is seen there, 1 hidden, 2 out of the picture, 3 there is no such point. */
+export interface Motion {
+  x: number;
+  y: number;
+  state: number;
 }
 
-function motionColour(value: number): Rgb | null {
-  const [x, y] = motionOf(value);
+/** Two numbers per pixel: see PictureKind::Motion. */
+export class Motions {
+  constructor(private readonly numbers: Numbers) {}
+
+  at(x: number, y: number): Motion | null {
+    const height = this.numbers.height / 2;
+    const upper = y < height ? this.numbers.at(x, y) : null;
+    if (upper === null) return null;
+    const pixels = (value: number) => (value & 0x3fffff) / 256 - 8192;
+    return { x: pixels(upper), y: pixels(this.numbers.at(x, y + height)!), state: upper >> 22 };
+  }
+
+  drawing(): HTMLCanvasElement {
+    const { width } = this.numbers;
+    const height = this.numbers.height / 2;
+    const [canvas, context] = canvasOf(width, height);
+    const image = context.createImageData(width, height);
+    for (let y = 0; y < height; ++y) {
+      for (let x = 0; x < width; ++x) {
+        const rgb = motionColour(this.at(x, y)!);
+        if (rgb) image.data.set([...rgb, 255], 4 * (y * width + x));
+      }
+    }
+    context.putImageData(image, 0, 0);
+    return canvas;
+  }
+}
+
+/** The hue says where to; darker is what the other frame does not show. */
+function motionColour({ x, y, state }: Motion): Rgb | null {
   const length = Math.hypot(x, y);
-  if (length < 0.05) return null;
+  if (length < 0.05 || state === 3) return null;
   const hue = Math.atan2(y, x) / (2 * Math.PI) + 0.5;
   const strength = Math.min(1, Math.log1p(length) / 3);
+  const light = state === 0 ? 255 : 140;
   const part = (shift: number): number => {
     const k = (shift + hue * 6) % 6;
-    return Math.round(255 * (1 - strength + strength * Math.max(0, Math.min(1, Math.abs(k - 3) - 1))));
+    return Math.round(light * (1 - strength + strength * Math.max(0, Math.min(1, Math.abs(k - 3) - 1))));
   };
   return [part(0), part(4), part(2)];
 }
@@ -138,6 +174,7 @@ function motionColour(value: number): Rgb | null {
 export class FramePixels {
   private readonly made = new Map<string, Promise<unknown>>();
   private readonly ready = new Map<string, unknown>();
+  private pending = 0;
 
   constructor(readonly dataset: number, readonly capture: number, readonly frame: number) {}
 
@@ -146,13 +183,19 @@ export class FramePixels {
     return (this.ready.get(key) as T) ?? null;
   }
 
+  /** All that was asked for has come, or will not. */
+  get isIdle(): boolean {
+    return this.pending === 0;
+  }
+
   private keep<T>(key: string, make: () => Promise<T>): Promise<T> {
     let promise = this.made.get(key) as Promise<T> | undefined;
     if (!promise) {
+      ++this.pending;
       promise = make().then((value) => {
         this.ready.set(key, value);
         return value;
-      });
+      }).finally(() => --this.pending);
       this.made.set(key, promise);
     }
     return promise;
@@ -160,6 +203,10 @@ export class FramePixels {
 
   numbers(kind: string): Promise<Numbers> {
     return this.keep(kind, async () => Numbers.of(await loadPicture(this.dataset, this.capture, this.frame, kind)));
+  }
+
+  motions(kind: string): Promise<Motions> {
+    return this.keep('motions ' + kind, async () => new Motions(await this.numbers(kind)));
   }
 
   picture(kind: string): Promise<HTMLImageElement> {
@@ -270,8 +317,8 @@ export function overlays(pixels: FramePixels, labels: FrameLabels, state: State,
       take('normals drawing', async () => (await pixels.numbers('normals')).coloured((value) =>
         value === 0 ? null : [value & 255, (value >> 8) & 255, value >> 16]));
     }
-    if (layer.key === 'motion') {
-      take('motion drawing', async () => (await pixels.numbers('motion')).coloured(motionColour));
+    if (kMotions.includes(layer.key)) {
+      take(layer.key + ' drawing', async () => (await pixels.motions(layer.key)).drawing());
     }
     if (layer.key === 'mask') take('mask ' + state.colour, maskDrawing(pixels, labels, state, palette));
     if (layer.key === 'amodal') take('amodal ' + state.colour, amodalDrawing(pixels, labels, state, palette));
@@ -345,5 +392,50 @@ export function drawLines(context: CanvasRenderingContext2D, labels: FrameLabels
     context.fillRect(x(object.box[0]) - line, top, width, size + 5 * line);
     context.fillStyle = 0.3 * colour[0] + 0.59 * colour[1] + 0.11 * colour[2] > 115 ? '#101418' : '#fff';
     context.fillText(text, x(object.box[0]) + 3 * line, top + (size + 5 * line) / 2);
+  }
+}
+
+export function skeletonOf(skeletons: { [name: string]: Skeleton }, object: ObjectLabels): Skeleton {
+  const isOwn = (name: string) => Object.prototype.hasOwnProperty.call(skeletons, name);
+  if (isOwn(object.class)) return skeletons[object.class];
+  return isOwn('') ? skeletons[''] : { names: [], lines: [] };
+}
+
+/** Discs where points are seen, rings where something hides them, and the lines between. */
+export function drawKeypoints(context: CanvasRenderingContext2D, labels: FrameLabels, view: View, state: State, palette: Palette,
+                              skeletons: { [name: string]: Skeleton }, line: number): void {
+  if (!state.layers.has('point')) return;
+  const at = ([x, y]: Keypoint): [number, number] => [view.x + x * view.scale, view.y + y * view.scale];
+  for (const object of labels.objects) {
+    const points = object.keypoints ?? [];
+    const colour = css(palette.of(object, state));
+    for (const [from, to] of skeletonOf(skeletons, object).lines) {
+      const ends = [points[from], points[to]];
+      if (ends.some((end) => !end || end[2] === 0)) continue;
+      context.setLineDash(ends.some((end) => end[2] === 1) ? [4 * line, 3 * line] : []);
+      for (const [width, stroke] of [[3, 'rgba(0, 0, 0, 0.55)'], [1.6, colour]] as [number, string][]) {
+        context.lineWidth = width * line;
+        context.strokeStyle = stroke;
+        context.beginPath();
+        context.moveTo(...at(ends[0]));
+        context.lineTo(...at(ends[1]));
+        context.stroke();
+      }
+    }
+    context.setLineDash([]);
+    for (const point of points) {
+      if (point[2] === 0) continue;
+      context.beginPath();
+      context.arc(...at(point), 3.6 * line, 0, 2 * Math.PI);
+      context.lineWidth = 3.4 * line;
+      context.strokeStyle = 'rgba(0, 0, 0, 0.65)';
+      context.stroke();
+      context.lineWidth = 1.8 * line;
+      context.strokeStyle = point[2] === 2 ? '#fff' : colour;
+      context.stroke();
+      if (point[2] !== 2) continue;
+      context.fillStyle = colour;
+      context.fill();
+    }
   }
 }

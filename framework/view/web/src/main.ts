@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-import { App, LabelStore } from './app';
+import { App, LabelStore, Lint } from './app';
 import { CapturePage, kKeys } from './capture';
 import { ComparePage } from './compare';
 import { CaptureLabels, CaptureTable, DatasetInfo, DatasetState, Gone, SiteState, get, isReport } from './data';
@@ -11,7 +11,13 @@ import { Palette, kLayers } from './layers';
 import { FindingsPage, RunPage, StatsPage } from './pages';
 import { Page, State, addressOf, readState } from './state';
 
-const kNotInReports = ['depth', 'normals', 'motion'];
+
+const kAddressMs = 250;
+
+/** Of a run that has made nothing that could be read yet. */
+function noDataset(site: SiteState): DatasetInfo {
+  return { name: site.folder.slice(site.folder.lastIndexOf('/') + 1), folder: site.folder, format: '', holds: [], cameras: [], classes: [], captures: [], skeletons: {} };
+}
 
 /** What a dataset is compared with unless asked: the one of its name on the other side; -1: nothing. */
 function partnerOf(datasets: DatasetState[], dataset: number): number {
@@ -42,21 +48,26 @@ class Site {
   private readonly capture = new CapturePage();
   private readonly compare = new ComparePage();
   private readonly stats = new StatsPage();
-  private readonly findings = new FindingsPage(isReport);
+  private readonly findings = new FindingsPage();
   private readonly run = new RunPage();
   private readonly help = el('dialog', { 'aria-label': 'Keys' });
   private app!: App;
   private stores = new Map<number, LabelStore>();
   private loading = 0;
+  private addressed = 0;
+  private tabs = false;  ///< From button to button by keyboard.
 
   async start(): Promise<void> {
     document.body.append(this.top, this.tools, this.gridPage, this.capture.element, this.compare.element,
       this.stats.element, this.findings.element, this.run.element, this.status, this.help);
     this.makeHelp();
     this.setTheme(this.keptTheme());
-    await this.load(readState(location.hash));
-    window.addEventListener('hashchange', () => void this.follow(readState(location.hash)));
+    window.addEventListener('hashchange', () => void (this.app && this.follow(readState(location.hash))));
     document.addEventListener('keydown', (event) => this.press(event));
+    document.addEventListener('keydown', (event) => (this.tabs ||= event.key === 'Tab'), true);
+    document.addEventListener('pointerdown', () => (this.tabs = false), true);
+    // Returns when all labels are read; the page is there before.
+    await this.load(readState(location.hash));
     if (!isReport) this.watch();
   }
 
@@ -64,20 +75,33 @@ class Site {
   private async load(state: State): Promise<void> {
     const site = (await get('/api/state')) as SiteState;
     complete(state, site.datasets);
-    const info = (await get(`/api/${state.dataset}/info`)) as DatasetInfo;
+    const info = site.datasets.length > 0 ? (await get(`/api/${state.dataset}/info`)) as DatasetInfo : noDataset(site);
+    if (site.datasets.length === 0) state.page = 'run';
     this.stores.clear();
     const table = new CaptureTable();
     this.app = {
       state, site, info, table, holds: new Set(info.holds), palette: new Palette(info.classes),
       filtered: filter(table, info.cameras, state.facets, info.captures.length),
+      lint: new Lint(() => this.takeFindings()),
       go: (change, replaces) => this.go(change, replaces),
+      seek: (capture) => this.seek(capture),
       labels: (capture, dataset = state.dataset) => this.labels(capture, dataset),
     };
     document.title = `${info.name} – diorama view`;
     const ticket = ++this.loading;
     this.show();
+    // An address that filters by them needs them.
+    if (site.is_linted || state.facets.has('lint')) this.app.lint.ask();
     await this.readIndex(ticket);
     if (this.app.holds.has('color')) await this.readBrightness(ticket);
+  }
+
+  private takeFindings(): void {
+    const { app } = this;
+    const findings = app.lint.findingsOf(app.site, app.state.dataset);
+    if (findings) app.table.setFindings(findings, app.info.captures);
+    this.refilter();
+    this.show();
   }
 
   private labels(capture: number, dataset: number): Promise<CaptureLabels> {
@@ -139,10 +163,21 @@ class Site {
 
   private go(change: Partial<State>, replaces = false): void {
     const state = { ...this.app.state, ...change };
+    if (state.page !== 'capture') state.plays = false;
+    this.addressed = performance.now();
     const address = addressOf(state);
     if (replaces) history.replaceState(null, '', address);
     else if (address !== location.hash) history.pushState(null, '', address);
     void this.follow(state);
+  }
+
+  private seek(capture: number): void {
+    this.app.state = { ...this.app.state, capture };
+    const now = performance.now();
+    // Browsers ignore addresses that change too often.
+    if (now - this.addressed < kAddressMs) return;
+    this.addressed = now;
+    history.replaceState(null, '', addressOf(this.app.state));
   }
 
   private async follow(state: State): Promise<void> {
@@ -153,6 +188,7 @@ class Site {
     complete(state, this.app.site.datasets);
     const filters = JSON.stringify([...state.facets]) !== JSON.stringify([...this.app.state.facets]);
     this.app.state = state;
+    if (state.facets.has('lint')) this.app.lint.ask();
     if (filters) this.refilter();
     this.show();
   }
@@ -171,6 +207,7 @@ class Site {
       this.grid.show(app);
     }
     if (page === 'capture') void this.capture.show(app);
+    else this.capture.rest();
     if (page === 'compare') void this.compare.show(app);
     if (page === 'stats') this.stats.show(app);
     if (page === 'findings') this.findings.show(app);
@@ -215,7 +252,7 @@ class Site {
     const focus = document.activeElement instanceof HTMLElement ? document.activeElement.dataset.tool : undefined;
     clear(this.tools);
     for (const layer of kLayers) {
-      if (!layer.held.some((name) => holds.has(name)) || (isReport && kNotInReports.includes(layer.key))) continue;
+      if (!layer.held.some((name) => holds.has(name))) continue;
       const tool = button('', `${layer.title} (${layer.hotkey})`, () => this.toggle(layer.key),
         { 'aria-pressed': state.layers.has(layer.key) ? 'true' : 'false', 'data-tool': layer.key });
       tool.append(layer.title, el('kbd', {}, layer.hotkey));
@@ -246,8 +283,13 @@ class Site {
     if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey || this.help.open || !this.app) return;
     const target = event.target as HTMLElement;
     if (target.matches('input, select, textarea') && event.key !== 'Escape') return;
+    if (event.key === ' ' && target.matches('button, summary, a')) {
+      // Who has clicked it did not mean to stay there.
+      if (this.tabs) return;
+      target.blur();
+    }
     const { state } = this.app;
-    const layer = kLayers.find((one) => one.hotkey === event.key && !(isReport && kNotInReports.includes(one.key)));
+    const layer = kLayers.find((one) => one.hotkey === event.key);
     const pictures = !this.tools.hidden;
     if (event.key === '?') this.help.showModal();
     else if (state.page === 'capture' && this.capture.press(event)) event.preventDefault();

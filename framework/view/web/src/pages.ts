@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Statistics, findings, and what is known of the run.
-import { App } from './app';
-import { Finding, RunState, get } from './data';
-import { button, clear, el, plural, svg } from './dom';
+import { App, datasetOf } from './app';
+import { Finding, RunState, get, pictureAddress } from './data';
+import { button, clear, el, on, plural, svg } from './dom';
 import { css } from './layers';
 
 interface Histogram {
@@ -198,33 +198,24 @@ export class StatsPage {
 
 export class FindingsPage {
   readonly element = el('main', { class: 'page' });
-  private readonly lint = new Awaited();
-  private isAsked = false;
-
-  constructor(reads: boolean) {
-    this.isAsked = reads;
-  }
 
   show(app: App): void {
     clear(this.element);
     this.element.append(el('h1', {}, 'Findings'));
-    if (!this.isAsked) {
+    if (!app.lint.isAsked) {
       this.element.append(el('p', {}, 'Every file of the dataset is read, and what must hold between labels, pixels, cameras and formats is checked, as by "diorama lint".'),
-        button('Check the dataset', '', () => {
-          this.isAsked = true;
-          this.show(app);
-        }, { class: 'main' }));
+        button('Check the dataset', '', () => app.lint.ask(), { class: 'main' }));
       return;
     }
-    if (!this.lint.want('/api/lint', String(app.site.generation), () => this.show(app))) {
+    if (app.lint.fault !== '') {
+      this.element.append(el('p', { class: 'bad' }, app.lint.fault));
+      return;
+    }
+    const { reports } = app.lint;
+    if (!reports) {
       this.element.append(waitingFor('Every file is read and checked …'));
       return;
     }
-    if (this.lint.fault !== '') {
-      this.element.append(el('p', { class: 'bad' }, this.lint.fault));
-      return;
-    }
-    const reports = this.lint.value as { dataset: string; format: string; files: number; checks: number; findings: Finding[] }[];
     for (const report of reports) {
       this.element.append(el('h2', {}, report.dataset.slice(report.dataset.lastIndexOf('/') + 1), el('small', {}, report.format)),
         el('p', { class: report.findings.length === 0 ? 'good' : 'bad' },
@@ -232,14 +223,15 @@ export class FindingsPage {
           (report.findings.length === 0 ? 'nothing found' : plural(report.findings.length, 'finding'))));
       const checks = new Map<string, Finding[]>();
       for (const finding of report.findings) checks.set(finding.check, [...(checks.get(finding.check) ?? []), finding]);
-      const number = app.site.datasets.findIndex((one) => report.dataset.endsWith('/' + one.name) || report.dataset === one.name);
       for (const [check, findings] of checks) {
         const list = el('ul');
         for (const finding of findings.slice(0, 200)) {
-          const isHere = number === app.state.dataset || app.site.datasets.length === 1;
-          list.append(el('li', {}, finding.capture !== undefined && isHere
-            ? jump(app, `capture ${finding.capture}${finding.camera ? ', ' + finding.camera : ''}`, finding.capture, finding.camera ?? '')
-            : null, ' ', finding.message ?? '', el('small', {}, finding.file ?? '')));
+          const isHere = datasetOf(app.site, report) === app.state.dataset;
+          const place = `capture ${finding.capture}${finding.camera ? ', ' + finding.camera : ''}`;
+          const message = finding.message ?? '';
+          const isJump = finding.capture !== undefined && isHere;
+          list.append(el('li', {}, isJump && jump(app, place, finding.capture!, finding.camera ?? ''), ' ',
+            isJump && message.startsWith(place + ': ') ? message.slice(place.length + 2) : message, el('small', {}, finding.file ?? '')));
         }
         this.element.append(el('details', { open: checks.size <= 3 }, el('summary', {}, check, el('small', {}, String(findings.length))), list));
       }
@@ -257,6 +249,11 @@ function table(heads: string[], rows: string[][]): HTMLElement {
     body.append(el('tr', {}, el('th', { scope: 'row' }, first), ...others.map((word) => el('td', {}, word))));
   }
   return el('table', { class: 'texts' }, el('thead', {}, el('tr', {}, ...heads.map((word) => el('th', { scope: 'col' }, word)))), body);
+}
+
+/** For a shell. */
+export function replayCommand(folder: string, capture: number): string {
+  return `diorama replay '${folder.replaceAll("'", "'\\''")}' --capture ${capture}`;
 }
 
 export class RunPage {
@@ -283,13 +280,42 @@ export class RunPage {
     if (run.captures !== undefined) add('captures', `${(run.done ?? 0).toLocaleString('en')} of ${run.captures.toLocaleString('en')}`);
     this.element.append(facts);
     if (run.captures !== undefined && !run.is_finished) this.showProgress(run);
+    this.showLast(app, run);
+    this.showStages(run);
     this.showWorkers(run);
     this.showViews(run);
     this.showSettling(run);
     const capture = app.state.capture || app.info.captures[0] || 0;
     this.element.append(el('h2', {}, 'Make a capture again'),
-      el('pre', {}, `diorama replay '${run.folder.replaceAll("'", "'\\''")}' --capture ${capture}`));
+      el('pre', {}, replayCommand(run.folder, capture)));
     if (run.job) this.element.append(el('h2', {}, 'Job'), el('pre', { class: 'job', tabindex: '0' }, run.job));
+  }
+
+  /** The first camera's pictures of the captures that came last. */
+  private showLast(app: App, run: RunState): void {
+    const there = new Set(app.info.captures);
+    const last = (run.last ?? []).filter((capture) => there.has(capture));
+    if (last.length === 0 || !app.holds.has('color')) return;
+    const pictures = el('div', { class: 'last' });
+    for (const capture of last) {
+      pictures.append(on(el('a', { href: '#', title: `Capture ${capture}` },
+        el('img', { src: pictureAddress(app.state.dataset, capture, 0, 'thumbnail'), alt: `Capture ${capture}` }), el('small', {}, `#${capture}`)), {
+        click: (event: MouseEvent) => {
+          event.preventDefault();
+          app.go({ page: 'capture', capture, frame: 0, object: 0 });
+        },
+      }));
+    }
+    this.element.append(el('h2', {}, 'Last pictures'), pictures);
+  }
+
+  private showStages(run: RunState): void {
+    const stages = Object.entries(run.stages ?? {}).sort((a, b) => b[1] - a[1]);
+    const all = stages.reduce((sum, [, seconds]) => sum + seconds, 0);
+    if (all <= 0) return;
+    const rows = stages.filter(([, seconds]) => seconds >= 0.005 * all)
+      .map(([name, seconds]) => [name, `${seconds.toFixed(1)} s`, `${((100 * seconds) / all).toFixed(0)} %`]);
+    this.element.append(el('h2', {}, 'Where the time goes', el('small', {}, `slowest: ${stages[0][0]}`)), table(['Stage', 'Time of all workers', 'Share'], rows));
   }
 
   private showWorkers(run: RunState): void {
@@ -328,6 +354,6 @@ export class RunPage {
     const rate = made > 0 ? made / Math.max(1, now - this.began.time) : 0;
     const left = rate > 0 ? ((run.captures ?? 0) - (run.done ?? 0)) / rate : 0;
     this.element.append(el('progress', { max: run.captures ?? 1, value: run.done ?? 0, 'aria-label': 'Captures made' }),
-      el('p', {}, rate > 0 ? `${(rate * 60).toFixed(1)} captures a minute, ${Math.ceil(left / 60)} min left` : 'waiting for the next capture …'));
+      el('p', {}, rate > 0 ? `${(rate * 60).toFixed(1)} captures a minute, ${left < 90 ? `${Math.ceil(left)} s` : `${Math.ceil(left / 60)} min`} left` : 'waiting for the next capture …'));
   }
 }

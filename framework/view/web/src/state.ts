@@ -18,7 +18,11 @@ export interface State {
   card: number;  ///< Width of pictures in the grid.
   facets: Map<string, string>;
   space: boolean;  ///< The 3-D view is open.
+  plays: boolean;  ///< The clip of the capture.
+  speed: number;  ///< One of kSpeeds.
 }
+
+export const kSpeeds = [0.25, 0.5, 1, 2, 4];
 
 const kPages: Page[] = ['grid', 'capture', 'compare', 'stats', 'findings', 'run'];
 const kModes: CompareMode[] = ['side', 'divider', 'difference'];
@@ -48,6 +52,8 @@ export function readState(hash: string): State {
     card: Math.min(640, Math.max(120, whole(query.get('card'), 240))),
     facets,
     space: query.get('space') === '1',
+    plays: query.get('play') === '1' && words[0] === 'capture',
+    speed: kSpeeds.find((speed) => String(speed) === query.get('speed')) ?? 1,
   };
 }
 
@@ -65,6 +71,8 @@ export function addressOf(state: State): string {
   if (state.opacity !== 60) query.set('opacity', String(state.opacity));
   if (state.card !== 240) query.set('card', String(state.card));
   if (state.space && state.page === 'capture') query.set('space', '1');
+  if (state.plays && state.page === 'capture') query.set('play', '1');
+  if (state.speed !== 1 && state.page === 'capture') query.set('speed', String(state.speed));
   for (const [key, value] of state.facets) query.set('f.' + key, value);
   const place = state.page === 'capture' || state.page === 'compare' ? `/${state.capture}/${state.frame}` : '';
   const text = query.toString();

@@ -26,6 +26,11 @@ export class Zoom {
     this.listen();
   }
 
+  /** Pixels of the page per pixel of the picture. */
+  get scale(): number {
+    return this.view.scale;
+  }
+
   get paneWidth(): number {
     return this.canvas.clientWidth / this.panes;
   }
