@@ -138,7 +138,7 @@ struct ParamSpec {
   double min = -std::numeric_limits<double>::infinity();
   double max = std::numeric_limits<double>::infinity();
   std::vector<std::string> choices;
-  std::vector<ParamSpec> children;  ///< Of a group, or of one item of a list.
+  std::vector<ParamSpec> children;  ///< Of a group, of an item of a list, or of a variant of Any.
 };
 
 /// Reads a mapping into fields. Complaints: unknown keys (with the nearest known one), wrong types,

@@ -14,9 +14,10 @@ namespace diorama {
 
 /// What a host must know of a component before it makes one; words separated by blanks.
 struct Listing {
-  const char* claims = "";    ///< Loaders: what claims() returns.
-  const char* needs = "";     ///< Annotators: what needs() returns with the default parameters ...
-  const char* provides = "";  ///< ... and what provides() does; at least one name.
+  const char* claims = "";  ///< Loaders: what claims() returns.
+  const char* needs = "";   ///< Annotators: what needs() returns with the default parameters ...
+  /// ... and what provides() does: at least one name, or "*" where only the parameters tell.
+  const char* provides = "";
 };
 
 /// One component type, as data. Everything a host needs to list, check and make it. What it points

@@ -20,7 +20,7 @@ struct RandomizeContext {
   /// one, whether or not this run made them. What a `sequence` goes by.
   int occurrence = 0;
   /// The first frame of the clip that begins, at the moments of clips.
-  std::optional<ClipFrame> clip;
+  std::optional<ClipFrame> clip = {};
 };
 
 /// Changes poses, lights, materials, cameras. Called by one thread at a time.
