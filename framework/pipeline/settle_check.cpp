@@ -151,7 +151,8 @@ std::string speed_text(double speed) {
 }  // namespace
 
 std::vector<Flaw> find_unsettled(const Scene& scene, const Room& room,
-                                 const std::vector<NodeId>& objects, const SettleLimits& limits) {
+                                 const std::vector<NodeId>& objects, const LastStep& last,
+                                 const SettleLimits& limits) {
   const Obstacles all = all_obstacles(scene, objects, Obstacles::Hidden::LeaveOut);
   const std::set<NodeId> held = supported(scene, objects, all, limits.reach_m);
   std::vector<Flaw> flaws;
@@ -161,8 +162,9 @@ std::vector<Flaw> find_unsettled(const Scene& scene, const Room& room,
     const bool is_seen = !node_bounds(scene, object).is_empty();
     if (!room.holds(scene, object)) {
       flaws.push_back({object, "left the room"});
-    } else if (falls && body->linear_velocity.norm() > limits.rest_speed) {
-      flaws.push_back({object, speed_text(body->linear_velocity.norm())});
+    } else if (const double speed = falls ? speed_of(scene, object, last) : 0.0;
+               speed > limits.rest_speed) {
+      flaws.push_back({object, speed_text(speed)});
     } else if (const NodeId other = stuck_in(scene, object, all, limits)) {
       flaws.push_back({object, "is stuck in " + scene.path(other)});
     } else if (falls && is_seen && !held.contains(object)) {

@@ -11,6 +11,7 @@
 namespace diorama {
 
 class Room;
+struct LastStep;
 
 /// A thing and what is wrong with it, in words that follow its name: "hangs in the air".
 struct Flaw {
@@ -21,14 +22,15 @@ struct Flaw {
 struct SettleLimits {
   double rest_speed = 0.05;  ///< m/s; slower is at rest.
   double reach_m = 0.01;     ///< Nearer than this is supported.
-  double depth_m = 0.015;    ///< Crossed deeper than this is stuck; thin things at a third.
+  double depth_m = 0.01;     ///< Crossed deeper than this is stuck; thin things at a third.
 };
 
 /// Objects that are no picture of things at rest: outside the room, moving, in the air without
 /// touching anything that stands, or crossed by something deep inside. What floats (without
 /// gravity) may hang and drift. Each object once, in the order given.
 std::vector<Flaw> find_unsettled(const Scene& scene, const Room& room,
-                                 const std::vector<NodeId>& objects, const SettleLimits& limits);
+                                 const std::vector<NodeId>& objects, const LastStep& last,
+                                 const SettleLimits& limits);
 
 /// Objects that touch or stand inside something, hidden or not.
 std::vector<Flaw> find_born_inside(const Scene& scene, const std::vector<NodeId>& objects);

@@ -170,13 +170,25 @@ bool Room::holds(const Scene& scene, NodeId node) const {
   return (place.array() >= box_.min.array()).all() && (place.array() <= box_.max.array()).all();
 }
 
-double fastest_falling(const Scene& scene, const Room& room, const std::vector<NodeId>& objects) {
+double speed_of(const Scene& scene, NodeId object, const LastStep& last) {
+  const auto& body = scene[object].rigid_body;
+  double speed = body ? body->linear_velocity.norm() : 0.0;
+  const auto before = last.before.find(object);
+  if (before != last.before.end() && last.seconds > 0.0) {
+    const Vec3 way = scene.world_from_node(object).translation() - before->second.translation();
+    speed = std::max(speed, way.norm() / last.seconds);
+  }
+  return speed;
+}
+
+double fastest_falling(const Scene& scene, const Room& room, const std::vector<NodeId>& objects,
+                       const LastStep& last) {
   double fastest = 0.0;
   for (const NodeId object : objects) {
     const auto& body = scene[object].rigid_body;
     // What has left the room falls for ever and says nothing about the rest.
     if (!body || !body->has_gravity || !room.holds(scene, object)) continue;
-    fastest = std::max(fastest, body->linear_velocity.norm());
+    fastest = std::max(fastest, speed_of(scene, object, last));
   }
   return fastest;
 }

@@ -9,6 +9,7 @@
 
 #include "diorama/math.h"
 #include "diorama/scene.h"
+#include "framework/annotators/motion.h"
 
 /// How the objects of a visit come to rest, and what becomes of those that do not stay in the room.
 namespace diorama {
@@ -76,8 +77,19 @@ class Room {
   Aabb box_;
 };
 
+/// The last step of a simulation.
+struct LastStep {
+  const BodyPoses& before;  ///< Where bodies were; those that were placed since are not among them.
+  double seconds = 0.0;     ///< 0: none was taken.
+};
+
+/// How fast an object is seen to move, in m/s: by its velocity, or by how far the last step took it
+/// if that is more, as engines push bodies out of each other without giving them a velocity.
+double speed_of(const Scene& scene, NodeId object, const LastStep& last);
+
 /// Highest speed, in m/s, of those objects in the room that gravity acts on; 0 without any.
-double fastest_falling(const Scene& scene, const Room& room, const std::vector<NodeId>& objects);
+double fastest_falling(const Scene& scene, const Room& room, const std::vector<NodeId>& objects,
+                       const LastStep& last);
 
 /// Where everything with a mesh stood, and whether it was visible, when a visit had been set up.
 class SceneAsSetUp {

@@ -13,7 +13,6 @@
 #include "framework/pipeline/physics_view.h"
 #include "framework/pipeline/scene_setup.h"
 #include "framework/pipeline/stopwatch.h"
-#include "framework/pipeline/view_search.h"
 #include "framework/plugins/fatal_end.h"
 #include "framework/plugins/plugin_call.h"
 
@@ -295,7 +294,7 @@ std::vector<Flaw> VisitRun::unsettled(const TimelineStep& step) const {
   if (!components_.physics) return {};
   const Room room(scene_, environment_);
   if (step.until_rest) {
-    return find_unsettled(scene_, room, objects_, {job_.settle.rest_speed});
+    return find_unsettled(scene_, room, objects_, last_step(), {job_.settle.rest_speed});
   }
   std::vector<Flaw> flaws;
   for (const NodeId object : objects_) {
@@ -324,20 +323,15 @@ void VisitRun::advance(const TimelineStep& step) {
   for (int taken = 0; taken < step.steps;) {
     setting_.stop_if_asked();
     const int now = step.each_step.empty() ? std::min(kStepsAtOnce, step.steps - taken) : 1;
-    const bool may_be_last = step.until_rest || taken + now == step.steps;
     // The last step goes by itself: what it moves is the motion that captures show, and how fast
     // objects are.
-    if (may_be_last) {
-      take(now - 1);
-      before_last_step_ = body_poses(scene_);
-      take(1);
-      if (components_.physics) last_step_s_ = components_.physics->step_seconds();
-    } else {
-      take(now);
-    }
+    take(now - 1);
+    before_last_step_ = body_poses(scene_);
+    take(1);
+    if (components_.physics) last_step_s_ = components_.physics->step_seconds();
     taken += now;
     if (!step.each_step.empty()) randomize(step.each_step, events_[step.each_step]++, -1);
-    if (fastest_falling(scene_, room, objects_) > job_.settle.rest_speed) {
+    if (fastest_falling(scene_, room, objects_, last_step()) > job_.settle.rest_speed) {
       moving_until_s_ = simulated_s_;
     }
     if (step.until_rest && taken >= step.at_least && is_at_rest()) return;
@@ -383,13 +377,7 @@ void VisitRun::take_captures(const TimelineStep& step) {
     if (next_capture_ == planned_.capture_count) return;
     const PlannedCapture planned = setting_.plan.capture(planned_.first_capture + next_capture_++);
     randomize(planned.phase, planned.number, planned.index);
-    if (setting_.is_needed(planned.index)) {
-      take(planned);
-    } else if (job_.views.empty()) {
-      // The visit's report tells of all captures. Where rules choose views, only making the capture
-      // would say which it has.
-      note_blocked_cameras();
-    }
+    take_or_pass(planned);
   }
 }
 
@@ -413,12 +401,8 @@ void VisitRun::record(const TimelineStep& step) {
     }
     track_.show(frame, scene_);
     const PlannedCapture planned = setting_.plan.capture(planned_.first_capture + next_capture_++);
-    if (setting_.is_needed(planned.index)) {
-      shutters.move(scene_, track_, frame, step.fps);
-      take(planned);
-    } else {
-      note_blocked_cameras();
-    }
+    if (setting_.is_needed(planned.index)) shutters.move(scene_, track_, frame, step.fps);
+    take_or_pass(planned);
   }
   shutters.restore(scene_);
 }
@@ -441,7 +425,7 @@ void VisitRun::play(const PlannedCapture& first, const ClipFrame& at) {
     take_steps(1);
     simulated_s_ += seconds;
     const Room room(scene_, environment_);
-    if (fastest_falling(scene_, room, objects_) > job_.settle.rest_speed) {
+    if (fastest_falling(scene_, room, objects_, last_step()) > job_.settle.rest_speed) {
       moving_until_s_ = simulated_s_;
     }
   }
@@ -461,6 +445,20 @@ void VisitRun::play(const PlannedCapture& first, const ClipFrame& at) {
     });
   }
   track_.add(scene_);
+}
+
+/// The visit's report tells of all its captures, so that it is the same whichever of them were made
+/// before: those that are not needed are looked at as well, as far as the report needs it.
+void VisitRun::take_or_pass(const PlannedCapture& planned) {
+  if (setting_.is_needed(planned.index)) return take(planned);
+  const int last = planned_.first_capture + planned_.capture_count - 1;
+  if (!setting_.is_needed(last)) return;
+  setting_.stop_if_asked();
+  const SavedView drawn(scene_, camera_tops(scene_));
+  ViewSearch search = view_search(planned);
+  choose_views(search);
+  note_blocked_cameras();
+  drawn.restore(scene_);
 }
 
 void VisitRun::take(const PlannedCapture& planned) {
@@ -487,17 +485,17 @@ void VisitRun::take(const PlannedCapture& planned) {
   // A visit that is cut short ends with its objects in the air, which says nothing.
   const bool is_last = next_capture_ == planned_.capture_count;
   if (is_last && simulations_to_come_ == 0) {
-    result_.reports.push_back(report());
-    pending.settle_json = settle_json(result_.reports.back());
+    VisitReport& report = result_.reports.emplace_back(make_report());
+    pending.settle_json = settle_json(report);
+    // A run keeps the reports of all its visits. Places, a line for every mesh of a room, are in
+    // the file now.
+    for (auto* places : {&report.born, &report.placed}) *places = {};
+    report.objects = {};
   }
   ++result_.captures;
   result_.respawned = int(report_.respawned.size());
   const Stopwatch watch(result_.seconds["waiting for writers"]);
   setting_.hand_over(std::move(pending), result_);
-}
-
-void VisitRun::note_blocked_cameras() {
-  note(scene_, find_blocked_cameras(scene_, cameras_), report_.cameras);
 }
 
 void VisitRun::prepare_renderer() {
@@ -506,19 +504,29 @@ void VisitRun::prepare_renderer() {
                  [&] { components_.renderer->prepare(scene_); });
 }
 
-/// The pictures of all cameras, from views as the job wants them.
-std::vector<ViewOutcome> VisitRun::take_frames(const PlannedCapture& planned,
-                                               std::vector<Frame>& frames) {
-  ViewSearch search({job_, setting_.streams, host_, *components_.renderer, scene_, cameras_,
-                     small_cameras_, planned, !camera_randomizers_.empty(), [&](int number) {
+ViewSearch VisitRun::view_search(const PlannedCapture& planned) {
+  return ViewSearch({job_, setting_.streams, host_, *components_.renderer, scene_, cameras_,
+                     small_cameras_, planned, !camera_randomizers_.empty(),
+                     [this, planned](int number) {
                        call_randomizers(planned.phase, planned.number, planned.index,
                                         {"view", number, &camera_randomizers_});
                      }});
-  const auto choose_views = [&] {
-    const Stopwatch watch(result_.seconds["choosing views"]);
-    search.run();
-  };
-  choose_views();
+}
+
+void VisitRun::choose_views(ViewSearch& search) {
+  const Stopwatch watch(result_.seconds["choosing views"]);
+  search.run();
+}
+
+void VisitRun::note_blocked_cameras() {
+  note(scene_, find_blocked_cameras(scene_, cameras_), report_.cameras);
+}
+
+/// The pictures of all cameras, from views as the job wants them.
+std::vector<ViewOutcome> VisitRun::take_frames(const PlannedCapture& planned,
+                                               std::vector<Frame>& frames) {
+  ViewSearch search = view_search(planned);
+  choose_views(search);
   note_blocked_cameras();
   prepare_renderer();
   for (std::size_t i = 0; i < cameras_.size(); ++i) {
@@ -526,7 +534,7 @@ std::vector<ViewOutcome> VisitRun::take_frames(const PlannedCapture& planned,
     frames.push_back(make_frame(i, planned));
   }
   for (auto refused = search.refuse_pictures(frames); !refused.empty();) {
-    choose_views();
+    choose_views(search);
     prepare_renderer();
     for (const std::size_t i : refused) frames[i] = make_frame(i, planned);
     refused = search.refuse_pictures(frames);
@@ -650,7 +658,7 @@ Image<Rgba8> VisitRun::make_overview(int capture) {
                         [&] { return components_.renderer->render(request).get(kColor); });
 }
 
-VisitReport VisitRun::report() const {
+VisitReport VisitRun::make_report() const {
   VisitReport report = report_;
   report.visit = planned_.index;
   report.environment = clean_name(setting_.plan.environments[planned_.environment].asset);
@@ -665,10 +673,10 @@ VisitReport VisitRun::report() const {
   }
   const Room room(scene_, environment_);
   if (components_.physics) {
-    note(scene_, find_unsettled(scene_, room, objects_, {job_.settle.rest_speed}),
+    note(scene_, find_unsettled(scene_, room, objects_, last_step(), {job_.settle.rest_speed}),
          report.unsettled);
   }
-  report.max_speed = fastest_falling(scene_, room, objects_);
+  report.max_speed = fastest_falling(scene_, room, objects_, last_step());
   if (components_.physics) {
     report.step_s = last_step_s_ > 0.0 ? last_step_s_ : components_.physics->step_seconds();
   }

@@ -21,6 +21,7 @@
 #include "framework/pipeline/settle_check.h"
 #include "framework/pipeline/settling.h"
 #include "framework/pipeline/view_report.h"
+#include "framework/pipeline/view_search.h"
 #include "framework/pipeline/writer_queue.h"
 
 namespace diorama {
@@ -74,6 +75,7 @@ class VisitRun {
   std::vector<std::size_t> call_randomizers(const std::string& moment, int number, int capture,
                                             const Draw& draw,
                                             const std::optional<ClipFrame>& clip = {});
+  LastStep last_step() const { return {before_last_step_, last_step_s_}; }
   void simulate(const TimelineStep& step);
   void advance(const TimelineStep& step);
   std::vector<Flaw> unsettled(const TimelineStep& step) const;
@@ -86,14 +88,17 @@ class VisitRun {
   void measure_flows(const std::optional<ClipFrame>& clip, std::vector<Frame>& frames);
   FlowMeter::WorldThere world_in(int frame) const;
   void set_motion(const std::optional<ClipFrame>& clip, Frame& frame);
+  void take_or_pass(const PlannedCapture& planned);
   void take(const PlannedCapture& planned);
-  std::vector<ViewOutcome> take_frames(const PlannedCapture& planned, std::vector<Frame>& frames);
+  ViewSearch view_search(const PlannedCapture& planned);
+  void choose_views(ViewSearch& search);
   void note_blocked_cameras();
+  std::vector<ViewOutcome> take_frames(const PlannedCapture& planned, std::vector<Frame>& frames);
   void prepare_renderer();
   Frame make_frame(std::size_t camera, const PlannedCapture& planned);
   void measure_coverage(NodeId camera, Frame& frame);
   Image<Rgba8> make_overview(int capture);
-  VisitReport report() const;
+  VisitReport make_report() const;
 
   Setting setting_;
   const Job& job_;

@@ -27,6 +27,10 @@ float filmic(float x) {
 template <class LuminanceAt>
 double exposure_of(int width, int height, const LuminanceAt& luminance_at) {
   constexpr double kMiddleGrey = 0.18;
+  // What the middle tones of a dark picture ask for burns all else in it. Brighter by more than
+  // this are windows and lamps, whatever they take of the picture: what they light is to be seen.
+  constexpr double kWhite = 1.0;
+  constexpr double kMostDarker = 3.0;
   // Of large pictures every so many pixels will do.
   const double share = double(width) * double(height) / kExposurePixels;
   const int step = std::max(1, int(std::sqrt(share)));
@@ -46,7 +50,11 @@ double exposure_of(int width, int height, const LuminanceAt& luminance_at) {
   if (end != lit.end()) std::nth_element(begin, end, lit.end());
   double sum = 0.0;
   for (auto it = begin; it != end; ++it) sum += std::log(double(*it));
-  return std::clamp(kMiddleGrey / std::exp(sum / double(end - begin)), 1e-8, 1e8);
+  double exposure = kMiddleGrey / std::exp(sum / double(end - begin));
+  if (end != lit.end()) {
+    exposure /= std::clamp(exposure * double(*end) / kWhite, 1.0, kMostDarker);
+  }
+  return std::clamp(exposure, 1e-8, 1e8);
 }
 
 }  // namespace

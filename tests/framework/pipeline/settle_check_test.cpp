@@ -36,9 +36,9 @@ struct Stage {
     return node;
   }
   /// "name: why", in order.
-  std::vector<std::string> unsettled() const {
+  std::vector<std::string> unsettled(const LastStep& last = {{}, 0.0}) const {
     std::vector<std::string> texts;
-    for (const Flaw& flaw : find_unsettled(scene, Room(scene, environment), objects, {})) {
+    for (const Flaw& flaw : find_unsettled(scene, Room(scene, environment), objects, last, {})) {
       texts.push_back(scene[flaw.node].name + ": " + flaw.why);
     }
     return texts;
@@ -76,6 +76,22 @@ TEST_CASE("What hangs, moves, is outside or sticks is named with the reason", "[
   CHECK(stage.unsettled() == Texts{"in_air: hangs in the air", "rolls: moves at 0.30 m/s",
                                    "gone: left the room", "half_in: is stuck in /Environment/table",
                                    "inside: is stuck in /Environment/table"});
+}
+
+TEST_CASE("What has sunk in by more than a centimetre is stuck", "[settle]") {
+  Stage stage;
+  stage.add_object("sunk", kBox, at(0.2, 0.1, 0.787));
+  stage.add_object("pressed", kBox, at(-0.2, 0.1, 0.793));
+  CHECK(stage.unsettled() == Texts{"sunk: is stuck in /Environment/table"});
+}
+
+TEST_CASE("What the last step pushed moves, whatever its velocity", "[settle]") {
+  Stage stage;
+  const NodeId pushed = stage.add_object("pushed", kBox, at(0.2, 0.1, 0.8));
+  BodyPoses before = body_poses(stage.scene);
+  CHECK(stage.unsettled({before, 0.02}) == Texts{});
+  before.at(pushed).translation().x() -= 0.002;
+  CHECK(stage.unsettled({before, 0.02}) == Texts{"pushed: moves at 0.10 m/s"});
 }
 
 TEST_CASE("Two things that hold each other hang both; what floats may hang and hold", "[settle]") {

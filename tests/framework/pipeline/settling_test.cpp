@@ -65,7 +65,14 @@ TEST_CASE("The fastest object is one that falls, in the room", "[settle]") {
   set_speed(1, 7.0, false);
   set_speed(2, 9.0, true);  // outside
   const Room room(stage.scene, stage.environment);
-  CHECK(fastest_falling(stage.scene, room, stage.objects) == 0.2);
+  CHECK(fastest_falling(stage.scene, room, stage.objects, {{}, 0.0}) == 0.2);
+  // Pushed by 10 mm in 20 ms, which left no velocity.
+  BodyPoses before = body_poses(stage.scene);
+  before.at(stage.objects[3]).translation().x() += 0.01;
+  CHECK(fastest_falling(stage.scene, room, stage.objects, {before, 0.02}) == Approx(0.5));
+  // It was placed since.
+  before.erase(stage.objects[3]);
+  CHECK(fastest_falling(stage.scene, room, stage.objects, {before, 0.02}) == 0.2);
 }
 
 TEST_CASE("Saved nodes come back as they were, all others stay as they are", "[settle]") {

@@ -350,6 +350,24 @@ TEST_CASE("exposure does not depend on the scale of the light", "[exposure]") {
   CHECK(automatic_exposure(Image<Vec3f>(4, 3, Vec3f::Zero())) == 1.0);
 }
 
+TEST_CASE("dark middle tones burn no more than a tenth of a picture", "[exposure]") {
+  // So many hundredths of a dark picture are lit, so many times as bright.
+  const auto exposed = [](int percent, float brighter) {
+    Image<Vec3f> picture(50, 20, Vec3f::Constant(0.02f));
+    for (int i = 0; i < 10 * percent; ++i) {
+      picture.pixels()[std::size_t(i)] = Vec3f::Constant(0.02f * brighter);
+    }
+    return automatic_exposure(picture) * 0.02;
+  };
+  // Of 30 hundredths 20 are among the middle 80.
+  CHECK(exposed(30, 5.0f) == Approx(0.18 / std::pow(5.0, 0.25)));
+  CHECK(exposed(30, 20.0f) == Approx(1.0 / 20.0));
+  CHECK(exposed(20, 16.0f) == Approx(1.0 / 16.0));
+  // What takes less than a tenth may burn, and what is far brighter, too.
+  CHECK(exposed(9, 20.0f) == Approx(0.18));
+  CHECK(exposed(20, 1e5f) == Approx(0.18 / std::pow(1e5, 0.125) / 3.0));
+}
+
 TEST_CASE("the standard view is sRGB, the filmic one never clips abruptly", "[exposure]") {
   test::RenderHost host(2);
   Image<Vec3f> ramp(256, 1, Vec3f::Zero());
