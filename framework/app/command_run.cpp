@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "framework/app/exit_codes.h"
+#include "framework/app/shell_text.h"
 #include "framework/config/clean_text.h"
 #include "framework/config/job_overrides.h"
 #include "framework/config/yaml_config.h"
@@ -111,7 +112,8 @@ RunSummary run_job(JobAssembly& assembly, HostServices& host, const RunCommandOp
   run.only = options.only;
   run.progress = [&](const RunProgress& progress) {
     if (lines) {
-      lines->update(progress.done, progress.total, progress.resumed, progress.respawned);
+      lines->update(progress.done, progress.total, progress.resumed, progress.respawned,
+                    progress.refused);
       return;
     }
     if (!bar) bar.emplace(log, "captures", progress.total);
@@ -132,8 +134,8 @@ void log_lines(const std::string& text, ConsoleLog& log) {
 
 /// Where the dataset is, and what comes after it.
 void log_next_step(const RunSummary& summary, const fs::path& dataset, ConsoleLog& log) {
-  const std::string folder = dataset.string();
-  log.write(LogLevel::Info, "dataset: " + folder);
+  const std::string folder = shell_word(dataset.string());
+  log.write(LogLevel::Info, "dataset: " + dataset.string());
   log.write(LogLevel::Info, summary.is_finished
                                 ? "next: diorama lint " + folder + ", diorama view " + folder
                                 : "next: diorama status " + folder);

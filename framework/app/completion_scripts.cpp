@@ -5,6 +5,7 @@
 #include <map>
 #include <string_view>
 
+#include "framework/app/shell_text.h"
 #include "framework/config/joined.h"
 
 namespace diorama {
@@ -42,13 +43,6 @@ ValueOffer offer_for(std::string_view value) {
     if (known.value == value) return known;
   }
   return {value, Offer::Files};  // JOB, FILE, ASSET ...
-}
-
-/// In single quotes, for any of the three shells.
-std::string shell_quoted(std::string_view text) {
-  std::string out = "'";
-  for (const char c : text) out += c == '\'' ? std::string(R"('\'')") : std::string(1, c);
-  return out + "'";
 }
 
 std::string last_word(const std::string& name) { return name.substr(name.rfind(' ') + 1); }

@@ -2,15 +2,13 @@
 #include "framework/datasets/dataset_origin.h"
 
 #include <algorithm>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
-#include <sstream>
 #include <utility>
 
 #include "framework/config/json_text.h"
 #include "framework/datasets/capture_sweep.h"
-#include "framework/host/regular_file.h"
+#include "framework/output/file_system.h"
 #include "framework/pipeline/view_report.h"
 
 namespace diorama {
@@ -20,10 +18,8 @@ namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
 std::string read_file(const fs::path& file) {
-  std::ifstream in = open_regular_file(file);
-  std::ostringstream text;
-  if (in) text << in.rdbuf();
-  return std::move(text).str();
+  LocalFileSystem file_system;
+  return file_system.exists(file) ? file_system.read(file) : std::string();
 }
 
 std::string read_page(const fs::path& folder) { return read_file(folder / "dataset.json"); }

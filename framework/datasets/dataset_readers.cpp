@@ -4,16 +4,14 @@
 #include <fnmatch.h>
 
 #include <algorithm>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
-#include <sstream>
 
 #include "diorama/config.h"
 #include "diorama/error.h"
 #include "framework/config/joined.h"
 #include "framework/config/json_text.h"
-#include "framework/host/regular_file.h"
+#include "framework/output/file_system.h"
 #include "framework/plugins/plugin_call.h"
 
 namespace diorama {
@@ -26,10 +24,9 @@ std::string reader_name(const std::string& type) { return "reader '" + type + "'
 /// Folders that the page of a run names, as far as they lie below it.
 std::set<fs::path> named_folders(const fs::path& run) {
   std::set<fs::path> folders;
-  std::ifstream in = open_regular_file(run / "dataset.json");
-  std::ostringstream text;
-  if (in) text << in.rdbuf();
-  const auto json = parse_json_or_nothing(text.str());
+  LocalFileSystem file_system;
+  if (!file_system.exists(run / "dataset.json")) return {};
+  const auto json = parse_json_or_nothing(file_system.read(run / "dataset.json"));
   if (!json.is_object() || !json.contains("writers") || !json.at("writers").is_array()) return {};
   for (const auto& writer : json.at("writers")) {
     if (!writer.is_object() || !writer.contains("folder") || !writer.at("folder").is_string()) {

@@ -2,14 +2,12 @@
 #include "framework/datasets/page_checks.h"
 
 #include <algorithm>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
-#include <sstream>
 
 #include "framework/config/json_text.h"
 #include "framework/datasets/check_names.h"
-#include "framework/host/regular_file.h"
+#include "framework/output/file_system.h"
 
 namespace diorama {
 namespace {
@@ -92,13 +90,11 @@ void compare(const Json& page, const PlannedDataset& planned, const StoredInfo& 
 
 std::optional<PlannedDataset> check_page(const std::filesystem::path& folder,
                                          const StoredInfo& info, ReadLog& log) {
-  std::ifstream in = open_regular_file(folder / kPage);
-  if (!in) return std::nullopt;
-  std::ostringstream text;
-  text << in.rdbuf();
+  LocalFileSystem file_system;
+  if (!file_system.exists(folder / kPage)) return std::nullopt;
   ++log.files;
   try {
-    const Json page = parse_json(text.str());
+    const Json page = parse_json(file_system.read(folder / kPage));
     // The page of a run, or of somebody else.
     if (!page.contains("split") && !page.contains("program")) return std::nullopt;
     check_stated(page, log);

@@ -3,12 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <sstream>
 #include <utility>
 #include <vector>
 
@@ -16,7 +14,7 @@
 #include "framework/datasets/capture_sweep.h"
 #include "framework/datasets/check_names.h"
 #include "framework/datasets/frame_checks.h"
-#include "framework/host/regular_file.h"
+#include "framework/output/file_system.h"
 
 namespace diorama {
 namespace {
@@ -45,13 +43,11 @@ struct RunPlan {
 };
 
 std::optional<RunPlan> read_plan(const std::filesystem::path& run, ReadLog& log) {
-  std::ifstream in = open_regular_file(run / "dataset.json");
-  if (!in) return std::nullopt;
-  std::ostringstream text;
-  text << in.rdbuf();
+  LocalFileSystem file_system;
+  if (!file_system.exists(run / "dataset.json")) return std::nullopt;
   ++log.files;
   try {
-    const Json page = parse_json(text.str());
+    const Json page = parse_json(file_system.read(run / "dataset.json"));
     return RunPlan{page.at("captures").get<int>(),
                    page.at("cameras").get<std::vector<std::string>>()};
   } catch (const std::exception& error) {

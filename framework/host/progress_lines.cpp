@@ -24,7 +24,7 @@ ProgressLines::ProgressLines(Format format, std::ostream& stream)
     : format_(format), stream_(stream), start_(std::chrono::steady_clock::now()) {}
 
 void ProgressLines::update(std::int64_t done, std::int64_t total, std::int64_t resumed,
-                           std::int64_t respawned) {
+                           std::int64_t respawned, std::int64_t refused) {
   const double seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
   const double per_second = seconds > 0 ? double(done - resumed) / seconds : 0.0;
@@ -37,9 +37,9 @@ void ProgressLines::update(std::int64_t done, std::int64_t total, std::int64_t r
         per_second > 0 ? fmt::format("{:.1f}", double(total - done) / per_second) : "null";
     stream_ << fmt::format(
         R"({{"done": {}, "total": {}, "resumed": {}, "per_minute": {:.2f}, "seconds_left": {}, )"
-        R"("respawned": {}, "rss_mib": {:.1f}}})"
+        R"("respawned": {}, "refused": {}, "rss_mib": {:.1f}}})"
         "\n",
-        done, total, resumed, 60.0 * per_second, left, respawned,
+        done, total, resumed, 60.0 * per_second, left, respawned, refused,
         double(resident_bytes()) / (1 << 20));
   }
   stream_.flush();

@@ -20,8 +20,9 @@ class ProgressLines {
   ProgressLines(Format format, std::ostream& stream);
 
   /// `done` includes `resumed`, which were there before and do not count for the rate. `respawned`:
-  /// objects that had left the room and were placed anew.
-  void update(std::int64_t done, std::int64_t total, std::int64_t resumed, std::int64_t respawned);
+  /// objects that had left the room and were placed anew. `refused`: views that were drawn again.
+  void update(std::int64_t done, std::int64_t total, std::int64_t resumed, std::int64_t respawned,
+              std::int64_t refused);
 
  private:
   Format format_;

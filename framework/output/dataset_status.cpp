@@ -10,6 +10,7 @@
 #include <system_error>
 
 #include "diorama/error.h"
+#include "framework/config/clean_text.h"
 #include "framework/config/json_text.h"
 #include "framework/output/journal.h"
 #include "framework/output/workers.h"
@@ -139,7 +140,8 @@ DatasetStatus read_status(FileSystem& file_system, const fs::path& folder, bool 
   Journals journals(file_system, folder / ".diorama" / "journal", status.captures);
   journals.refresh();
   status.done = journals.published_captures();
-  status.is_finished = status.done == status.captures && journals.is_published(kFinishEntry);
+  status.is_finished = status.done == status.captures && journals.is_published(kBeginEntry) &&
+                       journals.is_published(kFinishEntry);
   const std::string records = journals.records_folder().value_or(".");
   status.base = base_of(folder, records);
   for (int capture = 0; capture < status.captures; ++capture) {
@@ -175,7 +177,7 @@ std::string status_text(const DatasetStatus& status, const fs::path& folder) {
     text += "ended: " + std::to_string(ended) + (ended == 1 ? " worker, " : " workers, ") +
             std::to_string(captures_of_ended) + " captures\n";
   }
-  for (const std::string& fault : status.faults) text += "fault: " + fault + "\n";
+  for (const std::string& fault : status.faults) text += "fault: " + clean_name(fault) + "\n";
   if (!status.faults.empty()) text += "'diorama run --resume --verify' makes them anew\n";
   return text;
 }

@@ -254,7 +254,18 @@ std::optional<FileStatus> LocalFileSystem::status(const fs::path& path) {
 }
 
 std::string LocalFileSystem::read(const fs::path& file) {
-  return OpenFile(file, O_RDONLY | O_NONBLOCK, "cannot read").read(0, ~std::uint64_t(0));
+  OpenFile open_file(file, O_RDONLY | O_NONBLOCK, "cannot read");
+  struct stat status {};
+  if (::fstat(open_file.handle(), &status) != 0) fail("cannot read", file, errno);
+  if (!S_ISREG(status.st_mode)) {
+    throw Error(ErrorKind::Output, "cannot read " + file.string() + ": it is no regular file");
+  }
+  if (std::uint64_t(status.st_size) > kMostReadBytes) {
+    throw Error(ErrorKind::Output, "cannot read " + file.string() + ": it has " +
+                                       std::to_string(status.st_size) + " bytes, more than the " +
+                                       std::to_string(kMostReadBytes) + " that are read at once");
+  }
+  return open_file.read(0, kMostReadBytes);
 }
 
 std::string LocalFileSystem::read_part(const fs::path& file, std::uint64_t offset,

@@ -22,6 +22,9 @@ struct FileStatus {
   std::int64_t modified_ns = 0;  ///< By the clock of the file system, which may be a server's.
 };
 
+/// What read() takes: far more than any description of a dataset has.
+inline constexpr std::uint64_t kMostReadBytes = std::uint64_t(1) << 30;
+
 /// A file that one process appends to.
 class AppendFile {
  public:
@@ -71,6 +74,7 @@ class FileSystem {
 
   /// Empty when there is nothing, or a parent is missing.
   virtual std::optional<FileStatus> status(const std::filesystem::path& path) = 0;
+  /// All of a regular file of at most kMostReadBytes: what a stranger sent may have no end.
   virtual std::string read(const std::filesystem::path& file) = 0;
   /// Fewer bytes where the file ends; empty when it is not there.
   virtual std::string read_part(const std::filesystem::path& file, std::uint64_t offset,

@@ -303,21 +303,25 @@ std::vector<EntryPlace> WorkerIndex::unsettled() const {
   return places;
 }
 
-void Journals::set_published(const std::string& worker, int entry, WorkerIndex& index) {
+/// False, and nothing happens, when no line of its worker says what it holds: who looks for damage
+/// would never see it.
+bool Journals::set_published(const std::string& worker, int entry, WorkerIndex& index) {
   const auto [first, last] = index.committed.equal_range(entry);
+  if (first == last) return false;
   for (auto at = first; at != last; ++at) {
     at->second.is_published = true;
     index.published_since.push_back(std::move(at->second));
   }
   index.committed.erase(first, last);
-  if (voids_.contains({worker, entry})) return;
+  if (voids_.contains({worker, entry})) return true;
   if (entry == kBeginEntry) has_begun_ = true;
   if (entry == kFinishEntry) has_finished_ = true;
-  if (entry < 0 || entry >= capture_count_) return;
+  if (entry < 0 || entry >= capture_count_) return true;
   ++index.published;
-  if (published_[std::size_t(entry)]) return;
+  if (published_[std::size_t(entry)]) return true;
   published_[std::size_t(entry)] = true;
   ++published_captures_;
+  return true;
 }
 
 namespace {
@@ -342,6 +346,28 @@ std::string_view checked(std::string_view line) {
   return checksum(text) == line.substr(line.size() - 8) ? text : std::string_view();
 }
 
+/// Those whose checksums hold, without these, from `offset` on, in little memory; moves `offset`
+/// behind what was read.
+void read_lines(FileSystem& file_system, const fs::path& file, std::uint64_t& offset,
+                const std::function<void(std::string_view)>& visit) {
+  constexpr std::uint64_t kBlock = std::uint64_t(1) << 22;
+  for (;;) {
+    const std::string block = file_system.read_part(file, offset, kBlock);
+    // A line without its end is on its way, or torn.
+    const std::size_t end = block.rfind('\n');
+    if (end == std::string::npos) return;
+    std::string_view rest = std::string_view(block).substr(0, end + 1);
+    while (!rest.empty()) {
+      const std::size_t length = rest.find('\n');
+      const std::string_view text = checked(rest.substr(0, length));
+      rest.remove_prefix(length + 1);
+      if (!text.empty()) visit(text);
+    }
+    offset += end + 1;
+    if (block.size() < kBlock) return;
+  }
+}
+
 }  // namespace
 
 void Journals::take(const std::string& worker, WorkerIndex& index, const Line& line) {
@@ -360,7 +386,7 @@ void Journals::take(const std::string& worker, WorkerIndex& index, const Line& l
       index.published_since.clear();
       break;
     case 'p':
-      set_published(line.worker, line.entry, workers_[line.worker]);
+      published_for_.emplace(line.worker, line.entry);
       break;
     case 'v':
       has_new_voids_ |= voids_.emplace(line.worker, line.entry).second;
@@ -417,47 +443,44 @@ std::optional<Journals::Line> Journals::parse(std::string_view text) {
 }
 
 void Journals::read_worker(const std::string& worker) {
-  constexpr std::uint64_t kBlock = std::uint64_t(1) << 22;
-  const fs::path file = index_file(worker);
   WorkerIndex& index = workers_[worker];
-  for (;;) {
-    const std::string block = file_system_.read_part(file, index.bytes_read, kBlock);
-    // A line without its end is on its way, or torn.
-    const std::size_t end = block.rfind('\n');
-    if (end == std::string::npos) return;
-    std::string_view rest = std::string_view(block).substr(0, end + 1);
-    while (!rest.empty()) {
-      const std::size_t length = rest.find('\n');
-      const std::string_view text = checked(rest.substr(0, length));
-      rest.remove_prefix(length + 1);
-      if (text.empty()) continue;
-      const auto line = parse(text);
-      if (!line) {
-        throw Error(ErrorKind::Output, file.string() + ": no journal of this version: expected " +
-                                           "lines such as 'd 000017', found '" +
-                                           std::string(text.substr(0, 80)) + "'");
-      }
-      take(worker, index, *line);
+  const fs::path file = index_file(worker);
+  read_lines(file_system_, file, index.bytes_read, [&](std::string_view text) {
+    const auto line = parse(text);
+    if (!line) {
+      throw Error(ErrorKind::Output, file.string() + ": no journal of this version: expected " +
+                                         "lines such as 'd 000017', found '" +
+                                         std::string(text.substr(0, 80)) + "'");
     }
-    index.bytes_read += end + 1;
-    if (block.size() < kBlock) return;
-  }
+    take(worker, index, *line);
+  });
+}
+
+void Journals::read_workers() {
+  for (const std::string& worker : worker_names()) read_worker(worker);
+  // Lines about other workers' entries: they stand in indexes that may be read before those. What
+  // is not known yet may come with the next reading.
+  std::erase_if(published_for_, [this](const auto& of) {
+    const auto index = workers_.find(of.first);
+    return index != workers_.end() && set_published(of.first, of.second, index->second);
+  });
 }
 
 void Journals::refresh() {
-  for (const std::string& worker : worker_names()) read_worker(worker);
+  read_workers();
   if (!std::exchange(has_new_voids_, false)) return;
   // What a void takes back was counted before: count all anew, with the voids known.
-  Voids voids = std::move(voids_);
+  EntriesOfWorkers voids = std::move(voids_);
   forget();
   voids_ = std::move(voids);
-  for (const std::string& worker : worker_names()) read_worker(worker);
+  read_workers();
   has_new_voids_ = false;
 }
 
 void Journals::forget() {
   workers_.clear();
   voids_.clear();
+  published_for_.clear();
   published_.assign(published_.size(), false);
   published_captures_ = 0;
   has_begun_ = has_finished_ = false;
@@ -468,19 +491,16 @@ void Journals::visit_entries(
   // A second reader keeps every entry of one worker at a time.
   for (const std::string& worker : worker_names()) {
     std::map<int, EntryPlace> places;
-    const fs::path file = index_file(worker);
-    const std::string text = file_system_.read_part(file, 0, ~std::uint64_t(0));
-    std::string_view rest = text;
-    for (std::size_t end; (end = rest.find('\n')) != std::string_view::npos;) {
-      const auto words = words_of(checked(rest.substr(0, end)));
-      rest.remove_prefix(end + 1);
-      if (words.size() != 5 || words.front() != "c") continue;
+    std::uint64_t offset = 0;
+    read_lines(file_system_, index_file(worker), offset, [&](std::string_view text) {
+      const auto words = words_of(text);
+      if (words.size() != 5 || words.front() != "c") return;
       const auto entry = entry_in(words[1]);
       auto place = place_in(words, 2);
-      if (!entry || !place) continue;
+      if (!entry || !place) return;
       place->entry = *entry;
       places[*entry] = *place;
-    }
+    });
     for (auto& [entry, place] : places) {
       const bool is_void = voids_.contains({worker, entry});
       place.is_published = !is_void && (entry >= capture_count_ || is_published(entry));

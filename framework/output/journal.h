@@ -28,7 +28,7 @@ namespace diorama {
 /// Lines of an index, each ended by a checksum, without which a line does not count:
 ///   h <offset> <length> <digest>          where the header is among the entries
 ///   c <entry> <offset> <length> <digest>  staged and synced: from now on it will be
-///   d <entry>                             its files are in their places
+///   d <entry>                             its files are in their places; nothing without a 'c'
 ///   s                                     ... and all that stands above survives a power cut
 ///   p <worker> <entry>                    the same as d, for an entry of a worker that is gone
 ///   v <worker> <entry>                    files are missing or wrong: it never was
@@ -177,19 +177,21 @@ class Journals {
   std::filesystem::path entries_file(const std::string& worker) const;
 
  private:
-  using Voids = std::set<std::pair<std::string, int>>;
+  using EntriesOfWorkers = std::set<std::pair<std::string, int>>;
   struct Line;
   static std::optional<Line> parse(std::string_view text);
   std::vector<std::string> worker_names() const;
   void read_worker(const std::string& worker);
+  void read_workers();
   void take(const std::string& worker, WorkerIndex& index, const Line& line);
-  void set_published(const std::string& worker, int entry, WorkerIndex& index);
+  bool set_published(const std::string& worker, int entry, WorkerIndex& index);
 
   FileSystem& file_system_;
   std::filesystem::path folder_;
   int capture_count_;
   std::map<std::string, WorkerIndex> workers_;
-  Voids voids_;
+  EntriesOfWorkers voids_;
+  EntriesOfWorkers published_for_;  ///< Whose own lines have not been read yet.
   bool has_new_voids_ = false;
   std::vector<bool> published_;
   bool has_begun_ = false;

@@ -41,19 +41,13 @@ class MemoryFileSystem::Appender final : public AppendFile {
   fs::path file_;
 };
 
+/// Of the file, whatever its name becomes.
 class MemoryFileSystem::Held final : public FileLock {
  public:
-  Held(MemoryFileSystem& system, fs::path file) : system_(system), file_(std::move(file)) {}
-  ~Held() override {
-    const std::lock_guard lock(system_.mutex_);
-    system_.locked_.erase(file_);
-  }
-  Held(const Held&) = delete;
-  Held& operator=(const Held&) = delete;
+  explicit Held(std::shared_ptr<void> lock) : lock_(std::move(lock)) {}
 
  private:
-  MemoryFileSystem& system_;
-  fs::path file_;
+  std::shared_ptr<void> lock_;
 };
 
 MemoryFileSystem::File& MemoryFileSystem::file_at(const fs::path& file) {
@@ -92,7 +86,9 @@ std::vector<fs::path> MemoryFileSystem::make_folders(const fs::path& folder) {
 void MemoryFileSystem::write(const fs::path& file, std::span<const std::byte> bytes) {
   const std::lock_guard lock(mutex_);
   require_parent(file);
-  files_[file] = {std::string(text_of(bytes)), now_ns()};
+  File& written = files_[file];
+  written.content = text_of(bytes);
+  written.modified_ns = now_ns();
 }
 
 bool MemoryFileSystem::move_new(const fs::path& from, const fs::path& to) {
@@ -169,14 +165,17 @@ std::vector<std::string> MemoryFileSystem::list(const fs::path& folder) {
 
 std::unique_ptr<FileLock> MemoryFileSystem::lock(const fs::path& file) {
   const std::lock_guard lock(mutex_);
-  file_at(file);
-  if (!locked_.insert(file).second) return nullptr;
-  return std::make_unique<Held>(*this, file);
+  File& locked = file_at(file);
+  if (!locked.lock.expired()) return nullptr;
+  const auto held = std::make_shared<char>();
+  locked.lock = held;
+  return std::make_unique<Held>(held);
 }
 
 bool MemoryFileSystem::is_locked(const fs::path& file) {
   const std::lock_guard lock(mutex_);
-  return locked_.contains(file);
+  const auto found = files_.find(file);
+  return found != files_.end() && !found->second.lock.expired();
 }
 
 }  // namespace diorama

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <memory>
 #include <mutex>
 #include <set>
 #include <string>
@@ -37,6 +38,7 @@ class MemoryFileSystem final : public FileSystem {
   struct File {
     std::string content;
     std::int64_t modified_ns = 0;
+    std::weak_ptr<void> lock;  ///< Its holder's.
   };
   File& file_at(const std::filesystem::path& file);
   void require_parent(const std::filesystem::path& path) const;
@@ -45,7 +47,6 @@ class MemoryFileSystem final : public FileSystem {
   std::mutex mutex_;
   std::map<std::filesystem::path, File> files_;
   std::set<std::filesystem::path> folders_;
-  std::set<std::filesystem::path> locked_;
 };
 
 }  // namespace diorama

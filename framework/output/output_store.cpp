@@ -469,7 +469,8 @@ bool OutputStore::is_done(int capture) const {
 int OutputStore::done_count() const { return replaces_ ? 0 : journals_.published_captures(); }
 
 bool OutputStore::is_finished() const {
-  return !replaces_ && is_complete() && journals_.is_published(kFinishEntry);
+  return !replaces_ && is_complete() && journals_.is_published(kBeginEntry) &&
+         journals_.is_published(kFinishEntry);
 }
 
 void OutputStore::refresh() { journals_.refresh(); }
@@ -504,7 +505,12 @@ void OutputStore::settle_dead_workers() {
       throw Busy(folders_.records_path().string() + ": another process removes a dataset here (" +
                  workers_.describe(*owner) + ")");
     }
-    if (!file_system_.exists(dataset_file())) remove_dataset();
+    if (!file_system_.exists(dataset_file())) {
+      say(dataset_file().string() + ": is missing, so what the journals beside it name (" +
+          std::to_string(journals_.published_captures()) +
+          " captures) is the rest of an interrupted removal: it is removed and made anew");
+      remove_dataset();
+    }
     workers_.release("removal");
     return;
   }

@@ -157,7 +157,7 @@ class OutputStore {
   bool is_done(int capture) const;
   int done_count() const;
   bool is_complete() const { return done_count() == capture_count_; }
-  bool is_finished() const;  ///< finish files are there, too.
+  bool is_finished() const;  ///< Begin and finish files are there, too.
 
   /// Empty ones with stages; what they hold on disk goes when they are not committed. To be handed
   /// to the function of the same name.

@@ -10,6 +10,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "framework/config/clean_text.h"
 #include "framework/config/json_text.h"
 #include "framework/output/journal.h"
 
@@ -19,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 using OrderedJson = nlohmann::ordered_json;
 
-/// Of a claim's file, before it gets its name.
+/// Of a lease's or a claim's file, before it gets its name.
 const std::string kDraft = "draft-";
 
 std::string plain(std::string text) {
@@ -92,14 +93,29 @@ fs::path Workers::lease_file(const Lease& lease) const {
 
 void Workers::join(const std::string& role) {
   lease_ = Lease{role, self_.name};
-  const OrderedJson content{
-      {"host", self_.host}, {"process", self_.process}, {"machine", self_.machine}};
-  const std::string text =
-      content.dump(-1, ' ', false, OrderedJson::error_handler_t::replace) + "\n";
+  OrderedJson content{{"host", self_.host}, {"process", self_.process}, {"machine", self_.machine}};
   const fs::path file = lease_file(*lease_);
-  in_folder(file_system_, file.parent_path(),
-            [&] { file_system_.write(file, std::as_bytes(std::span(text))); });
-  lock_ = file_system_.lock(file);
+  // The lock comes with the name: a lease without it would be taken for a dead worker's.
+  draft_ = new_draft();
+  const auto write = [&] {
+    const std::string text =
+        content.dump(-1, ' ', false, OrderedJson::error_handler_t::replace) + "\n";
+    file_system_.write(draft_, std::as_bytes(std::span(text)));
+  };
+  in_folder(file_system_, file.parent_path(), [&] {
+    write();
+    lock_ = file_system_.lock(draft_);
+    if (!lock_) {
+      content["locked"] = false;
+      write();
+    }
+    return file_system_.move_new(draft_, file);
+  });
+  draft_.clear();
+}
+
+fs::path Workers::new_draft() {
+  return folder_ / "workers" / (kDraft + self_.name + "-" + std::to_string(drafts_++));
 }
 
 void Workers::leave() {
@@ -110,7 +126,8 @@ void Workers::leave() {
     if (task.find('/') == std::string::npos) release(task);
   }
   claimed_.clear();
-  file_system_.remove_file(lease_file(*lease_));
+  file_system_.remove_file(draft_.empty() ? lease_file(*lease_) : draft_);
+  draft_.clear();
   lock_.reset();
   lease_.reset();
   for (const char* name : {"claims", "workers"}) file_system_.remove_if_empty(folder_ / name);
@@ -152,8 +169,12 @@ bool Workers::is_alive(const Lease& lease) {
   if (file_system_.is_locked(file)) return true;
   const std::string text = file_system_.read_part(file, 0, 4096);
   const OrderedJson content = parse_json_or_nothing<OrderedJson>(text);
-  // Within one machine locks are certain, and nobody holds this one.
-  if (content.is_object() && content.value("machine", OrderedJson()) == self_.machine) return false;
+  // Within one machine locks are certain, where there are any, and nobody holds this one.
+  const bool has_no_locks = content.is_object() && content.value("locked", OrderedJson()) == false;
+  if (!has_no_locks && content.is_object() &&
+      content.value("machine", OrderedJson()) == self_.machine) {
+    return false;
+  }
   const auto age = age_ns(lease);
   return age && *age <= std::int64_t(timeout_.count()) * 1'000'000'000;
 }
@@ -164,7 +185,7 @@ std::string Workers::describe(const Lease& lease) {
   std::string who = "worker " + lease.worker;
   if (content.is_object() && content.contains("host") && content["host"].is_string() &&
       content.contains("process") && content["process"].is_number_integer()) {
-    who = "host " + content["host"].get<std::string>() + ", process " +
+    who = "host " + clean_name(content["host"].get<std::string>()) + ", process " +
           std::to_string(content["process"].get<std::int64_t>());
   }
   if (const auto age = age_ns(lease)) {
@@ -202,8 +223,7 @@ std::optional<Workers::Lease> Workers::claim(const std::string& task) {
       if (owner && is_alive(*owner)) return owner;
     }
     // The content comes with the name, so nobody sees a claim without its owner.
-    const fs::path draft =
-        folder_ / "workers" / (kDraft + self_.name + "-" + std::to_string(drafts_++));
+    const fs::path draft = new_draft();
     const std::string text = lease_->file_name();
     const bool is_mine = in_folder(file_system_, folder, [&] {
       // Whoever found no worker when we joined may sweep drafts away.

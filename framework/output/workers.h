@@ -39,7 +39,8 @@ class Busy final : public std::exception {
 };
 
 /// The workers of a dataset and what each has taken. A lease says that a worker lives: it holds a
-/// lock of the file, and changes the file's time every few seconds. Claims say who does what. They
+/// lock of the file (or says in it that the file system has none), and changes the file's time
+/// every few seconds. Claims say who does what. They
 /// save work and give clear messages; nothing is lost where they fail, as every worker has a stage
 /// and a journal of its own.
 ///
@@ -92,6 +93,7 @@ class Workers {
 
  private:
   std::filesystem::path lease_file(const Lease& lease) const;
+  std::filesystem::path new_draft();
   std::optional<std::int64_t> age_ns(const Lease& lease);
   std::filesystem::path claim_file(const std::string& task, int generation) const;
 
@@ -100,6 +102,7 @@ class Workers {
   WorkerIdentity self_;
   std::chrono::seconds timeout_;
   std::optional<Lease> lease_;
+  std::filesystem::path draft_;  ///< Of the lease; empty once it has its name.
   std::unique_ptr<FileLock> lock_;
   std::map<std::string, int> claimed_;  ///< Task to generation.
   int drafts_ = 0;

@@ -54,6 +54,7 @@ struct Pipeline::Flight {
     int captures = 0;
     int respawned = 0;
     std::map<std::string, double> seconds;
+    std::int64_t refused = 0;
   };
   struct Call {
     const std::function<void()>* function = nullptr;
@@ -311,12 +312,15 @@ void Pipeline::hand_over(const Turn& turn, PendingCapture pending, const VisitRe
       own.respawned = result.respawned;
       own.seconds = result.seconds;
       seconds = summary_.seconds;
+      own.refused = 0;
+      for (const auto& [capture, outcomes] : result.views) own.refused += refused_draws(outcomes);
       progress = {summary_.resumed + summary_.captures, total_, summary_.resumed,
-                  summary_.respawned};
+                  summary_.respawned, summary_.views.refused_draws()};
       for (const auto& [number, begun] : flight_->begun) {
         progress.done += begun.captures;
         progress.respawned += begun.respawned;
         for (const auto& [stage, time] : begun.seconds) seconds[stage] += time;
+        progress.refused += begun.refused;
       }
     }
     store_.tell_times(seconds);
@@ -448,7 +452,7 @@ void Pipeline::finish_output(const DatasetInfo& dataset) {
     transaction.files.push_back({kRecordsFolder, kViewsFile, {bytes.begin(), bytes.end()}});
   }
   store_.commit_finish(transaction);
-  summary_.is_finished = true;
+  summary_.is_finished = store_.is_finished();
 }
 
 std::string summary_text(const RunSummary& summary) {

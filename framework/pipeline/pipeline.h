@@ -28,10 +28,11 @@ namespace diorama {
 
 /// How far a run is.
 struct RunProgress {
-  int done = 0;       ///< With `resumed`.
-  int total = 0;      ///< Of this shard; of the whole job with RunOptions::takes_visits.
-  int resumed = 0;    ///< Were there before.
-  int respawned = 0;  ///< Objects that had left the room and were placed anew.
+  int done = 0;              ///< With `resumed`.
+  int total = 0;             ///< Of this shard; of the whole job with RunOptions::takes_visits.
+  int resumed = 0;           ///< Were there before.
+  int respawned = 0;         ///< Objects that had left the room and were placed anew.
+  std::int64_t refused = 0;  ///< Views that did not hold and were drawn again.
 };
 
 struct RunOptions {

@@ -51,6 +51,18 @@ void ViewCounts::add(int capture, const std::vector<ViewOutcome>& outcomes) {
   }
 }
 
+std::int64_t ViewCounts::refused_draws() const {
+  std::int64_t sum = 0;
+  for (const auto& [condition, count] : refused) sum += count;
+  return sum;
+}
+
+std::int64_t refused_draws(const std::vector<ViewOutcome>& outcomes) {
+  ViewCounts counts;
+  counts.add(0, outcomes);
+  return counts.refused_draws();
+}
+
 std::string outcomes_json(const std::vector<ViewOutcome>& outcomes) {
   OrderedJson list = OrderedJson::array();
   for (const ViewOutcome& outcome : outcomes) {

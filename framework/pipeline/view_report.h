@@ -35,7 +35,10 @@ struct ViewCounts {
   std::vector<Unmet> unmet;
 
   void add(int capture, const std::vector<ViewOutcome>& outcomes);
+  std::int64_t refused_draws() const;
 };
+
+std::int64_t refused_draws(const std::vector<ViewOutcome>& outcomes);
 
 /// One line of JSON.
 std::string outcomes_json(const std::vector<ViewOutcome>& outcomes);

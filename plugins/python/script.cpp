@@ -3,7 +3,6 @@
 
 #include <pybind11/eigen.h>
 #include <pybind11/stl.h>
-#include <sys/stat.h>
 
 #include <algorithm>
 #include <array>
@@ -18,6 +17,8 @@
 #include <utility>
 #include <variant>
 #include <vector>
+
+#include "framework/plugins/file_safety.h"
 
 namespace py = pybind11;
 namespace fs = std::filesystem;
@@ -60,9 +61,10 @@ std::optional<fs::path> file_in(const std::vector<fs::path>& folders, const fs::
   return file;
 }
 
-bool may_be_written_by_all(const fs::path& file) {
-  struct stat status {};
-  return ::stat(file.c_str(), &status) == 0 && (status.st_mode & S_IWOTH) != 0;
+/// As with plugins: who else may change the file, or exchange it in a folder above it.
+std::string danger_of(const fs::path& file) {
+  std::error_code failed;
+  return FileSafety(fs::read_symlink("/proc/self/exe", failed)).danger(file);
 }
 
 /// A job alone must not run code: it may come from anyone. Folders are chosen by the user.
@@ -73,9 +75,8 @@ std::string find_script(const std::string& name) {
     looked += (looked.empty() ? "" : ", ") + folder.string();
     const std::optional<fs::path> file = file_in(folders, folder / name);
     if (!file) continue;
-    if (may_be_written_by_all(*file)) {
-      throw Error(ErrorKind::Config, "file: " + file->string() +
-                                         ": everybody may write it, so it is not run (chmod o-w)");
+    if (const std::string danger = danger_of(*file); !danger.empty()) {
+      throw Error(ErrorKind::Config, "file: " + file->string() + ": is not run: " + danger);
     }
     return file->string();
   }
@@ -178,7 +179,7 @@ std::vector<ScriptFile> script_files(std::string_view word) {
           std::ranges::find(files, name, &ScriptFile::name) != files.end();  // as find_script()
       if (at->path().extension() != ".py" || is_taken) continue;
       const std::optional<fs::path> file = file_in(folders, at->path());
-      if (!file || may_be_written_by_all(*file)) continue;
+      if (!file || !danger_of(*file).empty()) continue;
       std::ifstream in(*file);
       const std::string text{std::istreambuf_iterator<char>(in), {}};
       if (text.find("diorama.plugins") == text.npos || text.find(word) == text.npos) continue;

@@ -119,7 +119,10 @@ std::map<std::string, std::string> run_job(const std::string& text, const std::s
 TEST_CASE("Every picture holds the conditions, and quotas are met exactly", "[views]") {
   constexpr int kCaptures = 120;
   const TemporaryFolder folder;
-  run_job(job(kConditions, kCaptures), "out", folder);
+  write_file(folder / "views.yaml", job(kConditions, kCaptures));
+  const Outcome outcome =
+      run({"run", "views.yaml", "--output", "out", "--progress", "json"}, folder.path());
+  REQUIRE(outcome.exit_code == 0);
   const auto pictures = samples(folder / "out/web");
   REQUIRE(pictures.size() == kCaptures);
   std::map<std::string, int> labels;
@@ -152,6 +155,8 @@ TEST_CASE("Every picture holds the conditions, and quotas are met exactly", "[vi
   int refused = 0;
   for (const auto& [condition, count] : report["refused"].items()) refused += count.get<int>();
   CHECK(refused + kCaptures == report["draws"].get<int>());
+  const std::size_t last = outcome.output.rfind('\n', outcome.output.size() - 2) + 1;
+  CHECK(Json::parse(outcome.output.substr(last))["refused"] == refused);
   CHECK(report["quotas"]["seen.label"]["cone"] == kCaptures / 5);
   CHECK(Json::parse(read_file(folder / "out/dataset.json"))["views"] == "views.json");
   const Outcome stats = run({"stats", "out/web"}, folder.path());

@@ -138,6 +138,7 @@ TEST_CASE("Progress comes as lines for programs", "[workers]") {
     CHECK(object.at("done") == ++count);
     CHECK(object.at("total") == kCaptures);
     CHECK(object.at("rss_mib").get<double>() > 1.0);
+    CHECK(object.at("refused") == 0);
     CHECK(object.contains("per_minute"));
     CHECK(object.contains("seconds_left"));
   }
@@ -153,25 +154,39 @@ TEST_CASE("What was deleted or damaged is found and made anew", "[workers]") {
   REQUIRE(run(job(), folder.path()).exit_code == 0);
   const auto whole = tree(folder / "out");
   CHECK_THAT(whole.at("settle/3_sphere.json"), ContainsSubstring("m from something"));
-  std::string picture;  // of the last capture of a visit, with which its report goes
-  for (const auto& [name, text] : whole) {
-    if (name.ends_with("rgb_0007.png")) picture = name;
+  // Of the last capture of a visit, with which its report goes, and of what was written before the
+  // first one.
+  for (const char* ending : {"rgb_0007.png", "metadata.txt"}) {
+    CAPTURE(ending);
+    std::string file;
+    for (const auto& [name, text] : whole) {
+      if (name.ends_with(ending)) file = name;
+    }
+    REQUIRE(!file.empty());
+    fs::remove(folder / "out" / file);
+    CHECK(run({"status", "out"}, folder.path()).exit_code == 0);
+    const Outcome found = run({"status", "out", "--verify"}, folder.path());
+    CHECK(found.exit_code == 8);
+    CHECK_THAT(found.output, ContainsSubstring(file + ": missing"));
+    const Outcome repaired = run(job({"--resume", "--verify"}), folder.path());
+    INFO(repaired.errors);
+    CHECK(repaired.exit_code == 0);
+    CHECK_THAT(repaired.errors, ContainsSubstring("is missing; it is made anew"));
+    CHECK(difference(whole, tree(folder / "out")) == "");
+    CHECK(run({"status", "out", "--verify"}, folder.path()).exit_code == 0);
   }
-  REQUIRE(!picture.empty());
-  fs::remove(folder / "out" / picture);
-  CHECK(run({"status", "out"}, folder.path()).exit_code == 0);
-  const Outcome found = run({"status", "out", "--verify"}, folder.path());
-  CHECK(found.exit_code == 8);
-  CHECK_THAT(found.output, ContainsSubstring(picture + ": missing"));
-  const Outcome repaired = run(job({"--resume", "--verify"}), folder.path());
-  INFO(repaired.errors);
-  CHECK(repaired.exit_code == 0);
-  CHECK_THAT(repaired.errors, ContainsSubstring("is missing; it is made anew"));
-  CHECK(difference(whole, tree(folder / "out")) == "");
-  CHECK(run({"status", "out", "--verify"}, folder.path()).exit_code == 0);
   const Outcome replayed = run({"replay", "out", "--capture", "7"}, folder.path());
   INFO(replayed.errors);
   CHECK(replayed.exit_code == 0);
+}
+
+TEST_CASE("The next command can be pasted, whatever the folder's name", "[workers]") {
+  const TemporaryFolder folder;
+  const Outcome outcome = run(
+      {"run", config_file("smoke.yaml"), "--output", "it's two words", "--set", "total_captures=1"},
+      folder.path());
+  REQUIRE(outcome.exit_code == 0);
+  CHECK_THAT(outcome.errors, ContainsSubstring(R"(next: diorama lint 'it'\''s two words', )"));
 }
 
 TEST_CASE("A dataset whose captures are all there is finished by its own job", "[workers]") {

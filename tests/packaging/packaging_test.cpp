@@ -8,6 +8,7 @@
 #include <string>
 
 #include "diorama/abi.h"
+#include "framework/config/yaml_config.h"
 #include "support/catch.h"
 
 namespace fs = std::filesystem;
@@ -82,6 +83,44 @@ TEST_CASE("every plugin is in one package", "[packaging]") {
     INFO(plugin);
     CHECK(packages == 1);
   }
+}
+
+TEST_CASE("templates for clusters say what their schedulers read", "[packaging]") {
+  const auto read = [](const char* name) {
+    return diorama::parse_yaml(read_text(kRoot / "packaging/cluster" / name), name);
+  };
+  const auto at = [](const diorama::Value& value, std::initializer_list<const char*> keys) {
+    const diorama::Value* found = &value;
+    for (const char* key : keys) {
+      INFO(key);
+      found = found->find(key);
+      REQUIRE(found);
+    }
+    return *found;
+  };
+  const diorama::Value pods = read("kubernetes_job.yaml");
+  CHECK(at(pods, {"kind"}).scalar == "Job");
+  CHECK(at(pods, {"spec", "completionMode"}).scalar == "Indexed");
+  const std::string shards = at(pods, {"spec", "completions"}).scalar;
+  const diorama::Value containers = at(pods, {"spec", "template", "spec", "containers"});
+  REQUIRE(containers.list.size() == 1);
+  CHECK(at(containers.list[0], {"args"}).list[0].scalar.ends_with("+ 1))/" + shards + "\""));
+  for (const diorama::Value& rule : at(pods, {"spec", "podFailurePolicy", "rules"}).list) {
+    CHECK((rule.find("onPodConditions") || rule.find("onExitCodes")));
+    if (!rule.find("onExitCodes")) continue;
+    CHECK(at(rule, {"onExitCodes", "containerName"}).scalar ==
+          at(containers.list[0], {"name"}).scalar);
+  }
+
+  const diorama::Value batch = read("aws_batch_job.yaml");
+  CHECK(at(batch, {"type"}).scalar == "container");
+  CHECK(at(batch, {"containerProperties", "command"}).list.size() == 3);
+  const diorama::Value variable = at(batch, {"containerProperties", "environment"}).list[0];
+  CHECK(at(variable, {"name"}).scalar == "SHARDS");
+  // What the service takes of either.
+  const int attempts = std::stoi(at(batch, {"retryStrategy", "attempts"}).scalar);
+  CHECK((attempts >= 1 && attempts <= 10));
+  CHECK(at(batch, {"retryStrategy", "evaluateOnExit"}).list.size() <= 5);
 }
 
 TEST_CASE("nobody needs what few use", "[packaging]") {

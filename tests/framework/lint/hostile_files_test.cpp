@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <filesystem>
 #include <sstream>
 #include <string>
 
@@ -124,6 +125,17 @@ TEST_CASE("names in a dataset neither lead out of it nor to what never ends", "[
     coco.write(page, changed);
     CHECK_FALSE(coco.lint().findings.empty());
   }
+}
+
+TEST_CASE("a page without an end is a finding", "[lint]") {
+  const DatasetOnDisk basic = sample("basic");
+  basic.write("dataset.json", "{}");
+  const auto page = basic.folder() / "dataset.json";
+  std::filesystem::resize_file(page, std::uintmax_t(20) << 30);  // a hole
+  CHECK(finds(basic.lint(), "dataset.json", "it has 21474836480 bytes, more than"));
+  basic.remove("dataset.json");
+  std::filesystem::create_symlink("/dev/zero", page);
+  CHECK(finds(basic.lint(), "dataset.json", "it is no regular file"));
 }
 
 TEST_CASE("a long element of a label file is read without recursion", "[lint]") {

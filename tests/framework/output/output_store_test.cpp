@@ -15,6 +15,7 @@
 
 #include "diorama/error.h"
 #include "framework/output/memory_file_system.h"
+#include "framework/output/workers.h"
 #include "simulated_disk.h"
 #include "support/catch.h"
 
@@ -516,6 +517,87 @@ TEST_CASE("A living worker keeps its part; the message names it", "[store]") {
   CHECK(dataset_files(disk.tree("/data")) == expected_files(8));
 }
 
+namespace {
+
+/// Others go on before it locks its first file.
+class SlowToLock final : public SimulatedProcess {
+ public:
+  SlowToLock(SimulatedDisk& disk, std::function<void()> meanwhile)
+      : SimulatedProcess(disk), meanwhile_(std::move(meanwhile)) {}
+  std::unique_ptr<FileLock> lock(const fs::path& file) override {
+    if (const auto meanwhile = std::exchange(meanwhile_, nullptr)) meanwhile();
+    return SimulatedProcess::lock(file);
+  }
+
+ private:
+  std::function<void()> meanwhile_;
+};
+
+Job shard_of(std::string name, int shard, int shards, int captures) {
+  Job job = resuming(std::move(name), captures);
+  job.shard = shard;
+  job.shards = shards;
+  return job;
+}
+
+}  // namespace
+
+TEST_CASE("A worker that others overtake while it joins is not taken for dead", "[store]") {
+  for (const bool is_finished : {false, true}) {
+    CAPTURE(is_finished);
+    SimulatedDisk disk(1);
+    SimulatedProcess before(disk);
+    // Who leaves a finished dataset sweeps what looks like the rest of dead workers.
+    if (is_finished) REQUIRE(run(before, "/data", resuming("w0", 8)));
+    SimulatedProcess second(disk);
+    SlowToLock first(disk, [&] { run(second, "/data", shard_of("w2", 1, 2, 8)); });
+    CHECK(run(first, "/data", shard_of("w1", 0, 2, 8)));
+    const Files left = disk.tree("/data");
+    CHECK(dataset_files(left) == expected_files(8));
+    for (const auto& [name, text] : disk.tree("/data/out/.diorama")) {
+      CHECK(name.starts_with("journal/"));
+    }
+  }
+}
+
+TEST_CASE("Without locks the workers of one machine do not take each other for dead", "[store]") {
+  constexpr int kShards = 4;
+  SimulatedDisk disk(1);
+  std::vector<std::unique_ptr<SimulatedProcess>> processes;
+  std::vector<std::unique_ptr<OutputStore>> stores;
+  for (int shard = 0; shard < kShards; ++shard) {
+    processes.push_back(std::make_unique<SimulatedProcess>(disk));
+    processes.back()->set_locks(false);
+    const Job job = shard_of("w" + std::to_string(shard), shard, kShards, kShards);
+    stores.push_back(std::make_unique<OutputStore>(*processes.back(), folders_in("/data"), kShards,
+                                                   options_of(job)));
+    stores.back()->join(kDataset);
+    stores.back()->open();
+  }
+  for (int shard = 0; shard < kShards; ++shard) commit(*stores[std::size_t(shard)], shard);
+  // A silent one is dead, after a while.
+  processes.push_back(std::make_unique<SimulatedProcess>(disk));
+  processes.back()->set_locks(false);
+  const Job again = shard_of("again", 0, kShards, kShards);
+  CHECK_THROWS_AS(run(*processes.back(), "/data", again), Busy);
+  disk.wait(kRestartSeconds);
+  CHECK(run(*processes.back(), "/data", again));
+  CHECK(dataset_files(disk.tree("/data")) == expected_files(kShards));
+}
+
+TEST_CASE("A stranger's lease says who it is on one line", "[store]") {
+  SimulatedDisk disk(1);
+  SimulatedProcess process(disk);
+  process.make_folders("/data/workers");
+  disk.put("/data/workers/auto~x",
+           R"({"host": "n07\u001b[2J\nworker y", "process": 7, "machine": "m"})");
+  Workers workers(process, "/data", this_worker(), std::chrono::seconds(120));
+  REQUIRE(workers.others().size() == 1);
+  const std::string who = workers.describe(workers.others().front());
+  INFO(who);
+  CHECK(who.starts_with("host n07\\x1B[2J\\x0Aworker y, process 7"));
+}
+
 TEST_CASE("A file that others remove between two looks is gone, and no failure", "[store]") {
   const TemporaryFolder folder;
   const fs::path lease = folder.path() / "lease";
@@ -740,6 +822,43 @@ TEST_CASE("What is missing or damaged is made anew when all is verified", "[stor
   CHECK(dataset_files(disk.tree("/data")) == expected);
 }
 
+TEST_CASE("What was written before the first capture is made anew, too", "[store]") {
+  SimulatedDisk disk(1);
+  SimulatedProcess process(disk);
+  run(process, "/data", {});
+  disk.erase("/data/out/one/classes.txt");
+  Job verifying = resuming("w2");
+  verifying.verifies_all = true;
+  std::vector<std::string> said;
+  {
+    auto options = options_of(verifying);
+    options.warn = [&](const std::string& text) { said.push_back(text); };
+    OutputStore store(process, folders_in("/data"), 3, options);
+    store.join(kDataset);
+    CHECK(store.done_count() == 3);
+    CHECK_FALSE(store.is_finished());
+  }
+  CHECK(said == std::vector<std::string>{"begin: out/one/classes.txt is missing; it is made anew"});
+  // What is known to be missing is made without a second look.
+  CHECK(run(process, "/data", resuming("w3")));
+  CHECK(dataset_files(disk.tree("/data")) == expected_files(3));
+}
+
+TEST_CASE("A dataset without its description is not made anew in silence", "[store]") {
+  SimulatedDisk disk(1);
+  SimulatedProcess process(disk);
+  run(process, "/data", {});
+  disk.erase("/data/out/dataset.json");
+  std::vector<std::string> said;
+  auto options = options_of(resuming("w2"));
+  options.warn = [&](const std::string& text) { said.push_back(text); };
+  OutputStore store(process, folders_in("/data"), 3, options);
+  store.join(kDataset);
+  REQUIRE(said.size() == 1);
+  CHECK_THAT(said[0], ContainsSubstring("/data/out/dataset.json: is missing") &&
+                          ContainsSubstring("3 captures") && ContainsSubstring("made anew"));
+}
+
 TEST_CASE("What captures kept is made anew with the files that it went into", "[store]") {
   const Files expected = expected_files(3);
   SimulatedDisk disk(1);
@@ -900,6 +1019,64 @@ TEST_CASE("Bad journal lines are one message, torn ones do not count", "[store]"
     CHECK(dataset_files(tree(folder.path())) == files);
     fs::resize_file(index, before);
   }
+}
+
+TEST_CASE("A capture counts when a line says what it holds", "[store]") {
+  const TemporaryFolder folder;
+  LocalFileSystem local;
+  run(local, folder.path(), {});
+  const fs::path journal = folder.path() / "out/.diorama/journal";
+  // One damaged byte, and what its line would have shown to be missing.
+  std::string text = local.read(journal / "w1.index");
+  const std::size_t line = text.find("c 000002 ");
+  REQUIRE(line != std::string::npos);
+  text[line + 9] = text[line + 9] == '1' ? '2' : '1';
+  local.write(journal / "w1.index", bytes_of(text));
+  fs::remove(folder.path() / "out/one/rgb_2.png");
+  CHECK(run(local, folder.path(), resuming("w2")));
+  CHECK(dataset_files(tree(folder.path())) == expected_files(3));
+
+  // Lines about others' entries may be read before the entries' own, or come before them.
+  const fs::path other = folder.path() / "other";
+  JournalWriter first(local, other, "a", "out");
+  JournalWriter second(local, other, "b", "out");
+  JournalWriter third(local, other, "c", "out");
+  first.published_for("b", 1);
+  first.published_for("c", 2);
+  second.commit(1, {});
+  third.checkpoint();
+  std::ofstream(other / "d.index") << journal_line("d 000000");
+  Journals journals(local, other, 3);
+  journals.refresh();
+  CHECK(journals.is_published(1));
+  CHECK(journals.published_captures() == 1);
+  third.commit(2, {});
+  journals.refresh();
+  CHECK(journals.is_published(2));
+  CHECK(journals.published_captures() == 2);
+}
+
+TEST_CASE("Files without an end are one message or nothing", "[store]") {
+  const TemporaryFolder folder;
+  LocalFileSystem local;
+  run(local, folder.path(), {});
+  // Holes: as large as a stranger likes, in a few kilobytes.
+  constexpr std::uintmax_t kHuge = std::uintmax_t(20) << 30;
+  fs::resize_file(folder.path() / "out/.diorama/journal/w1.index", kHuge);
+  fs::resize_file(folder.path() / "out/.diorama/journal/w1.entries", kHuge);
+  Job verifying = resuming("w2");
+  verifying.verifies_all = true;
+  CHECK(run(local, folder.path(), verifying));
+  const fs::path page = folder.path() / "out/dataset.json";
+  fs::resize_file(page, kHuge);
+  CHECK_THROWS_WITH(run(local, folder.path(), resuming("w3")),
+                    "cannot read " + page.string() +
+                        ": it has 21474836480 bytes, more than the "
+                        "1073741824 that are read at once");
+  fs::remove(page);
+  fs::create_symlink("/dev/zero", page);
+  CHECK_THROWS_WITH(run(local, folder.path(), resuming("w4")),
+                    "cannot read " + page.string() + ": it is no regular file");
 }
 
 // Minutes, were a line to cost a look at all open ones.

@@ -73,7 +73,7 @@ class SimulatedDisk {
 
 /// One process on the disk; may be killed at its n-th step. Each has a machine of its own or
 /// shares one with others, as its identity says.
-class SimulatedProcess final : public FileSystem {
+class SimulatedProcess : public FileSystem {
  public:
   explicit SimulatedProcess(SimulatedDisk& disk) : disk_(disk) {}
   /// Releases its locks, as the kernel does.

@@ -318,7 +318,12 @@ class Runs(unittest.TestCase):
         (self.scripts / "link.py").symlink_to(evil)
         self.check_refused(self.run_job(self.randomizer("Move", file="link.py")), 3, "DIORAMA_PYTHON_PATH")
         (self.scripts / "mine.py").chmod(0o666)
-        self.check_refused(self.run_job(self.randomizer("Move")), 3, "everybody may write it")
+        self.check_refused(self.run_job(self.randomizer("Move")), 3, "everybody may write to", "mine.py")
+        (self.scripts / "mine.py").chmod(0o644)
+        self.scripts.chmod(0o777)
+        self.check_refused(self.run_job(self.randomizer("Move")), 3, "is not run", f"everybody may write to {self.scripts.resolve()}, ")
+        self.scripts.chmod(0o755)
+        self.assertEqual(self.run_job(self.randomizer("Move")).returncode, 0)
 
     def test_parameters_are_checked_by_their_declaration(self):
         for params, words in {
