@@ -3,18 +3,15 @@
 // One input is one URDF model. It is read by the system's library behind our own check, put into a
 // scene, and its joints are posed. Refusing is fine; crashing, hanging, running out of memory, and
 // scenes with numbers that are none are findings.
-#include <stdlib.h>
-#include <unistd.h>
-
 #include <cstddef>
 #include <cstdint>
-#include <cstdio>
 #include <cstdlib>
 #include <string>
 #include <vector>
 
 #include "diorama/error.h"
 #include "diorama/joints.h"
+#include "input_file.h"
 #include "loader_urdf/urdf_loader.h"
 #include "support/plain_host.h"
 
@@ -34,28 +31,6 @@ class AnyFileHost final : public test::PlainHost {
   std::shared_ptr<const Texture> read_texture(const std::filesystem::path&) const override {
     return std::make_shared<const Texture>();
   }
-};
-
-// Models are read by name, so the input is written to one file over and over.
-class InputFile {
- public:
-  InputFile() {
-    std::string name = "/tmp/model_fuzzer_XXXXXX.urdf";
-    const int descriptor = ::mkstemps(name.data(), 5);
-    if (descriptor >= 0) ::close(descriptor);
-    path_ = name;
-  }
-  ~InputFile() { ::unlink(path_.c_str()); }
-  const std::string& write(const std::uint8_t* data, std::size_t size) const {
-    if (std::FILE* file = std::fopen(path_.c_str(), "wb")) {
-      std::fwrite(data, 1, size, file);
-      std::fclose(file);
-    }
-    return path_;
-  }
-
- private:
-  std::string path_;
 };
 
 void require(bool is_sound) {
@@ -83,7 +58,7 @@ void check(Scene& scene) {
 extern "C" const char* __lsan_default_suppressions() { return "leak:liburdfdom_model"; }
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static const InputFile file;
+  static const diorama::test::InputFile file(".urdf");
   AnyFileHost host;
   const loader_urdf::UrdfLoader loader({}, host);
   const std::string& path = file.write(data, size);

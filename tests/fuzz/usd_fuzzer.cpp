@@ -3,17 +3,14 @@
 // One input is one file of any kind: text, crate or package. Everything that it holds is read and,
 // if it is a layer, composed, measured and put into a scene. Refusing is fine; crashing, hanging,
 // running out of memory, and scenes with numbers that are none are findings.
-#include <stdlib.h>
-#include <unistd.h>
-
 #include <cstddef>
 #include <cstdint>
-#include <cstdio>
 #include <cstdlib>
 #include <memory>
 #include <string>
 
 #include "diorama/error.h"
+#include "input_file.h"
 #include "loader_usd/scene_translator.h"
 #include "loader_usd/usd/asset_library.h"
 #include "loader_usd/usd/crate_reader.h"
@@ -29,28 +26,6 @@ namespace {
 namespace usd = diorama::usd;
 
 constexpr std::size_t kMostPrims = 2000;
-
-// Stages are opened by name, so the input is written to one file over and over.
-class InputFile {
- public:
-  InputFile() {
-    std::string name = "/tmp/usd_fuzzer_XXXXXX.usd";
-    const int descriptor = ::mkstemps(name.data(), 4);
-    if (descriptor >= 0) ::close(descriptor);
-    path_ = name;
-  }
-  ~InputFile() { ::unlink(path_.c_str()); }
-  const std::string& write(const std::uint8_t* data, std::size_t size) const {
-    if (std::FILE* file = std::fopen(path_.c_str(), "wb")) {
-      std::fwrite(data, 1, size, file);
-      std::fclose(file);
-    }
-    return path_;
-  }
-
- private:
-  std::string path_;
-};
 
 void visit(usd::Stage& stage, usd::Geometry& geometry, const usd::Prim& prim, std::size_t& budget) {
   for (const usd::Prim* child : stage.visible_children(prim)) {
@@ -105,7 +80,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   } catch (const usd::FormatError&) {
     return 0;
   }
-  static const InputFile file;
+  static const diorama::test::InputFile file(".usd");
   try {
     usd::Stage stage(file.write(data, size), usd::Sampling::OrFirstSample);
     usd::Geometry geometry(stage);
