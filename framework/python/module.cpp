@@ -176,6 +176,8 @@ class Listener {
   void call(const Capture& capture) {
     std::shared_ptr<const StoredCapture> stored = copy_of(capture, needs_);
     const py::gil_scoped_acquire python;
+    // A signal may have ended the run since: the function is not called any more.
+    if (error_) return;
     try {
       const py::object goes_on = on_capture_(capture_of(std::move(stored), made_holds()));
       if (goes_on.is(py::bool_(false))) is_over_ = true;
