@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Several processes on one dataset, and what tells how far it is.
 #include <csignal>
+#include <cstdint>
 #include <nlohmann/json.hpp>
 
 #include "program.h"
@@ -133,16 +134,19 @@ TEST_CASE("Progress comes as lines for programs", "[workers]") {
   REQUIRE(json.exit_code == 0);
   std::istringstream lines(json.output);
   int count = 0;
+  std::int64_t refused = 0;  // views
   for (std::string line; std::getline(lines, line);) {
     const auto object = nlohmann::json::parse(line);
     CHECK(object.at("done") == ++count);
     CHECK(object.at("total") == kCaptures);
     CHECK(object.at("rss_mib").get<double>() > 1.0);
-    CHECK(object.at("refused") == 0);
+    CHECK(object.at("refused") >= refused);
+    refused = object.at("refused");
     CHECK(object.contains("per_minute"));
     CHECK(object.contains("seconds_left"));
   }
   CHECK(count == kCaptures);
+  CHECK(refused > 0);
   const Outcome openjd = run(job({"--progress", "openjd", "--overwrite"}), folder.path());
   CHECK_THAT(openjd.output, ContainsSubstring("openjd_progress: 5.0\n") &&
                                 ContainsSubstring("openjd_progress: 100.0\n") &&
