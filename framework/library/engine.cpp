@@ -28,7 +28,12 @@ fs::path library_file() {
   if (dladdr(reinterpret_cast<const void*>(&library_file), &info) == 0 || !info.dli_fname) {
     throw Error(ErrorKind::Internal, "libdiorama does not know where it lies");
   }
-  return fs::canonical(info.dli_fname);
+  std::error_code failed;
+  const fs::path file = fs::canonical(info.dli_fname, failed);
+  if (failed) {
+    throw Error(ErrorKind::Internal, std::string(info.dli_fname) + ": " + failed.message());
+  }
+  return file;
 }
 
 /// One message at a time.
@@ -154,16 +159,18 @@ Value Engine::check_job(const Value& job) {
 RunJobResult Engine::run_job(const Value& job, const RunJobOptions& options) {
   const JobServices services = impl_->services_for(job);
   if (options.stop) services.host->stop_on(*options.stop);
-  JobAssembly assembly = assemble_job(job, *services.registry, *services.host, services.assets_root,
-                                      program_version(), AssembleFor::Run);
   RunJobResult result;
-  if (options.keeps_files) result.dataset = output_folders(assembly.job).records_path();
   try {
+    JobAssembly assembly = assemble_job(job, *services.registry, *services.host,
+                                        services.assets_root, program_version(), AssembleFor::Run);
+    if (options.keeps_files) result.dataset = output_folders(assembly.job).records_path();
     const RunSummary summary = impl_->run(assembly, *services.host, options);
     result.captures = summary.captures;
     result.resumed = summary.resumed;
     result.is_finished = summary.is_finished;
   } catch (const Interrupted&) {
+    result.is_stopped = true;
+  } catch (const Stopped&) {
     result.is_stopped = true;
   } catch (const Busy& busy) {
     throw Error(ErrorKind::Output, busy.what());

@@ -422,7 +422,11 @@ void OutputStore::leave() {
   }
   // What is staged for good stays for who comes next.
   if (next_times_ != std::chrono::steady_clock::time_point{}) {
-    file_system_.remove_file(stage(options_.self.name) / kTimesFile);
+    try {
+      file_system_.remove_file(stage(options_.self.name) / kTimesFile);
+    } catch (const Error&) {
+      // Nothing depends on it.
+    }
   }
   file_system_.remove_if_empty(stage(options_.self.name));
   file_system_.remove_if_empty(diorama_folder() / "stage");

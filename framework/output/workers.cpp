@@ -10,6 +10,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "diorama/error.h"
 #include "framework/config/clean_text.h"
 #include "framework/config/json_text.h"
 #include "framework/output/journal.h"
@@ -102,7 +103,7 @@ void Workers::join(const std::string& role) {
         content.dump(-1, ' ', false, OrderedJson::error_handler_t::replace) + "\n";
     file_system_.write(draft_, std::as_bytes(std::span(text)));
   };
-  in_folder(file_system_, file.parent_path(), [&] {
+  const bool is_new = in_folder(file_system_, file.parent_path(), [&] {
     write();
     lock_ = file_system_.lock(draft_);
     if (!lock_) {
@@ -111,6 +112,7 @@ void Workers::join(const std::string& role) {
     }
     return file_system_.move_new(draft_, file);
   });
+  if (!is_new) throw Error(ErrorKind::Output, file.string() + ": exists already");
   draft_.clear();
 }
 

@@ -191,6 +191,19 @@ py::dict finding_of(const Finding& finding) {
   return result;
 }
 
+/// A row each: x, y, sight.
+py::object keypoints_px_of(const std::vector<StoredKeypoint>& points) {
+  py::array_t<double> rows({py::ssize_t(points.size()), py::ssize_t(3)});
+  auto values = rows.mutable_unchecked<2>();
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const auto row = py::ssize_t(i);
+    values(row, 0) = points[i].pixel.x();
+    values(row, 1) = points[i].pixel.y();
+    values(row, 2) = double(points[i].sight);
+  }
+  return rows;
+}
+
 }  // namespace
 
 py::list findings_of(const ReadLog& log) {
@@ -212,7 +225,19 @@ py::dict capture_of(std::shared_ptr<const StoredCapture> stored, const NameSet& 
   result["clip"] = clip_of(stored->capture.clip);
   result["split"] = stored->split;
   py::list frames;
-  for (const Frame& frame : stored->capture.frames) frames.append(frame_of(frame, holds, owner));
+  for (std::size_t i = 0; i < stored->capture.frames.size(); ++i) {
+    const Frame& frame = stored->capture.frames[i];
+    py::dict made = frame_of(frame, holds, owner);
+    const bool has_keypoints = i < stored->keypoints.size();
+    py::size_t place = 0;
+    for (const py::handle instance : py::list(made["instances"])) {
+      const std::uint32_t id = frame.instances[place++].id;
+      const bool is_known = has_keypoints && stored->keypoints[i].contains(id);
+      instance["keypoints_px"] =
+          is_known ? keypoints_px_of(stored->keypoints[i].at(id)) : py::object(py::none());
+    }
+    frames.append(made);
+  }
   result["frames"] = frames;
   result["findings"] = findings_of(stored->log);
   return result;

@@ -125,7 +125,9 @@ CoverageMask mask_given(const py::object& given) {
   CoverageMask mask;
   if (given.is_none()) return mask;
   const auto [box, bits] = given.cast<std::pair<py::object, py::array_t<std::uint8_t>>>();
-  mask.box = *pixel_box(box);
+  const std::optional<PixelBox> place = pixel_box(box);
+  if (!place) throw Error(ErrorKind::Plugin, "an amodal mask has a box");
+  mask.box = *place;
   if (bits.ndim() != 2 || bits.shape(0) != mask.box.height() || bits.shape(1) != mask.box.width()) {
     throw Error(ErrorKind::Plugin, "an amodal mask has the size of its box");
   }

@@ -79,6 +79,11 @@ class OpenDataset {
     result["cameras"] = info.camera_names;
     result["captures"] = info.captures;
     result["classes"] = info.classes;
+    py::dict skeletons;
+    for (const auto& [label, skeleton] : info.skeletons) {
+      skeletons[py::str(label)] = py::make_tuple(skeleton.names, skeleton.lines);
+    }
+    result["skeletons"] = skeletons;
     result["findings"] = findings_of(dataset_->log());
     return result;
   }
@@ -103,13 +108,22 @@ class OpenDataset {
 /// After a fork they are made anew: the threads of the old ones are not there, so that those cannot
 /// even be destroyed.
 Services& services_of(const std::string& program) {
+  static std::mutex* mutex = new std::mutex;
   static Services* services = nullptr;
-  static pid_t process = 0;
-  if (!services || process != getpid()) {
+  static pid_t process = getpid();
+  if (process != getpid()) {  // the only thread of a new process
+    process = getpid();
+    mutex = new std::mutex;
+    services = nullptr;
+  }
+  // What it logs while it is made goes to Python: others may run meanwhile, and must not make it
+  // too.
+  const py::gil_scoped_release unlocked;
+  const std::lock_guard lock(*mutex);
+  if (!services) {
     GlobalOptions options;
     options.program = program;
     services = new Services(options);
-    process = getpid();
   }
   return *services;
 }

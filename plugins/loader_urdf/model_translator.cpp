@@ -169,6 +169,10 @@ void ModelTranslator::translate(NodeId root) {
 void ModelTranslator::add_links(const std::vector<PlacedLink>& order,
                                 const std::vector<const urdf::Joint*>& joints, NodeId root) {
   std::map<std::string, std::string> carriers;  // of each link that is or rides on a body
+  // By convention, what is called "world" stands still, and so does what is fixed to it.
+  const auto is_world = [&](const std::string& link) {
+    return link == "world" && link == model_.root_link_->name && !has_collision(*model_.root_link_);
+  };
   for (const PlacedLink& placed : order) {
     if (has_collision(*placed.link)) carriers.emplace(placed.link->name, placed.link->name);
   }
@@ -181,7 +185,8 @@ void ModelTranslator::add_links(const std::vector<PlacedLink>& order,
   std::vector<const urdf::Joint*> fixed = joints;
   std::erase_if(fixed, [](const urdf::Joint* joint) { return joint->type != urdf::Joint::FIXED; });
   for (auto joint = fixed.rbegin(); joint != fixed.rend(); ++joint) {
-    carry((*joint)->parent_link_name, (*joint)->child_link_name);
+    const std::string& parent = (*joint)->parent_link_name;
+    if (!is_world(parent)) carry(parent, (*joint)->child_link_name);
   }
   for (const urdf::Joint* joint : fixed) carry(joint->child_link_name, joint->parent_link_name);
   std::map<std::string, Affine> poses;
@@ -194,9 +199,8 @@ void ModelTranslator::add_links(const std::vector<PlacedLink>& order,
       continue;
     }
     const NodeId node = add_link(*placed.link, root, placed.root_from_link);
-    // By convention, what is called "world" stands still.
-    const bool is_world = placed.link == model_.root_link_.get() && placed.link->name == "world";
-    if (has_bodies && carrier == carriers.end() && !is_world && !joints.empty()) {
+    const bool is_held = carrier != carriers.end() || is_world(placed.link->name);
+    if (has_bodies && !is_held && !joints.empty()) {
       make_body(*placed.link, node, kLightBody);
     }
   }

@@ -42,10 +42,9 @@ Freedom freedom_of(usd::Stage& stage, const Prim& prim) {
     const std::string name(word);
     const std::string lower = "limit:" + name + ":physics:low";
     const std::string upper = "limit:" + name + ":physics:high";
-    if (usd::number_or(stage, prim, lower.c_str(), -kInfinity) >
-        usd::number_or(stage, prim, upper.c_str(), kInfinity)) {
-      continue;
-    }
+    const double low = usd::number_or(stage, prim, lower.c_str(), -kInfinity);
+    const double high = usd::number_or(stage, prim, upper.c_str(), kInfinity);
+    if (low > high || (low == 0.0 && high == 0.0)) continue;  // locked
     const bool turns = name.starts_with("rot");
     ++(turns ? found.turns : found.slides);
     found.kind = turns ? JointKind::Revolute : JointKind::Prismatic;

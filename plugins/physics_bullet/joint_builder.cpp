@@ -49,7 +49,7 @@ std::unique_ptr<btTypedConstraint> make_hinge(const Joint& joint, btRigidBody& p
   auto hinge = std::make_unique<btHingeConstraint>(parent, child, in_parent, in_child, true);
   const double range = joint.upper - joint.lower;
   // Bullet knows angles within one turn only.
-  if (range < 2.0 * kPi && !joint.mimic) hinge->setLimit(joint.lower, joint.upper, 0.9, 0.3, 0.0);
+  if (range < 2.0 * kPi) hinge->setLimit(joint.lower, joint.upper, 0.9, 0.3, 0.0);
   return hinge;
 }
 
@@ -58,8 +58,8 @@ std::unique_ptr<btTypedConstraint> make_slider(const Joint& joint, double scale,
                                                const btTransform& in_parent,
                                                const btTransform& in_child) {
   auto slider = std::make_unique<btSliderConstraint>(parent, child, in_parent, in_child, true);
-  slider->setLowerLinLimit(joint.mimic ? -kFar : std::max(scale * joint.lower, -kFar));
-  slider->setUpperLinLimit(joint.mimic ? kFar : std::min(scale * joint.upper, kFar));
+  slider->setLowerLinLimit(std::max(scale * joint.lower, -kFar));
+  slider->setUpperLinLimit(std::min(scale * joint.upper, kFar));
   slider->setLowerAngLimit(0.0);
   slider->setUpperAngLimit(0.0);
   slider->setRestitutionLimLin(0.0);
@@ -112,7 +112,18 @@ Motion motion_of(HeldJoint& held) {
           axis.dot(child.getAngularVelocity() - parent.getAngularVelocity())};
 }
 
-/// Those that lead nowhere but to each other are left out, and move freely.
+/// Where a motor says where a joint is, limits would fight it.
+void take_limits_off(HeldJoint& held) {
+  if (held.kind == JointKind::Prismatic) {
+    auto& slider = static_cast<btSliderConstraint&>(*held.constraint);
+    slider.setLowerLinLimit(-kFar);
+    slider.setUpperLinLimit(kFar);
+  } else {
+    static_cast<btHingeConstraint&>(*held.constraint).setLimit(1.0, -1.0);
+  }
+}
+
+/// Those that lead nowhere but to each other are left out, and move freely within their limits.
 void add_followers(const Scene& scene, Bodies& bodies) {
   std::map<NodeId, std::size_t> held;
   std::vector<std::size_t> waiting;
@@ -136,6 +147,7 @@ void add_followers(const Scene& scene, Bodies& bodies) {
       if (leader != held.end()) follower.leader = leader->second;
       follower.leader_position = joint_position(scene, mimic.joint);
       bodies.followers.push_back(follower);
+      take_limits_off(bodies.joints[i]);
       unknown.erase(node);
       is_news = true;
     }
@@ -147,7 +159,8 @@ void add_followers(const Scene& scene, Bodies& bodies) {
 void drive_followers(Bodies& bodies, double seconds) {
   constexpr double kStrong = 1e9;     // N or N s: whatever it takes
   constexpr double kStill = 1e-5;     // rad/s, m/s: sleeping bodies stay asleep
-  constexpr double kCorrected = 0.5;  // of what is off, in one step
+  constexpr double kCorrected = 0.5;  // of what is off, in one step ...
+  constexpr double kFastest = 6.0;    // ... rad/s, m/s: what begins elsewhere strikes nothing
   for (Follower& follower : bodies.followers) {
     double speed = 0.0;
     if (follower.leader) {
@@ -162,7 +175,7 @@ void drive_followers(Bodies& bodies, double seconds) {
     const double wanted = follower.multiplier * follower.leader_position + follower.offset;
     double off = wanted - motion_of(held).position;
     if (held.kind == JointKind::Revolute) off = std::remainder(off, 2.0 * kPi);
-    speed += kCorrected * off / seconds;
+    speed += std::clamp(kCorrected * off / seconds, -kFastest, kFastest);
     if (std::abs(speed) > kStill) {
       held.constraint->getRigidBodyA().activate();
       held.constraint->getRigidBodyB().activate();

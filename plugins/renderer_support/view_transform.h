@@ -9,8 +9,9 @@ namespace diorama {
 
 /// The factor that brings a picture's middle tones to a pleasant grey, whatever the scale of its
 /// light. The darkest and the brightest tenth do not count, so that a lamp or a window in view does
-/// not darken a room. Where they would burn more than that tenth it is less, down to a third, so
-/// that nine tenths of a mostly dark picture stay below white. 1 for a picture without light.
+/// not darken a room. Where they would burn more than that tenth it is less, as far as
+/// down to a third, so that nine tenths of a mostly dark picture stay below white. 1 for a picture
+/// without light.
 double automatic_exposure(const Image<Vec3f>& hdr);
 /// The same for a picture that still has its noise.
 double automatic_exposure(const Film& film);

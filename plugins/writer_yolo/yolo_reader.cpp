@@ -531,8 +531,8 @@ class YoloPictureReading : private FrameReading {
         const double flag = numbers[at + 2];
         sight = flag == 2.0 ? Sight::Seen : flag == 1.0 ? Sight::Hidden : Sight::NotTold;
       }
-      points.push_back(
-          {share.cwiseProduct(Vec2(frame_.camera.width, frame_.camera.height)), sight});
+      const Vec2 pixel = share.cwiseProduct(Vec2(frame_.camera.width, frame_.camera.height));
+      points.push_back({pixel, pixel.allFinite() ? sight : Sight::NotTold});
     }
     return points;
   }

@@ -104,6 +104,9 @@ class Instance:
     visibility: Visibility | None = None
     #: By name: float64, 3, metres in the object's own space. Only what is made has them, not what is read.
     keypoints: dict[str, Array] = dataclasses.field(default_factory=dict)
+    #: Where "keypoints" are held: float64, count x 3: x to the right and y down from the picture's upper left corner
+    #: in pixels, and 2 for seen, 1 for hidden, 0 for not told. In the order of the class's `Dataset.skeletons`.
+    keypoints_px: Array | None = None
     velocity: Velocity | None = None  #: of rigid bodies, where "velocities" are held
 
     @property
@@ -268,6 +271,8 @@ class Dataset(Sequence[Capture]):
         self.cameras: list[str] = info["cameras"]
         self.captures: list[int] = info["captures"]  #: `Capture.index` of each
         self.classes: list[str] = info["classes"]  #: the format's own list; may be empty
+        #: Of keypoints by class, "" for all others: their names, and the places of those that lines join.
+        self.skeletons: dict[str, tuple[list[str], list[tuple[int, int]]]] = info["skeletons"]
         #: What opening found.
         self.findings: list[Finding] = [Finding(**finding) for finding in info["findings"]]
 

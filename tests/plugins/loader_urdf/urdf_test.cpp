@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "diorama/joints.h"
@@ -206,6 +207,25 @@ TEST_CASE("links that nothing can touch go with the bodies that they are fixed t
   LoadedModel held(folder.write("held.urdf", robot("<link name=\"world\"/>" + solid("base") +
                                                    joined("a", "continuous", "world", "base"))));
   CHECK_FALSE(held.node("world").rigid_body);
+  // Also when it is fixed to it, itself or by links between.
+  for (const char* between : {"", "plate"}) {
+    CAPTURE(between);
+    const bool has_between = std::string_view(between) != "";
+    const std::string joints = has_between ? "<link name=\"plate\"/>" +
+                                                 joined("a", "fixed", "world", between) +
+                                                 joined("b", "fixed", between, "base")
+                                           : joined("a", "fixed", "world", "base");
+    LoadedModel arm(
+        folder.write("arm.urdf", robot("<link name=\"world\"/>" + solid("base") + solid("tool") +
+                                       joints + joined("t", "continuous", "base", "tool"))));
+    const NodeId base = arm.scene.require("/asset/base");
+    CHECK(arm.scene[base].rigid_body);
+    CHECK_FALSE(arm.node("world").rigid_body);
+    const Joint& joint = *arm.scene[arm.scene.require("/asset/joints/a")].joint;
+    CHECK(joint.parent_body == arm.scene.require("/asset/world"));
+    const NodeId held_body = has_between ? arm.scene.require("/asset/base/plate") : base;
+    CHECK(joint.child_body == held_body);
+  }
 }
 
 TEST_CASE("models with words that cannot be are one message", "[loader_urdf]") {

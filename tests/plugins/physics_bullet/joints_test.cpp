@@ -218,6 +218,19 @@ TEST_CASE("joints that mimic others follow them while things fall", "[physics_bu
   CHECK(world.backend.report().max_speed < 0.02);
 }
 
+TEST_CASE("a joint that follows nothing keeps its limits", "[physics_bullet]") {
+  PhysicsWorld world;
+  const NodeId rail = world.scene.create(world.scene.root(), "rail");
+  const NodeId weight =
+      world.add_primitive("weight", PrimitiveShape::Box, Vec3(0.1, 0.1, 0.1), at(0, 0, 2));
+  world.make_body(weight, 0.5);
+  const NodeId slide =
+      join(world, JointKind::Prismatic, rail, weight, at(0, 0, 2), -Vec3::UnitZ(), 0.0, 0.4);
+  world.scene.edit(slide).joint->mimic = Joint::Mimic{slide, 1.0, 0.0};
+  world.run(90);
+  CHECK(joint_position(world.scene, slide) == Approx(0.4).margin(0.01));
+}
+
 TEST_CASE("what is held to the world meets what stands there", "[physics_bullet]") {
   // A weight on a rail, above a plate of the same asset. The rail has no part in what lies beside
   // it; a rail that the plate is part of lets its slide through.
