@@ -286,10 +286,17 @@ bool DatasetView::make_stats(Opened& opened) {
 
 bool DatasetView::make_findings() {
   if (!wants_findings_) return false;
-  auto text = std::make_shared<const std::string>(
-      lint_json(lint_datasets(options_.folder, readers_, host_, options_.reader)));
+  std::string text;
+  try {
+    text = lint_json(lint_datasets(options_.folder, readers_, host_, options_.reader));
+  } catch (const Stopped&) {
+    throw;
+  } catch (const Error& error) {
+    // Of a run that has nothing to read yet, or is just writing it: no reason to end.
+    text = json_text({{"fault", error.what()}});
+  }
   const std::lock_guard lock(mutex_);
-  findings_ = std::move(text);
+  findings_ = std::make_shared<const std::string>(std::move(text));
   wants_findings_ = false;
   return true;
 }
@@ -412,7 +419,7 @@ HttpAnswer DatasetView::run_answer() {
     const std::lock_guard lock(records_mutex_);
     if (!records_) records_.emplace(folder_of_run(options_.folder));
     try {
-      records_->refresh(status->captures, page.is_object() && page.contains("views"));
+      records_->refresh(*status, page.is_object() && page.contains("views"));
     } catch (const Error& error) {
       // What was read until then is true all the same.
       host_.log(LogLevel::Debug, error.what());

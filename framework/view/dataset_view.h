@@ -32,7 +32,8 @@ namespace diorama {
 ///
 ///   /  /view.js  /view.css  /icon.svg       the page
 ///   /api/state                              which datasets, how far each is indexed
-///   /api/run  /api/lint                     what dataset.json and the journals say; findings
+///   /api/run  /api/lint                     what dataset.json and the journals say; findings,
+///                                           or why there are none: {"fault": TEXT}
 ///   /api/D/info  /api/D/stats               one dataset
 ///   /api/D/compare/E                        in what dataset E differs from D; of all captures
 ///   /api/D/compare/E/N                      the same, of capture number N
@@ -75,6 +76,7 @@ class DatasetView {
     NameSet holds;
   };
   std::vector<Shown> shown() const;
+  const std::filesystem::path& folder() const { return options_.folder; }
 
  private:
   struct Opened;

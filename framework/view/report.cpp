@@ -35,9 +35,10 @@ class ReportWriter {
       : view_(view), folder_(std::move(folder)), has_all_overlays_(has_all_overlays) {}
 
   ReportSize write() {
+    make_folder(folder_);
+    finish_work();  // Before there is a file: what fails here may be tried again.
     make_folder(folder_ / "data");
     write_page();
-    finish_work();
     add_data("/api/state");
     add_data("/api/run");
     add_data("/api/lint");
@@ -175,6 +176,11 @@ class ReportWriter {
 }  // namespace
 
 ReportSize write_report(DatasetView& view, const fs::path& folder, bool has_all_overlays) {
+  if (view.shown().empty()) {
+    throw Error(ErrorKind::Usage, view.folder().string() +
+                                      ": the run has made nothing that could be read yet; try "
+                                      "again when it has");
+  }
   std::error_code ignored;
   if (fs::exists(folder, ignored) && !fs::is_empty(folder, ignored)) {
     throw Error(ErrorKind::Output,

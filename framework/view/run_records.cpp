@@ -23,6 +23,7 @@ using OrderedJson = nlohmann::ordered_json;
 constexpr const char* kOfTheRun = "";
 /// Larger files are not the run's.
 constexpr std::uint64_t kMostBytes = std::uint64_t(64) << 20;
+constexpr std::uint64_t kMostTimesBytes = std::uint64_t(64) << 10;
 /// Captures that are shown as the last ones.
 constexpr std::size_t kMostLast = 8;
 
@@ -40,10 +41,10 @@ std::string without_numbers(std::string_view why) {
 
 }  // namespace
 
-void RunRecords::refresh(int captures, bool has_views) {
-  read_journals(captures, has_views);
+void RunRecords::refresh(const DatasetStatus& status, bool has_views) {
+  read_journals(status.captures, has_views);
   read_settling();
-  read_times();
+  read_times(status.workers);
 }
 
 void RunRecords::read_journals(int captures, bool has_views) {
@@ -74,20 +75,23 @@ void RunRecords::read_journals(int captures, bool has_views) {
   }
 }
 
-void RunRecords::read_times() {
+void RunRecords::read_times(const std::vector<DatasetStatus::Worker>& workers) {
   LocalFileSystem file_system;
   const fs::path stages = folder_ / ".diorama" / "stage";
-  stages_.clear();
-  for (const std::string& worker : file_system.list(stages)) {
-    const fs::path file = stages / worker / kTimesFile;
+  // What was read before stays when a file goes while it is read.
+  std::map<std::string, double> seconds_of;
+  for (const DatasetStatus::Worker& worker : workers) {
+    if (!worker.is_alive) continue;  // nobody takes its file away
+    const fs::path file = stages / worker.name / kTimesFile;
     const auto found = file_system.status(file);
-    if (!found || found->kind != FileStatus::Kind::File || found->size > kMostBytes) continue;
+    if (!found || found->kind != FileStatus::Kind::File || found->size > kMostTimesBytes) continue;
     const OrderedJson times = parse_json_or_nothing<OrderedJson>(file_system.read(file));
     if (!times.is_object()) continue;
     for (const auto& [stage, seconds] : times.items()) {
-      if (seconds.is_number()) stages_[stage] += seconds.get<double>();
+      if (seconds.is_number()) seconds_of[stage] += seconds.get<double>();
     }
   }
+  stages_ = std::move(seconds_of);
 }
 
 void RunRecords::read_settling() {

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "framework/output/dataset_status.h"
 #include "framework/pipeline/view_report.h"
 
 namespace diorama {
@@ -22,8 +23,9 @@ class RunRecords {
   /// `folder` holds dataset.json.
   explicit RunRecords(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
-  /// Reads what is new. `captures` of the job; `has_views`: its section `views` asks for something.
-  void refresh(int captures, bool has_views);
+  /// Reads what is new. `status` of the folder; `has_views`: its job's section `views` asks for
+  /// something.
+  void refresh(const DatasetStatus& status, bool has_views);
   /// Members `views`, `settle`, `stages` (seconds of all workers that live) and `last` (captures
   /// that came last), each as far as there is something.
   nlohmann::ordered_json json() const;
@@ -35,7 +37,7 @@ class RunRecords {
     std::string first;  ///< "visit 3: /Assets/cup_2 moves at 0.6 m/s"
   };
   void read_journals(int captures, bool has_views);
-  void read_times();
+  void read_times(const std::vector<DatasetStatus::Worker>& workers);
   void read_settling();
   void add_visit(const nlohmann::ordered_json& visit);
 

@@ -117,6 +117,58 @@ async function tryClip(page, drawn) {
   await page.waitForTimeout(300);
 }
 
+/** A page that is told of clips what no run writes */
+async function oddPage(odd) {
+  const page = await newPage();
+  await page.addInitScript((kind) => {
+    const real = window.fetch.bind(window);
+    window.fetch = async (path, options) => {
+      const answer = await real(path, options);
+      const number = /\/capture\/(\d+)$/.exec(String(path))?.[1];
+      if (number === undefined || !answer.ok) return answer;
+      const labels = await answer.json();
+      if (kind === 'none') delete labels.clip;
+      if (kind === 'single') labels.clip = { clip: 0, frame: 0, frames: 1, fps: 30 };
+      if (kind === 'fast') labels.clip = { clip: 0, frame: Number(number), frames: 1e6, fps: 1e30 };
+      return new Response(JSON.stringify(labels), { status: 200 });
+    };
+  }, odd);
+  await page.goto(address);
+  await page.waitForSelector('.card a.picture');
+  await page.locator('.card a.picture').first().click();
+  await page.waitForSelector('.capture:not([hidden]) .objects h3');
+  return page;
+}
+
+/** Datasets of others may state anything of their clips. */
+async function tryOddClips() {
+  for (const kind of ['none', 'single']) {
+    const page = await oddPage(kind);
+    const isStill = async () => !(await hashOf(page)).includes('play=1') &&
+      !(await page.locator('.capture:not([hidden]) .objects').evaluate((panel) => panel.inert));
+    await page.goto(page.url() + (page.url().includes('?') ? '&' : '?') + 'play=1');
+    await page.reload();
+    await page.waitForSelector('.capture:not([hidden]) .objects h3');
+    await page.waitForTimeout(300);
+    check(await isStill(), `an address that plays what is no clip shows it (${kind})`);
+    await page.keyboard.press(' ');
+    await page.waitForTimeout(100);
+    await page.keyboard.press(' ');
+    await page.waitForTimeout(300);
+    check(await isStill(), `and space leaves its panel alive (${kind})`);
+    await page.close();
+  }
+  const page = await oddPage('fast');
+  await page.keyboard.press(' ');
+  const answers = page.waitForTimeout(1500).then(() => page.keyboard.press(' ')).then(() => page.waitForTimeout(300)).then(() => hashOf(page));
+  const late = new Promise((resolve) => setTimeout(() => resolve(null), 20000));
+  const hash = await Promise.race([answers, late]);
+  check(hash !== null && !hash.includes('play=1'), 'a clip of 1e30 frames a second plays, and stops');
+  answers.catch(() => undefined);
+  // A page that hangs does not close either.
+  if (hash !== null) await page.close();
+}
+
 try {
   const page = await newPage();
   const began = performance.now();
@@ -334,6 +386,8 @@ try {
     await page.waitForSelector('.capture:not([hidden]) .objects h3');
     check(page.url().includes('#/compare/'), 'and back comes back');
   }
+
+  await tryOddClips();
 
   const dark = await newPage('dark');
   await dark.goto(address);

@@ -50,6 +50,8 @@ class HostileDataset final : public StoredDataset {
   const ReadLog& log() const override { return log_; }
   StoredCapture read(std::size_t i, const NameSet& wanted) const override {
     ++reads;
+    if (stops) throw Stopped();
+    if (fails) throw Error(ErrorKind::Plugin, "a.txt: is being written");
     StoredCapture stored;
     stored.capture.index = info_.captures[i];
     stored.capture.phase = kHostile;
@@ -110,6 +112,8 @@ class HostileDataset final : public StoredDataset {
   }
 
   static inline std::atomic<int> reads = 0;
+  static inline std::atomic<bool> fails = false;
+  static inline std::atomic<bool> stops = false;
 
  private:
   bool is_changed_;
@@ -444,6 +448,53 @@ TEST_CASE("A run that goes on is shown before it has anything that could be read
   CHECK(json("/api/state")["datasets"].size() == 1);
   CHECK(json("/api/state")["generation"] == 1);
   CHECK(json("/api/run")["last"] == Json({0}));
+}
+
+TEST_CASE("A run that has nothing to read yet cannot be checked, and makes no report", "[view]") {
+  test::TemporaryFolder folder;
+  test::EncodingHost host;
+  DatasetReaders readers{
+      {{"hostile", {"mark.txt"}, [] { return std::make_unique<HostileReader>(); }}}};
+  folder.write("dataset.json", R"({"captures": 3, "job": "", "writers": []})");
+  DatasetView view({.folder = folder.path("")}, readers, host);
+  CHECK(view.answer("/api/lint").status == 202);
+  while (view.work()) {
+  }
+  const HttpAnswer findings = view.answer("/api/lint");
+  CHECK(findings.status == 200);
+  CHECK_THAT(Json::parse(*findings.body)["fault"].get<std::string>(),
+             ContainsSubstring("holds no dataset"));
+  CHECK_THROWS_WITH(write_report(view, folder.path("report"), false),
+                    ContainsSubstring("nothing that could be read yet"));
+  CHECK_FALSE(std::filesystem::exists(folder.path("report")));
+}
+
+TEST_CASE("What cannot be checked is told, and nothing else ends", "[view]") {
+  Viewed viewed;
+  const std::filesystem::path out = viewed.folder.path("report");
+  CHECK(viewed.answer("/api/lint").status == 202);
+  SECTION("files that are just being written") {
+    HostileDataset::fails = true;
+    CHECK_NOTHROW(viewed.view->work());
+    HostileDataset::fails = false;
+    CHECK_THAT(viewed.json("/api/lint")["fault"].get<std::string>(),
+               ContainsSubstring("is being written"));
+    while (viewed.view->work()) {
+    }
+    write_report(*viewed.view, out, false);
+    CHECK_THAT(content_of(out / "data" / "lint.js"), ContainsSubstring("is being written"));
+  }
+  SECTION("a report that fails can be made again") {
+    HostileDataset::fails = true;
+    CHECK_THROWS_AS(write_report(*viewed.view, out, false), Error);
+    HostileDataset::fails = false;
+    CHECK(write_report(*viewed.view, out, false).captures == 3);
+  }
+  SECTION("Ctrl-C ends the check") {
+    HostileDataset::stops = true;
+    CHECK_THROWS_AS(viewed.view->work(), Stopped);
+    HostileDataset::stops = false;
+  }
 }
 
 TEST_CASE("Clips, keypoints and flow reach the page", "[view]") {

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "framework/output/dataset_status.h"
 #include "framework/output/journal.h"
@@ -26,6 +27,15 @@ ViewOutcome outcome(int draws, std::map<std::string, int> refused) {
   return {"cam", draws, std::move(refused), {}, {}};
 }
 
+DatasetStatus status_of(int captures, const std::vector<std::string>& living = {},
+                        const std::vector<std::string>& dead = {}) {
+  DatasetStatus status;
+  status.captures = captures;
+  for (const std::string& name : living) status.workers.push_back({name, "auto", "", true});
+  for (const std::string& name : dead) status.workers.push_back({name, "auto", "", false});
+  return status;
+}
+
 }  // namespace
 
 TEST_CASE("Refused views are counted once per capture, as captures come", "[view]") {
@@ -38,11 +48,11 @@ TEST_CASE("Refused views are counted once per capture, as captures come", "[view
     writer.published(capture);
   };
   RunRecords records(folder.path(""));
-  records.refresh(3, true);
+  records.refresh(status_of(3), true);
   CHECK(records.json().empty());
   publish(0, outcome(3, {{"seen.targets", 2}}));
-  records.refresh(3, true);
-  records.refresh(3, true);
+  records.refresh(status_of(3), true);
+  records.refresh(status_of(3), true);
   CHECK(records.json()["views"] ==
         Json::parse(R"({"views":1,"draws":3,"refused":{"seen.targets":2},"unmet":0})"));
   ViewOutcome unmet = outcome(8, {{"seen.targets", 4}, {"seen.distance_m", 4}});
@@ -50,7 +60,7 @@ TEST_CASE("Refused views are counted once per capture, as captures come", "[view
   publish(2, unmet);
   // Staged is not yet made.
   writer.commit(1, {{}, {{"", outcomes_json({outcome(100, {})})}}});
-  records.refresh(3, true);
+  records.refresh(status_of(3), true);
   CHECK(records.json()["views"] ==
         Json::parse(R"({"views":2,"draws":11,"refused":{"seen.distance_m":4,"seen.targets":6},)"
                     R"("unmet":1})"));
@@ -73,9 +83,16 @@ TEST_CASE("The last captures of all workers, and where their time goes", "[view]
   folder.write(".diorama/stage/two/times.json", R"({"rendering": 0.5, "x": "y"})");
   folder.write(".diorama/stage/three/times.json", R"({"rendering": )");
   RunRecords records(folder.path(""));
-  records.refresh(10, false);
+  records.refresh(status_of(10, {"one", "two", "three", "four"}), false);
   CHECK(records.json()["last"] == Json({2, 7, 1, 0}));
   CHECK(records.json()["stages"] == Json::parse(R"({"loading":1.0,"rendering":3.0})"));
+  // One has died, and leaves its file; one has no lease any more; one is not what a worker writes.
+  folder.write(".diorama/stage/three/times.json",
+               R"({"rendering": 100, "x": ")" + std::string(std::size_t(64) << 10, 'y') + "\"}");
+  records.refresh(status_of(10, {"two", "three"}, {"one"}), false);
+  CHECK(records.json()["stages"] == Json::parse(R"({"rendering":0.5})"));
+  records.refresh(status_of(10), false);
+  CHECK_FALSE(records.json().contains("stages"));
 }
 
 TEST_CASE("Verdicts of settling are counted by reason, other files passed over", "[view]") {
@@ -90,7 +107,7 @@ TEST_CASE("Verdicts of settling are counted by reason, other files passed over",
   for (const char* text : {"", "{", "[]", "{\"visit\":1}", "{\"visit\":\"x\"}"}) {
     folder.write("settle/bad.json", text);
     RunRecords records(folder.path(""));
-    records.refresh(1, false);
+    records.refresh(status_of(1), false);
     const Json settle = records.json()["settle"];
     CHECK(settle["visits"] == 1);
     CHECK(settle["at_rest"] == 1);
@@ -103,7 +120,7 @@ TEST_CASE("Verdicts of settling are counted by reason, other files passed over",
     report.visit = 5;
     report.rest_after_s.reset();
     folder.write("settle/5_room.json", settle_json(report));
-    records.refresh(1, false);
+    records.refresh(status_of(1), false);
     CHECK(records.json()["settle"]["falling_objects"] == 14);
     CHECK(records.json()["settle"]["at_rest"] == 1);
     CHECK(records.json()["settle"]["verdicts"][1]["count"] == 4);

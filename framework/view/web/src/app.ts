@@ -57,7 +57,9 @@ export class Lint {
     this.changed();
     const look = async (): Promise<void> => {
       try {
-        this.reports = (await get('/api/lint')) as LintReport[] | null;
+        const found = (await get('/api/lint')) as LintReport[] | { fault: string } | null;
+        if (found && 'fault' in found) this.fault = found.fault;
+        else this.reports = found;
       } catch (error) {
         this.fault = (error as Error).message;
       }

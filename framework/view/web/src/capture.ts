@@ -71,7 +71,7 @@ export class CapturePage {
       this.player.forget();
       get('/api/run').then((run) => {
         this.run = run as RunState;
-        if (this.capture && !this.app.state.plays) this.showPanel();
+        if (this.capture && !this.player.isPlaying) this.showPanel();
       }, () => undefined);
     }
     if (state.capture !== this.shown) {
@@ -102,7 +102,12 @@ export class CapturePage {
     if (!this.capture) return;
     this.player.show(this.capture, app.info.captures, app.state.plays, app.state.speed,
       (this.frame?.width ?? 1) * (this.frame?.height ?? 1));
-    if (!app.state.plays) this.wantNumbers();
+    if (app.state.plays && !this.player.isPlaying) {
+      // Addresses may ask to play what is no clip, or one frame.
+      app.go({ plays: false }, true);
+      return;
+    }
+    if (!this.player.isPlaying) this.wantNumbers();
     this.showHead();
     this.showPanel();
     this.showSpace();
@@ -200,7 +205,7 @@ export class CapturePage {
     const scroll = this.panel.scrollTop;
     clear(this.panel);
     // Numbers of a frame that has passed are nobody's to choose from.
-    this.panel.inert = app.state.plays;
+    this.panel.inert = this.player.isPlaying;
     if (!frame) return;
     const seen = frame.objects.filter((object) => object.box);
     this.panel.append(el('h3', {}, 'Objects', el('small', {}, `${seen.length} in the picture, ${frame.objects.length} in all`)));

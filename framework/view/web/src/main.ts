@@ -11,7 +11,6 @@ import { Palette, kLayers } from './layers';
 import { FindingsPage, RunPage, StatsPage } from './pages';
 import { Page, State, addressOf, readState } from './state';
 
-
 const kAddressMs = 250;
 
 /** Of a run that has made nothing that could be read yet. */

@@ -23,6 +23,8 @@ export interface PlayerHooks {
 /** Pixels of pictures that are kept, so that a short clip is fetched once. */
 const kMostPixels = 40e6;
 const kAhead = 10;
+/** Frames in a second, whatever rate a dataset states. */
+const kMostRate = 1000;
 
 export class Player {
   private readonly play = button('', '', () => this.toggle(), { class: 'play' });
@@ -77,6 +79,11 @@ export class Player {
       cancelAnimationFrame(this.request);
       this.request = requestAnimationFrame((now) => this.tick(now));
     }
+  }
+
+  /** Whether it does what it was asked for: there may be nothing to play. */
+  get isPlaying(): boolean {
+    return this.plays;
   }
 
   /** Nothing of what was fetched holds any more. */
@@ -141,16 +148,16 @@ export class Player {
     if (!this.plays || !this.clip) return;
     this.request = requestAnimationFrame((later) => this.tick(later));
     const count = this.captures.length;
-    // A page in the background goes on where it was.
     // Reports may have every tenth frame alone.
-    const rate = this.clip.fps * this.speed * (this.captures.length / this.clip.frames);
+    const rate = Math.max(0, Math.min(kMostRate, this.clip.fps * this.speed * (count / this.clip.frames)));
+    // A page in the background goes on where it was.
     const passed = Math.min(0.25, (now - this.last) / 1000) * rate;
     this.last = now;
     const here = Math.floor(this.position);
     const due = Math.floor(this.position + passed);
-    for (let i = 1; i <= kAhead + due - here; ++i) this.shot(this.captures[(here + i) % count]);
+    for (let i = 1; i <= Math.min(count, kAhead + due - here); ++i) this.shot(this.captures[(here + i) % count]);
     // Of what has come, the frame whose time it is; the clock waits for the others.
-    for (let place = due; place > here; --place) {
+    for (let place = due; place > Math.max(here, due - count); --place) {
       const capture = this.captures[place % count];
       const shot = this.shot(capture);
       if (!this.isReady(shot)) continue;
