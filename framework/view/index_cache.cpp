@@ -122,10 +122,10 @@ void IndexCache::keep(const Key& key, const CaptureIndex& index) const {
     }
   }
   fs::rename(draft, file_of(key), error);
-  remove_oldest();
+  remove_oldest(file_of(key));
 }
 
-void IndexCache::remove_oldest() const {
+void IndexCache::remove_oldest(const fs::path& newest) const {
   std::vector<std::tuple<fs::file_time_type, std::uintmax_t, fs::path>> files;
   std::uintmax_t all = 0;
   std::error_code error;
@@ -137,6 +137,8 @@ void IndexCache::remove_oldest() const {
     const fs::file_time_type time = at->last_write_time(failed);
     if (failed) continue;
     all += size;
+    // Clocks of files are too coarse to tell that it is.
+    if (at->path() == newest) continue;
     files.emplace_back(time, size, at->path());
   }
   std::ranges::sort(files);

@@ -39,7 +39,7 @@ class IndexCache {
 
  private:
   std::filesystem::path file_of(const Key& key) const { return folder_ / (key.place + ".index"); }
-  void remove_oldest() const;
+  void remove_oldest(const std::filesystem::path& newest) const;
 
   std::filesystem::path folder_;
   std::uintmax_t most_bytes_;
