@@ -9,6 +9,7 @@
 
 #include "framework/config/clean_text.h"
 #include "framework/config/yaml_config.h"
+#include "framework/datasets/dataset_difference.h"
 #include "framework/jobs/assemble.h"
 #include "framework/jobs/assemble_job.h"
 #include "framework/lint/lint_dataset.h"
@@ -28,7 +29,8 @@ Value job_of(const std::string& run) {
 LintReport lint_scenes_of(const std::string& run, const Value& job, const JobServices& services,
                           DatasetReaders& readers) {
   JobAssembly assembly = assemble_job(job, *services.registry, *services.host, services.assets_root,
-                                      program_version(), AssembleFor::Plan, 1);
+                                      program_version(), AssembleFor::Run, 1);
+  require_same_assets(run, assembly.dataset_json, services.assets_root);
   return lint_scenes(run, assembly.job, assembly.plan, assembly.components.sets.front(), readers,
                      *services.host);
 }

@@ -117,8 +117,9 @@ int command_replay(const GlobalOptions& global, const ReplayOptions& options, Co
   const std::set<int> captures = chosen_captures(options, status);
   std::optional<ScratchFolder> scratch;
   if (!options.output) scratch.emplace("replay");
-  const fs::path records = make_captures_again(
-      global, status, scratch ? scratch->path() : *options.output, captures, options.sets, log);
+  const fs::path records =
+      make_captures_again(global, options.dataset, status,
+                          scratch ? scratch->path() : *options.output, captures, options.sets, log);
   const Comparison result =
       compare(records, read_status(file_system, records, false), options.dataset, status, captures);
   for (const std::string& difference : result.differences) {

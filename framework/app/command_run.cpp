@@ -18,6 +18,7 @@
 #include "framework/config/clean_text.h"
 #include "framework/config/job_overrides.h"
 #include "framework/config/yaml_config.h"
+#include "framework/datasets/dataset_difference.h"
 #include "framework/host/machine_limits.h"
 #include "framework/host/progress_bar.h"
 #include "framework/host/progress_lines.h"
@@ -189,6 +190,9 @@ int run_value(const GlobalOptions& global, const Value& job, const RunCommandOpt
   JobAssembly assembly =
       assemble_job(job, *services.registry, *services.host, services.assets_root, program_version(),
                    AssembleFor::Run, options.visits_in_flight);
+  if (options.again_of) {
+    require_same_assets(*options.again_of, assembly.dataset_json, services.assets_root);
+  }
   check_folders_are_free(output_folders(assembly.job));
   try {
     const RunSummary summary = run_job(assembly, *services.host, options, log);
@@ -235,13 +239,15 @@ int finish_dataset(const GlobalOptions& global, const DatasetStatus& status, Con
   return run_value(global, job, options, log);
 }
 
-fs::path make_captures_again(const GlobalOptions& global, const DatasetStatus& status,
-                             const fs::path& output, std::set<int> captures,
-                             const std::vector<std::string>& sets, ConsoleLog& log) {
+fs::path make_captures_again(const GlobalOptions& global, const fs::path& dataset,
+                             const DatasetStatus& status, const fs::path& output,
+                             std::set<int> captures, const std::vector<std::string>& sets,
+                             ConsoleLog& log) {
   Value job = job_of(status, output);
   for (const std::string& assignment : sets) apply_set(job, assignment);
   RunCommandOptions options;
   options.only = std::move(captures);
+  if (sets.empty()) options.again_of = dataset;
   run_value(global, job, options, log);
   const Value* section = job.find("output");
   const Value* records = section ? section->find("records") : nullptr;

@@ -19,9 +19,12 @@ int command_run(const GlobalOptions& global, const RunCommandOptions& options, C
 /// What is left to do when all captures of a dataset are there. Throws like command_run().
 int finish_dataset(const GlobalOptions& global, const DatasetStatus& status, ConsoleLog& log);
 
-/// Makes captures of a dataset again, by its own job with `sets` on top, into the folder `output`.
-/// Returns where dataset.json lies there. Throws like command_run().
-std::filesystem::path make_captures_again(const GlobalOptions& global, const DatasetStatus& status,
+/// Makes captures of `dataset` again, by its own job with `sets` on top, into the folder `output`.
+/// Returns where dataset.json lies there. Throws like command_run(), and, where nothing is set,
+/// require_same_assets().
+std::filesystem::path make_captures_again(const GlobalOptions& global,
+                                          const std::filesystem::path& dataset,
+                                          const DatasetStatus& status,
                                           const std::filesystem::path& output,
                                           std::set<int> captures,
                                           const std::vector<std::string>& sets, ConsoleLog& log);

@@ -26,6 +26,8 @@ struct RunCommandOptions {
   bool overwrite = false;
   bool only_finishes = false;  ///< See RunOptions.
   std::optional<std::set<int>> only = {};
+  /// A dataset whose captures are made again, so of the same assets.
+  std::optional<std::filesystem::path> again_of = {};
   bool plan = false;     ///< Checks the job and plans it, opens no asset.
   bool dry_run = false;  ///< The same, then estimates what a run takes.
 };

@@ -41,8 +41,12 @@ namespace fs = std::filesystem;
 /// What a child may fill, and what it prints.
 class Scratch {
  public:
-  Scratch() { fs::create_directory(work()); }
+  Scratch() {
+    fs::create_directory(work());
+    fs::create_directory(of_drivers());
+  }
   fs::path work() const { return folder_.path() / "work"; }
+  fs::path of_drivers() const { return folder_.path() / "drivers"; }
   fs::path printed() const { return folder_.path() / "printed"; }
 
  private:
@@ -84,6 +88,10 @@ void enter(const Scratch& scratch) {
   if (chdir(scratch.work().c_str()) != 0) fail(scratch.work().string());
   for (const char* variable : {"HOME", "TMPDIR", "XDG_CACHE_HOME", "XDG_CONFIG_HOME"}) {
     setenv(variable, scratch.work().c_str(), 1);
+  }
+  // Drivers keep compiled kernels of their own accord, which are no files of the plugin.
+  for (const char* variable : {"MESA_SHADER_CACHE_DIR", "__GL_SHADER_DISK_CACHE_PATH"}) {
+    setenv(variable, scratch.of_drivers().c_str(), 0);
   }
   const int printed = open(scratch.printed().c_str(), O_CREAT | O_WRONLY, 0600);
   if (printed < 0 || dup2(printed, STDOUT_FILENO) < 0) fail(scratch.printed().string());

@@ -9,6 +9,7 @@
 #include <set>
 #include <sstream>
 
+#include "diorama/error.h"
 #include "framework/config/json_text.h"
 #include "framework/datasets/capture_sweep.h"
 #include "framework/datasets/dataset_origin.h"
@@ -176,6 +177,34 @@ std::vector<std::string> page_differences(const std::string& a, const std::strin
   for (const std::string& line : lines_beyond(job, other_job)) lines.push_back("job: < " + line);
   for (const std::string& line : lines_beyond(other_job, job)) lines.push_back("job: > " + line);
   return lines;
+}
+
+void require_same_assets(const std::filesystem::path& folder, const std::string& page,
+                         const std::optional<std::filesystem::path>& assets_root) {
+  const auto then = assets_of(parse_json_or_nothing(page_of_run(folder)));
+  const auto now = assets_of(parse_json_or_nothing(page));
+  std::string first;
+  std::size_t count = 0;
+  const auto note = [&](const std::string& asset, const char* what) {
+    if (++count == 1) first = asset + what;
+  };
+  for (const auto& [asset, files] : then) {
+    const auto found = now.find(asset);
+    if (found == now.end()) {
+      note(asset, " is not among those that the job takes now");
+    } else if (found->second != files) {
+      note(asset, " has other files now");
+    }
+  }
+  for (const auto& [asset, files] : now) {
+    if (!then.contains(asset)) note(asset, " was not among them");
+  }
+  if (count == 0) return;
+  throw Error(ErrorKind::Asset,
+              folder.string() + ": was made of other assets: " + first +
+                  (count > 1 ? ", and " + std::to_string(count - 1) + " more" : "") +
+                  "; --assets-root names the folder of assets that it was made with, now it is " +
+                  (assets_root ? assets_root->string() : "none"));
 }
 
 std::vector<std::string> capture_difference(const StoredDataset& a, const StoredDataset& b,

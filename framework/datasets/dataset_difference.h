@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -41,5 +42,10 @@ std::vector<std::string> capture_difference(const StoredDataset& a, const Stored
 
 /// Lines for what two pages dataset.json say differently.
 std::vector<std::string> page_differences(const std::string& a, const std::string& b);
+
+/// Throws Error(Asset) when the assets that `page` names, the dataset.json that the job of the
+/// dataset in `folder` gives now, are not those which that dataset was made of.
+void require_same_assets(const std::filesystem::path& folder, const std::string& page,
+                         const std::optional<std::filesystem::path>& assets_root);
 
 }  // namespace diorama

@@ -200,6 +200,39 @@ TEST_CASE("diff finds nothing between equal datasets, and what was changed", "[d
   CHECK(run({"diff", "out", "absent"}, folder.path()).exit_code == 2);
 }
 
+TEST_CASE("captures are made again of the same assets alone", "[replay][lint]") {
+  const TemporaryFolder folder;
+  for (const char* root : {"first", "second"}) {
+    fs::create_directories(folder / root);
+    const std::string height = root[0] == 'f' ? "1" : "2";
+    write_file(folder / root / "wedge.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 " + height +
+                                                "\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
+  }
+  write_file(folder / "job.yaml", R"(
+environments: [{type: files, files: [/wedge.obj]}]
+cameras: [{type: pinhole, name: eye, width: 16, height: 12}]
+renderer: {type: "null"}
+timeline: [{capture: now}]
+writers: [{type: PoseWriter, name: pose}]
+)");
+  succeed({"--assets-root", "first", "run", "job.yaml", "--output", "out"}, folder);
+  succeed({"--assets-root", "first", "replay", "out", "--capture", "0"}, folder);
+  succeed({"--assets-root", "first", "lint", "--scenes", "out"}, folder);
+  for (const std::vector<std::string>& command :
+       {std::vector<std::string>{"replay", "out", "--capture", "0"},
+        {"verify", "out", "--sample", "1"},
+        {"lint", "--scenes", "out"}}) {
+    std::vector<std::string> arguments{"--assets-root", "second"};
+    arguments.insert(arguments.end(), command.begin(), command.end());
+    const Outcome outcome = run(arguments, folder.path());
+    INFO(outcome.output);
+    CHECK(outcome.exit_code == 5);
+    CHECK_THAT(outcome.errors,
+               ContainsSubstring("out: was made of other assets: /wedge.obj has other "
+                                 "files now; --assets-root names the folder"));
+  }
+}
+
 TEST_CASE("captures are made again, byte by byte", "[replay]") {
   const TemporaryFolder folder;
   make(folder, job(7, std::string(kBasic) + kTraining));
