@@ -10,6 +10,7 @@
 #include <csignal>
 #include <cstdlib>
 #include <fstream>
+#include <functional>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -24,6 +25,7 @@
 #include "framework/view/http_server.h"
 #include "framework/view/index_cache.h"
 #include "framework/view/report.h"
+#include "framework/view/unfinished_writers.h"
 
 namespace diorama {
 namespace {
@@ -73,16 +75,23 @@ class BrowserStart {
   std::optional<ScratchFolder> folder_;
 };
 
+/// What the assembly of a run's job has to say, the run has said.
+Log quiet(ConsoleLog& log) {
+  return [&log](LogLevel, std::string_view text) { log.write(LogLevel::Debug, text); };
+}
+
 }  // namespace
 
 int command_view(const GlobalOptions& global, const ViewOptions& options, ConsoleLog& log) {
   const JobServices services = make_services(global, log.sink());
   DatasetReaders readers(*services.registry, *services.host);
+  UnfinishedWriters unfinished(global, quiet(log));
   DatasetView view({.folder = options.dataset,
                     .other = options.other,
                     .tolerance = options.tolerance,
                     .reader = options.reader,
-                    .cache = index_cache_folder()},
+                    .cache = index_cache_folder(),
+                    .unfinished = std::bind_front(&UnfinishedWriters::folder_for, &unfinished)},
                    readers, *services.host);
 
   view_is_to_end = false;
@@ -121,9 +130,12 @@ int command_view(const GlobalOptions& global, const ViewOptions& options, Consol
 int command_report(const GlobalOptions& global, const ReportOptions& options, ConsoleLog& log) {
   const JobServices services = make_services(global, log.sink());
   DatasetReaders readers(*services.registry, *services.host);
-  DatasetView view(
-      {.folder = options.dataset, .reader = options.reader, .most_captures = options.captures},
-      readers, *services.host);
+  UnfinishedWriters unfinished(global, quiet(log));
+  DatasetView view({.folder = options.dataset,
+                    .reader = options.reader,
+                    .most_captures = options.captures,
+                    .unfinished = std::bind_front(&UnfinishedWriters::folder_for, &unfinished)},
+                   readers, *services.host);
   const ReportSize size = write_report(view, options.output, options.has_all_overlays);
   log.write(LogLevel::Info, "wrote " + (options.output / "index.html").string() + ": " +
                                 std::to_string(size.captures) + " captures, " +

@@ -22,6 +22,7 @@
 #include "framework/jobs/assemble_job.h"
 #include "framework/jobs/job_file.h"
 #include "framework/jobs/run_in_memory.h"
+#include "framework/plugins/plugin_call.h"
 #include "framework/plugins/plugin_search.h"
 #include "framework/python/captures.h"
 #include "framework/python/given.h"
@@ -95,7 +96,10 @@ class OpenDataset {
     std::shared_ptr<const StoredCapture> capture;
     {
       const py::gil_scoped_release unlocked;
-      capture = std::make_shared<const StoredCapture>(dataset_->read(place, names));
+      const std::string who = "reader of " + dataset_->info().format + ", capture " +
+                              std::to_string(dataset_->info().captures[place]);
+      capture = std::make_shared<const StoredCapture>(
+          call_component(who, [&] { return dataset_->read(place, names); }));
     }
     return capture_of(std::move(capture), dataset_->info().holds);
   }
@@ -132,7 +136,8 @@ std::unique_ptr<OpenDataset> open_dataset(const std::string& program, const std:
                                           const std::string& reader) {
   return services_of(program).with_readers([&](DatasetReaders& readers) {
     FoundDataset found = find_dataset(folder, readers, reader);
-    auto dataset = readers.open(found.folder, found.reader);
+    auto dataset =
+        readers.open(found.folder, found.reader, DatasetReaders::LostCaptures::Throw);
     return std::make_unique<OpenDataset>(std::move(found), std::move(dataset));
   });
 }

@@ -92,11 +92,15 @@ class ReportWriter {
     return "data/" + name;
   }
 
-  /// False when there is nothing at this address.
+  /// False when there is nothing at this address, or to be looked for elsewhere.
   bool add_data(const std::string& path,
                 const std::function<std::string(const std::string&)>& adapt = {}) {
     const HttpAnswer answer = view_.answer(path);
     if (answer.status == 404) return false;
+    if (answer.status == 204) {
+      put(file_name(path) + ".js", "diorama_data('" + path + "',null);\n");
+      return false;
+    }
     const bool is_json = answer.type == "application/json";
     std::string script = "diorama_data('" + path + "',";
     if (is_json) {
@@ -142,7 +146,8 @@ class ReportWriter {
         const std::string frame = address + "/" + std::to_string(f);
         add_picture(frame + "/color");
         add_picture(frame + "/thumbnail");
-        if (shown.holds.contains(kInstanceId.name)) add_data(frame + "/ids");
+        const bool has_masks = shown.holds.contains(kInstanceId.name);
+        if (has_masks && !add_data(frame + "/ids")) add_data(frame + "/masks");
         if (shown.holds.contains("amodal_mask")) add_data(frame + "/amodal");
         for (const std::string& kind : kinds) add_data(frame + "/" + kind);
       }
