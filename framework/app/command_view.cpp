@@ -5,6 +5,7 @@
 #include <spawn.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <csignal>
@@ -29,6 +30,9 @@
 
 namespace diorama {
 namespace {
+
+/// What most servers take of attachments, which grow by a third on their way, is 25 MB.
+constexpr std::size_t kMostMailBytes = 18'000'000;
 
 std::atomic<bool> view_is_to_end = false;
 static_assert(std::atomic<bool>::is_always_lock_free);
@@ -140,6 +144,13 @@ int command_report(const GlobalOptions& global, const ReportOptions& options, Co
   log.write(LogLevel::Info, "wrote " + (options.output / "index.html").string() + ": " +
                                 std::to_string(size.captures) + " captures, " +
                                 std::to_string((size.bytes + (1U << 20) - 1) >> 20) + " MiB");
+  if (size.bytes > kMostMailBytes) {
+    std::size_t shown = 0;
+    for (const auto& each : view.shown()) shown = std::max(shown, each.captures.size());
+    const std::size_t fewer = std::max<std::size_t>(1, shown * kMostMailBytes / size.bytes);
+    log.write(LogLevel::Info,
+              "for a mail choose fewer of them: --captures " + std::to_string(fewer));
+  }
   return 0;
 }
 

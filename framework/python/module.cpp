@@ -18,6 +18,7 @@
 #include "diorama/reader.h"
 #include "framework/config/yaml_config.h"
 #include "framework/datasets/dataset_readers.h"
+#include "framework/datasets/pixel_boxes.h"
 #include "framework/jobs/assemble.h"
 #include "framework/jobs/assemble_job.h"
 #include "framework/jobs/job_file.h"
@@ -98,8 +99,9 @@ class OpenDataset {
       const py::gil_scoped_release unlocked;
       const std::string who = "reader of " + dataset_->info().format + ", capture " +
                               std::to_string(dataset_->info().captures[place]);
-      capture = std::make_shared<const StoredCapture>(
-          call_component(who, [&] { return dataset_->read(place, names); }));
+      StoredCapture stored = call_component(who, [&] { return dataset_->read(place, names); });
+      for (Frame& frame : stored.capture.frames) complete_boxes(frame);
+      capture = std::make_shared<const StoredCapture>(std::move(stored));
     }
     return capture_of(std::move(capture), dataset_->info().holds);
   }

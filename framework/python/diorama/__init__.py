@@ -100,7 +100,8 @@ class Instance:
     world_from_object: Array | None = None  #: float64, 4 x 4, metres
     #: Least and greatest corner in the object's own space: float64, 3 each, metres.
     bounds: tuple[Array, Array] | None = None
-    box: Box | None = None  #: of its visible pixels
+    #: Of its visible pixels; where a dataset has no boxes, found in "instance_id" when that is read.
+    box: Box | None = None
     visibility: Visibility | None = None
     #: By name: float64, 3, metres in the object's own space. Only what is made has them, not what is read.
     keypoints: dict[str, Array] = dataclasses.field(default_factory=dict)

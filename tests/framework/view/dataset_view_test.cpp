@@ -626,6 +626,7 @@ TEST_CASE("A report is the same as files, whose names no text of the dataset mak
   CHECK(capture.starts_with("diorama_data('/api/0/capture/3',{"));
   CHECK(read("data/0_capture_3_0_ids.js").find("'data:image/png;base64,iVBOR") !=
         std::string::npos);
+  CHECK(read("data/0_capture_3_0_color").starts_with("\xFF\xD8\xFF"));
   // What it lacks its page does not ask for.
   const auto holds = [&](const std::filesystem::path& report, const char* name) {
     std::ifstream stream(report / "data" / "0_info.js", std::ios::binary);
