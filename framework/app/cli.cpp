@@ -232,9 +232,10 @@ void add_run(CLI::App& app, CommandLine& line) {
 
 void add_reader(CLI::App& command, std::string& reader) {
   command
-      .add_option("--reader", reader,
-                  "Reader to use: its type, or '{type: TYPE, KEY: VALUE}' with parameters; default: "
-                  "the one that knows the folder")
+      .add_option(
+          "--reader", reader,
+          "Reader to use: its type, or '{type: TYPE, KEY: VALUE}' with parameters; default: "
+          "the one that knows the folder")
       ->type_name("TYPE");
 }
 

@@ -139,8 +139,9 @@ Reader& DatasetReaders::reader_with(const std::string& mapping) {
   const Value map = parse_yaml(mapping, "--reader");
   const Value* const type = map.kind == Value::Kind::Map ? map.find("type") : nullptr;
   if (!type || type->kind != Value::Kind::Scalar) {
-    throw Error(ErrorKind::Usage,
-                "--reader: expected a type or a mapping {type: TYPE, ...}, found '" + mapping + "'");
+    throw Error(
+        ErrorKind::Usage,
+        "--reader: expected a type or a mapping {type: TYPE, ...}, found '" + mapping + "'");
   }
   const Entry& entry = entry_of(type->scalar);
   if (!entry.make_with) {

@@ -24,8 +24,7 @@ class GuardedDataset final : public StoredDataset {
     } catch (const Error& error) {
       StoredCapture lost;
       lost.capture.index = info().captures.at(i);
-      lost.log.check(false,
-                     {kFilesCanBeRead, ".", lost.capture.index, "", "", error.what(), ""});
+      lost.log.check(false, {kFilesCanBeRead, ".", lost.capture.index, "", "", error.what(), ""});
       return lost;
     }
   }

@@ -50,7 +50,8 @@ std::optional<RunPlan> read_plan(const std::filesystem::path& run, ReadLog& log)
     return RunPlan{page.at("captures").get<int>(),
                    page.at("cameras").get<std::vector<std::string>>()};
   } catch (const std::exception& error) {
-    log.findings.push_back({kFilesCanBeRead, "dataset.json", std::nullopt, "", "", error.what(), ""});
+    log.findings.push_back(
+        {kFilesCanBeRead, "dataset.json", std::nullopt, "", "", error.what(), ""});
     return std::nullopt;
   }
 }

@@ -72,8 +72,8 @@ py::dict camera_of(const Camera& camera) {
 
 /// Its box, and 0 or 1 for each pixel in there.
 py::tuple mask_of(const CoverageMask& mask, const py::capsule& owner) {
-  return py::make_tuple(
-      box_of(mask.box), view_of(mask.bits.data(), {mask.box.height(), mask.box.width()}, owner));
+  return py::make_tuple(box_of(mask.box),
+                        view_of(mask.bits.data(), {mask.box.height(), mask.box.width()}, owner));
 }
 
 py::object visibility_of(const std::optional<Visibility>& seen, const py::capsule& owner) {

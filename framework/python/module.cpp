@@ -138,8 +138,7 @@ std::unique_ptr<OpenDataset> open_dataset(const std::string& program, const std:
                                           const std::string& reader) {
   return services_of(program).with_readers([&](DatasetReaders& readers) {
     FoundDataset found = find_dataset(folder, readers, reader);
-    auto dataset =
-        readers.open(found.folder, found.reader, DatasetReaders::LostCaptures::Throw);
+    auto dataset = readers.open(found.folder, found.reader, DatasetReaders::LostCaptures::Throw);
     return std::make_unique<OpenDataset>(std::move(found), std::move(dataset));
   });
 }

@@ -134,10 +134,7 @@ struct DatasetView::Opened {
 };
 
 DatasetView::DatasetView(Options options, DatasetReaders& readers, Host& host)
-    : options_(std::move(options)),
-      readers_(readers),
-      host_(host),
-      indexes_(options_.cache) {
+    : options_(std::move(options)), readers_(readers), host_(host), indexes_(options_.cache) {
   Opening opening = open();
   datasets_ = std::move(opening.datasets);
   faults_ = std::move(opening.faults);

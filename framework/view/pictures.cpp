@@ -149,7 +149,10 @@ std::optional<PictureFile> make_picture(const Frame& frame, PictureKind kind, co
     if (kind == PictureKind::Color || kind == PictureKind::Photo) {
       const bool is_exact = kind == PictureKind::Color;
       return picture_of(
-          *color, host, [](const Rgba8& p) { return Rgb{p[0], p[1], p[2]}; },
+          *color, host,
+          [](const Rgba8& p) {
+            return Rgb{p[0], p[1], p[2]};
+          },
           is_exact ? ImageFormat::Png : ImageFormat::Jpeg);
     }
   }

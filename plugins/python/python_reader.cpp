@@ -99,8 +99,7 @@ std::unique_ptr<const StoredDataset> opened_by(const py::object& reader, const s
 
 PythonReader::PythonReader(const Params& params, Host& host) : host_(host) {
   const bool is_named =
-      !params.file.empty() || !params.class_name.empty() ||
-                        params.params.kind != Value::Kind::Null;
+      !params.file.empty() || !params.class_name.empty() || params.params.kind != Value::Kind::Null;
   if (is_named) script_.emplace(params, kScriptKind, host);
 }
 

@@ -86,8 +86,8 @@ class HostileDataset final : public StoredDataset {
       frame.set(kColor, std::move(color));
     }
     if (wanted.contains(kInstanceId.name) && overlaps) {
-      stored.masks.push_back({{0x123456U, {{1, 1, 3, 3}, {0, 1, 1, 1}}},
-                              {9U, {{2, 1, 3, 2}, {1}}}});
+      stored.masks.push_back(
+          {{0x123456U, {{1, 1, 3, 3}, {0, 1, 1, 1}}}, {9U, {{2, 1, 3, 2}, {1}}}});
     } else if (wanted.contains(kInstanceId.name)) {
       Image<std::uint32_t> ids(6, 4, 0U);
       ids.at(2, 1) = 0x123456;
@@ -539,8 +539,7 @@ TEST_CASE("A capture in which the reader throws is lost alone", "[view]") {
     while (viewed.view->work()) {
     }
     HostileDataset::has_no_pixels = -1;
-    CHECK(viewed.json("/api/0/brightness/0")["brightness"] ==
-          Json({CaptureIndex::kUnknown, 9, 9}));
+    CHECK(viewed.json("/api/0/brightness/0")["brightness"] == Json({CaptureIndex::kUnknown, 9, 9}));
   }
 }
 
@@ -565,9 +564,8 @@ TEST_CASE("A dataset that cannot be opened is named beside those that can", "[vi
   CHECK(state["datasets"].size() == 2);
   REQUIRE(state["faults"].size() == 1);
   CHECK_THAT(state["faults"][0].get<std::string>(), ContainsSubstring("no table"));
-  CHECK_THROWS_WITH(
-      DatasetView({.folder = viewed.folder.path("broken")}, readers, viewed.host),
-      ContainsSubstring("no table"));
+  CHECK_THROWS_WITH(DatasetView({.folder = viewed.folder.path("broken")}, readers, viewed.host),
+                    ContainsSubstring("no table"));
 }
 
 TEST_CASE("Masks that overlap reach the page one by one", "[view]") {
