@@ -78,6 +78,17 @@ class FilesOverLinks final : public DatasetFiles {
   std::map<std::string, std::ofstream, std::less<>> files_;
 };
 
+/// Place of the writer that writes into the folder; nothing when there is none.
+std::optional<std::size_t> writer_in(const Value& job, const fs::path& folder) {
+  Complaints complaints;
+  const OutputFolders folders = output_folders(read_job(job, complaints));
+  for (std::size_t i = 0; i < folders.writers.size(); ++i) {
+    std::error_code ignored;
+    if (fs::equivalent(folders.base / folders.folder(i), folder, ignored)) return i;
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 UnfinishedWriters::UnfinishedWriters(GlobalOptions options, Log log)
@@ -89,7 +100,7 @@ fs::path UnfinishedWriters::next_folder(const fs::path& folder) {
   std::vector<fs::path>& all = folders_[folder];
   while (all.size() > 1) {
     std::error_code ignored;
-    fs::remove_all(all.front(), ignored);
+    fs::remove_all(all.front().parent_path(), ignored);
     all.erase(all.begin());
   }
   // Datasets are called by the names of their folders.
@@ -100,32 +111,28 @@ fs::path UnfinishedWriters::next_folder(const fs::path& folder) {
 std::optional<fs::path> UnfinishedWriters::folder_for(const DatasetStatus& status,
                                                       const fs::path& folder) {
   const Value job = job_of(status, status.base);
+  const std::optional<std::size_t> place = writer_in(job, folder);
+  if (!place) return std::nullopt;
   const JobServices services = make_job_services(options_, job, log_);
-  // What the job draws may have gone since, or lie elsewhere: this needs its names alone.
   JobAssembly assembly = assemble_job(job, *services.registry, *services.host, services.assets_root,
                                       program_version(), AssembleFor::Trial, 1);
   const OutputFolders folders = output_folders(assembly.job);
-  for (std::size_t i = 0; i < folders.writers.size(); ++i) {
-    std::error_code ignored;
-    if (!fs::equivalent(folders.base / folders.folder(i), folder, ignored)) continue;
-    LocalFileSystem file_system;
-    OutputStore store(file_system, folders, assembly.plan.capture_count(), {});
-    store.refresh();
-    const fs::path here = next_folder(folder);
-    try {
-      FilesOverLinks files(fs::absolute(folder), here);
-      Writer& writer = *assembly.components.writers[i];
-      call_component("writer '" + folders.name(i) + "'", [&] {
-        writer.begin(assembly.dataset, files);
-        writer.finish([&](const RecordVisitor& visit) { store.read_records(i, visit); }, files);
-      });
-      files.close();
-    } catch (const fs::filesystem_error& error) {
-      throw Error(ErrorKind::Output, error.what());
-    }
-    return here;
+  LocalFileSystem file_system;
+  OutputStore store(file_system, folders, assembly.plan.capture_count(), {});
+  store.refresh();
+  const fs::path here = next_folder(folder);
+  try {
+    FilesOverLinks files(fs::absolute(folder), here);
+    Writer& writer = *assembly.components.writers[*place];
+    call_component("writer '" + folders.name(*place) + "'", [&] {
+      writer.begin(assembly.dataset, files);
+      writer.finish([&](const RecordVisitor& visit) { store.read_records(*place, visit); }, files);
+    });
+    files.close();
+  } catch (const fs::filesystem_error& error) {
+    throw Error(ErrorKind::Output, error.what());
   }
-  return std::nullopt;
+  return here;
 }
 
 }  // namespace diorama

@@ -86,8 +86,13 @@ class HostileDataset final : public StoredDataset {
       frame.set(kColor, std::move(color));
     }
     if (wanted.contains(kInstanceId.name) && overlaps) {
-      stored.masks.push_back(
-          {{0x123456U, {{1, 1, 3, 3}, {0, 1, 1, 1}}}, {9U, {{2, 1, 3, 2}, {1}}}});
+      CoverageMask lower;
+      lower.box = {1, 1, 3, 3};
+      lower.bits = {0, 1, 1, 1};
+      CoverageMask upper;
+      upper.box = {2, 1, 3, 2};
+      upper.bits = {1};
+      stored.masks.push_back({{0x123456U, lower}, {9U, upper}});
     } else if (wanted.contains(kInstanceId.name)) {
       Image<std::uint32_t> ids(6, 4, 0U);
       ids.at(2, 1) = 0x123456;
