@@ -21,6 +21,8 @@ class GuardedDataset final : public StoredDataset {
     try {
       return call_component("reader of " + info().format,
                             [&] { return dataset_->read(i, wanted); });
+    } catch (const Stopped&) {
+      throw;
     } catch (const Error& error) {
       StoredCapture lost;
       lost.capture.index = info().captures.at(i);

@@ -62,6 +62,8 @@ class RunLint {
       const std::shared_ptr<const StoredDataset> dataset = readers_.open(folder, reader);
       reports_.push_back(lint_read(*dataset, folder, host_));
       datasets_.push_back({folder.filename().string(), dataset});
+    } catch (const Stopped&) {
+      throw;
     } catch (const Error& error) {
       if (error.kind() == ErrorKind::Usage) throw;
       reports_.push_back({folder.string(), reader, 0, 1, {}});

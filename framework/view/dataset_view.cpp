@@ -156,6 +156,7 @@ void DatasetView::open_below(const fs::path& folder, bool is_other, Datasets& al
   // Formats may have nothing to read before a run's end; the others show how it goes.
   std::exception_ptr first_fault;
   const auto forgive = [&](const Error& error) {
+    if (dynamic_cast<const Stopped*>(&error)) throw;
     if (goes_on) return host_.log(LogLevel::Debug, error.what());
     if (!first_fault) first_fault = std::current_exception();
     faults.emplace_back(error.what());

@@ -111,6 +111,7 @@ try {
   await page.waitForSelector('.object');
   check((await page.locator('.object').count()) === 3, 'and the next one is there');
   await page.getByRole('button', { name: 'Findings', exact: true }).click();
+  await page.locator('.page:not([hidden]) button.main').click();
   await page.waitForSelector('.page:not([hidden]) .bad');
   const words = await page.textContent('.page:not([hidden])');
   check(words.includes('KeyError') && words.includes('its table is <b>gone</b>'), 'findings have both');

@@ -162,7 +162,7 @@ export class Grid {
       const canvas = el('canvas');
       if (app.holds.has('color')) {
         const image = on(el('img', { alt: '', decoding: 'async', src: pictureAddress(state.dataset, capture, frame, 'thumbnail') }), {
-          error: () => image.classList.add('missing'),
+          error: () => image.replaceWith(el('span', { class: 'missing' })),
         });
         link.append(image);
       } else {
