@@ -106,7 +106,7 @@ TEST_CASE("A run of a format that ends with its tables is shown before its end",
   CHECK_THAT(files.at("data/state.js"), ContainsSubstring("\"captures\":10"));
   CHECK_THAT(files.at("data/0_info.js"), ContainsSubstring("\"name\":\"coco\""));
   CHECK(files.contains("data/0_capture_0_0_color"));
-  CHECK_THAT(files.at("data/0_capture_0.js"), ContainsSubstring("\"class\":\"cube\""));
+  CHECK_THAT(files.at("data/0_capture_0.js"), ContainsSubstring("\"class\":\"sphere\""));
   REQUIRE(shard("2/2").exit_code == 0);
   CHECK(run({"lint", "out"}, folder.path()).exit_code == 0);
 }
