@@ -40,17 +40,19 @@ class Tables(Reader):
     """Opens what Table writes: for `diorama lint`, `view`, `convert` and `diorama.open()`."""
 
     patterns = ["table.csv"]
+    taxonomy = param("class", "What its labels are.")
 
     def open(self, folder):
-        return OpenTable(folder)
+        return OpenTable(folder, self.taxonomy)
 
 
 class OpenTable(Stored):
     format = "table"
     holds = ["color", "edges", "instances", "labels", "tight_boxes"]
 
-    def __init__(self, folder):
+    def __init__(self, folder, taxonomy):
         self.folder = folder
+        self.taxonomy = taxonomy
         rows = [line.split(",") for line in (folder / "table.csv").read_text().splitlines()]
         self.seen_by = {int(capture): cameras for capture, *cameras in rows}
         self.captures = sorted(self.seen_by)
@@ -64,7 +66,7 @@ class OpenTable(Stored):
         for camera in self.seen_by[index]:
             pictures = np.load(self.folder / f"{index:06d}_{camera}.npz", allow_pickle=False)
             height, width = pictures["edges"].shape
-            instances = [Instance(id=int(row["id"]), path=f"/{row['id']}", labels={"class": row["label"]},
+            instances = [Instance(id=int(row["id"]), path=f"/{row['id']}", labels={self.taxonomy: row["label"]},
                                   box=tuple(int(row[key]) for key in FIELDS[3:]))
                          for row in rows if row["camera"] == camera]
             channels = {name: pictures[name] for name in ("color", "edges") if name in wanted}

@@ -230,6 +230,15 @@ void add_run(CLI::App& app, CommandLine& line) {
   });
 }
 
+void add_reader(CLI::App& command, std::string& reader) {
+  command
+      .add_option(
+          "--reader", reader,
+          "Reader to use: its type, or '{type: TYPE, KEY: VALUE}' with parameters; default: "
+          "the one that knows the folder")
+      ->type_name("TYPE");
+}
+
 void add_preview(CLI::App& app, CommandLine& line) {
   CLI::App* command = app.add_subcommand(
       "preview", "Make a few of a job's pictures quickly, and estimate the whole job");
@@ -460,8 +469,7 @@ void add_lint(CLI::App& app, CommandLine& line) {
   command->add_flag("--json", line.lint.as_json, "All findings as JSON");
   command->add_flag("--scenes", line.lint.looks_at_scenes,
                     "Also set up the scenes of a run anew and name what moves, hangs or is stuck");
-  command->add_option("--reader", line.lint.reader, "Reader to use; default: the one that knows it")
-      ->type_name("TYPE");
+  add_reader(*command, line.lint.reader);
   command->callback([&line] {
     line.command = [&line](ConsoleLog& log) { return command_lint(line.global, line.lint, log); };
   });
@@ -477,9 +485,7 @@ void add_stats(CLI::App& app, CommandLine& line) {
   command->add_option("--html", line.stats.html, "Write a page of tables and pictures instead")
       ->type_name("FILE")
       ->excludes(json);
-  command
-      ->add_option("--reader", line.stats.reader, "Reader to use; default: the one that knows it")
-      ->type_name("TYPE");
+  add_reader(*command, line.stats.reader);
   command->callback([&line] {
     line.command = [&line](ConsoleLog& log) { return command_stats(line.global, line.stats, log); };
   });
@@ -511,8 +517,7 @@ void add_view(CLI::App& app, CommandLine& line) {
       ->check(CLI::Range(0, 1 << 20))
       ->type_name("N")
       ->capture_default_str();
-  command->add_option("--reader", line.view.reader, "Reader to use; default: the one that knows it")
-      ->type_name("TYPE");
+  add_reader(*command, line.view.reader);
   command->callback([&line] {
     line.command = [&line](ConsoleLog& log) {
       line.view.opens_browser = !line.no_browser;
@@ -536,9 +541,7 @@ void add_report(CLI::App& app, CommandLine& line) {
       ->check(CLI::Range(1, 1 << 20))
       ->type_name("N")
       ->capture_default_str();
-  command
-      ->add_option("--reader", line.report.reader, "Reader to use; default: the one that knows it")
-      ->type_name("TYPE");
+  add_reader(*command, line.report.reader);
   command->add_flag("--all-overlays", line.report.has_all_overlays,
                     "Also depth, normals and flow, which make it several times as large");
   command->callback([&line] {
@@ -555,9 +558,7 @@ void add_conversion(CLI::App* command, CommandLine& line) {
       ->required()
       ->type_name("WRITER")
       ->allow_extra_args(false);
-  command
-      ->add_option("--reader", line.convert.reader, "Reader to use; default: the one that knows it")
-      ->type_name("TYPE");
+  add_reader(*command, line.convert.reader);
   command->add_option("-o,--output", line.convert.output, "Output folder")
       ->required()
       ->type_name("DIR");
@@ -601,8 +602,7 @@ void add_diff(CLI::App& app, CommandLine& line) {
       ->type_name("FOLDER");
   command->add_option("second", line.diff.second, "Another one")->required()->type_name("FOLDER");
   add_tolerance(*command, line.diff.tolerance);
-  command->add_option("--reader", line.diff.reader, "Reader to use; default: the one that knows it")
-      ->type_name("TYPE");
+  add_reader(*command, line.diff.reader);
   command->callback([&line] {
     line.command = [&line](ConsoleLog& log) { return command_diff(line.global, line.diff, log); };
   });

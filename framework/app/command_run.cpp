@@ -17,7 +17,6 @@
 #include "framework/app/shell_text.h"
 #include "framework/config/clean_text.h"
 #include "framework/config/job_overrides.h"
-#include "framework/config/yaml_config.h"
 #include "framework/datasets/dataset_difference.h"
 #include "framework/host/machine_limits.h"
 #include "framework/host/progress_bar.h"
@@ -203,15 +202,6 @@ int run_value(const GlobalOptions& global, const Value& job, const RunCommandOpt
     log.write(LogLevel::Warning, "interrupted; '--resume' goes on");
     return options.stopped_exit_code;
   }
-}
-
-/// The job of a dataset, with another output folder.
-Value job_of(const DatasetStatus& status, const fs::path& folder) {
-  Value job = parse_yaml(status.job, "the job in dataset.json");
-  Value* output = job.find("output");
-  if (!output) output = &job.set("output", Value::make_map());
-  output->set("folder", Value::text(folder.string()));
-  return job;
 }
 
 }  // namespace

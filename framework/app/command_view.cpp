@@ -5,11 +5,13 @@
 #include <spawn.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <fstream>
+#include <functional>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -24,9 +26,13 @@
 #include "framework/view/http_server.h"
 #include "framework/view/index_cache.h"
 #include "framework/view/report.h"
+#include "framework/view/unfinished_writers.h"
 
 namespace diorama {
 namespace {
+
+/// What most servers take of attachments, which grow by a third on their way, is 25 MB.
+constexpr std::size_t kMostMailBytes = 18'000'000;
 
 std::atomic<bool> view_is_to_end = false;
 static_assert(std::atomic<bool>::is_always_lock_free);
@@ -73,16 +79,23 @@ class BrowserStart {
   std::optional<ScratchFolder> folder_;
 };
 
+/// What the assembly of a run's job has to say, the run has said.
+Log quiet(ConsoleLog& log) {
+  return [&log](LogLevel, std::string_view text) { log.write(LogLevel::Debug, text); };
+}
+
 }  // namespace
 
 int command_view(const GlobalOptions& global, const ViewOptions& options, ConsoleLog& log) {
   const JobServices services = make_services(global, log.sink());
   DatasetReaders readers(*services.registry, *services.host);
+  UnfinishedWriters unfinished(global, quiet(log));
   DatasetView view({.folder = options.dataset,
                     .other = options.other,
                     .tolerance = options.tolerance,
                     .reader = options.reader,
-                    .cache = index_cache_folder()},
+                    .cache = index_cache_folder(),
+                    .unfinished = std::bind_front(&UnfinishedWriters::folder_for, &unfinished)},
                    readers, *services.host);
 
   view_is_to_end = false;
@@ -121,13 +134,23 @@ int command_view(const GlobalOptions& global, const ViewOptions& options, Consol
 int command_report(const GlobalOptions& global, const ReportOptions& options, ConsoleLog& log) {
   const JobServices services = make_services(global, log.sink());
   DatasetReaders readers(*services.registry, *services.host);
-  DatasetView view(
-      {.folder = options.dataset, .reader = options.reader, .most_captures = options.captures},
-      readers, *services.host);
+  UnfinishedWriters unfinished(global, quiet(log));
+  DatasetView view({.folder = options.dataset,
+                    .reader = options.reader,
+                    .most_captures = options.captures,
+                    .unfinished = std::bind_front(&UnfinishedWriters::folder_for, &unfinished)},
+                   readers, *services.host);
   const ReportSize size = write_report(view, options.output, options.has_all_overlays);
   log.write(LogLevel::Info, "wrote " + (options.output / "index.html").string() + ": " +
                                 std::to_string(size.captures) + " captures, " +
                                 std::to_string((size.bytes + (1U << 20) - 1) >> 20) + " MiB");
+  if (size.bytes > kMostMailBytes) {
+    std::size_t shown = 0;
+    for (const auto& each : view.shown()) shown = std::max(shown, each.captures.size());
+    const std::size_t fewer = std::max<std::size_t>(1, shown * kMostMailBytes / size.bytes);
+    log.write(LogLevel::Info,
+              "for a mail choose fewer of them: --captures " + std::to_string(fewer));
+  }
   return 0;
 }
 

@@ -133,11 +133,24 @@ std::optional<StoredCapture> read_numbered(const StoredDataset& data, int number
   return data.read(std::size_t(place - all.begin()), wanted);
 }
 
-std::vector<std::string> partner_differences(const StoredInfo& common, const Capture& a,
+/// Why a capture cannot be compared; empty when it can.
+std::string loss_of(const StoredCapture& stored) {
+  const bool is_lost = stored.capture.frames.empty() && !stored.log.findings.empty();
+  return is_lost ? stored.log.findings.front().found : std::string();
+}
+
+std::vector<std::string> partner_differences(const StoredInfo& common, const StoredCapture& a,
                                              const StoredDataset& b) {
-  const std::optional<StoredCapture> partner = read_numbered(b, a.index, common.holds);
+  const std::optional<StoredCapture> partner = read_numbered(b, a.capture.index, common.holds);
   if (!partner) return {"only in the first"};
-  return capture_differences(common, a, partner->capture);
+  std::vector<std::string> lines;
+  if (const std::string loss = loss_of(a); !loss.empty()) {
+    lines.push_back("cannot be read in the first: " + loss);
+  }
+  if (const std::string loss = loss_of(*partner); !loss.empty()) {
+    lines.push_back("cannot be read in the second: " + loss);
+  }
+  return lines.empty() ? capture_differences(common, a.capture, partner->capture) : lines;
 }
 
 void compare_infos(const StoredInfo& a, const StoredInfo& b, std::vector<std::string>& lines) {
@@ -211,7 +224,7 @@ std::vector<std::string> capture_difference(const StoredDataset& a, const Stored
                                             int capture, double tolerance) {
   const StoredInfo common = common_info(a.info(), b.info(), tolerance);
   const std::optional<StoredCapture> first = read_numbered(a, capture, common.holds);
-  if (first) return partner_differences(common, first->capture, b);
+  if (first) return partner_differences(common, *first, b);
   const bool is_there = read_numbered(b, capture, {}).has_value();
   return {is_there ? "only in the second" : "in neither"};
 }
@@ -236,7 +249,7 @@ DatasetDifference dataset_difference(const ComparedDataset& a, const ComparedDat
   sweep_captures<Lines>(
       a.data, common.holds, host,
       [&](const StoredCapture& stored) {
-        return Lines{stored.capture.index, partner_differences(common, stored.capture, b.data)};
+        return Lines{stored.capture.index, partner_differences(common, stored, b.data)};
       },
       [&](const Lines& lines) {
         ++result.captures;

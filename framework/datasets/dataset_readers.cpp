@@ -11,6 +11,8 @@
 #include "diorama/error.h"
 #include "framework/config/joined.h"
 #include "framework/config/json_text.h"
+#include "framework/config/yaml_config.h"
+#include "framework/datasets/guarded_dataset.h"
 #include "framework/output/file_system.h"
 #include "framework/plugins/plugin_call.h"
 
@@ -73,19 +75,21 @@ bool has_file_like(const fs::path& folder, std::string_view pattern) {
 }
 
 DatasetReaders::DatasetReaders(Registry& registry, Host& host) {
-  const auto maker = [&registry, &host](const std::string& type) {
-    return [&registry, &host, type] {
-      Value map = Value::make_map();
-      map.set("type", Value::text(type));
-      Complaints complaints;
-      auto made = registry.make<Reader>(map, reader_name(type), {}, complaints, host);
-      complaints.raise();
-      return made;
-    };
+  const auto make = [&registry, &host](const Value& map, const std::string& path) {
+    Complaints complaints;
+    auto made = registry.make<Reader>(map, path, {}, complaints, host);
+    complaints.raise();
+    return made;
   };
   for (const std::string& type : registry.types(ComponentKind::Reader)) {
     const ComponentEntry& entry = registry.entry(ComponentKind::Reader, type);
-    entries_.push_back({type, entry.claims, maker(type)});
+    const auto make_default = [make, type] {
+      Value map = Value::make_map();
+      map.set("type", Value::text(type));
+      return make(map, reader_name(type));
+    };
+    entries_.push_back({type, entry.claims, make_default,
+                        [make](const Value& map) { return make(map, "reader"); }});
     if (!entry.claims_are_listed) {
       entries_.back().patterns =
           call_component(reader_name(type), [&] { return reader(entries_.back()).patterns(); });
@@ -120,18 +124,42 @@ std::string DatasetReaders::recognise(const fs::path& folder) {
   return found.empty() ? std::string() : found.front();
 }
 
-std::unique_ptr<const StoredDataset> DatasetReaders::open(const fs::path& folder,
-                                                          const std::string& type) {
+const DatasetReaders::Entry& DatasetReaders::entry_of(const std::string& type) const {
   const auto entry = std::ranges::find(entries_, type, &Entry::type);
-  if (entry == entries_.end()) {
-    const std::string near = nearest_name(type, types());
-    throw Error(ErrorKind::Usage, "unknown " + reader_name(type) +
-                                      (near.empty() ? "" : "; did you mean '" + near + "'?") +
-                                      " Known: " + joined(types()));
+  if (entry != entries_.end()) return *entry;
+  const std::string near = nearest_name(type, types());
+  throw Error(ErrorKind::Usage, "unknown " + reader_name(type) +
+                                    (near.empty() ? "" : "; did you mean '" + near + "'?") +
+                                    " Known: " + joined(types()));
+}
+
+Reader& DatasetReaders::reader_with(const std::string& mapping) {
+  std::unique_ptr<Reader>& made = made_[mapping];
+  if (made) return *made;
+  const Value map = parse_yaml(mapping, "--reader");
+  const Value* const type = map.kind == Value::Kind::Map ? map.find("type") : nullptr;
+  if (!type || type->kind != Value::Kind::Scalar) {
+    throw Error(
+        ErrorKind::Usage,
+        "--reader: expected a type or a mapping {type: TYPE, ...}, found '" + mapping + "'");
   }
-  auto opened = call_component(reader_name(type), [&] { return reader(*entry).open(folder); });
-  if (!opened) throw Error(ErrorKind::Plugin, reader_name(type) + ": opened nothing");
-  return opened;
+  const Entry& entry = entry_of(type->scalar);
+  if (!entry.make_with) {
+    throw Error(ErrorKind::Usage, reader_name(entry.type) + ": takes no parameters");
+  }
+  made = entry.make_with(map);
+  return *made;
+}
+
+std::unique_ptr<const StoredDataset> DatasetReaders::open(const fs::path& folder,
+                                                          const std::string& named,
+                                                          LostCaptures lost) {
+  const bool is_mapping = named.starts_with('{');
+  Reader& opener = is_mapping ? reader_with(named) : reader(entry_of(named));
+  const std::string who = is_mapping ? "reader " + named : reader_name(named);
+  auto opened = call_component(who, [&] { return opener.open(folder); });
+  if (!opened) throw Error(ErrorKind::Plugin, who + ": opened nothing");
+  return lost == LostCaptures::Throw ? std::move(opened) : guarded(std::move(opened));
 }
 
 std::vector<std::string> DatasetReaders::types() const {

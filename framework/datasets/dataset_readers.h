@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <map>
@@ -23,6 +24,8 @@ class DatasetReaders {
     std::string type;
     std::vector<std::string> patterns;
     std::function<std::unique_ptr<Reader>()> make;
+    /// With parameters, as a mapping of a job has them. Empty: it takes none.
+    std::function<std::unique_ptr<Reader>(const Value&)> make_with = {};
   };
 
   explicit DatasetReaders(std::vector<Entry> entries) : entries_(std::move(entries)) {}
@@ -32,17 +35,24 @@ class DatasetReaders {
   /// Type of the reader that knows the folder best; empty when none does. Throws Error(Usage) that
   /// names the readers when two know it equally well.
   std::string recognise(const std::filesystem::path& folder);
-  /// Opens the folder with a reader of this type. Throws Error(Usage) for an unknown type, naming
-  /// the nearest one, and Error(Asset) when the folder cannot be read.
+  /// What becomes of a capture in which a reader throws: see guarded(), or its caller sees it.
+  enum class LostCaptures : std::uint8_t { Findings, Throw };
+  /// Opens the folder with a reader of this type, or of a mapping in YAML with its parameters:
+  /// "{type: python, file: mine.py, class: Mine}". Throws Error(Usage) for an unknown type, naming
+  /// the nearest one, Error(Config) for wrong parameters and Error(Asset) when the folder cannot be
+  /// read.
   std::unique_ptr<const StoredDataset> open(const std::filesystem::path& folder,
-                                            const std::string& type);
+                                            const std::string& named,
+                                            LostCaptures lost = LostCaptures::Findings);
   std::vector<std::string> types() const;
 
  private:
   Reader& reader(const Entry& entry);
+  const Entry& entry_of(const std::string& type) const;
+  Reader& reader_with(const std::string& mapping);
 
   std::vector<Entry> entries_;
-  std::map<std::string, std::unique_ptr<Reader>> made_;
+  std::map<std::string, std::unique_ptr<Reader>> made_;  ///< By type, or mapping.
 };
 
 /// The folders of a run: those that its dataset.json names and those right below, sorted.
@@ -51,7 +61,7 @@ std::vector<std::filesystem::path> folders_of_run(const std::filesystem::path& r
 /// A dataset's folder, and who reads it.
 struct FoundDataset {
   std::filesystem::path folder;
-  std::string reader;  ///< Type.
+  std::string reader;  ///< As DatasetReaders::open() takes it.
 };
 
 /// The folder itself; else the folders that a run's dataset.json names and those right below that

@@ -102,7 +102,7 @@ std::optional<PlannedDataset> check_page(const std::filesystem::path& folder,
     compare(page, planned, info, log);
     return planned;
   } catch (const std::exception& error) {
-    log.findings.push_back(about_page("every file can be read", error.what()));
+    log.findings.push_back(about_page(kFilesCanBeRead, error.what()));
     return std::nullopt;
   }
 }

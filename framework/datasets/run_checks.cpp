@@ -21,7 +21,6 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr const char* kReadable = "every file can be read";
 constexpr const char* kBetween = "writers of one run agree";
 
 /// Lossy pictures of the same thing differ by less than this in the mean, of 255.
@@ -51,7 +50,8 @@ std::optional<RunPlan> read_plan(const std::filesystem::path& run, ReadLog& log)
     return RunPlan{page.at("captures").get<int>(),
                    page.at("cameras").get<std::vector<std::string>>()};
   } catch (const std::exception& error) {
-    log.findings.push_back({kReadable, "dataset.json", std::nullopt, "", "", error.what(), ""});
+    log.findings.push_back(
+        {kFilesCanBeRead, "dataset.json", std::nullopt, "", "", error.what(), ""});
     return std::nullopt;
   }
 }

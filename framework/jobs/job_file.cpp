@@ -62,4 +62,12 @@ Value native_job(Value job, const JobOptions& options, const Log& log) {
   return job;
 }
 
+Value job_of(const DatasetStatus& status, const std::filesystem::path& folder) {
+  Value job = parse_yaml(status.job, "the job in dataset.json");
+  Value* output = job.find("output");
+  if (!output) output = &job.set("output", Value::make_map());
+  output->set("folder", Value::text(folder.string()));
+  return job;
+}
+
 }  // namespace diorama

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <filesystem>
+
 #include "diorama/config.h"
 #include "framework/host/log.h"
 #include "framework/jobs/job_options.h"
+#include "framework/output/dataset_status.h"
 
 namespace diorama {
 
@@ -14,5 +17,8 @@ Value load_job(const JobOptions& options, const Log& log);
 
 /// The same for a job that was read already; JobOptions::job is not looked at.
 Value native_job(Value job, const JobOptions& options, const Log& log);
+
+/// The job of a dataset, with another output folder.
+Value job_of(const DatasetStatus& status, const std::filesystem::path& folder);
 
 }  // namespace diorama

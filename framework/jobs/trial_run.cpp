@@ -220,7 +220,7 @@ std::string estimate_text(const Trial& trial) {
   }
   text += ": " + counted(estimate.captures, "capture") + " in " +
           long_duration_text(estimate.seconds()) + " or less on " +
-          counted(trial.threads, "thread");
+          counted(trial.threads, "thread") + ", the disk not counted";
   text += " (" + counted(estimate.visits, "visit") + " of " + long_duration_text(estimate.visit_s) +
           ", " + long_duration_text(estimate.capture_s) + " a capture), ";
   return text + size_text(estimate.bytes) + " on disk, " + size_text(estimate.memory_bytes) +

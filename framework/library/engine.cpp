@@ -189,7 +189,7 @@ std::vector<DatasetPlace> Engine::find_datasets(const fs::path& folder) {
 std::unique_ptr<const StoredDataset> Engine::open_dataset(const fs::path& folder,
                                                           const std::string& reader) {
   const FoundDataset found = find_dataset(folder, impl_->readers(), reader);
-  return impl_->readers().open(found.folder, found.reader);
+  return impl_->readers().open(found.folder, found.reader, DatasetReaders::LostCaptures::Throw);
 }
 
 }  // namespace diorama

@@ -9,6 +9,7 @@
 
 #include "diorama/error.h"
 #include "framework/datasets/capture_sweep.h"
+#include "framework/datasets/check_names.h"
 #include "framework/datasets/frame_checks.h"
 #include "framework/datasets/page_checks.h"
 #include "framework/datasets/run_checks.h"
@@ -61,11 +62,13 @@ class RunLint {
       const std::shared_ptr<const StoredDataset> dataset = readers_.open(folder, reader);
       reports_.push_back(lint_read(*dataset, folder, host_));
       datasets_.push_back({folder.filename().string(), dataset});
+    } catch (const Stopped&) {
+      throw;
     } catch (const Error& error) {
-      if (error.kind() != ErrorKind::Asset) throw;
+      if (error.kind() == ErrorKind::Usage) throw;
       reports_.push_back({folder.string(), reader, 0, 1, {}});
       reports_.back().findings.push_back(
-          lint_finding({"every file can be read", ".", std::nullopt, "", "", error.what(), ""}));
+          lint_finding({kFilesCanBeRead, ".", std::nullopt, "", "", error.what(), ""}));
     }
     return true;
   }

@@ -18,6 +18,7 @@
 
 #include "framework/config/json_text.h"
 #include "framework/datasets/capture_sweep.h"
+#include "framework/datasets/check_names.h"
 #include "framework/lint/support_check.h"
 #include "framework/pipeline/scene_setup.h"
 #include "framework/pipeline/settling.h"
@@ -28,7 +29,6 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
-constexpr const char* kReadable = "every file can be read";
 constexpr const char* kAgrees = "settle/ agrees with the job";
 constexpr const char* kRests = "objects at rest rest on something";
 constexpr const char* kBegins = "objects begin clear of everything";
@@ -331,7 +331,7 @@ LintReport lint_scenes(const fs::path& run, const Job& job, const CapturePlan& p
       record = read_record(file);
     } catch (const std::exception& wrong) {
       report.findings.push_back(lint_finding(
-          {kReadable, file.filename().string(), std::nullopt, "", "", wrong.what(), ""}));
+          {kFilesCanBeRead, file.filename().string(), std::nullopt, "", "", wrong.what(), ""}));
     }
     if (record) lint.check(*record, file.filename().string());
   }

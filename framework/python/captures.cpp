@@ -70,6 +70,12 @@ py::dict camera_of(const Camera& camera) {
   return result;
 }
 
+/// Its box, and 0 or 1 for each pixel in there.
+py::tuple mask_of(const CoverageMask& mask, const py::capsule& owner) {
+  return py::make_tuple(box_of(mask.box),
+                        view_of(mask.bits.data(), {mask.box.height(), mask.box.width()}, owner));
+}
+
 py::object visibility_of(const std::optional<Visibility>& seen, const py::capsule& owner) {
   if (!seen) return py::none();
   py::dict result;
@@ -80,12 +86,7 @@ py::object visibility_of(const std::optional<Visibility>& seen, const py::capsul
   result["truncation"] = seen->truncation();
   result["amodal_box"] = box_of(seen->amodal_box);
   const CoverageMask& mask = seen->amodal_mask;
-  if (mask.bits.empty()) {
-    result["amodal_mask"] = py::none();
-  } else {
-    result["amodal_mask"] = py::make_tuple(
-        box_of(mask.box), view_of(mask.bits.data(), {mask.box.height(), mask.box.width()}, owner));
-  }
+  result["amodal_mask"] = mask.bits.empty() ? py::object(py::none()) : mask_of(mask, owner);
   return result;
 }
 
@@ -236,6 +237,11 @@ py::dict capture_of(std::shared_ptr<const StoredCapture> stored, const NameSet& 
       instance["keypoints_px"] =
           is_known ? keypoints_px_of(stored->keypoints[i].at(id)) : py::object(py::none());
     }
+    py::dict masks;
+    if (i < stored->masks.size()) {
+      for (const auto& [id, mask] : stored->masks[i]) masks[py::int_(id)] = mask_of(mask, owner);
+    }
+    made["masks"] = masks;
     frames.append(made);
   }
   result["frames"] = frames;

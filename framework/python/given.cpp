@@ -218,6 +218,10 @@ void store_capture(StoredCapture& stored, const py::object& given) {
   }
   for (const py::handle frame : given.attr("frames")) {
     capture.frames.push_back(frame_given(py::reinterpret_borrow<py::object>(frame)));
+    auto& masks = stored.masks.emplace_back();
+    for (const auto& [id, mask] : frame.attr("masks").cast<std::map<std::uint32_t, py::object>>()) {
+      masks.emplace(id, mask_given(mask));
+    }
   }
   stored.files.resize(capture.frames.size());
   for (const py::handle finding : given.attr("findings")) {

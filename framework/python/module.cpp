@@ -18,10 +18,12 @@
 #include "diorama/reader.h"
 #include "framework/config/yaml_config.h"
 #include "framework/datasets/dataset_readers.h"
+#include "framework/datasets/pixel_boxes.h"
 #include "framework/jobs/assemble.h"
 #include "framework/jobs/assemble_job.h"
 #include "framework/jobs/job_file.h"
 #include "framework/jobs/run_in_memory.h"
+#include "framework/plugins/plugin_call.h"
 #include "framework/plugins/plugin_search.h"
 #include "framework/python/captures.h"
 #include "framework/python/given.h"
@@ -95,7 +97,11 @@ class OpenDataset {
     std::shared_ptr<const StoredCapture> capture;
     {
       const py::gil_scoped_release unlocked;
-      capture = std::make_shared<const StoredCapture>(dataset_->read(place, names));
+      const std::string who = "reader of " + dataset_->info().format + ", capture " +
+                              std::to_string(dataset_->info().captures[place]);
+      StoredCapture stored = call_component(who, [&] { return dataset_->read(place, names); });
+      for (Frame& frame : stored.capture.frames) complete_boxes(frame);
+      capture = std::make_shared<const StoredCapture>(std::move(stored));
     }
     return capture_of(std::move(capture), dataset_->info().holds);
   }
@@ -132,7 +138,7 @@ std::unique_ptr<OpenDataset> open_dataset(const std::string& program, const std:
                                           const std::string& reader) {
   return services_of(program).with_readers([&](DatasetReaders& readers) {
     FoundDataset found = find_dataset(folder, readers, reader);
-    auto dataset = readers.open(found.folder, found.reader);
+    auto dataset = readers.open(found.folder, found.reader, DatasetReaders::LostCaptures::Throw);
     return std::make_unique<OpenDataset>(std::move(found), std::move(dataset));
   });
 }

@@ -169,7 +169,12 @@ void CaptureIndex::add(const Entry& entry) {
 
 void CaptureIndex::add_brightness(const std::vector<std::int32_t>& pictures) {
   const std::lock_guard lock(mutex_);
-  brightness_.insert(brightness_.end(), pictures.begin(), pictures.end());
+  // Of a capture whose pictures could not be read there are fewer.
+  const std::size_t place = first_bright_.size() - 1;
+  const std::size_t count = first_picture_.at(place + 1) - first_picture_[place];
+  for (std::size_t i = 0; i < count; ++i) {
+    brightness_.push_back(i < pictures.size() ? pictures[i] : kUnknown);
+  }
   first_bright_.push_back(brightness_.size());
 }
 

@@ -50,7 +50,8 @@ class CaptureIndex {
 
   /// Captures come in the order of StoredInfo::captures.
   void add(const Entry& entry);
-  /// Brightness of the next capture's pictures, percent or kUnknown each; after its entry.
+  /// Brightness of the next capture's pictures, percent or kUnknown each; after its entry, whose
+  /// pictures count.
   void add_brightness(const std::vector<std::int32_t>& pictures);
   std::size_t size() const;
   std::size_t brightness_size() const;  ///< Of captures, too.

@@ -145,6 +145,23 @@ Json frame_json(const StoredInfo& info, const Frame& frame) {
   return json;
 }
 
+/// Lengths of runs of pixels that are not in it, that are, and so on, row by row of its box.
+Json mask_json(std::uint32_t id, const CoverageMask& mask) {
+  Json runs = Json::array();
+  std::uint8_t value = 0;
+  std::int64_t length = 0;
+  for (const std::uint8_t bit : mask.bits) {
+    if (bit != value) {
+      runs.push_back(length);
+      value = bit;
+      length = 0;
+    }
+    ++length;
+  }
+  runs.push_back(length);
+  return {{"id", id}, {"box", box_json(mask.box)}, {"runs", std::move(runs)}};
+}
+
 }  // namespace
 
 NameSet wanted_for_labels(const StoredInfo& info) {
@@ -200,22 +217,14 @@ std::string amodal_json(const Frame& frame) {
   Json objects = Json::array();
   for (const Instance& instance : frame.instances) {
     if (!instance.visibility || instance.visibility->amodal_mask.bits.empty()) continue;
-    const CoverageMask& mask = instance.visibility->amodal_mask;
-    Json runs = Json::array();
-    std::uint8_t value = 0;
-    std::int64_t length = 0;
-    for (const std::uint8_t bit : mask.bits) {
-      if (bit != value) {
-        runs.push_back(length);
-        value = bit;
-        length = 0;
-      }
-      ++length;
-    }
-    runs.push_back(length);
-    objects.push_back(
-        {{"id", instance.id}, {"box", box_json(mask.box)}, {"runs", std::move(runs)}});
+    objects.push_back(mask_json(instance.id, instance.visibility->amodal_mask));
   }
+  return dumped({{"objects", std::move(objects)}});
+}
+
+std::string masks_json(const std::map<std::uint32_t, CoverageMask>& masks) {
+  Json objects = Json::array();
+  for (const auto& [id, mask] : masks) objects.push_back(mask_json(id, mask));
   return dumped({{"objects", std::move(objects)}});
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
+#include <map>
 #include <string>
 
 #include "diorama/reader.h"
@@ -17,5 +19,7 @@ std::string capture_json(const StoredInfo& info, const StoredCapture& stored);
 
 /// Amodal masks of a frame: per object a box and the lengths of runs, outside first, row by row.
 std::string amodal_json(const Frame& frame);
+/// The same of StoredCapture::masks.
+std::string masks_json(const std::map<std::uint32_t, CoverageMask>& masks);
 
 }  // namespace diorama

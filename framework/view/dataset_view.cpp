@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <exception>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -14,7 +15,6 @@
 #include "framework/datasets/pixel_boxes.h"
 #include "framework/lint/lint_dataset.h"
 #include "framework/output/dataset_status.h"
-#include "framework/plugins/plugin_call.h"
 #include "framework/view/capture_json.h"
 #include "framework/view/page.h"
 #include "framework/view/pictures.h"
@@ -46,6 +46,13 @@ HttpAnswer json_answer(const OrderedJson& json, int status = 200) {
 HttpAnswer not_there() {
   HttpAnswer answer = answer_of("text/plain; charset=utf-8", "nothing here\n");
   answer.status = 404;
+  return answer;
+}
+
+/// No picture of ids can show the masks that overlap.
+HttpAnswer look_elsewhere() {
+  HttpAnswer answer = answer_of("image/png", "");
+  answer.status = 204;
   return answer;
 }
 
@@ -127,11 +134,10 @@ struct DatasetView::Opened {
 };
 
 DatasetView::DatasetView(Options options, DatasetReaders& readers, Host& host)
-    : options_(std::move(options)),
-      readers_(readers),
-      host_(host),
-      indexes_(options_.cache),
-      datasets_(open()) {
+    : options_(std::move(options)), readers_(readers), host_(host), indexes_(options_.cache) {
+  Opening opening = open();
+  datasets_ = std::move(opening.datasets);
+  faults_ = std::move(opening.faults);
   if (const auto status = status_of_run(options_.folder)) {
     done_ = status->done;
     is_finished_ = status->is_finished;
@@ -142,14 +148,18 @@ DatasetView::~DatasetView() {
   for (const auto& opened : *datasets_) keep_index(*opened);
 }
 
-void DatasetView::open_below(const fs::path& folder, bool is_other, Datasets& all) const {
+void DatasetView::open_below(const fs::path& folder, bool is_other, Datasets& all,
+                             std::vector<std::string>& faults) const {
   const std::ptrdiff_t before = std::ssize(all);
   const auto status = status_of_run(folder);
   const bool goes_on = status && !status->is_finished;
   // Formats may have nothing to read before a run's end; the others show how it goes.
+  std::exception_ptr first_fault;
   const auto forgive = [&](const Error& error) {
-    if (!goes_on) throw;
-    host_.log(LogLevel::Debug, error.what());
+    if (dynamic_cast<const Stopped*>(&error)) throw;
+    if (goes_on) return host_.log(LogLevel::Debug, error.what());
+    if (!first_fault) first_fault = std::current_exception();
+    faults.emplace_back(error.what());
   };
   std::vector<FoundDataset> found;
   try {
@@ -157,18 +167,13 @@ void DatasetView::open_below(const fs::path& folder, bool is_other, Datasets& al
   } catch (const Error& error) {
     forgive(error);
   }
-  for (const FoundDataset& each : found) {
+  const auto add = [&](const fs::path& place, std::shared_ptr<const StoredDataset> whole) {
     auto dataset = std::make_shared<Opened>();
-    dataset->folder = each.folder;
+    dataset->folder = place;
     dataset->is_other = is_other;
-    dataset->name = each.folder.filename().empty() ? each.folder.parent_path().filename().string()
-                                                   : each.folder.filename().string();
-    try {
-      dataset->whole = readers_.open(each.folder, each.reader);
-    } catch (const Error& error) {
-      forgive(error);
-      continue;
-    }
+    dataset->name = place.filename().empty() ? place.parent_path().filename().string()
+                                             : place.filename().string();
+    dataset->whole = std::move(whole);
     dataset->shown = dataset->whole;
     const std::size_t count = dataset->whole->info().captures.size();
     if (options_.most_captures && *options_.most_captures < count) {
@@ -176,7 +181,36 @@ void DatasetView::open_below(const fs::path& folder, bool is_other, Datasets& al
           std::make_shared<const PartOfDataset>(dataset->whole, *options_.most_captures);
     }
     all.push_back(std::move(dataset));
+  };
+  for (const FoundDataset& each : found) {
+    try {
+      add(each.folder, readers_.open(each.folder, each.reader));
+    } catch (const Error& error) {
+      forgive(error);
+    }
   }
+  const auto is_shown = [&](const fs::path& place) {
+    return std::any_of(all.begin() + before, all.end(), [&](const auto& opened) {
+      return opened->folder == place && !opened->whole->info().captures.empty();
+    });
+  };
+  if (goes_on && status->done > 0 && options_.unfinished) {
+    const bool is_whole_run = run_of(folder) == folder;
+    for (const fs::path& place : is_whole_run ? folders_of_run(folder) : std::vector{folder}) {
+      if (is_shown(place)) continue;
+      try {
+        const auto made = options_.unfinished(*status, place);
+        const std::string reader = made ? readers_.recognise(*made) : std::string();
+        if (reader.empty()) continue;
+        auto whole = readers_.open(*made, reader);
+        std::erase_if(all, [&](const auto& opened) { return opened->folder == place; });
+        add(place, std::move(whole));
+      } catch (const Error& error) {
+        forgive(error);
+      }
+    }
+  }
+  if (std::ssize(all) == before && first_fault) std::rethrow_exception(first_fault);
   if (std::ssize(all) == before && !goes_on) find_dataset(folder, readers_, options_.reader);
   // Those that hold most come first: what the page shows unless asked.
   std::stable_sort(all.begin() + before, all.end(), [](const auto& a, const auto& b) {
@@ -187,11 +221,14 @@ void DatasetView::open_below(const fs::path& folder, bool is_other, Datasets& al
   });
 }
 
-std::shared_ptr<const DatasetView::Datasets> DatasetView::open() const {
+DatasetView::Opening DatasetView::open() const {
   auto opened = std::make_shared<Datasets>();
-  open_below(options_.folder, false, *opened);
-  if (!options_.other.empty()) open_below(options_.other, true, *opened);
-  return opened;
+  Opening opening;
+  open_below(options_.folder, false, *opened, opening.faults);
+  if (!options_.other.empty()) open_below(options_.other, true, *opened, opening.faults);
+  for (const std::string& fault : opening.faults) host_.log(LogLevel::Warning, fault);
+  opening.datasets = std::move(opened);
+  return opening;
 }
 
 std::shared_ptr<const DatasetView::Datasets> DatasetView::datasets() const {
@@ -243,12 +280,15 @@ bool DatasetView::index_some(Opened& opened) {
   std::vector<CaptureIndex::Entry> entries(std::min(at_once, count - first));
   const NameSet wanted = CaptureIndex::wanted(data.info());
   host_.parallel_for(entries.size(), [&](std::size_t i) {
-    StoredCapture stored = call_component("reader of " + data.info().format,
-                                          [&] { return data.read(first + i, wanted); });
+    StoredCapture stored = data.read(first + i, wanted);
     for (Frame& frame : stored.capture.frames) complete_boxes(frame);
     entries[i] = CaptureIndex::entry_of(data.info(), stored);
   });
-  for (const CaptureIndex::Entry& entry : entries) opened.index.add(entry);
+  for (const CaptureIndex::Entry& entry : entries) {
+    opened.index.add(entry);
+    // What could not be read may well be the next time.
+    if (entry.pictures.empty()) opened.key.reset();
+  }
   if (opened.index.size() == count) keep_index(opened);
   return true;
 }
@@ -263,8 +303,7 @@ bool DatasetView::brighten_some(Opened& opened) {
   const std::size_t at_once = 8 * std::size_t(std::max(host_.thread_count(), 1));
   std::vector<std::vector<std::int32_t>> found(std::min(at_once, count - first));
   host_.parallel_for(found.size(), [&](std::size_t i) {
-    const StoredCapture stored = call_component("reader of " + data.info().format,
-                                                [&] { return data.read(first + i, wanted); });
+    const StoredCapture stored = data.read(first + i, wanted);
     for (const Frame& frame : stored.capture.frames) {
       found[i].push_back(frame.has(kColor.name)
                              ? std::int32_t(std::lround(100.0 * mean_brightness(frame.get(kColor))))
@@ -335,9 +374,10 @@ bool DatasetView::follow_run() {
   const auto status = status_of_run(options_.folder);
   if (status && (status->done != done_ || status->is_finished)) {
     try {
-      auto fresh = open();
+      Opening fresh = open();
       const std::lock_guard lock(mutex_);
-      datasets_ = std::move(fresh);
+      datasets_ = std::move(fresh.datasets);
+      faults_ = std::move(fresh.faults);
       ++generation_;
       findings_ = nullptr;
       comparisons_.clear();
@@ -379,6 +419,7 @@ HttpAnswer DatasetView::state() const {
     json["generation"] = generation_;
     json["is_finished"] = is_finished_;
     json["is_linted"] = findings_ != nullptr;
+    json["faults"] = faults_;
   }
   json["datasets"] = OrderedJson::array();
   for (const auto& opened : *datasets()) {
@@ -459,9 +500,7 @@ HttpAnswer DatasetView::capture_answer(const Opened& opened, Words words) {
   const auto at = std::ranges::lower_bound(info.captures, int(*number));
   if (at == info.captures.end() || *at != int(*number)) return not_there();
   const auto read = [&](const NameSet& wanted) {
-    return call_component("reader of " + info.format, [&] {
-      return data.read(std::size_t(at - info.captures.begin()), wanted);
-    });
+    return data.read(std::size_t(at - info.captures.begin()), wanted);
   };
   if (words.size() == 1) {
     StoredCapture stored = read(wanted_for_labels(info));
@@ -471,15 +510,21 @@ HttpAnswer DatasetView::capture_answer(const Opened& opened, Words words) {
   if (words.size() != 3) return not_there();
   const auto place = whole_number(words[1]);
   const auto kind = picture_kind(words[2]);
-  if (!place || (!kind && words[2] != "amodal")) return not_there();
+  const bool is_amodal = words[2] == "amodal";
+  const bool is_masks = words[2] == "masks";
+  if (!place || (!kind && !is_amodal && !is_masks)) return not_there();
   const StoredCapture stored =
-      read(kind ? channels_of(*kind)
-                : NameSet{"amodal_mask", "visibility", std::string(kHoldsInstances)});
+      read(kind        ? channels_of(*kind)
+           : is_amodal ? NameSet{"amodal_mask", "visibility", std::string(kHoldsInstances)}
+                       : channels_of(PictureKind::Ids));
   if (*place >= stored.capture.frames.size()) return not_there();
   const Frame& frame = stored.capture.frames[*place];
-  if (!kind) return answer_of(kJson, amodal_json(frame));
+  if (is_amodal) return answer_of(kJson, amodal_json(frame));
+  const bool has_masks = *place < stored.masks.size() && !stored.masks[*place].empty();
+  if (is_masks) return has_masks ? answer_of(kJson, masks_json(stored.masks[*place])) : not_there();
   auto picture = make_picture(frame, *kind, host_);
-  return picture ? answer_of(std::move(picture->type), std::move(picture->bytes)) : not_there();
+  if (picture) return answer_of(std::move(picture->type), std::move(picture->bytes));
+  return has_masks ? look_elsewhere() : not_there();
 }
 
 HttpAnswer DatasetView::dataset_answer(Opened& opened, Words words) {

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -18,6 +19,7 @@
 #include "diorama/host.h"
 #include "diorama/reader.h"
 #include "framework/datasets/dataset_readers.h"
+#include "framework/output/dataset_status.h"
 #include "framework/view/byte_cache.h"
 #include "framework/view/capture_index.h"
 #include "framework/view/http_server.h"
@@ -40,7 +42,8 @@ namespace diorama {
 ///   /api/D/index/FROM                       CaptureIndex::json(), kIndexPart captures
 ///   /api/D/brightness/FROM                  CaptureIndex::brightness_json(), the same
 ///   /api/D/capture/N                        capture_json() of capture number N
-///   /api/D/capture/N/F/KIND                 of its frame F a PictureKind, or "amodal"
+///   /api/D/capture/N/F/KIND                 of its frame F a PictureKind, or "amodal", or "masks"
+///                                           where "ids" has no content: StoredCapture::masks
 class DatasetView {
  public:
   static constexpr std::size_t kIndexPart = 5000;
@@ -56,6 +59,11 @@ class DatasetView {
     std::optional<std::size_t> most_captures = {};
     /// Of IndexCache; empty: none.
     std::filesystem::path cache = {};
+    /// Of a run that goes on: the folder that stands for a writer's, of which no reader makes
+    /// anything yet. See UnfinishedWriters::folder_for(); may throw Error, may be empty.
+    std::function<std::optional<std::filesystem::path>(const DatasetStatus&,
+                                                       const std::filesystem::path&)>
+        unfinished = {};
   };
 
   /// Throws Error(Usage) when there is no dataset. Readers and host must outlive the object.
@@ -82,8 +90,14 @@ class DatasetView {
   struct Opened;
   using Datasets = std::vector<std::shared_ptr<Opened>>;
 
-  std::shared_ptr<const Datasets> open() const;
-  void open_below(const std::filesystem::path& folder, bool is_other, Datasets& all) const;
+  /// What was opened, and what is wrong with the folders that were not.
+  struct Opening {
+    std::shared_ptr<const Datasets> datasets;
+    std::vector<std::string> faults;
+  };
+  Opening open() const;
+  void open_below(const std::filesystem::path& folder, bool is_other, Datasets& all,
+                  std::vector<std::string>& faults) const;
   std::shared_ptr<const Datasets> datasets() const;
   bool look_up_index(Opened& opened);
   void keep_index(Opened& opened) const;
@@ -108,6 +122,7 @@ class DatasetView {
   IndexCache indexes_;
   mutable std::mutex mutex_;
   std::shared_ptr<const Datasets> datasets_;
+  std::vector<std::string> faults_;    ///< Of datasets that could not be opened beside others.
   int generation_ = 0;                 ///< Counts how often the datasets were opened.
   std::atomic<std::size_t> asked_{0};  ///< The dataset that the page shows: indexed first.
   std::atomic<bool> wants_findings_{false};

@@ -28,11 +28,12 @@ PictureFile encoded(const std::vector<Rgb>& pixels, int width, int height, Image
 }
 
 template <class Pixel, class Turn>
-PictureFile picture_of(const Image<Pixel>& image, const Host& host, Turn&& turn) {
+PictureFile picture_of(const Image<Pixel>& image, const Host& host, Turn&& turn,
+                       ImageFormat format = ImageFormat::Png) {
   std::vector<Rgb> pixels;
   pixels.reserve(image.pixels().size());
   for (const Pixel& pixel : image.pixels()) pixels.push_back(turn(pixel));
-  return encoded(pixels, image.width(), image.height(), ImageFormat::Png, host);
+  return encoded(pixels, image.width(), image.height(), format, host);
 }
 
 Rgb packed_depth(float metres) {
@@ -106,6 +107,7 @@ const Image<Pixel>* image_of(const Frame& frame, const Channel<Pixel>& channel) 
 
 std::optional<PictureKind> picture_kind(std::string_view name) {
   if (name == "color") return PictureKind::Color;
+  if (name == "photo") return PictureKind::Photo;
   if (name == "thumbnail") return PictureKind::Thumbnail;
   if (name == "ids") return PictureKind::Ids;
   if (name == "depth") return PictureKind::Depth;
@@ -122,6 +124,7 @@ NameSet channels_of(PictureKind kind) {
   };
   switch (kind) {
     case PictureKind::Color:
+    case PictureKind::Photo:
     case PictureKind::Thumbnail:
       return names({kColor.name});
     case PictureKind::Ids:
@@ -143,8 +146,14 @@ NameSet channels_of(PictureKind kind) {
 std::optional<PictureFile> make_picture(const Frame& frame, PictureKind kind, const Host& host) {
   if (const auto* color = image_of(frame, kColor)) {
     if (kind == PictureKind::Thumbnail) return thumbnail(*color, host);
-    if (kind == PictureKind::Color) {
-      return picture_of(*color, host, [](const Rgba8& p) { return Rgb{p[0], p[1], p[2]}; });
+    if (kind == PictureKind::Color || kind == PictureKind::Photo) {
+      const bool is_exact = kind == PictureKind::Color;
+      return picture_of(
+          *color, host,
+          [](const Rgba8& p) {
+            return Rgb{p[0], p[1], p[2]};
+          },
+          is_exact ? ImageFormat::Png : ImageFormat::Jpeg);
     }
   }
   if (kind == PictureKind::Ids) {

@@ -20,6 +20,7 @@ struct PictureFile {
 /// the three bytes of a pixel, red lowest, so that the page can read them back exactly.
 enum class PictureKind {
   Color,         ///< "color": as it is.
+  Photo,         ///< "photo": the same as JPEG, a fifth of the size.
   Thumbnail,     ///< "thumbnail": at most kThumbnailWidth wide, JPEG.
   Ids,           ///< "ids": instance ids, their lower 24 bits.
   Depth,         ///< "depth": tenths of millimetres, 0 where nothing is.

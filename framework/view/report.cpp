@@ -92,11 +92,15 @@ class ReportWriter {
     return "data/" + name;
   }
 
-  /// False when there is nothing at this address.
+  /// False when there is nothing at this address, or to be looked for elsewhere.
   bool add_data(const std::string& path,
                 const std::function<std::string(const std::string&)>& adapt = {}) {
     const HttpAnswer answer = view_.answer(path);
     if (answer.status == 404) return false;
+    if (answer.status == 204) {
+      put(file_name(path) + ".js", "diorama_data('" + path + "',null);\n");
+      return false;
+    }
     const bool is_json = answer.type == "application/json";
     std::string script = "diorama_data('" + path + "',";
     if (is_json) {
@@ -108,9 +112,10 @@ class ReportWriter {
     return true;
   }
 
-  void add_picture(const std::string& path) {
+  /// Under the address by which the page asks for it.
+  void add_picture(const std::string& path, const std::string& asked) {
     const HttpAnswer answer = view_.answer(path);
-    if (answer.status == 200) put(file_name(path), *answer.body);
+    if (answer.status == 200) put(file_name(asked), *answer.body);
   }
 
   /// What the report lacks, its page need not ask for.
@@ -140,9 +145,11 @@ class ReportWriter {
       add_data(address);
       for (std::size_t f = 0; f < shown.cameras.size(); ++f) {
         const std::string frame = address + "/" + std::to_string(f);
-        add_picture(frame + "/color");
-        add_picture(frame + "/thumbnail");
-        if (shown.holds.contains(kInstanceId.name)) add_data(frame + "/ids");
+        // Small enough for mails; nothing on the page reads colours.
+        add_picture(frame + "/photo", frame + "/color");
+        add_picture(frame + "/thumbnail", frame + "/thumbnail");
+        const bool has_masks = shown.holds.contains(kInstanceId.name);
+        if (has_masks && !add_data(frame + "/ids")) add_data(frame + "/masks");
         if (shown.holds.contains("amodal_mask")) add_data(frame + "/amodal");
         for (const std::string& kind : kinds) add_data(frame + "/" + kind);
       }

@@ -125,18 +125,20 @@ void add_script(Registrar& registrar, const char* help, const Listing& listing) 
 }  // namespace
 }  // namespace diorama
 
-#define DIORAMA_ADD_SCRIPT(T, HELP, PROVIDES)                                       \
-  do {                                                                              \
-    DIORAMA_DETAIL_LIST(std::uint32_t(T::kKind), "python", HELP, "", "", PROVIDES); \
-    diorama::add_script<T>(registrar, HELP, {"", "", PROVIDES});                    \
+#define DIORAMA_ADD_SCRIPT(T, HELP, CLAIMS, PROVIDES)                                   \
+  do {                                                                                  \
+    DIORAMA_DETAIL_LIST(std::uint32_t(T::kKind), "python", HELP, CLAIMS, "", PROVIDES); \
+    diorama::add_script<T>(registrar, HELP, {CLAIMS, "", PROVIDES});                    \
   } while (false)
 
-DIORAMA_PLUGIN("python", "1.1.0", "Apache-2.0") {
+DIORAMA_PLUGIN("python", "1.2.0", "Apache-2.0") {
   DIORAMA_ADD_SCRIPT(diorama::PythonRandomizer, "Changes the scene by a class in a Python file.",
-                     "");
+                     "", "");
   // What it makes depends on its class: it works where a job lists it.
-  DIORAMA_ADD_SCRIPT(diorama::PythonAnnotator, "Makes channels by a class in a Python file.", "*");
-  DIORAMA_ADD_SCRIPT(diorama::PythonWriter, "Writes files by a class in a Python file.", "");
-  DIORAMA_ADD_READER(diorama::PythonReader, "python",
-                     "Opens datasets by classes in Python files of the user's folders.", "*.* */*");
+  DIORAMA_ADD_SCRIPT(diorama::PythonAnnotator, "Makes channels by a class in a Python file.", "",
+                     "*");
+  DIORAMA_ADD_SCRIPT(diorama::PythonWriter, "Writes files by a class in a Python file.", "", "");
+  DIORAMA_ADD_SCRIPT(diorama::PythonReader,
+                     "Opens datasets by classes in Python files of the user's folders.", "*.* */*",
+                     "");
 }

@@ -83,13 +83,42 @@ StoredInfo info_of_dataset(const py::dict& given) {
   return info;
 }
 
+/// Calls the object's open(). With the interpreter's lock held.
+std::unique_ptr<const StoredDataset> opened_by(const py::object& reader, const std::string& file,
+                                               const fs::path& folder, Host& host) {
+  const py::tuple opened = plugins_module().attr("_open")(reader, file, folder.string());
+  if (!opened[1].is_none()) {
+    throw Error(ErrorKind::Asset, folder.string() + ": " + opened[1].cast<std::string>());
+  }
+  StoredInfo info = info_of_dataset(opened[2].cast<py::dict>());
+  return std::make_unique<const PythonDataset>(file, SharedObject(opened[0].cast<py::object>()),
+                                               std::move(info), host);
+}
+
 }  // namespace
 
+PythonReader::PythonReader(const Params& params, Host& host) : host_(host) {
+  const bool is_named =
+      !params.file.empty() || !params.class_name.empty() || params.params.kind != Value::Kind::Null;
+  if (is_named) script_.emplace(params, kScriptKind, host);
+}
+
 Recognition PythonReader::recognise(const fs::path& folder) const {
+  if (script_) {
+    const bool knows = script_->call([&](const py::object& reader) {
+      return plugins_module().attr("_knows")(reader, folder.string()).cast<bool>();
+    });
+    return knows ? Recognition::ByName : Recognition::No;
+  }
   return known_by(folder, host_).titles.empty() ? Recognition::No : Recognition::ByName;
 }
 
 std::unique_ptr<const StoredDataset> PythonReader::open(const fs::path& folder) const {
+  if (script_) {
+    return script_->call([&](const py::object& reader) {
+      return opened_by(reader, script_->file(), folder, host_);
+    });
+  }
   const KnownBy known = known_by(folder, host_);
   if (known.titles.empty()) {
     throw Error(ErrorKind::Asset, folder.string() +
@@ -101,17 +130,11 @@ std::unique_ptr<const StoredDataset> PythonReader::open(const fs::path& folder) 
     for (const std::string& title : known.titles) list += (list.empty() ? "" : ", ") + title;
     throw Error(ErrorKind::Usage,
                 folder.string() + ": several classes know it (" + list +
-                    "); let DIORAMA_PYTHON_PATH list the folder of one of them alone");
+                    "); name one: --reader '{type: python, file: FILE, class: CLASS}'");
   }
   return call_python(known.file, host_, [&] {
-    const py::tuple opened =
-        plugins_module().attr("_open")(known.type.get(), known.file, folder.string());
-    if (!opened[1].is_none()) {
-      throw Error(ErrorKind::Asset, folder.string() + ": " + opened[1].cast<std::string>());
-    }
-    StoredInfo info = info_of_dataset(opened[2].cast<py::dict>());
-    return std::make_unique<const PythonDataset>(
-        known.file, SharedObject(opened[0].cast<py::object>()), std::move(info), host_);
+    return opened_by(plugins_module().attr("_with_defaults")(known.type.get()), known.file, folder,
+                     host_);
   });
 }
 

@@ -2,23 +2,25 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "diorama/host.h"
 #include "diorama/params.h"
 #include "diorama/reader.h"
+#include "python/script.h"
 
 namespace diorama {
 
-/// Opens the folders that a class derived from diorama.plugins.Reader knows, in any file of the
-/// user's folders. Without such a file the interpreter is not started.
+/// Opens folders by the class that its parameters name; by themselves, those that a class derived
+/// from diorama.plugins.Reader knows, in any file of the user's folders. Without such a file the
+/// interpreter is not started.
 class PythonReader final : public Reader {
  public:
-  struct Params {
-    void visit(ParamVisitor&) {}
-  };
-  PythonReader(Params, Host& host) : host_(host) {}
+  static constexpr const char* kScriptKind = "reader";
+  using Params = ScriptParams;
+  PythonReader(const Params& params, Host& host);
 
   std::vector<std::string> patterns() const override { return {"*.*", "*/*"}; }
   Recognition recognise(const std::filesystem::path& folder) const override;
@@ -26,6 +28,7 @@ class PythonReader final : public Reader {
 
  private:
   Host& host_;
+  std::optional<Script> script_;  ///< Of the class that was named.
 };
 
 }  // namespace diorama

@@ -51,6 +51,7 @@ class Script {
   auto call(Call&& call) const {
     return call_python(file_, host_, [&] { return call(object_.get()); });
   }
+  const std::string& file() const { return file_; }
   /// Where the class stands, for messages: "edges.py: Edges".
   std::string title() const { return file_ + ": " + class_name_; }
 

@@ -412,6 +412,9 @@ class BopImageReading : private FrameReading {
     return std::move(frame_);
   }
 
+  /// By id of the object; see StoredCapture::masks.
+  std::map<std::uint32_t, CoverageMask> take_masks() { return std::move(lone_masks_); }
+
  private:
   /// False when no picture tells the size.
   bool read_pictures(FrameSources& sources) {
@@ -690,7 +693,12 @@ class BopImageReading : private FrameReading {
                      "shares " + std::to_string(shared) + " pixels with others");
       }
     }
-    if (!have_all || painter.has_overlaps()) return;
+    if (!have_all || painter.has_overlaps()) {
+      for (std::size_t i = 0; i < masks_.size(); ++i) {
+        if (masks_[i]) lone_masks_.emplace(frame_.instances[i].id, std::move(*masks_[i]));
+      }
+      return;
+    }
     frame_.set(kInstanceId, painter.take());
     sources.emplace(kInstanceId.name, scene_.place("mask_visib", stem_));
   }
@@ -703,6 +711,7 @@ class BopImageReading : private FrameReading {
   std::string depth_file_;
   std::optional<StoredPicture> depth_;
   std::vector<std::optional<CoverageMask>> masks_;  ///< What is seen of each object.
+  std::map<std::uint32_t, CoverageMask> lone_masks_;
 };
 
 StoredCapture BopDataset::read(std::size_t i, const NameSet& wanted) const {
@@ -711,7 +720,10 @@ StoredCapture BopDataset::read(std::size_t i, const NameSet& wanted) const {
                        const std::string& split = scenes_[image.scene].split;
                        // Our writer's validation captures are what the benchmark tests on.
                        stored.split = page_ && split == "test" ? "val" : split;
-                       return BopImageReading(*this, image, wanted, stored.log).read(sources);
+                       BopImageReading reading(*this, image, wanted, stored.log);
+                       std::optional<Frame> frame = reading.read(sources);
+                       if (frame) stored.masks.push_back(reading.take_masks());
+                       return frame;
                      });
 }
 

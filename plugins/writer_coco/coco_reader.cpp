@@ -214,6 +214,8 @@ class CocoImageReading : private FrameReading {
   std::map<std::uint32_t, std::vector<StoredKeypoint>> take_keypoints() {
     return std::move(keypoints_);
   }
+  /// By id of the object; see StoredCapture::masks.
+  std::map<std::uint32_t, CoverageMask> take_masks() { return std::move(lone_masks_); }
 
  private:
   void read_camera() {
@@ -523,7 +525,9 @@ class CocoImageReading : private FrameReading {
       return;
     }
     for (std::size_t i = 0; i < masks_.size(); ++i) {
-      if (has_mask_[i]) check_box(i);
+      if (!has_mask_[i]) continue;
+      check_box(i);
+      lone_masks_.emplace(frame_.instances[i].id, masks_[i]);
     }
   }
 
@@ -647,6 +651,7 @@ class CocoImageReading : private FrameReading {
   std::vector<bool> has_mask_;
   std::vector<OccludedBy> occluded_by_;
   std::map<std::uint32_t, std::vector<StoredKeypoint>> keypoints_;
+  std::map<std::uint32_t, CoverageMask> lone_masks_;
 };
 
 StoredCapture CocoDataset::read(std::size_t i, const NameSet& wanted) const {
@@ -660,6 +665,9 @@ StoredCapture CocoDataset::read(std::size_t i, const NameSet& wanted) const {
         std::optional<Frame> frame = reading.read(sources);
         const bool has_keypoints = wanted.contains(kHoldsKeypoints) && tables_.has_keypoints;
         if (frame && has_keypoints) stored.keypoints.push_back(reading.take_keypoints());
+        if (frame && wanted.contains(kInstanceId.name)) {
+          stored.masks.push_back(reading.take_masks());
+        }
         return frame;
       });
 }

@@ -350,6 +350,8 @@ class YoloPictureReading : private FrameReading {
   std::map<std::uint32_t, std::vector<StoredKeypoint>> take_keypoints() {
     return std::move(keypoints_);
   }
+  /// By id of the object; see StoredCapture::masks.
+  std::map<std::uint32_t, CoverageMask> take_masks() { return std::move(lone_masks_); }
 
  private:
   void read_lines(const std::string& text) {
@@ -602,7 +604,12 @@ class YoloPictureReading : private FrameReading {
       files_.check(contested == 0, kPartition, labels_, "",
                    std::to_string(contested) + " pixels belong to two polygons");
     }
-    if (contested > 0 || !are_all_masks) return;
+    if (contested > 0 || !are_all_masks) {
+      for (std::size_t i = 0; i < masks_.size(); ++i) {
+        if (!masks_[i].bits.empty()) lone_masks_.emplace(ids[i], std::move(masks_[i]));
+      }
+      return;
+    }
     frame_.set(kInstanceId,
                ids_with_smaller_on_top(masks_, ids, frame_.camera.width, frame_.camera.height));
     sources.emplace(kInstanceId.name, labels_);
@@ -614,6 +621,7 @@ class YoloPictureReading : private FrameReading {
   std::string labels_;
   std::vector<CoverageMask> masks_;  ///< Of each instance; without bits for boxes.
   std::map<std::uint32_t, std::vector<StoredKeypoint>> keypoints_;
+  std::map<std::uint32_t, CoverageMask> lone_masks_;
 };
 
 StoredCapture YoloDataset::read(std::size_t i, const NameSet& wanted) const {
@@ -626,6 +634,9 @@ StoredCapture YoloDataset::read(std::size_t i, const NameSet& wanted) const {
         const bool has_keypoints =
             wanted.contains(kHoldsKeypoints) && info_.holds.contains(kHoldsKeypoints);
         if (frame && has_keypoints) stored.keypoints.push_back(reading.take_keypoints());
+        if (frame && wanted.contains(kInstanceId.name)) {
+          stored.masks.push_back(reading.take_masks());
+        }
         return frame;
       });
 }

@@ -90,6 +90,27 @@ TEST_CASE("Workers that take visits share a job, also when one of them is killed
   CHECK(difference(whole_dataset(), tree(folder / "out")) == "");
 }
 
+TEST_CASE("A run of a format that ends with its tables is shown before its end", "[workers]") {
+  const TemporaryFolder folder;
+  const std::string writers = "writers=[{type: CocoWriter, name: coco}]";
+  const auto shard = [&](const char* which) {
+    return run(job({"--set", writers, "--shard", which}), folder.path());
+  };
+  REQUIRE(shard("1/2").exit_code == 0);
+  const auto before = tree(folder / "out");
+  const Outcome report = run({"report", "out", "-o", "report"}, folder.path());
+  INFO(report.errors);
+  CHECK(report.exit_code == 0);
+  CHECK(difference(before, tree(folder / "out")) == "");
+  const auto files = tree(folder / "report");
+  CHECK_THAT(files.at("data/state.js"), ContainsSubstring("\"captures\":10"));
+  CHECK_THAT(files.at("data/0_info.js"), ContainsSubstring("\"name\":\"coco\""));
+  CHECK(files.contains("data/0_capture_0_0_color"));
+  CHECK_THAT(files.at("data/0_capture_0.js"), ContainsSubstring("\"class\":\"sphere\""));
+  REQUIRE(shard("2/2").exit_code == 0);
+  CHECK(run({"lint", "out"}, folder.path()).exit_code == 0);
+}
+
 TEST_CASE("A shard that runs twice ends with 75 and names who has it", "[workers]") {
   const TemporaryFolder folder;
   Process first(job({"--shard", "1/2", "--threads", "1"}), place_of(folder, 0));

@@ -4,11 +4,12 @@
 # look at: tests/view/browser.sh PROGRAM DATASET PICTURES [OTHER], which is compared with it. Not part of the tests that ctest runs.
 # tests/view/browser.sh --speed PROGRAM DATASET measures instead; make_coco.py makes large datasets.
 # tests/view/browser.sh --run PROGRAM JOB PICTURES watches a run that goes on.
+# tests/view/browser.sh --faults PROGRAM PICTURES shows what cannot be read, and masks that overlap.
 set -euo pipefail
 script=browser
-case $1 in --speed) script=speed ;; --run) script=live ;; esac
+case $1 in --speed) script=speed ;; --run) script=live ;; --faults) script=faults ;; esac
 if [[ $script != browser ]]; then shift; fi
-program=$(realpath "$1") dataset=$(realpath "$2") pictures=$(realpath -m "${3:-.}")
+program=$(realpath "$1") dataset=$(realpath -m "$2") pictures=$(realpath -m "${3:-.}")
 other=${4:+$(realpath "$4")}
 here=$(cd "$(dirname "$0")" && pwd)
 work=$(mktemp -d)
@@ -19,6 +20,8 @@ if [[ $script == browser ]]; then
   # shellcheck disable=SC2086
   "$program" ${DIORAMA_OPTIONS:-} report "$dataset" -o "$work/report" --captures 20
   node "$work/browser.mjs" "$program" "$dataset" "$pictures" "$work/report" ${other:+"$other"}
+elif [[ $script == faults ]]; then
+  node "$work/faults.mjs" "$program" "$dataset" "$work"  # the second argument is the folder of pictures
 else
   node "$work/$script.mjs" "$program" "$dataset" "$pictures" "$work"
 fi

@@ -100,7 +100,8 @@ class Instance:
     world_from_object: Array | None = None  #: float64, 4 x 4, metres
     #: Least and greatest corner in the object's own space: float64, 3 each, metres.
     bounds: tuple[Array, Array] | None = None
-    box: Box | None = None  #: of its visible pixels
+    #: Of its visible pixels; where a dataset has no boxes, found in "instance_id" when that is read.
+    box: Box | None = None
     visibility: Visibility | None = None
     #: By name: float64, 3, metres in the object's own space. Only what is made has them, not what is read.
     keypoints: dict[str, Array] = dataclasses.field(default_factory=dict)
@@ -157,10 +158,21 @@ class Frame:
     leaf_paths: dict[int, str] = dataclasses.field(default_factory=dict)  #: of the ids in "leaf_id"
     exposure: float = 1.0  #: factor from "color_hdr" to what is seen
     channels: dict[str, Array] = dataclasses.field(default_factory=dict)  #: see above
+    #: Where masks of a format overlap, so that "instance_id" cannot hold them: by `Instance.id` where each lies, and 0 or
+    #: 1 per pixel of that, uint8, height x width of the box. Read with "instance_id", which is then not there.
+    masks: dict[int, tuple[Box, Array]] = dataclasses.field(default_factory=dict)
+
+    def has_mask(self, instance: Instance) -> bool:
+        return "instance_id" in self.channels or instance.id in self.masks
 
     def mask(self, instance: Instance) -> Array:
-        """bool, height x width: where the instance is seen. Needs the channel "instance_id"."""
-        mask: Array = self.channels["instance_id"] == instance.id
+        """bool, height x width: where the instance is seen. Needs the channel "instance_id" or one of `masks`."""
+        if "instance_id" in self.channels or instance.id not in self.masks:
+            mask: Array = self.channels["instance_id"] == instance.id
+            return mask
+        (x_min, y_min, x_max, y_max), pixels = self.masks[instance.id]
+        mask = np.zeros((self.camera.height, self.camera.width), dtype=bool)
+        mask[y_min:y_max, x_min:x_max] = pixels != 0
         return mask
 
 
@@ -252,8 +264,9 @@ class Dataset(Sequence[Capture]):
     It can be handed to other processes (`torch.utils.data.DataLoader` with workers): they open it anew.
     Several threads may read at once."""
 
-    def __init__(self, folder: str | os.PathLike[str], reader: str = "", wanted: Iterable[str] | None = None) -> None:
-        self._asked = (os.fspath(folder), reader)
+    def __init__(self, folder: str | os.PathLike[str], reader: str | Mapping[str, Any] = "",
+                 wanted: Iterable[str] | None = None) -> None:
+        self._asked = (os.fspath(folder), reader if isinstance(reader, str) else json.dumps(dict(reader)))
         self._wanted = None if wanted is None else sorted(wanted)
         self._open()
         unknown = sorted(set(self._wanted or ()) - set(self.holds))
@@ -265,7 +278,7 @@ class Dataset(Sequence[Capture]):
         self._stored = _diorama.open_dataset(_program(), *self._asked)
         info = self._stored.info()
         self.folder: str = info["folder"]
-        self.reader: str = info["reader"]  #: type of the component that reads it
+        self.reader: str = info["reader"]  #: type of the component that reads it, or `reader` as JSON
         self.format: str = info["format"]
         self.holds: list[str] = info["holds"]  #: channels and labels that some frame has
         self.cameras: list[str] = info["cameras"]
@@ -322,7 +335,7 @@ class Dataset(Sequence[Capture]):
                                   "category_id": names.index(name) + 1, "iscrowd": 0,
                                   "bbox": [x_min, y_min, x_max - x_min, y_max - y_min],
                                   "area": (x_max - x_min) * (y_max - y_min)}
-                    if "instance_id" in frame.channels:
+                    if frame.has_mask(instance):
                         mask = frame.mask(instance)
                         annotation["area"] = int(mask.sum())
                         annotation["segmentation"] = _run_lengths(mask)
@@ -339,10 +352,12 @@ def _run_lengths(mask: Array) -> dict[str, Any]:
     return {"size": list(mask.shape), "counts": counts}
 
 
-def open(folder: str | os.PathLike[str], *, reader: str = "", wanted: Iterable[str] | None = None) -> Dataset:
+def open(folder: str | os.PathLike[str], *, reader: str | Mapping[str, Any] = "",
+         wanted: Iterable[str] | None = None) -> Dataset:
     """Opens a dataset's folder, or a run's that holds one dataset.
 
-    `reader` is the type of a reader for folders that none knows by itself. `wanted` names what is to be read of
+    `reader` is the type of a reader for folders that none knows by itself, or a mapping with its parameters:
+    {"type": "python", "file": "mine.py", "class": "Mine", "params": {...}}. `wanted` names what is to be read of
     `Dataset.holds`; the rest is left out, which saves time. Raises Error when there is no dataset, or several."""
     return Dataset(folder, reader, wanted)
 

@@ -191,7 +191,8 @@ class Stored:
 
 class Reader:
     """Opens folders of a format of your own, for diorama.open(), lint, stats, view, convert and all else that reads
-    datasets. It is found in the folders of DIORAMA_PYTHON_PATH; its parameters have their defaults."""
+    datasets. It is found in the folders of DIORAMA_PYTHON_PATH, and its parameters then have their defaults; other values
+    are given where it is named: --reader '{type: python, file: mine.py, class: Mine, params: {...}}'."""
 
     #: Files of which such a folder has one at least, "*" for any text inside one name: ("objects.csv", "boxes/*.txt").
     #: Some file must lie right in the folder, with an ending, or in a folder right below.
@@ -284,9 +285,18 @@ def _readers_of(files: Sequence[tuple[str, str]], folder: str) -> list[tuple[str
     found = []
     root = pathlib.Path(folder)
     for name, path, key, cls in _each_class("reader", files):
-        if any(next(root.glob(pattern), None) is not None for pattern in cls.patterns) and _with_defaults(cls).recognise(root):
+        if _has_files(cls, root) and _with_defaults(cls).recognise(root):
             found.append((path, f"{name}: {key}", cls))
     return found
+
+
+def _has_files(reader: Reader | type[Reader], root: pathlib.Path) -> bool:
+    return any(next(root.glob(pattern), None) is not None for pattern in reader.patterns)
+
+
+def _knows(reader: Reader, folder: str) -> bool:
+    root = pathlib.Path(folder)
+    return _has_files(reader, root) and reader.recognise(root)
 
 
 def _type_of(default: Any, choices: tuple[str, ...]) -> str:
@@ -371,19 +381,20 @@ def _annotate(component: Annotator, frame: Any, needs: list[str], provides: list
     _diorama.set_channels(frame, {name: np.asarray(channel) for name, channel in made.items()})
 
 
-def _open(cls: type[Any], file: str, folder: str) -> tuple[Stored | None, str | None, dict[str, Any]]:
+def _open(reader: Reader, file: str, folder: str) -> tuple[Stored | None, str | None, dict[str, Any]]:
     """What was opened, or what is wrong with the folder; and what all its captures share."""
+    name = type(reader).__name__
     try:
-        stored = _with_defaults(cls).open(pathlib.Path(folder))
+        stored = reader.open(pathlib.Path(folder))
     except (OSError, ValueError) as error:
         return None, _say(error, file), {}
     if not isinstance(stored, Stored):
-        raise TypeError(f"{cls.__name__}.open() returns a diorama.plugins.Stored, not {type(stored).__name__}")
+        raise TypeError(f"{name}.open() returns a diorama.plugins.Stored, not {type(stored).__name__}")
     captures = [int(index) for index in stored.captures]
-    info = {"format": stored.format or cls.__name__, "holds": list(stored.holds), "cameras": list(stored.cameras),
+    info = {"format": stored.format or name, "holds": list(stored.holds), "cameras": list(stored.cameras),
             "captures": captures, "classes": list(stored.classes), "steps": dict(stored.steps)}
     if captures != sorted(set(captures)):
-        raise TypeError(f"{cls.__name__}: captures ascend")
+        raise TypeError(f"{name}: captures ascend")
     return stored, None, info
 
 
@@ -393,7 +404,7 @@ def _read(stored: Stored, file: str, place: int, wanted: set[str], into: Any) ->
         capture = stored.read(place, frozenset(wanted))
     except (OSError, ValueError) as error:
         where = getattr(error, "filename", None)
-        capture = Capture(int(index), findings=[Finding("files can be read", str(where or "."), int(index), found=_say(error, file))])
+        capture = Capture(int(index), findings=[Finding("every file can be read", str(where or "."), int(index), found=_say(error, file))])
     if not isinstance(capture, Capture) or capture.index != index:
         raise TypeError(f"read({place}) returns the diorama.Capture with index {index}")
     _diorama.store_capture(into, capture)

@@ -108,6 +108,10 @@ struct StoredCapture {
   /// Per frame, by Instance::id, in the order of the skeleton; empty when there are none.
   std::vector<std::map<std::uint32_t, std::vector<StoredKeypoint>>> keypoints;
   ReadLog log;
+  /// Per frame, by Instance::id: the pixels that show the object, where channel "instance_id" is
+  /// wanted and cannot say it, because masks overlap or some object has none. The frame has no such
+  /// channel then. Empty when there are none.
+  std::vector<std::map<std::uint32_t, CoverageMask>> masks;
 };
 
 /// A dataset that was opened. Every function may be called from several threads at once.

@@ -131,6 +131,15 @@ TEST_CASE("COCO masks that overlap are boxes still, but no picture of ids", "[re
   const StoredCapture stored = opened.read(0);
   CHECK(stored.capture.frames.at(0).instances.size() == 2);
   CHECK_FALSE(stored.capture.frames.at(0).has(kInstanceId.name));
+  REQUIRE(stored.masks.size() == 1);
+  REQUIRE(stored.masks[0].size() == 2);
+  for (const auto& [id, box] :
+       {std::pair(1U, PixelBox{1, 1, 9, 9}), {2U, PixelBox{5, 5, 13, 13}}}) {
+    const CoverageMask& mask = stored.masks[0].at(id);
+    CHECK(mask.extent() == box);
+    CHECK(std::ranges::count(mask.bits, 1) == 64);
+  }
+  CHECK(opened.dataset->read(0, {std::string(kHoldsTightBoxes)}).masks.empty());
 }
 
 TEST_CASE("Faults of a foreign COCO file are told with what they are about", "[readers]") {

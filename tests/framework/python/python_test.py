@@ -115,6 +115,21 @@ class Open(unittest.TestCase):
         with self.assertRaises(ValueError):
             color[0, 0, 0] = 1
 
+    def test_boxes_come_from_ids_where_there_are_no_others(self):
+        boxes = diorama.open(run / "basic")
+        without = pathlib.Path(temporary.name) / "without"
+        shutil.copytree(run / "basic", without, ignore=shutil.ignore_patterns("bounding_box_2d_*"))
+        ids = diorama.open(without)
+        self.assertNotIn("tight_boxes", ids.holds)
+        seen = 0
+        for i in (0, 7):
+            for ours, theirs in zip(ids[i].frames, boxes[i].frames):
+                expected = {each.id: each.box for each in theirs.instances if each.box}
+                self.assertEqual({each.id: each.box for each in ours.instances if each.box}, expected)
+                seen += len(expected)
+        self.assertGreater(seen, 0)
+        self.assertEqual(len(ids.to_coco()["annotations"]), len(boxes.to_coco()["annotations"]))
+
     def test_only_what_is_wanted(self):
         dataset = diorama.open(run / "basic", wanted=["distance_to_image_plane"])
         self.assertEqual(set(dataset[0].frames[0].channels), {"distance_to_image_plane"})
@@ -143,6 +158,26 @@ class Open(unittest.TestCase):
         next(copy.rglob("rp_cam_0/rgb/*0003.png")).write_bytes(b"no picture")
         findings = diorama.open(copy)[3].findings
         self.assertTrue(any("0003.png" in finding.file for finding in findings), findings)
+
+    def test_masks_that_overlap(self):
+        folder = pathlib.Path(temporary.name) / "overlaps"
+        (folder / "annotations").mkdir(parents=True)
+        (folder / "images").mkdir()
+        cv2.imwrite(str(folder / "images/a.png"), np.full((20, 30, 3), 90, np.uint8))
+        corners = [(1, 2, 9, 10), (5, 5, 13, 13)]
+        (folder / "annotations/instances_train.json").write_text(json.dumps({
+            "images": [{"id": 1, "file_name": "a.png", "width": 30, "height": 20}], "categories": [{"id": 1, "name": "box"}],
+            "annotations": [{"id": i, "image_id": 1, "category_id": 1, "bbox": [a, b, c - a, d - b], "segmentation": [[a, b, c, b, c, d, a, d]]}
+                            for i, (a, b, c, d) in enumerate(corners)]}))
+        dataset = diorama.open(folder)
+        frame = dataset[0].frames[0]
+        self.assertNotIn("instance_id", frame.channels)
+        for instance, (a, b, c, d) in zip(frame.instances, corners):
+            expected = np.zeros((20, 30), bool)
+            expected[b:d, a:c] = True
+            np.testing.assert_array_equal(frame.mask(instance), expected)
+        self.assertEqual([each["area"] for each in dataset.to_coco()["annotations"]], [64, 64])
+        self.assertEqual(diorama.open(folder, wanted=["tight_boxes"])[0].frames[0].masks, {})
 
 
 class Types(unittest.TestCase):

@@ -247,6 +247,32 @@ class Runs(unittest.TestCase):
         unknown = self.call(PROGRAM, "lint", data, path="")
         self.assertNotEqual(unknown.returncode, 0)
 
+    def test_a_reader_has_parameters(self):
+        data = self.reader(self.GOOD)
+        file = self.scripts / "reader.py"
+        file.write_text(file.read_text().replace("    patterns", "    label = param('a', 'Of all objects.')\n    every = param(1, 'Keeps one of so many.', least=1)\n    patterns")
+                        .replace("range(len(stored.files))", "range(0, len(stored.files), self.every)\n        stored.label = self.label")
+                        .replace("{'class': 'a'}", "{'class': self.label}").replace("Capture(place", "Capture(self.captures[place]"))
+        named = "{type: python, file: reader.py, class: Arrays, params: {label: mug, every: 2}}"
+        stats = self.call(PROGRAM, "stats", data, "--json", "--reader", named)
+        self.assertEqual(stats.returncode, 0, stats.stderr)
+        told = json.loads(stats.stdout)
+        self.assertEqual((told["captures"], list(told["classes"])), (2, ["mug"]))
+        opened = self.call(sys.executable, "-c", "import sys, diorama; d = diorama.open(sys.argv[1], reader={'type': 'python', 'file': 'reader.py', "
+                           "'class': 'Arrays', 'params': {'label': 'cup'}}); print(len(d), d[0].frames[0].instances[0].labels)", data)
+        self.assertEqual(opened.stdout, "3 {'class': 'cup'}\n", opened.stderr)
+        for wrong, code, words in [
+            (named.replace("every: 2", "every: 0"), 3, ["every", "at least 1"]), (named.replace("label", "lable"), 3, ["lable", "label"]),
+            (named.replace("class: Arrays", "class: Arays"), 3, ["no reader 'Arays'", "Arrays"]), (named.replace("file: reader.py, ", ""), 3, ["file: expected"]),
+            (named.replace("python", "phyton", 1), 2, ["python"]), ("{file: reader.py}", 2, ["--reader"]), ("{type: [", 3, ["--reader"]),
+            ("{type: CocoReader, label: mug}", 3, ["label"]),
+        ]:
+            with self.subTest(wrong):
+                self.check_refused(self.call(PROGRAM, "stats", data, "--reader", wrong), code, *words)
+        described = self.call(PROGRAM, "plugins", "describe", "reader/python")
+        for words in ("params of Arrays of reader.py", "params.every: integer, default 1", "Keeps one of so many."):
+            self.assertIn(words, described.stdout)
+
     def test_readers_that_are_wrong(self):
         data = self.reader(self.GOOD)
         np.save(data / "1.npy", np.zeros((4, 6, 4), np.uint8))
@@ -261,7 +287,20 @@ class Runs(unittest.TestCase):
             "return Capture(place, frames=[Frame('eye', Camera(0, 4))])": ["width and height"],
         }.items():
             with self.subTest(body):
-                self.check_refused(self.call(PROGRAM, "lint", self.reader(body)), 4, *words)
+                lint = self.call(PROGRAM, "lint", self.reader(body))
+                self.assertEqual(lint.returncode, 7, lint.stdout + lint.stderr)
+                for word in [*words, "capture 2"]:
+                    self.assertIn(word, lint.stdout)
+                opened = self.call(sys.executable, "-c", "import sys, diorama; diorama.open(sys.argv[1])[2]", data)
+                self.assertIn("diorama.Error: reader of Arrays, capture 2: ", opened.stderr)
+        once = self.reader("if place == 1: 1 / 0\n        " + self.GOOD)
+        lint = self.call(PROGRAM, "lint", once)
+        self.assertEqual(lint.stdout.count("ZeroDivisionError"), 1, lint.stdout + lint.stderr)
+        stats = self.call(PROGRAM, "stats", once, "--json")
+        self.assertEqual(stats.returncode, 0, stats.stderr)
+        self.assertEqual((json.loads(stats.stdout)["pictures"], json.loads(stats.stdout)["findings"]), (2, 1))
+        self.check_refused(self.call(PROGRAM, "convert", once, "--writer", "YoloWriter", "-o", "lost"), 5, "ZeroDivisionError", "capture 1")
+        self.assertEqual(self.call(PROGRAM, "diff", once, once).returncode, 1)
         (self.scripts / "twin.py").write_text((self.scripts / "reader.py").read_text())
         self.check_refused(self.call(PROGRAM, "lint", data), 2, "several classes", "reader.py: Arrays", "twin.py: Arrays")
         (self.scripts / "twin.py").write_text("from diorama.plugins import Reader\n1 / 0\n")

@@ -3,7 +3,7 @@
 import { App } from './app';
 import { CaptureLabels, FrameLabels, ObjectLabels, RunState, get, pictureAddress } from './data';
 import { button, clear, el } from './dom';
-import { FramePixels, Motions, Numbers, View, css, drawKeypoints, drawLines, drawPicture, kLayers, overlays, skeletonOf } from './layers';
+import { FramePixels, MaskStack, Motions, Numbers, View, css, drawKeypoints, drawLines, drawPicture, kLayers, overlays, skeletonOf } from './layers';
 import { replayCommand } from './pages';
 import { Player, Shot } from './player';
 import { SpaceView } from './scene';
@@ -153,7 +153,7 @@ export class CapturePage {
   private wantNumbers(): void {
     const { holds } = this.app;
     const changed = () => this.showProbe();
-    if (holds.has('instance_id')) this.pixels?.numbers('ids').then(changed, changed);
+    if (holds.has('instance_id')) this.pixels?.masks().then(changed, changed);
     if (holds.has('distance_to_image_plane') || holds.has('distance_to_camera')) this.pixels?.numbers('depth').then(changed, changed);
   }
 
@@ -206,7 +206,11 @@ export class CapturePage {
     clear(this.panel);
     // Numbers of a frame that has passed are nobody's to choose from.
     this.panel.inert = this.player.isPlaying;
-    if (!frame) return;
+    if (!frame) {
+      this.panel.append(el('h3', {}, 'No picture'));
+      this.showFaults();
+      return;
+    }
     const seen = frame.objects.filter((object) => object.box);
     this.panel.append(el('h3', {}, 'Objects', el('small', {}, `${seen.length} in the picture, ${frame.objects.length} in all`)));
     for (const object of [...seen].sort((a, b) => this.area(b) - this.area(a))) {
@@ -236,6 +240,12 @@ export class CapturePage {
       for (const [held, file] of files) list.append(el('dt', {}, held), el('dd', {}, file));
       this.panel.append(el('details', {}, el('summary', {}, 'Files'), list));
     }
+    this.showFaults();
+    this.panel.scrollTop = scroll;
+  }
+
+  private showFaults(): void {
+    const { app } = this;
     const linted = (app.lint.findingsOf(app.site, app.state.dataset) ?? []).filter((finding) => finding.capture === app.state.capture);
     if (linted.length + this.capture!.findings.length > 0) {
       this.panel.append(el('h3', { class: 'bad' }, 'Faults'));
@@ -244,7 +254,6 @@ export class CapturePage {
         this.panel.append(el('p', { class: 'bad' }, `${finding.check}: ${finding.message ?? finding.found ?? ''}`));
       }
     }
-    this.panel.scrollTop = scroll;
   }
 
   private detail(object: ObjectLabels): HTMLElement {
@@ -311,12 +320,16 @@ export class CapturePage {
   /** Objects at a pixel: by the mask where there is one, then by boxes, small ones first. */
   private objectsAt(x: number, y: number): ObjectLabels[] {
     const frame = this.frame!;
-    const id = this.pixels?.now<Numbers>('ids')?.at(x, y) ?? null;
+    const masks = this.pixels?.now<Numbers | MaskStack>('masks') ?? null;
+    const ids = masks instanceof MaskStack ? masks.at(x, y) : [masks?.at(x, y) ?? 0];
     const inside = frame.objects.filter((object) => object.box && x >= object.box[0] && y >= object.box[1] &&
       x < object.box[2] && y < object.box[3]);
     inside.sort((a, b) => this.area(a) - this.area(b));
-    const shown = frame.objects.find((object) => id !== null && id !== 0 && (object.id & 0xffffff) === id);
-    return shown ? [shown, ...inside.filter((object) => object !== shown)] : inside;
+    // Pictures of numbers hold 24 bits of an id.
+    const bits = masks instanceof MaskStack ? -1 : 0xffffff;
+    const shown = frame.objects.filter((object) => ids.some((id) => id !== 0 && ((object.id ^ id) & bits) === 0));
+    shown.sort((a, b) => this.area(a) - this.area(b));
+    return [...shown, ...inside.filter((object) => !shown.includes(object))];
   }
 
   private showProbe(): void {

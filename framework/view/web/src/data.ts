@@ -16,6 +16,7 @@ export interface SiteState {
   generation: number;
   is_finished: boolean;
   is_linted: boolean;  ///< The findings are known, and cost nothing.
+  faults: string[];  ///< Of datasets that could not be opened beside these.
   datasets: DatasetState[];
 }
 
@@ -99,7 +100,7 @@ export interface CaptureLabels {
   findings: Finding[];
 }
 
-export interface AmodalMasks {
+export interface ObjectMasks {
   objects: { id: number; box: Box; runs: number[] }[];
 }
 
@@ -209,9 +210,11 @@ export async function loadPicture(dataset: number, capture: number, frame: numbe
                                   kind: string): Promise<HTMLImageElement> {
   const image = new Image();
   const hasNumbers = kind !== 'color' && kind !== 'thumbnail';
-  image.src = isReport && hasNumbers
+  const source = isReport && hasNumbers
     ? await getFromFile(`/api/${dataset}/capture/${capture}/${frame}/${kind}`)
     : pictureAddress(dataset, capture, frame, kind);
+  if (source === null) throw new Error('no such picture');
+  image.src = source;
   await image.decode();
   return image;
 }

@@ -111,7 +111,8 @@ export class Grid {
 
   private picturesOf(place: number): number {
     const { table, info } = this.app;
-    return place < table.captures ? table.of('pictures')[place] : Math.max(1, info.cameras.length);
+    // What could not be read has none, and a card all the same.
+    return Math.max(1, place < table.captures ? table.of('pictures')[place] : info.cameras.length);
   }
 
   /** What the index says of a card that was there before it; nothing when it shows other pictures. */
@@ -161,7 +162,7 @@ export class Grid {
       const canvas = el('canvas');
       if (app.holds.has('color')) {
         const image = on(el('img', { alt: '', decoding: 'async', src: pictureAddress(state.dataset, capture, frame, 'thumbnail') }), {
-          error: () => image.classList.add('missing'),
+          error: () => image.replaceWith(el('span', { class: 'missing' })),
         });
         link.append(image);
       } else {

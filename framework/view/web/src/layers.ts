@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What is drawn over a picture: exact labels where they are few numbers, pictures of numbers where they
 // are many.
-import { AmodalMasks, FrameLabels, Keypoint, ObjectLabels, Skeleton, get, loadPicture } from './data';
+import { Box, FrameLabels, Keypoint, ObjectLabels, ObjectMasks, Skeleton, get, loadPicture } from './data';
 import { State } from './state';
 
 export interface Layer {
@@ -170,6 +170,28 @@ function motionColour({ x, y, state }: Motion): Rgb | null {
   return [part(0), part(4), part(2)];
 }
 
+/** Which objects a pixel shows where masks overlap, so that a picture of ids cannot say it. */
+export class MaskStack {
+  private readonly masks: { id: number; box: Box; pixels: Uint8Array }[];
+
+  constructor(readonly told: ObjectMasks) {
+    this.masks = told.objects.map(({ id, box, runs }) => {
+      const pixels = new Uint8Array(Math.max(0, box[2] - box[0]) * Math.max(0, box[3] - box[1]));
+      let at = 0;
+      runs.forEach((length, i) => {
+        if (i % 2 === 1) pixels.fill(1, at, at + length);
+        at += length;
+      });
+      return { id, box, pixels };
+    });
+  }
+
+  at(x: number, y: number): number[] {
+    return this.masks.filter(({ box, pixels }) => x >= box[0] && y >= box[1] && x < box[2] && y < box[3] &&
+      pixels[(y - box[1]) * (box[2] - box[0]) + x - box[0]] === 1).map(({ id }) => id);
+  }
+}
+
 /** Pixels of one frame, fetched when they are first wanted. */
 export class FramePixels {
   private readonly made = new Map<string, Promise<unknown>>();
@@ -213,8 +235,14 @@ export class FramePixels {
     return this.keep('picture ' + kind, () => loadPicture(this.dataset, this.capture, this.frame, kind));
   }
 
-  amodal(): Promise<AmodalMasks> {
+  amodal(): Promise<ObjectMasks> {
     return this.keep('amodal masks', () => get(`/api/${this.dataset}/capture/${this.capture}/${this.frame}/amodal`));
+  }
+
+  /** Of objects that are seen: a picture of their ids, or where masks overlap one of each. */
+  masks(): Promise<Numbers | MaskStack> {
+    return this.keep('masks', () => this.numbers('ids').catch(async () =>
+      new MaskStack(await get(`/api/${this.dataset}/capture/${this.capture}/${this.frame}/masks`))));
   }
 
   drawing(key: string, make: () => Promise<HTMLCanvasElement>): Promise<HTMLCanvasElement> {
@@ -224,47 +252,46 @@ export class FramePixels {
 
 function maskDrawing(pixels: FramePixels, labels: FrameLabels, state: State, palette: Palette) {
   return async (): Promise<HTMLCanvasElement> => {
-    const ids = await pixels.numbers('ids');
+    const masks = await pixels.masks();
+    if (masks instanceof MaskStack) return stackDrawing(masks.told, labels, state, palette);
     const objects = new Map(labels.objects.map((object) => [object.id & 0xffffff, object]));
-    return ids.coloured((id) => {
+    return masks.coloured((id) => {
       const object = objects.get(id);
       return object ? palette.of(object, state) : null;
     });
   };
 }
 
-function amodalDrawing(pixels: FramePixels, labels: FrameLabels, state: State, palette: Palette) {
-  return async (): Promise<HTMLCanvasElement> => {
-    const masks = await pixels.amodal();
-    const [canvas, context] = canvasOf(labels.width, labels.height);
-    const objects = new Map(labels.objects.map((object) => [object.id, object]));
-    for (const mask of masks.objects) {
-      const object = objects.get(mask.id);
-      if (!object) continue;
-      const width = mask.box[2] - mask.box[0];
-      const height = mask.box[3] - mask.box[1];
-      if (width <= 0 || height <= 0) continue;
-      const [part, partContext] = canvasOf(width, height);
-      const image = partContext.createImageData(width, height);
-      const [r, g, b] = palette.of(object, state);
-      let at = 0;
-      mask.runs.forEach((length, i) => {
-        for (const end = at + length; at < end; ++at) if (i % 2 === 1) image.data.set([r, g, b, 150], 4 * at);
-      });
-      // A rim, so that masks on top of each other can be told apart.
-      const covers = (x: number, y: number) =>
-        x >= 0 && y >= 0 && x < width && y < height && image.data[4 * (y * width + x) + 3] > 0;
-      for (let y = 0; y < height; ++y) {
-        for (let x = 0; x < width; ++x) {
-          if (!covers(x, y) || (covers(x - 1, y) && covers(x + 1, y) && covers(x, y - 1) && covers(x, y + 1))) continue;
-          image.data[4 * (y * width + x) + 3] = 255;
-        }
+/** Masks that lie on top of each other. */
+function stackDrawing(masks: ObjectMasks, labels: FrameLabels, state: State, palette: Palette): HTMLCanvasElement {
+  const [canvas, context] = canvasOf(labels.width, labels.height);
+  const objects = new Map(labels.objects.map((object) => [object.id, object]));
+  for (const mask of masks.objects) {
+    const object = objects.get(mask.id);
+    if (!object) continue;
+    const width = mask.box[2] - mask.box[0];
+    const height = mask.box[3] - mask.box[1];
+    if (width <= 0 || height <= 0) continue;
+    const [part, partContext] = canvasOf(width, height);
+    const image = partContext.createImageData(width, height);
+    const [r, g, b] = palette.of(object, state);
+    let at = 0;
+    mask.runs.forEach((length, i) => {
+      for (const end = at + length; at < end; ++at) if (i % 2 === 1) image.data.set([r, g, b, 150], 4 * at);
+    });
+    // A rim, so that they can be told apart.
+    const covers = (x: number, y: number) =>
+      x >= 0 && y >= 0 && x < width && y < height && image.data[4 * (y * width + x) + 3] > 0;
+    for (let y = 0; y < height; ++y) {
+      for (let x = 0; x < width; ++x) {
+        if (!covers(x, y) || (covers(x - 1, y) && covers(x + 1, y) && covers(x, y - 1) && covers(x, y + 1))) continue;
+        image.data[4 * (y * width + x) + 3] = 255;
       }
-      partContext.putImageData(image, 0, 0);
-      context.drawImage(part, mask.box[0], mask.box[1]);
     }
-    return canvas;
-  };
+    partContext.putImageData(image, 0, 0);
+    context.drawImage(part, mask.box[0], mask.box[1]);
+  }
+  return canvas;
 }
 
 function depthDrawing(pixels: FramePixels) {
@@ -321,7 +348,9 @@ export function overlays(pixels: FramePixels, labels: FrameLabels, state: State,
       take(layer.key + ' drawing', async () => (await pixels.motions(layer.key)).drawing());
     }
     if (layer.key === 'mask') take('mask ' + state.colour, maskDrawing(pixels, labels, state, palette));
-    if (layer.key === 'amodal') take('amodal ' + state.colour, amodalDrawing(pixels, labels, state, palette));
+    if (layer.key === 'amodal') {
+      take('amodal ' + state.colour, async () => stackDrawing(await pixels.amodal(), labels, state, palette));
+    }
   }
   return found;
 }

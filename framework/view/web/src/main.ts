@@ -39,6 +39,7 @@ function complete(state: State, datasets: DatasetState[]): void {
 
 class Site {
   private readonly top = el('header');
+  private readonly faults = el('div', { class: 'faults', role: 'status' });
   private readonly tools = el('div', { class: 'tools', role: 'toolbar', 'aria-label': 'Overlays' });
   private readonly status = el('div', { class: 'status', role: 'status' });
   private readonly facets = new FacetBar();
@@ -57,7 +58,7 @@ class Site {
   private tabs = false;  ///< From button to button by keyboard.
 
   async start(): Promise<void> {
-    document.body.append(this.top, this.tools, this.gridPage, this.capture.element, this.compare.element,
+    document.body.append(this.top, this.faults, this.tools, this.gridPage, this.capture.element, this.compare.element,
       this.stats.element, this.findings.element, this.run.element, this.status, this.help);
     this.makeHelp();
     this.setTheme(this.keptTheme());
@@ -237,6 +238,8 @@ class Site {
     this.top.append(tabs, el('span', { class: 'folder', title: app.site.folder }, el('bdi', {}, app.site.folder)),
       button('◐', 'Light or dark', () => this.setTheme(document.documentElement.dataset.theme === 'dark' ? 'light' : 'dark')),
       button('?', 'Keys (?)', () => this.help.showModal()));
+    clear(this.faults);
+    for (const fault of app.site.faults) this.faults.append(el('p', { class: 'bad' }, `Left out: ${fault}`));
     if (focus) this.top.querySelector<HTMLElement>(`[data-page="${focus}"]`)?.focus();
   }
 

@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the page makes of masks that overlap, of a capture whose reader throws and of a dataset that cannot be opened, in
+// Chromium. See browser.sh.
+import { spawn } from 'node:child_process';
+import { mkdirSync, writeFileSync } from 'node:fs';
+import { chromium } from 'playwright-core';
+
+const [program, pictures, work] = process.argv.slice(2);
+mkdirSync(pictures, { recursive: true });
+let failures = 0;
+function check(holds, what) {
+  console.log(`${holds ? 'ok    ' : 'FAILED'} ${what}`);
+  if (!holds) ++failures;
+}
+mkdirSync(`${work}/scripts`);
+writeFileSync(`${work}/scripts/boxes.py`, `
+import numpy as np
+from diorama.plugins import Camera, Capture, Frame, Instance, Reader, Stored, param
+
+
+class Boxes(Reader):
+    """Three captures, of which the second cannot be read."""
+
+    patterns = ["*.boxes"]
+    count = param(3, "Captures.", least=1)
+
+    def open(self, folder):
+        if (folder / "bad.boxes").exists():
+            raise ValueError("its table is <b>gone</b>")
+        return Opened(self.count)
+
+
+class Opened(Stored):
+    format, holds, cameras = "boxes", ["color", "instance_id", "instances", "labels", "tight_boxes"], ["eye"]
+
+    def __init__(self, count):
+        self.captures = range(count)
+
+    def read(self, place, wanted):
+        if place == 1:
+            return {}["<img src=x onerror=alert(1)>"]
+        channels, masks, instances = {}, {}, []
+        if "color" in wanted:
+            channels["color"] = np.full((120, 160, 4), 120 + 20 * place, np.uint8)
+        for i, (a, b, c, d) in enumerate([(20, 20, 100, 80), (60, 40, 140, 110), (70, 50, 90, 70)]):
+            instances.append(Instance(i + 1, f"/{i}", {"class": ["plate", "cup", "spoon"][i]}, box=(a, b, c, d)))
+            if "instance_id" in wanted:
+                masks[i + 1] = ((a, b, c, d), np.ones((d - b, c - a), np.uint8))
+        return Capture(place, frames=[Frame("eye", Camera(160, 120), instances=instances, channels=channels, masks=masks)])
+`);
+for (const name of ['good', 'bad']) {
+  mkdirSync(`${work}/run/${name}`, { recursive: true });
+  writeFileSync(`${work}/run/${name}/${name}.boxes`, '');
+}
+const server = spawn(program, [...(process.env.DIORAMA_OPTIONS ?? '').split(' ').filter(Boolean), 'view', `${work}/run`, '--no-browser'],
+  { stdio: ['ignore', 'pipe', 'inherit'], env: { ...process.env, DIORAMA_PYTHON_PATH: `${work}/scripts`, XDG_CACHE_HOME: work } });
+const address = await new Promise((resolve, reject) => {
+  server.stdout.once('data', (bytes) => resolve(String(bytes).trim()));
+  server.once('exit', (code) => reject(new Error(`view ended with ${code}`)));
+});
+const browser = await chromium.launch({ executablePath: '/usr/bin/chromium', args: ['--no-sandbox'] });
+try {
+  const page = await browser.newPage({ viewport: { width: 1366, height: 768 } });
+  const faults = [];
+  page.on('pageerror', (error) => faults.push(error.message));
+  page.on('dialog', (dialog) => {
+    faults.push('a text of the dataset ran');
+    void dialog.dismiss();
+  });
+  await page.goto(address);
+  await page.waitForFunction(() => document.querySelectorAll('.card').length === 3 && document.querySelector('.status')?.hidden);
+  await page.waitForTimeout(800);
+  check((await page.textContent('.faults')).includes('its table is <b>gone</b>'), 'a dataset that cannot be opened is named');
+  check((await page.locator('.card').nth(1).locator('.bad').count()) === 1, 'the card of a lost capture says so');
+  await page.keyboard.press('m');
+  await page.waitForTimeout(900);
+  await page.screenshot({ path: `${pictures}/faults_grid.png` });
+  await page.locator('.card a.picture').first().click();
+  await page.waitForSelector('.object');
+  await page.keyboard.press('b');
+  await page.waitForTimeout(600);
+  const canvas = page.locator('.capture:not([hidden]) canvas.big');
+  const drawn = () => canvas.evaluate((element) => element.toDataURL());
+  const masked = await drawn();
+  await page.screenshot({ path: `${pictures}/faults_masks.png` });
+  await page.keyboard.press('m');
+  await page.waitForTimeout(300);
+  check((await drawn()) !== masked, 'masks that overlap are drawn');
+  await page.keyboard.press('m');
+  const box = await canvas.boundingBox();
+  const scale = Math.min(box.width / 160, box.height / 120);
+  const at = (x, y) => [box.x + box.width / 2 + (x - 80) * scale, box.y + box.height / 2 + (y - 60) * scale];
+  await page.mouse.move(...at(80, 60));
+  await page.waitForTimeout(200);
+  const probe = await page.textContent('.capture:not([hidden]) .probe');
+  check(/object spoon/.test(probe) && /below cup, plate|below plate, cup/.test(probe), `the probe names all three there: ${probe}`);
+  const seen = new Set();
+  for (let i = 0; i < 3; ++i) {
+    await page.keyboard.press('ArrowDown');
+    await page.waitForTimeout(150);
+    seen.add(/object=(\d+)/.exec(await page.evaluate(() => location.hash))?.[1]);
+  }
+  check(seen.size === 3, 'arrow down goes through the three that overlap');
+  await page.screenshot({ path: `${pictures}/faults_probe.png` });
+  await page.keyboard.press('Escape');
+  await page.keyboard.press('ArrowRight');
+  await page.waitForFunction(() => /KeyError/.test(document.querySelector('.capture:not([hidden]) .objects')?.textContent ?? ''));
+  check(true, 'a lost capture says why');
+  await page.screenshot({ path: `${pictures}/faults_lost.png` });
+  await page.keyboard.press('ArrowRight');
+  await page.waitForSelector('.object');
+  check((await page.locator('.object').count()) === 3, 'and the next one is there');
+  await page.getByRole('button', { name: 'Findings', exact: true }).click();
+  await page.locator('.page:not([hidden]) button.main').click();
+  await page.waitForSelector('.page:not([hidden]) .bad');
+  const words = await page.textContent('.page:not([hidden])');
+  check(words.includes('KeyError') && words.includes('its table is <b>gone</b>'), 'findings have both');
+  await page.screenshot({ path: `${pictures}/faults_findings.png` });
+  await page.getByRole('button', { name: 'Statistics' }).click();
+  await page.waitForSelector('.page:not([hidden]) table');
+  check(/pictures\s*2|2\s*pictures/.test(await page.textContent('.page:not([hidden])')), 'statistics are of the others');
+  check(faults.length === 0, 'no fault in the page' + (faults.length ? ': ' + faults.join(' | ') : ''));
+} catch (error) {
+  check(false, error.message);
+} finally {
+  await browser.close();
+  server.removeAllListeners('exit');
+  server.kill('SIGTERM');
+}
+process.exit(failures === 0 ? 0 : 1);
