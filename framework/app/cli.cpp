@@ -684,7 +684,7 @@ void add_export(CLI::App& app, CommandLine& line) {
       ->required()
       ->type_name("FILE");
   command->add_flag("--without-physics", line.export_.without_physics,
-                    "Leave out masses, rigid bodies and colliders");
+                    "Leave out masses, rigid bodies, colliders and joints");
   command->callback([&line] {
     line.command = [&line](ConsoleLog& log) {
       return command_export(line.global, line.export_, log);

@@ -22,6 +22,7 @@ enum class Type : std::uint64_t {
   Token = 11,
   AssetPath = 12,
   Matrix4d = 15,
+  Quatf = 17,
   Vec2f = 20,
   Vec3d = 23,
   Vec3f = 24,
@@ -156,6 +157,9 @@ class CrateWriter {
     return placed(Type::Vec3f, std::array{v.x(), v.y(), v.z()});
   }
   std::uint64_t value(const Float4& v) { return placed(Type::Vec4f, v); }
+  std::uint64_t value(const Eigen::Quaternionf& q) {
+    return placed(Type::Quatf, std::array{q.x(), q.y(), q.z(), q.w()});
+  }
   std::uint64_t value(const Double3& v) { return placed(Type::Vec3d, v); }
   std::uint64_t value(const Matrix& v) { return placed(Type::Matrix4d, v); }
   std::uint64_t value(const std::vector<Vec2f>& v) { return placed_array(Type::Vec2f, v); }

@@ -9,7 +9,7 @@
 namespace diorama {
 
 struct ExportOptions {
-  bool with_physics = true;  ///< Masses, rigid bodies, colliders.
+  bool with_physics = true;  ///< Masses, rigid bodies, colliders, joints.
 };
 
 /// Writes what is at and below `root` to `file`: .usda as text, .usdc and .usd as crate, pictures

@@ -6,6 +6,8 @@
 #include <set>
 #include <utility>
 
+#include "framework/export/joint_export.h"
+
 namespace diorama::usd_export {
 namespace {
 
@@ -131,6 +133,7 @@ class Exporter {
 
   SceneLayer run(NodeId root) {
     Prim world = node_prim(root, kWorld, "/" + std::string(kWorld));
+    if (with_physics_) add_joints(scene_, paths_, world);
     world.kind = "component";
     if (!materials_.children.empty()) world.children.push_back(std::move(materials_));
     SceneLayer result;
@@ -154,6 +157,7 @@ class Exporter {
     const Node& node = scene_[id];
     const int things = int(bool(node.mesh)) + int(bool(node.light)) + int(bool(node.camera));
     const bool is_leaf = node.children.empty() && things == 1 && path.rfind('/') != 0;
+    paths_.emplace(id, path);
     Prim prim;
     prim.name = name;
     prim.type = "Xform";
@@ -304,6 +308,7 @@ class Exporter {
 
   const Scene& scene_;
   bool with_physics_;
+  std::map<NodeId, std::string> paths_;
   TextureNames textures_;
   Prim materials_;
   std::map<const Material*, std::string> material_names_;

@@ -16,8 +16,8 @@ struct SceneLayer {
 };
 
 /// Everything at and below `root` as "/World", z up and in metres: transforms, meshes with their
-/// material subsets, lights, cameras, labels and, if wanted, rigid bodies and colliders. `stem` is
-/// the name of the file without folder and ending; pictures are called after it.
+/// material subsets, lights, cameras, labels and, if wanted, rigid bodies, colliders and joints.
+/// `stem` is the name of the file without folder and ending; pictures are called after it.
 SceneLayer scene_layer(const Scene& scene, NodeId root, const std::string& stem, bool with_physics);
 
 }  // namespace diorama::usd_export

@@ -27,8 +27,8 @@ using Double3 = std::array<double, 3>;
 using Float4 = std::array<float, 4>;
 
 using Value = std::variant<bool, int, float, double, std::string, Token, AssetPath, Vec2f, Vec3f,
-                           Float4, Double3, Matrix, std::vector<Token>, std::vector<int>,
-                           std::vector<Vec2f>, std::vector<Vec3f>>;
+                           Float4, Eigen::Quaternionf, Double3, Matrix, std::vector<Token>,
+                           std::vector<int>, std::vector<Vec2f>, std::vector<Vec3f>>;
 
 /// An attribute, or a relationship when `type` is empty.
 struct Property {

@@ -47,6 +47,9 @@ void put(std::string& out, const AssetPath& path) { out += "@" + path.text + "@"
 void put(std::string& out, const Vec2f& v) { put_tuple(out, v.data(), 0, 2); }
 void put(std::string& out, const Vec3f& v) { put_tuple(out, v.data(), 0, 3); }
 void put(std::string& out, const Float4& v) { put_tuple(out, v, 0, 4); }
+void put(std::string& out, const Eigen::Quaternionf& q) {
+  put_tuple(out, std::array{q.w(), q.x(), q.y(), q.z()}, 0, 4);
+}
 void put(std::string& out, const Double3& v) { put_tuple(out, v, 0, 3); }
 void put(std::string& out, const Matrix& m) {
   out += "( ";

@@ -260,11 +260,11 @@ NodeId HostServices::load_asset(std::string_view asset, Scene& scene, NodeId par
 
 std::shared_ptr<const Texture> HostServices::decode_texture(std::span<const std::byte> bytes,
                                                             std::string_view name) const {
-  return decode_image(bytes, name, picture_bytes_);
+  return pictures_.get(bytes, name, [&] { return decode_image(bytes, name, picture_bytes_); });
 }
 
 std::shared_ptr<const Texture> HostServices::read_texture(const fs::path& file) const {
-  return decode_image(read_bytes(file), file.string(), picture_bytes_);
+  return decode_texture(read_bytes(file), file.string());
 }
 
 std::vector<std::byte> HostServices::encode_image(const ImageView& image,

@@ -19,6 +19,7 @@
 #include "framework/host/asset_cache.h"
 #include "framework/host/asset_paths.h"
 #include "framework/host/log.h"
+#include "framework/host/picture_pool.h"
 #include "framework/host/thread_pool.h"
 #include "framework/images/image_codecs.h"
 #include "framework/plugins/registry.h"
@@ -98,6 +99,7 @@ class HostServices final : public Host {
   std::recursive_mutex loading_;  ///< Loaders may load what theirs consists of.
   AssetCache cache_;
   std::uint64_t picture_bytes_;
+  mutable PicturePool pictures_;
   std::map<std::string, std::unique_ptr<Loader>> loaders_;
   std::vector<Claim> claims_;  // earlier ones win
   mutable std::mutex resolved_mutex_;

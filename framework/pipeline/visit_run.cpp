@@ -430,16 +430,18 @@ void VisitRun::play(const PlannedCapture& first, const ClipFrame& at) {
     }
   }
   const std::uint64_t shapes = scene_.shape_revision();
-  const BodyPoses bodies = body_poses(scene_);
+  std::optional<BodyPoses> bodies;
   for (std::size_t i = 0; i < job_.randomizers.size(); ++i) {
     const RandomizerEntry& entry = job_.randomizers[i];
     if (!randomizer_call(job_, entry, first.phase, planned_.index, first.number)) continue;
+    if (!bodies) bodies = body_poses(scene_);
+    const std::uint64_t poses = scene_.pose_revision();
     call_component("randomizer '" + entry.name + "'", [&] {
       components_.randomizers[i]->play(scene_, at);
       if (scene_.shape_revision() != shapes) {
         throw Error(ErrorKind::Plugin, "changes more than poses while a clip plays");
       }
-      if (!are_equal(body_poses(scene_), bodies)) {
+      if (scene_.pose_revision() != poses && !are_equal(body_poses(scene_), *bodies)) {
         throw Error(ErrorKind::Plugin, "moves rigid bodies while a clip plays");
       }
     });

@@ -344,40 +344,70 @@ std::shared_ptr<const Material> ModelTranslator::material_of(const urdf::Visual&
 
 void ModelTranslator::add_joint(const urdf::Joint& said, NodeId above) {
   const std::string where = "joint '" + said.name + "'";
-  const NodeId parent = links_.at(said.parent_link_name);
-  const NodeId child = links_.at(said.child_link_name);
+  const loader_support::JointEnd parent{links_.at(said.parent_link_name),
+                                        pose_of(said.parent_to_joint_origin_transform, where)};
+  const loader_support::JointEnd child{links_.at(said.child_link_name)};
+  if (said.type == urdf::Joint::FLOATING || said.type == urdf::Joint::PLANAR) {
+    return add_free_joint(said, above, parent, child);
+  }
   Joint joint;
   if (said.type == urdf::Joint::REVOLUTE || said.type == urdf::Joint::CONTINUOUS) {
     joint.kind = JointKind::Revolute;
   } else if (said.type == urdf::Joint::PRISMATIC) {
     joint.kind = JointKind::Prismatic;
   } else if (said.type != urdf::Joint::FIXED) {
-    warn(where + " is of a type that does not hold (floating or planar)");
+    warn(where + " is of a type that is not known; it holds nothing");
     return;
   }
-  joint.parent_body = parent;
-  joint.child_body = child;
-  joint.parent_from_joint = pose_of(said.parent_to_joint_origin_transform, where);
-  if (joint.kind != JointKind::Fixed) {
-    const Vec3 axis = to_vec3(said.axis);
-    if (axis.allFinite() && axis.norm() > 1e-9) {
-      joint.axis = axis.normalized();
-    } else {
-      warn(where + " has no axis; it is x");
-    }
-  }
+  if (joint.kind != JointKind::Fixed) joint.axis = axis_of(said);
   if (said.limits && joint.kind != JointKind::Fixed && said.type != urdf::Joint::CONTINUOUS) {
     const auto [lower, upper] = std::pair(said.limits->lower, said.limits->upper);
-    if (lower <= upper) {
-      joint.lower = lower;
-      joint.upper = upper;
-    } else {
+    if (std::isnan(lower) || std::isnan(upper)) {
       warn(where + " has limits that are no interval; it has none");
+    } else {
+      if (lower > upper) warn(where + " has limits the wrong way round; they are swapped");
+      joint.lower = std::min(lower, upper);
+      joint.upper = std::max(lower, upper);
     }
   }
   const NodeId node = scene_.create(above, node_name(said.name, "joint"));
   joints_[said.name] = node;
-  scene_.edit(node).joint = joint;
+  loader_support::add_joint(scene_, node, {joint}, {}, parent, child);
+}
+
+Vec3 ModelTranslator::axis_of(const urdf::Joint& said) {
+  const Vec3 axis = to_vec3(said.axis);
+  if (axis.allFinite() && axis.norm() > 1e-9) return axis.normalized();
+  warn("joint '" + said.name + "' has no axis; it is x");
+  return Vec3::UnitX();
+}
+
+/// Floating joints allow everything, planar ones what keeps a plane: to slide in it, and to turn
+/// about its normal.
+void ModelTranslator::add_free_joint(const urdf::Joint& said, NodeId above,
+                                     const loader_support::JointEnd& parent,
+                                     const loader_support::JointEnd& child) {
+  const bool is_planar = said.type == urdf::Joint::PLANAR;
+  const Vec3 normal = is_planar ? axis_of(said) : Vec3::UnitZ();
+  const Mat3 axes = Quat::FromTwoVectors(Vec3::UnitZ(), normal).toRotationMatrix();
+  std::vector<Joint> joints;
+  std::vector<std::string> names;
+  const auto add = [&](JointKind kind, int column) {
+    Joint joint;
+    joint.kind = kind;
+    joint.axis = axes.col(column);
+    joints.push_back(joint);
+    names.push_back((kind == JointKind::Revolute ? "rot" : "trans") +
+                    std::string(1, "XYZ"[column]));
+  };
+  add(JointKind::Prismatic, 0);
+  add(JointKind::Prismatic, 1);
+  if (!is_planar) add(JointKind::Prismatic, 2);
+  if (!is_planar) add(JointKind::Revolute, 0);
+  if (!is_planar) add(JointKind::Revolute, 1);
+  add(JointKind::Revolute, 2);
+  const NodeId node = scene_.create(above, node_name(said.name, "joint"));
+  loader_support::add_joint(scene_, node, std::move(joints), names, parent, child);
 }
 
 }  // namespace diorama::loader_urdf

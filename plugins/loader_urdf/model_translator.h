@@ -11,6 +11,7 @@
 
 #include "diorama/host.h"
 #include "diorama/scene.h"
+#include "loader_support/joint_chain.h"
 #include "loader_urdf/model_file.h"
 
 namespace diorama::loader_urdf {
@@ -37,6 +38,10 @@ class ModelTranslator {
   NodeId add_link(const urdf::Link& link, NodeId above, const Affine& above_from_link);
   void make_body(const urdf::Link& link, NodeId node, double unsaid_mass_kg);
   void add_joint(const urdf::Joint& joint, NodeId above);
+  void add_free_joint(const urdf::Joint& joint, NodeId above,
+                      const loader_support::JointEnd& parent,
+                      const loader_support::JointEnd& child);
+  Vec3 axis_of(const urdf::Joint& joint);
   /// The node of a shape; null when it cannot be made.
   NodeId add_geometry(const urdf::Geometry& geometry, const urdf::Pose& pose,
                       const std::string& name, NodeId link, bool is_collision);

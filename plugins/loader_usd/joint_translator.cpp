@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "loader_usd/joint_translator.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <string_view>
 #include <utility>
+#include <vector>
 
+#include "loader_support/joint_chain.h"
 #include "loader_usd/usd/geometry.h"
 
 namespace diorama::loader_usd {
@@ -18,42 +22,58 @@ Vec3 axis_named(const std::string& word) {
   return Vec3::UnitX();
 }
 
-/// What a joint leaves free, and where its limits are said.
-struct Freedom {
-  JointKind kind = JointKind::Fixed;
-  std::string axis;
-  std::string lower, upper;
-  std::size_t turns = 0, slides = 0;  ///< Axes that are free.
-};
-
-/// Joints without a kind of their own are free along and about every axis but those whose limits
-/// are turned round.
-Freedom freedom_of(usd::Stage& stage, const Prim& prim) {
-  if (prim.type_name != "PhysicsJoint") {
-    Freedom one{JointKind::Fixed, usd::token_or(stage, prim, "physics:axis", "X"),
-                "physics:lowerLimit", "physics:upperLimit"};
-    if (prim.type_name == "PhysicsRevoluteJoint") one.kind = JointKind::Revolute;
-    if (prim.type_name == "PhysicsPrismaticJoint") one.kind = JointKind::Prismatic;
-    if (prim.type_name == "PhysicsSphericalJoint") one.turns = 3;
-    return one;
+/// None: it holds its bodies as they stand. Joints without a kind of their own are free along and
+/// about every axis but those whose limits are turned round; slides come first.
+std::vector<FreeAxis> free_axes(usd::Stage& stage, const Prim& prim) {
+  const auto number = [&](const std::string& name, double fallback) {
+    return usd::number_or(stage, prim, name.c_str(), fallback);
+  };
+  const std::string& type = prim.type_name;
+  const std::string word = usd::token_or(stage, prim, "physics:axis", "X");
+  if (type == "PhysicsRevoluteJoint" || type == "PhysicsPrismaticJoint") {
+    return {{"", type == "PhysicsRevoluteJoint" ? JointKind::Revolute : JointKind::Prismatic,
+             axis_named(word), number("physics:lowerLimit", -kInfinity),
+             number("physics:upperLimit", kInfinity)}};
   }
-  Freedom found;
-  for (const char* word : {"transX", "transY", "transZ", "rotX", "rotY", "rotZ"}) {
-    const std::string name(word);
-    const std::string lower = "limit:" + name + ":physics:low";
-    const std::string upper = "limit:" + name + ":physics:high";
-    const double low = usd::number_or(stage, prim, lower.c_str(), -kInfinity);
-    const double high = usd::number_or(stage, prim, upper.c_str(), kInfinity);
+  if (type == "PhysicsSphericalJoint") {
+    // The axis tilts towards the two after it within a cone, and turns freely. Within the cone, but
+    // not all of it, lie two tilts that are each a square root of two smaller.
+    const std::string letters = "XYZ";
+    const std::size_t first = word == "Y" ? 1 : word == "Z" ? 2 : 0;
+    std::vector<FreeAxis> axes;
+    for (const std::size_t step : {1, 2, 0}) {
+      const std::string letter(1, letters[(first + step) % 3]);
+      FreeAxis axis{"rot" + letter, JointKind::Revolute, axis_named(letter)};
+      const double cone =
+          step == 0 ? -1.0
+                    : number(step == 1 ? "physics:coneAngle0Limit" : "physics:coneAngle1Limit", -1);
+      if (cone >= 0.0 && cone < 180.0) {
+        axis.lower = -std::sqrt(0.5) * cone;
+        axis.upper = -axis.lower;
+      }
+      axes.push_back(axis);
+    }
+    return axes;
+  }
+  std::vector<FreeAxis> axes;
+  if (type != "PhysicsJoint") return axes;
+  for (const char* name : {"transX", "transY", "transZ", "rotX", "rotY", "rotZ"}) {
+    const std::string limit = "limit:" + std::string(name) + ":physics:";
+    const double low = number(limit + "low", -kInfinity);
+    const double high = number(limit + "high", kInfinity);
     if (low > high || (low == 0.0 && high == 0.0)) continue;  // locked
-    const bool turns = name.starts_with("rot");
-    ++(turns ? found.turns : found.slides);
-    found.kind = turns ? JointKind::Revolute : JointKind::Prismatic;
-    found.axis = name.substr(name.size() - 1);
-    found.lower = lower;
-    found.upper = upper;
+    const bool turns = std::string_view(name).starts_with("rot");
+    axes.push_back({name, turns ? JointKind::Revolute : JointKind::Prismatic,
+                    axis_named(std::string(1, std::string_view(name).back())), low, high});
   }
-  if (found.turns + found.slides != 1) found.kind = JointKind::Fixed;
-  return found;
+  // The second of three turns is ambiguous beyond a quarter: it is that which turns least.
+  const auto turns = std::ranges::find(axes, JointKind::Revolute, &FreeAxis::kind);
+  const auto reach = [](const FreeAxis& axis) { return std::max(-axis.lower, axis.upper); };
+  if (axes.end() - turns == 3 && reach(turns[1]) > 90.0) {
+    const auto least = std::ranges::min_element(turns, axes.end(), {}, reach);
+    if (reach(*least) < reach(turns[1])) std::swap(turns[1], *least);
+  }
+  return axes;
 }
 
 }  // namespace
@@ -120,11 +140,25 @@ JointTranslator::Side JointTranslator::side(const Prim& prim, char number) {
   return result;
 }
 
-double JointTranslator::limit(const Prim& prim, const char* name, double fallback) {
-  const double number = usd::number_or(stage_, prim, name, fallback);
-  if (!std::isnan(number)) return number;
-  note_(prim, "is a joint with a limit that is no number; it has none there", {});
-  return fallback;
+Joint JointTranslator::joint_of(const Prim& prim, const FreeAxis& free, double meters_per_unit) {
+  Joint joint;
+  joint.kind = free.kind;
+  joint.axis = free.axis;
+  const auto limit = [&](double number, double fallback) {
+    if (!std::isnan(number)) return number;
+    note_(prim, "is a joint with a limit that is no number; it has none there", {});
+    return fallback;
+  };
+  const double unit = joint.kind == JointKind::Revolute ? kPi / 180.0 : meters_per_unit;
+  joint.lower = unit * limit(free.lower, -kInfinity);
+  joint.upper = unit * limit(free.upper, kInfinity);
+  // In units of no length they are no numbers.
+  if (!(joint.lower <= joint.upper)) {
+    note_(prim, "is a joint with limits that are no interval; it has none", {});
+    joint.lower = -kInfinity;
+    joint.upper = kInfinity;
+  }
+  return joint;
 }
 
 void JointTranslator::translate(const Prim& prim, NodeId node, double meters_per_unit) {
@@ -132,54 +166,34 @@ void JointTranslator::translate(const Prim& prim, NodeId node, double meters_per
   Side first = side(prim, '0');
   Side second = side(prim, '1');
   if (!first.is_known || !second.is_known) return;
-  Joint joint;
-  const Freedom freedom = freedom_of(stage_, prim);
-  joint.kind = freedom.kind;
-  joint.axis = axis_named(freedom.axis);
-  if (second.is_world) {
-    std::swap(first, second);
-    joint.axis = -joint.axis;
-  }
+  const bool is_reversed = second.is_world;
+  if (is_reversed) std::swap(first, second);
   if (first.body == second.body) {
     note_(prim, "is a joint of a body with itself, and holds nothing", {});
     return;
   }
-  if (freedom.slides + freedom.turns > 1) {
-    if (freedom.slides > 0) {
-      note_(prim,
-            "is a joint that lets its bodies slide along or beside several axes, and holds "
-            "nothing",
-            {});
-      return;
-    }
-    note_(prim,
-          "is a joint that turns about several axes, which it does not here: it holds its "
-          "bodies as they stand",
-          {});
-  }
   if (first.is_world) first.body = world_body();
-  if (joint.kind != JointKind::Fixed) {
-    const double unit = joint.kind == JointKind::Revolute ? kPi / 180.0 : meters_per_unit;
-    joint.lower = unit * limit(prim, freedom.lower.c_str(), -kInfinity);
-    joint.upper = unit * limit(prim, freedom.upper.c_str(), kInfinity);
-    // In units of no length they are no numbers.
-    if (!(joint.lower <= joint.upper)) {
-      note_(prim, "is a joint with limits that are no interval; it has none", {});
-      joint.lower = -kInfinity;
-      joint.upper = kInfinity;
-    }
+  std::vector<Joint> joints;
+  std::vector<std::string> names;
+  for (const FreeAxis& free : free_axes(stage_, prim)) {
+    joints.push_back(joint_of(prim, free, meters_per_unit));
+    names.push_back(free.name);
+    if (is_reversed) joints.back().axis = -joints.back().axis;
   }
-  joint.parent_body = first.body;
-  joint.child_body = second.body;
-  joint.parent_from_joint = scene_.world_from_node(first.body).inverse() * first.world_from_joint;
-  joint.child_from_joint = scene_.world_from_node(second.body).inverse() * second.world_from_joint;
-  const bool is_finite =
-      joint.parent_from_joint.matrix().allFinite() && joint.child_from_joint.matrix().allFinite();
-  if (!is_finite) {
-    note_(prim, "is a joint of a body without a size, and holds nothing", {});
+  if (joints.empty()) joints.emplace_back();
+  const Affine parent_from_joint =
+      scene_.world_from_node(first.body).inverse() * first.world_from_joint;
+  const Affine child_from_joint =
+      scene_.world_from_node(second.body).inverse() * second.world_from_joint;
+  const bool has_room =
+      joints.size() == 1 || scene_.world_from_node(node).inverse().matrix().allFinite();
+  if (!parent_from_joint.matrix().allFinite() || !child_from_joint.matrix().allFinite() ||
+      !has_room) {
+    note_(prim, "is a joint of a body or in a prim without a size, and holds nothing", {});
     return;
   }
-  scene_.edit(node).joint = joint;
+  loader_support::add_joint(scene_, node, std::move(joints), names, {first.body, parent_from_joint},
+                            {second.body, child_from_joint});
 }
 
 }  // namespace diorama::loader_usd

@@ -15,6 +15,14 @@ namespace diorama::loader_usd {
 bool is_joint(const std::string& type_name);
 bool is_foreign_joint(const std::string& type_name);
 
+/// One axis along or about which a joint is free, and where its limits are said.
+struct FreeAxis {
+  std::string name;  ///< "transX" ... "rotZ"; nothing where a joint has only this one.
+  JointKind kind = JointKind::Revolute;
+  Vec3 axis = Vec3::UnitX();
+  double lower = -kInfinity, upper = kInfinity;  ///< As the file says them, in its units.
+};
+
 /// Reads UsdPhysics joints into nodes that were made for them.
 class JointTranslator {
  public:
@@ -32,6 +40,7 @@ class JointTranslator {
         nodes_(nodes),
         note_(std::move(note)) {}
 
+  /// Joints of several axes become a chain of joints below the node, named after the axes.
   /// `meters_per_unit` of the layer that says the joint's limits. All bodies have their poses.
   void translate(const usd::Prim& prim, NodeId node, double meters_per_unit);
 
@@ -46,7 +55,7 @@ class JointTranslator {
   Side side(const usd::Prim& prim, char number);
   NodeId world_body();
   NodeId body_at_or_above(const usd::Prim& prim) const;
-  double limit(const usd::Prim& prim, const char* name, double fallback);
+  Joint joint_of(const usd::Prim& prim, const FreeAxis& free, double meters_per_unit);
 
   usd::Stage& stage_;
   Scene& scene_;

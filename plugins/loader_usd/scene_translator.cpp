@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "diorama/error.h"
+#include "diorama/joints.h"
 #include "loader_usd/conversion.h"
 #include "loader_usd/light_translator.h"
 #include "loader_usd/usd/extent.h"
@@ -460,6 +461,8 @@ void SceneTranslator::add_joints(NodeId root) {
     }
     translator.translate(*prim, node, unit);
   }
+  // Bodies need not stand where their joints are at 0.
+  for (const CompoundJoint& compound : compound_joints(scene_)) place_frames(scene_, compound);
 }
 
 // --- PointInstancer ---------------------------------------------------------------------------

@@ -11,6 +11,7 @@
 
 #include "bullet_backend.h"
 #include "convex_part.h"
+#include "diorama/joints.h"
 #include "shape_cache.h"
 
 namespace diorama {
@@ -51,7 +52,8 @@ struct HeldJoint {
   std::unique_ptr<btTypedConstraint> constraint;
   NodeId node;
   JointKind kind = JointKind::Fixed;
-  double scale = 1.0;  ///< World metres per metre of a slider.
+  double scale = 1.0;                     ///< World metres per metre of a slider.
+  std::optional<CompoundJoint> compound;  ///< `node` and `kind` are those of its last joint.
 };
 
 /// A joint that follows another one by a motor of its own: what hinders it does not hinder the

@@ -194,6 +194,9 @@ void BulletBackend::do_write_poses(Scene& scene) const {
     if (known.linear_velocity == velocity && known.angular_velocity == spin) continue;
     scene.set_velocity(moving.node, velocity, spin);
   }
+  for (const HeldJoint& held : world_->bodies.joints) {
+    if (held.compound) place_frames(scene, *held.compound);
+  }
 }
 
 PhysicsReport BulletBackend::report() const {

@@ -3,9 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <map>
 #include <optional>
 #include <set>
+#include <tuple>
+#include <utility>
 
 #include "diorama/error.h"
 #include "diorama/joints.h"
@@ -37,6 +40,12 @@ Rigid turned_to_axis(const Affine& world_from_joint, const Joint& joint) {
   return frame;
 }
 
+Rigid turned_to_axes(const Affine& world_from_joint, const Mat3& axes) {
+  Rigid frame = split_rigid(world_from_joint).rigid;
+  frame.linear() = frame.linear() * axes;
+  return frame;
+}
+
 btTransform frame_in(const MovingBody* body, const Rigid& world_from_joint) {
   const btTransform world = bullet_transform(world_from_joint);
   return body ? body->start.inverse() * world : world;
@@ -64,6 +73,35 @@ std::unique_ptr<btTypedConstraint> make_slider(const Joint& joint, double scale,
   slider->setUpperAngLimit(0.0);
   slider->setRestitutionLimLin(0.0);
   return slider;
+}
+
+/// Bullet takes the frames apart as turns about z, y, then x, as CompoundJoint does, and counts
+/// them the other way round.
+std::unique_ptr<btTypedConstraint> make_compound(const Scene& scene, const CompoundJoint& compound,
+                                                 double scale, btRigidBody& parent,
+                                                 btRigidBody& child, const btTransform& in_parent,
+                                                 const btTransform& in_child) {
+  auto made =
+      std::make_unique<btGeneric6DofSpring2Constraint>(parent, child, in_parent, in_child, RO_XYZ);
+  for (int axis = 0; axis < 6; ++axis) {
+    made->setLimit(axis, 0.0, 0.0);
+    made->setParam(BT_CONSTRAINT_STOP_ERP, 0.8, axis);
+  }
+  for (const NodeId id : compound.joints) {
+    const Joint& joint = *scene[id].joint;
+    int column = 0;
+    const Vec3 parts = compound.axes.transpose() * joint.axis;
+    parts.cwiseAbs().maxCoeff(&column);
+    const bool turns = joint.kind == JointKind::Revolute;
+    double lower = turns ? joint.lower : std::max(scale * joint.lower, -kFar);
+    double upper = turns ? joint.upper : std::min(scale * joint.upper, kFar);
+    if ((parts[column] < 0.0) != turns) std::tie(lower, upper) = std::pair(-upper, -lower);
+    // Bullet knows angles within one turn only.
+    const bool is_free = turns ? upper - lower >= 2.0 * kPi : upper - lower >= 2.0 * kFar;
+    if (is_free) std::tie(lower, upper) = std::pair(1.0, -1.0);
+    made->setLimit(turns ? 3 + column : column, lower, upper);
+  }
+  return made;
 }
 
 bool is_below(const Scene& scene, NodeId node, NodeId top) {
@@ -123,34 +161,70 @@ void take_limits_off(HeldJoint& held) {
   }
 }
 
+/// Where the leader of a joint is, with the turns that it has made: as many as the follower's own
+/// place tells.
+double leader_position(const Scene& scene, const Joint& follower, double now) {
+  constexpr int kMostTurns = 64;
+  const Joint::Mimic& mimic = *follower.mimic;
+  const Joint& leader = *scene[mimic.joint].joint;
+  const double position = joint_position(scene, mimic.joint);
+  if (leader.kind != JointKind::Revolute) return position;
+  const bool turns = follower.kind == JointKind::Revolute;
+  const auto plain = [&](double difference) {
+    return std::abs(turns ? std::remainder(difference, 2.0 * kPi) : difference);
+  };
+  const auto off = [&](double at) { return plain(mimic.multiplier * at + mimic.offset - now); };
+  double best = position;
+  // What a turn changes less than that is as good without it.
+  const double least_gain = std::max(0.25 * plain(mimic.multiplier * 2.0 * kPi), 1e-6);
+  for (int turn = 1; turn <= kMostTurns; ++turn) {
+    for (const int sign : {1, -1}) {
+      const double at = position + 2.0 * kPi * sign * turn;
+      // Followers themselves know no limits.
+      if (!leader.mimic && (at < leader.lower || at > leader.upper)) continue;
+      if (off(at) < off(best) - least_gain) best = at;
+    }
+  }
+  return best;
+}
+
 /// Those that lead nowhere but to each other are left out, and move freely within their limits.
 void add_followers(const Scene& scene, Bodies& bodies) {
   std::map<NodeId, std::size_t> held;
   std::vector<std::size_t> waiting;
   for (std::size_t i = 0; i < bodies.joints.size(); ++i) {
     const HeldJoint& joint = bodies.joints[i];
-    if (joint.kind == JointKind::Fixed) continue;
+    if (joint.kind == JointKind::Fixed || joint.compound) continue;
     held.emplace(joint.node, i);
     if (scene[joint.node].joint->mimic) waiting.push_back(i);
   }
-  std::set<NodeId> unknown;  // followers whose leaders were not dealt with as yet
-  for (const std::size_t i : waiting) unknown.insert(bodies.joints[i].node);
-  for (bool is_news = true; is_news;) {
-    is_news = false;
-    for (const std::size_t i : waiting) {
-      const NodeId node = bodies.joints[i].node;
-      const Joint::Mimic& mimic = *scene[node].joint->mimic;
-      if (!unknown.contains(node) || unknown.contains(mimic.joint)) continue;
-      if (!scene.contains(mimic.joint) || !scene[mimic.joint].joint) continue;
-      Follower follower{i, std::nullopt, mimic.multiplier, mimic.offset, 0.0};
-      const auto leader = held.find(mimic.joint);
-      if (leader != held.end()) follower.leader = leader->second;
-      follower.leader_position = joint_position(scene, mimic.joint);
-      bodies.followers.push_back(follower);
-      take_limits_off(bodies.joints[i]);
-      unknown.erase(node);
-      is_news = true;
+  // Leaders come first; those that only lead to each other never come.
+  std::map<NodeId, std::vector<std::size_t>> by_leader;
+  std::set<NodeId> followers;
+  for (const std::size_t i : waiting) followers.insert(bodies.joints[i].node);
+  std::deque<std::size_t> ready;
+  for (const std::size_t i : waiting) {
+    const NodeId leader = scene[bodies.joints[i].node].joint->mimic->joint;
+    if (!scene.contains(leader) || !scene[leader].joint) continue;
+    if (followers.contains(leader)) {
+      by_leader[leader].push_back(i);
+    } else {
+      ready.push_back(i);
     }
+  }
+  for (; !ready.empty(); ready.pop_front()) {
+    const std::size_t i = ready.front();
+    const NodeId node = bodies.joints[i].node;
+    const Joint::Mimic& mimic = *scene[node].joint->mimic;
+    Follower follower{i, std::nullopt, mimic.multiplier, mimic.offset, 0.0};
+    const auto leader = held.find(mimic.joint);
+    if (leader != held.end()) follower.leader = leader->second;
+    follower.leader_position =
+        leader_position(scene, *scene[node].joint, joint_position(scene, node));
+    bodies.followers.push_back(follower);
+    take_limits_off(bodies.joints[i]);
+    const auto led = by_leader.find(node);
+    if (led != by_leader.end()) ready.insert(ready.end(), led->second.begin(), led->second.end());
   }
 }
 
@@ -195,41 +269,62 @@ void add_joints(const Scene& scene, Bodies& bodies) {
   MovingBodies moving;
   for (std::size_t i = 0; i < bodies.moving.size(); ++i) moving[bodies.moving[i].node] = i;
   if (moving.empty()) return;
+  std::map<NodeId, CompoundJoint> compounds;  // by their last joint
+  std::set<NodeId> in_compound;
+  for (CompoundJoint& compound : compound_joints(scene)) {
+    in_compound.insert(compound.joints.begin(), compound.joints.end());
+    const NodeId last = compound.joints.back();
+    compounds.emplace(last, std::move(compound));
+  }
   for (const NodeId id : joints_of(scene)) {
-    const Joint& joint = *scene[id].joint;
-    const MovingBody* parent = body_above(scene, joint.parent_body, moving, bodies);
-    const MovingBody* child = body_above(scene, joint.child_body, moving, bodies);
+    const auto compound = compounds.find(id);
+    const bool is_compound = compound != compounds.end();
+    if (!is_compound && in_compound.contains(id)) continue;
+    const Joint& last = *scene[id].joint;
+    const Joint& first = is_compound ? *scene[compound->second.joints.front()].joint : last;
+    const MovingBody* parent = body_above(scene, first.parent_body, moving, bodies);
+    const MovingBody* child = body_above(scene, last.child_body, moving, bodies);
     if (parent == child) continue;
     check_joint(scene, id);
+    if (is_compound) {
+      for (const NodeId part : compound->second.joints) check_joint(scene, part);
+    }
     if (!bodies.anchor) {
       bodies.anchor = std::make_unique<btRigidBody>(
           btRigidBody::btRigidBodyConstructionInfo(0.0, nullptr, nullptr));
     }
-    const Affine world_from_joint =
-        scene.world_from_node(joint.parent_body) * joint.parent_from_joint;
-    const btTransform in_parent = frame_in(parent, turned_to_axis(world_from_joint, joint));
-    const btTransform in_child = frame_in(
-        child,
-        turned_to_axis(scene.world_from_node(joint.child_body) * joint.child_from_joint, joint));
+    const Affine world_from_parent_joint =
+        scene.world_from_node(first.parent_body) * first.parent_from_joint;
+    const Affine world_from_child_joint =
+        scene.world_from_node(last.child_body) * last.child_from_joint;
+    const auto turned = [&](const Affine& world_from_joint) {
+      return is_compound ? turned_to_axes(world_from_joint, compound->second.axes)
+                         : turned_to_axis(world_from_joint, last);
+    };
+    const btTransform in_parent = frame_in(parent, turned(world_from_parent_joint));
+    const btTransform in_child = frame_in(child, turned(world_from_child_joint));
     btRigidBody& parent_body = parent ? *parent->body : *bodies.anchor;
     btRigidBody& child_body = child ? *child->body : *bodies.anchor;
     HeldJoint held;
     held.path = scene.path(id);
     held.node = id;
-    held.kind = joint.kind;
-    if (joint.kind == JointKind::Revolute) {
-      held.constraint = make_hinge(joint, parent_body, child_body, in_parent, in_child);
-    } else if (joint.kind == JointKind::Prismatic) {
-      held.scale = (world_from_joint.linear() * joint.axis).norm();
-      held.constraint =
-          make_slider(joint, held.scale, parent_body, child_body, in_parent, in_child);
+    held.kind = last.kind;
+    held.scale = (world_from_parent_joint.linear() * last.axis).norm();
+    if (is_compound) {
+      held.compound = compound->second;
+      held.constraint = make_compound(scene, compound->second, held.scale, parent_body, child_body,
+                                      in_parent, in_child);
+    } else if (last.kind == JointKind::Revolute) {
+      held.constraint = make_hinge(last, parent_body, child_body, in_parent, in_child);
+    } else if (last.kind == JointKind::Prismatic) {
+      held.constraint = make_slider(last, held.scale, parent_body, child_body, in_parent, in_child);
     } else {
       held.constraint =
           std::make_unique<btFixedConstraint>(parent_body, child_body, in_parent, in_child);
     }
     bodies.joints.push_back(std::move(held));
     if (parent && child) continue;
-    const NodeId still = parent ? joint.child_body : joint.parent_body;
+    const NodeId still = parent ? last.child_body : first.parent_body;
     btRigidBody& body = parent ? parent_body : child_body;
     for (const StaticObject& fixed : bodies.statics) {
       if (is_below(scene, fixed.node, still))

@@ -290,6 +290,8 @@ TEST_CASE("Clips are the same bytes for any threads, visits in flight, shards an
     write_file(folder / "job.yaml", clip_job());
     for (const char* shard : {"2/2", "1/2"}) {
       CHECK(run({"run", "job.yaml", "--shard", shard}, folder.path()).exit_code == 0);
+      // Six frames each: a shard has whole clips.
+      CHECK(journal_entries(folder / "out") == (shard[0] == '2' ? 6 : 12));
     }
     CHECK(difference(expected, tree(folder / "out")) == "");
   }

@@ -139,4 +139,93 @@ TEST_CASE("loops of joints, missing bodies and numbers that are none leave thing
   CHECK(joints_of(arm.scene).size() == 1);
 }
 
+TEST_CASE("a joint of several axes is a chain whose frames share the motion", "[joints]") {
+  // In a parent that is turned and twice the size, with a node above the frames that is neither.
+  for (const bool is_left_handed : {false, true}) {
+    Scene scene;
+    const NodeId parent = scene.create(scene.root(), "parent");
+    const NodeId child = scene.create(scene.root(), "child");
+    scene.set_pose(parent, pose({0.3, -0.2, 0.1}, 0.7, {1, 2, 3}, 2.0));
+    const Affine world_from_joint =
+        scene.world_from_node(parent) * pose({0.1, 0.2, 0.3}, -0.4, {0, 1, 1});
+    scene.set_pose(child, world_from_joint * pose({0.5, 0, 0}, 0.3, {0, 0, 1}));
+    const NodeId hip = scene.create(scene.root(), "hip");
+    scene.set_pose(hip, pose({5, 5, 5}, 1.0, {1, 0, 0}));
+    const double sign = is_left_handed ? -1.0 : 1.0;
+    const std::vector<std::pair<JointKind, Vec3>> axes{{JointKind::Prismatic, Vec3::UnitY()},
+                                                       {JointKind::Prismatic, -Vec3::UnitX()},
+                                                       {JointKind::Revolute, Vec3::UnitZ()},
+                                                       {JointKind::Revolute, -Vec3::UnitX()},
+                                                       {JointKind::Revolute, sign * Vec3::UnitY()}};
+    std::vector<NodeId> joints;
+    for (const auto& [kind, axis] : axes) {
+      const NodeId id = scene.create(hip, "axis");
+      scene.set_pose(id, scene.world_from_node(hip).inverse() * world_from_joint);
+      Joint joint;
+      joint.kind = kind;
+      joint.axis = axis;
+      joint.parent_body = joints.empty() ? parent : joints.back();
+      joint.child_body = joints.size() + 1 < axes.size() ? id : child;
+      if (joints.empty()) {
+        joint.parent_from_joint = scene.world_from_node(parent).inverse() * world_from_joint;
+      }
+      if (joint.child_body == child) {
+        joint.child_from_joint = scene.world_from_node(child).inverse() * world_from_joint;
+      }
+      scene.edit(id).joint = joint;
+      joints.push_back(id);
+    }
+    // The middle turn goes beyond a quarter, which its limits say.
+    scene.edit(joints[3]).joint->lower = 1.8;
+    scene.edit(joints[3]).joint->upper = 2.5;
+    const auto compounds = compound_joints(scene);
+    REQUIRE(compounds.size() == 1);
+    CHECK(compounds.front().joints == joints);
+    const std::vector<double> wanted{0.2, -0.1, 0.6, 2.1, -0.8};
+    std::vector<JointTarget> targets;
+    for (std::size_t i = 0; i < joints.size(); ++i) targets.push_back({joints[i], wanted[i]});
+    pose_joints(scene, targets);
+    // A body that was carried there by something else: frames follow.
+    for (std::size_t i = 0; i + 1 < joints.size(); ++i) {
+      scene.set_pose(joints[i], pose({1, 2, 3}, 0.3, {1, 1, 0}));
+    }
+    place_frames(scene, compounds.front());
+    for (std::size_t i = 0; i < joints.size(); ++i) {
+      CAPTURE(i, is_left_handed);
+      CHECK(joint_position(scene, joints[i]) == Approx(wanted[i]).margin(1e-9));
+    }
+    // Its size is that of the parent.
+    CHECK(
+        (scene.world_from_node(joints[1]).translation() - world_from_joint.translation()).norm() ==
+        Approx(2.0 * std::hypot(0.2, 0.1)));
+  }
+}
+
+TEST_CASE("chains that bend at no right angle or end nowhere are no joint of several axes",
+          "[joints]") {
+  Scene scene;
+  const NodeId child = scene.create(scene.root(), "child");
+  const NodeId first = scene.create(scene.root(), "first");
+  const NodeId second = scene.create(scene.root(), "second");
+  Joint joint;
+  joint.kind = JointKind::Revolute;
+  joint.parent_body = scene.root();
+  joint.child_body = first;
+  scene.edit(first).joint = joint;
+  joint.parent_body = first;
+  joint.child_body = child;
+  joint.axis = Vec3(1, 1, 0).normalized();
+  scene.edit(second).joint = joint;
+  CHECK(compound_joints(scene).empty());
+  scene.edit(second).joint->axis = Vec3::UnitY();
+  CHECK(compound_joints(scene).size() == 1);
+  scene.edit(second).joint->parent_from_joint = pose({0, 0, 0.1}, 0.0, {0, 0, 1});
+  CHECK(compound_joints(scene).empty());
+  scene.edit(second).joint->parent_from_joint = Affine::Identity();
+  // Frames that lead to each other.
+  scene.edit(first).joint->parent_body = second;
+  scene.edit(second).joint->child_body = second;
+  CHECK(compound_joints(scene).empty());
+}
+
 }  // namespace diorama

@@ -47,11 +47,11 @@ inline constexpr std::uint64_t kLayout =
     layout_of<Vec2, Vec3, Vec3f, Quat, Mat4, Affine, Transform, Aabb, Rng, Image<Rgba8>, AnyImage,
               PixelBox, Mesh, Texture, TextureInput, Material, Light, Camera, Collider, RigidBody,
               NodeId, Joint, Animation, Node, Scene, LabelledInstance, CoverageMask, Visibility,
-              Velocity, Instance, JointState, JointTarget, Frame, ClipFrame, Capture, Place, Value,
-              Complaints, Range, ParamDoc, ParamSpec, ParamReader, ParamLister, Distribution,
-              TextDistribution, Component, Host, ImageView, Loader, PhysicsReport, PhysicsBackend,
-              RandomizeContext, Randomizer, RenderRequest, RenderReport, Renderer, Annotator,
-              DatasetInfo, DatasetFiles, CaptureFiles, Writer, Finding, ReadLog, StoredInfo,
-              StoredCapture, StoredDataset, Reader, Error>();
+              Velocity, Instance, JointState, JointTarget, CompoundJoint, Frame, ClipFrame, Capture,
+              Place, Value, Complaints, Range, ParamDoc, ParamSpec, ParamReader, ParamLister,
+              Distribution, TextDistribution, Component, Host, ImageView, Loader, PhysicsReport,
+              PhysicsBackend, RandomizeContext, Randomizer, RenderRequest, RenderReport, Renderer,
+              Annotator, DatasetInfo, DatasetFiles, CaptureFiles, Writer, Finding, ReadLog,
+              StoredInfo, StoredCapture, StoredDataset, Reader, Error>();
 
 }  // namespace diorama::abi

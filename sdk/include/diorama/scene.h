@@ -51,7 +51,7 @@ enum class JointKind : std::uint8_t { Fixed, Revolute, Prismatic };
 struct Joint {
   JointKind kind = JointKind::Fixed;
   NodeId parent_body;  ///< Any node; what has no RigidBody at or above it stands still.
-  NodeId child_body;
+  NodeId child_body;   ///< The joint's own node: a frame between two of CompoundJoint (joints.h).
   Affine parent_from_joint = Affine::Identity();
   Affine child_from_joint = Affine::Identity();
   Vec3 axis = Vec3::UnitX();  ///< In joint space, unit length.

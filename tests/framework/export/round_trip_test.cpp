@@ -4,7 +4,9 @@
 #include <fstream>
 #include <map>
 #include <string>
+#include <vector>
 
+#include "diorama/joints.h"
 #include "diorama/plugin.h"
 #include "framework/export/scene_export.h"
 #include "framework/host/host_services.h"
@@ -193,6 +195,93 @@ TEST_CASE("objects keep mass, collider and labels", "[export]") {
     CHECK(colliders == 1);
     export_scene(scene, root, shop.folder / "plain.usda", {.with_physics = false}, *shop.host);
     CHECK(slurp(shop.folder / "plain.usda").find("physics") == std::string::npos);
+  }
+}
+
+TEST_CASE("joints come back with their places, limits and positions", "[export]") {
+  for (const char* file : {"joints.usda", "joints.usdc"}) {
+    INFO(file);
+    Workshop shop;
+    Scene scene, loaded;
+    const NodeId root = scene.create(scene.root(), "thing");
+    scene.set_pose(root, Affine(Eigen::Translation3d(5, 6, 7)));
+    const auto body = [&](const char* name, const Vec3& place, double angle, double scale) {
+      const NodeId id = scene.create(root, name);
+      scene.set_pose(id,
+                     Transform{place, Quat(Eigen::AngleAxisd(angle, Vec3(1, -1, 2).normalized())),
+                               Vec3::Constant(scale)});
+      scene.edit(id).rigid_body = RigidBody{};
+      scene.edit(id).mesh = std::make_shared<const Mesh>(make_box(Vec3::Constant(0.1)));
+      scene.edit(id).collider = Collider{};
+      return id;
+    };
+    const NodeId base = body("base", {0, 0, 1}, 0.3, 2.0);
+    const NodeId door = body("door", {0.3, 0, 1}, -0.4, 1.0);
+    const NodeId drawer = body("drawer", {0, 0.4, 1}, 0.0, 0.5);
+    const NodeId leg = body("leg", {0, 0, 0.5}, 1.0, 1.0);
+    Affine place = Affine(Eigen::Translation3d(0.05, 0.02, -0.1));
+    place.linear() = Eigen::AngleAxisd(0.8, Vec3(1, 1, 0).normalized()).toRotationMatrix();
+    const auto joint = [&](NodeId above, const char* name, JointKind kind, const Vec3& axis,
+                           NodeId parent, NodeId child, double lower, double upper) {
+      const NodeId id = scene.create(above, name);
+      Joint made;
+      made.kind = kind;
+      made.axis = axis;
+      made.parent_body = parent;
+      made.child_body = child ? child : id;
+      if (parent == base) made.parent_from_joint = place;
+      made.lower = lower;
+      made.upper = upper;
+      scene.edit(id).joint = made;
+      return id;
+    };
+    const NodeId hinge = joint(root, "hinge", JointKind::Revolute, Vec3(1, 2, 2).normalized(), base,
+                               door, -0.5, 1.5);
+    const NodeId slide =
+        joint(root, "slide", JointKind::Prismatic, -Vec3::UnitY(), base, drawer, -0.1, 0.2);
+    joint(root, "weld", JointKind::Fixed, Vec3::UnitX(), door, drawer, -kInfinity, kInfinity);
+    const NodeId hip = scene.create(root, "hip");
+    const NodeId first =
+        joint(hip, "rotX", JointKind::Revolute, Vec3::UnitX(), base, NodeId{}, -0.3, 0.4);
+    const NodeId second =
+        joint(hip, "rotY", JointKind::Revolute, -Vec3::UnitZ(), first, leg, -0.6, kInfinity);
+    const double positions[] = {0.7, 0.15, 0.2, -0.25};
+    pose_joints(scene, std::vector<JointTarget>{{hinge, positions[0]},
+                                                {slide, positions[1]},
+                                                {first, positions[2]},
+                                                {second, positions[3]}});
+    const NodeId back = shop.there_and_back(scene, root, file, loaded);
+    CHECK(shop.warnings.empty());
+    CHECK(loaded.contains(back));
+    const auto found = [&](const char* name) {
+      const auto all = loaded.match(std::string("/**/") + name);
+      REQUIRE(all.size() == 1);
+      return all.front();
+    };
+    for (const NodeId body : {door, drawer, leg}) {
+      INFO(scene[body].name);
+      const Affine was = scene.world_from_node(base).inverse() * scene.world_from_node(body);
+      const Affine now = loaded.world_from_node(found("base")).inverse() *
+                         loaded.world_from_node(found(scene[body].name.c_str()));
+      CHECK(now.isApprox(was, 1e-9));
+    }
+    const auto check = [&](const char* name, NodeId was, double scale) {
+      INFO(name);
+      const NodeId now = found(name);
+      REQUIRE(loaded[now].joint);
+      const Joint& a = *scene[was].joint;
+      const Joint& b = *loaded[now].joint;
+      CHECK(b.kind == a.kind);
+      CHECK(b.lower == Approx(scale * a.lower));
+      CHECK(b.upper == Approx(scale * a.upper));
+      CHECK(joint_position(loaded, now) == Approx(scale * joint_position(scene, was)).margin(1e-5));
+    };
+    check("hinge", hinge, 1);
+    check("slide", slide, 2);  // In the metres of a body of twice the size.
+    CHECK(loaded[found("weld")].joint->kind == JointKind::Fixed);
+    REQUIRE(compound_joints(loaded).size() == 1);
+    check("hip/rotX", first, 1);
+    check("hip/rotY", second, 1);
   }
 }
 

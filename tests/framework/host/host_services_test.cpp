@@ -204,6 +204,26 @@ TEST_CASE("image files that cannot be read say so", "[host]") {
   CHECK(shop.host->thread_count() == 2);
 }
 
+TEST_CASE("A picture that is in use is decoded once, and is that of the file as it is now",
+          "[host]") {
+  Workshop shop;
+  const fs::path file = shop.folder / "picture.png";
+  const auto write = [&](std::uint8_t grey) {
+    const std::vector<std::uint8_t> pixels(6, grey);
+    const auto bytes = shop.host->encode_image({pixels.data(), 2, 1, 3, 8}, ImageFormat::Png);
+    std::ofstream(file, std::ios::binary)
+        .write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
+  };
+  write(10);
+  const auto first = shop.host->read_texture(file);
+  CHECK(shop.host->read_texture(file) == first);
+  write(200);
+  const auto second = shop.host->read_texture(file);
+  CHECK(second != first);
+  CHECK(second->bytes.front() == 200);
+  CHECK(first->bytes.front() == 10);
+}
+
 TEST_CASE("Copies of an asset have joints of their own, but for those that lead out of it",
           "[host]") {
   Scene from;

@@ -267,6 +267,33 @@ TEST_CASE("models with words that cannot be are one message", "[loader_urdf]") {
   refused(robot("<link" + many + "/>"), "more than 100 attributes");
 }
 
+TEST_CASE("floating and planar joints are chains of joints", "[loader_urdf]") {
+  const TemporaryFolder folder;
+  LoadedModel floating(folder.write("f.urdf", robot(kTwo + joint("floating", ""))));
+  CHECK(floating.log().empty());
+  const auto loose = compound_joints(floating.scene);
+  REQUIRE(loose.size() == 1);
+  CHECK(loose.front().joints.size() == 6);
+  LoadedModel planar(folder.write(
+      "p.urdf", robot(kTwo + joint("planar", "<origin xyz=\"1 0 0\"/><axis xyz=\"0 2 0\"/>"))));
+  CHECK(planar.log().empty());
+  const auto flat = compound_joints(planar.scene);
+  REQUIRE(flat.size() == 1);
+  REQUIRE(flat.front().joints.size() == 3);
+  const Scene& scene = planar.scene;
+  CHECK(scene.path(flat.front().joints[2]).ends_with("/joints/j/rotZ"));
+  CHECK(scene[flat.front().joints[2]].joint->axis.isApprox(Vec3::UnitY()));
+  pose_joints(planar.scene, std::vector<JointTarget>{{flat.front().joints[0], 0.3},
+                                                     {flat.front().joints[1], -0.4},
+                                                     {flat.front().joints[2], 1.1}});
+  const NodeId child = scene[flat.front().joints[2]].joint->child_body;
+  const NodeId parent = scene[flat.front().joints[0]].joint->parent_body;
+  const Affine moved = scene.world_from_node(parent).inverse() * scene.world_from_node(child);
+  CHECK(std::abs(moved.translation().y()) < 1e-12);
+  CHECK((moved.translation() - Vec3(1, 0, 0)).norm() == Approx(0.5));
+  CHECK(Eigen::AngleAxisd(moved.linear()).angle() == Approx(1.1));
+}
+
 TEST_CASE("numbers that cannot be are warnings, and what they are of is left out",
           "[loader_urdf]") {
   const TemporaryFolder folder;
@@ -278,10 +305,10 @@ TEST_CASE("numbers that cannot be are warnings, and what they are of is left out
       CHECK(model.scene[node].parent_from_node.matrix().allFinite());
     }
   };
-  warned(kTwo + joint("floating", ""), "joint 'j' is of a type that does not hold");
+  warned(kTwo + joint("planar", "<axis xyz=\"0 0 0\"/>"), "joint 'j' has no axis; it is x");
   warned(kTwo + joint("continuous", "<axis xyz=\"0 0 0\"/>"), "joint 'j' has no axis; it is x");
   warned(kTwo + joint("revolute", "<limit lower=\"2\" upper=\"1\" effort=\"1\" velocity=\"1\"/>"),
-         "limits that are no interval");
+         "limits the wrong way round");
   warned(kTwo + joint("fixed", "<mimic joint=\"nobody\"/>"), "mimics no joint of the model");
   warned("<link name=\"a\"><visual><geometry><box size=\"1 0 1\"/></geometry></visual></link>",
          "a shape without a size");

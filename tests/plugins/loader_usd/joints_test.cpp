@@ -175,11 +175,13 @@ TEST_CASE("joints of any freedom are what is left of it", "[loader_usd]") {
           bodies + limits("") +
           "}\n"
           "def PhysicsJoint \"hip\"\n{\n" +
-          bodies + limits("rotX rotY") +
-          "}\n"
+          bodies + limits("rotX rotY rotZ") +
+          "    float limit:rotX:physics:low = -10\n    float limit:rotX:physics:high = 20\n"
+          "    float limit:rotY:physics:low = -110\n    float limit:rotY:physics:high = 5\n"
+          "    float limit:rotZ:physics:low = -30\n    float limit:rotZ:physics:high = 30\n}\n"
           "def PhysicsSphericalJoint \"ball\"\n{\n" +
           bodies +
-          "}\n"
+          "    uniform token physics:axis = \"Y\"\n    float physics:coneAngle0Limit = 60\n}\n"
           "def PhysicsJoint \"loose\"\n{\n" +
           bodies + "}\n"));
   const Joint& turn = *loaded.node("turn").joint;
@@ -190,14 +192,102 @@ TEST_CASE("joints of any freedom are what is left of it", "[loader_usd]") {
   CHECK(loaded.node("slide").joint->kind == JointKind::Prismatic);
   CHECK(loaded.node("slide").joint->axis == Vec3::UnitZ());
   CHECK(loaded.node("slide").joint->upper == kInfinity);
-  for (const char* name : {"none", "hip", "ball"}) {
-    CHECK(loaded.node(name).joint->kind == JointKind::Fixed);
-  }
-  CHECK_FALSE(loaded.node("loose").joint);
-  const std::string all = warnings(loaded);
-  CHECK(all.find("</hip> is a joint that turns about several axes, which it does not here: it "
-                 "holds its bodies as they stand, like 1 more of them") != std::string::npos);
-  CHECK(all.find("</loose> is a joint that lets its bodies slide") != std::string::npos);
+  CHECK(loaded.node("none").joint->kind == JointKind::Fixed);
+  // Of several: a chain, from the parent to the child. What turns most is not in the middle.
+  const auto chain = [&](const std::string& name) {
+    std::string all;
+    CHECK_FALSE(loaded.node(name).joint);
+    for (const NodeId id : loaded.node(name).children) all += loaded.scene[id].name + " ";
+    return all;
+  };
+  CHECK(chain("hip") == "rotY rotX rotZ ");
+  CHECK(chain("ball") == "rotZ rotX rotY ");
+  CHECK(chain("loose") == "transX transY transZ rotX rotY rotZ ");
+  CHECK(compound_joints(loaded.scene).size() == 3);
+  const Joint& first = *loaded.node("hip/rotY").joint;
+  CHECK(loaded.scene.path(first.parent_body) == "/asset/A");
+  CHECK(loaded.scene.path(first.child_body) == "/asset/hip/rotY");
+  CHECK(first.lower == Approx(-110.0 * kPi / 180.0));
+  const Joint& last = *loaded.node("hip/rotZ").joint;
+  CHECK(loaded.scene.path(last.parent_body) == "/asset/hip/rotX");
+  CHECK(loaded.scene.path(last.child_body) == "/asset/B");
+  // Both tilts at their most are within the cone.
+  CHECK(loaded.node("ball/rotZ").joint->upper == Approx(std::sqrt(0.5) * kPi / 3.0));
+  CHECK(loaded.node("ball/rotX").joint->upper == kInfinity);
+  CHECK(loaded.node("ball/rotY").joint->upper == kInfinity);
+  CHECK(loaded.node("loose/transX").joint->upper == kInfinity);
+  CHECK(warnings(loaded).empty());
+}
+
+TEST_CASE("a joint of several axes in a prim without a size holds nothing", "[loader_usd]") {
+  const TemporaryFolder folder;
+  LoadedStage loaded(folder.write("a.usda", R"(#usda 1.0
+def Xform "A" ( prepend apiSchemas = ["PhysicsRigidBodyAPI"] )
+{
+}
+def Xform "B" ( prepend apiSchemas = ["PhysicsRigidBodyAPI"] )
+{
+}
+def Xform "flat"
+{
+    float3 xformOp:scale = (0, 1, 1)
+    uniform token[] xformOpOrder = ["xformOp:scale"]
+    def PhysicsJoint "hip"
+    {
+        rel physics:body0 = </A>
+        rel physics:body1 = </B>
+    }
+}
+)"));
+  CHECK(joints_of(loaded.scene).empty());
+  CHECK(warnings(loaded).find("in a prim without a size, and holds nothing") != std::string::npos);
+}
+
+TEST_CASE("bodies that stand turned at a joint of several axes begin so", "[loader_usd]") {
+  const TemporaryFolder folder;
+  LoadedStage loaded(folder.write("a.usda", R"(#usda 1.0
+(
+    metersPerUnit = 1
+    upAxis = "Z"
+)
+def Xform "A" ( prepend apiSchemas = ["PhysicsRigidBodyAPI"] )
+{
+    float3 xformOp:scale = (2, 2, 2)
+    uniform token[] xformOpOrder = ["xformOp:scale"]
+}
+def Xform "B" ( prepend apiSchemas = ["PhysicsRigidBodyAPI"] )
+{
+    double3 xformOp:translate = (0, 0, 0.5)
+    float3 xformOp:rotateXYZ = (10, 20, 30)
+    uniform token[] xformOpOrder = ["xformOp:translate", "xformOp:rotateXYZ"]
+}
+def PhysicsJoint "hip"
+{
+    rel physics:body0 = </A>
+    rel physics:body1 = </B>
+    float limit:transX:physics:low = 1
+    float limit:transX:physics:high = -1
+    float limit:transY:physics:low = 1
+    float limit:transY:physics:high = -1
+    float limit:rotZ:physics:low = -90
+    float limit:rotZ:physics:high = 90
+}
+)"));
+  const auto at = [&](const std::string& name) {
+    return joint_position(loaded.scene, loaded.scene.require("/asset/hip/" + name));
+  };
+  CHECK(at("transZ") == Approx(0.5));
+  // R = Rz(30) Ry(20) Rx(10) as turns about x, z, which alone has limits, and y in this order.
+  const Mat3 turned =
+      (Eigen::AngleAxisd(at("rotX"), Vec3::UnitX()) * Eigen::AngleAxisd(at("rotZ"), Vec3::UnitZ()) *
+       Eigen::AngleAxisd(at("rotY"), Vec3::UnitY()))
+          .toRotationMatrix();
+  const double degree = kPi / 180.0;
+  const Mat3 said = (Eigen::AngleAxisd(30 * degree, Vec3::UnitZ()) *
+                     Eigen::AngleAxisd(20 * degree, Vec3::UnitY()) *
+                     Eigen::AngleAxisd(10 * degree, Vec3::UnitX()))
+                        .toRotationMatrix();
+  CHECK(turned.isApprox(said, 1e-6));
 }
 
 TEST_CASE("foreign articulations are read and can be posed within their limits",
@@ -215,7 +305,7 @@ TEST_CASE("foreign articulations are read and can be posed within their limits",
   for (const auto& [file, count] :
        {Known{"examples/assets/cartpole.usda", 4}, Known{"examples/assets/boxes_fourbar.usda", 4},
         Known{"tests/assets/revolute_articulation.usda", 2}, Known{"examples/assets/ant.usda", 8},
-        Known{"examples/assets/humanoid.usda", 15}}) {
+        Known{"examples/assets/humanoid.usda", 23}}) {
     INFO(file);
     LoadedStage loaded((folder / file).string());
     const std::vector<NodeId> joints = joints_of(loaded.scene);

@@ -218,6 +218,152 @@ TEST_CASE("joints that mimic others follow them while things fall", "[physics_bu
   CHECK(world.backend.report().max_speed < 0.02);
 }
 
+TEST_CASE("what follows turns beyond one goes on when physics is set up anew", "[physics_bullet]") {
+  PhysicsWorld world;
+  const NodeId rail = world.scene.create(world.scene.root(), "rail");
+  const NodeId wheel =
+      world.add_primitive("wheel", PrimitiveShape::Box, Vec3(0.3, 0.3, 0.02), at(0, 0, 2));
+  const NodeId hand =
+      world.add_primitive("hand", PrimitiveShape::Box, Vec3(0.3, 0.02, 0.02), at(1, 0, 2));
+  const NodeId rack =
+      world.add_primitive("rack", PrimitiveShape::Box, Vec3(0.3, 0.02, 0.02), at(2, 0, 2));
+  for (const NodeId body : {wheel, hand, rack}) world.make_body(body, 0.5);
+  const NodeId turn = join(world, JointKind::Revolute, rail, wheel, at(0, 0, 2), Vec3::UnitZ());
+  const NodeId slow = join(world, JointKind::Revolute, rail, hand, at(1, 0, 2), Vec3::UnitZ());
+  const NodeId slide = join(world, JointKind::Prismatic, rail, rack, at(2, 0, 2), Vec3::UnitX());
+  world.scene.edit(slow).joint->mimic = Joint::Mimic{turn, 0.25, 0.0};
+  world.scene.edit(slide).joint->mimic = Joint::Mimic{turn, 0.05, 0.1};
+  pose_joints(world.scene, std::vector<JointTarget>{{turn, 0.0}});
+  world.scene.set_velocity(wheel, Vec3::Zero(), Vec3(0, 0, 12.0));
+  double turned = 0.0;
+  double before = 0.0;
+  for (int step = 0; step < 120; ++step) {
+    if (step % 15 == 0) world.backend.reset(world.scene);
+    world.backend.advance(world.scene, 1);
+    const double now = joint_position(world.scene, turn);
+    turned += std::remainder(now - before, 2.0 * kPi);
+    before = now;
+    CAPTURE(step, turned);
+    const double angle = joint_position(world.scene, slow) - 0.25 * turned;
+    CHECK(std::remainder(angle, 2.0 * kPi) == Approx(0.0).margin(0.05));
+    CHECK(joint_position(world.scene, slide) == Approx(0.05 * turned + 0.1).margin(0.01));
+  }
+  CHECK(turned > 3.0 * 2.0 * kPi);
+}
+
+TEST_CASE("joints of several axes hold all but these, within their limits", "[physics_bullet]") {
+  // Three turns with limits that no two of them share, thrown round: whatever way the axes are, the
+  // leg stays at the hip, within them, and reaches some.
+  const double degree = kPi / 180.0;
+  const std::vector<std::pair<double, double>> limits{{-20, 35}, {-50, 10}, {-70, 45}};
+  const auto hip_with = [&](PhysicsWorld& world, NodeId parent, NodeId child, int first_axis,
+                            bool is_left_handed, std::size_t count) {
+    const NodeId hip = world.scene.create(world.scene.root(), "hip");
+    Affine world_from_joint = tilted(0.2, -0.1, 2.0, 0.6, Vec3(1, 2, -1).normalized());
+    world.scene.set_pose(hip, at(3, 2, 1));
+    std::vector<NodeId> joints;
+    for (std::size_t i = 0; i < count; ++i) {
+      const NodeId id = world.scene.create(hip, "turn" + std::to_string(i));
+      world.scene.set_pose(id, world.scene.world_from_node(hip).inverse() * world_from_joint);
+      Joint joint;
+      joint.kind = JointKind::Revolute;
+      joint.axis = Vec3::Unit((first_axis + int(i)) % 3);
+      if (is_left_handed && i == 1) joint.axis = -joint.axis;
+      joint.lower = limits[i].first * degree;
+      joint.upper = limits[i].second * degree;
+      joint.parent_body = joints.empty() ? parent : joints.back();
+      joint.child_body = i + 1 < count ? id : child;
+      if (i == 0) {
+        joint.parent_from_joint = world.scene.world_from_node(parent).inverse() * world_from_joint;
+      }
+      if (i + 1 == count) {
+        joint.child_from_joint = world.scene.world_from_node(child).inverse() * world_from_joint;
+      }
+      world.scene.edit(id).joint = joint;
+      joints.push_back(id);
+    }
+    return joints;
+  };
+  for (const std::size_t count : {2, 3}) {
+    for (const int first_axis : {0, 1, 2}) {
+      for (const bool is_left_handed : {false, true}) {
+        PhysicsWorld world;
+        const NodeId hook = world.scene.create(world.scene.root(), "hook");
+        const NodeId leg = world.add_primitive("leg", PrimitiveShape::Box, Vec3(0.1, 0.1, 0.6),
+                                               at(0.2, -0.1, 1.7));
+        world.make_body(leg, 2.0);
+        const auto joints = hip_with(world, hook, leg, first_axis, is_left_handed, count);
+        REQUIRE(compound_joints(world.scene).size() == 1);
+        const Vec3 hold = world.scene.world_from_node(leg).inverse() * Vec3(0.2, -0.1, 2.0);
+        std::vector<double> reached(2 * count, 0.0);
+        for (int throw_of = 0; throw_of < 4; ++throw_of) {
+          const double angle = 1.6 * throw_of + 0.4 * first_axis;
+          world.scene.set_velocity(
+              leg, Vec3::Zero(),
+              9.0 * Vec3(std::cos(angle), std::sin(angle), throw_of % 2 ? 0.8 : -0.8));
+          world.backend.reset(world.scene);
+          for (int step = 0; step < 40; ++step) {
+            world.backend.advance(world.scene, 1);
+            CAPTURE(count, first_axis, is_left_handed, throw_of, step);
+            CHECK((world.scene.world_from_node(leg) * hold - Vec3(0.2, -0.1, 2.0)).norm() < 0.02);
+            for (std::size_t i = 0; i < count; ++i) {
+              const double now = joint_position(world.scene, joints[i]) / degree;
+              CHECK(now > limits[i].first - 6.0);
+              CHECK(now < limits[i].second + 6.0);
+              reached[2 * i] = std::min(reached[2 * i], now);
+              reached[2 * i + 1] = std::max(reached[2 * i + 1], now);
+            }
+          }
+        }
+        // They are the limits of these axes, not of others or turned round.
+        double stops = 0;
+        for (std::size_t i = 0; i < count; ++i) {
+          if (reached[2 * i] < limits[i].first + 3.0) ++stops;
+          if (reached[2 * i + 1] > limits[i].second - 3.0) ++stops;
+        }
+        CHECK(stops >= 2);
+      }
+    }
+  }
+}
+
+TEST_CASE("a thing on a planar joint slides and turns in its plane", "[physics_bullet]") {
+  PhysicsWorld world;
+  const NodeId base = world.scene.create(world.scene.root(), "base");
+  const double lean = 0.3;
+  const NodeId puck = world.add_primitive("puck", PrimitiveShape::Box, Vec3(0.2, 0.1, 0.05),
+                                          tilted(0, 0, 1, lean, Vec3::UnitX()));
+  world.make_body(puck);
+  const Affine plane = tilted(0, 0, 1, lean, Vec3::UnitX());
+  std::vector<NodeId> joints;
+  const std::vector<JointKind> kinds{JointKind::Prismatic, JointKind::Prismatic,
+                                     JointKind::Revolute};
+  for (int i = 0; i < 3; ++i) {
+    const NodeId id = world.scene.create(world.scene.root(), "joint");
+    world.scene.set_pose(id, plane);
+    Joint joint;
+    joint.kind = kinds[std::size_t(i)];
+    joint.axis = Vec3::Unit(i);
+    joint.parent_body = i == 0 ? base : joints.back();
+    joint.child_body = i == 2 ? puck : id;
+    if (i == 0) joint.parent_from_joint = plane;
+    if (i == 0) joint.lower = -0.1;
+    if (i == 0) joint.upper = 0.05;
+    world.scene.edit(id).joint = joint;
+    joints.push_back(id);
+  }
+  world.scene.set_velocity(puck, Vec3(2.0, 0, 0), plane.linear() * Vec3(0, 0, 3.0));
+  world.run(30);
+  const Affine plane_from_puck = plane.inverse() * world.scene.world_from_node(puck);
+  CHECK(std::abs(plane_from_puck.translation().z()) < 0.005);
+  CHECK(Vec3(plane_from_puck.linear().col(2)).isApprox(Vec3::UnitZ(), 0.01));
+  // Down the slope as far as it fell, along it to the limit, and turned on.
+  CHECK(joint_position(world.scene, joints[0]) == Approx(0.05).margin(0.005));
+  CHECK(joint_position(world.scene, joints[1]) ==
+        Approx(-0.5 * 9.81 * std::sin(lean) * 0.25).epsilon(0.06));
+  CHECK(joint_position(world.scene, joints[2]) == Approx(1.5).margin(0.15));
+}
+
 TEST_CASE("a joint that follows nothing keeps its limits", "[physics_bullet]") {
   PhysicsWorld world;
   const NodeId rail = world.scene.create(world.scene.root(), "rail");
