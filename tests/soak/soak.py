@@ -19,12 +19,22 @@ MARKS = (50, 100, 200, 500, 1000, 2000, 5000, 10000, 20000)  # captures of which
 STOPPED = 130  # the program's exit code when it was asked to stop
 CACHE_MIB = 2  # for assets: less than the rooms take, so that they come and go
 
-USUAL = ("null", "path_traced", "real_time")
-RENDERERS = {
-    "null": '{type: "null"}',
-    "path_traced": "{type: embree, samples: 1}",
-    "real_time": "{type: embree, mode: real_time, samples: 1}",
-    "vulkan": "{type: vulkan, samples: 1}",
+STILLS = """  - simulate: 4
+  - {capture: floating, count: 8}
+  - simulate: 4
+  - {capture: dropped, count: 8}"""
+CLIPS = """  - simulate: 4
+  - record: {name: floating, fps: 20, seconds: 0.4}
+  - simulate: 4
+  - record: {name: dropped, fps: 20, seconds: 0.4}"""
+USUAL = ("null", "path_traced", "real_time", "clips")
+# What a run is called, its renderer and timeline; some writers have work with clips alone.
+RUNS = {
+    "null": ('{type: "null"}', STILLS),
+    "path_traced": ("{type: embree, samples: 1}", STILLS),
+    "real_time": ("{type: embree, mode: real_time, samples: 1}", STILLS),
+    "vulkan": ("{type: vulkan, samples: 1}", STILLS),
+    "clips": ('{type: "null"}', CLIPS),
 }
 
 JOB = """
@@ -56,10 +66,7 @@ randomizers:
      targets: "/Assets/*", distance: [1.0, 2.0], polar_angle_deg: [10, 60]}
 renderer: %(renderer)s
 timeline:
-  - simulate: 4
-  - {capture: floating, count: 8}
-  - simulate: 4
-  - {capture: dropped, count: 8}
+%(timeline)s
 writers:
 %(writers)s
 output:
@@ -157,7 +164,7 @@ def main():
     parser.add_argument("--build", required=True, type=pathlib.Path)
     parser.add_argument("--captures", type=int, default=10000)
     parser.add_argument("--seconds", type=float, help="until a run is stopped and judged (default: no limit)")
-    parser.add_argument("--renderer", action="append", choices=sorted(RENDERERS))
+    parser.add_argument("--renderer", action="append", choices=sorted(RUNS))
     options = parser.parse_args()
     if options.captures < 2 * WARM_UP:
         sys.exit("soak: at least %d captures are needed" % (2 * WARM_UP))
@@ -168,7 +175,8 @@ def main():
     for name in options.renderer or USUAL:
         folder = pathlib.Path(tempfile.mkdtemp(prefix="diorama-soak-"))
         try:
-            job = JOB % {"captures": options.captures, "renderer": RENDERERS[name],
+            renderer, timeline = RUNS[name]
+            job = JOB % {"captures": options.captures, "renderer": renderer, "timeline": timeline,
                          "writers": writers}
             is_flat &= check(name, watch(program, job, folder, options.captures, options.seconds))
         finally:
