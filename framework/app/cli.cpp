@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "framework/app/cli.h"
 
-#include <unistd.h>
-
 #include <CLI/CLI.hpp>
 #include <charconv>
 #include <cstdint>
@@ -41,7 +39,6 @@
 #include "framework/app/standard_output.h"
 #include "framework/config/clean_text.h"
 #include "framework/host/console_log.h"
-#include "framework/host/terminal.h"
 #include "framework/jobs/assemble.h"
 #include "framework/output/workers.h"
 #include "framework/plugins/fatal_end.h"
@@ -849,8 +846,7 @@ int parse_and_run(CLI::App& app, CommandLine& line, int argc, const char* const*
     // Help and version are no errors, they go to stdout.
     std::ostringstream text;
     app.exit(error, text);
-    const bool is_terminal = isatty(STDOUT_FILENO) == 1;
-    std::cout << (is_terminal ? wrapped(text.str(), terminal_columns(STDOUT_FILENO)) : text.str());
+    print_text(text.str());
     return 0;
   }
   return run_command(line);

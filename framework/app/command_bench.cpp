@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "framework/app/standard_output.h"
 #include "framework/bench/cpu_time.h"
 #include "framework/bench/picture_error.h"
 #include "framework/bench/scene_rig.h"
@@ -271,7 +272,11 @@ int command_bench(const GlobalOptions& global, const BenchOptions& given, Consol
         services.host->encode_image({light.pixels().data(), light.width(), light.height(), 3, 32},
                                     ImageFormat::Exr));
   }
-  std::cout << (options.as_json ? result_json(options, result) : result_text(options, result));
+  if (options.as_json) {
+    std::cout << result_json(options, result);
+  } else {
+    print_text(result_text(options, result));
+  }
   return 0;
 }
 

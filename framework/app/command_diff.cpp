@@ -2,14 +2,13 @@
 #include "framework/app/command_diff.h"
 
 #include <algorithm>
-#include <iostream>
 #include <memory>
 #include <set>
 #include <utility>
 #include <vector>
 
 #include "diorama/error.h"
-#include "framework/config/clean_text.h"
+#include "framework/app/standard_output.h"
 #include "framework/datasets/dataset_difference.h"
 #include "framework/datasets/dataset_origin.h"
 #include "framework/datasets/dataset_readers.h"
@@ -67,7 +66,7 @@ std::vector<FoundDataset> datasets_in(const fs::path& folder, DatasetReaders& re
 /// Pages of runs are the same for all of their datasets.
 void print_once(const std::vector<std::string>& lines, std::set<std::string>& printed) {
   for (const std::string& line : lines) {
-    if (printed.insert(line).second) std::cout << printable(line) << "\n";
+    if (printed.insert(line).second) print_text(line + "\n");
   }
 }
 
@@ -90,11 +89,11 @@ int command_diff(const GlobalOptions& global, const DiffOptions& options, Consol
     print_once(difference.pages, printed);
     const std::string name = first.folder.filename().string();
     for (const std::string& line : difference.contents) {
-      std::cout << printable(name + ": " + line) << "\n";
+      print_text(name + ": " + line + "\n");
     }
     if (!difference.differing.empty()) {
-      std::cout << printable(name) << ": " << difference.differing.size() << " of "
-                << difference.captures << " captures differ\n";
+      print_text(name + ": " + std::to_string(difference.differing.size()) + " of " +
+                 std::to_string(difference.captures) + " captures differ\n");
     }
   }
   return is_same ? 0 : 1;

@@ -10,10 +10,11 @@
 #include <limits>
 #include <optional>
 #include <set>
+#include <sstream>
 
 #include "diorama/renderer.h"
 #include "framework/app/cli.h"
-#include "framework/config/clean_text.h"
+#include "framework/app/standard_output.h"
 #include "framework/host/machine_limits.h"
 #include "framework/jobs/assemble.h"
 
@@ -71,27 +72,30 @@ class Doctor {
 
  private:
   void problem(const std::string& text) {
-    std::cout << "  ! " << printable(text) << "\n";
+    print_text("  ! " + text + "\n");
     ++problems_;
   }
 
   void show_program() const {
-    std::cout << "program\n  version " << program_version() << "\n  file "
-              << printable(global_.program.string()) << "\n  plugin ABI " << DIORAMA_SDK_ABI
-              << "\n  ABI tag " << DIORAMA_ABI_TAG << "\n  layout digest " << abi::kLayout
-              << "\n  compiler g++ " << __VERSION__ << "\n";
+    std::ostringstream text;
+    text << "program\n  version " << program_version() << "\n  file " << global_.program.string()
+         << "\n  plugin ABI " << DIORAMA_SDK_ABI << "\n  ABI tag " << DIORAMA_ABI_TAG
+         << "\n  layout digest " << abi::kLayout << "\n  compiler g++ " << __VERSION__ << "\n";
+    print_text(text.str());
   }
 
   void show_machine() const {
-    std::cout << "machine\n  processor " << line_of("/proc/cpuinfo", "model name") << "\n  threads "
-              << ThreadPool::available_threads() << "\n  memory " << memory_text(total_memory())
-              << ", " << memory_text(available_memory()) << " of it available\n";
+    std::ostringstream text;
+    text << "machine\n  processor " << line_of("/proc/cpuinfo", "model name") << "\n  threads "
+         << ThreadPool::available_threads() << "\n  memory " << memory_text(total_memory()) << ", "
+         << memory_text(available_memory()) << " of it available\n";
 #if defined(__x86_64__)
-    std::cout << "  vector units sse2" << (__builtin_cpu_supports("sse4.2") ? " sse4.2" : "")
-              << (__builtin_cpu_supports("avx") ? " avx" : "")
-              << (__builtin_cpu_supports("avx2") ? " avx2" : "")
-              << (__builtin_cpu_supports("avx512f") ? " avx512f" : "") << "\n";
+    text << "  vector units sse2" << (__builtin_cpu_supports("sse4.2") ? " sse4.2" : "")
+         << (__builtin_cpu_supports("avx") ? " avx" : "")
+         << (__builtin_cpu_supports("avx2") ? " avx2" : "")
+         << (__builtin_cpu_supports("avx512f") ? " avx512f" : "") << "\n";
 #endif
+    print_text(text.str());
   }
 
   void show_plugins() {
@@ -99,8 +103,8 @@ class Doctor {
     for (const SearchLevel& level : registry_->levels()) {
       for (const fs::path& folder : level.folders) {
         std::error_code failed;
-        std::cout << "  " << printable(folder.string()) << " (" << level.name
-                  << (fs::is_directory(folder, failed) ? ")\n" : ", not there)\n");
+        print_text("  " + folder.string() + " (" + level.name +
+                   (fs::is_directory(folder, failed) ? ")\n" : ", not there)\n"));
       }
     }
     for (const RejectedPlugin& rejected : registry_->rejected()) problem(rejected.reason);
@@ -118,9 +122,7 @@ class Doctor {
     if (entry.file.empty() || !seen.insert(entry.file.string()).second) return;
     try {
       registry_->describe(entry.kind, entry.type);
-      std::cout << "  "
-                << printable(entry.plugin + " " + entry.version + ", " + entry.file.string())
-                << "\n";
+      print_text("  " + entry.plugin + " " + entry.version + ", " + entry.file.string() + "\n");
     } catch (const Error& error) {
       problem(error.what());
     }
@@ -151,10 +153,10 @@ class Doctor {
         const auto renderer =
             registry_->make<Renderer>(parameters, "renderer", known, complaints, *host);
         complaints.raise();
-        std::cout << "  " << printable(type + " starts" + said) << "\n";
+        print_text("  " + type + " starts" + said + "\n");
         ++started;
       } catch (const Error& error) {
-        std::cout << "  " << printable(type + " does not start: " + error.what()) << "\n";
+        print_text("  " + type + " does not start: " + error.what() + "\n");
       }
     }
     if (started == 0) problem("no renderer starts on this machine");
@@ -174,7 +176,7 @@ class Doctor {
       const std::optional<fs::path> root = choose_assets_root(
           global_.assets_root, std::getenv("DIORAMA_ASSETS_ROOT"), std::nullopt, samples);
       if (root) {
-        std::cout << "  root " << printable(root->string()) << "\n";
+        print_text("  root " + root->string() + "\n");
         return;
       }
       problem("no assets root: the sample pack is not at " + samples.string() +

@@ -4,6 +4,7 @@
 #include <iostream>
 #include <mutex>
 
+#include "framework/app/standard_output.h"
 #include "framework/config/clean_text.h"
 #include "framework/inspect/scene_report.h"
 #include "framework/jobs/assemble.h"
@@ -34,8 +35,11 @@ int command_inspect(const GlobalOptions& global, const InspectOptions& options, 
   SceneReport report = report_scene(scene, root, clean_name(options.asset));
   report.notes = std::move(notes);
   report.warnings.insert(report.warnings.begin(), warnings.begin(), warnings.end());
-  std::cout << (options.as_json ? report_json(report)
-                                : printable(report_text(report, options.depth)));
+  if (options.as_json) {
+    std::cout << report_json(report);
+  } else {
+    print_text(report_text(report, options.depth));
+  }
   return 0;
 }
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "framework/config/clean_text.h"
+#include "framework/app/standard_output.h"
 #include "framework/config/yaml_config.h"
 #include "framework/datasets/dataset_difference.h"
 #include "framework/jobs/assemble.h"
@@ -53,7 +53,7 @@ int print_lint(const std::vector<LintReport>& reports, bool as_json) {
   if (as_json) {
     std::cout << lint_json(reports);
   } else {
-    for (const LintReport& report : reports) std::cout << printable(lint_text(report));
+    for (const LintReport& report : reports) print_text(lint_text(report));
   }
   const bool is_clean = std::ranges::all_of(
       reports, [](const LintReport& report) { return report.findings.empty(); });

@@ -8,7 +8,7 @@
 
 #include "framework/app/cli.h"
 #include "framework/app/param_text.h"
-#include "framework/config/clean_text.h"
+#include "framework/app/standard_output.h"
 #include "framework/config/value_text.h"
 #include "framework/conformance/conformance.h"
 #include "framework/jobs/assemble.h"
@@ -100,7 +100,7 @@ void print_list(const Registry& registry) {
   for (const RejectedPlugin& rejected : registry.rejected()) {
     text << "  " << rejected.reason << "\n";
   }
-  std::cout << printable(text.str());
+  print_text(text.str());
 }
 
 /// The entries that "type" or "kind/type" means.
@@ -139,7 +139,7 @@ void print_description(const ComponentEntry& entry, const std::vector<ParamSpec>
     if (!row.range.empty()) text << ", " << row.range;
     text << "\n    " << row.help << "\n";
   }
-  std::cout << printable(text.str());
+  print_text(text.str());
 }
 
 std::ptrdiff_t count(const std::vector<CheckResult>& results, Outcome outcome) {
@@ -154,7 +154,7 @@ void print_checks(const std::vector<CheckResult>& results) {
   }
   text << results.size() << " checks, " << count(results, Outcome::Failed) << " failed, "
        << count(results, Outcome::Skipped) << " skipped\n";
-  std::cout << printable(text.str());
+  print_text(text.str());
 }
 
 void print_checks_json(const std::vector<CheckResult>& results) {

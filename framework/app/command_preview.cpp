@@ -6,6 +6,7 @@
 #include <system_error>
 
 #include "diorama/error.h"
+#include "framework/app/standard_output.h"
 #include "framework/config/clean_text.h"
 #include "framework/host/replace_file.h"
 #include "framework/jobs/job_file.h"
@@ -42,7 +43,7 @@ int command_preview(const GlobalOptions& global, const PreviewOptions& options, 
     replace_file(file, picture.png);
     std::cout << printable(file.string()) << "\n";
   }
-  std::cout << estimate_text(trial);
+  print_text(estimate_text(trial));
   return 0;
 }
 

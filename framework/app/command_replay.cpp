@@ -12,7 +12,7 @@
 #include "diorama/error.h"
 #include "diorama/rng.h"
 #include "framework/app/command_run.h"
-#include "framework/config/clean_text.h"
+#include "framework/app/standard_output.h"
 #include "framework/host/regular_file.h"
 #include "framework/host/scratch_folder.h"
 #include "framework/output/dataset_status.h"
@@ -123,7 +123,7 @@ int command_replay(const GlobalOptions& global, const ReplayOptions& options, Co
   const Comparison result =
       compare(records, read_status(file_system, records, false), options.dataset, status, captures);
   for (const std::string& difference : result.differences) {
-    std::cout << printable(difference) << "\n";
+    print_text(difference + "\n");
   }
   std::cout << captures.size() << " captures made again, " << result.files << " files compared, "
             << result.differences.size() << " differ\n";

@@ -15,7 +15,7 @@
 
 #include "framework/app/exit_codes.h"
 #include "framework/app/shell_text.h"
-#include "framework/config/clean_text.h"
+#include "framework/app/standard_output.h"
 #include "framework/config/job_overrides.h"
 #include "framework/datasets/dataset_difference.h"
 #include "framework/host/machine_limits.h"
@@ -147,8 +147,8 @@ void print_plan(const GlobalOptions& global, const Value& job, const Log& log) {
   const JobAssembly assembly =
       assemble_job(job, *services.registry, *services.host, services.assets_root, program_version(),
                    AssembleFor::Plan);
-  std::cout << printable(plan_text(assembly.plan, assembly.job, services.assets_root))
-            << memory_text(memory_of(assembly));
+  print_text(plan_text(assembly.plan, assembly.job, services.assets_root) +
+             memory_text(memory_of(assembly)));
 }
 
 /// The plan, then what a trial of it says. Both read the job; what they say about it is said once.
@@ -168,7 +168,7 @@ void print_estimate(const GlobalOptions& global, const Value& job, ConsoleLog& l
   trial.is_within_visit = true;
   trial.spread = 2;
   trial.max_samples = 2;
-  std::cout << estimate_text(run_trial(global, job, trial, once));
+  print_text(estimate_text(run_trial(global, job, trial, once)));
 }
 
 /// From now on blocks as large as pictures go back to the system when they are freed. By itself

@@ -5,6 +5,7 @@
 #include <iostream>
 
 #include "diorama/error.h"
+#include "framework/app/standard_output.h"
 #include "framework/datasets/dataset_origin.h"
 #include "framework/datasets/dataset_readers.h"
 #include "framework/datasets/dataset_stats.h"
@@ -20,7 +21,11 @@ int command_stats(const GlobalOptions& global, const StatsOptions& options, Cons
   DatasetStats stats = dataset_stats(*dataset, *services.host);
   stats.views = views_of_run(found.folder);
   if (options.html.empty()) {
-    std::cout << (options.as_json ? stats_json(stats) : stats_text(stats));
+    if (options.as_json) {
+      std::cout << stats_json(stats);
+    } else {
+      print_text(stats_text(stats));
+    }
     return 0;
   }
   std::ofstream page(options.html, std::ios::binary);

@@ -5,7 +5,7 @@
 
 #include "framework/app/command_run.h"
 #include "framework/app/exit_codes.h"
-#include "framework/config/clean_text.h"
+#include "framework/app/standard_output.h"
 #include "framework/output/dataset_status.h"
 
 namespace diorama {
@@ -13,8 +13,11 @@ namespace diorama {
 int command_status(const StatusOptions& options) {
   LocalFileSystem file_system;
   const DatasetStatus status = read_status(file_system, options.dataset, options.verify);
-  std::cout << (options.as_json ? status_json(status)
-                                : printable(status_text(status, options.dataset)));
+  if (options.as_json) {
+    std::cout << status_json(status);
+  } else {
+    print_text(status_text(status, options.dataset));
+  }
   return status.is_finished && status.faults.empty() ? 0 : kDatasetIncomplete;
 }
 
@@ -27,7 +30,7 @@ int command_finish(const GlobalOptions& global, const std::filesystem::path& dat
     return 0;
   }
   if (!status.missing.empty()) {
-    std::cout << printable(status_text(status, dataset));
+    print_text(status_text(status, dataset));
     return kDatasetIncomplete;
   }
   return finish_dataset(global, status, log);

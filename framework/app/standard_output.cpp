@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "framework/app/standard_output.h"
 
+#include <unistd.h>
+
 #include <cerrno>
 #include <cstdio>
 #include <iostream>
@@ -8,6 +10,8 @@
 #include <system_error>
 
 #include "diorama/error.h"
+#include "framework/config/clean_text.h"
+#include "framework/host/terminal.h"
 
 namespace diorama {
 
@@ -44,6 +48,12 @@ int StandardOutput::sync() {
 void StandardOutput::note_failure() {
   int none = 0;
   failure_.compare_exchange_strong(none, errno);
+}
+
+void print_text(std::string_view text) {
+  const std::string clean = printable(text);
+  const bool is_terminal = isatty(STDOUT_FILENO) == 1;
+  std::cout << (is_terminal ? wrapped(clean, terminal_columns(STDOUT_FILENO)) : clean);
 }
 
 }  // namespace diorama

@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <streambuf>
+#include <string_view>
 
 namespace diorama {
 
@@ -28,5 +29,10 @@ class StandardOutput final : private std::streambuf {
   std::streambuf* former_;
   std::atomic<int> failure_ = 0;  ///< errno of the first failure.
 };
+
+/// Text for people, to std::cout: nothing in it steers a terminal, and its lines fit the width of
+/// the terminal where there is one. What programs read, and commands to copy, go to std::cout as
+/// they are.
+void print_text(std::string_view text);
 
 }  // namespace diorama

@@ -11,15 +11,15 @@ namespace {
 constexpr int kUsualColumns = 80;
 constexpr int kLeastColumns = 20;
 
-/// Where the last column of a line begins.
-std::size_t column_start(std::string_view line) {
-  const std::size_t gap = line.rfind("  ");
+/// Where the last column of a line begins that begins in the first half of the width.
+std::size_t column_start(std::string_view line, std::size_t columns) {
+  const std::size_t gap = line.rfind("  ", columns / 2);
   const std::size_t start = gap == std::string_view::npos ? 0 : gap + 2;
   return std::min(line.find_first_not_of(' ', start), line.size());
 }
 
 void append_wrapped(std::string_view line, std::size_t columns, std::string& out) {
-  const std::size_t start = column_start(line);
+  const std::size_t start = column_start(line, columns);
   const std::size_t indent = start <= columns / 2 ? start : columns / 8;
   std::size_t margin = 0;
   while (margin + line.size() > columns) {
@@ -29,7 +29,8 @@ void append_wrapped(std::string_view line, std::size_t columns, std::string& out
     std::size_t cut = line.rfind(' ', room);
     if (cut == std::string_view::npos || cut <= first) cut = line.find(' ', std::max(room, first));
     if (cut == std::string_view::npos) break;
-    out += std::string(margin, ' ') + std::string(line.substr(0, cut)) + "\n";
+    const std::size_t end = line.find_last_not_of(' ', cut);
+    out += std::string(margin, ' ') + std::string(line.substr(0, end + 1)) + "\n";
     line.remove_prefix(std::min(line.find_first_not_of(' ', cut), line.size()));
     margin = indent;
   }

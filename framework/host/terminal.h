@@ -10,7 +10,7 @@ namespace diorama {
 int terminal_columns(int descriptor);
 
 /// Breaks lines longer than `columns` at spaces. What goes on begins where the last column of the
-/// line began (behind two or more spaces), as far as that leaves half of the width.
+/// line began (behind two or more spaces) that leaves half of the width.
 std::string wrapped(std::string_view text, int columns);
 
 }  // namespace diorama

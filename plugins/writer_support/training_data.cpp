@@ -14,33 +14,53 @@
 namespace diorama {
 namespace {
 
-/// Exactly the asked share, as far as whole captures allow; both sides get one at least.
-std::vector<bool> choose_validation(int count, double share, std::uint64_t seed) {
-  std::vector<bool> is_val(std::size_t(std::max(count, 0)), false);
-  if (share <= 0.0 || count < 2) return is_val;
-  const auto wanted = std::clamp(std::lround(share * count), 1L, long(count) - 1);
-  const Rng stream = Rng(seed).fork("training and validation");
-  std::vector<std::pair<std::uint64_t, std::size_t>> order;
-  for (std::size_t i = 0; i < is_val.size(); ++i) {
-    order.emplace_back(stream.fork(std::uint64_t(i)).bits(), i);
+/// The `wanted` units with the lowest draws, which are never all in memory: jobs may have hundreds
+/// of millions. Counts them by their first bits, then sorts only those among which the last one is.
+std::vector<bool> choose_units(int count, long wanted, const Rng& stream) {
+  constexpr int kBits = 16;
+  const auto draw = [&](int unit) { return stream.fork(std::uint64_t(unit)).bits(); };
+  std::vector<int> sizes(std::size_t(1) << kBits);
+  for (int unit = 0; unit < count; ++unit) ++sizes[draw(unit) >> (64 - kBits)];
+  std::uint64_t last = 0;
+  long rest = wanted;
+  while (sizes[last] < rest) rest -= sizes[last++];
+
+  std::vector<bool> is_chosen(std::size_t(count), false);
+  std::vector<std::pair<std::uint64_t, int>> order;
+  for (int unit = 0; unit < count; ++unit) {
+    const std::uint64_t bits = draw(unit);
+    const std::uint64_t first = bits >> (64 - kBits);
+    if (first < last) is_chosen[std::size_t(unit)] = true;
+    if (first == last) order.emplace_back(bits, unit);
   }
   std::ranges::sort(order);
-  for (long i = 0; i < wanted; ++i) is_val[order[std::size_t(i)].second] = true;
-  return is_val;
+  for (long i = 0; i < rest; ++i) is_chosen[std::size_t(order[std::size_t(i)].second)] = true;
+  return is_chosen;
+}
+
+/// Exactly the asked share, as far as whole captures allow; both sides get one at least.
+std::vector<bool> choose_validation(int count, double share, std::uint64_t seed) {
+  if (share <= 0.0 || count < 2) return std::vector<bool>(std::size_t(std::max(count, 0)), false);
+  const auto wanted = std::clamp(std::lround(share * count), 1L, long(count) - 1);
+  return choose_units(count, wanted, Rng(seed).fork("training and validation"));
 }
 
 /// Frames of a clip, which show nearly the same, stay together.
 std::vector<bool> choose_validation(const DatasetInfo& dataset, double share) {
-  std::vector<std::size_t> unit_of_capture;
+  const auto begins_unit = [&](int capture) {
+    const auto clip = clip_frame(dataset.clips, capture);
+    return !clip || clip->frame == 0;
+  };
   int units = 0;
-  for (int i = 0; i < dataset.capture_count; ++i) {
-    const auto clip = clip_frame(dataset.clips, i);
-    if (!clip || clip->frame == 0) ++units;
-    unit_of_capture.push_back(std::size_t(units - 1));
-  }
+  for (int i = 0; i < dataset.capture_count; ++i) units += begins_unit(i) ? 1 : 0;
   const std::vector<bool> is_val_unit = choose_validation(units, share, dataset.seed);
   std::vector<bool> is_val;
-  for (const std::size_t unit : unit_of_capture) is_val.push_back(is_val_unit[unit]);
+  is_val.reserve(std::size_t(std::max(dataset.capture_count, 0)));
+  int unit = -1;
+  for (int i = 0; i < dataset.capture_count; ++i) {
+    unit += begins_unit(i) ? 1 : 0;
+    is_val.push_back(is_val_unit[std::size_t(unit)]);
+  }
   return is_val;
 }
 
@@ -160,10 +180,7 @@ void TrainingData::add_dataset_page(const std::string& format, Json more,
   page["captures"] = dataset.capture_count;
   page["cameras"] = dataset.camera_names;
   page["classes"] = classes_;
-  Json split = Json::object();
-  for (const std::string& name : splits()) split[name] = Json::array();
-  for (int i = 0; i < capture_count(); ++i) split[this->split(i)].push_back(i);
-  page["split"] = std::move(split);
+  page["split"] = Json::object();
   if (!dataset.clips.empty()) page["clips"] = clips_json(dataset.clips);
   page["conventions"] = {
       {"units", "metres, radians"},
@@ -178,7 +195,34 @@ void TrainingData::add_dataset_page(const std::string& format, Json more,
   for (const auto& [name, version] : dataset.plugin_versions) page["plugins"][name] = version;
   page["assets"] = assets_json(dataset);
   page["job"] = dataset.resolved_job;
-  files.add_text("dataset.json", python_json(page, 2) + "\n");
+  add_page(python_json(page, 2) + "\n", files);
+}
+
+/// The lists of captures are the only part that grows with the dataset, so they are never in memory
+/// as a whole.
+void TrainingData::add_page(const std::string& page, DatasetFiles& files) const {
+  constexpr const char* kFile = "dataset.json";
+  constexpr std::size_t kPart = std::size_t(1) << 16;
+  // No text holds a line break, so this is nothing but the key.
+  const std::string key = "\n  \"split\": {";
+  const std::size_t lists = page.find(key) + key.size();
+  std::string text = page.substr(0, lists);
+  const char* before_name = "\n";
+  for (const std::string& name : splits()) {
+    text += before_name + std::string("    \"") + name + "\": [";
+    const char* before = "\n";
+    for (int i = 0; i < capture_count(); ++i) {
+      if (split(i) != name) continue;
+      text += before + std::string("      ") + std::to_string(i);
+      before = ",\n";
+      if (text.size() < kPart) continue;
+      files.append_text(kFile, text);
+      text.clear();
+    }
+    text += *before == ',' ? "\n    ]" : "]";
+    before_name = ",\n";
+  }
+  files.append_text(kFile, text + "\n  " + page.substr(lists));
 }
 
 }  // namespace diorama

@@ -78,6 +78,8 @@ class TrainingData {
  private:
   /// The place of an object's class in the list, or -1.
   int class_of(const Labels& labels) const;
+  /// Adds a page whose split is still empty, with the split.
+  void add_page(const std::string& page, DatasetFiles& files) const;
 
   TrainingParams params_;
   ClassChoice choice_;

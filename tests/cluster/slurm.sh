@@ -194,7 +194,7 @@ slurm_test_full_disk() {
   data=$work/small/dataset
   head -c 100M /dev/zero >"$work/small/filler" 2>/dev/null || true
   submit 1-2 2
-  wait_until 60 grep -q 'exit code 6: back into the queue' "$work/log/$scenario.1.out" ||
+  wait_until 60 grep -qs 'exit code 6: back into the queue' "$work/log/$scenario.1.out" ||
     fault "exit code 6 was not requeued: $(tail -n 2 "$work/log/$scenario.1.out")"
   rm "$work/small/filler"
   finish 120 COMPLETED

@@ -8,11 +8,13 @@ faulty file system, until a number of kills and faults is reached. What must hol
 - when all shards were started once more and ended, the dataset has the files of one undisturbed run, byte
   by byte.
 
-    tests/cluster/torture.py --kills 1000 --faults 5000 [--build FOLDER] [--seed N]
+    tests/cluster/torture.py --kills 1000 --faults 5000 [--build FOLDER] [--seed N] [--seconds N]
 
-Ends with a line of counts, and with 1 when something did not hold; then the folders of that round are kept.
+Says every half minute what was done so far; ends with a line of counts, and with 1 when something did not
+hold; then the folders of that round are kept. With --seconds no round begins after that time.
 """
 import argparse
+import collections
 import errno
 import filecmp
 import os
@@ -31,6 +33,7 @@ DELAYS_MS = [0, 0, 0, 2, 2, 2, 2, 120]  # of every file operation in a round
 ERRORS = [errno.ENOSPC, errno.EIO, errno.EDQUOT, errno.EACCES, errno.ESTALE, errno.EMFILE]
 RETRY_LATER = 75
 STOPPED = 130
+SAY_EVERY_S = 30
 
 
 class Round:
@@ -77,8 +80,7 @@ class Round:
     def run_with_kills(self, budget):
         """All shards, one of them twice in most rounds; some are killed in the middle. Returns the kills."""
         processes = [self.start(shard) for shard in range(1, SHARDS + 1)]
-        if self.rng.random() < 0.7:
-            processes.append(self.start(self.rng.randint(1, SHARDS)))
+        processes += self.double(0.7)
         # In most rounds a process is killed early; a slow disk makes the middle later.
         span = 0.6 + 0.05 * self.delay_ms
         kills = sorted((self.rng.uniform(0.02, span), process) for process in processes
@@ -93,6 +95,13 @@ class Round:
         self.wait(processes)
         return done
 
+    def double(self, chance):
+        """A shard that another process works on already, as a list of one or none."""
+        if self.rng.random() >= chance:
+            return []
+        self.torture.counts["doubled"] += 1
+        return [self.start(self.rng.randint(1, SHARDS))]
+
     def run_with_faults(self, budget):
         """All shards, each with one operation (or all from one on) that fails. Returns the faults."""
         processes = []
@@ -102,6 +111,7 @@ class Round:
                            "FAIL_ON": str(self.rng.randint(0, 1)),
                            "FAIL_MARK": str(self.folder / f"failed_{shard}")}
             processes.append(self.start(shard, environment if shard <= budget else None))
+        processes += self.double(0.3)
         self.wait(processes)
         return len(list(self.folder.glob("failed_*")))  # some ended before their operation came
 
@@ -145,9 +155,13 @@ class Torture:
         self.options = options
         self.program = options.build / "bin/diorama"
         self.work = pathlib.Path(tempfile.mkdtemp(prefix="diorama-torture."))
-        self.library = self.work / "unkind_files.so"
-        subprocess.run(["cc", "-shared", "-fPIC", "-O1", "-o", self.library, HERE / "unkind_files.c", "-ldl"],
-                       check=True)
+        self.library = options.library
+        if self.library is None:
+            self.library = self.work / "unkind_files.so"
+            subprocess.run(["cc", "-shared", "-fPIC", "-O1", "-o", self.library, HERE / "unkind_files.c",
+                            "-ldl"], check=True)
+        self.begin = time.monotonic()
+        self.counts = collections.Counter()
         self.reference = self.work / "reference"
         subprocess.run([self.program, "run", HERE / "job.yaml", "--output", self.reference, *self.smaller()],
                        check=True, capture_output=True)
@@ -157,26 +171,39 @@ class Torture:
         return ["--set", f"total_captures={self.options.captures}"]
 
     def run(self):
-        kills = injected = rounds = bad = 0
-        begin = time.monotonic()
-        while kills < self.options.kills or injected < self.options.faults:
-            rounds += 1
-            round_ = Round(self, rounds)
-            if kills < self.options.kills:
-                kills += round_.run_with_kills(self.options.kills - kills)
+        counts, options = self.counts, self.options
+        said = 0
+        while counts["kills"] < options.kills or counts["faults"] < options.faults:
+            elapsed = time.monotonic() - self.begin
+            if options.seconds and elapsed >= options.seconds:
+                break
+            if elapsed >= said + SAY_EVERY_S:
+                said = elapsed
+                print("so far: " + self.report(), flush=True)
+            counts["rounds"] += 1
+            round_ = Round(self, counts["rounds"])
+            counts[f"rounds at {round_.delay_ms} ms"] += 1
+            if counts["kills"] < options.kills:
+                counts["kills"] += round_.run_with_kills(options.kills - counts["kills"])
             else:
-                injected += round_.run_with_faults(self.options.faults - injected)
+                counts["faults"] += round_.run_with_faults(options.faults - counts["faults"])
             round_.finish()
             for fault in round_.faults:
-                print(f"round {rounds} ({round_.folder}): {fault}", flush=True)
-            bad += bool(round_.faults)
+                print(f"round {counts['rounds']} ({round_.folder}): {fault}", flush=True)
+            counts["bad"] += bool(round_.faults)
             if not round_.faults:
                 shutil.rmtree(round_.folder)
-        print(f"torture: {rounds} rounds of {SHARDS} shards, {kills} kills, {injected} faults, "
-              f"{len(self.expected)} files each, {bad} rounds with faults, {time.monotonic() - begin:.0f} s")
-        if not bad:
+        print("torture: " + self.report(), flush=True)
+        if not counts["bad"]:
             shutil.rmtree(self.work)
-        return 1 if bad else 0
+        return 1 if counts["bad"] else 0
+
+    def report(self):
+        counts = self.counts
+        delays = ", ".join(f"{counts[f'rounds at {delay} ms']} at {delay} ms" for delay in sorted({*DELAYS_MS}))
+        return (f"{counts['rounds']} rounds of {SHARDS} shards ({delays}; {counts['doubled']} with a shard twice), "
+                f"{counts['kills']} kills, {counts['faults']} faults, {len(self.expected)} files each, "
+                f"{counts['bad']} rounds with faults, {time.monotonic() - self.begin:.0f} s")
 
 
 def files_of(folder):
@@ -195,6 +222,8 @@ def main():
     parser.add_argument("--faults", type=int, default=0)
     parser.add_argument("--captures", type=int, default=16, help="of the job")
     parser.add_argument("--seed", default="1")
+    parser.add_argument("--seconds", type=float, help="until no further round begins (default: no limit)")
+    parser.add_argument("--library", type=pathlib.Path, help="unkind_files.c, compiled (default: cc does it)")
     parser.add_argument("--build", type=pathlib.Path, default=HERE.parent.parent / "build/release")
     return Torture(parser.parse_args()).run()
 

@@ -5,6 +5,7 @@ import argparse
 import os
 import pathlib
 import shutil
+import signal
 import statistics
 import subprocess
 import sys
@@ -14,14 +15,26 @@ import time
 WARM_UP = 50  # captures until all caches are full
 MOST_GROWTH = 0.05
 SECONDS_PER_CAPTURE = 30  # a run that is slower hangs
+MARKS = (50, 100, 200, 500, 1000, 2000, 5000, 10000, 20000)  # captures of which the memory is told
+STOPPED = 130  # the program's exit code when it was asked to stop
 CACHE_MIB = 2  # for assets: less than the rooms take, so that they come and go
 
-USUAL = ("null", "path_traced", "real_time")
-RENDERERS = {
-    "null": '{type: "null"}',
-    "path_traced": "{type: embree, samples: 1}",
-    "real_time": "{type: embree, mode: real_time, samples: 1}",
-    "vulkan": "{type: vulkan, samples: 1}",
+STILLS = """  - simulate: 4
+  - {capture: floating, count: 8}
+  - simulate: 4
+  - {capture: dropped, count: 8}"""
+CLIPS = """  - simulate: 4
+  - record: {name: floating, fps: 20, seconds: 0.4}
+  - simulate: 4
+  - record: {name: dropped, fps: 20, seconds: 0.4}"""
+USUAL = ("null", "path_traced", "real_time", "clips")
+# What a run is called, its renderer and timeline; some writers have work with clips alone.
+RUNS = {
+    "null": ('{type: "null"}', STILLS),
+    "path_traced": ("{type: embree, samples: 1}", STILLS),
+    "real_time": ("{type: embree, mode: real_time, samples: 1}", STILLS),
+    "vulkan": ("{type: vulkan, samples: 1}", STILLS),
+    "clips": ('{type: "null"}', CLIPS),
 }
 
 JOB = """
@@ -53,10 +66,7 @@ randomizers:
      targets: "/Assets/*", distance: [1.0, 2.0], polar_angle_deg: [10, 60]}
 renderer: %(renderer)s
 timeline:
-  - simulate: 4
-  - {capture: floating, count: 8}
-  - simulate: 4
-  - {capture: dropped, count: 8}
+%(timeline)s
 writers:
 %(writers)s
 output:
@@ -101,8 +111,8 @@ def rss_mib(process):
     return None
 
 
-def watch(program, job, folder, captures):
-    """Runs the job; returns (captures done, MiB) at intervals."""
+def watch(program, job, folder, captures, seconds):
+    """Runs the job, at most for some seconds when those are given; returns (captures done, MiB) at intervals."""
     file = folder / "job.yaml"
     file.write_text(job)
     log = (folder / "log").open("w")
@@ -110,34 +120,42 @@ def watch(program, job, folder, captures):
                                           "--output", str(folder / "out")],
                                stdout=log, stderr=log, cwd=folder)
     samples = []
-    deadline = time.monotonic() + SECONDS_PER_CAPTURE * captures
+    begin = time.monotonic()
+    allowed = {0}
     try:
-        while process.poll() is None and time.monotonic() < deadline:
+        while process.poll() is None and time.monotonic() < begin + SECONDS_PER_CAPTURE * captures:
             done = captures_in(folder / "out" / "basicwriter")
             memory = rss_mib(process)
             if memory is not None:
                 samples.append((done, memory))
+            if seconds and allowed == {0} and time.monotonic() > begin + seconds:
+                process.send_signal(signal.SIGTERM)
+                allowed = {0, STOPPED}
             time.sleep(max(0.1, captures / 20000))
     finally:
         process.kill()
         process.wait()
-    if process.returncode != 0:
+    if process.returncode not in allowed:
         sys.exit("soak: exit code %d\n%s" % (process.returncode, (folder / "log").read_text()[-3000:]))
     return samples
 
 
-def check(name, samples, captures):
+def check(name, samples):
     """Memory towards the end against memory after the warm-up; both are medians of many samples."""
+    captures = samples[-1][0] if samples else 0
     rest = captures - WARM_UP
     begin = [m for done, m in samples if WARM_UP <= done < WARM_UP + rest / 4]
     end = [m for done, m in samples if done >= captures - rest / 4]
     if len(begin) < 3 or len(end) < 3:
-        sys.exit("soak: %s: too few samples to judge (%d and %d); ask for more captures"
-                 % (name, len(begin), len(end)))
+        sys.exit("soak: %s: too few samples to judge (%d and %d of %d captures); ask for more captures"
+                 % (name, len(begin), len(end), captures))
     growth = statistics.median(end) / statistics.median(begin) - 1
     print("%-11s %6d captures: %7.1f MiB after the warm-up, %7.1f MiB at the end (%+.1f %%), most %.1f"
           % (name, captures, statistics.median(begin), statistics.median(end), 100 * growth,
              max(m for _, m in samples)), flush=True)
+    marks = [mark for mark in MARKS if mark < captures] + [captures]
+    print("%-11s MiB at: %s" % ("", ", ".join(
+        "%d: %.0f" % (mark, next(m for done, m in samples if done >= mark)) for mark in marks)), flush=True)
     return growth <= MOST_GROWTH
 
 
@@ -145,7 +163,8 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--build", required=True, type=pathlib.Path)
     parser.add_argument("--captures", type=int, default=10000)
-    parser.add_argument("--renderer", action="append", choices=sorted(RENDERERS))
+    parser.add_argument("--seconds", type=float, help="until a run is stopped and judged (default: no limit)")
+    parser.add_argument("--renderer", action="append", choices=sorted(RUNS))
     options = parser.parse_args()
     if options.captures < 2 * WARM_UP:
         sys.exit("soak: at least %d captures are needed" % (2 * WARM_UP))
@@ -156,9 +175,10 @@ def main():
     for name in options.renderer or USUAL:
         folder = pathlib.Path(tempfile.mkdtemp(prefix="diorama-soak-"))
         try:
-            job = JOB % {"captures": options.captures, "renderer": RENDERERS[name],
+            renderer, timeline = RUNS[name]
+            job = JOB % {"captures": options.captures, "renderer": renderer, "timeline": timeline,
                          "writers": writers}
-            is_flat &= check(name, watch(program, job, folder, options.captures), options.captures)
+            is_flat &= check(name, watch(program, job, folder, options.captures, options.seconds))
         finally:
             shutil.rmtree(folder)
     if not is_flat:

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <set>
+#include <sstream>
 #include <string>
 
 #include "diorama/abi.h"
@@ -8,6 +10,7 @@
 #include "support/catch.h"
 
 using namespace diorama;
+using test::run_in_terminal;
 using test::run_program;
 using test::WorkFolder;
 
@@ -47,6 +50,26 @@ TEST_CASE("help and version go to standard output and are no errors", "[cli]") {
   CHECK(version.code == 0);
   CHECK(version.out.starts_with("diorama "));
   CHECK(has(version.out, "(plugin ABI "));
+}
+
+TEST_CASE("lists and descriptions fit narrow terminals", "[cli]") {
+  constexpr std::size_t kColumns = 50;
+  for (const char* command : {"plugins", "plugins describe CocoWriter", "doctor", "run --help"}) {
+    const std::string shown = run_in_terminal(command, int(kColumns));
+    INFO(command << "\n" << shown);
+    CHECK(std::ranges::count(shown, '\n') > 20);
+    std::istringstream lines(shown);
+    for (std::string line; std::getline(lines, line);) {
+      while (line.ends_with('\r')) line.pop_back();
+      // A path has no place to break at.
+      const std::size_t word = line.find_first_not_of(' ');
+      const bool may_break = word != std::string::npos && line.find(' ', word) != std::string::npos;
+      if (may_break && !has(line, "/")) CHECK(line.size() <= kColumns);
+    }
+  }
+  // Elsewhere lines stay whole, for grep.
+  CHECK(has(run_program("plugins").out,
+            "  empty                    Empty space, as an environment.  [diorama "));
 }
 
 TEST_CASE("mistakes on the command line end with code 2", "[cli]") {

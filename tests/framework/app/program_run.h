@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <pty.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -56,6 +57,27 @@ inline ProgramRun run_shell(const std::string& command) {
 
 inline ProgramRun run_program(const std::string& arguments) {
   return run_shell(DIORAMA_PROGRAM " " + arguments);
+}
+
+/// What the program prints on a terminal that is so wide; lines end as terminals end them.
+inline std::string run_in_terminal(const std::string& arguments, int columns) {
+  winsize size{};
+  size.ws_row = 50;
+  size.ws_col = static_cast<unsigned short>(columns);
+  int ours = -1;
+  const pid_t child = forkpty(&ours, nullptr, nullptr, &size);
+  if (child == 0) {
+    execl("/bin/sh", "sh", "-c", (DIORAMA_PROGRAM " " + arguments).c_str(), nullptr);
+    _exit(127);
+  }
+  std::string text;
+  char part[4096];
+  for (ssize_t count = 0; (count = read(ours, part, sizeof part)) > 0;)
+    text.append(part, std::size_t(count));
+  close(ours);
+  int status = 0;
+  waitpid(child, &status, 0);
+  return text;
 }
 
 }  // namespace diorama::test

@@ -37,6 +37,9 @@ TEST_CASE("long lines of help go on in their column", "[host]") {
         "of it\n");
   CHECK(wrapped(text, 30) ==
         "Options:\n  --seed N          Start of\n   all random streams, instead\n   of it\n");
+  // A last column on the right is text like the rest.
+  CHECK(wrapped("  empty    Empty space, as an environment.  [diorama 0.1.0]\n", 40) ==
+        "  empty    Empty space, as an\n           environment.  [diorama 0.1.0]\n");
   CHECK(wrapped("averylongwordthatnothingbreaks\n", 20) == "averylongwordthatnothingbreaks\n");
   CHECK(wrapped("", 20).empty());
 }
