@@ -330,7 +330,7 @@ void ViewSearch::end_at_limit(Group& group) {
     text += "; no randomizer places the camera at this capture, so it cannot be drawn anew";
   }
   if (!group.stops) {
-    setting_.host.log(LogLevel::Warning, text);
+    if (!setting_.is_passed) setting_.host.log(LogLevel::Warning, text);
     return;
   }
   throw Error(ErrorKind::Config,
@@ -384,6 +384,10 @@ ViewVerdict ViewSearch::by_light(const Group& group) {
     }
   }
   return verdict;
+}
+
+bool ViewSearch::needs_pictures() const {
+  return std::ranges::any_of(rules_, [](const ViewRule* rule) { return rule->brightness.is_set(); });
 }
 
 std::vector<std::size_t> ViewSearch::refuse_pictures(const std::vector<Frame>& frames) {

@@ -59,6 +59,7 @@ class ViewSearch {
     const std::vector<NodeId>& cameras;  ///< All of the visit, in job order.
     const std::map<NodeId, NodeId>& small_cameras;
     PlannedCapture capture;
+    bool is_passed = false;   ///< It is not made now: whoever made it has logged what it lacks.
     bool can_redraw = false;  ///< Some randomizer places cameras at this moment.
     /// Lets these randomizers draw once more, from the stream of that number.
     std::function<void(int number)> redraw;
@@ -70,6 +71,8 @@ class ViewSearch {
   /// Leaves the cameras at views that hold, or that came nearest. Throws Error(Config) at a limit
   /// at which the job is to stop, and what the renderer throws.
   void run();
+  /// Some view is known only once refuse_pictures() has judged it.
+  bool needs_pictures() const;
   /// Judges the finished pictures of the cameras, which is what takes light. Frames whose view has
   /// to be drawn anew by run() are named by their index.
   std::vector<std::size_t> refuse_pictures(const std::vector<Frame>& frames);
