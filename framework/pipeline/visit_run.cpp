@@ -521,8 +521,14 @@ ViewSearch VisitRun::view_search(const PlannedCapture& planned, bool is_passed) 
 }
 
 void VisitRun::choose_views(ViewSearch& search) {
-  const Stopwatch watch(result_.seconds["choosing views"]);
-  search.run();
+  const double before = search.refused_s();
+  {
+    const Stopwatch watch(result_.seconds["choosing views"]);
+    search.run();
+  }
+  const double refused = search.refused_s() - before;
+  result_.seconds["choosing views"] -= refused;
+  result_.seconds["refusing views"] += refused;
 }
 
 void VisitRun::note_blocked_cameras() {
@@ -532,6 +538,8 @@ void VisitRun::note_blocked_cameras() {
 /// The pictures of all cameras, from views as the job wants them.
 std::vector<Frame> VisitRun::take_frames(const PlannedCapture& planned, ViewSearch& search) {
   std::vector<Frame> frames;
+  // What moved since the last picture is no cost of choosing.
+  if (search.judges_views()) prepare_renderer();
   choose_views(search);
   prepare_renderer();
   for (std::size_t i = 0; i < cameras_.size(); ++i) {

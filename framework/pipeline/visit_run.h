@@ -119,7 +119,7 @@ class VisitRun {
   double last_step_s_ = 0.0;    ///< Length of that step; 0: none was taken.
   ClipTrack track_;             ///< Of the clip that is being taken.
   NodeId overview_;             ///< Null unless this visit makes an overview picture.
-  std::map<NodeId, NodeId> small_cameras_;  ///< For the brightness of views; by camera.
+  SmallCameras small_cameras_;
   /// Randomizers that placed cameras at the last moment.
   std::vector<std::size_t> camera_randomizers_;
   int next_capture_ = 0;  ///< Of the visit's.
