@@ -59,22 +59,17 @@ std::vector<Triangle> triangles_of(const Scene& scene, NodeId object) {
   return triangles;
 }
 
-/// Chords from points that are spread evenly over the surface.
-std::vector<Chord> chords_of(const Scene& scene, NodeId object) {
-  constexpr int kPoints = 96;
-  constexpr double kSkin = 1e-5;  // metres; off the triangle that the chord starts from
-  const std::vector<Triangle> triangles = triangles_of(scene, object);
+/// Calls body(point, normal) for points that are spread evenly over the surface.
+template <class Body>
+void spread_over(const std::vector<Triangle>& triangles, int points, Body&& body) {
   double area = 0.0;
   for (const Triangle& triangle : triangles) area += triangle.normal.norm();
-  if (area <= 0.0) return {};
-  const Obstacles own(scene, std::span(&object, 1), Obstacles::Hidden::LeaveOut);
-  const double reach = 2.0 * scene.world_bounds(object).size().norm();
-  std::vector<Chord> chords;
+  if (area <= 0.0) return;
   double passed = 0.0;
   int point = 0;
   for (const Triangle& triangle : triangles) {
     passed += triangle.normal.norm();
-    for (; point < kPoints && area * (point + 0.5) < passed * kPoints; ++point) {
+    for (; point < points && area * (point + 0.5) < passed * points; ++point) {
       double u = std::fmod(0.5 + 0.7548776662466927 * point, 1.0);
       double v = std::fmod(0.5 + 0.5698402909980532 * point, 1.0);
       if (u + v > 1.0) {
@@ -82,16 +77,49 @@ std::vector<Chord> chords_of(const Scene& scene, NodeId object) {
         v = 1.0 - v;
       }
       const auto& [a, b, c] = triangle.corner;
-      Chord chord;
-      chord.direction = -triangle.normal.normalized();
-      chord.start = a + u * (b - a) + v * (c - a) + kSkin * chord.direction;
-      const auto exit = own.first_hit(chord.start, chord.start + reach * chord.direction);
-      if (!exit || !exit->is_leaving) continue;
-      chord.length = exit->t * reach;
-      chords.push_back(chord);
+      body(Vec3(a + u * (b - a) + v * (c - a)), Vec3(triangle.normal.normalized()));
     }
   }
+}
+
+std::vector<Chord> chords_of(const Scene& scene, NodeId object) {
+  constexpr int kPoints = 96;
+  constexpr double kSkin = 1e-5;  // metres; off the triangle that the chord starts from
+  const Obstacles own(scene, std::span(&object, 1), Obstacles::Hidden::LeaveOut);
+  const double reach = 2.0 * scene.world_bounds(object).size().norm();
+  std::vector<Chord> chords;
+  spread_over(triangles_of(scene, object), kPoints, [&](const Vec3& point, const Vec3& normal) {
+    const Vec3 start = point - kSkin * normal;
+    const auto exit = own.first_hit(start, start - reach * normal);
+    if (exit && exit->is_leaving) chords.push_back({start, -normal, exit->t * reach});
+  });
   return chords;
+}
+
+/// What some of the object's surface is deep inside of, little as it may be: the rim of a can in a
+/// table top. Null: nothing.
+NodeId sunk_in(const Scene& scene, NodeId object, const Obstacles& all, double depth_m) {
+  constexpr int kPoints = 8192;
+  constexpr int kWitnesses = 2;
+  std::vector<Aabb> cores;
+  for (const NodeId other : all.near_node(scene, object, 0.0, object)) {
+    Aabb core = scene.world_bounds(other);
+    core.min.array() += depth_m;
+    core.max.array() -= depth_m;
+    if (!core.is_empty()) cores.push_back(core);
+  }
+  if (cores.empty()) return {};
+  std::map<NodeId, int> deep;
+  NodeId found;
+  spread_over(triangles_of(scene, object), kPoints, [&](const Vec3& point, const Vec3&) {
+    const bool is_possible = !found && std::ranges::any_of(cores, [&](const Aabb& core) {
+      return (point.array() > core.min.array()).all() && (point.array() < core.max.array()).all();
+    });
+    if (!is_possible || all.is_near(point, depth_m, object)) return;
+    const NodeId encloser = all.encloser(point, object);
+    if (encloser && ++deep[encloser] >= kWitnesses) found = encloser;
+  });
+  return found;
 }
 
 /// What crosses the object deep inside, or holds its middle; null: nothing.
@@ -112,7 +140,7 @@ NodeId stuck_in(const Scene& scene, NodeId object, const Obstacles& all,
                                    chord.start + (chord.length - skin) * chord.direction, object);
     if (hit && ++crossed[hit->owner] >= kWitnesses) return hit->owner;
   }
-  return {};
+  return sunk_in(scene, object, all, limits.depth_m);
 }
 
 /// What could hold the object up, of `near`: what lies below it somewhere, within reach. What it

@@ -88,6 +88,17 @@ TEST_CASE("What has sunk in by more than a centimetre is stuck", "[settle]") {
   CHECK(stage.unsettled() == Texts{"sunk: is stuck in /Environment/table"});
 }
 
+TEST_CASE("A wide thing that is sunk in with one corner alone is stuck", "[settle]") {
+  Stage stage;
+  const Mesh board = make_box(Vec3(0.8, 0.8, 0.03));
+  const auto tilted = Eigen::Quaterniond(Eigen::AngleAxisd(0.2, Vec3(1, -1, 0).normalized()));
+  const double low = 0.4 * std::sqrt(2.0) * std::sin(0.2) + 0.015 * std::cos(0.2);
+  stage.add_object("stands", board, at(0, 0, 0.7 + low - 0.002) * tilted);
+  CHECK(stage.unsettled() == Texts{});
+  stage.scene.set_pose(stage.objects[0], at(0, 0, 0.7 + low - 0.025) * tilted);
+  CHECK(stage.unsettled() == Texts{"stands: is stuck in /Environment/table"});
+}
+
 TEST_CASE("What the last step pushed moves, whatever its velocity", "[settle]") {
   Stage stage;
   const NodeId pushed = stage.add_object("pushed", kBox, at(0.2, 0.1, 0.8));
