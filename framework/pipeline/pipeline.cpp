@@ -312,8 +312,7 @@ void Pipeline::hand_over(const Turn& turn, PendingCapture pending, const VisitRe
       own.respawned = result.respawned;
       own.seconds = result.seconds;
       seconds = summary_.seconds;
-      own.refused = 0;
-      for (const auto& [capture, outcomes] : result.views) own.refused += refused_draws(outcomes);
+      own.refused = result.refused;
       progress = {summary_.resumed + summary_.captures, total_, summary_.resumed,
                   summary_.respawned, summary_.views.refused_draws()};
       for (const auto& [number, begun] : flight_->begun) {

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <functional>
 #include <map>
 #include <set>
 #include <span>
@@ -58,22 +59,17 @@ std::vector<Triangle> triangles_of(const Scene& scene, NodeId object) {
   return triangles;
 }
 
-/// Chords from points that are spread evenly over the surface.
-std::vector<Chord> chords_of(const Scene& scene, NodeId object) {
-  constexpr int kPoints = 96;
-  constexpr double kSkin = 1e-5;  // metres; off the triangle that the chord starts from
-  const std::vector<Triangle> triangles = triangles_of(scene, object);
+/// Calls body(point, normal) for points that are spread evenly over the surface.
+template <class Body>
+void spread_over(const std::vector<Triangle>& triangles, int points, Body&& body) {
   double area = 0.0;
   for (const Triangle& triangle : triangles) area += triangle.normal.norm();
-  if (area <= 0.0) return {};
-  const Obstacles own(scene, std::span(&object, 1), Obstacles::Hidden::LeaveOut);
-  const double reach = 2.0 * scene.world_bounds(object).size().norm();
-  std::vector<Chord> chords;
+  if (area <= 0.0) return;
   double passed = 0.0;
   int point = 0;
   for (const Triangle& triangle : triangles) {
     passed += triangle.normal.norm();
-    for (; point < kPoints && area * (point + 0.5) < passed * kPoints; ++point) {
+    for (; point < points && area * (point + 0.5) < passed * points; ++point) {
       double u = std::fmod(0.5 + 0.7548776662466927 * point, 1.0);
       double v = std::fmod(0.5 + 0.5698402909980532 * point, 1.0);
       if (u + v > 1.0) {
@@ -81,16 +77,49 @@ std::vector<Chord> chords_of(const Scene& scene, NodeId object) {
         v = 1.0 - v;
       }
       const auto& [a, b, c] = triangle.corner;
-      Chord chord;
-      chord.direction = -triangle.normal.normalized();
-      chord.start = a + u * (b - a) + v * (c - a) + kSkin * chord.direction;
-      const auto exit = own.first_hit(chord.start, chord.start + reach * chord.direction);
-      if (!exit || !exit->is_leaving) continue;
-      chord.length = exit->t * reach;
-      chords.push_back(chord);
+      body(Vec3(a + u * (b - a) + v * (c - a)), Vec3(triangle.normal.normalized()));
     }
   }
+}
+
+std::vector<Chord> chords_of(const Scene& scene, NodeId object) {
+  constexpr int kPoints = 96;
+  constexpr double kSkin = 1e-5;  // metres; off the triangle that the chord starts from
+  const Obstacles own(scene, std::span(&object, 1), Obstacles::Hidden::LeaveOut);
+  const double reach = 2.0 * scene.world_bounds(object).size().norm();
+  std::vector<Chord> chords;
+  spread_over(triangles_of(scene, object), kPoints, [&](const Vec3& point, const Vec3& normal) {
+    const Vec3 start = point - kSkin * normal;
+    const auto exit = own.first_hit(start, start - reach * normal);
+    if (exit && exit->is_leaving) chords.push_back({start, -normal, exit->t * reach});
+  });
   return chords;
+}
+
+/// What some of the object's surface is deep inside of, little as it may be: the rim of a can in a
+/// table top. Null: nothing.
+NodeId sunk_in(const Scene& scene, NodeId object, const Obstacles& all, double depth_m) {
+  constexpr int kPoints = 8192;
+  constexpr int kWitnesses = 2;
+  std::vector<Aabb> cores;
+  for (const NodeId other : all.near_node(scene, object, 0.0, object)) {
+    Aabb core = scene.world_bounds(other);
+    core.min.array() += depth_m;
+    core.max.array() -= depth_m;
+    if (!core.is_empty()) cores.push_back(core);
+  }
+  if (cores.empty()) return {};
+  std::map<NodeId, int> deep;
+  NodeId found;
+  spread_over(triangles_of(scene, object), kPoints, [&](const Vec3& point, const Vec3&) {
+    const bool is_possible = !found && std::ranges::any_of(cores, [&](const Aabb& core) {
+      return (point.array() > core.min.array()).all() && (point.array() < core.max.array()).all();
+    });
+    if (!is_possible || all.is_near(point, depth_m, object)) return;
+    const NodeId encloser = all.encloser(point, object);
+    if (encloser && ++deep[encloser] >= kWitnesses) found = encloser;
+  });
+  return found;
 }
 
 /// What crosses the object deep inside, or holds its middle; null: nothing.
@@ -111,31 +140,90 @@ NodeId stuck_in(const Scene& scene, NodeId object, const Obstacles& all,
                                    chord.start + (chord.length - skin) * chord.direction, object);
     if (hit && ++crossed[hit->owner] >= kWitnesses) return hit->owner;
   }
-  return {};
+  return sunk_in(scene, object, all, limits.depth_m);
 }
 
-/// Objects that something holds up: they touch what is no object or floats, or one that is held up.
+/// What could hold the object up, of `near`: what lies below it somewhere, within reach. What it
+/// merely leans against holds nothing. Columns are tried all over its outline, those of its corners
+/// as well: a thing may stand on one. Ends with the first for which `is_enough` holds.
+std::set<NodeId> found_below(const Scene& scene, NodeId object, const std::vector<NodeId>& near,
+                             const SettleLimits& limits,
+                             const std::function<bool(NodeId)>& is_enough) {
+  constexpr int kColumns = 2048;
+  constexpr std::size_t kCorners = 512;
+  constexpr int kFloors = 8;       // of one column: a cup by its handle
+  constexpr double kSkin = 1e-5;   // metres; off what a segment has met
+  constexpr double kInset = 5e-4;  // metres; a corner's own column may pass it by
+  const Obstacles own(scene, std::span(&object, 1), Obstacles::Hidden::LeaveOut);
+  const Obstacles others(scene, near, Obstacles::Hidden::LeaveOut);
+  const Aabb box = scene.world_bounds(object);
+  const Vec3 size = box.size();
+  std::set<NodeId> below;
+  const auto finds_enough = [&](double x, double y) {
+    double z = box.min.z() - kSkin;
+    const double top = box.max.z() + kSkin;
+    for (int floor = 0; floor < kFloors; ++floor) {
+      const auto entry = own.first_hit({x, y, z}, {x, y, top});
+      if (!entry) return false;
+      const double underside = z + entry->t * (top - z);
+      const auto exit = own.first_hit({x, y, underside + kSkin}, {x, y, top});
+      const double inside = exit ? kSkin + exit->t * (top - underside - kSkin) : kInfinity;
+      // It may have sunk in, but what lies on a thin thing does not hold it.
+      const double start = underside + std::min(limits.depth_m, inside);
+      const auto hit = others.first_hit({x, y, start}, {x, y, underside - limits.reach_m});
+      if (hit) {
+        below.insert(hit->owner);
+        if (is_enough(hit->owner)) return true;
+      }
+      if (!exit) return false;
+      z = underside + inside + kSkin;
+    }
+    return false;
+  };
+  for (int i = 0; i < kColumns; ++i) {
+    const double x = box.min.x() + size.x() * std::fmod(0.5 + 0.7548776662466927 * i, 1.0);
+    const double y = box.min.y() + size.y() * std::fmod(0.5 + 0.5698402909980532 * i, 1.0);
+    if (finds_enough(x, y)) return below;
+  }
+  const std::vector<Triangle> triangles = triangles_of(scene, object);
+  const std::size_t stride = std::max<std::size_t>(1, triangles.size() / kCorners);
+  for (std::size_t i = 0; i < triangles.size(); i += stride) {
+    const auto& corners = triangles[i].corner;
+    const Vec3 middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+    for (const Vec3& corner : corners) {
+      const Vec3 way = middle - corner;
+      const Vec3 inner = corner + std::min(1.0, kInset / std::max(way.norm(), kInset)) * way;
+      if (finds_enough(inner.x(), inner.y())) return below;
+    }
+  }
+  return below;
+}
+
+/// Objects that something holds up: what is no object or floats lies below them, or one that is
+/// held up.
 std::set<NodeId> supported(const Scene& scene, const std::vector<NodeId>& objects,
-                           const Obstacles& all, double reach_m) {
+                           const Obstacles& all, const SettleLimits& limits) {
   const auto falls = [&](NodeId node) {
     return scene[node].rigid_body && scene[node].rigid_body->has_gravity;
   };
   const std::set<NodeId> known(objects.begin(), objects.end());
-  std::map<NodeId, std::vector<NodeId>> touched_by;
+  const auto stands = [&](NodeId node) { return !known.contains(node) || !falls(node); };
+  std::map<NodeId, std::vector<NodeId>> lies_on;
   std::vector<NodeId> ready;
   std::set<NodeId> held;
   for (const NodeId object : objects) {
     if (!falls(object)) continue;
-    for (const NodeId other : all.near_node(scene, object, reach_m, object)) {
-      touched_by[other].push_back(object);
-      const bool stands = !known.contains(other) || !falls(other);
-      if (stands && held.insert(object).second) ready.push_back(object);
+    const std::vector<NodeId> near = all.near_node(scene, object, limits.reach_m, object);
+    if (near.empty()) continue;
+    for (const NodeId other : found_below(scene, object, near, limits, stands)) {
+      lies_on[other].push_back(object);
+      if (stands(other) && held.insert(object).second) ready.push_back(object);
     }
   }
   while (!ready.empty()) {
     const NodeId holder = ready.back();
     ready.pop_back();
-    for (const NodeId object : touched_by[holder]) {
+    for (const NodeId object : lies_on[holder]) {
       if (held.insert(object).second) ready.push_back(object);
     }
   }
@@ -154,7 +242,7 @@ std::vector<Flaw> find_unsettled(const Scene& scene, const Room& room,
                                  const std::vector<NodeId>& objects, const LastStep& last,
                                  const SettleLimits& limits) {
   const Obstacles all = all_obstacles(scene, objects, Obstacles::Hidden::LeaveOut);
-  const std::set<NodeId> held = supported(scene, objects, all, limits.reach_m);
+  const std::set<NodeId> held = supported(scene, objects, all, limits);
   std::vector<Flaw> flaws;
   for (const NodeId object : objects) {
     const auto& body = scene[object].rigid_body;

@@ -21,12 +21,12 @@ struct Flaw {
 
 struct SettleLimits {
   double rest_speed = 0.05;  ///< m/s; slower is at rest.
-  double reach_m = 0.01;     ///< Nearer than this is supported.
+  double reach_m = 0.01;     ///< What is nearer than this below holds.
   double depth_m = 0.01;     ///< Crossed deeper than this is stuck; thin things at a third.
 };
 
-/// Objects that are no picture of things at rest: outside the room, moving, in the air without
-/// touching anything that stands, or crossed by something deep inside. What floats (without
+/// Objects that are no picture of things at rest: outside the room, moving, in the air with
+/// nothing that stands below them, or crossed by something deep inside. What floats (without
 /// gravity) may hang and drift. Each object once, in the order given.
 std::vector<Flaw> find_unsettled(const Scene& scene, const Room& room,
                                  const std::vector<NodeId>& objects, const LastStep& last,

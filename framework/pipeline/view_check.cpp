@@ -46,17 +46,69 @@ struct Measures {
   double size_px = 0.0;
   double size_share = 0.0;
   double occluders = 0.0;
+  double all_pixels = 0.0;  ///< Of what the shares are of: covered ones, and those outside.
+};
+
+/// Numbers that a measure may stand for.
+struct Margin {
+  double low = 0.0;
+  double high = 0.0;
 };
 
 /// How a target does: the first condition that it misses, and how far it is off in all.
 struct Score {
   const char* failed = nullptr;
   double shortfall = 0.0;
+  bool is_sure = true;  ///< It holds wherever in their margins the numbers lie.
   void take(const char* key, const Limits& limits, double value) {
-    if (limits.hold(value)) return;
+    take(key, limits, value, {value, value});
+  }
+  void take(const char* key, const Limits& limits, double value, const Margin& margin) {
+    if (!limits.hold(margin.low) || !limits.hold(margin.high)) is_sure = false;
+    const bool is_below = limits.min && margin.high < *limits.min;
+    const bool is_above = limits.max && margin.low > *limits.max;
+    if (!is_below && !is_above) return;
     if (!failed) failed = key;
     shortfall += std::max(limits.shortfall(value), 1e-3);
   }
+};
+
+/// Where the exact numbers lie for all that can be believed, when a grid of pixels `step` apart was
+/// looked at instead of all of them. Of a thing that it meets n times, the grid tells the area as
+/// well as chance would, or better.
+class Margins {
+ public:
+  explicit Margins(int step) : step_(step) {}
+
+  bool are_exact() const { return step_ == 1; }
+  Margin pixels(double pixels) const {
+    if (are_exact()) return {pixels, pixels};
+    const double met = pixels / (double(step_) * step_);
+    const double off = double(step_) * step_ * (kDeviations * std::sqrt(met) + kEdge);
+    // Whatever the grid meets is seen.
+    return {std::max(met, pixels - off), pixels + off};
+  }
+  /// Of a box's longer side; `pixel`: one of the picture's in the same unit.
+  Margin size(double size, double pixel) const {
+    if (are_exact()) return {size, size};
+    // Thin ends may lie between the lines of the grid.
+    const double off = 2.0 * step_ * pixel;
+    return {std::max(0.0, size - off), 1.25 * size + off};
+  }
+  /// Of a thing with so many pixels, of which part is outside or covered.
+  Margin share(double share, double pixels) const {
+    if (are_exact()) return {share, share};
+    const double met = pixels / (double(step_) * step_);
+    const double off = met > 0.0 ? 0.5 * kDeviations / std::sqrt(met) : 1.0;
+    return {std::max(0.0, share - off), std::min(1.0, share + off)};
+  }
+  /// All that the grid meets are there; slivers may be missing.
+  Margin things(double count) const { return {count, are_exact() ? count : count + 1.0}; }
+
+ private:
+  static constexpr double kDeviations = 3.0;
+  static constexpr double kEdge = 4.0;
+  double step_;
 };
 
 bool is_about_place(const std::string& of) {
@@ -109,19 +161,27 @@ void score_place(const ViewRule& rule, const Measures& measures, Score& score) {
   score.take("elevation_deg", rule.elevation_deg, measures.elevation_deg);
 }
 
-void score_pixels(const ViewRule& rule, const Measures& measures, Score& score) {
+void score_pixels(const ViewRule& rule, const Measures& measures, const Margins& margins,
+                  Score& score) {
   static const Limits kSeen{1.0, std::nullopt};
-  score.take("visible_pixels", kSeen, measures.visible_pixels);
-  score.take("visible_pixels", rule.visible_pixels, measures.visible_pixels);
-  score.take("size_px", rule.size_px, measures.size_px);
-  score.take("size_share", rule.size_share, measures.size_share);
+  const Margin pixels = margins.pixels(measures.visible_pixels);
+  score.take("visible_pixels", kSeen, measures.visible_pixels, pixels);
+  score.take("visible_pixels", rule.visible_pixels, measures.visible_pixels, pixels);
+  const double pixel = measures.size_px > 0.0 ? measures.size_share / measures.size_px : 1.0;
+  score.take("size_px", rule.size_px, measures.size_px, margins.size(measures.size_px, 1.0));
+  score.take("size_share", rule.size_share, measures.size_share,
+             margins.size(measures.size_share, pixel));
 }
 
-void score_coverage(const ViewRule& rule, const Measures& measures, Score& score) {
-  score.take("truncation", rule.truncation, measures.truncation);
-  score.take("occlusion", rule.occlusion, measures.occlusion);
-  score.take("visible_share", rule.visible_share, measures.visible_share);
-  score.take("occluders", rule.occluders, measures.occluders);
+void score_coverage(const ViewRule& rule, const Measures& measures, const Margins& margins,
+                    Score& score) {
+  const auto take_share = [&](const char* key, const Limits& limits, double share) {
+    score.take(key, limits, share, margins.share(share, measures.all_pixels));
+  };
+  take_share("truncation", rule.truncation, measures.truncation);
+  take_share("occlusion", rule.occlusion, measures.occlusion);
+  take_share("visible_share", rule.visible_share, measures.visible_share);
+  score.take("occluders", rule.occluders, measures.occluders, margins.things(measures.occluders));
 }
 
 std::string label_of(const Target& target, const ViewRule& rule) {
@@ -289,14 +349,38 @@ bool wants_bins(const WantedView& wanted) {
                      [](const auto& bin) { return bin.has_value(); });
 }
 
+/// Refuses where every target that may turn out as the main one misses a quota about its place.
+ViewVerdict judge_quotas_coarsely(const WantedView& wanted, const std::vector<Scored>& scored,
+                                  const Margins& margins) {
+  double least = 0.0;  // pixels of the main target
+  for (const Scored& one : scored) {
+    if (one.score.failed || !one.score.is_sure) continue;
+    least = std::max(least, margins.pixels(one.measures.visible_pixels).low);
+  }
+  const Quota* missed = nullptr;
+  double most = -1.0;
+  for (const Scored& one : scored) {
+    const double pixels = one.measures.visible_pixels;
+    if (one.score.failed || margins.pixels(pixels).high < least) continue;
+    const Quota* own = missed_quota(wanted, one, true);
+    if (!own) return {};
+    if (pixels > most) missed = own;
+    most = std::max(most, pixels);
+  }
+  if (!missed) return {};
+  return refused(*wanted.rule, "quotas." + missed->of, 1.0);
+}
+
 /// All that a rule says, once its targets have been scored.
-ViewVerdict judge(const WantedView& wanted, const std::vector<Scored>& scored) {
+ViewVerdict judge(const WantedView& wanted, const std::vector<Scored>& scored,
+                  const Margins& margins) {
   const ViewRule& rule = *wanted.rule;
   const std::size_t holding = count_holding(scored);
   if (rule.count.min && double(holding) < *rule.count.min) {
     return missing_targets(rule, scored, holding);
   }
-  if (rule.count.max && double(holding) > *rule.count.max) {
+  const bool are_counted = margins.are_exact();
+  if (are_counted && rule.count.max && double(holding) > *rule.count.max) {
     return refused(rule, "count", double(holding) - *rule.count.max);
   }
   if (rule.every_target) {
@@ -309,6 +393,7 @@ ViewVerdict judge(const WantedView& wanted, const std::vector<Scored>& scored) {
     if (!verdict.holds()) return verdict;
   }
   if (!wants_bins(wanted)) return {};
+  if (!margins.are_exact()) return judge_quotas_coarsely(wanted, scored, margins);
   const Scored* main = nullptr;
   for (const Scored& one : scored) {
     const bool is_larger =
@@ -326,8 +411,9 @@ ViewVerdict judge(const WantedView& wanted, const std::vector<Scored>& scored) {
 class SeenTargets {
  public:
   SeenTargets(const std::vector<Target>& targets, const Scene& scene, NodeId camera,
-              Image<std::uint32_t> leaves, const std::vector<std::uint32_t>& instance_of_leaf)
-      : leaves_(std::move(leaves)) {
+              Image<std::uint32_t> leaves, const std::vector<std::uint32_t>& instance_of_leaf,
+              int step)
+      : leaves_(std::move(leaves)), step_(step) {
     frame_.camera_path = scene.path(camera);
     frame_.camera = *scene[camera].camera;
     frame_.set(kInstanceId, instance_ids(instance_of_leaf, leaves_));
@@ -344,9 +430,9 @@ class SeenTargets {
     measure_tight_boxes(ids, seen);
     for (const Instance& instance : seen) {
       Measures& own = known_[instance.id];
-      own.visible_pixels = double(pixels.at(instance.id));
+      own.visible_pixels = step_ * step_ * double(pixels.at(instance.id));
       const PixelBox& box = *instance.tight_box;
-      own.size_px = std::max(box.width(), box.height());
+      own.size_px = step_ * std::max(box.width(), box.height());
       own.size_share =
           std::max(double(box.width()) / ids.width(), double(box.height()) / ids.height());
     }
@@ -383,6 +469,7 @@ class SeenTargets {
       const Visibility& visibility = *instance.visibility;
       Measures& own = known_.at(instance.id);
       const double all = double(visibility.amodal_pixels + visibility.outside_pixels);
+      own.all_pixels = step_ * step_ * all;
       own.visible_share = all > 0.0 ? double(visibility.visible_pixels) / all : 0.0;
       own.occlusion = visibility.occlusion().value_or(1.0);
       own.truncation = visibility.truncation();
@@ -394,6 +481,7 @@ class SeenTargets {
   void measure_coverage(Scored& target) const {
     const auto known = known_.find(target.target->instance.node.index);
     if (known == known_.end()) return;
+    target.measures.all_pixels = known->second.all_pixels;
     target.measures.visible_share = known->second.visible_share;
     target.measures.occlusion = known->second.occlusion;
     target.measures.truncation = known->second.truncation;
@@ -403,6 +491,7 @@ class SeenTargets {
  private:
   Frame frame_;  ///< Instances are those that are being covered.
   Image<std::uint32_t> leaves_;
+  double step_;  ///< Pixels of the picture from one of these to the next.
   std::map<std::uint32_t, Measures> known_;  ///< By id, of what has pixels.
   std::set<std::uint32_t> covered_;
 };
@@ -479,15 +568,21 @@ ViewVerdict ViewCheck::by_place(const Scene& scene, NodeId camera, const WantedV
 ViewVerdict ViewCheck::by_labels(const Scene& scene, NodeId camera,
                                  const std::vector<WantedView>& wanted,
                                  const Labels& labels) const {
-  SeenTargets seen(state_->targets, scene, camera, labels.render(), state_->instance_of_leaf);
-  const Vec3 camera_world = scene.world_from_node(camera).translation();
+  const Margins margins(labels.step);
+  SeenTargets seen(state_->targets, scene, camera, labels.render(), state_->instance_of_leaf,
+                   labels.step);
+  const Affine world_from_camera = scene.world_from_node(camera);
+  const Affine camera_from_world = world_from_camera.inverse();
+  const Vec3 camera_world = world_from_camera.translation();
+  const double widest = margins.are_exact() ? kPi : widest_angle(*scene[camera].camera);
   ViewVerdict verdict;
   for (const WantedView& one : wanted) {
     const ViewRule& rule = *one.rule;
     std::vector<Scored> scored = state_->by_place(rule, camera_world);
     for (Scored& target : scored) {
       seen.measure_pixels(target);
-      score_pixels(rule, target.measures, target.score);
+      const bool is_out = !may_be_seen(*target.target, camera_from_world, widest);
+      score_pixels(rule, target.measures, is_out ? Margins(1) : margins, target.score);
     }
     // What shares and coverage say makes no target hold that does not hold without them.
     const std::size_t possible = count_holding(scored);
@@ -496,7 +591,7 @@ ViewVerdict ViewCheck::by_labels(const Scene& scene, NodeId camera,
       continue;
     }
     if (!needs_coverage(rule)) {
-      verdict.add(judge(one, scored));
+      verdict.add(judge(one, scored, margins));
       continue;
     }
     // Coverage is dear: that of targets which cannot hold any more counts only where too few hold,
@@ -504,7 +599,7 @@ ViewVerdict ViewCheck::by_labels(const Scene& scene, NodeId camera,
     std::vector<Scored> judged = scored;
     const auto add_coverage = [&](Scored& target) {
       seen.measure_coverage(target);
-      score_coverage(rule, target.measures, target.score);
+      score_coverage(rule, target.measures, margins, target.score);
     };
     seen.cover(judged, !rule.every_target, labels.cover);
     for (Scored& target : judged) {
@@ -526,7 +621,7 @@ ViewVerdict ViewCheck::by_labels(const Scene& scene, NodeId camera,
         if (is_new) add_coverage(judged[i]);
       }
     }
-    verdict.add(judge(one, judged));
+    verdict.add(judge(one, judged, margins));
   }
   return verdict;
 }

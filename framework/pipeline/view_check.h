@@ -46,11 +46,16 @@ class ViewCheck {
   /// By where things are, without a ray: what fails here fails by_labels(), too.
   ViewVerdict by_place(const Scene& scene, NodeId camera, const WantedView& wanted) const;
 
-  /// Exactly, but for the brightness. `render` gives kLeafId; `cover` is Renderer::cover().
+  /// Of a camera: `render` gives kLeafId, `cover` is Renderer::cover().
   struct Labels {
     std::function<Image<std::uint32_t>()> render;
     std::function<std::vector<CoverageMask>(std::span<const LabelledInstance>)> cover;
+    /// How many pixels of the picture lie from one pixel of these labels to the next, across and
+    /// down. With more than one, what is out of a condition by a clear margin fails, and all else
+    /// holds.
+    int step = 1;
   };
+  /// All but the brightness. `camera` is the one of the labels.
   ViewVerdict by_labels(const Scene& scene, NodeId camera, const std::vector<WantedView>& wanted,
                         const Labels& labels) const;
 

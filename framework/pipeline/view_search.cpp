@@ -8,12 +8,13 @@
 
 #include "diorama/error.h"
 #include "framework/config/joined.h"
+#include "framework/pipeline/stopwatch.h"
 #include "framework/plugins/plugin_call.h"
 
 namespace diorama {
 namespace {
 
-constexpr int kSmaller = 4;  // of width and height, for judging brightness
+constexpr int kSmaller = 4;  // of width and height, for judging before all pixels are looked at
 
 auto numbers_of(const Camera& c) {
   return std::tie(c.width, c.height, c.lens, c.fx, c.fy, c.cx, c.cy, c.distortion,
@@ -24,6 +25,15 @@ auto numbers_of(const Camera& c) {
 
 bool are_equal(const std::optional<Camera>& a, const std::optional<Camera>& b) {
   return a.has_value() == b.has_value() && (!a || numbers_of(*a) == numbers_of(*b));
+}
+
+/// What a polynomial lens says of distances in pixels, when they get this much shorter.
+void shrink_radii(Camera& camera, double by) {
+  double scale = 1.0;
+  for (double& term : camera.fisheye_polynomial) {
+    term /= scale;
+    scale *= by;
+  }
 }
 
 /// The same view with fewer pixels.
@@ -37,11 +47,24 @@ Camera smaller(Camera camera) {
   camera.cx *= x;
   camera.fy *= y;
   camera.cy *= y;
-  double scale = 1.0;
-  for (double& term : camera.fisheye_polynomial) {
-    term /= scale;
-    scale *= x;
-  }
+  shrink_radii(camera, x);
+  return camera;
+}
+
+/// The rays of every fourth pixel, and no others. Null: there are too few of them to tell anything.
+std::optional<Camera> sparser(Camera camera) {
+  constexpr int kFirst = 1;
+  constexpr int kLeast = 8;  // pixels of a side
+  const auto counted = [](int size) { return (size - kFirst + kSmaller - 1) / kSmaller; };
+  const auto moved = [](double centre) { return 0.5 + (centre - (kFirst + 0.5)) / kSmaller; };
+  camera.width = counted(camera.width);
+  camera.height = counted(camera.height);
+  if (std::min(camera.width, camera.height) < kLeast) return std::nullopt;
+  camera.fx /= kSmaller;
+  camera.fy /= kSmaller;
+  camera.cx = moved(camera.cx);
+  camera.cy = moved(camera.cy);
+  shrink_radii(camera, 1.0 / kSmaller);
   return camera;
 }
 
@@ -120,19 +143,24 @@ std::uint64_t view_number(const Job& job, const ViewRule& rule, int capture, std
   return std::uint64_t(number) * cameras + camera;
 }
 
-std::map<NodeId, NodeId> create_small_cameras(const Job& job, const std::vector<NodeId>& cameras,
-                                              Scene& scene) {
-  std::set<NodeId> wanted;
+SmallCameras create_small_cameras(const Job& job, const std::vector<NodeId>& cameras,
+                                  Scene& scene) {
+  std::set<NodeId> judged;
+  std::set<NodeId> lit;
   for (const ViewRule& rule : job.views) {
-    if (!rule.brightness.is_set()) continue;
-    wanted.merge(nodes_of(scene, rule));
+    const std::set<NodeId> nodes = nodes_of(scene, rule);
+    judged.insert(nodes.begin(), nodes.end());
+    if (rule.brightness.is_set()) lit.insert(nodes.begin(), nodes.end());
   }
-  std::map<NodeId, NodeId> small;
-  for (const NodeId camera : cameras) {
-    if (!wanted.contains(camera)) continue;
+  SmallCameras small;
+  const auto create = [&](NodeId camera, std::map<NodeId, NodeId>& nodes) {
     const NodeId node = scene.create(scene.root(), "SmallView");
-    scene.edit(node).camera = smaller(*scene[camera].camera);
-    small.emplace(camera, node);
+    scene.edit(node).camera = *scene[camera].camera;
+    nodes.emplace(camera, node);
+  };
+  for (const NodeId camera : cameras) {
+    if (lit.contains(camera)) create(camera, small.of_light);
+    if (judged.contains(camera)) create(camera, small.of_labels);
   }
   return small;
 }
@@ -242,8 +270,15 @@ void ViewSearch::run() {
     setting_.host.stop_if_asked();
     const bool is_first = draws_ == 0;
     ++draws_;
-    if (!is_first) draw_anew(pending);
-    judge(pending);
+    double seconds = 0.0;
+    {
+      const Stopwatch watch(seconds);
+      if (!is_first) draw_anew(pending);
+      judge(pending);
+    }
+    const auto refused = std::ranges::count_if(
+        pending, [](const Group* group) { return !group->is_done || !group->unmet.empty(); });
+    refused_s_ += seconds * double(refused) / double(pending.size());
   }
 }
 
@@ -282,10 +317,12 @@ void ViewSearch::judge(const std::vector<Group*>& pending) {
     }
   }
   if (possible.empty()) return;
+  for (const Group* group : possible) place_small_cameras(*group);
   prepare();
   std::vector<Group*> shown;
   for (Group* group : possible) {
-    const ViewVerdict verdict = by_labels(*group);
+    ViewVerdict verdict = by_labels(*group, true);
+    if (verdict.holds()) verdict = by_labels(*group, false);
     if (verdict.holds()) {
       shown.push_back(group);
     } else {
@@ -330,7 +367,7 @@ void ViewSearch::end_at_limit(Group& group) {
     text += "; no randomizer places the camera at this capture, so it cannot be drawn anew";
   }
   if (!group.stops) {
-    setting_.host.log(LogLevel::Warning, text);
+    if (!setting_.is_passed) setting_.host.log(LogLevel::Warning, text);
     return;
   }
   throw Error(ErrorKind::Config,
@@ -350,12 +387,28 @@ ViewVerdict ViewSearch::by_place(const Group& group) const {
   return verdict;
 }
 
-ViewVerdict ViewSearch::by_labels(const Group& group) {
+void ViewSearch::place_small_cameras(const Group& group) {
+  Scene& scene = setting_.scene;
+  for (const Group::Member& member : group.members) {
+    const NodeId camera = setting_.cameras[member.camera];
+    const NodeId small = setting_.small_cameras.of_labels.at(camera);
+    const std::optional<Camera> lens = sparser(*scene[camera].camera);
+    if (lens && !are_equal(scene[small].camera, lens)) scene.edit(small).camera = lens;
+    scene.set_pose(small, scene.world_from_node(camera));
+  }
+}
+
+ViewVerdict ViewSearch::by_labels(const Group& group, bool is_coarse) {
   ViewVerdict verdict;
   for (const Group::Member& member : group.members) {
-    if (member.wanted.empty()) continue;
-    const NodeId camera = setting_.cameras[member.camera];
+    NodeId camera = setting_.cameras[member.camera];
+    const bool is_too_small = is_coarse && !sparser(*setting_.scene[camera].camera);
+    if (member.wanted.empty() || is_too_small) continue;
     ViewCheck::Labels labels;
+    if (is_coarse) {
+      camera = setting_.small_cameras.of_labels.at(camera);
+      labels.step = kSmaller;
+    }
     labels.render = [&] { return render(camera, kLeafId.name).get(kLeafId); };
     labels.cover = [&](std::span<const LabelledInstance> instances) {
       return call_component("renderer '" + setting_.job.renderer.type + "'",
@@ -375,7 +428,7 @@ ViewVerdict ViewSearch::by_light(const Group& group) {
     for (const WantedView& wanted : member.wanted) {
       if (!wanted.rule->brightness.is_set()) continue;
       const NodeId camera = setting_.cameras[member.camera];
-      const NodeId small = setting_.small_cameras.at(camera);
+      const NodeId small = setting_.small_cameras.of_light.at(camera);
       const std::optional<Camera> lens = smaller(*scene[camera].camera);
       if (!are_equal(scene[small].camera, lens)) scene.edit(small).camera = lens;
       scene.set_pose(small, scene.world_from_node(camera));
@@ -384,6 +437,11 @@ ViewVerdict ViewSearch::by_light(const Group& group) {
     }
   }
   return verdict;
+}
+
+bool ViewSearch::needs_pictures() const {
+  return std::ranges::any_of(rules_,
+                             [](const ViewRule* rule) { return rule->brightness.is_set(); });
 }
 
 std::vector<std::size_t> ViewSearch::refuse_pictures(const std::vector<Frame>& frames) {

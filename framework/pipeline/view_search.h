@@ -42,9 +42,15 @@ class SavedView {
 std::uint64_t view_number(const Job& job, const ViewRule& rule, int capture, std::size_t camera,
                           std::size_t cameras);
 
-/// Makes a node per camera whose rules ask for brightness: the same lens, a quarter of the pixels.
-std::map<NodeId, NodeId> create_small_cameras(const Job& job, const std::vector<NodeId>& cameras,
-                                              Scene& scene);
+/// Nodes with a sixteenth of a camera's pixels, which views are judged by before all of them are
+/// looked at.
+struct SmallCameras {
+  std::map<NodeId, NodeId> of_labels;  ///< By camera; every fourth pixel across and down.
+  std::map<NodeId, NodeId> of_light;   ///< The same view in larger pixels, for the brightness.
+};
+
+/// Makes them for the cameras whose views rules speak of.
+SmallCameras create_small_cameras(const Job& job, const std::vector<NodeId>& cameras, Scene& scene);
 
 /// Draws the views of one capture anew until they hold, each camera (or rig) by itself. Everything
 /// else stays as the first draw left it.
@@ -57,8 +63,9 @@ class ViewSearch {
     Renderer& renderer;
     Scene& scene;
     const std::vector<NodeId>& cameras;  ///< All of the visit, in job order.
-    const std::map<NodeId, NodeId>& small_cameras;
+    const SmallCameras& small_cameras;
     PlannedCapture capture;
+    bool is_passed = false;   ///< It is not made now: whoever made it has logged what it lacks.
     bool can_redraw = false;  ///< Some randomizer places cameras at this moment.
     /// Lets these randomizers draw once more, from the stream of that number.
     std::function<void(int number)> redraw;
@@ -70,9 +77,15 @@ class ViewSearch {
   /// Leaves the cameras at views that hold, or that came nearest. Throws Error(Config) at a limit
   /// at which the job is to stop, and what the renderer throws.
   void run();
+  /// Rules speak of some camera.
+  bool judges_views() const { return !groups_.empty(); }
+  /// Some view is known only once refuse_pictures() has judged it.
+  bool needs_pictures() const;
   /// Judges the finished pictures of the cameras, which is what takes light. Frames whose view has
   /// to be drawn anew by run() are named by their index.
   std::vector<std::size_t> refuse_pictures(const std::vector<Frame>& frames);
+  /// Wall time that run() spent on views that were refused.
+  double refused_s() const { return refused_s_; }
   /// Per camera that rules speak of.
   std::vector<ViewOutcome> outcomes() const;
 
@@ -85,7 +98,8 @@ class ViewSearch {
   void end_at_limit(Group& group);
   void draw_anew(const std::vector<Group*>& pending);
   ViewVerdict by_place(const Group& group) const;
-  ViewVerdict by_labels(const Group& group);
+  void place_small_cameras(const Group& group);
+  ViewVerdict by_labels(const Group& group, bool is_coarse);
   ViewVerdict by_light(const Group& group);
   Frame render(NodeId camera, std::string_view channel);
   void prepare();
@@ -97,6 +111,7 @@ class ViewSearch {
   std::optional<SavedNodes> others_;
   std::uint64_t others_shapes_ = 0;
   int draws_ = 0;
+  double refused_s_ = 0.0;
 };
 
 }  // namespace diorama

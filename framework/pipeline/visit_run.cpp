@@ -457,9 +457,13 @@ void VisitRun::take_or_pass(const PlannedCapture& planned) {
   if (!setting_.is_needed(last)) return;
   setting_.stop_if_asked();
   const SavedView drawn(scene_, camera_tops(scene_));
-  ViewSearch search = view_search(planned);
-  choose_views(search);
-  note_blocked_cameras();
+  ViewSearch search = view_search(planned, true);
+  if (search.needs_pictures()) {
+    take_frames(planned, search);
+  } else {
+    choose_views(search);
+    note_blocked_cameras();
+  }
   drawn.restore(scene_);
 }
 
@@ -475,9 +479,12 @@ void VisitRun::take(const PlannedCapture& planned) {
   capture.clip = planned.clip;
   capture.environment = clean_name(setting_.plan.environments[planned_.environment].asset);
   const SavedView drawn(scene_, camera_tops(scene_));
-  const std::vector<ViewOutcome> views = take_frames(planned, capture.frames);
+  ViewSearch search = view_search(planned);
+  capture.frames = take_frames(planned, search);
+  const std::vector<ViewOutcome> views = search.outcomes();
   if (!views.empty()) pending.views_json = outcomes_json(views);
   result_.views.emplace_back(planned.index, views);
+  result_.refused += refused_draws(views);
   if (overview_ && next_capture_ == 1) {
     pending.overview = make_overview(planned.index);
   }
@@ -506,9 +513,9 @@ void VisitRun::prepare_renderer() {
                  [&] { components_.renderer->prepare(scene_); });
 }
 
-ViewSearch VisitRun::view_search(const PlannedCapture& planned) {
+ViewSearch VisitRun::view_search(const PlannedCapture& planned, bool is_passed) {
   return ViewSearch({job_, setting_.streams, host_, *components_.renderer, scene_, cameras_,
-                     small_cameras_, planned, !camera_randomizers_.empty(),
+                     small_cameras_, planned, is_passed, !camera_randomizers_.empty(),
                      [this, planned](int number) {
                        call_randomizers(planned.phase, planned.number, planned.index,
                                         {"view", number, &camera_randomizers_});
@@ -516,8 +523,14 @@ ViewSearch VisitRun::view_search(const PlannedCapture& planned) {
 }
 
 void VisitRun::choose_views(ViewSearch& search) {
-  const Stopwatch watch(result_.seconds["choosing views"]);
-  search.run();
+  const double before = search.refused_s();
+  {
+    const Stopwatch watch(result_.seconds["choosing views"]);
+    search.run();
+  }
+  const double refused = search.refused_s() - before;
+  result_.seconds["choosing views"] -= refused;
+  result_.seconds["refusing views"] += refused;
 }
 
 void VisitRun::note_blocked_cameras() {
@@ -525,11 +538,11 @@ void VisitRun::note_blocked_cameras() {
 }
 
 /// The pictures of all cameras, from views as the job wants them.
-std::vector<ViewOutcome> VisitRun::take_frames(const PlannedCapture& planned,
-                                               std::vector<Frame>& frames) {
-  ViewSearch search = view_search(planned);
+std::vector<Frame> VisitRun::take_frames(const PlannedCapture& planned, ViewSearch& search) {
+  std::vector<Frame> frames;
+  // What moved since the last picture is no cost of choosing.
+  if (search.judges_views()) prepare_renderer();
   choose_views(search);
-  note_blocked_cameras();
   prepare_renderer();
   for (std::size_t i = 0; i < cameras_.size(); ++i) {
     setting_.stop_if_asked();
@@ -541,8 +554,9 @@ std::vector<ViewOutcome> VisitRun::take_frames(const PlannedCapture& planned,
     for (const std::size_t i : refused) frames[i] = make_frame(i, planned);
     refused = search.refuse_pictures(frames);
   }
+  note_blocked_cameras();
   measure_flows(planned.clip, frames);
-  return search.outcomes();
+  return frames;
 }
 
 /// Last of all: it shows the renderer the frames beside this one.

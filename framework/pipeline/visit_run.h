@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <exception>
 #include <functional>
 #include <map>
@@ -39,6 +40,7 @@ struct VisitResult {
   std::vector<VisitReport> reports;  ///< None when the visit was cut short by the end of the job.
   int respawned = 0;                 ///< Objects that had left the room and were placed anew.
   std::vector<std::pair<int, std::vector<ViewOutcome>>> views;  ///< By capture.
+  std::int64_t refused = 0;                                     ///< Draws of all these views.
   std::map<std::string, double> seconds;                        ///< Phase to wall time.
 };
 
@@ -90,10 +92,10 @@ class VisitRun {
   void set_motion(const std::optional<ClipFrame>& clip, Frame& frame);
   void take_or_pass(const PlannedCapture& planned);
   void take(const PlannedCapture& planned);
-  ViewSearch view_search(const PlannedCapture& planned);
+  ViewSearch view_search(const PlannedCapture& planned, bool is_passed = false);
   void choose_views(ViewSearch& search);
   void note_blocked_cameras();
-  std::vector<ViewOutcome> take_frames(const PlannedCapture& planned, std::vector<Frame>& frames);
+  std::vector<Frame> take_frames(const PlannedCapture& planned, ViewSearch& search);
   void prepare_renderer();
   Frame make_frame(std::size_t camera, const PlannedCapture& planned);
   void measure_coverage(NodeId camera, Frame& frame);
@@ -117,7 +119,7 @@ class VisitRun {
   double last_step_s_ = 0.0;    ///< Length of that step; 0: none was taken.
   ClipTrack track_;             ///< Of the clip that is being taken.
   NodeId overview_;             ///< Null unless this visit makes an overview picture.
-  std::map<NodeId, NodeId> small_cameras_;  ///< For the brightness of views; by camera.
+  SmallCameras small_cameras_;
   /// Randomizers that placed cameras at the last moment.
   std::vector<std::size_t> camera_randomizers_;
   int next_capture_ = 0;  ///< Of the visit's.

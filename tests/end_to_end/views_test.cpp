@@ -196,6 +196,37 @@ TEST_CASE("Views are the same bytes after kill -9 and resume, and are counted on
   CHECK(difference(whole, tree(folder / "killed")) == "");
 }
 
+TEST_CASE("A resumed job says nothing anew of captures that it passes", "[views]") {
+  const TemporaryFolder folder;
+  write_file(folder / "keep.yaml",
+             job("{name: seen, targets: \"/Assets/*\", distance_m: {max: 0.1}, max_tries: 3}", 25));
+  const std::vector<std::string> arguments{"run", "keep.yaml", "--output", "out", "--resume"};
+  REQUIRE(run_and_kill(arguments, folder.path(), folder / "out", {5}));
+  const Outcome resumed = run(arguments, folder.path());
+  CHECK(resumed.exit_code == 0);
+  CHECK_THAT(resumed.errors, !ContainsSubstring("views: capture 0 (still)"));
+  CHECK_THAT(resumed.errors, ContainsSubstring("views: capture 24 (still)"));
+}
+
+TEST_CASE("Blocked cameras are those of the views that stay, also after kill -9", "[views]") {
+  const TemporaryFolder folder;
+  std::string text =
+      job("{name: lit, brightness: {min: 0.45, max: 0.46}, count: {min: 0}, max_tries: 400}", 25);
+  text.replace(text.find("name: cam, width"), 10, "name: cam, near_m: 0.9,");
+  text.replace(text.find("look_at_offset"), 0, "avoid_obstacles: false, ");
+  const auto whole = run_job(text, "whole", folder);
+  int refused = 0;
+  for (const auto& [name, content] : whole) {
+    if (name.starts_with("settle/")) refused += int(Json::parse(content)["blocked_cameras"].size());
+  }
+  CHECK(refused > 0);
+  CHECK(refused <= 25);
+  const std::vector<std::string> arguments{"run", "views.yaml", "--output", "killed", "--resume"};
+  REQUIRE(run_and_kill(arguments, folder.path(), folder / "killed", {9}));
+  CHECK(run(arguments, folder.path()).exit_code == 0);
+  CHECK(difference(whole, tree(folder / "killed")) == "");
+}
+
 TEST_CASE("At the limit a job keeps the nearest view and says so, or ends", "[views]") {
   const TemporaryFolder folder;
   const std::string impossible =

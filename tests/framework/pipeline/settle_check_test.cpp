@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "framework/pipeline/settle_check.h"
 
+#include <cmath>
+#include <cstdint>
+
 #include "framework/pipeline/physics_view.h"
 #include "framework/pipeline/settling.h"
 #include "support/catch.h"
@@ -85,6 +88,17 @@ TEST_CASE("What has sunk in by more than a centimetre is stuck", "[settle]") {
   CHECK(stage.unsettled() == Texts{"sunk: is stuck in /Environment/table"});
 }
 
+TEST_CASE("A wide thing that is sunk in with one corner alone is stuck", "[settle]") {
+  Stage stage;
+  const Mesh board = make_box(Vec3(0.8, 0.8, 0.03));
+  const auto tilted = Eigen::Quaterniond(Eigen::AngleAxisd(0.2, Vec3(1, -1, 0).normalized()));
+  const double low = 0.4 * std::sqrt(2.0) * std::sin(0.2) + 0.015 * std::cos(0.2);
+  stage.add_object("stands", board, at(0, 0, 0.7 + low - 0.002) * tilted);
+  CHECK(stage.unsettled() == Texts{});
+  stage.scene.set_pose(stage.objects[0], at(0, 0, 0.7 + low - 0.025) * tilted);
+  CHECK(stage.unsettled() == Texts{"stands: is stuck in /Environment/table"});
+}
+
 TEST_CASE("What the last step pushed moves, whatever its velocity", "[settle]") {
   Stage stage;
   const NodeId pushed = stage.add_object("pushed", kBox, at(0.2, 0.1, 0.8));
@@ -101,6 +115,34 @@ TEST_CASE("Two things that hold each other hang both; what floats may hang and h
   stage.add_object("balloon", kBox, at(2, 0, 1.5), false);
   stage.add_object("on_balloon", kBox, at(2, 0, 1.7));
   CHECK(stage.unsettled() == Texts{"lower: hangs in the air", "upper: hangs in the air"});
+}
+
+TEST_CASE("What leans against something and stands on nothing hangs in the air", "[settle]") {
+  Stage stage;
+  stage.add_object("at_its_side", kBox, at(0.601, 0, 0.4));
+  stage.add_object("stands_there_too", kBox, at(-0.601, 0, 0.1));
+  stage.add_object("between", kBox, at(-0.702, -0.1, 0.5) * Eigen::AngleAxisd(0.1, Vec3::UnitY()));
+  CHECK(stage.unsettled() == Texts{"at_its_side: hangs in the air", "between: hangs in the air"});
+}
+
+TEST_CASE("A frame hangs on a peg by its upper bar, a box stands on a corner, a fork is sunk in",
+          "[settle]") {
+  Stage stage;
+  stage.add(stage.environment, "peg", make_box(Vec3(0.4, 0.01, 0.01)), at(0.7, 0, 0.6));
+  Mesh frame = make_box(Vec3(0.02, 0.3, 0.02));
+  const Mesh lower = frame;
+  for (auto position : lower.positions) frame.positions.push_back(position - Vec3f(0, 0, 0.2f));
+  for (auto indices : lower.triangles) {
+    for (auto& index : indices) index += std::uint32_t(lower.positions.size());
+    frame.triangles.push_back(indices);
+  }
+  frame.normals.clear();
+  frame.uvs.clear();
+  stage.add_object("frame", frame, at(0.8, 0, 0.616));
+  const auto on_corner = Eigen::Quaterniond::FromTwoVectors(Vec3(1, 1, 1), Vec3::UnitZ());
+  stage.add_object("on_a_corner", kBox, at(-2, -2, 0.1 * std::sqrt(3.0) + 0.002) * on_corner);
+  stage.add_object("fork", make_box(Vec3(0.15, 0.02, 0.002)), at(0, 0.2, 0.7));
+  CHECK(stage.unsettled() == Texts{});
 }
 
 TEST_CASE("Things that lie on what is hidden hang in the air", "[settle]") {

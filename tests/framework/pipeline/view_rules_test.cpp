@@ -7,6 +7,7 @@
 #include "diorama/error.h"
 #include "framework/config/value_text.h"
 #include "framework/pipeline/capture_plan.h"
+#include "framework/pipeline/view_check.h"
 #include "framework/pipeline/view_report.h"
 #include "framework/pipeline/view_search.h"
 #include "jobs.h"
@@ -21,7 +22,93 @@ std::string job_with_views(const std::string& entry) {
   return good_job() + "views: [" + entry + "]\n";
 }
 
+/// A near and a far thing before a camera, and the rectangles of the picture where they are seen.
+struct Shown {
+  struct Rectangle {
+    int x, y, width, height;
+  };
+  Shown() {
+    near_thing = add("near", 1.0);
+    far_thing = add("far", 3.0);
+    camera = scene.create(scene.root(), "cam");
+    scene.edit(camera).camera = Camera{};
+    scene.edit(camera).camera->width = 160;
+    scene.edit(camera).camera->height = 120;
+    scene.edit(camera).camera->fx = scene.edit(camera).camera->fy = 100.0;
+    scene.edit(camera).camera->cx = 80.0;
+    scene.edit(camera).camera->cy = 60.0;
+  }
+  NodeId add(const std::string& name, double distance_m) {
+    const NodeId node = scene.create(scene.root(), name);
+    scene.edit(node).mesh = std::make_shared<const Mesh>(make_box(Vec3(0.2, 0.2, 0.2)));
+    scene.edit(node).labels["class"] = name;
+    scene.set_pose(node, Affine(Eigen::Translation3d(0, 0, -distance_m)));
+    return node;
+  }
+  /// The first condition that fails by every step-th pixel; empty: none.
+  std::string failed(const std::string& entry, int step, const Rectangle& near_one,
+                     const Rectangle& far_one = {0, 0, 0, 0}) const {
+    const Job job = job_from(job_with_views("{name: seen, targets: \"/**\", " + entry + "}"));
+    const ViewRule& rule = job.views.front();
+    const ViewCheck check(scene, {&rule});
+    WantedView wanted{&rule, std::vector<std::optional<std::size_t>>(rule.quotas.size(), 0)};
+    ViewCheck::Labels labels;
+    labels.step = step;
+    labels.render = [&] {
+      const int first = step / 4;
+      Image<std::uint32_t> ids(160 / step, 120 / step, 0);
+      for (int y = 0; y < ids.height(); ++y) {
+        for (int x = 0; x < ids.width(); ++x) {
+          const auto lies_in = [&](const Rectangle& r) {
+            const int across = x * step + first - r.x;
+            const int down = y * step + first - r.y;
+            return across >= 0 && across < r.width && down >= 0 && down < r.height;
+          };
+          if (lies_in(far_one)) ids.at(x, y) = far_thing.index;
+          if (lies_in(near_one)) ids.at(x, y) = near_thing.index;
+        }
+      }
+      return ids;
+    };
+    const ViewVerdict verdict = check.by_labels(scene, camera, {wanted}, labels);
+    return verdict.holds() ? "" : verdict.failed.front();
+  }
+
+  Scene scene;
+  NodeId near_thing, far_thing, camera;
+};
+
 }  // namespace
+
+TEST_CASE("Few pixels refuse what misses a condition clearly, and leave the rest to all of them",
+          "[views]") {
+  const Shown shown;
+  const std::string large = "visible_pixels: {min: 400}";
+  CHECK(shown.failed(large, 4, {10, 10, 40, 30}) == "");
+  CHECK(shown.failed(large, 4, {10, 10, 8, 8}) == "seen.visible_pixels");
+  // Nobody knows by a sixteenth of its pixels.
+  CHECK(shown.failed(large, 4, {10, 10, 19, 20}) == "");
+  CHECK(shown.failed(large, 1, {10, 10, 19, 20}) == "seen.visible_pixels");
+  // The grid passes it by.
+  CHECK(shown.failed("visible_pixels: {min: 1}", 4, {10, 10, 3, 3}) == "");
+
+  const std::string narrow = "visible_pixels: {min: 100}, size_px: {max: 50}";
+  CHECK(shown.failed(narrow, 4, {10, 10, 52, 5}) == "");
+  CHECK(shown.failed(narrow, 1, {10, 10, 52, 5}) == "seen.size_px");
+  CHECK(shown.failed(narrow, 4, {10, 10, 90, 5}) == "seen.size_px");
+}
+
+TEST_CASE("By few pixels a quota is missed where no other target can be the main one", "[views]") {
+  const Shown shown;
+  const std::string near = "quotas: [{of: distance_m, edges: [0.5, 2, 4]}]";
+  CHECK(shown.failed(near, 4, {10, 10, 20, 20}, {60, 10, 80, 80}) == "seen.quotas.distance_m");
+  CHECK(shown.failed(near, 4, {10, 10, 80, 80}, {100, 10, 20, 20}) == "");
+  for (const int width : {56, 64}) {  // of 60
+    INFO(width);
+    CHECK(shown.failed(near, 4, {0, 10, 60, 60}, {80, 10, width, 60}) == "");
+  }
+  CHECK(shown.failed(near, 1, {0, 10, 60, 60}, {80, 10, 64, 60}) == "seen.quotas.distance_m");
+}
 
 TEST_CASE("Of every block of views each part of a quota gets its share exactly", "[views]") {
   Quota quota;
