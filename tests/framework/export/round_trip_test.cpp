@@ -258,11 +258,11 @@ TEST_CASE("joints come back with their places, limits and positions", "[export]"
       REQUIRE(all.size() == 1);
       return all.front();
     };
-    for (const NodeId body : {door, drawer, leg}) {
-      INFO(scene[body].name);
-      const Affine was = scene.world_from_node(base).inverse() * scene.world_from_node(body);
+    for (const NodeId held : {door, drawer, leg}) {
+      INFO(scene[held].name);
+      const Affine was = scene.world_from_node(base).inverse() * scene.world_from_node(held);
       const Affine now = loaded.world_from_node(found("base")).inverse() *
-                         loaded.world_from_node(found(scene[body].name.c_str()));
+                         loaded.world_from_node(found(scene[held].name.c_str()));
       CHECK(now.isApprox(was, 1e-9));
     }
     const auto check = [&](const char* name, NodeId was, double scale) {
