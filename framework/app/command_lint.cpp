@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "framework/app/heap.h"
 #include "framework/app/standard_output.h"
 #include "framework/config/yaml_config.h"
 #include "framework/datasets/dataset_difference.h"
@@ -38,6 +39,7 @@ LintReport lint_scenes_of(const std::string& run, const Value& job, const JobSer
 }  // namespace
 
 int command_lint(const GlobalOptions& global, const LintOptions& options, ConsoleLog& log) {
+  keep_large_blocks();
   const Value job = options.looks_at_scenes ? job_of(options.dataset) : Value();
   const JobServices services = make_job_services(global, job, log.sink());
   DatasetReaders readers(*services.registry, *services.host);

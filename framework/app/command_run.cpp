@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "framework/app/command_run.h"
 
-#include <malloc.h>
-
 #include <atomic>
 #include <csignal>
 #include <functional>
@@ -14,6 +12,7 @@
 #include <utility>
 
 #include "framework/app/exit_codes.h"
+#include "framework/app/heap.h"
 #include "framework/app/shell_text.h"
 #include "framework/app/standard_output.h"
 #include "framework/config/job_overrides.h"
@@ -171,20 +170,9 @@ void print_estimate(const GlobalOptions& global, const Value& job, ConsoleLog& l
   print_text(estimate_text(run_trial(global, job, trial, once)));
 }
 
-/// From now on blocks as large as pictures go back to the system when they are freed. By itself
-/// glibc keeps ever larger ones, up to 32 MiB, in heaps that it can only cut at their ends: memory
-/// would creep up over thousands of captures.
-void give_memory_back() {
-#ifdef __GLIBC__
-  constexpr int kLargeBlock = 512 << 10;
-  mallopt(M_MMAP_THRESHOLD, kLargeBlock);
-  mallopt(M_TRIM_THRESHOLD, 2 * kLargeBlock);
-#endif
-}
-
 int run_value(const GlobalOptions& global, const Value& job, const RunCommandOptions& options,
               ConsoleLog& log) {
-  give_memory_back();
+  give_large_blocks_back();
   const JobServices services = make_job_services(global, job, log.sink());
   JobAssembly assembly =
       assemble_job(job, *services.registry, *services.host, services.assets_root, program_version(),

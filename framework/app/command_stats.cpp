@@ -5,6 +5,7 @@
 #include <iostream>
 
 #include "diorama/error.h"
+#include "framework/app/heap.h"
 #include "framework/app/standard_output.h"
 #include "framework/datasets/dataset_origin.h"
 #include "framework/datasets/dataset_readers.h"
@@ -14,6 +15,7 @@
 namespace diorama {
 
 int command_stats(const GlobalOptions& global, const StatsOptions& options, ConsoleLog& log) {
+  keep_large_blocks();
   const JobServices services = make_services(global, log.sink());
   DatasetReaders readers(*services.registry, *services.host);
   const FoundDataset found = find_dataset(options.dataset, readers, options.reader);

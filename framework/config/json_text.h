@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <limits>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 #include <string_view>
 
 /// JSON files of others.
@@ -26,6 +28,18 @@ Json parse_json_or_nothing(std::string_view text) {
   } catch (const std::exception&) {
     return Json(Json::value_t::discarded);
   }
+}
+
+/// Throws std::exception for what is no number, and for numbers that an int cannot hold: with those
+/// get() does what it likes.
+template <class Json>
+int int_of_json(const Json& value) {
+  const double number = value.template get<double>();
+  constexpr double kMost = std::numeric_limits<int>::max();
+  if (!(number >= -kMost && number <= kMost)) {
+    throw std::runtime_error(value.dump() + " is beyond reason");
+  }
+  return value.template get<int>();
 }
 
 }  // namespace diorama

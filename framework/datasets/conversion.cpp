@@ -124,6 +124,11 @@ void Conversion::note_differences(const ConversionSource& source) {
   if (!derived.empty()) {
     notes_.push_back(who + ": " + joined(derived) + " comes from the other kind of distance");
   }
+  if (made_up.erase("occlusion_order") > 0) {
+    notes_.push_back(who +
+                     ": does not hold occlusion_order; lists of what hides an object are empty, "
+                     "whatever is hidden");
+  }
   if (!made_up.empty()) {
     notes_.push_back(who + ": does not hold " + joined(made_up) +
                      "; objects count as neither hidden nor cut off");

@@ -110,12 +110,14 @@ class Measurement {
   }
 
   static void judge_color(const Image<Rgba8>& image, SeenPicture& seen) {
+    const auto pixels = image.pixels();
     std::size_t burnt = 0;
-    bool is_uniform = true;
-    for (const Rgba8& pixel : image.pixels()) {
-      if (pixel[0] >= 254 && pixel[1] >= 254 && pixel[2] >= 254) ++burnt;
-      is_uniform = is_uniform && pixel == image.pixels()[0];
+    for (const Rgba8& pixel : pixels) {
+      burnt += std::size_t(std::min({pixel[0], pixel[1], pixel[2]}) >= 254);
     }
+    // Nearly always the first rows tell.
+    const bool is_uniform =
+        std::ranges::all_of(pixels, [&](const Rgba8& pixel) { return pixel == pixels[0]; });
     const double count = double(std::max<std::size_t>(image.pixels().size(), 1));
     seen.brightness = mean_brightness(image);
     if (*seen.brightness < kBlack) {

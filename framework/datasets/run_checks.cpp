@@ -10,10 +10,13 @@
 #include <utility>
 #include <vector>
 
+#include "diorama/writer.h"
 #include "framework/config/json_text.h"
 #include "framework/datasets/capture_sweep.h"
 #include "framework/datasets/check_names.h"
 #include "framework/datasets/frame_checks.h"
+#include "framework/datasets/level_agreement.h"
+#include "framework/datasets/track_agreement.h"
 #include "framework/output/file_system.h"
 
 namespace diorama {
@@ -32,6 +35,8 @@ constexpr std::size_t kMostExamples = 100;
 constexpr double kMuchLarger = 5.0;
 /// Shares are quotients of pixel counts, which formats round.
 constexpr double kShareSlack = 1e-3;
+/// Keypoints are rounded to a few digits.
+constexpr double kKeypointSlack = 0.05;
 /// Boxes that are rounded to more do not tell objects apart.
 constexpr int kTellingPixels = 16;
 
@@ -39,7 +44,17 @@ constexpr int kTellingPixels = 16;
 struct RunPlan {
   int captures = 0;
   std::vector<std::string> cameras;
+  std::vector<DatasetClip> clips;
 };
+
+std::vector<DatasetClip> planned_clips(const Json& page) {
+  std::vector<DatasetClip> clips;
+  for (const Json& clip : page.value("clips", Json::array())) {
+    clips.push_back({int_of_json(clip.at("first_capture")), int_of_json(clip.at("frame_count")),
+                     clip.at("fps").get<double>()});
+  }
+  return clips;
+}
 
 std::optional<RunPlan> read_plan(const std::filesystem::path& run, ReadLog& log) {
   LocalFileSystem file_system;
@@ -47,12 +62,33 @@ std::optional<RunPlan> read_plan(const std::filesystem::path& run, ReadLog& log)
   ++log.files;
   try {
     const Json page = parse_json(file_system.read(run / "dataset.json"));
-    return RunPlan{page.at("captures").get<int>(),
-                   page.at("cameras").get<std::vector<std::string>>()};
+    return RunPlan{int_of_json(page.at("captures")),
+                   page.at("cameras").get<std::vector<std::string>>(), planned_clips(page)};
   } catch (const std::exception& error) {
     log.findings.push_back(
         {kFilesCanBeRead, "dataset.json", std::nullopt, "", "", error.what(), ""});
     return std::nullopt;
+  }
+}
+
+/// Captures that a clip of the plan begins with begin one in the dataset, as long and as fast.
+void check_clips(const RunPlan& plan, const RunDataset& dataset, ReadLog& log) {
+  const StoredInfo& info = dataset.data->info();
+  if (!info.holds.contains(kHoldsClips)) return;
+  for (std::size_t i = 0; i < plan.clips.size(); ++i) {
+    const DatasetClip& clip = plan.clips[i];
+    const auto place = std::ranges::lower_bound(info.captures, clip.first);
+    if (place == info.captures.end() || *place != clip.first) continue;
+    const auto stored = dataset.data->read(std::size_t(place - info.captures.begin()), {});
+    const auto& found = stored.capture.clip;
+    const bool is_same = found && found->clip == int(i) && found->frame == 0 &&
+                         found->frame_count == clip.count && found->fps == clip.fps;
+    log.check(is_same, {kCountsAgree, dataset.name, clip.first, "", "clip " + std::to_string(i),
+                        !found ? "is none"
+                               : "has " + std::to_string(found->frame_count) + " frames, " +
+                                     std::to_string(found->fps) + " per second",
+                        "dataset.json plans " + std::to_string(clip.count) + ", " +
+                            std::to_string(clip.fps) + " per second"});
   }
 }
 
@@ -70,6 +106,7 @@ void check_plan(const RunPlan& plan, const RunDataset& dataset, ReadLog& log) {
               {kNothingIsMissing, dataset.name, std::nullopt, camera, "",
                "has no pictures of this camera", ""});
   }
+  check_clips(plan, dataset, log);
 }
 
 /// An object of one dataset without a partner in the other, or with one of a rare class.
@@ -99,22 +136,54 @@ double misfit(const Affine& camera_from_box, const Aabb& box, const Affine& came
   return off.cwiseProduct(camera_from_box.linear().colwise().norm().transpose()).maxCoeff();
 }
 
-/// Compares a dataset with the one that holds most.
+/// What two datasets say of the same objects beside their places.
+NameSet shared_facts(const StoredInfo& a, const StoredInfo& b) {
+  NameSet facts;
+  const auto add = [&](std::string_view held, const char* asked) {
+    if (!a.holds.contains(held)) return;
+    if (b.holds.contains(held))
+      facts.emplace(held);
+    else if (b.steps.contains(std::string_view(asked)))
+      facts.emplace(asked);
+  };
+  add(kHoldsOcclusion, kAskOcclusionLevels);
+  add(kHoldsTruncation, kAskTruncationLevels);
+  const auto holds_share = [](const StoredInfo& info) {
+    return info.holds.contains(kHoldsOcclusion) && info.holds.contains(kHoldsTruncation);
+  };
+  if (holds_share(a) && b.steps.contains(std::string_view(kAskSeenShares))) {
+    facts.emplace(kAskSeenShares);
+  }
+  if (a.holds.contains(kHoldsKeypoints) && b.holds.contains(kHoldsKeypoints)) {
+    facts.emplace(kHoldsKeypoints);
+  }
+  return facts;
+}
+
+/// Compares a dataset with the one that holds most, or, with a third one, in what that does not
+/// tell: `facts` is of shared_facts().
 class RunComparison {
  public:
-  RunComparison(const RunDataset& reference, const RunDataset& other)
-      : reference_(reference), other_(other), a_(reference.data->info()), b_(other.data->info()) {}
+  RunComparison(const RunDataset& reference, const RunDataset& other, NameSet facts, bool is_all)
+      : reference_(reference),
+        other_(other),
+        a_(reference.data->info()),
+        b_(other.data->info()),
+        facts_(std::move(facts)),
+        is_all_(is_all) {}
 
   NameSet wanted() const {
-    NameSet both;
+    NameSet both = facts_;
+    // Levels and the like go with shares of the other.
+    both.insert({std::string(kHoldsInstances), std::string(kHoldsTightBoxes),
+                 std::string(kHoldsOcclusion), std::string(kHoldsTruncation)});
+    if (!is_all_) return both;
     for (const std::string& name : b_.holds) {
       if (a_.holds.contains(name) && name != "amodal_mask" && name != "pointcloud") {
         both.insert(name);
       }
     }
-    if (knows_sights()) {
-      both.insert({std::string(kInstanceId.name), std::string(kHoldsOcclusion)});
-    }
+    if (knows_sights()) both.emplace(kInstanceId.name);
     return both;
   }
 
@@ -139,18 +208,14 @@ class RunComparison {
       const bool is_small = !object.is_over_some && object.area < kMuchLarger * least_area_;
       if (!is_other_choice && !is_small) log.findings.push_back(std::move(object.finding));
     }
-    for (auto& [held, shares] : shares_) {
+    for (auto& [what, agreement] : agreements_) {
       ++log.checks;
-      const double rare = std::max(1.0, kRare * double(shares.count));
-      if (shares.count < 2 || double(shares.wrong_count) > rare) continue;
-      for (Finding& finding : shares.wrong) log.findings.push_back(std::move(finding));
+      const double rare = std::max(1.0, kRare * double(agreement.count));
+      if (agreement.count < 2 || double(agreement.wrong_count) > rare) continue;
+      for (Finding& finding : agreement.wrong) log.findings.push_back(std::move(finding));
     }
-    for (auto& [labels, boxes] : boxes_of_labels_) {
-      ++log.checks;
-      const double rare = std::max(1.0, kRare * double(boxes.count));
-      if (boxes.count < 2 || double(boxes.wrong_count) > rare) continue;
-      for (Finding& finding : boxes.wrong) log.findings.push_back(std::move(finding));
-    }
+    for (auto& [asked, levels] : levels_) levels.finish(log);
+    tracks_.finish(log);
     for (auto& [labels, classes] : classes_of_labels_) {
       std::int64_t all = 0;
       for (const auto& [name, example] : classes) all += example.count;
@@ -197,14 +262,12 @@ class RunComparison {
     log.check(is_same_size, about(b, k, kColor.name, "", "has another size of picture",
                                   "that of " + in_reference(kColor.name)));
     if (!is_same_size) return;
-    if (one.has(kColor.name) && other.has(kColor.name)) {
+    if (is_all_ && one.has(kColor.name) && other.has(kColor.name)) {
       log.check(is_same_picture(one, other),
                 about(b, k, kColor.name, "", "is another picture than", in_reference(kColor.name)));
     }
     compare_depth(one, other, b, k, in_reference(kDistanceToImagePlane.name), log);
-    if (a_.holds.contains(kHoldsTightBoxes) && b_.holds.contains(kHoldsTightBoxes)) {
-      compare_objects(one, b, k, in_reference(kHoldsInstances), log);
-    }
+    if (have_partners()) compare_objects(a, i, b, k, in_reference(kHoldsInstances), log);
   }
 
   bool is_same_picture(const Frame& one, const Frame& other) const {
@@ -238,38 +301,84 @@ class RunComparison {
                     std::to_string(wrong) + " pixels have another depth than in", in_reference));
   }
 
-  void compare_objects(const Frame& one, const StoredCapture& b, std::size_t k,
+  /// Objects are the same by name, or else by place.
+  bool have_partners() const { return are_named() || have_boxes(); }
+  bool are_named() const {
+    return a_.holds.contains(kHoldsNodePaths) && b_.holds.contains(kHoldsNodePaths);
+  }
+  bool have_boxes() const {
+    return a_.holds.contains(kHoldsTightBoxes) && b_.holds.contains(kHoldsTightBoxes) &&
+           box_slack() < kTellingPixels;
+  }
+  int box_slack() const {
+    return int(std::ceil(step_of(a_, kHoldsTightBoxes) + step_of(b_, kHoldsTightBoxes)));
+  }
+
+  bool is_namesake(const Instance& one, const Instance& other) const {
+    return are_named() && one.node_path == other.node_path;
+  }
+  bool is_in_place(const Instance& one, const Instance& other) const {
+    return have_boxes() && one.tight_box && other.tight_box &&
+           is_near(*one.tight_box, *other.tight_box, box_slack());
+  }
+
+  /// The one of the same name, or else all in the same place.
+  std::vector<const Instance*> partners_of(const Frame& one, const Instance& object) const {
+    std::vector<const Instance*> partners;
+    for (const Instance& candidate : one.instances) {
+      if (is_namesake(candidate, object)) return {&candidate};
+      if (is_in_place(candidate, object)) partners.push_back(&candidate);
+    }
+    return partners;
+  }
+
+  void compare_objects(const StoredCapture& a, std::size_t i, const StoredCapture& b, std::size_t k,
                        const std::string& in_reference, ReadLog& log) {
-    const int slack = int(std::ceil(step_of(a_, kHoldsTightBoxes) + step_of(b_, kHoldsTightBoxes)));
-    if (slack >= kTellingPixels) return;
+    const Frame& one = a.capture.frames[i];
+    std::map<std::uint32_t, std::int64_t> pixels;
+    if (one.has(kInstanceId.name)) {
+      for (const std::uint32_t id : one.get(kInstanceId).pixels()) ++pixels[id];
+    }
     for (const Instance& object : b.capture.frames[k].instances) {
-      if (!object.tight_box) continue;
+      if (have_boxes() && !object.tight_box) continue;
       ++objects_;
       ++log.checks;
-      std::vector<const Instance*> partners;
-      for (const Instance& candidate : one.instances) {
-        if (candidate.tight_box && is_near(*candidate.tight_box, *object.tight_box, slack)) {
-          partners.push_back(&candidate);
-        }
-      }
+      const std::vector<const Instance*> partners = partners_of(one, object);
       if (partners.empty()) {
         ++unmatched_;
-        if (unmatched_examples_.size() < kMostExamples) {
+        if (is_all_ && unmatched_examples_.size() < kMostExamples) {
+          const PixelBox box = object.tight_box.value_or(PixelBox());
           unmatched_examples_.push_back(
-              {about(b, k, kHoldsTightBoxes, object.node_path, "lies where no object is",
-                     "the place of an object in " + in_reference),
-               area_of(*object.tight_box), is_over_some(one, *object.tight_box)});
+              {about(b, k, kHoldsTightBoxes, object.node_path,
+                     have_boxes() ? "lies where no object is" : "is no object",
+                     (have_boxes() ? "the place of an object in " : "one of those in ") +
+                         in_reference),
+               area_of(box), !have_boxes() || is_over_some(one, box)});
         }
         continue;
       }
       // Of several in one place, none says which is meant.
       if (partners.size() != 1) continue;
-      remember_class(*partners.front(), object, b, k, in_reference);
-      remember_box(one, *partners.front(), b, k, object, in_reference);
-      remember_shares(*partners.front(), b, k, object, in_reference);
+      const Instance& partner = *partners.front();
+      remember_facts(partner, b, k, object, in_reference);
+      remember_keypoints(a, i, partner, b, k, object, in_reference);
+      if (!is_all_) continue;
+      if (have_boxes() && partner.tight_box) {
+        remember("box", is_in_place(partner, object), [&] {
+          return about(b, k, kHoldsTightBoxes, object.node_path, "lies elsewhere than",
+                       "it does in " + in_reference);
+        });
+      }
+      if (!is_namesake(partner, object)) remember_track(partner, b, k, object, in_reference);
+      remember_class(partner, object, b, k, in_reference);
+      remember_box(one, partner, b, k, object, in_reference);
+      remember_place(partner, b, k, object, in_reference);
+      const auto seen = pixels.find(partner.id);
+      if (seen != pixels.end()) remember_pixels(seen->second, b, k, object, in_reference);
     }
+    if (!is_all_) return;
     remember_areas(one);
-    if (knows_sights()) remember_choice(one, b, k, in_reference, slack);
+    if (knows_sights()) remember_choice(one, b, k, in_reference, pixels);
   }
 
   static double area_of(const PixelBox& box) {
@@ -293,24 +402,115 @@ class RunComparison {
     }
   }
 
-  /// Hidden and cut off shares. Where most differ, a format measures them in its own way.
-  void remember_shares(const Instance& partner, const StoredCapture& b, std::size_t k,
-                       const Instance& object, const std::string& in_reference) {
+  /// Where most objects differ in something, a format measures it in its own way.
+  template <class Make>
+  void remember(const std::string& what, bool is_same, Make&& make) {
+    Agreement& agreement = agreements_[what];
+    ++agreement.count;
+    if (is_same) return;
+    ++agreement.wrong_count;
+    if (agreement.wrong.size() < kMostExamples) agreement.wrong.push_back(make());
+  }
+
+  void remember_number(const std::string& what, std::string_view held, double first, double second,
+                       double slack, const StoredCapture& b, std::size_t k, const Instance& object,
+                       const std::string& in_reference) {
+    remember(what, std::abs(first - second) <= slack, [&] {
+      return about(b, k, held, object.node_path, "its " + what + " is " + std::to_string(second),
+                   std::to_string(first) + ", as in " + in_reference);
+    });
+  }
+
+  /// Hidden and cut off shares, or levels of them.
+  void remember_facts(const Instance& partner, const StoredCapture& b, std::size_t k,
+                      const Instance& object, const std::string& in_reference) {
     if (!partner.visibility || !object.visibility) return;
-    const auto compare = [&](std::string_view held, std::optional<double> first,
+    const Visibility& said = *object.visibility;
+    const auto compare = [&](std::string_view held, const char* asked, std::optional<double> first,
                              std::optional<double> second) {
-      if (!a_.holds.contains(held) || !b_.holds.contains(held) || !first || !second) return;
-      Boxes& shares = shares_[std::string(held)];
-      ++shares.count;
-      if (std::abs(*first - *second) <= step_of(a_, held) + step_of(b_, held) + kShareSlack) return;
-      ++shares.wrong_count;
-      if (shares.wrong.size() >= kMostExamples) return;
-      shares.wrong.push_back(about(b, k, held, object.node_path,
-                                   "its " + std::string(held) + " is " + std::to_string(*second),
-                                   std::to_string(*first) + ", as in " + in_reference));
+      if (!first || !second) return;
+      if (facts_.contains(held)) {
+        const double slack = step_of(a_, held) + step_of(b_, held) + kShareSlack;
+        remember_number(std::string(held), held, *first, *second, slack, b, k, object,
+                        in_reference);
+      }
+      if (!facts_.contains(asked)) return;
+      levels_[asked].add(*second, *first, [&] {
+        return about(b, k, held, object.node_path,
+                     "its level of " + std::string(held) + " does not go with others",
+                     "one for " + std::to_string(*first) + ", as in " + in_reference);
+      });
     };
-    compare(kHoldsOcclusion, partner.visibility->occlusion(), object.visibility->occlusion());
-    compare(kHoldsTruncation, partner.visibility->truncation(), object.visibility->truncation());
+    compare(kHoldsOcclusion, kAskOcclusionLevels, partner.visibility->occlusion(),
+            said.occlusion());
+    compare(kHoldsTruncation, kAskTruncationLevels, partner.visibility->truncation(),
+            said.truncation());
+    const auto seen_share = [](const Visibility& seen) {
+      return (1.0 - seen.occlusion().value_or(0.0)) * (1.0 - seen.truncation());
+    };
+    if (facts_.contains(kAskSeenShares)) {
+      remember_number("visible share", kHoldsOcclusion, seen_share(*partner.visibility),
+                      seen_share(said), kShareSlack, b, k, object, in_reference);
+    }
+  }
+
+  /// Pixels of the reference's masks against what the other dataset counts.
+  void remember_pixels(std::int64_t pixels, const StoredCapture& b, std::size_t k,
+                       const Instance& object, const std::string& in_reference) {
+    if (!b_.holds.contains(kHoldsOcclusion) || !object.visibility) return;
+    remember_number("count of visible pixels", kHoldsOcclusion, double(pixels),
+                    double(object.visibility->visible_pixels), 0.5, b, k, object, in_reference);
+  }
+
+  /// Poses of named objects; those of boxes are remember_box()'s.
+  void remember_place(const Instance& partner, const StoredCapture& b, std::size_t k,
+                      const Instance& object, const std::string& in_reference) {
+    const auto holds = [](const StoredInfo& info) {
+      return info.holds.contains(kHoldsPoses) && info.holds.contains(kHoldsCameraPose);
+    };
+    if (!are_named() || !holds(a_) || !holds(b_)) return;
+    const Vec3 first = partner.world_from_node.translation();
+    const double off = (first - object.world_from_node.translation()).norm();
+    const double slack =
+        step_of(a_, kHoldsPoses) + step_of(b_, kHoldsPoses) + 1e-3 * (1.0 + first.norm());
+    remember("place", off <= slack, [&] {
+      return about(b, k, kHoldsPoses, object.node_path, "is " + std::to_string(off) + " m beside",
+                   "its place in " + in_reference);
+    });
+  }
+
+  void remember_track(const Instance& partner, const StoredCapture& b, std::size_t k,
+                      const Instance& object, const std::string& in_reference) {
+    const auto& clip = b.capture.clip;
+    const bool is_named = a_.holds.contains(kHoldsNodePaths);
+    if (!clip || !b_.holds.contains(kHoldsTracks)) return;
+    if (!is_named && !a_.holds.contains(kHoldsTracks)) return;
+    const std::string name = is_named ? partner.node_path : std::to_string(partner.id);
+    tracks_.add(*clip, b.capture.frames[k].camera_name, name, object.id, [&] {
+      return about(b, k, kHoldsInstances, "track " + std::to_string(object.id),
+                   "is " + name + " by " + in_reference, "the same object in all of the clip");
+    });
+  }
+
+  void remember_keypoints(const StoredCapture& a, std::size_t i, const Instance& partner,
+                          const StoredCapture& b, std::size_t k, const Instance& object,
+                          const std::string& in_reference) {
+    if (!facts_.contains(kHoldsKeypoints)) return;
+    if (i >= a.keypoints.size() || k >= b.keypoints.size()) return;
+    const auto first = a.keypoints[i].find(partner.id);
+    const auto second = b.keypoints[k].find(object.id);
+    if (first == a.keypoints[i].end() || second == b.keypoints[k].end()) return;
+    const double slack =
+        kKeypointSlack + step_of(a_, kHoldsKeypoints) + step_of(b_, kHoldsKeypoints);
+    const auto is_same = [&](const StoredKeypoint& one, const StoredKeypoint& other) {
+      if (one.sight != other.sight) return false;
+      if (one.sight == StoredKeypoint::Sight::NotTold) return true;
+      return (one.pixel - other.pixel).cwiseAbs().maxCoeff() <= slack;
+    };
+    remember("keypoints", std::ranges::equal(first->second, second->second, is_same), [&] {
+      return about(b, k, kHoldsKeypoints, object.node_path, "its keypoints are others than",
+                   "those in " + in_reference);
+    });
   }
 
   /// What is seen of an object, by which writers leave some out.
@@ -325,22 +525,21 @@ class RunComparison {
 
   bool knows_sights() const {
     return a_.holds.contains(kInstanceId.name) && a_.holds.contains(kHoldsOcclusion) &&
-           a_.holds.contains(kHoldsTightBoxes) && b_.holds.contains(kHoldsTightBoxes) &&
+           a_.holds.contains(kHoldsTightBoxes) && have_partners() &&
            a_.holds.contains(kHoldsLabels);
   }
 
   /// Which objects of the reference the other dataset has, and which not.
   void remember_choice(const Frame& one, const StoredCapture& b, std::size_t k,
-                       const std::string& in_reference, int slack) {
+                       const std::string& in_reference,
+                       std::map<std::uint32_t, std::int64_t>& pixels) {
     if (!one.has(kInstanceId.name)) return;
-    std::map<std::uint32_t, std::int64_t> pixels;
-    for (const std::uint32_t id : one.get(kInstanceId).pixels()) ++pixels[id];
     for (const Instance& object : one.instances) {
       const auto occlusion = object.visibility ? object.visibility->occlusion() : std::nullopt;
       if (!object.tight_box || object.labels.empty() || !occlusion) continue;
       const auto& others = b.capture.frames[k].instances;
       const bool is_there = std::ranges::any_of(others, [&](const Instance& other) {
-        return other.tight_box && is_near(*object.tight_box, *other.tight_box, slack);
+        return is_namesake(object, other) || is_in_place(object, other);
       });
       const Sight sight{pixels[object.id], 1.0 - *occlusion};
       Choice& choice = choices_[text_of(object.labels)];
@@ -407,20 +606,19 @@ class RunComparison {
     const double size = (first.linear() * partner.bounds_node.size()).norm();
     const double slack =
         2.0 * (step(a_) + step(b_)) + 1e-3 * (size + 0.1 * first.translation().norm());
-    Boxes& boxes = boxes_of_labels_[text_of(partner.labels)];
-    ++boxes.count;
-    if (off <= slack) return;
-    ++boxes.wrong_count;
-    if (boxes.wrong.size() >= kMostExamples) return;
-    boxes.wrong.push_back(about(b, k, kHoldsBoxes3d, object.node_path,
-                                "its 3-D box is off by " + std::to_string(off) + " m",
-                                "the place, size and turn that it has in " + in_reference));
+    remember("3-D box of " + text_of(partner.labels), off <= slack, [&] {
+      return about(b, k, kHoldsBoxes3d, object.node_path,
+                   "its 3-D box is off by " + std::to_string(off) + " m",
+                   "the place, size and turn that it has in " + in_reference);
+    });
   }
 
   const RunDataset& reference_;
   const RunDataset& other_;
   const StoredInfo& a_;
   const StoredInfo& b_;
+  NameSet facts_;
+  bool is_all_;
   std::int64_t objects_ = 0;
   std::int64_t unmatched_ = 0;
   struct Unmatched {
@@ -437,22 +635,22 @@ class RunComparison {
   };
   std::map<std::string, Choice> choices_;  ///< By labels in the reference.
   std::vector<Sight> kept_;                ///< Of all of them.
-  struct Boxes {
+  struct Agreement {
     std::int64_t count = 0;
     std::int64_t wrong_count = 0;
     std::vector<Finding> wrong;
   };
-  std::map<std::string, Boxes> boxes_of_labels_;  ///< By labels in the reference.
-  std::map<std::string, Boxes> shares_;           ///< By what is held.
+  std::map<std::string, Agreement> agreements_;   ///< By what is compared.
+  std::map<std::string, LevelAgreement> levels_;  ///< By what was asked for.
+  TrackAgreement tracks_;
   /// Labels in the reference, then classes in the other dataset.
   std::map<std::string, std::map<std::string, Example>> classes_of_labels_;
 };
 
-void compare_datasets(const RunDataset& reference, const RunDataset& other, Host& host,
-                      ReadLog& log) {
-  RunComparison comparison(reference, other);
+void compare_datasets(const RunDataset& reference, const RunDataset& other, const NameSet& facts,
+                      bool is_all, Host& host, ReadLog& log) {
+  RunComparison comparison(reference, other, facts, is_all);
   const NameSet wanted = comparison.wanted();
-  if (wanted.empty()) return;
   const std::vector<int>& captures = reference.data->info().captures;
   struct Pair {
     StoredCapture a;
@@ -473,6 +671,22 @@ void compare_datasets(const RunDataset& reference, const RunDataset& other, Host
   comparison.finish(log);
 }
 
+/// What the reference does not tell and a third dataset does.
+void compare_rest(const std::vector<RunDataset>& datasets, const RunDataset& reference,
+                  const RunDataset& dataset, const NameSet& compared, Host& host, ReadLog& log) {
+  const RunDataset* third = nullptr;
+  NameSet rest;
+  for (const RunDataset& candidate : datasets) {
+    if (&candidate == &reference || &candidate == &dataset) continue;
+    NameSet facts = shared_facts(candidate.data->info(), dataset.data->info());
+    std::erase_if(facts, [&](const std::string& name) { return compared.contains(name); });
+    if (facts.size() <= rest.size()) continue;
+    rest = std::move(facts);
+    third = &candidate;
+  }
+  if (third) compare_datasets(*third, dataset, rest, false, host, log);
+}
+
 }  // namespace
 
 ReadLog check_run(const std::filesystem::path& run, const std::vector<RunDataset>& datasets,
@@ -485,7 +699,10 @@ ReadLog check_run(const std::filesystem::path& run, const std::vector<RunDataset
   const auto reference = std::ranges::max_element(
       datasets, {}, [](const RunDataset& dataset) { return dataset.data->info().holds.size(); });
   for (const RunDataset& dataset : datasets) {
-    if (&dataset != &*reference) compare_datasets(*reference, dataset, host, log);
+    if (&dataset == &*reference) continue;
+    const NameSet facts = shared_facts(reference->data->info(), dataset.data->info());
+    compare_datasets(*reference, dataset, facts, true, host, log);
+    compare_rest(datasets, *reference, dataset, facts, host, log);
   }
   return log;
 }

@@ -62,10 +62,11 @@ std::optional<Mesh> make_tapered(const Ends& ends, bool is_capsule) {
 
 std::optional<Mesh> make_shape(const usd::Stage& stage, const usd::Prim& prim) {
   const std::string& type = prim.type_name;
-  // Zero where it is no number.
+  // Zero where it is no number, or one whose square is none that fits into a mesh.
+  constexpr double kLargest = 1e18;
   const auto length = [&](const char* name, double fallback) {
     const double value = std::abs(usd::number_or(stage, prim, name, fallback));
-    return std::isfinite(value) ? value : 0.0;
+    return value < kLargest ? value : 0.0;
   };
   if (type == "Cube") {
     const double size = length("size", 2.0);

@@ -51,6 +51,15 @@ double distance_now(const btPersistentManifold& manifold, const btManifoldPoint&
   return (a - b).dot(contact.m_normalWorldOnB);
 }
 
+/// Bullet sets 6 MiB aside for each world, for 4096 pairs that touch. A visit has some dozens; what
+/// is beyond comes from the heap.
+btDefaultCollisionConstructionInfo small_pools() {
+  btDefaultCollisionConstructionInfo info;
+  info.m_defaultMaxPersistentManifoldPoolSize = 256;
+  info.m_defaultMaxCollisionAlgorithmPoolSize = 512;
+  return info;
+}
+
 }  // namespace
 
 void BulletBackend::Params::visit(ParamVisitor& v) {
@@ -96,7 +105,7 @@ struct BulletBackend::World {
 
   ShapeCache cache;
   Bodies bodies;
-  btDefaultCollisionConfiguration configuration;
+  btDefaultCollisionConfiguration configuration{small_pools()};
   btCollisionDispatcher dispatcher;
   btDbvtBroadphase broadphase;
   btSequentialImpulseConstraintSolver solver;

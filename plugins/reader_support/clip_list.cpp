@@ -11,8 +11,8 @@ std::vector<DatasetClip> clips_of_json(const Json& list) {
   std::vector<DatasetClip> clips;
   std::int64_t end = 0;
   for (const Json& entry : list) {
-    const auto first = entry.at("first_capture").get<std::int64_t>();
-    const auto count = entry.at("frame_count").get<std::int64_t>();
+    const auto first = whole_number<std::int64_t>(entry.at("first_capture"));
+    const auto count = whole_number<std::int64_t>(entry.at("frame_count"));
     const auto fps = entry.at("fps").get<double>();
     constexpr std::int64_t kMost = 1'000'000'000;
     if (first < end || first > kMost || count < 1 || count > kMost - first) {

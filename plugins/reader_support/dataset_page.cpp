@@ -55,14 +55,14 @@ std::optional<DatasetPage> read_dataset_page(const std::filesystem::path& folder
   if (!json.contains("split") || !json.contains("cameras")) return std::nullopt;
   try {
     DatasetPage page;
-    page.captures = json.at("captures").get<int>();
+    page.captures = whole_number<int>(json.at("captures"));
     if (page.captures < 0 || page.captures > kMostCaptures) return std::nullopt;
     page.cameras = json.at("cameras").get<std::vector<std::string>>();
     if (json.contains("classes")) page.classes = json.at("classes").get<std::vector<std::string>>();
     if (json.contains("conventions")) page.conventions = json.at("conventions");
     for (const auto& [split, captures] : json.at("split").items()) {
       for (const Json& capture : captures) {
-        const int index = capture.get<int>();
+        const int index = whole_number<int>(capture);
         if (index >= 0 && index < page.captures) page.split_of_capture.emplace(index, split);
       }
     }

@@ -38,7 +38,7 @@ PixelBox box_of_json(const Json& bbox) {
 std::string label_of_json(const Json& value, const std::vector<std::string>& classes) {
   if (value.is_string()) return value.get<std::string>();
   if (!value.is_number_integer()) return {};
-  const auto number = value.get<std::int64_t>();
+  const auto number = whole_number<std::int64_t>(value);
   if (number >= 0 && std::size_t(number) < classes.size()) return classes[std::size_t(number)];
   return std::to_string(number);
 }

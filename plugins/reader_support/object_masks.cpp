@@ -56,16 +56,22 @@ void visit_runs(const std::vector<std::int64_t>& runs, std::int64_t size, Visit&
   if (at != size) throw std::runtime_error("run lengths do not fill the image");
 }
 
+std::vector<std::int64_t> run_list(const Json& counts) {
+  std::vector<std::int64_t> runs;
+  for (const Json& count : counts) runs.push_back(whole_number<std::int64_t>(count));
+  return runs;
+}
+
 }  // namespace
 
 CoverageMask mask_of_run_lengths(const Json& rle, int width, int height) {
-  if (rle.at("size").at(0).get<std::int64_t>() != height ||
-      rle.at("size").at(1).get<std::int64_t>() != width) {
+  if (whole_number<std::int64_t>(rle.at("size").at(0)) != height ||
+      whole_number<std::int64_t>(rle.at("size").at(1)) != width) {
     throw std::runtime_error("mask and image differ in size");
   }
   const Json& counts = rle.at("counts");
-  const auto runs = counts.is_array() ? counts.get<std::vector<std::int64_t>>()
-                                      : decoded_counts(counts.get<std::string>());
+  const auto runs =
+      counts.is_array() ? run_list(counts) : decoded_counts(counts.get<std::string>());
   const std::int64_t size = std::int64_t(width) * height;
   PixelBox box{width, height, 0, 0};
   visit_runs(runs, size, [&](std::int64_t first, std::int64_t count) {

@@ -4,11 +4,14 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "diorama/host.h"
@@ -37,6 +40,24 @@ std::string read_whole_file(const std::filesystem::path& file,
 /// Throws std::exception for texts that are no JSON, or nest deeper than 100: copies of a tree walk
 /// down by recursion.
 Json parse_stored_json(std::string_view text);
+
+/// Cuts off what is behind the point, as get() does. Throws std::exception for what is no number,
+/// and for numbers that the type cannot hold: with those get() does what it likes.
+template <class Whole>
+Whole whole_number(const Json& value) {
+  bool fits = true;
+  if (value.is_number_float()) {
+    const double number = value.get<double>();
+    fits = number > double(std::numeric_limits<Whole>::min()) - 1.0 &&
+           number < double(std::numeric_limits<Whole>::max()) + 1.0;
+  } else if (value.is_number_unsigned()) {
+    fits = std::in_range<Whole>(value.get<std::uint64_t>());
+  } else if (value.is_number_integer()) {
+    fits = std::in_range<Whole>(value.get<std::int64_t>());
+  }
+  if (!fits) throw std::runtime_error(value.dump() + " is beyond reason");
+  return value.get<Whole>();
+}
 
 /// Decoded samples of a picture.
 struct StoredPicture {

@@ -149,8 +149,8 @@ void BasicFrameReading::read_camera() {
   files_.reading(file, [&] {
     const Json& size = json->at("renderProductResolution");
     Camera& camera = frame_.camera;
-    const int width = size.at(0).get<int>();
-    const int height = size.at(1).get<int>();
+    const int width = whole_number<int>(size.at(0));
+    const int height = whole_number<int>(size.at(1));
     if (width <= 0 || height <= 0 || std::int64_t(width) * height > (std::int64_t(1) << 28)) {
       throw std::runtime_error("its resolution is none");
     }
@@ -289,11 +289,11 @@ void BasicFrameReading::read_color() {
 /// Floats by row and column; nothing when it is something else.
 std::optional<StoredArray> BasicFrameReading::pixel_array(const std::string& file,
                                                           std::size_t values, const char* type) {
-  const auto text = files_.text(file);
+  auto text = files_.text(file);
   if (!text) return std::nullopt;
   std::optional<StoredArray> array;
   files_.reading(file, [&] {
-    StoredArray parsed = parse_array(*text);
+    StoredArray parsed = parse_array(std::move(*text));
     const std::size_t dimensions = parsed.shape.size();
     const bool fits =
         parsed.is_plain(type) &&

@@ -40,7 +40,11 @@ class BasicFrameReading {
 
   bool wants(std::string_view name) const { return wanted_.contains(name); }
   /// Tables alone tell boxes and labels, of what has a box.
-  bool wants_pixels_of_objects() const { return wants(kInstanceId.name) || wants(kHoldsInstances); }
+  /// Boxes say which objects there are, without a look at any pixel.
+  bool wants_pixels_of_objects() const {
+    const bool tell_boxes = !path("bounding_box_2d_tight_prim_paths.json").empty() && has_size_;
+    return wants(kInstanceId.name) || (wants(kHoldsInstances) && !tell_boxes);
+  }
   std::string path(std::string_view kind) const { return names_.path(product_, number_, kind); }
   /// The first file that tells a size tells that of the frame; false for another one.
   bool note_size(int width, int height, const std::string& file);

@@ -133,7 +133,7 @@ class BopDataset final : public StoredDataset {
           if (is_info) {
             visible[image].push_back(entry.at("visib_fract").get<double>());
           } else {
-            objects[image].push_back(entry.at("obj_id").get<int>());
+            objects[image].push_back(whole_number<int>(entry.at("obj_id")));
           }
         });
     for (const auto& [image, ids] : objects) {
@@ -180,7 +180,7 @@ class BopDataset final : public StoredDataset {
     files.reading("dataset.json", [&] {
       std::set<std::string> classes(page_->classes.begin(), page_->classes.end());
       for (const Json& object : page_->conventions.at("objects")) {
-        const int id = object.at("obj_id").get<int>();
+        const int id = whole_number<int>(object.at("obj_id"));
         const std::string name = object.at("class").get<std::string>();
         const std::string who = "object " + std::to_string(id);
         const auto own = names_.find(std::to_string(id));
@@ -208,8 +208,9 @@ class BopDataset final : public StoredDataset {
       files.reading(file, [&] {
         std::map<std::array<int, 3>, int> found;
         for (const Json& target : *targets) {
-          found[{target.at("scene_id").get<int>(), target.at("im_id").get<int>(),
-                 target.at("obj_id").get<int>()}] += target.at("inst_count").get<int>();
+          found[{whole_number<int>(target.at("scene_id")), whole_number<int>(target.at("im_id")),
+                 whole_number<int>(target.at("obj_id"))}] +=
+              whole_number<int>(target.at("inst_count"));
         }
         files.check(
             found == expected.objects, kCounts, file, "",
@@ -222,7 +223,8 @@ class BopDataset final : public StoredDataset {
       files.reading(pictures, [&] {
         std::multiset<std::pair<int, int>> found;
         for (const Json& target : *targets) {
-          found.emplace(target.at("scene_id").get<int>(), target.at("im_id").get<int>());
+          found.emplace(whole_number<int>(target.at("scene_id")),
+                        whole_number<int>(target.at("im_id")));
         }
         files.check(found == expected.images, kCounts, pictures, "",
                     "its targets are not the images of test/*/scene_gt.json");
@@ -531,7 +533,7 @@ class BopImageReading : private FrameReading {
 
   void read_pose(const Json& pose, const std::string& who, Instance& instance) {
     const std::string table = scene_.table("scene_gt");
-    const int id = pose.at("obj_id").get<int>();
+    const int id = whole_number<int>(pose.at("obj_id"));
     const auto model = dataset_.models_.find(id);
     files_.check(dataset_.models_.empty() ? !is_own_ : model != dataset_.models_.end(), kIds, table,
                  who, "its obj_id " + std::to_string(id) + " is not in models_info.json");
@@ -608,14 +610,14 @@ class BopImageReading : private FrameReading {
     const auto& seen = masks_.back();
     if (info.is_object()) {
       instance.tight_box = box_of(info.at("bbox_visib"));
-      const auto visible = info.at("px_count_visib").get<std::int64_t>();
+      const auto visible = whole_number<std::int64_t>(info.at("px_count_visib"));
       if (visible == 0) instance.tight_box.reset();
       if (seen) {
         files_.check(pixel_count(*seen) == visible, kArea, table, who,
                      "its px_count_visib is " + std::to_string(visible),
                      "its mask has " + std::to_string(pixel_count(*seen)) + " pixels");
       }
-      const auto all = info.at("px_count_all").get<std::int64_t>();
+      const auto all = whole_number<std::int64_t>(info.at("px_count_all"));
       const double share = info.at("visib_fract").get<double>();
       const double expected = all > 0 ? double(visible) / double(all) : 0.0;
       files_.check(std::abs(share - expected) < (is_own_ ? 1e-6 : 1e-3), kArea, table, who,
@@ -642,7 +644,7 @@ class BopImageReading : private FrameReading {
     const std::string table = scene_.table("scene_gt_info");
     const auto box = box_of(info.at("bbox_obj"));
     const std::int64_t count = pixel_count(mask);
-    const auto all = info.at("px_count_all").get<std::int64_t>();
+    const auto all = whole_number<std::int64_t>(info.at("px_count_all"));
     if (!box) {
       files_.check(count == 0, kBox, table, who, "its bbox_obj is none",
                    "its mask extends over " + box_text(mask.box));
@@ -663,7 +665,7 @@ class BopImageReading : private FrameReading {
                  "its px_count_all is " + std::to_string(all),
                  "its mask has " + std::to_string(count) + " pixels" +
                      (is_whole ? "" : " of a silhouette that is cut off"));
-    const auto valid = info.at("px_count_valid").get<std::int64_t>();
+    const auto valid = whole_number<std::int64_t>(info.at("px_count_valid"));
     std::int64_t measured = 0;
     if (depth_) {
       for (int y = mask.box.y_min; y < mask.box.y_max; ++y) {

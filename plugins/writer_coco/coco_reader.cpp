@@ -7,6 +7,7 @@
 
 #include <span>
 #include "diorama/error.h"
+#include "reader_support/asked_levels.h"
 #include "reader_support/camera_json.h"
 #include "reader_support/capture_rows.h"
 #include "reader_support/frame_reading.h"
@@ -106,7 +107,7 @@ class CocoDataset final : public StoredDataset {
     files.reading("categories.json", [&] {
       bool is_same = list.size() == part.categories.size();
       for (const Json& category : list) {
-        const auto found = part.categories.find(category.at("id").get<std::int64_t>());
+        const auto found = part.categories.find(whole_number<std::int64_t>(category.at("id")));
         is_same = is_same && found != part.categories.end() &&
                   found->second.name == category.at("name").get<std::string>();
       }
@@ -137,6 +138,7 @@ class CocoDataset final : public StoredDataset {
     hold(tables_.has_amodal,
          {"amodal_mask", "occlusion_order", kHoldsOcclusion, kHoldsTruncation, kHoldsAmodalBoxes});
     hold(tables_.has_keypoints, {kHoldsKeypoints});
+    hold(tables_.has_tracks, {kHoldsTracks});
     for (const CocoPart& part : tables_.parts) {
       for (const auto& [id, category] : part.categories) {
         if (category.keypoint_count > 0) info_.skeletons.emplace(category.name, category.skeleton);
@@ -192,8 +194,8 @@ class CocoImageReading : private FrameReading {
     bool has_size = false;
     files_.reading(part_.file, [&] {
       image_ = parse_stored_json(read_span(dataset_.folder_ / part_.file, entry_.span));
-      frame_.camera.width = image_.at("width").get<int>();
-      frame_.camera.height = image_.at("height").get<int>();
+      frame_.camera.width = whole_number<int>(image_.at("width"));
+      frame_.camera.height = whole_number<int>(image_.at("height"));
       const std::int64_t pixels = std::int64_t(frame_.camera.width) * frame_.camera.height;
       if (frame_.camera.width <= 0 || frame_.camera.height <= 0 || pixels > kMostPixels) {
         throw std::runtime_error("image " + std::to_string(entry_.id) +
@@ -203,6 +205,7 @@ class CocoImageReading : private FrameReading {
     });
     if (!has_size) return std::nullopt;
     if (dataset_.tables_.has_cameras) files_.reading(part_.file, [&] { read_camera(); });
+    files_.reading(part_.file, [&] { check_clip_frame(); });
     read_picture(sources);
     read_annotations();
     finish(sources);
@@ -233,6 +236,22 @@ class CocoImageReading : private FrameReading {
     const Affine world_from_camera = affine_of_rows(image_.at("world_from_camera"));
     require_rigid(world_from_camera, "world_from_camera");
     frame_.world_from_camera = world_from_camera;
+  }
+
+  /// Our writer says of a picture which frame of which video it is; videos count from 1, by clip
+  /// and camera.
+  void check_clip_frame() {
+    const auto clip = clip_frame(clips_of(dataset_.page_), entry_.capture);
+    if (!clip) return;
+    const auto cameras = std::int64_t(dataset_.tables_.cameras.size());
+    const std::int64_t video = clip->clip * cameras + entry_.camera + 1;
+    const bool holds = image_.at("video_id") == video && image_.at("frame_index") == clip->frame &&
+                       std::abs(image_.at("time_s").get<double>() - clip->time_s()) <= 1e-8;
+    files_.check(holds, kCounts, part_.file, "image " + std::to_string(entry_.id),
+                 "its video, frame and time are " + image_.at("video_id").dump() + ", " +
+                     image_.at("frame_index").dump() + ", " + image_.at("time_s").dump(),
+                 std::to_string(video) + ", " + std::to_string(clip->frame) + ", " +
+                     std::to_string(clip->time_s()) + ", as dataset.json says");
   }
 
   void read_picture(FrameSources& sources) {
@@ -270,7 +289,7 @@ class CocoImageReading : private FrameReading {
         "annotation " + (json.contains("id") ? json.at("id").dump() : std::to_string(id));
     instance.node_path = json.contains("node") ? json.at("node").get<std::string>()
                                                : "/Assets/" + std::to_string(id);
-    const auto category = part_.categories.find(json.at("category_id").get<std::int64_t>());
+    const auto category = part_.categories.find(whole_number<std::int64_t>(json.at("category_id")));
     files_.check(category != part_.categories.end(), kIds, part_.file, who,
                  "has the unknown category " + json.at("category_id").dump());
     if (category != part_.categories.end()) instance.labels["class"] = category->second.name;
@@ -278,7 +297,7 @@ class CocoImageReading : private FrameReading {
     const bool has_page = dataset_.page_.has_value();
     if (track != json.end() && (has_page || track->is_number_unsigned())) {
       // Others may count tracks from 0, which is no id, or have none where they write -1 or null.
-      instance.id = track->get<std::uint32_t>() + (has_page ? 0 : 1);
+      instance.id = whole_number<std::uint32_t>(*track) + (has_page ? 0 : 1);
       const bool is_again =
           std::ranges::find(frame_.instances, instance.id, &Instance::id) != frame_.instances.end();
       files_.check(instance.id > 0 && !is_again, kOnce, part_.file, who,
@@ -299,7 +318,7 @@ class CocoImageReading : private FrameReading {
     }
     check_crowd(json, part_.file, who, crowd_below_px());
     whos_.push_back(who);
-    categories_.push_back(json.at("category_id").get<std::int64_t>());
+    categories_.push_back(whole_number<std::int64_t>(json.at("category_id")));
     masks_.push_back(std::move(mask));
     has_mask_.push_back(json.contains("segmentation") && !json.at("segmentation").empty());
     frame_.instances.push_back(std::move(instance));
@@ -382,7 +401,7 @@ class CocoImageReading : private FrameReading {
         mask_of_run_lengths(entry->at("segmentation"), frame_.camera.width, frame_.camera.height);
     visibility.amodal_pixels = pixel_count(visibility.amodal_mask);
     visibility.amodal_box = box_of_json(entry->at("bbox"));
-    files_.check(entry->at("area").get<std::int64_t>() == visibility.amodal_pixels, kArea,
+    files_.check(whole_number<std::int64_t>(entry->at("area")) == visibility.amodal_pixels, kArea,
                  part_.file, who, "its amodal area is " + entry->at("area").dump(),
                  "its amodal mask has " + std::to_string(visibility.amodal_pixels) + " pixels");
     files_.check(*visibility.amodal_box == visibility.amodal_mask.extent(), kBox, part_.file, who,
@@ -399,7 +418,7 @@ class CocoImageReading : private FrameReading {
     cut_off(truncation, visibility);
     for (const Json& front : entry->at("occluded_by")) {
       occluded_by_.push_back({front.at("node").get<std::string>(), instance.id,
-                              front.at("pixels").get<std::int64_t>()});
+                              whole_number<std::int64_t>(front.at("pixels"))});
     }
     instance.visibility = std::move(visibility);
   }
@@ -415,8 +434,8 @@ class CocoImageReading : private FrameReading {
     const auto entry = json.find("amodal");
     if (entry == json.end()) return;
     Visibility visibility;
-    visibility.visible_pixels = json.at("area").get<std::int64_t>();
-    visibility.amodal_pixels = entry->at("area").get<std::int64_t>();
+    visibility.visible_pixels = whole_number<std::int64_t>(json.at("area"));
+    visibility.amodal_pixels = whole_number<std::int64_t>(entry->at("area"));
     visibility.amodal_box = box_of_json(entry->at("bbox"));
     cut_off(entry->at("truncation").get<double>(), visibility);
     instance.visibility = std::move(visibility);
@@ -456,7 +475,7 @@ class CocoImageReading : private FrameReading {
                    "a keypoint in sight lies outside the image");
     }
     if (json.contains("num_keypoints")) {
-      files_.check(json.at("num_keypoints").get<int>() == count, kArea, part_.file, who,
+      files_.check(whole_number<int>(json.at("num_keypoints")) == count, kArea, part_.file, who,
                    "num_keypoints is " + json.at("num_keypoints").dump(),
                    std::to_string(count) + " keypoints are in the image");
     }
@@ -579,17 +598,17 @@ class CocoImageReading : private FrameReading {
     }
     std::map<std::uint32_t, std::int64_t> categories;
     for (const Json& entry : json.at("segments_info")) {
-      const auto id = entry.at("id").get<std::uint32_t>();
+      const auto id = whole_number<std::uint32_t>(entry.at("id"));
       const std::string who = "segment " + std::to_string(id);
       const auto found = segments.find(id);
       files_.check(found != segments.end(), kIds, file, who, "has no pixel");
-      const auto category = entry.at("category_id").get<std::int64_t>();
+      const auto category = whole_number<std::int64_t>(entry.at("category_id"));
       files_.check(part_.categories.contains(category), kIds, part_.panoptic, who,
                    "has an unknown category");
       check_crowd(entry, part_.panoptic, who, 0);
       if (found == segments.end()) continue;
       const Segment& segment = found->second;
-      files_.check(entry.at("area").get<std::int64_t>() == segment.count, kArea, file, who,
+      files_.check(whole_number<std::int64_t>(entry.at("area")) == segment.count, kArea, file, who,
                    "its area is " + entry.at("area").dump(),
                    std::to_string(segment.count) + " pixels");
       files_.check(box_of_json(entry.at("bbox")) == segment.box, kBox, file, who,

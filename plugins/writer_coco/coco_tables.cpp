@@ -5,6 +5,7 @@
 #include <set>
 
 #include "diorama/error.h"
+#include "writer_coco/video_tracks.h"
 
 namespace diorama {
 namespace {
@@ -68,6 +69,7 @@ class TableReader {
     check_names_once();
     check_tables_complete();
     number_captures();
+    if (page_ && tables_.has_tracks) check_video_tracks(folder_, tables_, *page_, tracks_, files_);
     return std::move(tables_);
   }
 
@@ -108,11 +110,11 @@ class TableReader {
 
   void add_image(std::uint16_t part, JsonSpan span, const Json& json) {
     CocoImageEntry entry;
-    entry.id = json.at("id").get<std::int64_t>();
+    entry.id = whole_number<std::int64_t>(json.at("id"));
     entry.span = span;
     entry.part = part;
     const bool says_capture = json.contains("capture") && json.contains("camera");
-    entry.capture = says_capture ? json.at("capture").get<std::int32_t>() : -1;
+    entry.capture = says_capture ? whole_number<std::int32_t>(json.at("capture")) : -1;
     if (says_capture) entry.camera = camera_number(json.at("camera").get<std::string>());
     tables_.has_cameras = tables_.has_cameras || json.contains("intrinsics");
     const auto& name = json.at("file_name").get_ref<const std::string&>();
@@ -132,25 +134,28 @@ class TableReader {
   }
 
   void add_annotation(JsonSpan span, const Json& json) {
-    if (json.contains("id")) ids_.push_back(json.at("id").get<std::int64_t>());
-    annotations_.push_back({json.at("image_id").get<std::int64_t>(), span});
+    if (json.contains("id")) ids_.push_back(whole_number<std::int64_t>(json.at("id")));
+    annotations_.push_back({whole_number<std::int64_t>(json.at("image_id")), span});
     tables_.has_masks = tables_.has_masks || json.contains("segmentation");
     tables_.has_amodal = tables_.has_amodal || json.contains("amodal");
     tables_.has_nodes = tables_.has_nodes || json.contains("node");
     tables_.has_keypoints = tables_.has_keypoints || json.contains("keypoints");
+    if (!json.contains("track_id")) return;
+    tables_.has_tracks = true;
+    if (page_) tracks_.push_back(tracked_annotation(json));
   }
 
   void add_category(CocoPart& part, const Json& json) {
     StoredCategory category;
     category.name = json.at("name").get<std::string>();
-    category.is_thing = json.value("isthing", 1) != 0;
+    category.is_thing = json.value("isthing", Json(1)) != 0;
     if (const auto points = json.find("keypoints"); points != json.end() && points->is_array()) {
       category.keypoint_count = points->size();
       category.has_cuboid_keypoints =
           points->size() == 9 && points->at(0) == "Center" && points->at(1) == "LDB";
       category.skeleton = skeleton_of(json);
     }
-    const std::int64_t id = json.at("id").get<std::int64_t>();
+    const std::int64_t id = whole_number<std::int64_t>(json.at("id"));
     const bool has_group = json.contains("supercategory") && json.at("supercategory") != "object";
     tables_.has_own_categories = tables_.has_own_categories || json.contains("color") ||
                                  has_group || id != std::int64_t(part.categories.size()) + 1;
@@ -170,9 +175,9 @@ class TableReader {
     const auto count = std::int64_t(skeleton.names.size());
     const Json lines = category.value("skeleton", Json::array());
     const auto place = [&](const Json& number) {  // from 1
-      const bool is_one = number.is_number_integer() && number.get<std::int64_t>() >= 1 &&
-                          number.get<std::int64_t>() <= count;
-      return is_one ? number.get<int>() - 1 : -1;
+      const bool is_one = number.is_number_integer() && whole_number<std::int64_t>(number) >= 1 &&
+                          whole_number<std::int64_t>(number) <= count;
+      return is_one ? whole_number<int>(number) - 1 : -1;
     };
     for (const Json& line : lines) {
       if (!line.is_array() || line.size() != 2) continue;
@@ -210,7 +215,7 @@ class TableReader {
         if (!is_element) return;
         if (key == "images") check_same_image(part, text);
         if (key != "annotations") return;
-        const std::int64_t id = parse_stored_json(text).at("image_id").get<std::int64_t>();
+        const std::int64_t id = whole_number<std::int64_t>(parse_stored_json(text).at("image_id"));
         CocoImageEntry* image = image_of(id);
         const std::string who = "image " + std::to_string(id);
         files_.check(image != nullptr, kCounts, part.panoptic, who, "is not in " + part.file);
@@ -233,7 +238,7 @@ class TableReader {
     if (!page_) return;
     ++images_listed_;
     const Json json = parse_stored_json(text);
-    const std::int64_t id = json.at("id").get<std::int64_t>();
+    const std::int64_t id = whole_number<std::int64_t>(json.at("id"));
     const CocoImageEntry* image = image_of(id);
     if (!image)
       return files_.find(kCounts, part.panoptic, "image " + std::to_string(id),
@@ -353,6 +358,7 @@ class TableReader {
   std::vector<CocoImageEntry> images_;  ///< Of one part.
   std::vector<RawAnnotation> annotations_;
   std::vector<std::int64_t> ids_;
+  std::vector<TrackedAnnotation> tracks_;  ///< Of all parts of our own writer.
   std::vector<std::string> names_;
   std::size_t images_listed_ = 0;  ///< By the panoptic file.
   std::string first_file_;

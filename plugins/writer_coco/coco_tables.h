@@ -56,6 +56,7 @@ struct CocoTables {
   bool has_amodal = false;
   bool has_nodes = false;
   bool has_keypoints = false;
+  bool has_tracks = false;
   bool has_own_categories = false;  ///< With colours, supercategories or ids that leave gaps.
 };
 

@@ -396,7 +396,7 @@ class Hdf5PictureReading : private FrameReading {
   }
 
   void add_object(const Json& object, const std::map<std::uint32_t, PixelBox>& boxes) {
-    const auto id = object.at("idx").get<std::uint32_t>();
+    const auto id = whole_number<std::uint32_t>(object.at("idx"));
     if (id == 0) return;  // the background
     const std::string who = object.contains("name") && object.at("name").is_string()
                                 ? object.at("name").get<std::string>()
@@ -412,7 +412,7 @@ class Hdf5PictureReading : private FrameReading {
     if (box != boxes.end()) instance.tight_box = box->second;
     files_.check(box != boxes.end() || !dataset_.page_, kIds, file_, who, "has no pixel");
     if (object.contains("category_id")) {
-      const auto category = object.at("category_id").get<std::int64_t>();
+      const auto category = whole_number<std::int64_t>(object.at("category_id"));
       categories_[id] = category;
       const auto& classes = dataset_.info_.classes;
       files_.check(

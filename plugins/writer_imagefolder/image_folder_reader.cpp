@@ -384,7 +384,7 @@ class ImageFolderReading : private FrameReading {
     if (objects == row_.end() || !objects->contains("id")) return;
     std::set<std::int64_t> ids;
     for (const Json& id : objects->at("id")) {
-      files_.check(ids.insert(id.get<std::int64_t>()).second, kOnce, table_.path(), file,
+      files_.check(ids.insert(whole_number<std::int64_t>(id)).second, kOnce, table_.path(), file,
                    "the id " + id.dump() + " is there twice");
     }
   }
@@ -399,7 +399,7 @@ class ImageFolderReading : private FrameReading {
   }
 
   void read_share(const Json& area, const Json& share, const std::string& who, Instance& instance) {
-    const auto visible = area.get<std::int64_t>();
+    const auto visible = whole_number<std::int64_t>(area);
     const double visible_share = share.get<double>();
     const auto box = instance.tight_box;
     files_.check(

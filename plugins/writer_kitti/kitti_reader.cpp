@@ -8,9 +8,11 @@
 #include <map>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "diorama/error.h"
+#include "reader_support/asked_levels.h"
 #include "reader_support/camera_json.h"
 #include "reader_support/capture_rows.h"
 #include "reader_support/frame_reading.h"
@@ -237,6 +239,8 @@ class KittiDataset final : public StoredDataset {
   void describe() {
     info_.format = is_tracking_ ? kTrackingFormat : kFormat;
     note_clips(clips_, info_);
+    if (is_tracking_) info_.holds.emplace(kHoldsTracks);
+    info_.steps[kAskOcclusionLevels] = info_.steps[kAskTruncationLevels] = 1.0;
     info_.camera_names = pictures_.cameras();
     info_.captures = pictures_.captures();
     if (page_) info_.classes = page_->classes;
@@ -440,9 +444,12 @@ class KittiPictureReading : private FrameReading {
         files_.check(label.truncation == 0.0 || label.truncation == 1.0 || label.truncation == 2.0,
                      kAmodal, labels_, who, "its truncation is " + std::to_string(label.truncation),
                      "0, 1 or 2");
-        label.truncation = 0.0;  // a level, not a share
+        const double level = std::exchange(label.truncation, 0.0);  // not a share
         const std::size_t before = frame_.instances.size();
         add_object(label, who);
+        if (frame_.instances.size() > before) {
+          tell_levels(wanted_, label.occlusion, level, frame_.instances.back());
+        }
         if (frame_.instances.size() == before || track < 0) return;
         // The benchmark counts tracks from 0, which is no id.
         Instance& instance = frame_.instances.back();
@@ -498,6 +505,7 @@ class KittiPictureReading : private FrameReading {
     label.location += offset_;
     Instance instance = next_instance(name);
     instance.tight_box = box;
+    tell_levels(wanted_, label.occlusion, label.truncation, instance);
     if (label.has_box_3d()) {
       const Vec3 half = 0.5 * label.size;
       instance.world_from_node = camera_from_box(label);

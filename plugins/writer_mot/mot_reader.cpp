@@ -11,6 +11,7 @@
 
 #include "diorama/error.h"
 #include "diorama/writer.h"
+#include "reader_support/asked_levels.h"
 #include "reader_support/capture_rows.h"
 #include "reader_support/dataset_page.h"
 #include "reader_support/frame_reading.h"
@@ -35,6 +36,7 @@ struct TrackLine {
   std::uint32_t track = 0;
   int number = 0;  ///< Of the class, from 1.
   std::array<double, 4> box{};
+  double seen = 1.0;  ///< Share that is neither hidden nor cut off.
   std::size_t line = 0;
 };
 
@@ -170,6 +172,9 @@ class MotDataset final : public StoredDataset {
         object.track = std::uint32_t(track);
         for (std::size_t k = 0; k < 4; ++k) object.box[k] = number_of(words[2 + k]);
         object.number = words.size() > 7 ? integer_of(words[7]) : 1;
+        if (words.size() > 8) object.seen = number_of(words[8]);
+        files.check(!page_ || (object.seen >= 0.0 && object.seen <= 1.0), kAmodal, file, who,
+                    "its visibility is " + std::to_string(object.seen), "0 to 1");
         files.check(frame >= 1 && frame <= sequence.length, kCounts, file, who,
                     "is of frame " + words[0],
                     "1 to " + std::to_string(sequence.length) + ", as many as there are");
@@ -225,6 +230,10 @@ class MotDataset final : public StoredDataset {
       files.check(sequence.length == count, kCounts, sequence.folder + "/seqinfo.ini", "",
                   "says " + std::to_string(sequence.length) + " frames",
                   std::to_string(count) + ", as dataset.json says");
+      files.check(!is_clip || sequence.fps == clips_[std::size_t(number)].fps, kCounts,
+                  sequence.folder + "/seqinfo.ini", "",
+                  "says " + std::to_string(sequence.fps) + " frames per second",
+                  "that of dataset.json");
       const auto split = page_->split_of_capture.find(first);
       if (split != page_->split_of_capture.end()) {
         files.check(split->second == sequence.split, kCounts, sequence.folder, "",
@@ -260,6 +269,8 @@ class MotDataset final : public StoredDataset {
     if (page_) info_.classes = page_->classes;
     info_.holds = {std::string(kColor.name), std::string(kHoldsInstances),
                    std::string(kHoldsLabels), std::string(kHoldsTightBoxes)};
+    info_.holds.emplace(kHoldsTracks);
+    if (page_) info_.steps[kAskSeenShares] = 0.0;
     note_clips(clips_, info_);
     // The challenge's boxes were drawn round whole people.
     info_.steps[std::string(kHoldsTightBoxes)] = page_ ? 0.0 : 1e4;
@@ -342,6 +353,11 @@ class MotDataset::FrameOfSequence : private FrameReading {
     instance.id = line.track;
     instance.node_path = "/Assets/track_" + std::to_string(line.track);
     instance.tight_box = box;
+    if (!wanted_.contains(std::string_view(kAskSeenShares))) return;
+    constexpr std::int64_t kWhole = 1'000'000;
+    Visibility& seen = instance.visibility.emplace();
+    seen.amodal_pixels = kWhole;
+    seen.visible_pixels = std::llround(std::clamp(line.seen, 0.0, 1.0) * double(kWhole));
   }
 
   const MotDataset& dataset_;

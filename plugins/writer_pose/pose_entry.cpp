@@ -85,7 +85,7 @@ std::vector<ObjectPose::Named> named_of(const Json& json) {
     point.camera_point = vector_of_json(entry.at("location_camera_frame"));
     const Json& pixel = entry.at("projected");
     point.image.pixel = {finite(pixel.at(0).get<double>()), finite(pixel.at(1).get<double>())};
-    const int state = entry.at("visibility").get<int>();
+    const int state = whole_number<int>(entry.at("visibility"));
     if (state < 0 || state > 2)
       throw std::runtime_error("a keypoint's visibility is not 0, 1 or 2");
     point.image.state = ImagePoint::State(state);
@@ -196,11 +196,11 @@ StoredPoseFile parse_pose_file(const std::string& text, int width, int height) {
   camera.cx = intrinsics.at("cx").get<double>();
   camera.cy = intrinsics.at("cy").get<double>();
   if (data.contains("resolution")) {
-    camera.width = data.at("resolution").at(0).get<int>();
-    camera.height = data.at("resolution").at(1).get<int>();
+    camera.width = whole_number<int>(data.at("resolution").at(0));
+    camera.height = whole_number<int>(data.at("resolution").at(1));
   } else if (data.contains("width")) {
-    camera.width = data.at("width").get<int>();
-    camera.height = data.at("height").get<int>();
+    camera.width = whole_number<int>(data.at("width"));
+    camera.height = whole_number<int>(data.at("height"));
   }
   constexpr int kMostExtent = 1 << 20;
   if (camera.width < 0 || camera.height < 0 || camera.width > kMostExtent ||

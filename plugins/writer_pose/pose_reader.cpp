@@ -50,7 +50,7 @@ std::optional<RunPage> page_of_run(const fs::path& folder) {
           parse_stored_json(read_whole_file(place / "dataset.json", std::uintmax_t(256) << 20));
       if (!page.is_object() || !page.contains("writers") || !page.contains("cameras")) continue;
       RunPage run{page.at("cameras").get<std::vector<std::string>>(),
-                  page.at("captures").get<int>()};
+                  whole_number<int>(page.at("captures"))};
       constexpr int kMostCaptures = 10'000'000;
       if (run.cameras.empty() || run.captures < 0 || run.captures > kMostCaptures) continue;
       return run;

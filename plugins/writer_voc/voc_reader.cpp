@@ -9,6 +9,7 @@
 #include <set>
 
 #include "diorama/error.h"
+#include "reader_support/asked_levels.h"
 #include "reader_support/capture_rows.h"
 #include "reader_support/frame_reading.h"
 #include "reader_support/label_text.h"
@@ -202,6 +203,7 @@ class VocDataset final : public StoredDataset {
     info_.holds = {std::string(kColor.name), std::string(kHoldsInstances),
                    std::string(kHoldsLabels), std::string(kHoldsTightBoxes)};
     if (has_masks_) info_.holds.emplace(kInstanceId.name);
+    info_.steps[kAskOcclusionLevels] = info_.steps[kAskTruncationLevels] = 1.0;
     // People draw boxes wider than objects whose outline is left out.
     info_.steps[std::string(kHoldsTightBoxes)] = page_ ? 0.0 : 12.0;
     const auto pictures = names_in(folder_ / "JPEGImages");
@@ -318,12 +320,6 @@ class VocPictureReading : private FrameReading {
     const auto& classes = dataset_.classes_;
     files_.check(classes.empty() || std::ranges::find(classes, name) != classes.end(), kIds,
                  xml_file_, who, "is of the unknown class '" + name + "'");
-    for (const char* flag : {"truncated", "difficult", "occluded"}) {
-      if (!object.child(flag)) continue;
-      const std::string value = object.text_of(flag);
-      files_.check(value == "0" || value == "1", kIds, xml_file_, who,
-                   std::string(flag) + " is '" + value + "'", "0 or 1");
-    }
     for (const char* flag : {"truncated", "occluded", "difficult"}) {
       const XmlElement* said = object.child(flag);
       if (!said) continue;
@@ -344,6 +340,10 @@ class VocPictureReading : private FrameReading {
                  kInImage, xml_file_, who, "its box is " + box_text(pixels),
                  "a box with pixels inside the image");
     instance.tight_box = pixels;
+    const auto is_set = [&](const char* flag) {
+      return object.child(flag) && object.text_of(flag) == "1";
+    };
+    tell_levels(wanted_, is_set("occluded"), is_set("truncated"), instance);
     frame_.instances.push_back(std::move(instance));
   }
 

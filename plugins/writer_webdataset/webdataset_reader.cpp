@@ -454,8 +454,8 @@ class SampleReading : private FrameReading {
     if (is_own_) {
       bool is_good = false;
       with("json", [&] {
-        const auto width = json_.at("width").get<std::int64_t>();
-        const auto height = json_.at("height").get<std::int64_t>();
+        const auto width = whole_number<std::int64_t>(json_.at("width"));
+        const auto height = whole_number<std::int64_t>(json_.at("height"));
         constexpr std::int64_t kMostExtent = 1 << 20;
         if (width <= 0 || height <= 0 || width > kMostExtent || height > kMostExtent) {
           throw std::runtime_error("its size is none");
@@ -497,8 +497,9 @@ class SampleReading : private FrameReading {
   }
 
   void read_own() {
-    files_.check(json_.at("capture").get<std::int64_t>() == sample_.capture || !dataset_.page_,
-                 kCounts, file_, key_, "its json says capture " + json_.at("capture").dump());
+    files_.check(
+        whole_number<std::int64_t>(json_.at("capture")) == sample_.capture || !dataset_.page_,
+        kCounts, file_, key_, "its json says capture " + json_.at("capture").dump());
     files_.check(json_.at("camera").get<std::string>() == frame_.camera_name || !dataset_.page_,
                  kCounts, file_, key_, "its json says camera " + json_.at("camera").dump());
     frame_.camera.fx = json_.at("intrinsics").at(0).get<double>();
@@ -540,7 +541,7 @@ class SampleReading : private FrameReading {
                    const std::map<std::uint32_t, std::int64_t>& counts, Instance& instance) {
     instance.node_path = object.at("node").get<std::string>();
     instance.labels["class"] = object.at("class").get<std::string>();
-    const auto index = object.at("class_index").get<std::int64_t>();
+    const auto index = whole_number<std::int64_t>(object.at("class_index"));
     const auto& classes = dataset_.info_.classes;
     files_.check(!dataset_.page_ || (index >= 0 && std::size_t(index) < classes.size() &&
                                      classes[std::size_t(index)] == instance.labels.at("class")),
@@ -548,7 +549,7 @@ class SampleReading : private FrameReading {
                  "the place of '" + instance.labels.at("class") + "' in the classes");
     const Json& box = object.at("box");
     const auto edge = [&](std::size_t i) {
-      const auto value = box.at(i).get<std::int64_t>();
+      const auto value = whole_number<std::int64_t>(box.at(i));
       if (std::abs(value) > 100'000'000) throw std::runtime_error("a box is beyond reason");
       return int(value);
     };
@@ -556,7 +557,7 @@ class SampleReading : private FrameReading {
     instance.world_from_node = affine_of_rows(object.at("world_from_node"));
     instance.bounds_node = {vector_of_json(object.at("bounds_min")),
                             vector_of_json(object.at("bounds_max"))};
-    const auto visible = object.at("visible_px").get<std::int64_t>();
+    const auto visible = whole_number<std::int64_t>(object.at("visible_px"));
     if (frame_.has(kInstanceId.name)) {
       const auto found = counts.find(instance.id);
       const std::int64_t count = found == counts.end() ? 0 : found->second;

@@ -14,6 +14,8 @@
 #include "writer_imagefolder/image_folder_writer.h"
 #include "writer_kitti/kitti_reader.h"
 #include "writer_kitti/kitti_writer.h"
+#include "writer_mot/mot_reader.h"
+#include "writer_mot/mot_writer.h"
 #include "writer_pose/pose_reader.h"
 #include "writer_pose/pose_writer.h"
 #include "writer_voc/voc_reader.h"
@@ -99,9 +101,9 @@ DatasetReaders every_reader(Host& host) {
        reader<CocoReader>("CocoReader", host),
        reader<DataVisualizationReader>("DataVisualizationReader", host),
        reader<Hdf5Reader>("Hdf5Reader", host), reader<ImageFolderReader>("ImageFolderReader", host),
-       reader<KittiReader>("KittiReader", host), reader<PoseReader>("PoseReader", host),
-       reader<VocReader>("VocReader", host), reader<WebDatasetReader>("WebDatasetReader", host),
-       reader<YoloReader>("YoloReader", host)});
+       reader<KittiReader>("KittiReader", host), reader<MotReader>("MotReader", host),
+       reader<PoseReader>("PoseReader", host), reader<VocReader>("VocReader", host),
+       reader<WebDatasetReader>("WebDatasetReader", host), reader<YoloReader>("YoloReader", host)});
 }
 
 WebDatasetWriter::Params shards_of_two() {
@@ -140,6 +142,15 @@ std::vector<SampleFormat> every_format() {
           format<WebDatasetWriter>("webdataset_shards", shards_of_two()),
           format<Hdf5Writer>("hdf5"),
           format<ImageFolderWriter>("imagefolder")};
+}
+
+std::vector<SampleFormat> formats_of_clips() {
+  CocoWriter::Params videos;
+  videos.youtube_vis = true;
+  KittiWriter::Params tracking;
+  tracking.layout = "tracking";
+  return {format<BasicWriter>("basic", everything()), format<CocoWriter>("coco", videos),
+          format<KittiWriter>("kitti", tracking), format<MotWriter>("mot")};
 }
 
 }  // namespace diorama::test

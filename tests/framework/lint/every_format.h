@@ -23,6 +23,9 @@ struct SampleFormat {
 /// Every writer, with the parameters that change what is in its files.
 std::vector<SampleFormat> every_format();
 
+/// Writers of clips: captures are frames of some.
+std::vector<SampleFormat> formats_of_clips();
+
 /// The readers of all formats that have one. The host must outlive them.
 DatasetReaders every_reader(Host& host);
 

@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "diorama/error.h"
+#include "framework/datasets/frame_copy.h"
 #include "framework/lint/dataset_on_disk.h"
 #include "framework/lint/encoding_host.h"
 #include "framework/lint/every_format.h"
@@ -651,4 +652,169 @@ TEST_CASE("a model's diameter is that of its vertices", "[lint]") {
   model["diameter"] = 0.5 * (model["diameter"].get<double>() + model["size_x"].get<double>());
   run.write(file, page.dump());
   CHECK(is_found(run));
+}
+
+namespace {
+
+/// The sample's captures as the frames of one clip.
+DatasetOnDisk clip_on_disk() {
+  const int count = int(test::sample_captures().size());
+  DatasetInfo dataset = test::sample_dataset(test::SampleScene(8, 6));
+  dataset.clips = {{0, count, 10.0}};
+  std::vector<Capture> frames;
+  for (const Capture& capture : test::sample_captures()) {
+    Capture& frame = frames.emplace_back();
+    frame.index = capture.index;
+    frame.clip = {0, int(frames.size()) - 1, count, 10.0};
+    for (const Frame& seen : capture.frames) frame.frames.push_back(copy_of(seen));
+  }
+  std::vector<const Capture*> captures;
+  for (const Capture& frame : frames) captures.push_back(&frame);
+  test::EncodingHost host;
+  test::MemoryFiles all;
+  for (const test::SampleFormat& format : test::formats_of_clips()) {
+    for (const auto& [path, bytes] : format.write(host, dataset, captures).files) {
+      all.files[format.name + "/" + path] = bytes;
+    }
+  }
+  const Json clip{{"clip", 0}, {"first_capture", 0}, {"frame_count", count}, {"fps", 10.0}};
+  const std::string page =
+      Json{{"captures", count}, {"cameras", dataset.camera_names}, {"clips", Json::array({clip})}}
+          .dump();
+  const auto bytes = std::as_bytes(std::span(page));
+  all.files["dataset.json"] = {bytes.begin(), bytes.end()};
+  return DatasetOnDisk(all);
+}
+
+std::string file_like(const DatasetOnDisk& dataset, const std::string& pattern) {
+  for (const std::string& file : files_of(dataset)) {
+    if (fnmatch(pattern.c_str(), file.c_str(), 0) == 0) return file;
+  }
+  FAIL("no file like " << pattern);
+  return {};
+}
+
+struct TextFault {
+  const char* what;
+  const char* file;  ///< A pattern.
+  std::function<std::string(const std::string&)> spoil;
+};
+
+void check_all_found(const DatasetOnDisk& run, const std::vector<TextFault>& faults) {
+  REQUIRE_FALSE(is_found(run));
+  for (const TextFault& fault : faults) {
+    INFO(fault.what);
+    const std::string file = file_like(run, fault.file);
+    const std::string before = run.read(file);
+    const std::string spoiled = fault.spoil(before);
+    REQUIRE(spoiled != before);
+    run.write(file, spoiled);
+    CHECK(is_found(run));
+    run.write(file, before);
+  }
+}
+
+/// Changes one field of the last line.
+std::function<std::string(const std::string&)> last_line(
+    char cut, const std::function<void(std::vector<std::string>&)>& change) {
+  return [=](const std::string& text) {
+    std::vector<std::string> lines = pieces(text, '\n');
+    std::vector<std::string> words = pieces(lines.back(), cut);
+    change(words);
+    lines.back() = put_together(words, cut, false);
+    return put_together(lines, '\n', true);
+  };
+}
+
+std::function<std::string(const std::string&)> json(const std::function<void(Json&)>& change) {
+  return [=](const std::string& text) {
+    Json page = Json::parse(text);
+    change(page);
+    return page.dump();
+  };
+}
+
+}  // namespace
+
+TEST_CASE("tracks, videos and clips of a run are held against each other", "[lint]") {
+  using Words = std::vector<std::string>;
+  const auto video = [](const char* list) {
+    return [list](Json& page) -> Json& { return page["annotations"][0][list]; };
+  };
+  check_all_found(
+      clip_on_disk(),
+      {{"a track of MOT ends as another", "mot/*/gt/gt.txt",
+        last_line(',', [](Words& words) { words[1] = "77"; })},
+       {"visibility of MOT", "mot/*/gt/gt.txt",
+        last_line(',', [](Words& words) { words[8] = "0.123"; })},
+       {"frames per second of MOT", "mot/*/seqinfo.ini",
+        [](const std::string& text) {
+          return std::regex_replace(text, std::regex("frameRate=10"), "frameRate=20");
+        }},
+       {"a track of KITTI ends as another", "kitti/training/label_02/*.txt",
+        last_line(' ', [](Words& words) { words[1] = "77"; })},
+       {"a track of COCO is of two nodes", "coco/annotations/instances_*.json",
+        json([](Json& page) { page["annotations"].back()["track_id"] = 77; })},
+       {"the frame of a picture of COCO", "coco/annotations/instances_*.json",
+        json([](Json& page) { page["images"][1]["frame_index"] = 7; })},
+       {"a frame of a video is empty", "coco/youtube_vis/*.json", json([](Json& page) {
+          for (const char* list : {"bboxes", "areas", "segmentations"}) {
+            page["annotations"][0][list][1] = nullptr;
+          }
+        })},
+       {"an area in a video", "coco/youtube_vis/*.json",
+        json([&](Json& page) { video("areas")(page)[1] = 3; })},
+       {"a mask in a video", "coco/youtube_vis/*.json", json([&](Json& page) {
+          video("segmentations")(page)[1] = video("segmentations")(page)[0];
+        })},
+       {"the length of a video", "coco/youtube_vis/*.json",
+        json([](Json& page) { page["videos"][0]["length"] = 2; })},
+       {"the order of pictures in a video", "coco/youtube_vis/*.json", json([](Json& page) {
+          std::swap(page["videos"][0]["file_names"][0], page["videos"][0]["file_names"][1]);
+        })},
+       {"a track of a video is gone", "coco/youtube_vis/*.json",
+        json([](Json& page) { page["annotations"].erase(0); })},
+       {"frames per second of the run", "dataset.json",
+        json([](Json& page) { page["clips"][0]["fps"] = 20.0; })}});
+}
+
+TEST_CASE("levels, areas and keypoints are held against shares of other writers", "[lint]") {
+  using Words = std::vector<std::string>;
+  const auto changed_flag = [](const char* flag) {
+    return [=](const std::string& text) {
+      const std::string open = "<" + std::string(flag) + ">";
+      std::string changed = text;
+      char& value = changed[changed.rfind(open) + open.size()];
+      value = value == '0' ? '1' : '0';
+      return changed;
+    };
+  };
+  const auto other_level = [](Words& words) { words[2] = words[2] == "0" ? "2" : "0"; };
+  check_all_found(
+      run_on_disk({"basic", "coco", "kitti", "voc", "imagefolder", "pose", "yolo_pose"}),
+      {{"KITTI's occluded", "kitti/training/label_2/*4.txt", last_line(' ', other_level)},
+       {"KITTI's truncated", "kitti/training/label_2/*4.txt",
+        last_line(' ', [](Words& words) { words[1] = words[1] == "0.00" ? "0.50" : "0.00"; })},
+       {"VOC's truncated", "voc/Annotations/*.xml", changed_flag("truncated")},
+       {"VOC's occluded", "voc/Annotations/*.xml", changed_flag("occluded")},
+       {"the area of an image folder", "imagefolder/train/metadata.jsonl",
+        [](const std::string& text) {
+          const std::size_t end = text.find('\n');
+          Json row = Json::parse(text.substr(0, end));
+          Json& area = row["objects"]["area"][0];
+          area = area.get<int>() - 1;
+          return row.dump() + text.substr(end);
+        }},
+       {"the order of YOLO's keypoints", "yolo_pose/labels/*.txt",
+        last_line(' ',
+                  [](Words& words) {
+                    Words turned(words.begin(), words.begin() + 5);
+                    for (std::size_t at = words.size(); at > 5; at -= 3) {
+                      turned.insert(turned.end(), words.begin() + long(at - 3),
+                                    words.begin() + long(at));
+                    }
+                    words = turned;
+                  })},
+       {"an object of PoseWriter is gone", "pose/*0.json",
+        json([](Json& page) { page["objects"].erase(page["objects"].size() - 1); })}});
 }

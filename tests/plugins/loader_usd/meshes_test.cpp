@@ -115,6 +115,13 @@ def Points "P"
   CHECK(loaded.node("P").mesh->bounds().max.z() == Approx(2.0).epsilon(0.05));
 }
 
+TEST_CASE("a shape beyond what a mesh can hold is none", "[loader_usd]") {
+  const TemporaryFolder folder;
+  LoadedStage loaded(
+      folder.write("a.usda", stage("def Sphere \"S\"\n{\n    double radius = 1e300\n}\n")));
+  CHECK_FALSE(loaded.node("S").mesh);
+}
+
 TEST_CASE("a blocked default gives way to the samples beside it", "[loader_usd]") {
   const TemporaryFolder folder;
   folder.write("weak.usda", stage("def Sphere \"Weak\"\n{\n    double radius = 3\n}\n"));

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+namespace diorama {
+
+// How the C library's heap treats blocks as large as pictures; for the whole program, from now on.
+
+/// They go back to the system when they are freed. By itself glibc keeps ever larger ones, up to
+/// 32 MiB, in heaps that it can only cut at their ends: memory would creep up over thousands of
+/// captures.
+void give_large_blocks_back();
+
+/// They stay with the program: reading a picture every few milliseconds, it would spend a third of
+/// its time on pages that the system clears for it. For programs that end soon.
+void keep_large_blocks();
+
+}  // namespace diorama
