@@ -317,7 +317,8 @@ TEST_CASE("Messages quote in one way", "[architecture]") {
       "plugins/writer_bop/bop_writer.cpp",
       "plugins/writer_coco/coco_writer.cpp",
       "plugins/writer_imagefolder/image_folder_writer.cpp",
-      "plugins/writer_support/python_json.cpp"};
+      "plugins/writer_support/python_json.cpp",
+      "plugins/writer_support/training_data.cpp"};
   const auto speaks = [](const Source& source) {
     return (source.is_below("framework") || source.is_below("plugins") ||
             source.is_below("sdk/src")) &&
