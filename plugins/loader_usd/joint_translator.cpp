@@ -28,6 +28,8 @@ std::vector<FreeAxis> free_axes(usd::Stage& stage, const Prim& prim) {
   const auto number = [&](const std::string& name, double fallback) {
     return usd::number_or(stage, prim, name.c_str(), fallback);
   };
+  // The second of three turns is ambiguous beyond a quarter: it is that which turns least.
+  const auto reach = [](const FreeAxis& axis) { return std::max(-axis.lower, axis.upper); };
   const std::string& type = prim.type_name;
   const std::string word = usd::token_or(stage, prim, "physics:axis", "X");
   if (type == "PhysicsRevoluteJoint" || type == "PhysicsPrismaticJoint") {
@@ -53,6 +55,7 @@ std::vector<FreeAxis> free_axes(usd::Stage& stage, const Prim& prim) {
       }
       axes.push_back(axis);
     }
+    if (reach(axes[1]) > 90.0 && reach(axes[0]) < reach(axes[1])) std::swap(axes[0], axes[1]);
     return axes;
   }
   std::vector<FreeAxis> axes;
@@ -66,9 +69,7 @@ std::vector<FreeAxis> free_axes(usd::Stage& stage, const Prim& prim) {
     axes.push_back({name, turns ? JointKind::Revolute : JointKind::Prismatic,
                     axis_named(std::string(1, std::string_view(name).back())), low, high});
   }
-  // The second of three turns is ambiguous beyond a quarter: it is that which turns least.
   const auto turns = std::ranges::find(axes, JointKind::Revolute, &FreeAxis::kind);
-  const auto reach = [](const FreeAxis& axis) { return std::max(-axis.lower, axis.upper); };
   if (axes.end() - turns == 3 && reach(turns[1]) > 90.0) {
     const auto least = std::ranges::min_element(turns, axes.end(), {}, reach);
     if (reach(*least) < reach(turns[1])) std::swap(turns[1], *least);

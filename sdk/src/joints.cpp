@@ -87,7 +87,7 @@ std::optional<Column> column_of(const Mat3& axes, const Vec3& axis) {
   const Vec3 parts = axes.transpose() * axis;
   Column column;
   const double most = parts.cwiseAbs().maxCoeff(&column.index);
-  if (std::abs(most - 1.0) > kSameAxis) return std::nullopt;
+  if (!(std::abs(most - 1.0) <= kSameAxis)) return std::nullopt;
   column.sign = parts[column.index] > 0.0 ? 1.0 : -1.0;
   return column;
 }
@@ -315,10 +315,12 @@ void place_frames(Scene& scene, const CompoundJoint& compound) {
     turns.push_back(&joint);
     signs.push_back(column_of(axes, joint.axis).value_or(Column{}).sign);
   }
-  // Beyond a quarter turn of the middle one there is another answer.
+  // Beyond a quarter turn of the middle one of three there is another answer.
   Vec3 angles = turns_of(turned);
   const Vec3 other(angles[0] + kPi, kPi - angles[1], angles[2] + kPi);
-  if (beyond(other, turns, signs) + 1e-9 < beyond(angles, turns, signs)) angles = other;
+  if (turns.size() == 3 && beyond(other, turns, signs) + 1e-9 < beyond(angles, turns, signs)) {
+    angles = other;
+  }
   Affine world_from_joint = world_from_entry;
   std::size_t turn = 0;
   for (std::size_t i = 0; i + 1 < compound.joints.size(); ++i) {

@@ -201,7 +201,7 @@ TEST_CASE("joints of any freedom are what is left of it", "[loader_usd]") {
     return all;
   };
   CHECK(chain("hip") == "rotY rotX rotZ ");
-  CHECK(chain("ball") == "rotZ rotX rotY ");
+  CHECK(chain("ball") == "rotX rotZ rotY ");
   CHECK(chain("loose") == "transX transY transZ rotX rotY rotZ ");
   CHECK(compound_joints(loaded.scene).size() == 3);
   const Joint& first = *loaded.node("hip/rotY").joint;
