@@ -181,6 +181,16 @@ void JointTranslator::translate(const Prim& prim, NodeId node, double meters_per
     names.push_back(free.name);
     if (is_reversed) joints.back().axis = -joints.back().axis;
   }
+  if (is_reversed && joints.size() > 1) {
+    // The last turn is the first from the other side; slides would come after turns.
+    const auto turns = [](const Joint& joint) { return joint.kind == JointKind::Revolute; };
+    if (std::ranges::any_of(joints, turns) && !std::ranges::all_of(joints, turns)) {
+      note_(prim, "is a joint to the world that slides and turns, and holds nothing", {});
+      return;
+    }
+    std::ranges::reverse(joints);
+    std::ranges::reverse(names);
+  }
   if (joints.empty()) joints.emplace_back();
   const Affine parent_from_joint =
       scene_.world_from_node(first.body).inverse() * first.world_from_joint;
@@ -193,8 +203,11 @@ void JointTranslator::translate(const Prim& prim, NodeId node, double meters_per
     note_(prim, "is a joint of a body or in a prim without a size, and holds nothing", {});
     return;
   }
-  loader_support::add_joint(scene_, node, std::move(joints), names, {first.body, parent_from_joint},
-                            {second.body, child_from_joint});
+  if (!loader_support::add_joint(scene_, node, std::move(joints), names,
+                                 {first.body, parent_from_joint},
+                                 {second.body, child_from_joint})) {
+    note_(prim, "is a joint of places that are no numbers, and holds nothing", {});
+  }
 }
 
 }  // namespace diorama::loader_usd
