@@ -150,7 +150,7 @@ std::set<NodeId> found_below(const Scene& scene, NodeId object, const std::vecto
                              const SettleLimits& limits,
                              const std::function<bool(NodeId)>& is_enough) {
   constexpr int kColumns = 2048;
-  constexpr std::size_t kCorners = 512;
+  constexpr std::size_t kTriangles = 512;
   constexpr int kFloors = 8;       // of one column: a cup by its handle
   constexpr double kSkin = 1e-5;   // metres; off what a segment has met
   constexpr double kInset = 5e-4;  // metres; a corner's own column may pass it by
@@ -186,15 +186,30 @@ std::set<NodeId> found_below(const Scene& scene, NodeId object, const std::vecto
     if (finds_enough(x, y)) return below;
   }
   const std::vector<Triangle> triangles = triangles_of(scene, object);
-  const std::size_t stride = std::max<std::size_t>(1, triangles.size() / kCorners);
-  for (std::size_t i = 0; i < triangles.size(); i += stride) {
-    const auto& corners = triangles[i].corner;
+  const auto finds_enough_at = [&](const Triangle& triangle) {
+    const auto& corners = triangle.corner;
     const Vec3 middle = (corners[0] + corners[1] + corners[2]) / 3.0;
-    for (const Vec3& corner : corners) {
+    return std::ranges::any_of(corners, [&](const Vec3& corner) {
       const Vec3 way = middle - corner;
       const Vec3 inner = corner + std::min(1.0, kInset / std::max(way.norm(), kInset)) * way;
-      if (finds_enough(inner.x(), inner.y())) return below;
-    }
+      return finds_enough(inner.x(), inner.y());
+    });
+  };
+  // The lowest first: a thing on thin feet stands on these.
+  std::vector<std::pair<double, std::size_t>> lowest;
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    const auto& [a, b, c] = triangles[i].corner;
+    lowest.emplace_back(std::min({a.z(), b.z(), c.z()}), i);
+  }
+  const std::size_t count = std::min(kTriangles, lowest.size());
+  std::ranges::partial_sort(lowest, lowest.begin() + std::ptrdiff_t(count));
+  lowest.resize(count);
+  for (const auto& [z, i] : lowest) {
+    if (finds_enough_at(triangles[i])) return below;
+  }
+  const std::size_t stride = std::max<std::size_t>(1, triangles.size() / kTriangles);
+  for (std::size_t i = 0; i < triangles.size(); i += stride) {
+    if (finds_enough_at(triangles[i])) return below;
   }
   return below;
 }

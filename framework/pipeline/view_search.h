@@ -109,7 +109,6 @@ class ViewSearch {
   std::vector<Group> groups_;
   std::optional<ViewCheck> check_;
   std::optional<SavedNodes> others_;
-  std::uint64_t others_shapes_ = 0;
   int draws_ = 0;
   double refused_s_ = 0.0;
 };

@@ -3,20 +3,25 @@
 
 namespace diorama::loader_support {
 
-void add_joint(Scene& scene, NodeId node, std::vector<Joint> axes,
+bool add_joint(Scene& scene, NodeId node, std::vector<Joint> axes,
                const std::vector<std::string>& names, const JointEnd& parent,
                const JointEnd& child) {
+  // Frames have the size of the asset, so that its metres count.
+  const Affine world_from_joint = scene.world_from_node(parent.body) * parent.body_from_joint;
+  const Affine world_from_child = scene.world_from_node(child.body) * child.body_from_joint;
+  const Affine node_from_joint = scene.world_from_node(node).inverse() * world_from_joint;
+  if (!world_from_joint.matrix().allFinite() || !world_from_child.matrix().allFinite()) {
+    return false;
+  }
+  if (axes.size() > 1 && !node_from_joint.matrix().allFinite()) return false;
   axes.front().parent_body = parent.body;
   axes.front().parent_from_joint = parent.body_from_joint;
   axes.back().child_body = child.body;
   axes.back().child_from_joint = child.body_from_joint;
   if (axes.size() == 1) {
     scene.edit(node).joint = axes.front();
-    return;
+    return true;
   }
-  // Frames have the size of the asset, so that its metres count.
-  const Affine world_from_joint = scene.world_from_node(parent.body) * parent.body_from_joint;
-  const Affine node_from_joint = scene.world_from_node(node).inverse() * world_from_joint;
   NodeId frame;
   for (std::size_t i = 0; i < axes.size(); ++i) {
     const NodeId id = scene.create(node, names[i]);
@@ -26,6 +31,7 @@ void add_joint(Scene& scene, NodeId node, std::vector<Joint> axes,
     scene.edit(id).joint = axes[i];
     frame = id;
   }
+  return true;
 }
 
 }  // namespace diorama::loader_support

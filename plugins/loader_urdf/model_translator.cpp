@@ -371,8 +371,11 @@ void ModelTranslator::add_joint(const urdf::Joint& said, NodeId above) {
     }
   }
   const NodeId node = scene_.create(above, node_name(said.name, "joint"));
+  if (!loader_support::add_joint(scene_, node, {joint}, {}, parent, child)) {
+    warn(where + " is too far away to be told in numbers; it holds nothing");
+    return;
+  }
   joints_[said.name] = node;
-  loader_support::add_joint(scene_, node, {joint}, {}, parent, child);
 }
 
 Vec3 ModelTranslator::axis_of(const urdf::Joint& said) {
@@ -407,7 +410,9 @@ void ModelTranslator::add_free_joint(const urdf::Joint& said, NodeId above,
   if (!is_planar) add(JointKind::Revolute, 1);
   add(JointKind::Revolute, 2);
   const NodeId node = scene_.create(above, node_name(said.name, "joint"));
-  loader_support::add_joint(scene_, node, std::move(joints), names, parent, child);
+  if (!loader_support::add_joint(scene_, node, std::move(joints), names, parent, child)) {
+    warn("joint '" + said.name + "' is too far away to be told in numbers; it holds nothing");
+  }
 }
 
 }  // namespace diorama::loader_urdf

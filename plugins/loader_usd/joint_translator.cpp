@@ -28,6 +28,8 @@ std::vector<FreeAxis> free_axes(usd::Stage& stage, const Prim& prim) {
   const auto number = [&](const std::string& name, double fallback) {
     return usd::number_or(stage, prim, name.c_str(), fallback);
   };
+  // The second of three turns is ambiguous beyond a quarter: it is that which turns least.
+  const auto reach = [](const FreeAxis& axis) { return std::max(-axis.lower, axis.upper); };
   const std::string& type = prim.type_name;
   const std::string word = usd::token_or(stage, prim, "physics:axis", "X");
   if (type == "PhysicsRevoluteJoint" || type == "PhysicsPrismaticJoint") {
@@ -53,6 +55,7 @@ std::vector<FreeAxis> free_axes(usd::Stage& stage, const Prim& prim) {
       }
       axes.push_back(axis);
     }
+    if (reach(axes[1]) > 90.0 && reach(axes[0]) < reach(axes[1])) std::swap(axes[0], axes[1]);
     return axes;
   }
   std::vector<FreeAxis> axes;
@@ -66,9 +69,7 @@ std::vector<FreeAxis> free_axes(usd::Stage& stage, const Prim& prim) {
     axes.push_back({name, turns ? JointKind::Revolute : JointKind::Prismatic,
                     axis_named(std::string(1, std::string_view(name).back())), low, high});
   }
-  // The second of three turns is ambiguous beyond a quarter: it is that which turns least.
   const auto turns = std::ranges::find(axes, JointKind::Revolute, &FreeAxis::kind);
-  const auto reach = [](const FreeAxis& axis) { return std::max(-axis.lower, axis.upper); };
   if (axes.end() - turns == 3 && reach(turns[1]) > 90.0) {
     const auto least = std::ranges::min_element(turns, axes.end(), {}, reach);
     if (reach(*least) < reach(turns[1])) std::swap(turns[1], *least);
@@ -180,6 +181,16 @@ void JointTranslator::translate(const Prim& prim, NodeId node, double meters_per
     names.push_back(free.name);
     if (is_reversed) joints.back().axis = -joints.back().axis;
   }
+  if (is_reversed && joints.size() > 1) {
+    // The last turn is the first from the other side; slides would come after turns.
+    const auto turns = [](const Joint& joint) { return joint.kind == JointKind::Revolute; };
+    if (std::ranges::any_of(joints, turns) && !std::ranges::all_of(joints, turns)) {
+      note_(prim, "is a joint to the world that slides and turns, and holds nothing", {});
+      return;
+    }
+    std::ranges::reverse(joints);
+    std::ranges::reverse(names);
+  }
   if (joints.empty()) joints.emplace_back();
   const Affine parent_from_joint =
       scene_.world_from_node(first.body).inverse() * first.world_from_joint;
@@ -192,8 +203,11 @@ void JointTranslator::translate(const Prim& prim, NodeId node, double meters_per
     note_(prim, "is a joint of a body or in a prim without a size, and holds nothing", {});
     return;
   }
-  loader_support::add_joint(scene_, node, std::move(joints), names, {first.body, parent_from_joint},
-                            {second.body, child_from_joint});
+  if (!loader_support::add_joint(scene_, node, std::move(joints), names,
+                                 {first.body, parent_from_joint},
+                                 {second.body, child_from_joint})) {
+    note_(prim, "is a joint of places that are no numbers, and holds nothing", {});
+  }
 }
 
 }  // namespace diorama::loader_usd

@@ -75,6 +75,7 @@ struct Bodies {
   std::vector<HeldJoint> joints;
   std::vector<Follower> followers;  ///< In an order in which leaders come before their followers.
   std::vector<std::string> shapeless;  ///< Rigid bodies without anything that collides.
+  std::vector<std::string> unheld;     ///< Joints at the end of chains that are no compound.
 };
 
 btTransform bullet_transform(const Rigid& rigid);

@@ -169,6 +169,11 @@ void BulletBackend::do_reset(const Scene& scene) {
   for (const std::string& path : world.bodies.shapeless) {
     host_.log(LogLevel::Warning, path + ": a rigid body without colliders stays where it is");
   }
+  for (const std::string& path : world.bodies.unheld) {
+    host_.log(LogLevel::Warning, path +
+                                     ": the chain of joints that it ends is none of several axes "
+                                     "at right angles in one place, and holds nothing in physics");
+  }
   host_.log(LogLevel::Debug, "physics: " + std::to_string(world.bodies.statics.size()) +
                                  " static colliders, " +
                                  std::to_string(world.bodies.moving.size()) + " moving bodies, " +

@@ -2,12 +2,12 @@
 #include "joint_builder.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <deque>
 #include <map>
 #include <optional>
 #include <set>
-#include <tuple>
 #include <utility>
 
 #include "diorama/error.h"
@@ -75,33 +75,131 @@ std::unique_ptr<btTypedConstraint> make_slider(const Joint& joint, double scale,
   return slider;
 }
 
+struct Interval {
+  double lower = 0.0;
+  double upper = 0.0;
+
+  double middle() const { return 0.5 * (lower + upper); }
+  bool is_within(double reach) const { return lower >= -reach && upper <= reach; }
+  Interval moved(double by) const { return {lower + by, upper + by}; }
+  Interval mirrored() const { return {-upper, -lower}; }
+};
+
+/// Of a turn or slide of a compound, by its axes; nothing: it is free.
+using Limit = std::optional<Interval>;
+
+/// Bullet knows angles within one turn only.
+Limit turn_limit(const Joint& joint, double sign) {
+  if (!(joint.upper - joint.lower < 2.0 * kPi)) return std::nullopt;
+  Interval limit{joint.lower, joint.upper};
+  if (sign < 0.0) limit = limit.mirrored();
+  return limit.moved(-2.0 * kPi * std::round(limit.middle() / (2.0 * kPi)));
+}
+
+/// What the sine of the interval's angles takes them for, in a quarter turn either way.
+Interval folded(const Interval& limit) {
+  const auto holds = [&](double angle) {
+    return std::ceil((limit.lower - angle) / (2.0 * kPi)) <=
+           std::floor((limit.upper - angle) / (2.0 * kPi));
+  };
+  const double one = std::asin(std::sin(limit.lower));
+  const double other = std::asin(std::sin(limit.upper));
+  return {holds(-0.5 * kPi) ? -0.5 * kPi : std::min(one, other),
+          holds(0.5 * kPi) ? 0.5 * kPi : std::max(one, other)};
+}
+
+/// Of three turns Bullet tells the answer whose second one is within a quarter, so that limits have
+/// to speak of that one: limits[2] is the first turn, limits[1] the second, limits[0] the third.
+void speak_of_least_turns(std::array<Limit, 3>& limits) {
+  constexpr double kQuarter = 0.5 * kPi + 1e-9;
+  if (limits[1]) {
+    if (limits[1]->is_within(kQuarter)) return;
+    Interval other = limits[1]->mirrored().moved(kPi);
+    other = other.moved(-2.0 * kPi * std::round(other.middle() / (2.0 * kPi)));
+    if (other.is_within(kQuarter)) {
+      limits[1] = other;
+      for (const std::size_t outer : {0, 2}) {
+        if (limits[outer]) {
+          limits[outer] = limits[outer]->moved(limits[outer]->middle() > 0.0 ? -kPi : kPi);
+        }
+      }
+      return;
+    }
+    limits[1] = folded(*limits[1]);
+  }
+  // Which of the two answers the others' limits mean changes on the way.
+  limits[0].reset();
+  limits[2].reset();
+}
+
+/// Turned so that the limit has 0 in the middle, since Bullet knows none across half a turn.
+void centre(Limit& limit, btTransform& frame, int column, double sign) {
+  const double angle = limit->middle();
+  limit = limit->moved(-angle);
+  btVector3 axis(0, 0, 0);
+  axis[column] = 1.0;
+  frame.setBasis(frame.getBasis() * btMatrix3x3(btQuaternion(axis, sign * angle)));
+}
+
 /// Bullet takes the frames apart as turns about z, y, then x, as CompoundJoint does, and counts
 /// them the other way round.
 std::unique_ptr<btTypedConstraint> make_compound(const Scene& scene, const CompoundJoint& compound,
-                                                 double scale, btRigidBody& parent,
-                                                 btRigidBody& child, const btTransform& in_parent,
-                                                 const btTransform& in_child) {
-  auto made =
-      std::make_unique<btGeneric6DofSpring2Constraint>(parent, child, in_parent, in_child, RO_XYZ);
-  for (int axis = 0; axis < 6; ++axis) {
-    made->setLimit(axis, 0.0, 0.0);
-    made->setParam(BT_CONSTRAINT_STOP_ERP, 0.8, axis);
-  }
+                                                 const Mat3& world_from_joint, btRigidBody& parent,
+                                                 btRigidBody& child, btTransform in_parent,
+                                                 btTransform in_child) {
+  const Interval locked{0.0, 0.0};
+  std::array<Limit, 3> turns{locked, locked, locked};
+  std::array<Limit, 3> slides{locked, locked, locked};
+  int turn_count = 0;
+  bool slides_beside_first_turn = false;
   for (const NodeId id : compound.joints) {
     const Joint& joint = *scene[id].joint;
     int column = 0;
     const Vec3 parts = compound.axes.transpose() * joint.axis;
     parts.cwiseAbs().maxCoeff(&column);
-    const bool turns = joint.kind == JointKind::Revolute;
-    double lower = turns ? joint.lower : std::max(scale * joint.lower, -kFar);
-    double upper = turns ? joint.upper : std::min(scale * joint.upper, kFar);
-    if ((parts[column] < 0.0) != turns) std::tie(lower, upper) = std::pair(-upper, -lower);
-    // Bullet knows angles within one turn only.
-    const bool is_free = turns ? upper - lower >= 2.0 * kPi : upper - lower >= 2.0 * kFar;
-    if (is_free) std::tie(lower, upper) = std::pair(1.0, -1.0);
-    made->setLimit(turns ? 3 + column : column, lower, upper);
+    if (joint.kind == JointKind::Revolute) {
+      turns[std::size_t(column)] = turn_limit(joint, parts[column]);
+      ++turn_count;
+      continue;
+    }
+    slides_beside_first_turn = slides_beside_first_turn || column != 2;
+    const double scale = (world_from_joint * joint.axis).norm();
+    Interval limit{std::max(scale * joint.lower, -kFar), std::min(scale * joint.upper, kFar)};
+    if (parts[column] < 0.0) limit = limit.mirrored();
+    slides[std::size_t(column)] = limit;
+    if (limit.upper - limit.lower >= 2.0 * kFar) slides[std::size_t(column)].reset();
+  }
+  if (turn_count == 3) speak_of_least_turns(turns);
+  constexpr double kHalf = kPi - 1e-6;
+  if (turns[0] && !turns[0]->is_within(kHalf)) centre(turns[0], in_child, 0, -1.0);
+  if (turns[2] && !turns[2]->is_within(kHalf)) {
+    if (turn_count == 1) {
+      centre(turns[2], in_child, 2, -1.0);
+    } else if (!slides_beside_first_turn) {
+      centre(turns[2], in_parent, 2, 1.0);
+    } else {
+      turns[2].reset();  // slides are along the parent's axes
+    }
+  }
+  auto made =
+      std::make_unique<btGeneric6DofSpring2Constraint>(parent, child, in_parent, in_child, RO_XYZ);
+  const auto limit = [&](int axis, const Limit& allowed) {
+    const Interval all = allowed.value_or(Interval{1.0, -1.0});
+    made->setLimit(axis, all.lower, all.upper);
+    made->setParam(BT_CONSTRAINT_STOP_ERP, 0.8, axis);
+  };
+  for (int column = 0; column < 3; ++column) {
+    limit(column, slides[std::size_t(column)]);
+    const Limit& turn = turns[std::size_t(column)];
+    limit(3 + column, turn ? Limit(turn->mirrored()) : turn);
   }
   return made;
+}
+
+/// A place between the joints of a chain; see Joint::child_body.
+bool is_frame(const Scene& scene, NodeId id) {
+  const Node& node = scene[id];
+  return node.joint && node.joint->child_body == id && !node.rigid_body;
 }
 
 bool is_below(const Scene& scene, NodeId node, NodeId top) {
@@ -282,6 +380,14 @@ void add_joints(const Scene& scene, Bodies& bodies) {
     if (!is_compound && in_compound.contains(id)) continue;
     const Joint& last = *scene[id].joint;
     const Joint& first = is_compound ? *scene[compound->second.joints.front()].joint : last;
+    // Frames of no compound belong to nothing that moves, and would pin bodies to the world.
+    if (is_frame(scene, last.child_body)) continue;
+    if (is_frame(scene, first.parent_body)) {
+      if (body_above(scene, last.child_body, moving, bodies)) {
+        bodies.unheld.push_back(scene.path(id));
+      }
+      continue;
+    }
     const MovingBody* parent = body_above(scene, first.parent_body, moving, bodies);
     const MovingBody* child = body_above(scene, last.child_body, moving, bodies);
     if (parent == child) continue;
@@ -312,8 +418,8 @@ void add_joints(const Scene& scene, Bodies& bodies) {
     held.scale = (world_from_parent_joint.linear() * last.axis).norm();
     if (is_compound) {
       held.compound = compound->second;
-      held.constraint = make_compound(scene, compound->second, held.scale, parent_body, child_body,
-                                      in_parent, in_child);
+      held.constraint = make_compound(scene, compound->second, world_from_parent_joint.linear(),
+                                      parent_body, child_body, in_parent, in_child);
     } else if (last.kind == JointKind::Revolute) {
       held.constraint = make_hinge(last, parent_body, child_body, in_parent, in_child);
     } else if (last.kind == JointKind::Prismatic) {

@@ -87,7 +87,7 @@ std::optional<Column> column_of(const Mat3& axes, const Vec3& axis) {
   const Vec3 parts = axes.transpose() * axis;
   Column column;
   const double most = parts.cwiseAbs().maxCoeff(&column.index);
-  if (std::abs(most - 1.0) > kSameAxis) return std::nullopt;
+  if (!(std::abs(most - 1.0) <= kSameAxis)) return std::nullopt;
   column.sign = parts[column.index] > 0.0 ? 1.0 : -1.0;
   return column;
 }
@@ -157,6 +157,18 @@ Vec3 turns_of(const Mat3& turned) {
   const bool is_upright = std::hypot(turned(2, 1), turned(2, 2)) < 1e-9;
   if (is_upright) return {std::atan2(-turned(0, 1), turned(1, 1)), swing, 0.0};
   return {std::atan2(turned(1, 0), turned(0, 0)), swing, std::atan2(turned(2, 1), turned(2, 2))};
+}
+
+/// How far the first two of three angles are from where joints stand; the third is of the body,
+/// which has moved before its frames.
+double way_from(const std::vector<double>& standing, const Vec3& angles,
+                const std::vector<double>& signs) {
+  double sum = 0.0;
+  for (const int i : {0, 1}) {
+    const std::size_t at = std::size_t(i);
+    sum += std::abs(std::remainder(signs[at] * angles[i] - standing[at], 2.0 * kPi));
+  }
+  return sum;
 }
 
 /// How far the angles are beyond limits.
@@ -279,6 +291,11 @@ std::vector<CompoundJoint> compound_joints(const Scene& scene) {
       leaving[parent].push_back(id);
     }
   }
+  // Those of a chain are placed together, and neither lead nor follow others.
+  std::set<NodeId> mimics;
+  for (const NodeId id : joints) {
+    if (const auto& mimic = scene[id].joint->mimic) mimics.insert({id, mimic->joint});
+  }
   std::vector<CompoundJoint> compounds;
   for (const NodeId id : joints) {
     if (is_frame(scene, id)) continue;
@@ -289,7 +306,9 @@ std::vector<CompoundJoint> compound_joints(const Scene& scene) {
       if (frame == leaving.end() || frame->second.size() != 1 || chain.size() > 6) break;
       chain.insert(chain.begin(), above);
     }
-    if (chain.size() < 2) continue;
+    const bool is_alone =
+        std::ranges::none_of(chain, [&](NodeId part) { return mimics.contains(part); });
+    if (chain.size() < 2 || !is_alone) continue;
     if (auto compound = compound_of(scene, std::move(chain))) {
       compounds.push_back(std::move(*compound));
     }
@@ -308,17 +327,25 @@ void place_frames(Scene& scene, const CompoundJoint& compound) {
   const Mat3 turned =
       axes.transpose() * Transform::from_affine(moved).rotation.toRotationMatrix() * axes;
   std::vector<const Joint*> turns;
+  std::vector<double> standing;
   std::vector<double> signs;
   for (const NodeId id : compound.joints) {
     const Joint& joint = *scene[id].joint;
     if (joint.kind != JointKind::Revolute) continue;
     turns.push_back(&joint);
+    standing.push_back(joint_position(scene, id));
     signs.push_back(column_of(axes, joint.axis).value_or(Column{}).sign);
   }
-  // Beyond a quarter turn of the middle one there is another answer.
+  // Beyond a quarter turn of the middle one of three there is another answer.
   Vec3 angles = turns_of(turned);
   const Vec3 other(angles[0] + kPi, kPi - angles[1], angles[2] + kPi);
-  if (beyond(other, turns, signs) + 1e-9 < beyond(angles, turns, signs)) angles = other;
+  if (turns.size() == 3) {
+    // Limits tell which, else the frames as they stand: nothing jumps.
+    const double gain = beyond(angles, turns, signs) - beyond(other, turns, signs);
+    const bool is_nearer =
+        way_from(standing, other, signs) + 1e-9 < way_from(standing, angles, signs);
+    if (gain > 1e-9 || (gain > -1e-9 && is_nearer)) angles = other;
+  }
   Affine world_from_joint = world_from_entry;
   std::size_t turn = 0;
   for (std::size_t i = 0; i + 1 < compound.joints.size(); ++i) {

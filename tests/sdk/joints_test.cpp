@@ -201,6 +201,50 @@ TEST_CASE("a joint of several axes is a chain whose frames share the motion", "[
   }
 }
 
+TEST_CASE("frames tell the answer that lies nearest to where they stood", "[joints]") {
+  Scene scene;
+  const NodeId child = scene.create(scene.root(), "child");
+  std::vector<NodeId> joints;
+  for (int i = 0; i < 3; ++i) {
+    const NodeId id = scene.create(scene.root(), "turn");
+    Joint joint;
+    joint.kind = JointKind::Revolute;
+    joint.axis = Vec3::Unit(i);
+    joint.parent_body = i == 0 ? scene.root() : joints.back();
+    joint.child_body = i == 2 ? child : id;
+    scene.edit(id).joint = joint;
+    joints.push_back(id);
+  }
+  const auto compounds = compound_joints(scene);
+  REQUIRE(compounds.size() == 1);
+  const auto check = [&](double a, double b, double c) {
+    for (const auto& [id, wanted] :
+         {std::pair(joints[0], a), std::pair(joints[1], b), std::pair(joints[2], c)}) {
+      CHECK(joint_position(scene, id) == Approx(wanted).margin(1e-9));
+    }
+  };
+  pose_joints(scene, std::vector<JointTarget>{{joints[0], 0.3}, {joints[1], 2.0}, {joints[2], 1}});
+  place_frames(scene, compounds.front());
+  check(0.3, 2.0, 1.0);
+  // Across the quarter turn, a step at a time, where only the body moves.
+  for (double b = 1.99; b > 1.0; b -= 0.03) {
+    scene.set_pose(
+        child, Affine(Eigen::AngleAxisd(0.3, Vec3::UnitX()) * Eigen::AngleAxisd(b, Vec3::UnitY()) *
+                      Eigen::AngleAxisd(1.0, Vec3::UnitZ())));
+    place_frames(scene, compounds.front());
+    CAPTURE(b);
+    check(0.3, b, 1.0);
+  }
+  // One that leads another is no part of a chain.
+  const NodeId follower = scene.create(scene.root(), "follower");
+  Joint follows = *scene[joints[2]].joint;
+  follows.parent_body = scene.root();
+  follows.child_body = scene.create(scene.root(), "led");
+  follows.mimic = Joint::Mimic{joints[1], 1.0, 0.0};
+  scene.edit(follower).joint = follows;
+  CHECK(compound_joints(scene).empty());
+}
+
 TEST_CASE("chains that bend at no right angle or end nowhere are no joint of several axes",
           "[joints]") {
   Scene scene;

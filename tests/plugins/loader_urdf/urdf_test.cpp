@@ -305,6 +305,13 @@ TEST_CASE("numbers that cannot be are warnings, and what they are of is left out
       CHECK(model.scene[node].parent_from_node.matrix().allFinite());
     }
   };
+  for (const char* type : {"planar", "floating", "fixed"}) {
+    warned("<link name=\"z\"/>" + kTwo +
+               "<joint name=\"i\" type=\"fixed\"><parent link=\"z\"/><child link=\"a\"/>"
+               "<origin xyz=\"1e308 0 0\"/></joint>" +
+               joint(type, "<origin xyz=\"1e308 0 0\"/>"),
+           "too far away");
+  }
   warned(kTwo + joint("planar", "<axis xyz=\"0 0 0\"/>"), "joint 'j' has no axis; it is x");
   warned(kTwo + joint("continuous", "<axis xyz=\"0 0 0\"/>"), "joint 'j' has no axis; it is x");
   warned(kTwo + joint("revolute", "<limit lower=\"2\" upper=\"1\" effort=\"1\" velocity=\"1\"/>"),

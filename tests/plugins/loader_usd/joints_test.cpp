@@ -201,7 +201,7 @@ TEST_CASE("joints of any freedom are what is left of it", "[loader_usd]") {
     return all;
   };
   CHECK(chain("hip") == "rotY rotX rotZ ");
-  CHECK(chain("ball") == "rotZ rotX rotY ");
+  CHECK(chain("ball") == "rotX rotZ rotY ");
   CHECK(chain("loose") == "transX transY transZ rotX rotY rotZ ");
   CHECK(compound_joints(loaded.scene).size() == 3);
   const Joint& first = *loaded.node("hip/rotY").joint;
@@ -217,6 +217,36 @@ TEST_CASE("joints of any freedom are what is left of it", "[loader_usd]") {
   CHECK(loaded.node("ball/rotY").joint->upper == kInfinity);
   CHECK(loaded.node("loose/transX").joint->upper == kInfinity);
   CHECK(warnings(loaded).empty());
+}
+
+TEST_CASE("a joint of several axes that ends in the world begins there", "[loader_usd]") {
+  const TemporaryFolder folder;
+  LoadedStage loaded(folder.write("a.usda", R"(#usda 1.0
+def Xform "A" ( prepend apiSchemas = ["PhysicsRigidBodyAPI"] )
+{
+}
+def PhysicsSphericalJoint "hip"
+{
+    rel physics:body0 = </A>
+    float physics:coneAngle0Limit = 60
+    float physics:coneAngle1Limit = 60
+}
+def PhysicsJoint "both"
+{
+    rel physics:body0 = </A>
+}
+)"));
+  std::string names;
+  for (const NodeId id : loaded.node("hip").children) names += loaded.scene[id].name + " ";
+  CHECK(names == "rotX rotZ rotY ");
+  const Joint& first = *loaded.node("hip/rotX").joint;
+  CHECK(loaded.scene.path(first.parent_body) == "/asset/world");
+  CHECK(first.axis == Vec3(-Vec3::UnitX()));
+  CHECK(loaded.scene.path(loaded.node("hip/rotY").joint->child_body) == "/asset/A");
+  CHECK(compound_joints(loaded.scene).size() == 1);
+  CHECK(loaded.node("both").children.empty());
+  CHECK(warnings(loaded).find("</both> is a joint to the world that slides and turns") !=
+        std::string::npos);
 }
 
 TEST_CASE("a joint of several axes in a prim without a size holds nothing", "[loader_usd]") {

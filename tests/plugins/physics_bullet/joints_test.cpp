@@ -327,6 +327,115 @@ TEST_CASE("joints of several axes hold all but these, within their limits", "[ph
   }
 }
 
+TEST_CASE("limits of several axes hold wherever they lie", "[physics_bullet]") {
+  const double degree = kPi / 180.0;
+  using Limits = std::vector<std::pair<double, double>>;
+  const double none = kInfinity;
+  struct Case {
+    Limits limits;
+    std::vector<bool> is_held;  ///< Bullet knows nothing of the others.
+  };
+  const std::vector<Case> cases{
+      {{{100, 250}, {-40, 30}, {-250, -120}}, {true, true, true}},
+      {{{100, 250}, {-100, 10}}, {true, true}},
+      {{{-100, 10}, {100, 250}}, {true, true}},
+      {{{-20, 35}, {103, 143}, {-70, 45}}, {true, true, true}},
+      {{{150, 200}, {-250, -200}, {330, 400}}, {true, true, true}},
+      {{{-42, 42}, {-none, none}, {-none, none}}, {false, true, true}},
+      {{{-42, 42}, {-110, 5}, {-20, 20}}, {false, false, false}},
+      {{{-42, 42}, {60, 140}, {-20, 20}}, {false, false, false}},
+  };
+  for (std::size_t number = 0; number < cases.size(); ++number) {
+    const auto& [limits, is_held] = cases[number];
+    PhysicsWorld world;
+    const NodeId hook = world.scene.create(world.scene.root(), "hook");
+    const NodeId ball =
+        world.add_primitive("ball", PrimitiveShape::Box, Vec3(0.3, 0.3, 0.3), at(0, 0, 1));
+    world.make_body(ball, 1.0);
+    world.scene.edit(ball).rigid_body->has_gravity = false;
+    std::vector<NodeId> joints;
+    for (std::size_t i = 0; i < limits.size(); ++i) {
+      const NodeId id = world.scene.create(world.scene.root(), "turn" + std::to_string(i));
+      world.scene.set_pose(id, at(0, 0, 1));
+      Joint joint;
+      joint.kind = JointKind::Revolute;
+      joint.axis = (i == 1 ? -1.0 : 1.0) * Vec3::Unit(int(i));
+      joint.lower = limits[i].first * degree;
+      joint.upper = limits[i].second * degree;
+      joint.parent_body = i == 0 ? hook : joints.back();
+      joint.child_body = i + 1 < limits.size() ? id : ball;
+      if (i == 0) joint.parent_from_joint = at(0, 0, 1);
+      world.scene.edit(id).joint = joint;
+      joints.push_back(id);
+    }
+    REQUIRE(compound_joints(world.scene).size() == 1);
+    for (int draw = 0; draw < 12; ++draw) {
+      CAPTURE(number, draw);
+      std::vector<JointTarget> targets;
+      for (std::size_t i = 0; i < limits.size(); ++i) {
+        const double share = 0.05 + 0.9 * std::fmod((0.38 + 0.21 * double(i)) * (draw + 1), 1.0);
+        const double lower = std::isfinite(limits[i].first) ? limits[i].first : -180.0;
+        const double upper = std::isfinite(limits[i].second) ? limits[i].second : 180.0;
+        targets.push_back({joints[i], (lower + share * (upper - lower)) * degree});
+      }
+      pose_joints(world.scene, targets);
+      // What is within its limits stays.
+      const Quat before(Mat3(world.scene.world_from_node(ball).linear()));
+      world.scene.set_velocity(ball, Vec3::Zero(), Vec3::Zero());
+      world.backend.reset(world.scene);
+      world.backend.advance(world.scene, 5);
+      const Quat after(Mat3(world.scene.world_from_node(ball).linear()));
+      CHECK(before.angularDistance(after) < 0.02);
+      // What is thrown stays within them.
+      world.scene.set_velocity(
+          ball, Vec3::Zero(),
+          4.0 * Vec3(std::cos(1.0 * draw), std::sin(1.0 * draw), std::cos(2.3 * draw)));
+      world.backend.reset(world.scene);
+      for (int step = 0; step < 20; ++step) {
+        world.backend.advance(world.scene, 1);
+        for (std::size_t i = 0; i < limits.size(); ++i) {
+          if (!is_held[i]) continue;
+          CAPTURE(step, i);
+          if (!std::isfinite(limits[i].first)) continue;
+          const double now = joint_position(world.scene, joints[i]) / degree;
+          const double middle = 0.5 * (limits[i].first + limits[i].second);
+          CHECK(std::abs(std::remainder(now - middle, 360.0)) < limits[i].second - middle + 8.0);
+        }
+      }
+    }
+  }
+}
+
+TEST_CASE("frames of chains that are none of several axes hold nothing", "[physics_bullet]") {
+  PhysicsWorld world;
+  const NodeId box =
+      world.add_primitive("box", PrimitiveShape::Box, Vec3(0.2, 0.2, 0.2), at(0, 0, 2));
+  const NodeId lost =
+      world.add_primitive("lost", PrimitiveShape::Box, Vec3(0.2, 0.2, 0.2), at(1, 0, 2));
+  const NodeId other =
+      world.add_primitive("other", PrimitiveShape::Box, Vec3(0.2, 0.2, 0.2), at(2, 0, 2));
+  for (const NodeId body : {box, lost, other}) world.make_body(body);
+  const auto chain = [&](NodeId parent, NodeId child, const Vec3& second_axis) {
+    const NodeId frame = world.scene.create(world.scene.root(), "frame");
+    world.scene.set_pose(frame, world.scene.world_from_node(parent));
+    Joint joint;
+    joint.kind = JointKind::Revolute;
+    joint.axis = Vec3::UnitX();
+    joint.parent_body = parent;
+    joint.child_body = frame;
+    world.scene.edit(frame).joint = joint;
+    const NodeId end = join(world, JointKind::Revolute, frame, child,
+                            world.scene.world_from_node(parent), second_axis);
+    return end;
+  };
+  chain(box, lost, Vec3::UnitY());
+  chain(box, other, Vec3(1, 1, 0).normalized());
+  world.scene.erase(lost);
+  world.run(30);
+  CHECK(world.position(box).z() < 1.0);
+  CHECK(world.position(other).z() < 1.0);
+}
+
 TEST_CASE("a thing on a planar joint slides and turns in its plane", "[physics_bullet]") {
   PhysicsWorld world;
   const NodeId base = world.scene.create(world.scene.root(), "base");
