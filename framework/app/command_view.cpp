@@ -18,6 +18,7 @@
 #include <thread>
 
 #include "diorama/error.h"
+#include "framework/app/exit_codes.h"
 #include "framework/config/clean_text.h"
 #include "framework/datasets/dataset_readers.h"
 #include "framework/host/scratch_folder.h"
@@ -124,18 +125,7 @@ void show_until_end(const GlobalOptions& global, const ViewOptions& options, Con
   }
 }
 
-}  // namespace
-
-int command_view(const GlobalOptions& global, const ViewOptions& options, ConsoleLog& log) {
-  try {
-    show_until_end(global, options, log);
-  } catch (const Stopped&) {
-    // Ctrl-C while datasets were opened, or the index was made.
-  }
-  return 0;
-}
-
-int command_report(const GlobalOptions& global, const ReportOptions& options, ConsoleLog& log) {
+void make_report(const GlobalOptions& global, const ReportOptions& options, ConsoleLog& log) {
   const JobServices services = make_services(global, log.sink());
   end_in_order(*services.host);
   DatasetReaders readers(*services.registry, *services.host);
@@ -155,6 +145,25 @@ int command_report(const GlobalOptions& global, const ReportOptions& options, Co
     const std::size_t fewer = std::max<std::size_t>(1, shown * kMostMailBytes / size.bytes);
     log.write(LogLevel::Info,
               "for a mail choose fewer of them: --captures " + std::to_string(fewer));
+  }
+}
+
+}  // namespace
+
+int command_view(const GlobalOptions& global, const ViewOptions& options, ConsoleLog& log) {
+  try {
+    show_until_end(global, options, log);
+  } catch (const Stopped&) {
+    // Ctrl-C while datasets were opened, or the index was made.
+  }
+  return 0;
+}
+
+int command_report(const GlobalOptions& global, const ReportOptions& options, ConsoleLog& log) {
+  try {
+    make_report(global, options, log);
+  } catch (const Stopped&) {
+    return kStopped;
   }
   return 0;
 }
