@@ -18,6 +18,7 @@
 #include <thread>
 
 #include "diorama/error.h"
+#include "framework/app/exit_codes.h"
 #include "framework/config/clean_text.h"
 #include "framework/datasets/dataset_readers.h"
 #include "framework/host/scratch_folder.h"
@@ -79,30 +80,28 @@ class BrowserStart {
   std::optional<ScratchFolder> folder_;
 };
 
-/// What the assembly of a run's job has to say, the run has said.
-Log quiet(ConsoleLog& log) {
-  return [&log](LogLevel, std::string_view text) { log.write(LogLevel::Debug, text); };
+/// Before anything is put among the temporary files: it is removed in good order only.
+void end_in_order(HostServices& host) {
+  view_is_to_end = false;
+  std::signal(SIGINT, &end_view);
+  std::signal(SIGTERM, &end_view);
+  std::signal(SIGHUP, &end_view);
+  host.stop_on(view_is_to_end);
 }
 
-}  // namespace
-
-int command_view(const GlobalOptions& global, const ViewOptions& options, ConsoleLog& log) {
+void show_until_end(const GlobalOptions& global, const ViewOptions& options, ConsoleLog& log) {
   const JobServices services = make_services(global, log.sink());
+  end_in_order(*services.host);
   DatasetReaders readers(*services.registry, *services.host);
-  UnfinishedWriters unfinished(global, quiet(log));
+  UnfinishedWriters unfinished(global, view_is_to_end, log.sink());
   DatasetView view({.folder = options.dataset,
                     .other = options.other,
                     .tolerance = options.tolerance,
                     .reader = options.reader,
                     .cache = index_cache_folder(),
-                    .unfinished = std::bind_front(&UnfinishedWriters::folder_for, &unfinished)},
+                    .unfinished = std::bind_front(&UnfinishedWriters::folders_for, &unfinished)},
                    readers, *services.host);
 
-  view_is_to_end = false;
-  std::signal(SIGINT, &end_view);
-  std::signal(SIGTERM, &end_view);
-  std::signal(SIGHUP, &end_view);
-  services.host->stop_on(view_is_to_end);
   HttpServer::Options server_options;
   server_options.port = options.port;
   HttpServer server(server_options, [&view](std::string_view path) { return view.answer(path); });
@@ -116,29 +115,25 @@ int command_view(const GlobalOptions& global, const ViewOptions& options, Consol
   if (options.opens_browser) browser.emplace(server.address());
 
   const std::chrono::minutes most_idle(options.idle_minutes);
-  try {
-    while (!view_is_to_end) {
-      if (options.idle_minutes > 0 && server.idle_time() >= most_idle) {
-        log.write(LogLevel::Info, "ended, as nobody has asked for " +
-                                      std::to_string(options.idle_minutes) + " minutes");
-        break;
-      }
-      if (!view.work()) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  while (!view_is_to_end) {
+    if (options.idle_minutes > 0 && server.idle_time() >= most_idle) {
+      log.write(LogLevel::Info, "ended, as nobody has asked for " +
+                                    std::to_string(options.idle_minutes) + " minutes");
+      break;
     }
-  } catch (const Stopped&) {
-    // Ctrl-C while the index was made.
+    if (!view.work()) std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }
-  return 0;
 }
 
-int command_report(const GlobalOptions& global, const ReportOptions& options, ConsoleLog& log) {
+void make_report(const GlobalOptions& global, const ReportOptions& options, ConsoleLog& log) {
   const JobServices services = make_services(global, log.sink());
+  end_in_order(*services.host);
   DatasetReaders readers(*services.registry, *services.host);
-  UnfinishedWriters unfinished(global, quiet(log));
+  UnfinishedWriters unfinished(global, view_is_to_end, log.sink());
   DatasetView view({.folder = options.dataset,
                     .reader = options.reader,
                     .most_captures = options.captures,
-                    .unfinished = std::bind_front(&UnfinishedWriters::folder_for, &unfinished)},
+                    .unfinished = std::bind_front(&UnfinishedWriters::folders_for, &unfinished)},
                    readers, *services.host);
   const ReportSize size = write_report(view, options.output, options.has_all_overlays);
   log.write(LogLevel::Info, "wrote " + (options.output / "index.html").string() + ": " +
@@ -150,6 +145,25 @@ int command_report(const GlobalOptions& global, const ReportOptions& options, Co
     const std::size_t fewer = std::max<std::size_t>(1, shown * kMostMailBytes / size.bytes);
     log.write(LogLevel::Info,
               "for a mail choose fewer of them: --captures " + std::to_string(fewer));
+  }
+}
+
+}  // namespace
+
+int command_view(const GlobalOptions& global, const ViewOptions& options, ConsoleLog& log) {
+  try {
+    show_until_end(global, options, log);
+  } catch (const Stopped&) {
+    // Ctrl-C while datasets were opened, or the index was made.
+  }
+  return 0;
+}
+
+int command_report(const GlobalOptions& global, const ReportOptions& options, ConsoleLog& log) {
+  try {
+    make_report(global, options, log);
+  } catch (const Stopped&) {
+    return kStopped;
   }
   return 0;
 }

@@ -7,5 +7,6 @@ namespace diorama {
 
 inline constexpr int kDatasetIncomplete = 8;  ///< `status` and `finish`: captures are missing.
 inline constexpr int kBusy = 75;              ///< Another process has this part; later it is free.
+inline constexpr int kStopped = 130;          ///< A signal came before the end.
 
 }  // namespace diorama

@@ -133,10 +133,11 @@ std::optional<StoredCapture> read_numbered(const StoredDataset& data, int number
   return data.read(std::size_t(place - all.begin()), wanted);
 }
 
-/// Why a capture cannot be compared; empty when it can.
-std::string loss_of(const StoredCapture& stored) {
-  const bool is_lost = stored.capture.frames.empty() && !stored.log.findings.empty();
-  return is_lost ? stored.log.findings.front().found : std::string();
+/// Why a capture cannot be compared; nothing when it can.
+std::optional<std::string> loss_of(const StoredCapture& stored) {
+  if (!stored.capture.frames.empty() || stored.log.findings.empty()) return std::nullopt;
+  const Finding& first = stored.log.findings.front();
+  return first.found.empty() ? first.check : first.found;
 }
 
 std::vector<std::string> partner_differences(const StoredInfo& common, const StoredCapture& a,
@@ -144,11 +145,11 @@ std::vector<std::string> partner_differences(const StoredInfo& common, const Sto
   const std::optional<StoredCapture> partner = read_numbered(b, a.capture.index, common.holds);
   if (!partner) return {"only in the first"};
   std::vector<std::string> lines;
-  if (const std::string loss = loss_of(a); !loss.empty()) {
-    lines.push_back("cannot be read in the first: " + loss);
+  if (const auto loss = loss_of(a)) {
+    lines.push_back("cannot be read in the first: " + *loss);
   }
-  if (const std::string loss = loss_of(*partner); !loss.empty()) {
-    lines.push_back("cannot be read in the second: " + loss);
+  if (const auto loss = loss_of(*partner)) {
+    lines.push_back("cannot be read in the second: " + *loss);
   }
   return lines.empty() ? capture_differences(common, a.capture, partner->capture) : lines;
 }

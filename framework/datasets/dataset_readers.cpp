@@ -151,13 +151,16 @@ Reader& DatasetReaders::reader_with(const std::string& mapping) {
   return *made;
 }
 
+Reader& DatasetReaders::opener(const std::string& named) {
+  return named.starts_with('{') ? reader_with(named) : reader(entry_of(named));
+}
+
 std::unique_ptr<const StoredDataset> DatasetReaders::open(const fs::path& folder,
                                                           const std::string& named,
                                                           LostCaptures lost) {
-  const bool is_mapping = named.starts_with('{');
-  Reader& opener = is_mapping ? reader_with(named) : reader(entry_of(named));
-  const std::string who = is_mapping ? "reader " + named : reader_name(named);
-  auto opened = call_component(who, [&] { return opener.open(folder); });
+  Reader& reader = opener(named);
+  const std::string who = named.starts_with('{') ? "reader " + named : reader_name(named);
+  auto opened = call_component(who, [&] { return reader.open(folder); });
   if (!opened) throw Error(ErrorKind::Plugin, who + ": opened nothing");
   return lost == LostCaptures::Throw ? std::move(opened) : guarded(std::move(opened));
 }

@@ -35,6 +35,9 @@ class DatasetReaders {
   /// Type of the reader that knows the folder best; empty when none does. Throws Error(Usage) that
   /// names the readers when two know it equally well.
   std::string recognise(const std::filesystem::path& folder);
+  /// Makes the reader that open() takes for `named`, so that what is wrong with the name or the
+  /// parameters is told apart from what is wrong with a dataset. Throws as open() does.
+  void make(const std::string& named) { opener(named); }
   /// What becomes of a capture in which a reader throws: see guarded(), or its caller sees it.
   enum class LostCaptures : std::uint8_t { Findings, Throw };
   /// Opens the folder with a reader of this type, or of a mapping in YAML with its parameters:
@@ -50,6 +53,7 @@ class DatasetReaders {
   Reader& reader(const Entry& entry);
   const Entry& entry_of(const std::string& type) const;
   Reader& reader_with(const std::string& mapping);
+  Reader& opener(const std::string& named);
 
   std::vector<Entry> entries_;
   std::map<std::string, std::unique_ptr<Reader>> made_;  ///< By type, or mapping.

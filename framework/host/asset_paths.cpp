@@ -246,8 +246,12 @@ std::optional<fs::path> choose_assets_root(const std::optional<fs::path>& comman
                                            const std::optional<fs::path>& sample_pack) {
   const auto checked = [](const fs::path& root, const char* origin) {
     std::error_code failed;
-    // Absolute, as paths of assets become: datasets name them relative to it.
-    if (fs::is_directory(root, failed)) return fs::absolute(root).lexically_normal();
+    if (fs::is_directory(root, failed)) {
+      // Absolute, as paths of assets become: datasets name them relative to it.
+      fs::path plain = fs::absolute(root).lexically_normal();
+      // A link in front of ".." leads elsewhere.
+      return fs::equivalent(plain, root, failed) ? plain : fs::canonical(root);
+    }
     throw Error(ErrorKind::Asset,
                 root.string() + ": the assets root (" + origin + ") is no folder that exists");
   };

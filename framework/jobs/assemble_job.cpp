@@ -147,16 +147,18 @@ void make_randomizers(Assembler& assembler, JobAssembly& assembly) {
   }
 }
 
-void make_engines_and_writers(Assembler& assembler, JobAssembly& assembly) {
+void make_engines(Assembler& assembler, JobAssembly& assembly) {
   const Job& job = assembly.job;
-  JobComponents& parts = assembly.components;
-  VisitComponents& set = parts.sets.front();
+  VisitComponents& set = assembly.components.sets.front();
   if (job.physics.type != "none") {
     set.physics = assembler.make<PhysicsBackend>(job.physics, "physics");
   }
   set.renderer = assembler.make<Renderer>(job.renderer, "renderer");
-  for (const WriterEntry& entry : job.writers) {
-    parts.writers.push_back(assembler.make<Writer>(entry.component, "writers"));
+}
+
+void make_writers(Assembler& assembler, JobAssembly& assembly) {
+  for (const WriterEntry& entry : assembly.job.writers) {
+    assembly.components.writers.push_back(assembler.make<Writer>(entry.component, "writers"));
   }
 }
 
@@ -368,7 +370,8 @@ Value check_job(const Value& value, Registry& registry, Host& host) {
   assembly.job = read_job(value, assembler.complaints());
   make_loaders(assembler, assembly);
   make_randomizers(assembler, assembly);
-  make_engines_and_writers(assembler, assembly);
+  make_engines(assembler, assembly);
+  make_writers(assembler, assembly);
   make_annotators(assembler, assembly.job);
   assembler.complaints().raise();
   return resolved_job(value, describe_from(registry));
@@ -386,8 +389,11 @@ JobAssembly assemble_job(const Value& value, Registry& registry, HostServices& h
   host.take_resolved();
   make_randomizers(assembler, assembly);
   const std::vector<std::string> drawn_assets = texts_of(host.take_resolved());
-  make_engines_and_writers(assembler, assembly);
-  ListedAnnotators annotators = make_annotators(assembler, assembly.job);
+  const bool is_for_tables = purpose == AssembleFor::Tables;
+  if (!is_for_tables) make_engines(assembler, assembly);
+  make_writers(assembler, assembly);
+  ListedAnnotators annotators;
+  if (!is_for_tables) annotators = make_annotators(assembler, assembly.job);
   assembler.complaints().raise();
   for (auto& [type, loader] : loaders.of_files) host.use_loader(type, std::move(loader));
   assembly.resolved = resolved_job(value, describe_from(registry));
@@ -399,7 +405,7 @@ JobAssembly assemble_job(const Value& value, Registry& registry, HostServices& h
   for (const std::string& message : unknown_view_labels(assembly.job, assembly.plan)) {
     host.log(LogLevel::Warning, message);
   }
-  resolve_needs(assembler, std::move(annotators), assembly);
+  if (!is_for_tables) resolve_needs(assembler, std::move(annotators), assembly);
   for (const EnvironmentChoice& choice : assembly.plan.environments) {
     assembler.note_loader(host.loader_of(choice.asset));
   }
@@ -415,7 +421,7 @@ JobAssembly assemble_job(const Value& value, Registry& registry, HostServices& h
       assembly.job, assembly.plan, portable_job(assembly.resolved), program_version,
       assembler.plugins(), drawn_assets,
       [&](const std::string& asset) {
-        return purpose == AssembleFor::Trial ? std::vector<fs::path>() : host.files_of(asset);
+        return purpose == AssembleFor::Run ? host.files_of(asset) : std::vector<fs::path>();
       },
       assets_root, host);
   assembly.dataset_json = dataset_json(assembly.dataset, assembly.job);

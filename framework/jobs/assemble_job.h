@@ -35,8 +35,9 @@ DescribeComponent describe_from(Registry& registry);
 Value check_job(const Value& job, Registry& registry, Host& host);
 
 /// A plan needs no description of the dataset, for which every file of every asset is read. A trial
-/// has one that names no files.
-enum class AssembleFor { Plan, Trial, Run };
+/// has one that names no files. For the tables that writers make of records, there are no renderer,
+/// physics or annotators besides, as these open devices.
+enum class AssembleFor { Plan, Tables, Trial, Run };
 
 /// Reads the job, makes its components, lists its assets, plans its captures and resolves what its
 /// writers need. The host gets the job's loaders. Nothing is loaded or written. All complaints

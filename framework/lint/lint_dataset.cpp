@@ -65,7 +65,7 @@ class RunLint {
     } catch (const Stopped&) {
       throw;
     } catch (const Error& error) {
-      if (error.kind() == ErrorKind::Usage) throw;
+      if (error.kind() == ErrorKind::Usage || error.kind() == ErrorKind::Internal) throw;
       reports_.push_back({folder.string(), reader, 0, 1, {}});
       reports_.back().findings.push_back(
           lint_finding({kFilesCanBeRead, ".", std::nullopt, "", "", error.what(), ""}));
@@ -100,6 +100,7 @@ std::vector<LintReport> lint_datasets(const std::filesystem::path& folder, Datas
   if (!std::filesystem::is_directory(folder)) {
     throw Error(ErrorKind::Usage, folder.string() + ": not a folder; give the output of a run");
   }
+  if (!reader.empty()) readers.make(reader);
   RunLint run(readers, host);
   if (run.lint(folder, reader)) return run.take_reports();
   for (const auto& path : folders_of_run(folder)) run.lint(path, "");

@@ -121,32 +121,45 @@ Camera camera_given(const py::object& given) {
   return camera;
 }
 
-CoverageMask mask_given(const py::object& given) {
+/// `beyond` is how many image sizes the box may reach beyond the image to each side.
+CoverageMask mask_given(const std::string& what, const py::object& given, const Camera& camera,
+                        int beyond) {
   CoverageMask mask;
   if (given.is_none()) return mask;
-  const auto [box, bits] = given.cast<std::pair<py::object, py::array_t<std::uint8_t>>>();
+  using Bits = py::array_t<bool, py::array::c_style | py::array::forcecast>;
+  const auto [box, bits] = given.cast<std::pair<py::object, Bits>>();
   const std::optional<PixelBox> place = pixel_box(box);
-  if (!place) throw Error(ErrorKind::Plugin, "an amodal mask has a box");
+  if (!place) throw Error(ErrorKind::Plugin, what + " has a box");
   mask.box = *place;
-  if (bits.ndim() != 2 || bits.shape(0) != mask.box.height() || bits.shape(1) != mask.box.width()) {
-    throw Error(ErrorKind::Plugin, "an amodal mask has the size of its box");
+  const auto fits = [beyond](int from, int to, int size) {
+    return from <= to && from >= -std::int64_t(beyond) * size &&
+           to <= (1 + std::int64_t(beyond)) * size;
+  };
+  if (!fits(place->x_min, place->x_max, camera.width) ||
+      !fits(place->y_min, place->y_max, camera.height)) {
+    throw Error(ErrorKind::Plugin,
+                what + " has a box " +
+                    (beyond > 0 ? "at most one image size beyond the image" : "in the image") +
+                    ", found " + py::str(box).cast<std::string>());
   }
-  const auto dense = py::array_t<std::uint8_t, py::array::c_style>(bits);
-  mask.bits.assign(dense.data(), dense.data() + dense.size());
+  if (bits.ndim() != 2 || bits.shape(0) != mask.box.height() || bits.shape(1) != mask.box.width()) {
+    throw Error(ErrorKind::Plugin, what + " has the size of its box, found " + shape_of(bits));
+  }
+  mask.bits.assign(bits.data(), bits.data() + bits.size());
   return mask;
 }
 
-Visibility visibility_given(const py::object& given) {
+Visibility visibility_given(const py::object& given, const Camera& camera) {
   Visibility seen;
   seen.visible_pixels = given.attr("visible_pixels").cast<std::int64_t>();
   seen.amodal_pixels = given.attr("amodal_pixels").cast<std::int64_t>();
   seen.outside_pixels = given.attr("outside_pixels").cast<std::int64_t>();
   seen.amodal_box = pixel_box(given.attr("amodal_box"));
-  seen.amodal_mask = mask_given(given.attr("amodal_mask"));
+  seen.amodal_mask = mask_given("an amodal mask", given.attr("amodal_mask"), camera, 1);
   return seen;
 }
 
-Instance instance_given(const py::object& given) {
+Instance instance_given(const py::object& given, const Camera& camera) {
   Instance instance;
   instance.id = given.attr("id").cast<std::uint32_t>();
   instance.node_path = given.attr("path").cast<std::string>();
@@ -160,7 +173,7 @@ Instance instance_given(const py::object& given) {
   }
   instance.tight_box = pixel_box(given.attr("box"));
   if (const py::object seen = given.attr("visibility"); !seen.is_none()) {
-    instance.visibility = visibility_given(seen);
+    instance.visibility = visibility_given(seen, camera);
   }
   for (const auto& [name, position] : given.attr("keypoints").cast<std::map<std::string, Vec3>>()) {
     instance.keypoints.push_back({name, position});
@@ -181,7 +194,8 @@ Frame frame_given(const py::object& given) {
     frame.world_from_camera = affine_of(*pose);
   }
   for (const py::handle each : given.attr("instances")) {
-    frame.instances.push_back(instance_given(py::reinterpret_borrow<py::object>(each)));
+    frame.instances.push_back(
+        instance_given(py::reinterpret_borrow<py::object>(each), frame.camera));
   }
   for (const auto& [front, behind, pixels] :
        given.attr("occlusions")
@@ -220,7 +234,7 @@ void store_capture(StoredCapture& stored, const py::object& given) {
     capture.frames.push_back(frame_given(py::reinterpret_borrow<py::object>(frame)));
     auto& masks = stored.masks.emplace_back();
     for (const auto& [id, mask] : frame.attr("masks").cast<std::map<std::uint32_t, py::object>>()) {
-      masks.emplace(id, mask_given(mask));
+      masks.emplace(id, mask_given("a mask", mask, capture.frames.back().camera, 0));
     }
   }
   stored.files.resize(capture.frames.size());

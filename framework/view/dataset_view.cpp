@@ -135,13 +135,15 @@ struct DatasetView::Opened {
 
 DatasetView::DatasetView(Options options, DatasetReaders& readers, Host& host)
     : options_(std::move(options)), readers_(readers), host_(host), indexes_(options_.cache) {
-  Opening opening = open();
-  datasets_ = std::move(opening.datasets);
-  faults_ = std::move(opening.faults);
+  if (!options_.reader.empty()) readers_.make(options_.reader);
+  // Before they are opened, which takes long: what comes meanwhile is seen at the next look.
   if (const auto status = status_of_run(options_.folder)) {
     done_ = status->done;
     is_finished_ = status->is_finished;
   }
+  Opening opening = open();
+  datasets_ = std::move(opening.datasets);
+  faults_ = std::move(opening.faults);
 }
 
 DatasetView::~DatasetView() {
@@ -149,14 +151,14 @@ DatasetView::~DatasetView() {
 }
 
 void DatasetView::open_below(const fs::path& folder, bool is_other, Datasets& all,
-                             std::vector<std::string>& faults) const {
+                             std::vector<std::string>& faults) {
   const std::ptrdiff_t before = std::ssize(all);
   const auto status = status_of_run(folder);
   const bool goes_on = status && !status->is_finished;
   // Formats may have nothing to read before a run's end; the others show how it goes.
   std::exception_ptr first_fault;
   const auto forgive = [&](const Error& error) {
-    if (dynamic_cast<const Stopped*>(&error)) throw;
+    if (dynamic_cast<const Stopped*>(&error) || error.kind() == ErrorKind::Usage) throw;
     if (goes_on) return host_.log(LogLevel::Debug, error.what());
     if (!first_fault) first_fault = std::current_exception();
     faults.emplace_back(error.what());
@@ -195,15 +197,31 @@ void DatasetView::open_below(const fs::path& folder, bool is_other, Datasets& al
     });
   };
   if (goes_on && status->done > 0 && options_.unfinished) {
-    const bool is_whole_run = run_of(folder) == folder;
-    for (const fs::path& place : is_whole_run ? folders_of_run(folder) : std::vector{folder}) {
-      if (is_shown(place)) continue;
+    const bool is_whole_run = options_.reader.empty() && run_of(folder) == folder;
+    std::vector<fs::path> places = is_whole_run ? folders_of_run(folder) : std::vector{folder};
+    std::erase_if(places, [&](const fs::path& place) {
+      return is_shown(place) || unreadable_.contains(place);
+    });
+    std::map<fs::path, fs::path> stand_ins;
+    try {
+      stand_ins = options_.unfinished(*status, places);
+    } catch (const Stopped&) {
+      throw;
+    } catch (const Error& error) {
+      host_.log(LogLevel::Debug, error.what());  // also a job that cannot be assembled here
+    }
+    for (const auto& [place, made] : stand_ins) {
       try {
-        const auto made = options_.unfinished(*status, place);
-        const std::string reader = made ? readers_.recognise(*made) : std::string();
-        if (reader.empty()) continue;
-        auto whole = readers_.open(*made, reader);
-        std::erase_if(all, [&](const auto& opened) { return opened->folder == place; });
+        const std::string reader =
+            options_.reader.empty() ? readers_.recognise(made) : options_.reader;
+        if (reader.empty()) {
+          unreadable_.insert(place);
+          continue;
+        }
+        auto whole = readers_.open(made, reader);
+        all.erase(std::remove_if(all.begin() + before, all.end(),
+                                 [&](const auto& opened) { return opened->folder == place; }),
+                  all.end());
         add(place, std::move(whole));
       } catch (const Error& error) {
         forgive(error);
@@ -221,7 +239,7 @@ void DatasetView::open_below(const fs::path& folder, bool is_other, Datasets& al
   });
 }
 
-DatasetView::Opening DatasetView::open() const {
+DatasetView::Opening DatasetView::open() {
   auto opened = std::make_shared<Datasets>();
   Opening opening;
   open_below(options_.folder, false, *opened, opening.faults);
@@ -574,7 +592,13 @@ HttpAnswer DatasetView::answer(std::string_view path) {
   if (words.size() == 2 && words[1] == "state") return state();
   if (words.size() == 2 && words[1] == "run") return run_answer();
   if (words.size() == 2 && words[1] == "lint") return lint_answer();
-  const auto all = datasets();
+  std::shared_ptr<const Datasets> all;
+  int generation = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    all = datasets_;
+    generation = generation_;
+  }
   const auto number = whole_number(words[1]);
   if (words.size() < 3 || !number || *number >= all->size()) return not_there();
   Opened& opened = *all->at(*number);
@@ -584,11 +608,7 @@ HttpAnswer DatasetView::answer(std::string_view path) {
   if (rest[0] != "capture") return dataset_answer(opened, rest);
 
   // What captures hold stays the same for as long as a dataset is open.
-  std::string key;
-  {
-    const std::lock_guard lock(mutex_);
-    key = std::to_string(generation_) + std::string(path);
-  }
+  const std::string key = std::to_string(generation) + std::string(path);
   if (const auto known = cache_.find(key)) return *known;
   HttpAnswer made = dataset_answer(opened, rest);
   if (made.status == 200) {

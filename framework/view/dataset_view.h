@@ -10,6 +10,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <string_view>
@@ -59,10 +60,10 @@ class DatasetView {
     std::optional<std::size_t> most_captures = {};
     /// Of IndexCache; empty: none.
     std::filesystem::path cache = {};
-    /// Of a run that goes on: the folder that stands for a writer's, of which no reader makes
-    /// anything yet. See UnfinishedWriters::folder_for(); may throw Error, may be empty.
-    std::function<std::optional<std::filesystem::path>(const DatasetStatus&,
-                                                       const std::filesystem::path&)>
+    /// Of a run that goes on: the folders that stand for those of writers, of which no reader makes
+    /// anything yet. See UnfinishedWriters::folders_for(); may throw Error, may be empty.
+    std::function<std::map<std::filesystem::path, std::filesystem::path>(
+        const DatasetStatus&, std::span<const std::filesystem::path>)>
         unfinished = {};
   };
 
@@ -95,9 +96,9 @@ class DatasetView {
     std::shared_ptr<const Datasets> datasets;
     std::vector<std::string> faults;
   };
-  Opening open() const;
+  Opening open();
   void open_below(const std::filesystem::path& folder, bool is_other, Datasets& all,
-                  std::vector<std::string>& faults) const;
+                  std::vector<std::string>& faults);
   std::shared_ptr<const Datasets> datasets() const;
   bool look_up_index(Opened& opened);
   void keep_index(Opened& opened) const;
@@ -136,6 +137,7 @@ class DatasetView {
   int done_ = 0;
   bool is_finished_ = true;
   std::chrono::steady_clock::time_point next_look_{};
+  std::set<std::filesystem::path> unreadable_;  ///< Of its writers; no reader knows their formats.
 };
 
 }  // namespace diorama

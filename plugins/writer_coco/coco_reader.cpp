@@ -546,6 +546,7 @@ class CocoImageReading : private FrameReading {
     for (std::size_t i = 0; i < masks_.size(); ++i) {
       if (!has_mask_[i]) continue;
       check_box(i);
+      // A copy: check_panoptic() has them, too.
       lone_masks_.emplace(frame_.instances[i].id, masks_[i]);
     }
   }

@@ -11,7 +11,8 @@ faulty file system, until a number of kills and faults is reached. What must hol
     tests/cluster/torture.py --kills 1000 --faults 5000 [--build FOLDER] [--seed N] [--seconds N]
 
 Says every half minute what was done so far; ends with a line of counts, and with 1 when something did not
-hold; then the folders of that round are kept. With --seconds no round begins after that time.
+hold; then the folders of that round are kept. With --seconds no round begins after that time; it ends with 1
+when it came to none of the kills or faults that were asked for.
 """
 import argparse
 import collections
@@ -196,7 +197,10 @@ class Torture:
         print("torture: " + self.report(), flush=True)
         if not counts["bad"]:
             shutil.rmtree(self.work)
-        return 1 if counts["bad"] else 0
+        missing = [what for what in ("kills", "faults") if getattr(options, what) and not counts[what]]
+        if missing:
+            print("torture: the time ended before any " + " and ".join(missing), flush=True)
+        return 1 if counts["bad"] or missing else 0
 
     def report(self):
         counts = self.counts

@@ -17,6 +17,7 @@ MOST_GROWTH = 0.05
 SECONDS_PER_CAPTURE = 30  # a run that is slower hangs
 MARKS = (50, 100, 200, 500, 1000, 2000, 5000, 10000, 20000)  # captures of which the memory is told
 STOPPED = 130  # the program's exit code when it was asked to stop
+SECONDS_TO_STOP = 60
 CACHE_MIB = 2  # for assets: less than the rooms take, so that they come and go
 
 STILLS = """  - simulate: 4
@@ -121,9 +122,10 @@ def watch(program, job, folder, captures, seconds):
                                stdout=log, stderr=log, cwd=folder)
     samples = []
     begin = time.monotonic()
+    deadline = begin + SECONDS_PER_CAPTURE * captures
     allowed = {0}
     try:
-        while process.poll() is None and time.monotonic() < begin + SECONDS_PER_CAPTURE * captures:
+        while process.poll() is None and time.monotonic() < deadline:
             done = captures_in(folder / "out" / "basicwriter")
             memory = rss_mib(process)
             if memory is not None:
@@ -131,12 +133,16 @@ def watch(program, job, folder, captures, seconds):
             if seconds and allowed == {0} and time.monotonic() > begin + seconds:
                 process.send_signal(signal.SIGTERM)
                 allowed = {0, STOPPED}
+                deadline = time.monotonic() + SECONDS_TO_STOP
             time.sleep(max(0.1, captures / 20000))
     finally:
         process.kill()
         process.wait()
     if process.returncode not in allowed:
         sys.exit("soak: exit code %d\n%s" % (process.returncode, (folder / "log").read_text()[-3000:]))
+    done = captures_in(folder / "out" / "basicwriter")
+    if done != captures and process.returncode != STOPPED:
+        sys.exit("soak: the run ended with %d of %d captures" % (done, captures))
     return samples
 
 

@@ -266,7 +266,8 @@ class Dataset(Sequence[Capture]):
 
     def __init__(self, folder: str | os.PathLike[str], reader: str | Mapping[str, Any] = "",
                  wanted: Iterable[str] | None = None) -> None:
-        self._asked = (os.fspath(folder), reader if isinstance(reader, str) else json.dumps(dict(reader)))
+        self._asked = (os.fspath(folder), reader if isinstance(reader, str)
+                       else json.dumps(dict(reader), ensure_ascii=False, default=os.fspath))
         self._wanted = None if wanted is None else sorted(wanted)
         self._open()
         unknown = sorted(set(self._wanted or ()) - set(self.holds))

@@ -160,6 +160,17 @@ TEST_CASE("the assets root is the first one that is given", "[assets]") {
         "/nowhere: the assets root (DIORAMA_ASSETS_ROOT) is no folder that exists");
 }
 
+TEST_CASE("the assets root is the folder that was checked", "[assets]") {
+  const AssetFolder assets;
+  fs::create_directories(assets.root / "elsewhere/deep");
+  fs::create_directories(assets.root / "elsewhere/pack");
+  fs::create_directory_symlink(assets.root / "elsewhere/deep", assets.root / "link");
+  const auto chosen = choose_assets_root(assets.root / "link/../pack", nullptr, {}, {});
+  CHECK(chosen == fs::canonical(assets.root / "elsewhere/pack"));
+  CHECK(choose_assets_root(assets.root / "Isaac/../link", nullptr, {}, {}) == assets.root / "link");
+  CHECK(choose_assets_root(fs::path("."), nullptr, {}, {})->is_absolute());
+}
+
 TEST_CASE("variants are told from names", "[assets]") {
   using Parts = std::pair<std::string_view, std::string_view>;
   CHECK(split_variants("/a/mug.usd{look=red}{size=big}") ==

@@ -269,6 +269,9 @@ class Runs(unittest.TestCase):
         ]:
             with self.subTest(wrong):
                 self.check_refused(self.call(PROGRAM, "stats", data, "--reader", wrong), code, *words)
+                for command in [("lint", data), ("diff", data, data), ("report", data, "-o", "page")]:
+                    refused = self.call(PROGRAM, *command, "--reader", wrong)
+                    self.assertEqual(refused.returncode, code, (command, refused.stdout, refused.stderr))
         described = self.call(PROGRAM, "plugins", "describe", "reader/python")
         for words in ("params of Arrays of reader.py", "params.every: integer, default 1", "Keeps one of so many."):
             self.assertIn(words, described.stdout)
@@ -285,6 +288,8 @@ class Runs(unittest.TestCase):
             "return Capture(place + 1)": ["returns the diorama.Capture with index"],
             "return Capture(place, frames=[Frame('eye', Camera(6, 4), channels={'color': np.zeros((4, 6, 3), np.uint8)})])": ["uint8 (4, 6, 3)"],
             "return Capture(place, frames=[Frame('eye', Camera(0, 4))])": ["width and height"],
+            "return Capture(place, frames=[Frame('eye', Camera(6, 4), masks={1: ((0, 0, 7, 1), np.ones((1, 7)))})])": ["a mask has a box in the image", "7"],
+            "return Capture(place, frames=[Frame('eye', Camera(6, 4), masks={1: ((0, 0, 2, 1), np.ones((1, 3)))})])": ["a mask has the size of its box"],
         }.items():
             with self.subTest(body):
                 lint = self.call(PROGRAM, "lint", self.reader(body))
