@@ -145,6 +145,13 @@ TEST_CASE("A frame hangs on a peg by its upper bar, a box stands on a corner, a 
   CHECK(stage.unsettled() == Texts{});
 }
 
+TEST_CASE("A thing of many triangles stands on a foot of few", "[settle]") {
+  Stage stage;
+  const NodeId ball = stage.add_object("ball", make_sphere(0.15, 192), at(2, 1, 0.45));
+  stage.add(ball, "foot", make_box(Vec3(0.002, 0.002, 0.31)), at(0.031, 0.017, -0.295));
+  CHECK(stage.unsettled() == Texts{});
+}
+
 TEST_CASE("Things that lie on what is hidden hang in the air", "[settle]") {
   Stage stage;
   stage.add_object("mug", kBox, at(0, 0, 0.8));
