@@ -4,9 +4,9 @@
 #   ./bootstrap.sh demo     install what is needed, build, make the sample pack, run the default job
 #   ./bootstrap.sh test     install what is needed, build, run every test
 #   ./bootstrap.sh build    install what is needed, build
-#   ./bootstrap.sh sanitize install what is needed, build with sanitizers and run what reads files of others
-#                           (address, undefined) and what has threads (thread)
-#   ./bootstrap.sh sanitize-more the same for tests that take longer, the renderer's among them
+#   ./bootstrap.sh sanitize install what is needed, build with sanitizers and run what reads files of others and
+#                           the renderer (address, undefined) and what has threads (thread)
+#   ./bootstrap.sh sanitize-more the same for tests that take longer
 #   ./bootstrap.sh packages install what is needed for all of these, tests/check_format.sh and tests/check_tidy.sh
 # Options: --preset NAME   a preset of CMakePresets.json (default: release)
 set -euo pipefail
@@ -28,15 +28,16 @@ test_packages=(
   python3-h5py python3-jsonschema python3-opencv mypy
 )
 
-check_packages=(clang-format-14 clang-tidy-19)
+check_packages=(clang-format-14 clang-tidy-19 clang-16)  # clang-16: for tests of the headers
 # Tests by what they are about, for the sanitizers: in every run of CI, and by night.
 foreign_bytes=(
   sdk_test config_test host_test images_test pipeline_test output_test datasets_test lint_test loader_usd_test
   physics_bullet_test writer_support_test
 )
+renderer=(renderer_embree_test)
 by_night=(
   replicator_test plugin_search_test framework_inspect_test loader_usd_expected loader_assimp_test
-  renderer_embree_test renderer_support_test loader_urdf_test
+  renderer_support_test loader_urdf_test
 )
 threads=(host_test pipeline_test output_test)
 mapfile -t writers < <(cd plugins && ls -d writer_*/ | sed '/^writer_support/d; s,/,,')
@@ -139,7 +140,7 @@ case $command in
     ;;
   sanitize)
     install_packages "${build_packages[@]}" "${test_packages[@]}"
-    sanitize asan "${foreign_bytes[@]}"
+    sanitize asan "${foreign_bytes[@]}" "${renderer[@]}"
     sanitize tsan "${threads[@]}"
     run_all_writers tsan
     ;;

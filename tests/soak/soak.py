@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Runs long jobs and watches the memory of the program. See run.sh beside it."""
 import argparse
+import concurrent.futures
+import json
 import os
 import pathlib
 import shutil
@@ -18,18 +20,21 @@ SECONDS_PER_CAPTURE = 30  # a run that is slower hangs
 MARKS = (50, 100, 200, 500, 1000, 2000, 5000, 10000, 20000)  # captures of which the memory is told
 STOPPED = 130  # the program's exit code when it was asked to stop
 SECONDS_TO_STOP = 60
+LAST_LINES = 1000  # bytes of progress in which a whole line lies
 CACHE_MIB = 2  # for assets: less than the rooms take, so that they come and go
 
+# Of a visit; a half of its captures each.
 STILLS = """  - simulate: 4
-  - {capture: floating, count: 8}
+  - {capture: floating, count: %(half)d}
   - simulate: 4
-  - {capture: dropped, count: 8}"""
+  - {capture: dropped, count: %(half)d}"""
 CLIPS = """  - simulate: 4
-  - record: {name: floating, fps: 20, seconds: 0.4}
+  - record: {name: floating, fps: 20, seconds: %(half_s)g}
   - simulate: 4
-  - record: {name: dropped, fps: 20, seconds: 0.4}"""
+  - record: {name: dropped, fps: 20, seconds: %(half_s)g}"""
+FOR_CLIPS = ("MotWriter", "VideoWriter")  # have work with clips alone
 USUAL = ("null", "path_traced", "real_time", "clips")
-# What a run is called, its renderer and timeline; some writers have work with clips alone.
+# What a run is called, its renderer and timeline.
 RUNS = {
     "null": ('{type: "null"}', STILLS),
     "path_traced": ("{type: embree, samples: 1}", STILLS),
@@ -94,10 +99,18 @@ def writer_lines(types):
     return "\n".join(lines)
 
 
-def captures_in(folder):
-    """One camera: as many as there are pictures."""
+class Fault(Exception):
+    """A run that failed or cannot be judged."""
+
+
+def captures_done(folder):
+    """As the newest line of progress says."""
     try:
-        return sum(1 for entry in os.scandir(folder) if entry.name.startswith("rgb_"))
+        with (folder / "progress").open("rb") as file:
+            file.seek(0, os.SEEK_END)
+            file.seek(max(0, file.tell() - LAST_LINES))
+            lines = file.read().split(b"\n")
+        return json.loads(lines[-2])["done"] if len(lines) > 1 else 0
     except FileNotFoundError:
         return 0
 
@@ -116,17 +129,17 @@ def watch(program, job, folder, captures, seconds):
     """Runs the job, at most for some seconds when those are given; returns (captures done, MiB) at intervals."""
     file = folder / "job.yaml"
     file.write_text(job)
-    log = (folder / "log").open("w")
-    process = subprocess.Popen(program + ["--asset-cache-mib", str(CACHE_MIB), "run", str(file),
-                                          "--output", str(folder / "out")],
-                               stdout=log, stderr=log, cwd=folder)
+    with (folder / "progress").open("w") as progress, (folder / "log").open("w") as log:
+        process = subprocess.Popen(program + ["--asset-cache-mib", str(CACHE_MIB), "run", str(file),
+                                              "--output", str(folder / "out"), "--progress", "json"],
+                                   stdout=progress, stderr=log, cwd=folder)
     samples = []
     begin = time.monotonic()
     deadline = begin + SECONDS_PER_CAPTURE * captures
     allowed = {0}
     try:
         while process.poll() is None and time.monotonic() < deadline:
-            done = captures_in(folder / "out" / "basicwriter")
+            done = captures_done(folder)
             memory = rss_mib(process)
             if memory is not None:
                 samples.append((done, memory))
@@ -139,56 +152,80 @@ def watch(program, job, folder, captures, seconds):
         process.kill()
         process.wait()
     if process.returncode not in allowed:
-        sys.exit("soak: exit code %d\n%s" % (process.returncode, (folder / "log").read_text()[-3000:]))
-    done = captures_in(folder / "out" / "basicwriter")
+        raise Fault("exit code %d\n%s" % (process.returncode, (folder / "log").read_text()[-3000:]))
+    done = captures_done(folder)
     if done != captures and process.returncode != STOPPED:
-        sys.exit("soak: the run ended with %d of %d captures" % (done, captures))
+        raise Fault("the run ended with %d of %d captures" % (done, captures))
     return samples
 
 
-def check(name, samples):
-    """Memory towards the end against memory after the warm-up; both are medians of many samples."""
+def verdict(name, samples):
+    """Memory towards the end against memory after the warm-up; both are medians of many samples. Returns lines to
+    print and whether it is flat."""
     captures = samples[-1][0] if samples else 0
     rest = captures - WARM_UP
     begin = [m for done, m in samples if WARM_UP <= done < WARM_UP + rest / 4]
     end = [m for done, m in samples if done >= captures - rest / 4]
     if len(begin) < 3 or len(end) < 3:
-        sys.exit("soak: %s: too few samples to judge (%d and %d of %d captures); ask for more captures"
-                 % (name, len(begin), len(end), captures))
+        raise Fault("too few samples to judge (%d and %d of %d captures); ask for more captures"
+                    % (len(begin), len(end), captures))
     growth = statistics.median(end) / statistics.median(begin) - 1
-    print("%-11s %6d captures: %7.1f MiB after the warm-up, %7.1f MiB at the end (%+.1f %%), most %.1f"
-          % (name, captures, statistics.median(begin), statistics.median(end), 100 * growth,
-             max(m for _, m in samples)), flush=True)
+    is_flat = growth <= MOST_GROWTH
     marks = [mark for mark in MARKS if mark < captures] + [captures]
-    print("%-11s MiB at: %s" % ("", ", ".join(
-        "%d: %.0f" % (mark, next(m for done, m in samples if done >= mark)) for mark in marks)), flush=True)
-    return growth <= MOST_GROWTH
+    return ("%-24s %-5s %6d captures: %7.1f MiB after the warm-up, %7.1f MiB at the end (%+.1f %%), most %.1f\n"
+            "%-30s MiB at: %s"
+            % (name, "flat" if is_flat else "GROWS", captures, statistics.median(begin), statistics.median(end),
+               100 * growth, max(m for _, m in samples), "", ", ".join(
+                   "%d: %.0f" % (mark, next(m for done, m in samples if done >= mark)) for mark in marks))), is_flat
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--build", required=True, type=pathlib.Path)
     parser.add_argument("--captures", type=int, default=10000)
+    parser.add_argument("--per-visit", type=int, default=16, help="captures; an even number")
     parser.add_argument("--seconds", type=float, help="until a run is stopped and judged (default: no limit)")
     parser.add_argument("--renderer", action="append", choices=sorted(RUNS))
+    parser.add_argument("--alone", action="store_true", help="instead, each writer alone, without a renderer")
+    parser.add_argument("--at-once", type=int, default=1, help="runs side by side")
+    parser.add_argument("--threads", type=int, default=0, help="of a run (default: all of the machine)")
     options = parser.parse_args()
     if options.captures < 2 * WARM_UP:
         sys.exit("soak: at least %d captures are needed" % (2 * WARM_UP))
+    if options.per_visit < 2 or options.per_visit % 2:
+        sys.exit("soak: --per-visit needs an even number")
     build = options.build.resolve()
-    program = [str(build / "bin" / "diorama"), "--plugin-dir", str(build / "plugins")]
-    writers = writer_lines(writer_types(program))
-    is_flat = True
-    for name in options.renderer or USUAL:
+    program = [str(build / "bin" / "diorama"), "--plugin-dir", str(build / "plugins"),
+               "--threads", str(options.threads)]
+    types = writer_types(program)
+    if options.alone:
+        runs = [(kind, "clips" if kind in FOR_CLIPS else "null", [kind]) for kind in types]
+    else:
+        runs = [(name, name, types) for name in options.renderer or USUAL]
+
+    def tell(run):
+        """Whether the memory of a run is flat."""
+        name, kind, writers = run
+        renderer, timeline = RUNS[kind]
+        half = options.per_visit // 2
+        job = JOB % {"captures": options.captures, "renderer": renderer, "writers": writer_lines(writers),
+                     "timeline": timeline % {"half": half, "half_s": half / 20}}
         folder = pathlib.Path(tempfile.mkdtemp(prefix="diorama-soak-"))
         try:
-            renderer, timeline = RUNS[name]
-            job = JOB % {"captures": options.captures, "renderer": renderer, "timeline": timeline,
-                         "writers": writers}
-            is_flat &= check(name, watch(program, job, folder, options.captures, options.seconds))
+            text, is_flat = verdict(name, watch(program, job, folder, options.captures, options.seconds))
+        except Fault as fault:
+            text, is_flat = "%-24s FAILED: %s" % (name, fault), False
         finally:
             shutil.rmtree(folder)
-    if not is_flat:
-        sys.exit("soak: memory grew by more than %.0f %%" % (100 * MOST_GROWTH))
+        print(text, flush=True)
+        return is_flat
+
+    with concurrent.futures.ThreadPoolExecutor(options.at_once) as pool:
+        failed = [run[0] for run, is_flat in zip(runs, pool.map(tell, runs)) if not is_flat]
+    if failed:
+        sys.exit("soak: memory grew by more than %.0f %%, or the run failed: %s"
+                 % (100 * MOST_GROWTH, ", ".join(failed)))
+    print("soak: all %d runs are flat" % len(runs))
 
 
 if __name__ == "__main__":

@@ -40,11 +40,11 @@ EnvironmentRules infinigen_rules() {
   return rules;
 }
 
-struct Room {
+struct BuiltRoom {
   FakeHost host;
   Scene scene;
   NodeId environment;
-  Room() {
+  BuiltRoom() {
     host.assets["room"] = build_room;
     environment = host.load_asset("room", scene, scene.create(scene.root(), "Environment"));
   }
@@ -56,7 +56,7 @@ struct Room {
 }  // namespace
 
 TEST_CASE("Walls stand hidden round the working area and leave the inside free", "[environment]") {
-  Room room;
+  BuiltRoom room;
   EnvironmentRules rules;
   rules.working_area = "TableDiningFactory_1";
   rules.walls = {4, 6, 3};
@@ -92,7 +92,7 @@ TEST_CASE("Walls stand hidden round the working area and leave the inside free",
 }
 
 TEST_CASE("Spheres round cameras collide and are not seen", "[environment]") {
-  Room room;
+  BuiltRoom room;
   const auto cameras = create_cameras(job_from(good_job()).cameras, room.scene);
   const auto spheres = create_camera_spheres(cameras, 0.3, room.scene);
   REQUIRE(spheres.size() == 2);
@@ -104,7 +104,7 @@ TEST_CASE("Spheres round cameras collide and are not seen", "[environment]") {
 
 TEST_CASE("Rules hide by part of the path and find the working area in the world",
           "[environment]") {
-  Room room;
+  BuiltRoom room;
   const Vec3 area =
       apply_environment_rules(infinigen_rules(), false, room.environment, room.scene, room.host);
   CHECK((area - Vec3(11.0, 22.0, 0.5)).norm() < 1e-12);
@@ -114,7 +114,7 @@ TEST_CASE("Rules hide by part of the path and find the working area in the world
 }
 
 TEST_CASE("A star in a rule stands for anything within one name", "[environment]") {
-  Room room;
+  BuiltRoom room;
   const auto hidden_by = [&](const char* text) {
     EnvironmentRules rules;
     rules.hide = {text};
@@ -136,7 +136,7 @@ TEST_CASE("A star in a rule stands for anything within one name", "[environment]
 }
 
 TEST_CASE("Debug mode also hides walls and ceiling", "[environment]") {
-  Room room;
+  BuiltRoom room;
   apply_environment_rules(infinigen_rules(), true, room.environment, room.scene, room.host);
   CHECK_FALSE(room.at("dining_room_exterior").is_visible);
   CHECK_FALSE(room.at("dining_room_ceiling").is_visible);
@@ -144,7 +144,7 @@ TEST_CASE("Debug mode also hides walls and ceiling", "[environment]") {
 }
 
 TEST_CASE("Every mesh collides, hidden ones too; the first table as boxes", "[environment]") {
-  Room room;
+  BuiltRoom room;
   apply_environment_rules(infinigen_rules(), true, room.environment, room.scene, room.host);
   CHECK(room.at("dining_room_ceiling").collider->shape == ColliderShape::TriangleMesh);
   CHECK(room.at("CeilingLight_001_SPLIT_GLA/glass").collider->shape == ColliderShape::TriangleMesh);
@@ -154,7 +154,7 @@ TEST_CASE("Every mesh collides, hidden ones too; the first table as boxes", "[en
 }
 
 TEST_CASE("A room without a table gets a warning and the origin", "[environment]") {
-  Room room;
+  BuiltRoom room;
   EnvironmentRules rules = infinigen_rules();
   rules.working_area = "TablePingPong";
   const Vec3 area = apply_environment_rules(rules, false, room.environment, room.scene, room.host);
@@ -165,7 +165,7 @@ TEST_CASE("A room without a table gets a warning and the origin", "[environment]
 }
 
 TEST_CASE("The environment's own name matches no rule", "[environment]") {
-  Room room;
+  BuiltRoom room;
   EnvironmentRules rules;
   rules.hide = {"loaded", "Environment"};
   apply_environment_rules(rules, false, room.environment, room.scene, room.host);
@@ -359,7 +359,7 @@ cameras:
 }
 
 TEST_CASE("Lamps of the environment are dimmed to a limit, each by itself", "[environment]") {
-  Room room;
+  BuiltRoom room;
   const auto add_lamp = [&](const char* name, float nits) {
     const NodeId node = room.scene.create(room.environment, name);
     Light light;

@@ -10,8 +10,8 @@ using namespace diorama;
 namespace {
 
 /// A room of 4 x 2 x 3 m whose floor is at z = 0, with objects at the given places.
-struct Stage {
-  explicit Stage(const std::vector<Vec3>& places) {
+struct RoomStage {
+  explicit RoomStage(const std::vector<Vec3>& places) {
     environment = scene.create(scene.create(scene.root(), "Environment"), "room");
     scene.edit(environment).mesh = std::make_shared<const Mesh>(make_box(Vec3(4, 2, 3)));
     scene.set_pose(environment, Affine(Eigen::Translation3d(0, 0, 1.5)));
@@ -31,7 +31,7 @@ struct Stage {
 }  // namespace
 
 TEST_CASE("A room holds what is within its walls and above its floor, however high", "[settle]") {
-  const Stage stage({{1.9, 0.9, 0.1}, {2.1, 0, 1}, {0, -1.1, 1}, {0, 0, -0.5}, {0, 0, 50}});
+  const RoomStage stage({{1.9, 0.9, 0.1}, {2.1, 0, 1}, {0, -1.1, 1}, {0, 0, -0.5}, {0, 0, 50}});
   const Room room(stage.scene, stage.environment);
   std::vector<bool> held;
   for (const NodeId object : stage.objects) held.push_back(room.holds(stage.scene, object));
@@ -39,13 +39,13 @@ TEST_CASE("A room holds what is within its walls and above its floor, however hi
 }
 
 TEST_CASE("An environment without meshes has no outside", "[settle]") {
-  Stage stage({{100, 100, -100}});
+  RoomStage stage({{100, 100, -100}});
   stage.scene.edit(stage.environment).mesh.reset();
   CHECK(Room(stage.scene, stage.environment).holds(stage.scene, stage.objects[0]));
 }
 
 TEST_CASE("Hidden geometry does not make a room larger", "[settle]") {
-  Stage stage({{5, 0, 1}, {1, 0, 1}});
+  RoomStage stage({{5, 0, 1}, {1, 0, 1}});
   const NodeId guide = stage.scene.create(stage.environment, "guide");
   stage.scene.edit(guide).mesh = std::make_shared<const Mesh>(make_box(Vec3(20, 30, 40)));
   stage.scene.edit(guide).is_visible = false;
@@ -55,7 +55,7 @@ TEST_CASE("Hidden geometry does not make a room larger", "[settle]") {
 }
 
 TEST_CASE("The fastest object is one that falls, in the room", "[settle]") {
-  Stage stage({{0, 0, 1}, {1, 0, 1}, {9, 0, 1}, {-1, 0, 1}});
+  RoomStage stage({{0, 0, 1}, {1, 0, 1}, {9, 0, 1}, {-1, 0, 1}});
   const auto set_speed = [&](std::size_t object, double speed, bool has_gravity) {
     RigidBody& body = *stage.scene.edit(stage.objects[object]).rigid_body;
     body.linear_velocity = Vec3(0, speed, 0);
@@ -76,7 +76,7 @@ TEST_CASE("The fastest object is one that falls, in the room", "[settle]") {
 }
 
 TEST_CASE("Saved nodes come back as they were, all others stay as they are", "[settle]") {
-  Stage stage({{0, 0, 1}, {1, 0, 1}});
+  RoomStage stage({{0, 0, 1}, {1, 0, 1}});
   Scene& scene = stage.scene;
   const NodeId lamp = scene.create(scene.root(), "lamp");
   scene.edit(lamp).light = Light{};

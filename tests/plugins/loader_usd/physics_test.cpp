@@ -10,7 +10,7 @@ using test::TemporaryFolder;
 
 namespace {
 
-std::string stage(const std::string& units, const std::string& body) {
+std::string physics_stage(const std::string& units, const std::string& body) {
   return "#usda 1.0\n(\n" + units + "    upAxis = \"Z\"\n)\n" + body;
 }
 
@@ -35,19 +35,21 @@ def Xform "Body" (
 
 TEST_CASE("density and volume make a mass in kilograms", "[loader_usd]") {
   const TemporaryFolder folder;
-  LoadedStage metres(folder.write("a.usda", stage("    metersPerUnit = 1\n", kWoodenCube)));
+  LoadedStage metres(folder.write("a.usda", physics_stage("    metersPerUnit = 1\n", kWoodenCube)));
   CHECK(metres.node("Body").rigid_body->mass_kg == Approx(500.0 * 4.0));
   // The same numbers in centimetres: as much per cubic centimetre.
-  LoadedStage centimetres(folder.write("b.usda", stage("    metersPerUnit = 0.01\n", kWoodenCube)));
+  LoadedStage centimetres(
+      folder.write("b.usda", physics_stage("    metersPerUnit = 0.01\n", kWoodenCube)));
   CHECK(centimetres.node("Body").rigid_body->mass_kg == Approx(500.0 * 4.0));
   LoadedStage grams(folder.write(
-      "c.usda", stage("    metersPerUnit = 0.01\n    kilogramsPerUnit = 0.001\n", kWoodenCube)));
+      "c.usda",
+      physics_stage("    metersPerUnit = 0.01\n    kilogramsPerUnit = 0.001\n", kWoodenCube)));
   CHECK(grams.node("Body").rigid_body->mass_kg == Approx(2.0));
 }
 
 TEST_CASE("the density may stand in the physics material", "[loader_usd]") {
   const TemporaryFolder folder;
-  LoadedStage loaded(folder.write("a.usda", stage("    metersPerUnit = 1\n", R"(
+  LoadedStage loaded(folder.write("a.usda", physics_stage("    metersPerUnit = 1\n", R"(
 def Cube "Body" (
     prepend apiSchemas = ["PhysicsRigidBodyAPI", "PhysicsCollisionAPI"]
 )
@@ -92,7 +94,7 @@ TEST_CASE("a body weighs what its parts say", "[loader_usd]") {
     }
 )";
   const auto body = [&](const std::string& more) {
-    return stage("    metersPerUnit = 1\n", R"(
+    return physics_stage("    metersPerUnit = 1\n", R"(
 def Xform "Body" ( prepend apiSchemas = ["PhysicsRigidBodyAPI", "PhysicsMassAPI"] )
 {)" + parts + more + "}\n");
   };
