@@ -14,7 +14,7 @@ endforeach()
 build_and_list(${project} ${project}_build my_${KIND})
 
 # Tools that go by clang see what the compiler sees.
-find_program(CLANG_TIDY clang-tidy)
+find_program(CLANG_TIDY NAMES clang-tidy clang-tidy-19)
 if(CLANG_TIDY)
   run(${CLANG_TIDY} -p ${project}_build --quiet
       --checks=-*,clang-diagnostic-*,bugprone-use-after-move,modernize-use-override

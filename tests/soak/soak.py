@@ -183,7 +183,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--build", required=True, type=pathlib.Path)
     parser.add_argument("--captures", type=int, default=10000)
-    parser.add_argument("--per-visit", type=int, default=16, help="captures; an even number")
+    parser.add_argument("--per-visit", type=int, default=16, help="captures of a visit, an even number")
     parser.add_argument("--seconds", type=float, help="until a run is stopped and judged (default: no limit)")
     parser.add_argument("--renderer", action="append", choices=sorted(RUNS))
     parser.add_argument("--alone", action="store_true", help="instead, each writer alone, without a renderer")

@@ -144,7 +144,7 @@ TEST_CASE("what an asset cache keeps is made ready once", "[memory]") {
   CHECK(uploaded.kept().skies == 2);
 }
 
-TEST_CASE("roughness drawn for every capture leaves no tables behind", "[memory]") {
+TEST_CASE("roughness drawn for every capture leaves no tables behind", "[memory][long]") {
   RenderHost host(2);
   EmbreeScene uploaded(host, {});
   std::size_t most = 0;

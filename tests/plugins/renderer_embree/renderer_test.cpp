@@ -91,7 +91,7 @@ TestWorld busy_room() {
 
 }  // namespace
 
-TEST_CASE("nothing is seen of any object in a white furnace", "[renderer][furnace]") {
+TEST_CASE("nothing is seen of any object in a white furnace", "[renderer][furnace][long]") {
   const std::vector<std::pair<const char*, std::function<void(Material&)>>> materials{
       {"matte", [](Material& m) { m.specular = 0.0f; }},
       {"plastic", [](Material& m) { m.roughness = 0.3f; }},
@@ -236,7 +236,7 @@ TEST_CASE("light between two parallel bounces follows the geometric series", "[r
   CHECK(statistics(render(world, camera, reference(64, 40))).mean == Approx(2.0).epsilon(0.01));
 }
 
-TEST_CASE("light samples, BSDF samples and both together agree", "[renderer][mis]") {
+TEST_CASE("light samples, BSDF samples and both together agree", "[renderer][mis][long]") {
   TestWorld world = busy_room();
   const NodeId camera = world.add_camera(40, 30, 22.0, Vec3(-1.8, -1.5, 0.6), Vec3(0.3, 0.6, -0.9));
   RenderHost host(2);
@@ -281,7 +281,7 @@ TEST_CASE("light samples, BSDF samples and both together agree", "[renderer][mis
         4.0 * std::hypot(both.error, fewer_bounces.error));
 }
 
-TEST_CASE("fireflies are rarer than one in a million samples", "[renderer]") {
+TEST_CASE("fireflies are rarer than one in a million samples", "[renderer][long]") {
   TestWorld world = busy_room();
   const NodeId camera = world.add_camera(40, 30, 22.0, Vec3(-1.8, -1.5, 0.6), Vec3(0.3, 0.6, -0.9));
   RenderHost host(2);
@@ -317,7 +317,7 @@ TEST_CASE("fireflies are rarer than one in a million samples", "[renderer]") {
 }
 
 TEST_CASE("an error target gives the same bytes for every number of threads",
-          "[renderer][determinism]") {
+          "[renderer][determinism][long]") {
   TestWorld world = busy_room();
   const NodeId camera = world.add_camera(50, 35, 30.0, Vec3(-1.8, -1.5, 0.6), Vec3(0.3, 0.6, -0.9));
   EmbreeRenderer::Params params = reference(256, 3);
