@@ -90,12 +90,18 @@ sanitize() {
 # The program itself, with every writer at once on many threads, two shards after each other.
 run_all_writers() {
   cmake --build --preset "$1" --target diorama physics_bullet randomizers_core renderer_null "${writers[@]}"
-  local output shard
-  output=$(mktemp -d)
-  for shard in 1/2 2/2; do
-    "build/$1/bin/diorama" run tests/end_to_end/all_writers.yaml --output "$output" --threads 4 --shard "$shard"
+  local jobs=(tests/end_to_end/all_writers.yaml tests/end_to_end/all_clip_writers.yaml)
+  local program=build/$1/bin/diorama output job shard type
+  for type in $("$program" plugins | grep -oE '\b[A-Za-z0-9]+Writer\b' | sort -u); do
+    grep -q "type: $type," "${jobs[@]}" || { echo "bootstrap: $type is in none of ${jobs[*]}" >&2; exit 1; }
   done
-  rm -rf "$output"
+  for job in "${jobs[@]}"; do
+    output=$(mktemp -d)
+    for shard in 1/2 2/2; do
+      "$program" run "$job" --output "$output" --threads 4 --shard "$shard"
+    done
+    rm -rf "$output"
+  done
 }
 
 # The program has no place on the PATH yet; says what to type.
