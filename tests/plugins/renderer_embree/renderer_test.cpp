@@ -567,7 +567,7 @@ std::vector<double> block_means(const Image<Vec3f>& image) {
 
 }  // namespace
 
-TEST_CASE("screens that cannot be seen leave the light of a room as it is", "[renderer]") {
+TEST_CASE("screens that cannot be seen leave the light of a room as it is", "[renderer][long]") {
   Material pane;
   pane.base_color.setOnes();
   pane.transmission = 1.0f;

@@ -54,7 +54,7 @@ double low_frequencies(const std::vector<double>& errors) {
 
 }  // namespace
 
-TEST_CASE("errors of few paths are of high frequency: neighbours cancel", "[sampling]") {
+TEST_CASE("errors of few paths are of high frequency: neighbours cancel", "[sampling][long]") {
   TestWorld world;
   world.add("floor", make_plane(8, 8), matte(0.6f));
   world.add("pillar", make_box(Vec3(0.3, 0.3, 1.0)), matte(0.3f), at(0.5, 0.3, 0.5));

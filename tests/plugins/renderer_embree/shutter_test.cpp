@@ -234,7 +234,7 @@ TEST_CASE("blurred pictures are the same for any threads and after other scenes"
 }
 
 TEST_CASE("a light out of focus becomes the circle that the thin lens says",
-          "[renderer][shutter]") {
+          "[renderer][shutter][long]") {
   for (const double focus : {2.0, 8.0}) {
     TestWorld world;
     const double radius = 0.01;
