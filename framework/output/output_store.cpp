@@ -794,7 +794,7 @@ void OutputStore::put_staged(const fs::path& place, StagedFile& file) {
   file.staged->add(file.bytes);
   file.staged_size += file.bytes.size();
   bytes_written_ += file.bytes.size();
-  file.bytes = {};
+  file.bytes = std::vector<std::byte>();  // {} would keep the memory
 }
 
 void OutputStore::write_stage(int entry, Transaction& transaction) {
