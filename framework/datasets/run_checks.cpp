@@ -100,7 +100,10 @@ void check_plan(const RunPlan& plan, const RunDataset& dataset, ReadLog& log) {
             {kNothingIsMissing, dataset.name, std::nullopt, "", "",
              "holds " + std::to_string(info.captures.size()) + " captures",
              "dataset.json plans " + std::to_string(plan.captures)});
-  const bool has_names = info.camera_names != std::vector<std::string>{"camera"};
+  // A folder without any picture is one that was asked for nothing: what lost all of them has
+  // nothing that it could be known by.
+  const bool has_names =
+      !info.camera_names.empty() && info.camera_names != std::vector<std::string>{"camera"};
   for (const std::string& camera : plan.cameras) {
     log.check(!has_names || std::ranges::find(info.camera_names, camera) != info.camera_names.end(),
               {kNothingIsMissing, dataset.name, std::nullopt, camera, "",

@@ -8,8 +8,9 @@
 namespace diorama::images {
 namespace {
 
-/// The channels of a pixel side by side, with room for sums and differences.
-using Lanes [[gnu::vector_size(8)]] = std::int16_t;
+/// The channels of a pixel side by side, with room for sums and differences; the rest is unused.
+using Lanes [[gnu::vector_size(16)]] = std::int16_t;
+using Halves [[gnu::vector_size(16)]] = std::uint64_t;
 
 template <std::size_t kStride>
 Lanes load(const std::uint8_t* from) {
@@ -18,46 +19,50 @@ Lanes load(const std::uint8_t* from) {
   std::uint64_t spread = pixel;
   spread = (spread | spread << 16) & 0x0000FFFF0000FFFFu;
   spread = (spread | spread << 8) & 0x00FF00FF00FF00FFu;
-  return std::bit_cast<Lanes>(spread);
+  return std::bit_cast<Lanes>(Halves{spread, 0});
 }
 
 /// Values are 0 to 255.
 template <std::size_t kStride>
 void store(Lanes lanes, std::uint8_t* to) {
-  auto spread = std::bit_cast<std::uint64_t>(lanes);
+  std::uint64_t spread = std::bit_cast<Halves>(lanes)[0];
   spread = (spread | spread >> 8) & 0x0000FFFF0000FFFFu;
   const auto pixel = std::uint32_t(spread | spread >> 16);
   std::memcpy(to, &pixel, kStride);
 }
 
 Lanes least(Lanes a, Lanes b) { return a < b ? a : b; }
+
 Lanes absolute(Lanes lanes) {
-  const Lanes sign = lanes >> 15;
-  return (lanes ^ sign) - sign;
+  const Lanes turned = -lanes;
+  return lanes > turned ? lanes : turned;
 }
 
-
-/// Whichever of the three is nearest to left + up - corner, of equally near ones the first.
-Lanes paeth(Lanes left, Lanes up, Lanes corner) {
+/// Whichever of the three is nearest to left + up - corner, of equally near ones the first; `rest`
+/// is added before the choice, as pixels wait for their left neighbours.
+Lanes paeth(Lanes left, Lanes up, Lanes corner, Lanes rest) {
   const Lanes from_up = up - corner;
   const Lanes from_left = left - corner;
   const Lanes to_left = absolute(from_up);
   const Lanes to_up = absolute(from_left);
   const Lanes to_corner = absolute(from_up + from_left);
-  const Lanes nearest = least(to_left, least(to_up, to_corner));
-  return to_left == nearest ? left : (to_up == nearest ? up : corner);
+  const Lanes if_left = (left + rest) & 255;
+  const Lanes if_up = (up + rest) & 255;
+  const Lanes if_corner = (corner + rest) & 255;
+  const Lanes if_other = to_up <= to_corner ? if_up : if_corner;
+  return to_left <= least(to_up, to_corner) ? if_left : if_other;
 }
 
 /// What a pixel is beyond what its neighbours tell, by filter. `above` has the length of the row.
 template <std::size_t kStride>
 bool undo_row(int filter, const std::uint8_t* from, const std::uint8_t* above, std::size_t size,
               std::uint8_t* to) {
-  const auto each_pixel = [&](auto&& guess) {
+  const auto each_pixel = [&](auto&& sum) {
     Lanes left{};
     Lanes corner{};
     for (std::size_t i = 0; i < size; i += kStride) {
       const Lanes up = load<kStride>(above + i);
-      left = (load<kStride>(from + i) + guess(left, up, corner)) & 255;
+      left = sum(load<kStride>(from + i), left, up, corner);
       corner = up;
       store<kStride>(left, to + i);
     }
@@ -67,16 +72,20 @@ bool undo_row(int filter, const std::uint8_t* from, const std::uint8_t* above, s
       std::memcpy(to, from, size);
       return true;
     case 1:
-      each_pixel([](Lanes left, Lanes, Lanes) { return left; });
+      each_pixel([](Lanes rest, Lanes left, Lanes, Lanes) { return (rest + left) & 255; });
       return true;
     case 2:
       for (std::size_t i = 0; i < size; ++i) to[i] = std::uint8_t(from[i] + above[i]);
       return true;
     case 3:
-      each_pixel([](Lanes left, Lanes up, Lanes) { return (left + up) >> 1; });
+      each_pixel([](Lanes rest, Lanes left, Lanes up, Lanes) {
+        return (rest + ((left + up) >> 1)) & 255;
+      });
       return true;
     case 4:
-      each_pixel([](Lanes left, Lanes up, Lanes corner) { return paeth(left, up, corner); });
+      each_pixel([](Lanes rest, Lanes left, Lanes up, Lanes corner) {
+        return paeth(left, up, corner, rest);
+      });
       return true;
     default:
       return false;
