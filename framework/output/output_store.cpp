@@ -751,7 +751,9 @@ void OutputStore::make_target_folder(const fs::path& folder) {
     if (known_folders_.contains(folder)) return;
   }
   file_system_.make_folders(folder);
+  constexpr std::size_t kMostKnown = 256;  // Clips have folders of their own, without end.
   const std::lock_guard lock(folders_mutex_);
+  if (known_folders_.size() >= kMostKnown) known_folders_.clear();
   known_folders_.insert(folder);
 }
 
