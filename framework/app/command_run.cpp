@@ -110,6 +110,8 @@ RunSummary run_job(JobAssembly& assembly, HostServices& host, const RunCommandOp
   run.only_finishes = options.only_finishes;
   run.only = options.only;
   run.progress = [&](const RunProgress& progress) {
+    constexpr int kCapturesPerTrim = 200;
+    if (progress.done % kCapturesPerTrim == 0) give_free_pages_back();
     if (lines) {
       lines->update(progress.done, progress.total, progress.resumed, progress.respawned,
                     progress.refused);

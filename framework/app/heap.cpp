@@ -13,6 +13,12 @@ void give_large_blocks_back() {
 #endif
 }
 
+void give_free_pages_back() {
+#ifdef __GLIBC__
+  malloc_trim(0);
+#endif
+}
+
 void keep_large_blocks() {
 #ifdef __GLIBC__
   constexpr int kLargeBlock = 32 << 20;  // the largest that glibc takes

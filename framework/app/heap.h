@@ -10,6 +10,10 @@ namespace diorama {
 /// captures.
 void give_large_blocks_back();
 
+/// All pages that hold nothing, wherever in the heap. Small blocks of thousands of captures leave
+/// holes, in a heap per thread, that are never quite filled again.
+void give_free_pages_back();
+
 /// They stay with the program: reading a picture every few milliseconds, it would spend a third of
 /// its time on pages that the system clears for it. For programs that end soon.
 void keep_large_blocks();

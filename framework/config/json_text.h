@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string_view>
+#include <utility>
 
 /// JSON files of others.
 namespace diorama {
@@ -30,16 +32,22 @@ Json parse_json_or_nothing(std::string_view text) {
   }
 }
 
-/// Throws std::exception for what is no number, and for numbers that an int cannot hold: with those
-/// get() does what it likes.
-template <class Json>
-int int_of_json(const Json& value) {
-  const double number = value.template get<double>();
-  constexpr double kMost = std::numeric_limits<int>::max();
-  if (!(number >= -kMost && number <= kMost)) {
-    throw std::runtime_error(value.dump() + " is beyond reason");
+/// Cuts off what is behind the point, as get() does. Throws std::exception for what is no number,
+/// and for numbers that the type cannot hold: with those get() does what it likes.
+template <class Whole, class Json>
+Whole whole_of_json(const Json& value) {
+  bool fits = true;
+  if (value.is_number_float()) {
+    const auto number = value.template get<double>();
+    fits = number > double(std::numeric_limits<Whole>::min()) - 1.0 &&
+           number < double(std::numeric_limits<Whole>::max()) + 1.0;
+  } else if (value.is_number_unsigned()) {
+    fits = std::in_range<Whole>(value.template get<std::uint64_t>());
+  } else if (value.is_number_integer()) {
+    fits = std::in_range<Whole>(value.template get<std::int64_t>());
   }
-  return value.template get<int>();
+  if (!fits) throw std::runtime_error(value.dump() + " is beyond reason");
+  return value.template get<Whole>();
 }
 
 }  // namespace diorama

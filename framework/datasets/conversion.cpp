@@ -83,6 +83,77 @@ void complete_instances(Frame& frame, const NameSet& needs) {
   }
 }
 
+/// Where one is seen and another's whole mask lies it is in front of that one. Of pixels where a
+/// third hides both nothing is known.
+std::vector<Occlusion> order_of_masks(const Frame& frame) {
+  std::vector<Occlusion> order;
+  if (!frame.has(kInstanceId.name)) return order;
+  const Image<std::uint32_t>& ids = frame.get(kInstanceId);
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::int64_t> pixels;
+  for (const Instance& behind : frame.instances) {
+    if (!behind.visibility || behind.visibility->amodal_mask.bits.empty()) continue;
+    const CoverageMask& mask = behind.visibility->amodal_mask;
+    const PixelBox& box = mask.box;
+    for (int y = std::max(box.y_min, 0); y < std::min(box.y_max, ids.height()); ++y) {
+      for (int x = std::max(box.x_min, 0); x < std::min(box.x_max, ids.width()); ++x) {
+        const std::uint32_t front = ids.at(x, y);
+        if (front == 0 || front == behind.id || mask.bits[mask.index(x, y)] == 0) continue;
+        ++pixels[{front, behind.id}];
+      }
+    }
+  }
+  for (const Instance& front : frame.instances) {
+    for (const Instance& behind : frame.instances) {
+      const auto found = pixels.find({front.id, behind.id});
+      if (found != pixels.end()) order.push_back({front.id, behind.id, found->second});
+    }
+  }
+  return order;
+}
+
+/// Writers of clips take an object's id for its number in all frames. Where readers count anew in
+/// each frame, objects are told apart by their paths.
+class ClipNumbers {
+ public:
+  void renumber(Capture& capture) {
+    if (!capture.clip) return;
+    if (capture.clip->frame == 0) numbers_.clear();
+    for (Frame& frame : capture.frames) renumber(frame);
+  }
+
+ private:
+  void renumber(Frame& frame) {
+    std::map<std::uint32_t, std::uint32_t> number_of_id{{0, 0}};
+    for (Instance& instance : frame.instances) {
+      const std::uint32_t number = number_of(instance.node_path);
+      number_of_id.emplace(instance.id, number);
+      instance.id = number;
+    }
+    const auto renumbered = [&](std::uint32_t id) {
+      const auto [found, is_new] = number_of_id.emplace(id, 0);
+      // Nobody lists it: it stays something of its own.
+      if (is_new) found->second = number_of("id " + std::to_string(id));
+      return found->second;
+    };
+    for (Occlusion& occlusion : frame.occlusions) {
+      occlusion.front = renumbered(occlusion.front);
+      occlusion.behind = renumbered(occlusion.behind);
+    }
+    if (!frame.has(kInstanceId.name)) return;
+    Image<std::uint32_t> ids = frame.get(kInstanceId);
+    for (std::uint32_t& id : ids.pixels()) {
+      if (id != 0) id = renumbered(id);
+    }
+    frame.set(kInstanceId, std::move(ids));
+  }
+
+  std::uint32_t number_of(const std::string& path) {
+    return numbers_.emplace(path, std::uint32_t(numbers_.size() + 1)).first->second;
+  }
+
+  std::map<std::string, std::uint32_t> numbers_;  ///< By path, in one clip.
+};
+
 std::string source_name(const ConversionSource& source) {
   return source.folder.string() + " (" + source.data->info().format + ")";
 }
@@ -97,6 +168,7 @@ Conversion::Conversion(std::vector<ConversionSource> sources, NameSet needs)
     }
     note_differences(source);
   }
+  for (ConversionSource& source : sources_) note_clips(source);
   unite_infos();
 }
 
@@ -125,9 +197,11 @@ void Conversion::note_differences(const ConversionSource& source) {
     notes_.push_back(who + ": " + joined(derived) + " comes from the other kind of distance");
   }
   if (made_up.erase("occlusion_order") > 0) {
-    notes_.push_back(who +
-                     ": does not hold occlusion_order; lists of what hides an object are empty, "
-                     "whatever is hidden");
+    notes_.push_back(who + ": does not hold occlusion_order; " +
+                     (holds.contains("amodal_mask")
+                          ? "lists of what hides an object are those of the masks, without pixels "
+                            "where a third hides both"
+                          : "lists of what hides an object are empty, whatever is hidden"));
   }
   if (!made_up.empty()) {
     notes_.push_back(who + ": does not hold " + joined(made_up) +
@@ -156,6 +230,17 @@ void Conversion::note_differences(const ConversionSource& source) {
     if (is_channel && !needs_.contains(name)) left.insert(name);
   }
   if (!left.empty()) notes_.push_back(who + ": no writer takes " + joined(left));
+}
+
+/// Frames of a clip are one only if its objects are known again.
+void Conversion::note_clips(ConversionSource& source) {
+  const NameSet& holds = source.data->info().holds;
+  const bool are_known = holds.contains(kHoldsTracks) || holds.contains(kHoldsNodePaths);
+  if (source.info.clips.empty() || are_known || !needs_.contains("instances")) return;
+  source.info.clips.clear();
+  notes_.push_back(source_name(source) +
+                   ": does not hold which objects of a clip's frames are the same; frames of clips "
+                   "become captures of their own");
 }
 
 void Conversion::unite_infos() {
@@ -218,12 +303,15 @@ void Conversion::run(Host& host, const std::function<void(Capture)>& take) const
           std::string_view("pointcloud")}) {
       if (!needs_.contains(name)) wanted.erase(std::string(name));
     }
+    const bool counts_anew = !source.data->info().holds.contains(kHoldsTracks);
+    ClipNumbers numbers;
     sweep_captures<Capture>(
         *source.data, wanted, host,
         [&](StoredCapture stored) { return converted(source, std::move(stored)); },
         [&](Capture capture) {
           capture.index = number++;
           capture.clip = clip_frame(info_.clips, capture.index);
+          if (counts_anew) numbers.renumber(capture);
           take(std::move(capture));
         });
   }
@@ -245,6 +333,10 @@ Capture Conversion::converted(const ConversionSource& source, StoredCapture stor
     }
     if (frame.camera_path.empty()) frame.camera_path = "/Cameras/" + frame.camera_name;
     if (needs_.contains("instances")) complete_instances(frame, needs_);
+    if (needs_.contains("occlusion_order") &&
+        !source.data->info().holds.contains("occlusion_order")) {
+      frame.occlusions = order_of_masks(frame);
+    }
     if (source.data->info().holds.contains(kHoldsBounds)) continue;
     if (source.data->info().holds.contains(kHoldsBoxes3d)) continue;
     // What means nothing is a point, a number that every format can write; empty boxes are

@@ -38,6 +38,7 @@ class Conversion {
   void run(Host& host, const std::function<void(Capture)>& take) const;
 
  private:
+  void note_clips(ConversionSource& source);
   void unite_infos();
   void note_differences(const ConversionSource& source);
   Capture converted(const ConversionSource& source, StoredCapture stored) const;

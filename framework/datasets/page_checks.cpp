@@ -45,14 +45,14 @@ void check_stated(const Json& page, ReadLog& log) {
 
 PlannedDataset planned_by(const Json& page, ReadLog& log) {
   PlannedDataset planned;
-  planned.captures = int_of_json(page.at("captures"));
+  planned.captures = whole_of_json<int>(page.at("captures"));
   if (planned.captures < 0 || planned.captures > kMostCaptures) {
     throw std::runtime_error("its number of captures is beyond reason");
   }
   planned.cameras = page.at("cameras").get<std::vector<std::string>>();
   for (const auto& [split, list] : page.at("split").items()) {
     for (const Json& entry : list) {
-      const int capture = int_of_json(entry);
+      const int capture = whole_of_json<int>(entry);
       const bool is_known = capture >= 0 && capture < planned.captures;
       log.check(is_known && planned.split_of_capture.emplace(capture, split).second,
                 about_page(kSplit,

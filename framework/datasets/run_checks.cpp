@@ -50,8 +50,8 @@ struct RunPlan {
 std::vector<DatasetClip> planned_clips(const Json& page) {
   std::vector<DatasetClip> clips;
   for (const Json& clip : page.value("clips", Json::array())) {
-    clips.push_back({int_of_json(clip.at("first_capture")), int_of_json(clip.at("frame_count")),
-                     clip.at("fps").get<double>()});
+    clips.push_back({whole_of_json<int>(clip.at("first_capture")),
+                     whole_of_json<int>(clip.at("frame_count")), clip.at("fps").get<double>()});
   }
   return clips;
 }
@@ -62,7 +62,7 @@ std::optional<RunPlan> read_plan(const std::filesystem::path& run, ReadLog& log)
   ++log.files;
   try {
     const Json page = parse_json(file_system.read(run / "dataset.json"));
-    return RunPlan{int_of_json(page.at("captures")),
+    return RunPlan{whole_of_json<int>(page.at("captures")),
                    page.at("cameras").get<std::vector<std::string>>(), planned_clips(page)};
   } catch (const std::exception& error) {
     log.findings.push_back(
@@ -100,7 +100,10 @@ void check_plan(const RunPlan& plan, const RunDataset& dataset, ReadLog& log) {
             {kNothingIsMissing, dataset.name, std::nullopt, "", "",
              "holds " + std::to_string(info.captures.size()) + " captures",
              "dataset.json plans " + std::to_string(plan.captures)});
-  const bool has_names = info.camera_names != std::vector<std::string>{"camera"};
+  // A folder without any picture is one that was asked for nothing: what lost all of them has
+  // nothing that it could be known by.
+  const bool has_names =
+      !info.camera_names.empty() && info.camera_names != std::vector<std::string>{"camera"};
   for (const std::string& camera : plan.cameras) {
     log.check(!has_names || std::ranges::find(info.camera_names, camera) != info.camera_names.end(),
               {kNothingIsMissing, dataset.name, std::nullopt, camera, "",

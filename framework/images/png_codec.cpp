@@ -10,11 +10,17 @@
 #include <cstring>
 #include <memory>
 #include <new>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
 
 #include "framework/images/codecs.h"
+#include "framework/images/png_filters.h"
 
-// PNG (ISO/IEC 15948). Reading is libpng's. Writing is done here, because the time goes into
-// deflate and libdeflate is several times as fast as zlib; filters and container are a page.
+// PNG (ISO/IEC 15948). The time goes into deflate, and libdeflate is several times as fast as zlib:
+// writing is done here, and so is reading of the plain files that nearly all are. Whatever else
+// there is, and whatever is wrong with a file, is libpng's.
 namespace diorama::images {
 namespace {
 
@@ -125,6 +131,118 @@ class PngReader {
   png_structp png_;
   png_infop info_;
 };
+
+// --- reading what is plain ---
+
+constexpr std::array<std::uint8_t, 8> kMark{0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
+
+/// Larger pictures go row by row: here their samples are in memory twice for a while.
+constexpr std::uint64_t kMostAtOnce = std::uint64_t(32) << 20;
+
+std::uint32_t get_u32(const std::uint8_t* from) {
+  return std::uint32_t(from[0]) << 24 | std::uint32_t(from[1]) << 16 | std::uint32_t(from[2]) << 8 |
+         std::uint32_t(from[3]);
+}
+
+struct PlainPng {
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  int channels = 0;
+  std::vector<std::uint8_t> joined;  ///< Behind `packed`, where that comes in parts.
+  std::span<const std::uint8_t> packed;
+};
+
+/// Nothing but eight bits without palette or colour for transparency, row by row, in chunks that
+/// follow the standard and are not damaged.
+std::optional<PlainPng> plain_png(std::span<const std::uint8_t> file) {
+  struct Chunk {
+    std::string_view type;
+    std::span<const std::uint8_t> data;
+  };
+  std::size_t at = kMark.size();
+  const auto next_chunk = [&]() -> std::optional<Chunk> {
+    if (file.size() - at < 12) return std::nullopt;
+    const std::uint32_t size = get_u32(&file[at]);
+    if (size > file.size() - at - 12) return std::nullopt;
+    const std::uint8_t* type = &file[at + 4];
+    at += 12 + std::size_t(size);
+    if (libdeflate_crc32(0, type, 4 + std::size_t(size)) != get_u32(type + 4 + size)) {
+      return std::nullopt;
+    }
+    return Chunk{{reinterpret_cast<const char*>(type), 4}, {type + 4, size}};
+  };
+
+  const auto header = next_chunk();
+  if (!header || header->type != "IHDR" || header->data.size() != 13) return std::nullopt;
+  PlainPng png{get_u32(&header->data[0]), get_u32(&header->data[4]), 0, {}, {}};
+  constexpr std::array<int, 7> kChannels{1, 0, 3, 0, 2, 0, 4};  // by type of colour
+  const std::uint8_t colors = header->data[9];
+  png.channels = colors < kChannels.size() ? kChannels[colors] : 0;
+  const bool is_plain = header->data[8] == 8 && png.channels > 0 && header->data[10] == 0 &&
+                        header->data[11] == 0 && header->data[12] == 0;
+  if (!is_plain) return std::nullopt;
+
+  bool has_ended = false;  // the run of IDAT, which is one
+  for (auto chunk = next_chunk(); chunk; chunk = next_chunk()) {
+    if (chunk->type == "IEND") {
+      if (!chunk->data.empty() || png.packed.empty()) return std::nullopt;
+      return png;
+    }
+    if (chunk->type == "IDAT") {
+      if (has_ended) return std::nullopt;
+      if (png.packed.empty()) {
+        png.packed = chunk->data;
+        continue;
+      }
+      if (png.joined.empty()) png.joined.assign(png.packed.begin(), png.packed.end());
+      png.joined.insert(png.joined.end(), chunk->data.begin(), chunk->data.end());
+      png.packed = png.joined;
+      continue;
+    }
+    has_ended = !png.packed.empty();
+    // Texts, times, profiles and the like have a small first letter, and no part in the pixels.
+    const bool is_critical = (chunk->type[0] & 0x20) == 0;
+    if (is_critical || chunk->type == "tRNS") return std::nullopt;
+  }
+  return std::nullopt;
+}
+
+/// Nothing where libpng has to look, be it that the file is damaged.
+std::optional<Texture> decode_plain(const Source& source) {
+  const auto png =
+      plain_png({reinterpret_cast<const std::uint8_t*>(source.bytes.data()), source.bytes.size()});
+  if (!png || png->width == 0 || png->height == 0 || png->width > kMaxSide ||
+      png->height > kMaxSide) {
+    return std::nullopt;
+  }
+  const std::uint64_t row_size = std::uint64_t(png->width) * std::uint64_t(png->channels);
+  const std::uint64_t size = row_size * png->height;
+  const std::uint64_t filtered_size = size + png->height;
+  // Deflate makes at most 1032 bytes of one.
+  if (size > kMostAtOnce || size + filtered_size + png->joined.size() > source.budget ||
+      filtered_size / 1032 > png->packed.size()) {
+    return std::nullopt;
+  }
+  const std::unique_ptr<libdeflate_decompressor, void (*)(libdeflate_decompressor*)> inflater(
+      libdeflate_alloc_decompressor(), libdeflate_free_decompressor);
+  if (!inflater) throw std::bad_alloc();
+  const auto rows = std::make_unique_for_overwrite<std::uint8_t[]>(std::size_t(filtered_size));
+  // Without a place for the size there must be exactly so much.
+  if (libdeflate_zlib_decompress(inflater.get(), png->packed.data(), png->packed.size(), rows.get(),
+                                 std::size_t(filtered_size), nullptr) != LIBDEFLATE_SUCCESS) {
+    return std::nullopt;
+  }
+  Texture texture;
+  texture.width = int(png->width);
+  texture.height = int(png->height);
+  texture.channels = png->channels;
+  texture.bytes.resize(std::size_t(size));
+  if (!undo_png_filters({rows.get(), std::size_t(filtered_size)}, png->height,
+                        std::size_t(png->channels), texture.bytes)) {
+    return std::nullopt;
+  }
+  return texture;
+}
 
 // --- writing ---
 
@@ -256,6 +374,7 @@ std::vector<std::uint8_t> deflated(const std::vector<std::uint8_t>& bytes) {
 }  // namespace
 
 Texture decode_png(const Source& source) {
+  if (auto texture = decode_plain(source)) return std::move(*texture);
   PngRead read;
   read.at = source.bytes.data();
   read.left = source.bytes.size();
@@ -321,7 +440,6 @@ Texture decode_png(const Source& source) {
 }
 
 std::vector<std::byte> encode_png(const ImageView& image) {
-  constexpr std::array<std::uint8_t, 8> kMark{0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
   constexpr std::array<std::uint8_t, 5> kColorType{0, 0, 0, 2, 6};  // by channels
   std::array<std::uint8_t, 13> header{};
   put_u32(header.data(), std::uint32_t(image.width));

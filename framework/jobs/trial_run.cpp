@@ -125,7 +125,7 @@ Estimate estimate_of(const RunSummary& summary, const CapturePlan& plan, const R
   Estimate estimate;
   estimate.captures = plan.capture_count();
   estimate.visits = plan.visit_count();
-  const double visits = std::max(1.0, double(summary.visits.size()));
+  const double visits = std::max(1.0, double(summary.settled.visit_count()));
   const double captures = std::max(1, summary.captures);
   double per_visit = 0.0;
   double per_capture = 0.0;

@@ -97,7 +97,7 @@ std::optional<VisitRecord> read_record(const fs::path& file) {
   const Json json = parse_json(text.str());
   if (!json.contains("objects")) return std::nullopt;
   VisitRecord record;
-  record.visit = json.at("visit").get<int>();
+  record.visit = whole_of_json<int>(json.at("visit"));
   record.simulated_s = number(json.at("simulated_s"));
   record.step_s = number(json.at("step_seconds"));
   for (const Json& entry : json.at("objects")) {

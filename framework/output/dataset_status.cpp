@@ -58,7 +58,8 @@ std::uint64_t memory_of_holder(FileSystem& file_system, const fs::path& lease) {
       !content["process"].is_number_integer()) {
     return 0;
   }
-  const fs::path process = fs::path("/proc") / std::to_string(content["process"].get<int>());
+  const fs::path process =
+      fs::path("/proc") / std::to_string(content["process"].get<std::int64_t>());
   std::error_code error;
   const fs::path file = fs::canonical(lease, error);
   bool is_holder = false;

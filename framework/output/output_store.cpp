@@ -751,7 +751,9 @@ void OutputStore::make_target_folder(const fs::path& folder) {
     if (known_folders_.contains(folder)) return;
   }
   file_system_.make_folders(folder);
+  constexpr std::size_t kMostKnown = 256;  // Clips have folders of their own, without end.
   const std::lock_guard lock(folders_mutex_);
+  if (known_folders_.size() >= kMostKnown) known_folders_.clear();
   known_folders_.insert(folder);
 }
 
@@ -794,7 +796,7 @@ void OutputStore::put_staged(const fs::path& place, StagedFile& file) {
   file.staged->add(file.bytes);
   file.staged_size += file.bytes.size();
   bytes_written_ += file.bytes.size();
-  file.bytes = {};
+  file.bytes = std::vector<std::byte>();  // {} would keep the memory
 }
 
 void OutputStore::write_stage(int entry, Transaction& transaction) {

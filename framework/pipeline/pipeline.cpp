@@ -270,7 +270,7 @@ void Pipeline::fail_turn(const Turn& turn, std::exception_ptr error) {
 void Pipeline::add_up(VisitResult result) {
   summary_.captures += result.captures;
   summary_.respawned += result.respawned;
-  for (VisitReport& report : result.reports) summary_.visits.push_back(std::move(report));
+  for (const VisitReport& report : result.reports) summary_.settled.add(report);
   for (const auto& [capture, outcomes] : result.views) summary_.views.add(capture, outcomes);
   for (const auto& [phase, seconds] : result.seconds) summary_.seconds[phase] += seconds;
 }
@@ -461,7 +461,7 @@ std::string summary_text(const RunSummary& summary) {
     text += (text.empty() ? "time: " : ", ") + phase + " " + duration_text(seconds);
   }
   if (!text.empty()) text += "\n";
-  text += settle_text(summary.visits);
+  text += summary.settled.text();
   text += views_text(summary.views);
   char line[64];
   std::snprintf(line, sizeof line, "%.1f MB written", double(summary.bytes_written) * 1e-6);

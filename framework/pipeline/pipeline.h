@@ -60,8 +60,8 @@ struct RunSummary {
   std::uint64_t bytes_written = 0;
   double wall_s = 0.0;
   std::map<std::string, double> seconds;  ///< Phase to wall time, summed over all visits.
-  std::vector<VisitReport> visits;
-  ViewCounts views;  ///< Of the captures that this run made.
+  SettleSummary settled;                  ///< Of all visits.
+  ViewCounts views;                       ///< Of the captures that this run made.
 };
 
 std::string summary_text(const RunSummary& summary);

@@ -17,34 +17,25 @@ std::string number_text(const char* format, double number) {
   return text;
 }
 
-std::string visit_text(const VisitReport& visit) {
-  return "visit " + std::to_string(visit.visit + 1);
-}
+std::string visit_text(int visit) { return "visit " + std::to_string(visit + 1); }
 
-/// The visit with the largest value; the first of equal ones. `visits` is not empty.
-template <class ValueOf>
-const VisitReport& worst(const std::vector<VisitReport>& visits, const ValueOf& value_of) {
-  return *std::max_element(visits.begin(), visits.end(),
-                           [&](auto& a, auto& b) { return value_of(a) < value_of(b); });
-}
-
-std::string incidents_text(const VisitReport& visit, const std::vector<Incident>& incidents,
-                           const char* what) {
-  std::string text;
-  for (const Incident& incident : incidents) {
-    text += visit_text(visit) + ": " + incident.path + " " + incident.why + what + "\n";
+std::vector<std::string> lines_of(const VisitReport& report) {
+  std::vector<std::string> lines;
+  const std::string front = visit_text(report.visit) + ": ";
+  if (!report.rest_after_s) {
+    lines.push_back(front + number_text("not at rest after %.2f s\n", report.simulated_s));
   }
-  return text;
-}
-
-/// A long run may tell of thousands.
-std::string first_lines(const std::string& text) {
-  constexpr int kLines = 40;
-  std::size_t end = 0;
-  for (int line = 0; line < kLines && end < text.size(); ++line) end = text.find('\n', end) + 1;
-  const auto more = std::count(text.begin() + std::ptrdiff_t(end), text.end(), '\n');
-  if (more == 0) return text;
-  return text.substr(0, end) + "... and " + std::to_string(more) + " more, in settle/\n";
+  const auto tell = [&](const std::vector<Incident>& incidents, const char* what) {
+    for (const Incident& incident : incidents) {
+      lines.push_back(front + incident.path + " " + incident.why + what + "\n");
+    }
+  };
+  tell(report.born_inside, "");
+  tell(report.respawned, ", so it was placed anew");
+  tell(report.dropped, ", so it was taken out");
+  tell(report.unsettled, "");
+  tell(report.cameras, "");
+  return lines;
 }
 
 nlohmann::ordered_json as_json(const std::vector<Incident>& incidents, const char* name) {
@@ -93,42 +84,47 @@ std::set<NodeId> nodes_with_shape(const Scene& scene) {
 
 }  // namespace
 
-std::string settle_text(const std::vector<VisitReport>& visits) {
-  if (visits.empty()) return {};
-  std::size_t falling = 0;
-  std::size_t outside = 0;
-  for (const VisitReport& visit : visits) {
-    falling += std::size_t(visit.falling_objects);
-    outside += visit.left_room.size();
+void SettleSummary::Worst::add(double its_value, const VisitReport& report) {
+  if (visit >= 0 && its_value <= value) return;
+  value = its_value;
+  visit = report.visit;
+  body = report.deepest_body;
+}
+
+void SettleSummary::add(const VisitReport& report) {
+  constexpr std::int64_t kMostLines = 40;
+  ++visit_count_;
+  falling_ += report.falling_objects;
+  outside_ += std::int64_t(report.left_room.size());
+  if (report.rest_after_s) rest_after_s_.add(*report.rest_after_s, report);
+  max_speed_.add(report.max_speed, report);
+  max_penetration_m_.add(report.max_penetration_m, report);
+  for (const std::string& line : lines_of(report)) {
+    if (lines_++ < kMostLines) first_lines_ += line;
   }
-  const auto rest_after = [](const VisitReport& v) { return v.rest_after_s.value_or(-1.0); };
-  const VisitReport& slowest = worst(visits, rest_after);
-  const VisitReport& fastest = worst(visits, [](const VisitReport& v) { return v.max_speed; });
-  const VisitReport& deepest =
-      worst(visits, [](const VisitReport& v) { return v.max_penetration_m; });
-  std::string text = "objects: " + std::to_string(falling) + " falling over all visits, " +
-                     std::to_string(outside) + " left the room";
-  if (slowest.rest_after_s) {
-    text += number_text("; at rest after at most %.2f s (", *slowest.rest_after_s) +
-            visit_text(slowest) + ")";
+}
+
+std::string SettleSummary::text() const {
+  if (visit_count_ == 0) return {};
+  std::string text = "objects: " + std::to_string(falling_) + " falling over all visits, " +
+                     std::to_string(outside_) + " left the room";
+  const auto tell = [&](const char* front, double value, const Worst& worst,
+                        const std::string& more) {
+    text += number_text(front, value) + visit_text(worst.visit) + more + ")";
+  };
+  if (rest_after_s_.visit >= 0) {
+    tell("; at rest after at most %.2f s (", rest_after_s_.value, rest_after_s_, "");
   }
-  text += number_text("; residual speed at most %.4f m/s (", fastest.max_speed) +
-          visit_text(fastest) + ")";
-  text += number_text(", deepest penetration %.2f mm (", deepest.max_penetration_m * 1000.0) +
-          visit_text(deepest) + (deepest.deepest_body.empty() ? "" : ", " + deepest.deepest_body) +
-          ")\n";
-  std::string details;
-  for (const VisitReport& visit : visits) {
-    if (!visit.rest_after_s) {
-      details += visit_text(visit) + number_text(": not at rest after %.2f s\n", visit.simulated_s);
-    }
-    details += incidents_text(visit, visit.born_inside, "");
-    details += incidents_text(visit, visit.respawned, ", so it was placed anew");
-    details += incidents_text(visit, visit.dropped, ", so it was taken out");
-    details += incidents_text(visit, visit.unsettled, "");
-    details += incidents_text(visit, visit.cameras, "");
+  tell("; residual speed at most %.4f m/s (", max_speed_.value, max_speed_, "");
+  const std::string& deepest = max_penetration_m_.body;
+  tell(", deepest penetration %.2f mm (", max_penetration_m_.value * 1000.0, max_penetration_m_,
+       deepest.empty() ? "" : ", " + deepest);
+  text += "\n" + first_lines_;
+  const auto named = std::int64_t(std::count(first_lines_.begin(), first_lines_.end(), '\n'));
+  if (lines_ > named) {
+    text += "... and " + std::to_string(lines_ - named) + " more, in settle/\n";
   }
-  return text + first_lines(details);
+  return text;
 }
 
 std::string settle_json(const VisitReport& report) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
@@ -62,9 +63,34 @@ struct VisitReport {
 /// As JSON text with a newline at its end.
 std::string settle_json(const VisitReport& report);
 
-/// For the end of a run: the worst of all visits, and what did not stay where it should. Lines that
-/// end with a newline; nothing without visits.
-std::string settle_text(const std::vector<VisitReport>& visits);
+/// For the end of a run: the worst of all visits, and what did not stay where it should. Takes as
+/// much memory for many visits as for some; settle/ has everything.
+class SettleSummary {
+ public:
+  /// Of equally bad visits the first counts.
+  void add(const VisitReport& report);
+  int visit_count() const { return visit_count_; }
+  /// Lines that end with a newline; nothing without visits.
+  std::string text() const;
+
+ private:
+  struct Worst {
+    double value = 0.0;
+    int visit = -1;  ///< Below 0: none yet.
+    std::string body;
+
+    void add(double its_value, const VisitReport& report);
+  };
+
+  int visit_count_ = 0;
+  std::int64_t falling_ = 0;
+  std::int64_t outside_ = 0;
+  Worst rest_after_s_;  ///< Of visits that came to rest.
+  Worst max_speed_;
+  Worst max_penetration_m_;
+  std::string first_lines_;
+  std::int64_t lines_ = 0;
+};
 
 /// The space that an environment takes. It is open above, as rooms may have no roof.
 class Room {

@@ -7,6 +7,7 @@
 
 #include "diorama/error.h"
 #include "framework/config/joined.h"
+#include "framework/config/json_text.h"
 
 namespace diorama {
 namespace {
@@ -19,18 +20,19 @@ std::string dumped(const OrderedJson& json, int indent) {
 
 ViewCounts counts_from(const OrderedJson& json) {
   ViewCounts counts;
-  counts.views = json.at("views").get<std::int64_t>();
-  counts.draws = json.at("draws").get<std::int64_t>();
+  counts.views = whole_of_json<std::int64_t>(json.at("views"));
+  counts.draws = whole_of_json<std::int64_t>(json.at("draws"));
   for (const auto& [condition, count] : json.at("refused").items()) {
-    counts.refused[condition] = count.get<std::int64_t>();
+    counts.refused[condition] = whole_of_json<std::int64_t>(count);
   }
   for (const auto& [quota, parts] : json.at("quotas").items()) {
     for (const auto& [part, count] : parts.items()) {
-      counts.parts[quota][part] = count.get<std::int64_t>();
+      counts.parts[quota][part] = whole_of_json<std::int64_t>(count);
     }
   }
   for (const OrderedJson& one : json.at("unmet")) {
-    counts.unmet.push_back({one.at("capture").get<int>(), one.at("camera").get<std::string>(),
+    counts.unmet.push_back({whole_of_json<int>(one.at("capture")),
+                            one.at("camera").get<std::string>(),
                             one.at("conditions").get<std::vector<std::string>>()});
   }
   return counts;
@@ -78,14 +80,17 @@ std::string outcomes_json(const std::vector<ViewOutcome>& outcomes) {
 std::vector<ViewOutcome> outcomes_from_json(std::string_view text) {
   try {
     std::vector<ViewOutcome> outcomes;
-    for (const OrderedJson& one : OrderedJson::parse(text)) {
-      outcomes.push_back({one.at("camera").get<std::string>(), one.at("draws").get<int>(),
-                          one.at("refused").get<std::map<std::string, int>>(),
-                          one.at("unmet").get<std::vector<std::string>>(),
+    for (const OrderedJson& one : parse_json<OrderedJson>(text)) {
+      std::map<std::string, int> refused;
+      for (const auto& [condition, count] : one.at("refused").items()) {
+        refused[condition] = whole_of_json<int>(count);
+      }
+      outcomes.push_back({one.at("camera").get<std::string>(), whole_of_json<int>(one.at("draws")),
+                          std::move(refused), one.at("unmet").get<std::vector<std::string>>(),
                           one.at("quotas").get<std::map<std::string, std::string>>()});
     }
     return outcomes;
-  } catch (const OrderedJson::exception& error) {
+  } catch (const std::exception& error) {
     throw Error(ErrorKind::Output,
                 std::string("the journal's record of views cannot be read: ") + error.what());
   }
@@ -110,11 +115,11 @@ std::string views_json(const ViewCounts& counts) {
 }
 
 std::string views_text(std::string_view json) {
-  const OrderedJson parsed = OrderedJson::parse(json, nullptr, false);
+  const OrderedJson parsed = parse_json_or_nothing<OrderedJson>(json);
   if (!parsed.is_object()) return {};
   try {
     return views_text(counts_from(parsed));
-  } catch (const OrderedJson::exception&) {
+  } catch (const std::exception&) {
     return {};  // somebody else's file of that name
   }
 }

@@ -494,12 +494,8 @@ void VisitRun::take(const PlannedCapture& planned) {
   // A visit that is cut short ends with its objects in the air, which says nothing.
   const bool is_last = next_capture_ == planned_.capture_count;
   if (is_last && simulations_to_come_ == 0) {
-    VisitReport& report = result_.reports.emplace_back(make_report());
+    const VisitReport& report = result_.reports.emplace_back(make_report());
     pending.settle_json = settle_json(report);
-    // A run keeps the reports of all its visits. Places, a line for every mesh of a room, are in
-    // the file now.
-    for (auto* places : {&report.born, &report.placed}) *places = {};
-    report.objects = {};
   }
   ++result_.captures;
   result_.respawned = int(report_.respawned.size());

@@ -47,8 +47,8 @@ StoredCaptures::StoredCaptures(const fs::path& folder, const NameSet& channels,
   std::string job;
   try {
     const Json json = parse_json(dataset_json_);
-    seed_ = json.at("seed").get<std::uint64_t>();
-    capture_count_ = int_of_json(json.at("captures"));
+    seed_ = whole_of_json<std::uint64_t>(json.at("seed"));
+    capture_count_ = whole_of_json<int>(json.at("captures"));
     camera_names_ = json.at("cameras").get<std::vector<std::string>>();
     job = json.at("job").get<std::string>();
     if (capture_count_ < 0) throw std::runtime_error("a negative number of captures");

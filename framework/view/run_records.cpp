@@ -105,15 +105,15 @@ void RunRecords::read_settling() {
     try {
       add_visit(visit);
       visits_.insert(name);
-    } catch (const OrderedJson::exception&) {
+    } catch (const std::exception&) {
       // Somebody else's file.
     }
   }
 }
 
 void RunRecords::add_visit(const OrderedJson& visit) {
-  const std::string at = "visit " + std::to_string(visit.at("visit").get<int>()) + ": ";
-  const int falling = visit.at("falling_objects").get<int>();
+  const std::string at = "visit " + std::to_string(whole_of_json<int>(visit.at("visit"))) + ": ";
+  const int falling = whole_of_json<int>(visit.at("falling_objects"));
   std::optional<double> rest_s;
   if (!visit.at("rest_after_s").is_null()) rest_s = visit.at("rest_after_s").get<double>();
   std::vector<std::pair<const char*, std::pair<std::string, std::string>>> found;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <fstream>
 #include <span>
 #include <stdexcept>
@@ -60,7 +61,11 @@ std::uint32_t StoredPicture::at(int x, int y, int c) const {
 Image<Rgba8> StoredPicture::color() const {
   Image<Rgba8> image(width(), height(), {0, 0, 0, 255});
   const int used = std::min(channels(), 4);
-  if (used >= 3 && texture->floats.empty()) {  // as nearly all are
+  if (used == channels() && used == 4 && texture->floats.empty()) {  // as nearly all are
+    std::memcpy(image.pixels().data(), texture->bytes.data(), image.pixels().size_bytes());
+    return image;
+  }
+  if (used >= 3 && texture->floats.empty()) {
     const std::uint8_t* from = texture->bytes.data();
     for (Rgba8& pixel : image.pixels()) {
       for (std::size_t c = 0; c < std::size_t(used); ++c) pixel[c] = from[c];

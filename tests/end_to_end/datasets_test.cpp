@@ -120,6 +120,50 @@ TEST_CASE("a converted dataset is the one that the run would have written", "[co
   }
 }
 
+TEST_CASE("clips of a rig stay clips, or become pictures that say so", "[convert]") {
+  const TemporaryFolder folder;
+  write_file(folder / "job.yaml", R"(
+seed: 11
+total_captures: 8
+environments: [{type: shapes, shapes: [cube]}]
+environment: {colliders: triangle_mesh}
+objects:
+  - {type: shapes, name: things, under: /Assets, count: 6, label_pattern: "^"}
+lights: [{type: dome, name: sky}]
+cameras:
+  - {type: pinhole, name: eyes, width: 96, height: 72, rig: [{name: left}, {name: right, position: [0.1, 0, 0]}]}
+randomizers:
+  - {type: scatter_poses, name: poses, on: [environment], nodes: "/Assets/*",
+     offset: [[-0.6, 0.6], [-0.6, 0.6], [1.4, 2.0]], scale: [0.1, 0.2]}
+  - {type: camera_path, name: path, on: [fall], kind: orbit, targets: "/Environment", distance: 3.0,
+     polar_angle_deg: 40, turn_deg_s: 40}
+settle: {policy: keep}
+renderer: {type: "null"}
+timeline: [{simulate: 14}, {record: {name: fall, fps: 24, seconds: 0.17}}]
+writers:
+  - {type: BasicWriter, name: basic, instance_segmentation: true, semantic_segmentation: true,
+     bounding_box_2d_tight: true, bounding_box_2d_loose: true, bounding_box_3d: true, camera_params: true,
+     distance_to_camera: true}
+  - {type: Hdf5Writer, name: hdf5}
+  - {type: BopWriter, name: bop}
+  - {type: DataVisualizationWriter, name: nothing_asked}
+output: {folder: out}
+)");
+  succeed({"run", "job.yaml"}, folder);
+  succeed({"lint", "out"}, folder);
+  for (const std::string from : {"basic", "hdf5", "bop"}) {
+    INFO(from);
+    const Outcome made =
+        succeed({"convert", "out/" + from, "--writer", "CocoWriter", "-o", "coco_" + from}, folder);
+    succeed({"lint", "coco_" + from}, folder);
+    succeed(
+        {"merge", "out/" + from, "out/" + from, "--writer", "CocoWriter", "-o", "twice_" + from},
+        folder);
+    succeed({"lint", "twice_" + from}, folder);
+    if (from == "hdf5") CHECK_THAT(made.errors, ContainsSubstring("become captures of their own"));
+  }
+}
+
 TEST_CASE("what writers need and a dataset does not hold is said before anything is written",
           "[convert]") {
   const TemporaryFolder folder;

@@ -29,10 +29,33 @@ def chunk(kind, data):
     return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
 
-def png(width, height, depth, color, rows, extra=b"", interlace=0):
+def png(width, height, depth, color, rows, extra=b"", interlace=0, part=1 << 30):
     head = struct.pack(">IIBBBBB", width, height, depth, color, 0, 0, interlace)
-    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + extra
-            + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
+    packed = zlib.compress(rows)
+    parts = [chunk(b"IDAT", packed[at:at + part]) for at in range(0, len(packed), part)]
+    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + extra + b"".join(parts) + chunk(b"IEND", b""))
+
+
+def paeth(left, up, corner):
+    guess = left + up - corner
+    return min((left, up, corner), key=lambda value: abs(guess - value))
+
+
+def filtered(pixels):
+    """Rows with all filters in turn, as PNG's section 9.2 has them."""
+    rows = b""
+    above = None
+    for y, row in enumerate(pixels.reshape(pixels.shape[0], -1).tolist()):
+        stride = len(row) // pixels.shape[1]
+        above = above or [0] * len(row)
+        kind = (y + 1) % 5
+        rows += bytes([kind])
+        for i, value in enumerate(row):
+            left, corner = (row[i - stride], above[i - stride]) if i >= stride else (0, 0)
+            guess = (0, left, above[i], (left + above[i]) // 2, paeth(left, above[i], corner))[kind]
+            rows += bytes([(value - guess) & 255])
+        above = row
+    return rows
 
 
 def write(folder, name, data):
@@ -73,6 +96,19 @@ def make_pngs(folder, rng):
                     if grey_alpha[y::dy, x::dx].size for row in grey_alpha[y::dy, x::dx])
     write(folder, "interlaced.png", png(width, height, 8, 4, rows, interlace=1))
     expect(folder, "interlaced.png", grey_alpha)
+
+    for channels, color in ((1, 0), (2, 4), (3, 2), (4, 6)):
+        pixels = rng.integers(0, 256, (23, 19, channels), dtype=np.uint8)
+        pixels[12:, 5:] //= 16  # where neighbours are alike and filters meet ties
+        name = f"filters_{channels}.png"
+        text = chunk(b"tEXt", b"Comment\0between header and pixels")
+        write(folder, name, png(19, 23, 8, color, filtered(pixels), text, part=100))
+        expect(folder, name, pixels)
+    clear = rng.integers(0, 2, (4, 5, 3), dtype=np.uint8) * 255
+    write(folder, "one_colour_clear.png", png(5, 4, 8, 2, filtered(clear),
+                                              chunk(b"tRNS", struct.pack(">HHH", 255, 0, 255))))
+    hidden = np.where((clear == (255, 0, 255)).all(axis=2), 0, 255).astype(np.uint8)
+    expect(folder, "one_colour_clear.png", np.dstack([clear, hidden]))
 
 
 def make_tgas(folder, rng):

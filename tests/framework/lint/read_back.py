@@ -647,6 +647,41 @@ def check_webdataset(root):
                 equal(extent(ids == place), item["box"], key)
 
 
+def check_torchvision(root):
+    """Loaders of a training library, which look for the benchmarks' own folders."""
+    try:
+        from torchvision import datasets
+    except ImportError:
+        print("torchvision is absent: its loaders are left out")
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        os.makedirs(f"{folder}/VOCdevkit")
+        os.symlink(os.path.abspath(f"{root}/voc"), f"{folder}/VOCdevkit/VOC2012")
+        os.makedirs(f"{folder}/Kitti")
+        os.symlink(os.path.abspath(f"{root}/kitti"), f"{folder}/Kitti/raw")
+        voc = datasets.VOCDetection(folder, "2012", "trainval")
+        equal(len(voc), len(glob.glob(f"{root}/voc/JPEGImages/*")), "pictures of VOC")
+        for image, entry in voc:
+            size = entry["annotation"]["size"]
+            equal((int(size["width"]), int(size["height"])), image.size, "size in VOC")
+            for thing in entry["annotation"].get("object", []):
+                box = {side: int(thing["bndbox"][side]) for side in thing["bndbox"]}
+                assert 1 <= box["xmin"] <= box["xmax"] <= image.size[0], thing
+                assert 1 <= box["ymin"] <= box["ymax"] <= image.size[1], thing
+        for image, mask in datasets.VOCSegmentation(folder, "2012", "trainval"):
+            equal(mask.size, image.size, "size of a mask of VOC")
+            equal(mask.mode, "P", "mask of VOC")
+        kitti = datasets.Kitti(folder, train=True)
+        equal(len(kitti), len(glob.glob(f"{root}/kitti/training/image_2/*")), "pictures of KITTI")
+        for image, things in kitti:
+            for thing in things:
+                left, top, right, bottom = thing["bbox"]
+                assert 0 <= left <= right <= image.size[0], thing
+                assert 0 <= top <= bottom <= image.size[1], thing
+                equal(len(thing["dimensions"]), 3, "dimensions in KITTI")
+        assert sum(len(things) for _, things in kitti) > 0
+
+
 def main():
     with tempfile.TemporaryDirectory() as root:
         if len(sys.argv) > 2:
@@ -654,7 +689,7 @@ def main():
         subprocess.run([sys.argv[1], root], check=True)
         for check in (check_basic, check_pose, check_boxes, check_page, check_coco, check_yolo,
                       check_kitti, check_voc, check_bop, check_polygons, check_imagefolder,
-                      check_webdataset, check_hdf5, check_across):
+                      check_webdataset, check_hdf5, check_across, check_torchvision):
             check(root)
             print(check.__name__, "ok")
 

@@ -116,8 +116,14 @@ TEST_CASE("The report names the worst visits and every object that left", "[sett
   wild.dropped = {{"/Assets/pot", "hangs in the air"}};
   wild.unsettled = {{"/Assets/mug", "left the room"}};
   wild.cameras = {{"/Cameras/cam_0", "stands in /Environment/lamp"}};
-  CHECK(settle_text({}).empty());
-  const std::string text = settle_text({quiet, wild});
+  const auto text_of = [](const std::vector<VisitReport>& visits) {
+    SettleSummary summary;
+    for (const VisitReport& visit : visits) summary.add(visit);
+    CHECK(summary.visit_count() == int(visits.size()));
+    return summary.text();
+  };
+  CHECK(text_of({}).empty());
+  const std::string text = text_of({quiet, wild});
   CHECK_THAT(text, ContainsSubstring("11 falling over all visits, 1 left the room"));
   CHECK_THAT(text, ContainsSubstring("at rest after at most 1.25 s (visit 1)"));
   CHECK_THAT(text, ContainsSubstring("residual speed at most 0.5000 m/s (visit 2)"));
@@ -130,7 +136,7 @@ TEST_CASE("The report names the worst visits and every object that left", "[sett
   CHECK_THAT(text, ContainsSubstring("visit 2: /Cameras/cam_0 stands in /Environment/lamp\n"));
   VisitReport terrible;
   for (int i = 0; i < 100; ++i) terrible.dropped.push_back({"/Assets/a", "hangs in the air"});
-  CHECK_THAT(settle_text({terrible}), ContainsSubstring("... and 61 more, in settle/\n"));
+  CHECK_THAT(text_of({terrible}), ContainsSubstring("... and 61 more, in settle/\n"));
   const auto json = nlohmann::json::parse(settle_json(wild));
   CHECK(json["rest_after_s"].is_null());
   CHECK(json["environment"] == "room.usdc");
