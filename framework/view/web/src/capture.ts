@@ -2,7 +2,7 @@
 // One picture in full: zoom to its pixels, a probe, its objects.
 import { App } from './app';
 import { CaptureLabels, FrameLabels, ObjectLabels, RunState, get, pictureAddress } from './data';
-import { button, clear, el } from './dom';
+import { button, clear, el, remake } from './dom';
 import { FramePixels, MaskStack, Motions, Numbers, View, css, drawKeypoints, drawLines, drawPicture, kLayers, overlays, skeletonOf } from './layers';
 import { replayCommand } from './pages';
 import { Player, Shot } from './player';
@@ -26,7 +26,7 @@ export class CapturePage {
   private readonly canvas = el('canvas', { class: 'big', tabindex: '0', role: 'img' });
   private readonly probe = el('div', { class: 'probe', 'aria-live': 'off' });
   private readonly head = el('div', { class: 'bar' });
-  private readonly title = el('b');
+  private readonly title = el('h1');
   private readonly panel = el('aside', { class: 'objects', 'aria-label': 'Objects' });
   private readonly space = new SpaceView((frame, object) => {
     this.app.go(frame !== null ? { frame } : { object: object ?? 0 });
@@ -168,25 +168,26 @@ export class CapturePage {
   private showHead(): void {
     const { app } = this;
     const { state } = app;
-    clear(this.head);
+    const refocus = remake(this.head, 'head');
     this.title.textContent = `Capture ${state.capture}`;
     this.head.append(
       button('← Grid', 'Back to all captures (Escape)', () => app.go({ page: 'grid' })),
-      button('‹', 'Capture before (arrow left)', () => this.step(-1)),
+      button('‹', 'Capture before (arrow left)', () => this.step(-1), { 'data-head': 'back' }),
       this.title,
-      button('›', 'Next capture (arrow right)', () => this.step(1)));
+      button('›', 'Next capture (arrow right)', () => this.step(1), { 'data-head': 'next' }));
     const cameras = el('span', { class: 'tabs', role: 'tablist', 'aria-label': 'Cameras' });
     this.capture?.frames.forEach((frame, i) => {
       cameras.append(button(frame.camera, `Camera ${frame.camera} (${i + 1})`, () => app.go({ frame: i, object: 0 }),
-        { role: 'tab', 'aria-selected': i === state.frame ? 'true' : 'false' }));
+        { role: 'tab', 'aria-selected': i === state.frame ? 'true' : 'false', 'data-head': `camera ${i}` }));
     });
     this.head.append(cameras, el('span', { class: 'words' },
       [this.capture?.phase, this.capture?.environment, this.capture?.split].filter((word) => word).join(' · ')));
     this.head.append(el('span', { class: 'right' },
-      button('Fit', 'Whole picture (0)', () => this.zoom.fit()),
-      button('1:1', 'One pixel for one (1:1)', () => this.zoom.toPixels()),
+      button('Fit', 'Whole picture (0)', () => this.zoom.fit(), { 'data-head': 'fit' }),
+      button('1:1', 'One pixel for one (1:1)', () => this.zoom.toPixels(), { 'data-head': 'pixels' }),
       app.holds.has('camera_pose') && button('3-D', 'Cameras and boxes in space (s)', () => app.go({ space: !state.space }),
-        { 'aria-pressed': state.space ? 'true' : 'false' })));
+        { 'aria-pressed': state.space ? 'true' : 'false', 'data-head': 'space' })));
+    refocus();
   }
 
   /** To another capture of those that the filters leave. */
@@ -203,7 +204,7 @@ export class CapturePage {
   private showPanel(): void {
     const { app, frame } = this;
     const scroll = this.panel.scrollTop;
-    clear(this.panel);
+    const refocus = remake(this.panel, 'object');
     // Numbers of a frame that has passed are nobody's to choose from.
     this.panel.inert = this.player.isPlaying;
     if (!frame) {
@@ -218,7 +219,7 @@ export class CapturePage {
       const dot = el('em');
       dot.style.background = css(app.palette.of(object, app.state));
       const row = button('', object.path, () => app.go({ object: isChosen ? 0 : object.id }, true),
-        { class: 'object', 'aria-pressed': isChosen ? 'true' : 'false' });
+        { class: 'object', 'aria-pressed': isChosen ? 'true' : 'false', 'data-object': object.id });
       row.append(dot, el('span', {}, object.class === '' ? object.path : object.class),
         el('small', {}, object.occlusion === undefined ? '' : percent(1 - (object.occlusion ?? 1))));
       this.panel.append(row);
@@ -241,6 +242,7 @@ export class CapturePage {
       this.panel.append(el('details', {}, el('summary', {}, 'Files'), list));
     }
     this.showFaults();
+    refocus();
     this.panel.scrollTop = scroll;
   }
 
@@ -296,6 +298,7 @@ export class CapturePage {
     if (view.scale >= 16) this.drawGrid(context, view);
     drawLines(context, frame, view, state, palette, 1, state.object);
     drawKeypoints(context, frame, view, state, palette, this.app.info.skeletons, 1);
+    this.zoom.drawPixel(context);
     this.canvas.setAttribute('aria-label', `Capture ${state.capture}, ${frame.camera}: ` +
       frame.objects.filter((object) => object.box).map((object) => object.class).join(', '));
   }
@@ -334,6 +337,7 @@ export class CapturePage {
 
   private showProbe(): void {
     clear(this.probe);
+    this.probe.setAttribute('aria-live', this.zoom.isByKeys ? 'polite' : 'off');
     if (!this.frame || !this.pixels || !this.pointer) {
       this.probe.append(el('span', {}, 'Point at a pixel. Wheel zooms, drag moves, click chooses, ? lists all keys.'));
       return;
@@ -400,16 +404,18 @@ export class CapturePage {
     const { app } = this;
     const frames = this.capture?.frames.length ?? 0;
     const digit = /^[1-9]$/.test(event.key) ? Number(event.key) - 1 : -1;
+    if (event.shiftKey && this.zoom.press(event)) return true;
     if (digit >= 0 && digit < frames) app.go({ frame: digit, object: 0 });
     else if (event.key === 'ArrowLeft') this.step(-1);
     else if (event.key === 'ArrowRight') this.step(1);
     else if (event.key === 'ArrowUp') this.cycle(-1);
     else if (event.key === 'ArrowDown') this.cycle(1);
+    else if (event.key === 'Enter' && event.target === this.canvas) this.choose();
     else if (event.key === 'z') this.zoomToObject();
     else if (event.key === 's') app.go({ space: !app.state.space });
     else if (this.player.press(event.key)) return true;
     else if (event.key === 'Escape') app.go(app.state.object !== 0 ? { object: 0 } : { page: 'grid' });
-    else return this.zoom.press(event.key);
+    else return this.zoom.press(event);
     return true;
   }
 }
@@ -420,11 +426,12 @@ export const kKeys: [string, string][] = [
   ['[  ]', 'Overlays fainter, stronger'],
   ['← →', 'Capture before, next one (of those that the filters leave)'],
   ['↑ ↓', 'Through the labels under the pointer, or all'],
+  ['Shift ← → ↑ ↓', 'Points at a pixel; Enter in the picture chooses what is there'],
   ['1 … 9', 'Camera'],
   ['+ −  wheel', 'Zoom'],
   ['0', 'Whole picture'],
   ['space', 'Plays a clip, or stops it'],
-  [',  .', 'Frame of a clip before, next one'],
+  [',  .', 'Frame of a clip before, next one; divider of a comparison to the left, right'],
   ['<  >', 'Plays slower, faster'],
   ['Home End', 'First and last frame of a clip'],
   ['z', 'Zoom to the chosen object'],

@@ -321,7 +321,7 @@ export class RunPage {
   private showWorkers(run: RunState): void {
     const rows = (run.workers ?? []).map((worker) => [worker.name, worker.role, worker.role === '' ? 'ended' : worker.is_alive ? 'alive' : 'dead',
       worker.captures.toLocaleString('en'), worker.memory_bytes > 0 ? `${(worker.memory_bytes / 2 ** 20).toFixed(0)} MiB` : '', worker.description]);
-    if (rows.length > 0) this.element.append(el('h2', {}, 'Workers'), table(['Name', 'Role', 'State', 'Captures', 'Memory', ''], rows));
+    if (rows.length > 0) this.element.append(el('h2', {}, 'Workers'), table(['Name', 'Role', 'State', 'Captures', 'Memory', 'What it is'], rows));
   }
 
   /** Which conditions the views that were drawn did not hold. */
