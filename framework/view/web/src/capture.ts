@@ -208,12 +208,12 @@ export class CapturePage {
     // Numbers of a frame that has passed are nobody's to choose from.
     this.panel.inert = this.player.isPlaying;
     if (!frame) {
-      this.panel.append(el('h3', {}, 'No picture'));
+      this.panel.append(el('h2', {}, 'No picture'));
       this.showFaults();
       return;
     }
     const seen = frame.objects.filter((object) => object.box);
-    this.panel.append(el('h3', {}, 'Objects', el('small', {}, `${seen.length} in the picture, ${frame.objects.length} in all`)));
+    this.panel.append(el('h2', {}, 'Objects', el('small', {}, `${seen.length} in the picture, ${frame.objects.length} in all`)));
     for (const object of [...seen].sort((a, b) => this.area(b) - this.area(a))) {
       const isChosen = object.id === app.state.object;
       const dot = el('em');
@@ -233,7 +233,7 @@ export class CapturePage {
     if (eye) add('Stands at', `${eye[3].toFixed(2)}, ${eye[7].toFixed(2)}, ${eye[11].toFixed(2)} m`);
     add('Visit', String(this.capture!.visit));
     if (this.run?.seed !== undefined) add('Seed', String(this.run.seed));
-    this.panel.append(el('h3', {}, 'Picture'), about);
+    this.panel.append(el('h2', {}, 'Picture'), about);
     if (this.run?.folder) this.panel.append(el('small', {}, 'Make it again:'), el('pre', { class: 'replay' }, replayCommand(this.run.folder, app.state.capture)));
     const files = Object.entries(frame.files ?? {});
     if (files.length > 0) {
@@ -250,7 +250,7 @@ export class CapturePage {
     const { app } = this;
     const linted = (app.lint.findingsOf(app.site, app.state.dataset) ?? []).filter((finding) => finding.capture === app.state.capture);
     if (linted.length + this.capture!.findings.length > 0) {
-      this.panel.append(el('h3', { class: 'bad' }, 'Faults'));
+      this.panel.append(el('h2', { class: 'bad' }, 'Faults'));
       // What lint has found holds what the reader has.
       for (const finding of linted.length > 0 ? linted : this.capture!.findings) {
         this.panel.append(el('p', { class: 'bad' }, `${finding.check}: ${finding.message ?? finding.found ?? ''}`));

@@ -187,7 +187,7 @@ export class ComparePage {
     const hasWhole = this.whole.want(path, generation, again);
     const scroll = this.panel.scrollTop;
     clear(this.panel);
-    this.panel.append(el('h3', {}, `Capture ${state.capture}`));
+    this.panel.append(el('h2', {}, `Capture ${state.capture}`));
     const [a, b] = this.sides!;
     if (this.difference) {
       const { pixels, most } = this.difference;
@@ -205,7 +205,7 @@ export class ComparePage {
     if (this.ofCapture.fault !== '') this.panel.append(el('p', { class: 'bad' }, this.ofCapture.fault));
     else if (!hasCapture) this.panel.append(waitingFor('Comparing …'));
     else this.panel.append(lines(this.ofCapture.value as string[], 'Nothing that both hold differs.'));
-    this.panel.append(el('h3', {}, 'All captures'));
+    this.panel.append(el('h2', {}, 'All captures'));
     if (this.whole.fault !== '') this.panel.append(el('p', { class: 'bad' }, this.whole.fault));
     else if (!hasWhole) this.panel.append(waitingFor('Every file of both is read …'));
     else this.showWhole(this.whole.value as Difference, lines);
@@ -230,7 +230,7 @@ export class ComparePage {
         el('summary', {}, 'How they were made', el('small', {}, String(found.pages.length))), lines(found.pages, '')));
     }
     const others = found.contents.filter((line) => !line.startsWith('capture '));
-    if (others.length > 0) this.panel.append(el('h3', {}, 'Contents'), lines(others, ''));
+    if (others.length > 0) this.panel.append(el('h2', {}, 'Contents'), lines(others, ''));
   }
 
   private showProbe(pixel: [number, number] | null): void {

@@ -66,7 +66,7 @@ export class FacetBar {
   }
 
   private section(app: App, facet: Facet, chosen: Chosen | null, detail: string): HTMLElement {
-    return el('section', {}, el('h3', {}, facet.title, el('small', {}, detail),
+    return el('section', {}, el('h2', {}, facet.title, el('small', {}, detail),
       chosen && button('×', `Clear the filter "${facet.title}"`, () => this.choose(app, facet, null), { class: 'plain' })));
   }
 

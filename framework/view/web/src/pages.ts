@@ -127,7 +127,7 @@ export function waitingFor(what: string): HTMLElement {
 }
 
 export class StatsPage {
-  readonly element = el('main', { class: 'page' });
+  readonly element = el('main', { class: 'page', tabindex: '0' });
   private readonly stats = new Awaited();
 
   show(app: App): void {
@@ -197,7 +197,7 @@ export class StatsPage {
 }
 
 export class FindingsPage {
-  readonly element = el('main', { class: 'page' });
+  readonly element = el('main', { class: 'page', tabindex: '0' });
 
   show(app: App): void {
     clear(this.element);
@@ -257,7 +257,7 @@ export function replayCommand(folder: string, capture: number): string {
 }
 
 export class RunPage {
-  readonly element = el('main', { class: 'page' });
+  readonly element = el('main', { class: 'page', tabindex: '0' });
   private readonly run = new Awaited();
   private began: { time: number; done: number } | null = null;
 
