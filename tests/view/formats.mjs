@@ -140,6 +140,16 @@ async function tryDataset(page, place, name) {
     await page.keyboard.press('s');
     await page.waitForTimeout(300);
     want(await page.locator('canvas.space').isVisible(), '3-D');
+    // Ids may count from picture to picture: what is chosen in one is the same in space.
+    for (let i = 0; i < boxes.length; ++i) {
+      await page.keyboard.press('ArrowDown');
+      await page.waitForTimeout(60);
+      const chosen = await page.getAttribute('.object[aria-pressed=true]', 'title');
+      const object = boxes.find((one) => one.path === chosen);
+      if (!object?.bounds) continue;
+      const label = await page.getAttribute('canvas.space', 'aria-label');
+      if (!label.includes(`chosen: ${object.class || object.path};`)) wrong.push(`${chosen} chosen in space: ${label}`);
+    }
     if (place === 0) await page.screenshot({ path: `${pictures}/${name}_space.png` });
   }
   await page.getByRole('button', { name: 'Statistics' }).click();

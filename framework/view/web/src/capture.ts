@@ -29,7 +29,7 @@ export class CapturePage {
   private readonly title = el('h1');
   private readonly panel = el('aside', { class: 'objects', 'aria-label': 'Objects' });
   private readonly space = new SpaceView((frame, object) => {
-    this.app.go(frame !== null ? { frame } : { object: object ?? 0 });
+    this.app.go({ frame, object: object ?? 0 });
   });
   private readonly player = new Player({
     shot: (capture) => this.shot(capture),
@@ -272,7 +272,8 @@ export class CapturePage {
     if (object.keypoints) add('Keypoints', `${points.length} of ${object.keypoints.length}, ${points.filter((point) => point[2] === 2).length} seen`);
     if (object.bounds) {
       const [low, high] = object.bounds;
-      add('Size', high.map((value, i) => (value - low[i]).toFixed(3)).join(' × ') + ' m');
+      const grows = (axis: number) => (object.world_from_node ? Math.hypot(...[0, 4, 8].map((row) => object.world_from_node![row + axis])) : 1);
+      add('Size', high.map((value, i) => ((value - low[i]) * grows(i)).toFixed(3)).join(' × ') + ' m');
     }
     return list;
   }
