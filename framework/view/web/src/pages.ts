@@ -109,7 +109,8 @@ export class Awaited {
       try {
         const value = await get(path);
         if (asked !== this.path) return;
-        this.value = value;
+        if (typeof value?.fault === 'string') this.fault = value.fault;
+        else this.value = value;
       } catch (error) {
         if (asked !== this.path) return;
         this.fault = (error as Error).message;
