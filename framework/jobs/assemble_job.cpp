@@ -324,10 +324,9 @@ DescribeComponent describe_from(Registry& registry) {
 }
 
 int visits_at_a_time(const JobAssembly& assembly, const HostServices& host, int asked) {
-  const int wanted =
-      asked > 0
-          ? asked
-          : default_visits_in_flight(host.thread_count(), available_memory(), memory_of(assembly));
+  const int wanted = asked > 0 ? asked
+                               : default_visits_in_flight(host.thread_count(), available_memory(),
+                                                          memory_of(assembly));
   return std::min(wanted, assembly.plan.visit_count());
 }
 

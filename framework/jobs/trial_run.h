@@ -34,9 +34,9 @@ struct TrialPicture {
 struct Estimate {
   int captures = 0;
   int visits = 0;
-  double visit_s = 0.0;    ///< Loading and simulating.
-  double capture_s = 0.0;  ///< With all of the job's samples.
-  double bytes = 0.0;      ///< On the disk.
+  double visit_s = 0.0;       ///< Loading and simulating.
+  double capture_s = 0.0;     ///< With all of the job's samples.
+  double bytes = 0.0;         ///< On the disk.
   double memory_bytes = 0.0;  ///< With so many visits at a time.
   int visits_at_a_time = 1;
 

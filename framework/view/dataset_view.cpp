@@ -106,8 +106,8 @@ fs::path folder_of_run(const fs::path& folder) {
   return run_of(plain).value_or(plain);
 }
 
-/// JSON that the page has asked for, or why there is none: files may change while they are read, and
-/// that is no reason to end.
+/// JSON that the page has asked for, or why there is none: files may change while they are read,
+/// and that is no reason to end.
 template <class Make>
 std::shared_ptr<const std::string> made_or_fault(Make&& make) {
   try {

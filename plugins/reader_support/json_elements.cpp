@@ -17,8 +17,7 @@ constexpr std::size_t kMostValueBytes = std::size_t(1) << 30;
 /// The characters of a file, one after the other.
 class Characters {
  public:
-  explicit Characters(const std::filesystem::path& file)
-      : in_(open_stored(file)), block_(kBlock) {
+  explicit Characters(const std::filesystem::path& file) : in_(open_stored(file)), block_(kBlock) {
     if (!in_) throw std::runtime_error("the file cannot be opened");
   }
 

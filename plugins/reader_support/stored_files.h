@@ -34,7 +34,8 @@ inline constexpr const char* kPartition = "pixels partition into instances";
 inline constexpr const char* kAmodal = "visible <= amodal";
 inline constexpr const char* kInImage = "labels lie in the image";
 
-/// Opens a file of a dataset; not good when it is a pipe or a device, for which a reader would wait.
+/// Opens a file of a dataset; not good when it is a pipe or a device, for which a reader would
+/// wait.
 std::ifstream open_stored(const std::filesystem::path& file);
 
 /// Whole content of a file of at most `most` bytes. Throws std::runtime_error that says why not.
