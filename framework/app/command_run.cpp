@@ -153,7 +153,8 @@ void print_plan(const GlobalOptions& global, const Value& job, const Log& log) {
 }
 
 /// The plan, then what a trial of it says. Both read the job; what they say about it is said once.
-void print_estimate(const GlobalOptions& global, const Value& job, ConsoleLog& log) {
+void print_estimate(const GlobalOptions& global, const Value& job, int visits_in_flight,
+                    ConsoleLog& log) {
   std::set<std::string, std::less<>> said;
   std::mutex mutex;
   const Log once = [&](LogLevel level, std::string_view text) {
@@ -169,6 +170,7 @@ void print_estimate(const GlobalOptions& global, const Value& job, ConsoleLog& l
   trial.is_within_visit = true;
   trial.spread = 2;
   trial.max_samples = 2;
+  trial.visits_in_flight = visits_in_flight;
   print_text(estimate_text(run_trial(global, job, trial, once)));
 }
 
@@ -204,7 +206,7 @@ int command_run(const GlobalOptions& global, const RunCommandOptions& options, C
     return 0;
   }
   if (options.dry_run) {
-    print_estimate(global, job, log);
+    print_estimate(global, job, options.visits_in_flight, log);
     return 0;
   }
   return run_value(global, job, options, log);

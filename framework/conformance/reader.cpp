@@ -151,6 +151,27 @@ std::string told(const StoredDataset& dataset, std::size_t i) {
   return fingerprint(dataset.read(i, dataset.info().holds).capture);
 }
 
+/// Amodal masks come with the objects, whether or not the pixels of these are asked for, too.
+void check_asked_alone(const StoredDataset& dataset) {
+  const NameSet& holds = dataset.info().holds;
+  const NameSet wanted{"amodal_mask", std::string(kHoldsInstances)};
+  if (!holds.contains("amodal_mask")) return;
+  for (std::size_t i = 0; i < dataset.info().captures.size(); ++i) {
+    const StoredCapture whole = dataset.read(i, holds);
+    const StoredCapture alone = dataset.read(i, wanted);
+    for (std::size_t k = 0; k < whole.capture.frames.size(); ++k) {
+      const std::vector<Instance>& instances = alone.capture.frames.at(k).instances;
+      for (const Instance& instance : whole.capture.frames[k].instances) {
+        if (!instance.visibility || instance.visibility->amodal_mask.bits.empty()) continue;
+        const auto same = std::ranges::find(instances, instance.id, &Instance::id);
+        require(same != instances.end() && same->visibility &&
+                    same->visibility->amodal_mask.bits == instance.visibility->amodal_mask.bits,
+                "gives no amodal masks when they are asked for alone");
+      }
+    }
+  }
+}
+
 /// A dataset that is read by several threads, in any order, while another one is open.
 void check_reading(const Reader& reader, const fs::path& folder,
                    const std::map<std::string, std::string>& written) {
@@ -175,6 +196,7 @@ void check_reading(const Reader& reader, const fs::path& folder,
               "gives no camera sizes when nothing is asked of a frame");
     }
   }
+  check_asked_alone(*dataset);
   constexpr int kRounds = 20;
   std::atomic<bool> is_same = true;
   for (int round = 0; round < kRounds; ++round) {

@@ -41,6 +41,57 @@ std::set<fs::path> named_folders(const fs::path& run) {
   return folders;
 }
 
+/// What folders hold, each read once: all readers together ask with dozens of patterns, of folders
+/// with hundreds of thousands of files.
+class FolderNames {
+ public:
+  bool has_file_like(const fs::path& folder, std::string_view pattern) {
+    const std::size_t cut = pattern.find('/');
+    const std::string part(pattern.substr(0, cut));
+    const bool is_last = cut == pattern.npos;
+    const auto holds_rest = [&](const std::string& name) {
+      return has_file_like(folder / name, pattern.substr(cut + 1));
+    };
+    if (part.find('*') == part.npos) {
+      std::error_code error;
+      return is_last ? fs::is_regular_file(folder / part, error) : holds_rest(part);
+    }
+    // Most names differ before or after what the stars stand for, which is cheap to see.
+    constexpr const char* kSpecial = "*?[]\\";
+    const std::string_view front = std::string_view(part).substr(0, part.find_first_of(kSpecial));
+    const std::string_view back = std::string_view(part).substr(part.find_last_of(kSpecial) + 1);
+    return std::ranges::any_of(of(folder), [&](const Name& each) {
+      return each.is_folder == !is_last && each.name.starts_with(front) &&
+             each.name.ends_with(back) &&
+             fnmatch(part.c_str(), each.name.c_str(), FNM_PERIOD) == 0 &&
+             (is_last || holds_rest(each.name));
+    });
+  }
+
+ private:
+  /// Of a file or a folder.
+  struct Name {
+    std::string name;
+    bool is_folder = false;
+  };
+
+  const std::vector<Name>& of(const fs::path& folder) {
+    const auto [place, is_new] = names_.try_emplace(folder);
+    if (!is_new) return place->second;
+    std::vector<Name>& names = place->second;
+    std::error_code error;
+    for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
+      std::error_code ignored;
+      const bool is_folder = at->is_directory(ignored);
+      if (!is_folder && !at->is_regular_file(ignored)) continue;
+      names.push_back({at->path().filename().string(), is_folder});
+    }
+    return names;
+  }
+
+  std::map<fs::path, std::vector<Name>> names_;  ///< Grows while others of it are looked through.
+};
+
 }  // namespace
 
 std::vector<fs::path> folders_of_run(const fs::path& run) {
@@ -55,23 +106,7 @@ std::vector<fs::path> folders_of_run(const fs::path& run) {
 }
 
 bool has_file_like(const fs::path& folder, std::string_view pattern) {
-  const std::size_t cut = pattern.find('/');
-  const std::string part(pattern.substr(0, cut));
-  std::error_code error;
-  if (part.find('*') == part.npos) {
-    return cut == pattern.npos ? fs::is_regular_file(folder / part, error)
-                               : has_file_like(folder / part, pattern.substr(cut + 1));
-  }
-  for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
-    if (fnmatch(part.c_str(), at->path().filename().c_str(), FNM_PERIOD) != 0) continue;
-    std::error_code ignored;
-    if (cut == pattern.npos
-            ? at->is_regular_file(ignored)
-            : at->is_directory(ignored) && has_file_like(at->path(), pattern.substr(cut + 1))) {
-      return true;
-    }
-  }
-  return false;
+  return FolderNames().has_file_like(folder, pattern);
 }
 
 DatasetReaders::DatasetReaders(Registry& registry, Host& host) {
@@ -106,9 +141,11 @@ Reader& DatasetReaders::reader(const Entry& entry) {
 std::string DatasetReaders::recognise(const fs::path& folder) {
   Recognition best = Recognition::No;
   std::vector<std::string> found;
+  FolderNames names;
   for (const Entry& entry : entries_) {
-    const bool may_be = std::ranges::any_of(
-        entry.patterns, [&](const std::string& pattern) { return has_file_like(folder, pattern); });
+    const bool may_be = std::ranges::any_of(entry.patterns, [&](const std::string& pattern) {
+      return names.has_file_like(folder, pattern);
+    });
     if (!may_be) continue;
     const Recognition said =
         call_component(reader_name(entry.type), [&] { return reader(entry).recognise(folder); });

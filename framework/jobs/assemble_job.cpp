@@ -323,6 +323,13 @@ DescribeComponent describe_from(Registry& registry) {
   };
 }
 
+int visits_at_a_time(const JobAssembly& assembly, const HostServices& host, int asked) {
+  const int wanted = asked > 0 ? asked
+                               : default_visits_in_flight(host.thread_count(), available_memory(),
+                                                          memory_of(assembly));
+  return std::min(wanted, assembly.plan.visit_count());
+}
+
 CaptureMemory memory_of(const JobAssembly& assembly) {
   const JobComponents& parts = assembly.components;
   const VisitComponents& set = parts.sets.front();
@@ -425,12 +432,8 @@ JobAssembly assemble_job(const Value& value, Registry& registry, HostServices& h
       },
       assets_root, host);
   assembly.dataset_json = dataset_json(assembly.dataset, assembly.job);
-  if (visits_in_flight == 0) {
-    visits_in_flight =
-        default_visits_in_flight(host.thread_count(), available_memory(), memory_of(assembly));
-  }
-  visits_in_flight = std::min(visits_in_flight, assembly.plan.visit_count());
-  for (int i = 1; i < visits_in_flight; ++i) add_set(assembler, assembly);
+  const int sets = visits_at_a_time(assembly, host, visits_in_flight);
+  for (int i = 1; i < sets; ++i) add_set(assembler, assembly);
   return assembly;
 }
 

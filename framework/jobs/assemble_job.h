@@ -49,6 +49,10 @@ JobAssembly assemble_job(const Value& job, Registry& registry, HostServices& hos
                          const std::string& program_version, AssembleFor purpose,
                          int visits_in_flight = 0);
 
+/// How many visits a run of it makes at a time when so many are asked for; 0: as
+/// default_visits_in_flight() says.
+int visits_at_a_time(const JobAssembly& assembly, const HostServices& host, int asked = 0);
+
 /// Of the job's cameras and what its writers need.
 CaptureMemory memory_of(const JobAssembly& assembly);
 

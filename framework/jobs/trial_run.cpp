@@ -120,6 +120,13 @@ double more_paths_s(const RenderReport& report, double rendering_s, double facto
   return rendering_s * (factor - 1.0);
 }
 
+/// The most that this process has had.
+double peak_memory_bytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return double(usage.ru_maxrss) * 1024.0;
+}
+
 Estimate estimate_of(const RunSummary& summary, const CapturePlan& plan, const RenderReport& report,
                      double samples_factor) {
   Estimate estimate;
@@ -138,9 +145,6 @@ Estimate estimate_of(const RunSummary& summary, const CapturePlan& plan, const R
   estimate.capture_s =
       per_capture / captures + cameras * more_paths_s(report, picture_s, samples_factor);
   estimate.bytes = double(summary.bytes_written) / captures * estimate.captures;
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  estimate.memory_bytes = double(usage.ru_maxrss) * 1024.0;
   return estimate;
 }
 
@@ -197,6 +201,7 @@ Trial run_trial(const GlobalOptions& global, const Value& given, const TrialOpti
   run.only = chosen_captures(options, assembly.plan);
   trial.captures = int(run.only->size());
   const KeepPictures keep(trial.pictures);
+  const double before_visits = peak_memory_bytes();
   const RunSummary summary = run_in_memory(assembly, *services.host, run);
   std::ranges::sort(trial.pictures, {}, [](const TrialPicture& picture) {
     return std::pair(picture.capture, std::string_view(picture.camera));
@@ -205,6 +210,11 @@ Trial run_trial(const GlobalOptions& global, const Value& given, const TrialOpti
   const double factor = trial.samples > 0 ? double(trial.job_samples) / trial.samples : 1.0;
   trial.estimate = estimate_of(summary, assembly.plan,
                                assembly.components.sets.front().renderer->report(), factor);
+  // Each visit has a scene and components of its own; the trial made one visit at a time.
+  trial.estimate.visits_at_a_time =
+      visits_at_a_time(assembly, *services.host, options.visits_in_flight);
+  trial.estimate.memory_bytes =
+      before_visits + trial.estimate.visits_at_a_time * (peak_memory_bytes() - before_visits);
   return trial;
 }
 
@@ -224,7 +234,7 @@ std::string estimate_text(const Trial& trial) {
   text += " (" + counted(estimate.visits, "visit") + " of " + long_duration_text(estimate.visit_s) +
           ", " + long_duration_text(estimate.capture_s) + " a capture), ";
   return text + size_text(estimate.bytes) + " on disk, " + size_text(estimate.memory_bytes) +
-         " of memory for one visit at a time\n";
+         " of memory for " + counted(estimate.visits_at_a_time, "visit") + " at a time\n";
 }
 
 }  // namespace diorama

@@ -20,6 +20,7 @@ struct TrialOptions {
   bool is_within_visit = false;  ///< Spread over the first visit only.
   int max_samples = 4;           ///< Paths per pixel at most, where the renderer has `samples`.
   bool keeps_pictures = false;
+  int visits_in_flight = 0;  ///< Of the run that is estimated; see visits_at_a_time().
 };
 
 struct TrialPicture {
@@ -33,10 +34,11 @@ struct TrialPicture {
 struct Estimate {
   int captures = 0;
   int visits = 0;
-  double visit_s = 0.0;    ///< Loading and simulating.
-  double capture_s = 0.0;  ///< With all of the job's samples.
-  double bytes = 0.0;      ///< On the disk.
-  double memory_bytes = 0.0;
+  double visit_s = 0.0;       ///< Loading and simulating.
+  double capture_s = 0.0;     ///< With all of the job's samples.
+  double bytes = 0.0;         ///< On the disk.
+  double memory_bytes = 0.0;  ///< With so many visits at a time.
+  int visits_at_a_time = 1;
 
   double seconds() const { return visits * visit_s + captures * capture_s; }
 };

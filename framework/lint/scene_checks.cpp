@@ -19,6 +19,7 @@
 #include "framework/config/json_text.h"
 #include "framework/datasets/capture_sweep.h"
 #include "framework/datasets/check_names.h"
+#include "framework/host/regular_file.h"
 #include "framework/lint/support_check.h"
 #include "framework/pipeline/scene_setup.h"
 #include "framework/pipeline/settling.h"
@@ -91,7 +92,7 @@ std::vector<PlacedNode> placed_nodes(const Json& list) {
 
 /// Nothing when the file is of a program that did not write where things stood.
 std::optional<VisitRecord> read_record(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
+  std::ifstream in = open_regular_file(file);
   std::ostringstream text;
   text << in.rdbuf();
   const Json json = parse_json(text.str());

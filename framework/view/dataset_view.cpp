@@ -106,9 +106,22 @@ fs::path folder_of_run(const fs::path& folder) {
   return run_of(plain).value_or(plain);
 }
 
-std::optional<DatasetStatus> status_of_run(const fs::path& folder) {
-  if (page_of_run(folder).empty()) return std::nullopt;
+/// JSON that the page has asked for, or why there is none: files may change while they are read,
+/// and that is no reason to end.
+template <class Make>
+std::shared_ptr<const std::string> made_or_fault(Make&& make) {
   try {
+    return std::make_shared<const std::string>(make());
+  } catch (const Stopped&) {
+    throw;
+  } catch (const Error& error) {
+    return std::make_shared<const std::string>(json_text({{"fault", error.what()}}));
+  }
+}
+
+std::optional<DatasetStatus> status_of_run(const fs::path& folder) {
+  try {
+    if (page_of_run(folder).empty()) return std::nullopt;
     LocalFileSystem file_system;
     return read_status(file_system, folder_of_run(folder), false);
   } catch (const Error&) {
@@ -335,7 +348,7 @@ bool DatasetView::brighten_some(Opened& opened) {
 
 bool DatasetView::make_stats(Opened& opened) {
   if (!opened.wants_stats.exchange(false)) return false;
-  auto text = std::make_shared<const std::string>(stats_json(dataset_stats(*opened.whole, host_)));
+  auto text = made_or_fault([&] { return stats_json(dataset_stats(*opened.whole, host_)); });
   const std::lock_guard lock(opened.mutex);
   opened.stats = std::move(text);
   return true;
@@ -343,17 +356,10 @@ bool DatasetView::make_stats(Opened& opened) {
 
 bool DatasetView::make_findings() {
   if (!wants_findings_) return false;
-  std::string text;
-  try {
-    text = lint_json(lint_datasets(options_.folder, readers_, host_, options_.reader));
-  } catch (const Stopped&) {
-    throw;
-  } catch (const Error& error) {
-    // Of a run that has nothing to read yet, or is just writing it: no reason to end.
-    text = json_text({{"fault", error.what()}});
-  }
+  auto text = made_or_fault(
+      [&] { return lint_json(lint_datasets(options_.folder, readers_, host_, options_.reader)); });
   const std::lock_guard lock(mutex_);
-  findings_ = std::make_shared<const std::string>(std::move(text));
+  findings_ = std::move(text);
   wants_findings_ = false;
   return true;
 }
@@ -375,12 +381,14 @@ bool DatasetView::make_comparison() {
   }
   const Opened& a = *all->at(asked.first);
   const Opened& b = *all->at(asked.second);
-  const DatasetDifference difference =
-      dataset_difference({a.folder, *a.whole}, {b.folder, *b.whole}, options_.tolerance, host_);
-  auto text = std::make_shared<const std::string>(json_text({{"pages", difference.pages},
-                                                             {"contents", difference.contents},
-                                                             {"captures", difference.captures},
-                                                             {"differing", difference.differing}}));
+  auto text = made_or_fault([&] {
+    const DatasetDifference difference =
+        dataset_difference({a.folder, *a.whole}, {b.folder, *b.whole}, options_.tolerance, host_);
+    return json_text({{"pages", difference.pages},
+                      {"contents", difference.contents},
+                      {"captures", difference.captures},
+                      {"differing", difference.differing}});
+  });
   const std::lock_guard lock(mutex_);
   if (all == datasets_) comparisons_[asked] = std::move(text);
   return true;
@@ -455,7 +463,12 @@ HttpAnswer DatasetView::state() const {
 
 HttpAnswer DatasetView::run_answer() {
   OrderedJson json = OrderedJson::object();
-  const OrderedJson page = parse_json_or_nothing<OrderedJson>(page_of_run(options_.folder));
+  OrderedJson page;
+  try {
+    page = parse_json_or_nothing<OrderedJson>(page_of_run(options_.folder));
+  } catch (const Error& error) {
+    host_.log(LogLevel::Debug, error.what());  // it was readable when the view began
+  }
   if (page.is_object()) {
     json["folder"] = folder_of_run(options_.folder).string();
     for (const char* key : {"seed", "version", "job", "plugins"}) {

@@ -37,8 +37,9 @@ namespace diorama {
 ///   /api/state                              which datasets, how far each is indexed
 ///   /api/run  /api/lint                     what dataset.json and the journals say; findings,
 ///                                           or why there are none: {"fault": TEXT}
-///   /api/D/info  /api/D/stats               one dataset
-///   /api/D/compare/E                        in what dataset E differs from D; of all captures
+///   /api/D/info  /api/D/stats               one dataset; stats may be {"fault": TEXT}, too
+///   /api/D/compare/E                        in what dataset E differs from D; of all captures, or
+///                                           a fault, as of /api/D/stats
 ///   /api/D/compare/E/N                      the same, of capture number N
 ///   /api/D/index/FROM                       CaptureIndex::json(), kIndexPart captures
 ///   /api/D/brightness/FROM                  CaptureIndex::brightness_json(), the same

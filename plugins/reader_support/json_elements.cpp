@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include "reader_support/stored_files.h"
+
 namespace diorama {
 namespace {
 
@@ -15,8 +17,7 @@ constexpr std::size_t kMostValueBytes = std::size_t(1) << 30;
 /// The characters of a file, one after the other.
 class Characters {
  public:
-  explicit Characters(const std::filesystem::path& file)
-      : in_(file, std::ios::binary), block_(kBlock) {
+  explicit Characters(const std::filesystem::path& file) : in_(open_stored(file)), block_(kBlock) {
     if (!in_) throw std::runtime_error("the file cannot be opened");
   }
 
@@ -167,7 +168,7 @@ void visit_json_file(const std::filesystem::path& file, const JsonVisitor& visit
 }
 
 std::string read_span(const std::filesystem::path& file, JsonSpan span) {
-  std::ifstream in(file, std::ios::binary);
+  std::ifstream in = open_stored(file);
   in.seekg(std::streamoff(span.offset));
   std::string text(span.length, '\0');
   in.read(text.data(), std::streamsize(text.size()));

@@ -15,6 +15,14 @@ namespace diorama {
 
 namespace fs = std::filesystem;
 
+std::ifstream open_stored(const fs::path& file) {
+  std::error_code error;
+  if (fs::is_regular_file(file, error)) return std::ifstream(file, std::ios::binary);
+  std::ifstream refused;
+  refused.setstate(std::ios::failbit);
+  return refused;
+}
+
 std::string read_whole_file(const fs::path& file, std::uintmax_t most) {
   std::error_code error;
   if (!fs::is_regular_file(file, error)) throw std::runtime_error("the file is not there");
@@ -25,7 +33,7 @@ std::string read_whole_file(const fs::path& file, std::uintmax_t most) {
                              std::to_string(most) + " are read");
   }
   std::string content(std::size_t(size), '\0');
-  std::ifstream in(file, std::ios::binary);
+  std::ifstream in = open_stored(file);
   in.read(content.data(), std::streamsize(size));
   if (!in && size > 0) throw std::runtime_error("cannot be read");
   return content;

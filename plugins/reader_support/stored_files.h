@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <fstream>
 #include <functional>
 #include <limits>
 #include <memory>
@@ -32,6 +33,10 @@ inline constexpr const char* kBox = "box = extent of mask";
 inline constexpr const char* kPartition = "pixels partition into instances";
 inline constexpr const char* kAmodal = "visible <= amodal";
 inline constexpr const char* kInImage = "labels lie in the image";
+
+/// Opens a file of a dataset; not good when it is a pipe or a device, for which a reader would
+/// wait.
+std::ifstream open_stored(const std::filesystem::path& file);
 
 /// Whole content of a file of at most `most` bytes. Throws std::runtime_error that says why not.
 std::string read_whole_file(const std::filesystem::path& file,

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "reader_support/dataset_page.h"
+#include "reader_support/stored_files.h"
 #include "writer_bop/point_diameter.h"
 
 namespace diorama {
@@ -41,7 +42,7 @@ PlyMeasures measure_ply(const std::filesystem::path& file) {
   constexpr std::string_view kEnd = "\nend_header\n";
   constexpr std::size_t kVertex = 27;
   constexpr std::size_t kFace = 13;
-  std::ifstream in(file, std::ios::binary);
+  std::ifstream in = open_stored(file);
   std::string front(4096, '\0');
   in.read(front.data(), std::streamsize(front.size()));
   front.resize(std::size_t(in.gcount()));

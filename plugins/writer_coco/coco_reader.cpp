@@ -272,7 +272,9 @@ class CocoImageReading : private FrameReading {
   }
 
   void read_annotations() {
-    const bool wants_masks = wanted_.contains(kInstanceId.name);
+    const auto wants = [&](std::string_view name) { return wanted_.contains(name); };
+    const bool wants_masks =
+        wants(kInstanceId.name) || wants("amodal_mask") || wants("occlusion_order");
     for (std::uint32_t i = 0; i < entry_.annotation_count; ++i) {
       files_.reading(part_.file, [&] {
         const JsonSpan span = dataset_.tables_.annotations[entry_.first_annotation + i];
@@ -310,7 +312,8 @@ class CocoImageReading : private FrameReading {
     if (wants_masks && json.contains("segmentation")) {
       mask = read_mask(json, who);
       read_amodal(json, who, mask, instance);
-    } else if (wanted_.contains(kHoldsOcclusion) || wanted_.contains(kHoldsTruncation)) {
+    } else if (wanted_.contains(kHoldsOcclusion) || wanted_.contains(kHoldsTruncation) ||
+               wanted_.contains(kHoldsAmodalBoxes)) {
       read_shares(json, instance);
     }
     if (category != part_.categories.end()) {

@@ -4,6 +4,8 @@
 #include <fstream>
 #include <stdexcept>
 
+#include "reader_support/stored_files.h"
+
 namespace diorama {
 namespace {
 
@@ -24,7 +26,7 @@ Json value_of(const std::string& field) {
 }  // namespace
 
 void visit_rows(const std::filesystem::path& file, bool is_csv, const RowVisitor& visit) {
-  std::ifstream in(file, std::ios::binary);
+  std::ifstream in = open_stored(file);
   if (!in) throw std::runtime_error("cannot be read");
   std::vector<char> block(std::size_t(1) << 20);
   std::string row;
@@ -55,7 +57,7 @@ void visit_rows(const std::filesystem::path& file, bool is_csv, const RowVisitor
 }
 
 std::string read_row(const std::filesystem::path& file, RowSpan span) {
-  std::ifstream in(file, std::ios::binary);
+  std::ifstream in = open_stored(file);
   in.seekg(std::streamoff(span.offset));
   std::string row(span.length, '\0');
   in.read(row.data(), std::streamsize(row.size()));

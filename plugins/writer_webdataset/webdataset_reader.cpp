@@ -19,6 +19,7 @@
 #include "reader_support/label_text.h"
 #include "reader_support/listed_boxes.h"
 #include "reader_support/picture_list.h"
+#include "reader_support/stored_files.h"
 #include "writer_webdataset/tar_walk.h"
 
 namespace diorama {
@@ -122,7 +123,7 @@ class WebDataset final : public StoredDataset {
 
   void scan(std::uint32_t shard, StoredFiles& files) {
     const std::string& file = shards_[shard];
-    std::ifstream in(folder_ / file, std::ios::binary);
+    std::ifstream in = open_stored(folder_ / file);
     std::error_code error;
     const std::uintmax_t size = fs::file_size(folder_ / file, error);
     ++log_.files;
@@ -323,7 +324,7 @@ class WebDataset final : public StoredDataset {
   template <class Wanted>
   std::map<std::string, std::string> load(const Sample& sample, std::string& key,
                                           Wanted&& is_wanted) const {
-    std::ifstream in(folder_ / shards_[sample.shard], std::ios::binary);
+    std::ifstream in = open_stored(folder_ / shards_[sample.shard]);
     std::error_code error;
     const std::uintmax_t size = fs::file_size(folder_ / shards_[sample.shard], error);
     if (!in || error) throw std::runtime_error("cannot be read");

@@ -75,7 +75,9 @@ TEST_CASE("A preview shows the pictures of the run", "[preview]") {
 TEST_CASE("A dry run estimates and leaves nothing", "[preview]") {
   const TemporaryFolder folder;
   write_file(folder / "job.yaml", kJob);
-  const Outcome dry = run({"run", "job.yaml", "--dry-run", "--output", "out"}, folder.path());
+  const Outcome dry =
+      run({"run", "job.yaml", "--dry-run", "--output", "out", "--visits-in-flight", "2"},
+          folder.path());
   INFO(dry.errors);
   REQUIRE(dry.exit_code == 0);
   CHECK(files_below(folder.path()).size() == 1);  // the job
@@ -86,7 +88,7 @@ TEST_CASE("A dry run estimates and leaves nothing", "[preview]") {
       std::regex(
           "estimate from 2 captures with 2 of 16 samples: 7 captures in [0-9.]+ s or less on "
           "[0-9]+ threads?, the disk not counted \\(3 visits of [0-9.]+ s, [0-9.]+ s a capture\\), "
-          "([0-9]+) kB on disk, [0-9]+ MB of memory for one visit at a time\n")));
+          "([0-9]+) kB on disk, [0-9]+ MB of memory for 2 visits at a time\n")));
 
   REQUIRE(run({"run", "job.yaml", "--output", "out"}, folder.path()).exit_code == 0);
   double size = 0.0;

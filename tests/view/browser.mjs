@@ -136,7 +136,7 @@ async function oddPage(odd) {
   await page.goto(address);
   await page.waitForSelector('.card a.picture');
   await page.locator('.card a.picture').first().click();
-  await page.waitForSelector('.capture:not([hidden]) .objects h3');
+  await page.waitForSelector('.capture:not([hidden]) .objects h2');
   return page;
 }
 
@@ -148,7 +148,7 @@ async function tryOddClips() {
       !(await page.locator('.capture:not([hidden]) .objects').evaluate((panel) => panel.inert));
     await page.goto(page.url() + (page.url().includes('?') ? '&' : '?') + 'play=1');
     await page.reload();
-    await page.waitForSelector('.capture:not([hidden]) .objects h3');
+    await page.waitForSelector('.capture:not([hidden]) .objects h2');
     await page.waitForTimeout(300);
     check(await isStill(), `an address that plays what is no clip shows it (${kind})`);
     await page.keyboard.press(' ');
@@ -208,11 +208,11 @@ try {
   await same.close();
   await page.screenshot({ path: `${pictures}/grid_filtered.png` });
   await page.getByRole('button', { name: 'Clear all filters' }).first().click();
-  const titles = await page.locator('.facets section h3').evaluateAll((heads) => heads.map((head) => head.firstChild.textContent));
+  const titles = await page.locator('.facets section h2').evaluateAll((heads) => heads.map((head) => head.firstChild.textContent));
   console.log(`       facets: ${titles.join(', ')}`);
   const number = async () => Number((await page.textContent('.total b')).replaceAll(',', ''));
   for (const section of await page.locator('.facets section:has(svg.bars)').all()) {
-    const title = await section.locator('h3').evaluate((head) => head.firstChild.textContent);
+    const title = await section.locator('h2').evaluate((head) => head.firstChild.textContent);
     const bars = await section.locator('svg.bars').boundingBox();
     await section.scrollIntoViewIfNeeded();
     const place = await section.locator('svg.bars').boundingBox();
@@ -378,12 +378,12 @@ try {
     await page.waitForTimeout(500);
     check(page.url() !== place && page.url().includes('mode=difference'), 'arrow right goes to the next capture that differs');
     await page.reload();
-    await page.waitForSelector('.capture:not([hidden]) .objects h3');
+    await page.waitForSelector('.capture:not([hidden]) .objects h2');
     check(page.url().includes('mode=difference'), 'the address of a comparison opens again');
     await page.keyboard.press('Escape');
     check(page.url().includes('#/grid'), 'escape leaves the comparison');
     await page.goBack();
-    await page.waitForSelector('.capture:not([hidden]) .objects h3');
+    await page.waitForSelector('.capture:not([hidden]) .objects h2');
     check(page.url().includes('#/compare/'), 'and back comes back');
   }
 

@@ -483,6 +483,20 @@ TEST_CASE("A run that has nothing to read yet cannot be checked, and makes no re
   CHECK_FALSE(std::filesystem::exists(folder.path("report")));
 }
 
+TEST_CASE("Files that change under the page end nothing", "[view]") {
+  Viewed viewed({}, true);
+  std::filesystem::create_directories(viewed.folder.path("dataset.json"));
+  for (const char* asked : {"/api/lint", "/api/0/stats", "/api/0/compare/1"}) {
+    INFO(asked);
+    CHECK(viewed.answer(asked).status == 202);
+    CHECK_NOTHROW(viewed.view->work());
+    CHECK(viewed.answer(asked).status == 200);
+  }
+  CHECK_THAT(viewed.json("/api/0/compare/1").value("fault", ""),
+             ContainsSubstring("no regular file"));
+  CHECK(viewed.answer("/api/run").status == 200);
+}
+
 TEST_CASE("What cannot be checked is told, and nothing else ends", "[view]") {
   Viewed viewed;
   const std::filesystem::path out = viewed.folder.path("report");

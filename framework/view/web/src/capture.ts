@@ -2,7 +2,7 @@
 // One picture in full: zoom to its pixels, a probe, its objects.
 import { App } from './app';
 import { CaptureLabels, FrameLabels, ObjectLabels, RunState, get, pictureAddress } from './data';
-import { button, clear, el } from './dom';
+import { button, clear, el, remake } from './dom';
 import { FramePixels, MaskStack, Motions, Numbers, View, css, drawKeypoints, drawLines, drawPicture, kLayers, overlays, skeletonOf } from './layers';
 import { replayCommand } from './pages';
 import { Player, Shot } from './player';
@@ -26,10 +26,10 @@ export class CapturePage {
   private readonly canvas = el('canvas', { class: 'big', tabindex: '0', role: 'img' });
   private readonly probe = el('div', { class: 'probe', 'aria-live': 'off' });
   private readonly head = el('div', { class: 'bar' });
-  private readonly title = el('b');
+  private readonly title = el('h1');
   private readonly panel = el('aside', { class: 'objects', 'aria-label': 'Objects' });
   private readonly space = new SpaceView((frame, object) => {
-    this.app.go(frame !== null ? { frame } : { object: object ?? 0 });
+    this.app.go({ frame, object: object ?? 0 });
   });
   private readonly player = new Player({
     shot: (capture) => this.shot(capture),
@@ -168,25 +168,26 @@ export class CapturePage {
   private showHead(): void {
     const { app } = this;
     const { state } = app;
-    clear(this.head);
+    const refocus = remake(this.head, 'head');
     this.title.textContent = `Capture ${state.capture}`;
     this.head.append(
       button('← Grid', 'Back to all captures (Escape)', () => app.go({ page: 'grid' })),
-      button('‹', 'Capture before (arrow left)', () => this.step(-1)),
+      button('‹', 'Capture before (arrow left)', () => this.step(-1), { 'data-head': 'back' }),
       this.title,
-      button('›', 'Next capture (arrow right)', () => this.step(1)));
+      button('›', 'Next capture (arrow right)', () => this.step(1), { 'data-head': 'next' }));
     const cameras = el('span', { class: 'tabs', role: 'tablist', 'aria-label': 'Cameras' });
     this.capture?.frames.forEach((frame, i) => {
       cameras.append(button(frame.camera, `Camera ${frame.camera} (${i + 1})`, () => app.go({ frame: i, object: 0 }),
-        { role: 'tab', 'aria-selected': i === state.frame ? 'true' : 'false' }));
+        { role: 'tab', 'aria-selected': i === state.frame ? 'true' : 'false', 'data-head': `camera ${i}` }));
     });
     this.head.append(cameras, el('span', { class: 'words' },
       [this.capture?.phase, this.capture?.environment, this.capture?.split].filter((word) => word).join(' · ')));
     this.head.append(el('span', { class: 'right' },
-      button('Fit', 'Whole picture (0)', () => this.zoom.fit()),
-      button('1:1', 'One pixel for one (1:1)', () => this.zoom.toPixels()),
+      button('Fit', 'Whole picture (0)', () => this.zoom.fit(), { 'data-head': 'fit' }),
+      button('1:1', 'One pixel for one (1:1)', () => this.zoom.toPixels(), { 'data-head': 'pixels' }),
       app.holds.has('camera_pose') && button('3-D', 'Cameras and boxes in space (s)', () => app.go({ space: !state.space }),
-        { 'aria-pressed': state.space ? 'true' : 'false' })));
+        { 'aria-pressed': state.space ? 'true' : 'false', 'data-head': 'space' })));
+    refocus();
   }
 
   /** To another capture of those that the filters leave. */
@@ -203,22 +204,22 @@ export class CapturePage {
   private showPanel(): void {
     const { app, frame } = this;
     const scroll = this.panel.scrollTop;
-    clear(this.panel);
+    const refocus = remake(this.panel, 'object');
     // Numbers of a frame that has passed are nobody's to choose from.
     this.panel.inert = this.player.isPlaying;
     if (!frame) {
-      this.panel.append(el('h3', {}, 'No picture'));
+      this.panel.append(el('h2', {}, 'No picture'));
       this.showFaults();
       return;
     }
     const seen = frame.objects.filter((object) => object.box);
-    this.panel.append(el('h3', {}, 'Objects', el('small', {}, `${seen.length} in the picture, ${frame.objects.length} in all`)));
+    this.panel.append(el('h2', {}, 'Objects', el('small', {}, `${seen.length} in the picture, ${frame.objects.length} in all`)));
     for (const object of [...seen].sort((a, b) => this.area(b) - this.area(a))) {
       const isChosen = object.id === app.state.object;
       const dot = el('em');
       dot.style.background = css(app.palette.of(object, app.state));
       const row = button('', object.path, () => app.go({ object: isChosen ? 0 : object.id }, true),
-        { class: 'object', 'aria-pressed': isChosen ? 'true' : 'false' });
+        { class: 'object', 'aria-pressed': isChosen ? 'true' : 'false', 'data-object': object.id });
       row.append(dot, el('span', {}, object.class === '' ? object.path : object.class),
         el('small', {}, object.occlusion === undefined ? '' : percent(1 - (object.occlusion ?? 1))));
       this.panel.append(row);
@@ -232,7 +233,7 @@ export class CapturePage {
     if (eye) add('Stands at', `${eye[3].toFixed(2)}, ${eye[7].toFixed(2)}, ${eye[11].toFixed(2)} m`);
     add('Visit', String(this.capture!.visit));
     if (this.run?.seed !== undefined) add('Seed', String(this.run.seed));
-    this.panel.append(el('h3', {}, 'Picture'), about);
+    this.panel.append(el('h2', {}, 'Picture'), about);
     if (this.run?.folder) this.panel.append(el('small', {}, 'Make it again:'), el('pre', { class: 'replay' }, replayCommand(this.run.folder, app.state.capture)));
     const files = Object.entries(frame.files ?? {});
     if (files.length > 0) {
@@ -241,6 +242,7 @@ export class CapturePage {
       this.panel.append(el('details', {}, el('summary', {}, 'Files'), list));
     }
     this.showFaults();
+    refocus();
     this.panel.scrollTop = scroll;
   }
 
@@ -248,7 +250,7 @@ export class CapturePage {
     const { app } = this;
     const linted = (app.lint.findingsOf(app.site, app.state.dataset) ?? []).filter((finding) => finding.capture === app.state.capture);
     if (linted.length + this.capture!.findings.length > 0) {
-      this.panel.append(el('h3', { class: 'bad' }, 'Faults'));
+      this.panel.append(el('h2', { class: 'bad' }, 'Faults'));
       // What lint has found holds what the reader has.
       for (const finding of linted.length > 0 ? linted : this.capture!.findings) {
         this.panel.append(el('p', { class: 'bad' }, `${finding.check}: ${finding.message ?? finding.found ?? ''}`));
@@ -270,7 +272,8 @@ export class CapturePage {
     if (object.keypoints) add('Keypoints', `${points.length} of ${object.keypoints.length}, ${points.filter((point) => point[2] === 2).length} seen`);
     if (object.bounds) {
       const [low, high] = object.bounds;
-      add('Size', high.map((value, i) => (value - low[i]).toFixed(3)).join(' × ') + ' m');
+      const grows = (axis: number) => (object.world_from_node ? Math.hypot(...[0, 4, 8].map((row) => object.world_from_node![row + axis])) : 1);
+      add('Size', high.map((value, i) => ((value - low[i]) * grows(i)).toFixed(3)).join(' × ') + ' m');
     }
     return list;
   }
@@ -296,6 +299,7 @@ export class CapturePage {
     if (view.scale >= 16) this.drawGrid(context, view);
     drawLines(context, frame, view, state, palette, 1, state.object);
     drawKeypoints(context, frame, view, state, palette, this.app.info.skeletons, 1);
+    this.zoom.drawPixel(context);
     this.canvas.setAttribute('aria-label', `Capture ${state.capture}, ${frame.camera}: ` +
       frame.objects.filter((object) => object.box).map((object) => object.class).join(', '));
   }
@@ -334,6 +338,7 @@ export class CapturePage {
 
   private showProbe(): void {
     clear(this.probe);
+    this.probe.setAttribute('aria-live', this.zoom.isByKeys ? 'polite' : 'off');
     if (!this.frame || !this.pixels || !this.pointer) {
       this.probe.append(el('span', {}, 'Point at a pixel. Wheel zooms, drag moves, click chooses, ? lists all keys.'));
       return;
@@ -400,16 +405,18 @@ export class CapturePage {
     const { app } = this;
     const frames = this.capture?.frames.length ?? 0;
     const digit = /^[1-9]$/.test(event.key) ? Number(event.key) - 1 : -1;
+    if (event.shiftKey && this.zoom.press(event)) return true;
     if (digit >= 0 && digit < frames) app.go({ frame: digit, object: 0 });
     else if (event.key === 'ArrowLeft') this.step(-1);
     else if (event.key === 'ArrowRight') this.step(1);
     else if (event.key === 'ArrowUp') this.cycle(-1);
     else if (event.key === 'ArrowDown') this.cycle(1);
+    else if (event.key === 'Enter' && event.target === this.canvas) this.choose();
     else if (event.key === 'z') this.zoomToObject();
     else if (event.key === 's') app.go({ space: !app.state.space });
     else if (this.player.press(event.key)) return true;
     else if (event.key === 'Escape') app.go(app.state.object !== 0 ? { object: 0 } : { page: 'grid' });
-    else return this.zoom.press(event.key);
+    else return this.zoom.press(event);
     return true;
   }
 }
@@ -420,11 +427,12 @@ export const kKeys: [string, string][] = [
   ['[  ]', 'Overlays fainter, stronger'],
   ['← →', 'Capture before, next one (of those that the filters leave)'],
   ['↑ ↓', 'Through the labels under the pointer, or all'],
+  ['Shift ← → ↑ ↓', 'Points at a pixel; Enter in the picture chooses what is there'],
   ['1 … 9', 'Camera'],
   ['+ −  wheel', 'Zoom'],
   ['0', 'Whole picture'],
   ['space', 'Plays a clip, or stops it'],
-  [',  .', 'Frame of a clip before, next one'],
+  [',  .', 'Frame of a clip before, next one; divider of a comparison to the left, right'],
   ['<  >', 'Plays slower, faster'],
   ['Home End', 'First and last frame of a clip'],
   ['z', 'Zoom to the chosen object'],

@@ -2,7 +2,7 @@
 // Two datasets: the same capture of both beside each other, under a divider, or as what differs.
 import { App } from './app';
 import { CaptureLabels, DatasetInfo, Difference, FrameLabels, get } from './data';
-import { button, clear, el, on, plural } from './dom';
+import { button, clear, el, on, plural, remake } from './dom';
 import { FramePixels, Numbers, View, differenceDrawing, drawKeypoints, drawLines, drawPicture, overlays } from './layers';
 import { Awaited, waitingFor } from './pages';
 import { CompareMode } from './state';
@@ -13,6 +13,8 @@ const kModes: [CompareMode, string, string][] = [
 ];
 /** Of the divider a pointer takes hold within so many pixels. */
 const kGrip = 12;
+/** Keys that move it, by shares of the width. */
+const kSlides: { [key: string]: number } = { ',': -0.04, '.': 0.04 };
 
 /** One of the two. */
 interface Side {
@@ -49,8 +51,7 @@ export class ComparePage {
     dragged: (x, _, isFirst) => {
       if (this.app.state.mode !== 'divider') return false;
       if (isFirst && Math.abs(x - this.divider * this.canvas.clientWidth) > kGrip) return false;
-      this.divider = Math.max(0, Math.min(1, x / Math.max(1, this.canvas.clientWidth)));
-      this.draw();
+      this.divide(x / Math.max(1, this.canvas.clientWidth));
       return true;
     },
   });
@@ -122,6 +123,11 @@ export class ComparePage {
     this.draw();
   }
 
+  private divide(at: number): void {
+    this.divider = Math.max(0, Math.min(1, at));
+    this.draw();
+  }
+
   private nameOf(dataset: number): string {
     const site = this.app.site.datasets[dataset];
     const isAlone = this.app.site.datasets.every((other, i) => i === dataset || other.name !== site.name);
@@ -131,8 +137,7 @@ export class ComparePage {
   private showHead(): void {
     const { app } = this;
     const { state } = app;
-    const focus = document.activeElement instanceof HTMLElement ? document.activeElement.dataset.head : undefined;
-    clear(this.head);
+    const refocus = remake(this.head, 'head');
     const other = on(el('select', { 'aria-label': 'Compare with', 'data-head': 'other' }), {
       change: () => app.go({ other: Number(other.value) }),
     });
@@ -142,19 +147,19 @@ export class ComparePage {
     other.value = String(state.other);
     this.head.append(el('span', { class: 'words' }, this.nameOf(state.dataset)), 'and', other,
       button('‹', 'Capture before (arrow left)', () => this.step(-1), { 'data-head': 'back' }),
-      el('b', {}, `Capture ${state.capture}`),
+      el('h1', {}, `Capture ${state.capture}`),
       button('›', 'Next capture (arrow right)', () => this.step(1), { 'data-head': 'next' }));
     const cameras = el('span', { class: 'tabs', role: 'tablist', 'aria-label': 'Cameras' });
     const frames = (this.sides![0].capture ?? this.sides![1].capture)?.frames ?? [];
     frames.forEach((frame, i) => cameras.append(button(frame.camera, '', () => app.go({ frame: i }),
-      { role: 'tab', 'aria-selected': i === state.frame ? 'true' : 'false' })));
+      { role: 'tab', 'aria-selected': i === state.frame ? 'true' : 'false', 'data-head': `camera ${i}` })));
     const modes = el('span', { class: 'right', role: 'group', 'aria-label': 'How to compare' });
     for (const [mode, title, key] of kModes) {
       modes.append(button(title, `${title} (${key})`, () => app.go({ mode }, true),
         { 'aria-pressed': mode === state.mode ? 'true' : 'false', 'data-head': mode }));
     }
     this.head.append(cameras, modes);
-    if (focus) this.head.querySelector<HTMLElement>(`[data-head="${focus}"]`)?.focus();
+    refocus();
   }
 
   /** Captures of either side; only those that differ once that is known. */
@@ -182,7 +187,7 @@ export class ComparePage {
     const hasWhole = this.whole.want(path, generation, again);
     const scroll = this.panel.scrollTop;
     clear(this.panel);
-    this.panel.append(el('h3', {}, `Capture ${state.capture}`));
+    this.panel.append(el('h2', {}, `Capture ${state.capture}`));
     const [a, b] = this.sides!;
     if (this.difference) {
       const { pixels, most } = this.difference;
@@ -200,7 +205,7 @@ export class ComparePage {
     if (this.ofCapture.fault !== '') this.panel.append(el('p', { class: 'bad' }, this.ofCapture.fault));
     else if (!hasCapture) this.panel.append(waitingFor('Comparing …'));
     else this.panel.append(lines(this.ofCapture.value as string[], 'Nothing that both hold differs.'));
-    this.panel.append(el('h3', {}, 'All captures'));
+    this.panel.append(el('h2', {}, 'All captures'));
     if (this.whole.fault !== '') this.panel.append(el('p', { class: 'bad' }, this.whole.fault));
     else if (!hasWhole) this.panel.append(waitingFor('Every file of both is read …'));
     else this.showWhole(this.whole.value as Difference, lines);
@@ -225,7 +230,7 @@ export class ComparePage {
         el('summary', {}, 'How they were made', el('small', {}, String(found.pages.length))), lines(found.pages, '')));
     }
     const others = found.contents.filter((line) => !line.startsWith('capture '));
-    if (others.length > 0) this.panel.append(el('h3', {}, 'Contents'), lines(others, ''));
+    if (others.length > 0) this.panel.append(el('h2', {}, 'Contents'), lines(others, ''));
   }
 
   private showProbe(pixel: [number, number] | null): void {
@@ -303,10 +308,12 @@ export class ComparePage {
   press(event: KeyboardEvent): boolean {
     const mode = kModes.find(([, , key]) => key === event.key);
     if (mode) this.app.go({ mode: mode[0] }, true);
+    else if (event.shiftKey && this.zoom.press(event)) return true;
+    else if (this.app.state.mode === 'divider' && event.key in kSlides) this.divide(this.divider + kSlides[event.key]);
     else if (event.key === 'ArrowLeft') this.step(-1);
     else if (event.key === 'ArrowRight') this.step(1);
     else if (event.key === 'Escape') this.app.go({ page: 'grid' });
-    else return this.zoom.press(event.key);
+    else return this.zoom.press(event);
     return true;
   }
 }

@@ -44,6 +44,17 @@ export function clear(element: Element): void {
   element.replaceChildren();
 }
 
+/** Empties an element that is about to be made anew. The function that it returns gives the focus back to what
+ *  has the same data-`mark` as what had it. */
+export function remake(element: HTMLElement, mark: string): () => void {
+  const active = document.activeElement;
+  const focus = active instanceof HTMLElement && element.contains(active) ? active.dataset[mark] : undefined;
+  clear(element);
+  return () => {
+    if (focus !== undefined) element.querySelector<HTMLElement>(`[data-${mark}="${CSS.escape(focus)}"]`)?.focus();
+  };
+}
+
 export function plural(count: number, one: string, many = one + 's'): string {
   return `${count.toLocaleString('en')} ${count === 1 ? one : many}`;
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The side bar: what there is to filter by, with counts of what a click would give.
 import { App } from './app';
-import { button, clear, el, on, plural, svg } from './dom';
+import { button, el, on, plural, remake, svg } from './dom';
 import { Chosen, Facet, kFacets, readChosen, writeChosen } from './filter';
 import { css } from './layers';
 
@@ -14,12 +14,10 @@ export class FacetBar {
 
   show(app: App): void {
     if (this.dragging) return;
-    const focus = document.activeElement instanceof HTMLElement ? document.activeElement.dataset.focus : undefined;
-    clear(this.element);
+    const refocus = remake(this.element, 'focus');
     const { table, filtered } = app;
     this.element.append(el('div', { class: 'total', 'aria-live': 'polite' },
-      el('b', {}, filtered.places.length.toLocaleString('en')),
-      ` of ${plural(app.info.captures.length, 'capture')}`,
+      el('h1', {}, el('b', {}, filtered.places.length.toLocaleString('en')), ` of ${plural(app.info.captures.length, 'capture')}`),
       el('small', {}, plural(filtered.objects, 'object'))));
     if (app.state.facets.size > 0) {
       this.element.append(button('Clear all filters', 'Show everything', () => app.go({ facets: new Map() }), { class: 'wide' }));
@@ -41,7 +39,7 @@ export class FacetBar {
       const saysNothing = facet.key === 'findings' ? !chosen && counts[1] === 0 : told.length === 0;
       if (!saysNothing) this.element.append(this.nameFacet(app, facet, names, counts, chosen));
     }
-    if (focus) this.element.querySelector<HTMLElement>(`[data-focus="${CSS.escape(focus)}"]`)?.focus();
+    refocus();
   }
 
   /** What lint finds takes as long as reading every file. */
@@ -68,7 +66,7 @@ export class FacetBar {
   }
 
   private section(app: App, facet: Facet, chosen: Chosen | null, detail: string): HTMLElement {
-    return el('section', {}, el('h3', {}, facet.title, el('small', {}, detail),
+    return el('section', {}, el('h2', {}, facet.title, el('small', {}, detail),
       chosen && button('×', `Clear the filter "${facet.title}"`, () => this.choose(app, facet, null), { class: 'plain' })));
   }
 

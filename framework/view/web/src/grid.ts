@@ -101,7 +101,9 @@ export class Grid {
       card.element.style.transform = `translate(${kGap + column * (this.cardWidth + kGap)}px, ${kGap + line * pitch + shift}px)`;
       card.element.dataset.at = String(i);
       card.element.classList.toggle('chosen', i === this.chosen);
+      if (i === this.chosen) this.element.setAttribute('aria-activedescendant', card.element.id);
     }
+    if (!wanted.has(places[this.chosen])) this.element.removeAttribute('aria-activedescendant');
     for (const [place, card] of this.cards) {
       if (wanted.has(place)) continue;
       card.element.remove();
@@ -144,13 +146,13 @@ export class Grid {
     const { table, state } = app;
     const capture = app.info.captures[place];
     const count = this.picturesOf(place);
-    const element = el('div', { class: 'card', role: 'row' });
+    const element = el('div', { class: 'card', role: 'row', id: `card-${place}`, 'aria-label': `capture ${capture}` });
     element.append(this.head(place, element));
     element.style.width = `${this.cardWidth}px`;
     element.style.height = `${this.cardHeight}px`;
     const row = el('div', { class: 'pictures' });
     for (let frame = 0; frame < count; ++frame) {
-      const link = on(el('a', { href: '#', class: 'picture', role: 'gridcell', tabindex: '-1',
+      const link = on(el('a', { href: '#', class: 'picture', tabindex: '-1',
         'aria-label': `capture ${capture}, picture ${frame + 1}` }), {
         click: (event: MouseEvent) => {
           event.preventDefault();
@@ -169,7 +171,7 @@ export class Grid {
         link.append(el('span', { class: 'missing' }));
       }
       link.append(canvas);
-      row.append(link);
+      row.append(el('div', { role: 'gridcell' }, link));
       this.draw(capture, frame, canvas, element);
     }
     element.append(row);

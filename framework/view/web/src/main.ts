@@ -3,7 +3,7 @@ import { App, LabelStore, Lint } from './app';
 import { CapturePage, kKeys } from './capture';
 import { ComparePage } from './compare';
 import { CaptureLabels, CaptureTable, DatasetInfo, DatasetState, Gone, SiteState, get, isReport } from './data';
-import { button, clear, el, on, plural } from './dom';
+import { button, clear, el, on, plural, remake } from './dom';
 import { FacetBar } from './facets';
 import { filter } from './filter';
 import { Grid } from './grid';
@@ -40,7 +40,7 @@ function complete(state: State, datasets: DatasetState[]): void {
 class Site {
   private readonly top = el('header');
   private readonly faults = el('div', { class: 'faults', role: 'status' });
-  private readonly tools = el('div', { class: 'tools', role: 'toolbar', 'aria-label': 'Overlays' });
+  private readonly tools = el('section', { class: 'tools', 'aria-label': 'Overlays' });
   private readonly status = el('div', { class: 'status', role: 'status' });
   private readonly facets = new FacetBar();
   private readonly grid = new Grid();
@@ -219,8 +219,7 @@ class Site {
 
   private showTop(): void {
     const { app } = this;
-    const focus = document.activeElement instanceof HTMLElement ? document.activeElement.dataset.page : undefined;
-    clear(this.top);
+    const refocus = remake(this.top, 'page');
     const choice = on(el('select', { 'aria-label': 'Dataset' }), {
       change: () => this.go({ dataset: Number(choice.value), page: 'grid', facets: new Map(), object: 0 }),
     });
@@ -236,11 +235,11 @@ class Site {
       tabs.append(button(title, '', () => this.go(page === 'compare' ? { page, capture: this.captureHere() } : { page }), { 'aria-current': isHere ? 'page' : false, 'data-page': page }));
     }
     this.top.append(tabs, el('span', { class: 'folder', title: app.site.folder }, el('bdi', {}, app.site.folder)),
-      button('◐', 'Light or dark', () => this.setTheme(document.documentElement.dataset.theme === 'dark' ? 'light' : 'dark')),
+      button('◐', 'Light or dark', () => this.setTheme(document.documentElement.dataset.theme === 'dark' ? 'light' : 'dark'), { 'data-page': 'theme' }),
       button('?', 'Keys (?)', () => this.help.showModal()));
     clear(this.faults);
     for (const fault of app.site.faults) this.faults.append(el('p', { class: 'bad' }, `Left out: ${fault}`));
-    if (focus) this.top.querySelector<HTMLElement>(`[data-page="${focus}"]`)?.focus();
+    refocus();
   }
 
   /** The capture that is looked at, else the first of the dataset. */
@@ -251,8 +250,7 @@ class Site {
 
   private showTools(): void {
     const { state, holds } = this.app;
-    const focus = document.activeElement instanceof HTMLElement ? document.activeElement.dataset.tool : undefined;
-    clear(this.tools);
+    const refocus = remake(this.tools, 'tool');
     for (const layer of kLayers) {
       if (!layer.held.some((name) => holds.has(name))) continue;
       const tool = button('', `${layer.title} (${layer.hotkey})`, () => this.toggle(layer.key),
@@ -272,7 +270,7 @@ class Site {
     colour.append(`by ${state.colour}`, el('kbd', {}, 'i'));
     this.tools.append(colour, slider('Opacity', 'opacity', 0, 100));
     if (state.page === 'grid') this.tools.append(slider('Size', 'card', 120, 640));
-    if (focus) this.tools.querySelector<HTMLElement>(`[data-tool="${focus}"]`)?.focus();
+    refocus();
   }
 
   private toggle(layer: string): void {

@@ -109,7 +109,8 @@ export class Awaited {
       try {
         const value = await get(path);
         if (asked !== this.path) return;
-        this.value = value;
+        if (typeof value?.fault === 'string') this.fault = value.fault;
+        else this.value = value;
       } catch (error) {
         if (asked !== this.path) return;
         this.fault = (error as Error).message;
@@ -127,7 +128,7 @@ export function waitingFor(what: string): HTMLElement {
 }
 
 export class StatsPage {
-  readonly element = el('main', { class: 'page' });
+  readonly element = el('main', { class: 'page', tabindex: '0' });
   private readonly stats = new Awaited();
 
   show(app: App): void {
@@ -197,7 +198,7 @@ export class StatsPage {
 }
 
 export class FindingsPage {
-  readonly element = el('main', { class: 'page' });
+  readonly element = el('main', { class: 'page', tabindex: '0' });
 
   show(app: App): void {
     clear(this.element);
@@ -257,7 +258,7 @@ export function replayCommand(folder: string, capture: number): string {
 }
 
 export class RunPage {
-  readonly element = el('main', { class: 'page' });
+  readonly element = el('main', { class: 'page', tabindex: '0' });
   private readonly run = new Awaited();
   private began: { time: number; done: number } | null = null;
 
@@ -321,7 +322,7 @@ export class RunPage {
   private showWorkers(run: RunState): void {
     const rows = (run.workers ?? []).map((worker) => [worker.name, worker.role, worker.role === '' ? 'ended' : worker.is_alive ? 'alive' : 'dead',
       worker.captures.toLocaleString('en'), worker.memory_bytes > 0 ? `${(worker.memory_bytes / 2 ** 20).toFixed(0)} MiB` : '', worker.description]);
-    if (rows.length > 0) this.element.append(el('h2', {}, 'Workers'), table(['Name', 'Role', 'State', 'Captures', 'Memory', ''], rows));
+    if (rows.length > 0) this.element.append(el('h2', {}, 'Workers'), table(['Name', 'Role', 'State', 'Captures', 'Memory', 'What it is'], rows));
   }
 
   /** Which conditions the views that were drawn did not hold. */

@@ -30,8 +30,7 @@ function frustum(frame: FrameLabels, length: number): Vec[] | null {
 }
 
 export class SpaceView {
-  readonly canvas = el('canvas', { class: 'space', tabindex: '0', role: 'img',
-    'aria-label': '3-D view; arrow keys turn it, plus and minus zoom, t looks from above' });
+  readonly canvas = el('canvas', { class: 'space', tabindex: '0', role: 'img' });
   private turn = 0.7;
   private rise = 0.5;
   private zoom = 1;
@@ -39,9 +38,9 @@ export class SpaceView {
   private state!: State;
   private palette!: Palette;
   private readonly pictures = new Map<number, HTMLImageElement>();
-  private spots: { x: number; y: number; frame?: number; object?: number }[] = [];
+  private spots: { x: number; y: number; frame: number; object: number | null }[] = [];
 
-  constructor(private readonly pick: (frame: number | null, object: number | null) => void) {
+  constructor(private readonly pick: (frame: number, object: number | null) => void) {
     let held: [number, number] | null = null;
     let moved = 0;
     on(this.canvas, {
@@ -107,7 +106,7 @@ export class SpaceView {
     const y = event.clientY - frame.top;
     const distance = (spot: { x: number; y: number }) => Math.hypot(spot.x - x, spot.y - y);
     const near = [...this.spots].sort((a, b) => distance(a) - distance(b))[0];
-    if (near && distance(near) < 24) this.pick(near.frame ?? null, near.object ?? null);
+    if (near && distance(near) < 24) this.pick(near.frame, near.object);
   }
 
   private draw(): void {
@@ -120,12 +119,19 @@ export class SpaceView {
     const context = this.canvas.getContext('2d')!;
     const colours = getComputedStyle(this.canvas);
 
-    // An object is the same in all pictures.
-    const objects = new Map<string, ObjectLabels>();
-    for (const frame of this.labels.frames) {
-      for (const object of frame.objects) if (object.bounds && object.world_from_node) objects.set(object.path, object);
+    // An object is the same in all pictures, but its id need not be: that of the picture that is looked at counts.
+    const objects = new Map<string, { object: ObjectLabels; frame: number }>();
+    const places = this.labels.frames.map((_, i) => i).filter((i) => i !== this.state.frame);
+    for (const frame of [...places, this.state.frame]) {
+      for (const object of this.labels.frames[frame]?.objects ?? []) {
+        if (object.bounds && object.world_from_node) objects.set(object.path, { object, frame });
+      }
     }
-    const boxes = [...objects.values()].map((object) => ({ object, points: corners(object) }));
+    const boxes = [...objects.values()].map((each) => ({ ...each, points: corners(each.object) }));
+    const isChosen = (box: { object: ObjectLabels; frame: number }) => box.frame === this.state.frame && box.object.id === this.state.object;
+    const chosen = boxes.find(isChosen)?.object;
+    this.canvas.setAttribute('aria-label', `3-D view of ${boxes.length} objects${chosen ? `, chosen: ${chosen.class || chosen.path}` : ''}; ` +
+      'arrow keys turn it, plus and minus zoom, t looks from above');
     const eyes = this.labels.frames.map((frame) => frustum(frame, 1)?.[0]).filter((eye) => eye !== undefined);
     const all: Vec[] = [...boxes.flatMap((box) => box.points), ...eyes].filter((p) => p.every(Number.isFinite));
     if (all.length === 0) return;
@@ -186,22 +192,22 @@ export class SpaceView {
       context.fillText(frame.camera, x + 6, y - 6);
       for (const spot of [eye, a, b, c, d]) {
         const [sx, sy] = project(spot);
-        this.spots.push({ x: sx, y: sy, frame: i });
+        this.spots.push({ x: sx, y: sy, frame: i, object: null });
       }
     });
-    for (const { object, points } of boxes) {
-      const isChosen = object.id === this.state.object;
+    for (const box of boxes) {
+      const { object, points } = box;
       context.strokeStyle = css(this.palette.of(object, this.state));
-      context.lineWidth = isChosen ? 3 : 1.4;
+      context.lineWidth = isChosen(box) ? 3 : 1.4;
       context.beginPath();
       for (const [from, to] of kEdges) line(points[from], points[to]);
       context.stroke();
       const centre = [0, 1, 2].map((i) => points.reduce((sum, p) => sum + p[i], 0) / 8) as Vec;
       const [x, y] = project(centre);
-      this.spots.push({ x, y, object: object.id });
-      if (isChosen || boxes.length <= 12) {
+      this.spots.push({ x, y, frame: box.frame, object: object.id });
+      if (isChosen(box) || boxes.length <= 12) {
         context.fillStyle = colours.getPropertyValue('--text');
-        context.font = `${isChosen ? 600 : 400} 12px system-ui, sans-serif`;
+        context.font = `${isChosen(box) ? 600 : 400} 12px system-ui, sans-serif`;
         context.fillText(object.class, x + 4, y);
       }
     }

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// A canvas with a picture that is zoomed by wheel and keys and dragged, in one or several panes side by
-// side that show the same part.
+// A canvas with a picture that is zoomed by wheel and keys and dragged, and whose pixels are pointed at by
+// mouse and keys, in one or several panes side by side that show the same part.
 import { on } from './dom';
 import { View } from './layers';
 
 const kMostScale = 64;
+
+const kSteps: { [key: string]: [number, number] } = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
 export interface ZoomUser {
   /** Size of the picture; null while there is none. */
@@ -21,6 +23,8 @@ export class Zoom {
   panes = 1;
   private view: View = { scale: 1, x: 0, y: 0 };
   private fits = true;
+  private pixel: [number, number] | null = null;  ///< Pointed at.
+  private byKeys = false;
 
   constructor(readonly canvas: HTMLCanvasElement, private readonly user: ZoomUser) {
     this.listen();
@@ -29,6 +33,11 @@ export class Zoom {
   /** Pixels of the page per pixel of the picture. */
   get scale(): number {
     return this.view.scale;
+  }
+
+  /** Whether keys have moved the pixel that is pointed at. */
+  get isByKeys(): boolean {
+    return this.byKeys;
   }
 
   get paneWidth(): number {
@@ -58,6 +67,7 @@ export class Zoom {
   /** The next picture is shown whole, without drawing it now. */
   reset(): void {
     this.fits = true;
+    this.point(null, false);
   }
 
   fit(): void {
@@ -83,13 +93,61 @@ export class Zoom {
     this.user.draw();
   }
 
+  /** Shows in each pane where keys point, as no mouse does it. */
+  drawPixel(context: CanvasRenderingContext2D): void {
+    if (!this.byKeys || !this.pixel) return;
+    const { scale, x, y } = this.view;
+    const side = Math.max(scale, 9);
+    const [left, top] = [x + (this.pixel[0] + 0.5) * scale - side / 2, y + (this.pixel[1] + 0.5) * scale - side / 2];
+    for (let pane = 0; pane < this.panes; ++pane) {
+      for (const [colour, off] of [['#000', 0], ['#fff', 2]] as [string, number][]) {
+        context.strokeStyle = colour;
+        context.lineWidth = 2;
+        context.strokeRect(left + pane * this.paneWidth - off, top - off, side + 2 * off, side + 2 * off);
+      }
+    }
+  }
+
   /** True when the key means something here. */
-  press(key: string): boolean {
-    if (key === '+' || key === '=') this.by(1.4);
+  press({ key, shiftKey }: KeyboardEvent): boolean {
+    const step = kSteps[key];
+    if (shiftKey && step) this.move(...step);
+    else if (key === '+' || key === '=') this.by(1.4);
     else if (key === '-') this.by(1 / 1.4);
     else if (key === '0') this.fit();
     else return false;
     return true;
+  }
+
+  /** From the middle of what is seen; the pixel stays in sight. */
+  private move(dx: number, dy: number): void {
+    const size = this.user.size();
+    if (!size) return;
+    const { scale } = this.view;
+    const sides = [this.paneWidth, this.canvas.clientHeight];
+    const origin = [this.view.x, this.view.y];
+    const next = [dx, dy].map((by, i) => {
+      const from = this.pixel ? this.pixel[i] + by : Math.floor((sides[i] / 2 - origin[i]) / scale);
+      return Math.max(0, Math.min(size[i] - 1, from));
+    }) as [number, number];
+    next.forEach((value, i) => {
+      const over = Math.max(0, origin[i] + (value + 1) * scale - sides[i]);
+      const under = Math.max(0, -(origin[i] + value * scale));
+      if (over + under === 0) return;
+      this.fits = false;
+      origin[i] += under - over;
+    });
+    this.view = { scale, x: origin[0], y: origin[1] };
+    this.point(next, true);
+    this.user.draw();
+  }
+
+  private point(pixel: [number, number] | null, byKeys: boolean): void {
+    const wasByKeys = this.byKeys;
+    this.pixel = pixel;
+    this.byKeys = byKeys;
+    this.user.pointed(pixel);
+    if (wasByKeys && !byKeys) this.user.draw();
   }
 
   private to(scale: number, at?: [number, number]): void {
@@ -127,7 +185,7 @@ export class Zoom {
         const [x, y] = inPane(place(event));
         const size = this.user.size();
         const px: [number, number] = [Math.floor((x - this.view.x) / this.view.scale), Math.floor((y - this.view.y) / this.view.scale)];
-        this.user.pointed(size && px[0] >= 0 && px[1] >= 0 && px[0] < size[0] && px[1] < size[1] ? px : null);
+        this.point(size && px[0] >= 0 && px[1] >= 0 && px[0] < size[0] && px[1] < size[1] ? px : null, false);
         if (!held) return;
         moved += Math.abs(event.clientX - held[0]) + Math.abs(event.clientY - held[1]);
         if (isTaken) {
@@ -145,7 +203,7 @@ export class Zoom {
         held = null;
         if (moved < 4 && !isTaken && this.user.size()) this.user.clicked?.();
       },
-      pointerleave: () => this.user.pointed(null),
+      pointerleave: () => this.point(null, false),
       dblclick: () => this.fit(),
     });
   }
