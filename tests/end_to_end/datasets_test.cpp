@@ -124,7 +124,7 @@ TEST_CASE("clips of a rig stay clips, or become pictures that say so", "[convert
   const TemporaryFolder folder;
   write_file(folder / "job.yaml", R"(
 seed: 11
-total_captures: 8
+total_captures: 12
 environments: [{type: shapes, shapes: [cube]}]
 environment: {colliders: triangle_mesh}
 objects:
@@ -139,7 +139,7 @@ randomizers:
      polar_angle_deg: 40, turn_deg_s: 40}
 settle: {policy: keep}
 renderer: {type: "null"}
-timeline: [{simulate: 14}, {record: {name: fall, fps: 24, seconds: 0.17}}]
+timeline: [{simulate: 14}, {record: {name: fall, fps: 24, seconds: 0.25}}]
 writers:
   - {type: BasicWriter, name: basic, instance_segmentation: true, semantic_segmentation: true,
      bounding_box_2d_tight: true, bounding_box_2d_loose: true, bounding_box_3d: true, camera_params: true,
@@ -151,17 +151,18 @@ output: {folder: out}
 )");
   succeed({"run", "job.yaml"}, folder);
   succeed({"lint", "out"}, folder);
-  for (const std::string from : {"basic", "hdf5", "bop"}) {
+  for (const std::string from : {"basic", "bop"}) {
     INFO(from);
-    const Outcome made =
-        succeed({"convert", "out/" + from, "--writer", "CocoWriter", "-o", "coco_" + from}, folder);
+    succeed({"convert", "out/" + from, "--writer", "CocoWriter", "-o", "coco_" + from}, folder);
     succeed({"lint", "coco_" + from}, folder);
     succeed(
         {"merge", "out/" + from, "out/" + from, "--writer", "CocoWriter", "-o", "twice_" + from},
         folder);
     succeed({"lint", "twice_" + from}, folder);
-    if (from == "hdf5") CHECK_THAT(made.errors, ContainsSubstring("become captures of their own"));
   }
+  const Outcome single =
+      succeed({"convert", "out/hdf5", "--writer", "CocoWriter", "-o", "coco_hdf5"}, folder);
+  CHECK_THAT(single.errors, ContainsSubstring("become captures of their own"));
 }
 
 TEST_CASE("what writers need and a dataset does not hold is said before anything is written",
