@@ -143,9 +143,18 @@ NodeId stuck_in(const Scene& scene, NodeId object, const Obstacles& all,
   return sunk_in(scene, object, all, limits.depth_m);
 }
 
+/// Whether the surface that a column met there is as good as a wall: what is above it slides past.
+bool is_upright(const Obstacles& others, const Vec3& met) {
+  constexpr double kAbove = 2e-4;  // metres
+  constexpr double kLean = 0.25;   // sine of the surface's normal over the level
+  // Right above a plane the way to it is the shorter the steeper it is.
+  return others.distance(met + kAbove * Vec3::UnitZ(), kAbove) < kLean * kAbove;
+}
+
 /// What could hold the object up, of `near`: what lies below it somewhere, within reach. What it
-/// merely leans against holds nothing. Columns are tried all over its outline, those of its corners
-/// as well: a thing may stand on one. Ends with the first for which `is_enough` holds.
+/// merely leans against holds nothing, steep as it may be. Columns are tried all over its outline,
+/// those of its corners as well: a thing may stand on one. Ends with the first for which
+/// `is_enough` holds.
 std::set<NodeId> found_below(const Scene& scene, NodeId object, const std::vector<NodeId>& near,
                              const SettleLimits& limits,
                              const std::function<bool(NodeId)>& is_enough) {
@@ -170,8 +179,9 @@ std::set<NodeId> found_below(const Scene& scene, NodeId object, const std::vecto
       const double inside = exit ? kSkin + exit->t * (top - underside - kSkin) : kInfinity;
       // It may have sunk in, but what lies on a thin thing does not hold it.
       const double start = underside + std::min(limits.depth_m, inside);
-      const auto hit = others.first_hit({x, y, start}, {x, y, underside - limits.reach_m});
-      if (hit) {
+      const double end = underside - limits.reach_m;
+      const auto hit = others.first_hit({x, y, start}, {x, y, end});
+      if (hit && !is_upright(others, {x, y, start + hit->t * (end - start)})) {
         below.insert(hit->owner);
         if (is_enough(hit->owner)) return true;
       }

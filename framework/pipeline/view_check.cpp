@@ -2,6 +2,7 @@
 #include "framework/pipeline/view_check.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -23,6 +24,8 @@ constexpr double kNoTarget = 100.0;
 
 constexpr double degrees(double radians) { return radians * 180.0 / kPi; }
 
+const Limits kSeen{1.0, std::nullopt};
+
 /// A labelled thing that rules may ask for.
 struct Target {
   LabelledInstance instance;
@@ -32,6 +35,7 @@ struct Target {
   Vec3 middle_node;
   Vec3 middle_world;
   double radius_m = 0.0;  ///< Of a ball round its box.
+  std::array<Vec3, 8> corners_world;
 };
 
 /// Everything that rules ask of a target, as far as it is known.
@@ -138,8 +142,9 @@ Target target_of(const Scene& scene, const LabelledInstance& instance) {
   for (int corner = 0; corner < 8; ++corner) {
     const Vec3 point((corner & 1 ? box.max : box.min).x(), (corner & 2 ? box.max : box.min).y(),
                      (corner & 4 ? box.max : box.min).z());
-    target.radius_m =
-        std::max(target.radius_m, (world_from_node * point - target.middle_world).norm());
+    target.corners_world[std::size_t(corner)] = world_from_node * point;
+    target.radius_m = std::max(
+        target.radius_m, (target.corners_world[std::size_t(corner)] - target.middle_world).norm());
   }
   return target;
 }
@@ -163,7 +168,6 @@ void score_place(const ViewRule& rule, const Measures& measures, Score& score) {
 
 void score_pixels(const ViewRule& rule, const Measures& measures, const Margins& margins,
                   Score& score) {
-  static const Limits kSeen{1.0, std::nullopt};
   const Margin pixels = margins.pixels(measures.visible_pixels);
   score.take("visible_pixels", kSeen, measures.visible_pixels, pixels);
   score.take("visible_pixels", rule.visible_pixels, measures.visible_pixels, pixels);
@@ -174,11 +178,15 @@ void score_pixels(const ViewRule& rule, const Measures& measures, const Margins&
 }
 
 void score_coverage(const ViewRule& rule, const Measures& measures, const Margins& margins,
-                    Score& score) {
+                    bool is_whole, Score& score) {
   const auto take_share = [&](const char* key, const Limits& limits, double share) {
     score.take(key, limits, share, margins.share(share, measures.all_pixels));
   };
-  take_share("truncation", rule.truncation, measures.truncation);
+  if (is_whole) {
+    score.take("truncation", rule.truncation, 0.0);
+  } else {
+    take_share("truncation", rule.truncation, measures.truncation);
+  }
   take_share("occlusion", rule.occlusion, measures.occlusion);
   take_share("visible_share", rule.visible_share, measures.visible_share);
   score.take("occluders", rule.occluders, measures.occluders, margins.things(measures.occluders));
@@ -234,6 +242,64 @@ bool may_be_seen(const Target& target, const Affine& camera_from_world, double w
   if (distance <= target.radius_m) return true;
   const double angle = std::acos(std::clamp(-place.z() / distance, -1.0, 1.0));
   return angle - std::asin(target.radius_m / distance) <= widest + 1e-6;
+}
+
+/// Where in a picture a target lies, with some room round it, by the corners of its box.
+struct Reach {
+  double left = kInfinity;
+  double top = kInfinity;
+  double right = -kInfinity;
+  double bottom = -kInfinity;
+  bool is_whole = false;  ///< All of it lies inside.
+  /// Of what lies inside; both are 0 where nothing does.
+  double most_pixels = 0.0;
+  double longest_px = 0.0;
+  double longest_share = 0.0;
+};
+
+/// Null: the corners do not tell, through lenses that bend lines, and of what is not before the
+/// camera as a whole.
+std::optional<Reach> reach_of(const Target& target, const Affine& camera_from_world,
+                              const Camera& camera) {
+  if (camera.lens != LensModel::Pinhole) return std::nullopt;
+  Reach reach;
+  for (const Vec3& corner : target.corners_world) {
+    const Vec3 place = camera_from_world * corner;
+    const std::optional<Vec2> pixel = project(camera, place);
+    if (!pixel || -place.z() <= camera.near_m || -place.z() >= camera.far_m) return std::nullopt;
+    reach.left = std::min(reach.left, pixel->x());
+    reach.right = std::max(reach.right, pixel->x());
+    reach.top = std::min(reach.top, pixel->y());
+    reach.bottom = std::max(reach.bottom, pixel->y());
+  }
+  // What is displaced may stick out of its box.
+  constexpr double kRoom = 0.02;
+  const double across = 1.0 + kRoom * (reach.right - reach.left);
+  const double down = 1.0 + kRoom * (reach.bottom - reach.top);
+  reach.left -= across;
+  reach.right += across;
+  reach.top -= down;
+  reach.bottom += down;
+  reach.is_whole = reach.left >= 0.0 && reach.top >= 0.0 && reach.right <= camera.width &&
+                   reach.bottom <= camera.height;
+  const double width = std::min<double>(reach.right, camera.width) - std::max(reach.left, 0.0);
+  const double height = std::min<double>(reach.bottom, camera.height) - std::max(reach.top, 0.0);
+  if (width <= 0.0 || height <= 0.0) return reach;
+  reach.most_pixels = width * height;
+  reach.longest_px = std::max(width, height);
+  reach.longest_share = std::max(width / camera.width, height / camera.height);
+  return reach;
+}
+
+/// What has too few pixels even when all of its box is seen.
+void score_reach(const ViewRule& rule, const Reach& reach, Score& score) {
+  const auto take = [&](const char* key, const Limits& limits, double most) {
+    score.take(key, limits, most, {0.0, most});
+  };
+  take("visible_pixels", kSeen, reach.most_pixels);
+  take("visible_pixels", rule.visible_pixels, reach.most_pixels);
+  take("size_px", rule.size_px, reach.longest_px);
+  take("size_share", rule.size_share, reach.longest_share);
 }
 
 /// How many different things are seen where the target would be.
@@ -349,26 +415,47 @@ bool wants_bins(const WantedView& wanted) {
                      [](const auto& bin) { return bin.has_value(); });
 }
 
+/// The indices of those that did not fail.
+std::vector<std::size_t> largest_first(const std::vector<Scored>& scored) {
+  std::vector<std::size_t> order;
+  for (std::size_t i = 0; i < scored.size(); ++i) {
+    if (!scored[i].score.failed) order.push_back(i);
+  }
+  std::ranges::stable_sort(order, std::ranges::greater(),
+                           [&](std::size_t i) { return scored[i].measures.visible_pixels; });
+  return order;
+}
+
 /// Refuses where every target that may turn out as the main one misses a quota about its place.
-ViewVerdict judge_quotas_coarsely(const WantedView& wanted, const std::vector<Scored>& scored,
-                                  const Margins& margins) {
-  double least = 0.0;  // pixels of the main target
+ViewVerdict judge_quotas_by_place(const WantedView& wanted, const std::vector<Scored>& scored,
+                                  const auto& may_be_main, double shortfall) {
+  const Quota* missed = nullptr;
+  double most = -1.0;
+  for (const Scored& one : scored) {
+    if (one.score.failed || !may_be_main(one)) continue;
+    const Quota* own = missed_quota(wanted, one, true);
+    if (!own) return {};
+    if (one.measures.visible_pixels > most) missed = own;
+    most = std::max(most, one.measures.visible_pixels);
+  }
+  if (!missed) return {};
+  return refused(*wanted.rule, "quotas." + missed->of, shortfall);
+}
+
+ViewVerdict judge_quotas_by_place(const WantedView& wanted, const std::vector<Scored>& scored,
+                                  double shortfall) {
+  return judge_quotas_by_place(
+      wanted, scored, [](const Scored&) { return true; }, shortfall);
+}
+
+/// The pixels that the main target has at least.
+double least_of_main(const std::vector<Scored>& scored, const Margins& margins) {
+  double least = 0.0;
   for (const Scored& one : scored) {
     if (one.score.failed || !one.score.is_sure) continue;
     least = std::max(least, margins.pixels(one.measures.visible_pixels).low);
   }
-  const Quota* missed = nullptr;
-  double most = -1.0;
-  for (const Scored& one : scored) {
-    const double pixels = one.measures.visible_pixels;
-    if (one.score.failed || margins.pixels(pixels).high < least) continue;
-    const Quota* own = missed_quota(wanted, one, true);
-    if (!own) return {};
-    if (pixels > most) missed = own;
-    most = std::max(most, pixels);
-  }
-  if (!missed) return {};
-  return refused(*wanted.rule, "quotas." + missed->of, 1.0);
+  return least;
 }
 
 /// All that a rule says, once its targets have been scored.
@@ -393,7 +480,13 @@ ViewVerdict judge(const WantedView& wanted, const std::vector<Scored>& scored,
     if (!verdict.holds()) return verdict;
   }
   if (!wants_bins(wanted)) return {};
-  if (!margins.are_exact()) return judge_quotas_coarsely(wanted, scored, margins);
+  if (!margins.are_exact()) {
+    const double least = least_of_main(scored, margins);
+    const auto may_be_main = [&](const Scored& one) {
+      return margins.pixels(one.measures.visible_pixels).high >= least;
+    };
+    return judge_quotas_by_place(wanted, scored, may_be_main, 1.0);
+  }
   const Scored* main = nullptr;
   for (const Scored& one : scored) {
     const bool is_larger =
@@ -545,7 +638,12 @@ ViewVerdict ViewCheck::by_place(const Scene& scene, NodeId camera, const WantedV
   const double widest = widest_angle(*scene[camera].camera);
   std::vector<Scored> scored = state_->by_place(rule, world_from_camera.translation());
   for (Scored& one : scored) {
-    if (may_be_seen(*one.target, camera_from_world, widest)) continue;
+    if (may_be_seen(*one.target, camera_from_world, widest)) {
+      if (one.score.failed) continue;
+      const auto reach = reach_of(*one.target, camera_from_world, *scene[camera].camera);
+      if (reach) score_reach(rule, *reach, one.score);
+      continue;
+    }
     if (!one.score.failed) one.score.failed = "visible_pixels";
     one.score.shortfall += 1.0;
   }
@@ -556,13 +654,8 @@ ViewVerdict ViewCheck::by_place(const Scene& scene, NodeId camera, const WantedV
     return verdict;
   }
   if (!wants_bins(wanted)) return {};
-  const Quota* missed = nullptr;
-  for (const Scored& one : scored) {
-    if (one.score.failed) continue;
-    missed = missed_quota(wanted, one, true);
-    if (!missed) return {};
-  }
-  return refused(rule, missed ? "quotas." + missed->of : "count", kUntraced);
+  if (possible == 0) return refused(rule, "count", kUntraced);
+  return judge_quotas_by_place(wanted, scored, kUntraced);
 }
 
 ViewVerdict ViewCheck::by_labels(const Scene& scene, NodeId camera,
@@ -596,14 +689,39 @@ ViewVerdict ViewCheck::by_labels(const Scene& scene, NodeId camera,
     }
     // Coverage is dear: that of targets which cannot hold any more counts only where too few hold,
     // for what is nearest to holding, or where every target counts.
+    if (wants_bins(one)) {
+      const ViewVerdict quotas = judge_quotas_by_place(one, scored, 1.0);
+      if (!quotas.holds()) {
+        verdict.add(quotas);
+        continue;
+      }
+    }
     std::vector<Scored> judged = scored;
     const auto add_coverage = [&](Scored& target) {
       seen.measure_coverage(target);
-      score_coverage(rule, target.measures, margins, target.score);
+      // Known from the start, whatever share of the pixels was looked at.
+      const auto reach = margins.are_exact()
+                             ? std::nullopt
+                             : reach_of(*target.target, camera_from_world, *scene[camera].camera);
+      score_coverage(rule, target.measures, margins, reach && reach->is_whole, target.score);
     };
-    seen.cover(judged, !rule.every_target, labels.cover);
-    for (Scored& target : judged) {
-      if (rule.every_target || !target.score.failed) add_coverage(target);
+    if (rule.every_target) {
+      seen.cover(judged, false, labels.cover);
+      for (Scored& target : judged) add_coverage(target);
+    } else {
+      std::size_t covered = 0;  // that hold
+      double least = 0.0;       // pixels of the main target
+      for (const std::size_t i : largest_first(scored)) {
+        const bool are_enough = !rule.count.max && rule.count.min.value_or(0.0) <= double(covered);
+        const bool is_smaller = margins.pixels(scored[i].measures.visible_pixels).high < least;
+        if (are_enough && (is_smaller || !wants_bins(one))) break;
+        seen.cover({judged[i]}, true, labels.cover);
+        add_coverage(judged[i]);
+        if (judged[i].score.failed) continue;
+        ++covered;
+        if (!judged[i].score.is_sure) continue;
+        least = std::max(least, margins.pixels(scored[i].measures.visible_pixels).low);
+      }
     }
     const std::size_t holding = count_holding(judged);
     const bool lacks_targets = rule.count.min && double(holding) < *rule.count.min;

@@ -2,6 +2,7 @@
 #include "framework/pipeline/view_search.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <set>
 #include <tuple>
@@ -14,7 +15,9 @@
 namespace diorama {
 namespace {
 
-constexpr int kSmaller = 4;  // of width and height, for judging before all pixels are looked at
+constexpr int kSmaller = 4;  // of width and height, for the brightness
+// From one ray of the grids to the next, in pixels: what is decided by few costs little.
+constexpr std::array kGridSteps = {8, 4};
 
 auto numbers_of(const Camera& c) {
   return std::tie(c.width, c.height, c.lens, c.fx, c.fy, c.cx, c.cy, c.distortion,
@@ -51,20 +54,21 @@ Camera smaller(Camera camera) {
   return camera;
 }
 
-/// The rays of every fourth pixel, and no others. Null: there are too few of them to tell anything.
-std::optional<Camera> sparser(Camera camera) {
-  constexpr int kFirst = 1;
+/// The rays of every step-th pixel across and down, and no others. Null: there are too few of them
+/// to tell anything.
+std::optional<Camera> sparser(Camera camera, int step) {
+  const int first = step / 2 - 1;
   constexpr int kLeast = 8;  // pixels of a side
-  const auto counted = [](int size) { return (size - kFirst + kSmaller - 1) / kSmaller; };
-  const auto moved = [](double centre) { return 0.5 + (centre - (kFirst + 0.5)) / kSmaller; };
+  const auto counted = [&](int size) { return (size - first + step - 1) / step; };
+  const auto moved = [&](double centre) { return 0.5 + (centre - (first + 0.5)) / step; };
   camera.width = counted(camera.width);
   camera.height = counted(camera.height);
   if (std::min(camera.width, camera.height) < kLeast) return std::nullopt;
-  camera.fx /= kSmaller;
-  camera.fy /= kSmaller;
+  camera.fx /= step;
+  camera.fy /= step;
   camera.cx = moved(camera.cx);
   camera.cy = moved(camera.cy);
-  shrink_radii(camera, 1.0 / kSmaller);
+  shrink_radii(camera, 1.0 / step);
   return camera;
 }
 
@@ -153,14 +157,17 @@ SmallCameras create_small_cameras(const Job& job, const std::vector<NodeId>& cam
     if (rule.brightness.is_set()) lit.insert(nodes.begin(), nodes.end());
   }
   SmallCameras small;
-  const auto create = [&](NodeId camera, std::map<NodeId, NodeId>& nodes) {
+  const auto create = [&](NodeId camera) {
     const NodeId node = scene.create(scene.root(), "SmallView");
     scene.edit(node).camera = *scene[camera].camera;
-    nodes.emplace(camera, node);
+    return node;
   };
   for (const NodeId camera : cameras) {
-    if (lit.contains(camera)) create(camera, small.of_light);
-    if (judged.contains(camera)) create(camera, small.of_labels);
+    if (lit.contains(camera)) small.of_light.emplace(camera, create(camera));
+    if (!judged.contains(camera)) continue;
+    for (std::size_t i = 0; i < kGridSteps.size(); ++i) {
+      small.of_labels[camera].push_back(create(camera));
+    }
   }
   return small;
 }
@@ -276,8 +283,8 @@ void ViewSearch::run() {
       if (!is_first) draw_anew(pending);
       judge(pending);
     }
-    const auto refused = std::ranges::count_if(
-        pending, [](const Group* group) { return !group->is_done || !group->unmet.empty(); });
+    const auto refused =
+        std::ranges::count_if(pending, [](const Group* group) { return !group->is_done; });
     refused_s_ += seconds * double(refused) / double(pending.size());
   }
 }
@@ -321,8 +328,11 @@ void ViewSearch::judge(const std::vector<Group*>& pending) {
   prepare();
   std::vector<Group*> shown;
   for (Group* group : possible) {
-    ViewVerdict verdict = by_labels(*group, true);
-    if (verdict.holds()) verdict = by_labels(*group, false);
+    ViewVerdict verdict;
+    for (std::size_t grid = 0; grid < kGridSteps.size() && verdict.holds(); ++grid) {
+      verdict = by_grid(*group, grid);
+    }
+    if (verdict.holds()) verdict = by_labels(*group);
     if (verdict.holds()) {
       shown.push_back(group);
     } else {
@@ -349,9 +359,12 @@ void ViewSearch::settle(Group& group, const ViewVerdict& verdict) {
   group.is_done = true;
   group.best.restore(setting_.scene);
   group.unmet = group.impossible;
-  group.unmet.insert(group.unmet.end(), group.best_verdict->failed.begin(),
-                     group.best_verdict->failed.end());
+  const std::vector<std::string>& failed = group.best_verdict->failed;
+  group.unmet.insert(group.unmet.end(), failed.begin(), failed.end());
   end_at_limit(group);
+  // It stays after all.
+  const auto stays = group.refused.find(failed.front());
+  if (--stays->second == 0) group.refused.erase(stays);
 }
 
 void ViewSearch::end_at_limit(Group& group) {
@@ -391,34 +404,49 @@ void ViewSearch::place_small_cameras(const Group& group) {
   Scene& scene = setting_.scene;
   for (const Group::Member& member : group.members) {
     const NodeId camera = setting_.cameras[member.camera];
-    const NodeId small = setting_.small_cameras.of_labels.at(camera);
-    const std::optional<Camera> lens = sparser(*scene[camera].camera);
-    if (lens && !are_equal(scene[small].camera, lens)) scene.edit(small).camera = lens;
-    scene.set_pose(small, scene.world_from_node(camera));
+    const std::vector<NodeId>& grids = setting_.small_cameras.of_labels.at(camera);
+    for (std::size_t i = 0; i < grids.size(); ++i) {
+      const std::optional<Camera> lens = sparser(*scene[camera].camera, kGridSteps[i]);
+      if (!lens) continue;
+      if (!are_equal(scene[grids[i]].camera, lens)) scene.edit(grids[i]).camera = lens;
+      scene.set_pose(grids[i], scene.world_from_node(camera));
+    }
   }
 }
 
-ViewVerdict ViewSearch::by_labels(const Group& group, bool is_coarse) {
+ViewVerdict ViewSearch::by_grid(const Group& group, std::size_t grid) {
   ViewVerdict verdict;
   for (const Group::Member& member : group.members) {
-    NodeId camera = setting_.cameras[member.camera];
-    const bool is_too_small = is_coarse && !sparser(*setting_.scene[camera].camera);
-    if (member.wanted.empty() || is_too_small) continue;
-    ViewCheck::Labels labels;
-    if (is_coarse) {
-      camera = setting_.small_cameras.of_labels.at(camera);
-      labels.step = kSmaller;
-    }
-    labels.render = [&] { return render(camera, kLeafId.name).get(kLeafId); };
-    labels.cover = [&](std::span<const LabelledInstance> instances) {
-      return call_component("renderer '" + setting_.job.renderer.type + "'",
-                            [&] { return setting_.renderer.cover(camera, instances); });
-    };
-    verdict.add(check_->by_labels(setting_.scene, camera, member.wanted, labels));
+    const NodeId camera = setting_.cameras[member.camera];
+    if (!sparser(*setting_.scene[camera].camera, kGridSteps[grid])) continue;
+    verdict.add(by_labels_of(setting_.small_cameras.of_labels.at(camera)[grid], member.wanted,
+                             kGridSteps[grid]));
     // One camera of a group that fails is enough.
     if (!verdict.holds()) break;
   }
   return verdict;
+}
+
+ViewVerdict ViewSearch::by_labels(const Group& group) {
+  ViewVerdict verdict;
+  for (const Group::Member& member : group.members) {
+    verdict.add(by_labels_of(setting_.cameras[member.camera], member.wanted, 1));
+    if (!verdict.holds()) break;
+  }
+  return verdict;
+}
+
+ViewVerdict ViewSearch::by_labels_of(NodeId camera, const std::vector<WantedView>& wanted,
+                                     int step) {
+  if (wanted.empty()) return {};
+  ViewCheck::Labels labels;
+  labels.step = step;
+  labels.render = [&] { return render(camera, kLeafId.name).get(kLeafId); };
+  labels.cover = [&](std::span<const LabelledInstance> instances) {
+    return call_component("renderer '" + setting_.job.renderer.type + "'",
+                          [&] { return setting_.renderer.cover(camera, instances); });
+  };
+  return check_->by_labels(setting_.scene, camera, wanted, labels);
 }
 
 ViewVerdict ViewSearch::by_light(const Group& group) {

@@ -42,11 +42,11 @@ class SavedView {
 std::uint64_t view_number(const Job& job, const ViewRule& rule, int capture, std::size_t camera,
                           std::size_t cameras);
 
-/// Nodes with a sixteenth of a camera's pixels, which views are judged by before all of them are
-/// looked at.
+/// Nodes with few of a camera's pixels, which views are judged by before all of them are looked at.
 struct SmallCameras {
-  std::map<NodeId, NodeId> of_labels;  ///< By camera; every fourth pixel across and down.
-  std::map<NodeId, NodeId> of_light;   ///< The same view in larger pixels, for the brightness.
+  /// By camera; rays of fewer and of more of its pixels, as kGridSteps says.
+  std::map<NodeId, std::vector<NodeId>> of_labels;
+  std::map<NodeId, NodeId> of_light;  ///< The same view in larger pixels, for the brightness.
 };
 
 /// Makes them for the cameras whose views rules speak of.
@@ -99,7 +99,9 @@ class ViewSearch {
   void draw_anew(const std::vector<Group*>& pending);
   ViewVerdict by_place(const Group& group) const;
   void place_small_cameras(const Group& group);
-  ViewVerdict by_labels(const Group& group, bool is_coarse);
+  ViewVerdict by_grid(const Group& group, std::size_t grid);
+  ViewVerdict by_labels(const Group& group);
+  ViewVerdict by_labels_of(NodeId camera, const std::vector<WantedView>& wanted, int step);
   ViewVerdict by_light(const Group& group);
   Frame render(NodeId camera, std::string_view channel);
   void prepare();

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <utility>
 
@@ -36,14 +37,15 @@ struct OrbitCameras::Surroundings {
   Obstacles blocking;         ///< What may not stand between a camera and its target.
   Obstacles all;              ///< What may not be too near to a camera.
   std::vector<Vec3> targets;  ///< Empty: nothing fits the pattern.
+  std::vector<NodeId> placed;
 
   std::uint64_t shape_revision = 0;
-  std::vector<std::pair<NodeId, Affine>> poses;  ///< In the world, of all that this depends on.
+  std::map<NodeId, Affine> poses;  ///< In their parents, of all that this depends on.
 
   bool is_of(const Scene& scene) const {
     return scene.shape_revision() == shape_revision &&
            std::all_of(poses.begin(), poses.end(), [&](const auto& pose) {
-             return scene.world_from_node(pose.first).matrix() == pose.second.matrix();
+             return scene[pose.first].parent_from_node.matrix() == pose.second.matrix();
            });
   }
 };
@@ -87,10 +89,13 @@ void OrbitCameras::look_around(const Scene& scene) {
       Surroundings{Obstacles(scene, avoid ? params_.obstacles : std::string()),
                    Obstacles(scene, avoid ? "/**" : ""),
                    centres_of(scene, targets),
+                   scene.match(params_.nodes),
                    scene.shape_revision(),
                    {}});
   const auto depend_on = [&](NodeId node) {
-    surroundings_->poses.emplace_back(node, scene.world_from_node(node));
+    for (; node && surroundings_->poses.emplace(node, scene[node].parent_from_node).second;) {
+      node = scene[node].parent;
+    }
   };
   for (const NodeId node : scene.subtree(scene.root())) {
     if (scene[node].mesh) depend_on(node);
@@ -156,8 +161,6 @@ Affine OrbitCameras::pose_of(const View& view) const {
 }
 
 void OrbitCameras::randomize(Scene& scene, const RandomizeContext& context, const Rng& rng) {
-  const std::vector<NodeId> nodes = scene.match(params_.nodes);
-  if (nodes.empty()) return;
   look_around(scene);
   const std::vector<Vec3> targets = surroundings_->targets.empty()
                                         ? std::vector<Vec3>{context.working_area_world}
@@ -166,7 +169,7 @@ void OrbitCameras::randomize(Scene& scene, const RandomizeContext& context, cons
     const View view = draw_free_view(targets, cameras_at(scene, node), draws);
     set_world_pose(scene, node, pose_of(view));
   };
-  draw_for_each(scene, nodes, context, rng, place);
+  draw_for_each(scene, surroundings_->placed, context, rng, place);
 }
 
 }  // namespace diorama

@@ -241,6 +241,9 @@ TEST_CASE("At the limit a job keeps the nearest view and says so, or ends", "[vi
   const Json report = Json::parse(read_file(folder / "kept/views.json"));
   CHECK(report["unmet"].size() == 2);
   CHECK(report["unmet"][0]["conditions"][0] == "seen.distance_m");
+  // The one that is kept was not refused.
+  CHECK(report["draws"] == 2 * 7);
+  CHECK(report["refused"] == Json{{"seen.distance_m", 2 * 6}});
 
   write_file(folder / "stop.yaml",
              job(impossible.substr(0, impossible.size() - 1) + ", at_limit: stop}", 2));

@@ -125,6 +125,22 @@ TEST_CASE("What leans against something and stands on nothing hangs in the air",
   CHECK(stage.unsettled() == Texts{"at_its_side: hangs in the air", "between: hangs in the air"});
 }
 
+TEST_CASE("What touches a board that leans by 5 degrees is not held by it, by one of 30 it is",
+          "[settle]") {
+  const auto leaning = [](double degrees) {
+    const double angle = degrees * kPi / 180.0;
+    Stage stage;
+    stage.add(stage.environment, "board", make_box(Vec3(0.5, 0.02, 2.0)),
+              at(2, 1, 1) * Eigen::AngleAxisd(-angle, Vec3::UnitX()));
+    // Its lower edge is a tenth of a millimetre before the board.
+    const double front = 1.0 - 0.01 / std::cos(angle) - 0.6 * std::tan(angle);
+    stage.add_object("box", kBox, at(2, front - 0.1 - 1e-4, 0.5));
+    return stage.unsettled();
+  };
+  CHECK(leaning(5.0) == Texts{"box: hangs in the air"});
+  CHECK(leaning(30.0) == Texts{});
+}
+
 TEST_CASE("A frame hangs on a peg by its upper bar, a box stands on a corner, a fork is sunk in",
           "[settle]") {
   Stage stage;

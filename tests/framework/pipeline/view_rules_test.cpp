@@ -70,12 +70,33 @@ struct Shown {
       }
       return ids;
     };
+    // Nothing is covered, nothing is outside.
+    labels.cover = [&](std::span<const LabelledInstance> instances) {
+      std::vector<CoverageMask> masks;
+      for (const LabelledInstance& instance : instances) {
+        const Rectangle& r = instance.node == near_thing ? near_one : far_one;
+        CoverageMask mask;
+        mask.box = {r.x / step, r.y / step, (r.x + r.width) / step, (r.y + r.height) / step};
+        mask.bits.assign(std::size_t(mask.box.width()) * std::size_t(mask.box.height()), 1);
+        masks.push_back(std::move(mask));
+      }
+      covered += int(instances.size());
+      return masks;
+    };
     const ViewVerdict verdict = check.by_labels(scene, camera, {wanted}, labels);
+    return verdict.holds() ? "" : verdict.failed.front();
+  }
+  /// The first condition that fails by place alone; empty: none.
+  std::string failed_by_place(const std::string& entry) const {
+    const Job job = job_from(job_with_views("{name: seen, targets: \"/**\", " + entry + "}"));
+    const ViewRule& rule = job.views.front();
+    const ViewVerdict verdict = ViewCheck(scene, {&rule}).by_place(scene, camera, {&rule, {}});
     return verdict.holds() ? "" : verdict.failed.front();
   }
 
   Scene scene;
   NodeId near_thing, far_thing, camera;
+  mutable int covered = 0;  ///< Things whose coverage was asked for.
 };
 
 }  // namespace
@@ -108,6 +129,45 @@ TEST_CASE("By few pixels a quota is missed where no other target can be the main
     CHECK(shown.failed(near, 4, {0, 10, 60, 60}, {80, 10, width, 60}) == "");
   }
   CHECK(shown.failed(near, 1, {0, 10, 60, 60}, {80, 10, 64, 60}) == "seen.quotas.distance_m");
+}
+
+TEST_CASE("What its box is too small for fails without a ray", "[views]") {
+  const Shown shown;
+  // 100 pixels per metre and metre: the near thing's box is 22 pixels wide, the far one's 7.
+  CHECK(shown.failed_by_place("visible_pixels: {min: 400}") == "");
+  CHECK(shown.failed_by_place("visible_pixels: {min: 700}") == "seen.visible_pixels");
+  CHECK(shown.failed_by_place("visible_pixels: {min: 100}, count: {min: 2}") ==
+        "seen.visible_pixels");
+  CHECK(shown.failed_by_place("size_px: {min: 20}") == "");
+  CHECK(shown.failed_by_place("size_px: {min: 30}") == "seen.size_px");
+  CHECK(shown.failed_by_place("size_share: {min: 0.3}") == "seen.size_share");
+  // A lens that bends lines tells nothing of the kind.
+  Shown bent;
+  bent.scene.edit(bent.camera).camera->lens = LensModel::OpencvPinhole;
+  CHECK(bent.failed_by_place("visible_pixels: {min: 700}") == "");
+}
+
+TEST_CASE("Coverage is asked for as long as it decides, the largest first", "[views]") {
+  const auto asked = [](const std::string& entry, int step, const Shown::Rectangle& far_one) {
+    const Shown shown;
+    const std::string failed = shown.failed(entry, step, {16, 16, 32, 32}, far_one);
+    return failed + " " + std::to_string(shown.covered);
+  };
+  const std::string open = "occlusion: {max: 0.9}";
+  const std::string near = open + ", quotas: [{of: distance_m, edges: [0.5, 2, 4]}]";
+  for (const int step : {1, 4}) {
+    INFO(step);
+    CHECK(asked(open, step, {80, 16, 16, 16}) == " 1");
+    CHECK(asked(open + ", count: {min: 2}", step, {80, 16, 16, 16}) == " 2");
+    CHECK(asked(open + ", count: {max: 3}", step, {80, 16, 16, 16}) == " 2");
+    // The main target is the far one, which lies in another part of the quota.
+    CHECK(asked(near, step, {64, 16, 80, 80}) == "seen.quotas.distance_m 1");
+  }
+  CHECK(asked(near, 1, {80, 16, 8, 8}) == " 1");
+  // Nobody is where the quota wants the main target to be.
+  const Shown shown;
+  CHECK(shown.failed(near, 1, {0, 0, 0, 0}, {64, 16, 80, 80}) == "seen.quotas.distance_m");
+  CHECK(shown.covered == 0);
 }
 
 TEST_CASE("Of every block of views each part of a quota gets its share exactly", "[views]") {
@@ -228,13 +288,13 @@ TEST_CASE("How views came about survives the journal and is added up", "[views]"
   const std::vector<ViewOutcome> first{
       {"cam_0", 5, {{"seen.truncation", 3}, {"seen.count", 1}}, {}, {{"seen.label", "mug"}}}};
   const std::vector<ViewOutcome> second{
-      {"cam_0", 2, {{"seen.truncation", 2}}, {"seen.truncation"}, {{"seen.label", "can"}}}};
+      {"cam_0", 2, {{"seen.truncation", 1}}, {"seen.truncation"}, {{"seen.label", "can"}}}};
   ViewCounts counts;
   counts.add(0, outcomes_from_json(outcomes_json(first)));
   counts.add(1, outcomes_from_json(outcomes_json(second)));
   const std::string text = views_text(views_json(counts));
   CHECK(text == views_text(counts));
-  CHECK_THAT(text, ContainsSubstring("views: 2 of 7 draws; 6 refused: seen.truncation 5, "
+  CHECK_THAT(text, ContainsSubstring("views: 2 of 7 draws; 5 refused: seen.truncation 4, "
                                      "seen.count 1"));
   CHECK_THAT(text, ContainsSubstring("quota seen.label: mug: 1"));
   CHECK_THAT(text, !ContainsSubstring("can: 1"));
