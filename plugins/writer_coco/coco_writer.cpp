@@ -10,6 +10,7 @@
 
 #include "diorama/error.h"
 #include "opencv_support/contours.h"
+#include "writer_support/clips_json.h"
 #include "writer_support/cuboid.h"
 #include "writer_support/image_files.h"
 #include "writer_support/lens_json.h"
@@ -106,8 +107,7 @@ Json image_json(const Capture& capture, std::size_t camera_index, int id, const 
             {"world_from_camera", nested_list(frame.world_from_camera.matrix())}};
   if (capture.clip) {
     json["video_id"] = video_id(capture, camera_index);
-    json["frame_index"] = capture.clip->frame;
-    json["time_s"] = python_round(capture.clip->time_s(), 9);
+    add_clip_frame(capture, json);
   }
   return json;
 }
