@@ -191,7 +191,8 @@ def check_clip(dataset, clip, pictures):
               f"{off.max():.2g} px (most); {sum_['hidden']} hidden, {sum_['outside']} left; "
               f"{sum_['other_ids'] / sum_['seen']:.4f} of the seen meet another id")
         check(median <= 0.1 and high <= 0.1, f"flow {way} is off by {median} px, {high} px")
-        check(sum_["wrong_inside"] == 0, f"flow {way}: {sum_['wrong_inside']} states of who leaves the picture")
+        # The border of the picture is met to a ten-thousandth of a pixel, as flow is single precision.
+        check(sum_["wrong_inside"] <= 1e-5 * sum_["seen"], f"flow {way}: {sum_['wrong_inside']} states of who leaves the picture")
         check(sum_["other_ids"] <= 0.02 * sum_["seen"], f"flow {way}: {sum_['other_ids']} seen points meet other ids")
         check(sum_["not_hidden"] <= 0.02 * max(1, sum_["hidden"]), f"flow {way}: {sum_['not_hidden']} hidden by nothing")
         check(sum_["hidden"] > 0 and sum_["outside"] > 0, f"flow {way}: nothing is hidden, or leaves")
@@ -386,13 +387,16 @@ def check_tracks(dataset, clip, place, cameras, tracks):
                     sources[name] = [frames[video + 1][frame] for frame in range(length)]
         check(len(sources) == 4, f"{camera}: tracks only in {sorted(sources)}")
         for name, frames in sources.items():
-            check([set(frame) for frame in frames] == [set(frame) for frame in own], f"{camera}: tracks of {name}")
+            # BasicWriter has ids of its own; whoever scores 1 has one name for each of them.
+            check([set(frame) for frame in frames] == [set(frame) for frame in sources["MOT"]],
+                  f"{camera}: tracks of {name} are not those of MOT")
             mota, switches, idf1 = scores(own, frames)
             check((mota, switches, idf1) == (1.0, 0, 1.0), f"{camera}: {name} scores {mota}, {switches}, {idf1}")
         # The judge is judged: two tracks that change names halfway are two switches.
-        longest = sorted({key for frame in own for key in frame}, key=lambda key: -sum(key in f for f in own))[:2]
+        told = sources["MOT"]
+        longest = sorted({key for frame in told for key in frame}, key=lambda key: -sum(key in f for f in told))[:2]
         swapped = [{(dict(zip(longest, longest[::-1])).get(key, key) if at >= length // 2 else key): box
-                    for key, box in frame.items()} for at, frame in enumerate(sources["MOT"])]
+                    for key, box in frame.items()} for at, frame in enumerate(told)]
         mota, switches, idf1 = scores(own, swapped)
         check(switches == 2 and idf1 < 1.0, f"{camera}: swapped names score {mota}, {switches}, {idf1}")
         boxes = sum(len(frame) for frame in own)
