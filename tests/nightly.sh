@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # What takes longer than CI may. Every part runs, whatever the others say; ends with a table, and with 1 when
 # one failed.
-#   tests/nightly.sh [PART]...   build mutants kills faults large cluster views soak fuzz sanitize tidy deb12 deb13 (default: all)
+#   tests/nightly.sh [PART]...   build mutants kills faults large cluster views clip soak fuzz sanitize tidy deb12 deb13 (default: all)
 # Needs root for cluster, deb12 and deb13. KILLS (1000), FAULTS (5000), SOAK_CAPTURES (10000) and FUZZ_MINUTES
 # (60, shared by all fuzzers) say how much. Logs are in build/nightly.
 set -uo pipefail
@@ -22,6 +22,11 @@ part_faults() { tests/cluster/torture.py --faults "${FAULTS:-5000}" --seed "$(da
 part_large() { build/release/tests/output_test '[.large]'; }
 part_cluster() { tests/cluster/run.sh; }
 part_views() { tests/chosen_views/check_views.py; }
+part_clip() {
+  local folder="$logs/clip"
+  build/release/bin/diorama run configs/clip.yaml --output "$folder" --overwrite --set renderer.samples=2 &&
+    /usr/bin/python3 tests/clips/check_clip.py "$folder"
+}
 part_soak() { tests/soak/run.sh "${SOAK_CAPTURES:-10000}"; }
 # What the fuzzers of ctest built, for longer; what they find to be new is kept in their corpus folders.
 part_fuzz() {
@@ -46,7 +51,7 @@ part_deb12() { packaging/build-deb.sh --with-tests && packaging/test-deb.sh; }
 part_deb13() { packaging/test-deb.sh trixie; }
 
 parts=("$@")
-if ((${#parts[@]} == 0)); then parts=(build mutants kills faults large cluster views soak fuzz sanitize tidy deb12 deb13); fi
+if ((${#parts[@]} == 0)); then parts=(build mutants kills faults large cluster views clip soak fuzz sanitize tidy deb12 deb13); fi
 for part in "${parts[@]}"; do
   if ! declare -F "part_$part" >/dev/null; then echo "nightly: there is no part '$part'" >&2; exit 2; fi
 done

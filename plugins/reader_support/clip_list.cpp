@@ -28,4 +28,23 @@ std::vector<DatasetClip> clips_of_json(const Json& list) {
   return clips;
 }
 
+void check_clip_frame(const Json& picture, std::span<const DatasetClip> clips, int capture,
+                      StoredFiles& files, const std::string& file, const std::string& who) {
+  const auto clip = clip_frame(clips, capture);
+  const auto said = [&](const char* key) {
+    const auto value = picture.find(key);
+    return value == picture.end() ? Json() : Json(*value);
+  };
+  const Json number = said("clip"), frame = said("frame_index"), time = said("time_s");
+  const bool holds = clip ? number == clip->clip && frame == clip->frame && time.is_number() &&
+                                std::abs(time.get<double>() - clip->time_s()) <= 1e-8
+                          : number.is_null() && frame.is_null() && time.is_null();
+  files.check(holds, kCounts, file, who,
+              "its clip, frame and time are " + number.dump() + ", " + frame.dump() + ", " +
+                  time.dump(),
+              clip ? std::to_string(clip->clip) + ", " + std::to_string(clip->frame) + ", " +
+                         std::to_string(clip->time_s()) + ", as dataset.json says"
+                   : "none, as dataset.json says");
+}
+
 }  // namespace diorama

@@ -10,6 +10,7 @@
 
 #include "diorama/error.h"
 #include "opencv_support/contours.h"
+#include "writer_support/clips_json.h"
 #include "writer_support/cuboid.h"
 #include "writer_support/image_files.h"
 #include "writer_support/lens_json.h"
@@ -90,6 +91,12 @@ Json rle_json(const Frame& frame, const Instance& instance) {
   return coco_rle(run_length(frame.get(kInstanceId), instance.id, *instance.tight_box));
 }
 
+/// Tools for videos take the runs as numbers only.
+Json runs_json(const Frame& frame, const Instance& instance) {
+  const RunLength runs = run_length(frame.get(kInstanceId), instance.id, *instance.tight_box);
+  return {{"size", {runs.height, runs.width}}, {"counts", runs.counts}};
+}
+
 Json image_json(const Capture& capture, std::size_t camera_index, int id, const std::string& file,
                 const Json& licenses) {
   const Frame& frame = capture.frames[camera_index];
@@ -106,8 +113,7 @@ Json image_json(const Capture& capture, std::size_t camera_index, int id, const 
             {"world_from_camera", nested_list(frame.world_from_camera.matrix())}};
   if (capture.clip) {
     json["video_id"] = video_id(capture, camera_index);
-    json["frame_index"] = capture.clip->frame;
-    json["time_s"] = python_round(capture.clip->time_s(), 9);
+    add_clip_frame(capture, json);
   }
   return json;
 }
@@ -416,7 +422,7 @@ void CocoWriter::write(const Capture& capture, CaptureFiles& files) const {
 }
 
 /// What YouTube-VIS needs of one picture: masks are those of the annotations, always as run
-/// lengths.
+/// lengths, and not packed.
 Json CocoWriter::video_frame(const Capture& capture, std::size_t camera, const std::string& file,
                              const std::vector<TrainingObject>& objects) const {
   const Frame& frame = capture.frames[camera];
@@ -427,7 +433,7 @@ Json CocoWriter::video_frame(const Capture& capture, std::size_t camera, const s
   for (const TrainingObject& object : objects) {
     json["objects"].push_back({{"track", object.instance->id},
                                {"category_id", category_id(object.class_index)},
-                               {"segmentation", rle_json(frame, *object.instance)},
+                               {"segmentation", runs_json(frame, *object.instance)},
                                {"bbox", box_json(*object.instance->tight_box)},
                                {"area", object.visible_px}});
   }

@@ -9,6 +9,8 @@
 #include <unordered_map>
 #include <utility>
 
+#include "writer_support/run_length.h"
+
 namespace diorama {
 namespace {
 
@@ -22,8 +24,17 @@ std::uint64_t box_digest(const Json& category, const Json& box, const Json& area
   return digest(Json::array({category, box, area}));
 }
 
+/// Packed masks and runs as numbers are equal when they mean the same.
 std::uint64_t mask_digest(const Json& segmentation) {
-  return segmentation.is_object() ? digest(segmentation) : 0;
+  if (!segmentation.is_object()) return 0;
+  const Json& counts = segmentation.at("counts");
+  if (!counts.is_array()) return digest(segmentation);
+  const Json& size = segmentation.at("size");
+  RunLength runs;
+  runs.height = whole_number<int>(size.at(0));
+  runs.width = whole_number<int>(size.at(1));
+  for (const Json& count : counts) runs.counts.push_back(whole_number<std::uint32_t>(count));
+  return digest(coco_rle(runs));
 }
 
 /// Where a frame of a video is: our writer counts videos by clip and camera, from 1.

@@ -11,6 +11,7 @@
 #include "reader_support/camera_json.h"
 #include "reader_support/capture_rows.h"
 #include "reader_support/channel_arrays.h"
+#include "reader_support/clip_list.h"
 #include "reader_support/frame_reading.h"
 #include "reader_support/picture_list.h"
 #include "writer_hdf5/hdf5_view.h"
@@ -191,6 +192,7 @@ class Hdf5PictureReading : private FrameReading {
       : FrameReading(dataset.folder_, dataset.host_, dataset.info_, picture.capture,
                      dataset.pictures_.cameras()[picture.camera], wanted, log),
         dataset_(dataset),
+        capture_(picture.capture),
         file_(dataset.file_of(picture)) {}
 
   std::optional<Frame> read(FrameSources& sources) {
@@ -339,6 +341,11 @@ class Hdf5PictureReading : private FrameReading {
     with("lens", [&] {
       read_lens_entry(Json{{"lens", parse_stored_json(view_->text("lens"))}}, camera);
     });
+    if (dataset_.page_) {
+      Json clip = Json::object();
+      with("clip", [&] { clip = parse_stored_json(view_->text("clip")); });
+      check_clip_frame(clip, dataset_.page_->clips, capture_, files_, file_, "clip");
+    }
     with("world_from_camera",
          [&] { frame_.world_from_camera = pose_of(view_->read("world_from_camera")); });
     with("cam_states", [&] {
@@ -463,6 +470,7 @@ class Hdf5PictureReading : private FrameReading {
   }
 
   const Hdf5Dataset& dataset_;
+  int capture_ = 0;
   std::string file_;
   std::optional<Hdf5View> view_;
   std::map<std::uint32_t, std::int64_t> categories_;  ///< By idx.

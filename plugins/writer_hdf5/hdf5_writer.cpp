@@ -7,6 +7,7 @@
 #include <span>
 
 #include "writer_hdf5/hdf5_file.h"
+#include "writer_support/clips_json.h"
 #include "writer_support/lens_json.h"
 
 namespace diorama {
@@ -88,6 +89,7 @@ Hdf5Writer::Hdf5Writer(Params params, Host&)
                                          "cam_K",
                                          "world_from_camera",
                                          "lens",
+                                         "clip",
                                          "instance_attribute_maps"};
   params_.channels.check(kTaken);
 }
@@ -111,7 +113,7 @@ void Hdf5Writer::begin(const DatasetInfo& dataset, DatasetFiles& files) {
       dataset, files);
 }
 
-void Hdf5Writer::write_frame(const Frame& frame, CaptureFiles& files,
+void Hdf5Writer::write_frame(const Capture& capture, const Frame& frame, CaptureFiles& files,
                              const std::string& path) const {
   const Camera& camera = frame.camera;
   const auto objects = training_.objects(frame);
@@ -140,6 +142,11 @@ void Hdf5Writer::write_frame(const Frame& frame, CaptureFiles& files,
   file.add("cam_K", std::array{std::size_t(3), std::size_t(3)}, intrinsics.data());
   file.add("world_from_camera", std::array{std::size_t(4), std::size_t(4)}, rows.data());
   file.add_text("lens", python_json(lens_json(camera)));
+  if (capture.clip) {
+    Json clip = Json::object();
+    add_clip_frame(capture, clip);
+    file.add_text("clip", python_json(clip));
+  }
   file.add_text("instance_attribute_maps",
                 python_json(attributes_json(objects, training_.classes())));
   file.append_to(files, path);
@@ -147,7 +154,7 @@ void Hdf5Writer::write_frame(const Frame& frame, CaptureFiles& files,
 
 void Hdf5Writer::write(const Capture& capture, CaptureFiles& files) const {
   for (const Frame& frame : capture.frames) {
-    write_frame(frame, files,
+    write_frame(capture, frame, files,
                 std::string(training_.split(capture.index)) + "/" +
                     training_.image_stem(capture, frame) + ".hdf5");
   }

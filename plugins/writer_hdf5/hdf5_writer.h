@@ -37,7 +37,8 @@ class Hdf5Writer final : public Writer {
   void write(const Capture& capture, CaptureFiles& files) const override;
 
  private:
-  void write_frame(const Frame& frame, CaptureFiles& files, const std::string& path) const;
+  void write_frame(const Capture& capture, const Frame& frame, CaptureFiles& files,
+                   const std::string& path) const;
 
   Params params_;
   TrainingData training_;

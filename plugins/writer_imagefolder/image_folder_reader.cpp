@@ -8,6 +8,7 @@
 
 #include "diorama/error.h"
 #include "reader_support/capture_rows.h"
+#include "reader_support/clip_list.h"
 #include "reader_support/frame_reading.h"
 #include "reader_support/label_text.h"
 #include "reader_support/listed_boxes.h"
@@ -375,6 +376,7 @@ class ImageFolderReading : private FrameReading {
     said("width", frame_.camera.width);
     said("height", frame_.camera.height);
     said("capture", entry_.capture);
+    check_clip_frame(row_, dataset_.page_->clips, entry_.capture, files_, table_.path(), file);
     said("image_id", entry_.capture * int(dataset_.page_->cameras.size()) + int(entry_.camera));
     const auto camera = row_.find("camera");
     files_.check(camera != row_.end() && *camera == frame_.camera_name, kCounts, table_.path(),

@@ -4,6 +4,8 @@
 #include <string>
 #include <string_view>
 
+#include "writer_support/clips_json.h"
+
 namespace diorama {
 namespace {
 
@@ -60,13 +62,15 @@ std::string ImageFolderWriter::metadata_line(const Capture& capture, std::size_t
     objects["id"].push_back(instance.id);
     objects["visible_share"].push_back(python_round(1.0 - hidden, 6));
   }
-  return python_json(Json{{"file_name", file},
-                          {"image_id", capture.index * training_.camera_count() + int(camera)},
-                          {"width", frame.camera.width},
-                          {"height", frame.camera.height},
-                          {"capture", capture.index},
-                          {"camera", frame.camera_name},
-                          {"objects", std::move(objects)}});
+  Json row{{"file_name", file},
+           {"image_id", capture.index * training_.camera_count() + int(camera)},
+           {"width", frame.camera.width},
+           {"height", frame.camera.height},
+           {"capture", capture.index},
+           {"camera", frame.camera_name}};
+  add_clip_frame(capture, row);
+  row["objects"] = std::move(objects);
+  return python_json(row);
 }
 
 /// The record is the lines of metadata.jsonl, a tab behind each: no JSON text holds one.

@@ -26,9 +26,16 @@ std::string track_line(int frame, const TrainingObject& object) {
   return text.data();
 }
 
+/// Tools read it as a whole number, which most rates are.
+std::string frame_rate(double fps) {
+  std::string text = python_float(fps);
+  if (text.ends_with(".0")) text.resize(text.size() - 2);
+  return text;
+}
+
 std::string sequence_page(const std::string& name, const Frame& frame, const ClipFrame& clip,
                           const std::string& ending) {
-  return "[Sequence]\nname=" + name + "\nimDir=img1\nframeRate=" + python_float(clip.fps) +
+  return "[Sequence]\nname=" + name + "\nimDir=img1\nframeRate=" + frame_rate(clip.fps) +
          "\nseqLength=" + std::to_string(clip.frame_count) +
          "\nimWidth=" + std::to_string(frame.camera.width) +
          "\nimHeight=" + std::to_string(frame.camera.height) + "\nimExt=." + ending + "\n";

@@ -3,6 +3,7 @@
 
 #include "writer_pose/overlay.h"
 #include "writer_pose/pose_json.h"
+#include "writer_support/clips_json.h"
 #include "writer_support/image_files.h"
 
 namespace diorama {
@@ -90,15 +91,17 @@ std::string PoseWriter::stem(const Capture& capture, std::size_t camera) const {
 
 void PoseWriter::write(const Capture& capture, CaptureFiles& files) const {
   for (std::size_t camera = 0; camera < capture.frames.size(); ++camera) {
-    write_frame(capture.frames[camera], stem(capture, camera), files);
+    write_frame(capture, capture.frames[camera], stem(capture, camera), files);
   }
 }
 
-void PoseWriter::write_frame(const Frame& frame, const std::string& stem,
+void PoseWriter::write_frame(const Capture& capture, const Frame& frame, const std::string& stem,
                              CaptureFiles& files) const {
   const auto objects = object_poses(frame, filter_, format_, params_.visibility_threshold);
   if (objects.empty() && params_.skip_empty_frames) return;
-  files.add_text(stem + ".json", python_json(pose_json(frame, objects, format_), 2));
+  Json json = pose_json(frame, objects, format_);
+  add_clip_frame(capture, json);
+  files.add_text(stem + ".json", python_json(json, 2));
   if (params_.image_output_format == "exr") {
     files.add(stem + ".exr", exr_file(host_, frame.get(kColorHdr)));
   } else {

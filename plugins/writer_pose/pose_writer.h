@@ -47,7 +47,8 @@ class PoseWriter final : public Writer {
 
  private:
   std::string stem(const Capture& capture, std::size_t camera) const;
-  void write_frame(const Frame& frame, const std::string& stem, CaptureFiles& files) const;
+  void write_frame(const Capture& capture, const Frame& frame, const std::string& stem,
+                   CaptureFiles& files) const;
   void add_picture(const std::string& stem, const Image<Rgba8>& picture, CaptureFiles& files) const;
 
   Params params_;

@@ -14,4 +14,11 @@ Json clips_json(std::span<const DatasetClip> clips) {
   return list;
 }
 
+void add_clip_frame(const Capture& capture, Json& json) {
+  if (!capture.clip) return;
+  json["clip"] = capture.clip->clip;
+  json["frame_index"] = capture.clip->frame;
+  json["time_s"] = python_round(capture.clip->time_s(), 9);
+}
+
 }  // namespace diorama

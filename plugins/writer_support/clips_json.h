@@ -12,4 +12,8 @@ namespace diorama {
 /// first_capture + f, and its time f / fps seconds.
 Json clips_json(std::span<const DatasetClip> clips);
 
+/// Puts "clip", "frame_index" and "time_s" (since the clip's first frame) into what a format says
+/// of one picture; nothing for captures that stand alone.
+void add_clip_frame(const Capture& capture, Json& json);
+
 }  // namespace diorama

@@ -15,6 +15,7 @@
 #include "reader_support/camera_json.h"
 #include "reader_support/capture_rows.h"
 #include "reader_support/channel_arrays.h"
+#include "reader_support/clip_list.h"
 #include "reader_support/frame_reading.h"
 #include "reader_support/label_text.h"
 #include "reader_support/listed_boxes.h"
@@ -503,6 +504,9 @@ class SampleReading : private FrameReading {
         kCounts, file_, key_, "its json says capture " + json_.at("capture").dump());
     files_.check(json_.at("camera").get<std::string>() == frame_.camera_name || !dataset_.page_,
                  kCounts, file_, key_, "its json says camera " + json_.at("camera").dump());
+    if (dataset_.page_) {
+      check_clip_frame(json_, dataset_.page_->clips, sample_.capture, files_, file_, key_);
+    }
     frame_.camera.fx = json_.at("intrinsics").at(0).get<double>();
     frame_.camera.fy = json_.at("intrinsics").at(1).get<double>();
     frame_.camera.cx = json_.at("intrinsics").at(2).get<double>();

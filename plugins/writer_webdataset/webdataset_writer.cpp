@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "diorama/error.h"
+#include "writer_support/clips_json.h"
 #include "writer_support/image_files.h"
 #include "writer_support/lens_json.h"
 #include "writer_support/npy.h"
@@ -159,6 +160,7 @@ Json WebDatasetWriter::sample_json(const Capture& capture, const Frame& frame,
             {"lens", lens_json(camera)},
             {"world_from_camera", nested_list(frame.world_from_camera.matrix())},
             {"objects", Json::array()}};
+  add_clip_frame(capture, json);
   for (const TrainingObject& object : objects) {
     json["objects"].push_back(
         object_json(object, training_.classes()[std::size_t(object.class_index)]));

@@ -295,6 +295,28 @@ TEST_CASE("Clips are the same bytes for any threads, visits in flight, shards an
     }
     CHECK(difference(expected, tree(folder / "out")) == "");
   }
+  {
+    // Workers that take visits, one of which dies in a clip.
+    const TemporaryFolder folder;
+    write_file(folder / "job.yaml", clip_job());
+    std::vector<Process> workers;
+    for (int i = 0; i < 3; ++i) {
+      const fs::path place = folder / ("worker" + std::to_string(i));
+      fs::create_directories(place);
+      workers.emplace_back(std::vector<std::string>{"run", "../job.yaml", "--output", "../out",
+                                                    "--shard", "auto", "--threads", "1"},
+                           place);
+    }
+    CHECK(wait_for_captures(folder / "out", 2));
+    workers[0].signal(SIGKILL);
+    for (Process& worker : workers) {
+      const Outcome outcome = worker.wait();
+      INFO(outcome.errors);
+      if (&worker != &workers[0]) CHECK(outcome.exit_code == 0);
+    }
+    CHECK(run({"run", "job.yaml", "--shard", "auto"}, folder.path()).exit_code == 0);
+    CHECK(difference(expected, tree(folder / "out")) == "");
+  }
   const TemporaryFolder folder;
   write_file(folder / "job.yaml", clip_job());
   const std::vector<std::string> arguments{"run", "job.yaml", "--resume"};
@@ -437,7 +459,7 @@ TEST_CASE("Formats with tracks call one object the same in every frame, and are 
     if (!name.starts_with("mot/") || !name.ends_with("gt/gt.txt")) continue;
     const std::string sequence = name.substr(4, name.size() - 4 - 10);
     CHECK_THAT(files.at("mot/" + sequence + "/seqinfo.ini"),
-               ContainsSubstring("frameRate=24.0\nseqLength=6\nimWidth=96\nimHeight=72"));
+               ContainsSubstring("frameRate=24\nseqLength=6\nimWidth=96\nimHeight=72"));
     std::istringstream lines(text);
     for (std::string line; std::getline(lines, line);) {
       std::size_t end = 0;
@@ -505,6 +527,49 @@ TEST_CASE("Formats with tracks call one object the same in every frame, and are 
   CHECK_THAT(finding("1,2,3\n" + gt), ContainsSubstring("line 1 has 3 fields, not 9"));
   fs::remove(folder / (broken + "/img1/000003.png"));
   CHECK(run({"lint", "out/mot"}, folder.path()).exit_code != 0);
+}
+
+TEST_CASE("Formats with a place for it say clip, frame and time of each picture", "[run]") {
+  const TemporaryFolder folder;
+  std::string job = clip_job("{fps: 24, seconds: 0.25}", "6");
+  job.insert(job.find("output:"), R"(  - {type: WebDatasetWriter, name: web, val_share: 0}
+  - {type: ImageFolderWriter, name: hugging, val_share: 0}
+  - {type: PoseWriter, name: pose}
+)");
+  write_file(folder / "job.yaml", job);
+  const Outcome outcome = run({"run", "job.yaml"}, folder.path());
+  INFO(outcome.errors);
+  REQUIRE(outcome.exit_code == 0);
+  const auto files = tree(folder / "out");
+  // By capture, then camera; in an archive the texts of JSON stand as they are.
+  std::string web;
+  for (const auto& [path, bytes] : files) {
+    if (path.starts_with("web/") && path.ends_with(".tar")) web += bytes;
+  }
+  std::istringstream rows(files.at("hugging/train/metadata.jsonl"));
+  int number = 0;
+  for (std::string line; std::getline(rows, line); ++number) {
+    const Json row = Json::parse(line);
+    CHECK(row.at("clip") == 0);
+    CHECK(row.at("frame_index") == number / 2);
+    CHECK(std::abs(row.at("time_s").get<double>() - number / 2 / 24.0) < 1e-8);
+    const std::string text = R"("clip": 0, "frame_index": )" + std::to_string(number / 2) +
+                             R"(, "time_s": )" + row.at("time_s").dump();
+    CHECK_THAT(web, ContainsSubstring(text));
+    const std::string pose = "000000" + std::to_string(number);
+    const std::string file = "pose/" + pose.substr(pose.size() - 6) + ".json";
+    CHECK(Json::parse(files.at(file)).at("frame_index") == number / 2);
+  }
+  CHECK(number == 12);
+  CHECK(run({"lint", "out"}, folder.path()).exit_code == 0);
+
+  const std::string name = "out/hugging/train/metadata.jsonl";
+  std::string text = read_file(folder / name);
+  text.replace(text.find(R"("frame_index": 3)"), 16, R"("frame_index": 4)");
+  write_file(folder / name, text);
+  const Outcome lint = run({"lint", "out/hugging"}, folder.path());
+  CHECK(lint.exit_code != 0);
+  CHECK_THAT(lint.output, ContainsSubstring("its clip, frame and time are 0, 4"));
 }
 
 TEST_CASE("Tracking folders of others are read, and what is wrong with them is said", "[run]") {
