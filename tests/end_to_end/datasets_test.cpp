@@ -141,7 +141,7 @@ settle: {policy: keep}
 renderer: {type: "null"}
 timeline: [{simulate: 14}, {record: {name: fall, fps: 24, seconds: 0.25}}]
 writers:
-  - {type: BasicWriter, name: basic, instance_segmentation: true, semantic_segmentation: true,
+  - {type: BasicWriter, name: basic, rgb: true, instance_segmentation: true, semantic_segmentation: true,
      bounding_box_2d_tight: true, bounding_box_2d_loose: true, bounding_box_3d: true, camera_params: true,
      distance_to_camera: true}
   - {type: Hdf5Writer, name: hdf5}
