@@ -39,12 +39,12 @@ void check_clip_frame(const Json& picture, std::span<const DatasetClip> clips, i
   const bool holds = clip ? number == clip->clip && frame == clip->frame && time.is_number() &&
                                 std::abs(time.get<double>() - clip->time_s()) <= 1e-8
                           : number.is_null() && frame.is_null() && time.is_null();
-  files.check(holds, kCounts, file, who,
-              "its clip, frame and time are " + number.dump() + ", " + frame.dump() + ", " +
-                  time.dump(),
-              clip ? std::to_string(clip->clip) + ", " + std::to_string(clip->frame) + ", " +
-                         std::to_string(clip->time_s()) + ", as dataset.json says"
-                   : "none, as dataset.json says");
+  files.check(
+      holds, kCounts, file, who,
+      "its clip, frame and time are " + number.dump() + ", " + frame.dump() + ", " + time.dump(),
+      clip ? std::to_string(clip->clip) + ", " + std::to_string(clip->frame) + ", " +
+                 std::to_string(clip->time_s()) + ", as dataset.json says"
+           : "none, as dataset.json says");
 }
 
 }  // namespace diorama

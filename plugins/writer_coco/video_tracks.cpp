@@ -27,8 +27,10 @@ std::uint64_t box_digest(const Json& category, const Json& box, const Json& area
 /// Packed masks and runs as numbers are equal when they mean the same.
 std::uint64_t mask_digest(const Json& segmentation) {
   if (!segmentation.is_object()) return 0;
+  if (!segmentation.contains("counts") || !segmentation.at("counts").is_array()) {
+    return digest(segmentation);
+  }
   const Json& counts = segmentation.at("counts");
-  if (!counts.is_array()) return digest(segmentation);
   const Json& size = segmentation.at("size");
   RunLength runs;
   runs.height = whole_number<int>(size.at(0));
