@@ -57,7 +57,7 @@ class FolderNames {
       return is_last ? fs::is_regular_file(folder / part, error) : holds_rest(part);
     }
     // Most names differ before or after what the stars stand for, which is cheap to see.
-    constexpr const char* kSpecial = "*?[]\\";
+    constexpr const char* kSpecial = R"(*?[]\)";
     const std::string_view front = std::string_view(part).substr(0, part.find_first_of(kSpecial));
     const std::string_view back = std::string_view(part).substr(part.find_last_of(kSpecial) + 1);
     return std::ranges::any_of(of(folder), [&](const Name& each) {
