@@ -62,7 +62,7 @@ cameras:
   - {type: pinhole, name: cam, count: 1, width: 48, height: 32}
 randomizers:
   - {type: scatter_poses, name: poses, on: [environment], nodes: "/Assets/*",
-     offset: [[-0.5, 0.5], [-0.5, 0.5], [1.0, 1.5]], scale: [0.9, 1.2]}
+     offset: [[-0.5, 0.5], [-0.5, 0.5], [1.0, 1.5]], scale: {choice: {choices: [0.9, 1.05, 1.2]}}}  # BOP has a model per size
   - {type: scatter_poses, name: shape_poses, on: [environment], nodes: "/Distractors/*",
      offset: [[-1.0, 1.0], [-1.0, 1.0], [1.0, 1.6]], scale: [0.02, 0.08]}
   - {type: random_colors, name: colors, on: [floating, dropped], nodes: "/Distractors/**"}
