@@ -210,11 +210,14 @@ Trial run_trial(const GlobalOptions& global, const Value& given, const TrialOpti
   const double factor = trial.samples > 0 ? double(trial.job_samples) / trial.samples : 1.0;
   trial.estimate = estimate_of(summary, assembly.plan,
                                assembly.components.sets.front().renderer->report(), factor);
-  // Each visit has a scene and components of its own; the trial made one visit at a time.
+  // Each visit has a scene and components of its own. What visits leave to others, as pictures of
+  // assets, is about as much as one of its own: those of a trial one after the other count, too.
   trial.estimate.visits_at_a_time =
       visits_at_a_time(assembly, *services.host, options.visits_in_flight);
+  const double more = double(trial.estimate.visits_at_a_time) /
+                      double(std::max<std::size_t>(summary.visits.size(), 1));
   trial.estimate.memory_bytes =
-      before_visits + trial.estimate.visits_at_a_time * (peak_memory_bytes() - before_visits);
+      before_visits + std::max(1.0, more) * (peak_memory_bytes() - before_visits);
   return trial;
 }
 

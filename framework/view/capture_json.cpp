@@ -109,7 +109,10 @@ Json object_json(const StoredInfo& info, const Frame& frame, const Instance& ins
     }
     if (holds(kHoldsTruncation)) object["truncation"] = rounded(seen.truncation(), 1e-4);
     if (holds(kHoldsAmodalBoxes)) object["amodal_box"] = box_json(seen.amodal_box);
-    if (seen.visible_pixels > 0) object["visible_pixels"] = seen.visible_pixels;
+    // Formats that hold shares alone have readers that give pixels of a size which no picture has.
+    const auto pixels = std::int64_t(frame.camera.width) * frame.camera.height;
+    const bool are_counted = seen.visible_pixels > 0 && seen.amodal_pixels <= pixels;
+    if (are_counted) object["visible_pixels"] = seen.visible_pixels;
   }
   if (const auto seen = seen_from(info, frame, instance)) {
     object["distance_m"] = rounded(seen->distance_m, 1e-4);

@@ -127,6 +127,29 @@ TEST_CASE("names in a dataset neither lead out of it nor to what never ends", "[
   }
 }
 
+TEST_CASE("files that become pipes while a dataset is open are not waited for", "[lint]") {
+  for (const test::SampleFormat& format : test::every_format()) {
+    INFO(format.name);
+    const DatasetOnDisk disk = sample(format.name);
+    test::EncodingHost host;
+    DatasetReaders readers = test::every_reader(host);
+    const std::string reader = readers.recognise(disk.folder());
+    if (reader.empty()) continue;
+    const auto dataset = readers.open(disk.folder(), reader);
+    std::vector<std::filesystem::path> files;
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(disk.folder())) {
+      if (entry.is_regular_file()) files.push_back(entry.path());
+    }
+    for (const std::filesystem::path& file : files) {
+      std::filesystem::remove(file);
+      REQUIRE(mkfifo(file.c_str(), 0600) == 0);
+    }
+    for (std::size_t i = 0; i < dataset->info().captures.size(); ++i) {
+      CHECK_FALSE(dataset->read(i, dataset->info().holds).log.findings.empty());
+    }
+  }
+}
+
 TEST_CASE("a page without an end is a finding", "[lint]") {
   const DatasetOnDisk basic = sample("basic");
   basic.write("dataset.json", "{}");

@@ -78,6 +78,10 @@ class HostileDataset final : public StoredDataset {
     instance.visibility = Visibility{};
     instance.visibility->visible_pixels = 6;
     instance.visibility->amodal_pixels = 8;
+    if (i == 2) {  // as readers of formats with shares alone
+      instance.visibility->visible_pixels = 3 << 22;
+      instance.visibility->amodal_pixels = 4 << 22;
+    }
     frame.instances.push_back(instance);
     if (wanted.contains(kColor.name)) {
       Image<Rgba8> color(6, 4, Rgba8{10, 20, 30, 255});
@@ -252,6 +256,10 @@ TEST_CASE("Hostile texts arrive as texts in JSON", "[view]") {
   CHECK(object["path"] == kHostile);
   CHECK(object["box"] == Json({1, 1, 4, 3}));
   CHECK(object["occlusion"] == 0.25);
+  CHECK(object["visible_pixels"] == 6);
+  const Json share = viewed.json("/api/0/capture/9")["frames"][0]["objects"][0];
+  CHECK(share["occlusion"] == 0.25);
+  CHECK_FALSE(share.contains("visible_pixels"));
   // The corner (-0.1, -0.2, -0.3) of the box at z = -2 is 2.3 m before the camera.
   CHECK(object["edges"].size() == 12);
   CHECK(object["edges"][0][0].get<double>() == Approx(3.0 - 5.0 * 0.1 / 2.3).margin(0.006));
