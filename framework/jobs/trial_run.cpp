@@ -214,8 +214,8 @@ Trial run_trial(const GlobalOptions& global, const Value& given, const TrialOpti
   // assets, is about as much as one of its own: those of a trial one after the other count, too.
   trial.estimate.visits_at_a_time =
       visits_at_a_time(assembly, *services.host, options.visits_in_flight);
-  const double more = double(trial.estimate.visits_at_a_time) /
-                      double(std::max<std::size_t>(summary.visits.size(), 1));
+  const double more =
+      trial.estimate.visits_at_a_time / std::max(1.0, double(summary.settled.visit_count()));
   trial.estimate.memory_bytes =
       before_visits + std::max(1.0, more) * (peak_memory_bytes() - before_visits);
   return trial;

@@ -145,7 +145,9 @@ TEST_CASE("files that become pipes while a dataset is open are not waited for", 
       REQUIRE(mkfifo(file.c_str(), 0600) == 0);
     }
     for (std::size_t i = 0; i < dataset->info().captures.size(); ++i) {
-      CHECK_FALSE(dataset->read(i, dataset->info().holds).log.findings.empty());
+      const auto stored = dataset->read(i, dataset->info().holds);
+      // The third party's reader has read its only table when the dataset was opened.
+      CHECK((format.name == std::string_view("boxes") || !stored.log.findings.empty()));
     }
   }
 }
