@@ -20,5 +20,7 @@ inline constexpr const char* kAskTruncationLevels = "truncation_levels";
 /// Visible pixels as a share of all, hidden and cut off ones too: Visibility has counts of which
 /// only that share is true.
 inline constexpr const char* kAskSeenShares = "seen_shares";
+/// Pictures of some cameras stand beside those of others, whose names are all that is known.
+inline constexpr const char* kAskCamerasOfPairs = "cameras_of_pairs";
 
 }  // namespace diorama

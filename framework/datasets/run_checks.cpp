@@ -102,8 +102,9 @@ void check_plan(const RunPlan& plan, const RunDataset& dataset, ReadLog& log) {
              "dataset.json plans " + std::to_string(plan.captures)});
   // A folder without any picture is one that was asked for nothing: what lost all of them has
   // nothing that it could be known by.
-  const bool has_names =
-      !info.camera_names.empty() && info.camera_names != std::vector<std::string>{"camera"};
+  const bool has_names = !info.camera_names.empty() &&
+                         info.camera_names != std::vector<std::string>{"camera"} &&
+                         !info.steps.contains(kAskCamerasOfPairs);
   for (const std::string& camera : plan.cameras) {
     log.check(!has_names || std::ranges::find(info.camera_names, camera) != info.camera_names.end(),
               {kNothingIsMissing, dataset.name, std::nullopt, camera, "",

@@ -205,17 +205,18 @@ ViewSearch::~ViewSearch() = default;
 
 WantedView ViewSearch::wanted_view(const ViewRule& rule, std::size_t camera) {
   const Scene& scene = setting_.scene;
-  std::size_t count = 0;
-  std::size_t place = 0;
+  // Cameras of a rig are drawn as one, and look at the same.
+  std::vector<NodeId> tops;
   const std::set<NodeId> own = nodes_of(scene, rule);
-  for (std::size_t i = 0; i < setting_.cameras.size(); ++i) {
-    if (!own.contains(setting_.cameras[i])) continue;
-    if (i < camera) ++place;
-    ++count;
+  for (const NodeId node : setting_.cameras) {
+    if (!own.contains(node)) continue;
+    const NodeId top = top_of(scene, node);
+    if (std::ranges::find(tops, top) == tops.end()) tops.push_back(top);
   }
+  const auto place = std::ranges::find(tops, top_of(scene, setting_.cameras[camera]));
   WantedView wanted{&rule, {}};
-  const std::uint64_t number =
-      view_number(setting_.job, rule, setting_.capture.index, place, count);
+  const std::uint64_t number = view_number(setting_.job, rule, setting_.capture.index,
+                                           std::size_t(place - tops.begin()), tops.size());
   for (std::size_t i = 0; i < rule.quotas.size(); ++i) {
     wanted.bins.emplace_back(
         quota_bin(rule.quotas[i], setting_.streams.views(rule.name, i), number));

@@ -15,6 +15,7 @@ inline constexpr const char* kHoldsTracks = "tracks";
 inline constexpr const char* kAskOcclusionLevels = "occlusion_levels";
 inline constexpr const char* kAskTruncationLevels = "truncation_levels";
 inline constexpr const char* kAskSeenShares = "seen_shares";
+inline constexpr const char* kAskCamerasOfPairs = "cameras_of_pairs";
 
 /// Counts that grow with the levels, for who has asked. Levels are 0 to 3, or shares.
 inline void tell_levels(const NameSet& wanted, double occlusion, double truncation,

@@ -241,6 +241,7 @@ class KittiDataset final : public StoredDataset {
     note_clips(clips_, info_);
     if (is_tracking_) info_.holds.emplace(kHoldsTracks);
     info_.steps[kAskOcclusionLevels] = info_.steps[kAskTruncationLevels] = 1.0;
+    if (is_stereo_) info_.steps[kAskCamerasOfPairs] = 1.0;
     info_.camera_names = pictures_.cameras();
     info_.captures = pictures_.captures();
     if (page_) info_.classes = page_->classes;

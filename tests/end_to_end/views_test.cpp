@@ -196,6 +196,34 @@ TEST_CASE("Views are the same bytes after kill -9 and resume, and are counted on
   CHECK(difference(whole, tree(folder / "killed")) == "");
 }
 
+TEST_CASE("Cameras of a rig share a part of each quota, and KITTI's pairs are linted", "[views]") {
+  const TemporaryFolder folder;
+  std::string text = job(R"(
+  {name: seen, targets: "/Assets/*", visible_pixels: {min: 12}, distance_m: {max: 2.2},
+   direction_space: world, elevation_deg: {min: -40}, max_tries: 2000,
+   quotas: [{of: direction, columns: 4, rows: 2}]}
+)",
+                         40);
+  const std::string camera = "width: 64, height: 48}";
+  text.replace(
+      text.find(camera), camera.size(),
+      "width: 64, height: 48, rig: [{name: left}, {name: right, position: [0.06, 0, 0]}]}");
+  const std::string writers = "writers: [";
+  text.replace(text.find(writers), writers.size(),
+               writers + "{type: KittiWriter, name: kitti, layout: stereo}, ");
+  const auto files = run_job(text, "out", folder);
+  CHECK(files.contains("kitti/training/image_3/000000.png"));
+  const Json report = Json::parse(read_file(folder / "out/views.json"));
+  CHECK(report["unmet"].empty());
+  for (const auto& [cell, count] : report["quotas"]["seen.direction"].items()) {
+    INFO(cell);
+    CHECK(count == 10);  // of 80 views
+  }
+  const Outcome lint = run({"lint", "out"}, folder.path());
+  INFO(lint.output);
+  CHECK(lint.exit_code == 0);
+}
+
 TEST_CASE("A resumed job says nothing anew of captures that it passes", "[views]") {
   const TemporaryFolder folder;
   write_file(folder / "keep.yaml",
