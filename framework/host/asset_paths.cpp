@@ -176,6 +176,12 @@ AssetPaths::AssetPaths(std::optional<fs::path> root, std::vector<AssetPrefix> pr
 
 std::vector<fs::path> AssetPaths::places_below(std::string_view asset) const {
   std::vector<fs::path> places;
+  const bool is_remote = is_url(asset);
+  // Nothing lies above the root of a server (RFC 3986, 5.2.4).
+  const auto plain = [&](const fs::path& path) {
+    return is_remote ? ("/" / path.relative_path()).lexically_normal().relative_path()
+                     : path.relative_path();
+  };
   const auto add = [&](const fs::path& below) {
     const fs::path place = *root_ / below.relative_path();
     if (std::find(places.begin(), places.end(), place) == places.end()) places.push_back(place);
@@ -183,15 +189,17 @@ std::vector<fs::path> AssetPaths::places_below(std::string_view asset) const {
   for (const AssetPrefix& one : prefixes_) {
     if (one.prefix.empty() || !asset.starts_with(one.prefix)) continue;
     const std::string rest(asset.substr(one.prefix.size()));
-    add(fs::path(one.below) / fs::path(is_url(asset) ? decoded(rest) : rest).relative_path());
+    add(fs::path(one.below) / plain(is_remote ? decoded(rest) : rest));
   }
   const std::string path = path_of(asset);
-  add(path);
+  add(plain(path));
   for (std::size_t slash = path.find('/', 1); slash != std::string::npos;
        slash = path.find('/', slash + 1)) {
     const std::string_view rest = std::string_view(path).substr(slash);
     const auto begins = [&](std::string_view folder) { return rest.starts_with(folder); };
-    if (std::any_of(std::begin(kKnownFolders), std::end(kKnownFolders), begins)) add(rest);
+    if (std::any_of(std::begin(kKnownFolders), std::end(kKnownFolders), begins)) {
+      add(plain(rest));
+    }
   }
   return places;
 }

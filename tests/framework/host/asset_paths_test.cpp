@@ -88,6 +88,16 @@ TEST_CASE("assets of servers and of other disks are looked up below the assets r
   }
   CHECK(paths.resolve("https://host/Isaac/Props/with%20space.usd") ==
         assets.root / "Isaac/Props/with space.usd");
+  // Nothing of a server lies above the assets root.
+  const fs::path outside = assets.root.string() + "_outside.usd";
+  std::ofstream(outside) << "x";
+  for (const char* up : {"../", "Isaac/../../", "Isaac/%2e%2e/%2E%2E/"}) {
+    CAPTURE(up);
+    const std::string error =
+        error_of([&] { paths.resolve("https://host/" + (up + outside.filename().string())); });
+    CHECK(error.find("remote assets are not fetched") != std::string::npos);
+  }
+  fs::remove(outside);
   // Other folders have other prefixes; the longest one counts, and what is not there is looked up
   // as ever.
   const AssetPaths mapped(assets.root, {{"omniverse://nucleus/", "/nowhere"},
