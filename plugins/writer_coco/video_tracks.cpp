@@ -39,10 +39,9 @@ std::uint64_t mask_digest(const Json& segmentation) {
   return digest(coco_rle(runs));
 }
 
-/// Where a frame of a video is: our writer counts videos by clip and camera, from 1.
-struct VideoFrame {
+/// The video of a capture's picture, and the clip that it is of.
+struct VideoOfClip {
   std::size_t clip = 0;
-  int frame = 0;
   std::int64_t video = 0;
 };
 
@@ -65,7 +64,7 @@ class VideoTracks {
     std::map<std::pair<std::int64_t, std::uint64_t>, std::uint32_t> tracks;
     for (const auto& [key, annotation] : of_frame_) {
       const auto& [capture, camera, track] = key;
-      const auto at = frame_of(capture, camera);
+      const auto at = video_at(capture, camera);
       if (!at) continue;
       const auto node = nodes.emplace(std::pair(at->video, track), annotation->node).first;
       const auto own = tracks.emplace(std::pair(at->video, annotation->node), track).first;
@@ -101,15 +100,16 @@ class VideoTracks {
   }
 
  private:
-  std::optional<VideoFrame> frame_of(int capture, std::size_t camera) const {
-    const auto& clips = page_.clips;
-    const auto next = std::ranges::upper_bound(clips, capture, {}, &DatasetClip::first);
-    if (next == clips.begin()) return std::nullopt;
-    const auto clip = std::prev(next);
-    if (capture >= clip->first + clip->count) return std::nullopt;
-    const auto place = std::size_t(clip - clips.begin());
-    return VideoFrame{place, capture - clip->first,
-                      std::int64_t(place * page_.cameras.size() + camera) + 1};
+  /// Our writer counts videos by clip and camera, from 1.
+  std::int64_t video_of(std::size_t clip, std::size_t camera) const {
+    return std::int64_t(clip * page_.cameras.size() + camera) + 1;
+  }
+
+  std::optional<VideoOfClip> video_at(int capture, std::size_t camera) const {
+    const auto at = clip_frame(page_.clips, capture);
+    if (!at) return std::nullopt;
+    const auto clip = std::size_t(at->clip);
+    return VideoOfClip{clip, video_of(clip, camera)};
   }
 
   /// Clip and camera of a video; nothing for one that dataset.json does not tell of.
@@ -203,7 +203,7 @@ class VideoTracks {
     for (std::size_t clip = 0; clip < page_.clips.size(); ++clip) {
       if (!is_of_split(page_.clips[clip], split)) continue;
       for (std::size_t camera = 0; camera < page_.cameras.size(); ++camera) {
-        const auto video = std::int64_t(clip * page_.cameras.size() + camera) + 1;
+        const std::int64_t video = video_of(clip, camera);
         files_.check(videos_.contains(video), kMissing, file, "video " + std::to_string(video),
                      "is not there", "one for each clip and camera");
       }
@@ -211,7 +211,7 @@ class VideoTracks {
     std::set<std::pair<std::int64_t, std::uint32_t>> missing;
     for (const auto& [key, annotation] : of_frame_) {
       const auto& [capture, camera, track] = key;
-      const auto at = frame_of(capture, camera);
+      const auto at = video_at(capture, camera);
       if (!at || !is_of_split(page_.clips[at->clip], split)) continue;
       const bool is_there = told_.contains({at->video, track});
       if (!is_there) missing.emplace(at->video, track);
