@@ -5,6 +5,7 @@
 #include <array>
 #include <cctype>
 #include <cmath>
+#include <fstream>
 #include <map>
 #include <set>
 
@@ -25,6 +26,8 @@ namespace fs = std::filesystem;
 
 constexpr const char* kFormat = "Pascal VOC";
 constexpr const char* kAnnotations = "Annotations/";
+/// The benchmark's folder of annotations, or, beside pictures, the dataset's own.
+constexpr std::array kAnnotationFolders{kAnnotations, ""};
 constexpr std::uint32_t kBorder = 255;  ///< VOC's own objects have an outline of this value.
 
 /// Value of each colour of VOC's palette: three bits of a value, red, green and blue, from the top
@@ -63,6 +66,20 @@ Image<std::uint32_t> values_of(const StoredPicture& picture) {
   return values;
 }
 
+bool has_annotations(const fs::path& folder) {
+  constexpr std::size_t kMostLooked = 3;
+  std::size_t looked = 0;
+  for (const std::string& name : names_in(folder)) {
+    if (!name.ends_with(".xml")) continue;
+    std::string front(4096, '\0');
+    std::ifstream in = open_stored(folder / name);
+    in.read(front.data(), std::streamsize(front.size()));
+    if (front.find("<annotation") != front.npos) return true;
+    if (++looked == kMostLooked) break;
+  }
+  return false;
+}
+
 std::string lines_text(const std::vector<std::string>& lines) {
   std::string text;
   for (const std::string& line : lines) text += line + "\n";
@@ -75,7 +92,8 @@ class VocDataset final : public StoredDataset {
     page_ = read_dataset_page(folder_);
     StoredFiles files(folder_, host_, log_);
     std::vector<ListedPicture> listed;
-    for (const std::string& name : names_in(folder_ / "Annotations")) {
+    if (!page_ && names_in(folder_ / kAnnotations).empty()) annotations_ = "";
+    for (const std::string& name : names_in(folder_ / annotations_)) {
       if (name.ends_with(".xml")) listed.push_back({name.substr(0, name.size() - 4), "", 0, 0, 0});
     }
     if (listed.empty() && !page_) {
@@ -83,7 +101,7 @@ class VocDataset final : public StoredDataset {
     }
     pictures_.set(
         std::move(listed), page_,
-        [&](const std::string& stem) { return capture_and_camera(*page_, stem); }, {kAnnotations},
+        [&](const std::string& stem) { return capture_and_camera(*page_, stem); }, {annotations_},
         files);
     has_masks_ = fs::is_directory(folder_ / "SegmentationObject");
     read_lists(files);
@@ -217,6 +235,7 @@ class VocDataset final : public StoredDataset {
   fs::path folder_;
   const Host& host_;
   std::optional<DatasetPage> page_;
+  std::string annotations_ = kAnnotations;
   PictureList pictures_;
   std::map<std::string, std::string> split_of_;  ///< By stem.
   std::map<std::string, std::string> marks_of_;  ///< By stem: what the lists of the classes say.
@@ -235,7 +254,7 @@ class VocPictureReading : private FrameReading {
                      dataset.pictures_.cameras()[picture.camera], wanted, log),
         dataset_(dataset),
         picture_(picture),
-        xml_file_(kAnnotations + picture.stem + ".xml") {}
+        xml_file_(dataset.annotations_ + picture.stem + ".xml") {}
 
   std::optional<Frame> read(FrameSources& sources) {
     const auto text = files_.text(xml_file_);
@@ -261,6 +280,12 @@ class VocPictureReading : private FrameReading {
  private:
   void read_size() {
     const XmlElement* size = annotation_.child("size");
+    if (!size && !dataset_.page_) {
+      // Some tools leave it out.
+      const auto picture = files_.picture(picture_file());
+      if (!picture) throw std::runtime_error("has no <size>");
+      return set_size(*picture);
+    }
     if (!size) throw std::runtime_error("has no <size>");
     frame_.camera.width = integer_of(size->text_of("width"));
     frame_.camera.height = integer_of(size->text_of("height"));
@@ -288,19 +313,23 @@ class VocPictureReading : private FrameReading {
                  "the lists of the classes say " + said->second, expected);
   }
 
+  std::string picture_file() const {
+    const std::string plain = fs::path(annotation_.text_of("filename")).filename().string();
+    std::string file = "JPEGImages/" + plain;
+    if (files_.has(file) || dataset_.page_) return file;
+    for (const std::string& other : {kAnnotations + plain, "images/" + plain, plain}) {
+      if (files_.has(other)) file = other;
+    }
+    return file;
+  }
+
   void read_picture(FrameSources& sources) {
     const std::string name = annotation_.text_of("filename");
     const fs::path path(name);
     files_.check(!path.has_parent_path() && path.stem() == picture_.stem, kCounts, xml_file_, "",
                  "its filename is '" + name + "'", "that of a picture called " + picture_.stem);
     if (!wanted_.contains(kColor.name)) return;
-    const std::string plain = path.filename().string();
-    std::string file = "JPEGImages/" + plain;
-    if (!files_.has(file) && !dataset_.page_) {
-      for (const std::string& other : {kAnnotations + plain, "images/" + plain, plain}) {
-        if (files_.has(other)) file = other;
-      }
-    }
+    const std::string file = picture_file();
     const auto picture =
         files_.picture_of_size(file, frame_.camera.width, frame_.camera.height, xml_file_);
     if (!picture) return;
@@ -427,13 +456,12 @@ StoredCapture VocDataset::read(std::size_t i, const NameSet& wanted) const {
 
 }  // namespace
 
-std::vector<std::string> VocReader::patterns() const { return {"Annotations/*.xml"}; }
+std::vector<std::string> VocReader::patterns() const { return {"Annotations/*.xml", "*.xml"}; }
 
 Recognition VocReader::recognise(const fs::path& folder) const {
   if (recognise_page(folder, kFormat) == Recognition::ByName) return Recognition::ByName;
-  const auto names = names_in(folder / "Annotations");
-  const bool has_any =
-      std::ranges::any_of(names, [](const std::string& name) { return name.ends_with(".xml"); });
+  const bool has_any = std::ranges::any_of(
+      kAnnotationFolders, [&](const char* below) { return has_annotations(folder / below); });
   return has_any ? Recognition::ByFiles : Recognition::No;
 }
 

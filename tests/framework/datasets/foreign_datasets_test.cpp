@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "framework/datasets/opened_dataset.h"
+#include "reader_support/stored_files.h"
 #include "support/catch.h"
 #include "support/temporary_folder.h"
 
@@ -225,6 +226,88 @@ TEST_CASE("YOLO polygons and block-style names; a line in two is found", "[reade
   CHECK(finds(report, "ids within the label map", "labels/train/a.txt"));
 }
 
+TEST_CASE("COCO whose pictures were elsewhere: drives, folders of others, a mark in front",
+          "[readers]") {
+  const test::TemporaryFolder folder;
+  const auto page = [](const std::string& file) {
+    return "\xEF\xBB\xBF{\"images\": [{\"id\": 9007199254740993, \"file_name\": \"" + file +
+           "\", \"width\": 40, \"height\": 30}], \"categories\": [{\"id\": 0, \"name\": \"cup\"}], "
+           "\"annotations\": [{\"id\": 1, \"image_id\": 9007199254740993, \"category_id\": 0.0, "
+           "\"bbox\": [3, 4, 10, 12]}]}\r\n";
+  };
+  folder.write("data/sub/1.png", picture(40, 30, 90, ImageFormat::Png));
+  for (const char* name : {"sub/1.png", "sub\\\\1.png", "D:\\\\old\\\\data\\\\sub\\\\1.png",
+                           "/mnt/somewhere/data/sub/1.png", "../data/sub/1.png"}) {
+    INFO(name);
+    folder.write("labels.json", page(name));
+    const Opened opened(folder, "CocoReader");
+    const StoredCapture stored = opened.read(0);
+    const Frame& frame = stored.capture.frames.at(0);
+    REQUIRE(frame.has(kColor.name));
+    REQUIRE(frame.instances.size() == 1);
+    CHECK(*frame.instances[0].tight_box == PixelBox{3, 4, 13, 16});
+    CHECK(frame.instances[0].labels.at("class") == "cup");
+  }
+  folder.write("labels.json", page("/etc/passwd"));
+  CHECK(finds(lint(folder), "every file can be read", "labels.json"));
+  CHECK(possible_places("..\\a/./b") == std::vector<std::string>{"a/b", "b"});
+  CHECK(possible_places("/").empty());
+  CHECK(possible_places("a/../b/..").empty());
+}
+
+TEST_CASE("YOLO by any page's name, with labels beside pictures, and by lists", "[readers]") {
+  const std::string label = "\xEF\xBB\xBF" + std::string("1 0.5 0.5 0.25 0.5\r\n\r\n");
+  const auto check = [](const test::TemporaryFolder& folder, const std::string& name) {
+    const Opened opened(folder, "YoloReader");
+    const StoredCapture stored = opened.read(0);
+    const Frame& frame = stored.capture.frames.at(0);
+    REQUIRE(frame.instances.size() == 1);
+    CHECK(frame.instances[0].labels.at("class") == name);
+    CHECK(*frame.instances[0].tight_box == PixelBox{15, 5, 25, 15});
+    return stored.split;
+  };
+  SECTION("a page of another name") {
+    const test::TemporaryFolder folder;
+    folder.write("images/train2017/1.JPG", picture(40, 20, 50, ImageFormat::Jpeg));
+    folder.write("labels/train2017/1.txt", label);
+    folder.write("hyp.yaml", "lr0: 0.01\n");
+    folder.write("coco8.yaml",
+                 "path: ../datasets/coco8 # root\r\ntrain: images/train2017\r\nval: "
+                 "images/val2017\r\nnames:\r\n  0: person\r\n  1: \"hot dog\"\r\n");
+    CHECK(check(folder, "hot dog") == "train");
+  }
+  SECTION("a labelling tool's folder") {
+    const test::TemporaryFolder folder;
+    folder.write("1.png", picture(40, 20, 50, ImageFormat::Png));
+    folder.write("1.txt", label);
+    folder.write("classes.txt", "cup\r\nplate\r\n");
+    CHECK(check(folder, "plate").empty());
+  }
+  SECTION("Darknet's list") {
+    const test::TemporaryFolder folder;
+    folder.write("obj_train_data/1.png", picture(40, 20, 50, ImageFormat::Png));
+    folder.write("obj_train_data/1.txt", label);
+    folder.write("obj.names", "cup\nplate\n");
+    folder.write("train.txt", "data/obj_train_data/1.png\n");
+    CHECK(check(folder, "plate") == "train");
+  }
+  SECTION("a list with the paths of another machine") {
+    const test::TemporaryFolder folder;
+    folder.write("images/train/1.png", picture(40, 20, 50, ImageFormat::Png));
+    folder.write("labels/train/1.txt", label);
+    folder.write("train.txt", "/content/d/images/train/1.png\r\n");
+    folder.write("data.yaml", "train: /content/d/train.txt\nnc: 2\nnames: [cup, plate]\n");
+    CHECK(check(folder, "plate") == "train");
+  }
+  SECTION("texts beside pictures are no labels without a list of classes") {
+    const test::TemporaryFolder folder;
+    folder.write("1.png", picture(40, 20, 50, ImageFormat::Png));
+    folder.write("1.txt", "a caption\n");
+    test::EncodingHost host;
+    CHECK(test::every_reader(host).recognise(folder.path("")) != "YoloReader");
+  }
+}
+
 TEST_CASE("KITTI's own fifteen columns, DontCare, and a calibration with a shift", "[readers]") {
   const test::TemporaryFolder folder;
   folder.write("training/image_2/000007.png", picture(124, 38, 50, ImageFormat::Png));
@@ -308,6 +391,23 @@ TEST_CASE("VOC by a labelling tool: attributes, parts, floats, a border in the m
   for (int i = 0; i < 100000; ++i) deep += "<a>";
   folder.write("Annotations/2007_000032.xml", deep);
   CHECK(finds(lint(folder), "every file can be read", "2007_000032.xml"));
+}
+
+TEST_CASE("VOC of a labelling tool: beside its pictures, with a mark in front, without sizes",
+          "[readers]") {
+  const test::TemporaryFolder folder;
+  folder.write("1.png", picture(12, 10, 50, ImageFormat::Png));
+  folder.write("1.xml",
+               "\xEF\xBB\xBF<annotation><folder>me</folder><filename>1.png</filename>"
+               "<path>C:\\Users\\me\\1.png</path><object><name>cup</name><bndbox><xmin>2</xmin>"
+               "<ymin>3</ymin><xmax>9</xmax><ymax>8</ymax></bndbox></object></annotation>\r\n");
+  const Opened opened(folder, "VocReader");
+  const StoredCapture stored = opened.read(0);
+  const Frame& frame = stored.capture.frames.at(0);
+  CHECK(frame.camera.width == 12);
+  CHECK(frame.has(kColor.name));
+  REQUIRE(frame.instances.size() == 1);
+  CHECK(*frame.instances[0].tight_box == PixelBox{1, 2, 9, 8});
 }
 
 TEST_CASE(
