@@ -22,6 +22,7 @@ struct DatasetPage {
   std::map<int, std::string> split_of_capture;
   Json conventions = Json::object();
   std::vector<DatasetClip> clips;
+  std::string job;  ///< The resolved job, YAML; empty for what no run made.
 
   /// One picture per capture and camera.
   std::size_t picture_count() const { return std::size_t(captures) * cameras.size(); }
@@ -32,6 +33,9 @@ struct DatasetPage {
 /// Nothing when there is no such page, or one that cannot be read: such a dataset is read by the
 /// format's rules alone.
 std::optional<DatasetPage> read_dataset_page(const std::filesystem::path& folder);
+
+/// Classes that no parameter of a writer has put in an order are sorted.
+void check_class_order(const DatasetPage& page, StoredFiles& files);
 
 /// Clips that the page lists; none without a page.
 std::span<const DatasetClip> clips_of(const std::optional<DatasetPage>& page);

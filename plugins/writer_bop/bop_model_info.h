@@ -5,6 +5,7 @@
 #include <string>
 
 #include "diorama/math.h"
+#include "reader_support/dataset_page.h"
 #include "reader_support/stored_files.h"
 
 namespace diorama {
@@ -12,9 +13,9 @@ namespace diorama {
 /// The extent of a model by obj_id, millimetres: what models_info.json says.
 using BopModelBoxes = std::map<int, Aabb>;
 
-/// Reads it from the first folder of models that has one; nothing when there is none. With
-/// `is_own`, models must be there and as large as the page says.
-BopModelBoxes read_bop_models(StoredFiles& files, bool is_own);
+/// Reads it from the first folder of models that has one; nothing when there is none. With our own
+/// page, models must be there, as large as the table says, and look the same by their symmetries.
+BopModelBoxes read_bop_models(StoredFiles& files, const DatasetPage* page);
 
 std::string bop_model_file(int id);  ///< "models/obj_000001.ply"
 

@@ -359,7 +359,12 @@ class VocPictureReading : private FrameReading {
     const XmlElement* box = object.child("bndbox");
     if (!box) throw std::runtime_error(who + " has no <bndbox>");
     // The format counts pixels from 1 and names the last one.
-    const auto number = [&](const char* key) { return number_of(box->text_of(key)); };
+    const auto number = [&](const char* key) {
+      const double value = number_of(box->text_of(key));
+      files_.check(!dataset_.page_ || value == std::floor(value), kBox, xml_file_, who,
+                   std::string(key) + " is " + box->text_of(key), "the number of a pixel");
+      return value;
+    };
     const PixelBox pixels{int(std::floor(number("xmin"))) - 1, int(std::floor(number("ymin"))) - 1,
                           int(std::ceil(number("xmax"))), int(std::ceil(number("ymax")))};
     const int slack = dataset_.page_ ? 0 : 1;

@@ -149,11 +149,27 @@ class YoloDataset final : public StoredDataset {
     if (const auto text = files.text(yaml_file_)) {
       files.reading(yaml_file_, [&] { yaml_ = parse_data_yaml(*text); });
     }
+    const auto count = std::to_string(yaml_.names.size());
+    files.check(!yaml_.nc || std::size_t(*yaml_.nc) == yaml_.names.size(), kIds, yaml_file_, "nc",
+                "is " + std::to_string(yaml_.nc.value_or(0)), count + ", as many as there are names");
     if (page_) {
+      check_own_splits(files);
       std::vector<std::string> names;
       for (const auto& [id, name] : yaml_.names) names.push_back(name);
       files.check(names == page_->classes, kIds, yaml_file_, "",
                   "its names are not the classes of dataset.json");
+    }
+  }
+
+  /// Without pictures for validation those for training stand there, too.
+  void check_own_splits(StoredFiles& files) {
+    const bool has_validation = std::ranges::any_of(
+        page_->split_of_capture, [](const auto& each) { return each.second == "val"; });
+    for (const std::string split : {"train", "val"}) {
+      const std::string folder =
+          "images/" + (split == "val" && !has_validation ? std::string("train") : split);
+      files.check(yaml_.splits[split] == std::vector<std::string>{folder}, kCounts, yaml_file_, split,
+                  "is not " + folder, "the folder of the pictures that dataset.json lists");
     }
   }
 
