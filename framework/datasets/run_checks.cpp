@@ -322,9 +322,9 @@ class RunComparison {
       if (!p[i].allFinite() || !q[i].allFinite()) continue;  // said where it stands
       if (double((p[i] - q[i]).cwiseAbs().maxCoeff()) > step) ++wrong;
     }
-    log.check(wrong == 0, about(b, k, channel.name, "",
-                                std::to_string(wrong) + " pixels have others than in",
-                                in_reference));
+    log.check(wrong == 0,
+              about(b, k, channel.name, "", std::to_string(wrong) + " pixels have others than in",
+                    in_reference));
   }
 
   /// Objects are the same by name, or else by place.

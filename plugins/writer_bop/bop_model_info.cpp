@@ -91,14 +91,14 @@ PlyMeasures measure_ply(const std::filesystem::path& file) {
 
 /// How far turned models may be off, as a share of their diameters: what writers of the job were
 /// told, or else the most that they take.
-double symmetry_tolerance(const DatasetPage& page) {
+double symmetry_tolerance(const std::string& job) {
   constexpr std::string_view kKey = "symmetry_tolerance: ";
   constexpr double kMost = 0.2;
   double tolerance = -1.0;
-  for (std::size_t at = page.job.find(kKey); at != page.job.npos; at = page.job.find(kKey, at)) {
+  for (std::size_t at = job.find(kKey); at != job.npos; at = job.find(kKey, at)) {
     at += kKey.size();
     double said = kMost;
-    std::from_chars(page.job.data() + at, page.job.data() + page.job.size(), said);
+    std::from_chars(job.data() + at, job.data() + job.size(), said);
     tolerance = std::max(tolerance, said);
   }
   return tolerance < 0.0 ? kMost : tolerance;
@@ -118,8 +118,8 @@ class SymmetryChecks {
 
   bool holds(const Affine& map) const {
     const Mat3 turn = map.linear();
-    const bool is_rotation = (turn * turn.transpose() - Mat3::Identity()).norm() < 1e-4 &&
-                             turn.determinant() > 0.0;
+    const bool is_rotation =
+        (turn * turn.transpose() - Mat3::Identity()).norm() < 1e-4 && turn.determinant() > 0.0;
     if (!is_rotation || !map.matrix().allFinite()) return false;
     for (std::size_t i = 0; i < ways_.size(); ++i) {
       if (std::abs(reach(ways_[i], map) - reaches_[i]) > slack_) return false;
@@ -168,8 +168,7 @@ std::vector<Affine> symmetries_of(const Json& model) {
 
 std::string bop_model_file(int id) { return "models/obj_" + zero_padded(id, 6) + ".ply"; }
 
-BopModelBoxes read_bop_models(StoredFiles& files, const DatasetPage* own_page) {
-  const bool is_own = own_page != nullptr;
+BopModelBoxes read_bop_models(StoredFiles& files, bool is_own) {
   BopModelBoxes boxes;
   std::string page = "models/models_info.json";
   for (const char* folder : {"models", "models_eval", "models_cad", "models_reconst"}) {
@@ -181,6 +180,7 @@ BopModelBoxes read_bop_models(StoredFiles& files, const DatasetPage* own_page) {
   if (!is_own && !files.has(page)) return boxes;
   const auto json = files.json(page);
   if (!json) return boxes;
+  const double tolerance = is_own ? symmetry_tolerance(job_of_page(files.root())) : 0.0;
   files.reading(page, [&] {
     for (const auto& item : json->items()) {
       const std::string& key = item.key();
@@ -221,7 +221,7 @@ BopModelBoxes read_bop_models(StoredFiles& files, const DatasetPage* own_page) {
                     kCounts, file, "", "is not as large as " + page + " says");
         const std::vector<Affine> symmetries = symmetries_of(model);
         if (points.empty() || symmetries.empty()) return;
-        const SymmetryChecks checks(points, (symmetry_tolerance(*own_page) + 1e-3) * diameter);
+        const SymmetryChecks checks(points, (tolerance + 1e-3) * diameter);
         for (std::size_t i = 0; i < symmetries.size(); ++i) {
           files.check(checks.holds(symmetries[i]), kCounts, page, who,
                       "turned by its symmetry " + std::to_string(i) + " it is another shape",

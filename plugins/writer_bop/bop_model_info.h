@@ -5,7 +5,6 @@
 #include <string>
 
 #include "diorama/math.h"
-#include "reader_support/dataset_page.h"
 #include "reader_support/stored_files.h"
 
 namespace diorama {
@@ -13,9 +12,10 @@ namespace diorama {
 /// The extent of a model by obj_id, millimetres: what models_info.json says.
 using BopModelBoxes = std::map<int, Aabb>;
 
-/// Reads it from the first folder of models that has one; nothing when there is none. With our own
-/// page, models must be there, as large as the table says, and look the same by their symmetries.
-BopModelBoxes read_bop_models(StoredFiles& files, const DatasetPage* page);
+/// Reads it from the first folder of models that has one; nothing when there is none. With
+/// `is_own`, models must be there, as large as the table says, and look the same by their
+/// symmetries.
+BopModelBoxes read_bop_models(StoredFiles& files, bool is_own);
 
 std::string bop_model_file(int id);  ///< "models/obj_000001.ply"
 

@@ -151,7 +151,8 @@ class YoloDataset final : public StoredDataset {
     }
     const auto count = std::to_string(yaml_.names.size());
     files.check(!yaml_.nc || std::size_t(*yaml_.nc) == yaml_.names.size(), kIds, yaml_file_, "nc",
-                "is " + std::to_string(yaml_.nc.value_or(0)), count + ", as many as there are names");
+                "is " + std::to_string(yaml_.nc.value_or(0)),
+                count + ", as many as there are names");
     if (page_) {
       check_own_splits(files);
       std::vector<std::string> names;
@@ -168,8 +169,8 @@ class YoloDataset final : public StoredDataset {
     for (const std::string split : {"train", "val"}) {
       const std::string folder =
           "images/" + (split == "val" && !has_validation ? std::string("train") : split);
-      files.check(yaml_.splits[split] == std::vector<std::string>{folder}, kCounts, yaml_file_, split,
-                  "is not " + folder, "the folder of the pictures that dataset.json lists");
+      files.check(yaml_.splits[split] == std::vector<std::string>{folder}, kCounts, yaml_file_,
+                  split, "is not " + folder, "the folder of the pictures that dataset.json lists");
     }
   }
 

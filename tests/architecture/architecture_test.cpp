@@ -316,8 +316,8 @@ TEST_CASE("The framework knows no format's name", "[architecture]") {
   CHECK(files_with_code(any_of(names), knows_none) == None{});
 
   // The page, the package and scripts, with their comments.
-  static const std::set<std::string> kEndings{".py", ".pyi", ".ts", ".mjs", ".html", ".css",
-                                              ".in", ".txt", ".cmake"};
+  static const std::set<std::string> kEndings{".py",  ".pyi", ".ts",  ".mjs",  ".html",
+                                              ".css", ".in",  ".txt", ".cmake"};
   const std::regex any(any_of(names));
   std::set<std::string> others = names;
   others.erase("COCO");  // Dataset.to_coco() of the package

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Datasets as other people's tools make them, by hand: their habits, not our writers'.
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "framework/datasets/opened_dataset.h"
@@ -435,4 +436,48 @@ TEST_CASE(
   CHECK(frame.instances[0].node_path == "/World/Cube");
   CHECK(frame.instances[0].labels.at("class") == "cube");
   CHECK(std::ranges::count(frame.get(kInstanceId).pixels(), frame.instances[0].id) == 6);
+}
+
+TEST_CASE("A Replicator folder of a version that names no nodes", "[readers]") {
+  const test::TemporaryFolder folder;
+  const auto table = [](const std::vector<std::array<std::int32_t, 5>>& rows) {
+    std::string header =
+        "{'descr': [('semanticId', '<u4'), ('x_min', '<i4'), ('y_min', '<i4'), ('x_max', '<i4'), "
+        "('y_max', '<i4'), ('occlusionRatio', '<f4')], 'fortran_order': False, 'shape': (" +
+        std::to_string(rows.size()) + ",), }";
+    while ((header.size() + 11) % 64 != 0) header += ' ';
+    header += '\n';
+    std::string bytes("\x93NUMPY\x01\x00", 8);
+    bytes += char(header.size() & 255);
+    bytes += char(header.size() >> 8);
+    bytes += header;
+    for (const auto& row : rows) {
+      const float ratio = 0.25f;
+      bytes.append(reinterpret_cast<const char*>(row.data()), sizeof row);
+      bytes.append(reinterpret_cast<const char*>(&ratio), sizeof ratio);
+    }
+    return bytes;
+  };
+  folder.write("rgb_0000.png", picture(40, 30, 50, ImageFormat::Png));
+  folder.write("bounding_box_2d_tight_0000.npy", table({{0, 5, 6, 9, 11}, {1, 20, 4, 30, 8}}));
+  folder.write("bounding_box_2d_tight_labels_0000.json",
+               R"({"0": {"class": "cube"}, "1": {"class": "ball"}})");
+  folder.write("bounding_box_2d_loose_0000.npy", table({{1, 20, 4, 30, 8}, {0, 5, 6, 9, 11}}));
+  folder.write("bounding_box_2d_loose_labels_0000.json",
+               R"({"0": {"class": "cube"}, "1": {"class": "ball"}})");
+  folder.write("rgb_0001.png", picture(40, 30, 51, ImageFormat::Png));
+  for (const char* kind : {"tight", "loose"}) {
+    const std::string front = std::string("bounding_box_2d_") + kind;
+    folder.write(front + "_0001.npy", table({}));
+    folder.write(front + "_labels_0001.json", "{}");
+  }
+  const Opened opened(folder, "BasicReader");
+  CHECK_FALSE(opened.holds(kHoldsNodePaths));
+  const StoredCapture stored = opened.read(0);
+  const Frame& frame = stored.capture.frames.at(0);
+  REQUIRE(frame.instances.size() == 2);
+  CHECK(frame.instances[0].labels.at("class") == "cube");
+  CHECK(*frame.instances[0].tight_box == PixelBox{5, 6, 10, 12});
+  CHECK(frame.instances[0].id != frame.instances[1].id);
+  CHECK(opened.read(1).capture.frames.at(0).instances.empty());
 }
