@@ -511,7 +511,9 @@ std::vector<EntryPlace> Journals::entries_of(const std::string& worker) const {
     if (!entry || !place) return;
     place->entry = *entry;
     // One worker alone has nearly all: a list that doubles would take as much again.
-    if (places.size() == places.capacity()) places.reserve(places.size() + published_.size() + 3);
+    if (places.size() == places.capacity()) {
+      places.reserve(places.size() + std::size_t(published_captures_) + 64);
+    }
     places.push_back(*place);
   });
   std::ranges::sort(places, [](const EntryPlace& a, const EntryPlace& b) {

@@ -26,8 +26,6 @@ namespace fs = std::filesystem;
 
 constexpr const char* kFormat = "Pascal VOC";
 constexpr const char* kAnnotations = "Annotations/";
-/// The benchmark's folder of annotations, or, beside pictures, the dataset's own.
-constexpr std::array kAnnotationFolders{kAnnotations, ""};
 constexpr std::uint32_t kBorder = 255;  ///< VOC's own objects have an outline of this value.
 
 /// Value of each colour of VOC's palette: three bits of a value, red, green and blue, from the top
@@ -66,7 +64,8 @@ Image<std::uint32_t> values_of(const StoredPicture& picture) {
   return values;
 }
 
-bool has_annotations(const fs::path& folder) {
+/// Files right in the folder, which may be of any kind: some begin as annotations do.
+bool has_annotations_beside_pictures(const fs::path& folder) {
   constexpr std::size_t kMostLooked = 3;
   std::size_t looked = 0;
   for (const std::string& name : names_in(folder)) {
@@ -465,9 +464,11 @@ std::vector<std::string> VocReader::patterns() const { return {"Annotations/*.xm
 
 Recognition VocReader::recognise(const fs::path& folder) const {
   if (recognise_page(folder, kFormat) == Recognition::ByName) return Recognition::ByName;
-  const bool has_any = std::ranges::any_of(
-      kAnnotationFolders, [&](const char* below) { return has_annotations(folder / below); });
-  return has_any ? Recognition::ByFiles : Recognition::No;
+  const auto names = names_in(folder / kAnnotations);
+  const bool has_any =
+      std::ranges::any_of(names, [](const std::string& name) { return name.ends_with(".xml"); });
+  return has_any || has_annotations_beside_pictures(folder) ? Recognition::ByFiles
+                                                            : Recognition::No;
 }
 
 std::unique_ptr<const StoredDataset> VocReader::open(const fs::path& folder) const {

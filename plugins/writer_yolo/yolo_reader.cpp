@@ -214,7 +214,7 @@ class YoloDataset final : public StoredDataset {
         if (!place) continue;
         if (fs::is_directory(folder_ / *place)) {
           take(split, *place);
-        } else {
+        } else if (taken.insert(*place).second) {
           lists_.emplace_back(split, *place);
         }
       }

@@ -265,6 +265,7 @@ TEST_CASE("YOLO by any page's name, with labels beside pictures, and by lists", 
     REQUIRE(frame.instances.size() == 1);
     CHECK(frame.instances[0].labels.at("class") == name);
     CHECK(*frame.instances[0].tight_box == PixelBox{15, 5, 25, 15});
+    CHECK(opened.dataset->info().captures.size() == 1);
     return stored.split;
   };
   SECTION("a page of another name") {
@@ -297,7 +298,9 @@ TEST_CASE("YOLO by any page's name, with labels beside pictures, and by lists", 
     folder.write("images/train/1.png", picture(40, 20, 50, ImageFormat::Png));
     folder.write("labels/train/1.txt", label);
     folder.write("train.txt", "/content/d/images/train/1.png\r\n");
-    folder.write("data.yaml", "train: /content/d/train.txt\nnc: 2\nnames: [cup, plate]\n");
+    folder.write(
+        "data.yaml",
+        "train: /content/d/train.txt\nval: /content/d/train.txt\nnc: 2\nnames: [cup, plate]\n");
     CHECK(check(folder, "plate") == "train");
   }
   SECTION("texts beside pictures are no labels without a list of classes") {
