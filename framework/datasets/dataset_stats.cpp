@@ -52,6 +52,11 @@ std::size_t bin(double share, std::size_t bins) {
   return std::size_t(std::clamp(share * double(bins), 0.0, double(bins) - 1.0));
 }
 
+/// Of all red, green and blue values of a picture.
+double brightness_of_sum(std::uint64_t sum, std::size_t pixels) {
+  return double(sum) / (3.0 * 255.0 * double(std::max<std::size_t>(pixels, 1)));
+}
+
 /// Measures frames of one dataset.
 class Measurement {
  public:
@@ -111,15 +116,19 @@ class Measurement {
 
   static void judge_color(const Image<Rgba8>& image, SeenPicture& seen) {
     const auto pixels = image.pixels();
+    // Both in one walk: a picture is more than the processor's nearer memory holds.
+    std::uint64_t sum = 0;
     std::size_t burnt = 0;
     for (const Rgba8& pixel : pixels) {
-      burnt += std::size_t(std::min({pixel[0], pixel[1], pixel[2]}) >= 254);
+      sum += std::uint64_t(pixel[0]) + pixel[1] + pixel[2];
+      // Numbers from 254 on have all bits but the last.
+      burnt += std::size_t((pixel[0] & pixel[1] & pixel[2]) >= 254);
     }
     // Nearly always the first rows tell.
     const bool is_uniform =
         std::ranges::all_of(pixels, [&](const Rgba8& pixel) { return pixel == pixels[0]; });
-    const double count = double(std::max<std::size_t>(image.pixels().size(), 1));
-    seen.brightness = mean_brightness(image);
+    const double count = double(std::max<std::size_t>(pixels.size(), 1));
+    seen.brightness = brightness_of_sum(sum, pixels.size());
     if (*seen.brightness < kBlack) {
       seen.suspicions.push_back("black");
     } else if (double(burnt) > kBurntShare * count) {
@@ -224,7 +233,7 @@ std::string class_of(const Instance& instance) {
 double mean_brightness(const Image<Rgba8>& image) {
   std::uint64_t sum = 0;
   for (const Rgba8& pixel : image.pixels()) sum += std::uint64_t(pixel[0]) + pixel[1] + pixel[2];
-  return double(sum) / (3.0 * 255.0 * double(std::max<std::size_t>(image.pixels().size(), 1)));
+  return brightness_of_sum(sum, image.pixels().size());
 }
 
 std::optional<SeenFrom> seen_from(const StoredInfo& info, const Frame& frame,
@@ -265,7 +274,7 @@ DatasetStats dataset_stats(const StoredDataset& dataset, Host& host) {
         for (Frame& frame : stored.capture.frames) complete_boxes(frame);
         return measurement.measure(stored);
       },
-      [&](const SeenCapture& capture) { add(capture, stats); });
+      [&](const SeenCapture& capture) { add(capture, stats); }, kSmallResults);
   return stats;
 }
 

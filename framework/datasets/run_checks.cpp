@@ -271,6 +271,10 @@ class RunComparison {
                 about(b, k, kColor.name, "", "is another picture than", in_reference(kColor.name)));
     }
     compare_depth(one, other, b, k, in_reference(kDistanceToImagePlane.name), log);
+    compare_vectors(kNormals, one, other, b, k, in_reference(kNormals.name), log);
+    for (const Channel<Vec2f>& channel : {kMotion, kFlowForward, kFlowBackward}) {
+      compare_vectors(channel, one, other, b, k, in_reference(channel.name), log);
+    }
     if (have_partners()) compare_objects(a, i, b, k, in_reference(kHoldsInstances), log);
   }
 
@@ -303,6 +307,24 @@ class RunComparison {
     log.check(wrong == 0,
               about(b, k, channel.name, "",
                     std::to_string(wrong) + " pixels have another depth than in", in_reference));
+  }
+
+  template <class Vector>
+  void compare_vectors(const Channel<Vector>& channel, const Frame& one, const Frame& other,
+                       const StoredCapture& b, std::size_t k, const std::string& in_reference,
+                       ReadLog& log) const {
+    if (!one.has(channel.name) || !other.has(channel.name)) return;
+    const auto p = one.get(channel).pixels();
+    const auto q = other.get(channel).pixels();
+    const double step = 2.0 * (step_of(a_, channel.name) + step_of(b_, channel.name)) + 1e-4;
+    std::size_t wrong = 0;
+    for (std::size_t i = 0; i < p.size(); ++i) {
+      if (!p[i].allFinite() || !q[i].allFinite()) continue;  // said where it stands
+      if (double((p[i] - q[i]).cwiseAbs().maxCoeff()) > step) ++wrong;
+    }
+    log.check(wrong == 0,
+              about(b, k, channel.name, "", std::to_string(wrong) + " pixels have others than in",
+                    in_reference));
   }
 
   /// Objects are the same by name, or else by place.

@@ -136,7 +136,7 @@ class PngReader {
 
 constexpr std::array<std::uint8_t, 8> kMark{0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
 
-/// Larger pictures go row by row: here their samples are in memory twice for a while.
+/// Larger pictures go row by row, and are in memory as far as the file goes.
 constexpr std::uint64_t kMostAtOnce = std::uint64_t(32) << 20;
 
 std::uint32_t get_u32(const std::uint8_t* from) {
@@ -219,28 +219,28 @@ std::optional<Texture> decode_plain(const Source& source) {
   const std::uint64_t size = row_size * png->height;
   const std::uint64_t filtered_size = size + png->height;
   // Deflate makes at most 1032 bytes of one.
-  if (size > kMostAtOnce || size + filtered_size + png->joined.size() > source.budget ||
+  if (size > kMostAtOnce || filtered_size + png->joined.size() > source.budget ||
       filtered_size / 1032 > png->packed.size()) {
     return std::nullopt;
   }
   const std::unique_ptr<libdeflate_decompressor, void (*)(libdeflate_decompressor*)> inflater(
       libdeflate_alloc_decompressor(), libdeflate_free_decompressor);
   if (!inflater) throw std::bad_alloc();
-  const auto rows = std::make_unique_for_overwrite<std::uint8_t[]>(std::size_t(filtered_size));
-  // Without a place for the size there must be exactly so much.
-  if (libdeflate_zlib_decompress(inflater.get(), png->packed.data(), png->packed.size(), rows.get(),
-                                 std::size_t(filtered_size), nullptr) != LIBDEFLATE_SUCCESS) {
-    return std::nullopt;
-  }
   Texture texture;
   texture.width = int(png->width);
   texture.height = int(png->height);
   texture.channels = png->channels;
-  texture.bytes.resize(std::size_t(size));
-  if (!undo_png_filters({rows.get(), std::size_t(filtered_size)}, png->height,
-                        std::size_t(png->channels), texture.bytes)) {
+  texture.bytes.resize(std::size_t(filtered_size));
+  // Without a place for the size there must be exactly so much.
+  if (libdeflate_zlib_decompress(inflater.get(), png->packed.data(), png->packed.size(),
+                                 texture.bytes.data(), std::size_t(filtered_size),
+                                 nullptr) != LIBDEFLATE_SUCCESS) {
     return std::nullopt;
   }
+  if (!undo_png_filters(texture.bytes, png->height, std::size_t(png->channels))) {
+    return std::nullopt;
+  }
+  texture.bytes.resize(std::size_t(size));
   return texture;
 }
 

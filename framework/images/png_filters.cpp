@@ -53,7 +53,25 @@ Lanes paeth(Lanes left, Lanes up, Lanes corner, Lanes rest) {
   return to_left <= least(to_up, to_corner) ? if_left : if_other;
 }
 
-/// What a pixel is beyond what its neighbours tell, by filter. `above` has the length of the row.
+/// Sixteen sums at a time: `to` may lie in front of `from` and reach into it, which compilers do
+/// not make vectors for.
+void add_above(const std::uint8_t* from, const std::uint8_t* above, std::size_t size,
+               std::uint8_t* to) {
+  using Bytes [[gnu::vector_size(16)]] = std::uint8_t;
+  std::size_t i = 0;
+  for (; i + sizeof(Bytes) <= size; i += sizeof(Bytes)) {
+    Bytes rest;
+    Bytes up;
+    std::memcpy(&rest, from + i, sizeof rest);
+    std::memcpy(&up, above + i, sizeof up);
+    rest += up;
+    std::memcpy(to + i, &rest, sizeof rest);
+  }
+  for (; i < size; ++i) to[i] = std::uint8_t(from[i] + above[i]);
+}
+
+/// What a pixel is beyond what its neighbours tell, by filter. `above` has the length of the row;
+/// `to` lies in front of `from`, which it may reach into.
 template <std::size_t kStride>
 bool undo_row(int filter, const std::uint8_t* from, const std::uint8_t* above, std::size_t size,
               std::uint8_t* to) {
@@ -69,13 +87,13 @@ bool undo_row(int filter, const std::uint8_t* from, const std::uint8_t* above, s
   };
   switch (filter) {
     case 0:
-      std::memcpy(to, from, size);
+      std::memmove(to, from, size);
       return true;
     case 1:
       each_pixel([](Lanes rest, Lanes left, Lanes, Lanes) { return (rest + left) & 255; });
       return true;
     case 2:
-      for (std::size_t i = 0; i < size; ++i) to[i] = std::uint8_t(from[i] + above[i]);
+      add_above(from, above, size, to);
       return true;
     case 3:
       each_pixel([](Lanes rest, Lanes left, Lanes up, Lanes) {
@@ -93,13 +111,13 @@ bool undo_row(int filter, const std::uint8_t* from, const std::uint8_t* above, s
 }
 
 template <std::size_t kStride>
-bool undo_rows(const std::uint8_t* rows, std::size_t height, std::size_t size,
-               std::uint8_t* pixels) {
+bool undo_rows(std::span<std::uint8_t> rows, std::size_t height) {
+  const std::size_t size = rows.size() / height - 1;
   const std::vector<std::uint8_t> zeros(size, 0);
   const std::uint8_t* above = zeros.data();
   for (std::size_t y = 0; y < height; ++y) {
-    const std::uint8_t* from = rows + y * (size + 1);
-    std::uint8_t* to = pixels + y * size;
+    const std::uint8_t* from = rows.data() + y * (size + 1);
+    std::uint8_t* to = rows.data() + y * size;
     if (!undo_row<kStride>(from[0], from + 1, above, size, to)) return false;
     above = to;
   }
@@ -108,18 +126,16 @@ bool undo_rows(const std::uint8_t* rows, std::size_t height, std::size_t size,
 
 }  // namespace
 
-bool undo_png_filters(std::span<const std::uint8_t> rows, std::size_t height, std::size_t stride,
-                      std::span<std::uint8_t> pixels) {
-  const std::size_t size = pixels.size() / height;
+bool undo_png_filters(std::span<std::uint8_t> rows, std::size_t height, std::size_t stride) {
   switch (stride) {
     case 1:
-      return undo_rows<1>(rows.data(), height, size, pixels.data());
+      return undo_rows<1>(rows, height);
     case 2:
-      return undo_rows<2>(rows.data(), height, size, pixels.data());
+      return undo_rows<2>(rows, height);
     case 3:
-      return undo_rows<3>(rows.data(), height, size, pixels.data());
+      return undo_rows<3>(rows, height);
     default:
-      return undo_rows<4>(rows.data(), height, size, pixels.data());
+      return undo_rows<4>(rows, height);
   }
 }
 

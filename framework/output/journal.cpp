@@ -326,16 +326,29 @@ bool Journals::set_published(const std::string& worker, int entry, WorkerIndex& 
 
 namespace {
 
+/// Of digest_of(), as numbers.
+std::optional<std::array<std::uint64_t, 2>> digits_of(std::string_view digest) {
+  std::array<std::uint64_t, 2> halves{};
+  if (digest.size() != 32) return std::nullopt;
+  for (std::size_t i = 0; i < 2; ++i) {
+    const char* begin = digest.data() + 16 * i;
+    const auto [end, code] = std::from_chars(begin, begin + 16, halves[i], 16);
+    if (code != std::errc() || end != begin + 16) return std::nullopt;
+  }
+  return halves;
+}
+
 std::optional<EntryPlace> place_in(const std::vector<std::string_view>& words, std::size_t first) {
-  if (words.size() != first + 3 || words[first + 2].size() != 32) return std::nullopt;
+  if (words.size() != first + 3) return std::nullopt;
   const auto offset = number_in(words[first]);
   const auto length = number_in(words[first + 1]);
+  const auto digest = digits_of(words[first + 2]);
   // A transaction of a million files is the most that anyone writes.
-  if (!offset || !length || *length > (std::uint64_t(1) << 30)) return std::nullopt;
+  if (!offset || !length || !digest || *length > (std::uint64_t(1) << 30)) return std::nullopt;
   EntryPlace place;
   place.offset = *offset;
-  place.length = *length;
-  place.digest = words[first + 2];
+  place.length = std::uint32_t(*length);
+  place.digest = *digest;
   return place;
 }
 
@@ -486,26 +499,68 @@ void Journals::forget() {
   has_begun_ = has_finished_ = false;
 }
 
+/// Read anew, by number; of one that comes again the last.
+std::vector<EntryPlace> Journals::entries_of(const std::string& worker) const {
+  std::vector<EntryPlace> places;
+  std::uint64_t offset = 0;
+  read_lines(file_system_, index_file(worker), offset, [&](std::string_view text) {
+    const auto words = words_of(text);
+    if (words.size() != 5 || words.front() != "c") return;
+    const auto entry = entry_in(words[1]);
+    auto place = place_in(words, 2);
+    if (!entry || !place) return;
+    place->entry = *entry;
+    // One worker alone has nearly all: a list that doubles would take as much again.
+    if (places.size() == places.capacity()) {
+      places.reserve(places.size() + std::size_t(published_captures_) + 64);
+    }
+    places.push_back(*place);
+  });
+  std::ranges::sort(places, [](const EntryPlace& a, const EntryPlace& b) {
+    return std::pair(a.entry, b.offset) < std::pair(b.entry, a.offset);
+  });
+  const auto again = std::ranges::unique(places, {}, &EntryPlace::entry);
+  places.erase(again.begin(), again.end());
+  std::erase_if(places, [&](const EntryPlace& place) {
+    return voids_.contains({worker, place.entry});
+  });
+  for (EntryPlace& place : places) {
+    place.is_published = place.entry >= capture_count_ || is_published(place.entry);
+  }
+  return places;
+}
+
 void Journals::visit_entries(
     const std::function<void(const std::string&, const EntryPlace&)>& visit) const {
-  // A second reader keeps every entry of one worker at a time.
   for (const std::string& worker : worker_names()) {
-    std::map<int, EntryPlace> places;
-    std::uint64_t offset = 0;
-    read_lines(file_system_, index_file(worker), offset, [&](std::string_view text) {
-      const auto words = words_of(text);
-      if (words.size() != 5 || words.front() != "c") return;
-      const auto entry = entry_in(words[1]);
-      auto place = place_in(words, 2);
-      if (!entry || !place) return;
-      place->entry = *entry;
-      places[*entry] = *place;
-    });
-    for (auto& [entry, place] : places) {
-      const bool is_void = voids_.contains({worker, entry});
-      place.is_published = !is_void && (entry >= capture_count_ || is_published(entry));
-      if (!is_void) visit(worker, place);
+    for (const EntryPlace& place : entries_of(worker)) visit(worker, place);
+  }
+}
+
+void Journals::visit_captures(
+    const std::function<bool(const std::string&, const EntryPlace&)>& visit) const {
+  const std::vector<std::string> names = worker_names();
+  struct Candidate {
+    EntryPlace place;
+    std::uint32_t worker = 0;  ///< Place in `names`, which are sorted.
+  };
+  std::vector<Candidate> candidates;
+  for (std::size_t worker = 0; worker < names.size(); ++worker) {
+    if (!workers_.contains(names[worker])) continue;
+    const std::vector<EntryPlace> places = entries_of(names[worker]);
+    candidates.reserve(candidates.size() + places.size());
+    for (const EntryPlace& place : places) {
+      const bool is_wanted = place.entry >= 0 && place.entry < capture_count_ && place.is_published;
+      if (is_wanted) candidates.push_back({place, std::uint32_t(worker)});
     }
+  }
+  std::ranges::sort(candidates, [](const Candidate& a, const Candidate& b) {
+    return std::pair(a.place.entry, a.worker) < std::pair(b.place.entry, b.worker);
+  });
+  std::optional<int> taken;
+  for (const auto& [place, worker] : candidates) {
+    if (taken == place.entry || !visit(names[worker], place)) continue;
+    taken = place.entry;
   }
 }
 
@@ -513,7 +568,9 @@ std::optional<JournalledFiles> Journals::files_of(const std::string& worker,
                                                   const EntryPlace& place) const {
   const fs::path file = entries_file(worker);
   const std::string text = file_system_.read_part(file, place.offset, place.length);
-  if (text.size() != place.length || digest_of(text) != place.digest) return std::nullopt;
+  if (text.size() != place.length || digits_of(digest_of(text)) != place.digest) {
+    return std::nullopt;
+  }
   auto content = from_text(text);
   if (!content) {
     throw Error(ErrorKind::Output, file.string() + ": byte " + std::to_string(place.offset) +
@@ -530,7 +587,7 @@ std::optional<std::string> Journals::records_folder() const {
     if (index.header.length == 0) continue;
     const std::string text =
         file_system_.read_part(entries_file(worker), index.header.offset, index.header.length);
-    if (digest_of(text) != index.header.digest) continue;
+    if (digits_of(digest_of(text)) != index.header.digest) continue;
     const OrderedJson json = parse_json_or_nothing<OrderedJson>(text);
     if (!json.is_object() || !json.contains("records") || !json["records"].is_string()) continue;
     std::string records = json["records"].get<std::string>();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -125,12 +126,13 @@ class JournalWriter {
   bool is_torn_ = false;
 };
 
-/// Where a transaction stands among a worker's entries.
+/// Where a transaction stands among a worker's entries. Small: at the end of a run there is one in
+/// memory for each capture.
 struct EntryPlace {
   int entry = 0;
+  std::uint32_t length = 0;
   std::uint64_t offset = 0;
-  std::uint64_t length = 0;
-  std::string digest;
+  std::array<std::uint64_t, 2> digest{};  ///< The digits of digest_of().
   bool is_published = false;
 };
 
@@ -168,6 +170,10 @@ class Journals {
   /// Everything that is published, read anew, worker by worker.
   void visit_entries(
       const std::function<void(const std::string& worker, const EntryPlace&)>& visit) const;
+  /// The published captures in their order; of one that several workers have, one after the other
+  /// by name, until `visit` takes it.
+  void visit_captures(
+      const std::function<bool(const std::string& worker, const EntryPlace&)>& visit) const;
   /// Empty when it is torn; Error(Output) when it is whole but no journal entry.
   std::optional<JournalledFiles> files_of(const std::string& worker, const EntryPlace& place) const;
   /// Where dataset.json lies below the output folder, by the header of any worker.
@@ -181,6 +187,7 @@ class Journals {
   struct Line;
   static std::optional<Line> parse(std::string_view text);
   std::vector<std::string> worker_names() const;
+  std::vector<EntryPlace> entries_of(const std::string& worker) const;
   void read_worker(const std::string& worker);
   void read_workers();
   void take(const std::string& worker, WorkerIndex& index, const Line& line);

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
-#include <unordered_map>
 
 #include "diorama/error.h"
 
@@ -118,6 +117,7 @@ void CollectedFiles::append(std::string_view path, std::span<const std::byte> by
   if (found == growing_.end()) {
     add(path, {});
     found = growing_.emplace(path, transaction_.files.size() - 1).first;
+    transaction_.growing.push_back(found->second);
   }
   grow(found->second, bytes);
 }
@@ -127,16 +127,14 @@ void CollectedFiles::grow(std::size_t number, std::span<const std::byte> bytes) 
   const std::size_t before = file.size();
   file.insert(file.end(), bytes.begin(), bytes.end());
   stage_if_large(number);
-  growing_bytes_ += file.size() - before;
-  // Many small ones fill the memory, too.
-  if (!transaction_.stage || growing_bytes_ < kKeptGrowingBytes) return;
-  const auto put = [this](std::size_t each) {
+  transaction_.growing_bytes += file.size() - before;
+  // Many small ones fill the memory, too: this writer's, and what those before it left.
+  if (!transaction_.stage || transaction_.growing_bytes < kKeptGrowingBytes) return;
+  for (const std::size_t each : transaction_.growing) {
     StagedFile& growing = transaction_.files[each];
     if (!growing.bytes.empty()) transaction_.stage->put(each, growing);
-  };
-  for (const auto& [path, each] : growing_) put(each);
-  if (kept_) put(*kept_);
-  growing_bytes_ = 0;
+  }
+  transaction_.growing_bytes = 0;
 }
 
 void CollectedFiles::append_kept(std::string_view path, int capture) {
@@ -153,6 +151,7 @@ void CollectedFiles::keep(std::span<const std::byte> bytes) {
     transaction_.files.push_back({folder_, {}, {}});
     transaction_.files.back().is_kept = true;
     kept_ = transaction_.files.size() - 1;
+    transaction_.growing.push_back(*kept_);
   }
   grow(*kept_, bytes);
 }
@@ -889,15 +888,15 @@ void OutputStore::checkpoint() {
 }
 
 Transaction OutputStore::begin_transaction() {
-  return {std::make_unique<DiskStage>(*this, kBeginEntry), {}, {}};
+  return {.stage = std::make_unique<DiskStage>(*this, kBeginEntry)};
 }
 
 Transaction OutputStore::capture_transaction(int capture) {
-  return {std::make_unique<DiskStage>(*this, capture), {}, {}};
+  return {.stage = std::make_unique<DiskStage>(*this, capture)};
 }
 
 Transaction OutputStore::finish_transaction() {
-  Transaction transaction{std::make_unique<DiskStage>(*this, kFinishEntry), {}, {}};
+  Transaction transaction{.stage = std::make_unique<DiskStage>(*this, kFinishEntry)};
   transaction.read_kept = [this](std::size_t writer, int capture, const BytesVisitor& visit) {
     read_kept(writer, capture, visit);
   };
@@ -961,30 +960,14 @@ std::optional<int> OutputStore::claim_visit(int visit_count,
 
 void OutputStore::read_records(std::size_t writer, const RecordVisitor& visit) const {
   const std::string name = folders_.name(writer);
-  struct Place {
-    EntryPlace place;
-    const std::string* worker;
-  };
-  std::unordered_map<std::string, const std::string*> names;
-  std::vector<Place> places;
-  journals_.visit_entries([&](const std::string& worker, const EntryPlace& place) {
-    if (place.entry < 0 || place.entry >= capture_count_ || !place.is_published) return;
-    const auto known = journals_.workers().find(worker);
-    if (known != journals_.workers().end()) places.push_back({place, &known->first});
-  });
-  std::sort(places.begin(), places.end(), [](const Place& a, const Place& b) {
-    return std::pair(a.place.entry, *a.worker) < std::pair(b.place.entry, *b.worker);
-  });
-  int last = -1;
-  for (const Place& place : places) {
-    if (place.place.entry == last) continue;
-    const auto content = journals_.files_of(*place.worker, place.place);
-    if (!content) continue;
-    last = place.place.entry;
+  journals_.visit_captures([&](const std::string& worker, const EntryPlace& place) {
+    const auto content = journals_.files_of(worker, place);
+    if (!content) return false;
     for (const auto& [who, line] : content->records) {
-      if (who == name) visit(place.place.entry, line);
+      if (who == name) visit(place.entry, line);
     }
-  }
+    return true;
+  });
 }
 
 }  // namespace diorama

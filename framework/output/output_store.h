@@ -56,9 +56,11 @@ using BytesVisitor = std::function<void(std::span<const std::byte>)>;
 /// What becomes visible on disk together.
 struct Transaction {
   std::unique_ptr<Stage> stage = nullptr;  ///< Null: everything stays in memory.
-  std::vector<StagedFile> files;
+  std::vector<StagedFile> files = {};
+  std::vector<std::size_t> growing = {};  ///< Numbers of those that writers append to.
+  std::size_t growing_bytes = 0;          ///< Of them all, in memory.
   /// Per writer that recorded something: index (or kRecordsFolder, for the run itself) and line.
-  std::vector<std::pair<std::size_t, std::string>> records;
+  std::vector<std::pair<std::size_t, std::string>> records = {};
   /// Of the dataset's end: what captures kept for a writer, piece by piece. Throws Error(Output)
   /// when it is not there.
   std::function<void(std::size_t writer, int capture, const BytesVisitor&)> read_kept = {};
@@ -88,8 +90,8 @@ class CollectedFiles final : public CaptureFiles {
   /// Adds to `transaction`, which must outlive this. `writer` is for messages.
   CollectedFiles(Transaction& transaction, std::size_t folder, std::string writer);
   static constexpr std::size_t kKeptBytes = std::size_t(256) << 10;
-  /// Of all files together that grow.
-  static constexpr std::size_t kKeptGrowingBytes = std::size_t(4) << 20;
+  /// Of all files of a transaction together that grow.
+  static constexpr std::size_t kKeptGrowingBytes = std::size_t(1) << 20;
 
   void add(std::string_view path, std::vector<std::byte> bytes) override;
   void append(std::string_view path, std::span<const std::byte> bytes) override;
@@ -106,7 +108,6 @@ class CollectedFiles final : public CaptureFiles {
   std::size_t folder_;
   std::string writer_;
   std::map<std::string, std::size_t, std::less<>> growing_;  ///< Numbers of files by path.
-  std::size_t growing_bytes_ = 0;                            ///< Of them all, in memory.
   std::optional<std::size_t> kept_;                          ///< Number of what is kept.
 };
 

@@ -75,6 +75,29 @@ std::optional<DatasetPage> read_dataset_page(const std::filesystem::path& folder
   }
 }
 
+std::string job_of_page(const std::filesystem::path& folder) {
+  const Json json = parsed_page(folder);
+  const auto job = json.find("job");
+  return job != json.end() && job->is_string() ? job->get<std::string>() : std::string();
+}
+
+void check_class_order(const DatasetPage& page, StoredFiles& files) {
+  const std::string job = job_of_page(files.root());
+  // Keys of writers that name classes, or what becomes of them, with nothing behind.
+  const auto is_plain = [&](std::string_view key, std::string_view nothing) {
+    for (std::size_t at = job.find(key); at != job.npos; at = job.find(key, at)) {
+      at += key.size();
+      if (!std::string_view(job).substr(at).starts_with(nothing)) return false;
+    }
+    return true;
+  };
+  const bool is_free = job.find("classes: []") != job.npos && is_plain("classes: ", "[]") &&
+                       is_plain("_categories: ", "null") && is_plain("mapping_path: ", "null") &&
+                       is_plain("mapping_dict: ", "null");
+  files.check(!is_free || std::ranges::is_sorted(page.classes), kIds, kPage, "classes",
+              "are not sorted", "the order that a job without a list of classes gives them");
+}
+
 std::span<const DatasetClip> clips_of(const std::optional<DatasetPage>& page) {
   return page ? std::span<const DatasetClip>(page->clips) : std::span<const DatasetClip>();
 }

@@ -33,6 +33,12 @@ struct DatasetPage {
 /// format's rules alone.
 std::optional<DatasetPage> read_dataset_page(const std::filesystem::path& folder);
 
+/// The resolved job that the page states, YAML; empty for what no run made.
+std::string job_of_page(const std::filesystem::path& folder);
+
+/// Classes that no parameter of a writer has put in an order are sorted.
+void check_class_order(const DatasetPage& page, StoredFiles& files);
+
 /// Clips that the page lists; none without a page.
 std::span<const DatasetClip> clips_of(const std::optional<DatasetPage>& page);
 /// What a dataset with such clips holds.

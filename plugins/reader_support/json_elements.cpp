@@ -19,6 +19,9 @@ class Characters {
  public:
   explicit Characters(const std::filesystem::path& file) : in_(open_stored(file)), block_(kBlock) {
     if (!in_) throw std::runtime_error("the file cannot be opened");
+    // Some editors put the mark of UTF-8 in front.
+    fill();
+    if (std::string_view(block_.data(), size_).starts_with("\xEF\xBB\xBF")) at_ = 3;
   }
 
   /// -1 at the end.

@@ -14,6 +14,7 @@ constexpr std::string_view kBlanks = " \t\r\f\v";
 
 std::vector<std::string> text_lines(std::string_view text) {
   std::vector<std::string> lines;
+  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
   while (!text.empty()) {
     const std::size_t end = text.find('\n');
     std::string_view line = text.substr(0, end);

@@ -187,6 +187,28 @@ std::vector<std::string> names_in(const fs::path& folder, bool of_folders) {
   return names;
 }
 
+std::vector<std::string> possible_places(std::string said) {
+  constexpr std::size_t kMostPlaces = 32;
+  std::ranges::replace(said, '\\', '/');
+  std::vector<std::string> parts;
+  for (const fs::path& part : fs::path(said)) {
+    const std::string name = part.generic_string();
+    if (name == "..") {
+      parts.clear();
+    } else if (name != "." && name != "/" && !name.empty()) {
+      parts.push_back(name);
+    }
+  }
+  if (parts.size() > kMostPlaces) parts.erase(parts.begin(), parts.end() - kMostPlaces);
+  std::vector<std::string> places;
+  for (std::size_t first = 0; first < parts.size(); ++first) {
+    std::string place = parts[first];
+    for (std::size_t i = first + 1; i < parts.size(); ++i) place += "/" + parts[i];
+    places.push_back(std::move(place));
+  }
+  return places;
+}
+
 std::string box_text(const PixelBox& box) {
   return "[" + std::to_string(box.x_min) + ", " + std::to_string(box.y_min) + ", " +
          std::to_string(box.x_max) + ", " + std::to_string(box.y_max) + ")";

@@ -115,6 +115,11 @@ class StoredFiles {
 /// Names of the plain files (or folders) right below `folder`, sorted; none when it is not there.
 std::vector<std::string> names_in(const std::filesystem::path& folder, bool of_folders = false);
 
+/// Where a file may lie below a dataset's folder that says where it was on somebody's disk,
+/// likeliest first: "data\\images\\1.png", "/home/me/images/1.png" and "../images/1.png" may all be
+/// "images/1.png", or "1.png". None leads out of the folder.
+std::vector<std::string> possible_places(std::string said);
+
 /// "[3, 5, 10, 12)".
 std::string box_text(const PixelBox& box);
 

@@ -163,6 +163,20 @@ bool BasicFiles::has(std::string_view kind) const {
   return index < kKinds.size() && (kinds_ >> index & 1) != 0;
 }
 
+std::string BasicFiles::nameless_boxes() const {
+  if (has_node_paths()) return {};
+  for (const char* name : {"bounding_box_2d_tight", "bounding_box_2d_loose", "bounding_box_3d"}) {
+    if (has(std::string(name) + ".npy")) return name;
+  }
+  return {};
+}
+
+bool BasicFiles::has_node_paths() const {
+  return has("instance_segmentation_mapping.json") ||
+         has("bounding_box_2d_tight_prim_paths.json") ||
+         has("bounding_box_2d_loose_prim_paths.json") || has("bounding_box_3d_prim_paths.json");
+}
+
 std::string BasicFiles::path_of(const std::string& product, const Product& own, int number,
                                 std::size_t kind) const {
   std::size_t digits = 4;

@@ -23,6 +23,11 @@ class BasicFiles {
   /// Kinds that some frame has: "rgb.png", "bounding_box_3d_labels.json".
   std::vector<std::string> kinds() const;
   bool has(std::string_view kind) const;
+  /// Some file says which node an object is. Replicator's first versions wrote none.
+  bool has_node_paths() const;
+  /// The kind of boxes whose rows are all that is known of objects, "bounding_box_2d_tight"; empty
+  /// where nodes are known.
+  std::string nameless_boxes() const;
 
   /// Files with numbers beyond reason, the first hundred.
   const std::vector<std::string>& unnumbered() const { return unnumbered_; }

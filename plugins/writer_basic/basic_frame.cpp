@@ -672,7 +672,9 @@ std::optional<BasicFrameReading::BoxRows> BasicFrameReading::read_rows(const std
     files_.check(once.size() == rows.paths.size(), kOnce, paths_file, "", "names an object twice");
   }
   rows.paths.resize(count);
+  const bool is_nameless = names_.nameless_boxes() == name;
   for (std::size_t row = 0; row < count; ++row) {
+    if (is_nameless) rows.paths[row] = "/Assets/" + std::to_string(row + 1);
     const std::string who =
         rows.paths[row].empty() ? "row " + std::to_string(row) : rows.paths[row];
     const float ratio = rows.array.value<float>(row, *rows.array.field("occlusionRatio"));
@@ -755,6 +757,7 @@ void BasicFrameReading::read_loose() {
       name, [&](Instance& object, const PixelBox& box) { loose_of_path_[object.node_path] = box; });
   if (!is_there) return;
   const std::string file = path(name + ".npy");
+  if (!names_.nameless_boxes().empty()) return;
   for (const Instance& object : frame_.instances) {
     files_.check(!object.tight_box || loose_of_path_.contains(object.node_path), kAmodal, file,
                  object.node_path, "has a tight box, but no loose one");

@@ -123,13 +123,18 @@ class BasicDataset final : public StoredDataset {
          {kInstanceId.name, kHoldsInstances, kHoldsLabels, kHoldsNodePaths});
     hold("instance_id_segmentation.png", {kLeafId.name, kHoldsLeafPaths});
     hold("semantic_segmentation.png", {kHoldsLabels});
-    hold("bounding_box_2d_tight.npy",
-         {kHoldsInstances, kHoldsLabels, kHoldsNodePaths, kHoldsTightBoxes, kHoldsOcclusion});
-    hold("bounding_box_2d_loose.npy",
-         {kHoldsInstances, kHoldsLabels, kHoldsNodePaths, kHoldsAmodalBoxes, kHoldsOcclusion});
-    hold("bounding_box_3d.npy",
-         {kHoldsInstances, kHoldsLabels, kHoldsNodePaths, kHoldsPoses, kHoldsBounds, kHoldsBoxes3d,
-          kHoldsOcclusion, kHoldsUnseenInstances});
+    const std::string nameless = names_.nameless_boxes();
+    const auto hold_boxes = [&](const char* kind, std::initializer_list<std::string_view> names) {
+      if (nameless.empty() || nameless == kind) hold(std::string(kind) + ".npy", names);
+    };
+    hold_boxes("bounding_box_2d_tight",
+               {kHoldsInstances, kHoldsLabels, kHoldsNodePaths, kHoldsTightBoxes, kHoldsOcclusion});
+    hold_boxes("bounding_box_2d_loose", {kHoldsInstances, kHoldsLabels, kHoldsNodePaths,
+                                         kHoldsAmodalBoxes, kHoldsOcclusion});
+    hold_boxes("bounding_box_3d",
+               {kHoldsInstances, kHoldsLabels, kHoldsNodePaths, kHoldsPoses, kHoldsBounds,
+                kHoldsBoxes3d, kHoldsOcclusion, kHoldsUnseenInstances});
+    if (!names_.has_node_paths()) info_.holds.erase(std::string(kHoldsNodePaths));
     hold("occlusion.npy", {kHoldsOcclusion});
     hold("pointcloud.npy", {"pointcloud"});
     info_.steps[std::string(kNormals.name)] = 0.01;

@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "writer_bop/bop_model_info.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <limits>
 #include <optional>
 #include <stdexcept>
 #include <vector>
 
+#include "reader_support/camera_json.h"
 #include "reader_support/dataset_page.h"
 #include "reader_support/stored_files.h"
 #include "writer_bop/point_diameter.h"
@@ -35,6 +38,7 @@ constexpr std::size_t kMostMeasured = 100'000;
 struct PlyMeasures {
   Aabb box;
   std::optional<double> diameter;
+  std::vector<Vec3f> points;  ///< As long as the diameter is looked at.
 };
 
 /// Of a model of our writer's: vertices begin with three floats and take 27 bytes each, faces 13.
@@ -62,7 +66,7 @@ PlyMeasures measure_ply(const std::filesystem::path& file) {
   in.seekg(std::streamoff(data));
   PlyMeasures measures;
   bool is_measured = vertices > 0 && vertices <= kMostMeasured;
-  std::vector<Vec3f> points;
+  std::vector<Vec3f>& points = measures.points;
   std::vector<char> block(kVertex * 4096);
   for (std::size_t left = vertices; left > 0;) {
     const std::size_t now = std::min<std::size_t>(left, 4096);
@@ -77,8 +81,87 @@ PlyMeasures measure_ply(const std::filesystem::path& file) {
     }
     left -= now;
   }
-  if (is_measured) measures.diameter = point_diameter(points);
+  if (is_measured) {
+    measures.diameter = point_diameter(points);
+  } else {
+    points.clear();
+  }
   return measures;
+}
+
+/// How far turned models may be off, as a share of their diameters: what writers of the job were
+/// told, or else the most that they take.
+double symmetry_tolerance(const std::string& job) {
+  constexpr std::string_view kKey = "symmetry_tolerance: ";
+  constexpr double kMost = 0.2;
+  double tolerance = -1.0;
+  for (std::size_t at = job.find(kKey); at != job.npos; at = job.find(kKey, at)) {
+    at += kKey.size();
+    double said = kMost;
+    std::from_chars(job.data() + at, job.data() + job.size(), said);
+    tolerance = std::max(tolerance, said);
+  }
+  return tolerance < 0.0 ? kMost : tolerance;
+}
+
+/// Models reach equally far in all directions when they are turned.
+class SymmetryChecks {
+ public:
+  SymmetryChecks(const std::vector<Vec3f>& points, double slack) : slack_(slack) {
+    for (const Vec3f& point : points) points_.push_back(point.cast<double>());
+    for (int i = 0; i < 27; ++i) {
+      const Vec3 way(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
+      if (!way.isZero()) ways_.push_back(way.normalized());
+    }
+    for (const Vec3& way : ways_) reaches_.push_back(reach(way, Affine::Identity()));
+  }
+
+  bool holds(const Affine& map) const {
+    const Mat3 turn = map.linear();
+    const bool is_rotation =
+        (turn * turn.transpose() - Mat3::Identity()).norm() < 1e-4 && turn.determinant() > 0.0;
+    if (!is_rotation || !map.matrix().allFinite()) return false;
+    for (std::size_t i = 0; i < ways_.size(); ++i) {
+      if (std::abs(reach(ways_[i], map) - reaches_[i]) > slack_) return false;
+    }
+    return true;
+  }
+
+ private:
+  double reach(const Vec3& way, const Affine& map) const {
+    const Vec3 before = map.linear().transpose() * way;
+    double most = -std::numeric_limits<double>::infinity();
+    for (const Vec3& point : points_) most = std::max(most, before.dot(point));
+    return most + way.dot(map.translation());
+  }
+
+  double slack_;
+  std::vector<Vec3> points_;
+  std::vector<Vec3> ways_;
+  std::vector<double> reaches_;
+};
+
+/// Matrices and axes that a table lists for a model.
+std::vector<Affine> symmetries_of(const Json& model) {
+  std::vector<Affine> maps;
+  for (const Json& rows : model.value("symmetries_discrete", Json::array())) {
+    Affine& map = maps.emplace_back();
+    for (std::size_t i = 0; i < 16; ++i) {
+      map.matrix()(Eigen::Index(i / 4), Eigen::Index(i % 4)) = rows.at(i).get<double>();
+    }
+  }
+  for (const Json& each : model.value("symmetries_continuous", Json::array())) {
+    const Vec3 axis = vector_of_json(each.at("axis"));
+    const Vec3 offset = vector_of_json(each.at("offset"));
+    if (std::abs(axis.norm() - 1.0) > 1e-4) {
+      throw std::runtime_error("an axis of symmetry has not the length 1");
+    }
+    for (const double angle : {0.7, 1.6, 2.9}) {
+      maps.push_back(Eigen::Translation3d(offset) * Eigen::AngleAxisd(angle, axis) *
+                     Eigen::Translation3d(-offset));
+    }
+  }
+  return maps;
 }
 
 }  // namespace
@@ -97,6 +180,7 @@ BopModelBoxes read_bop_models(StoredFiles& files, bool is_own) {
   if (!is_own && !files.has(page)) return boxes;
   const auto json = files.json(page);
   if (!json) return boxes;
+  const double tolerance = is_own ? symmetry_tolerance(job_of_page(files.root())) : 0.0;
   files.reading(page, [&] {
     for (const auto& item : json->items()) {
       const std::string& key = item.key();
@@ -128,13 +212,21 @@ BopModelBoxes read_bop_models(StoredFiles& files, bool is_own) {
         continue;
       }
       files.reading(file, [&] {
-        const auto [extent, measured] = measure_ply(files.root() / file);
+        const auto [extent, measured, points] = measure_ply(files.root() / file);
         const double near = 1e-5 * size.norm();
         files.check(!measured || std::abs(*measured - diameter) <= near, kCounts, page, who,
                     "its diameter is " + std::to_string(diameter),
                     std::to_string(measured.value_or(0.0)) + ", of the vertices of " + file);
         files.check((extent.min - box.min).norm() <= near && (extent.max - box.max).norm() <= near,
                     kCounts, file, "", "is not as large as " + page + " says");
+        const std::vector<Affine> symmetries = symmetries_of(model);
+        if (points.empty() || symmetries.empty()) return;
+        const SymmetryChecks checks(points, (tolerance + 1e-3) * diameter);
+        for (std::size_t i = 0; i < symmetries.size(); ++i) {
+          files.check(checks.holds(symmetries[i]), kCounts, page, who,
+                      "turned by its symmetry " + std::to_string(i) + " it is another shape",
+                      "the same");
+        }
       });
     }
   });

@@ -13,7 +13,8 @@ namespace diorama {
 using BopModelBoxes = std::map<int, Aabb>;
 
 /// Reads it from the first folder of models that has one; nothing when there is none. With
-/// `is_own`, models must be there and as large as the page says.
+/// `is_own`, models must be there, as large as the table says, and look the same by their
+/// symmetries.
 BopModelBoxes read_bop_models(StoredFiles& files, bool is_own);
 
 std::string bop_model_file(int id);  ///< "models/obj_000001.ply"

@@ -76,6 +76,7 @@ class BopDataset final : public StoredDataset {
     }
     StoredFiles files(folder_, host_, log_);
     models_ = read_bop_models(files, page_.has_value());
+    if (page_) check_class_order(*page_, files);
     read_names(files);
     Targets targets;
     for (std::uint32_t i = 0; i < scenes_.size(); ++i) read_scene(i, files, targets);
@@ -370,7 +371,7 @@ class BopDataset final : public StoredDataset {
     const BopScene& scene = scenes_[image.scene];
     std::error_code ignored;
     for (const char* kind : {"rgb", "gray"}) {
-      for (const char* ending : {".png", ".jpg", ".jpeg"}) {
+      for (const char* ending : {".png", ".jpg", ".jpeg", ".tif", ".tiff"}) {
         const std::string file = scene.place(kind, stem(image.image) + ending);
         if (fs::is_regular_file(folder_ / file, ignored)) return file;
       }
@@ -438,6 +439,10 @@ class BopImageReading : private FrameReading {
       }
     }
     depth_file_ = scene_.place("depth", stem_ + ".png");
+    for (const char* ending : {".tif", ".tiff"}) {  // ITODD's
+      const std::string other = scene_.place("depth", stem_ + ending);
+      if (!is_own_ && !files_.has(depth_file_) && files_.has(other)) depth_file_ = other;
+    }
     if (scene_.has_depth && (wants(kDistanceToImagePlane.name) || !has_size)) {
       if (is_own_ || files_.has(depth_file_)) {
         depth_ = has_size ? files_.picture_of_size(depth_file_, frame_.camera.width,

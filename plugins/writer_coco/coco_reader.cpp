@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <set>
 
 #include <span>
@@ -10,6 +11,7 @@
 #include "reader_support/asked_levels.h"
 #include "reader_support/camera_json.h"
 #include "reader_support/capture_rows.h"
+#include "reader_support/clip_list.h"
 #include "reader_support/frame_reading.h"
 #include "reader_support/listed_boxes.h"
 #include "reader_support/object_masks.h"
@@ -151,18 +153,29 @@ class CocoDataset final : public StoredDataset {
     if (tables_.has_lossy_pictures) info_.steps[std::string(kColor.name)] = 16.0;
   }
 
-  /// The file of a picture, as COCO folders have it; the likeliest name when there is none.
+  /// The file of a picture, as COCO folders have it; the likeliest name when there is none. Names
+  /// of others may be those that the file had on their disk.
   std::string picture_file(const CocoPart& part, const std::string& name) const {
     const std::string beside = fs::path(part.file).parent_path().generic_string();
     std::vector<std::string> folders;
     if (!part.split.empty()) {
       folders = {"images/" + part.split + "/", part.split + "/", "images/" + part.split + "2017/"};
     }
-    folders.insert(folders.end(), {"images/", ""});
+    folders.insert(folders.end(), {"images/", "", "data/"});
     if (!beside.empty()) folders.push_back(beside + "/");
+    const fs::path path(name);
+    const bool leads_out = path.is_absolute() || std::ranges::find(path, "..") != path.end();
+    std::vector<std::string> places;
+    if (!leads_out) places.push_back(name);
+    if (!page_) std::ranges::copy(possible_places(name), std::back_inserter(places));
     std::error_code ignored;
-    for (const std::string& at : folders) {
-      if (fs::is_regular_file(folder_ / (at + name), ignored)) return at + name;
+    for (const std::string& place : places) {
+      for (const std::string& at : folders) {
+        if (fs::is_regular_file(folder_ / (at + place), ignored)) return at + place;
+      }
+    }
+    if (leads_out) {
+      throw std::runtime_error("the picture '" + name + "' lies outside of the dataset");
     }
     return folders.front() + name;
   }
@@ -205,7 +218,7 @@ class CocoImageReading : private FrameReading {
     });
     if (!has_size) return std::nullopt;
     if (dataset_.tables_.has_cameras) files_.reading(part_.file, [&] { read_camera(); });
-    files_.reading(part_.file, [&] { check_clip_frame(); });
+    files_.reading(part_.file, [&] { check_clip(); });
     read_picture(sources);
     read_annotations();
     finish(sources);
@@ -238,31 +251,26 @@ class CocoImageReading : private FrameReading {
     frame_.world_from_camera = world_from_camera;
   }
 
-  /// Our writer says of a picture which frame of which video it is; videos count from 1, by clip
-  /// and camera.
-  void check_clip_frame() {
-    const auto clip = clip_frame(clips_of(dataset_.page_), entry_.capture);
-    if (!clip) return;
+  /// Our writer says of a picture which frame of which clip and video it is; videos count from 1,
+  /// by clip and camera.
+  void check_clip() {
+    if (!dataset_.page_) return;
+    const auto& clips = dataset_.page_->clips;
+    const std::string who = "image " + std::to_string(entry_.id);
+    check_clip_frame(image_, clips, entry_.capture, files_, part_.file, who);
+    const auto clip = clip_frame(clips, entry_.capture);
     const auto cameras = std::int64_t(dataset_.tables_.cameras.size());
-    const std::int64_t video = clip->clip * cameras + entry_.camera + 1;
-    const bool holds = image_.at("video_id") == video && image_.at("frame_index") == clip->frame &&
-                       std::abs(image_.at("time_s").get<double>() - clip->time_s()) <= 1e-8;
-    files_.check(holds, kCounts, part_.file, "image " + std::to_string(entry_.id),
-                 "its video, frame and time are " + image_.at("video_id").dump() + ", " +
-                     image_.at("frame_index").dump() + ", " + image_.at("time_s").dump(),
-                 std::to_string(video) + ", " + std::to_string(clip->frame) + ", " +
-                     std::to_string(clip->time_s()) + ", as dataset.json says");
+    const Json expected = clip ? Json(clip->clip * cameras + entry_.camera + 1) : Json();
+    const Json video = image_.value("video_id", Json());
+    files_.check(video == expected, kCounts, part_.file, who, "its video is " + video.dump(),
+                 expected.dump() + ", as dataset.json says");
   }
 
   void read_picture(FrameSources& sources) {
     if (!wanted_.contains(kColor.name)) return;
     files_.reading(part_.file, [&] {
-      const std::string name = image_.at("file_name").get<std::string>();
-      const fs::path path(name);
-      if (path.is_absolute() || std::ranges::find(path, "..") != path.end()) {
-        throw std::runtime_error("the picture '" + name + "' lies outside of the dataset");
-      }
-      const std::string file = dataset_.picture_file(part_, name);
+      const std::string file =
+          dataset_.picture_file(part_, image_.at("file_name").get<std::string>());
       const auto picture =
           files_.picture_of_size(file, frame_.camera.width, frame_.camera.height, part_.file);
       if (!picture) return;
@@ -698,8 +706,8 @@ StoredCapture CocoDataset::read(std::size_t i, const NameSet& wanted) const {
 }  // namespace
 
 std::vector<std::string> CocoReader::patterns() const {
-  return {"annotations/*.json", "instances*.json", "annotations.json", "*.coco.json",
-          "*/_annotations.coco.json"};
+  return {"annotations/*.json", "instances*.json", "annotations.json",
+          "labels.json",        "*.coco.json",     "*/_annotations.coco.json"};
 }
 
 Recognition CocoReader::recognise(const fs::path& folder) const {

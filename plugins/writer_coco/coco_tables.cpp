@@ -385,7 +385,9 @@ std::vector<CocoPart> find_coco_parts(const fs::path& folder) {
     if (name.ends_with(".json")) take("annotations", name, "");
   }
   for (const std::string& name : names_in(folder)) {
-    const bool fits = name.starts_with("instances") || name == "annotations.json";
+    // The last one beside a folder "data" with the pictures.
+    const bool fits = name.starts_with("instances") || name == "annotations.json" ||
+                      (name == "labels.json" && fs::is_directory(folder / "data"));
     if (ends_with_any(name, {".json"}) && (fits || name.ends_with(".coco.json")))
       take("", name, "");
   }

@@ -8,6 +8,6 @@ DIORAMA_PLUGIN("writer_coco", "1.0.0", "Apache-2.0") {
               "Writes COCO detection, segmentation, keypoint and panoptic annotations.");
   DIORAMA_ADD_READER(diorama::CocoReader, "CocoReader",
                      "Reads COCO folders, whoever wrote them: pictures, boxes, masks, classes.",
-                     "annotations/*.json instances*.json annotations.json *.coco.json "
+                     "annotations/*.json instances*.json annotations.json labels.json *.coco.json "
                      "*/_annotations.coco.json");
 }

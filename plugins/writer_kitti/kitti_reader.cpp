@@ -103,6 +103,7 @@ class KittiDataset final : public StoredDataset {
     is_stereo_ = page_ && page_->conventions.contains("image_3");
     split_of_ = read_split_lists(files, "ImageSets", {"train", "val"});
     if (page_) check_own_files(files);
+    if (page_) check_class_order(*page_, files);
     describe();
   }
 

@@ -5,6 +5,7 @@
 #include <array>
 #include <cctype>
 #include <cmath>
+#include <fstream>
 #include <map>
 #include <set>
 
@@ -63,6 +64,21 @@ Image<std::uint32_t> values_of(const StoredPicture& picture) {
   return values;
 }
 
+/// Files right in the folder, which may be of any kind: some begin as annotations do.
+bool has_annotations_beside_pictures(const fs::path& folder) {
+  constexpr std::size_t kMostLooked = 3;
+  std::size_t looked = 0;
+  for (const std::string& name : names_in(folder)) {
+    if (!name.ends_with(".xml")) continue;
+    std::string front(4096, '\0');
+    std::ifstream in = open_stored(folder / name);
+    in.read(front.data(), std::streamsize(front.size()));
+    if (front.find("<annotation") != front.npos) return true;
+    if (++looked == kMostLooked) break;
+  }
+  return false;
+}
+
 std::string lines_text(const std::vector<std::string>& lines) {
   std::string text;
   for (const std::string& line : lines) text += line + "\n";
@@ -75,7 +91,8 @@ class VocDataset final : public StoredDataset {
     page_ = read_dataset_page(folder_);
     StoredFiles files(folder_, host_, log_);
     std::vector<ListedPicture> listed;
-    for (const std::string& name : names_in(folder_ / "Annotations")) {
+    if (!page_ && names_in(folder_ / kAnnotations).empty()) annotations_ = "";
+    for (const std::string& name : names_in(folder_ / annotations_)) {
       if (name.ends_with(".xml")) listed.push_back({name.substr(0, name.size() - 4), "", 0, 0, 0});
     }
     if (listed.empty() && !page_) {
@@ -83,7 +100,7 @@ class VocDataset final : public StoredDataset {
     }
     pictures_.set(
         std::move(listed), page_,
-        [&](const std::string& stem) { return capture_and_camera(*page_, stem); }, {kAnnotations},
+        [&](const std::string& stem) { return capture_and_camera(*page_, stem); }, {annotations_},
         files);
     has_masks_ = fs::is_directory(folder_ / "SegmentationObject");
     read_lists(files);
@@ -217,6 +234,7 @@ class VocDataset final : public StoredDataset {
   fs::path folder_;
   const Host& host_;
   std::optional<DatasetPage> page_;
+  std::string annotations_ = kAnnotations;
   PictureList pictures_;
   std::map<std::string, std::string> split_of_;  ///< By stem.
   std::map<std::string, std::string> marks_of_;  ///< By stem: what the lists of the classes say.
@@ -235,7 +253,7 @@ class VocPictureReading : private FrameReading {
                      dataset.pictures_.cameras()[picture.camera], wanted, log),
         dataset_(dataset),
         picture_(picture),
-        xml_file_(kAnnotations + picture.stem + ".xml") {}
+        xml_file_(dataset.annotations_ + picture.stem + ".xml") {}
 
   std::optional<Frame> read(FrameSources& sources) {
     const auto text = files_.text(xml_file_);
@@ -261,6 +279,12 @@ class VocPictureReading : private FrameReading {
  private:
   void read_size() {
     const XmlElement* size = annotation_.child("size");
+    if (!size && !dataset_.page_) {
+      // Some tools leave it out.
+      const auto picture = files_.picture(picture_file());
+      if (!picture) throw std::runtime_error("has no <size>");
+      return set_size(*picture);
+    }
     if (!size) throw std::runtime_error("has no <size>");
     frame_.camera.width = integer_of(size->text_of("width"));
     frame_.camera.height = integer_of(size->text_of("height"));
@@ -288,19 +312,23 @@ class VocPictureReading : private FrameReading {
                  "the lists of the classes say " + said->second, expected);
   }
 
+  std::string picture_file() const {
+    const std::string plain = fs::path(annotation_.text_of("filename")).filename().string();
+    std::string file = "JPEGImages/" + plain;
+    if (files_.has(file) || dataset_.page_) return file;
+    for (const std::string& other : {kAnnotations + plain, "images/" + plain, plain}) {
+      if (files_.has(other)) file = other;
+    }
+    return file;
+  }
+
   void read_picture(FrameSources& sources) {
     const std::string name = annotation_.text_of("filename");
     const fs::path path(name);
     files_.check(!path.has_parent_path() && path.stem() == picture_.stem, kCounts, xml_file_, "",
                  "its filename is '" + name + "'", "that of a picture called " + picture_.stem);
     if (!wanted_.contains(kColor.name)) return;
-    const std::string plain = path.filename().string();
-    std::string file = "JPEGImages/" + plain;
-    if (!files_.has(file) && !dataset_.page_) {
-      for (const std::string& other : {kAnnotations + plain, "images/" + plain, plain}) {
-        if (files_.has(other)) file = other;
-      }
-    }
+    const std::string file = picture_file();
     const auto picture =
         files_.picture_of_size(file, frame_.camera.width, frame_.camera.height, xml_file_);
     if (!picture) return;
@@ -330,7 +358,12 @@ class VocPictureReading : private FrameReading {
     const XmlElement* box = object.child("bndbox");
     if (!box) throw std::runtime_error(who + " has no <bndbox>");
     // The format counts pixels from 1 and names the last one.
-    const auto number = [&](const char* key) { return number_of(box->text_of(key)); };
+    const auto number = [&](const char* key) {
+      const double value = number_of(box->text_of(key));
+      files_.check(!dataset_.page_ || value == std::floor(value), kBox, xml_file_, who,
+                   std::string(key) + " is " + box->text_of(key), "the number of a pixel");
+      return value;
+    };
     const PixelBox pixels{int(std::floor(number("xmin"))) - 1, int(std::floor(number("ymin"))) - 1,
                           int(std::ceil(number("xmax"))), int(std::ceil(number("ymax")))};
     const int slack = dataset_.page_ ? 0 : 1;
@@ -427,14 +460,15 @@ StoredCapture VocDataset::read(std::size_t i, const NameSet& wanted) const {
 
 }  // namespace
 
-std::vector<std::string> VocReader::patterns() const { return {"Annotations/*.xml"}; }
+std::vector<std::string> VocReader::patterns() const { return {"Annotations/*.xml", "*.xml"}; }
 
 Recognition VocReader::recognise(const fs::path& folder) const {
   if (recognise_page(folder, kFormat) == Recognition::ByName) return Recognition::ByName;
-  const auto names = names_in(folder / "Annotations");
+  const auto names = names_in(folder / kAnnotations);
   const bool has_any =
       std::ranges::any_of(names, [](const std::string& name) { return name.ends_with(".xml"); });
-  return has_any ? Recognition::ByFiles : Recognition::No;
+  return has_any || has_annotations_beside_pictures(folder) ? Recognition::ByFiles
+                                                            : Recognition::No;
 }
 
 std::unique_ptr<const StoredDataset> VocReader::open(const fs::path& folder) const {

@@ -8,5 +8,5 @@ DIORAMA_PLUGIN("writer_voc", "1.0.0", "Apache-2.0") {
               "Writes Pascal VOC annotations and segmentation pictures.");
   DIORAMA_ADD_READER(diorama::VocReader, "VocReader",
                      "Reads Pascal VOC folders, whoever wrote them: pictures, boxes, masks.",
-                     "Annotations/*.xml");
+                     "Annotations/*.xml *.xml");
 }

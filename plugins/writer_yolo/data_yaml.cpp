@@ -262,13 +262,15 @@ DataYaml parse_data_yaml(std::string_view text) {
     if (end == line.text.npos) refuse(line.number, "'" + line.text + "' is no key with a value");
     const std::string key = Flow(line.text.substr(0, end), line.number).scalar("");
     const bool is_known = key == "path" || key == "train" || key == "val" || key == "valid" ||
-                          key == "test" || key == "names" || key == "kpt_shape";
+                          key == "test" || key == "names" || key == "kpt_shape" || key == "nc";
     if (!is_known) continue;
     if (!keys.insert(key).second) refuse(line.number, "'" + key + "' is there twice");
     const YamlNode node = value_of(lines, at, trimmed(line.text.substr(end + 1)));
     try {
       if (key == "path") {
         yaml.path = node.scalar;
+      } else if (key == "nc") {
+        yaml.nc = integer_of(node.scalar);
       } else if (key == "names") {
         for (const auto& [id, name] : node.items) {
           if (!yaml.names.emplace(integer_of(id), name).second) {

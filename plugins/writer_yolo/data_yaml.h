@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -14,6 +15,7 @@ struct DataYaml {
   std::map<std::string, std::vector<std::string>> splits;  ///< "train": folders or list files.
   std::map<int, std::string> names;                        ///< Classes.
   std::vector<int> kpt_shape;
+  std::optional<int> nc;  ///< Number of classes.
 };
 
 /// Reads the part of YAML that such files use: plain and quoted scalars, lists and maps in block or

@@ -9,5 +9,5 @@ DIORAMA_PLUGIN("writer_yolo", "1.0.0", "Apache-2.0") {
       "Writes pictures and label lines for YOLO: boxes, polygons, keypoints or rotated boxes.");
   DIORAMA_ADD_READER(diorama::YoloReader, "YoloReader",
                      "Reads YOLO folders, whoever wrote them: pictures, boxes, masks, classes.",
-                     "data.yaml dataset.yaml labels/*.txt labels/*/*.txt */labels/*.txt");
+                     "*.yaml *.yml classes.txt *.names labels/*.txt labels/*/*.txt */labels/*.txt");
 }

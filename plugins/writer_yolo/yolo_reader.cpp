@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <set>
 
 #include "diorama/error.h"
@@ -51,6 +52,67 @@ std::string labels_beside(const std::string& pictures) {
   return (framed.substr(0, at) + "/labels/" + framed.substr(at + 8)).substr(1);
 }
 
+/// A page with names of classes and places of splits, whatever it is called; nothing for others'.
+std::optional<DataYaml> page_in(const fs::path& file) {
+  try {
+    constexpr std::uintmax_t kMostBytes = std::uintmax_t(1) << 24;
+    DataYaml yaml = parse_data_yaml(read_whole_file(file, kMostBytes));
+    if (!yaml.names.empty() && !yaml.splits.empty()) return yaml;
+  } catch (const std::runtime_error&) {
+    // It says nothing of YOLO.
+  }
+  return std::nullopt;
+}
+
+/// Name of the page that describes a dataset: "data.yaml", or the only one of its kind, such as
+/// "coco128.yaml"; empty when there is none.
+std::string page_name(const fs::path& folder) {
+  constexpr std::size_t kMostLooked = 20;
+  for (const char* name : {"data.yaml", "dataset.yaml"}) {
+    std::error_code ignored;
+    if (fs::is_regular_file(folder / name, ignored)) return name;
+  }
+  std::string found;
+  std::size_t looked = 0;
+  for (const std::string& name : names_in(folder)) {
+    const bool is_yaml = name.ends_with(".yaml") || name.ends_with(".yml");
+    if (!is_yaml || ++looked > kMostLooked || !page_in(folder / name)) continue;
+    if (!found.empty()) return {};
+    found = name;
+  }
+  return found;
+}
+
+/// "classes.txt" of labelling tools, or a list of Darknet's; empty when there is none.
+std::string class_list_name(const fs::path& folder) {
+  std::error_code ignored;
+  if (fs::is_regular_file(folder / "classes.txt", ignored)) return "classes.txt";
+  for (const std::string& name : names_in(folder)) {
+    if (name.ends_with(".names")) return name;
+  }
+  return {};
+}
+
+/// Some picture has labels of its name beside it, as Darknet and labelling tools have it.
+bool has_labels_beside_pictures(const fs::path& folder) {
+  for (const ListedPicture& picture : pictures_in(folder, 0)) {
+    const fs::path labels = folder / (picture.stem + ".txt");
+    std::error_code ignored;
+    if (!fs::is_regular_file(labels, ignored)) continue;
+    try {
+      for (const std::string& line : text_lines(read_whole_file(labels))) {
+        const std::vector<std::string> words = text_words(line);
+        if (words.empty()) continue;
+        integer_of(words[0]);
+        return numbers_from(words, 1).size() >= 4;
+      }
+    } catch (const std::runtime_error&) {
+      return false;  // Some other text.
+    }
+  }
+  return false;
+}
+
 class YoloDataset final : public StoredDataset {
  public:
   YoloDataset(fs::path folder, const Host& host) : folder_(std::move(folder)), host_(host) {
@@ -78,22 +140,47 @@ class YoloDataset final : public StoredDataset {
 
  private:
   void read_yaml(StoredFiles& files) {
-    for (const char* name : {"data.yaml", "dataset.yaml"}) {
-      if (files.has(name)) yaml_file_ = name;
-      if (!yaml_file_.empty()) break;
-    }
+    yaml_file_ = page_name(folder_);
     if (yaml_file_.empty()) {
       files.check(!page_, kMissing, "data.yaml", "", "the file is not there");
+      read_class_list(files);
       return;
     }
     if (const auto text = files.text(yaml_file_)) {
       files.reading(yaml_file_, [&] { yaml_ = parse_data_yaml(*text); });
     }
+    const auto count = std::to_string(yaml_.names.size());
+    files.check(!yaml_.nc || std::size_t(*yaml_.nc) == yaml_.names.size(), kIds, yaml_file_, "nc",
+                "is " + std::to_string(yaml_.nc.value_or(0)),
+                count + ", as many as there are names");
     if (page_) {
+      check_own_splits(files);
       std::vector<std::string> names;
       for (const auto& [id, name] : yaml_.names) names.push_back(name);
       files.check(names == page_->classes, kIds, yaml_file_, "",
                   "its names are not the classes of dataset.json");
+    }
+  }
+
+  /// Without pictures for validation those for training stand there, too.
+  void check_own_splits(StoredFiles& files) {
+    const bool has_validation = std::ranges::any_of(
+        page_->split_of_capture, [](const auto& each) { return each.second == "val"; });
+    for (const std::string split : {"train", "val"}) {
+      const std::string folder =
+          "images/" + (split == "val" && !has_validation ? std::string("train") : split);
+      files.check(yaml_.splits[split] == std::vector<std::string>{folder}, kCounts, yaml_file_,
+                  split, "is not " + folder, "the folder of the pictures that dataset.json lists");
+    }
+  }
+
+  /// One name a line, in the order of the classes.
+  void read_class_list(StoredFiles& files) {
+    const std::string name = class_list_name(folder_);
+    const auto text = name.empty() ? std::nullopt : files.text(name);
+    if (!text) return;
+    for (const std::string& line : text_lines(*text)) {
+      if (!text_words(line).empty()) yaml_.names.emplace(int(yaml_.names.size()), line);
     }
   }
 
@@ -102,11 +189,7 @@ class YoloDataset final : public StoredDataset {
   std::optional<std::string> located(const std::string& said) const {
     const fs::path name(said);
     std::vector<fs::path> tries{fs::path(yaml_.path) / name, name};
-    for (const char* front : {"../", "./"}) {
-      if (said.starts_with(front))
-        tries.push_back(fs::path(said.substr(std::string(front).size())));
-    }
-    tries.push_back(name.parent_path().filename() / name.filename());
+    if (!page_) std::ranges::copy(possible_places(said), std::back_inserter(tries));
     std::error_code ignored;
     for (const fs::path& each : tries) {
       const fs::path plain = each.lexically_normal();
@@ -131,12 +214,13 @@ class YoloDataset final : public StoredDataset {
         if (!place) continue;
         if (fs::is_directory(folder_ / *place)) {
           take(split, *place);
-        } else {
+        } else if (taken.insert(*place).second) {
           lists_.emplace_back(split, *place);
         }
       }
     }
     if (folders_.empty() && lists_.empty()) look_around(take);
+    if (folders_.empty() && lists_.empty() && yaml_file_.empty()) look_beside_pictures(take);
     if (page_) {
       for (const auto& [capture, split] : page_->split_of_capture) take(split, "images/" + split);
     }
@@ -152,6 +236,22 @@ class YoloDataset final : public StoredDataset {
       if (fs::is_directory(folder_ / split / "images")) take(split, split + "/images");
     }
     if (fs::is_directory(folder_ / "images")) take("", "images");
+  }
+
+  /// Without a page: lists of pictures, or labels that lie beside them.
+  template <class Take>
+  void look_beside_pictures(Take&& take) {
+    for (const auto& [list, split] :
+         {std::pair("train.txt", "train"), std::pair("valid.txt", "val"),
+          std::pair("val.txt", "val"), std::pair("test.txt", "test")}) {
+      std::error_code ignored;
+      if (fs::is_regular_file(folder_ / list, ignored)) lists_.emplace_back(split, list);
+    }
+    if (!lists_.empty()) return;
+    if (has_labels_beside_pictures(folder_)) take("", "");
+    for (const std::string& below : names_in(folder_, true)) {
+      if (has_labels_beside_pictures(folder_ / below)) take("", below);
+    }
   }
 
   /// A file with one picture per line.
@@ -644,24 +744,25 @@ StoredCapture YoloDataset::read(std::size_t i, const NameSet& wanted) const {
 }  // namespace
 
 std::vector<std::string> YoloReader::patterns() const {
-  return {"data.yaml", "dataset.yaml", "labels/*.txt", "labels/*/*.txt", "*/labels/*.txt"};
+  return {"*.yaml",       "*.yml",          "classes.txt",   "*.names",
+          "labels/*.txt", "labels/*/*.txt", "*/labels/*.txt"};
 }
 
 Recognition YoloReader::recognise(const fs::path& folder) const {
   if (recognise_page(folder, kFormat) == Recognition::ByName) return Recognition::ByName;
   if (fs::is_directory(folder / "images")) return Recognition::ByFiles;
-  for (const char* name : {"data.yaml", "dataset.yaml"}) {
-    try {
-      const DataYaml yaml = parse_data_yaml(read_whole_file(folder / name));
-      if (!yaml.names.empty() && !yaml.splits.empty()) return Recognition::ByFiles;
-    } catch (const std::runtime_error&) {
-      continue;  // It says nothing of YOLO.
-    }
-  }
+  const std::string page = page_name(folder);
+  if (!page.empty() && page_in(folder / page)) return Recognition::ByFiles;
   for (const std::string& split : names_in(folder, true)) {
     const bool has_both =
         fs::is_directory(folder / split / "images") && fs::is_directory(folder / split / "labels");
     if (has_both) return Recognition::ByFiles;
+  }
+  // Labels beside pictures, with a list of classes, so that other texts are not taken for labels.
+  if (class_list_name(folder).empty()) return Recognition::No;
+  if (has_labels_beside_pictures(folder)) return Recognition::ByFiles;
+  for (const std::string& below : names_in(folder, true)) {
+    if (has_labels_beside_pictures(folder / below)) return Recognition::ByFiles;
   }
   return Recognition::No;
 }

@@ -278,8 +278,10 @@ TEST_CASE("Chance comes from diorama::Rng alone", "[architecture]") {
   CHECK(files_with_code(R"((\bstd::|[^\w:.>])s?rand\s*\()", is_code) == None{});
 }
 
-TEST_CASE("The framework knows no format's name", "[architecture]") {
-  // Types of writers and readers, as the plugins register them.
+namespace {
+
+/// Of formats, and the types of their writers and readers as the plugins register them.
+std::set<std::string> names_of_formats() {
   std::set<std::string> names{"BOP",  "COCO", "HDF5",  "Hugging Face", "KITTI",      "MOT",
                               "MOTS", "VOC",  "YOLO",  "YouTube",      "WebDataset", "bop",
                               "coco", "hdf5", "kitti", "voc",          "webdataset", "yolo"};
@@ -293,14 +295,49 @@ TEST_CASE("The framework knows no format's name", "[architecture]") {
     }
   }
   names.erase("python");  // a language first of all
-  CHECK(names.size() > 15);
+  return names;
+}
+
+std::string any_of(const std::set<std::string>& names) {
   std::string any;
   for (const std::string& name : names) any += (any.empty() ? "" : "|") + name;
+  return "\\b(" + any + ")\\b";
+}
+
+}  // namespace
+
+TEST_CASE("The framework knows no format's name", "[architecture]") {
+  const std::set<std::string> names = names_of_formats();
+  CHECK(names.size() > 15);
   const auto knows_none = [](const Source& source) {
     // The dialect of Replicator names its writers.
     return source.is_below("framework") && !source.is_below("framework/replicator");
   };
-  CHECK(files_with_code("\\b(" + any + ")\\b", knows_none) == None{});
+  CHECK(files_with_code(any_of(names), knows_none) == None{});
+
+  // The page, the package and scripts, with their comments.
+  static const std::set<std::string> kEndings{".py",  ".pyi", ".ts",  ".mjs",  ".html",
+                                              ".css", ".in",  ".txt", ".cmake"};
+  const std::regex any(any_of(names));
+  std::set<std::string> others = names;
+  others.erase("COCO");  // Dataset.to_coco() of the package
+  const std::regex any_other(any_of(others));
+  const fs::path root = DIORAMA_SOURCE_DIR;
+  std::size_t looked = 0;
+  None knowing;
+  for (const auto& entry : fs::recursive_directory_iterator(root / "framework")) {
+    const std::string path = fs::relative(entry.path(), root).generic_string();
+    if (path.find("node_modules") != path.npos || !kEndings.contains(entry.path().extension())) {
+      continue;
+    }
+    std::ostringstream text;
+    text << std::ifstream(entry.path()).rdbuf();
+    const bool is_package = path == "framework/python/diorama/__init__.py";
+    ++looked;
+    if (std::regex_search(text.str(), is_package ? any_other : any)) knowing.push_back(path);
+  }
+  CHECK(looked > 20);
+  CHECK(knowing == None{});
 }
 
 TEST_CASE("Messages quote in one way", "[architecture]") {

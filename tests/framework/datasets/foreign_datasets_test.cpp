@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Datasets as other people's tools make them, by hand: their habits, not our writers'.
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "framework/datasets/opened_dataset.h"
+#include "reader_support/stored_files.h"
 #include "support/catch.h"
 #include "support/temporary_folder.h"
 
@@ -225,6 +227,91 @@ TEST_CASE("YOLO polygons and block-style names; a line in two is found", "[reade
   CHECK(finds(report, "ids within the label map", "labels/train/a.txt"));
 }
 
+TEST_CASE("COCO whose pictures were elsewhere: drives, folders of others, a mark in front",
+          "[readers]") {
+  const test::TemporaryFolder folder;
+  const auto page = [](const std::string& file) {
+    return "\xEF\xBB\xBF{\"images\": [{\"id\": 9007199254740993, \"file_name\": \"" + file +
+           "\", \"width\": 40, \"height\": 30}], \"categories\": [{\"id\": 0, \"name\": \"cup\"}], "
+           "\"annotations\": [{\"id\": 1, \"image_id\": 9007199254740993, \"category_id\": 0.0, "
+           "\"bbox\": [3, 4, 10, 12]}]}\r\n";
+  };
+  folder.write("data/sub/1.png", picture(40, 30, 90, ImageFormat::Png));
+  for (const char* name : {"sub/1.png", "sub\\\\1.png", "D:\\\\old\\\\data\\\\sub\\\\1.png",
+                           "/mnt/somewhere/data/sub/1.png", "../data/sub/1.png"}) {
+    INFO(name);
+    folder.write("labels.json", page(name));
+    const Opened opened(folder, "CocoReader");
+    const StoredCapture stored = opened.read(0);
+    const Frame& frame = stored.capture.frames.at(0);
+    REQUIRE(frame.has(kColor.name));
+    REQUIRE(frame.instances.size() == 1);
+    CHECK(*frame.instances[0].tight_box == PixelBox{3, 4, 13, 16});
+    CHECK(frame.instances[0].labels.at("class") == "cup");
+  }
+  folder.write("labels.json", page("/etc/passwd"));
+  CHECK(finds(lint(folder), "every file can be read", "labels.json"));
+  CHECK(possible_places("..\\a/./b") == std::vector<std::string>{"a/b", "b"});
+  CHECK(possible_places("/").empty());
+  CHECK(possible_places("a/../b/..").empty());
+}
+
+TEST_CASE("YOLO by any page's name, with labels beside pictures, and by lists", "[readers]") {
+  const std::string label = "\xEF\xBB\xBF" + std::string("1 0.5 0.5 0.25 0.5\r\n\r\n");
+  const auto check = [](const test::TemporaryFolder& folder, const std::string& name) {
+    const Opened opened(folder, "YoloReader");
+    const StoredCapture stored = opened.read(0);
+    const Frame& frame = stored.capture.frames.at(0);
+    REQUIRE(frame.instances.size() == 1);
+    CHECK(frame.instances[0].labels.at("class") == name);
+    CHECK(*frame.instances[0].tight_box == PixelBox{15, 5, 25, 15});
+    CHECK(opened.dataset->info().captures.size() == 1);
+    return stored.split;
+  };
+  SECTION("a page of another name") {
+    const test::TemporaryFolder folder;
+    folder.write("images/train2017/1.JPG", picture(40, 20, 50, ImageFormat::Jpeg));
+    folder.write("labels/train2017/1.txt", label);
+    folder.write("hyp.yaml", "lr0: 0.01\n");
+    folder.write("coco8.yaml",
+                 "path: ../datasets/coco8 # root\r\ntrain: images/train2017\r\nval: "
+                 "images/val2017\r\nnames:\r\n  0: person\r\n  1: \"hot dog\"\r\n");
+    CHECK(check(folder, "hot dog") == "train");
+  }
+  SECTION("a labelling tool's folder") {
+    const test::TemporaryFolder folder;
+    folder.write("1.png", picture(40, 20, 50, ImageFormat::Png));
+    folder.write("1.txt", label);
+    folder.write("classes.txt", "cup\r\nplate\r\n");
+    CHECK(check(folder, "plate").empty());
+  }
+  SECTION("Darknet's list") {
+    const test::TemporaryFolder folder;
+    folder.write("obj_train_data/1.png", picture(40, 20, 50, ImageFormat::Png));
+    folder.write("obj_train_data/1.txt", label);
+    folder.write("obj.names", "cup\nplate\n");
+    folder.write("train.txt", "data/obj_train_data/1.png\n");
+    CHECK(check(folder, "plate") == "train");
+  }
+  SECTION("a list with the paths of another machine") {
+    const test::TemporaryFolder folder;
+    folder.write("images/train/1.png", picture(40, 20, 50, ImageFormat::Png));
+    folder.write("labels/train/1.txt", label);
+    folder.write("train.txt", "/content/d/images/train/1.png\r\n");
+    folder.write(
+        "data.yaml",
+        "train: /content/d/train.txt\nval: /content/d/train.txt\nnc: 2\nnames: [cup, plate]\n");
+    CHECK(check(folder, "plate") == "train");
+  }
+  SECTION("texts beside pictures are no labels without a list of classes") {
+    const test::TemporaryFolder folder;
+    folder.write("1.png", picture(40, 20, 50, ImageFormat::Png));
+    folder.write("1.txt", "a caption\n");
+    test::EncodingHost host;
+    CHECK(test::every_reader(host).recognise(folder.path("")) != "YoloReader");
+  }
+}
+
 TEST_CASE("KITTI's own fifteen columns, DontCare, and a calibration with a shift", "[readers]") {
   const test::TemporaryFolder folder;
   folder.write("training/image_2/000007.png", picture(124, 38, 50, ImageFormat::Png));
@@ -310,6 +397,23 @@ TEST_CASE("VOC by a labelling tool: attributes, parts, floats, a border in the m
   CHECK(finds(lint(folder), "every file can be read", "2007_000032.xml"));
 }
 
+TEST_CASE("VOC of a labelling tool: beside its pictures, with a mark in front, without sizes",
+          "[readers]") {
+  const test::TemporaryFolder folder;
+  folder.write("1.png", picture(12, 10, 50, ImageFormat::Png));
+  folder.write("1.xml",
+               "\xEF\xBB\xBF<annotation><folder>me</folder><filename>1.png</filename>"
+               "<path>C:\\Users\\me\\1.png</path><object><name>cup</name><bndbox><xmin>2</xmin>"
+               "<ymin>3</ymin><xmax>9</xmax><ymax>8</ymax></bndbox></object></annotation>\r\n");
+  const Opened opened(folder, "VocReader");
+  const StoredCapture stored = opened.read(0);
+  const Frame& frame = stored.capture.frames.at(0);
+  CHECK(frame.camera.width == 12);
+  CHECK(frame.has(kColor.name));
+  REQUIRE(frame.instances.size() == 1);
+  CHECK(*frame.instances[0].tight_box == PixelBox{1, 2, 9, 8});
+}
+
 TEST_CASE(
     "A Replicator folder with other product names, raw ids and nothing but pictures and boxes",
     "[readers]") {
@@ -335,4 +439,48 @@ TEST_CASE(
   CHECK(frame.instances[0].node_path == "/World/Cube");
   CHECK(frame.instances[0].labels.at("class") == "cube");
   CHECK(std::ranges::count(frame.get(kInstanceId).pixels(), frame.instances[0].id) == 6);
+}
+
+TEST_CASE("A Replicator folder of a version that names no nodes", "[readers]") {
+  const test::TemporaryFolder folder;
+  const auto table = [](const std::vector<std::array<std::int32_t, 5>>& rows) {
+    std::string header =
+        "{'descr': [('semanticId', '<u4'), ('x_min', '<i4'), ('y_min', '<i4'), ('x_max', '<i4'), "
+        "('y_max', '<i4'), ('occlusionRatio', '<f4')], 'fortran_order': False, 'shape': (" +
+        std::to_string(rows.size()) + ",), }";
+    while ((header.size() + 11) % 64 != 0) header += ' ';
+    header += '\n';
+    std::string bytes("\x93NUMPY\x01\x00", 8);
+    bytes += char(header.size() & 255);
+    bytes += char(header.size() >> 8);
+    bytes += header;
+    for (const auto& row : rows) {
+      const float ratio = 0.25f;
+      bytes.append(reinterpret_cast<const char*>(row.data()), sizeof row);
+      bytes.append(reinterpret_cast<const char*>(&ratio), sizeof ratio);
+    }
+    return bytes;
+  };
+  folder.write("rgb_0000.png", picture(40, 30, 50, ImageFormat::Png));
+  folder.write("bounding_box_2d_tight_0000.npy", table({{0, 5, 6, 9, 11}, {1, 20, 4, 30, 8}}));
+  folder.write("bounding_box_2d_tight_labels_0000.json",
+               R"({"0": {"class": "cube"}, "1": {"class": "ball"}})");
+  folder.write("bounding_box_2d_loose_0000.npy", table({{1, 20, 4, 30, 8}, {0, 5, 6, 9, 11}}));
+  folder.write("bounding_box_2d_loose_labels_0000.json",
+               R"({"0": {"class": "cube"}, "1": {"class": "ball"}})");
+  folder.write("rgb_0001.png", picture(40, 30, 51, ImageFormat::Png));
+  for (const char* kind : {"tight", "loose"}) {
+    const std::string front = std::string("bounding_box_2d_") + kind;
+    folder.write(front + "_0001.npy", table({}));
+    folder.write(front + "_labels_0001.json", "{}");
+  }
+  const Opened opened(folder, "BasicReader");
+  CHECK_FALSE(opened.holds(kHoldsNodePaths));
+  const StoredCapture stored = opened.read(0);
+  const Frame& frame = stored.capture.frames.at(0);
+  REQUIRE(frame.instances.size() == 2);
+  CHECK(frame.instances[0].labels.at("class") == "cube");
+  CHECK(*frame.instances[0].tight_box == PixelBox{5, 6, 10, 12});
+  CHECK(frame.instances[0].id != frame.instances[1].id);
+  CHECK(opened.read(1).capture.frames.at(0).instances.empty());
 }

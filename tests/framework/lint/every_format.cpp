@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "framework/lint/every_format.h"
 
+#include "framework/datasets/frame_copy.h"
+#include "plugins/writer_support/sample_dataset.h"
 #include "writer_basic/basic_reader.h"
 #include "writer_bop/bop_reader.h"
 #include "writer_bop/bop_writer.h"
@@ -142,6 +144,25 @@ std::vector<SampleFormat> every_format() {
           format<WebDatasetWriter>("webdataset_shards", shards_of_two()),
           format<Hdf5Writer>("hdf5"),
           format<ImageFolderWriter>("imagefolder")};
+}
+
+SampleClip sample_clip() {
+  SampleClip clip{sample_dataset(SampleScene(8, 6)), {}};
+  const int count = int(sample_captures().size());
+  clip.dataset.clips = {{0, count, 10.0}};
+  for (const Capture& capture : sample_captures()) {
+    Capture& frame = clip.frames.emplace_back();
+    frame.index = capture.index;
+    frame.clip = {0, int(clip.frames.size()) - 1, count, 10.0};
+    for (const Frame& seen : capture.frames) frame.frames.push_back(copy_of(seen));
+  }
+  return clip;
+}
+
+std::vector<const Capture*> SampleClip::captures() const {
+  std::vector<const Capture*> list;
+  for (const Capture& frame : frames) list.push_back(&frame);
+  return list;
 }
 
 std::vector<SampleFormat> formats_of_clips() {

@@ -26,6 +26,15 @@ std::vector<SampleFormat> every_format();
 /// Writers of clips: captures are frames of some.
 std::vector<SampleFormat> formats_of_clips();
 
+/// The sample's captures as the frames of one clip, ten per second.
+struct SampleClip {
+  DatasetInfo dataset;
+  std::vector<Capture> frames;
+
+  std::vector<const Capture*> captures() const;
+};
+SampleClip sample_clip();
+
 /// The readers of all formats that have one. The host must outlive them.
 DatasetReaders every_reader(Host& host);
 

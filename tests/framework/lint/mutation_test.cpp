@@ -19,7 +19,6 @@
 #include <vector>
 
 #include "diorama/error.h"
-#include "framework/datasets/frame_copy.h"
 #include "framework/lint/dataset_on_disk.h"
 #include "framework/lint/encoding_host.h"
 #include "framework/lint/every_format.h"
@@ -656,31 +655,22 @@ TEST_CASE("a model's diameter is that of its vertices", "[lint]") {
 
 namespace {
 
-/// The sample's captures as the frames of one clip.
+/// The sample's captures as the frames of one clip, by all writers of clips.
 DatasetOnDisk clip_on_disk() {
-  const int count = int(test::sample_captures().size());
-  DatasetInfo dataset = test::sample_dataset(test::SampleScene(8, 6));
-  dataset.clips = {{0, count, 10.0}};
-  std::vector<Capture> frames;
-  for (const Capture& capture : test::sample_captures()) {
-    Capture& frame = frames.emplace_back();
-    frame.index = capture.index;
-    frame.clip = {0, int(frames.size()) - 1, count, 10.0};
-    for (const Frame& seen : capture.frames) frame.frames.push_back(copy_of(seen));
-  }
-  std::vector<const Capture*> captures;
-  for (const Capture& frame : frames) captures.push_back(&frame);
+  const test::SampleClip sample = test::sample_clip();
+  const int count = int(sample.frames.size());
   test::EncodingHost host;
   test::MemoryFiles all;
   for (const test::SampleFormat& format : test::formats_of_clips()) {
-    for (const auto& [path, bytes] : format.write(host, dataset, captures).files) {
-      all.files[format.name + "/" + path] = bytes;
-    }
+    const auto files = format.write(host, sample.dataset, sample.captures());
+    for (const auto& [path, bytes] : files.files) all.files[format.name + "/" + path] = bytes;
   }
   const Json clip{{"clip", 0}, {"first_capture", 0}, {"frame_count", count}, {"fps", 10.0}};
-  const std::string page =
-      Json{{"captures", count}, {"cameras", dataset.camera_names}, {"clips", Json::array({clip})}}
-          .dump();
+  const std::string page = Json{
+      {"captures", count},
+      {"cameras", sample.dataset.camera_names},
+      {"clips",
+       Json::array({clip})}}.dump();
   const auto bytes = std::as_bytes(std::span(page));
   all.files["dataset.json"] = {bytes.begin(), bytes.end()};
   return DatasetOnDisk(all);

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """read_back.py WRITE_SAMPLE_DATASETS: reads what the writers make with the readers that people use
 (numpy, OpenCV, json, tarfile, ElementTree) and compares the files with each other."""
+import configparser
 import glob
 import io
 import json
@@ -647,6 +648,60 @@ def check_webdataset(root):
                 equal(extent(ids == place), item["box"], key)
 
 
+def check_mot(root):
+    """A sequence as TrackEval and mmtracking take it: comma-separated columns, an ini file, pictures
+    that count from 1."""
+    folders = sorted(glob.glob(f"{root}/clips/mot/*/*/"))
+    equal(len(folders), len(SIZES), "sequences")
+    for folder in folders:
+        camera = folder.rstrip("/")[-5:]
+        h, w = SIZES[camera]
+        page = configparser.ConfigParser()
+        page.read(folder + "seqinfo.ini")
+        page = page["Sequence"]
+        equal(page["name"], os.path.basename(folder.rstrip("/")), "name of the sequence")
+        equal([int(page[key]) for key in ("frameRate", "imWidth", "imHeight")], [10, w, h], folder)
+        pictures = sorted(glob.glob(f"{folder}{page['imDir']}/*{page['imExt']}"))
+        equal([os.path.basename(path)[:6] for path in pictures],
+              [f"{i + 1:06d}" for i in range(int(page["seqLength"]))], folder)
+        rows = np.loadtxt(folder + "gt/gt.txt", delimiter=",", ndmin=2)
+        equal(rows.shape[1], 9, "columns")
+        assert (rows[:, 6] == 1).all() and (rows[:, 7] >= 1).all()
+        assert (rows[:, 8] > 0).all() and (rows[:, 8] <= 1).all()
+        for frame, path in enumerate(pictures):
+            basic = f"{root}/clips/basic/rp_{camera}"
+            equal(picture(path), picture(f"{basic}/rgb/rgb_{frame:04d}.png")[:, :, :3], path)
+            tight = f"{basic}/bounding_box_2d_tight/bounding_box_2d_tight"
+            boxes = np.load(f"{tight}_{frame:04d}.npy")
+            own = rows[rows[:, 0] == frame + 1]
+            equal(len(set(own[:, 1])), len(own), "tracks of a frame")
+            known = {(b["x_min"] + 1, b["y_min"] + 1, b["x_max"] - b["x_min"] + 1,
+                      b["y_max"] - b["y_min"] + 1) for b in boxes}
+            assert len(own) > 0 and {tuple(row) for row in own[:, 2:6].astype(int)} <= known, path
+
+
+def check_video(root):
+    files = glob.glob(f"{root}/clips/video/*.mp4")
+    if not files:
+        print("VideoWriter was not built: its files are left out")
+        return
+    equal(len(files), 1, "videos")
+    video = cv2.VideoCapture(files[0])
+    assert video.isOpened() and abs(video.get(cv2.CAP_PROP_FPS) - 10.0) < 1e-6, files[0]
+    count = 0
+    while True:
+        is_there, frame = video.read()
+        if not is_there:
+            break
+        left = 0
+        for camera, (h, w) in SIZES.items():
+            rgb = picture(f"{root}/clips/basic/rp_{camera}/rgb/rgb_{count:04d}.png")[:, :, :3]
+            assert cv2.PSNR(frame[:h, left:left + w], rgb) > 25.0, (files[0], count, camera)
+            left += w
+        count += 1
+    equal(count, len(glob.glob(f"{root}/clips/basic/rp_cam_0/rgb/*.png")), "frames of the video")
+
+
 def check_torchvision(root):
     """Loaders of a training library, which look for the benchmarks' own folders."""
     try:
@@ -689,7 +744,8 @@ def main():
         subprocess.run([sys.argv[1], root], check=True)
         for check in (check_basic, check_pose, check_boxes, check_page, check_coco, check_yolo,
                       check_kitti, check_voc, check_bop, check_polygons, check_imagefolder,
-                      check_webdataset, check_hdf5, check_across, check_torchvision):
+                      check_webdataset, check_hdf5, check_across, check_mot, check_video,
+                      check_torchvision):
             check(root)
             print(check.__name__, "ok")
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// write_sample_datasets FOLDER: the sample scene in every format, one folder each. What Python's
-// readers make of it is checked by read_back.py.
+// write_sample_datasets FOLDER: the sample scene in every format, one folder each, and below clips/
+// as a clip. What Python's readers make of it is checked by read_back.py.
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -8,6 +8,9 @@
 #include "framework/lint/encoding_host.h"
 #include "framework/lint/every_format.h"
 #include "plugins/writer_support/sample_dataset.h"
+#ifdef DIORAMA_HAS_VIDEO
+#include "writer_video/video_writer.h"
+#endif
 
 using namespace diorama;
 
@@ -32,6 +35,18 @@ void write_all(const std::filesystem::path& folder) {
   }
 }
 
+void write_clips(const std::filesystem::path& folder) {
+  const test::SampleClip clip = test::sample_clip();
+  test::EncodingHost host;
+  for (const test::SampleFormat& format : test::formats_of_clips()) {
+    save(format.write(host, clip.dataset, clip.captures()), folder / format.name);
+  }
+#ifdef DIORAMA_HAS_VIDEO
+  VideoWriter writer({}, host);
+  save(test::write_dataset(writer, clip.dataset, clip.captures()), folder / "video");
+#endif
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -41,6 +56,7 @@ int main(int argc, char** argv) {
   }
   try {
     write_all(argv[1]);
+    write_clips(std::filesystem::path(argv[1]) / "clips");
     return 0;
   } catch (const std::exception& error) {
     std::cerr << error.what() << "\n";

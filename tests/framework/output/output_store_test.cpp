@@ -1141,6 +1141,69 @@ TEST_CASE("What is appended to a file leaves the memory and comes out whole", "[
   CHECK(store.bytes_written() == odd.size() + even.size() + 3'000'000);
 }
 
+TEST_CASE("What writers append one after the other has one budget", "[store]") {
+  const TemporaryFolder folder;
+  LocalFileSystem local;
+  OutputStore store(local, folders_in(folder.path()), 1, options_of({}));
+  store.join(kDataset);
+  store.open();
+  Transaction transaction = store.capture_transaction(0);
+  std::map<std::string, std::string> expected;
+  for (int writer = 0; writer < 2; ++writer) {
+    CollectedFiles files(transaction, std::size_t(writer), writer == 0 ? "one" : "two");
+    for (int i = 0; i < 24; ++i) {
+      const std::string name = std::to_string(i % 8) + ".txt";
+      const std::string piece(40'000, char('a' + i));
+      files.append_text(name, piece);
+      expected[std::to_string(writer) + name] += piece;
+      std::size_t kept = 0;
+      for (const StagedFile& file : transaction.files) kept += file.bytes.size();
+      CHECK(kept < CollectedFiles::kKeptGrowingBytes);
+      CHECK(kept == transaction.growing_bytes);
+    }
+  }
+  store.commit_capture(0, transaction);
+  const std::map<std::string, std::string> found[] = {tree(folder.path() / "out/one"),
+                                                      tree(folder.path() / "elsewhere")};
+  for (const auto& [name, content] : expected) {
+    CHECK(found[name[0] - '0'].at(name.substr(1)) == content);
+  }
+}
+
+TEST_CASE("Records come by capture, of each the first whole one, in little memory", "[store]") {
+  // 20,000 of them in a run are a megabyte.
+  CHECK(sizeof(EntryPlace) <= 40);
+  const TemporaryFolder folder;
+  LocalFileSystem local;
+  constexpr int kCaptures = 3;
+  const auto commit = [&](const std::string& worker, std::vector<int> captures) {
+    const Job job{.captures = kCaptures, .existing = Existing::Resume, .name = worker};
+    OutputStore store(local, folders_in(folder.path()), kCaptures, options_of(job));
+    store.join(kDataset);
+    store.open();
+    for (const int capture : captures) {
+      Transaction transaction = store.capture_transaction(capture);
+      CollectedFiles(transaction, 0, "one").record(worker + std::to_string(capture));
+      store.commit_capture(capture, transaction);
+    }
+    store.close();
+  };
+  commit("b", {2, 0, 1});
+  commit("a", {1, 0});
+  // One byte of the record of capture 0 by "a" is damaged: the other worker's counts.
+  const fs::path entries = folder.path() / "out/.diorama/journal/a.entries";
+  std::string text = local.read(entries);
+  text.at(text.rfind("a0")) = 'x';
+  std::ofstream(entries, std::ios::binary) << text;
+  OutputStore store(local, folders_in(folder.path()), kCaptures, options_of({}));
+  store.refresh();
+  std::vector<std::string> lines;
+  store.read_records(0, [&](int capture, std::string_view line) {
+    lines.push_back(std::to_string(capture) + " " + std::string(line));
+  });
+  CHECK(lines == std::vector<std::string>{"0 b0", "1 a1", "2 b2"});
+}
+
 TEST_CASE("What a stage holds goes when its transaction is not committed", "[store]") {
   const TemporaryFolder folder;
   LocalFileSystem local;
