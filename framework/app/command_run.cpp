@@ -75,8 +75,9 @@ OutputStore::Existing existing_policy(const RunCommandOptions& options) {
   return joins ? OutputStore::Existing::Resume : OutputStore::Existing::Refuse;
 }
 
+/// `has_begun` becomes true with the first thing that the run says of itself.
 RunSummary run_job(JobAssembly& assembly, HostServices& host, const RunCommandOptions& options,
-                   ConsoleLog& log) {
+                   ConsoleLog& log, bool& has_begun) {
   const StopOnSignal stop;
   host.stop_on(stop_requested);
   LocalFileSystem file_system;
@@ -111,6 +112,7 @@ RunSummary run_job(JobAssembly& assembly, HostServices& host, const RunCommandOp
   run.only = options.only;
   run.progress = [&](const RunProgress& progress) {
     constexpr int kCapturesPerTrim = 200;
+    has_begun = true;
     if (progress.done % kCapturesPerTrim == 0) give_free_pages_back();
     if (lines) {
       lines->update(progress.done, progress.total, progress.resumed, progress.respawned,
@@ -140,6 +142,13 @@ void log_next_step(const RunSummary& summary, const fs::path& dataset, ConsoleLo
   log.write(LogLevel::Info, summary.is_finished
                                 ? "next: diorama lint " + folder + ", diorama view " + folder
                                 : "next: diorama status " + folder);
+}
+
+/// The same for what stopped or failed before its end.
+void log_way_on(const fs::path& dataset, ConsoleLog& log) {
+  log.write(LogLevel::Info, "dataset: " + dataset.string());
+  log.write(LogLevel::Info,
+            "next: the same command with --resume, diorama view " + shell_word(dataset.string()));
 }
 
 /// The plan, and what a capture needs.
@@ -185,14 +194,20 @@ int run_value(const GlobalOptions& global, const Value& job, const RunCommandOpt
     require_same_assets(*options.again_of, assembly.dataset_json, services.assets_root);
   }
   check_folders_are_free(output_folders(assembly.job));
+  const fs::path dataset = output_folders(assembly.job).records_path();
+  bool has_begun = false;
   try {
-    const RunSummary summary = run_job(assembly, *services.host, options, log);
+    const RunSummary summary = run_job(assembly, *services.host, options, log, has_begun);
     log_lines(summary_text(summary), log);
-    if (!options.only) log_next_step(summary, output_folders(assembly.job).records_path(), log);
+    if (!options.only) log_next_step(summary, dataset, log);
     return 0;
   } catch (const Interrupted&) {
     log.write(LogLevel::Warning, "interrupted; '--resume' goes on");
+    if (!options.only) log_way_on(dataset, log);
     return options.stopped_exit_code;
+  } catch (const std::exception&) {
+    if (has_begun && !options.only) log_way_on(dataset, log);
+    throw;
   }
 }
 

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "framework/host/machine_limits.h"
 
+#include <unistd.h>
+
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <limits>
@@ -101,6 +104,26 @@ int quota_cpus(const fs::path& root) {
     least = least == 0 ? cpus : std::min(least, cpus);
   }
   return least;
+}
+
+std::optional<ProcessorTime> processor_time(const fs::path& root) {
+  // user nice system idle iowait irq softirq steal
+  constexpr std::size_t kIdle = 3;
+  constexpr std::size_t kWaiting = 4;
+  std::array<double, 8> ticks{};
+  std::ifstream stream(root / "proc/stat");
+  std::string key;
+  if (!(stream >> key) || key != "cpu") return std::nullopt;
+  for (double& each : ticks) {
+    if (!(stream >> each)) return std::nullopt;
+  }
+  const double per_s = double(sysconf(_SC_CLK_TCK));
+  ProcessorTime time;
+  for (std::size_t i = 0; i < ticks.size(); ++i) {
+    time.all_s += ticks[i] / per_s;
+    if (i != kIdle && i != kWaiting) time.busy_s += ticks[i] / per_s;
+  }
+  return time;
 }
 
 }  // namespace diorama

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 
 /// What the machine and this process's cgroups (version 2) leave to it. `root` is where /proc and
 /// /sys are, for tests.
@@ -19,5 +20,14 @@ std::uint64_t total_memory(const std::filesystem::path& root = "/");
 
 /// Processors that the least quota of its cgroups amounts to, rounded up; 0: no quota.
 int quota_cpus(const std::filesystem::path& root = "/");
+
+/// Seconds since the machine started, summed over its processors.
+struct ProcessorTime {
+  double busy_s = 0.0;  ///< At work for anybody.
+  double all_s = 0.0;
+};
+
+/// Nothing when it is not known.
+std::optional<ProcessorTime> processor_time(const std::filesystem::path& root = "/");
 
 }  // namespace diorama

@@ -11,9 +11,11 @@
 #include <optional>
 #include <set>
 #include <string_view>
+#include <thread>
 #include <utility>
 
 #include "diorama/error.h"
+#include "framework/host/machine_limits.h"
 #include "framework/jobs/assemble.h"
 #include "framework/jobs/assemble_job.h"
 #include "framework/jobs/run_in_memory.h"
@@ -127,6 +129,31 @@ double peak_memory_bytes() {
   return double(usage.ru_maxrss) * 1024.0;
 }
 
+/// How many processors other programs leave to this one from here on.
+class ProcessorsLeft {
+ public:
+  std::optional<double> now() const {
+    const std::optional<ProcessorTime> time = processor_time();
+    if (!began_ || !time || time->all_s - began_->all_s <= 0.0) return std::nullopt;
+    const double others = time->busy_s - began_->busy_s - (own_s() - own_began_s_);
+    const double share = std::clamp(others / (time->all_s - began_->all_s), 0.0, 1.0);
+    return (1.0 - share) * std::thread::hardware_concurrency();
+  }
+
+ private:
+  static double own_s() {
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    const auto seconds = [](const timeval& time) {
+      return double(time.tv_sec) + 1e-6 * double(time.tv_usec);
+    };
+    return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+  }
+
+  std::optional<ProcessorTime> began_ = processor_time();
+  double own_began_s_ = own_s();
+};
+
 Estimate estimate_of(const RunSummary& summary, const CapturePlan& plan, const RenderReport& report,
                      double samples_factor) {
   Estimate estimate;
@@ -202,11 +229,15 @@ Trial run_trial(const GlobalOptions& global, const Value& given, const TrialOpti
   trial.captures = int(run.only->size());
   const KeepPictures keep(trial.pictures);
   const double before_visits = peak_memory_bytes();
+  const ProcessorsLeft left;
   const RunSummary summary = run_in_memory(assembly, *services.host, run);
   std::ranges::sort(trial.pictures, {}, [](const TrialPicture& picture) {
     return std::pair(picture.capture, std::string_view(picture.camera));
   });
   trial.threads = services.host->thread_count();
+  trial.processors_left = left.now();
+  trial.processors = int(std::thread::hardware_concurrency());
+  trial.visits = std::max(1, int(summary.settled.visit_count()));
   const double factor = trial.samples > 0 ? double(trial.job_samples) / trial.samples : 1.0;
   trial.estimate = estimate_of(summary, assembly.plan,
                                assembly.components.sets.front().renderer->report(), factor);
@@ -226,7 +257,8 @@ std::string estimate_text(const Trial& trial) {
   const auto counted = [](int count, const char* what) {
     return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
   };
-  std::string text = "estimate from " + counted(trial.captures, "capture");
+  std::string text = "estimate from " + counted(trial.captures, "capture") + " in " +
+                     counted(trial.visits, "visit");
   if (trial.samples > 0) {
     text += " with " + std::to_string(trial.samples) + " of " + std::to_string(trial.job_samples) +
             " samples";
@@ -236,8 +268,17 @@ std::string estimate_text(const Trial& trial) {
           counted(trial.threads, "thread") + ", the disk not counted";
   text += " (" + counted(estimate.visits, "visit") + " of " + long_duration_text(estimate.visit_s) +
           ", " + long_duration_text(estimate.capture_s) + " a capture), ";
-  return text + size_text(estimate.bytes) + " on disk, " + size_text(estimate.memory_bytes) +
-         " of memory for " + counted(estimate.visits_at_a_time, "visit") + " at a time\n";
+  text += size_text(estimate.bytes) + " on disk, " + size_text(estimate.memory_bytes) +
+          " of memory for " + counted(estimate.visits_at_a_time, "visit") + " at a time\n";
+  constexpr double kBusy = 0.8;
+  if (trial.processors_left && *trial.processors_left < kBusy * trial.threads) {
+    char said[160];
+    std::snprintf(said, sizeof said,
+                  "other programs left %.1f of %d processors to it: without them it takes less\n",
+                  *trial.processors_left, trial.processors);
+    text += said;
+  }
+  return text;
 }
 
 }  // namespace diorama

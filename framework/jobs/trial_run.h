@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -46,9 +47,13 @@ struct Estimate {
 struct Trial {
   std::vector<TrialPicture> pictures;  ///< By capture and camera.
   int captures = 0;                    ///< That were made.
+  int visits = 1;                      ///< They are of.
   int samples = 0;                     ///< Traced per pixel; 0: as many as the job says.
   int job_samples = 0;                 ///< The job's, where it says more.
   int threads = 1;
+  /// What other programs left meanwhile; nothing when that is not known.
+  std::optional<double> processors_left;
+  int processors = 0;
   Estimate estimate;
 };
 
@@ -57,7 +62,8 @@ struct Trial {
 Trial run_trial(const GlobalOptions& global, const Value& job, const TrialOptions& options,
                 const Log& log);
 
-/// One line: "estimate from 2 captures: 24 captures in about 4 min ...".
+/// What the job will take, and on what that rests: "estimate from 2 captures in 1 visit: 24
+/// captures in 4 min or less ...". A line more where others kept the machine busy.
 std::string estimate_text(const Trial& trial);
 
 }  // namespace diorama

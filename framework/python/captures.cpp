@@ -5,7 +5,6 @@
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
-#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -47,6 +46,12 @@ py::array image_view(const AnyImage& any, const py::capsule& owner) {
         }
       },
       any);
+}
+
+py::dict labels_of(const Labels& labels) {
+  py::dict result;
+  for (const auto& [taxonomy, label] : labels) result[text_of(taxonomy)] = text_of(label);
+  return result;
 }
 
 py::object box_of(const std::optional<PixelBox>& box) {
@@ -103,10 +108,10 @@ py::list joints_of(const std::vector<JointState>& joints) {
   py::list result;
   for (const JointState& joint : joints) {
     py::dict each;
-    each["path"] = joint.path;
+    each["path"] = text_of(joint.path);
     each["kind"] = kKinds[std::size_t(joint.kind)];
-    each["parent_path"] = joint.parent_path;
-    each["child_path"] = joint.child_path;
+    each["parent_path"] = text_of(joint.parent_path);
+    each["child_path"] = text_of(joint.child_path);
     each["position"] = joint.position;
     each["lower"] = joint.lower;
     each["upper"] = joint.upper;
@@ -128,9 +133,8 @@ py::object clip_of(const std::optional<ClipFrame>& clip) {
 py::dict instance_of(const Instance& instance, const NameSet& holds, const py::capsule& owner) {
   py::dict result;
   result["id"] = instance.id;
-  result["path"] = instance.node_path;
-  result["labels"] =
-      py::cast(std::map<std::string, std::string>(instance.labels.begin(), instance.labels.end()));
+  result["path"] = text_of(instance.node_path);
+  result["labels"] = labels_of(instance.labels);
   const auto if_held = [&](std::string_view name, auto make) -> py::object {
     return holds.contains(name) ? py::object(make()) : py::object(py::none());
   };
@@ -145,7 +149,7 @@ py::dict instance_of(const Instance& instance, const NameSet& holds, const py::c
   result["visibility"] = visibility_of(instance.visibility, owner);
   py::dict keypoints;
   for (const Keypoint& point : instance.keypoints) {
-    keypoints[py::str(point.name)] = point.position;
+    keypoints[text_of(point.name)] = point.position;
   }
   result["keypoints"] = keypoints;
   result["velocity"] = velocity_of(instance.velocity);
@@ -154,7 +158,7 @@ py::dict instance_of(const Instance& instance, const NameSet& holds, const py::c
 
 py::dict frame_of(const Frame& frame, const NameSet& holds, const py::capsule& owner) {
   py::dict result;
-  result["camera_name"] = frame.camera_name;
+  result["camera_name"] = text_of(frame.camera_name);
   result["camera"] = camera_of(frame.camera);
   result["world_from_camera"] = holds.contains(kHoldsCameraPose)
                                     ? py::cast(Mat4(frame.world_from_camera.matrix()))
@@ -170,11 +174,13 @@ py::dict frame_of(const Frame& frame, const NameSet& holds, const py::capsule& o
   }
   result["occlusions"] = occlusions;
   result["joints"] = joints_of(frame.joints);
-  result["leaf_paths"] = frame.leaf_paths;
+  py::dict leaf_paths;
+  for (const auto& [id, path] : frame.leaf_paths) leaf_paths[py::int_(id)] = text_of(path);
+  result["leaf_paths"] = leaf_paths;
   result["exposure"] = frame.exposure;
   py::dict channels;
   for (const std::string& name : frame.channels()) {
-    channels[py::str(name)] = image_view(frame.image_named(name), owner);
+    channels[text_of(name)] = image_view(frame.image_named(name), owner);
   }
   result["channels"] = channels;
   return result;
@@ -182,13 +188,13 @@ py::dict frame_of(const Frame& frame, const NameSet& holds, const py::capsule& o
 
 py::dict finding_of(const Finding& finding) {
   py::dict result;
-  result["check"] = finding.check;
-  result["file"] = finding.file;
+  result["check"] = text_of(finding.check);
+  result["file"] = text_of(finding.file);
   result["capture"] = finding.capture;
-  result["camera"] = finding.camera;
-  result["object"] = finding.object;
-  result["found"] = finding.found;
-  result["expected"] = finding.expected;
+  result["camera"] = text_of(finding.camera);
+  result["object"] = text_of(finding.object);
+  result["found"] = text_of(finding.found);
+  result["expected"] = text_of(finding.expected);
   return result;
 }
 
@@ -207,6 +213,19 @@ py::object keypoints_px_of(const std::vector<StoredKeypoint>& points) {
 
 }  // namespace
 
+py::str text_of(std::string_view text) {
+  PyObject* const made =
+      PyUnicode_DecodeUTF8(text.data(), py::ssize_t(text.size()), "surrogateescape");
+  if (made == nullptr) throw py::error_already_set();
+  return py::reinterpret_steal<py::str>(made);
+}
+
+py::list texts_of(const std::vector<std::string>& texts) {
+  py::list result;
+  for (const std::string& text : texts) result.append(text_of(text));
+  return result;
+}
+
 py::list findings_of(const ReadLog& log) {
   py::list result;
   for (const Finding& finding : log.findings) result.append(finding_of(finding));
@@ -221,10 +240,10 @@ py::dict capture_of(std::shared_ptr<const StoredCapture> stored, const NameSet& 
   py::dict result;
   result["index"] = stored->capture.index;
   result["visit"] = stored->capture.visit;
-  result["phase"] = stored->capture.phase;
-  result["environment"] = stored->capture.environment;
+  result["phase"] = text_of(stored->capture.phase);
+  result["environment"] = text_of(stored->capture.environment);
   result["clip"] = clip_of(stored->capture.clip);
-  result["split"] = stored->split;
+  result["split"] = text_of(stored->split);
   py::list frames;
   for (std::size_t i = 0; i < stored->capture.frames.size(); ++i) {
     const Frame& frame = stored->capture.frames[i];
@@ -286,20 +305,23 @@ std::span<const std::byte> bytes_of(const Content& content) {
 }
 
 void bind_files(py::module_& module) {
-  py::class_<PyFiles>(module, "Files")
+  py::class_<PyFiles>(
+      module, "Files",
+      "The files of a writer, for one call. Paths are relative to the writer's folder, with '/'.")
       .def(
           "add",
           [](const PyFiles& f, const std::string& path, const Content& content) {
             const auto bytes = bytes_of(content);
             f.get().add(path, {bytes.begin(), bytes.end()});
           },
-          py::arg("path"), py::arg("content"))
+          py::arg("path"), py::arg("content"), "A file; texts are written as UTF-8.")
       .def(
           "append",
           [](const PyFiles& f, const std::string& path, const Content& content) {
             f.get().append(path, bytes_of(content));
           },
-          py::arg("path"), py::arg("content"))
+          py::arg("path"), py::arg("content"),
+          "Puts content at the end of a file that begins empty.")
       .def(
           "record",
           [](const PyFiles& f, const std::string& line) {
@@ -309,7 +331,7 @@ void bind_files(py::module_& module) {
             }
             f.of_capture->record(line);
           },
-          py::arg("line"))
+          py::arg("line"), "In write() alone: a line that finish() gets.")
       .def("_end", [](PyFiles& f) { f = {}; });
   module.def("files_of", [](const py::capsule& files) {
     return PyFiles{held<DatasetFiles>(files, "diorama::DatasetFiles"), nullptr};
@@ -321,19 +343,16 @@ void bind_files(py::module_& module) {
 }
 
 py::dict dataset_of(const DatasetInfo& info) {
-  const auto plain = [](const Labels& labels) {
-    return std::map<std::string, std::string>(labels.begin(), labels.end());
-  };
   py::dict result;
   result["seed"] = info.seed;
   result["captures"] = info.capture_count;
-  result["cameras"] = info.camera_names;
+  result["cameras"] = texts_of(info.camera_names);
   py::list labels;
-  for (const Labels& each : info.labels) labels.append(plain(each));
+  for (const Labels& each : info.labels) labels.append(labels_of(each));
   result["labels"] = labels;
-  result["classes"] = info.classes;
+  result["classes"] = texts_of(info.classes);
   result["validation"] = info.validation;
-  result["job"] = info.resolved_job;
+  result["job"] = text_of(info.resolved_job);
   result["version"] = info.program_version;
   return result;
 }

@@ -4,6 +4,9 @@
 #include <pybind11/pybind11.h>
 
 #include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include "diorama/reader.h"
 
@@ -13,6 +16,11 @@ namespace diorama {
 
 /// By LensModel.
 inline constexpr const char* kLensNames[]{"pinhole", "opencv_pinhole", "fisheye_polynomial"};
+
+/// Files may say what is no UTF-8, and be called so: such bytes stay what they are, as in
+/// os.fsdecode().
+pybind11::str text_of(std::string_view text);
+pybind11::list texts_of(const std::vector<std::string>& texts);
 
 pybind11::list findings_of(const ReadLog& log);
 

@@ -78,36 +78,50 @@ void set_channels(Frame& frame, const std::map<std::string, py::array>& channels
   }
 }
 
+/// What a class of diorama/__init__.py has below a name.
 template <class T>
-std::optional<T> optional_of(const py::object& given, const char* name) {
-  return given.attr(name).cast<std::optional<T>>();
+T value_of(const py::handle& given, const char* name) {
+  const py::object value = given.attr(name);
+  try {
+    return value.cast<T>();
+  } catch (const py::cast_error&) {
+    throw Error(ErrorKind::Plugin,
+                py::str(py::type::of(given).attr("__name__")).cast<std::string>() + "." + name +
+                    " cannot be " + py::repr(value).cast<std::string>());
+  }
 }
 
-std::optional<PixelBox> pixel_box(const py::object& value) {
-  if (value.is_none()) return std::nullopt;
-  const auto box = value.cast<std::array<int, 4>>();
-  return PixelBox{box[0], box[1], box[2], box[3]};
+template <class T>
+std::optional<T> optional_of(const py::handle& given, const char* name) {
+  return value_of<std::optional<T>>(given, name);
+}
+
+using Corners = std::array<int, 4>;
+
+std::optional<PixelBox> pixel_box(const std::optional<Corners>& corners) {
+  if (!corners) return std::nullopt;
+  return PixelBox{(*corners)[0], (*corners)[1], (*corners)[2], (*corners)[3]};
 }
 
 Camera camera_given(const py::object& given) {
   Camera camera;
-  camera.width = given.attr("width").cast<int>();
-  camera.height = given.attr("height").cast<int>();
+  camera.width = value_of<int>(given, "width");
+  camera.height = value_of<int>(given, "height");
   if (camera.width < 1 || camera.height < 1) {
     throw Error(ErrorKind::Plugin, "a camera's width and height are at least 1");
   }
-  const auto lens = given.attr("lens").cast<std::string>();
+  const auto lens = value_of<std::string>(given, "lens");
   const auto known = std::ranges::find(kLensNames, lens);
   if (known == std::end(kLensNames)) {
     throw Error(ErrorKind::Plugin, "there is no lens '" + lens + "'");
   }
   camera.lens = LensModel(known - std::begin(kLensNames));
-  camera.fx = given.attr("fx").cast<double>();
-  camera.fy = given.attr("fy").cast<double>();
-  camera.cx = given.attr("cx").cast<double>();
-  camera.cy = given.attr("cy").cast<double>();
+  camera.fx = value_of<double>(given, "fx");
+  camera.fy = value_of<double>(given, "fy");
+  camera.cx = value_of<double>(given, "cx");
+  camera.cy = value_of<double>(given, "cy");
   const auto copy = [&](const char* name, auto& to) {
-    const auto values = given.attr(name).cast<std::vector<double>>();
+    const auto values = value_of<std::vector<double>>(given, name);
     if (values.size() > to.size()) {
       throw Error(ErrorKind::Plugin,
                   std::string(name) + " has at most " + std::to_string(to.size()) + " numbers");
@@ -116,8 +130,8 @@ Camera camera_given(const py::object& given) {
   };
   copy("distortion", camera.distortion);
   copy("fisheye_polynomial", camera.fisheye_polynomial);
-  camera.near_m = given.attr("near_m").cast<double>();
-  camera.far_m = given.attr("far_m").cast<double>();
+  camera.near_m = value_of<double>(given, "near_m");
+  camera.far_m = value_of<double>(given, "far_m");
   return camera;
 }
 
@@ -127,7 +141,14 @@ CoverageMask mask_given(const std::string& what, const py::object& given, const 
   CoverageMask mask;
   if (given.is_none()) return mask;
   using Bits = py::array_t<bool, py::array::c_style | py::array::forcecast>;
-  const auto [box, bits] = given.cast<std::pair<py::object, Bits>>();
+  const auto [box, bits] = [&] {
+    try {
+      return given.cast<std::pair<std::optional<Corners>, Bits>>();
+    } catch (const py::cast_error&) {
+      throw Error(ErrorKind::Plugin, what + " is a pair of a box and its pixels, found " +
+                                         py::repr(given).cast<std::string>());
+    }
+  }();
   const std::optional<PixelBox> place = pixel_box(box);
   if (!place) throw Error(ErrorKind::Plugin, what + " has a box");
   mask.box = *place;
@@ -140,7 +161,7 @@ CoverageMask mask_given(const std::string& what, const py::object& given, const 
     throw Error(ErrorKind::Plugin,
                 what + " has a box " +
                     (beyond > 0 ? "at most one image size beyond the image" : "in the image") +
-                    ", found " + py::str(box).cast<std::string>());
+                    ", found " + py::str(py::cast(*box)).cast<std::string>());
   }
   if (bits.ndim() != 2 || bits.shape(0) != mask.box.height() || bits.shape(1) != mask.box.width()) {
     throw Error(ErrorKind::Plugin, what + " has the size of its box, found " + shape_of(bits));
@@ -151,19 +172,19 @@ CoverageMask mask_given(const std::string& what, const py::object& given, const 
 
 Visibility visibility_given(const py::object& given, const Camera& camera) {
   Visibility seen;
-  seen.visible_pixels = given.attr("visible_pixels").cast<std::int64_t>();
-  seen.amodal_pixels = given.attr("amodal_pixels").cast<std::int64_t>();
-  seen.outside_pixels = given.attr("outside_pixels").cast<std::int64_t>();
-  seen.amodal_box = pixel_box(given.attr("amodal_box"));
+  seen.visible_pixels = value_of<std::int64_t>(given, "visible_pixels");
+  seen.amodal_pixels = value_of<std::int64_t>(given, "amodal_pixels");
+  seen.outside_pixels = value_of<std::int64_t>(given, "outside_pixels");
+  seen.amodal_box = pixel_box(optional_of<Corners>(given, "amodal_box"));
   seen.amodal_mask = mask_given("an amodal mask", given.attr("amodal_mask"), camera, 1);
   return seen;
 }
 
 Instance instance_given(const py::object& given, const Camera& camera) {
   Instance instance;
-  instance.id = given.attr("id").cast<std::uint32_t>();
-  instance.node_path = given.attr("path").cast<std::string>();
-  const auto labels = given.attr("labels").cast<std::map<std::string, std::string>>();
+  instance.id = value_of<std::uint32_t>(given, "id");
+  instance.node_path = value_of<std::string>(given, "path");
+  const auto labels = value_of<std::map<std::string, std::string>>(given, "labels");
   instance.labels = Labels(labels.begin(), labels.end());
   if (const auto pose = optional_of<Mat4>(given, "world_from_object")) {
     instance.world_from_node = affine_of(*pose);
@@ -171,23 +192,23 @@ Instance instance_given(const py::object& given, const Camera& camera) {
   if (const auto bounds = optional_of<std::pair<Vec3, Vec3>>(given, "bounds")) {
     instance.bounds_node = Aabb{bounds->first, bounds->second};
   }
-  instance.tight_box = pixel_box(given.attr("box"));
+  instance.tight_box = pixel_box(optional_of<Corners>(given, "box"));
   if (const py::object seen = given.attr("visibility"); !seen.is_none()) {
     instance.visibility = visibility_given(seen, camera);
   }
-  for (const auto& [name, position] : given.attr("keypoints").cast<std::map<std::string, Vec3>>()) {
+  for (const auto& [name, position] : value_of<std::map<std::string, Vec3>>(given, "keypoints")) {
     instance.keypoints.push_back({name, position});
   }
   if (const py::object velocity = given.attr("velocity"); !velocity.is_none()) {
     instance.velocity =
-        Velocity{velocity.attr("linear").cast<Vec3>(), velocity.attr("angular").cast<Vec3>()};
+        Velocity{value_of<Vec3>(velocity, "linear"), value_of<Vec3>(velocity, "angular")};
   }
   return instance;
 }
 
 Frame frame_given(const py::object& given) {
   Frame frame;
-  frame.camera_name = given.attr("camera_name").cast<std::string>();
+  frame.camera_name = value_of<std::string>(given, "camera_name");
   frame.camera_path = frame.camera_name;
   frame.camera = camera_given(given.attr("camera"));
   if (const auto pose = optional_of<Mat4>(given, "world_from_camera")) {
@@ -198,42 +219,42 @@ Frame frame_given(const py::object& given) {
         instance_given(py::reinterpret_borrow<py::object>(each), frame.camera));
   }
   for (const auto& [front, behind, pixels] :
-       given.attr("occlusions")
-           .cast<std::vector<std::tuple<std::uint32_t, std::uint32_t, std::int64_t>>>()) {
+       value_of<std::vector<std::tuple<std::uint32_t, std::uint32_t, std::int64_t>>>(
+           given, "occlusions")) {
     frame.occlusions.push_back({front, behind, pixels});
   }
-  frame.leaf_paths = given.attr("leaf_paths").cast<std::map<std::uint32_t, std::string>>();
-  set_channels(frame, given.attr("channels").cast<std::map<std::string, py::array>>());
+  frame.leaf_paths = value_of<std::map<std::uint32_t, std::string>>(given, "leaf_paths");
+  set_channels(frame, value_of<std::map<std::string, py::array>>(given, "channels"));
   return frame;
 }
 
 Finding finding_given(const py::object& given) {
   Finding finding;
-  finding.check = given.attr("check").cast<std::string>();
-  finding.file = given.attr("file").cast<std::string>();
+  finding.check = value_of<std::string>(given, "check");
+  finding.file = value_of<std::string>(given, "file");
   finding.capture = optional_of<int>(given, "capture");
-  finding.camera = given.attr("camera").cast<std::string>();
-  finding.object = given.attr("object").cast<std::string>();
-  finding.found = given.attr("found").cast<std::string>();
-  finding.expected = given.attr("expected").cast<std::string>();
+  finding.camera = value_of<std::string>(given, "camera");
+  finding.object = value_of<std::string>(given, "object");
+  finding.found = value_of<std::string>(given, "found");
+  finding.expected = value_of<std::string>(given, "expected");
   return finding;
 }
 
 void store_capture(StoredCapture& stored, const py::object& given) {
   Capture& capture = stored.capture;
-  capture.index = given.attr("index").cast<int>();
-  capture.visit = given.attr("visit").cast<int>();
-  capture.phase = given.attr("phase").cast<std::string>();
-  capture.environment = given.attr("environment").cast<std::string>();
-  stored.split = given.attr("split").cast<std::string>();
+  capture.index = value_of<int>(given, "index");
+  capture.visit = value_of<int>(given, "visit");
+  capture.phase = value_of<std::string>(given, "phase");
+  capture.environment = value_of<std::string>(given, "environment");
+  stored.split = value_of<std::string>(given, "split");
   if (const py::object clip = given.attr("clip"); !clip.is_none()) {
-    capture.clip = ClipFrame{clip.attr("clip").cast<int>(), clip.attr("frame").cast<int>(),
-                             clip.attr("frame_count").cast<int>(), clip.attr("fps").cast<double>()};
+    capture.clip = ClipFrame{value_of<int>(clip, "clip"), value_of<int>(clip, "frame"),
+                             value_of<int>(clip, "frame_count"), value_of<double>(clip, "fps")};
   }
   for (const py::handle frame : given.attr("frames")) {
     capture.frames.push_back(frame_given(py::reinterpret_borrow<py::object>(frame)));
     auto& masks = stored.masks.emplace_back();
-    for (const auto& [id, mask] : frame.attr("masks").cast<std::map<std::uint32_t, py::object>>()) {
+    for (const auto& [id, mask] : value_of<std::map<std::uint32_t, py::object>>(frame, "masks")) {
       masks.emplace(id, mask_given("a mask", mask, capture.frames.back().camera, 0));
     }
   }

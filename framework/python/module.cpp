@@ -5,12 +5,15 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <cstdlib>
+#include <exception>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -41,7 +44,7 @@ void log_to_python(LogLevel level, std::string_view message) {
   constexpr int kPythonLevels[]{10, 20, 30, 40};
   const py::gil_scoped_acquire lock;
   py::module_::import("logging").attr("getLogger")("diorama").attr("log")(
-      kPythonLevels[std::size_t(level)], "%s", std::string(message));
+      kPythonLevels[std::size_t(level)], "%s", text_of(message));
 }
 
 /// What all datasets of the process share. Made when the first one is opened, never destroyed:
@@ -74,16 +77,16 @@ class OpenDataset {
   py::dict info() const {
     const StoredInfo& info = dataset_->info();
     py::dict result;
-    result["folder"] = found_.folder.string();
-    result["reader"] = found_.reader;
-    result["format"] = info.format;
-    result["holds"] = std::vector<std::string>(info.holds.begin(), info.holds.end());
-    result["cameras"] = info.camera_names;
+    result["folder"] = text_of(found_.folder.string());
+    result["reader"] = text_of(found_.reader);
+    result["format"] = text_of(info.format);
+    result["holds"] = texts_of({info.holds.begin(), info.holds.end()});
+    result["cameras"] = texts_of(info.camera_names);
     result["captures"] = info.captures;
-    result["classes"] = info.classes;
+    result["classes"] = texts_of(info.classes);
     py::dict skeletons;
     for (const auto& [label, skeleton] : info.skeletons) {
-      skeletons[py::str(label)] = py::make_tuple(skeleton.names, skeleton.lines);
+      skeletons[text_of(label)] = py::make_tuple(texts_of(skeleton.names), skeleton.lines);
     }
     result["skeletons"] = skeletons;
     result["findings"] = findings_of(dataset_->log());
@@ -143,81 +146,97 @@ std::unique_ptr<OpenDataset> open_dataset(const std::string& program, const std:
   });
 }
 
-std::vector<std::pair<std::string, std::string>> find_in(const std::string& program,
-                                                         const std::string& folder) {
-  return services_of(program).with_readers([&](DatasetReaders& readers) {
-    std::vector<std::pair<std::string, std::string>> all;
-    for (const FoundDataset& found : find_datasets(folder, readers)) {
-      all.emplace_back(found.folder.string(), found.reader);
-    }
-    return all;
-  });
+py::list find_in(const std::string& program, const std::string& folder) {
+  const std::vector<FoundDataset> all = services_of(program).with_readers(
+      [&](DatasetReaders& readers) { return find_datasets(folder, readers); });
+  py::list result;
+  for (const FoundDataset& found : all) {
+    result.append(py::make_tuple(text_of(found.folder.string()), text_of(found.reader)));
+  }
+  return result;
 }
 
-/// Hands captures to a Python function, in their order, one at a time.
+/// Hands captures to a Python function, in their order, one at a time, in the thread that waits for
+/// them: what holds for that thread alone (torch.no_grad(), autocast) holds in the function, and
+/// Ctrl-C interrupts it.
 class Listener {
  public:
   Listener(py::object on_capture, NameSet needs)
       : on_capture_(std::move(on_capture)), needs_(std::move(needs)) {}
 
   const NameSet& needs() const { return needs_; }
-  bool is_over() const { return is_over_; }
   const std::atomic<bool>& stop() const { return is_over_; }
 
   /// Called by several threads; those of later captures wait, and with them the run.
   void take(const Capture& capture) {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return is_over_ || capture.index == next_; });
-    if (!is_over_) call(capture);
-    ++next_;
-    lock.unlock();
+    if (is_over_) return;
+    given_ = copy_of(capture, needs_);
     changed_.notify_all();
+    changed_.wait(lock, [&] { return is_over_ || capture.index < next_; });
   }
 
-  /// Ends the run when the interpreter has a signal to handle: Ctrl-C.
-  void look_for_signals() {
-    {
-      const py::gil_scoped_acquire python;
-      if (PyErr_CheckSignals() == 0) return;
-      keep(py::error_already_set());
+  /// Calls the function until end(), without the interpreter's lock between two calls.
+  void serve() {
+    constexpr std::chrono::milliseconds kSignalPause(50);
+    std::unique_lock lock(mutex_);
+    while (!is_ended_) {
+      changed_.wait_for(lock, kSignalPause, [&] { return given_ || is_ended_; });
+      const std::shared_ptr<const StoredCapture> stored = std::exchange(given_, nullptr);
+      const bool is_wanted = stored && !is_over_;
+      // Not while the interpreter is locked: who has that lock may wait for this one.
+      lock.unlock();
+      const bool goes_on = is_wanted ? call(stored) : !has_signal();
+      lock.lock();
+      if (is_wanted) ++next_;
+      if (!goes_on) is_over_ = true;
+      changed_.notify_all();
     }
-    // Not while the interpreter is locked: who holds this may wait for it.
+  }
+
+  /// There are no more captures.
+  void end() {
     const std::lock_guard lock(mutex_);
-    is_over_ = true;
+    is_ended_ = true;
     changed_.notify_all();
   }
 
-  /// With the interpreter's lock held: throws what the function threw.
-  void rethrow() {
-    if (error_) throw py::error_already_set(*error_);
-  }
+  /// What the function threw, or Ctrl-C.
+  std::exception_ptr error() const { return error_; }
 
  private:
-  void call(const Capture& capture) {
-    std::shared_ptr<const StoredCapture> stored = copy_of(capture, needs_);
+  bool call(std::shared_ptr<const StoredCapture> stored) {
     const py::gil_scoped_acquire python;
-    // A signal may have ended the run since: the function is not called any more.
-    if (error_) return;
     try {
-      const py::object goes_on = on_capture_(capture_of(std::move(stored), made_holds()));
-      if (goes_on.is(py::bool_(false))) is_over_ = true;
-    } catch (const py::error_already_set& error) {
-      keep(error);
-      is_over_ = true;
+      return !on_capture_(capture_of(std::move(stored), made_holds())).is(py::bool_(false));
+    } catch (...) {
+      keep(std::current_exception());
+      return false;
     }
   }
 
-  /// The first one; the interpreter's lock guards it.
-  void keep(const py::error_already_set& error) {
-    if (!error_) error_ = error;
+  /// Ctrl-C while the function is not at work.
+  bool has_signal() {
+    const py::gil_scoped_acquire python;
+    if (PyErr_CheckSignals() == 0) return false;
+    keep(std::make_exception_ptr(py::error_already_set()));
+    return true;
+  }
+
+  /// The first one.
+  void keep(std::exception_ptr error) {
+    if (!error_) error_ = std::move(error);
   }
 
   py::object on_capture_;
   NameSet needs_;
   std::mutex mutex_;
   std::condition_variable changed_;
+  std::shared_ptr<const StoredCapture> given_;  ///< Number next_, not handed over yet.
   int next_ = 0;
-  std::optional<py::error_already_set> error_;
+  bool is_ended_ = false;
+  std::exception_ptr error_;
   std::atomic<bool> is_over_ = false;
 };
 
@@ -251,6 +270,17 @@ Value job_value(const std::string& file, const std::string& text,
 }
 
 /// Without output: nothing is written anywhere.
+void make_captures(const GlobalOptions& options, const Value& job, const Listener& own) {
+  const JobServices services = make_job_services(options, job, log_to_python, register_listener);
+  services.host->stop_on(own.stop());
+  JobAssembly assembly = assemble_job(job, *services.registry, *services.host, services.assets_root,
+                                      program_version(), AssembleFor::Run);
+  RunOptions run;
+  run.stop = &own.stop();
+  run.encodes_in_order = true;
+  run_in_memory(assembly, *services.host, run);
+}
+
 void listen(const std::string& program, const Value& given, const py::object& on_capture,
             const std::vector<std::string>& needs, int threads) {
   if (listener) throw Error(ErrorKind::Usage, "run() with on_capture is at work already");
@@ -268,23 +298,24 @@ void listen(const std::string& program, const Value& given, const py::object& on
   listener = &own;
   const std::unique_ptr<Listener*, void (*)(Listener**)> forget(
       &listener, [](Listener** held) { *held = nullptr; });
+  std::exception_ptr failed;
   {
     const py::gil_scoped_release unlocked;
-    const JobServices services = make_job_services(options, job, log_to_python, register_listener);
-    services.host->stop_on(own.stop());
-    JobAssembly assembly = assemble_job(job, *services.registry, *services.host,
-                                        services.assets_root, program_version(), AssembleFor::Run);
-    RunOptions run;
-    run.stop = &own.stop();
-    run.encodes_in_order = true;
-    run.progress = [&](const RunProgress&) { own.look_for_signals(); };
-    try {
-      run_in_memory(assembly, *services.host, run);
-    } catch (const Interrupted&) {
-      // Whoever ended it knows.
-    }
+    std::thread maker([&] {
+      try {
+        make_captures(options, job, own);
+      } catch (const Interrupted&) {
+        // Whoever ended it knows.
+      } catch (...) {
+        failed = std::current_exception();
+      }
+      own.end();
+    });
+    own.serve();
+    maker.join();
   }
-  own.rethrow();
+  if (own.error()) std::rethrow_exception(own.error());
+  if (failed) std::rethrow_exception(failed);
 }
 
 }  // namespace
@@ -303,7 +334,7 @@ PYBIND11_MODULE(_diorama, module) {
     try {
       if (pointer) std::rethrow_exception(pointer);
     } catch (const Error& error) {
-      const py::object raised = py::reinterpret_borrow<py::object>(error_class)(error.what());
+      const py::object raised = py::reinterpret_borrow<py::object>(error_class)(text_of(error.what()));
       raised.attr("kind") = kErrorKinds[std::size_t(error.kind())];
       PyErr_SetObject(error_class, raised.ptr());
     }

@@ -38,6 +38,9 @@ Json matrix_json(const Affine& map) {
   return numbers;
 }
 
+/// Readers give what files say, which may be no number. Then the page is not told.
+bool is_finite(const Affine& map) { return map.matrix().allFinite(); }
+
 /// Pairs of corners (see Aabb::corner()) that differ in one bit.
 constexpr std::array<std::pair<int, int>, 12> kEdges{{{0, 1},
                                                       {2, 3},
@@ -117,12 +120,14 @@ Json object_json(const StoredInfo& info, const Frame& frame, const Instance& ins
   if (const auto seen = seen_from(info, frame, instance)) {
     object["distance_m"] = rounded(seen->distance_m, 1e-4);
   }
+  if (!is_finite(instance.world_from_node)) return object;
   if (holds(kHoldsPoses) || holds(kHoldsBoxes3d)) {
     object["world_from_node"] = matrix_json(instance.world_from_node);
   }
-  if (holds(kHoldsBoxes3d) && !instance.bounds_node.is_empty()) {
-    object["bounds"] = {vector_json(instance.bounds_node.min),
-                        vector_json(instance.bounds_node.max)};
+  const Aabb& bounds = instance.bounds_node;
+  if (holds(kHoldsBoxes3d) && !bounds.is_empty() && bounds.min.allFinite() &&
+      bounds.max.allFinite()) {
+    object["bounds"] = {vector_json(bounds.min), vector_json(bounds.max)};
     object["edges"] = edges_json(frame, instance);
   }
   return object;
@@ -131,14 +136,16 @@ Json object_json(const StoredInfo& info, const Frame& frame, const Instance& ins
 Json frame_json(const StoredInfo& info, const Frame& frame) {
   const Camera& camera = frame.camera;
   Json json{{"camera", frame.camera_name}, {"width", camera.width}, {"height", camera.height}};
-  if (info.holds.contains(kHoldsCamera)) {
+  const bool is_lens = std::isfinite(camera.fx) && std::isfinite(camera.fy) &&
+                       std::isfinite(camera.cx) && std::isfinite(camera.cy);
+  if (info.holds.contains(kHoldsCamera) && is_lens) {
     json["lens"] = camera.lens == LensModel::Pinhole         ? "pinhole"
                    : camera.lens == LensModel::OpencvPinhole ? "opencv"
                                                              : "fisheye";
     json["focal"] = {camera.fx, camera.fy};
     json["centre"] = {camera.cx, camera.cy};
   }
-  if (info.holds.contains(kHoldsCameraPose)) {
+  if (info.holds.contains(kHoldsCameraPose) && is_finite(frame.world_from_camera)) {
     json["world_from_camera"] = matrix_json(frame.world_from_camera);
   }
   json["objects"] = Json::array();

@@ -102,14 +102,24 @@ class ReportWriter {
       return false;
     }
     const bool is_json = answer.type == "application/json";
-    std::string script = "diorama_data('" + path + "',";
-    if (is_json) {
-      script += adapt ? adapt(*answer.body) : *answer.body;
-    } else {
-      script += "'data:" + answer.type + ";base64," + base64(*answer.body) + "'";
-    }
-    put(file_name(path) + ".js", script + ");\n");
+    const std::string json =
+        !is_json ? "\"data:" + answer.type + ";base64," + base64(*answer.body) + "\""
+        : adapt  ? adapt(*answer.body)
+                 : *answer.body;
+    put(file_name(path) + ".js", "diorama_data('" + path + "','" + quoted(json) + "');\n");
     return true;
+  }
+
+  /// As a text of a script. As it stands it would be no JSON there: a key "__proto__" is none.
+  static std::string quoted(std::string_view json) {
+    std::string text;
+    text.reserve(json.size() + json.size() / 8);
+    for (const char letter : json) {
+      if (letter == '\n') continue;  // between words; in texts there are none
+      if (letter == '\\' || letter == '\'') text += '\\';
+      text += letter;
+    }
+    return text;
   }
 
   /// Under the address by which the page asks for it.

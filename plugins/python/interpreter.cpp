@@ -82,6 +82,8 @@ void start_python() {
 py::module_ plugins_module() { return py::module_::import("diorama.plugins"); }
 
 std::string message_of(const py::error_already_set& error, const std::string& file) {
+  // Python itself does so only where Python code catches it.
+  if (error.trace()) PyException_SetTraceback(error.value().ptr(), error.trace().ptr());
   try {
     return plugins_module().attr("_say")(error.value(), file).cast<std::string>();
   } catch (const py::error_already_set&) {

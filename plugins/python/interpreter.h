@@ -37,6 +37,8 @@ auto call_python(const std::string& file, Host& host, Call&& call) {
   } catch (const pybind11::error_already_set& error) {
     host.stop_if_asked();
     throw Error(ErrorKind::Plugin, message_of(error, file));
+  } catch (const pybind11::cast_error& error) {
+    throw Error(ErrorKind::Plugin, file + ": " + error.what());
   }
 }
 

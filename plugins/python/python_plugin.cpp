@@ -20,6 +20,10 @@ namespace py = pybind11;
 namespace diorama {
 namespace {
 
+std::vector<std::string> names_of(const py::object& component, const char* attribute) {
+  return plugins_module().attr("_names")(component, attribute).cast<std::vector<std::string>>();
+}
+
 class PythonRandomizer final : public Randomizer {
  public:
   static constexpr const char* kScriptKind = "randomizer";
@@ -47,8 +51,8 @@ class PythonAnnotator final : public Annotator {
   using Params = ScriptParams;
   PythonAnnotator(const Params& params, Host& host) : script_(params, kScriptKind, host) {
     script_.call([&](const py::object& object) {
-      needs_ = object.attr("needs").cast<std::vector<std::string>>();
-      provides_ = object.attr("provides").cast<std::vector<std::string>>();
+      needs_ = names_of(object, "needs");
+      provides_ = names_of(object, "provides");
     });
     if (provides_.empty()) refuse("provides nothing; list the channels that annotate() makes");
     for (const std::string& name : provides_) {
@@ -81,9 +85,7 @@ class PythonWriter final : public Writer {
   static constexpr const char* kScriptKind = "writer";
   using Params = ScriptParams;
   PythonWriter(const Params& params, Host& host) : script_(params, kScriptKind, host) {
-    script_.call([&](const py::object& object) {
-      needs_ = object.attr("needs").cast<std::vector<std::string>>();
-    });
+    script_.call([&](const py::object& object) { needs_ = names_of(object, "needs"); });
   }
 
   NameSet needs() const override { return {needs_.begin(), needs_.end()}; }

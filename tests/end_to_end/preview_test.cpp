@@ -53,8 +53,9 @@ TEST_CASE("A preview shows the pictures of the run", "[preview]") {
     CHECK(quick.contains(name));
     CHECK_THAT(few.output, ContainsSubstring(std::string("preview/") + name + "\n"));
   }
-  CHECK_THAT(few.output, ContainsSubstring("estimate from 3 captures with 4 of 16 samples: "
-                                           "7 captures in "));
+  CHECK_THAT(few.output,
+             ContainsSubstring("estimate from 3 captures in 3 visits with 4 of 16 samples: "
+                               "7 captures in "));
   CHECK_FALSE(fs::exists(folder / "_out_diorama"));
 
   // With all samples they are the run's own.
@@ -62,7 +63,7 @@ TEST_CASE("A preview shows the pictures of the run", "[preview]") {
                            "1", "--dir", "all"},
                           folder.path());
   REQUIRE(all.exit_code == 0);
-  CHECK_THAT(all.output, ContainsSubstring("estimate from 2 captures: "));
+  CHECK_THAT(all.output, ContainsSubstring("estimate from 2 captures in "));
   const auto written = files_below(folder / "out");
   const auto shown = files_below(folder / "all");
   REQUIRE(shown.size() == 4);
@@ -86,8 +87,9 @@ TEST_CASE("A dry run estimates and leaves nothing", "[preview]") {
   REQUIRE(std::regex_search(
       dry.output, said,
       std::regex(
-          "estimate from 2 captures with 2 of 16 samples: 7 captures in [0-9.]+ s or less on "
-          "[0-9]+ threads?, the disk not counted \\(3 visits of [0-9.]+ s, [0-9.]+ s a capture\\), "
+          "estimate from 2 captures in 1 visit with 2 of 16 samples: 7 captures in [0-9.]+ s or "
+          "less on [0-9]+ threads?, the disk not counted \\(3 visits of [0-9.]+ s, [0-9.]+ s a "
+          "capture\\), "
           "([0-9]+) kB on disk, [0-9]+ MB of memory for 2 visits at a time\n")));
 
   REQUIRE(run({"run", "job.yaml", "--output", "out"}, folder.path()).exit_code == 0);

@@ -47,6 +47,37 @@ async function newPage(scheme = 'light') {
 const hashOf = (page) => page.evaluate(() => location.hash);
 const captureOf = async (page) => Number(/#\/capture\/(\d+)/.exec(await hashOf(page))[1]);
 
+/** Whoever opens the address of a page sees the same: what `read` says of it. */
+async function sameElsewhere(page, read, what) {
+  // Addresses follow four times a second.
+  await page.waitForTimeout(600);
+  const expected = await read(page);
+  const twin = await newPage();
+  await twin.goto(address);
+  await twin.waitForSelector('.card');
+  await twin.goto(page.url());
+  await twin.waitForFunction(() => document.querySelector('.status')?.hidden, null, { timeout: 120000 });
+  await twin.waitForTimeout(800);
+  const found = await read(twin);
+  check(found === expected, `${what} stands in the address: ${expected}` + (found === expected ? '' : `, elsewhere ${found}`));
+  await twin.close();
+}
+
+/** What the probe says of the canvas's middle. */
+async function middlePixel(page) {
+  const box = await page.locator('.capture:not([hidden]) canvas.big').boundingBox();
+  await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+  await page.waitForTimeout(200);
+  return /pixel \d+, \d+/.exec(await page.textContent('.capture:not([hidden]) .probe'))?.[0];
+}
+
+/** The number of the card that is first in sight. */
+const firstCard = (page) => page.evaluate(() => {
+  const top = document.querySelector('.grid').getBoundingClientRect().top;
+  const cards = [...document.querySelectorAll('.card')].map((card) => [card.getBoundingClientRect(), card.getAttribute('aria-label')]);
+  return cards.filter(([box]) => box.bottom > top + box.height / 2).sort(([a], [b]) => a.top - b.top || a.left - b.left)[0][1];
+});
+
 /** Clips play, by key and button, at speeds, and stand in the address. */
 async function tryClip(page, drawn) {
   const time = () => page.textContent('.player .time');
@@ -191,6 +222,26 @@ try {
   await page.waitForTimeout(800);
   await page.screenshot({ path: `${pictures}/grid_overlays.png` });
 
+  // What was scrolled to stands in the address, and is there when one comes back.
+  const firstOfAll = await firstCard(page);
+  await page.mouse.move(900, 500);
+  for (let i = 0; i < 3; ++i) await page.mouse.wheel(0, 300);
+  await page.waitForTimeout(400);
+  if ((await firstCard(page)) !== firstOfAll) {
+    await sameElsewhere(page, firstCard, 'the place in the grid');
+    const place = await firstCard(page);
+    const link = await page.getAttribute('.grid .card:last-child a.picture', 'aria-label');
+    await page.locator(`a[aria-label="${link}"]`).click();
+    await page.waitForSelector('.capture:not([hidden]) .objects h2');
+    await page.goBack();
+    await page.waitForTimeout(300);
+    check((await firstCard(page)) === place, 'and who comes back finds it');
+    await page.locator('.grid').focus();
+    await page.keyboard.press('Home');
+  } else {
+    console.log('       the grid has nothing to scroll');
+  }
+
   // A facet filters, and its count says how many stay.
   const first = page.locator('.facets section').first().locator('.name').first();
   await first.click();
@@ -250,7 +301,11 @@ try {
   await page.mouse.wheel(0, -2400);
   await page.waitForTimeout(300);
   await page.screenshot({ path: `${pictures}/capture_pixels.png` });
+  check((await hashOf(page)).includes('object='), 'what is zoomed into leaves the chosen object');
+  await sameElsewhere(page, middlePixel, 'the part of a picture');
   await page.keyboard.press('0');
+  await page.waitForTimeout(600);
+  check(!(await hashOf(page)).includes('view='), 'a whole picture has the short address');
   await page.screenshot({ path: `${pictures}/capture.png` });
   await page.keyboard.press('m');
   await page.waitForTimeout(500);
@@ -318,6 +373,11 @@ try {
     await page.screenshot({ path: `${pictures}/space.png` });
     check(await page.locator('canvas.space').isVisible(), 'the 3-D view opens');
     check((await hashOf(page)).includes('space=1'), 'and stands in the address');
+    await page.locator('canvas.space').focus();
+    for (let i = 0; i < 3; ++i) await page.keyboard.press('ArrowLeft');
+    await page.keyboard.press('+');
+    await sameElsewhere(page, (one) => one.locator('canvas.space').evaluate((canvas) => canvas.toDataURL()).then((url) => `${url.length} bytes, ${[...url].reduce((sum, c) => (sum * 31 + c.charCodeAt(0)) | 0, 0)}`),
+      'the place that space is looked at from');
     // From a place in space back to the object, or the camera, that lies there.
     const space = await page.locator('canvas.space').boundingBox();
     const here = await hashOf(page);
@@ -370,6 +430,8 @@ try {
     await page.mouse.up();
     check((await shown()) !== divided, 'the divider is dragged');
     await page.screenshot({ path: `${pictures}/compare_divider.png` });
+    await page.waitForTimeout(400);
+    check((await hashOf(page)).includes('divider=25'), 'and stands in the address');
     await page.keyboard.press('3');
     await page.waitForTimeout(300);
     await page.screenshot({ path: `${pictures}/compare_difference.png` });

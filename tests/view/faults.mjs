@@ -119,6 +119,46 @@ try {
   await page.getByRole('button', { name: 'Statistics' }).click();
   await page.waitForSelector('.page:not([hidden]) table');
   check(/pictures\s*2|2\s*pictures/.test(await page.textContent('.page:not([hidden])')), 'statistics are of the others');
+  // Something as far away as numbers go must not make a grid of as many lines.
+  const far = await browser.newPage({ viewport: { width: 1366, height: 768 } });
+  await far.addInitScript(() => {
+    const real = window.fetch.bind(window);
+    window.fetch = async (path, options) => {
+      const answer = await real(path, options);
+      if (/\/info$/.test(String(path))) {
+        const info = await answer.json();
+        return new Response(JSON.stringify({ ...info, holds: [...info.holds, 'camera_pose', 'boxes_3d'] }), { status: 200 });
+      }
+      if (!/\/capture\/\d+$/.test(String(path)) || !answer.ok) return answer;
+      const labels = await answer.json();
+      labels.frames[0].world_from_camera = [1, 0, 0, 2, 0, 1, 0, 3, 0, 0, 1, 4];
+      labels.frames[0].objects.forEach((object, i) => {
+        object.id = 4294967295 - i;
+        object.bounds = [[0, 0, 0], [1, 1, 1]];
+        object.world_from_node = [1, 0, 0, 10 ** (5 * i), 0, 1, 0, -(10 ** (6 * i)), 0, 0, 1, 0];
+      });
+      return new Response(JSON.stringify(labels), { status: 200 });
+    };
+  });
+  far.on('pageerror', (error) => faults.push(error.message));
+  await far.goto(address);
+  await far.waitForSelector('.card a.picture');
+  await far.locator('.card a.picture').first().click();
+  await far.waitForSelector('.object');
+  await far.keyboard.press('s');
+  const drawnFar = far.waitForFunction(() => /3-D view of 3 objects/.test(document.querySelector('canvas.space')?.getAttribute('aria-label') ?? ''), null, { timeout: 20000 })
+    .then(() => far.waitForTimeout(300)).then(() => true, () => false);
+  const isDrawn = await Promise.race([drawnFar, new Promise((resolve) => setTimeout(() => resolve(false), 22000))]);
+  check(isDrawn, 'objects a million kilometres apart are shown in space');
+  if (isDrawn) {
+    await far.screenshot({ path: `${pictures}/faults_far.png` });
+    // Ids may be as large as 32 bits are.
+    await far.keyboard.press('ArrowDown');
+    await far.reload();
+    await far.waitForSelector('.object[aria-pressed=true]', { timeout: 5000 }).catch(() => undefined);
+    check((await far.locator('.object[aria-pressed=true]').count()) === 1, 'an object of a large id stands in the address');
+    await far.close();
+  }
   check(faults.length === 0, 'no fault in the page' + (faults.length ? ': ' + faults.join(' | ') : ''));
 } catch (error) {
   check(false, error.message);

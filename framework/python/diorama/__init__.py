@@ -37,17 +37,26 @@ Box = tuple[int, int, int, int]
 
 @dataclasses.dataclass(frozen=True)
 class Camera:
-    """Lens and picture size; `fx` to `cy` in pixels from the left and top edge."""
+    """Lens and picture size.
+
+    - `width`: pixels
+    - `height`: pixels
+    - `lens`: "pinhole", "opencv_pinhole" or "fisheye_polynomial"
+    - `fx`, `fy`: focal lengths, pixels
+    - `cx`, `cy`: principal point, pixels from the left and the top edge
+    - `distortion`: k1 k2 p1 p2 k3 k4 k5 k6 of OpenCV
+    - `fisheye_polynomial`: angle = a + b r + c r^2 ..., r in pixels
+    - `near_m`, `far_m`: metres; nothing nearer or farther is seen"""
 
     width: int
     height: int
-    lens: str = "pinhole"  #: "pinhole", "opencv_pinhole" or "fisheye_polynomial"
+    lens: str = "pinhole"
     fx: float = 600.0
     fy: float = 600.0
     cx: float = 320.0
     cy: float = 240.0
-    distortion: tuple[float, ...] = ()  #: k1 k2 p1 p2 k3 k4 k5 k6 of OpenCV
-    fisheye_polynomial: tuple[float, ...] = ()  #: angle = a + b r + c r^2 ..., r in pixels
+    distortion: tuple[float, ...] = ()
+    fisheye_polynomial: tuple[float, ...] = ()
     near_m: float = 0.25
     far_m: float = 1000.0
 
@@ -59,60 +68,84 @@ class Camera:
 
 @dataclasses.dataclass(frozen=True)
 class Visibility:
-    """How much of an object one camera sees."""
+    """How much of an object one camera sees.
+
+    - `visible_pixels`: that show it
+    - `amodal_pixels`: inside of the picture, were nothing in front
+    - `outside_pixels`: beside the picture
+    - `occlusion`: 1 - visible / amodal; None when nothing is inside
+    - `truncation`: share outside of the picture
+    - `amodal_box`: of all of it, half open; may reach out of the picture
+    - `amodal_mask`: where it lies, and 0 or 1 per pixel of that: uint8, height x width of the box"""
 
     visible_pixels: int
-    amodal_pixels: int  #: inside of the picture, were nothing in front
-    outside_pixels: int  #: beside the picture
-    occlusion: float | None  #: 1 - visible / amodal; None when nothing is inside
-    truncation: float  #: share outside of the picture
+    amodal_pixels: int
+    outside_pixels: int
+    occlusion: float | None
+    truncation: float
     amodal_box: Box | None
-    #: Where it lies, and 0 or 1 per pixel of that: uint8, height x width of the box.
     amodal_mask: tuple[Box, Array] | None
 
 
 class FlowState(enum.IntEnum):
     """What the other frame of a flow shows of the point in a pixel: values of "flow_forward_state" and
-    "flow_backward_state"."""
+    "flow_backward_state".
 
-    SEEN = 0  #: the point itself
-    HIDDEN = 1  #: something in front of it
-    OUTSIDE = 2  #: nothing: it is out of the picture, or too near or far
-    UNKNOWN = 3  #: there is no such point (nothing was hit), or no such frame
+    - `SEEN`: the point itself
+    - `HIDDEN`: something in front of it
+    - `OUTSIDE`: nothing: it is out of the picture, or too near or far
+    - `UNKNOWN`: there is no such point (nothing was hit), or no such frame"""
+
+    SEEN = 0
+    HIDDEN = 1
+    OUTSIDE = 2
+    UNKNOWN = 3
 
 
 @dataclasses.dataclass(frozen=True)
 class Velocity:
-    """How an object's origin moves and how the object turns."""
+    """How an object's origin moves and how the object turns.
 
-    linear: Array  #: float64, 3: m/s, world
-    angular: Array  #: float64, 3: rad/s, world axes
+    - `linear`: float64, 3: m/s, world
+    - `angular`: float64, 3: rad/s, world axes"""
+
+    linear: Array
+    angular: Array
 
 
 @dataclasses.dataclass(frozen=True)
 class Instance:
     """An object in a picture. `id` is its value in the channel "instance_id"; in a clip the same object has the same
-    id in all frames."""
+    id in all frames.
+
+    - `id`: value in the channel "instance_id"
+    - `path`: of its node in the scene; unique
+    - `labels`: taxonomy to label: {"class": "mug"}
+    - `world_from_object`: float64, 4 x 4, metres
+    - `bounds`: least and greatest corner in the object's own space: float64, 3 each, metres
+    - `box`: of its visible pixels; where a dataset has no boxes, found in "instance_id" when that is read
+    - `visibility`: how much of it is seen, where that is held
+    - `keypoints`: by name: float64, 3, metres in the object's own space. Only what is made has them, not what is
+      read
+    - `keypoints_px`: where "keypoints" are held: float64, count x 3: x to the right and y down from the picture's
+      upper left corner in pixels, and 2 for seen, 1 for hidden, 0 for not told. In the order of the class's
+      `Dataset.skeletons`
+    - `velocity`: of rigid bodies, where "velocities" are held"""
 
     id: int
     path: str
-    labels: dict[str, str] = dataclasses.field(default_factory=dict)  #: taxonomy to label: {"class": "mug"}
-    world_from_object: Array | None = None  #: float64, 4 x 4, metres
-    #: Least and greatest corner in the object's own space: float64, 3 each, metres.
+    labels: dict[str, str] = dataclasses.field(default_factory=dict)
+    world_from_object: Array | None = None
     bounds: tuple[Array, Array] | None = None
-    #: Of its visible pixels; where a dataset has no boxes, found in "instance_id" when that is read.
     box: Box | None = None
     visibility: Visibility | None = None
-    #: By name: float64, 3, metres in the object's own space. Only what is made has them, not what is read.
     keypoints: dict[str, Array] = dataclasses.field(default_factory=dict)
-    #: Where "keypoints" are held: float64, count x 3: x to the right and y down from the picture's upper left corner
-    #: in pixels, and 2 for seen, 1 for hidden, 0 for not told. In the order of the class's `Dataset.skeletons`.
     keypoints_px: Array | None = None
-    velocity: Velocity | None = None  #: of rigid bodies, where "velocities" are held
+    velocity: Velocity | None = None
 
     @property
     def keypoints_world(self) -> dict[str, Array]:
-        """The same in the world. Needs `world_from_object`."""
+        """By name: float64, 3, metres in the world. Needs `world_from_object`."""
         if self.world_from_object is None:
             return {}
         return {name: self.world_from_object[:3, :3] @ point + self.world_from_object[:3, 3]
@@ -121,14 +154,21 @@ class Instance:
 
 @dataclasses.dataclass(frozen=True)
 class JointState:
-    """A joint of the scene at the moment of a capture."""
+    """A joint of the scene at the moment of a capture.
+
+    - `path`: of the joint in the scene
+    - `kind`: "fixed", "revolute" or "prismatic"
+    - `parent_path`, `child_path`: of the bodies that it joins
+    - `position`: radians or metres; 0 when fixed
+    - `lower`: least position; -inf: none
+    - `upper`: greatest one; inf: none"""
 
     path: str
-    kind: str  #: "fixed", "revolute" or "prismatic"
-    parent_path: str  #: of the bodies that it joins
+    kind: str
+    parent_path: str
     child_path: str
-    position: float  #: radians or metres; 0 when fixed
-    lower: float  #: least position; -inf: none
+    position: float
+    lower: float
     upper: float
 
 
@@ -147,22 +187,34 @@ class Frame:
     - "motion", "flow_forward", "flow_backward": float32 x 2, pixels to the right and down, since the last step of
       physics, to the clip's next and its previous frame; "flow_forward_state", "flow_backward_state": uint32, `FlowState`
 
-    They are views that cannot be written to and keep the capture's pixels in memory: copy what you keep for long."""
+    They are views that cannot be written to and keep the capture's pixels in memory: copy what you keep for long.
+
+    - `camera_name`: as in `Dataset.cameras`
+    - `camera`: lens and size
+    - `world_from_camera`: float64, 4 x 4, metres; the camera looks along -z, y is up
+    - `instances`: objects, also those that are not seen
+    - `occlusions`: (front id, behind id, pixels)
+    - `joints`: of the whole scene, the same for all cameras
+    - `leaf_paths`: of the ids in "leaf_id"
+    - `exposure`: factor from "color_hdr" to what is seen
+    - `channels`: see above
+    - `masks`: where masks of a format overlap, so that "instance_id" cannot hold them: by `Instance.id` where each
+      lies, and 0 or 1 per pixel of that, uint8, height x width of the box. Read with "instance_id", which is then
+      not there"""
 
     camera_name: str
     camera: Camera
-    world_from_camera: Array | None = None  #: float64, 4 x 4, metres; the camera looks along -z, y is up
+    world_from_camera: Array | None = None
     instances: list[Instance] = dataclasses.field(default_factory=list)
-    occlusions: list[tuple[int, int, int]] = dataclasses.field(default_factory=list)  #: (front id, behind id, pixels)
-    joints: list[JointState] = dataclasses.field(default_factory=list)  #: of the whole scene, the same for all cameras
-    leaf_paths: dict[int, str] = dataclasses.field(default_factory=dict)  #: of the ids in "leaf_id"
-    exposure: float = 1.0  #: factor from "color_hdr" to what is seen
-    channels: dict[str, Array] = dataclasses.field(default_factory=dict)  #: see above
-    #: Where masks of a format overlap, so that "instance_id" cannot hold them: by `Instance.id` where each lies, and 0 or
-    #: 1 per pixel of that, uint8, height x width of the box. Read with "instance_id", which is then not there.
+    occlusions: list[tuple[int, int, int]] = dataclasses.field(default_factory=list)
+    joints: list[JointState] = dataclasses.field(default_factory=list)
+    leaf_paths: dict[int, str] = dataclasses.field(default_factory=dict)
+    exposure: float = 1.0
+    channels: dict[str, Array] = dataclasses.field(default_factory=dict)
     masks: dict[int, tuple[Box, Array]] = dataclasses.field(default_factory=dict)
 
     def has_mask(self, instance: Instance) -> bool:
+        """Whether mask() has what it needs."""
         return "instance_id" in self.channels or instance.id in self.masks
 
     def mask(self, instance: Instance) -> Array:
@@ -178,10 +230,18 @@ class Frame:
 
 @dataclasses.dataclass(frozen=True)
 class Finding:
-    """Something in the files that cannot be right; see `diorama lint`."""
+    """Something in the files that cannot be right; see `diorama lint`.
 
-    check: str  #: the rule that is broken
-    file: str  #: relative to the dataset
+    - `check`: the rule that is broken
+    - `file`: relative to the dataset
+    - `capture`: `Capture.index`
+    - `camera`: its name
+    - `object`: its path
+    - `found`: what is there
+    - `expected`: what would be right"""
+
+    check: str
+    file: str
     capture: int | None = None
     camera: str = ""
     object: str = ""
@@ -191,12 +251,17 @@ class Finding:
 
 @dataclasses.dataclass(frozen=True)
 class ClipFrame:
-    """The place of a capture in a clip: captures of one scene in which time goes on."""
+    """The place of a capture in a clip: captures of one scene in which time goes on.
 
-    clip: int  #: from 0 in the whole job
-    frame: int  #: from 0 in the clip
-    frame_count: int  #: of the clip
-    fps: float  #: frames per second
+    - `clip`: from 0 in the whole job
+    - `frame`: from 0 in the clip
+    - `frame_count`: of the clip
+    - `fps`: frames per second"""
+
+    clip: int
+    frame: int
+    frame_count: int
+    fps: float
 
     @property
     def time_s(self) -> float:
@@ -206,15 +271,24 @@ class ClipFrame:
 
 @dataclasses.dataclass(frozen=True)
 class Capture:
-    """One moment, seen by all cameras."""
+    """One moment, seen by all cameras.
 
-    index: int  #: in the job that made it
+    - `index`: in the job that made it
+    - `visit`: of an environment, from 0
+    - `phase`: name of the capture series
+    - `environment`: asset or name of the room
+    - `clip`: None for captures that stand alone
+    - `split`: "train", "val" ...; empty when the format has none
+    - `frames`: one per camera
+    - `findings`: what is wrong with its files"""
+
+    index: int
     visit: int = 0
     phase: str = ""
     environment: str = ""
-    clip: ClipFrame | None = None  #: None for captures that stand alone
-    split: str = ""  #: "train", "val" ...; empty when the format has none
-    frames: list[Frame] = dataclasses.field(default_factory=list)  #: one per camera
+    clip: ClipFrame | None = None
+    split: str = ""
+    frames: list[Frame] = dataclasses.field(default_factory=list)
     findings: list[Finding] = dataclasses.field(default_factory=list)
 
 
@@ -244,31 +318,46 @@ def _refused(kind: str, text: str) -> Error:
     return error
 
 
-def _program() -> str:
+def _names(wanted: Iterable[str]) -> list[str]:
+    if isinstance(wanted, str):  # which has letters
+        raise TypeError(f"wanted is a list of names, [{wanted!r}]")
+    return sorted(set(wanted))
+
+
+def _program() -> bytes:
     """The program of the same build, which knows where plugins are: in a build tree, beside the installed
     package, or on the PATH."""
     here = pathlib.Path(__file__).resolve()
     for level in (2, 4):
         program = here.parents[level] / "bin" / "diorama"
         if program.is_file():
-            return str(program)
+            return os.fsencode(program)
     found = shutil.which("diorama")
     if found is None:
         raise _refused("plugin", f"the program 'diorama' is neither near {here.parent} nor on the PATH; plugins are found from there")
-    return str(pathlib.Path(found).resolve())
+    return os.fsencode(pathlib.Path(found).resolve())
 
 
 class Dataset(Sequence[Capture]):
     """A dataset that was opened: a sequence of captures, each read when it is asked for.
+
+    - `folder`, `format`: where and what it is
+    - `reader`: type of the component that reads it, or what was asked for as JSON
+    - `holds`: channels and labels that some frame has
+    - `cameras`: names
+    - `captures`: `Capture.index` of each
+    - `classes`: the format's own list; may be empty
+    - `skeletons`: of keypoints by class, "" for all others: their names, and the places of those that lines join
+    - `findings`: what opening found
 
     It can be handed to other processes (`torch.utils.data.DataLoader` with workers): they open it anew.
     Several threads may read at once."""
 
     def __init__(self, folder: str | os.PathLike[str], reader: str | Mapping[str, Any] = "",
                  wanted: Iterable[str] | None = None) -> None:
-        self._asked = (os.fspath(folder), reader if isinstance(reader, str)
+        self._asked = (os.fsdecode(folder), reader if isinstance(reader, str)
                        else json.dumps(dict(reader), ensure_ascii=False, default=os.fspath))
-        self._wanted = None if wanted is None else sorted(wanted)
+        self._wanted = None if wanted is None else _names(wanted)
         self._open()
         unknown = sorted(set(self._wanted or ()) - set(self.holds))
         if unknown:
@@ -276,18 +365,17 @@ class Dataset(Sequence[Capture]):
 
     def _open(self) -> None:
         self._process = os.getpid()
-        self._stored = _diorama.open_dataset(_program(), *self._asked)
+        folder, reader = self._asked
+        self._stored = _diorama.open_dataset(_program(), os.fsencode(folder), reader)
         info = self._stored.info()
         self.folder: str = info["folder"]
-        self.reader: str = info["reader"]  #: type of the component that reads it, or `reader` as JSON
+        self.reader: str = info["reader"]
         self.format: str = info["format"]
-        self.holds: list[str] = info["holds"]  #: channels and labels that some frame has
+        self.holds: list[str] = info["holds"]
         self.cameras: list[str] = info["cameras"]
-        self.captures: list[int] = info["captures"]  #: `Capture.index` of each
-        self.classes: list[str] = info["classes"]  #: the format's own list; may be empty
-        #: Of keypoints by class, "" for all others: their names, and the places of those that lines join.
+        self.captures: list[int] = info["captures"]
+        self.classes: list[str] = info["classes"]
         self.skeletons: dict[str, tuple[list[str], list[tuple[int, int]]]] = info["skeletons"]
-        #: What opening found.
         self.findings: list[Finding] = [Finding(**finding) for finding in info["findings"]]
 
     def __len__(self) -> int:
@@ -365,20 +453,25 @@ def open(folder: str | os.PathLike[str], *, reader: str | Mapping[str, Any] = ""
 
 def find(folder: str | os.PathLike[str]) -> Mapping[str, str]:
     """The datasets of a run: folder to the reader's type."""
-    return dict(_diorama.find_datasets(_program(), os.fspath(folder)))
+    return dict(_diorama.find_datasets(_program(), os.fsencode(folder)))
 
 
 def run(job: Mapping[str, Any] | str | os.PathLike[str], on_capture: Callable[[Capture], object], *,
         wanted: Iterable[str] = ("color", "instances", "instance_id"), settings: Mapping[str, Any] | None = None,
         seed: int | None = None, threads: int = 0) -> None:
     """Makes the captures of a job and hands each to `on_capture`, in their order, as soon as it is there; nothing is
-    written to the disk. While the function works the next captures are made, until 256 MB of them wait.
+    written to the disk. The function is called in the thread that called this one. While it works the next captures are
+    made, until 256 MB of them wait.
 
     `job` is a file, or the same as a dictionary; its writers are not looked at. `wanted` names channels and the
     annotations "instances", "visibility", "amodal_mask" and "occlusion_order". `settings` overrides single values,
     {"renderer.samples": 16}. The same job and seed give the same pixels as `diorama run` writes, for any number of
     threads (0: all). The function ends the run by returning False or by an exception, which comes out here."""
-    file, text = ("", json.dumps(job)) if isinstance(job, Mapping) else (os.fspath(job), "")
+    if not callable(on_capture):
+        raise TypeError(f"on_capture is a function that takes a Capture, not {on_capture!r}")
+    if threads < 0 or (seed is not None and not 0 <= seed < 2**64):
+        raise _refused("usage", f"threads are 0 or more, a seed is from 0 to 2^64 - 1; found {threads} and {seed}")
+    file, text = (b"", json.dumps(job)) if isinstance(job, Mapping) else (os.fsencode(job), "")
     sets = [f"{key}={json.dumps(value)}" for key, value in (settings or {}).items()]
-    _diorama.listen(_program(), file, text, sets, seed, lambda values: on_capture(_capture(values)), sorted(set(wanted)),
+    _diorama.listen(_program(), file, text, sets, seed, lambda values: on_capture(_capture(values)), _names(wanted),
                     threads)

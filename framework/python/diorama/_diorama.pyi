@@ -18,9 +18,10 @@ class OpenDataset:
     def info(self) -> dict[str, Any]: ...
     def read(self, place: int, wanted: list[str] | None = None) -> dict[str, Any]: ...
 
-def open_dataset(program: str, folder: str, reader: str = "") -> OpenDataset: ...
-def find_datasets(program: str, folder: str) -> list[tuple[str, str]]: ...
-def listen(program: str, file: str, text: str, sets: list[str], seed: int | None,
+# Paths are bytes, as the system has them.
+def open_dataset(program: bytes, folder: bytes, reader: str = "") -> OpenDataset: ...
+def find_datasets(program: bytes, folder: bytes) -> list[tuple[str, str]]: ...
+def listen(program: bytes, file: bytes, text: str, sets: list[str], seed: int | None,
            on_capture: Callable[[dict[str, Any]], object], needs: list[str], threads: int) -> None: ...
 
 # What the plugin `python` hands to components of diorama.plugins, each for one call.
@@ -29,38 +30,48 @@ class Node:
     """A node of the scene's tree. Poses are float64, 4 x 4, in metres; what is set holds for all below it."""
 
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """The end of the path."""
     @property
     def path(self) -> str:
         """"/Assets/mug_01"."""
     @property
-    def parent(self) -> Node | None: ...
+    def parent(self) -> Node | None:
+        """None above the root."""
     @property
-    def children(self) -> list[Node]: ...
+    def children(self) -> list[Node]:
+        """In their order."""
     labels: dict[str, str]  #: taxonomy to label, of this node alone; set it as a whole
     is_visible: bool  #: False hides all below it from cameras, not from physics
-    parent_from_node: Any  #: float64, 4 x 4
-    world_from_node: Any  #: float64, 4 x 4
-    position: Any  #: float64, 3: of its origin in the world; setting it keeps rotation and scale
+    parent_from_node: Any  #: float64, 4 x 4, metres
+    world_from_node: Any  #: float64, 4 x 4, metres
+    position: Any  #: float64, 3, metres: of its origin in the world; setting it keeps rotation and scale
     @property
     def world_bounds(self) -> tuple[_Array, _Array] | None:
-        """Least and greatest corner, float64, 3 each, of the visible meshes at and below it."""
+        """Least and greatest corner, float64, 3 each, metres, of the visible meshes at and below it; None where there are none."""
     @property
-    def has_mesh(self) -> bool: ...
+    def has_mesh(self) -> bool:
+        """Whether it has a shape of its own."""
     @property
-    def is_light(self) -> bool: ...
+    def is_light(self) -> bool:
+        """Whether it shines."""
     @property
-    def is_camera(self) -> bool: ...
+    def is_camera(self) -> bool:
+        """Whether it takes pictures."""
     light_color: Any  #: float32, 3, or None: nits; lux of a distant light
     def set_base_color(self, color: Sequence[float] | _Array) -> None:
         """Linear red, green, blue of all materials at and below it, instead of their textures."""
 
 class Scene:
+    """The tree of nodes, for one call. Units are metres, z is up."""
+
     @property
-    def root(self) -> Node: ...
+    def root(self) -> Node:
+        """The node above all others."""
     def match(self, pattern: str) -> list[Node]:
         """Nodes by path in creation order: '*' is any text without '/', '**' any text."""
-    def find(self, path: str) -> Node | None: ...
+    def find(self, path: str) -> Node | None:
+        """The node at a path, or None."""
     def create(self, parent: Node, name: str) -> Node:
         """A taken name gets a number."""
     def erase(self, node: Node) -> None:
@@ -81,9 +92,10 @@ class Rng:
     def rotation(self) -> _Array: ...
 
 class Files:
-    """Paths are relative to the writer's folder, with '/'."""
+    """The files of a writer, for one call. Paths are relative to the writer's folder, with '/'."""
 
-    def add(self, path: str, content: bytes | str) -> None: ...
+    def add(self, path: str, content: bytes | str) -> None:
+        """A file; texts are written as UTF-8."""
     def append(self, path: str, content: bytes | str) -> None:
         """Puts content at the end of a file that begins empty."""
     def record(self, line: str) -> None:

@@ -24,13 +24,14 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import importlib.util
+import inspect
 import logging
 import math
 import pathlib
 import sys
 import traceback
 import types
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -44,7 +45,13 @@ __all__ = ["Annotator", "Camera", "Capture", "Context", "DatasetInfo", "Error", 
 
 @dataclasses.dataclass(frozen=True)
 class Parameter:
-    """What a component declares; see param()."""
+    """What a component declares.
+
+    - `default`: bool, int, float, str, a list of str or float, or a tuple of three floats; says the type
+    - `help`: for people
+    - `unit`: "m", "deg" ...
+    - `least`, `most`: of numbers, both allowed
+    - `choices`: of texts; empty: any"""
 
     default: Any
     help: str
@@ -53,11 +60,25 @@ class Parameter:
     most: float = math.inf
     choices: tuple[str, ...] = ()
 
+    def __post_init__(self) -> None:
+        kind = _type_of(self.default, self.choices)
+        if not all(isinstance(text, str) for text in (self.help, self.unit, *self.choices)):
+            raise TypeError("the help, the unit and all choices of a parameter are texts")
+        if self.choices and self.default not in self.choices:
+            raise ValueError(f"the default {self.default!r} is none of the choices {', '.join(self.choices)}")
+        numbers = [] if kind not in ("int", "float", "vector", "numbers") else \
+            self.default if isinstance(self.default, (list, tuple)) else [self.default]
+        for number in numbers:
+            if not self.least <= number <= self.most:
+                raise ValueError(f"the default {number!r} is not from {self.least!r} to {self.most!r}")
+        if kind == "int" and not -2**31 <= self.default < 2**31:
+            raise ValueError(f"a parameter of whole numbers has 32 bits, {self.default} has more")
+
 
 def param(default: Any, help: str, *, unit: str = "", least: float = -math.inf, most: float = math.inf,
           choices: Sequence[str] = ()) -> Any:
     """Declares a parameter as an attribute of a component's class. Its default says its type: bool, int, float, str,
-    a list of str, a list of float, or a tuple of three floats. Numbers must lie in [least, most], texts among
+    a list of str, a list of float (an empty list, too), or a tuple of three floats. Numbers must lie in [least, most], texts among
     `choices` if there are any. Jobs are checked by it: unknown keys, wrong types and values are errors with their
     place. In methods the attribute is the value."""
     return Parameter(default, help, unit, least, most, tuple(choices))
@@ -65,12 +86,17 @@ def param(default: Any, help: str, *, unit: str = "", least: float = -math.inf, 
 
 @dataclasses.dataclass(frozen=True)
 class Context:
-    """When a randomizer acts."""
+    """When a randomizer acts.
 
-    moment: str  #: "environment" once per visit, before physics; or the name of a capture series
-    capture: int  #: `Capture.index`; -1 at "environment"
-    working_area: Array  #: float64, 3: its centre in the world, metres
-    occurrence: int  #: how often it acted at this moment before, over the whole job
+    - `moment`: "environment" once per visit, before physics; or the name of a capture series
+    - `capture`: `Capture.index`; -1 at "environment"
+    - `working_area`: float64, 3: its centre in the world, metres
+    - `occurrence`: how often it acted at this moment before, over the whole job"""
+
+    moment: str
+    capture: int
+    working_area: Array
+    occurrence: int
 
 
 class Rng:
@@ -90,6 +116,7 @@ class Rng:
         return self._stream.uniform(low, high)
 
     def normal(self, mean: float = 0.0, deviation: float = 1.0) -> float:
+        """Gaussian."""
         return self._stream.normal(mean, deviation)
 
     def index(self, count: int) -> int:
@@ -97,9 +124,11 @@ class Rng:
         return self._stream.index(count)
 
     def choice(self, items: Sequence[Any]) -> Any:
+        """One of them, each as likely."""
         return items[self._stream.index(len(items))]
 
     def chance(self, probability: float) -> bool:
+        """True with this probability, from 0 to 1."""
         return self._stream.chance(probability)
 
     def unit_vector(self) -> Array:
@@ -120,21 +149,31 @@ class Randomizer:
     one call to the next."""
 
     def randomize(self, scene: Scene, context: Context, rng: Rng) -> None:
+        """Once per moment of the job's `on`. Scene and nodes are of no use after it; all chance comes from `rng`."""
         raise NotImplementedError
 
 
 @dataclasses.dataclass(frozen=True)
 class DatasetInfo:
-    """What a writer knows before the first capture. Equal in every shard."""
+    """What a writer knows before the first capture. Equal in every shard.
+
+    - `seed`: of the job
+    - `captures`: in the whole job
+    - `cameras`: names
+    - `labels`: every distinct label set of the job's objects
+    - `classes`: class list in its order; empty: not settled
+    - `validation`: captures kept for validation
+    - `job`: YAML; running it gives the same dataset
+    - `version`: of the program"""
 
     seed: int
-    captures: int  #: in the whole job
+    captures: int
     cameras: list[str]
-    labels: list[dict[str, str]]  #: every distinct label set of the job's objects
-    classes: list[str]  #: class list in its order; empty: not settled
-    validation: list[int] | None  #: captures kept for validation
-    job: str  #: YAML; running it gives the same dataset
-    version: str  #: of the program
+    labels: list[dict[str, str]]
+    classes: list[str]
+    validation: list[int] | None
+    job: str
+    version: str
 
 
 class Writer:
@@ -171,16 +210,22 @@ class Annotator:
 
 
 class Stored:
-    """A dataset that a Reader opened. Set the attributes, write read()."""
+    """A dataset that a Reader opened. Set the attributes, write read().
 
-    format: str = ""  #: for people: "my tables"
-    #: What captures may have: names of channels, "instances", "labels", "tight_boxes", "poses", "bounds", "camera",
-    #: "camera_pose", "visibility" ... (diorama/reader.h lists them with what each means)
+    - `format`: for people: "my tables"
+    - `holds`: what captures may have: names of channels, "instances", "labels", "tight_boxes", "poses", "bounds", "camera",
+      "camera_pose", "visibility" ... (diorama/reader.h lists them with what each means)
+    - `cameras`: names
+    - `captures`: `Capture.index` of each, ascending
+    - `classes`: the format's class list, in its order
+    - `steps`: to what it rounds, by what is held: metres, pixels"""
+
+    format: str = ""
     holds: Sequence[str] = ()
-    cameras: Sequence[str] = ()  #: names
-    captures: Sequence[int] = ()  #: `Capture.index` of each, ascending
-    classes: Sequence[str] = ()  #: the format's class list, in its order
-    steps: Mapping[str, float] = types.MappingProxyType({})  #: to what it rounds, by what is held: metres, pixels
+    cameras: Sequence[str] = ()
+    captures: Sequence[int] = ()
+    classes: Sequence[str] = ()
+    steps: Mapping[str, float] = types.MappingProxyType({})
 
     def read(self, place: int, wanted: frozenset[str]) -> Capture:
         """The capture at a place of `captures`. What `wanted` does not name may be left out; sizes of cameras are
@@ -192,10 +237,11 @@ class Stored:
 class Reader:
     """Opens folders of a format of your own, for diorama.open(), lint, stats, view, convert and all else that reads
     datasets. It is found in the folders of DIORAMA_PYTHON_PATH, and its parameters then have their defaults; other values
-    are given where it is named: --reader '{type: python, file: mine.py, class: Mine, params: {...}}'."""
+    are given where it is named: --reader '{type: python, file: mine.py, class: Mine, params: {...}}'.
 
-    #: Files of which such a folder has one at least, "*" for any text inside one name: ("objects.csv", "boxes/*.txt").
-    #: Some file must lie right in the folder, with an ending, or in a folder right below.
+    `patterns` are files of which such a folder has one at least, "*" for any text inside one name: ("objects.csv",
+    "boxes/*.txt"). Some file must lie right in the folder, with an ending, or in a folder right below."""
+
     patterns: Sequence[str] = ()
 
     def recognise(self, folder: pathlib.Path) -> bool:
@@ -271,11 +317,6 @@ def _classes(kind: str, files: Sequence[tuple[str, str]]) -> list[tuple[str, str
     for file, path, name, cls in _each_class(kind, begun or files):
         text = (cls.__doc__ or "").strip().split("\n\n")[0].replace("\n", " ")
         help = " ".join(text.split()) or f"Parameters of {name}."
-        try:
-            _params_of(cls)
-        except TypeError as error:
-            _LOG.warning("%s: %s: %s (the class is left out)", path, name, error)
-            continue
         found.append((file, name, help if help.endswith(".") else help + ".", cls))
     return found
 
@@ -285,13 +326,16 @@ def _readers_of(files: Sequence[tuple[str, str]], folder: str) -> list[tuple[str
     found = []
     root = pathlib.Path(folder)
     for name, path, key, cls in _each_class("reader", files):
-        if _has_files(cls, root) and _with_defaults(cls).recognise(root):
-            found.append((path, f"{name}: {key}", cls))
+        try:
+            if _has_files(cls, root) and _with_defaults(cls).recognise(root):
+                found.append((path, f"{name}: {key}", cls))
+        except Exception as error:
+            _LOG.warning("%s (the reader is left out)", _say(error, path))
     return found
 
 
 def _has_files(reader: Reader | type[Reader], root: pathlib.Path) -> bool:
-    return any(next(root.glob(pattern), None) is not None for pattern in reader.patterns)
+    return any(next(root.glob(pattern), None) is not None for pattern in _names(reader, "patterns"))
 
 
 def _knows(reader: Reader, folder: str) -> bool:
@@ -319,9 +363,14 @@ def _type_of(default: Any, choices: tuple[str, ...]) -> str:
 
 def _params_of(cls: type[Any]) -> list[tuple[str, str, Parameter]]:
     """Key, type and declaration of each, those of base classes first."""
+
     all_of: dict[str, Parameter] = {}
     for each in reversed(cls.__mro__):
-        all_of.update({key: value for key, value in vars(each).items() if isinstance(value, Parameter)})
+        for key, value in vars(each).items():
+            if isinstance(value, Parameter):
+                all_of[key] = value
+            else:
+                all_of.pop(key, None)  # settled by this class
     return [(key, _type_of(value.default, value.choices), value) for key, value in all_of.items()]
 
 
@@ -333,17 +382,71 @@ def _make(cls: type[Any], values: dict[str, Any]) -> Any:
     component: Any = object.__new__(cls)
     for key, value in values.items():
         setattr(component, key, value)
+    _require_call(component.__init__, "__init__", ())
     component.__init__()
+    for base, methods in _METHODS.items():
+        if not isinstance(component, base):
+            continue
+        for name, is_optional in methods.items():
+            _, *arguments = inspect.signature(getattr(base, name)).parameters
+            if not is_optional and getattr(cls, name) is getattr(base, name):
+                raise Unfit(f"{cls.__name__} has no method {name}({', '.join(['self', *arguments])})", cls)
+            _require_call(getattr(component, name), name, arguments)
     return component
+
+
+#: What is called, and whether a class may do without.
+_METHODS: dict[type[Any], dict[str, bool]] = {
+    Annotator: {"annotate": False}, Randomizer: {"randomize": False}, Reader: {"recognise": True, "open": False},
+    Writer: {"begin": True, "write": False, "finish": True}}
+
+
+class Unfit(TypeError):
+    """A class that cannot be used as its base class says."""
+
+    def __init__(self, text: str, what: Any) -> None:
+        super().__init__(text)
+        try:
+            self.line: int | None = inspect.getsourcelines(what)[1]
+        except (OSError, TypeError):
+            self.line = None
+
+
+def _require_call(method: Callable[..., Any], name: str, arguments: Sequence[str]) -> None:
+    """Before it is called, so that the message is about the method and not about who calls it."""
+    try:
+        inspect.signature(method).bind(*arguments)
+    except ValueError:
+        pass  # compiled ones need not say what they take
+    except TypeError:
+        raise Unfit(f"{method.__qualname__} is called as {name}({', '.join(['self', *arguments])})", method) from None
+
+
+def _names(component: Any, attribute: str) -> list[str]:
+    """Of an object or a class."""
+    names = getattr(component, attribute)
+    cls = component if isinstance(component, type) else type(component)
+    # A text is a sequence of texts, too.
+    if isinstance(names, str) or not isinstance(names, Iterable) or not all(isinstance(name, str) for name in names):
+        raise Unfit(f"{cls.__name__}.{attribute} is a list of texts, not {names!r}", cls)
+    return list(names)
 
 
 def _say(error: BaseException, file: str) -> str:
     """Where in the file, and what."""
-    if isinstance(error, SyntaxError) and error.filename == file:
-        return f"{file}:{error.lineno}: {type(error).__name__}: {error.msg}"
     lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
-    place = f"{file}:{lines[-1]}" if lines else file
-    return f"{place}: {type(error).__name__}: {error}"
+    line = lines[-1] if lines else None
+    try:
+        text = str(error)
+    except Exception:
+        text = "(its own text fails)"
+    if isinstance(error, SyntaxError) and error.filename == file:
+        line, text = error.lineno, str(error.msg)
+    if isinstance(error, Unfit):
+        line = error.line
+    place = f"{file}:{line}" if line else file
+    said = f"{place}: {type(error).__name__}: {text}" if text else f"{place}: {type(error).__name__}"
+    return said.encode(errors="backslashreplace").decode()
 
 
 def _randomize(component: Randomizer, scene: Any, host: Any, moment: str, capture: int, area: Sequence[float],
@@ -391,8 +494,8 @@ def _open(reader: Reader, file: str, folder: str) -> tuple[Stored | None, str | 
     if not isinstance(stored, Stored):
         raise TypeError(f"{name}.open() returns a diorama.plugins.Stored, not {type(stored).__name__}")
     captures = [int(index) for index in stored.captures]
-    info = {"format": stored.format or name, "holds": list(stored.holds), "cameras": list(stored.cameras),
-            "captures": captures, "classes": list(stored.classes), "steps": dict(stored.steps)}
+    info = {"format": stored.format or name, "holds": _names(stored, "holds"), "cameras": _names(stored, "cameras"),
+            "captures": captures, "classes": _names(stored, "classes"), "steps": dict(stored.steps)}
     if captures != sorted(set(captures)):
         raise TypeError(f"{name}: captures ascend")
     return stored, None, info

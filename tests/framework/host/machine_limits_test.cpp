@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "framework/host/machine_limits.h"
 
+#include <unistd.h>
+
 #include <cstdlib>
 #include <fstream>
 #include <limits>
+#include <optional>
 #include <string>
 
 #include "support/catch.h"
@@ -28,6 +31,7 @@ class Machine {
   std::uint64_t memory() const { return available_memory(root_); }
   std::uint64_t all_memory() const { return total_memory(root_); }
   int cpus() const { return quota_cpus(root_); }
+  std::optional<ProcessorTime> time() const { return processor_time(root_); }
 
  private:
   fs::path root_;
@@ -89,4 +93,17 @@ TEST_CASE("processors are counted by the least quota of all cgroups around", "[h
 TEST_CASE("this machine has some memory", "[host]") {
   CHECK(available_memory() > (std::uint64_t(1) << 20));
   CHECK(total_memory() >= available_memory());
+}
+
+TEST_CASE("the time of processors is that of the first line, waiting for disks is no work",
+          "[host]") {
+  const Machine machine;
+  CHECK_FALSE(machine.time());
+  machine.says("proc/stat", "cpu  100 20 30 4000\n");
+  CHECK_FALSE(machine.time());
+  machine.says("proc/stat", "cpu  100 20 30 4000 500 6 7 8 9 10\ncpu0 1 1 1 1 1 1 1 1 1 1\n");
+  REQUIRE(machine.time());
+  const double per_s = double(sysconf(_SC_CLK_TCK));
+  CHECK(machine.time()->busy_s == Approx((100 + 20 + 30 + 6 + 7 + 8) / per_s));
+  CHECK(machine.time()->all_s == Approx((171 + 4000 + 500) / per_s));
 }

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The package "diorama" on a dataset of every writer: python_test.py PROGRAM JOB"""
+import ast
+import dataclasses
+import enum
 import gc
 import json
 import multiprocessing
@@ -12,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+import types
 import unittest
 
 try:
@@ -152,6 +156,34 @@ class Open(unittest.TestCase):
         with self.assertRaises(diorama.Error):
             diorama.open(run / "coco", reader="CocoReeder")
 
+    def test_texts_that_are_no_utf8(self):
+        folder = pathlib.Path(temporary.name) / os.fsdecode(b"caf\xe9")
+        folder.mkdir()
+        for name in ("images/train", "labels/train"):
+            (folder / name).mkdir(parents=True)
+        cv2.imwrite(str(folder / "images/train/a.png"), np.zeros((8, 8, 3), np.uint8))
+        (folder / "images/train/a.png").rename(folder / "images/train" / os.fsdecode(b"\xfc.png"))
+        (folder / "labels/train" / os.fsdecode(b"\xfc.txt")).write_text("0 0.5 0.5 0.5 0.5\n")
+        (folder / "data.yaml").write_text("path: .\ntrain: images/train\nval: images/train\nnames:\n  0: cup\n")
+        dataset = diorama.open(folder)
+        self.assertEqual((len(dataset), dataset.folder), (1, str(folder)))
+        self.assertEqual(dataset[0].frames[0].instances[0].labels, {"class": "cup"})
+        self.assertEqual(list(diorama.find(folder)), [str(folder)])
+        self.assertEqual(len(pickle.loads(pickle.dumps(dataset))), 1)
+        (folder / "labels/train" / os.fsdecode(b"\xfc.txt")).write_text("nothing\n")
+        finding, *_ = diorama.open(folder)[0].findings
+        self.assertTrue(finding.file.endswith(os.fsdecode(b"\xfc.txt")), finding)
+
+    def test_arguments_are_looked_at_first(self):
+        for wrong, words in [(lambda: diorama.open(run / "coco", wanted="color"), r"a list of names, \['color'\]"),
+                             (lambda: diorama.run(JOB, print, wanted="color"), r"a list of names"),
+                             (lambda: diorama.run(JOB, None), "on_capture is a function"), (lambda: diorama.run(JOB, [1]), "on_capture is a function")]:
+            with self.assertRaisesRegex(TypeError, words):
+                wrong()
+        for arguments in ({"threads": -1}, {"seed": -1}, {"seed": 2**64}):
+            with self.assertRaisesRegex(diorama.Error, "threads are 0 or more, a seed is from 0"):
+                diorama.run(JOB, print, **arguments)
+
     def test_damage_is_a_finding(self):
         copy = pathlib.Path(temporary.name) / "damaged"
         subprocess.run(["cp", "-r", run / "basic", copy], check=True)
@@ -201,8 +233,32 @@ class Types(unittest.TestCase):
         for module in (diorama, diorama.plugins):
             for name in module.__all__:
                 each = getattr(module, name)
-                if isinstance(each, type) and each.__module__ == module.__name__:
-                    self.assertTrue(each.__doc__ and not each.__doc__.startswith(name + "("), name)
+                if not callable(each) or isinstance(each, types.GenericAlias):
+                    continue
+                self.assertTrue(each.__doc__ and not each.__doc__.startswith(name + "("), name)
+                if not isinstance(each, type):
+                    continue
+                if dataclasses.is_dataclass(each):
+                    for field in dataclasses.fields(each):
+                        self.assertIn(f"`{field.name}`", each.__doc__, name)
+                for key, member in vars(each).items():
+                    if not key.startswith("_") and (callable(member) or isinstance(member, property)) and not isinstance(member, enum.Enum):
+                        first, _, rest = (member.__doc__ or "").partition("\n")
+                        self.assertTrue((rest if "(self: " in first else first + rest).strip(), f"{name}.{key}")  # pybind11 begins with the signature
+
+    def test_stubs_say_what_the_module_says(self):
+        """People read the one in an editor, the other by help()."""
+        stub = ast.parse((pathlib.Path(diorama.__file__).parent / "_diorama.pyi").read_text())
+        native = diorama._diorama
+        told = 0
+        for cls in (each for each in stub.body if isinstance(each, ast.ClassDef)):
+            pairs = [(ast.get_docstring(cls), getattr(native, cls.name).__doc__)]
+            pairs += [(ast.get_docstring(each), getattr(getattr(native, cls.name), each.name).__doc__) for each in cls.body if isinstance(each, ast.FunctionDef)]
+            for ours, theirs in pairs:
+                if ours and cls.name != "Error":
+                    told += 1
+                    self.assertIn(" ".join(ours.split()), " ".join((theirs or "").split()))
+        self.assertGreater(told, 15)
 
 
 def sum_in_another_process(dataset, place):
@@ -433,17 +489,45 @@ class Run(unittest.TestCase):
         with self.assertRaisesRegex(KeyError, "mine"):
             diorama.run(JOB, fail)
 
+    def test_the_function_is_called_in_the_thread_that_waits(self):
+        threads = set()
+        diorama.run(JOB, lambda capture: threads.add(threading.get_ident()), threads=3)
+        self.assertEqual(threads, {threading.get_ident()})
+        other = threading.Thread(target=diorama.run, args=(JOB, lambda capture: threads.add(threading.get_ident())))
+        other.start()
+        other.join()
+        self.assertEqual(threads, {threading.main_thread().ident, other.ident})
+
     def test_ctrl_c(self):
-        interrupted = []
+        seen = []
 
         def interrupt(capture):
-            # Captures that were on their way arrive before the run ends; a second signal would hit the test.
-            if not interrupted:
-                interrupted.append(capture)
-                signal.raise_signal(signal.SIGINT)
+            signal.raise_signal(signal.SIGINT)
+            seen.append(capture)
 
         with self.assertRaises(KeyboardInterrupt):
             diorama.run(JOB, interrupt)
+        self.assertEqual(seen, [], "the function itself is interrupted")
+        diorama.run(JOB, lambda capture: seen.append(capture) or False)
+        self.assertEqual(len(seen), 1)
+
+    def test_ctrl_c_while_the_first_capture_is_made(self):
+        code = """if True:
+            import diorama
+            job = {"total_captures": 4, "environments": [{"type": "shapes", "shapes": ["cube"]}], "physics": {"type": "none"},
+                   "cameras": [{"type": "pinhole", "name": "cam", "width": 4000, "height": 3000}], "renderer": {"type": "null"},
+                   "timeline": [{"capture": "still", "count": 4}]}
+            try:
+                print("begins", flush=True)
+                diorama.run(job, lambda capture: None, wanted=["color", "normals", "position"])
+            except KeyboardInterrupt:
+                print("interrupted")
+        """
+        child = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+        self.assertEqual(child.stdout.readline(), "begins\n")
+        child.send_signal(signal.SIGINT)
+        self.assertEqual(child.communicate(timeout=120)[0], "interrupted\n")
+        self.assertEqual(child.returncode, 0)
 
     def test_one_at_a_time(self):
         def again(capture):

@@ -2,6 +2,7 @@
 // What the page asks for, over a dataset whose every text is hostile.
 #include "framework/view/dataset_view.h"
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <filesystem>
@@ -82,6 +83,16 @@ class HostileDataset final : public StoredDataset {
       instance.visibility->visible_pixels = 3 << 22;
       instance.visibility->amodal_pixels = 4 << 22;
     }
+    if (info_.captures[i] == has_no_numbers) {
+      const double none = std::nan("");
+      frame.camera.fx = none;
+      frame.world_from_camera.translation().x() = none;
+      instance.world_from_node.translation().z() = none;
+      frame.instances.push_back(instance);
+      instance.id = 2;
+      instance.world_from_node.setIdentity();
+      instance.bounds_node.max.x() = std::numeric_limits<double>::infinity();
+    }
     frame.instances.push_back(instance);
     if (wanted.contains(kColor.name)) {
       Image<Rgba8> color(6, 4, Rgba8{10, 20, 30, 255});
@@ -132,6 +143,7 @@ class HostileDataset final : public StoredDataset {
   static inline std::atomic<bool> overlaps = false;
   static inline std::atomic<int> fails_at = -1;       ///< Number of a capture.
   static inline std::atomic<int> has_no_pixels = -1;  ///< The same.
+  static inline std::atomic<int> has_no_numbers = -1;
 
  private:
   bool is_changed_;
@@ -264,6 +276,29 @@ TEST_CASE("Hostile texts arrive as texts in JSON", "[view]") {
   CHECK(object["edges"].size() == 12);
   CHECK(object["edges"][0][0].get<double>() == Approx(3.0 - 5.0 * 0.1 / 2.3).margin(0.006));
   CHECK(object["edges"][0][1].get<double>() == Approx(2.0 + 5.0 * 0.2 / 2.3).margin(0.006));
+}
+
+TEST_CASE("What is no number is not told", "[view]") {
+  Viewed viewed;
+  HostileDataset::has_no_numbers = 7;
+  const HttpAnswer made = viewed.answer("/api/0/capture/7");
+  while (viewed.view->work()) {
+  }
+  CHECK(viewed.answer("/api/0/index/0").status == 200);
+  HostileDataset::has_no_numbers = -1;
+  REQUIRE(made.status == 200);
+  CHECK(made.body->find("null") == std::string::npos);
+  const Json frame = Json::parse(*made.body)["frames"][0];
+  CHECK_FALSE(frame.contains("focal"));
+  CHECK_FALSE(frame.contains("world_from_camera"));
+  REQUIRE(frame["objects"].size() == 2);
+  CHECK_FALSE(frame["objects"][0].contains("world_from_node"));
+  CHECK(frame["objects"][1].contains("world_from_node"));
+  for (const Json& object : frame["objects"]) {
+    CHECK(object["box"] == Json({1, 1, 4, 3}));
+    CHECK_FALSE(object.contains("bounds"));
+    CHECK_FALSE(object.contains("edges"));
+  }
 }
 
 TEST_CASE("Pictures of numbers hold them exactly", "[view]") {
@@ -648,8 +683,12 @@ TEST_CASE("A report is the same as files, whose names no text of the dataset mak
   };
   CHECK(read("index.html").find("Content-Security-Policy") != std::string::npos);
   const std::string capture = read("data/0_capture_3.js");
-  CHECK(capture.starts_with("diorama_data('/api/0/capture/3',{"));
-  CHECK(read("data/0_capture_3_0_ids.js").find("'data:image/png;base64,iVBOR") !=
+  // A script of one text, which is JSON whatever the dataset's texts are.
+  CHECK(capture.starts_with(R"(diorama_data('/api/0/capture/3','{"capture":3)"));
+  CHECK(capture.find(R"(alert(\'1\'))") != std::string::npos);
+  CHECK(capture.find(R"(\\")") != std::string::npos);
+  CHECK(std::ranges::count(capture, '\n') == 1);
+  CHECK(read("data/0_capture_3_0_ids.js").find("'\"data:image/png;base64,iVBOR") !=
         std::string::npos);
   CHECK(read("data/0_capture_3_0_color").starts_with("\xFF\xD8\xFF"));
   // What it lacks its page does not ask for.

@@ -41,6 +41,12 @@ class Keeps(Move):
             Keeps.kept.path
         Keeps.kept = scene.root
 
+class Settled(Move):
+    height_m = 4.0
+    def randomize(self, scene, context, rng):
+        if self.height_m != 4.0:
+            raise RuntimeError("the base class's value")
+
 class Divides(dp.Randomizer):
     def randomize(self, scene, context, rng):
         1 / 0
@@ -298,6 +304,14 @@ class Runs(unittest.TestCase):
                     self.assertIn(word, lint.stdout)
                 opened = self.call(sys.executable, "-c", "import sys, diorama; diorama.open(sys.argv[1])[2]", data)
                 self.assertIn("diorama.Error: reader of Arrays, capture 2: ", opened.stderr)
+        for body, words in {
+            "Instance(7, '/a', {'class': 'a'}, box=(2, 1, 5.5, 3))": "Instance.box cannot be (2, 1, 5.5, 3)",
+            "Instance(-1, '/a')": "Instance.id cannot be -1", "Instance(7, '/a', {'class': 7})": "Instance.labels cannot be {'class': 7}",
+            "Instance(7, '/a', world_from_object=np.eye(3))": "Instance.world_from_object cannot be array(",
+        }.items():
+            with self.subTest(body):
+                lint = self.call(PROGRAM, "lint", self.reader(f"return Capture(place, frames=[Frame('eye', Camera(6, 4), instances=[{body}])])"))
+                self.assertIn(words, lint.stdout)
         once = self.reader("if place == 1: 1 / 0\n        " + self.GOOD)
         lint = self.call(PROGRAM, "lint", once)
         self.assertEqual(lint.stdout.count("ZeroDivisionError"), 1, lint.stdout + lint.stderr)
@@ -312,6 +326,16 @@ class Runs(unittest.TestCase):
         told = self.call(PROGRAM, "lint", self.reader(self.GOOD))
         self.assertEqual(told.returncode, 0, told.stderr)
         self.assertIn("twin.py:2: ZeroDivisionError", told.stderr)
+
+    def test_a_reader_that_fails_leaves_the_others(self):
+        data = self.reader(self.GOOD)
+        for body, words in {"def recognise(self, folder):\n        return 1 / 0": "wrong.py:7: ZeroDivisionError", "patterns = '*.npy'": "X.patterns is a list of texts"}.items():
+            with self.subTest(body):
+                (self.scripts / "wrong.py").write_text("from diorama.plugins import *\n\n\nclass X(Reader):\n    patterns = ['*.npy']\n    " + body + "\n    def open(self, folder): pass\n")
+                lint = self.call(PROGRAM, "lint", data)
+                self.assertEqual(lint.returncode, 0, lint.stdout + lint.stderr)
+                self.assertIn(words, lint.stderr)
+                self.assertIn("(the reader is left out)", lint.stderr)
 
     def test_parameters_are_in_the_schema(self):
         told = self.call(PROGRAM, "plugins", "describe", "annotator/python")
@@ -397,6 +421,79 @@ class Runs(unittest.TestCase):
         (self.scripts / "broken.py").write_text("import diorama\n\ndef x(:\n")
         self.check_refused(self.run_job(self.randomizer("Move", file="broken.py")), 4, "broken.py:3: SyntaxError")
         self.assertFalse((self.folder / "escaped.txt").exists())
+        self.assertEqual(self.run_job(self.randomizer("Settled"), output="settled").returncode, 0)
+        self.check_refused(self.run_job(self.randomizer("Settled", "height_m: 2"), output="settled"), 3, "height_m")
+
+    def script(self, body, kind="Randomizer", head=""):
+        """A class X of a file of its own, in which the mark "# here" stands in the line that messages are to name."""
+        (self.scripts / "x.py").write_text(f"import numpy as np\nimport diorama.plugins as dp\n{head}\n\nclass X(dp.{kind}):\n    {body}\n")
+        lines = (self.scripts / "x.py").read_text().splitlines()
+        return next((i + 1 for i, line in enumerate(lines) if "# here" in line), None)
+
+    def test_whatever_is_wrong_is_said_with_file_and_line(self):
+        act = "def randomize(self, scene, context, rng):\n        "
+        write = "needs = ['color']\n    def write(self, capture, files):\n        "
+        annotate = "provides = ['noise']\n    def annotate(self, frame, rng):\n        "
+        node = "scene.match('/Assets/*')[0]"
+        cases = [
+            # What Python throws.
+            ("Randomizer", act + "raise ValueError('bad \\udcff text')  # here", ["ValueError: bad \\udcff text"]),
+            ("Randomizer", act + "raise type('E', (Exception,), {'__str__': lambda self: 1 / 0})()  # here", ["E: (its own text fails)"]),
+            ("Randomizer", act + "raise KeyboardInterrupt  # here", ["KeyboardInterrupt"]),
+            ("Randomizer", "def __init__(self):\n        1 / 0  # here\n    " + act + "pass", ["ZeroDivisionError"]),
+            ("Randomizer", act + "import nowhere  # here", ["ModuleNotFoundError: No module named 'nowhere'"]),
+            ("Writer", write + "1 / 0  # here", ["ZeroDivisionError"]),
+            ("Writer", write + "pass\n    def begin(self, dataset, files):\n        1 / 0  # here", ["ZeroDivisionError"]),
+            ("Writer", write + "pass\n    def finish(self, records, files):\n        1 / 0  # here", ["ZeroDivisionError"]),
+            ("Annotator", annotate + "1 / 0  # here", ["ZeroDivisionError"]),
+            # Classes that cannot be used.
+            ("Randomizer", act.replace("rng", "rng, more") + "pass", ["x.py:6", "X.randomize is called as randomize(self, scene, context, rng)"]),
+            ("Randomizer", "def __init__(self, size): pass", ["x.py:6", "X.__init__ is called as __init__(self)"]),
+            ("Randomizer", "pass", ["x.py:5", "X has no method randomize(self, scene, context, rng)"]),
+            ("Writer", "pass", ["x.py:5", "X has no method write(self, capture, files)"]),
+            ("Writer", write.replace("['color']", "'color'") + "pass", ["x.py:5", "X.needs is a list of texts, not 'color'"]),
+            ("Annotator", annotate.replace("['noise']", "7") + "pass", ["x.py:5", "X.provides is a list of texts, not 7"]),
+            # Declarations.
+            ("Randomizer", "n = dp.param(2**40, 'Large.')  # here\n    " + act + "pass", ["32 bits"]),
+            ("Randomizer", "n = dp.param(None, 'None.')  # here\n    " + act + "pass", ["a parameter is a bool, int", "not None"]),
+            ("Randomizer", "n = dp.param(1.0, None)  # here\n    " + act + "pass", ["are texts"]),
+            ("Randomizer", "n = dp.param(9.0, 'Far.', most=1.0)  # here\n    " + act + "pass", ["the default 9.0 is not from -inf to 1.0"]),
+            ("Randomizer", "n = dp.param((0.0, 9.0, 0.0), 'Far.', most=1.0)  # here\n    " + act + "pass", ["the default 9.0"]),
+            ("Randomizer", "n = dp.param(float('nan'), 'None.')  # here\n    " + act + "pass", ["the default nan"]),
+            ("Randomizer", "n = dp.param('c', 'Word.', choices=['a', 'b'])  # here\n    " + act + "pass", ["'c' is none of the choices a, b"]),
+            ("Randomizer", "n = dp.param('c', 'Word.', choices=[1, 2])  # here\n    " + act + "pass", ["are texts"]),
+            # Values of wrong types.
+            ("Randomizer", act + node + ".position = [0, 0]  # here", ["a position is three numbers, metres, found [0, 0]"]),
+            ("Randomizer", act + node + ".world_from_node = np.eye(3)  # here", ["a pose is a matrix of 4 x 4 numbers, found array("]),
+            ("Randomizer", act + node + ".labels = {'class': 7}  # here", ["labels are texts by texts", "found {'class': 7}"]),
+            ("Randomizer", act + node + ".set_base_color('red')  # here", ["a colour is three numbers, found 'red'"]),
+            ("Randomizer", act + node + ".positon = [0, 0, 0]  # here", ["no attribute 'positon'"]),
+        ]
+        for i, (kind, body, words) in enumerate(cases):
+            with self.subTest(body):
+                line = self.script(body, kind)
+                sets = {"Randomizer": [self.randomizer("X", file="x.py")], "Writer": [self.writer("X", file="x.py")],
+                        "Annotator": ["annotators=[{type: python, file: x.py, class: X}]", self.writer("NeedsNoise")]}[kind]
+                result = self.run_job(*sets, output=f"wrong{i}")
+                self.check_refused(result, 4, *([f"x.py:{line}: "] if line else []), *words)
+                for word in ("Unable to cast", "incompatible function arguments", "unexpected error"):
+                    self.assertNotIn(word, result.stderr)
+        # Files that are no text of Python.
+        for content, words in {b"x = 'caf\xe9'\n": ["SyntaxError", "utf-8"], b"x = 1\0\n": ["null bytes"]}.items():
+            (self.scripts / "x.py").write_bytes(b"import diorama.plugins as dp\n" + content)
+            self.check_refused(self.run_job(self.randomizer("X", file="x.py"), output="bytes"), 4, "x.py", *words)
+
+    def test_a_run_that_fails_says_where_its_dataset_is(self):
+        self.script("needs = ['color']\n    def write(self, capture, files):\n        files.add(f'{capture.index}.txt', b'')\n"
+                    "        if capture.index == 3: raise OSError(28, 'No space left')", "Writer")
+        sets = ["total_captures=8", self.writer("X", file="x.py")]
+        failed = self.run_job(*sets, options=["--threads", "1", "--visits-in-flight", "1"])
+        place = self.folder / "out"
+        self.check_refused(failed, 4, f"dataset: {place}\n", f"next: the same command with --resume, diorama view {place}", "No space left")
+        self.script("needs = ['color']\n    def write(self, capture, files):\n        files.add(f'{capture.index}.txt', b'')", "Writer")
+        self.assertEqual(self.run_job(*sets, options=["--resume"]).returncode, 0)
+        early = self.run_job(self.randomizer("Mov"), output="early")
+        self.assertNotIn("dataset:", early.stderr)
         self.check_refused(self.run_job("randomizers.poses={type: python, name: poses, on: [environment]}", output="none"), 3, "file: expected a Python file")
 
 

@@ -16,8 +16,9 @@ export interface App {
   lint: Lint;
   /** Changes what is shown, and the address. `replaces`: without a step for the way back. */
   go(change: Partial<State>, replaces?: boolean): void;
-  /** Another frame of a clip that plays: neither the page is made anew, nor each frame's address. */
-  seek(capture: number): void;
+  /** The same, of what the page shows already: a frame of a clip that plays, the part of a picture that was dragged to. It is
+   *  not made anew, and the address follows as often as browsers let it. */
+  note(change: Partial<State>): void;
   /** Of the dataset that is shown, unless another one is named. */
   labels(capture: number, dataset?: number): Promise<CaptureLabels>;
 }

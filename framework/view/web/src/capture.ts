@@ -30,11 +30,12 @@ export class CapturePage {
   private readonly panel = el('aside', { class: 'objects', 'aria-label': 'Objects' });
   private readonly space = new SpaceView((frame, object) => {
     this.app.go({ frame, object: object ?? 0 });
-  });
+  }, (eye) => this.app.note({ eye }));
   private readonly player = new Player({
     shot: (capture) => this.shot(capture),
     shows: (capture, shot) => this.showShot(capture, shot),
-    go: (change) => this.app.go(change.capture === this.app.state.capture ? { ...change } : { ...change, object: 0 }, true),
+    // Within a clip the place that is looked at stays.
+    go: (change) => this.app.go(change.capture === this.app.state.capture ? { ...change } : { ...change, object: 0, view: this.app.state.view }, true),
   });
   private readonly stage = el('div', { class: 'stage' }, this.canvas, this.probe);
   private app!: App;
@@ -48,6 +49,7 @@ export class CapturePage {
   private readonly zoom = new Zoom(this.canvas, {
     size: () => this.frame && [this.frame.width, this.frame.height],
     draw: () => this.draw(),
+    moved: (view) => this.app.note({ view }),
     pointed: (pixel) => {
       this.pointer = pixel;
       this.showProbe();
@@ -75,7 +77,7 @@ export class CapturePage {
       }, () => undefined);
     }
     if (state.capture !== this.shown) {
-      // Within a clip the place that is looked at stays, and what is there until the next is.
+      // Within a clip what is there stays until the next is.
       const isOfClip = this.player.has(state.capture);
       this.shown = state.capture;
       const shot = this.player.shot(state.capture);
@@ -108,6 +110,7 @@ export class CapturePage {
       return;
     }
     if (!this.player.isPlaying) this.wantNumbers();
+    this.zoom.show(app.state.view);
     this.showHead();
     this.showPanel();
     this.showSpace();
@@ -142,7 +145,7 @@ export class CapturePage {
     this.pixels = shot.pixels;
     this.capture = shot.labels ?? this.capture;
     this.frame = shot.labels?.frames[this.app.state.frame] ?? this.frame;
-    this.app.seek(capture);
+    this.app.note({ capture });
     this.title.textContent = `Capture ${capture}`;
     this.draw();
     this.showSpace();
@@ -198,7 +201,7 @@ export class CapturePage {
     let at = list.indexOf(state.capture);
     if (at < 0) at = list.findIndex((number) => number > state.capture) - (by > 0 ? 1 : 0);
     const next = list[at + by];
-    if (next !== undefined) this.app.go({ capture: next, object: 0, plays: false });
+    if (next !== undefined) this.app.go({ capture: next, object: 0, plays: false, view: this.player.has(next) ? state.view : null });
   }
 
   private showPanel(): void {

@@ -13,8 +13,8 @@ const kModes: [CompareMode, string, string][] = [
 ];
 /** Of the divider a pointer takes hold within so many pixels. */
 const kGrip = 12;
-/** Keys that move it, by shares of the width. */
-const kSlides: { [key: string]: number } = { ',': -0.04, '.': 0.04 };
+/** Keys that move it, by percent of the width. */
+const kSlides: { [key: string]: number } = { ',': -4, '.': 4 };
 
 /** One of the two. */
 interface Side {
@@ -40,18 +40,19 @@ export class ComparePage {
   private key = '';
   private infos = new Map<string, Promise<DatasetInfo>>();
   private difference: { canvas: HTMLCanvasElement; pixels: number; most: number } | null = null;
-  private divider = 0.5;
   private readonly zoom = new Zoom(this.canvas, {
     size: () => {
       const frame = this.sides?.[0].frame ?? this.sides?.[1].frame;
       return frame ? [frame.width, frame.height] : null;
     },
     draw: () => this.draw(),
+    moved: (view) => this.app.note({ view }),
     pointed: (pixel) => this.showProbe(pixel),
     dragged: (x, _, isFirst) => {
       if (this.app.state.mode !== 'divider') return false;
-      if (isFirst && Math.abs(x - this.divider * this.canvas.clientWidth) > kGrip) return false;
-      this.divide(x / Math.max(1, this.canvas.clientWidth));
+      const share = (100 * x) / Math.max(1, this.canvas.clientWidth);
+      if (isFirst && (Math.abs(share - this.app.state.divider) * this.canvas.clientWidth) / 100 > kGrip) return false;
+      this.divide(share);
       return true;
     },
   });
@@ -91,6 +92,7 @@ export class ComparePage {
     this.showHead();
     this.showPanel();
     if (this.probe.childElementCount === 0) this.showProbe(null);
+    this.zoom.show(state.view);
     this.draw();
   }
 
@@ -123,8 +125,8 @@ export class ComparePage {
     this.draw();
   }
 
-  private divide(at: number): void {
-    this.divider = Math.max(0, Math.min(1, at));
+  private divide(percent: number): void {
+    this.app.note({ divider: Math.round(Math.max(0, Math.min(100, percent))) });
     this.draw();
   }
 
@@ -258,7 +260,7 @@ export class ComparePage {
     const [context, view] = began;
     const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
     const [a, b] = this.sides;
-    const middle = state.mode === 'side' ? this.zoom.paneWidth : this.divider * width;
+    const middle = state.mode === 'side' ? this.zoom.paneWidth : (state.divider / 100) * width;
     if (state.mode === 'difference' && this.difference) {
       const { canvas } = this.difference;
       context.fillStyle = '#000';
@@ -309,7 +311,7 @@ export class ComparePage {
     const mode = kModes.find(([, , key]) => key === event.key);
     if (mode) this.app.go({ mode: mode[0] }, true);
     else if (event.shiftKey && this.zoom.press(event)) return true;
-    else if (this.app.state.mode === 'divider' && event.key in kSlides) this.divide(this.divider + kSlides[event.key]);
+    else if (this.app.state.mode === 'divider' && event.key in kSlides) this.divide(this.app.state.divider + kSlides[event.key]);
     else if (event.key === 'ArrowLeft') this.step(-1);
     else if (event.key === 'ArrowRight') this.step(1);
     else if (event.key === 'Escape') this.app.go({ page: 'grid' });

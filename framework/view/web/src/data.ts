@@ -160,10 +160,17 @@ export const isReport = document.querySelector('meta[name=diorama]') !== null;
 /** The program has ended, or the token is not known any more. */
 export class Gone extends Error {}
 
-const waiting = new Map<string, (value: unknown) => void>();
-(window as any).diorama_data = (path: string, value: unknown): void => {
-  waiting.get(path)?.(value);
-  waiting.delete(path);
+interface Asked {
+  promise: Promise<any>;
+  resolve: (value: unknown) => void;
+}
+
+/** What scripts of a report are on their way with, for all who want it. */
+const asked = new Map<string, Asked>();
+/** `text`: JSON; null: nothing. */
+(window as any).diorama_data = (path: string, text: string | null): void => {
+  asked.get(path)?.resolve(text === null ? null : JSON.parse(text));
+  asked.delete(path);
 };
 
 function fileOf(path: string): string {
@@ -171,18 +178,22 @@ function fileOf(path: string): string {
 }
 
 function getFromFile(path: string): Promise<any> {
-  return new Promise((resolve, reject) => {
-    waiting.set(path, resolve);
+  const known = asked.get(path);
+  if (known) return known.promise;
+  const promise = new Promise((resolve, reject) => {
+    asked.set(path, { promise: undefined!, resolve });
     const script = document.createElement('script');
     script.src = fileOf(path) + '.js';
     script.onload = () => script.remove();
     script.onerror = () => {
       script.remove();
-      waiting.delete(path);
+      asked.delete(path);
       reject(new Error('not in this report'));
     };
     document.head.append(script);
   });
+  asked.get(path)!.promise = promise;
+  return promise;
 }
 
 /** JSON at an address; null while the program is still at work on it. */

@@ -27,11 +27,14 @@ export class Grid {
   private cardWidth = 1;
   private cardHeight = 1;
   private chosen = 0;
+  private told = -1;  ///< The capture that is first in sight, as the address has it.
+  private wanted: number | null = null;  ///< To be scrolled to as soon as it is there.
+  private ownTop = -Infinity;  ///< Where it has scrolled to by itself.
   private height = 0;  ///< Of all cards.
 
   constructor() {
     this.element.append(this.empty, this.field);
-    on(this.element, { scroll: () => this.fill(), keydown: (event: KeyboardEvent) => this.press(event) });
+    on(this.element, { scroll: () => this.scrolled(), keydown: (event: KeyboardEvent) => this.press(event) });
     new ResizeObserver(() => this.app && this.show(this.app)).observe(this.element);
   }
 
@@ -65,7 +68,31 @@ export class Grid {
       for (const card of this.cards.values()) card.element.remove();
       this.cards.clear();
     }
+    if (state.at !== this.told) this.told = this.wanted = state.at;
+    this.scrollToWanted();
     this.fill();
+  }
+
+  /** Until somebody scrolls: heights are not known before labels are, nor which captures a filter leaves. */
+  private scrollToWanted(): void {
+    if (this.wanted === null || this.element.clientHeight === 0) return;
+    const { filtered, info } = this.app;
+    let first = filtered.places.findIndex((place) => info.captures[place] >= this.wanted!);
+    if (first < 0) first = filtered.places.length - 1;
+    this.element.scrollTop = Math.max(0, (Math.floor(Math.max(0, first) / this.columns) * (this.cardHeight + kGap)) / this.stretch);
+    this.ownTop = this.element.scrollTop;
+  }
+
+  private scrolled(): void {
+    if (!this.app || this.element.clientHeight === 0) return;
+    this.fill();
+    if (Math.abs(this.element.scrollTop - this.ownTop) < 2) return;
+    this.ownTop = -Infinity;
+    this.wanted = null;
+    const line = Math.round((this.element.scrollTop * this.stretch) / (this.cardHeight + kGap));
+    const place = this.app.filtered.places[line * this.columns];
+    this.told = line === 0 || place === undefined ? -1 : this.app.info.captures[place];
+    this.app.note({ at: this.told });
   }
 
   /** Pixels of all cards per pixel that is scrolled. */

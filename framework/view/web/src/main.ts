@@ -12,6 +12,8 @@ import { FindingsPage, RunPage, StatsPage } from './pages';
 import { Page, State, addressOf, readState } from './state';
 
 const kAddressMs = 250;
+/** Who changes one of them shows another picture. */
+const kOther: (keyof State)[] = ['page', 'dataset', 'other', 'capture', 'frame'];
 
 /** Of a run that has made nothing that could be read yet. */
 function noDataset(site: SiteState): DatasetInfo {
@@ -54,7 +56,8 @@ class Site {
   private app!: App;
   private stores = new Map<number, LabelStore>();
   private loading = 0;
-  private addressed = 0;
+  private addressed = 0;  ///< When the address was changed.
+  private noting = 0;  ///< Timer of a change that it does not have yet.
   private tabs = false;  ///< From button to button by keyboard.
 
   async start(): Promise<void> {
@@ -84,7 +87,7 @@ class Site {
       filtered: filter(table, info.cameras, state.facets, info.captures.length),
       lint: new Lint(() => this.takeFindings()),
       go: (change, replaces) => this.go(change, replaces),
-      seek: (capture) => this.seek(capture),
+      note: (change) => this.note(change),
       labels: (capture, dataset = state.dataset) => this.labels(capture, dataset),
     };
     document.title = `${info.name} – diorama view`;
@@ -164,6 +167,9 @@ class Site {
   private go(change: Partial<State>, replaces = false): void {
     const state = { ...this.app.state, ...change };
     if (state.page !== 'capture') state.plays = false;
+    // What is another picture is shown whole, what is filtered from its beginning.
+    if (!('view' in change) && kOther.some((key) => key in change && change[key] !== this.app.state[key])) state.view = null;
+    if ('facets' in change) state.at = -1;
     this.addressed = performance.now();
     const address = addressOf(state);
     if (replaces) history.replaceState(null, '', address);
@@ -171,16 +177,20 @@ class Site {
     void this.follow(state);
   }
 
-  private seek(capture: number): void {
-    this.app.state = { ...this.app.state, capture };
-    const now = performance.now();
+  private note(change: Partial<State>): void {
+    this.app.state = { ...this.app.state, ...change };
     // Browsers ignore addresses that change too often.
-    if (now - this.addressed < kAddressMs) return;
-    this.addressed = now;
-    history.replaceState(null, '', addressOf(this.app.state));
+    const wait = Math.max(0, kAddressMs - (performance.now() - this.addressed));
+    this.noting ||= window.setTimeout(() => {
+      this.noting = 0;
+      this.addressed = performance.now();
+      history.replaceState(null, '', addressOf(this.app.state));
+    }, wait);
   }
 
   private async follow(state: State): Promise<void> {
+    window.clearTimeout(this.noting);
+    this.noting = 0;
     if (state.dataset !== this.app.state.dataset) {
       await this.load(state).catch((error: Error) => this.fail(error));
       return;

@@ -79,15 +79,17 @@ function heatMap(title: string, rows: number[][], width: number): HTMLElement {
 function jumpTo(app: App, name: string): HTMLElement {
   const found = /^capture (\d+), (.*)$/.exec(name);
   if (!found) return el('span', {}, name);
-  return jump(app, name, Number(found[1]), found[2]);
+  return jump(app, name, app.state.dataset, Number(found[1]), found[2]);
 }
 
-function jump(app: App, text: string, capture: number, camera: string): HTMLElement {
+/** To a capture of a dataset, to the picture of a camera and to an object by its path, where they are known. */
+function jump(app: App, text: string, dataset: number, capture: number, camera = '', path = ''): HTMLElement {
   return button(text, 'Show it', () => {
-    app.labels(capture).then((labels) => {
+    app.labels(capture, dataset).then((labels) => {
       const frame = Math.max(0, labels.frames.findIndex((one) => one.camera === camera));
-      app.go({ page: 'capture', capture, frame, object: 0 });
-    }, () => app.go({ page: 'capture', capture, frame: 0, object: 0 }));
+      const object = labels.frames[frame]?.objects.find((one) => one.path === path)?.id ?? 0;
+      app.go({ page: 'capture', dataset, capture, frame, object });
+    }, () => app.go({ page: 'capture', dataset, capture, frame: 0, object: 0 }));
   }, { class: 'link' });
 }
 
@@ -227,11 +229,11 @@ export class FindingsPage {
       for (const [check, findings] of checks) {
         const list = el('ul');
         for (const finding of findings.slice(0, 200)) {
-          const isHere = datasetOf(app.site, report) === app.state.dataset;
+          const dataset = datasetOf(app.site, report);
           const place = `capture ${finding.capture}${finding.camera ? ', ' + finding.camera : ''}`;
           const message = finding.message ?? '';
-          const isJump = finding.capture !== undefined && isHere;
-          list.append(el('li', {}, isJump && jump(app, place, finding.capture!, finding.camera ?? ''), ' ',
+          const isJump = finding.capture !== undefined && dataset >= 0;
+          list.append(el('li', {}, isJump && jump(app, place, dataset, finding.capture!, finding.camera, finding.object), ' ',
             isJump && message.startsWith(place + ': ') ? message.slice(place.length + 2) : message, el('small', {}, finding.file ?? '')));
         }
         this.element.append(el('details', { open: checks.size <= 3 }, el('summary', {}, check, el('small', {}, String(findings.length))), list));

@@ -4,7 +4,7 @@
 import { CaptureLabels, FrameLabels, ObjectLabels } from './data';
 import { el, on } from './dom';
 import { Palette, css } from './layers';
-import { State } from './state';
+import { Eye, State } from './state';
 
 type Vec = [number, number, number];
 
@@ -31,16 +31,15 @@ function frustum(frame: FrameLabels, length: number): Vec[] | null {
 
 export class SpaceView {
   readonly canvas = el('canvas', { class: 'space', tabindex: '0', role: 'img' });
-  private turn = 0.7;
-  private rise = 0.5;
-  private zoom = 1;
+  private eye!: Eye;
   private labels: CaptureLabels | null = null;
   private state!: State;
   private palette!: Palette;
   private readonly pictures = new Map<number, HTMLImageElement>();
   private spots: { x: number; y: number; frame: number; object: number | null }[] = [];
 
-  constructor(private readonly pick: (frame: number, object: number | null) => void) {
+  constructor(private readonly pick: (frame: number, object: number | null) => void,
+              private readonly turned: (eye: Eye) => void) {
     let held: [number, number] | null = null;
     let moved = 0;
     on(this.canvas, {
@@ -51,11 +50,10 @@ export class SpaceView {
       },
       pointermove: (event: PointerEvent) => {
         if (!held) return;
-        this.turn -= (event.clientX - held[0]) * 0.008;
-        this.rise = Math.max(-1.57, Math.min(1.57, this.rise + (event.clientY - held[1]) * 0.008));
-        moved += Math.abs(event.clientX - held[0]) + Math.abs(event.clientY - held[1]);
+        const [dx, dy] = [event.clientX - held[0], event.clientY - held[1]];
+        moved += Math.abs(dx) + Math.abs(dy);
         held = [event.clientX, event.clientY];
-        this.draw();
+        this.move(-0.46 * dx, 0.46 * dy, 1);
       },
       pointerup: (event: PointerEvent) => {
         held = null;
@@ -63,20 +61,18 @@ export class SpaceView {
       },
       wheel: (event: WheelEvent) => {
         event.preventDefault();
-        this.zoom = Math.max(0.2, Math.min(20, this.zoom * Math.exp(-event.deltaY * 0.0015)));
-        this.draw();
+        this.move(0, 0, Math.exp(-event.deltaY * 0.0015));
       },
       keydown: (event: KeyboardEvent) => {
         const acts: { [key: string]: () => void } = {
-          ArrowLeft: () => (this.turn += 0.1), ArrowRight: () => (this.turn -= 0.1),
-          ArrowUp: () => (this.rise = Math.min(1.57, this.rise + 0.1)), ArrowDown: () => (this.rise = Math.max(-1.57, this.rise - 0.1)),
-          '+': () => (this.zoom *= 1.2), '-': () => (this.zoom /= 1.2), t: () => (this.rise = 1.57),
+          ArrowLeft: () => this.move(6, 0, 1), ArrowRight: () => this.move(-6, 0, 1),
+          ArrowUp: () => this.move(0, 6, 1), ArrowDown: () => this.move(0, -6, 1),
+          '+': () => this.move(0, 0, 1.2), '-': () => this.move(0, 0, 1 / 1.2), t: () => this.move(0, 180, 1),
         };
         if (!(event.key in acts)) return;
         acts[event.key]();
         event.preventDefault();
         event.stopPropagation();
-        this.draw();
       },
     });
     new ResizeObserver(() => this.draw()).observe(this.canvas);
@@ -96,8 +92,17 @@ export class SpaceView {
     }
     this.labels = labels;
     this.state = state;
+    this.eye = state.eye;
     this.palette = palette;
     this.draw();
+  }
+
+  /** Degrees around and up, and a factor. */
+  private move(turn: number, rise: number, factor: number): void {
+    const [around, above, size] = this.eye;
+    this.eye = [(around + turn + 360) % 360, Math.max(-90, Math.min(90, above + rise)), Math.max(20, Math.min(2000, size * factor))];
+    this.draw();
+    this.turned(this.eye);
   }
 
   private click(event: PointerEvent): void {
@@ -135,12 +140,14 @@ export class SpaceView {
     const eyes = this.labels.frames.map((frame) => frustum(frame, 1)?.[0]).filter((eye) => eye !== undefined);
     const all: Vec[] = [...boxes.flatMap((box) => box.points), ...eyes].filter((p) => p.every(Number.isFinite));
     if (all.length === 0) return;
-    const low = [0, 1, 2].map((i) => Math.min(...all.map((p) => p[i])));
-    const high = [0, 1, 2].map((i) => Math.max(...all.map((p) => p[i])));
+    const low = [0, 1, 2].map((i) => all.reduce((least, p) => Math.min(least, p[i]), Infinity));
+    const high = [0, 1, 2].map((i) => all.reduce((most, p) => Math.max(most, p[i]), -Infinity));
     const middle = low.map((value, i) => (value + high[i]) / 2);
     const extent = Math.max(1e-6, Math.hypot(...high.map((value, i) => value - low[i])));
-    const scale = (Math.min(width, height) / extent) * 0.85 * this.zoom;
-    const [ct, st, cr, sr] = [Math.cos(this.turn), Math.sin(this.turn), Math.cos(this.rise), Math.sin(this.rise)];
+    const [around, above, size] = this.eye;
+    const scale = (Math.min(width, height) / extent) * 0.85 * (size / 100);
+    const [turn, rise] = [(around * Math.PI) / 180, (above * Math.PI) / 180];
+    const [ct, st, cr, sr] = [Math.cos(turn), Math.sin(turn), Math.cos(rise), Math.sin(rise)];
     const project = (p: Vec): [number, number] => {
       const [x, y, z] = p.map((value, i) => value - middle[i]);
       return [width / 2 + scale * (-st * x + ct * y), height / 2 - scale * (cr * z - sr * (ct * x + st * y))];
@@ -153,16 +160,18 @@ export class SpaceView {
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.clearRect(0, 0, width, height);
     this.spots = [];
-    // A grid of metres below everything.
+    // A grid of metres below everything; of more where that would be too many lines.
     context.strokeStyle = colours.getPropertyValue('--line');
     context.lineWidth = 1;
     context.beginPath();
-    const step = extent > 40 ? 10 : extent > 2 ? 1 : 0.1;
-    for (let x = Math.floor(low[0] / step); x <= Math.ceil(high[0] / step); ++x) {
-      line([x * step, Math.floor(low[1] / step) * step, low[2]], [x * step, Math.ceil(high[1] / step) * step, low[2]]);
+    const step = extent <= 2 ? 0.1 : extent <= 40 ? 1 : 10 ** Math.ceil(Math.log10(extent / 40));
+    const from = low.map((value) => Math.floor(value / step));
+    const lines = high.map((value, i) => Math.ceil(value / step) - from[i]);
+    for (let x = 0; x <= lines[0]; ++x) {
+      line([(from[0] + x) * step, from[1] * step, low[2]], [(from[0] + x) * step, (from[1] + lines[1]) * step, low[2]]);
     }
-    for (let y = Math.floor(low[1] / step); y <= Math.ceil(high[1] / step); ++y) {
-      line([Math.floor(low[0] / step) * step, y * step, low[2]], [Math.ceil(high[0] / step) * step, y * step, low[2]]);
+    for (let y = 0; y <= lines[1]; ++y) {
+      line([from[0] * step, (from[1] + y) * step, low[2]], [(from[0] + lines[0]) * step, (from[1] + y) * step, low[2]]);
     }
     context.stroke();
 

@@ -3,7 +3,9 @@
 // mouse and keys, in one or several panes side by side that show the same part.
 import { on } from './dom';
 import { View } from './layers';
+import { Place } from './state';
 
+const kLeastScale = 0.05;
 const kMostScale = 64;
 
 const kSteps: { [key: string]: [number, number] } = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
@@ -12,6 +14,8 @@ export interface ZoomUser {
   /** Size of the picture; null while there is none. */
   size(): [number, number] | null;
   draw(): void;
+  /** Another part of the picture is seen, as Zoom::show() takes it. */
+  moved(place: Place | null): void;
   /** The pointer is at a pixel, or (null) beside the picture. */
   pointed(pixel: [number, number] | null): void;
   clicked?(): void;
@@ -23,6 +27,8 @@ export class Zoom {
   panes = 1;
   private view: View = { scale: 1, x: 0, y: 0 };
   private fits = true;
+  private told: Place | null = null;  ///< What was shown, or said to be seen, last.
+  private wanted: Place | null = null;  ///< Seen as soon as there is a picture.
   private pixel: [number, number] | null = null;  ///< Pointed at.
   private byKeys = false;
 
@@ -53,6 +59,13 @@ export class Zoom {
     this.canvas.height = Math.round(height * ratio);
     const size = this.user.size();
     if (!size) return null;
+    if (this.wanted) {
+      const [cx, cy, across] = this.wanted;
+      const scale = Math.max(kLeastScale, Math.min(kMostScale, this.paneWidth / Math.max(1e-3, across)));
+      this.view = { scale, x: this.paneWidth / 2 - scale * cx, y: height / 2 - scale * cy };
+      this.wanted = null;
+      this.fits = false;
+    }
     if (this.fits) {
       const scale = Math.min(this.paneWidth / size[0], height / size[1]) * 0.98;
       this.view = { scale, x: (this.paneWidth - scale * size[0]) / 2, y: (height - scale * size[1]) / 2 };
@@ -64,15 +77,30 @@ export class Zoom {
     return [context, this.view];
   }
 
-  /** The next picture is shown whole, without drawing it now. */
+  /** No pixel is pointed at any more. */
   reset(): void {
-    this.fits = true;
     this.point(null, false);
+  }
+
+  /** The part that is seen from the next drawing on; null: all. What it has told itself changes nothing. */
+  show(place: Place | null): void {
+    if (String(place) === String(this.told)) return;
+    this.told = place;
+    this.wanted = place;
+    this.fits = place === null;
   }
 
   fit(): void {
     this.fits = true;
+    this.seen();
+  }
+
+  /** Draws what is seen now, and tells of it. */
+  private seen(): void {
     this.user.draw();
+    const { scale, x, y } = this.view;
+    this.told = this.fits ? null : [(this.paneWidth / 2 - x) / scale, (this.canvas.clientHeight / 2 - y) / scale, this.paneWidth / scale];
+    this.user.moved(this.told);
   }
 
   /** One pixel of the picture for one of the screen. */
@@ -90,7 +118,7 @@ export class Zoom {
     const scale = Math.min(kMostScale, 0.6 * Math.min(width / Math.max(1, right - left), height / Math.max(1, bottom - top)));
     this.view = { scale, x: width / 2 - (scale * (left + right)) / 2, y: height / 2 - (scale * (top + bottom)) / 2 };
     this.fits = false;
-    this.user.draw();
+    this.seen();
   }
 
   /** Shows in each pane where keys point, as no mouse does it. */
@@ -139,7 +167,7 @@ export class Zoom {
     });
     this.view = { scale, x: origin[0], y: origin[1] };
     this.point(next, true);
-    this.user.draw();
+    this.seen();
   }
 
   private point(pixel: [number, number] | null, byKeys: boolean): void {
@@ -152,12 +180,12 @@ export class Zoom {
 
   private to(scale: number, at?: [number, number]): void {
     const [x, y] = at ?? [this.paneWidth / 2, this.canvas.clientHeight / 2];
-    const next = Math.max(0.05, Math.min(kMostScale, scale));
+    const next = Math.max(kLeastScale, Math.min(kMostScale, scale));
     const px = (x - this.view.x) / this.view.scale;
     const py = (y - this.view.y) / this.view.scale;
     this.view = { scale: next, x: x - px * next, y: y - py * next };
     this.fits = false;
-    this.user.draw();
+    this.seen();
   }
 
   private listen(): void {
@@ -193,7 +221,7 @@ export class Zoom {
         } else if (moved >= 4) {
           this.view = { ...this.view, x: this.view.x + event.clientX - held[0], y: this.view.y + event.clientY - held[1] };
           this.fits = false;
-          this.user.draw();
+          this.seen();
         } else {
           return;
         }
