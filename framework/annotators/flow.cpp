@@ -2,7 +2,10 @@
 #include "framework/annotators/flow.h"
 
 #include <map>
+#include <memory>
 #include <optional>
+
+#include "framework/annotators/triangle_grid.h"
 
 namespace diorama {
 namespace {
@@ -19,33 +22,69 @@ bool is_imaged(const Camera& camera, const Vec3& point, const Vec2& pixel) {
   return is_inside && depth >= camera.near_m && depth <= camera.far_m;
 }
 
+/// Takes points of a leaf from the world here to the world there.
+class LeafMove {
+ public:
+  LeafMove(const Scene& scene, NodeId leaf, const FlowMeter::There& there)
+      : there_(there), here_(scene[leaf].mesh) {
+    const Affine world_from_here = scene.world_from_node(leaf);
+    here_from_world_ = world_from_here.inverse();
+    there_from_here_ = there.world_from_node * here_from_world_;
+    stands_still_ = world_from_here.matrix() == there.world_from_node.matrix();
+    bends_ = here_ != there_.mesh;
+    const bool has_same_triangles =
+        here_ && there_.mesh && here_->triangles.size() == there_.mesh->triangles.size();
+    if (bends_ && has_same_triangles) grid_.emplace(*here_);
+  }
+
+  /// Nothing: it is not known.
+  std::optional<Vec3> of(const Vec3& point) const {
+    if (!bends_) return stands_still_ ? point : Vec3(there_from_here_ * point);
+    const auto place = grid_ ? grid_->place_of(here_from_world_ * point) : std::nullopt;
+    if (!place) return std::nullopt;
+    const auto& corners = there_.mesh->triangles[place->triangle];
+    Vec3 in_node = Vec3::Zero();
+    for (std::size_t k = 0; k < 3; ++k) {
+      in_node += place->weights[k] * there_.mesh->positions[corners[k]].cast<double>();
+    }
+    return Vec3(there_.world_from_node * in_node);
+  }
+
+ private:
+  Affine here_from_world_;
+  Affine there_from_here_;  ///< In world space.
+  FlowMeter::There there_;
+  std::shared_ptr<const Mesh> here_;
+  bool stands_still_ = false;
+  bool bends_ = false;
+  std::optional<TriangleGrid> grid_;
+};
+
 }  // namespace
 
-FlowMeter::FlowMeter(const Scene& scene, const Frame& frame, const WorldThere& world_there) {
+FlowMeter::FlowMeter(const Scene& scene, const Frame& frame, const NodeThere& node_there) {
   const auto& leaves = frame.get(kLeafId);
   const auto& positions = frame.get(kPosition);
   flow_ = Image<Vec2f>(leaves.width(), leaves.height(), Vec2f::Zero());
   states_ = Image<std::uint32_t>(leaves.width(), leaves.height(), number_of(FlowState::Unknown));
-  // By leaf: from the world here to the world there; nothing for what stands still.
-  std::map<std::uint32_t, std::optional<Affine>> moves;
+  std::map<std::uint32_t, LeafMove> moves;
   for (const auto& [leaf, path] : frame.leaf_paths) {
-    const Affine here = scene.world_from_node(NodeId{leaf});
-    const Affine there = world_there(NodeId{leaf});
-    const bool stands_still = here.matrix() == there.matrix();
-    moves[leaf] = stands_still ? std::nullopt : std::optional<Affine>(there * here.inverse());
+    moves.try_emplace(leaf, scene, NodeId{leaf}, node_there(NodeId{leaf}));
   }
   const Affine camera_from_here = frame.world_from_camera.inverse();
-  const Affine camera_from_there = world_there(scene.require(frame.camera_path)).inverse();
+  const Affine camera_from_there =
+      node_there(scene.require(frame.camera_path)).world_from_node.inverse();
   std::uint32_t last_leaf = 0;
-  const std::optional<Affine>* move = nullptr;
+  const LeafMove* move = nullptr;
   for (std::size_t i = 0; i < leaves.pixels().size(); ++i) {
     const std::uint32_t leaf = leaves.pixels()[i];
     if (leaf == 0) continue;
     if (leaf != last_leaf) move = &moves.at(leaf);
     last_leaf = leaf;
     const Vec3 here = positions.pixels()[i].cast<double>();
-    const Vec3 there = *move ? Vec3(**move * here) : here;
-    const Vec3 in_camera = camera_from_there * there;
+    const std::optional<Vec3> there = move->of(here);
+    if (!there) continue;
+    const Vec3 in_camera = camera_from_there * *there;
     const auto from = project(frame.camera, camera_from_here * here);
     const auto to = project(frame.camera, in_camera);
     states_.pixels()[i] = number_of(FlowState::Outside);
@@ -53,7 +92,7 @@ FlowMeter::FlowMeter(const Scene& scene, const Frame& frame, const WorldThere& w
     flow_.pixels()[i] = (*to - *from).cast<float>();
     if (!is_imaged(frame.camera, in_camera, *to)) continue;
     states_.pixels()[i] = number_of(FlowState::Hidden);
-    points_.push_back(there);
+    points_.push_back(*there);
     pixels_.push_back(i);
   }
 }

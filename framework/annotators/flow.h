@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -15,11 +16,17 @@ namespace diorama {
 /// Where the surface points of a frame are in the picture of the same camera at another moment.
 class FlowMeter {
  public:
-  /// Where a node is in the world at that moment.
-  using WorldThere = std::function<Affine(NodeId)>;
+  /// A node at that moment.
+  struct There {
+    Affine world_from_node = Affine::Identity();
+    /// Points go with their triangles from the mesh here to this one; where it has others, nobody
+    /// knows where they are.
+    std::shared_ptr<const Mesh> mesh;
+  };
+  using NodeThere = std::function<There(NodeId)>;
 
   /// The scene is that of the frame, which has kLeafId and kPosition.
-  FlowMeter(const Scene& scene, const Frame& frame, const WorldThere& world_there);
+  FlowMeter(const Scene& scene, const Frame& frame, const NodeThere& node_there);
 
   /// What the camera may see there, if nothing hides it, where it is there.
   const std::vector<Vec3>& points() const { return points_; }

@@ -68,12 +68,6 @@ class ObjectMotion {
   std::vector<Known> known_;
 };
 
-bool are_equal(const BodyPoses& a, const BodyPoses& b) {
-  return std::ranges::equal(a, b, [](const auto& one, const auto& other) {
-    return one.first == other.first && one.second.matrix() == other.second.matrix();
-  });
-}
-
 /// Cameras whose pictures show how they move along their paths. Those that ride on a body move as
 /// it does anyway.
 class OpenShutters {
@@ -392,6 +386,7 @@ void VisitRun::record(const TimelineStep& step) {
   randomize(first.phase, first.number, first.index, at);
   const OpenShutters shutters(scene_, cameras_);
   track_ = {};
+  watch_ = PlayWatch(scene_);
   for (int frame = 0; frame < frames; ++frame) {
     const int ahead = std::min(frame + 1, step.count - 1);
     while (track_.size() <= ahead) {
@@ -429,21 +424,13 @@ void VisitRun::play(const PlannedCapture& first, const ClipFrame& at) {
       moving_until_s_ = simulated_s_;
     }
   }
-  const std::uint64_t shapes = scene_.shape_revision();
-  std::optional<BodyPoses> bodies;
+  watch_.begin_frame(scene_);
   for (std::size_t i = 0; i < job_.randomizers.size(); ++i) {
     const RandomizerEntry& entry = job_.randomizers[i];
     if (!randomizer_call(job_, entry, first.phase, planned_.index, first.number)) continue;
-    if (!bodies) bodies = body_poses(scene_);
-    const std::uint64_t poses = scene_.pose_revision();
     call_component("randomizer '" + entry.name + "'", [&] {
       components_.randomizers[i]->play(scene_, at);
-      if (scene_.shape_revision() != shapes) {
-        throw Error(ErrorKind::Plugin, "changes more than poses while a clip plays");
-      }
-      if (scene_.pose_revision() != poses && !are_equal(body_poses(scene_), *bodies)) {
-        throw Error(ErrorKind::Plugin, "moves rigid bodies while a clip plays");
-      }
+      watch_.check(scene_);
     });
   }
   track_.add(scene_);
@@ -573,7 +560,7 @@ void VisitRun::measure_flows(const std::optional<ClipFrame>& clip, std::vector<F
       return;
     }
     std::vector<FlowMeter> meters;
-    for (const Frame& each : frames) meters.emplace_back(scene_, each, world_in(other));
+    for (const Frame& each : frames) meters.emplace_back(scene_, each, nodes_in(other));
     track_.show(other, scene_);
     prepare_renderer();
     for (std::size_t i = 0; i < frames.size(); ++i) {
@@ -590,9 +577,11 @@ void VisitRun::measure_flows(const std::optional<ClipFrame>& clip, std::vector<F
   if (clip) prepare_renderer();
 }
 
-/// Where nodes are in another frame of the clip.
-FlowMeter::WorldThere VisitRun::world_in(int frame) const {
-  return [this, frame](NodeId node) { return track_.world_from_node(scene_, node, frame); };
+/// Where nodes are in another frame of the clip, and in which shape.
+FlowMeter::NodeThere VisitRun::nodes_in(int frame) const {
+  return [this, frame](NodeId node) {
+    return FlowMeter::There{track_.world_from_node(scene_, node, frame), track_.mesh(node, frame)};
+  };
 }
 
 /// How far things moved since the last frame of a clip, or the last step of the simulation.
@@ -603,7 +592,7 @@ void VisitRun::set_motion(const std::optional<ClipFrame>& clip, Frame& frame) {
   }
   Image<Vec2f> motion(frame.camera.width, frame.camera.height, Vec2f::Zero());
   if (clip->frame > 0) {
-    motion = FlowMeter(scene_, frame, world_in(clip->frame - 1)).flow();
+    motion = FlowMeter(scene_, frame, nodes_in(clip->frame - 1)).flow();
     for (Vec2f& pixel : motion.pixels()) pixel = Vec2f::Zero() - pixel;
   }
   frame.set(kMotion, std::move(motion));

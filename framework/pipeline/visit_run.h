@@ -88,7 +88,7 @@ class VisitRun {
   void record(const TimelineStep& step);
   void play(const PlannedCapture& first, const ClipFrame& at);
   void measure_flows(const std::optional<ClipFrame>& clip, std::vector<Frame>& frames);
-  FlowMeter::WorldThere world_in(int frame) const;
+  FlowMeter::NodeThere nodes_in(int frame) const;
   void set_motion(const std::optional<ClipFrame>& clip, Frame& frame);
   void take_or_pass(const PlannedCapture& planned);
   void take(const PlannedCapture& planned);
@@ -118,6 +118,7 @@ class VisitRun {
   BodyPoses before_last_step_;  ///< Empty when nothing moved by itself since it was placed.
   double last_step_s_ = 0.0;    ///< Length of that step; 0: none was taken.
   ClipTrack track_;             ///< Of the clip that is being taken.
+  PlayWatch watch_;             ///< Over those that play it.
   NodeId overview_;             ///< Null unless this visit makes an overview picture.
   SmallCameras small_cameras_;
   /// Randomizers that placed cameras at the last moment.

@@ -143,7 +143,7 @@ EmbreeScene::Trees EmbreeScene::trees() const {
   return trees;
 }
 
-/// Which of the rays leave what follows no rigid body.
+/// Which of the rays leave what is not movable.
 std::uint32_t EmbreeScene::sees(std::span<const SkyGrid::Ray> rays) const {
   static_assert(SkyGrid::kMostRays <= RayPacket8::kSize);
   RayPacket8 packet;
@@ -200,16 +200,17 @@ void EmbreeScene::attenuate_shadow_ray(const RTCFilterFunctionNArguments* args) 
   }
 }
 
-// Equal meshes in equal order keep their trees; moved ones are fitted or built again. Otherwise all
-// in world space is built, so that geometry numbers never depend on what was shown before.
+// What is as it was keeps its tree; moved instances are fitted or built again, and those that have
+// another mesh take the place of what was there before. Numbers are those of the instances,
+// whatever was shown before.
 void EmbreeScene::update_trees() {
   find_filters();
   update_shared_trees();
-  if (can_keep()) {
-    update_filters();
-  } else {
-    attach_all();
-    // What follows a body has its tree built as attach_all() left it, in its own space.
+  const std::vector<std::size_t> changed = changed_instances();
+  update_filters();
+  if (!changed.empty()) {
+    attach(changed);
+    // What is movable has its tree built as attach() left it, in its own space.
     rtcCommitScene(tree_.get());
   }
   move_to_poses();
@@ -240,7 +241,7 @@ void EmbreeScene::set_filters(RTCGeometry geometry, const Filters& filters) cons
 void EmbreeScene::update_filters() {
   for (std::size_t i = 0; i < placed_.size(); ++i) {
     const Filters& filters = filters_[instances()[i].mesh];
-    if (placed_[i].filters == filters) continue;
+    if (!placed_[i].geometry || placed_[i].filters == filters) continue;
     placed_[i].filters = filters;
     if (!placed_[i].is_shared) set_filters(placed_[i].geometry.get(), filters);
     rtcCommitGeometry(placed_[i].geometry.get());
@@ -291,29 +292,37 @@ void EmbreeScene::commit(const SharedTree& shared) const {
   check_device("build the tree of a mesh");
 }
 
-bool EmbreeScene::can_keep() const {
-  if (!tree_ || placed_.size() != instances().size()) return false;
+/// The instances that have to be attached; all of them to a new tree, if their number is another
+/// one.
+std::vector<std::size_t> EmbreeScene::changed_instances() {
+  if (!tree_ || placed_.size() != instances().size()) {
+    tree_.reset(rtcNewScene(device_.get()));
+    // Two levels: the scene over whole meshes is rebuilt cheaply, each mesh has a good tree.
+    rtcSetSceneFlags(tree_.get(), RTC_SCENE_FLAG_DYNAMIC);
+    rtcSetSceneBuildQuality(tree_.get(), RTC_BUILD_QUALITY_LOW);
+    placed_.clear();
+    placed_.resize(instances().size());
+  }
+  std::vector<std::size_t> changed;
   for (std::size_t i = 0; i < placed_.size(); ++i) {
     const MeshInstance& instance = instances()[i];
-    if (placed_[i].mesh.get() != instance.shading) return false;
-    if (placed_[i].is_movable != instance.is_movable) return false;
-    if (placed_[i].is_shared != is_shared(instance)) return false;
+    const bool is_kept = placed_[i].mesh.get() == instance.shading &&
+                         placed_[i].is_movable == instance.is_movable &&
+                         placed_[i].is_shared == is_shared(instance);
+    if (is_kept) continue;
+    if (placed_[i].geometry) rtcDetachGeometry(tree_.get(), unsigned(i));
+    placed_[i] = {};
+    changed.push_back(i);
   }
-  return true;
+  return changed;
 }
 
 // A tree that is fitted to new poses depends on the pose it was built in. What may move is built in
 // its own space, so that the result is the same whatever poses came before.
-void EmbreeScene::attach_all() {
-  tree_.reset(rtcNewScene(device_.get()));
-  // Two levels: the scene over whole meshes is rebuilt cheaply, each mesh has a good tree.
-  rtcSetSceneFlags(tree_.get(), RTC_SCENE_FLAG_DYNAMIC);
-  rtcSetSceneBuildQuality(tree_.get(), RTC_BUILD_QUALITY_LOW);
-  placed_.clear();
-  placed_.resize(instances().size());
-  host_.parallel_for(placed_.size(), [&](std::size_t i) {
-    const MeshInstance& instance = instances()[i];
-    Placed& placed = placed_[i];
+void EmbreeScene::attach(const std::vector<std::size_t>& changed) {
+  host_.parallel_for(changed.size(), [&](std::size_t k) {
+    const MeshInstance& instance = instances()[changed[k]];
+    Placed& placed = placed_[changed[k]];
     placed.mesh = scene_.meshes()[instance.mesh].shading;
     placed.is_movable = instance.is_movable;
     placed.is_shared = is_shared(instance);
@@ -326,7 +335,7 @@ void EmbreeScene::attach_all() {
     placed.positions = room_for(instance.source());
     place(instance.source(), placed.linear, placed.translation, placed.positions);
   });
-  for (std::size_t i = 0; i < placed_.size(); ++i) {
+  for (const std::size_t i : changed) {
     Placed& placed = placed_[i];
     if (placed.is_shared) {
       placed.geometry = new_instance(*placed.mesh);

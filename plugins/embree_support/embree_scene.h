@@ -237,8 +237,8 @@ class EmbreeScene {
   SharedTree make_shared_tree(std::shared_ptr<const ShadingMesh> mesh,
                               const Filters& filters) const;
   void commit(const SharedTree& shared) const;
-  bool can_keep() const;
-  void attach_all();
+  std::vector<std::size_t> changed_instances();
+  void attach(const std::vector<std::size_t>& changed);
   void move_to_poses();
   embree::GeometryHandle new_geometry(const ShadingMesh& mesh) const;
   embree::GeometryHandle new_instance(const ShadingMesh& mesh) const;

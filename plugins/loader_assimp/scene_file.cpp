@@ -9,8 +9,13 @@
 #include <assimp/LogStream.hpp>
 #include <cctype>
 #include <filesystem>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <utility>
 
 #include "loader_assimp/child_process.h"
+#include "loader_assimp/gltf_animation.h"
 #include "loader_assimp/posing.h"
 #include "loader_assimp/regular_files.h"
 
@@ -84,6 +89,36 @@ ChildLimits limits_for(const std::string& file) {
   return limits;
 }
 
+// Files that a child has read without harm, as they were then: an animated one is read again for
+// each of its times.
+class HarmlessFiles {
+ public:
+  bool contains(const std::string& file) {
+    const std::lock_guard lock(mutex_);
+    const auto known = files_.find(file);
+    return known != files_.end() && known->second == state_of(file);
+  }
+  void add(const std::string& file) {
+    const std::lock_guard lock(mutex_);
+    files_[file] = state_of(file);
+  }
+
+ private:
+  using State = std::pair<std::uintmax_t, fs::file_time_type>;
+  static std::optional<State> state_of(const std::string& file) {
+    std::error_code error;
+    const State state{fs::file_size(file, error), fs::last_write_time(file, error)};
+    return error ? std::nullopt : std::optional(state);
+  }
+  std::mutex mutex_;
+  std::map<std::string, std::optional<State>> files_;
+};
+
+HarmlessFiles& harmless_files() {
+  static HarmlessFiles files;
+  return files;
+}
+
 // Collects what assimp reports as an error and goes on after.
 class Complaints final : public Assimp::LogStream {
  public:
@@ -132,11 +167,14 @@ Error unreadable(const std::string& file, const std::string& why) {
 
 SceneFile::SceneFile(const std::string& file, Host& host, std::optional<double> seconds)
     : name_(file), format_(format_of(file)) {
-  const std::string trial = read_in_child(file, [&] {
-    Assimp::Importer importer;
-    return read(importer, file, format_);
-  });
-  if (!trial.empty()) throw unreadable(file, trial);
+  if (!harmless_files().contains(file)) {
+    const std::string trial = read_in_child(file, [&] {
+      Assimp::Importer importer;
+      return read(importer, file, format_);
+    });
+    if (!trial.empty()) throw unreadable(file, trial);
+    harmless_files().add(file);
+  }
   std::vector<std::string> complaints;
   {
     const AssimpLog log(complaints);
@@ -144,7 +182,17 @@ SceneFile::SceneFile(const std::string& file, Host& host, std::optional<double> 
     if (!why.empty()) throw unreadable(file, why);
   }
   // The importer's scene is nobody else's.
-  if (seconds) pose_at(const_cast<aiScene&>(*importer_.GetScene()), *seconds);
+  if (seconds) {
+    auto& scene = const_cast<aiScene&>(*importer_.GetScene());
+    pose_at(scene, *seconds);
+    const std::string why =
+        format_ == Format::Gltf ? pose_gltf_at(scene, file, *seconds) : std::string();
+    if (!why.empty()) {
+      host.log(LogLevel::Warning,
+               file + ": its animation runs straight from key to key, as what it says of " +
+                   "steps and splines cannot be read: " + why);
+    }
+  }
   for (const std::string& line : complaints) {
     host.log(LogLevel::Warning, file + ": assimp: " + line);
   }

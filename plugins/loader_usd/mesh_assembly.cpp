@@ -88,8 +88,10 @@ class MeshAssembly {
   std::size_t point_of(std::size_t corner) const {
     return static_cast<std::size_t>(indices_[corner]);
   }
-  Vec3 position(std::size_t corner) const {
-    const float* p = points_.data() + point_of(corner) * 3;
+  Vec3 position(std::size_t corner) const { return point_in(points_, corner); }
+  Vec3 position_at_rest(std::size_t corner) const { return point_in(points_at_rest_, corner); }
+  Vec3 point_in(std::span<const float> points, std::size_t corner) const {
+    const float* p = points.data() + point_of(corner) * 3;
     return Vec3(p[0], p[1], p[2]);
   }
   void add_seam(const std::optional<CornerData>& data, bool has_three);
@@ -116,6 +118,7 @@ class MeshAssembly {
   MeshSources sources_;
   const std::function<void()>& rest_;
   std::span<const float> points_;
+  std::span<const float> points_at_rest_;
   std::span<const std::int32_t> counts_;
   std::span<const std::int32_t> indices_;
   bool are_points_finite_;
@@ -142,6 +145,9 @@ MeshAssembly::MeshAssembly(MeshSources sources, const std::function<void()>& res
     : sources_(std::move(sources)),
       rest_(rest),
       points_(sources_.points.span),
+      points_at_rest_(sources_.points_at_rest.size() == points_.size()
+                          ? std::span<const float>(sources_.points_at_rest)
+                          : points_),
       counts_(sources_.counts.span),
       indices_(sources_.indices.span),
       are_points_finite_(all_finite(points_)),
@@ -228,10 +234,13 @@ void MeshAssembly::add_normal(const Vec3& normal, std::span<const std::uint32_t>
 // The diagonal from the first to the third corner splits four corners into two triangles that face
 // the same way, as it does in convex quads and so in nearly all, or the quad is any polygon.
 void MeshAssembly::add_quad(std::size_t face, std::size_t corner) {
-  const Vec3 origin = position(corner);
-  const Vec3 diagonal = position(corner + 2) - origin;
-  const Vec3 first = (position(corner + 1) - origin).cross(diagonal);
-  const Vec3 second = diagonal.cross(position(corner + 3) - origin);
+  const auto halves = [&](const auto& place) {
+    const Vec3 origin = place(corner);
+    const Vec3 diagonal = place(corner + 2) - origin;
+    return std::pair(Vec3((place(corner + 1) - origin).cross(diagonal)),
+                     Vec3(diagonal.cross(place(corner + 3) - origin)));
+  };
+  const auto [first, second] = halves([&](std::size_t at) { return position_at_rest(at); });
   const double both = first.dot(second);
   if (!(first.squaredNorm() + both > 0.0 && second.squaredNorm() + both > 0.0)) {
     return add_polygon(face, corner, 4);
@@ -243,7 +252,8 @@ void MeshAssembly::add_quad(std::size_t face, std::size_t corner) {
   add_triangle(face, a, b, c);
   add_triangle(face, a, c, d);
   if (!makes_normals_) return;
-  add_normal(first + second, std::array{a, b, c, d});
+  const auto [one, other] = halves([&](std::size_t at) { return position(at); });
+  add_normal(one + other, std::array{a, b, c, d});
 }
 
 void MeshAssembly::add_polygon(std::size_t face, std::size_t corner, std::size_t count) {
@@ -251,7 +261,7 @@ void MeshAssembly::add_polygon(std::size_t face, std::size_t corner, std::size_t
   ring_points_.clear();
   for (std::size_t i = corner; i < corner + count; ++i) {
     ring_.push_back(vertex(face, i));
-    ring_points_.push_back(position(i).cast<float>());
+    ring_points_.push_back(position_at_rest(i).cast<float>());
   }
   split_.clear();
   triangulate(ring_points_, split_);

@@ -16,6 +16,9 @@ namespace diorama::loader_usd {
 /// What a Mesh prim says of itself. Nothing of it is trusted.
 struct MeshSources {
   usd::Numbers<float> points;
+  /// Where the points are at rest, if that is elsewhere: faces are split as they are there, so that
+  /// a mesh has the same triangles in all its poses.
+  std::vector<float> points_at_rest;
   usd::Numbers<std::int32_t> counts;   ///< Corners of each face.
   usd::Numbers<std::int32_t> indices;  ///< The point of each corner.
   std::optional<usd::Numbers<std::int32_t>> holes;

@@ -50,28 +50,82 @@ std::optional<std::vector<int>> parents_of(const usd::Strings& joints) {
   return parents;
 }
 
-Affine linear_blend(const std::vector<Affine>& moves, const std::int32_t* joints,
-                    const float* weights, std::size_t count, const std::vector<int>& places,
-                    bool& is_sound) {
-  Affine::MatrixType sum = Affine::MatrixType::Zero();
-  double total = 0.0;
-  for (std::size_t k = 0; k < count; ++k) {
-    const double weight = weights[k];
-    if (weight == 0.0) continue;
-    const auto joint = static_cast<std::size_t>(joints[k]);
-    const bool exists = joints[k] >= 0 && joint < places.size() && places[joint] >= 0;
-    if (!exists || !(weight > 0.0) || !std::isfinite(weight)) {
-      is_sound = false;
-      continue;
+/// How the joints of a skeleton move what is bound to them.
+class JointMoves {
+ public:
+  JointMoves(const std::vector<Affine>& moves, bool is_dual) : moves_(moves) {
+    if (!is_dual) return;
+    for (const Affine& move : moves) {
+      Mat3 turn, stretch;
+      move.computeRotationScaling(&turn, &stretch);
+      turns_.push_back(Quat(turn));
+      stretches_.push_back(stretch);
     }
-    sum += weight * moves[static_cast<std::size_t>(places[joint])].matrix();
-    total += weight;
   }
-  if (!(total > 0.0)) return Affine::Identity();
-  Affine result;
-  result.matrix() = sum / total;
-  return result;
-}
+
+  /// Of a point that weighs so much on these joints, whose places among the moves are `places`.
+  /// Without any weight it stays.
+  Affine blend(const std::int32_t* joints, const float* weights, std::size_t count,
+               const std::vector<int>& places, bool& is_sound) const {
+    Blend sum;
+    for (std::size_t k = 0; k < count; ++k) {
+      const double weight = weights[k];
+      if (weight == 0.0) continue;
+      const auto joint = static_cast<std::size_t>(joints[k]);
+      const bool exists = joints[k] >= 0 && joint < places.size() && places[joint] >= 0;
+      if (!exists || !(weight > 0.0) || !std::isfinite(weight)) {
+        is_sound = false;
+        continue;
+      }
+      add(static_cast<std::size_t>(places[joint]), weight, sum);
+    }
+    if (!(sum.weight > 0.0)) return Affine::Identity();
+    return turns_.empty() ? linear(sum) : dual(sum);
+  }
+
+ private:
+  struct Blend {
+    double weight = 0.0;
+    Affine::MatrixType matrix = Affine::MatrixType::Zero();  ///< Linear blending only ...
+    Eigen::Vector4d turn = Eigen::Vector4d::Zero();          ///< ... dual quaternions only.
+    Eigen::Vector4d shift = Eigen::Vector4d::Zero();         ///< Their second halves.
+    Mat3 stretch = Mat3::Zero();
+  };
+  void add(std::size_t joint, double weight, Blend& sum) const {
+    sum.weight += weight;
+    if (turns_.empty()) {
+      sum.matrix += weight * moves_[joint].matrix();
+      return;
+    }
+    const Quat& turn = turns_[joint];
+    const Vec3 place = moves_[joint].translation();
+    const Quat shift = Quat(0.0, 0.5 * place.x(), 0.5 * place.y(), 0.5 * place.z()) * turn;
+    // Both signs are the same turn; of two joints the way between them is the shorter one.
+    const double sign = sum.turn.dot(turn.coeffs()) < 0.0 ? -weight : weight;
+    sum.turn += sign * turn.coeffs();
+    sum.shift += sign * shift.coeffs();
+    sum.stretch += weight * stretches_[joint];
+  }
+  static Affine linear(const Blend& sum) {
+    Affine result;
+    result.matrix() = sum.matrix / sum.weight;
+    return result;
+  }
+  static Affine dual(const Blend& sum) {
+    const double length = sum.turn.norm();
+    if (!(length > 0.0)) return Affine::Identity();
+    const Quat turn(Eigen::Vector4d(sum.turn / length));
+    const Quat shift = Quat(Eigen::Vector4d(sum.shift / length)) * turn.conjugate();
+    Affine result = Affine::Identity();
+    result.linear() = turn.toRotationMatrix() * (sum.stretch / sum.weight);
+    result.translation() = 2.0 * shift.vec();
+    return result;
+  }
+
+  const std::vector<Affine>& moves_;
+  std::vector<Quat> turns_;      ///< Of dual quaternions; empty: blending is linear.
+  std::vector<Mat3> stretches_;  ///< What joints do before they turn.
+};
 
 void set_points(MeshSources& sources, const std::vector<Vec3>& points) {
   std::vector<float>& numbers = sources.points.converted;
@@ -124,13 +178,21 @@ const Prim* Skinning::target_of(const Prim& prim, const char* name) {
 }
 
 bool Skinning::applies_to(const Prim& prim) {
-  if (!stage_.has_property(prim, "primvars:skel:jointIndices") &&
-      !stage_.has_property(prim, "skel:blendShapes")) {
-    return false;
-  }
   const Prim* at = &prim;
   while (at && at->type_name != "SkelRoot") at = at->parent;
-  return at != nullptr;
+  if (!at) return false;
+  return stage_.has_property(prim, "skel:blendShapes") ||
+         stage_.has_property(owner_of(prim, "primvars:skel:jointIndices"),
+                             "primvars:skel:jointIndices");
+}
+
+/// The prim that says a property of a binding: it holds for all below.
+const Prim& Skinning::owner_of(const Prim& prim, const char* name) {
+  for (const Prim* at = &prim; at; at = at->parent) {
+    if (stage_.has_property(*at, name)) return *at;
+    if (at->type_name == "SkelRoot") break;
+  }
+  return prim;
 }
 
 std::vector<Affine> Skinning::matrices(const Prim& prim, const char* name) const {
@@ -239,6 +301,51 @@ const Skinning::Skeleton& Skinning::skeleton(const Prim& prim) {
   return skeletons_.emplace(&prim, read_skeleton(prim)).first->second;
 }
 
+/// The shape itself and those in between, by their weights, from nothing at 0 on.
+std::vector<Skinning::SubShape> Skinning::sub_shapes(const Prim& shape, std::size_t offsets,
+                                                     Losses& losses) const {
+  std::vector<SubShape> shapes{{0.0, ""}, {1.0, "offsets"}};
+  for (const std::string& name : stage_.property_names(shape, "inbetweens:")) {
+    // inbetweens:half:normalOffsets is about the normals of inbetweens:half.
+    if (name.find(':', std::string_view("inbetweens:").size()) != std::string::npos) continue;
+    const double weight = stage_.property_metadata(shape, name, "weight").as_number().value_or(NAN);
+    const auto found = usd::numbers<float>(stage_.value(shape, name), 3);
+    const bool is_sound = std::isfinite(weight) && weight != 0.0 && weight != 1.0 && found &&
+                          found->span.size() == offsets && shapes.size() < kMaxShapes;
+    if (is_sound) {
+      shapes.push_back({weight, name});
+    } else {
+      losses.insert(
+          "has a shape in between that has no weight of its own or other points, which "
+          "is left out");
+    }
+  }
+  std::ranges::stable_sort(shapes, {}, &SubShape::weight);
+  return shapes;
+}
+
+/// Runs straight from sub-shape to sub-shape, and on beyond the outer ones.
+std::vector<double> Skinning::offsets_at(const Prim& shape, double weight, Losses& losses) const {
+  const auto whole = usd::numbers<float>(stage_.value(shape, "offsets"), 3);
+  if (!whole) return {};
+  const std::vector<SubShape> shapes = sub_shapes(shape, whole->span.size(), losses);
+  const auto later = std::ranges::upper_bound(shapes, weight, {}, &SubShape::weight);
+  const auto after = std::clamp(later, shapes.begin() + 1, shapes.end() - 1);
+  const SubShape& high = *after;
+  const SubShape& low = *(after - 1);
+  const double length = high.weight - low.weight;
+  const double share = length > 0.0 ? (weight - low.weight) / length : 1.0;
+  std::vector<double> sum(whole->span.size(), 0.0);
+  const auto add = [&](const SubShape& sub, double part) {
+    if (sub.name.empty() || part == 0.0) return;
+    const auto numbers = usd::numbers<float>(stage_.value(shape, sub.name), 3);
+    for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += part * double(numbers->span[i]);
+  };
+  add(low, 1.0 - share);
+  add(high, share);
+  return sum;
+}
+
 void Skinning::blend_shapes(const Prim& prim, const Animation& animation, std::vector<Vec3>& points,
                             MeshSources& sources, Losses& losses) {
   const usd::Strings names = texts(stage_.value(prim, "skel:blendShapes"));
@@ -256,13 +363,10 @@ void Skinning::blend_shapes(const Prim& prim, const Animation& animation, std::v
     const auto weight = animation.weights.find(names[i]);
     const Prim* shape = stage_.find(targets[i]);
     if (weight == animation.weights.end() || weight->second == 0.0 || !shape) continue;
-    if (!stage_.property_names(*shape, "inbetweens:").empty()) {
-      losses.insert("has blend shapes with shapes in between, which are left out");
-    }
-    const auto offsets = usd::numbers<float>(stage_.value(*shape, "offsets"), 3);
-    if (!offsets) continue;
+    const std::vector<double> offsets = offsets_at(*shape, weight->second, losses);
     const auto where = usd::numbers<std::int32_t>(stage_.value(*shape, "pointIndices"), 1);
-    const std::size_t count = offsets->span.size() / 3;
+    const std::size_t count = offsets.size() / 3;
+    if (count == 0) continue;
     const bool has_places = where && !where->span.empty();
     if (has_places ? where->span.size() != count : count != points.size()) {
       losses.insert("has a blend shape of another number of points, which is left out");
@@ -270,12 +374,12 @@ void Skinning::blend_shapes(const Prim& prim, const Animation& animation, std::v
     }
     for (std::size_t k = 0; k < count; ++k) {
       const std::int64_t point = has_places ? where->span[k] : static_cast<std::int64_t>(k);
-      const Vec3 offset(offsets->span[3 * k], offsets->span[3 * k + 1], offsets->span[3 * k + 2]);
+      const Vec3 offset(offsets[3 * k], offsets[3 * k + 1], offsets[3 * k + 2]);
       if (point < 0 || point >= static_cast<std::int64_t>(points.size()) || !offset.allFinite()) {
         losses.insert("has a blend shape of points that do not exist");
         continue;
       }
-      points[static_cast<std::size_t>(point)] += weight->second * offset;
+      points[static_cast<std::size_t>(point)] += offset;
     }
     // Those that were said are of another shape; the mean ones of the faces are right.
     sources.is_smooth = sources.is_smooth || sources.normals.has_value();
@@ -285,6 +389,7 @@ void Skinning::blend_shapes(const Prim& prim, const Animation& animation, std::v
 
 void Skinning::apply(const Prim& prim, MeshSources& sources, Losses& losses) {
   const std::size_t count = sources.points.span.size() / 3;
+  sources.points_at_rest.assign(sources.points.span.begin(), sources.points.span.end());
   std::vector<Vec3> points(count);
   for (std::size_t i = 0; i < count; ++i) {
     const float* p = sources.points.span.data() + 3 * i;
@@ -309,14 +414,17 @@ void Skinning::apply(const Prim& prim, MeshSources& sources, Losses& losses) {
   }
   if (bones->skeleton_from_bound.empty()) return;
 
-  const auto joints =
-      usd::numbers<std::int32_t>(stage_.value(prim, "primvars:skel:jointIndices"), 1);
-  const auto weights = usd::numbers<float>(stage_.value(prim, "primvars:skel:jointWeights"), 1);
+  const auto bound_value = [&](const char* name) {
+    return stage_.value(owner_of(prim, name), name);
+  };
+  const char* const indices = "primvars:skel:jointIndices";
+  const auto joints = usd::numbers<std::int32_t>(bound_value(indices), 1);
+  const auto weights = usd::numbers<float>(bound_value("primvars:skel:jointWeights"), 1);
   if (!joints || !weights || joints->span.empty()) return;
-  const usd::Value said =
-      stage_.property_metadata(prim, "primvars:skel:jointIndices", "interpolation");
+  const Prim& speaker = owner_of(prim, indices);
+  const usd::Value said = stage_.property_metadata(speaker, indices, "interpolation");
   const bool is_rigid = !said.as_text() || *said.as_text() == "constant";
-  const double each = stage_.property_metadata(prim, "primvars:skel:jointIndices", "elementSize")
+  const double each = stage_.property_metadata(speaker, indices, "elementSize")
                           .as_number()
                           .value_or(is_rigid ? static_cast<double>(joints->span.size()) : 1.0);
   const auto influences = each >= 1.0 && each <= double(kMaxInfluences) ? std::size_t(each) : 0;
@@ -326,7 +434,7 @@ void Skinning::apply(const Prim& prim, MeshSources& sources, Losses& losses) {
     return;
   }
   // The mesh may have an order of its own.
-  const usd::Strings own = texts(stage_.value(prim, "skel:joints"));
+  const usd::Strings own = texts(bound_value("skel:joints"));
   std::vector<int> places;
   if (own.empty()) {
     for (std::size_t i = 0; i < bones->joints.size(); ++i) places.push_back(static_cast<int>(i));
@@ -342,7 +450,7 @@ void Skinning::apply(const Prim& prim, MeshSources& sources, Losses& losses) {
   }
   std::array<double, 16> numbers{};
   usd::Matrix geom_bind;
-  if (stage_.value(prim, "primvars:skel:geomBindTransform").read(numbers)) geom_bind.m = numbers;
+  if (bound_value("primvars:skel:geomBindTransform").read(numbers)) geom_bind.m = numbers;
   const Affine skeleton_from_mesh = to_affine(geom_bind);
   // Bent in the skeleton's space, drawn in the mesh's.
   const Affine mesh_from_skeleton = to_affine(geometry_.world_from_prim(prim)).inverse() *
@@ -351,6 +459,9 @@ void Skinning::apply(const Prim& prim, MeshSources& sources, Losses& losses) {
     losses.insert("is bound to a skeleton in a space without a size; it stays as it is bound");
     return;
   }
+  const usd::Value method = bound_value("primvars:skel:skinningMethod");
+  const bool is_dual = method.as_text() && *method.as_text() == "dualQuaternion";
+  const JointMoves joint_moves(bones->skeleton_from_bound, is_dual);
   bool is_sound = true;
   std::vector<Mat3> turns(count);
   Affine moved = Affine::Identity();
@@ -358,8 +469,8 @@ void Skinning::apply(const Prim& prim, MeshSources& sources, Losses& losses) {
     const std::size_t first = is_rigid ? 0 : influences * i;
     if (!is_rigid || i == 0) {
       moved = mesh_from_skeleton *
-              linear_blend(bones->skeleton_from_bound, joints->span.data() + first,
-                           weights->span.data() + first, influences, places, is_sound) *
+              joint_moves.blend(joints->span.data() + first, weights->span.data() + first,
+                                influences, places, is_sound) *
               skeleton_from_mesh;
     }
     points[i] = moved * points[i];

@@ -15,8 +15,8 @@
 namespace diorama::loader_usd {
 
 /// Bends meshes as their skeletons (UsdSkel) stand at the stage's time: blend shapes first, then
-/// linear blend skinning. What an animation does not say a joint does at rest. Nothing of a file
-/// is trusted.
+/// linear or dual quaternion skinning. What an animation does not say a joint does at rest. Nothing
+/// of a file is trusted.
 class Skinning {
  public:
   Skinning(usd::Stage& stage, usd::Geometry& geometry) : stage_(stage), geometry_(geometry) {}
@@ -49,6 +49,15 @@ class Skinning {
   const Animation* animation_of(const usd::Prim& skeleton);
   void blend_shapes(const usd::Prim& prim, const Animation& animation, std::vector<Vec3>& points,
                     MeshSources& sources, Losses& losses);
+  /// A blend shape at one of its weights: nothing at 0, its offsets at 1, others in between.
+  struct SubShape {
+    double weight = 0.0;
+    std::string name;  ///< Of the property; empty: nothing.
+  };
+  std::vector<SubShape> sub_shapes(const usd::Prim& shape, std::size_t offsets,
+                                   Losses& losses) const;
+  std::vector<double> offsets_at(const usd::Prim& shape, double weight, Losses& losses) const;
+  const usd::Prim& owner_of(const usd::Prim& prim, const char* name);
   std::vector<Affine> matrices(const usd::Prim& prim, const char* name) const;
 
   usd::Stage& stage_;

@@ -5,6 +5,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <memory>
 #include <set>
 
 #include "diorama/error.h"
@@ -13,6 +14,28 @@
 #include "sampling.h"
 
 namespace diorama {
+namespace {
+
+constexpr const char* kAtEnd[] = {"repeat", "ping_pong", "hold"};
+
+/// The asset as it is at a time.
+std::string name_at(const Animation& animation, double time_s) {
+  std::array<char, 512> digits{};  // enough for every number
+  const auto end =
+      std::to_chars(digits.data(), digits.data() + digits.size(), time_s, std::chars_format::fixed)
+          .ptr;
+  return animation.asset + "{time=" + std::string(digits.data(), end) + "}";
+}
+
+/// What another time makes anew without a change: renderers would take it for another mesh.
+bool is_same(const std::shared_ptr<const Mesh>& a, const std::shared_ptr<const Mesh>& b) {
+  if (a == b || !a || !b) return a == b;
+  return a->positions == b->positions && a->triangles == b->triangles && a->normals == b->normals &&
+         a->uvs == b->uvs && a->colors == b->colors && a->material_slots == b->material_slots &&
+         a->is_double_sided == b->is_double_sided;
+}
+
+}  // namespace
 
 void AnimationTime::Params::visit(ParamVisitor& v) {
   v.param("nodes", nodes,
@@ -22,26 +45,43 @@ void AnimationTime::Params::visit(ParamVisitor& v) {
   v.param("time_s", time_s,
           {"Time instead, as the asset counts it, kept within the animation.", "s", -1e6, 1e6});
   v.param("frames_per_second", frames_per_second,
-          {"Times are rounded to frames of this length; each is loaded once.", "1/s", 0.001, 1000});
+          {"Times drawn are rounded to frames of this length; each is loaded once.", "1/s", 0.001,
+           1000});
+  v.param("speed", speed,
+          {"In a clip: seconds of the animation per second, from the time drawn on; below 0 "
+           "backwards, 0 stands still.",
+           "", -1000, 1000});
+  v.choice(
+      "at_end", at_end, kAtEnd,
+      {"In a clip, where the animation ends: begins again, goes back, or keeps its last pose."});
 }
 
 AnimationTime::AnimationTime(Params params, Host& host) : params_(std::move(params)), host_(host) {}
 
-std::string AnimationTime::draw_name(const Animation& animation, NodeDraws& draws) const {
+double AnimationTime::draw_time(const Animation& animation, NodeDraws& draws) const {
   const double length = animation.end_s - animation.start_s;
   double time = animation.start_s + draws.number(params_.share) * length;
   if (params_.time_s) time = draws.number(*params_.time_s);
   const double frame = std::round((time - animation.start_s) * params_.frames_per_second);
-  time = std::clamp(animation.start_s + frame / params_.frames_per_second, animation.start_s,
+  return std::clamp(animation.start_s + frame / params_.frames_per_second, animation.start_s,
                     animation.end_s);
-  std::array<char, 512> digits{};  // enough for every number
-  const auto end =
-      std::to_chars(digits.data(), digits.data() + digits.size(), time, std::chars_format::fixed)
-          .ptr;
-  return animation.asset + "{time=" + std::string(digits.data(), end) + "}";
 }
 
-void AnimationTime::show(Scene& scene, NodeId node, const std::string& name) {
+/// Not rounded: what moves in steps looks as if it stumbled.
+double AnimationTime::time_at(const Animation& animation, const Playing& playing,
+                              double clip_s) const {
+  const double length = animation.end_s - animation.start_s;
+  double gone = playing.time_s - animation.start_s + playing.speed * clip_s;
+  if (clip_s > 0.0 && length > 0.0 && params_.at_end != "hold") {
+    const double period = params_.at_end == "ping_pong" ? 2.0 * length : length;
+    gone -= std::floor(gone / period) * period;
+    if (gone > length) gone = period - gone;
+  }
+  return animation.start_s + std::clamp(gone, 0.0, length);
+}
+
+void AnimationTime::show(Scene& scene, NodeId node, double time_s) {
+  const std::string name = name_at(*scene[node].animation, time_s);
   Scene look;
   const NodeId top = host_.load_asset(name, look, look.root());
   const std::string front = scene.path(node);
@@ -55,7 +95,7 @@ void AnimationTime::show(Scene& scene, NodeId node, const std::string& name) {
                                         "' as " + name + " has");
     }
     const Node& wanted = look[from];
-    if (scene[to].mesh != wanted.mesh) scene.edit(to).mesh = wanted.mesh;
+    if (!is_same(scene[to].mesh, wanted.mesh)) scene.edit(to).mesh = wanted.mesh;
     const bool is_moved = from != top && !scene[to].rigid_body && !held.contains(to) &&
                           scene[to].parent_from_node.matrix() != wanted.parent_from_node.matrix();
     if (is_moved) scene.set_pose(to, wanted.parent_from_node);
@@ -65,9 +105,19 @@ void AnimationTime::show(Scene& scene, NodeId node, const std::string& name) {
 void AnimationTime::randomize(Scene& scene, const RandomizeContext& context, const Rng& rng) {
   const std::vector<NodeId> nodes =
       match_if(scene, params_.nodes, [](const Node& node) { return node.animation.has_value(); });
+  playing_.clear();
   draw_for_each(scene, nodes, context, rng, [&](NodeId node, NodeDraws& draws) {
-    show(scene, node, draw_name(*scene[node].animation, draws));
+    const Playing& playing = playing_.emplace_back(
+        Playing{node, draw_time(*scene[node].animation, draws), draws.number(params_.speed)});
+    show(scene, node, playing.time_s);
   });
+}
+
+void AnimationTime::play(Scene& scene, const ClipFrame& frame) {
+  for (const Playing& playing : playing_) {
+    if (!scene.contains(playing.node) || playing.speed == 0.0) continue;
+    show(scene, playing.node, time_at(*scene[playing.node].animation, playing, frame.time_s()));
+  }
 }
 
 }  // namespace diorama

@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "diorama/distribution.h"
 #include "diorama/host.h"
@@ -13,7 +14,8 @@ namespace diorama {
 struct NodeDraws;
 
 /// Shows assets that move (walkers, fans, waving flags) as they are at a time that is drawn: meshes
-/// and poses of all their parts. Bodies of the simulation keep their poses.
+/// and poses of all their parts. In a clip they go on from there. Bodies of the simulation keep
+/// their poses.
 class AnimationTime final : public Randomizer {
  public:
   struct Params {
@@ -21,19 +23,30 @@ class AnimationTime final : public Randomizer {
     Distribution share = Range{0.0, 1.0};
     std::optional<Distribution> time_s;
     double frames_per_second = 24.0;
+    Distribution speed = 1.0;
+    std::string at_end = "repeat";
 
     void visit(ParamVisitor& v);
   };
 
   AnimationTime(Params params, Host& host);
   void randomize(Scene& scene, const RandomizeContext& context, const Rng& rng) override;
+  void play(Scene& scene, const ClipFrame& frame) override;
 
  private:
-  std::string draw_name(const Animation& animation, NodeDraws& draws) const;
-  void show(Scene& scene, NodeId node, const std::string& name);
+  /// An asset that was given a time at the last moment.
+  struct Playing {
+    NodeId node;
+    double time_s = 0.0;  ///< That was drawn.
+    double speed = 1.0;
+  };
+  double draw_time(const Animation& animation, NodeDraws& draws) const;
+  double time_at(const Animation& animation, const Playing& playing, double clip_s) const;
+  void show(Scene& scene, NodeId node, double time_s);
 
   Params params_;
   Host& host_;
+  std::vector<Playing> playing_;
 };
 
 }  // namespace diorama

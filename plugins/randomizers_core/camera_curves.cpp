@@ -133,6 +133,10 @@ double HandShake::sum(std::size_t axis, double time_s) const {
   return sum * std::sqrt(2.0 / double(kWaves));
 }
 
+double HandShake::reach_m() const {
+  return position_m_ * std::sqrt(3.0) * double(kWaves) * std::sqrt(2.0 / double(kWaves));
+}
+
 Affine HandShake::at(double time_s) const {
   Vec3 offset = Vec3::Zero();
   Vec3 turn = Vec3::Zero();

@@ -58,6 +58,8 @@ class HandShake {
   HandShake(double position_m, double angle_rad, double frequency_hz, Rng rng);
   /// In the space of what is held.
   Affine at(double time_s) const;
+  /// How far off its path it may carry what is held, in metres.
+  double reach_m() const;
 
  private:
   struct Wave {

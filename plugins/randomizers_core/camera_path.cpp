@@ -82,16 +82,32 @@ struct CameraPath::Follow final : Path {
   double last_s = 0.0;
 };
 
+/// Waits for what flies or rolls across the way, and steps back from what comes nearer.
 struct CameraPath::Walk final : Path {
   explicit Walk(const std::vector<Vec3>& places) : curve(places) {}
-  Affine pose(const Scene&, double time_s) override {
-    const double distance = speed * time_s;
-    const Vec3 place = curve.place(distance);
-    return looking(place, target ? *target : Vec3(place + curve.direction(distance)));
+  Affine pose(const Scene& scene, double time_s) override {
+    const double step = speed * (time_s - last_s);
+    last_s = time_s;
+    things.look(scene);
+    const double from = gone_m;
+    double farthest = -1.0;
+    for (const double wanted : {from + step, from, from - step}) {
+      const double there = std::clamp(wanted, 0.0, curve.length_m());
+      const double distance = std::min(things.distance(curve.place(there)), clearance_m);
+      if (distance <= farthest) continue;
+      farthest = distance;
+      gone_m = there;
+    }
+    const Vec3 place = curve.place(gone_m);
+    return looking(place, target ? *target : Vec3(place + curve.direction(gone_m)));
   }
   WalkCurve curve;
   double speed = 0.0;
   std::optional<Vec3> target;  ///< Nothing: it looks ahead.
+  MovingThings things;
+  double clearance_m = 0.0;  ///< Of the path itself.
+  double gone_m = 0.0;
+  double last_s = 0.0;
 };
 
 struct CameraPath::Moving {
@@ -136,7 +152,9 @@ void CameraPath::Params::visit(ParamVisitor& v) {
   v.param("speed", speed, {"Walk: speed; less where the way found is short.", "m/s", 0, 100});
   v.choice("look", look, kLooks, {"Walk: at a target, or ahead along the way."});
   v.param("clearance_m", clearance_m,
-          {"Walk: nothing visible is nearer, nor what falls as seen from above.", "m", 0, 100});
+          {"Walk: nothing visible is nearer, nor what falls as seen from above, however it shakes; "
+           "for what comes nearer it waits, or steps back.",
+           "m", 0, 100});
   v.param("max_tries", max_tries, {"Walk: draws of a place at most.", "", 1, 100000});
   v.param("jitter_m", jitter_m,
           {"Handheld: root mean square of the way off the path, per axis.", "m", 0, 10});
@@ -165,8 +183,9 @@ CameraPath::~CameraPath() = default;
 
 std::unique_ptr<CameraPath::Path> CameraPath::draw_walk(const Scene& scene, NodeId node,
                                                         const RandomizeContext& context,
-                                                        NodeDraws& draws) const {
-  const WalkSpace space(scene, params_.clearance_m + reach_of(scene, node));
+                                                        double shake_m, NodeDraws& draws) const {
+  const double clearance_m = params_.clearance_m + reach_of(scene, node) + shake_m;
+  const WalkSpace space(scene, clearance_m);
   const double seconds = context.clip ? context.clip->frame_count / context.clip->fps : 0.0;
   const double speed = draws.number(params_.speed);
   const auto draw_place = [&](Rng& rng) -> Vec3 {
@@ -183,6 +202,8 @@ std::unique_ptr<CameraPath::Path> CameraPath::draw_walk(const Scene& scene, Node
                                      " draws; it stays where it may be too near to something");
   }
   auto walk = std::make_unique<Walk>(places);
+  walk->things = MovingThings(scene);
+  walk->clearance_m = clearance_m;
   walk->speed = seconds > 0.0 ? std::min(speed, walk->curve.length_m() / seconds) : 0.0;
   if (params_.look == "targets") {
     const auto targets = target_centres(scene, params_.targets, context.working_area_world);
@@ -193,8 +214,8 @@ std::unique_ptr<CameraPath::Path> CameraPath::draw_walk(const Scene& scene, Node
 
 std::unique_ptr<CameraPath::Path> CameraPath::draw_path(const Scene& scene, NodeId node,
                                                         const RandomizeContext& context,
-                                                        NodeDraws& draws) const {
-  if (params_.kind == "walk") return draw_walk(scene, node, context, draws);
+                                                        double shake_m, NodeDraws& draws) const {
+  if (params_.kind == "walk") return draw_walk(scene, node, context, shake_m, draws);
   if (params_.kind == "keys") {
     std::vector<KeyCurve::Key> keys;
     for (const Key& key : params_.keys) {
@@ -230,7 +251,7 @@ void CameraPath::randomize(Scene& scene, const RandomizeContext& context, const 
   const auto draw = [&](NodeId node, NodeDraws& draws) {
     const HandShake shake(params_.jitter_m, radians(params_.jitter_deg), params_.jitter_hz,
                           draws.rng.fork("shake"));
-    moving_.push_back({node, draw_path(scene, node, context, draws), shake});
+    moving_.push_back({node, draw_path(scene, node, context, shake.reach_m(), draws), shake});
   };
   draw_for_each(scene, scene.match(params_.nodes), context, rng, draw);
   play(scene, context.clip.value_or(ClipFrame()));

@@ -62,9 +62,9 @@ class CameraPath final : public Randomizer {
   struct Walk;
   struct Moving;
   std::unique_ptr<Path> draw_path(const Scene& scene, NodeId node, const RandomizeContext& context,
-                                  NodeDraws& draws) const;
+                                  double shake_m, NodeDraws& draws) const;
   std::unique_ptr<Path> draw_walk(const Scene& scene, NodeId node, const RandomizeContext& context,
-                                  NodeDraws& draws) const;
+                                  double shake_m, NodeDraws& draws) const;
 
   Params params_;
   Host& host_;

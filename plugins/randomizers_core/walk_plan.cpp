@@ -58,6 +58,29 @@ bool WalkSpace::holds(const Vec3& from, const Vec3& to) const {
   }
 }
 
+MovingThings::MovingThings(const Scene& scene) {
+  for (const NodeId node : scene.subtree(scene.root())) {
+    if (scene[node].rigid_body) bodies_.push_back(node);
+  }
+}
+
+void MovingThings::look(const Scene& scene) {
+  boxes_.clear();
+  for (const NodeId body : bodies_) {
+    const Aabb box = scene.contains(body) ? scene.world_bounds(body) : Aabb();
+    if (!box.is_empty()) boxes_.push_back(box);
+  }
+}
+
+double MovingThings::distance(const Vec3& place) const {
+  double distance = kInfinity;
+  for (const Aabb& box : boxes_) {
+    const Vec3 off = (box.min - place).cwiseMax(place - box.max).cwiseMax(0.0);
+    distance = std::min(distance, off.norm());
+  }
+  return distance;
+}
+
 std::vector<Vec3> plan_walk(const WalkSpace& space, const std::function<Vec3(Rng&)>& draw_place,
                             double length_m, int max_tries, const Rng& rng) {
   std::vector<Vec3> best;

@@ -29,6 +29,20 @@ class WalkSpace {
   double clearance_m_;
 };
 
+/// Distance of a place to the boxes of rigid bodies where they are now.
+class MovingThings {
+ public:
+  MovingThings() = default;
+  explicit MovingThings(const Scene& scene);
+  /// To be called when bodies have moved.
+  void look(const Scene& scene);
+  double distance(const Vec3& place) const;
+
+ private:
+  std::vector<NodeId> bodies_;
+  std::vector<Aabb> boxes_;
+};
+
 /// Places that lead through the space, as WalkCurve goes along them, for `length_m` or as far as
 /// was found in so many draws of a place; at least one, if the space holds any that was drawn.
 std::vector<Vec3> plan_walk(const WalkSpace& space, const std::function<Vec3(Rng&)>& draw_place,

@@ -41,7 +41,7 @@ struct MeshInstance {
   const ShutterMotion* motion = nullptr;  ///< Null: it does not move while the shutter is open.
   std::uint32_t mesh = 0;                 ///< Its number in RenderScene::meshes().
   NodeId node;
-  bool is_movable = false;   ///< Follows a rigid body.
+  bool is_movable = false;   ///< Follows a rigid body, or an animation.
   bool is_mirrored = false;  ///< The pose turns front sides into back sides.
   Eigen::Matrix3f linear = Eigen::Matrix3f::Identity();  ///< Of world_from_node.
   Vec3f translation = Vec3f::Zero();

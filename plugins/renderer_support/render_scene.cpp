@@ -105,7 +105,7 @@ RenderScene::Kept RenderScene::kept() const {
 void RenderScene::collect(const Scene& scene, NodeId id, const Affine& world_from_parent,
                           bool is_movable, std::vector<Placed>& meshes) {
   const Node& node = scene[id];
-  is_movable |= node.rigid_body.has_value();
+  is_movable |= node.rigid_body.has_value() || node.animation.has_value();
   if (!node.is_visible) return;
   const Affine world_from_node = world_from_parent * node.parent_from_node;
   const double determinant = world_from_node.linear().determinant();

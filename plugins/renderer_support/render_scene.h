@@ -32,7 +32,7 @@ class RenderScene {
   /// light().
   bool take(const Scene& scene);
   /// Makes the tables of lights, if anything they depend on has changed. `sees` asks for the rays
-  /// of SkyGrid among what follows no rigid body.
+  /// of SkyGrid among what is not movable.
   void light(const Scene& scene, const SkyGrid::Sees& sees);
 
   /// Those of the scene that was taken in; see Scene::pose_revision.
@@ -75,7 +75,8 @@ class RenderScene {
     bool is_movable = false;
     Affine world_from_node;
   };
-  /// What decides which parts of the sky can be seen: all that does not follow a rigid body.
+  /// What decides which parts of the sky can be seen: all that follows neither a rigid body nor an
+  /// animation.
   struct Surroundings {
     struct Pose {
       Eigen::Matrix3f linear;

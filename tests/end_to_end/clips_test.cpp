@@ -385,6 +385,130 @@ output: {folder: out}
   }
 }
 
+/// A sheet that grows by half of its first size per second, and bends as it does.
+std::string growing_sheet() {
+  std::string first, last, counts, indices;
+  const auto put = [](std::string& list, const std::string& text) {
+    list += (list.empty() ? "" : ", ") + text;
+  };
+  constexpr int kQuads = 8;
+  for (int y = 0; y <= kQuads; ++y) {
+    for (int x = 0; x <= kQuads; ++x) {
+      const double u = double(x) / kQuads - 0.5, v = double(y) / kQuads - 0.5;
+      const auto point = [&](double scale) {
+        return "(" + std::to_string(scale * u) + ", " + std::to_string(scale * 0.2 * u * v) + ", " +
+               std::to_string(scale * v) + ")";
+      };
+      put(first, point(1.0));
+      put(last, point(1.5));
+    }
+  }
+  for (int y = 0; y < kQuads; ++y) {
+    for (int x = 0; x < kQuads; ++x) {
+      const int a = y * (kQuads + 1) + x;
+      put(counts, "4");
+      put(indices, std::to_string(a) + ", " + std::to_string(a + 1) + ", " +
+                       std::to_string(a + kQuads + 2) + ", " + std::to_string(a + kQuads + 1));
+    }
+  }
+  return R"(#usda 1.0
+(
+    metersPerUnit = 1
+    upAxis = "Z"
+    timeCodesPerSecond = 24
+    startTimeCode = 0
+    endTimeCode = 24
+)
+def Mesh "Sheet"
+{
+    uniform token subdivisionScheme = "none"
+    int[] faceVertexCounts = [)" +
+         counts + "]\n    int[] faceVertexIndices = [" + indices +
+         "]\n    point3f[] points.timeSamples = { 0: [" + first + "], 24: [" + last + "] }\n}\n";
+}
+
+std::string growing_job(const std::string& renderer) {
+  return R"(
+seed: 4
+total_captures: 6
+environments: [{type: shapes, shapes: [cube]}]
+objects:
+  - {type: files, files: [sheet.usda], name: sheet, under: /Assets, label: sheet, collider: none,
+     gravity_disabled_chance: 1.0}
+lights: [{type: dome, name: sky, intensity: 100}]
+cameras:
+  - {type: pinhole, name: cam, width: 96, height: 72, position: [0.3, -4, 2.5], look_at: [0, 0, 2]}
+randomizers:
+  - {type: scatter_poses, name: place, on: [environment], nodes: "/Assets/*", offset: [0, 0, 2],
+     rotation: none, avoid_overlap: false}
+  - {type: animation_time, name: grow, on: [clip], nodes: "/Assets/**", time_s: 0.25}
+settle: {policy: keep}
+physics: {type: none}
+renderer: )" +
+         renderer + R"(
+timeline: [{record: {fps: 12, seconds: 0.5}}]
+writers:
+  - {type: BasicWriter, name: basic, rgb: true, instance_segmentation: true, colorize_instance_segmentation: false,
+     bounding_box_3d: true, camera_params: true, distance_to_camera: true, motion_vectors: true, velocities: true,
+     channels: [flow_forward, flow_forward_state, flow_backward, flow_backward_state]}
+output: {folder: out}
+)";
+}
+
+TEST_CASE("An animation plays in a clip, and flow goes with what bends", "[run]") {
+  const TemporaryFolder folder;
+  write_file(folder / "sheet.usda", growing_sheet());
+  write_file(folder / "job.yaml", growing_job("{type: \"null\"}"));
+  const Outcome outcome = run({"run", "job.yaml"}, folder.path());
+  INFO(outcome.errors);
+  REQUIRE(outcome.exit_code == 0);
+  const auto files = tree(folder / "out");
+  const Vec3 place(0.0, 0.0, 2.0);
+  const auto scale = [](int frame) { return 1.0 + 0.5 * (0.25 + frame / 12.0); };
+  int seen = 0;
+  double worst = 0.0;
+  for (int i = 0; i < 6; ++i) {
+    const StoredView view(files, "cam_0", i);
+    for (const int other : {i - 1, i + 1}) {
+      if (other < 0 || other > 5) continue;
+      const NpyArray& flow = other > i ? view.forward : view.backward;
+      const NpyArray& state = other > i ? view.forward_state : view.backward_state;
+      for (int y = 0; y < kHeight; ++y) {
+        for (int x = 0; x < kWidth; ++x) {
+          if (!view.path_at(x, y).starts_with("/Assets")) continue;
+          const Vec3 there = place + scale(other) / scale(i) * (view.point_at(x, y) - place);
+          const Vec2 expected = *view.lens.lens.pixel(Vec3(view.lens.camera_from_world * there));
+          worst =
+              std::max(worst, (Vec2(x + 0.5, y + 0.5) + view.flow(flow, x, y) - expected).norm());
+          seen += StoredView::state(state, x, y) == 0 ? 1 : 0;
+        }
+      }
+    }
+  }
+  CHECK(seen > 3000);
+  CHECK(worst < 0.01);
+}
+
+TEST_CASE("Clips of what bends are the same bytes after kills, and whatever was shown before",
+          "[run]") {
+  const std::string job = growing_job("{type: embree, samples: 2, max_bounces: 2}");
+  const auto prepare = [&](const fs::path& place) {
+    write_file(place / "job.yaml", job);
+    write_file(place / "sheet.usda", growing_sheet());
+  };
+  const TemporaryFolder folder;
+  prepare(folder / "whole");
+  const Outcome outcome = run({"run", "job.yaml"}, folder / "whole");
+  INFO(outcome.errors);
+  REQUIRE(outcome.exit_code == 0);
+  const auto expected = tree(folder / "whole/out");
+  prepare(folder.path());
+  const std::vector<std::string> arguments{"run", "job.yaml", "--resume"};
+  REQUIRE(run_and_kill(arguments, folder.path(), folder / "out", {2, 4}));
+  CHECK(run(arguments, folder.path()).exit_code == 0);
+  CHECK(difference(expected, tree(folder / "out")) == "");
+}
+
 TEST_CASE("Formats with tracks call one object the same in every frame, and are read back",
           "[run]") {
   const TemporaryFolder folder;

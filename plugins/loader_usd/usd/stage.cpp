@@ -33,7 +33,42 @@ void collect_opinions(Prim& prim) {
   }
 }
 
+// Whether arcs of a node lead to another one.
+bool is_below(const Prim& prim, const IndexNode& node, const IndexNode& above) {
+  const IndexNode* at = &node;
+  while (at->parent != IndexNode::kNone) {
+    at = &prim.index.nodes[static_cast<std::size_t>(at->parent)];
+    if (at == &above) return true;
+  }
+  return false;
+}
+
 }  // namespace
+
+/// What value clips say of an attribute. They are weaker than the layers that they stand beside,
+/// and stronger than what is referenced from there.
+struct Stage::Clipped {
+  FoundValue found;
+  const IndexNode* anchor = nullptr;
+  bool has_passed = false;  ///< The layers beside it.
+
+  bool are_stronger_than(const Prim& prim, const IndexNode& node) {
+    if (!found || !anchor) return false;
+    if (&node == anchor) {
+      has_passed = true;
+      return false;
+    }
+    return has_passed || is_below(prim, node, *anchor);
+  }
+};
+
+Stage::Clipped Stage::clipped_value(const Prim& prim, std::string_view name) const {
+  Clipped clips;
+  if (!prim.has_clips) return clips;
+  has_samples_ = true;
+  clips.found = clips_->find(prim, name, &clips.anchor);
+  return clips;
+}
 
 Stage::Stage(const std::string& file, Sampling sampling, std::uint64_t most_composed_bytes,
              AssetLibrary::LookUp look_up, std::map<std::string, std::string> selections,
@@ -360,8 +395,10 @@ std::vector<std::int64_t> Stage::metadata_integers(const Prim& prim, std::string
 FoundValue Stage::timed_value(const Prim& prim, std::string_view name) const {
   FoundValue result;
   bool is_found = false;
+  Clipped clips = clipped_value(prim, name);
   for_each_spec(prim, [&](const IndexNode& node, const LayerStack::Entry& entry,
                           const PrimSpec& spec) {
+    if (clips.are_stronger_than(prim, node)) return false;
     const PropertySpec* property = spec.property(name);
     if (!property) return true;
     result.layer = entry.layer.get();
@@ -384,18 +421,17 @@ FoundValue Stage::timed_value(const Prim& prim, std::string_view name) const {
     is_found = bool(result);
     return !is_found;
   });
-  if (!is_found && prim.has_clips) {
-    has_samples_ = true;
-    return clips_->find(prim, name);
-  }
+  if (!is_found && prim.has_clips) return clips.found;
   return !is_found || result.value.is_block() ? FoundValue() : result;
 }
 
 // The same without reading any number.
 const PropertySpec* Stage::timed_spec(const Prim& prim, std::string_view name) const {
   const PropertySpec* result = nullptr;
+  Clipped clips = clipped_value(prim, name);
   for_each_spec(prim, [&](const IndexNode& node, const LayerStack::Entry& entry,
                           const PrimSpec& spec) {
+    if (clips.are_stronger_than(prim, node)) return false;
     const PropertySpec* property = spec.property(name);
     if (!property) return true;
     if (entry.layer->has(property->fields, "timeSamples")) {
@@ -409,12 +445,13 @@ const PropertySpec* Stage::timed_spec(const Prim& prim, std::string_view name) c
     if (entry.layer->has(property->fields, "default")) result = property;
     return !result;
   });
-  if (!result && prim.has_clips) return clips_->find(prim, name).spec;
-  return result;
+  return result ? result : clips.found.spec;
 }
 
 FoundValue Stage::find_value(const Prim& prim, std::string_view name) const {
   if (time_) return timed_value(prim, name);
+  // Whatever it is at the default time, clips move it at others.
+  has_samples_ = has_samples_ || prim.has_clips;
   FoundValue first_default;
   FoundValue first_sample;
   for_each_spec(
@@ -441,7 +478,6 @@ FoundValue Stage::find_value(const Prim& prim, std::string_view name) const {
   const bool has_default = first_default && !first_default.value.is_block();
   FoundValue result = has_default ? first_default : first_sample;
   if (!result && prim.has_clips && sampling_ == Sampling::OrFirstSample) {
-    has_samples_ = true;
     result = clips_->find(prim, name);
   }
   return result.value.is_block() ? FoundValue() : result;

@@ -151,6 +151,8 @@ class Stage {
   Strings compose_paths(const Prim& prim, std::string_view name, std::string_view field,
                         std::string* lost) const;
 
+  struct Clipped;
+  Clipped clipped_value(const Prim& prim, std::string_view name) const;
   FoundValue timed_value(const Prim& prim, std::string_view name) const;
   const PropertySpec* timed_spec(const Prim& prim, std::string_view name) const;
   double codes_per_second() const;

@@ -296,6 +296,10 @@ Value blend(const Value& a, const Value& b, double share) {
 
 }  // namespace
 
+Value blended(const Value& a, const Value& b, double share) {
+  return is_blended(a, b) ? blend(a, b, share) : a;
+}
+
 Value value_at(const TimeSamples& samples, double time) {
   const auto& times = samples.times;
   const auto later = std::upper_bound(times.begin(), times.end(), time);
@@ -305,8 +309,8 @@ Value value_at(const TimeSamples& samples, double time) {
   if (later == times.end() || times[before] == time) return earlier;
   const Value next = samples.value(before + 1);
   const double length = times[before + 1] - times[before];
-  if (!(length > 0.0) || !is_blended(earlier, next)) return earlier;
-  return blend(earlier, next, (time - times[before]) / length);
+  if (!(length > 0.0)) return earlier;
+  return blended(earlier, next, (time - times[before]) / length);
 }
 
 template <class T>

@@ -91,6 +91,8 @@ struct TimeSamples {
 /// where both are of one kind and size; else the earlier one holds. Before the first and after the
 /// last sample these hold.
 Value value_at(const TimeSamples& samples, double time);
+/// On the way between two values, as between two samples; the first one where there is no way.
+Value blended(const Value& a, const Value& b, double share);
 
 /// A run of numbers in memory that the value keeps alive: a part of the mapped file where that is
 /// possible, a buffer otherwise.

@@ -89,14 +89,6 @@ std::optional<std::string> fill_template(const std::string& pattern, double time
          pattern.substr(second_end);
 }
 
-// A sample that is not later than the time, or the first one.
-std::size_t sample_at(const TimeSamples& samples, double time) {
-  const auto later = std::upper_bound(samples.times.begin(), samples.times.end(), time);
-  return later == samples.times.begin()
-             ? 0
-             : static_cast<std::size_t>(later - samples.times.begin()) - 1;
-}
-
 }  // namespace
 
 // One clip set as it is at the time that counts.
@@ -104,13 +96,41 @@ struct ValueClips::ClipSet {
   std::string name;
   const LayerStack* stack = nullptr;
   const Layer* layer = nullptr;  ///< That names the assets.
+  std::string node_path;         ///< Of the node that they stand in, without variants.
   LayerOffset to_stage;          ///< From the times of that layer.
   std::string prim_path;
   std::string asset;  ///< As written; empty: no clip is active.
   double time = 0.0;  ///< Of the clip.
+  double stage_time = 0.0;
+  TimePairs times;  ///< From stage times to those of clips; empty: they are the same.
+  /// The clip that comes after it.
+  struct Next {
+    std::string asset;
+    double stage_time = 0.0;  ///< When it begins.
+  };
+  std::optional<Next> next;
+};
+
+/// What a clip's layer says of an attribute.
+struct ValueClips::Said {
+  std::shared_ptr<const Layer> layer;
+  const PropertySpec* property = nullptr;
+  Value samples;
 };
 
 namespace {
+
+// When the clip that is active at a stage time showed one of its own times, as far back as the
+// mapping runs straight.
+double stage_time_of(const TimePairs& times, double stage_time, double clip_time) {
+  if (times.empty()) return clip_time;
+  const auto before = pair_at(times, stage_time);
+  const auto after = before + 1;
+  if (after == times.end() || after->second == before->second) return before->first;
+  const double share = (clip_time - before->second) / (after->second - before->second);
+  return std::clamp(before->first + share * (after->first - before->first), before->first,
+                    std::max(before->first, stage_time));
+}
 
 // The time that counts, or when the stage starts, in the time of a layer.
 std::optional<double> start_time(const Layer& root, const LayerOffset& to_stage,
@@ -135,12 +155,22 @@ void ValueClips::read_explicit(ClipSet& set, const Dictionary& fields) {
   double time = 0.0;
   if (!active.empty()) time = active.front().first;
   time = start_time(root_, set.to_stage, time_).value_or(time);
-  const double number = active.empty() ? 0.0 : pair_at(active, time)->second;
   const Strings& names = *assets->as_strings();
-  if (number >= 0.0 && number < static_cast<double>(names.size())) {
-    set.asset = names[static_cast<std::size_t>(number)];
+  const auto name_of = [&](double number) {
+    const bool exists = number >= 0.0 && number < static_cast<double>(names.size());
+    return exists ? names[static_cast<std::size_t>(number)] : std::string();
+  };
+  set.asset = name_of(0.0);
+  if (!active.empty()) {
+    const auto now = pair_at(active, time);
+    set.asset = name_of(now->second);
+    if (now + 1 != active.end() && (now + 1)->first > time) {
+      set.next = {name_of((now + 1)->second), (now + 1)->first};
+    }
   }
   set.time = clip_time(times, time);
+  set.stage_time = time;
+  set.times = times;
 }
 
 // Of a template the files that are there count.
@@ -165,10 +195,16 @@ bool ValueClips::read_template(ClipSet& set, const Dictionary& fields) {
   for (double number = wanted; number >= 0.0 && set.asset.empty(); --number) {
     set.asset = asset_at(number);
   }
-  for (double number = wanted + 1.0; number <= most && set.asset.empty(); ++number) {
-    set.asset = asset_at(number);
+  for (double number = wanted + 1.0; number <= most; ++number) {
+    const std::string later = asset_at(number);
+    if (later.empty()) continue;
+    if (!set.asset.empty()) {
+      set.next = {later, first + number * stride + offset};
+      break;
+    }
+    set.asset = later;
   }
-  set.time = time;
+  set.time = set.stage_time = time;
   return !set.asset.empty();
 }
 
@@ -204,6 +240,7 @@ std::vector<ValueClips::ClipSet> ValueClips::read_sets(const Prim& prim) {
     set.name = name;
     set.stack = origin->second->node->stack;
     set.layer = origin->second->entry->layer.get();
+    set.node_path = path::strip_variants(origin->second->node->path);
     set.to_stage =
         origin->second->node->map_to_root->offset().compose(origin->second->entry->offset);
     set.prim_path = *path->as_text();
@@ -227,8 +264,9 @@ const std::vector<ValueClips::ClipSet>& ValueClips::sets_of(const Prim& prim) {
   return sets_.emplace(&prim, read_sets(prim)).first->second;
 }
 
-std::shared_ptr<const Layer> ValueClips::open(const std::string& identifier, const ClipSet& set) {
-  const std::string where = set.layer->identifier() + ": value clip @" + set.asset + "@";
+std::shared_ptr<const Layer> ValueClips::open(const std::string& asset, const ClipSet& set) {
+  const std::string identifier = stacks_.anchor(asset, *set.layer, set.stack->expression_variables);
+  const std::string where = set.layer->identifier() + ": value clip @" + asset + "@";
   try {
     if (assets_.exists(identifier)) return assets_.open(identifier);
     diagnostics_.missing(identifier, where + " " + assets_.missing_text(identifier));
@@ -238,22 +276,46 @@ std::shared_ptr<const Layer> ValueClips::open(const std::string& identifier, con
   return nullptr;
 }
 
-FoundValue ValueClips::find(const Prim& prim, std::string_view attribute) {
+ValueClips::Said ValueClips::said_in(const std::string& asset, const ClipSet& set,
+                                     const std::string& path, std::string_view attribute) {
+  Said said;
+  said.layer = asset.empty() ? nullptr : open(asset, set);
+  const PrimSpec* spec = said.layer ? said.layer->prim(path) : nullptr;
+  said.property = spec ? spec->property(attribute) : nullptr;
+  if (said.property) said.samples = said.layer->get(said.property->fields, "timeSamples");
+  const TimeSamples* samples = said.samples.as_time_samples();
+  if (!samples || samples->times.empty()) said.property = nullptr;
+  return said;
+}
+
+FoundValue ValueClips::find(const Prim& prim, std::string_view attribute,
+                            const IndexNode** anchor) {
   for (const Prim* at = &prim; at && at->has_clips; at = at->parent) {
     for (const ClipSet& set : sets_of(*at)) {
-      const auto layer =
-          open(stacks_.anchor(set.asset, *set.layer, set.stack->expression_variables), set);
-      if (!layer) continue;
-      const PrimSpec* spec = layer->prim(path::replace_prefix(prim.path, at->path, set.prim_path));
-      const PropertySpec* property = spec ? spec->property(attribute) : nullptr;
-      if (!property) continue;
-      const Value value = layer->get(property->fields, "timeSamples");
-      const TimeSamples* samples = value.as_time_samples();
-      if (!samples || samples->times.empty()) continue;
-      const std::size_t sample = sample_at(*samples, set.time);
-      auto& known = samples_[{property, sample}];
-      if (!known) known = std::make_unique<PropertySpec>(*property);
-      return {samples->value(sample), layer.get(), set.stack, known.get()};
+      const std::string path = path::replace_prefix(prim.path, at->path, set.prim_path);
+      const Said said = said_in(set.asset, set, path, attribute);
+      if (!said.property) continue;
+      const TimeSamples& samples = *said.samples.as_time_samples();
+      Value value = value_at(samples, set.time);
+      if (set.next && set.time > samples.times.back()) {
+        const double from = stage_time_of(set.times, set.stage_time, samples.times.back());
+        const Said next = said_in(set.next->asset, set, path, attribute);
+        if (next.property && from < set.next->stage_time) {
+          const double begin = clip_time(set.times, set.next->stage_time);
+          value = blended(value, value_at(*next.samples.as_time_samples(), begin),
+                          (set.stage_time - from) / (set.next->stage_time - from));
+        }
+      }
+      if (anchor) {
+        const std::string site = set.node_path + prim.path.substr(at->path.size());
+        for (const IndexNode& node : prim.index.nodes) {
+          if (*anchor || node.stack != set.stack) continue;
+          if (path::strip_variants(node.path) == site) *anchor = &node;
+        }
+      }
+      auto& known = timed_[{said.property, set.time}];
+      if (!known) known = std::make_unique<PropertySpec>(*said.property);
+      return {std::move(value), said.layer.get(), set.stack, known.get()};
     }
   }
   return {};

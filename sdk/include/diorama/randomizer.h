@@ -34,9 +34,9 @@ class DIORAMA_SDK_API Randomizer : public Component {
   /// it per node path, so that one more node leaves the draws of the others as they were.
   virtual void randomize(Scene& scene, const RandomizeContext& context, const Rng& rng) = 0;
 
-  /// Of randomizers that acted when a clip began: sets poses for one of its frames. Called for all
-  /// of them in order, the first one too, once physics has moved its bodies. Only poses may change
-  /// (Scene::set_pose), none of rigid bodies. Nothing moves unless a randomizer does more.
+  /// Of randomizers that acted when a clip began: shows one of its frames. Called for all of these
+  /// in order, the first one too, once physics has moved its bodies. Poses may change, but none of
+  /// rigid bodies, and which mesh a node has. Nothing moves unless a randomizer does more.
   virtual void play(Scene& scene, const ClipFrame& frame);
 };
 

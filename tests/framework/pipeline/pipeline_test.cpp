@@ -14,7 +14,9 @@
 #include <vector>
 
 #include "diorama/error.h"
+#include "diorama/geometry.h"
 #include "framework/output/memory_file_system.h"
+#include "framework/pipeline/clip_track.h"
 #include "framework/plugins/registry.h"
 #include "jobs.h"
 #include "support/catch.h"
@@ -628,5 +630,46 @@ TEST_CASE("Who plays a clip may move neither bodies nor shapes", "[pipeline]") {
     if (frame.frame == 1) scene.create(scene.root(), "more");
   };
   Run with_more(script, 1, 1, kClipJob);
-  CHECK_THROWS_WITH(with_more.go(), ContainsSubstring("changes more than poses"));
+  CHECK_THROWS_WITH(with_more.go(), ContainsSubstring("changes more than poses and meshes"));
+  script.has_bodies = false;
+  script.play = [](Scene& scene, const ClipFrame& frame) {
+    if (frame.frame == 1) scene.edit(scene.require("/Environment")).labels["mood"] = "gloomy";
+  };
+  Run with_label(script, 1, 1, kClipJob);
+  CHECK_THROWS_WITH(with_label.go(), ContainsSubstring("changes more than poses and meshes"));
+}
+
+TEST_CASE("A clip's track shows meshes as they were in each frame", "[pipeline]") {
+  Scene scene;
+  const NodeId flag = scene.create(scene.root(), "flag");
+  const NodeId pole = scene.create(scene.root(), "pole");
+  const auto box = [](double size) {
+    return std::make_shared<const Mesh>(make_box(Vec3::Constant(size)));
+  };
+  const std::vector<std::shared_ptr<const Mesh>> frames{box(1), box(2), box(3), box(4)};
+  scene.edit(pole).mesh = box(9);
+  const auto stands = scene[pole].mesh;
+  ClipTrack track;
+  PlayWatch watch(scene);
+  for (const auto& mesh : frames) {
+    watch.begin_frame(scene);
+    scene.edit(flag).mesh = mesh;
+    if (track.size() == 0) {
+      // It had none before.
+      CHECK_THROWS_WITH(watch.check(scene), ContainsSubstring("more than poses and meshes"));
+      watch = PlayWatch(scene);
+    }
+    CHECK_NOTHROW(watch.check(scene));
+    track.add(scene);
+  }
+  for (const int frame : {1, 3, 2}) {
+    track.show(frame, scene);
+    CHECK(scene[flag].mesh == frames[std::size_t(frame)]);
+    CHECK(track.mesh(flag, frame) == frames[std::size_t(frame)]);
+    CHECK(scene[pole].mesh == stands);
+  }
+  // What is shown already is not touched.
+  const std::uint64_t shapes = scene.shape_revision();
+  track.show(2, scene);
+  CHECK(scene.shape_revision() == shapes);
 }

@@ -124,4 +124,90 @@ TEST_CASE("glTF: morph targets move points by their weights", "[loader_assimp]")
   CHECK(has_point(LoadedFile(file + "{time=1}"), "Face", {0, -2, 1}));
 }
 
+/// A triangle on a node that moves along x by an interpolation of glTF; two nodes have one name.
+std::string mover(const std::string& interpolation, const std::vector<float>& places,
+                  const std::string& more = "") {
+  Buffer b;
+  b.add(test::bytes_of<float>({0, 0, 0, 1, 0, 0, 0, 1, 0}), kFloat, "VEC3", 3,
+        R"(,"min":[0,0,0],"max":[1,1,0])");
+  b.add(test::bytes_of<std::uint16_t>({0, 1, 2}), kShort, "SCALAR", 3);
+  b.add(test::bytes_of<float>({0, 1, 3}), kFloat, "SCALAR", 3, R"(,"min":[0],"max":[3])");
+  b.add(test::bytes_of<float>(places), kFloat, "VEC3", places.size() / 3, more);
+  return b.gltf(R"(
+    "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+    "nodes": [{"name": "same", "mesh": 0, "translation": [0, 5, 0]}, {"name": "same", "mesh": 0}],
+    "animations": [{"channels": [{"sampler": 0, "target": {"node": 1, "path": "translation"}}],
+                    "samplers": [{"input": 2, "output": 3, "interpolation": ")" +
+                interpolation + R"("}]}], "scenes": [{"nodes": [0, 1]}])");
+}
+
+/// Where the second node is along x.
+double x_of_mover(const std::string& file, const std::string& time) {
+  const LoadedFile loaded(file + "{time=" + time + "}");
+  double x = -1.0;
+  for (const NodeId node : loaded.scene.subtree(loaded.root)) {
+    if (!loaded.scene[node].mesh) continue;
+    const Vec3 place = loaded.scene.world_from_node(node).translation();
+    if (std::abs(place.z()) < 1e-6) x = place.x();
+  }
+  return x;
+}
+
+TEST_CASE("glTF: steps hold, and splines run along their tangents", "[loader_assimp]") {
+  const TemporaryFolder folder;
+  const std::vector<float> places{0, 0, 0, 2, 0, 0, 6, 0, 0};
+  const std::string straight = folder.write("straight.gltf", mover("LINEAR", places));
+  CHECK(x_of_mover(straight, "0.25") == Approx(0.5));
+  CHECK(x_of_mover(straight, "2") == Approx(4.0));
+  const std::string step = folder.write("step.gltf", mover("STEP", places));
+  CHECK(x_of_mover(step, "0.25") == Approx(0.0).margin(1e-6));
+  CHECK(x_of_mover(step, "0.99") == Approx(0.0).margin(1e-6));
+  CHECK(x_of_mover(step, "1") == Approx(2.0));
+  CHECK(x_of_mover(step, "3") == Approx(6.0));
+  // Per key: the tangent before it, the value, the tangent behind it.
+  const std::string spline =
+      folder.write("spline.gltf", mover("CUBICSPLINE", {0, 0, 0, 0, 0, 0, 4, 0, 0, 1, 0, 0, 2, 0,
+                                                        0, 3, 0, 0, 0, 0, 0, 6, 0, 0, 0, 0, 0}));
+  CHECK(x_of_mover(spline, "1") == Approx(2.0));
+  // Hermite's at a half: the mean, and an eighth of the span times the tangents' difference.
+  CHECK(x_of_mover(spline, "0.5") == Approx(1.0 + (4.0 - 1.0) / 8.0));
+  CHECK(x_of_mover(spline, "2") == Approx(4.0 + 2.0 * (3.0 - 0.0) / 8.0));
+}
+
+TEST_CASE("glTF: sparse keys and weights below zero count", "[loader_assimp]") {
+  const TemporaryFolder folder;
+  Buffer b;
+  b.add(test::bytes_of<float>({0, 0, 0, 1, 0, 0, 0, 1, 0}), kFloat, "VEC3", 3,
+        R"(,"min":[0,0,0],"max":[1,1,0])");
+  b.add(test::bytes_of<std::uint16_t>({0, 1, 2}), kShort, "SCALAR", 3);
+  b.add(test::bytes_of<float>({0, 0, 0, 0, 0, 0, 0, 0, 2}), kFloat, "VEC3", 3,
+        R"(,"min":[0,0,0],"max":[0,0,2])");
+  b.add(test::bytes_of<float>({0, 1}), kFloat, "SCALAR", 2, R"(,"min":[0],"max":[1])");
+  b.add(test::bytes_of<std::uint8_t>({1}), kByte, "SCALAR", 1);
+  b.add(test::bytes_of<float>({-1}), kFloat, "SCALAR", 1);
+  // No view of its own: zeros, of which the second becomes -1.
+  b.add(test::bytes_of<float>({5, 5}), kFloat, "SCALAR", 2,
+        R"(,"sparse":{"count":1,"indices":{"bufferView":4,"componentType":5121},)"
+        R"("values":{"bufferView":5}})");
+  const std::string file = folder.write("face.gltf", b.gltf(R"(
+    "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1,
+                                "targets": [{"POSITION": 2}]}]}],
+    "nodes": [{"name": "Face", "mesh": 0}],
+    "animations": [{"channels": [{"sampler": 0, "target": {"node": 0, "path": "weights"}}],
+                    "samplers": [{"input": 3, "output": 6, "interpolation": "STEP"}]}],
+    "scenes": [{"nodes": [0]}])"));
+  CHECK(has_point(LoadedFile(file + "{time=1}"), "Face", {0, 2, 1}));
+  CHECK(has_point(LoadedFile(file + "{time=0.5}"), "Face", {0, -10, 1}));
+}
+
+TEST_CASE("glTF: what cannot be read of an animation is said", "[loader_assimp]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("odd.gltf", mover("WIGGLE", {0, 0, 0, 2, 0, 0, 6, 0, 0}));
+  const LoadedFile loaded(file + "{time=0.5}");
+  REQUIRE(loaded.host.messages.size() == 1);
+  CHECK_THAT(loaded.host.messages.front(),
+             ContainsSubstring("cannot be read: unknown interpolation"));
+  CHECK(x_of_mover(file, "0.5") == Approx(1.0));
+}
+
 }  // namespace diorama::loader_assimp

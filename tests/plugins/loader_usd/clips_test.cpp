@@ -45,11 +45,87 @@ TEST_CASE("values of clips are those of the stage's start", "[clips]") {
     return x_of_child(folder.write("root.usda", with_clips(head, kTwo)));
   };
   CHECK(at("") == 5.0);
-  CHECK(at("    startTimeCode = 5\n") == 6.0);
-  // At the same time the later mapping counts; between two samples the earlier one does.
-  CHECK(at("    startTimeCode = 10\n") == 7.0);
+  CHECK(at("    startTimeCode = 4\n") == 6.0);
+  // At the same time the later mapping counts.
+  CHECK(at("    startTimeCode = 10\n") == Approx(7.0 + 1.0 / 3.0));
   CHECK(at("    startTimeCode = 12\n") == 8.0);
   CHECK(at("    startTimeCode = -3\n") == 5.0);
+}
+
+TEST_CASE("values run straight from sample to sample, and on to the next clip", "[clips]") {
+  const TemporaryFolder folder;
+  folder.write("one.usda", samples("1: 5, 4: 6"));
+  folder.write("two.usda", samples("101: 12, 103: 8, 200: 9"));
+  const std::string file = folder.write("root.usda", with_clips("", kTwo));
+  const auto at = [&](double time) {
+    Stage stage(file, Sampling::OrFirstSample, Stage::kComposedBytes, {}, {}, time / 24.0);
+    return x_of(stage, "/Model/Child");
+  };
+  CHECK(at(2.5) == Approx(5.5));
+  CHECK(at(11) == Approx(10.0));  // clip time 102
+  // Behind its last sample a clip leads to where the next one begins: 6 at 4, 12 at 10.
+  CHECK(at(7) == Approx(9.0));
+  CHECK(at(9.5) == Approx(11.5));
+  CHECK(at(10) == Approx(12.0));
+  CHECK(at(0) == Approx(5.0));
+  CHECK(at(1000) == Approx(8.0 + 8.0 / 97.0));
+
+  // One file per frame, as caches of geometry have it.
+  folder.write("clip.1.usda", samples("1: 10"));
+  folder.write("clip.2.usda", samples("2: 20"));
+  folder.write("clip.4.usda", samples("4: 60"));
+  const std::string cache = folder.write("cache.usda", with_clips("", R"(
+            string templateAssetPath = "./clip.#.usda"
+            double templateStartTime = 1
+            double templateEndTime = 4
+            double templateStride = 1
+            string primPath = "/Anim"
+)"));
+  const auto cached = [&](double time) {
+    Stage stage(cache, Sampling::OrFirstSample, Stage::kComposedBytes, {}, {}, time / 24.0);
+    return x_of(stage, "/Model/Child");
+  };
+  CHECK(cached(1.25) == Approx(12.5));
+  CHECK(cached(3) == Approx(40.0));
+  CHECK(cached(5) == Approx(60.0));
+}
+
+TEST_CASE("clips are stronger than what is referenced beside them", "[clips]") {
+  const TemporaryFolder folder;
+  folder.write("one.usda", samples("1: 5, 4: 6"));
+  folder.write("two.usda", samples("100: 7"));
+  folder.write("model.usda", R"(#usda 1.0
+def "Model"
+{
+    def "Child"
+    {
+        double x = 3
+        double y = 4
+    }
+}
+)");
+  // As caches are laid over a model that stands at rest.
+  std::string text = with_clips("", kTwo, "double z = 8");
+  text.replace(text.find("def \"Model\" ("), 13,
+               "def \"Model\" (\n    references = @model.usda@</Model>");
+  const std::string file = folder.write("root.usda", text);
+  Stage stage(file, Sampling::OrFirstSample, Stage::kComposedBytes, {}, {}, 1.0 / 24.0);
+  CHECK(x_of(stage, "/Model/Child") == 5.0);
+  CHECK(x_of(stage, "/Model/Child", "y") == 4.0);
+  CHECK(x_of(stage, "/Model/Child", "z") == 8.0);
+  // What stands beside them is stronger.
+  std::string said = text;
+  said.replace(said.find("double z = 8"), 12, "double x = 9");
+  Stage beside(folder.write("root.usda", said), Sampling::OrFirstSample, Stage::kComposedBytes, {},
+               {}, 1.0 / 24.0);
+  CHECK(x_of(beside, "/Model/Child") == 9.0);
+  // A child that the file with the clips does not mention.
+  std::string silent = text;
+  const std::size_t from = silent.find("    def \"Child\"");
+  silent.replace(from, silent.rfind('}') - from, "");
+  Stage unmentioned(folder.write("root.usda", silent), Sampling::OrFirstSample,
+                    Stage::kComposedBytes, {}, {}, 1.0 / 24.0);
+  CHECK(x_of(unmentioned, "/Model/Child") == 5.0);
 }
 
 TEST_CASE("clips are weaker than what the layers say at the default time", "[clips]") {
@@ -81,7 +157,7 @@ TEST_CASE("templates of clips are filled in with what is there", "[clips]") {
     return x_of_child(folder.write("root.usda", with_clips(head, clips)));
   };
   CHECK(at("") == 12.0);
-  CHECK(at("    startTimeCode = 3\n") == 12.0);
+  CHECK(at("    startTimeCode = 3\n") == 13.0);
   CHECK(at("    startTimeCode = 4\n") == 14.0);
   CHECK(at("    startTimeCode = 400\n") == 14.0);
 }
@@ -93,7 +169,7 @@ TEST_CASE("clips of a referenced file are relative to it, and moved with it", "[
   folder.write("parts/model.usda", with_clips("", kTwo));
   const std::string file = folder.write("root.usda", R"(#usda 1.0
 (
-    startTimeCode = 25
+    startTimeCode = 24
 )
 def "A" (
     references = @parts/model.usda@</Model> (offset = 20)

@@ -127,6 +127,134 @@ TEST_CASE("a blend shape at half of its weight moves points by half", "[loader_u
   CHECK(has_point(*bent.node("Arm/Skin").mesh, {1, 1, 0.2f}));
 }
 
+TEST_CASE("shapes in between stand on the way to a blend shape, and beyond it", "[loader_usd]") {
+  const TemporaryFolder folder;
+  const auto height = [&](const std::string& weight, const std::string& between) {
+    std::string text = arm(R"(
+        uniform token[] skel:blendShapes = ["swell"]
+        rel skel:blendShapeTargets = </Arm/Skin/swell>
+        def BlendShape "swell"
+        {
+            uniform vector3f[] offsets = [(0, 0, 1)]
+            uniform int[] pointIndices = [0]
+)" + between + "        }\n");
+    const std::string was = "blendShapeWeights.timeSamples = { 0: [0], 24: [0.5] }";
+    text.replace(text.find(was), was.size(), "blendShapeWeights = [" + weight + "]");
+    LoadedStage loaded(folder.write("arm.usda", text) + "{time=0}");
+    CAPTURE(all_warnings(loaded));
+    return double(loaded.node("Arm/Skin").mesh->bounds().max.z());
+  };
+  const std::string two = R"(
+            uniform vector3f[] inbetweens:late = [(0, 0, 0.2)] ( weight = 0.75 )
+            uniform vector3f[] inbetweens:early = [(0, 0, 0.6)] ( weight = 0.25 )
+            uniform vector3f[] inbetweens:early:normalOffsets = [(1, 0, 0)]
+)";
+  CHECK(height("0.125", two) == Approx(0.3));
+  CHECK(height("0.25", two) == Approx(0.6));
+  CHECK(height("0.5", two) == Approx(0.4));
+  CHECK(height("0.75", two) == Approx(0.2));
+  CHECK(height("0.875", two) == Approx(0.6));
+  CHECK(height("1", two) == Approx(1.0));
+  // Straight on from the outer two, as without them.
+  CHECK(height("1.25", two) == Approx(1.8));
+  CHECK(height("2", "") == Approx(2.0));
+  // What cannot be used is left out, and said.
+  for (const char* broken :
+       {"[(0, 0, 0.6)]", "[(0, 0, 0.6)] ( weight = 1 )", "[(0, 0, 0.6)] ( weight = 0 )",
+        "[] ( weight = 0.5 )", "[(0, 0, 7), (0, 0, 7)] ( weight = 0.5 )"}) {
+    CAPTURE(broken);
+    const std::string said = std::string("uniform vector3f[] inbetweens:a = ") + broken + "\n";
+    CHECK(height("0.5", said) == Approx(0.5));
+  }
+}
+
+TEST_CASE("dual quaternions keep the thickness of what linear blending flattens", "[loader_usd]") {
+  const TemporaryFolder folder;
+  // The fore arm turns half round about its own axis; what weighs the same on both lies between.
+  std::string twist = arm();
+  const std::string was = "24: [(0.70710678, 0, 0, 0.70710678)]";
+  twist.replace(twist.find(was), was.size(), "24: [(0.0001, 1, 0, 0)]");
+  const auto with = [&](const std::string& method) {
+    std::string text = twist;
+    if (!method.empty()) {
+      const std::string place = "        int[] primvars:skel:jointIndices";
+      text.insert(text.find(place),
+                  "        uniform token primvars:skel:skinningMethod = \"" + method + "\"\n");
+    }
+    LoadedStage loaded(folder.write("arm.usda", text) + "{time=1}");
+    return loaded.node("Arm/Skin").mesh->positions;
+  };
+  const auto off_axis = [](const std::vector<Vec3f>& points) {
+    for (const Vec3f& p : points) {
+      if (std::abs(p.x() - 1.0f) < 1e-3f) return double(p.tail<2>().norm());
+    }
+    return -1.0;
+  };
+  CHECK(off_axis(with("")) < 0.001);
+  CHECK(off_axis(with("classicLinear")) < 0.001);
+  CHECK(off_axis(with("dualQuaternion")) == Approx(0.2).margin(1e-4));
+  // Where one joint counts alone, both are the same, also if it stretches.
+  std::string stretched = arm();
+  const std::string scales = "half3[] scales = [(1, 1, 1)]";
+  stretched.replace(stretched.find(scales), scales.size(), "half3[] scales = [(2, 0.5, 1)]");
+  std::string dual = stretched;
+  dual.insert(dual.find("        int[] primvars:skel:jointIndices"),
+              "        uniform token primvars:skel:skinningMethod = \"dualQuaternion\"\n");
+  LoadedStage linear(folder.write("linear.usda", stretched) + "{time=1}");
+  LoadedStage other(folder.write("dual.usda", dual) + "{time=1}");
+  CHECK(has_point(*linear.node("Arm/Skin").mesh, {1, 2, 0}));
+  CHECK(has_point(*other.node("Arm/Skin").mesh, {1, 2, 0}));
+}
+
+TEST_CASE("what a binding says holds for the meshes below it", "[loader_usd]") {
+  const TemporaryFolder folder;
+  std::string text = arm();
+  const std::string begin = "    def Mesh \"Skin\"";
+  text.insert(text.find(begin), R"(    def Xform "Rigid" ( prepend apiSchemas = ["SkelBindingAPI"] )
+    {
+        rel skel:skeleton = </Arm/Bones>
+        uniform token[] skel:joints = ["upper/fore"]
+        int[] primvars:skel:jointIndices = [0] ( elementSize = 1 )
+        float[] primvars:skel:jointWeights = [1] ( elementSize = 1 )
+        matrix4d primvars:skel:geomBindTransform = ((1,0,0,0),(0,1,0,0),(0,0,1,0),(2,0,0,1))
+        def Mesh "Plate"
+        {
+            uniform token subdivisionScheme = "none"
+            int[] faceVertexCounts = [3]
+            int[] faceVertexIndices = [0, 1, 2]
+            point3f[] points = [(0, 0, 0), (0.5, 0, 0), (0, 0.5, 0)]
+        }
+    }
+)");
+  LoadedStage bent(folder.write("arm.usda", text) + "{time=1}");
+  const Mesh& plate = *bent.node("Arm/Rigid/Plate").mesh;
+  // Two metres out it is bound; the elbow at x = 1 turns by 90 degrees.
+  CHECK(has_point(plate, {1, 1, 0}));
+  CHECK(has_point(plate, {1, 1.5f, 0}));
+  CHECK(has_point(plate, {0.5f, 1, 0}));
+}
+
+TEST_CASE("a skin has the same triangles in all its poses", "[loader_usd]") {
+  const TemporaryFolder folder;
+  // The quad is convex as it is bound, and folds when its second point is pulled in.
+  std::string text = arm(R"(
+        uniform token[] skel:blendShapes = ["swell"]
+        rel skel:blendShapeTargets = </Arm/Skin/swell>
+        def BlendShape "swell"
+        {
+            uniform vector3f[] offsets = [(0.2, -1.0, 0)]
+            uniform int[] pointIndices = [1]
+        }
+    )");
+  const std::string file = folder.write("arm.usda", text);
+  LoadedStage rest(file);
+  LoadedStage bent(file + "{time=0.9}");
+  const Mesh& a = *rest.node("Arm/Skin").mesh;
+  const Mesh& b = *bent.node("Arm/Skin").mesh;
+  CHECK(a.triangles == b.triangles);
+  CHECK(a.positions != b.positions);
+}
+
 TEST_CASE("normals turn with the skin", "[loader_usd]") {
   const TemporaryFolder folder;
   const std::string file = folder.write("arm.usda", arm(R"(

@@ -191,6 +191,62 @@ TEST_CASE("who walks keeps clear of walls, pillars and what may fall, at one spe
   CHECK(long_ones >= 5);
 }
 
+TEST_CASE("a hand that shakes brings nobody who walks nearer to anything", "[randomizers]") {
+  Hall hall;
+  CameraPath::Params params;
+  params.kind = "walk";
+  params.area = Distribution::between(Vec3(-2.9, -2.9, 1.2), Vec3(2.9, 2.9, 1.7));
+  params.speed = 1.5;
+  params.clearance_m = 0.2;
+  params.jitter_m = 0.06;
+  params.jitter_hz = 9.0;
+  params.max_tries = 3000;
+  const Obstacles obstacles(hall.scene, "/Environment/**");
+  double nearest = 1.0;
+  for (std::uint64_t seed = 0; seed < 12; ++seed) {
+    for (const Affine& pose : hall.play(params, 90, seed)) {
+      nearest = std::min(nearest, obstacles.distance(pose.translation(), 1.0));
+    }
+  }
+  CHECK(nearest >= 0.2);
+}
+
+TEST_CASE("who walks waits for what crosses the way, and steps back from it", "[randomizers]") {
+  for (std::uint64_t seed = 0; seed < 6; ++seed) {
+    Hall hall;
+    CameraPath::Params params;
+    params.kind = "walk";
+    params.area = Distribution::between(Vec3(-2.9, -2.9, 1.5), Vec3(2.9, 2.9, 1.5));
+    params.speed = 1.0;
+    params.max_tries = 3000;
+    hall.scene.edit(hall.thing).rigid_body->has_gravity = false;
+    hall.scene.set_pose(hall.thing, Affine(Eigen::Translation3d(0, 0, 9)));
+    const auto alone = hall.play(params, 90, seed);
+    // It flies to where the walk would be after a second, and stays there for a while.
+    const Vec3 there = alone[30].translation();
+    const auto fly = [&](int frame) {
+      const double height = frame < 45 ? std::max(0.0, 25.0 - frame) * 0.2 : (frame - 45) * 0.2;
+      hall.scene.set_pose(hall.thing, Affine(Eigen::Translation3d(there + Vec3(0, 0, height))));
+    };
+    // Planned as before: high above.
+    const auto careful = hall.play(params, 90, seed, [&](int frame) {
+      if (frame > 0) fly(frame);
+    });
+    hall.scene.set_pose(hall.thing, Affine(Eigen::Translation3d(0, 0, 9)));
+    CAPTURE(seed);
+    if ((alone.back().translation() - alone.front().translation()).norm() < 0.8) continue;
+    if ((alone.front().translation() - there).norm() < 0.9) continue;
+    for (int frame = 1; frame < 90; ++frame) {
+      fly(frame);
+      const Aabb box = hall.scene.world_bounds(hall.thing);
+      const Vec3 place = careful[std::size_t(frame)].translation();
+      const Vec3 off = (box.min - place).cwiseMax(place - box.max).cwiseMax(0.0);
+      CHECK(off.norm() > 0.25);
+    }
+    CHECK((careful.back().translation() - alone.back().translation()).norm() > 0.2);
+  }
+}
+
 TEST_CASE("where there is no room to walk it is said, and the camera stands", "[randomizers]") {
   Hall hall;
   CameraPath::Params params;

@@ -122,3 +122,58 @@ TEST_CASE("an animated asset is shown at a time of its animation", "[randomizers
   AnimationTime(params, host).randomize(scene, {}, Rng(3));
   CHECK(scene[blade].mesh->bounds().size().x() == Approx(4.0));
 }
+
+TEST_CASE("in a clip an animated asset goes on from the time that was drawn", "[randomizers]") {
+  FakeHost host;
+  Scene scene;
+  const auto still = std::make_shared<const Mesh>(make_box(Vec3::Constant(9.0)));
+  std::vector<double> loaded;
+  const auto build = [&](double seconds) {
+    return [&, seconds](Scene& made, NodeId root) {
+      loaded.push_back(seconds);
+      made.edit(root).animation = Animation{"fan.usd", 1.0, 3.0};
+      const NodeId blade = made.create(root, "blade");
+      made.edit(blade).mesh = std::make_shared<const Mesh>(make_box(Vec3::Constant(1.0 + seconds)));
+      // Equal at all times, and made anew each time.
+      made.edit(made.create(root, "post")).mesh = std::make_shared<const Mesh>(*still);
+    };
+  };
+  for (const double time : {1.0, 1.5, 2.0, 2.5, 3.0}) {
+    std::string name = std::to_string(time);
+    name.erase(name.find_last_not_of('0') + 1);
+    if (name.ends_with('.')) name.pop_back();
+    host.assets["fan.usd{time=" + name + "}"] = build(time);
+  }
+  host.assets["fan.usd"] = build(1.0);
+  const NodeId fan = host.load_asset("fan.usd", scene, scene.root());
+  const NodeId blade = scene.require(scene.path(fan) + "/blade");
+  const NodeId post = scene.require(scene.path(fan) + "/post");
+
+  const auto times = [&](const std::string& at_end, double speed) {
+    AnimationTime::Params params;
+    params.time_s = Distribution(2.0);
+    params.speed = Distribution(speed);
+    params.at_end = at_end;
+    AnimationTime player(params, host);
+    RandomizeContext context;
+    context.clip = ClipFrame{0, 0, 6, 2.0};
+    player.randomize(scene, context, Rng(3));
+    const auto post_mesh = scene[post].mesh;
+    std::string text;
+    for (ClipFrame at = *context.clip; at.frame < 6; ++at.frame) {
+      player.play(scene, at);
+      const double time = scene[blade].mesh->bounds().size().x() - 1.0;
+      text += (text.empty() ? "" : " ") + std::to_string(time).substr(0, 3);
+      CHECK(scene[post].mesh == post_mesh);
+    }
+    return text;
+  };
+  CHECK(times("repeat", 1.0) == "2.0 2.5 1.0 1.5 2.0 2.5");
+  CHECK(times("ping_pong", 1.0) == "2.0 2.5 3.0 2.5 2.0 1.5");
+  CHECK(times("hold", 1.0) == "2.0 2.5 3.0 3.0 3.0 3.0");
+  CHECK(times("repeat", -1.0) == "2.0 1.5 1.0 2.5 2.0 1.5");
+  CHECK(times("hold", -2.0) == "2.0 1.0 1.0 1.0 1.0 1.0");
+  loaded.clear();
+  CHECK(times("repeat", 0.0) == "2.0 2.0 2.0 2.0 2.0 2.0");
+  CHECK(loaded.size() == 1);
+}
