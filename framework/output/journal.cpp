@@ -539,28 +539,34 @@ void Journals::visit_entries(
 
 void Journals::visit_captures(
     const std::function<bool(const std::string&, const EntryPlace&)>& visit) const {
-  const std::vector<std::string> names = worker_names();
-  struct Candidate {
-    EntryPlace place;
-    std::uint32_t worker = 0;  ///< Place in `names`, which are sorted.
+  struct Reading {
+    std::string worker;
+    std::vector<EntryPlace> places;
+    std::size_t at = 0;
   };
-  std::vector<Candidate> candidates;
-  for (std::size_t worker = 0; worker < names.size(); ++worker) {
-    if (!workers_.contains(names[worker])) continue;
-    const std::vector<EntryPlace> places = entries_of(names[worker]);
-    candidates.reserve(candidates.size() + places.size());
-    for (const EntryPlace& place : places) {
-      const bool is_wanted = place.entry >= 0 && place.entry < capture_count_ && place.is_published;
-      if (is_wanted) candidates.push_back({place, std::uint32_t(worker)});
-    }
+  std::vector<Reading> readings;
+  for (const std::string& worker : worker_names()) {
+    if (workers_.contains(worker)) readings.push_back({worker, entries_of(worker)});
   }
-  std::ranges::sort(candidates, [](const Candidate& a, const Candidate& b) {
-    return std::pair(a.place.entry, a.worker) < std::pair(b.place.entry, b.worker);
-  });
+  std::set<std::pair<int, std::size_t>> next;  // captures and places in `readings`
+  const auto find_next = [&](std::size_t i) {
+    Reading& reading = readings[i];
+    for (; reading.at < reading.places.size(); ++reading.at) {
+      const EntryPlace& place = reading.places[reading.at];
+      if (place.entry < 0 || place.entry >= capture_count_ || !place.is_published) continue;
+      next.emplace(place.entry, i);
+      return;
+    }
+  };
+  for (std::size_t i = 0; i < readings.size(); ++i) find_next(i);
   std::optional<int> taken;
-  for (const auto& [place, worker] : candidates) {
-    if (taken == place.entry || !visit(names[worker], place)) continue;
-    taken = place.entry;
+  while (!next.empty()) {
+    const auto [capture, i] = *next.begin();
+    next.erase(next.begin());
+    Reading& reading = readings[i];
+    if (taken != capture && visit(reading.worker, reading.places[reading.at])) taken = capture;
+    ++reading.at;
+    find_next(i);
   }
 }
 

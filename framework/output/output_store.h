@@ -91,7 +91,7 @@ class CollectedFiles final : public CaptureFiles {
   CollectedFiles(Transaction& transaction, std::size_t folder, std::string writer);
   static constexpr std::size_t kKeptBytes = std::size_t(256) << 10;
   /// Of all files of a transaction together that grow.
-  static constexpr std::size_t kKeptGrowingBytes = std::size_t(1) << 20;
+  static constexpr std::size_t kKeptGrowingBytes = std::size_t(256) << 10;
 
   void add(std::string_view path, std::vector<std::byte> bytes) override;
   void append(std::string_view path, std::span<const std::byte> bytes) override;

@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "diorama/error.h"
+#include "framework/datasets/frame_copy.h"
 #include "framework/lint/dataset_on_disk.h"
 #include "framework/lint/encoding_host.h"
 #include "framework/lint/every_format.h"
@@ -807,4 +808,104 @@ TEST_CASE("levels, areas and keypoints are held against shares of other writers"
                   })},
        {"an object of PoseWriter is gone", "pose/*0.json",
         json([](Json& page) { page["objects"].erase(page["objects"].size() - 1); })}});
+}
+
+TEST_CASE("splits and counts of YOLO's page, floats of VOC and clips that are none", "[lint]") {
+  check_all_found(run_on_disk({"basic", "yolo_detect", "voc", "coco"}),
+                  {{"pictures for validation are those for training", "yolo_detect/data.yaml",
+                    [](const std::string& text) {
+                      return std::regex_replace(text, std::regex("images/val"), "images/train");
+                    }},
+                   {"a number of classes", "yolo_detect/data.yaml",
+                    [](const std::string& text) { return text + "nc: 17\n"; }},
+                   {"a part of a pixel", "voc/Annotations/*.xml",
+                    [](const std::string& text) {
+                      return std::regex_replace(text, std::regex("</xmax>"), ".5</xmax>",
+                                                std::regex_constants::format_first_only);
+                    }},
+                   {"a clip of a picture that is in none", "coco/annotations/instances_*.json",
+                    json([](Json& page) { page["images"][0]["clip"] = 0; })},
+                   {"a video of a picture that is in none", "coco/annotations/instances_*.json",
+                    json([](Json& page) { page["images"][0]["video_id"] = 1; })}});
+}
+
+TEST_CASE("symmetries leave models what they are, as near as the job asks", "[lint]") {
+  const DatasetOnDisk run = run_on_disk({"bop"});
+  const auto say_tolerance = [&](const char* tolerance) {
+    Json page = Json::parse(run.read("bop/dataset.json"));
+    page["job"] = "    symmetry_tolerance: " + std::string(tolerance) + "\n";
+    run.write("bop/dataset.json", page.dump());
+  };
+  say_tolerance("0.01");
+  const std::string file = "bop/models/models_info.json";
+  const std::string before = run.read(file);
+  const auto with = [&](const char* key, const Json& value) {
+    Json table = Json::parse(before);
+    for (auto& [id, model] : table.items()) model[key] = value;
+    run.write(file, table.dump());
+  };
+  REQUIRE_FALSE(is_found(run));
+  const Json none = Json::array();
+  // A mirror, a turn by less than a quarter, a shift and an axis beside the middle.
+  const Json mirror{{-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}};
+  const Json shift{{1, 0, 0, 40, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}};
+  for (const Json& map : {mirror, shift}) {
+    with("symmetries_discrete", Json::array({map}));
+    CHECK(is_found(run));
+  }
+  with("symmetries_continuous", Json::array({{{"axis", {0, 0, 1}}, {"offset", {70, 0, 0}}}}));
+  CHECK(is_found(run));
+  with("symmetries_continuous", Json::array({{{"axis", {0, 0, 2}}, {"offset", {0, 0, 0}}}}));
+  CHECK(is_found(run));
+  with("symmetries_continuous", none);
+  CHECK_FALSE(is_found(run));
+}
+
+TEST_CASE("classes are sorted unless the job puts them in an order", "[lint]") {
+  const DatasetOnDisk run = run_on_disk({"kitti"});
+  const std::string file = "kitti/dataset.json";
+  const Json before = Json::parse(run.read(file));
+  const auto say = [&](const std::string& job, bool is_turned) {
+    Json page = before;
+    page["job"] = job;
+    if (is_turned) std::ranges::reverse(page["classes"]);
+    run.write(file, page.dump());
+    return is_found(run);
+  };
+  const std::string plain = "    classes: []\n    mapping_dict: null\n";
+  CHECK_FALSE(say(plain, false));
+  CHECK(say(plain, true));
+  CHECK_FALSE(say(plain + "    classes: [mug, ball]\n", true));
+  CHECK_FALSE(say(plain + "    mapping_dict: {a: b}\n", true));
+  CHECK_FALSE(say("", true));
+}
+
+TEST_CASE("normals are held against those of another writer of the run", "[lint]") {
+  const test::SampleClip sample = test::sample_clip();
+  std::vector<Capture> turned;
+  for (const Capture& capture : sample.frames) {
+    Capture& copy = turned.emplace_back();
+    copy.index = capture.index;
+    copy.clip = capture.clip;
+    for (const Frame& frame : capture.frames) {
+      Frame& own = copy.frames.emplace_back(copy_of(frame));
+      Image<Vec3f> normals = frame.get(kNormals);
+      for (int y = 0; y < normals.height(); ++y) std::ranges::reverse(normals.row(y));
+      own.set(kNormals, std::move(normals));
+    }
+  }
+  std::vector<const Capture*> captures;
+  for (const Capture& capture : turned) captures.push_back(&capture);
+  test::EncodingHost host;
+  for (const bool is_turned : {false, true}) {
+    test::MemoryFiles all;
+    for (const test::SampleFormat& format : test::every_format()) {
+      const bool is_hdf5 = format.name == "hdf5";
+      if (!is_hdf5 && format.name != "basic") continue;
+      const auto files =
+          format.write(host, sample.dataset, is_hdf5 && is_turned ? captures : sample.captures());
+      for (const auto& [path, bytes] : files.files) all.files[format.name + "/" + path] = bytes;
+    }
+    CHECK(is_found(DatasetOnDisk(all)) == is_turned);
+  }
 }
