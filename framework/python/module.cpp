@@ -334,7 +334,8 @@ PYBIND11_MODULE(_diorama, module) {
     try {
       if (pointer) std::rethrow_exception(pointer);
     } catch (const Error& error) {
-      const py::object raised = py::reinterpret_borrow<py::object>(error_class)(text_of(error.what()));
+      const py::object raised =
+          py::reinterpret_borrow<py::object>(error_class)(text_of(error.what()));
       raised.attr("kind") = kErrorKinds[std::size_t(error.kind())];
       PyErr_SetObject(error_class, raised.ptr());
     }

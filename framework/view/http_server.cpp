@@ -310,7 +310,8 @@ Response HttpServer::State::respond(const Request& request) {
   const std::string_view query = target.substr(path.size());
   constexpr std::string_view kToken = "?token=";
   const auto site = plain(request["Sec-Fetch-Site"]);
-  const bool is_own_site = site.empty() || site == "same-origin" || site == "none";
+  const bool is_own_site = request.count("Sec-Fetch-Site") <= 1 &&
+                           (site.empty() || site == "same-origin" || site == "none");
 
   std::optional<HttpAnswer> made = refusal(request);
   bool greets = false;

@@ -34,7 +34,7 @@ class Node:
         """The end of the path."""
     @property
     def path(self) -> str:
-        """"/Assets/mug_01"."""
+        '''"/Assets/mug_01"'''
     @property
     def parent(self) -> Node | None:
         """None above the root."""

@@ -161,8 +161,7 @@ class Open(unittest.TestCase):
         folder.mkdir()
         for name in ("images/train", "labels/train"):
             (folder / name).mkdir(parents=True)
-        cv2.imwrite(str(folder / "images/train/a.png"), np.zeros((8, 8, 3), np.uint8))
-        (folder / "images/train/a.png").rename(folder / "images/train" / os.fsdecode(b"\xfc.png"))
+        (folder / "images/train" / os.fsdecode(b"\xfc.png")).write_bytes(cv2.imencode(".png", np.zeros((8, 8, 3), np.uint8))[1].tobytes())
         (folder / "labels/train" / os.fsdecode(b"\xfc.txt")).write_text("0 0.5 0.5 0.5 0.5\n")
         (folder / "data.yaml").write_text("path: .\ntrain: images/train\nval: images/train\nnames:\n  0: cup\n")
         dataset = diorama.open(folder)

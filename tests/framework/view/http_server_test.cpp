@@ -197,7 +197,8 @@ TEST_CASE("Other pages get nothing, even with the cookie", "[view]") {
   for (const std::string& header :
        {std::string("Origin: null"), std::string("Origin: https://evil.example"),
         "Origin: " + own + "0", std::string("Origin: http://localhost:1"),
-        std::string("Sec-Fetch-Site: cross-site"), std::string("Sec-Fetch-Site: same-site")}) {
+        std::string("Sec-Fetch-Site: cross-site"), std::string("Sec-Fetch-Site: same-site"),
+        std::string("Sec-Fetch-Site: none\r\nSec-Fetch-Site: cross-site")}) {
     INFO(header);
     CHECK(has_status(served.get("/a", header + "\r\n"), 403));
   }
