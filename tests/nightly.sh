@@ -25,7 +25,8 @@ part_views() { tests/chosen_views/check_views.py; }
 part_clip() {
   local folder="$logs/clip"
   build/release/bin/diorama run configs/clip.yaml --output "$folder" --overwrite --set renderer.samples=2 &&
-    /usr/bin/python3 tests/clips/check_clip.py "$folder"
+    /usr/bin/python3 tests/clips/check_clip.py "$folder" &&
+    /usr/bin/python3 tests/clips/check_walk.py --seeds 8 --height -0.3 0.6 --output "$logs"
 }
 part_soak() { tests/soak/run.sh "${SOAK_CAPTURES:-10000}"; }
 # What the fuzzers of ctest built, for longer; what they find to be new is kept in their corpus folders.

@@ -49,7 +49,8 @@ TriangleGrid::TriangleGrid(const Mesh& mesh) : mesh_(mesh), bounds_(mesh.bounds(
   int along = std::clamp(int(std::cbrt(double(mesh_.triangles.size()))), 1, kMostCells);
   const std::size_t most = kMostCellsPerTriangle * mesh_.triangles.size();
   while (choose_cells(along) > most && along > 1) along /= 2;
-  const std::size_t cells = std::size_t(cells_[0]) * std::size_t(cells_[1]) * std::size_t(cells_[2]);
+  const std::size_t cells =
+      std::size_t(cells_[0]) * std::size_t(cells_[1]) * std::size_t(cells_[2]);
   begins_.assign(cells + 1, 0);
   for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
     for_each_cell(bounds_of(t), [&](std::size_t cell) { ++begins_[cell + 1]; });
@@ -127,8 +128,7 @@ std::optional<TriangleGrid::Place> TriangleGrid::place_of(const Vec3& point) con
     const Vec3 b = mesh_.positions[corners[1]].cast<double>();
     const Vec3 c = mesh_.positions[corners[2]].cast<double>();
     const auto weights = nearest_weights(a, b, c, point);
-    const double squared =
-        (weights[0] * a + weights[1] * b + weights[2] * c - point).squaredNorm();
+    const double squared = (weights[0] * a + weights[1] * b + weights[2] * c - point).squaredNorm();
     if (squared >= best_squared) continue;
     best_squared = squared;
     best = Place{triangle, weights};

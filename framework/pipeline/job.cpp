@@ -580,13 +580,13 @@ std::optional<TimelineStep> read_recording(const Value& map, const std::string& 
   }
   read_all_keys(value, path + ".record", keys, complaints);
   if (complaints.messages().size() != before) return std::nullopt;
+  // All frames that begin within the time: rates such as 29.97 fill no second.
   const double frames = keys.fps * keys.seconds;
-  const double count = std::round(frames);
-  if (count < 1.0 || count > 1e6 || std::abs(frames - count) > 1e-6 * count) {
-    complaints.add(value.place, path +
-                                    ".record: expected fps x seconds to be a whole number of "
-                                    "frames from 1 to 1000000, found " +
-                                    short_number(frames));
+  const double count = std::max(1.0, std::ceil(frames * (1.0 - 1e-6)));
+  if (count > 1e6) {
+    complaints.add(value.place,
+                   path + ".record: expected fps x seconds to be at most 1000000 frames, found " +
+                       short_number(frames));
     return std::nullopt;
   }
   TimelineStep step{TimelineStep::Kind::Record, 0, keys.name, int(count)};

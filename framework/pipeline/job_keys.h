@@ -81,7 +81,7 @@ struct RecordKeys {
   void visit(ParamVisitor& v) {
     v.param("name", name, {"Name of the clips: the moment that randomizers name in `on`."});
     v.param("fps", fps, {"Frames per second.", "1/s", 0.1, 1000});
-    v.param("seconds", seconds, {"Length; a whole number of frames.", "s", 0.001, 36000});
+    v.param("seconds", seconds, {"Length: the frames that begin within it.", "s", 0.001, 36000});
   }
 };
 

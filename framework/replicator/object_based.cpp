@@ -78,8 +78,8 @@ struct ObjectBasedKeys {
     v.param("env_url", env_url, {"The environment; empty: none."});
     v.param("working_area_size", working_area_size, {"Width, depth, height.", "m", 0.01, 1e5});
     v.param("rt_subframes", rt_subframes, {"Quality of a frame; -1: one.", "", -1, 1e5});
-    v.param("num_frames", num_frames, {"Frames of each camera.", "", 0, 1e6});
-    v.param("num_cameras", num_cameras, {"Cameras.", "", 0, 1e4});
+    v.param("num_frames", num_frames, {"Frames of each camera.", "", 1, 1e6});
+    v.param("num_cameras", num_cameras, {"Cameras.", "", 1, 1e4});
     v.param("camera_collider_radius", camera_collider_radius,
             {"Of the spheres that push objects away from cameras.", "m", 0, 1e3});
     v.param("disable_render_products_between_captures", disable_render_products,
@@ -202,6 +202,7 @@ class ObjectBasedTranslator : private replicator::Translator {
     complain_about_unknown(*given_, "", object_based_keys());
     read_keys();
     const std::vector<LabeledAsset> assets = labeled_assets();
+    check_targets(assets);
     set("seed", Value::integer(std::int64_t(kObjectBasedSeed)));
     set("total_captures", Value::integer(keys_.num_frames));
     add_environment();
@@ -243,6 +244,14 @@ class ObjectBasedTranslator : private replicator::Translator {
     ParamReader reader(flat, "", complaints_);
     keys_.visit(reader);
     reader.finish();
+    // What was complained about has no need of errors that follow from it.
+    keys_.num_frames = std::max(1, keys_.num_frames);
+    keys_.num_cameras = std::max(1, keys_.num_cameras);
+    read_shape_types();
+    if (keys_.mesh_num > 0 && keys_.mesh_urls.empty()) {
+      complain_about_none("mesh_distractors_urls", "mesh_distractors_num", keys_.mesh_num);
+      keys_.mesh_num = 0;
+    }
     check_resolution(keys_.resolution, section("resolution").place, "resolution");
     if (keys_.working_area_size.size() != 3) {
       complaints_.add(section("working_area_size").place,
@@ -254,6 +263,34 @@ class ObjectBasedTranslator : private replicator::Translator {
           "disable_render_products_between_captures (nothing is rendered between captures in any "
           "case)");
     }
+  }
+
+  /// The program takes 'Cube' and 'CUBE' for 'cube'.
+  void read_shape_types() {
+    for (std::string& type : keys_.shape_types) {
+      std::ranges::transform(type, type.begin(),
+                             [](unsigned char c) { return char(std::tolower(c)); });
+    }
+    if (keys_.shape_num == 0 || !keys_.shape_types.empty()) return;
+    complain_about_none("shape_distractors_types", "shape_distractors_num", keys_.shape_num);
+    keys_.shape_num = 0;
+  }
+
+  void complain_about_none(const std::string& key, const std::string& count_key, int count) {
+    complaints_.add(section(key).place,
+                    key + ": there are none, but " + count_key + " is " + std::to_string(count));
+  }
+
+  /// Each of the cameras looks at one of the objects.
+  void check_targets(const std::vector<LabeledAsset>& assets) {
+    const auto is_there = [](const LabeledAsset& asset) { return asset.keys.count > 0; };
+    const Value& list = section("labeled_assets_and_properties");
+    if (list.kind == Value::Kind::Scalar || list.kind == Value::Kind::Map ||
+        std::ranges::any_of(assets, is_there)) {
+      return;
+    }
+    complaints_.add(list.place,
+                    "labeled_assets_and_properties: there is no object for cameras to look at");
   }
 
   std::vector<LabeledAsset> labeled_assets() {

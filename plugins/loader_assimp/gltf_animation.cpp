@@ -98,7 +98,8 @@ class GltfFile {
       require(20 + json_size <= text.size(), "the file ends early");
       const std::size_t next = 20 + json_size;
       if (next + 8 <= text.size()) {
-        const std::size_t size = std::min<std::size_t>(number_at(text, next), text.size() - next - 8);
+        const std::size_t size =
+            std::min<std::size_t>(number_at(text, next), text.size() - next - 8);
         chunk_ = text.substr(next + 8, size);
       }
       text = text.substr(20, json_size);
@@ -356,8 +357,7 @@ std::string pose_gltf_at(aiScene& scene, const std::string& name, double seconds
           {"translation", 3}, {"scale", 3}, {"rotation", 4}, {"weights", 0}};
       const auto width = widths.find(path);
       if (!node || width == widths.end()) continue;
-      const Json& said =
-          animation.at("samplers").at(channel.at("sampler").get<std::size_t>());
+      const Json& said = animation.at("samplers").at(channel.at("sampler").get<std::size_t>());
       const std::vector<double> value =
           read_sampler(file, said, width->second).at(seconds, path == "rotation");
       if (path == "weights") {

@@ -42,7 +42,7 @@ randomizers:
      offset: [[-1.5, 1.5], [-1.5, 1.5], [0.8, 1.6]]}}
   - {{type: random_velocities, name: drift, on: [environment], nodes: "/Assets/*", velocity: [[-0.6, 0.6], [-0.6, 0.6], [-0.2, 0.2]]}}
   - {{type: camera_path, name: walk, on: [clip], nodes: "/Cameras/*", kind: walk, area: [[-2.5, 2.5], [-2.5, 2.5], [{low}, {high}]],
-     speed: {speed}, clearance_m: {clearance}, look: ahead, max_tries: 4000, jitter_m: 0.01, jitter_deg: 1.0}}
+     speed: {speed}, clearance_m: {clearance}, look: ahead, max_tries: 4000, jitter_m: 0.03, jitter_deg: 1.0}}
 settle: {{policy: keep}}
 renderer: {{type: "null"}}
 timeline: [{{record: {{fps: {fps}, seconds: 4}}}}]

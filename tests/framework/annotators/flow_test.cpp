@@ -123,8 +123,7 @@ TEST_CASE("Flow follows points of a mesh that bends", "[flow]") {
     pixel.frame.camera.width = pixel.frame.camera.height = 100;
     const Vec3 from(point_at(*here, triangle, weights) + Vec3(0, 0, -2));
     const Vec3 to(point_at(*there, triangle, weights) + Vec3(0, 0, -2));
-    const Vec2 expected =
-        *project(pixel.frame.camera, to) - *project(pixel.frame.camera, from);
+    const Vec2 expected = *project(pixel.frame.camera, to) - *project(pixel.frame.camera, from);
     const FlowMeter meter = pixel.meter(there);
     CHECK((meter.flow().at(0, 0).cast<double>() - expected).norm() < 1e-3);
     REQUIRE(meter.points().size() == 1);

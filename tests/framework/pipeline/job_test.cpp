@@ -235,6 +235,23 @@ TEST_CASE("Steps are repeated, some of them in every so-manieth round only", "[j
   CHECK(job.series() == std::vector<std::string>{"floating", "dropped"});
 }
 
+TEST_CASE("A clip has the frames that begin within its time", "[job]") {
+  const auto frames = [](const std::string& record) {
+    const Job job = job_from(with(good_job(), "{simulate: 200}", "{record: " + record + "}"));
+    CHECK(job.timeline[2].name == "clip");
+    return job.timeline[2].count;
+  };
+  CHECK(frames("{fps: 30, seconds: 2}") == 60);
+  CHECK(frames("{fps: 29.97, seconds: 2}") == 60);
+  CHECK(frames("{fps: 23.976, seconds: 1.7}") == 41);
+  CHECK(frames("{fps: 24, seconds: 0.25}") == 6);
+  CHECK(frames("{fps: 24, seconds: 0.26}") == 7);
+  // Whole but for rounding.
+  CHECK(frames("{fps: 10, seconds: 0.3}") == 3);
+  CHECK(frames("{fps: 60, seconds: 1.1}") == 66);
+  CHECK(frames("{fps: 7, seconds: 0.1}") == 1);
+}
+
 TEST_CASE("What stands beside a step of the timeline must belong to it", "[job]") {
   const auto complaint = [](const std::string& step) {
     return complaints_about(with(good_job(), "{simulate: 200}", step));

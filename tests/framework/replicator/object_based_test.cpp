@@ -230,3 +230,28 @@ TEST_CASE("What has no effect is named, what is unknown is refused", "[replicato
   CHECK_THAT(complaints_about("{num_frames: 3, capture: {}}"),
              ContainsSubstring("unknown key 'capture'"));
 }
+
+TEST_CASE("Numbers that leave nothing to photograph are told by the keys of the file",
+          "[replicator]") {
+  const auto only = [](const std::string& yaml, const std::string& expected) {
+    CAPTURE(yaml);
+    const std::string text = complaints_about(yaml);
+    CHECK_THAT(text, ContainsSubstring(expected));
+    // One fault, one line.
+    CHECK(text.find('\n') == text.size() - 1);
+  };
+  only("num_frames: 0", "num_frames: expected a number in [1, ");
+  only("num_cameras: 0", "num_cameras: expected a number in [1, ");
+  only("labeled_assets_and_properties: []", "there is no object for cameras to look at");
+  only("labeled_assets_and_properties: [{url: a.usd, count: 0}]",
+       "there is no object for cameras to look at");
+  only("{shape_distractors_num: 3, shape_distractors_types: []}",
+       "shape_distractors_types: there are none, but shape_distractors_num is 3");
+  only("mesh_distractors_urls: []",
+       "mesh_distractors_urls: there are none, but mesh_distractors_num is 75");
+}
+
+TEST_CASE("Shapes are called as the example takes them, in any case", "[replicator]") {
+  const Job job = translated("shape_distractors_types: [Cube, SPHERE, cone]").job;
+  CHECK(to_json(*job.objects[2].loader.map.find("shapes"), 0) == "[\"cube\",\"sphere\",\"cone\"]");
+}
