@@ -119,6 +119,22 @@ try {
   await page.getByRole('button', { name: 'Statistics' }).click();
   await page.waitForSelector('.page:not([hidden]) table');
   check(/pictures\s*2|2\s*pictures/.test(await page.textContent('.page:not([hidden])')), 'statistics are of the others');
+  // While brightness comes in, a click that takes long is a click.
+  const busy = await browser.newPage({ viewport: { width: 1366, height: 768 } });
+  await busy.addInitScript(() => {
+    const real = window.fetch.bind(window);
+    window.fetch = (path, options) => /\/brightness\//.test(String(path))
+      ? Promise.resolve(new Response(JSON.stringify({ from: 0, captures: 0, brightness: [] }), { status: 200 })) : real(path, options);
+  });
+  await busy.goto(address);
+  await busy.waitForFunction(() => document.querySelector('.facets .name') && document.querySelector('.status')?.hidden);
+  await busy.locator('.facets .name').first().hover();
+  await busy.mouse.down();
+  await busy.waitForTimeout(4000);
+  await busy.mouse.up();
+  await busy.waitForTimeout(300);
+  check((await busy.evaluate(() => location.hash)).includes('f.class'), 'a slow click filters while the page is still reading');
+  await busy.close();
   // Something as far away as numbers go must not make a grid of as many lines.
   const far = await browser.newPage({ viewport: { width: 1366, height: 768 } });
   await far.addInitScript(() => {

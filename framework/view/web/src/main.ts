@@ -59,6 +59,7 @@ class Site {
   private addressed = 0;  ///< When the address was changed.
   private noting = 0;  ///< Timer of a change that it does not have yet.
   private tabs = false;  ///< From button to button by keyboard.
+  private isHeld = false;  ///< A pointer is down: what is below it must not be made anew, or the click is lost.
 
   async start(): Promise<void> {
     document.body.append(this.top, this.faults, this.tools, this.gridPage, this.capture.element, this.compare.element,
@@ -68,7 +69,14 @@ class Site {
     window.addEventListener('hashchange', () => void (this.app && this.follow(readState(location.hash))));
     document.addEventListener('keydown', (event) => this.press(event));
     document.addEventListener('keydown', (event) => (this.tabs ||= event.key === 'Tab'), true);
-    document.addEventListener('pointerdown', () => (this.tabs = false), true);
+    document.addEventListener('pointerdown', () => {
+      this.tabs = false;
+      this.isHeld = true;
+    }, true);
+    for (const end of ['pointerup', 'pointercancel']) {
+      // The click comes after it.
+      document.addEventListener(end, () => window.setTimeout(() => (this.isHeld = false)), true);
+    }
     // Returns when all labels are read; the page is there before.
     await this.load(readState(location.hash));
     if (!isReport) this.watch();
@@ -148,6 +156,8 @@ class Site {
       if (ticket !== this.loading) return;
       const show = take(part);
       if (count() >= app.info.captures.length || performance.now() - shown > showMs) {
+        while (this.isHeld) await new Promise((resolve) => setTimeout(resolve, 30));
+        if (ticket !== this.loading) return;
         this.refilter();
         show();
         shown = performance.now();
