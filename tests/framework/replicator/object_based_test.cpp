@@ -253,5 +253,6 @@ TEST_CASE("Numbers that leave nothing to photograph are told by the keys of the 
 
 TEST_CASE("Shapes are called as the example takes them, in any case", "[replicator]") {
   const Job job = translated("shape_distractors_types: [Cube, SPHERE, cone]").job;
-  CHECK(to_json(*job.objects[2].loader.map.find("shapes"), 0) == "[\"cube\",\"sphere\",\"cone\"]");
+  CHECK(to_json(*job.objects[2].loader.map.find("shapes"), 0) ==
+        "[\"cube\", \"sphere\", \"cone\"]");
 }
