@@ -91,6 +91,7 @@ constexpr std::array kFieldTypes = {
     FieldType{"timeCodesPerSecond", FieldKind::Value, "double"},
     FieldType{"unauthoredValuesIndex", FieldKind::Value, "int"},
     FieldType{"upAxis", FieldKind::Value, "token"},
+    FieldType{"weight", FieldKind::Value, "float"},
 };
 
 FieldType field_type(std::string_view name) {

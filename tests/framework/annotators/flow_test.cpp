@@ -40,18 +40,16 @@ Vec3 point_at(const Mesh& mesh, std::uint32_t triangle, const std::array<double,
   return point;
 }
 
-/// One pixel of a camera at the origin that looks along -z, which shows a point of a leaf.
+/// The pictures have one pixel, which shows a point of a leaf; the camera at the origin looks along
+/// -z and images more.
 struct OnePixel {
   explicit OnePixel(std::shared_ptr<const Mesh> mesh) {
     leaf = scene.create(scene.root(), "leaf");
     scene.edit(leaf).mesh = std::move(mesh);
     scene.set_pose(leaf, Affine(Eigen::Translation3d(0.0, 0.0, -2.0)));
     camera = scene.create(scene.root(), "camera");
-    Camera lens;
-    lens.width = lens.height = 100;
-    scene.edit(camera).camera = lens;
-    frame.camera = lens;
-    frame.camera.width = frame.camera.height = 1;
+    frame.camera = Camera::from_lens(100, 100, 24.0, 40.0);
+    scene.edit(camera).camera = frame.camera;
     frame.camera_path = "/camera";
     frame.leaf_paths[leaf.index] = "/leaf";
   }
@@ -120,7 +118,6 @@ TEST_CASE("Flow follows points of a mesh that bends", "[flow]") {
     const double a = rng.uniform(0.1, 0.4), b = rng.uniform(0.1, 0.4);
     const std::array<double, 3> weights{a, b, 1.0 - a - b};
     pixel.show(point_at(*here, triangle, weights));
-    pixel.frame.camera.width = pixel.frame.camera.height = 100;
     const Vec3 from(point_at(*here, triangle, weights) + Vec3(0, 0, -2));
     const Vec3 to(point_at(*there, triangle, weights) + Vec3(0, 0, -2));
     const Vec2 expected = *project(pixel.frame.camera, to) - *project(pixel.frame.camera, from);

@@ -240,8 +240,8 @@ TEST_CASE("Numbers that leave nothing to photograph are told by the keys of the 
     // One fault, one line.
     CHECK(text.find('\n') == text.size() - 1);
   };
-  only("num_frames: 0", "num_frames: expected a number in [1, ");
-  only("num_cameras: 0", "num_cameras: expected a number in [1, ");
+  only("num_frames: 0", "num_frames: expected an integer in [1, ");
+  only("num_cameras: 0", "num_cameras: expected an integer in [1, ");
   only("labeled_assets_and_properties: []", "there is no object for cameras to look at");
   only("labeled_assets_and_properties: [{url: a.usd, count: 0}]",
        "there is no object for cameras to look at");
@@ -253,5 +253,6 @@ TEST_CASE("Numbers that leave nothing to photograph are told by the keys of the 
 
 TEST_CASE("Shapes are called as the example takes them, in any case", "[replicator]") {
   const Job job = translated("shape_distractors_types: [Cube, SPHERE, cone]").job;
-  CHECK(to_json(*job.objects[2].loader.map.find("shapes"), 0) == "[\"cube\",\"sphere\",\"cone\"]");
+  CHECK(to_json(*job.objects[2].loader.map.find("shapes"), 0) ==
+        "[\"cube\", \"sphere\", \"cone\"]");
 }
