@@ -109,6 +109,20 @@ std::set<int> chosen_captures(const TrialOptions& options, const CapturePlan& pl
   return chosen;
 }
 
+/// How many visits have one of them. Visits that nothing settles in count, too.
+int count_visits(const std::set<int>& captures, const CapturePlan& plan) {
+  std::set<int> visits;
+  for (const int capture : captures) {
+    int first = 0;
+    for (int end = plan.visit_count(); end - first > 1;) {
+      const int middle = first + (end - first) / 2;
+      (plan.visit(middle).first_capture <= capture ? first : end) = middle;
+    }
+    visits.insert(first);
+  }
+  return int(visits.size());
+}
+
 double seconds_of(const RunSummary& summary, std::string_view phase) {
   const auto found = summary.seconds.find(std::string(phase));
   return found == summary.seconds.end() ? 0.0 : found->second;
@@ -154,12 +168,11 @@ class ProcessorsLeft {
   double own_began_s_ = own_s();
 };
 
-Estimate estimate_of(const RunSummary& summary, const CapturePlan& plan, const RenderReport& report,
-                     double samples_factor) {
+Estimate estimate_of(const RunSummary& summary, const CapturePlan& plan, int visits,
+                     const RenderReport& report, double samples_factor) {
   Estimate estimate;
   estimate.captures = plan.capture_count();
   estimate.visits = plan.visit_count();
-  const double visits = std::max(1.0, double(summary.settled.visit_count()));
   const double captures = std::max(1, summary.captures);
   double per_visit = 0.0;
   double per_capture = 0.0;
@@ -237,16 +250,15 @@ Trial run_trial(const GlobalOptions& global, const Value& given, const TrialOpti
   trial.threads = services.host->thread_count();
   trial.processors_left = left.now();
   trial.processors = int(std::thread::hardware_concurrency());
-  trial.visits = std::max(1, int(summary.settled.visit_count()));
+  trial.visits = count_visits(*run.only, assembly.plan);
   const double factor = trial.samples > 0 ? double(trial.job_samples) / trial.samples : 1.0;
-  trial.estimate = estimate_of(summary, assembly.plan,
+  trial.estimate = estimate_of(summary, assembly.plan, trial.visits,
                                assembly.components.sets.front().renderer->report(), factor);
   // Each visit has a scene and components of its own. What visits leave to others, as pictures of
   // assets, is about as much as one of its own: those of a trial one after the other count, too.
   trial.estimate.visits_at_a_time =
       visits_at_a_time(assembly, *services.host, options.visits_in_flight);
-  const double more =
-      trial.estimate.visits_at_a_time / std::max(1.0, double(summary.settled.visit_count()));
+  const double more = double(trial.estimate.visits_at_a_time) / trial.visits;
   trial.estimate.memory_bytes =
       before_visits + std::max(1.0, more) * (peak_memory_bytes() - before_visits);
   return trial;
