@@ -109,9 +109,9 @@ RunSummary run_job(JobAssembly& assembly, HostServices& host, const RunCommandOp
   run.stop = &stop_requested;
   run.only_finishes = options.only_finishes;
   run.only = options.only;
-  run.progress = [&](const RunProgress& progress) {
+  run.progress = [&, calls = 0](const RunProgress& progress) mutable {
     constexpr int kCapturesPerTrim = 200;
-    if (progress.done % kCapturesPerTrim == 0) give_free_pages_back();
+    if (++calls % kCapturesPerTrim == 0) give_free_pages_back();
     if (lines) {
       lines->update(progress.done, progress.total, progress.resumed, progress.respawned,
                     progress.refused);
