@@ -29,7 +29,8 @@ out=$PWD/build/deb
 source=$out/diorama-$version
 rm -rf "$out"
 mkdir -p "$source"
-git ls-files -z | xargs -0 cp --parents -t "$source"
+# As root in a clone of somebody else, too.
+git -c "safe.directory=*" ls-files -z | xargs -0 cp --parents -t "$source"
 # The same bytes for the same sources; files of the packages get this date.
 date=$(dpkg-parsechangelog -l packaging/debian/changelog -S Timestamp)
 tar -C "$out" --sort=name --mtime="@$date" --owner=0 --group=0 -czf "$out/diorama_$version.orig.tar.gz" \

@@ -3,48 +3,63 @@
 # What takes longer than CI may. Every part runs, whatever the others say; ends with a table, and with 1 when
 # one failed.
 #   tests/nightly.sh [PART]...   build mutants kills faults large cluster views clip soak fuzz sanitize tidy deb12 deb13 (default: all)
-# Needs root for cluster, deb12 and deb13. KILLS (1000), FAULTS (5000), SOAK_CAPTURES (10000) and FUZZ_MINUTES
-# (60, shared by all fuzzers) say how much. Logs are in build/nightly.
+# Needs root for cluster, deb12 and deb13. KILLS (1000), FAULTS (5000), VIEWS (1000), SOAK_CAPTURES (10000) and
+# FUZZ_MINUTES (60, shared by all fuzzers) say how much. Logs are in build/nightly.
+# DIORAMA_BUILD says where the build is (default: build/release, which the part build makes). The parts kills, faults,
+# large, views, clip, soak and fuzz need nothing else of a build: neither compilers nor the place where it was made.
 set -uo pipefail
 cd "$(dirname "$0")/.."
 logs=$PWD/build/nightly
 mkdir -p "$logs"
 export CMAKE_GENERATOR=Ninja
+build=$(realpath -m "${DIORAMA_BUILD:-build/release}")
+export DIORAMA_BUILD=$build
 
 part_build() {
   ./bootstrap.sh packages && cmake --preset release -D DIORAMA_BUILD_TESTS=ON -D DIORAMA_WARNINGS_AS_ERRORS=ON &&
-    cmake --build --preset release --target all benchmarks denoiser_pictures
+    cmake --build --preset release --target all benchmarks denoiser_pictures &&
+    ctest --preset release -R '^fuzz_'  # builds the fuzzers
 }
-part_mutants() { DIORAMA_ALL_MUTANTS=1 ctest --preset release -R '^lint_test$' --output-on-failure; }
-part_kills() { tests/cluster/torture.py --kills "${KILLS:-1000}" --seed "$(date +%F)"; }
-part_faults() { tests/cluster/torture.py --faults "${FAULTS:-5000}" --seed "$(date +%F)"; }
+part_mutants() { DIORAMA_ALL_MUTANTS=1 "$build/tests/lint_test"; }
+part_kills() { tests/cluster/torture.py --kills "${KILLS:-1000}" --seed "$(date +%F)" --build "$build"; }
+part_faults() { tests/cluster/torture.py --faults "${FAULTS:-5000}" --seed "$(date +%F)" --build "$build"; }
 # The hidden tests: a million captures of a thousand shards.
-part_large() { build/release/tests/output_test '[.large]'; }
-part_cluster() { tests/cluster/run.sh; }
-part_views() { tests/chosen_views/check_views.py; }
+part_large() { "$build/tests/output_test" '[.large]'; }
+part_cluster() { tests/cluster/run.sh --build "$build"; }
+part_views() { tests/chosen_views/check_views.py --build "$build" --captures "${VIEWS:-1000}"; }
 part_clip() {
   local folder="$logs/clip"
-  build/release/bin/diorama run configs/clip.yaml --output "$folder" --overwrite --set renderer.samples=2 &&
+  "$build/bin/diorama" run configs/clip.yaml --output "$folder" --overwrite --set renderer.samples=2 &&
     /usr/bin/python3 tests/clips/check_clip.py "$folder" &&
-    /usr/bin/python3 tests/clips/check_walk.py --seeds 8 --height -0.3 0.6 --output "$logs"
+    /usr/bin/python3 tests/clips/check_walk.py --build "$build" --seeds 8 --height -0.3 0.6 --output "$logs"
 }
 part_soak() { tests/soak/run.sh "${SOAK_CAPTURES:-10000}"; }
-# What the fuzzers of ctest built, for longer; what they find to be new is kept in their corpus folders.
+
+# fuzz_one FUZZER SECONDS: what it finds to be new is kept in its corpus folder.
+fuzz_one() {
+  local fuzzer=$1 name place seeds=()
+  name=$(basename "$fuzzer" _fuzzer)
+  place=$(dirname "$fuzzer")
+  mapfile -t seeds < <(find "tests/fuzz/seeds/${name}s" "$place/corpus/${name}s" "$place/seeds" -maxdepth 0 -type d 2>/dev/null)
+  mkdir -p "$place/corpus/nightly_$name"
+  "$fuzzer" -max_total_time="$2" -rss_limit_mb=2048 -timeout=10 -max_len=65536 -print_final_stats=1 \
+    -artifact_prefix="$logs/${name}_fuzzer-" "$place/corpus/nightly_$name" "${seeds[@]}" \
+    >"$logs/fuzz_$name.log" 2>&1
+  local code=$?
+  echo "$name: exit code $code, ${#seeds[@]} folders of seeds, $(grep -a number_of_executed_units "$logs/fuzz_$name.log" || tail -n 1 "$logs/fuzz_$name.log")"
+  return "$code"
+}
+# What the part build made, for longer: as many at a time as there are processors.
 part_fuzz() {
-  local fuzzers fuzzer place seeds failed=0
-  ctest --preset release -R '^fuzz_' || failed=1
-  mapfile -t fuzzers < <(find build/release/fuzz -name '*_fuzzer' -type f -perm -u+x)
-  if ((${#fuzzers[@]} == 0)); then echo 'no fuzzers were built'; return 1; fi
-  for fuzzer in "${fuzzers[@]}"; do
-    place=$(dirname "$fuzzer")
-    mapfile -t seeds < <(find "$place/corpus" "$place/seeds" -type d 2>/dev/null)
-    echo "== $fuzzer, ${#seeds[@]} folders of seeds"
-    mkdir -p "$place/corpus/nightly_$(basename "$fuzzer")"
-    "$fuzzer" -max_total_time=$((60 * ${FUZZ_MINUTES:-60} / ${#fuzzers[@]})) -rss_limit_mb=2048 -timeout=10 \
-      -max_len=65536 -print_final_stats=1 -artifact_prefix="$logs/$(basename "$fuzzer")-" \
-      "$place/corpus/nightly_$(basename "$fuzzer")" "${seeds[@]}" || failed=1
-  done
-  return "$failed"
+  local fuzzers at_once
+  mapfile -t fuzzers < <(find "$build/fuzz" -name '*_fuzzer' -type f -perm -u+x)
+  if ((${#fuzzers[@]} == 0)); then echo "no fuzzers in $build/fuzz; the part build makes them"; return 1; fi
+  at_once=$(nproc)
+  if ((at_once > ${#fuzzers[@]})); then at_once=${#fuzzers[@]}; fi
+  export -f fuzz_one
+  export logs
+  printf '%s\0' "${fuzzers[@]}" | xargs -0 -P "$at_once" -I {} bash -c 'fuzz_one "$0" "$1"' {} \
+    $((60 * ${FUZZ_MINUTES:-60} * at_once / ${#fuzzers[@]}))
 }
 part_sanitize() { ./bootstrap.sh sanitize-more; }
 part_tidy() { tests/check_tidy.sh --all-checks; }

@@ -110,10 +110,10 @@ RunSummary run_job(JobAssembly& assembly, HostServices& host, const RunCommandOp
   run.stop = &stop_requested;
   run.only_finishes = options.only_finishes;
   run.only = options.only;
-  run.progress = [&](const RunProgress& progress) {
+  run.progress = [&, calls = 0](const RunProgress& progress) mutable {
     constexpr int kCapturesPerTrim = 200;
     has_begun = true;
-    if (progress.done % kCapturesPerTrim == 0) give_free_pages_back();
+    if (++calls % kCapturesPerTrim == 0) give_free_pages_back();
     if (lines) {
       lines->update(progress.done, progress.total, progress.resumed, progress.respawned,
                     progress.refused);

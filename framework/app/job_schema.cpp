@@ -129,33 +129,31 @@ class DistributionSchemas {
     schema.set("maxProperties", Value::integer(1));
     return schema;
   }
-  /// The forms that numbers and vectors share; `point` is a number or a vector.
-  static std::vector<Form> drawn(const Value& point, const Value& deviation,
+  /// The forms that numbers and vectors share; `point` is a number or a vector of such numbers.
+  template <class Point>
+  static std::vector<Form> drawn(const ParamSpec& spec, const Point& point,
                                  const std::string& name) {
-    const Value bounds = keys({{"lower", point}, {"upper", point}});
-    return {{"uniform", bounds},
-            {"log_uniform", bounds},
-            {"normal", keys({{"mean", point}, {"std", deviation}})},
+    const Value number = number_schema("number", spec);
+    Value positive = number;
+    if (spec.min <= 0.0) positive.set("exclusiveMinimum", Value::integer(0));
+    ParamSpec deviation;
+    deviation.min = 0.0;
+    return {{"uniform", keys({{"lower", point(number)}, {"upper", point(number)}})},
+            {"log_uniform", keys({{"lower", point(positive)}, {"upper", point(positive)}})},
+            {"normal",
+             keys({{"mean", point(number)}, {"std", point(number_schema("number", deviation))}})},
             choice("choices", reference_to(name)),
             sequence(reference_to(name))};
   }
-  static ParamSpec not_negative() {
-    ParamSpec spec;
-    spec.min = 0.0;
-    return spec;
-  }
   static Value numbers(const ParamSpec& spec, const std::string& name) {
     const Value number = number_schema("number", spec);
-    return any_of({number, list_schema(number, 2),
-                   forms(drawn(number, number_schema("number", not_negative()), name))});
+    const auto point = [](const Value& of) { return of; };
+    return any_of({number, list_schema(number, 2), forms(drawn(spec, point, name))});
   }
   Value vectors(const ParamSpec& spec, const std::string& name) {
     const Value axis = reference(spec, false);
-    const auto point = [](const ParamSpec& of) {
-      const Value number = number_schema("number", of);
-      return any_of({number, list_schema(number, 3)});
-    };
-    std::vector<Form> words = drawn(point(spec), point(not_negative()), name);
+    const auto point = [](const Value& of) { return any_of({of, list_schema(of, 3)}); };
+    std::vector<Form> words = drawn(spec, point, name);
     words.emplace_back("combine", keys({{"distributions", list_schema(axis, 3)}}));
     const Value number = number_schema("number", spec);
     return any_of({number, list_schema(number, 2), list_schema(axis, 3), forms(std::move(words))});

@@ -121,7 +121,10 @@ void move_addresses(Surroundings number) {
 
 void change_environment(Surroundings number) {
   const std::string text = std::to_string(number);
-  for (const char* variable : {"USER", "LOGNAME", "HOSTNAME", "DISPLAY", "OMP_NUM_THREADS"}) {
+  for (const char* variable :
+       {"USER", "LOGNAME", "HOSTNAME", "DISPLAY", "OMP_NUM_THREADS", "SHELL", "TERM", "COLUMNS",
+        "EDITOR", "PWD", "CI", "SLURM_JOB_ID", "SLURM_ARRAY_TASK_ID", "SGE_TASK_ID", "JOB_ID",
+        "JOB_COMPLETION_INDEX", "AWS_BATCH_JOB_ARRAY_INDEX", "SOURCE_DATE_EPOCH"}) {
     setenv(variable, text.c_str(), 1);
   }
   setenv("TZ", "Asia/Kathmandu", 1);

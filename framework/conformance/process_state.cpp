@@ -6,6 +6,7 @@
 
 #include <cfenv>
 #include <clocale>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <limits>
@@ -36,6 +37,20 @@ std::map<std::string, std::string> current_environment() {
   return variables;
 }
 
+/// Names of the files that are open. What drivers and libraries hold (devices, sockets, caches of
+/// kernels) is theirs.
+std::multiset<std::string> current_files() {
+  std::multiset<std::string> names;
+  std::error_code gone;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd", gone)) {
+    struct stat status {};
+    const int number = std::atoi(entry.path().filename().c_str());
+    if (::fstat(number, &status) != 0 || !S_ISREG(status.st_mode)) continue;
+    names.insert(std::filesystem::read_symlink(entry.path(), gone).string());
+  }
+  return names;
+}
+
 }  // namespace
 
 ProcessState::ProcessState() {
@@ -46,6 +61,8 @@ ProcessState::ProcessState() {
   rounding_ = std::fegetround();
   keeps_tiny_numbers_ = keeps_tiny_numbers();
   environment_ = current_environment();
+  files_ = current_files();
+  ::pthread_sigmask(SIG_BLOCK, nullptr, &blocked_);
   for (int number = 1; number < NSIG; ++number) {
     struct sigaction action {};
     if (sigaction(number, nullptr, &action) == 0)
@@ -61,7 +78,12 @@ void ProcessState::require_unchanged() const {
   require(now.rounding_ == rounding_, "changes how floating-point numbers are rounded");
   require(now.keeps_tiny_numbers_ == keeps_tiny_numbers_, "makes tiny numbers zero");
   require(now.environment_ == environment_, "changes environment variables");
+  for (const std::string& name : now.files_) {
+    require(now.files_.count(name) <= files_.count(name), "leaves '" + name + "' open");
+  }
   for (std::size_t number = 1; number < NSIG; ++number) {
+    require(::sigismember(&now.blocked_, int(number)) == ::sigismember(&blocked_, int(number)),
+            "blocks signal " + std::to_string(number));
     require(now.handlers_[number] == handlers_[number],
             "changes what signal " + std::to_string(number) + " does");
   }

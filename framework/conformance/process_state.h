@@ -6,6 +6,7 @@
 #include <array>
 #include <csignal>
 #include <map>
+#include <set>
 #include <string>
 
 namespace diorama::conformance {
@@ -24,7 +25,9 @@ class ProcessState {
   int rounding_ = 0;
   bool keeps_tiny_numbers_ = true;
   std::map<std::string, std::string> environment_;
+  std::multiset<std::string> files_;
   std::array<void (*)(int), NSIG> handlers_{};
+  sigset_t blocked_{};  ///< Of the calling thread.
 };
 
 }  // namespace diorama::conformance

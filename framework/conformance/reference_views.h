@@ -16,8 +16,9 @@ struct ReferenceView {
   NodeId camera;
 };
 
-/// Three: a principal point off the centre; a rolled camera before turned, scaled and nested nodes;
-/// a distorted lens.
+/// Three: a principal point off the centre and pixels that are not square, before faces of several
+/// materials, a texture and the back of a sheet; a rolled camera on a turned stand before turned,
+/// scaled and nested nodes; a distorted lens, before which something is too near.
 std::vector<ReferenceView> reference_views();
 
 /// What the ray through a pixel's centre meets, by the words of frame.h, found by trying every

@@ -276,6 +276,35 @@ void compare_coverage(const Subject& subject) {
   }
 }
 
+/// One thing that may be another one in the next picture.
+struct Change {
+  const char* what;
+  void (*make)(ReferenceView& view, NodeId node);
+};
+
+constexpr Change kChanges[]{
+    {"a node moved",
+     [](ReferenceView& view, NodeId node) {
+       const Affine pose = view.scene[node].parent_from_node;
+       view.scene.set_pose(node, Affine(Eigen::Translation3d(0.0, 0.3, 0.4)) * pose);
+     }},
+    {"a node was hidden",
+     [](ReferenceView& view, NodeId node) { view.scene.edit(node).is_visible = false; }},
+    {"a node got another mesh",
+     [](ReferenceView& view, NodeId node) {
+       // As many points as before.
+       view.scene.edit(node).mesh = std::make_shared<const Mesh>(make_box({0.4, 0.7, 0.6}));
+     }},
+    {"a node got another material",
+     [](ReferenceView& view, NodeId node) {
+       auto paint = std::make_shared<Material>(*view.scene[node].materials.front());
+       paint->base_color = Vec3f(0.9f, 0.1f, 0.7f);
+       view.scene.edit(node).materials = {std::move(paint)};
+     }},
+    {"the camera got another lens",
+     [](ReferenceView& view, NodeId) { view.scene.edit(view.camera).camera->fx = 61.0; }},
+};
+
 /// What one renderer drew before must not show in what it draws next.
 void check_history(const Subject& subject) {
   const auto draw = [](Renderer& renderer, const ReferenceView& view) {
@@ -287,18 +316,27 @@ void check_history(const Subject& subject) {
   for (const ReferenceView& view : views) draw(*used, view);
   require(draw(*used, views.front()) == draw(*subject.make<Renderer>(), views.front()),
           "draws a scene differently after others");
-  // A change of the pose alone, and back.
-  std::vector<ReferenceView> fresh = reference_views();
-  ReferenceView& moved = fresh.front();
-  const auto still = subject.make<Renderer>();
-  const std::string before = draw(*still, moved);
-  const NodeId box = moved.scene.require("/Assets/low");
-  const Affine pose = moved.scene[box].parent_from_node;
-  moved.scene.set_pose(box, Affine(Eigen::Translation3d(0.0, 0.3, 0.4)) * pose);
-  require(draw(*still, moved) == draw(*subject.make<Renderer>(), moved),
-          "does not see that a node moved since the last picture");
-  moved.scene.set_pose(box, pose);
-  require(draw(*still, moved) == before, "a node that moved and came back looks different");
+  for (const Change& change : kChanges) {
+    std::vector<ReferenceView> fresh = reference_views();
+    ReferenceView& changed = fresh.front();
+    const auto still = subject.make<Renderer>();
+    const std::string before = draw(*still, changed);
+    const NodeId node = changed.scene.require("/Assets/low");
+    const Affine pose = changed.scene[node].parent_from_node;
+    const Node was = changed.scene[node];
+    const Camera lens = *changed.scene[changed.camera].camera;
+    change.make(changed, node);
+    require(draw(*still, changed) == draw(*subject.make<Renderer>(), changed),
+            std::string("does not see that ") + change.what + " since the last picture");
+    changed.scene.set_pose(node, pose);
+    Node& again = changed.scene.edit(node);
+    again.is_visible = was.is_visible;
+    again.mesh = was.mesh;
+    again.materials = was.materials;
+    changed.scene.edit(changed.camera).camera = lens;
+    require(draw(*still, changed) == before,
+            std::string("draws something else when ") + change.what + " and it was undone");
+  }
 }
 
 }  // namespace

@@ -127,6 +127,15 @@ Dataset write_on_two_threads(Writer& writer, const std::vector<Capture>& capture
   return dataset;
 }
 
+/// Another process wrote the captures: its records and what it kept are all that is left of that.
+Dataset finished_by_another(Writer& writer, const std::vector<Capture>& captures,
+                            const Dataset& written) {
+  Dataset dataset = begun(writer, captures);
+  dataset.captures = written.captures;
+  finish(writer, dataset);
+  return dataset;
+}
+
 /// Many threads write the same captures through one writer, again and again, each as it was written
 /// alone: what they share in the writer they share without knowing.
 void write_all_at_once(Writer& writer, const std::vector<Capture>& captures,
@@ -183,6 +192,10 @@ void check_dataset(const CheckRun& run, const Subject& subject, const std::strin
   run.check("captures may come in any order, on two threads" + which, [&] {
     require(dataset == write_on_two_threads(*fresh(subject.host), captures),
             "differs from captures in order");
+  });
+  run.check("what finish() writes follows from the records" + which, [&] {
+    require(dataset == finished_by_another(*fresh(subject.host), captures, dataset),
+            "differs when another process wrote the captures");
   });
   run.check("several threads may write at once" + which, [&] {
     require(dataset.captures.size() == captures.size(),

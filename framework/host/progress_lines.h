@@ -8,7 +8,7 @@
 
 namespace diorama {
 
-/// How far a run is, for programs that wait for it: a line per capture.
+/// How far a run is, for programs that wait for it: a line for each update.
 class ProgressLines {
  public:
   enum class Format : std::uint8_t {
@@ -19,8 +19,9 @@ class ProgressLines {
   /// `stream` must outlive this.
   ProgressLines(Format format, std::ostream& stream);
 
-  /// `done` includes `resumed`, which were there before and do not count for the rate. `respawned`:
-  /// objects that had left the room and were placed anew. `refused`: views that were drawn again.
+  /// `done`: on disk. It includes `resumed`, which were there before and do not count for the rate.
+  /// `respawned`: objects that had left the room and were placed anew. `refused`: views that were
+  /// drawn again.
   void update(std::int64_t done, std::int64_t total, std::int64_t resumed, std::int64_t respawned,
               std::int64_t refused);
 

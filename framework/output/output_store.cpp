@@ -658,19 +658,38 @@ bool OutputStore::may_remove(const JournalledFile& file) {
   return is_own || state_of(path, file) == FileState::Right;
 }
 
+/// Of a folder that the old dataset did not have: what lies there is somebody else's.
+void OutputStore::refuse_content(const fs::path& folder) const {
+  const auto status = file_system_.status(folder);
+  if (!status || status->kind != FileStatus::Kind::Folder) return;
+  for (const std::string& name : file_system_.list(folder)) {
+    if (name.starts_with('.')) continue;
+    throw Error(ErrorKind::Output, folder.string() + ": holds '" + name +
+                                       "', which is not of the dataset that is replaced; move it "
+                                       "away or choose another folder");
+  }
+}
+
 void OutputStore::remove_dataset() {
   Journals old(file_system_, diorama_folder() / "journal", capture_count_);
   old.refresh();
   std::set<std::string> workers;
   for (const auto& [worker, index] : old.workers()) workers.insert(worker);
   // All of it is read before anything goes: a bad journal is an error, not half a removal.
+  std::vector<bool> is_known(folders_.writers.size(), false);
   old.visit_entries([&](const std::string& worker, const EntryPlace& place) {
     const auto content = old.files_of(worker, place);
     if (!content) return;
     for (const JournalledFile& file : content->files) {
       check_no_links((folders_.base / file.path).parent_path());
+      for (std::size_t i = 0; i < is_known.size(); ++i) {
+        if (is_below(folders_.writers[i].folder, file.path)) is_known[i] = true;
+      }
     }
   });
+  for (std::size_t i = 0; i < is_known.size(); ++i) {
+    if (!is_known[i]) refuse_content(joined(folders_.base, folders_.writers[i].folder));
+  }
   // dataset.json goes first: from then on the folder holds no dataset that could be resumed.
   file_system_.remove_file(dataset_file());
   file_system_.sync_folder(folders_.records_path());
@@ -843,6 +862,11 @@ void OutputStore::publish(int entry, const JournalledFiles& content) {
 
 void OutputStore::check_membership() {
   if (!is_lost_ && workers_.is_member()) return;
+  if (!file_system_.exists(dataset_file())) {
+    throw Error(ErrorKind::Output, folders_.records_path().string() +
+                                       ": the dataset is gone; it was removed or moved while this "
+                                       "process worked on it");
+  }
   throw Busy(folders_.records_path().string() +
              ": other processes took this one for dead and go on with its part; it was cut off for "
              "more than " +

@@ -220,6 +220,7 @@ class OutputStore {
   void verify(const std::function<bool(int)>& is_wanted);
   void take_back(const std::string& worker, const EntryPlace& place, const std::string& reason,
                  const std::vector<JournalledFile>& damaged);
+  void refuse_content(const std::filesystem::path& folder) const;
   void remove_dataset();
   bool may_remove(const JournalledFile& file);
   void remove_stage(const std::string& worker);

@@ -51,7 +51,6 @@ struct Pipeline::Turn {
 struct Pipeline::Flight {
   struct Begun {
     std::atomic<bool> is_cancelled = false;
-    int captures = 0;
     int respawned = 0;
     std::map<std::string, double> seconds;
     std::int64_t refused = 0;
@@ -111,11 +110,17 @@ RunSummary Pipeline::run(const DatasetInfo& dataset, const std::string& dataset_
         queue, WriterQueue::Work{[this](const PendingCapture& pending) { return encode(pending); },
                                  [this](int capture, Transaction& transaction) {
                                    store_.commit_capture(capture, transaction);
+                                   ++written_;
                                  }});
     try {
       run_visits();
       const Stopwatch watch(summary_.seconds["waiting for writers"]);
-      if (!queue_->drain([this] { return options_.stop && *options_.stop; })) throw Interrupted();
+      const auto look = [this] {
+        tell_written();
+        return options_.stop && *options_.stop;
+      };
+      if (!queue_->drain(look)) throw Interrupted();
+      tell_written();
     } catch (const Interrupted&) {
       end_early();
       throw;
@@ -308,23 +313,32 @@ void Pipeline::hand_over(const Turn& turn, PendingCapture pending, const VisitRe
     {
       const std::lock_guard lock(flight_->mutex);
       Flight::Begun& own = flight_->begun[turn.number];
-      own.captures = result.captures;
       own.respawned = result.respawned;
       own.seconds = result.seconds;
       seconds = summary_.seconds;
       own.refused = result.refused;
-      progress = {summary_.resumed + summary_.captures, total_, summary_.resumed,
-                  summary_.respawned, summary_.views.refused_draws()};
+      progress = {summary_.resumed + written_, total_, summary_.resumed, summary_.respawned,
+                  summary_.views.refused_draws()};
       for (const auto& [number, begun] : flight_->begun) {
-        progress.done += begun.captures;
         progress.respawned += begun.respawned;
         for (const auto& [stage, time] : begun.seconds) seconds[stage] += time;
         progress.refused += begun.refused;
       }
     }
     store_.tell_times(seconds);
+    told_ = progress;
     if (options_.progress) options_.progress(progress);
   });
+}
+
+/// Once all visits have ended; says nothing when nothing was written since it was said last.
+void Pipeline::tell_written() {
+  RunProgress progress{0, total_, summary_.resumed, 0, 0};
+  if (told_) progress = *told_;
+  progress.done = summary_.resumed + written_;
+  if (told_ && told_->done == progress.done) return;
+  told_ = progress;
+  if (options_.progress) options_.progress(progress);
 }
 
 /// Waits for its end; throws what it throws. Visits that are alone are on that thread already.
@@ -367,6 +381,7 @@ void Pipeline::serve_visits() {
 void Pipeline::end_early() {
   queue_->drop_waiting();
   queue_->drain();
+  tell_written();
   store_.close();
 }
 

@@ -28,7 +28,7 @@ namespace diorama {
 
 /// How far a run is.
 struct RunProgress {
-  int done = 0;              ///< With `resumed`.
+  int done = 0;              ///< On disk, with `resumed`.
   int total = 0;             ///< Of this shard; of the whole job with RunOptions::takes_visits.
   int resumed = 0;           ///< Were there before.
   int respawned = 0;         ///< Objects that had left the room and were placed anew.
@@ -46,7 +46,7 @@ struct RunOptions {
   /// were made. If not, later visits are encoded meanwhile; either way they are published in order.
   bool encodes_in_order = false;
   const std::atomic<bool>* stop = nullptr;  ///< True asks the run to end soon.
-  /// Called on the main thread after each capture.
+  /// Called on the main thread after each capture, and while and after the last ones are written.
   std::function<void(const RunProgress&)> progress;
 };
 
@@ -94,6 +94,7 @@ class Pipeline {
   void add_up(VisitResult result);
   void wait_for_output(const Turn& turn);
   void hand_over(const Turn& turn, PendingCapture pending, const VisitResult& result);
+  void tell_written();
   void call_on_main_thread(const std::function<void()>& call);
   void serve_visits();
   bool has_to_stop(const Turn& turn) const;
@@ -116,6 +117,8 @@ class Pipeline {
   const DatasetInfo* dataset_ = nullptr;
   const std::string* dataset_json_ = nullptr;
   int total_ = 0;
+  std::atomic<int> written_ = 0;  ///< Captures, by this run.
+  std::optional<RunProgress> told_;
   RunSummary summary_;
   std::unique_ptr<Flight> flight_;
   std::unique_ptr<WriterQueue> queue_;

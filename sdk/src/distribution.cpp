@@ -108,6 +108,9 @@ struct Distribution::Reader {
     } else {
       complain(value, name);
     }
+    if (!made.first_.allFinite() || !made.second_.allFinite()) {
+      complaints.add(value.place, name + ": expected finite numbers, found " + value.describe());
+    }
     made.source_ = value;
     return made;
   }

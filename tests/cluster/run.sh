@@ -19,7 +19,9 @@ engines=(slurm gridengine)
 if (($#)); then engines=("$1"); shift; fi
 scenarios=("$@")
 if ((EUID != 0)); then echo "run.sh: must run as root" >&2; exit 1; fi
-if [[ ! -x $build/bin/diorama ]]; then echo "run.sh: no $build/bin/diorama; build first" >&2; exit 1; fi
+for file in bin/diorama tests/unkind_files.so; do
+  if [[ ! -e $build/$file ]]; then echo "run.sh: no $build/$file; build with tests first" >&2; exit 1; fi
+done
 
 work=$(mktemp -d /tmp/diorama-cluster.XXXXXX)
 chmod 755 "$work"
@@ -77,7 +79,7 @@ delay() {
 
 # The program as tasks find it: slowed down, with the plugins of the build.
 make_program() {
-  cc -shared -fPIC -O1 -o "$work/unkind_files.so" tests/cluster/unkind_files.c -ldl
+  cp "$build/tests/unkind_files.so" "$work"  # a path without spaces
   cat >"$work/bin/diorama" <<-END
 	#!/bin/sh
 	export SLOW_RENAME_MS=\$(cat $work/delay) LD_PRELOAD=$work/unkind_files.so XDG_DATA_HOME=$work/none

@@ -8,7 +8,7 @@ faulty file system, until a number of kills and faults is reached. What must hol
 - when all shards were started once more and ended, the dataset has the files of one undisturbed run, byte
   by byte.
 
-    tests/cluster/torture.py --kills 1000 --faults 5000 [--build FOLDER] [--seed N] [--seconds N]
+    tests/cluster/torture.py --kills 1000 --faults 5000 [--build FOLDER] [--seed N] [--seconds N] [--at-once N]
 
 Says every half minute what was done so far; ends with a line of counts, and with 1 when something did not
 hold; then the folders of that round are kept. With --seconds no round begins after that time; it ends with 1
@@ -16,6 +16,7 @@ when it came to none of the kills or faults that were asked for.
 """
 import argparse
 import collections
+import concurrent.futures
 import errno
 import filecmp
 import os
@@ -26,6 +27,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 
 HERE = pathlib.Path(__file__).resolve().parent
@@ -100,7 +102,8 @@ class Round:
         """A shard that another process works on already, as a list of one or none."""
         if self.rng.random() >= chance:
             return []
-        self.torture.counts["doubled"] += 1
+        with self.torture.mutex:
+            self.torture.counts["doubled"] += 1
         return [self.start(self.rng.randint(1, SHARDS))]
 
     def run_with_faults(self, budget):
@@ -155,12 +158,12 @@ class Torture:
     def __init__(self, options):
         self.options = options
         self.program = options.build / "bin/diorama"
+        self.library = options.build / "tests/unkind_files.so"
+        for file in (self.program, self.library):
+            if not file.exists():
+                sys.exit(f"torture: no {file}; build with tests first")
         self.work = pathlib.Path(tempfile.mkdtemp(prefix="diorama-torture."))
-        self.library = options.library
-        if self.library is None:
-            self.library = self.work / "unkind_files.so"
-            subprocess.run(["cc", "-shared", "-fPIC", "-O1", "-o", self.library, HERE / "unkind_files.c",
-                            "-ldl"], check=True)
+        self.mutex = threading.Lock()  # of the counts
         self.begin = time.monotonic()
         self.counts = collections.Counter()
         self.reference = self.work / "reference"
@@ -173,27 +176,13 @@ class Torture:
 
     def run(self):
         counts, options = self.counts, self.options
-        said = 0
-        while counts["kills"] < options.kills or counts["faults"] < options.faults:
-            elapsed = time.monotonic() - self.begin
-            if options.seconds and elapsed >= options.seconds:
-                break
-            if elapsed >= said + SAY_EVERY_S:
-                said = elapsed
-                print("so far: " + self.report(), flush=True)
-            counts["rounds"] += 1
-            round_ = Round(self, counts["rounds"])
-            counts[f"rounds at {round_.delay_ms} ms"] += 1
-            if counts["kills"] < options.kills:
-                counts["kills"] += round_.run_with_kills(options.kills - counts["kills"])
-            else:
-                counts["faults"] += round_.run_with_faults(options.faults - counts["faults"])
-            round_.finish()
-            for fault in round_.faults:
-                print(f"round {counts['rounds']} ({round_.folder}): {fault}", flush=True)
-            counts["bad"] += bool(round_.faults)
-            if not round_.faults:
-                shutil.rmtree(round_.folder)
+        ended = threading.Event()
+        talker = threading.Thread(target=self.tell_progress, args=(ended,), daemon=True)
+        talker.start()
+        with concurrent.futures.ThreadPoolExecutor(options.at_once) as pool:
+            for future in [pool.submit(self.make_rounds) for _ in range(options.at_once)]:
+                future.result()
+        ended.set()
         print("torture: " + self.report(), flush=True)
         if not counts["bad"]:
             shutil.rmtree(self.work)
@@ -201,6 +190,36 @@ class Torture:
         if missing:
             print("torture: the time ended before any " + " and ".join(missing), flush=True)
         return 1 if counts["bad"] or missing else 0
+
+    def make_rounds(self):
+        """One after the other, until there is nothing more to do."""
+        counts, options = self.counts, self.options
+        while not (options.seconds and time.monotonic() - self.begin >= options.seconds):
+            with self.mutex:
+                wants_kills = counts["kills"] < options.kills
+                if not wants_kills and counts["faults"] >= options.faults:
+                    return
+                left = {what: getattr(options, what) - counts[what] for what in ("kills", "faults")}
+                counts["rounds"] += 1
+                round_ = Round(self, counts["rounds"])
+                counts[f"rounds at {round_.delay_ms} ms"] += 1
+            if wants_kills:
+                what, done = "kills", round_.run_with_kills(left["kills"])
+            else:
+                what, done = "faults", round_.run_with_faults(left["faults"])
+            with self.mutex:
+                counts[what] += done
+            round_.finish()
+            with self.mutex:
+                for fault in round_.faults:
+                    print(f"{round_.folder}: {fault}", flush=True)
+                counts["bad"] += bool(round_.faults)
+            if not round_.faults:
+                shutil.rmtree(round_.folder)
+
+    def tell_progress(self, ended):
+        while not ended.wait(SAY_EVERY_S):
+            print("so far: " + self.report(), flush=True)
 
     def report(self):
         counts = self.counts
@@ -227,9 +246,12 @@ def main():
     parser.add_argument("--captures", type=int, default=16, help="of the job")
     parser.add_argument("--seed", default="1")
     parser.add_argument("--seconds", type=float, help="until no further round begins (default: no limit)")
-    parser.add_argument("--library", type=pathlib.Path, help="unkind_files.c, compiled (default: cc does it)")
+    parser.add_argument("--at-once", type=int, default=max(1, len(os.sched_getaffinity(0)) // 2),
+                        help="rounds side by side, which wait for most of their time (default: %(default)s)")
     parser.add_argument("--build", type=pathlib.Path, default=HERE.parent.parent / "build/release")
-    return Torture(parser.parse_args()).run()
+    options = parser.parse_args()
+    options.build = options.build.resolve()  # rounds are run elsewhere
+    return Torture(options).run()
 
 
 if __name__ == "__main__":

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// Preloaded into the program; makes its file system slow or faulty:
-//   SLOW_RENAME_MS  every move of a file takes so long. A run then lasts long enough to be
-//   disturbed, without
-//                   using the processor.
-//   SLOW_FILES_MS   so does everything that makes, moves, removes or syncs a file or folder, as on
-//   a network. FAIL_AT         the operation of that number (1, 2, ...; writes count, too) fails
-//   with the error number
-//                   FAIL_ERRNO (default: no space left), and with FAIL_ON=1 every later one as
-//                   well; FAIL_MARK names a file that is made then.
+// Preloaded into the program; makes its file system slow or faulty. The environment says how:
+//
+// SLOW_RENAME_MS: every move of a file takes so long. A run then lasts long enough to be disturbed,
+// without using the processor.
+//
+// SLOW_FILES_MS: so does everything that makes, moves, removes or syncs a file or folder, as on a
+// network.
+//
+// FAIL_AT: the operation of that number (1, 2, ...; writes count, too) fails with the error number
+// FAIL_ERRNO (default: no space left), and with FAIL_ON=1 every later one as well; FAIL_MARK names
+// a file that is made then.
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "diorama/plugin.h"
 #include "diorama/renderer.h"
@@ -34,7 +35,18 @@ enum class Lie : std::uint8_t {
   NoAlpha,
   ShowsHidden,
   ParentIds,
+  OneFocalLength,
+  SeesTooNear,
+  CameraWithoutItsStand,
+  CullsBackFaces,
+  FirstMaterialOnly,
+  NoTextures,
+  NoColoursOfCorners,
   KeepsTheFirstPoses,
+  KeepsWhatWasVisible,
+  KeepsTheFirstMeshes,
+  KeepsTheFirstPaint,
+  KeepsTheFirstLens,
   CountsPictures,
   MillimetreDistances,
 };
@@ -70,16 +82,25 @@ class Liar final : public Renderer {
  private:
   void do_prepare(const Scene& scene) override {
     if (lie == Lie::KeepsTheFirstPoses && !poses_.empty()) return;
-    poses_.clear();
+    std::vector<std::pair<NodeId, Affine>> now;
     for (const NodeId node : scene.subtree(scene.root())) {
       if (!scene[node].mesh) continue;
-      if (lie != Lie::ShowsHidden && !scene.is_visible(node)) continue;
-      poses_.emplace_back(node, scene.world_from_node(node));
+      meshes_.emplace(node, scene[node].mesh);
+      paints_.emplace(node, scene[node].materials);
+      if (lie != Lie::ShowsHidden && !scene.is_visible(node)) {
+        const auto was = std::ranges::find(poses_, node, &std::pair<NodeId, Affine>::first);
+        if (lie != Lie::KeepsWhatWasVisible || was == poses_.end()) continue;
+      }
+      now.emplace_back(node, scene.world_from_node(node));
     }
+    poses_ = std::move(now);
   }
 
   Frame do_render(const Scene& scene, const RenderRequest& request) override {
-    const Camera camera = *scene[request.camera].camera;
+    Camera camera = *scene[request.camera].camera;
+    if (lie == Lie::KeepsTheFirstLens) {
+      camera = lenses_.emplace(std::pair(camera.width, camera.height), camera).first->second;
+    }
     const int w = camera.width, h = camera.height;
     Image<Rgba8> color(w, h, {20, 30, 40, std::uint8_t(lie == Lie::NoAlpha ? 0 : 255)});
     Image<float> distance(w, h, std::numeric_limits<float>::infinity()), depth = distance;
@@ -163,6 +184,7 @@ class Liar final : public Renderer {
 
   static Affine view_of(const Scene& scene, NodeId camera) {
     Affine view = scene.world_from_node(camera);
+    if (lie == Lie::CameraWithoutItsStand) view = scene[camera].parent_from_node;
     if (lie == Lie::NoRoll) view.linear() = look_rotation(-view.linear().col(2)).toRotationMatrix();
     return view;
   }
@@ -184,6 +206,8 @@ class Liar final : public Renderer {
       camera.cx = camera.width / 2.0;
       camera.cy = camera.height / 2.0;
     }
+    if (lie == Lie::OneFocalLength) camera.fy = camera.fx;
+    if (lie == Lie::SeesTooNear) camera.near_m = 0.0;
     if (lie == Lie::NoDistortion) camera.lens = LensModel::Pinhole;
     const auto direction = ray_direction(camera, pixel);
     if (!direction) return hit;
@@ -192,15 +216,19 @@ class Liar final : public Renderer {
     const double slant = std::max(-direction->z(), 1e-6);
     for (const auto& [leaf, world_from_node] : poses_) {
       if (leaves && std::ranges::find(*leaves, leaf) == leaves->end()) continue;
-      meet(scene[leaf], leaf, world_from_node, origin, ray, camera.near_m / slant, hit);
+      const Mesh& mesh = lie == Lie::KeepsTheFirstMeshes ? *meshes_.at(leaf) : *scene[leaf].mesh;
+      const auto& paint = lie == Lie::KeepsTheFirstPaint ? paints_.at(leaf) : scene[leaf].materials;
+      meet(mesh, paint, leaf, world_from_node, origin, ray, camera.near_m / slant, hit);
     }
     return hit;
   }
 
-  static void meet(const Node& node, NodeId leaf, const Affine& world_from_node, const Vec3& origin,
-                   const Vec3& ray, double nearest, Hit& hit) {
-    const Mesh& mesh = *node.mesh;
-    for (const auto& triangle : mesh.triangles) {
+  using Paint = std::vector<std::shared_ptr<const Material>>;
+
+  static void meet(const Mesh& mesh, const Paint& paint, NodeId leaf, const Affine& world_from_node,
+                   const Vec3& origin, const Vec3& ray, double nearest, Hit& hit) {
+    for (std::size_t number = 0; number < mesh.triangles.size(); ++number) {
+      const auto& triangle = mesh.triangles[number];
       const auto corner = [&](std::size_t i) -> Vec3 {
         return world_from_node * mesh.positions[triangle[i]].cast<double>();
       };
@@ -211,6 +239,8 @@ class Liar final : public Renderer {
       const Vec3 uvt = columns.inverse() * (origin - a);
       if (uvt.x() < 0 || uvt.y() < 0 || uvt.x() + uvt.y() > 1) continue;
       if (uvt.z() < nearest || uvt.z() >= hit.distance) continue;
+      const bool is_from_behind = (b - a).cross(c - a).dot(ray) > 0.0;
+      if (lie == Lie::CullsBackFaces && is_from_behind) continue;
       hit.leaf = leaf;
       hit.distance = uvt.z();
       hit.position = origin + uvt.z() * ray;
@@ -222,11 +252,27 @@ class Liar final : public Renderer {
         return mesh.uvs[triangle[i]].cast<double>();
       };
       hit.uv = (1.0 - uvt.x() - uvt.y()) * uv_at(0) + uvt.x() * uv_at(1) + uvt.y() * uv_at(2);
-      hit.color = node.materials.empty() ? Vec3f(Vec3f::Constant(0.8f))
-                                         : node.materials.front()->base_color;
+      hit.color = color_of(mesh, paint, number);
     }
   }
 
+  static Vec3f color_of(const Mesh& mesh, const Paint& paint, std::size_t triangle) {
+    if (paint.empty()) return Vec3f::Constant(0.8f);
+    const bool has_slots = !mesh.material_slots.empty() && lie != Lie::FirstMaterialOnly;
+    const Material& material = *paint[has_slots ? mesh.material_slots[triangle] : 0];
+    Vec3f color = material.base_color;
+    // The textures of the checks are of one colour.
+    const auto& texture = material.base_color_texture.texture;
+    for (int k = 0; texture && lie != Lie::NoTextures && k < 3; ++k) {
+      color[k] *= linear_from_srgb(float(texture->bytes[std::size_t(k)]) / 255.0f);
+    }
+    if (mesh.colors.empty() || lie == Lie::NoColoursOfCorners) return color;
+    return color.cwiseProduct(mesh.colors[mesh.triangles[triangle][0]]);
+  }
+
+  std::map<NodeId, std::shared_ptr<const Mesh>> meshes_;  // as they were first
+  std::map<NodeId, Paint> paints_;
+  std::map<std::pair<int, int>, Camera> lenses_;
   std::vector<std::pair<NodeId, Affine>> poses_;
   int pictures_ = 0;
 };
@@ -260,7 +306,18 @@ DIORAMA_PLUGIN("lying_renderers", "1.0.0", "MIT") {
   ADD_LIAR(NoAlpha, "no_alpha");
   ADD_LIAR(ShowsHidden, "shows_hidden");
   ADD_LIAR(ParentIds, "parent_ids");
+  ADD_LIAR(OneFocalLength, "one_focal_length");
+  ADD_LIAR(SeesTooNear, "sees_too_near");
+  ADD_LIAR(CameraWithoutItsStand, "camera_without_its_stand");
+  ADD_LIAR(CullsBackFaces, "culls_back_faces");
+  ADD_LIAR(FirstMaterialOnly, "first_material_only");
+  ADD_LIAR(NoTextures, "no_textures");
+  ADD_LIAR(NoColoursOfCorners, "no_colours_of_corners");
   ADD_LIAR(KeepsTheFirstPoses, "keeps_the_first_poses");
+  ADD_LIAR(KeepsWhatWasVisible, "keeps_what_was_visible");
+  ADD_LIAR(KeepsTheFirstMeshes, "keeps_the_first_meshes");
+  ADD_LIAR(KeepsTheFirstPaint, "keeps_the_first_paint");
+  ADD_LIAR(KeepsTheFirstLens, "keeps_the_first_lens");
   ADD_LIAR(CountsPictures, "counts_pictures");
   ADD_LIAR(MillimetreDistances, "millimetre_distances");
 #undef ADD_LIAR

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Writers that break one promise each, in ways that a single run does not show.
+#include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -12,6 +13,7 @@
 #include <set>
 #include <thread>
 
+#include "diorama/distribution.h"
 #include "diorama/plugin.h"
 #include "diorama/writer.h"
 
@@ -64,6 +66,10 @@ std::string time_zone() {
   localtime_r(&noon, &local);
   return number_text(local.tm_hour);
 }
+std::string batch_job() {
+  const char* const task = std::getenv("SLURM_ARRAY_TASK_ID");
+  return task ? task : "";
+}
 std::string thread() {
   return number_text((long long)(std::hash<std::thread::id>()(std::this_thread::get_id()) % 1000));
 }
@@ -101,6 +107,15 @@ void go_elsewhere() {
 void open_rights() { umask(0); }
 void speak_differently() { std::setlocale(LC_ALL, "C.UTF-8"); }
 void set_variable() { setenv("DIORAMA_ASSETS_ROOT", "/elsewhere", 1); }
+void block_terminations() {
+  sigset_t set;
+  sigemptyset(&set);
+  sigaddset(&set, SIGTERM);
+  pthread_sigmask(SIG_BLOCK, &set, nullptr);
+}
+void leave_a_file_open() {
+  if (open("/proc/self/exe", O_RDONLY) < 0) std::abort();
+}
 void ignore_interrupts() { std::signal(SIGINT, SIG_IGN); }
 
 /// A line that all threads build in one place.
@@ -129,12 +144,45 @@ struct CountsFrames : Honest {
   }
 };
 
+/// Knows of captures that it wrote itself, and of no others.
+struct CountsItself : Honest {
+  using Honest::Honest;
+  mutable std::atomic<int> count = 0;
+  std::string line(const Capture& capture) const override {
+    ++count;
+    return capture.phase;
+  }
+  void finish(const RecordReader&, DatasetFiles& files) override {
+    files.add_text("count.txt", std::to_string(count));
+  }
+};
+
 struct DefaultTooLarge : Honest {
   struct Params {
     double size_m = 3.0;
     void visit(ParamVisitor& v) { v.param("size_m", size_m, {"Size.", "m", 0.0, 2.0}); }
   };
   DefaultTooLarge(Params, Host& host) : Honest({}, host) {}
+};
+
+struct DrawsTooLarge : Honest {
+  struct Params {
+    Distribution size_m = Range{1.0, 3.0};
+    void visit(ParamVisitor& v) { v.param("size_m", size_m, {"Size.", "m", 0.0, 2.0}); }
+  };
+  DrawsTooLarge(Params, Host& host) : Honest({}, host) {}
+};
+
+struct ItemTooLarge : Honest {
+  struct Item {
+    double size_m = 3.0;
+    void visit(ParamVisitor& v) { v.param("size_m", size_m, {"Size.", "m", 0.0, 2.0}); }
+  };
+  struct Params {
+    std::vector<Item> items;
+    void visit(ParamVisitor& v) { v.list("items", items, {"Items."}); }
+  };
+  ItemTooLarge(Params, Host& host) : Honest({}, host) {}
 };
 
 struct DefaultNotAmongWords : Honest {
@@ -170,6 +218,7 @@ DIORAMA_PLUGIN("lying_writers", "1.0.0", "MIT") {
   DIORAMA_ADD(Says<heap_order>, "says_heap_order", "Sorts by addresses.");
   DIORAMA_ADD(Says<user>, "says_user", "Writes the user's name.");
   DIORAMA_ADD(Says<time_zone>, "says_time_zone", "Writes local time.");
+  DIORAMA_ADD(Says<batch_job>, "says_batch_job", "Writes its number among the tasks of a job.");
   DIORAMA_ADD(Says<thread>, "says_thread", "Writes its thread.");
   DIORAMA_ADD(Does<loop_for_ever>, "loops", "Never returns, busily.");
   DIORAMA_ADD(Does<sleep_for_ever>, "sleeps", "Never returns, asleep.");
@@ -182,9 +231,14 @@ DIORAMA_PLUGIN("lying_writers", "1.0.0", "MIT") {
   DIORAMA_ADD(Does<speak_differently>, "speaks_differently", "Changes the locale.");
   DIORAMA_ADD(Does<set_variable>, "sets_variable", "Changes the environment.");
   DIORAMA_ADD(Does<ignore_interrupts>, "ignores_interrupts", "Changes what Ctrl-C does.");
+  DIORAMA_ADD(Does<block_terminations>, "blocks_terminations", "Does not hear SIGTERM any more.");
+  DIORAMA_ADD(Does<leave_a_file_open>, "leaves_a_file_open", "Opens a file and forgets it.");
+  DIORAMA_ADD(CountsItself, "counts_itself", "Finishes without the records.");
   DIORAMA_ADD(SharesItsBuffer, "shares_its_buffer", "Builds all lines in one place.");
   DIORAMA_ADD(CountsFrames, "counts_frames", "Expects to be alone.");
   DIORAMA_ADD(DefaultTooLarge, "default_too_large", "Has a default beyond its range.");
+  DIORAMA_ADD(DrawsTooLarge, "draws_too_large", "Draws from beyond its range by default.");
+  DIORAMA_ADD(ItemTooLarge, "item_too_large", "Has items with a default beyond their range.");
   DIORAMA_ADD(DefaultNotAmongWords, "default_not_among_words", "Has a default that is no word.");
   DIORAMA_ADD(SaysItTwice, "says_it_twice", "Declares a key twice.");
 }

@@ -157,6 +157,10 @@ TEST_CASE("Mistakes in distributions are told with place, finding and what would
              ContainsSubstring("expected a number in [0, 5], found '7'"));
   CHECK_THAT(complaint("{choice: {choices: [1, 9]}}", 1, {"A quantity.", "m", 0.0, 5.0}),
              ContainsSubstring("scale.choice.choices[1]"));
+  for (const char* endless : {".inf", "[0, .inf]", "{normal: {mean: 0, std: .inf}}",
+                              "{log_uniform: {lower: 1, upper: .inf}}"}) {
+    CHECK_THAT(complaint(endless), ContainsSubstring("expected finite numbers"));
+  }
 }
 
 TEST_CASE("Texts are chosen by weight or in turn", "[distribution]") {

@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <cstdlib>
 #include <optional>
+#include <sstream>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "diorama/distribution.h"
 #include "framework/app/cli.h"
 #include "framework/app/reference_pages.h"
 #include "framework/config/value_text.h"
@@ -131,6 +133,161 @@ bool says(const std::vector<std::string>& messages, const std::string& text) {
 }
 
 }  // namespace
+
+namespace {
+
+/// Parameters that are drawn at random, some of them bounded.
+struct Drawn {
+  Distribution size = 1.5;
+  Distribution angle = Range{-90.0, 90.0};
+  Distribution color = Vec3(0.5, 0.5, 0.5);
+  Distribution place = Vec3(0, 1, 2);
+  std::optional<Distribution> length;
+  std::optional<Distribution> speed;
+  TextDistribution sky;
+
+  void visit(ParamVisitor& v) {
+    v.param("size", size, {"Size.", "m", 0.5, 4.0});
+    v.param("angle", angle, {"Angle.", "deg"});
+    v.param("color", color, {"Color.", "", 0.0, 1.0}, 3);
+    v.param("place", place, {"Place.", "m"}, 3);
+    v.param("length", length, {"Length; null keeps it.", "mm", 1.0});
+    v.param("speed", speed, {"Speed; null keeps it.", "m/s", -2.0, 2.0}, 3);
+    v.param("sky", sky, {"Pictures."});
+  }
+};
+
+bool is_accepted(const std::string& yaml) {
+  const Value job = parse_yaml(yaml, "job.yaml");
+  Complaints complaints;
+  Drawn drawn;
+  ParamReader reader(job, "", complaints);
+  drawn.visit(reader);
+  reader.finish();
+  return complaints.messages().empty();
+}
+
+}  // namespace
+
+TEST_CASE("the schema says of distributions what the reader says, out of range and malformed",
+          "[schema]") {
+  if (!has_validator()) return;
+  struct Given {
+    const char* text;
+    bool is_right;
+  };
+  const std::vector<Given> givens{
+      {"size: 0.5", true},
+      {"size: 4", true},
+      {"size: 0.49", false},
+      {"size: 4.01", false},
+      {"size: [0.5, 4]", true},
+      {"size: [0.4, 2]", false},
+      {"size: [1, 5]", false},
+      {"size: [1]", false},
+      {"size: [1, 2, 3]", false},
+      {"size: true", false},
+      {"size: null", false},
+      {"size: '1'", false},
+      {"size: {uniform: {lower: 1, upper: 2}}", true},
+      {"size: {distribution.uniform: {lower: 1, upper: 2}}", true},
+      {"size: {distribution.uniform: {lower: 0, upper: 2}}", false},
+      {"size: {uniform: {lower: 1, upper: 9}}", false},
+      {"size: {uniform: {lower: 1}}", false},
+      {"size: {uniform: {lower: 1, upper: 2, middle: 1}}", false},
+      {"size: {uniform: [1, 2]}", false},
+      {"size: {uniform: {lower: [1, 1, 1], upper: 2}}", false},
+      {"size: {uniform: {lower: 1, upper: 2}, normal: {mean: 1, std: 1}}", false},
+      {"size: {unifrom: {lower: 1, upper: 2}}", false},
+      {"size: {normal: {mean: 4, std: 100}}", true},  // clamped
+      {"size: {normal: {mean: 5, std: 1}}", false},
+      {"size: {normal: {mean: 1, std: -1}}", false},
+      {"size: {log_uniform: {lower: 0.5, upper: 4}}", true},
+      {"size: {log_uniform: {lower: 0.5, upper: 5}}", false},
+      {"size: {log_uniform: {lower: 0.1, upper: 4}}", false},
+      {"size: {choice: {choices: [0.5, [1, 2], {uniform: {lower: 1, upper: 4}}]}}", true},
+      {"size: {choice: {choices: [0.5, [1, 2], {uniform: {lower: 1, upper: 5}}]}}", false},
+      {"size: {choice: {choices: [0.5, 5]}}", false},
+      {"size: {choice: {choices: []}}", false},
+      {"size: {choice: {choices: [1, 2], weights: [3, 0]}}", true},
+      {"size: {choice: {choices: [1, 2], weights: [3, -1]}}", false},
+      {"size: {choice: {choices: [1, 2], weights: null}}", false},
+      {"size: {sequence: {items: [1, 4]}}", true},
+      {"size: {sequence: {items: [1, 4.5]}}", false},
+      {"size: {sequence: {items: [1], weights: [1]}}", false},
+      {"size: {combine: {distributions: [1, 1, 1]}}", false},
+      {"angle: -1e9", true},
+      {"angle: {log_uniform: {lower: 0, upper: 1}}", false},
+      {"angle: {log_uniform: {lower: 1, upper: -1}}", false},
+      {"angle: {log_uniform: {lower: 1e-9, upper: 1}}", true},
+      {"color: 0.5", true},
+      {"color: 1.5", false},
+      {"color: [0, 1]", true},
+      {"color: [0, 2]", false},
+      {"color: [0, 1, 1]", true},
+      {"color: [0, 1, 1.5]", false},
+      {"color: [[0, 1], 1, {normal: {mean: 1, std: 2}}]", true},
+      {"color: [[0, 1.5], 1, {normal: {mean: 1, std: 2}}]", false},
+      {"color: [[0, 1], 1, {normal: {mean: -1, std: 2}}]", false},
+      {"color: [[0, 0, 0], [1, 1, 1]]", false},
+      {"color: {uniform: {lower: [0, 0, 0], upper: 1}}", true},
+      {"color: {uniform: {lower: [0, 0, -1], upper: 1}}", false},
+      {"color: {uniform: {lower: [0, 0], upper: 1}}", false},
+      {"color: {log_uniform: {lower: [0.1, 0.1, 0], upper: 1}}", false},
+      {"color: {log_uniform: {lower: [0.1, 0.1, 0.1], upper: 1}}", true},
+      {"color: {normal: {mean: [0, 1, 1], std: [0, 0, 3]}}", true},
+      {"color: {normal: {mean: [0, 1, 1], std: [0, 0, -3]}}", false},
+      {"color: {choice: {choices: [[0, 0, 0], [1, 1, 1], 0.5]}}", true},
+      {"color: {choice: {choices: [[0, 0, 0], [1, 1, 2]]}}", false},
+      {"color: {combine: {distributions: [0, [0, 1], 1]}}", true},
+      {"color: {distribution.combine: {distributions: [0, [0, 1.1], 1]}}", false},
+      {"color: {combine: {distributions: [0, 1]}}", false},
+      {"place: [-1e6, 0, 1e6]", true},
+      {"place: {combine: {distributions: [{sequence: {items: [1, -2]}}, 0, 0]}}", true},
+      {"place: null", false},
+      {"length: null", true},
+      {"length: 1", true},
+      {"length: 0.9", false},
+      {"length: {log_uniform: {lower: 0.9, upper: 2}}", false},
+      {"speed: null", true},
+      {"speed: [2, -2, 0]", true},
+      {"speed: [2, -2.5, 0]", false},
+      {"speed: {choice: {choices: [{uniform: {lower: [-2, -2, -3], upper: 0}}]}}", false},
+      {"sky: a.hdr", true},
+      {"sky: []", true},
+      {"sky: [a.hdr, b.hdr]", true},
+      {"sky: [[a.hdr]]", false},
+      {"sky: {choice: {choices: [a, b], weights: [1, 2]}}", true},
+      {"sky: {choice: {choices: [a, b], weights: [1, -2]}}", false},
+      {"sky: {sequence: {items: []}}", false},
+      {"sky: {shuffle: {items: [a]}}", false}};
+
+  ParamLister lister;
+  Drawn().visit(lister);
+  auto known = components();
+  known.push_back({ComponentKind::Randomizer, "shake", "Shakes.", lister.take()});
+  const test::WorkFolder folder;
+  std::string files =
+      folder.write("schema.json", to_json(job_schema(job_specs(), known), 1)).string();
+  for (std::size_t i = 0; i < givens.size(); ++i) {
+    const Value job = parse_yaml("environments: [{type: shapes}]\nrandomizers:\n- {type: shake, " +
+                                     std::string(givens[i].text) + "}",
+                                 "job");
+    files += " " + folder.write(std::to_string(i) + ".json", to_json(job, 1)).string();
+  }
+  const auto run = test::run_shell(
+      "/usr/bin/python3 " DIORAMA_SOURCE_DIR "/tests/framework/app/check_schema.py " + files);
+  REQUIRE(run.err.empty());
+  std::istringstream lines(run.out);
+  for (const Given& given : givens) {
+    INFO(given.text);
+    CHECK(is_accepted(given.text) == given.is_right);
+    const std::string key(given.text, std::string_view(given.text).find(':'));
+    std::string line;
+    REQUIRE(std::getline(lines, line));
+    CHECK(line == (given.is_right ? "ok" : "refused: randomizers/0/" + key));
+  }
+}
 
 TEST_CASE("a key of the job's table is known to reader, defaults, schema and reference",
           "[schema]") {

@@ -643,6 +643,27 @@ TEST_CASE("A worker that was cut off for too long stops when it comes back", "[s
   CHECK(dataset_files(disk.tree("/data")) == expected_files(8));
 }
 
+TEST_CASE("A dataset that is moved away while it is made is one message, and goes on elsewhere",
+          "[store]") {
+  const TemporaryFolder folder;
+  LocalFileSystem local;
+  const fs::path before = folder.path() / "before";
+  const fs::path after = folder.path() / "after";
+  {
+    OutputStore store(local, folders_in(before), 3, options_of({}));
+    store.join(kDataset);
+    store.open();
+    commit(store, 0);
+    fs::rename(before, after);
+    CHECK(thrown<Error>([&] { commit(store, 1); }) ==
+          (before / "out").string() +
+              ": the dataset is gone; it was removed or moved while this process worked on it");
+  }
+  CHECK_FALSE(fs::exists(before));
+  CHECK(run(local, after, resuming("w2")));
+  CHECK(dataset_files(tree(after)) == expected_files(3));
+}
+
 TEST_CASE("Overwriting removes all files of the old dataset, others stay", "[store]") {
   const TemporaryFolder folder;
   LocalFileSystem local;
@@ -664,22 +685,33 @@ TEST_CASE("Overwriting with a job of other writers leaves nothing of the old one
   run(process, "/data", {});
   disk.put("/data/new/rgb_0.png", "a picture of mine");
   disk.put("/data/elsewhere/mine.txt", "mine, too");
-  OutputFolders folders{"/data", "out", {{"one", "new"}}};
+  disk.put("/data/out/one/new_0.png", "and mine");
   Job job = resuming("w2", 1);
   job.existing = Existing::Overwrite;
+  const Files before = dataset_files(disk.tree("/data"));
   {
-    OutputStore store(process, folders, 1, options_of(job));
+    // Found before anything is removed.
+    OutputStore store(process, {"/data", "out", {{"one", "new"}}}, 1, options_of(job));
+    store.join(kDataset);
+    CHECK(thrown<Error>([&] { store.open(); }) ==
+          "/data/new: holds 'rgb_0.png', which is not of the dataset that is replaced; move it "
+          "away or choose another folder");
+  }
+  CHECK(dataset_files(disk.tree("/data")) == before);
+  {
+    OutputStore store(process, {"/data", "out", {{"one", "out/one"}}}, 1, options_of(job));
     store.join(kDataset);
     store.open();
     Transaction capture;
-    capture.files.push_back({0, "rgb_0.png", bytes_of("colour 0")});
+    capture.files.push_back({0, "new_0.png", bytes_of("colour 0")});
     CHECK_THROWS_WITH(store.commit_capture(0, capture),
-                      ContainsSubstring("/data/new/rgb_0.png: exists and is no file of this "
+                      ContainsSubstring("/data/out/one/new_0.png: exists and is no file of this "
                                         "dataset") &&
                           ContainsSubstring("move it away"));
   }
   CHECK(dataset_files(disk.tree("/data")) == Files{{"out/dataset.json", kDataset},
                                                    {"new/rgb_0.png", "a picture of mine"},
+                                                   {"out/one/new_0.png", "and mine"},
                                                    {"elsewhere/mine.txt", "mine, too"}});
 }
 

@@ -277,7 +277,8 @@ struct Run {
     options.stop = &stop;
     options.progress = [this](const RunProgress& now) {
       if (std::this_thread::get_id() != main_thread) script.fault("progress by another thread");
-      if (now.done <= progress.done) script.fault("progress goes back");
+      if (now.done < progress.done) script.fault("progress goes back");
+      if (now.done > int(captures().size())) script.fault("what is not on disk is called done");
       progress = now;
     };
   }

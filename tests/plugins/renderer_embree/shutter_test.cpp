@@ -103,7 +103,7 @@ void check_ramp(const Image<Vec3f>& image, double width_px) {
 
 }  // namespace
 
-TEST_CASE("a moving edge is blurred over the way it goes", "[renderer][shutter]") {
+TEST_CASE("a moving edge is blurred over the way it goes", "[renderer][shutter][long]") {
   Edge edge;
   edge.lens().exposure_time_s = 0.02;
   // 20 px = focal * v * t / depth
@@ -112,7 +112,7 @@ TEST_CASE("a moving edge is blurred over the way it goes", "[renderer][shutter]"
   check_ramp(edge.picture(), 20.0);
 }
 
-TEST_CASE("a moving camera blurs like moving things do", "[renderer][shutter]") {
+TEST_CASE("a moving camera blurs like moving things do", "[renderer][shutter][long]") {
   const double speed = 20.0 * kDepth / kFocal / 0.02;
   SECTION("by its own velocity") {
     Edge edge;
@@ -136,7 +136,7 @@ TEST_CASE("a moving camera blurs like moving things do", "[renderer][shutter]") 
   }
 }
 
-TEST_CASE("a rolling shutter leans what moves", "[renderer][shutter]") {
+TEST_CASE("a rolling shutter leans what moves", "[renderer][shutter][long]") {
   Edge edge;
   edge.lens().readout_time_s = 0.03;
   const double speed = 20.0 * kDepth / kFocal / 0.03;
@@ -149,7 +149,7 @@ TEST_CASE("a rolling shutter leans what moves", "[renderer][shutter]") {
   }
 }
 
-TEST_CASE("a whole turn smears a bar over its circle", "[renderer][shutter]") {
+TEST_CASE("a whole turn smears a bar over its circle", "[renderer][shutter][long]") {
   TestWorld world;
   const NodeId camera = world.add_camera(64, 64, 60.0, Vec3(-kDepth, 0, 0), Vec3(0, 0, 0));
   Camera& lens = *world.scene.edit(camera).camera;
@@ -217,7 +217,7 @@ TEST_CASE("blurred pictures are the same for any threads and after other scenes"
   edge.lens().exposure_time_s = 0.02;
   RigidBody& body = *edge.world.scene.edit(edge.body).rigid_body;
   body.linear_velocity = Vec3(3, 2, 1);
-  body.angular_velocity = Vec3(0, 5, 1);
+  body.angular_velocity = Vec3(300, 5, 1);  // nearly a whole turn
   const Image<Vec3f> first = edge.render(kColorHdr, 4, 1);
   CHECK(edge.render(kColorHdr, 4, 4) == first);
 
@@ -231,6 +231,27 @@ TEST_CASE("blurred pictures are the same for any threads and after other scenes"
     renderer.prepare(edge.world.scene);
   }
   CHECK(renderer.render({edge.camera, {std::string(kColorHdr.name)}, 7}).get(kColorHdr) == first);
+}
+
+TEST_CASE("an open aperture leaves what is in focus sharp, and nothing else",
+          "[renderer][shutter]") {
+  Edge edge;
+  edge.lens().focal_length_mm = 100.0;
+  edge.lens().f_stop = 1.4;
+  const auto softest = [&](double focus_m) {
+    edge.lens().focus_distance_m = focus_m;
+    const Image<Vec3f> image = edge.picture(4);
+    double most = 0.0;
+    for (int x = 0; x < kWidth; ++x) {
+      if (std::abs(x + 0.5 - 0.5 * kWidth) < 1.0) continue;  // pixels that the edge itself divides
+      const double expected = x < kWidth / 2 ? 1.0 : 0.0;
+      most = std::max(most, std::abs(column(image, x) - expected));
+    }
+    return most;
+  };
+  CHECK(softest(kDepth) < 1e-6);
+  // 80 px * (0.1 m / 1.4) * |1 / 0.5 - 1 / 4| are 10 px.
+  CHECK(softest(0.5) > 0.2);
 }
 
 TEST_CASE("a light out of focus becomes the circle that the thin lens says",
