@@ -58,6 +58,12 @@ bool is_url(std::string_view asset) {
   return asset.find("://") != std::string_view::npos && has_scheme(asset);
 }
 
+/// Without what a URL says besides (RFC 3986, 3.4 and 3.5): "?version=3", "#top". Servers keep many
+/// versions of a file, the assets root one.
+std::string_view plain_url(std::string_view asset) {
+  return is_url(asset) ? asset.substr(0, asset.find_first_of("?#")) : asset;
+}
+
 /// What follows the host, or the whole of what is no URL; begins with '/'.
 std::string path_of(std::string_view asset) {
   if (!is_url(asset)) return (asset.starts_with('/') ? "" : "/") + std::string(asset);
@@ -176,6 +182,7 @@ AssetPaths::AssetPaths(std::optional<fs::path> root, std::vector<AssetPrefix> pr
 
 std::vector<fs::path> AssetPaths::places_below(std::string_view asset) const {
   std::vector<fs::path> places;
+  asset = plain_url(asset);
   const bool is_remote = is_url(asset);
   // Nothing lies above the root of a server (RFC 3986, 5.2.4).
   const auto plain = [&](const fs::path& path) {
@@ -225,7 +232,8 @@ fs::path AssetPaths::resolve(std::string_view asset) const {
                 name +
                     ": remote assets are not fetched; copy the file below the assets root "
                     "(--assets-root, DIORAMA_ASSETS_ROOT) and name it '" +
-                    usual_name(path_of(asset)) + "'" + (tried.empty() ? "" : "; tried " + tried));
+                    usual_name(path_of(plain_url(asset))) + "'" +
+                    (tried.empty() ? "" : "; tried " + tried));
   }
   if (!root_) {
     throw Error(ErrorKind::Asset,

@@ -31,6 +31,7 @@ constexpr const char* kColliderWords[] = {"none", "triangle_mesh", "convex_hull"
 constexpr const char* kJointWords[] = {"held", "free"};
 constexpr const char* kEnvironmentColliderWords[] = {"none", "triangle_mesh", "convex_hull",
                                                      "bounding_box"};
+constexpr const char* kUnmatchedWords[] = {"error", "warning"};
 constexpr const char* kPickWords[] = {"per_job", "per_visit"};
 constexpr const char* kSettlePolicies[] = {"keep", "respawn", "drop"};
 constexpr const char* kLightWords[] = {"sphere", "rect", "disk", "distant", "dome"};
@@ -802,8 +803,10 @@ void EnvironmentRules::visit(ParamVisitor& v) {
   v.param("hide_in_debug", hide_in_debug, {"The same, in debug mode only."});
   v.choice("colliders", colliders, kEnvironmentColliderWords,
            {"Collider of every mesh of the environment."});
-  v.param("box_colliders", box_colliders,
-          {"The first node whose path holds the text gets bounding box colliders instead."});
+  v.param(
+      "box_colliders", box_colliders,
+      {"The first node whose path holds the text gets bounding box colliders instead, for those "
+       "of its meshes that fill their box: table tops, but no table that is one mesh."});
   v.param("working_area", working_area,
           {"The first node whose path holds this text is the centre of the working area; null: the "
            "origin."});
@@ -818,6 +821,9 @@ void EnvironmentRules::visit(ParamVisitor& v) {
   v.choice("joints", joints, kJointWords,
            {"held: what joints hold together stands still as it is posed; free: it moves as its "
             "joints allow."});
+  v.choice("unmatched", unmatched, kUnmatchedWords,
+           {"What a text of these rules, or a pattern below /Environment, is that fits nothing in "
+            "any of the job's environments. What fits in some of them only is never an error."});
 }
 
 void ObjectGroup::visit(ParamVisitor& v) {
@@ -1045,6 +1051,7 @@ Job read_job(const Value& value, Complaints& complaints) {
       read_parameters(value, "loaders", "each loader reads its files in one way", complaints);
   read_environments(value, job, complaints);
   read_section(value, "environment", job.environment, complaints);
+  if (const Value* map = value.find("environment")) job.environment.map = *map;
   if (!job.environment.walls.empty() && job.environment.walls.size() != 3) {
     complaints.add(place_of(*value.find("environment"), "walls"),
                    "environment.walls: expected [width, depth, height] in metres, or []");

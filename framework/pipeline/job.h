@@ -40,6 +40,8 @@ struct EnvironmentRules {
   std::optional<double> max_lamp_lux;  ///< At kLampDistance.
   std::string joints = "held";
   std::vector<double> walls;  ///< Size of the box that they enclose, or empty: none.
+  std::string unmatched = "error";
+  Value map;  ///< As the job gives it, for places in messages.
   void visit(ParamVisitor& v);
 };
 

@@ -39,7 +39,7 @@ struct JobComponents {
   std::vector<VisitComponents> sets;             ///< One per visit in flight, at least one.
   std::vector<std::unique_ptr<Writer>> writers;  ///< In the order of the job.
   Demand demand;
-  /// Of randomizers; they can be tried only once an environment is there.
+  /// They can be tried only once an environment is there.
   std::vector<EnvironmentPattern> environment_patterns;
 };
 

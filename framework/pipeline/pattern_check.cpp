@@ -12,6 +12,8 @@ namespace {
 
 using Names = std::vector<std::string_view>;
 
+constexpr const char* kEnvironmentPath = "/Environment";
+
 /// "/Assets/*" is "Assets" and "*".
 Names names_of(std::string_view path) {
   Names names;
@@ -53,7 +55,7 @@ std::size_t fitting_names(const Names& pattern, const Names& path) {
 /// Every path that a visit may have outside of the environment: of all assets, falling and
 /// floating.
 std::vector<std::string> possible_paths(const Job& job, const CapturePlan& plan) {
-  std::set<std::string> paths{"/Environment"};
+  std::set<std::string> paths{kEnvironmentPath};
   // A group that is switched off may be spoken of.
   for (const ObjectGroup& group : job.objects) {
     if (group.count == 0) paths.insert(group.under);
@@ -91,7 +93,93 @@ bool is_about_environment(std::string_view pattern) {
   return names.size() > 1 && names.front() == "Environment";
 }
 
+char lower(char c) { return c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c; }
+
+/// Insertions, deletions and replacements that make the first text a part of the second, upper and
+/// lower case being the same. A '*' of the first costs nothing.
+std::size_t distance_within(std::string_view wanted, std::string_view text) {
+  std::vector<std::size_t> last(text.size() + 1, 0);
+  std::vector<std::size_t> row(text.size() + 1);
+  for (const char c : wanted) {
+    const bool is_star = c == '*';
+    row[0] = last[0] + (is_star ? 0 : 1);
+    for (std::size_t j = 1; j <= text.size(); ++j) {
+      row[j] = is_star ? std::min(last[j], row[j - 1])
+                       : std::min({last[j] + 1, row[j - 1] + 1,
+                                   last[j - 1] + (lower(c) == lower(text[j - 1]) ? 0 : 1)});
+    }
+    std::swap(last, row);
+  }
+  return *std::ranges::min_element(last);
+}
+
+/// What the pattern's first name that fits none of the paths is nearest to.
+NearestText nearest_path(std::string_view pattern, const std::vector<std::string>& paths) {
+  const Names names = names_of(pattern);
+  std::size_t fitting = 0;
+  for (const std::string& path : paths) {
+    fitting = std::max(fitting, fitting_names(names, names_of(path)));
+  }
+  NearestText nearest;
+  for (const std::string& path : paths) {
+    const Names of_path = names_of(path);
+    if (fitting >= of_path.size() || fitting_names(names, of_path) != fitting) continue;
+    std::string shown;
+    for (std::size_t i = 0; i <= fitting; ++i) shown += "/" + std::string(of_path[i]);
+    nearest.add(names[fitting], of_path[fitting], shown);
+  }
+  return nearest;
+}
+
+/// Of the rules for environments.
+std::vector<EnvironmentPattern> rule_patterns(const Job& job) {
+  const EnvironmentRules& rules = job.environment;
+  std::vector<EnvironmentPattern> patterns;
+  const auto add = [&](const char* key, const std::vector<std::string>& texts,
+                       const std::string& otherwise, LogLevel level) {
+    const Value* value = rules.map.find(key);
+    for (std::size_t i = 0; i < texts.size(); ++i) {
+      const bool is_listed = value && i < value->list.size();
+      const Place place = is_listed ? value->list[i].place : value ? value->place : Place();
+      patterns.push_back(
+          {texts[i], std::string("environment.") + key, place, false, otherwise, level});
+    }
+  };
+  // Rooms often lack some of what is hidden where it is.
+  add("hide", rules.hide, "nothing is hidden for it", LogLevel::Info);
+  if (job.debug) {
+    add("hide_in_debug", rules.hide_in_debug, "nothing is hidden for it", LogLevel::Info);
+  }
+  add("box_colliders", rules.box_colliders, "nothing gets a bounding box collider for it",
+      LogLevel::Warning);
+  if (rules.working_area) {
+    add("working_area", {*rules.working_area}, "the working area is centred on the origin",
+        LogLevel::Warning);
+  }
+  return patterns;
+}
+
 }  // namespace
+
+void NearestText::add(std::string_view wanted, std::string_view candidate, std::string_view shown) {
+  const std::size_t distance = distance_within(wanted, candidate);
+  const auto letters = std::size_t(std::ranges::count_if(wanted, [](char c) { return c != '*'; }));
+  NearestText one;
+  one.shown_ = shown;
+  one.distance_ = distance;
+  one.is_near_ = distance < letters && distance <= std::max<std::size_t>(1, letters / 3);
+  add(one);
+}
+
+void NearestText::add(const NearestText& other) {
+  if (!shown_.empty() && distance_ <= other.distance_) return;
+  *this = other;
+}
+
+std::string NearestText::hint() const {
+  if (shown_.empty()) return {};
+  return is_near_ ? "; did you mean '" + shown_ + "'?" : "; the nearest is '" + shown_ + "'";
+}
 
 bool may_fit(std::string_view pattern, std::string_view path) {
   const Names names = names_of(pattern);
@@ -124,23 +212,25 @@ std::vector<EnvironmentPattern> check_patterns(const Job& job, const CapturePlan
                                                const DescribeComponent& describe,
                                                Complaints& complaints) {
   const std::vector<std::string> paths = possible_paths(job, plan);
-  std::vector<EnvironmentPattern> open;
+  std::vector<EnvironmentPattern> open = rule_patterns(job);
+  const auto fits_an_object = [&](const std::string& pattern) {
+    return std::any_of(paths.begin(), paths.end(), [&](const std::string& path) {
+      return path != kEnvironmentPath && may_fit(pattern, path);
+    });
+  };
   const auto check_value = [&](const Value& value, const std::string& key) {
     for (const Value* text : texts_of(value)) {
       const std::string& pattern = text->scalar;
-      if (is_about_environment(pattern)) {
-        open.push_back({pattern, key});
+      if (fits_an_object(pattern) || may_fit(pattern, kEnvironmentPath)) {
+        // Objects may stand below the environment.
+        if (is_about_environment(pattern) && !fits_an_object(pattern)) {
+          open.push_back({pattern, key, text->place, true, "", LogLevel::Warning});
+        }
         continue;
       }
-      const bool fits = std::any_of(paths.begin(), paths.end(), [&](const std::string& path) {
-        return may_fit(pattern, path);
-      });
-      if (fits) continue;
       const std::string near = nearest_pattern(pattern, paths);
       complaints.add(text->place, key + ": '" + pattern + "' fits no node" +
-                                      (near.empty() ? std::string("; nodes are below /Environment, "
-                                                                  "/Lights, /Cameras and what "
-                                                                  "'under' of the objects says")
+                                      (near.empty() ? nearest_path(pattern, paths).hint()
                                                     : "; did you mean '" + near + "'?"));
     }
   };

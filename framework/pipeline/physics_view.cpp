@@ -65,4 +65,47 @@ bool PhysicsView::is_of(const Scene& scene) const {
                     [](const Part& a, const Part& b) { return are_equal(a, b); });
 }
 
+void HiddenNodes::note_new(const Scene& scene) {
+  const std::uint32_t known = first_unknown_;
+  for (const NodeId node : scene.subtree(scene.root())) {
+    if (node.index < known) continue;
+    first_unknown_ = std::max(first_unknown_, node.index + 1);
+    if (!scene[node].is_visible) came_hidden_.insert(node);
+  }
+}
+
+void HiddenNodes::hidden_by_job(const std::vector<NodeId>& nodes) {
+  for (const NodeId node : nodes) came_hidden_.erase(node);
+}
+
+HiddenNodes::Aside::Aside(Scene& scene, const HiddenNodes& hidden) : scene_(scene) {
+  take(scene.root(), false, hidden);
+  for (const Part& part : parts_) {
+    Node& edited = scene_.edit(part.node);
+    edited.collider.reset();
+    edited.rigid_body.reset();
+  }
+}
+
+void HiddenNodes::Aside::take(NodeId node, bool is_hidden, const HiddenNodes& hidden) {
+  const Node& known = scene_[node];
+  is_hidden = is_hidden || (!known.is_visible && !hidden.came_hidden_.contains(node));
+  if (is_hidden && (known.collider || known.rigid_body)) {
+    Part& part = parts_.emplace_back(Part{node, known.collider, known.rigid_body});
+    if (part.body) {
+      part.body->linear_velocity = Vec3::Zero();
+      part.body->angular_velocity = Vec3::Zero();
+    }
+  }
+  for (const NodeId child : known.children) take(child, is_hidden, hidden);
+}
+
+HiddenNodes::Aside::~Aside() {
+  for (const Part& part : parts_) {
+    Node& edited = scene_.edit(part.node);
+    edited.collider = part.collider;
+    edited.rigid_body = part.body;
+  }
+}
+
 }  // namespace diorama

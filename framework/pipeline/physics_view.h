@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "diorama/scene.h"
@@ -37,6 +38,42 @@ class PhysicsView {
   std::uint64_t pose_revision_ = 0;
   std::uint64_t shape_revision_ = 0;
   std::vector<Part> parts_;
+};
+
+/// Tells what an asset hides, as it stands in for something that is seen, from what a job hides.
+/// The first collides: collision meshes, walls round a working area. The second does not: nothing
+/// may lie on what no picture shows.
+class HiddenNodes {
+ public:
+  /// What has come since the last call, and is hidden, came so.
+  void note_new(const Scene& scene);
+  /// Of nodes that came hidden: the job hid them.
+  void hidden_by_job(const std::vector<NodeId>& nodes);
+
+  /// Takes colliders and bodies of what the job has hidden out of a scene, for as long as it lives.
+  /// Hidden bodies come back at rest.
+  class Aside {
+   public:
+    Aside(Scene& scene, const HiddenNodes& hidden);
+    ~Aside();
+    Aside(const Aside&) = delete;
+    Aside& operator=(const Aside&) = delete;
+
+   private:
+    struct Part {
+      NodeId node;
+      std::optional<Collider> collider;
+      std::optional<RigidBody> body;
+    };
+    void take(NodeId node, bool is_hidden, const HiddenNodes& hidden);
+
+    Scene& scene_;
+    std::vector<Part> parts_;
+  };
+
+ private:
+  std::uint32_t first_unknown_ = 0;
+  std::set<NodeId> came_hidden_;
 };
 
 }  // namespace diorama

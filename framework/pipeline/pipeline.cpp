@@ -84,6 +84,7 @@ Pipeline::Pipeline(const Job& job, const CapturePlan& plan, JobComponents& compo
       store_(store),
       options_(std::move(options)),
       streams_(job.seed),
+      environment_patterns_(components.environment_patterns, job.environment.unmatched == "error"),
       flight_(std::make_unique<Flight>()) {}
 
 Pipeline::~Pipeline() = default;
@@ -231,7 +232,8 @@ std::optional<PlannedVisit> Pipeline::next_visit() {
 
 VisitResult Pipeline::run_visit(const Turn& turn, VisitComponents& components) {
   const Stoppable stoppable(*turn.is_cancelled);
-  VisitRun::Setting setting{job_, plan_, streams_, components_, components, host_, {}, {}, {}, {}};
+  VisitRun::Setting setting{
+      job_, plan_, streams_, components_, environment_patterns_, components, host_, {}, {}, {}, {}};
   setting.is_needed = [this](int capture) {
     const std::lock_guard lock(flight_->mutex);
     return is_needed(capture);

@@ -17,6 +17,7 @@
 #include "framework/host/host_services.h"
 #include "framework/output/output_store.h"
 #include "framework/pipeline/capture_plan.h"
+#include "framework/pipeline/environment_patterns.h"
 #include "framework/pipeline/job.h"
 #include "framework/pipeline/job_components.h"
 #include "framework/pipeline/settling.h"
@@ -114,6 +115,7 @@ class Pipeline {
   OutputStore& store_;
   RunOptions options_;
   JobStreams streams_;
+  EnvironmentPatterns environment_patterns_;
   const DatasetInfo* dataset_ = nullptr;
   const std::string* dataset_json_ = nullptr;
   int total_ = 0;

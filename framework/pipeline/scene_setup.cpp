@@ -2,6 +2,8 @@
 #include "framework/pipeline/scene_setup.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdio>
 #include <map>
 #include <memory>
@@ -33,13 +35,6 @@ bool starts_with_text(std::string_view path, std::string_view text) {
   }
 }
 
-bool holds_text(std::string_view path, std::string_view text) {
-  for (std::size_t start = 0; start <= path.size(); ++start) {
-    if (starts_with_text(path.substr(start), text)) return true;
-  }
-  return false;
-}
-
 bool holds_any(std::string_view path, const std::vector<std::string>& texts) {
   return std::any_of(texts.begin(), texts.end(),
                      [&](const std::string& text) { return holds_text(path, text); });
@@ -66,6 +61,91 @@ bool claims_scheme(const Loader& loader, std::string_view asset) {
   const std::string scheme(asset.substr(0, colon + 1));
   const std::vector<std::string> claims = loader.claims();
   return std::find(claims.begin(), claims.end(), scheme) != claims.end();
+}
+
+/// Two opposite sides of a mesh's box, in cells, and which of these the mesh reaches.
+class BoxSides {
+ public:
+  /// `gap`: how far below a side counts as reached, in the space of the mesh.
+  BoxSides(const Aabb& box, int axis, double gap)
+      : box_(box),
+        axis_(axis),
+        right_((axis + 1) % 3),
+        up_((axis + 2) % 3),
+        gap_(gap),
+        cell_(box.size() / kCells),
+        reached_{Cells(kCells * kCells, is_flat()), Cells(kCells * kCells, is_flat())} {}
+
+  void add(const std::array<Vec3, 3>& p) {
+    const double area = cross(p[1] - p[0], p[2] - p[0]);
+    if (area == 0.0 || is_flat()) return;
+    const auto [left, last] = cells_of(right_, p);
+    const auto [bottom, top] = cells_of(up_, p);
+    for (int row = bottom; row <= top; ++row) {
+      for (int column = left; column <= last; ++column) {
+        Vec3 middle = box_.min;
+        middle[right_] += (column + 0.5) * cell_[right_];
+        middle[up_] += (row + 0.5) * cell_[up_];
+        const Vec3 weight(cross(p[1] - middle, p[2] - middle), cross(p[2] - middle, p[0] - middle),
+                          cross(p[0] - middle, p[1] - middle));
+        if ((weight / area).minCoeff() < 0.0) continue;
+        const double place = (weight / area).dot(Vec3(p[0][axis_], p[1][axis_], p[2][axis_]));
+        const auto cell = std::size_t(row * kCells + column);
+        if (place - box_.min[axis_] <= gap_) reached_[0][cell] = true;
+        if (box_.max[axis_] - place <= gap_) reached_[1][cell] = true;
+      }
+    }
+  }
+
+  bool are_reached() const {
+    constexpr double kMostEmpty = 0.02;  // of a side's cells: bevelled edges
+    return std::ranges::all_of(reached_, [](const Cells& side) {
+      return double(std::ranges::count(side, false)) <= kMostEmpty * kCells * kCells;
+    });
+  }
+
+ private:
+  using Cells = std::vector<bool>;
+  static constexpr int kCells = 24;  // across and down
+
+  /// Nothing is below a side without area.
+  bool is_flat() const { return cell_[right_] <= 0.0 || cell_[up_] <= 0.0; }
+  double cross(const Vec3& a, const Vec3& b) const {
+    return a[right_] * b[up_] - b[right_] * a[up_];
+  }
+  /// First and last of the cells whose middles lie within the triangle's extent.
+  std::pair<int, int> cells_of(int along, const std::array<Vec3, 3>& p) const {
+    const auto [low, high] = std::minmax({p[0][along], p[1][along], p[2][along]});
+    const auto place = [&](double value) {
+      return std::clamp((value - box_.min[along]) / cell_[along] - 0.5, -1.0, double(kCells));
+    };
+    return {std::max(int(std::ceil(place(low))), 0),
+            std::min(int(std::floor(place(high))), kCells - 1)};
+  }
+
+  Aabb box_;
+  int axis_, right_, up_;
+  double gap_;
+  Vec3 cell_;
+  std::array<Cells, 2> reached_;  ///< The low side and the high one.
+};
+
+/// Whether a mesh reaches all six sides of its box, as a table top does: else its box is solid
+/// where pictures show nothing, under a table that is one mesh or round a round one.
+bool fills_box(const Mesh& mesh, const Affine& world_from_node) {
+  constexpr double kGap = 0.01;  // metres
+  const Aabb box = mesh.bounds();
+  if (box.is_empty()) return true;
+  for (int axis = 0; axis < 3; ++axis) {
+    BoxSides sides(box, axis, kGap / std::max(world_from_node.linear().col(axis).norm(), 1e-12));
+    for (const auto& indices : mesh.triangles) {
+      std::array<Vec3, 3> corners;
+      for (std::size_t i = 0; i < 3; ++i) corners[i] = mesh.positions[indices[i]].cast<double>();
+      sides.add(corners);
+    }
+    if (!sides.are_reached()) return false;
+  }
+  return true;
 }
 
 /// Parts of paths below one node, in traversal order.
@@ -258,6 +338,13 @@ Quat rotation_xyz(const Vec3& degrees) {
 
 }  // namespace
 
+bool holds_text(std::string_view path, std::string_view text) {
+  for (std::size_t start = 0; start <= path.size(); ++start) {
+    if (starts_with_text(path.substr(start), text)) return true;
+  }
+  return false;
+}
+
 NodeId load_environment(const std::string& asset, const ComponentConfig& entry, Loader& loader,
                         Scene& scene, Host& host) {
   const NodeId parent = node_at(scene, "/Environment");
@@ -272,17 +359,42 @@ NodeId load_environment(const std::string& asset, const ComponentConfig& entry, 
   return environment;
 }
 
+std::vector<NodeId> nodes_to_hide(const std::vector<std::string>& texts, NodeId environment,
+                                  const Scene& scene) {
+  const PathsBelow paths(scene, environment);
+  std::vector<NodeId> nodes;
+  for (const auto& [node, path] : paths.all()) {
+    if (scene[node].is_visible && holds_any(path, texts)) nodes.push_back(node);
+  }
+  return nodes;
+}
+
 Vec3 apply_environment_rules(const EnvironmentRules& rules, bool debug, NodeId environment,
                              Scene& scene, Host& host) {
   const PathsBelow paths(scene, environment);
-  for (const auto& [node, path] : paths.all()) {
-    if (holds_any(path, rules.hide) || (debug && holds_any(path, rules.hide_in_debug))) {
+  const auto hide = [&](const std::vector<std::string>& texts) {
+    for (const NodeId node : nodes_to_hide(texts, environment, scene)) {
       scene.edit(node).is_visible = false;
     }
-  }
+  };
+  hide(rules.hide);
+  if (debug) hide(rules.hide_in_debug);
+  const auto box_is_full = [&](NodeId node) {
+    return fills_box(*scene[node].mesh, scene.world_from_node(node));
+  };
   if (const auto shape = collider_shape(rules.colliders)) {
+    int half_empty = 0;
     for (const NodeId node : scene.subtree(environment)) {
-      if (scene[node].mesh) set_collider(scene, node, *shape);
+      if (!scene[node].mesh) continue;
+      set_collider(scene, node, *shape);
+      if (*shape == ColliderShape::BoundingBox && !box_is_full(node)) ++half_empty;
+    }
+    if (half_empty > 0) {
+      host.log(LogLevel::Warning, scene.path(environment) +
+                                      ": 'environment.colliders: bounding_box' makes " +
+                                      std::to_string(half_empty) +
+                                      " meshes solid where pictures show nothing: things will lie "
+                                      "on air, and lean on it");
     }
   }
   if (rules.joints == "held") {
@@ -296,13 +408,11 @@ Vec3 apply_environment_rules(const EnvironmentRules& rules, bool debug, NodeId e
   }
   for (const std::string& text : rules.box_colliders) {
     const NodeId match = paths.first_with(text);
-    if (!match) {
-      host.log(LogLevel::Warning, scene.path(environment) + ": no node's path holds '" + text +
-                                      "', so nothing gets a bounding box collider");
-      continue;
-    }
+    if (!match) continue;
     for (const NodeId node : scene.subtree(match)) {
-      if (scene[node].mesh) set_collider(scene, node, ColliderShape::BoundingBox);
+      if (scene[node].mesh && box_is_full(node)) {
+        set_collider(scene, node, ColliderShape::BoundingBox);
+      }
     }
   }
   if (rules.max_lamp_lux) dim_environment(*rules.max_lamp_lux, environment, scene, host);
@@ -310,10 +420,6 @@ Vec3 apply_environment_rules(const EnvironmentRules& rules, bool debug, NodeId e
   if (rules.working_area) {
     if (const NodeId match = paths.first_with(*rules.working_area)) {
       working_area_world = scene.world_from_node(match).translation();
-    } else {
-      host.log(LogLevel::Warning, scene.path(environment) + ": no node's path holds '" +
-                                      *rules.working_area +
-                                      "', so the working area is centred on the origin");
     }
   }
   if (rules.walls.size() == 3) {

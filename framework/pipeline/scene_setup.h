@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "diorama/host.h"
@@ -20,9 +21,16 @@ namespace diorama {
 NodeId load_environment(const std::string& asset, const ComponentConfig& entry, Loader& loader,
                         Scene& scene, Host& host);
 
-/// Hides, adds colliders, finds the working area and builds the walls round it. A rule whose text
-/// matches nothing gives a warning where the result would surprise (working area, box colliders).
-/// Returns the centre of the working area in the world; the origin when there is none.
+/// Whether some part of the path goes like the text, whose '*' stand for anything within a name.
+bool holds_text(std::string_view path, std::string_view text);
+
+/// Nodes below the environment that are visible, and that a rule with these texts hides.
+std::vector<NodeId> nodes_to_hide(const std::vector<std::string>& texts, NodeId environment,
+                                  const Scene& scene);
+
+/// Hides, adds colliders, finds the working area and builds the walls round it. What matches
+/// nothing does nothing: EnvironmentPatterns tells of it. Returns the centre of the working area in
+/// the world; the origin when there is none.
 Vec3 apply_environment_rules(const EnvironmentRules& rules, bool debug, NodeId environment,
                              Scene& scene, Host& host);
 

@@ -182,10 +182,14 @@ void VisitRun::set_up() {
                                 std::to_string(setting_.plan.visit_count()) + ": " + choice.asset);
   environment_ = load_environment(choice.asset, job_.environments[choice.entry],
                                   *components_.environments[choice.entry], scene_, host_);
+  const std::vector<NodeId> to_hide = nodes_to_hide(job_.environment.hide, environment_, scene_);
   working_area_world_ =
       apply_environment_rules(job_.environment, job_.debug, environment_, scene_, host_);
   objects_ = spawn_objects(plan_objects(job_, setting_.plan.object_assets, planned_.index), job_,
                            scene_, host_);
+  hidden_.note_new(scene_);
+  // What is hidden for the debug mode's picture from above is there all the same.
+  hidden_.hidden_by_job(to_hide);
   as_set_up_ = SceneAsSetUp(scene_);
   create_lights(job_.lights, scene_, host_);
   cameras_ = create_cameras(job_.cameras, scene_);
@@ -195,14 +199,26 @@ void VisitRun::set_up() {
         int(step.kind == TimelineStep::Kind::Simulate || step.kind == TimelineStep::Kind::Record);
     return true;
   });
-  for (const EnvironmentPattern& pattern : setting_.shared.environment_patterns) {
-    if (!scene_.match(pattern.text).empty()) continue;
-    host_.log(LogLevel::Warning,
-              choice.asset + ": no node fits '" + pattern.text + "' (" + pattern.key + ")");
-  }
+  setting_.environment_patterns.try_in(
+      scene_, environment_, choice.asset, host_,
+      [this](const EnvironmentPatterns::Look& look) { show_other_environments(look); });
   // The first visit of each environment shows it from above.
   if (job_.debug && std::size_t(planned_.index) == planned_.environment) {
     overview_ = create_overview_camera(working_area_world_, scene_);
+  }
+}
+
+/// Each as it is loaded.
+void VisitRun::show_other_environments(const EnvironmentPatterns::Look& look) {
+  const std::vector<EnvironmentChoice>& choices = setting_.plan.environments;
+  for (std::size_t i = 0; i < choices.size(); ++i) {
+    if (i == planned_.environment) continue;
+    setting_.stop_if_asked();
+    Scene scene;
+    const NodeId environment =
+        load_environment(choices[i].asset, job_.environments[choices[i].entry],
+                         *components_.environments[choices[i].entry], scene, host_);
+    if (!look(scene, environment)) return;
   }
 }
 
@@ -249,6 +265,8 @@ std::vector<std::size_t> VisitRun::call_randomizers(const std::string& moment, i
 
 void VisitRun::reset_physics() {
   if (!components_.physics) return;
+  hidden_.note_new(scene_);
+  const HiddenNodes::Aside aside(scene_, hidden_);
   call_component("physics '" + job_.physics.type + "'",
                  [&] { components_.physics->reset(scene_); });
 }

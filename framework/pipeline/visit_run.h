@@ -17,8 +17,10 @@
 #include "framework/annotators/motion.h"
 #include "framework/pipeline/capture_plan.h"
 #include "framework/pipeline/clip_track.h"
+#include "framework/pipeline/environment_patterns.h"
 #include "framework/pipeline/job.h"
 #include "framework/pipeline/job_components.h"
+#include "framework/pipeline/physics_view.h"
 #include "framework/pipeline/settle_check.h"
 #include "framework/pipeline/settling.h"
 #include "framework/pipeline/view_report.h"
@@ -53,6 +55,7 @@ class VisitRun {
     const CapturePlan& plan;
     const JobStreams& streams;
     const JobComponents& shared;
+    EnvironmentPatterns& environment_patterns;
     VisitComponents& components;  ///< No other visit's meanwhile.
     Host& host;
     std::function<bool(int capture)> is_needed;
@@ -72,6 +75,7 @@ class VisitRun {
  private:
   struct Draw;
   void set_up();
+  void show_other_environments(const EnvironmentPatterns::Look& look);
   void randomize(const std::string& moment, int number, int capture,
                  const std::optional<ClipFrame>& clip = {});
   std::vector<std::size_t> call_randomizers(const std::string& moment, int number, int capture,
@@ -115,6 +119,7 @@ class VisitRun {
   std::vector<NodeId> objects_;
   std::vector<NodeId> cameras_;
   SceneAsSetUp as_set_up_;
+  HiddenNodes hidden_;
   BodyPoses before_last_step_;  ///< Empty when nothing moved by itself since it was placed.
   double last_step_s_ = 0.0;    ///< Length of that step; 0: none was taken.
   ClipTrack track_;             ///< Of the clip that is being taken.

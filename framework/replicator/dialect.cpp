@@ -241,11 +241,12 @@ class InfinigenTranslator : private replicator::Translator {
     }
     set("environments", std::move(list));
     // The reference hides every node of that ending, glass table tops with all that stands on them
-    // included, to let the light of ceiling lamps out.
+    // included, to let the light of ceiling lamps out. It looks for a dining table, and goes on
+    // without one.
     set("environment", native("{hide: ['CeilingLight*001_SPLIT_GLA', 'Lamp*001_SPLIT_GLA'], "
                               "hide_in_debug: [_exterior, _ceiling], "
                               "colliders: triangle_mesh, box_colliders: [TableDining], "
-                              "working_area: TableDining}"));
+                              "working_area: TableDining, unmatched: warning}"));
   }
 
   void add_auto_labelled(Value& objects) {

@@ -237,8 +237,7 @@ void fill_channels(Frame& frame, const NameSet& wanted, const EmbreeScene& meshe
   }
   if (all_hits) *all_hits = Image<RayHit>(width, height, RayHit());
   ChannelImages channels(wanted, view);
-  host.parallel_for(std::size_t(height), [&](std::size_t row) {
-    const int y = int(row);
+  const auto fill_row = [&](int y) {
     std::array<int, kBatch> columns;
     BatchRays rays;
     rays.is_coherent = true;
@@ -265,6 +264,14 @@ void fill_channels(Frame& frame, const NameSet& wanted, const EmbreeScene& meshe
         channels.put(columns[i], y, ray, hit);
       }
     }
+  };
+  // Views are judged by some thousand rays each, which take less time than waking threads for each
+  // row of them.
+  constexpr int kRaysOfTask = 4096;
+  const int rows = std::max(1, kRaysOfTask / std::max(width, 1));
+  host.parallel_for(std::size_t((height + rows - 1) / rows), [&](std::size_t task) {
+    const int first = int(task) * rows;
+    for (int y = first; y < std::min(height, first + rows); ++y) fill_row(y);
   });
   channels.move_to(frame);
 }

@@ -17,6 +17,8 @@ class MissingPictures {
   /// One line per picture in the order of their first mention: `WHAT (material "NAME")`. A name in
   /// quotes is what `diorama inspect` finds the material by.
   std::vector<std::string> lines() const;
+  /// Those that the lines are about.
+  const std::vector<std::string>& pictures() const { return order_; }
 
  private:
   struct Missing {

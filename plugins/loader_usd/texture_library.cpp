@@ -27,7 +27,10 @@ void TextureLibrary::missing(const usd::FoundValue& asset, const std::string& wh
 }
 
 void TextureLibrary::report_missing() const {
-  for (const std::string& line : missing_.lines()) stage_.diagnostics().missing(line, line);
+  const std::vector<std::string> lines = missing_.lines();
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    stage_.diagnostics().missing(missing_.pictures()[i], lines[i]);
+  }
 }
 
 std::optional<TextureLibrary::Picture> TextureLibrary::find_tiles(const std::string& identifier) {

@@ -167,13 +167,27 @@ void UsdLoader::load(std::string_view asset, Scene& scene, NodeId root) {
     }
     const auto& missing = stage.diagnostics().missing_assets();
     if (params_.missing_assets_are_errors && !missing.empty()) {
-      throw Error(ErrorKind::Asset, std::string(asset) + ": " + missing.front());
+      throw Error(ErrorKind::Asset, std::string(asset) + ": " + missing.front().text);
     }
-    for (const std::string& warning : stage.warnings()) host_.log(LogLevel::Warning, warning);
+    const std::set<std::string> known = told_before(missing);
+    for (const std::string& warning : stage.warnings()) {
+      host_.log(known.contains(warning) ? LogLevel::Debug : LogLevel::Warning, warning);
+    }
   } catch (const usd::FormatError& error) {
     const std::string text = error.what();
     throw Error(ErrorKind::Asset, text.starts_with(named.file) ? text : named.file + ": " + text);
   }
+}
+
+/// Warnings about assets that another scene was told to lack.
+std::set<std::string> UsdLoader::told_before(
+    const std::vector<usd::Diagnostics::MissingAsset>& missing) {
+  const std::lock_guard lock(told_mutex_);
+  std::set<std::string> known;
+  for (const auto& [asset, text] : missing) {
+    if (!told_.insert(asset).second) known.insert(text);
+  }
+  return known;
 }
 
 }  // namespace diorama::loader_usd

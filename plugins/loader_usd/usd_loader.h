@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <mutex>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -38,8 +40,12 @@ class UsdLoader final : public Loader {
   void load(std::string_view asset, Scene& scene, NodeId root) override;
 
  private:
+  std::set<std::string> told_before(const std::vector<usd::Diagnostics::MissingAsset>& missing);
+
   Params params_;
   Host& host_;
+  std::mutex told_mutex_;
+  std::set<std::string> told_;  ///< Missing assets that a warning was about.
 };
 
 }  // namespace diorama::loader_usd

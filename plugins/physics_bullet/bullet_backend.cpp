@@ -92,7 +92,8 @@ void BulletBackend::Params::visit(ParamVisitor& v) {
   v.param("hull_vertices", hull_vertices,
           {"Corners of a convex hull at most; more are slower and follow the mesh closer.", "", 16,
            512});
-  v.param("hidden_collide", hidden_collide, {"Hidden nodes collide as well."});
+  v.param("hidden_collide", hidden_collide,
+          {"What assets hide collides as well: collision meshes. What a job hides never does."});
 }
 
 /// Members are destroyed last to first: the world before the bodies it points at.
@@ -131,6 +132,9 @@ BulletBackend::~BulletBackend() = default;
 void BulletBackend::do_reset(const Scene& scene) {
   world_ = std::make_unique<World>(params_, std::move(world_->cache));
   World& world = *world_;
+  // Bullet finds one point of two hulls per step, and so a face only in time. Where there are fewer
+  // than three, it looks for more with the hulls turned a little.
+  world.configuration.setConvexConvexMultipointIterations(3, 3);
   world.cache.forget_dead_meshes();
   world.bodies = build_bodies(scene, params_, world.cache);
 

@@ -24,7 +24,7 @@ class BulletBackend final : public PhysicsBackend {
     double angular_damping = 0.05;
     double floating_damping = 0.95;
     double rolling_friction = 0.02;
-    int solver_iterations = 20;
+    int solver_iterations = 50;
     bool ccd = true;
     double margin_m = 0.0005;
     double max_depenetration_speed = 2.0;

@@ -405,6 +405,67 @@ void GentleWorld::keep_steady_impulses(btPersistentManifold& manifold) {
   }
 }
 
+/// Puts the last step's contacts of a face in place of those that were found now, where both say
+/// the same: they have neither slipped nor parted, and nothing reaches deeper elsewhere.
+void GentleWorld::hold_face(btPersistentManifold& manifold, double lowest_distance) {
+  constexpr double kSlip = 1e-3;       // metres
+  constexpr double kDeeper = 5e-5;     // metres
+  constexpr double kParallel = 0.999;  // cosine
+  const auto known = faces_.find(&manifold);
+  if (known == faces_.end() || manifold.getNumContacts() == 0) return;
+  Face& face = known->second;
+  // The manifold may have become one of other bodies.
+  if (face.a != manifold.getBody0() || face.b != manifold.getBody1()) return;
+  double lowest = kInfinity;
+  for (int i = 0; i < face.count; ++i) {
+    btManifoldPoint& contact = face.contacts[std::size_t(i)];
+    contact.m_positionWorldOnA = face.a->getWorldTransform() * contact.m_localPointA;
+    contact.m_positionWorldOnB = face.b->getWorldTransform() * contact.m_localPointB;
+    contact.m_normalWorldOnB =
+        face.b->getWorldTransform().getBasis() * face.normals[std::size_t(i)];
+    const btVector3 apart = contact.m_positionWorldOnA - contact.m_positionWorldOnB;
+    const double gap = apart.dot(contact.m_normalWorldOnB);
+    const double slip = (apart - gap * contact.m_normalWorldOnB).length();
+    if (slip > kSlip || gap > manifold.getContactBreakingThreshold()) return;
+    contact.setDistance(gap);
+    lowest = std::min(lowest, gap);
+  }
+  for (int i = 0; i < manifold.getNumContacts(); ++i) {
+    const btManifoldPoint& found = manifold.getContactPoint(i);
+    if (found.getDistance() < lowest - kDeeper) return;
+    if (found.m_normalWorldOnB.dot(face.contacts[0].m_normalWorldOnB) < kParallel) return;
+  }
+  while (manifold.getNumContacts() > 0) manifold.removeContactPoint(manifold.getNumContacts() - 1);
+  for (int i = 0; i < face.count; ++i) {
+    btManifoldPoint contact = face.contacts[std::size_t(i)];
+    ++contact.m_lifeTime;
+    // Bullet draws the two points of such a contact together as far as friction can.
+    contact.m_contactPointFlags |= BT_CONTACT_FLAG_FRICTION_ANCHOR;
+    contact.setDistance(std::max(contact.getDistance(), lowest_distance));
+    manifold.addManifoldPoint(contact);
+  }
+}
+
+/// With the impulses that the step ended with. What lies on fewer contacts rolls or rocks.
+void GentleWorld::note_faces() {
+  std::map<const btPersistentManifold*, Face> faces;
+  btDispatcher& dispatcher = *getDispatcher();
+  for (int i = 0; i < dispatcher.getNumManifolds(); ++i) {
+    const btPersistentManifold& manifold = *dispatcher.getManifoldByIndexInternal(i);
+    if (manifold.getNumContacts() < 3) continue;
+    Face& face = faces[&manifold];
+    face.a = manifold.getBody0();
+    face.b = manifold.getBody1();
+    face.count = manifold.getNumContacts();
+    const btMatrix3x3 b_from_world = face.b->getWorldTransform().getBasis().transpose();
+    for (int k = 0; k < face.count; ++k) {
+      face.contacts[std::size_t(k)] = manifold.getContactPoint(k);
+      face.normals[std::size_t(k)] = b_from_world * manifold.getContactPoint(k).m_normalWorldOnB;
+    }
+  }
+  faces_.swap(faces);
+}
+
 void GentleWorld::solveConstraints(btContactSolverInfo& info) {
   // The solver undoes the share erp2 of a depth per step. Contact detection writes the distances
   // anew before the next step.
@@ -417,6 +478,7 @@ void GentleWorld::solveConstraints(btContactSolverInfo& info) {
   for (int i = 0; i < dispatcher.getNumManifolds(); ++i) {
     btPersistentManifold& manifold = *dispatcher.getManifoldByIndexInternal(i);
     mend_contacts(manifold, lowest);
+    hold_face(manifold, lowest);
     keep_steady_impulses(manifold);
   }
   for (std::size_t i = 0; i < clear_centres_.size(); ++i) {
@@ -424,6 +486,8 @@ void GentleWorld::solveConstraints(btContactSolverInfo& info) {
     clear_centres_[i] = m_nonStaticRigidBodies[int(i)]->getWorldTransform().getOrigin();
   }
   btDiscreteDynamicsWorld::solveConstraints(info);
+  // Before the bodies move on.
+  note_faces();
 }
 
 void GentleWorld::createPredictiveContacts(btScalar seconds) {

@@ -3,6 +3,8 @@
 
 #include <btBulletDynamicsCommon.h>
 
+#include <array>
+#include <map>
 #include <vector>
 
 namespace diorama {
@@ -20,6 +22,9 @@ namespace diorama {
 /// - Faces that have lain on others for some steps are held from the start of a step by all of the
 ///   last one's impulses, other contacts begin with the share that Bullet gives: with that share
 ///   alone, stacks creep; without it, things are pressed into each other when others fall on them.
+/// - A face that lies on another one keeps its contact points, and is drawn back to where it lay on
+///   them: Bullet chooses among all points of two faces anew in each step, and friction only ends
+///   motion, so that stacks creep.
 /// - Continuous detection works for compound bodies as well; Bullet leaves them out.
 ///
 /// Static objects of triangles must carry their StaticMesh as user pointer, all others none. The
@@ -38,12 +43,24 @@ class GentleWorld final : public btDiscreteDynamicsWorld {
  private:
   void mend_contacts(btPersistentManifold& manifold, double lowest_distance);
   void keep_steady_impulses(btPersistentManifold& manifold);
+  void hold_face(btPersistentManifold& manifold, double lowest_distance);
+  void note_faces();
+
+  /// Contacts of a face with another one, as a step left them.
+  struct Face {
+    const btCollisionObject* a = nullptr;
+    const btCollisionObject* b = nullptr;
+    int count = 0;
+    std::array<btManifoldPoint, MANIFOLD_CACHE_SIZE> contacts;
+    std::array<btVector3, MANIFOLD_CACHE_SIZE> normals;  ///< Of the contacts, in the space of b.
+  };
 
   double max_depenetration_speed_;
   btSphereShape stand_in_{0.01};
   /// Of each moving body, its centre of mass when it was last not deep in anything fixed.
   std::vector<btVector3> clear_centres_;
-  std::vector<bool> is_clear_;  ///< Of each moving body in this step.
+  std::vector<bool> is_clear_;                         ///< Of each moving body in this step.
+  std::map<const btPersistentManifold*, Face> faces_;  ///< Only ever looked up.
   // Scratch of mend_contacts.
   std::vector<btManifoldPoint> rebuilt_;
   std::vector<btManifoldPoint> candidates_;

@@ -42,9 +42,9 @@ constexpr std::pair<std::string_view, MapRole> kRoles[] = {
     {"arm", MapRole::Arm},
     {"ambientocclusion", MapRole::Ignored},
     {"ao", MapRole::Ignored},
-    {"displacement", MapRole::Ignored},
-    {"disp", MapRole::Ignored},
-    {"height", MapRole::Ignored},
+    {"displacement", MapRole::Displacement},
+    {"disp", MapRole::Displacement},
+    {"height", MapRole::Displacement},
 };
 constexpr std::string_view kPictureEndings[] = {".png", ".jpg", ".jpeg", ".exr",  ".hdr", ".tga",
                                                 ".bmp", ".tif", ".tiff", ".webp", ".jp2"};
@@ -109,6 +109,26 @@ TextureInput input(std::shared_ptr<const Texture> texture, int channel = 0) {
   return input;
 }
 
+/// Takes displacement out of the materials. Most have normals of the same relief.
+void tell_displacement(const std::string& folder, std::vector<MaterialMaps>& materials,
+                       Host& host) {
+  std::size_t with_normals = 0;
+  std::size_t without = 0;
+  for (MaterialMaps& maps : materials) {
+    if (maps.files.erase(MapRole::Displacement) == 0) continue;
+    const bool has_normals =
+        maps.files.contains(MapRole::NormalGl) || maps.files.contains(MapRole::NormalDx);
+    ++(has_normals ? with_normals : without);
+  }
+  const auto tell = [&](LogLevel level, std::size_t count, const char* instead) {
+    if (count == 0) return;
+    host.log(level, folder + ": materials with displacement, which moves no surface here: " +
+                        std::to_string(count) + instead);
+  };
+  tell(LogLevel::Info, with_normals, "; their normals show the relief");
+  tell(LogLevel::Warning, without, " without normals, which look flat");
+}
+
 /// 0..1 as -1..1; DirectX counts green downwards.
 TextureInput normals(std::shared_ptr<const Texture> texture, bool is_directx) {
   const float green = is_directx ? -1.0f : 1.0f;
@@ -144,7 +164,7 @@ std::optional<MapName> map_name(std::string_view file_name) {
   return std::nullopt;
 }
 
-std::vector<MaterialMaps> find_materials(const std::string& folder, const Host& host) {
+std::vector<MaterialMaps> find_materials(const std::string& folder, Host& host) {
   const fs::path place = host.resolve(folder);
   std::error_code error;
   if (!fs::is_directory(place, error)) {
@@ -168,6 +188,7 @@ std::vector<MaterialMaps> find_materials(const std::string& folder, const Host& 
                     ": holds no material, expected pictures named as those of ambientCG or "
                     "Poly Haven: 'Wood051_1K-JPG_Color.jpg', 'brick_wall_diff_1k.png'");
   }
+  tell_displacement(folder, materials, host);
   // Datasets name what they are made of.
   for (const MaterialMaps& maps : materials) {
     for (const auto& [role, file] : maps.files) (void)host.resolve(file.string());

@@ -23,8 +23,9 @@ enum class MapRole : std::uint8_t {
   NormalDx,
   Opacity,
   Emission,
-  Arm,      ///< Occlusion, roughness and metalness in red, green and blue.
-  Ignored,  ///< Occlusion, which renderers find themselves, and displacement, which they cannot do.
+  Arm,           ///< Occlusion, roughness and metalness in red, green and blue.
+  Displacement,  ///< Told, but renderers move no surface.
+  Ignored,       ///< Occlusion, which renderers find themselves.
 };
 
 /// A picture's name, taken apart: "brick_wall_nor_gl_1k.png" is the map NormalGl of "brick_wall".
@@ -44,8 +45,8 @@ struct MaterialMaps {
 
 /// The materials of a folder and of those below it, sorted by folder and name: pictures whose names
 /// differ in their role alone, a colour among them. Throws Error(Asset), beginning with `folder`,
-/// when there is none.
-std::vector<MaterialMaps> find_materials(const std::string& folder, const Host& host);
+/// when there is none. Logs how many of them have displacement, which is left out.
+std::vector<MaterialMaps> find_materials(const std::string& folder, Host& host);
 
 /// Makes materials of maps. Pictures are read when they are first wanted and kept as long as a
 /// scene uses them.

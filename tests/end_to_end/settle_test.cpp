@@ -41,6 +41,25 @@ Run run_with_policy(const std::string& policy, const std::vector<std::string>& m
   return result;
 }
 
+/// A room with one thing of two metres in it.
+void write_room(const fs::path& file, const std::string& thing) {
+  write_file(file, R"(#usda 1.0
+(
+    defaultPrim = "Room"
+    metersPerUnit = 1
+    upAxis = "Z"
+)
+def Xform "Room"
+{
+    def Cube ")" + thing +
+                       R"("
+    {
+        double size = 2
+    }
+}
+)");
+}
+
 std::size_t sum(const Run& run, const char* key) {
   std::size_t count = 0;
   for (const auto& report : run.reports) count += report[key].size();
@@ -138,6 +157,39 @@ writers: [{type: BasicWriter, name: basic, motion_vectors: true}]
   CHECK(moved("pulled_away",
               "  - {type: scatter_poses, on: [pull], nodes: \"/Environment\", "
               "offset: [30, 0, 0], rotation: none, avoid_overlap: false}"));
+  CHECK(moved("hidden",
+              "  - {type: random_visibility, on: [pull], nodes: \"/Environment/*\", "
+              "visible_chance: 0}"));
+}
+
+TEST_CASE("Nothing lies on what the job hides, and debug mode changes no scene", "[run][settle]") {
+  const TemporaryFolder folder;
+  write_room(folder / "room.usda", "Slab");
+  const auto falls = [&](const std::string& name, const std::string& more) {
+    write_file(folder / (name + ".yaml"), R"(
+total_captures: 1
+environments: [{type: files, files: [room.usda]}]
+objects: [{type: shapes, name: ball, shapes: [sphere], under: /Assets, label: ball}]
+cameras: [{type: pinhole, name: cam, width: 64, height: 48}]
+lights: [{type: dome, name: sky}]
+randomizers:
+  - {type: scatter_poses, name: poses, on: [environment], nodes: "/Assets/*", offset: [0, 0, 1.3],
+     scale: 0.1}
+settle: {policy: keep}
+renderer: {type: "null"}
+timeline: [{simulate: 120}, {capture: after}]
+writers: [{type: BasicWriter, name: basic, rgb: true}]
+)" + more);
+    const Outcome outcome = run({"run", name + ".yaml", "--output", name}, folder.path());
+    INFO(outcome.errors);
+    REQUIRE(outcome.exit_code == 0);
+    const auto report =
+        nlohmann::json::parse(read_file(fs::directory_iterator(folder / name / "settle")->path()));
+    return report["max_speed_m_per_s"].get<double>() > 1.0;
+  };
+  CHECK_FALSE(falls("seen", ""));
+  CHECK(falls("hidden", "environment: {hide: [Slab]}\n"));
+  CHECK_FALSE(falls("debug", "debug: true\nenvironment: {hide_in_debug: [Slab]}\n"));
 }
 
 TEST_CASE("A simulation until rest ends early, and what never rests is placed anew or taken out",
@@ -173,6 +225,35 @@ TEST_CASE("A misspelt pattern ends a run and a dry run with the nearest path", "
     }
   }
   CHECK_FALSE(fs::exists(folder / "out"));
+}
+
+TEST_CASE("What fits in none of the job's environments ends a run and a dry run", "[run]") {
+  const TemporaryFolder folder;
+  write_room(folder / "room.usda", "Slab");
+  write_room(folder / "kitchen.usda", "Stove");
+  const auto start = [&](const std::string& set, bool is_dry) {
+    std::vector<std::string> arguments{
+        "run",      config_file("smoke.yaml"),
+        "--output", "out",
+        "--set",    "environments=[{type: files, files: [room.usda, kitchen.usda]}]",
+        "--set",    set};
+    if (is_dry) arguments.push_back("--dry-run");
+    return run(arguments, folder.path());
+  };
+  for (const bool is_dry : {true, false}) {
+    CAPTURE(is_dry);
+    for (const char* set :
+         {"environment.hide=[Slb]", "environment.working_area=Stve",
+          "environment.box_colliders=[Slb]", "randomizers.cameras.targets=/Environment/**/Stve*"}) {
+      const Outcome outcome = start(set, is_dry);
+      INFO(outcome.errors);
+      CHECK(outcome.exit_code == 3);
+      CHECK_THAT(outcome.errors,
+                 ContainsSubstring("in any environment of the job; did you mean '/Environment/"));
+    }
+  }
+  // The second environment has it.
+  CHECK(start("environment.hide=[Stove]", true).exit_code == 0);
 }
 
 TEST_CASE("Objects picked per visit are the same in every shard, and left out ones are named",

@@ -47,7 +47,7 @@ void Diagnostics::missing(const std::string& asset, const std::string& text) {
       by_asset_.try_emplace(asset, Missing{warnings_.size(), missing_.size(), text});
   if (is_new) {
     warnings_.push_back(text);
-    missing_.push_back(text);
+    missing_.push_back({asset, text});
     return;
   }
   Missing& known = entry->second;
@@ -55,7 +55,7 @@ void Diagnostics::missing(const std::string& asset, const std::string& text) {
   const std::string all = known.text + " (and " + std::to_string(known.others) + " more " +
                           (known.others == 1 ? "reference" : "references") + " to it)";
   warnings_[known.warning] = all;
-  missing_[known.place] = all;
+  missing_[known.place].text = all;
 }
 
 bool LayerStack::has_prim(std::string_view path) const {

@@ -21,12 +21,15 @@ class Diagnostics {
   /// others do.
   void missing(const std::string& asset, const std::string& text);
   const std::vector<std::string>& warnings() const { return warnings_; }
-  /// The warnings that are about missing assets.
-  const std::vector<std::string>& missing_assets() const { return missing_; }
+  struct MissingAsset {
+    std::string asset;
+    std::string text;  ///< One of the warnings.
+  };
+  const std::vector<MissingAsset>& missing_assets() const { return missing_; }
 
  private:
   std::vector<std::string> warnings_;
-  std::vector<std::string> missing_;
+  std::vector<MissingAsset> missing_;
   std::set<std::string> known_;
   struct Missing {
     std::size_t warning = 0;  ///< Index.

@@ -86,6 +86,11 @@ TEST_CASE("assets of servers and of other disks are looked up below the assets r
     CAPTURE(name);
     CHECK(paths.resolve(name) == box);
   }
+  for (const char* more : {"?version=3", "?a=b/Isaac/c.usd&d=%20", "#top", "?x#y"}) {
+    CAPTURE(more);
+    CHECK(paths.resolve(std::string("omniverse://server/Isaac/Props/YCB/003_box.usd") + more) ==
+          box);
+  }
   CHECK(paths.resolve("https://host/Isaac/Props/with%20space.usd") ==
         assets.root / "Isaac/Props/with space.usd");
   // Nothing of a server lies above the assets root.
@@ -104,6 +109,7 @@ TEST_CASE("assets of servers and of other disks are looked up below the assets r
                                         {"omniverse://nucleus/Lib/", "Isaac/Props"},
                                         {"/mnt/lib", "/Isaac/Props/YCB/"}});
   CHECK(mapped.resolve("omniverse://nucleus/Lib/YCB/003_box.usd") == box);
+  CHECK(mapped.resolve("omniverse://nucleus/Lib/YCB/003_box.usd?version=2") == box);
   CHECK(mapped.resolve("omniverse://nucleus/Lib/with%20space.usd") ==
         assets.root / "Isaac/Props/with space.usd");
   CHECK(mapped.resolve("/mnt/lib/003_box.usd") == box);

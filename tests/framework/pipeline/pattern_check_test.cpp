@@ -56,8 +56,11 @@ TEST_CASE("A pattern that fits no node is told with its place and the nearest pa
   CHECK_THAT(check(R"(targets: ["/Assets/*", "/Distrctors/*/x"])").complaints,
              ContainsSubstring("randomizers[0].targets: '/Distrctors/*/x' fits no node; did you "
                                "mean '/Distractors/*/x'?"));
+  // Far from everything: a path all the same.
   CHECK_THAT(check(R"(nodes: "/Quux/*")").complaints,
-             ContainsSubstring("fits no node; nodes are below /Environment"));
+             ContainsSubstring("'/Quux/*' fits no node; the nearest is '/"));
+  CHECK_THAT(check(R"(nodes: "/Assets/falling_0123456789")").complaints,
+             ContainsSubstring("; the nearest is '/Assets/falling_"));
   CHECK_THAT(check(R"(nodes: "/Assets/falling_banan")").complaints,
              ContainsSubstring("did you mean '/Assets/falling_banana'?"));
 }
@@ -70,6 +73,26 @@ TEST_CASE("Patterns that may fit are no complaint", "[patterns]") {
     CHECK(check(std::string("nodes: \"") + pattern + "\"").complaints.empty());
   }
   CHECK(check(R"(file: "/Asset/*")").complaints.empty());
+}
+
+TEST_CASE("Texts of the environment's rules are tried when it is there", "[patterns]") {
+  const auto open_of = [](const std::string& section) {
+    const Job job = job_from(good_job() + section);
+    const std::vector<std::vector<std::string>> assets{{"011_banana.usd"}, {"shape:cube"}};
+    Complaints complaints;
+    return check_patterns(job, plan_captures(job, {{"room", 0}}, assets), describe, complaints);
+  };
+  const auto open = open_of(
+      "environment: {hide: [Lamp, 'Glass*'], hide_in_debug: [_ceiling], box_colliders: [Table], "
+      "working_area: Table}\n");
+  REQUIRE(open.size() == 4);
+  CHECK(open[1].text == "Glass*");
+  CHECK(open[1].key == "environment.hide");
+  CHECK(open[1].place.line == 14);
+  CHECK_FALSE(open[1].is_path);
+  CHECK(open[2].key == "environment.box_colliders");
+  CHECK(open[3].otherwise == "the working area is centred on the origin");
+  CHECK(open_of("debug: true\nenvironment: {hide_in_debug: [_ceiling]}\n").size() == 1);
 }
 
 TEST_CASE("Patterns about the environment are tried when it is there", "[patterns]") {

@@ -153,15 +153,59 @@ TEST_CASE("Every mesh collides, hidden ones too; the first table as boxes", "[en
   CHECK_FALSE(room.at("TableDiningFactory_1_spawn").collider);
 }
 
-TEST_CASE("A room without a table gets a warning and the origin", "[environment]") {
+TEST_CASE("Meshes that leave their box half empty get no box", "[environment]") {
+  const auto shape_of = [](Mesh mesh, const Vec3& scale = Vec3::Ones()) {
+    FakeHost host;
+    Scene scene;
+    const NodeId room = scene.create(scene.root(), "room");
+    const NodeId table = scene.create(room, "TableDining");
+    scene.edit(table).mesh = std::make_shared<const Mesh>(std::move(mesh));
+    Transform place;
+    place.scale = scale;
+    scene.set_pose(table, place);
+    apply_environment_rules(infinigen_rules(), false, room, scene, host);
+    return scene[table].collider->shape;
+  };
+  const auto join = [](Mesh to, Mesh more, const Vec3& at) {
+    const auto first = std::uint32_t(to.positions.size());
+    for (const Vec3f& p : more.positions) to.positions.push_back(p + at.cast<float>());
+    for (auto triangle : more.triangles) {
+      for (std::uint32_t& corner : triangle) corner += first;
+      to.triangles.push_back(triangle);
+    }
+    return to;
+  };
+  CHECK(shape_of(make_box(Vec3(1.6, 0.9, 0.04))) == ColliderShape::BoundingBox);
+  // Top and legs in one mesh: a solid block would stand under its edge.
+  Mesh table = make_box(Vec3(1.6, 0.9, 0.04));
+  for (const double x : {-0.75, 0.75}) {
+    for (const double y : {-0.4, 0.4}) {
+      table = join(table, make_box(Vec3(0.05, 0.05, 0.7)), Vec3(x, y, -0.37));
+    }
+  }
+  CHECK(shape_of(table) == ColliderShape::TriangleMesh);
+  // Round: things would lie on the air at its corners.
+  CHECK(shape_of(make_cylinder(0.6, 0.03, 48)) == ColliderShape::TriangleMesh);
+  // Nothing is gained by exactness below a centimetre.
+  const Mesh stepped =
+      join(make_box(Vec3(1.6, 0.9, 0.04)), make_box(Vec3(1.61, 0.91, 0.02)), Vec3(0, 0, 0.005));
+  CHECK(shape_of(stepped) == ColliderShape::BoundingBox);
+  CHECK(shape_of(stepped, Vec3::Constant(10.0)) == ColliderShape::TriangleMesh);
+  CHECK(shape_of(make_plane(1.0, 2.0)) == ColliderShape::BoundingBox);
+}
+
+TEST_CASE("Boxes for the whole environment warn of those that are half empty", "[environment]") {
   BuiltRoom room;
-  EnvironmentRules rules = infinigen_rules();
-  rules.working_area = "TablePingPong";
-  const Vec3 area = apply_environment_rules(rules, false, room.environment, room.scene, room.host);
-  CHECK(area == Vec3::Zero());
+  const NodeId round = room.scene.create(room.environment, "round");
+  room.scene.edit(round).mesh = std::make_shared<const Mesh>(make_cylinder(0.6, 0.03, 48));
+  EnvironmentRules rules;
+  rules.colliders = "bounding_box";
+  apply_environment_rules(rules, false, room.environment, room.scene, room.host);
+  CHECK(room.scene[round].collider->shape == ColliderShape::BoundingBox);
   REQUIRE(room.host.warnings.size() == 1);
   CHECK_THAT(room.host.warnings[0],
-             ContainsSubstring("/Environment/loaded: no node's path holds 'TablePingPong'"));
+             ContainsSubstring("/Environment/loaded: 'environment.colliders: bounding_box' makes 1 "
+                               "meshes solid where pictures show nothing"));
 }
 
 TEST_CASE("The environment's own name matches no rule", "[environment]") {

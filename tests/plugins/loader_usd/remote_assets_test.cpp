@@ -84,7 +84,8 @@ TEST_CASE("what servers and other disks have is found below the assets root", "[
       "/Isaac/Props/cup.usda",
       "/home/somebody/Isaac/Props/cup.usda",
       "C:/Users/somebody/Isaac/Props/cup.usda",
-      "omniverse://nucleus/Mine/cup.usda"};
+      "omniverse://nucleus/Mine/cup.usda",
+      "omniverse://server/Isaac/Props/cup.usda?version=12"};
   disk.load(disk.scene_of(names));
   CHECK(disk.host.warnings.empty());
   for (std::size_t i = 0; i < names.size(); ++i) {
@@ -130,6 +131,47 @@ TEST_CASE("an asset that is nowhere is one warning that says where it would be l
           "root (--assets-root, DIORAMA_ASSETS_ROOT) and name it '/Isaac/Props/gone.usda'; tried " +
           disk.root.path("Isaac/Props/gone.usda") + " (and 2 more references to it)");
   CHECK(disk.host.warnings[1].ends_with("@beside.usda@ could not be found"));
+}
+
+TEST_CASE("scenes that lack the same asset say so once", "[loader_usd]") {
+  Disk disk;
+  const std::string gone = "omniverse://server/Isaac/Props/gone.usda";
+  const std::string picture = R"(
+    def Cube "C" ( prepend apiSchemas = ["MaterialBindingAPI"] )
+    {
+        rel material:binding = </Root/Mat>
+    }
+    def Material "Mat"
+    {
+        token outputs:surface.connect = </Root/Mat/S.outputs:surface>
+        def Shader "S"
+        {
+            uniform token info:id = "UsdPreviewSurface"
+            color3f inputs:diffuseColor.connect = </Root/Mat/T.outputs:rgb>
+            token outputs:surface
+        }
+        def Shader "T"
+        {
+            uniform token info:id = "UsdUVTexture"
+            asset inputs:file = @https://host/NVIDIA/Materials/gone.png@
+            float3 outputs:rgb
+        }
+    }
+)";
+  const std::string part = "    def \"P\" ( references = @" + gone + "@ )\n    {\n    }\n";
+  const std::string first = disk.elsewhere.write(
+      "first.usda", "#usda 1.0\n(\n    defaultPrim = \"Root\"\n)\ndef Xform \"Root\"\n{\n" + part +
+                        picture + "}\n");
+  const std::string second = disk.elsewhere.write(
+      "second.usda", "#usda 1.0\n(\n    defaultPrim = \"Root\"\n)\ndef Xform \"Root\"\n{\n" + part +
+                         part.substr(0, 9) + "Q" + part.substr(10) + picture + "}\n");
+  UsdLoader loader({}, disk.host);
+  for (const std::string& file : {first, second, first}) {
+    loader.load(file, disk.scene, disk.scene.create(disk.scene.root(), "asset"));
+  }
+  REQUIRE(disk.host.warnings.size() == 2);
+  CHECK_THAT(disk.host.warnings[0] + disk.host.warnings[1],
+             ContainsSubstring("gone.usda") && ContainsSubstring("gone.png"));
 }
 
 TEST_CASE("pictures and sets of tiles of servers are found, too", "[loader_usd]") {

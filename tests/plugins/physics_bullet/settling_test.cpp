@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <cmath>
 #include <cstring>
 
 #include "diorama/rng.h"
@@ -198,4 +199,100 @@ TEST_CASE("a capsule comes to rest lying, on a mesh, on a box and half over an e
     CHECK(world.position(capsules[1]).z() == Approx(0.05).margin(0.002));
     CHECK(world.backend.report().max_penetration_m < 0.001);
   }
+}
+
+namespace {
+
+/// Things on each other, from a millimetre above each other on.
+struct Stack {
+  const char* name;
+  bool is_hull = false;
+  PrimitiveShape shape = PrimitiveShape::Box;
+  Vec3 size = Vec3::Constant(0.1);
+  int count = 6;
+  double turn_deg = 0.0;  ///< Of each against the one below.
+  double offset_m = 0.0;  ///< Of every other one, sideways.
+  double top_mass_kg = 0.3;
+};
+
+std::vector<NodeId> add_stack(PhysicsWorld& world, const Stack& stack) {
+  world.add_floor();
+  std::vector<NodeId> things;
+  double z = 0.0;
+  for (int i = 0; i < stack.count; ++i) {
+    z += 1e-3;
+    const Vec3 place(stack.offset_m * (i % 2), 0.5 * stack.offset_m * (i % 3),
+                     z + 0.5 * stack.size.z());
+    const Affine pose = turned(place, kPi / 180.0 * stack.turn_deg * i, Vec3::UnitZ());
+    if (stack.is_hull) {
+      things.push_back(
+          world.add("thing", shared(make_box(stack.size)), ColliderShape::ConvexHull, pose));
+    } else {
+      things.push_back(world.add_primitive("thing", stack.shape, stack.size, pose));
+    }
+    world.make_body(things.back(), i + 1 == stack.count ? stack.top_mass_kg : 0.3);
+    z += stack.size.z();
+  }
+  return things;
+}
+
+}  // namespace
+
+TEST_CASE("stacks neither creep nor fall, whatever they are of and however they are turned",
+          "[physics]") {
+  const Stack stacks[] = {
+      {.name = "aligned", .count = 8},
+      {.name = "turned by 2", .turn_deg = 2.0},
+      {.name = "turned by 7", .turn_deg = 7.0},
+      {.name = "turned by 15", .count = 8, .turn_deg = 15.0},
+      {.name = "turned by 45", .count = 8, .turn_deg = 45.0},
+      {.name = "ten", .count = 10, .turn_deg = 11.0},
+      {.name = "heavy on light", .turn_deg = 11.0, .top_mass_kg = 3.0},
+      {.name = "off", .turn_deg = 11.0, .offset_m = 0.02},
+      {.name = "books", .size = {0.2, 0.15, 0.03}, .count = 8, .turn_deg = 11.0, .offset_m = 0.004},
+      {.name = "small", .size = {0.03, 0.03, 0.02}, .turn_deg = 11.0, .offset_m = 0.001},
+      {.name = "cylinders",
+       .shape = PrimitiveShape::Cylinder,
+       .size = {0.08, 0.08, 0.1},
+       .offset_m = 0.003},
+      {.name = "hulls", .is_hull = true, .count = 8},
+      {.name = "turned hulls", .is_hull = true, .count = 8, .turn_deg = 15.0},
+      {.name = "heavy hull on light ones", .is_hull = true, .turn_deg = 11.0, .top_mass_kg = 3.0},
+  };
+  for (const Stack& stack : stacks) {
+    CAPTURE(stack.name);
+    PhysicsWorld world;
+    const std::vector<NodeId> things = add_stack(world, stack);
+    std::vector<Vec3> start;
+    for (const NodeId thing : things) start.push_back(world.position(thing));
+    world.run(12 * 60);
+    for (std::size_t i = 0; i < things.size(); ++i) {
+      CAPTURE(i);
+      const Vec3 way = world.position(things[i]) - start[i];
+      CHECK(way.head<2>().norm() < 0.003);
+      CHECK(std::abs(way.z()) < 0.001 * double(i + 1) + 0.0015);
+    }
+    CHECK(world.backend.report().sleeping_bodies == stack.count);
+  }
+}
+
+TEST_CASE("what lies on a slope too steep for friction slides, and stays on a flat one",
+          "[physics]") {
+  const auto way_on = [](double angle_deg, double friction) {
+    PhysicsWorld world;
+    const Affine slope(Eigen::AngleAxisd(kPi / 180.0 * angle_deg, Vec3::UnitY()));
+    const NodeId floor =
+        world.add_primitive("slope", PrimitiveShape::Box, Vec3(8, 2, 0.2), slope * at(0, 0, -0.1));
+    const NodeId box = world.add_primitive("box", PrimitiveShape::Box, Vec3(0.1, 0.1, 0.1),
+                                           slope * at(0, 0, 0.051));
+    world.make_body(box);
+    for (const NodeId node : {floor, box}) world.scene.edit(node).collider->friction = friction;
+    const Vec3 start = world.position(box);
+    world.run(60);
+    return (world.position(box) - start).norm();
+  };
+  // tan 20 = 0.364
+  CHECK(way_on(20.0, 0.5) < 0.002);
+  // g (sin 20 - 0.2 cos 20) / 2 in the first second.
+  CHECK(way_on(20.0, 0.2) == Approx(0.755).epsilon(0.05));
 }

@@ -36,7 +36,7 @@ struct Shelf {
     folder.write("brick_wall/brick_wall_1k.blend", "x");
     folder.write("empty/readme.txt", "x");
   }
-  std::vector<MaterialMaps> all() const { return find_materials(folder.path(""), host); }
+  std::vector<MaterialMaps> all() { return find_materials(folder.path(""), host); }
 };
 
 std::string texture_name(const TextureInput& input) {
@@ -89,9 +89,10 @@ TEST_CASE("names of pictures are taken apart as their collections put them toget
 
 TEST_CASE("a folder's materials are found at any depth, with what each picture is for",
           "[randomizers]") {
-  const Shelf shelf;
+  Shelf shelf;
   const std::vector<MaterialMaps> found = shelf.all();
   REQUIRE(found.size() == 2);
+  CHECK(shelf.host.warnings.empty());
   MaterialReader reader(shelf.host);
   const Material metal = reader.read(found[0]);
   CHECK(metal.name == "metal_051");
@@ -139,6 +140,22 @@ TEST_CASE("a folder without materials is an error that says what one is", "[rand
   params.assets = TextDistribution({"oak.usd"});
   CHECK_THROWS_WITH(RandomMaterial(params, shelf.host),
                     ContainsSubstring("both 'assets' and 'folders' are given"));
+}
+
+TEST_CASE("displacement is told, as a warning where no normals show the relief", "[randomizers]") {
+  Shelf shelf;
+  for (const char* map : {"Color", "Displacement"}) {
+    shelf.folder.write(std::string("flat/Tiles_1K-PNG_") + map + ".png", "x");
+  }
+  shelf.folder.write("plain/oak_diff_1k.png", "x");
+  const std::vector<MaterialMaps> found = shelf.all();
+  CHECK(found.size() == 4);
+  for (const MaterialMaps& maps : found) CHECK_FALSE(maps.files.contains(MapRole::Displacement));
+  REQUIRE(shelf.host.warnings.size() == 1);
+  CHECK(shelf.host.warnings[0] ==
+        shelf.folder.path("") +
+            ": materials with displacement, which moves no surface here: 1 without normals, which "
+            "look flat");
 }
 
 TEST_CASE("each node gets one of the materials, and its pictures count", "[randomizers]") {
