@@ -77,9 +77,8 @@ void EnvironmentPatterns::try_in(const Scene& scene, NodeId environment, const s
     }
     if (told_.emplace(i, asset).second) {
       const EnvironmentPattern& pattern = patterns_[i];
-      host.log(pattern.level,
-               asset + ": " + fitless(pattern) + " (" + pattern.key + ")" +
-                   (pattern.otherwise.empty() ? "" : "; " + pattern.otherwise));
+      host.log(pattern.level, asset + ": " + fitless(pattern) + " (" + pattern.key + ")" +
+                                  (pattern.otherwise.empty() ? "" : "; " + pattern.otherwise));
     }
     if (!met_.contains(i)) missing.insert(i);
   }
@@ -99,8 +98,8 @@ void EnvironmentPatterns::try_in(const Scene& scene, NodeId environment, const s
   Complaints complaints;
   for (const std::size_t i : missing) {
     const EnvironmentPattern& pattern = patterns_[i];
-    const std::string text =
-        pattern.key + ": " + fitless(pattern) + " in any environment of the job" + nearest[i].hint();
+    const std::string text = pattern.key + ": " + fitless(pattern) +
+                             " in any environment of the job" + nearest[i].hint();
     // Lists of what is hidden name the lamps of many rooms: one of them has to be there.
     const bool has_other =
         pattern.level == LogLevel::Info && std::ranges::any_of(met_, [&](std::size_t other) {

@@ -29,7 +29,7 @@ EnvironmentPattern path(const std::string& text, int line = 7) {
 }
 
 EnvironmentPattern rule(const std::string& text, LogLevel level = LogLevel::Warning) {
-  return {text,  "environment.working_area",   Place{"job.yaml", 4, 1},
+  return {text,  "environment.working_area", Place{"job.yaml", 4, 1},
           false, "the origin is its middle", level};
 }
 
