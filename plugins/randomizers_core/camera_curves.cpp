@@ -133,8 +133,12 @@ double HandShake::sum(std::size_t axis, double time_s) const {
   return sum * std::sqrt(2.0 / double(kWaves));
 }
 
-double HandShake::reach_m() const {
-  return position_m_ * std::sqrt(3.0) * double(kWaves) * std::sqrt(2.0 / double(kWaves));
+double HandShake::reach_m(int frames, double fps) const {
+  double reach = 0.0;
+  for (int frame = 0; frame < frames; ++frame) {
+    reach = std::max(reach, at(frame / fps).translation().norm());
+  }
+  return reach;
 }
 
 Affine HandShake::at(double time_s) const {

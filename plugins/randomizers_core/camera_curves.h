@@ -58,8 +58,8 @@ class HandShake {
   HandShake(double position_m, double angle_rad, double frequency_hz, Rng rng);
   /// In the space of what is held.
   Affine at(double time_s) const;
-  /// How far off its path it may carry what is held, in metres.
-  double reach_m() const;
+  /// How far off its path it carries what is held in any of so many frames, in metres.
+  double reach_m(int frames, double fps) const;
 
  private:
   struct Wave {

@@ -251,7 +251,9 @@ void CameraPath::randomize(Scene& scene, const RandomizeContext& context, const 
   const auto draw = [&](NodeId node, NodeDraws& draws) {
     const HandShake shake(params_.jitter_m, radians(params_.jitter_deg), params_.jitter_hz,
                           draws.rng.fork("shake"));
-    moving_.push_back({node, draw_path(scene, node, context, shake.reach_m(), draws), shake});
+    const double shake_m =
+        context.clip ? shake.reach_m(context.clip->frame_count, context.clip->fps) : 0.0;
+    moving_.push_back({node, draw_path(scene, node, context, shake_m, draws), shake});
   };
   draw_for_each(scene, scene.match(params_.nodes), context, rng, draw);
   play(scene, context.clip.value_or(ClipFrame()));
