@@ -115,7 +115,7 @@ void bind_node(py::module_& module) {
       "A node of the scene's tree. Poses are float64, 4 x 4, in metres; what is set holds for all "
       "below it.")
       .def_property_readonly(
-          "path", [](const PyNode& n) { return n.scene().path(n.id); }, "\"/Assets/mug_01\"")
+          "path", [](const PyNode& n) { return n.scene().path(n.id); }, R"("/Assets/mug_01")")
       .def_property_readonly(
           "name", [](const PyNode& n) { return n.node().name; }, "The end of the path.")
       .def_property_readonly(

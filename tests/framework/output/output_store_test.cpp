@@ -1002,6 +1002,10 @@ TEST_CASE("A stranger's journal removes and writes nothing outside of the datase
   forge_journal(root, R"({"files":[["src/main.c",9,"00"],["victim",1,"00"]],"records":{}})");
   Job job = resuming("w3");
   job.existing = Existing::Overwrite;
+  const auto before = tree(folder.path());
+  CHECK_THROWS_WITH(run(local, root, job), ContainsSubstring("holds 'rgb_7.png', which is not of"));
+  CHECK(tree(folder.path()) == before);
+  fs::remove(root / "out/one/rgb_7.png");
   CHECK(run(local, root, job));
   CHECK(tree(folder.path()).at("data/src/main.c") == "int main;");
   CHECK(tree(folder.path()).at("victim/a.txt") == "precious");
