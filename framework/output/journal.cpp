@@ -519,8 +519,9 @@ std::vector<EntryPlace> Journals::entries_of(const std::string& worker) const {
   std::ranges::sort(places, [](const EntryPlace& a, const EntryPlace& b) {
     return std::pair(a.entry, b.offset) < std::pair(b.entry, a.offset);
   });
-  const auto again = std::ranges::unique(places, {}, &EntryPlace::entry);
-  places.erase(again.begin(), again.end());
+  // Not by ranges: clang 14, which builds the fuzzers, does not know what they return.
+  const auto are_same = [](const EntryPlace& a, const EntryPlace& b) { return a.entry == b.entry; };
+  places.erase(std::unique(places.begin(), places.end(), are_same), places.end());
   std::erase_if(places, [&](const EntryPlace& place) {
     return voids_.contains({worker, place.entry});
   });
