@@ -37,6 +37,18 @@ std::map<std::string, std::string> current_environment() {
   return variables;
 }
 
+/// Output may go to a file, and drivers keep such a stream once more for their log.
+bool is_standard_stream(const struct stat& file) {
+  for (const int number : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    struct stat stream {};
+    if (::fstat(number, &stream) == 0 && stream.st_dev == file.st_dev &&
+        stream.st_ino == file.st_ino) {
+      return true;
+    }
+  }
+  return false;
+}
+
 /// Names of the files that are open. What drivers and libraries hold (devices, sockets, caches of
 /// kernels) is theirs.
 std::multiset<std::string> current_files() {
@@ -46,6 +58,7 @@ std::multiset<std::string> current_files() {
     struct stat status {};
     const int number = std::atoi(entry.path().filename().c_str());
     if (::fstat(number, &status) != 0 || !S_ISREG(status.st_mode)) continue;
+    if (is_standard_stream(status)) continue;
     names.insert(std::filesystem::read_symlink(entry.path(), gone).string());
   }
   return names;
