@@ -587,7 +587,7 @@ std::optional<TimelineStep> read_recording(const Value& map, const std::string& 
   if (count > 1e6) {
     complaints.add(value.place,
                    path + ".record: expected fps x seconds to be at most 1000000 frames, found " +
-                       short_number(frames));
+                       std::to_string(std::llround(std::min(frames, 1e18))));
     return std::nullopt;
   }
   TimelineStep step{TimelineStep::Kind::Record, 0, keys.name, int(count)};

@@ -73,7 +73,10 @@ struct StoredView {
     const std::string ending = number.substr(number.size() - 4);
     const auto file = [&](const std::string& kind, const std::string& stem,
                           const std::string& type) {
-      return files.at("basic/rp_" + camera + "/" + kind + "/" + stem + "_" + ending + type);
+      const std::string name = stem + "_" + ending + type;
+      // Where there is one camera, all files lie side by side.
+      const auto own = files.find("basic/rp_" + camera + "/" + kind + "/" + name);
+      return own != files.end() ? own->second : files.at("basic/" + name);
     };
     const auto array = [&](const std::string& kind) { return parse_npy(file(kind, kind, ".npy")); };
     forward = array("flow_forward");

@@ -153,10 +153,9 @@ TEST_CASE("Ctrl-C and SIGTERM end a run with 130 and leave it resumable", "[run]
     CHECK(outcome.exit_code == 130);
     CHECK_THAT(outcome.errors, ContainsSubstring("interrupted; '--resume' goes on"));
     // Where it is, and what to do next.
-    const std::string place = (folder / "out").string();
-    CHECK_THAT(outcome.errors, ContainsSubstring("dataset: " + place + "\n"));
+    CHECK_THAT(outcome.errors, ContainsSubstring("dataset: out\n"));
     CHECK_THAT(outcome.errors,
-               ContainsSubstring("next: the same command with --resume, diorama view " + place));
+               ContainsSubstring("next: the same command with --resume, diorama view out"));
     CHECK_FALSE(fs::exists(folder / "out/.diorama/stage"));
     std::vector<std::string> resumed = arguments;
     resumed.emplace_back("--resume");
