@@ -67,6 +67,8 @@ std::optional<DatasetPage> read_dataset_page(const std::filesystem::path& folder
       }
     }
     if (json.contains("clips")) page.clips = clips_of_json(json.at("clips"));
+    const auto job = json.find("job");
+    if (job != json.end() && job->is_string()) page.job = job->get<std::string>();
     return page;
   } catch (const std::runtime_error&) {
     return std::nullopt;
@@ -75,14 +77,8 @@ std::optional<DatasetPage> read_dataset_page(const std::filesystem::path& folder
   }
 }
 
-std::string job_of_page(const std::filesystem::path& folder) {
-  const Json json = parsed_page(folder);
-  const auto job = json.find("job");
-  return job != json.end() && job->is_string() ? job->get<std::string>() : std::string();
-}
-
 void check_class_order(const DatasetPage& page, StoredFiles& files) {
-  const std::string job = job_of_page(files.root());
+  const std::string& job = page.job;
   // Keys of writers that name classes, or what becomes of them, with nothing behind.
   const auto is_plain = [&](std::string_view key, std::string_view nothing) {
     for (std::size_t at = job.find(key); at != job.npos; at = job.find(key, at)) {

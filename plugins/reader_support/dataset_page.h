@@ -22,6 +22,7 @@ struct DatasetPage {
   std::map<int, std::string> split_of_capture;
   Json conventions = Json::object();
   std::vector<DatasetClip> clips;
+  std::string job;  ///< As resolved by the run, YAML; empty for what no run made.
 
   /// One picture per capture and camera.
   std::size_t picture_count() const { return std::size_t(captures) * cameras.size(); }
@@ -32,9 +33,6 @@ struct DatasetPage {
 /// Nothing when there is no such page, or one that cannot be read: such a dataset is read by the
 /// format's rules alone.
 std::optional<DatasetPage> read_dataset_page(const std::filesystem::path& folder);
-
-/// The resolved job that the page states, YAML; empty for what no run made.
-std::string job_of_page(const std::filesystem::path& folder);
 
 /// Classes that no parameter of a writer has put in an order are sorted.
 void check_class_order(const DatasetPage& page, StoredFiles& files);

@@ -168,7 +168,7 @@ std::vector<Affine> symmetries_of(const Json& model) {
 
 std::string bop_model_file(int id) { return "models/obj_" + zero_padded(id, 6) + ".ply"; }
 
-BopModelBoxes read_bop_models(StoredFiles& files, bool is_own) {
+BopModelBoxes read_bop_models(StoredFiles& files, const std::optional<DatasetPage>& own) {
   BopModelBoxes boxes;
   std::string page = "models/models_info.json";
   for (const char* folder : {"models", "models_eval", "models_cad", "models_reconst"}) {
@@ -177,10 +177,10 @@ BopModelBoxes read_bop_models(StoredFiles& files, bool is_own) {
     page = file;
     break;
   }
-  if (!is_own && !files.has(page)) return boxes;
+  if (!own && !files.has(page)) return boxes;
   const auto json = files.json(page);
   if (!json) return boxes;
-  const double tolerance = is_own ? symmetry_tolerance(job_of_page(files.root())) : 0.0;
+  const double tolerance = own ? symmetry_tolerance(own->job) : 0.0;
   files.reading(page, [&] {
     for (const auto& item : json->items()) {
       const std::string& key = item.key();
@@ -197,14 +197,14 @@ BopModelBoxes read_bop_models(StoredFiles& files, bool is_own) {
       const std::string who = "obj_id " + key;
       const double diameter = number("diameter");
       // Meshes of the benchmark were measured on fewer points.
-      const double slack = is_own ? 1e-5 : 0.02;
+      const double slack = own ? 1e-5 : 0.02;
       files.check(size.allFinite() && low.allFinite() && (size.array() >= 0.0).all() &&
                       diameter <= size.norm() * (1.0 + slack) &&
                       diameter >= size.maxCoeff() * (1.0 - slack),
                   kCounts, page, who, "its diameter is " + std::to_string(diameter),
                   "one that goes with its size");
       const std::string file = bop_model_file(id);
-      if (!is_own) continue;
+      if (!own) continue;
       if (!files.has(file)) {
         // A box is all that is known of such an object.
         files.check(std::abs(diameter - size.norm()) <= 1e-5 * size.norm(), kCounts, page, who,

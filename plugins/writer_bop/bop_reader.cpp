@@ -75,7 +75,7 @@ class BopDataset final : public StoredDataset {
       throw Error(ErrorKind::Asset, folder_.string() + ": holds no scenes of BOP");
     }
     StoredFiles files(folder_, host_, log_);
-    models_ = read_bop_models(files, page_.has_value());
+    models_ = read_bop_models(files, page_);
     if (page_) check_class_order(*page_, files);
     read_names(files);
     Targets targets;
