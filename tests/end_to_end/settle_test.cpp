@@ -126,19 +126,23 @@ TEST_CASE("Retries are the same for any number of threads and split into shards"
   CHECK(difference(one.files, tree(folder / "out")) == "");
 }
 
+/// Of a job, up to its randomizers: a small ball above the middle.
+const std::string kBallAbove =
+    R"(objects: [{type: shapes, name: ball, shapes: [sphere], under: /Assets, label: ball}]
+cameras: [{type: pinhole, name: cam, width: 64, height: 48}]
+lights: [{type: dome, name: sky}]
+randomizers:
+  - {type: scatter_poses, name: poses, on: [environment], nodes: "/Assets/*", offset: [0, 0, 1.3],
+     scale: 0.1}
+)";
+
 TEST_CASE("What rests on a thing that an event takes away falls", "[run][settle]") {
   const TemporaryFolder folder;
   const auto moved = [&](const std::string& name, const std::string& event) {
     write_file(folder / (name + ".yaml"), R"(
 total_captures: 1
 environments: [{type: shapes, shapes: [cube]}]
-objects: [{type: shapes, name: ball, shapes: [sphere], under: /Assets, label: ball}]
-cameras: [{type: pinhole, name: cam, width: 64, height: 48}]
-lights: [{type: dome, name: sky}]
-randomizers:
-  - {type: scatter_poses, name: poses, on: [environment], nodes: "/Assets/*", offset: [0, 0, 1.3],
-     scale: 0.1}
-)" + event + R"(
+)" + kBallAbove + event + R"(
   - {type: orbit_cameras, name: view, on: [after], nodes: "/Cameras/*", targets: "/Assets/*",
      distance: 2, polar_angle_deg: 80}
 settle: {policy: keep}
@@ -169,13 +173,7 @@ TEST_CASE("Nothing lies on what the job hides, and debug mode changes no scene",
     write_file(folder / (name + ".yaml"), R"(
 total_captures: 1
 environments: [{type: files, files: [room.usda]}]
-objects: [{type: shapes, name: ball, shapes: [sphere], under: /Assets, label: ball}]
-cameras: [{type: pinhole, name: cam, width: 64, height: 48}]
-lights: [{type: dome, name: sky}]
-randomizers:
-  - {type: scatter_poses, name: poses, on: [environment], nodes: "/Assets/*", offset: [0, 0, 1.3],
-     scale: 0.1}
-settle: {policy: keep}
+)" + kBallAbove + R"(settle: {policy: keep}
 renderer: {type: "null"}
 timeline: [{simulate: 120}, {capture: after}]
 writers: [{type: BasicWriter, name: basic, rgb: true}]
