@@ -10,9 +10,9 @@
 #include <optional>
 
 #include "framework/app/standard_output.h"
-#include "framework/bench/cpu_time.h"
 #include "framework/bench/picture_error.h"
 #include "framework/bench/scene_rig.h"
+#include "framework/host/machine_limits.h"
 #include "framework/host/replace_file.h"
 #include "framework/images/linear_picture.h"
 #include "framework/jobs/assemble.h"
@@ -31,11 +31,11 @@ struct StepTime {
 
 template <class Step>
 StepTime measured(Step&& step) {
-  const double cpu = bench::cpu_seconds();
+  const double cpu = cpu_seconds();
   const auto start = std::chrono::steady_clock::now();
   step();
   const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - start;
-  return {wall.count(), bench::cpu_seconds() - cpu};
+  return {wall.count(), cpu_seconds() - cpu};
 }
 
 /// One picture.

@@ -30,4 +30,7 @@ struct ProcessorTime {
 /// Nothing when it is not known.
 std::optional<ProcessorTime> processor_time(const std::filesystem::path& root = "/");
 
+/// CPU seconds of this process so far, all threads, in the program and in the system for it.
+double cpu_seconds();
+
 }  // namespace diorama

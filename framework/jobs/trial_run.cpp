@@ -112,14 +112,8 @@ std::set<int> chosen_captures(const TrialOptions& options, const CapturePlan& pl
 /// How many visits have one of them. Visits that nothing settles in count, too.
 int count_visits(const std::set<int>& captures, const CapturePlan& plan) {
   std::set<int> visits;
-  for (const int capture : captures) {
-    int first = 0;
-    for (int end = plan.visit_count(); end - first > 1;) {
-      const int middle = first + (end - first) / 2;
-      (plan.visit(middle).first_capture <= capture ? first : end) = middle;
-    }
-    visits.insert(first);
-  }
+  const int per_visit = plan.visit(0).capture_count;  // of all but the last
+  for (const int capture : captures) visits.insert(capture / per_visit);
   return int(visits.size());
 }
 
@@ -149,23 +143,14 @@ class ProcessorsLeft {
   std::optional<double> now() const {
     const std::optional<ProcessorTime> time = processor_time();
     if (!began_ || !time || time->all_s - began_->all_s <= 0.0) return std::nullopt;
-    const double others = time->busy_s - began_->busy_s - (own_s() - own_began_s_);
+    const double others = time->busy_s - began_->busy_s - (cpu_seconds() - own_began_s_);
     const double share = std::clamp(others / (time->all_s - began_->all_s), 0.0, 1.0);
     return (1.0 - share) * std::thread::hardware_concurrency();
   }
 
  private:
-  static double own_s() {
-    rusage usage{};
-    getrusage(RUSAGE_SELF, &usage);
-    const auto seconds = [](const timeval& time) {
-      return double(time.tv_sec) + 1e-6 * double(time.tv_usec);
-    };
-    return seconds(usage.ru_utime) + seconds(usage.ru_stime);
-  }
-
   std::optional<ProcessorTime> began_ = processor_time();
-  double own_began_s_ = own_s();
+  double own_began_s_ = cpu_seconds();
 };
 
 Estimate estimate_of(const RunSummary& summary, const CapturePlan& plan, int visits,

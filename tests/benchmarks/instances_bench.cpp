@@ -12,14 +12,13 @@
 #include "diorama/geometry.h"
 #include "diorama/rng.h"
 #include "embree_scene.h"
-#include "framework/bench/cpu_time.h"
+#include "framework/host/machine_limits.h"
 #include "renderer_support/isa.h"
 #include "support/render_host/render_host.h"
 
 namespace {
 
 using namespace diorama;
-using bench::cpu_seconds;
 
 double resident_mib() {
   std::size_t total = 0;

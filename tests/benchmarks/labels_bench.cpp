@@ -21,14 +21,13 @@
 #include "framework/annotators/motion.h"
 #include "framework/annotators/object_coordinates.h"
 #include "framework/annotators/visibility.h"
-#include "framework/bench/cpu_time.h"
+#include "framework/host/machine_limits.h"
 #include "support/render_host/render_host.h"
 #include "writer_basic/basic_writer.h"
 
 namespace {
 
 using namespace diorama;
-using bench::cpu_seconds;
 
 /// Median CPU seconds of each step.
 class Times {

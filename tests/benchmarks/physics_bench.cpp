@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "diorama/rng.h"
-#include "framework/bench/cpu_time.h"
+#include "framework/host/machine_limits.h"
 #include "framework/pipeline/scene_setup.h"
 #include "framework/pipeline/settling.h"
 #include "loader_dining_room/dining_room.h"
@@ -22,7 +22,6 @@
 #include "support/sample_meshes.h"
 
 using namespace diorama;
-using bench::cpu_seconds;
 
 namespace {
 

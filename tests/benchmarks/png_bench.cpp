@@ -22,13 +22,12 @@
 #include <stdexcept>
 
 #include "diorama/rng.h"
-#include "framework/bench/cpu_time.h"
+#include "framework/host/machine_limits.h"
 #include "framework/images/image_codecs.h"
 
 namespace {
 
 using namespace diorama;
-using bench::cpu_seconds;
 using Bytes = std::vector<std::uint8_t>;
 
 struct Picture {

@@ -17,8 +17,8 @@
 #ifdef DIORAMA_HAS_VULKAN
 #include "vulkan_renderer.h"
 #endif
-#include "framework/bench/cpu_time.h"
 #include "framework/bench/picture_error.h"
+#include "framework/host/machine_limits.h"
 #include "framework/images/linear_picture.h"
 #include "renderer_support/sample_plan.h"
 #include "support/render_host/render_host.h"
@@ -26,7 +26,6 @@
 namespace {
 
 using namespace diorama;
-using bench::cpu_seconds;
 
 double thread_seconds() {
   timespec now;
