@@ -15,8 +15,8 @@ namespace {
 Affine at(double x, double y, double z) { return Affine(Eigen::Translation3d(x, y, z)); }
 
 /// A room of 8 x 8 x 3 m with its floor at z = 0, and a table of 1 x 1 x 0.7 m at the origin.
-struct Stage {
-  Stage() {
+struct FurnishedRoom {
+  FurnishedRoom() {
     environment = scene.create(scene.root(), "Environment");
     Mesh walls = make_box(Vec3(8, 8, 3));
     for (auto& [a, b, c] : walls.triangles) std::swap(b, c);  // faces look inwards
@@ -58,7 +58,7 @@ using Texts = std::vector<std::string>;
 }  // namespace
 
 TEST_CASE("What lies on the table, on the floor or on what lies there is settled", "[settle]") {
-  Stage stage;
+  FurnishedRoom stage;
   stage.add_object("on_table", kBox, at(0.2, 0.1, 0.8));
   stage.add_object("on_box", make_sphere(0.1), at(0.2, 0.1, 1.0));
   stage.add_object("on_floor", kBox, at(2, 1, 0.1));
@@ -69,7 +69,7 @@ TEST_CASE("What lies on the table, on the floor or on what lies there is settled
 }
 
 TEST_CASE("What hangs, moves, is outside or sticks is named with the reason", "[settle]") {
-  Stage stage;
+  FurnishedRoom stage;
   stage.add_object("in_air", kBox, at(0, 0, 1.2));
   const NodeId rolls = stage.add_object("rolls", make_sphere(0.1), at(2, 0, 0.1));
   stage.scene.edit(rolls).rigid_body->linear_velocity = Vec3(0.3, 0, 0);
@@ -82,14 +82,14 @@ TEST_CASE("What hangs, moves, is outside or sticks is named with the reason", "[
 }
 
 TEST_CASE("What has sunk in by more than a centimetre is stuck", "[settle]") {
-  Stage stage;
+  FurnishedRoom stage;
   stage.add_object("sunk", kBox, at(0.2, 0.1, 0.787));
   stage.add_object("pressed", kBox, at(-0.2, 0.1, 0.793));
   CHECK(stage.unsettled() == Texts{"sunk: is stuck in /Environment/table"});
 }
 
 TEST_CASE("A wide thing that is sunk in with one corner alone is stuck", "[settle]") {
-  Stage stage;
+  FurnishedRoom stage;
   const Mesh board = make_box(Vec3(0.8, 0.8, 0.03));
   const auto tilted = Eigen::Quaterniond(Eigen::AngleAxisd(0.2, Vec3(1, -1, 0).normalized()));
   const double low = 0.4 * std::sqrt(2.0) * std::sin(0.2) + 0.015 * std::cos(0.2);
@@ -100,7 +100,7 @@ TEST_CASE("A wide thing that is sunk in with one corner alone is stuck", "[settl
 }
 
 TEST_CASE("What the last step pushed moves, whatever its velocity", "[settle]") {
-  Stage stage;
+  FurnishedRoom stage;
   const NodeId pushed = stage.add_object("pushed", kBox, at(0.2, 0.1, 0.8));
   BodyPoses before = body_poses(stage.scene);
   CHECK(stage.unsettled({before, 0.02}) == Texts{});
@@ -109,7 +109,7 @@ TEST_CASE("What the last step pushed moves, whatever its velocity", "[settle]") 
 }
 
 TEST_CASE("Two things that hold each other hang both; what floats may hang and hold", "[settle]") {
-  Stage stage;
+  FurnishedRoom stage;
   stage.add_object("lower", kBox, at(0, 0, 1.5));
   stage.add_object("upper", kBox, at(0, 0, 1.7));
   stage.add_object("balloon", kBox, at(2, 0, 1.5), false);
@@ -118,7 +118,7 @@ TEST_CASE("Two things that hold each other hang both; what floats may hang and h
 }
 
 TEST_CASE("What leans against something and stands on nothing hangs in the air", "[settle]") {
-  Stage stage;
+  FurnishedRoom stage;
   stage.add_object("at_its_side", kBox, at(0.601, 0, 0.4));
   stage.add_object("stands_there_too", kBox, at(-0.601, 0, 0.1));
   stage.add_object("between", kBox, at(-0.702, -0.1, 0.5) * Eigen::AngleAxisd(0.1, Vec3::UnitY()));
@@ -129,7 +129,7 @@ TEST_CASE("What touches a board that leans by 5 degrees is not held by it, by on
           "[settle]") {
   const auto leaning = [](double degrees) {
     const double angle = degrees * kPi / 180.0;
-    Stage stage;
+    FurnishedRoom stage;
     stage.add(stage.environment, "board", make_box(Vec3(0.5, 0.02, 2.0)),
               at(2, 1, 1) * Eigen::AngleAxisd(-angle, Vec3::UnitX()));
     // Its lower edge is a tenth of a millimetre before the board.
@@ -143,7 +143,7 @@ TEST_CASE("What touches a board that leans by 5 degrees is not held by it, by on
 
 TEST_CASE("A frame hangs on a peg by its upper bar, a box stands on a corner, a fork is sunk in",
           "[settle]") {
-  Stage stage;
+  FurnishedRoom stage;
   stage.add(stage.environment, "peg", make_box(Vec3(0.4, 0.01, 0.01)), at(0.7, 0, 0.6));
   Mesh frame = make_box(Vec3(0.02, 0.3, 0.02));
   const Mesh lower = frame;
@@ -162,14 +162,14 @@ TEST_CASE("A frame hangs on a peg by its upper bar, a box stands on a corner, a 
 }
 
 TEST_CASE("A thing of many triangles stands on a foot of few", "[settle]") {
-  Stage stage;
+  FurnishedRoom stage;
   const NodeId ball = stage.add_object("ball", make_sphere(0.15, 192), at(2, 1, 0.45));
   stage.add(ball, "foot", make_box(Vec3(0.002, 0.002, 0.31)), at(0.031, 0.017, -0.295));
   CHECK(stage.unsettled() == Texts{});
 }
 
 TEST_CASE("Things that lie on what is hidden hang in the air", "[settle]") {
-  Stage stage;
+  FurnishedRoom stage;
   stage.add_object("mug", kBox, at(0, 0, 0.8));
   CHECK(stage.unsettled() == Texts{});
   stage.scene.edit(stage.table).is_visible = false;
@@ -178,7 +178,7 @@ TEST_CASE("Things that lie on what is hidden hang in the air", "[settle]") {
 
 TEST_CASE("Objects that start in a table, in each other or in a hidden lamp are named",
           "[settle]") {
-  Stage stage;
+  FurnishedRoom stage;
   const NodeId lamp = stage.add(stage.environment, "lamp", make_sphere(0.2), at(2, 2, 2));
   stage.scene.edit(lamp).is_visible = false;
   stage.add_object("free", kBox, at(0, 0, 1.2));
@@ -198,7 +198,7 @@ TEST_CASE("Objects that start in a table, in each other or in a hidden lamp are 
 }
 
 TEST_CASE("Cameras in something or right before it are named", "[settle]") {
-  Stage stage;
+  FurnishedRoom stage;
   std::vector<NodeId> cameras;
   for (const Vec3& place : {Vec3(2, 2, 1.5), Vec3(0, 0, 0.4), Vec3(0.7, 0, 0.5)}) {
     cameras.push_back(stage.scene.create(stage.scene.root(), "cam"));
@@ -215,7 +215,7 @@ TEST_CASE("Cameras in something or right before it are named", "[settle]") {
 }
 
 TEST_CASE("Physics looks anew when anything that collides changed, and only then", "[settle]") {
-  Stage stage;
+  FurnishedRoom stage;
   stage.scene.edit(stage.table).collider = Collider{};
   const NodeId mug = stage.add_object("mug", kBox, at(0, 0, 0.8));
   const NodeId lamp = stage.scene.create(stage.scene.root(), "Lamp");

@@ -42,7 +42,7 @@ WriterQueue::Work encoding(std::function<void(const PendingCapture&)> work) {
 }
 
 /// Notes what is encoded and what is committed.
-struct Log {
+struct QueueLog {
   std::mutex mutex;
   std::vector<int> encoded;
   std::vector<int> committed;
@@ -155,7 +155,7 @@ TEST_CASE("Who asks a run to stop does not wait for captures whose writing has n
 }
 
 TEST_CASE("What is encoded before its turn is written when it is let through", "[queue]") {
-  Log log;
+  QueueLog log;
   WriterQueue queue(with(2, 1000), log.work());
   REQUIRE(queue.push(capture_of(4, 1, 2)));
   REQUIRE(queue.push(capture_of(2, 1, 1)));
@@ -176,7 +176,7 @@ TEST_CASE("What is encoded before its turn is written when it is let through", "
 }
 
 TEST_CASE("Where writers want order, nothing is encoded before its turn", "[queue]") {
-  Log log;
+  QueueLog log;
   WriterQueue::Options options = with(1, 1000);
   options.encodes_ahead = false;
   WriterQueue queue(options, log.work());
@@ -193,7 +193,7 @@ TEST_CASE("Where writers want order, nothing is encoded before its turn", "[queu
 }
 
 TEST_CASE("Later turns that fill the memory leave room for the one whose turn it is", "[queue]") {
-  Log log;
+  QueueLog log;
   std::atomic<bool> gives_up = false;
   WriterQueue::Options options = with(2, 100);
   options.encodes_ahead = false;
@@ -212,7 +212,7 @@ TEST_CASE("Later turns that fill the memory leave room for the one whose turn it
 
 TEST_CASE("A capture of a later turn that is larger than the memory is encoded by itself",
           "[queue]") {
-  Log log;
+  QueueLog log;
   WriterQueue queue(with(2, 100), log.work());
   REQUIRE(queue.push(capture_of(7, 1000, 1)));
   REQUIRE(queue.push(capture_of(8, 1000, 2)));  // when the first is encoded
