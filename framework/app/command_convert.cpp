@@ -65,10 +65,10 @@ struct ChosenWriters {
 ChosenWriters make_writers(const std::vector<std::string>& texts, Registry& registry, Host& host) {
   constexpr std::array<std::string_view, 2> kKeys{"type", "name"};
   ChosenWriters chosen;
-  Complaints complaints;
+  Diagnostics diagnostics;
   for (const std::string& text : texts) {
     const Value entry = writer_entry(text);
-    auto writer = registry.make<Writer>(entry, "--writer", kKeys, complaints, host);
+    auto writer = registry.make<Writer>(entry, "--writer", kKeys, diagnostics, host);
     if (!writer) continue;
     const std::string& type = entry.find("type")->scalar;
     const Value* own = entry.find("name");
@@ -82,7 +82,7 @@ ChosenWriters make_writers(const std::vector<std::string>& texts, Registry& regi
     chosen.pages.push_back({{"name", name}, {"type", type}, {"folder", name}});
     chosen.writers.push_back({name, std::move(writer)});
   }
-  complaints.raise();
+  diagnostics.raise();
   return chosen;
 }
 

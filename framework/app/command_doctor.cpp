@@ -148,11 +148,11 @@ class Doctor {
       try {
         Value parameters = Value::make_map();
         parameters.set("type", Value::text(type));
-        Complaints complaints;
+        Diagnostics diagnostics;
         const std::vector<std::string_view> known{"type"};
         const auto renderer =
-            registry_->make<Renderer>(parameters, "renderer", known, complaints, *host);
-        complaints.raise();
+            registry_->make<Renderer>(parameters, "renderer", known, diagnostics, *host);
+        diagnostics.raise();
         print_text("  " + type + " starts" + said + "\n");
         ++started;
       } catch (const Error& error) {

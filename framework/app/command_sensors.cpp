@@ -59,16 +59,16 @@ void add_needs(const Annotator& annotator, const std::string& type, Effects& eff
 
 Effects make_effects(const fs::path& file, Registry& registry, Host& host) {
   const Value job = read_job_file(file);
-  Complaints complaints;
-  const std::vector<ComponentConfig> entries = read_annotators(job, complaints);
+  Diagnostics diagnostics;
+  const std::vector<ComponentConfig> entries = read_annotators(job, diagnostics);
   const auto keys = host_keys("annotators");
   Effects effects;
   for (const ComponentConfig& entry : entries) {
     effects.types.push_back(entry.type);
     effects.annotators.push_back(
-        registry.make<Annotator>(entry.map, entry.path, keys, complaints, host));
+        registry.make<Annotator>(entry.map, entry.path, keys, diagnostics, host));
   }
-  complaints.raise();
+  diagnostics.raise();
   if (entries.empty()) {
     throw Error(ErrorKind::Config, file.string() +
                                        ": the section 'annotators' is missing or empty; name for "
@@ -84,10 +84,10 @@ Effects make_effects(const fs::path& file, Registry& registry, Host& host) {
 }
 
 std::unique_ptr<Writer> make_writer(const Value& entry, Registry& registry, Host& host) {
-  Complaints complaints;
+  Diagnostics diagnostics;
   const std::vector<std::string_view> keys{"type"};
-  auto writer = registry.make<Writer>(entry, "writer", keys, complaints, host);
-  complaints.raise();
+  auto writer = registry.make<Writer>(entry, "writer", keys, diagnostics, host);
+  diagnostics.raise();
   return writer;
 }
 

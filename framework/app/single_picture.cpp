@@ -81,10 +81,10 @@ std::unique_ptr<Renderer> make_renderer(const PictureOptions& options, Registry&
   Value parameters = Value::make_map();
   parameters.set("type", Value::text(options.renderer));
   for (const std::string& assignment : options.sets) apply_set(parameters, assignment);
-  Complaints complaints;
+  Diagnostics diagnostics;
   const std::vector<std::string_view> known{"type"};
-  auto renderer = registry.make<Renderer>(parameters, "renderer", known, complaints, host);
-  complaints.raise();
+  auto renderer = registry.make<Renderer>(parameters, "renderer", known, diagnostics, host);
+  diagnostics.raise();
   return renderer;
 }
 

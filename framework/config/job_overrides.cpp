@@ -116,7 +116,7 @@ void apply_set(Value& job, std::string_view assignment) {
     }
     path += is_entry ? "[" + part + "]" : (path.empty() ? "" : ".") + part;
   }
-  const Place key_place = at->key_place;
+  const SourceLocation key_place = at->key_place;
   *at = std::move(value);
   at->key_place = key_place;
 }

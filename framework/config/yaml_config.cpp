@@ -26,7 +26,7 @@ constexpr std::size_t kMaxValues = 500'000;
 constexpr std::uintmax_t kMaxFileBytes = std::uintmax_t(64) << 20;
 constexpr std::string_view kCoreTag = "tag:yaml.org,2002:";
 
-[[noreturn]] void refuse(const Place& place, const std::string& message) {
+[[noreturn]] void refuse(const SourceLocation& place, const std::string& message) {
   throw Error(ErrorKind::Config, place.text() + ": " + message);
 }
 
@@ -119,14 +119,16 @@ class TreeBuilder final : public YAML::EventHandler {
     YAML::anchor_t anchor = YAML::NullAnchor;
     bool has_key = false;
     std::string key;
-    Place key_place;
+    SourceLocation key_place;
     std::set<std::string, std::less<>> keys;
     std::vector<Value> merged;  // values of "<<"
   };
 
-  Place place(const YAML::Mark& mark) const { return {file_, mark.line + 1, mark.column + 1}; }
+  SourceLocation place(const YAML::Mark& mark) const {
+    return {file_, mark.line + 1, mark.column + 1};
+  }
 
-  void check_tag(const std::string& tag, const Place& where,
+  void check_tag(const std::string& tag, const SourceLocation& where,
                  std::initializer_list<const char*> known) const {
     if (tag.empty() || tag == "?" || tag == "!") return;
     for (const char* name : known) {
@@ -152,7 +154,7 @@ class TreeBuilder final : public YAML::EventHandler {
     refuse(place(mark), "YAML syntax error: the quotes that open here are never closed");
   }
 
-  void count(std::size_t values, const Place& where) {
+  void count(std::size_t values, const SourceLocation& where) {
     count_ += values;
     if (count_ > kMaxValues) {
       refuse(where, "the document expands to more than " + std::to_string(kMaxValues) +
@@ -160,7 +162,7 @@ class TreeBuilder final : public YAML::EventHandler {
     }
   }
 
-  static void check_depth(std::size_t depth, const Place& where) {
+  static void check_depth(std::size_t depth, const SourceLocation& where) {
     if (depth <= kMaxDepth) return;
     refuse(where, "nested deeper than " + std::to_string(kMaxDepth) + " levels");
   }

@@ -22,9 +22,9 @@ struct Subject {
   template <class T>
   std::unique_ptr<T> make(Host& on, Value params = Value::make_map()) const {
     params.set("type", Value::text(entry.type));
-    Complaints complaints;
-    std::unique_ptr<T> made = registry.make<T>(params, "check", {}, complaints, on);
-    complaints.raise();
+    Diagnostics diagnostics;
+    std::unique_ptr<T> made = registry.make<T>(params, "check", {}, diagnostics, on);
+    diagnostics.raise();
     return made;
   }
   template <class T>

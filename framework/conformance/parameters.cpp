@@ -17,9 +17,9 @@ namespace {
 constexpr const char* kUnknown = "no_such_key_here";
 
 std::unique_ptr<Component> make_any(const Subject& subject, const Value& map,
-                                    Complaints& complaints) {
+                                    Diagnostics& diagnostics) {
   const auto make_as = [&]<class T>(T*) -> std::unique_ptr<Component> {
-    return subject.registry.make<T>(map, "check", {}, complaints, subject.host);
+    return subject.registry.make<T>(map, "check", {}, diagnostics, subject.host);
   };
   switch (subject.entry.kind) {
     case ComponentKind::Loader:
@@ -99,9 +99,9 @@ std::vector<Slot> slots_of(const std::vector<ParamSpec>& specs,
 }
 
 void require_complaint(const Subject& subject, const Value& map, const std::string& key) {
-  Complaints complaints;
-  make_any(subject, map, complaints);
-  const auto& messages = complaints.messages();
+  Diagnostics diagnostics;
+  make_any(subject, map, diagnostics);
+  const auto& messages = diagnostics.messages();
   require(std::any_of(messages.begin(), messages.end(),
                       [&](const std::string& text) { return text.find(key) != text.npos; }),
           "no complaint names '" + key + "'");
@@ -170,15 +170,16 @@ void refuse_out_of_range(const Subject& subject, const Slot& slot) {
 void accept_default(const Subject& subject, const Slot& slot) {
   const bool has_parts = slot.spec.type == ParamType::Group || slot.spec.type == ParamType::List;
   if (has_parts || slot.spec.default_value.kind == Value::Kind::Null) return;
-  Complaints complaints;
+  Diagnostics diagnostics;
   const Value job = slot.in_job(subject, slot.spec.default_value);
   try {
-    make_any(subject, job, complaints);
+    make_any(subject, job, diagnostics);
   } catch (const Error&) {
     return;  // it needs other keys as well, or the asset that it names
   }
-  require(complaints.is_empty(), "refuses the default of '" + slot.spec.key + "': " +
-                                     (complaints.is_empty() ? "" : complaints.messages().front()));
+  require(diagnostics.is_empty(),
+          "refuses the default of '" + slot.spec.key +
+              "': " + (diagnostics.is_empty() ? "" : diagnostics.messages().front()));
 }
 
 }  // namespace
@@ -196,10 +197,10 @@ bool check_parameters(const CheckRun& run, const Subject& subject) {
   const bool is_made = run.check("defaults are valid", [&] {
     Value map = Value::make_map();
     map.set("type", Value::text(entry.type));
-    Complaints complaints;
-    const auto one = make_any(subject, map, complaints);
-    const auto other = make_any(subject, map, complaints);
-    complaints.raise();
+    Diagnostics diagnostics;
+    const auto one = make_any(subject, map, diagnostics);
+    const auto other = make_any(subject, map, diagnostics);
+    diagnostics.raise();
   });
   run.check("defaults are within their ranges", [&] {
     for (const Slot& slot : slots) accept_default(subject, slot);

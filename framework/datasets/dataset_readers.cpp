@@ -111,9 +111,9 @@ bool has_file_like(const fs::path& folder, std::string_view pattern) {
 
 DatasetReaders::DatasetReaders(Registry& registry, Host& host) {
   const auto make = [&registry, &host](const Value& map, const std::string& path) {
-    Complaints complaints;
-    auto made = registry.make<Reader>(map, path, {}, complaints, host);
-    complaints.raise();
+    Diagnostics diagnostics;
+    auto made = registry.make<Reader>(map, path, {}, diagnostics, host);
+    diagnostics.raise();
     return made;
   };
   for (const std::string& type : registry.types(ComponentKind::Reader)) {

@@ -211,9 +211,9 @@ Loader& HostServices::loader(const std::string& type) {
   if (!made) {
     Value defaults = Value::make_map();
     defaults.set("type", Value::text(type));
-    Complaints complaints;
-    made = registry_.make<Loader>(defaults, "loader", {}, complaints, *this);
-    complaints.raise();
+    Diagnostics diagnostics;
+    made = registry_.make<Loader>(defaults, "loader", {}, diagnostics, *this);
+    diagnostics.raise();
   }
   return *made;
 }

@@ -44,8 +44,8 @@ std::vector<AssetPrefix> asset_prefixes_of(const Value& job) {
   if (!list) return prefixes;
   for (const Value& item : list->list) {
     AssetPrefix prefix;
-    Complaints complaints;  // read_job() makes them
-    ParamReader reader(item, "asset_prefixes", complaints);
+    Diagnostics diagnostics;  // read_job() makes them
+    ParamReader reader(item, "asset_prefixes", diagnostics);
     prefix.visit(reader);
     prefixes.push_back(std::move(prefix));
   }

@@ -35,7 +35,7 @@ class Assembler {
     if (config.type.empty()) return nullptr;
     const auto keys = host_keys(section);
     try {
-      auto made = registry_.make<T>(config.map, config.path, keys, complaints_, host_);
+      auto made = registry_.make<T>(config.map, config.path, keys, diagnostics_, host_);
       if (made) note_plugin(registry_.entry(T::kKind, config.type));
       return made;
     } catch (const Error& error) {
@@ -65,8 +65,8 @@ class Assembler {
     Value map = Value::make_map();
     map.set("type", Value::text(type));
     const auto keys = host_keys("annotators");
-    auto made = registry_.make<Annotator>(map, "annotator", keys, complaints_, host_);
-    complaints_.raise();
+    auto made = registry_.make<Annotator>(map, "annotator", keys, diagnostics_, host_);
+    diagnostics_.raise();
     const ComponentEntry& entry = annotator_entry(type);
     call_component("annotator '" + type + "'", [&] {
       require_listed("needs", made->needs(), entry.needs);
@@ -86,7 +86,7 @@ class Assembler {
                                      ")");
   }
 
-  Complaints& complaints() { return complaints_; }
+  Diagnostics& diagnostics() { return diagnostics_; }
   std::vector<std::pair<std::string, std::string>> plugins() const {
     return {plugins_.begin(), plugins_.end()};
   }
@@ -109,7 +109,7 @@ class Assembler {
   Registry& registry_;
   Host& host_;
   MissingAssets missing_;
-  Complaints complaints_;
+  Diagnostics diagnostics_;
   std::map<std::string, std::string> plugins_;
 };
 
@@ -297,7 +297,7 @@ void add_set(Assembler& assembler, JobAssembly& assembly) {
     set.annotators.push_back(
         {type, entry, entry ? std::move(listed[*entry]) : assembler.make_default_annotator(type)});
   }
-  assembler.complaints().raise();
+  assembler.diagnostics().raise();
   assembly.components.sets.push_back(std::move(set));
 }
 
@@ -374,13 +374,13 @@ Value check_job(const Value& value, Registry& registry, Host& host) {
   JobAssembly assembly;
   assembly.components.sets.resize(1);
   Assembler assembler(registry, host);
-  assembly.job = read_job(value, assembler.complaints());
+  assembly.job = read_job(value, assembler.diagnostics());
   make_loaders(assembler, assembly);
   make_randomizers(assembler, assembly);
   make_engines(assembler, assembly);
   make_writers(assembler, assembly);
   make_annotators(assembler, assembly.job);
-  assembler.complaints().raise();
+  assembler.diagnostics().raise();
   return resolved_job(value, describe_from(registry));
 }
 
@@ -391,7 +391,7 @@ JobAssembly assemble_job(const Value& value, Registry& registry, HostServices& h
   JobAssembly assembly;
   assembly.components.sets.resize(1);
   Assembler assembler(registry, host);
-  assembly.job = read_job(value, assembler.complaints());
+  assembly.job = read_job(value, assembler.diagnostics());
   JobLoaders loaders = make_loaders(assembler, assembly);
   host.take_resolved();
   make_randomizers(assembler, assembly);
@@ -401,13 +401,13 @@ JobAssembly assemble_job(const Value& value, Registry& registry, HostServices& h
   make_writers(assembler, assembly);
   ListedAnnotators annotators;
   if (!is_for_tables) annotators = make_annotators(assembler, assembly.job);
-  assembler.complaints().raise();
+  assembler.diagnostics().raise();
   for (auto& [type, loader] : loaders.of_files) host.use_loader(type, std::move(loader));
   assembly.resolved = resolved_job(value, describe_from(registry));
   assembly.plan = plan_from_assets(assembly, loaders.of_objects);
   assembly.components.environment_patterns =
-      check_patterns(assembly.job, assembly.plan, describe_from(registry), assembler.complaints());
-  assembler.complaints().raise();
+      check_patterns(assembly.job, assembly.plan, describe_from(registry), assembler.diagnostics());
+  assembler.diagnostics().raise();
   tell_unused_assets(assembly, assets_root, host);
   for (const std::string& message : unknown_view_labels(assembly.job, assembly.plan)) {
     host.log(LogLevel::Warning, message);

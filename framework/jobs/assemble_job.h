@@ -30,7 +30,7 @@ struct JobAssembly {
 DescribeComponent describe_from(Registry& registry);
 
 /// Reads the job, makes its components to check their parameters and returns it with every default.
-/// Assets need not be there: what a component misses becomes a warning. All complaints come in one
+/// Assets need not be there: what a component misses becomes a warning. All diagnostics come in one
 /// Error(Config).
 Value check_job(const Value& job, Registry& registry, Host& host);
 
@@ -40,7 +40,7 @@ Value check_job(const Value& job, Registry& registry, Host& host);
 enum class AssembleFor { Plan, Tables, Trial, Run };
 
 /// Reads the job, makes its components, lists its assets, plans its captures and resolves what its
-/// writers need. The host gets the job's loaders. Nothing is loaded or written. All complaints
+/// writers need. The host gets the job's loaders. Nothing is loaded or written. All diagnostics
 /// about the file come in one Error (Config); then Error(Plugin), Error(Asset) as found. For a run
 /// there are sets of components for `visits_in_flight` visits at a time; 0: for
 /// default_visits_in_flight(). Never for more than the job has.

@@ -19,9 +19,9 @@ bool is_replicator_key(const std::string& assignment) {
 }
 
 Value translated(const Value& job, const Log& log) {
-  Complaints complaints;
-  ReplicatorTranslation translation = translate_replicator_job(job, complaints);
-  complaints.raise();
+  Diagnostics diagnostics;
+  ReplicatorTranslation translation = translate_replicator_job(job, diagnostics);
+  diagnostics.raise();
   std::string keys;
   for (const std::string& key : translation.without_effect) {
     keys += (keys.empty() ? "" : ", ") + key;

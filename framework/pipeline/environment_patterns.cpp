@@ -95,7 +95,7 @@ void EnvironmentPatterns::try_in(const Scene& scene, NodeId environment, const s
   };
   look(scene, environment);
   show_others(look);
-  Complaints complaints;
+  Diagnostics diagnostics;
   for (const std::size_t i : missing) {
     const EnvironmentPattern& pattern = patterns_[i];
     const std::string text = pattern.key + ": " + fitless(pattern) +
@@ -106,13 +106,13 @@ void EnvironmentPatterns::try_in(const Scene& scene, NodeId environment, const s
           return patterns_[other].key == pattern.key;
         });
     if (!has_other) {
-      complaints.add(pattern.place, text);
+      diagnostics.add(pattern.place, text);
       continue;
     }
     host.log(LogLevel::Warning, text);
     met_.insert(i);  // It need not be looked for again.
   }
-  complaints.raise();
+  diagnostics.raise();
 }
 
 }  // namespace diorama

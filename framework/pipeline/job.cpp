@@ -9,6 +9,7 @@
 #include <set>
 
 #include "framework/config/clean_text.h"
+#include "framework/config/joined.h"
 #include "framework/config/value_text.h"
 #include "framework/pipeline/camera_rig.h"
 #include "framework/pipeline/job_keys.h"
@@ -45,8 +46,8 @@ std::string item_path(std::string_view section, std::size_t index) {
 Value with_type_as_text(const Value& map) {
   Value copy = map;
   if (Value* type = copy.find("type"); type && type->kind == Value::Kind::Null) {
-    const Place place = type->place;
-    const Place key_place = type->key_place;
+    const SourceLocation place = type->place;
+    const SourceLocation key_place = type->key_place;
     *type = Value::text("null");
     type->place = place;
     type->key_place = key_place;
@@ -55,26 +56,27 @@ Value with_type_as_text(const Value& map) {
 }
 
 template <class Keys>
-void read_keys(const Value& map, const std::string& path, Keys& keys, Complaints& complaints) {
-  ParamReader reader(map, path, complaints);
+void read_keys(const Value& map, const std::string& path, Keys& keys, Diagnostics& diagnostics) {
+  ParamReader reader(map, path, diagnostics);
   keys.visit(reader);
 }
 
 template <class Keys>
-void read_all_keys(const Value& map, const std::string& path, Keys& keys, Complaints& complaints) {
-  ParamReader reader(map, path, complaints);
+void read_all_keys(const Value& map, const std::string& path, Keys& keys,
+                   Diagnostics& diagnostics) {
+  ParamReader reader(map, path, diagnostics);
   keys.visit(reader);
   reader.finish();
 }
 
 /// The maps of a list section; complains about other things and leaves them out.
 std::vector<std::pair<std::string, Value>> entries(const Value* list, std::string_view section,
-                                                   Complaints& complaints) {
+                                                   Diagnostics& diagnostics) {
   std::vector<std::pair<std::string, Value>> result;
   if (!list || list->kind == Value::Kind::Null) return result;
   if (list->kind != Value::Kind::List) {
-    complaints.add(list->place, std::string(section) + ": expected a list of mappings, found " +
-                                    list->describe());
+    diagnostics.add(list->place, std::string(section) + ": expected a list of mappings, found " +
+                                     list->describe());
     return result;
   }
   for (std::size_t i = 0; i < list->list.size(); ++i) {
@@ -83,39 +85,39 @@ std::vector<std::pair<std::string, Value>> entries(const Value* list, std::strin
     if (item.kind == Value::Kind::Map) {
       result.emplace_back(path, with_type_as_text(item));
     } else {
-      complaints.add(item.place, path + ": expected a mapping, found " + item.describe());
+      diagnostics.add(item.place, path + ": expected a mapping, found " + item.describe());
     }
   }
   return result;
 }
 
 std::vector<std::pair<std::string, Value>> entries(const Value& job, std::string_view section,
-                                                   Complaints& complaints) {
-  return entries(job.find(section), section, complaints);
+                                                   Diagnostics& diagnostics) {
+  return entries(job.find(section), section, diagnostics);
 }
 
-const Place& place_of(const Value& map, std::string_view key) {
+const SourceLocation& place_of(const Value& map, std::string_view key) {
   const Value* value = map.find(key);
   return value ? value->place : map.place;
 }
 
-void require_type(const ComponentConfig& entry, Complaints& complaints) {
+void require_type(const ComponentConfig& entry, Diagnostics& diagnostics) {
   if (entry.type.empty() && !entry.map.find("type")) {
-    complaints.add(entry.map.place, entry.path + ": 'type' is missing");
+    diagnostics.add(entry.map.place, entry.path + ": 'type' is missing");
   }
 }
 
 /// Names key random streams, node paths and folders, so they must differ.
 template <class Entry, class NameOf, class MapOf>
 void require_unique(const std::vector<Entry>& list, std::string_view section, NameOf name_of,
-                    MapOf map_of, Complaints& complaints) {
+                    MapOf map_of, Diagnostics& diagnostics) {
   std::set<std::string, std::less<>> seen;
   for (std::size_t i = 0; i < list.size(); ++i) {
     const std::string& name = name_of(list[i]);
     if (name.empty() || seen.insert(name).second) continue;
-    complaints.add(place_of(map_of(list[i]), "name"), item_path(section, i) +
-                                                          ": another entry is called '" + name +
-                                                          "'; give this one a 'name' of its own");
+    diagnostics.add(place_of(map_of(list[i]), "name"), item_path(section, i) +
+                                                           ": another entry is called '" + name +
+                                                           "'; give this one a 'name' of its own");
   }
 }
 
@@ -123,17 +125,17 @@ void require_unique(const std::vector<Entry>& list, std::string_view section, Na
 constexpr std::size_t kMostNameBytes = 200;
 
 void check_node_name(const std::string& name, const Value& map, const std::string& path,
-                     Complaints& complaints) {
+                     Diagnostics& diagnostics) {
   if (name.size() > kMostNameBytes) {
-    complaints.add(place_of(map, "name"), path + ".name: expected a name of up to " +
-                                              std::to_string(kMostNameBytes) + " bytes, found " +
-                                              std::to_string(name.size()));
+    diagnostics.add(place_of(map, "name"), path + ".name: expected a name of up to " +
+                                               std::to_string(kMostNameBytes) + " bytes, found " +
+                                               std::to_string(name.size()));
     return;
   }
   if (name.find('/') == std::string::npos && is_clean_name(name)) return;
-  complaints.add(place_of(map, "name"),
-                 path + ".name: expected a name without '/' and control characters, found '" +
-                     clean_name(name) + "'");
+  diagnostics.add(place_of(map, "name"),
+                  path + ".name: expected a name without '/' and control characters, found '" +
+                      clean_name(name) + "'");
 }
 
 template <class Group>
@@ -141,60 +143,61 @@ void name_after_type(Group& group) {
   if (group.name.empty()) group.name = group.type;
 }
 
-ComponentConfig read_entry(const std::string& path, Value map, Complaints& complaints) {
+ComponentConfig read_entry(const std::string& path, Value map, Diagnostics& diagnostics) {
   EntryHead head;
-  read_keys(map, path, head, complaints);
+  read_keys(map, path, head, diagnostics);
   if (head.name.empty()) head.name = head.type;
   ComponentConfig entry{head.type, head.name, std::move(map), path};
-  require_type(entry, complaints);
+  require_type(entry, diagnostics);
   return entry;
 }
 
 /// The entries of a list that sets the parameters of components, each type once.
 std::vector<ComponentConfig> read_parameters(const Value& value, std::string_view section,
-                                             const std::string& why_once, Complaints& complaints) {
+                                             const std::string& why_once,
+                                             Diagnostics& diagnostics) {
   std::vector<ComponentConfig> list;
-  for (auto& [path, map] : entries(value, section, complaints)) {
-    ComponentConfig entry = read_entry(path, std::move(map), complaints);
+  for (auto& [path, map] : entries(value, section, diagnostics)) {
+    ComponentConfig entry = read_entry(path, std::move(map), diagnostics);
     const auto is_same = [&](const ComponentConfig& known) { return known.type == entry.type; };
     if (std::any_of(list.begin(), list.end(), is_same)) {
-      complaints.add(place_of(entry.map, "type"),
-                     path + ": another entry is of type '" + entry.type + "'; " + why_once);
+      diagnostics.add(place_of(entry.map, "type"),
+                      path + ": another entry is of type '" + entry.type + "'; " + why_once);
     }
     list.push_back(std::move(entry));
   }
   return list;
 }
 
-void read_environments(const Value& value, Job& job, Complaints& complaints) {
-  const std::size_t before = complaints.messages().size();
-  for (auto& [path, map] : entries(value, "environments", complaints)) {
-    job.environments.push_back(read_entry(path, std::move(map), complaints));
+void read_environments(const Value& value, Job& job, Diagnostics& diagnostics) {
+  const std::size_t before = diagnostics.messages().size();
+  for (auto& [path, map] : entries(value, "environments", diagnostics)) {
+    job.environments.push_back(read_entry(path, std::move(map), diagnostics));
   }
   const Value* list = value.find("environments");
-  if (job.environments.empty() && complaints.messages().size() == before) {
-    complaints.add(list ? list->place : value.place,
-                   "environments: the list is empty; name at least one, for example "
-                   "'- {type: files, folders: [...]}'");
+  if (job.environments.empty() && diagnostics.messages().size() == before) {
+    diagnostics.add(list ? list->place : value.place,
+                    "environments: the list is empty; name at least one, for example "
+                    "'- {type: files, folders: [...]}'");
   }
 }
 
 void check_pattern(const ObjectGroup& group, const Value& map, const std::string& path,
-                   Complaints& complaints) {
+                   Diagnostics& diagnostics) {
   if (!group.label_pattern) return;
   try {
     const LabelPattern pattern(*group.label_pattern);
   } catch (const Error& error) {
-    complaints.add(place_of(map, "label_pattern"), path + ".label_pattern: " + error.what());
+    diagnostics.add(place_of(map, "label_pattern"), path + ".label_pattern: " + error.what());
   }
 }
 
-void read_variants(ObjectGroup& group, const std::string& path, Complaints& complaints) {
+void read_variants(ObjectGroup& group, const std::string& path, Diagnostics& diagnostics) {
   const Value& given = group.variants;
   if (given.kind == Value::Kind::Null) return;
   const std::string key = path + ".variants";
   if (given.kind != Value::Kind::Map) {
-    complaints.add(
+    diagnostics.add(
         given.place,
         key + ": expected variants by set, {lookVariant: [red, blue]}, found " + given.describe());
     return;
@@ -208,34 +211,35 @@ void read_variants(ObjectGroup& group, const std::string& path, Complaints& comp
       if (is_name) {
         names.push_back(item.scalar);
       } else {
-        complaints.add(item.place, key + "." + set + ": expected the name of a variant, found " +
-                                       item.describe());
+        diagnostics.add(item.place, key + "." + set + ": expected the name of a variant, found " +
+                                        item.describe());
       }
     }
     if (names.empty() && value.kind == Value::Kind::List) {
-      complaints.add(value.place, key + "." + set + ": the list is empty");
+      diagnostics.add(value.place, key + "." + set + ": the list is empty");
     }
     group.variant_sets.emplace_back(set, std::move(names));
   }
 }
 
-void read_parts(ObjectGroup& group, const std::string& path, Complaints& complaints) {
+void read_parts(ObjectGroup& group, const std::string& path, Diagnostics& diagnostics) {
   const Value& given = group.parts;
   if (given.kind == Value::Kind::Null) return;
   const std::string key = path + ".parts";
   if (given.kind != Value::Kind::Map) {
-    complaints.add(given.place, key + ": expected labels by name, {drawer_*: drawer}, found " +
-                                    given.describe());
+    diagnostics.add(given.place, key + ": expected labels by name, {drawer_*: drawer}, found " +
+                                     given.describe());
     return;
   }
   for (const auto& [pattern, label] : given.map) {
     const bool is_label = label.kind == Value::Kind::Scalar && !label.scalar.empty();
     if (!is_label) {
-      complaints.add(label.place,
-                     key + "." + pattern + ": expected a label, found " + label.describe());
+      diagnostics.add(label.place,
+                      key + "." + pattern + ": expected a label, found " + label.describe());
     } else if (pattern.empty() || pattern.find('/') != std::string::npos) {
-      complaints.add(label.place, key + ": expected names in which * stands for anything, found '" +
-                                      pattern + "'");
+      diagnostics.add(
+          label.place,
+          key + ": expected names in which * stands for anything, found '" + pattern + "'");
     } else {
       group.part_labels.emplace_back(pattern, clean_name(label.scalar));
     }
@@ -243,103 +247,103 @@ void read_parts(ObjectGroup& group, const std::string& path, Complaints& complai
 }
 
 void check_fewer(const ObjectGroup& group, const Value& map, const std::string& path,
-                 Complaints& complaints) {
+                 Diagnostics& diagnostics) {
   if (group.fewer > group.count) {
-    complaints.add(place_of(map, "fewer"), path + ".fewer: expected at most the count, " +
-                                               std::to_string(group.count) + ", found " +
-                                               std::to_string(group.fewer));
+    diagnostics.add(place_of(map, "fewer"), path + ".fewer: expected at most the count, " +
+                                                std::to_string(group.count) + ", found " +
+                                                std::to_string(group.fewer));
   }
   if (group.fewer > 0 && group.pick != "per_visit") {
-    complaints.add(place_of(map, "fewer"),
-                   path + ".fewer: visits can differ only with 'pick: per_visit'");
+    diagnostics.add(place_of(map, "fewer"),
+                    path + ".fewer: visits can differ only with 'pick: per_visit'");
   }
 }
 
-void read_objects(const Value& value, Job& job, Complaints& complaints) {
-  for (auto& [path, map] : entries(value, "objects", complaints)) {
+void read_objects(const Value& value, Job& job, Diagnostics& diagnostics) {
+  for (auto& [path, map] : entries(value, "objects", diagnostics)) {
     ObjectGroup group;
-    read_keys(map, path, group, complaints);
+    read_keys(map, path, group, diagnostics);
     name_after_type(group);
-    check_pattern(group, map, path, complaints);
-    read_variants(group, path, complaints);
-    read_parts(group, path, complaints);
-    check_node_name(group.name, map, path, complaints);
+    check_pattern(group, map, path, diagnostics);
+    read_variants(group, path, diagnostics);
+    read_parts(group, path, diagnostics);
+    check_node_name(group.name, map, path, diagnostics);
     if (group.under.size() < 2 || group.under.front() != '/' || group.under.back() == '/') {
-      complaints.add(place_of(map, "under"),
-                     path + ".under: expected a path like /Assets, found '" + group.under + "'");
+      diagnostics.add(place_of(map, "under"),
+                      path + ".under: expected a path like /Assets, found '" + group.under + "'");
     }
-    check_fewer(group, map, path, complaints);
+    check_fewer(group, map, path, diagnostics);
     group.loader = {group.type, group.name, std::move(map), path};
-    require_type(group.loader, complaints);
+    require_type(group.loader, diagnostics);
     job.objects.push_back(std::move(group));
   }
   require_unique(
       job.objects, "objects", [](const ObjectGroup& g) -> const std::string& { return g.name; },
-      [](const ObjectGroup& g) -> const Value& { return g.loader.map; }, complaints);
+      [](const ObjectGroup& g) -> const Value& { return g.loader.map; }, diagnostics);
 }
 
-void read_lights(const Value& value, Job& job, Complaints& complaints) {
+void read_lights(const Value& value, Job& job, Diagnostics& diagnostics) {
   std::set<std::string> names;
-  for (auto& [path, map] : entries(value, "lights", complaints)) {
+  for (auto& [path, map] : entries(value, "lights", diagnostics)) {
     LightGroup group;
-    read_all_keys(map, path, group, complaints);
+    read_all_keys(map, path, group, diagnostics);
     name_after_type(group);
-    check_node_name(group.name, map, path, complaints);
+    check_node_name(group.name, map, path, diagnostics);
     if (!names.insert(group.name).second) {
-      complaints.add(place_of(map, "name"), path + ": another light is called '" + group.name +
-                                                "'; give this one a 'name' of its own");
+      diagnostics.add(place_of(map, "name"), path + ": another light is called '" + group.name +
+                                                 "'; give this one a 'name' of its own");
     }
     job.lights.push_back(std::move(group));
   }
 }
 
 void check_camera(const CameraGroup& group, const Value& map, const std::string& path,
-                  Complaints& complaints) {
+                  Diagnostics& diagnostics) {
   if (group.far_m <= group.near_m) {
-    complaints.add(place_of(map, "far_m"), path + ".far_m: must be greater than near_m");
+    diagnostics.add(place_of(map, "far_m"), path + ".far_m: must be greater than near_m");
   }
   if (group.distortion.size() > 8) {
-    complaints.add(place_of(map, "distortion"),
-                   path + ".distortion: expected at most 8 numbers (k1 k2 p1 p2 k3 k4 k5 k6)");
+    diagnostics.add(place_of(map, "distortion"),
+                    path + ".distortion: expected at most 8 numbers (k1 k2 p1 p2 k3 k4 k5 k6)");
   }
   const std::size_t terms = group.fisheye_polynomial.size();
   if (terms > 6 || (group.type == "fisheye_polynomial" && terms < 2)) {
-    complaints.add(place_of(map, "fisheye_polynomial"),
-                   path + ".fisheye_polynomial: expected 2 to 6 numbers (theta = a + b r + ...)");
+    diagnostics.add(place_of(map, "fisheye_polynomial"),
+                    path + ".fisheye_polynomial: expected 2 to 6 numbers (theta = a + b r + ...)");
   }
   for (const auto& [key, focal] : {std::pair{"fx_px", group.fx_px}, {"fy_px", group.fy_px}}) {
     if (!focal || *focal > 0.0) continue;
-    complaints.add(place_of(map, key), path + "." + key + ": must be greater than 0");
+    diagnostics.add(place_of(map, key), path + "." + key + ": must be greater than 0");
   }
 }
 
 void check_rig(const CameraGroup& group, const Value& map, const std::string& path,
-               Complaints& complaints) {
+               Diagnostics& diagnostics) {
   std::set<std::string> names;
   for (std::size_t i = 0; i < group.rig.size(); ++i) {
     const RigMember& member = group.rig[i];
     const Value& item = map.find("rig")->list[i];
     const std::string item_path = path + ".rig[" + std::to_string(i) + "]";
     if (member.name.empty()) {
-      complaints.add(item.place, item_path + ".name: is empty, expected one such as 'left'");
+      diagnostics.add(item.place, item_path + ".name: is empty, expected one such as 'left'");
       continue;
     }
-    check_node_name(member.name, item, item_path, complaints);
+    check_node_name(member.name, item, item_path, diagnostics);
     if (!names.insert(member.name).second) {
-      complaints.add(place_of(item, "name"),
-                     item_path + ": another camera of the rig is called '" + member.name + "'");
+      diagnostics.add(place_of(item, "name"),
+                      item_path + ": another camera of the rig is called '" + member.name + "'");
     }
   }
 }
 
-void check_camera_names(const Value& value, const Job& job, Complaints& complaints) {
+void check_camera_names(const Value& value, const Job& job, Diagnostics& diagnostics) {
   std::set<std::string> names;
   for (const PlannedCamera& camera : planned_cameras(job.cameras)) {
     for (const std::string& name : {camera.rig, camera.name}) {
       if (name.empty() || (name == camera.rig && names.contains(name + "/"))) continue;
       if (!names.insert(name).second) {
-        complaints.add(value.find("cameras")->place,
-                       "cameras: two would be called '" + name + "'; give one another 'name'");
+        diagnostics.add(value.find("cameras")->place,
+                        "cameras: two would be called '" + name + "'; give one another 'name'");
         return;
       }
       if (name == camera.rig) names.insert(name + "/");
@@ -347,47 +351,42 @@ void check_camera_names(const Value& value, const Job& job, Complaints& complain
   }
 }
 
-void read_cameras(const Value& value, Job& job, Complaints& complaints) {
+void read_cameras(const Value& value, Job& job, Diagnostics& diagnostics) {
   std::set<std::string> names;
-  for (auto& [path, map] : entries(value, "cameras", complaints)) {
+  for (auto& [path, map] : entries(value, "cameras", diagnostics)) {
     CameraGroup group;
     group.name = "cam";
-    read_all_keys(map, path, group, complaints);
-    check_node_name(group.name, map, path, complaints);
-    check_camera(group, map, path, complaints);
-    check_rig(group, map, path, complaints);
+    read_all_keys(map, path, group, diagnostics);
+    check_node_name(group.name, map, path, diagnostics);
+    check_camera(group, map, path, diagnostics);
+    check_rig(group, map, path, diagnostics);
     if (!names.insert(group.name).second) {
-      complaints.add(place_of(map, "name"), path + ": another camera is called '" + group.name +
-                                                "'; give this one a 'name' of its own");
+      diagnostics.add(place_of(map, "name"), path + ": another camera is called '" + group.name +
+                                                 "'; give this one a 'name' of its own");
     }
     job.cameras.push_back(std::move(group));
   }
-  check_camera_names(value, job, complaints);
-}
-
-std::string quoted_list(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
+  check_camera_names(value, job, diagnostics);
 }
 
 void check_moments(const RandomizerEntry& entry, const std::vector<std::string>& moments,
-                   const Value& map, const std::string& path, Complaints& complaints) {
+                   const Value& map, const std::string& path, Diagnostics& diagnostics) {
   if (entry.on.empty()) {
-    complaints.add(
+    diagnostics.add(
         place_of(map, "on"),
-        path + ".on: no moment named, so it would never act; one of: " + quoted_list(moments));
+        path + ".on: no moment named, so it would never act; one of: " + joined(moments));
   }
   for (const std::string& moment : entry.on) {
     if (std::find(moments.begin(), moments.end(), moment) != moments.end()) continue;
     const std::string near = nearest_name(moment, moments);
-    complaints.add(place_of(map, "on"), path + ".on: unknown moment '" + moment + "'" +
-                                            (near.empty() ? "" : "; did you mean '" + near + "'?") +
-                                            " (known: " + quoted_list(moments) + ")");
+    diagnostics.add(place_of(map, "on"),
+                    path + ".on: unknown moment '" + moment + "'" +
+                        (near.empty() ? "" : "; did you mean '" + near + "'?") +
+                        " (known: " + joined(moments) + ")");
   }
 }
 
-void read_randomizers(const Value& value, Job& job, Complaints& complaints) {
+void read_randomizers(const Value& value, Job& job, Diagnostics& diagnostics) {
   std::vector<std::string> moments{"environment"};
   for_each_step(job.timeline, [&](const TimelineStep& step) {
     const bool simulates = step.kind == TimelineStep::Kind::Simulate;
@@ -397,59 +396,59 @@ void read_randomizers(const Value& value, Job& job, Complaints& complaints) {
     }
     return true;
   });
-  for (auto& [path, map] : entries(value, "randomizers", complaints)) {
+  for (auto& [path, map] : entries(value, "randomizers", diagnostics)) {
     RandomizerEntry entry;
-    read_keys(map, path, entry, complaints);
+    read_keys(map, path, entry, diagnostics);
     name_after_type(entry);
-    check_moments(entry, moments, map, path, complaints);
+    check_moments(entry, moments, map, path, diagnostics);
     entry.component = {entry.type, entry.name, std::move(map), path};
-    require_type(entry.component, complaints);
+    require_type(entry.component, diagnostics);
     job.randomizers.push_back(std::move(entry));
   }
   require_unique(
       job.randomizers, "randomizers",
       [](const RandomizerEntry& e) -> const std::string& { return e.name; },
-      [](const RandomizerEntry& e) -> const Value& { return e.component.map; }, complaints);
+      [](const RandomizerEntry& e) -> const Value& { return e.component.map; }, diagnostics);
 }
 
-void read_writers(const Value& value, Job& job, Complaints& complaints) {
-  for (auto& [path, map] : entries(value, "writers", complaints)) {
+void read_writers(const Value& value, Job& job, Diagnostics& diagnostics) {
+  for (auto& [path, map] : entries(value, "writers", diagnostics)) {
     WriterEntry entry;
-    read_keys(map, path, entry, complaints);
+    read_keys(map, path, entry, diagnostics);
     name_after_type(entry);
     entry.component = {entry.type, entry.name, std::move(map), path};
-    require_type(entry.component, complaints);
+    require_type(entry.component, diagnostics);
     job.writers.push_back(std::move(entry));
   }
   require_unique(
       job.writers, "writers", [](const WriterEntry& e) -> const std::string& { return e.name; },
-      [](const WriterEntry& e) -> const Value& { return e.component.map; }, complaints);
+      [](const WriterEntry& e) -> const Value& { return e.component.map; }, diagnostics);
 }
 
 /// What a clip shows is decided at its start, by its randomizers.
-void check_no_clips(const ViewRule& rule, const Job& job, Complaints& complaints) {
+void check_no_clips(const ViewRule& rule, const Job& job, Diagnostics& diagnostics) {
   for_each_step(job.timeline, [&](const TimelineStep& step) {
     if (step.kind != TimelineStep::Kind::Record || !rule.is_on(step.name)) return true;
-    complaints.add(rule.map.place, rule.path + ": conditions hold for single captures, and '" +
-                                       step.name + "' is recorded; name capture series in 'on'");
+    diagnostics.add(rule.map.place, rule.path + ": conditions hold for single captures, and '" +
+                                        step.name + "' is recorded; name capture series in 'on'");
     return false;
   });
 }
 
-void read_views(const Value& value, Job& job, Complaints& complaints) {
-  for (auto& [path, map] : entries(value, "views", complaints)) {
+void read_views(const Value& value, Job& job, Diagnostics& diagnostics) {
+  for (auto& [path, map] : entries(value, "views", diagnostics)) {
     ViewRule rule;
-    read_all_keys(map, path, rule, complaints);
+    read_all_keys(map, path, rule, diagnostics);
     if (rule.name.empty()) rule.name = "views_" + std::to_string(job.views.size());
     rule.map = std::move(map);
     rule.path = path;
-    check_view_rule(rule, job.series(), complaints);
-    check_no_clips(rule, job, complaints);
+    check_view_rule(rule, job.series(), diagnostics);
+    check_no_clips(rule, job, diagnostics);
     job.views.push_back(std::move(rule));
   }
   require_unique(
       job.views, "views", [](const ViewRule& r) -> const std::string& { return r.name; },
-      [](const ViewRule& r) -> const Value& { return r.map; }, complaints);
+      [](const ViewRule& r) -> const Value& { return r.map; }, diagnostics);
 }
 
 /// Where a folder of the job leads, seen from the output folder; nothing when that is out of it or
@@ -485,7 +484,7 @@ std::string flaw_of_place(const std::filesystem::path& place,
 }
 
 /// A job of somebody else must not write where nobody expects it.
-void check_folders(const Value& value, const Job& job, Complaints& complaints) {
+void check_folders(const Value& value, const Job& job, Diagnostics& diagnostics) {
   const std::string root = "the output folder '" + job.output.folder + "'";
   const std::string advice =
       "; name a folder below it, or choose one that holds both by '--output'";
@@ -498,96 +497,96 @@ void check_folders(const Value& value, const Job& job, Complaints& complaints) {
                                    : "the folder '" + folder + "' is not below " + root + advice;
     if (place) places.emplace(*place, writer.name);
     if (flaw.empty()) continue;
-    complaints.add(place_of(writer.component.map, key),
-                   writer.component.path + "." + key + ": " + flaw);
+    diagnostics.add(place_of(writer.component.map, key),
+                    writer.component.path + "." + key + ": " + flaw);
   }
   if (place_below_output(job, job.output.records)) return;
   const Value* output = value.find("output");
-  complaints.add(
+  diagnostics.add(
       output ? place_of(*output, "records") : value.place,
       "output.records: the folder '" + job.output.records + "' is not below " + root + advice);
 }
 
 ComponentConfig read_engine(const Value& value, std::string_view section, const char* default_type,
-                            Complaints& complaints) {
+                            Diagnostics& diagnostics) {
   ComponentConfig entry{default_type, std::string(section), Value::make_map(),
                         std::string(section)};
   entry.map.set("type", Value::text(default_type));
   const Value* map = value.find(section);
   if (!map || map->kind == Value::Kind::Null) return entry;
   if (map->kind != Value::Kind::Map) {
-    complaints.add(map->place,
-                   std::string(section) + ": expected a mapping, found " + map->describe());
+    diagnostics.add(map->place,
+                    std::string(section) + ": expected a mapping, found " + map->describe());
     return entry;
   }
   entry.map = with_type_as_text(*map);
   EngineHead head{default_type};
-  read_keys(entry.map, entry.path, head, complaints);
+  read_keys(entry.map, entry.path, head, diagnostics);
   entry.type = head.type;
   entry.map.set("type", Value::text(head.type));
   return entry;
 }
 
 /// The number of `simulate: 200`, whatever stands beside it.
-int read_steps(const Value& value, const std::string& path, Complaints& complaints) {
+int read_steps(const Value& value, const std::string& path, Diagnostics& diagnostics) {
   Value alone = Value::make_map();
   alone.place = value.place;
   alone.set("simulate", value);
   StepsKeys keys;
-  read_all_keys(alone, path, keys, complaints);
+  read_all_keys(alone, path, keys, diagnostics);
   if (keys.simulate != std::floor(keys.simulate)) {
-    complaints.add(value.place, path + ".simulate: expected a whole number");
+    diagnostics.add(value.place, path + ".simulate: expected a whole number");
   }
   return int(keys.simulate);
 }
 
 /// `simulate: 200` or `simulate: {until: rest, ...}`.
 std::optional<TimelineStep> read_simulation(const Value& map, const std::string& path,
-                                            Complaints& complaints) {
-  const std::size_t before = complaints.messages().size();
+                                            Diagnostics& diagnostics) {
+  const std::size_t before = diagnostics.messages().size();
   const Value& value = *map.find("simulate");
   TimelineStep step;
   if (value.kind == Value::Kind::Map) {
     RestKeys keys;
-    read_all_keys(value, path + ".simulate", keys, complaints);
+    read_all_keys(value, path + ".simulate", keys, diagnostics);
     if (keys.at_least > keys.at_most) {
-      complaints.add(place_of(value, "at_least"), path + ".simulate.at_least: expected at_most (" +
-                                                      std::to_string(keys.at_most) +
-                                                      ") or less, found " +
-                                                      std::to_string(keys.at_least));
+      diagnostics.add(place_of(value, "at_least"), path + ".simulate.at_least: expected at_most (" +
+                                                       std::to_string(keys.at_most) +
+                                                       ") or less, found " +
+                                                       std::to_string(keys.at_least));
     }
     step.until_rest = true;
     step.steps = keys.at_most;
     step.at_least = keys.at_least;
   } else {
-    step.steps = read_steps(value, path, complaints);
+    step.steps = read_steps(value, path, diagnostics);
   }
-  if (complaints.messages().size() != before) return std::nullopt;
+  if (diagnostics.messages().size() != before) return std::nullopt;
   return step;
 }
 
 /// `record: {fps: 30, seconds: 2}`.
 std::optional<TimelineStep> read_recording(const Value& map, const std::string& path,
-                                           Complaints& complaints) {
-  const std::size_t before = complaints.messages().size();
+                                           Diagnostics& diagnostics) {
+  const std::size_t before = diagnostics.messages().size();
   const Value& value = *map.find("record");
   RecordKeys keys;
   if (value.kind != Value::Kind::Map) {
-    complaints.add(value.place, path +
-                                    ".record: expected a mapping such as {fps: 30, seconds: 2}, "
-                                    "found " +
-                                    value.describe());
+    diagnostics.add(value.place, path +
+                                     ".record: expected a mapping such as {fps: 30, seconds: 2}, "
+                                     "found " +
+                                     value.describe());
     return std::nullopt;
   }
-  read_all_keys(value, path + ".record", keys, complaints);
-  if (complaints.messages().size() != before) return std::nullopt;
+  read_all_keys(value, path + ".record", keys, diagnostics);
+  if (diagnostics.messages().size() != before) return std::nullopt;
   // All frames that begin within the time: rates such as 29.97 fill no second.
   const double frames = keys.fps * keys.seconds;
   const double count = std::max(1.0, std::ceil(frames * (1.0 - 1e-6)));
   if (count > 1e6) {
-    complaints.add(value.place,
-                   path + ".record: expected fps x seconds to be at most 1000000 frames, found " +
-                       std::to_string(std::llround(std::min(frames, 1e18))));
+    diagnostics.add(value.place,
+                    path + ".record: expected fps x seconds to be at most 1000000 frames, found " +
+                        std::to_string(std::llround(std::min(frames, 1e18))));
     return std::nullopt;
   }
   TimelineStep step{TimelineStep::Kind::Record, 0, keys.name, int(count)};
@@ -596,82 +595,82 @@ std::optional<TimelineStep> read_recording(const Value& map, const std::string& 
 }
 
 std::vector<TimelineStep> read_steps_of(const Value* list, const std::string& path, bool is_round,
-                                        Complaints& complaints);
+                                        Diagnostics& diagnostics);
 
 bool is_moment_name(const std::string& name) { return !name.empty() && name != "environment"; }
 
 /// What stands beside a step must belong to it.
 void check_companions(const StepKeys& keys, const Value& map, const std::string& path,
-                      bool is_round, Complaints& complaints) {
+                      bool is_round, Diagnostics& diagnostics) {
   const auto complain = [&](const char* key, const std::string& where) {
-    complaints.add(place_of(map, key), path + "." + key + ": has a meaning only " + where);
+    diagnostics.add(place_of(map, key), path + "." + key + ": has a meaning only " + where);
   };
   const bool simulates = keys.simulate.kind != Value::Kind::Null;
   if (map.find("each_step") && !simulates) complain("each_step", "beside 'simulate'");
   if (map.find("camera_radius_m") && !simulates) complain("camera_radius_m", "beside 'simulate'");
   if (map.find("steps") && !keys.repeat) complain("steps", "beside 'repeat'");
   if (keys.repeat && !map.find("steps")) {
-    complaints.add(map.place, path + ": 'steps' is missing, the timeline that 'repeat' repeats");
+    diagnostics.add(map.place, path + ": 'steps' is missing, the timeline that 'repeat' repeats");
   }
   if (map.find("every") && !is_round) complain("every", "within the 'steps' of a 'repeat'");
   if (keys.each_step && !is_moment_name(*keys.each_step)) {
-    complaints.add(place_of(map, "each_step"), path +
-                                                   ".each_step: a moment needs a name of its own, "
-                                                   "found '" +
-                                                   *keys.each_step + "'");
+    diagnostics.add(place_of(map, "each_step"), path +
+                                                    ".each_step: a moment needs a name of its own, "
+                                                    "found '" +
+                                                    *keys.each_step + "'");
   }
 }
 
 TimelineStep read_repetition(const StepKeys& keys, const Value& map, const std::string& path,
-                             Complaints& complaints) {
+                             Diagnostics& diagnostics) {
   TimelineStep step;
   step.kind = TimelineStep::Kind::Repeat;
   step.rounds = int(*keys.repeat);
   if (*keys.repeat != std::floor(*keys.repeat)) {
-    complaints.add(place_of(map, "repeat"), path + ".repeat: expected a whole number");
+    diagnostics.add(place_of(map, "repeat"), path + ".repeat: expected a whole number");
   }
-  step.steps_of_round = read_steps_of(map.find("steps"), path + ".steps", true, complaints);
+  step.steps_of_round = read_steps_of(map.find("steps"), path + ".steps", true, diagnostics);
   return step;
 }
 
 std::optional<TimelineStep> read_step(const Value& map, const std::string& path, bool is_round,
-                                      Complaints& complaints) {
+                                      Diagnostics& diagnostics) {
   StepKeys keys;
-  const std::size_t before = complaints.messages().size();
-  read_all_keys(map, path, keys, complaints);
-  if (complaints.messages().size() != before) return std::nullopt;
+  const std::size_t before = diagnostics.messages().size();
+  read_all_keys(map, path, keys, diagnostics);
+  if (diagnostics.messages().size() != before) return std::nullopt;
   const bool simulates = keys.simulate.kind != Value::Kind::Null;
   const bool records = keys.record.kind != Value::Kind::Null;
   if (int(simulates) + int(records) + int(keys.capture.has_value()) + int(keys.event.has_value()) +
           int(keys.repeat.has_value()) !=
       1) {
-    complaints.add(map.place, path +
-                                  ": expected one of 'simulate: STEPS', 'capture: NAME' (with "
-                                  "'count'), 'record: {fps: 30, seconds: 2}', 'event: NAME' and "
-                                  "'repeat: TIMES' (with 'steps')");
+    diagnostics.add(map.place, path +
+                                   ": expected one of 'simulate: STEPS', 'capture: NAME' (with "
+                                   "'count'), 'record: {fps: 30, seconds: 2}', 'event: NAME' and "
+                                   "'repeat: TIMES' (with 'steps')");
     return std::nullopt;
   }
-  check_companions(keys, map, path, is_round, complaints);
+  check_companions(keys, map, path, is_round, diagnostics);
   std::optional<TimelineStep> step;
   if (simulates) {
-    step = read_simulation(map, path, complaints);
+    step = read_simulation(map, path, diagnostics);
   } else if (keys.repeat) {
-    step = read_repetition(keys, map, path, complaints);
+    step = read_repetition(keys, map, path, diagnostics);
   } else if (records) {
-    step = read_recording(map, path, complaints);
+    step = read_recording(map, path, diagnostics);
     if (step && !is_moment_name(step->name)) {
-      complaints.add(map.place,
-                     path + ": a moment needs a name of its own, found '" + step->name + "'");
+      diagnostics.add(map.place,
+                      path + ": a moment needs a name of its own, found '" + step->name + "'");
     }
   } else {
     const std::string& name = keys.capture ? *keys.capture : *keys.event;
     if (!is_moment_name(name)) {
-      complaints.add(map.place, path + ": a moment needs a name of its own, found '" + name + "'");
+      diagnostics.add(map.place, path + ": a moment needs a name of its own, found '" + name + "'");
     }
     step = keys.capture ? TimelineStep{TimelineStep::Kind::Capture, 0, name, keys.count}
                         : TimelineStep{TimelineStep::Kind::Event, 0, name, 0};
   }
-  if (complaints.messages().size() != before) return std::nullopt;
+  if (diagnostics.messages().size() != before) return std::nullopt;
   step->every = keys.every;
   step->camera_radius_m = keys.camera_radius_m;
   step->each_step = keys.each_step.value_or("");
@@ -679,10 +678,10 @@ std::optional<TimelineStep> read_step(const Value& map, const std::string& path,
 }
 
 std::vector<TimelineStep> read_steps_of(const Value* list, const std::string& path, bool is_round,
-                                        Complaints& complaints) {
+                                        Diagnostics& diagnostics) {
   std::vector<TimelineStep> steps;
-  for (const auto& [item, map] : entries(list, path, complaints)) {
-    if (auto step = read_step(map, item, is_round, complaints)) steps.push_back(std::move(*step));
+  for (const auto& [item, map] : entries(list, path, diagnostics)) {
+    if (auto step = read_step(map, item, is_round, diagnostics)) steps.push_back(std::move(*step));
   }
   return steps;
 }
@@ -700,7 +699,7 @@ std::int64_t steps_in_all(const std::vector<TimelineStep>& timeline) {
 }
 
 /// What is called once per clip and what is called once per capture are moments of their own.
-void check_clip_names(const Job& job, const Place& place, Complaints& complaints) {
+void check_clip_names(const Job& job, const SourceLocation& place, Diagnostics& diagnostics) {
   std::set<std::string> clips;
   std::set<std::string> others;
   for_each_step(job.timeline, [&](const TimelineStep& step) {
@@ -711,53 +710,53 @@ void check_clip_names(const Job& job, const Place& place, Complaints& complaints
   });
   for (const std::string& name : clips) {
     if (!others.contains(name)) continue;
-    complaints.add(place, "timeline: '" + name +
-                              "' is the name of clips and of another moment; give 'record' a "
-                              "'name' of its own");
+    diagnostics.add(place, "timeline: '" + name +
+                               "' is the name of clips and of another moment; give 'record' a "
+                               "'name' of its own");
     return;
   }
 }
 
-void read_timeline(const Value& value, Job& job, Complaints& complaints) {
+void read_timeline(const Value& value, Job& job, Diagnostics& diagnostics) {
   const Value* list = value.find("timeline");
   if (!list || list->kind == Value::Kind::Null) {
     job.timeline = default_timeline();
     return;
   }
-  const std::size_t before = complaints.messages().size();
-  job.timeline = read_steps_of(list, "timeline", false, complaints);
+  const std::size_t before = diagnostics.messages().size();
+  job.timeline = read_steps_of(list, "timeline", false, diagnostics);
   constexpr std::int64_t kMostSteps = 10'000'000;
   if (steps_in_all(job.timeline) > kMostSteps) {
-    complaints.add(list->place, "timeline: expected at most " + std::to_string(kMostSteps) +
-                                    " steps per visit in all rounds; take fewer");
+    diagnostics.add(list->place, "timeline: expected at most " + std::to_string(kMostSteps) +
+                                     " steps per visit in all rounds; take fewer");
     job.timeline.clear();
   }
-  check_clip_names(job, list->place, complaints);
-  if (complaints.messages().size() != before) return;
+  check_clip_names(job, list->place, diagnostics);
+  if (diagnostics.messages().size() != before) return;
   std::int64_t captures_per_visit = 0;
   for_each_step(job.timeline, [&](const TimelineStep& step) {
     captures_per_visit += step.count;
     return true;
   });
   if (captures_per_visit == 0 && job.total_captures > 0) {
-    complaints.add(list->place,
-                   "timeline: the capture series have no captures in all, so "
-                   "total_captures: " +
-                       std::to_string(job.total_captures) +
-                       " can never be reached; give a series a 'count' above 0");
+    diagnostics.add(list->place,
+                    "timeline: the capture series have no captures in all, so "
+                    "total_captures: " +
+                        std::to_string(job.total_captures) +
+                        " can never be reached; give a series a 'count' above 0");
   }
 }
 
 template <class Section>
-void read_section(const Value& job, const char* name, Section& section, Complaints& complaints) {
+void read_section(const Value& job, const char* name, Section& section, Diagnostics& diagnostics) {
   const Value* map = job.find(name);
   if (!map || map->kind == Value::Kind::Null) return;
   if (map->kind != Value::Kind::Map) {
-    complaints.add(map->place,
-                   std::string(name) + ": expected a mapping, found " + map->describe());
+    diagnostics.add(map->place,
+                    std::string(name) + ": expected a mapping, found " + map->describe());
     return;
   }
-  read_all_keys(*map, name, section, complaints);
+  read_all_keys(*map, name, section, diagnostics);
 }
 
 bool is_plain_key(std::string_view key) {
@@ -765,14 +764,14 @@ bool is_plain_key(std::string_view key) {
   return std::ranges::any_of(specs, [&](const ParamSpec& spec) { return spec.key == key; });
 }
 
-void complain_about_unknown_sections(const Value& job, Complaints& complaints) {
+void report_unknown_sections(const Value& job, Diagnostics& diagnostics) {
   std::vector<std::string> known;
   for (const ParamSpec& spec : job_specs()) known.push_back(spec.key);
   for (const auto& [key, value] : job.map) {
     if (std::find(known.begin(), known.end(), key) != known.end()) continue;
     const std::string near = nearest_name(key, known);
-    complaints.add(value.key_place, "unknown key '" + key + "'" +
-                                        (near.empty() ? "" : "; did you mean '" + near + "'?"));
+    diagnostics.add(value.key_place, "unknown key '" + key + "'" +
+                                         (near.empty() ? "" : "; did you mean '" + near + "'?"));
   }
 }
 
@@ -785,12 +784,12 @@ Value head_of(const Value& job) {
   return head;
 }
 
-void check_asset_prefixes(const Value& value, const Job& job, Complaints& complaints) {
+void check_asset_prefixes(const Value& value, const Job& job, Diagnostics& diagnostics) {
   for (std::size_t i = 0; i < job.asset_prefixes.size(); ++i) {
     if (!job.asset_prefixes[i].prefix.empty()) continue;
-    complaints.add(value.find("asset_prefixes")->list[i].place,
-                   item_path("asset_prefixes", i) +
-                       ".prefix: is empty, expected how names begin: 'omniverse://nucleus/'");
+    diagnostics.add(value.find("asset_prefixes")->list[i].place,
+                    item_path("asset_prefixes", i) +
+                        ".prefix: is empty, expected how names begin: 'omniverse://nucleus/'");
   }
 }
 
@@ -973,10 +972,10 @@ void OutputSection::visit(ParamVisitor& v) {
           {"Folder of dataset.json and the journal of finished captures, below `folder`."});
 }
 
-std::vector<ComponentConfig> read_annotators(const Value& job, Complaints& complaints) {
+std::vector<ComponentConfig> read_annotators(const Value& job, Diagnostics& diagnostics) {
   std::vector<ComponentConfig> list;
-  for (auto& [path, map] : entries(job, "annotators", complaints)) {
-    list.push_back(read_entry(path, std::move(map), complaints));
+  for (auto& [path, map] : entries(job, "annotators", diagnostics)) {
+    list.push_back(read_entry(path, std::move(map), diagnostics));
   }
   return list;
 }
@@ -1032,48 +1031,48 @@ std::vector<TimelineStep> default_timeline() {
           {Kind::Capture, 0, "dropped", 2}};
 }
 
-Job read_job(const Value& value, Complaints& complaints) {
+Job read_job(const Value& value, Diagnostics& diagnostics) {
   Job job;
   if (value.kind != Value::Kind::Map) {
-    complaints.add(value.place, "a job is a mapping of sections, found " + value.describe());
+    diagnostics.add(value.place, "a job is a mapping of sections, found " + value.describe());
     return job;
   }
-  complain_about_unknown_sections(value, complaints);
+  report_unknown_sections(value, diagnostics);
   JobHead head;
-  read_all_keys(head_of(value), "", head, complaints);
+  read_all_keys(head_of(value), "", head, diagnostics);
   job.seed = head.seed;
   job.assets_root = head.assets_root;
   job.asset_prefixes = head.asset_prefixes;
-  check_asset_prefixes(value, job, complaints);
+  check_asset_prefixes(value, job, diagnostics);
   job.debug = head.debug;
   job.total_captures = head.total_captures;
   job.loaders =
-      read_parameters(value, "loaders", "each loader reads its files in one way", complaints);
-  read_environments(value, job, complaints);
-  read_section(value, "environment", job.environment, complaints);
+      read_parameters(value, "loaders", "each loader reads its files in one way", diagnostics);
+  read_environments(value, job, diagnostics);
+  read_section(value, "environment", job.environment, diagnostics);
   if (const Value* map = value.find("environment")) job.environment.map = *map;
   if (!job.environment.walls.empty() && job.environment.walls.size() != 3) {
-    complaints.add(place_of(*value.find("environment"), "walls"),
-                   "environment.walls: expected [width, depth, height] in metres, or []");
+    diagnostics.add(place_of(*value.find("environment"), "walls"),
+                    "environment.walls: expected [width, depth, height] in metres, or []");
   }
-  read_objects(value, job, complaints);
-  read_lights(value, job, complaints);
-  read_cameras(value, job, complaints);
-  read_timeline(value, job, complaints);
-  read_randomizers(value, job, complaints);
-  job.physics = read_engine(value, "physics", kDefaultPhysics, complaints);
-  job.renderer = read_engine(value, "renderer", kDefaultRenderer, complaints);
-  job.annotators = read_annotators(value, complaints);
-  read_section(value, "settle", job.settle, complaints);
-  read_views(value, job, complaints);
-  read_writers(value, job, complaints);
-  read_section(value, "output", job.output, complaints);
-  check_folders(value, job, complaints);
+  read_objects(value, job, diagnostics);
+  read_lights(value, job, diagnostics);
+  read_cameras(value, job, diagnostics);
+  read_timeline(value, job, diagnostics);
+  read_randomizers(value, job, diagnostics);
+  job.physics = read_engine(value, "physics", kDefaultPhysics, diagnostics);
+  job.renderer = read_engine(value, "renderer", kDefaultRenderer, diagnostics);
+  job.annotators = read_annotators(value, diagnostics);
+  read_section(value, "settle", job.settle, diagnostics);
+  read_views(value, job, diagnostics);
+  read_writers(value, job, diagnostics);
+  read_section(value, "output", job.output, diagnostics);
+  check_folders(value, job, diagnostics);
   if (job.camera_names().empty() && job.total_captures > 0) {
     const Value* cameras = value.find("cameras");
-    complaints.add(cameras ? cameras->place : value.place,
-                   "cameras: there are none, so a capture would hold no picture; add "
-                   "'- {type: pinhole, count: 1}'");
+    diagnostics.add(cameras ? cameras->place : value.place,
+                    "cameras: there are none, so a capture would hold no picture; add "
+                    "'- {type: pinhole, count: 1}'");
   }
   return job;
 }

@@ -228,11 +228,12 @@ inline constexpr const char* kDefaultRenderer = "embree";
 /// 200 steps or more to fall and come to rest, dropped captures.
 std::vector<TimelineStep> default_timeline();
 
-/// Reads a native job. All complaints are collected; the result is of use only when there are none.
-Job read_job(const Value& job, Complaints& complaints);
+/// Reads a native job. All diagnostics are collected; the result is of use only when there are
+/// none.
+Job read_job(const Value& job, Diagnostics& diagnostics);
 
 /// The section `annotators` of a job, which may consist of it alone.
-std::vector<ComponentConfig> read_annotators(const Value& job, Complaints& complaints);
+std::vector<ComponentConfig> read_annotators(const Value& job, Diagnostics& diagnostics);
 
 /// The name of a node, made from a file's name or a label: '/' becomes '_', never empty.
 std::string node_name(std::string_view text);

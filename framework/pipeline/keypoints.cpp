@@ -18,20 +18,20 @@ namespace fs = std::filesystem;
 /// `keypoints: {tip: [0.1, 0, 0.02]}`, metres in the space of the asset's own node.
 std::vector<Keypoint> read_keypoints(const fs::path& file) {
   const Value all = read_job_file(file);
-  Complaints complaints;
+  Diagnostics diagnostics;
   std::vector<Keypoint> points;
   const Value* map = all.find("keypoints");
   if (!map || map->kind != Value::Kind::Map || all.map.size() != 1) {
-    complaints.add(all.place, "expected 'keypoints: {tip: [0.1, 0, 0.02]}' and nothing else");
+    diagnostics.add(all.place, "expected 'keypoints: {tip: [0.1, 0, 0.02]}' and nothing else");
   } else {
-    ParamReader reader(*map, "keypoints", complaints);
+    ParamReader reader(*map, "keypoints", diagnostics);
     for (const auto& [name, value] : map->map) {
       points.push_back({name, Vec3::Zero()});
       reader.param(name.c_str(), points.back().position, {"Its place.", "m", -1e4, 1e4});
     }
     reader.finish();
   }
-  complaints.raise();
+  diagnostics.raise();
   return points;
 }
 

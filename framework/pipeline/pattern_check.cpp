@@ -140,7 +140,9 @@ std::vector<EnvironmentPattern> rule_patterns(const Job& job) {
     const Value* value = rules.map.find(key);
     for (std::size_t i = 0; i < texts.size(); ++i) {
       const bool is_listed = value && i < value->list.size();
-      const Place place = is_listed ? value->list[i].place : value ? value->place : Place();
+      const SourceLocation place = is_listed ? value->list[i].place
+                                   : value   ? value->place
+                                             : SourceLocation();
       patterns.push_back(
           {texts[i], std::string("environment.") + key, place, false, otherwise, level});
     }
@@ -210,7 +212,7 @@ std::string nearest_pattern(std::string_view pattern, const std::vector<std::str
 
 std::vector<EnvironmentPattern> check_patterns(const Job& job, const CapturePlan& plan,
                                                const DescribeComponent& describe,
-                                               Complaints& complaints) {
+                                               Diagnostics& diagnostics) {
   const std::vector<std::string> paths = possible_paths(job, plan);
   std::vector<EnvironmentPattern> open = rule_patterns(job);
   const auto fits_an_object = [&](const std::string& pattern) {
@@ -229,9 +231,9 @@ std::vector<EnvironmentPattern> check_patterns(const Job& job, const CapturePlan
         continue;
       }
       const std::string near = nearest_pattern(pattern, paths);
-      complaints.add(text->place, key + ": '" + pattern + "' fits no node" +
-                                      (near.empty() ? nearest_path(pattern, paths).hint()
-                                                    : "; did you mean '" + near + "'?"));
+      diagnostics.add(text->place, key + ": '" + pattern + "' fits no node" +
+                                       (near.empty() ? nearest_path(pattern, paths).hint()
+                                                     : "; did you mean '" + near + "'?"));
     }
   };
   for (const RandomizerEntry& entry : job.randomizers) {

@@ -17,7 +17,7 @@ namespace diorama {
 struct EnvironmentPattern {
   std::string text;
   std::string key;  ///< "randomizers[2].surfaces"
-  Place place;
+  SourceLocation place;
   bool is_path = true;                 ///< Else a text as in EnvironmentRules.
   std::string otherwise;               ///< What becomes of an environment in which it fits nothing.
   LogLevel level = LogLevel::Warning;  ///< How such an environment is told.
@@ -29,7 +29,7 @@ struct EnvironmentPattern {
 /// knows yet, the texts of the job's environment rules among them.
 std::vector<EnvironmentPattern> check_patterns(const Job& job, const CapturePlan& plan,
                                                const DescribeComponent& describe,
-                                               Complaints& complaints);
+                                               Diagnostics& diagnostics);
 
 /// About labels in the job's `views` that none of its objects gets, with the nearest one. Assets
 /// and randomizers may know more, so these are no errors.

@@ -19,7 +19,7 @@ constexpr const char* kQuotaWords[] = {
     "visible_share", "occlusion", "truncation", "size_px",     "size_share",    "occluders"};
 constexpr double kMostShares = 100000.0;
 
-const Place& place_of_key(const Value& map, const std::string& key) {
+const SourceLocation& place_of_key(const Value& map, const std::string& key) {
   const Value* value = map.find(key);
   return value ? value->place : map.place;
 }
@@ -59,9 +59,9 @@ std::vector<std::pair<const char*, const Limits*>> limits_of(const ViewRule& rul
           {"brightness", &rule.brightness}};
 }
 
-void check_quota(const Quota& quota, const Place& place, const std::string& path,
-                 Complaints& complaints) {
-  const auto complain = [&](const std::string& what) { complaints.add(place, path + what); };
+void check_quota(const Quota& quota, const SourceLocation& place, const std::string& path,
+                 Diagnostics& diagnostics) {
+  const auto complain = [&](const std::string& what) { diagnostics.add(place, path + what); };
   if (quota.of == "label") {
     const std::set<std::string> different(quota.labels.begin(), quota.labels.end());
     if (quota.labels.size() < 2 || different.size() < quota.labels.size()) {
@@ -223,28 +223,28 @@ std::optional<std::size_t> ViewRule::direction_bin(const Quota& quota, double az
 }
 
 void check_view_rule(const ViewRule& rule, const std::vector<std::string>& series,
-                     Complaints& complaints) {
+                     Diagnostics& diagnostics) {
   for (const std::string& name : rule.on) {
     if (std::find(series.begin(), series.end(), name) != series.end()) continue;
     const std::string near = nearest_name(name, series);
     std::string known;
     for (const std::string& one : series) known += (known.empty() ? "" : ", ") + one;
-    complaints.add(place_of_key(rule.map, "on"),
-                   rule.path + ".on: unknown capture series '" + name + "'" +
-                       (near.empty() ? "" : "; did you mean '" + near + "'?") +
-                       " (known: " + known + ")");
+    diagnostics.add(place_of_key(rule.map, "on"),
+                    rule.path + ".on: unknown capture series '" + name + "'" +
+                        (near.empty() ? "" : "; did you mean '" + near + "'?") +
+                        " (known: " + known + ")");
   }
   for (const auto& [key, limits] : limits_of(rule)) {
     if (!limits->min || !limits->max || *limits->min <= *limits->max) continue;
-    complaints.add(place_of_key(rule.map, key),
-                   rule.path + "." + key + ": min (" + short_number(*limits->min) +
-                       ") is greater than max (" + short_number(*limits->max) + ")");
+    diagnostics.add(place_of_key(rule.map, key),
+                    rule.path + "." + key + ": min (" + short_number(*limits->min) +
+                        ") is greater than max (" + short_number(*limits->max) + ")");
   }
   const Value* list = rule.map.find("quotas");
   for (std::size_t i = 0; i < rule.quotas.size(); ++i) {
     const bool is_there = list && i < list->list.size();
     check_quota(rule.quotas[i], is_there ? list->list[i].place : rule.map.place,
-                rule.path + ".quotas[" + std::to_string(i) + "]", complaints);
+                rule.path + ".quotas[" + std::to_string(i) + "]", diagnostics);
   }
 }
 

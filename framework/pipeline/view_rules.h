@@ -90,7 +90,7 @@ double turned_into(const Limits& limits, double azimuth_deg);
 /// Complains about what the keys alone cannot tell: bounds the wrong way round, quotas without
 /// bins. `series` are those of the job.
 void check_view_rule(const ViewRule& rule, const std::vector<std::string>& series,
-                     Complaints& complaints);
+                     Diagnostics& diagnostics);
 
 /// The bin that the view with this number (from 0, over the whole dataset) has to fall into. Of
 /// every so many views as the shares add up to, each bin gets its share exactly, in an order that

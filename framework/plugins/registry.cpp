@@ -211,36 +211,36 @@ std::vector<ParamSpec> Registry::describe(ComponentKind kind, std::string_view t
 std::unique_ptr<Component> Registry::make_component(ComponentKind kind, const Value& map,
                                                     const std::string& path,
                                                     std::span<const std::string_view> also_known,
-                                                    Complaints& complaints, Host& host) {
+                                                    Diagnostics& diagnostics, Host& host) {
   const std::string name(kind_name(kind));
   if (map.kind != Value::Kind::Map) {
-    complaints.add(map.place, path + ": expected a mapping that names a " + name +
-                                  " with the key 'type', found " + map.describe());
+    diagnostics.add(map.place, path + ": expected a mapping that names a " + name +
+                                   " with the key 'type', found " + map.describe());
     return nullptr;
   }
   const Value* type = map.find("type");
   if (!type || type->kind != Value::Kind::Scalar) {
-    complaints.add(type ? type->place : map.place,
-                   path + ": expected the key 'type' with one of: " + joined(types(kind)) +
-                       (type ? ", found " + type->describe() : ""));
+    diagnostics.add(type ? type->place : map.place,
+                    path + ": expected the key 'type' with one of: " + joined(types(kind)) +
+                        (type ? ", found " + type->describe() : ""));
     return nullptr;
   }
   if (!has(kind, type->scalar)) {
     try {
       state_->require(kind, type->scalar);
     } catch (const Error& error) {
-      complaints.add(type->place, path + ": " + error.what());
+      diagnostics.add(type->place, path + ": " + error.what());
     }
     return nullptr;
   }
   const ComponentInfo& info = state_->info(kind, type->scalar);
   std::vector<std::string_view> known(also_known.begin(), also_known.end());
   known.push_back("type");
-  const std::size_t before = complaints.messages().size();
+  const std::size_t before = diagnostics.messages().size();
   std::unique_ptr<Component> made = call_component(titled(kind, type->scalar), [&] {
-    return info.make(info.context, map, path, known, complaints, host);
+    return info.make(info.context, map, path, known, diagnostics, host);
   });
-  if (!made && complaints.messages().size() == before) {
+  if (!made && diagnostics.messages().size() == before) {
     throw Error(ErrorKind::Plugin, titled(kind, type->scalar) + ": its factory returned nothing (" +
                                        entry(kind, type->scalar).file.string() + ")");
   }

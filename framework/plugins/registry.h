@@ -62,15 +62,15 @@ class Registry {
 
   /// Makes the component that `map` names with its key `type`; the other keys are parameters, those
   /// in `also_known` the caller's. `path` is where `map` stands in the job ("renderer",
-  /// "writers[1]"). Bad parameters, a missing and an unknown type are added to `complaints`, and
+  /// "writers[1]"). Bad parameters, a missing and an unknown type are added to `diagnostics`, and
   /// the result is null. Throws Error(Plugin) when the plugin is broken: it cannot be loaded,
   /// throws, returns null or something of another kind.
   template <class T>
   std::unique_ptr<T> make(const Value& map, const std::string& path,
-                          std::span<const std::string_view> also_known, Complaints& complaints,
+                          std::span<const std::string_view> also_known, Diagnostics& diagnostics,
                           Host& host) {
     std::unique_ptr<Component> made =
-        make_component(T::kKind, map, path, also_known, complaints, host);
+        make_component(T::kKind, map, path, also_known, diagnostics, host);
     if (!made) return nullptr;
     T* typed = dynamic_cast<T*>(made.get());
     if (!typed) refuse_kind(T::kKind, map);
@@ -82,7 +82,7 @@ class Registry {
   std::unique_ptr<Component> make_component(ComponentKind kind, const Value& map,
                                             const std::string& path,
                                             std::span<const std::string_view> also_known,
-                                            Complaints& complaints, Host& host);
+                                            Diagnostics& diagnostics, Host& host);
   [[noreturn]] void refuse_kind(ComponentKind kind, const Value& map) const;
 
   struct State;

@@ -167,8 +167,8 @@ std::string ecmascript_replacement(const std::string& python) {
 
 class InfinigenTranslator : private replicator::Translator {
  public:
-  InfinigenTranslator(const Value& job, Complaints& complaints)
-      : Translator(job, builtin_replicator_job(), "infinigen_default.yaml", complaints) {}
+  InfinigenTranslator(const Value& job, Diagnostics& diagnostics)
+      : Translator(job, builtin_replicator_job(), "infinigen_default.yaml", diagnostics) {}
 
   ReplicatorTranslation translate() {
     complain_about_unknown_sections();
@@ -215,7 +215,7 @@ class InfinigenTranslator : private replicator::Translator {
     if (map.kind == Value::Kind::Null) return nullptr;
     if (map.kind != Value::Kind::Map) {
       if (key == *known.begin()) {
-        complaints_.add(
+        diagnostics_.add(
             map.place, std::string(section_name) + ": expected a mapping, found " + map.describe());
       }
       return nullptr;
@@ -272,7 +272,7 @@ class InfinigenTranslator : private replicator::Translator {
                "labeled_assets.manual_label")) {
       const auto keys = block<ManualLabelBlock>(*map, path);
       if (keys.url.empty() && map->kind == Value::Kind::Map) {
-        complaints_.add(map->place, path + ": 'url' is missing");
+        diagnostics_.add(map->place, path + ": 'url' is missing");
       }
       Value entry = object_entry(*map, "files", "manual_label" + numbered(number++), "/Assets",
                                  keys.num, keys.gravity_disabled_chance);
@@ -428,13 +428,13 @@ class InfinigenTranslator : private replicator::Translator {
 
   std::optional<Value> writer(const Value& map, const std::string& path) {
     if (map.kind != Value::Kind::Map) {
-      complaints_.add(map.place, path + ": expected a mapping, found " + map.describe());
+      diagnostics_.add(map.place, path + ": expected a mapping, found " + map.describe());
       return std::nullopt;
     }
     complain_about_unknown(map, path, {"type", "kwargs"});
     const Value* type = map.find("type");
     if (!type || type->kind != Value::Kind::Scalar) {
-      complaints_.add(map.place, path + ": 'type' is missing");
+      diagnostics_.add(map.place, path + ": 'type' is missing");
       return std::nullopt;
     }
     return writer_entry(*type, map.find("kwargs"), map.place, path + ".kwargs");
@@ -468,9 +468,9 @@ bool is_replicator_section(std::string_view key) {
          key == "debug_mode" || is_object_based_key(key);
 }
 
-ReplicatorTranslation translate_replicator_job(const Value& job, Complaints& complaints) {
-  if (is_object_based_job(job)) return translate_object_based_job(job, complaints);
-  return InfinigenTranslator(job, complaints).translate();
+ReplicatorTranslation translate_replicator_job(const Value& job, Diagnostics& diagnostics) {
+  if (is_object_based_job(job)) return translate_object_based_job(job, diagnostics);
+  return InfinigenTranslator(job, diagnostics).translate();
 }
 
 }  // namespace diorama

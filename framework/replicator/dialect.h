@@ -26,11 +26,11 @@ struct ReplicatorTranslation {
   std::vector<std::string> without_effect;
 };
 
-/// Unknown keys, wrong types and values out of range are added to `complaints`; the result is of
+/// Unknown keys, wrong types and values out of range are added to `diagnostics`; the result is of
 /// use only when there are none. Like in the reference, a top-level key that the file lacks comes
 /// from the built-in defaults as a whole, and a key missing inside a given block takes the fallback
 /// of the reference's program.
-ReplicatorTranslation translate_replicator_job(const Value& job, Complaints& complaints);
+ReplicatorTranslation translate_replicator_job(const Value& job, Diagnostics& diagnostics);
 
 /// The tutorial's built-in defaults, as YAML text in this dialect (configs/infinigen_default.yaml).
 std::string builtin_replicator_job();

@@ -195,8 +195,8 @@ Value range(const Range& value) { return numbers({value.lo, value.hi}); }
 
 class ObjectBasedTranslator : private replicator::Translator {
  public:
-  ObjectBasedTranslator(const Value& job, Complaints& complaints)
-      : Translator(job, builtin_object_based_job(), "object_based_default.yaml", complaints) {}
+  ObjectBasedTranslator(const Value& job, Diagnostics& diagnostics)
+      : Translator(job, builtin_object_based_job(), "object_based_default.yaml", diagnostics) {}
 
   ReplicatorTranslation translate() {
     complain_about_unknown(*given_, "", object_based_keys());
@@ -241,7 +241,7 @@ class ObjectBasedTranslator : private replicator::Translator {
       if (key == "env_url" && is_nothing) continue;
       flat.set(key, value);
     }
-    ParamReader reader(flat, "", complaints_);
+    ParamReader reader(flat, "", diagnostics_);
     keys_.visit(reader);
     reader.finish();
     // What was complained about has no need of errors that follow from it.
@@ -254,8 +254,8 @@ class ObjectBasedTranslator : private replicator::Translator {
     }
     check_resolution(keys_.resolution, section("resolution").place, "resolution");
     if (keys_.working_area_size.size() != 3) {
-      complaints_.add(section("working_area_size").place,
-                      "working_area_size: expected [width, depth, height] in metres");
+      diagnostics_.add(section("working_area_size").place,
+                       "working_area_size: expected [width, depth, height] in metres");
       keys_.working_area_size = {1.0, 1.0, 1.0};
     }
     if (given_->find("disable_render_products_between_captures")) {
@@ -277,8 +277,8 @@ class ObjectBasedTranslator : private replicator::Translator {
   }
 
   void complain_about_none(const std::string& key, const std::string& count_key, int count) {
-    complaints_.add(section(key).place,
-                    key + ": there are none, but " + count_key + " is " + std::to_string(count));
+    diagnostics_.add(section(key).place,
+                     key + ": there are none, but " + count_key + " is " + std::to_string(count));
   }
 
   /// Each of the cameras looks at one of the objects.
@@ -289,8 +289,8 @@ class ObjectBasedTranslator : private replicator::Translator {
         std::ranges::any_of(assets, is_there)) {
       return;
     }
-    complaints_.add(list.place,
-                    "labeled_assets_and_properties: there is no object for cameras to look at");
+    diagnostics_.add(list.place,
+                     "labeled_assets_and_properties: there is no object for cameras to look at");
   }
 
   std::vector<LabeledAsset> labeled_assets() {
@@ -299,8 +299,8 @@ class ObjectBasedTranslator : private replicator::Translator {
     const Value& list = section(key);
     if (list.kind == Value::Kind::Null) return assets;
     if (list.kind != Value::Kind::List) {
-      complaints_.add(list.place,
-                      std::string(key) + ": expected a list of mappings, found " + list.describe());
+      diagnostics_.add(
+          list.place, std::string(key) + ": expected a list of mappings, found " + list.describe());
       return assets;
     }
     std::map<std::string, int> uses;
@@ -309,7 +309,7 @@ class ObjectBasedTranslator : private replicator::Translator {
       const std::string path = std::string(key) + "[" + std::to_string(i) + "]";
       LabeledAsset asset{&map, {}, {}, block<LabeledAssetBlock>(map, path)};
       if (map.kind == Value::Kind::Map) {
-        if (asset.keys.url.empty()) complaints_.add(map.place, path + ": 'url' is missing");
+        if (asset.keys.url.empty()) diagnostics_.add(map.place, path + ": 'url' is missing");
         // The program's own word wins over the one that it never reads.
         asset.keys.scale =
             map.find("randomize_scale") ? asset.keys.randomize_scale : asset.keys.scale_min_max;
@@ -534,8 +534,8 @@ class ObjectBasedTranslator : private replicator::Translator {
         }
       }
     } else if (launch.kind != Value::Kind::Null) {
-      complaints_.add(launch.place,
-                      "launch_config: expected a mapping, found " + launch.describe());
+      diagnostics_.add(launch.place,
+                       "launch_config: expected a mapping, found " + launch.describe());
     }
     const bool is_path_traced = mode == "PathTracing";
     // As with the other dialect's path_tracing.
@@ -552,10 +552,10 @@ class ObjectBasedTranslator : private replicator::Translator {
                                                 "RayTracedLighting", "PathTracing"};
     if (std::find(modes.begin(), modes.end(), value.scalar) != modes.end()) return;
     const std::string near = nearest_name(value.scalar, modes);
-    complaints_.add(value.place,
-                    "launch_config.renderer: expected RealTimePathTracing, RaytracedLighting or "
-                    "PathTracing, found " +
-                        value.describe() + (near.empty() ? "" : "; did you mean '" + near + "'?"));
+    diagnostics_.add(value.place,
+                     "launch_config.renderer: expected RealTimePathTracing, RaytracedLighting or "
+                     "PathTracing, found " +
+                         value.describe() + (near.empty() ? "" : "; did you mean '" + near + "'?"));
   }
 
   static Value simulation(int steps) {
@@ -597,7 +597,7 @@ class ObjectBasedTranslator : private replicator::Translator {
       list.list.push_back(
           writer_entry(type, &section("writer_kwargs"), type.place, "writer_kwargs"));
     } else if (type.kind != Value::Kind::Null) {
-      complaints_.add(type.place, "writer_type: expected a name, found " + type.describe());
+      diagnostics_.add(type.place, "writer_type: expected a name, found " + type.describe());
     }
     set_writers(std::move(list));
   }
@@ -618,8 +618,8 @@ bool is_object_based_job(const Value& job) {
                      [](const auto& entry) { return is_object_based_key(entry.first); });
 }
 
-ReplicatorTranslation translate_object_based_job(const Value& job, Complaints& complaints) {
-  return ObjectBasedTranslator(job, complaints).translate();
+ReplicatorTranslation translate_object_based_job(const Value& job, Diagnostics& diagnostics) {
+  return ObjectBasedTranslator(job, diagnostics).translate();
 }
 
 }  // namespace diorama

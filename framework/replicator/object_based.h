@@ -19,7 +19,7 @@ bool is_object_based_key(std::string_view key);
 bool is_object_based_job(const Value& job);
 
 /// See translate_replicator_job().
-ReplicatorTranslation translate_object_based_job(const Value& job, Complaints& complaints);
+ReplicatorTranslation translate_object_based_job(const Value& job, Diagnostics& diagnostics);
 
 /// The example's built-in defaults, as YAML text (configs/object_based_default.yaml).
 std::string builtin_object_based_job();

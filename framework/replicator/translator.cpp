@@ -25,8 +25,8 @@ Value numbers(const std::vector<double>& list) {
 std::string numbered(int number) { return number == 0 ? "" : "_" + std::to_string(number + 1); }
 
 Translator::Translator(const Value& job, std::string_view builtin_job, const char* builtin_name,
-                       Complaints& complaints)
-    : complaints_(complaints), given_(&job), defaults_(parse_yaml(builtin_job, builtin_name)) {}
+                       Diagnostics& diagnostics)
+    : diagnostics_(diagnostics), given_(&job), defaults_(parse_yaml(builtin_job, builtin_name)) {}
 
 const Value& Translator::section(std::string_view key) const {
   if (const Value* given = given_->find(key)) return *given;
@@ -39,20 +39,20 @@ void Translator::complain_about_unknown(const Value& map, const std::string& pat
   for (const auto& [key, value] : map.map) {
     if (std::find(known.begin(), known.end(), key) != known.end()) continue;
     const std::string near = nearest_name(key, known);
-    complaints_.add(value.key_place, (path.empty() ? "" : path + ": ") + "unknown key '" + key +
-                                         "'" +
-                                         (near.empty() ? "" : "; did you mean '" + near + "'?"));
+    diagnostics_.add(value.key_place, (path.empty() ? "" : path + ": ") + "unknown key '" + key +
+                                          "'" +
+                                          (near.empty() ? "" : "; did you mean '" + near + "'?"));
   }
 }
 
-void Translator::check_resolution(const std::vector<double>& resolution, const Place& place,
-                                  const std::string& path) {
+void Translator::check_resolution(const std::vector<double>& resolution,
+                                  const SourceLocation& place, const std::string& path) {
   const bool is_fine = resolution.size() == 2 &&
                        std::all_of(resolution.begin(), resolution.end(), [](double number) {
                          return number >= 1 && number == std::floor(number);
                        });
   if (is_fine) return;
-  complaints_.add(place, path + ": expected [width, height] in whole pixels");
+  diagnostics_.add(place, path + ": expected [width, height] in whole pixels");
 }
 
 Value Translator::object_entry(const Value& source, const char* type, const std::string& name,
@@ -68,7 +68,7 @@ Value Translator::object_entry(const Value& source, const char* type, const std:
   return entry;
 }
 
-Value Translator::writer_entry(const Value& type, const Value* kwargs, const Place& place,
+Value Translator::writer_entry(const Value& type, const Value* kwargs, const SourceLocation& place,
                                const std::string& kwargs_path) {
   Value entry = Value::make_map();
   entry.place = place;
@@ -77,14 +77,14 @@ Value Translator::writer_entry(const Value& type, const Value* kwargs, const Pla
   entry.set("output_dir", Value::text("_out_" + entry.find("name")->scalar));
   if (!kwargs || kwargs->kind == Value::Kind::Null) return entry;
   if (kwargs->kind != Value::Kind::Map) {
-    complaints_.add(kwargs->place,
-                    kwargs_path + ": expected a mapping, found " + kwargs->describe());
+    diagnostics_.add(kwargs->place,
+                     kwargs_path + ": expected a mapping, found " + kwargs->describe());
     return entry;
   }
   for (const auto& [key, value] : kwargs->map) {
     const bool is_own_name = key == "type" || key == "name";
     if (is_own_name) {
-      complaints_.add(value.key_place, kwargs_path + ": unknown key '" + key + "'");
+      diagnostics_.add(value.key_place, kwargs_path + ": unknown key '" + key + "'");
     } else if (key != "output_dir" || value.kind != Value::Kind::Null) {
       entry.set(key, value);
     }

@@ -24,7 +24,7 @@ std::string numbered(int number);
 class Translator {
  protected:
   Translator(const Value& job, std::string_view builtin_job, const char* builtin_name,
-             Complaints& complaints);
+             Diagnostics& diagnostics);
 
   void set(std::string_view key, Value value) { result_.job.set(key, std::move(value)); }
   /// The file's, else the built-in one as a whole.
@@ -37,25 +37,25 @@ class Translator {
     Block result;
     if (map.kind == Value::Kind::Null) return result;
     if (map.kind != Value::Kind::Map) {
-      complaints_.add(map.place, path + ": expected a mapping, found " + map.describe());
+      diagnostics_.add(map.place, path + ": expected a mapping, found " + map.describe());
       return result;
     }
-    ParamReader reader(map, path, complaints_);
+    ParamReader reader(map, path, diagnostics_);
     result.visit(reader);
     reader.finish();
     return result;
   }
-  void check_resolution(const std::vector<double>& resolution, const Place& place,
+  void check_resolution(const std::vector<double>& resolution, const SourceLocation& place,
                         const std::string& path);
   Value object_entry(const Value& source, const char* type, const std::string& name,
                      const std::string& under, int count, double gravity_disabled_chance);
   /// An entry of `writers`; the kwargs become its own keys.
-  Value writer_entry(const Value& type, const Value* kwargs, const Place& place,
+  Value writer_entry(const Value& type, const Value* kwargs, const SourceLocation& place,
                      const std::string& kwargs_path);
   /// Sets `writers` and `output`: all folders are relative to the current one.
   void set_writers(Value list);
 
-  Complaints& complaints_;
+  Diagnostics& diagnostics_;
   const Value* given_ = nullptr;
   ReplicatorTranslation result_;
 

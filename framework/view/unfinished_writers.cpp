@@ -179,9 +179,9 @@ UnfinishedWriters::Folders UnfinishedWriters::folders_for(const DatasetStatus& s
   // What the assembly of a run's job has to say, the run has said.
   const Log quiet = [this](LogLevel, std::string_view text) { log_(LogLevel::Debug, text); };
   const Value value = job_of(status, status.base);
-  Complaints complaints;
-  const Job job = read_job(value, complaints);
-  complaints.raise();
+  Diagnostics diagnostics;
+  const Job job = read_job(value, diagnostics);
+  diagnostics.raise();
   const OutputFolders places = output_folders(job);
   std::vector<std::pair<fs::path, std::size_t>> due;
   for (const fs::path& folder : folders) {

@@ -120,9 +120,9 @@ HarmlessFiles& harmless_files() {
 }
 
 // Collects what assimp reports as an error and goes on after.
-class Complaints final : public Assimp::LogStream {
+class Diagnostics final : public Assimp::LogStream {
  public:
-  explicit Complaints(std::vector<std::string>& lines) : lines_(lines) {}
+  explicit Diagnostics(std::vector<std::string>& lines) : lines_(lines) {}
   void write(const char* message) override {
     std::string line = message;
     while (!line.empty() && std::isspace(static_cast<unsigned char>(line.back()))) line.pop_back();
@@ -141,9 +141,9 @@ class Complaints final : public Assimp::LogStream {
 // assimp's log is one for the process; it is ours while this lives.
 class AssimpLog {
  public:
-  explicit AssimpLog(std::vector<std::string>& complaints) {
+  explicit AssimpLog(std::vector<std::string>& diagnostics) {
     Assimp::Logger* log = Assimp::DefaultLogger::create(nullptr, Assimp::Logger::NORMAL, 0);
-    log->attachStream(new Complaints(complaints), Assimp::Logger::Err);
+    log->attachStream(new Diagnostics(diagnostics), Assimp::Logger::Err);
   }
   ~AssimpLog() { Assimp::DefaultLogger::kill(); }
   AssimpLog(const AssimpLog&) = delete;
@@ -175,9 +175,9 @@ SceneFile::SceneFile(const std::string& file, Host& host, std::optional<double> 
     if (!trial.empty()) throw unreadable(file, trial);
     harmless_files().add(file);
   }
-  std::vector<std::string> complaints;
+  std::vector<std::string> diagnostics;
   {
-    const AssimpLog log(complaints);
+    const AssimpLog log(diagnostics);
     const std::string why = read(importer_, file, format_);
     if (!why.empty()) throw unreadable(file, why);
   }
@@ -193,7 +193,7 @@ SceneFile::SceneFile(const std::string& file, Host& host, std::optional<double> 
                    "steps and splines cannot be read: " + why);
     }
   }
-  for (const std::string& line : complaints) {
+  for (const std::string& line : diagnostics) {
     host.log(LogLevel::Warning, file + ": assimp: " + line);
   }
 }

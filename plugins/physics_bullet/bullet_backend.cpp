@@ -6,8 +6,8 @@
 
 #include "body_builder.h"
 #include "diorama/error.h"
-#include "gentle_world.h"
 #include "joint_builder.h"
+#include "soft_contact_world.h"
 
 namespace diorama {
 namespace {
@@ -110,7 +110,7 @@ struct BulletBackend::World {
   btCollisionDispatcher dispatcher;
   btDbvtBroadphase broadphase;
   btSequentialImpulseConstraintSolver solver;
-  GentleWorld dynamics;
+  SoftContactWorld dynamics;
 
   ~World() {
     for (const HeldJoint& held : bodies.joints) dynamics.removeConstraint(held.constraint.get());

@@ -136,11 +136,11 @@ std::deque<Declared> visit_declared(const py::object& type, ParamVisitor& visito
 }
 
 py::dict read_params(const py::object& type, const Value& map) {
-  Complaints complaints;
-  ParamReader reader(map, "params", complaints);
+  Diagnostics diagnostics;
+  ParamReader reader(map, "params", diagnostics);
   const std::deque<Declared> all = visit_declared(type, reader);
   reader.finish();
-  complaints.raise();
+  diagnostics.raise();
   py::dict values;
   for (const Declared& one : all) {
     values[py::str(one.key)] =

@@ -28,9 +28,10 @@ constexpr float kMinAlbedo = 0.02f;
 // little of how alike two such pixels are.
 constexpr float kMixedTolerance = 100.0f;
 // Below this share of agreeing neighbours a pixel was hardly averaged: edges, thin things.
-constexpr float kLonely = 0.35f;
-constexpr float kWitnesses = 10.0f;  // averaged pixels near a lonely one that make it suspect
-constexpr float kLeeway = 2.0f;      // by which it may leave their range
+constexpr float kLowSupport = 0.35f;
+constexpr float kValidNeighbours =
+    10.0f;                       // averaged pixels near a low_support one that make it suspect
+constexpr float kLeeway = 2.0f;  // by which it may leave their range
 
 // Of the paths of one pixel: what so many may bring each, one of more may bring for all of them.
 constexpr float kLimitedPaths = 16.0f;
@@ -42,7 +43,7 @@ constexpr float kMostReturned = 1.5f;  // of the light that is left
 
 /// What steers the filter; constant over the rounds. Normals are zero where there is no surface;
 /// positions are as seen from the camera.
-enum Guide { kNormal = 0, kPosition = 3, kFirmness = 6, kGuides = 7 };
+enum Guide { kNormal = 0, kPosition = 3, kNormalConfidence = 6, kGuides = 7 };
 /// How much differences from a pixel mean, in (0, 1]; without a surface it differs from all others.
 constexpr float kNoSurface = 1e6f;
 
@@ -86,7 +87,7 @@ inline bool has_any(const Lanes& numbers) {
 
 /// 1 for surfaces, 0 elsewhere.
 inline Lanes surfaces(const Guides::Row& guides, int x) {
-  return guides.lanes(kFirmness, x) < kNoSurface ? all_lanes(1.0f) : Lanes{};
+  return guides.lanes(kNormalConfidence, x) < kNoSurface ? all_lanes(1.0f) : Lanes{};
 }
 
 class PlaneFilter {
@@ -121,15 +122,15 @@ class PlaneFilter {
   void rows_avx512(Step step, int round, int begin, int end);
   void read(int y);
   Vec3f believable(int x, int y, float& variance, float& removed) const;
-  void tame(int y);
+  void clamp_fireflies(int y);
   void weigh(const Lights& light, int y_begin, std::vector<float>& sums) const;
   void measure(int y);
   int row_by_reach(int index, int reach) const;
   void filter(int y, int round);
-  void calm(int y);
-  Lanes calming(int x, int y, const Lanes& lonely) const;
+  void limit_outliers(int y);
+  Lanes outlier_scale(int x, int y, const Lanes& low_support) const;
   std::vector<float> lost() const;
-  void give_back(int y);
+  void restore_removed_energy(int y);
   void write(int y);
 
   Film film_;  ///< Until it is read.
@@ -174,7 +175,7 @@ inline void PlaneFilter::rows(Step step, int round, int begin, int end) {
       case Step::Tame:
         next_.fill_margins(y, {});
         support_.fill_margins(y, {});
-        tame(y);
+        clamp_fireflies(y);
         break;
       case Step::Measure:
         measure(y);
@@ -185,8 +186,8 @@ inline void PlaneFilter::rows(Step step, int round, int begin, int end) {
       case Step::Weigh:
         break;
       case Step::Finish:
-        calm(y);
-        give_back(y);
+        limit_outliers(y);
+        restore_removed_energy(y);
         write(y);
         break;
     }
@@ -304,7 +305,7 @@ void PlaneFilter::read(int y) {
       *light.at(kIrradiance + k, x) = irradiance[k];
     }
     *light.at(kLuminance, x) = luminance(irradiance);
-    *guides.at(kFirmness, x) =
+    *guides.at(kNormalConfidence, x) =
         is_surface ? 1.0f / (1.0f + kMixedTolerance * std::max(0.0f, 1.0f - length)) : kNoSurface;
     const float own_color = luminance(color);
     *light.at(kVariance, x) = variance / (own_color * own_color);
@@ -316,11 +317,11 @@ void PlaneFilter::read(int y) {
 
 /// Samples that are far brighter than everything around them are chance finds; the brightest
 /// believable value is the third brightest neighbour's.
-inline void PlaneFilter::tame(int y) {
+inline void PlaneFilter::clamp_fireflies(int y) {
   const int v_begin = std::max(0, y - 2);
   const int v_end = std::min(height_, y + 3);
   const auto light = lights_.row(y);
-  const auto tamed = next_.row(y);
+  const auto clamped = next_.row(y);
   for (int x = 0; x < width_; x += kLanes) {
     const Lanes zero{};
     Lanes first{};
@@ -347,8 +348,9 @@ inline void PlaneFilter::tame(int y) {
     const Lanes judged = neighbours >= 8.0f ? surfaces(guides_.row(y), x) : zero;
     const Lanes suspect = own > third ? judged : zero;
     const Lanes scale = suspect > zero ? third / larger(own, all_lanes(1e-30f)) : zero + 1.0f;
-    store_irradiance({irradiance.x * scale, irradiance.y * scale, irradiance.z * scale}, tamed, x);
-    store_lanes(light.lanes(kVariance, x) * scale * scale, tamed.at(kVariance, x));
+    store_irradiance({irradiance.x * scale, irradiance.y * scale, irradiance.z * scale}, clamped,
+                     x);
+    store_lanes(light.lanes(kVariance, x) * scale * scale, clamped.at(kVariance, x));
   }
 }
 
@@ -398,7 +400,7 @@ struct Centre {
   Lanes3 normal;  ///< kTurn long.
   Lanes plane;    ///< Where the plane is along `normal`.
   Lanes slack;    ///< Weight of a distance from the plane, along `normal`.
-  Lanes firmness;
+  Lanes normal_confidence;
   Lanes luminance;
   Lanes certainty;
 };
@@ -422,10 +424,10 @@ inline void add_neighbours(const Centre& own, const Guides::Row& guides, const L
   unlike = unlike - n.x * normal.x;
   unlike = unlike - n.y * normal.y;
   unlike = unlike - n.z * normal.z;
-  const Lanes firmness = larger(own.firmness, guides.lanes(kFirmness, x));
+  const Lanes normal_confidence = larger(own.normal_confidence, guides.lanes(kNormalConfidence, x));
   const Lanes brighter = magnitude(light.lanes(kLuminance, x) - own.luminance);
   const Lanes certainty = own.certainty + light.lanes(kCertainty, x);
-  const Lanes alike = (1.0f - unlike * firmness) - brighter * certainty;
+  const Lanes alike = (1.0f - unlike * normal_confidence) - brighter * certainty;
   const Lanes w = share * fast_exp16(alike);
   const Lanes3 irradiance = light.lanes3(kIrradiance, x);
   sums.irradiance.x += w * irradiance.x;
@@ -443,7 +445,7 @@ inline Centre centre_of(const Guides::Row& guides, const Lights::Row& light, int
   centre.plane = dot(centre.normal, position);
   centre.slack =
       (1.0f / (16.0f * kTurn)) / (kPlaneSlack * square_roots(dot(position, position)) + 1e-6f);
-  centre.firmness = guides.lanes(kFirmness, x);
+  centre.normal_confidence = guides.lanes(kNormalConfidence, x);
   centre.luminance = light.lanes(kLuminance, x);
   centre.certainty = light.lanes(kCertainty, x);
   return centre;
@@ -486,43 +488,43 @@ inline void PlaneFilter::filter(int y, int round) {
 
 /// Pixels that agree with none of their neighbours, mostly mixtures at edges, keep their noise;
 /// they may at least be no darker and no brighter than what surrounds them.
-inline void PlaneFilter::calm(int y) {
+inline void PlaneFilter::limit_outliers(int y) {
   const auto light = lights_.row(y);
   for (int x = 0; x < width_; x += kLanes) {
     const Lanes support = support_.row(y).lanes(0, x);
-    const Lanes lonely = support < kLonely ? surfaces(guides_.row(y), x) : Lanes{};
+    const Lanes low_support = support < kLowSupport ? surfaces(guides_.row(y), x) : Lanes{};
     Lanes3 irradiance = light.lanes3(kIrradiance, x);
-    if (has_any(lonely)) {
-      const Lanes scale = calming(x, y, lonely);
+    if (has_any(low_support)) {
+      const Lanes scale = outlier_scale(x, y, low_support);
       irradiance = {irradiance.x * scale, irradiance.y * scale, irradiance.z * scale};
     }
     store_irradiance(irradiance, next_.row(y), x);
   }
 }
 
-/// By how much eight pixels of which some are lonely become brighter or darker.
-inline Lanes PlaneFilter::calming(int x, int y, const Lanes& lonely) const {
+/// By how much eight pixels of which some are low_support become brighter or darker.
+inline Lanes PlaneFilter::outlier_scale(int x, int y, const Lanes& low_support) const {
   const Lanes zero{};
   Lanes low = all_lanes(kInfinite);
   Lanes high{};
-  Lanes witnesses{};
+  Lanes valid_neighbours{};
   for (int v = std::max(0, y - 2); v < std::min(height_, y + 3); ++v) {
     const auto guides = guides_.row(v);
     const auto other = lights_.row(v);
     for (int dx = -2; dx <= 2; ++dx) {
       const Lanes support = support_.row(v).lanes(0, x + dx);
-      const Lanes counts = support >= kLonely ? surfaces(guides, x + dx) : zero;
+      const Lanes counts = support >= kLowSupport ? surfaces(guides, x + dx) : zero;
       const Lanes value = other.lanes(kLuminance, x + dx);
       low = counts > zero ? smaller(low, value) : low;
       high = larger(high, counts * value);
-      witnesses += counts;
+      valid_neighbours += counts;
     }
   }
   const Lanes own = lights_.row(y).lanes(kLuminance, x);
-  const Lanes calm = smaller(larger(own, low * (1.0f / kLeeway)), high * kLeeway);
-  const Lanes judged = witnesses >= kWitnesses ? lonely : zero;
+  const Lanes limited = smaller(larger(own, low * (1.0f / kLeeway)), high * kLeeway);
+  const Lanes judged = valid_neighbours >= kValidNeighbours ? low_support : zero;
   const Lanes changed = own > zero ? judged : zero;
-  return changed > zero ? calm / larger(own, all_lanes(1e-30f)) : zero + 1.0f;
+  return changed > zero ? limited / larger(own, all_lanes(1e-30f)) : zero + 1.0f;
 }
 
 /// By how much the light around the middles of blocks was weakened.
@@ -548,7 +550,7 @@ std::vector<float> PlaneFilter::lost() const {
 
 /// The light that was cut off or left out comes back, spread over a wide neighbourhood: pictures
 /// would be too dark otherwise.
-inline void PlaneFilter::give_back(int y) {
+inline void PlaneFilter::restore_removed_energy(int y) {
   const auto light = next_.row(y);
   // Between the middles of blocks.
   const float v = std::max(0.0f, (float(y) + 0.5f) / float(kBlock) - 0.5f);

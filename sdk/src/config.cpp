@@ -8,7 +8,7 @@
 
 namespace diorama {
 
-std::string Place::text() const {
+std::string SourceLocation::text() const {
   if (line <= 0) return file;
   return file + ":" + std::to_string(line) + ":" + std::to_string(column);
 }
@@ -104,12 +104,12 @@ std::string Value::describe() const {
   return (is_quoted ? "the text '" : "'") + shown + "'";
 }
 
-void Complaints::add(const Place& place, std::string_view message) {
+void Diagnostics::add(const SourceLocation& place, std::string_view message) {
   const std::string where = place.text();
   messages_.push_back((where.empty() ? "" : where + ": ") + std::string(message));
 }
 
-void Complaints::raise() const {
+void Diagnostics::raise() const {
   if (messages_.empty()) return;
   std::string all;
   for (const std::string& message : messages_) all += (all.empty() ? "" : "\n") + message;

@@ -50,16 +50,16 @@ std::size_t pick(const std::vector<double>& weights, double share) {
 }
 
 void check_weights(std::vector<double>& weights, std::size_t count, const Value& body,
-                   const std::string& name, Complaints& complaints) {
+                   const std::string& name, Diagnostics& diagnostics) {
   const Value* given = body.find("weights");
   if (!given || given->kind == Value::Kind::Null) {
     weights.assign(count, 1.0);
   } else if (weights.size() != count) {
-    complaints.add(given->place, name + ".weights: expected one per choice (" +
-                                     std::to_string(count) + "), found " +
-                                     std::to_string(weights.size()));
+    diagnostics.add(given->place, name + ".weights: expected one per choice (" +
+                                      std::to_string(count) + "), found " +
+                                      std::to_string(weights.size()));
   } else if (std::accumulate(weights.begin(), weights.end(), 0.0) <= 0.0) {
-    complaints.add(given->place, name + ".weights: at least one must be above 0");
+    diagnostics.add(given->place, name + ".weights: at least one must be above 0");
   }
 }
 
@@ -69,26 +69,26 @@ struct ItemKeys {
   Value items = Value::make_list();
   std::vector<double> weights;
 
-  ItemKeys(const Value& body, bool is_sequence, const std::string& name, Complaints& complaints)
+  ItemKeys(const Value& body, bool is_sequence, const std::string& name, Diagnostics& diagnostics)
       : list_key(is_sequence ? "items" : "choices") {
-    ParamReader reader(body, name, complaints);
+    ParamReader reader(body, name, diagnostics);
     reader.param(list_key, items, {"What is chosen from."});
     if (!is_sequence) reader.param("weights", weights, {"One per choice.", "", 0.0});
     reader.finish();
     if (items.kind != Value::Kind::List || items.list.empty()) {
-      complaints.add(items.place.line > 0 ? items.place : body.place,
-                     name + "." + list_key + ": expected a list with at least one entry");
+      diagnostics.add(items.place.line > 0 ? items.place : body.place,
+                      name + "." + list_key + ": expected a list with at least one entry");
     }
   }
 };
 
 }  // namespace
 
-/// Reads one distribution; complaints are collected.
+/// Reads one distribution; diagnostics are collected.
 struct Distribution::Reader {
   const ParamDoc& doc;
   int width;
-  Complaints& complaints;
+  Diagnostics& diagnostics;
 
   Distribution read(const Value& value, const std::string& name) {
     Distribution made;
@@ -97,7 +97,7 @@ struct Distribution::Reader {
       made.first_ = made.second_ = point(mapping("", value), "", name, made.width_);
     } else if (value.kind == Value::Kind::List && value.list.size() == 2) {
       Range range;
-      ParamReader(mapping(name.c_str(), value), "", complaints).param(name.c_str(), range, doc);
+      ParamReader(mapping(name.c_str(), value), "", diagnostics).param(name.c_str(), range, doc);
       made.first_ = Vec3::Constant(range.lo);
       made.second_ = Vec3::Constant(range.hi);
     } else if (value.kind == Value::Kind::List && value.list.size() == 3 && width == 3) {
@@ -109,7 +109,7 @@ struct Distribution::Reader {
       complain(value, name);
     }
     if (!made.first_.allFinite() || !made.second_.allFinite()) {
-      complaints.add(value.place, name + ": expected finite numbers, found " + value.describe());
+      diagnostics.add(value.place, name + ": expected finite numbers, found " + value.describe());
     }
     made.source_ = value;
     return made;
@@ -118,20 +118,20 @@ struct Distribution::Reader {
  private:
   void complain(const Value& value, const std::string& name) {
     const std::string vector = width == 3 ? "[x, y, z] with one of these per axis, " : "";
-    complaints.add(value.place,
-                   name + ": expected " + vector + kForms + ", found " + value.describe());
+    diagnostics.add(value.place,
+                    name + ": expected " + vector + kForms + ", found " + value.describe());
   }
 
   /// A number or three of them; `used_width` grows to 3 for the latter.
   Vec3 point(const Value& map, const char* key, const std::string& name, int& used_width) {
     const Value* value = map.find(key);
     if (!value) {
-      complaints.add(map.place, name + ": '" + key + "' is missing");
+      diagnostics.add(map.place, name + ": '" + key + "' is missing");
       return Vec3::Zero();
     }
     const std::string full = *key ? name + "." + key : name;
     const Value named = mapping(full.c_str(), *value);
-    ParamReader reader(named, "", complaints);
+    ParamReader reader(named, "", diagnostics);
     if (value->kind == Value::Kind::List && width == 3) {
       used_width = 3;
       Vec3 vector = Vec3::Zero();
@@ -161,8 +161,8 @@ struct Distribution::Reader {
     } else {
       const std::string near =
           nearest_name(word, {"uniform", "normal", "log_uniform", "choice", "sequence", "combine"});
-      complaints.add(body.key_place, name + ": unknown distribution '" + std::string(word) + "'" +
-                                         (near.empty() ? "" : ", did you mean '" + near + "'?"));
+      diagnostics.add(body.key_place, name + ": unknown distribution '" + std::string(word) + "'" +
+                                          (near.empty() ? "" : ", did you mean '" + near + "'?"));
     }
   }
 
@@ -170,33 +170,33 @@ struct Distribution::Reader {
                  const char* second_key, Distribution& made) {
     Value first;
     Value second;
-    const std::size_t before = complaints.messages().size();
-    ParamReader reader(body, name, complaints);
+    const std::size_t before = diagnostics.messages().size();
+    ParamReader reader(body, name, diagnostics);
     reader.param(first_key, first, {"The first."});
     reader.param(second_key, second, {"The second."});
     reader.finish();
-    if (complaints.messages().size() != before) return;
+    if (diagnostics.messages().size() != before) return;
     made.first_ = point(body, first_key, name, made.width_);
     if (made.kind_ == Kind::Normal) {
       const ParamDoc not_negative{"Standard deviation.", "", 0.0};
       made.second_ =
-          Reader{not_negative, width, complaints}.point(body, second_key, name, made.width_);
+          Reader{not_negative, width, diagnostics}.point(body, second_key, name, made.width_);
       return;
     }
     made.second_ = point(body, second_key, name, made.width_);
-    if (complaints.messages().size() != before) return;
+    if (diagnostics.messages().size() != before) return;
     if ((made.first_.array() > made.second_.array()).any()) {
-      complaints.add(body.place, name + ": lower must not exceed upper");
+      diagnostics.add(body.place, name + ": lower must not exceed upper");
     }
     if (made.kind_ == Kind::LogUniform && (made.first_.array() <= 0.0).any()) {
-      complaints.add(body.place, name + ": the bounds must be above 0");
+      diagnostics.add(body.place, name + ": the bounds must be above 0");
     }
   }
 
   void read_items(const Value& body, const std::string& name, Distribution& made) {
-    const std::size_t before = complaints.messages().size();
-    ItemKeys keys(body, made.kind_ == Kind::Sequence, name, complaints);
-    if (complaints.messages().size() != before) return;
+    const std::size_t before = diagnostics.messages().size();
+    ItemKeys keys(body, made.kind_ == Kind::Sequence, name, diagnostics);
+    if (diagnostics.messages().size() != before) return;
     for (std::size_t i = 0; i < keys.items.list.size(); ++i) {
       made.parts_.push_back(
           read(keys.items.list[i], name + "." + keys.list_key + "[" + std::to_string(i) + "]"));
@@ -204,19 +204,19 @@ struct Distribution::Reader {
     }
     made.weights_ = std::move(keys.weights);
     if (made.kind_ == Kind::Choice) {
-      check_weights(made.weights_, made.parts_.size(), body, name, complaints);
+      check_weights(made.weights_, made.parts_.size(), body, name, diagnostics);
     }
   }
 
   void read_axes(const Value& body, const std::string& name, Distribution& made) {
     Value axes = Value::make_list();
-    ParamReader reader(body, name, complaints);
+    ParamReader reader(body, name, diagnostics);
     reader.param("distributions", axes, {"One per axis."});
     reader.finish();
     if (width != 3 || axes.kind != Value::Kind::List || axes.list.size() != 3) {
-      complaints.add(body.place,
-                     width == 3 ? name + ".distributions: expected a list of three, one per axis"
-                                : name + ": only a vector can be combined from several");
+      diagnostics.add(body.place,
+                      width == 3 ? name + ".distributions: expected a list of three, one per axis"
+                                 : name + ": only a vector can be combined from several");
       return;
     }
     add_axes(axes, name + ".distributions", made);
@@ -226,7 +226,7 @@ struct Distribution::Reader {
     made.width_ = 3;
     for (std::size_t i = 0; i < 3; ++i) {
       made.parts_.push_back(
-          Reader{doc, 1, complaints}.read(axes.list[i], name + "[" + std::to_string(i) + "]"));
+          Reader{doc, 1, diagnostics}.read(axes.list[i], name + "[" + std::to_string(i) + "]"));
     }
   }
 };
@@ -254,18 +254,18 @@ Distribution Distribution::between(const Vec3& lower, const Vec3& upper) {
 
 std::optional<Distribution> Distribution::read(const Value& value, const std::string& name,
                                                const ParamDoc& doc, int width,
-                                               Complaints& complaints) {
-  const std::size_t before = complaints.messages().size();
-  Distribution made = Reader{doc, width, complaints}.read(value, name);
-  if (complaints.messages().size() != before) return std::nullopt;
+                                               Diagnostics& diagnostics) {
+  const std::size_t before = diagnostics.messages().size();
+  Distribution made = Reader{doc, width, diagnostics}.read(value, name);
+  if (diagnostics.messages().size() != before) return std::nullopt;
   return made;
 }
 
 Distribution Distribution::parse(const Value& value, const std::string& name, const ParamDoc& doc,
                                  int width) {
-  Complaints complaints;
-  std::optional<Distribution> made = read(value, name, doc, width, complaints);
-  complaints.raise();
+  Diagnostics diagnostics;
+  std::optional<Distribution> made = read(value, name, doc, width, diagnostics);
+  diagnostics.raise();
   return *std::move(made);
 }
 
@@ -312,9 +312,9 @@ TextDistribution::TextDistribution(const std::vector<std::string>& choices)
 }
 
 std::optional<TextDistribution> TextDistribution::read(const Value& value, const std::string& name,
-                                                       Complaints& complaints) {
-  const std::size_t before = complaints.messages().size();
-  const auto is_bad = [&] { return complaints.messages().size() != before; };
+                                                       Diagnostics& diagnostics) {
+  const std::size_t before = diagnostics.messages().size();
+  const auto is_bad = [&] { return diagnostics.messages().size() != before; };
   TextDistribution made;
   Value items = value;
   const auto* entry = only_entry(value);
@@ -324,21 +324,21 @@ std::optional<TextDistribution> TextDistribution::read(const Value& value, const
     items.list.push_back(value);
   } else if (word == "choice" || word == "sequence") {
     made.is_sequence_ = word == "sequence";
-    ItemKeys keys(entry->second, made.is_sequence_, name + "." + std::string(word), complaints);
+    ItemKeys keys(entry->second, made.is_sequence_, name + "." + std::string(word), diagnostics);
     items = std::move(keys.items);
     made.weights_ = std::move(keys.weights);
     if (!made.is_sequence_ && !is_bad()) {
-      check_weights(made.weights_, items.list.size(), entry->second, name + ".choice", complaints);
+      check_weights(made.weights_, items.list.size(), entry->second, name + ".choice", diagnostics);
     }
   } else if (value.kind != Value::Kind::List && value.kind != Value::Kind::Null) {
-    complaints.add(value.place, name +
-                                    ": expected a text, a list of texts, 'choice' or "
-                                    "'sequence', found " +
-                                    value.describe());
+    diagnostics.add(value.place, name +
+                                     ": expected a text, a list of texts, 'choice' or "
+                                     "'sequence', found " +
+                                     value.describe());
   }
   if (is_bad()) return std::nullopt;
   if (items.kind == Value::Kind::List) {
-    ParamReader(mapping(name.c_str(), items), "", complaints)
+    ParamReader(mapping(name.c_str(), items), "", diagnostics)
         .param(name.c_str(), made.texts_, {"Texts."});
   }
   if (is_bad()) return std::nullopt;
@@ -348,9 +348,9 @@ std::optional<TextDistribution> TextDistribution::read(const Value& value, const
 }
 
 TextDistribution TextDistribution::parse(const Value& value, const std::string& name) {
-  Complaints complaints;
-  std::optional<TextDistribution> made = read(value, name, complaints);
-  complaints.raise();
+  Diagnostics diagnostics;
+  std::optional<TextDistribution> made = read(value, name, diagnostics);
+  diagnostics.raise();
   return *std::move(made);
 }
 

@@ -88,7 +88,7 @@ struct ParamReader::State {
     std::string path;
   };
 
-  Complaints& complaints;
+  Diagnostics& diagnostics;
   std::vector<Scope> scopes;
   std::vector<List> lists;
 
@@ -105,8 +105,8 @@ struct ParamReader::State {
 
   void complain(const Value& found, const std::string& name, const std::string& expected,
                 const std::string& hint = "") {
-    complaints.add(found.place, (name.empty() ? "" : name + ": ") + "expected " + expected +
-                                    ", found " + found.describe() + hint);
+    diagnostics.add(found.place, (name.empty() ? "" : name + ": ") + "expected " + expected +
+                                     ", found " + found.describe() + hint);
   }
 
   /// The value as a mapping to read from; null after a complaint.
@@ -126,7 +126,7 @@ struct ParamReader::State {
       message += "unknown key '" + key + "'";
       const std::string meant = nearest_name(key, scope.known);
       if (!meant.empty()) message += ", did you mean '" + meant + "'?";
-      complaints.add(value.key_place, message);
+      diagnostics.add(value.key_place, message);
     }
   }
 
@@ -169,8 +169,8 @@ struct ParamReader::State {
   }
 };
 
-ParamReader::ParamReader(const Value& map, std::string path, Complaints& complaints)
-    : state_(new State{complaints, {}, {}}) {
+ParamReader::ParamReader(const Value& map, std::string path, Diagnostics& diagnostics)
+    : state_(new State{diagnostics, {}, {}}) {
   const Value* top = map.kind == Value::Kind::Null ? nullptr : state_->as_map(&map, path);
   state_->scopes.push_back({top, std::move(path), {}});
 }
@@ -231,9 +231,9 @@ void ParamReader::param(const char* key, Range& field, const ParamDoc& doc) {
       field = {(*ends)[0], (*ends)[1]};
       return;
     }
-    state_->complaints.add(value->place, name + ": expected [lo, hi] with lo <= hi, found [" +
-                                             value->list[0].scalar + ", " + value->list[1].scalar +
-                                             "]");
+    state_->diagnostics.add(value->place, name + ": expected [lo, hi] with lo <= hi, found [" +
+                                              value->list[0].scalar + ", " + value->list[1].scalar +
+                                              "]");
     return;
   }
   const std::optional<double> number = read_number(*value);
@@ -316,7 +316,7 @@ void ParamReader::param(const char* key, std::optional<std::string>& field, cons
 void ParamReader::param(const char* key, Distribution& field, const ParamDoc& doc, int width) {
   const Value* value = state_->take(key);
   if (!value) return;
-  auto read = Distribution::read(*value, state_->full_name(key), doc, width, state_->complaints);
+  auto read = Distribution::read(*value, state_->full_name(key), doc, width, state_->diagnostics);
   if (read) field = *std::move(read);
 }
 
@@ -326,13 +326,13 @@ void ParamReader::param(const char* key, std::optional<Distribution>& field, con
   if (!value) return;
   field.reset();
   if (value->kind == Value::Kind::Null) return;
-  field = Distribution::read(*value, state_->full_name(key), doc, width, state_->complaints);
+  field = Distribution::read(*value, state_->full_name(key), doc, width, state_->diagnostics);
 }
 
 void ParamReader::param(const char* key, TextDistribution& field, const ParamDoc&) {
   const Value* value = state_->take(key);
   if (!value) return;
-  auto read = TextDistribution::read(*value, state_->full_name(key), state_->complaints);
+  auto read = TextDistribution::read(*value, state_->full_name(key), state_->diagnostics);
   if (read) field = *std::move(read);
 }
 

@@ -107,16 +107,16 @@ struct FaultyHost {
                     [](LogLevel, std::string_view) {}};
   HostServices host{registry, {}, [](LogLevel, std::string_view) {}};
 
-  std::unique_ptr<Writer> make(const std::string& type, Complaints& complaints) {
+  std::unique_ptr<Writer> make(const std::string& type, Diagnostics& diagnostics) {
     Value map = Value::make_map();
     map.set("type", Value::text(type));
-    return registry.make<Writer>(map, "writers[0]", {}, complaints, host);
+    return registry.make<Writer>(map, "writers[0]", {}, diagnostics, host);
   }
   std::string make_error(const std::string& type) {
     return error_of([&] {
-      Complaints complaints;
-      make(type, complaints);
-      complaints.raise();
+      Diagnostics diagnostics;
+      make(type, diagnostics);
+      diagnostics.raise();
     });
   }
 };
@@ -349,13 +349,13 @@ TEST_CASE("a library may register types that it learns at run time", "[plugins]"
   Value map = Value::make_map();
   map.set("type", Value::text("script_b"));
   map.set("breadth", Value::integer(7));
-  Complaints complaints;
-  const auto writer = registry.make<Writer>(map, "writers[0]", {}, complaints, host);
+  Diagnostics diagnostics;
+  const auto writer = registry.make<Writer>(map, "writers[0]", {}, diagnostics, host);
   REQUIRE(writer);
   CHECK(writer->needs() == NameSet{"breadth7"});
   map.set("breadth", Value::integer(3));
-  CHECK_FALSE(registry.make<Writer>(map, "writers[0]", {}, complaints, host));
-  CHECK(complaints.messages() ==
+  CHECK_FALSE(registry.make<Writer>(map, "writers[0]", {}, diagnostics, host));
+  CHECK(diagnostics.messages() ==
         std::vector<std::string>{"writers[0].breadth: expected an integer in [4, 9], found '3'"});
 }
 
@@ -400,15 +400,15 @@ TEST_CASE("faults of single components name the component", "[plugins]") {
         "writer 'returns_null': its factory returned nothing (" + file + ")");
   CHECK(faulty.make_error("not_a_writer") ==
         "writer 'not_a_writer': its factory made something that is no writer (" + file + ")");
-  Complaints complaints;
-  const std::unique_ptr<Writer> writer = faulty.make("throws_in_call", complaints);
+  Diagnostics diagnostics;
+  const std::unique_ptr<Writer> writer = faulty.make("throws_in_call", diagnostics);
   REQUIRE(writer);
   CHECK(error_of([&] {
           call_component("writer 'throws_in_call'", [&] { return writer->needs(); });
         }) == "writer 'throws_in_call': unexpected error: do not ask");
-  CHECK(faulty.make("works", complaints));
-  CHECK(faulty.make("quiet", complaints));
-  CHECK(complaints.is_empty());
+  CHECK(faulty.make("works", diagnostics));
+  CHECK(faulty.make("quiet", diagnostics));
+  CHECK(diagnostics.is_empty());
 }
 
 TEST_CASE("a folder that everybody may write to is refused unless allowed", "[plugins]") {

@@ -57,5 +57,5 @@ DIORAMA_PLUGIN("faulty_components", "1.0.0", "MIT") {
        nullptr,
        [](const void*) { return std::vector<ParamSpec>(); },
        [](const void*, const Value&, const std::string&, std::span<const std::string_view>,
-          Complaints&, Host&) { return std::unique_ptr<Component>(); }});
+          Diagnostics&, Host&) { return std::unique_ptr<Component>(); }});
 }

@@ -21,9 +21,9 @@ namespace {
 using namespace diorama;
 
 void plan(const Value& value) {
-  Complaints complaints;
-  const Job job = read_job(value, complaints);
-  if (!complaints.is_empty()) return;
+  Diagnostics diagnostics;
+  const Job job = read_job(value, diagnostics);
+  if (!diagnostics.is_empty()) return;
   std::size_t objects = 0;
   for (const ObjectGroup& group : job.objects) objects += std::size_t(group.count);
   if (objects > 1000) return;

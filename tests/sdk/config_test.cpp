@@ -7,9 +7,9 @@
 using namespace diorama;
 
 TEST_CASE("A place reads as file, line and column", "[config]") {
-  CHECK(Place{"a.yaml", 31, 7}.text() == "a.yaml:31:7");
-  CHECK(Place{"--set", 0, 0}.text() == "--set");
-  CHECK(Place{}.text().empty());
+  CHECK(SourceLocation{"a.yaml", 31, 7}.text() == "a.yaml:31:7");
+  CHECK(SourceLocation{"--set", 0, 0}.text() == "--set");
+  CHECK(SourceLocation{}.text().empty());
 }
 
 TEST_CASE("A map keeps its order and replaces in place", "[config]") {
@@ -59,10 +59,10 @@ TEST_CASE("The nearest name is the one that was meant, or none", "[config]") {
   CHECK(nearest_name("a", {}).empty());
 }
 
-TEST_CASE("Complaints are reported together", "[config]") {
-  Complaints complaints;
-  complaints.raise();
-  complaints.add({"a.yaml", 3, 1}, "one");
-  complaints.add({}, "two");
-  CHECK(test::error_text([&] { complaints.raise(); }) == "a.yaml:3:1: one\ntwo");
+TEST_CASE("Diagnostics are reported together", "[config]") {
+  Diagnostics diagnostics;
+  diagnostics.raise();
+  diagnostics.add({"a.yaml", 3, 1}, "one");
+  diagnostics.add({}, "two");
+  CHECK(test::error_text([&] { diagnostics.raise(); }) == "a.yaml:3:1: one\ntwo");
 }

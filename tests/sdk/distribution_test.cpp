@@ -233,12 +233,12 @@ TEST_CASE("Mistakes in distributions are collected with the others, with their p
       "size: {uniform: {lower: 1, upper: 9}}\nplace: [0, 1]\nlength: null\nspeed: null\n"
       "sky: {shuffle: [a]}\nsise: 1\n",
       "job.yaml");
-  Complaints complaints;
+  Diagnostics diagnostics;
   Drawn drawn;
-  ParamReader reader(job, "randomizers[2]", complaints);
+  ParamReader reader(job, "randomizers[2]", diagnostics);
   drawn.visit(reader);
   reader.finish();
-  CHECK(complaints.messages() ==
+  CHECK(diagnostics.messages() ==
         std::vector<std::string>{
             "job.yaml:1:35: randomizers[2].size.uniform.upper: expected a number in [0.5, 4], "
             "found '9'",

@@ -80,29 +80,29 @@ Value entry(const char* key, Value value) {
 
 struct Outcome {
   Everything params;
-  std::vector<std::string> complaints;
+  std::vector<std::string> diagnostics;
 };
 
 Outcome read(const Value& map, std::span<const std::string_view> also_known = {}) {
   Outcome outcome;
-  Complaints complaints;
-  ParamReader reader(map, "renderer", complaints);
+  Diagnostics diagnostics;
+  ParamReader reader(map, "renderer", diagnostics);
   outcome.params.visit(reader);
   reader.finish(also_known);
-  outcome.complaints = complaints.messages();
+  outcome.diagnostics = diagnostics.messages();
   return outcome;
 }
 
 Everything good(const char* key, Value value) {
   const Outcome outcome = read(entry(key, std::move(value)));
-  CHECK(outcome.complaints == std::vector<std::string>{});
+  CHECK(outcome.diagnostics == std::vector<std::string>{});
   return outcome.params;
 }
 
 std::string bad(const char* key, Value value) {
   const Outcome outcome = read(entry(key, std::move(value)));
-  if (outcome.complaints.size() != 1) return std::to_string(outcome.complaints.size());
-  return outcome.complaints[0];
+  if (outcome.diagnostics.size() != 1) return std::to_string(outcome.diagnostics.size());
+  return outcome.diagnostics[0];
 }
 
 }  // namespace
@@ -110,7 +110,7 @@ std::string bad(const char* key, Value value) {
 TEST_CASE("Absent keys keep their defaults", "[params]") {
   for (const Value& map : {Value(), Value::make_map()}) {
     const Outcome outcome = read(map);
-    CHECK(outcome.complaints.empty());
+    CHECK(outcome.diagnostics.empty());
     CHECK(outcome.params.samples == 16);
     CHECK(outcome.params.items.size() == 1);
     CHECK(outcome.params.items[0].count == 9);
@@ -240,7 +240,7 @@ TEST_CASE("Unknown keys are refused where they stand, with a guess", "[params]")
         "job.yaml:31:3: renderer: unknown key 'sampels', did you mean 'samples'?");
   CHECK(bad("zzz", plain("1")) == "job.yaml:31:3: renderer: unknown key 'zzz'");
   const std::string_view also_known[] = {"type"};
-  CHECK(read(entry("type", plain("embree")), also_known).complaints.empty());
+  CHECK(read(entry("type", plain("embree")), also_known).diagnostics.empty());
 }
 
 TEST_CASE("Groups nest in names, unknown keys and types", "[params]") {
@@ -270,13 +270,13 @@ TEST_CASE("Lists of mappings replace the default items", "[params]") {
         "job.yaml:31:12: renderer.items: expected a list of mappings, found nothing");
 }
 
-TEST_CASE("All complaints of a mapping are collected", "[params]") {
+TEST_CASE("All diagnostics of a mapping are collected", "[params]") {
   Value map = Value::make_map();
   map.set("samples", plain("x"));
   map.set("on", plain("maybe"));
   map.set("nonsense", plain("1"));
-  CHECK(read(map).complaints.size() == 3);
-  CHECK(read(plain("7")).complaints ==
+  CHECK(read(map).diagnostics.size() == 3);
+  CHECK(read(plain("7")).diagnostics ==
         std::vector<std::string>{"renderer: expected a mapping, found '7'"});
 }
 
@@ -314,7 +314,7 @@ TEST_CASE("The listed defaults read back as the defaults", "[params]") {
   Value map = Value::make_map();
   for (const ParamSpec& spec : lister.take()) map.set(spec.key, spec.default_value);
   const Outcome outcome = read(map);
-  CHECK(outcome.complaints.empty());
+  CHECK(outcome.diagnostics.empty());
   CHECK(outcome.params.height_m == params.height_m);
   CHECK(outcome.params.items.size() == 1);
   CHECK(outcome.params.items[0].width_m == 9.0);

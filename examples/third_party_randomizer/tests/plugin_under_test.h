@@ -65,10 +65,10 @@ class PluginUnderTest final : private diorama::Registrar {
   std::unique_ptr<T> make(const diorama::Value& params = diorama::Value::make_map()) {
     for (const diorama::ComponentInfo& info : components_) {
       if (info.kind != T::kKind) continue;
-      diorama::Complaints complaints;
+      diorama::Diagnostics diagnostics;
       std::unique_ptr<diorama::Component> made =
-          info.make(info.context, params, info.type, {}, complaints, host_);
-      complaints.raise();
+          info.make(info.context, params, info.type, {}, diagnostics, host_);
+      diagnostics.raise();
       return std::unique_ptr<T>(dynamic_cast<T*>(made.release()));
     }
     fail("it provides no component of this kind");

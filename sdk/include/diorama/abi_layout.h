@@ -48,10 +48,10 @@ inline constexpr std::uint64_t kLayout =
               PixelBox, Mesh, Texture, TextureInput, Material, Light, Camera, Collider, RigidBody,
               NodeId, Joint, Animation, Node, Scene, LabelledInstance, CoverageMask, Visibility,
               Velocity, Instance, JointState, JointTarget, CompoundJoint, Frame, ClipFrame, Capture,
-              Place, Value, Complaints, Range, ParamDoc, ParamSpec, ParamReader, ParamLister,
-              Distribution, TextDistribution, Component, Host, ImageView, Loader, PhysicsReport,
-              PhysicsBackend, RandomizeContext, Randomizer, RenderRequest, RenderReport, Renderer,
-              Annotator, DatasetInfo, DatasetFiles, CaptureFiles, Writer, Finding, ReadLog,
-              StoredInfo, StoredCapture, StoredDataset, Reader, Error>();
+              SourceLocation, Value, Diagnostics, Range, ParamDoc, ParamSpec, ParamReader,
+              ParamLister, Distribution, TextDistribution, Component, Host, ImageView, Loader,
+              PhysicsReport, PhysicsBackend, RandomizeContext, Randomizer, RenderRequest,
+              RenderReport, Renderer, Annotator, DatasetInfo, DatasetFiles, CaptureFiles, Writer,
+              Finding, ReadLog, StoredInfo, StoredCapture, StoredDataset, Reader, Error>();
 
 }  // namespace diorama::abi

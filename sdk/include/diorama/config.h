@@ -13,7 +13,7 @@
 namespace diorama {
 
 /// Where a value stands. `line` and `column` count from 1; 0 means "not in a file".
-struct Place {
+struct SourceLocation {
   std::string file;
   int line = 0;
   int column = 0;
@@ -31,8 +31,8 @@ struct DIORAMA_SDK_API Value {
   bool is_quoted = false;   ///< A quoted scalar is text whatever it looks like.
   std::vector<Value> list;  ///< Kind::List.
   std::vector<std::pair<std::string, Value>> map;  ///< Kind::Map, in file order, keys unique.
-  Place place;
-  Place key_place;  ///< Of the key, when the value stands in a map.
+  SourceLocation place;
+  SourceLocation key_place;  ///< Of the key, when the value stands in a map.
 
   // Out of line, where the list and the map of values are complete types.
   Value();
@@ -59,10 +59,10 @@ struct DIORAMA_SDK_API Value {
   std::string describe() const;
 };
 
-/// Collects the complaints of one document, so that all of them are reported in one go.
-class DIORAMA_SDK_API Complaints {
+/// Collects the diagnostics of one document, so that all of them are reported in one go.
+class DIORAMA_SDK_API Diagnostics {
  public:
-  void add(const Place& place, std::string_view message);
+  void add(const SourceLocation& place, std::string_view message);
   bool is_empty() const { return messages_.empty(); }
   const std::vector<std::string>& messages() const { return messages_; }
   /// Throws Error(Config) with one complaint per line unless there are none.

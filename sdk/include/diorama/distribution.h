@@ -53,9 +53,9 @@ class DIORAMA_SDK_API Distribution {
   friend class ParamReader;
   enum class Kind : std::uint8_t { Uniform, Normal, LogUniform, Choice, Sequence, Combine };
   struct Reader;
-  /// parse() with complaints instead of an exception; nothing when there are any.
+  /// parse() with diagnostics instead of an exception; nothing when there are any.
   static std::optional<Distribution> read(const Value& value, const std::string& name,
-                                          const ParamDoc& doc, int width, Complaints& complaints);
+                                          const ParamDoc& doc, int width, Diagnostics& diagnostics);
   double draw_axis(int axis, Rng& rng) const;
 
   Kind kind_ = Kind::Uniform;
@@ -84,9 +84,9 @@ class DIORAMA_SDK_API TextDistribution {
 
  private:
   friend class ParamReader;
-  /// parse() with complaints instead of an exception; nothing when there are any.
+  /// parse() with diagnostics instead of an exception; nothing when there are any.
   static std::optional<TextDistribution> read(const Value& value, const std::string& name,
-                                              Complaints& complaints);
+                                              Diagnostics& diagnostics);
   std::vector<std::string> texts_;
   std::vector<double> weights_;  ///< One per text, unless it is a sequence.
   bool is_sequence_ = false;

@@ -141,12 +141,12 @@ struct ParamSpec {
   std::vector<ParamSpec> children;  ///< Of a group, of an item of a list, or of a variant of Any.
 };
 
-/// Reads a mapping into fields. Complaints: unknown keys (with the nearest known one), wrong types,
-/// values out of range. Keys in `also_known` are the caller's own.
+/// Reads a mapping into fields. Diagnostics: unknown keys (with the nearest known one), wrong
+/// types, values out of range. Keys in `also_known` are the caller's own.
 class DIORAMA_SDK_API ParamReader final : public ParamVisitor {
  public:
   /// `path` is put in front of keys in messages: "renderer". All arguments must outlive the reader.
-  ParamReader(const Value& map, std::string path, Complaints& complaints);
+  ParamReader(const Value& map, std::string path, Diagnostics& diagnostics);
   ~ParamReader() override;
   /// Call after visiting: complains about keys that nobody read.
   void finish(std::span<const std::string_view> also_known = {});

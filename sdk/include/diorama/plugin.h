@@ -29,12 +29,12 @@ struct ComponentInfo {
   Listing listing;
   const void* context;  ///< Handed to both functions: what tells types apart that share them.
   std::vector<ParamSpec> (*describe)(const void* context);
-  /// Reads `params` (keys in `also_known` are the host's); complaints are collected, and no
+  /// Reads `params` (keys in `also_known` are the host's); diagnostics are collected, and no
   /// component is made when there are any (null).
   std::unique_ptr<Component> (*make)(const void* context, const Value& params,
                                      const std::string& path,
                                      std::span<const std::string_view> also_known,
-                                     Complaints& complaints, Host& host);
+                                     Diagnostics& diagnostics, Host& host);
 };
 
 class DIORAMA_SDK_API Registrar {
@@ -56,14 +56,14 @@ ComponentInfo info_of(const char* type, const char* help, const Listing& listing
     return lister.take();
   };
   auto make = [](const void* about, const Value& map, const std::string& path,
-                 std::span<const std::string_view> also_known, Complaints& complaints,
+                 std::span<const std::string_view> also_known, Diagnostics& diagnostics,
                  Host& host) -> std::unique_ptr<Component> {
     auto params = MakeParams()(about);
-    const std::size_t before = complaints.messages().size();
-    ParamReader reader(map, path, complaints);
+    const std::size_t before = diagnostics.messages().size();
+    ParamReader reader(map, path, diagnostics);
     params.visit(reader);
     reader.finish(also_known);
-    if (complaints.messages().size() != before) return nullptr;
+    if (diagnostics.messages().size() != before) return nullptr;
     return std::make_unique<T>(std::move(params), host);
   };
   return {T::kKind, type, help, listing, context, describe, make};

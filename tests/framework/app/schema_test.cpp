@@ -121,9 +121,9 @@ namespace {
 std::vector<std::string> complaints_of(const std::string& key, Value value) {
   Value job = parse_yaml("environments: [{type: shapes}]\ncameras: [{type: pinhole}]", "job");
   job.set(key, std::move(value));
-  Complaints complaints;
-  read_job(job, complaints);
-  return complaints.messages();
+  Diagnostics diagnostics;
+  read_job(job, diagnostics);
+  return diagnostics.messages();
 }
 
 bool says(const std::vector<std::string>& messages, const std::string& text) {
@@ -159,12 +159,12 @@ struct Drawn {
 
 bool is_accepted(const std::string& yaml) {
   const Value job = parse_yaml(yaml, "job.yaml");
-  Complaints complaints;
+  Diagnostics diagnostics;
   Drawn drawn;
-  ParamReader reader(job, "", complaints);
+  ParamReader reader(job, "", diagnostics);
   drawn.visit(reader);
   reader.finish();
-  return complaints.messages().empty();
+  return diagnostics.messages().empty();
 }
 
 }  // namespace

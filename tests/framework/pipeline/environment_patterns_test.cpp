@@ -25,11 +25,12 @@ struct Room {
 };
 
 EnvironmentPattern path(const std::string& text, int line = 7) {
-  return {text, "randomizers[2].surfaces", Place{"job.yaml", line, 3}, true, "", LogLevel::Warning};
+  return {text, "randomizers[2].surfaces", SourceLocation{"job.yaml", line, 3}, true,
+          "",   LogLevel::Warning};
 }
 
 EnvironmentPattern rule(const std::string& text, LogLevel level = LogLevel::Warning) {
-  return {text,  "environment.working_area", Place{"job.yaml", 4, 1},
+  return {text,  "environment.working_area", SourceLocation{"job.yaml", 4, 1},
           false, "the origin is its middle", level};
 }
 

@@ -8,7 +8,7 @@
 using namespace diorama;
 using namespace diorama::test;
 
-TEST_CASE("A right job is read without complaints", "[job]") {
+TEST_CASE("A right job is read without diagnostics", "[job]") {
   const Job job = job_from(good_job());
   CHECK(job.seed == 5);
   CHECK(job.total_captures == 7);
@@ -36,7 +36,7 @@ TEST_CASE("Without a timeline a visit does what the tutorial does", "[job]") {
   CHECK(job.timeline[3].name == "dropped");
 }
 
-TEST_CASE("All complaints about a job come in one go, with places and near names", "[job]") {
+TEST_CASE("All diagnostics about a job come in one go, with places and near names", "[job]") {
   std::string yaml = with(good_job(), "total_captures: 7", "total_captures: -7");
   yaml = with(yaml, "timeline:", "timelime:");
   yaml = with(yaml, "width: 64", "widht: 64");
@@ -154,26 +154,26 @@ TEST_CASE("The resolved job has every default and means the same", "[job]") {
 }
 
 TEST_CASE("Writers stay below the output folder, and out of its bookkeeping", "[job]") {
-  const auto complaints = [](const std::string& writer) {
+  const auto diagnostics = [](const std::string& writer) {
     return complaints_about(with(good_job(), "name: basic", writer));
   };
-  CHECK(complaints("name: ../../x") ==
+  CHECK(diagnostics("name: ../../x") ==
         "job.yaml:12:37: writers[0].name: the folder '../../x' is not below the output folder "
         "'out'; name a folder below it, or choose one that holds both by '--output'\n");
-  CHECK_THAT(complaints("name: basic, output_dir: /etc/x"),
+  CHECK_THAT(diagnostics("name: basic, output_dir: /etc/x"),
              ContainsSubstring("job.yaml:12:56: writers[0].output_dir: the folder '/etc/x' is "
                                "not below the output folder 'out'"));
   for (const char* folder : {"..", "a/../..", "./../out2", ".diorama", "a/.diorama-stage/b",
                              "../out/.diorama/journal"}) {
     INFO(folder);
-    CHECK_THAT(complaints("name: basic, output_dir: " + std::string(folder)),
+    CHECK_THAT(diagnostics("name: basic, output_dir: " + std::string(folder)),
                ContainsSubstring("is not below the output folder"));
   }
   for (const char* folder : {"a", "a/b/", "a/../b", "../out/c", "..."}) {
     INFO(folder);
-    CHECK(complaints("name: basic, output_dir: " + std::string(folder)).empty());
+    CHECK(diagnostics("name: basic, output_dir: " + std::string(folder)).empty());
   }
-  CHECK(complaints("name: ../../x, output_dir: inside").empty());
+  CHECK(diagnostics("name: ../../x, output_dir: inside").empty());
   CHECK_THAT(complaints_about(with(good_job(), "{folder: out}", "{folder: out, records: ../y}")),
              ContainsSubstring("job.yaml:13:32: output.records: the folder '../y' is not below"));
   CHECK(complaints_about(with(with(good_job(), "{folder: out}", "{folder: /data}"), "name: basic",

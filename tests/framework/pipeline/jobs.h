@@ -28,20 +28,20 @@ output: {folder: out}
 
 inline Value job_value(const std::string& yaml) { return parse_yaml(yaml, "job.yaml"); }
 
-/// Throws Error(Config) with all complaints.
+/// Throws Error(Config) with all diagnostics.
 inline Job job_from(const std::string& yaml) {
-  Complaints complaints;
-  Job job = read_job(job_value(yaml), complaints);
-  complaints.raise();
+  Diagnostics diagnostics;
+  Job job = read_job(job_value(yaml), diagnostics);
+  diagnostics.raise();
   return job;
 }
 
-/// All complaints, one per line.
+/// All diagnostics, one per line.
 inline std::string complaints_about(const std::string& yaml) {
-  Complaints complaints;
-  read_job(job_value(yaml), complaints);
+  Diagnostics diagnostics;
+  read_job(job_value(yaml), diagnostics);
   std::string text;
-  for (const std::string& message : complaints.messages()) text += message + "\n";
+  for (const std::string& message : diagnostics.messages()) text += message + "\n";
   return text;
 }
 

@@ -26,7 +26,7 @@ std::optional<std::vector<ParamSpec>> describe(ComponentKind, std::string_view) 
 }
 
 struct Checked {
-  std::string complaints;
+  std::string diagnostics;
   std::vector<EnvironmentPattern> open;
 };
 
@@ -37,31 +37,31 @@ Checked check(const std::string& keys) {
   const std::vector<std::vector<std::string>> assets{{"011_banana.usd", "024_bowl.usd"},
                                                      {"shape:cube"}};
   const CapturePlan plan = plan_captures(job, {{"room", 0}}, assets);
-  Complaints complaints;
+  Diagnostics diagnostics;
   Checked checked;
-  checked.open = check_patterns(job, plan, describe, complaints);
-  for (const std::string& message : complaints.messages()) checked.complaints += message + "\n";
+  checked.open = check_patterns(job, plan, describe, diagnostics);
+  for (const std::string& message : diagnostics.messages()) checked.diagnostics += message + "\n";
   return checked;
 }
 
 }  // namespace
 
 TEST_CASE("A pattern that fits no node is told with its place and the nearest path", "[patterns]") {
-  CHECK_THAT(check(R"(nodes: "/Asset/*")").complaints,
+  CHECK_THAT(check(R"(nodes: "/Asset/*")").diagnostics,
              ContainsSubstring("job.yaml:9:") &&
                  ContainsSubstring("randomizers[0].nodes: '/Asset/*' fits no node; did you mean "
                                    "'/Assets/*'?"));
-  CHECK_THAT(check(R"(nodes: "/Cameras/cm_1")").complaints,
+  CHECK_THAT(check(R"(nodes: "/Cameras/cm_1")").diagnostics,
              ContainsSubstring("did you mean '/Cameras/cam_1'?"));
-  CHECK_THAT(check(R"(targets: ["/Assets/*", "/Distrctors/*/x"])").complaints,
+  CHECK_THAT(check(R"(targets: ["/Assets/*", "/Distrctors/*/x"])").diagnostics,
              ContainsSubstring("randomizers[0].targets: '/Distrctors/*/x' fits no node; did you "
                                "mean '/Distractors/*/x'?"));
   // Far from everything: a path all the same.
-  CHECK_THAT(check(R"(nodes: "/Quux/*")").complaints,
+  CHECK_THAT(check(R"(nodes: "/Quux/*")").diagnostics,
              ContainsSubstring("'/Quux/*' fits no node; the nearest is '/"));
-  CHECK_THAT(check(R"(nodes: "/Assets/falling_0123456789")").complaints,
+  CHECK_THAT(check(R"(nodes: "/Assets/falling_0123456789")").diagnostics,
              ContainsSubstring("; the nearest is '/Assets/falling_"));
-  CHECK_THAT(check(R"(nodes: "/Assets/falling_banan")").complaints,
+  CHECK_THAT(check(R"(nodes: "/Assets/falling_banan")").diagnostics,
              ContainsSubstring("did you mean '/Assets/falling_banana'?"));
 }
 
@@ -70,17 +70,17 @@ TEST_CASE("Patterns that may fit are no complaint", "[patterns]") {
        {"/Assets/*", "/Assets", "/**", "/Assets/**", "/Assets/*/mesh/*", "/Cameras/cam_1",
         "/Assets/*banana*", "/Assets/floating_bowl", "/*/falling_*", "/Distractors/*", ""}) {
     INFO(pattern);
-    CHECK(check(std::string("nodes: \"") + pattern + "\"").complaints.empty());
+    CHECK(check(std::string("nodes: \"") + pattern + "\"").diagnostics.empty());
   }
-  CHECK(check(R"(file: "/Asset/*")").complaints.empty());
+  CHECK(check(R"(file: "/Asset/*")").diagnostics.empty());
 }
 
 TEST_CASE("Texts of the environment's rules are tried when it is there", "[patterns]") {
   const auto open_of = [](const std::string& section) {
     const Job job = job_from(good_job() + section);
     const std::vector<std::vector<std::string>> assets{{"011_banana.usd"}, {"shape:cube"}};
-    Complaints complaints;
-    return check_patterns(job, plan_captures(job, {{"room", 0}}, assets), describe, complaints);
+    Diagnostics diagnostics;
+    return check_patterns(job, plan_captures(job, {{"room", 0}}, assets), describe, diagnostics);
   };
   const auto open = open_of(
       "environment: {hide: [Lamp, 'Glass*'], hide_in_debug: [_ceiling], box_colliders: [Table], "
@@ -97,7 +97,7 @@ TEST_CASE("Texts of the environment's rules are tried when it is there", "[patte
 
 TEST_CASE("Patterns about the environment are tried when it is there", "[patterns]") {
   const Checked checked = check(R"(nodes: "/Environment/**/Tabel*")");
-  CHECK(checked.complaints.empty());
+  CHECK(checked.diagnostics.empty());
   REQUIRE(checked.open.size() == 1);
   CHECK(checked.open[0].text == "/Environment/**/Tabel*");
   CHECK(checked.open[0].key == "randomizers[0].nodes");

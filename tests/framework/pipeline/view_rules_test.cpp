@@ -239,32 +239,32 @@ TEST_CASE("Directions fall into cells of equal area within the rule's limits", "
 }
 
 TEST_CASE("Mistakes in views are named with the nearest key", "[views]") {
-  const auto complaints = [](const std::string& entry) {
+  const auto diagnostics = [](const std::string& entry) {
     return complaints_about(job_with_views(entry));
   };
-  CHECK_THAT(complaints("{truncaton: {max: 0.1}}"),
+  CHECK_THAT(diagnostics("{truncaton: {max: 0.1}}"),
              ContainsSubstring("views[0]") && ContainsSubstring("truncaton") &&
                  ContainsSubstring("did you mean 'truncation'?"));
-  CHECK_THAT(complaints("{truncation: {mx: 0.1}}"), ContainsSubstring("did you mean 'max'?"));
-  CHECK_THAT(complaints("{truncation: {max: 2}}"), ContainsSubstring("views[0].truncation.max"));
-  CHECK_THAT(complaints("{distance_m: {min: 2, max: 1}}"),
+  CHECK_THAT(diagnostics("{truncation: {mx: 0.1}}"), ContainsSubstring("did you mean 'max'?"));
+  CHECK_THAT(diagnostics("{truncation: {max: 2}}"), ContainsSubstring("views[0].truncation.max"));
+  CHECK_THAT(diagnostics("{distance_m: {min: 2, max: 1}}"),
              ContainsSubstring("views[0].distance_m: min (2) is greater than max (1)"));
-  CHECK_THAT(complaints("{on: [droped]}"),
+  CHECK_THAT(diagnostics("{on: [droped]}"),
              ContainsSubstring("unknown capture series 'droped'; did you mean 'dropped'?"));
-  CHECK_THAT(complaints("{on: [environment]}"), ContainsSubstring("unknown capture series"));
-  CHECK_THAT(complaints("{at_limit: keep}"), ContainsSubstring("keep_best"));
-  CHECK_THAT(complaints("{quotas: [{of: distance}]}"), ContainsSubstring("distance_m"));
-  CHECK_THAT(complaints("{quotas: [{of: label, labels: [a]}]}"),
+  CHECK_THAT(diagnostics("{on: [environment]}"), ContainsSubstring("unknown capture series"));
+  CHECK_THAT(diagnostics("{at_limit: keep}"), ContainsSubstring("keep_best"));
+  CHECK_THAT(diagnostics("{quotas: [{of: distance}]}"), ContainsSubstring("distance_m"));
+  CHECK_THAT(diagnostics("{quotas: [{of: label, labels: [a]}]}"),
              ContainsSubstring("views[0].quotas[0].labels: expected two or more different labels"));
-  CHECK_THAT(complaints("{quotas: [{of: distance_m, edges: [1, 2, 2]}]}"),
+  CHECK_THAT(diagnostics("{quotas: [{of: distance_m, edges: [1, 2, 2]}]}"),
              ContainsSubstring("views[0].quotas[0].edges: expected three or more rising numbers"));
-  CHECK_THAT(complaints("{quotas: [{of: distance_m, edges: [1, 2, 3], shares: [1]}]}"),
+  CHECK_THAT(diagnostics("{quotas: [{of: distance_m, edges: [1, 2, 3], shares: [1]}]}"),
              ContainsSubstring("views[0].quotas[0].shares: expected 2 numbers"));
-  CHECK_THAT(complaints("{quotas: [{of: distance_m, edges: [1, 2, 3], shares: [0.5, 1]}]}"),
+  CHECK_THAT(diagnostics("{quotas: [{of: distance_m, edges: [1, 2, 3], shares: [0.5, 1]}]}"),
              ContainsSubstring("expected whole numbers"));
-  CHECK_THAT(complaints("{name: a}, {name: a}"),
+  CHECK_THAT(diagnostics("{name: a}, {name: a}"),
              ContainsSubstring("views[1]: another entry is called 'a'"));
-  CHECK(complaints("{truncation: {max: 0.1}}").empty());
+  CHECK(diagnostics("{truncation: {max: 0.1}}").empty());
 }
 
 TEST_CASE("The resolved job has the views with all defaults and means the same", "[views]") {

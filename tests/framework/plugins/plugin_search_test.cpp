@@ -118,9 +118,9 @@ TEST_CASE("making components complains about everything that a job got wrong", "
   Registry registry({}, ignore);
   registry.add_builtin(register_ball, "1.0.0");
   HostServices host(registry, {}, ignore);
-  Complaints complaints;
+  Diagnostics diagnostics;
   const auto make = [&](const Value& map) {
-    return registry.make<Loader>(map, "environments[0]", {}, complaints, host);
+    return registry.make<Loader>(map, "environments[0]", {}, diagnostics, host);
   };
   CHECK_FALSE(make(job_entry("bal")));
   Value without = Value::make_map();
@@ -133,22 +133,22 @@ TEST_CASE("making components complains about everything that a job got wrong", "
   extra.set("radios", Value::number(2)).key_place = {"job.yaml", 9, 3};
   CHECK_FALSE(make(extra));
   CHECK_FALSE(make(job_entry("submarine")));
-  REQUIRE(complaints.messages().size() == 5);
-  CHECK(complaints.messages()[4] ==
+  REQUIRE(diagnostics.messages().size() == 5);
+  CHECK(diagnostics.messages()[4] ==
         "job.yaml:5:9: environments[0]: unknown loader 'submarine'. There is: ball");
-  CHECK(complaints.messages()[0] ==
+  CHECK(diagnostics.messages()[0] ==
         "job.yaml:5:9: environments[0]: unknown loader 'bal', did you mean 'ball'? There is: ball");
-  CHECK(complaints.messages()[1] ==
+  CHECK(diagnostics.messages()[1] ==
         "job.yaml:7:3: environments[0]: expected the key 'type' with one of: ball");
   CHECK(
-      complaints.messages()[2] ==
+      diagnostics.messages()[2] ==
       "job.yaml:8:3: environments[0]: expected a mapping that names a loader with the key 'type', "
       "found the text 'ball'");
-  CHECK(complaints.messages()[3].starts_with("job.yaml:9:3: "));
-  CHECK(complaints.messages()[3].find("radius") != std::string::npos);
+  CHECK(diagnostics.messages()[3].starts_with("job.yaml:9:3: "));
+  CHECK(diagnostics.messages()[3].find("radius") != std::string::npos);
   const Value good = job_entry("ball");
   CHECK(make(good));
-  CHECK(complaints.messages().size() == 5);
+  CHECK(diagnostics.messages().size() == 5);
 }
 
 TEST_CASE("the bundled plugins are found from the program's place", "[plugins]") {

@@ -14,11 +14,11 @@ using diorama::test::complaints_about;
 namespace {
 
 Job native_job(const std::string& yaml) {
-  Complaints complaints;
+  Diagnostics diagnostics;
   const ReplicatorTranslation translation =
-      translate_replicator_job(parse_yaml(yaml, "job.yaml"), complaints);
-  Job job = read_job(translation.job, complaints);
-  complaints.raise();
+      translate_replicator_job(parse_yaml(yaml, "job.yaml"), diagnostics);
+  Job job = read_job(translation.job, diagnostics);
+  diagnostics.raise();
   return job;
 }
 
@@ -99,15 +99,15 @@ debug_mode: false
 }
 
 TEST_CASE("Keys that the reference drops work", "[replicator]") {
-  Complaints complaints;
+  Diagnostics diagnostics;
   const auto translation = translate_replicator_job(parse_yaml(R"(
 capture: {total_captures: 1, num_floating_captures_per_env: 1, num_cameras: 1,
           camera_look_at_target_offset: 0.3, camera_distance_to_target_range: [0.75, 2]}
 distractors: {shape_distractors: {num: 4, types: [cone]}}
 )",
                                                                "job.yaml"),
-                                                    complaints);
-  REQUIRE(complaints.is_empty());
+                                                    diagnostics);
+  REQUIRE(diagnostics.is_empty());
   CHECK_THAT(text_of(translation.job), ContainsSubstring(R"("shapes": ["cone"])"));
   CHECK_THAT(text_of(translation.job), ContainsSubstring(R"("look_at_offset": [-0.3, 0.3])"));
   CHECK_THAT(text_of(translation.job), ContainsSubstring(R"("distance": [0.75, 2])"));
@@ -115,10 +115,10 @@ distractors: {shape_distractors: {num: 4, types: [cone]}}
 
 TEST_CASE("Both spellings of the shapes are read, the program's own wins", "[replicator]") {
   const auto shapes = [](const char* keys) {
-    Complaints complaints;
+    Diagnostics diagnostics;
     const auto translation = translate_replicator_job(
         parse_yaml(std::string("distractors: {shape_distractors: {num: 1, ") + keys + "}}", "j"),
-        complaints);
+        diagnostics);
     return text_of(*translation.job.find("objects"));
   };
   CHECK_THAT(shapes("shape_types: [cube]"), ContainsSubstring(R"("shapes": ["cube"])"));
@@ -158,7 +158,7 @@ TEST_CASE("JSON jobs mean the same, tabs and escapes included", "[replicator]") 
 }
 
 TEST_CASE("Keys without effect are named", "[replicator]") {
-  Complaints complaints;
+  Diagnostics diagnostics;
   const auto translation = translate_replicator_job(parse_yaml(R"(
 capture: {disable_render_products: true}
 physics: {gpu_collision_stack_size: 314572800, gpu_found_lost_pairs_capacity: 1,
@@ -167,8 +167,8 @@ physics: {gpu_collision_stack_size: 314572800, gpu_found_lost_pairs_capacity: 1,
   gpu_temp_buffer_capacity: 7}
 )",
                                                                "job.yaml"),
-                                                    complaints);
-  CHECK(complaints.is_empty());
+                                                    diagnostics);
+  CHECK(diagnostics.is_empty());
   CHECK(translation.without_effect.size() == 9);
 }
 
@@ -219,7 +219,7 @@ writers: [{kwargs: {}}]
   CHECK_THAT(text, ContainsSubstring("writers[0]: 'type' is missing"));
 }
 
-TEST_CASE("Empty environments and counts that lead nowhere are complaints", "[replicator]") {
+TEST_CASE("Empty environments and counts that lead nowhere are diagnostics", "[replicator]") {
   CHECK_THAT(complaints_about("environments: {folders: [], files: []}"),
              ContainsSubstring("environments: the list is empty"));
   CHECK_THAT(complaints_about("capture: {total_captures: 5, num_cameras: 1}"),

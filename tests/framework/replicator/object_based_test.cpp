@@ -20,12 +20,12 @@ struct Translated {
 };
 
 Translated translated(const std::string& yaml) {
-  Complaints complaints;
+  Diagnostics diagnostics;
   ReplicatorTranslation translation =
-      translate_replicator_job(parse_yaml(yaml, "job.yaml"), complaints);
+      translate_replicator_job(parse_yaml(yaml, "job.yaml"), diagnostics);
   Translated result;
-  result.job = read_job(translation.job, complaints);
-  complaints.raise();
+  result.job = read_job(translation.job, diagnostics);
+  diagnostics.raise();
   result.native = std::move(translation.job);
   for (const std::string& key : translation.without_effect) result.without_effect += key + "\n";
   return result;

@@ -11,12 +11,12 @@ namespace diorama::test {
 
 /// What is wrong with a file of the Replicator dialect, a line each.
 inline std::string complaints_about(const std::string& yaml) {
-  Complaints complaints;
+  Diagnostics diagnostics;
   const ReplicatorTranslation translation =
-      translate_replicator_job(parse_yaml(yaml, "job.yaml"), complaints);
-  if (complaints.is_empty()) read_job(translation.job, complaints);
+      translate_replicator_job(parse_yaml(yaml, "job.yaml"), diagnostics);
+  if (diagnostics.is_empty()) read_job(translation.job, diagnostics);
   std::string text;
-  for (const std::string& message : complaints.messages()) text += message + "\n";
+  for (const std::string& message : diagnostics.messages()) text += message + "\n";
   return text;
 }
 

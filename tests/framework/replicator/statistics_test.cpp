@@ -31,10 +31,10 @@ Job tutorial_job() {
   Value value = parse_yaml(builtin_replicator_job(), "built-in");
   value.find("labeled_assets")->find("auto_label")->set("num", Value::integer(1));
   value.find("labeled_assets")->set("manual_label", Value::make_list());
-  Complaints complaints;
-  const ReplicatorTranslation translation = translate_replicator_job(value, complaints);
-  Job job = read_job(translation.job, complaints);
-  complaints.raise();
+  Diagnostics diagnostics;
+  const ReplicatorTranslation translation = translate_replicator_job(value, diagnostics);
+  Job job = read_job(translation.job, diagnostics);
+  diagnostics.raise();
   return job;
 }
 
@@ -49,12 +49,12 @@ CapturePlan plan_of(const Job& job) {
 
 template <class T>
 std::unique_ptr<Randomizer> make(const ComponentConfig& config, Host& host) {
-  Complaints complaints;
-  ParamReader reader(config.map, config.path, complaints);
+  Diagnostics diagnostics;
+  ParamReader reader(config.map, config.path, diagnostics);
   typename T::Params params;
   params.visit(reader);
   reader.finish(host_keys("randomizers"));
-  complaints.raise();
+  diagnostics.raise();
   return std::make_unique<T>(params, host);
 }
 

@@ -28,12 +28,12 @@ template <class Params>
 std::string complaint_about(const std::string& key, Value value) {
   Value map = Value::make_map();
   map.set(key, std::move(value));
-  Complaints complaints;
-  ParamReader reader(map, "randomizers[0]", complaints);
+  Diagnostics diagnostics;
+  ParamReader reader(map, "randomizers[0]", diagnostics);
   Params params;
   params.visit(reader);
   reader.finish();
-  return complaints.is_empty() ? "" : complaints.messages().front();
+  return diagnostics.is_empty() ? "" : diagnostics.messages().front();
 }
 
 Value scalar(const std::string& text) {

@@ -96,7 +96,7 @@ class DIORAMA_SDK_API Engine {
   /// The same of text; `name` stands for the file in messages.
   Value parse_job(std::string_view text, const JobChanges& changes = {},
                   std::string_view name = "job") const;
-  /// The job with every default. All complaints come in one Error(Config); assets need not be
+  /// The job with every default. All diagnostics come in one Error(Config); assets need not be
   /// there.
   Value check_job(const Value& job);
   /// Makes all captures of a job that load_job() or parse_job() gave.

@@ -29,11 +29,11 @@ namespace diorama {
 ///
 /// Static objects of triangles must carry their StaticMesh as user pointer, all others none. The
 /// user index of a moving body is its place in the order of addition.
-class GentleWorld final : public btDiscreteDynamicsWorld {
+class SoftContactWorld final : public btDiscreteDynamicsWorld {
  public:
-  GentleWorld(btDispatcher* dispatcher, btBroadphaseInterface* broadphase,
-              btConstraintSolver* solver, btCollisionConfiguration* configuration,
-              double max_depenetration_speed);
+  SoftContactWorld(btDispatcher* dispatcher, btBroadphaseInterface* broadphase,
+                   btConstraintSolver* solver, btCollisionConfiguration* configuration,
+                   double max_depenetration_speed);
 
  protected:
   void solveConstraints(btContactSolverInfo& info) override;
@@ -41,7 +41,7 @@ class GentleWorld final : public btDiscreteDynamicsWorld {
   void integrateTransforms(btScalar seconds) override;
 
  private:
-  void mend_contacts(btPersistentManifold& manifold, double lowest_distance);
+  void repair_contacts(btPersistentManifold& manifold, double lowest_distance);
   void keep_steady_impulses(btPersistentManifold& manifold);
   void hold_face(btPersistentManifold& manifold, double lowest_distance);
   void note_faces();
@@ -61,7 +61,7 @@ class GentleWorld final : public btDiscreteDynamicsWorld {
   std::vector<btVector3> clear_centres_;
   std::vector<bool> is_clear_;                         ///< Of each moving body in this step.
   std::map<const btPersistentManifold*, Face> faces_;  ///< Only ever looked up.
-  // Scratch of mend_contacts.
+  // Scratch of repair_contacts.
   std::vector<btManifoldPoint> rebuilt_;
   std::vector<btManifoldPoint> candidates_;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "gentle_world.h"
+#include "soft_contact_world.h"
 
 #include <algorithm>
 #include <array>
@@ -341,15 +341,16 @@ void turn_deep_contact(const FixedContact& seen, btManifoldPoint contact,
 
 }  // namespace
 
-GentleWorld::GentleWorld(btDispatcher* dispatcher, btBroadphaseInterface* broadphase,
-                         btConstraintSolver* solver, btCollisionConfiguration* configuration,
-                         double max_depenetration_speed)
+SoftContactWorld::SoftContactWorld(btDispatcher* dispatcher, btBroadphaseInterface* broadphase,
+                                   btConstraintSolver* solver,
+                                   btCollisionConfiguration* configuration,
+                                   double max_depenetration_speed)
     : btDiscreteDynamicsWorld(dispatcher, broadphase, solver, configuration),
       max_depenetration_speed_(max_depenetration_speed) {
   getSolverInfo().m_warmstartingFactor = 1.0;
 }
 
-void GentleWorld::mend_contacts(btPersistentManifold& manifold, double lowest_distance) {
+void SoftContactWorld::repair_contacts(btPersistentManifold& manifold, double lowest_distance) {
   const auto fixed = [&](const btManifoldPoint& contact) {
     return fixed_contact(manifold, contact, clear_centres_);
   };
@@ -389,7 +390,7 @@ void GentleWorld::mend_contacts(btPersistentManifold& manifold, double lowest_di
   }
 }
 
-void GentleWorld::keep_steady_impulses(btPersistentManifold& manifold) {
+void SoftContactWorld::keep_steady_impulses(btPersistentManifold& manifold) {
   constexpr int kSteadySteps = 8;
   // What is still being pushed apart presses with too much already.
   constexpr double kTouching = -0.0005;  // metres
@@ -407,7 +408,7 @@ void GentleWorld::keep_steady_impulses(btPersistentManifold& manifold) {
 
 /// Puts the last step's contacts of a face in place of those that were found now, where both say
 /// the same: they have neither slipped nor parted, and nothing reaches deeper elsewhere.
-void GentleWorld::hold_face(btPersistentManifold& manifold, double lowest_distance) {
+void SoftContactWorld::hold_face(btPersistentManifold& manifold, double lowest_distance) {
   constexpr double kSlip = 1e-3;       // metres
   constexpr double kDeeper = 5e-5;     // metres
   constexpr double kParallel = 0.999;  // cosine
@@ -447,7 +448,7 @@ void GentleWorld::hold_face(btPersistentManifold& manifold, double lowest_distan
 }
 
 /// With the impulses that the step ended with. What lies on fewer contacts rolls or rocks.
-void GentleWorld::note_faces() {
+void SoftContactWorld::note_faces() {
   std::map<const btPersistentManifold*, Face> faces;
   btDispatcher& dispatcher = *getDispatcher();
   for (int i = 0; i < dispatcher.getNumManifolds(); ++i) {
@@ -466,7 +467,7 @@ void GentleWorld::note_faces() {
   faces_.swap(faces);
 }
 
-void GentleWorld::solveConstraints(btContactSolverInfo& info) {
+void SoftContactWorld::solveConstraints(btContactSolverInfo& info) {
   // The solver undoes the share erp2 of a depth per step. Contact detection writes the distances
   // anew before the next step.
   const double lowest = -max_depenetration_speed_ * info.m_timeStep / info.m_erp2;
@@ -477,7 +478,7 @@ void GentleWorld::solveConstraints(btContactSolverInfo& info) {
   btDispatcher& dispatcher = *getDispatcher();
   for (int i = 0; i < dispatcher.getNumManifolds(); ++i) {
     btPersistentManifold& manifold = *dispatcher.getManifoldByIndexInternal(i);
-    mend_contacts(manifold, lowest);
+    repair_contacts(manifold, lowest);
     hold_face(manifold, lowest);
     keep_steady_impulses(manifold);
   }
@@ -490,7 +491,7 @@ void GentleWorld::solveConstraints(btContactSolverInfo& info) {
   note_faces();
 }
 
-void GentleWorld::createPredictiveContacts(btScalar seconds) {
+void SoftContactWorld::createPredictiveContacts(btScalar seconds) {
   releasePredictiveContacts();
   for (int i = 0; i < m_nonStaticRigidBodies.size(); ++i) {
     const ConvexDisguise disguise(*m_nonStaticRigidBodies[i], stand_in_);
@@ -498,7 +499,7 @@ void GentleWorld::createPredictiveContacts(btScalar seconds) {
   }
 }
 
-void GentleWorld::integrateTransforms(btScalar seconds) {
+void SoftContactWorld::integrateTransforms(btScalar seconds) {
   for (int i = 0; i < m_nonStaticRigidBodies.size(); ++i) {
     const ConvexDisguise disguise(*m_nonStaticRigidBodies[i], stand_in_);
     integrateTransformsInternal(&m_nonStaticRigidBodies[i], 1, seconds);
