@@ -27,7 +27,7 @@ endif()
 
 # For what nearly all of a job's time is spent in. Compilers need up to ten times as long for it, with sanitizers minutes.
 if(DIORAMA_SANITIZE)
-  set(DIORAMA_HOT_CODE)
+  set(DIORAMA_HOT_CODE -O1)
 else()
   set(DIORAMA_HOT_CODE $<$<CONFIG:RelWithDebInfo,Release>:-O3>)
 endif()

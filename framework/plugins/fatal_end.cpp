@@ -11,6 +11,7 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "diorama/abi.h"
 #include "diorama/error.h"
 
 namespace diorama {
@@ -153,7 +154,7 @@ class HandlerStack {
   void* room_ = nullptr;
 };
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if DIORAMA_DETAIL_ADDRESS_SANITIZER || DIORAMA_DETAIL_THREAD_SANITIZER
 constexpr bool kHandlesSignals = false;
 #else
 constexpr bool kHandlesSignals = true;
@@ -230,7 +231,7 @@ FatalEndReports::~FatalEndReports() {
 // No handler hears of these two. The program exports them (framework/app/CMakeLists.txt), so that
 // they come before the C library's for every component; the C library's own exit() does not pass
 // through here.
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#if !DIORAMA_DETAIL_ADDRESS_SANITIZER && !DIORAMA_DETAIL_THREAD_SANITIZER
 extern "C" {
 [[gnu::visibility("default")]] void _exit(int code) {
   if (diorama::is_watched()) diorama::end_for_component("_exit()");

@@ -17,6 +17,8 @@
 #include <string>
 #include <utility>
 
+#include "diorama/abi.h"
+
 namespace diorama::loader_assimp {
 namespace {
 
@@ -42,7 +44,7 @@ void limit(__rlimit_resource resource, std::uint64_t value) {
 
 // On top of the memory that the process has already.
 void limit_added_memory([[maybe_unused]] std::uint64_t bytes) {
-#ifndef __SANITIZE_ADDRESS__  // its shadow memory alone takes terabytes of addresses
+#if !DIORAMA_DETAIL_ADDRESS_SANITIZER  // its shadow memory alone takes terabytes of addresses
   std::uint64_t pages = 0;
   std::ifstream("/proc/self/statm") >> pages;
   limit(RLIMIT_AS, pages * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE)) + bytes);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "diorama/abi.h"
 #include "path.h"
 
 namespace diorama {
@@ -36,7 +37,7 @@ RayCounts PathTracer::trace(const TraceJob& job, PixelSum* sums, std::size_t str
 
 // One kernel per instruction set: all that it calls is compiled into it, but for what is rarely
 // needed (noinline, and path_special.cpp). Sanitizers would take many minutes to look through that.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if DIORAMA_DETAIL_ADDRESS_SANITIZER || DIORAMA_DETAIL_THREAD_SANITIZER
 #define DIORAMA_FLATTEN
 #else
 #define DIORAMA_FLATTEN gnu::flatten

@@ -2,6 +2,7 @@
 // What bad plugins do to runs of the program, and to runs that do not name them.
 #include <csignal>
 
+#include "diorama/abi.h"
 #include "end_to_end/program.h"
 #include "support/catch.h"
 
@@ -66,7 +67,7 @@ TEST_CASE("exit(0) in a plugin ends a run with an error", "[plugins]") {
                                "which components must not\n"));
 }
 
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#if !DIORAMA_DETAIL_ADDRESS_SANITIZER && !DIORAMA_DETAIL_THREAD_SANITIZER
 TEST_CASE("nor does any other way to end the process pass for success", "[plugins]") {
   const auto [writer, call] =
       GENERATE(std::pair("leaves_quickly", "quick_exit()"), std::pair("leaves_at_once", "_exit()"),

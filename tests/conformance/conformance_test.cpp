@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <map>
 
+#include "diorama/abi.h"
 #include "framework/conformance/fingerprint.h"
 #include "framework/conformance/isolated.h"
 #include "framework/conformance/sample_scene.h"
@@ -113,7 +114,7 @@ TEST_CASE("a crash fails the check in which it happens", "[conformance]") {
   const CheckResult& crash = result_of(results, "a capture without frames is survived");
   CHECK(crash.outcome == Outcome::Failed);
   CHECK(crash.subject == "writer/crashes");
-#if !defined(__SANITIZE_ADDRESS__)  // which ends the process by itself
+#if !DIORAMA_DETAIL_ADDRESS_SANITIZER  // which ends the process by itself
   CHECK(crash.message == "crashes: Segmentation fault");
 #endif
 }
@@ -125,7 +126,7 @@ TEST_CASE("builds with AddressSanitizer find leaks", "[conformance]") {
            result.check == "all is given back, the process ends well";
   });
   REQUIRE(end != results.end());
-#if defined(__SANITIZE_ADDRESS__)
+#if DIORAMA_DETAIL_ADDRESS_SANITIZER
   CHECK(end->outcome == Outcome::Failed);
   CHECK(end->message.starts_with("ends with code "));
 #else

@@ -12,7 +12,7 @@ using namespace diorama::test;
 
 namespace {
 
-std::string job(int seed, const std::string& writers) {
+std::string job_of_writers(int seed, const std::string& writers) {
   return "seed: " + std::to_string(seed) + R"(
 total_captures: 6
 environments:
@@ -96,7 +96,7 @@ Files without_lens_digits(const fs::path& folder) {
 
 TEST_CASE("a converted dataset is the one that the run would have written", "[convert]") {
   const TemporaryFolder folder;
-  make(folder, job(7, std::string(kBasic) + kTraining));
+  make(folder, job_of_writers(7, std::string(kBasic) + kTraining));
   const Outcome first = succeed(
       {"convert", "out/basic", "--writer", "CocoWriter amodal=false keypoints=false", "-o", "coco"},
       folder);
@@ -168,7 +168,7 @@ output: {folder: out}
 TEST_CASE("what writers need and a dataset does not hold is said before anything is written",
           "[convert]") {
   const TemporaryFolder folder;
-  make(folder, job(7, kTraining));
+  make(folder, job_of_writers(7, kTraining));
   const Outcome depth =
       run({"convert", "out/CocoWriter", "--writer", "BopWriter", "-o", "bop"}, folder.path());
   CHECK(depth.exit_code == 2);
@@ -190,7 +190,7 @@ TEST_CASE("what writers need and a dataset does not hold is said before anything
 
 TEST_CASE("a damaged file ends a conversion, which names it", "[convert]") {
   const TemporaryFolder folder;
-  make(folder, job(7, kBasic));
+  make(folder, job_of_writers(7, kBasic));
   const fs::path picture = folder / "out/basic/rp_cam_1/rgb/rgb_0004.png";
   REQUIRE(fs::exists(picture));
   write_file(picture, "no picture");
@@ -203,9 +203,9 @@ TEST_CASE("a damaged file ends a conversion, which names it", "[convert]") {
 
 TEST_CASE("merged datasets have new numbers, all classes and their own splits", "[merge]") {
   const TemporaryFolder one;
-  make(one, job(7, kTraining));
+  make(one, job_of_writers(7, kTraining));
   const TemporaryFolder two;
-  make(two, job(8, kTraining));
+  make(two, job_of_writers(8, kTraining));
   const std::string other = (two / "out" / "CocoWriter").string();
   succeed({"merge", "out/CocoWriter", other, "--writer", "CocoWriter amodal=false keypoints=false",
            "-o", "all"},
@@ -226,7 +226,7 @@ TEST_CASE("merged datasets have new numbers, all classes and their own splits", 
 
 TEST_CASE("diff finds nothing between equal datasets, and what was changed", "[diff]") {
   const TemporaryFolder folder;
-  make(folder, job(7, std::string(kBasic) + kTraining));
+  make(folder, job_of_writers(7, std::string(kBasic) + kTraining));
   fs::copy(folder / "out", folder / "copy", fs::copy_options::recursive);
   const Outcome same = succeed({"diff", "out", "copy"}, folder);
   CHECK(same.output.empty());
@@ -280,7 +280,7 @@ writers: [{type: PoseWriter, name: pose}]
 
 TEST_CASE("captures are made again, byte by byte", "[replay]") {
   const TemporaryFolder folder;
-  make(folder, job(7, std::string(kBasic) + kTraining));
+  make(folder, job_of_writers(7, std::string(kBasic) + kTraining));
   const Outcome replayed = succeed({"replay", "out", "--capture", "4"}, folder);
   CHECK_THAT(replayed.output, ContainsSubstring("1 captures made again"));
   CHECK_THAT(replayed.output, ContainsSubstring(" 0 differ"));

@@ -54,17 +54,17 @@ class SmallDisk {
 
 const std::vector<std::string> kLonger{"--set", "total_captures=20"};
 
-std::vector<std::string> job(const fs::path& output, std::vector<std::string> more = {}) {
+std::vector<std::string> failing_job(const fs::path& output, std::vector<std::string> more = {}) {
   std::vector<std::string> arguments{"run", config_file("smoke.yaml"), "--output", output.string()};
   arguments.insert(arguments.end(), kLonger.begin(), kLonger.end());
   arguments.insert(arguments.end(), more.begin(), more.end());
   return arguments;
 }
 
-const std::map<std::string, std::string>& whole_dataset() {
+const std::map<std::string, std::string>& undisturbed_dataset() {
   static const std::map<std::string, std::string> files = [] {
     const TemporaryFolder folder;
-    REQUIRE(run(job(folder / "out"), folder.path()).exit_code == 0);
+    REQUIRE(run(failing_job(folder / "out"), folder.path()).exit_code == 0);
     return tree(folder / "out");
   }();
   return files;
@@ -110,7 +110,7 @@ void expect_whole_captures(const fs::path& output) {
   for (const std::string& name : owned) {
     INFO(name);
     REQUIRE(left.contains(name));
-    CHECK(left.at(name) == whole_dataset().at(name));
+    CHECK(left.at(name) == undisturbed_dataset().at(name));
   }
   for (const auto& [name, text] : left) {
     INFO(name);
@@ -129,15 +129,16 @@ TEST_CASE("A write that fails ends the run with one message and whole captures",
   {
     const Variable preload("LD_PRELOAD", DIORAMA_FAILING_WRITE);
     const Variable below("DIORAMA_TEST_FAIL_BELOW", (folder / "out").string());
-    const Variable after("DIORAMA_TEST_FAIL_AFTER", std::to_string(bytes_of(whole_dataset()) / 2));
+    const Variable after("DIORAMA_TEST_FAIL_AFTER",
+                         std::to_string(bytes_of(undisturbed_dataset()) / 2));
     const Variable with("DIORAMA_TEST_FAIL_WITH", std::to_string(number));
     // Sanitizers want to be loaded first.
     const Variable order("ASAN_OPTIONS", "verify_asan_link_order=0");
-    expect_one_message(run(job(folder / "out"), folder.path()), reason);
+    expect_one_message(run(failing_job(folder / "out"), folder.path()), reason);
   }
   expect_whole_captures(folder / "out");
-  CHECK(run(job(folder / "out", {"--resume"}), folder.path()).exit_code == 0);
-  CHECK(difference(whole_dataset(), tree(folder / "out")) == "");
+  CHECK(run(failing_job(folder / "out", {"--resume"}), folder.path()).exit_code == 0);
+  CHECK(difference(undisturbed_dataset(), tree(folder / "out")) == "");
 }
 
 TEST_CASE("A disk that is too small ends the run; with more room it goes on", "[failed_write]") {
@@ -147,11 +148,12 @@ TEST_CASE("A disk that is too small ends the run; with more room it goes on", "[
     WARN("mounting is not allowed here: no small disk tried");
     return;
   }
-  expect_one_message(run(job(folder / "disk/out"), folder.path()), "No space left on device");
+  expect_one_message(run(failing_job(folder / "disk/out"), folder.path()),
+                     "No space left on device");
   expect_whole_captures(folder / "disk/out");
   disk.grow("64m");
-  CHECK(run(job(folder / "disk/out", {"--resume"}), folder.path()).exit_code == 0);
-  CHECK(difference(whole_dataset(), tree(folder / "disk/out")) == "");
+  CHECK(run(failing_job(folder / "disk/out", {"--resume"}), folder.path()).exit_code == 0);
+  CHECK(difference(undisturbed_dataset(), tree(folder / "disk/out")) == "");
 }
 
 TEST_CASE("A folder that may not be written to is named at start", "[failed_write]") {
@@ -162,6 +164,6 @@ TEST_CASE("A folder that may not be written to is named at start", "[failed_writ
   const TemporaryFolder folder;
   fs::create_directories(folder / "locked");
   fs::permissions(folder / "locked", fs::perms::owner_read | fs::perms::owner_exec);
-  expect_one_message(run(job(folder / "locked/out"), folder.path()), "Permission denied");
+  expect_one_message(run(failing_job(folder / "locked/out"), folder.path()), "Permission denied");
   fs::permissions(folder / "locked", fs::perms::owner_all);
 }

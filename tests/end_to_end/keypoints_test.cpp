@@ -34,7 +34,7 @@ def Xform "Board"
 }
 )";
 
-const std::string kJob = R"(
+const std::string kKeypointJob = R"(
 seed: 4
 total_captures: 4
 environments: [{type: shapes, shapes: [cube]}]
@@ -63,7 +63,7 @@ TEST_CASE("Named keypoints reach the labels, and lint agrees with them", "[run]"
   const TemporaryFolder folder;
   write_file(folder / "board.usda", kBoard);
   write_file(folder / "board.keypoints.yaml", "keypoints:\n  edge: [0, -0.15, 0.001]\n");
-  write_file(folder / "job.yaml", kJob);
+  write_file(folder / "job.yaml", kKeypointJob);
   const Outcome outcome = run({"run", "job.yaml", "--output", "out"}, folder.path());
   INFO(outcome.errors);
   REQUIRE(outcome.exit_code == 0);

@@ -12,7 +12,7 @@ using namespace diorama::test;
 namespace {
 
 /// Everything in the air: turning, falling, and what floats.
-std::string job(int steps) {
+std::string falling_job(int steps) {
   return R"(
 seed: 11
 total_captures: 1
@@ -38,10 +38,10 @@ output: {folder: out}
 )";
 }
 
-class Output {
+class FallOutput {
  public:
-  explicit Output(int steps) {
-    write_file(folder_ / "job.yaml", job(steps));
+  explicit FallOutput(int steps) {
+    write_file(folder_ / "job.yaml", falling_job(steps));
     const Outcome outcome = run({"run", "job.yaml"}, folder_.path());
     INFO(outcome.errors);
     REQUIRE(outcome.exit_code == 0);
@@ -73,8 +73,8 @@ class Output {
 }  // namespace
 
 TEST_CASE("motion vectors are what the last step moved", "[run]") {
-  const Output before(14);
-  const Output now(15);
+  const FallOutput before(14);
+  const FallOutput now(15);
   const auto earlier_poses = before.poses();
   const auto poses = now.poses();
   const auto camera = camera_of(Json::parse(now.file("camera_params_0000.json")));

@@ -9,7 +9,7 @@ using namespace diorama::test;
 
 namespace {
 
-constexpr const char* kJob = R"(
+constexpr const char* kPreviewJob = R"(
 seed: 3
 total_captures: 7
 environments: [{type: shapes, shapes: [cube]}]
@@ -40,7 +40,7 @@ std::map<std::string, std::string> files_below(const fs::path& folder) {
 
 TEST_CASE("A preview shows the pictures of the run", "[preview]") {
   const TemporaryFolder folder;
-  write_file(folder / "job.yaml", kJob);
+  write_file(folder / "job.yaml", kPreviewJob);
   REQUIRE(run({"run", "job.yaml", "--output", "out"}, folder.path()).exit_code == 0);
 
   const Outcome few = run({"preview", "job.yaml"}, folder.path());
@@ -75,7 +75,7 @@ TEST_CASE("A preview shows the pictures of the run", "[preview]") {
 
 TEST_CASE("A dry run estimates and leaves nothing", "[preview]") {
   const TemporaryFolder folder;
-  write_file(folder / "job.yaml", kJob);
+  write_file(folder / "job.yaml", kPreviewJob);
   const Outcome dry =
       run({"run", "job.yaml", "--dry-run", "--output", "out", "--visits-in-flight", "2"},
           folder.path());
@@ -101,13 +101,13 @@ TEST_CASE("A dry run estimates and leaves nothing", "[preview]") {
 
 TEST_CASE("What a trial meets ends it", "[preview]") {
   const TemporaryFolder folder;
-  write_file(folder / "job.yaml", kJob);
+  write_file(folder / "job.yaml", kPreviewJob);
   const Outcome beyond = run({"preview", "job.yaml", "--capture", "7"}, folder.path());
   CHECK(beyond.exit_code == 2);
   CHECK_THAT(beyond.errors, ContainsSubstring("--capture 7: the job has captures 0 to 6"));
   CHECK_FALSE(fs::exists(folder / "preview"));
 
-  std::string job = kJob;
+  std::string job = kPreviewJob;
   write_file(folder / "room.usda", "#usda 1.0\ndef Mesh \"m\" {\n  int[] faceVertexCounts = [3\n");
   const std::string shapes = "{type: shapes, shapes: [cube]}";
   job.replace(job.find(shapes), shapes.size(),

@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kBaseline = 0.09;
 
-const std::string kJob = R"(
+const std::string kRigJob = R"(
 seed: 3
 total_captures: 6
 environments: [{type: shapes, shapes: [cube, sphere]}]
@@ -45,10 +45,10 @@ writers:
      bounding_box_2d_tight: true}
 )";
 
-class Output {
+class RigOutput {
  public:
-  Output() {
-    write_file(folder_ / "rig.yaml", kJob);
+  RigOutput() {
+    write_file(folder_ / "rig.yaml", kRigJob);
     const Outcome outcome = run({"run", "rig.yaml", "--output", "out"}, folder_.path());
     INFO(outcome.errors);
     REQUIRE(outcome.exit_code == 0);
@@ -80,7 +80,7 @@ class Output {
 }  // namespace
 
 TEST_CASE("A rig's cameras are placed together, and a stereo pair has its disparity", "[run]") {
-  const Output output;
+  const RigOutput output;
   std::size_t compared = 0;
   std::size_t agreeing = 0;
   for (int capture = 0; capture < 6; ++capture) {
@@ -119,7 +119,7 @@ TEST_CASE("A rig's cameras are placed together, and a stereo pair has its dispar
 
 TEST_CASE("Extrinsics of a rig stand in dataset.json, and views speak of each of its cameras",
           "[run]") {
-  const Output output;
+  const RigOutput output;
   const Json page = Json::parse(output.file("dataset.json"));
   CHECK(page["cameras"] == Json::array({"stereo_0_left", "stereo_0_right", "stereo_0_depth"}));
   const Json& rig = page["rigs"]["stereo_0"];

@@ -14,7 +14,7 @@ annotators:
 )";
 
 /// Two captures; `cameras` of them have lenses that are not round numbers.
-std::string job(const std::string& cameras) {
+std::string job_of_cameras(const std::string& cameras) {
   return R"(
 seed: 11
 total_captures: 2
@@ -60,7 +60,7 @@ constexpr const char* kTwoCameras = "[{type: pinhole, count: 2, width: 97, heigh
 constexpr const char* kOneCamera =
     "[{type: opencv_pinhole, width: 97, height: 61, distortion: [-0.1, 0.03, 0.001, 0.002]}]";
 
-Outcome run_job(const TemporaryFolder& folder, const std::string& text) {
+Outcome run_sensors(const TemporaryFolder& folder, const std::string& text) {
   write_file(folder / "room.usda", kRoom);
   write_file(folder / "job.yaml", text);
   write_file(folder / "effects.yaml", kEffects);
@@ -80,7 +80,7 @@ std::string error_of(const TemporaryFolder& folder, std::vector<std::string> arg
 TEST_CASE("sensors give the same bytes in a run and from what it stored", "[sensors]") {
   for (const char* cameras : {kTwoCameras, kOneCamera}) {
     const TemporaryFolder folder;
-    const Outcome made = run_job(folder, job(cameras));
+    const Outcome made = run_sensors(folder, job_of_cameras(cameras));
     INFO(made.errors);
     REQUIRE(made.exit_code == 0);
     CHECK_THAT(made.errors, !ContainsSubstring("warning"));
@@ -107,14 +107,14 @@ TEST_CASE("sensors give the same bytes in a run and from what it stored", "[sens
 TEST_CASE("sensors change pictures and no label", "[sensors]") {
   const TemporaryFolder with;
   const TemporaryFolder without;
-  const std::string labelled = job(kTwoCameras);
+  const std::string labelled = job_of_cameras(kTwoCameras);
   std::string text = labelled;
   text.insert(text.find("  - {type: BasicWriter, name: seen"),
               "  - {type: BasicWriter, name: labels, distance_to_camera: true, normals: true,\n"
               "     instance_id_segmentation: true}\n");
-  REQUIRE(run_job(with, text).exit_code == 0);
+  REQUIRE(run_sensors(with, text).exit_code == 0);
   std::string bare = text.substr(0, text.find("annotators:"));
-  REQUIRE(run_job(without, bare).exit_code == 0);
+  REQUIRE(run_sensors(without, bare).exit_code == 0);
   CHECK(difference(tree(with / "out" / "labels"), tree(without / "out" / "labels")) == "");
   CHECK(difference(tree(with / "out" / "stored"), tree(without / "out" / "stored")) == "");
   CHECK_THAT(difference(tree(with / "out" / "seen"), tree(without / "out" / "seen")),
@@ -123,9 +123,9 @@ TEST_CASE("sensors change pictures and no label", "[sensors]") {
 
 TEST_CASE("what sensors cannot use is told", "[sensors]") {
   const TemporaryFolder folder;
-  std::string text = job(kTwoCameras);
+  std::string text = job_of_cameras(kTwoCameras);
   text.replace(text.find("camera_params: true"), 19, "camera_params: false");
-  REQUIRE(run_job(folder, text).exit_code == 0);
+  REQUIRE(run_sensors(folder, text).exit_code == 0);
   CHECK_THAT(error_of(folder, {"out", "--effects", "effects.yaml"}, 2),
              ContainsSubstring("out: no writer stored what the effects need, camera, color_hdr, "
                                "distance_to_image_plane: stored lacks camera"));
@@ -144,7 +144,7 @@ TEST_CASE("what sensors cannot use is told", "[sensors]") {
 
 TEST_CASE("a cut file of the dataset is named", "[sensors]") {
   const TemporaryFolder folder;
-  REQUIRE(run_job(folder, job(kTwoCameras)).exit_code == 0);
+  REQUIRE(run_sensors(folder, job_of_cameras(kTwoCameras)).exit_code == 0);
   const std::string name =
       "out/stored/rp_cam_1/distance_to_image_plane/"
       "distance_to_image_plane_0001.npy";
@@ -156,7 +156,7 @@ TEST_CASE("a cut file of the dataset is named", "[sensors]") {
 
 TEST_CASE("lint finds measurements that are none", "[sensors]") {
   const TemporaryFolder folder;
-  REQUIRE(run_job(folder, job(kTwoCameras)).exit_code == 0);
+  REQUIRE(run_sensors(folder, job_of_cameras(kTwoCameras)).exit_code == 0);
   const std::string name = "out/seen/rp_cam_0/sensor_depth/sensor_depth_0000.npy";
   const std::string bytes = read_file(folder / name);
   for (const char* value : {"\x00\x00\xc0\x7f", "\x00\x00\x80\xbf"}) {  // not a number, -1
@@ -169,9 +169,9 @@ TEST_CASE("lint finds measurements that are none", "[sensors]") {
 
 TEST_CASE("a sensor that no writer asks for is warned of", "[sensors]") {
   const TemporaryFolder folder;
-  std::string text = job(kTwoCameras);
+  std::string text = job_of_cameras(kTwoCameras);
   text.erase(text.find(", sensor_depth: true"), 20);
-  const Outcome made = run_job(folder, text);
+  const Outcome made = run_sensors(folder, text);
   CHECK(made.exit_code == 0);
   CHECK_THAT(made.errors,
              ContainsSubstring("annotators: depth_sensor does nothing, as no writer needs what "

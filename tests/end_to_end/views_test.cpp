@@ -16,7 +16,7 @@ namespace {
 using Json = nlohmann::json;
 
 /// Shapes float round a cube; each is a class of its own. Most draws show several of them.
-std::string job(const std::string& views, int captures, const std::string& more = "") {
+std::string job_of_views(const std::string& views, int captures, const std::string& more = "") {
   return R"(
 seed: 11
 total_captures: )" +
@@ -102,9 +102,9 @@ Seen seen_of(const Json& object, const Json& picture) {
   return seen;
 }
 
-std::map<std::string, std::string> run_job(const std::string& text, const std::string& output,
-                                           const TemporaryFolder& folder,
-                                           const std::vector<std::string>& more = {}) {
+std::map<std::string, std::string> run_views(const std::string& text, const std::string& output,
+                                             const TemporaryFolder& folder,
+                                             const std::vector<std::string>& more = {}) {
   write_file(folder / "views.yaml", text);
   std::vector<std::string> arguments{"run", "views.yaml", "--output", output};
   arguments.insert(arguments.end(), more.begin(), more.end());
@@ -119,7 +119,7 @@ std::map<std::string, std::string> run_job(const std::string& text, const std::s
 TEST_CASE("Every picture holds the conditions, and quotas are met exactly", "[views]") {
   constexpr int kCaptures = 120;
   const TemporaryFolder folder;
-  write_file(folder / "views.yaml", job(kConditions, kCaptures));
+  write_file(folder / "views.yaml", job_of_views(kConditions, kCaptures));
   const Outcome outcome =
       run({"run", "views.yaml", "--output", "out", "--progress", "json"}, folder.path());
   REQUIRE(outcome.exit_code == 0);
@@ -170,10 +170,10 @@ TEST_CASE(
     "Views are the same bytes in shards, with other threads, and when captures are made alone",
     "[views]") {
   const TemporaryFolder folder;
-  const std::string text = job(kConditions, 40);
-  const auto whole = run_job(text, "whole", folder, {"--threads", "1"});
+  const std::string text = job_of_views(kConditions, 40);
+  const auto whole = run_views(text, "whole", folder, {"--threads", "1"});
   for (const char* shard : {"2/2", "1/2"}) {
-    run_job(text, "shards", folder, {"--shard", shard, "--threads", "3"});
+    run_views(text, "shards", folder, {"--shard", shard, "--threads", "3"});
   }
   CHECK(difference(whole, tree(folder / "shards")) == "");
   const Outcome verified = run({"verify", "whole", "--sample", "3"}, folder.path());
@@ -183,8 +183,8 @@ TEST_CASE(
 
 TEST_CASE("Views are the same bytes after kill -9 and resume, and are counted once", "[views]") {
   const TemporaryFolder folder;
-  const std::string text = job(kConditions, 60);
-  const auto whole = run_job(text, "whole", folder);
+  const std::string text = job_of_views(kConditions, 60);
+  const auto whole = run_views(text, "whole", folder);
   CHECK(whole.contains("web/shards/train-000001.tar"));
   const std::vector<std::string> arguments{"run",      "views.yaml", "--output", "killed",
                                            "--resume", "--threads",  "2"};
@@ -198,12 +198,12 @@ TEST_CASE("Views are the same bytes after kill -9 and resume, and are counted on
 
 TEST_CASE("Cameras of a rig share a part of each quota, and KITTI's pairs are linted", "[views]") {
   const TemporaryFolder folder;
-  std::string text = job(R"(
+  std::string text = job_of_views(R"(
   {name: seen, targets: "/Assets/*", visible_pixels: {min: 12}, distance_m: {max: 2.2},
    direction_space: world, elevation_deg: {min: -40}, max_tries: 2000,
    quotas: [{of: direction, columns: 4, rows: 2}]}
 )",
-                         40);
+                                  40);
   const std::string camera = "width: 64, height: 48}";
   text.replace(
       text.find(camera), camera.size(),
@@ -211,7 +211,7 @@ TEST_CASE("Cameras of a rig share a part of each quota, and KITTI's pairs are li
   const std::string writers = "writers: [";
   text.replace(text.find(writers), writers.size(),
                writers + "{type: KittiWriter, name: kitti, layout: stereo}, ");
-  const auto files = run_job(text, "out", folder);
+  const auto files = run_views(text, "out", folder);
   CHECK(files.contains("kitti/training/image_3/000000.png"));
   const Json report = Json::parse(read_file(folder / "out/views.json"));
   CHECK(report["unmet"].empty());
@@ -227,7 +227,8 @@ TEST_CASE("Cameras of a rig share a part of each quota, and KITTI's pairs are li
 TEST_CASE("A resumed job says nothing anew of captures that it passes", "[views]") {
   const TemporaryFolder folder;
   write_file(folder / "keep.yaml",
-             job("{name: seen, targets: \"/Assets/*\", distance_m: {max: 0.1}, max_tries: 3}", 25));
+             job_of_views(
+                 "{name: seen, targets: \"/Assets/*\", distance_m: {max: 0.1}, max_tries: 3}", 25));
   const std::vector<std::string> arguments{"run", "keep.yaml", "--output", "out", "--resume"};
   REQUIRE(run_and_kill(arguments, folder.path(), folder / "out", {5}));
   const Outcome resumed = run(arguments, folder.path());
@@ -238,11 +239,11 @@ TEST_CASE("A resumed job says nothing anew of captures that it passes", "[views]
 
 TEST_CASE("Blocked cameras are those of the views that stay, also after kill -9", "[views]") {
   const TemporaryFolder folder;
-  std::string text =
-      job("{name: lit, brightness: {min: 0.45, max: 0.46}, count: {min: 0}, max_tries: 400}", 25);
+  std::string text = job_of_views(
+      "{name: lit, brightness: {min: 0.45, max: 0.46}, count: {min: 0}, max_tries: 400}", 25);
   text.replace(text.find("name: cam, width"), 10, "name: cam, near_m: 0.9,");
   text.replace(text.find("look_at_offset"), 0, "avoid_obstacles: false, ");
-  const auto whole = run_job(text, "whole", folder);
+  const auto whole = run_views(text, "whole", folder);
   int refused = 0;
   for (const auto& [name, content] : whole) {
     if (name.starts_with("settle/")) refused += int(Json::parse(content)["blocked_cameras"].size());
@@ -259,7 +260,7 @@ TEST_CASE("At the limit a job keeps the nearest view and says so, or ends", "[vi
   const TemporaryFolder folder;
   const std::string impossible =
       "{name: seen, targets: \"/Assets/*\", distance_m: {max: 0.1}, max_tries: 7}";
-  write_file(folder / "keep.yaml", job(impossible, 2));
+  write_file(folder / "keep.yaml", job_of_views(impossible, 2));
   const Outcome kept = run({"run", "keep.yaml", "--output", "kept"}, folder.path());
   CHECK(kept.exit_code == 0);
   CHECK_THAT(kept.errors, ContainsSubstring("views: capture 0 (still), cam_0: seen.distance_m not "
@@ -274,7 +275,7 @@ TEST_CASE("At the limit a job keeps the nearest view and says so, or ends", "[vi
   CHECK(report["refused"] == Json{{"seen.distance_m", 2 * 6}});
 
   write_file(folder / "stop.yaml",
-             job(impossible.substr(0, impossible.size() - 1) + ", at_limit: stop}", 2));
+             job_of_views(impossible.substr(0, impossible.size() - 1) + ", at_limit: stop}", 2));
   const Outcome stopped = run({"run", "stop.yaml", "--output", "stopped"}, folder.path());
   CHECK(stopped.exit_code == 3);
   CHECK_THAT(stopped.errors, ContainsSubstring("seen.distance_m (7 of 7)") &&
@@ -284,11 +285,11 @@ TEST_CASE("At the limit a job keeps the nearest view and says so, or ends", "[vi
 
 TEST_CASE("A label that a room has not got costs no draws", "[views]") {
   const TemporaryFolder folder;
-  const auto files =
-      run_job(job("{name: seen, targets: \"/Assets/*\", visible_pixels: {min: 5}, max_tries: 500, "
-                  "quotas: [{of: label, labels: [cone, unicorn]}]}",
-                  10),
-              "out", folder);
+  const auto files = run_views(
+      job_of_views("{name: seen, targets: \"/Assets/*\", visible_pixels: {min: 5}, max_tries: 500, "
+                   "quotas: [{of: label, labels: [cone, unicorn]}]}",
+                   10),
+      "out", folder);
   const Json report = Json::parse(files.at("views.json"));
   CHECK(report["unmet"].size() == 5);
   CHECK(report["draws"].get<int>() < 10 * 50);
@@ -297,8 +298,9 @@ TEST_CASE("A label that a room has not got costs no draws", "[views]") {
 
 TEST_CASE("Views are as bright as a job wants them", "[views]") {
   const TemporaryFolder folder;
-  const auto files = run_job(
-      job("{name: lit, brightness: {min: 0.35, max: 0.6}, count: {min: 0}, max_tries: 300}", 12),
+  const auto files = run_views(
+      job_of_views(
+          "{name: lit, brightness: {min: 0.35, max: 0.6}, count: {min: 0}, max_tries: 300}", 12),
       "out", folder);
   const Json report = Json::parse(files.at("views.json"));
   CHECK(report["unmet"].empty());
@@ -310,22 +312,22 @@ TEST_CASE("Views are as bright as a job wants them", "[views]") {
 
 TEST_CASE("Without views nothing changes", "[views]") {
   const TemporaryFolder folder;
-  const auto without = run_job(job("", 3), "without", folder);
+  const auto without = run_views(job_of_views("", 3), "without", folder);
   CHECK_FALSE(without.contains("views.json"));
   // A rule that everything holds draws nothing anew.
-  const auto with = run_job(job("{name: any, count: {min: 0}}", 3), "with", folder);
+  const auto with = run_views(job_of_views("{name: any, count: {min: 0}}", 3), "with", folder);
   CHECK(without.at("web/shards/train-000000.tar") == with.at("web/shards/train-000000.tar"));
   CHECK(Json::parse(with.at("views.json"))["draws"] == 3);
 }
 
 TEST_CASE("Wrong patterns and labels in views are named before anything is loaded", "[views]") {
   const TemporaryFolder folder;
-  write_file(folder / "job.yaml", job("{name: seen, targets: \"/Asset/*\"}", 2));
+  write_file(folder / "job.yaml", job_of_views("{name: seen, targets: \"/Asset/*\"}", 2));
   const Outcome outcome = run({"run", "job.yaml", "--plan"}, folder.path());
   CHECK(outcome.exit_code == 3);
   CHECK_THAT(outcome.errors, ContainsSubstring("views[0].targets: '/Asset/*' fits no node; did you "
                                                "mean '/Assets/*'?"));
-  write_file(folder / "job.yaml", job("{name: seen, labels: [sphera]}", 2));
+  write_file(folder / "job.yaml", job_of_views("{name: seen, labels: [sphera]}", 2));
   CHECK_THAT(run({"run", "job.yaml", "--plan"}, folder.path()).errors,
              ContainsSubstring("views[0].labels: the job labels no object 'sphera'; did you mean "
                                "'sphere'?"));

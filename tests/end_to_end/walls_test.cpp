@@ -12,7 +12,7 @@ using namespace diorama::test;
 
 namespace {
 
-constexpr const char* kJob = R"(
+constexpr const char* kWallJob = R"(
 seed: 3
 total_captures: 20
 environments: [{type: empty}]
@@ -45,7 +45,7 @@ output: {folder: out}
 
 TEST_CASE("What is thrown about within walls stays there and comes up again", "[run][walls]") {
   const TemporaryFolder folder;
-  write_file(folder / "job.yaml", kJob);
+  write_file(folder / "job.yaml", kWallJob);
   const auto files_of = [&](const std::string& output, std::vector<std::string> more) {
     std::vector<std::string> arguments{"run", "job.yaml", "--output", output};
     arguments.insert(arguments.end(), more.begin(), more.end());

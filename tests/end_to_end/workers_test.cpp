@@ -17,7 +17,7 @@ constexpr int kCaptures = 20;  // in ten visits
 
 /// Its cameras are blocked, each view by another distance, and drawn until rules are met: what a
 /// visit's report says of its earlier captures.
-std::vector<std::string> job(std::vector<std::string> more = {}) {
+std::vector<std::string> shared_job(std::vector<std::string> more = {}) {
   std::vector<std::string> arguments{
       "run",
       config_file("smoke.yaml"),
@@ -33,10 +33,10 @@ std::vector<std::string> job(std::vector<std::string> more = {}) {
   return arguments;
 }
 
-const std::map<std::string, std::string>& whole_dataset() {
+const std::map<std::string, std::string>& dataset_of_one_worker() {
   static const std::map<std::string, std::string> files = [] {
     const TemporaryFolder folder;
-    REQUIRE(run(job(), folder.path()).exit_code == 0);
+    REQUIRE(run(shared_job(), folder.path()).exit_code == 0);
     return tree(folder / "out");
   }();
   return files;
@@ -61,7 +61,7 @@ TEST_CASE("Shards side by side make the dataset of one run", "[workers]") {
   const TemporaryFolder folder;
   std::vector<Process> processes;
   for (int i = 0; i < 4; ++i) {
-    processes.emplace_back(job({"--shard", std::to_string(i + 1) + "/4", "--threads", "1"}),
+    processes.emplace_back(shared_job({"--shard", std::to_string(i + 1) + "/4", "--threads", "1"}),
                            place_of(folder, i));
   }
   for (Process& process : processes) {
@@ -69,7 +69,7 @@ TEST_CASE("Shards side by side make the dataset of one run", "[workers]") {
     INFO(outcome.errors);
     CHECK(outcome.exit_code == 0);
   }
-  CHECK(difference(whole_dataset(), tree(folder / "out")) == "");
+  CHECK(difference(dataset_of_one_worker(), tree(folder / "out")) == "");
   CHECK(run({"status", "out"}, folder.path()).exit_code == 0);
 }
 
@@ -77,7 +77,7 @@ TEST_CASE("Workers that take visits share a job, also when one of them is killed
   const TemporaryFolder folder;
   std::vector<Process> processes;
   for (int i = 0; i < 3; ++i) {
-    processes.emplace_back(job({"--shard", "auto", "--threads", "1"}), place_of(folder, i));
+    processes.emplace_back(shared_job({"--shard", "auto", "--threads", "1"}), place_of(folder, i));
   }
   while (!fs::exists(folder / "out/dataset.json")) ::usleep(1000);
   processes[0].signal(SIGKILL);
@@ -86,17 +86,17 @@ TEST_CASE("Workers that take visits share a job, also when one of them is killed
     INFO(outcome.errors);
     if (&process != &processes[0]) CHECK(outcome.exit_code == 0);
   }
-  const Outcome last = run(job({"--shard", "auto"}), folder.path());
+  const Outcome last = run(shared_job({"--shard", "auto"}), folder.path());
   INFO(last.errors);
   CHECK(last.exit_code == 0);
-  CHECK(difference(whole_dataset(), tree(folder / "out")) == "");
+  CHECK(difference(dataset_of_one_worker(), tree(folder / "out")) == "");
 }
 
 TEST_CASE("A run of a format that ends with its tables is shown before its end", "[workers]") {
   const TemporaryFolder folder;
   const std::string writers = "writers=[{type: CocoWriter, name: coco}]";
   const auto shard = [&](const char* which) {
-    return job({"--set", writers, "--threads", "1", "--shard", which});
+    return shared_job({"--set", writers, "--threads", "1", "--shard", which});
   };
   // Only where somebody works: another's files are not to say what is done here.
   Process first(shard("1/2"), place_of(folder, 0));
@@ -142,16 +142,16 @@ TEST_CASE("A run of a format that ends with its tables is shown before its end",
 
 TEST_CASE("A shard that runs twice ends with 75 and names who has it", "[workers]") {
   const TemporaryFolder folder;
-  Process first(job({"--shard", "1/2", "--threads", "1"}), place_of(folder, 0));
+  Process first(shared_job({"--shard", "1/2", "--threads", "1"}), place_of(folder, 0));
   while (!fs::exists(folder / "out/dataset.json")) ::usleep(1000);
   first.signal(SIGSTOP);
-  const Outcome second = run(job({"--shard", "1/2"}), folder.path());
+  const Outcome second = run(shared_job({"--shard", "1/2"}), folder.path());
   CHECK(second.exit_code == 75);
   CHECK_THAT(
       second.errors,
       ContainsSubstring("another process works on this dataset as shard 1 of 2, too (host ") &&
           ContainsSubstring(", process "));
-  CHECK(run(job({"--overwrite"}), folder.path()).exit_code == 75);
+  CHECK(run(shared_job({"--overwrite"}), folder.path()).exit_code == 75);
   const auto status = status_of(folder);
   CHECK(status.at("finished") == false);
   CHECK(status.at("captures") == kCaptures);
@@ -163,24 +163,24 @@ TEST_CASE("A shard that runs twice ends with 75 and names who has it", "[workers
   CHECK_THAT(outcome.errors, ContainsSubstring("this part is done, the dataset lacks 10 captures"));
   CHECK(run({"status", "out"}, folder.path()).exit_code == 8);
   CHECK(run({"finish", "out"}, folder.path()).exit_code == 8);
-  CHECK(run(job({"--shard", "2/2"}), folder.path()).exit_code == 0);
-  CHECK(difference(whole_dataset(), tree(folder / "out")) == "");
+  CHECK(run(shared_job({"--shard", "2/2"}), folder.path()).exit_code == 0);
+  CHECK(difference(dataset_of_one_worker(), tree(folder / "out")) == "");
 }
 
 TEST_CASE("A signal ends a run with the code that the scheduler wants", "[workers]") {
   const TemporaryFolder folder;
-  Process process(job({"--stopped-exit-code", "99", "--progress", "json"}), folder.path());
+  Process process(shared_job({"--stopped-exit-code", "99", "--progress", "json"}), folder.path());
   while (!fs::exists(folder / "out/dataset.json")) ::usleep(1000);
   process.signal(SIGTERM);
   const Outcome outcome = process.wait();
   CHECK(outcome.exit_code == 99);
-  CHECK(run(job({"--resume"}), folder.path()).exit_code == 0);
-  CHECK(difference(whole_dataset(), tree(folder / "out")) == "");
+  CHECK(run(shared_job({"--resume"}), folder.path()).exit_code == 0);
+  CHECK(difference(dataset_of_one_worker(), tree(folder / "out")) == "");
 }
 
 TEST_CASE("Progress comes as lines for programs", "[workers]") {
   const TemporaryFolder folder;
-  const Outcome json = run(job({"--progress", "json"}), folder.path());
+  const Outcome json = run(shared_job({"--progress", "json"}), folder.path());
   REQUIRE(json.exit_code == 0);
   std::istringstream lines(json.output);
   int done = 0;
@@ -201,19 +201,19 @@ TEST_CASE("Progress comes as lines for programs", "[workers]") {
   CHECK(count >= kCaptures);
   CHECK(refused > 0);
   // Nothing is left to do: said, too.
-  const Outcome again = run(job({"--progress", "json", "--resume"}), folder.path());
+  const Outcome again = run(shared_job({"--progress", "json", "--resume"}), folder.path());
   REQUIRE(again.exit_code == 0);
   const auto only = nlohmann::json::parse(again.output);
   CHECK(only.at("done") == kCaptures);
   CHECK(only.at("resumed") == kCaptures);
-  const Outcome openjd = run(job({"--progress", "openjd", "--overwrite"}), folder.path());
+  const Outcome openjd = run(shared_job({"--progress", "openjd", "--overwrite"}), folder.path());
   CHECK_THAT(openjd.output, ContainsSubstring("openjd_progress: 100.0\n") &&
                                 ContainsSubstring("openjd_status: 20 of 20 captures\n"));
 }
 
 TEST_CASE("What was deleted or damaged is found and made anew", "[workers]") {
   const TemporaryFolder folder;
-  REQUIRE(run(job(), folder.path()).exit_code == 0);
+  REQUIRE(run(shared_job(), folder.path()).exit_code == 0);
   const auto whole = tree(folder / "out");
   CHECK_THAT(whole.at("settle/3_sphere.json"), ContainsSubstring("m from something"));
   // Of the last capture of a visit, with which its report goes, and of what was written before the
@@ -230,7 +230,7 @@ TEST_CASE("What was deleted or damaged is found and made anew", "[workers]") {
     const Outcome found = run({"status", "out", "--verify"}, folder.path());
     CHECK(found.exit_code == 8);
     CHECK_THAT(found.output, ContainsSubstring(file + ": missing"));
-    const Outcome repaired = run(job({"--resume", "--verify"}), folder.path());
+    const Outcome repaired = run(shared_job({"--resume", "--verify"}), folder.path());
     INFO(repaired.errors);
     CHECK(repaired.exit_code == 0);
     CHECK_THAT(repaired.errors, ContainsSubstring("is missing; it is made anew"));
@@ -253,7 +253,7 @@ TEST_CASE("The next command can be pasted, whatever the folder's name", "[worker
 
 TEST_CASE("A dataset whose captures are all there is finished by its own job", "[workers]") {
   const TemporaryFolder folder;
-  REQUIRE(run(job(), folder.path()).exit_code == 0);
+  REQUIRE(run(shared_job(), folder.path()).exit_code == 0);
   // As if the last worker had been killed before the end: nothing says that it is finished.
   for (const auto& entry : fs::directory_iterator(folder / "out/.diorama/journal")) {
     if (entry.path().extension() != ".index") continue;
@@ -266,6 +266,6 @@ TEST_CASE("A dataset whose captures are all there is finished by its own job", "
   INFO(outcome.errors);
   CHECK(outcome.exit_code == 0);
   CHECK(run({"status", "out"}, folder.path()).exit_code == 0);
-  CHECK(difference(whole_dataset(), tree(folder / "out")) == "");
+  CHECK(difference(dataset_of_one_worker(), tree(folder / "out")) == "");
   CHECK(run({"finish", "out"}, folder.path()).exit_code == 0);
 }

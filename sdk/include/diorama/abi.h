@@ -19,9 +19,26 @@
 #define DIORAMA_DETAIL_TEXT2(x) #x
 #define DIORAMA_DETAIL_TEXT(x) DIORAMA_DETAIL_TEXT2(x)
 
-#if defined(__SANITIZE_ADDRESS__)
+// GCC has macros for its sanitizers, clang before 20 features.
+#if defined(__has_feature)
+#define DIORAMA_DETAIL_HAS_FEATURE(name) __has_feature(name)
+#else
+#define DIORAMA_DETAIL_HAS_FEATURE(name) 0
+#endif
+#if defined(__SANITIZE_ADDRESS__) || DIORAMA_DETAIL_HAS_FEATURE(address_sanitizer)
+#define DIORAMA_DETAIL_ADDRESS_SANITIZER 1
+#else
+#define DIORAMA_DETAIL_ADDRESS_SANITIZER 0
+#endif
+#if defined(__SANITIZE_THREAD__) || DIORAMA_DETAIL_HAS_FEATURE(thread_sanitizer)
+#define DIORAMA_DETAIL_THREAD_SANITIZER 1
+#else
+#define DIORAMA_DETAIL_THREAD_SANITIZER 0
+#endif
+
+#if DIORAMA_DETAIL_ADDRESS_SANITIZER
 #define DIORAMA_DETAIL_SANITIZER "address"
-#elif defined(__SANITIZE_THREAD__)
+#elif DIORAMA_DETAIL_THREAD_SANITIZER
 #define DIORAMA_DETAIL_SANITIZER "thread"
 #else
 #define DIORAMA_DETAIL_SANITIZER "none"

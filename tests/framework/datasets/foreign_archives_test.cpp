@@ -35,7 +35,7 @@ bool make(const std::string& kind, const test::TemporaryFolder& folder) {
   return true;
 }
 
-std::string picture(int width, int height, int channels, const std::vector<std::uint8_t>& samples) {
+std::string png_of(int width, int height, int channels, const std::vector<std::uint8_t>& samples) {
   return test::encoded({samples.data(), width, height, channels, 8});
 }
 
@@ -45,7 +45,7 @@ std::string colors(int width, int height, int shade = 0) {
   for (std::size_t i = 0; i < samples.size(); ++i) {
     samples[i] = std::uint8_t((i + std::size_t(shade)) % 251);
   }
-  return picture(width, height, 3, samples);
+  return png_of(width, height, 3, samples);
 }
 
 std::string mask(int width, int height, const PixelBox& box) {
@@ -53,7 +53,7 @@ std::string mask(int width, int height, const PixelBox& box) {
   for (int y = box.y_min; y < box.y_max; ++y) {
     for (int x = box.x_min; x < box.x_max; ++x) samples[std::size_t(y * width + x)] = 255;
   }
-  return picture(width, height, 1, samples);
+  return png_of(width, height, 1, samples);
 }
 
 std::string depth(int width, int height, std::uint16_t value) {
@@ -61,7 +61,7 @@ std::string depth(int width, int height, std::uint16_t value) {
   return test::encoded({samples.data(), width, height, 1, 16});
 }
 
-bool finds(const LintReport& report, const std::string& check, const std::string& message) {
+bool finds_message(const LintReport& report, const std::string& check, const std::string& message) {
   return std::ranges::any_of(report.findings, [&](const LintFinding& finding) {
     return finding.check == check &&
            (finding.file + ": " + finding.message).find(message) != std::string::npos;
@@ -201,9 +201,9 @@ TEST_CASE("A shard that is cut off tells what it has, and that it ends", "[reade
   shard.resize(shard.size() / 2);
   folder.write("train-000000.tar", shard);
   const LintReport report = lint(folder);
-  CHECK(finds(report, "every file can be read", "train-000000.tar: "));
+  CHECK(finds_message(report, "every file can be read", "train-000000.tar: "));
   folder.write("train-000000.tar", std::string(512, 'x') + std::string(1024, '\0'));
-  CHECK(finds(lint(folder), "every file can be read", "the header at byte 0 is damaged"));
+  CHECK(finds_message(lint(folder), "every file can be read", "the header at byte 0 is damaged"));
 }
 
 TEST_CASE("BOP as the benchmark has it: no node names, gaps in ids, scenes without poses",
@@ -287,12 +287,14 @@ TEST_CASE("Faults of a foreign BOP dataset are told with what they are about", "
                           "visib_fract": 0.2}]})");
   const LintReport report = lint(folder);
   INFO(lint_text(report, 50));
-  CHECK(finds(report, "nothing is there twice", "scene_camera.json: image 1: is there twice"));
-  CHECK(finds(report, "nothing is missing", "image 77: has no entry"));
-  CHECK(finds(report, "pose agrees with the keypoints", "cam_R_m2c is not a rotation"));
-  CHECK(finds(report, "area = count", "its px_count_visib is 53; right would be: its mask has 54"));
-  CHECK(finds(report, "area = count", "its visib_fract is 0.2"));
-  CHECK(finds(report, "area = count", "its px_count_valid is 99"));
+  CHECK(finds_message(report, "nothing is there twice",
+                      "scene_camera.json: image 1: is there twice"));
+  CHECK(finds_message(report, "nothing is missing", "image 77: has no entry"));
+  CHECK(finds_message(report, "pose agrees with the keypoints", "cam_R_m2c is not a rotation"));
+  CHECK(finds_message(report, "area = count",
+                      "its px_count_visib is 53; right would be: its mask has 54"));
+  CHECK(finds_message(report, "area = count", "its visib_fract is 0.2"));
+  CHECK(finds_message(report, "area = count", "its px_count_valid is 99"));
 }
 
 TEST_CASE("Image folders with metadata in lines, in columns, and with a folder per class",
@@ -351,11 +353,12 @@ TEST_CASE("Image folders with metadata in lines, in columns, and with a folder p
                  "\"../a.png\"}\n{\"name\": 3}\n{\"file_name\": \"gone.png\"}\n{\"file_na");
     const LintReport report = lint(folder);
     INFO(lint_text(report, 50));
-    CHECK(finds(report, "nothing is there twice", "row 2: 'a.png' is there a second time"));
-    CHECK(finds(report, "every file can be read", "'../a.png' lies outside of the dataset"));
-    CHECK(finds(report, "every file can be read", "a row has no file_name"));
-    CHECK(finds(report, "nothing is missing", "gone.png: "));
-    CHECK(finds(report, "nothing is missing", "stray.png: the picture has no row"));
+    CHECK(finds_message(report, "nothing is there twice", "row 2: 'a.png' is there a second time"));
+    CHECK(
+        finds_message(report, "every file can be read", "'../a.png' lies outside of the dataset"));
+    CHECK(finds_message(report, "every file can be read", "a row has no file_name"));
+    CHECK(finds_message(report, "nothing is missing", "gone.png: "));
+    CHECK(finds_message(report, "nothing is missing", "stray.png: the picture has no row"));
     CHECK(report.findings.size() >= 6);
   }
 }

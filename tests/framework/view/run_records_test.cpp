@@ -21,7 +21,7 @@ using namespace diorama;
 
 namespace {
 
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 
 ViewOutcome outcome(int draws, std::map<std::string, int> refused) {
   return {"cam", draws, std::move(refused), {}, {}};
@@ -54,7 +54,7 @@ TEST_CASE("Refused views are counted once per capture, as captures come", "[view
   records.refresh(status_of(3), true);
   records.refresh(status_of(3), true);
   CHECK(records.json()["views"] ==
-        Json::parse(R"({"views":1,"draws":3,"refused":{"seen.targets":2},"unmet":0})"));
+        OrderedJson::parse(R"({"views":1,"draws":3,"refused":{"seen.targets":2},"unmet":0})"));
   ViewOutcome unmet = outcome(8, {{"seen.targets", 4}, {"seen.distance_m", 4}});
   unmet.unmet = {"seen.distance_m"};
   publish(2, unmet);
@@ -62,8 +62,9 @@ TEST_CASE("Refused views are counted once per capture, as captures come", "[view
   writer.commit(1, {{}, {{"", outcomes_json({outcome(100, {})})}}});
   records.refresh(status_of(3), true);
   CHECK(records.json()["views"] ==
-        Json::parse(R"({"views":2,"draws":11,"refused":{"seen.distance_m":4,"seen.targets":6},)"
-                    R"("unmet":1})"));
+        OrderedJson::parse(
+            R"({"views":2,"draws":11,"refused":{"seen.distance_m":4,"seen.targets":6},)"
+            R"("unmet":1})"));
 }
 
 TEST_CASE("The last captures of all workers, and where their time goes", "[view]") {
@@ -84,13 +85,13 @@ TEST_CASE("The last captures of all workers, and where their time goes", "[view]
   folder.write(".diorama/stage/three/times.json", R"({"rendering": )");
   RunRecords records(folder.path(""));
   records.refresh(status_of(10, {"one", "two", "three", "four"}), false);
-  CHECK(records.json()["last"] == Json({2, 7, 1, 0}));
-  CHECK(records.json()["stages"] == Json::parse(R"({"loading":1.0,"rendering":3.0})"));
+  CHECK(records.json()["last"] == OrderedJson({2, 7, 1, 0}));
+  CHECK(records.json()["stages"] == OrderedJson::parse(R"({"loading":1.0,"rendering":3.0})"));
   // One has died, and leaves its file; one has no lease any more; one is not what a worker writes.
   folder.write(".diorama/stage/three/times.json",
                R"({"rendering": 100, "x": ")" + std::string(std::size_t(64) << 10, 'y') + "\"}");
   records.refresh(status_of(10, {"two", "three"}, {"one"}), false);
-  CHECK(records.json()["stages"] == Json::parse(R"({"rendering":0.5})"));
+  CHECK(records.json()["stages"] == OrderedJson::parse(R"({"rendering":0.5})"));
   records.refresh(status_of(10), false);
   CHECK_FALSE(records.json().contains("stages"));
 }
@@ -108,15 +109,15 @@ TEST_CASE("Verdicts of settling are counted by reason, other files passed over",
     folder.write("settle/bad.json", text);
     RunRecords records(folder.path(""));
     records.refresh(status_of(1), false);
-    const Json settle = records.json()["settle"];
+    const OrderedJson settle = records.json()["settle"];
     CHECK(settle["visits"] == 1);
     CHECK(settle["at_rest"] == 1);
     CHECK(settle["longest_rest_s"] == 1.5);
     REQUIRE(settle["verdicts"].size() == 2);
     CHECK(settle["verdicts"][0]["first"] == "visit 4: /Cameras/c is inside of something");
     CHECK(settle["verdicts"][1] ==
-          Json::parse(R"({"kind":"respawned","why":"moves at … m/s.","count":2,)"
-                      R"("first":"visit 4: /Assets/a moves at 0.65 m/s."})"));
+          OrderedJson::parse(R"({"kind":"respawned","why":"moves at … m/s.","count":2,)"
+                             R"("first":"visit 4: /Assets/a moves at 0.65 m/s."})"));
     report.visit = 5;
     report.rest_after_s.reset();
     folder.write("settle/5_room.json", settle_json(report));

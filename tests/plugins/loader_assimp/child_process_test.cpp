@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "diorama/abi.h"
 #include "support/catch.h"
 #include "support/temporary_folder.h"
 
@@ -55,7 +56,7 @@ TEST_CASE("a child process that waits in vain is replaced", "[loader_assimp]") {
   CHECK(second == "the second one's answer");
 }
 
-#ifndef __SANITIZE_ADDRESS__
+#if !DIORAMA_DETAIL_ADDRESS_SANITIZER
 TEST_CASE("a child process gets no more memory than it may", "[loader_assimp]") {
   const std::string why = run_in_child({60, 64u << 20}, [] {
     const std::vector<char> much(std::size_t(1) << 30, 'x');

@@ -12,8 +12,8 @@ using namespace diorama::test;
 namespace {
 
 /// Two targets whose box centres are not their nodes' origins, one camera.
-struct Set {
-  Set() {
+struct CameraSet {
+  CameraSet() {
     Mesh mesh = make_box(Vec3(0.1, 0.2, 0.3));
     for (Vec3f& position : mesh.positions) position.z() += 0.5f;
     const auto shared_mesh = std::make_shared<const Mesh>(mesh);
@@ -57,7 +57,7 @@ OrbitCameras::Params orbit_params() {
 }  // namespace
 
 TEST_CASE("cameras keep distance and polar angle from the target itself", "[randomizers]") {
-  Set set;
+  CameraSet set;
   OrbitCameras orbit(orbit_params(), set.host);
   std::vector<double> distance, polar, azimuth, jitter;
   int first = 0;
@@ -86,7 +86,7 @@ TEST_CASE("cameras keep distance and polar angle from the target itself", "[rand
 }
 
 TEST_CASE("an arc roll is the shortest turn from looking down", "[randomizers]") {
-  Set set;
+  CameraSet set;
   OrbitCameras::Params params = orbit_params();
   params.roll = "arc";
   params.look_at_offset = 0.0;
@@ -100,7 +100,7 @@ TEST_CASE("an arc roll is the shortest turn from looking down", "[randomizers]")
 }
 
 TEST_CASE("without targets cameras look at the working area", "[randomizers]") {
-  Set set;
+  CameraSet set;
   OrbitCameras::Params params = orbit_params();
   params.targets = "/Nothing/*";
   params.look_at_offset = 0.0;
@@ -113,7 +113,7 @@ TEST_CASE("without targets cameras look at the working area", "[randomizers]") {
 }
 
 TEST_CASE("cameras stay on the target's side of a wall and off its surface", "[randomizers]") {
-  Set set;
+  CameraSet set;
   // Walls 0.4 m beside both targets: about a third of all views would be taken from behind.
   for (const Vec3& centre : set.centres) {
     set.add_wall("wall", make_box(Vec3(0.1, 8, 8)), centre + Vec3(0.4, 0, 0));
@@ -136,7 +136,7 @@ TEST_CASE("cameras stay on the target's side of a wall and off its surface", "[r
 }
 
 TEST_CASE("no near plane cuts a thing open, but things may hide a target", "[randomizers]") {
-  Set set;
+  CameraSet set;
   // A plate of clutter 0.7 m beside each target: some views are taken from within 0.3 m of it.
   const Vec3 half(0.05, 0.5, 0.5);
   const NodeId clutter = set.scene.create(set.scene.root(), "Distractors");
@@ -168,7 +168,7 @@ TEST_CASE("no near plane cuts a thing open, but things may hide a target", "[ran
 
 TEST_CASE("a target that nothing can see still gets a view, the one without avoidance",
           "[randomizers]") {
-  Set set;
+  CameraSet set;
   for (const Vec3& centre : set.centres) {
     set.add_wall("box", make_box(Vec3(0.7, 0.7, 0.7)), centre);
   }
@@ -182,7 +182,7 @@ TEST_CASE("a target that nothing can see still gets a view, the one without avoi
 }
 
 TEST_CASE("hidden obstacles block no view, distances to triangles are exact", "[randomizers]") {
-  Set set;
+  CameraSet set;
   const NodeId wall = set.add_wall("wall", make_plane(2, 4), Vec3(10, 0, 1));
   const Obstacles obstacles(set.scene, "/Environment/**");
   CHECK(obstacles.is_between(Vec3(10.9, 1.9, 0), Vec3(10.9, 1.9, 2)));
@@ -200,14 +200,14 @@ TEST_CASE("hidden obstacles block no view, distances to triangles are exact", "[
 }
 
 TEST_CASE("cameras know the scene as it is at each call", "[randomizers]") {
-  Set set;
-  Set other;
+  CameraSet set;
+  CameraSet other;
   NodeId wall;
   for (const Vec3& centre : set.centres) {
     wall = set.add_wall("wall", make_box(Vec3(0.1, 8, 8)), centre + Vec3(0.4, 0, 0));
   }
   OrbitCameras orbit(orbit_params(), set.host);
-  const auto sees_what_is_there = [&](Set& now) {
+  const auto sees_what_is_there = [&](CameraSet& now) {
     for (int seed = 0; seed < 20; ++seed) {
       orbit.randomize(now.scene, {}, Rng(std::uint64_t(seed)));
       const Affine pose = now.pose();
@@ -233,7 +233,7 @@ TEST_CASE("cameras know the scene as it is at each call", "[randomizers]") {
 
 TEST_CASE("cameras never stand in a closed thing, and leave the nearest for the freest place",
           "[randomizers]") {
-  Set set;
+  CameraSet set;
   // Shades of lamps, hollow for a camera of 0.3 m clearance, on the sphere of views.
   for (const Vec3& centre : set.centres) {
     for (int i = 0; i < 6; ++i) {

@@ -12,8 +12,8 @@ using namespace diorama::test;
 namespace {
 
 /// Bodies at heights 0, 1 and 2 above the working area, and a lamp that is none.
-struct Shelf {
-  Shelf() {
+struct BodyShelf {
+  BodyShelf() {
     const NodeId parent = scene.create(scene.root(), "Assets");
     for (int i = 0; i < 3; ++i) {
       const NodeId cup = scene.create(parent, "cup_" + std::to_string(i));
@@ -42,7 +42,7 @@ struct Shelf {
 }  // namespace
 
 TEST_CASE("Velocities are drawn per body, and null keeps what it has", "[randomizers]") {
-  Shelf shelf;
+  BodyShelf shelf;
   RandomVelocities::Params params;
   params.velocity = Distribution::between({1, -2, 4}, {2, -1, 8});
   RandomVelocities thrower(params, shelf.host);
@@ -50,7 +50,7 @@ TEST_CASE("Velocities are drawn per body, and null keeps what it has", "[randomi
   for (int i = 0; i < 3; ++i) {
     const Vec3& v = shelf.body(i).linear_velocity;
     CHECK((v.x() >= 1 && v.x() <= 2 && v.y() >= -2 && v.y() <= -1 && v.z() >= 4 && v.z() <= 8));
-    CHECK(shelf.body(i).angular_velocity == Shelf::kBefore);
+    CHECK(shelf.body(i).angular_velocity == BodyShelf::kBefore);
   }
   CHECK(shelf.body(0).linear_velocity != shelf.body(1).linear_velocity);
 
@@ -64,7 +64,7 @@ TEST_CASE("Velocities are drawn per body, and null keeps what it has", "[randomi
 }
 
 TEST_CASE("Only what meets the box is thrown, wherever the working area is", "[randomizers]") {
-  Shelf shelf;
+  BodyShelf shelf;
   RandomVelocities::Params params;
   params.velocity = Distribution::between({0, 0, 5}, {0, 0, 5});
   // The boxes of the cups reach 0.3 m up and down: the first reaches up into it, the second down.
@@ -73,7 +73,7 @@ TEST_CASE("Only what meets the box is thrown, wherever the working area is", "[r
   RandomVelocities(params, shelf.host).randomize(shelf.scene, shelf.context, Rng(3));
   CHECK(shelf.body(0).linear_velocity == Vec3(0, 0, 5));
   CHECK(shelf.body(1).linear_velocity == Vec3(0, 0, 5));
-  CHECK(shelf.body(2).linear_velocity == Shelf::kBefore);
+  CHECK(shelf.body(2).linear_velocity == BodyShelf::kBefore);
 
   params.box_max = {3, 3};
   CHECK_THROWS_WITH(RandomVelocities(params, shelf.host),
@@ -83,18 +83,18 @@ TEST_CASE("Only what meets the box is thrown, wherever the working area is", "[r
 }
 
 TEST_CASE("Bodies are sent towards the working area, the farther the faster", "[randomizers]") {
-  Shelf shelf;
+  BodyShelf shelf;
   PullTogether::Params params;
   params.strength = Range{0.5, 0.5};
   PullTogether(params, shelf.host).randomize(shelf.scene, shelf.context, Rng(3));
   CHECK(shelf.body(0).linear_velocity.isZero(1e-12));
   CHECK(shelf.body(1).linear_velocity.isApprox(Vec3(-0.25, 0.5, -0.5), 1e-12));
   CHECK(shelf.body(2).linear_velocity.isApprox(Vec3(-0.5, 1, -1), 1e-12));
-  CHECK(shelf.body(2).angular_velocity == Shelf::kBefore);
+  CHECK(shelf.body(2).angular_velocity == BodyShelf::kBefore);
 }
 
 TEST_CASE("A lamp's temperature tints its colour and keeps its luminance", "[randomizers]") {
-  Shelf shelf;
+  BodyShelf shelf;
   const NodeId lamp = shelf.scene.require("/Assets/lamp");
   shelf.scene.edit(lamp).light.emplace();
   const auto color_at = [&](double kelvin) {

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "diorama/abi.h"
 #include "diorama/geometry.h"
 #include "embree_renderer.h"
 #include "support/catch.h"
@@ -64,7 +65,7 @@ std::shared_ptr<const Material> textured(int number) {
 }  // namespace
 
 TEST_CASE("a million triangles and a hundred textures fit into 1 GiB", "[memory]") {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if DIORAMA_DETAIL_ADDRESS_SANITIZER || DIORAMA_DETAIL_THREAD_SANITIZER
   WARN("sanitizers need memory of their own: not measured");
 #else
   Scene scene;

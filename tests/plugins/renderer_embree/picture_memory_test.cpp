@@ -3,6 +3,7 @@
 #include <fstream>
 #include <string>
 
+#include "diorama/abi.h"
 #include "embree_renderer.h"
 #include "null_renderer.h"
 #include "support/catch.h"
@@ -57,7 +58,7 @@ Memory memory_of_picture(Renderer& renderer) {
 }  // namespace
 
 TEST_CASE("a large picture takes what its renderer announces, and no more", "[memory]") {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if DIORAMA_DETAIL_ADDRESS_SANITIZER || DIORAMA_DETAIL_THREAD_SANITIZER
   WARN("sanitizers need memory of their own: not measured");
 #else
   test::RenderHost host(2);

@@ -16,19 +16,19 @@ float sample_at(int x, Rng& rng) {
   return float(2.0 + spread * rng.uniform(-1.0, 1.0));
 }
 
-constexpr int kWidth = 64;
-constexpr int kHeight = 40;
+constexpr int kPlanWidth = 64;
+constexpr int kPlanHeight = 40;
 constexpr double kNoisySpread =
     0.57735;  // standard deviation of the uniform distribution on [-1, 1]
 
 struct Outcome {
-  Image<PixelSum> sums{kWidth, kHeight, PixelSum{}};
+  Image<PixelSum> sums{kPlanWidth, kPlanHeight, PixelSum{}};
   int rounds = 0;
 };
 
 Outcome carry_out(const SamplePlan::Limits& limits, double seconds_per_round = 0.0) {
   Outcome outcome;
-  SamplePlan plan(kWidth, kHeight, limits, 5);
+  SamplePlan plan(kPlanWidth, kPlanHeight, limits, 5);
   Rng rng(17);
   while (true) {
     const auto jobs = plan.next_round(outcome.sums, outcome.rounds * seconds_per_round);
@@ -65,8 +65,8 @@ TEST_CASE("an error target is met with few samples where the picture is flat", "
   const Outcome outcome = carry_out({4096, kTarget, 0.0});
   double squares = 0.0;
   double mean = 0.0;
-  for (int y = 0; y < kHeight; ++y) {
-    for (int x = 0; x < kWidth; ++x) {
+  for (int y = 0; y < kPlanHeight; ++y) {
+    for (int x = 0; x < kPlanWidth; ++x) {
       const PixelSum& sum = outcome.sums.at(x, y);
       if (x >= 32) {
         CHECK(sum.count() == 16);
@@ -77,13 +77,13 @@ TEST_CASE("an error target is met with few samples where the picture is flat", "
       CHECK(sum.count() > 0.75 * needed);
       CHECK(sum.count() < 1.6 * needed);
       const double value = double(luminance(sum.mean().scattered));
-      squares += std::pow(value / 2.0 - 1.0, 2) / (32 * kHeight);
-      mean += value / (32 * kHeight);
+      squares += std::pow(value / 2.0 - 1.0, 2) / (32 * kPlanHeight);
+      mean += value / (32 * kPlanHeight);
     }
   }
   CHECK(std::sqrt(squares) < 1.1 * kTarget);
   // Stopping by the error does not shift the mean: four standard errors of it.
-  CHECK(std::abs(mean - 2.0) < 4.0 * 2.0 * kTarget / std::sqrt(32.0 * kHeight));
+  CHECK(std::abs(mean - 2.0) < 4.0 * 2.0 * kTarget / std::sqrt(32.0 * kPlanHeight));
 }
 
 TEST_CASE("an error target ends at the most samples", "[sample_plan]") {

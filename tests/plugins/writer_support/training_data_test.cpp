@@ -7,6 +7,7 @@
 #include <set>
 #include <string>
 
+#include "diorama/abi.h"
 #include "diorama/rng.h"
 #include "memory_files.h"
 #include "support/catch.h"
@@ -99,7 +100,7 @@ TEST_CASE("the page of a dataset is one text, however it is written", "[training
 }
 
 TEST_CASE("a job of millions of captures is split in little memory", "[training]") {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if DIORAMA_DETAIL_ADDRESS_SANITIZER || DIORAMA_DETAIL_THREAD_SANITIZER
   WARN("sanitizers need memory of their own: not measured");
 #else
   constexpr int kCaptures = 2'000'000;
