@@ -2,6 +2,7 @@
 // Writers that break one promise each, in ways that a single run does not show.
 #include <fcntl.h>
 #include <sys/stat.h>
+#include <sys/utsname.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -59,6 +60,11 @@ std::string heap_order() {
 std::string user() {
   const char* const name = std::getenv("USER");
   return name ? name : "nobody";
+}
+std::string machine() {
+  utsname names{};
+  uname(&names);
+  return names.nodename;
 }
 std::string time_zone() {
   const std::time_t noon = 43200;
@@ -217,6 +223,7 @@ DIORAMA_PLUGIN("lying_writers", "1.0.0", "MIT") {
   DIORAMA_ADD(Says<address>, "says_address", "Writes an address of its library.");
   DIORAMA_ADD(Says<heap_order>, "says_heap_order", "Sorts by addresses.");
   DIORAMA_ADD(Says<user>, "says_user", "Writes the user's name.");
+  DIORAMA_ADD(Says<machine>, "says_machine", "Writes the machine's name.");
   DIORAMA_ADD(Says<time_zone>, "says_time_zone", "Writes local time.");
   DIORAMA_ADD(Says<batch_job>, "says_batch_job", "Writes its number among the tasks of a job.");
   DIORAMA_ADD(Says<thread>, "says_thread", "Writes its thread.");
