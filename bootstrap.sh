@@ -24,7 +24,7 @@ build_packages=(
   libxxhash-dev nettle-dev libopencv-core-dev libopencv-imgproc-dev libopencv-calib3d-dev libopencv-imgcodecs-dev
 )
 test_packages=(
-  catch2 binutils clang libclang-rt-14-dev clang-19 libclang-rt-19-dev mesa-vulkan-drivers
+  catch2 binutils clang libclang-rt-14-dev clang-19 lld-19 libclang-rt-19-dev mesa-vulkan-drivers
   python3-h5py python3-jsonschema python3-opencv mypy
 )
 

@@ -33,7 +33,7 @@ DatasetOnDisk dataset_of(typename W::Params params = {}) {
 
 DatasetOnDisk basic_dataset() { return dataset_of<BasicWriter>(everything()); }
 
-bool finds_file(const LintReport& report, const std::string& check, const std::string& file) {
+bool finds(const LintReport& report, const std::string& check, const std::string& file) {
   return std::ranges::any_of(report.findings, [&](const LintFinding& finding) {
     return finding.check == check && finding.file.find(file) != std::string::npos;
   });
@@ -64,8 +64,8 @@ TEST_CASE("swapped numbers in an array are found", "[lint]") {
   const float y = basic.peek<float>(file, place + 4);
   basic.poke(file, place, y);
   basic.poke(file, place + 4, x);
-  CHECK(finds_file(basic.lint(), "pose and camera reproject onto the mask", file));
-  CHECK(finds_file(basic.lint(), "depth back-projects", "rp_cam_0"));
+  CHECK(finds(basic.lint(), "pose and camera reproject onto the mask", file));
+  CHECK(finds(basic.lint(), "depth back-projects", "rp_cam_0"));
 }
 
 TEST_CASE("a missing file is named once", "[lint]") {
@@ -84,13 +84,13 @@ TEST_CASE("the wrong kind of depth is found, with and without the other kind", "
   const auto both = basic_dataset();
   const std::string plane = "rp_cam_0/distance_to_image_plane/distance_to_image_plane_0000.npy";
   both.write("rp_cam_0/distance_to_camera/distance_to_camera_0000.npy", both.read(plane));
-  CHECK(finds_file(both.lint(), "depth back-projects", "distance_to_camera_0000.npy"));
+  CHECK(finds(both.lint(), "depth back-projects", "distance_to_camera_0000.npy"));
 
   BasicWriter::Params params = everything();
   params.distance_to_image_plane = false;
   const auto one = dataset_of<BasicWriter>(params);
   one.write("rp_cam_0/distance_to_camera/distance_to_camera_0000.npy", both.read(plane));
-  CHECK(finds_file(one.lint(), "depth back-projects", "distance_to_camera_0000.npy"));
+  CHECK(finds(one.lint(), "depth back-projects", "distance_to_camera_0000.npy"));
 }
 
 TEST_CASE("the reference's swapped product is right where all files have it, a fault in one",
@@ -107,7 +107,7 @@ TEST_CASE("the reference's swapped product is right where all files have it, a f
     INFO(lint_text(report, 20));
     CHECK(report.findings.empty());
     right.write("000002.json", swapped.read("000002.json"));
-    CHECK(finds_file(right.lint(), "pose agrees with the keypoints", "000002.json"));
+    CHECK(finds(right.lint(), "pose agrees with the keypoints", "000002.json"));
   }
 }
 
@@ -116,7 +116,7 @@ TEST_CASE("ids without an entry and overlapping masks are found", "[lint]") {
   const std::string labels =
       "rp_cam_0/semantic_segmentation/semantic_segmentation_labels_0000.json";
   basic.replace(labels, "(93, ", "(94, ");
-  CHECK(finds_file(basic.lint(), "ids within the label map", "semantic_segmentation_0000.png"));
+  CHECK(finds(basic.lint(), "ids within the label map", "semantic_segmentation_0000.png"));
 
   const auto coco = dataset_of<CocoWriter>();
   std::string json = coco.read("annotations/instances_train.json");
@@ -135,17 +135,17 @@ TEST_CASE("pictures of a foreign size are found, not read beyond their end", "[l
   // cam_1 has fewer columns.
   basic.write("rp_cam_0/instance_segmentation/instance_segmentation_0000.png",
               basic.read("rp_cam_1/instance_segmentation/instance_segmentation_0000.png"));
-  CHECK(finds_file(basic.lint(), "counts agree between files", "instance_segmentation_0000.png"));
+  CHECK(finds(basic.lint(), "counts agree between files", "instance_segmentation_0000.png"));
   const auto kitti = dataset_of<KittiWriter>();
   kitti.write("training/depth_2/000000.png", kitti.read("training/depth_2/000001.png"));
-  CHECK(finds_file(kitti.lint(), "counts agree between files", "depth_2/000000.png"));
+  CHECK(finds(kitti.lint(), "counts agree between files", "depth_2/000000.png"));
   const auto bop = dataset_of<BopWriter>();
   for (const char* split : {"train_pbr", "test"}) {
     const std::string scenes = std::string(split) + "/";
     if (!std::filesystem::exists(bop.folder() / (scenes + "000000/depth/000000.png"))) continue;
     bop.write(scenes + "000000/depth/000000.png", bop.read(scenes + "000001/depth/000000.png"));
   }
-  CHECK(finds_file(bop.lint(), "counts agree between files", "depth/000000.png"));
+  CHECK(finds(bop.lint(), "counts agree between files", "depth/000000.png"));
 }
 
 TEST_CASE("a folder of several datasets is linted in one go, others are refused", "[lint]") {

@@ -443,7 +443,7 @@ bool is_free(const std::string& format, const Mutant& mutant) {
   });
 }
 
-bool is_mutant_found(const DatasetOnDisk& dataset) {
+bool is_found(const DatasetOnDisk& dataset) {
   test::EncodingHost host;
   DatasetReaders readers = test::every_reader(host);
   try {
@@ -479,7 +479,7 @@ Score score_of(const test::SampleFormat& format, const DatasetOnDisk& dataset) {
       dataset.remove(mutant.file);
     }
     ++score.all;
-    if (is_mutant_found(dataset)) {
+    if (is_found(dataset)) {
       ++score.found;
     } else {
       score.missed += "  " + format.name + " " + mutant.file + ": " + mutant.what + "\n";
@@ -501,7 +501,7 @@ TEST_CASE("lint finds seeded faults of every kind", "[lint][mutation]") {
   for (const test::SampleFormat& format : test::every_format()) {
     const DatasetOnDisk dataset(
         format.write(host, test::sample_dataset(test::SampleScene(8, 6)), captures));
-    REQUIRE_FALSE(is_mutant_found(dataset));
+    REQUIRE_FALSE(is_found(dataset));
     const Score score = score_of(format, dataset);
     INFO(format.name << ": " << score.found << " of " << score.all << "\n" << score.missed);
     std::cout << format.name << ": " << score.found << " of " << score.all << "\n"
@@ -561,7 +561,7 @@ TEST_CASE("lint finds what one writer's folder says against another's of the run
           "[lint][mutation]") {
   const DatasetOnDisk run = run_on_disk({"basic", "coco", "yolo_detect", "kitti", "voc", "bop",
                                          "webdataset", "hdf5", "imagefolder", "pose"});
-  REQUIRE_FALSE(is_mutant_found(run));
+  REQUIRE_FALSE(is_found(run));
   int found = 0;
   int all = 0;
   std::string missed;
@@ -574,7 +574,7 @@ TEST_CASE("lint finds what one writer's folder says against another's of the run
     const std::string before = run.read(mutant.file);
     run.write(mutant.file, *mutant.content);
     ++all;
-    if (is_mutant_found(run)) {
+    if (is_found(run)) {
       ++found;
     } else {
       missed += "  " + mutant.file + ": " + mutant.what + "\n";
@@ -590,7 +590,7 @@ TEST_CASE("lint finds what one writer's folder says against another's of the run
 
 TEST_CASE("3-D boxes are held against those of another writer of the run", "[lint][mutation]") {
   const DatasetOnDisk run = run_on_disk({"basic", "kitti"});
-  REQUIRE_FALSE(is_mutant_found(run));
+  REQUIRE_FALSE(is_found(run));
   const std::string file = "kitti/training/label_2/000004.txt";
   const std::vector<std::string> lines = pieces(run.read(file), '\n');
   using Words = std::vector<std::string>;
@@ -624,13 +624,13 @@ TEST_CASE("3-D boxes are held against those of another writer of the run", "[lin
     changed[std::size_t(line - lines.begin())] = put_together(words, ' ', false);
     run.write(file, put_together(changed, '\n', true));
     INFO(*line << ": " << what);
-    CHECK(is_mutant_found(run));
+    CHECK(is_found(run));
   }
 }
 
 TEST_CASE("hidden shares are held against those of another writer of the run", "[lint][mutation]") {
   const DatasetOnDisk run = run_on_disk({"basic", "imagefolder"});
-  REQUIRE_FALSE(is_mutant_found(run));
+  REQUIRE_FALSE(is_found(run));
   const std::string file = "imagefolder/train/metadata.jsonl";
   std::string text = run.read(file);
   const std::string key = "\"visible_share\": [";
@@ -639,19 +639,19 @@ TEST_CASE("hidden shares are held against those of another writer of the run", "
   const std::size_t begin = at + key.size();
   text.replace(begin, text.find_first_of(",]", begin) - begin, "0.123");
   run.write(file, text);
-  CHECK(is_mutant_found(run));
+  CHECK(is_found(run));
 }
 
 TEST_CASE("a model's diameter is that of its vertices", "[lint][mutation]") {
   const DatasetOnDisk run = run_on_disk({"bop"});
-  REQUIRE_FALSE(is_mutant_found(run));
+  REQUIRE_FALSE(is_found(run));
   const std::string file = "bop/models/models_info.json";
   auto page = nlohmann::json::parse(run.read(file));
   nlohmann::json& model = page.begin().value();
   // Still no less than its longest side.
   model["diameter"] = 0.5 * (model["diameter"].get<double>() + model["size_x"].get<double>());
   run.write(file, page.dump());
-  CHECK(is_mutant_found(run));
+  CHECK(is_found(run));
 }
 
 namespace {
@@ -692,7 +692,7 @@ struct TextFault {
 };
 
 void check_all_found(const DatasetOnDisk& run, const std::vector<TextFault>& faults) {
-  REQUIRE_FALSE(is_mutant_found(run));
+  REQUIRE_FALSE(is_found(run));
   for (const TextFault& fault : faults) {
     INFO(fault.what);
     const std::string file = file_like(run, fault.file);
@@ -700,7 +700,7 @@ void check_all_found(const DatasetOnDisk& run, const std::vector<TextFault>& fau
     const std::string spoiled = fault.spoil(before);
     REQUIRE(spoiled != before);
     run.write(file, spoiled);
-    CHECK(is_mutant_found(run));
+    CHECK(is_found(run));
     run.write(file, before);
   }
 }
@@ -846,21 +846,21 @@ TEST_CASE("symmetries leave models what they are, as near as the job asks", "[li
     for (auto& [id, model] : table.items()) model[key] = value;
     run.write(file, table.dump());
   };
-  REQUIRE_FALSE(is_mutant_found(run));
+  REQUIRE_FALSE(is_found(run));
   const Json none = Json::array();
   // A mirror, a turn by less than a quarter, a shift and an axis beside the middle.
   const Json mirror{{-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}};
   const Json shift{{1, 0, 0, 40, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}};
   for (const Json& map : {mirror, shift}) {
     with("symmetries_discrete", Json::array({map}));
-    CHECK(is_mutant_found(run));
+    CHECK(is_found(run));
   }
   with("symmetries_continuous", Json::array({{{"axis", {0, 0, 1}}, {"offset", {70, 0, 0}}}}));
-  CHECK(is_mutant_found(run));
+  CHECK(is_found(run));
   with("symmetries_continuous", Json::array({{{"axis", {0, 0, 2}}, {"offset", {0, 0, 0}}}}));
-  CHECK(is_mutant_found(run));
+  CHECK(is_found(run));
   with("symmetries_continuous", none);
-  CHECK_FALSE(is_mutant_found(run));
+  CHECK_FALSE(is_found(run));
 }
 
 TEST_CASE("classes are sorted unless the job puts them in an order", "[lint][mutation]") {
@@ -872,7 +872,7 @@ TEST_CASE("classes are sorted unless the job puts them in an order", "[lint][mut
     page["job"] = job;
     if (is_turned) std::ranges::reverse(page["classes"]);
     run.write(file, page.dump());
-    return is_mutant_found(run);
+    return is_found(run);
   };
   const std::string plain = "    classes: []\n    mapping_dict: null\n";
   CHECK_FALSE(say(plain, false));
@@ -908,6 +908,6 @@ TEST_CASE("normals are held against those of another writer of the run", "[lint]
           format.write(host, sample.dataset, is_hdf5 && is_turned ? captures : sample.captures());
       for (const auto& [path, bytes] : files.files) all.files[format.name + "/" + path] = bytes;
     }
-    CHECK(is_mutant_found(DatasetOnDisk(all)) == is_turned);
+    CHECK(is_found(DatasetOnDisk(all)) == is_turned);
   }
 }
