@@ -6,7 +6,7 @@
 #   ./bootstrap.sh build    install what is needed, build
 #   ./bootstrap.sh sanitize install what is needed, build with sanitizers and run what reads files of others and
 #                           the renderer (address, undefined) and what has threads (thread)
-#   ./bootstrap.sh sanitize-more the same for tests that take longer
+#   ./bootstrap.sh sanitize-more the same for tests that take longer, and the program with every writer (thread)
 #   ./bootstrap.sh packages install what is needed for all of these, tests/check_format.sh and tests/check_tidy.sh
 # Options: --preset NAME   a preset of CMakePresets.json (default: release)
 set -euo pipefail
@@ -148,11 +148,13 @@ case $command in
     install_packages "${build_packages[@]}" "${test_packages[@]}"
     sanitize asan "${foreign_bytes[@]}" "${renderer[@]}"
     sanitize tsan "${threads[@]}"
-    run_all_writers tsan
     ;;
   sanitize-more)
     install_packages "${build_packages[@]}" "${test_packages[@]}"
     sanitize asan "${by_night[@]}"
+    preset=tsan
+    configure ON
+    run_all_writers tsan
     ;;
   packages) install_packages "${build_packages[@]}" "${test_packages[@]}" "${check_packages[@]}" ;;
   help | -h | --help) usage ;;
