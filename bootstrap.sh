@@ -30,13 +30,11 @@ test_packages=(
 
 check_packages=(clang-format-14 clang-tidy-19 clang-16)  # clang-16: for tests of the headers
 # Tests by what they are about, for the sanitizers: in every run of CI, and by night.
-foreign_bytes=(
-  sdk_test config_test host_test images_test output_test datasets_test lint_test loader_usd_test
-  writer_support_test
-)
+foreign_bytes=(config_test host_test images_test loader_usd_test)  # readers of datasets: the fuzzers
 renderer=(renderer_embree_test)
 by_night=(
-  pipeline_test physics_bullet_test replicator_test plugin_search_test framework_inspect_test loader_usd_expected loader_assimp_test
+  sdk_test output_test datasets_test lint_test writer_support_test pipeline_test physics_bullet_test
+  replicator_test plugin_search_test framework_inspect_test loader_usd_expected loader_assimp_test
   renderer_support_test loader_urdf_test
 )
 threads=(host_test pipeline_test output_test)
