@@ -18,7 +18,7 @@ export DIORAMA_BUILD=$build
 part_build() {
   ./bootstrap.sh packages && cmake --preset release -D DIORAMA_BUILD_TESTS=ON -D DIORAMA_WARNINGS_AS_ERRORS=ON &&
     cmake --build --preset release --target all benchmarks denoiser_pictures &&
-    DIORAMA_FUZZER_OPTIMIZATION=-O1 ctest --preset release -R '^fuzz_'  # builds the fuzzers
+    ctest --preset release -R '^fuzz_'  # builds the fuzzers
 }
 part_mutants() { DIORAMA_ALL_MUTANTS=1 "$build/tests/lint_test"; }
 part_kills() { tests/cluster/torture.py --kills "${KILLS:-1000}" --seed "$(date +%F)" --build "$build"; }

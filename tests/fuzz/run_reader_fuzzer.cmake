@@ -4,8 +4,7 @@
 include(${CMAKE_CURRENT_LIST_DIR}/run.cmake)
 
 cmake_host_system_information(RESULT processors QUERY NUMBER_OF_LOGICAL_CORES)
-run(${CMAKE_COMMAND} -S ${SOURCE}/tests/fuzz/readers -B ${BUILD} -DCMAKE_CXX_COMPILER=${CLANGXX}
-    -DFUZZER_OPTIMIZATION=${optimization})
+run(${CMAKE_COMMAND} -S ${SOURCE}/tests/fuzz/readers -B ${BUILD} -DCMAKE_CXX_COMPILER=${CLANGXX})
 run(${CMAKE_COMMAND} --build ${BUILD} --parallel ${processors} --target ${FUZZER})
 file(MAKE_DIRECTORY ${BUILD}/corpus/${NAME})
 run(${BUILD}/${FUZZER} -max_total_time=${SECONDS} -rss_limit_mb=1024 -timeout=10 -max_len=65536

@@ -3,8 +3,7 @@
 include(${CMAKE_CURRENT_LIST_DIR}/run.cmake)
 
 cmake_host_system_information(RESULT processors QUERY NUMBER_OF_LOGICAL_CORES)
-run(${CMAKE_COMMAND} -S ${SOURCE}/tests/fuzz/usd -B ${BUILD} -DCMAKE_CXX_COMPILER=${CLANGXX}
-    -DFUZZER_OPTIMIZATION=${optimization})
+run(${CMAKE_COMMAND} -S ${SOURCE}/tests/fuzz/usd -B ${BUILD} -DCMAKE_CXX_COMPILER=${CLANGXX})
 run(${CMAKE_COMMAND} --build ${BUILD} --parallel ${processors})
 file(MAKE_DIRECTORY ${BUILD}/corpus ${BUILD}/seeds)
 if(EXISTS ${SOURCE}/../shared/data/usd)
