@@ -87,9 +87,11 @@ sanitize() {
 
 # The program itself, with every writer at once on many threads, two shards after each other.
 run_all_writers() {
-  cmake --build --preset "$1" --target diorama physics_bullet randomizers_core renderer_null "${writers[@]}"
+  preset=$1
+  configure ON
+  cmake --build --preset "$preset" --target diorama physics_bullet randomizers_core renderer_null "${writers[@]}"
   local jobs=(tests/end_to_end/all_writers.yaml tests/end_to_end/all_clip_writers.yaml)
-  local program=build/$1/bin/diorama output job shard type
+  local program=build/$preset/bin/diorama output job shard type
   for type in $("$program" plugins | grep -oE '\b[A-Za-z0-9]+Writer\b' | sort -u); do
     grep -q "type: $type," "${jobs[@]}" || { echo "bootstrap: $type is in none of ${jobs[*]}" >&2; exit 1; }
   done
@@ -150,8 +152,6 @@ case $command in
   sanitize-more)
     install_packages "${build_packages[@]}" "${test_packages[@]}"
     sanitize asan "${by_night[@]}"
-    preset=tsan
-    configure ON
     run_all_writers tsan
     ;;
   packages) install_packages "${build_packages[@]}" "${test_packages[@]}" "${check_packages[@]}" ;;

@@ -29,8 +29,8 @@ constexpr float kMinAlbedo = 0.02f;
 constexpr float kMixedTolerance = 100.0f;
 // Below this share of agreeing neighbours a pixel was hardly averaged: edges, thin things.
 constexpr float kLowSupport = 0.35f;
-constexpr float kValidNeighbours =
-    10.0f;                       // averaged pixels near a low_support one that make it suspect
+// So many averaged pixels near one of low support make it suspect.
+constexpr float kValidNeighbours = 10.0f;
 constexpr float kLeeway = 2.0f;  // by which it may leave their range
 
 // Of the paths of one pixel: what so many may bring each, one of more may bring for all of them.
@@ -502,7 +502,7 @@ inline void PlaneFilter::limit_outliers(int y) {
   }
 }
 
-/// By how much eight pixels of which some are low_support become brighter or darker.
+/// By how much eight pixels of which some have low support become brighter or darker.
 inline Lanes PlaneFilter::outlier_scale(int x, int y, const Lanes& low_support) const {
   const Lanes zero{};
   Lanes low = all_lanes(kInfinite);

@@ -81,14 +81,6 @@ bool can_rename_the_machine() {
 }  // namespace
 
 TEST_CASE("writers that lie are found out", "[conformance]") {
-  Expected machine;
-  std::set<std::string> honest{"honest"};
-  if (can_rename_the_machine()) {
-    machine.emplace("says_machine", kAnotherProcess);
-  } else {
-    WARN("no other name of the machine here: writers that tell it are not looked for");
-    honest.insert("says_machine");
-  }
   Expected liars{{"says_process", kAnotherProcess},
                  {"says_seconds", kAnotherProcess},
                  {"says_address", kAnotherProcess},
@@ -118,7 +110,13 @@ TEST_CASE("writers that lie are found out", "[conformance]") {
                  {"item_too_large", "defaults are within their ranges"},
                  {"default_not_among_words", "defaults are within their ranges"},
                  {"says_it_twice", "parameters are documented"}};
-  liars.merge(machine);
+  std::set<std::string> honest{"honest"};
+  if (can_rename_the_machine()) {
+    liars.emplace("says_machine", kAnotherProcess);
+  } else {
+    WARN("no other name of the machine here: writers that tell it are not looked for");
+    honest.insert("says_machine");
+  }
   expect("lying_writers", "writer", liars, honest);
 }
 

@@ -8,7 +8,7 @@ using namespace diorama::test;
 
 namespace {
 
-constexpr const char* kBenchSquare = R"(#usda 1.0
+constexpr const char* kBenchBox = R"(#usda 1.0
 (
     metersPerUnit = 1
     upAxis = "Z"
@@ -36,7 +36,7 @@ constexpr const char* kRig = R"({
               "color": [1, 1, 1]}]})";
 
 Outcome bench(const TemporaryFolder& folder, std::vector<std::string> more) {
-  write_file(folder / "box.usda", kBenchSquare);
+  write_file(folder / "box.usda", kBenchBox);
   write_file(folder / "rig.json", kRig);
   std::vector<std::string> all{"bench", "--scene", "box.usda"};
   all.insert(all.end(), more.begin(), more.end());
