@@ -854,9 +854,11 @@ void OutputStore::publish(int entry, const JournalledFiles& content) {
     writer_.void_entry(options_.self.name, entry);
     for (const fs::path& path : moved) file_system_.remove_file(path);
     clear_stage(entry, content.files.size());
-    throw Error(ErrorKind::Output,
-                target.string() + ": exists and is no file of this dataset (" + entry_name(entry) +
-                    " has another content); move it away or choose another --output");
+    throw Error(
+        ErrorKind::Output,
+        target.string() + ": exists with another content than " + entry_name(entry) +
+            " has. When another capture wrote it, a writer names files of two captures alike; "
+            "when it is not of this dataset, move it away or choose another --output");
   }
 }
 

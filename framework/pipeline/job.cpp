@@ -10,6 +10,7 @@
 
 #include "framework/config/clean_text.h"
 #include "framework/config/joined.h"
+#include "framework/config/place_of.h"
 #include "framework/config/value_text.h"
 #include "framework/pipeline/camera_rig.h"
 #include "framework/pipeline/job_keys.h"
@@ -94,11 +95,6 @@ std::vector<std::pair<std::string, Value>> entries(const Value* list, std::strin
 std::vector<std::pair<std::string, Value>> entries(const Value& job, std::string_view section,
                                                    Diagnostics& diagnostics) {
   return entries(job.find(section), section, diagnostics);
-}
-
-const SourceLocation& place_of(const Value& map, std::string_view key) {
-  const Value* value = map.find(key);
-  return value ? value->place : map.place;
 }
 
 void require_type(const ComponentConfig& entry, Diagnostics& diagnostics) {

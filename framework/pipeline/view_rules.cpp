@@ -7,6 +7,7 @@
 #include <span>
 
 #include "diorama/node_pattern.h"
+#include "framework/config/place_of.h"
 #include "framework/config/value_text.h"
 
 namespace diorama {
@@ -18,11 +19,6 @@ constexpr const char* kQuotaWords[] = {
     "label",         "direction", "distance_m", "azimuth_deg", "elevation_deg", "visible_pixels",
     "visible_share", "occlusion", "truncation", "size_px",     "size_share",    "occluders"};
 constexpr double kMostShares = 100000.0;
-
-const SourceLocation& place_of_key(const Value& map, const std::string& key) {
-  const Value* value = map.find(key);
-  return value ? value->place : map.place;
-}
 
 /// The azimuths that a rule lets be, as an interval of at most 360 degrees.
 struct Azimuths {
@@ -229,14 +225,14 @@ void check_view_rule(const ViewRule& rule, const std::vector<std::string>& serie
     const std::string near = nearest_name(name, series);
     std::string known;
     for (const std::string& one : series) known += (known.empty() ? "" : ", ") + one;
-    diagnostics.add(place_of_key(rule.map, "on"),
+    diagnostics.add(place_of(rule.map, "on"),
                     rule.path + ".on: unknown capture series '" + name + "'" +
                         (near.empty() ? "" : "; did you mean '" + near + "'?") +
                         " (known: " + known + ")");
   }
   for (const auto& [key, limits] : limits_of(rule)) {
     if (!limits->min || !limits->max || *limits->min <= *limits->max) continue;
-    diagnostics.add(place_of_key(rule.map, key),
+    diagnostics.add(place_of(rule.map, key),
                     rule.path + "." + key + ": min (" + short_number(*limits->min) +
                         ") is greater than max (" + short_number(*limits->max) + ")");
   }

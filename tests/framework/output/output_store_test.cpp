@@ -705,8 +705,8 @@ TEST_CASE("Overwriting with a job of other writers leaves nothing of the old one
     Transaction capture;
     capture.files.push_back({0, "new_0.png", bytes_of("colour 0")});
     CHECK_THROWS_WITH(store.commit_capture(0, capture),
-                      ContainsSubstring("/data/out/one/new_0.png: exists and is no file of this "
-                                        "dataset") &&
+                      ContainsSubstring("/data/out/one/new_0.png: exists with another content than "
+                                        "000000 has") &&
                           ContainsSubstring("move it away"));
   }
   CHECK(dataset_files(disk.tree("/data")) == Files{{"out/dataset.json", kDataset},

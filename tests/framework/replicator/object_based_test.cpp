@@ -5,7 +5,7 @@
 #include "framework/config/value_text.h"
 #include "framework/config/yaml_config.h"
 #include "framework/pipeline/job.h"
-#include "replicator_complaints.h"
+#include "replicator_diagnostics.h"
 #include "support/catch.h"
 
 using namespace diorama;
