@@ -194,15 +194,31 @@ std::string JournalWriter::add_entry(const std::string& text) {
 
 void JournalWriter::add_line(std::string line) { append(*index_, journal_line(std::move(line))); }
 
-/// What follows a torn line would be lost with it.
-void JournalWriter::append(AppendFile& file, const std::string& text) {
-  if (is_torn_) {
-    throw Error(ErrorKind::Output, (folder_ / worker_).string() +
-                                       ": the journal takes no more since writing it failed");
+/// Nothing is written after a failure: what follows a torn line would be lost with it. Each thread
+/// that tries says why the first one failed, as any of them may be the one that is heard.
+template <class Write>
+void JournalWriter::attempt(Write write) {
+  if (!failure_.empty()) {
+    throw Error(ErrorKind::Output,
+                (folder_ / worker_).string() +
+                    ": the journal takes no more since writing it failed: " + failure_);
   }
-  is_torn_ = true;
-  file.append(std::as_bytes(std::span(text)));
-  is_torn_ = false;
+  failure_ = "it was broken off";
+  try {
+    write();
+  } catch (const Error& error) {
+    failure_ = error.what();
+    throw;
+  }
+  failure_.clear();
+}
+
+void JournalWriter::append(AppendFile& file, const std::string& text) {
+  attempt([&] { file.append(std::as_bytes(std::span(text))); });
+}
+
+void JournalWriter::sync(AppendFile& file) {
+  attempt([&] { file.sync(); });
 }
 
 void JournalWriter::commit(int entry, const JournalledFiles& files) {
@@ -210,9 +226,9 @@ void JournalWriter::commit(int entry, const JournalledFiles& files) {
   const std::lock_guard lock(mutex_);
   start();
   const std::string place = add_entry(text);
-  entries_->sync();
+  sync(*entries_);
   add_line("c " + entry_name(entry) + " " + place);
-  index_->sync();
+  sync(*index_);
 }
 
 void JournalWriter::published(int entry) {
@@ -230,21 +246,21 @@ void JournalWriter::void_entry(const std::string& worker, int entry) {
   const std::lock_guard lock(mutex_);
   start();
   add_line("v " + worker + " " + entry_name(entry));
-  index_->sync();
+  sync(*index_);
 }
 
 void JournalWriter::settled(const std::string& worker, std::uint64_t bytes) {
   const std::lock_guard lock(mutex_);
   start();
   add_line("r " + worker + " " + std::to_string(bytes));
-  index_->sync();
+  sync(*index_);
 }
 
 void JournalWriter::checkpoint() {
   const std::lock_guard lock(mutex_);
   if (!index_) return;
   add_line("s");
-  index_->sync();
+  sync(*index_);
 }
 
 bool JournalWriter::has_lines() const {

@@ -114,6 +114,9 @@ class JournalWriter {
   std::string add_entry(const std::string& text);
   void add_line(std::string line);
   void append(AppendFile& file, const std::string& text);
+  void sync(AppendFile& file);
+  template <class Write>
+  void attempt(Write write);
 
   FileSystem& file_system_;
   std::filesystem::path folder_;
@@ -123,7 +126,7 @@ class JournalWriter {
   std::unique_ptr<AppendFile> index_;
   std::unique_ptr<AppendFile> entries_;
   std::uint64_t entries_bytes_ = 0;
-  bool is_torn_ = false;
+  std::string failure_;  // why nothing is written any more; empty: nothing failed
 };
 
 /// Where a transaction stands among a worker's entries. Small: at the end of a run there is one in

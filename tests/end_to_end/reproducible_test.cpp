@@ -252,9 +252,11 @@ TEST_CASE("The resolved job gives the dataset of the job", "[run]") {
 TEST_CASE("Memory does not grow from the third visit on", "[run][slow]") {
   const TemporaryFolder folder;
   const auto peak_of = [&](const char* captures, const char* visits, const char* output) {
-    const Outcome outcome = run(smoke(output, {"--queue-mib", "1", "--visits-in-flight", visits,
-                                               "--set", std::string("total_captures=") + captures}),
-                                folder.path());
+    // A long run puts more threads to work than a short one, and each holds memory of its own.
+    const Outcome outcome =
+        run(smoke(output, {"--threads", "2", "--queue-mib", "1", "--visits-in-flight", visits,
+                           "--set", std::string("total_captures=") + captures}),
+            folder.path());
     REQUIRE(outcome.exit_code == 0);
     return outcome.max_rss_kb;
   };

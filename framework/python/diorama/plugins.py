@@ -23,6 +23,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+import importlib.machinery
 import importlib.util
 import inspect
 import logging
@@ -265,12 +266,20 @@ def _module_name(file: str) -> str:
     return "_diorama_script_" + hashlib.sha256(file.encode()).hexdigest()[:16]
 
 
+class _SourceLoader(importlib.machinery.SourceFileLoader):
+    """Runs what the file says now, and nothing else: compiled files beside it may be of another text that is as long
+    and as old to the second, or of somebody who may write there."""
+
+    def get_code(self, fullname: str) -> types.CodeType:
+        return self.source_to_code(self.get_data(self.path), self.path)
+
+
 def _module(file: str) -> types.ModuleType:
     """A file is run once per process."""
     name = _module_name(file)
     module = sys.modules.get(name)
     if module is None:
-        spec = importlib.util.spec_from_file_location(name, pathlib.Path(file))
+        spec = importlib.util.spec_from_file_location(name, pathlib.Path(file), loader=_SourceLoader(name, file))
         assert spec is not None and spec.loader is not None
         module = importlib.util.module_from_spec(spec)
         sys.modules[name] = module

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Components in Python files, by the program: python_plugin_test.py PROGRAM SOURCE"""
+import importlib.util
 import json
 import os
 import pathlib
+import py_compile
 import subprocess
 import sys
 import tempfile
@@ -392,6 +394,15 @@ class Runs(unittest.TestCase):
         self.check_refused(self.run_job(self.randomizer("Move")), 3, "is not run", f"everybody may write to {self.scripts.resolve()}, ")
         self.scripts.chmod(0o755)
         self.assertEqual(self.run_job(self.randomizer("Move")).returncode, 0)
+
+    def test_compiled_files_beside_a_script_are_not_run(self):
+        script = self.scripts / "mine.py"
+        planted = self.folder / "planted.py"
+        planted.write_text("raise SystemExit('planted')\n")
+        py_compile.compile(str(planted), importlib.util.cache_from_source(str(script)),
+                           invalidation_mode=py_compile.PycInvalidationMode.UNCHECKED_HASH)
+        result = self.run_job(self.randomizer("Move"))
+        self.assertEqual(result.returncode, 0, result.stderr)
 
     def test_parameters_are_checked_by_their_declaration(self):
         for params, words in {
