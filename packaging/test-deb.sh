@@ -5,11 +5,13 @@
 # come with the packages, removes everything and looks for leftovers.
 #   packaging/test-deb.sh            Debian 12, with the packages of packaging/build-deb.sh
 #   packaging/test-deb.sh trixie     Debian 13: first builds, tests and packs the source there
+#   packaging/test-deb.sh RELEASE FOLDER   either, with packages of that release that were built before
 # Needs root; installs debootstrap. Packages come from the mirror that apt uses here. The default job renders
 # with fewer samples per pixel (SAMPLES, default 2): what is tried is the installation.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 release=${1:-bookworm}
+packages=${2:-}
 mirror=$(apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' 'Label: Debian' | head -n 1)
 
 if ((EUID != 0)); then echo "test-deb: must run as root (chroot)" >&2; exit 1; fi
@@ -18,8 +20,9 @@ if ! command -v debootstrap >/dev/null; then
   DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends debootstrap >/dev/null
 fi
 mkdir -p build
-if [[ $release == bookworm && ! -e $(echo build/deb/diorama_*.deb) ]]; then
-  echo "test-deb: no packages in build/deb; run packaging/build-deb.sh" >&2
+if [[ -z $packages && $release == bookworm ]]; then packages=build/deb; fi
+if [[ $packages && ! -e $(echo "$packages"/diorama_*.deb) ]]; then
+  echo "test-deb: no packages in $packages; run packaging/build-deb.sh" >&2
   exit 1
 fi
 
@@ -121,8 +124,7 @@ remove_everything() {
     -o APT::AutoRemove::SuggestsImportant=false >/dev/null
 }
 
-packages=build/deb
-if [[ $release != bookworm ]]; then
+if [[ -z $packages ]]; then
   make_system "$PWD/build/debootstrap-$release-build"
   build_inside
   packages=build/deb-$release

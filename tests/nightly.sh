@@ -23,8 +23,8 @@ part_build() {
 part_mutants() { DIORAMA_ALL_MUTANTS=1 "$build/tests/lint_test"; }
 part_kills() { tests/cluster/torture.py --kills "${KILLS:-1000}" --seed "$(date +%F)" --build "$build"; }
 part_faults() { tests/cluster/torture.py --faults "${FAULTS:-5000}" --seed "$(date +%F)" --build "$build"; }
-# The hidden tests: a million captures of a thousand shards.
-part_large() { "$build/tests/output_test" '[.large]'; }
+# The hidden tests: a million captures of a thousand shards, all sample rooms.
+part_large() { "$build/tests/output_test" '[.large]' && "$build/tests/resting_test" '[.large]'; }
 part_cluster() { tests/cluster/run.sh --build "$build"; }
 part_views() { tests/chosen_views/check_views.py --build "$build" --captures "${VIEWS:-1000}"; }
 part_clip() {

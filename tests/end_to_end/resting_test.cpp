@@ -56,12 +56,8 @@ struct Room {
   std::vector<NodeId> things;
 };
 
-}  // namespace
-
-TEST_CASE(
-    "In each of the ten sample rooms forty things come to rest, none through the floor or deep in "
-    "furniture",
-    "[run][slow]") {
+/// Forty things in a sample room.
+void expect_rest(std::uint64_t first_seed, std::uint64_t last_seed) {
   test::PlainHost host;
   // Not held to this yet: parts of these (a white board's panel, the pages of a book, a barrel) end
   // up to 30 mm deep in furniture.
@@ -70,7 +66,7 @@ TEST_CASE(
       "SM_Book_34",           "SM_BookOpen_01", "SM_Briefcase",
       "SM_Extinguisher",      "SM_GasCart_01b", "SM_Toweldispenser_01a"};
   const Meshes meshes = test::sample_meshes(host, kLeftOut);
-  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+  for (std::uint64_t seed = first_seed; seed <= last_seed; ++seed) {
     Room room(seed, host);
     room.drop(meshes, 40, Rng(seed));
     BulletBackend physics({}, host);
@@ -92,3 +88,13 @@ TEST_CASE(
     CHECK(slow >= 36);  // one may just be rolling off a chair
   }
 }
+
+}  // namespace
+
+TEST_CASE("In sample rooms forty things come to rest, none through the floor or deep in furniture",
+          "[run][slow]") {
+  expect_rest(1, 3);
+}
+
+// By night: three rooms tell of most mistakes.
+TEST_CASE("So they do in the other seven", "[.large]") { expect_rest(4, 10); }

@@ -643,14 +643,15 @@ TEST_CASE("sums do not depend on how many paths are under way", "[vulkan]") {
   CHECK(sums(7) == many);
 }
 
-TEST_CASE("a ray that passes a hundred thousand surfaces is right, or ends the job", "[vulkan]") {
+TEST_CASE("a ray that passes forty thousand surfaces is right, or ends the job", "[vulkan]") {
   if (!test::has_vulkan_device()) return;
-  // Sheets that are not there, one behind the other: rays look at all of them.
+  // Sheets that are not there, one behind the other: rays look at all of them, and at as many nodes
+  // of the tree, which is more than the 65,535 rounds after which lavapipe of Mesa 22.3 ends loops.
   TestWorld world;
-  constexpr int kSheets = 100'000;
+  constexpr int kSheets = 40'000;
   Mesh sheets;
   for (int i = 0; i < kSheets; ++i) {
-    const float x = 1.0f + 1e-4f * float(i);
+    const float x = 1.0f + 2e-4f * float(i);
     const auto first = std::uint32_t(sheets.positions.size());
     sheets.positions.insert(sheets.positions.end(),
                             {Vec3f(x, -9, -9), Vec3f(x, 9, -9), Vec3f(x, 0, 9)});
