@@ -11,6 +11,17 @@
 #include "stage.h"
 
 namespace diorama::usd {
+
+/// The times of a template, from file to file.
+struct ClipTemplate {
+  const std::string* pattern = nullptr;
+  double first = 0.0;
+  double stride = 1.0;
+  double last = 0.0;
+
+  double count() const { return std::floor((last - first) / stride + 1e-9) + 1.0; }
+};
+
 namespace {
 
 // A template of more files than this is none.
@@ -144,19 +155,10 @@ std::string fill_template(const std::string& pattern, double time) {
          pattern.substr(second_end);
 }
 
-// The times of a template, from file to file; nothing where it is none.
-struct Template {
-  const std::string* pattern = nullptr;
-  double first = 0.0;
-  double stride = 1.0;
-  double last = 0.0;
-
-  double count() const { return std::floor((last - first) / stride + 1e-9) + 1.0; }
-};
-
-std::optional<Template> template_of(const Dictionary& fields) {
+// Nothing where it is none.
+std::optional<ClipTemplate> template_of(const Dictionary& fields) {
   const Value* value = find(fields, "templateAssetPath");
-  Template result;
+  ClipTemplate result;
   result.pattern = value ? value->as_text() : nullptr;
   result.first = number_or(fields, "templateStartTime", NAN);
   result.last = number_or(fields, "templateEndTime", NAN);
@@ -244,19 +246,30 @@ void ValueClips::read_explicit(ClipSet& set, const Dictionary& fields) {
   set.time = start_time(root_, set.to_stage, time_).value_or(set.clips.front().begin);
 }
 
+// Of the files of a template that are there. Members of a crowd share one.
+const std::vector<double>& ValueClips::times_of(const ClipSet& set, const ClipTemplate& files) {
+  const TemplateKey key{set.layer,   set.stack,  *files.pattern,
+                        files.first, files.last, files.stride};
+  const auto [known, is_new] = templates_.try_emplace(key);
+  std::vector<double>& times = known->second;
+  for (double number = 0.0; is_new && number < files.count(); ++number) {
+    const double time = files.first + number * files.stride;
+    const std::string asset = fill_template(*files.pattern, time);
+    const bool is_there =
+        assets_.exists(stacks_.anchor(asset, *set.layer, set.stack->expression_variables));
+    if (is_there) times.push_back(time);
+  }
+  return times;
+}
+
 // Of a template the files that are there count, and each is a pair of the mapping.
 bool ValueClips::read_template(ClipSet& set, const Dictionary& fields) {
-  const std::optional<Template> files = template_of(fields);
+  const std::optional<ClipTemplate> files = template_of(fields);
   if (!files) return false;
   double offset = number_or(fields, "templateActiveOffset", 0.0);
   if (!std::isfinite(offset)) offset = 0.0;
-  for (double number = 0.0; number < files->count(); ++number) {
-    const double time = files->first + number * files->stride;
-    const std::string asset = fill_template(*files->pattern, time);
-    if (!assets_.exists(stacks_.anchor(asset, *set.layer, set.stack->expression_variables))) {
-      continue;
-    }
-    set.clips.push_back({time + offset, asset});
+  for (const double time : times_of(set, *files)) {
+    set.clips.push_back({time + offset, fill_template(*files->pattern, time)});
     set.times.emplace_back(time, time);
   }
   if (set.clips.empty()) return false;
@@ -474,7 +487,7 @@ void add_clip_assets(const Dictionary& clips, std::set<std::string>& assets) {
     if (listed && listed->as_strings()) {
       assets.insert(listed->as_strings()->begin(), listed->as_strings()->end());
     }
-    const std::optional<Template> files = template_of(*fields);
+    const std::optional<ClipTemplate> files = template_of(*fields);
     for (double number = 0.0;
          files && number < files->count() && double(assets.size()) < kMostClips; ++number) {
       assets.insert(fill_template(*files->pattern, files->first + number * files->stride));

@@ -14,6 +14,7 @@
 
 namespace diorama::usd {
 
+struct ClipTemplate;
 struct IndexNode;
 struct Prim;
 struct FoundValue;
@@ -49,6 +50,7 @@ class ValueClips {
   std::vector<ClipSet> read_sets(const Prim& prim);
   static void in_order(const Prim& prim, std::vector<ClipSet>& sets);
   void read_explicit(ClipSet& set, const Dictionary& fields);
+  const std::vector<double>& times_of(const ClipSet& set, const ClipTemplate& files);
   bool read_template(ClipSet& set, const Dictionary& fields);
   std::shared_ptr<const Layer> open(const std::string& asset, const ClipSet& set);
   Said said_in(const std::string& asset, const ClipSet& set, const std::string& path,
@@ -61,6 +63,9 @@ class ValueClips {
   const Layer& root_;
   std::optional<double> time_;
   std::map<const Prim*, std::vector<ClipSet>> sets_;
+  using TemplateKey =
+      std::tuple<const Layer*, const LayerStack*, std::string, double, double, double>;
+  std::map<TemplateKey, std::vector<double>> templates_;  ///< To the times of files.
   std::map<std::tuple<const PropertySpec*, double, const ClipSet*>, std::unique_ptr<PropertySpec>>
       timed_;
 };
