@@ -34,14 +34,18 @@ std::vector<std::filesystem::path> AssimpLoader::files(std::string_view asset) c
 }
 
 void AssimpLoader::load(std::string_view asset, Scene& scene, NodeId root) {
-  const auto [name, seconds] = loader_support::split_time(asset);
-  const SceneFile file(name, host_, seconds);
+  const loader_support::TimedAsset timed = loader_support::split_time(asset);
+  const SceneFile file(timed, host_);
   host_.log(LogLevel::Debug, describe_units(file, params_.unstated));
+  for (unsigned i = 0; i < file.scene().mNumAnimations; ++i) {
+    host_.log(LogLevel::Debug, describe_animation(file.scene(), i));
+  }
   SceneTranslator translator(file, params_.unstated, host_, scene);
   translator.translate(root);
-  const auto length = animation_seconds(file.scene());
-  if (length && loader_support::is_time(*length)) {
-    scene.edit(root).animation = Animation{name, 0.0, *length};
+  // One that was chosen may be a pose.
+  const double length = animation_seconds(file.scene(), file.animation());
+  if ((length > 0.0 || timed.animation) && loader_support::is_time(length)) {
+    scene.edit(root).animation = Animation{timed.timeless(), 0.0, length};
   }
   const std::vector<std::string> missing = translator.missing();
   if (params_.missing_assets_are_errors && !missing.empty()) {

@@ -342,12 +342,12 @@ void set_weights(aiScene& scene, const aiNode& node, const std::vector<double>& 
 
 }  // namespace
 
-std::string pose_gltf_at(aiScene& scene, const std::string& name, double seconds) {
+std::string pose_gltf_at(aiScene& scene, const std::string& name, unsigned number, double seconds) {
   try {
     GltfFile file(name);
     const Json& root = file.root();
     const Nodes nodes(root, scene);
-    const Json& animation = root.at("animations").at(0);
+    const Json& animation = root.at("animations").at(number);
     for (const Json& channel : animation.at("channels")) {
       const Json& target = channel.at("target");
       if (!target.contains("node")) continue;

@@ -4,13 +4,22 @@
 #include <assimp/anim.h>
 
 #include <algorithm>
+#include <array>
+#include <charconv>
 #include <cmath>
+#include <cstdio>
 #include <string_view>
 #include <unordered_map>
 #include <vector>
 
+#include "diorama/config.h"
+#include "diorama/error.h"
+
 namespace diorama::loader_assimp {
 namespace {
+
+// Of names in an error.
+constexpr std::size_t kNamesListed = 20;
 
 double ticks_per_second(const aiAnimation& animation) {
   const double ticks = animation.mTicksPerSecond;
@@ -118,18 +127,47 @@ void weigh_targets(aiScene& scene, const aiNode& node, const aiMeshMorphAnim& ch
 
 }  // namespace
 
-std::optional<double> animation_seconds(const aiScene& scene) {
-  if (scene.mNumAnimations == 0) return std::nullopt;
-  const aiAnimation& animation = *scene.mAnimations[0];
-  const double seconds = animation.mDuration / ticks_per_second(animation);
-  const bool moves = animation.mNumChannels > 0 || animation.mNumMorphMeshChannels > 0;
-  if (!moves || !(seconds > 0.0) || !std::isfinite(seconds)) return std::nullopt;
-  return seconds;
+unsigned find_animation(const aiScene& scene, const std::string& word, const std::string& asset) {
+  std::vector<std::string> names;
+  for (unsigned i = 0; i < scene.mNumAnimations; ++i) {
+    names.emplace_back(text_of(scene.mAnimations[i]->mName));
+    if (names.back() == word) return i;
+  }
+  unsigned number = 0;
+  const auto parsed = std::from_chars(word.data(), word.data() + word.size(), number);
+  const bool is_number = parsed.ec == std::errc() && parsed.ptr == word.data() + word.size();
+  if (is_number && number < names.size()) return number;
+  std::string text = asset + ": found the animation '" + word + "', expected ";
+  if (names.empty()) throw Error(ErrorKind::Asset, text + "none, as the file has none");
+  for (std::size_t i = 0; i < std::min(names.size(), kNamesListed); ++i) {
+    text += (i == 0                  ? ""
+             : i + 1 == names.size() ? " or "
+                                     : ", ") +
+            std::to_string(i) + " '" + names[i] + "'";
+  }
+  if (names.size() > kNamesListed) text += " ... " + std::to_string(names.size() - 1);
+  const std::string near = is_number ? std::string() : nearest_name(word, names);
+  throw Error(ErrorKind::Asset, text + (near.empty() ? "" : "; did you mean '" + near + "'?"));
 }
 
-void pose_at(aiScene& scene, double seconds) {
-  if (!animation_seconds(scene)) return;
-  const aiAnimation& animation = *scene.mAnimations[0];
+double animation_seconds(const aiScene& scene, unsigned number) {
+  if (number >= scene.mNumAnimations) return 0.0;
+  const aiAnimation& animation = *scene.mAnimations[number];
+  const double seconds = animation.mDuration / ticks_per_second(animation);
+  const bool moves = animation.mNumChannels > 0 || animation.mNumMorphMeshChannels > 0;
+  return moves && seconds > 0.0 && std::isfinite(seconds) ? seconds : 0.0;
+}
+
+std::string describe_animation(const aiScene& scene, unsigned number) {
+  std::array<char, 64> digits{};
+  std::snprintf(digits.data(), digits.size(), "%.4g", animation_seconds(scene, number));
+  return "animation " + std::to_string(number) + " '" +
+         std::string(text_of(scene.mAnimations[number]->mName)) + "' lasts " + digits.data() + " s";
+}
+
+void pose_at(aiScene& scene, unsigned number, double seconds) {
+  if (number >= scene.mNumAnimations) return;
+  const aiAnimation& animation = *scene.mAnimations[number];
   const double time = seconds * ticks_per_second(animation);
   const FirstNodes nodes = first_nodes_by_name(*scene.mRootNode);
   for (unsigned i = 0; i < animation.mNumChannels; ++i) {

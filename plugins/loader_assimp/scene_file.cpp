@@ -165,8 +165,9 @@ Error unreadable(const std::string& file, const std::string& why) {
   return Error(ErrorKind::Asset, file + ": assimp cannot read it: " + why);
 }
 
-SceneFile::SceneFile(const std::string& file, Host& host, std::optional<double> seconds)
-    : name_(file), format_(format_of(file)) {
+SceneFile::SceneFile(const loader_support::TimedAsset& asset, Host& host)
+    : name_(asset.file), format_(format_of(asset.file)) {
+  const std::string& file = name_;
   if (!harmless_files().contains(file)) {
     const std::string trial = read_in_child(file, [&] {
       Assimp::Importer importer;
@@ -181,12 +182,14 @@ SceneFile::SceneFile(const std::string& file, Host& host, std::optional<double> 
     const std::string why = read(importer_, file, format_);
     if (!why.empty()) throw unreadable(file, why);
   }
+  if (asset.animation) animation_ = find_animation(scene(), *asset.animation, asset.timeless());
   // The importer's scene is nobody else's.
-  if (seconds) {
+  if (asset.seconds && animation_ < scene().mNumAnimations) {
     auto& scene = const_cast<aiScene&>(*importer_.GetScene());
-    pose_at(scene, *seconds);
-    const std::string why =
-        format_ == Format::Gltf ? pose_gltf_at(scene, file, *seconds) : std::string();
+    pose_at(scene, animation_, *asset.seconds);
+    const std::string why = format_ == Format::Gltf
+                                ? pose_gltf_at(scene, file, animation_, *asset.seconds)
+                                : std::string();
     if (!why.empty()) {
       host.log(LogLevel::Warning,
                file + ": its animation runs straight from key to key, as what it says of " +

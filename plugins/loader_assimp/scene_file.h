@@ -5,11 +5,11 @@
 
 #include <assimp/Importer.hpp>
 #include <functional>
-#include <optional>
 #include <string>
 
 #include "diorama/error.h"
 #include "diorama/host.h"
+#include "loader_support/asset_time.h"
 
 namespace diorama::loader_assimp {
 
@@ -29,23 +29,26 @@ std::string read_in_child(const std::string& file, const std::function<std::stri
 /// "FILE: assimp cannot read it: WHY".
 Error unreadable(const std::string& file, const std::string& why);
 
-/// A file as assimp reads it: triangles only, and its nodes where its first animation has them at a
-/// time, or at rest.
+/// A file as assimp reads it: triangles only, and its nodes where one of its animations has them at
+/// a time, or at rest.
 class SceneFile {
  public:
   /// Some files make assimp crash, hang or take all memory. So the file is read in a child process
   /// first, whose time and memory are limited, and here only when that went well. Throws
   /// Error(Asset) that begins with the file's name. What assimp complains about and survives
   /// becomes a warning.
-  SceneFile(const std::string& file, Host& host, std::optional<double> seconds = {});
+  SceneFile(const loader_support::TimedAsset& asset, Host& host);
 
   const std::string& name() const { return name_; }
   Format format() const { return format_; }
   const aiScene& scene() const { return *importer_.GetScene(); }
+  /// The one that was asked for, or the first.
+  unsigned animation() const { return animation_; }
 
  private:
   std::string name_;
   Format format_;
+  unsigned animation_ = 0;
   Assimp::Importer importer_;
 };
 

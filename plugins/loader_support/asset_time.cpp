@@ -21,17 +21,27 @@ double parse_time(std::string_view word, std::string_view asset) {
                                     "', expected seconds as {time=1.5}");
 }
 
+std::string TimedAsset::timeless() const {
+  return animation ? file + "{animation=" + *animation + "}" : file;
+}
+
 TimedAsset split_time(std::string_view asset) {
-  constexpr std::string_view kKey = "{time=";
-  TimedAsset result{std::string(asset), std::nullopt};
+  TimedAsset result{std::string(asset), std::nullopt, std::nullopt};
   std::error_code error;
-  const std::size_t start = asset.rfind(kKey);
-  const bool is_timed = start != std::string_view::npos && asset.ends_with('}') &&
-                        !std::filesystem::exists(result.file, error);
-  if (!is_timed) return result;
-  const std::size_t begin = start + kKey.size();
-  result.seconds = parse_time(asset.substr(begin, asset.size() - begin - 1), asset);
-  result.file = asset.substr(0, start);
+  if (!asset.ends_with('}') || std::filesystem::exists(result.file, error)) return result;
+  // What stands behind a key at the end of `rest`, which loses both.
+  std::string_view rest = asset;
+  const auto take = [&](std::string_view key) -> std::optional<std::string_view> {
+    const std::size_t start = rest.rfind(key);
+    if (start == std::string_view::npos || !rest.ends_with('}')) return std::nullopt;
+    const std::size_t begin = start + key.size();
+    const std::string_view word = rest.substr(begin, rest.size() - begin - 1);
+    rest = rest.substr(0, start);
+    return word;
+  };
+  if (const auto word = take("{time=")) result.seconds = parse_time(*word, asset);
+  if (const auto word = take("{animation=")) result.animation = *word;
+  result.file = rest;
   return result;
 }
 

@@ -15,10 +15,15 @@ double parse_time(std::string_view word, std::string_view asset);
 
 struct TimedAsset {
   std::string file;
+  std::optional<std::string> animation;  ///< Name or number, as it is said.
   std::optional<double> seconds;
+
+  /// The name without a time.
+  std::string timeless() const;
 };
 
-/// "walker.glb{time=1.5}" in its parts. A file that has such a name is a file.
+/// "walker.glb{animation=run}{time=1.5}" in its parts, of which the last two may be left out. A
+/// file that has such a name is a file. Throws Error(Asset) that begins with the asset's name.
 TimedAsset split_time(std::string_view asset);
 
 }  // namespace diorama::loader_support

@@ -206,10 +206,10 @@ TranslatedMesh MeshTranslator::translate_mesh(const Prim& prim, const Primvars& 
   add_primvar(key, uv_owner, uv);
   add_primvar(key, color_owner, kDisplayColor);
   for (const Prim* subset : subsets) key.push_back(stage_.value_spec(*subset, "indices"));
-  // What bends a mesh is not all in its own specs.
+  // What bends a mesh is not all in its own specs, but the same prim, seen through an instancer, is
+  // bent the same.
   const bool is_bent = skinning_.applies_to(prim);
-  Made own;
-  Made& known = is_bent ? own : meshes_[{key, uv_name}];
+  Made& known = meshes_[{key, is_bent ? uv_name + " " + prim.path : uv_name}];
   if (known.mesh) {
     result.mesh = known.mesh;
     result.losses = known.losses;

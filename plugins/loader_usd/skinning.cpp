@@ -139,14 +139,15 @@ void set_points(MeshSources& sources, const std::vector<Vec3>& points) {
   sources.points.span = numbers;
 }
 
-// Normals become those of corners, each turned as its point is.
-void turn_normals(MeshSources& sources, const std::vector<Mat3>& turns) {
+// Normals become those of corners, each moved as `moved` says of its point.
+template <class Move>
+void move_normals(MeshSources& sources, std::size_t points, const Move& moved) {
   if (!sources.normals) return;
   const CornerData& data = *sources.normals;
-  CornerData turned;
-  turned.width = 3;
-  turned.interpolation = Interpolation::FaceVarying;
-  std::vector<float>& numbers = turned.values.converted;
+  CornerData result;
+  result.width = 3;
+  result.interpolation = Interpolation::FaceVarying;
+  std::vector<float>& numbers = result.values.converted;
   numbers.reserve(3 * sources.indices.span.size());
   std::size_t corner = 0;
   for (std::size_t face = 0; face < sources.counts.span.size(); ++face) {
@@ -154,16 +155,16 @@ void turn_normals(MeshSources& sources, const std::vector<Mat3>& turns) {
       if (corner >= sources.indices.span.size()) break;
       const std::int32_t index = sources.indices.span[corner];
       const auto point = static_cast<std::size_t>(index);
-      const bool exists = index >= 0 && point < turns.size();
+      const bool exists = index >= 0 && point < points;
       const float* said = exists ? data.at(face, point, corner) : nullptr;
       Vec3 normal = said ? Vec3(said[0], said[1], said[2]) : Vec3::Zero();
-      if (exists) normal = turns[point] * normal;
+      if (exists) normal = moved(point, normal);
       for (int axis = 0; axis < 3; ++axis) numbers.push_back(static_cast<float>(normal[axis]));
     }
   }
   numbers.resize(3 * sources.indices.span.size(), 0.0f);
-  turned.values.span = numbers;
-  sources.normals = std::move(turned);
+  result.values.span = numbers;
+  sources.normals = std::move(result);
 }
 
 }  // namespace
@@ -325,24 +326,33 @@ std::vector<Skinning::SubShape> Skinning::sub_shapes(const Prim& shape, std::siz
 }
 
 /// Runs straight from sub-shape to sub-shape, and on beyond the outer ones.
-std::vector<double> Skinning::offsets_at(const Prim& shape, double weight, Losses& losses) const {
+Skinning::Offsets Skinning::offsets_at(const Prim& shape, double weight, Losses& losses) const {
+  Offsets sum;
   const auto whole = usd::numbers<float>(stage_.value(shape, "offsets"), 3);
-  if (!whole) return {};
-  const std::vector<SubShape> shapes = sub_shapes(shape, whole->span.size(), losses);
+  if (!whole) return sum;
+  const std::size_t count = whole->span.size();
+  const std::vector<SubShape> shapes = sub_shapes(shape, count, losses);
   const auto later = std::ranges::upper_bound(shapes, weight, {}, &SubShape::weight);
   const auto after = std::clamp(later, shapes.begin() + 1, shapes.end() - 1);
   const SubShape& high = *after;
   const SubShape& low = *(after - 1);
   const double length = high.weight - low.weight;
   const double share = length > 0.0 ? (weight - low.weight) / length : 1.0;
-  std::vector<double> sum(whole->span.size(), 0.0);
-  const auto add = [&](const SubShape& sub, double part) {
-    if (sub.name.empty() || part == 0.0) return;
-    const auto numbers = usd::numbers<float>(stage_.value(shape, sub.name), 3);
-    for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += part * double(numbers->span[i]);
+  sum.of_points.assign(count, 0.0);
+  sum.of_normals.assign(count, 0.0);
+  const auto add = [&](const std::string& name, double part, std::vector<double>& list) {
+    const auto numbers = usd::numbers<float>(stage_.value(shape, name), 3);
+    if (!numbers || numbers->span.size() != count) return false;
+    for (std::size_t i = 0; i < count; ++i) list[i] += part * double(numbers->span[i]);
+    return true;
   };
-  add(low, 1.0 - share);
-  add(high, share);
+  for (const auto& [sub, part] : {std::pair(&low, 1.0 - share), std::pair(&high, share)}) {
+    if (sub->name.empty() || part == 0.0) continue;
+    add(sub->name, part, sum.of_points);
+    const std::string normals =
+        sub->name == "offsets" ? "normalOffsets" : sub->name + ":normalOffsets";
+    if (!add(normals, part, sum.of_normals)) sum.has_normals = false;
+  }
   return sum;
 }
 
@@ -359,32 +369,49 @@ void Skinning::blend_shapes(const Prim& prim, const Animation& animation, std::v
                   " blend shapes, which are left out");
     return;
   }
+  std::vector<Vec3> turned(points.size(), Vec3::Zero());
+  bool is_moved = false;
+  bool have_normals = true;
   for (std::size_t i = 0; i < names.size(); ++i) {
     const auto weight = animation.weights.find(names[i]);
     const Prim* shape = stage_.find(targets[i]);
     if (weight == animation.weights.end() || weight->second == 0.0 || !shape) continue;
-    const std::vector<double> offsets = offsets_at(*shape, weight->second, losses);
+    const Offsets offsets = offsets_at(*shape, weight->second, losses);
     const auto where = usd::numbers<std::int32_t>(stage_.value(*shape, "pointIndices"), 1);
-    const std::size_t count = offsets.size() / 3;
+    const std::size_t count = offsets.of_points.size() / 3;
     if (count == 0) continue;
     const bool has_places = where && !where->span.empty();
     if (has_places ? where->span.size() != count : count != points.size()) {
       losses.insert("has a blend shape of another number of points, which is left out");
       continue;
     }
+    const auto vector = [](const std::vector<double>& list, std::size_t k) {
+      return Vec3(list[3 * k], list[3 * k + 1], list[3 * k + 2]);
+    };
     for (std::size_t k = 0; k < count; ++k) {
       const std::int64_t point = has_places ? where->span[k] : static_cast<std::int64_t>(k);
-      const Vec3 offset(offsets[3 * k], offsets[3 * k + 1], offsets[3 * k + 2]);
+      const Vec3 offset = vector(offsets.of_points, k);
       if (point < 0 || point >= static_cast<std::int64_t>(points.size()) || !offset.allFinite()) {
         losses.insert("has a blend shape of points that do not exist");
         continue;
       }
       points[static_cast<std::size_t>(point)] += offset;
+      const Vec3 turn = vector(offsets.of_normals, k);
+      if (turn.allFinite()) turned[static_cast<std::size_t>(point)] += turn;
     }
-    // Those that were said are of another shape; the mean ones of the faces are right.
-    sources.is_smooth = sources.is_smooth || sources.normals.has_value();
-    sources.normals.reset();
+    is_moved = true;
+    have_normals = have_normals && offsets.has_normals;
   }
+  if (!is_moved) return;
+  if (have_normals) {
+    move_normals(sources, points.size(), [&](std::size_t point, const Vec3& normal) {
+      return Vec3(normal + turned[point]);
+    });
+    return;
+  }
+  // Those that were said are of another shape; the mean ones of the faces are right.
+  sources.is_smooth = sources.is_smooth || sources.normals.has_value();
+  sources.normals.reset();
 }
 
 void Skinning::apply(const Prim& prim, MeshSources& sources, Losses& losses) {
@@ -483,7 +510,8 @@ void Skinning::apply(const Prim& prim, MeshSources& sources, Losses& losses) {
         "are left out");
   }
   set_points(sources, points);
-  turn_normals(sources, turns);
+  move_normals(sources, count,
+               [&](std::size_t point, const Vec3& normal) { return Vec3(turns[point] * normal); });
 }
 
 }  // namespace diorama::loader_usd

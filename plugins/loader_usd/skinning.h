@@ -23,7 +23,7 @@ class Skinning {
 
   /// Whether a skeleton or blend shapes may move the points of the mesh.
   bool applies_to(const usd::Prim& prim);
-  /// Moves points and normals; normals that cannot follow are left out.
+  /// Moves points and normals; normals of shapes that do not say how they move are left out.
   void apply(const usd::Prim& prim, MeshSources& sources, Losses& losses);
 
  private:
@@ -56,7 +56,13 @@ class Skinning {
   };
   std::vector<SubShape> sub_shapes(const usd::Prim& shape, std::size_t offsets,
                                    Losses& losses) const;
-  std::vector<double> offsets_at(const usd::Prim& shape, double weight, Losses& losses) const;
+  /// What a blend shape adds, three numbers per point that it moves.
+  struct Offsets {
+    std::vector<double> of_points;
+    std::vector<double> of_normals;
+    bool has_normals = true;  ///< Everything that counts says those of normals, too.
+  };
+  Offsets offsets_at(const usd::Prim& shape, double weight, Losses& losses) const;
   const usd::Prim& owner_of(const usd::Prim& prim, const char* name);
   std::vector<Affine> matrices(const usd::Prim& prim, const char* name) const;
 

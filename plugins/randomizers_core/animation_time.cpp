@@ -27,6 +27,16 @@ std::string name_at(const Animation& animation, double time_s) {
   return animation.asset + "{time=" + std::string(digits.data(), end) + "}";
 }
 
+/// The name of an asset with another of its animations.
+std::string name_with(std::string asset, const std::string& animation) {
+  const std::size_t begin = asset.find("{animation=");
+  if (begin != std::string::npos) {
+    const std::size_t next = asset.find("}{", begin);
+    asset.erase(begin, next == std::string::npos ? next : next + 1 - begin);
+  }
+  return asset + "{animation=" + animation + "}";
+}
+
 /// What another time makes anew without a change: renderers would take it for another mesh.
 bool is_same(const std::shared_ptr<const Mesh>& a, const std::shared_ptr<const Mesh>& b) {
   if (a == b || !a || !b) return a == b;
@@ -40,6 +50,10 @@ bool is_same(const std::shared_ptr<const Mesh>& a, const std::shared_ptr<const M
 void AnimationTime::Params::visit(ParamVisitor& v) {
   v.param("nodes", nodes,
           {"Nodes of assets that move; others that fit are left alone.", kNodePattern});
+  v.param(
+      "animation", animation,
+      {"Name or number (from 0) of the animation, of files that hold several; the first, or the "
+       "one that the asset's name asks for, where nothing is said. `diorama inspect` lists them."});
   v.param("share", share,
           {"Time as a share of the animation, from its start to its end.", "", 0, 1});
   v.param("time_s", time_s,
@@ -57,6 +71,15 @@ void AnimationTime::Params::visit(ParamVisitor& v) {
 }
 
 AnimationTime::AnimationTime(Params params, Host& host) : params_(std::move(params)), host_(host) {}
+
+void AnimationTime::choose(Scene& scene, NodeId node, const std::string& animation) {
+  const std::string name = name_with(scene[node].animation->asset, animation);
+  if (name == scene[node].animation->asset) return;
+  Scene look;
+  const NodeId top = host_.load_asset(name, look, look.root());
+  if (!look[top].animation) throw Error(ErrorKind::Asset, name + ": does not move");
+  scene.edit(node).animation = look[top].animation;
+}
 
 double AnimationTime::draw_time(const Animation& animation, NodeDraws& draws) const {
   const double length = animation.end_s - animation.start_s;
@@ -106,7 +129,9 @@ void AnimationTime::randomize(Scene& scene, const RandomizeContext& context, con
   const std::vector<NodeId> nodes =
       match_if(scene, params_.nodes, [](const Node& node) { return node.animation.has_value(); });
   playing_.clear();
+  const std::vector<std::string>& animations = params_.animation.texts();
   draw_for_each(scene, nodes, context, rng, [&](NodeId node, NodeDraws& draws) {
+    if (!animations.empty()) choose(scene, node, animations[draws.text(params_.animation)]);
     const Playing& playing = playing_.emplace_back(
         Playing{node, draw_time(*scene[node].animation, draws), draws.number(params_.speed)});
     show(scene, node, playing.time_s);

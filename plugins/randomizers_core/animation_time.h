@@ -20,6 +20,7 @@ class AnimationTime final : public Randomizer {
  public:
   struct Params {
     std::string nodes = "/**";
+    TextDistribution animation;
     Distribution share = Range{0.0, 1.0};
     std::optional<Distribution> time_s;
     double frames_per_second = 24.0;
@@ -40,6 +41,7 @@ class AnimationTime final : public Randomizer {
     double time_s = 0.0;  ///< That was drawn.
     double speed = 1.0;
   };
+  void choose(Scene& scene, NodeId node, const std::string& animation);
   double draw_time(const Animation& animation, NodeDraws& draws) const;
   double time_at(const Animation& animation, const Playing& playing, double clip_s) const;
   void show(Scene& scene, NodeId node, double time_s);

@@ -10,6 +10,9 @@
 namespace diorama {
 namespace {
 
+// A clip with flow shows what bends at a time, the next, the last, and the first again.
+constexpr std::uint64_t kTakesKept = 4;
+
 std::shared_ptr<const Texture> make_white_sky() {
   auto texture = std::make_shared<Texture>();
   texture->width = 64;
@@ -98,8 +101,8 @@ void RenderScene::light(const Scene& scene, const SkyGrid::Sees& sees) {
 }
 
 RenderScene::Kept RenderScene::kept() const {
-  return {shading_meshes_.size(), materials_.material_count(), materials_.texture_count(),
-          domes_.size(), materials_.albedo_row_count()};
+  return {shading_meshes_.size() + bent_.size(), materials_.material_count(),
+          materials_.texture_count(), domes_.size(), materials_.albedo_row_count()};
 }
 
 void RenderScene::collect(const Scene& scene, NodeId id, const Affine& world_from_parent,
@@ -119,12 +122,20 @@ void RenderScene::collect(const Scene& scene, NodeId id, const Affine& world_fro
 void RenderScene::assign_meshes(const Scene& scene, const std::vector<Placed>& placed) {
   auto before = std::move(shading_meshes_);
   shading_meshes_.clear();
+  std::map<NodeId, const Mesh*> mesh_before;
+  for (const MeshInstance& instance : instances_) {
+    if (instance.is_movable) mesh_before.emplace(instance.node, &instance.source());
+  }
+  ++takes_;
   std::map<const Mesh*, std::uint32_t> numbers;
   std::vector<std::shared_ptr<const Mesh>> used;
   std::vector<std::shared_ptr<const Mesh>> missing;
+  std::set<const Mesh*> left;  // for another mesh of the same node
   instances_.clear();
   for (const Placed& p : placed) {
     const auto& mesh = scene[p.node].mesh;
+    const auto bent = mesh_before.find(p.node);
+    if (bent != mesh_before.end() && bent->second != mesh.get()) left.insert(bent->second);
     const auto [number, is_new] = numbers.emplace(mesh.get(), std::uint32_t(used.size()));
     MeshInstance& instance = instances_.emplace_back();
     instance.node = p.node;
@@ -135,10 +146,22 @@ void RenderScene::assign_meshes(const Scene& scene, const std::vector<Placed>& p
     // The entry keeps its mesh alive, so an address never comes to mean another mesh.
     if (const auto old = before.find(mesh.get()); old != before.end()) {
       shading_meshes_.insert(before.extract(old));
+    } else if (const auto bent_before = bent_.find(mesh.get()); bent_before != bent_.end()) {
+      shading_meshes_[mesh.get()] = std::move(bent_before->second.shading);
+      bent_.erase(bent_before);
     } else {
       missing.push_back(mesh);
     }
   }
+  for (const Mesh* mesh : left) {
+    const auto old = before.find(mesh);
+    if (old != before.end()) bent_[mesh] = {std::move(old->second), takes_};
+  }
+  // A mesh that nobody else has is of a scene that is gone.
+  std::erase_if(bent_, [&](const auto& entry) {
+    return takes_ - entry.second.left_at >= kTakesKept ||
+           entry.second.shading->shared_source().use_count() == 1;
+  });
   std::vector<std::shared_ptr<ShadingMesh>> made(missing.size());
   host_.parallel_for(missing.size(),
                      [&](std::size_t i) { made[i] = std::make_shared<ShadingMesh>(missing[i]); });

@@ -122,6 +122,13 @@ class RenderScene {
   double window_ = 0.0;
   MaterialLibrary materials_;
   std::map<const Mesh*, std::shared_ptr<ShadingMesh>> shading_meshes_;
+  /// That a movable node left for another one: it may come back soon.
+  struct BentMesh {
+    std::shared_ptr<ShadingMesh> shading;
+    std::uint64_t left_at = 0;
+  };
+  std::map<const Mesh*, BentMesh> bent_;
+  std::uint64_t takes_ = 0;
   std::map<const Texture*, CachedDome> domes_;
   std::shared_ptr<const Material> default_material_;
   std::shared_ptr<const Texture> white_sky_;  ///< Of domes without an image.

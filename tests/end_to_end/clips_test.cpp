@@ -492,6 +492,65 @@ TEST_CASE("An animation plays in a clip, and flow goes with what bends", "[run]"
   CHECK(worst < 0.01);
 }
 
+TEST_CASE("Inspect lists the animations of a file of which a job chooses one", "[run]") {
+  const auto set = [](const std::string& name, const std::string& end, const std::string& x) {
+    return "AnimationSet " + name +
+           " {\n Animation {\n  {Mover}\n  AnimationKey { 2; 2; 0;3;0.0,0.0,0.0;;, " + end + ";3;" +
+           x + ",0.0,0.0;;; }\n }\n}\n";
+  };
+  const TemporaryFolder folder;
+  write_file(folder / "mover.x", R"(xof 0303txt 0032
+AnimTicksPerSecond { 10; }
+Frame Mover {
+ FrameTransformMatrix { 1.0,0.0,0.0,0.0, 0.0,1.0,0.0,0.0, 0.0,0.0,1.0,0.0, 0.0,0.0,0.0,1.0;; }
+ Mesh { 4; 0;0;0;, 0.5;0;0;, 0;0.5;0;, 0;0;0.5;; 4; 3;0,1,2;, 3;0,1,3;, 3;0,2,3;, 3;1,2,3;; }
+}
+)" + set("Walk", "20", "1.0") + set("Run", "10", "5.0"));
+  const Outcome inspected = run({"inspect", "mover.x"}, folder.path());
+  INFO(inspected.errors);
+  REQUIRE(inspected.exit_code == 0);
+  CHECK_THAT(inspected.output, ContainsSubstring("animation 0 'Walk' lasts 2 s"));
+  CHECK_THAT(inspected.output, ContainsSubstring("animation 1 'Run' lasts 1 s"));
+  CHECK_THAT(inspected.output, ContainsSubstring("moves from 0 to 2 s"));
+  const Outcome second = run({"inspect", "mover.x{animation=Run}"}, folder.path());
+  CHECK_THAT(second.output, ContainsSubstring("moves from 0 to 1 s"));
+
+  std::string job = growing_job("{type: \"null\"}");
+  const auto replace = [&](const std::string& from, const std::string& to) {
+    job.replace(job.find(from), from.size(), to);
+  };
+  replace("sheet.usda", "mover.x");
+  replace("time_s: 0.25", "time_s: 0, animation: Run");
+  write_file(folder / "job.yaml", job);
+  const Outcome outcome = run({"run", "job.yaml"}, folder.path());
+  INFO(outcome.errors);
+  REQUIRE(outcome.exit_code == 0);
+  // 5 m/s, at 12 frames per second.
+  const auto files = tree(folder / "out");
+  const StoredView first(files, "cam_0", 0);
+  int seen = 0;
+  double worst = 0.0;
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      if (!first.path_at(x, y).starts_with("/Assets")) continue;
+      const Vec3 there = first.point_at(x, y) + Vec3(5.0 / 12.0, 0.0, 0.0);
+      const Vec2 expected = *first.lens.lens.pixel(Vec3(first.lens.camera_from_world * there));
+      const Vec2 moved = Vec2(x + 0.5, y + 0.5) + first.flow(first.forward, x, y);
+      worst = std::max(worst, (moved - expected).norm());
+      ++seen;
+    }
+  }
+  CHECK(seen > 20);
+  CHECK(worst < 0.01);
+
+  replace("animation: Run", "animation: Rum");
+  write_file(folder / "job.yaml", job);
+  const Outcome failed = run({"run", "job.yaml", "--overwrite"}, folder.path());
+  CHECK(failed.exit_code != 0);
+  CHECK_THAT(failed.errors, ContainsSubstring("found the animation 'Rum'"));
+  CHECK_THAT(failed.errors, ContainsSubstring("did you mean 'Run'?"));
+}
+
 TEST_CASE("Clips of what bends are the same bytes after kills, and whatever was shown before",
           "[run]") {
   const std::string job = growing_job("{type: embree, samples: 2, max_bounces: 2}");

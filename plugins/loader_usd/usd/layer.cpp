@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "value_clips.h"
+
 namespace diorama::usd {
 namespace {
 
@@ -84,6 +86,8 @@ Layer::NamedAssets Layer::named_assets() const {
   collect_texts(get(root(), "subLayers"), named.layers);
   for (const auto& [path, spec] : prims_) {
     for (const char* arc : {"references", "payload"}) collect_assets(get(spec, arc), named.layers);
+    const Value clips = get(spec, "clips");
+    if (clips.as_dictionary()) add_clip_assets(*clips.as_dictionary(), named.layers);
     for (const PropertySpec& property : spec.properties) {
       const Value type = get(property.fields, "typeName");
       if (!type.as_text() || !type.as_text()->starts_with("asset")) continue;

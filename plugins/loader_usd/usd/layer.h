@@ -71,7 +71,8 @@ class Layer {
 
   /// What the layer names, as it is written.
   struct NamedAssets {
-    std::set<std::string> layers;  ///< Sublayers, references and payloads, those of variants too.
+    /// Sublayers, references and payloads, those of variants too, value clips.
+    std::set<std::string> layers;
     std::set<std::string> values;  ///< Of asset-valued attributes: textures.
   };
   NamedAssets named_assets() const;

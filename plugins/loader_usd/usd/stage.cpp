@@ -421,8 +421,8 @@ FoundValue Stage::timed_value(const Prim& prim, std::string_view name) const {
     is_found = bool(result);
     return !is_found;
   });
-  if (!is_found && prim.has_clips) return clips.found;
-  return !is_found || result.value.is_block() ? FoundValue() : result;
+  if (!is_found) result = clips.found;
+  return result.value.is_block() ? FoundValue() : result;
 }
 
 // The same without reading any number.

@@ -11,10 +11,23 @@
 #include "stage.h"
 
 namespace diorama::usd {
+
+/// The times of a template, from file to file.
+struct ClipTemplate {
+  const std::string* pattern = nullptr;
+  double first = 0.0;
+  double stride = 1.0;
+  double last = 0.0;
+
+  double count() const { return std::floor((last - first) / stride + 1e-9) + 1.0; }
+};
+
 namespace {
 
 // A template of more files than this is none.
 constexpr double kMostClips = 100'000.0;
+// Nor one whose numbers are longer.
+constexpr double kMostTime = 1e15;
 
 const Value* find(const Dictionary& dictionary, std::string_view key) {
   const auto found = dictionary.find(key);
@@ -50,21 +63,74 @@ TimePairs::const_iterator pair_at(const TimePairs& pairs, double time) {
   return later == pairs.begin() ? later : later - 1;
 }
 
-// Runs through the pairs in straight lines.
-double clip_time(const TimePairs& times, double stage_time) {
-  if (times.empty()) return stage_time;
+// Of two pairs of one time the first holds until just before it: time jumps there. As long as
+// OpenUSD's step, and above the rounding of times of days in frames.
+constexpr double kBeforeJump = 1e-8;
+
+TimePairs with_jumps(TimePairs times) {
+  for (std::size_t i = 0; i + 1 < times.size(); ++i) {
+    if (times[i].first == times[i + 1].first) times[i].first -= kBeforeJump;
+  }
+  return times;
+}
+
+// The straight piece of a mapping that a stage time is in.
+struct Piece {
+  double stage = 0.0;
+  double clip = 0.0;
+  double speed = 0.0;  ///< 0 before the first pair and from the last one on.
+
+  double clip_time(double stage_time) const { return clip + (stage_time - stage) * speed; }
+};
+
+// Without pairs both times are the same.
+Piece piece_at(const TimePairs& times, double stage_time) {
+  if (times.empty()) return {0.0, 0.0, 1.0};
   const auto before = pair_at(times, stage_time);
   const auto after = before + 1;
-  const double elapsed = stage_time - before->first;
-  if (elapsed < 0.0 || after == times.end() || after->first <= before->first) return before->second;
-  return before->second +
-         elapsed * (after->second - before->second) / (after->first - before->first);
+  const bool is_outside = stage_time < before->first || after == times.end();
+  if (is_outside || after->first <= before->first) return {before->first, before->second, 0.0};
+  return {before->first, before->second,
+          (after->second - before->second) / (after->first - before->first)};
+}
+
+double clip_time(const TimePairs& times, double stage_time) {
+  return piece_at(times, stage_time).clip_time(stage_time);
+}
+
+// When clips are shown that are active from `begin` until `end`.
+struct Span {
+  double begin = 0.0;
+  double end = 0.0;
+};
+
+// The last stage time that a clip says something of, for a time within its span: a sample's, a
+// pair's of the mapping, its begin. Infinity if it says more later.
+double last_said(const TimePairs& times, const TimeSamples* samples, double time,
+                 const Span& span) {
+  if (time < span.begin) return INFINITY;
+  double last = span.begin;
+  const auto say = [&](double stage_time) {
+    if (stage_time <= time) last = std::max(last, stage_time);
+    return stage_time <= time || stage_time >= span.end;
+  };
+  const auto later = std::upper_bound(times.begin(), times.end(), time,
+                                      [](double t, const auto& pair) { return t < pair.first; });
+  if (later != times.end() && !say(later->first)) return INFINITY;
+  if (later != times.begin()) say((later - 1)->first);
+  const Piece piece = piece_at(times, time);
+  if (!samples || piece.speed == 0.0) return last;
+  const std::vector<double>& said = samples->times;
+  const auto next = std::upper_bound(said.begin(), said.end(), piece.clip_time(time));
+  const auto stage_time = [&](double at) { return piece.stage + (at - piece.clip) / piece.speed; };
+  if (next != said.end() && !say(stage_time(*next))) return INFINITY;
+  if (next != said.begin() && !say(stage_time(*(next - 1)))) return INFINITY;
+  return last;
 }
 
 // `clip.###.usd` at 7 is `clip.007.usd`; a second group of # holds what is behind the point.
-std::optional<std::string> fill_template(const std::string& pattern, double time) {
+std::string fill_template(const std::string& pattern, double time) {
   const std::size_t first = pattern.find('#');
-  if (first == std::string::npos) return std::nullopt;
   const std::size_t first_end = std::min(pattern.find_first_not_of('#', first), pattern.size());
   const std::size_t second = pattern.find('#', first_end);
   const std::size_t second_end =
@@ -89,26 +155,49 @@ std::optional<std::string> fill_template(const std::string& pattern, double time
          pattern.substr(second_end);
 }
 
+// Nothing where it is none.
+std::optional<ClipTemplate> template_of(const Dictionary& fields) {
+  const Value* value = find(fields, "templateAssetPath");
+  ClipTemplate result;
+  result.pattern = value ? value->as_text() : nullptr;
+  result.first = number_or(fields, "templateStartTime", NAN);
+  result.last = number_or(fields, "templateEndTime", NAN);
+  result.stride = number_or(fields, "templateStride", NAN);
+  const bool is_sound = result.pattern && result.pattern->find('#') != std::string::npos &&
+                        std::abs(result.first) < kMostTime && result.last >= result.first &&
+                        std::abs(result.last) < kMostTime && result.stride > 0.0 &&
+                        (result.last - result.first) / result.stride < kMostClips;
+  return is_sound ? std::optional(result) : std::nullopt;
+}
+
 }  // namespace
 
-// One clip set as it is at the time that counts.
+// One clip set, and the time that counts.
 struct ValueClips::ClipSet {
+  struct Clip {
+    double begin = 0.0;  ///< In stage time.
+    std::string asset;   ///< As written; empty: there is none.
+  };
   std::string name;
   const LayerStack* stack = nullptr;
   const Layer* layer = nullptr;  ///< That names the assets.
   std::string node_path;         ///< Of the node that they stand in, without variants.
   LayerOffset to_stage;          ///< From the times of that layer.
   std::string prim_path;
-  std::string asset;  ///< As written; empty: no clip is active.
-  double time = 0.0;  ///< Of the clip.
-  double stage_time = 0.0;
-  TimePairs times;  ///< From stage times to those of clips; empty: they are the same.
-  /// The clip that comes after it.
-  struct Next {
-    std::string asset;
-    double stage_time = 0.0;  ///< When it begins.
-  };
-  std::optional<Next> next;
+  std::string manifest;  ///< As written; empty: what the clips say counts.
+  bool bridges_gaps = false;
+  std::vector<Clip> clips;  ///< One at least, by their begins; the first holds before, too.
+  TimePairs times;          ///< From stage times to those of clips; empty: they are the same.
+  double time = 0.0;        ///< Of the stage, as all times here in that of the layer.
+
+  std::size_t active() const {
+    const auto later = std::upper_bound(clips.begin(), clips.end(), time,
+                                        [](double t, const Clip& clip) { return t < clip.begin; });
+    return later == clips.begin() ? 0 : static_cast<std::size_t>(later - clips.begin()) - 1;
+  }
+  Span span(std::size_t clip) const {
+    return {clips[clip].begin, clip + 1 < clips.size() ? clips[clip + 1].begin : INFINITY};
+  }
 };
 
 /// What a clip's layer says of an attribute.
@@ -116,21 +205,19 @@ struct ValueClips::Said {
   std::shared_ptr<const Layer> layer;
   const PropertySpec* property = nullptr;
   Value samples;
+
+  const TimeSamples* list() const { return property ? samples.as_time_samples() : nullptr; }
+};
+
+/// What a set has for an attribute.
+struct ValueClips::Answer {
+  Value value;  ///< Empty: the set is not about the attribute.
+  std::shared_ptr<const Layer> layer;
+  const PropertySpec* property = nullptr;
+  bool is_between = false;  ///< Two clips, or a clip and what stands in for one.
 };
 
 namespace {
-
-// When the clip that is active at a stage time showed one of its own times, as far back as the
-// mapping runs straight.
-double stage_time_of(const TimePairs& times, double stage_time, double clip_time) {
-  if (times.empty()) return clip_time;
-  const auto before = pair_at(times, stage_time);
-  const auto after = before + 1;
-  if (after == times.end() || after->second == before->second) return before->first;
-  const double share = (clip_time - before->second) / (after->second - before->second);
-  return std::clamp(before->first + share * (after->first - before->first), before->first,
-                    std::max(before->first, stage_time));
-}
 
 // The time that counts, or when the stage starts, in the time of a layer.
 std::optional<double> start_time(const Layer& root, const LayerOffset& to_stage,
@@ -149,63 +236,69 @@ ValueClips::ValueClips(AssetLibrary& assets, const LayerStacks& stacks, Diagnost
 ValueClips::~ValueClips() = default;
 
 void ValueClips::read_explicit(ClipSet& set, const Dictionary& fields) {
-  const Value* assets = usd::find(fields, "assetPaths");
-  const TimePairs active = pairs_of(fields, "active");
-  const TimePairs times = pairs_of(fields, "times");
-  double time = 0.0;
-  if (!active.empty()) time = active.front().first;
-  time = start_time(root_, set.to_stage, time_).value_or(time);
-  const Strings& names = *assets->as_strings();
-  const auto name_of = [&](double number) {
+  const Strings& names = *usd::find(fields, "assetPaths")->as_strings();
+  set.times = with_jumps(pairs_of(fields, "times"));
+  for (const auto& [begin, number] : pairs_of(fields, "active")) {
     const bool exists = number >= 0.0 && number < static_cast<double>(names.size());
-    return exists ? names[static_cast<std::size_t>(number)] : std::string();
-  };
-  set.asset = name_of(0.0);
-  if (!active.empty()) {
-    const auto now = pair_at(active, time);
-    set.asset = name_of(now->second);
-    if (now + 1 != active.end() && (now + 1)->first > time) {
-      set.next = {name_of((now + 1)->second), (now + 1)->first};
-    }
+    set.clips.push_back({begin, exists ? names[static_cast<std::size_t>(number)] : std::string()});
   }
-  set.time = clip_time(times, time);
-  set.stage_time = time;
-  set.times = times;
+  if (set.clips.empty()) set.clips.push_back({0.0, names.front()});
+  set.time = start_time(root_, set.to_stage, time_).value_or(set.clips.front().begin);
 }
 
-// Of a template the files that are there count.
+// Of the files of a template that are there. Members of a crowd share one.
+const std::vector<double>& ValueClips::times_of(const ClipSet& set, const ClipTemplate& files) {
+  const TemplateKey key{set.layer,   set.stack,  *files.pattern,
+                        files.first, files.last, files.stride};
+  const auto [known, is_new] = templates_.try_emplace(key);
+  std::vector<double>& times = known->second;
+  for (double number = 0.0; is_new && number < files.count(); ++number) {
+    const double time = files.first + number * files.stride;
+    const std::string asset = fill_template(*files.pattern, time);
+    const bool is_there =
+        assets_.exists(stacks_.anchor(asset, *set.layer, set.stack->expression_variables));
+    if (is_there) times.push_back(time);
+  }
+  return times;
+}
+
+// Of a template the files that are there count, and each is a pair of the mapping.
 bool ValueClips::read_template(ClipSet& set, const Dictionary& fields) {
-  const Value* value = usd::find(fields, "templateAssetPath");
-  const std::string* pattern = value ? value->as_text() : nullptr;
-  const double first = number_or(fields, "templateStartTime", NAN);
-  const double last = number_or(fields, "templateEndTime", NAN);
-  const double stride = number_or(fields, "templateStride", NAN);
-  const bool is_sound = pattern && std::isfinite(first) && last >= first && stride > 0.0 &&
-                        (last - first) / stride < kMostClips;
-  if (!is_sound) return false;
-  const double offset = number_or(fields, "templateActiveOffset", 0.0);
-  const double time = start_time(root_, set.to_stage, time_).value_or(first);
-  const double most = std::floor((last - first) / stride + 1e-9);
-  const double wanted = std::clamp(std::floor((time - offset - first) / stride), 0.0, most);
-  const auto asset_at = [&](double number) {
-    auto asset = fill_template(*pattern, first + number * stride).value_or("");
-    const std::string file = stacks_.anchor(asset, *set.layer, set.stack->expression_variables);
-    return assets_.exists(file) ? asset : std::string();
-  };
-  for (double number = wanted; number >= 0.0 && set.asset.empty(); --number) {
-    set.asset = asset_at(number);
+  const std::optional<ClipTemplate> files = template_of(fields);
+  if (!files) return false;
+  double offset = number_or(fields, "templateActiveOffset", 0.0);
+  if (!std::isfinite(offset)) offset = 0.0;
+  for (const double time : times_of(set, *files)) {
+    set.clips.push_back({time + offset, fill_template(*files->pattern, time)});
+    set.times.emplace_back(time, time);
   }
-  for (double number = wanted + 1.0; number <= most; ++number) {
-    const std::string later = asset_at(number);
-    if (later.empty()) continue;
-    if (!set.asset.empty()) {
-      set.next = {later, first + number * stride + offset};
-      break;
-    }
-    set.asset = later;
+  if (set.clips.empty()) return false;
+  if (offset != 0.0) {
+    const double before = files->first - std::abs(offset);
+    const double after = files->last + std::abs(offset);
+    set.times.insert(set.times.begin(), {before, before});
+    set.times.emplace_back(after, after);
   }
-  set.time = set.stage_time = time;
-  return !set.asset.empty();
+  set.time = start_time(root_, set.to_stage, time_).value_or(set.clips.front().begin);
+  return true;
+}
+
+// By name, or as `clipSets` lists them, which may leave some out.
+void ValueClips::in_order(const Prim& prim, std::vector<ClipSet>& sets) {
+  Strings names;
+  for (const ClipSet& set : sets) names.push_back(set.name);
+  const Strings by_name = names;
+  for (auto opinion = prim.opinions.rbegin(); opinion != prim.opinions.rend(); ++opinion) {
+    const Value edits = opinion->entry->layer->get(*opinion->spec, "clipSets");
+    if (edits.as_string_list_op()) edits.as_string_list_op()->apply(names);
+  }
+  if (names == by_name) return;
+  std::vector<ClipSet> ordered;
+  for (const std::string& name : names) {
+    const auto found = std::ranges::find(sets, name, &ClipSet::name);
+    if (found != sets.end()) ordered.push_back(*found);
+  }
+  sets = std::move(ordered);
 }
 
 std::vector<ValueClips::ClipSet> ValueClips::read_sets(const Prim& prim) {
@@ -244,6 +337,10 @@ std::vector<ValueClips::ClipSet> ValueClips::read_sets(const Prim& prim) {
     set.to_stage =
         origin->second->node->map_to_root->offset().compose(origin->second->entry->offset);
     set.prim_path = *path->as_text();
+    const Value* manifest = usd::find(fields, "manifestAssetPath");
+    if (manifest && manifest->as_text()) set.manifest = *manifest->as_text();
+    const Value* bridges = usd::find(fields, "interpolateMissingClipValues");
+    set.bridges_gaps = bridges && bridges->as_bool().value_or(false);
     const Value* assets = usd::find(fields, "assetPaths");
     if (assets && assets->as_strings() && !assets->as_strings()->empty()) {
       read_explicit(set, fields);
@@ -253,8 +350,9 @@ std::vector<ValueClips::ClipSet> ValueClips::read_sets(const Prim& prim) {
       diagnostics_.missing(text, text);
       continue;
     }
-    if (!set.asset.empty()) sets.push_back(std::move(set));
+    sets.push_back(std::move(set));
   }
+  in_order(prim, sets);
   return sets;
 }
 
@@ -283,9 +381,75 @@ ValueClips::Said ValueClips::said_in(const std::string& asset, const ClipSet& se
   const PrimSpec* spec = said.layer ? said.layer->prim(path) : nullptr;
   said.property = spec ? spec->property(attribute) : nullptr;
   if (said.property) said.samples = said.layer->get(said.property->fields, "timeSamples");
-  const TimeSamples* samples = said.samples.as_time_samples();
+  const TimeSamples* samples = said.list();
   if (!samples || samples->times.empty()) said.property = nullptr;
   return said;
+}
+
+// Without a manifest what the active clip leaves out is not the set's: else every clip would have
+// to be opened for every attribute that none of them mentions.
+ValueClips::Answer ValueClips::answer_of(const ClipSet& set, const std::string& path,
+                                         std::string_view attribute) {
+  const std::shared_ptr<const Layer> manifest =
+      set.manifest.empty() ? nullptr : open(set.manifest, set);
+  const PropertySpec* declared = nullptr;
+  Value fallback;
+  if (manifest) {
+    const PrimSpec* spec = manifest->prim(path);
+    declared = spec ? spec->property(attribute) : nullptr;
+    if (!declared) return {};
+    fallback = manifest->get(declared->fields, "default");
+  }
+  const Value blocks = declared ? manifest->get(declared->fields, "timeSamples") : Value();
+  const auto said_by = [&](std::size_t clip) {
+    const TimeSamples* list = set.bridges_gaps ? blocks.as_time_samples() : nullptr;
+    const double begin = set.clips[clip].begin;
+    const bool has_word = list && std::ranges::binary_search(list->times, begin);
+    if (has_word && value_at(*list, begin).is_block()) return Said();
+    return said_in(set.clips[clip].asset, set, path, attribute);
+  };
+  const auto value_of = [&](const Said& said, double time) {
+    return said.property ? value_at(*said.list(), clip_time(set.times, time)) : fallback;
+  };
+  const std::size_t active = set.active();
+  const auto is_silent = [&](const Said& said) { return !said.property && fallback.is_empty(); };
+  const auto answer_by = [&](const Said& said, Value value) {
+    return said.property ? Answer{std::move(value), said.layer, said.property}
+                         : Answer{std::move(value), manifest, declared};
+  };
+
+  Said said = said_by(active);
+  Value value = value_of(said, set.time);
+  double from = last_said(set.times, said.list(), set.time, set.span(active));
+  if (is_silent(said) && set.bridges_gaps) {
+    std::size_t clip = active;
+    while (is_silent(said) && clip > 0) said = said_by(--clip);
+    if (is_silent(said)) {
+      clip = active;
+      while (is_silent(said) && clip + 1 < set.clips.size()) said = said_by(++clip);
+      value = value_of(said, set.clips[clip].begin);
+      from = INFINITY;
+    } else {
+      const Span span = set.span(clip);
+      from = last_said(set.times, said.list(), std::nextafter(span.end, span.begin), span);
+      value = value_of(said, from);
+    }
+  }
+  if (is_silent(said)) return declared ? Answer{Value::block(), manifest, declared} : Answer();
+  Answer answer = answer_by(said, std::move(value));
+  for (std::size_t clip = active + 1; clip < set.clips.size(); ++clip) {
+    const double begin = set.clips[clip].begin;
+    if (from >= begin) break;
+    const Said next = said_by(clip);
+    if (is_silent(next) && set.bridges_gaps) continue;
+    if (!is_silent(next)) {
+      answer.value =
+          blended(answer.value, value_of(next, begin), (set.time - from) / (begin - from));
+      answer.is_between = true;
+    }
+    break;
+  }
+  return answer;
 }
 
 FoundValue ValueClips::find(const Prim& prim, std::string_view attribute,
@@ -293,19 +457,8 @@ FoundValue ValueClips::find(const Prim& prim, std::string_view attribute,
   for (const Prim* at = &prim; at && at->has_clips; at = at->parent) {
     for (const ClipSet& set : sets_of(*at)) {
       const std::string path = path::replace_prefix(prim.path, at->path, set.prim_path);
-      const Said said = said_in(set.asset, set, path, attribute);
-      if (!said.property) continue;
-      const TimeSamples& samples = *said.samples.as_time_samples();
-      Value value = value_at(samples, set.time);
-      if (set.next && set.time > samples.times.back()) {
-        const double from = stage_time_of(set.times, set.stage_time, samples.times.back());
-        const Said next = said_in(set.next->asset, set, path, attribute);
-        if (next.property && from < set.next->stage_time) {
-          const double begin = clip_time(set.times, set.next->stage_time);
-          value = blended(value, value_at(*next.samples.as_time_samples(), begin),
-                          (set.stage_time - from) / (set.next->stage_time - from));
-        }
-      }
+      Answer answer = answer_of(set, path, attribute);
+      if (!answer.property) continue;
       if (anchor) {
         const std::string site = set.node_path + prim.path.substr(at->path.size());
         for (const IndexNode& node : prim.index.nodes) {
@@ -313,12 +466,33 @@ FoundValue ValueClips::find(const Prim& prim, std::string_view attribute,
           if (path::strip_variants(node.path) == site) *anchor = &node;
         }
       }
-      auto& known = timed_[{said.property, set.time}];
-      if (!known) known = std::make_unique<PropertySpec>(*said.property);
-      return {std::move(value), said.layer.get(), set.stack, known.get()};
+      if (answer.value.is_block()) return {std::move(answer.value), nullptr, nullptr, nullptr};
+      // What is blended between two clips is this set's alone.
+      auto& known = timed_[{answer.property, clip_time(set.times, set.time),
+                            answer.is_between ? &set : nullptr}];
+      if (!known) known = std::make_unique<PropertySpec>(*answer.property);
+      return {std::move(answer.value), answer.layer.get(), set.stack, known.get()};
     }
   }
   return {};
+}
+
+void add_clip_assets(const Dictionary& clips, std::set<std::string>& assets) {
+  for (const auto& [name, set] : clips) {
+    const Dictionary* fields = set.as_dictionary();
+    if (!fields) continue;
+    const Value* manifest = find(*fields, "manifestAssetPath");
+    if (manifest && manifest->as_text()) assets.insert(*manifest->as_text());
+    const Value* listed = find(*fields, "assetPaths");
+    if (listed && listed->as_strings()) {
+      assets.insert(listed->as_strings()->begin(), listed->as_strings()->end());
+    }
+    const std::optional<ClipTemplate> files = template_of(*fields);
+    for (double number = 0.0;
+         files && number < files->count() && double(assets.size()) < kMostClips; ++number) {
+      assets.insert(fill_template(*files->pattern, files->first + number * files->stride));
+    }
+  }
 }
 
 }  // namespace diorama::usd

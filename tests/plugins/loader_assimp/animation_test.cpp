@@ -5,6 +5,8 @@
 #include <vector>
 
 #include "diorama/error.h"
+#include "loader_assimp/posing.h"
+#include "loader_assimp/scene_file.h"
 #include "plugins/loader_assimp/loaded_file.h"
 #include "support/catch.h"
 #include "support/temporary_folder.h"
@@ -124,6 +126,42 @@ TEST_CASE("glTF: morph targets move points by their weights", "[loader_assimp]")
   CHECK(has_point(LoadedFile(file + "{time=1}"), "Face", {0, -2, 1}));
 }
 
+TEST_CASE("glTF: morph targets turn normals by their weights", "[loader_assimp]") {
+  const auto normal = [](bool says_normals, const std::string& time) {
+    Buffer b;
+    b.add(test::bytes_of<float>({0, 0, 0, 1, 0, 0, 0, 1, 0}), kFloat, "VEC3", 3,
+          R"(,"min":[0,0,0],"max":[1,1,0])");
+    b.add(test::bytes_of<std::uint16_t>({0, 1, 2}), kShort, "SCALAR", 3);
+    b.add(test::bytes_of<float>({0, 0, 0, 0, 0, 0, 0, 0, 2}), kFloat, "VEC3", 3,
+          R"(,"min":[0,0,0],"max":[0,0,2])");
+    b.add(test::bytes_of<float>({0, 1}), kFloat, "SCALAR", 2, R"(,"min":[0],"max":[1])");
+    b.add(test::bytes_of<float>({0, 1}), kFloat, "SCALAR", 2);
+    b.add(test::bytes_of<float>({0, 0, 1, 0, 0, 1, 0, 0, 1}), kFloat, "VEC3", 3);
+    b.add(test::bytes_of<float>({1, 0, 0, 1, 0, 0, 1, 0, 0}), kFloat, "VEC3", 3);
+    const TemporaryFolder folder;
+    const std::string target =
+        says_normals ? R"({"POSITION": 2, "NORMAL": 6})" : R"({"POSITION": 2})";
+    const LoadedFile loaded(folder.write("face.gltf", b.gltf(R"(
+    "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "NORMAL": 5}, "indices": 1,
+                                "targets": [)" + target + R"(]}], "weights": [0]}],
+    "nodes": [{"name": "Face", "mesh": 0}],
+    "animations": [{"channels": [{"sampler": 0, "target": {"node": 0, "path": "weights"}}],
+                    "samplers": [{"input": 3, "output": 4}]}],
+    "scenes": [{"nodes": [0]}])")) +
+                            time);
+    const Affine world_from_node = loaded.scene.world_from_node(loaded.id("Face"));
+    return Vec3(world_from_node.linear() *
+                loaded.node("Face").mesh->normals.front().cast<double>());
+  };
+  const auto is_near = [](const Vec3& a, const Vec3& b) {
+    return (a - b.normalized()).norm() < 1e-5;
+  };
+  CHECK(is_near(normal(true, ""), {0, -1, 0}));
+  CHECK(is_near(normal(true, "{time=0.5}"), {0.5, -1, 0}));
+  CHECK(is_near(normal(true, "{time=1}"), {1, -1, 0}));
+  CHECK(is_near(normal(false, "{time=1}"), {0, -1, 0}));
+}
+
 /// A triangle on a node that moves along x by an interpolation of glTF; two nodes have one name.
 std::string mover(const std::string& interpolation, const std::vector<float>& places,
                   const std::string& more = "") {
@@ -207,6 +245,113 @@ TEST_CASE("glTF: what cannot be read of an animation is said", "[loader_assimp]"
   REQUIRE(loaded.host.messages.size() == 1);
   CHECK_THAT(loaded.host.messages.front(),
              ContainsSubstring("cannot be read: unknown interpolation"));
+}
+
+namespace {
+
+/// One triangle that moves along x by three animations: 1 m in 2 s, 5 m in 1 s, and a pose at 7 m.
+std::string three_animations(const std::string& first, const std::string& second) {
+  Buffer b;
+  b.add(test::bytes_of<float>({0, 0, 0, 1, 0, 0, 0, 1, 0}), kFloat, "VEC3", 3,
+        R"(,"min":[0,0,0],"max":[1,1,0])");
+  b.add(test::bytes_of<std::uint16_t>({0, 1, 2}), kShort, "SCALAR", 3);
+  b.add(test::bytes_of<float>({0, 2}), kFloat, "SCALAR", 2, R"(,"min":[0],"max":[2])");
+  b.add(test::bytes_of<float>({0, 0, 0, 1, 0, 0}), kFloat, "VEC3", 2);
+  b.add(test::bytes_of<float>({0, 1}), kFloat, "SCALAR", 2, R"(,"min":[0],"max":[1])");
+  b.add(test::bytes_of<float>({0, 0, 0, 5, 0, 0}), kFloat, "VEC3", 2);
+  b.add(test::bytes_of<float>({0}), kFloat, "SCALAR", 1, R"(,"min":[0],"max":[0])");
+  b.add(test::bytes_of<float>({7, 0, 0}), kFloat, "VEC3", 1);
+  const auto animation = [](const std::string& name, int times, int values) {
+    return R"({"name": ")" + name + R"(",
+     "channels": [{"sampler": 0, "target": {"node": 0, "path": "translation"}}],
+     "samplers": [{"input": )" +
+           std::to_string(times) + R"(, "output": )" + std::to_string(values) + "}]}";
+  };
+  return b.gltf(R"(
+    "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+    "nodes": [{"name": "Mover", "mesh": 0}],
+    "animations": [)" +
+                animation(first, 2, 3) + "," + animation(second, 4, 5) + "," +
+                animation("Stand", 6, 7) + R"(], "scenes": [{"nodes": [0]}])");
+}
+
+double x_of(const LoadedFile& loaded) {
+  double x = -1.0;
+  for (const NodeId node : loaded.scene.subtree(loaded.root)) {
+    if (loaded.scene[node].mesh) x = loaded.scene.world_from_node(node).translation().x();
+  }
+  return x;
+}
+
+}  // namespace
+
+TEST_CASE("glTF: a file's animations are chosen by name or number", "[loader_assimp]") {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("mover.gltf", three_animations("Walk", "Run"));
+  const auto range = [](const LoadedFile& loaded) { return *loaded.scene[loaded.root].animation; };
+  CHECK(x_of(LoadedFile(file + "{time=1}")) == Approx(0.5));
+  for (const std::string word : {"{animation=Run}", "{animation=1}"}) {
+    CAPTURE(word);
+    const LoadedFile rest(file + word);
+    CHECK(x_of(rest) == 0.0);
+    CHECK(range(rest).asset == file + word);
+    CHECK(range(rest).end_s == Approx(1.0));
+    const LoadedFile later(file + word + "{time=0.5}");
+    CHECK(x_of(later) == Approx(2.5));
+    CHECK(range(later).asset == file + word);
+  }
+  CHECK(x_of(LoadedFile(file + "{animation=Walk}{time=1}")) == Approx(0.5));
+  // One that lasts no time is a pose.
+  const LoadedFile pose(file + "{animation=Stand}{time=0}");
+  CHECK(x_of(pose) == Approx(7.0));
+  CHECK(range(pose).end_s == 0.0);
+  // A name that looks like a number is a name.
+  const std::string numbers = folder.write("numbers.gltf", three_animations("1", "Run"));
+  CHECK(x_of(LoadedFile(numbers + "{animation=1}{time=2}")) == Approx(1.0));
+
+  CHECK_THROWS_WITH(LoadedFile(file + "{animation=Rum}{time=1}"),
+                    file +
+                        "{animation=Rum}: found the animation 'Rum', expected 0 'Walk', 1 'Run' "
+                        "or 2 'Stand'; did you mean 'Run'?");
+  CHECK_THROWS_WITH(
+      LoadedFile(file + "{animation=3}"),
+      ContainsSubstring("found the animation '3', expected 0 'Walk', 1 'Run' or 2 'Stand'"));
+  std::string still = three_animations("Walk", "Run");
+  still.replace(still.find("\"animations\""), 12, "\"extras\"");
+  CHECK_THROWS_WITH(
+      LoadedFile(folder.write("still.gltf", still) + "{animation=Walk}"),
+      ContainsSubstring("found the animation 'Walk', expected none, as the file has none"));
+  CHECK_THROWS_WITH(LoadedFile(file + "{animation=Run}{time=x}"),
+                    ContainsSubstring("expected seconds"));
+}
+
+TEST_CASE("animations are told with names and lengths", "[loader_assimp]") {
+  const TemporaryFolder folder;
+  test::RenderHost host{1};
+  const SceneFile file({folder.write("mover.gltf", three_animations("Walk", "Run")), {}, {}}, host);
+  CHECK(describe_animation(file.scene(), 0) == "animation 0 'Walk' lasts 2 s");
+  CHECK(describe_animation(file.scene(), 1) == "animation 1 'Run' lasts 1 s");
+  CHECK(describe_animation(file.scene(), 2) == "animation 2 'Stand' lasts 0 s");
+}
+
+TEST_CASE("other formats choose among animations likewise", "[loader_assimp]") {
+  const auto set = [](const std::string& name, const std::string& end, const std::string& x) {
+    return "AnimationSet " + name +
+           " {\n Animation {\n  {Mover}\n  AnimationKey { 2; 2; 0;3;0.0,0.0,0.0;;, " + end + ";3;" +
+           x + ",0.0,0.0;;; }\n }\n}\n";
+  };
+  const TemporaryFolder folder;
+  const std::string file = folder.write("mover.x", R"(xof 0303txt 0032
+AnimTicksPerSecond { 10; }
+Frame Mover {
+ FrameTransformMatrix { 1.0,0.0,0.0,0.0, 0.0,1.0,0.0,0.0, 0.0,0.0,1.0,0.0, 0.0,0.0,0.0,1.0;; }
+ Mesh { 3; 0;0;0;, 1;0;0;, 0;1;0;; 1; 3;0,1,2;; }
+}
+)" + set("Walk", "20", "1.0") + set("Run", "10", "5.0"));
+  CHECK(x_of(LoadedFile(file + "{time=1}")) == Approx(0.5));
+  CHECK(x_of(LoadedFile(file + "{animation=Run}{time=0.5}")) == Approx(2.5));
+  CHECK(x_of(LoadedFile(file + "{animation=1}{time=1}")) == Approx(5.0));
+  CHECK_THROWS_WITH(LoadedFile(file + "{animation=run}"), ContainsSubstring("did you mean 'Run'?"));
 }
 
 }  // namespace diorama::loader_assimp

@@ -263,7 +263,7 @@ TEST_CASE("units and axes can be told", "[loader_assimp]") {
   const TemporaryFolder folder;
   test::RenderHost host{1};
   const auto told = [&](const std::string& name, const std::string& text) {
-    return describe_units(SceneFile(folder.write(name, text), host), {});
+    return describe_units(SceneFile({folder.write(name, text), {}, {}}, host), {});
   };
   CHECK(told("a.fbx", fbx(fbx_axes(2, 1, 1, -1) + fbx_double("UnitScaleFactor", 2.54))) ==
         "units: 0.0254 m, z up");

@@ -270,6 +270,170 @@ TEST_CASE("normals turn with the skin", "[loader_usd]") {
   }
 }
 
+TEST_CASE("a blend shape turns normals by its normal offsets, before the skin does",
+          "[loader_usd]") {
+  const TemporaryFolder folder;
+  const auto normal = [&](const std::string& weight, const std::string& more,
+                          const std::string& interpolation, const Vec3f& place) {
+    const std::string values =
+        interpolation == "uniform" ? "(0, 0, 1)" : "(0, 0, 1), (0, 0, 1), (0, 0, 1), (0, 0, 1)";
+    std::string text = arm(R"(
+        uniform token[] skel:blendShapes = ["swell"]
+        rel skel:blendShapeTargets = </Arm/Skin/swell>
+        normal3f[] normals = [)" +
+                           values + R"(] ( interpolation = ")" + interpolation + R"(" )
+        def BlendShape "swell"
+        {
+            uniform vector3f[] offsets = [(0, 0, 1), (0, 0, 2)]
+            uniform int[] pointIndices = [0, 2]
+)" + more + "        }\n");
+    const std::string was = "blendShapeWeights.timeSamples = { 0: [0], 24: [0.5] }";
+    text.replace(text.find(was), was.size(), "blendShapeWeights = [" + weight + "]");
+    LoadedStage loaded(folder.write("arm.usda", text) + "{time=1}");
+    const Mesh& mesh = *loaded.node("Arm/Skin").mesh;
+    for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+      if ((mesh.positions[i] - place).norm() < 1e-4f) return mesh.normals[i];
+    }
+    FAIL("no such point");
+    return Vec3f();
+  };
+  const auto is_near = [](const Vec3f& a, const Vec3& b) {
+    return (a.cast<double>() - b.normalized()).norm() < 1e-5;
+  };
+  const std::string offsets = "uniform vector3f[] normalOffsets = [(1, 0, 0), (0.5, 0, -0.5)]\n";
+  for (const char* interpolation : {"vertex", "faceVarying", "uniform"}) {
+    CAPTURE(interpolation);
+    // The first point hangs on the upper arm, which stands; the third on the fore arm, which turns
+    // x to y.
+    CHECK(is_near(normal("1", offsets, interpolation, {0, 0, 1}), {1, 0, 1}));
+    CHECK(is_near(normal("1", offsets, interpolation, {1, 1, 2}), {0, 0.5, 0.5}));
+    CHECK(is_near(normal("0.5", offsets, interpolation, {0, 0, 0.5f}), {0.5, 0, 1}));
+    CHECK(is_near(normal("2", offsets, interpolation, {0, 0, 2}), {2, 0, 1}));
+    CHECK(is_near(normal("1", offsets, interpolation, {1.2f, 0.5f, 0}), {0, 0, 1}));
+  }
+  // Those in between have their own.
+  const std::string between =
+      offsets + "uniform vector3f[] inbetweens:half = [(0, 0, 1), (0, 0, 2)] ( weight = 0.5 )\n";
+  const std::string their =
+      between + "uniform vector3f[] inbetweens:half:normalOffsets = [(0, 2, 0), (0, 0, 0)]\n";
+  CHECK(is_near(normal("0.5", their, "vertex", {0, 0, 1}), {0, 2, 1}));
+  CHECK(is_near(normal("0.75", their, "vertex", {0, 0, 1}), {0.5, 1, 1}));
+  // A shape that says nothing of its normals gets those of its faces, and so does one that says too
+  // few: the face is no longer level.
+  CHECK_FALSE(is_near(normal("0.5", between, "vertex", {0, 0, 1}), {0, 0, 1}));
+  CHECK_FALSE(is_near(normal("1", "", "vertex", {0, 0, 1}), {0, 0, 1}));
+  CHECK_FALSE(
+      is_near(normal("1", "uniform vector3f[] normalOffsets = [(1, 0, 0)]\n", "vertex", {0, 0, 1}),
+              {1, 0, 1}));
+}
+
+TEST_CASE("instances of a skin move as each one's own animation says", "[loader_usd]") {
+  const TemporaryFolder folder;
+  std::string text = arm();
+  // The animations stand outside of what is instanced, and the instances choose.
+  const std::string binding = "        rel skel:animationSource = </Arm/Moves>\n";
+  text.erase(text.find(binding), binding.size());
+  text.insert(text.find("def SkelRoot"), R"(def "Library"
+{
+    def SkelAnimation "Down"
+    {
+        uniform token[] joints = ["upper/fore"]
+        float3[] translations = [(1, 0, 0)]
+        half3[] scales = [(1, 1, 1)]
+        quatf[] rotations.timeSamples = { 0: [(1, 0, 0, 0)], 24: [(0.70710678, 0, 0, -0.70710678)] }
+    }
+    def SkelAnimation "Still"
+    {
+        uniform token[] joints = ["upper/fore"]
+        float3[] translations = [(1, 0, 0)]
+        half3[] scales = [(1, 1, 1)]
+        quatf[] rotations = [(1, 0, 0, 0)]
+    }
+}
+)");
+  const auto instance = [](const std::string& name, const std::string& source,
+                           const std::string& offset = "") {
+    return "def \"" + name +
+           "\" (\n    instanceable = true\n    prepend apiSchemas = [\"SkelBindingAPI\"]\n"
+           "    references = </Arm>" +
+           offset + "\n)\n{\n    rel skel:animationSource = " + source + "\n}\n";
+  };
+  text += instance("Up", "</Up/Moves>") + instance("Down", "</Library/Down>") +
+          instance("Still", "</Library/Still>") +
+          instance("Late", "</Late/Moves>", " (offset = 12)");
+  const std::string file = folder.write("arms.usda", text);
+  LoadedStage now(file + "{time=1}");
+  CAPTURE(all_warnings(now));
+  CHECK(has_point(*now.node("Up/Skin").mesh, {1, 1, 0}));
+  CHECK(has_point(*now.node("Down/Skin").mesh, {1, -1, 0}));
+  CHECK(has_point(*now.node("Still/Skin").mesh, {2, 0, 0}));
+  // Half a second late it is bent by half.
+  const float half = std::sqrt(0.5f);
+  CHECK(has_point(*now.node("Late/Skin").mesh, {1 + half, half, 0}));
+}
+
+TEST_CASE("prototypes of an instancer move, and its instances with them", "[loader_usd]") {
+  const TemporaryFolder folder;
+  std::string text = arm();
+  text += R"(def PointInstancer "Crowd"
+{
+    rel prototypes = [</Crowd/Arms/Arm>, </Crowd/Arms/Fan>]
+    int[] protoIndices.timeSamples = { 0: [0, 1, 1], 12: [0, 1, 0] }
+    point3f[] positions.timeSamples = { 0: [(0, 0, 0), (0, 0, 4), (0, 0, 8)],
+                                       24: [(0, 6, 0), (0, 6, 4), (0, 6, 8)] }
+    quath[] orientations.timeSamples = { 0: [(1, 0, 0, 0), (1, 0, 0, 0), (1, 0, 0, 0)],
+                                        24: [(1, 0, 0, 0), (0.70710678, 0, 0, 0.70710678), (1, 0, 0, 0)] }
+    int64[] invisibleIds.timeSamples = { 0: [], 20: [2] }
+    over "Arms"
+    {
+        def "Arm" ( references = </Arm> )
+        {
+        }
+        def Xform "Fan"
+        {
+            double3 xformOp:translate.timeSamples = { 0: (0, 0, 0), 24: (4, 0, 0) }
+            uniform token[] xformOpOrder = ["xformOp:translate"]
+            def Mesh "Blade"
+            {
+                int[] faceVertexCounts = [3]
+                int[] faceVertexIndices = [0, 1, 2]
+                point3f[] points.timeSamples = { 0: [(0, 0, 0), (1, 0, 0), (0, 1, 0)],
+                                                24: [(0, 0, 0), (3, 0, 0), (0, 1, 0)] }
+            }
+        }
+    }
+}
+)";
+  const std::string file = folder.write("crowd.usda", text);
+  // Points of all that is drawn of the crowd, in its space.
+  const auto has = [](LoadedStage& loaded, const Vec3& place) {
+    const NodeId crowd = loaded.scene.require("/asset/Crowd");
+    for (const NodeId node : loaded.scene.subtree(crowd)) {
+      if (!loaded.scene[node].mesh || !loaded.scene.is_visible(node)) continue;
+      const Affine pose = loaded.scene.world_from_node(node);
+      for (const Vec3f& point : loaded.scene[node].mesh->positions) {
+        if ((pose * point.cast<double>() - place).norm() < 2e-3) return true;
+      }
+    }
+    return false;
+  };
+  LoadedStage first(file + "{time=0}");
+  CHECK(has(first, {2, 0, 0}));
+  CHECK(has(first, {1, 0, 4}));
+  CHECK(has(first, {1, 0, 8}));
+  LoadedStage middle(file + "{time=0.5}");
+  const double half = std::sqrt(0.5);
+  CHECK(has(middle, {1 + half, 3 + half, 0}));
+  // By 2 m along x within the prototype, and 45 degrees about the instance.
+  CHECK(has(middle, {4 * half, 3 + 4 * half, 4}));
+  // The third one has become an arm.
+  CHECK(has(middle, {1 + half, 3 + half, 8}));
+  LoadedStage last(file + "{time=1}");
+  CHECK(has(last, {1, 7, 0}));
+  CHECK(has(last, {0, 13, 4}));
+  CHECK_FALSE(has(last, {1, 7, 8}));
+}
+
 TEST_CASE("poses and points are those of the time that is asked for", "[loader_usd]") {
   const TemporaryFolder folder;
   const std::string file = folder.write("fan.usda", R"(#usda 1.0

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "diorama/joints.h"
 
+#include <cmath>
+#include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -121,6 +124,48 @@ TEST_CASE("an animated asset is shown at a time of its animation", "[randomizers
   params.time_s = Distribution(50.0);
   AnimationTime(params, host).randomize(scene, {}, Rng(3));
   CHECK(scene[blade].mesh->bounds().size().x() == Approx(4.0));
+}
+
+TEST_CASE("an animation is drawn among those of the file", "[randomizers]") {
+  FakeHost host;
+  const auto build = [&](const std::string& asset, double end, double size) {
+    return [asset, end, size](Scene& made, NodeId root) {
+      made.edit(root).animation = Animation{asset, 0.0, end};
+      made.edit(root).mesh = std::make_shared<const Mesh>(make_box(Vec3::Constant(size)));
+    };
+  };
+  host.assets["man.glb"] = build("man.glb", 4.0, 1.0);
+  host.assets["man.glb{animation=run}"] = build("man.glb{animation=run}", 2.0, 1.0);
+  host.assets["man.glb{animation=run}{time=1}"] = build("man.glb{animation=run}", 2.0, 5.0);
+  host.assets["man.glb{animation=jump}"] = build("man.glb{animation=jump}", 1.0, 1.0);
+  host.assets["man.glb{animation=jump}{time=0.5}"] = build("man.glb{animation=jump}", 1.0, 7.0);
+  host.assets["man.glb{animation=still}"] = [](Scene&, NodeId) {};
+  Scene scene;
+  const NodeId man = host.load_asset("man.glb", scene, scene.root());
+  const auto show = [&](const std::vector<std::string>& words, int seed) {
+    AnimationTime::Params params;
+    params.animation = TextDistribution(words);
+    params.share = Distribution(0.5);
+    AnimationTime(params, host).randomize(scene, {}, Rng(std::uint64_t(seed)));
+    return scene[man].mesh->bounds().size().x();
+  };
+  CHECK(show({"run"}, 1) == Approx(5.0));
+  CHECK(scene[man].animation->asset == "man.glb{animation=run}");
+  CHECK(scene[man].animation->end_s == 2.0);
+  // From one to another.
+  CHECK(show({"jump"}, 1) == Approx(7.0));
+  CHECK(scene[man].animation->asset == "man.glb{animation=jump}");
+  std::set<double> sizes;
+  for (int seed = 0; seed < 20; ++seed) sizes.insert(std::round(show({"run", "jump"}, seed)));
+  CHECK(sizes == std::set<double>{5.0, 7.0});
+  CHECK_THROWS_WITH(show({"still"}, 1), "man.glb{animation=still}: does not move");
+  // What the name chose stays chosen.
+  Scene other;
+  const NodeId runner = host.load_asset("man.glb{animation=run}", other, other.root());
+  AnimationTime::Params params;
+  params.share = Distribution(0.5);
+  AnimationTime(params, host).randomize(other, {}, Rng(3));
+  CHECK(other[runner].mesh->bounds().size().x() == Approx(5.0));
 }
 
 TEST_CASE("in a clip an animated asset goes on from the time that was drawn", "[randomizers]") {

@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <memory>
+#include <vector>
 
 #include "diorama/rng.h"
 #include "support/catch.h"
@@ -543,6 +546,45 @@ TEST_CASE("what has not changed is not made again", "[instances]") {
   scene.take(world.scene);
   CHECK(scene.lights().records().data() == light);
   CHECK(scene.instances()[0].shading == mesh);
+}
+
+TEST_CASE("a mesh that bends is made once, although others are shown in between", "[instances]") {
+  TestWorld world;
+  const NodeId node = world.add("sheet", make_plane(1.0, 1.0), matte(0.5f));
+  world.scene.edit(world.base).animation = Animation{"sheet", 0.0, 1.0};
+  RenderHost host(1);
+  EmbreeScene scene(host, {});
+  std::vector<std::shared_ptr<const Mesh>> frames;
+  for (int i = 0; i < 12; ++i) {
+    frames.push_back(std::make_shared<const Mesh>(make_plane(1.0 + 0.1 * i, 1.0)));
+  }
+  std::map<int, const ShadingMesh*> made;
+  const auto show = [&](int frame) {
+    world.scene.edit(node).mesh = frames[std::size_t(frame)];
+    scene.take(world.scene);
+    const MeshInstance& instance = scene.instances()[0];
+    CHECK(&instance.source() == frames[std::size_t(frame)].get());
+    const auto [known, is_new] = made.emplace(frame, instance.shading);
+    CHECK(known->second == instance.shading);
+    // Near its edge, which is elsewhere in each.
+    const Affine world_from_node = world.scene.world_from_node(node);
+    const Vec3 above(0.5 + 0.05 * frame - 0.01, 0.0, 1.0);
+    const RayHit hit = scene.intersect(
+        (world_from_node * above).cast<float>(),
+        (world_from_node.linear() * Vec3(0.0, 0.0, -1.0)).cast<float>(), 0.0f, 2.0f);
+    CHECK(hit);
+  };
+  // As a clip with flow shows them.
+  for (int frame = 1; frame + 1 < 12; ++frame) {
+    for (const int shown : {frame, frame + 1, frame - 1, frame}) show(shown);
+  }
+  CHECK(scene.kept().meshes <= 4);
+  // Whose scene is gone goes, too.
+  frames.clear();
+  made.clear();
+  world.scene.edit(node).mesh = std::make_shared<const Mesh>(make_plane(1.0, 1.0));
+  scene.take(world.scene);
+  CHECK(scene.kept().meshes == 1);
 }
 
 TEST_CASE("cut-outs have their holes in both halves of a quad", "[rays]") {
