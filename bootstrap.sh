@@ -18,7 +18,7 @@ build_packages=(
   libboost-dev libboost-filesystem-dev libbullet-dev libfcl-dev libembree-dev libeigen3-dev libassimp-dev
   libavcodec-dev libavutil-dev liburdfdom-dev libconsole-bridge-dev
   libyaml-cpp-dev libcli11-dev libspdlog-dev libfmt-dev nlohmann-json3-dev
-  libre2-dev libhdf5-dev liblz4-dev libdeflate-dev libpng-dev libjpeg-dev libopenexr-dev libtbb-dev
+  libre2-dev libhdf5-dev liblz4-dev libdeflate-dev zlib1g-dev libpng-dev libjpeg-dev libopenexr-dev libtbb-dev
   libvulkan-dev glslang-tools spirv-tools
   pybind11-dev python3-dev python3-minimal python3-numpy
   libxxhash-dev nettle-dev libopencv-core-dev libopencv-imgproc-dev libopencv-calib3d-dev libopencv-imgcodecs-dev

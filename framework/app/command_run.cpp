@@ -2,6 +2,7 @@
 #include "framework/app/command_run.h"
 
 #include <atomic>
+#include <chrono>
 #include <csignal>
 #include <functional>
 #include <iostream>
@@ -110,10 +111,14 @@ RunSummary run_job(JobAssembly& assembly, HostServices& host, const RunCommandOp
   run.stop = &stop_requested;
   run.only_finishes = options.only_finishes;
   run.only = options.only;
-  run.progress = [&, calls = 0](const RunProgress& progress) mutable {
-    constexpr int kCapturesPerTrim = 200;
+  using Clock = std::chrono::steady_clock;
+  run.progress = [&, trimmed = Clock::now()](const RunProgress& progress) mutable {
+    constexpr std::chrono::seconds kBetweenTrims{1};
     has_begun = true;
-    if (++calls % kCapturesPerTrim == 0) give_free_pages_back();
+    if (const auto now = Clock::now(); now - trimmed >= kBetweenTrims) {
+      trimmed = now;
+      give_free_pages_back();
+    }
     if (lines) {
       lines->update(progress.done, progress.total, progress.resumed, progress.respawned,
                     progress.refused);

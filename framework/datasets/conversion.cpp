@@ -111,6 +111,17 @@ std::vector<Occlusion> order_of_masks(const Frame& frame) {
   return order;
 }
 
+/// Paths that a reader made up say that objects of different pictures are one.
+void name_by_picture(Capture& capture) {
+  for (Frame& frame : capture.frames) {
+    const std::string front =
+        "/Assets/" + std::to_string(capture.index) + "_" + frame.camera_name + "_";
+    for (Instance& instance : frame.instances) {
+      instance.node_path = front + std::to_string(instance.id);
+    }
+  }
+}
+
 /// Writers of clips take an object's id for its number in all frames. Where readers count anew in
 /// each frame, objects are told apart by their paths.
 class ClipNumbers {
@@ -303,7 +314,9 @@ void Conversion::run(Host& host, const std::function<void(Capture)>& take) const
           std::string_view("pointcloud")}) {
       if (!needs_.contains(name)) wanted.erase(std::string(name));
     }
-    const bool counts_anew = !source.data->info().holds.contains(kHoldsTracks);
+    const NameSet& holds = source.data->info().holds;
+    const bool counts_anew = !holds.contains(kHoldsTracks);
+    const bool has_paths = holds.contains(kHoldsNodePaths) || !counts_anew;
     ClipNumbers numbers;
     sweep_captures<Capture>(
         *source.data, wanted, host,
@@ -311,6 +324,7 @@ void Conversion::run(Host& host, const std::function<void(Capture)>& take) const
         [&](Capture capture) {
           capture.index = number++;
           capture.clip = clip_frame(info_.clips, capture.index);
+          if (!has_paths) name_by_picture(capture);
           if (counts_anew) numbers.renumber(capture);
           take(std::move(capture));
         });

@@ -567,6 +567,7 @@ void check_frames(const StoredInfo& info, StoredCapture& stored) {
 void CaptureComparison::add(const StoredCapture& stored, ReadLog& log) {
   for (std::size_t i = 0; i < stored.capture.frames.size(); ++i) {
     if (info_.holds.contains(kHoldsNodePaths)) compare_objects(stored, i, log);
+    if (is_own_ && info_.holds.contains(kHoldsTracks)) compare_tracks(stored, i, log);
     compare_pixels(stored, i, log);
   }
 }
@@ -587,6 +588,23 @@ void CaptureComparison::compare_objects(const StoredCapture& stored, std::size_t
                  frame.camera_name, instance.node_path, "has other labels",
                  "those of capture " + std::to_string(before.capture)});
     }
+  }
+}
+
+void CaptureComparison::compare_tracks(const StoredCapture& stored, std::size_t place,
+                                       ReadLog& log) {
+  const auto& clip = stored.capture.clip;
+  if (!clip || !info_.holds.contains(kHoldsLabels)) return;
+  if (std::exchange(clip_, clip->clip) != clip->clip) tracks_.clear();
+  const Frame& frame = stored.capture.frames[place];
+  for (const Instance& instance : frame.instances) {
+    const KnownObject& known =
+        tracks_.try_emplace(instance.id, KnownObject{stored.capture.index, instance.labels})
+            .first->second;
+    log.check(instance.labels == known.labels,
+              {kSame, file_of(stored, place, kHoldsLabels), stored.capture.index, frame.camera_name,
+               "track " + std::to_string(instance.id), "has other labels",
+               "those of capture " + std::to_string(known.capture)});
   }
 }
 

@@ -20,7 +20,8 @@ void check_frames(const StoredInfo& info, StoredCapture& stored);
 /// and object. Captures come in order, from one thread.
 class CaptureComparison {
  public:
-  explicit CaptureComparison(const StoredInfo& info) : info_(info) {}
+  /// `is_own`: one of our writers made it. Tracks of others may change their classes.
+  CaptureComparison(const StoredInfo& info, bool is_own) : info_(info), is_own_(is_own) {}
   void add(const StoredCapture& stored, ReadLog& log);
 
  private:
@@ -33,9 +34,13 @@ class CaptureComparison {
     std::uint64_t labels = 0;
   };
   void compare_objects(const StoredCapture& stored, std::size_t frame, ReadLog& log);
+  void compare_tracks(const StoredCapture& stored, std::size_t frame, ReadLog& log);
   void compare_pixels(const StoredCapture& stored, std::size_t frame, ReadLog& log);
 
   const StoredInfo& info_;
+  bool is_own_;
+  int clip_ = -1;
+  std::map<std::uint32_t, KnownObject> tracks_;     ///< Of that clip.
   std::map<std::string, KnownObject> objects_;      ///< By node path.
   std::map<std::uint64_t, KnownPicture> pictures_;  ///< By digest.
 };

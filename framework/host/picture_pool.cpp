@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "framework/host/picture_pool.h"
 
+#include <xxhash.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -8,8 +10,8 @@ namespace diorama {
 
 std::shared_ptr<const Texture> PicturePool::get(std::span<const std::byte> bytes,
                                                 std::string_view name, const Decode& decode) {
-  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  Key key(name, bytes.size(), std::hash<std::string_view>{}(text));
+  // In half the time of std::hash, which took a thirtieth of what decoding takes.
+  Key key(name, bytes.size(), XXH3_64bits(bytes.data(), bytes.size()));
   {
     const std::lock_guard lock(mutex_);
     const auto known = pictures_.find(key);

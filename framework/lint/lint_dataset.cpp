@@ -33,7 +33,7 @@ LintReport lint_read(const StoredDataset& dataset, const std::filesystem::path& 
   ReadLog log = dataset.log();
   const auto planned = check_page(folder, info, log);
   take(std::move(log), report);
-  CaptureComparison comparison(info);
+  CaptureComparison comparison(info, planned.has_value());
   sweep_captures<StoredCapture>(
       dataset, info.holds, host,
       [&](StoredCapture stored) {

@@ -379,7 +379,7 @@ std::string_view checked(std::string_view line) {
 /// behind what was read.
 void read_lines(FileSystem& file_system, const fs::path& file, std::uint64_t& offset,
                 const std::function<void(std::string_view)>& visit) {
-  constexpr std::uint64_t kBlock = std::uint64_t(1) << 22;
+  constexpr std::uint64_t kBlock = std::uint64_t(1) << 18;
   for (;;) {
     const std::string block = file_system.read_part(file, offset, kBlock);
     // A line without its end is on its way, or torn.

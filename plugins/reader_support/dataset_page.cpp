@@ -59,7 +59,8 @@ std::optional<DatasetPage> read_dataset_page(const std::filesystem::path& folder
     if (page.captures < 0 || page.captures > kMostCaptures) return std::nullopt;
     page.cameras = json.at("cameras").get<std::vector<std::string>>();
     if (json.contains("classes")) page.classes = json.at("classes").get<std::vector<std::string>>();
-    if (json.contains("conventions")) page.conventions = json.at("conventions");
+    const auto conventions = json.find("conventions");
+    if (conventions != json.end() && conventions->is_object()) page.conventions = *conventions;
     for (const auto& [split, captures] : json.at("split").items()) {
       for (const Json& capture : captures) {
         const int index = whole_number<int>(capture);
@@ -67,8 +68,6 @@ std::optional<DatasetPage> read_dataset_page(const std::filesystem::path& folder
       }
     }
     if (json.contains("clips")) page.clips = clips_of_json(json.at("clips"));
-    const auto job = json.find("job");
-    if (job != json.end() && job->is_string()) page.job = job->get<std::string>();
     return page;
   } catch (const std::runtime_error&) {
     return std::nullopt;
@@ -78,20 +77,10 @@ std::optional<DatasetPage> read_dataset_page(const std::filesystem::path& folder
 }
 
 void check_class_order(const DatasetPage& page, StoredFiles& files) {
-  const std::string& job = page.job;
-  // Keys of writers that name classes, or what becomes of them, with nothing behind.
-  const auto is_plain = [&](std::string_view key, std::string_view nothing) {
-    for (std::size_t at = job.find(key); at != job.npos; at = job.find(key, at)) {
-      at += key.size();
-      if (!std::string_view(job).substr(at).starts_with(nothing)) return false;
-    }
-    return true;
-  };
-  const bool is_free = job.find("classes: []") != job.npos && is_plain("classes: ", "[]") &&
-                       is_plain("_categories: ", "null") && is_plain("mapping_path: ", "null") &&
-                       is_plain("mapping_dict: ", "null");
-  files.check(!is_free || std::ranges::is_sorted(page.classes), kIds, kPage, "classes",
-              "are not sorted", "the order that a job without a list of classes gives them");
+  const auto order = page.conventions.find("class_order");
+  if (order == page.conventions.end() || *order != "sorted") return;
+  files.check(std::ranges::is_sorted(page.classes), kIds, kPage, "classes", "are not sorted",
+              "sorted, as its convention class_order says");
 }
 
 std::span<const DatasetClip> clips_of(const std::optional<DatasetPage>& page) {

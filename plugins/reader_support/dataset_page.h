@@ -20,9 +20,8 @@ struct DatasetPage {
   std::vector<std::string> cameras;
   std::vector<std::string> classes;
   std::map<int, std::string> split_of_capture;
-  Json conventions = Json::object();
+  Json conventions = Json::object();  ///< An object always.
   std::vector<DatasetClip> clips;
-  std::string job;  ///< As resolved by the run, YAML; empty for what no run made.
 
   /// One picture per capture and camera.
   std::size_t picture_count() const { return std::size_t(captures) * cameras.size(); }
@@ -34,7 +33,7 @@ struct DatasetPage {
 /// format's rules alone.
 std::optional<DatasetPage> read_dataset_page(const std::filesystem::path& folder);
 
-/// Classes that no parameter of a writer has put in an order are sorted.
+/// Classes of which the page says that they are sorted are.
 void check_class_order(const DatasetPage& page, StoredFiles& files);
 
 /// Clips that the page lists; none without a page.

@@ -89,19 +89,13 @@ PlyMeasures measure_ply(const std::filesystem::path& file) {
   return measures;
 }
 
-/// How far turned models may be off, as a share of their diameters: what writers of the job were
-/// told, or else the most that they take.
-double symmetry_tolerance(const std::string& job) {
-  constexpr std::string_view kKey = "symmetry_tolerance: ";
+/// How far turned models may be off, as a share of their diameters: what the page says, or else the
+/// most that writers take.
+double symmetry_tolerance(const DatasetPage& page) {
   constexpr double kMost = 0.2;
-  double tolerance = -1.0;
-  for (std::size_t at = job.find(kKey); at != job.npos; at = job.find(kKey, at)) {
-    at += kKey.size();
-    double said = kMost;
-    std::from_chars(job.data() + at, job.data() + job.size(), said);
-    tolerance = std::max(tolerance, said);
-  }
-  return tolerance < 0.0 ? kMost : tolerance;
+  const auto said = page.conventions.find("symmetry_tolerance");
+  const bool is_told = said != page.conventions.end() && said->is_number();
+  return is_told ? std::clamp(said->get<double>(), 0.0, kMost) : kMost;
 }
 
 /// Models reach equally far in all directions when they are turned.
@@ -180,7 +174,7 @@ BopModelBoxes read_bop_models(StoredFiles& files, const std::optional<DatasetPag
   if (!own && !files.has(page)) return boxes;
   const auto json = files.json(page);
   if (!json) return boxes;
-  const double tolerance = own ? symmetry_tolerance(own->job) : 0.0;
+  const double tolerance = own ? symmetry_tolerance(*own) : 0.0;
   files.reading(page, [&] {
     for (const auto& item : json->items()) {
       const std::string& key = item.key();

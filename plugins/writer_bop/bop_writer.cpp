@@ -196,6 +196,7 @@ void BopWriter::begin(const DatasetInfo& dataset, DatasetFiles& files) {
         "px_count_all, visib_fract and bbox_obj count what lies up to one image size "
         "outside of the picture"},
        {"depth", "along the viewing axis, 16 bit x depth_scale, 0: nothing"},
+       {"symmetry_tolerance", params_.symmetry_tolerance},
        {"scene", is_sensors ? "all cameras, by suffixes; image ids are captures"
                             : "one camera; image ids are captures"},
        {"objects", std::move(objects)}},

@@ -56,7 +56,19 @@ NumberType type_of(Hdf5File::Number number) {
 /// Of a chunk: the library packs each in a buffer of its own.
 constexpr std::size_t kChunkBytes = std::size_t(1) << 19;
 
+/// What the library frees it keeps for later, in lists of every size that it ever had: megabytes
+/// that grow over thousands of files, as sizes of what is packed differ.
+void keep_short_free_lists() {
+  constexpr int kAll = 1 << 16;
+  constexpr int kList = 1 << 14;
+  static const bool once = [] {
+    return H5set_free_list_limits(kAll, kList, kAll, kList, kAll, kList) >= 0;
+  }();
+  static_cast<void>(once);
+}
+
 hid_t create_in_memory() {
+  keep_short_free_lists();
   const Handle access(H5Pcreate(H5P_FILE_ACCESS), "file properties");
   constexpr std::size_t kGrowth = std::size_t(1) << 18;
   H5Pset_fapl_core(access, kGrowth, false);

@@ -95,7 +95,7 @@ class Hdf5Dataset final : public StoredDataset {
   }
 
   /// What the first file that can be read holds; the others are alike, and what they lack is a
-  /// finding where it is read.
+  /// finding where it is read. What objects hold is said by the first file that has some.
   void describe(StoredFiles& files) {
     info_.format = kFormat;
     info_.camera_names = pictures_.cameras();
@@ -113,6 +113,7 @@ class Hdf5Dataset final : public StoredDataset {
         continue;
       }
     }
+    describe_objects();
     // What passes through segmaps of 8-bit steps or (n + 1) / 2 in 32 bits.
     info_.steps[std::string(kNormals.name)] = 1e-6;
   }
@@ -134,7 +135,6 @@ class Hdf5Dataset final : public StoredDataset {
     hold("cam_states", {kHoldsCamera, kHoldsCameraPose});
     if (view.has(kCategories)) held_sets_.emplace_back(kCategories);
     if (view.has("lens")) held_sets_.emplace_back("lens");
-    if (view.has(kObjects)) describe_objects(view);
     // Each further picture is a channel of its own name.
     static const std::set<std::string> kKnown{"colors", "depth", "distance", "normals"};
     for (const std::string& name : view.names()) {
@@ -160,14 +160,24 @@ class Hdf5Dataset final : public StoredDataset {
     }
   }
 
-  void describe_objects(const Hdf5View& view) {
-    try {
-      const Json list = parse_stored_json(view.text(kObjects));
-      if (!list.is_array() || list.empty() || !list[0].contains("world_from_node")) return;
-      info_.holds.insert({std::string(kHoldsNodePaths), std::string(kHoldsPoses),
-                          std::string(kHoldsBounds), std::string(kHoldsBoxes3d)});
-    } catch (const std::exception&) {
-      return;
+  void describe_objects() {
+    if (std::ranges::count(held_sets_, kObjects) == 0) return;
+    constexpr std::size_t kLookedAt = 32;  // from all over
+    const auto& all = pictures_.all();
+    for (std::size_t i = 0; i < all.size(); i += all.size() / kLookedAt + 1) {
+      try {
+        const Hdf5View view(read_whole_file(folder_ / file_of(all[i])));
+        const Json list = parse_stored_json(view.text(kObjects));
+        if (!list.is_array() || list.empty()) continue;
+        if (!list[0].contains("world_from_node")) return;
+        info_.holds.insert({std::string(kHoldsNodePaths), std::string(kHoldsPoses),
+                            std::string(kHoldsBounds), std::string(kHoldsBoxes3d)});
+        return;
+      } catch (const std::runtime_error&) {
+        continue;
+      } catch (const Json::exception&) {
+        continue;
+      }
     }
   }
 

@@ -113,7 +113,8 @@ void TrainingParams::visit(ParamVisitor& v) {
 
 void TrainingData::begin(const DatasetInfo& dataset) {
   classes_ = params_.classes.empty() ? dataset.classes : params_.classes;
-  if (classes_.empty()) {
+  is_sorted_ = classes_.empty();
+  if (is_sorted_) {
     std::set<std::string> names;
     for (const Labels& labels : dataset.labels) {
       if (const auto label = choice_.of(labels)) names.insert(*label);
@@ -189,7 +190,8 @@ void TrainingData::add_dataset_page(const std::string& format, Json more,
       {"pixels", "(0, 0) is the top left corner, the first pixel's centre is (0.5, 0.5)"},
       {"boxes", "x_max and y_max are one past the last pixel"},
       {"rotations", "matrices; there are no quaternions"},
-      {"depth", "none"}};
+      {"depth", "none"},
+      {"class_order", is_sorted_ ? "sorted" : "as given"}};
   for (auto& [key, value] : more.items()) page["conventions"][key] = value;
   page["plugins"] = Json::object();
   for (const auto& [name, version] : dataset.plugin_versions) page["plugins"][name] = version;

@@ -59,7 +59,10 @@ std::string TarWalk::bytes(std::uint64_t begin, std::uint64_t size) {
   in_.clear();
   in_.seekg(std::streamoff(begin));
   in_.read(result.data(), std::streamsize(size));
-  if (!in_) throw std::runtime_error("has become shorter");
+  if (!in_) {
+    throw std::runtime_error(size_ == kAnySize ? "the end of the archive is missing"
+                                               : "has become shorter");
+  }
   return result;
 }
 

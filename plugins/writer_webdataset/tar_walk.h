@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <istream>
+#include <limits>
 #include <optional>
 #include <string>
 
@@ -24,6 +25,9 @@ struct TarMember {
 /// and the long names and sizes of pax and GNU tar. Links, folders and devices are left out.
 class TarWalk {
  public:
+  /// The size of an archive of which only reading tells it.
+  static constexpr std::uint64_t kAnySize = std::numeric_limits<std::int64_t>::max();
+
   /// `size` is that of the whole archive. `in` must outlive the object.
   TarWalk(std::istream& in, std::uint64_t size, std::uint64_t at = 0)
       : in_(in), size_(size), at_(at) {}

@@ -21,6 +21,7 @@
 #include "reader_support/listed_boxes.h"
 #include "reader_support/picture_list.h"
 #include "reader_support/stored_files.h"
+#include "writer_webdataset/gzip_stream.h"
 #include "writer_webdataset/tar_walk.h"
 
 namespace diorama {
@@ -33,6 +34,10 @@ constexpr const char* kArea = "area = count";
 constexpr const char* kOrder = "samples are in order";
 /// More members with one name, or kinds of them, are refused: each is kept in memory.
 constexpr std::size_t kMostMembers = 1'000;
+
+bool is_shard(const std::string& name) {
+  return name.ends_with(".tar") || name.ends_with(".tar.gz") || name.ends_with(".tgz");
+}
 
 struct Names {
   std::string key;     ///< With the folder in the archive.
@@ -106,6 +111,7 @@ class WebDataset final : public StoredDataset {
     if (shards_.empty() && !page_) {
       throw Error(ErrorKind::Asset, folder_.string() + ": holds no tar archives");
     }
+    contents_.resize(shards_.size());
     for (std::uint32_t shard = 0; shard < shards_.size(); ++shard) scan(shard, files);
     read_lists(files);
     group(files);
@@ -118,44 +124,90 @@ class WebDataset final : public StoredDataset {
   StoredCapture read(std::size_t i, const NameSet& wanted) const override;
 
  private:
+  /// What a shard holds, packed or not.
+  struct Content {
+    std::uint64_t size = 0;
+    std::optional<GzipPlaces> places;  ///< Of a packed one.
+  };
+
   void add_shard(const std::string& path) {
-    if (path.ends_with(".tar")) shards_.push_back(path);
+    if (is_shard(path)) shards_.push_back(path);
+  }
+
+  std::ifstream open_shard(std::uint32_t shard) const {
+    std::ifstream in = open_stored(folder_ / shards_[shard]);
+    if (!in) throw std::runtime_error("cannot be read");
+    return in;
   }
 
   void scan(std::uint32_t shard, StoredFiles& files) {
     const std::string& file = shards_[shard];
-    std::ifstream in = open_stored(folder_ / file);
-    std::error_code error;
-    const std::uintmax_t size = fs::file_size(folder_ / file, error);
     ++log_.files;
     std::vector<std::uint64_t> hashes;
-    std::string key;
     files.reading(file, [&] {
-      if (!in || error) throw std::runtime_error("cannot be read");
-      TarWalk walk(in, size);
-      while (const auto member = walk.next()) {
-        const auto names = names_of(member->name);
-        if (!names) continue;
-        if (names->key != key || samples_.empty() || samples_.back().shard != shard) {
-          if (page_ && !key.empty()) {
-            files.check(key < names->key, kOrder, file, names->key, "stands behind " + key);
-          }
-          key = names->key;
-          hashes.push_back(text_hash(key));
-          samples_.push_back({member->header, shard, 0, 0, 0});
-          number(samples_.back(), key, files);
-        }
-        if (++samples_.back().members > kMostMembers) {
-          throw std::runtime_error(key + " has more than " + std::to_string(kMostMembers) +
-                                   " members");
-        }
-        if (endings_.size() < kMostMembers) endings_.insert(names->ending);
+      std::ifstream in = open_shard(shard);
+      Content& content = contents_[shard];
+      if (!is_gzip(in)) {
+        content.size = fs::file_size(folder_ / file);
+        scan(shard, in, content.size, hashes, files);
+        return;
       }
+      GzipPlaces& places = content.places.emplace(place_spacing_);
+      GzipStream packed(std::move(in), places);
+      try {
+        scan(shard, packed, TarWalk::kAnySize, hashes, files);
+        // The checksum stands at its end.
+        packed.ignore(std::numeric_limits<std::streamsize>::max());
+      } catch (...) {
+        end_packed(content, packed.seen());
+        throw;
+      }
+      end_packed(content, packed.seen());
     });
     std::ranges::sort(hashes);
     const auto again = std::ranges::adjacent_find(hashes);
     files.check(again == hashes.end(), kOnce, file, "", "the name of a sample comes again",
                 "members of a sample follow each other");
+  }
+
+  /// Notes what was seen, and keeps the memory of all places together bounded.
+  void end_packed(Content& content, std::uint64_t size) {
+    content.size = size;
+    place_count_ += content.places->count();
+    while (place_count_ > GzipPlaces::kMost) {
+      place_spacing_ *= 2;
+      place_count_ = 0;
+      for (Content& each : contents_) {
+        if (!each.places) continue;
+        each.places->thin(place_spacing_);
+        place_count_ += each.places->count();
+      }
+    }
+  }
+
+  void scan(std::uint32_t shard, std::istream& in, std::uint64_t size,
+            std::vector<std::uint64_t>& hashes, StoredFiles& files) {
+    const std::string& file = shards_[shard];
+    std::string key;
+    TarWalk walk(in, size);
+    while (const auto member = walk.next()) {
+      const auto names = names_of(member->name);
+      if (!names) continue;
+      if (names->key != key || samples_.empty() || samples_.back().shard != shard) {
+        if (page_ && !key.empty()) {
+          files.check(key < names->key, kOrder, file, names->key, "stands behind " + key);
+        }
+        key = names->key;
+        hashes.push_back(text_hash(key));
+        samples_.push_back({member->header, shard, 0, 0, 0});
+        number(samples_.back(), key, files);
+      }
+      if (++samples_.back().members > kMostMembers) {
+        throw std::runtime_error(key + " has more than " + std::to_string(kMostMembers) +
+                                 " members");
+      }
+      if (endings_.size() < kMostMembers) endings_.insert(names->ending);
+    }
   }
 
   /// Capture and camera, as far as names say them; -1 for a sample of nobody.
@@ -325,11 +377,11 @@ class WebDataset final : public StoredDataset {
   template <class Wanted>
   std::map<std::string, std::string> load(const Sample& sample, std::string& key,
                                           Wanted&& is_wanted) const {
-    std::ifstream in = open_stored(folder_ / shards_[sample.shard]);
-    std::error_code error;
-    const std::uintmax_t size = fs::file_size(folder_ / shards_[sample.shard], error);
-    if (!in || error) throw std::runtime_error("cannot be read");
-    TarWalk walk(in, size, sample.offset);
+    const Content& content = contents_[sample.shard];
+    std::ifstream in = open_shard(sample.shard);
+    std::optional<GzipStream> packed;
+    if (content.places) packed.emplace(std::move(in), *content.places);
+    TarWalk walk(packed ? static_cast<std::istream&>(*packed) : in, content.size, sample.offset);
     std::map<std::string, std::string> members;
     for (std::uint32_t i = 0; i < sample.members;) {
       const auto member = walk.next();
@@ -338,9 +390,9 @@ class WebDataset final : public StoredDataset {
       if (!names) continue;
       ++i;
       key = names->key;
-      std::string content;
-      if (is_wanted(names->ending)) content = walk.content(*member);
-      if (!members.emplace(names->ending, std::move(content)).second) {
+      std::string bytes;
+      if (is_wanted(names->ending)) bytes = walk.content(*member);
+      if (!members.emplace(names->ending, std::move(bytes)).second) {
         throw std::runtime_error(member->name + " is there twice");
       }
     }
@@ -353,8 +405,11 @@ class WebDataset final : public StoredDataset {
   const Host& host_;
   std::optional<DatasetPage> page_;
   std::vector<std::string> shards_;  ///< Paths in the folder.
+  std::vector<Content> contents_;    ///< Of each shard.
   std::vector<std::string> splits_;  ///< Of each shard.
-  std::vector<Sample> samples_;      ///< While shards are scanned.
+  std::uint64_t place_spacing_ = std::uint64_t(1) << 20;
+  std::size_t place_count_ = 0;
+  std::vector<Sample> samples_;  ///< While shards are scanned.
   CaptureRows<Sample> rows_;
   std::set<std::string> endings_;
   std::set<std::string> channels_;  ///< Arrays of these names are.
@@ -673,16 +728,16 @@ StoredCapture WebDataset::read(std::size_t i, const NameSet& wanted) const {
 
 }  // namespace
 
-std::vector<std::string> WebDatasetReader::patterns() const { return {"*.tar", "*/*.tar"}; }
+std::vector<std::string> WebDatasetReader::patterns() const {
+  return {"*.tar", "*/*.tar", "*.tar.gz", "*/*.tar.gz", "*.tgz", "*/*.tgz"};
+}
 
 Recognition WebDatasetReader::recognise(const fs::path& folder) const {
   if (recognise_page(folder, kFormat) == Recognition::ByName) return Recognition::ByName;
   std::vector<fs::path> folders{folder};
   for (const std::string& below : names_in(folder, true)) folders.push_back(folder / below);
-  const bool has_any = std::ranges::any_of(folders, [](const fs::path& each) {
-    return std::ranges::any_of(names_in(each),
-                               [](const std::string& name) { return name.ends_with(".tar"); });
-  });
+  const bool has_any = std::ranges::any_of(
+      folders, [](const fs::path& each) { return std::ranges::any_of(names_in(each), is_shard); });
   return has_any ? Recognition::ByFiles : Recognition::No;
 }
 

@@ -12,7 +12,8 @@ namespace diorama {
 /// member is: png, jpg ... (or image.png, rgb.jpg) a picture, json what our writer says or objects
 /// with `bbox`, cls or json's label a class, NAME.npy an array. Samples of our own writer say
 /// capture and camera in their names; any other is a capture. Opening goes from header to header;
-/// some tens of bytes per sample are kept.
+/// some tens of bytes per sample are kept. Shards may be packed by gzip: opening unpacks them once,
+/// and remembers places from which it goes on for a sample (32 MiB of memory at most).
 class WebDatasetReader final : public Reader {
  public:
   struct Params {

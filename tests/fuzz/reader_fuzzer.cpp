@@ -117,7 +117,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   try {
     const auto dataset = reader->open(scratch());
     const StoredInfo& info = dataset->info();
-    CaptureComparison comparison(info);
+    CaptureComparison comparison(info, true);
     ReadLog log;
     for (std::size_t i = 0; i < std::min<std::size_t>(info.captures.size(), 4); ++i) {
       dataset->read(i, {});

@@ -172,7 +172,7 @@ TEST_CASE("WebDataset of tarfile: long names, folders, classes and arrays of all
           "[readers]") {
   const test::TemporaryFolder folder;
   for (int i = 0; i < 8; ++i) folder.write(std::to_string(i) + ".png", colors(16, 12, i));
-  if (!make("tar", folder)) return;
+  if (!make(GENERATE("tar", "packed_tar"), folder)) return;
   const Opened opened(folder, "WebDatasetReader");
   REQUIRE(opened.dataset->info().captures.size() == 8);
   CHECK(opened.holds(kColor.name));
@@ -204,6 +204,23 @@ TEST_CASE("A shard that is cut off tells what it has, and that it ends", "[reade
   CHECK(finds_message(report, "every file can be read", "train-000000.tar: "));
   folder.write("train-000000.tar", std::string(512, 'x') + std::string(1024, '\0'));
   CHECK(finds_message(lint(folder), "every file can be read", "the header at byte 0 is damaged"));
+}
+
+TEST_CASE("A packed shard that is cut off or damaged says so", "[readers]") {
+  const test::TemporaryFolder folder;
+  for (int i = 0; i < 8; ++i) folder.write(std::to_string(i) + ".png", colors(16, 12, i));
+  if (!make("packed_tar", folder)) return;
+  const std::string file = "train-000000.tar.gz";
+  const std::string whole = content(folder.path(file));
+  folder.write(file, whole.substr(0, whole.size() / 2));
+  CHECK(finds_message(lint(folder), "every file can be read", "its packed content ends too early"));
+  // The checksum at the end.
+  std::string damaged = whole;
+  damaged[damaged.size() - 6] ^= 1;
+  folder.write(file, damaged);
+  CHECK(finds_message(lint(folder), "every file can be read", "its packed content is damaged"));
+  folder.write(file, whole);
+  CHECK(lint(folder).findings.empty());
 }
 
 TEST_CASE("BOP as the benchmark has it: no node names, gaps in ids, scenes without poses",

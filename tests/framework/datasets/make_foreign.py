@@ -102,7 +102,7 @@ def npy(array):
     return out.getvalue()
 
 
-def make_tar(folder):
+def make_tar(folder, packing="", ending=""):
     pictures = []
     for name in sorted(os.listdir(folder)):
         with open(os.path.join(folder, name), "rb") as file:
@@ -111,8 +111,8 @@ def make_tar(folder):
     for part, count in (("train", 3), ("val", 1)):
         for shard in range(2):
             form = tarfile.PAX_FORMAT if shard == 0 else tarfile.GNU_FORMAT
-            name = os.path.join(folder, f"{part}-{shard:06d}.tar")
-            with tarfile.open(name, "w", format=form) as archive:
+            name = os.path.join(folder, f"{part}-{shard:06d}.tar" + ending)
+            with tarfile.open(name, "w" + packing, format=form) as archive:
                 folder_info = tarfile.TarInfo("images")
                 folder_info.type = tarfile.DIRTYPE
                 archive.addfile(folder_info)
@@ -129,4 +129,5 @@ def make_tar(folder):
                         add(archive, key + ".json", json.dumps(boxes).encode())
 
 
-{"hdf5": make_hdf5, "pieces": make_pieces, "tar": make_tar}[sys.argv[1]](sys.argv[2])
+{"hdf5": make_hdf5, "pieces": make_pieces, "tar": make_tar,
+ "packed_tar": lambda folder: make_tar(folder, ":gz", ".gz")}[sys.argv[1]](sys.argv[2])

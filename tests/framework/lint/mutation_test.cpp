@@ -656,13 +656,14 @@ TEST_CASE("a model's diameter is that of its vertices", "[lint][mutation]") {
 
 namespace {
 
-/// The sample's captures as the frames of one clip, by all writers of clips.
-DatasetOnDisk clip_on_disk() {
+/// The sample's captures as the frames of one clip, by all writers of clips, or one of them.
+DatasetOnDisk clip_on_disk(const std::string& only = {}) {
   const test::SampleClip sample = test::sample_clip();
   const int count = int(sample.frames.size());
   test::EncodingHost host;
   test::MemoryFiles all;
   for (const test::SampleFormat& format : test::formats_of_clips()) {
+    if (!only.empty() && format.name != only) continue;
     const auto files = format.write(host, sample.dataset, sample.captures());
     for (const auto& [path, bytes] : files.files) all.files[format.name + "/" + path] = bytes;
   }
@@ -726,6 +727,13 @@ std::function<std::string(const std::string&)> json(const std::function<void(Jso
 }
 
 }  // namespace
+
+TEST_CASE("a track is of one class, also where nothing else says which", "[lint][mutation]") {
+  using Words = std::vector<std::string>;
+  const auto other_class = [](Words& words) { words[7] = words[7] == "1" ? "2" : "1"; };
+  check_all_found(clip_on_disk("mot"), {{"the class of a track of MOT", "mot/*/gt/gt.txt",
+                                         last_line(',', other_class)}});
+}
 
 TEST_CASE("tracks, videos and clips of a run are held against each other", "[lint][mutation]") {
   using Words = std::vector<std::string>;
@@ -831,14 +839,8 @@ TEST_CASE("splits and counts of YOLO's page, floats of VOC and clips that are no
                     json([](Json& page) { page["images"][0]["video_id"] = 1; })}});
 }
 
-TEST_CASE("symmetries leave models what they are, as near as the job asks", "[lint][mutation]") {
+TEST_CASE("symmetries leave models what they are, as near as the page says", "[lint][mutation]") {
   const DatasetOnDisk run = run_on_disk({"bop"});
-  const auto say_tolerance = [&](const char* tolerance) {
-    Json page = Json::parse(run.read("bop/dataset.json"));
-    page["job"] = "    symmetry_tolerance: " + std::string(tolerance) + "\n";
-    run.write("bop/dataset.json", page.dump());
-  };
-  say_tolerance("0.01");
   const std::string file = "bop/models/models_info.json";
   const std::string before = run.read(file);
   const auto with = [&](const char* key, const Json& value) {
@@ -863,23 +865,22 @@ TEST_CASE("symmetries leave models what they are, as near as the job asks", "[li
   CHECK_FALSE(is_found(run));
 }
 
-TEST_CASE("classes are sorted unless the job puts them in an order", "[lint][mutation]") {
+TEST_CASE("classes are sorted where the page says so", "[lint][mutation]") {
   const DatasetOnDisk run = run_on_disk({"kitti"});
   const std::string file = "kitti/dataset.json";
   const Json before = Json::parse(run.read(file));
-  const auto say = [&](const std::string& job, bool is_turned) {
+  REQUIRE(before.at("conventions").at("class_order") == "sorted");
+  const auto is_found_with = [&](const Json& order, bool is_turned) {
     Json page = before;
-    page["job"] = job;
+    page["conventions"]["class_order"] = order;
     if (is_turned) std::ranges::reverse(page["classes"]);
     run.write(file, page.dump());
     return is_found(run);
   };
-  const std::string plain = "    classes: []\n    mapping_dict: null\n";
-  CHECK_FALSE(say(plain, false));
-  CHECK(say(plain, true));
-  CHECK_FALSE(say(plain + "    classes: [mug, ball]\n", true));
-  CHECK_FALSE(say(plain + "    mapping_dict: {a: b}\n", true));
-  CHECK_FALSE(say("", true));
+  CHECK_FALSE(is_found_with("sorted", false));
+  CHECK(is_found_with("sorted", true));
+  CHECK_FALSE(is_found_with("as given", true));
+  CHECK_FALSE(is_found_with(7, true));
 }
 
 TEST_CASE("normals are held against those of another writer of the run", "[lint][mutation]") {

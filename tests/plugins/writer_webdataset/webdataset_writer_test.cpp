@@ -5,6 +5,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <set>
 #include <span>
 #include <string>
@@ -12,6 +13,7 @@
 
 #include "plugins/writer_support/sample_dataset.h"
 #include "support/catch.h"
+#include "writer_webdataset/gzip_stream.h"
 #include "writer_webdataset/tar_archive.h"
 
 using namespace diorama;
@@ -38,6 +40,63 @@ TEST_CASE("tar reads the archive", "[writers]") {
                               "test \"$(wc -c < folder/b.bin)\" = 700";
   CHECK(std::system(command.c_str()) == 0);
   std::filesystem::remove_all(folder);
+}
+
+TEST_CASE("what gzip packed is read from any place", "[readers]") {
+  const auto folder = std::filesystem::temp_directory_path() / "diorama_gzip_test";
+  std::filesystem::create_directories(folder);
+  std::string text;  // Packs to a half.
+  std::uint32_t state = 1;
+  while (text.size() < 3'000'000) {
+    state = state * 1664525 + 1013904223;
+    text += char('a' + (state >> 28));
+  }
+  for (const auto& [name, begin] : {std::pair("a", 0), std::pair("b", 2'000'000)}) {
+    std::ofstream(folder / name, std::ios::binary) << text.substr(begin, begin ? -1 : 2'000'000);
+  }
+  // Members with and without a name in front, the last one with zeros behind.
+  const std::string command = "cd '" + folder.string() +
+                              "' && gzip -9 -c a > t.gz && gzip -n < b >> t.gz && "
+                              "head -c 100 /dev/zero >> t.gz";
+  REQUIRE(std::system(command.c_str()) == 0);
+  const auto open = [&] { return std::ifstream(folder / "t.gz", std::ios::binary); };
+  GzipPlaces places(100'000);
+  {
+    GzipStream stream(open(), places);
+    stream.ignore(std::numeric_limits<std::streamsize>::max());
+    CHECK(stream.seen() == text.size());
+  }
+  CHECK(places.count() > 10);
+  CHECK(places.count() <= 30);
+  const std::size_t starts[] = {0, 2'999'990, 1'999'995, 150'000, 149'999, 2'000'000, 700'001, 5};
+  for (const std::uint64_t spacing : {100'000, 800'000, 100'000'000}) {
+    places.thin(spacing);
+    GzipStream stream(open(), places);
+    for (const std::size_t start : starts) {
+      std::string part(std::min<std::size_t>(200'000, text.size() - start), ' ');
+      stream.seekg(std::streamoff(start));
+      stream.read(part.data(), std::streamsize(part.size()));
+      CHECK(stream.good());
+      CHECK(part == text.substr(start, part.size()));
+    }
+    stream.seekg(std::streamoff(text.size() + 1));
+    CHECK(stream.fail());
+  }
+  CHECK(places.count() == 0);
+  std::filesystem::remove_all(folder);
+}
+
+TEST_CASE("few places are kept of content of any length", "[readers]") {
+  GzipPlaces places(1);
+  for (std::uint64_t at = 1; at < 100'000; ++at) {
+    if (places.is_wanted(at)) places.add({at, at, 0, {}});
+  }
+  CHECK(places.count() <= GzipPlaces::kMost);
+  CHECK(places.count() > GzipPlaces::kMost / 4);
+  CHECK(places.before(0) == nullptr);
+  REQUIRE(places.before(50'000));
+  CHECK(places.before(50'000)->at <= 50'000);
+  CHECK(places.before(50'000)->at > 49'000);
 }
 
 TEST_CASE("names that tar cannot hold are refused", "[writers]") {
