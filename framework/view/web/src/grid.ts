@@ -12,6 +12,7 @@ const kMostHeight = 16e6;
 
 interface Card {
   element: HTMLElement;
+  capture: number;
   pictures: number;
   isDescribed: boolean;  ///< The labels of its capture were read when it was made.
 }
@@ -61,12 +62,18 @@ export class Grid {
       else this.empty.append(isReading ? 'Reading labels …' : 'No capture fits these filters. ');
       if (!isReading && app.info.captures.length > 0) this.empty.append(button('Clear all filters', '', () => app.go({ facets: new Map() })));
     }
-    const key = JSON.stringify([state.dataset, app.site.generation, table.captures > 0, [...state.layers].sort(), state.colour, state.opacity,
+    const key = JSON.stringify([app.info.folder, app.site.edition, table.captures > 0, [...state.layers].sort(), state.colour, state.opacity,
       state.card, this.columns, this.cardWidth, this.cardHeight]);
     if (key !== this.key) {
       this.key = key;
       for (const card of this.cards.values()) card.element.remove();
       this.cards.clear();
+    }
+    // While a dataset is made others come in between.
+    for (const [place, card] of this.cards) {
+      if (app.info.captures[place] === card.capture) continue;
+      card.element.remove();
+      this.cards.delete(place);
     }
     if (state.at !== this.told) this.told = this.wanted = state.at;
     this.scrollToWanted();
@@ -202,7 +209,7 @@ export class Grid {
       this.draw(capture, frame, canvas, element);
     }
     element.append(row);
-    return { element, pictures: count, isDescribed: place < table.captures };
+    return { element, capture, pictures: count, isDescribed: place < table.captures };
   }
 
   /** Overlays of one picture of a card. */
