@@ -27,6 +27,7 @@ export class Grid {
   private columns = 1;
   private cardWidth = 1;
   private cardHeight = 1;
+  private pictureHeight = 1;
   private chosen = 0;
   private told = -1;  ///< The capture that is first in sight, as the address has it.
   private wanted: number | null = null;  ///< To be scrolled to as soon as it is there.
@@ -42,14 +43,16 @@ export class Grid {
   show(app: App): void {
     this.app = app;
     const { state, table } = app;
-    // Pictures of a capture stand side by side as long as the card fits into the window.
+    // Pictures of a capture stand side by side as long as the card fits into the window. All have the room that the first of the
+    // dataset takes; those of other shapes are smaller in it.
     const pictures = Math.max(1, table.captures > 0 ? table.of('pictures')[0] : app.info.cameras.length);
     const aspect = table.pictures > 0 && table.of('width')[0] > 0 ? table.of('height')[0] / table.of('width')[0] : 0.75;
     const inside = Math.max(200, this.element.clientWidth - 2 * kGap);
     const beside = Math.max(1, Math.min(pictures, Math.floor((inside - 2) / (state.card + 2))));
     this.cardWidth = beside * (state.card + 2) - 2;
     const rows = Math.ceil(pictures / beside);
-    this.cardHeight = kHead + rows * (Math.round(state.card * aspect) + 2);
+    this.pictureHeight = Math.round(state.card * aspect);
+    this.cardHeight = kHead + rows * (this.pictureHeight + 2);
     this.columns = Math.max(1, Math.floor((inside + kGap) / (this.cardWidth + kGap)));
     const lines = Math.ceil(app.filtered.places.length / this.columns);
     this.height = lines * (this.cardHeight + kGap) + kGap;
@@ -195,6 +198,7 @@ export class Grid {
         },
       });
       link.style.width = `${state.card}px`;
+      link.style.height = `${this.pictureHeight}px`;
       const canvas = el('canvas');
       if (app.holds.has('color')) {
         const image = on(el('img', { alt: '', decoding: 'async', src: pictureAddress(state.dataset, capture, frame, 'thumbnail') }), {
