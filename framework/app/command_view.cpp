@@ -106,6 +106,7 @@ void show_until_end(const GlobalOptions& global, const ViewOptions& options, Con
   server_options.port = options.port;
   HttpServer server(server_options, [&view](std::string_view path) { return view.answer(path); });
   std::cout << server.address() << std::endl;
+  if (!std::cout) throw Error(ErrorKind::Output, "cannot write the address to standard output");
   log.write(LogLevel::Info,
             "Open the address in a browser of this machine; from another one, forward its port: "
             "ssh -L " +

@@ -13,6 +13,7 @@
 #include <sstream>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <vector>
 
 namespace diorama {
@@ -125,6 +126,21 @@ std::optional<ProcessorTime> processor_time(const fs::path& root) {
     if (i != kIdle && i != kWaiting) time.busy_s += ticks[i] / per_s;
   }
   return time;
+}
+
+std::map<std::string, ThreadTime> thread_times(const fs::path& root) {
+  std::map<std::string, ThreadTime> times;
+  std::error_code error;
+  fs::directory_iterator threads(root / "proc/self/task", error);
+  // Threads may end meanwhile.
+  for (; !error && threads != fs::directory_iterator(); threads.increment(error)) {
+    std::ifstream stream(threads->path() / "schedstat");
+    double working_ns = 0.0;
+    double waiting_ns = 0.0;
+    if (!(stream >> working_ns >> waiting_ns)) continue;
+    times[threads->path().filename().string()] = {working_ns * 1e-9, waiting_ns * 1e-9};
+  }
+  return times;
 }
 
 double cpu_seconds() {

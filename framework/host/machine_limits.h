@@ -3,7 +3,9 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <optional>
+#include <string>
 
 /// What the machine and this process's cgroups (version 2) leave to it. `root` is where /proc and
 /// /sys are, for tests.
@@ -29,6 +31,15 @@ struct ProcessorTime {
 
 /// Nothing when it is not known.
 std::optional<ProcessorTime> processor_time(const std::filesystem::path& root = "/");
+
+/// What a thread has had of the processors since it began.
+struct ThreadTime {
+  double working_s = 0.0;
+  double waiting_s = 0.0;  ///< It could have worked, but others did.
+};
+
+/// Of the threads that this process has now, by their numbers. Nothing when it is not known.
+std::map<std::string, ThreadTime> thread_times(const std::filesystem::path& root = "/");
 
 /// CPU seconds of this process so far, all threads, in the program and in the system for it.
 double cpu_seconds();

@@ -7,6 +7,7 @@
 #include <charconv>
 #include <cstdint>
 #include <cstdio>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <set>
@@ -122,12 +123,17 @@ double seconds_of(const RunSummary& summary, std::string_view phase) {
   return found == summary.seconds.end() ? 0.0 : found->second;
 }
 
-/// What more samples would add to a picture. Without a report all of the rendering grows with them.
+/// What more samples would add to a picture that takes `rendering_s`. `report` is of one picture,
+/// and pictures differ: it says which share of them are paths. Without it all are.
 double more_paths_s(const RenderReport& report, double rendering_s, double factor) {
+  double all = 0.0;
+  double paths = 0.0;
   for (const auto& [phase, seconds] : report.seconds) {
-    if (phase == "paths") return seconds * (factor - 1.0);
+    all += seconds;
+    if (phase == "paths") paths = seconds;
   }
-  return rendering_s * (factor - 1.0);
+  const double share = paths > 0.0 ? paths / all : 1.0;
+  return share * rendering_s * (factor - 1.0);
 }
 
 /// The most that this process has had.
@@ -137,10 +143,11 @@ double peak_memory_bytes() {
   return double(usage.ru_maxrss) * 1024.0;
 }
 
-/// How many processors other programs leave to this one from here on.
-class ProcessorsLeft {
+/// What other programs take from this one, from here on.
+class OtherPrograms {
  public:
-  std::optional<double> now() const {
+  /// Processors that they leave to it.
+  std::optional<double> processors_left() const {
     const std::optional<ProcessorTime> time = processor_time();
     if (!began_ || !time || time->all_s - began_->all_s <= 0.0) return std::nullopt;
     const double others = time->busy_s - began_->busy_s - (cpu_seconds() - own_began_s_);
@@ -148,9 +155,27 @@ class ProcessorsLeft {
     return (1.0 - share) * std::thread::hardware_concurrency();
   }
 
+  /// How many times longer all takes: what threads waited for a processor, in proportion to what
+  /// they worked. Threads wait for each other, too; the machine as a whole has no more to give than
+  /// the others take.
+  double slowed(double processors_left) const {
+    double working = 0.0;
+    double waiting = 0.0;
+    for (const auto& [thread, time] : thread_times()) {
+      const auto before = threads_began_.find(thread);
+      const ThreadTime from = before == threads_began_.end() ? ThreadTime{} : before->second;
+      working += time.working_s - from.working_s;
+      waiting += time.waiting_s - from.waiting_s;
+    }
+    if (working <= 0.0 || processors_left <= 0.0) return 1.0;
+    const double most = std::thread::hardware_concurrency() / processors_left;
+    return std::clamp(1.0 + waiting / working, 1.0, most);
+  }
+
  private:
   std::optional<ProcessorTime> began_ = processor_time();
   double own_began_s_ = cpu_seconds();
+  std::map<std::string, ThreadTime> threads_began_ = thread_times();
 };
 
 Estimate estimate_of(const RunSummary& summary, const CapturePlan& plan, int visits,
@@ -171,6 +196,12 @@ Estimate estimate_of(const RunSummary& summary, const CapturePlan& plan, int vis
       per_capture / captures + cameras * more_paths_s(report, picture_s, samples_factor);
   estimate.bytes = double(summary.bytes_written) / captures * estimate.captures;
   return estimate;
+}
+
+/// Whether they kept threads of the trial from working.
+bool is_beside_others(const Trial& trial) {
+  constexpr double kBusy = 0.8;
+  return trial.processors_left && *trial.processors_left < kBusy * trial.threads;
 }
 
 /// "40 s", "4 min", "3.5 h", "2.1 days".
@@ -227,18 +258,21 @@ Trial run_trial(const GlobalOptions& global, const Value& given, const TrialOpti
   trial.captures = int(run.only->size());
   const KeepPictures keep(trial.pictures);
   const double before_visits = peak_memory_bytes();
-  const ProcessorsLeft left;
+  const OtherPrograms others;
   const RunSummary summary = run_in_memory(assembly, *services.host, run);
   std::ranges::sort(trial.pictures, {}, [](const TrialPicture& picture) {
     return std::pair(picture.capture, std::string_view(picture.camera));
   });
   trial.threads = services.host->thread_count();
-  trial.processors_left = left.now();
+  trial.processors_left = others.processors_left();
+  if (is_beside_others(trial)) trial.slowed = others.slowed(*trial.processors_left);
   trial.processors = int(std::thread::hardware_concurrency());
   trial.visits = count_visits(*run.only, assembly.plan);
   const double factor = trial.samples > 0 ? double(trial.job_samples) / trial.samples : 1.0;
   trial.estimate = estimate_of(summary, assembly.plan, trial.visits,
                                assembly.components.sets.front().renderer->report(), factor);
+  trial.estimate.visit_s /= trial.slowed;
+  trial.estimate.capture_s /= trial.slowed;
   // Each visit has a scene and components of its own. What visits leave to others, as pictures of
   // assets, is about as much as one of its own: those of a trial one after the other count, too.
   trial.estimate.visits_at_a_time =
@@ -260,19 +294,23 @@ std::string estimate_text(const Trial& trial) {
     text += " with " + std::to_string(trial.samples) + " of " + std::to_string(trial.job_samples) +
             " samples";
   }
+  // Visits overlap, which makes it less; what others took is not known as well.
+  const std::string time = long_duration_text(estimate.seconds());
   text += ": " + counted(estimate.captures, "capture") + " in " +
-          long_duration_text(estimate.seconds()) + " or less on " +
+          (trial.slowed > 1.0 ? "about " + time : time + " or less") + " on " +
           counted(trial.threads, "thread") + ", the disk not counted";
   text += " (" + counted(estimate.visits, "visit") + " of " + long_duration_text(estimate.visit_s) +
           ", " + long_duration_text(estimate.capture_s) + " a capture), ";
   text += size_text(estimate.bytes) + " on disk, " + size_text(estimate.memory_bytes) +
           " of memory for " + counted(estimate.visits_at_a_time, "visit") + " at a time\n";
-  constexpr double kBusy = 0.8;
-  if (trial.processors_left && *trial.processors_left < kBusy * trial.threads) {
+  if (is_beside_others(trial)) {
     char said[160];
-    std::snprintf(said, sizeof said,
-                  "other programs left %.1f of %d processors to it: without them it takes less\n",
-                  *trial.processors_left, trial.processors);
+    std::snprintf(
+        said, sizeof said,
+        "other programs left %.1f of %d processors to it, which that does not count: with "
+        "no more it takes %s or less\n",
+        *trial.processors_left, trial.processors,
+        long_duration_text(estimate.seconds() * trial.slowed).c_str());
     text += said;
   }
   return text;

@@ -54,7 +54,8 @@ struct Trial {
   /// What other programs left meanwhile; nothing when that is not known.
   std::optional<double> processors_left;
   int processors = 0;
-  Estimate estimate;
+  double slowed = 1.0;  ///< How many times longer it took beside them.
+  Estimate estimate;    ///< Without them.
 };
 
 /// `job` is native. Nothing is written. Throws Error(Usage) for captures that the job has not, and

@@ -56,6 +56,11 @@ HttpAnswer look_elsewhere() {
   return answer;
 }
 
+/// A part of an index, which is JSON of an object. Those of different openings do not fit together.
+HttpAnswer part_answer(std::string part, int generation) {
+  return answer_of(kJson, part.insert(1, "\"generation\":" + std::to_string(generation) + ","));
+}
+
 /// "7", not "+7", "07" or "7.0".
 std::optional<std::size_t> whole_number(std::string_view word) {
   std::size_t value = 0;
@@ -70,6 +75,18 @@ OrderedJson skeletons_json(const StoredInfo& info) {
   OrderedJson json = OrderedJson::object();
   for (const auto& [name, skeleton] : info.skeletons) {
     json[name] = {{"names", skeleton.names}, {"lines", skeleton.lines}};
+  }
+  return json;
+}
+
+/// The first that is wrong with the dataset as a whole. What is wrong with a capture is told with
+/// it.
+OrderedJson faults_json(const ReadLog& log) {
+  constexpr std::size_t kMost = 3;
+  OrderedJson json = OrderedJson::array();
+  for (const Finding& finding : log.findings) {
+    if (json.size() == kMost) break;
+    json.push_back(finding.file + ": " + lint_finding(finding).message);
   }
   return json;
 }
@@ -144,6 +161,22 @@ struct DatasetView::Opened {
   std::atomic<bool> wants_stats{false};
   std::mutex mutex;
   std::shared_ptr<const std::string> stats;  ///< JSON; null until they were counted.
+  // Of a run that goes on, on the main thread: what was read stays true of captures that were there
+  // at an earlier look. Others may have come while they were read.
+  std::vector<int> whole_captures;  ///< Ascending.
+  std::map<int, CaptureIndex::Entry> read_entries;
+  std::map<int, std::vector<std::int32_t>> read_brightness;
+
+  bool is_whole(int capture) const { return std::ranges::binary_search(whole_captures, capture); }
+  /// What was read of the same folder before it was opened anew.
+  void take_over(Opened& before) {
+    const StoredInfo& info = shown->info();
+    const StoredInfo& old = before.shown->info();
+    if (info.camera_names != old.camera_names || info.holds != old.holds) return;
+    whole_captures = old.captures;
+    read_entries = std::move(before.read_entries);
+    read_brightness = std::move(before.read_brightness);
+  }
 };
 
 DatasetView::DatasetView(Options options, DatasetReaders& readers, Host& host)
@@ -311,14 +344,24 @@ bool DatasetView::index_some(Opened& opened) {
   std::vector<CaptureIndex::Entry> entries(std::min(at_once, count - first));
   const NameSet wanted = CaptureIndex::wanted(data.info());
   host_.parallel_for(entries.size(), [&](std::size_t i) {
+    const auto known = opened.read_entries.find(data.info().captures[first + i]);
+    if (known != opened.read_entries.end()) {
+      entries[i] = known->second;
+      return;
+    }
     StoredCapture stored = data.read(first + i, wanted);
     for (Frame& frame : stored.capture.frames) complete_boxes(frame);
     entries[i] = CaptureIndex::entry_of(data.info(), stored);
   });
-  for (const CaptureIndex::Entry& entry : entries) {
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    const CaptureIndex::Entry& entry = entries[i];
+    const int capture = data.info().captures[first + i];
     opened.index.add(entry);
     // What could not be read may well be the next time.
     if (entry.pictures.empty()) opened.key.reset();
+    if (!entry.pictures.empty() && entry.findings == 0 && opened.is_whole(capture)) {
+      opened.read_entries.emplace(capture, entry);
+    }
   }
   if (opened.index.size() == count) keep_index(opened);
   return true;
@@ -334,6 +377,11 @@ bool DatasetView::brighten_some(Opened& opened) {
   const std::size_t at_once = 8 * std::size_t(std::max(host_.thread_count(), 1));
   std::vector<std::vector<std::int32_t>> found(std::min(at_once, count - first));
   host_.parallel_for(found.size(), [&](std::size_t i) {
+    const auto known = opened.read_brightness.find(data.info().captures[first + i]);
+    if (known != opened.read_brightness.end()) {
+      found[i] = known->second;
+      return;
+    }
     const StoredCapture stored = data.read(first + i, wanted);
     for (const Frame& frame : stored.capture.frames) {
       found[i].push_back(frame.has(kColor.name)
@@ -341,7 +389,11 @@ bool DatasetView::brighten_some(Opened& opened) {
                              : CaptureIndex::kUnknown);
     }
   });
-  for (const auto& pictures : found) opened.index.add_brightness(pictures);
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const int capture = data.info().captures[first + i];
+    opened.index.add_brightness(found[i]);
+    if (opened.is_whole(capture)) opened.read_brightness.emplace(capture, found[i]);
+  }
   if (opened.index.brightness_size() == count) keep_index(opened);
   return true;
 }
@@ -401,10 +453,21 @@ bool DatasetView::follow_run() {
   if (status && (status->done != done_ || status->is_finished)) {
     try {
       Opening fresh = open();
+      const bool is_other_edition = status->is_finished || status->done < done_;
+      if (!is_other_edition) {
+        for (const auto& opened : *fresh.datasets) {
+          for (const auto& old : *datasets_) {
+            if (old->folder == opened->folder && old->is_other == opened->is_other) {
+              opened->take_over(*old);
+            }
+          }
+        }
+      }
       const std::lock_guard lock(mutex_);
       datasets_ = std::move(fresh.datasets);
       faults_ = std::move(fresh.faults);
       ++generation_;
+      edition_ += is_other_edition ? 1 : 0;
       findings_ = nullptr;
       comparisons_.clear();
       done_ = status->done;
@@ -443,6 +506,7 @@ HttpAnswer DatasetView::state() const {
   {
     const std::lock_guard lock(mutex_);
     json["generation"] = generation_;
+    json["edition"] = edition_;
     json["is_finished"] = is_finished_;
     json["is_linted"] = findings_ != nullptr;
     json["faults"] = faults_;
@@ -558,7 +622,7 @@ HttpAnswer DatasetView::capture_answer(const Opened& opened, Words words) {
   return has_masks ? look_elsewhere() : not_there();
 }
 
-HttpAnswer DatasetView::dataset_answer(Opened& opened, Words words) {
+HttpAnswer DatasetView::dataset_answer(Opened& opened, int generation, Words words) {
   const StoredInfo& info = opened.shown->info();
   if (words[0] == "info" && words.size() == 1) {
     return json_answer({{"name", opened.name},
@@ -568,7 +632,9 @@ HttpAnswer DatasetView::dataset_answer(Opened& opened, Words words) {
                         {"cameras", info.camera_names},
                         {"classes", info.classes},
                         {"captures", info.captures},
-                        {"skeletons", skeletons_json(info)}});
+                        {"skeletons", skeletons_json(info)},
+                        {"faults", faults_json(opened.whole->log())},
+                        {"fault_count", opened.whole->log().findings.size()}});
   }
   if (words[0] == "stats" && words.size() == 1) {
     const std::lock_guard lock(opened.mutex);
@@ -578,11 +644,12 @@ HttpAnswer DatasetView::dataset_answer(Opened& opened, Words words) {
   }
   if (words[0] == "index" && words.size() == 2) {
     const auto from = whole_number(words[1]);
-    return from ? answer_of(kJson, opened.index.json(*from, kIndexPart)) : not_there();
+    return from ? part_answer(opened.index.json(*from, kIndexPart), generation) : not_there();
   }
   if (words[0] == "brightness" && words.size() == 2) {
     const auto from = whole_number(words[1]);
-    return from ? answer_of(kJson, opened.index.brightness_json(*from, kIndexPart)) : not_there();
+    return from ? part_answer(opened.index.brightness_json(*from, kIndexPart), generation)
+                : not_there();
   }
   if (words[0] == "capture" && words.size() >= 2) return capture_answer(opened, words.subspan(1));
   return not_there();
@@ -618,12 +685,12 @@ HttpAnswer DatasetView::answer(std::string_view path) {
   const Words rest = Words(words).subspan(2);
   if (rest[0] == "index") asked_ = *number;
   if (rest[0] == "compare") return compare_answer(*all, *number, rest.subspan(1));
-  if (rest[0] != "capture") return dataset_answer(opened, rest);
+  if (rest[0] != "capture") return dataset_answer(opened, generation, rest);
 
   // What captures hold stays the same for as long as a dataset is open.
   const std::string key = std::to_string(generation) + std::string(path);
   if (const auto known = cache_.find(key)) return *known;
-  HttpAnswer made = dataset_answer(opened, rest);
+  HttpAnswer made = dataset_answer(opened, generation, rest);
   if (made.status == 200) {
     cache_.add(key, std::make_shared<const HttpAnswer>(made), made.body->size() + key.size() + 256);
   }

@@ -41,7 +41,8 @@ namespace diorama {
 ///   /api/D/compare/E                        in what dataset E differs from D; of all captures, or
 ///                                           a fault, as of /api/D/stats
 ///   /api/D/compare/E/N                      the same, of capture number N
-///   /api/D/index/FROM                       CaptureIndex::json(), kIndexPart captures
+///   /api/D/index/FROM                       CaptureIndex::json(), kIndexPart captures, and the
+///                                           "generation" of /api/state whose places these are
 ///   /api/D/brightness/FROM                  CaptureIndex::brightness_json(), the same
 ///   /api/D/capture/N                        capture_json() of capture number N
 ///   /api/D/capture/N/F/KIND                 of its frame F a PictureKind, or "amodal", or "masks"
@@ -115,7 +116,7 @@ class DatasetView {
   HttpAnswer run_answer();
   HttpAnswer lint_answer();
   HttpAnswer compare_answer(const Datasets& all, std::size_t first, Words words);
-  HttpAnswer dataset_answer(Opened& opened, Words words);
+  HttpAnswer dataset_answer(Opened& opened, int generation, Words words);
   HttpAnswer capture_answer(const Opened& opened, Words words);
 
   Options options_;
@@ -126,6 +127,7 @@ class DatasetView {
   std::shared_ptr<const Datasets> datasets_;
   std::vector<std::string> faults_;    ///< Of datasets that could not be opened beside others.
   int generation_ = 0;                 ///< Counts how often the datasets were opened.
+  int edition_ = 0;                    ///< While it stays the same, captures do: others come.
   std::atomic<std::size_t> asked_{0};  ///< The dataset that the page shows: indexed first.
   std::atomic<bool> wants_findings_{false};
   std::shared_ptr<const std::string> findings_;  ///< JSON; null until they were looked for.

@@ -64,7 +64,7 @@ class TableReader {
     }
     if (readable == 0) {
       throw Error(ErrorKind::Asset,
-                  folder_.string() + ": holds no annotation file of COCO that can be read");
+                  folder_.string() + ": holds no annotation file of COCO that can be read" + why_);
     }
     check_names_once();
     check_tables_complete();
@@ -95,10 +95,10 @@ class TableReader {
       });
     } catch (const Json::exception& error) {
       is_whole = false;
-      files_.find(kReadable, own.file, "", error.what());
+      note_unreadable(own.file, error.what());
     } catch (const std::runtime_error& error) {
       is_whole = false;
-      files_.find(kReadable, own.file, "", error.what());
+      note_unreadable(own.file, error.what());
     }
     if (!is_whole && images_.empty()) return false;
     std::ranges::sort(images_, {}, [](const CocoImageEntry& image) { return image.id; });
@@ -106,6 +106,11 @@ class TableReader {
     if (!own.panoptic.empty()) read_panoptic(own);
     join(own);
     return true;
+  }
+
+  void note_unreadable(const std::string& file, const std::string& error) {
+    files_.find(kReadable, file, "", error);
+    why_ += (why_.empty() ? ": " : "; ") + file + ": " + error;
   }
 
   void add_image(std::uint16_t part, JsonSpan span, const Json& json) {
@@ -361,6 +366,7 @@ class TableReader {
   std::vector<TrackedAnnotation> tracks_;  ///< Of all parts of our own writer.
   std::vector<std::string> names_;
   std::size_t images_listed_ = 0;  ///< By the panoptic file.
+  std::string why_;                ///< What could not be read, and why; for when that is all.
   std::string first_file_;
   std::map<std::string, std::vector<Json>> first_tables_;  ///< By key, of the first file.
   std::map<std::string, std::map<std::string, std::size_t>> counted_;  ///< By file, by key.

@@ -87,8 +87,9 @@ TEST_CASE("A dry run estimates and leaves nothing", "[preview]") {
   REQUIRE(std::regex_search(
       dry.output, said,
       std::regex(
-          "estimate from 2 captures in 1 visit with 2 of 16 samples: 7 captures in [0-9.]+ s or "
-          "less on [0-9]+ threads?, the disk not counted \\(3 visits of [0-9.]+ s, [0-9.]+ s a "
+          "estimate from 2 captures in 1 visit with 2 of 16 samples: 7 captures in (?:[0-9.]+ s or "
+          "less|about [0-9.]+ s) on [0-9]+ threads?, the disk not counted \\(3 visits of [0-9.]+ "
+          "s, [0-9.]+ s a "
           "capture\\), "
           "([0-9]+) kB on disk, [0-9]+ MB of memory for 2 visits at a time\n")));
 

@@ -216,6 +216,8 @@ try {
   check(atOnce.startsWith(`${total} of`), `and has them all before labels are read (${atOnce})`);
   await page.waitForTimeout(800);
   await page.screenshot({ path: `${pictures}/grid.png` });
+  check(await page.evaluate(() => [...document.querySelectorAll('.card')].every((card) => [...card.querySelectorAll('.picture, img')].every((part) =>
+    part.getBoundingClientRect().bottom <= card.getBoundingClientRect().bottom + 1))), 'pictures lie whole in their cards');
   for (const key of ['c', 'l']) await page.keyboard.press(key);
   // The page itself knows its address at once; what watches it may hear later.
   check((await page.evaluate(() => location.hash)).includes('layers='), 'overlays stand in the address');

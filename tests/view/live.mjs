@@ -55,6 +55,21 @@ try {
   const before = await count();
   await page.waitForFunction((old) => Number(/of ([\d,]+)/.exec(document.querySelector('.total').textContent)[1].replaceAll(',', '')) > old, before, { timeout: 120000 });
   check(true, 'the grid grows with the run');
+  // What is looked at stays while captures come.
+  await page.waitForFunction(() => document.querySelector('.facets .name input'), null, { timeout: 60000 });
+  await page.locator('.facets .name input').first().check();
+  const card = await page.locator('.card').first().elementHandle();
+  await page.evaluate(() => {
+    window.least = Infinity;
+    new MutationObserver(() => {
+      const total = document.querySelector('.total b');
+      if (total) window.least = Math.min(window.least, Number(total.textContent.replaceAll(',', '')));
+    }).observe(document.querySelector('.facets'), { childList: true, subtree: true });
+  });
+  const filtered = await count();
+  await page.waitForFunction((old) => Number(/of ([\d,]+)/.exec(document.querySelector('.total').textContent)[1].replaceAll(',', '')) > old, filtered, { timeout: 120000 });
+  const least = await page.evaluate(() => window.least);
+  check(least > 0 && least < Infinity && (await card.evaluate((element) => element.isConnected)), `a filter and its cards stay while captures come (${least} at least)`);
   const codes = await Promise.all(ends);
   check(codes.every((code) => code === 0), 'both shards end well');
   await page.getByRole('button', { name: 'Run', exact: true }).click();

@@ -16,7 +16,9 @@ from __future__ import annotations
 
 import dataclasses
 import enum
+import inspect
 import json
+import operator
 import os
 import pathlib
 import shutil
@@ -66,7 +68,7 @@ class Camera:
         return np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class Visibility:
     """How much of an object one camera sees.
 
@@ -102,7 +104,7 @@ class FlowState(enum.IntEnum):
     UNKNOWN = 3
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class Velocity:
     """How an object's origin moves and how the object turns.
 
@@ -113,7 +115,7 @@ class Velocity:
     angular: Array
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class Instance:
     """An object in a picture. `id` is its value in the channel "instance_id"; in a clip the same object has the same
     id in all frames.
@@ -172,7 +174,7 @@ class JointState:
     upper: float
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class Frame:
     """What one camera sees in one capture.
 
@@ -269,7 +271,7 @@ class ClipFrame:
         return self.frame / self.fps
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class Capture:
     """One moment, seen by all cameras.
 
@@ -321,7 +323,37 @@ def _refused(kind: str, text: str) -> Error:
 def _names(wanted: Iterable[str]) -> list[str]:
     if isinstance(wanted, str):  # which has letters
         raise TypeError(f"wanted is a list of names, [{wanted!r}]")
-    return sorted(set(wanted))
+    names: list[Any] = list(wanted) if isinstance(wanted, Iterable) else [wanted]
+    if not all(isinstance(name, str) for name in names):
+        raise TypeError(f"wanted is a list of names, not {wanted!r}")
+    return sorted(set(names))
+
+
+def _plain(value: Any) -> Any:
+    """What JSON does not know."""
+    if isinstance(value, (np.generic, np.ndarray)):
+        return value.tolist()
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    if isinstance(value, Mapping):
+        return dict(value)
+    raise TypeError(f"a job has texts, numbers, lists and mappings, not {value!r}")
+
+
+def _json(value: Any, place: str) -> str:
+    """Every character as it is, which is YAML, too: JSON's escapes are not."""
+    try:
+        return json.dumps(value, ensure_ascii=False, default=_plain)
+    except TypeError as error:
+        below = value.items() if isinstance(value, Mapping) else enumerate(value) if isinstance(value, (list, tuple)) else ()
+        for key, each in below:
+            _json(each, f"{place}[{key!r}]")  # the innermost says where
+        raise TypeError(f"{place}: {error}") from None
+
+
+def _is_false(answer: object) -> bool:
+    """Python's False, and that of comparisons of numpy and PyTorch."""
+    return answer is False or (str(getattr(answer, "dtype", "")) in ("bool", "torch.bool") and not answer)
 
 
 def _program() -> bytes:
@@ -355,18 +387,20 @@ class Dataset(Sequence[Capture]):
 
     def __init__(self, folder: str | os.PathLike[str], reader: str | Mapping[str, Any] = "",
                  wanted: Iterable[str] | None = None) -> None:
-        self._asked = (os.fsdecode(folder), reader if isinstance(reader, str)
-                       else json.dumps(dict(reader), ensure_ascii=False, default=os.fspath))
+        named = os.fsdecode(folder)  # first, so that what is no name of a file is said
+        if not isinstance(reader, (str, Mapping)):
+            raise TypeError(f"reader is a type or a mapping with parameters, not {reader!r}")
+        # Other processes may be in another folder by then.
+        self._asked = (os.path.join(os.getcwd(), named), reader if isinstance(reader, str) else _json(dict(reader), "reader"))
         self._wanted = None if wanted is None else _names(wanted)
-        self._open()
+        self._open(named)
         unknown = sorted(set(self._wanted or ()) - set(self.holds))
         if unknown:
             raise _refused("usage", f"{self.folder}: does not hold {', '.join(unknown)}; it holds {', '.join(self.holds)}")
 
-    def _open(self) -> None:
+    def _open(self, folder: str) -> None:
         self._process = os.getpid()
-        folder, reader = self._asked
-        self._stored = _diorama.open_dataset(_program(), os.fsencode(folder), reader)
+        self._stored = _diorama.open_dataset(_program(), os.fsencode(folder), os.fsencode(self._asked[1]))
         info = self._stored.info()
         self.folder: str = info["folder"]
         self.reader: str = info["reader"]
@@ -390,7 +424,7 @@ class Dataset(Sequence[Capture]):
             return [self[i] for i in range(*place.indices(len(self)))]
         place = range(len(self))[place]  # negative ones count from the end; others raise IndexError
         if os.getpid() != self._process:
-            self._open()  # after a fork the threads of readers are gone
+            self._open(self._asked[0])  # after a fork the threads of readers are gone
         return _capture(self._stored.read(place, self._wanted))
 
     def __iter__(self) -> Iterator[Capture]:
@@ -469,9 +503,20 @@ def run(job: Mapping[str, Any] | str | os.PathLike[str], on_capture: Callable[[C
     threads (0: all). The function ends the run by returning False or by an exception, which comes out here."""
     if not callable(on_capture):
         raise TypeError(f"on_capture is a function that takes a Capture, not {on_capture!r}")
-    if threads < 0 or (seed is not None and not 0 <= seed < 2**64):
+    if inspect.isgeneratorfunction(on_capture) or inspect.iscoroutinefunction(on_capture):
+        raise TypeError(f"on_capture is a plain function: nothing would run {on_capture!r}, which has yield or is async")
+    if not isinstance(job, (Mapping, str, os.PathLike)) or job == "":
+        raise TypeError(f"job is the name of a file, or a dictionary with what would be in it, not {job!r}")
+    if not isinstance(settings or {}, Mapping):
+        raise TypeError(f"settings are values by their names, {{'renderer.samples': 16}}, not {settings!r}")
+    threads, seed = operator.index(threads), None if seed is None else operator.index(seed)
+    if not 0 <= threads < 2**31 or (seed is not None and not 0 <= seed < 2**64):
         raise _refused("usage", f"threads are 0 or more, a seed is from 0 to 2^64 - 1; found {threads} and {seed}")
-    file, text = (b"", json.dumps(job)) if isinstance(job, Mapping) else (os.fsencode(job), "")
-    sets = [f"{key}={json.dumps(value)}" for key, value in (settings or {}).items()]
-    _diorama.listen(_program(), file, text, sets, seed, lambda values: on_capture(_capture(values)), _names(wanted),
-                    threads)
+    file, text = ("", _json(dict(job), "job")) if isinstance(job, Mapping) else (job, "")
+    sets = [f"{key}={_json(value, f'settings[{key!r}]')}" for key, value in (settings or {}).items()]
+
+    def take(values: dict[str, Any]) -> bool:
+        return not _is_false(on_capture(_capture(values)))
+
+    _diorama.listen(_program(), os.fsencode(file), os.fsencode(text), [os.fsencode(each) for each in sets], seed, take,
+                    _names(wanted), threads)

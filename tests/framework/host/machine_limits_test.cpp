@@ -32,6 +32,7 @@ class Machine {
   std::uint64_t all_memory() const { return total_memory(root_); }
   int cpus() const { return quota_cpus(root_); }
   std::optional<ProcessorTime> time() const { return processor_time(root_); }
+  std::map<std::string, ThreadTime> threads() const { return thread_times(root_); }
 
  private:
   fs::path root_;
@@ -106,4 +107,18 @@ TEST_CASE("the time of processors is that of the first line, waiting for disks i
   const double per_s = double(sysconf(_SC_CLK_TCK));
   CHECK(machine.time()->busy_s == Approx((100 + 20 + 30 + 6 + 7 + 8) / per_s));
   CHECK(machine.time()->all_s == Approx((171 + 4000 + 500) / per_s));
+}
+
+TEST_CASE("threads say how long they worked and how long others did instead", "[host]") {
+  const Machine machine;
+  CHECK(machine.threads().empty());
+  machine.says("proc/self/task/71/schedstat", "2500000000 500000000 12\n");
+  machine.says("proc/self/task/72/schedstat", "1000000 0 1\n");
+  machine.says("proc/self/task/73/comm", "has just ended\n");
+  const auto threads = machine.threads();
+  REQUIRE(threads.size() == 2);
+  CHECK(threads.at("71").working_s == Approx(2.5));
+  CHECK(threads.at("71").waiting_s == Approx(0.5));
+  CHECK(threads.at("72").working_s == Approx(1e-3));
+  CHECK(threads.at("72").waiting_s == 0.0);
 }

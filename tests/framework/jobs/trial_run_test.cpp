@@ -29,8 +29,13 @@ TEST_CASE("An estimate says on what it rests", "[preview]") {
   CHECK(estimate_text(trial) == quiet);
   // What was measured beside others is no measure of the machine.
   trial.processors_left = 0.62;
-  CHECK(estimate_text(trial) ==
-        quiet + "other programs left 0.6 of 2 processors to it: without them it takes less\n");
+  trial.slowed = 2.5;
+  const std::string busy = estimate_text(trial);
+  CHECK_THAT(busy, ContainsSubstring(": 100 captures in about 4 min on 2 threads"));
+  CHECK(
+      busy.ends_with("other programs left 0.6 of 2 processors to it, which that does not count: "
+                     "with no more it takes 11 min or less\n"));
+  trial.slowed = 1.0;
   trial.threads = 1;
   trial.processors_left = 0.9;
   CHECK(estimate_text(trial).ends_with("at a time\n"));

@@ -155,6 +155,11 @@ class Open(unittest.TestCase):
             self.assertEqual(caught.exception.kind, "usage")
         with self.assertRaises(diorama.Error):
             diorama.open(run / "coco", reader="CocoReeder")
+        broken = pathlib.Path(temporary.name) / "broken"
+        (broken / "annotations").mkdir(parents=True)
+        (broken / "annotations/instances_train.json").write_text('{"images": [{"id": 1')
+        with self.assertRaisesRegex(diorama.Error, "no annotation file of COCO that can be read: annotations/instances_train.json: "):
+            diorama.open(broken)
 
     def test_texts_that_are_no_utf8(self):
         folder = pathlib.Path(temporary.name) / os.fsdecode(b"caf\xe9")
@@ -179,9 +184,39 @@ class Open(unittest.TestCase):
                              (lambda: diorama.run(JOB, None), "on_capture is a function"), (lambda: diorama.run(JOB, [1]), "on_capture is a function")]:
             with self.assertRaisesRegex(TypeError, words):
                 wrong()
+        def yields(capture):
+            yield capture
+
+        async def waits(capture):
+            pass
+
+        for wrong, words in [(lambda: diorama.open(run / "coco", wanted=["color", 3]), r"a list of names, not \['color', 3\]"),
+                             (lambda: diorama.open(run / "coco", wanted=7), "a list of names, not 7"),
+                             (lambda: diorama.open(run / "coco", reader=["CocoReader"]), r"reader is a type or a mapping.*not \['CocoReader'\]"),
+                             (lambda: diorama.open(None), "not NoneType"),
+                             (lambda: diorama.run(JOB, yields), "has yield or is async"), (lambda: diorama.run(JOB, waits), "has yield or is async"),
+                             (lambda: diorama.run("", print), "job is the name of a file.*not ''"), (lambda: diorama.run([JOB], print), "job is the name of a file"),
+                             (lambda: diorama.run(JOB, print, settings=["seed=3"]), r"settings are values by their names.*not \['seed=3'\]"),
+                             (lambda: diorama.run(JOB, print, settings={"seed": {3}}), r"settings\['seed'\]: a job has texts, numbers.*not \{3\}"),
+                             (lambda: diorama.run({"seed": 3, "cameras": [{"width": 8}, {"width": {8}}]}, print), r"job\['cameras'\]\[1\]\['width'\]: a job has .*not \{8\}"),
+                             (lambda: diorama.run(JOB, print, threads="2"), "'str' object cannot be interpreted as an integer"),
+                             (lambda: diorama.run(JOB, print, seed=1.5), "'float' object cannot be interpreted as an integer")]:
+            with self.assertRaisesRegex(TypeError, words):
+                wrong()
         for arguments in ({"threads": -1}, {"seed": -1}, {"seed": 2**64}):
             with self.assertRaisesRegex(diorama.Error, "threads are 0 or more, a seed is from 0"):
                 diorama.run(JOB, print, **arguments)
+
+    def test_things_are_themselves(self):
+        """They have arrays, which are neither equal nor different."""
+        first, again = diorama.open(run / "basic")[0], diorama.open(run / "basic")[0]
+        self.assertNotEqual(first, again)
+        for frame, other in zip(first.frames, again.frames):
+            self.assertEqual(len({*frame.instances, *other.instances}), 2 * len(frame.instances))
+            for place, instance in enumerate(frame.instances):
+                self.assertEqual(frame.instances.index(instance), place)
+                self.assertNotIn(instance, other.instances)
+            self.assertEqual(frame.camera, other.camera)
 
     def test_damage_is_a_finding(self):
         copy = pathlib.Path(temporary.name) / "damaged"
@@ -308,6 +343,18 @@ class Workers(unittest.TestCase):
         for thread in threads:
             thread.join()
         self.assertEqual(sorted(lengths), [(name, 24, len(FOLDERS) + 1) for name in FOLDERS])
+
+    def test_processes_that_are_elsewhere(self):
+        """Names of files that are relative hold for where they were given."""
+        here = os.getcwd()
+        os.chdir(run)
+        try:
+            dataset = diorama.open("webdataset")
+        finally:
+            os.chdir(here)
+        for method in ("fork", "spawn"):
+            with self.subTest(method), multiprocessing.get_context(method).Pool(1) as pool:
+                self.assertEqual(pool.apply(sum_in_another_process, (dataset, 3)), self.expected[3])
 
     def test_pickled(self):
         again = pickle.loads(pickle.dumps(diorama.open(run / "basic", wanted=["color"])))
@@ -466,6 +513,15 @@ class Run(unittest.TestCase):
         diorama.run(job, lambda capture: sizes.append(capture.frames[0].channels["color"].shape),
                     settings={"cameras[0].width": 40})
         self.assertEqual(sizes, [(24, 40, 4)] * 6)
+        label = "tasse \U0001f375 \u7897"
+        folder = pathlib.Path(temporary.name) / "caf\xe9"
+        folder.mkdir(exist_ok=True)
+        (folder / "box.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+        labelled = []
+        diorama.run({**job, "total_captures": np.int64(2), "objects": (
+            {"type": "files", "name": "boxes", "files": [folder / "box.obj"], "under": "/Assets", "label": label},)},
+            lambda capture: labelled.append(capture.frames[0].instances[-1].labels), settings={"cameras[0].position": np.array([0.0, 0.0, 5.0])})
+        self.assertEqual(labelled, [{"class": label}] * 2)
         with self.assertRaisesRegex(diorama.Error, "renderer: unknown renderer 'nul', did you mean 'null'") as caught:
             diorama.run({**job, "renderer": {"type": "nul"}}, print)
         self.assertIn(caught.exception.kind, ("config", "plugin"))
@@ -481,6 +537,14 @@ class Run(unittest.TestCase):
 
         diorama.run(JOB, take)
         self.assertEqual(seen, [0, 1, 2, 3, 4])
+
+        for no in (False, np.bool_(False), np.zeros(()) > 0):
+            seen.clear()
+            diorama.run(JOB, lambda capture: (seen.append(capture.index), no)[1])
+            self.assertEqual(seen, [0], repr(no))
+        seen.clear()
+        diorama.run(JOB, lambda capture: (seen.append(capture.index), np.float32(0) if capture.index < 3 else False)[1])
+        self.assertEqual(seen, [0, 1, 2, 3])
 
         def fail(capture):
             raise KeyError("mine")

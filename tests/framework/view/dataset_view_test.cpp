@@ -13,6 +13,8 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
+#include <thread>
+#include <utility>
 
 #include "diorama/error.h"
 #include "framework/lint/encoding_host.h"
@@ -47,6 +49,9 @@ class HostileDataset final : public StoredDataset {
       info_.holds.emplace(name);
     }
     info_.skeletons[kHostile] = {{kHostile, "tip"}, {{0, 1}}};
+    for (int i = 0; i < faults; ++i) {
+      log_.findings.push_back({"is read", kHostile, {}, "", "", std::to_string(i), "another"});
+    }
   }
   const StoredInfo& info() const override { return info_; }
   const ReadLog& log() const override { return log_; }
@@ -138,6 +143,7 @@ class HostileDataset final : public StoredDataset {
   }
 
   static inline std::atomic<int> reads = 0;
+  static inline std::atomic<int> faults = 0;  ///< Of the whole.
   static inline std::atomic<bool> fails = false;
   static inline std::atomic<bool> stops = false;
   static inline std::atomic<bool> overlaps = false;
@@ -276,6 +282,17 @@ TEST_CASE("Hostile texts arrive as texts in JSON", "[view]") {
   CHECK(object["edges"].size() == 12);
   CHECK(object["edges"][0][0].get<double>() == Approx(3.0 - 5.0 * 0.1 / 2.3).margin(0.006));
   CHECK(object["edges"][0][1].get<double>() == Approx(2.0 + 5.0 * 0.2 / 2.3).margin(0.006));
+}
+
+TEST_CASE("The page is told what is wrong with a dataset as a whole", "[view]") {
+  CHECK(Viewed().json("/api/0/info")["fault_count"] == 0);
+  HostileDataset::faults = 5;
+  Viewed viewed;
+  HostileDataset::faults = 0;
+  const Json info = viewed.json("/api/0/info");
+  CHECK(info["fault_count"] == 5);
+  REQUIRE(info["faults"].size() == 3);
+  CHECK(info["faults"][2] == kHostile + ": 2; right would be: another");
 }
 
 TEST_CASE("What is no number is not told", "[view]") {
@@ -505,6 +522,42 @@ TEST_CASE("A run that goes on is shown before it has anything that could be read
   CHECK(json("/api/state")["datasets"].size() == 1);
   CHECK(json("/api/state")["generation"] == 1);
   CHECK(json("/api/run")["last"] == Json({0}));
+}
+
+TEST_CASE("What was read of a run that goes on is not read again when there is more", "[view]") {
+  test::TemporaryFolder folder;
+  test::EncodingHost host;
+  DatasetReaders readers{
+      {{"hostile", {"mark.txt"}, [] { return std::make_unique<HostileReader>(); }}}};
+  folder.write("dataset.json", R"({"captures": 12, "job": "", "writers": []})");
+  folder.write("hostile/mark.txt", "");
+  LocalFileSystem file_system;
+  file_system.make_folders(folder.path(".diorama/journal"));
+  JournalWriter writer(file_system, folder.path(".diorama/journal"), "one", ".");
+  DatasetView view({.folder = folder.path("")}, readers, host);
+  const auto json = [&](const std::string& path) { return Json::parse(*view.answer(path).body); };
+  const auto reads_after = [&](int made) {
+    writer.commit(made, {});
+    writer.published(made);
+    HostileDataset::reads = 0;
+    while (view.work()) {
+    }
+    return int(HostileDataset::reads);
+  };
+  // Labels and brightness of three captures, which stay as they are from now on.
+  CHECK(reads_after(3) == 6);
+  const Json before = json("/api/0/index/0");
+  CHECK(before["generation"] == 1);
+  CHECK(json("/api/0/brightness/0")["generation"] == 1);
+  folder.write("hostile/mark.txt", "changed");  // 11 instead of 9
+  std::this_thread::sleep_for(std::chrono::milliseconds(3100));
+  CHECK(reads_after(7) == 2);
+  Json after = json("/api/0/index/0");
+  CHECK(json("/api/0/info")["captures"] == Json({3, 7, 11}));
+  CHECK(json("/api/state")["edition"] == 0);
+  CHECK(std::exchange(after["generation"], 1) == 2);
+  CHECK(after == before);
+  CHECK(json("/api/0/brightness/0")["captures"] == 3);
 }
 
 TEST_CASE("A run that has nothing to read yet cannot be checked, and makes no report", "[view]") {

@@ -66,7 +66,7 @@ export class CapturePage {
   async show(app: App): Promise<void> {
     this.app = app;
     const { state } = app;
-    const key = JSON.stringify([app.site.generation, state.dataset, state.frame]);
+    const key = JSON.stringify([app.info.folder, app.site.edition, state.frame]);
     if (key !== this.key) {
       this.key = key;
       this.shown = -1;

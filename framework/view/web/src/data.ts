@@ -14,6 +14,7 @@ export interface DatasetState {
 export interface SiteState {
   folder: string;
   generation: number;
+  edition: number;  ///< While it stays the same, so do captures that are there.
   is_finished: boolean;
   is_linted: boolean;  ///< The findings are known, and cost nothing.
   faults: string[];  ///< Of datasets that could not be opened beside these.
@@ -29,6 +30,8 @@ export interface DatasetInfo {
   classes: string[];
   captures: number[];
   skeletons: { [name: string]: Skeleton };  ///< By class; '' is for those of all others.
+  faults: string[];  ///< The first that its reader found when it opened it.
+  fault_count: number;
 }
 
 export interface Skeleton {

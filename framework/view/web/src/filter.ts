@@ -74,7 +74,7 @@ function highOf(facet: Facet, table: CaptureTable): number {
 export function filter(table: CaptureTable, cameras: string[], facets: Map<string, string>, captures: number): Filtered {
   const counts = new Map<string, number[]>();
   const highs = new Map<string, number>();
-  const tests = kFacets.map((facet, bit) => {
+  const tests = kFacets.map((facet, place) => {
     let chosen: Chosen | null = null;
     try {
       // Nothing is filtered by what is not known yet.
@@ -89,45 +89,53 @@ export function filter(table: CaptureTable, cameras: string[], facets: Map<strin
     counts.set(facet.key, count);
     const values = facet.column === '' ? new Int32Array() : table.of(facet.column);
     const allowed = chosen?.names ? names.map((name) => chosen!.names!.has(name)) : null;
-    const range = chosen?.range ?? null;
-    const valueOf = (i: number) => facet.key === 'findings' ? Math.min(1, values[i]) : values[i];
-    const fits = (i: number): boolean => {
-      if (allowed && facet.key === 'lint') return table.checksOf(i).some((check) => allowed[check]);
-      if (allowed) return allowed[valueOf(i)] === true;
-      return !range || (values[i] !== kUnknown && values[i] >= range[0] && values[i] <= range[1]);
-    };
-    const low = facet.range?.low ?? 0;
-    const bins = facet.range?.bins ?? 0;
-    const add = (i: number): void => {
-      if (facet.key === 'lint') {
-        for (const check of table.checks ? table.checksOf(i) : []) ++count[check];
-        return;
-      }
-      const value = valueOf(i);
-      if (!facet.range) {
-        ++count[value];
-      } else if (value !== kUnknown) {
-        ++count[Math.min(bins - 1, Math.max(0, Math.floor(((value - low) / (high - low)) * bins)))];
-      }
-    };
-    return { facet, bit: 1 << bit, fits, add, isActive: chosen !== null };
+    return { facet, bit: 1 << place, values, high, count, allowed, range: chosen?.range ?? null, isActive: chosen !== null };
   });
-  const of = (what: Facet['of']) => tests.filter((test) => test.facet.of === what);
-  const objectTests = of('object');
-  const pictureTests = of('picture');
-  const captureTests = of('capture');
-  const filtersObjects = objectTests.some((test) => test.isActive);
-  const failing = (list: typeof tests, i: number): number => {
-    let bits = 0;
-    for (const test of list) if (test.isActive && !test.fits(i)) bits |= test.bit;
+  type Test = (typeof tests)[number];
+  const numberOf = (test: Test, value: number): number => test.facet.key === 'findings' ? Math.min(1, value) : value;
+  /** Which facets each of `size` things fails, as bits. One column after the other: there may be a million objects. */
+  const failed = (of: Facet['of'], size: number): Int32Array => {
+    const bits = new Int32Array(size);
+    for (const test of tests) {
+      if (test.facet.of !== of || !test.isActive) continue;
+      const { bit, values, allowed, range } = test;
+      for (let i = 0; i < size; ++i) {
+        const fits = range ? values[i] !== kUnknown && values[i] >= range[0] && values[i] <= range[1]
+          : test.facet.key === 'lint' ? table.checksOf(i).some((check) => allowed![check])
+          : allowed ? allowed[numberOf(test, values[i])] === true : true;
+        if (!fits) bits[i] |= bit;
+      }
+    }
     return bits;
   };
   /** What fails nothing counts everywhere, what fails one facet counts there. */
-  const tally = (list: typeof tests, i: number, bits: number): void => {
-    if ((bits & (bits - 1)) !== 0) return;
-    for (const test of list) if (bits === 0 || bits === test.bit) test.add(i);
+  const tally = (of: Facet['of'], bits: Int32Array): void => {
+    for (const test of tests) {
+      if (test.facet.of !== of) continue;
+      const { facet: { range, key }, bit, values, high, count } = test;
+      if (range) {
+        const { low, bins } = range;
+        const perUnit = bins / (high - low);
+        for (let i = 0; i < bits.length; ++i) {
+          if ((bits[i] !== 0 && bits[i] !== bit) || values[i] === kUnknown) continue;
+          const bin = ((values[i] - low) * perUnit) | 0;
+          ++count[bin < 0 ? 0 : bin < bins ? bin : bins - 1];
+        }
+        continue;
+      }
+      for (let i = 0; i < bits.length; ++i) {
+        if (bits[i] !== 0 && bits[i] !== bit) continue;
+        if (key !== 'lint') ++count[numberOf(test, values[i])];
+        else for (const check of table.checks ? table.checksOf(i) : []) ++count[check];
+      }
+    }
   };
 
+  const kOut = -1;  // fails more than one
+  const filtersObjects = tests.some((test) => test.facet.of === 'object' && test.isActive);
+  const captureBits = failed('capture', table.captures);
+  const pictureBits = failed('picture', table.pictures);
+  const objectBits = failed('object', table.objects);
   const places: number[] = [];
   const pictures = table.of('pictures');
   const objects = table.of('objects');
@@ -135,27 +143,25 @@ export function filter(table: CaptureTable, cameras: string[], facets: Map<strin
   let object = 0;
   let fitting = 0;
   for (let capture = 0; capture < table.captures; ++capture) {
-    const captureBits = failing(captureTests, capture);
-    let stays = false;
+    const own = captureBits[capture];
+    let stays = pictures[capture] === 0 && !filtersObjects;
     for (const end = picture + pictures[capture]; picture < end; ++picture) {
-      const pictureBits = failing(pictureTests, picture);
+      const above = pictureBits[picture] | own;
       let shows = !filtersObjects;
       for (const last = object + objects[picture]; object < last; ++object) {
-        const bits = failing(objectTests, object);
-        if (bits === 0) shows = true;
-        const all = bits | pictureBits | captureBits;
-        if (all === 0) ++fitting;
-        tally(objectTests, object, all);
+        if (objectBits[object] === 0) shows = true;
+        objectBits[object] |= above;
+        if (objectBits[object] === 0) ++fitting;
       }
-      if (!shows) continue;
-      tally(pictureTests, picture, pictureBits | captureBits);
-      if (pictureBits === 0) stays = true;
+      if (shows && pictureBits[picture] === 0) stays = true;
+      pictureBits[picture] = shows ? above : kOut;
     }
-    if (pictures[capture] === 0) stays = !filtersObjects;
-    if (!stays) continue;
-    tally(captureTests, capture, captureBits);
-    if (captureBits === 0) places.push(capture);
+    if (stays && own === 0) places.push(capture);
+    if (!stays) captureBits[capture] = kOut;
   }
+  tally('object', objectBits);
+  tally('picture', pictureBits);
+  tally('capture', captureBits);
   if (!tests.some((test) => test.isActive)) {
     for (let capture = table.captures; capture < captures; ++capture) places.push(capture);
   }

@@ -12,6 +12,7 @@ const kMostHeight = 16e6;
 
 interface Card {
   element: HTMLElement;
+  capture: number;
   pictures: number;
   isDescribed: boolean;  ///< The labels of its capture were read when it was made.
 }
@@ -26,6 +27,7 @@ export class Grid {
   private columns = 1;
   private cardWidth = 1;
   private cardHeight = 1;
+  private pictureHeight = 1;
   private chosen = 0;
   private told = -1;  ///< The capture that is first in sight, as the address has it.
   private wanted: number | null = null;  ///< To be scrolled to as soon as it is there.
@@ -41,14 +43,16 @@ export class Grid {
   show(app: App): void {
     this.app = app;
     const { state, table } = app;
-    // Pictures of a capture stand side by side as long as the card fits into the window.
+    // Pictures of a capture stand side by side as long as the card fits into the window. All have the room that the first of the
+    // dataset takes; those of other shapes are smaller in it.
     const pictures = Math.max(1, table.captures > 0 ? table.of('pictures')[0] : app.info.cameras.length);
     const aspect = table.pictures > 0 && table.of('width')[0] > 0 ? table.of('height')[0] / table.of('width')[0] : 0.75;
     const inside = Math.max(200, this.element.clientWidth - 2 * kGap);
     const beside = Math.max(1, Math.min(pictures, Math.floor((inside - 2) / (state.card + 2))));
     this.cardWidth = beside * (state.card + 2) - 2;
     const rows = Math.ceil(pictures / beside);
-    this.cardHeight = kHead + rows * (Math.round(state.card * aspect) + 2);
+    this.pictureHeight = Math.round(state.card * aspect);
+    this.cardHeight = kHead + rows * (this.pictureHeight + 2);
     this.columns = Math.max(1, Math.floor((inside + kGap) / (this.cardWidth + kGap)));
     const lines = Math.ceil(app.filtered.places.length / this.columns);
     this.height = lines * (this.cardHeight + kGap) + kGap;
@@ -61,12 +65,18 @@ export class Grid {
       else this.empty.append(isReading ? 'Reading labels …' : 'No capture fits these filters. ');
       if (!isReading && app.info.captures.length > 0) this.empty.append(button('Clear all filters', '', () => app.go({ facets: new Map() })));
     }
-    const key = JSON.stringify([state.dataset, app.site.generation, table.captures > 0, [...state.layers].sort(), state.colour, state.opacity,
+    const key = JSON.stringify([app.info.folder, app.site.edition, table.captures > 0, [...state.layers].sort(), state.colour, state.opacity,
       state.card, this.columns, this.cardWidth, this.cardHeight]);
     if (key !== this.key) {
       this.key = key;
       for (const card of this.cards.values()) card.element.remove();
       this.cards.clear();
+    }
+    // While a dataset is made others come in between.
+    for (const [place, card] of this.cards) {
+      if (app.info.captures[place] === card.capture) continue;
+      card.element.remove();
+      this.cards.delete(place);
     }
     if (state.at !== this.told) this.told = this.wanted = state.at;
     this.scrollToWanted();
@@ -188,6 +198,7 @@ export class Grid {
         },
       });
       link.style.width = `${state.card}px`;
+      link.style.height = `${this.pictureHeight}px`;
       const canvas = el('canvas');
       if (app.holds.has('color')) {
         const image = on(el('img', { alt: '', decoding: 'async', src: pictureAddress(state.dataset, capture, frame, 'thumbnail') }), {
@@ -202,7 +213,7 @@ export class Grid {
       this.draw(capture, frame, canvas, element);
     }
     element.append(row);
-    return { element, pictures: count, isDescribed: place < table.captures };
+    return { element, capture, pictures: count, isDescribed: place < table.captures };
   }
 
   /** Overlays of one picture of a card. */

@@ -17,7 +17,7 @@ const kOther: (keyof State)[] = ['page', 'dataset', 'other', 'capture', 'frame']
 
 /** Of a run that has made nothing that could be read yet. */
 function noDataset(site: SiteState): DatasetInfo {
-  return { name: site.folder.slice(site.folder.lastIndexOf('/') + 1), folder: site.folder, format: '', holds: [], cameras: [], classes: [], captures: [], skeletons: {} };
+  return { name: site.folder.slice(site.folder.lastIndexOf('/') + 1), folder: site.folder, format: '', holds: [], cameras: [], classes: [], captures: [], skeletons: {}, faults: [], fault_count: 0 };
 }
 
 /** What a dataset is compared with unless asked: the one of its name on the other side; -1: nothing. */
@@ -59,6 +59,7 @@ class Site {
   private addressed = 0;  ///< When the address was changed.
   private noting = 0;  ///< Timer of a change that it does not have yet.
   private tabs = false;  ///< From button to button by keyboard.
+  private isGone = false;  ///< Nobody answers any more, which stays said.
   private isHeld = false;  ///< A pointer is down: what is below it must not be made anew, or the click is lost.
 
   async start(): Promise<void> {
@@ -77,20 +78,19 @@ class Site {
       // The click comes after it.
       document.addEventListener(end, () => window.setTimeout(() => (this.isHeld = false)), true);
     }
-    // Returns when all labels are read; the page is there before.
     await this.load(readState(location.hash));
     if (!isReport) this.watch();
   }
 
-  /** Opens the dataset that the address names. */
-  private async load(state: State): Promise<void> {
+  /** Opens the dataset that the address names, and begins to read its labels. `old`: what is shown of it, which has grown; that
+   *  stays until as much is known of what is there now. */
+  private async load(state: State, old: App | null = null): Promise<void> {
     const site = (await get('/api/state')) as SiteState;
     complete(state, site.datasets);
     const info = site.datasets.length > 0 ? (await get(`/api/${state.dataset}/info`)) as DatasetInfo : noDataset(site);
     if (site.datasets.length === 0) state.page = 'run';
-    this.stores.clear();
     const table = new CaptureTable();
-    this.app = {
+    const app: App = {
       state, site, info, table, holds: new Set(info.holds), palette: new Palette(info.classes),
       filtered: filter(table, info.cameras, state.facets, info.captures.length),
       lint: new Lint(() => this.takeFindings()),
@@ -98,13 +98,26 @@ class Site {
       note: (change) => this.note(change),
       labels: (capture, dataset = state.dataset) => this.labels(capture, dataset),
     };
-    document.title = `${info.name} – diorama view`;
     const ticket = ++this.loading;
+    if (old && old.info.folder === info.folder) {
+      await this.readIndex(app, ticket, Math.min(old.table.captures, info.captures.length));
+      if (table.captures === info.captures.length) await this.readBrightness(app, ticket, Math.min(old.table.brightCaptures, info.captures.length));
+      if (ticket !== this.loading || table.captures < Math.min(old.table.captures, info.captures.length)) return;
+      // Somebody may have gone on meanwhile.
+      app.state = this.app.state;
+      app.filtered = filter(table, info.cameras, app.state.facets, info.captures.length);
+    }
+    this.stores.clear();
+    this.app = app;
+    document.title = `${info.name} – diorama view`;
     this.show();
     // An address that filters by them needs them.
-    if (site.is_linted || state.facets.has('lint')) this.app.lint.ask();
-    await this.readIndex(ticket);
-    if (this.app.holds.has('color')) await this.readBrightness(ticket);
+    if (site.is_linted || app.state.facets.has('lint')) app.lint.ask();
+    const read = async (): Promise<void> => {
+      await this.readIndex(app, ticket, info.captures.length);
+      if (app.holds.has('color')) await this.readBrightness(app, ticket, info.captures.length);
+    };
+    read().catch((error: Error) => this.fail(error));
   }
 
   private takeFindings(): void {
@@ -122,9 +135,8 @@ class Site {
   }
 
   /** Columns come while they are made. */
-  private readIndex(ticket: number): Promise<void> {
-    const { app } = this;
-    return this.readParts(ticket, 'index', [400, 120], () => app.table.captures, (part) => {
+  private readIndex(app: App, ticket: number, captures: number): Promise<void> {
+    return this.readParts(app, ticket, 'index', [400, 120], captures, () => app.table.captures, (part) => {
       app.table.add(part);
       return () => {
         for (const name of app.table.names.classes) app.palette.ofClass(name);
@@ -134,9 +146,8 @@ class Site {
   }
 
   /** Comes last: the pictures have to be looked at for it. */
-  private readBrightness(ticket: number): Promise<void> {
-    const { app } = this;
-    return this.readParts(ticket, 'brightness', [1500, 500], () => app.table.brightCaptures, (part) => {
+  private readBrightness(app: App, ticket: number, captures: number): Promise<void> {
+    return this.readParts(app, ticket, 'brightness', [1500, 500], captures, () => app.table.brightCaptures, (part) => {
       app.table.addBrightness(part);
       return () => {
         if (app.state.page === 'grid') this.show();
@@ -144,18 +155,18 @@ class Site {
     });
   }
 
-  /** Asks for parts until `count` has all captures. `take` gives what shows them: called once in a
-   *  while (first of the milliseconds), and when all are there. Asks anew after the second ones. */
-  private async readParts(ticket: number, what: string, [showMs, askMs]: number[], count: () => number,
+  /** Asks for parts until `count` has so many captures. `take` gives what shows them: called once in a
+   *  while (first of the milliseconds), and when all are there. Asks anew after the second ones. Ends before when there is more
+   *  in the dataset than when it was opened: places of captures are others then. */
+  private async readParts(app: App, ticket: number, what: string, [showMs, askMs]: number[], captures: number, count: () => number,
     take: (part: any) => () => void): Promise<void> {
-    const { app } = this;
     let shown = -Infinity;
-    while (count() < app.info.captures.length) {
+    while (count() < captures) {
       const before = count();
       const part = await get(`/api/${app.state.dataset}/${what}/${before}`);
-      if (ticket !== this.loading) return;
+      if (ticket !== this.loading || part.generation !== app.site.generation) return;
       const show = take(part);
-      if (count() >= app.info.captures.length || performance.now() - shown > showMs) {
+      if (this.app === app && (count() >= captures || performance.now() - shown > showMs)) {
         while (this.isHeld) await new Promise((resolve) => setTimeout(resolve, 30));
         if (ticket !== this.loading) return;
         this.refilter();
@@ -232,7 +243,9 @@ class Site {
     if (page === 'stats') this.stats.show(app);
     if (page === 'findings') this.findings.show(app);
     if (page === 'run') this.run.show(app);
+    if (this.isGone) return;
     const left = app.info.captures.length - app.table.captures;
+    this.status.classList.remove('bad');
     this.status.hidden = left === 0 || app.info.captures.length === 0;
     this.status.textContent = `Reading labels: ${app.table.captures.toLocaleString('en')} of ${plural(app.info.captures.length, 'capture')}`;
   }
@@ -259,6 +272,12 @@ class Site {
       button('?', 'Keys (?)', () => this.help.showModal()));
     clear(this.faults);
     for (const fault of app.site.faults) this.faults.append(el('p', { class: 'bad' }, `Left out: ${fault}`));
+    // Tables of a run that goes on are not there yet.
+    if (app.site.is_finished) {
+      for (const fault of app.info.faults) this.faults.append(el('p', { class: 'bad' }, fault));
+      const more = app.info.fault_count - app.info.faults.length;
+      if (more > 0) this.faults.append(el('p', { class: 'bad' }, `and ${more.toLocaleString('en')} more: see Findings`));
+    }
     refocus();
   }
 
@@ -356,7 +375,7 @@ class Site {
       if (document.visibilityState === 'visible') {
         try {
           const site = (await get('/api/state')) as SiteState;
-          if (site.generation !== this.app.site.generation) await this.load(this.app.state);
+          if (site.generation !== this.app.site.generation) await this.load(this.app.state, this.app);
           else if (!site.is_finished && this.app.state.page === 'run') this.run.show(this.app);
         } catch (error) {
           this.fail(error as Error);
@@ -369,6 +388,7 @@ class Site {
   }
 
   fail(error: Error): void {
+    this.isGone ||= error instanceof Gone;
     this.status.hidden = false;
     this.status.classList.add('bad');
     this.status.textContent = error instanceof Gone
