@@ -58,7 +58,7 @@ HttpAnswer look_elsewhere() {
 
 /// A part of an index, which is JSON of an object. Those of different openings do not fit together.
 HttpAnswer part_answer(std::string part, int generation) {
-  return answer_of(kJson, part.insert(1, "\"generation\":" + std::to_string(generation) + ","));
+  return answer_of(kJson, part.insert(1, R"("generation":)" + std::to_string(generation) + ","));
 }
 
 /// "7", not "+7", "07" or "7.0".

@@ -364,6 +364,12 @@ TEST_CASE("Messages quote in one way", "[architecture]") {
   CHECK(files_with_code(R"(\\")", speaks) == None{});
 }
 
+TEST_CASE("Tests name what both versions of Catch2 have", "[architecture]") {
+  // Debian 12 has the second, Debian 13 the third.
+  CHECK(files_with_code(R"(Catch::(Contains|StartsWith|EndsWith|Equals|VectorContains)\()",
+                        [](const Source& source) { return source.is_below("tests"); }) == None{});
+}
+
 TEST_CASE("Every source says its licence first", "[architecture]") {
   None missing;
   for (const Source& source : sources()) {

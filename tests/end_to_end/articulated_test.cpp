@@ -98,7 +98,7 @@ TEST_CASE("Drawers are open at random, labelled by part, and told in the labels"
   const Json first = Json::parse(read_file(folder / "out/basic/joint_states_0001.json"));
   for (std::size_t i = 0; i < 8; ++i) {
     const diorama::JointState& state = stored.capture.frames[0].joints[i];
-    CHECK(state.path == first["joints"][i]["prim_path"]);
+    CHECK(state.path == first["joints"][i]["prim_path"].get<std::string>());
     CHECK(state.position == first["joints"][i]["position"]);
     CHECK(state.upper == first["joints"][i]["upper_limit"]);
   }

@@ -50,9 +50,9 @@ def write_blenderproc(path, how, seed):
         if how.get("variable"):
             file.create_dataset("instance_attribute_maps", data=text)
         else:
-            file.create_dataset("instance_attribute_maps", data=np.string_(text))
-        file.create_dataset("cam_states", data=np.string_(json.dumps(state)))
-        file.create_dataset("blender_proc_version", data=np.string_("2.6.1"))
+            file.create_dataset("instance_attribute_maps", data=np.bytes_(text))
+        file.create_dataset("cam_states", data=np.bytes_(json.dumps(state)))
+        file.create_dataset("blender_proc_version", data=np.bytes_("2.6.1"))
         file.create_group("more").create_dataset("inner", data=[1, 2, 3])
 
 

@@ -209,7 +209,8 @@ TEST_CASE("Each of nine seeded things inside of others is named", "[support]") {
     FurnishedStage stage;
     stage.add_object("seeded", seeded[i].mesh, seeded[i].pose);
     INFO("number " << i + 1);
-    CHECK_THAT(stage.unheld(), Catch::VectorContains("seeded: is stuck in /" + seeded[i].in));
+    CHECK_THAT(stage.unheld(),
+               Catch::Matchers::VectorContains("seeded: is stuck in /" + seeded[i].in));
   }
 }
 

@@ -94,8 +94,8 @@ TEST_CASE("a machine without a driver is told what to install", "[vulkan]") {
   const Environment none_of_new("VK_DRIVER_FILES", "/nowhere/no_icd.json");
   CHECK_THROWS_WITH(
       VulkanInstance(),
-      Catch::StartsWith("Vulkan ") &&
-          Catch::Contains("install the driver of the device, or mesa-vulkan-drivers"));
+      Catch::Matchers::StartsWith("Vulkan ") &&
+          ContainsSubstring("install the driver of the device, or mesa-vulkan-drivers"));
 }
 
 TEST_CASE("too little memory is told with what was wanted and what there is", "[vulkan]") {
@@ -116,9 +116,10 @@ TEST_CASE("what is lost with a device is told", "[vulkan]") {
   if (!test::has_vulkan_device()) return;
   const VulkanDevice device(0);
   CHECK(!device.is_lost());
-  CHECK_THROWS_WITH(device.check(VK_ERROR_DEVICE_LOST, "run kernels"),
-                    Catch::Contains("failed to run kernels: the device was lost; the captures that "
-                                    "were written stay: run the job again with --resume"));
+  CHECK_THROWS_WITH(
+      device.check(VK_ERROR_DEVICE_LOST, "run kernels"),
+      ContainsSubstring("failed to run kernels: the device was lost; the captures that "
+                        "were written stay: run the job again with --resume"));
   CHECK(device.is_lost());
 }
 
@@ -127,7 +128,7 @@ TEST_CASE("a device is open once in a process, and stays so", "[vulkan]") {
   std::weak_ptr<const PathDevice> left = shared_path_device(0);
   CHECK(!left.expired());
   CHECK(shared_path_device(0) == test::path_device());
-  CHECK_THROWS_WITH(shared_path_device(77), Catch::Contains("there is no Vulkan device 77"));
+  CHECK_THROWS_WITH(shared_path_device(77), ContainsSubstring("there is no Vulkan device 77"));
   CHECK(&test::path_device()->device.instance() == &VulkanInstance::of_process());
 }
 
@@ -149,10 +150,10 @@ TEST_CASE("devices are numbers, or all", "[vulkan]") {
   CHECK_FALSE(numbers_of(Value::text("all")).empty());
   constexpr const char* kWanted =
       "devices: expected a list of device numbers such as [0, 1], or all, found ";
-  CHECK_THROWS_WITH(numbers_of(Value::text("both")), Catch::StartsWith(kWanted));
-  CHECK_THROWS_WITH(numbers_of(list_of({})), Catch::StartsWith(kWanted));
+  CHECK_THROWS_WITH(numbers_of(Value::text("both")), Catch::Matchers::StartsWith(kWanted));
+  CHECK_THROWS_WITH(numbers_of(list_of({})), Catch::Matchers::StartsWith(kWanted));
   for (const char* wrong : {"-1", "1.5", "1024", "99999999999", "", "one"}) {
-    CHECK_THROWS_WITH(numbers_of(list_of({"0", wrong})), Catch::StartsWith(kWanted));
+    CHECK_THROWS_WITH(numbers_of(list_of({"0", wrong})), Catch::Matchers::StartsWith(kWanted));
   }
   VulkanRenderer::Params params;
   params.devices = list_of({"0", "77"});

@@ -442,7 +442,7 @@ TEST_CASE("what turns while the shutter is open is refused", "[vulkan]") {
   world.scene.edit(camera).camera->exposure_time_s = 0.02;
   CHECK_THROWS_WITH(
       render_by_vulkan(world.scene, camera, reference(1), channels),
-      Catch::Contains("exposure_time_s or readout_time_s, and something turns meanwhile"));
+      ContainsSubstring("exposure_time_s or readout_time_s, and something turns meanwhile"));
 }
 
 TEST_CASE("what a job says of pictures holds on the device", "[vulkan]") {
@@ -673,8 +673,8 @@ TEST_CASE("a ray that passes forty thousand surfaces is right, or ends the job",
   } catch (const Error& error) {
     CHECK(test::path_device()->kernels.iteration_limit != 0xFFFFFFFFu);
     CHECK_THAT(error.what(),
-               Catch::Contains("and a ray of this scene needs more; use a newer driver, or the "
-                               "renderer embree"));
+               ContainsSubstring("and a ray of this scene needs more; use a newer driver, or the "
+                                 "renderer embree"));
   }
 }
 
