@@ -113,8 +113,7 @@ void TrainingParams::visit(ParamVisitor& v) {
 
 void TrainingData::begin(const DatasetInfo& dataset) {
   classes_ = params_.classes.empty() ? dataset.classes : params_.classes;
-  is_sorted_ = classes_.empty();
-  if (is_sorted_) {
+  if (classes_.empty()) {
     std::set<std::string> names;
     for (const Labels& labels : dataset.labels) {
       if (const auto label = choice_.of(labels)) names.insert(*label);
@@ -191,7 +190,7 @@ void TrainingData::add_dataset_page(const std::string& format, Json more,
       {"boxes", "x_max and y_max are one past the last pixel"},
       {"rotations", "matrices; there are no quaternions"},
       {"depth", "none"},
-      {"class_order", is_sorted_ ? "sorted" : "as given"}};
+      {"class_order", std::ranges::is_sorted(classes_) ? "sorted" : "as given"}};
   for (auto& [key, value] : more.items()) page["conventions"][key] = value;
   page["plugins"] = Json::object();
   for (const auto& [name, version] : dataset.plugin_versions) page["plugins"][name] = version;

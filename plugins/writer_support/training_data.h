@@ -85,7 +85,6 @@ class TrainingData {
   ClassChoice choice_;
   std::string other_;
   std::vector<std::string> classes_;
-  bool is_sorted_ = false;  ///< Nobody has put the classes in an order.
   std::vector<bool> is_val_;
   int padding_ = 6;
   int camera_count_ = 0;
