@@ -8,6 +8,7 @@
 #include <fstream>
 #include <limits>
 #include <map>
+#include <memory>
 #include <set>
 #include <span>
 
@@ -378,10 +379,13 @@ class WebDataset final : public StoredDataset {
   std::map<std::string, std::string> load(const Sample& sample, std::string& key,
                                           Wanted&& is_wanted) const {
     const Content& content = contents_[sample.shard];
-    std::ifstream in = open_shard(sample.shard);
-    std::optional<GzipStream> packed;
-    if (content.places) packed.emplace(std::move(in), *content.places);
-    TarWalk walk(packed ? static_cast<std::istream&>(*packed) : in, content.size, sample.offset);
+    std::unique_ptr<std::istream> in;
+    if (content.places) {
+      in = std::make_unique<GzipStream>(open_shard(sample.shard), *content.places);
+    } else {
+      in = std::make_unique<std::ifstream>(open_shard(sample.shard));
+    }
+    TarWalk walk(*in, content.size, sample.offset);
     std::map<std::string, std::string> members;
     for (std::uint32_t i = 0; i < sample.members;) {
       const auto member = walk.next();
