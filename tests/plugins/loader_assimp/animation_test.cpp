@@ -50,6 +50,20 @@ constexpr int kFloat = 5126;
 constexpr int kShort = 5123;
 constexpr int kByte = 5121;
 
+/// Accessors of a triangle, its indices, a target that lifts its third point by 2, and the keys of
+/// a weight from 0 to 1 in a second.
+Buffer face() {
+  Buffer b;
+  b.add(test::bytes_of<float>({0, 0, 0, 1, 0, 0, 0, 1, 0}), kFloat, "VEC3", 3,
+        R"(,"min":[0,0,0],"max":[1,1,0])");
+  b.add(test::bytes_of<std::uint16_t>({0, 1, 2}), kShort, "SCALAR", 3);
+  b.add(test::bytes_of<float>({0, 0, 0, 0, 0, 0, 0, 0, 2}), kFloat, "VEC3", 3,
+        R"(,"min":[0,0,0],"max":[0,0,2])");
+  b.add(test::bytes_of<float>({0, 1}), kFloat, "SCALAR", 2, R"(,"min":[0],"max":[1])");
+  b.add(test::bytes_of<float>({0, 1}), kFloat, "SCALAR", 2);
+  return b;
+}
+
 /// Two bones along x, the elbow at x = 1, which bends by 90 degrees about z in two seconds.
 std::string arm() {
   const float half = std::sqrt(0.5f);
@@ -105,14 +119,7 @@ TEST_CASE("glTF: an arm bends as its animation says at the time", "[loader_assim
 }
 
 TEST_CASE("glTF: morph targets move points by their weights", "[loader_assimp]") {
-  Buffer b;
-  b.add(test::bytes_of<float>({0, 0, 0, 1, 0, 0, 0, 1, 0}), kFloat, "VEC3", 3,
-        R"(,"min":[0,0,0],"max":[1,1,0])");
-  b.add(test::bytes_of<std::uint16_t>({0, 1, 2}), kShort, "SCALAR", 3);
-  b.add(test::bytes_of<float>({0, 0, 0, 0, 0, 0, 0, 0, 2}), kFloat, "VEC3", 3,
-        R"(,"min":[0,0,0],"max":[0,0,2])");
-  b.add(test::bytes_of<float>({0, 1}), kFloat, "SCALAR", 2, R"(,"min":[0],"max":[1])");
-  b.add(test::bytes_of<float>({0, 1}), kFloat, "SCALAR", 2);
+  const Buffer b = face();
   const TemporaryFolder folder;
   const std::string file = folder.write("face.gltf", b.gltf(R"(
     "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1,
@@ -128,14 +135,7 @@ TEST_CASE("glTF: morph targets move points by their weights", "[loader_assimp]")
 
 TEST_CASE("glTF: morph targets turn normals by their weights", "[loader_assimp]") {
   const auto normal = [](bool says_normals, const std::string& time) {
-    Buffer b;
-    b.add(test::bytes_of<float>({0, 0, 0, 1, 0, 0, 0, 1, 0}), kFloat, "VEC3", 3,
-          R"(,"min":[0,0,0],"max":[1,1,0])");
-    b.add(test::bytes_of<std::uint16_t>({0, 1, 2}), kShort, "SCALAR", 3);
-    b.add(test::bytes_of<float>({0, 0, 0, 0, 0, 0, 0, 0, 2}), kFloat, "VEC3", 3,
-          R"(,"min":[0,0,0],"max":[0,0,2])");
-    b.add(test::bytes_of<float>({0, 1}), kFloat, "SCALAR", 2, R"(,"min":[0],"max":[1])");
-    b.add(test::bytes_of<float>({0, 1}), kFloat, "SCALAR", 2);
+    Buffer b = face();
     b.add(test::bytes_of<float>({0, 0, 1, 0, 0, 1, 0, 0, 1}), kFloat, "VEC3", 3);
     b.add(test::bytes_of<float>({1, 0, 0, 1, 0, 0, 1, 0, 0}), kFloat, "VEC3", 3);
     const TemporaryFolder folder;
