@@ -9,6 +9,7 @@
 #include "program.h"
 #include "replicator_camera.h"
 #include "support/catch.h"
+#include "support/walk_and_run.h"
 
 using namespace diorama;
 using namespace diorama::test;
@@ -493,19 +494,11 @@ TEST_CASE("An animation plays in a clip, and flow goes with what bends", "[run]"
 }
 
 TEST_CASE("Inspect lists the animations of a file of which a job chooses one", "[run]") {
-  const auto set = [](const std::string& name, const std::string& end, const std::string& x) {
-    return "AnimationSet " + name +
-           " {\n Animation {\n  {Mover}\n  AnimationKey { 2; 2; 0;3;0.0,0.0,0.0;;, " + end + ";3;" +
-           x + ",0.0,0.0;;; }\n }\n}\n";
-  };
   const TemporaryFolder folder;
-  write_file(folder / "mover.x", R"(xof 0303txt 0032
-AnimTicksPerSecond { 10; }
-Frame Mover {
- FrameTransformMatrix { 1.0,0.0,0.0,0.0, 0.0,1.0,0.0,0.0, 0.0,0.0,1.0,0.0, 0.0,0.0,0.0,1.0;; }
- Mesh { 4; 0;0;0;, 0.5;0;0;, 0;0.5;0;, 0;0;0.5;; 4; 3;0,1,2;, 3;0,1,3;, 3;0,2,3;, 3;1,2,3;; }
-}
-)" + set("Walk", "20", "1.0") + set("Run", "10", "5.0"));
+  write_file(
+      folder / "mover.x",
+      walk_and_run(
+          "4; 0;0;0;, 0.5;0;0;, 0;0.5;0;, 0;0;0.5;; 4; 3;0,1,2;, 3;0,1,3;, 3;0,2,3;, 3;1,2,3;;"));
   const Outcome inspected = run({"inspect", "mover.x"}, folder.path());
   INFO(inspected.errors);
   REQUIRE(inspected.exit_code == 0);

@@ -10,6 +10,7 @@
 #include "plugins/loader_assimp/loaded_file.h"
 #include "support/catch.h"
 #include "support/temporary_folder.h"
+#include "support/walk_and_run.h"
 
 namespace diorama::loader_assimp {
 
@@ -335,19 +336,9 @@ TEST_CASE("animations are told with names and lengths", "[loader_assimp]") {
 }
 
 TEST_CASE("other formats choose among animations likewise", "[loader_assimp]") {
-  const auto set = [](const std::string& name, const std::string& end, const std::string& x) {
-    return "AnimationSet " + name +
-           " {\n Animation {\n  {Mover}\n  AnimationKey { 2; 2; 0;3;0.0,0.0,0.0;;, " + end + ";3;" +
-           x + ",0.0,0.0;;; }\n }\n}\n";
-  };
   const TemporaryFolder folder;
-  const std::string file = folder.write("mover.x", R"(xof 0303txt 0032
-AnimTicksPerSecond { 10; }
-Frame Mover {
- FrameTransformMatrix { 1.0,0.0,0.0,0.0, 0.0,1.0,0.0,0.0, 0.0,0.0,1.0,0.0, 0.0,0.0,0.0,1.0;; }
- Mesh { 3; 0;0;0;, 1;0;0;, 0;1;0;; 1; 3;0,1,2;; }
-}
-)" + set("Walk", "20", "1.0") + set("Run", "10", "5.0"));
+  const std::string file =
+      folder.write("mover.x", test::walk_and_run("3; 0;0;0;, 1;0;0;, 0;1;0;; 1; 3;0,1,2;;"));
   CHECK(x_of(LoadedFile(file + "{time=1}")) == Approx(0.5));
   CHECK(x_of(LoadedFile(file + "{animation=Run}{time=0.5}")) == Approx(2.5));
   CHECK(x_of(LoadedFile(file + "{animation=1}{time=1}")) == Approx(5.0));
