@@ -51,13 +51,19 @@ constexpr int kFloat = 5126;
 constexpr int kShort = 5123;
 constexpr int kByte = 5121;
 
-/// Accessors of a triangle, its indices, a target that lifts its third point by 2, and the keys of
-/// a weight from 0 to 1 in a second.
-Buffer face() {
+/// Accessors of a triangle and of its indices.
+Buffer triangle() {
   Buffer b;
   b.add(test::bytes_of<float>({0, 0, 0, 1, 0, 0, 0, 1, 0}), kFloat, "VEC3", 3,
         R"(,"min":[0,0,0],"max":[1,1,0])");
   b.add(test::bytes_of<std::uint16_t>({0, 1, 2}), kShort, "SCALAR", 3);
+  return b;
+}
+
+/// Those, a target that lifts its third point by 2, and the keys of
+/// a weight from 0 to 1 in a second.
+Buffer face() {
+  Buffer b = triangle();
   b.add(test::bytes_of<float>({0, 0, 0, 0, 0, 0, 0, 0, 2}), kFloat, "VEC3", 3,
         R"(,"min":[0,0,0],"max":[0,0,2])");
   b.add(test::bytes_of<float>({0, 1}), kFloat, "SCALAR", 2, R"(,"min":[0],"max":[1])");
@@ -166,10 +172,7 @@ TEST_CASE("glTF: morph targets turn normals by their weights", "[loader_assimp]"
 /// A triangle on a node that moves along x by an interpolation of glTF; two nodes have one name.
 std::string mover(const std::string& interpolation, const std::vector<float>& places,
                   const std::string& more = "") {
-  Buffer b;
-  b.add(test::bytes_of<float>({0, 0, 0, 1, 0, 0, 0, 1, 0}), kFloat, "VEC3", 3,
-        R"(,"min":[0,0,0],"max":[1,1,0])");
-  b.add(test::bytes_of<std::uint16_t>({0, 1, 2}), kShort, "SCALAR", 3);
+  Buffer b = triangle();
   b.add(test::bytes_of<float>({0, 1, 3}), kFloat, "SCALAR", 3, R"(,"min":[0],"max":[3])");
   b.add(test::bytes_of<float>(places), kFloat, "VEC3", places.size() / 3, more);
   return b.gltf(R"(
@@ -215,10 +218,7 @@ TEST_CASE("glTF: steps hold, and splines run along their tangents", "[loader_ass
 
 TEST_CASE("glTF: sparse keys and weights below zero count", "[loader_assimp]") {
   const TemporaryFolder folder;
-  Buffer b;
-  b.add(test::bytes_of<float>({0, 0, 0, 1, 0, 0, 0, 1, 0}), kFloat, "VEC3", 3,
-        R"(,"min":[0,0,0],"max":[1,1,0])");
-  b.add(test::bytes_of<std::uint16_t>({0, 1, 2}), kShort, "SCALAR", 3);
+  Buffer b = triangle();
   b.add(test::bytes_of<float>({0, 0, 0, 0, 0, 0, 0, 0, 2}), kFloat, "VEC3", 3,
         R"(,"min":[0,0,0],"max":[0,0,2])");
   b.add(test::bytes_of<float>({0, 1}), kFloat, "SCALAR", 2, R"(,"min":[0],"max":[1])");
@@ -252,10 +252,7 @@ namespace {
 
 /// One triangle that moves along x by three animations: 1 m in 2 s, 5 m in 1 s, and a pose at 7 m.
 std::string three_animations(const std::string& first, const std::string& second) {
-  Buffer b;
-  b.add(test::bytes_of<float>({0, 0, 0, 1, 0, 0, 0, 1, 0}), kFloat, "VEC3", 3,
-        R"(,"min":[0,0,0],"max":[1,1,0])");
-  b.add(test::bytes_of<std::uint16_t>({0, 1, 2}), kShort, "SCALAR", 3);
+  Buffer b = triangle();
   b.add(test::bytes_of<float>({0, 2}), kFloat, "SCALAR", 2, R"(,"min":[0],"max":[2])");
   b.add(test::bytes_of<float>({0, 0, 0, 1, 0, 0}), kFloat, "VEC3", 2);
   b.add(test::bytes_of<float>({0, 1}), kFloat, "SCALAR", 2, R"(,"min":[0],"max":[1])");
