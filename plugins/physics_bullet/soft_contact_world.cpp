@@ -339,6 +339,27 @@ void turn_deep_contact(const FixedContact& seen, btManifoldPoint contact,
   manifold.addManifoldPoint(contact);
 }
 
+/// Whether the body moves so slowly that rolling friction can hold it, and a small tilt would lower
+/// its centre of mass over a plane: it balances. What rolls keeps its height, within half of what
+/// is lost on an edge.
+bool is_balancing(const btRigidBody& body, const btVector3& up) {
+  constexpr double kSlow = 0.03;  // m/s
+  constexpr double kTilt = 0.1;   // radians
+  if (body.getLinearVelocity().length2() > kSlow * kSlow) return false;
+  const btVector3& centre = body.getWorldTransform().getOrigin();
+  const auto height = [&](const btVector3& direction) {
+    return direction.dot(centre - support_point(body, -direction));
+  };
+  const double lowered = height(up) * (1.0 - 0.25 * kTilt * kTilt);
+  btVector3 side, unused;
+  btPlaneSpace1(up, side, unused);
+  for (int i = 0; i < 8; ++i) {
+    const btVector3 sideways = side.rotate(up, btScalar(0.25 * SIMD_PI * i));
+    if (height(up * std::cos(kTilt) + sideways * std::sin(kTilt)) < lowered) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 SoftContactWorld::SoftContactWorld(btDispatcher* dispatcher, btBroadphaseInterface* broadphase,
@@ -447,6 +468,51 @@ void SoftContactWorld::hold_face(btPersistentManifold& manifold, double lowest_d
   }
 }
 
+void SoftContactWorld::let_balance_go() {
+  constexpr double kTouching = 2e-4;    // metres
+  constexpr int kFace = 3;              // contacts
+  constexpr double kLeastLever = 1e-9;  // metres; with none Bullet leaves out spinning, too
+  struct Touches {
+    int others = 0;
+    int contacts = 0;
+  };
+  if (getGravity().isZero()) return;
+  std::vector<Touches> touches(std::size_t(m_nonStaticRigidBodies.size()));
+  btDispatcher& dispatcher = *getDispatcher();
+  for (int i = 0; i < dispatcher.getNumManifolds(); ++i) {
+    const btPersistentManifold& manifold = *dispatcher.getManifoldByIndexInternal(i);
+    int count = 0;
+    for (int k = 0; k < manifold.getNumContacts(); ++k) {
+      if (manifold.getContactPoint(k).getDistance() < kTouching) ++count;
+    }
+    if (count == 0) continue;
+    for (const btCollisionObject* body : {manifold.getBody0(), manifold.getBody1()}) {
+      if (body->isStaticObject()) continue;
+      Touches& seen = touches[std::size_t(body->getUserIndex())];
+      ++seen.others;
+      seen.contacts += count;
+    }
+  }
+  const btVector3 up = -getGravity().normalized();
+  const auto lever = [&](const btCollisionObject& body) {
+    if (body.isStaticObject()) return 0.0;
+    const Touches& seen = touches[std::size_t(body.getUserIndex())];
+    const bool is_on_edge = seen.others == 1 && seen.contacts < kFace;
+    if (is_on_edge && is_balancing(*btRigidBody::upcast(&body), up)) return 0.0;
+    return double(body.getRollingFriction());
+  };
+  for (int i = 0; i < dispatcher.getNumManifolds(); ++i) {
+    btPersistentManifold& manifold = *dispatcher.getManifoldByIndexInternal(i);
+    if (manifold.getNumContacts() == 0) continue;
+    const btCollisionObject& a = *manifold.getBody0();
+    const btCollisionObject& b = *manifold.getBody1();
+    const double combined = lever(a) * b.getFriction() + lever(b) * a.getFriction();
+    for (int k = 0; k < manifold.getNumContacts(); ++k) {
+      manifold.getContactPoint(k).m_combinedRollingFriction = std::max(combined, kLeastLever);
+    }
+  }
+}
+
 /// With the impulses that the step ended with. What lies on fewer contacts rolls or rocks.
 void SoftContactWorld::note_faces() {
   std::map<const btPersistentManifold*, Face> faces;
@@ -482,6 +548,7 @@ void SoftContactWorld::solveConstraints(btContactSolverInfo& info) {
     hold_face(manifold, lowest);
     keep_steady_impulses(manifold);
   }
+  let_balance_go();
   for (std::size_t i = 0; i < clear_centres_.size(); ++i) {
     if (!is_clear_[i]) continue;
     clear_centres_[i] = m_nonStaticRigidBodies[int(i)]->getWorldTransform().getOrigin();

@@ -25,6 +25,9 @@ namespace diorama {
 /// - A face that lies on another one keeps its contact points, and is drawn back to where it lay on
 ///   them: Bullet chooses among all points of two faces anew in each step, and friction only ends
 ///   motion, so that stacks creep.
+/// - What balances on an edge or a corner, and on nothing else, has no rolling friction: Bullet's
+/// would
+///   hold it there for good.
 /// - Continuous detection works for compound bodies as well; Bullet leaves them out.
 ///
 /// Static objects of triangles must carry their StaticMesh as user pointer, all others none. The
@@ -44,6 +47,7 @@ class SoftContactWorld final : public btDiscreteDynamicsWorld {
   void repair_contacts(btPersistentManifold& manifold, double lowest_distance);
   void keep_steady_impulses(btPersistentManifold& manifold);
   void hold_face(btPersistentManifold& manifold, double lowest_distance);
+  void let_balance_go();
   void note_faces();
 
   /// Contacts of a face with another one, as a step left them.
