@@ -126,6 +126,9 @@ TEST_CASE("mistakes in job files end with code 3 and all of them are named", "[c
   CHECK(has(all.err, wrong.string() + ":4:34: cameras[0].width: expected an integer"));
   check_error(run_program("config " DIORAMA_SOURCE_DIR "/configs/smoke.yaml --set seed"), 2,
               "--set seed: expected key=value, for instance renderer.samples=64");
+  check_error(run_program("config " DIORAMA_SOURCE_DIR
+                          "/configs/object_based_default.yaml --set num_frame=3"),
+              3, "--set num_frame=3:1:1: unknown key 'num_frame'; did you mean 'num_frames'?");
 }
 
 TEST_CASE("config prints a job that means the same again", "[cli]") {
