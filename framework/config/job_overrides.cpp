@@ -112,7 +112,11 @@ void apply_set(Value& job, std::string_view assignment) {
       refuse(assignment, path + " is " + at->describe() + ", it has no key '" + part + "'");
     } else {
       Value* next = at->find(part);
-      at = next ? next : &at->set(part, Value());
+      if (!next) {
+        next = &at->set(part, Value());
+        next->key_place = value.place;
+      }
+      at = next;
     }
     path += is_entry ? "[" + part + "]" : (path.empty() ? "" : ".") + part;
   }

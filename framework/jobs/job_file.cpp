@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "framework/jobs/job_file.h"
 
+#include <algorithm>
+
 #include "framework/config/job_overrides.h"
 #include "framework/config/yaml_config.h"
+#include "framework/pipeline/job.h"
 #include "framework/replicator/dialect.h"
 
 namespace diorama {
@@ -13,9 +16,12 @@ Value from_command_line(Value value, const char* option) {
   return value;
 }
 
-/// Keys of the Replicator dialect are set before the translation, all others after it.
+/// Keys of the Replicator dialect are set before the translation, those of jobs after it. What is
+/// neither is a mistake in a file of the dialect, which says so with the nearest key.
 bool is_replicator_key(const std::string& assignment) {
-  return is_replicator_section(assignment.substr(0, assignment.find_first_of(".[=")));
+  const std::string key = assignment.substr(0, assignment.find_first_of(".[="));
+  return is_replicator_section(key) ||
+         std::ranges::none_of(job_specs(), [&](const ParamSpec& spec) { return spec.key == key; });
 }
 
 Value translated(const Value& job, const Log& log) {

@@ -54,7 +54,7 @@ class PlayWatch {
   PlayWatch() = default;
   /// The scene as the clip begins.
   explicit PlayWatch(const Scene& scene);
-  /// To be called before each frame is played, when the bodies stand where physics has put them.
+  /// To be called before randomizers show a frame: bodies stand where physics has put them.
   void begin_frame(const Scene& scene);
   /// Throws Error(Plugin) when more has changed since.
   void check(const Scene& scene);

@@ -382,7 +382,8 @@ void check_moments(const RandomizerEntry& entry, const std::vector<std::string>&
   }
 }
 
-void read_randomizers(const Value& value, Job& job, Diagnostics& diagnostics) {
+/// A timeline with mistakes does not say which moments there are.
+void read_randomizers(const Value& value, bool knows_moments, Job& job, Diagnostics& diagnostics) {
   std::vector<std::string> moments{"environment"};
   for_each_step(job.timeline, [&](const TimelineStep& step) {
     const bool simulates = step.kind == TimelineStep::Kind::Simulate;
@@ -396,7 +397,7 @@ void read_randomizers(const Value& value, Job& job, Diagnostics& diagnostics) {
     RandomizerEntry entry;
     read_keys(map, path, entry, diagnostics);
     name_after_type(entry);
-    check_moments(entry, moments, map, path, diagnostics);
+    if (knows_moments) check_moments(entry, moments, map, path, diagnostics);
     entry.component = {entry.type, entry.name, std::move(map), path};
     require_type(entry.component, diagnostics);
     job.randomizers.push_back(std::move(entry));
@@ -1054,8 +1055,10 @@ Job read_job(const Value& value, Diagnostics& diagnostics) {
   read_objects(value, job, diagnostics);
   read_lights(value, job, diagnostics);
   read_cameras(value, job, diagnostics);
+  const std::size_t before = diagnostics.messages().size();
   read_timeline(value, job, diagnostics);
-  read_randomizers(value, job, diagnostics);
+  const bool knows_moments = diagnostics.messages().size() == before;
+  read_randomizers(value, knows_moments, job, diagnostics);
   job.physics = read_engine(value, "physics", kDefaultPhysics, diagnostics);
   job.renderer = read_engine(value, "renderer", kDefaultRenderer, diagnostics);
   job.annotators = read_annotators(value, diagnostics);

@@ -424,8 +424,11 @@ void VisitRun::record(const TimelineStep& step) {
 void VisitRun::play(const PlannedCapture& first, const ClipFrame& at) {
   const Stopwatch watch(result_.seconds["simulating"]);
   setting_.stop_if_asked();
+  const double seconds = 1.0 / at.fps;
+  if (at.frame > 0) call_players(first, at, &Randomizer::lead);
   if (components_.physics && at.frame > 0) {
-    const double seconds = 1.0 / at.fps;
+    call_component("physics '" + job_.physics.type + "'",
+                   [&] { components_.physics->carry(scene_, seconds); });
     // As many as the job's steps, or a little shorter ones.
     const int steps = int(std::ceil(seconds / components_.physics->step_seconds() - 1e-9));
     last_step_s_ = seconds / steps;
@@ -442,16 +445,22 @@ void VisitRun::play(const PlannedCapture& first, const ClipFrame& at) {
       moving_until_s_ = simulated_s_;
     }
   }
+  call_players(first, at, &Randomizer::play);
+  track_.add(scene_);
+}
+
+/// Calls all randomizers that acted when the clip began.
+void VisitRun::call_players(const PlannedCapture& first, const ClipFrame& at,
+                            void (Randomizer::*show)(Scene&, const ClipFrame&)) {
   watch_.begin_frame(scene_);
   for (std::size_t i = 0; i < job_.randomizers.size(); ++i) {
     const RandomizerEntry& entry = job_.randomizers[i];
     if (!randomizer_call(job_, entry, first.phase, planned_.index, first.number)) continue;
     call_component("randomizer '" + entry.name + "'", [&] {
-      components_.randomizers[i]->play(scene_, at);
+      (*components_.randomizers[i].*show)(scene_, at);
       watch_.check(scene_);
     });
   }
-  track_.add(scene_);
 }
 
 /// The visit's report tells of all its captures, so that it is the same whichever of them were made

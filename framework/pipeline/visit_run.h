@@ -91,6 +91,8 @@ class VisitRun {
   void take_captures(const TimelineStep& step);
   void record(const TimelineStep& step);
   void play(const PlannedCapture& first, const ClipFrame& at);
+  void call_players(const PlannedCapture& first, const ClipFrame& at,
+                    void (Randomizer::*show)(Scene&, const ClipFrame&));
   void measure_flows(const std::optional<ClipFrame>& clip, std::vector<Frame>& frames);
   FlowMeter::NodeThere nodes_in(int frame) const;
   void set_motion(const std::optional<ClipFrame>& clip, Frame& frame);

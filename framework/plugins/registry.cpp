@@ -237,9 +237,17 @@ std::unique_ptr<Component> Registry::make_component(ComponentKind kind, const Va
   std::vector<std::string_view> known(also_known.begin(), also_known.end());
   known.push_back("type");
   const std::size_t before = diagnostics.messages().size();
-  std::unique_ptr<Component> made = call_component(titled(kind, type->scalar), [&] {
-    return info.make(info.context, map, path, known, diagnostics, host);
-  });
+  std::unique_ptr<Component> made;
+  try {
+    made = call_component(titled(kind, type->scalar), [&] {
+      return info.make(info.context, map, path, known, diagnostics, host);
+    });
+  } catch (const Error& error) {
+    // What stands in a file is told with its place, and beside all else that is wrong there.
+    if (error.kind() != ErrorKind::Config || map.place.text().empty()) throw;
+    diagnostics.add(map.place, path + ": " + error.what());
+    return nullptr;
+  }
   if (!made && diagnostics.messages().size() == before) {
     throw Error(ErrorKind::Plugin, titled(kind, type->scalar) + ": its factory returned nothing (" +
                                        entry(kind, type->scalar).file.string() + ")");

@@ -58,14 +58,14 @@ const std::vector<std::string>& object_based_keys() {
 /// The keys at the top that are numbers, words or lists of them.
 struct ObjectBasedKeys {
   std::string env_url;
-  std::vector<double> working_area_size;
+  std::vector<double> working_area_size{4, 4, 3};
   int rt_subframes = -1;
   int num_frames = 0;
   int num_cameras = 0;
   double camera_collider_radius = 0.0;
   bool disable_render_products = false;
   double simulation_duration = 0.0;
-  std::vector<double> resolution;
+  std::vector<double> resolution{640, 480};
   double look_at_offset = 0.0;
   Range distance;
   std::vector<std::string> shape_types;
@@ -277,6 +277,7 @@ class ObjectBasedTranslator : private replicator::Translator {
   }
 
   void complain_about_none(const std::string& key, const std::string& count_key, int count) {
+    if (section(key).kind == Value::Kind::Scalar || section(key).kind == Value::Kind::Map) return;
     diagnostics_.add(section(key).place,
                      key + ": there are none, but " + count_key + " is " + std::to_string(count));
   }

@@ -8,7 +8,7 @@
 #include "loader_assimp/posing.h"
 #include "loader_assimp/scene_file.h"
 #include "loader_assimp/scene_translator.h"
-#include "loader_support/asset_time.h"
+#include "loader_support/asset_name.h"
 
 namespace diorama::loader_assimp {
 

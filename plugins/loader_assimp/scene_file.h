@@ -9,7 +9,7 @@
 
 #include "diorama/error.h"
 #include "diorama/host.h"
-#include "loader_support/asset_time.h"
+#include "loader_support/asset_name.h"
 
 namespace diorama::loader_assimp {
 

@@ -9,7 +9,7 @@
 #include <system_error>
 
 #include "diorama/error.h"
-#include "loader_support/asset_time.h"
+#include "loader_support/asset_name.h"
 #include "loader_usd/scene_translator.h"
 #include "loader_usd/texture_library.h"
 #include "loader_usd/usd/error.h"

@@ -113,6 +113,8 @@ void add_static(const Scene& scene, NodeId id, const BulletBackend::Params& para
   made.object = std::make_unique<btCollisionObject>();
   made.object->setCollisionShape(made.shapes.shape());
   made.object->setWorldTransform(bullet_transform(place));
+  made.world_from_node = scene.world_from_node(id);
+  made.node_from_object = split.rigid.inverse() * place;
   made.object->setUserPointer(const_cast<StaticMesh*>(made.shapes.mesh.get()));
   set_surface(*made.object, *node.collider);
   statics.push_back(std::move(made));

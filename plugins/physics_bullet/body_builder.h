@@ -32,6 +32,8 @@ struct StaticObject {
   std::string path;
   OwnedShapes shapes;
   std::unique_ptr<btCollisionObject> object;
+  Affine world_from_node = Affine::Identity();  ///< As it was last seen.
+  Rigid node_from_object = Rigid::Identity();   ///< Of the node without its stretch.
 };
 
 struct MovingBody {

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "body_builder.h"
+#include "carrier.h"
 #include "diorama/error.h"
 #include "joint_builder.h"
 #include "soft_contact_world.h"
@@ -111,6 +112,7 @@ struct BulletBackend::World {
   btDbvtBroadphase broadphase;
   btSequentialImpulseConstraintSolver solver;
   SoftContactWorld dynamics;
+  Carrier carrier{dynamics};
 
   ~World() {
     for (const HeldJoint& held : bodies.joints) dynamics.removeConstraint(held.constraint.get());
@@ -152,9 +154,7 @@ void BulletBackend::do_reset(const Scene& scene) {
   for (std::size_t i = 0; i < world.bodies.statics.size(); ++i) {
     btCollisionObject& object = *world.bodies.statics[i].object;
     object.setUserIndex(-1 - int(i));
-    world.dynamics.addCollisionObject(
-        &object, btBroadphaseProxy::StaticFilter,
-        btBroadphaseProxy::AllFilter ^ btBroadphaseProxy::StaticFilter);
+    world.dynamics.addCollisionObject(&object, kStaticGroup, kStaticMask);
   }
   for (std::size_t i = 0; i < world.bodies.moving.size(); ++i) {
     world.bodies.moving[i].body->setUserIndex(int(i));
@@ -190,9 +190,15 @@ bool BulletBackend::do_advance_by(int steps, double step_s) {
   const double seconds = step_s / params_.sub_steps;
   for (int i = 0; i < steps * params_.sub_steps; ++i) {
     drive_followers(world_->bodies, seconds);
+    world_->carrier.begin_step(seconds);
     world_->dynamics.stepSimulation(seconds, 0);
+    world_->carrier.end_step();
   }
   return true;
+}
+
+void BulletBackend::do_carry(const Scene& scene, double seconds) {
+  world_->carrier.aim(scene, seconds, world_->bodies.statics);
 }
 
 void BulletBackend::do_write_poses(Scene& scene) const {

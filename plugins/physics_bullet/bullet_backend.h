@@ -48,6 +48,7 @@ class BulletBackend final : public PhysicsBackend {
   void do_advance(int steps) override;
   bool do_advance_by(int steps, double step_s) override;
   void do_write_poses(Scene& scene) const override;
+  void do_carry(const Scene& scene, double seconds) override;
 
   Params params_;
   Host& host_;

@@ -371,6 +371,17 @@ SoftContactWorld::SoftContactWorld(btDispatcher* dispatcher, btBroadphaseInterfa
   getSolverInfo().m_warmstartingFactor = 1.0;
 }
 
+/// Where the body was clear goes with the thing that it is deep in.
+void SoftContactWorld::note_depth(const btCollisionObject& body, const btCollisionObject& fixed) {
+  const std::size_t index = std::size_t(body.getUserIndex());
+  is_clear_[index] = false;
+  const btRigidBody* const carried = btRigidBody::upcast(&fixed);
+  if (!carried) return;
+  const btVector3 arm = clear_centres_[index] - carried->getWorldTransform().getOrigin();
+  const btVector3 velocity = carried->getVelocityInLocalPoint(arm);
+  if (velocity.length2() > drifts_[index].length2()) drifts_[index] = velocity;
+}
+
 void SoftContactWorld::repair_contacts(btPersistentManifold& manifold, double lowest_distance) {
   const auto fixed = [&](const btManifoldPoint& contact) {
     return fixed_contact(manifold, contact, clear_centres_);
@@ -380,7 +391,7 @@ void SoftContactWorld::repair_contacts(btPersistentManifold& manifold, double lo
     btManifoldPoint& contact = manifold.getContactPoint(i);
     const auto seen = fixed(contact);
     if (!seen) continue;
-    if (is_deep(*seen, contact)) is_clear_[std::size_t(seen->body->getUserIndex())] = false;
+    if (is_deep(*seen, contact)) note_depth(*seen->body, *seen->fixed);
     const Verdict verdict = mend_direction(*seen, contact);
     if (verdict == Verdict::Keep) continue;
     const bool is_known = std::any_of(rebuilt_.begin(), rebuilt_.end(), [&](const auto& other) {
@@ -541,6 +552,7 @@ void SoftContactWorld::solveConstraints(btContactSolverInfo& info) {
     clear_centres_.push_back(m_nonStaticRigidBodies[int(i)]->getWorldTransform().getOrigin());
   }
   is_clear_.assign(clear_centres_.size(), true);
+  drifts_.assign(clear_centres_.size(), btVector3(0.0, 0.0, 0.0));
   btDispatcher& dispatcher = *getDispatcher();
   for (int i = 0; i < dispatcher.getNumManifolds(); ++i) {
     btPersistentManifold& manifold = *dispatcher.getManifoldByIndexInternal(i);
@@ -550,8 +562,11 @@ void SoftContactWorld::solveConstraints(btContactSolverInfo& info) {
   }
   let_balance_go();
   for (std::size_t i = 0; i < clear_centres_.size(); ++i) {
-    if (!is_clear_[i]) continue;
-    clear_centres_[i] = m_nonStaticRigidBodies[int(i)]->getWorldTransform().getOrigin();
+    if (is_clear_[i]) {
+      clear_centres_[i] = m_nonStaticRigidBodies[int(i)]->getWorldTransform().getOrigin();
+    } else {
+      clear_centres_[i] += drifts_[i] * info.m_timeStep;
+    }
   }
   btDiscreteDynamicsWorld::solveConstraints(info);
   // Before the bodies move on.

@@ -31,7 +31,8 @@ namespace diorama {
 /// - Continuous detection works for compound bodies as well; Bullet leaves them out.
 ///
 /// Static objects of triangles must carry their StaticMesh as user pointer, all others none. The
-/// user index of a moving body is its place in the order of addition.
+/// user index of a moving body is its place in the order of addition. What moves without being
+/// moved is a rigid body that is static and kinematic.
 class SoftContactWorld final : public btDiscreteDynamicsWorld {
  public:
   SoftContactWorld(btDispatcher* dispatcher, btBroadphaseInterface* broadphase,
@@ -44,6 +45,7 @@ class SoftContactWorld final : public btDiscreteDynamicsWorld {
   void integrateTransforms(btScalar seconds) override;
 
  private:
+  void note_depth(const btCollisionObject& body, const btCollisionObject& fixed);
   void repair_contacts(btPersistentManifold& manifold, double lowest_distance);
   void keep_steady_impulses(btPersistentManifold& manifold);
   void hold_face(btPersistentManifold& manifold, double lowest_distance);
@@ -61,9 +63,11 @@ class SoftContactWorld final : public btDiscreteDynamicsWorld {
 
   double max_depenetration_speed_;
   btSphereShape stand_in_{0.01};
-  /// Of each moving body, its centre of mass when it was last not deep in anything fixed.
+  /// Of each moving body, its centre of mass when it was last not deep in anything fixed, seen from
+  /// what it is deep in.
   std::vector<btVector3> clear_centres_;
   std::vector<bool> is_clear_;                         ///< Of each moving body in this step.
+  std::vector<btVector3> drifts_;                      ///< Velocities of what they are deep in.
   std::map<const btPersistentManifold*, Face> faces_;  ///< Only ever looked up.
   // Scratch of repair_contacts.
   std::vector<btManifoldPoint> rebuilt_;

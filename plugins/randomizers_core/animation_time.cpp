@@ -2,8 +2,6 @@
 #include "animation_time.h"
 
 #include <algorithm>
-#include <array>
-#include <charconv>
 #include <cmath>
 #include <memory>
 #include <set>
@@ -11,31 +9,13 @@
 #include "diorama/error.h"
 #include "diorama/joints.h"
 #include "diorama/node_pattern.h"
+#include "loader_support/asset_name.h"
 #include "sampling.h"
 
 namespace diorama {
 namespace {
 
 constexpr const char* kAtEnd[] = {"repeat", "ping_pong", "hold"};
-
-/// The asset as it is at a time.
-std::string name_at(const Animation& animation, double time_s) {
-  std::array<char, 512> digits{};  // enough for every number
-  const auto end =
-      std::to_chars(digits.data(), digits.data() + digits.size(), time_s, std::chars_format::fixed)
-          .ptr;
-  return animation.asset + "{time=" + std::string(digits.data(), end) + "}";
-}
-
-/// The name of an asset with another of its animations.
-std::string name_with(std::string asset, const std::string& animation) {
-  const std::size_t begin = asset.find("{animation=");
-  if (begin != std::string::npos) {
-    const std::size_t next = asset.find("}{", begin);
-    asset.erase(begin, next == std::string::npos ? next : next + 1 - begin);
-  }
-  return asset + "{animation=" + animation + "}";
-}
 
 /// What another time makes anew without a change: renderers would take it for another mesh.
 bool is_same(const std::shared_ptr<const Mesh>& a, const std::shared_ptr<const Mesh>& b) {
@@ -73,12 +53,17 @@ void AnimationTime::Params::visit(ParamVisitor& v) {
 AnimationTime::AnimationTime(Params params, Host& host) : params_(std::move(params)), host_(host) {}
 
 void AnimationTime::choose(Scene& scene, NodeId node, const std::string& animation) {
-  const std::string name = name_with(scene[node].animation->asset, animation);
+  const std::string name =
+      loader_support::named_with(scene[node].animation->asset, "animation", animation);
   if (name == scene[node].animation->asset) return;
-  Scene look;
-  const NodeId top = host_.load_asset(name, look, look.root());
-  if (!look[top].animation) throw Error(ErrorKind::Asset, name + ": does not move");
-  scene.edit(node).animation = look[top].animation;
+  auto known = known_.find(name);
+  if (known == known_.end()) {
+    Scene look;
+    const NodeId top = host_.load_asset(name, look, look.root());
+    if (!look[top].animation) throw Error(ErrorKind::Asset, name + ": does not move");
+    known = known_.emplace(name, *look[top].animation).first;
+  }
+  scene.edit(node).animation = known->second;
 }
 
 double AnimationTime::draw_time(const Animation& animation, NodeDraws& draws) const {
@@ -104,7 +89,7 @@ double AnimationTime::time_at(const Animation& animation, const Playing& playing
 }
 
 void AnimationTime::show(Scene& scene, NodeId node, double time_s) {
-  const std::string name = name_at(*scene[node].animation, time_s);
+  const std::string name = loader_support::named_at(scene[node].animation->asset, time_s);
   Scene look;
   const NodeId top = host_.load_asset(name, look, look.root());
   const std::string front = scene.path(node);
@@ -138,7 +123,7 @@ void AnimationTime::randomize(Scene& scene, const RandomizeContext& context, con
   });
 }
 
-void AnimationTime::play(Scene& scene, const ClipFrame& frame) {
+void AnimationTime::lead(Scene& scene, const ClipFrame& frame) {
   for (const Playing& playing : playing_) {
     if (!scene.contains(playing.node) || playing.speed == 0.0) continue;
     show(scene, playing.node, time_at(*scene[playing.node].animation, playing, frame.time_s()));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -32,7 +33,7 @@ class AnimationTime final : public Randomizer {
 
   AnimationTime(Params params, Host& host);
   void randomize(Scene& scene, const RandomizeContext& context, const Rng& rng) override;
-  void play(Scene& scene, const ClipFrame& frame) override;
+  void lead(Scene& scene, const ClipFrame& frame) override;
 
  private:
   /// An asset that was given a time at the last moment.
@@ -49,6 +50,7 @@ class AnimationTime final : public Randomizer {
   Params params_;
   Host& host_;
   std::vector<Playing> playing_;
+  std::map<std::string, Animation> known_;  ///< By the names of assets that were chosen.
 };
 
 }  // namespace diorama

@@ -5,6 +5,7 @@
 
 #include "diorama/error.h"
 #include "diorama/node_pattern.h"
+#include "loader_support/asset_name.h"
 #include "sampling.h"
 
 namespace diorama {
@@ -45,7 +46,7 @@ std::string RandomVariant::draw_name(const NodeDraws& draws) const {
   std::string name = params_.asset;
   for (const auto& [set, names] : sets_) {
     Rng own = draws.rng.fork(set);
-    name += "{" + set + "=" + names[own.index(names.size())] + "}";
+    name = loader_support::named_with(std::move(name), set, names[own.index(names.size())]);
   }
   return name;
 }

@@ -33,6 +33,7 @@ Component::~Component() = default;
 Loader::~Loader() = default;
 Randomizer::~Randomizer() = default;
 void Randomizer::play(Scene&, const ClipFrame&) {}
+void Randomizer::lead(Scene&, const ClipFrame&) {}
 Registrar::~Registrar() = default;
 
 std::vector<std::string> Loader::assets() const { return {}; }

@@ -29,6 +29,16 @@ void PhysicsBackend::reset(const Scene& scene) { do_reset(scene); }
 
 bool PhysicsBackend::do_advance_by(int, double) { return false; }
 
+void PhysicsBackend::do_carry(const Scene&, double) {}
+
+void PhysicsBackend::carry(const Scene& scene, double seconds) {
+  if (!(seconds > 0.0)) {
+    throw Error(ErrorKind::Internal, "PhysicsBackend::carry: expected a time above 0 s, found " +
+                                         std::to_string(seconds));
+  }
+  do_carry(scene, seconds);
+}
+
 void PhysicsBackend::advance(Scene& scene, int steps) { advance(scene, steps, step_seconds()); }
 
 void PhysicsBackend::advance(Scene& scene, int steps, double step_s) {

@@ -493,6 +493,62 @@ TEST_CASE("An animation plays in a clip, and flow goes with what bends", "[run]"
   CHECK(worst < 0.01);
 }
 
+TEST_CASE("What an animation moves pushes what is in its way", "[run]") {
+  const TemporaryFolder folder;
+  // From x = -1 to 1 in two seconds.
+  write_file(folder / "yard.usda", R"(#usda 1.0
+(
+    metersPerUnit = 1
+    upAxis = "Z"
+    timeCodesPerSecond = 24
+    startTimeCode = 0
+    endTimeCode = 48
+)
+def Cube "Floor"
+{
+    double3 xformOp:translate = (0, 0, -1)
+    float3 xformOp:scale = (4, 4, 1)
+    uniform token[] xformOpOrder = ["xformOp:translate", "xformOp:scale"]
+}
+def Cube "Pusher"
+{
+    double3 xformOp:translate.timeSamples = { 0: (-1, 0, 0.5), 48: (1, 0, 0.5) }
+    float3 xformOp:scale = (0.1, 2, 0.5)
+    uniform token[] xformOpOrder = ["xformOp:translate", "xformOp:scale"]
+}
+)");
+  std::string job = growing_job("{type: \"null\"}");
+  const auto replace = [&](const std::string& from, const std::string& to) {
+    job.replace(job.find(from), from.size(), to);
+  };
+  replace("[{type: shapes, shapes: [cube]}]",
+          "[{type: files, files: [yard.usda]}]\nenvironment: {colliders: triangle_mesh}");
+  replace(
+      "{type: files, files: [sheet.usda], name: sheet, under: /Assets, label: sheet, collider: "
+      "none,\n     gravity_disabled_chance: 1.0}",
+      "{type: shapes, shapes: [cube], name: box, under: /Assets, label: box}");
+  replace("offset: [0, 0, 2]", "scale: 0.1, offset: [-0.6, 0, 0.101]");
+  replace("look_at: [0, 0, 2]", "look_at: [0, 0, 0]");
+  replace("nodes: \"/Assets/**\", time_s: 0.25", "nodes: \"/Environment/**\", time_s: 0");
+  replace("physics: {type: none}\n", "");
+  replace("timeline: [{record: {fps: 12, seconds: 0.5}}]",
+          "timeline: [{record: {fps: 4, seconds: 1.5}}]");
+  write_file(folder / "job.yaml", job);
+  const Outcome outcome = run({"run", "job.yaml"}, folder.path());
+  INFO(outcome.errors);
+  REQUIRE(outcome.exit_code == 0);
+  const auto files = tree(folder / "out");
+  for (int frame = 0; frame < 6; ++frame) {
+    const StoredView view(files, "cam_0", frame);
+    REQUIRE(view.poses.size() == 1);
+    // The pusher's face is 0.1 m before its middle, the box's 0.1 m behind its own.
+    const double touching = -1.0 + frame / 4.0 + 0.1 + 0.1;
+    const double x = view.poses.begin()->second.translation().x();
+    CHECK(x > std::max(-0.6, touching) - 0.02);
+    CHECK(x < std::max(-0.6, touching) + 0.1);
+  }
+}
+
 TEST_CASE("Inspect lists the animations of a file of which a job chooses one", "[run]") {
   const TemporaryFolder folder;
   write_file(

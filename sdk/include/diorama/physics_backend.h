@@ -34,6 +34,10 @@ class DIORAMA_SDK_API PhysicsBackend : public Component {
   /// The same in steps of another length, in seconds above 0. Throws Error(Config) when the backend
   /// knows no length but its own.
   void advance(Scene& scene, int steps, double step_s);
+  /// Colliders that no rigid body holds go evenly, in the next `seconds` (above 0) of simulation,
+  /// to where the scene has them now, and push what is in their way; then they stand still. Shapes
+  /// stay those of the reset. Backends that cannot leave everything where the reset found it.
+  void carry(const Scene& scene, double seconds);
   virtual double step_seconds() const = 0;
   virtual PhysicsReport report() const = 0;
 
@@ -42,6 +46,7 @@ class DIORAMA_SDK_API PhysicsBackend : public Component {
   virtual void do_advance(int steps) = 0;                // steps > 0
   virtual bool do_advance_by(int steps, double step_s);  // false: takes none
   virtual void do_write_poses(Scene& scene) const = 0;
+  virtual void do_carry(const Scene& scene, double seconds);
 };
 
 }  // namespace diorama

@@ -38,6 +38,11 @@ class DIORAMA_SDK_API Randomizer : public Component {
   /// in order, the first one too, once physics has moved its bodies. Poses may change, but none of
   /// rigid bodies, and which mesh a node has. Nothing moves unless a randomizer does more.
   virtual void play(Scene& scene, const ClipFrame& frame);
+
+  /// The same before physics moves on to that frame, of every frame but the first. What goes by
+  /// time alone belongs here: colliders without a rigid body that it moves push bodies on their
+  /// way.
+  virtual void lead(Scene& scene, const ClipFrame& frame);
 };
 
 }  // namespace diorama

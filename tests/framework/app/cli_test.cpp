@@ -126,6 +126,17 @@ TEST_CASE("mistakes in job files end with code 3 and all of them are named", "[c
   CHECK(has(all.err, wrong.string() + ":4:34: cameras[0].width: expected an integer"));
   check_error(run_program("config " DIORAMA_SOURCE_DIR "/configs/smoke.yaml --set seed"), 2,
               "--set seed: expected key=value, for instance renderer.samples=64");
+  // What a component itself finds wrong has a place, too.
+  check_error(run_program("config " DIORAMA_SOURCE_DIR
+                          "/configs/smoke.yaml --set 'environments[0]={type: shapes, shapes: "
+                          "[cubee]}'"),
+              3,
+              "--set environments[0]={type: shapes, shapes: [cubee]}:1:1: environments[0]: loader "
+              "'shapes': unknown shape 'cubee'; did you mean 'cube'? (known: capsule, cone, "
+              "cylinder, sphere, cube)");
+  check_error(run_program("config " DIORAMA_SOURCE_DIR
+                          "/configs/object_based_default.yaml --set num_frame=3"),
+              3, "--set num_frame=3:1:1: unknown key 'num_frame'; did you mean 'num_frames'?");
 }
 
 TEST_CASE("config prints a job that means the same again", "[cli]") {

@@ -55,6 +55,8 @@ TEST_CASE("--set reaches keys, indices and named entries", "[config]") {
   CHECK(value.find("writers")->list[1].find("debug")->is_quoted);
   CHECK(value.find("writers")->list[1].find("level")->scalar == "3");
   CHECK(value.find("renderer")->find("samples")->place.file == "--set renderer.samples=64");
+  CHECK(value.find("renderer")->find("nested")->key_place.file ==
+        "--set renderer.nested.key=[a, {b: 1}]");
 }
 
 TEST_CASE("--set says which part does not fit", "[config]") {

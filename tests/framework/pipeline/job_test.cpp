@@ -89,6 +89,9 @@ TEST_CASE("Mistakes that make a job pointless are named", "[job]") {
   CHECK_THAT(
       complaints_about(with(good, "on: [floating, dropped]", "on: [floting]")),
       ContainsSubstring("randomizers[1].on: unknown moment 'floting'; did you mean 'floating'?"));
+  // Which moments there are is not known then.
+  CHECK_THAT(complaints_about(with(good, "capture: floating", "captur: floating")),
+             ContainsSubstring("timeline") && !ContainsSubstring("unknown moment"));
   CHECK_THAT(complaints_about(with(good, "name: clutter", "name: targets")),
              ContainsSubstring("objects[1]: another entry is called 'targets'"));
   CHECK_THAT(complaints_about(with(good, "name: orbit", "name: poses")),

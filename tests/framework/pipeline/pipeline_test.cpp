@@ -32,6 +32,8 @@ struct Script {
   std::function<void(const std::string& who, int visit)> at = [](const std::string&, int) {};
   /// What the randomizer does to a frame of a clip.
   std::function<void(Scene& scene, const ClipFrame& frame)> play = [](Scene&, const ClipFrame&) {};
+  std::function<void(Scene& scene, const ClipFrame& frame)> lead = [](Scene&, const ClipFrame&) {};
+  std::function<void(const Scene& scene, double seconds)> carry = [](const Scene&, double) {};
   bool has_bodies = false;  ///< Rooms are rigid bodies.
   std::mutex mutex;
   std::vector<std::string> faults;
@@ -98,6 +100,7 @@ class Movers final : public Randomizer {
     }
   }
   void play(Scene& scene, const ClipFrame& frame) override { script_.play(scene, frame); }
+  void lead(Scene& scene, const ClipFrame& frame) override { script_.lead(scene, frame); }
 
  private:
   Script& script_;
@@ -124,6 +127,7 @@ class Pusher final : public PhysicsBackend {
     taken_ += steps;
     script_.at("physics", visit_);
   }
+  void do_carry(const Scene& scene, double seconds) override { script_.carry(scene, seconds); }
   void do_write_poses(Scene& scene) const override {
     if (visit_of(scene) != visit_) script_.fault("the physics changed visits");
     scene.set_pose(scene.require("/Lights/lamp_0"), Transform{{0.0, 0.0, double(taken_)}});
@@ -615,6 +619,32 @@ TEST_CASE("A clip that the job's end cuts short begins as the whole one", "[pipe
   }
   CHECK(same == 7);
   CHECK(has_first);
+}
+
+TEST_CASE("Who leads a clip does so before physics goes on to a frame", "[pipeline]") {
+  Script script;
+  std::string told;
+  const auto height = [](const Scene& scene) {
+    return std::to_string(int(scene[scene.require("/Environment")].parent_from_node(2, 3)));
+  };
+  script.lead = [&](Scene& scene, const ClipFrame& frame) {
+    scene.set_pose(scene.require("/Environment"), Transform{{0, 0, double(frame.frame)}});
+    told += " lead " + std::to_string(frame.frame);
+  };
+  script.carry = [&](const Scene& scene, double seconds) {
+    CHECK(seconds == Approx(0.1));
+    told += " carry " + height(scene);
+  };
+  script.play = [&](Scene& scene, const ClipFrame& frame) {
+    told += " play " + std::to_string(frame.frame) + " " + height(scene);
+  };
+  Run run(script, 1, 1, kClipJob);
+  run.options.only = first_captures(4);
+  run.go();
+  CHECK_THAT(told, ContainsSubstring(" play 0 0 lead 1 carry 1 play 1 1 lead 2 carry 2 play 2 2"));
+  script.has_bodies = true;
+  Run with_body(script, 1, 1, kClipJob);
+  CHECK_THROWS_WITH(with_body.go(), ContainsSubstring("moves rigid bodies while a clip plays"));
 }
 
 TEST_CASE("Who plays a clip may move neither bodies nor shapes", "[pipeline]") {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "framework/replicator/object_based.h"
 
+#include <algorithm>
+
 #include "diorama/error.h"
 #include "framework/config/value_text.h"
 #include "framework/config/yaml_config.h"
@@ -225,6 +227,15 @@ TEST_CASE("What has no effect is named, what is unknown is refused", "[replicato
   CHECK_THAT(complaints_about("resolution: [640.5, 480]"),
              ContainsSubstring("resolution: expected [width, height] in whole pixels"));
   CHECK_THAT(complaints_about("num_frames: many"), ContainsSubstring("num_frames"));
+  // One mistake, one complaint.
+  for (const char* text :
+       {"working_area_size: [4, -4, 3]", "working_area_size: 4", "resolution: 640",
+        "resolution: [0, 480]", "shape_distractors_types: cube"}) {
+    const std::string complaints = complaints_about(text);
+    INFO(complaints);
+    CHECK(std::ranges::count(complaints, '\n') == 1);
+    CHECK_THAT(complaints, ContainsSubstring("found"));
+  }
   CHECK_THAT(complaints_about("writer_type: [a]"),
              ContainsSubstring("writer_type: expected a name"));
   CHECK_THAT(complaints_about("{num_frames: 3, capture: {}}"),

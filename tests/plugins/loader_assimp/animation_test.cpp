@@ -273,6 +273,42 @@ std::string three_animations(const std::string& first, const std::string& second
                 animation("Stand", 6, 7) + R"(], "scenes": [{"nodes": [0]}])");
 }
 
+/// An FBX file as text: a triangle that goes along x as that of walk_and_run() does.
+std::string walk_and_run_fbx() {
+  std::string objects, connections;
+  int id = 10;
+  const auto array = [](const char* name, const std::string& numbers, int count) {
+    return std::string(name) + ": *" + std::to_string(count) + " {\na: " + numbers + "\n}\n";
+  };
+  const auto add = [&](const std::string& name, int x, int end_s) {
+    const std::string stack = std::to_string(id), layer = std::to_string(id + 1);
+    const std::string node = std::to_string(id + 2), curve = std::to_string(id + 3);
+    id += 10;
+    const std::string end = std::to_string(46186158000 * end_s);
+    objects += "AnimationStack: " + stack + ", \"AnimStack::" + name +
+               "\", \"\" {\nProperties70:  {\nP: \"LocalStop\", \"KTime\", \"Time\", \"\"," + end +
+               "\n}\n}\nAnimationLayer: " + layer +
+               ", \"AnimLayer::\", \"\" {\n}\nAnimationCurveNode: " + node +
+               ", \"AnimCurveNode::T\", \"\" {\n}\nAnimationCurve: " + curve +
+               ", \"AnimCurve::\", \"\" {\n" + array("KeyTime", "0," + end, 2) +
+               array("KeyValueFloat", "0," + std::to_string(x), 2) +
+               array("KeyAttrFlags", "24836", 1) + array("KeyAttrDataFloat", "0,0,0,0", 4) +
+               array("KeyAttrRefCount", "2", 1) + "}\n";
+    connections += "C: \"OO\"," + layer + "," + stack + "\nC: \"OO\"," + node + "," + layer +
+                   "\nC: \"OP\"," + node + ",2, \"Lcl Translation\"\nC: \"OP\"," + curve + "," +
+                   node + ", \"d|X\"\n";
+  };
+  add("Walk", 1, 2);
+  add("Run", 5, 1);
+  return "; FBX 7.4.0 project file\nFBXHeaderExtension:  {\nFBXVersion: 7400\n}\nGlobalSettings:  "
+         "{\n"
+         "Properties70:  {\nP: \"UnitScaleFactor\", \"double\", \"Number\", \"\",100\n}\n}\n"
+         "Objects:  {\nGeometry: 1, \"Geometry::\", \"Mesh\" {\n" +
+         array("Vertices", "0,0,0,1,0,0,0,1,0", 9) + array("PolygonVertexIndex", "0,1,-3", 3) +
+         "}\nModel: 2, \"Model::Mover\", \"Mesh\" {\n}\n" + objects +
+         "}\nConnections:  {\nC: \"OO\",2,0\nC: \"OO\",1,2\n" + connections + "}\n";
+}
+
 double x_of(const LoadedFile& loaded) {
   double x = -1.0;
   for (const NodeId node : loaded.scene.subtree(loaded.root)) {
@@ -334,12 +370,17 @@ TEST_CASE("animations are told with names and lengths", "[loader_assimp]") {
 
 TEST_CASE("other formats choose among animations likewise", "[loader_assimp]") {
   const TemporaryFolder folder;
-  const std::string file =
-      folder.write("mover.x", test::walk_and_run("3; 0;0;0;, 1;0;0;, 0;1;0;; 1; 3;0,1,2;;"));
-  CHECK(x_of(LoadedFile(file + "{time=1}")) == Approx(0.5));
-  CHECK(x_of(LoadedFile(file + "{animation=Run}{time=0.5}")) == Approx(2.5));
-  CHECK(x_of(LoadedFile(file + "{animation=1}{time=1}")) == Approx(5.0));
-  CHECK_THROWS_WITH(LoadedFile(file + "{animation=run}"), ContainsSubstring("did you mean 'Run'?"));
+  const std::string files[] = {
+      folder.write("mover.x", test::walk_and_run("3; 0;0;0;, 1;0;0;, 0;1;0;; 1; 3;0,1,2;;")),
+      folder.write("mover.fbx", walk_and_run_fbx())};
+  for (const std::string& file : files) {
+    CAPTURE(file);
+    CHECK(x_of(LoadedFile(file + "{time=1}")) == Approx(0.5));
+    CHECK(x_of(LoadedFile(file + "{animation=Run}{time=0.5}")) == Approx(2.5));
+    CHECK(x_of(LoadedFile(file + "{animation=1}{time=1}")) == Approx(5.0));
+    CHECK_THROWS_WITH(LoadedFile(file + "{animation=run}"),
+                      ContainsSubstring("did you mean 'Run'?"));
+  }
 }
 
 }  // namespace diorama::loader_assimp

@@ -186,3 +186,89 @@ TEST_CASE("velocities are those of the node's origin, wherever the mass is", "[p
   }
   CHECK(has_turned);
 }
+
+TEST_CASE("what is carried pushes bodies, lifts them and stands still again", "[physics]") {
+  BulletBackend::Params params;
+  params.step_seconds = 1.0 / 100.0;
+  PhysicsWorld world(params);
+  world.add_floor();
+  // A wall of triangles, a lift, and what asleep lies on it.
+  Mesh plate = make_box(Vec3(0.1, 2, 2));
+  const NodeId wall = world.add("wall", shared(plate), ColliderShape::TriangleMesh, at(-1, 0, 1));
+  const NodeId lift =
+      world.add_primitive("lift", PrimitiveShape::Box, Vec3(1, 1, 0.1), at(5, 0, 1));
+  const NodeId ball = add_ball(world, "ball", at(-0.7, 0, 0.05));
+  // It rubs on the floor, and is thinner than the way that the wall takes.
+  const NodeId block =
+      world.add_primitive("block", PrimitiveShape::Box, Vec3(0.1, 0.2, 0.2), at(-0.7, 0.5, 0.1));
+  world.make_body(block);
+  const NodeId load =
+      world.add_primitive("load", PrimitiveShape::Box, Vec3(0.2, 0.2, 0.2), at(5, 0.2, 1.15));
+  world.make_body(load);
+  world.backend.reset(world.scene);
+  world.backend.advance(world.scene, 300);
+  CHECK(world.backend.report().sleeping_bodies == 3);
+  CHECK(world.position(load).z() == Approx(1.15).margin(2e-3));
+  // In frames of 4 steps: 1 m/s, and the lift rises and turns.
+  double deepest = 0.0;
+  for (int frame = 1; frame <= 25; ++frame) {
+    world.scene.set_pose(wall, at(-1 + 0.04 * frame, 0, 1));
+    world.scene.set_pose(
+        lift, at(5, 0, 1 + 0.02 * frame) * Eigen::AngleAxisd(0.04 * frame, Vec3::UnitZ()));
+    world.backend.carry(world.scene, 0.04);
+    world.backend.advance(world.scene, 3);
+    world.backend.advance(world.scene, 1);
+    const double face = -1 + 0.04 * frame + 0.05;
+    if (face > -0.7) CHECK(world.position(block).x() == Approx(face + 0.05).margin(0.01));
+    deepest = std::max(deepest, -1 + 0.04 * frame + 0.05 + 0.05 - world.position(ball).x());
+  }
+  CHECK(deepest < 0.015);
+  CHECK(world.position(ball).x() > 0.09);
+  CHECK(world.position(load).z() == Approx(1.65).margin(5e-3));
+  CHECK(world.scene[load].rigid_body->linear_velocity.z() == Approx(0.5).margin(0.05));
+  // It turned with the lift about the lift's middle.
+  CHECK((world.position(load) - Vec3(5 - 0.2 * std::sin(1.0), 0.2 * std::cos(1.0), 1.65)).norm() <
+        0.02);
+  // No more is carried: the ball rolls on, the load comes to rest on the lift.
+  world.backend.advance(world.scene, 1000);
+  CHECK(world.position(load).z() == Approx(1.65).margin(2e-3));
+  CHECK(world.position(ball).x() > 0.2);
+  CHECK(world.backend.report().sleeping_bodies == 3);
+}
+
+TEST_CASE("what is carried does so alike each time, and not at all where nothing moved",
+          "[physics]") {
+  PhysicsWorld world;
+  const NodeId wall =
+      world.add_primitive("wall", PrimitiveShape::Box, Vec3(0.1, 2, 2), at(-1, 0, 1));
+  world.add_floor();
+  std::vector<NodeId> balls;
+  for (int i = 0; i < 8; ++i) {
+    balls.push_back(
+        add_ball(world, "ball" + std::to_string(i), at(-0.6 + 0.02 * i, 0, 0.1 + 0.12 * i)));
+  }
+  const auto run = [&](double speed, bool carries) {
+    world.scene.set_pose(wall, at(-1, 0, 1));
+    for (std::size_t i = 0; i < balls.size(); ++i) {
+      world.scene.set_pose(balls[i], at(-0.6 + 0.02 * double(i), 0, 0.1 + 0.12 * double(i)));
+      world.scene.set_velocity(balls[i], Vec3::Zero(), Vec3::Zero());
+    }
+    world.backend.reset(world.scene);
+    for (int frame = 1; frame <= 30; ++frame) {
+      world.scene.set_pose(wall, at(-1 + speed * frame / 30.0, 0, 1));
+      if (carries) world.backend.carry(world.scene, 1.0 / 30.0);
+      world.backend.advance(world.scene, 2);
+    }
+    std::vector<double> places;
+    for (const NodeId ball : balls) {
+      const Vec3 place = world.position(ball);
+      places.insert(places.end(), place.data(), place.data() + 3);
+    }
+    return places;
+  };
+  CHECK(run(1.0, true) == run(1.0, true));
+  CHECK(run(1.0, true) != run(0.0, true));
+  CHECK(run(0.0, true) == run(0.0, false));
+  CHECK_THROWS_WITH(world.backend.carry(world.scene, 0.0),
+                    ContainsSubstring("expected a time above 0 s"));
+}

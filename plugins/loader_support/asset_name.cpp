@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "loader_support/asset_time.h"
+#include "loader_support/asset_name.h"
 
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <filesystem>
@@ -43,6 +44,24 @@ TimedAsset split_time(std::string_view asset) {
   if (const auto word = take("{animation=")) result.animation = *word;
   result.file = rest;
   return result;
+}
+
+std::string named_with(std::string asset, std::string_view key, std::string_view word) {
+  const std::string begin = "{" + std::string(key) + "=";
+  const std::size_t known = asset.find(begin);
+  if (known != std::string::npos) {
+    const std::size_t end = asset.find('}', known);
+    asset.erase(known, end == std::string::npos ? end : end + 1 - known);
+  }
+  return asset + begin + std::string(word) + "}";
+}
+
+std::string named_at(std::string asset, double seconds) {
+  std::array<char, 512> digits{};  // enough for every number
+  const auto end =
+      std::to_chars(digits.data(), digits.data() + digits.size(), seconds, std::chars_format::fixed)
+          .ptr;
+  return named_with(std::move(asset), "time", {digits.data(), end});
 }
 
 }  // namespace diorama::loader_support

@@ -22,6 +22,13 @@ struct TimedAsset {
   std::string timeless() const;
 };
 
+/// The name of an asset as another one is made of it: "mug.usd" and "look", "red" give
+/// "mug.usd{look=red}". What it says of the same thing goes.
+std::string named_with(std::string asset, std::string_view key, std::string_view word);
+
+/// The name of an asset as it is at a time.
+std::string named_at(std::string asset, double seconds);
+
 /// "walker.glb{animation=run}{time=1.5}" in its parts, of which the last two may be left out. A
 /// file that has such a name is a file. Throws Error(Asset) that begins with the asset's name.
 TimedAsset split_time(std::string_view asset);
