@@ -342,7 +342,7 @@ Capture Conversion::converted(const ConversionSource& source, StoredCapture stor
       if (is_annotation(name) || frame.has(name)) continue;
       const std::string_view twin = twin_of(name);
       const bool can_derive = !twin.empty() && frame.has(twin);
-      if (!can_derive) refuse_capture(source.folder, stored, frame.camera_name);
+      if (!can_derive) refuse_capture(source.folder, stored, frame.camera_name, name);
       derive_distance(name, frame);
     }
     if (frame.camera_path.empty()) frame.camera_path = "/Cameras/" + frame.camera_name;
@@ -363,18 +363,20 @@ Capture Conversion::converted(const ConversionSource& source, StoredCapture stor
 }
 
 void refuse_capture(const std::filesystem::path& folder, const StoredCapture& stored,
-                    const std::string& camera) {
+                    const std::string& camera, const std::string& lacking) {
   const Finding* reason = nullptr;
   for (const Finding& finding : stored.log.findings) {
     const bool is_missing = finding.check == kNothingIsMissing;
     if (!finding.camera.empty() && !camera.empty() && finding.camera != camera) continue;
     if (!reason || (reason->check == kNothingIsMissing && !is_missing)) reason = &finding;
   }
-  const std::string where = (folder / (reason ? reason->file : ".")).string();
-  throw Error(ErrorKind::Asset,
-              where + ": " + (reason ? reason->found : "does not hold what its dataset holds") +
-                  " (capture " + std::to_string(stored.capture.index) +
-                  (camera.empty() ? "" : ", " + camera) + ")");
+  const std::string where = (reason ? folder / reason->file : folder).string();
+  const std::string none =
+      "does not hold " + (lacking.empty() ? "what its dataset holds" : lacking) +
+      (lacking == kInstanceId.name ? ": masks overlap, or an object has none" : "");
+  throw Error(ErrorKind::Asset, where + ": " + (reason ? reason->found : none) + " (capture " +
+                                    std::to_string(stored.capture.index) +
+                                    (camera.empty() ? "" : ", " + camera) + ")");
 }
 
 }  // namespace diorama

@@ -50,8 +50,9 @@ class Conversion {
 };
 
 /// Throws Error(Asset) that names the file whose fault it is that a frame lacks something: one that
-/// cannot be read rather than one that is not there. `camera` may be empty.
+/// cannot be read rather than one that is not there. `camera`, and `lacking`, the channel that is
+/// not there, may be empty.
 [[noreturn]] void refuse_capture(const std::filesystem::path& folder, const StoredCapture& stored,
-                                 const std::string& camera);
+                                 const std::string& camera, const std::string& lacking = {});
 
 }  // namespace diorama

@@ -15,7 +15,14 @@ using Halves [[gnu::vector_size(16)]] = std::uint64_t;
 template <std::size_t kStride>
 Lanes load(const std::uint8_t* from) {
   std::uint32_t pixel = 0;
-  std::memcpy(&pixel, from, kStride);
+  if constexpr (kStride == 3) {
+    // A copy of three bytes goes through memory in two parts, for which the processor waits.
+    std::uint16_t low = 0;
+    std::memcpy(&low, from, sizeof low);
+    pixel = low | std::uint32_t(from[2]) << 16;
+  } else {
+    std::memcpy(&pixel, from, kStride);
+  }
   std::uint64_t spread = pixel;
   spread = (spread | spread << 16) & 0x0000FFFF0000FFFFu;
   spread = (spread | spread << 8) & 0x00FF00FF00FF00FFu;

@@ -141,7 +141,10 @@ class TableReader {
   void add_annotation(JsonSpan span, const Json& json) {
     if (json.contains("id")) ids_.push_back(whole_number<std::int64_t>(json.at("id")));
     annotations_.push_back({whole_number<std::int64_t>(json.at("image_id")), span});
-    tables_.has_masks = tables_.has_masks || json.contains("segmentation");
+    // Others leave the list empty where they have boxes alone.
+    const auto mask = json.find("segmentation");
+    const bool has_mask = mask != json.end() && (page_ || !mask->empty());
+    tables_.has_masks = tables_.has_masks || has_mask;
     tables_.has_amodal = tables_.has_amodal || json.contains("amodal");
     tables_.has_nodes = tables_.has_nodes || json.contains("node");
     tables_.has_keypoints = tables_.has_keypoints || json.contains("keypoints");

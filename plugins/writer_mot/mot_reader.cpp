@@ -45,6 +45,7 @@ struct Sequence {
   std::string split;
   std::string pictures = "img1";
   std::string ending = ".jpg";
+  std::size_t digits = 6;  ///< Of the pictures' names.
   int length = 0;
   double fps = 30.0;
   int width = 0;  ///< 0: not said.
@@ -52,7 +53,7 @@ struct Sequence {
   std::map<int, std::vector<TrackLine>> lines;  ///< By frame, from 1.
 
   std::string picture(int frame) const {
-    return folder + "/" + pictures + "/" + zero_padded(frame, 6) + ending;
+    return folder + "/" + pictures + "/" + zero_padded(frame, digits) + ending;
   }
 };
 
@@ -105,12 +106,25 @@ class MotDataset final : public StoredDataset {
     sequence.folder = name;
     sequence.split = split;
     read_page_of(sequence, files);
-    if (sequence.length == 0) {
-      const auto pictures = names_in(folder_ / name / sequence.pictures);
-      sequence.length = int(std::min<std::size_t>(pictures.size(), kMostFrames));
-    }
+    if (!page_) look_at_pictures(sequence);
     read_lines(sequence, files);
     sequences_.push_back(std::move(sequence));
+  }
+
+  /// Others may number their pictures with more digits.
+  void look_at_pictures(Sequence& sequence) const {
+    const auto pictures = names_in(folder_ / sequence.folder / sequence.pictures);
+    if (sequence.length == 0) {
+      sequence.length = int(std::min<std::size_t>(pictures.size(), kMostFrames));
+    }
+    for (const std::string& name : pictures) {
+      const fs::path path(name);
+      const std::string stem = path.stem().string();
+      const bool is_number = stem.find_first_not_of("0123456789") == stem.npos;
+      if (path.extension() != sequence.ending || !is_number) continue;
+      sequence.digits = stem.size();
+      return;
+    }
   }
 
   void read_page_of(Sequence& sequence, StoredFiles& files) {
@@ -169,7 +183,9 @@ class MotDataset final : public StoredDataset {
         const int track = integer_of(words[1]);
         TrackLine object;
         object.line = number;
-        object.track = std::uint32_t(track);
+        // Others may count tracks from 0, which is no id.
+        const int first = page_ ? 1 : 0;
+        object.track = std::uint32_t(track) + std::uint32_t(1 - first);
         for (std::size_t k = 0; k < 4; ++k) object.box[k] = number_of(words[2 + k]);
         object.number = words.size() > 7 ? integer_of(words[7]) : 1;
         if (words.size() > 8) object.seen = number_of(words[8]);
@@ -180,8 +196,9 @@ class MotDataset final : public StoredDataset {
                     "1 to " + std::to_string(sequence.length) + ", as many as there are");
         files.check(known.emplace(frame, object.track).second, kOnce, file, who,
                     "the track " + words[1] + " is in frame " + words[0] + " twice");
-        files.check(track >= 1, kIds, file, who, "its track is " + words[1], "1 or more");
-        if (number_of(words[6]) != 0.0 && track >= 1) {
+        files.check(track >= first, kIds, file, who, "its track is " + words[1],
+                    std::to_string(first) + " or more");
+        if (number_of(words[6]) != 0.0 && track >= first) {
           sequence.lines[frame].push_back(object);
         }
       });

@@ -180,6 +180,14 @@ bool is_pose_file(const Json& json) {
          json.contains("objects");
 }
 
+Json clip_entry(const Json& json) {
+  Json entry = Json::object();
+  for (const char* key : {"clip", "frame_index", "time_s"}) {
+    if (json.contains(key)) entry[key] = json.at(key);
+  }
+  return entry;
+}
+
 StoredPoseFile parse_pose_file(const std::string& text, int width, int height) {
   const Json json = parse_stored_json(text);
   if (!is_pose_file(json)) {
@@ -229,6 +237,7 @@ StoredPoseFile parse_pose_file(const std::string& text, int width, int height) {
   const Json& objects = json.at("objects");
   if (objects.size() > kMostObjects) throw std::runtime_error("has too many objects");
   for (const Json& object : objects) file.objects.push_back(pose_of(object, file));
+  file.clip = clip_entry(json);
   return file;
 }
 

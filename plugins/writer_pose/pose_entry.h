@@ -50,7 +50,11 @@ struct StoredPoseFile {
   Mat4 view = Mat4::Identity();          ///< World to camera.
   std::vector<Vec3> sides;               ///< Of the keypoints: -1, 0 or 1 along each axis.
   std::vector<StoredPose> objects;
+  Json clip = Json::object();  ///< What it says of its place in a clip, by the writer's keys.
 };
+
+/// The keys of a file that say its place in a clip, as far as they are there.
+Json clip_entry(const Json& json);
 
 /// The size of the picture, 0 where it is not known, fills in for files that do not say it. Throws
 /// std::runtime_error or a JSON exception that says what is wrong.

@@ -10,6 +10,7 @@
 #include <span>
 #include "diorama/error.h"
 #include "reader_support/capture_rows.h"
+#include "reader_support/clip_list.h"
 #include "reader_support/dataset_page.h"
 #include "reader_support/frame_reading.h"
 #include "reader_support/picture_list.h"
@@ -41,6 +42,7 @@ std::vector<std::string> said_cameras(const fs::path& folder) {
 struct RunPage {
   std::vector<std::string> cameras;
   int captures = 0;
+  std::vector<DatasetClip> clips;
 };
 
 std::optional<RunPage> page_of_run(const fs::path& folder) {
@@ -50,7 +52,8 @@ std::optional<RunPage> page_of_run(const fs::path& folder) {
           parse_stored_json(read_whole_file(place / "dataset.json", std::uintmax_t(256) << 20));
       if (!page.is_object() || !page.contains("writers") || !page.contains("cameras")) continue;
       RunPage run{page.at("cameras").get<std::vector<std::string>>(),
-                  whole_number<int>(page.at("captures"))};
+                  whole_number<int>(page.at("captures")),
+                  clips_of_json(page.value("clips", Json::array()))};
       constexpr int kMostCaptures = 10'000'000;
       if (run.cameras.empty() || run.captures < 0 || run.captures > kMostCaptures) continue;
       return run;
@@ -70,6 +73,38 @@ std::optional<int> number_of(const std::string& stem) {
   }
   return number;
 }
+
+/// What a file says of its place in a clip, when nothing else does.
+struct ClipPlace {
+  int clip = 0;
+  int frame = 0;
+  double time_s = 0.0;
+
+  /// Nothing when it cannot be.
+  static std::optional<ClipPlace> of(const Json& entry) {
+    try {
+      const ClipPlace place{whole_number<int>(entry.at("clip")),
+                            whole_number<int>(entry.at("frame_index")),
+                            entry.at("time_s").get<double>()};
+      const bool is_first = place.frame == 0;
+      const bool can_be = place.clip >= 0 && place.frame >= 0 && std::isfinite(place.time_s) &&
+                          (is_first ? place.time_s == 0.0 : place.time_s > 0.0);
+      return can_be ? std::optional(place) : std::nullopt;
+    } catch (const std::exception&) {
+      return std::nullopt;
+    }
+  }
+
+  /// With the place of a file that is `captures` before: time grows evenly in a clip, and a new one
+  /// begins after the last.
+  bool goes_on(const ClipPlace& before, int captures) const {
+    if (clip != before.clip) return clip > before.clip && frame < captures;
+    const int steps = frame - before.frame;
+    const double off = time_s * before.frame - before.time_s * frame;
+    return steps >= 0 && steps <= captures && std::abs(off) <= 1e-8 * (frame + before.frame) &&
+           (steps > 0 || time_s == before.time_s);
+  }
+};
 
 struct PoseFrame {
   std::string stem;
@@ -161,6 +196,8 @@ class PoseDataset final : public StoredDataset {
                   "its number is there a second time");
     });
     number_captures(run ? run->captures : 0);
+    has_page_ = run.has_value();
+    if (run) clips_ = run->clips;
     if (overlay_ending_.empty()) return;
     for (const std::string& stem : lacking_) {
       files.find(kMissing, stem + "_overlay" + overlay_ending_, "", "the drawing is not there",
@@ -192,6 +229,7 @@ class PoseDataset final : public StoredDataset {
                    std::string(kHoldsNodePaths), std::string(kHoldsOcclusion),
                    std::string(kHoldsCamera),    std::string(kHoldsCameraPose)};
     if (!overlay_ending_.empty()) info_.holds.emplace(kOverlays);
+    note_clips(clips_, info_);
     info_.steps[std::string(kHoldsOcclusion)] = 5.1e-4;
     // The view matrix has five decimals.
     info_.steps[std::string(kHoldsCameraPose)] = 2e-4;
@@ -252,6 +290,24 @@ class PoseDataset final : public StoredDataset {
     return file;
   }
 
+  /// The place in a clip of the same camera's file before this one, and how many captures before.
+  std::optional<std::pair<ClipPlace, int>> place_before(const PoseFrame& frame) const {
+    const auto first = std::ranges::lower_bound(frames_, frame.capture, {}, &PoseFrame::capture);
+    const auto before =
+        std::find_if(std::make_reverse_iterator(first), frames_.rend(),
+                     [&](const PoseFrame& other) { return other.camera == frame.camera; });
+    if (before == frames_.rend()) return std::nullopt;
+    ReadLog ignored;
+    StoredFiles files(folder_, host_, ignored);
+    const std::string table = folders_[before->folder] + before->stem + ".json";
+    std::optional<ClipPlace> place;
+    if (const auto text = files.text(table)) {
+      files.reading(table, [&] { place = ClipPlace::of(clip_entry(parse_stored_json(*text))); });
+    }
+    if (!place) return std::nullopt;
+    return std::pair(*place, frame.capture - before->capture);
+  }
+
   static double slack_of(const StoredPoseFile& file, const StoredPose& object) {
     if (object.size) return 1e-3 + 0.01 * object.size->norm();
     return 1.5 / std::min(file.camera.fx, file.camera.fy);
@@ -286,6 +342,8 @@ class PoseDataset final : public StoredDataset {
   std::vector<PoseFrame> frames_;
   std::vector<std::size_t> first_;  ///< Per capture, and one behind the last.
   std::vector<std::string> cameras_;
+  bool has_page_ = false;             ///< Of a run.
+  std::vector<DatasetClip> clips_;    ///< By that page.
   std::vector<std::string> lacking_;  ///< Stems without a drawing.
   std::string overlay_ending_;        ///< Empty: there are no drawings.
   bool has_layout_ = false;
@@ -330,11 +388,20 @@ class PoseFrameReading : private FrameReading {
     if (!file) return std::move(frame_);
     file_ = std::move(*file);
     read_camera();
+    check_clip();
     for (const StoredPose& object : file_.objects) add_object(object);
     for (const std::string_view held : {kHoldsInstances, kHoldsCamera, kHoldsCameraPose}) {
       sources.emplace(held, table_);
     }
     return std::move(frame_);
+  }
+
+  /// What the file says of its place in a clip, which is the same for all cameras of the capture.
+  const Json& clip() const { return file_.clip; }
+  void compare_clip(const Json& other) {
+    files_.check(file_.clip == other, kCounts, table_, "",
+                 "its place in a clip is " + file_.clip.dump(),
+                 other.dump() + ", as by other cameras");
   }
 
   /// With the other cameras of the capture.
@@ -415,6 +482,22 @@ class PoseFrameReading : private FrameReading {
       frame_.set(kColorHdr, std::move(light));
       sources.emplace(kColorHdr.name, file);
     });
+  }
+
+  void check_clip() {
+    if (dataset_.has_page_) {
+      check_clip_frame(file_.clip, dataset_.clips_, of_.capture, files_, table_, "");
+      return;
+    }
+    if (file_.clip.empty()) return;
+    const auto place = ClipPlace::of(file_.clip);
+    files_.check(place.has_value(), kCounts, table_, "",
+                 "its place in a clip is " + file_.clip.dump(),
+                 "clip, frame_index and time_s, which grows from 0 with the frame");
+    const auto before = place ? dataset_.place_before(of_) : std::nullopt;
+    files_.check(!before || place->goes_on(before->first, before->second), kCounts, table_, "",
+                 "its place in a clip, " + file_.clip.dump() + ", does not follow the one before",
+                 "the next frame, or a new clip");
   }
 
   void read_camera() {
@@ -725,11 +808,14 @@ class PoseFrameReading : private FrameReading {
 StoredCapture PoseDataset::read(std::size_t i, const NameSet& wanted) const {
   const auto frames = std::span(frames_).subspan(first_.at(i), first_.at(i + 1) - first_[i]);
   SeenLocations locations;
-  return read_frames(info_.captures.at(i), {}, frames,
+  std::optional<Json> clip;
+  return read_frames(info_.captures.at(i), clips_, frames,
                      [&](const PoseFrame& frame, StoredCapture& stored, FrameSources& sources) {
                        PoseFrameReading reading(*this, frame, wanted, stored.log);
                        auto result = reading.read(sources);
                        if (is_right_) reading.compare(locations);
+                       if (result && clip && !has_page_) reading.compare_clip(*clip);
+                       if (result && !clip) clip = reading.clip();
                        return result;
                      });
 }

@@ -144,6 +144,38 @@ TEST_CASE("COCO masks that overlap are boxes still, but no picture of ids", "[re
   CHECK(opened.dataset->read(0, {std::string(kHoldsTightBoxes)}).masks.empty());
 }
 
+TEST_CASE("COCO boxes without masks, whose lists are empty, are no picture of ids", "[readers]") {
+  const test::TemporaryFolder folder;
+  folder.write("train/a.png", picture(20, 20, 9, ImageFormat::Png));
+  folder.write("train/_annotations.coco.json", R"({"images": [{"id": 0, "file_name": "a.png",
+    "width": 20, "height": 20}], "categories": [{"id": 1, "name": "box"}], "annotations": [
+    {"id": 0, "image_id": 0, "category_id": 1, "bbox": [1, 1, 8, 8], "segmentation": []}]})");
+  const Opened opened(folder, "CocoReader");
+  CHECK(opened.read(0).capture.frames.at(0).instances.size() == 1);
+  CHECK_FALSE(opened.holds(kInstanceId.name));
+}
+
+TEST_CASE("MOT sequences whose pictures have eight digits and whose tracks count from 0",
+          "[readers]") {
+  const test::TemporaryFolder folder;
+  const std::string sequence = "val/dancetrack0004/";
+  folder.write(sequence + "img1/00000001.jpg", picture(40, 30, 90, ImageFormat::Jpeg));
+  folder.write(sequence + "img1/00000002.jpg", picture(40, 30, 30, ImageFormat::Jpeg));
+  folder.write(sequence + "seqinfo.ini",
+               "[Sequence]\nname=dancetrack0004\nimDir=img1\nframeRate=20\nseqLength=2\n"
+               "imWidth=40\nimHeight=30\nimExt=.jpg\n");
+  folder.write(sequence + "gt/gt.txt",
+               "1,0,3,4,8,12,1,1,1\n2,0,4,4,8,12,1,1,1\n2,1,20,4,8,12,1,1,1\n");
+  const Opened opened(folder, "MotReader");
+  REQUIRE(opened.dataset->info().captures.size() == 2);
+  CHECK(opened.read(0).capture.frames.at(0).has(kColor.name));
+  const StoredCapture second = opened.read(1);
+  const Frame& last = second.capture.frames.at(0);
+  REQUIRE(last.instances.size() == 2);
+  CHECK(last.instances[0].id == opened.read(0).capture.frames.at(0).instances.at(0).id);
+  CHECK(last.instances[0].id != last.instances[1].id);
+}
+
 TEST_CASE("Faults of a foreign COCO file are told with what they are about", "[readers]") {
   const test::TemporaryFolder folder;
   folder.write("images/a.png", picture(20, 20, 9, ImageFormat::Png));

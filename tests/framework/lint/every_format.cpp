@@ -171,7 +171,8 @@ std::vector<SampleFormat> formats_of_clips() {
   KittiWriter::Params tracking;
   tracking.layout = "tracking";
   return {format<BasicWriter>("basic", everything()), format<CocoWriter>("coco", videos),
-          format<KittiWriter>("kitti", tracking), format<MotWriter>("mot")};
+          format<KittiWriter>("kitti", tracking), format<MotWriter>("mot"),
+          format<PoseWriter>("pose")};
 }
 
 }  // namespace diorama::test

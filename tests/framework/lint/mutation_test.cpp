@@ -773,8 +773,27 @@ TEST_CASE("tracks, videos and clips of a run are held against each other", "[lin
         })},
        {"a track of a video is gone", "coco/youtube_vis/*.json",
         json([](Json& page) { page["annotations"].erase(0); })},
+       {"the time of a file of PoseWriter", "pose/*2.json",
+        json([](Json& page) { page["time_s"] = 0.5 * page["time_s"].get<double>(); })},
        {"frames per second of the run", "dataset.json",
         json([](Json& page) { page["clips"][0]["fps"] = 20.0; })}});
+}
+
+TEST_CASE("times of PoseWriter grow evenly with the frames, and are the same for all cameras",
+          "[lint][mutation]") {
+  const DatasetOnDisk run = clip_on_disk("pose");
+  run.remove("dataset.json");
+  const auto with = [](const char* key, const Json& value) {
+    return json([=](Json& page) { page[key] = value; });
+  };
+  const char* last = "pose/*5.json";
+  check_all_found(
+      run, {{"a time that is not that of other cameras", "pose/*2.json", with("time_s", 0.2)},
+            {"a time that is no multiple of the frame's", last, with("time_s", 0.25)},
+            {"a time before the clip", last, with("time_s", -0.1)},
+            {"no time", last, with("time_s", nullptr)},
+            {"a frame beyond the next one", last, with("frame_index", 5)},
+            {"a clip that begins with a later frame", last, with("clip", 1)}});
 }
 
 TEST_CASE("levels, areas and keypoints are held against shares of other writers",
