@@ -29,6 +29,40 @@ function frustum(frame: FrameLabels, length: number): Vec[] | null {
   return [mapped(frame.world_from_camera, [0, 0, 0]), at(0, 0), at(frame.width, 0), at(0, frame.height), at(frame.width, frame.height)];
 }
 
+interface Name {
+  text: string;
+  x: number;  // of its left end
+  y: number;  // of its base line
+  isChosen: boolean;
+}
+
+/** Each in a place of its own, above or below where it belongs: the cameras of a rig are close to each other.
+ * What finds none is left out. */
+function drawNames(context: CanvasRenderingContext2D, names: Name[], width: number, height: number): void {
+  const kLine = 15;
+  const colours = getComputedStyle(context.canvas);
+  const taken: { left: number; right: number; y: number }[] = [];
+  context.lineJoin = 'round';
+  for (const name of [...names].sort((a, b) => Number(b.isChosen) - Number(a.isChosen))) {
+    if (name.text === '' || name.x < 0 || name.x > width || name.y < 0 || name.y > height) continue;
+    context.font = `${name.isChosen ? 600 : 400} 12px system-ui, sans-serif`;
+    const length = context.measureText(name.text).width;
+    const left = Math.max(3, Math.min(name.x, width - length - 3));
+    const isFree = (y: number): boolean => y >= kLine && y <= height - 4 &&
+      taken.every((other) => Math.abs(other.y - y) >= kLine || other.right < left || other.left > left + length);
+    let y = Math.max(kLine, Math.min(name.y, height - 4));
+    const steps = 2 * Math.ceil(height / kLine);
+    for (let i = 1; i <= steps && !isFree(y); ++i) y = name.y + kLine * Math.ceil(i / 2) * (i % 2 === 1 ? -1 : 1);
+    if (!isFree(y)) continue;
+    taken.push({ left, right: left + length + 4, y });
+    context.strokeStyle = colours.getPropertyValue('--panel');
+    context.lineWidth = 3;
+    context.strokeText(name.text, left, y);
+    context.fillStyle = colours.getPropertyValue('--text');
+    context.fillText(name.text, left, y);
+  }
+}
+
 export class SpaceView {
   readonly canvas = el('canvas', { class: 'space', tabindex: '0', role: 'img' });
   private eye!: Eye;
@@ -175,6 +209,7 @@ export class SpaceView {
     }
     context.stroke();
 
+    const names: Name[] = [];
     this.labels.frames.forEach((frame, i) => {
       const points = frustum(frame, 0.16 * extent);
       if (!points) return;
@@ -196,9 +231,7 @@ export class SpaceView {
       for (const [from, to] of [[a, b], [b, d], [d, c], [c, a]]) line(from, to);
       context.stroke();
       const [x, y] = project(eye);
-      context.fillStyle = colours.getPropertyValue('--text');
-      context.font = '12px system-ui, sans-serif';
-      context.fillText(frame.camera, x + 6, y - 6);
+      names.push({ text: frame.camera, x: x + 6, y: y - 6, isChosen: i === this.state.frame });
       for (const spot of [eye, a, b, c, d]) {
         const [sx, sy] = project(spot);
         this.spots.push({ x: sx, y: sy, frame: i, object: null });
@@ -215,10 +248,9 @@ export class SpaceView {
       const [x, y] = project(centre);
       this.spots.push({ x, y, frame: box.frame, object: object.id });
       if (isChosen(box) || boxes.length <= 12) {
-        context.fillStyle = colours.getPropertyValue('--text');
-        context.font = `${isChosen(box) ? 600 : 400} 12px system-ui, sans-serif`;
-        context.fillText(object.class, x + 4, y);
+        names.push({ text: object.class, x: x + 4, y, isChosen: isChosen(box) });
       }
     }
+    drawNames(context, names, width, height);
   }
 }
