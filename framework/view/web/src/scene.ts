@@ -36,10 +36,11 @@ interface Name {
   isChosen: boolean;
 }
 
-/** Each in a place of its own, above or below where it belongs: the cameras of a rig are close to each other.
- * What finds none is left out. */
+/** Each in a place of its own, with a line to where it belongs when that was taken: the cameras of a rig are close to
+ * each other. What finds none is left out. */
 function drawNames(context: CanvasRenderingContext2D, names: Name[], width: number, height: number): void {
   const kLine = 15;
+  const kGap = 6;
   const colours = getComputedStyle(context.canvas);
   const taken: { left: number; right: number; y: number }[] = [];
   context.lineJoin = 'round';
@@ -54,7 +55,15 @@ function drawNames(context: CanvasRenderingContext2D, names: Name[], width: numb
     const steps = 2 * Math.ceil(height / kLine);
     for (let i = 1; i <= steps && !isFree(y); ++i) y = name.y + kLine * Math.ceil(i / 2) * (i % 2 === 1 ? -1 : 1);
     if (!isFree(y)) continue;
-    taken.push({ left, right: left + length + 4, y });
+    taken.push({ left: left - kGap, right: left + length + kGap, y });
+    if (y !== name.y) {
+      context.strokeStyle = colours.getPropertyValue('--quiet');
+      context.lineWidth = 1;
+      context.beginPath();
+      context.moveTo(name.x - 4, name.y + 2);
+      context.lineTo(left + 2, y < name.y ? y + 2 : y - 9);
+      context.stroke();
+    }
     context.strokeStyle = colours.getPropertyValue('--panel');
     context.lineWidth = 3;
     context.strokeText(name.text, left, y);
