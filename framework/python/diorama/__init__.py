@@ -437,9 +437,7 @@ class Dataset(Sequence[Capture]):
         return f"<diorama.Dataset {self.folder}: {self.format}, {len(self)} captures, {len(self.cameras)} cameras>"
 
     def _crowd_below_px(self) -> int:
-        """The parameter of CocoWriter, which its datasets state."""
-        if self.format != "COCO":
-            return 0
+        """Of how few pixels the dataset's page says that they are a crowd."""
         try:
             below = json.loads(pathlib.Path(self.folder, "dataset.json").read_bytes())["conventions"]["crowd_below_px"]
         except (OSError, ValueError, KeyError, TypeError):  # there is no page, or it is somebody else's
