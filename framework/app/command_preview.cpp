@@ -1,16 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "framework/app/command_preview.h"
 
+#include <unistd.h>
+
 #include <cstdio>
 #include <iostream>
-#include <system_error>
+#include <string>
 
-#include "diorama/error.h"
 #include "framework/app/standard_output.h"
 #include "framework/config/clean_text.h"
 #include "framework/host/replace_file.h"
 #include "framework/jobs/job_file.h"
 #include "framework/jobs/trial_run.h"
+#include "framework/output/file_system.h"
 
 namespace diorama {
 namespace {
@@ -31,13 +33,10 @@ int command_preview(const GlobalOptions& global, const PreviewOptions& options, 
   trial_options.max_samples = options.samples;
   trial_options.keeps_pictures = true;
   const Value job = load_job(options.job, log.sink());
+  LocalFileSystem file_system;
+  require_writable(file_system, options.folder, std::to_string(::getpid()));
   const Trial trial = run_trial(global, job, trial_options, log.sink());
-  std::error_code error;
-  fs::create_directories(options.folder, error);
-  if (error) {
-    throw Error(ErrorKind::Output,
-                "cannot create " + options.folder.string() + ": " + error.message());
-  }
+  file_system.make_folders(options.folder);
   for (const TrialPicture& picture : trial.pictures) {
     const fs::path file = options.folder / file_name(picture);
     replace_file(file, picture.png);

@@ -309,4 +309,26 @@ bool LocalFileSystem::is_locked(const fs::path& file) {
   return open && ::fcntl(open->handle(), F_OFD_GETLK, &whole) == 0 && whole.l_type != F_UNLCK;
 }
 
+void require_writable(FileSystem& file_system, const fs::path& folder, const std::string& name) {
+  const fs::path whole = fs::absolute(folder).lexically_normal();
+  fs::path existing = whole;
+  while (!file_system.exists(existing) && existing.has_relative_path()) {
+    existing = existing.parent_path();
+  }
+  if (existing.filename().empty() && existing.has_parent_path()) existing = existing.parent_path();
+  const fs::path trial = existing / (".diorama-write-test-" + name);
+  try {
+    file_system.make_folders(trial);
+  } catch (const Error& error) {
+    // Nobody asked for the trial: the message is about the folder that was asked for.
+    const std::string text = error.what();
+    const std::size_t at = text.find(trial.string());
+    if (at == text.npos) throw;
+    throw Error(error.kind(), (existing == whole ? "cannot write into the folder "
+                                                 : "cannot create the folder ") +
+                                  folder.string() + text.substr(at + trial.string().size()));
+  }
+  file_system.remove_if_empty(trial);
+}
+
 }  // namespace diorama

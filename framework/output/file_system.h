@@ -126,4 +126,9 @@ class LocalFileSystem final : public FileSystem {
   bool is_locked(const std::filesystem::path& file) override;
 };
 
+/// Throws Error(Output) that names `folder` unless it, or what is missing of its path, can be made
+/// and written. What is there stays as it is; `name` tells trials of several processes apart.
+void require_writable(FileSystem& file_system, const std::filesystem::path& folder,
+                      const std::string& name);
+
 }  // namespace diorama

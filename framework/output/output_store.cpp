@@ -282,29 +282,6 @@ void OutputStore::say(const std::string& text) const {
 
 // Joining and leaving.
 
-/// The folder for files that are to come can be made and written.
-void OutputStore::probe(const fs::path& target) {
-  fs::path existing = fs::absolute(target).lexically_normal();
-  while (!file_system_.exists(existing) && existing.has_relative_path()) {
-    existing = existing.parent_path();
-  }
-  if (existing.filename().empty() && existing.has_parent_path()) existing = existing.parent_path();
-  const fs::path trial = existing / (".diorama-write-test-" + options_.self.name);
-  try {
-    file_system_.make_folders(trial);
-  } catch (const Error& error) {
-    // Nobody asked for the trial: the message is about the folder that was asked for.
-    const std::string text = error.what();
-    const std::size_t at = text.find(trial.string());
-    if (at == text.npos) throw;
-    const bool is_there = existing == fs::absolute(target).lexically_normal();
-    throw Error(error.kind(),
-                (is_there ? "cannot write into the folder " : "cannot create the folder ") +
-                    target.string() + text.substr(at + trial.string().size()));
-  }
-  file_system_.remove_if_empty(trial);
-}
-
 /// A stranger's dataset could lead our files and removals elsewhere.
 void OutputStore::refuse_links() const {
   const fs::path top = diorama_folder();
@@ -347,7 +324,8 @@ void OutputStore::check_folder() {
                     "complete it, or choose another --output");
   }
   if (options_.existing == Existing::Resume && is_there) check_same_dataset();
-  for (const auto& writer : folders_.writers) probe(joined(folders_.base, writer.folder));
+  for (const auto& writer : folders_.writers)
+    require_writable(file_system_, joined(folders_.base, writer.folder), options_.self.name);
 }
 
 /// Living workers whose part overlaps with this one's.

@@ -209,7 +209,6 @@ class OutputStore {
   void refuse_links() const;
   void refuse_rivals();
   void check_same_dataset() const;
-  void probe(const std::filesystem::path& folder);
   void leave();
   void start_heart();
 

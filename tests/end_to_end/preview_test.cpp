@@ -118,4 +118,14 @@ TEST_CASE("What a trial meets ends it", "[preview]") {
   const Outcome dry = run({"run", "bad.yaml", "--dry-run"}, folder.path());
   CHECK(dry.exit_code == 5);
   CHECK_THAT(dry.errors, ContainsSubstring("room.usda"));
+
+  // Known before the work, which would have ended with the scene.
+  write_file(folder / "taken", "");
+  for (const char* place : {"taken", "taken/pictures"}) {
+    const Outcome nowhere = run({"preview", "bad.yaml", "--dir", place}, folder.path());
+    CHECK(nowhere.exit_code == 6);
+    CHECK_THAT(nowhere.errors, ContainsSubstring(std::string(place) + ": Not a directory\n"));
+  }
+  CHECK(run({"preview", "bad.yaml", "--dir", "new/pictures"}, folder.path()).exit_code == 5);
+  CHECK_FALSE(fs::exists(folder / "new"));
 }

@@ -47,6 +47,31 @@ async function newPage(scheme = 'light') {
 const hashOf = (page) => page.evaluate(() => location.hash);
 const captureOf = async (page) => Number(/#\/capture\/(\d+)/.exec(await hashOf(page))[1]);
 
+/** Cameras of a rig are close to each other: every name is to be read all the same, from wherever they are looked at. */
+async function namesInSpace(page) {
+  await page.evaluate(() => {
+    const { fillText } = CanvasRenderingContext2D.prototype;
+    window.namesDrawn = [];
+    CanvasRenderingContext2D.prototype.fillText = function (text, x, y) {
+      if (this.canvas.matches('.space')) window.namesDrawn.push({ text, left: x, right: x + this.measureText(text).width, y });
+      fillText.call(this, text, x, y);
+    };
+  });
+  const cameras = await page.locator('[aria-label="Cameras"] [role="tab"]').allTextContents();
+  let overlaps = 0;
+  let names = [];
+  for (const key of ['ArrowRight', 'ArrowUp', 'ArrowUp', 't', 'ArrowLeft']) {
+    await page.evaluate(() => (window.namesDrawn = []));
+    await page.keyboard.press(key);
+    names = await page.evaluate(() => window.namesDrawn);
+    for (const [i, a] of names.entries()) {
+      overlaps += names.slice(i + 1).filter((b) => Math.abs(a.y - b.y) < 12 && a.left < b.right && b.left < a.right).length;
+    }
+  }
+  const isThere = cameras.every((camera) => names.some(({ text }) => text === camera));
+  check(isThere && overlaps === 0, `names in space can be read (${names.length} of them, ${cameras.length} cameras)`);
+}
+
 /** Whoever opens the address of a page sees the same: what `read` says of it. */
 async function sameElsewhere(page, read, what) {
   // Addresses follow four times a second.
@@ -376,6 +401,7 @@ try {
     check(await page.locator('canvas.space').isVisible(), 'the 3-D view opens');
     check((await hashOf(page)).includes('space=1'), 'and stands in the address');
     await page.locator('canvas.space').focus();
+    await namesInSpace(page);
     for (let i = 0; i < 3; ++i) await page.keyboard.press('ArrowLeft');
     await page.keyboard.press('+');
     await sameElsewhere(page, (one) => one.locator('canvas.space').evaluate((canvas) => canvas.toDataURL()).then((url) => `${url.length} bytes, ${[...url].reduce((sum, c) => (sum * 31 + c.charCodeAt(0)) | 0, 0)}`),

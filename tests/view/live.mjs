@@ -48,8 +48,8 @@ try {
   const done = Number(/(\d+) of \d+/.exec(words)[1]);
   const last = await page.getAttribute('.last a', 'title');
   await page.waitForFunction((before) => Number(/(\d+) of \d+/.exec(document.querySelector('.page:not([hidden])').textContent)?.[1]) > before, done, { timeout: 120000 });
-  await page.waitForTimeout(4000);
-  check((await page.getAttribute('.last a', 'title')) !== last, 'last pictures follow');
+  await page.waitForFunction((before) => document.querySelector('.last a')?.title !== before, last, { timeout: 120000 });
+  check(true, 'last pictures follow');
   await page.getByRole('button', { name: 'Captures' }).click();
   const count = async () => Number(/of ([\d,]+)/.exec(await page.textContent('.total'))[1].replaceAll(',', ''));
   const before = await count();

@@ -62,7 +62,7 @@ await frames('dragging the scroll bar to the end', async () => {
 });
 await page.waitForTimeout(500);
 const clicks = [];
-for (const name of await page.locator('.facets .name').all().then((all) => all.slice(0, 5))) {
+for (const name of await page.locator('.facets .name').all().then((all) => all.slice(1, 6))) {  // the first is in every capture
   const start = performance.now();
   const total = await page.textContent('.total b');
   await name.click();

@@ -436,10 +436,21 @@ class Dataset(Sequence[Capture]):
     def __repr__(self) -> str:
         return f"<diorama.Dataset {self.folder}: {self.format}, {len(self)} captures, {len(self.cameras)} cameras>"
 
+    def _crowd_below_px(self) -> int:
+        """Of how few pixels the dataset's page says that they are a crowd."""
+        try:
+            below = json.loads(pathlib.Path(self.folder, "dataset.json").read_bytes())["conventions"]["crowd_below_px"]
+        except (OSError, ValueError, KeyError, TypeError):  # there is no page, or it is somebody else's
+            return 0
+        return below if isinstance(below, int) else 0
+
     def to_coco(self, taxonomy: str = "class") -> dict[str, Any]:
         """The boxes and masks of all frames as COCO's detection files have them; nothing is written. File names are
-        `<capture>_<camera>.png`. Masks are uncompressed run lengths, present where "instance_id" is held. Reads every capture."""
+        `<capture>_<camera>.png`. Masks are uncompressed run lengths, present where "instance_id" is held. Crowds (`iscrowd`)
+        are those of a dataset in COCO's format: the label "iscrowd", or fewer pixels than its page counts as objects. Reads
+        every capture."""
         names = list(self.classes)
+        crowd_below_px = self._crowd_below_px()
         images: list[dict[str, Any]] = []
         annotations: list[dict[str, Any]] = []
         for capture in self:
@@ -454,13 +465,14 @@ class Dataset(Sequence[Capture]):
                     if name not in names:
                         names.append(name)
                     x_min, y_min, x_max, y_max = instance.box
-                    annotation = {"id": len(annotations) + 1, "image_id": image["id"],
-                                  "category_id": names.index(name) + 1, "iscrowd": 0,
-                                  "bbox": [x_min, y_min, x_max - x_min, y_max - y_min],
-                                  "area": (x_max - x_min) * (y_max - y_min)}
+                    annotation: dict[str, Any] = {
+                        "id": len(annotations) + 1, "image_id": image["id"], "category_id": names.index(name) + 1,
+                        "iscrowd": int(instance.labels.get("iscrowd") == "1"),
+                        "bbox": [x_min, y_min, x_max - x_min, y_max - y_min], "area": (x_max - x_min) * (y_max - y_min)}
                     if frame.has_mask(instance):
                         mask = frame.mask(instance)
                         annotation["area"] = int(mask.sum())
+                        annotation["iscrowd"] |= int(annotation["area"] < crowd_below_px)
                         annotation["segmentation"] = _run_lengths(mask)
                     annotations.append(annotation)
         categories = [{"id": i + 1, "name": name} for i, name in enumerate(names)]

@@ -65,7 +65,8 @@ TEST_CASE("COCO as its own tools have it: polygons, crowds, overlaps, split fold
   CHECK(first.split == "val2017");
   const Frame& frame = first.capture.frames.at(0);
   REQUIRE(frame.instances.size() == 2);
-  CHECK(frame.instances[0].labels.at("class") == "dog");
+  CHECK(frame.instances[0].labels == Labels{{"class", "dog"}});
+  CHECK(frame.instances[1].labels == Labels{{"class", "person"}, {"iscrowd", "1"}});
   CHECK(*frame.instances[0].tight_box == PixelBox{3, 4, 14, 11});
   CHECK(*frame.instances[1].tight_box == PixelBox{20, 10, 22, 13});
   const auto& ids = frame.get(kInstanceId);

@@ -37,7 +37,8 @@ def setUpModule():
     global run, temporary
     temporary = tempfile.TemporaryDirectory()
     run = pathlib.Path(temporary.name) / "run"
-    subprocess.run([PROGRAM, "--log-level", "error", "run", JOB, "--output", run], check=True, capture_output=True)
+    subprocess.run([PROGRAM, "--log-level", "error", "run", JOB, "--output", run, "--set", "writers.3.crowd_below_px=30"],
+                   check=True, capture_output=True)
 
 
 def tearDownModule():
@@ -82,12 +83,12 @@ class Open(unittest.TestCase):
         pictures = {image["id"]: image for image in written["images"]}
         classes = {category["id"]: category["name"] for category in written["categories"]}
         theirs = {(pathlib.Path(pictures[a["image_id"]]["file_name"]).stem, classes[a["category_id"]],
-                   tuple(a["bbox"]), a["area"]) for a in written["annotations"]}
+                   tuple(a["bbox"]), a["area"], a["iscrowd"]) for a in written["annotations"]}
         made = dataset.to_coco()
         names = {category["id"]: category["name"] for category in made["categories"]}
         ours = {(pathlib.Path(made["images"][a["image_id"] - 1]["file_name"]).stem, names[a["category_id"]],
-                 tuple(a["bbox"]), a["area"]) for a in made["annotations"]}
-        self.assertTrue(theirs)
+                 tuple(a["bbox"]), a["area"], a["iscrowd"]) for a in made["annotations"]}
+        self.assertEqual({a["iscrowd"] for a in written["annotations"]}, {0, 1})
         self.assertLessEqual(theirs, ours)  # ours has those of both splits
         for annotation in made["annotations"]:
             counts = annotation["segmentation"]["counts"]
@@ -233,7 +234,8 @@ class Open(unittest.TestCase):
         corners = [(1, 2, 9, 10), (5, 5, 13, 13)]
         (folder / "annotations/instances_train.json").write_text(json.dumps({
             "images": [{"id": 1, "file_name": "a.png", "width": 30, "height": 20}], "categories": [{"id": 1, "name": "box"}],
-            "annotations": [{"id": i, "image_id": 1, "category_id": 1, "bbox": [a, b, c - a, d - b], "segmentation": [[a, b, c, b, c, d, a, d]]}
+            "annotations": [{"id": i, "image_id": 1, "category_id": 1, "bbox": [a, b, c - a, d - b], "iscrowd": i,
+                             "segmentation": [[a, b, c, b, c, d, a, d]]}
                             for i, (a, b, c, d) in enumerate(corners)]}))
         dataset = diorama.open(folder)
         frame = dataset[0].frames[0]
@@ -242,7 +244,8 @@ class Open(unittest.TestCase):
             expected = np.zeros((20, 30), bool)
             expected[b:d, a:c] = True
             np.testing.assert_array_equal(frame.mask(instance), expected)
-        self.assertEqual([each["area"] for each in dataset.to_coco()["annotations"]], [64, 64])
+        self.assertEqual([(each["area"], each["iscrowd"]) for each in dataset.to_coco()["annotations"]], [(64, 0), (64, 1)])
+        self.assertEqual([instance.labels for instance in frame.instances], [{"class": "box"}, {"class": "box", "iscrowd": "1"}])
         self.assertEqual(diorama.open(folder, wanted=["tight_boxes"])[0].frames[0].masks, {})
 
 

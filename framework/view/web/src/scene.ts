@@ -29,6 +29,49 @@ function frustum(frame: FrameLabels, length: number): Vec[] | null {
   return [mapped(frame.world_from_camera, [0, 0, 0]), at(0, 0), at(frame.width, 0), at(0, frame.height), at(frame.width, frame.height)];
 }
 
+interface Name {
+  text: string;
+  x: number;  // of its left end
+  y: number;  // of its base line
+  isChosen: boolean;
+}
+
+/** Each in a place of its own, with a line to where it belongs when that was taken: the cameras of a rig are close to
+ * each other. What finds none is left out. */
+function drawNames(context: CanvasRenderingContext2D, names: Name[], width: number, height: number): void {
+  const kLine = 15;
+  const kGap = 6;
+  const colours = getComputedStyle(context.canvas);
+  const taken: { left: number; right: number; y: number }[] = [];
+  context.lineJoin = 'round';
+  for (const name of [...names].sort((a, b) => Number(b.isChosen) - Number(a.isChosen))) {
+    if (name.text === '' || name.x < 0 || name.x > width || name.y < 0 || name.y > height) continue;
+    context.font = `${name.isChosen ? 600 : 400} 12px system-ui, sans-serif`;
+    const length = context.measureText(name.text).width;
+    const left = Math.max(3, Math.min(name.x, width - length - 3));
+    const isFree = (y: number): boolean => y >= kLine && y <= height - 4 &&
+      taken.every((other) => Math.abs(other.y - y) >= kLine || other.right < left || other.left > left + length);
+    let y = Math.max(kLine, Math.min(name.y, height - 4));
+    const steps = 2 * Math.ceil(height / kLine);
+    for (let i = 1; i <= steps && !isFree(y); ++i) y = name.y + kLine * Math.ceil(i / 2) * (i % 2 === 1 ? -1 : 1);
+    if (!isFree(y)) continue;
+    taken.push({ left: left - kGap, right: left + length + kGap, y });
+    if (y !== name.y) {
+      context.strokeStyle = colours.getPropertyValue('--quiet');
+      context.lineWidth = 1;
+      context.beginPath();
+      context.moveTo(name.x - 4, name.y + 2);
+      context.lineTo(left + 2, y < name.y ? y + 2 : y - 9);
+      context.stroke();
+    }
+    context.strokeStyle = colours.getPropertyValue('--panel');
+    context.lineWidth = 3;
+    context.strokeText(name.text, left, y);
+    context.fillStyle = colours.getPropertyValue('--text');
+    context.fillText(name.text, left, y);
+  }
+}
+
 export class SpaceView {
   readonly canvas = el('canvas', { class: 'space', tabindex: '0', role: 'img' });
   private eye!: Eye;
@@ -175,6 +218,7 @@ export class SpaceView {
     }
     context.stroke();
 
+    const names: Name[] = [];
     this.labels.frames.forEach((frame, i) => {
       const points = frustum(frame, 0.16 * extent);
       if (!points) return;
@@ -196,9 +240,7 @@ export class SpaceView {
       for (const [from, to] of [[a, b], [b, d], [d, c], [c, a]]) line(from, to);
       context.stroke();
       const [x, y] = project(eye);
-      context.fillStyle = colours.getPropertyValue('--text');
-      context.font = '12px system-ui, sans-serif';
-      context.fillText(frame.camera, x + 6, y - 6);
+      names.push({ text: frame.camera, x: x + 6, y: y - 6, isChosen: i === this.state.frame });
       for (const spot of [eye, a, b, c, d]) {
         const [sx, sy] = project(spot);
         this.spots.push({ x: sx, y: sy, frame: i, object: null });
@@ -215,10 +257,9 @@ export class SpaceView {
       const [x, y] = project(centre);
       this.spots.push({ x, y, frame: box.frame, object: object.id });
       if (isChosen(box) || boxes.length <= 12) {
-        context.fillStyle = colours.getPropertyValue('--text');
-        context.font = `${isChosen(box) ? 600 : 400} 12px system-ui, sans-serif`;
-        context.fillText(object.class, x + 4, y);
+        names.push({ text: object.class, x: x + 4, y, isChosen: isChosen(box) });
       }
     }
+    drawNames(context, names, width, height);
   }
 }
