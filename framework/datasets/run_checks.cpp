@@ -2,6 +2,7 @@
 #include "framework/datasets/run_checks.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -140,9 +141,17 @@ double misfit(const Affine& camera_from_box, const Aabb& box, const Affine& came
   return off.cwiseProduct(camera_from_box.linear().colwise().norm().transpose()).maxCoeff();
 }
 
-/// What two datasets say of the same objects beside their places.
+/// Channels of which few formats have any, so that the dataset that holds most may not.
+constexpr std::array kRareChannels{std::string_view(kNormals.name), std::string_view(kMotion.name),
+                                   std::string_view(kFlowForward.name),
+                                   std::string_view(kFlowBackward.name)};
+
+/// What two datasets say beside pictures and the places of objects.
 NameSet shared_facts(const StoredInfo& a, const StoredInfo& b) {
   NameSet facts;
+  for (const std::string_view channel : kRareChannels) {
+    if (a.holds.contains(channel) && b.holds.contains(channel)) facts.emplace(channel);
+  }
   const auto add = [&](std::string_view held, const char* asked) {
     if (!a.holds.contains(held)) return;
     if (b.holds.contains(held))
@@ -705,7 +714,12 @@ void compare_rest(const std::vector<RunDataset>& datasets, const RunDataset& ref
   for (const RunDataset& candidate : datasets) {
     if (&candidate == &reference || &candidate == &dataset) continue;
     NameSet facts = shared_facts(candidate.data->info(), dataset.data->info());
-    std::erase_if(facts, [&](const std::string& name) { return compared.contains(name); });
+    // Channels are compared with an earlier dataset, once.
+    const bool is_later = &candidate > &dataset;
+    std::erase_if(facts, [&](const std::string& name) {
+      const bool is_channel = std::ranges::find(kRareChannels, name) != kRareChannels.end();
+      return compared.contains(name) || (is_later && is_channel);
+    });
     if (facts.size() <= rest.size()) continue;
     rest = std::move(facts);
     third = &candidate;

@@ -588,6 +588,32 @@ TEST_CASE("lint finds what one writer's folder says against another's of the run
   CHECK(found >= all - 2);
 }
 
+TEST_CASE("normals are held against another writer's, also if the one that holds most has none",
+          "[lint][mutation]") {
+  const DatasetOnDisk run = run_on_disk({"bop"});
+  std::vector<const Capture*> captures;
+  for (const Capture& capture : test::sample_captures()) captures.push_back(&capture);
+  BasicWriter::Params params;
+  params.rgb = params.normals = true;
+  test::EncodingHost host;
+  BasicWriter writer(params, host);
+  const auto files =
+      test::write_dataset(writer, test::sample_dataset(test::SampleScene(8, 6)), captures);
+  std::vector<std::string> normals;
+  for (const auto& [path, bytes] : files.files) {
+    for (const std::string& file : {"one/" + path, "two/" + path}) {
+      std::filesystem::create_directories((run.folder() / file).parent_path());
+      run.write(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+    }
+    if (path.find("/normals_") != std::string::npos) normals.push_back("one/" + path);
+  }
+  REQUIRE_FALSE(is_found(run));
+  REQUIRE(normals.size() > 1);
+  REQUIRE(run.read(normals.front()) != run.read(normals.at(1)));
+  run.write(normals.front(), run.read(normals.at(1)));
+  CHECK(is_found(run));
+}
+
 TEST_CASE("3-D boxes are held against those of another writer of the run", "[lint][mutation]") {
   const DatasetOnDisk run = run_on_disk({"basic", "kitti"});
   REQUIRE_FALSE(is_found(run));
