@@ -3,7 +3,7 @@
 # What takes longer than CI may. Every part runs, whatever the others say; ends with a table, and with 1 when
 # one failed.
 #   tests/nightly.sh [PART]...   build mutants kills faults large cluster views clip soak fuzz sanitize tidy deb12 deb13 (default: all)
-# Needs root for cluster, deb12 and deb13. KILLS (1000), FAULTS (5000), VIEWS (1000), SOAK_CAPTURES (10000) and
+# Needs root for cluster, deb12 and deb13, and python3-scipy for clip. KILLS (1000), FAULTS (5000), VIEWS (1000), SOAK_CAPTURES (10000) and
 # FUZZ_MINUTES (60, shared by all fuzzers) say how much. Logs are in build/nightly.
 # DIORAMA_BUILD says where the build is (default: build/release, which the part build makes). The parts kills, faults,
 # large, views, clip, soak and fuzz need nothing else of a build: neither compilers nor the place where it was made.
