@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "diorama/writer.h"
+#include "framework/config/joined.h"
 #include "framework/config/json_text.h"
 #include "framework/config/yaml_config.h"
 #include "framework/datasets/conversion.h"
@@ -58,12 +59,19 @@ std::string free_name(const std::string& wanted, const std::vector<NamedWriter>&
 
 struct ChosenWriters {
   std::vector<NamedWriter> writers;
-  NameSet needs;
+  std::vector<Value> entries;                ///< What each of them was made of.
   OrderedJson pages = OrderedJson::array();  ///< For dataset.json.
+
+  NameSet needs() const {
+    NameSet all;
+    for (const NamedWriter& each : writers) all.merge(each.writer->needs());
+    return all;
+  }
 };
 
+constexpr std::array<std::string_view, 2> kKeys{"type", "name"};
+
 ChosenWriters make_writers(const std::vector<std::string>& texts, Registry& registry, Host& host) {
-  constexpr std::array<std::string_view, 2> kKeys{"type", "name"};
   ChosenWriters chosen;
   Diagnostics diagnostics;
   for (const std::string& text : texts) {
@@ -78,9 +86,9 @@ ChosenWriters make_writers(const std::vector<std::string>& texts, Registry& regi
       throw Error(ErrorKind::Usage, "--writer " + text + ": its name becomes a folder and may " +
                                         "neither begin with '.' nor hold '/'");
     }
-    chosen.needs.merge(writer->needs());
     chosen.pages.push_back({{"name", name}, {"type", type}, {"folder", name}});
     chosen.writers.push_back({name, std::move(writer)});
+    chosen.entries.push_back(entry);
   }
   diagnostics.raise();
   return chosen;
@@ -89,9 +97,64 @@ ChosenWriters make_writers(const std::vector<std::string>& texts, Registry& regi
 ConversionSource open_source(const fs::path& folder, const ConvertOptions& options,
                              DatasetReaders& readers, Host& host) {
   const FoundDataset found = find_dataset(folder, readers, options.reader);
-  ConversionSource source{found.folder, readers.open(found.folder, found.reader), {}};
+  ConversionSource source{found.folder, readers.open(found.folder, found.reader), {}, {}, {}};
   source.info = dataset_info_of(found.folder, *source.data, host);
   return source;
+}
+
+NameSet lacking_channels(const std::vector<ConversionSource>& sources, const NameSet& needs) {
+  NameSet all;
+  for (const ConversionSource& source : sources) all.merge(lacking_channels(source, needs));
+  return all;
+}
+
+/// Null where parameters do not go together.
+std::unique_ptr<Writer> writer_or_none(const Value& entry, Registry& registry, Host& host) {
+  Diagnostics ignored;
+  try {
+    return registry.make<Writer>(entry, "--writer", kKeys, ignored, host);
+  } catch (const Error&) {
+    return nullptr;
+  }
+}
+
+/// Where sources lack what a writer needs, switches its parameters off that need it: those that
+/// are on without being asked for. Returns what was done, a line for each writer.
+std::vector<std::string> go_without(ChosenWriters& chosen,
+                                    const std::vector<ConversionSource>& sources,
+                                    Registry& registry, Host& host) {
+  const bool have_boxes = std::ranges::all_of(sources, [](const ConversionSource& source) {
+    return source.holds.contains(kHoldsTightBoxes);
+  });
+  std::vector<std::string> notes;
+  for (std::size_t i = 0; i < chosen.writers.size(); ++i) {
+    NamedWriter& own = chosen.writers[i];
+    const NameSet lacking = lacking_channels(sources, own.writer->needs());
+    // Nothing but ids of pixels would tell where objects are.
+    if (lacking.empty() || (lacking.contains(kInstanceId.name) && !have_boxes)) continue;
+    Value& entry = chosen.entries[i];
+    NameSet rest = lacking;
+    std::string switched;
+    for (const ParamSpec& param :
+         registry.describe(ComponentKind::Writer, entry.find("type")->scalar)) {
+      const bool is_on = param.type == ParamType::Bool && param.default_value.scalar == "true";
+      if (rest.empty() || !is_on || entry.find(param.key)) continue;
+      Value without = entry;
+      without.set(param.key, Value::boolean(false));
+      auto writer = writer_or_none(without, registry, host);
+      if (!writer) continue;
+      NameSet still = lacking_channels(sources, writer->needs());
+      if (still.size() >= rest.size()) continue;
+      rest = std::move(still);
+      own.writer = std::move(writer);
+      entry = std::move(without);
+      switched += " " + param.key + "=false";
+    }
+    if (switched.empty()) continue;
+    notes.push_back("--writer " + own.name + ": is taken with" + switched + ", as not all of " +
+                    joined(lacking) + " is held");
+  }
+  return notes;
 }
 
 /// That of the run which the only source comes from, where there is one; else what readers know.
@@ -131,7 +194,10 @@ int command_convert(const GlobalOptions& global, const ConvertOptions& options, 
     formats.push_back(sources.back().data->info().format);
     sources.back().info.program_version = program_version();
   }
-  const Conversion conversion(std::move(sources), chosen.needs);
+  for (ConversionSource& source : sources) look_through(source, chosen.needs(), *services.host);
+  const auto switched = go_without(chosen, sources, *services.registry, *services.host);
+  const Conversion conversion(std::move(sources), chosen.needs());
+  for (const std::string& note : switched) log.write(LogLevel::Warning, note);
   for (const std::string& note : conversion.notes()) log.write(LogLevel::Warning, note);
 
   const DatasetInfo& info = conversion.info();

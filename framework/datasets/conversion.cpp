@@ -57,8 +57,22 @@ CoverageMask visible_mask(const Image<std::uint32_t>& ids, std::uint32_t id, con
   return mask;
 }
 
+/// Boxes that people drew may reach out of the picture.
+void clip_boxes(Frame& frame) {
+  for (Instance& instance : frame.instances) {
+    if (!instance.tight_box) continue;
+    const PixelBox inside = instance.tight_box->clipped(frame.camera.width, frame.camera.height);
+    if (inside.is_empty()) {
+      instance.tight_box.reset();
+    } else {
+      instance.tight_box = inside;
+    }
+  }
+}
+
 /// Boxes of pixels, and visibility as if nothing were hidden or cut off, where they are missing.
 void complete_instances(Frame& frame, const NameSet& needs) {
+  clip_boxes(frame);
   if (!frame.has(kInstanceId.name)) return;
   complete_boxes(frame);
   if (!needs.contains("visibility")) return;
@@ -169,7 +183,52 @@ std::string source_name(const ConversionSource& source) {
   return source.folder.string() + " (" + source.data->info().format + ")";
 }
 
+/// The first capture whose ids of pixels nobody can tell although its files are whole.
+struct IdGap {
+  bool is_there = false;
+  int capture = 0;
+};
+
+IdGap find_gap(const StoredCapture& stored) {
+  const bool is_damaged = std::ranges::any_of(stored.log.findings, [](const Finding& finding) {
+    return finding.check == kNothingIsMissing || finding.check == kFilesCanBeRead;
+  });
+  const bool has_all = std::ranges::all_of(
+      stored.capture.frames, [](const Frame& frame) { return frame.has(kInstanceId.name); });
+  return {!is_damaged && !has_all, stored.capture.index};
+}
+
 }  // namespace
+
+void look_through(ConversionSource& source, const NameSet& needs, Host& host) {
+  const StoredDataset& data = *source.data;
+  source.holds = data.info().holds;
+  // What a job made has a picture of ids; visibility that is not held is counted in it.
+  const bool uses_ids = needs.contains(kInstanceId.name) || needs.contains("visibility");
+  if (!uses_ids || !source.holds.contains(kInstanceId.name) || !source.info.resolved_job.empty()) {
+    return;
+  }
+  int gaps = 0;
+  int first = 0;
+  sweep_captures<IdGap>(data, NameSet{std::string(kInstanceId.name)}, host, find_gap,
+                        [&](const IdGap& gap) {
+                          if (gap.is_there && gaps++ == 0) first = gap.capture;
+                        });
+  if (gaps == 0) return;
+  source.holds.erase(std::string(kInstanceId.name));
+  source.why_no_ids = "masks overlap, or an object has none, in " + std::to_string(gaps) + " of " +
+                      std::to_string(data.info().captures.size()) + " captures, first in capture " +
+                      std::to_string(first);
+}
+
+NameSet lacking_channels(const ConversionSource& source, const NameSet& needs) {
+  NameSet missing;
+  for (const std::string& name : needs) {
+    if (is_annotation(name) || source.holds.contains(name)) continue;
+    if (!is_derivable(name, source.holds)) missing.insert(name);
+  }
+  return missing;
+}
 
 Conversion::Conversion(std::vector<ConversionSource> sources, NameSet needs)
     : sources_(std::move(sources)), needs_(std::move(needs)) {
@@ -184,8 +243,8 @@ Conversion::Conversion(std::vector<ConversionSource> sources, NameSet needs)
 }
 
 void Conversion::note_differences(const ConversionSource& source) {
-  const NameSet& holds = source.data->info().holds;
-  NameSet missing;
+  const NameSet& holds = source.holds;
+  NameSet missing = lacking_channels(source, needs_);
   NameSet derived;
   NameSet made_up;
   const auto is_annotation_held = [&](std::string_view name) {
@@ -194,16 +253,22 @@ void Conversion::note_differences(const ConversionSource& source) {
   for (const std::string& name : needs_) {
     if (is_annotation(name)) {
       if (!is_annotation_held(name)) made_up.insert(name);
-    } else if (!holds.contains(name)) {
-      (is_derivable(name, holds) ? derived : missing).insert(name);
+    } else if (!holds.contains(name) && !missing.contains(name)) {
+      derived.insert(name);
     }
   }
   if (!missing.empty() || made_up.contains("instances")) {
     if (made_up.contains("instances")) missing.emplace("instances");
-    throw Error(ErrorKind::Usage, source_name(source) + ": does not hold " + joined(missing) +
+    const std::string why = missing.contains(kInstanceId.name) && !source.why_no_ids.empty()
+                                ? " (" + source.why_no_ids + ")"
+                                : "";
+    throw Error(ErrorKind::Usage, source_name(source) + ": does not hold " + joined(missing) + why +
                                       ", which the writers need; it holds " + joined(holds));
   }
   const std::string who = source_name(source);
+  if (!source.why_no_ids.empty()) {
+    notes_.push_back(who + ": " + source.why_no_ids + "; no writer gets a mask");
+  }
   if (!derived.empty()) {
     notes_.push_back(who + ": " + joined(derived) + " comes from the other kind of distance");
   }
@@ -215,8 +280,19 @@ void Conversion::note_differences(const ConversionSource& source) {
                           : "lists of what hides an object are empty, whatever is hidden"));
   }
   if (!made_up.empty()) {
-    notes_.push_back(who + ": does not hold " + joined(made_up) +
-                     "; objects count as neither hidden nor cut off");
+    notes_.push_back(who + ": does not hold " + joined(made_up) + "; objects count as neither " +
+                     "hidden nor cut off" +
+                     (holds.contains(kInstanceId.name)
+                          ? ""
+                          : ", where a format cannot say that it is not known"));
+  }
+  const auto step = source.data->info().steps.find(kHoldsTightBoxes);
+  const bool has_drawn_boxes = step != source.data->info().steps.end() && step->second > 0.0 &&
+                               holds.contains(kHoldsTightBoxes);
+  if (has_drawn_boxes && needs_.contains("instances")) {
+    notes_.push_back(who +
+                     ": boxes are those of whole pixels inside the picture; others are rounded "
+                     "and cut off");
   }
   NameSet unknown;
   for (const std::string_view name : {kHoldsLabels, kHoldsPoses, kHoldsBounds, kHoldsCamera,
@@ -245,7 +321,7 @@ void Conversion::note_differences(const ConversionSource& source) {
 
 /// Frames of a clip are one only if its objects are known again.
 void Conversion::note_clips(ConversionSource& source) {
-  const NameSet& holds = source.data->info().holds;
+  const NameSet& holds = source.holds;
   const bool are_known = holds.contains(kHoldsTracks) || holds.contains(kHoldsNodePaths);
   if (source.info.clips.empty() || are_known || !needs_.contains("instances")) return;
   source.info.clips.clear();
@@ -302,7 +378,7 @@ void Conversion::unite_infos() {
 void Conversion::run(Host& host, const std::function<void(Capture)>& take) const {
   int number = 0;
   for (const ConversionSource& source : sources_) {
-    NameSet wanted = source.data->info().holds;
+    NameSet wanted = source.holds;
     for (const auto* channel : {&kDistanceToCamera, &kDistanceToImagePlane}) {
       const bool is_used =
           needs_.contains(channel->name) || needs_.contains(twin_of(channel->name));
@@ -314,7 +390,7 @@ void Conversion::run(Host& host, const std::function<void(Capture)>& take) const
           std::string_view("pointcloud")}) {
       if (!needs_.contains(name)) wanted.erase(std::string(name));
     }
-    const NameSet& holds = source.data->info().holds;
+    const NameSet& holds = source.holds;
     const bool counts_anew = !holds.contains(kHoldsTracks);
     const bool has_paths = holds.contains(kHoldsNodePaths) || !counts_anew;
     ClipNumbers numbers;
@@ -347,12 +423,10 @@ Capture Conversion::converted(const ConversionSource& source, StoredCapture stor
     }
     if (frame.camera_path.empty()) frame.camera_path = "/Cameras/" + frame.camera_name;
     if (needs_.contains("instances")) complete_instances(frame, needs_);
-    if (needs_.contains("occlusion_order") &&
-        !source.data->info().holds.contains("occlusion_order")) {
+    if (needs_.contains("occlusion_order") && !source.holds.contains("occlusion_order")) {
       frame.occlusions = order_of_masks(frame);
     }
-    if (source.data->info().holds.contains(kHoldsBounds)) continue;
-    if (source.data->info().holds.contains(kHoldsBoxes3d)) continue;
+    if (source.holds.contains(kHoldsBounds) || source.holds.contains(kHoldsBoxes3d)) continue;
     // What means nothing is a point, a number that every format can write; empty boxes are
     // infinite.
     for (Instance& instance : frame.instances) {

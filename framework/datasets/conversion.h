@@ -19,14 +19,25 @@ struct ConversionSource {
   std::filesystem::path folder;
   std::unique_ptr<const StoredDataset> data;
   DatasetInfo info;  ///< See dataset_info_of().
+  NameSet holds;     ///< What every capture holds, see look_through().
+  /// Empty, or why captures do not hold ids of pixels, although the dataset does.
+  std::string why_no_ids;
 };
+
+/// Fills in the source's last two fields. Where writers `need` ids of pixels and somebody else made
+/// the dataset, reads the masks of all its captures: they may overlap, or some object may have
+/// none.
+void look_through(ConversionSource& source, const NameSet& needs, Host& host);
+
+/// The channels among `needs` that the source neither holds nor tells by others.
+NameSet lacking_channels(const ConversionSource& source, const NameSet& needs);
 
 /// Stored captures as writers want them: those of one dataset, or of several one after the other,
 /// with new numbers, classes united and splits kept.
 class Conversion {
  public:
-  /// `needs` of all writers. Throws Error(Usage) when a source lacks a channel that cannot be
-  /// derived, or holds nothing.
+  /// Sources that were looked through, and `needs` of all writers. Throws Error(Usage) when a
+  /// source lacks a channel that cannot be derived, or holds nothing.
   Conversion(std::vector<ConversionSource> sources, NameSet needs);
 
   const DatasetInfo& info() const { return info_; }

@@ -67,6 +67,8 @@ std::optional<DatasetPage> read_dataset_page(const std::filesystem::path& folder
         if (index >= 0 && index < page.captures) page.split_of_capture.emplace(index, split);
       }
     }
+    const auto job = json.find("job");
+    page.is_rendered = job != json.end() && job->is_string() && *job != "";
     if (json.contains("clips")) page.clips = clips_of_json(json.at("clips"));
     return page;
   } catch (const std::runtime_error&) {

@@ -22,6 +22,7 @@ struct DatasetPage {
   std::map<int, std::string> split_of_capture;
   Json conventions = Json::object();  ///< An object always.
   std::vector<DatasetClip> clips;
+  bool is_rendered = false;  ///< A job made it; else it comes from somebody else's dataset.
 
   /// One picture per capture and camera.
   std::size_t picture_count() const { return std::size_t(captures) * cameras.size(); }

@@ -23,6 +23,9 @@ struct CocoCategory {
 /// The label that stands for all labels which are not in a list of categories.
 inline constexpr const char* kOtherCategory = "other";
 
+/// Labelled "1" by this name is what a dataset that no job made calls a crowd.
+inline constexpr const char* kCrowdLabel = "iscrowd";
+
 /// Replicator's `coco_categories`: label -> {name, id, supercategory, color, isthing}, of which
 /// name and id are required. The category "other" is added if it is not there. Empty for null.
 /// Throws Error(Config) that says where.

@@ -15,6 +15,7 @@
 #include "reader_support/frame_reading.h"
 #include "reader_support/listed_boxes.h"
 #include "reader_support/object_masks.h"
+#include "writer_coco/coco_categories.h"
 #include "writer_coco/coco_tables.h"
 #include "writer_support/cuboid.h"
 
@@ -332,6 +333,7 @@ class CocoImageReading : private FrameReading {
       read_keypoints(json, who, category->second, instance.id);
     }
     check_crowd(json, part_.file, who, crowd_below_px());
+    if (is_group(json)) instance.labels[kCrowdLabel] = "1";
     whos_.push_back(who);
     categories_.push_back(whole_number<std::int64_t>(json.at("category_id")));
     masks_.push_back(std::move(mask));
@@ -347,7 +349,17 @@ class CocoImageReading : private FrameReading {
     return is_there ? below->get<std::int64_t>() : 0;
   }
 
-  /// `below_px`: see crowd_below_px(); 0 where there are none.
+  bool can_have_groups() const { return !dataset_.page_ || !dataset_.page_->is_rendered; }
+
+  /// Said to be a crowd, and not for its few pixels.
+  bool is_group(const Json& json) const {
+    if (!can_have_groups() || json.value("iscrowd", Json(0)) != 1) return false;
+    const std::int64_t below_px = crowd_below_px();
+    return below_px == 0 || json.at("area").get<double>() >= double(below_px);
+  }
+
+  /// `below_px`: see crowd_below_px(); 0 where there are none. Datasets that were converted have
+  /// the crowds of their sources, too.
   void check_crowd(const Json& json, const std::string& file, const std::string& who,
                    std::int64_t below_px) {
     const auto crowd = json.find("iscrowd");
@@ -358,8 +370,9 @@ class CocoImageReading : private FrameReading {
       return;
     }
     const bool is_small = json.at("area").get<double>() < double(below_px);
-    files_.check(is_flag && (*crowd == 1) == is_small, kIds, file, who,
-                 "its iscrowd is " + crowd->dump(), is_small ? "1" : "0");
+    const bool holds = (*crowd == 1) == is_small || (*crowd == 1 && can_have_groups());
+    files_.check(is_flag && holds, kIds, file, who, "its iscrowd is " + crowd->dump(),
+                 is_small ? "1" : "0");
   }
 
   void check_box_inside(const std::string& who, const PixelBox& box) {

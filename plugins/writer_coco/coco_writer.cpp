@@ -44,6 +44,12 @@ Json keypoints_json(const Frame& frame, const Instance& instance,
   return list;
 }
 
+/// In the dataset that it comes from, as its reader labels it.
+bool was_crowd(const Instance& instance) {
+  const auto label = instance.labels.find(kCrowdLabel);
+  return label != instance.labels.end() && label->second == "1";
+}
+
 /// Who is in front of it where both lie, and in how many pixels.
 Json occluded_by_json(const Frame& frame, const Instance& instance) {
   Json list = Json::array();
@@ -234,6 +240,7 @@ TrainingParams with_categories(TrainingParams params, const std::vector<CocoCate
 
 void CocoWriter::Params::visit(ParamVisitor& v) {
   training.visit(v);
+  training.visit_masks(v);
   v.param("keypoints", keypoints,
           {"Keypoints: those that the job names for the objects of a class, else box centre and "
            "corners."});
@@ -270,6 +277,12 @@ CocoWriter::CocoWriter(Params params, Host& host)
                 params_.labels.choice(params_.training.taxonomy),
                 categories_.empty() ? "" : kOtherCategory) {
   params_.remote.check();
+  if (!params_.training.masks) {
+    if (params_.youtube_vis) {
+      throw Error(ErrorKind::Config, "youtube_vis has masks; 'masks: false' excludes it");
+    }
+    params_.amodal = params_.panoptic = false;
+  }
   if (!categories_.empty() && !params_.training.classes.empty()) {
     throw Error(ErrorKind::Config, "classes and coco_categories exclude each other");
   }
@@ -283,7 +296,8 @@ CocoWriter::CocoWriter(Params params, Host& host)
 }
 
 NameSet CocoWriter::needs() const {
-  NameSet names{std::string(kColor.name), std::string(kInstanceId.name), "instances"};
+  NameSet names{std::string(kColor.name), "instances"};
+  if (params_.training.masks) names.emplace(kInstanceId.name);
   if (params_.keypoints) names.emplace(kDistanceToCamera.name);
   if (params_.amodal) names.insert({"visibility", "amodal_mask", "occlusion_order"});
   return names;
@@ -333,6 +347,10 @@ void CocoWriter::begin(const DatasetInfo& dataset, DatasetFiles& files) {
       {"amodal.occluded_by",
        "objects nearer to the camera in pixels that both cover, seen or not, and how many pixels"},
       {"keypoint_visibility", "0 outside the image, 1 hidden, 2 visible"}};
+  if (!params_.training.masks) {
+    conventions.erase("segmentation");
+    conventions["area"] = "of the box";
+  }
   if (params_.crowd_below_px > 0) conventions["crowd_below_px"] = params_.crowd_below_px;
   training_.add_dataset_page("COCO", std::move(conventions), dataset, files);
 }
@@ -348,12 +366,16 @@ Json CocoWriter::segmentation_json(const Frame& frame, const Instance& instance,
 
 Json CocoWriter::annotation(const Frame& frame, const TrainingObject& object, int image_id) const {
   const Instance& instance = *object.instance;
-  const bool is_crowd = object.visible_px < params_.crowd_below_px;
-  Json json{
-      {"image_id", image_id},        {"category_id", category_id(object.class_index)},
-      {"iscrowd", is_crowd ? 1 : 0}, {"bbox", box_json(*instance.tight_box)},
-      {"area", object.visible_px},   {"segmentation", segmentation_json(frame, instance, is_crowd)},
-      {"node", instance.node_path}};
+  const bool is_crowd = object.visible_px < params_.crowd_below_px || was_crowd(instance);
+  Json json{{"image_id", image_id},
+            {"category_id", category_id(object.class_index)},
+            {"iscrowd", is_crowd ? 1 : 0},
+            {"bbox", box_json(*instance.tight_box)},
+            {"area", object.visible_px}};
+  if (params_.training.masks) {
+    json["segmentation"] = segmentation_json(frame, instance, is_crowd);
+  }
+  json["node"] = instance.node_path;
   if (params_.keypoints) {
     int count = 0;
     json["keypoints"] =
@@ -378,7 +400,7 @@ Json CocoWriter::panoptic_annotation(const Frame& frame, const std::vector<Train
                         {"category_id", category_id(object.class_index)},
                         {"area", object.visible_px},
                         {"bbox", box_json(*object.instance->tight_box)},
-                        {"iscrowd", 0}});
+                        {"iscrowd", was_crowd(*object.instance) ? 1 : 0}});
   }
   const auto& ids = frame.get(kInstanceId);
   Image<Rgba8> picture(ids.width(), ids.height(), {0, 0, 0, 255});

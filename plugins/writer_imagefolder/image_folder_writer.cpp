@@ -31,7 +31,9 @@ std::string card(const std::vector<std::string>& splits, const std::vector<std::
 }  // namespace
 
 NameSet ImageFolderWriter::needs() const {
-  return {std::string(kColor.name), std::string(kInstanceId.name), "instances", "visibility"};
+  NameSet names{std::string(kColor.name), "instances", "visibility"};
+  if (params_.training.masks) names.emplace(kInstanceId.name);
+  return names;
 }
 
 void ImageFolderWriter::begin(const DatasetInfo& dataset, DatasetFiles& files) {
@@ -51,6 +53,10 @@ std::string ImageFolderWriter::metadata_line(const Capture& capture, std::size_t
                {"area", Json::array()},
                {"id", Json::array()},
                {"visible_share", Json::array()}};
+  if (!params_.training.masks) {
+    objects.erase("area");
+    objects.erase("visible_share");
+  }
   for (const TrainingObject& object : training_.objects(frame)) {
     const Instance& instance = *object.instance;
     const PixelBox& box = *instance.tight_box;
@@ -58,8 +64,9 @@ std::string ImageFolderWriter::metadata_line(const Capture& capture, std::size_t
         instance.visibility ? instance.visibility->occlusion().value_or(0.0) : 0.0;
     objects["bbox"].push_back({box.x_min, box.y_min, box.width(), box.height()});
     objects["categories"].push_back(object.class_index);
-    objects["area"].push_back(object.visible_px);
     objects["id"].push_back(instance.id);
+    if (!params_.training.masks) continue;
+    objects["area"].push_back(object.visible_px);
     objects["visible_share"].push_back(python_round(1.0 - hidden, 6));
   }
   Json row{{"file_name", file},

@@ -21,11 +21,14 @@ class ImageFolderWriter final : public Writer {
   struct Params {
     TrainingParams training;
 
-    void visit(ParamVisitor& v) { training.visit(v); }
+    void visit(ParamVisitor& v) {
+      training.visit(v);
+      training.visit_masks(v);
+    }
   };
 
   ImageFolderWriter(Params params, Host& host)
-      : host_(host), training_(std::move(params.training)) {}
+      : params_(std::move(params)), host_(host), training_(params_.training) {}
 
   NameSet needs() const override;
   void begin(const DatasetInfo& dataset, DatasetFiles& files) override;
@@ -36,6 +39,7 @@ class ImageFolderWriter final : public Writer {
   std::string metadata_line(const Capture& capture, std::size_t camera,
                             const std::string& file) const;
 
+  Params params_;
   Host& host_;
   TrainingData training_;
 };

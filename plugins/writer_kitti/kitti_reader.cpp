@@ -101,6 +101,7 @@ class KittiDataset final : public StoredDataset {
     has_depth_ = fs::is_directory(folder_ / front_ / "depth_2");
     has_calibration_ = fs::is_directory(folder_ / front_ / "calib");
     is_stereo_ = page_ && page_->conventions.contains("image_3");
+    has_unknown_ = !page_ || page_->conventions.contains("unknown");
     split_of_ = read_split_lists(files, "ImageSets", {"train", "val"});
     if (page_) check_own_files(files);
     if (page_) check_class_order(*page_, files);
@@ -272,6 +273,7 @@ class KittiDataset final : public StoredDataset {
   PictureList pictures_;
   std::map<std::string, std::string> split_of_;  ///< By stem.
   bool has_depth_ = false;
+  bool has_unknown_ = false;  ///< Labels may say that they do not know.
   bool has_calibration_ = false;
   bool is_stereo_ = false;
   bool is_tracking_ = false;
@@ -443,7 +445,8 @@ class KittiPictureReading : private FrameReading {
         if (label.name == "DontCare") return;
         files_.check(track >= 0 && known.insert(track).second, kOnce, labels_, who,
                      "is there twice, or below 0");
-        files_.check(label.truncation == 0.0 || label.truncation == 1.0 || label.truncation == 2.0,
+        files_.check(label.truncation == 0.0 || label.truncation == 1.0 ||
+                         label.truncation == 2.0 || is_unknown(label.truncation),
                      kAmodal, labels_, who, "its truncation is " + std::to_string(label.truncation),
                      "0, 1 or 2");
         const double level = std::exchange(label.truncation, 0.0);  // not a share
@@ -518,9 +521,12 @@ class KittiPictureReading : private FrameReading {
     frame_.instances.push_back(std::move(instance));
   }
 
+  bool is_unknown(double truncation) const { return dataset_.has_unknown_ && truncation == -1.0; }
+
   void check_numbers(const KittiLabel& label, const std::string& who) {
-    files_.check(label.truncation >= 0.0 && label.truncation <= 1.0, kAmodal, labels_, who,
-                 "its truncation is " + std::to_string(label.truncation), "0 to 1");
+    files_.check(
+        (label.truncation >= 0.0 && label.truncation <= 1.0) || is_unknown(label.truncation),
+        kAmodal, labels_, who, "its truncation is " + std::to_string(label.truncation), "0 to 1");
     // To two digits, also where a last pixel is left in a corner.
     const bool is_at_border = label.box[0] <= 0.0 || label.box[1] <= 0.0 ||
                               label.box[2] >= frame_.camera.width ||
@@ -529,12 +535,15 @@ class KittiPictureReading : private FrameReading {
                  "nothing of it is inside the image, and its box does not touch the border");
     const bool is_level = label.occlusion == 0.0 || label.occlusion == 1.0 ||
                           label.occlusion == 2.0 || label.occlusion == 3.0;
-    files_.check(is_level && !(dataset_.page_ && label.occlusion == 3.0), kAmodal, labels_, who,
-                 "its occlusion is " + std::to_string(label.occlusion), "0, 1, 2 or, unknown, 3");
-    files_.check(std::abs(label.rotation_y) <= kPi + 0.01 && std::abs(label.alpha) <= kPi + 0.01,
+    files_.check(is_level && (dataset_.has_unknown_ || label.occlusion != 3.0), kAmodal, labels_,
+                 who, "its occlusion is " + std::to_string(label.occlusion),
+                 "0, 1, 2 or, unknown, 3");
+    const bool is_nowhere = !label.has_box_3d() && dataset_.has_unknown_;
+    files_.check(is_nowhere || (std::abs(label.rotation_y) <= kPi + 0.01 &&
+                                std::abs(label.alpha) <= kPi + 0.01),
                  kAngles, labels_, who, "an angle is beyond pi");
     if (!label.has_box_3d()) {
-      files_.check(!dataset_.page_, kReadable, labels_, who, "its 3-D box has no size");
+      files_.check(dataset_.has_unknown_, kReadable, labels_, who, "its 3-D box has no size");
       return;
     }
     // The benchmark's own angles were made of another point of the box.

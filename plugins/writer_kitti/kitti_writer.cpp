@@ -25,6 +25,15 @@ struct UprightBox {
   double rotation_y = 0.0;
 };
 
+/// What the benchmark writes where it knows nothing.
+const UprightBox kUnknownBox{Vec3::Constant(-1.0), Vec3::Constant(-1000.0), -10.0};
+
+/// Is more than a point.
+bool has_extent(const Instance& instance) {
+  const Aabb& bounds = instance.bounds_node;
+  return !bounds.is_empty() && !bounds.size().isZero();
+}
+
 /// Turns about y by `angle`: the heading (cos, 0, -sin) becomes x.
 Vec3 unturned(const Vec3& p, double angle) {
   const double c = std::cos(angle);
@@ -49,16 +58,18 @@ UprightBox upright_box(const Frame& frame, const Instance& instance) {
   return box;
 }
 
-/// 0 fully visible, 1 partly hidden, 2 largely hidden.
+/// 0 fully visible, 1 partly hidden, 2 largely hidden, 3 unknown.
 int occlusion_level(const Instance& instance, const KittiWriter::Params& limits) {
+  if (!instance.visibility && !limits.training.masks) return 3;
   const double visible =
       instance.visibility ? 1.0 - instance.visibility->occlusion().value_or(0.0) : 1.0;
   if (visible >= limits.fully_visible_threshold) return 0;
   return visible >= limits.partly_occluded_threshold ? 1 : 2;
 }
 
-/// 0 none, 1 up to half, 2 more of it is outside of the picture.
-int truncation_level(const Instance& instance) {
+/// 0 none, 1 up to half, 2 more of it is outside of the picture, -1 unknown.
+int truncation_level(const Instance& instance, const KittiWriter::Params& limits) {
+  if (!instance.visibility && !limits.training.masks) return -1;
   const double truncation = instance.visibility ? instance.visibility->truncation() : 0.0;
   return truncation <= 0.0 ? 0 : truncation <= 0.5 ? 1 : 2;
 }
@@ -72,9 +83,13 @@ struct LabelText {
 LabelText label_text(const Frame& frame, const TrainingObject& object, const std::string& name,
                      const KittiWriter::Params& limits) {
   const Instance& instance = *object.instance;
-  const UprightBox box = upright_box(frame, instance);
-  const double bearing = std::atan2(box.location.x(), box.location.z());
-  const double alpha = std::remainder(box.rotation_y - bearing, 2.0 * kPi);
+  UprightBox box = kUnknownBox;
+  double alpha = kUnknownBox.rotation_y;
+  if (limits.training.masks || has_extent(instance)) {
+    box = upright_box(frame, instance);
+    const double bearing = std::atan2(box.location.x(), box.location.z());
+    alpha = std::remainder(box.rotation_y - bearing, 2.0 * kPi);
+  }
   const PixelBox& pixels = *instance.tight_box;
   std::array<char, 512> text{};
   std::snprintf(text.data(), text.size(),
@@ -94,7 +109,9 @@ std::string label_line(const Frame& frame, const TrainingObject& object, const s
   const auto& visibility = object.instance->visibility;
   std::array<char, 32> truncation{};
   std::snprintf(truncation.data(), truncation.size(), " %.2f",
-                visibility ? visibility->truncation() : 0.0);
+                visibility              ? visibility->truncation()
+                : limits.training.masks ? 0.0
+                                        : -1.0);
   return label.name + truncation.data() + label.fields;
 }
 
@@ -102,7 +119,7 @@ std::string track_line(const Frame& frame, int number, const TrainingObject& obj
                        const std::string& name, const KittiWriter::Params& limits) {
   const LabelText label = label_text(frame, object, name, limits);
   return std::to_string(number) + " " + std::to_string(object.instance->id) + " " + label.name +
-         " " + std::to_string(truncation_level(*object.instance)) + label.fields;
+         " " + std::to_string(truncation_level(*object.instance, limits)) + label.fields;
 }
 
 /// From the left camera to the right one, in metres. Pictures are rectified: rows of both show the
@@ -180,6 +197,7 @@ std::vector<std::string> left_cameras(const DatasetInfo& dataset) {
 
 void KittiWriter::Params::visit(ParamVisitor& v) {
   training.visit(v);
+  training.visit_masks(v);
   v.param("depth", depth, {"Depth pictures, 16 bit, metres x 256."});
   v.choice(
       "layout", layout, kLayouts,
@@ -229,7 +247,8 @@ void KittiWriter::notice_idle_keywords() const {
 }
 
 NameSet KittiWriter::needs() const {
-  NameSet names{std::string(kColor.name), std::string(kInstanceId.name), "instances", "visibility"};
+  NameSet names{std::string(kColor.name), "instances", "visibility"};
+  if (params_.training.masks) names.emplace(kInstanceId.name);
   if (params_.depth) names.emplace(kDistanceToImagePlane.name);
   return names;
 }
@@ -242,6 +261,11 @@ void KittiWriter::begin(const DatasetInfo& all, DatasetFiles& files) {
   DatasetInfo dataset = all;
   if (is_stereo()) dataset.camera_names = left_cameras(all);
   training_.begin(dataset);
+  nlohmann::ordered_json unknown = nlohmann::ordered_json::object();
+  if (!params_.training.masks) {
+    unknown["unknown"] =
+        "truncation -1, occlusion 3, alpha and rotation_y -10, dimensions -1, location -1000";
+  }
   if (is_tracking()) {
     for (int i = 0; i < dataset.capture_count; ++i) {
       if (clip_frame(dataset.clips, i)) continue;
@@ -249,16 +273,16 @@ void KittiWriter::begin(const DatasetInfo& all, DatasetFiles& files) {
                                          " is in no clip; only a step 'record' of the timeline "
                                          "makes sequences");
     }
-    training_.add_dataset_page(
-        "KITTI tracking",
-        {{"camera_axes", "x right, y down, z forward"},
-         {"rotations", "rotation_y about the camera's y axis, radians; there are no quaternions"},
-         {"dimensions", "height, width, length in metres; length along the object's x axis"},
-         {"location", "middle of the bottom face in the camera's space"},
-         {"sequence", "clip x cameras + camera"},
-         {"track", "the number of the object's node, the same in all frames of a clip"},
-         {"depth", "along the viewing axis, metres x 256 in 16 bit, 0: nothing"}},
-        dataset, files);
+    nlohmann::ordered_json conventions{
+        {"camera_axes", "x right, y down, z forward"},
+        {"rotations", "rotation_y about the camera's y axis, radians; there are no quaternions"},
+        {"dimensions", "height, width, length in metres; length along the object's x axis"},
+        {"location", "middle of the bottom face in the camera's space"},
+        {"sequence", "clip x cameras + camera"},
+        {"track", "the number of the object's node, the same in all frames of a clip"},
+        {"depth", "along the viewing axis, metres x 256 in 16 bit, 0: nothing"}};
+    conventions.update(unknown);
+    training_.add_dataset_page("KITTI tracking", std::move(conventions), dataset, files);
     return;
   }
   padding_ = grown_padding(6, dataset.capture_count * training_.camera_count());
@@ -283,6 +307,7 @@ void KittiWriter::begin(const DatasetInfo& all, DatasetFiles& files) {
   if (is_stereo()) {
     conventions["image_3"] = "the camera to the right; P1 and P3 hold -fx x baseline in metres";
   }
+  conventions.update(unknown);
   training_.add_dataset_page("KITTI", std::move(conventions), dataset, files);
 }
 

@@ -43,13 +43,18 @@ std::string sequence_page(const std::string& name, const Frame& frame, const Cli
 
 }  // namespace
 
-void MotWriter::Params::visit(ParamVisitor& v) { training.visit(v); }
+void MotWriter::Params::visit(ParamVisitor& v) {
+  training.visit(v);
+  training.visit_masks(v);
+}
 
 MotWriter::MotWriter(Params params, Host& host)
-    : host_(host), training_(std::move(params.training)) {}
+    : params_(std::move(params)), host_(host), training_(params_.training) {}
 
 NameSet MotWriter::needs() const {
-  return {std::string(kColor.name), std::string(kInstanceId.name), "instances", "visibility"};
+  NameSet names{std::string(kColor.name), "instances", "visibility"};
+  if (params_.training.masks) names.emplace(kInstanceId.name);
+  return names;
 }
 
 void MotWriter::begin(const DatasetInfo& dataset, DatasetFiles& files) {

@@ -36,6 +36,7 @@ class MotWriter final : public Writer {
   void finish(const RecordReader& records, DatasetFiles& files) override;
 
  private:
+  Params params_;
   Host& host_;
   TrainingData training_;
 };

@@ -111,6 +111,12 @@ void TrainingParams::visit(ParamVisitor& v) {
   v.choice("image_format", image_format, kTrainingImageFormats, {"Format of the pictures."});
 }
 
+void TrainingParams::visit_masks(ParamVisitor& v) {
+  v.param("masks", masks,
+          {"What the pixels of objects tell. Without: boxes alone, whose pixels min_visible_px "
+           "counts."});
+}
+
 void TrainingData::begin(const DatasetInfo& dataset) {
   classes_ = params_.classes.empty() ? dataset.classes : params_.classes;
   if (classes_.empty()) {
@@ -158,15 +164,22 @@ std::vector<std::byte> TrainingData::image_file(const Host& host, const Frame& f
 }
 
 std::vector<TrainingObject> TrainingData::objects(const Frame& frame) const {
-  const auto counts = count_visible(frame.get(kInstanceId));
+  std::map<std::uint32_t, std::int64_t> counts;
+  if (params_.masks) counts = count_visible(frame.get(kInstanceId));
+  const auto pixels_of = [&](const Instance& instance) {
+    if (!params_.masks) {
+      return std::int64_t(instance.tight_box->width()) * instance.tight_box->height();
+    }
+    const auto count = counts.find(instance.id);
+    return count == counts.end() ? 0 : count->second;
+  };
   std::vector<TrainingObject> result;
   for (const Instance& instance : frame.instances) {
-    const auto count = counts.find(instance.id);
-    if (count == counts.end() || count->second < params_.min_visible_px || !instance.tight_box) {
-      continue;
-    }
+    if (!instance.tight_box) continue;
+    const std::int64_t pixels = pixels_of(instance);
+    if (pixels == 0 || pixels < params_.min_visible_px) continue;
     const int class_index = class_of(instance.labels);
-    if (class_index >= 0) result.push_back({&instance, class_index, count->second});
+    if (class_index >= 0) result.push_back({&instance, class_index, pixels});
   }
   return result;
 }
@@ -191,6 +204,7 @@ void TrainingData::add_dataset_page(const std::string& format, Json more,
       {"rotations", "matrices; there are no quaternions"},
       {"depth", "none"},
       {"class_order", std::ranges::is_sorted(classes_) ? "sorted" : "as given"}};
+  if (!params_.masks) page["conventions"]["masks"] = "none; boxes are all that is known of pixels";
   for (auto& [key, value] : more.items()) page["conventions"][key] = value;
   page["plugins"] = Json::object();
   for (const auto& [name, version] : dataset.plugin_versions) page["plugins"][name] = version;

@@ -23,15 +23,18 @@ struct TrainingParams {
   std::string taxonomy = "class";
   int min_visible_px = 1;
   std::string image_format = "png";
+  bool masks = true;  ///< False: objects are those that have boxes, and their pixels unknown.
 
   void visit(ParamVisitor& v);
+  /// For writers that can do without the pixels of objects: adds `masks`.
+  void visit_masks(ParamVisitor& v);
 };
 
 /// A visible instance with a class of the list.
 struct TrainingObject {
   const Instance* instance = nullptr;
-  int class_index = 0;  ///< From 0.
-  std::int64_t visible_px = 0;
+  int class_index = 0;          ///< From 0.
+  std::int64_t visible_px = 0;  ///< Without masks: those of its box.
 };
 
 class TrainingData {
@@ -67,7 +70,7 @@ class TrainingData {
   std::vector<std::byte> image_file(const Host& host, const Frame& frame) const;
 
   /// In the order of Frame::instances. Objects of classes that are not in the list are left out: an
-  /// environment's own labels count only when `classes` names them. Needs kInstanceId.
+  /// environment's own labels count only when `classes` names them. Needs kInstanceId for masks.
   std::vector<TrainingObject> objects(const Frame& frame) const;
 
   /// Adds dataset.json: what the numbers of this dataset mean and where it comes from. `more` holds

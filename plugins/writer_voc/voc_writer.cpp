@@ -63,16 +63,21 @@ std::string element(const char* name, const std::string& text) {
 
 void VocWriter::Params::visit(ParamVisitor& v) {
   training.visit(v);
-  v.param("segmentation", segmentation, {"Class and object pictures."});
+  training.visit_masks(v);
+  v.param("segmentation", segmentation, {"Class and object pictures, of masks."});
   v.param("difficult_below", difficult_below,
           {"Objects with a smaller visible share are marked difficult.", "", 0.0, 1.0});
 }
 
 VocWriter::VocWriter(Params params, Host& host)
-    : params_(std::move(params)), host_(host), training_(params_.training) {}
+    : params_(std::move(params)), host_(host), training_(params_.training) {
+  params_.segmentation = params_.segmentation && params_.training.masks;
+}
 
 NameSet VocWriter::needs() const {
-  return {std::string(kColor.name), std::string(kInstanceId.name), "instances", "visibility"};
+  NameSet names{std::string(kColor.name), "instances", "visibility"};
+  if (params_.training.masks) names.emplace(kInstanceId.name);
+  return names;
 }
 
 void VocWriter::begin(const DatasetInfo& dataset, DatasetFiles& files) {

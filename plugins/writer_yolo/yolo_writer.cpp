@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "diorama/error.h"
 #include "opencv_support/contours.h"
 #include "writer_support/cuboid.h"
 
@@ -57,6 +58,7 @@ void append_keypoints(std::string& line, const Frame& frame, const Instance& ins
 
 void YoloWriter::Params::visit(ParamVisitor& v) {
   training.visit(v);
+  training.visit_masks(v);
   v.choice("task", task, kTasks, {"What the label lines hold."});
   v.param(
       "box_margin", box_margin,
@@ -66,10 +68,18 @@ void YoloWriter::Params::visit(ParamVisitor& v) {
 }
 
 YoloWriter::YoloWriter(Params params, Host& host)
-    : params_(std::move(params)), host_(host), training_(params_.training) {}
+    : params_(std::move(params)), host_(host), training_(params_.training) {
+  const bool has_outlines = params_.task == "segment" || params_.task == "obb";
+  if (has_outlines && !params_.training.masks) {
+    throw Error(ErrorKind::Config, "task: " + params_.task +
+                                       " is drawn round masks; 'masks: false' "
+                                       "goes with detect and pose");
+  }
+}
 
 NameSet YoloWriter::needs() const {
-  NameSet names{std::string(kColor.name), std::string(kInstanceId.name), "instances"};
+  NameSet names{std::string(kColor.name), "instances"};
+  if (params_.training.masks) names.emplace(kInstanceId.name);
   if (params_.task == "pose") names.emplace(kDistanceToCamera.name);
   return names;
 }

@@ -3,8 +3,12 @@
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <string>
+#include <tuple>
+#include <vector>
 
+#include "framework/images/codecs.h"
 #include "program.h"
 #include "support/catch.h"
 
@@ -92,7 +96,239 @@ Files without_lens_digits(const fs::path& folder) {
   return files;
 }
 
+// Datasets of boxes as others write them, and what they are in another format, without any reader
+// or writer of the program.
+
+constexpr int kWidth = 60;
+constexpr int kHeight = 40;
+
+/// Class, x_min, y_min, x_max, y_max; the last two are one past the last pixel.
+using Box = std::tuple<std::string, int, int, int, int>;
+using Boxes = std::vector<std::vector<Box>>;  ///< Per picture.
+
+const Boxes kDrawn{{{"cat", 10, 8, 40, 25}, {"dog", 3, 4, 20, 30}, {"dog", 40, 0, 60, 12}},
+                   {},
+                   {{"cat", 0, 0, 60, 40}}};
+
+void write_picture(const fs::path& file, std::uint8_t shade) {
+  std::vector<std::uint8_t> samples;
+  for (int i = 0; i < kWidth * kHeight; ++i) {
+    samples.insert(samples.end(), {shade, std::uint8_t(i % 251), std::uint8_t(i / 7 % 251)});
+  }
+  const auto bytes = diorama::images::encode_png({samples.data(), kWidth, kHeight, 3, 8});
+  write_file(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+}
+
+std::string stem_of(std::size_t picture) { return "00000" + std::to_string(picture); }
+
+void write_voc(const fs::path& folder) {
+  for (std::size_t i = 0; i < kDrawn.size(); ++i) {
+    write_picture(folder / "JPEGImages" / (stem_of(i) + ".png"), std::uint8_t(40 * i));
+    std::ostringstream xml;
+    xml << "<annotation><filename>" << stem_of(i) << ".png</filename><size><width>60</width>"
+        << "<height>40</height><depth>3</depth></size>";
+    for (const auto& [name, x_min, y_min, x_max, y_max] : kDrawn[i]) {
+      xml << "<object><name>" << name << "</name><bndbox><xmin>" << x_min + 1 << "</xmin><ymin>"
+          << y_min + 1 << "</ymin><xmax>" << x_max << "</xmax><ymax>" << y_max
+          << "</ymax></bndbox></object>";
+    }
+    write_file(folder / "Annotations" / (stem_of(i) + ".xml"), xml.str() + "</annotation>");
+  }
+}
+
+void write_yolo(const fs::path& folder) {
+  write_file(folder / "data.yaml", "train: images/train\nval: images/train\nnames: [cat, dog]\n");
+  for (std::size_t i = 0; i < kDrawn.size(); ++i) {
+    write_picture(folder / "images/train" / (stem_of(i) + ".png"), std::uint8_t(40 * i));
+    std::ostringstream lines;
+    for (const auto& [name, x_min, y_min, x_max, y_max] : kDrawn[i]) {
+      lines << (name == "dog") << ' ' << 0.5 * (x_min + x_max) / kWidth << ' '
+            << 0.5 * (y_min + y_max) / kHeight << ' ' << double(x_max - x_min) / kWidth << ' '
+            << double(y_max - y_min) / kHeight << '\n';
+    }
+    write_file(folder / "labels/train" / (stem_of(i) + ".txt"), lines.str());
+  }
+}
+
+void write_kitti(const fs::path& folder) {
+  for (std::size_t i = 0; i < kDrawn.size(); ++i) {
+    write_picture(folder / "training/image_2" / (stem_of(i) + ".png"), std::uint8_t(40 * i));
+    std::ostringstream lines;
+    const char* unknown = " -1 -1 -1 -1000 -1000 -1000 -10\n";
+    for (const auto& [name, x_min, y_min, x_max, y_max] : kDrawn[i]) {
+      lines << name << " -1 3 -10 " << x_min << ".00 " << y_min << ".00 " << x_max << ".00 "
+            << y_max << ".00" << unknown;
+    }
+    lines << "DontCare -1 -1 -10 1.00 2.00 3.00 4.00" << unknown;
+    write_file(folder / "training/label_2" / (stem_of(i) + ".txt"), lines.str());
+  }
+}
+
+/// With `has_masks` each box is a polygon, too, and two of them overlap. The first is a crowd.
+void write_coco(const fs::path& folder, bool has_masks) {
+  nlohmann::json page{{"categories", {{{"id", 5}, {"name", "cat"}}, {{"id", 7}, {"name", "dog"}}}},
+                      {"images", nlohmann::json::array()},
+                      {"annotations", nlohmann::json::array()}};
+  for (std::size_t i = 0; i < kDrawn.size(); ++i) {
+    write_picture(folder / "images" / (stem_of(i) + ".png"), std::uint8_t(40 * i));
+    page["images"].push_back(
+        {{"id", i}, {"file_name", stem_of(i) + ".png"}, {"width", kWidth}, {"height", kHeight}});
+    for (const auto& [name, x_min, y_min, x_max, y_max] : kDrawn[i]) {
+      nlohmann::json object{{"id", page["annotations"].size()},
+                            {"image_id", i},
+                            {"category_id", name == "cat" ? 5 : 7},
+                            {"bbox", {x_min, y_min, x_max - x_min, y_max - y_min}},
+                            {"area", (x_max - x_min) * (y_max - y_min)},
+                            {"iscrowd", page["annotations"].empty() ? 1 : 0}};
+      if (has_masks) {
+        object["segmentation"] = {{x_min, y_min, x_max, y_min, x_max, y_max, x_min, y_max}};
+      }
+      page["annotations"].push_back(std::move(object));
+    }
+  }
+  write_file(folder / "annotations/instances_train.json", page.dump());
+}
+
+nlohmann::json coco_page(const fs::path& folder) {
+  return nlohmann::json::parse(read_file(folder / "annotations/instances_train.json"));
+}
+
+Boxes boxes_of_coco(const fs::path& folder) {
+  const auto page = coco_page(folder);
+  std::map<int, std::string> names;
+  for (const auto& each : page.at("categories")) names[each.at("id")] = each.at("name");
+  std::map<int, std::vector<Box>> found;
+  for (const auto& image : page.at("images")) found[image.at("id")];
+  for (const auto& each : page.at("annotations")) {
+    CHECK_FALSE(each.contains("segmentation"));
+    const auto box = each.at("bbox").get<std::vector<int>>();
+    found.at(each.at("image_id"))
+        .emplace_back(names.at(each.at("category_id")), box[0], box[1], box[0] + box[2],
+                      box[1] + box[3]);
+  }
+  Boxes boxes;
+  for (auto& [image, own] : found) boxes.push_back(std::move(own));
+  return boxes;
+}
+
+/// One for each label file, `boxes_of(text)`.
+template <class BoxesOf>
+Boxes boxes_of_files(const fs::path& folder, const std::string& ending, BoxesOf&& boxes_of) {
+  Boxes boxes;
+  for (const auto& [name, text] : tree(folder)) {
+    if (name.ends_with(ending)) boxes.push_back(boxes_of(text));
+  }
+  return boxes;
+}
+
+std::vector<Box> boxes_of_yolo(const std::string& text) {
+  std::vector<Box> boxes;
+  std::istringstream in(text);
+  double x = 0, y = 0, width = 0, height = 0;
+  for (int number = 0; in >> number >> x >> y >> width >> height;) {
+    const auto edge = [](double share, int size) { return int(std::lround(share * size)); };
+    boxes.emplace_back(number == 0 ? "cat" : "dog", edge(x - width / 2, kWidth),
+                       edge(y - height / 2, kHeight), edge(x + width / 2, kWidth),
+                       edge(y + height / 2, kHeight));
+  }
+  return boxes;
+}
+
+std::vector<Box> boxes_of_voc(const std::string& text) {
+  std::vector<Box> boxes;
+  for (std::size_t at = text.find("<object>"); at != text.npos;
+       at = text.find("<object>", at + 1)) {
+    const auto element = [&](const std::string& name) {
+      const std::size_t begin = text.find("<" + name + ">", at) + name.size() + 2;
+      return text.substr(begin, text.find('<', begin) - begin);
+    };
+    boxes.emplace_back(element("name"), std::stoi(element("xmin")) - 1,
+                       std::stoi(element("ymin")) - 1, std::stoi(element("xmax")),
+                       std::stoi(element("ymax")));
+  }
+  return boxes;
+}
+
+std::vector<Box> boxes_of_kitti(const std::string& text) {
+  std::vector<Box> boxes;
+  std::istringstream in(text);
+  for (std::string line; std::getline(in, line);) {
+    CHECK_THAT(line, ContainsSubstring(" -1.00 3 -10.00 "));
+    CHECK(line.ends_with(" -1.0000 -1.0000 -1.0000 -1000.0000 -1000.0000 -1000.0000 -10.0000"));
+    std::istringstream words(line);
+    std::string name, skipped;
+    double x_min = 0, y_min = 0, x_max = 0, y_max = 0;
+    words >> name >> skipped >> skipped >> skipped >> x_min >> y_min >> x_max >> y_max;
+    boxes.emplace_back(name, int(x_min), int(y_min), int(x_max), int(y_max));
+  }
+  return boxes;
+}
+
 }  // namespace
+
+TEST_CASE("boxes of others, which have no masks, become boxes of any format", "[convert]") {
+  const TemporaryFolder folder;
+  write_voc(folder / "voc");
+  write_yolo(folder / "yolo");
+  write_kitti(folder / "kitti");
+  write_coco(folder / "coco", false);
+  for (const std::string from : {"voc", "yolo", "kitti"}) {
+    INFO(from);
+    const Outcome outcome = succeed(
+        {"convert", from, "--writer", "CocoWriter val_share=0", "-o", "of_" + from}, folder);
+    CHECK_THAT(outcome.errors,
+               ContainsSubstring("--writer CocoWriter: is taken with masks=false keypoints=false"));
+    CHECK(boxes_of_coco(folder / ("of_" + from) / "CocoWriter") == kDrawn);
+    succeed({"lint", "of_" + from}, folder);
+  }
+  succeed({"convert", "coco", "--writer", "CocoWriter", "--writer", "YoloWriter", "--writer",
+           "VocWriter image_format=png", "--writer", "KittiWriter", "--writer", "ImageFolderWriter",
+           "-o", "all"},
+          folder);
+  succeed({"lint", "all"}, folder);
+  CHECK(boxes_of_coco(folder / "all/CocoWriter") == kDrawn);
+  CHECK(boxes_of_files(folder / "all/YoloWriter/labels", ".txt", boxes_of_yolo) == kDrawn);
+  CHECK(boxes_of_files(folder / "all/VocWriter/Annotations", ".xml", boxes_of_voc) == kDrawn);
+  CHECK(boxes_of_files(folder / "all/KittiWriter/training/label_2", ".txt", boxes_of_kitti) ==
+        kDrawn);
+  const std::string rows = read_file(folder / "all/ImageFolderWriter/train/metadata.jsonl");
+  CHECK_THAT(rows, ContainsSubstring("\"bbox\": [[10, 8, 30, 17], [3, 4, 17, 26]"));
+  CHECK_THAT(rows, !ContainsSubstring("area") && !ContainsSubstring("visible_share"));
+  // What is a crowd stays one, also from there on.
+  succeed({"convert", "all/CocoWriter", "--writer", "CocoWriter", "-o", "again"}, folder);
+  succeed({"lint", "again"}, folder);
+  for (const char* place : {"all/CocoWriter", "again/CocoWriter"}) {
+    std::vector<int> crowds;
+    const auto page = coco_page(folder / place);
+    for (const auto& each : page.at("annotations")) {
+      crowds.push_back(each.at("iscrowd"));
+    }
+    CHECK(crowds == std::vector{1, 0, 0, 0});
+  }
+  // A parameter that somebody names stays as it is.
+  const Outcome asked =
+      run({"convert", "voc", "--writer", "CocoWriter masks=true", "-o", "masks"}, folder.path());
+  CHECK(asked.exit_code == 2);
+  CHECK_THAT(asked.errors, ContainsSubstring("does not hold instance_id, which the writers need"));
+  CHECK_FALSE(fs::exists(folder / "masks"));
+}
+
+TEST_CASE("masks that overlap are found before anything is written", "[convert]") {
+  const TemporaryFolder folder;
+  write_coco(folder / "coco", true);
+  const Outcome boxes =
+      succeed({"convert", "coco", "--writer", "CocoWriter", "-o", "boxes"}, folder);
+  CHECK_THAT(boxes.errors,
+             ContainsSubstring("masks overlap, or an object has none, in 1 of 3 captures, first in "
+                               "capture 0; no writer gets a mask"));
+  CHECK(boxes_of_coco(folder / "boxes/CocoWriter") == kDrawn);
+  succeed({"lint", "boxes"}, folder);
+  const Outcome outlines = run(
+      {"convert", "coco", "--writer", "YoloWriter task=segment", "-o", "outlines"}, folder.path());
+  CHECK(outlines.exit_code == 2);
+  CHECK_THAT(outlines.errors, ContainsSubstring("does not hold instance_id (masks overlap"));
+  CHECK_FALSE(fs::exists(folder / "outlines"));
+}
 
 TEST_CASE("a converted dataset is the one that the run would have written", "[convert]") {
   const TemporaryFolder folder;
