@@ -303,11 +303,7 @@ class CocoImageReading : private FrameReading {
     const auto category = part_.categories.find(whole_number<std::int64_t>(json.at("category_id")));
     files_.check(category != part_.categories.end(), kIds, part_.file, who,
                  "has the unknown category " + json.at("category_id").dump());
-    if (category != part_.categories.end()) {
-      instance.labels["class"] = category->second.name;
-      // Ours follows from the area, and may differ between pictures of one object.
-      if (!dataset_.page_ && json.value("iscrowd", Json()) == 1) instance.labels["iscrowd"] = "1";
-    }
+    if (category != part_.categories.end()) instance.labels["class"] = category->second.name;
     const auto track = json.find("track_id");
     const bool has_page = dataset_.page_.has_value();
     if (track != json.end() && (has_page || track->is_number_unsigned())) {
