@@ -68,7 +68,8 @@ std::optional<DatasetPage> read_dataset_page(const std::filesystem::path& folder
       }
     }
     const auto job = json.find("job");
-    page.is_rendered = job != json.end() && job->is_string() && *job != "";
+    page.is_rendered =
+        job != json.end() && job->is_string() && !job->get_ref<const std::string&>().empty();
     if (json.contains("clips")) page.clips = clips_of_json(json.at("clips"));
     return page;
   } catch (const std::runtime_error&) {
