@@ -25,9 +25,8 @@ namespace diorama {
 /// - A face that lies on another one keeps its contact points, and is drawn back to where it lay on
 ///   them: Bullet chooses among all points of two faces anew in each step, and friction only ends
 ///   motion, so that stacks creep.
-/// - What balances on an edge or a corner, and on nothing else, has no rolling friction: Bullet's
-/// would
-///   hold it there for good.
+/// - What balances on an edge or a corner, and on nothing else, has no rolling friction. Bullet's
+///   would hold it there for good.
 /// - Continuous detection works for compound bodies as well; Bullet leaves them out.
 ///
 /// Static objects of triangles must carry their StaticMesh as user pointer, all others none. The
