@@ -23,8 +23,8 @@ constexpr double kMovingPx = 1.0;
 
 struct SeenObject {
   std::string name;
-  double box_side = 0.0;
-  Vec2 place = Vec2::Zero();  ///< Shares of the picture.
+  std::optional<double> box_side;
+  Vec2 place = Vec2::Zero();  ///< Of the box: shares of the picture.
   std::optional<double> visible;
   std::optional<double> truncation;
   std::optional<double> distance_m;
@@ -89,16 +89,19 @@ class Measurement {
     return seen;
   }
 
-  /// Nothing for what is not in the picture.
+  /// Nothing for what is not in the picture. Where nothing tells of that, each object counts.
   std::optional<SeenObject> object(const Frame& frame, const Instance& instance) const {
-    if (!instance.tight_box || instance.tight_box->is_empty()) return std::nullopt;
-    const PixelBox& box = *instance.tight_box;
-    const double width = std::max(frame.camera.width, 1);
-    const double height = std::max(frame.camera.height, 1);
     SeenObject seen;
     seen.name = class_of(instance);
-    seen.box_side = std::sqrt(double(box.width()) * box.height() / (width * height));
-    seen.place = {0.5 * (box.x_min + box.x_max) / width, 0.5 * (box.y_min + box.y_max) / height};
+    if (instance.tight_box && !instance.tight_box->is_empty()) {
+      const PixelBox& box = *instance.tight_box;
+      const double width = std::max(frame.camera.width, 1);
+      const double height = std::max(frame.camera.height, 1);
+      seen.box_side = std::sqrt(double(box.width()) * box.height() / (width * height));
+      seen.place = {0.5 * (box.x_min + box.x_max) / width, 0.5 * (box.y_min + box.y_max) / height};
+    } else if (holds(kHoldsTightBoxes) || holds(kInstanceId.name)) {
+      return std::nullopt;
+    }
     if (instance.visibility && holds(kHoldsOcclusion)) {
       if (const auto occlusion = instance.visibility->occlusion()) seen.visible = 1.0 - *occlusion;
     }
@@ -186,12 +189,14 @@ NameSet wanted_of(const StoredInfo& info) {
 
 void add(const SeenObject& object, ClassStats& own) {
   ++own.objects;
-  own.box_side.add(object.box_side);
+  if (object.box_side) {
+    own.box_side.add(*object.box_side);
+    ++own.places[bin(object.place.y(), kHeatRows)][bin(object.place.x(), kHeatColumns)];
+  }
   if (object.visible) own.visible.add(*object.visible);
   if (object.truncation) own.truncation.add(*object.truncation);
   if (object.distance_m) own.distance_m.add(*object.distance_m);
   if (object.view) ++own.views[object.view->first][object.view->second];
-  ++own.places[bin(object.place.y(), kHeatRows)][bin(object.place.x(), kHeatColumns)];
 }
 
 void add(const SeenCapture& capture, DatasetStats& stats) {

@@ -307,7 +307,9 @@ class BopDataset final : public StoredDataset {
     hold(any(&BopScene::has_cameras), {kHoldsCamera});
     hold(any(&BopScene::has_poses), {kHoldsInstances, kHoldsLabels, kHoldsPoses});
     hold(any(&BopScene::has_poses) && any(&BopScene::has_visible_masks), {kInstanceId.name});
-    hold(any(&BopScene::has_poses) && any(&BopScene::has_infos), {kHoldsTightBoxes});
+    hold(any(&BopScene::has_poses) &&
+             (any(&BopScene::has_infos) || any(&BopScene::has_visible_masks)),
+         {kHoldsTightBoxes});
     hold(any(&BopScene::has_infos) && any(&BopScene::has_masks),
          {"amodal_mask", kHoldsOcclusion, kHoldsTruncation, kHoldsAmodalBoxes});
     constexpr std::size_t kLookedAt = 1000;
@@ -606,7 +608,8 @@ class BopImageReading : private FrameReading {
     const std::string table = scene_.table("scene_gt_info");
     const std::string name = stem_ + "_" + zero_padded(int(place), 6) + ".png";
     const bool wants_masks = wants(kInstanceId.name) || wants("amodal_mask") ||
-                             wants(kHoldsOcclusion) || wants(kHoldsTruncation);
+                             wants(kHoldsOcclusion) || wants(kHoldsTruncation) ||
+                             (!info.is_object() && wants(kHoldsTightBoxes));
     std::optional<CoverageMask> whole;
     if (wants_masks && scene_.has_visible_masks) {
       masks_.back() = mask_of(scene_.place("mask_visib", name));

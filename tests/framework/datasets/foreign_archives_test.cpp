@@ -277,6 +277,19 @@ TEST_CASE("BOP as the benchmark has it: no node names, gaps in ids, scenes witho
   CHECK(frame.get(kInstanceId).at(26, 9) == instance.id);
   CHECK(frame.get(kDistanceToImagePlane).at(0, 0) == Approx(0.47));
   CHECK(opened.read(2).capture.frames.at(0).instances.empty());
+  // The toolkit computes scene_gt_info.json later: boxes are those of the masks until then.
+  std::filesystem::remove(folder.path(scene + "scene_gt_info.json"));
+  const Opened early(folder, "BopReader");
+  CHECK(early.holds(kHoldsTightBoxes));
+  CHECK_FALSE(early.holds(kHoldsOcclusion));
+  NameSet boxes{std::string(kHoldsInstances), std::string(kHoldsTightBoxes)};
+  CHECK(early.dataset->read(1, boxes).capture.frames.at(0).instances.at(0).tight_box == box);
+  std::filesystem::remove_all(folder.path(scene + "mask_visib"));
+  const Opened poses(folder, "BopReader");
+  CHECK(poses.holds(kHoldsPoses));
+  CHECK_FALSE(poses.holds(kHoldsTightBoxes));
+  CHECK_FALSE(poses.holds(kInstanceId.name));
+  CHECK_FALSE(poses.read(1).capture.frames.at(0).instances.at(0).tight_box.has_value());
   // A scene, and a split, are datasets of their own.
   test::EncodingHost host;
   DatasetReaders readers = test::every_reader(host);
