@@ -41,6 +41,16 @@ Vec3 vector_of_json(const Json& list) {
   return v;
 }
 
+void read_pose_entry(const Json& object, Instance& instance) {
+  const bool has_bounds = object.contains("bounds_min") || object.contains("bounds_max");
+  if (has_bounds || object.contains("world_from_node")) {
+    instance.world_from_node = affine_of_rows(object.at("world_from_node"));
+  }
+  if (!has_bounds) return;
+  instance.bounds_node = {vector_of_json(object.at("bounds_min")),
+                          vector_of_json(object.at("bounds_max"))};
+}
+
 void require_rigid(const Affine& map, const std::string& name) {
   const bool ends_right =
       (map.matrix().row(3) - Eigen::RowVector4d(0.0, 0.0, 0.0, 1.0)).cwiseAbs().maxCoeff() <= 1e-6;

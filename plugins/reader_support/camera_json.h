@@ -4,6 +4,7 @@
 #include <string>
 
 #include "diorama/camera.h"
+#include "diorama/frame.h"
 #include "diorama/math.h"
 #include "reader_support/stored_files.h"
 
@@ -18,6 +19,10 @@ Affine affine_of_rows(const Json& rows);
 
 /// Three finite numbers. Throws the same.
 Vec3 vector_of_json(const Json& list);
+
+/// Reads "world_from_node", "bounds_min" and "bounds_max" of our writers. What they were not told
+/// is not there: the bounds, or all three. Throws the same.
+void read_pose_entry(const Json& object, Instance& instance);
 
 /// Throws std::runtime_error unless it turns and shifts alone. `name` is for the message.
 void require_rigid(const Affine& map, const std::string& name);

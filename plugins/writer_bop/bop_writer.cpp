@@ -12,6 +12,7 @@
 #include "writer_bop/bop_format.h"
 #include "writer_bop/bop_model.h"
 #include "writer_bop/model_symmetries.h"
+#include "writer_support/cuboid.h"
 #include "writer_support/image_files.h"
 #include "writer_support/lens_json.h"
 #include "writer_support/replicator.h"
@@ -290,6 +291,11 @@ Json BopWriter::write_frame(const Capture& capture, std::size_t camera, CaptureF
   for (const TrainingObject& object : training_.objects(frame)) {
     const Instance& instance = *object.instance;
     if (!instance.visibility || !instance.visibility->amodal_box) continue;
+    if (!has_pose(instance)) {
+      throw Error(ErrorKind::Config, frame.camera_name + ": nothing tells where " +
+                                         instance.node_path +
+                                         " lies, and BOP has nothing to say but poses");
+    }
     std::int64_t valid = 0;
     const PixelBox& box = *instance.visibility->amodal_box;
     for (int y = box.y_min; y < box.y_max; ++y) {

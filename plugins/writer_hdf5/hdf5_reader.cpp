@@ -169,9 +169,14 @@ class Hdf5Dataset final : public StoredDataset {
         const Hdf5View view(read_whole_file(folder_ / file_of(all[i])));
         const Json list = parse_stored_json(view.text(kObjects));
         if (!list.is_array() || list.empty()) continue;
-        if (!list[0].contains("world_from_node")) return;
-        info_.holds.insert({std::string(kHoldsNodePaths), std::string(kHoldsPoses),
-                            std::string(kHoldsBounds), std::string(kHoldsBoxes3d)});
+        const Json& first = list[0];
+        if (page_) info_.holds.emplace(kHoldsNodePaths);
+        if (first.contains("world_from_node")) {
+          info_.holds.insert({std::string(kHoldsNodePaths), std::string(kHoldsPoses)});
+        }
+        if (first.contains("bounds_min")) {
+          info_.holds.insert({std::string(kHoldsBounds), std::string(kHoldsBoxes3d)});
+        }
         return;
       } catch (const std::runtime_error&) {
         continue;
@@ -438,11 +443,7 @@ class Hdf5PictureReading : private FrameReading {
           kIds, file_, who, "its category_id is " + std::to_string(category),
           "the place of '" + instance.labels.at("class") + "' in the classes");
     }
-    if (object.contains("world_from_node")) {
-      instance.world_from_node = affine_of_rows(object.at("world_from_node"));
-      instance.bounds_node = {vector_of_json(object.at("bounds_min")),
-                              vector_of_json(object.at("bounds_max"))};
-    }
+    read_pose_entry(object, instance);
     frame_.instances.push_back(std::move(instance));
   }
 

@@ -8,6 +8,7 @@
 
 #include "writer_hdf5/hdf5_file.h"
 #include "writer_support/clips_json.h"
+#include "writer_support/cuboid.h"
 #include "writer_support/lens_json.h"
 
 namespace diorama {
@@ -62,10 +63,8 @@ Json attributes_json(const std::vector<TrainingObject>& objects,
     list.push_back({{"idx", i + 1},
                     {"name", instance.node_path},
                     {"category_id", objects[i].class_index + 1},
-                    {"class", classes[std::size_t(objects[i].class_index)]},
-                    {"world_from_node", nested_list(instance.world_from_node.matrix())},
-                    {"bounds_min", flat_list(instance.bounds_node.min.transpose())},
-                    {"bounds_max", flat_list(instance.bounds_node.max.transpose())}});
+                    {"class", classes[std::size_t(objects[i].class_index)]}});
+    add_pose(instance, list.back());
   }
   return list;
 }

@@ -7,6 +7,7 @@
 #include <cstdio>
 
 #include "diorama/error.h"
+#include "writer_support/cuboid.h"
 #include "writer_support/image_files.h"
 #include "writer_support/lens_json.h"
 #include "writer_support/replicator.h"
@@ -27,12 +28,6 @@ struct UprightBox {
 
 /// What the benchmark writes where it knows nothing.
 const UprightBox kUnknownBox{Vec3::Constant(-1.0), Vec3::Constant(-1000.0), -10.0};
-
-/// Is more than a point.
-bool has_extent(const Instance& instance) {
-  const Aabb& bounds = instance.bounds_node;
-  return !bounds.is_empty() && !bounds.size().isZero();
-}
 
 /// Turns about y by `angle`: the heading (cos, 0, -sin) becomes x.
 Vec3 unturned(const Vec3& p, double angle) {
@@ -85,7 +80,7 @@ LabelText label_text(const Frame& frame, const TrainingObject& object, const std
   const Instance& instance = *object.instance;
   UprightBox box = kUnknownBox;
   double alpha = kUnknownBox.rotation_y;
-  if (limits.training.masks || has_extent(instance)) {
+  if (has_extent(instance)) {
     box = upright_box(frame, instance);
     const double bearing = std::atan2(box.location.x(), box.location.z());
     alpha = std::remainder(box.rotation_y - bearing, 2.0 * kPi);

@@ -5,6 +5,23 @@
 
 namespace diorama {
 
+bool has_extent(const Instance& instance) {
+  const Aabb& bounds = instance.bounds_node;
+  return !bounds.is_empty() && !bounds.size().isZero(0.0);
+}
+
+bool has_pose(const Instance& instance) {
+  return has_extent(instance) || instance.world_from_node.matrix() != Affine::Identity().matrix();
+}
+
+void add_pose(const Instance& instance, Json& object) {
+  if (!has_pose(instance)) return;
+  object["world_from_node"] = nested_list(instance.world_from_node.matrix());
+  if (!has_extent(instance)) return;
+  object["bounds_min"] = flat_list(instance.bounds_node.min.transpose());
+  object["bounds_max"] = flat_list(instance.bounds_node.max.transpose());
+}
+
 Vec3 keypoint_in_box(const Aabb& box, const CuboidPoint& keypoint) {
   Vec3 point = box.centre();
   for (int axis = 0; axis < 3; ++axis) {

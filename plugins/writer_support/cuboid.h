@@ -4,6 +4,7 @@
 #include <array>
 
 #include "diorama/frame.h"
+#include "writer_support/python_json.h"
 
 namespace diorama {
 
@@ -27,6 +28,13 @@ inline constexpr KeypointOrder kCuboidKeypoints{{{"Center", {0, 0, 0}},
                                                  {"RDF", {1, -1, 1}},
                                                  {"RUB", {1, 1, -1}},
                                                  {"RUF", {1, 1, 1}}}};
+
+/// False for a point, which stands for what a stored dataset does not tell.
+bool has_extent(const Instance& instance);
+/// Also false without an extent at the origin of the world, unturned: nothing is told then.
+bool has_pose(const Instance& instance);
+/// "world_from_node", "bounds_min" and "bounds_max", as far as they are told.
+void add_pose(const Instance& instance, Json& object);
 
 Vec3 keypoint_in_box(const Aabb& box, const CuboidPoint& keypoint);
 

@@ -327,11 +327,14 @@ class WebDataset final : public StoredDataset {
       const Json json = parse_stored_json(members.at("json"));
       if (is_own(json)) {
         has_own_json_ = true;
-        info_.holds.insert(
-            {std::string(kHoldsInstances), std::string(kHoldsLabels), std::string(kHoldsNodePaths),
-             std::string(kHoldsTightBoxes), std::string(kHoldsPoses), std::string(kHoldsBounds),
-             std::string(kHoldsBoxes3d), std::string(kHoldsCamera), std::string(kHoldsCameraPose)});
+        info_.holds.insert({std::string(kHoldsInstances), std::string(kHoldsLabels),
+                            std::string(kHoldsNodePaths), std::string(kHoldsTightBoxes),
+                            std::string(kHoldsCamera), std::string(kHoldsCameraPose)});
         for (const Json& object : json.at("objects")) {
+          if (object.contains("world_from_node")) info_.holds.emplace(kHoldsPoses);
+          if (object.contains("bounds_min")) {
+            info_.holds.insert({std::string(kHoldsBounds), std::string(kHoldsBoxes3d)});
+          }
           if (!object.contains("visible_share")) continue;
           info_.holds.insert({std::string(kHoldsOcclusion), std::string(kHoldsTruncation)});
         }
@@ -618,9 +621,7 @@ class SampleReading : private FrameReading {
       return int(value);
     };
     instance.tight_box = PixelBox{edge(0), edge(1), edge(2), edge(3)};
-    instance.world_from_node = affine_of_rows(object.at("world_from_node"));
-    instance.bounds_node = {vector_of_json(object.at("bounds_min")),
-                            vector_of_json(object.at("bounds_max"))};
+    read_pose_entry(object, instance);
     const auto visible = whole_number<std::int64_t>(object.at("visible_px"));
     if (frame_.has(kInstanceId.name)) {
       const auto found = counts.find(instance.id);

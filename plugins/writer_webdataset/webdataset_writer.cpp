@@ -11,6 +11,7 @@
 
 #include "diorama/error.h"
 #include "writer_support/clips_json.h"
+#include "writer_support/cuboid.h"
 #include "writer_support/image_files.h"
 #include "writer_support/lens_json.h"
 #include "writer_support/npy.h"
@@ -79,10 +80,8 @@ Json object_json(const TrainingObject& object, const std::string& name) {
             {"class_index", object.class_index},
             {"node", instance.node_path},
             {"box", {box.x_min, box.y_min, box.x_max, box.y_max}},
-            {"visible_px", object.visible_px},
-            {"world_from_node", nested_list(instance.world_from_node.matrix())},
-            {"bounds_min", flat_list(instance.bounds_node.min.transpose())},
-            {"bounds_max", flat_list(instance.bounds_node.max.transpose())}};
+            {"visible_px", object.visible_px}};
+  add_pose(instance, json);
   if (instance.visibility) {
     json["visible_share"] = 1.0 - instance.visibility->occlusion().value_or(0.0);
     json["truncation"] = instance.visibility->truncation();
