@@ -44,6 +44,11 @@ struct KittiLabel {
   double rotation_y = 0.0;
 
   bool has_box_3d() const { return (size.array() > 0.0).all(); }
+  /// What the benchmark writes where it knows nothing.
+  bool says_no_box_3d() const {
+    return size == Vec3::Constant(-1.0) && location == Vec3::Constant(-1000.0) &&
+           rotation_y == -10.0 && alpha == -10.0;
+  }
 };
 
 KittiLabel label_of(const std::vector<std::string>& words) {
@@ -76,6 +81,7 @@ class KittiDataset final : public StoredDataset {
  public:
   KittiDataset(fs::path folder, const Host& host) : folder_(std::move(folder)), host_(host) {
     page_ = read_dataset_page(folder_);
+    has_unknown_ = !page_ || page_->conventions.contains("unknown");
     StoredFiles files(folder_, host_, log_);
     front_ = fs::is_directory(folder_ / "training") || page_ ? "training/" : "";
     is_tracking_ = recognise_page(folder_, kTrackingFormat) == Recognition::ByName ||
@@ -101,7 +107,6 @@ class KittiDataset final : public StoredDataset {
     has_depth_ = fs::is_directory(folder_ / front_ / "depth_2");
     has_calibration_ = fs::is_directory(folder_ / front_ / "calib");
     is_stereo_ = page_ && page_->conventions.contains("image_3");
-    has_unknown_ = !page_ || page_->conventions.contains("unknown");
     split_of_ = read_split_lists(files, "ImageSets", {"train", "val"});
     if (page_) check_own_files(files);
     if (page_) check_class_order(*page_, files);
@@ -242,7 +247,8 @@ class KittiDataset final : public StoredDataset {
     info_.format = is_tracking_ ? kTrackingFormat : kFormat;
     note_clips(clips_, info_);
     if (is_tracking_) info_.holds.emplace(kHoldsTracks);
-    info_.steps[kAskOcclusionLevels] = info_.steps[kAskTruncationLevels] = 1.0;
+    info_.steps[kAskOcclusionLevels] = 1.0;
+    info_.steps[kAskTruncationLevels] = is_tracking_ ? 1.0 : 0.005;
     if (is_stereo_) info_.steps[kAskCamerasOfPairs] = 1.0;
     info_.camera_names = pictures_.cameras();
     info_.captures = pictures_.captures();
@@ -446,14 +452,15 @@ class KittiPictureReading : private FrameReading {
         files_.check(track >= 0 && known.insert(track).second, kOnce, labels_, who,
                      "is there twice, or below 0");
         files_.check(label.truncation == 0.0 || label.truncation == 1.0 ||
-                         label.truncation == 2.0 || is_unknown(label.truncation),
+                         label.truncation == 2.0 || is_cut_unknown(label),
                      kAmodal, labels_, who, "its truncation is " + std::to_string(label.truncation),
                      "0, 1 or 2");
         const double level = std::exchange(label.truncation, 0.0);  // not a share
         const std::size_t before = frame_.instances.size();
         add_object(label, who);
         if (frame_.instances.size() > before) {
-          tell_levels(wanted_, label.occlusion, level, frame_.instances.back());
+          // None, up to half of it, more.
+          tell_seen(label, level > 0.0 ? 0.5 * level - 0.25 : level, frame_.instances.back());
         }
         if (frame_.instances.size() == before || track < 0) return;
         // The benchmark counts tracks from 0, which is no id.
@@ -510,7 +517,7 @@ class KittiPictureReading : private FrameReading {
     label.location += offset_;
     Instance instance = next_instance(name);
     instance.tight_box = box;
-    tell_levels(wanted_, label.occlusion, label.truncation, instance);
+    tell_seen(label, label.truncation, instance);
     if (label.has_box_3d()) {
       const Vec3 half = 0.5 * label.size;
       instance.world_from_node = camera_from_box(label);
@@ -521,12 +528,22 @@ class KittiPictureReading : private FrameReading {
     frame_.instances.push_back(std::move(instance));
   }
 
-  bool is_unknown(double truncation) const { return dataset_.has_unknown_ && truncation == -1.0; }
+  /// Who does not know how much is cut off does not know how much is hidden either.
+  bool is_cut_unknown(const KittiLabel& label) const {
+    return dataset_.has_unknown_ && label.truncation == -1.0 && label.occlusion == 3.0;
+  }
+
+  /// Level 1 is partly hidden, 2 largely; of other ones nothing is known.
+  void tell_seen(const KittiLabel& label, double cut_off, Instance& instance) {
+    const double& level = label.occlusion;
+    if (!(level >= 0.0 && level <= 2.0) || cut_off < 0.0) return;
+    tell_levels(wanted_, level > 0.0 ? 0.5 * level - 0.25 : 0.0, cut_off, instance);
+  }
 
   void check_numbers(const KittiLabel& label, const std::string& who) {
-    files_.check(
-        (label.truncation >= 0.0 && label.truncation <= 1.0) || is_unknown(label.truncation),
-        kAmodal, labels_, who, "its truncation is " + std::to_string(label.truncation), "0 to 1");
+    files_.check((label.truncation >= 0.0 && label.truncation <= 1.0) || is_cut_unknown(label),
+                 kAmodal, labels_, who, "its truncation is " + std::to_string(label.truncation),
+                 "0 to 1");
     // To two digits, also where a last pixel is left in a corner.
     const bool is_at_border = label.box[0] <= 0.0 || label.box[1] <= 0.0 ||
                               label.box[2] >= frame_.camera.width ||
@@ -538,12 +555,13 @@ class KittiPictureReading : private FrameReading {
     files_.check(is_level && (dataset_.has_unknown_ || label.occlusion != 3.0), kAmodal, labels_,
                  who, "its occlusion is " + std::to_string(label.occlusion),
                  "0, 1, 2 or, unknown, 3");
-    const bool is_nowhere = !label.has_box_3d() && dataset_.has_unknown_;
-    files_.check(is_nowhere || (std::abs(label.rotation_y) <= kPi + 0.01 &&
-                                std::abs(label.alpha) <= kPi + 0.01),
+    if (label.says_no_box_3d()) return;
+    files_.check(std::abs(label.rotation_y) <= kPi + 0.01 && std::abs(label.alpha) <= kPi + 0.01,
                  kAngles, labels_, who, "an angle is beyond pi");
     if (!label.has_box_3d()) {
-      files_.check(dataset_.has_unknown_, kReadable, labels_, who, "its 3-D box has no size");
+      // Others write zeros where they have no box.
+      files_.check(dataset_.has_unknown_ && (label.size.array() <= 0.0).all(), kReadable, labels_,
+                   who, "its 3-D box has no size");
       return;
     }
     // The benchmark's own angles were made of another point of the box.

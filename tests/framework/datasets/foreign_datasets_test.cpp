@@ -378,6 +378,25 @@ TEST_CASE("KITTI's own fifteen columns, DontCare, and a calibration with a shift
   const Vec3 heading = car.world_from_node.linear().col(0);
   CHECK(std::abs(heading.z()) == Approx(1.0).margin(1e-3));
 
+  // What is not known is said of all at once, and only of areas without labels by itself.
+  const std::string box = " 47.86 16.28 74.14 28.91 ";
+  const std::string nowhere = "-1 -1 -1 -1000 -1000 -1000 -10\n";
+  folder.write("training/label_2/000007.txt",
+               "Car -1 3 -10" + box + nowhere + "Van 0.00 0 0" + box + "0 0 0 0 0 0 0\n");
+  CHECK(lint(folder).findings.empty());
+  const std::string there = "1.50 1.80 4.00 0.00 1.45 10.00 ";
+  for (const auto& [label, check] : std::vector<std::pair<std::string, const char*>>{
+           {"Car -1 0 -1.57" + box + there + "-1.57\n", "visible <= amodal"},
+           {"Car 0.00 0 -10" + box + there + "-1.57\n", "angles agree"},
+           {"Car 0.00 0 -1.57" + box + there + "-10\n", "angles agree"},
+           {"Car 0.00 0 -10" + box + "-1 -1 -1 0.00 1.45 10.00 -10\n", "angles agree"},
+           {"Car 0.00 0 -1.57" + box + "-1 1.80 4.00 0.00 1.45 10.00 -1.57\n",
+            "every file can be read"}}) {
+    INFO(label);
+    folder.write("training/label_2/000007.txt", label);
+    CHECK(finds(lint(folder), check, "label_2/000007.txt"));
+  }
+
   folder.write("training/label_2/000007.txt",
                "Car 0.00 7 2.0 47.86 16.28 74.14 28.91 1.50 1.80 4.00 0.00 1.45 10.00 -1.57\n"
                "Car 0 0 0 1 2 3\n");
