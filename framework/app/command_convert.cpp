@@ -97,7 +97,7 @@ ChosenWriters make_writers(const std::vector<std::string>& texts, Registry& regi
 ConversionSource open_source(const fs::path& folder, const ConvertOptions& options,
                              DatasetReaders& readers, Host& host) {
   const FoundDataset found = find_dataset(folder, readers, options.reader);
-  ConversionSource source{found.folder, readers.open(found.folder, found.reader), {}, {}, {}};
+  ConversionSource source{found.folder, readers.open(found.folder, found.reader), {}, {}, {}, {}};
   source.info = dataset_info_of(found.folder, *source.data, host);
   return source;
 }
@@ -157,6 +157,35 @@ std::vector<std::string> go_without(ChosenWriters& chosen,
   return notes;
 }
 
+/// A writer that was told to do without ids of pixels takes objects from their boxes: there would
+/// be none without those.
+void require_boxes(const ChosenWriters& chosen, const std::vector<ConversionSource>& sources,
+                   Registry& registry, Host& host) {
+  const std::string ids(kInstanceId.name);
+  const auto boxless = std::ranges::find_if(sources, [&](const ConversionSource& source) {
+    return !source.holds.contains(kHoldsTightBoxes) && !source.holds.contains(ids);
+  });
+  if (boxless == sources.end()) return;
+  for (std::size_t i = 0; i < chosen.writers.size(); ++i) {
+    if (chosen.writers[i].writer->needs().contains(ids)) continue;
+    const Value& entry = chosen.entries[i];
+    for (const ParamSpec& param :
+         registry.describe(ComponentKind::Writer, entry.find("type")->scalar)) {
+      const bool is_on = param.type == ParamType::Bool && param.default_value.scalar == "true";
+      if (!is_on || !entry.find(param.key)) continue;
+      Value with = entry;
+      with.set(param.key, Value::boolean(true));
+      const auto writer = writer_or_none(with, registry, host);
+      if (!writer || !writer->needs().contains(ids)) continue;
+      throw Error(ErrorKind::Usage, boxless->folder.string() + ": holds neither " +
+                                        std::string(kHoldsTightBoxes) + " nor " + ids +
+                                        ", so --writer " + chosen.writers[i].name + " with " +
+                                        param.key + "=false would write no object; it holds " +
+                                        joined(boxless->holds));
+    }
+  }
+}
+
 /// That of the run which the only source comes from, where there is one; else what readers know.
 std::string page_text(const std::vector<fs::path>& sources, const std::vector<std::string>& formats,
                       const DatasetInfo& info, OrderedJson writers) {
@@ -196,6 +225,7 @@ int command_convert(const GlobalOptions& global, const ConvertOptions& options, 
   }
   for (ConversionSource& source : sources) look_through(source, chosen.needs(), *services.host);
   const auto switched = go_without(chosen, sources, *services.registry, *services.host);
+  require_boxes(chosen, sources, *services.registry, *services.host);
   const Conversion conversion(std::move(sources), chosen.needs());
   for (const std::string& note : switched) log.write(LogLevel::Warning, note);
   for (const std::string& note : conversion.notes()) log.write(LogLevel::Warning, note);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <map>
 #include <optional>
@@ -70,17 +71,38 @@ void clip_boxes(Frame& frame) {
   }
 }
 
+/// Levels are told by counts of which only the shares are true: makes them those of the object's
+/// visible pixels, which without masks are those of its box.
+void count_levels(Instance& instance, std::optional<std::int64_t> visible) {
+  if (!instance.visibility || !instance.tight_box) return;
+  const Visibility level = *instance.visibility;
+  const double pixels =
+      visible ? double(*visible)
+              : double(instance.tight_box->width()) * double(instance.tight_box->height());
+  const double inside = pixels / (1.0 - level.occlusion().value_or(0.0));
+  const double outside = inside * level.truncation() / (1.0 - level.truncation());
+  instance.visibility =
+      Visibility{std::llround(pixels), std::llround(inside), std::llround(std::ceil(outside)),
+                 instance.tight_box,   instance.tight_box,   {}};
+}
+
 /// Boxes of pixels, and visibility as if nothing were hidden or cut off, where they are missing.
-void complete_instances(Frame& frame, const NameSet& needs) {
+void complete_instances(Frame& frame, const NameSet& needs, bool tells_levels) {
   clip_boxes(frame);
-  if (!frame.has(kInstanceId.name)) return;
-  complete_boxes(frame);
+  const bool has_ids = frame.has(kInstanceId.name);
+  if (has_ids) complete_boxes(frame);
   if (!needs.contains("visibility")) return;
+  if (!has_ids) {
+    if (!tells_levels) return;
+    for (Instance& instance : frame.instances) count_levels(instance, std::nullopt);
+    return;
+  }
   const Image<std::uint32_t>& ids = frame.get(kInstanceId);
   const auto seen = pixel_extents(ids);
   for (Instance& instance : frame.instances) {
     const auto found = seen.find(instance.id);
     const std::int64_t pixels = found == seen.end() ? 0 : found->second.pixels;
+    if (tells_levels) count_levels(instance, pixels);
     if (!instance.visibility) {
       instance.visibility.emplace();
       instance.visibility->visible_pixels = instance.visibility->amodal_pixels = pixels;
@@ -183,20 +205,93 @@ std::string source_name(const ConversionSource& source) {
   return source.folder.string() + " (" + source.data->info().format + ")";
 }
 
-/// The first capture whose ids of pixels nobody can tell although its files are whole.
+/// Levels of what is hidden and cut off that the source tells in place of shares.
+NameSet told_levels(const ConversionSource& source) {
+  NameSet levels;
+  if (source.holds.contains(kHoldsOcclusion)) return levels;
+  for (const char* level : {kAskOcclusionLevels, kAskTruncationLevels}) {
+    if (source.data->info().steps.contains(std::string_view(level))) levels.emplace(level);
+  }
+  return levels;
+}
+
+/// One picture of ids of masks that overlap: a pixel is the smallest object's, which is likely to
+/// be a part of the others or to lie on them. Boxes become those of the pixels that are left.
+/// Returns how many objects have none.
+std::int64_t paint_masks(const std::map<std::uint32_t, CoverageMask>& masks, Frame& frame) {
+  std::vector<std::pair<std::int64_t, std::uint32_t>> by_size;
+  for (const auto& [id, mask] : masks) {
+    by_size.emplace_back(std::ranges::count(mask.bits, std::uint8_t(1)), id);
+  }
+  std::ranges::sort(by_size, std::greater());
+  Image<std::uint32_t> ids(frame.camera.width, frame.camera.height, 0);
+  for (const auto& [size, id] : by_size) {
+    const CoverageMask& mask = masks.at(id);
+    const PixelBox box = mask.box.clipped(ids.width(), ids.height());
+    for (int y = box.y_min; y < box.y_max; ++y) {
+      for (int x = box.x_min; x < box.x_max; ++x) {
+        if (mask.bits[mask.index(x, y)] != 0) ids.at(x, y) = id;
+      }
+    }
+  }
+  const auto seen = pixel_extents(ids);
+  for (Instance& instance : frame.instances) {
+    const auto found = seen.find(instance.id);
+    instance.tight_box.reset();
+    if (found != seen.end()) instance.tight_box = found->second.box;
+    if (instance.visibility) {
+      instance.visibility->visible_pixels = found == seen.end() ? 0 : found->second.pixels;
+    }
+  }
+  frame.set(kInstanceId, std::move(ids));
+  return std::ranges::count_if(
+      by_size, [&](const auto& each) { return each.first > 0 && !seen.contains(each.second); });
+}
+
+/// What a capture lacks of ids of pixels although its files are whole.
 struct IdGap {
-  bool is_there = false;
   int capture = 0;
+  bool has_overlaps = false;  ///< Of masks that all objects have.
+  bool lacks_masks = false;
+  std::int64_t vanishing = 0;  ///< Objects that smaller ones cover.
 };
 
-IdGap find_gap(const StoredCapture& stored) {
+IdGap find_gap(StoredCapture stored) {
+  IdGap gap;
+  gap.capture = stored.capture.index;
   const bool is_damaged = std::ranges::any_of(stored.log.findings, [](const Finding& finding) {
     return finding.check == kNothingIsMissing || finding.check == kFilesCanBeRead;
   });
-  const bool has_all = std::ranges::all_of(
-      stored.capture.frames, [](const Frame& frame) { return frame.has(kInstanceId.name); });
-  return {!is_damaged && !has_all, stored.capture.index};
+  if (is_damaged) return gap;
+  for (std::size_t i = 0; i < stored.capture.frames.size(); ++i) {
+    Frame& frame = stored.capture.frames[i];
+    if (frame.has(kInstanceId.name)) continue;
+    const bool have_all =
+        i < stored.masks.size() && std::ranges::all_of(frame.instances, [&](const Instance& each) {
+          return stored.masks[i].contains(each.id);
+        });
+    (have_all ? gap.has_overlaps : gap.lacks_masks) = true;
+    if (have_all) gap.vanishing += paint_masks(stored.masks[i], frame);
+  }
+  return gap;
 }
+
+/// "3 of 20 captures, first in capture 7".
+class CapturesFound {
+ public:
+  void add(int capture) {
+    if (count_++ == 0) first_ = capture;
+  }
+  std::size_t count() const { return count_; }
+  std::string text(std::size_t all) const {
+    return std::to_string(count_) + " of " + std::to_string(all) + " captures, first in capture " +
+           std::to_string(first_);
+  }
+
+ private:
+  std::size_t count_ = 0;
+  int first_ = 0;
+};
 
 }  // namespace
 
@@ -208,17 +303,24 @@ void look_through(ConversionSource& source, const NameSet& needs, Host& host) {
   if (!uses_ids || !source.holds.contains(kInstanceId.name) || !source.info.resolved_job.empty()) {
     return;
   }
-  int gaps = 0;
-  int first = 0;
+  CapturesFound lacking;
+  CapturesFound overlapping;
+  std::int64_t vanishing = 0;
   sweep_captures<IdGap>(data, NameSet{std::string(kInstanceId.name)}, host, find_gap,
                         [&](const IdGap& gap) {
-                          if (gap.is_there && gaps++ == 0) first = gap.capture;
+                          if (gap.lacks_masks) lacking.add(gap.capture);
+                          if (gap.has_overlaps) overlapping.add(gap.capture);
+                          vanishing += gap.vanishing;
                         });
-  if (gaps == 0) return;
-  source.holds.erase(std::string(kInstanceId.name));
-  source.why_no_ids = "masks overlap, or an object has none, in " + std::to_string(gaps) + " of " +
-                      std::to_string(data.info().captures.size()) + " captures, first in capture " +
-                      std::to_string(first);
+  const std::size_t all = data.info().captures.size();
+  if (lacking.count() > 0) {
+    source.holds.erase(std::string(kInstanceId.name));
+    source.why_no_ids = "an object has no mask in " + lacking.text(all);
+  } else if (overlapping.count() > 0) {
+    source.overlaps = "masks overlap in " + overlapping.text(all) +
+                      "; a pixel of several objects becomes the smallest one's, of which " +
+                      std::to_string(vanishing) + " objects lose all pixels";
+  }
 }
 
 NameSet lacking_channels(const ConversionSource& source, const NameSet& needs) {
@@ -269,6 +371,9 @@ void Conversion::note_differences(const ConversionSource& source) {
   if (!source.why_no_ids.empty()) {
     notes_.push_back(who + ": " + source.why_no_ids + "; no writer gets a mask");
   }
+  if (!source.overlaps.empty() && needs_.contains(kInstanceId.name)) {
+    notes_.push_back(who + ": " + source.overlaps);
+  }
   if (!derived.empty()) {
     notes_.push_back(who + ": " + joined(derived) + " comes from the other kind of distance");
   }
@@ -278,6 +383,11 @@ void Conversion::note_differences(const ConversionSource& source) {
                           ? "lists of what hides an object are those of the masks, without pixels "
                             "where a third hides both"
                           : "lists of what hides an object are empty, whatever is hidden"));
+  }
+  if (!told_levels(source).empty() && made_up.erase("visibility") > 0) {
+    notes_.push_back(who +
+                     ": holds levels of what is hidden or cut off, no shares; where a format says "
+                     "shares, objects have that in the middle of their level");
   }
   if (!made_up.empty()) {
     notes_.push_back(who + ": does not hold " + joined(made_up) + "; objects count as neither " +
@@ -390,6 +500,7 @@ void Conversion::run(Host& host, const std::function<void(Capture)>& take) const
           std::string_view("pointcloud")}) {
       if (!needs_.contains(name)) wanted.erase(std::string(name));
     }
+    if (needs_.contains("visibility")) wanted.merge(told_levels(source));
     const NameSet& holds = source.holds;
     const bool counts_anew = !holds.contains(kHoldsTracks);
     const bool has_paths = holds.contains(kHoldsNodePaths) || !counts_anew;
@@ -413,7 +524,11 @@ Capture Conversion::converted(const ConversionSource& source, StoredCapture stor
         stored.capture.frames, [&](const Frame& frame) { return frame.camera_name == camera; });
     if (!is_there) refuse_capture(source.folder, stored, camera);
   }
-  for (Frame& frame : stored.capture.frames) {
+  for (std::size_t i = 0; i < stored.capture.frames.size(); ++i) {
+    Frame& frame = stored.capture.frames[i];
+    const bool has_overlaps = !source.overlaps.empty() && !frame.has(kInstanceId.name) &&
+                              needs_.contains(kInstanceId.name) && i < stored.masks.size();
+    if (has_overlaps && !stored.masks[i].empty()) paint_masks(stored.masks[i], frame);
     for (const std::string& name : needs_) {
       if (is_annotation(name) || frame.has(name)) continue;
       const std::string_view twin = twin_of(name);
@@ -422,11 +537,12 @@ Capture Conversion::converted(const ConversionSource& source, StoredCapture stor
       derive_distance(name, frame);
     }
     if (frame.camera_path.empty()) frame.camera_path = "/Cameras/" + frame.camera_name;
-    if (needs_.contains("instances")) complete_instances(frame, needs_);
+    if (needs_.contains("instances")) {
+      complete_instances(frame, needs_, !told_levels(source).empty());
+    }
     if (needs_.contains("occlusion_order") && !source.holds.contains("occlusion_order")) {
       frame.occlusions = order_of_masks(frame);
     }
-    if (source.holds.contains(kHoldsBounds) || source.holds.contains(kHoldsBoxes3d)) continue;
     // What means nothing is a point, a number that every format can write; empty boxes are
     // infinite.
     for (Instance& instance : frame.instances) {

@@ -22,10 +22,12 @@ struct ConversionSource {
   NameSet holds;     ///< What every capture holds, see look_through().
   /// Empty, or why captures do not hold ids of pixels, although the dataset does.
   std::string why_no_ids;
+  /// Empty, or where masks overlap and what becomes of them.
+  std::string overlaps;
 };
 
-/// Fills in the source's last two fields. Where writers `need` ids of pixels and somebody else made
-/// the dataset, reads the masks of all its captures: they may overlap, or some object may have
+/// Fills in the source's last three fields. Where writers `need` ids of pixels and somebody else
+/// made the dataset, reads the masks of all its captures: they may overlap, or some object may have
 /// none.
 void look_through(ConversionSource& source, const NameSet& needs, Host& host);
 

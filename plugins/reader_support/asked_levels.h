@@ -17,20 +17,19 @@ inline constexpr const char* kAskTruncationLevels = "truncation_levels";
 inline constexpr const char* kAskSeenShares = "seen_shares";
 inline constexpr const char* kAskCamerasOfPairs = "cameras_of_pairs";
 
-/// Counts that grow with the levels, for who has asked. Levels are 0 to 3, or shares.
-inline void tell_levels(const NameSet& wanted, double occlusion, double truncation,
-                        Instance& instance) {
+/// Counts for who has asked: of a whole object this share is hidden, and this one outside of the
+/// picture. Of levels: the middle of what each stands for.
+inline void tell_levels(const NameSet& wanted, double hidden, double cut_off, Instance& instance) {
   const bool is_asked = wanted.contains(std::string_view(kAskOcclusionLevels)) ||
                         wanted.contains(std::string_view(kAskTruncationLevels));
   if (!is_asked) return;
-  constexpr double kWhole = 1000.0;
-  const auto part = [](double level) {
-    return std::llround(kWhole * std::clamp(0.25 * level, 0.0, 1.0));
-  };
+  constexpr double kInside = 1e6;
+  constexpr double kMost = 0.999;
+  const double outside = std::clamp(cut_off, 0.0, kMost);
   Visibility& seen = instance.visibility.emplace();
-  seen.amodal_pixels = std::llround(kWhole);
-  seen.visible_pixels = seen.amodal_pixels - part(occlusion);
-  seen.outside_pixels = part(truncation);
+  seen.amodal_pixels = std::llround(kInside);
+  seen.visible_pixels = std::llround(kInside * (1.0 - std::clamp(hidden, 0.0, kMost)));
+  seen.outside_pixels = std::llround(kInside * outside / (1.0 - outside));
 }
 
 }  // namespace diorama

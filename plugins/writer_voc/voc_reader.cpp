@@ -376,7 +376,10 @@ class VocPictureReading : private FrameReading {
     const auto is_set = [&](const char* flag) {
       return object.child(flag) && object.text_of(flag) == "1";
     };
-    tell_levels(wanted_, is_set("occluded"), is_set("truncated"), instance);
+    const bool tells = object.child("occluded") || object.child("truncated");
+    // What is difficult is hardly seen.
+    const double hidden = is_set("difficult") ? 0.9 : is_set("occluded") ? 0.25 : 0.0;
+    if (tells) tell_levels(wanted_, hidden, is_set("truncated") ? 0.25 : 0.0, instance);
     frame_.instances.push_back(std::move(instance));
   }
 

@@ -313,21 +313,116 @@ TEST_CASE("boxes of others, which have no masks, become boxes of any format", "[
   CHECK_FALSE(fs::exists(folder / "masks"));
 }
 
-TEST_CASE("masks that overlap are found before anything is written", "[convert]") {
+TEST_CASE("masks that overlap stay masks, and what is lost of them is said", "[convert]") {
   const TemporaryFolder folder;
   write_coco(folder / "coco", true);
-  const Outcome boxes =
-      succeed({"convert", "coco", "--writer", "CocoWriter", "-o", "boxes"}, folder);
-  CHECK_THAT(boxes.errors,
-             ContainsSubstring("masks overlap, or an object has none, in 1 of 3 captures, first in "
-                               "capture 0; no writer gets a mask"));
-  CHECK(boxes_of_coco(folder / "boxes/CocoWriter") == kDrawn);
-  succeed({"lint", "boxes"}, folder);
-  const Outcome outlines = run(
-      {"convert", "coco", "--writer", "YoloWriter task=segment", "-o", "outlines"}, folder.path());
-  CHECK(outlines.exit_code == 2);
-  CHECK_THAT(outlines.errors, ContainsSubstring("does not hold instance_id (masks overlap"));
-  CHECK_FALSE(fs::exists(folder / "outlines"));
+  const Outcome outcome = succeed({"convert", "coco", "--writer", "CocoWriter val_share=0",
+                                   "--writer", "YoloWriter task=segment", "-o", "out"},
+                                  folder);
+  CHECK_THAT(outcome.errors,
+             ContainsSubstring("masks overlap in 1 of 3 captures, first in capture 0; a pixel of "
+                               "several objects becomes the smallest one's, of which 0 objects "
+                               "lose all pixels"));
+  succeed({"lint", "out"}, folder);
+  // The dog, which is smaller, keeps what it shares with the cat.
+  std::vector<std::vector<int>> boxes;
+  std::vector<int> areas;
+  const auto page = coco_page(folder / "out/CocoWriter");
+  for (const auto& each : page.at("annotations")) {
+    CHECK(each.contains("segmentation"));
+    boxes.push_back(each.at("bbox").get<std::vector<int>>());
+    areas.push_back(each.at("area").get<int>());
+  }
+  CHECK(boxes == std::vector<std::vector<int>>{
+                     {20, 8, 20, 17}, {3, 4, 17, 26}, {40, 0, 20, 12}, {0, 0, 60, 40}});
+  CHECK(areas == std::vector{20 * 17, 17 * 26, 20 * 12, 60 * 40});
+}
+
+TEST_CASE("levels of what is hidden or cut off go from VOC to KITTI and back", "[convert]") {
+  const TemporaryFolder folder;
+  write_picture(folder / "voc/JPEGImages/0.png", 7);
+  std::string xml =
+      "<annotation><filename>0.png</filename><size><width>60</width><height>40</height>"
+      "<depth>3</depth></size>";
+  int place = 0;
+  for (const char* flags : {"000", "010", "110", "011", "111"}) {
+    const std::string x = std::to_string(10 * place + 1);
+    xml += std::string("<object><name>cat</name><truncated>") + flags[0] +
+           "</truncated><occluded>" + flags[1] + "</occluded><difficult>" + flags[2] +
+           "</difficult><bndbox><xmin>" + x + "</xmin><ymin>3</ymin><xmax>" +
+           std::to_string(10 * ++place) + "</xmax><ymax>30</ymax></bndbox></object>";
+  }
+  write_file(folder / "voc/Annotations/0.xml", xml + "</annotation>");
+  const Outcome outcome =
+      succeed({"convert", "voc", "--writer", "KittiWriter", "-o", "kitti"}, folder);
+  CHECK_THAT(outcome.errors, ContainsSubstring("holds levels of what is hidden or cut off"));
+  succeed({"lint", "kitti"}, folder);
+  std::istringstream lines(read_file(folder / "kitti/KittiWriter/training/label_2/000000.txt"));
+  std::vector<std::pair<std::string, int>> levels;
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream words(line);
+    std::string name, truncation;
+    int occlusion = 0;
+    words >> name >> truncation >> occlusion;
+    levels.emplace_back(truncation, occlusion);
+  }
+  CHECK(levels == std::vector<std::pair<std::string, int>>{
+                      {"0.00", 0}, {"0.00", 1}, {"0.25", 1}, {"0.00", 2}, {"0.25", 2}});
+  for (const std::string from : {"voc", "kitti"}) {
+    succeed({"convert", from, "--writer", "VocWriter", "-o", "from_" + from}, folder);
+    succeed({"lint", "from_" + from}, folder);
+    const std::string text =
+        read_file(folder / ("from_" + from) / "VocWriter/Annotations/000000_camera.xml");
+    std::string flags;
+    for (const char* name : {"<truncated>", "<occluded>", "<difficult>"}) {
+      for (std::size_t at = text.find(name); at != text.npos; at = text.find(name, at + 1)) {
+        flags += text[at + std::string(name).size()];
+      }
+    }
+    INFO(from);
+    CHECK(flags == std::string("0010101111") + (from == "voc" ? "00011" : "00000"));
+  }
+}
+
+TEST_CASE("what a dataset does not tell of places and boxes is not written", "[convert]") {
+  const TemporaryFolder folder;
+  make(folder, job_of_writers(7, R"(
+  - {type: VocWriter, name: voc}
+  - {type: BasicWriter, name: flat, rgb: true, instance_segmentation: true, camera_params: true,
+     bounding_box_2d_tight: true, distance_to_image_plane: true}
+)"));
+  succeed({"convert", "out/voc", "--writer", "KittiWriter", "--writer", "Hdf5Writer", "--writer",
+           "WebDatasetWriter", "-o", "all"},
+          folder);
+  succeed({"lint", "all"}, folder);
+  for (const char* writer : {"Hdf5Writer", "WebDatasetWriter"}) {
+    for (const auto& [file, bytes] : tree(folder / "all" / writer)) {
+      INFO(writer << " " << file);
+      CHECK(bytes.find("bounds_min") == bytes.npos);
+      CHECK(bytes.find("world_from_node") == bytes.npos);
+    }
+  }
+  CHECK_THAT(read_file(folder / "all/KittiWriter/training/label_2/000000.txt"),
+             ContainsSubstring(" -1.0000 -1.0000 -1.0000 -1000.0000 -1000.0000 -1000.0000 -10"));
+  const Outcome unplaced =
+      run({"convert", "out/flat", "--writer", "BopWriter", "-o", "bop"}, folder.path());
+  CHECK(unplaced.exit_code != 0);
+  CHECK_THAT(unplaced.errors, ContainsSubstring("BOP has nothing to say but poses"));
+  // Poses without masks or boxes: nothing tells which pixels objects have.
+  write_picture(folder / "poses/train/000000/rgb/000000.png", 7);
+  write_file(folder / "poses/train/000000/scene_camera.json",
+             R"({"0": {"cam_K": [60, 0, 30, 0, 60, 20, 0, 0, 1]}})");
+  write_file(folder / "poses/train/000000/scene_gt.json",
+             R"({"0": [{"cam_R_m2c": [1,0,0, 0,1,0, 0,0,1], "cam_t_m2c": [0, 0, 500],
+                        "obj_id": 5}]})");
+  CHECK_THAT(succeed({"stats", "poses"}, folder).output, ContainsSubstring("obj_000005"));
+  const Outcome boxless =
+      run({"convert", "poses", "--writer", "VocWriter masks=false", "-o", "voc"}, folder.path());
+  CHECK(boxless.exit_code == 2);
+  CHECK_THAT(boxless.errors,
+             ContainsSubstring("holds neither tight_boxes nor instance_id, so --writer VocWriter "
+                               "with masks=false would write no object"));
+  CHECK_FALSE(fs::exists(folder / "voc"));
 }
 
 TEST_CASE("a converted dataset is the one that the run would have written", "[convert]") {
