@@ -13,8 +13,9 @@ inline constexpr const char* kCountsAgree = "counts agree between files";
 
 /// Held: Instance::id is the same for an object in all frames of a clip, and nobody else's.
 inline constexpr const char* kHoldsTracks = "tracks";
-/// Levels in place of Visibility::occlusion() and truncation(): more is more hidden or cut off; how
-/// much more is not said.
+/// Levels in place of Visibility::occlusion() and truncation(): shares of counts that lie in the
+/// middle of the level. More is more hidden or cut off; how much more is not said, but where the
+/// step is below 1: those are shares, rounded to it.
 inline constexpr const char* kAskOcclusionLevels = "occlusion_levels";
 inline constexpr const char* kAskTruncationLevels = "truncation_levels";
 /// Visible pixels as a share of all, hidden and cut off ones too: Visibility has counts of which

@@ -8,6 +8,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -46,6 +47,8 @@ struct RunPlan {
   int captures = 0;
   std::vector<std::string> cameras;
   std::vector<DatasetClip> clips;
+  std::set<std::string> folders;  ///< Of its writers.
+  Json seed;
 };
 
 std::vector<DatasetClip> planned_clips(const Json& page) {
@@ -63,8 +66,13 @@ std::optional<RunPlan> read_plan(const std::filesystem::path& run, ReadLog& log)
   ++log.files;
   try {
     const Json page = parse_json(file_system.read(run / "dataset.json"));
+    std::set<std::string> folders;
+    for (const Json& writer : page.value("writers", Json::array())) {
+      if (writer.is_object()) folders.insert(writer.at("folder").get<std::string>());
+    }
     return RunPlan{whole_of_json<int>(page.at("captures")),
-                   page.at("cameras").get<std::vector<std::string>>(), planned_clips(page)};
+                   page.at("cameras").get<std::vector<std::string>>(), planned_clips(page),
+                   std::move(folders), page.value("seed", Json())};
   } catch (const std::exception& error) {
     log.findings.push_back(
         {kFilesCanBeRead, "dataset.json", std::nullopt, "", "", error.what(), ""});
@@ -112,6 +120,34 @@ void check_plan(const RunPlan& plan, const RunDataset& dataset, ReadLog& log) {
                "has no pictures of this camera", ""});
   }
   check_clips(plan, dataset, log);
+}
+
+/// A writer's folder may have been taken away, but not have become one that no writer has.
+void check_folders(const std::filesystem::path& run, const RunPlan& plan,
+                   const std::vector<RunDataset>& datasets, ReadLog& log) {
+  LocalFileSystem file_system;
+  const auto stranger = std::ranges::find_if(datasets, [&](const RunDataset& dataset) {
+    return !plan.folders.empty() && !plan.folders.contains(dataset.name);
+  });
+  for (const std::string& folder : plan.folders) {
+    log.check(stranger == datasets.end() || file_system.exists(run / folder),
+              {kCountsAgree, "dataset.json", std::nullopt, "", folder,
+               "is a writer's folder that is not there",
+               stranger == datasets.end() ? "" : "no writer has the folder " + stranger->name});
+  }
+}
+
+/// The pages of a run's datasets say its seed.
+void check_seed(const std::filesystem::path& run, const RunPlan& plan, const RunDataset& dataset,
+                ReadLog& log) {
+  LocalFileSystem file_system;
+  const std::string file = dataset.name + "/dataset.json";
+  if (plan.seed.is_null() || !file_system.exists(run / file)) return;
+  const Json page = parse_json_or_nothing<Json>(file_system.read(run / file));
+  if (!page.is_object() || !page.contains("seed")) return;
+  log.check(page["seed"] == plan.seed,
+            {kCountsAgree, file, std::nullopt, "", "seed", "is " + page["seed"].dump(),
+             plan.seed.dump() + " by the run's dataset.json"});
 }
 
 /// An object of one dataset without a partner in the other, or with one of a rare class.
@@ -470,6 +506,11 @@ class RunComparison {
                         in_reference);
       }
       if (!facts_.contains(asked)) return;
+      if (const double step = step_of(b_, asked); step < 1.0) {
+        remember_number(std::string(held), held, *first, *second, step + kShareSlack, b, k, object,
+                        in_reference);
+        return;
+      }
       levels_[asked].add(*second, *first, [&] {
         return about(b, k, held, object.node_path,
                      "its level of " + std::string(held) + " does not go with others",
@@ -733,7 +774,11 @@ ReadLog check_run(const std::filesystem::path& run, const std::vector<RunDataset
                   Host& host) {
   ReadLog log;
   if (const auto plan = read_plan(run, log)) {
-    for (const RunDataset& dataset : datasets) check_plan(*plan, dataset, log);
+    check_folders(run, *plan, datasets, log);
+    for (const RunDataset& dataset : datasets) {
+      check_plan(*plan, dataset, log);
+      check_seed(run, *plan, dataset, log);
+    }
   }
   if (datasets.size() < 2) return log;
   const auto reference = std::ranges::max_element(

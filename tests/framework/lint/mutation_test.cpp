@@ -529,10 +529,13 @@ DatasetOnDisk run_on_disk(const std::vector<std::string>& formats) {
     const auto files = format.write(host, test::sample_dataset(test::SampleScene(8, 6)), captures);
     for (const auto& [path, bytes] : files.files) all.files[format.name + "/" + path] = bytes;
   }
+  Json writers = Json::array();
+  for (const std::string& name : formats) writers.push_back({{"name", name}, {"folder", name}});
   const std::string page = Json{
       {"captures", captures.size()},
       {"cameras", {"cam_0", "cam_1"}},
-      {"writers", formats}}.dump();
+      {"seed", test::sample_dataset(test::SampleScene(8, 6)).seed},
+      {"writers", writers}}.dump();
   const auto bytes = std::as_bytes(std::span(page));
   all.files["dataset.json"] = {bytes.begin(), bytes.end()};
   return DatasetOnDisk(all);
@@ -840,6 +843,12 @@ TEST_CASE("levels, areas and keypoints are held against shares of other writers"
       {{"KITTI's occluded", "kitti/training/label_2/*4.txt", last_line(' ', other_level)},
        {"KITTI's truncated", "kitti/training/label_2/*4.txt",
         last_line(' ', [](Words& words) { words[1] = words[1] == "0.00" ? "0.50" : "0.00"; })},
+       {"the seed of the run", "dataset.json", json([](Json& page) { page["seed"] = 12345; })},
+       {"the folder of a writer", "dataset.json",
+        json([](Json& page) { page["writers"][1]["folder"] = "elsewhere"; })},
+       {"the share of KITTI's truncated", "kitti/training/label_2/*4.txt",
+        last_line(' ',
+                  [](Words& words) { words[1] = std::to_string(std::stod(words[1]) + 0.02); })},
        {"VOC's truncated", "voc/Annotations/*.xml", changed_flag("truncated")},
        {"VOC's occluded", "voc/Annotations/*.xml", changed_flag("occluded")},
        {"the area of an image folder", "imagefolder/train/metadata.jsonl",
