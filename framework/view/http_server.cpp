@@ -112,17 +112,6 @@ HttpAnswer text_answer(int status, std::string text) {
   return answer;
 }
 
-/// The page that takes the cookie along to the real one. A redirection would not do: browsers that
-/// come from elsewhere, a file or another program's link, send no strict cookie after it.
-HttpAnswer greeting() {
-  HttpAnswer answer;
-  answer.type = "text/html; charset=utf-8";
-  answer.body = std::make_shared<const std::string>(
-      "<!DOCTYPE html><meta charset='utf-8'><meta http-equiv='refresh' content='0;url=/'>"
-      "<link rel='icon' href='icon.svg'><title>diorama view</title>\n");
-  return answer;
-}
-
 }  // namespace
 
 struct HttpServer::State {
@@ -314,6 +303,9 @@ Response HttpServer::State::respond(const Request& request) {
                            (site.empty() || site == "same-origin" || site == "none");
 
   std::optional<HttpAnswer> made = refusal(request);
+  // The page itself, with the cookie that what it asks for takes along. A redirection would not do:
+  // browsers that come from elsewhere, a file or another program's link, send no strict cookie
+  // after it.
   bool greets = false;
   if (made) {
   } else if (target.size() > kMostTargetBytes) {
@@ -324,7 +316,8 @@ Response HttpServer::State::respond(const Request& request) {
     greets = is_same_secret(query.substr(kToken.size()), token);
   }
   if (greets) {
-    made = greeting();
+    last_use = Clock::now().time_since_epoch().count();
+    made = answer(path);
   } else if (!made) {
     const auto shown = request.count(http::field::cookie) == 1
                            ? cookie_of(plain(request[http::field::cookie]), cookie)

@@ -494,6 +494,9 @@ try {
   await opened.goto(`file://${pictures}/open.html`);
   await opened.waitForSelector('.card');
   check(!opened.url().includes('token'), 'a file of the user opens the page');
+  await opened.reload();
+  await opened.waitForSelector('.card');
+  check(true, 'which can be loaded anew');
 
   if (report) {
     const files = await newPage();

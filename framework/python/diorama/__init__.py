@@ -422,7 +422,10 @@ class Dataset(Sequence[Capture]):
     def __getitem__(self, place: int | slice) -> Capture | list[Capture]:
         if isinstance(place, slice):
             return [self[i] for i in range(*place.indices(len(self)))]
-        place = range(len(self))[place]  # negative ones count from the end; others raise IndexError
+        try:
+            place = range(len(self))[place]  # negative ones count from the end
+        except IndexError:
+            raise IndexError(f"{self.folder}: there is no capture at place {place} of {len(self)}") from None
         if os.getpid() != self._process:
             self._open(self._asked[0])  # after a fork the threads of readers are gone
         return _capture(self._stored.read(place, self._wanted))

@@ -146,7 +146,7 @@ class Open(unittest.TestCase):
         self.assertEqual([capture.index for capture in dataset[20:]], [20, 21, 22, 23])
         self.assertEqual([capture.index for capture in dataset], list(range(24)))
         for place in (24, -25):
-            with self.assertRaises(IndexError):
+            with self.assertRaisesRegex(IndexError, "there is no capture at place -?[0-9]+ of [0-9]+"):
                 dataset[place]
 
     def test_errors(self):

@@ -63,6 +63,8 @@ class Site {
   private isHeld = false;  ///< A pointer is down: what is below it must not be made anew, or the click is lost.
 
   async start(): Promise<void> {
+    // The token of the first address is a cookie by now.
+    if (!isReport && location.search !== '') history.replaceState(null, '', location.pathname + location.hash);
     document.body.append(this.top, this.faults, this.tools, this.gridPage, this.capture.element, this.compare.element,
       this.stats.element, this.findings.element, this.run.element, this.status, this.help);
     this.makeHelp();
