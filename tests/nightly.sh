@@ -2,9 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 # What takes longer than CI may. Every part runs, whatever the others say; ends with a table, and with 1 when
 # one failed.
-#   tests/nightly.sh [PART]...   build mutants kills faults large cluster views clip soak fuzz sanitize tidy deb12 deb13 (default: all)
-# Needs root for cluster, deb12 and deb13, and python3-scipy for clip. KILLS (1000), FAULTS (5000), VIEWS (1000), SOAK_CAPTURES (10000) and
-# FUZZ_MINUTES (60, shared by all fuzzers) say how much. Logs are in build/nightly.
+#   tests/nightly.sh [--at-once] [PART]...
+#              build mutants kills faults large cluster views clip soak fuzz sanitize tidy deb12 deb13 (default: all)
+# --at-once is for machines with many cores: build goes first, then the others run side by side, soak on one half of the
+# cores and the rest on the other; cluster, deb12 and deb13, which install packages, one after another among them.
+# Needs root and a network for cluster, deb12 and deb13, and python3-scipy for clip. KILLS (1000), FAULTS (5000), VIEWS (1000),
+# SOAK_CAPTURES (10000) and FUZZ_MINUTES (60, shared by all fuzzers) say how much. Logs are in build/nightly.
 # DIORAMA_BUILD says where the build is (default: build/release, which the part build makes). The parts kills, faults,
 # large, views, clip, soak and fuzz need nothing else of a build: neither compilers nor the place where it was made.
 set -uo pipefail
@@ -66,19 +69,69 @@ part_tidy() { tests/check_tidy.sh --all-checks; }
 part_deb12() { packaging/build-deb.sh --with-tests && packaging/test-deb.sh; }
 part_deb13() { packaging/test-deb.sh trixie; }
 
+# run_part PART: leaves its row of the table beside its log.
+run_part() {
+  local part=$1 begin=$SECONDS result=passed
+  echo "== nightly: $part (log: $logs/$part.log)"
+  "part_$part" >"$logs/$part.log" 2>&1 || result=FAILED
+  printf '%-8s %6s  %5ds  %s\n' "$part" "$result" $((SECONDS - begin)) "$(tail -n 1 "$logs/$part.log")" | tee "$logs/$part.row"
+  [[ $result == passed ]]
+}
+run_in_turn() {
+  local part worst=0
+  for part in "$@"; do run_part "$part" || worst=1; done
+  return "$worst"
+}
+
+# The cores of this process, one a line.
+list_cores() {
+  taskset -pc $$ | sed 's/.*: //' | tr , '\n' | while IFS=- read -r first last; do seq "$first" "${last:-$first}"; done
+}
+# start CORES PART...: in turn, in a process group of their own; CORES may be empty.
+start() {
+  {
+    if [[ $1 ]]; then taskset -pc "$1" "$BASHPID" >/dev/null; fi
+    shift
+    run_in_turn "$@"
+  } </dev/null &
+  started+=($!)
+}
+run_at_once() {
+  local part installing=() first='' second='' cores=() half worst=0
+  command -v taskset >/dev/null && mapfile -t cores < <(list_cores)
+  if ((${#cores[@]} >= 4)); then
+    half=$((${#cores[@]} / 2))
+    first=$(IFS=,; echo "${cores[*]:0:half}")
+    second=$(IFS=,; echo "${cores[*]:half}")
+  fi
+  for part in "$@"; do
+    if [[ $part == build ]]; then run_part build || worst=1; fi
+  done
+  set -m
+  started=()
+  trap 'kill -- "${started[@]/#/-}" 2>/dev/null; exit 130' INT TERM
+  for part in "$@"; do
+    case $part in
+      build) ;;
+      cluster | deb12 | deb13) installing+=("$part") ;;
+      soak) start "$first" soak ;;
+      *) start "$second" "$part" ;;
+    esac
+  done
+  if ((${#installing[@]})); then start "$second" "${installing[@]}"; fi
+  for part in "${started[@]}"; do wait "$part" || worst=1; done
+  return "$worst"
+}
+
+run=run_in_turn
+if [[ ${1:-} == --at-once ]]; then run=run_at_once; shift; fi
 parts=("$@")
 if ((${#parts[@]} == 0)); then parts=(build mutants kills faults large cluster views clip soak fuzz sanitize tidy deb12 deb13); fi
 for part in "${parts[@]}"; do
   if ! declare -F "part_$part" >/dev/null; then echo "nightly: there is no part '$part'" >&2; exit 2; fi
 done
-table=()
-worst=0
-for part in "${parts[@]}"; do
-  echo "== nightly: $part (log: $logs/$part.log)"
-  begin=$SECONDS
-  if "part_$part" >"$logs/$part.log" 2>&1; then result=passed; else result=FAILED worst=1; fi
-  table+=("$(printf '%-8s %6s  %5ds  %s' "$part" "$result" $((SECONDS - begin)) "$(tail -n 1 "$logs/$part.log")")")
-  echo "${table[-1]}"
-done
-printf '%s\n' '== nightly' "${table[@]}"
+"$run" "${parts[@]}"
+worst=$?
+echo '== nightly'
+for part in "${parts[@]}"; do cat "$logs/$part.row"; done
 exit "$worst"
