@@ -44,6 +44,8 @@ constexpr float kLimitedPaths = 16.0f;
 constexpr float kTimesOthers = 4.0f;
 
 constexpr float kMostGain = 1.0f;  // of a level, where it is all noise
+constexpr int kCalmLevel = 3;      // whose noise says whether there is any, ...
+constexpr float kCalm = 0.002f;    // ... so much of the light or more
 constexpr int kReach = 2;          // of the taps among a level's own pixels
 constexpr int kSide = 2 * kReach + 1;
 constexpr int kMargin = 32;  // pixels beside a row that taps may read
@@ -180,6 +182,7 @@ class TileFilter {
   void rows_avx512(Step step, std::size_t level, int y, Image<Vec3f>* image);
   template <int kWide>
   void filter(std::size_t level, int y);
+  float needed(int x, int y) const;
   template <int kWide>
   void finish(int block_row, Image<Vec3f>& image);
   template <int kWide>
@@ -483,6 +486,13 @@ inline void TileFilter::filter(std::size_t level, int y) {
   results_[level].fill_margins(y, {});
 }
 
+/// How much around a pixel there is to do: nothing, where nothing is noisy.
+inline float TileFilter::needed(int x, int y) const {
+  const auto row = pairs_[kCalmLevel].row(y >> kCalmLevel);
+  const float noise = *row.at(kNoise, x >> kCalmLevel);
+  return noise / std::max(noise + kCalm * *row.at(kShade, x >> kCalmLevel), 1e-12f);
+}
+
 /// Two rows of pixels.
 template <int kWide>
 inline void TileFilter::finish(int block_row, Image<Vec3f>& image) {
@@ -548,7 +558,7 @@ inline void TileFilter::finish(int block_row, Image<Vec3f>& image) {
       const float noise = *noisy.at(kNoise, x);
       const float noise_share = noise / std::max(noise + *noisy.at(kShade, x), 1e-12f);
       const float gain = 1.0f + kMostGain * noise_share * (1.0f - 2.0f / (1.0f + gains[x]));
-      const float other_share = others[x] / (1.0f + others[x]);
+      const float own_share = needed(x, y) / (1.0f + others[x]);
       const float stay = stays[x] / (1.0f + stays[x]);
       const Vec3f other = finite(other_.at(tile_.seen.x_min + x, image_y));
       for (int k = 0; k < 3; ++k) {
@@ -558,7 +568,7 @@ inline void TileFilter::finish(int block_row, Image<Vec3f>& image) {
         const float irradiance =
             gain * layer(sums, k) / std::max(layer(sums, kColor + k), kSmallest);
         float clean = (irradiance * layer(own, k) + layer(own, 3 + k)) / totals[std::size_t(x)];
-        clean += other_share * (other[k] - clean);
+        clean = other[k] + own_share * (clean - other[k]);
         color[k] = clean + stay * (*noisy.at(kLight + k, x) + *seen.at(k, x) - clean);
       }
     }

@@ -29,6 +29,8 @@ LIMITED_PATHS = 16.0
 SMALLEST = 1e-6
 PRIOR_BIAS = 0.1  # what a picture's mean is off by before it is set right
 MOST_GAIN = 1.0  # of a level, where it is all noise
+CALM_LEVEL = 3  # whose noise says whether there is any,
+CALM = 0.002  # so much of the light or more
 MAGIC = 0x574E4544  # "DENW"
 VERSION = 3
 
@@ -254,8 +256,12 @@ def denoised(film, logits):
     for k, weight in enumerate(weights[:, :, :height, :width].unbind(1)):
         total = total + weight.unsqueeze(1) * shifted(padded, k, 3, height, width)
     clean = irradiance[:, :, :height, :width] * total[:, :3] + total[:, 3:]
-    by_planes = torch.sigmoid(logits[0][:, -2:-1, :height, :width])
-    clean = clean + by_planes * (film.planes - clean)
+    # Where nothing is noisy, planes change nothing.
+    around = noise[CALM_LEVEL]
+    needed = around[:, 0:1] / (around[:, 0:1] + CALM * around[:, 1:2]).clamp(min=1e-12)
+    needed = F.interpolate(needed, scale_factor=1 << CALM_LEVEL, mode="nearest")
+    own_share = needed * torch.sigmoid(-logits[0][:, -2:-1])
+    clean = film.planes + own_share[:, :, :height, :width] * (clean - film.planes)
     stays = torch.sigmoid(logits[0][:, -1:, :height, :width])
     return clean + stays * (film.scattered[:, :, :height, :width] + film.seen - clean)
 

@@ -27,7 +27,7 @@ EDGES_COUNT = 1.0  # more than the other pixels
 REACH = 4  # pixels over which light of chance finds is spread
 KEPT = 0.9995  # of the average of weights, per step
 # How often which number of paths is drawn, where a view has it.
-SHARES = {1: 0.08, 2: 0.26, 4: 0.24, 16: 0.22, 256: 2.0}
+SHARES = {1: 0.08, 2: 0.26, 4: 0.24, 16: 0.22, 64: 1.0, 256: 2.0}
 OTHER_SHARE = 0.12
 SIZE = dict(widths=(48, 64, 80, 80, 64), encoder=(2, 2, 2, 2, 2), decoder=(2, 2, 2, 2))
 
