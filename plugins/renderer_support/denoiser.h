@@ -21,9 +21,14 @@ struct DenoiseSettings {
 /// What is held at most to denoise a picture of this size, the film included.
 std::size_t denoiser_bytes(int width, int height, bool is_quick);
 
-/// Removes sampling noise from a film by two filters, one that looks at planes (plane_filter.h) and
-/// one that was trained (network_filter.h). They err in different places: of each, as much is taken
-/// as the noisy picture around agrees with it. The film's memory is given back on the way.
+/// What a filter that looks at planes (plane_filter.h) makes of a film, with the mean that it had
+/// with its noise, as far as the noise lets that be known.
+Image<Vec3f> denoised_on_planes(const Film& film, const DenoiseSettings& settings, Isa isa,
+                                Host& host);
+
+/// Removes sampling noise from a film by two filters: one that was trained (network_filter.h) sees
+/// what the one that looks at planes made of it, and takes of that what it thinks right. The film's
+/// memory is given back on the way.
 Image<Vec3f> denoised(Film film, const DenoiseSettings& settings, Isa isa, Host& host);
 
 /// The plain means.

@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kBlock = ChannelBlocks::kWidth;
 constexpr std::int32_t kMagic = 0x574E4544;  // "DENW"
-constexpr std::int32_t kVersion = 2;
+constexpr std::int32_t kVersion = 3;
 constexpr int kRowsPerTask = 4;
 
 float from_half(std::uint16_t half) {
@@ -313,7 +313,7 @@ ChannelBlocks::ChannelBlocks(int channels, int width, int height, SpareMemory& s
 DenoiserNetwork::DenoiserNetwork(std::span<const std::byte> file) {
   WeightReader reader(file);
   if (reader.number() != kMagic || reader.number() != kVersion) {
-    throw Error(ErrorKind::Internal, "denoiser: these are no weights of version 2");
+    throw Error(ErrorKind::Internal, "denoiser: these are no weights of version 3");
   }
   constexpr int kMostChannels = 1024;
   constexpr int kMostConvolutions = 16;
@@ -342,14 +342,15 @@ DenoiserNetwork::DenoiserNetwork(std::span<const std::byte> file) {
   }
   // The first head stands for two: of its own level, and of single pixels.
   constexpr int kLevel = kGain + 1;
-  constexpr int kKernels = 4 * (kPixelLogits - 1);
-  const PlainWeights first(reader, widths[0], kLevel + kKernels + 8, 1);
+  constexpr int kTaps = 4 * kKernels;
+  constexpr int kOthers = 4 * (kPixelLogits - kKernels);
+  const PlainWeights first(reader, widths[0], kLevel + kTaps + 4 + kOthers, 1);
   heads_[0] = empty_convolution(widths[0], kLevel + 4, 1);
   add_outputs(heads_[0], first, 0, kLevel, 0);
-  add_outputs(heads_[0], first, kLevel + kKernels, 4, kPixelKeep);
-  pixels_ = empty_convolution(widths[0], kKernels + 4, 1);
-  add_outputs(pixels_, first, kLevel, kKernels, 0);
-  add_outputs(pixels_, first, kLevel + kKernels + 4, 4, kKernels);
+  add_outputs(heads_[0], first, kLevel + kTaps, 4, kPixelKeep);
+  pixels_ = empty_convolution(widths[0], kTaps + kOthers, 1);
+  add_outputs(pixels_, first, kLevel, kTaps, 0);
+  add_outputs(pixels_, first, kLevel + kTaps + 4, kOthers, kTaps);
   for (std::size_t level = 1; level < kDepth; ++level) {
     heads_[level] = read_convolution(reader, widths[level], kLevel, 1);
   }

@@ -70,7 +70,7 @@ struct Convolution {
 /// The U-Net that tells the denoiser how to average: see tests/denoiser_training/README.md.
 class DenoiserNetwork {
  public:
-  static constexpr int kFeatures = 16;  ///< Per pixel; in blocks of 2 x 2 they are its channels.
+  static constexpr int kFeatures = 20;  ///< Per pixel; in blocks of 2 x 2 they are its channels.
   static constexpr int kDepth = 5;      ///< Levels, from half the resolution on.
   static constexpr int kAlignment = 1 << kDepth;  ///< Of the sizes of pictures that it takes.
   static constexpr int kFine = 25;                ///< Taps among a level's own pixels ...
@@ -92,8 +92,13 @@ class DenoiserNetwork {
   static constexpr int kKeep = kFine + kCoarse;  ///< Channel of `levels`.
   static constexpr int kGain = kKeep + 1;
   static constexpr int kPixelKeep = kGain + 1;  ///< Four channels of the first of `levels`.
-  /// Of single pixels; the last one says how much of a pixel stays as it was.
-  static constexpr int kPixelLogits = kFine + kCoarse + kOwn + 1;
+  /// Of single pixels: the taps, how much brighter or darker the pixel becomes, the share that
+  /// another filter's result has, and that of the pixel as it was.
+  static constexpr int kKernels = kFine + kCoarse + kOwn;
+  static constexpr int kPixelGain = kKernels;
+  static constexpr int kOther = kKernels + 1;
+  static constexpr int kStays = kKernels + 2;
+  static constexpr int kPixelLogits = kKernels + 3;
 
   /// `features` holds kFeatures x 4 channels of blocks of 2 x 2 pixels: number 4 f + 2 y + x.
   Logits run(ChannelBlocks features, Isa isa, Host& host, SpareMemory& spare) const;

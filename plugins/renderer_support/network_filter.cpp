@@ -30,8 +30,10 @@ constexpr std::size_t kTileBytesPerPixel = 288;
 /// Of the network's features of which the logarithm, ln(1 + x), is taken: what that is multiplied
 /// by.
 constexpr std::array<float, Network::kFeatures> kLogScales{
-    1 / 3.0f, 1 / 3.0f, 1 / 3.0f,           0,       0, 0, 0, 0, 0, 1 / 2.0f, 0, 1 / 3.0f,
-    0,        0,        1.44269504f / 8.0f, 1 / 3.0f};
+    1 / 3.0f, 1 / 3.0f, 1 / 3.0f, 0,        0,
+    0,        0,        0,        0,        1 / 2.0f,
+    0,        1 / 3.0f, 0,        0,        1.44269504f / 8.0f,
+    1 / 3.0f, 1 / 3.0f, 1 / 3.0f, 1 / 3.0f, 1 / 3.0f};
 
 constexpr float kMinAlbedo = 0.02f;
 constexpr float kSmallest = 1e-6f;
@@ -42,6 +44,8 @@ constexpr float kLimitedPaths = 16.0f;
 constexpr float kTimesOthers = 4.0f;
 
 constexpr float kMostGain = 1.0f;  // of a level, where it is all noise
+constexpr int kCalmLevel = 3;      // whose noise says whether there is any, ...
+constexpr float kCalm = 0.002f;    // ... so much of the light or more
 constexpr int kReach = 2;          // of the taps among a level's own pixels
 constexpr int kSide = 2 * kReach + 1;
 constexpr int kMargin = 32;  // pixels beside a row that taps may read
@@ -146,9 +150,10 @@ int aligned(int size) {
 /// Denoises one tile.
 class TileFilter {
  public:
-  TileFilter(const Film& film, const Tile& tile, const DenoiseSettings& settings, float exposure,
-             Isa isa, Host& host)
+  TileFilter(const Film& film, const Image<Vec3f>& other, const Tile& tile,
+             const DenoiseSettings& settings, float exposure, Isa isa, Host& host)
       : film_(film),
+        other_(other),
         tile_(tile),
         network_(denoiser_network()),
         settings_(settings),
@@ -177,12 +182,14 @@ class TileFilter {
   void rows_avx512(Step step, std::size_t level, int y, Image<Vec3f>* image);
   template <int kWide>
   void filter(std::size_t level, int y);
+  float needed(int x, int y) const;
   template <int kWide>
   void finish(int block_row, Image<Vec3f>& image);
   template <int kWide>
   void sum_taps(std::size_t level, int y, const float* weights, std::size_t stride, float* sums);
 
   const Film& film_;
+  const Image<Vec3f>& other_;
   const Tile& tile_;
   const Network& network_;
   const DenoiseSettings& settings_;
@@ -307,15 +314,28 @@ inline void TileFilter::read_pixel(int x, int y, float* features, std::size_t st
   *row.at(kShade, x) = compared;
   const float peak = pixel.brightest / std::max(pixel.count * own, 1e-12f);
   const float scale = 8.0f * exposure_;
-  const std::array<float, Network::kFeatures> values{
-      scale * irradiance.x(),     scale * irradiance.y(),
-      scale * irradiance.z(),     pixel.albedo.x(),
-      pixel.albedo.y(),           pixel.albedo.z(),
-      pixel.normal.x(),           pixel.normal.y(),
-      pixel.normal.z(),           distance,
-      noise / (noise + compared), scale * luminance(pixel.seen),
-      pixel.surface_share,        std::min(peak, 1.0f),
-      pixel.count - 1.0f,         8.0f * shade};
+  const Vec3f other = (finite(other_.at(film_x, film_y)) - pixel.seen).cwiseMax(0.0f);
+  const Vec3f other_irradiance = other.cwiseQuotient(albedo.cwiseMax(kSmallest));
+  const std::array<float, Network::kFeatures> values{scale * irradiance.x(),
+                                                     scale * irradiance.y(),
+                                                     scale * irradiance.z(),
+                                                     pixel.albedo.x(),
+                                                     pixel.albedo.y(),
+                                                     pixel.albedo.z(),
+                                                     pixel.normal.x(),
+                                                     pixel.normal.y(),
+                                                     pixel.normal.z(),
+                                                     distance,
+                                                     noise / (noise + compared),
+                                                     scale * luminance(pixel.seen),
+                                                     pixel.surface_share,
+                                                     std::min(peak, 1.0f),
+                                                     pixel.count - 1.0f,
+                                                     8.0f * shade,
+                                                     scale * other_irradiance.x(),
+                                                     scale * other_irradiance.y(),
+                                                     scale * other_irradiance.z(),
+                                                     scale * luminance(other)};
   for (std::size_t f = 0; f < Network::kFeatures; ++f) features[f * stride] = values[f];
 }
 
@@ -466,11 +486,17 @@ inline void TileFilter::filter(std::size_t level, int y) {
   results_[level].fill_margins(y, {});
 }
 
+/// How much around a pixel there is to do: nothing, where nothing is noisy.
+inline float TileFilter::needed(int x, int y) const {
+  const auto row = pairs_[kCalmLevel].row(y >> kCalmLevel);
+  const float noise = *row.at(kNoise, x >> kCalmLevel);
+  return noise / std::max(noise + kCalm * *row.at(kShade, x >> kCalmLevel), 1e-12f);
+}
+
 /// Two rows of pixels.
 template <int kWide>
 inline void TileFilter::finish(int block_row, Image<Vec3f>& image) {
   constexpr int kBlock = ChannelBlocks::kWidth;
-  constexpr int kKernels = Network::kPixelLogits - 1;
   const std::size_t stride = row_stride(std::size_t(width_));
   const auto half = std::size_t(width_ / 2);
   std::vector<float> blocks(std::size_t(network_.pixel_blocks()) * half * kBlock);
@@ -522,18 +548,27 @@ inline void TileFilter::finish(int block_row, Image<Vec3f>& image) {
     }
     const auto noisy = pairs_[0].row(y);
     const auto seen = seen_.row(y);
-    const float* const stays = taps + std::size_t(kKernels) * stride;
+    const auto row_of = [&](int logit) { return taps + std::size_t(logit) * stride; };
+    const float* const gains = row_of(Network::kPixelGain);
+    const float* const others = row_of(Network::kOther);
+    const float* const stays = row_of(Network::kStays);
     for (int x = tile_.wanted.x_min - tile_.seen.x_min; x < tile_.wanted.x_max - tile_.seen.x_min;
          ++x) {
       Vec3f& color = image.at(tile_.seen.x_min + x, image_y);
+      const float noise = *noisy.at(kNoise, x);
+      const float noise_share = noise / std::max(noise + *noisy.at(kShade, x), 1e-12f);
+      const float gain = 1.0f + kMostGain * noise_share * (1.0f - 2.0f / (1.0f + gains[x]));
+      const float own_share = needed(x, y) / (1.0f + others[x]);
       const float stay = stays[x] / (1.0f + stays[x]);
+      const Vec3f other = finite(other_.at(tile_.seen.x_min + x, image_y));
       for (int k = 0; k < 3; ++k) {
         const auto layer = [&](const std::vector<float>& values, int number) {
           return values[std::size_t(number) * stride + std::size_t(x)];
         };
-        const float irradiance = layer(sums, k) / std::max(layer(sums, kColor + k), kSmallest);
-        const float clean =
-            (irradiance * layer(own, k) + layer(own, 3 + k)) / totals[std::size_t(x)];
+        const float irradiance =
+            gain * layer(sums, k) / std::max(layer(sums, kColor + k), kSmallest);
+        float clean = (irradiance * layer(own, k) + layer(own, 3 + k)) / totals[std::size_t(x)];
+        clean = other[k] + own_share * (clean - other[k]);
         color[k] = clean + stay * (*noisy.at(kLight + k, x) + *seen.at(k, x) - clean);
       }
     }
@@ -552,11 +587,12 @@ std::size_t network_filter_bytes(int width, int height) {
   return most * kTileBytesPerPixel;
 }
 
-Image<Vec3f> filtered_by_network(const Film& film, const DenoiseSettings& settings, double exposure,
-                                 Isa isa, Host& host) {
+Image<Vec3f> filtered_by_network(const Film& film, const Image<Vec3f>& other,
+                                 const DenoiseSettings& settings, double exposure, Isa isa,
+                                 Host& host) {
   Image<Vec3f> image(film.width(), film.height(), Vec3f::Zero());
   for (const Tile& tile : tiles_of(film.width(), film.height())) {
-    TileFilter(film, tile, settings, float(exposure), isa, host).run(image);
+    TileFilter(film, other, tile, settings, float(exposure), isa, host).run(image);
   }
   return image;
 }

@@ -92,13 +92,15 @@ inline Lanes surfaces(const Guides::Row& guides, int x) {
 
 class PlaneFilter {
  public:
-  PlaneFilter(Film film, const DenoiseSettings& settings, Isa isa, Host& host)
-      : film_(std::move(film)),
+  /// `spent`: the same film, where its memory is to be given back.
+  PlaneFilter(const Film& film, Film* spent, const DenoiseSettings& settings, Isa isa, Host& host)
+      : film_(film),
+        spent_(spent),
         settings_(settings),
         isa_(isa),
         host_(host),
-        width_(film_.width()),
-        height_(film_.height()),
+        width_(film.width()),
+        height_(film.height()),
         guides_(width_, height_, kMargin),
         lights_(width_, height_, kMargin),
         columns_((width_ + kBlock - 1) / kBlock),
@@ -133,7 +135,8 @@ class PlaneFilter {
   void restore_removed_energy(int y);
   void write(int y);
 
-  Film film_;  ///< Until it is read.
+  const Film& film_;  ///< Is read in the first step alone.
+  Film* spent_;
   DenoiseSettings settings_;
   Isa isa_;
   Host& host_;
@@ -193,10 +196,10 @@ inline void PlaneFilter::rows(Step step, int round, int begin, int end) {
     }
   }
   // But for what the blocks above and below look at.
-  if (step == Step::Read && end - begin > 2) {
+  if (step == Step::Read && spent_ != nullptr && end - begin > 2) {
     const auto width = std::size_t(width_);
-    forget_pages(film_.pixels().subspan(std::size_t(begin + 1) * width,
-                                        std::size_t(end - begin - 2) * width));
+    forget_pages(spent_->pixels().subspan(std::size_t(begin + 1) * width,
+                                          std::size_t(end - begin - 2) * width));
   }
   if (step == Step::Tame) weigh(lights_, begin, before_);
   if (step == Step::Weigh) weigh(lights_, begin, after_);
@@ -231,7 +234,7 @@ void PlaneFilter::all_rows(Step step, int round) {
 
 Image<Vec3f> PlaneFilter::run() {
   all_rows(Step::Read);
-  film_ = Film();
+  if (spent_ != nullptr) *spent_ = Film();
   next_ = Lights(width_, height_, kMargin);
   support_ = PixelLayers<1>(width_, height_, kMargin);
   all_rows(Step::Tame);
@@ -583,8 +586,14 @@ void PlaneFilter::write(int y) {
 
 }  // namespace
 
-Image<Vec3f> filtered_on_planes(Film film, const DenoiseSettings& settings, Isa isa, Host& host) {
-  return PlaneFilter(std::move(film), settings, isa, host).run();
+Image<Vec3f> filtered_on_planes(Film&& film, const DenoiseSettings& settings, Isa isa, Host& host) {
+  Film spent = std::move(film);
+  return PlaneFilter(spent, &spent, settings, isa, host).run();
+}
+
+Image<Vec3f> filtered_on_planes(const Film& film, const DenoiseSettings& settings, Isa isa,
+                                Host& host) {
+  return PlaneFilter(film, nullptr, settings, isa, host).run();
 }
 
 }  // namespace diorama

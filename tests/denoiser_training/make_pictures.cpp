@@ -10,11 +10,16 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "channels.h"
+#include "gpu_path_tracer.h"
+#include "gpu_scene.h"
 #include "half_floats.h"
+#include "path_device.h"
 #include "path_tracer.h"
 #include "renderer_support/denoiser.h"
 #include "renderer_support/film.h"
@@ -33,37 +38,78 @@ struct Pass {
   bool is_real_time = false;  ///< Through the pixels' centres, half of the bounces.
 };
 
-Film trace(const EmbreeScene& meshes, const View& view, const Pass& pass, int max_bounces,
-           std::uint64_t seed, Isa isa, Host& host) {
-  TraceSettings settings{max_bounces, 0.0f, false};
-  Image<RayHit> hits;
-  SeenMeshes seen;
-  if (pass.is_real_time) {
-    Frame frame;
-    fill_channels(frame, {}, meshes, view, seen, &hits, host);
-    settings.first_hits = &hits;
-    settings.indirect_share = 0.5f;
+/// Traces the paths of one scene, on the processor or on a GPU.
+class Tracer {
+ public:
+  /// `device`: null for the processor.
+  Tracer(const EmbreeScene& meshes, const std::shared_ptr<const PathDevice>& device, Isa isa,
+         Host& host)
+      : meshes_(meshes), isa_(isa), host_(host) {
+    if (!device) return;
+    on_device_.emplace(*device, host);
+    on_device_->scene.take(meshes.render_scene());
   }
-  const PathTracer tracer(meshes, view, settings, isa);
-  const int width = view.camera().width;
-  Film film(width, view.camera().height);
-  const auto jobs = SamplePlan(width, view.camera().height, {pass.samples}, seed).next_round({}, 0);
-  host.parallel_for(jobs.size(), [&](std::size_t i) {
-    const TraceJob& job = jobs[i];
-    std::vector<PixelSum> sums(job.pixel_count());
-    tracer.trace(job, sums.data(), std::size_t(job.x_end - job.x_begin));
-    const PixelSum* sum = sums.data();
-    for (int y = job.y_begin; y < job.y_end; ++y) {
-      for (int x = job.x_begin; x < job.x_end; ++x) film.at(x, y) = (sum++)->mean();
+
+  Film trace(const View& view, const Pass& pass, int max_bounces, std::uint64_t seed) {
+    PathSettings settings{max_bounces, 0.0f, false};
+    if (pass.is_real_time) {
+      settings.starts_at_centres = true;
+      settings.indirect_share = 0.5f;
     }
-  });
-  return film;
-}
+    const auto jobs = SamplePlan(view.camera().width, view.camera().height, {pass.samples}, seed)
+                          .next_round({}, 0);
+    return on_device_ ? on_device(view, settings, jobs) : on_processor(view, settings, jobs);
+  }
 
-constexpr int kChannels = 16;
+ private:
+  struct OnDevice {
+    OnDevice(const PathDevice& device, Host& host) : scene(device, host), tracer(device, host) {}
+    GpuScene scene;
+    GpuPathTracer tracer;
+  };
 
-/// Of one pixel; light times `scale`.
-std::array<float, kChannels> channels_of(const FilmPixel& p, const Vec3f& eye, float scale) {
+  Film on_device(const View& view, const PathSettings& settings,
+                 const std::vector<TraceJob>& jobs) {
+    on_device_->tracer.begin(view, settings, on_device_->scene.world(), meshes_.window());
+    on_device_->tracer.trace(jobs);
+    return on_device_->tracer.film();
+  }
+
+  Film on_processor(const View& view, const PathSettings& path_settings,
+                    const std::vector<TraceJob>& jobs) {
+    TraceSettings settings{path_settings};
+    Image<RayHit> hits;
+    if (settings.starts_at_centres) {
+      Frame frame;
+      SeenMeshes seen;
+      fill_channels(frame, {}, meshes_, view, seen, &hits, host_);
+      settings.first_hits = &hits;
+    }
+    const PathTracer tracer(meshes_, view, settings, isa_);
+    Film film(view.camera().width, view.camera().height);
+    host_.parallel_for(jobs.size(), [&](std::size_t i) {
+      const TraceJob& job = jobs[i];
+      std::vector<PixelSum> sums(job.pixel_count());
+      tracer.trace(job, sums.data(), std::size_t(job.x_end - job.x_begin));
+      const PixelSum* sum = sums.data();
+      for (int y = job.y_begin; y < job.y_end; ++y) {
+        for (int x = job.x_begin; x < job.x_end; ++x) film.at(x, y) = (sum++)->mean();
+      }
+    });
+    return film;
+  }
+
+  const EmbreeScene& meshes_;
+  Isa isa_;
+  Host& host_;
+  std::optional<OnDevice> on_device_;
+};
+
+constexpr int kChannels = 19;
+
+/// Of one pixel, and of what the filter by planes made of it; light times `scale`.
+std::array<float, kChannels> channels_of(const FilmPixel& p, const Vec3f& by_planes,
+                                         const Vec3f& eye, float scale) {
   const float distance = p.surface_share > 0.0f ? (p.position - eye).norm() : 0.0f;
   return {scale * p.seen.x(),
           scale * p.seen.y(),
@@ -80,7 +126,10 @@ std::array<float, kChannels> channels_of(const FilmPixel& p, const Vec3f& eye, f
           distance,
           scale * std::sqrt(std::max(0.0f, p.variance)),
           scale * p.brightest,
-          p.surface_share};
+          p.surface_share,
+          scale * by_planes.x(),
+          scale * by_planes.y(),
+          scale * by_planes.z()};
 }
 
 /// The whole file at once, so that who reads while we write never meets half of one.
@@ -88,12 +137,13 @@ class FilmFile {
  public:
   FilmFile(int width, int height, int films) { put({kMagic, width, height, films, kChannels}); }
   /// Light is stored times `scale`; the film's own exposure is told relative to that.
-  void add(const Film& film, const Pass& pass, const Vec3f& eye, float scale) {
+  void add(const Film& film, const Image<Vec3f>& by_planes, const Pass& pass, const Vec3f& eye,
+           float scale) {
     const auto exposure = float(quiet_exposure(film) / double(scale));
     put({pass.samples, pass.is_real_time ? 1 : 0, std::bit_cast<std::int32_t>(exposure)});
     std::vector<std::uint16_t> planes(film.pixels().size() * kChannels);
     for (std::size_t i = 0; i < film.pixels().size(); ++i) {
-      const auto values = channels_of(film.pixels()[i], eye, scale);
+      const auto values = channels_of(film.pixels()[i], by_planes.pixels()[i], eye, scale);
       for (std::size_t k = 0; k < kChannels; ++k) {
         planes[k * film.pixels().size() + i] = half_bits(values[k]);
       }
@@ -127,6 +177,7 @@ struct Options {
   int height = 192;
   int target_paths = 32;
   int bounces = 6;
+  int device = -1;
   double seconds = 1e9;
   int threads = 1;
 };
@@ -142,6 +193,12 @@ bool is_worthy(const Film& film, const Vec3f& eye) {
   return lit > film.pixels().size() / 20 && near < film.pixels().size() / 2;
 }
 
+DenoiseSettings denoise_settings(const Film& film, const View& view) {
+  DenoiseSettings settings{view.position()};
+  settings.brightest_path = float(4.0 / quiet_exposure(film));
+  return settings;
+}
+
 /// What the renderer makes of the first `count` films, light times `scale`.
 void write_denoised(const std::vector<Film>& films, std::size_t count, const View& view,
                     float scale, bool is_quick, Isa isa, Host& host,
@@ -150,8 +207,7 @@ void write_denoised(const std::vector<Film>& films, std::size_t count, const Vie
   for (std::size_t k = 0; k < count; ++k) {
     Film film(films[k].width(), films[k].height());
     std::ranges::copy(films[k].pixels(), film.pixels().begin());
-    DenoiseSettings settings{view.position()};
-    settings.brightest_path = float(4.0 / quiet_exposure(film));
+    DenoiseSettings settings = denoise_settings(film, view);
     settings.is_quick = is_quick;
     const Image<Vec3f> picture = denoised(std::move(film), settings, isa, host);
     for (int c = 0; c < 3; ++c) {
@@ -167,6 +223,8 @@ void render_set(const Set& set, std::uint64_t seed, const Options& options, Host
   const Isa isa = isa_by_name(best_isa_name());
   EmbreeScene meshes(host, {best_isa_name(), {false, false}});
   meshes.take(set.scene);
+  Tracer tracer(meshes, options.device < 0 ? nullptr : shared_path_device(options.device), isa,
+                host);
   Rng rng = Rng(seed).fork("passes");
   const bool is_judged = !options.judge.empty();
   for (std::size_t i = 0; i < set.cameras.size(); ++i) {
@@ -182,20 +240,22 @@ void render_set(const Set& set, std::uint64_t seed, const Options& options, Host
     if (is_judged) {
       if (bounces > 1) passes.erase(passes.begin());
       passes.push_back({256});
-    } else if (rng.chance(0.04)) {
-      passes.push_back({256});
+    } else if (rng.chance(0.12)) {
+      passes.push_back({rng.chance(0.5) ? 64 : 256});
     }
     passes.insert(passes.end(), 2, {options.target_paths});
     std::vector<Film> films;
     for (const Pass& pass : passes) {
-      films.push_back(trace(meshes, view, pass, bounces, rng.bits(), isa, host));
+      films.push_back(tracer.trace(view, pass, bounces, rng.bits()));
       if (films.size() == 2 && !is_judged && !is_worthy(films.back(), view.position())) break;
     }
     if (films.size() < passes.size()) continue;
     const auto scale = float(quiet_exposure(films.back()));
     FilmFile file(options.width, options.height, int(films.size()));
     for (std::size_t k = 0; k < films.size(); ++k) {
-      file.add(films[k], passes[k], view.position(), scale);
+      const Image<Vec3f> by_planes =
+          denoised_on_planes(films[k], denoise_settings(films[k], view), isa, host);
+      file.add(films[k], by_planes, passes[k], view.position(), scale);
     }
     file.write(options.out / (set.name + "_" + std::to_string(i) + ".films"));
     if (!is_judged) continue;
@@ -246,6 +306,8 @@ int main(int argc, char** argv) {
   app.add_option("--bounces", options.bounces, "Of what is judged by; few: as in real time, too");
   app.add_option("--seconds", options.seconds, "No further set is begun after that");
   app.add_option("--threads", options.threads);
+  app.add_option("--device", options.device,
+                 "Number of the Vulkan device that traces the paths; the processor by default");
   CLI11_PARSE(app, argc, argv);
   try {
     make(options);

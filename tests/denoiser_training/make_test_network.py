@@ -6,12 +6,12 @@ import argparse
 import numpy as np
 import torch
 
-from network import CHANNELS, Network
+from network import FEATURES, Network
 
 
 def features(width, height):
     """The same formula stands in the test."""
-    c, y, x = np.meshgrid(np.arange(CHANNELS), np.arange(height), np.arange(width), indexing="ij")
+    c, y, x = np.meshgrid(np.arange(FEATURES), np.arange(height), np.arange(width), indexing="ij")
     values = np.sin(0.37 * c + 0.11 * x + 0.23 * y) + 0.25 * np.cos(0.05 * x * (c % 3) - 0.31 * y)
     return torch.from_numpy(values.astype(np.float32))[None]
 
@@ -33,7 +33,8 @@ def main():
         logits = network(features(96, 64))
     for level, values in enumerate(logits):
         height, width = values.shape[2:]
-        for channel in (0, 17, values.shape[1] - 2, values.shape[1] - 1):
+        last = 4 if level == 0 else 2
+        for channel in (0, 17, *range(values.shape[1] - last, values.shape[1])):
             for x, y in ((0, 0), (width - 1, height // 2), (width // 3, height - 1)):
                 print(f"{{{level}, {channel}, {x}, {y}, {values[0, channel, y, x]:.6f}f}},")
 

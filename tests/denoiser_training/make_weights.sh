@@ -8,8 +8,10 @@
 #   TOTAL_MINUTES  from the first call until all is done         (60)
 #   MINUTES        that this call waits                          (TOTAL_MINUTES)
 #   THREADS        that render                                   (all)
-#   TARGET_PATHS   of each of the two films to compare with      (32)
-#   GPU            which                                         (0)
+#   TARGET_PATHS   of each of the two films to compare with      (32; on a GPU three times as many)
+#   GPUS           that train, as 0,1,2                          (0)
+#   RENDER_DEVICE  Vulkan device that renders beside THREADS     (none)
+#   RENDERERS      processes on it                               (12)
 #   BEGIN_FROM     weights to begin with                         (none)
 #   JUDGE          folder with assets_root/ and bench/           (no judging)
 #   JUDGED_SETS    numbers of the sets to judge by               (0 1 2 3 4 5 6 7 8)
@@ -25,7 +27,8 @@ PYTHON=${PYTHON:-python3}
 mkdir -p "$STATE"/{films,judged,weights,sets} "$OUT"
 cd "$STATE"
 export STATE OUT TOTAL_MINUTES THREADS PYTHONUNBUFFERED=1 OMP_NUM_THREADS=2
-export CUDA_VISIBLE_DEVICES=${GPU:-0}
+export CUDA_VISIBLE_DEVICES=${GPUS:-0}
+trainers=$(tr ',' '\n' <<<"$CUDA_VISIBLE_DEVICES" | wc -l)
 [ -e since ] || date +%s >since
 since=$(<since)
 judging=$([ -n "${JUDGE:-}" ] && echo 60 || echo 5)
@@ -42,7 +45,7 @@ render_judged() {
   done
 }
 
-# One process a set: none can end more than its own.
+# One process a set: none can end more than its own. On a GPU a few: to open it takes a second.
 render() {
   local worker=$1 number=0
   [ "$worker" -le 4 ] && [ -n "${JUDGE:-}" ] && render_judged
@@ -51,6 +54,14 @@ render() {
     mkdir "sets/${worker}_$number" 2>/dev/null || continue
     nice $PROGRAM films --first $((worker * 10000 + number)) --sets 1 --views 7 \
       --target-paths "${TARGET_PATHS:-32}"
+  done
+}
+render_on_gpu() {
+  local worker=$1 number=1
+  while [ "$(seconds)" -lt $((until - 20)) ]; do
+    $PROGRAM films --device "$RENDER_DEVICE" --first $(((1000 + worker) * 10000 + number)) --sets 20 --views 7 \
+      --target-paths $((3 * ${TARGET_PATHS:-32})) --seconds $((until - 20 - $(seconds)))
+    number=$((number + 20))
   done
 }
 
@@ -79,7 +90,7 @@ train() {
   for way in "" "" "--no-graphs" "--no-graphs --batch 24" "--no-graphs --batch 24"; do
     [ "$(seconds)" -lt "$until" ] || break
     # shellcheck disable=SC2086
-    "$PYTHON" "$here/train.py" films weights --since "$since" --until "$until" \
+    "$PYTHON" -m torch.distributed.run --nproc_per_node "$trainers" "$here/train.py" films weights --since "$since" --until "$until" \
       ${BEGIN_FROM:+--begin-from "$BEGIN_FROM"} ${TRAIN_OPTIONS:-} $way &
     pid=$!
     watch $pid
@@ -92,6 +103,9 @@ all() {
   for i in $(seq 1 "$THREADS"); do
     render "$i" 2>&1 | grep -v '^set ' &
   done
+  if [ -n "${RENDER_DEVICE:-}" ]; then
+    for i in $(seq 1 "${RENDERERS:-12}"); do render_on_gpu "$i" 2>&1 & done
+  fi
   train
   if [ -n "${JUDGE:-}" ]; then
     mkdir -p sheets

@@ -4,7 +4,8 @@
 A U-Net on blocks of 2x2 pixels predicts kernels for six levels of a pyramid. They average pairs of
 scattered light and the surfaces' colours; only their quotient, the light that falls on a surface, is
 used, times the pixel's own colour, averaged by a third kernel over 3x3 pixels. Where there is noise
-the coarse levels may also become brighter or darker, and a share of each pixel is left as it was.
+the levels may also become brighter or darker. Of each pixel a share is what the filter by planes
+made of it, which the network sees, too, and a share is left as it was.
 """
 import struct
 
@@ -13,11 +14,14 @@ import torch
 import torch.nn.functional as F
 from torch import nn
 
-CHANNELS = 16  # of a film, and of the network's input
+CHANNELS = 19  # of a film
+FEATURES = 20  # per pixel, of the network's input
 LEVELS = 6  # of the pyramid
 FINE = 25  # taps of a level's own pixels,
 COARSE = 9  # of the next level's result,
 OWN = 9  # of the pixel's colour
+KEEP = FINE + COARSE + OWN  # number of a pixel's logit of what it counts for the next level,
+GAIN = KEEP + 1  # of how much brighter or darker it becomes
 ALIGNMENT = 32  # pixels, so that all levels have whole ones
 MIN_ALBEDO = 0.02
 TIMES_OTHERS = 4.0
@@ -25,8 +29,10 @@ LIMITED_PATHS = 16.0
 SMALLEST = 1e-6
 PRIOR_BIAS = 0.1  # what a picture's mean is off by before it is set right
 MOST_GAIN = 1.0  # of a level, where it is all noise
+CALM_LEVEL = 3  # whose noise says whether there is any,
+CALM = 0.002  # so much of the light or more
 MAGIC = 0x574E4544  # "DENW"
-VERSION = 2
+VERSION = 3
 
 
 def luminance(rgb):
@@ -64,6 +70,9 @@ class Film:
         self.albedo = torch.maximum(albedo, MIN_ALBEDO * share)
         self.own_albedo = self.albedo
         irradiance = self.scattered / self.albedo.clamp(min=SMALLEST)
+        self.planes = raw[:, 16:19]
+        planes = (self.planes - self.seen).clamp(min=0.0)
+        planes_irradiance = planes / self.albedo.clamp(min=SMALLEST)
         seen = luminance(self.seen)
         shade = less * e
         noise = variance.sqrt() * e
@@ -83,6 +92,8 @@ class Film:
                 peak.clamp(0.0, 1.0),
                 (torch.log2(n) / 8.0).expand_as(share),
                 torch.log1p(8.0 * shade) / 3.0,
+                torch.log1p(8.0 * e * planes_irradiance) / 3.0,
+                torch.log1p(8.0 * e * luminance(planes)) / 3.0,
             ],
             1,
         )
@@ -111,13 +122,13 @@ class Network(nn.Module):
     def __init__(self, widths=(48, 64, 80, 80, 80), encoder=(2, 2, 2, 2, 2), decoder=(2, 2, 2, 2)):
         super().__init__()
         self.widths, self.encoder_counts, self.decoder_counts = widths, encoder, decoder
-        begins = (4 * CHANNELS,) + tuple(widths[:-1])
+        begins = (4 * FEATURES,) + tuple(widths[:-1])
         self.encoder = nn.ModuleList(Convs(b, w, c) for b, w, c in zip(begins, widths, encoder))
         self.narrow = nn.ModuleList(
             nn.Conv2d(widths[i + 1], widths[i], 1) for i in range(len(widths) - 1)
         )
         self.decoder = nn.ModuleList(Convs(w, w, c) for w, c in zip(widths[:-1], decoder))
-        pixel = FINE + COARSE + OWN + 2
+        pixel = FINE + COARSE + OWN + 4
         level = FINE + COARSE + 2
         self.heads = nn.ModuleList(
             nn.Conv2d(w, level + (4 * pixel if i == 0 else 0), 1) for i, w in enumerate(widths)
@@ -134,6 +145,7 @@ class Network(nn.Module):
                     finest = head.bias[level:].view(pixel, 4)
                     finest[FINE // 2] = 1.0
                     finest[FINE + COARSE + OWN // 2] = 5.0
+                    finest[-2] = -1.0
                     finest[-1] = -3.0
 
     def forward(self, features):
@@ -212,10 +224,12 @@ def gained(pairs, logit, noise):
 
 def denoised(film, logits):
     """Light and colour; `logits` are of the network: per level FINE, COARSE, (the finest) OWN, what
-    the pixel counts for the next level, and its gain (the finest: the share that stays)."""
+    the pixel counts for the next level, and its gain (the finest also: the share of the filter by
+    planes, and that of the pixel as it was)."""
     pairs, noise = [torch.cat([film.scattered, film.albedo], 1)], [film.noise]
     for level in range(LEVELS - 1):
-        keep = F.softmax(F.pixel_unshuffle(logits[level][:, -2:-1], 2), 1)
+        at = KEEP if level == 0 else -2
+        keep = F.softmax(F.pixel_unshuffle(logits[level][:, at : at + 1], 2), 1)
         quads = F.pixel_unshuffle(pairs[level], 2)
         b, _, h, w = keep.shape
         pairs.append((quads.view(b, 6, 4, h, w) * keep.unsqueeze(1)).sum(2))
@@ -231,7 +245,9 @@ def denoised(film, logits):
             part = widened(shifted(padded, k, 3, height // 2, width // 2))
             total = total + weight.unsqueeze(1) * part
         result = total
-    irradiance = result[:, :3] / result[:, 3:].clamp(min=SMALLEST)
+    share = noise[0][:, 0:1] / noise[0].sum(1, keepdim=True).clamp(min=1e-12)
+    gain = 1.0 + MOST_GAIN * share * torch.tanh(0.5 * logits[0][:, GAIN : GAIN + 1])
+    irradiance = gain * result[:, :3] / result[:, 3:].clamp(min=SMALLEST)
     weights = F.softmax(logits[0][:, FINE + COARSE : FINE + COARSE + OWN], 1)
     own = torch.cat([film.own_albedo, film.seen], 1)
     height, width = own.shape[2:]
@@ -240,6 +256,12 @@ def denoised(film, logits):
     for k, weight in enumerate(weights[:, :, :height, :width].unbind(1)):
         total = total + weight.unsqueeze(1) * shifted(padded, k, 3, height, width)
     clean = irradiance[:, :, :height, :width] * total[:, :3] + total[:, 3:]
+    # Where nothing is noisy, planes change nothing.
+    around = noise[CALM_LEVEL]
+    needed = around[:, 0:1] / (around[:, 0:1] + CALM * around[:, 1:2]).clamp(min=1e-12)
+    needed = F.interpolate(needed, scale_factor=1 << CALM_LEVEL, mode="nearest")
+    own_share = needed * torch.sigmoid(-logits[0][:, -2:-1])
+    clean = film.planes + own_share[:, :, :height, :width] * (clean - film.planes)
     stays = torch.sigmoid(logits[0][:, -1:, :height, :width])
     return clean + stays * (film.scattered[:, :, :height, :width] + film.seen - clean)
 
@@ -263,7 +285,7 @@ def denoise(network, raw, paths, exposure):
     height, width = raw.shape[2:]
     pad = (0, -width % ALIGNMENT, 0, -height % ALIGNMENT)
     whole = Film.__new__(Film)
-    whole.seen, whole.own_albedo = film.seen, film.own_albedo
+    whole.seen, whole.own_albedo, whole.planes = film.seen, film.own_albedo, film.planes
     whole.scattered, whole.albedo = F.pad(film.scattered, pad), F.pad(film.albedo, pad)
     whole.noise = F.pad(film.noise, pad)
     picture = denoised(whole, network(F.pad(film.features, pad)))

@@ -4,13 +4,16 @@
 import argparse
 import contextlib
 import math
+import os
 import pathlib
 import struct
 import threading
 import time
+import zlib
 
 import numpy as np
 import torch
+import torch.distributed as dist
 import torch.nn.functional as F
 
 from network import CHANNELS, Film, Network, denoised, luminance
@@ -24,7 +27,7 @@ EDGES_COUNT = 1.0  # more than the other pixels
 REACH = 4  # pixels over which light of chance finds is spread
 KEPT = 0.9995  # of the average of weights, per step
 # How often which number of paths is drawn, where a view has it.
-SHARES = {1: 0.08, 2: 0.26, 4: 0.24, 16: 0.22, 256: 2.0}
+SHARES = {1: 0.08, 2: 0.26, 4: 0.24, 16: 0.22, 64: 1.0, 256: 2.0}
 OTHER_SHARE = 0.12
 SIZE = dict(widths=(48, 64, 80, 80, 64), encoder=(2, 2, 2, 2, 2), decoder=(2, 2, 2, 2))
 
@@ -92,11 +95,36 @@ def spread(raw, paths):
     return raw[:, 0:3] + scattered - taken + given
 
 
+class Group:
+    """The processes that train together, one a GPU, begun by torchrun; or this one alone. Each has
+    views of its own; their gradients are averaged, so that all have the same weights."""
+
+    def __init__(self):
+        self.rank = int(os.environ.get("RANK", 0))
+        self.size = int(os.environ.get("WORLD_SIZE", 1))
+        if self.size > 1:
+            dist.init_process_group("nccl" if torch.cuda.is_available() else "gloo")
+
+    def average(self, values):
+        if self.size > 1:
+            dist.all_reduce(values)
+            values.div_(self.size)
+
+    def told(self, numbers, device):
+        """What the first process says."""
+        if self.size == 1:
+            return numbers
+        values = torch.tensor(numbers, dtype=torch.float64, device=device)
+        dist.broadcast(values, 0)
+        return values.tolist()
+
+
 class Pictures:
     """Views in the device's memory; further ones come in while training runs."""
 
-    def __init__(self, folder, device, most):
+    def __init__(self, folder, device, most, group):
         self.folder, self.device, self.most = pathlib.Path(folder), device, most
+        self.group = group
         self.names = set()
         self.views = []  # [(number of the film, paths, exposure, its target's other half is apart)]
         self.films = self.targets = None
@@ -107,6 +135,8 @@ class Pictures:
     def look(self):
         for path in sorted(self.folder.glob("*.films")):
             if path.name in self.names or len(self.views) >= self.most or self.is_done:
+                continue
+            if zlib.crc32(path.name.encode()) % self.group.size != self.group.rank:
                 continue
             self.names.add(path.name)
             try:
@@ -181,8 +211,10 @@ class Batch:
         colors = np.argsort(chance.random((size, 3)), 1)
         colors[chance.random(size) > 0.3] = np.arange(3)
         axes = np.argsort(chance.random((size, 3)), 1)
-        rest = np.broadcast_to(np.arange(12, CHANNELS), (size, CHANNELS - 12))
-        longs[:, 2 : 2 + CHANNELS] = np.hstack([colors, 3 + colors, 6 + colors, 9 + axes, rest])
+        rest = np.broadcast_to(np.arange(12, 16), (size, 4))
+        longs[:, 2 : 2 + CHANNELS] = np.hstack(
+            [colors, 3 + colors, 6 + colors, 9 + axes, rest, 16 + colors]
+        )
         longs[:, 2 + CHANNELS : 9 + CHANNELS] = np.hstack(
             [colors, 3 + colors, np.full((size, 1), 6)]
         )
@@ -247,8 +279,9 @@ def loss_of(output, target, edges):
 class Trainee:
     """A network with its optimizer (Adam), whose steps can be recorded once and played again."""
 
-    def __init__(self, pictures, options, chance):
+    def __init__(self, pictures, options, chance, group):
         self.device = pictures.device
+        self.group = group
         begin = options.begin_from
         self.network = (Network.load(begin) if begin else Network(**SIZE)).to(self.device)
         if self.device.type == "cuda":
@@ -264,14 +297,15 @@ class Trainee:
         # Rate, its corrections for the first steps, share of the average that is kept.
         self.numbers = torch.zeros(4, device=self.device)
         self.count = 0
-        self.graph = None
+        self.found = torch.zeros(flat.numel() + 1, device=self.device)  # gradient, loss
+        self.graphs = None  # of look() and of learn()
         self.put(self.flat)
 
     def put(self, flat):
         for p, values in zip(self.parameters, flat.split(self.sizes)):
             p.data.copy_(values.view_as(p))
 
-    def gradient(self):
+    def look(self):
         raw, paths, exposures, target, edges, factor = self.batch.make()
         with torch.no_grad():
             film = Film(raw, paths, exposures)
@@ -288,11 +322,11 @@ class Trainee:
         scale = factor.view(-1, 1, 1, 1)
         loss = loss_of(denoised(film, logits) * scale, target * scale, edges)
         gradients = torch.autograd.grad(loss, self.parameters)
-        return loss.detach(), torch.cat([g.flatten() for g in gradients])
+        self.found.copy_(torch.cat([g.flatten() for g in gradients] + [loss.detach().view(1)]))
 
-    def work(self):
-        loss, gradient = self.gradient()
+    def learn(self):
         with torch.no_grad():
+            gradient, loss = self.found[:-1], self.found[-1]
             rate, first_share, second_share, kept = self.numbers.unbind()
             norm = gradient.norm()
             is_sound = torch.isfinite(norm)
@@ -322,13 +356,13 @@ class Trainee:
         )
         self.numbers.copy_(torch.tensor(numbers))
         self.batch.draw()
-        if self.graph:
-            self.graph.replay()
-        else:
-            self.work()
+        look, learn = (g.replay for g in self.graphs) if self.graphs else (self.look, self.learn)
+        look()
+        self.group.average(self.found)
+        learn()
 
     def record(self):
-        """One launch a step instead of thousands."""
+        """Two launches a step instead of thousands."""
         stream = torch.cuda.Stream()
         stream.wait_stream(torch.cuda.current_stream())
         with torch.cuda.stream(stream):
@@ -336,11 +370,14 @@ class Trainee:
                 self.step(0.0)
         torch.cuda.current_stream().wait_stream(stream)
         torch.cuda.synchronize()
-        graph = torch.cuda.CUDAGraph()
-        with torch.cuda.graph(graph):
-            self.work()
+        graphs = []
+        for work in (self.look, self.learn):
+            graph = torch.cuda.CUDAGraph()
+            with torch.cuda.graph(graph, capture_error_mode="thread_local"):
+                work()
+            graphs.append(graph)
         torch.cuda.synchronize()
-        self.graph = graph
+        self.graphs = graphs
 
     def state(self):
         tensors = (self.flat, self.mean, self.first, self.second, self.norm, self.loss)
@@ -373,20 +410,24 @@ def save(trainee, folder):
 
 
 def train(options):
+    group = Group()
     device = torch.device(options.device)
+    if device.type == "cuda":
+        device = torch.device("cuda", int(os.environ.get("LOCAL_RANK", 0)))
+        torch.cuda.set_device(device)
     torch.manual_seed(options.seed)
-    chance = np.random.default_rng((options.seed, int(time.time())))
+    chance = np.random.default_rng((options.seed, group.rank, int(time.time())))
     options.out.mkdir(parents=True, exist_ok=True)
     if device.type == "cuda":
         torch.backends.cudnn.benchmark = True
         torch.backends.cuda.matmul.allow_tf32 = True
         torch.backends.cudnn.allow_tf32 = True
-    pictures = Pictures(options.pictures, device, options.most_views)
+    pictures = Pictures(options.pictures, device, options.most_views, group)
     begun = time.time()
     threading.Thread(target=pictures.keep_looking, daemon=True).start()
     while len(pictures.views) < options.first_views and time.time() < options.until:
         time.sleep(0.2)
-    trainee = Trainee(pictures, options, chance)
+    trainee = Trainee(pictures, options, chance, group)
     file = options.out / "state.pt"
     if file.exists():
         trainee.restore(torch.load(file, map_location="cpu"))
@@ -396,23 +437,33 @@ def train(options):
     print(f"first step after {time.time() - begun:.0f} s, {len(pictures.views)} views", flush=True)
     told = saved = time.time()
     steps = 0
-    while time.time() < options.until and steps < options.steps:
-        part = (time.time() - options.since) / (options.until - options.since)
-        rate = options.rate * max(0.005, 0.5 + 0.5 * math.cos(math.pi * min(1.0, max(0.0, part))))
+    rate = 0.0
+    while True:
+        if steps % 20 == 0:
+            now = time.time()
+            part = min(1.0, max(0.0, (now - options.since) / (options.until - options.since)))
+            rate = options.rate * max(0.005, 0.5 + 0.5 * math.cos(math.pi * part))
+            is_over = now >= options.until or steps >= options.steps
+            rate, is_over = group.told([rate, float(is_over)], device)
+            if is_over:
+                break
         trainee.step(rate)
         steps += 1
         now = time.time()
         if now - told > options.tell or steps == 20:
             told = now
-            print(f"{now - begun:.0f} s, rate {rate:.5f}, {len(pictures.views)} views, "
-                  f"step {trainee.count}, loss {float(trainee.loss):.4f}", flush=True)
+            print(f"{group.rank}: {now - begun:.0f} s, rate {rate:.5f}, {len(pictures.views)} "
+                  f"views, step {trainee.count}, loss {float(trainee.loss):.4f}", flush=True)
             (options.out / "alive").touch()
-        if now - saved > options.save_every:
+        if group.rank == 0 and now - saved > options.save_every:
             saved = now
             save(trainee, options.out)
     pictures.is_done = True
-    save(trainee, options.out)
-    print(f"{trainee.count} steps, {len(pictures.views)} views", flush=True)
+    if group.rank == 0:
+        save(trainee, options.out)
+    print(f"{group.rank}: {trainee.count} steps, {len(pictures.views)} views", flush=True)
+    if group.size > 1:
+        dist.destroy_process_group()
 
 
 def main():
