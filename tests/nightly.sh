@@ -74,7 +74,7 @@ run_part() {
   local part=$1 begin=$SECONDS result=passed
   echo "== nightly: $part (log: $logs/$part.log)"
   "part_$part" >"$logs/$part.log" 2>&1 || result=FAILED
-  printf '%-8s %6s  %5ds  %s\n' "$part" "$result" $((SECONDS - begin)) "$(tail -n 1 "$logs/$part.log")" | tee "$logs/$part.row"
+  printf '%-8s %6s  %5ds  %s\n' "$part" "$result" $((SECONDS - begin)) "$(grep -a . "$logs/$part.log" | tail -n 1)" | tee "$logs/$part.row"
   [[ $result == passed ]]
 }
 run_in_turn() {
