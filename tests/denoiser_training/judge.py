@@ -172,7 +172,7 @@ def main():
             noisy = float((raw[:, 0:3] + raw[:, 3:6]).mean())
             for name, picture in pictures.items():
                 table.append({"view": path.stem, "paths": paths[i], "way": name,
-                              "mean": float(picture.mean()) / noisy,
+                              "mean": float(picture.mean()) / max(noisy, 1e-6),
                               **errors(picture, references, edges)})
             wanted = [w for w in pictures if not w.endswith("_scattered")]
             rows.append(torch.cat([shown(pictures[w])[0] for w in wanted]
