@@ -105,7 +105,7 @@ std::size_t denoiser_bytes(int width, int height, bool is_quick) {
   if (is_quick) return pixels * std::max(sizeof(FilmPixel), kPlaneFilterBytesPerPixel);
   return pixels * sizeof(FilmPixel) +
          std::max(pixels * kPlaneFilterBytesPerPixel,
-                  pixels * 2 * sizeof(Vec3f) + network_filter_bytes(width, height));
+                  pixels * sizeof(Vec3f) + network_filter_bytes(width, height));
 }
 
 Image<Vec3f> denoised_on_planes(const Film& film, const DenoiseSettings& settings, Isa isa,
@@ -119,9 +119,8 @@ Image<Vec3f> denoised(Film film, const DenoiseSettings& settings, Isa isa, Host&
   if (settings.is_quick || film.pixels().empty()) {
     return filtered_on_planes(std::move(film), settings, isa, host);
   }
-  const Image<Vec3f> by_planes = denoised_on_planes(film, settings, isa, host);
-  Image<Vec3f> image =
-      filtered_by_network(film, by_planes, settings, quiet_exposure(film), isa, host);
+  Image<Vec3f> image = filtered_by_network(film, denoised_on_planes(film, settings, isa, host),
+                                           settings, quiet_exposure(film), isa, host);
   rebalance(image, film, host);
   return image;
 }

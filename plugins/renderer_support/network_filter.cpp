@@ -150,10 +150,11 @@ int aligned(int size) {
 /// Denoises one tile.
 class TileFilter {
  public:
-  TileFilter(const Film& film, const Image<Vec3f>& other, const Tile& tile,
+  /// `image`: what another filter made of the film, and in the end the result.
+  TileFilter(const Film& film, Image<Vec3f>& image, const Tile& tile,
              const DenoiseSettings& settings, float exposure, Isa isa, Host& host)
       : film_(film),
-        other_(other),
+        image_(image),
         tile_(tile),
         network_(denoiser_network()),
         settings_(settings),
@@ -165,7 +166,7 @@ class TileFilter {
         width_(aligned(own_width_)),
         height_(aligned(own_height_)) {}
 
-  void run(Image<Vec3f>& image);
+  void run();
 
  private:
   enum class Step : std::uint8_t { Read, Filter, Finish };
@@ -174,22 +175,22 @@ class TileFilter {
   void read_pixel(int x, int y, float* features, std::size_t stride);
   void gather_next(std::size_t level);
   void weigh_quads(std::size_t level, int y);
-  void all_rows(Step step, std::size_t level, int height, Image<Vec3f>* image);
+  void all_rows(Step step, std::size_t level, int height);
   template <int kWide>
-  void rows(Step step, std::size_t level, int y, Image<Vec3f>* image);
-  void rows_sse42(Step step, std::size_t level, int y, Image<Vec3f>* image);
-  void rows_avx2(Step step, std::size_t level, int y, Image<Vec3f>* image);
-  void rows_avx512(Step step, std::size_t level, int y, Image<Vec3f>* image);
+  void rows(Step step, std::size_t level, int y);
+  void rows_sse42(Step step, std::size_t level, int y);
+  void rows_avx2(Step step, std::size_t level, int y);
+  void rows_avx512(Step step, std::size_t level, int y);
   template <int kWide>
   void filter(std::size_t level, int y);
   float needed(int x, int y) const;
   template <int kWide>
-  void finish(int block_row, Image<Vec3f>& image);
+  void finish(int block_row);
   template <int kWide>
   void sum_taps(std::size_t level, int y, const float* weights, std::size_t stride, float* sums);
 
   const Film& film_;
-  const Image<Vec3f>& other_;
+  Image<Vec3f>& image_;
   const Tile& tile_;
   const Network& network_;
   const DenoiseSettings& settings_;
@@ -207,40 +208,40 @@ class TileFilter {
   Network::Logits logits_;
 };
 
-void TileFilter::run(Image<Vec3f>& image) {
+void TileFilter::run() {
   pairs_[0] = Pyramid(width_, height_, kMargin);
   seen_ = PixelLayers<3>(own_width_, own_height_, kMargin);
   SpareMemory spare;
   features_ = ChannelBlocks(4 * Network::kFeatures, width_ / 2, height_ / 2, spare);
-  all_rows(Step::Read, 0, height_ / 2, nullptr);
+  all_rows(Step::Read, 0, height_ / 2);
   logits_ = network_.run(std::move(features_), isa_, host_, spare);
   for (std::size_t level = 1; level <= Network::kDepth; ++level) gather_next(level);
   for (std::size_t level = Network::kDepth; level > 0; --level) {
     results_[level] = Pairs(width_ >> level, height_ >> level, kMargin);
-    all_rows(Step::Filter, level, height_ >> level, nullptr);
+    all_rows(Step::Filter, level, height_ >> level);
   }
-  all_rows(Step::Finish, 0, (own_height_ + 1) / 2, &image);
+  all_rows(Step::Finish, 0, (own_height_ + 1) / 2);
 }
 
-void TileFilter::all_rows(Step step, std::size_t level, int height, Image<Vec3f>* image) {
+void TileFilter::all_rows(Step step, std::size_t level, int height) {
   host_.parallel_for(std::size_t(height), [&](std::size_t y) {
     switch (isa_) {
       case Isa::Sse2:
-        return rows<4>(step, level, int(y), image);
+        return rows<4>(step, level, int(y));
       case Isa::Sse42:
-        return rows_sse42(step, level, int(y), image);
+        return rows_sse42(step, level, int(y));
       case Isa::Avx2:
-        return rows_avx2(step, level, int(y), image);
+        return rows_avx2(step, level, int(y));
       case Isa::Avx512:
-        return rows_avx512(step, level, int(y), image);
+        return rows_avx512(step, level, int(y));
     }
   });
 }
 
 #define DIORAMA_KERNEL(NAME, ARCH, WIDE)                                                          \
   [[gnu::target("arch=" ARCH), gnu::flatten]] void TileFilter::NAME(Step step, std::size_t level, \
-                                                                    int y, Image<Vec3f>* image) { \
-    rows<WIDE>(step, level, y, image);                                                            \
+                                                                    int y) {                      \
+    rows<WIDE>(step, level, y);                                                                   \
   }
 DIORAMA_KERNEL(rows_sse42, "x86-64-v2", 4)
 DIORAMA_KERNEL(rows_avx2, "x86-64-v3", 8)
@@ -248,14 +249,14 @@ DIORAMA_KERNEL(rows_avx512, "x86-64-v4", 16)
 #undef DIORAMA_KERNEL
 
 template <int kWide>
-inline void TileFilter::rows(Step step, std::size_t level, int y, Image<Vec3f>* image) {
+inline void TileFilter::rows(Step step, std::size_t level, int y) {
   switch (step) {
     case Step::Read:
       return read(y);
     case Step::Filter:
       return filter<kWide>(level, y);
     case Step::Finish:
-      return finish<kWide>(y, *image);
+      return finish<kWide>(y);
   }
 }
 
@@ -314,7 +315,7 @@ inline void TileFilter::read_pixel(int x, int y, float* features, std::size_t st
   *row.at(kShade, x) = compared;
   const float peak = pixel.brightest / std::max(pixel.count * own, 1e-12f);
   const float scale = 8.0f * exposure_;
-  const Vec3f other = (finite(other_.at(film_x, film_y)) - pixel.seen).cwiseMax(0.0f);
+  const Vec3f other = (finite(image_.at(film_x, film_y)) - pixel.seen).cwiseMax(0.0f);
   const Vec3f other_irradiance = other.cwiseQuotient(albedo.cwiseMax(kSmallest));
   const std::array<float, Network::kFeatures> values{scale * irradiance.x(),
                                                      scale * irradiance.y(),
@@ -495,7 +496,7 @@ inline float TileFilter::needed(int x, int y) const {
 
 /// Two rows of pixels.
 template <int kWide>
-inline void TileFilter::finish(int block_row, Image<Vec3f>& image) {
+inline void TileFilter::finish(int block_row) {
   constexpr int kBlock = ChannelBlocks::kWidth;
   const std::size_t stride = row_stride(std::size_t(width_));
   const auto half = std::size_t(width_ / 2);
@@ -554,13 +555,13 @@ inline void TileFilter::finish(int block_row, Image<Vec3f>& image) {
     const float* const stays = row_of(Network::kStays);
     for (int x = tile_.wanted.x_min - tile_.seen.x_min; x < tile_.wanted.x_max - tile_.seen.x_min;
          ++x) {
-      Vec3f& color = image.at(tile_.seen.x_min + x, image_y);
+      Vec3f& color = image_.at(tile_.seen.x_min + x, image_y);
       const float noise = *noisy.at(kNoise, x);
       const float noise_share = noise / std::max(noise + *noisy.at(kShade, x), 1e-12f);
       const float gain = 1.0f + kMostGain * noise_share * (1.0f - 2.0f / (1.0f + gains[x]));
       const float own_share = needed(x, y) / (1.0f + others[x]);
       const float stay = stays[x] / (1.0f + stays[x]);
-      const Vec3f other = finite(other_.at(tile_.seen.x_min + x, image_y));
+      const Vec3f other = finite(color);
       for (int k = 0; k < 3; ++k) {
         const auto layer = [&](const std::vector<float>& values, int number) {
           return values[std::size_t(number) * stride + std::size_t(x)];
@@ -587,14 +588,13 @@ std::size_t network_filter_bytes(int width, int height) {
   return most * kTileBytesPerPixel;
 }
 
-Image<Vec3f> filtered_by_network(const Film& film, const Image<Vec3f>& other,
+Image<Vec3f> filtered_by_network(const Film& film, Image<Vec3f> other,
                                  const DenoiseSettings& settings, double exposure, Isa isa,
                                  Host& host) {
-  Image<Vec3f> image(film.width(), film.height(), Vec3f::Zero());
   for (const Tile& tile : tiles_of(film.width(), film.height())) {
-    TileFilter(film, other, tile, settings, float(exposure), isa, host).run(image);
+    TileFilter(film, other, tile, settings, float(exposure), isa, host).run();
   }
-  return image;
+  return other;
 }
 
 }  // namespace diorama
