@@ -166,7 +166,7 @@ const DatasetReaders::Entry& DatasetReaders::entry_of(const std::string& type) c
   if (entry != entries_.end()) return *entry;
   const std::string near = nearest_name(type, types());
   throw Error(ErrorKind::Usage, "unknown " + reader_name(type) +
-                                    (near.empty() ? "" : "; did you mean '" + near + "'?") +
+                                    (near.empty() ? "." : "; did you mean '" + near + "'?") +
                                     " Known: " + joined(types()));
 }
 

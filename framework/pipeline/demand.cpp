@@ -89,6 +89,7 @@ class Resolution {
       known.emplace_back(derived);
     }
     std::sort(known.begin(), known.end());
+    known.erase(std::unique(known.begin(), known.end()), known.end());
     std::string list;
     for (const std::string& word : known) list += (list.empty() ? "" : ", ") + word;
     throw Error(ErrorKind::Config, who + ": needs '" + name + "', which neither " + renderer_ +
