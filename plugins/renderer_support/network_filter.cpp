@@ -59,6 +59,13 @@ enum Layer { kLight = 0, kColor = 3, kPair = 6, kNoise = 6, kShade = 7, kLayers 
 using Pyramid = PixelLayers<kLayers>;
 using Pairs = PixelLayers<kPair>;
 
+/// How much of what a pixel shows is noise, which counts as all where the light, so many times, is
+/// far less.
+inline float noise_share(const Pyramid::Row& row, int x, float times = 1.0f) {
+  const float noise = *row.at(kNoise, x);
+  return noise / std::max(noise + times * *row.at(kShade, x), 1e-12f);
+}
+
 /// Light beyond this has no sums.
 constexpr float kMostLight = 1e15f;
 
@@ -476,9 +483,8 @@ inline void TileFilter::filter(std::size_t level, int y) {
     float total = 0.0f;
     for (int k = 0; k < taps; ++k) total += weights[std::size_t(k) * stride + x];
     const float logit = gains[x * ChannelBlocks::kWidth];
-    const float noise = *own.at(kNoise, int(x));
-    const float share = noise / std::max(noise + *own.at(kShade, int(x)), 1e-12f);
-    const float gain = 1.0f + kMostGain * share * logit / (1.0f + std::abs(logit));
+    const float gain =
+        1.0f + kMostGain * noise_share(own, int(x)) * logit / (1.0f + std::abs(logit));
     for (int layer = 0; layer < kPair; ++layer) {
       const float sum = sums[std::size_t(layer) * stride + x] / total;
       *out.at(layer, int(x)) = layer < kColor ? gain * sum : sum;
@@ -489,9 +495,7 @@ inline void TileFilter::filter(std::size_t level, int y) {
 
 /// How much around a pixel there is to do: nothing, where nothing is noisy.
 inline float TileFilter::needed(int x, int y) const {
-  const auto row = pairs_[kCalmLevel].row(y >> kCalmLevel);
-  const float noise = *row.at(kNoise, x >> kCalmLevel);
-  return noise / std::max(noise + kCalm * *row.at(kShade, x >> kCalmLevel), 1e-12f);
+  return noise_share(pairs_[kCalmLevel].row(y >> kCalmLevel), x >> kCalmLevel, kCalm);
 }
 
 /// Two rows of pixels.
@@ -556,9 +560,8 @@ inline void TileFilter::finish(int block_row) {
     for (int x = tile_.wanted.x_min - tile_.seen.x_min; x < tile_.wanted.x_max - tile_.seen.x_min;
          ++x) {
       Vec3f& color = image_.at(tile_.seen.x_min + x, image_y);
-      const float noise = *noisy.at(kNoise, x);
-      const float noise_share = noise / std::max(noise + *noisy.at(kShade, x), 1e-12f);
-      const float gain = 1.0f + kMostGain * noise_share * (1.0f - 2.0f / (1.0f + gains[x]));
+      const float gain =
+          1.0f + kMostGain * noise_share(noisy, x) * (1.0f - 2.0f / (1.0f + gains[x]));
       const float own_share = needed(x, y) / (1.0f + others[x]);
       const float stay = stays[x] / (1.0f + stays[x]);
       const Vec3f other = finite(color);

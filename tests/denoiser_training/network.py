@@ -215,10 +215,15 @@ def widened(values):
     return F.interpolate(values, scale_factor=2, mode="nearest")
 
 
+def noise_share(noise, times=1.0):
+    """How much of what a pixel shows is noise, which counts as all where the light, so many times,
+    is far less."""
+    return noise[:, 0:1] / (noise[:, 0:1] + times * noise[:, 1:2]).clamp(min=1e-12)
+
+
 def gained(pairs, logit, noise):
     """Light of a level, as much brighter or darker as the network says and its noise allows."""
-    share = noise[:, 0:1] / noise.sum(1, keepdim=True).clamp(min=1e-12)
-    gain = 1.0 + MOST_GAIN * share * F.softsign(logit)
+    gain = 1.0 + MOST_GAIN * noise_share(noise) * F.softsign(logit)
     return torch.cat([pairs[:, :3] * gain, pairs[:, 3:]], 1)
 
 
@@ -245,8 +250,7 @@ def denoised(film, logits):
             part = widened(shifted(padded, k, 3, height // 2, width // 2))
             total = total + weight.unsqueeze(1) * part
         result = total
-    share = noise[0][:, 0:1] / noise[0].sum(1, keepdim=True).clamp(min=1e-12)
-    gain = 1.0 + MOST_GAIN * share * torch.tanh(0.5 * logits[0][:, GAIN : GAIN + 1])
+    gain = 1.0 + MOST_GAIN * noise_share(noise[0]) * torch.tanh(0.5 * logits[0][:, GAIN : GAIN + 1])
     irradiance = gain * result[:, :3] / result[:, 3:].clamp(min=SMALLEST)
     weights = F.softmax(logits[0][:, FINE + COARSE : FINE + COARSE + OWN], 1)
     own = torch.cat([film.own_albedo, film.seen], 1)
@@ -257,8 +261,7 @@ def denoised(film, logits):
         total = total + weight.unsqueeze(1) * shifted(padded, k, 3, height, width)
     clean = irradiance[:, :, :height, :width] * total[:, :3] + total[:, 3:]
     # Where nothing is noisy, planes change nothing.
-    around = noise[CALM_LEVEL]
-    needed = around[:, 0:1] / (around[:, 0:1] + CALM * around[:, 1:2]).clamp(min=1e-12)
+    needed = noise_share(noise[CALM_LEVEL], CALM)
     needed = F.interpolate(needed, scale_factor=1 << CALM_LEVEL, mode="nearest")
     own_share = needed * torch.sigmoid(-logits[0][:, -2:-1])
     clean = film.planes + own_share[:, :, :height, :width] * (clean - film.planes)
