@@ -8,6 +8,7 @@
 #include "carrier.h"
 #include "diorama/error.h"
 #include "joint_builder.h"
+#include "mesh_collision.h"
 #include "soft_contact_world.h"
 
 namespace diorama {
@@ -107,7 +108,7 @@ struct BulletBackend::World {
 
   ShapeCache cache;
   Bodies bodies;
-  btDefaultCollisionConfiguration configuration{small_pools()};
+  MeshCollisionConfiguration configuration{small_pools()};
   btCollisionDispatcher dispatcher;
   btDbvtBroadphase broadphase;
   btSequentialImpulseConstraintSolver solver;
