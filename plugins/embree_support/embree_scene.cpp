@@ -22,7 +22,8 @@ ShadingMesh::Point hit_point(const RTCFilterFunctionNArguments* args, unsigned i
                            RTCHitN_v(args->hit, args->N, i));
 }
 
-/// The share of light along a straight line through one surface of this material.
+/// The share of light along a straight line through one surface of this material; where it moves,
+/// the direction is what it is to the surface at the moment of the poses.
 Vec3f straight_share(const MeshInstance& instance, const ShadingMesh::Point& point,
                      const Vec3f& direction, bool passes_glass) {
   const ShadingMaterial& material = instance.material(point.triangle);
@@ -188,9 +189,11 @@ void EmbreeScene::attenuate_shadow_ray(const RTCFilterFunctionNArguments* args) 
     const MeshInstance& instance = instance_of(args, i);
     Vec3f direction(RTCRayN_dir_x(args->ray, count, i), RTCRayN_dir_y(args->ray, count, i),
                     RTCRayN_dir_z(args->ray, count, i));
-    // In shared trees rays are in the space of the mesh.
+    // In shared trees rays are in the space of the mesh, and turn with it.
     if (RTCHitN_instID(args->hit, count, i, 0) != RTC_INVALID_GEOMETRY_ID) {
       direction = instance.linear * direction;
+    } else if (instance.motion) {
+      direction = instance.motion->turned_back(direction, RTCRayN_time(args->ray, count, i));
     }
     const Vec3f share =
         straight_share(instance, hit_point(args, i), direction.normalized(), shadow.passes_glass);

@@ -26,8 +26,12 @@ Vec3f mapped_normal(const RayHit& hit, const SurfaceGeometry& s, const TextureSl
   const Vec3f a = instance.vertex(corners[0]);
   const Vec3f ab = instance.vertex(corners[1]) - a;
   const Vec3f ac = instance.vertex(corners[2]) - a;
-  const Vec3f along_u = (ab * f.y() - ac * e.y()) / det;
-  const Vec3f along_v = (ac * e.x() - ab * f.x()) / det;
+  Vec3f along_u = (ab * f.y() - ac * e.y()) / det;
+  Vec3f along_v = (ac * e.x() - ab * f.x()) / det;
+  if (instance.motion) [[unlikely]] {
+    along_u = instance.motion->turned(along_u, hit.time);
+    along_v = instance.motion->turned(along_v, hit.time);
+  }
   const Vec3f tangent = (along_u - s.normal * s.normal.dot(along_u)).normalized();
   Vec3f bitangent = s.normal.cross(tangent);
   if (bitangent.dot(along_v) < 0.0f) bitangent = -bitangent;

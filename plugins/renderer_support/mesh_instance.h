@@ -28,6 +28,10 @@ struct ShutterMotion {
     const double seconds = double(time - kMoment) * window;
     return (motion.then_from_now(seconds).linear() * direction.cast<double>()).cast<float>();
   }
+  /// The way back. The motion is steady: it was the same before the moment as after it.
+  Vec3f turned_back(const Vec3f& direction, float time) const {
+    return turned(direction, 2.0f * kMoment - time);
+  }
 };
 
 /// One visible mesh node. Points into the tables of its RenderScene.

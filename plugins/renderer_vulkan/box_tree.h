@@ -29,15 +29,22 @@ struct TreeBox {
 /// Two children, as kernels read them. Children are nodes, or leaves: kLeaf with what stands there.
 struct TreeNode {
   static constexpr std::uint32_t kLeaf = 0x80000000u;
+  /// The box of a child that is not there: a place farther away than rays reach. An empty box would
+  /// not do: kernels take its ends for one another, and enter it.
+  static Vec3f nowhere() { return {1.1e38f, -1.7e38f, 2.3e38f}; }
 
-  Vec3f low_a = TreeBox().low;
+  Vec3f low_a = nowhere();
   std::uint32_t child_a = kLeaf;
-  Vec3f high_a = TreeBox().high;
+  Vec3f high_a = nowhere();
   std::uint32_t pad_a = 0;
-  Vec3f low_b = TreeBox().low;
+  Vec3f low_b = nowhere();
   std::uint32_t child_b = kLeaf;
-  Vec3f high_b = TreeBox().high;
+  Vec3f high_b = nowhere();
   std::uint32_t pad_b = 0;
+
+  /// Only a root has less than two children.
+  bool has_a() const { return low_a != nowhere(); }
+  bool has_b() const { return low_b != nowhere(); }
 };
 static_assert(sizeof(TreeNode) == 64);
 

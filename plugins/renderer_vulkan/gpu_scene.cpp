@@ -75,8 +75,30 @@ std::array<Vec3f, 3> rows_of(const Eigen::Matrix3f& matrix) {
   return {matrix.row(0).transpose(), matrix.row(1).transpose(), matrix.row(2).transpose()};
 }
 
-/// Of all places that an instance comes to while the shutter is open.
-TreeBox box_of(const MeshInstance& instance, double window) {
+float half_area(const TreeBox& box) {
+  const Vec3f size = (box.high - box.low).cwiseMax(0.0f);
+  return size.x() * size.y() + size.y() * size.z() + size.z() * size.x();
+}
+
+/// A box in the space of an instance's mesh, in the world, as far as it reaches into another.
+TreeBox placed(const TreeBox& box, const MeshInstance& instance, const TreeBox& within) {
+  if (box.is_empty()) return box;
+  TreeBox result;
+  for (int i = 0; i < 8; ++i) {
+    const Vec3f corner((i & 1) != 0 ? box.high.x() : box.low.x(),
+                       (i & 2) != 0 ? box.high.y() : box.low.y(),
+                       (i & 4) != 0 ? box.high.z() : box.low.z());
+    result.add(instance.to_world(corner));
+  }
+  const float margin = 2e-6f * result.low.cwiseAbs().cwiseMax(result.high.cwiseAbs()).sum();
+  result.low = (result.low.array() - margin).matrix().cwiseMax(within.low);
+  result.high = (result.high.array() + margin).matrix().cwiseMin(within.high);
+  return result;
+}
+
+}  // namespace
+
+TreeBox box_over_time(const MeshInstance& instance, double window) {
   Aabb bounds = instance.bounds;
   if (instance.motion) {
     const RigidMotion& motion = instance.motion->motion;
@@ -107,29 +129,6 @@ TreeBox box_of(const MeshInstance& instance, double window) {
   box.add(Vec3f(bounds.max.cast<float>() + Vec3f::Constant(margin)));
   return box;
 }
-
-float half_area(const TreeBox& box) {
-  const Vec3f size = (box.high - box.low).cwiseMax(0.0f);
-  return size.x() * size.y() + size.y() * size.z() + size.z() * size.x();
-}
-
-/// A box in the space of an instance's mesh, in the world, as far as it reaches into another.
-TreeBox placed(const TreeBox& box, const MeshInstance& instance, const TreeBox& within) {
-  if (box.is_empty()) return box;
-  TreeBox result;
-  for (int i = 0; i < 8; ++i) {
-    const Vec3f corner((i & 1) != 0 ? box.high.x() : box.low.x(),
-                       (i & 2) != 0 ? box.high.y() : box.low.y(),
-                       (i & 4) != 0 ? box.high.z() : box.low.z());
-    result.add(instance.to_world(corner));
-  }
-  const float margin = 2e-6f * result.low.cwiseAbs().cwiseMax(result.high.cwiseAbs()).sum();
-  result.low = (result.low.array() - margin).matrix().cwiseMax(within.low);
-  result.high = (result.high.array() + margin).matrix().cwiseMin(within.high);
-  return result;
-}
-
-}  // namespace
 
 struct GpuScene::Parts {
   gpu::Address base = 0;
@@ -348,7 +347,7 @@ GpuScene::References GpuScene::references_of(const RenderScene& scene) const {
     if ((child & TreeNode::kLeaf) == 0) largest.emplace(half_area(box), number);
   };
   for (std::uint32_t i = 0; i < scene.instances().size(); ++i) {
-    add(i, 0, box_of(scene.instances()[i], scene.window()));
+    add(i, 0, box_over_time(scene.instances()[i], scene.window()));
   }
   const std::size_t most =
       result.parts.size() +
@@ -360,13 +359,12 @@ GpuScene::References GpuScene::references_of(const RenderScene& scene) const {
     const MeshInstance& instance = scene.instances()[part.instance];
     const auto& top = meshes_.at(instance.shading)->top;
     const auto node = top.find(part.child);
-    if (instance.motion || node == top.end()) continue;
+    if (instance.motion || node == top.end() || !node->second.has_b()) continue;
     const TreeBox whole = result.boxes[number];
     const TreeBox a = placed({node->second.low_a, node->second.high_a}, instance, whole);
     const TreeBox b = placed({node->second.low_b, node->second.high_b}, instance, whole);
     // Turned boxes may be no smaller than what they are part of.
     if (half_area(a) + half_area(b) > 1.5f * half_area(whole)) continue;
-    if (b.is_empty()) continue;
     result.parts[number].child = node->second.child_a;
     result.boxes[number] = a;
     if ((node->second.child_a & TreeNode::kLeaf) == 0) largest.emplace(half_area(a), number);

@@ -17,6 +17,9 @@
 
 namespace diorama {
 
+/// Of all places that an instance comes to in the `window` seconds around the moment of its pose.
+TreeBox box_over_time(const MeshInstance& instance, double window);
+
 /// A scene in a device's memory. take() is called for every change and transfers what is new.
 class GpuScene {
  public:

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "vulkan_renderer.h"
 
-#include <algorithm>
 #include <charconv>
 #include <chrono>
 #include <string>
@@ -61,21 +60,10 @@ VulkanRenderer::VulkanRenderer(const Params& params, Host& host,
                                device_->device.instance().list_of_devices());
 }
 
-void VulkanRenderer::prepare_paths() {
-  scene_.take(meshes().render_scene());
-  turns_ = std::ranges::any_of(meshes().instances(), [](const MeshInstance& instance) {
-    return instance.motion && instance.motion->motion.angular.norm() > 0.0;
-  });
-}
+void VulkanRenderer::prepare_paths() { scene_.take(meshes().render_scene()); }
 
 Film VulkanRenderer::trace(const View& view, const PathSettings& settings, SamplePlan& plan) {
   using Clock = std::chrono::steady_clock;
-  if (view.has_shutter() && turns_) {
-    throw Error(ErrorKind::Config,
-                "a camera has exposure_time_s or readout_time_s, and something turns meanwhile, "
-                "which the renderer vulkan does not show as yet: use the renderer embree, or set "
-                "both to 0");
-  }
   const auto start = Clock::now();
   tracer_.begin(view, settings, scene_.world(), meshes().window());
   Image<PixelSum> sums;

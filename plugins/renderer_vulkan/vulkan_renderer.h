@@ -36,7 +36,6 @@ class VulkanRenderer final : public PathRenderer {
 
   std::shared_ptr<const PathDevice> device_;
   GpuScene scene_;
-  bool turns_ = false;  ///< Something, while a shutter is open.
   GpuPathTracer tracer_;
 };
 

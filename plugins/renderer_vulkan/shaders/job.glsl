@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What paths carry from kernel to kernel, by columns: an entry of every column per path.
+// What paths carry from kernel to kernel, by columns: an entry of every column per path. A kernel reads
+// an entry as a whole and once: asked for .w of one that was read before, Mesa 22.3 gives its .x.
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer Columns { vec4 v[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Queue { uint v[]; };
 

@@ -31,6 +31,7 @@ struct Path {
   float width;
   float spread;
   Sampler random;
+  float time;  // share of the shutter's window
   // What is added to its result.
   vec3 seen;
   vec3 scattered;
@@ -85,6 +86,7 @@ Path load_path(uint index) {
   path.spread = s5.y;
   path.random =
       Sampler(floatBitsToUint(s6.x), floatBitsToUint(s6.y), floatBitsToUint(s6.z));
+  path.time = s6.w;
   path.seen = vec3(0.0);
   path.scattered = vec3(0.0);
   path.records = false;
@@ -101,10 +103,9 @@ void store_path(uint index, Path path) {
   STATE(kLastPosition, index) = vec4(path.last.position, path.last.total_score);
   STATE(kLastNormal, index) = vec4(path.last.normal, path.last_density);
   STATE(kFootprint, index) = vec4(path.width, path.spread, 0.0, kInfinite);
-  const float time = STATE(kSampler, index).w;
   STATE(kSampler, index) =
       vec4(uintBitsToFloat(path.random.key), uintBitsToFloat(path.random.dimension),
-           uintBitsToFloat(path.random.place), time);
+           uintBitsToFloat(path.random.place), path.time);
 }
 
 void store_result(uint index, Path path) {
@@ -178,19 +179,19 @@ void collect_emission(inout Path path, uint instance, uint number, uint instance
 }
 
 vec3 mapped_normal(uint instance, uint number, uint triangle, uint material, SurfacePoint s,
-                   float footprint, vec3 to_viewer) {
-  if ((world.instances.v[instance].flags & kHasUvs) == 0u) return s.normal;
+                   float footprint, vec3 to_viewer, float time) {
+  const uint flags = world.instances.v[instance].flags;
+  if ((flags & kHasUvs) == 0u) return s.normal;
   const CornerUvs uvs = corner_uvs(instance, number);
   const vec2 e = uvs.b - uvs.a;
   const vec2 f = uvs.c - uvs.a;
   const float det = e.x * f.y - e.y * f.x;
   if (det == 0.0) return s.normal;
-  const vec3 ab =
-      linear_part(instance, world.instances.v[instance].triangles.v[3u * triangle + 1u].xyz);
-  const vec3 ac =
-      linear_part(instance, world.instances.v[instance].triangles.v[3u * triangle + 2u].xyz);
-  const vec3 along_u = (ab * f.y - ac * e.y) / det;
-  const vec3 along_v = (ac * e.x - ab * f.x) / det;
+  Vec4s triangles = world.instances.v[instance].triangles;
+  const vec3 ab = linear_part(instance, triangles.v[3u * triangle + 1u].xyz);
+  const vec3 ac = linear_part(instance, triangles.v[3u * triangle + 2u].xyz);
+  const vec3 along_u = turned_vector(instance, flags, (ab * f.y - ac * e.y) / det, time);
+  const vec3 along_v = turned_vector(instance, flags, (ac * e.x - ab * f.x) / det, time);
   const vec3 within = along_u - s.normal * dot(s.normal, along_u);
   const float length2 = dot(within, within);
   if (!(length2 > 0.0)) return s.normal;
@@ -384,7 +385,7 @@ bool scatter(inout Path path, SurfacePoint s, Surface surface, inout ShadowRay s
 }
 
 SurfacePoint surface_of(Path path, vec4 hit, uint instance, uint flags, uint number, uint triangle,
-                        vec3 triangle_normal, float time) {
+                        vec3 triangle_normal) {
   SurfacePoint s;
   s.position = path.origin + hit.x * path.direction;
   const float area2 = dot(triangle_normal, triangle_normal);
@@ -398,7 +399,7 @@ SurfacePoint surface_of(Path path, vec4 hit, uint instance, uint flags, uint num
     vec3 interpolated = vec3(dot(world.instances.v[instance].normal_from_node[0], n),
                              dot(world.instances.v[instance].normal_from_node[1], n),
                              dot(world.instances.v[instance].normal_from_node[2], n));
-    interpolated = turned_vector(instance, flags, interpolated, time);
+    interpolated = turned_vector(instance, flags, interpolated, path.time);
     const float length2 = dot(interpolated, interpolated);
     if (length2 > 0.0) normal = interpolated * ((s.is_back ? -1.0 : 1.0) / sqrt(length2));
   }
@@ -427,14 +428,12 @@ bool advance(inout Path path, uint index, inout ShadowRay shadow) {
   const uint material_flags = world.materials.v[material].flags;
   if (path.bounce > job.max_bounces && (material_flags & kEmits) == 0u) return false;
 
-  const float time = STATE(kSampler, index).w;
   const vec3 triangle_normal =
       turned_vector(instance, flags,
                     normal_in_world(instance, cross(triangles.v[3u * triangle + 1u].xyz,
                                                     triangles.v[3u * triangle + 2u].xyz)),
-                    time);
-  SurfacePoint s =
-      surface_of(path, hit, instance, flags, number, triangle, triangle_normal, time);
+                    path.time);
+  SurfacePoint s = surface_of(path, hit, instance, flags, number, triangle, triangle_normal);
   const bool was_soft = is_soft(path);
   Surface surface = world.materials.v[material].surfaces[was_soft ? 1 : 0];
   const bool has_colors = (flags & kHasColors) != 0u;
@@ -469,7 +468,8 @@ bool advance(inout Path path, uint index, inout ShadowRay shadow) {
                                was_soft && surface.has_glass == 0u);
     }
     if (has_texture(material, kNormalSlot)) {
-      s.normal = mapped_normal(instance, number, triangle, material, s, footprint, -path.direction);
+      s.normal = mapped_normal(instance, number, triangle, material, s, footprint, -path.direction,
+                               path.time);
     }
   }
   if ((material_flags & (kThinGlass | kBlended)) != 0u) {
