@@ -6,7 +6,7 @@
 #              build mutants kills faults large cluster views clip soak fuzz sanitize tidy deb12 deb13 (default: all)
 # --at-once is for machines with many cores: build goes first, then the others run side by side, soak on one half of the
 # cores and the rest on the other; cluster, deb12 and deb13, which install packages, one after another among them.
-# Needs root and a network for cluster, deb12 and deb13, and python3-scipy for clip. KILLS (1000), FAULTS (5000), VIEWS (1000),
+# Needs root and a network for cluster, deb12 and deb13, and python3-scipy (with numpy and OpenCV) for clip. KILLS (1000), FAULTS (5000), VIEWS (1000),
 # SOAK_CAPTURES (10000) and FUZZ_MINUTES (60, shared by all fuzzers) say how much. Logs are in build/nightly.
 # DIORAMA_BUILD says where the build is (default: build/release, which the part build makes). The parts kills, faults,
 # large, views, clip, soak and fuzz need nothing else of a build: neither compilers nor the place where it was made.
@@ -32,7 +32,9 @@ part_cluster() { tests/cluster/run.sh --build "$build"; }
 part_views() { tests/chosen_views/check_views.py --build "$build" --captures "${VIEWS:-1000}"; }
 part_clip() {
   local folder="$logs/clip"
-  "$build/bin/diorama" run configs/clip.yaml --output "$folder" --overwrite --set renderer.samples=2 &&
+  # Its help first: a library that is missing is told before minutes of rendering.
+  /usr/bin/python3 tests/clips/check_clip.py --help &&
+    "$build/bin/diorama" run configs/clip.yaml --output "$folder" --overwrite --set renderer.samples=2 &&
     /usr/bin/python3 tests/clips/check_clip.py "$folder" &&
     /usr/bin/python3 tests/clips/check_walk.py --build "$build" --seeds 8 --height -0.3 0.6 --output "$logs"
 }

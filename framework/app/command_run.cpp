@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "framework/app/command_run.h"
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <csignal>
@@ -112,12 +113,12 @@ RunSummary run_job(JobAssembly& assembly, HostServices& host, const RunCommandOp
   run.only_finishes = options.only_finishes;
   run.only = options.only;
   using Clock = std::chrono::steady_clock;
-  run.progress = [&, trimmed = Clock::now()](const RunProgress& progress) mutable {
-    constexpr std::chrono::seconds kBetweenTrims{1};
+  run.progress = [&, next_trim = Clock::now()](const RunProgress& progress) mutable {
+    constexpr Clock::duration kBetweenTrims = std::chrono::milliseconds(100);
+    constexpr int kOfTime = 20;  // trims take at most one part of so many
     has_begun = true;
-    if (const auto now = Clock::now(); now - trimmed >= kBetweenTrims) {
-      trimmed = now;
-      give_free_pages_back();
+    if (const auto now = Clock::now(); now >= next_trim) {
+      next_trim = now + std::max(kBetweenTrims, kOfTime * give_free_pages_back());
     }
     if (lines) {
       lines->update(progress.done, progress.total, progress.resumed, progress.respawned,
@@ -191,6 +192,7 @@ void print_estimate(const GlobalOptions& global, const Value& job, int visits_in
 int run_value(const GlobalOptions& global, const Value& job, const RunCommandOptions& options,
               ConsoleLog& log) {
   give_large_blocks_back();
+  share_heaps();
   const JobServices services = make_job_services(global, job, log.sink());
   JobAssembly assembly =
       assemble_job(job, *services.registry, *services.host, services.assets_root, program_version(),

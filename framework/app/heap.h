@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
+
 namespace diorama {
 
 // How the C library's heap treats blocks as large as pictures; for the whole program, from now on.
@@ -10,9 +12,14 @@ namespace diorama {
 /// captures.
 void give_large_blocks_back();
 
+/// Threads that start from now on share two heaps. By itself glibc gives each its own, and in all
+/// of them what is kept long, like assets, comes to lie among what is soon freed. What the user
+/// says by MALLOC_ARENA_MAX or GLIBC_TUNABLES stays.
+void share_heaps();
+
 /// All pages that hold nothing, wherever in the heap. Small blocks of thousands of captures leave
-/// holes, in a heap per thread, that are never quite filled again.
-void give_free_pages_back();
+/// holes that are never quite filled again. Returns how long the processor had to do with it.
+std::chrono::nanoseconds give_free_pages_back();
 
 /// They stay with the program: reading a picture every few milliseconds, it would spend a third of
 /// its time on pages that the system clears for it. For programs that end soon.

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Makes a thousand captures with five conditions and three quotas (job.yaml beside this file) in shards, and
 looks at the written labels alone: every picture has a target that meets all conditions, the main one of each
-lies where the quotas want it, each part of a quota has its share exactly, and views.json counts the same.
+lies where the quotas want it, each part of a quota has its share exactly as far as captures can be shared out, and
+views.json counts the same.
 Refused views take at most a tenth of the time in which pictures are made, little as these take (`real_time`, one
 path per pixel), and each of them at most a twentieth of a picture's.
 
@@ -25,6 +26,12 @@ import tempfile
 HERE = pathlib.Path(__file__).resolve().parent
 WIDTH, HEIGHT = 640, 480
 LABELS = ["capsule", "cone", "cylinder", "sphere", "cube"]
+# Views are dealt in rounds: each gives every part its share, the last one as far as it comes.
+SHARES = {
+    "label": dict.fromkeys(LABELS, 1),
+    "distance_m": {"near": 1, "far": 3},
+    "direction": dict.fromkeys(range(8), 1),
+}
 LOWEST = math.sin(math.radians(-40))
 SLACK = 1e-6  # numbers are written with fewer digits than they are judged with
 
@@ -80,14 +87,12 @@ def check(dataset, captures):
         parts["direction"][int(main["azimuth"] // 90) + 4 * row] += 1
     if sorted(numbers) != list(range(captures)):
         faults.append(f"{len(set(numbers))} captures of {captures} are there")
-    wanted = {
-        "label": {label: captures // 5 for label in LABELS},
-        "distance_m": {"near": captures // 4, "far": captures - captures // 4},
-        "direction": {cell: captures // 8 for cell in range(8)},
-    }
     for quota, counts in parts.items():
-        if dict(counts) != wanted[quota]:
-            faults.append(f"quota {quota}: found {dict(counts)}, expected {wanted[quota]}")
+        shares = SHARES[quota]
+        rounds, rest = divmod(captures, sum(shares.values()))
+        wanted = {part: (rounds * share, (rounds + (rest > 0)) * share) for part, share in shares.items()}
+        if set(counts) - set(wanted) or any(not low <= counts[part] <= high for part, (low, high) in wanted.items()):
+            faults.append(f"quota {quota}: found {dict(counts)}, expected these at least and at most: {wanted}")
     report = json.loads((dataset / "views.json").read_text())
     refused = sum(report["refused"].values())
     if report["unmet"]:
@@ -99,7 +104,9 @@ def check(dataset, captures):
 
 def seconds_of_stages(log):
     stages = collections.Counter()
-    for name, seconds in re.findall(r"([a-z ]+) ([0-9.]+) s", re.search(r"time: (.*)", log)[1]):
+    times = re.search(r"time: (.*)", log)
+    # A shard that has no visit says none.
+    for name, seconds in re.findall(r"([a-z ]+) ([0-9.]+) s", times[1] if times else ""):
         stages[name.strip()] += float(seconds)
     return stages
 
@@ -119,12 +126,10 @@ def check_cost(stages, captures, refused):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
-    parser.add_argument("--captures", type=int, default=1000, help="a multiple of 40, the default is %(default)s")
+    parser.add_argument("--captures", type=int, default=1000, help="the default is %(default)s")
     parser.add_argument("--shards", type=int, default=3)
     parser.add_argument("--build", type=pathlib.Path, default=HERE.parents[1] / "build" / "release")
     options = parser.parse_args()
-    if options.captures % 40:
-        parser.error(f"--captures {options.captures}: expected a multiple of 40, which all quotas divide")
     dataset = pathlib.Path(tempfile.mkdtemp(prefix="diorama-views-")) / "out"
     stages = collections.Counter()
     for shard in range(options.shards, 0, -1):

@@ -27,7 +27,7 @@ try:
     import numpy as np
     from scipy.optimize import linear_sum_assignment
 except ImportError as missing:
-    print(f"skipped: {missing}")
+    print(f"skipped: {missing}; python3-numpy, python3-opencv and python3-scipy are needed")
     sys.exit(77)
 
 FAULTS = []

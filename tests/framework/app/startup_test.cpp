@@ -1,14 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-// What listing and describing plugins loads into the process.
+// What listing and describing plugins loads into the process, and how many heaps its threads have.
+#include <malloc.h>
+
 #include <algorithm>
+#include <cstdio>
+#include <cstdlib>
 #include <fstream>
 #include <iostream>
+#include <latch>
 #include <set>
 #include <sstream>
 #include <string>
+#include <thread>
 #include <vector>
 
+#include "diorama/abi.h"
 #include "framework/app/cli.h"
+#include "framework/app/heap.h"
 #include "support/catch.h"
 
 namespace {
@@ -40,6 +48,32 @@ std::string run(std::vector<const char*> words) {
   return out.str();
 }
 
+/// Heaps of the C library, as it counts them itself.
+int heaps() {
+  char* text = nullptr;
+  std::size_t size = 0;
+  std::FILE* const stream = open_memstream(&text, &size);
+  malloc_info(0, stream);
+  std::fclose(stream);
+  const std::string report(text, size);
+  std::free(text);
+  int count = 0;
+  for (std::size_t at = 0; (at = report.find("<heap nr=", at)) != report.npos; ++at) ++count;
+  return count;
+}
+
+/// All there at a time, each with memory of its own.
+void allocate_on_threads(int count) {
+  std::latch all(count);
+  std::vector<std::jthread> threads;
+  for (int i = 0; i < count; ++i) {
+    threads.emplace_back([&all] {
+      const std::vector<char> block(10000, 'x');
+      all.arrive_and_wait();
+    });
+  }
+}
+
 }  // namespace
 
 TEST_CASE("nothing heavy is mapped before a job needs it", "[startup]") {
@@ -57,4 +91,26 @@ TEST_CASE("nothing heavy is mapped before a job needs it", "[startup]") {
   run({"plugins", "describe", "embree"});
   CHECK(is_mapped("renderer_embree.so"));
   CHECK(is_mapped("libembree"));
+}
+
+TEST_CASE("threads get no more heaps, unless the user says how many", "[startup]") {
+#if DIORAMA_DETAIL_ADDRESS_SANITIZER || DIORAMA_DETAIL_THREAD_SANITIZER
+  WARN("sanitizers have heaps of their own: not measured");
+#else
+  constexpr int kThreads = 5;
+  unsetenv("GLIBC_TUNABLES");
+  setenv("MALLOC_ARENA_MAX", "100", 1);
+  diorama::share_heaps();
+  unsetenv("MALLOC_ARENA_MAX");
+  setenv("GLIBC_TUNABLES", "glibc.malloc.check=0:glibc.malloc.arena_max=100", 1);
+  diorama::share_heaps();
+  REQUIRE(heaps() < 3);
+  allocate_on_threads(kThreads);
+  const int before = heaps();
+  CHECK(before >= kThreads);
+  setenv("GLIBC_TUNABLES", "glibc.malloc.check=0", 1);
+  diorama::share_heaps();
+  allocate_on_threads(4 * kThreads);
+  CHECK(heaps() == before);
+#endif
 }
