@@ -79,7 +79,9 @@ void count_levels(Instance& instance, std::optional<std::int64_t> visible) {
   const double pixels =
       visible ? double(*visible)
               : double(instance.tight_box->width()) * double(instance.tight_box->height());
-  const double inside = pixels / (1.0 - level.occlusion().value_or(0.0));
+  // What has a box is seen, however little of it.
+  constexpr double kLeastSeen = 1e-3;
+  const double inside = pixels / std::max(1.0 - level.occlusion().value_or(0.0), kLeastSeen);
   const double outside = inside * level.truncation() / (1.0 - level.truncation());
   instance.visibility =
       Visibility{std::llround(pixels), std::llround(inside), std::llround(std::ceil(outside)),
@@ -205,11 +207,12 @@ std::string source_name(const ConversionSource& source) {
   return source.folder.string() + " (" + source.data->info().format + ")";
 }
 
-/// Levels of what is hidden and cut off that the source tells in place of shares.
+/// What the source tells in place of shares of what is hidden and what is cut off: levels of both,
+/// or one share of both.
 NameSet told_levels(const ConversionSource& source) {
   NameSet levels;
   if (source.holds.contains(kHoldsOcclusion)) return levels;
-  for (const char* level : {kAskOcclusionLevels, kAskTruncationLevels}) {
+  for (const char* level : {kAskOcclusionLevels, kAskTruncationLevels, kAskSeenShares}) {
     if (source.data->info().steps.contains(std::string_view(level))) levels.emplace(level);
   }
   return levels;
@@ -384,10 +387,14 @@ void Conversion::note_differences(const ConversionSource& source) {
                             "where a third hides both"
                           : "lists of what hides an object are empty, whatever is hidden"));
   }
-  if (!told_levels(source).empty() && made_up.erase("visibility") > 0) {
-    notes_.push_back(who +
-                     ": holds levels of what is hidden or cut off, no shares; where a format says "
-                     "shares, objects have that in the middle of their level");
+  const NameSet told = told_levels(source);
+  if (!told.empty() && made_up.erase("visibility") > 0) {
+    notes_.push_back(
+        who + (told.contains(std::string_view(kAskSeenShares))
+                   ? ": holds what share of an object is seen, but not whether the rest is hidden "
+                     "or cut off; it counts as hidden"
+                   : ": holds levels of what is hidden or cut off, no shares; where a format says "
+                     "shares, objects have that in the middle of their level"));
   }
   if (!made_up.empty()) {
     notes_.push_back(who + ": does not hold " + joined(made_up) + "; objects count as neither " +

@@ -10,6 +10,7 @@
 
 #include "framework/datasets/capture_sweep.h"
 #include "framework/datasets/pixel_boxes.h"
+#include "framework/datasets/pixel_counts.h"
 
 namespace diorama {
 namespace {
@@ -17,7 +18,7 @@ namespace {
 /// Shares of a picture from which on it is worth a look.
 constexpr double kBlack = 0.02;
 constexpr double kBurntShare = 0.5;
-constexpr double kCloseM = 0.15;
+constexpr float kCloseM = 0.15f;
 constexpr double kCloseShare = 0.5;
 constexpr double kMovingPx = 1.0;
 
@@ -118,25 +119,14 @@ class Measurement {
   }
 
   static void judge_color(const Image<Rgba8>& image, SeenPicture& seen) {
-    const auto pixels = image.pixels();
-    // Both in one walk: a picture is more than the processor's nearer memory holds.
-    std::uint64_t sum = 0;
-    std::size_t burnt = 0;
-    for (const Rgba8& pixel : pixels) {
-      sum += std::uint64_t(pixel[0]) + pixel[1] + pixel[2];
-      // Numbers from 254 on have all bits but the last.
-      burnt += std::size_t((pixel[0] & pixel[1] & pixel[2]) >= 254);
-    }
-    // Nearly always the first rows tell.
-    const bool is_uniform =
-        std::ranges::all_of(pixels, [&](const Rgba8& pixel) { return pixel == pixels[0]; });
-    const double count = double(std::max<std::size_t>(pixels.size(), 1));
-    seen.brightness = brightness_of_sum(sum, pixels.size());
+    const ColorCounts counts = color_counts(image.pixels());
+    const std::size_t size = image.pixels().size();
+    seen.brightness = brightness_of_sum(counts.sum, size);
     if (*seen.brightness < kBlack) {
       seen.suspicions.push_back("black");
-    } else if (double(burnt) > kBurntShare * count) {
+    } else if (double(counts.burnt) > kBurntShare * double(size)) {
       seen.suspicions.push_back("burnt");
-    } else if (is_uniform) {
+    } else if (counts.is_uniform) {
       seen.suspicions.push_back("one colour");
     }
   }
@@ -145,8 +135,7 @@ class Measurement {
     for (const Channel<float>& channel : {kDistanceToImagePlane, kDistanceToCamera}) {
       if (!frame.has(channel.name)) continue;
       const auto pixels = frame.get(channel).pixels();
-      const auto close = std::ranges::count_if(pixels, [](float d) { return double(d) < kCloseM; });
-      if (double(close) > kCloseShare * double(pixels.size())) {
+      if (double(count_below(pixels, kCloseM)) > kCloseShare * double(pixels.size())) {
         seen.suspicions.push_back("something close before the camera");
       }
       return;
@@ -236,9 +225,7 @@ std::string class_of(const Instance& instance) {
 }
 
 double mean_brightness(const Image<Rgba8>& image) {
-  std::uint64_t sum = 0;
-  for (const Rgba8& pixel : image.pixels()) sum += std::uint64_t(pixel[0]) + pixel[1] + pixel[2];
-  return brightness_of_sum(sum, image.pixels().size());
+  return brightness_of_sum(color_counts(image.pixels()).sum, image.pixels().size());
 }
 
 std::optional<SeenFrom> seen_from(const StoredInfo& info, const Frame& frame,

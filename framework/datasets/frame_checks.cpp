@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include "framework/datasets/check_names.h"
@@ -19,6 +20,7 @@ constexpr const char* kBox = "box = extent of mask";
 constexpr const char* kAmodal = "visible <= amodal";
 constexpr const char* kOrder = "occlusion order agrees with masks";
 constexpr const char* kNormalsFace = "normals face the camera";
+constexpr const char* kMotionAgrees = "motion agrees with flow and distances";
 constexpr const char* kSame = "an object stays what it is";
 constexpr const char* kInImage = "labels lie in the image";
 constexpr const char* kLeaves = "surfaces are parts of their objects";
@@ -84,6 +86,7 @@ class FrameChecks {
     if (holds(kHoldsLeafPaths) && holds(kHoldsNodePaths)) check_leaves();
     if (holds("occlusion_order") && holds("amodal_mask")) check_order();
     if (holds(kHoldsCamera)) check_geometry();
+    if (stored_.capture.clip && frame_.has(kMotion.name)) check_motion();
   }
 
  private:
@@ -432,6 +435,42 @@ class FrameChecks {
     // Smooth shading may bend a normal away at an outline.
     check(double(wrong) <= 0.02 * double(all), kNormalsFace, kNormals.name, "",
           std::to_string(wrong) + " of " + std::to_string(all) + " normals look away from it");
+  }
+
+  /// In a clip: none where nothing was hit and in the first frame, else the flow to the last frame,
+  /// turned round.
+  void check_motion() {
+    constexpr double kSlackPx = 1e-3;
+    const auto motion = frame_.get(kMotion).pixels();
+    const auto pixels_of = [&]<class Pixel>(const Channel<Pixel>& channel) {
+      return frame_.has(channel.name) ? frame_.get(channel).pixels() : std::span<const Pixel>();
+    };
+    auto distances = pixels_of(kDistanceToCamera);
+    if (distances.empty()) distances = pixels_of(kDistanceToImagePlane);
+    const auto flow = pixels_of(kFlowBackward);
+    const auto states = pixels_of(kFlowBackwardState);
+    const bool begins = stored_.capture.clip->frame == 0;
+    std::size_t without_surface = 0;
+    std::size_t at_the_beginning = 0;
+    std::size_t against_flow = 0;
+    for (std::size_t i = 0; i < motion.size(); ++i) {
+      const bool moves = double(motion[i].norm()) > kSlackPx;
+      const bool is_known = states.empty() || states[i] != std::uint32_t(FlowState::Unknown);
+      if (!distances.empty() && std::isinf(distances[i])) {
+        without_surface += std::size_t(moves);
+      } else if (begins) {
+        at_the_beginning += std::size_t(moves);
+      } else if (!flow.empty() && is_known) {
+        against_flow += std::size_t(double((motion[i] + flow[i]).norm()) > kSlackPx);
+      }
+    }
+    const auto check_count = [&](std::size_t wrong, const char* found, const char* expected) {
+      check(wrong == 0, kMotionAgrees, kMotion.name, "", std::to_string(wrong) + found, expected);
+    };
+    check_count(without_surface, " pixels move in which nothing was hit", "none");
+    check_count(at_the_beginning, " pixels have moved where a clip begins", "none");
+    check_count(against_flow, " pixels have moved otherwise",
+                "as flow_backward says, turned round");
   }
 
   const StoredInfo& info_;

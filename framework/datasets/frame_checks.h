@@ -11,8 +11,9 @@ namespace diorama {
 
 /// Checks what must hold in the frames of any format, as far as they hold it, and adds to the log:
 /// sizes, finite numbers, boxes and masks, whole objects and their visible parts, who hides whom,
-/// 3-D boxes against pixels and depth, the two kinds of depth, directions of normals. Formulas of
-/// lenses are lint's own, not those that wrote the data. Several threads may call it.
+/// 3-D boxes against pixels and depth, the two kinds of depth, directions of normals, motion in
+/// clips. Formulas of lenses are lint's own, not those that wrote the data. Several threads may
+/// call it.
 void check_frames(const StoredInfo& info, StoredCapture& stored);
 
 /// What must hold between the captures of one dataset: an object's labels stay, and no

@@ -207,6 +207,39 @@ std::optional<PlainPng> plain_png(std::span<const std::uint8_t> file) {
   return std::nullopt;
 }
 
+/// What a thread decodes with, kept from picture to picture: memory that is taken anew is cleared,
+/// and then far from the processor.
+class Inflater {
+ public:
+  /// Exactly `size` bytes, valid until the next call; empty for a damaged stream.
+  std::span<const std::uint8_t> inflate(std::span<const std::uint8_t> packed, std::size_t size) {
+    if (!inflater_) inflater_.reset(libdeflate_alloc_decompressor());
+    if (!inflater_) throw std::bad_alloc();
+    if (size > size_) {
+      bytes_ = std::make_unique_for_overwrite<std::uint8_t[]>(size);
+      size_ = size;
+    }
+    // Without a place for the size there must be exactly so much.
+    const auto result = libdeflate_zlib_decompress(inflater_.get(), packed.data(), packed.size(),
+                                                   bytes_.get(), size, nullptr);
+    if (result != LIBDEFLATE_SUCCESS) return {};
+    return {bytes_.get(), size};
+  }
+  /// Gives back what only a large picture needed.
+  void shrink() {
+    if (size_ <= kMostKept) return;
+    bytes_.reset();
+    size_ = 0;
+  }
+
+ private:
+  static constexpr std::size_t kMostKept = std::size_t(8) << 20;
+  std::unique_ptr<libdeflate_decompressor, void (*)(libdeflate_decompressor*)> inflater_{
+      nullptr, libdeflate_free_decompressor};
+  std::unique_ptr<std::uint8_t[]> bytes_;
+  std::size_t size_ = 0;
+};
+
 /// Nothing where libpng has to look, be it that the file is damaged.
 std::optional<Texture> decode_plain(const Source& source) {
   const auto png =
@@ -219,28 +252,20 @@ std::optional<Texture> decode_plain(const Source& source) {
   const std::uint64_t size = row_size * png->height;
   const std::uint64_t filtered_size = size + png->height;
   // Deflate makes at most 1032 bytes of one.
-  if (size > kMostAtOnce || filtered_size + png->joined.size() > source.budget ||
+  if (size > kMostAtOnce || filtered_size + size + png->joined.size() > source.budget ||
       filtered_size / 1032 > png->packed.size()) {
     return std::nullopt;
   }
-  const std::unique_ptr<libdeflate_decompressor, void (*)(libdeflate_decompressor*)> inflater(
-      libdeflate_alloc_decompressor(), libdeflate_free_decompressor);
-  if (!inflater) throw std::bad_alloc();
+  thread_local Inflater inflater;
+  const auto rows = inflater.inflate(png->packed, std::size_t(filtered_size));
   Texture texture;
   texture.width = int(png->width);
   texture.height = int(png->height);
   texture.channels = png->channels;
-  texture.bytes.resize(std::size_t(filtered_size));
-  // Without a place for the size there must be exactly so much.
-  if (libdeflate_zlib_decompress(inflater.get(), png->packed.data(), png->packed.size(),
-                                 texture.bytes.data(), std::size_t(filtered_size),
-                                 nullptr) != LIBDEFLATE_SUCCESS) {
-    return std::nullopt;
-  }
-  if (!undo_png_filters(texture.bytes, png->height, std::size_t(png->channels))) {
-    return std::nullopt;
-  }
-  texture.bytes.resize(std::size_t(size));
+  const bool is_good = !rows.empty() && undo_png_filters(rows, png->height,
+                                                         std::size_t(png->channels), texture.bytes);
+  inflater.shrink();
+  if (!is_good) return std::nullopt;
   return texture;
 }
 

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "reader_support/stored_files.h"
 
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -15,6 +19,26 @@ namespace diorama {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+class FileDescriptor {
+ public:
+  // Without O_NONBLOCK a pipe would be waited for before it can be refused.
+  explicit FileDescriptor(const fs::path& file)
+      : descriptor_(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)) {}
+  ~FileDescriptor() {
+    if (descriptor_ >= 0) ::close(descriptor_);
+  }
+  FileDescriptor(const FileDescriptor&) = delete;
+  FileDescriptor& operator=(const FileDescriptor&) = delete;
+  int get() const { return descriptor_; }
+
+ private:
+  int descriptor_;
+};
+
+}  // namespace
+
 std::ifstream open_stored(const fs::path& file) {
   std::error_code error;
   if (fs::is_regular_file(file, error)) return std::ifstream(file, std::ios::binary);
@@ -24,18 +48,30 @@ std::ifstream open_stored(const fs::path& file) {
 }
 
 std::string read_whole_file(const fs::path& file, std::uintmax_t most) {
-  std::error_code error;
-  if (!fs::is_regular_file(file, error)) throw std::runtime_error("the file is not there");
-  const std::uintmax_t size = fs::file_size(file, error);
-  if (error) throw std::runtime_error(error.message());
+  const FileDescriptor opened(file);
+  std::error_code ignored;
+  if (opened.get() < 0 && fs::is_regular_file(file, ignored)) {
+    throw std::runtime_error("cannot be read");
+  }
+  struct stat status {};
+  const bool is_there = opened.get() >= 0 && ::fstat(opened.get(), &status) == 0;
+  if (!is_there || !S_ISREG(status.st_mode)) throw std::runtime_error("the file is not there");
+  const auto size = std::uintmax_t(status.st_size);
   if (size > most) {
     throw std::runtime_error("has " + std::to_string(size) + " bytes; at most " +
                              std::to_string(most) + " are read");
   }
-  std::string content(std::size_t(size), '\0');
-  std::ifstream in = open_stored(file);
-  in.read(content.data(), std::streamsize(size));
-  if (!in && size > 0) throw std::runtime_error("cannot be read");
+  // What a block is filled with before it is read is still near the processor then.
+  constexpr std::size_t kBlock = std::size_t(128) << 10;
+  std::string content;
+  content.reserve(std::size_t(size));
+  while (content.size() < size) {
+    const std::size_t begin = content.size();
+    content.resize(std::min(begin + kBlock, std::size_t(size)));
+    const ssize_t count = ::read(opened.get(), content.data() + begin, content.size() - begin);
+    if (count <= 0) throw std::runtime_error("cannot be read");
+    content.resize(begin + std::size_t(count));
+  }
   return content;
 }
 
@@ -67,12 +103,13 @@ std::uint32_t StoredPicture::at(int x, int y, int c) const {
 }
 
 Image<Rgba8> StoredPicture::color() const {
-  Image<Rgba8> image(width(), height(), {0, 0, 0, 255});
   const int used = std::min(channels(), 4);
   if (used == channels() && used == 4 && texture->floats.empty()) {  // as nearly all are
+    Image<Rgba8> image(width(), height(), {});
     std::memcpy(image.pixels().data(), texture->bytes.data(), image.pixels().size_bytes());
     return image;
   }
+  Image<Rgba8> image(width(), height(), {0, 0, 0, 255});
   if (used >= 3 && texture->floats.empty()) {
     const std::uint8_t* from = texture->bytes.data();
     for (Rgba8& pixel : image.pixels()) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // What is made of stored datasets: converted, merged, compared, made again.
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -478,6 +480,7 @@ writers:
   - {type: Hdf5Writer, name: hdf5}
   - {type: BopWriter, name: bop}
   - {type: VocWriter, name: voc}
+  - {type: MotWriter, name: mot}
   - {type: DataVisualizationWriter, name: nothing_asked}
 output: {folder: out}
 )");
@@ -497,6 +500,34 @@ output: {folder: out}
   CHECK_THAT(single.errors, ContainsSubstring("become captures of their own"));
   // Objects of which nothing tells whether they are the same are others in each picture.
   succeed({"lint", "coco_voc"}, folder);
+  // A share of what is seen becomes one of whole pixels.
+  const Outcome shares = succeed(
+      {"convert", "out/mot", "--writer", "MotWriter masks=false", "-o", "mot_again"}, folder);
+  CHECK_THAT(shares.errors, ContainsSubstring("what share of an object is seen"));
+  succeed({"lint", "mot_again"}, folder);
+  const auto lines_of = [&](const fs::path& dataset) {
+    std::vector<std::vector<double>> lines;
+    for (const auto& [file, text] : tree(folder / dataset)) {
+      if (!file.ends_with("gt.txt")) continue;
+      std::istringstream stream(text);
+      for (std::string line; std::getline(stream, line);) {
+        std::ranges::replace(line, ',', ' ');
+        std::istringstream words(line);
+        lines.emplace_back(std::istream_iterator<double>(words), std::istream_iterator<double>());
+      }
+    }
+    return lines;
+  };
+  const auto before = lines_of("out/mot");
+  const auto after = lines_of("mot_again/MotWriter");
+  REQUIRE(before.size() == after.size());
+  bool is_any_hidden = false;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    const double slack = 4.0 / (before[i].at(4) * before[i].at(5));
+    CHECK(std::abs(after[i].at(8) - before[i].at(8)) <= slack);
+    is_any_hidden |= before[i].at(8) < 0.9;
+  }
+  CHECK(is_any_hidden);
 }
 
 TEST_CASE("what writers need and a dataset does not hold is said before anything is written",

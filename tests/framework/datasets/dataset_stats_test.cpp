@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "framework/datasets/dataset_stats.h"
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "diorama/rng.h"
+#include "framework/datasets/pixel_counts.h"
 #include "framework/lint/dataset_on_disk.h"
 #include "framework/lint/every_format.h"
 #include "plugins/writer_support/sample_dataset.h"
@@ -30,6 +33,39 @@ TEST_CASE("A histogram counts what lies beyond at its ends", "[stats]") {
   CHECK(values.least() == -3.0);
   CHECK(values.most() == 7.0);
   CHECK(values.mean() == Approx(5.4 / 5.0));
+}
+
+TEST_CASE("Pixels are counted alike whatever their number", "[stats]") {
+  Rng rng(3);
+  for (const int size : {1, 3, 4, 7, 512, 1030, 5000}) {
+    std::vector<Rgba8> pixels;
+    std::vector<float> values;
+    std::uint64_t sum = 0;
+    std::size_t burnt = 0;
+    std::size_t below = 0;
+    for (int i = 0; i < size; ++i) {
+      const auto shade = [&] { return std::uint8_t(248 + rng.bits() % 8); };
+      pixels.push_back({shade(), shade(), shade(), shade()});
+      const Rgba8& p = pixels.back();
+      sum += std::uint64_t(p[0]) + p[1] + p[2];
+      burnt += std::size_t(p[0] >= 254 && p[1] >= 254 && p[2] >= 254);
+      values.push_back(i % 5 == 0 ? std::nanf("") : float(rng.uniform()));
+      below += std::size_t(values.back() < 0.15f);
+    }
+    const ColorCounts counts = color_counts(pixels);
+    CHECK(counts.sum == sum);
+    CHECK(counts.burnt == burnt);
+    CHECK(counts.is_uniform == (size == 1));
+    CHECK(count_below(values, 0.15f) == below);
+    std::ranges::fill(pixels, Rgba8{255, 255, 255, 0});
+    CHECK(color_counts(pixels).is_uniform);
+    CHECK(color_counts(pixels).sum == 765 * std::uint64_t(size));
+    for (const std::size_t at : {std::size_t(0), pixels.size() - 1}) {
+      pixels[at][3] = 1;
+      CHECK(color_counts(pixels).is_uniform == (size == 1));
+      pixels[at][3] = 0;
+    }
+  }
 }
 
 TEST_CASE("What is counted is what was written", "[stats]") {

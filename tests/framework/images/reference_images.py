@@ -41,14 +41,14 @@ def paeth(left, up, corner):
     return min((left, up, corner), key=lambda value: abs(guess - value))
 
 
-def filtered(pixels):
-    """Rows with all filters in turn, as PNG's section 9.2 has them."""
+def filtered(pixels, kinds=(1, 2, 3, 4, 0)):
+    """Rows with these filters in turn, as PNG's section 9.2 has them."""
     rows = b""
     above = None
     for y, row in enumerate(pixels.reshape(pixels.shape[0], -1).tolist()):
         stride = len(row) // pixels.shape[1]
         above = above or [0] * len(row)
-        kind = (y + 1) % 5
+        kind = int(kinds[y % len(kinds)])
         rows += bytes([kind])
         for i, value in enumerate(row):
             left, corner = (row[i - stride], above[i - stride]) if i >= stride else (0, 0)
@@ -104,6 +104,13 @@ def make_pngs(folder, rng):
         text = chunk(b"tEXt", b"Comment\0between header and pixels")
         write(folder, name, png(19, 23, 8, color, filtered(pixels), text, part=100))
         expect(folder, name, pixels)
+        for width in (1, 6, 26):  # several rows are undone at once
+            pixels = rng.integers(0, 256, (40, width, channels), dtype=np.uint8)
+            pixels[10:20] //= 64
+            name = f"runs_{channels}_{width}.png"
+            kinds = rng.choice([4, 4, 4, 4, 4, 0, 1, 2, 3], 40)
+            write(folder, name, png(width, 40, 8, color, filtered(pixels, kinds)))
+            expect(folder, name, pixels)
     clear = rng.integers(0, 2, (4, 5, 3), dtype=np.uint8) * 255
     write(folder, "one_colour_clear.png", png(5, 4, 8, 2, filtered(clear),
                                               chunk(b"tRNS", struct.pack(">HHH", 255, 0, 255))))

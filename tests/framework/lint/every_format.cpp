@@ -154,7 +154,11 @@ SampleClip sample_clip() {
     Capture& frame = clip.frames.emplace_back();
     frame.index = capture.index;
     frame.clip = {0, int(clip.frames.size()) - 1, count, 10.0};
-    for (const Frame& seen : capture.frames) frame.frames.push_back(copy_of(seen));
+    for (const Frame& seen : capture.frames) {
+      Frame& own = frame.frames.emplace_back(copy_of(seen));
+      if (frame.clip->frame > 0) continue;
+      own.set(kMotion, Image<Vec2f>(own.camera.width, own.camera.height, Vec2f::Zero()));
+    }
   }
   return clip;
 }

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <functional>
 #include <iterator>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "diorama/error.h"
+#include "framework/datasets/frame_checks.h"
 #include "framework/datasets/frame_copy.h"
 #include "framework/lint/dataset_on_disk.h"
 #include "framework/lint/encoding_host.h"
@@ -286,6 +288,40 @@ TEST_CASE("the wrong kind of depth is found in every format that has depth", "[l
                [](Frame& frame) {
                  frame.set(kDistanceToImagePlane, Image<float>(frame.get(kDistanceToCamera)));
                });
+}
+
+TEST_CASE("motion in a clip is the flow to the last frame, turned round", "[lint]") {
+  const auto findings = [](int frame_of_clip, const Vec2f& moved, const Vec2f& beyond) {
+    StoredCapture stored;
+    stored.capture.clip = ClipFrame{0, frame_of_clip, 2, 10.0};
+    Frame& frame = stored.capture.frames.emplace_back();
+    frame.camera.width = 2;
+    frame.camera.height = 1;
+    Image<float> distance(2, 1, 1.5f);
+    distance.at(1, 0) = std::numeric_limits<float>::infinity();
+    Image<Vec2f> flow(2, 1, Vec2f(3.0f, -2.0f));
+    flow.at(1, 0) = Vec2f::Zero();
+    Image<std::uint32_t> states(2, 1, std::uint32_t(FlowState::Seen));
+    states.at(1, 0) = std::uint32_t(FlowState::Unknown);
+    Image<Vec2f> motion(2, 1, moved);
+    motion.at(1, 0) = beyond;
+    frame.set(kDistanceToCamera, std::move(distance));
+    frame.set(kFlowBackward, std::move(flow));
+    frame.set(kFlowBackwardState, std::move(states));
+    frame.set(kMotion, std::move(motion));
+    check_frames(StoredInfo(), stored);
+    std::vector<std::string> found;
+    for (const Finding& finding : stored.log.findings) found.push_back(finding.found);
+    return found;
+  };
+  using Found = std::vector<std::string>;
+  const Vec2f none = Vec2f::Zero();
+  CHECK(findings(1, {-3.0f, 2.0f}, none).empty());
+  CHECK(findings(0, none, none).empty());
+  CHECK(findings(1, {-2.0f, 2.0f}, none) == Found{"1 pixels have moved otherwise"});
+  CHECK(findings(1, {-3.0f, 2.0f}, {1.0f, 0.0f}) ==
+        Found{"1 pixels move in which nothing was hit"});
+  CHECK(findings(0, {1.0f, 0.0f}, none) == Found{"1 pixels have moved where a clip begins"});
 }
 
 TEST_CASE("the wrong order of a quaternion is found in every format that has one", "[lint]") {
