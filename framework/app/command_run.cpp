@@ -115,7 +115,7 @@ RunSummary run_job(JobAssembly& assembly, HostServices& host, const RunCommandOp
   using Clock = std::chrono::steady_clock;
   run.progress = [&, next_trim = Clock::now()](const RunProgress& progress) mutable {
     constexpr Clock::duration kBetweenTrims = std::chrono::milliseconds(100);
-    constexpr int kOfTime = 20;  // trims take at most one part of so many
+    constexpr int kOfTime = 10;  // trims take at most one part of so many
     has_begun = true;
     if (const auto now = Clock::now(); now >= next_trim) {
       next_trim = now + std::max(kBetweenTrims, kOfTime * give_free_pages_back());
