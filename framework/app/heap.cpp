@@ -3,6 +3,7 @@
 
 #include <malloc.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <cstring>
 #include <ctime>
@@ -17,12 +18,12 @@ void give_large_blocks_back() {
 #endif
 }
 
-void share_heaps() {
+void share_heaps([[maybe_unused]] int threads) {
 #ifdef __GLIBC__
   const char* tunables = std::getenv("GLIBC_TUNABLES");
   const bool is_chosen = std::getenv("MALLOC_ARENA_MAX") != nullptr ||
                          (tunables && std::strstr(tunables, "glibc.malloc.arena_max="));
-  if (!is_chosen) mallopt(M_ARENA_MAX, 2);
+  if (!is_chosen) mallopt(M_ARENA_MAX, std::max(2, threads / 2));
 #endif
 }
 

@@ -12,10 +12,10 @@ namespace diorama {
 /// captures.
 void give_large_blocks_back();
 
-/// Threads that start from now on share two heaps. By itself glibc gives each its own, and in all
-/// of them what is kept long, like assets, comes to lie among what is soon freed. What the user
-/// says by MALLOC_ARENA_MAX or GLIBC_TUNABLES stays.
-void share_heaps();
+/// Two of `threads` that start from now on share a heap; up to five share two. By itself glibc
+/// gives each its own, and in all of them what is kept long, like assets, comes to lie among what
+/// is soon freed. What the user says by MALLOC_ARENA_MAX or GLIBC_TUNABLES stays.
+void share_heaps(int threads);
 
 /// All pages that hold nothing, wherever in the heap. Small blocks of thousands of captures leave
 /// holes that are never quite filled again. Returns how long the processor had to do with it.

@@ -100,16 +100,16 @@ TEST_CASE("threads get no more heaps, unless the user says how many", "[startup]
   constexpr int kThreads = 5;
   unsetenv("GLIBC_TUNABLES");
   setenv("MALLOC_ARENA_MAX", "100", 1);
-  diorama::share_heaps();
+  diorama::share_heaps(4);
   unsetenv("MALLOC_ARENA_MAX");
   setenv("GLIBC_TUNABLES", "glibc.malloc.check=0:glibc.malloc.arena_max=100", 1);
-  diorama::share_heaps();
+  diorama::share_heaps(4);
   REQUIRE(heaps() < 3);
   allocate_on_threads(kThreads);
   const int before = heaps();
   CHECK(before >= kThreads);
   setenv("GLIBC_TUNABLES", "glibc.malloc.check=0", 1);
-  diorama::share_heaps();
+  diorama::share_heaps(4);
   allocate_on_threads(4 * kThreads);
   CHECK(heaps() == before);
 #endif
