@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstring>
 #include <fstream>
@@ -69,8 +70,9 @@ std::string read_whole_file(const fs::path& file, std::uintmax_t most) {
     const std::size_t begin = content.size();
     content.resize(std::min(begin + kBlock, std::size_t(size)));
     const ssize_t count = ::read(opened.get(), content.data() + begin, content.size() - begin);
-    if (count <= 0) throw std::runtime_error("cannot be read");
-    content.resize(begin + std::size_t(count));
+    const bool is_interrupted = count < 0 && errno == EINTR;
+    if (count <= 0 && !is_interrupted) throw std::runtime_error("cannot be read");
+    content.resize(begin + (is_interrupted ? 0 : std::size_t(count)));
   }
   return content;
 }
