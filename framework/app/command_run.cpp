@@ -22,7 +22,6 @@
 #include "framework/host/machine_limits.h"
 #include "framework/host/progress_bar.h"
 #include "framework/host/progress_lines.h"
-#include "framework/host/thread_pool.h"
 #include "framework/jobs/assemble.h"
 #include "framework/jobs/assemble_job.h"
 #include "framework/jobs/job_file.h"
@@ -193,7 +192,7 @@ void print_estimate(const GlobalOptions& global, const Value& job, int visits_in
 int run_value(const GlobalOptions& global, const Value& job, const RunCommandOptions& options,
               ConsoleLog& log) {
   give_large_blocks_back();
-  share_heaps(global.threads > 0 ? global.threads : ThreadPool::available_threads());
+  share_heaps(thread_count(global));
   const JobServices services = make_job_services(global, job, log.sink());
   JobAssembly assembly =
       assemble_job(job, *services.registry, *services.host, services.assets_root, program_version(),

@@ -52,6 +52,10 @@ std::vector<AssetPrefix> asset_prefixes_of(const Value& job) {
   return prefixes;
 }
 
+int thread_count(const GlobalOptions& options) {
+  return options.threads > 0 ? options.threads : ThreadPool::available_threads();
+}
+
 std::unique_ptr<HostServices> make_host(Registry& registry, const GlobalOptions& options,
                                         const std::optional<std::string>& job_assets_root,
                                         const Log& log, std::vector<AssetPrefix> asset_prefixes) {
@@ -59,7 +63,7 @@ std::unique_ptr<HostServices> make_host(Registry& registry, const GlobalOptions&
   host.asset_prefixes = std::move(asset_prefixes);
   host.assets_root = choose_assets_root(options.assets_root, std::getenv("DIORAMA_ASSETS_ROOT"),
                                         job_assets_root, sample_pack_folder(options.program));
-  host.threads = options.threads > 0 ? options.threads : ThreadPool::available_threads();
+  host.threads = thread_count(options);
   host.asset_cache_bytes = std::size_t(options.asset_cache_mib) << 20;
   host.picture_bytes = std::uint64_t(options.picture_mib) << 20;
   return std::make_unique<HostServices>(registry, host, log);

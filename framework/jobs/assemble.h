@@ -44,6 +44,9 @@ JobServices make_job_services(const GlobalOptions& options, const Value& job, co
 /// The same for what is no job.
 JobServices make_services(const GlobalOptions& options, const Log& log);
 
+/// How many threads host services made with these options have, the calling one included.
+int thread_count(const GlobalOptions& options);
+
 /// Host services for a job; `job_assets_root` is what the job says, if it says something. Throws
 /// Error(Asset) when the assets root is no folder.
 std::unique_ptr<HostServices> make_host(Registry& registry, const GlobalOptions& options,
