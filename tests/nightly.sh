@@ -19,7 +19,8 @@ build=$(realpath -m "${DIORAMA_BUILD:-build/release}")
 export DIORAMA_BUILD=$build
 
 part_build() {
-  ./bootstrap.sh packages && cmake --preset release -D DIORAMA_BUILD_TESTS=ON -D DIORAMA_WARNINGS_AS_ERRORS=ON &&
+  ./bootstrap.sh packages &&
+    cmake --preset release -D DIORAMA_BUILD_TESTS=ON -D DIORAMA_WARNINGS_AS_ERRORS=ON -D DIORAMA_FUZZ_OPTIMIZATION=-O1 &&
     cmake --build --preset release --target all benchmarks denoiser_pictures &&
     ctest --preset release -R '^fuzz_'  # builds the fuzzers
 }

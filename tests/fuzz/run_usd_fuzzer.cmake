@@ -1,9 +1,10 @@
-# cmake -D CLANGXX=... -D SOURCE=... -D BUILD=... -D SECONDS=... -P run_usd_fuzzer.cmake
+# cmake -D CLANGXX=... -D SOURCE=... -D BUILD=... -D OPTIMIZATION=-O1 -D SECONDS=... -P run_usd_fuzzer.cmake
 # Builds the fuzzer and runs it for a while. Seeds are the small shared files, where they are there.
 include(${CMAKE_CURRENT_LIST_DIR}/run.cmake)
 
 cmake_host_system_information(RESULT processors QUERY NUMBER_OF_LOGICAL_CORES)
-run(${CMAKE_COMMAND} -S ${SOURCE}/tests/fuzz/usd -B ${BUILD} -DCMAKE_CXX_COMPILER=${CLANGXX})
+run(${CMAKE_COMMAND} -S ${SOURCE}/tests/fuzz/usd -B ${BUILD} -DCMAKE_CXX_COMPILER=${CLANGXX}
+    -DDIORAMA_FUZZ_OPTIMIZATION=${OPTIMIZATION})
 run(${CMAKE_COMMAND} --build ${BUILD} --parallel ${processors})
 file(MAKE_DIRECTORY ${BUILD}/corpus ${BUILD}/seeds)
 if(EXISTS ${SOURCE}/../shared/data/usd)

@@ -4,8 +4,8 @@
 run.sh beside it.
 
 The program tells its memory (resident set) with every capture. Environments come and go in a cycle, so memory swings
-with it; a median over whole cycles does not. That of the cycles after the first 50 captures is held against that
-of the last ones: what grows by more than 5 % fails. The slope beside it (the median of the slopes between any
+with it; a median over whole cycles does so less. That of the cycles after the first 50 captures is held against that
+of the last ones, ten each: what grows by more than 5 % fails. The slope beside it (the median of the slopes between any
 two cycles, which outliers do not move) tells a leak from a cache that fills.
 """
 import argparse
@@ -29,7 +29,7 @@ STOPPED = 130  # the program's exit code when it was asked to stop
 SECONDS_TO_STOP = 60
 SAY_EVERY_S = 30
 ENVIRONMENTS = 4  # of a cycle
-CYCLES = 4  # that are judged at either end
+CYCLES = 10  # that are judged at either end: a fifth of a long run each; four swing by as much as is allowed
 VISITS = 200  # of a long run, each of which loads what the cache has dropped
 # What may be held at once is bounded by these, whatever the machine; each is less than the job could fill.
 BOUNDS = ["--asset-cache-mib", "2"]  # less than the rooms take, so that assets come and go
@@ -78,7 +78,7 @@ lights:
   - {type: sphere, name: lamp, count: 2, radius_m: 0.1}
   - {type: dome, name: sky}
 cameras:
-  - {type: pinhole, name: cam, count: 1, width: 48, height: 32}
+  - {type: pinhole, name: cam, count: 1, width: %(width)d, height: %(height)d}
 randomizers:
   - {type: scatter_poses, name: poses, on: [environment], nodes: "/Assets/*",
      offset: [[-0.5, 0.5], [-0.5, 0.5], [1.0, 1.5]]}
@@ -134,7 +134,8 @@ class Run:
     def job(self, options):
         renderer, timeline = RENDERERS[self.renderer]
         half = options.per_visit // 2
-        return JOB % {"captures": options.captures, "environment": self.environment, "skies": self.skies,
+        width, height = options.size
+        return JOB % {"captures": options.captures, "width": width, "height": height, "environment": self.environment, "skies": self.skies,
                       "renderer": renderer, "writers": writer_lines(self.writers),
                       "timeline": timeline % {"half": half, "half_s": half / 20}}
 
@@ -224,12 +225,21 @@ def tell_progress(runs, captures, ended):
         print("of %d captures: %s" % (captures, ", ".join(going)), flush=True)
 
 
+def picture_size(text):
+    width, height = (int(number) for number in text.split("x"))
+    if width <= 0 or height <= 0:
+        raise ValueError
+    return width, height
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("--build", required=True, type=pathlib.Path)
     parser.add_argument("--captures", type=int, default=10000)
     parser.add_argument("--per-visit", type=int, help="captures of a visit, an even number (default: for %d visits, "
                         "4 at least)" % VISITS)
+    parser.add_argument("--size", type=picture_size, default=(48, 32), metavar="WIDTHxHEIGHT",
+                        help="of the pictures (default: 48x32)")
     parser.add_argument("--seconds", type=float, help="until a run is stopped and judged (default: no limit)")
     parser.add_argument("--run", action="append", metavar="NAME",
                         help="these alone; vulkan, which needs a device, is run when it is named only")
