@@ -4,9 +4,10 @@
 run.sh beside it.
 
 The program tells its memory (resident set) with every capture. Environments come and go in a cycle, so memory swings
-with it; a median over whole cycles does so less. That of the cycles after the first 50 captures is held against that
-of the last ones, ten each: what grows by more than 5 % fails. The slope beside it (the median of the slopes between any
-two cycles, which outliers do not move) tells a leak from a cache that fills.
+with it, and a visit that is being loaded holds more for a moment; how many captures meet one depends on what else the
+machine does. The lower quartile of whole cycles is what stays. That of the cycles after the first 50 captures is held against
+that of the last ones: what grows by more than 5 % fails. The slope beside it (the median of the slopes between the
+quartiles of any two cycles, which outliers do not move) tells a leak from a cache that fills.
 """
 import argparse
 import concurrent.futures
@@ -29,7 +30,7 @@ STOPPED = 130  # the program's exit code when it was asked to stop
 SECONDS_TO_STOP = 60
 SAY_EVERY_S = 30
 ENVIRONMENTS = 4  # of a cycle
-CYCLES = 10  # that are judged at either end: a fifth of a long run each; four swing by as much as is allowed
+CYCLES = 4  # that are judged at either end
 VISITS = 200  # of a long run, each of which loads what the cache has dropped
 # What may be held at once is bounded by these, whatever the machine; each is less than the job could fill.
 BOUNDS = ["--asset-cache-mib", "2"]  # less than the rooms take, so that assets come and go
@@ -203,14 +204,18 @@ HEAD = "%-28s %8s %6s %9s %9s %7s %9s %12s  %s" % ("run", "captures", "s", "MiB 
                                                  "MiB per 1000", "")
 
 
+def what_stays(memory):
+    return statistics.quantiles(memory, n=4)[0]
+
+
 def verdict(memory, cycle):
     """Whether the memory is flat, and what is to be told of it."""
     judged = memory[WARM_UP:]
     window = cycle * min(CYCLES, len(judged) // (2 * cycle))
     if window == 0:
         raise Fault("%d captures are too few to judge, at least %d are needed" % (len(memory), WARM_UP + 2 * cycle))
-    begin, end = statistics.median(judged[:window]), statistics.median(judged[-window:])
-    cycles = [statistics.median(judged[at:at + cycle]) for at in range(0, len(judged) - cycle + 1, cycle)]
+    begin, end = what_stays(judged[:window]), what_stays(judged[-window:])
+    cycles = [what_stays(judged[at:at + cycle]) for at in range(0, len(judged) - cycle + 1, cycle)]
     slopes = [(later - earlier) / ((j - i) * cycle) for i, earlier in enumerate(cycles)
               for j, later in enumerate(cycles[i + 1:], i + 1)]
     growth = end / begin - 1
