@@ -149,6 +149,35 @@ PlacedPart part_of(const btCollisionObject& body, int part) {
           place * compound.getChildTransform(part)};
 }
 
+/// Whether a contact with that normal is one of a round flank, which has no face to lie on.
+bool is_on_flank(const btCollisionObject& body, int part, const btVector3& normal) {
+  constexpr double kFlat = 0.9;  // cosine of the normal to the axis
+  const btCollisionShape* shape = body.getCollisionShape();
+  if (!shape->isConvex() && !shape->isCompound()) return false;
+  const auto [convex, place] = part_of(body, part);
+  int axis = 0;
+  switch (convex->getShapeType()) {
+    case CYLINDER_SHAPE_PROXYTYPE:
+      axis = static_cast<const btCylinderShape*>(convex)->getUpAxis();
+      break;
+    case CONE_SHAPE_PROXYTYPE:
+      axis = static_cast<const btConeShape*>(convex)->getConeUpIndex();
+      break;
+    case CAPSULE_SHAPE_PROXYTYPE:
+      axis = static_cast<const btCapsuleShape*>(convex)->getUpAxis();
+      break;
+    default:
+      return false;
+  }
+  return std::abs(place.getBasis().getColumn(axis).dot(normal)) < kFlat;
+}
+
+bool can_roll(const btPersistentManifold& manifold) {
+  const btManifoldPoint& contact = manifold.getContactPoint(0);
+  return is_on_flank(*manifold.getBody0(), contact.m_index0, contact.m_normalWorldOnB) ||
+         is_on_flank(*manifold.getBody1(), contact.m_index1, contact.m_normalWorldOnB);
+}
+
 /// The farthest point of a whole body, world.
 btVector3 support_point(const btCollisionObject& body, const btVector3& direction) {
   const btCollisionShape& shape = *body.getCollisionShape();
@@ -524,13 +553,14 @@ void SoftContactWorld::let_balance_go() {
   }
 }
 
-/// With the impulses that the step ended with. What lies on fewer contacts rolls or rocks.
+/// With the impulses that the step ended with. What lies on fewer contacts or on a round flank
+/// rolls or rocks: kept contacts would stay behind and push it on.
 void SoftContactWorld::note_faces() {
   std::map<const btPersistentManifold*, Face> faces;
   btDispatcher& dispatcher = *getDispatcher();
   for (int i = 0; i < dispatcher.getNumManifolds(); ++i) {
     const btPersistentManifold& manifold = *dispatcher.getManifoldByIndexInternal(i);
-    if (manifold.getNumContacts() < 3) continue;
+    if (manifold.getNumContacts() < 3 || can_roll(manifold)) continue;
     Face& face = faces[&manifold];
     face.a = manifold.getBody0();
     face.b = manifold.getBody1();

@@ -174,6 +174,34 @@ TEST_CASE("nothing stays in balance on an edge or a corner, and what is round st
   }
 }
 
+TEST_CASE("a cylinder that rolls is slowed by rolling friction, on a box and on triangles",
+          "[physics]") {
+  constexpr double kRadius = 0.038;
+  constexpr double kSpeed = 0.2;
+  // The lever is a share of the ball round the shape, and friction is 0.5 on both sides.
+  const double lever = 0.02 * std::hypot(kRadius, kRadius) * std::sqrt(0.5);
+  const double brake = lever / kRadius * 9.81 / 1.5;  // m/s^2; a cylinder's inertia is m r^2 / 2
+  const double way = 0.5 * kSpeed * kSpeed / brake;
+  for (const ColliderShape floor : {ColliderShape::BoundingBox, ColliderShape::TriangleMesh}) {
+    PhysicsWorld world;
+    world.add("floor", shared(make_box(Vec3(8, 8, 1))), floor, at(0, 0, -0.5));
+    const Affine pose = turned(Vec3(0.013, 0.017, kRadius + 1e-3), kPi / 2, Vec3::UnitX());
+    const NodeId node = world.add_primitive("cylinder", PrimitiveShape::Cylinder,
+                                            Vec3::Constant(2.0 * kRadius), pose);
+    world.make_body(node, 0.3);
+    RigidBody& body = *world.scene.edit(node).rigid_body;
+    body.linear_velocity = kSpeed * Vec3::UnitX();
+    body.angular_velocity = kSpeed / kRadius * Vec3::UnitY();
+    world.run(4 * 60);
+    CAPTURE(int(floor), world.position(node).transpose(), way);
+    const double rolled = world.position(node).x() - pose.translation().x();
+    // Contacts are found some millimetres beside the line that touches.
+    CHECK(rolled > 0.5 * way);
+    CHECK(rolled < 2.0 * way);
+    CHECK(world.scene[node].rigid_body->linear_velocity.norm() < 0.001);
+  }
+}
+
 TEST_CASE("small things neither tunnel at speed nor through sheets", "[physics]") {
   // 60 Hz without sub-steps, spheres of 1 cm at 8 m/s: 13 cm per step.
   BulletBackend::Params params;
