@@ -9,7 +9,8 @@ namespace diorama {
 
 /// They go back to the system when they are freed. By itself glibc keeps ever larger ones, up to
 /// 32 MiB, in heaps that it can only cut at their ends: memory would creep up over thousands of
-/// captures.
+/// captures. What `new` then gets of them is mapped as a whole: a fault for each page takes longer
+/// than to fill it.
 void give_large_blocks_back();
 
 /// Two of `threads` that start from now on share a heap; up to five share two. By itself glibc

@@ -228,14 +228,14 @@ std::size_t geometry_bytes_per_pixel(const NameSet& wanted) {
 }
 
 void fill_channels(Frame& frame, const NameSet& wanted, const EmbreeScene& meshes, const View& view,
-                   SeenMeshes& seen, Image<RayHit>* all_hits, Host& host) {
+                   SeenMeshes& seen, HitImage* all_hits, Host& host) {
   const int width = view.camera().width;
   const int height = view.camera().height;
   if (seen.numbers.width() != width || seen.numbers.height() != height) {
     seen.numbers = Image<std::uint32_t>(width, height, SeenMeshes::kNone);
     seen.distances = Image<float>(width, height, kInfinite);
   }
-  if (all_hits) *all_hits = Image<RayHit>(width, height, RayHit());
+  if (all_hits) *all_hits = HitImage(width, height);
   ChannelImages channels(wanted, view);
   const auto fill_row = [&](int y) {
     std::array<int, kBatch> columns;
@@ -247,6 +247,7 @@ void fill_channels(Frame& frame, const NameSet& wanted, const EmbreeScene& meshe
       rays.count = 0;
       for (int x = begin; x < std::min(width, begin + int(kBatch)); ++x) {
         seen.numbers.at(x, y) = SeenMeshes::kNone;
+        if (all_hits) all_hits->at(x, y) = RayHit();
         const auto ray = view.ray(Vec2(x + 0.5, y + 0.5));
         if (!ray) continue;
         columns[rays.count] = x;

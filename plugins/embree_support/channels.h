@@ -9,6 +9,7 @@
 #include "diorama/frame.h"
 #include "diorama/host.h"
 #include "embree_scene.h"
+#include "renderer_support/hit_image.h"
 #include "renderer_support/isa.h"
 #include "renderer_support/view.h"
 
@@ -31,7 +32,7 @@ std::size_t geometry_bytes_per_pixel(const NameSet& wanted);
 /// `seen` with what these rays met; its memory is used again where it has the view's size. `hits`
 /// gets all of it, if there: they are valid until the scene's next take().
 void fill_channels(Frame& frame, const NameSet& wanted, const EmbreeScene& meshes, const View& view,
-                   SeenMeshes& seen, Image<RayHit>* hits, Host& host);
+                   SeenMeshes& seen, HitImage* hits, Host& host);
 
 /// See Renderer::cover. `seen` is that of the same view.
 std::vector<CoverageMask> coverage(const EmbreeScene& meshes, const View& view,

@@ -158,8 +158,8 @@ bool PathRenderer::starts_at_centres(const View& view) const {
   return params_.mode == "real_time" && params_.samples == 1 && sees_one_moment;
 }
 
-const Image<RayHit>& PathRenderer::first_hits(const View& view) {
-  if (first_hits_.pixels().empty()) {
+const HitImage& PathRenderer::first_hits(const View& view) {
+  if (first_hits_.is_empty()) {
     Frame frame;
     fill_channels(frame, {}, meshes_, view, seen_, &first_hits_, host_);
     seen_by_ = rendered_by_;
@@ -226,7 +226,7 @@ Frame PathRenderer::do_render(const Scene& scene, const RenderRequest& request) 
   const bool wants_labels = std::any_of(known.begin(), known.end(), [&](const auto& name) {
     return request.channels.contains(name);
   });
-  const auto make_labels = [&](Image<RayHit>* hits) {
+  const auto make_labels = [&](HitImage* hits) {
     if (!wants_labels) return;
     const Stopwatch watch(counts_.channels_s);
     fill_channels(frame, request.channels, meshes_, view, seen_, hits, host_);

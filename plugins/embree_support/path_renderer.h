@@ -12,9 +12,11 @@
 #include "diorama/renderer.h"
 #include "embree_scene.h"
 #include "renderer_support/denoiser.h"
+#include "renderer_support/hit_image.h"
 #include "renderer_support/isa.h"
 #include "renderer_support/path_settings.h"
 #include "renderer_support/sample_plan.h"
+#include "renderer_support/spare_pages.h"
 
 namespace diorama {
 
@@ -76,7 +78,7 @@ class PathRenderer : public Renderer {
 
   bool has_rounds() const { return params_.error_target > 0.0 || params_.time_budget_s > 0.0; }
   /// What the rays through the pixels' centres met, for pictures whose paths all start there.
-  const Image<RayHit>& first_hits(const View& view);
+  const HitImage& first_hits(const View& view);
   Host& host() { return host_; }
   Isa isa() const { return isa_; }
   const EmbreeScene& meshes() const { return meshes_; }
@@ -99,6 +101,7 @@ class PathRenderer : public Renderer {
   Film trace_paths(const View& view, std::uint64_t seed);
   void put_colors(Frame& frame, const RenderRequest& request, const View& view, Film film);
 
+  std::shared_ptr<SparePages> spare_pages_ = SparePages::shared();
   PictureParams params_;
   Host& host_;
   Isa isa_;
@@ -107,7 +110,7 @@ class PathRenderer : public Renderer {
   NodeId rendered_by_;  ///< The camera of the picture under way.
   NodeId seen_by_;      ///< The camera of `seen_`, if there is any.
   SeenMeshes seen_;
-  Image<RayHit> first_hits_;  ///< Of the picture under way, if its paths start there.
+  HitImage first_hits_;  ///< Of the picture under way, if its paths start there.
 };
 
 }  // namespace diorama

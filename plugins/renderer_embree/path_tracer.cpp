@@ -93,7 +93,7 @@ inline RayCounts PathTracer::trace_all(const TraceJob& job, PixelSum* sums,
 
 inline void PathTracer::start_paths(std::vector<Path>& paths, const BatchFloats& columns,
                                     const BatchFloats& rows, Batch& v) const {
-  const Image<RayHit>* hits = settings_.first_hits;
+  const HitImage* hits = settings_.first_hits;
   BatchNumbers numbers;
   for (std::size_t i = 0; i < paths.size(); ++i) numbers.take(i, paths[i].sampler, 2);
   BatchFloats x;

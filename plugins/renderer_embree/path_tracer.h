@@ -8,6 +8,7 @@
 #include "embree_support/embree_scene.h"
 #include "renderer_support/batch.h"
 #include "renderer_support/film.h"
+#include "renderer_support/hit_image.h"
 #include "renderer_support/isa.h"
 #include "renderer_support/path_settings.h"
 #include "renderer_support/trace_job.h"
@@ -27,7 +28,7 @@ struct LoggedRay {
 struct TraceSettings : PathSettings {
   /// What the rays through the pixels' centres met, if known: every path then starts there. For
   /// views without aperture and shutter, and no more than a path per pixel.
-  const Image<RayHit>* first_hits = nullptr;
+  const HitImage* first_hits = nullptr;
   /// Asked after every batch of paths whether to stop.
   const Host* host = nullptr;
   /// For tests of the estimators: which of the two techniques that find light are used.

@@ -9,6 +9,7 @@
 #include "network_filter.h"
 #include "plane_filter.h"
 #include "sampling.h"
+#include "spare_pages.h"
 #include "view_transform.h"
 
 namespace diorama {
@@ -102,7 +103,11 @@ double quiet_exposure(const Film& film) {
 
 std::size_t denoiser_bytes(int width, int height, bool is_quick) {
   const std::size_t pixels = std::size_t(width) * std::size_t(height);
-  if (is_quick) return pixels * std::max(sizeof(FilmPixel), kPlaneFilterBytesPerPixel);
+  if (is_quick) {
+    return SparePages::keeps(pixels * sizeof(FilmPixel))
+               ? pixels * (sizeof(FilmPixel) + kPlaneFilterBytesPerPixel)
+               : pixels * std::max(sizeof(FilmPixel), kPlaneFilterBytesPerPixel);
+  }
   return pixels * sizeof(FilmPixel) +
          std::max(pixels * kPlaneFilterBytesPerPixel,
                   pixels * sizeof(Vec3f) + network_filter_bytes(width, height));

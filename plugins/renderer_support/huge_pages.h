@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <sys/mman.h>
-
 #include <cstddef>
-#include <cstdlib>
 #include <memory>
-#include <new>
 #include <type_traits>
+
+#include "spare_pages.h"
 
 namespace diorama {
 
@@ -20,21 +18,20 @@ class HugePages {
   HugePages() = default;
   explicit HugePages(std::size_t count) : count_(count) {
     if (count == 0) return;
-    constexpr std::size_t kHugePage = std::size_t(1) << 21;
-    const std::size_t size = (count * sizeof(Value) + kHugePage - 1) / kHugePage * kHugePage;
-    values_.reset(static_cast<Value*>(std::aligned_alloc(kHugePage, size)));
-    if (!values_) throw std::bad_alloc();
-    madvise(values_.get(), size, MADV_HUGEPAGE);
+    std::size_t size = count * sizeof(Value);
+    Value* const values = static_cast<Value*>(SparePages::take(size));
+    values_ = {values, Give{size}};
   }
 
   Value* data() const { return values_.get(); }
   std::size_t size() const { return count_; }
 
  private:
-  struct Free {
-    void operator()(Value* values) const { std::free(values); }
+  struct Give {
+    std::size_t size = 0;  // bytes of the block
+    void operator()(Value* values) const { SparePages::give(values, size); }
   };
-  std::unique_ptr<Value[], Free> values_;
+  std::unique_ptr<Value[], Give> values_;
   std::size_t count_ = 0;
 };
 

@@ -195,8 +195,9 @@ inline void PlaneFilter::rows(Step step, int round, int begin, int end) {
         break;
     }
   }
-  // But for what the blocks above and below look at.
-  if (step == Step::Read && spent_ != nullptr && end - begin > 2) {
+  // But for what the blocks above and below look at. Smaller films are used again as a whole.
+  const bool is_forgotten = spent_ != nullptr && !SparePages::keeps(spent_->pixels().size_bytes());
+  if (step == Step::Read && is_forgotten && end - begin > 2) {
     const auto width = std::size_t(width_);
     forget_pages(spent_->pixels().subspan(std::size_t(begin + 1) * width,
                                           std::size_t(end - begin - 2) * width));

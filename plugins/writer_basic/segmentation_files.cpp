@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "writer_basic/segmentation_files.h"
 
+#include <bit>
 #include <set>
 
 #include "writer_support/image_files.h"
@@ -38,19 +39,20 @@ class Segmentation {
     return colorize_ ? color_text(colors_.at(id)) : std::to_string(id);
   }
 
-  std::vector<std::byte> file(const Host& host, const std::string& path) const {
+  /// Uses the picture up: the colours take its place.
+  std::vector<std::byte> file(const Host& host, const std::string& path) {
     if (!colorize_) return png_file(host, picture_, path);
-    Image<Rgba8> colored(picture_.width(), picture_.height(), Rgba8{});
     std::uint32_t last = 0;
-    Rgba8 color = segmentation_color(last);
-    for (std::size_t i = 0; i < picture_.pixels().size(); ++i) {
-      if (picture_.pixels()[i] != last) {
-        last = picture_.pixels()[i];
-        color = colors_.at(last);
+    auto color = std::bit_cast<std::uint32_t>(segmentation_color(last));
+    for (std::uint32_t& pixel : picture_.pixels()) {
+      if (pixel != last) {
+        last = pixel;
+        color = std::bit_cast<std::uint32_t>(colors_.at(last));
       }
-      colored.pixels()[i] = color;
+      pixel = color;
     }
-    return png_file(host, colored);
+    return host.encode_image({picture_.pixels().data(), picture_.width(), picture_.height(), 4, 8},
+                             ImageFormat::Png);
   }
 
  private:
@@ -60,7 +62,7 @@ class Segmentation {
   std::map<std::uint32_t, Rgba8> colors_;
 };
 
-void add_picture(const FrameOutput& output, std::string_view name, const Segmentation& picture) {
+void add_picture(const FrameOutput& output, std::string_view name, Segmentation& picture) {
   const std::string path = output.path(name, name, ".png");
   output.files.add(path, picture.file(output.host, path));
 }
@@ -76,8 +78,8 @@ Json class_json(const char* text) { return Json{{"class", text}}; }
 
 void write_semantic_segmentation(const FrameOutput& output, bool colorize) {
   constexpr std::string_view kName = "semantic_segmentation";
-  const Segmentation picture(instance_picture(output.frame, semantic_picture_ids(output)), colorize,
-                             {kBackgroundId, kUnlabelledId});
+  Segmentation picture(instance_picture(output.frame, semantic_picture_ids(output)), colorize,
+                       {kBackgroundId, kUnlabelledId});
   add_picture(output, kName, picture);
 
   Json labels = Json::object();
@@ -91,8 +93,8 @@ void write_semantic_segmentation(const FrameOutput& output, bool colorize) {
 
 void write_instance_segmentation(const FrameOutput& output, bool colorize) {
   constexpr std::string_view kName = "instance_segmentation";
-  const Segmentation picture(instance_picture(output.frame, instance_picture_ids(output)), colorize,
-                             {kBackgroundId, kUnlabelledId});
+  Segmentation picture(instance_picture(output.frame, instance_picture_ids(output)), colorize,
+                       {kBackgroundId, kUnlabelledId});
   add_picture(output, kName, picture);
 
   Json paths = Json::object();
@@ -117,7 +119,7 @@ void write_instance_id_segmentation(const FrameOutput& output, bool colorize,
   // Moved up by one, so that no leaf has the colour of kUnlabelledId.
   Image<std::uint32_t> ids = output.frame.get(kLeafId);
   for (std::uint32_t& id : ids.pixels()) id = id == 0 ? kBackgroundId : id + 1;
-  const Segmentation picture(std::move(ids), colorize, {kBackgroundId});
+  Segmentation picture(std::move(ids), colorize, {kBackgroundId});
   add_picture(output, kName, picture);
 
   Json paths = Json::object();

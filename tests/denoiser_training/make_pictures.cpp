@@ -78,7 +78,7 @@ class Tracer {
   Film on_processor(const View& view, const PathSettings& path_settings,
                     const std::vector<TraceJob>& jobs) {
     TraceSettings settings{path_settings};
-    Image<RayHit> hits;
+    HitImage hits;
     if (settings.starts_at_centres) {
       Frame frame;
       SeenMeshes seen;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // What listing and describing plugins loads into the process, and how many heaps its threads have.
 #include <malloc.h>
+#include <sys/mman.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -8,6 +10,7 @@
 #include <fstream>
 #include <iostream>
 #include <latch>
+#include <memory>
 #include <set>
 #include <sstream>
 #include <string>
@@ -91,6 +94,31 @@ TEST_CASE("nothing heavy is mapped before a job needs it", "[startup]") {
   run({"plugins", "describe", "embree"});
   CHECK(is_mapped("renderer_embree.so"));
   CHECK(is_mapped("libembree"));
+}
+
+TEST_CASE("large blocks of a run are mapped as a whole", "[startup]") {
+#if DIORAMA_DETAIL_ADDRESS_SANITIZER || DIORAMA_DETAIL_THREAD_SANITIZER
+  WARN("sanitizers have heaps of their own: not measured");
+#else
+  constexpr std::size_t kSize = std::size_t(4) << 20;
+  const auto faults = [] {
+    rusage usage{};
+    getrusage(RUSAGE_THREAD, &usage);
+    return usage.ru_minflt;
+  };
+  void* const page = mmap(nullptr, 1, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  const bool is_able = madvise(page, 4096, MADV_POPULATE_WRITE) == 0;
+  munmap(page, 1);
+  if (!is_able) {
+    WARN("Linux before 5.14 maps page by page: not measured");
+    return;
+  }
+  diorama::give_large_blocks_back();
+  const auto block = std::make_unique_for_overwrite<char[]>(kSize);
+  const long before = faults();
+  std::fill_n(block.get(), kSize, 'x');
+  CHECK(faults() - before < 16);  // of 1024
+#endif
 }
 
 TEST_CASE("threads get no more heaps, unless the user says how many", "[startup]") {

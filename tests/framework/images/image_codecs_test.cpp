@@ -134,6 +134,27 @@ TEST_CASE("PNG keeps every bit, for all kinds and odd sizes", "[images]") {
   }
 }
 
+TEST_CASE("PNG keeps pictures with few values, whatever was written before", "[images]") {
+  constexpr int kWidth = 640;  // rows of several parts
+  constexpr int kHeight = 24;
+  const auto noise = picture<std::uint8_t>(kWidth, 2 * kHeight, 4, 255);
+  for (const int channels : {1, 4}) {
+    std::vector<std::uint8_t> pixels(std::size_t(kWidth * kHeight * channels));
+    for (int y = 8; y < kHeight; ++y) {  // nothing, then a bar, then one that is wider
+      for (int x = 100; x < (y < 16 ? 200 : 300); ++x) {
+        for (int k = 0; k < channels; ++k) {
+          pixels[std::size_t((y * kWidth + x) * channels + k)] = std::uint8_t(200 + k);
+        }
+      }
+    }
+    const Bytes bytes = encode_image(view(pixels, kWidth, kHeight, channels), ImageFormat::Png);
+    CHECK(decode_image(bytes, "t.png")->bytes == pixels);
+    CHECK(bytes.size() < 400);
+    encode_image(view(noise, kWidth, 2 * kHeight, 4), ImageFormat::Png);
+    CHECK(bytes == encode_image(view(pixels, kWidth, kHeight, channels), ImageFormat::Png));
+  }
+}
+
 TEST_CASE("EXR keeps every bit of a float", "[images]") {
   for (const auto& [width, height] : kSizes) {
     for (const int channels : {1, 3, 4}) {

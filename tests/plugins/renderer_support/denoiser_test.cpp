@@ -6,10 +6,12 @@
 #include <cstring>
 #include <limits>
 #include <utility>
+#include <vector>
 
 #include "diorama/rng.h"
 #include "renderer_support/network_filter.h"
 #include "renderer_support/plane_filter.h"
+#include "renderer_support/spare_pages.h"
 #include "renderer_support/view_transform.h"
 #include "support/catch.h"
 #include "support/render_host/render_host.h"
@@ -250,6 +252,24 @@ TEST_CASE("denoised pictures are the same bytes for any number of threads", "[de
     CHECK(is_same(one, denoised_by(2, film, is_quick)));
     CHECK(is_same(one, denoised_by(5, film, is_quick)));
   }
+}
+
+TEST_CASE("memory of the last picture is used again and leaves no trace", "[denoiser]") {
+  constexpr std::size_t kNumbers = std::size_t(1) << 19;  // of a huge page
+  const Film film = rough_film(117, 75, 3);
+  const Image<Vec3f> planes = denoised_by(2, film, true);
+  const Image<Vec3f> network = denoised_by(2, film, false);
+  const auto spare_pages = SparePages::shared();
+  {
+    std::vector<HugePages<float>> last;
+    for (int i = 0; i < 24; ++i) {
+      last.emplace_back(kNumbers);
+      std::fill_n(last.back().data(), kNumbers, std::numeric_limits<float>::quiet_NaN());
+    }
+  }
+  CHECK(std::isnan(HugePages<float>(kNumbers).data()[kNumbers - 1]));
+  CHECK(is_same(planes, denoised_by(2, film, true)));
+  CHECK(is_same(network, denoised_by(2, film, false)));
 }
 
 TEST_CASE("instruction sets agree but for rounding", "[denoiser]") {
