@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "framework/images/codecs.h"
+#include "framework/images/idle_objects.h"
 #include "framework/images/png_filters.h"
 
 // PNG (ISO/IEC 15948). The time goes into deflate, and libdeflate is several times as fast as zlib:
@@ -207,7 +208,7 @@ std::optional<PlainPng> plain_png(std::span<const std::uint8_t> file) {
   return std::nullopt;
 }
 
-/// What a thread decodes with, kept from picture to picture: memory that is taken anew is cleared,
+/// What a picture is decoded with, kept for the next: memory that is taken anew is cleared,
 /// and then far from the processor.
 class Inflater {
  public:
@@ -256,15 +257,16 @@ std::optional<Texture> decode_plain(const Source& source) {
       filtered_size / 1032 > png->packed.size()) {
     return std::nullopt;
   }
-  thread_local Inflater inflater;
-  const auto rows = inflater.inflate(png->packed, std::size_t(filtered_size));
+  static IdleObjects<Inflater> inflaters;
+  IdleObjects<Inflater>::Lease inflater(inflaters);
+  const auto rows = inflater->inflate(png->packed, std::size_t(filtered_size));
   Texture texture;
   texture.width = int(png->width);
   texture.height = int(png->height);
   texture.channels = png->channels;
   const bool is_good = !rows.empty() && undo_png_filters(rows, png->height,
                                                          std::size_t(png->channels), texture.bytes);
-  inflater.shrink();
+  inflater->shrink();
   if (!is_good) return std::nullopt;
   return texture;
 }
@@ -331,7 +333,7 @@ std::uint64_t cost_of(const Row& row) {
   return sum;
 }
 
-/// What a thread encodes with, kept from picture to picture as that of Inflater is.
+/// What a picture is encoded with, kept for the next as an Inflater is.
 class Deflater {
  public:
   /// The stream of all rows, each behind the number of the filter that suits it best; valid until
@@ -504,8 +506,9 @@ std::vector<std::byte> encode_png(const ImageView& image) {
   header[8] = std::uint8_t(image.bits_per_channel);
   header[9] = kColorType[std::size_t(image.channels)];
 
-  thread_local Deflater deflater;
-  const std::span<const std::uint8_t> packed = deflater.deflate(image);
+  static IdleObjects<Deflater> deflaters;
+  IdleObjects<Deflater>::Lease deflater(deflaters);
+  const std::span<const std::uint8_t> packed = deflater->deflate(image);
   constexpr std::size_t kAroundChunk = 12;
   std::vector<std::byte> file;
   file.reserve(kMark.size() + header.size() + packed.size() + 3 * kAroundChunk);
@@ -513,7 +516,7 @@ std::vector<std::byte> encode_png(const ImageView& image) {
   put_chunk(file, "IHDR", header);
   put_chunk(file, "IDAT", packed);
   put_chunk(file, "IEND", {});
-  deflater.shrink();
+  deflater->shrink();
   return file;
 }
 
