@@ -74,15 +74,17 @@ configure() {
   rm -f "build-$preset.log"
 }
 
-# sanitize PRESET TEST...: builds and runs some tests only.
-sanitize() {
+# sanitize_build PRESET TEST..., sanitize_test PRESET TEST...: builds or runs some tests only.
+sanitize_build() {
   preset=$1
   shift
   configure ON
   cmake --build --preset "$preset" --target "$@"
+}
+sanitize_test() {
   local names
-  names=$(IFS='|'; echo "$*")
-  ctest --preset "$preset" -j "$(nproc)" -R "^($names)\$"
+  names=$(IFS='|'; echo "${*:2}")
+  ctest --preset "$1" -j "$(nproc)" -R "^($names)\$"
 }
 
 # The program itself, with every writer at once on many threads, two shards after each other.
@@ -146,12 +148,22 @@ case $command in
     ;;
   sanitize)
     install_packages "${build_packages[@]}" "${test_packages[@]}"
-    sanitize asan "${foreign_bytes[@]}" "${renderer[@]}"
-    sanitize tsan "${threads[@]}"
+    sanitize_build asan "${foreign_bytes[@]}" "${renderer[@]}"
+    # The renderer's test alone keeps one processor busy for as long as the next build takes.
+    sanitize_test asan "${foreign_bytes[@]}" "${renderer[@]}" >build/asan/tests.log 2>&1 &
+    asan_tests=$!
+    trap 'kill "$asan_tests" 2>/dev/null || true' EXIT
+    sanitize_build tsan "${threads[@]}"
+    sanitize_test tsan "${threads[@]}"
+    asan_code=0
+    wait "$asan_tests" || asan_code=$?
+    cat build/asan/tests.log
+    exit "$asan_code"
     ;;
   sanitize-more)
     install_packages "${build_packages[@]}" "${test_packages[@]}"
-    sanitize asan "${by_night[@]}"
+    sanitize_build asan "${by_night[@]}"
+    sanitize_test asan "${by_night[@]}"
     run_all_writers tsan
     ;;
   packages) install_packages "${build_packages[@]}" "${test_packages[@]}" "${check_packages[@]}" ;;
