@@ -136,9 +136,9 @@ class Run:
         renderer, timeline = RENDERERS[self.renderer]
         half = options.per_visit // 2
         width, height = options.size
-        return JOB % {"captures": options.captures, "width": width, "height": height, "environment": self.environment, "skies": self.skies,
-                      "renderer": renderer, "writers": writer_lines(self.writers),
-                      "timeline": timeline % {"half": half, "half_s": half / 20}}
+        return JOB % {"captures": options.captures, "width": width, "height": height,
+                      "environment": self.environment, "skies": self.skies, "renderer": renderer,
+                      "writers": writer_lines(self.writers), "timeline": timeline % {"half": half, "half_s": half / 20}}
 
     def memory(self):
         """MiB after each capture that is on disk so far."""
