@@ -7,6 +7,7 @@
 #include <future>
 #include <vector>
 
+#include "diorama/error.h"
 #include "renderer_support/oidn_denoiser.h"
 #include "renderer_support/sample_plan.h"
 #include "renderer_support/stopwatch.h"
@@ -118,7 +119,9 @@ std::size_t PathRenderer::working_bytes(const Camera& camera, const NameSet& cha
   std::size_t colors = 0;
   if (channels.contains(kColor.name) || channels.contains(kColorHdr.name)) {
     colors = pixels * traced_bytes_per_pixel();
-    if (params_.denoise) {
+    if (filters_film_elsewhere()) {
+      colors += pixels * sizeof(Vec3f);
+    } else if (params_.denoise) {
       colors += denoiser_bytes(camera.width, camera.height, is_quick());
     } else {
       colors += pixels * (sizeof(FilmPixel) + sizeof(Vec3f));
@@ -186,23 +189,27 @@ Image<Vec3f> PathRenderer::without_noise(Film film, const View& view) {
   return denoised(std::move(film), settings, isa_, host_);
 }
 
-Film PathRenderer::trace_paths(const View& view, std::uint64_t seed) {
-  const Stopwatch watch(counts_.trace_s);
-  SamplePlan plan(view.camera().width, view.camera().height,
-                  {params_.samples, params_.error_target, params_.time_budget_s}, seed);
-  Film film = trace(view, path_settings(view), plan);
-  first_hits_ = {};
-  return film;
+Image<Vec3f> PathRenderer::trace_quickly(const View&, const PathSettings&, SamplePlan&, double) {
+  throw Error(ErrorKind::Internal, "this renderer filters its pictures here");
 }
 
-void PathRenderer::put_colors(Frame& frame, const RenderRequest& request, const View& view,
-                              Film film) {
-  Image<Vec3f> hdr;
+/// What the camera sees, without noise where that is wanted.
+Image<Vec3f> PathRenderer::light(const View& view, std::uint64_t seed) {
+  SamplePlan plan(view.camera().width, view.camera().height,
+                  {params_.samples, params_.error_target, params_.time_budget_s}, seed);
+  const PathSettings settings = path_settings(view);
+  if (filters_film_elsewhere()) return trace_quickly(view, settings, plan, params_.firefly_limit);
+  Film film;
   {
-    const Stopwatch watch(counts_.denoise_s);
-    hdr = params_.denoise ? without_noise(std::move(film), view) : undenoised(film);
-    film = Film();
+    const Stopwatch watch(counts_.trace_s);
+    film = trace(view, settings, plan);
+    first_hits_ = {};
   }
+  const Stopwatch watch(counts_.denoise_s);
+  return params_.denoise ? without_noise(std::move(film), view) : undenoised(film);
+}
+
+void PathRenderer::put_colors(Frame& frame, const RenderRequest& request, Image<Vec3f> hdr) {
   const double base = params_.exposure == "auto" ? automatic_exposure(hdr) : 1.0;
   frame.exposure = base * std::exp2(params_.exposure_ev);
   if (request.channels.contains(kColor.name)) {
@@ -236,16 +243,16 @@ Frame PathRenderer::do_render(const Scene& scene, const RenderRequest& request) 
     make_labels(nullptr);
   } else if (traces_elsewhere()) {
     // Paths leave the processor idle: it makes the labels meanwhile.
-    std::future<Film> film =
-        std::async(std::launch::async, [&] { return trace_paths(view, request.seed); });
+    std::future<Image<Vec3f>> hdr =
+        std::async(std::launch::async, [&] { return light(view, request.seed); });
     make_labels(nullptr);
-    put_colors(frame, request, view, film.get());
+    put_colors(frame, request, hdr.get());
   } else if (starts_at_centres(view)) {
     make_labels(&first_hits_);
-    put_colors(frame, request, view, trace_paths(view, request.seed));
+    put_colors(frame, request, light(view, request.seed));
   } else {
     // Labels need not be held while the colours take most memory.
-    put_colors(frame, request, view, trace_paths(view, request.seed));
+    put_colors(frame, request, light(view, request.seed));
     make_labels(nullptr);
   }
   return frame;

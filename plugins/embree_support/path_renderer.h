@@ -71,6 +71,12 @@ class PathRenderer : public Renderer {
   /// Whether trace() leaves the processor idle and asks for no first hits: labels are then made
   /// while it runs on a thread of its own.
   virtual bool traces_elsewhere() const { return false; }
+  /// Whether trace_quickly() is to be called for quick modes.
+  virtual bool filters_elsewhere() const { return false; }
+  /// What the filter on planes (plane_filter.h) makes of a picture's light paths, where that is not
+  /// done here. `firefly_limit`: that of the parameters. Counts its own time.
+  virtual Image<Vec3f> trace_quickly(const View& view, const PathSettings& settings,
+                                     SamplePlan& plan, double firefly_limit);
   /// Memory per pixel that trace() holds beside the film.
   virtual std::size_t traced_bytes_per_pixel() const = 0;
   /// Called after the scene was taken in.
@@ -98,8 +104,11 @@ class PathRenderer : public Renderer {
   PathSettings path_settings(const View& view) const;
   Image<Vec3f> without_noise(Film film, const View& view);
   bool is_quick() const { return params_.mode != "path_traced"; }
-  Film trace_paths(const View& view, std::uint64_t seed);
-  void put_colors(Frame& frame, const RenderRequest& request, const View& view, Film film);
+  bool filters_film_elsewhere() const {
+    return filters_elsewhere() && is_quick() && params_.denoiser == "own";
+  }
+  Image<Vec3f> light(const View& view, std::uint64_t seed);
+  void put_colors(Frame& frame, const RenderRequest& request, Image<Vec3f> hdr);
 
   std::shared_ptr<SparePages> spare_pages_ = SparePages::shared();
   PictureParams params_;

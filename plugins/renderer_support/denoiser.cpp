@@ -15,7 +15,6 @@
 namespace diorama {
 namespace {
 
-constexpr int kExposureBlock = 16;     // pixels
 constexpr double kPriorBias = 0.1;     // what a picture's mean is off by before it is set right
 constexpr double kMostReturned = 2.0;  // of the light that is left
 constexpr float kMostLight = 1e15f;    // beyond it there are no sums

@@ -34,7 +34,8 @@ Image<Vec3f> denoised(Film film, const DenoiseSettings& settings, Isa isa, Host&
 /// The plain means.
 Image<Vec3f> undenoised(const Film& film);
 
-/// The exposure of a film's means over blocks of pixels: it hardly depends on the noise.
+inline constexpr int kExposureBlock = 16;  ///< Pixels.
+/// The exposure of a film's means over blocks of so many pixels: it hardly depends on the noise.
 double quiet_exposure(const Film& film);
 
 }  // namespace diorama

@@ -303,37 +303,40 @@ GpuPathTracer::Counts GpuPathTracer::trace(const Pass& pass) {
   return {counters.rays, counters.shadow_rays};
 }
 
+gpu::Address GpuPathTracer::record_film(VulkanCommands& commands) const {
+  commands.constants(push_);
+  commands.dispatch(kernels_.resolve, std::min((job_.pixel_count + gpu::kGroup - 1) / gpu::kGroup,
+                                               device_.info().most_groups));
+  commands.barrier();
+  return film_.address();
+}
+
 Film GpuPathTracer::film() {
-  const int width = view_->camera().width;
-  const int height = view_->camera().height;
   const std::size_t size = job_.pixel_count * sizeof(FilmPixel);
   grow(results_for_host_, kCountersRoom + size, "a picture", VulkanBuffer::Place::ToHost);
   const auto record = [&](VulkanCommands& commands) {
-    commands.constants(push_);
-    commands.dispatch(kernels_.resolve, std::min((job_.pixel_count + gpu::kGroup - 1) / gpu::kGroup,
-                                                 device_.info().most_groups));
-    commands.barrier();
+    record_film(commands);
     commands.mark(kSums);
     commands.copy(film_, 0, results_for_host_, kCountersRoom, size);
     commands.mark(kTransfers);
   };
   device_.run(record, seconds_);
-  Film film(width, height);
+  Film film(width(), height());
   const std::byte* from = results_for_host_.data() + kCountersRoom;
-  const std::size_t row_size = std::size_t(width) * sizeof(FilmPixel);
-  host_.parallel_for(std::size_t(height), [&](std::size_t row) {
+  const std::size_t row_size = std::size_t(width()) * sizeof(FilmPixel);
+  host_.parallel_for(std::size_t(height()), [&](std::size_t row) {
     std::memcpy(static_cast<void*>(&film.at(0, int(row))), from + row * row_size, row_size);
   });
   return film;
 }
 
 Image<PixelSum> GpuPathTracer::sums() {
-  Image<PixelSum> result(view_->camera().width, view_->camera().height, PixelSum());
+  Image<PixelSum> result(width(), height(), PixelSum());
   std::vector<gpu::PixelSum> sums(result.pixels().size());
   device_.download(sums_, 0, std::as_writable_bytes(std::span(sums)));
-  const auto width = std::size_t(result.width());
+  const auto row_width = std::size_t(result.width());
   host_.parallel_for(std::size_t(result.height()), [&](std::size_t row) {
-    for (std::size_t i = row * width; i < (row + 1) * width; ++i) {
+    for (std::size_t i = row * row_width; i < (row + 1) * row_width; ++i) {
       const gpu::PixelSum& sum = sums[i];
       FilmPixel pixel;
       pixel.seen = sum.seen;

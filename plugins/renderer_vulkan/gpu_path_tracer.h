@@ -41,6 +41,12 @@ class GpuPathTracer {
   Image<PixelSum> sums();
   /// Their means.
   Film film();
+  /// Has the device make the means without bringing them back; what is recorded next sees them, as
+  /// FilmPixels at the address that it returns.
+  gpu::Address record_film(VulkanCommands& commands) const;
+  /// Of the picture.
+  int width() const { return view_->camera().width; }
+  int height() const { return view_->camera().height; }
 
   /// What the device was busy with since begin(), in seconds by its clock; nothing, where it has
   /// none.

@@ -263,6 +263,23 @@ struct Push {
   std::uint32_t pad = 0;
 };
 
+/// Of the filter on planes: Push of planes.glsl.
+struct PlanePush {
+  Address film = 0;
+  Address layers = 0;
+  Address noise = 0;
+  Address support = 0;
+  Address blocks = 0;
+  Address image = 0;
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  std::uint32_t from = 0;
+  std::uint32_t reach = 0;
+  Vec3f view_position = Vec3f::Zero();
+  float brightest_path = 0.0f;
+};
+static_assert(sizeof(PlanePush) == 80);
+
 inline constexpr std::uint32_t kGroup = 64;
 inline constexpr std::uint32_t kStateColumns = 7;
 inline constexpr std::uint32_t kResultColumns = 4;

@@ -35,6 +35,16 @@ std::uint32_t find_iteration_limit(const VulkanDevice& device) {
 
 }  // namespace
 
+PlaneKernels::PlaneKernels(const VulkanDevice& device)
+    : means(device, kernels::kPlaneMeans),
+      read(device, kernels::kPlaneRead),
+      sums(device, kernels::kPlaneSums),
+      fireflies(device, kernels::kPlaneFireflies),
+      measure(device, kernels::kPlaneMeasure),
+      filter(device, kernels::kPlaneFilter),
+      lost(device, kernels::kPlaneLost),
+      finish(device, kernels::kPlaneFinish) {}
+
 PathKernels::PathKernels(const VulkanDevice& device)
     : start(device, kernels::kStart),
       arrange(device, kernels::kArrange),
@@ -43,6 +53,7 @@ PathKernels::PathKernels(const VulkanDevice& device)
       shadow(device, kernels::kShadow),
       gather(device, kernels::kGather),
       resolve(device, kernels::kResolve),
+      planes(device),
       iteration_limit(find_iteration_limit(device)) {}
 
 std::shared_ptr<const PathDevice> shared_path_device(std::span<const int> numbers) {

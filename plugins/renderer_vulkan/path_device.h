@@ -10,6 +10,20 @@
 
 namespace diorama {
 
+/// Of the filter on planes, in the order of its steps.
+struct PlaneKernels {
+  explicit PlaneKernels(const VulkanDevice& device);
+
+  VulkanKernel means;
+  VulkanKernel read;
+  VulkanKernel sums;
+  VulkanKernel fireflies;
+  VulkanKernel measure;
+  VulkanKernel filter;
+  VulkanKernel lost;
+  VulkanKernel finish;
+};
+
 /// What a device runs for light paths. Making it takes the driver a second or so.
 struct PathKernels {
   explicit PathKernels(const VulkanDevice& device);
@@ -21,6 +35,7 @@ struct PathKernels {
   VulkanKernel shadow;
   VulkanKernel gather;
   VulkanKernel resolve;
+  PlaneKernels planes;
   /// How often a kernel may loop here: some drivers end loops silently.
   std::uint32_t iteration_limit;
 };

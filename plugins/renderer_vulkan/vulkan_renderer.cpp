@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "diorama/error.h"
+#include "renderer_support/stopwatch.h"
 
 namespace diorama {
 
@@ -54,7 +55,8 @@ VulkanRenderer::VulkanRenderer(const Params& params, Host& host,
     : PathRenderer(params, host),
       device_(std::move(device)),
       scene_(*device_, host),
-      tracer_(*device_, host) {
+      tracer_(*device_, host),
+      filter_(*device_, host) {
   host.log(LogLevel::Info, "paths are traced by Vulkan device " +
                                std::to_string(device_->device.number()) + " of " +
                                device_->device.instance().list_of_devices());
@@ -62,7 +64,8 @@ VulkanRenderer::VulkanRenderer(const Params& params, Host& host,
 
 void VulkanRenderer::prepare_paths() { scene_.take(meshes().render_scene()); }
 
-Film VulkanRenderer::trace(const View& view, const PathSettings& settings, SamplePlan& plan) {
+void VulkanRenderer::trace_paths(const View& view, const PathSettings& settings,
+                                 SamplePlan& plan) {
   using Clock = std::chrono::steady_clock;
   const auto start = Clock::now();
   tracer_.begin(view, settings, scene_.world(), meshes().window());
@@ -78,9 +81,26 @@ Film VulkanRenderer::trace(const View& view, const PathSettings& settings, Sampl
     if (plan.has_one_round()) break;
     sums = tracer_.sums();
   }
+}
+
+Film VulkanRenderer::trace(const View& view, const PathSettings& settings, SamplePlan& plan) {
+  trace_paths(view, settings, plan);
   Film film = tracer_.film();
   counts().device_s = tracer_.device_seconds();
   return film;
+}
+
+Image<Vec3f> VulkanRenderer::trace_quickly(const View& view, const PathSettings& settings,
+                                           SamplePlan& plan, double firefly_limit) {
+  {
+    const Stopwatch watch(counts().trace_s);
+    trace_paths(view, settings, plan);
+  }
+  const Stopwatch watch(counts().denoise_s);
+  Image<Vec3f> image = filter_.filtered(tracer_, view.position(), firefly_limit);
+  counts().device_s = tracer_.device_seconds();
+  if (!counts().device_s.empty()) counts().device_s.emplace_back("filter", filter_.device_seconds());
+  return image;
 }
 
 }  // namespace diorama

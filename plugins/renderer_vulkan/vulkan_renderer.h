@@ -6,6 +6,7 @@
 
 #include "embree_support/path_renderer.h"
 #include "gpu_path_tracer.h"
+#include "gpu_plane_filter.h"
 #include "gpu_scene.h"
 #include "path_device.h"
 
@@ -30,13 +31,18 @@ class VulkanRenderer final : public PathRenderer {
 
  private:
   void prepare_paths() override;
+  void trace_paths(const View& view, const PathSettings& settings, SamplePlan& plan);
   Film trace(const View& view, const PathSettings& settings, SamplePlan& plan) override;
+  Image<Vec3f> trace_quickly(const View& view, const PathSettings& settings, SamplePlan& plan,
+                             double firefly_limit) override;
   bool traces_elsewhere() const override { return true; }
+  bool filters_elsewhere() const override { return true; }
   std::size_t traced_bytes_per_pixel() const override { return sizeof(FilmPixel); }
 
   std::shared_ptr<const PathDevice> device_;
   GpuScene scene_;
   GpuPathTracer tracer_;
+  GpuPlaneFilter filter_;
 };
 
 }  // namespace diorama

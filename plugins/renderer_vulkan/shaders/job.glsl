@@ -36,18 +36,7 @@ struct PixelSum {
 };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer PixelSums { PixelSum v[]; };
 
-// See FilmPixel of film.h.
-struct FilmPixel {
-  vec3 seen;
-  vec3 scattered;
-  vec3 albedo;
-  vec3 normal;
-  vec3 position;
-  float variance;
-  float brightest;
-  float count;
-  float surface_share;
-};
+#include "film.glsl"
 layout(buffer_reference, scalar, buffer_reference_align = 4) writeonly buffer FilmPixels { FilmPixel v[]; };
 
 // Counts and the arguments of the next dispatches.

@@ -15,6 +15,8 @@
 #include "diorama/rng.h"
 #include "embree_renderer.h"
 #include "plugins/renderer_embree/test_world.h"
+#include "renderer_support/denoiser.h"
+#include "renderer_support/plane_filter.h"
 #include "renderer_support/rigid_motion.h"
 #include "support/catch.h"
 #include "support/render_host/render_host.h"
@@ -718,6 +720,57 @@ TEST_CASE("visits share a device: meshes are there once, pictures are those of o
   for (int i = 0; i < 4; ++i) visits.push_back(std::async(std::launch::async, picture, 1));
   for (auto& visit : visits) CHECK(visit.get() == alone);
   CHECK(assets.kept().meshes == kept.meshes);
+}
+
+TEST_CASE("the filter on planes makes of a film there what it makes of it here", "[vulkan]") {
+  if (!test::has_vulkan_device()) return;
+  const PathDevice& device = *test::path_device();
+  RenderHost host(2);
+  Material mirror;
+  mirror.metallic = 1.0f;
+  mirror.roughness = 0.15f;
+  TestWorld world = room_with(mirror);
+  // Sizes that end within a block of pixels; of several paths some are far too bright.
+  for (const auto& [width, height] : {std::pair{67, 35}, std::pair{7, 5}}) {
+    const NodeId camera =
+        world.add_camera(width, height, 28.0, Vec3(-0.6, -1.8, 0.3), Vec3(0.1, 0.5, -0.7));
+    EmbreeScene meshes(host, {"sse2", {}});
+    meshes.take(world.scene);
+    GpuScene scene(device, host);
+    scene.take(meshes.render_scene());
+    const View view(world.scene, camera);
+    GpuPathTracer tracer(device, host);
+    GpuPlaneFilter filter(device, host);
+    for (const int samples : {1, 4, 20}) {
+      for (const double limit : {0.0, 0.5}) {
+        tracer.begin(view, {.max_bounces = 3, .has_caustics = true}, scene.world(),
+                     meshes.window());
+        SamplePlan plan(width, height, {samples}, 9);
+        tracer.trace(plan.next_round({}, 0.0));
+        const Image<Vec3f> there = filter.filtered(tracer, view.position(), limit);
+        const Film film = tracer.film();
+        DenoiseSettings settings{view.position()};
+        if (limit > 0.0) settings.brightest_path = float(limit / quiet_exposure(film));
+        const Image<Vec3f> here = filtered_on_planes(film, settings, Isa::Sse2, host);
+        REQUIRE(there.width() == width);
+        REQUIRE(there.height() == height);
+        double sum = 0.0;
+        double off = 0.0;
+        for (std::size_t i = 0; i < here.pixels().size(); ++i) {
+          sum += double(here.pixels()[i].sum());
+          off += double((there.pixels()[i] - here.pixels()[i]).cwiseAbs().sum());
+        }
+        const Image<Vec3f> raw = undenoised(film);
+        double changed = 0.0;
+        for (std::size_t i = 0; i < raw.pixels().size(); ++i) {
+          changed += double((raw.pixels()[i] - here.pixels()[i]).cwiseAbs().sum());
+        }
+        CAPTURE(width, samples, limit, off / sum, changed / sum);
+        CHECK(off < 1e-5 * sum);
+        CHECK(changed > 0.01 * sum);  // There is something to filter.
+      }
+    }
+  }
 }
 
 TEST_CASE("sums do not depend on how many paths are under way", "[vulkan]") {
