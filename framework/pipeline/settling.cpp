@@ -70,6 +70,12 @@ nlohmann::ordered_json as_json(const std::vector<PlacedNode>& nodes) {
   return list;
 }
 
+/// What has left the room falls for ever and says nothing about the rest.
+bool falls_in(const Room& room, const Scene& scene, NodeId object) {
+  const auto& body = scene[object].rigid_body;
+  return body && body->has_gravity && room.holds(scene, object);
+}
+
 /// Nodes with a mesh at or below them.
 std::set<NodeId> nodes_with_shape(const Scene& scene) {
   std::set<NodeId> shaped;
@@ -181,12 +187,34 @@ double fastest_falling(const Scene& scene, const Room& room, const std::vector<N
                        const LastStep& last) {
   double fastest = 0.0;
   for (const NodeId object : objects) {
-    const auto& body = scene[object].rigid_body;
-    // What has left the room falls for ever and says nothing about the rest.
-    if (!body || !body->has_gravity || !room.holds(scene, object)) continue;
-    fastest = std::max(fastest, speed_of(scene, object, last));
+    if (falls_in(room, scene, object)) fastest = std::max(fastest, speed_of(scene, object, last));
   }
   return fastest;
+}
+
+void JitterWatch::look(const Scene& scene, const Room& room, const std::vector<NodeId>& objects,
+                       const LastStep& last, double rest_speed, double now_s) {
+  constexpr double kAwayM = 0.02;
+  for (const NodeId object : objects) {
+    if (!falls_in(room, scene, object) || speed_of(scene, object, last) <= rest_speed) continue;
+    const Vec3 place = scene.world_from_node(object).translation();
+    const auto [it, is_new] = moving_.try_emplace(object, Moving{place, now_s, now_s});
+    Moving& moving = it->second;
+    const bool has_rested = now_s - moving.seen_s >= kRestS;
+    if (has_rested || (place - moving.from).norm() > kAwayM) moving = {place, now_s, now_s};
+    moving.seen_s = now_s;
+  }
+}
+
+bool JitterWatch::only_jitter_is_left(double now_s) const {
+  constexpr double kLongS = 2.0;
+  bool moves = false;
+  for (const auto& [object, moving] : moving_) {
+    if (now_s - moving.seen_s >= kRestS) continue;
+    if (now_s - moving.since_s < kLongS) return false;
+    moves = true;
+  }
+  return moves;
 }
 
 SceneAsSetUp::SceneAsSetUp(const Scene& scene) {

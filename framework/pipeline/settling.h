@@ -113,9 +113,34 @@ struct LastStep {
 /// if that is more, as engines push bodies out of each other without giving them a velocity.
 double speed_of(const Scene& scene, NodeId object, const LastStep& last);
 
+/// Slower than the job's `settle.rest_speed` for so long is at rest: at its highest point a thing is
+/// slow as well.
+inline constexpr double kRestS = 0.25;
+
 /// Highest speed, in m/s, of those objects in the room that gravity acts on; 0 without any.
 double fastest_falling(const Scene& scene, const Room& room, const std::vector<NodeId>& objects,
                        const LastStep& last);
+
+/// Tells things on their way to rest from those that jitter: engines push what is wedged to and fro
+/// for as long as they are asked to.
+class JitterWatch {
+ public:
+  /// Looks at the objects at a moment of the simulation; moments come in their order. What is
+  /// faster than `rest_speed` moves.
+  void look(const Scene& scene, const Room& room, const std::vector<NodeId>& objects,
+            const LastStep& last, double rest_speed, double now_s);
+  /// Whether something moved in the last quarter of a second, and all that did has been doing so
+  /// for two seconds or more without getting 2 cm away.
+  bool only_jitter_is_left(double now_s) const;
+
+ private:
+  struct Moving {
+    Vec3 from;             ///< World.
+    double since_s = 0.0;  ///< It has been near there.
+    double seen_s = 0.0;   ///< It was last seen moving.
+  };
+  std::map<NodeId, Moving> moving_;
+};
 
 /// Where everything with a mesh stood, and whether it was visible, when a visit had been set up.
 class SceneAsSetUp {

@@ -320,8 +320,6 @@ void VisitRun::advance(const TimelineStep& step) {
   const Room room(scene_, environment_);
   // Short enough that Ctrl-C is felt, and that the time to rest is known well.
   constexpr int kStepsAtOnce = 5;
-  // At its highest point a thing is slow as well.
-  constexpr double kRestS = 0.25;
   const auto take = [&](int steps) {
     if (!components_.physics) return;
     call_component("physics '" + job_.physics.type + "'",
@@ -332,6 +330,7 @@ void VisitRun::advance(const TimelineStep& step) {
   const auto is_at_rest = [&] {
     return simulated_s_ - std::max(start_s, moving_until_s_) >= kRestS - 1e-9;
   };
+  JitterWatch jitter;
   for (int taken = 0; taken < step.steps;) {
     setting_.stop_if_asked();
     const int now = step.each_step.empty() ? std::min(kStepsAtOnce, step.steps - taken) : 1;
@@ -346,8 +345,11 @@ void VisitRun::advance(const TimelineStep& step) {
     if (fastest_falling(scene_, room, objects_, last_step()) > job_.settle.rest_speed) {
       moving_until_s_ = simulated_s_;
     }
-    if (step.until_rest && taken >= step.at_least && is_at_rest()) return;
     if (!components_.physics) return;
+    if (!step.until_rest) continue;
+    jitter.look(scene_, room, objects_, last_step(), job_.settle.rest_speed, simulated_s_);
+    const bool is_over = is_at_rest() || jitter.only_jitter_is_left(simulated_s_);
+    if (taken >= step.at_least && is_over) return;
   }
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "framework/pipeline/settling.h"
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "support/catch.h"
@@ -73,6 +74,73 @@ TEST_CASE("The fastest object is one that falls, in the room", "[settle]") {
   // It was placed since.
   before.erase(stage.objects[3]);
   CHECK(fastest_falling(stage.scene, room, stage.objects, {before, 0.02}) == 0.2);
+}
+
+namespace {
+
+/// Plays a simulation of 10 s in 60 steps a second, looked at as often as a visit does; `place_at`
+/// is where object 0 is. The time at which nothing but jitter was left; below 0: never.
+template <class PlaceAt>
+double jitters_from(RoomStage& stage, const PlaceAt& place_at) {
+  constexpr double kStepS = 1 / 60.0;
+  const Room room(stage.scene, stage.environment);
+  JitterWatch watch;
+  for (int step = 5; step <= 600; step += 5) {
+    const double now = step * kStepS;
+    stage.scene.set_pose(stage.objects[0], Affine(Eigen::Translation3d(place_at(now - kStepS))));
+    const BodyPoses before = body_poses(stage.scene);
+    stage.scene.set_pose(stage.objects[0], Affine(Eigen::Translation3d(place_at(now))));
+    watch.look(stage.scene, room, stage.objects, {before, kStepS}, 0.05, now);
+    if (watch.only_jitter_is_left(now)) return now;
+  }
+  return -1.0;
+}
+
+}  // namespace
+
+TEST_CASE("What moves to and fro in place is not waited for, what gets somewhere is", "[settle]") {
+  // 17 mm wide, faster than 5 cm/s nearly all the time.
+  const auto jitter = [](double t) { return Vec3(0, 0.0085 * std::sin(60.0 * t), 0.1); };
+  SECTION("jitter") {
+    RoomStage stage({{0, 0, 1}, {1, 0, 1}});
+    CHECK(jitters_from(stage, jitter) == Approx(2.0).margin(0.3));
+  }
+  SECTION("jitter after a fall") {
+    RoomStage stage({{0, 0, 1}});
+    const double end = jitters_from(stage, [&](double t) {
+      return t < 1.5 ? Vec3(0, 0, 1.6 - t) : jitter(t);
+    });
+    CHECK(end == Approx(3.5).margin(0.3));
+  }
+  SECTION("jitter outside the room, and of what floats") {
+    RoomStage outside({{0, 0, 1}});
+    CHECK(jitters_from(outside, [&](double t) { return Vec3(jitter(t) + Vec3(9, 0, 0)); }) < 0.0);
+    RoomStage floating({{0, 0, 1}});
+    floating.scene.edit(floating.objects[0]).rigid_body->has_gravity = false;
+    CHECK(jitters_from(floating, jitter) < 0.0);
+  }
+  SECTION("a slow roll") {
+    RoomStage stage({{0, 0, 1}});
+    CHECK(jitters_from(stage, [](double t) { return Vec3(-1 + 0.06 * t, 0, 0.1); }) < 0.0);
+  }
+  SECTION("rest, with a push now and then") {
+    RoomStage stage({{0, 0, 1}});
+    CHECK(jitters_from(stage, [&](double t) {
+            return std::fmod(t, 1.0) < 0.5 ? jitter(t) : Vec3(0, 0, 0.1);
+          }) < 0.0);
+  }
+  SECTION("another thing is still under way") {
+    RoomStage stage({{0, 0, 1}, {1, 0, 2.5}});
+    RigidBody& body = *stage.scene.edit(stage.objects[1]).rigid_body;
+    double height = 2.5;
+    const double end = jitters_from(stage, [&](double t) {
+      height -= t < 6.0 ? 0.006 : 0.0;
+      stage.scene.set_pose(stage.objects[1], Affine(Eigen::Translation3d(1, 0, height)));
+      body.linear_velocity = Vec3(0, 0, t < 6.0 ? -0.4 : 0.0);
+      return jitter(t);
+    });
+    CHECK(end == Approx(6.25).margin(0.3));
+  }
 }
 
 TEST_CASE("Saved nodes come back as they were, all others stay as they are", "[settle]") {
