@@ -113,8 +113,8 @@ struct LastStep {
 /// if that is more, as engines push bodies out of each other without giving them a velocity.
 double speed_of(const Scene& scene, NodeId object, const LastStep& last);
 
-/// Slower than the job's `settle.rest_speed` for so long is at rest: at its highest point a thing is
-/// slow as well.
+/// Slower than the job's `settle.rest_speed` for so long is at rest: at its highest point a thing
+/// is slow as well.
 inline constexpr double kRestS = 0.25;
 
 /// Highest speed, in m/s, of those objects in the room that gravity acts on; 0 without any.

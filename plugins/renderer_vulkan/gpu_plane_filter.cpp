@@ -65,8 +65,7 @@ float GpuPlaneFilter::brightest_path(double firefly_limit) const {
 
 void GpuPlaneFilter::record_rounds(VulkanCommands& commands) {
   const auto most = std::size_t(device_.info().most_groups);
-  const auto per_pixel =
-      std::uint32_t(std::min((pixels_ + gpu::kGroup - 1) / gpu::kGroup, most));
+  const auto per_pixel = std::uint32_t(std::min((pixels_ + gpu::kGroup - 1) / gpu::kGroup, most));
   const auto per_block = std::uint32_t(std::min(blocks_, most));
   const auto dispatch = [&](const VulkanKernel& kernel, std::uint32_t groups) {
     commands.constants(push_);
@@ -102,8 +101,8 @@ Image<Vec3f> GpuPlaneFilter::filtered(GpuPathTracer& tracer, const Vec3f& view_p
     const auto record = [&](VulkanCommands& commands) {
       push_.film = tracer.record_film(commands);
       commands.constants(push_);
-      commands.dispatch(kernels_.means, std::uint32_t(std::min(
-                                            blocks_, std::size_t(device_.info().most_groups))));
+      commands.dispatch(kernels_.means,
+                        std::uint32_t(std::min(blocks_, std::size_t(device_.info().most_groups))));
       commands.barrier();
       commands.copy(layers_, push_.blocks - push_.layers, for_host_, 0,
                     kMeanNumbers * blocks_ * sizeof(float));

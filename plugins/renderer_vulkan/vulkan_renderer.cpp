@@ -64,8 +64,7 @@ VulkanRenderer::VulkanRenderer(const Params& params, Host& host,
 
 void VulkanRenderer::prepare_paths() { scene_.take(meshes().render_scene()); }
 
-void VulkanRenderer::trace_paths(const View& view, const PathSettings& settings,
-                                 SamplePlan& plan) {
+void VulkanRenderer::trace_paths(const View& view, const PathSettings& settings, SamplePlan& plan) {
   using Clock = std::chrono::steady_clock;
   const auto start = Clock::now();
   tracer_.begin(view, settings, scene_.world(), meshes().window());
@@ -99,7 +98,8 @@ Image<Vec3f> VulkanRenderer::trace_quickly(const View& view, const PathSettings&
   const Stopwatch watch(counts().denoise_s);
   Image<Vec3f> image = filter_.filtered(tracer_, view.position(), firefly_limit);
   counts().device_s = tracer_.device_seconds();
-  if (!counts().device_s.empty()) counts().device_s.emplace_back("filter", filter_.device_seconds());
+  if (!counts().device_s.empty())
+    counts().device_s.emplace_back("filter", filter_.device_seconds());
   return image;
 }
 

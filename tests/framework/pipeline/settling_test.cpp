@@ -107,9 +107,8 @@ TEST_CASE("What moves to and fro in place is not waited for, what gets somewhere
   }
   SECTION("jitter after a fall") {
     RoomStage stage({{0, 0, 1}});
-    const double end = jitters_from(stage, [&](double t) {
-      return t < 1.5 ? Vec3(0, 0, 1.6 - t) : jitter(t);
-    });
+    const double end =
+        jitters_from(stage, [&](double t) { return t < 1.5 ? Vec3(0, 0, 1.6 - t) : jitter(t); });
     CHECK(end == Approx(3.5).margin(0.3));
   }
   SECTION("jitter outside the room, and of what floats") {
