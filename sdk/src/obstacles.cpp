@@ -9,6 +9,8 @@
 #include <numeric>
 #include <set>
 #include <unordered_map>
+#include <utility>
+#include <vector>
 
 namespace diorama {
 namespace {
@@ -391,24 +393,56 @@ struct Obstacles::State {
     return std::abs(winding_number(item, point_world)) > kClosed;
   }
 
+  /// Goes down both trees at once, the larger of two boxes first.
   static bool is_near(const Item& item, const Item& other, double distance) {
     if (!overlaps(grown(other.box_world, distance), item.box_world)) return false;
+    constexpr double kRounding = 1e-12;
     const Affine item_from_other = item.mesh_from_world * other.world_from_mesh;
+    const Mat3 size_from_other = item_from_other.linear().cwiseAbs();
     const double reach = distance * item.mesh_per_world;
-    const Aabb all = item.tree().branches.front().box.as_double();
-    return other.tree().visit(
-        [&](const FloatBox& box) {
-          return overlaps(grown(box.as_double().mapped(item_from_other), reach), all);
-        },
-        [&](std::uint32_t triangle) {
-          const Corners corner = corners_of(*other.mesh, triangle);
-          const Aabb near = grown(box_of(mapped(item_from_other, corner)), reach);
-          const Corners in_world = mapped(other.world_from_mesh, corner);
-          return item.tree().visit([&](const FloatBox& box) { return overlaps(box, near); },
-                                   [&](std::uint32_t k) {
-                                     return are_within(item.corners_world(k), in_world, distance);
-                                   });
-        });
+    const auto& own = item.tree().branches;
+    const auto& others = other.tree().branches;
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs{{0, 0}};
+    while (!pairs.empty()) {
+      const MeshTree::Branch& a = own[pairs.back().first];
+      const MeshTree::Branch& b = others[pairs.back().second];
+      const auto [at_a, at_b] = pairs.back();
+      pairs.pop_back();
+      const Aabb box_a = a.box.as_double();
+      const Aabb box_b = b.box.as_double();
+      const Vec3 middle = item_from_other * box_b.centre();
+      Vec3 half = size_from_other * (0.5 * box_b.size()) + Vec3::Constant(reach);
+      half.array() += kRounding * (middle.cwiseAbs().sum() + half.sum());
+      if (!overlaps(box_a, {middle - half, middle + half})) continue;
+      const bool is_b_larger = half.squaredNorm() > 0.25 * box_a.size().squaredNorm();
+      if (b.count == 0 && (a.count > 0 || is_b_larger)) {
+        pairs.emplace_back(at_a, b.first + 1);
+        pairs.emplace_back(at_a, b.first);
+      } else if (a.count == 0) {
+        pairs.emplace_back(a.first + 1, at_b);
+        pairs.emplace_back(a.first, at_b);
+      } else if (are_leaves_within(item, a, other, b, item_from_other, distance)) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+  static bool are_leaves_within(const Item& item, const MeshTree::Branch& a, const Item& other,
+                                const MeshTree::Branch& b, const Affine& item_from_other,
+                                double distance) {
+    const double reach = distance * item.mesh_per_world;
+    for (std::uint32_t i = 0; i < b.count; ++i) {
+      const Corners corner = corners_of(*other.mesh, other.tree().order[b.first + i]);
+      const Aabb near = grown(box_of(mapped(item_from_other, corner)), reach);
+      const Corners in_world = mapped(other.world_from_mesh, corner);
+      for (std::uint32_t k = 0; k < a.count; ++k) {
+        const std::uint32_t triangle = item.tree().order[a.first + k];
+        if (!overlaps(box_of(corners_of(*item.mesh, triangle)), near)) continue;
+        if (are_within(item.corners_world(triangle), in_world, distance)) return true;
+      }
+    }
+    return false;
   }
 };
 

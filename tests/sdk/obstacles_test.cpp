@@ -119,6 +119,47 @@ TEST_CASE("Things are near each other by their triangles, not by their boxes", "
   CHECK(stage.all().near_node(stage.scene, needle, 0.0) == std::vector<NodeId>{cone});
 }
 
+TEST_CASE("How near stretched things are is how near points of their triangles are", "[obstacles]") {
+  const Mesh egg = make_sphere(0.6, 20);
+  const Mesh box = make_box(Vec3(0.5, 0.7, 0.3));
+  Rng rng(11);
+  int apart = 0;
+  for (int i = 0; i < 60; ++i) {
+    Stage stage;
+    stage.add("egg", egg, stretched());
+    const Vec3 place = rng.uniform_in({Vec3(0, -4, 1.5), Vec3(2, 0, 4.5)});
+    Affine pose(Eigen::Translation3d(place.x(), place.y(), place.z()));
+    pose.rotate(Eigen::AngleAxisd(0.1 * i, Vec3(3, -1, 2).normalized()));
+    pose.scale(Vec3(1.0, 0.4, 2.0));
+    const NodeId brick = stage.add("brick", box, pose);
+    const Obstacles all = stage.all();
+    double nearest = kInfinity;  // of points all over the brick: never below the true distance
+    constexpr int kSteps = 40;
+    for (const auto& [a, b, c] : box.triangles) {
+      for (int u = 0; u <= kSteps; ++u) {
+        for (int v = 0; u + v <= kSteps; ++v) {
+          const Vec3f p = box.positions[a] +
+                          (float(u) / kSteps) * (box.positions[b] - box.positions[a]) +
+                          (float(v) / kSteps) * (box.positions[c] - box.positions[a]);
+          nearest = std::min(nearest, all.distance(pose * p.cast<double>(), 100.0, brick));
+        }
+      }
+    }
+    const auto are_near = [&](double distance) {
+      return !all.near_node(stage.scene, brick, distance).empty();
+    };
+    CAPTURE(i, nearest);
+    CHECK(are_near(nearest + 1e-6));
+    // Half of the way between two of the points.
+    constexpr double kSpacing = 0.02;
+    if (nearest < kSpacing) continue;
+    ++apart;
+    CHECK_FALSE(are_near(nearest - kSpacing));
+  }
+  CHECK(apart > 20);
+  CHECK(apart < 60);
+}
+
 TEST_CASE("Closed meshes enclose, cups and rooms do not", "[obstacles]") {
   Stage stage;
   stage.add("room", make_box(Vec3(6, 5, 3)), at(0, 0, 1.5));
