@@ -100,13 +100,13 @@ void BulletBackend::Params::visit(ParamVisitor& v) {
 
 /// Members are destroyed last to first: the world before the bodies it points at.
 struct BulletBackend::World {
-  World(const Params& params, ShapeCache shape_cache)
+  World(const Params& params, std::shared_ptr<ShapeCache> shape_cache)
       : cache(std::move(shape_cache)),
         dispatcher(&configuration),
         dynamics(&dispatcher, &broadphase, &solver, &configuration,
                  params.max_depenetration_speed) {}
 
-  ShapeCache cache;
+  std::shared_ptr<ShapeCache> cache;
   Bodies bodies;
   MeshCollisionConfiguration configuration{small_pools()};
   btCollisionDispatcher dispatcher;
@@ -128,7 +128,7 @@ BulletBackend::BulletBackend(Params params, Host& host)
     : params_(std::move(params)),
       host_(host),
       world_(std::make_unique<World>(
-          params_, ShapeCache(std::size_t(params_.hull_vertices), params_.margin_m))) {}
+          params_, ShapeCache::shared(std::size_t(params_.hull_vertices), params_.margin_m))) {}
 
 BulletBackend::~BulletBackend() = default;
 
@@ -138,8 +138,8 @@ void BulletBackend::do_reset(const Scene& scene) {
   // Bullet finds one point of two hulls per step, and so a face only in time. Where there are fewer
   // than three, it looks for more with the hulls turned a little.
   world.configuration.setConvexConvexMultipointIterations(3, 3);
-  world.cache.forget_dead_meshes();
-  world.bodies = build_bodies(scene, params_, world.cache);
+  world.cache->forget_dead_meshes();
+  world.bodies = build_bodies(scene, params_, *world.cache);
 
   world.dynamics.setGravity(
       btVector3(params_.gravity.x(), params_.gravity.y(), params_.gravity.z()));

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <optional>
 
+#include "hull_shape.h"
+
 namespace diorama {
 namespace {
 
@@ -178,20 +180,18 @@ std::optional<ConvexPart> part_of(const Node& node, const Mat3& stretch, ShapeCa
   if (collider.shape == ColliderShape::BoundingSphere) {
     return bounding_sphere_part(*node.mesh, node.mesh->bounds(), stretch);
   }
-  return hull_part(stretched(stretch, cache.hull_points(node.mesh)), max_points);
+  return hull_part(stretched(stretch, *cache.hull_points(node.mesh)), max_points);
 }
 
 std::unique_ptr<btConvexInternalShape> hull_shape(const std::vector<Vec3>& points,
                                                   const Rigid& body_from_part, double margin_m) {
-  auto shape = std::make_unique<btConvexHullShape>();
-  // Before the points: the shape keeps a box that includes the margin.
-  shape->setMargin(margin_m);
+  std::vector<btVector3> placed;
+  placed.reserve(points.size());
   for (const Vec3& point : points) {
-    const Vec3 placed = body_from_part * point;
-    shape->addPoint(btVector3(placed.x(), placed.y(), placed.z()), false);
+    const Vec3 p = body_from_part * point;
+    placed.emplace_back(p.x(), p.y(), p.z());
   }
-  shape->recalcLocalAabb();
-  return shape;
+  return std::make_unique<HullShape>(placed, margin_m);
 }
 
 /// A cone whose surface lies `margin` inside the wanted one, so that with Bullet's margin it is the

@@ -65,34 +65,57 @@ StaticMesh::StaticMesh(const Mesh& mesh, const Mat3& stretch, double margin_m) {
 ShapeCache::ShapeCache(std::size_t hull_points, double margin_m)
     : max_hull_points_(hull_points), margin_m_(margin_m) {}
 
-const std::vector<Vec3>& ShapeCache::hull_points(const std::shared_ptr<const Mesh>& mesh) {
-  Hull& entry = hulls_[mesh.get()];
-  if (entry.mesh.lock() == mesh) return entry.points;
-  entry.mesh = mesh;
-  entry.points.clear();
-  std::vector<Vec3> points = used_positions(*mesh);
-  Aabb box;
-  for (const Vec3& point : points) box.add(point);
-  const double extent = box.is_empty() ? 0.0 : box.size().maxCoeff();
-  if (extent > 0.0) {
-    // A relative thickness makes the hull of a sheet computable whatever the mesh's unit is.
-    entry.points = reduced_hull_points(thickened(points, 1e-4 * extent), max_hull_points_);
+std::shared_ptr<ShapeCache> ShapeCache::shared(std::size_t hull_points, double margin_m) {
+  static std::mutex mutex;
+  static std::map<std::pair<std::size_t, double>, std::weak_ptr<ShapeCache>> caches;
+  const std::lock_guard lock(mutex);
+  std::weak_ptr<ShapeCache>& known = caches[{hull_points, margin_m}];
+  std::shared_ptr<ShapeCache> cache = known.lock();
+  if (!cache) known = cache = std::make_shared<ShapeCache>(hull_points, margin_m);
+  return cache;
+}
+
+template <class Key, class Made, class Make>
+std::shared_ptr<const Made> ShapeCache::find(std::map<Key, Entry<Made>>& entries, const Key& key,
+                                             const std::shared_ptr<const Mesh>& mesh,
+                                             const Make& make) {
+  {
+    const std::lock_guard lock(mutex_);
+    const auto known = entries.find(key);
+    if (known != entries.end() && known->second.mesh.lock() == mesh) return known->second.made;
   }
-  return entry.points;
+  std::shared_ptr<const Made> made = make();
+  const std::lock_guard lock(mutex_);
+  Entry<Made>& entry = entries[key];
+  if (entry.mesh.lock() != mesh) entry = {mesh, std::move(made)};
+  return entry.made;
+}
+
+std::shared_ptr<const std::vector<Vec3>> ShapeCache::hull_points(
+    const std::shared_ptr<const Mesh>& mesh) {
+  return find(hulls_, mesh.get(), mesh, [&] {
+    const std::vector<Vec3> points = used_positions(*mesh);
+    Aabb box;
+    for (const Vec3& point : points) box.add(point);
+    const double extent = box.is_empty() ? 0.0 : box.size().maxCoeff();
+    using Hull = const std::vector<Vec3>;
+    if (!(extent > 0.0)) return std::make_shared<Hull>();
+    // A relative thickness makes the hull of a sheet computable whatever the mesh's unit is.
+    return std::make_shared<Hull>(
+        reduced_hull_points(thickened(points, 1e-4 * extent), max_hull_points_));
+  });
 }
 
 std::shared_ptr<const StaticMesh> ShapeCache::static_mesh(const std::shared_ptr<const Mesh>& mesh,
                                                           const Mat3& stretch) {
   TreeKey key{mesh.get(), {}};
   std::copy(stretch.data(), stretch.data() + 9, key.second.begin());
-  Tree& entry = trees_[key];
-  if (entry.made && entry.mesh.lock() == mesh) return entry.made;
-  entry.mesh = mesh;
-  entry.made = std::make_shared<const StaticMesh>(*mesh, stretch, margin_m_);
-  return entry.made;
+  return find(trees_, key, mesh,
+              [&] { return std::make_shared<const StaticMesh>(*mesh, stretch, margin_m_); });
 }
 
 void ShapeCache::forget_dead_meshes() {
+  const std::lock_guard lock(mutex_);
   erase_dead(hulls_);
   erase_dead(trees_);
 }

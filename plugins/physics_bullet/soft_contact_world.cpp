@@ -5,6 +5,7 @@
 #include <array>
 #include <optional>
 
+#include "hull_shape.h"
 #include "shape_cache.h"
 
 namespace diorama {
@@ -294,7 +295,7 @@ std::vector<btVector3> foot_points(const FixedContact& seen, const btVector3& ou
   if (shape->isPolyhedral()) {
     const auto& polyhedron = static_cast<const btPolyhedralConvexShape&>(*shape);
     // A hull carries its margin outside of its corners, a box inside.
-    const bool is_hull = shape->getShapeType() == CONVEX_HULL_SHAPE_PROXYTYPE;
+    const bool is_hull = shape->getShapeType() == HullShape::kShapeType;
     const btVector3 margin = outward * (is_hull ? shape->getMargin() : 0.0);
     for (int i = 0; i < polyhedron.getNumVertices(); ++i) {
       btVector3 corner;
