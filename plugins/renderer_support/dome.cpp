@@ -140,4 +140,39 @@ DomeTexture::DomeTexture(const Texture& source) : image_(source, kColumns * kMos
   }
 }
 
+std::shared_ptr<DomeCache> DomeCache::shared() {
+  static std::mutex mutex;
+  static std::weak_ptr<DomeCache> known;
+  const std::lock_guard lock(mutex);
+  std::shared_ptr<DomeCache> cache = known.lock();
+  if (!cache) known = cache = std::make_shared<DomeCache>();
+  return cache;
+}
+
+std::shared_ptr<const DomeTexture> DomeCache::dome_of(const std::shared_ptr<const Texture>& image) {
+  std::shared_ptr<Entry> entry;
+  {
+    const std::lock_guard lock(mutex_);
+    std::shared_ptr<Entry>& known = entries_[image.get()];
+    if (!known || known->image.lock() != image) {
+      known = std::make_shared<Entry>();
+      known->image = image;
+    }
+    entry = known;
+  }
+  std::call_once(entry->is_made,
+                 [&] { entry->dome = std::make_shared<const DomeTexture>(*image); });
+  return entry->dome;
+}
+
+void DomeCache::forget_dead_images() {
+  const std::lock_guard lock(mutex_);
+  std::erase_if(entries_, [](const auto& entry) { return entry.second->image.expired(); });
+}
+
+std::size_t DomeCache::size() const {
+  const std::lock_guard lock(mutex_);
+  return entries_.size();
+}
+
 }  // namespace diorama

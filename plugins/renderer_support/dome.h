@@ -3,6 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <map>
+#include <memory>
+#include <mutex>
 #include <vector>
 
 #include "diorama/light.h"
@@ -105,6 +109,28 @@ class DomeTexture {
   MipTexture image_;
   std::vector<SquareDistribution> patches_;
   std::vector<float> patch_power_;
+};
+
+/// Domes of images, for all renderers of the process: visits that go on side by side show the same
+/// skies. A dome stays as long as anybody else, a scene or a cache of assets, keeps its image. From
+/// any thread.
+class DomeCache {
+ public:
+  /// The library's only one, which lives as long as somebody holds it.
+  static std::shared_ptr<DomeCache> shared();
+
+  std::shared_ptr<const DomeTexture> dome_of(const std::shared_ptr<const Texture>& image);
+  void forget_dead_images();
+  std::size_t size() const;
+
+ private:
+  struct Entry {
+    std::weak_ptr<const Texture> image;
+    std::once_flag is_made;  ///< Others wait for the one who makes it.
+    std::shared_ptr<const DomeTexture> dome;
+  };
+  mutable std::mutex mutex_;
+  std::map<const Texture*, std::shared_ptr<Entry>> entries_;
 };
 
 inline SquareDistribution::Draw SquareDistribution::sample(const Vec2f& u) const {

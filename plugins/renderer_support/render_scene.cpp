@@ -76,7 +76,7 @@ bool RenderScene::take(const Scene& scene) {
   const std::vector<MeshInstance> previous = instances_;
   const std::vector<UsedMesh> previous_meshes = meshes_;  // that `previous` points to
   if (!has_same_shapes) {
-    std::erase_if(domes_, [](const auto& entry) { return entry.second.owner.expired(); });
+    domes_->forget_dead_images();
     assign_meshes(scene, placed);
     assign_materials(scene);
     pack_uvs();
@@ -102,7 +102,7 @@ void RenderScene::light(const Scene& scene, const SkyGrid::Sees& sees) {
 
 RenderScene::Kept RenderScene::kept() const {
   return {shading_meshes_.size() + bent_.size(), materials_.material_count(),
-          materials_.texture_count(), domes_.size(), materials_.albedo_row_count()};
+          materials_.texture_count(), domes_->size(), materials_.albedo_row_count()};
 }
 
 void RenderScene::collect(const Scene& scene, NodeId id, const Affine& world_from_parent,
@@ -259,12 +259,7 @@ void RenderScene::add_lights(const Scene& scene) {
     const Light& light = *scene[placed.node].light;
     std::shared_ptr<const DomeTexture> dome;
     if (light.kind == LightKind::Dome) {
-      const auto& image = light.texture ? light.texture : white_sky_;
-      CachedDome& cached = domes_[image.get()];
-      if (cached.owner.lock() != image) {
-        cached = {image, std::make_shared<const DomeTexture>(*image)};
-      }
-      dome = cached.dome;
+      dome = domes_->dome_of(light.texture ? light.texture : white_sky_);
     }
     lights_.add(light, placed.world_from_node, dome);
   }

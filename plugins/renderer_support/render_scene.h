@@ -64,11 +64,6 @@ class RenderScene {
   Kept kept() const;
 
  private:
-  /// Kept while anybody else, a scene or a cache of assets, keeps the image.
-  struct CachedDome {
-    std::weak_ptr<const Texture> owner;
-    std::shared_ptr<const DomeTexture> dome;
-  };
   /// A mesh or light of the scene's tree.
   struct Placed {
     NodeId node;
@@ -129,7 +124,7 @@ class RenderScene {
   };
   std::map<const Mesh*, BentMesh> bent_;
   std::uint64_t takes_ = 0;
-  std::map<const Texture*, CachedDome> domes_;
+  std::shared_ptr<DomeCache> domes_ = DomeCache::shared();
   std::shared_ptr<const Material> default_material_;
   std::shared_ptr<const Texture> white_sky_;  ///< Of domes without an image.
   std::vector<UsedMesh> meshes_;

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <set>
 #include <utility>
 
 #include "gpu_bytes.h"
@@ -49,6 +48,13 @@ MeshBytes bytes_of(const ShadingMesh& mesh) {
   return bytes;
 }
 
+/// Of textures whose words wait to be sent together.
+constexpr std::size_t kMostTexels = std::size_t(16) << 20;
+
+std::size_t texel_count(const MipTexture& texture) {
+  return std::size_t(texture.width()) * std::size_t(texture.height());
+}
+
 /// Levels' offsets, then their texels.
 std::vector<std::uint32_t> words_of(const MipTexture& texture) {
   std::vector<std::uint32_t> words(gpu::kMostLevels, 0);
@@ -86,81 +92,137 @@ std::vector<std::uint32_t> words_of(const MipTexture& texture) {
 
 }  // namespace
 
-template <class OnDevice>
-void GpuAssets::drop_unowned(Entries<OnDevice>& entries) {
-  std::erase_if(entries, [](const auto& entry) { return entry.second.owner.expired(); });
+template <class OnDevice, class Make>
+std::vector<std::shared_ptr<const OnDevice>> GpuAssets::take(
+    Entries<OnDevice>& entries, std::span<const std::shared_ptr<const void>> owners,
+    const Make& make) {
+  std::unique_lock lock(mutex_);
+  while (true) {
+    std::erase_if(entries, [](const auto& entry) { return entry.second.owner.expired(); });
+    std::vector<std::size_t> missing;
+    for (std::size_t i = 0; i < owners.size(); ++i) {
+      const bool is_new =
+          entries.try_emplace(owners[i].get(), Entry<OnDevice>{owners[i], {}}).second;
+      if (is_new) missing.push_back(i);
+    }
+    if (!missing.empty()) {
+      lock.unlock();
+      std::vector<std::shared_ptr<const OnDevice>> made;
+      try {
+        made = make(missing);
+      } catch (...) {
+        lock.lock();
+        for (const std::size_t i : missing) entries.erase(owners[i].get());
+        has_made_.notify_all();
+        throw;
+      }
+      lock.lock();
+      for (std::size_t k = 0; k < missing.size(); ++k) {
+        entries.at(owners[missing[k]].get()).on_device = std::move(made[k]);
+      }
+      has_made_.notify_all();
+    }
+    // Where another thread has failed, its entry is gone, and is made here.
+    const auto is_settled = [&](const std::shared_ptr<const void>& owner) {
+      const auto entry = entries.find(owner.get());
+      return entry == entries.end() || entry->second.on_device;
+    };
+    has_made_.wait(lock, [&] { return std::ranges::all_of(owners, is_settled); });
+    std::vector<std::shared_ptr<const OnDevice>> result;
+    for (const auto& owner : owners) {
+      const auto entry = entries.find(owner.get());
+      if (entry == entries.end()) break;
+      result.push_back(entry->second.on_device);
+    }
+    if (result.size() == owners.size()) return result;
+  }
 }
 
 std::vector<std::shared_ptr<const MeshOnDevice>> GpuAssets::take(
     std::span<const std::shared_ptr<const ShadingMesh>> meshes, Host& host) {
-  const std::lock_guard lock(mutex_);
-  drop_unowned(meshes_);
-  std::set<const void*> seen;
-  std::vector<const ShadingMesh*> missing;
-  for (const auto& mesh : meshes) {
-    const void* source = &mesh->source();
-    if (!meshes_.contains(source) && seen.insert(source).second) missing.push_back(mesh.get());
-  }
-  std::vector<MeshBytes> made(missing.size());
-  host.parallel_for(missing.size(), [&](std::size_t i) { made[i] = bytes_of(*missing[i]); });
-  constexpr int kTopLevels = 7;
-  std::vector<GpuBytes> blobs(missing.size());
-  std::vector<std::shared_ptr<MeshOnDevice>> placed;
+  std::vector<std::shared_ptr<const void>> owners;
+  for (const auto& mesh : meshes) owners.push_back(mesh->shared_source());
+  return take(meshes_, owners, [&](std::span<const std::size_t> missing) {
+    std::vector<MeshBytes> made(missing.size());
+    host.parallel_for(missing.size(),
+                      [&](std::size_t k) { made[k] = bytes_of(*meshes[missing[k]]); });
+    constexpr int kTopLevels = 7;
+    std::vector<GpuBytes> blobs(missing.size());
+    std::vector<std::shared_ptr<const MeshOnDevice>> placed;
+    std::vector<VulkanDevice::Transfer> transfers;
+    for (std::size_t k = 0; k < missing.size(); ++k) {
+      const ShadingMesh& mesh = *meshes[missing[k]];
+      const MeshBytes bytes = std::move(made[k]);
+      GpuBytes& blob = blobs[k];
+      const std::size_t nodes = blob.add(bytes.tree.nodes);
+      const std::size_t triangles = blob.add(bytes.triangles);
+      const std::size_t shading = blob.add(mesh.triangles());
+      const std::size_t uvs = blob.add(bytes.uvs);
+      const std::size_t colors = blob.add(bytes.colors);
+      auto on_device = std::make_shared<MeshOnDevice>();
+      on_device->memory = arena_.take(blob.bytes().size(), "a mesh and its tree");
+      on_device->top = bytes.tree.top(kTopLevels);
+      transfers.push_back({blob.bytes(), &on_device->memory.buffer(), on_device->memory.offset()});
+      const gpu::Address base = on_device->memory.address();
+      gpu::Instance& parts = on_device->parts;
+      parts.nodes = base + nodes;
+      parts.triangles = base + triangles;
+      parts.shading = base + shading;
+      parts.uvs = base + uvs;
+      parts.colors = base + colors;
+      parts.flags = (mesh.has_normals() ? gpu::kHasNormals : 0u) |
+                    (bytes.uvs.empty() ? 0u : gpu::kHasUvs) |
+                    (bytes.colors.empty() ? 0u : gpu::kHasColors) |
+                    (mesh.source().is_double_sided ? gpu::kDoubleSided : 0u);
+      placed.push_back(std::move(on_device));
+    }
+    device_.upload(transfers);
+    return placed;
+  });
+}
+
+std::vector<std::shared_ptr<const TextureOnDevice>> GpuAssets::take(
+    std::span<const OwnedTexture> textures, Host& host) {
+  std::vector<std::shared_ptr<const void>> owners;
+  for (const OwnedTexture& texture : textures) owners.push_back(texture.owner);
+  return take(textures_, owners, [&](std::span<const std::size_t> missing) {
+    std::vector<std::shared_ptr<const TextureOnDevice>> placed;
+    while (placed.size() < missing.size()) {
+      // As many as their words may wait for each other.
+      std::vector<const MipTexture*> group;
+      for (std::size_t texels = 0; texels < kMostTexels; texels += texel_count(*group.back())) {
+        const std::size_t next = placed.size() + group.size();
+        if (next == missing.size()) break;
+        group.push_back(textures[missing[next]].texture);
+      }
+      upload(group, host, placed);
+    }
+    return placed;
+  });
+}
+
+void GpuAssets::upload(std::span<const MipTexture* const> textures, Host& host,
+                       std::vector<std::shared_ptr<const TextureOnDevice>>& placed) {
+  std::vector<std::vector<std::uint32_t>> words(textures.size());
+  host.parallel_for(textures.size(), [&](std::size_t i) { words[i] = words_of(*textures[i]); });
   std::vector<VulkanDevice::Transfer> transfers;
-  for (std::size_t i = 0; i < missing.size(); ++i) {
-    const ShadingMesh& mesh = *missing[i];
-    const MeshBytes bytes = std::move(made[i]);
-    GpuBytes& blob = blobs[i];
-    const std::size_t nodes = blob.add(bytes.tree.nodes);
-    const std::size_t triangles = blob.add(bytes.triangles);
-    const std::size_t shading = blob.add(mesh.triangles());
-    const std::size_t uvs = blob.add(bytes.uvs);
-    const std::size_t colors = blob.add(bytes.colors);
-    auto on_device = std::make_shared<MeshOnDevice>();
-    on_device->memory = arena_.take(blob.bytes().size(), "a mesh and its tree");
-    on_device->top = bytes.tree.top(kTopLevels);
-    transfers.push_back({blob.bytes(), &on_device->memory.buffer(), on_device->memory.offset()});
-    const gpu::Address base = on_device->memory.address();
-    gpu::Instance& parts = on_device->parts;
-    parts.nodes = base + nodes;
-    parts.triangles = base + triangles;
-    parts.shading = base + shading;
-    parts.uvs = base + uvs;
-    parts.colors = base + colors;
-    parts.flags = (mesh.has_normals() ? gpu::kHasNormals : 0u) |
-                  (bytes.uvs.empty() ? 0u : gpu::kHasUvs) |
-                  (bytes.colors.empty() ? 0u : gpu::kHasColors) |
-                  (mesh.source().is_double_sided ? gpu::kDoubleSided : 0u);
+  for (std::size_t i = 0; i < textures.size(); ++i) {
+    const MipTexture& texture = *textures[i];
+    const auto bytes = std::as_bytes(std::span(words[i]));
+    auto on_device = std::make_shared<TextureOnDevice>();
+    on_device->memory = arena_.take(bytes.size(), "a texture");
+    transfers.push_back({bytes, &on_device->memory.buffer(), on_device->memory.offset()});
+    gpu::Texture& record = on_device->record;
+    record.texels = on_device->memory.address();
+    record.width = texture.width();
+    record.height = texture.height();
+    record.level_count = std::min(std::uint32_t(texture.level_count()), gpu::kMostLevels);
+    record.kind = texture.bytes(0).empty() ? gpu::kFloats
+                  : texture.is_srgb()      ? gpu::kSrgbBytes
+                                           : gpu::kLinearBytes;
     placed.push_back(std::move(on_device));
   }
   device_.upload(transfers);
-  for (std::size_t i = 0; i < missing.size(); ++i) {
-    meshes_[&missing[i]->source()] = {missing[i]->shared_source(), std::move(placed[i])};
-  }
-  std::vector<std::shared_ptr<const MeshOnDevice>> result;
-  for (const auto& mesh : meshes) result.push_back(meshes_.at(&mesh->source()).on_device);
-  return result;
-}
-
-std::shared_ptr<const TextureOnDevice> GpuAssets::take(const std::shared_ptr<const void>& owner,
-                                                       const MipTexture& texture) {
-  const std::lock_guard lock(mutex_);
-  drop_unowned(textures_);
-  Entry<TextureOnDevice>& entry = textures_[owner.get()];
-  if (entry.on_device) return entry.on_device;
-  const std::vector<std::uint32_t> words = words_of(texture);
-  auto on_device = std::make_shared<TextureOnDevice>();
-  on_device->memory = upload(std::as_bytes(std::span(words)), "a texture");
-  gpu::Texture& record = on_device->record;
-  record.texels = on_device->memory.address();
-  record.width = texture.width();
-  record.height = texture.height();
-  record.level_count = std::min(std::uint32_t(texture.level_count()), gpu::kMostLevels);
-  record.kind = texture.bytes(0).empty() ? gpu::kFloats
-                : texture.is_srgb()      ? gpu::kSrgbBytes
-                                         : gpu::kLinearBytes;
-  entry = {owner, std::move(on_device)};
-  return entry.on_device;
 }
 
 VulkanRange GpuAssets::upload(std::span<const std::byte> bytes, const char* what) {

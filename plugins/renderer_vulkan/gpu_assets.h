@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <condition_variable>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -41,9 +42,13 @@ class GpuAssets {
   /// In the order of `meshes`.
   std::vector<std::shared_ptr<const MeshOnDevice>> take(
       std::span<const std::shared_ptr<const ShadingMesh>> meshes, Host& host);
-  /// `owner`: of the image that the texture was made of.
-  std::shared_ptr<const TextureOnDevice> take(const std::shared_ptr<const void>& owner,
-                                              const MipTexture& texture);
+  struct OwnedTexture {
+    std::shared_ptr<const void> owner;  ///< Of the image that the texture was made of.
+    const MipTexture* texture = nullptr;
+  };
+  /// In the order of `textures`.
+  std::vector<std::shared_ptr<const TextureOnDevice>> take(std::span<const OwnedTexture> textures,
+                                                           Host& host);
   /// Memory for what else a scene has.
   VulkanRange upload(std::span<const std::byte> bytes, const char* what);
 
@@ -58,18 +63,25 @@ class GpuAssets {
   template <class OnDevice>
   struct Entry {
     std::weak_ptr<const void> owner;
-    std::shared_ptr<const OnDevice> on_device;
+    std::shared_ptr<const OnDevice> on_device;  ///< Null while a thread makes it.
   };
   /// By the address of what they were made of, which is valid while the owner lives.
   template <class OnDevice>
   using Entries = std::map<const void*, Entry<OnDevice>>;
-  template <class OnDevice>
-  static void drop_unowned(Entries<OnDevice>& entries);
+  /// Adds them to `placed`.
+  void upload(std::span<const MipTexture* const> textures, Host& host,
+              std::vector<std::shared_ptr<const TextureOnDevice>>& placed);
+  /// In the order of `owners`. make(missing) makes, in their order, those of the owners with these
+  /// places that nobody has made or is making; what others are making is waited for.
+  template <class OnDevice, class Make>
+  std::vector<std::shared_ptr<const OnDevice>> take(
+      Entries<OnDevice>& entries, std::span<const std::shared_ptr<const void>> owners,
+      const Make& make);
 
   const VulkanDevice& device_;
   VulkanArena arena_;
-  mutable std::mutex
-      mutex_;  ///< Of all below; also held while they are made, so that one makes them.
+  mutable std::mutex mutex_;  ///< Of all below; not held while something is made.
+  std::condition_variable has_made_;
   Entries<MeshOnDevice> meshes_;
   Entries<TextureOnDevice> textures_;
 };

@@ -169,10 +169,9 @@ void GpuScene::take_meshes(const RenderScene& scene) {
 }
 
 void GpuScene::take_textures(const RenderScene& scene) {
-  std::map<std::uint64_t, TextureInScene> used;
+  std::map<std::uint64_t, GpuAssets::OwnedTexture> used;
   const auto take = [&](const MipTexture& texture, const std::shared_ptr<const void>& owner) {
-    const auto [entry, is_new] = used.try_emplace(texture.number());
-    if (is_new) entry->second.on_device = assets_.take(owner, texture);
+    used.try_emplace(texture.number(), GpuAssets::OwnedTexture{owner, &texture});
   };
   for (const MeshInstance& instance : scene.instances()) {
     for (const ShadingMaterial* m : instance.materials) {
@@ -185,9 +184,15 @@ void GpuScene::take_textures(const RenderScene& scene) {
   for (const LightTable::Record& light : scene.lights().records()) {
     if (light.texture) take(light.texture->image(), light.texture);
   }
-  textures_ = std::move(used);
+  std::vector<GpuAssets::OwnedTexture> wanted;
+  for (const auto& [number, texture] : used) wanted.push_back(texture);
+  const auto on_device = assets_.take(wanted, host_);
+  textures_.clear();
   std::uint32_t place = 0;
-  for (auto& [number, texture] : textures_) texture.number = place++;
+  for (const auto& [number, texture] : used) {
+    textures_[number] = {on_device[place], place};
+    ++place;
+  }
 }
 
 void GpuScene::take_skies(const LightTable& lights) {
