@@ -119,7 +119,8 @@ TEST_CASE("Things are near each other by their triangles, not by their boxes", "
   CHECK(stage.all().near_node(stage.scene, needle, 0.0) == std::vector<NodeId>{cone});
 }
 
-TEST_CASE("How near stretched things are is how near points of their triangles are", "[obstacles]") {
+TEST_CASE("How near stretched things are is how near points of their triangles are",
+          "[obstacles]") {
   const Mesh egg = make_sphere(0.6, 20);
   const Mesh box = make_box(Vec3(0.5, 0.7, 0.3));
   Rng rng(11);
