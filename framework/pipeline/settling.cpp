@@ -11,6 +11,9 @@
 namespace diorama {
 namespace {
 
+/// So long must a thing move without getting anywhere.
+constexpr double kJitterS = 2.0;
+
 std::string number_text(const char* format, double number) {
   char text[64];
   std::snprintf(text, sizeof text, format, number);
@@ -194,24 +197,36 @@ double fastest_falling(const Scene& scene, const Room& room, const std::vector<N
 
 void JitterWatch::look(const Scene& scene, const Room& room, const std::vector<NodeId>& objects,
                        const LastStep& last, double rest_speed, double now_s) {
-  constexpr double kAwayM = 0.02;
   for (const NodeId object : objects) {
-    if (!falls_in(room, scene, object) || speed_of(scene, object, last) <= rest_speed) continue;
-    const Vec3 place = scene.world_from_node(object).translation();
-    const auto [it, is_new] = moving_.try_emplace(object, Moving{place, now_s, now_s});
-    Moving& moving = it->second;
-    const bool has_rested = now_s - moving.seen_s >= kRestS;
-    if (has_rested || (place - moving.from).norm() > kAwayM) moving = {place, now_s, now_s};
-    moving.seen_s = now_s;
+    if (!falls_in(room, scene, object)) continue;
+    const double speed = speed_of(scene, object, last);
+    if (speed <= rest_speed) continue;
+    std::deque<Sight>& sights = moving_[object];
+    if (!sights.empty() && now_s - sights.back().at_s >= kRestS) sights.clear();
+    const double way = sights.empty() ? 0.0 : speed * (now_s - sights.back().at_s);
+    sights.push_back({now_s, scene.world_from_node(object).translation(), way});
+    while (sights.size() > 1 && now_s - sights[1].at_s >= kJitterS) sights.pop_front();
   }
 }
 
+bool JitterWatch::gets_nowhere(const std::deque<Sight>& sights) {
+  constexpr double kPlaceM = 0.02;
+  constexpr double kShareOfWay = 0.2;
+  if (sights.back().at_s - sights.front().at_s < kJitterS) return false;
+  Aabb box;
+  double way = 0.0;
+  for (const Sight& sight : sights) {
+    box.add(sight.place);
+    way += sight.way_m;
+  }
+  return box.size().norm() <= std::max(kPlaceM, kShareOfWay * way);
+}
+
 bool JitterWatch::only_jitter_is_left(double now_s) const {
-  constexpr double kLongS = 2.0;
   bool moves = false;
-  for (const auto& [object, moving] : moving_) {
-    if (now_s - moving.seen_s >= kRestS) continue;
-    if (now_s - moving.since_s < kLongS) return false;
+  for (const auto& [object, sights] : moving_) {
+    if (now_s - sights.back().at_s >= kRestS) continue;
+    if (!gets_nowhere(sights)) return false;
     moves = true;
   }
   return moves;

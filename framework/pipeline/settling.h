@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <optional>
 #include <string>
@@ -130,16 +131,19 @@ class JitterWatch {
   void look(const Scene& scene, const Room& room, const std::vector<NodeId>& objects,
             const LastStep& last, double rest_speed, double now_s);
   /// Whether something moved in the last quarter of a second, and all that did has been doing so
-  /// for two seconds or more without getting 2 cm away.
+  /// for two seconds or more and got nowhere: the box of its places in that time measures 2 cm, or
+  /// a fifth of its way if that is more.
   bool only_jitter_is_left(double now_s) const;
 
  private:
-  struct Moving {
-    Vec3 from;             ///< World.
-    double since_s = 0.0;  ///< It has been near there.
-    double seen_s = 0.0;   ///< It was last seen moving.
+  /// Where a thing was seen moving.
+  struct Sight {
+    double at_s = 0.0;
+    Vec3 place;          ///< World.
+    double way_m = 0.0;  ///< Since the last one.
   };
-  std::map<NodeId, Moving> moving_;
+  static bool gets_nowhere(const std::deque<Sight>& sights);
+  std::map<NodeId, std::deque<Sight>> moving_;  ///< The last two seconds or so, without rest.
 };
 
 /// Where everything with a mesh stood, and whether it was visible, when a visit had been set up.

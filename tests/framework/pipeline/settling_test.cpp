@@ -105,6 +105,18 @@ TEST_CASE("What moves to and fro in place is not waited for, what gets somewhere
     RoomStage stage({{0, 0, 1}, {1, 0, 1}});
     CHECK(jitters_from(stage, jitter) == Approx(2.0).margin(0.3));
   }
+  SECTION("something that is shaken") {
+    RoomStage stage({{0, 0, 1}});
+    const auto shaken = [](double t) { return Vec3(0.025 * std::sin(20.0 * t), 0, 0.1); };
+    CHECK(jitters_from(stage, shaken) == Approx(2.5).margin(0.6));
+  }
+  SECTION("a ball that rolls to and fro in a bowl for a while") {
+    RoomStage stage({{0, 0, 1}});
+    const auto rolls = [](double t) {
+      return Vec3(0.05 * std::exp(-t) * std::sin(9.0 * t), 0, 0.1);
+    };
+    CHECK(jitters_from(stage, rolls) < 0.0);
+  }
   SECTION("jitter after a fall") {
     RoomStage stage({{0, 0, 1}});
     const double end =
