@@ -12,7 +12,7 @@ namespace diorama {
 namespace {
 
 /// So long must a thing move without getting anywhere.
-constexpr double kJitterS = 2.0;
+constexpr double kJitterS = 1.5;
 
 std::string number_text(const char* format, double number) {
   char text[64];

@@ -131,7 +131,7 @@ class JitterWatch {
   void look(const Scene& scene, const Room& room, const std::vector<NodeId>& objects,
             const LastStep& last, double rest_speed, double now_s);
   /// Whether something moved in the last quarter of a second, and all that did has been doing so
-  /// for two seconds or more and got nowhere: the box of its places in that time measures 2 cm, or
+  /// for a second and a half and got nowhere: the box of its places in that time measures 2 cm, or
   /// a fifth of its way if that is more.
   bool only_jitter_is_left(double now_s) const;
 
@@ -143,7 +143,7 @@ class JitterWatch {
     double way_m = 0.0;  ///< Since the last one.
   };
   static bool gets_nowhere(const std::deque<Sight>& sights);
-  std::map<NodeId, std::deque<Sight>> moving_;  ///< The last two seconds or so, without rest.
+  std::map<NodeId, std::deque<Sight>> moving_;  ///< The last seconds, without rest.
 };
 
 /// Where everything with a mesh stood, and whether it was visible, when a visit had been set up.
