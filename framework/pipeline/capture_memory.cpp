@@ -57,17 +57,17 @@ int default_visits_in_flight(int threads, std::uint64_t available_bytes,
                              const CaptureMemory& memory) {
   // Measured with furnished rooms: trees of the renderer and the physics, textures, work space.
   constexpr std::uint64_t kVisitBytes = std::uint64_t(256) << 20;
-  // One that renders feeds several threads; one that simulates keeps one busy.
-  const int wanted = threads == 1 ? 1 : threads / 2 + 1;
+  // One that simulates keeps one thread busy, and most of a job may be that.
   const std::uint64_t each = kVisitBytes + memory.capture + memory.picture;
-  return int(std::clamp<std::uint64_t>(available_bytes / 2 / each, 1, std::uint64_t(wanted)));
+  return int(std::clamp<std::uint64_t>(available_bytes / 2 / each, 1, std::uint64_t(threads)));
 }
 
 std::size_t default_queue_bytes(int threads, std::uint64_t available_bytes,
                                 const CaptureMemory& memory) {
   constexpr std::uint64_t kLeast = std::uint64_t(256) << 20;
-  // Turns that are not let through yet share half of the queue (see WriterQueue).
-  const std::uint64_t wanted = 4 * std::uint64_t(threads) * memory.capture;
+  // Turns that are not let through yet share half of the queue (see WriterQueue), most of it
+  // encoded: a quarter or less. One visit in fifty takes as long as all threads need for that.
+  const std::uint64_t wanted = 16 * std::uint64_t(threads) * memory.capture;
   return std::size_t(std::max(kLeast, std::min(wanted, available_bytes / 4)));
 }
 

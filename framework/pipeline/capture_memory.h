@@ -26,8 +26,8 @@ CaptureMemory capture_memory(const std::vector<Camera>& cameras, const NameSet& 
 int default_visits_in_flight(int threads, std::uint64_t available_bytes,
                              const CaptureMemory& memory);
 
-/// Memory for captures that wait to be written: enough for every thread to encode one while another
-/// waits for it, as far as a quarter of the memory allows, and never below 256 MiB.
+/// Memory for captures that wait to be written: enough for all threads to go on with later visits
+/// while one takes long, as far as a quarter of the memory allows, and never below 256 MiB.
 std::size_t default_queue_bytes(int threads, std::uint64_t available_bytes,
                                 const CaptureMemory& memory);
 

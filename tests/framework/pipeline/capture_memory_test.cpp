@@ -10,8 +10,8 @@ TEST_CASE("Visits in flight follow from threads as long as there is memory for t
   const CaptureMemory small{std::size_t(100) << 20, std::size_t(156) << 20};  // 512 MiB a visit
   CHECK(default_visits_in_flight(1, 100 * kGiB, small) == 1);
   CHECK(default_visits_in_flight(2, 100 * kGiB, small) == 2);
-  CHECK(default_visits_in_flight(4, 100 * kGiB, small) == 3);
-  CHECK(default_visits_in_flight(16, 100 * kGiB, small) == 9);
+  CHECK(default_visits_in_flight(4, 100 * kGiB, small) == 4);
+  CHECK(default_visits_in_flight(16, 100 * kGiB, small) == 16);
   CHECK(default_visits_in_flight(16, 4 * kGiB, small) == 4);
   CHECK(default_visits_in_flight(16, kGiB / 8, small) == 1);
   CHECK(default_visits_in_flight(16, 0, small) == 1);
@@ -23,7 +23,7 @@ TEST_CASE("Captures that wait may fill what threads keep busy, and no more than 
           "[memory]") {
   constexpr std::uint64_t kMiB = std::uint64_t(1) << 20;
   const CaptureMemory four_cameras{100 * kMiB, 156 * kMiB};
-  CHECK(default_queue_bytes(16, 100 * 1024 * kMiB, four_cameras) == 6400 * kMiB);
+  CHECK(default_queue_bytes(16, 200 * 1024 * kMiB, four_cameras) == 25600 * kMiB);
   CHECK(default_queue_bytes(16, 8 * 1024 * kMiB, four_cameras) == 2048 * kMiB);
   CHECK(default_queue_bytes(2, 100 * 1024 * kMiB, {kMiB, kMiB}) == 256 * kMiB);
   CHECK(default_queue_bytes(16, 0, four_cameras) == 256 * kMiB);
