@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <functional>
 #include <map>
+#include <optional>
 #include <set>
 #include <span>
 #include <utility>
@@ -141,6 +142,13 @@ NodeId stuck_in(const Scene& scene, NodeId object, const Obstacles& all,
     if (hit && ++crossed[hit->owner] >= kWitnesses) return hit->owner;
   }
   return sunk_in(scene, object, all, limits.depth_m);
+}
+
+std::optional<Flaw> stuck_flaw(const Scene& scene, NodeId object, const Obstacles& all,
+                               const SettleLimits& limits) {
+  const NodeId other = stuck_in(scene, object, all, limits);
+  if (!other) return std::nullopt;
+  return Flaw{object, "is stuck in " + scene.path(other)};
 }
 
 /// Whether the surface that a column met there is as good as a wall: what is above it slides past.
@@ -278,11 +286,22 @@ std::vector<Flaw> find_unsettled(const Scene& scene, const Room& room,
     } else if (const double speed = falls ? speed_of(scene, object, last) : 0.0;
                speed > limits.rest_speed) {
       flaws.push_back({object, speed_text(speed)});
-    } else if (const NodeId other = stuck_in(scene, object, all, limits)) {
-      flaws.push_back({object, "is stuck in " + scene.path(other)});
+    } else if (const auto stuck = stuck_flaw(scene, object, all, limits)) {
+      flaws.push_back(*stuck);
     } else if (falls && is_seen && !held.contains(object)) {
       flaws.push_back({object, "hangs in the air"});
     }
+  }
+  return flaws;
+}
+
+std::vector<Flaw> find_stuck(const Scene& scene, const std::vector<NodeId>& objects,
+                             const std::vector<NodeId>& asked, const SettleLimits& limits) {
+  std::vector<Flaw> flaws;
+  if (asked.empty()) return flaws;
+  const Obstacles all = all_obstacles(scene, objects, Obstacles::Hidden::LeaveOut);
+  for (const NodeId object : asked) {
+    if (const auto stuck = stuck_flaw(scene, object, all, limits)) flaws.push_back(*stuck);
   }
   return flaws;
 }

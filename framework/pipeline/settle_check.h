@@ -32,6 +32,10 @@ std::vector<Flaw> find_unsettled(const Scene& scene, const Room& room,
                                  const std::vector<NodeId>& objects, const LastStep& last,
                                  const SettleLimits& limits);
 
+/// Those of the `asked` objects that something crosses deep inside.
+std::vector<Flaw> find_stuck(const Scene& scene, const std::vector<NodeId>& objects,
+                             const std::vector<NodeId>& asked, const SettleLimits& limits);
+
 /// Objects that touch or stand inside something, hidden or not.
 std::vector<Flaw> find_born_inside(const Scene& scene, const std::vector<NodeId>& objects);
 

@@ -232,6 +232,25 @@ bool JitterWatch::only_jitter_is_left(double now_s) const {
   return moves;
 }
 
+std::vector<NodeId> PlaceWatch::settled_since(const Scene& scene, const Room& room,
+                                              const std::vector<NodeId>& objects) {
+  constexpr double kNearM = 0.02;
+  constexpr double kSameM = 0.001;
+  std::vector<NodeId> settled;
+  for (const NodeId object : objects) {
+    if (!falls_in(room, scene, object)) continue;
+    const Vec3 place = scene.world_from_node(object).translation();
+    const auto [it, is_new] = places_.try_emplace(object, Places{place});
+    Places& places = it->second;
+    const bool is_near = !is_new && (place - places.last).norm() < kNearM;
+    places.last = place;
+    if (!is_near || (place - places.named).norm() < kSameM) continue;
+    places.named = place;
+    settled.push_back(object);
+  }
+  return settled;
+}
+
 SceneAsSetUp::SceneAsSetUp(const Scene& scene) {
   for (const NodeId node : nodes_with_shape(scene)) {
     nodes_.emplace(node, std::pair(scene[node].parent_from_node.matrix(), scene[node].is_visible));

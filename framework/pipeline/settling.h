@@ -146,6 +146,22 @@ class JitterWatch {
   std::map<NodeId, std::deque<Sight>> moving_;  ///< The last seconds, without rest.
 };
 
+/// Tells which objects have come to a place where it can be asked whether they are stuck.
+class PlaceWatch {
+ public:
+  /// Those that fall, in the room, are less than 2 cm from where the last call found them, and were
+  /// not named at that place before.
+  std::vector<NodeId> settled_since(const Scene& scene, const Room& room,
+                                    const std::vector<NodeId>& objects);
+
+ private:
+  struct Places {
+    Vec3 last;  ///< World.
+    Vec3 named = Vec3::Constant(kInfinity);
+  };
+  std::map<NodeId, Places> places_;
+};
+
 /// Where everything with a mesh stood, and whether it was visible, when a visit had been set up.
 class SceneAsSetUp {
  public:

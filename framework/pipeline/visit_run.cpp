@@ -273,31 +273,32 @@ void VisitRun::reset_physics() {
 
 /// Takes the steps, and deals with what has not settled afterwards.
 void VisitRun::simulate(const TimelineStep& step) {
+  // What is stuck halfway, or what has not settled at the end.
   const auto take_steps = [&] {
-    if (step.camera_radius_m <= 0.0) return advance(step);
-    const std::vector<NodeId> spheres =
-        create_camera_spheres(cameras_, step.camera_radius_m, scene_);
-    reset_physics();
-    advance(step);
+    std::vector<NodeId> spheres;
+    if (step.camera_radius_m > 0.0) {
+      spheres = create_camera_spheres(cameras_, step.camera_radius_m, scene_);
+      reset_physics();
+    }
+    std::vector<Flaw> stuck = advance(step);
     for (const NodeId sphere : spheres) scene_.erase(sphere);
-    reset_physics();
+    if (!spheres.empty()) reset_physics();
+    if (!stuck.empty() || job_.settle.policy == "keep") return stuck;
+    return unsettled(step);
   };
-  take_steps();
+  std::vector<Flaw> flaws = take_steps();
   if (job_.settle.policy == "keep") return;
-  std::vector<Flaw> flaws = unsettled(step);
   if (job_.settle.policy == "respawn") {
     for (int i = 0; i < job_.settle.max_respawns && !flaws.empty(); ++i) {
       respawn(flaws);
-      take_steps();
-      flaws = unsettled(step);
+      flaws = take_steps();
     }
   }
   while (!flaws.empty()) {
     drop(flaws);
     // What lay on them falls.
     if (!step.until_rest) return;
-    take_steps();
-    flaws = unsettled(step);
+    flaws = take_steps();
   }
 }
 
@@ -315,7 +316,9 @@ std::vector<Flaw> VisitRun::unsettled(const TimelineStep& step) const {
   return flaws;
 }
 
-void VisitRun::advance(const TimelineStep& step) {
+/// Until rest it ends as soon as something is stuck and stays where it is: those things are
+/// returned. Nothing gets it out, and to simulate it takes ten times as long as all else.
+std::vector<Flaw> VisitRun::advance(const TimelineStep& step) {
   const Stopwatch watch(result_.seconds["simulating"]);
   const Room room(scene_, environment_);
   // Short enough that Ctrl-C is felt, and that the time to rest is known well.
@@ -330,7 +333,10 @@ void VisitRun::advance(const TimelineStep& step) {
   const auto is_at_rest = [&] {
     return simulated_s_ - std::max(start_s, moving_until_s_) >= kRestS - 1e-9;
   };
+  constexpr double kStuckLookS = 0.5;
   JitterWatch jitter;
+  PlaceWatch places;
+  double looked_s = start_s;
   for (int taken = 0; taken < step.steps;) {
     setting_.stop_if_asked();
     const int now = step.each_step.empty() ? std::min(kStepsAtOnce, step.steps - taken) : 1;
@@ -345,12 +351,18 @@ void VisitRun::advance(const TimelineStep& step) {
     if (fastest_falling(scene_, room, objects_, last_step()) > job_.settle.rest_speed) {
       moving_until_s_ = simulated_s_;
     }
-    if (!components_.physics) return;
+    if (!components_.physics) return {};
     if (!step.until_rest) continue;
     jitter.look(scene_, room, objects_, last_step(), job_.settle.rest_speed, simulated_s_);
     const bool is_over = is_at_rest() || jitter.only_jitter_is_left(simulated_s_);
-    if (taken >= step.at_least && is_over) return;
+    if (taken >= step.at_least && is_over) return {};
+    if (job_.settle.policy == "keep" || simulated_s_ - looked_s < kStuckLookS) continue;
+    looked_s = simulated_s_;
+    const std::vector<NodeId> settled = places.settled_since(scene_, room, objects_);
+    std::vector<Flaw> stuck = find_stuck(scene_, objects_, settled, {job_.settle.rest_speed});
+    if (!stuck.empty()) return stuck;
   }
+  return {};
 }
 
 /// Places the objects as the moment "environment" may place them, where they meet nothing; all else

@@ -83,7 +83,7 @@ class VisitRun {
                                             const std::optional<ClipFrame>& clip = {});
   LastStep last_step() const { return {before_last_step_, last_step_s_}; }
   void simulate(const TimelineStep& step);
-  void advance(const TimelineStep& step);
+  std::vector<Flaw> advance(const TimelineStep& step);
   std::vector<Flaw> unsettled(const TimelineStep& step) const;
   void respawn(const std::vector<Flaw>& flaws);
   void drop(const std::vector<Flaw>& flaws);

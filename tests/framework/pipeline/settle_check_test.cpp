@@ -74,8 +74,18 @@ TEST_CASE("What hangs, moves, is outside or sticks is named with the reason", "[
   const NodeId rolls = stage.add_object("rolls", make_sphere(0.1), at(2, 0, 0.1));
   stage.scene.edit(rolls).rigid_body->linear_velocity = Vec3(0.3, 0, 0);
   stage.add_object("gone", kBox, at(0, 0, -3));
-  stage.add_object("half_in", kBox, at(0.3, 0.3, 0.7));
-  stage.add_object("inside", make_sphere(0.05), at(0, 0, 0.35));
+  const NodeId half_in = stage.add_object("half_in", kBox, at(0.3, 0.3, 0.7));
+  const NodeId inside = stage.add_object("inside", make_sphere(0.05), at(0, 0, 0.35));
+  const auto stuck = [&](const std::vector<NodeId>& asked) {
+    std::vector<NodeId> nodes;
+    for (const Flaw& flaw : find_stuck(stage.scene, stage.objects, asked, {})) {
+      nodes.push_back(flaw.node);
+    }
+    return nodes;
+  };
+  CHECK(stuck(stage.objects) == std::vector<NodeId>{half_in, inside});
+  CHECK(stuck({rolls, inside}) == std::vector<NodeId>{inside});
+  CHECK(stuck({}).empty());
   CHECK(stage.unsettled() == Texts{"in_air: hangs in the air", "rolls: moves at 0.30 m/s",
                                    "gone: left the room", "half_in: is stuck in /Environment/table",
                                    "inside: is stuck in /Environment/table"});

@@ -154,6 +154,27 @@ TEST_CASE("What moves to and fro in place is not waited for, what gets somewhere
   }
 }
 
+TEST_CASE("Things are named where they stay, once, until they move on", "[settle]") {
+  RoomStage stage({{0, 0, 1}, {1, 0, 1}, {9, 0, 1}, {-1, 0, 1}});
+  stage.scene.edit(stage.objects[3]).rigid_body->has_gravity = false;
+  const Room room(stage.scene, stage.environment);
+  PlaceWatch watch;
+  const auto move = [&](const Vec3& to) {
+    stage.scene.set_pose(stage.objects[0], Affine(Eigen::Translation3d(to)));
+  };
+  const auto look = [&] { return watch.settled_since(stage.scene, room, stage.objects); };
+  CHECK(look().empty());
+  move({0, 0, 0.5});  // It falls; the others, but one outside and one that floats, stay.
+  CHECK(look() == std::vector<NodeId>{stage.objects[1]});
+  move({0.015, 0, 0.5});
+  CHECK(look() == std::vector<NodeId>{stage.objects[0]});
+  CHECK(look().empty());
+  move({0.0195, 0, 0.5});  // Not where it was named.
+  CHECK(look() == std::vector<NodeId>{stage.objects[0]});
+  move({0.5, 0, 0.5});
+  CHECK(look().empty());
+}
+
 TEST_CASE("Saved nodes come back as they were, all others stay as they are", "[settle]") {
   RoomStage stage({{0, 0, 1}, {1, 0, 1}});
   Scene& scene = stage.scene;
