@@ -526,15 +526,19 @@ TEST_CASE("Visits run ahead of a slow one only so far", "[pipeline]") {
   std::atomic<int> renders = 0;
   std::atomic<int> begun_early = 0;
   script.at = [&](const std::string& who, int visit) {
-    if (who == "physics" && visit == 0 && renders == 0) pause(60);
-    if (who == "render" && visit == 0) ++renders;
-    // Visit 0 ends after its six pictures.
-    if (who == "loader" && visit >= 4 && renders < 6) ++begun_early;
+    // Visit 0 ends after its six pictures, and is slow once its first capture has been written:
+    // before, nobody else may write. Two at a time, and eight times as many are begun.
+    if (who == "render" && visit == 0 && ++renders == 4) pause(700);
+    if (who == "loader" && visit >= 16 && renders < 6) ++begun_early;
   };
   Run run(script, 2, 2);
+  run.job.total_captures = 120;
+  std::vector<EnvironmentChoice> environments;
+  for (int i = 0; i < 20; ++i) environments.push_back({"room:" + std::to_string(i), 0});
+  run.plan = plan_captures(run.job, environments, {});
   run.go();
   CHECK(begun_early == 0);
-  CHECK(run.captures() == first_captures(23));
+  CHECK(run.captures() == first_captures(120));
 }
 
 TEST_CASE("Writers that want it get captures in their order", "[pipeline]") {
