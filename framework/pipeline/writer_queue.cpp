@@ -22,8 +22,9 @@ namespace {
 // Before all visits: what is written frees memory.
 constexpr int kSeatRank = 0;
 
-// Captures, and some for each thread: more under way serve nobody, and where they are small memory
-// would grow for thousands of them before the limit in bytes is met.
+// Captures, and as many for each thread: what all threads make while one visit takes long. More
+// under way serve nobody, and where they are small memory would grow for thousands of them before
+// the limit in bytes is met.
 constexpr int kMostWaiting = 64;
 
 /// What a transaction holds that is not on disk yet.
@@ -51,7 +52,7 @@ struct WriterQueue::State {
   State(const Options& given, Work consume)
       : options(given),
         work(std::move(consume)),
-        least_bytes(given.max_bytes / std::size_t(kMostWaiting + 8 * given.threads)) {}
+        least_bytes(given.max_bytes / std::size_t(kMostWaiting * (1 + given.threads))) {}
 
   void run() {
     std::unique_lock lock(mutex);
