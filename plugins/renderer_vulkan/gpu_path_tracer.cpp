@@ -236,7 +236,7 @@ void GpuPathTracer::write_inputs(const Pass& pass) {
   job_.ranges = job_.slots + slots;
   push_.job = inputs_.address();
   std::byte* to = inputs_from_host_.data();
-  std::memcpy(to, &job_, sizeof(job_));
+  std::memcpy(to, static_cast<const void*>(&job_), sizeof(job_));
   std::memcpy(to + kJobRoom, pass.slots.data(), slots);
   std::memcpy(to + kJobRoom + slots, pass.ranges.data(),
               pass.ranges.size() * sizeof(gpu::SlotRange));
