@@ -49,10 +49,6 @@ std::uint32_t GpuPathTracer::slots_for_device() const {
   return std::uint32_t(std::clamp<std::uint64_t>(share / kPathBytes / gpu::kGroup, 64, most));
 }
 
-std::size_t GpuPathTracer::working_bytes() const {
-  return inputs_.size() + columns_.size() + camera_rays_.size() + sums_.size() + film_.size();
-}
-
 std::vector<std::pair<std::string, double>> GpuPathTracer::device_seconds() const {
   if (!(device_.info().nanoseconds_per_tick > 0.0)) return {};
   return {{"transfers", seconds_[kTransfers]},
@@ -63,26 +59,19 @@ std::vector<std::pair<std::string, double>> GpuPathTracer::device_seconds() cons
           {"sums", seconds_[kSums]}};
 }
 
-void GpuPathTracer::grow(VulkanBuffer& buffer, std::size_t size, const char* what,
-                         VulkanBuffer::Place place) const {
-  if (buffer.size() >= size) return;
-  buffer = VulkanBuffer();
-  buffer = VulkanBuffer(device_, size, place, what);
-}
-
 void GpuPathTracer::make_room(std::uint32_t slots) {
   constexpr const char* kWhat = "light paths";
   const std::size_t paths = std::size_t(slots) * gpu::kGroup;
   const std::size_t inputs = kJobRoom + slots * (sizeof(gpu::SampleSlot) + sizeof(gpu::SlotRange));
-  grow(inputs_, inputs, kWhat);
-  grow(inputs_from_host_, inputs, kWhat, VulkanBuffer::Place::ToDevice);
-  grow(results_for_host_, kCountersRoom, kWhat, VulkanBuffer::Place::ToHost);
+  inputs_.grow(device_, inputs, VulkanBuffer::Place::Device, kWhat);
+  inputs_from_host_.grow(device_, inputs, VulkanBuffer::Place::ToDevice, kWhat);
+  results_for_host_.grow(device_, kCountersRoom, VulkanBuffer::Place::ToHost, kWhat);
   if (job_.has_camera_rays != 0) {
-    grow(camera_rays_, paths * gpu::kCameraRaySize, kWhat);
+    camera_rays_.grow(device_, paths * gpu::kCameraRaySize, VulkanBuffer::Place::Device, kWhat);
     job_.camera_rays = camera_rays_.address();
   }
   if (columns_.size() >= paths * kPathBytes && job_.capacity >= paths) return;
-  grow(columns_, paths * kPathBytes, kWhat);
+  columns_.grow(device_, paths * kPathBytes, VulkanBuffer::Place::Device, kWhat);
   job_.capacity = std::uint32_t(paths);
   gpu::Address place = columns_.address();
   const auto take = [&](std::size_t bytes_per_path) {
@@ -123,8 +112,9 @@ void GpuPathTracer::begin(const View& view, const PathSettings& settings, gpu::A
     job_.far = std::min(pinhole->far, gpu::kInfinite);
   }
   const std::size_t pixels = std::size_t(view.camera().width) * std::size_t(view.camera().height);
-  grow(sums_, pixels * sizeof(gpu::PixelSum), "the sums of a picture");
-  grow(film_, pixels * sizeof(FilmPixel), "a picture");
+  sums_.grow(device_, pixels * sizeof(gpu::PixelSum), VulkanBuffer::Place::Device,
+             "the sums of a picture");
+  film_.grow(device_, pixels * sizeof(FilmPixel), VulkanBuffer::Place::Device, "a picture");
   job_.sums = sums_.address();
   job_.film = film_.address();
   job_.pixel_count = std::uint32_t(pixels);
@@ -313,7 +303,7 @@ gpu::Address GpuPathTracer::record_film(VulkanCommands& commands) const {
 
 Film GpuPathTracer::film() {
   const std::size_t size = job_.pixel_count * sizeof(FilmPixel);
-  grow(results_for_host_, kCountersRoom + size, "a picture", VulkanBuffer::Place::ToHost);
+  results_for_host_.grow(device_, kCountersRoom + size, VulkanBuffer::Place::ToHost, "a picture");
   const auto record = [&](VulkanCommands& commands) {
     record_film(commands);
     commands.mark(kSums);

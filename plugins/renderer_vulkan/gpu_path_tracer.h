@@ -51,8 +51,6 @@ class GpuPathTracer {
   /// What the device was busy with since begin(), in seconds by its clock; nothing, where it has
   /// none.
   std::vector<std::pair<std::string, double>> device_seconds() const;
-  /// Bytes on the device beside the scene.
-  std::size_t working_bytes() const;
 
  private:
   /// What the device's clock is read for.
@@ -72,8 +70,6 @@ class GpuPathTracer {
     std::vector<SampleOrder> orders;  ///< Of the slots, where the processor makes the rays.
   };
   std::uint32_t slots_for_device() const;
-  void grow(VulkanBuffer& buffer, std::size_t size, const char* what,
-            VulkanBuffer::Place place = VulkanBuffer::Place::Device) const;
   void make_room(std::uint32_t slots);
   void add(const TraceJob& job, std::uint32_t begin, std::uint32_t end, Pass& pass) const;
   void make_camera_rays(const Pass& pass);

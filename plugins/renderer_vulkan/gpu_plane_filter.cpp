@@ -37,14 +37,10 @@ void GpuPlaneFilter::make_room(int width, int height) {
   constexpr const char* kWhat = "the filter of a picture";
   pixels_ = std::size_t(width) * std::size_t(height);
   blocks_ = blocks_of(width) * blocks_of(height);
-  const auto grow = [&](VulkanBuffer& buffer, std::size_t numbers, VulkanBuffer::Place place) {
-    if (buffer.size() >= numbers * sizeof(float)) return;
-    buffer = VulkanBuffer();
-    buffer = VulkanBuffer(device_, numbers * sizeof(float), place, kWhat);
-  };
-  grow(layers_, kPixelNumbers * pixels_ + kMeanNumbers * blocks_, VulkanBuffer::Place::Device);
-  grow(for_host_, std::max(kImageNumbers * pixels_, kMeanNumbers * blocks_),
-       VulkanBuffer::Place::ToHost);
+  layers_.grow(device_, (kPixelNumbers * pixels_ + kMeanNumbers * blocks_) * sizeof(float),
+               VulkanBuffer::Place::Device, kWhat);
+  for_host_.grow(device_, std::max(kImageNumbers * pixels_, kMeanNumbers * blocks_) * sizeof(float),
+                 VulkanBuffer::Place::ToHost, kWhat);
   push_.layers = layers_.address();
   push_.noise = push_.layers + kLayerNumbers * pixels_ * sizeof(float);
   push_.support = push_.noise + kNoiseNumbers * pixels_ * sizeof(float);

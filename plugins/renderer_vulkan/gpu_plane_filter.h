@@ -1,11 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <cstddef>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "diorama/host.h"
 #include "diorama/image.h"
@@ -29,8 +25,6 @@ class GpuPlaneFilter {
   /// What the device was busy with for the last picture, in seconds by its clock; 0 where it has
   /// none.
   double device_seconds() const { return seconds_; }
-  /// Bytes on the device.
-  std::size_t working_bytes() const { return layers_.size(); }
 
  private:
   void make_room(int width, int height);

@@ -153,10 +153,7 @@ void GpuScene::take(const RenderScene& scene) {
 
 VulkanDevice::Transfer GpuScene::transfer_to(VulkanBuffer& buffer, std::span<const std::byte> bytes,
                                              const char* what) const {
-  if (buffer.size() < bytes.size()) {
-    buffer = VulkanBuffer();
-    buffer = VulkanBuffer(device_, bytes.size(), VulkanBuffer::Place::Device, what);
-  }
+  buffer.grow(device_, bytes.size(), VulkanBuffer::Place::Device, what);
   return {bytes, &buffer, 0};
 }
 

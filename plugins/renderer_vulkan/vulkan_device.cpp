@@ -84,6 +84,14 @@ VulkanBuffer& VulkanBuffer::operator=(VulkanBuffer&& other) noexcept {
   return *this;
 }
 
+void VulkanBuffer::grow(const VulkanDevice& device, std::size_t size, Place place,
+                        const char* what) {
+  if (size_ >= size) return;
+  // The old memory goes back first.
+  *this = VulkanBuffer();
+  *this = VulkanBuffer(device, size, place, what);
+}
+
 VulkanKernel::VulkanKernel(const VulkanDevice& device, std::span<const std::uint32_t> code)
     : device_(device) {
   const VulkanDeviceFunctions& vk = device.functions();

@@ -32,6 +32,9 @@ class VulkanBuffer {
   VulkanBuffer(VulkanBuffer&& other) noexcept;
   VulkanBuffer& operator=(VulkanBuffer&& other) noexcept;
 
+  /// Makes it anew where it is smaller than that; what it held is gone then.
+  void grow(const VulkanDevice& device, std::size_t size, Place place, const char* what);
+
   std::size_t size() const { return size_; }
   VkBuffer handle() const { return buffer_; }
   VkDeviceAddress address() const { return address_; }
