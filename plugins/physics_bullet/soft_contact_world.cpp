@@ -442,9 +442,10 @@ void SoftContactWorld::repair_contacts(btPersistentManifold& manifold, double lo
     manifold.addManifoldPoint(*next);
   }
   const bool touches = !candidates_.empty() && candidates_.front().getDistance() < 0.0;
-  if (!touches && !rebuilt_.empty()) {
-    const FixedContact seen = *fixed(rebuilt_.front());
-    if (is_deep(seen, rebuilt_.front())) turn_deep_contact(seen, rebuilt_.front(), manifold);
+  // On fine meshes no corner lies over the triangles that are met.
+  for (std::size_t i = 0; !touches && i < rebuilt_.size(); ++i) {
+    const FixedContact seen = *fixed(rebuilt_[i]);
+    if (is_deep(seen, rebuilt_[i])) turn_deep_contact(seen, rebuilt_[i], manifold);
   }
   for (int i = 0; i < manifold.getNumContacts(); ++i) {
     btManifoldPoint& contact = manifold.getContactPoint(i);

@@ -273,6 +273,82 @@ TEST_CASE("a capsule comes to rest lying, on a mesh, on a box and half over an e
 
 namespace {
 
+/// A level square of squares of 5 mm, in an order in which neighbours are far from each other.
+Mesh fine_floor(int squares) {
+  Mesh mesh;
+  const int corners = squares + 1;
+  for (int i = 0; i < corners * corners; ++i) {
+    mesh.positions.push_back(
+        5e-3f * Vec3f(float(i % corners - squares / 2), float(i / corners - squares / 2), 0.0f));
+  }
+  const int count = squares * squares;
+  for (int i = 0; i < count; ++i) {
+    const int square = int(std::int64_t(i) * 7919 % count);
+    const auto a = std::uint32_t(square / squares * corners + square % squares);
+    const std::uint32_t c = a + std::uint32_t(corners);
+    mesh.triangles.push_back({a, a + 1, c + 1});
+    mesh.triangles.push_back({a, c + 1, c});
+  }
+  return mesh;
+}
+
+/// A box that leans: its top is shifted along x.
+Mesh leaning_box(const Vec3& size, float shift) {
+  Mesh mesh = make_box(size);
+  for (Vec3f& position : mesh.positions) {
+    if (position.z() > 0.0f) position.x() += shift;
+  }
+  return mesh;
+}
+
+}  // namespace
+
+TEST_CASE("what stands on thousands of triangles stands as on two", "[physics]") {
+  struct Case {
+    const char* name;
+    Mesh mesh;
+    double half_height;
+  };
+  const std::vector<Case> cases{
+      {"a board", make_box(Vec3(0.34, 0.23, 0.02)), 0.01},
+      {"a crate", make_box(Vec3(0.4, 0.4, 0.3)), 0.15},
+      // Its centre of mass is 20 mm from falling over.
+      {"a leaning box", leaning_box(Vec3(0.2, 0.2, 0.3), 0.16f), 0.15},
+  };
+  for (const Case& c : cases) {
+    for (const bool is_fine : {false, true}) {
+      CAPTURE(c.name, is_fine);
+      PhysicsWorld world;
+      world.add("floor", shared(is_fine ? fine_floor(140) : sheet(0.7, 0.7)),
+                ColliderShape::TriangleMesh, at(0, 0, 0));
+      const Affine pose = turned(Vec3(0.012, -0.021, c.half_height + 4e-3), 0.4, Vec3::UnitZ());
+      const NodeId thing = world.add("thing", shared(c.mesh), ColliderShape::ConvexHull, pose);
+      world.make_body(thing);
+      world.run(240);
+      CHECK(world.position(thing).z() == Approx(c.half_height).margin(2.5e-3));
+      const Eigen::Matrix3d turn =
+          world.scene.world_from_node(thing).linear() * pose.linear().transpose();
+      CHECK(Eigen::AngleAxisd(turn).angle() < 0.01);
+      CHECK(world.scene[thing].rigid_body->linear_velocity.norm() < 1e-3);
+      CHECK((world.position(thing) - pose.translation()).head<2>().norm() < 2e-3);
+    }
+  }
+}
+
+TEST_CASE("a hull gets out of a mesh of thousands of triangles", "[physics]") {
+  PhysicsWorld world;
+  world.add("floor", shared(fine_floor(140)), ColliderShape::TriangleMesh, at(0, 0, 0));
+  const NodeId crate =
+      world.add("crate", shared(make_box(Vec3(0.4, 0.4, 0.3))), ColliderShape::ConvexHull,
+                turned(Vec3(0, 0, 0.13), 0.4, Vec3::UnitZ()));
+  world.make_body(crate);
+  world.run(240);
+  CHECK(world.position(crate).z() == Approx(0.15).margin(2.5e-3));
+  CHECK(world.backend.report().max_penetration_m < 1e-3);
+}
+
+namespace {
+
 /// Things on each other, from a millimetre above each other on.
 struct Stack {
   const char* name;
