@@ -52,10 +52,16 @@ class ContactsOfTriangle final : public btManifoldResult {
   void addContactPoint(const btVector3& normal, const btVector3& place,
                        btScalar distance) override {
     if (distance > getPersistentManifold()->getContactBreakingThreshold()) return;
-    contacts_.add({normal, place, distance, triangle_.m_partId, triangle_.m_index});
+    contacts_.add({normal, place, distance, facing(normal), triangle_.m_partId, triangle_.m_index});
   }
 
  private:
+  btScalar facing(const btVector3& normal) const {
+    btVector3 across;
+    static_cast<const btTriangleShape&>(*triangle_.getCollisionShape()).calcNormal(across);
+    return btFabs((triangle_.getWorldTransform().getBasis() * across).dot(normal));
+  }
+
   const btCollisionObjectWrapper& triangle_;
   MeshContacts& contacts_;
 };
@@ -118,12 +124,14 @@ class MeshAlgorithm final : public btConvexConcaveCollisionAlgorithm {
 struct Candidate {
   btVector3 place;  ///< World.
   btScalar distance;
+  btScalar facing;     ///< 0 of what was kept.
   std::size_t number;  ///< Of those found, then of those kept.
 };
 
 /// Up to four: the first is one of the deepest, the farthest out of them, and each next one is far
 /// from those before it. What touches comes before what is only near. A body stands on the corners
-/// of what it touches, or it would rock.
+/// of what it touches, or it would rock. Of triangles that meet where a contact is, at an edge, it
+/// is that one's that faces it most: contacts are judged by their triangles later on.
 std::vector<Candidate> widest(const std::vector<Candidate>& candidates) {
   constexpr double kAsDeep = 5e-4;  // metres
   constexpr double kApart = 1e-3;   // metres
@@ -157,12 +165,21 @@ std::vector<Candidate> widest(const std::vector<Candidate>& candidates) {
     }
     return best;
   };
+  const auto most_facing = [&](const Candidate& at) {
+    Candidate most = at;
+    for (const Candidate& c : candidates) {
+      const bool is_there =
+          double(c.place.distance(at.place)) < kApart && c.distance < at.distance + kAsDeep;
+      if (is_there && c.facing > most.facing) most = c;
+    }
+    return most;
+  };
   std::vector<Candidate> chosen;
   while (chosen.size() < MANIFOLD_CACHE_SIZE) {
     const std::optional<std::size_t> best = next();
     if (!best) break;
     if (chosen.empty()) std::fill(gaps.begin(), gaps.end(), kInfinity);
-    chosen.push_back(candidates[*best]);
+    chosen.push_back(most_facing(candidates[*best]));
     for (std::size_t i = 0; i < candidates.size(); ++i) {
       gaps[i] = std::min(gaps[i], double(candidates[i].place.distance(chosen.back().place)));
     }
@@ -208,13 +225,16 @@ void MeshContacts::write(btManifoldResult& result, bool is_mesh_first) const {
   std::vector<btManifoldPoint> kept;
   for (int i = 0; i < manifold.getNumContacts(); ++i) kept.push_back(manifold.getContactPoint(i));
   std::vector<Candidate> candidates;
-  for (const Contact& c : found_) candidates.push_back({c.place, c.distance, candidates.size()});
+  for (const Contact& c : found_) {
+    candidates.push_back({c.place, c.distance, c.facing, candidates.size()});
+  }
   for (std::size_t i = 0; i < kept.size(); ++i) {
     const bool is_found_again = std::ranges::any_of(found_, [&](const Contact& c) {
       return c.place.distance(kept[i].m_positionWorldOnB) < reach;
     });
     if (is_found_again) continue;
-    candidates.push_back({kept[i].m_positionWorldOnB, kept[i].getDistance(), found_.size() + i});
+    candidates.push_back(
+        {kept[i].m_positionWorldOnB, kept[i].getDistance(), 0.0, found_.size() + i});
   }
   // Bullet makes its contact of what was found; together they would take each other's places.
   const std::vector<btManifoldPoint> before = kept;

@@ -19,6 +19,7 @@ class MeshContacts {
     btVector3 normal;  ///< World, of the second body of the result.
     btVector3 place;   ///< World, on that body.
     btScalar distance;
+    btScalar facing;  ///< Cosine between the contact's normal and the triangle's, without its sign.
     int part;
     int triangle;
   };
