@@ -159,18 +159,31 @@ std::uint32_t EmbreeScene::sees(std::span<const SkyGrid::Ray> rays) const {
   return lit;
 }
 
-const MeshInstance& EmbreeScene::instance_of(const RTCFilterFunctionNArguments* args, unsigned i) {
-  const auto& instances = *static_cast<const std::vector<MeshInstance>*>(args->geometryUserPtr);
+std::uint32_t EmbreeScene::number_of(const RTCFilterFunctionNArguments* args, unsigned i) {
   const unsigned shared = RTCHitN_instID(args->hit, args->N, i, 0);
   const bool is_shared = shared != RTC_INVALID_GEOMETRY_ID;
-  return instances[is_shared ? shared : RTCHitN_geomID(args->hit, args->N, i)];
+  return is_shared ? shared : RTCHitN_geomID(args->hit, args->N, i);
 }
 
-void EmbreeScene::pass_where_cut_out(const RTCFilterFunctionNArguments* args) {
+const MeshInstance& EmbreeScene::instance_of(const RTCFilterFunctionNArguments* args, unsigned i) {
+  const auto& instances = *static_cast<const std::vector<MeshInstance>*>(args->geometryUserPtr);
+  return instances[number_of(args, i)];
+}
+
+void EmbreeScene::pass_where_left_or_cut_out(const RTCFilterFunctionNArguments* args) {
+  const auto& meeting = *reinterpret_cast<const MeetingContext*>(args->context);
   for (unsigned i = 0; i < args->N; ++i) {
     if (args->valid[i] == 0) continue;
     const MeshInstance& instance = instance_of(args, i);
     const ShadingMesh::Point point = hit_point(args, i);
+    if (meeting.left_instances) {
+      const unsigned ray = RTCRayN_id(args->ray, args->N, i);
+      if (meeting.left_instances[ray] == std::int32_t(number_of(args, i)) &&
+          meeting.left_triangles[ray] == std::int32_t(point.triangle)) {
+        args->valid[i] = 0;
+        continue;
+      }
+    }
     const ShadingMaterial& material = instance.material(point.triangle);
     if (!material.is_cut_out) continue;
     const Vec2f uv = instance.uv(point.triangle, point.u, point.v);
@@ -227,8 +240,7 @@ void EmbreeScene::find_filters() {
   filters_.assign(scene_.meshes().size(), Filters());
   for (const MeshInstance& instance : instances()) {
     for (const ShadingMaterial* m : instance.materials) {
-      filters_[instance.mesh].cuts_out |= m->is_cut_out;
-      filters_[instance.mesh].attenuates |= m->dims_shadows;
+      filters_[instance.mesh].lets_through |= m->dims_shadows;
     }
   }
 }
@@ -236,9 +248,9 @@ void EmbreeScene::find_filters() {
 /// To be followed by a commit: Embree counts filters then.
 void EmbreeScene::set_filters(RTCGeometry geometry, const Filters& filters) const {
   rtcSetGeometryUserData(geometry, const_cast<std::vector<MeshInstance>*>(&instances()));
-  rtcSetGeometryIntersectFilterFunction(geometry, filters.cuts_out ? &pass_where_cut_out : nullptr);
-  rtcSetGeometryOccludedFilterFunction(geometry,
-                                       filters.attenuates ? &attenuate_shadow_ray : nullptr);
+  const bool is_asked = filters.lets_through;
+  rtcSetGeometryIntersectFilterFunction(geometry, is_asked ? &pass_where_left_or_cut_out : nullptr);
+  rtcSetGeometryOccludedFilterFunction(geometry, is_asked ? &attenuate_shadow_ray : nullptr);
 }
 
 void EmbreeScene::update_filters() {
@@ -474,9 +486,9 @@ EmbreeScene::SubScene::SubScene(const EmbreeScene& scene,
 float EmbreeScene::SubScene::distance(const Vec3f& origin, const Vec3f& direction, float t_min,
                                       float t_max) const {
   RTCRayHit ray = make_ray(origin, direction, t_min, t_max, kMoment);
-  embree::Context context;
-  embree::init(context);
-  embree::intersect(tree_.get(), context, ray);
+  MeetingContext meeting;
+  embree::init(meeting.context);
+  embree::intersect(tree_.get(), meeting.context, ray);
   const bool is_met = ray.hit.geomID != RTC_INVALID_GEOMETRY_ID;
   return is_met ? ray.ray.tfar : kInfinite;
 }

@@ -173,8 +173,7 @@ class EmbreeScene {
 
   /// Asked at the surfaces of a mesh.
   struct Filters {
-    bool cuts_out = false;
-    bool attenuates = false;
+    bool lets_through = false;  ///< Rays, some of them or in part.
     bool operator==(const Filters&) const = default;
   };
   /// An instance as Embree has it.
@@ -197,6 +196,13 @@ class EmbreeScene {
     embree::SceneHandle tree;
   };
 
+  /// Carried by rays that look for a surface: what they left, by their ids, or null.
+  struct MeetingContext {
+    embree::Context context;
+    const std::int32_t* left_instances = nullptr;
+    const std::int32_t* left_triangles = nullptr;
+  };
+
   /// Carried by shadow rays; the filter of the surfaces on their way attenuates what they carry.
   struct ShadowContext {
     embree::Context context;
@@ -213,8 +219,7 @@ class EmbreeScene {
   static RTCRayHit make_ray(const Vec3f& origin, const Vec3f& direction, float t_min, float t_max,
                             float time);
   void intersect(RTCScene tree, const BatchRays& rays, BatchHits& hits) const;
-  void intersect(RTCScene tree, RayPacket8& rays, bool is_coherent, std::size_t begin,
-                 BatchHits& hits) const;
+  void intersect(RTCScene tree, const BatchRays& rays, std::size_t begin, BatchHits& hits) const;
   RayHit intersect(RTCScene tree, const Vec3f& origin, const Vec3f& direction, float t_min,
                    float t_max, float time) const;
   template <int kWidth, class Lit>
@@ -224,8 +229,9 @@ class EmbreeScene {
   /// What Embree tells of an instance's triangle is in the space of the mesh.
   static Vec3f normal_in_world(const MeshInstance& instance, const Vec3f& normal, float time);
   /// Of one of the rays that a filter is called for.
+  static std::uint32_t number_of(const RTCFilterFunctionNArguments* args, unsigned i);
   static const MeshInstance& instance_of(const RTCFilterFunctionNArguments* args, unsigned i);
-  static void pass_where_cut_out(const RTCFilterFunctionNArguments* args);
+  static void pass_where_left_or_cut_out(const RTCFilterFunctionNArguments* args);
   static void attenuate_shadow_ray(const RTCFilterFunctionNArguments* args);
   bool is_shared(const MeshInstance& instance) const;
   void update_trees();
@@ -284,9 +290,9 @@ inline RTCRayHit EmbreeScene::make_ray(const Vec3f& origin, const Vec3f& directi
 inline RayHit EmbreeScene::intersect(RTCScene tree, const Vec3f& origin, const Vec3f& direction,
                                      float t_min, float t_max, float time) const {
   RTCRayHit ray = make_ray(origin, direction, t_min, t_max, time);
-  embree::Context context;
-  embree::init(context);
-  embree::intersect(tree, context, ray);
+  MeetingContext meeting;
+  embree::init(meeting.context);
+  embree::intersect(tree, meeting.context, ray);
   if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
   const auto point = point_on_triangle(ray.hit.primID, ray.hit.u, ray.hit.v);
   const bool is_shared = ray.hit.instID[0] != RTC_INVALID_GEOMETRY_ID;
@@ -357,13 +363,18 @@ inline void RayPacket<kWidth>::pad(std::uint32_t mask) {
   }
 }
 
-inline void EmbreeScene::intersect(RTCScene tree, RayPacket8& packet, bool is_coherent,
-                                   std::size_t begin, BatchHits& hits) const {
+/// Those from `begin` on, as many as a packet takes.
+inline void EmbreeScene::intersect(RTCScene tree, const BatchRays& from, std::size_t begin,
+                                   BatchHits& hits) const {
+  RayPacket8 packet;
+  packet.load(from, begin);
   packet.pad(~0u);
   RTCRayHit8& rays = packet.rays_;
-  embree::Context context;
-  embree::init(context);
-  embree::intersect(packet.valid_.data(), tree, context, rays, is_coherent);
+  MeetingContext meeting;
+  embree::init(meeting.context);
+  meeting.left_instances = &from.left_instance[begin];
+  meeting.left_triangles = &from.left_triangle[begin];
+  embree::intersect(packet.valid_.data(), tree, meeting.context, rays, from.is_coherent);
   for (std::size_t i = 0; i < RayPacket8::kSize; ++i) {
     const std::size_t to = begin + i;
     const bool is_met = rays.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
@@ -394,10 +405,8 @@ inline void EmbreeScene::intersect(RTCScene tree, RayPacket8& packet, bool is_co
 }
 
 inline void EmbreeScene::intersect(RTCScene tree, const BatchRays& rays, BatchHits& hits) const {
-  RayPacket8 packet;
   for (std::size_t begin = 0; begin < rays.count; begin += RayPacket8::kSize) {
-    packet.load(rays, begin);
-    intersect(tree, packet, rays.is_coherent, begin, hits);
+    intersect(tree, rays, begin, hits);
   }
 }
 

@@ -56,6 +56,7 @@ struct PathTracer::StraightPass {
   bool goes_on = false;       ///< Along this ray.
   Vec3f origin = Vec3f::Zero();
   Vec3f direction = Vec3f::Zero();
+  LeftTriangle left = {};
 };
 
 struct PathTracer::Batch : Vertices {
@@ -69,9 +70,9 @@ struct PathTracer::Batch : Vertices {
 
   BatchRays next_rays;
   std::array<Path*, kBatch> next_paths;
-  void go_on(Path& path, const Vec3f& from, const Vec3f& towards) {
+  void go_on(Path& path, const Vec3f& from, const Vec3f& towards, const LeftTriangle& left = {}) {
     next_paths[next_rays.count] = &path;
-    next_rays.add(from, towards, 0.0f, kInfinite, path.time);
+    next_rays.add(from, towards, 0.0f, kInfinite, path.time, left);
   }
 
   RayCounts counts;
@@ -89,6 +90,9 @@ inline void PathTracer::Batch::move(std::size_t from, std::size_t to) {
   normal.set(to, normal.at(from));
   is_back[to] = is_back[from];
   bsdf[to] = bsdf[from];
+  hits.distance[to] = hits.distance[from];
+  hits.number[to] = hits.number[from];
+  hits.triangle[to] = hits.triangle[from];
 }
 
 inline void PathTracer::add(Path& path, int bounce, const Vec3f& radiance) const {

@@ -73,6 +73,7 @@ void PathTracer::collect_emission(Path& path, const Vec3f& direction, const RayH
 }
 
 PathTracer::StraightPass PathTracer::pass_or_reflect(Path& path, const Vec3f& direction,
+                                                     const RayHit& hit,
                                                      const SurfaceGeometry& surface,
                                                      const ShadingMaterial& material,
                                                      SurfaceBsdf& bsdf) const {
@@ -80,7 +81,15 @@ PathTracer::StraightPass PathTracer::pass_or_reflect(Path& path, const Vec3f& di
   const Vec2f u = path.sampler.next();
   const auto pass = [&]() -> StraightPass {
     const bool goes_on = ++path.straight_passes <= kMaxStraightPasses;
-    return {false, goes_on, leave(surface, direction), direction};
+    const Vec3f step = step_off(surface.position, surface.flat_normal);
+    const float back = step_back(surface.flat_normal, step, direction, hit.distance);
+    if (back < 0.0f) return {false, goes_on, leave(surface, direction), direction, {}};
+    path.since_last -= back;
+    return {false,
+            goes_on,
+            surface.position - back * direction,
+            direction,
+            {std::int32_t(hit.number), std::int32_t(hit.triangle)}};
   };
   float rest = u.x();
   if (material.is_blended) {
@@ -117,7 +126,7 @@ PathTracer::StraightPass PathTracer::pass_or_reflect(Path& path, const Vec3f& di
   path.is_camera_ray = false;
   ++path.bounce;
   const bool goes_on = surface.flat_normal.dot(reflection) > 0.0f;
-  return {false, goes_on, leave(surface, reflection), unit(reflection)};
+  return {false, goes_on, leave(surface, reflection), unit(reflection), {}};
 }
 
 void PathTracer::read_textures(const Path& path, const Vec3f& direction, const RayHit& hit,

@@ -265,8 +265,10 @@ inline bool PathTracer::evaluate_material(Batch& v, std::size_t i) const {
     v.normal.set(i, surface.normal);
   }
   if (!material.is_thin_glass && !material.is_blended) return true;
-  const StraightPass pass_through = pass_or_reflect(path, direction, surface, material, bsdf);
-  if (pass_through.goes_on) v.go_on(path, pass_through.origin, pass_through.direction);
+  const StraightPass pass_through = pass_or_reflect(path, direction, hit, surface, material, bsdf);
+  if (pass_through.goes_on) {
+    v.go_on(path, pass_through.origin, pass_through.direction, pass_through.left);
+  }
   return pass_through.is_scattered;
 }
 
@@ -368,7 +370,12 @@ inline void PathTracer::scatter(Batch& v, std::size_t i) const {
   if ((v.flat_normal.at(i).dot(direction) <= 0.0f) != next.is_transmitted) return;
   path.hides_lights =
       path.is_soft(settings_) && (std::isinf(next.density) || (next.is_transmitted && is_soft));
-  go_on(v, i, next, v.leave(i, direction), direction);
+  const float back = step_back(v.flat_normal.at(i), v.step.at(i), direction, v.hits.distance[i]);
+  if (!next.is_transmitted || back < 0.0f) {
+    return go_on(v, i, next, v.leave(i, direction), direction);
+  }
+  go_on(v, i, next, v.position.at(i) - back * direction, direction,
+        {v.hits.number[i], v.hits.triangle[i]});
 }
 
 /// What Vertices finds of the way to the light for other surfaces.
@@ -410,7 +417,7 @@ inline void PathTracer::queue_shadow_ray(Batch& v, std::size_t i) const {
 }
 
 inline void PathTracer::go_on(Batch& v, std::size_t i, const BsdfSample& next, const Vec3f& origin,
-                              const Vec3f& direction) const {
+                              const Vec3f& direction, const LeftTriangle& behind) const {
   if (!(next.weight.maxCoeff() > 0.0f)) return;
   Path& path = *v.paths[i];
   path.throughput = path.throughput.cwiseProduct(next.weight);
@@ -430,7 +437,7 @@ inline void PathTracer::go_on(Batch& v, std::size_t i, const BsdfSample& next, c
   path.last_density = next.density;
   path.since_last = 0.0f;
   path.spread = std::max(path.spread, next.spread);
-  v.go_on(path, origin, direction);
+  v.go_on(path, origin, direction, behind);
 }
 
 }  // namespace diorama

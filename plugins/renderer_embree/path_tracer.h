@@ -85,7 +85,7 @@ class PathTracer {
   void take_light_samples(const Batch& v, std::size_t i) const;
   void queue_shadow_ray(Batch& v, std::size_t i) const;
   void go_on(Batch& v, std::size_t i, const BsdfSample& next, const Vec3f& origin,
-             const Vec3f& direction) const;
+             const Vec3f& direction, const LeftTriangle& behind = {}) const;
   static void sort_by_light(Batch& v);
   template <int kPacketSize>
   void trace_shadow_rays(Batch& v) const;
@@ -94,8 +94,9 @@ class PathTracer {
   // `direction`: of the ray that met the surface.
   void collect_emission(Path& path, const Vec3f& direction, const RayHit& hit,
                         const SurfaceGeometry& surface, const ShadingMaterial& material) const;
-  StraightPass pass_or_reflect(Path& path, const Vec3f& direction, const SurfaceGeometry& surface,
-                               const ShadingMaterial& material, SurfaceBsdf& bsdf) const;
+  StraightPass pass_or_reflect(Path& path, const Vec3f& direction, const RayHit& hit,
+                               const SurfaceGeometry& surface, const ShadingMaterial& material,
+                               SurfaceBsdf& bsdf) const;
   void read_textures(const Path& path, const Vec3f& direction, const RayHit& hit,
                      const SurfaceGeometry& surface, const ShadingMaterial& material, bool is_soft,
                      SurfaceBsdf& bsdf, Vec3f& normal) const;

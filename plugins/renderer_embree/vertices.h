@@ -24,6 +24,16 @@ inline Vec3f leave(const Vec3f& position, const Vec3f& flat_normal, const Vec3f&
   return position + (towards.dot(flat_normal) < 0.0f ? -step : step);
 }
 
+/// How far before a surface a ray begins that goes on through it, as it may touch another thing
+/// there: a glass stands on a table. Below 0: beyond it, as the ray that met it began close by and
+/// the two would be met in turns.
+inline float step_back(const Vec3f& flat_normal, const Vec3f& step, const Vec3f& towards,
+                       float met_after) {
+  const float cosine = std::max(0.1f, std::abs(towards.dot(flat_normal)));
+  const float reach = std::sqrt(step.squaredNorm()) / cosine;
+  return met_after < reach ? -1.0f : 0.25f * reach;
+}
+
 /// LobeWeights of a batch, but for glass, whose paths are scattered one by one.
 struct BatchLobes {
   BatchVectors diffuse, f0, multiple;

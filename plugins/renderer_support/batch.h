@@ -31,6 +31,12 @@ struct BatchVectors {
   }
 };
 
+/// What a ray that goes on through a surface does not meet again; -1: it meets everything.
+struct LeftTriangle {
+  std::int32_t instance = -1;
+  std::int32_t triangle = -1;
+};
+
 /// Rays of a batch, side by side.
 struct BatchRays {
   std::size_t count = 0;
@@ -39,13 +45,17 @@ struct BatchRays {
   BatchVectors direction;  ///< Unit.
   BatchFloats t_min, t_max;
   BatchFloats time;  ///< Share of the shutter's window.
+  BatchInts left_instance, left_triangle;
 
-  void add(const Vec3f& from, const Vec3f& towards, float begin, float end, float when) {
+  void add(const Vec3f& from, const Vec3f& towards, float begin, float end, float when,
+           const LeftTriangle& left = {}) {
     origin.set(count, from);
     direction.set(count, towards);
     t_min[count] = begin;
     t_max[count] = end;
     time[count] = when;
+    left_instance[count] = left.instance;
+    left_triangle[count] = left.triangle;
     ++count;
   }
 };

@@ -10,9 +10,11 @@ layout(local_size_x = 64) in;
 #include "surfaces.glsl"
 #include "rays.glsl"
 
-Hit closest(vec3 origin, vec3 direction, float t_min, float t_max, float time) {
+Hit closest(vec3 origin, vec3 direction, float t_min, float t_max, float time, uint left_instance,
+            uint left_triangle) {
   Hit hit = Hit(kInfinite, 0.0, 0.0, kNone, 0u);
   TRAVERSE(
+      if (instance == left_instance && triangle == left_triangle) continue;
       if ((flags & kCutsOut) != 0u && is_absent(instance, number, u, v)) continue;
       t_max = t;
       hit = Hit(t, u, v, instance, triangle);)
@@ -23,8 +25,12 @@ void main() {
   if (gl_GlobalInvocationID.x >= job.counters.path_count) return;
   const uint path = job.queues[queue].v[gl_GlobalInvocationID.x];
   const vec4 range = STATE(kFootprint, path);
-  const Hit hit = closest(STATE(kOrigin, path).xyz, STATE(kDirection, path).xyz, range.z, range.w,
-                          STATE(kSampler, path).w);
+  const vec4 origin = STATE(kOrigin, path);
+  const bool leaves = (floatBitsToUint(origin.w) & kLeavesTriangle) != 0u;
+  const Hit hit = closest(origin.xyz, STATE(kDirection, path).xyz, leaves ? 0.0 : range.z,
+                          leaves ? kInfinite : range.w, STATE(kSampler, path).w,
+                          leaves ? floatBitsToUint(range.z) : kNone,
+                          leaves ? floatBitsToUint(range.w) : kNone);
   job.hits.v[path] = vec4(hit.t, hit.u, hit.v, uintBitsToFloat(hit.instance));
   job.hit_triangles.v[path] = hit.triangle;
 }

@@ -100,7 +100,8 @@ const uint kDirection = 1u;   // and metres since the last vertex
 const uint kThroughput = 2u;  // and what was left behind the first surface
 const uint kLastPosition = 3u;  // and its total score
 const uint kLastNormal = 4u;    // and the density of the direction from there
-const uint kFootprint = 5u;     // width, spread, and the ray's range
+// Width, spread, and the ray's range; or, of one that goes on through a surface, what it left.
+const uint kFootprint = 5u;
 const uint kSampler = 6u;       // key, dimension, place, and the time
 const uint kStateColumns = 7u;
 
@@ -109,6 +110,7 @@ const uint kHasScattered = 1u << 17;
 const uint kHidesLights = 1u << 18;
 const uint kLastTwoSided = 1u << 19;
 const uint kHasSurface = 1u << 20;
+const uint kLeavesTriangle = 1u << 21;  // which it does not meet again
 
 #define STATE(column, path) job.state.v[(column) * job.capacity + (path)]
 #define RESULT(column, path) job.results.v[(column) * job.capacity + (path)]

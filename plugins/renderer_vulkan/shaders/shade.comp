@@ -32,6 +32,8 @@ struct Path {
   float spread;
   Sampler random;
   float time;  // share of the shutter's window
+  uint left_instance;  // with kLeavesTriangle
+  uint left_triangle;
   // What is added to its result.
   vec3 seen;
   vec3 scattered;
@@ -57,6 +59,9 @@ struct SurfacePoint {
   vec2 uv;
   float uv_per_metre;
   bool is_back;
+  float met_after;  // by the ray
+  uint instance;
+  uint triangle;  // among those of its tree
 };
 
 bool has(Path path, uint flag) { return (path.flags & flag) != 0u; }
@@ -87,6 +92,7 @@ Path load_path(uint index) {
   path.random =
       Sampler(floatBitsToUint(s6.x), floatBitsToUint(s6.y), floatBitsToUint(s6.z));
   path.time = s6.w;
+  path.flags &= ~kLeavesTriangle;
   path.seen = vec3(0.0);
   path.scattered = vec3(0.0);
   path.records = false;
@@ -94,7 +100,9 @@ Path load_path(uint index) {
 }
 
 void store_path(uint index, Path path) {
-  uint flags = path.flags & (kIsCameraRay | kHasScattered | kHidesLights | kHasSurface);
+  const bool leaves = has(path, kLeavesTriangle);
+  uint flags = path.flags &
+               (kIsCameraRay | kHasScattered | kHidesLights | kHasSurface | kLeavesTriangle);
   flags |= uint(path.bounce) | path.passes << 8;
   if (path.last.is_two_sided) flags |= kLastTwoSided;
   STATE(kOrigin, index) = vec4(path.origin, uintBitsToFloat(flags));
@@ -102,7 +110,9 @@ void store_path(uint index, Path path) {
   STATE(kThroughput, index) = vec4(path.throughput, path.left_by_first);
   STATE(kLastPosition, index) = vec4(path.last.position, path.last.total_score);
   STATE(kLastNormal, index) = vec4(path.last.normal, path.last_density);
-  STATE(kFootprint, index) = vec4(path.width, path.spread, 0.0, kInfinite);
+  STATE(kFootprint, index) =
+      vec4(path.width, path.spread, leaves ? uintBitsToFloat(path.left_instance) : 0.0,
+           leaves ? uintBitsToFloat(path.left_triangle) : kInfinite);
   STATE(kSampler, index) =
       vec4(uintBitsToFloat(path.random.key), uintBitsToFloat(path.random.dimension),
            uintBitsToFloat(path.random.place), path.time);
@@ -220,9 +230,24 @@ const uint kScattered = 0u;
 const uint kGoesOn = 1u;
 const uint kEnds = 2u;
 
+// Where a path begins that goes on through the surface; see step_back() of renderer_embree.
+vec3 go_through(inout Path path, SurfacePoint s, vec3 towards, out float back) {
+  const float cosine = max(0.1, abs(dot(towards, s.flat_normal)));
+  const float reach = step_length(s.position) / cosine;
+  back = 0.0;
+  if (s.met_after < reach) return leave(s.position, s.flat_normal, towards);
+  path.flags |= kLeavesTriangle;
+  path.left_instance = s.instance;
+  path.left_triangle = s.triangle;
+  back = 0.25 * reach;
+  return s.position - back * towards;
+}
+
 void pass(inout Path path, SurfacePoint s, out uint what) {
   what = ++path.passes <= kMostStraightPasses ? kGoesOn : kEnds;
-  path.origin = leave(s.position, s.flat_normal, path.direction);
+  float back;
+  path.origin = go_through(path, s, path.direction, back);
+  path.since_last -= back;
 }
 
 uint pass_or_reflect(inout Path path, uint material, uint material_flags, SurfacePoint s,
@@ -361,8 +386,14 @@ bool scatter(inout Path path, SurfacePoint s, Surface surface, inout ShadowRay s
     if ((dot(s.flat_normal, direction) <= 0.0) != next.is_transmitted) return false;
     const bool hides = is_soft(path) && (next.density >= kInfinite || (next.is_transmitted && was_soft));
     path.flags = hides ? path.flags | kHidesLights : path.flags & ~kHidesLights;
-    return go_on(path, next.weight, next.density, next.spread, u0.y,
-                 leave(s.position, s.flat_normal, direction), direction);
+    vec3 origin;
+    if (next.is_transmitted) {
+      float back;
+      origin = go_through(path, s, direction, back);
+    } else {
+      origin = leave(s.position, s.flat_normal, direction);
+    }
+    return go_on(path, next.weight, next.density, next.spread, u0.y, origin, direction);
   }
 
   if (!has(path, kHasSurface) && !is_mirror(bsdf)) record(path, s, albedo(bsdf));
@@ -388,6 +419,9 @@ SurfacePoint surface_of(Path path, vec4 hit, uint instance, uint flags, uint num
                         vec3 triangle_normal) {
   SurfacePoint s;
   s.position = path.origin + hit.x * path.direction;
+  s.met_after = hit.x;
+  s.instance = instance;
+  s.triangle = triangle;
   const float area2 = dot(triangle_normal, triangle_normal);
   const vec3 flat_normal = area2 > 0.0 ? triangle_normal * (1.0 / sqrt(area2)) : -path.direction;
   const float facing = dot(flat_normal, path.direction);

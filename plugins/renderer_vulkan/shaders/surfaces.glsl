@@ -88,11 +88,9 @@ vec3 normal_in_world(uint instance, vec3 n) {
   return cross(c1, c2) * n.x + cross(c2, c0) * n.y + cross(c0, c1) * n.z;
 }
 
-vec3 step_off(vec3 position, vec3 flat_normal) {
-  return (2e-5 * (1.0 + largest(abs(position)))) * flat_normal;
-}
+float step_length(vec3 position) { return 2e-5 * (1.0 + largest(abs(position))); }
 vec3 leave(vec3 position, vec3 flat_normal, vec3 towards) {
-  const vec3 off = step_off(position, flat_normal);
+  const vec3 off = step_length(position) * flat_normal;
   return position + (dot(towards, flat_normal) < 0.0 ? -off : off);
 }
 

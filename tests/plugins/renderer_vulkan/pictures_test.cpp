@@ -219,6 +219,72 @@ TEST_CASE("surfaces of every kind look as Embree's", "[vulkan]") {
   }
 }
 
+namespace {
+
+/// A slab on a table, `gap_m` above it, seen from above through nothing but its top.
+TestWorld slab_on_table(const Material& material, double gap_m) {
+  TestWorld world;
+  world.add(dome(1.0f));
+  world.add("table", make_box(Vec3(4, 4, 0.5)), matte(0.5f), at(0, 0, -0.25));
+  world.add("slab", make_box(Vec3(1.4, 1.4, 0.02)), material, at(0, 0, 0.01 + gap_m));
+  return world;
+}
+
+float mean_of(const Image<Vec3f>& picture) {
+  Vec3f sum = Vec3f::Zero();
+  for (const Vec3f& pixel : picture.pixels()) sum += pixel;
+  return sum.mean() / float(picture.pixels().size());
+}
+
+}  // namespace
+
+TEST_CASE("what touches glass from behind is seen through it", "[vulkan]") {
+  struct Case {
+    const char* name;
+    Material material;
+    double least;  ///< Of the brightness of the same, lifted by 2 mm.
+  };
+  Material clear;
+  clear.base_color.setOnes();
+  clear.specular = 0.0f;
+  Material pane = clear;
+  pane.transmission = 1.0f;
+  pane.is_thin_walled = true;
+  Material veil = clear;
+  veil.opacity = 0.3f;
+  Material glass = clear;
+  glass.transmission = 1.0f;
+  glass.roughness = 0.0f;
+  // Light from what touches solid glass begins inside of it, and part of it stays there.
+  const std::vector<Case> cases{
+      {"pane", pane, 0.96}, {"veil", veil, 0.88}, {"solid glass", glass, 0.5}};
+  PictureParams params = reference(64, 8);
+  params.caustics = true;
+  const NameSet channels{std::string(kColorHdr.name)};
+  for (const Case& c : cases) {
+    const auto means_at = [&](double gap_m) {
+      TestWorld world = slab_on_table(c.material, gap_m);
+      const NodeId camera = world.add_camera(20, 14, 30.0, Vec3(0.2, -0.5, 0.9), Vec3(0, 0, 0));
+      std::vector<float> means{
+          mean_of(render_by_embree(world.scene, camera, params, channels).get(kColorHdr))};
+      if (test::has_vulkan_device()) {
+        means.push_back(
+            mean_of(render_by_vulkan(world.scene, camera, params, channels).get(kColorHdr)));
+      }
+      return means;
+    };
+    const std::vector<float> lifted = means_at(2e-3);
+    for (const double gap_m : {0.0, 2e-5}) {
+      const std::vector<float> touching = means_at(gap_m);
+      CAPTURE(c.name, gap_m, touching, lifted);
+      for (std::size_t i = 0; i < touching.size(); ++i) {
+        CHECK(touching[i] > c.least * lifted[i]);
+        CHECK(touching[i] < 1.08 * lifted[i]);
+      }
+    }
+  }
+}
+
 TEST_CASE("textures and colours of corners look as Embree's", "[vulkan]") {
   if (!test::has_vulkan_device()) return;
   const std::vector<std::pair<const char*, std::function<void(Material&)>>> materials{
