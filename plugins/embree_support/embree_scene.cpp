@@ -99,7 +99,7 @@ void EmbreeScene::check_device(const char* action) const {
                   (error == RTC_ERROR_OUT_OF_MEMORY ? ", out of memory)" : ")"));
 }
 
-void EmbreeScene::take(const Scene& scene) {
+void EmbreeScene::take(const Scene& scene, const std::function<void()>& beside) {
   const bool was_ready = std::exchange(is_ready_, false);
   bool has_changed = false;
   {
@@ -109,20 +109,27 @@ void EmbreeScene::take(const Scene& scene) {
   if (!has_changed && was_ready) {
     times_.tree_s = times_.lights_s = 0.0;
     is_ready_ = true;
-    return;
+    return beside();
   }
   moving_tree_.reset();
   if (!was_ready) tree_.reset();  // what an error left half made
-  {
+  const auto make_trees = [&] {
     const Stopwatch watch(times_.tree_s);
     update_trees();
     blur();
+  };
+  const bool is_lit = scene_.is_lit();
+  if (is_lit) {
+    host_.parallel_for(2, [&](std::size_t i) { i == 0 ? make_trees() : beside(); });
+  } else {
+    make_trees();
   }
   {
     const Stopwatch watch(times_.lights_s);
     scene_.light(scene, [this](std::span<const SkyGrid::Ray> rays) { return sees(rays); });
   }
   is_ready_ = true;
+  if (!is_lit) beside();
 }
 
 // A mesh pressed nearly flat is met in world space: rays lose too much on their way into its own.

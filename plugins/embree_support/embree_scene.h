@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <span>
@@ -104,7 +105,10 @@ class EmbreeScene {
   EmbreeScene(const EmbreeScene&) = delete;
   EmbreeScene& operator=(const EmbreeScene&) = delete;
 
-  void take(const Scene& scene);
+  /// `beside` is called once render_scene() is as the scene is, on another thread while the trees
+  /// are made, if the lights can do without these.
+  void take(
+      const Scene& scene, const std::function<void()>& beside = [] {});
 
   /// Wall time of the last take().
   struct Times {

@@ -138,8 +138,7 @@ std::size_t PathRenderer::working_bytes(const Camera& camera, const NameSet& cha
 void PathRenderer::do_prepare(const Scene& scene) {
   counts_ = {};
   seen_by_ = {};
-  meshes_.take(scene);
-  prepare_paths();
+  meshes_.take(scene, [&] { prepare_paths(); });
   if (meshes_.lights().is_empty()) {
     host_.log(LogLevel::Warning, "the scene has no light: pictures will be black");
   }

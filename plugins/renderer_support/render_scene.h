@@ -34,6 +34,8 @@ class RenderScene {
   /// Makes the tables of lights, if anything they depend on has changed. `sees` asks for the rays
   /// of SkyGrid among what is not movable.
   void light(const Scene& scene, const SkyGrid::Sees& sees);
+  /// Whether light() has nothing to do.
+  bool is_lit() const { return !needs_light_; }
 
   /// Those of the scene that was taken in; see Scene::pose_revision.
   std::uint64_t pose_revision() const { return pose_revision_; }

@@ -84,7 +84,7 @@ double share_of_raw_rays(const Scene& scene, NodeId camera, Host& host,
 /// Wall time from a change of the scene to the first ray: all that has a rigid body has moved.
 double update_seconds(Scene& scene, PathRenderer& renderer) {
   std::vector<double> times;
-  for (int i = 0; i < 5; ++i) {
+  for (int i = 0; i < 25; ++i) {
     for (const NodeId node : scene.match("/room/*")) {
       if (!scene[node].rigid_body) continue;
       Affine pose = scene[node].parent_from_node;
@@ -192,6 +192,8 @@ void run(const Options& options) {
     if (options.device < 0)
       line["raw_ray_share"] = share_of_raw_rays(scene, camera, host, options.params);
     line["update_wall_s"] = update_seconds(scene, renderer);
+    for (const auto& [phase, seconds] : renderer.report().seconds)
+      line["update_s"][phase] = seconds;
     std::printf("%s\n", line.dump().c_str());
   }
 }
