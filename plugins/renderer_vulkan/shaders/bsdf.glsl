@@ -244,24 +244,28 @@ vec4 evaluate_lobes(Bsdf b, vec3 wi) {
   const float cos_over_pi = wi.z * (1.0 / kPi);
   const vec3 h = unit(b.wo + wi);
   const float cos_h = max(0.0, dot(b.wo, h));
-  const float white = fresnel_share(b, cos_h);
-
-  const float d = ggx_distribution(h.z, b.alpha) / (4.0 * b.wo.z);
-  const float lambda_i = ggx_lambda(wi.z, b.alpha);
-  const float visible = d / (1.0 + b.lambda_o);
-  const float facets = stacks ? visible / (1.0 + lambda_i) : d / (1.0 + b.lambda_o + lambda_i);
-  const float past_coat = stacks ? 1.0 : 1.0 - max(b.seen.z, at_wi.z);
-  vec3 f_cos = (past_coat * facets) * (b.f0 * (1.0 - white) + vec3(b.f90 * white));
-  float density = b.p_facets * visible;
-
-  const float coat_d = ggx_distribution(h.z, b.coat_alpha) / (4.0 * b.wo.z);
-  const float coat_lambda_i = ggx_lambda(wi.z, b.coat_alpha);
-  const float coat_visible = coat_d / (1.0 + b.coat_lambda_o);
-  const float coat_facets = stacks ? 0.25 * coat_visible / (1.0 + coat_lambda_i)
-                                   : coat_d / (1.0 + b.coat_lambda_o + coat_lambda_i);
-  const float coat_white = kCoatF0 + (1.0 - kCoatF0) * schlick_weight(cos_h);
-  f_cos += vec3(b.coat * coat_white * coat_facets);
-  density += b.p_coat * coat_visible;
+  vec3 f_cos = vec3(0.0);
+  float density = 0.0;
+  if (b.layer_rows != 0u) {
+    const float white = fresnel_share(b, cos_h);
+    const float d = ggx_distribution(h.z, b.alpha) / (4.0 * b.wo.z);
+    const float lambda_i = ggx_lambda(wi.z, b.alpha);
+    const float visible = d / (1.0 + b.lambda_o);
+    const float facets = stacks ? visible / (1.0 + lambda_i) : d / (1.0 + b.lambda_o + lambda_i);
+    const float past_coat = stacks ? 1.0 : 1.0 - max(b.seen.z, at_wi.z);
+    f_cos = (past_coat * facets) * (b.f0 * (1.0 - white) + vec3(b.f90 * white));
+    density = b.p_facets * visible;
+  }
+  if (b.coat > 0.0) {
+    const float coat_d = ggx_distribution(h.z, b.coat_alpha) / (4.0 * b.wo.z);
+    const float coat_lambda_i = ggx_lambda(wi.z, b.coat_alpha);
+    const float coat_visible = coat_d / (1.0 + b.coat_lambda_o);
+    const float coat_facets = stacks ? 0.25 * coat_visible / (1.0 + coat_lambda_i)
+                                     : coat_d / (1.0 + b.coat_lambda_o + coat_lambda_i);
+    const float coat_white = kCoatF0 + (1.0 - kCoatF0) * schlick_weight(cos_h);
+    f_cos += vec3(b.coat * coat_white * coat_facets);
+    density += b.p_coat * coat_visible;
+  }
 
   f_cos += (missing(b.seen) * missing(at_wi) / b.mean_missing * cos_over_pi) * b.multiple;
   f_cos += (through(b, wi, cos_h, at_wi) * cos_over_pi) * b.diffuse;
