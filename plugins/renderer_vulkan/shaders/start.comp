@@ -64,7 +64,9 @@ bool start(uint path) {
 
 void main() {
   const uint path = gl_GlobalInvocationID.x;
-  for (uint k = 0u; k < 4u; ++k) RESULT(k, path) = vec4(0.0);
+  // The others are read where a surface has been recorded.
+  RESULT(0u, path) = vec4(0.0);
+  RESULT(1u, path) = vec4(0.0);
   const bool is_under_way = start(path);
   uint place;
   APPEND(job.counters.next_count, is_under_way, place)
