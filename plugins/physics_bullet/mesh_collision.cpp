@@ -51,7 +51,8 @@ class ContactsOfTriangle final : public btManifoldResult {
 
   void addContactPoint(const btVector3& normal, const btVector3& place,
                        btScalar distance) override {
-    if (distance > getPersistentManifold()->getContactBreakingThreshold()) return;
+    // Nor what is no number.
+    if (!(distance <= getPersistentManifold()->getContactBreakingThreshold())) return;
     contacts_.add({normal, place, distance, facing(normal), triangle_.m_partId, triangle_.m_index});
   }
 
