@@ -244,28 +244,28 @@ void EmbreeScene::update_trees() {
 
 /// Trees have the filters that any instance of their mesh needs: filters look at the material.
 void EmbreeScene::find_filters() {
-  filters_.assign(scene_.meshes().size(), Filters());
+  lets_through_.assign(scene_.meshes().size(), 0);
   for (const MeshInstance& instance : instances()) {
     for (const ShadingMaterial* m : instance.materials) {
-      filters_[instance.mesh].lets_through |= m->dims_shadows;
+      if (m->dims_shadows) lets_through_[instance.mesh] = 1;
     }
   }
 }
 
 /// To be followed by a commit: Embree counts filters then.
-void EmbreeScene::set_filters(RTCGeometry geometry, const Filters& filters) const {
+void EmbreeScene::set_filters(RTCGeometry geometry, bool lets_through) const {
   rtcSetGeometryUserData(geometry, const_cast<std::vector<MeshInstance>*>(&instances()));
-  const bool is_asked = filters.lets_through;
-  rtcSetGeometryIntersectFilterFunction(geometry, is_asked ? &pass_where_left_or_cut_out : nullptr);
-  rtcSetGeometryOccludedFilterFunction(geometry, is_asked ? &attenuate_shadow_ray : nullptr);
+  rtcSetGeometryIntersectFilterFunction(geometry,
+                                        lets_through ? &pass_where_left_or_cut_out : nullptr);
+  rtcSetGeometryOccludedFilterFunction(geometry, lets_through ? &attenuate_shadow_ray : nullptr);
 }
 
 void EmbreeScene::update_filters() {
   for (std::size_t i = 0; i < placed_.size(); ++i) {
-    const Filters& filters = filters_[instances()[i].mesh];
-    if (!placed_[i].geometry || placed_[i].filters == filters) continue;
-    placed_[i].filters = filters;
-    if (!placed_[i].is_shared) set_filters(placed_[i].geometry.get(), filters);
+    const bool lets_through = lets_through_[instances()[i].mesh] != 0;
+    if (!placed_[i].geometry || placed_[i].lets_through == lets_through) continue;
+    placed_[i].lets_through = lets_through;
+    if (!placed_[i].is_shared) set_filters(placed_[i].geometry.get(), lets_through);
     rtcCommitGeometry(placed_[i].geometry.get());
   }
 }
@@ -276,9 +276,9 @@ void EmbreeScene::update_shared_trees() {
     if (count < 2) continue;
     const auto known = shared_trees_.find(mesh.get());
     if (known == shared_trees_.end()) {
-      shared_trees_.emplace(mesh.get(), make_shared_tree(mesh, filters_[i]));
-    } else if (known->second.filters != filters_[i]) {
-      known->second.filters = filters_[i];
+      shared_trees_.emplace(mesh.get(), make_shared_tree(mesh, lets_through_[i] != 0));
+    } else if (known->second.lets_through != (lets_through_[i] != 0)) {
+      known->second.lets_through = lets_through_[i] != 0;
       commit(known->second);
     }
   }
@@ -293,8 +293,8 @@ void EmbreeScene::forget_shared_trees() {
 }
 
 EmbreeScene::SharedTree EmbreeScene::make_shared_tree(std::shared_ptr<const ShadingMesh> mesh,
-                                                      const Filters& filters) const {
-  SharedTree shared{std::move(mesh), {}, filters, nullptr, nullptr};
+                                                      bool lets_through) const {
+  SharedTree shared{std::move(mesh), {}, lets_through, nullptr, nullptr};
   const Mesh& source = shared.mesh->source();
   shared.positions = room_for(source);
   place(source, Eigen::Matrix3f::Identity(), Vec3f::Zero(), shared.positions);
@@ -308,7 +308,7 @@ EmbreeScene::SharedTree EmbreeScene::make_shared_tree(std::shared_ptr<const Shad
 }
 
 void EmbreeScene::commit(const SharedTree& shared) const {
-  set_filters(shared.geometry.get(), shared.filters);
+  set_filters(shared.geometry.get(), shared.lets_through);
   rtcCommitGeometry(shared.geometry.get());
   rtcCommitScene(shared.tree.get());
   check_device("build the tree of a mesh");
@@ -348,7 +348,7 @@ void EmbreeScene::attach(const std::vector<std::size_t>& changed) {
     placed.mesh = scene_.meshes()[instance.mesh].shading;
     placed.is_movable = instance.is_movable;
     placed.is_shared = is_shared(instance);
-    placed.filters = filters_[instance.mesh];
+    placed.lets_through = lets_through_[instance.mesh] != 0;
     if (placed.is_shared || !placed.is_movable) {
       placed.linear = instance.linear;
       placed.translation = instance.translation;
@@ -369,7 +369,7 @@ void EmbreeScene::attach(const std::vector<std::size_t>& changed) {
                                                             ? RTC_BUILD_QUALITY_REFIT
                                                             : RTC_BUILD_QUALITY_MEDIUM);
       set_positions(placed.geometry.get(), 0, placed.positions);
-      set_filters(placed.geometry.get(), placed.filters);
+      set_filters(placed.geometry.get(), placed.lets_through);
     }
     rtcSetGeometryMask(placed.geometry.get(), placed.is_movable ? kMovableMask : kStaticMask);
     rtcCommitGeometry(placed.geometry.get());
@@ -475,7 +475,7 @@ embree::GeometryHandle EmbreeScene::make_moving(std::uint32_t number) {
     place(instance.source(), linear, translation, positions);
     set_positions(geometry.get(), step, positions);
   }
-  if (!is_shared) set_filters(geometry.get(), filters_[instance.mesh]);
+  if (!is_shared) set_filters(geometry.get(), lets_through_[instance.mesh] != 0);
   rtcCommitGeometry(geometry.get());
   return geometry;
 }

@@ -175,11 +175,6 @@ class EmbreeScene {
   static constexpr std::uint32_t kStaticMask = 1;
   static constexpr std::uint32_t kMovableMask = 2;
 
-  /// Asked at the surfaces of a mesh.
-  struct Filters {
-    bool lets_through = false;  ///< Rays, some of them or in part.
-    bool operator==(const Filters&) const = default;
-  };
   /// An instance as Embree has it.
   struct Placed {
     std::shared_ptr<const ShadingMesh> mesh;
@@ -188,14 +183,14 @@ class EmbreeScene {
     Eigen::Matrix3f linear = Eigen::Matrix3f::Identity();  ///< The pose that it has there.
     Vec3f translation = Vec3f::Zero();
     std::vector<float> positions;  ///< x, y, z per vertex in the world; empty if is_shared.
-    Filters filters;               ///< Of its mesh.
+    bool lets_through = false;     ///< Rays, some or in part, by any of its materials.
     embree::GeometryHandle geometry;
   };
   /// The tree of a mesh that is used several times, in its own space.
   struct SharedTree {
     std::shared_ptr<const ShadingMesh> mesh;
     std::vector<float> positions;
-    Filters filters;
+    bool lets_through = false;
     embree::GeometryHandle geometry;
     embree::SceneHandle tree;
   };
@@ -240,12 +235,11 @@ class EmbreeScene {
   bool is_shared(const MeshInstance& instance) const;
   void update_trees();
   void find_filters();
-  void set_filters(RTCGeometry geometry, const Filters& filters) const;
+  void set_filters(RTCGeometry geometry, bool lets_through) const;
   void update_filters();
   void update_shared_trees();
   void forget_shared_trees();
-  SharedTree make_shared_tree(std::shared_ptr<const ShadingMesh> mesh,
-                              const Filters& filters) const;
+  SharedTree make_shared_tree(std::shared_ptr<const ShadingMesh> mesh, bool lets_through) const;
   void commit(const SharedTree& shared) const;
   std::vector<std::size_t> changed_instances();
   void attach(const std::vector<std::size_t>& changed);
@@ -262,7 +256,7 @@ class EmbreeScene {
   embree::DeviceHandle device_;
   std::map<const ShadingMesh*, SharedTree> shared_trees_;
   std::vector<Placed> placed_;  ///< By the numbers of the instances, which are those of geometries.
-  std::vector<Filters> filters_;  ///< By the numbers of the meshes.
+  std::vector<std::uint8_t> lets_through_;  ///< By the numbers of the meshes.
   embree::SceneHandle tree_;
   /// Vertices of what moves in the shutter's window, at equal steps through it.
   std::vector<std::vector<float>> moving_positions_;

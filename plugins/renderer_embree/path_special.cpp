@@ -81,15 +81,11 @@ PathTracer::StraightPass PathTracer::pass_or_reflect(Path& path, const Vec3f& di
   const Vec2f u = path.sampler.next();
   const auto pass = [&]() -> StraightPass {
     const bool goes_on = ++path.straight_passes <= kMaxStraightPasses;
-    const Vec3f step = step_off(surface.position, surface.flat_normal);
-    const float back = step_back(surface.flat_normal, step, direction, hit.distance);
-    if (back < 0.0f) return {false, goes_on, leave(surface, direction), direction, {}};
-    path.since_last -= back;
-    return {false,
-            goes_on,
-            surface.position - back * direction,
-            direction,
-            {std::int32_t(hit.number), std::int32_t(hit.triangle)}};
+    const Onward onward = go_through(
+        surface.position, surface.flat_normal, step_off(surface.position, surface.flat_normal),
+        direction, hit.distance, {std::int32_t(hit.number), std::int32_t(hit.triangle)});
+    path.since_last -= onward.back;
+    return {false, goes_on, onward.origin, direction, onward.left};
   };
   float rest = u.x();
   if (material.is_blended) {

@@ -370,12 +370,10 @@ inline void PathTracer::scatter(Batch& v, std::size_t i) const {
   if ((v.flat_normal.at(i).dot(direction) <= 0.0f) != next.is_transmitted) return;
   path.hides_lights =
       path.is_soft(settings_) && (std::isinf(next.density) || (next.is_transmitted && is_soft));
-  const float back = step_back(v.flat_normal.at(i), v.step.at(i), direction, v.hits.distance[i]);
-  if (!next.is_transmitted || back < 0.0f) {
-    return go_on(v, i, next, v.leave(i, direction), direction);
-  }
-  go_on(v, i, next, v.position.at(i) - back * direction, direction,
-        {v.hits.number[i], v.hits.triangle[i]});
+  if (!next.is_transmitted) return go_on(v, i, next, v.leave(i, direction), direction);
+  const Onward onward = go_through(v.position.at(i), v.flat_normal.at(i), v.step.at(i), direction,
+                                   v.hits.distance[i], {v.hits.number[i], v.hits.triangle[i]});
+  go_on(v, i, next, onward.origin, direction, onward.left);
 }
 
 /// What Vertices finds of the way to the light for other surfaces.

@@ -24,14 +24,22 @@ inline Vec3f leave(const Vec3f& position, const Vec3f& flat_normal, const Vec3f&
   return position + (towards.dot(flat_normal) < 0.0f ? -step : step);
 }
 
-/// How far before a surface a ray begins that goes on through it, as it may touch another thing
-/// there: a glass stands on a table. Below 0: beyond it, as the ray that met it began close by and
-/// the two would be met in turns.
-inline float step_back(const Vec3f& flat_normal, const Vec3f& step, const Vec3f& towards,
-                       float met_after) {
+/// Where a ray begins that goes on through a surface.
+struct Onward {
+  Vec3f origin;
+  float back = 0.0f;  ///< Metres before the surface.
+  LeftTriangle left;
+};
+
+/// A little before it, as it may touch another thing there: a glass stands on a table. Beyond it
+/// where the ray that met it began close by: the two would be met in turns.
+inline Onward go_through(const Vec3f& position, const Vec3f& flat_normal, const Vec3f& step,
+                         const Vec3f& towards, float met_after, const LeftTriangle& triangle) {
   const float cosine = std::max(0.1f, std::abs(towards.dot(flat_normal)));
-  const float reach = std::sqrt(step.squaredNorm()) / cosine;
-  return met_after < reach ? -1.0f : 0.25f * reach;
+  const float reach = step.norm() / cosine;
+  if (met_after < reach) return {leave(position, flat_normal, step, towards), 0.0f, {}};
+  const float back = 0.25f * reach;
+  return {position - back * towards, back, triangle};
 }
 
 /// LobeWeights of a batch, but for glass, whose paths are scattered one by one.

@@ -230,7 +230,7 @@ const uint kScattered = 0u;
 const uint kGoesOn = 1u;
 const uint kEnds = 2u;
 
-// Where a path begins that goes on through the surface; see step_back() of renderer_embree.
+// Where a path begins that goes on through the surface; see go_through() of renderer_embree.
 vec3 go_through(inout Path path, SurfacePoint s, vec3 towards, out float back) {
   const float cosine = max(0.1, abs(dot(towards, s.flat_normal)));
   const float reach = step_length(s.position) / cosine;
