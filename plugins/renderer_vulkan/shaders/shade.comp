@@ -188,8 +188,8 @@ void collect_emission(inout Path path, uint instance, uint number, uint instance
   add(path, path.throughput * radiance * weight);
 }
 
-vec3 mapped_normal(uint instance, uint number, uint triangle, uint material, SurfacePoint s,
-                   float footprint, vec3 to_viewer, float time) {
+vec3 mapped_normal(uint instance, uint number, uint triangle, vec3 local, SurfacePoint s,
+                   vec3 to_viewer, float time) {
   const uint flags = world.instances.v[instance].flags;
   if ((flags & kHasUvs) == 0u) return s.normal;
   const CornerUvs uvs = corner_uvs(instance, number);
@@ -208,7 +208,6 @@ vec3 mapped_normal(uint instance, uint number, uint triangle, uint material, Sur
   const vec3 tangent = within / sqrt(length2);
   vec3 bitangent = cross(s.normal, tangent);
   if (dot(bitangent, along_v) < 0.0) bitangent = -bitangent;
-  const vec3 local = slot_at(material, kNormalSlot, s.uv, footprint).xyz;
   vec3 n = local.x * tangent + local.y * bitangent + max(0.05, local.z) * s.normal;
   const float n2 = dot(n, n);
   if (!(n2 >= 1e-8 && n2 < 1e30)) return s.normal;
@@ -471,44 +470,53 @@ bool advance(inout Path path, uint index, inout ShadowRay shadow) {
   const bool was_soft = is_soft(path);
   Surface surface = world.materials.v[material].surfaces[was_soft ? 1 : 0];
   const bool has_colors = (flags & kHasColors) != 0u;
-  if ((material_flags & kSpecial) == 0u && !has_colors) return scatter(path, s, surface, shadow);
-
-  if ((material_flags & kReadsUv) != 0u && (flags & kHasUvs) != 0u) {
-    const CornerUvs uvs = corner_uvs(instance, number);
-    const vec2 e = uvs.b - uvs.a;
-    const vec2 f = uvs.c - uvs.a;
-    s.uv = uvs.a + hit.y * e + hit.z * f;
-    const float twice_area = sqrt(dot(triangle_normal, triangle_normal));
-    s.uv_per_metre = twice_area > 0.0 ? sqrt(abs(e.x * f.y - e.y * f.x) / twice_area) : 0.0;
-  }
-  if ((material_flags & kEmits) != 0u) {
-    collect_emission(path, instance, number, flags, material, s);
-  }
-  if (path.bounce > job.max_bounces) return false;
-  if ((material_flags & kTextured) != 0u || has_colors) {
-    const float cosine = max(0.1, -dot(s.normal, path.direction));
-    const float footprint = path.width * s.uv_per_metre / sqrt(cosine);
-    vec3 color = world.materials.v[material].base_color;
-    if (has_texture(material, kBaseColorSlot)) {
-      color *= slot_at(material, kBaseColorSlot, s.uv, footprint).xyz;
+  if ((material_flags & kSpecial) != 0u || has_colors) {
+    if ((material_flags & kReadsUv) != 0u && (flags & kHasUvs) != 0u) {
+      const CornerUvs uvs = corner_uvs(instance, number);
+      const vec2 e = uvs.b - uvs.a;
+      const vec2 f = uvs.c - uvs.a;
+      s.uv = uvs.a + hit.y * e + hit.z * f;
+      const float twice_area = sqrt(dot(triangle_normal, triangle_normal));
+      s.uv_per_metre = twice_area > 0.0 ? sqrt(abs(e.x * f.y - e.y * f.x) / twice_area) : 0.0;
     }
-    if (has_colors) color *= color_at(instance, number, hit.y, hit.z);
-    surface.base = clamp(color, vec3(0.0), vec3(1.0));
-    if (has_texture(material, kMetallicSlot)) {
-      surface.metallic = clamp(scalar_at(material, kMetallicSlot, s.uv, footprint), 0.0, 1.0);
+    if ((material_flags & kEmits) != 0u) {
+      collect_emission(path, instance, number, flags, material, s);
     }
-    if (has_texture(material, kRoughnessSlot)) {
-      surface.alpha = alpha_of(scalar_at(material, kRoughnessSlot, s.uv, footprint),
-                               was_soft && surface.has_glass == 0u);
+    if (path.bounce > job.max_bounces) return false;
+    if ((material_flags & kTextured) != 0u || has_colors) {
+      const float cosine = max(0.1, -dot(s.normal, path.direction));
+      const float footprint = path.width * s.uv_per_metre / sqrt(cosine);
+      vec3 color = world.materials.v[material].base_color;
+      vec3 local_normal = vec3(0.0, 0.0, 1.0);
+      // One lookup for all slots, and one scatter() for all surfaces: code that does not fit caches
+      // took longer than all that it did.
+      [[dont_unroll]] for (uint slot = kBaseColorSlot; slot <= kNormalSlot; ++slot) {
+        if (!has_texture(material, slot)) continue;
+        const vec4 value = slot_at(material, slot, s.uv, footprint);
+        if (slot == kBaseColorSlot) {
+          color *= value.xyz;
+        } else if (slot == kNormalSlot) {
+          local_normal = value.xyz;
+        } else {
+          const float scalar = value[world.materials.v[material].slots[slot].channel];
+          if (slot == kMetallicSlot) {
+            surface.metallic = clamp(scalar, 0.0, 1.0);
+          } else {
+            surface.alpha = alpha_of(scalar, was_soft && surface.has_glass == 0u);
+          }
+        }
+      }
+      if (has_colors) color *= color_at(instance, number, hit.y, hit.z);
+      surface.base = clamp(color, vec3(0.0), vec3(1.0));
+      if (has_texture(material, kNormalSlot)) {
+        s.normal = mapped_normal(instance, number, triangle, local_normal, s, -path.direction,
+                                 path.time);
+      }
     }
-    if (has_texture(material, kNormalSlot)) {
-      s.normal = mapped_normal(instance, number, triangle, material, s, footprint, -path.direction,
-                               path.time);
+    if ((material_flags & (kThinGlass | kBlended)) != 0u) {
+      const uint what = pass_or_reflect(path, material, material_flags, s, surface);
+      if (what != kScattered) return what == kGoesOn;
     }
-  }
-  if ((material_flags & (kThinGlass | kBlended)) != 0u) {
-    const uint what = pass_or_reflect(path, material, material_flags, s, surface);
-    if (what != kScattered) return what == kGoesOn;
   }
   return scatter(path, s, surface, shadow);
 }
