@@ -2,9 +2,12 @@
 #include "denoiser_network.h"
 
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <bit>
 #include <cstdint>
 #include <cstring>
+#include <numbers>
 #include <utility>
 
 #include "diorama/error.h"
@@ -16,6 +19,21 @@ constexpr int kBlock = ChannelBlocks::kWidth;
 constexpr std::int32_t kMagic = 0x574E4544;  // "DENW"
 constexpr std::int32_t kVersion = 3;
 constexpr int kRowsPerTask = 4;
+
+// Convolutions of 3 x 3 pixels go by Winograd's way, F(4 x 4, 3 x 3) of Lavin and Gray, "Fast
+// Algorithms for Convolutional Neural Networks" (2015): 4 x 4 pixels take 36 products instead of
+// 144. Rows and columns count as polynomials, which are multiplied by their values at the points
+// 0, +-kNear, +-kFar and infinity. With 1 and 2 the largest rounding errors would be three times as
+// large.
+constexpr int kTile = 4;   // pixels of a side of what comes out
+constexpr int kPatch = 6;  // of what goes in
+constexpr int kPlaces = kPatch * kPatch;
+constexpr float kFar = std::numbers::sqrt2_v<float>;
+constexpr float kNear = kFar / 2.0f;
+constexpr float kFar2 = 2.0f;
+constexpr float kNear2 = 0.5f;
+// They share the weights from the nearer caches, into which the values of many more would not fit.
+constexpr int kTilesPerGroup = 24;
 
 float from_half(std::uint16_t half) {
   const std::uint32_t sign = std::uint32_t(half & 0x8000u) << 16;
@@ -75,26 +93,64 @@ struct PlainWeights {
   std::vector<float> weights, biases;
 };
 
+/// The values of a row of three weights at the points, each divided by the product of the point's
+/// distances from the others, as interpolation asks for.
+std::array<double, kPatch> weights_at_points(double w0, double w1, double w2) {
+  const auto pair = [&](double x, double x2, double other2) {
+    const double scale = 1.0 / (2.0 * x2 * (x2 - other2));
+    const double even = scale * (w0 + x2 * w2);
+    const double odd = scale * x * w1;
+    return std::pair(even + odd, even - odd);
+  };
+  const auto [near, minus_near] = pair(kNear, kNear2, kFar2);
+  const auto [far, minus_far] = pair(kFar, kFar2, kNear2);
+  static_assert(kNear2 * kFar2 == 1.0f);  // by which w0 would be divided
+  return {w0, near, minus_near, far, minus_far, w2};
+}
+
+/// Of a point for columns and one for rows each.
+std::array<double, kPlaces> weights_at_places(const float* weights) {
+  std::array<std::array<double, kPatch>, 3> rows;
+  for (std::size_t y = 0; y < 3; ++y, weights += 3) {
+    rows[y] = weights_at_points(weights[0], weights[1], weights[2]);
+  }
+  std::array<double, kPlaces> places;
+  for (std::size_t x = 0; x < kPatch; ++x) {
+    const auto column = weights_at_points(rows[0][x], rows[1][x], rows[2][x]);
+    for (std::size_t y = 0; y < kPatch; ++y) places[y * kPatch + x] = column[y];
+  }
+  return places;
+}
+
 /// With the outputs from `begin` on, `count` of them, after those of `before`.
 void add_outputs(Convolution& to, const PlainWeights& from, int begin, int count, int before) {
-  const int taps = from.side * from.side;
-  for (int o = 0; o < count; ++o) {
-    const int out = before + o;
-    to.biases[std::size_t(out)] = from.biases[std::size_t(begin + o)];
-    for (int in = 0; in < from.inputs; ++in) {
-      for (int tap = 0; tap < taps; ++tap) {
-        const std::size_t row = std::size_t(
-            ((out / kBlock * to.inputs + in / kBlock) * taps + tap) * kBlock + in % kBlock);
-        to.weights[row * kBlock + std::size_t(out % kBlock)] =
-            from.weights[std::size_t(((begin + o) * from.inputs + in) * taps + tap)];
+  const bool is_tiled = from.side == 3;
+  const int places = is_tiled ? kPlaces : 1;
+  std::copy_n(&from.biases[std::size_t(begin)], count, &to.biases[std::size_t(before)]);
+  for (int in = 0; in < from.inputs; ++in) {
+    for (int o = 0; o < count; ++o) {
+      const int out = before + o;
+      const float* const plain =
+          &from.weights[std::size_t(((begin + o) * from.inputs + in) * from.side * from.side)];
+      const auto put = [&](int place, float value) {
+        const std::size_t row =
+            std::size_t((out / kBlock * places + place) * to.inputs * kBlock + in);
+        to.weights[row * kBlock + std::size_t(out % kBlock)] = value;
+      };
+      if (!is_tiled) {
+        put(0, *plain);
+        continue;
       }
+      const auto values = weights_at_places(plain);
+      for (int place = 0; place < kPlaces; ++place) put(place, float(values[std::size_t(place)]));
     }
   }
 }
 
 Convolution empty_convolution(int inputs, int outputs, int side) {
-  Convolution c{blocks_of(inputs), blocks_of(outputs), side, {}, {}};
-  c.weights.assign(std::size_t(c.inputs * c.outputs * side * side) * kBlock * kBlock, 0.0f);
+  Convolution c{blocks_of(inputs), blocks_of(outputs), {}, {}};
+  const int places = side == 3 ? kPlaces : 1;
+  c.weights.assign(std::size_t(c.inputs * c.outputs * places) * kBlock * kBlock, 0.0f);
   c.biases.assign(std::size_t(c.outputs) * kBlock, 0.0f);
   return c;
 }
@@ -113,115 +169,315 @@ struct Wide {
   using Loose [[gnu::vector_size(4 * kWide), gnu::aligned(4), gnu::may_alias]] = float;
 };
 
-struct RowTask {
-  const Convolution* convolution;
-  const ChannelBlocks* from;
-  bool is_cut;  ///< Below zero.
-  int y;        ///< Of the row that is read.
-  float* out;   ///< The row's first pixel of the first block.
+/// Of pixels or tiles that lie side by side in blocks of 16 channels.
+struct Product {
+  const float* in;  ///< The first one's first block.
+  std::size_t in_block_stride;
+  int inputs;            ///< Blocks.
+  const float* weights;  ///< Of the first block of outputs.
+  std::size_t weights_block_stride;
+  const float* biases;  ///< May be null.
+  float* out;           ///< The first one's first block.
   std::size_t out_block_stride;
 };
 
-/// kGroup blocks of outputs of kPixels pixels side by side.
-template <int kWide, int kGroup, int kPixels>
-[[gnu::always_inline]] inline void convolve_pixels(const RowTask& task, int first_block, int x) {
+/// kGroup blocks of outputs of kCount pixels or tiles.
+template <int kWide, int kGroup, int kCount>
+[[gnu::always_inline]] inline void multiply(const Product& product) {
   using Numbers = typename Wide<kWide>::Numbers;
   using Loose = typename Wide<kWide>::Loose;
   constexpr int kPerBlock = kBlock / kWide;
   constexpr int kVectors = kGroup * kPerBlock;
-  const Convolution& c = *task.convolution;
-  const int reach = c.side / 2;
-  Numbers sums[kVectors][kPixels];
+  Numbers sums[kVectors][kCount];
 #pragma GCC unroll 16
   for (int v = 0; v < kVectors; ++v) {
     const Numbers bias =
-        *reinterpret_cast<const Loose*>(&c.biases[std::size_t(first_block * kBlock + v * kWide)]);
+        product.biases ? *reinterpret_cast<const Loose*>(product.biases + v * kWide) : Numbers{};
 #pragma GCC unroll 16
-    for (int p = 0; p < kPixels; ++p) sums[v][p] = bias;
+    for (int p = 0; p < kCount; ++p) sums[v][p] = bias;
   }
-  const std::size_t per_block = std::size_t(c.inputs * c.side * c.side) * kBlock * kBlock;
-  const float* weights = c.weights.data() + std::size_t(first_block) * per_block;
-  for (int block = 0; block < c.inputs; ++block) {
-    for (int dy = -reach; dy <= reach; ++dy) {
-      for (int dx = -reach; dx <= reach; ++dx) {
-        const float* in = task.from->at(block, x + dx, task.y + dy);
-        for (int i = 0; i < kBlock; ++i, ++in, weights += kBlock) {
-          Numbers w[kVectors];
+  const float* weights = product.weights;
+  for (int block = 0; block < product.inputs; ++block) {
+    const float* in = product.in + std::size_t(block) * product.in_block_stride;
+    for (int i = 0; i < kBlock; ++i, ++in, weights += kBlock) {
+      Numbers w[kVectors];
 #pragma GCC unroll 16
-          for (int v = 0; v < kVectors; ++v) {
-            w[v] = *reinterpret_cast<const Loose*>(weights + (v / kPerBlock) * per_block +
-                                                   (v % kPerBlock) * kWide);
-          }
+      for (int v = 0; v < kVectors; ++v) {
+        w[v] = *reinterpret_cast<const Loose*>(
+            weights + (v / kPerBlock) * product.weights_block_stride + (v % kPerBlock) * kWide);
+      }
 #pragma GCC unroll 16
-          for (int p = 0; p < kPixels; ++p) {
-            const float value = in[p * kBlock];
+      for (int p = 0; p < kCount; ++p) {
+        const float value = in[p * kBlock];
 #pragma GCC unroll 16
-            for (int v = 0; v < kVectors; ++v) sums[v][p] += w[v] * value;
-          }
-        }
+        for (int v = 0; v < kVectors; ++v) sums[v][p] += w[v] * value;
       }
     }
   }
 #pragma GCC unroll 16
   for (int v = 0; v < kVectors; ++v) {
-    float* const out = task.out + std::size_t(first_block + v / kPerBlock) * task.out_block_stride +
-                       std::size_t(x) * kBlock + (v % kPerBlock) * kWide;
+    float* const out = product.out + std::size_t(v / kPerBlock) * product.out_block_stride +
+                       (v % kPerBlock) * kWide;
 #pragma GCC unroll 16
-    for (int p = 0; p < kPixels; ++p) {
-      const Numbers sum = sums[v][p];
-      *reinterpret_cast<Loose*>(out + p * kBlock) =
-          task.is_cut ? (sum > 0.0f ? sum : Numbers{}) : sum;
+    for (int p = 0; p < kCount; ++p) *reinterpret_cast<Loose*>(out + p * kBlock) = sums[v][p];
+  }
+}
+
+/// A convolution of 1 x 1 pixel.
+struct RowTask {
+  const Convolution* convolution;
+  const ChannelBlocks* from;
+  int y;       ///< Of the row that is read.
+  float* out;  ///< The row's first pixel of the first block.
+  std::size_t out_block_stride;
+};
+
+/// kGroup blocks of outputs, kCount pixels at a time. The last pixels of a row that is no multiple
+/// of kCount are found twice.
+template <int kWide, int kGroup, int kCount>
+[[gnu::always_inline]] inline void convolve_blocks(const RowTask& task, int first_block) {
+  const Convolution& c = *task.convolution;
+  const std::size_t per_block = std::size_t(c.inputs) * kBlock * kBlock;
+  const auto product_at = [&](int x) {
+    return Product{task.from->at(0, x, task.y),
+                   task.from->block_stride(),
+                   c.inputs,
+                   c.weights.data() + std::size_t(first_block) * per_block,
+                   per_block,
+                   c.biases.data() + first_block * kBlock,
+                   task.out + std::size_t(first_block) * task.out_block_stride + x * kBlock,
+                   task.out_block_stride};
+  };
+  const int width = task.from->width();
+  if (width < kCount) {
+    for (int x = 0; x < width; ++x) multiply<kWide, kGroup, 1>(product_at(x));
+    return;
+  }
+  for (int x = 0; x < width; x += kCount) {
+    multiply<kWide, kGroup, kCount>(product_at(std::min(x, width - kCount)));
+  }
+}
+
+/// A convolution of 3 x 3 pixels for a group of tiles, which are counted row by row. What is below
+/// zero becomes zero.
+struct TileTask {
+  const Convolution* convolution;
+  const ChannelBlocks* from;
+  const ChannelBlocks* to;
+  int first_tile;
+  int tiles;
+  float* values;    ///< Room for values_size(): of the patches, at the points.
+  float* products;  ///< Room for kProductsSize.
+};
+constexpr int kMostGroup = 3;  // blocks of outputs at a time
+// By place, block, tile. The line more keeps places of a tile from falling into the same few lines
+// of the nearest cache.
+constexpr std::size_t place_stride(int blocks) {
+  return std::size_t(blocks * kTilesPerGroup + 1) * kBlock;
+}
+constexpr std::size_t values_size(int inputs) { return kPlaces * place_stride(inputs); }
+constexpr std::size_t kProductsSize = kPlaces * place_stride(kMostGroup);
+
+int tiles_across(int pixels) { return (pixels + kTile - 1) / kTile; }
+
+/// A row or column of a patch as a polynomial's values.
+template <class Numbers>
+[[gnu::always_inline]] inline void to_points(const Numbers (&in)[kPatch], Numbers (&out)[kPatch]) {
+  const Numbers near_even = in[4] - kFar2 * in[2];
+  const Numbers near_odd = in[3] - kFar2 * in[1];
+  const Numbers far_even = in[4] - kNear2 * in[2];
+  const Numbers far_odd = in[3] - kNear2 * in[1];
+  out[0] = in[0] - (kNear2 + kFar2) * in[2] + in[4];
+  out[1] = near_even + kNear * near_odd;
+  out[2] = near_even - kNear * near_odd;
+  out[3] = far_even + kFar * far_odd;
+  out[4] = far_even - kFar * far_odd;
+  out[5] = in[1] - (kNear2 + kFar2) * in[3] + in[5];
+}
+
+/// Products of such values as a row or column of a tile.
+template <class Numbers>
+[[gnu::always_inline]] inline void from_points(const Numbers (&in)[kPatch], Numbers (&out)[kTile]) {
+  const Numbers near_even = in[1] + in[2];
+  const Numbers near_odd = in[1] - in[2];
+  const Numbers far_even = in[3] + in[4];
+  const Numbers far_odd = in[3] - in[4];
+  out[0] = in[0] + near_even + far_even;
+  out[1] = kNear * near_odd + kFar * far_odd;
+  out[2] = kNear2 * near_even + kFar2 * far_even;
+  out[3] = kNear * kNear2 * near_odd + kFar * kFar2 * far_odd + in[5];
+}
+
+/// A block of a patch; `out` is its tile's at the first place.
+template <int kWide>
+[[gnu::always_inline]] inline void transform_patch(const float* in, std::size_t in_row_stride,
+                                                   float* out, std::size_t out_place_stride) {
+  using Numbers = typename Wide<kWide>::Numbers;
+  using Loose = typename Wide<kWide>::Loose;
+  for (int i = 0; i < kBlock; i += kWide) {
+    Numbers lines[kPatch][kPatch];
+#pragma GCC unroll 6
+    for (int x = 0; x < kPatch; ++x) {
+      Numbers column[kPatch];
+#pragma GCC unroll 6
+      for (int y = 0; y < kPatch; ++y) {
+        column[y] =
+            *reinterpret_cast<const Loose*>(in + std::size_t(y) * in_row_stride + x * kBlock + i);
+      }
+      Numbers values[kPatch];
+      to_points(column, values);
+#pragma GCC unroll 6
+      for (int y = 0; y < kPatch; ++y) lines[y][x] = values[y];
+    }
+#pragma GCC unroll 6
+    for (int y = 0; y < kPatch; ++y) {
+      Numbers row[kPatch];
+      to_points(lines[y], row);
+#pragma GCC unroll 6
+      for (int x = 0; x < kPatch; ++x) {
+        *reinterpret_cast<Loose*>(out + std::size_t(y * kPatch + x) * out_place_stride + i) =
+            row[x];
+      }
     }
   }
 }
 
-/// The last pixels of a row that is no multiple of kPixels are found twice.
-template <int kWide, int kGroup, int kPixels>
-[[gnu::always_inline]] inline void convolve_group(const RowTask& task, int first_block) {
-  const int width = task.from->width();
-  if (width < kPixels) {
-    for (int x = 0; x < width; ++x) convolve_pixels<kWide, kGroup, 1>(task, first_block, x);
-    return;
-  }
-  for (int x = 0; x < width; x += kPixels) {
-    convolve_pixels<kWide, kGroup, kPixels>(task, first_block, std::min(x, width - kPixels));
+/// The values of all patches. Those of the last tile are repeated until the group is full.
+template <int kWide>
+[[gnu::always_inline]] inline void transform_inputs(const TileTask& task) {
+  const ChannelBlocks& from = *task.from;
+  const int across = tiles_across(from.width());
+  const std::size_t stride = place_stride(from.blocks());
+  for (int block = 0; block < from.blocks(); ++block) {
+    float* out = task.values + std::size_t(block * kTilesPerGroup) * kBlock;
+    for (int t = 0; t < kTilesPerGroup; ++t, out += kBlock) {
+      const int tile = task.first_tile + std::min(t, task.tiles - 1);
+      const int x = tile % across * kTile - 1;
+      const int y = tile / across * kTile - 1;
+      // With the frame, beyond which there is nothing to be read.
+      const int columns = std::min(kPatch, from.width() + 1 - x);
+      const int rows = std::min(kPatch, from.height() + 1 - y);
+      const float* in = from.at(block, x, y);
+      if (columns == kPatch && rows == kPatch) {
+        transform_patch<kWide>(in, from.row_stride(), out, stride);
+        continue;
+      }
+      alignas(64) float patch[kPlaces * kBlock] = {};
+      for (int row = 0; row < rows; ++row, in += from.row_stride()) {
+        std::copy_n(in, columns * kBlock, patch + row * kPatch * kBlock);
+      }
+      transform_patch<kWide>(patch, kPatch * kBlock, out, stride);
+    }
   }
 }
 
-inline void row_of_16(const RowTask& task) {
+/// A tile's pixels of a block of outputs; `in` is its tile's at the first place.
+template <int kWide>
+[[gnu::always_inline]] inline void write_tile(const float* in, const float* biases,
+                                              const ChannelBlocks& to, int block, int x, int y) {
+  using Numbers = typename Wide<kWide>::Numbers;
+  using Loose = typename Wide<kWide>::Loose;
+  constexpr std::size_t kStride = place_stride(kMostGroup);
+  const int rows = std::min(kTile, to.height() - y);
+  const int columns = std::min(kTile, to.width() - x);
+  for (int i = 0; i < kBlock; i += kWide) {
+    Numbers lines[kTile][kPatch];
+#pragma GCC unroll 6
+    for (int px = 0; px < kPatch; ++px) {
+      Numbers column[kPatch];
+#pragma GCC unroll 6
+      for (int py = 0; py < kPatch; ++py) {
+        column[py] =
+            *reinterpret_cast<const Loose*>(in + std::size_t(py * kPatch + px) * kStride + i);
+      }
+      Numbers done[kTile];
+      from_points(column, done);
+#pragma GCC unroll 4
+      for (int row = 0; row < kTile; ++row) lines[row][px] = done[row];
+    }
+    const Numbers bias = *reinterpret_cast<const Loose*>(biases + i);
+#pragma GCC unroll 4
+    for (int row = 0; row < kTile; ++row) {
+      if (row >= rows) break;
+      float* const out = to.at(block, x, y + row) + i;
+      Numbers done[kTile];
+      from_points(lines[row], done);
+#pragma GCC unroll 4
+      for (int column = 0; column < kTile; ++column) {
+        if (column >= columns) break;
+        const Numbers sum = done[column] + bias;
+        *reinterpret_cast<Loose*>(out + column * kBlock) = sum > 0.0f ? sum : Numbers{};
+      }
+    }
+  }
+}
+
+/// kGroup blocks of outputs, kCount tiles at a time.
+template <int kWide, int kGroup, int kCount>
+[[gnu::always_inline]] inline void convolve_blocks(const TileTask& task, int first_block) {
+  static_assert(kTilesPerGroup % kCount == 0 && kGroup <= kMostGroup);
+  const Convolution& c = *task.convolution;
+  const std::size_t per_place = std::size_t(c.inputs) * kBlock * kBlock;
+  for (int place = 0; place < kPlaces; ++place) {
+    const float* const weights =
+        c.weights.data() + std::size_t(first_block * kPlaces + place) * per_place;
+    const float* const in = task.values + std::size_t(place) * place_stride(c.inputs);
+    float* const out = task.products + std::size_t(place) * place_stride(kMostGroup);
+    for (int t = 0; t < task.tiles; t += kCount) {
+      multiply<kWide, kGroup, kCount>({in + t * kBlock, kTilesPerGroup * kBlock, c.inputs, weights,
+                                       kPlaces * per_place, nullptr, out + t * kBlock,
+                                       kTilesPerGroup * kBlock});
+    }
+  }
+  const int across = tiles_across(task.to->width());
+  for (int block = 0; block < kGroup; ++block) {
+    for (int t = 0; t < task.tiles; ++t) {
+      const int tile = task.first_tile + t;
+      write_tile<kWide>(task.products + (block * kTilesPerGroup + t) * kBlock,
+                        c.biases.data() + (first_block + block) * kBlock, *task.to,
+                        first_block + block, tile % across * kTile, tile / across * kTile);
+    }
+  }
+}
+
+template <class Task>
+[[gnu::always_inline]] inline void convolve_by_16(const Task& task) {
   const int outputs = task.convolution->outputs;
   int block = 0;
   for (; outputs - block >= 5 || outputs - block == 3; block += 3) {
-    convolve_group<16, 3, 8>(task, block);
+    convolve_blocks<16, 3, 8>(task, block);
   }
-  for (; block + 2 <= outputs; block += 2) convolve_group<16, 2, 12>(task, block);
-  if (block < outputs) convolve_group<16, 1, 12>(task, block);
+  for (; block + 2 <= outputs; block += 2) convolve_blocks<16, 2, 12>(task, block);
+  if (block < outputs) convolve_blocks<16, 1, 12>(task, block);
 }
-inline void row_of_8(const RowTask& task) {
+template <class Task>
+[[gnu::always_inline]] inline void convolve_by_8(const Task& task) {
   for (int block = 0; block < task.convolution->outputs; ++block) {
-    convolve_group<8, 1, 6>(task, block);
+    convolve_blocks<8, 1, 6>(task, block);
   }
 }
-inline void row_of_4(const RowTask& task) {
+template <class Task>
+[[gnu::always_inline]] inline void convolve_by_4(const Task& task) {
   for (int block = 0; block < task.convolution->outputs; ++block) {
-    convolve_group<4, 1, 2>(task, block);
+    convolve_blocks<4, 1, 2>(task, block);
   }
 }
 
 [[gnu::target("arch=x86-64-v4"), gnu::flatten]] void row_avx512(const RowTask& task) {
-  row_of_16(task);
+  convolve_by_16(task);
 }
 [[gnu::target("arch=x86-64-v3"), gnu::flatten]] void row_avx2(const RowTask& task) {
-  row_of_8(task);
+  convolve_by_8(task);
 }
 [[gnu::target("arch=x86-64-v2"), gnu::flatten]] void row_sse42(const RowTask& task) {
-  row_of_4(task);
+  convolve_by_4(task);
 }
+[[gnu::flatten]] void row_sse2(const RowTask& task) { convolve_by_4(task); }
 
 void convolve_row(const RowTask& task, Isa isa) {
   switch (isa) {
     case Isa::Sse2:
-      return row_of_4(task);
+      return row_sse2(task);
     case Isa::Sse42:
       return row_sse42(task);
     case Isa::Avx2:
@@ -229,6 +485,58 @@ void convolve_row(const RowTask& task, Isa isa) {
     case Isa::Avx512:
       return row_avx512(task);
   }
+}
+
+[[gnu::target("arch=x86-64-v4"), gnu::flatten]] void tiles_avx512(const TileTask& task) {
+  transform_inputs<16>(task);
+  convolve_by_16(task);
+}
+[[gnu::target("arch=x86-64-v3"), gnu::flatten]] void tiles_avx2(const TileTask& task) {
+  transform_inputs<8>(task);
+  convolve_by_8(task);
+}
+[[gnu::target("arch=x86-64-v2"), gnu::flatten]] void tiles_sse42(const TileTask& task) {
+  transform_inputs<4>(task);
+  convolve_by_4(task);
+}
+[[gnu::flatten]] void tiles_sse2(const TileTask& task) {
+  transform_inputs<4>(task);
+  convolve_by_4(task);
+}
+
+void convolve_group(const TileTask& task, Isa isa) {
+  switch (isa) {
+    case Isa::Sse2:
+      return tiles_sse2(task);
+    case Isa::Sse42:
+      return tiles_sse42(task);
+    case Isa::Avx2:
+      return tiles_avx2(task);
+    case Isa::Avx512:
+      return tiles_avx512(task);
+  }
+}
+
+/// With 3 x 3 pixels. Tasks take groups of tiles as long as there are some, so that each needs room
+/// for one group only.
+void convolve_tiles(const Convolution& c, const ChannelBlocks& from, const ChannelBlocks& to,
+                    Isa isa, Host& host, SpareMemory& spare) {
+  const int tiles = tiles_across(from.width()) * tiles_across(from.height());
+  const int groups = (tiles + kTilesPerGroup - 1) / kTilesPerGroup;
+  const std::size_t tasks = std::size_t(std::min(host.thread_count(), groups));
+  const std::size_t per_task = values_size(c.inputs) + kProductsSize;
+  HugePages<float> scratch = spare.take(tasks * per_task);
+  std::atomic<int> next = 0;
+  host.parallel_for(tasks, [&](std::size_t task) {
+    float* const values = scratch.data() + task * per_task;
+    for (int group = next++; group < groups; group = next++) {
+      const int first = group * kTilesPerGroup;
+      convolve_group({&c, &from, &to, first, std::min(kTilesPerGroup, tiles - first), values,
+                      values + values_size(c.inputs)},
+                     isa);
+    }
+  });
+  spare.give(std::move(scratch));
 }
 
 void for_rows(int height, Host& host, const std::function<void(int)>& body) {
@@ -359,11 +667,16 @@ DenoiserNetwork::DenoiserNetwork(std::span<const std::byte> file) {
 
 DenoiserNetwork::Logits DenoiserNetwork::run(ChannelBlocks features, Isa isa, Host& host,
                                              SpareMemory& spare) const {
-  const auto convolved = [&](const Convolution& c, const ChannelBlocks& from, bool is_cut) {
+  const auto convolved_1x1 = [&](const Convolution& c, const ChannelBlocks& from) {
     ChannelBlocks to(c.outputs * kBlock, from.width(), from.height(), spare);
     for_rows(from.height(), host, [&](int y) {
-      convolve_row({&c, &from, is_cut, y, to.at(0, 0, y), to.block_stride()}, isa);
+      convolve_row({&c, &from, y, to.at(0, 0, y), to.block_stride()}, isa);
     });
+    return to;
+  };
+  const auto convolved_3x3 = [&](const Convolution& c, const ChannelBlocks& from) {
+    ChannelBlocks to(c.outputs * kBlock, from.width(), from.height(), spare);
+    convolve_tiles(c, from, to, isa, host, spare);
     return to;
   };
   const auto move_on = [&](ChannelBlocks& now, ChannelBlocks next) {
@@ -372,7 +685,7 @@ DenoiserNetwork::Logits DenoiserNetwork::run(ChannelBlocks features, Isa isa, Ho
   };
   std::array<ChannelBlocks, kDepth> levels;
   const auto encode = [&](std::size_t level, ChannelBlocks now) {
-    for (const Convolution& c : encoder_[level]) move_on(now, convolved(c, now, true));
+    for (const Convolution& c : encoder_[level]) move_on(now, convolved_3x3(c, now));
     levels[level] = std::move(now);
   };
   encode(0, std::move(features));
@@ -381,14 +694,14 @@ DenoiserNetwork::Logits DenoiserNetwork::run(ChannelBlocks features, Isa isa, Ho
   }
   Logits logits;
   ChannelBlocks now = std::move(levels[kDepth - 1]);
-  logits.levels[kDepth - 1] = convolved(heads_[kDepth - 1], now, false);
+  logits.levels[kDepth - 1] = convolved_1x1(heads_[kDepth - 1], now);
   for (std::size_t level = kDepth - 1; level-- > 0;) {
-    ChannelBlocks next = convolved(narrow_[level], now, false);
+    ChannelBlocks next = convolved_1x1(narrow_[level], now);
     move_on(now, std::move(levels[level]));
     add_next_level(now, next, host);
     next.hand_on(spare);
-    for (const Convolution& c : decoder_[level]) move_on(now, convolved(c, now, true));
-    logits.levels[level] = convolved(heads_[level], now, false);
+    for (const Convolution& c : decoder_[level]) move_on(now, convolved_3x3(c, now));
+    logits.levels[level] = convolved_1x1(heads_[level], now);
   }
   logits.last = std::move(now);
   return logits;
@@ -396,7 +709,7 @@ DenoiserNetwork::Logits DenoiserNetwork::run(ChannelBlocks features, Isa isa, Ho
 
 void DenoiserNetwork::pixel_logits(const Logits& logits, int y, Isa isa, float* out) const {
   const std::size_t stride = std::size_t(logits.last.width()) * kBlock;
-  convolve_row({&pixels_, &logits.last, false, y, out, stride}, isa);
+  convolve_row({&pixels_, &logits.last, y, out, stride}, isa);
 }
 
 }  // namespace diorama

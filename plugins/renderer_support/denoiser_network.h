@@ -62,7 +62,8 @@ class ChannelBlocks {
 struct Convolution {
   int inputs = 0;   ///< Blocks.
   int outputs = 0;  ///< Blocks.
-  int side = 1;     ///< 1 or 3 pixels.
+  /// Per block of outputs: of 1 x 1 pixel one matrix, inputs x 16; of 3 x 3 pixels 36, by which
+  /// tiles of 4 x 4 pixels are multiplied.
   std::vector<float> weights;
   std::vector<float> biases;
 };
