@@ -29,6 +29,10 @@ struct PathTracer::Path {
   float spread = 0.0f;      ///< Its growth per metre.
   float time = kMoment;     ///< Share of the shutter's window.
 
+  /// Between ways to go on.
+  void choose() {
+    if (!result.has_surface) result.by_chance = true;
+  }
   /// Whether what it meets next is softened, as only caustics would show the difference.
   bool is_soft(const TraceSettings& settings) const {
     return has_scattered && !settings.has_caustics;

@@ -90,11 +90,13 @@ PathTracer::StraightPass PathTracer::pass_or_reflect(Path& path, const Vec3f& di
   float rest = u.x();
   if (material.is_blended) {
     const float gap = 1.0f - std::clamp(material.opacity_at(surface.uv, 0.0f), 0.0f, 1.0f);
+    if (gap > 0.0f) path.choose();
     if (rest < gap) return pass();
     rest = (rest - gap) / (1.0f - gap);
   }
   if (!material.is_thin_glass) return {.is_scattered = true};
   const float share = (1.0f - bsdf.metallic) * bsdf.transmission;
+  if (share > 0.0f) path.choose();
   if (rest >= share) {
     bsdf.metallic = share < 1.0f ? bsdf.metallic / (1.0f - share) : 0.0f;
     bsdf.transmission = 0.0f;

@@ -364,6 +364,7 @@ inline void PathTracer::scatter(Batch& v, std::size_t i) const {
     queue_shadow_ray(v, i);
   }
   path.is_camera_ray = false;
+  path.choose();
   const BsdfSample next =
       bsdf.sample(v.numbers[Vertices::kLobe][i], v.pair(Vertices::kDirectionU, i));
   const Vec3f direction = v.basis(i).to_world(next.wi);

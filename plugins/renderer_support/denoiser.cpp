@@ -100,6 +100,58 @@ double quiet_exposure(const Film& film) {
   return automatic_exposure(means);
 }
 
+void average_chances(Film& film, Host& host) {
+  constexpr float kPaths = 128.0f;
+  constexpr int kMostReach = 2;
+  struct Seen {
+    Vec3f albedo;
+    Vec3f normal;
+    Vec3f position;
+    float share;
+    float surfaces;
+  };
+  const std::span<FilmPixel> pixels = film.pixels();
+  const auto is_by_chance = [](const FilmPixel& pixel) { return pixel.chance_share > 0.0f; };
+  if (std::ranges::none_of(pixels, is_by_chance)) return;
+  std::vector<Seen> before(pixels.size());
+  std::ranges::transform(pixels, before.begin(), [](const FilmPixel& pixel) {
+    return Seen{pixel.albedo, pixel.normal, pixel.position, pixel.chance_share,
+                pixel.chance_share * pixel.surface_share};
+  });
+  host.parallel_for(std::size_t(film.height()), [&](std::size_t row) {
+    const int y = int(row);
+    for (int x = 0; x < film.width(); ++x) {
+      FilmPixel& pixel = film.at(x, y);
+      if (!is_by_chance(pixel)) continue;
+      int reach = 0;
+      while (reach < kMostReach &&
+             float((2 * reach + 1) * (2 * reach + 1)) * pixel.count < kPaths) {
+        ++reach;
+      }
+      Seen sum{Vec3f::Zero(), Vec3f::Zero(), Vec3f::Zero(), 0.0f, 0.0f};
+      for (int v = std::max(0, y - reach); v < std::min(film.height(), y + reach + 1); ++v) {
+        for (int u = std::max(0, x - reach); u < std::min(film.width(), x + reach + 1); ++u) {
+          const Seen& near = before[std::size_t(v) * std::size_t(film.width()) + std::size_t(u)];
+          const int closeness = (reach + 1 - std::abs(u - x)) * (reach + 1 - std::abs(v - y));
+          const float weight = float(closeness) * near.share;
+          const float surfaces = float(closeness) * near.surfaces;
+          sum.albedo += weight * near.albedo;
+          sum.share += weight;
+          sum.normal += surfaces * near.normal;
+          sum.position += surfaces * near.position;
+          sum.surfaces += surfaces;
+        }
+      }
+      const float share = pixel.chance_share;
+      pixel.albedo += share * (sum.albedo / sum.share - pixel.albedo);
+      if (!(sum.surfaces > 0.0f)) continue;
+      pixel.normal += share * (sum.normal / sum.surfaces - pixel.normal);
+      pixel.position += share * (sum.position / sum.surfaces - pixel.position);
+      pixel.surface_share += share * (sum.surfaces / sum.share - pixel.surface_share);
+    }
+  });
+}
+
 std::size_t denoiser_bytes(int width, int height, bool is_quick) {
   const std::size_t pixels = std::size_t(width) * std::size_t(height);
   if (is_quick) {
@@ -120,6 +172,7 @@ Image<Vec3f> denoised_on_planes(const Film& film, const DenoiseSettings& setting
 }
 
 Image<Vec3f> denoised(Film film, const DenoiseSettings& settings, Isa isa, Host& host) {
+  average_chances(film, host);
   if (settings.is_quick || film.pixels().empty()) {
     return filtered_on_planes(std::move(film), settings, isa, host);
   }

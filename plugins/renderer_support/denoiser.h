@@ -21,14 +21,21 @@ struct DenoiseSettings {
 /// What is held at most to denoise a picture of this size, the film included.
 std::size_t denoiser_bytes(int width, int height, bool is_quick);
 
+/// At glass paths choose between ways, so that the colours of what is seen there, where it is and
+/// how it faces are means over chances. A filter that multiplies by such colours shows their grain,
+/// and takes pixels with a rare choice for things of their own. So they are averaged over the
+/// pixels around that are seen so, too (FilmPixel::chance_share), 5 x 5 at most, until 128 paths
+/// make them. Lights that are seen there stay: small ones would become blots.
+void average_chances(Film& film, Host& host);
+
 /// What a filter that looks at planes (plane_filter.h) makes of a film, with the mean that it had
 /// with its noise, as far as the noise lets that be known.
 Image<Vec3f> denoised_on_planes(const Film& film, const DenoiseSettings& settings, Isa isa,
                                 Host& host);
 
-/// Removes sampling noise from a film by two filters: one that was trained (network_filter.h) sees
-/// what the one that looks at planes made of it, and takes of that what it thinks right. The film's
-/// memory is given back on the way.
+/// Removes sampling noise from a film, after average_chances(), by two filters: one that was
+/// trained (network_filter.h) sees what the one that looks at planes made of it, and takes of that
+/// what it thinks right. The film's memory is given back on the way.
 Image<Vec3f> denoised(Film film, const DenoiseSettings& settings, Isa isa, Host& host);
 
 /// The plain means.

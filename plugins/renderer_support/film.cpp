@@ -13,12 +13,14 @@ FilmPixel PixelSum::mean() const {
     pixel.brightest = float(brightest_);
     pixel.count = 1.0f;
     pixel.surface_share = float(surfaces_);
+    pixel.chance_share = float(chances_);
     return pixel;
   }
   const float scale = 1.0f / float(count_);
   pixel.seen = sum_.seen * scale;
   pixel.scattered = sum_.scattered * scale;
   pixel.surface_share = float(surfaces_) * scale;
+  pixel.chance_share = float(chances_) * scale;
   if (surfaces_ > 0) {
     const float per_surface = 1.0f / float(surfaces_);
     // Spread over all samples: an edge pixel reflects only where it has a surface.

@@ -19,6 +19,7 @@ struct PathSample {
   Vec3f normal = Vec3f::Zero();
   Vec3f position = Vec3f::Zero();
   bool has_surface = false;
+  bool by_chance = false;  ///< Chose between ways before it, as at glass, panes and veils.
 };
 
 /// Means over the samples of one pixel, and what the denoiser steers by.
@@ -32,6 +33,7 @@ struct FilmPixel {
   float brightest = 0.0f;      ///< Luminance of the brightest sample's scattered ...
   float count = 0.0f;          ///< ... among so many.
   float surface_share = 0.0f;  ///< Of the samples that met a scattering surface.
+  float chance_share = 0.0f;   ///< Of the samples by chance; see PathSample.
 };
 
 /// The pixels of a picture, row by row.
@@ -72,6 +74,7 @@ class PixelSum {
     luminance_ += l;
     luminance2_ += l * l;
     brightest_ = std::max(brightest_, l);
+    chances_ += sample.by_chance ? 1 : 0;
     if (!sample.has_surface) return;
     ++surfaces_;
     sum_.albedo += sample.albedo;
@@ -81,7 +84,7 @@ class PixelSum {
   /// Sums that were made elsewhere: `sum` over all samples, those of the surface over the samples
   /// that met one; of what was scattered the sums of luminances and their squares.
   static PixelSum of(const FilmPixel& sum, double luminance, double luminance2, int count,
-                     int surfaces) {
+                     int surfaces, int chances) {
     PixelSum result;
     result.sum_ = sum;
     result.luminance_ = luminance;
@@ -89,6 +92,7 @@ class PixelSum {
     result.brightest_ = double(sum.brightest);
     result.count_ = count;
     result.surfaces_ = surfaces;
+    result.chances_ = chances;
     return result;
   }
   FilmPixel mean() const;
@@ -101,6 +105,7 @@ class PixelSum {
   double brightest_ = 0.0;
   int count_ = 0;
   int surfaces_ = 0;
+  int chances_ = 0;
 };
 
 }  // namespace diorama

@@ -29,7 +29,7 @@ static_assert(sizeof(gpu::Job) <= kJobRoom);
 constexpr std::size_t kCountersRoom = 256;
 static_assert(sizeof(gpu::Counters) <= kCountersRoom);
 // What resolve.comp writes.
-static_assert(sizeof(FilmPixel) == 19 * sizeof(float));
+static_assert(sizeof(FilmPixel) == 20 * sizeof(float));
 
 }  // namespace
 
@@ -339,7 +339,7 @@ Image<PixelSum> GpuPathTracer::sums() {
       const double count = double(sum.count);
       result.pixels()[i] =
           PixelSum::of(pixel, mean * count, double(sum.squares) + mean * mean * count,
-                       int(sum.count), int(sum.surfaces));
+                       int(sum.count), int(sum.surfaces), int(sum.chances));
     }
   });
   return result;

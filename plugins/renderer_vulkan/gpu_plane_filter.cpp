@@ -39,8 +39,10 @@ void GpuPlaneFilter::make_room(int width, int height) {
   blocks_ = blocks_of(width) * blocks_of(height);
   layers_.grow(device_, (kPixelNumbers * pixels_ + kMeanNumbers * blocks_) * sizeof(float),
                VulkanBuffer::Place::Device, kWhat);
+  film_.grow(device_, pixels_ * sizeof(FilmPixel), VulkanBuffer::Place::Device, kWhat);
   for_host_.grow(device_, std::max(kImageNumbers * pixels_, kMeanNumbers * blocks_) * sizeof(float),
                  VulkanBuffer::Place::ToHost, kWhat);
+  push_.averaged = film_.address();
   push_.layers = layers_.address();
   push_.noise = push_.layers + kLayerNumbers * pixels_ * sizeof(float);
   push_.support = push_.noise + kNoiseNumbers * pixels_ * sizeof(float);
@@ -70,6 +72,8 @@ void GpuPlaneFilter::record_rounds(VulkanCommands& commands) {
   };
   push_.from = 0;
   push_.reach = 0;
+  dispatch(kernels_.chances, per_pixel);
+  push_.film = push_.averaged;
   dispatch(kernels_.read, per_pixel);
   dispatch(kernels_.sums, per_block);
   dispatch(kernels_.fireflies, per_pixel);

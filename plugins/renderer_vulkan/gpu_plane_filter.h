@@ -11,8 +11,8 @@
 
 namespace diorama {
 
-/// filtered_on_planes() of renderer_support on the device that traced the paths, where the film
-/// stays: the same steps, so that pictures differ by rounding alone.
+/// average_chances() and filtered_on_planes() of renderer_support on the device that traced the
+/// paths, where the film stays: the same steps, so that pictures differ by rounding alone.
 class GpuPlaneFilter {
  public:
   GpuPlaneFilter(const PathDevice& device, Host& host);
@@ -39,6 +39,7 @@ class GpuPlaneFilter {
   std::size_t blocks_ = 0;
   gpu::PlanePush push_;
   VulkanBuffer layers_;    ///< All that there is per pixel, and per block of pixels.
+  VulkanBuffer film_;      ///< After the first step.
   VulkanBuffer for_host_;  ///< Means of blocks, then the picture.
 };
 

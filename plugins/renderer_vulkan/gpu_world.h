@@ -207,8 +207,9 @@ struct PixelSum {
   float brightest = 0.0f;
   std::uint32_t count = 0;
   std::uint32_t surfaces = 0;
+  std::uint32_t chances = 0;
 };
-static_assert(sizeof(PixelSum) == 80);
+static_assert(sizeof(PixelSum) == 84);
 
 struct Counters {
   std::array<std::uint32_t, 3> paths_groups{};
@@ -277,8 +278,9 @@ struct PlanePush {
   std::uint32_t reach = 0;
   Vec3f view_position = Vec3f::Zero();
   float brightest_path = 0.0f;
+  Address averaged = 0;
 };
-static_assert(sizeof(PlanePush) == 80);
+static_assert(sizeof(PlanePush) == 88);
 
 inline constexpr std::uint32_t kGroup = 64;
 inline constexpr std::uint32_t kStateColumns = 7;

@@ -37,6 +37,7 @@ std::uint32_t find_iteration_limit(const VulkanDevice& device) {
 
 PlaneKernels::PlaneKernels(const VulkanDevice& device)
     : means(device, kernels::kPlaneMeans),
+      chances(device, kernels::kPlaneChances),
       read(device, kernels::kPlaneRead),
       sums(device, kernels::kPlaneSums),
       fireflies(device, kernels::kPlaneFireflies),

@@ -15,6 +15,7 @@ struct PlaneKernels {
   explicit PlaneKernels(const VulkanDevice& device);
 
   VulkanKernel means;
+  VulkanKernel chances;
   VulkanKernel read;
   VulkanKernel sums;
   VulkanKernel fireflies;

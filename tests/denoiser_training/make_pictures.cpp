@@ -251,19 +251,20 @@ void render_set(const Set& set, std::uint64_t seed, const Options& options, Host
     }
     if (films.size() < passes.size()) continue;
     const auto scale = float(quiet_exposure(films.back()));
+    for (const bool is_quick : is_judged ? std::vector{false, true} : std::vector<bool>()) {
+      write_denoised(
+          films, passes.size() - 2, view, scale, is_quick, isa, host,
+          options.out / (set.name + "_" + std::to_string(i) + (is_quick ? ".planes" : ".own")));
+    }
     FilmFile file(options.width, options.height, int(films.size()));
     for (std::size_t k = 0; k < films.size(); ++k) {
+      // As the renderer's network sees them; the last two are what it is compared with.
+      if (k + 2 < films.size()) average_chances(films[k], host);
       const Image<Vec3f> by_planes =
           denoised_on_planes(films[k], denoise_settings(films[k], view), isa, host);
       file.add(films[k], by_planes, passes[k], view.position(), scale);
     }
     file.write(options.out / (set.name + "_" + std::to_string(i) + ".films"));
-    if (!is_judged) continue;
-    for (const bool is_quick : {false, true}) {
-      write_denoised(
-          films, passes.size() - 2, view, scale, is_quick, isa, host,
-          options.out / (set.name + "_" + std::to_string(i) + (is_quick ? ".planes" : ".own")));
-    }
   }
 }
 

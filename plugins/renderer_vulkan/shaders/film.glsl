@@ -10,4 +10,5 @@ struct FilmPixel {
   float brightest;
   float count;
   float surface_share;
+  float chance_share;
 };

@@ -30,7 +30,8 @@ void main() {
     sum.mean += off / float(sum.count);
     sum.squares += off * (l - sum.mean);
     sum.brightest = max(sum.brightest, l);
-    if (seen.w == 0.0) continue;
+    if (seen.w >= kChance) ++sum.chances;
+    if (seen.w == 0.0 || seen.w == kChance) continue;
     const vec4 normal = RESULT(2u, path);
     const vec4 position = RESULT(3u, path);
     ++sum.surfaces;

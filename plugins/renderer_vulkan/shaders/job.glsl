@@ -33,6 +33,7 @@ struct PixelSum {
   float brightest;
   uint count;
   uint surfaces;
+  uint chances;
 };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer PixelSums { PixelSum v[]; };
 
@@ -111,6 +112,11 @@ const uint kHidesLights = 1u << 18;
 const uint kLastTwoSided = 1u << 19;
 const uint kHasSurface = 1u << 20;
 const uint kLeavesTriangle = 1u << 21;  // which it does not meet again
+const uint kByChance = 1u << 22;  // chose between ways before the first surface
+
+// What the first result has beside the lights seen: the sum of these.
+const float kSurface = 1.0;
+const float kChance = 2.0;
 
 #define STATE(column, path) job.state.v[(column) * job.capacity + (path)]
 #define RESULT(column, path) job.results.v[(column) * job.capacity + (path)]

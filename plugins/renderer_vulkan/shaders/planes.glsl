@@ -7,6 +7,7 @@ layout(local_size_x = 64) in;
 
 #include "film.glsl"
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer FilmPixels { FilmPixel v[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) writeonly buffer AveragedFilm { FilmPixel v[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) buffer Vec4s { vec4 v[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Vec3s { vec3 v[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Floats { float v[]; };
@@ -24,6 +25,7 @@ layout(push_constant, scalar) uniform Push {
   uint reach;  // of a round
   vec3 view_position;
   float brightest_path;
+  AveragedFilm averaged;  // the next steps' film
 };
 
 // Kinds of layers.

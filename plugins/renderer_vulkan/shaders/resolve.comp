@@ -21,6 +21,7 @@ FilmPixel mean_of(PixelSum sum) {
   mean.brightest = sum.brightest;
   mean.count = float(sum.count);
   mean.surface_share = float(sum.surfaces) * scale;
+  mean.chance_share = float(sum.chances) * scale;
   return mean;
 }
 

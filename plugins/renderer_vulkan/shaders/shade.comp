@@ -66,6 +66,9 @@ struct SurfacePoint {
 
 bool has(Path path, uint flag) { return (path.flags & flag) != 0u; }
 bool is_soft(Path path) { return has(path, kHasScattered) && job.has_caustics == 0u; }
+void choose(inout Path path) {
+  if (!has(path, kHasSurface)) path.flags |= kByChance;
+}
 bool is_first(Path path) { return path.last_density >= kInfinite; }
 
 Path load_path(uint index) {
@@ -102,7 +105,7 @@ Path load_path(uint index) {
 void store_path(uint index, Path path) {
   const bool leaves = has(path, kLeavesTriangle);
   uint flags = path.flags &
-               (kIsCameraRay | kHasScattered | kHidesLights | kHasSurface | kLeavesTriangle);
+               (kIsCameraRay | kHasScattered | kHidesLights | kHasSurface | kLeavesTriangle | kByChance);
   flags |= uint(path.bounce) | path.passes << 8;
   if (path.last.is_two_sided) flags |= kLastTwoSided;
   STATE(kOrigin, index) = vec4(path.origin, uintBitsToFloat(flags));
@@ -118,11 +121,13 @@ void store_path(uint index, Path path) {
            uintBitsToFloat(path.random.place), path.time);
 }
 
-void store_result(uint index, Path path) {
+void store_result(uint index, Path path, bool goes_on) {
   if (path.seen != vec3(0.0)) RESULT(0u, index).xyz += path.seen;
   if (path.scattered != vec3(0.0)) RESULT(1u, index).xyz += path.scattered;
+  const bool ends_without = !goes_on && !has(path, kHasSurface);
+  if (!path.records && !ends_without) return;
+  RESULT(0u, index).w = (path.records ? kSurface : 0.0) + (has(path, kByChance) ? kChance : 0.0);
   if (!path.records) return;
-  RESULT(0u, index).w = 1.0;
   RESULT(1u, index).w = path.albedo.x;
   RESULT(2u, index) = vec4(path.normal, path.albedo.y);
   RESULT(3u, index) = vec4(path.position, path.albedo.z);
@@ -256,6 +261,7 @@ uint pass_or_reflect(inout Path path, uint material, uint material_flags, Surfac
   float rest = u.x;
   if ((material_flags & kBlended) != 0u) {
     const float gap = 1.0 - clamp(opacity_at(material, s.uv), 0.0, 1.0);
+    if (gap > 0.0) choose(path);
     if (rest < gap) {
       pass(path, s, what);
       return what;
@@ -264,6 +270,7 @@ uint pass_or_reflect(inout Path path, uint material, uint material_flags, Surfac
   }
   if ((material_flags & kThinGlass) == 0u) return kScattered;
   const float share = (1.0 - surface.metallic) * surface.transmission;
+  if (share > 0.0) choose(path);
   if (rest >= share) {
     surface.metallic = share < 1.0 ? surface.metallic / (1.0 - share) : 0.0;
     surface.transmission = 0.0;
@@ -380,6 +387,7 @@ bool scatter(inout Path path, SurfacePoint s, Surface surface, inout ShadowRay s
       }
     }
     path.flags &= ~kIsCameraRay;
+    choose(path);
     const BsdfSample next = sample_bsdf(bsdf, u2.x, u3);
     const vec3 direction = to_world(basis, next.wi);
     if ((dot(s.flat_normal, direction) <= 0.0) != next.is_transmitted) return false;
@@ -530,7 +538,7 @@ void main() {
     index = job.queues[queue].v[gl_GlobalInvocationID.x];
     Path path = load_path(index);
     goes_on = advance(path, index, shadow);
-    store_result(index, path);
+    store_result(index, path, goes_on);
     if (goes_on) store_path(index, path);
   }
   uint place;

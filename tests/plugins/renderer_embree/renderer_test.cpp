@@ -518,6 +518,48 @@ TEST_CASE("glass lets the light of a lamp into a closed room", "[renderer]") {
   CHECK(lit(&wall, 0.02) < 1e-6);
 }
 
+TEST_CASE("what is seen through glass has no grain", "[renderer][denoiser]") {
+  // One path of some ten goes to a bright wall instead of the dark floor: colours that are means
+  // over such chances vary by a tenth from pixel to pixel.
+  TestWorld world;
+  world.add(dome(1.0f));
+  world.add("floor", make_plane(8, 8), matte(0.15f));
+  world.add("wall", make_box(Vec3(8, 0.1, 6)), matte(0.9f), at(0, 2.0, 3.0));
+  Material glass;
+  glass.base_color.setOnes();
+  glass.transmission = 1.0f;
+  glass.roughness = 0.0f;
+  world.add("slab", make_box(Vec3(1.2, 3.0, 0.1)), glass, at(-0.6, 0, 0.4));
+  const NodeId camera = world.add_camera(64, 48, 40.0, Vec3(0, -1.6, 1.6), Vec3(0, 0.1, 0.2));
+  const auto grain = [](const Image<Vec3f>& picture, int begin, int end) {
+    double sum = 0.0;
+    double squares = 0.0;
+    int count = 0;
+    for (int y = 16; y < 40; ++y) {
+      for (int x = begin; x < end; ++x) {
+        double around = 0.0;
+        for (int k = 0; k < 9; ++k) around += double(picture.at(x + k % 3 - 1, y + k / 3 - 1).x());
+        const double own = double(picture.at(x, y).x());
+        sum += own;
+        squares += std::pow(own - around / 9.0, 2);
+        ++count;
+      }
+    }
+    return std::sqrt(squares / count) / (sum / count);
+  };
+  for (const int samples : {4, 16}) {
+    EmbreeRenderer::Params params = reference(samples, 4);
+    params.caustics = false;
+    const double noisy = grain(render(world, camera, params), 8, 26);
+    params.denoise = true;
+    const Image<Vec3f> clean = render(world, camera, params);
+    const double through = grain(clean, 8, 26);
+    CAPTURE(samples, noisy, through);
+    CHECK(noisy > 0.05);
+    CHECK(through < 0.05);  // a fifth and an eighth without averaging them
+  }
+}
+
 namespace {
 
 /// A room with an opening to the sky and lamps of two kinds, and with screens, if any, before the

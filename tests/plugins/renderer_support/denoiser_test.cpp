@@ -329,6 +329,51 @@ TEST_CASE("a large picture, denoised in tiles, has no seams", "[denoiser]") {
   CHECK(column_steps(1024) <= around);
 }
 
+TEST_CASE("what is seen by chance is averaged over pixels that see so, too", "[denoiser]") {
+  // Glass on the right of column 8, where one path of four goes to a white wall, and one pixel
+  // whose paths all came to nothing; stripes beside it.
+  const auto film_of = [](float count) {
+    Film film(20, 12, FilmPixel{});
+    for (int y = 0; y < film.height(); ++y) {
+      for (int x = 0; x < film.width(); ++x) {
+        FilmPixel& pixel = film.at(x, y);
+        const bool is_glass = x >= 8;
+        const bool is_odd = (x + 2 * y) % 4 == 0;
+        pixel.count = count;
+        pixel.albedo = Vec3f::Constant(is_glass ? (is_odd ? 0.9f : 0.1f) : 0.1f * float(x % 3));
+        pixel.seen = Vec3f::Constant(float(x));
+        pixel.normal = Vec3f::UnitX();
+        pixel.position = Vec3f(float(is_odd), 0.0f, 0.0f);
+        pixel.surface_share = 1.0f;
+        pixel.chance_share = is_glass ? 1.0f : 0.0f;
+      }
+    }
+    FilmPixel& lost = film.at(13, 6);
+    lost.albedo = lost.normal = lost.position = Vec3f::Zero();
+    lost.surface_share = 0.0f;
+    return film;
+  };
+  test::RenderHost host(2);
+  const Film before = film_of(4.0f);
+  Film film = film_of(4.0f);
+  average_chances(film, host);
+  for (int y = 0; y < film.height(); ++y) {
+    for (int x = 0; x < 8; ++x) CHECK(film.at(x, y).albedo == before.at(x, y).albedo);
+    for (int x = 0; x < film.width(); ++x) CHECK(film.at(x, y).seen == before.at(x, y).seen);
+  }
+  // Of 5 x 5 pixels the closer ones weigh more: of 81 shares this one that saw the wall has 9, two
+  // in its column have 3 each, four in the rows beside 2 each.
+  CHECK(film.at(16, 2).position.x() == Approx(23.0 / 81.0));
+  CHECK(film.at(16, 2).albedo.x() == Approx(0.1 + 0.8 * 23.0 / 81.0));
+  CHECK(film.at(13, 6).surface_share == Approx(1.0f - 9.0f / 81.0f));
+  CHECK(film.at(13, 6).normal.x() == Approx(1.0f));
+  CHECK(film.at(13, 6).albedo.x() > 0.15f);
+  // Enough paths speak for themselves.
+  Film many = film_of(128.0f);
+  average_chances(many, host);
+  CHECK(many.at(16, 2).albedo == before.at(16, 2).albedo);
+}
+
 TEST_CASE("the network takes from planes what they do well", "[denoiser]") {
   // A shadow's edge on one wall, of which no plane tells, with little noise and with much.
   for (const double noise : {0.03, 1.0}) {

@@ -14,6 +14,7 @@
 
 #include "diorama/rng.h"
 #include "embree_renderer.h"
+#include "path_tracer.h"
 #include "plugins/renderer_embree/test_world.h"
 #include "renderer_support/denoiser.h"
 #include "renderer_support/plane_filter.h"
@@ -282,6 +283,65 @@ TEST_CASE("what touches glass from behind is seen through it", "[vulkan]") {
         CHECK(touching[i] < 1.08 * lifted[i]);
       }
     }
+  }
+}
+
+TEST_CASE("paths that chose their way at glass are counted as by Embree", "[vulkan]") {
+  struct Case {
+    const char* name;
+    std::function<void(Material&)> change;
+    double least;  ///< Of the picture's paths.
+    double most;
+  };
+  const std::vector<Case> cases{
+      {"matte", [](Material&) {}, 0.0, 0.0},
+      {"mirror", [](Material& m) { m.metallic = 1.0f, m.roughness = 0.0f; }, 0.0, 0.0},
+      {"glass", [](Material& m) { m.transmission = 1.0f, m.roughness = 0.0f; }, 0.15, 0.5},
+      // It has a colour of its own, where paths are recorded before they choose.
+      {"frosted", [](Material& m) { m.transmission = 0.9f, m.roughness = 0.5f; }, 0.0, 0.0},
+      {"pane", [](Material& m) { m.transmission = 0.8f, m.is_thin_walled = true; }, 0.15, 0.5},
+      {"veil", [](Material& m) { m.opacity = 0.4f; }, 0.15, 0.5},
+      {"opaque veil", [](Material& m) { m.opacity = 1.0f; }, 0.0, 0.0}};
+  RenderHost host(2);
+  for (const Case& c : cases) {
+    Material material = matte(0.7f);
+    c.change(material);
+    TestWorld world = room_with(material);
+    const View view(world.scene, camera_into(world));
+    EmbreeScene meshes(host, {"sse2", {}});
+    meshes.take(world.scene);
+    const PathSettings settings{.max_bounces = 4};
+    const int width = view.camera().width;
+    const int height = view.camera().height;
+    const auto jobs = SamplePlan(width, height, {8}, 9).next_round({}, 0.0);
+    Image<float> here(width, height, 0.0f);
+    for (const TraceJob& job : jobs) {
+      std::vector<PixelSum> sums(job.pixel_count());
+      PathTracer(meshes, view, {settings}, Isa::Sse2)
+          .trace(job, sums.data(), std::size_t(job.x_end - job.x_begin));
+      const PixelSum* sum = sums.data();
+      for (int y = job.y_begin; y < job.y_end; ++y) {
+        for (int x = job.x_begin; x < job.x_end; ++x) here.at(x, y) = (sum++)->mean().chance_share;
+      }
+    }
+    double mean = 0.0;
+    for (const float share : here.pixels()) mean += double(share) / double(here.pixels().size());
+    CAPTURE(c.name, mean);
+    CHECK(mean >= c.least);
+    CHECK(mean <= c.most);
+    if (!test::has_vulkan_device()) continue;
+    GpuScene scene(*test::path_device(), host);
+    scene.take(meshes.render_scene());
+    GpuPathTracer tracer(*test::path_device(), host);
+    tracer.begin(view, settings, scene.world(), meshes.window());
+    tracer.trace(jobs);
+    const Film film = tracer.film();
+    std::size_t unequal = 0;
+    for (std::size_t i = 0; i < film.pixels().size(); ++i) {
+      unequal += film.pixels()[i].chance_share == here.pixels()[i] ? 0 : 1;
+    }
+    CAPTURE(unequal);
+    CHECK(unequal <= film.pixels().size() / 100);
   }
 }
 
@@ -796,6 +856,10 @@ TEST_CASE("the filter on planes makes of a film there what it makes of it here",
   mirror.metallic = 1.0f;
   mirror.roughness = 0.15f;
   TestWorld world = room_with(mirror);
+  Material glass;
+  glass.transmission = 1.0f;
+  glass.roughness = 0.0f;
+  world.add("glass", make_sphere(0.3, 32), glass, at(0.0, -0.2, -0.5));
   // Sizes that end within a block of pixels; of several paths some are far too bright.
   for (const auto& [width, height] : {std::pair{67, 35}, std::pair{7, 5}}) {
     const NodeId camera =
@@ -814,7 +878,8 @@ TEST_CASE("the filter on planes makes of a film there what it makes of it here",
         SamplePlan plan(width, height, {samples}, 9);
         tracer.trace(plan.next_round({}, 0.0));
         const Image<Vec3f> there = filter.filtered(tracer, view.position(), limit);
-        const Film film = tracer.film();
+        Film film = tracer.film();
+        average_chances(film, host);
         DenoiseSettings settings{view.position()};
         if (limit > 0.0) settings.brightest_path = float(limit / quiet_exposure(film));
         const Image<Vec3f> here = filtered_on_planes(film, settings, Isa::Sse2, host);
