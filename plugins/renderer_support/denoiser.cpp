@@ -26,6 +26,63 @@ Vec3f finite(const Vec3f& value) {
   return value.unaryExpr([](float v) { return finite(v); });
 }
 
+/// What a pixel's paths found that chose their way.
+struct SeenByChance {
+  Vec3f albedo = Vec3f::Zero();
+  Vec3f normal = Vec3f::Zero();
+  Vec3f position = Vec3f::Zero();
+  Vec3f lights = Vec3f::Zero();
+  float share = 0.0f;     ///< Of all paths.
+  float surfaces = 0.0f;  ///< Share of the paths that met one.
+};
+
+void average_chances(FilmPixel& pixel, const Image<SeenByChance>& before, int x, int y) {
+  constexpr float kPaths = 128.0f;
+  constexpr int kMostReach = 2;
+  // Lights that pixels around see by so few paths each that, by chance, none of this one's found
+  // them.
+  constexpr int kLitAround = 4;
+  constexpr float kFewPaths = 4.0f;
+  int reach = 0;
+  while (reach < kMostReach && float((2 * reach + 1) * (2 * reach + 1)) * pixel.count < kPaths) {
+    ++reach;
+  }
+  SeenByChance sum;
+  float light_weights = 0.0f;
+  int lit = 0;
+  float without_surface = 0.0f;  // of those that are lit
+  for (int v = std::max(0, y - reach); v < std::min(before.height(), y + reach + 1); ++v) {
+    for (int u = std::max(0, x - reach); u < std::min(before.width(), x + reach + 1); ++u) {
+      const SeenByChance& near = before.at(u, v);
+      const int away_x = std::abs(u - x);
+      const int away_y = std::abs(v - y);
+      const float weight = float((reach + 1 - away_x) * (reach + 1 - away_y)) * near.share;
+      const float on_surfaces = weight * near.surfaces;
+      sum.albedo += weight * near.albedo;
+      sum.share += weight;
+      sum.normal += on_surfaces * near.normal;
+      sum.position += on_surfaces * near.position;
+      sum.surfaces += on_surfaces;
+      if (away_x > 1 || away_y > 1) continue;
+      const float light_weight = float((2 - away_x) * (2 - away_y)) * near.share;
+      sum.lights += light_weight * near.lights;
+      light_weights += light_weight;
+      if (away_x + away_y == 0 || !(luminance(near.lights) > 0.0f)) continue;
+      ++lit;
+      without_surface += 1.0f - near.surfaces;
+    }
+  }
+  const float share = pixel.chance_share;
+  pixel.albedo += share * (sum.albedo / sum.share - pixel.albedo);
+  if (lit >= kLitAround && pixel.count * without_surface < kFewPaths * float(lit)) {
+    pixel.seen += share * (sum.lights / light_weights - pixel.seen);
+  }
+  if (!(sum.surfaces > 0.0f)) return;
+  pixel.normal += share * (sum.normal / sum.surfaces - pixel.normal);
+  pixel.position += share * (sum.position / sum.surfaces - pixel.position);
+  pixel.surface_share += share * (sum.surfaces / sum.share - pixel.surface_share);
+}
+
 /// Gives the picture the mean that it had with its noise, as far as that noise lets it be known.
 /// What is seen directly stays.
 void rebalance(Image<Vec3f>& image, const Film& film, Host& host) {
@@ -101,53 +158,18 @@ double quiet_exposure(const Film& film) {
 }
 
 void average_chances(Film& film, Host& host) {
-  constexpr float kPaths = 128.0f;
-  constexpr int kMostReach = 2;
-  struct Seen {
-    Vec3f albedo;
-    Vec3f normal;
-    Vec3f position;
-    float share;
-    float surfaces;
-  };
   const std::span<FilmPixel> pixels = film.pixels();
   const auto is_by_chance = [](const FilmPixel& pixel) { return pixel.chance_share > 0.0f; };
   if (std::ranges::none_of(pixels, is_by_chance)) return;
-  std::vector<Seen> before(pixels.size());
-  std::ranges::transform(pixels, before.begin(), [](const FilmPixel& pixel) {
-    return Seen{pixel.albedo, pixel.normal, pixel.position, pixel.chance_share,
-                pixel.chance_share * pixel.surface_share};
+  Image<SeenByChance> before(film.width(), film.height(), {});
+  std::ranges::transform(pixels, before.pixels().begin(), [](const FilmPixel& pixel) {
+    return SeenByChance{pixel.albedo, pixel.normal,       pixel.position,
+                        pixel.seen,   pixel.chance_share, pixel.surface_share};
   });
   host.parallel_for(std::size_t(film.height()), [&](std::size_t row) {
     const int y = int(row);
     for (int x = 0; x < film.width(); ++x) {
-      FilmPixel& pixel = film.at(x, y);
-      if (!is_by_chance(pixel)) continue;
-      int reach = 0;
-      while (reach < kMostReach &&
-             float((2 * reach + 1) * (2 * reach + 1)) * pixel.count < kPaths) {
-        ++reach;
-      }
-      Seen sum{Vec3f::Zero(), Vec3f::Zero(), Vec3f::Zero(), 0.0f, 0.0f};
-      for (int v = std::max(0, y - reach); v < std::min(film.height(), y + reach + 1); ++v) {
-        for (int u = std::max(0, x - reach); u < std::min(film.width(), x + reach + 1); ++u) {
-          const Seen& near = before[std::size_t(v) * std::size_t(film.width()) + std::size_t(u)];
-          const int closeness = (reach + 1 - std::abs(u - x)) * (reach + 1 - std::abs(v - y));
-          const float weight = float(closeness) * near.share;
-          const float surfaces = float(closeness) * near.surfaces;
-          sum.albedo += weight * near.albedo;
-          sum.share += weight;
-          sum.normal += surfaces * near.normal;
-          sum.position += surfaces * near.position;
-          sum.surfaces += surfaces;
-        }
-      }
-      const float share = pixel.chance_share;
-      pixel.albedo += share * (sum.albedo / sum.share - pixel.albedo);
-      if (!(sum.surfaces > 0.0f)) continue;
-      pixel.normal += share * (sum.normal / sum.surfaces - pixel.normal);
-      pixel.position += share * (sum.position / sum.surfaces - pixel.position);
-      pixel.surface_share += share * (sum.surfaces / sum.share - pixel.surface_share);
+      if (is_by_chance(film.at(x, y))) average_chances(film.at(x, y), before, x, y);
     }
   });
 }

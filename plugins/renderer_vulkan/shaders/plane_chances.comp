@@ -7,6 +7,8 @@
 
 const float kPaths = 128.0;
 const int kMostReach = 2;
+const int kLitAround = 4;
+const float kFewPaths = 4.0;
 
 void average(inout FilmPixel pixel, int x, int y) {
   int reach = 0;
@@ -18,24 +20,40 @@ void average(inout FilmPixel pixel, int x, int y) {
   vec3 position = vec3(0.0);
   float shares = 0.0;
   float surfaces = 0.0;
+  vec3 lights = vec3(0.0);
+  float light_weights = 0.0;
+  int lit = 0;
+  float without_surface = 0.0;
   for (int v = max(0, y - reach); v < min(int(height), y + reach + 1); ++v) {
     for (int u = max(0, x - reach); u < min(int(width), x + reach + 1); ++u) {
       const FilmPixel near = film.v[uint(v) * width + uint(u)];
-      const float weight =
-          float((reach + 1 - abs(u - x)) * (reach + 1 - abs(v - y))) * near.chance_share;
+      const int away_x = abs(u - x);
+      const int away_y = abs(v - y);
+      const float weight = float((reach + 1 - away_x) * (reach + 1 - away_y)) * near.chance_share;
       const float on_surfaces = weight * near.surface_share;
       albedo += weight * near.albedo;
       shares += weight;
       normal += on_surfaces * near.normal;
       position += on_surfaces * near.position;
       surfaces += on_surfaces;
+      if (away_x > 1 || away_y > 1) continue;
+      const float light_weight = float((2 - away_x) * (2 - away_y)) * near.chance_share;
+      lights += light_weight * near.seen;
+      light_weights += light_weight;
+      if (away_x + away_y == 0 || !(luminance(near.seen) > 0.0)) continue;
+      ++lit;
+      without_surface += 1.0 - near.surface_share;
     }
   }
-  pixel.albedo += pixel.chance_share * (albedo / shares - pixel.albedo);
+  const float share = pixel.chance_share;
+  pixel.albedo += share * (albedo / shares - pixel.albedo);
+  if (lit >= kLitAround && pixel.count * without_surface < kFewPaths * float(lit)) {
+    pixel.seen += share * (lights / light_weights - pixel.seen);
+  }
   if (!(surfaces > 0.0)) return;
-  pixel.normal += pixel.chance_share * (normal / surfaces - pixel.normal);
-  pixel.position += pixel.chance_share * (position / surfaces - pixel.position);
-  pixel.surface_share += pixel.chance_share * (surfaces / shares - pixel.surface_share);
+  pixel.normal += share * (normal / surfaces - pixel.normal);
+  pixel.position += share * (position / surfaces - pixel.position);
+  pixel.surface_share += share * (surfaces / shares - pixel.surface_share);
 }
 
 void main() {

@@ -341,14 +341,23 @@ TEST_CASE("what is seen by chance is averaged over pixels that see so, too", "[d
         const bool is_odd = (x + 2 * y) % 4 == 0;
         pixel.count = count;
         pixel.albedo = Vec3f::Constant(is_glass ? (is_odd ? 0.9f : 0.1f) : 0.1f * float(x % 3));
-        pixel.seen = Vec3f::Constant(float(x));
         pixel.normal = Vec3f::UnitX();
         pixel.position = Vec3f(float(is_odd), 0.0f, 0.0f);
         pixel.surface_share = 1.0f;
         pixel.chance_share = is_glass ? 1.0f : 0.0f;
       }
     }
-    FilmPixel& lost = film.at(13, 6);
+    // Three pixels lit around a hole where one path of four found the light, where all did, and
+    // one alone.
+    for (int v = 8; v < 11; ++v) {
+      for (int u = 9; u < 12; ++u)
+        film.at(u, v).seen = Vec3f::Constant(v == 9 && u == 10 ? 0.0f : 8.0f);
+      for (int u = 9; u < 12; ++u) film.at(u, v).surface_share = 0.75f;
+      for (int u = 14; u < 17; ++u) film.at(u, v).seen = film.at(u - 5, v).seen;
+      for (int u = 14; u < 17; ++u) film.at(u, v).surface_share = v == 9 && u == 15 ? 1.0f : 0.0f;
+    }
+    film.at(18, 4).seen = Vec3f::Constant(8.0f);
+    FilmPixel& lost = film.at(12, 3);
     lost.albedo = lost.normal = lost.position = Vec3f::Zero();
     lost.surface_share = 0.0f;
     return film;
@@ -359,15 +368,18 @@ TEST_CASE("what is seen by chance is averaged over pixels that see so, too", "[d
   average_chances(film, host);
   for (int y = 0; y < film.height(); ++y) {
     for (int x = 0; x < 8; ++x) CHECK(film.at(x, y).albedo == before.at(x, y).albedo);
-    for (int x = 0; x < film.width(); ++x) CHECK(film.at(x, y).seen == before.at(x, y).seen);
   }
+  CHECK(film.at(10, 9).seen.x() == Approx(8.0f * 12.0f / 16.0f));
+  CHECK(film.at(15, 9).seen.x() == 0.0f);
+  CHECK(film.at(18, 4).seen.x() == 8.0f);
+  CHECK(film.at(17, 4).seen.x() == 0.0f);
   // Of 5 x 5 pixels the closer ones weigh more: of 81 shares this one that saw the wall has 9, two
   // in its column have 3 each, four in the rows beside 2 each.
   CHECK(film.at(16, 2).position.x() == Approx(23.0 / 81.0));
   CHECK(film.at(16, 2).albedo.x() == Approx(0.1 + 0.8 * 23.0 / 81.0));
-  CHECK(film.at(13, 6).surface_share == Approx(1.0f - 9.0f / 81.0f));
-  CHECK(film.at(13, 6).normal.x() == Approx(1.0f));
-  CHECK(film.at(13, 6).albedo.x() > 0.15f);
+  CHECK(film.at(12, 3).surface_share == Approx(1.0f - 9.0f / 81.0f));
+  CHECK(film.at(12, 3).normal.x() == Approx(1.0f));
+  CHECK(film.at(12, 3).albedo.x() > 0.15f);
   // Enough paths speak for themselves.
   Film many = film_of(128.0f);
   average_chances(many, host);
