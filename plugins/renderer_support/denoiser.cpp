@@ -36,23 +36,32 @@ struct SeenByChance {
   float surfaces = 0.0f;  ///< Share of the paths that met one.
 };
 
+/// Whether so many of the pixel's paths came to no surface as paths of which one in so many does
+/// not, and there are too few of them to tell how bright a light is that is seen so.
+bool is_chance(const FilmPixel& pixel, float probability) {
+  constexpr float kLeastPaths = 4.0f;
+  const float found = pixel.count * (1.0f - pixel.surface_share);
+  const float expected = pixel.count * probability;
+  const float deviation = std::sqrt(expected * (1.0f - probability));
+  return pixel.count >= kLeastPaths && std::abs(found - expected) <= 2.0f * deviation + 0.5f &&
+         deviation > 0.1f * expected;
+}
+
 void average_chances(FilmPixel& pixel, const Image<SeenByChance>& before, int x, int y) {
   constexpr float kPaths = 128.0f;
   constexpr int kMostReach = 2;
-  // Lights that pixels around see by so few paths each that, by chance, none of this one's found
-  // them.
-  constexpr int kLitAround = 4;
-  constexpr float kFewPaths = 4.0f;
   int reach = 0;
   while (reach < kMostReach && float((2 * reach + 1) * (2 * reach + 1)) * pixel.count < kPaths) {
     ++reach;
   }
+  const int looked_at = std::max(reach, 1);  // for lights at least so far
   SeenByChance sum;
   float light_weights = 0.0f;
   int lit = 0;
-  float without_surface = 0.0f;  // of those that are lit
-  for (int v = std::max(0, y - reach); v < std::min(before.height(), y + reach + 1); ++v) {
-    for (int u = std::max(0, x - reach); u < std::min(before.width(), x + reach + 1); ++u) {
+  int neighbours = 0;
+  float without_surface = 0.0f;
+  for (int v = std::max(0, y - looked_at); v < std::min(before.height(), y + looked_at + 1); ++v) {
+    for (int u = std::max(0, x - looked_at); u < std::min(before.width(), x + looked_at + 1); ++u) {
       const SeenByChance& near = before.at(u, v);
       const int away_x = std::abs(u - x);
       const int away_y = std::abs(v - y);
@@ -67,14 +76,15 @@ void average_chances(FilmPixel& pixel, const Image<SeenByChance>& before, int x,
       const float light_weight = float((2 - away_x) * (2 - away_y)) * near.share;
       sum.lights += light_weight * near.lights;
       light_weights += light_weight;
-      if (away_x + away_y == 0 || !(luminance(near.lights) > 0.0f)) continue;
-      ++lit;
+      if (away_x + away_y == 0 || !(near.share > 0.0f)) continue;
+      lit += luminance(near.lights) > 0.0f ? 1 : 0;
+      ++neighbours;
       without_surface += 1.0f - near.surfaces;
     }
   }
   const float share = pixel.chance_share;
   pixel.albedo += share * (sum.albedo / sum.share - pixel.albedo);
-  if (lit >= kLitAround && pixel.count * without_surface < kFewPaths * float(lit)) {
+  if (lit >= 4 && is_chance(pixel, without_surface / float(neighbours))) {
     pixel.seen += share * (sum.lights / light_weights - pixel.seen);
   }
   if (!(sum.surfaces > 0.0f)) return;

@@ -25,8 +25,8 @@ std::size_t denoiser_bytes(int width, int height, bool is_quick);
 /// how it faces are means over chances. A filter that multiplies by such colours shows their grain,
 /// and takes pixels with a rare choice for things of their own. So they are averaged over the
 /// pixels around that are seen so, too (FilmPixel::chance_share), 5 x 5 at most, until 128 paths
-/// make them. Lights that are seen there are averaged over 3 x 3 pixels where most of these see
-/// some, by few paths each: else they stay, or small ones would become blots.
+/// make them. Lights that are seen there are averaged over 3 x 3 pixels where half of those around
+/// see some and chance explains how they differ: else they stay, or small ones would become blots.
 void average_chances(Film& film, Host& host);
 
 /// What a filter that looks at planes (plane_filter.h) makes of a film, with the mean that it had
