@@ -189,7 +189,8 @@ std::size_t denoiser_bytes(int width, int height, bool is_quick) {
   if (is_quick) {
     return SparePages::keeps(pixels * sizeof(FilmPixel))
                ? pixels * (sizeof(FilmPixel) + kPlaneFilterBytesPerPixel)
-               : pixels * std::max(sizeof(FilmPixel), kPlaneFilterBytesPerPixel);
+               : pixels *
+                     std::max(sizeof(FilmPixel) + sizeof(SeenByChance), kPlaneFilterBytesPerPixel);
   }
   return pixels * sizeof(FilmPixel) +
          std::max(pixels * kPlaneFilterBytesPerPixel,
