@@ -440,80 +440,59 @@ template <int kWide, int kGroup, int kCount>
   }
 }
 
-template <class Task>
-[[gnu::always_inline]] inline void convolve_by_16(const Task& task) {
+/// All blocks of outputs, as many pixels or tiles at a time as registers hold.
+template <int kWide, class Task>
+[[gnu::always_inline]] inline void convolve_outputs(const Task& task) {
   const int outputs = task.convolution->outputs;
   int block = 0;
-  for (; outputs - block >= 5 || outputs - block == 3; block += 3) {
-    convolve_blocks<16, 3, 8>(task, block);
+  if constexpr (kWide == 16) {
+    for (; outputs - block >= 5 || outputs - block == 3; block += 3) {
+      convolve_blocks<16, 3, 8>(task, block);
+    }
+    for (; block + 2 <= outputs; block += 2) convolve_blocks<16, 2, 12>(task, block);
   }
-  for (; block + 2 <= outputs; block += 2) convolve_blocks<16, 2, 12>(task, block);
-  if (block < outputs) convolve_blocks<16, 1, 12>(task, block);
+  constexpr int kCount = kWide == 16 ? 12 : kWide == 8 ? 6 : 2;
+  for (; block < outputs; ++block) convolve_blocks<kWide, 1, kCount>(task, block);
+}
+
+template <int kWide>
+[[gnu::always_inline]] inline void convolve_by(const RowTask& task) {
+  convolve_outputs<kWide>(task);
+}
+template <int kWide>
+[[gnu::always_inline]] inline void convolve_by(const TileTask& task) {
+  transform_inputs<kWide>(task);
+  convolve_outputs<kWide>(task);
+}
+
+template <class Task>
+[[gnu::target("arch=x86-64-v4"), gnu::flatten]] void convolve_avx512(const Task& task) {
+  convolve_by<16>(task);
 }
 template <class Task>
-[[gnu::always_inline]] inline void convolve_by_8(const Task& task) {
-  for (int block = 0; block < task.convolution->outputs; ++block) {
-    convolve_blocks<8, 1, 6>(task, block);
-  }
+[[gnu::target("arch=x86-64-v3"), gnu::flatten]] void convolve_avx2(const Task& task) {
+  convolve_by<8>(task);
 }
 template <class Task>
-[[gnu::always_inline]] inline void convolve_by_4(const Task& task) {
-  for (int block = 0; block < task.convolution->outputs; ++block) {
-    convolve_blocks<4, 1, 2>(task, block);
-  }
+[[gnu::target("arch=x86-64-v2"), gnu::flatten]] void convolve_sse42(const Task& task) {
+  convolve_by<4>(task);
+}
+template <class Task>
+[[gnu::flatten]] void convolve_sse2(const Task& task) {
+  convolve_by<4>(task);
 }
 
-[[gnu::target("arch=x86-64-v4"), gnu::flatten]] void row_avx512(const RowTask& task) {
-  convolve_by_16(task);
-}
-[[gnu::target("arch=x86-64-v3"), gnu::flatten]] void row_avx2(const RowTask& task) {
-  convolve_by_8(task);
-}
-[[gnu::target("arch=x86-64-v2"), gnu::flatten]] void row_sse42(const RowTask& task) {
-  convolve_by_4(task);
-}
-[[gnu::flatten]] void row_sse2(const RowTask& task) { convolve_by_4(task); }
-
-void convolve_row(const RowTask& task, Isa isa) {
+template <class Task>
+void convolve(const Task& task, Isa isa) {
   switch (isa) {
     case Isa::Sse2:
-      return row_sse2(task);
+      return convolve_sse2(task);
     case Isa::Sse42:
-      return row_sse42(task);
+      return convolve_sse42(task);
     case Isa::Avx2:
-      return row_avx2(task);
+      return convolve_avx2(task);
     case Isa::Avx512:
-      return row_avx512(task);
-  }
-}
-
-[[gnu::target("arch=x86-64-v4"), gnu::flatten]] void tiles_avx512(const TileTask& task) {
-  transform_inputs<16>(task);
-  convolve_by_16(task);
-}
-[[gnu::target("arch=x86-64-v3"), gnu::flatten]] void tiles_avx2(const TileTask& task) {
-  transform_inputs<8>(task);
-  convolve_by_8(task);
-}
-[[gnu::target("arch=x86-64-v2"), gnu::flatten]] void tiles_sse42(const TileTask& task) {
-  transform_inputs<4>(task);
-  convolve_by_4(task);
-}
-[[gnu::flatten]] void tiles_sse2(const TileTask& task) {
-  transform_inputs<4>(task);
-  convolve_by_4(task);
-}
-
-void convolve_group(const TileTask& task, Isa isa) {
-  switch (isa) {
-    case Isa::Sse2:
-      return tiles_sse2(task);
-    case Isa::Sse42:
-      return tiles_sse42(task);
-    case Isa::Avx2:
-      return tiles_avx2(task);
-    case Isa::Avx512:
-      return tiles_avx512(task);
+      return convolve_avx512(task);
   }
 }
 
@@ -531,9 +510,9 @@ void convolve_tiles(const Convolution& c, const ChannelBlocks& from, const Chann
     float* const values = scratch.data() + task * per_task;
     for (int group = next++; group < groups; group = next++) {
       const int first = group * kTilesPerGroup;
-      convolve_group({&c, &from, &to, first, std::min(kTilesPerGroup, tiles - first), values,
-                      values + values_size(c.inputs)},
-                     isa);
+      const int count = std::min(kTilesPerGroup, tiles - first);
+      float* const products = values + values_size(c.inputs);
+      convolve(TileTask{&c, &from, &to, first, count, values, products}, isa);
     }
   });
   spare.give(std::move(scratch));
@@ -670,7 +649,7 @@ DenoiserNetwork::Logits DenoiserNetwork::run(ChannelBlocks features, Isa isa, Ho
   const auto convolved_1x1 = [&](const Convolution& c, const ChannelBlocks& from) {
     ChannelBlocks to(c.outputs * kBlock, from.width(), from.height(), spare);
     for_rows(from.height(), host, [&](int y) {
-      convolve_row({&c, &from, y, to.at(0, 0, y), to.block_stride()}, isa);
+      convolve(RowTask{&c, &from, y, to.at(0, 0, y), to.block_stride()}, isa);
     });
     return to;
   };
@@ -709,7 +688,7 @@ DenoiserNetwork::Logits DenoiserNetwork::run(ChannelBlocks features, Isa isa, Ho
 
 void DenoiserNetwork::pixel_logits(const Logits& logits, int y, Isa isa, float* out) const {
   const std::size_t stride = std::size_t(logits.last.width()) * kBlock;
-  convolve_row({&pixels_, &logits.last, y, out, stride}, isa);
+  convolve(RowTask{&pixels_, &logits.last, y, out, stride}, isa);
 }
 
 }  // namespace diorama

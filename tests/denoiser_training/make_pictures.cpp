@@ -251,10 +251,12 @@ void render_set(const Set& set, std::uint64_t seed, const Options& options, Host
     }
     if (films.size() < passes.size()) continue;
     const auto scale = float(quiet_exposure(films.back()));
-    for (const bool is_quick : is_judged ? std::vector{false, true} : std::vector<bool>()) {
-      write_denoised(
-          films, passes.size() - 2, view, scale, is_quick, isa, host,
-          options.out / (set.name + "_" + std::to_string(i) + (is_quick ? ".planes" : ".own")));
+    const std::filesystem::path file_stem = options.out / (set.name + "_" + std::to_string(i));
+    if (is_judged) {
+      for (const bool is_quick : {false, true}) {
+        write_denoised(films, passes.size() - 2, view, scale, is_quick, isa, host,
+                       file_stem.string() + (is_quick ? ".planes" : ".own"));
+      }
     }
     FilmFile file(options.width, options.height, int(films.size()));
     for (std::size_t k = 0; k < films.size(); ++k) {
@@ -264,7 +266,7 @@ void render_set(const Set& set, std::uint64_t seed, const Options& options, Host
           denoised_on_planes(films[k], denoise_settings(films[k], view), isa, host);
       file.add(films[k], by_planes, passes[k], view.position(), scale);
     }
-    file.write(options.out / (set.name + "_" + std::to_string(i) + ".films"));
+    file.write(file_stem.string() + ".films");
   }
 }
 

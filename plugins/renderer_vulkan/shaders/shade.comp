@@ -104,8 +104,8 @@ Path load_path(uint index) {
 
 void store_path(uint index, Path path) {
   const bool leaves = has(path, kLeavesTriangle);
-  uint flags = path.flags &
-               (kIsCameraRay | kHasScattered | kHidesLights | kHasSurface | kLeavesTriangle | kByChance);
+  uint flags = path.flags & (kIsCameraRay | kHasScattered | kHidesLights | kHasSurface |
+                             kLeavesTriangle | kByChance);
   flags |= uint(path.bounce) | path.passes << 8;
   if (path.last.is_two_sided) flags |= kLastTwoSided;
   STATE(kOrigin, index) = vec4(path.origin, uintBitsToFloat(flags));
