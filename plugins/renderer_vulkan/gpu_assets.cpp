@@ -48,6 +48,18 @@ MeshBytes bytes_of(const ShadingMesh& mesh) {
   return bytes;
 }
 
+/// Of the triangles that rays may meet, in the order of the tree's leaves.
+std::vector<Vec3f> corners_of(const ShadingMesh& mesh, std::span<const std::uint32_t> order) {
+  std::vector<Vec3f> corners;
+  corners.reserve(3 * order.size());
+  for (const std::uint32_t t : order) {
+    for (const std::uint32_t corner : mesh.corners(t)) {
+      corners.push_back(mesh.source().positions[corner]);
+    }
+  }
+  return corners;
+}
+
 /// Of textures whose words wait to be sent together.
 constexpr std::size_t kMostTexels = std::size_t(16) << 20;
 
@@ -148,11 +160,12 @@ std::vector<std::shared_ptr<const MeshOnDevice>> GpuAssets::take(
                       [&](std::size_t k) { made[k] = bytes_of(*meshes[missing[k]]); });
     constexpr int kTopLevels = 7;
     std::vector<GpuBytes> blobs(missing.size());
-    std::vector<std::shared_ptr<const MeshOnDevice>> placed;
+    std::vector<std::vector<std::uint32_t>> orders(missing.size());
+    std::vector<std::shared_ptr<MeshOnDevice>> placed;
     std::vector<VulkanDevice::Transfer> transfers;
     for (std::size_t k = 0; k < missing.size(); ++k) {
       const ShadingMesh& mesh = *meshes[missing[k]];
-      const MeshBytes bytes = std::move(made[k]);
+      MeshBytes bytes = std::move(made[k]);
       GpuBytes& blob = blobs[k];
       const std::size_t nodes = blob.add(bytes.tree.nodes);
       const std::size_t triangles = blob.add(bytes.triangles);
@@ -161,6 +174,7 @@ std::vector<std::shared_ptr<const MeshOnDevice>> GpuAssets::take(
       const std::size_t colors = blob.add(bytes.colors);
       auto on_device = std::make_shared<MeshOnDevice>();
       on_device->memory = arena_.take(blob.bytes().size(), "a mesh and its tree");
+      on_device->triangle_count = bytes.triangles.size();
       on_device->top = bytes.tree.top(kTopLevels);
       transfers.push_back({blob.bytes(), &on_device->memory.buffer(), on_device->memory.offset()});
       const gpu::Address base = on_device->memory.address();
@@ -174,10 +188,17 @@ std::vector<std::shared_ptr<const MeshOnDevice>> GpuAssets::take(
                     (bytes.uvs.empty() ? 0u : gpu::kHasUvs) |
                     (bytes.colors.empty() ? 0u : gpu::kHasColors) |
                     (mesh.source().is_double_sided ? gpu::kDoubleSided : 0u);
+      orders[k] = std::move(bytes.tree.order);
       placed.push_back(std::move(on_device));
     }
     device_.upload(transfers);
-    return placed;
+    if (device_.traces_by_query()) {
+      MeshStructureBuilder builder(device_, arena_);
+      for (std::size_t k = 0; k < missing.size(); ++k) {
+        placed[k]->structure = builder.build(corners_of(*meshes[missing[k]], orders[k]));
+      }
+    }
+    return std::vector<std::shared_ptr<const MeshOnDevice>>(placed.begin(), placed.end());
   });
 }
 

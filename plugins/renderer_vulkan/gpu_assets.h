@@ -13,6 +13,7 @@
 #include "box_tree.h"
 #include "diorama/host.h"
 #include "gpu_world.h"
+#include "ray_structure.h"
 #include "renderer_support/mip_texture.h"
 #include "renderer_support/shading_mesh.h"
 #include "vulkan_arena.h"
@@ -23,6 +24,8 @@ namespace diorama {
 /// A mesh with its tree in a device's memory.
 struct MeshOnDevice {
   VulkanRange memory;
+  MeshStructure structure;                ///< Where the device traces by ray queries.
+  std::size_t triangle_count = 0;         ///< That rays may meet.
   gpu::Instance parts;                    ///< Addresses and flags of the mesh.
   std::map<std::uint32_t, TreeNode> top;  ///< Of its tree.
 };

@@ -88,7 +88,7 @@ void GpuPathTracer::make_room(std::uint32_t slots) {
   job_.queues[1] = take(sizeof(std::uint32_t));
 }
 
-void GpuPathTracer::begin(const View& view, const PathSettings& settings, gpu::Address world,
+void GpuPathTracer::begin(const View& view, const PathSettings& settings, const GpuScene& scene,
                           double window) {
   view_ = &view;
   window_ = window;
@@ -120,7 +120,8 @@ void GpuPathTracer::begin(const View& view, const PathSettings& settings, gpu::A
   job_.pixel_count = std::uint32_t(pixels);
   has_sums_ = false;
   seconds_ = {};
-  push_.world = world;
+  push_.world = scene.world();
+  rays_ = scene.traces_by_query() ? &*kernels_.by_query : &kernels_.by_trees;
 }
 
 void GpuPathTracer::add(const TraceJob& job, std::uint32_t begin, std::uint32_t end,
@@ -250,10 +251,10 @@ GpuPathTracer::Counts GpuPathTracer::trace(const Pass& pass) {
     constexpr std::size_t kPaths = offsetof(gpu::Counters, paths_groups);
     constexpr std::size_t kShadows = offsetof(gpu::Counters, shadow_groups);
     for (std::uint32_t i = 0; i < count; ++i) {
-      dispatch(commands, kRays, kernels_.intersect, counters_, kPaths);
+      dispatch(commands, kRays, rays_->intersect, counters_, kPaths);
       dispatch(commands, kSurfaces, kernels_.shade, counters_, kPaths);
       dispatch(commands, kSurfaces, kernels_.arrange, 1u);
-      dispatch(commands, kShadowRays, kernels_.shadow, counters_, kShadows);
+      dispatch(commands, kShadowRays, rays_->shadow, counters_, kShadows);
       queue = 1 - queue;
     }
     // Does nothing while paths are under way.

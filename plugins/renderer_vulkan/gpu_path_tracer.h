@@ -10,6 +10,7 @@
 
 #include "diorama/host.h"
 #include "diorama/image.h"
+#include "gpu_scene.h"
 #include "gpu_world.h"
 #include "path_device.h"
 #include "renderer_support/film.h"
@@ -33,8 +34,8 @@ class GpuPathTracer {
   };
 
   /// Begins a picture.
-  /// `window`: see RenderScene::window().
-  void begin(const View& view, const PathSettings& settings, gpu::Address world, double window);
+  /// `scene` is used until the picture's last trace(). `window`: see RenderScene::window().
+  void begin(const View& view, const PathSettings& settings, const GpuScene& scene, double window);
   /// Traces the samples of these jobs. Sums are the same for any division into jobs and passes.
   Counts trace(std::span<const TraceJob> jobs);
   /// The pixels' sums until now.
@@ -81,9 +82,12 @@ class GpuPathTracer {
   Host& host_;
   std::uint32_t most_slots_;
 
-  const View* view_ = nullptr;  ///< Of the picture under way.
+  // Of the picture under way:
+  const View* view_ = nullptr;
+  const RayKernels* rays_ = nullptr;
   double window_ = 0.0;
-  bool has_sums_ = false;  ///< Of the picture under way.
+  bool has_sums_ = false;
+
   gpu::Job job_;
   gpu::Push push_;
   std::array<double, kWorkCount> seconds_{};

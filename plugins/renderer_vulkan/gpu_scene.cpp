@@ -375,6 +375,22 @@ GpuScene::References GpuScene::references_of(const RenderScene& scene) const {
   return result;
 }
 
+gpu::Address GpuScene::take_structure(const RenderScene& scene,
+                                      std::span<const gpu::Instance> instances) {
+  if (!device_.traces_by_query()) return 0;
+  std::vector<SceneStructure::Instance> records;
+  for (std::size_t i = 0; i < instances.size(); ++i) {
+    const gpu::Instance& instance = instances[i];
+    const MeshOnDevice& mesh = *meshes_.at(scene.instances()[i].shading);
+    const gpu::Address structure = mesh.structure.structure.address();
+    const bool is_too_large = structure == 0 && mesh.triangle_count > 0;
+    if ((instance.flags & gpu::kMoves) != 0 || is_too_large) return 0;
+    records.push_back({instance.world_from_node, structure,
+                       (instance.flags & (gpu::kCutsOut | gpu::kDims)) == 0});
+  }
+  return structure_.build(records);
+}
+
 void GpuScene::take_tables(const RenderScene& scene) {
   const LightTable& table = scene.lights();
   std::map<const ShadingMaterial*, std::uint32_t> material_numbers;
@@ -455,6 +471,8 @@ void GpuScene::take_tables(const RenderScene& scene) {
 
   GpuBytes tables;
   gpu::World world;
+  world.structure = take_structure(scene, instances);
+  traces_by_query_ = world.structure != 0;
   const References references = references_of(scene);
   world.tree = tables.add(tree_of_single(references.boxes).nodes);
   world.references = tables.add(references.parts);

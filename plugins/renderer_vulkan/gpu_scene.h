@@ -24,11 +24,14 @@ TreeBox box_over_time(const MeshInstance& instance, double window);
 class GpuScene {
  public:
   GpuScene(const PathDevice& device, Host& host)
-      : device_(device.device), assets_(*device.assets), host_(host) {}
+      : device_(device.device), assets_(*device.assets), host_(host), structure_(device.device) {}
 
   void take(const RenderScene& scene);
 
   gpu::Address world() const { return world_.address(); }
+  /// Whether the device's own ray queries find what rays meet: where it is opened for them, and
+  /// nothing moves while the shutter is open.
+  bool traces_by_query() const { return traces_by_query_; }
 
  private:
   struct TextureInScene {
@@ -60,6 +63,7 @@ class GpuScene {
   gpu::Light light_of(const LightTable::Record& light) const;
   References references_of(const RenderScene& scene) const;
   void take_tables(const RenderScene& scene);
+  gpu::Address take_structure(const RenderScene& scene, std::span<const gpu::Instance> instances);
 
   const VulkanDevice& device_;
   GpuAssets& assets_;
@@ -72,6 +76,8 @@ class GpuScene {
   VulkanBuffer parts_;
   VulkanBuffer tables_;
   VulkanBuffer world_;
+  SceneStructure structure_;
+  bool traces_by_query_ = false;
 };
 
 }  // namespace diorama

@@ -156,6 +156,7 @@ struct Reference {
 
 struct World {
   Address tree = 0;
+  Address structure = 0;
   Address references = 0;
   Address instances = 0;
   Address slot_materials = 0;

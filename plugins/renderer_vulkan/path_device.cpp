@@ -7,7 +7,10 @@
 #include <map>
 #include <mutex>
 #include <span>
+#include <string>
+#include <utility>
 
+#include "diorama/error.h"
 #include "gpu_world.h"
 
 namespace diorama {
@@ -49,28 +52,41 @@ PlaneKernels::PlaneKernels(const VulkanDevice& device)
 PathKernels::PathKernels(const VulkanDevice& device)
     : start(device, kernels::kStart),
       arrange(device, kernels::kArrange),
-      intersect(device, kernels::kIntersect),
+      by_trees(device, kernels::kIntersect, kernels::kShadow),
       shade(device, kernels::kShade),
-      shadow(device, kernels::kShadow),
       gather(device, kernels::kGather),
       resolve(device, kernels::kResolve),
       planes(device),
-      iteration_limit(find_iteration_limit(device)) {}
+      iteration_limit(find_iteration_limit(device)) {
+  if (device.traces_by_query()) {
+    by_query.emplace(device, kernels::kIntersectByQuery, kernels::kShadowByQuery);
+  }
+}
 
-std::shared_ptr<const PathDevice> shared_path_device(std::span<const int> numbers) {
-  using Opened = std::map<int, std::shared_ptr<const PathDevice>>;
+std::shared_ptr<const PathDevice> shared_path_device(std::span<const int> numbers,
+                                                     bool traces_by_query) {
+  using Opened = std::map<std::pair<int, bool>, std::shared_ptr<const PathDevice>>;
   static std::mutex mutex;
   // Never destroyed: at the end of the process drivers may be gone before.
   static Opened& opened = *new Opened;
-  for (const int number : numbers) VulkanInstance::of_process().device(number);
+  for (const int number : numbers) {
+    const VulkanDeviceInfo& info = VulkanInstance::of_process().device(number);
+    if (traces_by_query && !info.has_ray_query) {
+      throw Error(ErrorKind::Config, "ray_query: Vulkan device " + std::to_string(number) + " (" +
+                                         description_of(info) +
+                                         ") has no ray queries; leave ray_query out");
+    }
+  }
   const std::lock_guard lock(mutex);
-  const auto users = [](int number) {
-    const std::shared_ptr<const PathDevice>& device = opened[number];
+  const auto users = [&](int number) {
+    const std::shared_ptr<const PathDevice>& device = opened[{number, traces_by_query}];
     return device ? device.use_count() - 1 : 0;
   };
   const int number = *std::ranges::min_element(numbers, {}, users);
-  std::shared_ptr<const PathDevice>& device = opened[number];
-  if (!device || device->device.is_lost()) device = std::make_shared<const PathDevice>(number);
+  std::shared_ptr<const PathDevice>& device = opened[{number, traces_by_query}];
+  if (!device || device->device.is_lost()) {
+    device = std::make_shared<const PathDevice>(number, traces_by_query);
+  }
   return device;
 }
 

@@ -9,7 +9,7 @@ namespace diorama {
 namespace {
 
 constexpr std::size_t kBlockSize = std::size_t(32) << 20;
-constexpr std::size_t kStep = 16;
+constexpr std::size_t kStep = 256;  // as acceleration structures want it
 
 }  // namespace
 

@@ -41,7 +41,7 @@ class VulkanArena {
   VulkanArena(const VulkanArena&) = delete;
   VulkanArena& operator=(const VulkanArena&) = delete;
 
-  /// Begins at a multiple of 16 bytes.
+  /// Begins at a multiple of 256 bytes in its buffer.
   VulkanRange take(std::size_t size, const char* what);
   /// Buffers that it holds.
   std::size_t buffer_count() const;

@@ -25,6 +25,10 @@ VulkanBuffer::VulkanBuffer(const VulkanDevice& device, std::size_t size, Place p
   info.usage = VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT |
                VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT |
                VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT;
+  if (device.traces_by_query()) {
+    info.usage |= VK_BUFFER_USAGE_ACCELERATION_STRUCTURE_STORAGE_BIT_KHR |
+                  VK_BUFFER_USAGE_ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_BIT_KHR;
+  }
   const auto is_short = [](VkResult result) {
     return result == VK_ERROR_OUT_OF_DEVICE_MEMORY || result == VK_ERROR_OUT_OF_HOST_MEMORY;
   };
@@ -161,19 +165,31 @@ void VulkanCommands::zero(const VulkanBuffer& buffer, std::size_t size) {
   device_.functions().vkCmdFillBuffer(commands_, buffer.handle(), 0, size, 0);
 }
 
+void VulkanCommands::build(const VkAccelerationStructureBuildGeometryInfoKHR& info,
+                           std::uint32_t count) {
+  const VkAccelerationStructureBuildRangeInfoKHR range{count, 0, 0, 0};
+  const VkAccelerationStructureBuildRangeInfoKHR* const ranges = &range;
+  device_.functions().vkCmdBuildAccelerationStructuresKHR(commands_, 1, &info, &ranges);
+  barrier();
+}
+
 void VulkanCommands::barrier() {
-  constexpr VkPipelineStageFlags kStages = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT |
-                                           VK_PIPELINE_STAGE_TRANSFER_BIT |
-                                           VK_PIPELINE_STAGE_DRAW_INDIRECT_BIT;
+  VkPipelineStageFlags stages = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT |
+                                VK_PIPELINE_STAGE_TRANSFER_BIT |
+                                VK_PIPELINE_STAGE_DRAW_INDIRECT_BIT;
+  if (device_.traces_by_query()) stages |= VK_PIPELINE_STAGE_ACCELERATION_STRUCTURE_BUILD_BIT_KHR;
   auto memory = vulkan_info<VkMemoryBarrier>(VK_STRUCTURE_TYPE_MEMORY_BARRIER);
   memory.srcAccessMask = VK_ACCESS_MEMORY_WRITE_BIT;
   memory.dstAccessMask = VK_ACCESS_MEMORY_READ_BIT | VK_ACCESS_MEMORY_WRITE_BIT;
-  device_.functions().vkCmdPipelineBarrier(commands_, kStages, kStages | VK_PIPELINE_STAGE_HOST_BIT,
+  device_.functions().vkCmdPipelineBarrier(commands_, stages, stages | VK_PIPELINE_STAGE_HOST_BIT,
                                            0, 1, &memory, 0, nullptr, 0, nullptr);
 }
 
-VulkanDevice::VulkanDevice(int number)
-    : instance_(VulkanInstance::of_process()), info_(instance_.device(number)), number_(number) {
+VulkanDevice::VulkanDevice(int number, bool traces_by_query)
+    : instance_(VulkanInstance::of_process()),
+      info_(instance_.device(number)),
+      number_(number),
+      traces_by_query_(traces_by_query) {
   const VulkanInstanceFunctions& vk = instance_.functions();
   vk.vkGetPhysicalDeviceMemoryProperties(info_.handle, &memory_);
   const float priority = 1.0f;
@@ -187,12 +203,27 @@ VulkanDevice::VulkanDevice(int number)
   features.scalarBlockLayout = VK_TRUE;
   auto info = vulkan_info<VkDeviceCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO);
   info.pNext = &features;
+  auto queries = vulkan_info<VkPhysicalDeviceRayQueryFeaturesKHR>(
+      VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_RAY_QUERY_FEATURES_KHR);
+  queries.rayQuery = VK_TRUE;
+  auto structures = vulkan_info<VkPhysicalDeviceAccelerationStructureFeaturesKHR>(
+      VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_ACCELERATION_STRUCTURE_FEATURES_KHR);
+  structures.accelerationStructure = VK_TRUE;
+  if (traces_by_query) {
+    features.pNext = &structures;
+    structures.pNext = &queries;
+    info.enabledExtensionCount = std::uint32_t(VulkanInstance::kRayQueryExtensions.size());
+    info.ppEnabledExtensionNames = VulkanInstance::kRayQueryExtensions.data();
+  }
   info.queueCreateInfoCount = 1;
   info.pQueueCreateInfos = &queue;
   check(vk.vkCreateDevice(info_.handle, &info, nullptr, &device_), "open the device");
 #define DIORAMA_FIND(NAME) \
   functions_.NAME = reinterpret_cast<PFN_##NAME>(vk.vkGetDeviceProcAddr(device_, #NAME));
   DIORAMA_VULKAN_DEVICE_FUNCTIONS(DIORAMA_FIND)
+  if (traces_by_query) {
+    DIORAMA_VULKAN_RAY_QUERY_FUNCTIONS(DIORAMA_FIND)
+  }
 #undef DIORAMA_FIND
   try {
     make_layout();

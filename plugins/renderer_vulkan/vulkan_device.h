@@ -80,6 +80,8 @@ class VulkanCommands {
   void copy(const VulkanBuffer& from, std::size_t from_offset, const VulkanBuffer& to,
             std::size_t to_offset, std::size_t size);
   void zero(const VulkanBuffer& buffer, std::size_t size);
+  /// Of one geometry, with `count` triangles or instances; what comes after sees it.
+  void build(const VkAccelerationStructureBuildGeometryInfoKHR& info, std::uint32_t count);
   /// What comes after sees what came before.
   void barrier();
   /// Counts the time since the last mark for `what`; see VulkanDevice::run().
@@ -100,7 +102,8 @@ class VulkanDevice {
  public:
   static constexpr std::size_t kMostConstants = 128;
 
-  explicit VulkanDevice(int number);
+  /// `traces_by_query`: for ray queries, which the device must have.
+  explicit VulkanDevice(int number, bool traces_by_query = false);
   ~VulkanDevice();
   VulkanDevice(const VulkanDevice&) = delete;
   VulkanDevice& operator=(const VulkanDevice&) = delete;
@@ -109,6 +112,7 @@ class VulkanDevice {
   const VulkanDeviceInfo& info() const { return info_; }
   const VulkanDeviceFunctions& functions() const { return functions_; }
   int number() const { return number_; }
+  bool traces_by_query() const { return traces_by_query_; }
   VkDevice handle() const { return device_; }
   VkPipelineLayout layout() const { return layout_; }
   /// Some call found that the device is lost: nothing that is on it can be used any more.
@@ -161,6 +165,7 @@ class VulkanDevice {
   const VulkanInstance& instance_;
   const VulkanDeviceInfo& info_;
   int number_;
+  bool traces_by_query_;
   VulkanDeviceFunctions functions_;
   VkDevice device_ = VK_NULL_HANDLE;
   VkQueue queue_ = VK_NULL_HANDLE;

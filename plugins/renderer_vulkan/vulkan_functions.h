@@ -15,6 +15,7 @@ namespace diorama {
   DO(vkGetPhysicalDeviceFeatures2)             \
   DO(vkGetPhysicalDeviceMemoryProperties)      \
   DO(vkGetPhysicalDeviceQueueFamilyProperties) \
+  DO(vkEnumerateDeviceExtensionProperties)     \
   DO(vkCreateDevice)                           \
   DO(vkGetDeviceProcAddr)
 
@@ -60,12 +61,21 @@ namespace diorama {
   DO(vkCmdWriteTimestamp)                   \
   DO(vkGetQueryPoolResults)
 
+// Null unless the device was opened for ray queries.
+#define DIORAMA_VULKAN_RAY_QUERY_FUNCTIONS(DO)   \
+  DO(vkCreateAccelerationStructureKHR)           \
+  DO(vkDestroyAccelerationStructureKHR)          \
+  DO(vkGetAccelerationStructureBuildSizesKHR)    \
+  DO(vkGetAccelerationStructureDeviceAddressKHR) \
+  DO(vkCmdBuildAccelerationStructuresKHR)
+
 #define DIORAMA_DECLARE(NAME) PFN_##NAME NAME = nullptr;
 struct VulkanInstanceFunctions {
   DIORAMA_VULKAN_INSTANCE_FUNCTIONS(DIORAMA_DECLARE)
 };
 struct VulkanDeviceFunctions {
   DIORAMA_VULKAN_DEVICE_FUNCTIONS(DIORAMA_DECLARE)
+  DIORAMA_VULKAN_RAY_QUERY_FUNCTIONS(DIORAMA_DECLARE)
 };
 #undef DIORAMA_DECLARE
 

@@ -4,6 +4,7 @@
 #include <dlfcn.h>
 
 #include <algorithm>
+#include <string_view>
 
 #include "diorama/error.h"
 
@@ -41,7 +42,8 @@ std::string words_for(VkResult result) {
 
 std::string description_of(const VulkanDeviceInfo& device) {
   std::string text = device.name + ", " + device.driver + ", Vulkan " + device.api + ", " +
-                     std::to_string(device.memory >> 20) + " MiB";
+                     std::to_string(device.memory >> 20) + " MiB" +
+                     (device.has_ray_query ? ", ray queries" : "");
   for (std::size_t i = 0; i < device.missing.size(); ++i) {
     text += (i == 0 ? "; lacks " : ", ") + device.missing[i];
   }
@@ -152,6 +154,8 @@ VulkanDeviceInfo VulkanInstance::describe(VkPhysicalDevice handle) const {
     info.missing.push_back("ballots of subgroups in compute shaders");
   }
 
+  describe_ray_queries(info);
+
   std::uint32_t count = 0;
   functions_.vkGetPhysicalDeviceQueueFamilyProperties(handle, &count, nullptr);
   std::vector<VkQueueFamilyProperties> families(count);
@@ -169,6 +173,38 @@ VulkanDeviceInfo VulkanInstance::describe(VkPhysicalDevice handle) const {
     }
   }
   return info;
+}
+
+void VulkanInstance::describe_ray_queries(VulkanDeviceInfo& info) const {
+  std::uint32_t count = 0;
+  functions_.vkEnumerateDeviceExtensionProperties(info.handle, nullptr, &count, nullptr);
+  std::vector<VkExtensionProperties> extensions(count);
+  functions_.vkEnumerateDeviceExtensionProperties(info.handle, nullptr, &count, extensions.data());
+  const auto is_there = [&](std::string_view name) {
+    return std::ranges::any_of(
+        extensions, [&](const VkExtensionProperties& e) { return name == e.extensionName; });
+  };
+  if (!std::ranges::all_of(kRayQueryExtensions, is_there)) return;
+  auto queries = vulkan_info<VkPhysicalDeviceRayQueryFeaturesKHR>(
+      VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_RAY_QUERY_FEATURES_KHR);
+  auto structures = vulkan_info<VkPhysicalDeviceAccelerationStructureFeaturesKHR>(
+      VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_ACCELERATION_STRUCTURE_FEATURES_KHR);
+  structures.pNext = &queries;
+  auto features =
+      vulkan_info<VkPhysicalDeviceFeatures2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2);
+  features.pNext = &structures;
+  functions_.vkGetPhysicalDeviceFeatures2(info.handle, &features);
+  info.has_ray_query = queries.rayQuery == VK_TRUE && structures.accelerationStructure == VK_TRUE;
+  auto limits = vulkan_info<VkPhysicalDeviceAccelerationStructurePropertiesKHR>(
+      VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_ACCELERATION_STRUCTURE_PROPERTIES_KHR);
+  auto properties =
+      vulkan_info<VkPhysicalDeviceProperties2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2);
+  properties.pNext = &limits;
+  functions_.vkGetPhysicalDeviceProperties2(info.handle, &properties);
+  info.most_query_triangles = limits.maxPrimitiveCount;
+  info.most_query_instances = limits.maxInstanceCount;
+  info.scratch_alignment =
+      std::max<std::uint32_t>(1, limits.minAccelerationStructureScratchOffsetAlignment);
 }
 
 std::string VulkanInstance::list_of_devices() const {

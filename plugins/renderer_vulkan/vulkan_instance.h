@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -21,12 +22,21 @@ struct VulkanDeviceInfo {
   std::uint32_t most_groups = 0;      ///< Of one dispatch.
   double nanoseconds_per_tick = 0.0;  ///< Of its clock; 0: it has none for kernels.
   std::uint32_t queue_family = 0;
+  bool has_ray_query = false;  ///< Can find by itself what rays meet.
+  // Of what ray queries go through:
+  std::uint64_t most_query_triangles = 0;  ///< Of a mesh.
+  std::uint64_t most_query_instances = 0;
+  std::uint32_t scratch_alignment = 1;
   std::vector<std::string> missing;  ///< What path tracing needs and it does not have.
 };
 
 /// The machine's Vulkan, found at run time.
 class VulkanInstance {
  public:
+  /// Extensions that ray queries need.
+  static constexpr std::array kRayQueryExtensions{VK_KHR_DEFERRED_HOST_OPERATIONS_EXTENSION_NAME,
+                                                  VK_KHR_ACCELERATION_STRUCTURE_EXTENSION_NAME,
+                                                  VK_KHR_RAY_QUERY_EXTENSION_NAME};
   /// The one that all devices of the process come from; made when first asked for and never closed:
   /// drivers that are loaded again and again run out of room for their threads' variables.
   static const VulkanInstance& of_process();
@@ -51,6 +61,7 @@ class VulkanInstance {
     void operator()(void* library) const;
   };
   VulkanDeviceInfo describe(VkPhysicalDevice device) const;
+  void describe_ray_queries(VulkanDeviceInfo& info) const;
   std::unique_ptr<void, Unload> library_;
   VulkanInstanceFunctions functions_;
   VkInstance instance_ = VK_NULL_HANDLE;

@@ -19,6 +19,11 @@ void VulkanRenderer::Params::visit(ParamVisitor& v) {
   v.param("devices", devices,
           {"Several devices among which visits are shared, as a list such as [0, 1], or all: every "
            "GPU; in place of device."});
+  v.param(
+      "ray_query", ray_query,
+      {"Whether the device's own ray queries find what rays meet, instead of kernels over trees "
+       "of this program: where a device has cores for that, paths take less time. Pictures are "
+       "the same but for rounding."});
   PictureParams::visit(v);
 }
 
@@ -67,7 +72,7 @@ void VulkanRenderer::prepare_paths() { scene_.take(meshes().render_scene()); }
 void VulkanRenderer::trace_paths(const View& view, const PathSettings& settings, SamplePlan& plan) {
   using Clock = std::chrono::steady_clock;
   const auto start = Clock::now();
-  tracer_.begin(view, settings, scene_.world(), meshes().window());
+  tracer_.begin(view, settings, scene_, meshes().window());
   Image<PixelSum> sums;
   while (true) {
     const double elapsed = std::chrono::duration<double>(Clock::now() - start).count();

@@ -18,6 +18,7 @@ class VulkanRenderer final : public PathRenderer {
   struct Params : PictureParams {
     int device = 0;
     Value devices;  ///< Null, `all` or a list of numbers.
+    bool ray_query = false;
 
     void visit(ParamVisitor& v);
     /// Of the devices among which renderers are shared out. Throws Error(Config).
@@ -25,7 +26,8 @@ class VulkanRenderer final : public PathRenderer {
   };
 
   VulkanRenderer(const Params& params, Host& host)
-      : VulkanRenderer(params, host, shared_path_device(params.device_numbers())) {}
+      : VulkanRenderer(params, host,
+                       shared_path_device(params.device_numbers(), params.ray_query)) {}
   /// On a device that is open already.
   VulkanRenderer(const Params& params, Host& host, std::shared_ptr<const PathDevice> device);
 

@@ -113,6 +113,7 @@ struct Options {
   int repetitions = 1;
   bool probes = false;
   int device = -1;  ///< Of Vulkan; -1: none.
+  bool ray_query = false;
   std::uint64_t seed = 1;
   EmbreeRenderer::Params params;
 };
@@ -123,6 +124,7 @@ std::unique_ptr<PathRenderer> make_renderer(const Options& options, Host& host) 
     VulkanRenderer::Params params;
     static_cast<PictureParams&>(params) = options.params;
     params.device = options.device;
+    params.ray_query = options.ray_query;
     return std::make_unique<VulkanRenderer>(params, host);
   }
 #endif
@@ -221,6 +223,7 @@ int main(int argc, char** argv) {
   app.add_option("--seed", options.seed);
 #ifdef DIORAMA_HAS_VULKAN
   app.add_option("--device", options.device, "Vulkan device that traces the paths");
+  app.add_flag("--ray-query", options.ray_query, "Trace by the device's own ray queries");
 #endif
   app.add_flag("--probes", options.probes,
                "Also compare with Embree alone and time the update of a scene whose things moved");

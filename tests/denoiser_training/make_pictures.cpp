@@ -70,7 +70,7 @@ class Tracer {
 
   Film on_device(const View& view, const PathSettings& settings,
                  const std::vector<TraceJob>& jobs) {
-    on_device_->tracer.begin(view, settings, on_device_->scene.world(), meshes_.window());
+    on_device_->tracer.begin(view, settings, on_device_->scene, meshes_.window());
     on_device_->tracer.trace(jobs);
     return on_device_->tracer.film();
   }

@@ -10,6 +10,35 @@ layout(local_size_x = 64) in;
 #include "surfaces.glsl"
 #include "rays.glsl"
 
+// RAY_QUERY: by the device's own ray queries, for scenes where nothing moves.
+#ifdef RAY_QUERY
+#include "queries.glsl"
+
+Hit closest(vec3 origin, vec3 direction, float t_min, float t_max, float time, uint left_instance,
+            uint left_triangle) {
+  const Hit nothing = Hit(kInfinite, 0.0, 0.0, kNone, 0u);
+  // Of opaque triangles the device does not ask, unless one of them may be that which the ray left.
+  const uint ray_flags = left_instance != kNone ? gl_RayFlagsNoOpaqueEXT : gl_RayFlagsNoneEXT;
+  rayQueryEXT query;
+  rayQueryInitializeEXT(query, accelerationStructureEXT(world.structure), ray_flags, 0xFFu, origin,
+                        t_min, direction, t_max);
+  while (rayQueryProceedEXT(query)) {
+    const Hit hit = HIT_OF(query, false);
+    if (hit.instance == left_instance && hit.triangle == left_triangle) continue;
+    if ((world.instances.v[hit.instance].flags & kCutsOut) != 0u &&
+        is_absent(hit.instance, number_of(hit), hit.u, hit.v)) {
+      continue;
+    }
+    rayQueryConfirmIntersectionEXT(query);
+  }
+  if (rayQueryGetIntersectionTypeEXT(query, true) == gl_RayQueryCommittedIntersectionNoneEXT) {
+    return nothing;
+  }
+  return HIT_OF(query, true);
+}
+#else
+#include "trees.glsl"
+
 Hit closest(vec3 origin, vec3 direction, float t_min, float t_max, float time, uint left_instance,
             uint left_triangle) {
   Hit hit = Hit(kInfinite, 0.0, 0.0, kNone, 0u);
@@ -20,6 +49,7 @@ Hit closest(vec3 origin, vec3 direction, float t_min, float t_max, float time, u
       hit = Hit(t, u, v, instance, triangle);)
   return hit;
 }
+#endif
 
 void main() {
   if (gl_GlobalInvocationID.x >= job.counters.path_count) return;

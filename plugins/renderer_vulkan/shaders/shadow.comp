@@ -10,6 +10,35 @@ layout(local_size_x = 64) in;
 #include "surfaces.glsl"
 #include "rays.glsl"
 
+// RAY_QUERY: see intersect.comp.
+#ifdef RAY_QUERY
+#include "queries.glsl"
+
+vec3 transmittance(vec3 origin, vec3 direction, float t_max, float time) {
+  vec3 left = vec3(1.0);
+  rayQueryEXT query;
+  rayQueryInitializeEXT(query, accelerationStructureEXT(world.structure),
+                        gl_RayFlagsTerminateOnFirstHitEXT, 0xFFu, origin, 0.0, direction, t_max);
+  while (rayQueryProceedEXT(query)) {
+    const Hit hit = HIT_OF(query, false);
+    if ((world.instances.v[hit.instance].flags & kDims) != 0u) {
+      Vec4s triangles = world.instances.v[hit.instance].triangles;
+      const vec3 across =
+          normal_in_world(hit.instance, cross(triangles.v[3u * hit.triangle + 1u].xyz,
+                                              triangles.v[3u * hit.triangle + 2u].xyz));
+      left *= straight_share(hit.instance, number_of(hit), hit.u, hit.v, across, direction,
+                             job.has_caustics == 0u);
+      if (largest(left) > 1e-4) continue;
+    }
+    rayQueryConfirmIntersectionEXT(query);
+  }
+  const bool is_blocked =
+      rayQueryGetIntersectionTypeEXT(query, true) != gl_RayQueryCommittedIntersectionNoneEXT;
+  return is_blocked ? vec3(0.0) : left;
+}
+#else
+#include "trees.glsl"
+
 vec3 transmittance(vec3 origin, vec3 direction, float t_max, float time) {
   const float t_min = 0.0;
   vec3 left = vec3(1.0);
@@ -26,6 +55,7 @@ vec3 transmittance(vec3 origin, vec3 direction, float t_max, float time) {
       break;)
   return left;
 }
+#endif
 
 void main() {
   if (gl_GlobalInvocationID.x >= job.counters.ready_shadow_count) return;

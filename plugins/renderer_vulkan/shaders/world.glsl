@@ -157,6 +157,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Lig
 
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer World {
   Vec4s tree;       // over parts of the instances
+  uvec2 structure;  // address of what the device's own ray queries go through; 0: there is none
   Uints references;  // of its leaves: an instance and a child in its tree
   Instances instances;
   Uints slot_materials;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Both renderers make the same pictures and the same labels.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdlib>
@@ -38,6 +39,28 @@ struct Pictures {
   Image<Vec3f> vulkan;
 };
 
+/// How far apart two pictures are that share their random numbers: nearly all pixels are equal but
+/// for rounding; a few paths go other ways.
+struct Difference {
+  double mean = 0.0;     ///< Of the pictures' means, relative.
+  double unequal = 0.0;  ///< Share of the pixels that differ by more than a hundredth.
+};
+
+Difference difference(const Image<Vec3f>& one, const Image<Vec3f>& other) {
+  double a = 0.0;
+  double b = 0.0;
+  std::size_t unequal = 0;
+  const auto p = one.pixels();
+  const auto q = other.pixels();
+  for (std::size_t i = 0; i < p.size(); ++i) {
+    a += double(p[i].sum());
+    b += double(q[i].sum());
+    const float scale = std::max(1e-3f, p[i].cwiseAbs().maxCoeff());
+    if (!((p[i] - q[i]).cwiseAbs().maxCoeff() < 0.01f * scale)) ++unequal;
+  }
+  return {a == b ? 0.0 : std::abs(b / a - 1.0), double(unequal) / double(p.size())};
+}
+
 Frame render(PathRenderer&& renderer, const Scene& scene, NodeId camera, const NameSet& channels) {
   renderer.prepare(scene);
   return renderer.render({camera, channels, 5});
@@ -56,10 +79,10 @@ VulkanRenderer::Params on_device(const PictureParams& params) {
 }
 
 Frame render_by_vulkan(const Scene& scene, NodeId camera, const PictureParams& params,
-                       const NameSet& channels) {
+                       const NameSet& channels,
+                       const std::shared_ptr<const PathDevice>& device = test::path_device()) {
   RenderHost host(2);
-  return render(VulkanRenderer(on_device(params), host, test::path_device()), scene, camera,
-                channels);
+  return render(VulkanRenderer(on_device(params), host, device), scene, camera, channels);
 }
 
 PictureParams reference(int samples, int bounces = 4) {
@@ -73,29 +96,20 @@ PictureParams reference(int samples, int bounces = 4) {
 
 Pictures render_both(const TestWorld& world, NodeId camera, const PictureParams& params) {
   const NameSet channels{std::string(kColorHdr.name)};
-  return {render_by_embree(world.scene, camera, params, channels).get(kColorHdr),
-          render_by_vulkan(world.scene, camera, params, channels).get(kColorHdr)};
+  Pictures pictures{render_by_embree(world.scene, camera, params, channels).get(kColorHdr),
+                    render_by_vulkan(world.scene, camera, params, channels).get(kColorHdr)};
+  // What both ways to find what rays meet see of it.
+  if (const auto device = test::ray_query_device()) {
+    const Frame by_query = render_by_vulkan(world.scene, camera, params, channels, device);
+    const Difference found = difference(pictures.vulkan, by_query.get(kColorHdr));
+    CAPTURE(found.mean, found.unequal);
+    CHECK(found.mean < 0.001);
+    CHECK(found.unequal < 0.01);
+  }
+  return pictures;
 }
 
-/// How far apart two pictures are that share their random numbers: nearly all pixels are equal but
-/// for rounding; a few paths go other ways.
-struct Difference {
-  double mean = 0.0;     ///< Of the pictures' means, relative.
-  double unequal = 0.0;  ///< Share of the pixels that differ by more than a hundredth.
-};
-
 Difference difference(const Pictures& pictures, const char* name) {
-  double a = 0.0;
-  double b = 0.0;
-  std::size_t unequal = 0;
-  const auto p = pictures.embree.pixels();
-  const auto q = pictures.vulkan.pixels();
-  for (std::size_t i = 0; i < p.size(); ++i) {
-    a += double(p[i].sum());
-    b += double(q[i].sum());
-    const float scale = std::max(1e-3f, p[i].cwiseAbs().maxCoeff());
-    if (!((p[i] - q[i]).cwiseAbs().maxCoeff() < 0.01f * scale)) ++unequal;
-  }
   // DIORAMA_TEST_PICTURES=FOLDER shows them side by side.
   if (const char* folder = std::getenv("DIORAMA_TEST_PICTURES")) {
     const RenderHost host(1);
@@ -115,7 +129,7 @@ Difference difference(const Pictures& pictures, const char* name) {
     }
     test::write_png(host, both, std::filesystem::path(folder) / (std::string(name) + ".png"));
   }
-  return {std::abs(b / a - 1.0), double(unequal) / double(p.size())};
+  return difference(pictures.embree, pictures.vulkan);
 }
 
 Mesh inward_box(const Vec3& size) {
@@ -333,7 +347,7 @@ TEST_CASE("paths that chose their way at glass are counted as by Embree", "[vulk
     GpuScene scene(*test::path_device(), host);
     scene.take(meshes.render_scene());
     GpuPathTracer tracer(*test::path_device(), host);
-    tracer.begin(view, settings, scene.world(), meshes.window());
+    tracer.begin(view, settings, scene, meshes.window());
     tracer.trace(jobs);
     const Film film = tracer.film();
     std::size_t unequal = 0;
@@ -873,8 +887,7 @@ TEST_CASE("the filter on planes makes of a film there what it makes of it here",
     GpuPlaneFilter filter(device, host);
     for (const int samples : {1, 4, 20}) {
       for (const double limit : {0.0, 0.5}) {
-        tracer.begin(view, {.max_bounces = 3, .has_caustics = true}, scene.world(),
-                     meshes.window());
+        tracer.begin(view, {.max_bounces = 3, .has_caustics = true}, scene, meshes.window());
         SamplePlan plan(width, height, {samples}, 9);
         tracer.trace(plan.next_round({}, 0.0));
         const Image<Vec3f> there = filter.filtered(tracer, view.position(), limit);
@@ -917,7 +930,7 @@ TEST_CASE("sums do not depend on how many paths are under way", "[vulkan]") {
   const View view(world.scene, camera);
   const auto sums = [&](std::uint32_t most_slots) {
     GpuPathTracer tracer(device, host, most_slots);
-    tracer.begin(view, {.max_bounces = 3}, scene.world(), meshes.window());
+    tracer.begin(view, {.max_bounces = 3}, scene, meshes.window());
     SamplePlan plan(view.camera().width, view.camera().height, {5}, 9);
     const auto counts = tracer.trace(plan.next_round({}, 0.0));
     CHECK(counts.rays > 5u * 35u * 26u);
@@ -934,6 +947,101 @@ TEST_CASE("sums do not depend on how many paths are under way", "[vulkan]") {
   const std::vector<float> many = sums(1000);
   CHECK(sums(1) == many);
   CHECK(sums(7) == many);
+}
+
+TEST_CASE("a device's ray queries find what its kernels find", "[vulkan][ray_query]") {
+  if (!test::has_vulkan_device()) return;
+  const auto device = test::ray_query_device();
+  if (!device) {
+    WARN("skipped: " << VulkanInstance::of_process().list_of_devices() << ": no ray queries");
+    VulkanRenderer::Params params = on_device(reference(1));
+    params.ray_query = true;
+    RenderHost host(1);
+    CHECK_THROWS_WITH(VulkanRenderer(params, host),
+                      Catch::Matchers::StartsWith("ray_query: Vulkan device 0 (") &&
+                          ContainsSubstring(") has no ray queries; leave ray_query out"));
+    return;
+  }
+  // Mirrored, turned and stretched instances of one mesh, some cut out by a texture, some of glass,
+  // some as thin glass; nothing is symmetric.
+  Material glass;
+  glass.transmission = 1.0f;
+  glass.roughness = 0.1f;
+  Material pane = glass;
+  pane.is_thin_walled = true;
+  pane.base_color = Vec3f(0.9f, 0.7f, 0.5f);
+  Material holes = matte(0.6f);
+  auto mask = std::make_shared<Texture>(*checks(16, 16, 1, ColorSpace::Linear, false));
+  for (std::uint8_t& value : mask->bytes) value = value < 128 ? 0 : 255;
+  holes.opacity_texture = input(mask);
+  holes.opacity_threshold = 0.5f;
+  TestWorld world = room_with(matte(0.5f));
+  const Mesh ball = make_sphere(0.2, 24);
+  const std::array materials{glass, pane, holes, matte(0.8f)};
+  Rng rng(11);
+  for (int i = 0; i < 24; ++i) {
+    Affine pose = at(rng.uniform(-1.6, 1.6), rng.uniform(-0.4, 1.6), rng.uniform(-1.3, 0.8));
+    pose.rotate(Eigen::AngleAxisd(rng.uniform(0.0, 3.0), Vec3(1, 2, 3).normalized()));
+    const double side = i % 3 == 0 ? -1.0 : 1.0;
+    pose.scale(Vec3(side * rng.uniform(0.5, 1.5), rng.uniform(0.5, 1.5), rng.uniform(0.5, 1.5)));
+    world.add("ball" + std::to_string(i), ball, materials[std::size_t(i % 4)], pose);
+  }
+  world.add(dome(0.3f));
+  const NodeId camera = camera_into(world);
+  const NameSet channels{std::string(kColorHdr.name)};
+  const PictureParams params = reference(16, 5);
+  RenderHost host(2);
+  VulkanRenderer by_query(on_device(params), host, device);
+  const auto both = [&](const char* what) {
+    by_query.prepare(world.scene);
+    const Frame queried = by_query.render({camera, channels, 5});
+    const Frame traced = render_by_vulkan(world.scene, camera, params, channels);
+    const Difference found = difference(traced.get(kColorHdr), queried.get(kColorHdr));
+    CAPTURE(what, found.mean, found.unequal);
+    CHECK(found.mean < 0.001);
+    CHECK(found.unequal < 0.01);
+  };
+  both("as placed");
+  world.scene.set_pose(world.scene.match("/base/ball3").at(0), at(0.2, 0.3, -0.4));
+  world.scene.set_pose(world.scene.match("/base/ball0").at(0), at(-0.4, 0.1, 0.2));
+  both("after some moved");
+  world.add("wall", make_box(Vec3(0.5, 0.1, 1.0)), matte(0.2f), at(0.3, 1.0, -0.5));
+  both("with one more");
+
+  // Not where things move while the shutter is open: queries know one pose of each.
+  EmbreeScene meshes(host, {"sse2", {}});
+  GpuScene scene(*device, host);
+  const auto is_queried = [&] {
+    meshes.take(world.scene);
+    scene.take(meshes.render_scene());
+    return scene.traces_by_query();
+  };
+  CHECK(is_queried());
+  const NodeId moving = world.scene.match("/base/ball3").at(0);
+  world.scene.edit(moving).rigid_body.emplace().linear_velocity = Vec3(1.0, 2.0, -3.0);
+  world.scene.edit(camera).camera->exposure_time_s = 0.04;
+  CHECK_FALSE(is_queried());
+  both("with an open shutter");
+  world.scene.edit(camera).camera->exposure_time_s = 0.0;
+  CHECK(is_queried());
+  both("with a still shutter");
+
+  // The same bytes whatever came before, and for any number of threads.
+  const Frame last = by_query.render({camera, channels, 5});
+  RenderHost other_host(1);
+  const Frame anew =
+      render(VulkanRenderer(on_device(params), other_host, device), world.scene, camera, channels);
+  CHECK(std::ranges::equal(std::as_bytes(last.get(kColorHdr).pixels()),
+                           std::as_bytes(anew.get(kColorHdr).pixels())));
+
+  // Memory does not grow where things move.
+  const std::uint64_t held = device->device.held();
+  for (int i = 0; i < 5; ++i) {
+    world.scene.set_pose(world.scene.match("/base/ball5").at(0), at(0.1 * i, 0.3, -0.4));
+    by_query.prepare(world.scene);
+    by_query.render({camera, channels, 5});
+  }
+  CHECK(device->device.held() == held);
 }
 
 TEST_CASE("a ray that passes forty thousand surfaces is right, or ends the job", "[vulkan]") {

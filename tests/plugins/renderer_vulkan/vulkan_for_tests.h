@@ -21,6 +21,12 @@ inline bool has_vulkan_device() {
   }
 }
 
+/// One that is opened for ray queries; null where no device of this machine has them.
+inline std::shared_ptr<const PathDevice> ray_query_device() {
+  if (!VulkanInstance::of_process().device(0).has_ray_query) return nullptr;
+  return shared_path_device(0, true);
+}
+
 inline std::shared_ptr<const PathDevice> path_device() { return shared_path_device(0); }
 
 }  // namespace diorama::test
