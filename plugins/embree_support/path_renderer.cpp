@@ -9,6 +9,7 @@
 
 #include "diorama/error.h"
 #include "renderer_support/oidn_denoiser.h"
+#include "renderer_support/radiance_cache.h"
 #include "renderer_support/sample_plan.h"
 #include "renderer_support/stopwatch.h"
 #include "renderer_support/view_transform.h"
@@ -57,6 +58,11 @@ void PictureParams::visit(ParamVisitor& v) {
       "caustics", caustics,
       {"Follow light focused by glass and mirrors; noisy. Off: glass lets light pass straight."});
   v.param("clamp", clamp, {"Largest luminance of one indirect contribution; 0: none.", "", 0.0});
+  v.param(
+      "radiance_cache", radiance_cache,
+      {"Denoised path_traced pictures: let paths end at their second surface with light that some "
+       "of them found around there; far less noise and time for indirect light that is blurred "
+       "a little."});
   v.param(
       "firefly_limit", firefly_limit,
       {"Denoised pictures: how bright one path may be, over a few times the other paths around, "
@@ -126,6 +132,11 @@ std::size_t PathRenderer::working_bytes(const Camera& camera, const NameSet& cha
     } else {
       colors += pixels * (sizeof(FilmPixel) + sizeof(Vec3f));
     }
+    if (ends_in_cache()) {
+      // Before there is a film: what was found, in order, and at most a cell for each.
+      const std::uint64_t paths = SamplePlan::most_learning_paths(pixels, params_.samples);
+      colors = std::max(colors, std::size_t(paths) * RadianceCache::kBytesPerFinding);
+    }
     if (params_.mode == "real_time" && params_.samples == 1) {
       colors += pixels * sizeof(RayHit);
     } else if (!traces_elsewhere()) {
@@ -173,6 +184,7 @@ PathSettings PathRenderer::path_settings(const View& view) const {
   PathSettings settings{params_.max_bounces, float(params_.clamp), params_.caustics};
   if (params_.mode == "real_time") settings.indirect_share = kRealTimeIndirectShare;
   settings.starts_at_centres = starts_at_centres(view);
+  settings.ends_in_cache = ends_in_cache();
   return settings;
 }
 

@@ -31,6 +31,7 @@ struct PictureParams {
   std::string denoiser = "own";  ///< A parameter only where the build found another one.
   bool caustics = false;
   double clamp = 0.0;
+  bool radiance_cache = true;
   double firefly_limit = 4.0;
   std::string exposure = "auto";
   double exposure_ev = 0.0;
@@ -103,6 +104,9 @@ class PathRenderer : public Renderer {
   bool starts_at_centres(const View& view) const;
   PathSettings path_settings(const View& view) const;
   Image<Vec3f> without_noise(Film film, const View& view);
+  bool ends_in_cache() const {
+    return params_.radiance_cache && params_.denoise && !is_quick() && params_.max_bounces > 0;
+  }
   bool is_quick() const { return params_.mode != "path_traced"; }
   bool filters_film_elsewhere() const {
     return filters_elsewhere() && is_quick() && params_.denoiser == "own";

@@ -1,36 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "embree_renderer.h"
 
-#include <pmmintrin.h>
-#include <xmmintrin.h>
-
 #include <atomic>
 #include <chrono>
+#include <optional>
 #include <vector>
 
 namespace diorama {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
-
-/// Numbers too small to matter count as zero while it lives: they are slow otherwise.
-class FlushDenormals {
- public:
-  FlushDenormals() : before_(_mm_getcsr()) {
-    _MM_SET_FLUSH_ZERO_MODE(_MM_FLUSH_ZERO_ON);
-    _MM_SET_DENORMALS_ZERO_MODE(_MM_DENORMALS_ZERO_ON);
-  }
-  ~FlushDenormals() { _mm_setcsr(before_); }
-  FlushDenormals(const FlushDenormals&) = delete;
-  FlushDenormals& operator=(const FlushDenormals&) = delete;
-
- private:
-  unsigned before_;
-};
 
 /// Rays of jobs that run side by side.
 class RayTotals {
@@ -39,9 +20,9 @@ class RayTotals {
     rays_ += counts.rays;
     shadow_rays_ += counts.shadow_rays;
   }
-  void put_into(EmbreeRenderer::Counts& counts) const {
-    counts.rays = rays_;
-    counts.shadow_rays = shadow_rays_;
+  void add_to(EmbreeRenderer::Counts& counts) const {
+    counts.rays += rays_;
+    counts.shadow_rays += shadow_rays_;
   }
 
  private:
@@ -52,15 +33,26 @@ class RayTotals {
 }  // namespace
 
 Film EmbreeRenderer::trace(const View& view, const PathSettings& path_settings, SamplePlan& plan) {
+  const auto start = Clock::now();
   TraceSettings settings;
   static_cast<PathSettings&>(settings) = path_settings;
   settings.host = &host();
   if (settings.starts_at_centres) settings.first_hits = &first_hits(view);
+  std::optional<RadianceCache> cache;
+  if (settings.ends_in_cache) {
+    RayCounts rays;
+    const std::vector<TraceJob> jobs = plan.learning_jobs();
+    cache.emplace(PathTracer(meshes(), view, settings, isa()).learn(jobs, host(), rays));
+    settings.cache = &*cache;
+    for (const TraceJob& job : jobs) counts().paths += job.path_count();
+    counts().rays += rays.rays;
+    counts().shadow_rays += rays.shadow_rays;
+  }
   const PathTracer tracer(meshes(), view, settings, isa());
   const int width = view.camera().width;
   const int height = view.camera().height;
   return plan.has_one_round() ? trace_at_once(tracer, plan, width, height)
-                              : trace_in_rounds(tracer, plan, width, height);
+                              : trace_in_rounds(tracer, plan, width, height, start);
 }
 
 /// Without a picture of sums, which are larger than what is left of them.
@@ -70,7 +62,6 @@ Film EmbreeRenderer::trace_at_once(const PathTracer& tracer, SamplePlan& plan, i
   RayTotals totals;
   const std::vector<TraceJob> jobs = plan.next_round({}, 0.0);
   host().parallel_for(jobs.size(), [&](std::size_t i) {
-    const FlushDenormals flush;
     const TraceJob& job = jobs[i];
     const int columns = job.x_end - job.x_begin;
     std::vector<PixelSum> sums(job.pixel_count());
@@ -81,20 +72,18 @@ Film EmbreeRenderer::trace_at_once(const PathTracer& tracer, SamplePlan& plan, i
     }
   });
   for (const TraceJob& job : jobs) counts().paths += job.path_count();
-  totals.put_into(counts());
+  totals.add_to(counts());
   return film;
 }
 
 Film EmbreeRenderer::trace_in_rounds(const PathTracer& tracer, SamplePlan& plan, int width,
-                                     int height) {
+                                     int height, Clock::time_point start) {
   Image<PixelSum> sums(width, height, PixelSum{});
   RayTotals totals;
-  const auto start = Clock::now();
   while (true) {
     const std::vector<TraceJob> jobs = plan.next_round(sums, seconds_since(start));
     if (jobs.empty()) break;
     host().parallel_for(jobs.size(), [&](std::size_t i) {
-      const FlushDenormals flush;
       const TraceJob& job = jobs[i];
       totals.add(tracer.trace(job, &sums.at(job.x_begin, job.y_begin), std::size_t(width)));
     });
@@ -110,8 +99,8 @@ Film EmbreeRenderer::trace_in_rounds(const PathTracer& tracer, SamplePlan& plan,
     }
     paths += count;
   });
-  counts().paths = paths;
-  totals.put_into(counts());
+  counts().paths += paths;
+  totals.add_to(counts());
   return film;
 }
 

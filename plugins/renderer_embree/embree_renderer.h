@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
 #include <utility>
 
 #include "embree_support/path_renderer.h"
@@ -16,12 +17,15 @@ class EmbreeRenderer final : public PathRenderer {
   EmbreeRenderer(Params params, Host& host) : PathRenderer(std::move(params), host) {}
 
  private:
+  using Clock = std::chrono::steady_clock;
+
   Film trace(const View& view, const PathSettings& settings, SamplePlan& plan) override;
   std::size_t traced_bytes_per_pixel() const override {
     return has_rounds() ? sizeof(PixelSum) : 0;
   }
   Film trace_at_once(const PathTracer& tracer, SamplePlan& plan, int width, int height);
-  Film trace_in_rounds(const PathTracer& tracer, SamplePlan& plan, int width, int height);
+  Film trace_in_rounds(const PathTracer& tracer, SamplePlan& plan, int width, int height,
+                       Clock::time_point start);
 };
 
 }  // namespace diorama

@@ -24,10 +24,13 @@ struct PathTracer::Path {
   bool hides_lights = false;   ///< Their light was already counted, or is left out on purpose.
   Receiver last;               ///< The last vertex that took light samples.
   float last_density = kInfinite;
-  float since_last = 0.0f;  ///< Metres travelled from it.
-  float width = 0.0f;       ///< Of the ray's footprint, metres.
-  float spread = 0.0f;      ///< Its growth per metre.
-  float time = kMoment;     ///< Share of the shutter's window.
+  float since_last = 0.0f;         ///< Metres travelled from it.
+  float width = 0.0f;              ///< Of the ray's footprint, metres.
+  float spread = 0.0f;             ///< Its growth per metre.
+  float time = kMoment;            ///< Share of the shutter's window.
+  bool ends = false;               ///< In a RadianceCache.
+  bool has_finding = false;        ///< For a RadianceCache ...
+  RadianceCache::Finding finding;  ///< ... but for its light: what it has scattered in the end.
 
   /// Between ways to go on.
   void choose() {
@@ -72,6 +75,7 @@ struct PathTracer::Batch : Vertices {
   std::array<std::uint8_t, kBatch> shadow_rays;
   std::size_t shadow_ray_count = 0;
 
+  bool learns = false;  ///< For a RadianceCache.
   BatchRays next_rays;
   std::array<Path*, kBatch> next_paths;
   void go_on(Path& path, const Vec3f& from, const Vec3f& towards, const LeftTriangle& left = {}) {

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "path_tracer.h"
 
+#include <pmmintrin.h>
+#include <xmmintrin.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -15,24 +18,55 @@ namespace {
 // Samples of one pixel that are traced side by side: their first rays go nearly the same way.
 constexpr std::uint32_t kRun = 8;
 
+/// Numbers too small to matter count as zero while it lives: they are slow otherwise.
+class FlushDenormals {
+ public:
+  FlushDenormals() : before_(_mm_getcsr()) {
+    _MM_SET_FLUSH_ZERO_MODE(_MM_FLUSH_ZERO_ON);
+    _MM_SET_DENORMALS_ZERO_MODE(_MM_DENORMALS_ZERO_ON);
+  }
+  ~FlushDenormals() { _mm_setcsr(before_); }
+  FlushDenormals(const FlushDenormals&) = delete;
+  FlushDenormals& operator=(const FlushDenormals&) = delete;
+
+ private:
+  unsigned before_;
+};
+
 }  // namespace
 
 PathTracer::PathTracer(const EmbreeScene& scene, const View& view, const TraceSettings& settings,
                        Isa isa)
     : scene_(scene), view_(view), settings_(settings), isa_(isa) {}
 
-RayCounts PathTracer::trace(const TraceJob& job, PixelSum* sums, std::size_t stride) const {
+RayCounts PathTracer::trace(const TraceJob& job, const Output& output) const {
+  const FlushDenormals flush;
   switch (isa_) {
     case Isa::Sse2:
       break;
     case Isa::Sse42:
-      return trace_sse42(job, sums, stride);
+      return trace_sse42(job, output);
     case Isa::Avx2:
-      return trace_avx2(job, sums, stride);
+      return trace_avx2(job, output);
     case Isa::Avx512:
-      return trace_avx512(job, sums, stride);
+      return trace_avx512(job, output);
   }
-  return trace_all<8>(job, sums, stride);
+  return trace_all<8>(job, output);
+}
+
+RadianceCache PathTracer::learn(std::span<const TraceJob> jobs, Host& host,
+                                RayCounts& counts) const {
+  std::vector<std::vector<RadianceCache::Finding>> findings(jobs.size());
+  std::vector<RayCounts> rays(jobs.size());
+  host.parallel_for(jobs.size(), [&](std::size_t i) {
+    findings[i].reserve(jobs[i].path_count());
+    rays[i] = trace(jobs[i], Output{nullptr, 0, &findings[i]});
+  });
+  for (const RayCounts& own : rays) {
+    counts.rays += own.rays;
+    counts.shadow_rays += own.shadow_rays;
+  }
+  return {view_.position(), findings};
 }
 
 // One kernel per instruction set: all that it calls is compiled into it, but for what is rarely
@@ -44,8 +78,8 @@ RayCounts PathTracer::trace(const TraceJob& job, PixelSum* sums, std::size_t str
 #endif
 #define DIORAMA_KERNEL(NAME, ARCH, PACKET_SIZE)                              \
   [[gnu::target("arch=" ARCH), DIORAMA_FLATTEN]] RayCounts PathTracer::NAME( \
-      const TraceJob& job, PixelSum* sums, std::size_t stride) const {       \
-    return trace_all<PACKET_SIZE>(job, sums, stride);                        \
+      const TraceJob& job, const Output& output) const {                     \
+    return trace_all<PACKET_SIZE>(job, output);                              \
   }
 DIORAMA_KERNEL(trace_sse42, "x86-64-v2", 8)
 DIORAMA_KERNEL(trace_avx2, "x86-64-v3", 8)
@@ -54,19 +88,21 @@ DIORAMA_KERNEL(trace_avx512, "x86-64-v4", 16)
 #undef DIORAMA_FLATTEN
 
 template <int kPacketSize>
-inline RayCounts PathTracer::trace_all(const TraceJob& job, PixelSum* sums,
-                                       std::size_t stride) const {
+inline RayCounts PathTracer::trace_all(const TraceJob& job, const Output& output) const {
   std::vector<Path> paths;
   paths.reserve(kBatch);
   Batch batch;
   batch.own_bsdfs.reserve(kBatch);
+  batch.learns = output.findings != nullptr;
   std::array<PixelSum*, kBatch> pixels;
   BatchFloats columns{};
   BatchFloats rows{};
   const auto add_path = [&](int x, int y, std::uint32_t sample) {
     const std::size_t i = paths.size();
     const auto row = std::size_t(y - job.y_begin);
-    pixels[i] = &sums[row * stride + std::size_t(x - job.x_begin)];
+    if (output.sums) {
+      pixels[i] = &output.sums[row * output.stride + std::size_t(x - job.x_begin)];
+    }
     paths.emplace_back(PathSampler(job.order.place(x, y, sample)));
     columns[i] = float(x);
     rows[i] = float(y);
@@ -81,7 +117,14 @@ inline RayCounts PathTracer::trace_all(const TraceJob& job, PixelSum* sums,
           if (--left > 0 && paths.size() < kBatch) continue;
           start_paths(paths, columns, rows, batch);
           trace_batch<kPacketSize>(batch);
-          for (std::size_t i = 0; i < paths.size(); ++i) pixels[i]->add(paths[i].result);
+          for (std::size_t i = 0; i < paths.size(); ++i) {
+            if (!output.findings) {
+              pixels[i]->add(paths[i].result);
+            } else if (paths[i].has_finding) {
+              paths[i].finding.light = paths[i].result.scattered;
+              output.findings->push_back(paths[i].finding);
+            }
+          }
           paths.clear();
           if (settings_.host) settings_.host->stop_if_asked();
         }
@@ -272,6 +315,25 @@ inline bool PathTracer::evaluate_material(Batch& v, std::size_t i) const {
   return pass_through.is_scattered;
 }
 
+inline void PathTracer::use_cache(Batch& v, std::size_t i) const {
+  Path& path = *v.paths[i];
+  const bool is_wanted = (settings_.cache != nullptr) | v.learns;
+  if (!is_wanted || path.has_finding) return;
+  const SurfaceBsdf& s = *v.bsdf[i];
+  if (!s.is_rough() || ends_at(path, s)) return;
+  const Vec3f weight = path.throughput.cwiseProduct(s.albedo(v.albedo.at(i)));
+  if (v.learns) {
+    path.has_finding = true;
+    path.finding = {v.position.at(i), v.normal.at(i), path.since_last, weight, Vec3f::Zero()};
+    path.result.scattered = Vec3f::Zero();  // What comes from here on is what it finds.
+    return;
+  }
+  Vec3f light;
+  if (!settings_.cache->find(v.position.at(i), v.normal.at(i), path.since_last, light)) return;
+  add(path, path.bounce, weight.cwiseProduct(light));
+  path.ends = true;
+}
+
 inline void PathTracer::draw_numbers(Batch& v) const {
   LightQueries& queries = v.queries;
   const std::size_t size = whole_steps(v.count);
@@ -338,13 +400,16 @@ inline void PathTracer::scatter(Batch& v, std::size_t i) const {
   v.bounce[i] = path.bounce;
   if (s.lobes.glass > 0.0f) [[unlikely]]
     return scatter_glass(v, i);
-  if (!path.result.has_surface && !s.is_mirror()) {
+  const bool is_first = !path.result.has_surface;
+  if (is_first && !s.is_mirror()) {
     record_surface(v, i, s.albedo(v.albedo.at(i)));
   }
+  const bool asks_light = !v.learns || path.has_finding;
+  if (!is_first) use_cache(v, i);
   take_light_samples(v, i);
-  queue_shadow_ray(v, i);
+  if (asks_light) queue_shadow_ray(v, i);
   path.hides_lights = false;
-  if (ends_at(path, s)) return;
+  if (path.ends || ends_at(path, s)) return;
   BsdfSample next;
   next.weight = v.next_weight.at(i);
   next.density = v.next_density[i];

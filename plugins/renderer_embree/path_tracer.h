@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "diorama/host.h"
@@ -11,6 +12,7 @@
 #include "renderer_support/hit_image.h"
 #include "renderer_support/isa.h"
 #include "renderer_support/path_settings.h"
+#include "renderer_support/radiance_cache.h"
 #include "renderer_support/trace_job.h"
 #include "renderer_support/view.h"
 
@@ -29,6 +31,8 @@ struct TraceSettings : PathSettings {
   /// What the rays through the pixels' centres met, if known: every path then starts there. For
   /// views without aperture and shutter, and no more than a path per pixel.
   const HitImage* first_hits = nullptr;
+  /// Where paths end that may; null: nowhere.
+  const RadianceCache* cache = nullptr;
   /// Asked after every batch of paths whether to stop.
   const Host* host = nullptr;
   /// For tests of the estimators: which of the two techniques that find light are used.
@@ -51,19 +55,30 @@ class PathTracer {
 
   /// Adds samples to the sums of the job's pixels, which lie row by row from its first on, `stride`
   /// per row. Equal jobs give equal sums. Uses the kernel compiled for the instruction set.
-  RayCounts trace(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
+  RayCounts trace(const TraceJob& job, PixelSum* sums, std::size_t stride) const {
+    return trace(job, Output{sums, stride, nullptr});
+  }
+  /// What the jobs' paths find for those of the picture. Adds to `counts`.
+  RadianceCache learn(std::span<const TraceJob> jobs, Host& host, RayCounts& counts) const;
 
  private:
+  /// Sums of pixels, or findings.
+  struct Output {
+    PixelSum* sums;
+    std::size_t stride;
+    std::vector<RadianceCache::Finding>* findings;
+  };
   struct Path;
   struct StraightPass;
   struct Batch;
 
+  RayCounts trace(const TraceJob& job, const Output& output) const;
   // Rays to lights are traced kPacketSize at a time.
   template <int kPacketSize>
-  RayCounts trace_all(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
-  RayCounts trace_sse42(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
-  RayCounts trace_avx2(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
-  RayCounts trace_avx512(const TraceJob& job, PixelSum* sums, std::size_t stride) const;
+  RayCounts trace_all(const TraceJob& job, const Output& output) const;
+  RayCounts trace_sse42(const TraceJob& job, const Output& output) const;
+  RayCounts trace_avx2(const TraceJob& job, const Output& output) const;
+  RayCounts trace_avx512(const TraceJob& job, const Output& output) const;
   void start_paths(std::vector<Path>& paths, const BatchFloats& columns, const BatchFloats& rows,
                    Batch& v) const;
   template <int kPacketSize>
@@ -78,6 +93,8 @@ class PathTracer {
   void draw_numbers(Batch& v) const;
   void take_lobes(Batch& v, std::size_t i) const;
   bool ends_at(const Path& path, const SurfaceBsdf& s) const;
+  /// Ends the path with light from the cache, or begins what it finds for one.
+  void use_cache(Batch& v, std::size_t i) const;
   void scatter(Batch& v, std::size_t i) const;
   void scatter_glass(Batch& v, std::size_t i) const;
   void light_glass(Batch& v, std::size_t i, const Bsdf& bsdf) const;

@@ -14,6 +14,9 @@ struct PathSettings {
   /// Share of the paths that go on behind their first scattering surface, with more weight: less
   /// time for a picture, more noise in its indirect light.
   float indirect_share = 1.0f;
+  /// Paths end at their second surface, with light that others found there: see RadianceCache. Far
+  /// less noise for a little blur of indirect light.
+  bool ends_in_cache = false;
   /// Every path starts through its pixel's centre. For views without aperture and shutter, and no
   /// more than a path per pixel.
   bool starts_at_centres = false;

@@ -24,10 +24,20 @@ double typical_brightness(const Image<PixelSum>& sums) {
   return mean * mean;
 }
 
+constexpr std::uint64_t kMostLearningPaths = 1u << 19;
+
+/// Per pixel.
+std::uint32_t learning_samples(std::uint64_t pixels, int samples) {
+  constexpr std::uint32_t kPathsForOne = 4;
+  const auto affordable = std::uint32_t(
+      std::max<std::uint64_t>(1, kMostLearningPaths / std::max<std::uint64_t>(1, pixels)));
+  return std::clamp(std::uint32_t(samples) / kPathsForOne, 1u, affordable);
+}
+
 }  // namespace
 
 SamplePlan::SamplePlan(int width, int height, const Limits& limits, std::uint64_t seed)
-    : limits_(limits) {
+    : limits_(limits), seed_(seed) {
   const SampleOrder order(seed, std::uint32_t(limits.samples));
   for (int y = 0; y < height; y += kBlock) {
     for (int x = 0; x < width; x += kBlock) {
@@ -36,6 +46,30 @@ SamplePlan::SamplePlan(int width, int height, const Limits& limits, std::uint64_
       blocks_.push_back({{x, y, x_end, y_end, 0, 0, order}, 0});
     }
   }
+}
+
+std::vector<TraceJob> SamplePlan::learning_jobs() const {
+  std::uint64_t pixels = 0;
+  for (const Block& block : blocks_) pixels += block.job.pixel_count();
+  const std::uint32_t samples = learning_samples(pixels, limits_.samples);
+  // One block of so many, anywhere.
+  const std::uint64_t share = std::max<std::uint64_t>(1, pixels / kMostLearningPaths);
+  const std::uint64_t own_seed = mix_bits(seed_ ^ 0x4C4541524E494E47u);
+  const SampleOrder order(own_seed, samples);
+  std::vector<TraceJob> jobs;
+  for (std::size_t i = 0; i < blocks_.size(); ++i) {
+    if (mix_bits(own_seed ^ i) % share != 0) continue;
+    TraceJob& job = jobs.emplace_back(blocks_[i].job);
+    job.sample_begin = 0;
+    job.sample_end = samples;
+    job.order = order;
+  }
+  return jobs;
+}
+
+std::uint64_t SamplePlan::most_learning_paths(std::uint64_t pixels, int samples) {
+  // Blocks are chosen by chance: a few more than meant may be.
+  return std::min(pixels * learning_samples(pixels, samples), 2 * kMostLearningPaths);
 }
 
 std::vector<TraceJob> SamplePlan::next_round(const Image<PixelSum>& sums, double elapsed_s) {

@@ -25,6 +25,11 @@ class SamplePlan {
 
   /// Whether the first round takes all samples.
   bool has_one_round() const { return limits_.error_target <= 0.0 && limits_.time_budget_s <= 0.0; }
+  /// Paths of a sequence of their own for a RadianceCache to learn from: one for four of the
+  /// picture, but at least one per pixel; less where the picture is large.
+  std::vector<TraceJob> learning_jobs() const;
+  /// How many paths that are at most, of pictures of so many pixels and samples.
+  static std::uint64_t most_learning_paths(std::uint64_t pixels, int samples);
   /// What to trace next; empty: the picture is done. `sums` hold all earlier rounds, which took
   /// `elapsed_s` together.
   std::vector<TraceJob> next_round(const Image<PixelSum>& sums, double elapsed_s);
@@ -44,6 +49,7 @@ class SamplePlan {
   static double error_of(const Block& block, const Image<PixelSum>& sums, double faint);
 
   Limits limits_;
+  std::uint64_t seed_;
   std::vector<Block> blocks_;
   double paths_ = 0.0;  ///< Planned so far.
 };

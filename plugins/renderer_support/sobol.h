@@ -18,6 +18,13 @@ inline std::uint64_t mix_bits(std::uint64_t x) {
   return x ^ (x >> 31);
 }
 
+/// A good 32-bit hash (found by search, Wellons 2018).
+inline std::uint32_t hashed_bits(std::uint32_t x) {
+  x = (x ^ (x >> 16)) * 0x21F0AAADu;
+  x = (x ^ (x >> 15)) * 0xD35A2D97u;
+  return x ^ (x >> 15);
+}
+
 /// How the pixels of a picture share one Sobol sequence: each takes a run of it as long as the
 /// samples wanted (rounded up to a power of two), in the order of a Z-shaped curve. Neighbours then
 /// complete each other: their errors differ and cancel when the picture is blurred, by an eye or by
@@ -80,7 +87,7 @@ class PathSampler {
   }
   std::uint32_t place() const { return reversed_; }
   static Vec2f pair(std::uint32_t key, std::uint32_t place) {
-    const std::uint32_t hash = hashed(key);
+    const std::uint32_t hash = hashed_bits(key);
     const std::uint32_t first = shuffled(place, hash);
     const std::uint32_t scramble = hash * 0x9E3779B1u;
     return {fraction(first ^ scramble),
@@ -90,13 +97,6 @@ class PathSampler {
 
  private:
   static float fraction(std::uint32_t bits) { return float(std::int32_t(bits >> 8)) * 0x1p-24f; }
-
-  /// A good 32-bit hash (found by search, Wellons 2018).
-  static std::uint32_t hashed(std::uint32_t x) {
-    x = (x ^ (x >> 16)) * 0x21F0AAADu;
-    x = (x ^ (x >> 15)) * 0xD35A2D97u;
-    return x ^ (x >> 15);
-  }
 
   /// The bits in reverse order: the first coordinate of a Sobol point by its index.
   static std::uint32_t reversed(std::uint32_t x) {

@@ -70,6 +70,11 @@ void GpuPathTracer::make_room(std::uint32_t slots) {
     camera_rays_.grow(device_, paths * gpu::kCameraRaySize, VulkanBuffer::Place::Device, kWhat);
     job_.camera_rays = camera_rays_.address();
   }
+  if (learns()) {
+    device_findings_.grow(device_, paths * sizeof(gpu::Finding), VulkanBuffer::Place::Device,
+                          kWhat);
+    job_.findings = device_findings_.address();
+  }
   if (columns_.size() >= paths * kPathBytes && job_.capacity >= paths) return;
   columns_.grow(device_, paths * kPathBytes, VulkanBuffer::Place::Device, kWhat);
   job_.capacity = std::uint32_t(paths);
@@ -88,8 +93,17 @@ void GpuPathTracer::make_room(std::uint32_t slots) {
   job_.queues[1] = take(sizeof(std::uint32_t));
 }
 
+RadianceCache GpuPathTracer::learn(std::span<const TraceJob> jobs, Counts& counts) {
+  job_.cache_use = gpu::kCacheLearns;
+  findings_.clear();
+  const Counts own = trace(jobs);
+  counts.rays += own.rays;
+  counts.shadow_rays += own.shadow_rays;
+  return {view_->position(), std::span(&findings_, 1)};
+}
+
 void GpuPathTracer::begin(const View& view, const PathSettings& settings, const GpuScene& scene,
-                          double window) {
+                          double window, const RadianceCache* cache) {
   view_ = &view;
   window_ = window;
   const auto pinhole = view.has_shutter() ? std::nullopt : view.pinhole();
@@ -119,6 +133,16 @@ void GpuPathTracer::begin(const View& view, const PathSettings& settings, const 
   job_.film = film_.address();
   job_.pixel_count = std::uint32_t(pixels);
   has_sums_ = false;
+  job_.cache_use = gpu::kNoCache;
+  if (cache) {
+    const auto bytes = std::as_bytes(cache->table());
+    cache_.grow(device_, bytes.size(), VulkanBuffer::Place::Device, "a cache of light");
+    device_.upload(bytes, cache_, 0);
+    job_.cache = cache_.address();
+    job_.cache_mask = std::uint32_t(cache->table().size() - 1);
+    job_.cache_eye = cache->eye();
+    job_.cache_use = gpu::kCacheEnds;
+  }
   seconds_ = {};
   push_.world = scene.world();
   rays_ = scene.traces_by_query() ? &*kernels_.by_query : &kernels_.by_trees;
@@ -258,7 +282,9 @@ GpuPathTracer::Counts GpuPathTracer::trace(const Pass& pass) {
       queue = 1 - queue;
     }
     // Does nothing while paths are under way.
-    dispatch(commands, kSums, kernels_.gather, std::uint32_t(pass.ranges.size()));
+    if (!learns()) {
+      dispatch(commands, kSums, kernels_.gather, std::uint32_t(pass.ranges.size()));
+    }
     commands.copy(counters_, 0, results_for_host_, 0, sizeof(gpu::Counters));
     commands.mark(kTransfers);
   };
@@ -291,7 +317,24 @@ GpuPathTracer::Counts GpuPathTracer::trace(const Pass& pass) {
     host_.stop_if_asked();
     device_.run([&](VulkanCommands& commands) { steps(commands, kFurtherSteps); }, seconds_);
   }
+  if (learns()) read_findings(pass);
   return {counters.rays, counters.shadow_rays};
+}
+
+void GpuPathTracer::read_findings(const Pass& pass) {
+  const std::size_t paths = pass.slots.size() * gpu::kGroup;
+  std::vector<gpu::Finding> found(paths);
+  device_.download(device_findings_, 0, std::as_writable_bytes(std::span(found)));
+  std::vector<std::array<float, 4>> light(paths);
+  const std::size_t column = std::size_t(job_.capacity) * gpu::kColumnSize;
+  device_.download(columns_, job_.results - columns_.address() + column,
+                   std::as_writable_bytes(std::span(light)));
+  for (std::size_t i = 0; i < paths; ++i) {
+    const gpu::Finding& f = found[i];
+    if (f.is_there == 0.0f) continue;
+    findings_.push_back(
+        {f.position, f.normal, f.reach, f.weight, {light[i][0], light[i][1], light[i][2]}});
+  }
 }
 
 gpu::Address GpuPathTracer::record_film(VulkanCommands& commands) const {

@@ -15,6 +15,7 @@
 #include "path_device.h"
 #include "renderer_support/film.h"
 #include "renderer_support/path_settings.h"
+#include "renderer_support/radiance_cache.h"
 #include "renderer_support/trace_job.h"
 #include "renderer_support/view.h"
 
@@ -33,11 +34,14 @@ class GpuPathTracer {
     std::uint64_t shadow_rays = 0;
   };
 
-  /// Begins a picture.
+  /// Begins a picture. `cache`: where paths end that may; null: nowhere.
   /// `scene` is used until the picture's last trace(). `window`: see RenderScene::window().
-  void begin(const View& view, const PathSettings& settings, const GpuScene& scene, double window);
+  void begin(const View& view, const PathSettings& settings, const GpuScene& scene, double window,
+             const RadianceCache* cache = nullptr);
   /// Traces the samples of these jobs. Sums are the same for any division into jobs and passes.
   Counts trace(std::span<const TraceJob> jobs);
+  /// In place of a picture: what the jobs' paths find for those of pictures. Adds to `counts`.
+  RadianceCache learn(std::span<const TraceJob> jobs, Counts& counts);
   /// The pixels' sums until now.
   Image<PixelSum> sums();
   /// Their means.
@@ -74,6 +78,8 @@ class GpuPathTracer {
   void make_room(std::uint32_t slots);
   void add(const TraceJob& job, std::uint32_t begin, std::uint32_t end, Pass& pass) const;
   void make_camera_rays(const Pass& pass);
+  bool learns() const { return job_.cache_use == gpu::kCacheLearns; }
+  void read_findings(const Pass& pass);
   void write_inputs(const Pass& pass);
   Counts trace(const Pass& pass);
 
@@ -87,6 +93,7 @@ class GpuPathTracer {
   const RayKernels* rays_ = nullptr;
   double window_ = 0.0;
   bool has_sums_ = false;
+  std::vector<RadianceCache::Finding> findings_;  ///< Where it learns.
 
   gpu::Job job_;
   gpu::Push push_;
@@ -95,6 +102,8 @@ class GpuPathTracer {
   VulkanBuffer inputs_;   ///< The job, the slots and their ranges.
   VulkanBuffer columns_;  ///< State, results, hits, shadow rays and queues.
   VulkanBuffer camera_rays_;
+  VulkanBuffer cache_;
+  VulkanBuffer device_findings_;
   VulkanBuffer sums_;
   VulkanBuffer film_;
   VulkanBuffer inputs_from_host_;

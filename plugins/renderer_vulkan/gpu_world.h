@@ -212,6 +212,19 @@ struct PixelSum {
 };
 static_assert(sizeof(PixelSum) == 84);
 
+enum CacheUse : std::uint32_t { kNoCache, kCacheLearns, kCacheEnds };
+
+/// What a path that learns for a cache leaves, but for its light; see RadianceCache::Finding.
+struct Finding {
+  Vec3f position;
+  float is_there;
+  Vec3f normal;
+  float reach;
+  Vec3f weight;
+  float pad_weight;
+};
+static_assert(sizeof(Finding) == 48);
+
 struct Counters {
   std::array<std::uint32_t, 3> paths_groups{};
   std::array<std::uint32_t, 3> shadow_groups{};
@@ -237,6 +250,10 @@ struct Job {
   Address camera_rays = 0;
   Address sums = 0;
   Address film = 0;
+  Address cache = 0;
+  Address findings = 0;
+  std::uint32_t cache_mask = 0;
+  std::uint32_t cache_use = 0;
   std::uint32_t capacity = 0;
   std::uint32_t width = 0;
   std::uint32_t sample_bits = 0;
@@ -250,6 +267,7 @@ struct Job {
   std::uint32_t has_caustics = 0;
   float indirect_share = 1.0f;
   float pixel_angle = 0.0f;
+  Vec3f cache_eye = Vec3f::Zero();
   Vec3f camera = Vec3f::Zero();
   Vec3f towards = Vec3f::Zero();
   Vec3f per_column = Vec3f::Zero();

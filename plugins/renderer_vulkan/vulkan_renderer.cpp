@@ -3,6 +3,7 @@
 
 #include <charconv>
 #include <chrono>
+#include <optional>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -72,7 +73,17 @@ void VulkanRenderer::prepare_paths() { scene_.take(meshes().render_scene()); }
 void VulkanRenderer::trace_paths(const View& view, const PathSettings& settings, SamplePlan& plan) {
   using Clock = std::chrono::steady_clock;
   const auto start = Clock::now();
-  tracer_.begin(view, settings, scene_, meshes().window());
+  std::optional<RadianceCache> cache;
+  GpuPathTracer::Counts learnt;
+  if (settings.ends_in_cache) {
+    const std::vector<TraceJob> jobs = plan.learning_jobs();
+    tracer_.begin(view, settings, scene_, meshes().window());
+    cache.emplace(tracer_.learn(jobs, learnt));
+    for (const TraceJob& job : jobs) counts().paths += job.path_count();
+    counts().rays += learnt.rays;
+    counts().shadow_rays += learnt.shadow_rays;
+  }
+  tracer_.begin(view, settings, scene_, meshes().window(), cache ? &*cache : nullptr);
   Image<PixelSum> sums;
   while (true) {
     const double elapsed = std::chrono::duration<double>(Clock::now() - start).count();

@@ -137,10 +137,13 @@ def main():
     options = parser.parse_args()
     device = torch.device(options.device)
     ways = {"noisy": lambda raw, n, e: raw[:, 0:3] + raw[:, 3:6]}
+    ways["cached"] = ways["noisy"]
+    blind = {"noisy"}  # get films whose paths did not end in a cache
     for item in options.oidn:
         name, path = item.split("=")
         judge = Oidn(path, device)
         ways[name] = lambda raw, n, e, judge=judge: judge(raw, True)
+        blind |= {name, name + "_scattered"}
         ways[name + "_scattered"] = lambda raw, n, e, judge=judge: judge(raw, False)
     for item in options.network:
         name, path = item.split("=")
@@ -156,20 +159,23 @@ def main():
             data = data.reshape(-1, 3, height, width).astype(np.float32)
             own[part] = torch.from_numpy(data).to(device)
         films = torch.from_numpy(values.astype(np.float32)).to(device)
+        plain = torch.from_numpy(read_films(path.with_suffix(".plain"))[0].astype(np.float32))
+        plain = plain.to(device)
         counts = torch.tensor(paths[-2:], dtype=torch.float32, device=device)
         references = spread(films[-2:], counts).split(1)
         edges = edges_of(0.5 * (films[-2:-1] + films[-1:]))
         rows = []
         for i in range(len(paths) - 2):
             raw = films[i : i + 1]
+            noisy_raw = plain[i : i + 1]
             n = torch.tensor([float(paths[i])], device=device)
             e = torch.tensor([exposures[i]], device=device)
             pictures = {}
             with torch.no_grad():
                 for name, way in ways.items():
-                    pictures[name] = way(raw, n, e)
+                    pictures[name] = way(noisy_raw if name in blind else raw, n, e)
             pictures.update((part, values[i : i + 1]) for part, values in own.items())
-            noisy = float((raw[:, 0:3] + raw[:, 3:6]).mean())
+            noisy = float((noisy_raw[:, 0:3] + noisy_raw[:, 3:6]).mean())
             for name, picture in pictures.items():
                 table.append({"view": path.stem, "paths": paths[i], "way": name,
                               "mean": float(picture.mean()) / max(noisy, 1e-6),

@@ -36,6 +36,7 @@ using namespace diorama::training;
 struct Pass {
   int samples = 1;
   bool is_real_time = false;  ///< Through the pixels' centres, half of the bounces.
+  bool ends_in_cache = true;  ///< As the paths of denoised pictures do.
 };
 
 /// Traces the paths of one scene, on the processor or on a GPU.
@@ -56,9 +57,9 @@ class Tracer {
       settings.starts_at_centres = true;
       settings.indirect_share = 0.5f;
     }
-    const auto jobs = SamplePlan(view.camera().width, view.camera().height, {pass.samples}, seed)
-                          .next_round({}, 0);
-    return on_device_ ? on_device(view, settings, jobs) : on_processor(view, settings, jobs);
+    settings.ends_in_cache = pass.ends_in_cache && max_bounces > 0;
+    SamplePlan plan(view.camera().width, view.camera().height, {pass.samples}, seed);
+    return on_device_ ? on_device(view, settings, plan) : on_processor(view, settings, plan);
   }
 
  private:
@@ -68,15 +69,23 @@ class Tracer {
     GpuPathTracer tracer;
   };
 
-  Film on_device(const View& view, const PathSettings& settings,
-                 const std::vector<TraceJob>& jobs) {
-    on_device_->tracer.begin(view, settings, on_device_->scene, meshes_.window());
-    on_device_->tracer.trace(jobs);
-    return on_device_->tracer.film();
+  Film on_device(const View& view, const PathSettings& settings, SamplePlan& plan) {
+    GpuPathTracer& tracer = on_device_->tracer;
+    const auto begin = [&](const RadianceCache* cache) {
+      tracer.begin(view, settings, on_device_->scene, meshes_.window(), cache);
+    };
+    std::optional<RadianceCache> cache;
+    if (settings.ends_in_cache) {
+      GpuPathTracer::Counts counts;
+      begin(nullptr);
+      cache.emplace(tracer.learn(plan.learning_jobs(), counts));
+    }
+    begin(cache ? &*cache : nullptr);
+    tracer.trace(plan.next_round({}, 0.0));
+    return tracer.film();
   }
 
-  Film on_processor(const View& view, const PathSettings& path_settings,
-                    const std::vector<TraceJob>& jobs) {
+  Film on_processor(const View& view, const PathSettings& path_settings, SamplePlan& plan) {
     TraceSettings settings{path_settings};
     HitImage hits;
     if (settings.starts_at_centres) {
@@ -85,8 +94,16 @@ class Tracer {
       fill_channels(frame, {}, meshes_, view, seen, &hits, host_);
       settings.first_hits = &hits;
     }
+    std::optional<RadianceCache> cache;
+    if (settings.ends_in_cache) {
+      RayCounts counts;
+      cache.emplace(
+          PathTracer(meshes_, view, settings, isa_).learn(plan.learning_jobs(), host_, counts));
+      settings.cache = &*cache;
+    }
     const PathTracer tracer(meshes_, view, settings, isa_);
     Film film(view.camera().width, view.camera().height);
+    const std::vector<TraceJob> jobs = plan.next_round({}, 0.0);
     host_.parallel_for(jobs.size(), [&](std::size_t i) {
       const TraceJob& job = jobs[i];
       std::vector<PixelSum> sums(job.pixel_count());
@@ -236,17 +253,24 @@ void render_set(const Set& set, std::uint64_t seed, const Options& options, Host
                         : depth < 0.94 ? 1
                                        : 0;
     const bool sees_one_moment = !view.has_shutter() && !view.has_aperture();
-    std::vector<Pass> passes{{1, sees_one_moment && bounces < 2}, {2}, {4}, {16}};
+    const bool is_real_time = sees_one_moment && bounces < 2;
+    std::vector<Pass> passes{{1, is_real_time, !is_real_time}, {2}, {4}, {16}};
     if (is_judged) {
       if (bounces > 1) passes.erase(passes.begin());
       passes.push_back({256});
     } else if (rng.chance(0.12)) {
       passes.push_back({rng.chance(0.5) ? 64 : 256});
     }
-    passes.insert(passes.end(), 2, {options.target_paths});
+    passes.insert(passes.end(), 2, {options.target_paths, false, false});
     std::vector<Film> films;
+    std::vector<Film> plain;  // For denoisers that know nothing of caches.
     for (const Pass& pass : passes) {
-      films.push_back(tracer.trace(view, pass, bounces, rng.bits()));
+      const std::uint64_t own_seed = rng.bits();
+      films.push_back(tracer.trace(view, pass, bounces, own_seed));
+      if (is_judged && plain.size() + 2 < passes.size()) {
+        const Pass own{pass.samples, pass.is_real_time, false};
+        plain.push_back(tracer.trace(view, own, bounces, own_seed));
+      }
       if (films.size() == 2 && !is_judged && !is_worthy(films.back(), view.position())) break;
     }
     if (films.size() < passes.size()) continue;
@@ -258,15 +282,19 @@ void render_set(const Set& set, std::uint64_t seed, const Options& options, Host
                        file_stem.string() + (is_quick ? ".planes" : ".own"));
       }
     }
-    FilmFile file(options.width, options.height, int(films.size()));
-    for (std::size_t k = 0; k < films.size(); ++k) {
-      // As the renderer's network sees them; the last two are what it is compared with.
-      if (k + 2 < films.size()) average_chances(films[k], host);
-      const Image<Vec3f> by_planes =
-          denoised_on_planes(films[k], denoise_settings(films[k], view), isa, host);
-      file.add(films[k], by_planes, passes[k], view.position(), scale);
-    }
-    file.write(file_stem.string() + ".films");
+    const auto write = [&](std::vector<Film>& written, const char* suffix) {
+      FilmFile file(options.width, options.height, int(written.size()));
+      for (std::size_t k = 0; k < written.size(); ++k) {
+        // As the renderer's network sees them; the last two are what it is compared with.
+        if (k + 2 < films.size()) average_chances(written[k], host);
+        const Image<Vec3f> by_planes =
+            denoised_on_planes(written[k], denoise_settings(written[k], view), isa, host);
+        file.add(written[k], by_planes, passes[k], view.position(), scale);
+      }
+      file.write(file_stem.string() + suffix);
+    };
+    write(films, ".films");
+    if (is_judged) write(plain, ".plain");
   }
 }
 

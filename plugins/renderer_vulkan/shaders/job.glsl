@@ -66,6 +66,10 @@ layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Job
   Columns camera_rays;  // three entries per path, where the lens is no pinhole
   PixelSums sums;
   FilmPixels film;
+  Vec4s cache;  // light and key
+  Columns findings;  // three entries per path, where a cache learns
+  uint cache_mask;
+  uint cache_use;
   uint capacity;  // of the columns
   uint width;
   uint sample_bits;
@@ -79,6 +83,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Job
   uint has_caustics;
   float indirect_share;
   float pixel_angle;
+  vec3 cache_eye;
   vec3 camera;
   vec3 towards;
   vec3 per_column;
@@ -114,9 +119,17 @@ const uint kHasSurface = 1u << 20;
 const uint kLeavesTriangle = 1u << 21;  // which it does not meet again
 const uint kByChance = 1u << 22;  // chose between ways before the first surface
 
+const uint kHasFinding = 1u << 23;  // for the cache
+
+// What the cache is for.
+const uint kCacheLearns = 1u;
+const uint kCacheEnds = 2u;
+
 // What the first result has beside the lights seen: the sum of these.
 const float kSurface = 1.0;
 const float kChance = 2.0;
 
 #define STATE(column, path) job.state.v[(column) * job.capacity + (path)]
+// Position and whether there is any, normal and reach, weight.
+#define FINDING(path, entry) job.findings.v[3u * (path) + (entry)]
 #define RESULT(column, path) job.results.v[(column) * job.capacity + (path)]

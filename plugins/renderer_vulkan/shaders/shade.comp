@@ -12,6 +12,7 @@ layout(local_size_x = 64) in;
 #include "surfaces.glsl"
 #include "bsdf.glsl"
 #include "lights.glsl"
+#include "radiance_cache.glsl"
 #include "append.glsl"
 
 const float kContinuation = 0.7;
@@ -105,7 +106,7 @@ Path load_path(uint index) {
 void store_path(uint index, Path path) {
   const bool leaves = has(path, kLeavesTriangle);
   uint flags = path.flags & (kIsCameraRay | kHasScattered | kHidesLights | kHasSurface |
-                             kLeavesTriangle | kByChance);
+                             kLeavesTriangle | kByChance | kHasFinding);
   flags |= uint(path.bounce) | path.passes << 8;
   if (path.last.is_two_sided) flags |= kLastTwoSided;
   STATE(kOrigin, index) = vec4(path.origin, uintBitsToFloat(flags));
@@ -349,8 +350,27 @@ void want_light(Path path, vec3 share, vec3 radiance, SurfacePoint s, LightSampl
   shadow.is_indirect = path.bounce > 1;
 }
 
+// Whether the path ends here with light from the cache.
+bool ends_in_cache(inout Path path, uint index, SurfacePoint s, vec3 weight) {
+  if (job.cache_use == kCacheLearns) {
+    path.flags |= kHasFinding;
+    FINDING(index, 0u) = vec4(s.position, 1.0);
+    FINDING(index, 1u) = vec4(s.normal, path.since_last);
+    FINDING(index, 2u) = vec4(weight, 0.0);
+    // What comes from here on is what it finds.
+    path.scattered = vec3(0.0);
+    RESULT(1u, index) = vec4(0.0);
+    return false;
+  }
+  vec3 light;
+  if (!find_cached(s.position, s.normal, path.since_last, light)) return false;
+  add(path, weight * light);
+  return true;
+}
+
 // True: the path goes on.
-bool scatter(inout Path path, SurfacePoint s, Surface surface, inout ShadowRay shadow) {
+bool scatter(inout Path path, uint index, SurfacePoint s, Surface surface,
+             inout ShadowRay shadow) {
   const bool was_soft = is_soft(path);
   Bsdf bsdf = finished(surface, s.is_back);
   const mat3 basis = basis_around(s.normal);
@@ -370,7 +390,8 @@ bool scatter(inout Path path, SurfacePoint s, Surface surface, inout ShadowRay s
     const uint chosen = choose_light(receiver, u0.x, probability);
     if (probability > 0.0) light = sample_light(chosen, s.position, u1);
   }
-  const bool ends = path.bounce == job.max_bounces && is_rough(bsdf);
+  const bool is_last = path.bounce == job.max_bounces && is_rough(bsdf);
+  bool ends = false;  // in the cache
   const vec3 to_light = to_local(basis, light.direction);
 
   if (has_glass) {
@@ -403,15 +424,22 @@ bool scatter(inout Path path, SurfacePoint s, Surface surface, inout ShadowRay s
     return go_on(path, next.weight, next.density, next.spread, u0.y, origin, direction);
   }
 
-  if (!has(path, kHasSurface) && !is_mirror(bsdf)) record(path, s, albedo(bsdf));
+  const bool is_first_surface = !has(path, kHasSurface);
+  if (is_first_surface && !is_mirror(bsdf)) record(path, s, albedo(bsdf));
+  const bool asks_light = job.cache_use != kCacheLearns || has(path, kHasFinding);
+  if (job.cache_use != 0u && !is_first_surface && !is_last && !has(path, kHasFinding) &&
+      is_rough(bsdf)) {
+    ends = ends_in_cache(path, index, s, path.throughput * albedo(bsdf));
+  }
   path.flags = (path.flags & ~(kIsCameraRay | kHidesLights)) | kHasScattered;
   path.last = receiver;
-  if (light.density > 0.0 && to_light.z > 0.0 && dot(s.flat_normal, light.direction) > 0.0) {
+  if (asks_light && light.density > 0.0 && to_light.z > 0.0 &&
+      dot(s.flat_normal, light.direction) > 0.0) {
     const vec4 value = evaluate_lobes(bsdf, to_light);
-    const vec3 share = value.xyz * weight_of_light(light.density, probability, !ends, value.w);
+    const vec3 share = value.xyz * weight_of_light(light.density, probability, !is_last, value.w);
     want_light(path, share, light.radiance, s, light, shadow);
   }
-  if (ends) return false;
+  if (is_last || ends) return false;
   float spread;
   const vec3 wi = sample_lobes(bsdf, u2.x, u3, spread);
   if (!(wi.z > 0.0)) return false;
@@ -526,7 +554,7 @@ bool advance(inout Path path, uint index, inout ShadowRay shadow) {
       if (what != kScattered) return what == kGoesOn;
     }
   }
-  return scatter(path, s, surface, shadow);
+  return scatter(path, index, s, surface, shadow);
 }
 
 void main() {

@@ -2,9 +2,11 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <vector>
 
 #include "diorama/error.h"
 #include "embree_renderer.h"
+#include "renderer_support/sample_plan.h"
 #include "support/catch.h"
 #include "support/render_host/render_host.h"
 #include "test_world.h"
@@ -388,6 +390,146 @@ TEST_CASE("radiance is finite and never negative", "[renderer]") {
       REQUIRE(p.minCoeff() >= 0.0f);
     }
   }
+}
+
+namespace {
+
+/// A closed room of which a small lamp behind a screen lights one corner: all else is lit by walls.
+TestWorld dim_room() {
+  TestWorld world;
+  Mesh room = make_box(Vec3(5, 4, 3));
+  for (Vec3f& n : room.normals) n = -n;
+  for (auto& t : room.triangles) std::swap(t[1], t[2]);
+  world.add("room", room, matte(0.7f));
+  Material red = matte(0.7f);
+  red.base_color = Vec3f(0.75f, 0.25f, 0.2f);
+  world.add("left", make_box(Vec3(0.1, 4, 3)), red, at(-2.5, 0, 0));
+  Material blue = matte(0.7f);
+  blue.base_color = Vec3f(0.3f, 0.5f, 0.75f);
+  world.add("back", make_box(Vec3(5, 0.1, 3)), blue, at(0, 2, 0));
+  world.add("screen", make_box(Vec3(0.2, 1.6, 2.2)), matte(0.7f), at(1.2, 1.2, -0.4));
+  Light lamp;
+  lamp.radius_m = 0.08;
+  lamp.color = Vec3f(300.0f, 280.0f, 240.0f);
+  world.add(lamp, at(2.0, 1.3, -0.8));
+  return world;
+}
+
+constexpr int kDimWidth = 120;
+constexpr int kDimHeight = 90;
+
+NodeId camera_into_dim(TestWorld& world) {
+  return world.add_camera(kDimWidth, kDimHeight, 60.0, Vec3(-0.4, -1.8, 0.5), Vec3(0.0, 1.0, -0.4));
+}
+
+struct DimPicture {
+  std::vector<Vec3> scattered;
+  double rays = 0.0;
+
+  Vec3 mean() const {
+    Vec3 sum = Vec3::Zero();
+    for (const Vec3& p : scattered) sum += p / double(scattered.size());
+    return sum;
+  }
+  /// Mean square of the pixels' errors, each relative to its brightness and a little more.
+  double error(const DimPicture& truth) const {
+    const double little = 0.05 * truth.mean().mean();
+    double sum = 0.0;
+    for (std::size_t i = 0; i < scattered.size(); ++i) {
+      const double scale = truth.scattered[i].mean() + little;
+      sum += (scattered[i] - truth.scattered[i]).squaredNorm() / (3.0 * scale * scale);
+    }
+    return sum / double(scattered.size());
+  }
+};
+
+DimPicture traced(const PathTracer& tracer, SamplePlan plan, RenderHost& host) {
+  DimPicture picture;
+  picture.scattered.resize(std::size_t(kDimWidth * kDimHeight));
+  const std::vector<TraceJob> jobs = plan.next_round({}, 0.0);
+  std::vector<RayCounts> rays(jobs.size());
+  host.parallel_for(jobs.size(), [&](std::size_t i) {
+    const TraceJob& job = jobs[i];
+    std::vector<PixelSum> sums(job.pixel_count());
+    rays[i] = tracer.trace(job, sums.data(), std::size_t(job.x_end - job.x_begin));
+    const PixelSum* sum = sums.data();
+    for (int y = job.y_begin; y < job.y_end; ++y) {
+      for (int x = job.x_begin; x < job.x_end; ++x) {
+        picture.scattered[std::size_t(y * kDimWidth + x)] =
+            (sum++)->mean().scattered.cast<double>();
+      }
+    }
+  });
+  for (const RayCounts& own : rays) picture.rays += double(own.rays + own.shadow_rays);
+  return picture;
+}
+
+}  // namespace
+
+TEST_CASE("paths that end in a cache find the light of whole paths with less noise",
+          "[renderer][radiance_cache][long]") {
+  TestWorld world = dim_room();
+  const NodeId camera = camera_into_dim(world);
+  RenderHost host(2);
+  EmbreeScene scene(host, {});
+  scene.take(world.scene);
+  const View view(world.scene, camera);
+  const Isa isa = isa_by_name(EmbreeRenderer::Params().isa);
+  TraceSettings settings;
+  settings.max_bounces = 6;
+  const PathTracer whole(scene, view, settings, isa);
+  const auto plan_of = [](int samples, std::uint64_t seed) {
+    return SamplePlan(kDimWidth, kDimHeight, {samples}, seed);
+  };
+  const DimPicture truth = traced(whole, plan_of(512, 77), host);
+  // All pixels share the luck of a cache: one picture's mean is off by a hundredth by chance.
+  constexpr int kRuns = 4;
+  Vec3 mean = Vec3::Zero();
+  double error_with = 0.0;
+  double error_without = 0.0;
+  double rays_with = 0.0;
+  double rays_without = 0.0;
+  double rays_to_learn = 0.0;
+  for (int run = 0; run < kRuns; ++run) {
+    const SamplePlan plan = plan_of(16, std::uint64_t(run));
+    RayCounts learning;
+    const RadianceCache cache = whole.learn(plan.learning_jobs(), host, learning);
+    settings.cache = &cache;
+    const DimPicture with = traced(PathTracer(scene, view, settings, isa), plan, host);
+    const DimPicture without = traced(whole, plan, host);
+    mean += with.mean() / kRuns;
+    error_with += with.error(truth) / kRuns;
+    error_without += without.error(truth) / kRuns;
+    rays_with += with.rays;
+    rays_without += without.rays;
+    rays_to_learn += double(learning.rays + learning.shadow_rays);
+  }
+  const Vec3 expected = truth.mean();
+  CAPTURE(error_with, error_without, mean, expected, rays_with, rays_without, rays_to_learn);
+  CHECK(mean.mean() == Approx(expected.mean()).epsilon(0.02));
+  for (int k = 0; k < 3; ++k) CHECK(mean[k] == Approx(expected[k]).epsilon(0.03));
+  CHECK(error_with < 0.35 * error_without);
+  // Of as many paths.
+  CHECK(rays_with < 0.75 * rays_without);
+  CHECK(rays_with + rays_to_learn < 0.95 * rays_without);
+}
+
+TEST_CASE("denoised pictures come from a cache, the same for every number of threads",
+          "[renderer][radiance_cache][determinism]") {
+  TestWorld world = dim_room();
+  const NodeId camera = camera_into_dim(world);
+  EmbreeRenderer::Params params = reference(8);
+  params.caustics = false;
+  const auto picture = [&](bool denoise, bool radiance_cache, int threads) {
+    params.denoise = denoise;
+    params.radiance_cache = radiance_cache;
+    return render(world, camera, params, threads);
+  };
+  const Image<Vec3f> one = picture(true, true, 1);
+  CHECK(picture(true, true, 3) == one);
+  CHECK(picture(true, false, 3) != one);
+  // A picture that keeps its noise is not to be blurred either.
+  CHECK(picture(false, true, 1) == picture(false, false, 3));
 }
 
 TEST_CASE("a moved object, a new material and a hidden one show in the next picture",

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "renderer_support/sample_plan.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "diorama/rng.h"
@@ -51,6 +54,14 @@ Outcome carry_out(const SamplePlan::Limits& limits, double seconds_per_round = 0
     }
   }
 }
+
+std::uint64_t path_count(const std::vector<TraceJob>& jobs) {
+  std::uint64_t paths = 0;
+  for (const TraceJob& job : jobs) paths += job.path_count();
+  return paths;
+}
+
+constexpr std::uint64_t kManyPaths = 1u << 20;  // what a cache learns from in large pictures
 
 }  // namespace
 
@@ -112,6 +123,70 @@ TEST_CASE("a time budget ends the sampling, however slow the machine", "[sample_
   const Outcome fast = carry_out({100, 0.0, 1e6}, 1e-3);
   CHECK(fast.rounds < 12);
   for (const PixelSum& sum : fast.sums.pixels()) CHECK(sum.count() == 100);
+}
+
+TEST_CASE("a cache learns from one path for four of a small picture", "[sample_plan]") {
+  constexpr int kWidth = 67;
+  constexpr int kHeight = 35;
+  using Samples = std::pair<int, std::uint32_t>;  // of the picture, and to learn from
+  for (const auto& [samples, expected] :
+       {Samples{1, 1}, Samples{2, 1}, Samples{4, 1}, Samples{16, 4}}) {
+    CAPTURE(samples);
+    SamplePlan plan(kWidth, kHeight, {samples}, 9);
+    const SampleOrder own = plan.next_round({}, 0.0).at(0).order;
+    Image<int> covered(kWidth, kHeight, 0);
+    for (const TraceJob& job : plan.learning_jobs()) {
+      CHECK(job.sample_begin == 0);
+      CHECK(job.sample_end == expected);
+      for (int y = job.y_begin; y < job.y_end; ++y) {
+        for (int x = job.x_begin; x < job.x_end; ++x) {
+          ++covered.at(x, y);
+          // Else paths would find again what they found themselves.
+          REQUIRE(job.order.place(x, y, 0).key != own.place(x, y, 0).key);
+        }
+      }
+    }
+    CHECK(std::ranges::all_of(covered.pixels(), [](int count) { return count == 1; }));
+  }
+}
+
+TEST_CASE("of a large picture a cache learns from blocks all over it", "[sample_plan]") {
+  constexpr int kWidth = 4096;
+  constexpr int kHeight = 2160;
+  for (const int samples : {1, 64}) {
+    const SamplePlan plan(kWidth, kHeight, {samples}, 3);
+    const std::vector<TraceJob> jobs = plan.learning_jobs();
+    const std::uint64_t paths = path_count(jobs);
+    CAPTURE(samples, paths);
+    CHECK(paths <= SamplePlan::most_learning_paths(kWidth * kHeight, samples));
+    CHECK(paths >= kManyPaths / 4);
+    std::array<int, 4> quarters{};
+    for (const TraceJob& job : jobs) {
+      const int row = 2 * job.y_begin / kHeight;
+      ++quarters[std::size_t(2 * row + 2 * job.x_begin / kWidth)];
+    }
+    for (const int blocks : quarters) {
+      CHECK(blocks > 0.15 * double(jobs.size()));
+      CHECK(blocks < 0.35 * double(jobs.size()));
+    }
+  }
+}
+
+TEST_CASE("a cache never learns from more paths than its memory was counted for", "[sample_plan]") {
+  // Among them pictures next to where one more sample, or all blocks, would be too many.
+  using Size = std::array<int, 2>;
+  for (const auto& [width, height] :
+       {Size{8, 8}, Size{67, 35}, Size{640, 480}, Size{1024, 1024}, Size{1025, 1024},
+        Size{1920, 1080}, Size{2056, 1024}, Size{8000, 6000}}) {
+    for (const int samples : {1, 16, 1 << 20}) {
+      const SamplePlan plan(width, height, {samples}, 5);
+      const auto pixels = std::uint64_t(width) * std::uint64_t(height);
+      const std::uint64_t most = SamplePlan::most_learning_paths(pixels, samples);
+      CAPTURE(width, height, samples, most);
+      CHECK(path_count(plan.learning_jobs()) <= most);
+      CHECK(most <= 2 * kManyPaths);
+    }
+  }
 }
 
 }  // namespace diorama

@@ -1044,6 +1044,76 @@ TEST_CASE("a device's ray queries find what its kernels find", "[vulkan][ray_que
   CHECK(device->device.held() == held);
 }
 
+TEST_CASE("caches learn the same and paths end in them alike on the device", "[vulkan]") {
+  if (!test::has_vulkan_device()) return;
+  Material material;
+  material.roughness = 0.5f;
+  TestWorld world = room_with(material);
+  Material glass;
+  glass.transmission = 1.0f;
+  glass.roughness = 0.0f;
+  world.add("glass", make_sphere(0.3, 32), glass, at(0.0, -0.2, -0.5));
+  const NodeId camera = world.add_camera(67, 35, 28.0, Vec3(-0.6, -1.8, 0.3), Vec3(0.1, 0.5, -0.7));
+  RenderHost host(2);
+  EmbreeScene meshes(host, {"sse2", {}});
+  meshes.take(world.scene);
+  const PathDevice& device = *test::path_device();
+  GpuScene scene(device, host);
+  scene.take(meshes.render_scene());
+  const View view(world.scene, camera);
+  SamplePlan plan(67, 35, {16}, 9);
+  const std::vector<TraceJob> learning = plan.learning_jobs();
+  const std::vector<TraceJob> jobs = plan.next_round({}, 0.0);
+  const PathSettings settings{.max_bounces = 4};
+
+  RayCounts rays;
+  const RadianceCache here =
+      PathTracer(meshes, view, {settings}, Isa::Sse2).learn(learning, host, rays);
+  GpuPathTracer tracer(device, host);
+  GpuPathTracer::Counts counts;
+  tracer.begin(view, settings, scene, meshes.window());
+  const RadianceCache there = tracer.learn(learning, counts);
+  CHECK(counts.rays == Approx(double(rays.rays)).epsilon(0.001));
+  CHECK(counts.shadow_rays == Approx(double(rays.shadow_rays)).epsilon(0.001));
+  std::size_t known = 0;
+  std::size_t unequal = 0;
+  for (const RadianceCache::Cell& cell : here.table()) {
+    if (cell.key == 0) continue;
+    ++known;
+    const auto same = std::ranges::find(there.table(), cell.key, &RadianceCache::Cell::key);
+    const bool is_equal = same != there.table().end() &&
+                          (same->light - cell.light).norm() < 0.01f * (1e-3f + cell.light.norm());
+    if (!is_equal) ++unequal;
+  }
+  CAPTURE(known, unequal);
+  CHECK(known > 20);
+  CHECK(unequal <= known / 20);
+
+  // The same cache for both: paths end in it alike.
+  TraceSettings own{settings};
+  own.cache = &here;
+  const PathTracer by_processor(meshes, view, own, Isa::Sse2);
+  Film film(67, 35);
+  for (const TraceJob& job : jobs) {
+    std::vector<PixelSum> sums(job.pixel_count());
+    by_processor.trace(job, sums.data(), std::size_t(job.x_end - job.x_begin));
+    const PixelSum* sum = sums.data();
+    for (int y = job.y_begin; y < job.y_end; ++y) {
+      for (int x = job.x_begin; x < job.x_end; ++x) film.at(x, y) = (sum++)->mean();
+    }
+  }
+  tracer.begin(view, settings, scene, meshes.window(), &here);
+  const auto ended = tracer.trace(jobs);
+  const Difference found = difference(undenoised(film), undenoised(tracer.film()));
+  CAPTURE(found.mean, found.unequal);
+  CHECK(found.mean < 0.001);
+  CHECK(found.unequal < 0.02);
+  tracer.begin(view, settings, scene, meshes.window());
+  const auto whole = tracer.trace(jobs);
+  CHECK(double(ended.rays) < 0.9 * double(whole.rays));
+  CHECK(double(ended.shadow_rays) < 0.9 * double(whole.shadow_rays));
+}
+
 TEST_CASE("a ray that passes forty thousand surfaces is right, or ends the job", "[vulkan]") {
   if (!test::has_vulkan_device()) return;
   // Sheets that are not there, one behind the other: rays look at all of them, and at as many nodes
