@@ -12,10 +12,11 @@
 
 namespace diorama {
 
-/// Light that surfaces scatter, as paths find it that meet them second: means over cells of world
-/// space, from some paths for all others of a picture. A path that ends there has a fraction of the
-/// noise and takes half of its rays; what it brings is off by as much as light differs within a
-/// cell (path space filtering: Keller, Dahm and Binder 2014). Const and shareable between threads.
+/// Light that paths find behind the second surface that they meet, but for that surface's own light
+/// sample: means over cells of world space, from some paths for all others of a picture. A path
+/// that ends there has a fraction of the noise and fewer rays; what it brings is off by as much as
+/// light differs within a cell (path space filtering: Keller, Dahm and Binder 2014; ADR 0099).
+/// Const and shareable between threads.
 class RadianceCache {
  public:
   /// What a path found at a surface.
@@ -24,7 +25,7 @@ class RadianceCache {
     Vec3f normal = Vec3f::Zero();    ///< On the side that the path came from, unit.
     float reach = 0.0f;              ///< Metres from the surface before.
     Vec3f weight = Vec3f::Zero();    ///< Its throughput there times the surface's albedo.
-    Vec3f light = Vec3f::Zero();     ///< What it brought to the eye from there on.
+    Vec3f light = Vec3f::Zero();     ///< What it brought to the eye by its further way.
   };
 
   /// Memory that making one takes at most beside its table.
