@@ -4,8 +4,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <functional>
-#include <tuple>
+#include <unordered_map>
 #include <utility>
 
 #include "sobol.h"
@@ -59,37 +58,31 @@ RadianceCache::RadianceCache(const Vec3f& eye, std::span<const std::vector<Findi
 
 std::vector<RadianceCache::Sums> RadianceCache::smallest_cells(
     std::span<const std::vector<Finding>> findings) const {
-  struct Placed {
+  struct Wanted {
     Place place;
     int widest;
-    const Finding* finding;
-
-    bool operator<(const Placed& other) const {
-      return std::tie(place, widest) < std::tie(other.place, other.widest);
-    }
+    bool operator==(const Wanted&) const = default;
   };
-  std::vector<Placed> placed;
-  std::size_t count = 0;
-  for (const std::vector<Finding>& part : findings) count += part.size();
-  placed.reserve(count);
+  const auto hash = [](const Wanted& w) {
+    return std::size_t(w.place.key()) + std::size_t(w.widest);
+  };
+  constexpr std::size_t kExpected = 1u << 14;
+  std::unordered_map<Wanted, std::size_t, decltype(hash)> numbers(kExpected, hash);
+  std::vector<Sums> cells;
   for (const std::vector<Finding>& part : findings) {
     for (const Finding& finding : part) {
       const Place place = place_of(finding.position, finding.normal);
-      const int own = widest(place, finding.reach);
-      if (own >= place.exponent) placed.push_back({place, own, &finding});
+      const Wanted wanted{place, widest(place, finding.reach)};
+      if (wanted.widest < place.exponent) continue;
+      const auto [entry, is_new] = numbers.emplace(wanted, cells.size());
+      if (is_new) cells.push_back({.place = place, .widest = wanted.widest});
+      Sums& cell = cells[entry->second];
+      ++cell.count;
+      cell.weight += finding.weight;
+      cell.light += finding.light;
     }
   }
-  std::ranges::stable_sort(placed, std::less<>());
-  std::vector<Sums> cells;
-  for (const auto& [place, own, finding] : placed) {
-    if (cells.empty() || cells.back().place != place || cells.back().widest != own) {
-      cells.push_back({.place = place, .widest = own});
-    }
-    Sums& cell = cells.back();
-    ++cell.count;
-    cell.weight += finding->weight;
-    cell.light += finding->light;
-  }
+  std::ranges::stable_sort(cells, {}, &Sums::place);
   return cells;
 }
 
