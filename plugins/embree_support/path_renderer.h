@@ -104,8 +104,9 @@ class PathRenderer : public Renderer {
   bool starts_at_centres(const View& view) const;
   PathSettings path_settings(const View& view) const;
   Image<Vec3f> without_noise(Film film, const View& view);
+  /// With one bounce the second surface is the last one: its light sample finds all.
   bool ends_in_cache() const {
-    return params_.radiance_cache && params_.denoise && !is_quick() && params_.max_bounces > 0;
+    return params_.radiance_cache && params_.denoise && !is_quick() && params_.max_bounces > 1;
   }
   bool is_quick() const { return params_.mode != "path_traced"; }
   bool filters_film_elsewhere() const {

@@ -23,9 +23,8 @@ class EmbreeRenderer final : public PathRenderer {
   std::size_t traced_bytes_per_pixel() const override {
     return has_rounds() ? sizeof(PixelSum) : 0;
   }
-  Film trace_at_once(const PathTracer& tracer, SamplePlan& plan, int width, int height);
   Film trace_in_rounds(const PathTracer& tracer, SamplePlan& plan, int width, int height,
-                       Clock::time_point start);
+                       Clock::time_point start, RayCounts& rays);
 };
 
 }  // namespace diorama

@@ -54,6 +54,23 @@ RayCounts PathTracer::trace(const TraceJob& job, const Output& output) const {
   return trace_all<8>(job, output);
 }
 
+Film PathTracer::film(std::span<const TraceJob> jobs, Host& host, RayCounts& counts) const {
+  // A picture of sums would be larger than what is left of them.
+  Film film(view_.camera().width, view_.camera().height);
+  std::vector<RayCounts> rays(jobs.size());
+  host.parallel_for(jobs.size(), [&](std::size_t i) {
+    const TraceJob& job = jobs[i];
+    std::vector<PixelSum> sums(job.pixel_count());
+    rays[i] = trace(job, sums.data(), std::size_t(job.x_end - job.x_begin));
+    const PixelSum* sum = sums.data();
+    for (int y = job.y_begin; y < job.y_end; ++y) {
+      for (int x = job.x_begin; x < job.x_end; ++x) film.at(x, y) = (sum++)->mean();
+    }
+  });
+  for (const RayCounts& own : rays) counts += own;
+  return film;
+}
+
 RadianceCache PathTracer::learn(std::span<const TraceJob> jobs, Host& host,
                                 RayCounts& counts) const {
   std::vector<std::vector<RadianceCache::Finding>> findings(jobs.size());
@@ -62,10 +79,7 @@ RadianceCache PathTracer::learn(std::span<const TraceJob> jobs, Host& host,
     findings[i].reserve(jobs[i].path_count());
     rays[i] = trace(jobs[i], Output{nullptr, 0, &findings[i]});
   });
-  for (const RayCounts& own : rays) {
-    counts.rays += own.rays;
-    counts.shadow_rays += own.shadow_rays;
-  }
+  for (const RayCounts& own : rays) counts += own;
   return {view_.position(), findings};
 }
 

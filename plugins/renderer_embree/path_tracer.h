@@ -45,6 +45,12 @@ struct TraceSettings : PathSettings {
 struct RayCounts {
   std::uint64_t rays = 0;
   std::uint64_t shadow_rays = 0;
+
+  RayCounts& operator+=(const RayCounts& other) {
+    rays += other.rays;
+    shadow_rays += other.shadow_rays;
+    return *this;
+  }
 };
 
 /// Unidirectional path tracing with one light sample per vertex, weighted against what the BSDF
@@ -58,6 +64,8 @@ class PathTracer {
   RayCounts trace(const TraceJob& job, PixelSum* sums, std::size_t stride) const {
     return trace(job, Output{sums, stride, nullptr});
   }
+  /// The means of a picture that these jobs are all of. Adds to `counts`.
+  Film film(std::span<const TraceJob> jobs, Host& host, RayCounts& counts) const;
   /// What the jobs' paths find for those of the picture. Adds to `counts`.
   RadianceCache learn(std::span<const TraceJob> jobs, Host& host, RayCounts& counts) const;
 

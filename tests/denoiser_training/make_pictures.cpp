@@ -57,7 +57,7 @@ class Tracer {
       settings.starts_at_centres = true;
       settings.indirect_share = 0.5f;
     }
-    settings.ends_in_cache = pass.ends_in_cache && max_bounces > 0;
+    settings.ends_in_cache = pass.ends_in_cache && max_bounces > 1;
     SamplePlan plan(view.camera().width, view.camera().height, {pass.samples}, seed);
     return on_device_ ? on_device(view, settings, plan) : on_processor(view, settings, plan);
   }
@@ -94,26 +94,15 @@ class Tracer {
       fill_channels(frame, {}, meshes_, view, seen, &hits, host_);
       settings.first_hits = &hits;
     }
+    RayCounts counts;
     std::optional<RadianceCache> cache;
     if (settings.ends_in_cache) {
-      RayCounts counts;
       cache.emplace(
           PathTracer(meshes_, view, settings, isa_).learn(plan.learning_jobs(), host_, counts));
       settings.cache = &*cache;
     }
     const PathTracer tracer(meshes_, view, settings, isa_);
-    Film film(view.camera().width, view.camera().height);
-    const std::vector<TraceJob> jobs = plan.next_round({}, 0.0);
-    host_.parallel_for(jobs.size(), [&](std::size_t i) {
-      const TraceJob& job = jobs[i];
-      std::vector<PixelSum> sums(job.pixel_count());
-      tracer.trace(job, sums.data(), std::size_t(job.x_end - job.x_begin));
-      const PixelSum* sum = sums.data();
-      for (int y = job.y_begin; y < job.y_end; ++y) {
-        for (int x = job.x_begin; x < job.x_end; ++x) film.at(x, y) = (sum++)->mean();
-      }
-    });
-    return film;
+    return tracer.film(plan.next_round({}, 0.0), host_, counts);
   }
 
   const EmbreeScene& meshes_;

@@ -444,23 +444,13 @@ struct DimPicture {
 };
 
 DimPicture traced(const PathTracer& tracer, SamplePlan plan, RenderHost& host) {
+  RayCounts rays;
+  const Film film = tracer.film(plan.next_round({}, 0.0), host, rays);
   DimPicture picture;
-  picture.scattered.resize(std::size_t(kDimWidth * kDimHeight));
-  const std::vector<TraceJob> jobs = plan.next_round({}, 0.0);
-  std::vector<RayCounts> rays(jobs.size());
-  host.parallel_for(jobs.size(), [&](std::size_t i) {
-    const TraceJob& job = jobs[i];
-    std::vector<PixelSum> sums(job.pixel_count());
-    rays[i] = tracer.trace(job, sums.data(), std::size_t(job.x_end - job.x_begin));
-    const PixelSum* sum = sums.data();
-    for (int y = job.y_begin; y < job.y_end; ++y) {
-      for (int x = job.x_begin; x < job.x_end; ++x) {
-        picture.scattered[std::size_t(y * kDimWidth + x)] =
-            (sum++)->mean().scattered.cast<double>();
-      }
-    }
-  });
-  for (const RayCounts& own : rays) picture.rays += double(own.rays + own.shadow_rays);
+  for (const FilmPixel& pixel : film.pixels()) {
+    picture.scattered.push_back(pixel.scattered.cast<double>());
+  }
+  picture.rays = double(rays.rays + rays.shadow_rays);
   return picture;
 }
 
