@@ -9,11 +9,17 @@
 namespace diorama {
 namespace {
 
-constexpr int kRaysPerCell = 192;  // beside one for every patch
-constexpr int kMostRaysPerPatch = 48;
+// Of a cell at first: one for every patch, and so many more by the patches' light.
+constexpr float kFirstRays = 96.0f;
+constexpr int kMostFirstRays = 17;  // for one patch
+// For a patch that may be seen in part. One that is seen, and is not known to be, is left to what
+// surfaces scatter by chance, which find a window rarely.
+constexpr float kFurtherRays = 24.0f;
+constexpr float kFurtherByLight = 64.0f;  // times as many for a patch with all light
+constexpr int kMostFurtherRays = 256;
 // The grid may be wrong: what a cell does not see but its neighbour does gets a good share of the
 // samples, and everything else a small one.
-constexpr float kNeighbourShare = 0.05f;
+constexpr float kNeighbourShare = 0.2f;
 constexpr float kUnseenShare = 0.003f;
 
 float fraction(std::uint64_t bits) { return float(bits >> 40) * 0x1p-24f; }
@@ -37,10 +43,7 @@ SkyGrid::SkyGrid(const DomeTexture& dome, const Eigen::Matrix3f& world_from_dome
     cells_per_metre_[k] = float(counts_[std::size_t(k)] / size[k]);
   }
   low_ = bounds.min.cast<float>();
-  std::vector<Shares> seen(std::size_t(counts_[0] * counts_[1] * counts_[2]));
-  host.parallel_for(seen.size(), [&](std::size_t index) {
-    seen[index] = seen_from(index, dome, world_from_dome, sees);
-  });
+  const std::vector<Shares> seen = look_around(dome, world_from_dome, sees, host);
   cells_.resize(seen.size());
   host.parallel_for(seen.size(), [&](std::size_t index) {
     cells_[index] = make_cell(dome, with_neighbours(seen, int(index)));
@@ -48,10 +51,80 @@ SkyGrid::SkyGrid(const DomeTexture& dome, const Eigen::Matrix3f& world_from_dome
   for (const Cell& cell : cells_) powers_.push_back(cell.power);
 }
 
-SkyGrid::Shares SkyGrid::seen_from(std::size_t index, const DomeTexture& dome,
-                                   const Eigen::Matrix3f& world_from_dome, const Sees& sees) const {
+// Few rays tell which patches are hidden or open all around: there is nothing more to find there.
+// The rest goes to what lies between, which in a room are the ways through its windows.
+std::vector<SkyGrid::Shares> SkyGrid::look_around(const DomeTexture& dome,
+                                                  const Eigen::Matrix3f& world_from_dome,
+                                                  const Sees& sees, Host& host) const {
   float total = 0.0f;
   for (int patch = 0; patch < DomeTexture::kPatches; ++patch) total += dome.patch_power(patch);
+  RayCounts first{};
+  RayCounts further{};
+  for (int patch = 0; patch < DomeTexture::kPatches; ++patch) {
+    const float light = dome.patch_power(patch);
+    if (light <= 0.0f) continue;
+    const float share = light / total;
+    first[std::size_t(patch)] = std::min(1 + int(kFirstRays * share), kMostFirstRays);
+    further[std::size_t(patch)] =
+        std::min(int(kFurtherRays * (1.0f + kFurtherByLight * share)), kMostFurtherRays);
+  }
+  std::vector<Shares> seen(std::size_t(counts_[0] * counts_[1] * counts_[2]));
+  host.parallel_for(seen.size(), [&](std::size_t cell) {
+    const RayCounts none{};
+    seen[cell] = seen_from(cell, dome, world_from_dome, sees, none, first);
+  });
+  std::vector<Shares> all(seen.size());
+  host.parallel_for(seen.size(), [&](std::size_t cell) {
+    RayCounts wanted{};
+    for (int patch = 0; patch < DomeTexture::kPatches; ++patch) {
+      const auto k = std::size_t(patch);
+      if (may_be_seen_in_part(seen, int(cell), patch)) wanted[k] = further[k];
+    }
+    all[cell] = seen_from(cell, dome, world_from_dome, sees, first, wanted);
+    for (std::size_t patch = 0; patch < wanted.size(); ++patch) {
+      const int count = first[patch] + wanted[patch];
+      if (count == 0) continue;
+      all[cell][patch] =
+          (float(first[patch]) * seen[cell][patch] + float(wanted[patch]) * all[cell][patch]) /
+          float(count);
+    }
+  });
+  return all;
+}
+
+bool SkyGrid::may_be_seen_in_part(const std::vector<Shares>& seen, int cell, int patch) const {
+  bool is_seen = false;
+  bool is_hidden = false;
+  const auto look_at = [&](int other_cell, int other_patch) {
+    const float share = seen[std::size_t(other_cell)][std::size_t(other_patch)];
+    is_seen |= share > 0.0f;
+    is_hidden |= share < 0.9999f;
+  };
+  const std::array<int, 3> place{cell % counts_[0], cell / counts_[0] % counts_[1],
+                                 cell / counts_[0] / counts_[1]};
+  const auto begin = [&](std::size_t axis) { return std::max(place[axis] - 1, 0); };
+  const auto last = [&](std::size_t axis) { return std::min(place[axis] + 1, counts_[axis] - 1); };
+  for (int z = begin(2); z <= last(2); ++z) {
+    for (int y = begin(1); y <= last(1); ++y) {
+      for (int x = begin(0); x <= last(0); ++x) {
+        look_at((z * counts_[1] + y) * counts_[0] + x, patch);
+      }
+    }
+  }
+  // Columns close to a ring.
+  const int row = patch / DomeTexture::kColumns;
+  const int column = patch % DomeTexture::kColumns;
+  for (int r = std::max(row - 1, 0); r <= std::min(row + 1, DomeTexture::kRows - 1); ++r) {
+    for (const int c : {column + DomeTexture::kColumns - 1, column, column + 1}) {
+      look_at(cell, r * DomeTexture::kColumns + c % DomeTexture::kColumns);
+    }
+  }
+  return is_seen && is_hidden;
+}
+
+SkyGrid::Shares SkyGrid::seen_from(std::size_t index, const DomeTexture& dome,
+                                   const Eigen::Matrix3f& world_from_dome, const Sees& sees,
+                                   const RayCounts& before, const RayCounts& counts) const {
   const Vec3f corner(float(int(index) % counts_[0]), float(int(index) / counts_[0] % counts_[1]),
                      float(int(index) / counts_[0] / counts_[1]));
   Shares seen{};
@@ -66,11 +139,13 @@ SkyGrid::Shares SkyGrid::seen_from(std::size_t index, const DomeTexture& dome,
     }
     waiting = 0;
   };
+  constexpr std::uint64_t kNumbersPerRay = 5;
+  constexpr std::uint64_t kNumbersPerPatch =
+      kNumbersPerRay * std::uint64_t(kMostFirstRays + kMostFurtherRays);
   for (int patch = 0; patch < DomeTexture::kPatches; ++patch) {
-    const float power = dome.patch_power(patch);
-    if (power <= 0.0f) continue;
-    const int count = 1 + std::min(int(kRaysPerCell * (power / total)), kMostRaysPerPatch);
-    std::uint64_t key = (index * DomeTexture::kPatches + std::uint64_t(patch)) * 1024;
+    const int count = counts[std::size_t(patch)];
+    std::uint64_t key = (index * DomeTexture::kPatches + std::uint64_t(patch)) * kNumbersPerPatch +
+                        kNumbersPerRay * std::uint64_t(before[std::size_t(patch)]);
     const auto next = [&] { return fraction(mix_bits(++key * 0x9E3779B97F4A7C15u)); };
     for (int i = 0; i < count; ++i) {
       const Vec3f offset(next(), next(), next());

@@ -29,7 +29,7 @@ class SkyGrid {
 
   /// One cell that sees everything.
   explicit SkyGrid(const DomeTexture& dome);
-  /// By a few rays per cell and patch.
+  /// By rays from random places of each cell: few at first, more where they do not agree.
   SkyGrid(const DomeTexture& dome, const Eigen::Matrix3f& world_from_dome, const Aabb& bounds,
           const Sees& sees, Host& host);
 
@@ -69,8 +69,15 @@ class SkyGrid {
   };
   using Shares = std::array<float, DomeTexture::kPatches>;
   static Cell make_cell(const DomeTexture& dome, const Shares& seen);
+  using RayCounts = std::array<int, DomeTexture::kPatches>;
+  /// By cell: which share of each patch can be seen.
+  std::vector<Shares> look_around(const DomeTexture& dome, const Eigen::Matrix3f& world_from_dome,
+                                  const Sees& sees, Host& host) const;
+  bool may_be_seen_in_part(const std::vector<Shares>& seen, int cell, int patch) const;
+  /// By `counts` rays; `before`: how many the cell had.
   Shares seen_from(std::size_t cell, const DomeTexture& dome,
-                   const Eigen::Matrix3f& world_from_dome, const Sees& sees) const;
+                   const Eigen::Matrix3f& world_from_dome, const Sees& sees,
+                   const RayCounts& before, const RayCounts& counts) const;
   Shares with_neighbours(const std::vector<Shares>& seen, int cell) const;
 
   Vec3f low_ = Vec3f::Zero();

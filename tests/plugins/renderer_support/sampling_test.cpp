@@ -142,6 +142,60 @@ TEST_CASE("a dome is sampled as bright as it is", "[sampling]") {
   }
 }
 
+// Light of patches that a cell does not expect is left to what surfaces scatter by chance.
+TEST_CASE("a room's cells know what they see through its window", "[sampling]") {
+  Texture white;
+  white.width = 64;
+  white.height = 32;
+  white.channels = 3;
+  white.floats.assign(64 * 32 * 3, 1.0f);
+  const DomeTexture dome(white);
+  test::RenderHost host(2);
+  const Aabb bounds{Vec3(0, 0, 0), Vec3(5, 4, 3)};
+  const auto is_through_window = [](const SkyGrid::Ray& ray) {
+    if (ray.direction.y() <= 0.0f) return false;
+    const Vec3f p = ray.origin + (4.0f - ray.origin.y()) / ray.direction.y() * ray.direction;
+    return p.x() > 1.0f && p.x() < 2.2f && p.z() > 1.0f && p.z() < 2.0f;
+  };
+  const auto sees = [&](std::span<const SkyGrid::Ray> rays) {
+    std::uint32_t lit = 0;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      lit |= std::uint32_t(is_through_window(rays[i])) << i;
+    }
+    return lit;
+  };
+  const SkyGrid grid(dome, Eigen::Matrix3f::Identity(), bounds, sees, host);
+  Rng rng(7);
+  double all = 0.0;
+  double unexpected = 0.0;
+  for (int i = 0; i < 400; ++i) {
+    const Vec3f place(float(rng.uniform(0.0, 5.0)), float(rng.uniform(0.0, 4.0)),
+                      float(rng.uniform(0.0, 3.0)));
+    const std::uint32_t cell = grid.cell(place);
+    std::array<double, DomeTexture::kPatches> light{};
+    double sum = 0.0;
+    for (int patch = 0; patch < DomeTexture::kPatches; ++patch) {
+      constexpr int kRays = 40;
+      for (int k = 0; k < kRays; ++k) {
+        const Vec2f u(float(rng.uniform()), float(rng.uniform()));
+        const Vec3f towards = DomeTexture::towards(dome.sample(patch, u).place).direction;
+        if (is_through_window({place, towards})) {
+          light[std::size_t(patch)] += double(dome.patch_power(patch)) / kRays;
+        }
+      }
+      sum += light[std::size_t(patch)];
+    }
+    if (sum == 0.0) continue;
+    for (int patch = 0; patch < DomeTexture::kPatches; ++patch) {
+      const double part = light[std::size_t(patch)] / sum;
+      all += part;
+      if (double(grid.probability(cell, patch)) < 0.1 * part) unexpected += part;
+    }
+  }
+  CHECK(all > 100.0);
+  CHECK(unexpected < 0.02 * all);
+}
+
 TEST_CASE("points of a triangle are spread evenly", "[sampling]") {
   Rng rng(3);
   int in_corner = 0;
