@@ -64,6 +64,10 @@ void PictureParams::visit(ParamVisitor& v) {
        "of them found around there; far less noise and time for indirect light that is blurred "
        "a little."});
   v.param(
+      "virtual_lights", virtual_lights,
+      {"Pictures of path_traced without denoise, by the renderer embree: connect paths with bright "
+       "places on surfaces, so that light that is scattered several times has less noise."});
+  v.param(
       "firefly_limit", firefly_limit,
       {"Denoised pictures: how bright one path may be, over a few times the other paths around, "
        "where 1 is white in a well exposed picture; what it brings beyond is spread over its "
@@ -124,7 +128,7 @@ std::size_t PathRenderer::working_bytes(const Camera& camera, const NameSet& cha
   const std::size_t pixels = std::size_t(camera.width) * std::size_t(camera.height);
   std::size_t colors = 0;
   if (channels.contains(kColor.name) || channels.contains(kColorHdr.name)) {
-    colors = pixels * traced_bytes_per_pixel();
+    colors = traced_bytes(pixels);
     if (filters_film_elsewhere()) {
       colors += pixels * sizeof(Vec3f);
     } else if (params_.denoise) {
@@ -185,6 +189,7 @@ PathSettings PathRenderer::path_settings(const View& view) const {
   if (params_.mode == "real_time") settings.indirect_share = kRealTimeIndirectShare;
   settings.starts_at_centres = starts_at_centres(view);
   settings.ends_in_cache = ends_in_cache();
+  settings.has_virtual_lights = has_virtual_lights();
   return settings;
 }
 

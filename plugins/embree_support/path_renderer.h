@@ -32,6 +32,7 @@ struct PictureParams {
   bool caustics = false;
   double clamp = 0.0;
   bool radiance_cache = true;
+  bool virtual_lights = true;
   double firefly_limit = 4.0;
   std::string exposure = "auto";
   double exposure_ev = 0.0;
@@ -78,11 +79,15 @@ class PathRenderer : public Renderer {
   /// done here. `firefly_limit`: that of the parameters. Counts its own time.
   virtual Image<Vec3f> trace_quickly(const View& view, const PathSettings& settings,
                                      SamplePlan& plan, double firefly_limit);
-  /// Memory per pixel that trace() holds beside the film.
-  virtual std::size_t traced_bytes_per_pixel() const = 0;
+  /// Memory that trace() holds beside the film of so many pixels.
+  virtual std::size_t traced_bytes(std::size_t pixels) const = 0;
   /// Called after the scene was taken in.
   virtual void prepare_paths() {}
 
+  bool has_virtual_lights() const {
+    return params_.virtual_lights && !params_.denoise && !is_quick() && params_.max_bounces > 0;
+  }
+  int samples() const { return params_.samples; }
   bool has_rounds() const { return params_.error_target > 0.0 || params_.time_budget_s > 0.0; }
   /// What the rays through the pixels' centres met, for pictures whose paths all start there.
   const HitImage& first_hits(const View& view);

@@ -6,6 +6,7 @@
 
 #include "embree_support/path_renderer.h"
 #include "path_tracer.h"
+#include "virtual_light_tracer.h"
 
 namespace diorama {
 
@@ -20,11 +21,10 @@ class EmbreeRenderer final : public PathRenderer {
   using Clock = std::chrono::steady_clock;
 
   Film trace(const View& view, const PathSettings& settings, SamplePlan& plan) override;
-  std::size_t traced_bytes_per_pixel() const override {
-    return has_rounds() ? sizeof(PixelSum) : 0;
-  }
-  Film trace_in_rounds(const PathTracer& tracer, SamplePlan& plan, int width, int height,
-                       Clock::time_point start, RayCounts& rays);
+  std::size_t traced_bytes(std::size_t pixels) const override;
+  /// `sets`: null where there are no virtual lights.
+  Film trace_in_rounds(const PathTracer& tracer, SamplePlan& plan, VirtualLightSets* sets,
+                       int width, int height, Clock::time_point start, RayCounts& rays);
 };
 
 }  // namespace diorama

@@ -23,6 +23,8 @@ struct PathTracer::Path {
   bool has_scattered = false;  ///< Over a surface that is no mirror.
   bool hides_lights = false;   ///< Their light was already counted, or is left out on purpose.
   Receiver last;               ///< The last vertex that took light samples.
+  bool is_connected = false;   ///< With a virtual light, from the last vertex.
+  float light_share = 1.0f;    ///< What light found from it counts for beside virtual lights.
   float last_density = kInfinite;
   float since_last = 0.0f;         ///< Metres travelled from it.
   float width = 0.0f;              ///< Of the ray's footprint, metres.
@@ -75,6 +77,14 @@ struct PathTracer::Batch : Vertices {
   std::array<std::uint8_t, kBatch> shadow_rays;
   std::size_t shadow_ray_count = 0;
 
+  /// The rays to virtual lights, and the vertices that they start from.
+  std::array<std::uint8_t, kBatch> connections;
+  std::size_t connection_count = 0;
+  BatchVectors connection_origin;
+  BatchVectors connection_direction;
+  BatchFloats connection_reach;
+  BatchVectors connection_light;  ///< What they bring, if nothing is in the way.
+
   bool learns = false;  ///< For a RadianceCache.
   BatchRays next_rays;
   std::array<Path*, kBatch> next_paths;
@@ -101,6 +111,9 @@ inline void PathTracer::Batch::move(std::size_t from, std::size_t to) {
   hits.distance[to] = hits.distance[from];
   hits.number[to] = hits.number[from];
   hits.triangle[to] = hits.triangle[from];
+  hits.u[to] = hits.u[from];
+  hits.v[to] = hits.v[from];
+  is_mirrored[to] = is_mirrored[from];
 }
 
 inline void PathTracer::add(Path& path, int bounce, const Vec3f& radiance) const {

@@ -69,6 +69,7 @@ void PathTracer::collect_emission(Path& path, const Vec3f& direction, const RayH
                         scene_.lights().density_of_surface(light, path.since_last, cosine);
     weight = mis_weight(path.last_density, rival);
   }
+  if (light != MeshInstance::kNoLight) weight *= path.light_share;
   add(path, path.bounce, path.throughput.cwiseProduct(radiance) * weight);
 }
 
@@ -119,6 +120,8 @@ PathTracer::StraightPass PathTracer::pass_or_reflect(Path& path, const Vec3f& di
   path.throughput *= reflected / chance;
   const Vec3f reflection = direction + 2.0f * cosine * surface.normal;
   path.last_density = kInfinite;
+  path.is_connected = false;
+  path.light_share = 1.0f;
   path.hides_lights = path.is_soft(settings_);
   path.since_last = 0.0f;
   path.is_camera_ray = false;

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <utility>
 
@@ -17,6 +18,8 @@ namespace {
 
 // Samples of one pixel that are traced side by side: their first rays go nearly the same way.
 constexpr std::uint32_t kRun = 8;
+// Metres that textures are read over there.
+constexpr float kWidthOfVirtualLights = 0.02f;
 
 /// Numbers too small to matter count as zero while it lives: they are slow otherwise.
 class FlushDenormals {
@@ -183,6 +186,7 @@ inline void PathTracer::trace_batch(Batch& v) const {
   while (v.rays.count > 0) {
     v.next_rays.count = 0;
     v.shadow_ray_count = 0;
+    v.connection_count = 0;
     v.own_bsdfs.clear();
     find_surfaces(v);
     process_hits(v);
@@ -203,6 +207,7 @@ inline void PathTracer::trace_batch(Batch& v) const {
     for (std::size_t i = 0; i < v.count; ++i) scatter(v, i);
     sort_by_light(v);
     trace_shadow_rays<kPacketSize>(v);
+    if (settings_.virtual_lights) trace_connections<kPacketSize>(v);
     v.rays = v.next_rays;
     v.paths = v.next_paths;
   }
@@ -391,7 +396,7 @@ inline void PathTracer::collect_lights(const Batch& v, std::size_t i) const {
         const float rival =
             has_rival ? choice_probability(scene_.lights(), light, path.last) * density : 0.0f;
         add(path, path.bounce,
-            path.throughput.cwiseProduct(radiance) *
+            path.throughput.cwiseProduct(radiance) * path.light_share *
                 (has_rival ? mis_weight(path.last_density, rival) : 1.0f));
       });
 }
@@ -421,8 +426,13 @@ inline void PathTracer::scatter(Batch& v, std::size_t i) const {
   const bool asks_light = !v.learns || path.has_finding;
   if (!is_first) use_cache(v, i);
   take_light_samples(v, i);
+  path.light_share = path.is_connected ? share_beside_virtual_lights(v, i) : 1.0f;
   if (asks_light) queue_shadow_ray(v, i);
   path.hides_lights = false;
+  path.is_connected = settings_.virtual_lights && !path.ends && !s.is_mirror() &&
+                      path.bounce < settings_.max_bounces;
+  // Also from where findings begin: what comes over a further surface belongs to them.
+  if (path.is_connected && (!v.learns || path.has_finding)) connect(v, i);
   if (path.ends || ends_at(path, s)) return;
   BsdfSample next;
   next.weight = v.next_weight.at(i);
@@ -436,6 +446,8 @@ inline void PathTracer::scatter(Batch& v, std::size_t i) const {
   const SurfaceBsdf& s = *v.bsdf[i];
   const Bsdf bsdf(s, v.to_viewer.at(i));
   const bool is_soft = path.is_soft(settings_);
+  path.is_connected = false;
+  path.light_share = 1.0f;
   if (bsdf.has_smooth_part()) {
     if (!path.result.has_surface) record_surface(v, i, bsdf.albedo());
     take_light_samples(v, i);
@@ -490,7 +502,8 @@ inline void PathTracer::take_light_samples(const Batch& v, std::size_t i) const 
 inline void PathTracer::queue_shadow_ray(Batch& v, std::size_t i) const {
   const Vec3f share = v.light_share.at(i);
   if (!(v.light_reach[i] > 0.0f) || share.maxCoeff() <= 0.0f) return;
-  v.light_share.set(i, v.paths[i]->throughput.cwiseProduct(share));
+  const Path& path = *v.paths[i];
+  v.light_share.set(i, path.light_share * path.throughput.cwiseProduct(share));
   v.shadow_rays[v.shadow_ray_count++] = std::uint8_t(i);
 }
 
@@ -516,6 +529,166 @@ inline void PathTracer::go_on(Batch& v, std::size_t i, const BsdfSample& next, c
   path.since_last = 0.0f;
   path.spread = std::max(path.spread, next.spread);
   v.go_on(path, origin, direction, behind);
+}
+
+float PathTracer::share_beside_virtual_lights(const Batch& v, std::size_t i) const {
+  const Path& path = *v.paths[i];
+  const float cosine = std::abs(v.flat_normal.at(i).dot(v.rays.direction.at(i)));
+  // Per square metre, here.
+  const float own = path.last_density * cosine / (path.since_last * path.since_last);
+  const bool is_back = (v.is_back[i] != 0) != (v.is_mirrored[i] != 0);
+  const float rival = settings_.virtual_lights->rival(std::uint32_t(v.hits.number[i]),
+                                                      std::uint32_t(v.hits.triangle[i]),
+                                                      v.hits.u[i], v.hits.v[i], is_back);
+  return own / (own + rival);
+}
+
+/// With one virtual light, whose weight is that of the way over it beside the path's own way there.
+inline void PathTracer::connect(Batch& v, std::size_t i) const {
+  const Path& path = *v.paths[i];
+  const SurfaceBsdf& s = *v.bsdf[i];
+  const float u = v.numbers[Vertices::kSpare][i];
+  const std::uint32_t bits =
+      hashed_bits(std::bit_cast<std::uint32_t>(u) + hashed_bits(path.sampler.place()));
+  const VirtualLights::Choice choice = settings_.virtual_lights->choose(
+      v.position.at(i), v.normal.at(i), v.flat_normal.at(i), u, float(bits >> 8) * 0x1p-24f);
+  if (!choice.light) return;
+  const VirtualLights::Light& light = *choice.light;
+  const Vec3f to = light.position - v.position.at(i);
+  const float distance2 = to.squaredNorm();
+  const Vec3f towards = to * (1.0f / std::sqrt(distance2));
+  const Vec3f wi = v.basis(i).to_local(towards);
+  if (!(wi.z() > 0.0f)) return;
+  const Lobes seen(v.lobes.at(i), v.albedo.at(i), v.to_viewer.at(i), scene_.stacks_lobes());
+  const BsdfValue value = seen.evaluate(wi, s.albedo_at(wi.z()));
+  const float per_area = -light.flat_normal.dot(towards) / distance2;
+  const float own = value.density * per_area;
+  const float weight = choice.weight * per_area * choice.rival / (own + choice.rival);
+  // To where its own rays begin, too: what lies closer hides neither.
+  const Vec3f from = v.leave(i, towards);
+  const Vec3f way = light.position + step_off(light.position, light.flat_normal) - from;
+  const float length = way.norm();
+  constexpr float kAlmost = 0.99999f;
+  v.connections[v.connection_count++] = std::uint8_t(i);
+  v.connection_origin.set(i, from);
+  v.connection_direction.set(i, way * (1.0f / length));
+  v.connection_reach[i] = kAlmost * length;
+  v.connection_light.set(i, path.throughput.cwiseProduct(value.f_cos)
+                                    .cwiseProduct(light.radiance(-towards, scene_.stacks_lobes())) *
+                                weight);
+}
+
+template <int kPacketSize>
+inline void PathTracer::trace_connections(Batch& v) const {
+  RayPacket<kPacketSize> packet;
+  for (std::size_t begin = 0; begin < v.connection_count; begin += kPacketSize) {
+    const std::size_t end = std::min(begin + kPacketSize, v.connection_count);
+    packet.clear();
+    for (std::size_t k = begin; k < end; ++k) {
+      const std::size_t i = v.connections[k];
+      const Vec3f origin = v.connection_origin.at(i);
+      const Vec3f direction = v.connection_direction.at(i);
+      packet.add(origin, direction, 0.0f, v.connection_reach[i], kMoment);
+      log({origin, direction, 0.0f, v.connection_reach[i], true});
+    }
+    // Glass would bend them: paths find their own way through it.
+    scene_.transmittance(packet, false, [&](int k, const Vec3f& transmittance) {
+      const std::size_t i = v.connections[begin + std::size_t(k)];
+      add(*v.paths[i], v.bounce[i] + 1, v.connection_light.at(i).cwiseProduct(transmittance));
+    });
+  }
+  v.counts.shadow_rays += v.connection_count;
+}
+
+/// Has paths arrive there straight from above, as if they had been scattered before.
+void PathTracer::place_on_surfaces(std::span<const SurfaceParts::Point> places, std::uint32_t key,
+                                   std::uint32_t first, std::vector<Path>& paths, Batch& v) const {
+  v.rays.count = 0;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const SurfaceParts::Point& place = places[i];
+    Path& path = paths.emplace_back(PathSampler({key, first + std::uint32_t(i)}));
+    path.sampler.take(2);  // These made the place.
+    path.has_scattered = true;
+    path.hides_lights = true;
+    path.width = kWidthOfVirtualLights;
+    v.paths[i] = &path;
+    v.hits.set(i, place.hit);
+    v.rays.add(place.position + place.normal, -place.normal, 0.0f, kInfinite, kMoment);
+    const MeshInstance& instance = *place.hit.instance;
+    v.material[i] = &instance.material(place.hit.triangle);
+    v.interpolated.set(i, interpolated_normal(place.hit));
+    v.is_mirrored[i] = instance.is_mirrored;
+  }
+  v.count = places.size();
+  v.find_surfaces();
+  // Where two surfaces lie one on the other, paths meet one of them.
+  BatchRays down = v.rays;
+  for (std::size_t i = 0; i < v.count; ++i) {
+    const Vec3f step = 1.5f * step_off(v.position.at(i), v.flat_normal.at(i));
+    down.origin.set(i, v.position.at(i) + step);
+    down.t_max[i] = 2.0f * step.norm();
+  }
+  BatchHits met;
+  scene_.intersect(down, met);
+  v.counts.rays += v.count;
+  for (std::size_t i = 0; i < v.count; ++i) {
+    const bool is_met =
+        met.instance[i] == v.hits.instance[i] && met.triangle[i] / 2 == v.hits.triangle[i] / 2;
+    if (!is_met) v.material[i] = nullptr;
+  }
+}
+
+void PathTracer::light(std::span<const SurfaceParts::Point> places, std::uint32_t key,
+                       std::uint32_t first, std::span<VirtualLights::Light> lights,
+                       RayCounts& counts) const {
+  const FlushDenormals flush;
+  std::vector<Path> paths;
+  paths.reserve(kBatch);
+  Batch v;
+  v.own_bsdfs.reserve(kBatch);
+  for (std::size_t begin = 0; begin < places.size(); begin += kBatch) {
+    paths.clear();
+    v.own_bsdfs.clear();
+    v.next_rays.count = 0;
+    v.shadow_ray_count = 0;
+    const std::size_t size = std::min(kBatch, places.size() - begin);
+    place_on_surfaces(places.subspan(begin, size), key, first + std::uint32_t(begin), paths, v);
+    std::size_t scattered = 0;
+    std::array<std::size_t, kBatch> numbers;
+    for (std::size_t i = 0; i < v.count; ++i) {
+      // Where a pane or a cut-out lets the path through, it is lost.
+      if (!evaluate_material(v, i)) continue;
+      numbers[scattered] = begin + i;
+      v.move(i, scattered++);
+    }
+    v.count = scattered;
+    v.find_bases();
+    draw_numbers(v);
+    for (std::size_t i = 0; i < v.count; ++i) {
+      const Vec3f towards = v.lights.direction.at(i);
+      const bool is_lit = v.lights.density[i] > 0.0f && v.normal.at(i).dot(towards) > 0.0f &&
+                          v.flat_normal.at(i).dot(towards) > 0.0f;
+      if (!is_lit || v.bsdf[i]->lobes.glass > 0.0f) continue;
+      v.bounce[i] = 0;
+      v.light_share.set(i, Vec3f::Constant(v.weight_of_light(i, false, 0.0f)));
+      v.light_reach[i] = Vertices::reach(v.lights.distance[i]);
+      v.light_origin.set(i, v.leave(i, towards));
+      v.shadow_rays[v.shadow_ray_count++] = std::uint8_t(i);
+    }
+    trace_shadow_rays<8>(v);
+    for (std::size_t i = 0; i < v.count; ++i) {
+      VirtualLights::Light& light = lights[numbers[i]];
+      light.irradiance = v.paths[i]->result.scattered;
+      if (!(light.irradiance.maxCoeff() > 0.0f)) continue;
+      light.position = places[numbers[i]].position;
+      light.flat_normal = places[numbers[i]].normal;
+      light.normal = v.normal.at(i);
+      light.to_light = v.lights.direction.at(i);
+      light.is_by_lamp = scene_.lights().records()[std::uint32_t(v.lights.light[i])].is_body();
+      light.bsdf = *v.bsdf[i];
+    }
+  }
+  counts += v.counts;
 }
 
 }  // namespace diorama

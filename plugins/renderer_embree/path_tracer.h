@@ -15,6 +15,7 @@
 #include "renderer_support/radiance_cache.h"
 #include "renderer_support/trace_job.h"
 #include "renderer_support/view.h"
+#include "renderer_support/virtual_lights.h"
 
 namespace diorama {
 
@@ -33,6 +34,8 @@ struct TraceSettings : PathSettings {
   const HitImage* first_hits = nullptr;
   /// Where paths end that may; null: nowhere.
   const RadianceCache* cache = nullptr;
+  /// That paths are connected with; null: none. Not where things move while the shutter is open.
+  const VirtualLights* virtual_lights = nullptr;
   /// Asked after every batch of paths whether to stop.
   const Host* host = nullptr;
   /// For tests of the estimators: which of the two techniques that find light are used.
@@ -68,6 +71,10 @@ class PathTracer {
   Film film(std::span<const TraceJob> jobs, Host& host, RayCounts& counts) const;
   /// What the jobs' paths find for those of the picture. Adds to `counts`.
   RadianceCache learn(std::span<const TraceJob> jobs, Host& host, RayCounts& counts) const;
+  /// The light of lamps and sky that these places scatter, each by one light sample; dark ones have
+  /// no irradiance. `key` and the numbers from `first` on name the random numbers.
+  void light(std::span<const SurfaceParts::Point> places, std::uint32_t key, std::uint32_t first,
+             std::span<VirtualLights::Light> lights, RayCounts& counts) const;
 
  private:
   /// Sums of pixels, or findings.
@@ -104,6 +111,13 @@ class PathTracer {
   /// Ends the path with light from the cache, or begins what it finds for one.
   void use_cache(Batch& v, std::size_t i) const;
   void scatter(Batch& v, std::size_t i) const;
+  /// What the light found at a vertex counts for, as virtual lights bring a part of it.
+  float share_beside_virtual_lights(const Batch& v, std::size_t i) const;
+  void connect(Batch& v, std::size_t i) const;
+  template <int kPacketSize>
+  void trace_connections(Batch& v) const;
+  void place_on_surfaces(std::span<const SurfaceParts::Point> places, std::uint32_t key,
+                         std::uint32_t first, std::vector<Path>& paths, Batch& v) const;
   void scatter_glass(Batch& v, std::size_t i) const;
   void light_glass(Batch& v, std::size_t i, const Bsdf& bsdf) const;
   void record_surface(const Batch& v, std::size_t i, const Vec3f& albedo) const;

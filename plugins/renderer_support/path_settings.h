@@ -17,6 +17,9 @@ struct PathSettings {
   /// Paths end at their second surface, with light that others found there: see RadianceCache. Far
   /// less noise for a little blur of indirect light.
   bool ends_in_cache = false;
+  /// Paths are connected with what surfaces scatter: see VirtualLights. Where nothing moves while
+  /// the shutter is open, and by renderers that know how.
+  bool has_virtual_lights = false;
   /// Every path starts through its pixel's centre. For views without aperture and shutter, and no
   /// more than a path per pixel.
   bool starts_at_centres = false;

@@ -48,9 +48,14 @@ SamplePlan::SamplePlan(int width, int height, const Limits& limits, std::uint64_
   }
 }
 
-std::vector<TraceJob> SamplePlan::learning_jobs() const {
+std::uint64_t SamplePlan::pixel_count() const {
   std::uint64_t pixels = 0;
   for (const Block& block : blocks_) pixels += block.job.pixel_count();
+  return pixels;
+}
+
+std::vector<TraceJob> SamplePlan::learning_jobs() const {
+  const std::uint64_t pixels = pixel_count();
   const std::uint32_t samples = learning_samples(pixels, limits_.samples);
   // One block of so many, anywhere.
   const std::uint64_t share = std::max<std::uint64_t>(1, pixels / kMostLearningPaths);
@@ -82,8 +87,9 @@ std::vector<TraceJob> SamplePlan::next_round(const Image<PixelSum>& sums, double
   if (limits_.time_budget_s > 0.0) keep_to_time(elapsed_s);
   std::vector<TraceJob> jobs;
   for (Block& block : blocks_) {
-    const std::uint32_t wanted = std::min(block.wanted, most);
+    std::uint32_t wanted = std::min(block.wanted, most);
     if (wanted <= block.job.sample_end) continue;
+    wanted = block.job.sample_end + std::min(wanted - block.job.sample_end, most_per_round_);
     block.job.sample_begin = block.job.sample_end;
     block.job.sample_end = wanted;
     paths_ += double(block.job.path_count());

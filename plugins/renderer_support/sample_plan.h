@@ -24,7 +24,11 @@ class SamplePlan {
   SamplePlan(int width, int height, const Limits& limits, std::uint64_t seed);
 
   /// Whether the first round takes all samples.
-  bool has_one_round() const { return limits_.error_target <= 0.0 && limits_.time_budget_s <= 0.0; }
+  bool has_one_round() const {
+    return limits_.error_target <= 0.0 && limits_.time_budget_s <= 0.0 &&
+           most_per_round_ >= std::uint32_t(limits_.samples);
+  }
+  std::uint64_t seed() const { return seed_; }
   /// Paths of a sequence of their own for a RadianceCache to learn from: one for four of the
   /// picture, but at least one per pixel; less where the picture is large.
   std::vector<TraceJob> learning_jobs() const;
@@ -33,6 +37,11 @@ class SamplePlan {
   /// What to trace next; empty: the picture is done. `sums` hold all earlier rounds, which took
   /// `elapsed_s` together.
   std::vector<TraceJob> next_round(const Image<PixelSum>& sums, double elapsed_s);
+  /// No round takes more samples of a pixel from now on.
+  void limit_rounds(std::uint32_t samples) { most_per_round_ = samples; }
+  std::uint64_t pixel_count() const;
+  /// Of the whole picture, at most.
+  std::uint64_t path_count() const { return pixel_count() * std::uint64_t(limits_.samples); }
 
  private:
   static constexpr int kBlock = 8;          // pixels
@@ -51,6 +60,7 @@ class SamplePlan {
   Limits limits_;
   std::uint64_t seed_;
   std::vector<Block> blocks_;
+  std::uint32_t most_per_round_ = 0xFFFFFFFFu;
   double paths_ = 0.0;  ///< Planned so far.
 };
 
