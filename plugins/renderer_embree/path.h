@@ -2,6 +2,8 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
+#include <span>
 
 #include "path_tracer.h"
 #include "vertices.h"
@@ -42,6 +44,15 @@ struct PathTracer::Path {
   bool is_soft(const TraceSettings& settings) const {
     return has_scattered && !settings.has_caustics;
   }
+};
+
+/// Rays of a batch that ask what is in the way: one from each of these vertices, with columns by
+/// the vertices' numbers.
+struct PathTracer::RaysFromVertices {
+  std::span<const std::uint8_t> vertices;
+  const BatchVectors& origin;
+  const BatchVectors& direction;
+  const BatchFloats& reach;
 };
 
 /// The next random numbers of the paths of a batch, for loops over them.

@@ -249,24 +249,37 @@ inline void PathTracer::sort_by_light(Batch& v) {
   }
 }
 
-template <int kPacketSize>
-inline void PathTracer::trace_shadow_rays(Batch& v) const {
+/// Calls `lit` with every vertex whose ray arrives, and what is left of its light.
+template <int kPacketSize, class Lit>
+inline void PathTracer::trace_packets(Batch& v, const RaysFromVertices& rays, bool passes_glass,
+                                      Lit&& lit) const {
   RayPacket<kPacketSize> packet;
-  for (std::size_t begin = 0; begin < v.shadow_ray_count; begin += kPacketSize) {
-    const std::size_t end = std::min(begin + kPacketSize, v.shadow_ray_count);
+  for (std::size_t begin = 0; begin < rays.vertices.size(); begin += kPacketSize) {
+    const std::size_t end = std::min(begin + kPacketSize, rays.vertices.size());
     packet.clear();
     for (std::size_t k = begin; k < end; ++k) {
-      const std::size_t i = v.shadow_rays[k];
-      const Vec3f origin = v.light_origin.at(i);
-      const Vec3f direction = v.lights.direction.at(i);
-      packet.add(origin, direction, 0.0f, v.light_reach[i], v.paths[i]->time);
-      log({origin, direction, 0.0f, v.light_reach[i], true});
+      const std::size_t i = rays.vertices[k];
+      const Vec3f origin = rays.origin.at(i);
+      const Vec3f direction = rays.direction.at(i);
+      packet.add(origin, direction, 0.0f, rays.reach[i], v.paths[i]->time);
+      log({origin, direction, 0.0f, rays.reach[i], true});
     }
-    scene_.transmittance(packet, !settings_.has_caustics, [&](int k, const Vec3f& transmittance) {
-      add_light_sample(v, v.shadow_rays[begin + std::size_t(k)], transmittance);
+    scene_.transmittance(packet, passes_glass, [&](int k, const Vec3f& transmittance) {
+      lit(std::size_t(rays.vertices[begin + std::size_t(k)]), transmittance);
     });
   }
-  v.counts.shadow_rays += v.shadow_ray_count;
+  v.counts.shadow_rays += rays.vertices.size();
+}
+
+template <int kPacketSize>
+inline void PathTracer::trace_shadow_rays(Batch& v) const {
+  const RaysFromVertices rays{{v.shadow_rays.data(), v.shadow_ray_count},
+                              v.light_origin,
+                              v.lights.direction,
+                              v.light_reach};
+  trace_packets<kPacketSize>(
+      v, rays, !settings_.has_caustics,
+      [&](std::size_t i, const Vec3f& transmittance) { add_light_sample(v, i, transmittance); });
 }
 
 inline void PathTracer::add_light_sample(const Batch& v, std::size_t i,
@@ -551,7 +564,7 @@ inline void PathTracer::connect(Batch& v, std::size_t i) const {
   const std::uint32_t bits =
       hashed_bits(std::bit_cast<std::uint32_t>(u) + hashed_bits(path.sampler.place()));
   const VirtualLights::Choice choice = settings_.virtual_lights->choose(
-      v.position.at(i), v.normal.at(i), v.flat_normal.at(i), u, float(bits >> 8) * 0x1p-24f);
+      v.position.at(i), v.normal.at(i), v.flat_normal.at(i), u, PathSampler::fraction(bits));
   if (!choice.light) return;
   const VirtualLights::Light& light = *choice.light;
   const Vec3f to = light.position - v.position.at(i);
@@ -580,24 +593,14 @@ inline void PathTracer::connect(Batch& v, std::size_t i) const {
 
 template <int kPacketSize>
 inline void PathTracer::trace_connections(Batch& v) const {
-  RayPacket<kPacketSize> packet;
-  for (std::size_t begin = 0; begin < v.connection_count; begin += kPacketSize) {
-    const std::size_t end = std::min(begin + kPacketSize, v.connection_count);
-    packet.clear();
-    for (std::size_t k = begin; k < end; ++k) {
-      const std::size_t i = v.connections[k];
-      const Vec3f origin = v.connection_origin.at(i);
-      const Vec3f direction = v.connection_direction.at(i);
-      packet.add(origin, direction, 0.0f, v.connection_reach[i], kMoment);
-      log({origin, direction, 0.0f, v.connection_reach[i], true});
-    }
-    // Glass would bend them: paths find their own way through it.
-    scene_.transmittance(packet, false, [&](int k, const Vec3f& transmittance) {
-      const std::size_t i = v.connections[begin + std::size_t(k)];
-      add(*v.paths[i], v.bounce[i] + 1, v.connection_light.at(i).cwiseProduct(transmittance));
-    });
-  }
-  v.counts.shadow_rays += v.connection_count;
+  const RaysFromVertices rays{{v.connections.data(), v.connection_count},
+                              v.connection_origin,
+                              v.connection_direction,
+                              v.connection_reach};
+  // Glass would bend them: paths find their own way through it.
+  trace_packets<kPacketSize>(v, rays, false, [&](std::size_t i, const Vec3f& transmittance) {
+    add(*v.paths[i], v.bounce[i] + 1, v.connection_light.at(i).cwiseProduct(transmittance));
+  });
 }
 
 /// Has paths arrive there straight from above, as if they had been scattered before.

@@ -126,6 +126,9 @@ class PathTracer {
   void go_on(Batch& v, std::size_t i, const BsdfSample& next, const Vec3f& origin,
              const Vec3f& direction, const LeftTriangle& behind = {}) const;
   static void sort_by_light(Batch& v);
+  struct RaysFromVertices;
+  template <int kPacketSize, class Lit>
+  void trace_packets(Batch& v, const RaysFromVertices& rays, bool passes_glass, Lit&& lit) const;
   template <int kPacketSize>
   void trace_shadow_rays(Batch& v) const;
   void add_light_sample(const Batch& v, std::size_t i, const Vec3f& transmittance) const;

@@ -31,8 +31,6 @@ constexpr std::uint64_t kTrialPurpose = 0x545249414C53u;
 constexpr std::uint64_t kEyePurpose = 0x45594553u;
 constexpr std::uint64_t kLightPurpose = 0x4C4947485453u;
 
-float fraction(std::uint64_t bits) { return float(bits >> 40) * 0x1p-24f; }
-
 }  // namespace
 
 VirtualLightTracer::VirtualLightTracer(const EmbreeScene& scene, const View& view,
@@ -86,7 +84,7 @@ void VirtualLightTracer::look_along(const Vec2f& pixel, std::uint64_t number,
   std::uint64_t key = mix_bits(seed_ ^ kEyePurpose ^ mix_bits(number));
   const auto next = [&] {
     key = mix_bits(key + 0x9E3779B97F4A7C15u);
-    return fraction(key);
+    return unit_fraction(key);
   };
   const CameraRay ray = view_.sample_ray(pixel, {next(), next()});
   if (!(ray.t_max > 0.0f)) return;
@@ -128,7 +126,7 @@ std::vector<VirtualLightTracer::Eye> VirtualLightTracer::eyes(RayCounts& counts)
     for (std::size_t column = 0; column < columns; ++column) {
       const std::uint64_t number = row * columns + column;
       const std::uint64_t bits = mix_bits(seed_ ^ mix_bits(number));
-      const Vec2f within(fraction(bits), fraction(bits << 24));
+      const Vec2f within(unit_fraction(bits), unit_fraction(bits << 24));
       const Vec2f pixel = (Vec2f(float(column), float(row)) + within) * float(spacing);
       if (pixel.x() >= float(width) || pixel.y() >= float(height)) continue;
       look_along(pixel, number, found[row], rays[row]);
@@ -175,7 +173,7 @@ void VirtualLightTracer::find_shares(RayCounts& counts) {
       of_lamps[side] /= std::max(power[side], 1e-30);
       power[side] *= parts_.area(side);
       if (!(power[side] > 0.0) || seen_from.empty()) continue;
-      const double offset = double(fraction(mix_bits(seed_ ^ mix_bits(side))));
+      const double offset = double(unit_fraction(mix_bits(seed_ ^ mix_bits(side))));
       for (std::size_t k = 0; k < kEyesPerPart; ++k) {
         const double place = (offset + double(k)) / double(kEyesPerPart) * double(seen_from.size());
         const Trial& trial = own[k % kTrials];
@@ -228,7 +226,7 @@ VirtualLights VirtualLightTracer::lights(std::size_t count, std::uint64_t set,
   VirtualLights result(parts_, shares_);
   // At equal steps through the shares.
   std::vector<std::uint32_t> sides;
-  const double offset = double(fraction(mix_bits(seed_ ^ purpose)));
+  const double offset = double(unit_fraction(mix_bits(seed_ ^ purpose)));
   double end = 0.0;
   for (std::size_t side = 0; side < shares_.size(); ++side) {
     end += shares_[side] * double(count);

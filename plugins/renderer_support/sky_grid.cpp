@@ -22,8 +22,6 @@ constexpr int kMostFurtherRays = 256;
 constexpr float kNeighbourShare = 0.2f;
 constexpr float kUnseenShare = 0.003f;
 
-float fraction(std::uint64_t bits) { return float(bits >> 40) * 0x1p-24f; }
-
 }  // namespace
 
 SkyGrid::SkyGrid(const DomeTexture& dome) {
@@ -146,7 +144,7 @@ SkyGrid::Shares SkyGrid::seen_from(std::size_t index, const DomeTexture& dome,
     const int count = counts[std::size_t(patch)];
     std::uint64_t key = (index * DomeTexture::kPatches + std::uint64_t(patch)) * kNumbersPerPatch +
                         kNumbersPerRay * std::uint64_t(before[std::size_t(patch)]);
-    const auto next = [&] { return fraction(mix_bits(++key * 0x9E3779B97F4A7C15u)); };
+    const auto next = [&] { return unit_fraction(mix_bits(++key * 0x9E3779B97F4A7C15u)); };
     for (int i = 0; i < count; ++i) {
       const Vec3f offset(next(), next(), next());
       const Vec3f origin = low_ + (corner + offset).cwiseQuotient(cells_per_metre_);

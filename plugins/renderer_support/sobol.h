@@ -18,6 +18,9 @@ inline std::uint64_t mix_bits(std::uint64_t x) {
   return x ^ (x >> 31);
 }
 
+/// In [0, 1), by the upper bits.
+inline float unit_fraction(std::uint64_t bits) { return float(bits >> 40) * 0x1p-24f; }
+
 /// A good 32-bit hash (found by search, Wellons 2018).
 inline std::uint32_t hashed_bits(std::uint32_t x) {
   x = (x ^ (x >> 16)) * 0x21F0AAADu;
@@ -93,11 +96,11 @@ class PathSampler {
     return {fraction(first ^ scramble),
             fraction(second_coordinate(first) ^ (scramble >> 16 | scramble << 16))};
   }
+  /// In [0, 1), by the upper bits; vector code has no unsigned numbers.
+  static float fraction(std::uint32_t bits) { return float(std::int32_t(bits >> 8)) * 0x1p-24f; }
   static constexpr std::uint32_t kKeyStep = 0x9E3779B9u;  ///< From a pair's key to the next.
 
  private:
-  static float fraction(std::uint32_t bits) { return float(std::int32_t(bits >> 8)) * 0x1p-24f; }
-
   /// The bits in reverse order: the first coordinate of a Sobol point by its index.
   static std::uint32_t reversed(std::uint32_t x) {
     x = (x & 0x55555555u) << 1 | (x >> 1 & 0x55555555u);

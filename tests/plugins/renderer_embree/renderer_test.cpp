@@ -16,6 +16,7 @@ namespace {
 
 using test::at;
 using test::dome;
+using test::inside_out;
 using test::matte;
 using test::RenderHost;
 using test::TestWorld;
@@ -60,9 +61,7 @@ Statistics statistics(const Image<Vec3f>& image) {
 /// A room with shiny, rough, clear and glowing things under lights of every kind.
 TestWorld busy_room() {
   TestWorld world;
-  Mesh room = make_box(Vec3(5, 4, 3));
-  for (Vec3f& n : room.normals) n = -n;
-  for (auto& t : room.triangles) std::swap(t[1], t[2]);
+  const Mesh room = inside_out(make_box(Vec3(5, 4, 3)));
   world.add("room", room, matte(0.6f));
   Material metal;
   metal.base_color = Vec3f(0.9f, 0.7f, 0.3f);
@@ -397,9 +396,7 @@ namespace {
 /// A closed room of which a small lamp behind a screen lights one corner: all else is lit by walls.
 TestWorld dim_room() {
   TestWorld world;
-  Mesh room = make_box(Vec3(5, 4, 3));
-  for (Vec3f& n : room.normals) n = -n;
-  for (auto& t : room.triangles) std::swap(t[1], t[2]);
+  const Mesh room = inside_out(make_box(Vec3(5, 4, 3)));
   world.add("room", room, matte(0.7f));
   Material red = matte(0.7f);
   red.base_color = Vec3f(0.75f, 0.25f, 0.2f);

@@ -57,6 +57,13 @@ struct TestWorld {
   }
 };
 
+/// A closed mesh as a room around what is in it.
+inline Mesh inside_out(Mesh mesh) {
+  for (Vec3f& n : mesh.normals) n = -n;
+  for (auto& t : mesh.triangles) std::swap(t[1], t[2]);
+  return mesh;
+}
+
 inline Affine at(double x, double y, double z) { return Affine(Eigen::Translation3d(x, y, z)); }
 
 inline Material matte(float grey) {

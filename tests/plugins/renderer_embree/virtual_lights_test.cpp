@@ -18,15 +18,10 @@ namespace diorama {
 namespace {
 
 using test::at;
+using test::inside_out;
 using test::matte;
 using test::RenderHost;
 using test::TestWorld;
-
-Mesh inside_out(Mesh mesh) {
-  for (Vec3f& n : mesh.normals) n = -n;
-  for (auto& t : mesh.triangles) std::swap(t[1], t[2]);
-  return mesh;
-}
 
 /// A lamp in an open shade of metal, whose inside lights the room, and panes and veils on the way.
 TestWorld room_with_shade() {

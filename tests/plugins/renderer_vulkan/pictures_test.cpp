@@ -30,6 +30,7 @@ namespace {
 
 using test::at;
 using test::dome;
+using test::inside_out;
 using test::matte;
 using test::RenderHost;
 using test::TestWorld;
@@ -132,13 +133,6 @@ Difference difference(const Pictures& pictures, const char* name) {
   return difference(pictures.embree, pictures.vulkan);
 }
 
-Mesh inward_box(const Vec3& size) {
-  Mesh room = make_box(size);
-  for (Vec3f& n : room.normals) n = -n;
-  for (auto& t : room.triangles) std::swap(t[1], t[2]);
-  return room;
-}
-
 Light rect_light(float radiance) {
   Light panel;
   panel.kind = LightKind::Rect;
@@ -151,7 +145,7 @@ Light rect_light(float radiance) {
 /// A room with a ball of the material and a box beside it, under a panel and a lamp.
 TestWorld room_with(const Material& material) {
   TestWorld world;
-  world.add("room", inward_box(Vec3(5, 4, 3)), matte(0.6f));
+  world.add("room", inside_out(make_box(Vec3(5, 4, 3))), matte(0.6f));
   world.add("ball", make_sphere(0.6, 48), material, at(0.6, 0.4, -0.8));
   Material box;
   box.base_color = Vec3f(0.2f, 0.5f, 0.3f);
@@ -490,7 +484,7 @@ TEST_CASE("lights of every kind shine as Embree's", "[vulkan]") {
 TEST_CASE("a hall of lamps is lit as Embree's", "[vulkan]") {
   if (!test::has_vulkan_device()) return;
   TestWorld world;
-  world.add("hall", inward_box(Vec3(6, 5, 3)), matte(0.6f));
+  world.add("hall", inside_out(make_box(Vec3(6, 5, 3))), matte(0.6f));
   // More than are compared at once, of all shapes, and one mesh many times, mirrored and stretched.
   const auto lamp = std::make_shared<const Mesh>(make_cone(0.1, 0.2, 12));
   Material glow;
