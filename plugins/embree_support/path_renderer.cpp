@@ -131,10 +131,12 @@ std::size_t PathRenderer::working_bytes(const Camera& camera, const NameSet& cha
     colors = traced_bytes(pixels);
     if (filters_film_elsewhere()) {
       colors += pixels * sizeof(Vec3f);
-    } else if (params_.denoise) {
-      colors += denoiser_bytes(camera.width, camera.height, is_quick());
     } else {
-      colors += pixels * (sizeof(FilmPixel) + sizeof(Vec3f));
+      // What paths took is gone when noise is removed.
+      colors += pixels * sizeof(FilmPixel);
+      colors = params_.denoise
+                   ? std::max(colors, denoiser_bytes(camera.width, camera.height, is_quick()))
+                   : colors + pixels * sizeof(Vec3f);
     }
     if (ends_in_cache()) {
       // Before there is a film: what was found, in order, and at most a cell for each.

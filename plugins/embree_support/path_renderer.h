@@ -85,7 +85,7 @@ class PathRenderer : public Renderer {
   virtual void prepare_paths() {}
 
   bool has_virtual_lights() const {
-    return params_.virtual_lights && !params_.denoise && !is_quick() && params_.max_bounces > 0;
+    return params_.virtual_lights && !is_quick() && params_.max_bounces > 0;
   }
   int samples() const { return params_.samples; }
   bool has_rounds() const { return params_.error_target > 0.0 || params_.time_budget_s > 0.0; }

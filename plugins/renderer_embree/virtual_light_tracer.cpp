@@ -24,6 +24,9 @@ constexpr std::uint64_t kMostParts = 1u << 14;
 constexpr std::uint64_t kPathsPerLight = 32;
 constexpr std::uint64_t kFewLights = 1u << 11;
 constexpr std::uint64_t kMostLights = 1u << 16;
+constexpr std::uint64_t kLeastPaths = 1u
+                                      << 16;  // pictures of fewer are done before lights are found
+constexpr std::uint64_t kMostPaths = 1u << 21;  // that one set serves
 constexpr int kMostStraightPasses = 8;
 constexpr float kClear = 0.5f;  // transmission of what is looked through
 
@@ -255,14 +258,42 @@ VirtualLightSets::VirtualLightSets(const EmbreeScene& scene, const View& view,
       tracer_(scene, view, alone_, parts_, seed, host, counts),
       lights_(parts_, {}) {}
 
+std::unique_ptr<VirtualLightSets> VirtualLightSets::for_picture(const EmbreeScene& scene,
+                                                                const View& view,
+                                                                const PathSettings& settings,
+                                                                Isa isa, SamplePlan& plan,
+                                                                Host& host, RayCounts& counts) {
+  const std::uint64_t paths = plan.path_count();
+  const bool is_possible = settings.has_virtual_lights && !view.has_shutter();
+  if (!is_possible || scene.lights().bodies().empty() || paths < kLeastPaths) return nullptr;
+  TraceSettings own;
+  static_cast<PathSettings&>(own) = settings;
+  own.host = &host;
+  std::unique_ptr<VirtualLightSets> sets(
+      new VirtualLightSets(scene, view, own, isa, paths, plan.seed(), host, counts));
+  if (!sets->tracer_.are_worth_it()) return nullptr;
+  plan.limit_rounds(most_samples(plan.pixel_count()));
+  sets->make(std::min(paths, kMostPaths), counts);
+  return sets;
+}
+
 void VirtualLightSets::renew(std::span<const TraceJob> jobs, RayCounts& counts) {
   std::uint64_t paths = 0;
   for (const TraceJob& job : jobs) paths += job.path_count();
-  const std::uint64_t count = paths / kPathsPerLight;
   // A few paths more are served by those that there are.
-  if (sets_ > 0 && count < kFewLights) return;
+  if (paths >= kFewLights * kPathsPerLight) make(paths, counts);
+}
+
+void VirtualLightSets::make(std::uint64_t paths, RayCounts& counts) {
+  const std::uint64_t count = paths / kPathsPerLight;
   lights_ =
       tracer_.lights(std::clamp<std::uint64_t>(count, kFewLights, kMostLights), sets_++, counts);
+}
+
+std::uint32_t VirtualLightSets::most_samples(std::uint64_t pixels) {
+  // Rounds of large pictures take memory: not for a few samples.
+  constexpr std::uint64_t kLeastSamples = 4;
+  return std::uint32_t(std::max(kLeastSamples, kMostPaths / pixels));
 }
 
 std::size_t VirtualLightSets::most_bytes(std::span<const MeshInstance> instances) {

@@ -3,10 +3,12 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include "path_tracer.h"
+#include "renderer_support/sample_plan.h"
 
 namespace diorama {
 
@@ -62,27 +64,29 @@ class VirtualLightTracer {
 /// The virtual lights of a picture's rounds.
 class VirtualLightSets {
  public:
-  /// Pictures of fewer paths are done before the lights are found.
-  static constexpr std::uint64_t kLeastPaths = 1u << 16;
-  /// That one set serves.
-  static constexpr std::uint64_t kMostPaths = 1u << 21;
-
-  /// For a picture of so many paths. All must outlive this. Adds to `counts`.
-  VirtualLightSets(const EmbreeScene& scene, const View& view, const TraceSettings& settings,
-                   Isa isa, std::uint64_t paths, std::uint64_t seed, Host& host, RayCounts& counts);
+  /// For a picture that is to have some, with its first set; null where they are not worth it. Has
+  /// `plan` make no round that is too long for a set. All must outlive this. Adds to `counts`.
+  static std::unique_ptr<VirtualLightSets> for_picture(const EmbreeScene& scene, const View& view,
+                                                       const PathSettings& settings, Isa isa,
+                                                       SamplePlan& plan, Host& host,
+                                                       RayCounts& counts);
   VirtualLightSets(const VirtualLightSets&) = delete;
   VirtualLightSets& operator=(const VirtualLightSets&) = delete;
 
-  bool are_worth_it() const { return tracer_.are_worth_it(); }
-  /// Those of the current round; none before the first renew().
   const VirtualLights& lights() const { return lights_; }
-  /// For the next round.
+  /// For further rounds of the picture.
   void renew(std::span<const TraceJob> jobs, RayCounts& counts);
 
+  /// How many samples of a picture of so many pixels one set serves.
+  static std::uint32_t most_samples(std::uint64_t pixels);
   /// Memory that it takes at most in such a scene.
   static std::size_t most_bytes(std::span<const MeshInstance> instances);
 
  private:
+  VirtualLightSets(const EmbreeScene& scene, const View& view, const TraceSettings& settings,
+                   Isa isa, std::uint64_t paths, std::uint64_t seed, Host& host, RayCounts& counts);
+  void make(std::uint64_t paths, RayCounts& counts);
+
   SurfaceParts parts_;
   PathTracer alone_;
   VirtualLightTracer tracer_;

@@ -47,7 +47,7 @@ SurfaceParts::SurfaceParts(std::span<const MeshInstance> instances, std::size_t 
 
 void SurfaceParts::cut(std::uint32_t number, double most) {
   const MeshInstance& instance = instances_[number];
-  starts_.push_back(triangles_.size());
+  starts_.push_back(std::uint32_t(triangles_.size()));
   bool is_open = false;  // the last part: triangles may be added
   for (std::uint32_t t = 0; t < instance.shading->number_end(); ++t) {
     if (instance.shading->is_repeated(t)) {

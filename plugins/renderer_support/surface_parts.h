@@ -38,6 +38,16 @@ class SurfaceParts {
   /// Spread evenly over the part, by numbers in [0, 1): one chooses the triangle, two place.
   Point point(std::size_t side, float choice, const Vec2f& u) const;
 
+  /// A triangle, by what renderers elsewhere need for part_of().
+  struct Triangle {
+    std::uint32_t part = 0;  ///< The first, where it is cut.
+    std::uint32_t rows = 0;  ///< Of pieces that it is cut into; 0: it is whole.
+    float end = 0.0f;  ///< Area of the part up to and with this triangle, where it is whole.
+  };
+  /// By instances: their numbers, from where the instance starts.
+  std::span<const Triangle> triangles() const { return triangles_; }
+  std::span<const std::uint32_t> starts() const { return starts_; }
+
  private:
   /// Either triangles of an instance, one behind the other, or a piece of one.
   struct Part {
@@ -48,18 +58,13 @@ class SurfaceParts {
     std::uint32_t rows = 0;      ///< Of pieces that the triangle is cut into; 0: it is whole.
     std::uint32_t piece = 0;
   };
-  struct Triangle {
-    std::uint32_t part = 0;  ///< The first, where it is cut.
-    std::uint32_t rows = 0;
-    float end = 0.0f;  ///< Area of the part up to and with this triangle, where it is whole.
-  };
   static std::uint32_t piece_at(float u, float v, std::uint32_t rows);
   void cut(std::uint32_t instance, double area);
 
   std::span<const MeshInstance> instances_;
   std::vector<Part> parts_;
   std::vector<Triangle> triangles_;
-  std::vector<std::size_t> starts_;  ///< Of the instances in triangles_.
+  std::vector<std::uint32_t> starts_;  ///< Of the instances in triangles_.
 };
 
 }  // namespace diorama

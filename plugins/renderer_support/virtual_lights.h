@@ -62,15 +62,21 @@ class VirtualLights {
   }
   std::size_t size() const { return lights_.size(); }
 
- private:
-  static constexpr int kCandidates = 4;
   /// What choose() reads of a light.
   struct Candidate {
     Vec3f position;
     float density;  ///< Per square metre, of one light.
-    Vec3f normal;
+    Vec3f normal;   ///< flat_normal of the light.
     float brightness;
   };
+  // For renderers that choose elsewhere.
+  const SurfaceParts& parts() const { return *parts_; }
+  std::span<const float> densities() const { return density_; }  ///< By the parts' sides.
+  std::span<const Light> lights() const { return lights_; }
+  std::span<const Candidate> candidates() const { return candidates_; }
+
+ private:
+  static constexpr int kCandidates = 4;
 
   const SurfaceParts* parts_;
   std::vector<float> density_;  ///< By the parts' sides.

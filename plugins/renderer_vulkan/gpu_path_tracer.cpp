@@ -8,6 +8,7 @@
 #include <cstring>
 
 #include "diorama/error.h"
+#include "gpu_bytes.h"
 
 namespace diorama {
 namespace {
@@ -56,6 +57,7 @@ std::vector<std::pair<std::string, double>> GpuPathTracer::device_seconds() cons
           {"rays", seconds_[kRays]},
           {"surfaces", seconds_[kSurfaces]},
           {"rays to lights", seconds_[kShadowRays]},
+          {"rays to virtual lights", seconds_[kConnections]},
           {"sums", seconds_[kSums]}};
 }
 
@@ -74,6 +76,11 @@ void GpuPathTracer::make_room(std::uint32_t slots) {
     device_findings_.grow(device_, paths * sizeof(gpu::Finding), VulkanBuffer::Place::Device,
                           kWhat);
     job_.findings = device_findings_.address();
+  }
+  if (connects()) {
+    connections_.grow(device_, paths * gpu::kShadowColumns * gpu::kColumnSize,
+                      VulkanBuffer::Place::Device, kWhat);
+    job_.connections = connections_.address();
   }
   if (columns_.size() >= paths * kPathBytes && job_.capacity >= paths) return;
   columns_.grow(device_, paths * kPathBytes, VulkanBuffer::Place::Device, kWhat);
@@ -133,6 +140,7 @@ void GpuPathTracer::begin(const View& view, const PathSettings& settings, const 
   job_.film = film_.address();
   job_.pixel_count = std::uint32_t(pixels);
   has_sums_ = false;
+  job_.part_triangles = 0;
   job_.cache_use = gpu::kNoCache;
   if (cache) {
     const auto bytes = std::as_bytes(cache->table());
@@ -144,8 +152,37 @@ void GpuPathTracer::begin(const View& view, const PathSettings& settings, const 
     job_.cache_use = gpu::kCacheEnds;
   }
   seconds_ = {};
+  scene_ = &scene;
   push_.world = scene.world();
   rays_ = scene.traces_by_query() ? &*kernels_.by_query : &kernels_.by_trees;
+}
+
+void GpuPathTracer::connect_with(const VirtualLights& lights) {
+  constexpr const char* kWhat = "virtual lights";
+  static_assert(sizeof(VirtualLights::Candidate) == 8 * sizeof(float));
+  static_assert(sizeof(SurfaceParts::Triangle) == 3 * sizeof(std::uint32_t));
+  std::vector<gpu::VirtualLight> records;
+  records.reserve(lights.size());
+  for (const VirtualLights::Light& light : lights.lights()) {
+    records.push_back(
+        {light.normal, light.to_light, light.irradiance, 0, scene_->surface_of(light.bsdf)});
+  }
+  GpuBytes bytes;
+  job_.candidates = bytes.add(lights.candidates());
+  job_.virtual_lights = bytes.add(records);
+  job_.part_starts = bytes.add(lights.parts().starts());
+  job_.part_densities = bytes.add(lights.densities());
+  virtual_lights_.grow(device_, bytes.bytes().size(), VulkanBuffer::Place::Device, kWhat);
+  for (gpu::Address* address :
+       {&job_.candidates, &job_.virtual_lights, &job_.part_starts, &job_.part_densities}) {
+    *address += virtual_lights_.address();
+  }
+  const auto triangles = std::as_bytes(lights.parts().triangles());
+  parts_.grow(device_, triangles.size(), VulkanBuffer::Place::Device, kWhat);
+  job_.part_triangles = parts_.address();
+  device_.upload(std::array{VulkanDevice::Transfer{bytes.bytes(), &virtual_lights_, 0},
+                            VulkanDevice::Transfer{triangles, &parts_, 0}});
+  job_.virtual_light_count = std::uint32_t(lights.size());
 }
 
 void GpuPathTracer::add(const TraceJob& job, std::uint32_t begin, std::uint32_t end,
@@ -274,11 +311,18 @@ GpuPathTracer::Counts GpuPathTracer::trace(const Pass& pass) {
   const auto steps = [&](VulkanCommands& commands, std::uint32_t count) {
     constexpr std::size_t kPaths = offsetof(gpu::Counters, paths_groups);
     constexpr std::size_t kShadows = offsetof(gpu::Counters, shadow_groups);
+    constexpr std::size_t kVirtual = offsetof(gpu::Counters, connection_groups);
+    const VulkanKernel& shade = connects() ? kernels_.shade_with_virtual_lights : kernels_.shade;
     for (std::uint32_t i = 0; i < count; ++i) {
       dispatch(commands, kRays, rays_->intersect, counters_, kPaths);
-      dispatch(commands, kSurfaces, kernels_.shade, counters_, kPaths);
+      dispatch(commands, kSurfaces, shade, counters_, kPaths);
       dispatch(commands, kSurfaces, kernels_.arrange, 1u);
       dispatch(commands, kShadowRays, rays_->shadow, counters_, kShadows);
+      if (connects()) {
+        push_.connects = 1;
+        dispatch(commands, kConnections, rays_->shadow, counters_, kVirtual);
+        push_.connects = 0;
+      }
       queue = 1 - queue;
     }
     // Does nothing while paths are under way.

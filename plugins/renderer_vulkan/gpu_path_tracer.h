@@ -18,6 +18,7 @@
 #include "renderer_support/radiance_cache.h"
 #include "renderer_support/trace_job.h"
 #include "renderer_support/view.h"
+#include "renderer_support/virtual_lights.h"
 
 namespace diorama {
 
@@ -38,6 +39,8 @@ class GpuPathTracer {
   /// `scene` is used until the picture's last trace(). `window`: see RenderScene::window().
   void begin(const View& view, const PathSettings& settings, const GpuScene& scene, double window,
              const RadianceCache* cache = nullptr);
+  /// Connects the paths of the jobs to come with these; to be called after begin().
+  void connect_with(const VirtualLights& lights);
   /// Traces the samples of these jobs. Sums are the same for any division into jobs and passes.
   Counts trace(std::span<const TraceJob> jobs);
   /// In place of a picture: what the jobs' paths find for those of pictures. Adds to `counts`.
@@ -65,6 +68,7 @@ class GpuPathTracer {
     kRays,
     kSurfaces,
     kShadowRays,
+    kConnections,
     kSums,
     kWorkCount
   };
@@ -78,6 +82,7 @@ class GpuPathTracer {
   void make_room(std::uint32_t slots);
   void add(const TraceJob& job, std::uint32_t begin, std::uint32_t end, Pass& pass) const;
   void make_camera_rays(const Pass& pass);
+  bool connects() const { return job_.part_triangles != 0; }
   bool learns() const { return job_.cache_use == gpu::kCacheLearns; }
   void read_findings(const Pass& pass);
   void write_inputs(const Pass& pass);
@@ -91,6 +96,7 @@ class GpuPathTracer {
   // Of the picture under way:
   const View* view_ = nullptr;
   const RayKernels* rays_ = nullptr;
+  const GpuScene* scene_ = nullptr;
   double window_ = 0.0;
   bool has_sums_ = false;
   std::vector<RadianceCache::Finding> findings_;  ///< Where it learns.
@@ -102,7 +108,10 @@ class GpuPathTracer {
   VulkanBuffer inputs_;   ///< The job, the slots and their ranges.
   VulkanBuffer columns_;  ///< State, results, hits, shadow rays and queues.
   VulkanBuffer camera_rays_;
+  VulkanBuffer connections_;
   VulkanBuffer cache_;
+  VulkanBuffer parts_;  ///< Of surfaces, where paths are connected with virtual lights ...
+  VulkanBuffer virtual_lights_;
   VulkanBuffer device_findings_;
   VulkanBuffer sums_;
   VulkanBuffer film_;

@@ -130,12 +130,6 @@ TreeBox box_over_time(const MeshInstance& instance, double window) {
   return box;
 }
 
-struct GpuScene::Parts {
-  gpu::Address base = 0;
-  std::map<const LayerTable*, std::size_t> layers;
-  std::map<const GlassTable*, std::size_t> glasses;
-};
-
 void GpuScene::take(const RenderScene& scene) {
   const bool has_same_shapes = shape_revision_ == scene.shape_revision();
   if (has_same_shapes && pose_revision_ == scene.pose_revision()) return;
@@ -227,14 +221,15 @@ gpu::Slot GpuScene::slot_of(const TextureSlot& slot) const {
   return result;
 }
 
-gpu::Surface GpuScene::surface_of(const SurfaceBsdf& surface, const Parts& parts) const {
+gpu::Surface GpuScene::surface_of(const SurfaceBsdf& surface) const {
+  const MaterialTables& tables = material_tables_;
   gpu::Surface result;
   if (surface.table) {
-    result.layer = parts.base + parts.layers.at(surface.table);
+    result.layer = tables.base + tables.layers.at(surface.table);
     result.layer_rows = std::uint32_t(surface.table->means().size());
   }
   if (surface.glass) {
-    result.glass = parts.base + parts.glasses.at(surface.glass);
+    result.glass = tables.base + tables.glasses.at(surface.glass);
     result.glass_rows = std::uint32_t(surface.glass->rows());
     result.eta = surface.glass->eta();
     result.has_glass = 1;
@@ -250,10 +245,10 @@ gpu::Surface GpuScene::surface_of(const SurfaceBsdf& surface, const Parts& parts
   return result;
 }
 
-gpu::Material GpuScene::material_of(const ShadingMaterial& material, const Parts& parts) const {
+gpu::Material GpuScene::material_of(const ShadingMaterial& material) const {
   const Material& m = *material.source;
   gpu::Material result;
-  result.surfaces = {surface_of(material.sharp, parts), surface_of(material.soft, parts)};
+  result.surfaces = {surface_of(material.sharp), surface_of(material.soft)};
   result.slots = {slot_of(material.base_color), slot_of(material.metallic),
                   slot_of(material.roughness),  slot_of(material.normal),
                   slot_of(material.opacity),    slot_of(material.emission)};
@@ -406,7 +401,8 @@ void GpuScene::take_tables(const RenderScene& scene) {
 
   // What the tables below point to.
   GpuBytes blob;
-  Parts parts;
+  MaterialTables& parts = material_tables_;
+  parts = {};
   for (const ShadingMaterial* m : used) {
     for (const SurfaceBsdf* s : {&m->sharp, &m->soft}) {
       if (s->table && !parts.layers.contains(s->table)) {
@@ -456,7 +452,7 @@ void GpuScene::take_tables(const RenderScene& scene) {
     first_material += made.material_count;
   }
   std::vector<gpu::Material> materials;
-  for (const ShadingMaterial* m : used) materials.push_back(material_of(*m, parts));
+  for (const ShadingMaterial* m : used) materials.push_back(material_of(*m));
   std::vector<gpu::Texture> textures;
   for (const auto& [number, texture] : textures_) textures.push_back(texture.on_device->record);
   std::vector<gpu::Light> lights;

@@ -29,6 +29,8 @@ class GpuScene {
   void take(const RenderScene& scene);
 
   gpu::Address world() const { return world_.address(); }
+  /// One that has been finished, of a material of the scene.
+  gpu::Surface surface_of(const SurfaceBsdf& surface) const;
   /// Whether the device's own ray queries find what rays meet: where it is opened for them, and
   /// nothing moves while the shutter is open.
   bool traces_by_query() const { return traces_by_query_; }
@@ -47,8 +49,12 @@ class GpuScene {
     std::vector<gpu::Reference> parts;
     std::vector<TreeBox> boxes;
   };
-  /// Where albedo tables and the triangles of lamps stand.
-  struct Parts;
+  /// Where the tables of materials stand.
+  struct MaterialTables {
+    gpu::Address base = 0;
+    std::map<const LayerTable*, std::size_t> layers;
+    std::map<const GlassTable*, std::size_t> glasses;
+  };
 
   void take_meshes(const RenderScene& scene);
   void take_textures(const RenderScene& scene);
@@ -57,8 +63,7 @@ class GpuScene {
   VulkanDevice::Transfer transfer_to(VulkanBuffer& buffer, std::span<const std::byte> bytes,
                                      const char* what) const;
   gpu::Slot slot_of(const TextureSlot& slot) const;
-  gpu::Surface surface_of(const SurfaceBsdf& surface, const Parts& parts) const;
-  gpu::Material material_of(const ShadingMaterial& material, const Parts& parts) const;
+  gpu::Material material_of(const ShadingMaterial& material) const;
   gpu::Instance instance_of(const MeshInstance& instance, double window) const;
   gpu::Light light_of(const LightTable::Record& light) const;
   References references_of(const RenderScene& scene) const;
@@ -73,6 +78,7 @@ class GpuScene {
   std::map<const ShadingMesh*, std::shared_ptr<const MeshOnDevice>> meshes_;
   std::map<std::uint64_t, TextureInScene> textures_;  ///< By MipTexture::number().
   std::map<const void*, WordsOnDevice> skies_;        ///< Domes' patches and their grids.
+  MaterialTables material_tables_;
   VulkanBuffer parts_;
   VulkanBuffer tables_;
   VulkanBuffer world_;

@@ -225,13 +225,26 @@ struct Finding {
 };
 static_assert(sizeof(Finding) == 48);
 
+/// What kernels read of VirtualLights::Light beside its Candidate.
+struct VirtualLight {
+  Vec3f normal;
+  Vec3f to_light;
+  Vec3f irradiance;
+  std::uint32_t pad = 0;
+  Surface surface;
+};
+static_assert(sizeof(VirtualLight) == 112);
+
 struct Counters {
   std::array<std::uint32_t, 3> paths_groups{};
   std::array<std::uint32_t, 3> shadow_groups{};
+  std::array<std::uint32_t, 3> connection_groups{};
   std::uint32_t path_count = 0;
   std::uint32_t next_count = 0;
   std::uint32_t shadow_count = 0;
   std::uint32_t ready_shadow_count = 0;
+  std::uint32_t connection_count = 0;
+  std::uint32_t ready_connection_count = 0;
   std::uint32_t is_over_limit = 0;
   std::uint32_t rays = 0;
   std::uint32_t shadow_rays = 0;
@@ -246,12 +259,19 @@ struct Job {
   Address hits = 0;
   Address hit_triangles = 0;
   Address shadows = 0;
+  Address connections = 0;
   std::array<Address, 2> queues{};
   Address camera_rays = 0;
   Address sums = 0;
   Address film = 0;
   Address cache = 0;
   Address findings = 0;
+  Address candidates = 0;
+  Address virtual_lights = 0;
+  Address part_starts = 0;
+  Address part_triangles = 0;
+  Address part_densities = 0;
+  std::uint32_t virtual_light_count = 0;
   std::uint32_t cache_mask = 0;
   std::uint32_t cache_use = 0;
   std::uint32_t capacity = 0;
@@ -280,7 +300,7 @@ struct Push {
   Address world = 0;
   Address job = 0;
   std::uint32_t queue = 0;
-  std::uint32_t pad = 0;
+  std::uint32_t connects = 0;
 };
 
 /// Of the filter on planes: Push of planes.glsl.
@@ -302,7 +322,7 @@ struct PlanePush {
 static_assert(sizeof(PlanePush) == 88);
 
 inline constexpr std::uint32_t kGroup = 64;
-inline constexpr std::uint32_t kStateColumns = 7;
+inline constexpr std::uint32_t kStateColumns = 8;
 inline constexpr std::uint32_t kResultColumns = 4;
 inline constexpr std::uint32_t kShadowColumns = 3;
 inline constexpr std::uint32_t kColumnSize = 16;

@@ -54,6 +54,7 @@ PathKernels::PathKernels(const VulkanDevice& device)
       arrange(device, kernels::kArrange),
       by_trees(device, kernels::kIntersect, kernels::kShadow),
       shade(device, kernels::kShade),
+      shade_with_virtual_lights(device, kernels::kShadeWithVirtualLights),
       gather(device, kernels::kGather),
       resolve(device, kernels::kResolve),
       planes(device),

@@ -45,6 +45,7 @@ struct PathKernels {
   RayKernels by_trees;
   std::optional<RayKernels> by_query;  ///< Where the device is opened for ray queries.
   VulkanKernel shade;
+  VulkanKernel shade_with_virtual_lights;
   VulkanKernel gather;
   VulkanKernel resolve;
   PlaneKernels planes;

@@ -2,14 +2,14 @@
 #include "vulkan_renderer.h"
 
 #include <charconv>
-#include <chrono>
-#include <optional>
 #include <string>
 #include <system_error>
 #include <utility>
 
 #include "diorama/error.h"
+#include "gpu_picture.h"
 #include "renderer_support/stopwatch.h"
+#include "virtual_light_tracer.h"
 
 namespace diorama {
 
@@ -70,32 +70,17 @@ VulkanRenderer::VulkanRenderer(const Params& params, Host& host,
 
 void VulkanRenderer::prepare_paths() { scene_.take(meshes().render_scene()); }
 
+std::size_t VulkanRenderer::traced_bytes(std::size_t pixels) const {
+  return pixels * sizeof(FilmPixel) +
+         (has_virtual_lights() ? VirtualLightSets::most_bytes(meshes().instances()) : 0);
+}
+
 void VulkanRenderer::trace_paths(const View& view, const PathSettings& settings, SamplePlan& plan) {
-  using Clock = std::chrono::steady_clock;
-  const auto start = Clock::now();
-  std::optional<RadianceCache> cache;
-  GpuPathTracer::Counts learnt;
-  if (settings.ends_in_cache) {
-    const std::vector<TraceJob> jobs = plan.learning_jobs();
-    tracer_.begin(view, settings, scene_, meshes().window());
-    cache.emplace(tracer_.learn(jobs, learnt));
-    for (const TraceJob& job : jobs) counts().paths += job.path_count();
-    counts().rays += learnt.rays;
-    counts().shadow_rays += learnt.shadow_rays;
-  }
-  tracer_.begin(view, settings, scene_, meshes().window(), cache ? &*cache : nullptr);
-  Image<PixelSum> sums;
-  while (true) {
-    const double elapsed = std::chrono::duration<double>(Clock::now() - start).count();
-    const std::vector<TraceJob> jobs = plan.next_round(sums, elapsed);
-    if (jobs.empty()) break;
-    const GpuPathTracer::Counts own = tracer_.trace(jobs);
-    counts().rays += own.rays;
-    counts().shadow_rays += own.shadow_rays;
-    for (const TraceJob& job : jobs) counts().paths += job.path_count();
-    if (plan.has_one_round()) break;
-    sums = tracer_.sums();
-  }
+  PictureCounts own;
+  trace_picture(tracer_, scene_, meshes(), view, settings, isa(), plan, host(), own);
+  counts().paths += own.paths;
+  counts().rays += own.rays.rays;
+  counts().shadow_rays += own.rays.shadow_rays;
 }
 
 Film VulkanRenderer::trace(const View& view, const PathSettings& settings, SamplePlan& plan) {

@@ -39,7 +39,7 @@ class VulkanRenderer final : public PathRenderer {
                              double firefly_limit) override;
   bool traces_elsewhere() const override { return true; }
   bool filters_elsewhere() const override { return true; }
-  std::size_t traced_bytes(std::size_t pixels) const override { return pixels * sizeof(FilmPixel); }
+  std::size_t traced_bytes(std::size_t pixels) const override;
 
   std::shared_ptr<const PathDevice> device_;
   GpuScene scene_;

@@ -14,6 +14,7 @@
 
 #include "bench_scene.h"
 #include "embree_renderer.h"
+#include "path_tracer.h"
 #ifdef DIORAMA_HAS_VULKAN
 #include "vulkan_renderer.h"
 #endif

@@ -17,10 +17,11 @@
 
 #include "channels.h"
 #include "gpu_path_tracer.h"
+#include "gpu_picture.h"
 #include "gpu_scene.h"
 #include "half_floats.h"
 #include "path_device.h"
-#include "path_tracer.h"
+#include "picture_film.h"
 #include "renderer_support/denoiser.h"
 #include "renderer_support/film.h"
 #include "renderer_support/sample_plan.h"
@@ -35,8 +36,9 @@ using namespace diorama::training;
 /// What a film is traced with.
 struct Pass {
   int samples = 1;
-  bool is_real_time = false;  ///< Through the pixels' centres, half of the bounces.
-  bool ends_in_cache = true;  ///< As the paths of denoised pictures do.
+  bool is_real_time = false;       ///< Through the pixels' centres, half of the bounces.
+  bool ends_in_cache = true;       ///< As the paths of denoised pictures do.
+  bool has_virtual_lights = true;  ///< As all but quick pictures.
 };
 
 /// Traces the paths of one scene, on the processor or on a GPU.
@@ -58,8 +60,23 @@ class Tracer {
       settings.indirect_share = 0.5f;
     }
     settings.ends_in_cache = pass.ends_in_cache && max_bounces > 1;
+    settings.has_virtual_lights = pass.has_virtual_lights && !pass.is_real_time && max_bounces > 0;
     SamplePlan plan(view.camera().width, view.camera().height, {pass.samples}, seed);
-    return on_device_ ? on_device(view, settings, plan) : on_processor(view, settings, plan);
+    PictureCounts counts;
+    if (on_device_) {
+      trace_picture(on_device_->tracer, on_device_->scene, meshes_, view, settings, isa_, plan,
+                    host_, counts);
+      return on_device_->tracer.film();
+    }
+    TraceSettings here{settings};
+    HitImage hits;
+    if (settings.starts_at_centres) {
+      Frame frame;
+      SeenMeshes seen;
+      fill_channels(frame, {}, meshes_, view, seen, &hits, host_);
+      here.first_hits = &hits;
+    }
+    return picture_film(meshes_, view, here, isa_, plan, host_, counts);
   }
 
  private:
@@ -68,42 +85,6 @@ class Tracer {
     GpuScene scene;
     GpuPathTracer tracer;
   };
-
-  Film on_device(const View& view, const PathSettings& settings, SamplePlan& plan) {
-    GpuPathTracer& tracer = on_device_->tracer;
-    const auto begin = [&](const RadianceCache* cache) {
-      tracer.begin(view, settings, on_device_->scene, meshes_.window(), cache);
-    };
-    std::optional<RadianceCache> cache;
-    if (settings.ends_in_cache) {
-      GpuPathTracer::Counts counts;
-      begin(nullptr);
-      cache.emplace(tracer.learn(plan.learning_jobs(), counts));
-    }
-    begin(cache ? &*cache : nullptr);
-    tracer.trace(plan.next_round({}, 0.0));
-    return tracer.film();
-  }
-
-  Film on_processor(const View& view, const PathSettings& path_settings, SamplePlan& plan) {
-    TraceSettings settings{path_settings};
-    HitImage hits;
-    if (settings.starts_at_centres) {
-      Frame frame;
-      SeenMeshes seen;
-      fill_channels(frame, {}, meshes_, view, seen, &hits, host_);
-      settings.first_hits = &hits;
-    }
-    RayCounts counts;
-    std::optional<RadianceCache> cache;
-    if (settings.ends_in_cache) {
-      cache.emplace(
-          PathTracer(meshes_, view, settings, isa_).learn(plan.learning_jobs(), host_, counts));
-      settings.cache = &*cache;
-    }
-    const PathTracer tracer(meshes_, view, settings, isa_);
-    return tracer.film(plan.next_round({}, 0.0), host_, counts);
-  }
 
   const EmbreeScene& meshes_;
   Isa isa_;
@@ -184,6 +165,7 @@ struct Options {
   int target_paths = 32;
   int bounces = 6;
   int device = -1;
+  bool plain_with_virtual_lights = false;
   double seconds = 1e9;
   int threads = 1;
 };
@@ -250,14 +232,15 @@ void render_set(const Set& set, std::uint64_t seed, const Options& options, Host
     } else if (rng.chance(0.12)) {
       passes.push_back({rng.chance(0.5) ? 64 : 256});
     }
-    passes.insert(passes.end(), 2, {options.target_paths, false, false});
+    // What judges is made as plainly as can be.
+    passes.insert(passes.end(), 2, {options.target_paths, false, false, !is_judged});
     std::vector<Film> films;
     std::vector<Film> plain;  // For denoisers that know nothing of caches.
     for (const Pass& pass : passes) {
       const std::uint64_t own_seed = rng.bits();
       films.push_back(tracer.trace(view, pass, bounces, own_seed));
       if (is_judged && plain.size() + 2 < passes.size()) {
-        const Pass own{pass.samples, pass.is_real_time, false};
+        const Pass own{pass.samples, pass.is_real_time, false, options.plain_with_virtual_lights};
         plain.push_back(tracer.trace(view, own, bounces, own_seed));
       }
       if (films.size() == 2 && !is_judged && !is_worthy(films.back(), view.position())) break;
@@ -324,6 +307,8 @@ int main(int argc, char** argv) {
   app.add_option("--target-paths", options.target_paths,
                  "Of each of the two films to compare with");
   app.add_option("--bounces", options.bounces, "Of what is judged by; few: as in real time, too");
+  app.add_flag("--virtual-lights", options.plain_with_virtual_lights,
+               "Let films for other denoisers have them, too");
   app.add_option("--seconds", options.seconds, "No further set is begun after that");
   app.add_option("--threads", options.threads);
   app.add_option("--device", options.device,

@@ -13,12 +13,18 @@ void main() {
   job.counters.next_count = 0u;
   job.counters.ready_shadow_count = shadows;
   job.counters.shadow_count = 0u;
+  const uint connections = job.counters.connection_count;
+  job.counters.ready_connection_count = connections;
+  job.counters.connection_count = 0u;
   job.counters.paths_groups[0] = (paths + kGroup - 1u) / kGroup;
   job.counters.paths_groups[1] = 1u;
   job.counters.paths_groups[2] = 1u;
   job.counters.shadow_groups[0] = (shadows + kGroup - 1u) / kGroup;
   job.counters.shadow_groups[1] = 1u;
   job.counters.shadow_groups[2] = 1u;
+  job.counters.connection_groups[0] = (connections + kGroup - 1u) / kGroup;
+  job.counters.connection_groups[1] = 1u;
+  job.counters.connection_groups[2] = 1u;
   job.counters.rays += paths;
-  job.counters.shadow_rays += shadows;
+  job.counters.shadow_rays += shadows + connections;
 }

@@ -40,14 +40,27 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) buffer PixelSums { 
 #include "film.glsl"
 layout(buffer_reference, scalar, buffer_reference_align = 4) writeonly buffer FilmPixels { FilmPixel v[]; };
 
+// See VirtualLights::Light.
+struct VirtualLight {
+  vec3 normal;
+  vec3 to_light;
+  vec3 irradiance;
+  uint pad;
+  Surface surface;
+};
+layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer VirtualLights { VirtualLight v[]; };
+
 // Counts and the arguments of the next dispatches.
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Counters {
   uint paths_groups[3];
   uint shadow_groups[3];
+  uint connection_groups[3];
   uint path_count;    // of the queue that is worked on
   uint next_count;    // of the queue that is filled
   uint shadow_count;  // likewise
   uint ready_shadow_count;  // of the queue of shadow rays that is worked on
+  uint connection_count;    // of the rays to virtual lights, likewise
+  uint ready_connection_count;
   uint is_over_limit;  // a kernel would have looped more often than the device can
   uint rays;
   uint shadow_rays;
@@ -62,12 +75,19 @@ layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Job
   Columns hits;
   Queue hit_triangles;
   Columns shadows;
+  Columns connections;  // as shadows, to virtual lights
   Queue queues[2];
   Columns camera_rays;  // three entries per path, where the lens is no pinhole
   PixelSums sums;
   FilmPixels film;
   Vec4s cache;  // light and key
   Columns findings;  // three entries per path, where a cache learns
+  Vec4s candidates;  // position and density, normal and brightness of each virtual light
+  VirtualLights virtual_lights;
+  Uints part_starts;     // of instances ...
+  Uints part_triangles;  // ... among these: three words each, SurfaceParts::Triangle
+  Floats part_densities;  // two sides each
+  uint virtual_light_count;
   uint cache_mask;
   uint cache_use;
   uint capacity;  // of the columns
@@ -96,6 +116,7 @@ layout(push_constant, scalar) uniform Push {
   World world;
   Job job;
   uint queue;  // that is worked on
+  uint connects;  // shadow rays go to virtual lights
 };
 
 const uint kGroup = 64u;
@@ -109,7 +130,8 @@ const uint kLastNormal = 4u;    // and the density of the direction from there
 // Width, spread, and the ray's range; or, of one that goes on through a surface, what it left.
 const uint kFootprint = 5u;
 const uint kSampler = 6u;       // key, dimension, place, and the time
-const uint kStateColumns = 7u;
+const uint kBeside = 7u;  // with kHasShare: what light counts for beside virtual lights
+const uint kStateColumns = 8u;
 
 const uint kIsCameraRay = 1u << 16;
 const uint kHasScattered = 1u << 17;
@@ -120,6 +142,8 @@ const uint kLeavesTriangle = 1u << 21;  // which it does not meet again
 const uint kByChance = 1u << 22;  // chose between ways before the first surface
 
 const uint kHasFinding = 1u << 23;  // for the cache
+const uint kIsConnected = 1u << 24;  // with a virtual light, from the last vertex
+const uint kHasShare = 1u << 25;
 
 // What the cache is for.
 const uint kCacheLearns = 1u;

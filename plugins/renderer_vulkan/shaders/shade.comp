@@ -1,6 +1,8 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
 // What becomes of paths where they met something; see path_tracer.cpp of renderer_embree.
+// VIRTUAL_LIGHTS: surfaces are connected with virtual lights. That takes as much code again as the
+// lights have, which other pictures' paths need not wait for.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_ballot : require
@@ -23,6 +25,7 @@ struct Path {
   vec3 direction;
   vec3 throughput;
   float left_by_first;
+  float light_share;  // what light found from the last vertex counts for beside virtual lights
   uint flags;
   int bounce;
   uint passes;
@@ -63,6 +66,8 @@ struct SurfacePoint {
   float met_after;  // by the ray
   uint instance;
   uint triangle;  // among those of its tree
+  uint number;    // among those of the mesh
+  vec2 at;        // on it
 };
 
 bool has(Path path, uint flag) { return (path.flags & flag) != 0u; }
@@ -97,6 +102,10 @@ Path load_path(uint index) {
       Sampler(floatBitsToUint(s6.x), floatBitsToUint(s6.y), floatBitsToUint(s6.z));
   path.time = s6.w;
   path.flags &= ~kLeavesTriangle;
+  path.light_share = 1.0;
+#ifdef VIRTUAL_LIGHTS
+  if (has(path, kHasShare)) path.light_share = STATE(kBeside, index).x;
+#endif
   path.seen = vec3(0.0);
   path.scattered = vec3(0.0);
   path.records = false;
@@ -106,8 +115,14 @@ Path load_path(uint index) {
 void store_path(uint index, Path path) {
   const bool leaves = has(path, kLeavesTriangle);
   uint flags = path.flags & (kIsCameraRay | kHasScattered | kHidesLights | kHasSurface |
-                             kLeavesTriangle | kByChance | kHasFinding);
+                             kLeavesTriangle | kByChance | kHasFinding | kIsConnected);
   flags |= uint(path.bounce) | path.passes << 8;
+#ifdef VIRTUAL_LIGHTS
+  if (path.light_share != 1.0) {
+    flags |= kHasShare;
+    STATE(kBeside, index) = vec4(path.light_share, 0.0, 0.0, 0.0);
+  }
+#endif
   if (path.last.is_two_sided) flags |= kLastTwoSided;
   STATE(kOrigin, index) = vec4(path.origin, uintBitsToFloat(flags));
   STATE(kDirection, index) = vec4(path.direction, path.since_last);
@@ -156,7 +171,7 @@ void collect_light(inout Path path, uint light, vec3 from, float t_min, float t_
   if (!is_first(path)) {
     weight = mis_weight(path.last_density, choice_probability(light, path.last) * density);
   }
-  add(path, path.throughput * radiance * weight);
+  add(path, path.throughput * radiance * (weight * path.light_share));
 }
 
 // From the surface that took the light sample, which may lie behind panes.
@@ -191,6 +206,7 @@ void collect_emission(inout Path path, uint instance, uint number, uint instance
         path.since_last * path.since_last / (cosine * world.lights.v[light].area);
     weight = mis_weight(path.last_density, choice_probability(light, path.last) * density);
   }
+  if (light != kNone) weight *= path.light_share;
   add(path, path.throughput * radiance * weight);
 }
 
@@ -291,7 +307,8 @@ uint pass_or_reflect(inout Path path, uint material, uint material_flags, Surfac
   path.throughput *= reflected / chance;
   const vec3 reflection = path.direction + 2.0 * cosine * s.normal;
   path.last_density = kInfinite;
-  path.flags &= ~(kHidesLights | kIsCameraRay);
+  path.light_share = 1.0;
+  path.flags &= ~(kHidesLights | kIsCameraRay | kIsConnected);
   if (is_soft(path)) path.flags |= kHidesLights;
   path.since_last = 0.0;
   ++path.bounce;
@@ -346,7 +363,7 @@ void want_light(Path path, vec3 share, vec3 radiance, SurfacePoint s, LightSampl
   shadow.origin = leave(s.position, s.flat_normal, light.direction);
   shadow.direction = light.direction;
   shadow.reach = reach;
-  shadow.light = path.throughput * share * radiance;
+  shadow.light = path.light_share * path.throughput * share * radiance;
   shadow.is_indirect = path.bounce > 1;
 }
 
@@ -368,9 +385,13 @@ bool ends_in_cache(inout Path path, uint index, SurfacePoint s, vec3 weight) {
   return true;
 }
 
+#ifdef VIRTUAL_LIGHTS
+#include "virtual_lights.glsl"
+#endif
+
 // True: the path goes on.
-bool scatter(inout Path path, uint index, SurfacePoint s, Surface surface,
-             inout ShadowRay shadow) {
+bool scatter(inout Path path, uint index, SurfacePoint s, Surface surface, inout ShadowRay shadow,
+             inout ShadowRay connection) {
   const bool was_soft = is_soft(path);
   Bsdf bsdf = finished(surface, s.is_back);
   const mat3 basis = basis_around(s.normal);
@@ -395,6 +416,8 @@ bool scatter(inout Path path, uint index, SurfacePoint s, Surface surface,
   const vec3 to_light = to_local(basis, light.direction);
 
   if (has_glass) {
+    path.light_share = 1.0;
+    path.flags &= ~kIsConnected;
     if (has_smooth_part(bsdf)) {
       if (!has(path, kHasSurface)) record(path, s, albedo(bsdf));
       path.flags = (path.flags & ~kIsCameraRay) | kHasScattered;
@@ -433,6 +456,16 @@ bool scatter(inout Path path, uint index, SurfacePoint s, Surface surface,
   }
   path.flags = (path.flags & ~(kIsCameraRay | kHidesLights)) | kHasScattered;
   path.last = receiver;
+#ifdef VIRTUAL_LIGHTS
+  path.light_share = has(path, kIsConnected) ? share_beside_virtual_lights(path, s) : 1.0;
+  path.flags &= ~kIsConnected;
+  if (!ends && !is_mirror(bsdf) && path.bounce < job.max_bounces) {
+    path.flags |= kIsConnected;
+    // Also from where findings begin: what comes over a further surface belongs to them.
+    const bool counts = job.cache_use != kCacheLearns || has(path, kHasFinding);
+    if (counts) connect(path, s, bsdf, basis, u2.y, connection);
+  }
+#endif
   if (asks_light && light.density > 0.0 && to_light.z > 0.0 &&
       dot(s.flat_normal, light.direction) > 0.0) {
     const vec4 value = evaluate_lobes(bsdf, to_light);
@@ -457,6 +490,8 @@ SurfacePoint surface_of(Path path, vec4 hit, uint instance, uint flags, uint num
   s.met_after = hit.x;
   s.instance = instance;
   s.triangle = triangle;
+  s.number = number;
+  s.at = hit.yz;
   const float area2 = dot(triangle_normal, triangle_normal);
   const vec3 flat_normal = area2 > 0.0 ? triangle_normal * (1.0 / sqrt(area2)) : -path.direction;
   const float facing = dot(flat_normal, path.direction);
@@ -481,7 +516,7 @@ SurfacePoint surface_of(Path path, vec4 hit, uint instance, uint flags, uint num
 }
 
 // True: the path goes on.
-bool advance(inout Path path, uint index, inout ShadowRay shadow) {
+bool advance(inout Path path, uint index, inout ShadowRay shadow, inout ShadowRay connection) {
   const vec4 hit = job.hits.v[index];
   const uint instance = floatBitsToUint(hit.w);
   collect_lights(path, instance == kNone ? kInfinite : hit.x);
@@ -554,18 +589,27 @@ bool advance(inout Path path, uint index, inout ShadowRay shadow) {
       if (what != kScattered) return what == kGoesOn;
     }
   }
-  return scatter(path, index, s, surface, shadow);
+  return scatter(path, index, s, surface, shadow, connection);
 }
+
+#define STORE_RAY(RAYS, RAY)                                                           \
+  if (RAY.is_wanted) {                                                                \
+    RAYS.v[place] = vec4(RAY.origin, RAY.reach);                                      \
+    RAYS.v[job.capacity + place] = vec4(                                              \
+        RAY.direction, uintBitsToFloat(index | (RAY.is_indirect ? 0x80000000u : 0u))); \
+    RAYS.v[2u * job.capacity + place] = vec4(RAY.light, 0.0);                         \
+  }
 
 void main() {
   const bool is_under_way = gl_GlobalInvocationID.x < job.counters.path_count;
   uint index = 0u;
   bool goes_on = false;
   ShadowRay shadow = ShadowRay(false, vec3(0.0), vec3(0.0), 0.0, vec3(0.0), false);
+  ShadowRay connection = shadow;
   if (is_under_way) {
     index = job.queues[queue].v[gl_GlobalInvocationID.x];
     Path path = load_path(index);
-    goes_on = advance(path, index, shadow);
+    goes_on = advance(path, index, shadow, connection);
     store_result(index, path, goes_on);
     if (goes_on) store_path(index, path);
   }
@@ -573,10 +617,9 @@ void main() {
   APPEND(job.counters.next_count, goes_on, place)
   if (goes_on) job.queues[1u - queue].v[place] = index;
   APPEND(job.counters.shadow_count, shadow.is_wanted, place)
-  if (shadow.is_wanted) {
-    job.shadows.v[place] = vec4(shadow.origin, shadow.reach);
-    job.shadows.v[job.capacity + place] = vec4(
-        shadow.direction, uintBitsToFloat(index | (shadow.is_indirect ? 0x80000000u : 0u)));
-    job.shadows.v[2u * job.capacity + place] = vec4(shadow.light, 0.0);
-  }
+  STORE_RAY(job.shadows, shadow)
+#ifdef VIRTUAL_LIGHTS
+  APPEND(job.counters.connection_count, connection.is_wanted, place)
+  STORE_RAY(job.connections, connection)
+#endif
 }

@@ -1,6 +1,6 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// Adds the light that arrives along the rays to lights.
+// Adds the light that arrives along the rays to lights, or to virtual ones.
 #extension GL_GOOGLE_include_directive : require
 layout(local_size_x = 64) in;
 #include "world.glsl"
@@ -14,7 +14,7 @@ layout(local_size_x = 64) in;
 #ifdef RAY_QUERY
 #include "queries.glsl"
 
-vec3 transmittance(vec3 origin, vec3 direction, float t_max, float time) {
+vec3 transmittance(vec3 origin, vec3 direction, float t_max, float time, bool passes_glass) {
   vec3 left = vec3(1.0);
   rayQueryEXT query;
   rayQueryInitializeEXT(query, accelerationStructureEXT(world.structure),
@@ -27,7 +27,7 @@ vec3 transmittance(vec3 origin, vec3 direction, float t_max, float time) {
           normal_in_world(hit.instance, cross(triangles.v[3u * hit.triangle + 1u].xyz,
                                               triangles.v[3u * hit.triangle + 2u].xyz));
       left *= straight_share(hit.instance, number_of(hit), hit.u, hit.v, across, direction,
-                             job.has_caustics == 0u);
+                             passes_glass);
       if (largest(left) > 1e-4) continue;
     }
     rayQueryConfirmIntersectionEXT(query);
@@ -39,7 +39,7 @@ vec3 transmittance(vec3 origin, vec3 direction, float t_max, float time) {
 #else
 #include "trees.glsl"
 
-vec3 transmittance(vec3 origin, vec3 direction, float t_max, float time) {
+vec3 transmittance(vec3 origin, vec3 direction, float t_max, float time, bool passes_glass) {
   const float t_min = 0.0;
   vec3 left = vec3(1.0);
   TRAVERSE(
@@ -47,7 +47,7 @@ vec3 transmittance(vec3 origin, vec3 direction, float t_max, float time) {
         const vec3 across = turned_vector(
             instance, flags, normal_in_world(instance, cross(ab, ac)), time);
         left *= straight_share(instance, number, u, v, across, direction,
-                               job.has_caustics == 0u);
+                               passes_glass);
         if (largest(left) > 1e-4) continue;
       }
       left = vec3(0.0);
@@ -58,15 +58,21 @@ vec3 transmittance(vec3 origin, vec3 direction, float t_max, float time) {
 #endif
 
 void main() {
-  if (gl_GlobalInvocationID.x >= job.counters.ready_shadow_count) return;
+  const uint count = connects != 0u ? job.counters.ready_connection_count
+                                    : job.counters.ready_shadow_count;
+  if (gl_GlobalInvocationID.x >= count) return;
   const uint ray = gl_GlobalInvocationID.x;
-  const vec4 from = job.shadows.v[ray];
-  const vec4 towards = job.shadows.v[job.capacity + ray];
-  const vec4 light = job.shadows.v[2u * job.capacity + ray];
+  Columns rays = job.shadows;
+  if (connects != 0u) rays = job.connections;
+  const vec4 from = rays.v[ray];
+  const vec4 towards = rays.v[job.capacity + ray];
+  const vec4 light = rays.v[2u * job.capacity + ray];
   const uint path = floatBitsToUint(towards.w) & 0x7FFFFFFFu;
   const bool is_indirect = floatBitsToUint(towards.w) >> 31 != 0u;
   const float time = STATE(kSampler, path).w;
-  vec3 value = light.xyz * transmittance(from.xyz, towards.xyz, from.w, time);
+  // It would bend the way between surfaces: paths find their own way through it.
+  const bool passes_glass = job.has_caustics == 0u && connects == 0u;
+  vec3 value = light.xyz * transmittance(from.xyz, towards.xyz, from.w, time, passes_glass);
   if (!(value.x + value.y + value.z < 1e20)) return;
   if (job.clamp_to > 0.0 && is_indirect) {
     const float l = luminance(value);

@@ -6,6 +6,7 @@
 
 #include "diorama/error.h"
 #include "embree_renderer.h"
+#include "path_tracer.h"
 #include "renderer_support/sample_plan.h"
 #include "support/catch.h"
 #include "support/render_host/render_host.h"

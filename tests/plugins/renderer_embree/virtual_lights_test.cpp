@@ -21,40 +21,8 @@ using test::at;
 using test::inside_out;
 using test::matte;
 using test::RenderHost;
+using test::room_with_shade;
 using test::TestWorld;
-
-/// A lamp in an open shade of metal, whose inside lights the room, and panes and veils on the way.
-TestWorld room_with_shade() {
-  TestWorld world;
-  world.add("room", inside_out(make_box(Vec3(4, 4, 3))), matte(0.6f));
-  Material metal;
-  metal.base_color = Vec3f(0.9f, 0.7f, 0.4f);
-  metal.metallic = 1.0f;
-  metal.roughness = 0.5f;
-  world.add("wall", make_box(Vec3(0.02, 0.3, 0.3)), metal, at(0.85, 0.9, 0.7));
-  world.add("floor", make_box(Vec3(0.3, 0.3, 0.02)), metal, at(0.99, 0.9, 0.55));
-  Material lacquer;
-  lacquer.base_color = Vec3f(0.2f, 0.4f, 0.7f);
-  lacquer.roughness = 0.25f;
-  world.add("table", make_box(Vec3(1.2, 0.9, 0.1)), lacquer, at(-0.4, 0.3, -0.9));
-  Affine mirrored = at(0.6, -0.4, -1.1);
-  mirrored.linear().col(0) *= -1.0;
-  world.add("ball", make_sphere(0.3), matte(0.5f), mirrored);
-  Material pane;
-  pane.base_color = Vec3f(0.9f, 1.0f, 0.9f);
-  pane.transmission = 1.0f;
-  pane.is_thin_walled = true;
-  pane.roughness = 0.0f;
-  world.add("pane", make_box(Vec3(0.9, 0.01, 0.9)), pane, at(1.2, 0.3, 0.4));
-  Material veil = matte(0.5f);
-  veil.opacity = 0.4f;
-  world.add("veil", make_box(Vec3(0.01, 0.8, 0.8)), veil, at(-1.2, 0.9, 0.2));
-  Light lamp;
-  lamp.radius_m = 0.03;
-  lamp.color = Vec3f(900.0f, 800.0f, 600.0f);
-  world.add(lamp, at(0.95, 0.9, 0.65));
-  return world;
-}
 
 constexpr int kShadeWidth = 48;
 constexpr int kShadeHeight = 36;

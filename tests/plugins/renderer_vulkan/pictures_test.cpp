@@ -33,6 +33,7 @@ using test::dome;
 using test::inside_out;
 using test::matte;
 using test::RenderHost;
+using test::room_with_shade;
 using test::TestWorld;
 
 struct Pictures {
@@ -292,6 +293,30 @@ TEST_CASE("what touches glass from behind is seen through it", "[vulkan]") {
       }
     }
   }
+}
+
+TEST_CASE("paths are connected with virtual lights as by Embree", "[vulkan]") {
+  if (!test::has_vulkan_device()) return;
+  TestWorld world = room_with_shade();
+  const NodeId camera = world.add_camera(160, 120, 80.0, Vec3(-0.9, -1.8, 0.7), Vec3(0.1, 0.6, 0));
+  PictureParams params = reference(4);
+  const Pictures plain = render_both(world, camera, params);
+  const Difference d = difference(plain, "virtual_lights");
+  CAPTURE(d.mean, d.unequal);
+  CHECK(d.mean < 0.002);
+  CHECK(d.unequal < 0.05);
+  params.virtual_lights = false;
+  const NameSet channels{std::string(kColorHdr.name)};
+  const Frame without = render_by_vulkan(world.scene, camera, params, channels);
+  CHECK(difference(plain.vulkan, without.get(kColorHdr)).unequal > 0.5);
+  // Where the light of a lamp is found by chance it counts for less.
+  params.virtual_lights = true;
+  params.caustics = true;
+  CHECK(difference(render_both(world, camera, params), "with_caustics").mean < 0.002);
+  // Paths that learn for a cache are connected, too.
+  params.caustics = false;
+  params.denoise = true;
+  CHECK(difference(render_both(world, camera, params), "with_cache").mean < 0.004);
 }
 
 TEST_CASE("paths that chose their way at glass are counted as by Embree", "[vulkan]") {
