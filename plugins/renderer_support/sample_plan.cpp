@@ -24,14 +24,21 @@ double typical_brightness(const Image<PixelSum>& sums) {
   return mean * mean;
 }
 
+// Twice as many paths that learn take a tenth more time for half a percent less error (measured);
+// so few cells are known to fewer of them than the second number that pictures get worse.
+constexpr std::uint64_t kPathsForOne = 8;
+constexpr std::uint64_t kFewLearningPaths = 1u << 17;
 constexpr std::uint64_t kMostLearningPaths = 1u << 19;
 
-/// Per pixel.
+std::uint64_t learning_paths(std::uint64_t pixels, int samples) {
+  return std::clamp(pixels * std::uint64_t(samples) / kPathsForOne,
+                    std::min(pixels, kFewLearningPaths), kMostLearningPaths);
+}
+
+/// Per pixel of those that have any.
 std::uint32_t learning_samples(std::uint64_t pixels, int samples) {
-  constexpr std::uint32_t kPathsForOne = 4;
-  const auto affordable = std::uint32_t(
-      std::max<std::uint64_t>(1, kMostLearningPaths / std::max<std::uint64_t>(1, pixels)));
-  return std::clamp(std::uint32_t(samples) / kPathsForOne, 1u, affordable);
+  return std::uint32_t(std::max<std::uint64_t>(
+      1, learning_paths(pixels, samples) / std::max<std::uint64_t>(1, pixels)));
 }
 
 }  // namespace
@@ -58,7 +65,7 @@ std::vector<TraceJob> SamplePlan::learning_jobs() const {
   const std::uint64_t pixels = pixel_count();
   const std::uint32_t samples = learning_samples(pixels, limits_.samples);
   // One block of so many, anywhere.
-  const std::uint64_t share = std::max<std::uint64_t>(1, pixels / kMostLearningPaths);
+  const std::uint64_t share = pixels / std::min(pixels, learning_paths(pixels, limits_.samples));
   const std::uint64_t own_seed = mix_bits(seed_ ^ 0x4C4541524E494E47u);
   const SampleOrder order(own_seed, samples);
   std::vector<TraceJob> jobs;

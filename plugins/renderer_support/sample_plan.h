@@ -29,8 +29,8 @@ class SamplePlan {
            most_per_round_ >= std::uint32_t(limits_.samples);
   }
   std::uint64_t seed() const { return seed_; }
-  /// Paths of a sequence of their own for a RadianceCache to learn from: one for four of the
-  /// picture, but at least one per pixel; less where the picture is large.
+  /// Paths of a sequence of their own for a RadianceCache to learn from: one for eight of
+  /// the picture; one per pixel of small pictures, and less where the picture is large.
   std::vector<TraceJob> learning_jobs() const;
   /// How many paths that are at most, of pictures of so many pixels and samples.
   static std::uint64_t most_learning_paths(std::uint64_t pixels, int samples);

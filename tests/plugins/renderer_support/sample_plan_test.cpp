@@ -125,12 +125,12 @@ TEST_CASE("a time budget ends the sampling, however slow the machine", "[sample_
   for (const PixelSum& sum : fast.sums.pixels()) CHECK(sum.count() == 100);
 }
 
-TEST_CASE("a cache learns from one path for four of a small picture", "[sample_plan]") {
+TEST_CASE("a cache learns from one path for eight of a small picture", "[sample_plan]") {
   constexpr int kWidth = 67;
   constexpr int kHeight = 35;
   using Samples = std::pair<int, std::uint32_t>;  // of the picture, and to learn from
   for (const auto& [samples, expected] :
-       {Samples{1, 1}, Samples{2, 1}, Samples{4, 1}, Samples{16, 4}}) {
+       {Samples{1, 1}, Samples{4, 1}, Samples{16, 2}, Samples{40, 5}}) {
     CAPTURE(samples);
     SamplePlan plan(kWidth, kHeight, {samples}, 9);
     const SampleOrder own = plan.next_round({}, 0.0).at(0).order;
