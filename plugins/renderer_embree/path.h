@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <span>
 
+#include "connections.h"
 #include "path_tracer.h"
 #include "vertices.h"
 
@@ -88,13 +89,7 @@ struct PathTracer::Batch : Vertices {
   std::array<std::uint8_t, kBatch> shadow_rays;
   std::size_t shadow_ray_count = 0;
 
-  /// The rays to virtual lights, and the vertices that they start from.
-  std::array<std::uint8_t, kBatch> connections;
-  std::size_t connection_count = 0;
-  BatchVectors connection_origin;
-  BatchVectors connection_direction;
-  BatchFloats connection_reach;
-  BatchVectors connection_light;  ///< What they bring, if nothing is in the way.
+  Connections connections;
 
   bool learns = false;  ///< For a RadianceCache.
   BatchRays next_rays;

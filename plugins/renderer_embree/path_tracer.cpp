@@ -186,7 +186,6 @@ inline void PathTracer::trace_batch(Batch& v) const {
   while (v.rays.count > 0) {
     v.next_rays.count = 0;
     v.shadow_ray_count = 0;
-    v.connection_count = 0;
     v.own_bsdfs.clear();
     find_surfaces(v);
     process_hits(v);
@@ -198,6 +197,7 @@ inline void PathTracer::trace_batch(Batch& v) const {
     v.count = scattered;
     v.find_bases();
     draw_numbers(v);
+    if (settings_.virtual_lights) Connections::prefetch(v, *settings_.virtual_lights);
     for (std::size_t i = 0; i < v.count; ++i) take_lobes(v, i);
     if (scene_.stacks_lobes()) {
       v.balance_strategies<true>();
@@ -207,7 +207,7 @@ inline void PathTracer::trace_batch(Batch& v) const {
     for (std::size_t i = 0; i < v.count; ++i) scatter(v, i);
     sort_by_light(v);
     trace_shadow_rays<kPacketSize>(v);
-    if (settings_.virtual_lights) trace_connections<kPacketSize>(v);
+    if (settings_.virtual_lights) connect<kPacketSize>(v);
     v.rays = v.next_rays;
     v.paths = v.next_paths;
   }
@@ -418,7 +418,12 @@ inline void PathTracer::take_lobes(Batch& v, std::size_t i) const {
   const SurfaceBsdf& s = *v.bsdf[i];
   v.lobes.set(i, s.lobes);
   v.albedo.set(i, s.albedo_at(v.to_viewer.z[i]));
-  v.has_rival[i] = settings_.samples_bsdf && !ends_at(*v.paths[i], s);
+  const Path& path = *v.paths[i];
+  v.has_rival[i] = settings_.samples_bsdf && !ends_at(path, s);
+  if (path.is_connected) {
+    settings_.virtual_lights->prefetch_rival(std::uint32_t(v.hits.number[i]),
+                                             std::uint32_t(v.hits.triangle[i]));
+  }
 }
 
 /// Where the path ends, light samples alone find all light that a rough surface scatters.
@@ -430,6 +435,7 @@ inline void PathTracer::scatter(Batch& v, std::size_t i) const {
   Path& path = *v.paths[i];
   const SurfaceBsdf& s = *v.bsdf[i];
   v.bounce[i] = path.bounce;
+  v.connections.are_wanted[i] = 0;
   if (s.lobes.glass > 0.0f) [[unlikely]]
     return scatter_glass(v, i);
   const bool is_first = !path.result.has_surface;
@@ -445,7 +451,10 @@ inline void PathTracer::scatter(Batch& v, std::size_t i) const {
   path.is_connected = settings_.virtual_lights && !path.ends && !s.is_mirror() &&
                       path.bounce < settings_.max_bounces;
   // Also from where findings begin: what comes over a further surface belongs to them.
-  if (path.is_connected && (!v.learns || path.has_finding)) connect(v, i);
+  if (path.is_connected) {
+    v.connections.are_wanted[i] = !v.learns || path.has_finding;
+    v.connections.throughput.set(i, path.throughput);
+  }
   if (path.ends || ends_at(path, s)) return;
   BsdfSample next;
   next.weight = v.next_weight.at(i);
@@ -556,50 +565,26 @@ float PathTracer::share_beside_virtual_lights(const Batch& v, std::size_t i) con
   return own / (own + rival);
 }
 
-/// With one virtual light, whose weight is that of the way over it beside the path's own way there.
-inline void PathTracer::connect(Batch& v, std::size_t i) const {
-  const Path& path = *v.paths[i];
-  const SurfaceBsdf& s = *v.bsdf[i];
-  const float u = v.numbers[Vertices::kSpare][i];
-  const std::uint32_t bits =
-      hashed_bits(std::bit_cast<std::uint32_t>(u) + hashed_bits(path.sampler.place()));
-  const VirtualLights::Choice choice = settings_.virtual_lights->choose(
-      v.position.at(i), v.normal.at(i), v.flat_normal.at(i), u, PathSampler::fraction(bits));
-  if (!choice.light) return;
-  const VirtualLights::Light& light = *choice.light;
-  const Vec3f to = light.position - v.position.at(i);
-  const float distance2 = to.squaredNorm();
-  const Vec3f towards = to * (1.0f / std::sqrt(distance2));
-  const Vec3f wi = v.basis(i).to_local(towards);
-  if (!(wi.z() > 0.0f)) return;
-  const Lobes seen(v.lobes.at(i), v.albedo.at(i), v.to_viewer.at(i), scene_.stacks_lobes());
-  const BsdfValue value = seen.evaluate(wi, s.albedo_at(wi.z()));
-  const float per_area = -light.flat_normal.dot(towards) / distance2;
-  const float own = value.density * per_area;
-  const float weight = choice.weight * per_area * choice.rival / (own + choice.rival);
-  // To where its own rays begin, too: what lies closer hides neither.
-  const Vec3f from = v.leave(i, towards);
-  const Vec3f way = light.position + step_off(light.position, light.flat_normal) - from;
-  const float length = way.norm();
-  constexpr float kAlmost = 0.99999f;
-  v.connections[v.connection_count++] = std::uint8_t(i);
-  v.connection_origin.set(i, from);
-  v.connection_direction.set(i, way * (1.0f / length));
-  v.connection_reach[i] = kAlmost * length;
-  v.connection_light.set(i, path.throughput.cwiseProduct(value.f_cos)
-                                    .cwiseProduct(light.radiance(-towards, scene_.stacks_lobes())) *
-                                weight);
-}
-
 template <int kPacketSize>
-inline void PathTracer::trace_connections(Batch& v) const {
-  const RaysFromVertices rays{{v.connections.data(), v.connection_count},
-                              v.connection_origin,
-                              v.connection_direction,
-                              v.connection_reach};
+inline void PathTracer::connect(Batch& v) const {
+  Connections& connections = v.connections;
+  BatchFloats picks;
+  for (std::size_t i = 0; i < v.count; ++i) {
+    const auto spare = std::bit_cast<std::uint32_t>(v.numbers[Vertices::kSpare][i]);
+    picks[i] = PathSampler::fraction(hashed_bits(spare + hashed_bits(v.paths[i]->sampler.place())));
+  }
+  if (scene_.stacks_lobes()) {
+    connections.find<true>(v, *settings_.virtual_lights, picks);
+  } else {
+    connections.find<false>(v, *settings_.virtual_lights, picks);
+  }
+  const RaysFromVertices rays{{connections.vertices.data(), connections.count},
+                              connections.origin,
+                              connections.direction,
+                              connections.reach};
   // Glass would bend them: paths find their own way through it.
   trace_packets<kPacketSize>(v, rays, false, [&](std::size_t i, const Vec3f& transmittance) {
-    add(*v.paths[i], v.bounce[i] + 1, v.connection_light.at(i).cwiseProduct(transmittance));
+    add(*v.paths[i], v.bounce[i] + 1, connections.light.at(i).cwiseProduct(transmittance));
   });
 }
 

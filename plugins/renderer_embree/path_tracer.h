@@ -113,9 +113,8 @@ class PathTracer {
   void scatter(Batch& v, std::size_t i) const;
   /// What the light found at a vertex counts for, as virtual lights bring a part of it.
   float share_beside_virtual_lights(const Batch& v, std::size_t i) const;
-  void connect(Batch& v, std::size_t i) const;
   template <int kPacketSize>
-  void trace_connections(Batch& v) const;
+  void connect(Batch& v) const;
   void place_on_surfaces(std::span<const SurfaceParts::Point> places, std::uint32_t key,
                          std::uint32_t first, std::vector<Path>& paths, Batch& v) const;
   void scatter_glass(Batch& v, std::size_t i) const;

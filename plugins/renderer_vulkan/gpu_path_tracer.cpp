@@ -77,13 +77,17 @@ void GpuPathTracer::make_room(std::uint32_t slots) {
                           kWhat);
     job_.findings = device_findings_.address();
   }
+  if (columns_.size() < paths * kPathBytes || job_.capacity < paths) make_columns(paths);
   if (connects()) {
-    connections_.grow(device_, paths * gpu::kShadowColumns * gpu::kColumnSize,
-                      VulkanBuffer::Place::Device, kWhat);
+    // In columns as long as all others are.
+    const std::size_t size = std::size_t(job_.capacity) * gpu::kShadowColumns * gpu::kColumnSize;
+    connections_.grow(device_, size, VulkanBuffer::Place::Device, kWhat);
     job_.connections = connections_.address();
   }
-  if (columns_.size() >= paths * kPathBytes && job_.capacity >= paths) return;
-  columns_.grow(device_, paths * kPathBytes, VulkanBuffer::Place::Device, kWhat);
+}
+
+void GpuPathTracer::make_columns(std::size_t paths) {
+  columns_.grow(device_, paths * kPathBytes, VulkanBuffer::Place::Device, "light paths");
   job_.capacity = std::uint32_t(paths);
   gpu::Address place = columns_.address();
   const auto take = [&](std::size_t bytes_per_path) {

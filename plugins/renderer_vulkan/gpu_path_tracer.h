@@ -80,6 +80,7 @@ class GpuPathTracer {
   };
   std::uint32_t slots_for_device() const;
   void make_room(std::uint32_t slots);
+  void make_columns(std::size_t paths);
   void add(const TraceJob& job, std::uint32_t begin, std::uint32_t end, Pass& pass) const;
   void make_camera_rays(const Pass& pass);
   bool connects() const { return job_.part_triangles != 0; }

@@ -229,7 +229,7 @@ void render_set(const Set& set, std::uint64_t seed, const Options& options, Host
     if (is_judged) {
       if (bounces > 1) passes.erase(passes.begin());
       passes.push_back({256});
-    } else if (rng.chance(0.12)) {
+    } else if (rng.chance(0.2)) {
       passes.push_back({rng.chance(0.5) ? 64 : 256});
     }
     // What judges is made as plainly as can be.

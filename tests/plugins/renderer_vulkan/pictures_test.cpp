@@ -1074,7 +1074,7 @@ TEST_CASE("caches learn the same and paths end in them alike on the device", "[v
   GpuScene scene(device, host);
   scene.take(meshes.render_scene());
   const View view(world.scene, camera);
-  SamplePlan plan(67, 35, {16}, 9);
+  SamplePlan plan(67, 35, {32}, 9);
   const std::vector<TraceJob> learning = plan.learning_jobs();
   const std::vector<TraceJob> jobs = plan.next_round({}, 0.0);
   const PathSettings settings{.max_bounces = 4};
