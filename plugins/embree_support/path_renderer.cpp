@@ -65,8 +65,8 @@ void PictureParams::visit(ParamVisitor& v) {
        "a little."});
   v.param(
       "virtual_lights", virtual_lights,
-      {"Pictures of path_traced without denoise, by the renderer embree: connect paths with bright "
-       "places on surfaces, so that light that is scattered several times has less noise."});
+      {"Pictures of path_traced: connect paths with bright places on surfaces where lamps light few "
+       "of them, so that light that is scattered several times has less noise."});
   v.param(
       "firefly_limit", firefly_limit,
       {"Denoised pictures: how bright one path may be, over a few times the other paths around, "

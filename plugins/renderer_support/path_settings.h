@@ -18,7 +18,7 @@ struct PathSettings {
   /// less noise for a little blur of indirect light.
   bool ends_in_cache = false;
   /// Paths are connected with what surfaces scatter: see VirtualLights. Where nothing moves while
-  /// the shutter is open, and by renderers that know how.
+  /// the shutter is open.
   bool has_virtual_lights = false;
   /// Every path starts through its pixel's centre. For views without aperture and shutter, and no
   /// more than a path per pixel.
