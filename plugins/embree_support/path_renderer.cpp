@@ -63,10 +63,9 @@ void PictureParams::visit(ParamVisitor& v) {
       {"Denoised path_traced pictures: let paths end at their second surface with light that some "
        "of them found around there; far less noise and time for indirect light that is blurred "
        "a little."});
-  v.param(
-      "virtual_lights", virtual_lights,
-      {"Pictures of path_traced: connect paths with bright places on surfaces where lamps light few "
-       "of them, so that light that is scattered several times has less noise."});
+  v.param("virtual_lights", virtual_lights,
+          {"Pictures of path_traced: connect paths with bright places on surfaces where lamps "
+           "light few of them, so that light that is scattered several times has less noise."});
   v.param(
       "firefly_limit", firefly_limit,
       {"Denoised pictures: how bright one path may be, over a few times the other paths around, "

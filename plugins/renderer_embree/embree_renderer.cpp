@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "embree_renderer.h"
 
-#include "picture_film.h"
-#include "virtual_light_tracer.h"
+#include "embree_support/picture_film.h"
+#include "embree_support/virtual_light_tracer.h"
 
 namespace diorama {
 

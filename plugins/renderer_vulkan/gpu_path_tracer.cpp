@@ -20,6 +20,8 @@ constexpr std::size_t kPathBytes =
     std::size_t(gpu::kColumnSize) *
         (gpu::kStateColumns + gpu::kResultColumns + gpu::kShadowColumns + 1) +
     3 * sizeof(std::uint32_t);
+/// More where it is connected with virtual lights.
+constexpr std::size_t kConnectionBytes = std::size_t(gpu::kShadowColumns) * gpu::kColumnSize;
 /// More samples of a block in one pass would make a loop of gather.comp long.
 constexpr std::uint32_t kMostSamplesPerRange = 4096;
 
@@ -47,7 +49,8 @@ std::uint32_t GpuPathTracer::slots_for_device() const {
   const std::uint64_t share =
       device_.info().is_processor ? std::uint64_t(64) << 20 : device_.info().memory / 32;
   const std::uint64_t most = std::min(kMostSlots, device_.info().most_groups);
-  return std::uint32_t(std::clamp<std::uint64_t>(share / kPathBytes / gpu::kGroup, 64, most));
+  return std::uint32_t(
+      std::clamp<std::uint64_t>(share / (kPathBytes + kConnectionBytes) / gpu::kGroup, 64, most));
 }
 
 std::vector<std::pair<std::string, double>> GpuPathTracer::device_seconds() const {
@@ -80,8 +83,8 @@ void GpuPathTracer::make_room(std::uint32_t slots) {
   if (columns_.size() < paths * kPathBytes || job_.capacity < paths) make_columns(paths);
   if (connects()) {
     // In columns as long as all others are.
-    const std::size_t size = std::size_t(job_.capacity) * gpu::kShadowColumns * gpu::kColumnSize;
-    connections_.grow(device_, size, VulkanBuffer::Place::Device, kWhat);
+    connections_.grow(device_, job_.capacity * kConnectionBytes, VulkanBuffer::Place::Device,
+                      kWhat);
     job_.connections = connections_.address();
   }
 }

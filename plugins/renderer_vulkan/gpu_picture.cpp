@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "virtual_light_tracer.h"
+#include "embree_support/virtual_light_tracer.h"
 
 namespace diorama {
 

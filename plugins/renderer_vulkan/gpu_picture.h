@@ -2,8 +2,8 @@
 #pragma once
 
 #include "embree_support/embree_scene.h"
+#include "embree_support/picture_film.h"
 #include "gpu_path_tracer.h"
-#include "picture_film.h"
 #include "renderer_support/isa.h"
 #include "renderer_support/sample_plan.h"
 

@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "diorama/error.h"
+#include "embree_support/virtual_light_tracer.h"
 #include "gpu_picture.h"
 #include "renderer_support/stopwatch.h"
-#include "virtual_light_tracer.h"
 
 namespace diorama {
 

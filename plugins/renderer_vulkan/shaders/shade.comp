@@ -1,6 +1,6 @@
 #version 460
 // SPDX-License-Identifier: Apache-2.0
-// What becomes of paths where they met something; see path_tracer.cpp of renderer_embree.
+// What becomes of paths where they met something; see path_tracer.cpp of embree_support.
 // VIRTUAL_LIGHTS: surfaces are connected with virtual lights. That takes as much code again as the
 // lights have, which other pictures' paths need not wait for.
 #extension GL_GOOGLE_include_directive : require
@@ -251,7 +251,7 @@ const uint kScattered = 0u;
 const uint kGoesOn = 1u;
 const uint kEnds = 2u;
 
-// Where a path begins that goes on through the surface; see go_through() of renderer_embree.
+// Where a path begins that goes on through the surface; see go_through() of embree_support.
 vec3 go_through(inout Path path, SurfacePoint s, vec3 towards, out float back) {
   const float cosine = max(0.1, abs(dot(towards, s.flat_normal)));
   const float reach = step_length(s.position) / cosine;

@@ -4,7 +4,7 @@
 #include <array>
 #include <vector>
 
-#include "embree_support/embree_scene.h"
+#include "embree_scene.h"
 #include "renderer_support/bsdf.h"
 #include "renderer_support/light_samples.h"
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "diorama/host.h"
-#include "embree_support/embree_scene.h"
+#include "embree_scene.h"
 #include "renderer_support/batch.h"
 #include "renderer_support/film.h"
 #include "renderer_support/hit_image.h"
