@@ -138,6 +138,7 @@ hand_out() {
   tail -n +$((lines + 1)) log
   lines=$(wc -l <log)
 }
+[ -e done ] || begin
 while [ ! -e done ] && [ "$(seconds)" -lt "$end" ]; do
   begin
   sleep 5

@@ -22,6 +22,7 @@
 #include "renderer_support/rigid_motion.h"
 #include "support/catch.h"
 #include "support/render_host/render_host.h"
+#include "virtual_light_tracer.h"
 #include "vulkan_for_tests.h"
 #include "vulkan_renderer.h"
 
@@ -317,6 +318,42 @@ TEST_CASE("paths are connected with virtual lights as by Embree", "[vulkan]") {
   params.caustics = false;
   params.denoise = true;
   CHECK(difference(render_both(world, camera, params), "with_cache").mean < 0.004);
+}
+
+TEST_CASE("few connected paths are traced alike after many others", "[vulkan]") {
+  if (!test::has_vulkan_device()) return;
+  TestWorld world = room_with_shade();
+  const NodeId camera = world.add_camera(40, 24, 20.0, Vec3(-0.9, -1.8, 0.7), Vec3(0.1, 0.6, 0));
+  RenderHost host(2);
+  EmbreeScene meshes(host, {"sse2", {}});
+  meshes.take(world.scene);
+  const PathDevice& device = *test::path_device();
+  GpuScene scene(device, host);
+  scene.take(meshes.render_scene());
+  const View view(world.scene, camera);
+  const PathSettings settings{.max_bounces = 4};
+  const PathTracer alone(meshes, view, {settings}, Isa::Sse2);
+  const SurfaceParts parts(meshes.instances(), 500);
+  RayCounts rays;
+  const VirtualLightTracer finder(meshes, view, alone, parts, 3, host, rays);
+  const VirtualLights lights = finder.lights(300, 0, rays);
+  REQUIRE(lights.size() > 50);
+  const auto few = [&](GpuPathTracer& tracer) {
+    tracer.begin(view, settings, scene, meshes.window());
+    tracer.connect_with(lights);
+    tracer.trace(SamplePlan(40, 24, {2}, 9).next_round({}, 0.0));
+    return undenoised(tracer.film());
+  };
+  GpuPathTracer fresh(device, host);
+  const Image<Vec3f> expected = few(fresh);
+  // What it has room for stays: columns are longer than there are paths.
+  GpuPathTracer used(device, host);
+  used.begin(view, settings, scene, meshes.window());
+  used.trace(SamplePlan(40, 24, {64}, 9).next_round({}, 0.0));
+  CHECK(few(used) == expected);
+  used.begin(view, settings, scene, meshes.window());
+  used.trace(SamplePlan(40, 24, {2}, 9).next_round({}, 0.0));
+  CHECK(undenoised(used.film()) != expected);
 }
 
 TEST_CASE("paths that chose their way at glass are counted as by Embree", "[vulkan]") {
