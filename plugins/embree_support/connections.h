@@ -2,7 +2,6 @@
 #pragma once
 
 #include <array>
-#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -140,8 +139,7 @@ inline void Connections::evaluate(const Vertices& v) {
     // To where the light's own rays begin, too: what lies closer hides neither.
     const Vec3f from = v.position.at(i) + v.step.at(i);
     const Vec3f way = place_.at(i) + step_off(place_.at(i), facing_.at(i)) - from;
-    const float length2 = way.squaredNorm();
-    const float length = std::sqrt(length2);
+    const float length = std::sqrt(way.squaredNorm());
     constexpr float kAlmost = 0.99999f;
     origin.set(i, from);
     direction.set(i, way * (1.0f / length));

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "picture_film.h"
 
-#include <atomic>
 #include <chrono>
 #include <memory>
 #include <optional>
@@ -13,6 +12,10 @@ namespace diorama {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+
+void count(const std::vector<TraceJob>& jobs, PictureCounts& counts) {
+  for (const TraceJob& job : jobs) counts.paths += job.path_count();
+}
 
 /// `sets`: null where there are no virtual lights.
 Film film_in_rounds(const PathTracer& tracer, const View& view, SamplePlan& plan,
@@ -32,19 +35,12 @@ Film film_in_rounds(const PathTracer& tracer, const View& view, SamplePlan& plan
       own[i] = tracer.trace(job, &sums.at(job.x_begin, job.y_begin), std::size_t(width));
     });
     for (const RayCounts& counted : own) counts.rays += counted;
+    count(jobs, counts);
   }
   Film film(width, height);
-  std::atomic<std::uint64_t> paths{0};
   host.parallel_for(std::size_t(height), [&](std::size_t row) {
-    std::uint64_t count = 0;
-    for (int x = 0; x < width; ++x) {
-      const PixelSum& sum = sums.at(x, int(row));
-      film.at(x, int(row)) = sum.mean();
-      count += std::uint64_t(sum.count());
-    }
-    paths += count;
+    for (int x = 0; x < width; ++x) film.at(x, int(row)) = sums.at(x, int(row)).mean();
   });
-  counts.paths += paths;
   return film;
 }
 
@@ -54,9 +50,6 @@ Film picture_film(const EmbreeScene& scene, const View& view, TraceSettings sett
                   SamplePlan& plan, Host& host, PictureCounts& counts) {
   const auto start = Clock::now();
   settings.host = &host;
-  const auto count = [&](const std::vector<TraceJob>& jobs) {
-    for (const TraceJob& job : jobs) counts.paths += job.path_count();
-  };
   const std::unique_ptr<VirtualLightSets> sets =
       VirtualLightSets::for_picture(scene, view, settings, isa, plan, host, counts.rays);
   if (sets) settings.virtual_lights = &sets->lights();
@@ -65,14 +58,14 @@ Film picture_film(const EmbreeScene& scene, const View& view, TraceSettings sett
     const std::vector<TraceJob> jobs = plan.learning_jobs();
     cache.emplace(PathTracer(scene, view, settings, isa).learn(jobs, host, counts.rays));
     settings.cache = &*cache;
-    count(jobs);
+    count(jobs, counts);
   }
   const PathTracer tracer(scene, view, settings, isa);
   if (!plan.has_one_round()) {
     return film_in_rounds(tracer, view, plan, sets.get(), start, host, counts);
   }
   const std::vector<TraceJob> jobs = plan.next_round({}, 0.0);
-  count(jobs);
+  count(jobs, counts);
   return tracer.film(jobs, host, counts.rays);
 }
 

@@ -117,7 +117,7 @@ RadianceCache GpuPathTracer::learn(std::span<const TraceJob> jobs, Counts& count
 }
 
 void GpuPathTracer::begin(const View& view, const PathSettings& settings, const GpuScene& scene,
-                          double window, const RadianceCache* cache) {
+                          double window, const RadianceCache* cache, bool stays_connected) {
   view_ = &view;
   window_ = window;
   const auto pinhole = view.has_shutter() ? std::nullopt : view.pinhole();
@@ -147,7 +147,7 @@ void GpuPathTracer::begin(const View& view, const PathSettings& settings, const 
   job_.film = film_.address();
   job_.pixel_count = std::uint32_t(pixels);
   has_sums_ = false;
-  job_.part_triangles = 0;
+  if (!stays_connected) job_.part_triangles = 0;
   job_.cache_use = gpu::kNoCache;
   if (cache) {
     const auto bytes = std::as_bytes(cache->table());
@@ -184,11 +184,13 @@ void GpuPathTracer::connect_with(const VirtualLights& lights) {
        {&job_.candidates, &job_.virtual_lights, &job_.part_starts, &job_.part_densities}) {
     *address += virtual_lights_.address();
   }
-  const auto triangles = std::as_bytes(lights.parts().triangles());
-  parts_.grow(device_, triangles.size(), VulkanBuffer::Place::Device, kWhat);
-  job_.part_triangles = parts_.address();
-  device_.upload(std::array{VulkanDevice::Transfer{bytes.bytes(), &virtual_lights_, 0},
-                            VulkanDevice::Transfer{triangles, &parts_, 0}});
+  device_.upload(bytes.bytes(), virtual_lights_, 0);
+  if (!connects()) {
+    const auto triangles = std::as_bytes(lights.parts().triangles());
+    parts_.grow(device_, triangles.size(), VulkanBuffer::Place::Device, kWhat);
+    device_.upload(triangles, parts_, 0);
+    job_.part_triangles = parts_.address();
+  }
   job_.virtual_light_count = std::uint32_t(lights.size());
 }
 

@@ -35,11 +35,13 @@ class GpuPathTracer {
     std::uint64_t shadow_rays = 0;
   };
 
-  /// Begins a picture. `cache`: where paths end that may; null: nowhere.
-  /// `scene` is used until the picture's last trace(). `window`: see RenderScene::window().
+  /// Begins a picture. `cache`: where paths end that may; null: nowhere. `stays_connected`: with
+  /// the virtual lights that paths were connected with before, which the device has. `scene` is
+  /// used until the picture's last trace(). `window`: see RenderScene::window().
   void begin(const View& view, const PathSettings& settings, const GpuScene& scene, double window,
-             const RadianceCache* cache = nullptr);
-  /// Connects the paths of the jobs to come with these; to be called after begin().
+             const RadianceCache* cache = nullptr, bool stays_connected = false);
+  /// Connects the paths of the jobs to come with these; to be called after begin(), and again for
+  /// other lights on the same parts.
   void connect_with(const VirtualLights& lights);
   /// Traces the samples of these jobs. Sums are the same for any division into jobs and passes.
   Counts trace(std::span<const TraceJob> jobs);

@@ -21,19 +21,16 @@ void trace_picture(GpuPathTracer& tracer, const GpuScene& scene, const EmbreeSce
   };
   const std::unique_ptr<VirtualLightSets> sets =
       VirtualLightSets::for_picture(meshes, view, settings, isa, plan, host, counts.rays);
-  const auto begin = [&](const RadianceCache* cache) {
-    tracer.begin(view, settings, scene, meshes.window(), cache);
-    if (sets) tracer.connect_with(sets->lights());
-  };
+  tracer.begin(view, settings, scene, meshes.window());
+  if (sets) tracer.connect_with(sets->lights());
   std::optional<RadianceCache> cache;
   if (settings.ends_in_cache) {
     const std::vector<TraceJob> jobs = plan.learning_jobs();
-    begin(nullptr);
     GpuPathTracer::Counts own;
     cache.emplace(tracer.learn(jobs, own));
     count(jobs, own);
+    tracer.begin(view, settings, scene, meshes.window(), &*cache, sets != nullptr);
   }
-  begin(cache ? &*cache : nullptr);
   Image<PixelSum> sums;
   for (bool is_first = true;; is_first = false) {
     const double elapsed = std::chrono::duration<double>(Clock::now() - start).count();
