@@ -57,9 +57,10 @@ inline float score_of_distant(const LightTable::Record& light, const Vec3f& norm
 
 inline float score_of_surroundings(const LightTable::Record& light, const Receiver& receiver) {
   if (light.shape == LightShape::Distant) {
-    return score_of_distant(light, receiver.normal, receiver.is_two_sided);
+    return score_of_distant(light, receiver.normal, receiver.is_two_sided) *
+           light.sun->share(receiver.position);
   }
-  return light.power * light.sky->power(light.sky->cell(receiver.position));
+  return light.power * light.sky->power(light.sky->grid().cell(receiver.position));
 }
 
 /// The same for the places of a batch.
@@ -67,13 +68,14 @@ inline void score_surroundings(const LightTable::Record& light, const LightQueri
                                BatchFloats& scores) {
   const std::size_t size = whole_steps(queries.count);
   if (light.shape == LightShape::Distant) {
+    light.sun->find_shares(queries.position, size, scores);
     for (std::size_t i = 0; i < size; ++i) {
-      scores[i] = score_of_distant(light, queries.normal.at(i), queries.is_two_sided[i] != 0);
+      scores[i] *= score_of_distant(light, queries.normal.at(i), queries.is_two_sided[i] != 0);
     }
     return;
   }
   BatchInts cells;
-  light.sky->find_cells(queries.position, size, cells);
+  light.sky->grid().find_cells(queries.position, size, cells);
   light.sky->find_powers(cells, size, scores);
   const float power = light.power;
   for (std::size_t i = 0; i < size; ++i) scores[i] *= power;

@@ -161,7 +161,7 @@ inline void draw_dome(const LightTable& table, std::uint32_t number, const Light
   }
   const std::size_t size = whole_steps(count);
   BatchInts cells;
-  light.sky->find_cells(from, size, cells);
+  light.sky->grid().find_cells(from, size, cells);
   BatchFloats x;
   BatchFloats y;
   BatchFloats density;

@@ -79,6 +79,7 @@ void LightTable::add(const Light& light, const Affine& world_from_node,
     }
     case LightKind::Distant: {
       r.shape = LightShape::Distant;
+      r.sun = std::make_shared<const SunGrid>();
       const double half = 0.5 * std::clamp(light.angle_rad, 0.0, kPi);
       r.power = luminance(r.radiance);
       r.one_minus_cos = float(2.0 * std::pow(std::sin(0.5 * half), 2));
@@ -97,10 +98,14 @@ void LightTable::add(const Light& light, const Affine& world_from_node,
   if (r.power > 0.0f && std::isfinite(r.power)) records_.push_back(std::move(r));
 }
 
-void LightTable::learn_sky(const GridOf& grid_of) {
-  for (Record& light : records_) {
-    if (light.shape != LightShape::Dome) continue;
-    if (auto grid = grid_of(light.texture, light.dome_from_world.transpose())) light.sky = grid;
+void LightTable::learn_surroundings(const SkyGridOf& sky_grid_of, const SunGridOf& sun_grid_of) {
+  for (const std::uint32_t index : surroundings_) {
+    Record& light = records_[index];
+    if (light.shape == LightShape::Dome) {
+      light.sky = sky_grid_of(light.texture, light.dome_from_world.transpose());
+    } else {
+      light.sun = sun_grid_of(-light.direction, light.one_minus_cos);
+    }
   }
 }
 

@@ -13,6 +13,7 @@
 #include "light_tree.h"
 #include "sampling.h"
 #include "sky_grid.h"
+#include "sun_grid.h"
 
 namespace diorama {
 
@@ -70,7 +71,8 @@ class LightTable {
     bool is_visible_to_camera = true;
     Eigen::Matrix3f dome_from_world = Eigen::Matrix3f::Identity();
     std::shared_ptr<const DomeTexture> texture;
-    std::shared_ptr<const SkyGrid> sky;
+    std::shared_ptr<const SkyGrid> sky;  ///< Of a dome ...
+    std::shared_ptr<const SunGrid> sun;  ///< ... and of a distant light.
     std::uint32_t instance = 0;
     std::vector<EmittingTriangles::Triangle> triangles;
     std::vector<float> cumulative_area;
@@ -99,10 +101,13 @@ class LightTable {
 
   /// Builds the tables for choosing and drawing; call after the last add().
   void finish();
-  /// Which parts of a dome can be seen from where; null: all from everywhere.
-  using GridOf = std::function<std::shared_ptr<const SkyGrid>(
+  /// Which parts of a dome can be seen from where, and from where a distant light.
+  using SkyGridOf = std::function<std::shared_ptr<const SkyGrid>(
       const std::shared_ptr<const DomeTexture>&, const Eigen::Matrix3f& world_from_dome)>;
-  void learn_sky(const GridOf& grid_of);
+  using SunGridOf =
+      std::function<std::shared_ptr<const SunGrid>(const Vec3f& towards, float one_minus_cos)>;
+  /// Before, all is seen from everywhere.
+  void learn_surroundings(const SkyGridOf& sky_grid_of, const SunGridOf& sun_grid_of);
 
   bool is_empty() const { return records_.empty(); }
   std::size_t count() const { return records_.size(); }
@@ -259,7 +264,7 @@ inline float LightTable::density_of_surface(std::uint32_t light, float distance,
     case LightShape::Dome: {
       const DomeTexture::Place place = light.texture->place(light.dome_from_world * direction);
       radiance = light.radiance.cwiseProduct(place.radiance);
-      return place.density * light.sky->probability(light.sky->cell(from), place.patch);
+      return place.density * light.sky->probability(light.sky->grid().cell(from), place.patch);
     }
     case LightShape::Triangles:
       break;

@@ -96,7 +96,7 @@ void RenderScene::light(const Scene& scene, const SkyGrid::Sees& sees) {
   add_lights(scene);
   add_emitters();
   lights_.finish();
-  learn_sky(sees);
+  learn_surroundings(sees);
   needs_light_ = false;
 }
 
@@ -358,29 +358,56 @@ void RenderScene::add_emitters(std::uint32_t number, std::size_t slot,
   }
 }
 
-// Only what stays counts, so that the grid is the same whatever moved before, and is kept.
-void RenderScene::learn_sky(const SkyGrid::Sees& sees) {
+namespace {
+
+/// The one of `kept` that is alike, or a new one; it is added to `used`.
+template <class Cached, class IsAlike, class Make>
+auto grid_of(const std::vector<Cached>& kept, std::vector<Cached>& used, IsAlike&& is_alike,
+             Make&& make) {
+  const auto it = std::find_if(kept.begin(), kept.end(), is_alike);
+  used.push_back(it != kept.end() ? *it : make());
+  return used.back().grid;
+}
+
+}  // namespace
+
+// Only what stays counts, so that the grids are the same whatever moved before, and are kept.
+void RenderScene::learn_surroundings(const SkyGrid::Sees& sees) {
   Surroundings now = surroundings();
-  if (!(now == surroundings_)) sky_grids_.clear();
+  if (!(now == surroundings_)) {
+    sky_grids_.clear();
+    sun_grids_.clear();
+  }
   surroundings_ = std::move(now);
-  std::vector<CachedGrid> used;
-  lights_.learn_sky([&](const std::shared_ptr<const DomeTexture>& dome,
-                        const Eigen::Matrix3f& world_from_dome) -> std::shared_ptr<const SkyGrid> {
-    if (surroundings_.bounds.is_empty()) return nullptr;
-    const auto same = [&](const CachedGrid& cached) {
-      return cached.dome == dome && cached.world_from_dome == world_from_dome;
-    };
-    const auto it = std::find_if(sky_grids_.begin(), sky_grids_.end(), same);
-    if (it != sky_grids_.end()) {
-      used.push_back(*it);
-    } else {
-      used.push_back({dome, world_from_dome,
-                      std::make_shared<const SkyGrid>(*dome, world_from_dome, surroundings_.bounds,
-                                                      sees, host_)});
-    }
-    return used.back().grid;
-  });
-  sky_grids_ = std::move(used);
+  const Aabb& bounds = surroundings_.bounds;
+  if (bounds.is_empty()) return;
+  std::vector<CachedSky> skies;
+  std::vector<CachedSun> suns;
+  lights_.learn_surroundings(
+      [&](const std::shared_ptr<const DomeTexture>& dome, const Eigen::Matrix3f& world_from_dome) {
+        return grid_of(
+            sky_grids_, skies,
+            [&](const CachedSky& cached) {
+              return cached.dome == dome && cached.world_from_dome == world_from_dome;
+            },
+            [&]() -> CachedSky {
+              return {dome, world_from_dome,
+                      std::make_shared<const SkyGrid>(*dome, world_from_dome, bounds, sees, host_)};
+            });
+      },
+      [&](const Vec3f& towards, float one_minus_cos) {
+        return grid_of(
+            sun_grids_, suns,
+            [&](const CachedSun& cached) {
+              return cached.towards == towards && cached.one_minus_cos == one_minus_cos;
+            },
+            [&]() -> CachedSun {
+              return {towards, one_minus_cos,
+                      std::make_shared<const SunGrid>(towards, one_minus_cos, bounds, sees, host_)};
+            });
+      });
+  sky_grids_ = std::move(skies);
+  sun_grids_ = std::move(suns);
 }
 
 RenderScene::Surroundings RenderScene::surroundings() const {

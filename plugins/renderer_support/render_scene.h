@@ -72,8 +72,8 @@ class RenderScene {
     bool is_movable = false;
     Affine world_from_node;
   };
-  /// What decides which parts of the sky can be seen: all that follows neither a rigid body nor an
-  /// animation.
+  /// What decides which parts of sky and sun can be seen: all that follows neither a rigid body nor
+  /// an animation.
   struct Surroundings {
     struct Pose {
       Eigen::Matrix3f linear;
@@ -91,10 +91,15 @@ class RenderScene {
              clear_materials == other.clear_materials;
     }
   };
-  struct CachedGrid {
+  struct CachedSky {
     std::shared_ptr<const DomeTexture> dome;
     Eigen::Matrix3f world_from_dome;
     std::shared_ptr<const SkyGrid> grid;
+  };
+  struct CachedSun {
+    Vec3f towards;
+    float one_minus_cos = 0.0f;
+    std::shared_ptr<const SunGrid> grid;
   };
 
   void collect(const Scene& scene, NodeId node, const Affine& world_from_parent, bool is_movable,
@@ -108,7 +113,7 @@ class RenderScene {
   void add_emitters();
   void add_emitters(std::uint32_t instance, std::size_t slot,
                     std::span<std::uint32_t> triangle_lights);
-  void learn_sky(const SkyGrid::Sees& sees);
+  void learn_surroundings(const SkyGrid::Sees& sees);
   Surroundings surroundings() const;
 
   Host& host_;
@@ -139,7 +144,8 @@ class RenderScene {
   std::vector<Placed> placed_lights_;
   LightTable lights_;
   Surroundings surroundings_;
-  std::vector<CachedGrid> sky_grids_;  ///< Valid for surroundings_.
+  std::vector<CachedSky> sky_grids_;
+  std::vector<CachedSun> sun_grids_;  ///< Valid for surroundings_.
 };
 
 }  // namespace diorama

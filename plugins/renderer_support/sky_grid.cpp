@@ -17,10 +17,6 @@ constexpr int kMostFirstRays = 17;  // for one patch
 constexpr float kFurtherRays = 24.0f;
 constexpr float kFurtherByLight = 64.0f;  // times as many for a patch with all light
 constexpr int kMostFurtherRays = 256;
-// The grid may be wrong: what a cell does not see but its neighbour does gets a good share of the
-// samples, and everything else a small one.
-constexpr float kNeighbourShare = 0.2f;
-constexpr float kUnseenShare = 0.003f;
 
 }  // namespace
 
@@ -32,19 +28,12 @@ SkyGrid::SkyGrid(const DomeTexture& dome) {
 }
 
 SkyGrid::SkyGrid(const DomeTexture& dome, const Eigen::Matrix3f& world_from_dome,
-                 const Aabb& bounds, const Sees& sees, Host& host) {
-  const Vec3 size = bounds.size().cwiseMax(1e-3);
-  Eigen::Index shortest = 0;
-  size.minCoeff(&shortest);
-  for (Eigen::Index k = 0; k < 3; ++k) {
-    counts_[std::size_t(k)] = k == shortest ? kCellsLong / 2 : kCellsLong;
-    cells_per_metre_[k] = float(counts_[std::size_t(k)] / size[k]);
-  }
-  low_ = bounds.min.cast<float>();
+                 const Aabb& bounds, const Sees& sees, Host& host)
+    : grid_(bounds) {
   const std::vector<Shares> seen = look_around(dome, world_from_dome, sees, host);
   cells_.resize(seen.size());
   host.parallel_for(seen.size(), [&](std::size_t index) {
-    cells_[index] = make_cell(dome, with_neighbours(seen, int(index)));
+    cells_[index] = make_cell(dome, with_neighbours(seen, index));
   });
   for (const Cell& cell : cells_) powers_.push_back(cell.power);
 }
@@ -66,7 +55,7 @@ std::vector<SkyGrid::Shares> SkyGrid::look_around(const DomeTexture& dome,
     further[std::size_t(patch)] =
         std::min(int(kFurtherRays * (1.0f + kFurtherByLight * share)), kMostFurtherRays);
   }
-  std::vector<Shares> seen(std::size_t(counts_[0] * counts_[1] * counts_[2]));
+  std::vector<Shares> seen(grid_.size());
   host.parallel_for(seen.size(), [&](std::size_t cell) {
     const RayCounts none{};
     seen[cell] = seen_from(cell, dome, world_from_dome, sees, none, first);
@@ -76,7 +65,7 @@ std::vector<SkyGrid::Shares> SkyGrid::look_around(const DomeTexture& dome,
     RayCounts wanted{};
     for (int patch = 0; patch < DomeTexture::kPatches; ++patch) {
       const auto k = std::size_t(patch);
-      if (may_be_seen_in_part(seen, int(cell), patch)) wanted[k] = further[k];
+      if (may_be_seen_in_part(seen, cell, patch)) wanted[k] = further[k];
     }
     all[cell] = seen_from(cell, dome, world_from_dome, sees, first, wanted);
     for (std::size_t patch = 0; patch < wanted.size(); ++patch) {
@@ -90,25 +79,16 @@ std::vector<SkyGrid::Shares> SkyGrid::look_around(const DomeTexture& dome,
   return all;
 }
 
-bool SkyGrid::may_be_seen_in_part(const std::vector<Shares>& seen, int cell, int patch) const {
+bool SkyGrid::may_be_seen_in_part(const std::vector<Shares>& seen, std::size_t cell,
+                                  int patch) const {
   bool is_seen = false;
   bool is_hidden = false;
-  const auto look_at = [&](int other_cell, int other_patch) {
-    const float share = seen[std::size_t(other_cell)][std::size_t(other_patch)];
+  const auto look_at = [&](std::size_t other_cell, int other_patch) {
+    const float share = seen[other_cell][std::size_t(other_patch)];
     is_seen |= share > 0.0f;
     is_hidden |= share < 0.9999f;
   };
-  const std::array<int, 3> place{cell % counts_[0], cell / counts_[0] % counts_[1],
-                                 cell / counts_[0] / counts_[1]};
-  const auto begin = [&](std::size_t axis) { return std::max(place[axis] - 1, 0); };
-  const auto last = [&](std::size_t axis) { return std::min(place[axis] + 1, counts_[axis] - 1); };
-  for (int z = begin(2); z <= last(2); ++z) {
-    for (int y = begin(1); y <= last(1); ++y) {
-      for (int x = begin(0); x <= last(0); ++x) {
-        look_at((z * counts_[1] + y) * counts_[0] + x, patch);
-      }
-    }
-  }
+  grid_.visit_around(cell, [&](std::size_t other) { look_at(other, patch); });
   // Columns close to a ring.
   const int row = patch / DomeTexture::kColumns;
   const int column = patch % DomeTexture::kColumns;
@@ -123,8 +103,6 @@ bool SkyGrid::may_be_seen_in_part(const std::vector<Shares>& seen, int cell, int
 SkyGrid::Shares SkyGrid::seen_from(std::size_t index, const DomeTexture& dome,
                                    const Eigen::Matrix3f& world_from_dome, const Sees& sees,
                                    const RayCounts& before, const RayCounts& counts) const {
-  const Vec3f corner(float(int(index) % counts_[0]), float(int(index) / counts_[0] % counts_[1]),
-                     float(int(index) / counts_[0] / counts_[1]));
   Shares seen{};
   std::array<Ray, kMostRays> rays;
   std::array<std::pair<int, float>, kMostRays>
@@ -147,7 +125,7 @@ SkyGrid::Shares SkyGrid::seen_from(std::size_t index, const DomeTexture& dome,
     const auto next = [&] { return unit_fraction(mix_bits(++key * 0x9E3779B97F4A7C15u)); };
     for (int i = 0; i < count; ++i) {
       const Vec3f offset(next(), next(), next());
-      const Vec3f origin = low_ + (corner + offset).cwiseQuotient(cells_per_metre_);
+      const Vec3f origin = grid_.place(index, offset);
       const Vec2f u(next(), next());
       const Vec3f direction =
           world_from_dome * DomeTexture::towards(dome.sample(patch, u).place).direction;
@@ -160,20 +138,13 @@ SkyGrid::Shares SkyGrid::seen_from(std::size_t index, const DomeTexture& dome,
   return seen;
 }
 
-SkyGrid::Shares SkyGrid::with_neighbours(const std::vector<Shares>& seen, int index) const {
-  Shares shares = seen[std::size_t(index)];
-  int step = 1;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const int place = index / step % counts_[axis];
-    for (const int side : {-1, 1}) {
-      if (place + side < 0 || place + side >= counts_[axis]) continue;
-      const Shares& other = seen[std::size_t(index + side * step)];
-      for (std::size_t patch = 0; patch < shares.size(); ++patch) {
-        shares[patch] = std::max(shares[patch], kNeighbourShare * other[patch]);
-      }
+SkyGrid::Shares SkyGrid::with_neighbours(const std::vector<Shares>& seen, std::size_t cell) const {
+  Shares shares = seen[cell];
+  grid_.visit_beside(cell, [&](std::size_t other) {
+    for (std::size_t patch = 0; patch < shares.size(); ++patch) {
+      shares[patch] = std::max(shares[patch], CellGrid::kNeighbourShare * seen[other][patch]);
     }
-    step *= counts_[axis];
-  }
+  });
   return shares;
 }
 
@@ -181,7 +152,7 @@ SkyGrid::Cell SkyGrid::make_cell(const DomeTexture& dome, const Shares& seen) {
   Cell cell;
   float sum = 0.0f;
   for (std::size_t patch = 0; patch < seen.size(); ++patch) {
-    sum += dome.patch_power(int(patch)) * std::max(seen[patch], kUnseenShare);
+    sum += dome.patch_power(int(patch)) * std::max(seen[patch], CellGrid::kUnseenShare);
     cell.cumulative[patch + 1] = sum;
   }
   cell.power = sum;

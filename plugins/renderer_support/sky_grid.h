@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "batch.h"
+#include "cell_grid.h"
 #include "diorama/host.h"
 #include "dome.h"
 
@@ -33,20 +33,12 @@ class SkyGrid {
   SkyGrid(const DomeTexture& dome, const Eigen::Matrix3f& world_from_dome, const Aabb& bounds,
           const Sees& sees, Host& host);
 
-  /// Cells lie row by row from the low corner on, x fastest.
-  const Vec3f& low() const { return low_; }
-  const Vec3f& cells_per_metre() const { return cells_per_metre_; }
-  const std::array<int, 3>& counts() const { return counts_; }
+  const CellGrid& grid() const { return grid_; }
   /// Borders of the patches' shares in a cell, from 0 to 1.
   const std::array<float, DomeTexture::kPatches + 1>& borders(std::uint32_t cell) const {
     return cells_[cell].cumulative;
   }
 
-  std::uint32_t cell(const Vec3f& position) const;
-  /// The same for the first `size` entries of a batch.
-  void find_cells(const BatchVectors& positions, std::size_t size, BatchInts& cells) const {
-    for (std::size_t i = 0; i < size; ++i) cells[i] = std::int32_t(cell(positions.at(i)));
-  }
   /// Luminance times solid angle of what a cell sees.
   float power(std::uint32_t cell) const { return powers_[cell]; }
   void find_powers(const BatchInts& cells, std::size_t size, BatchFloats& powers) const {
@@ -62,7 +54,6 @@ class SkyGrid {
   float probability(std::uint32_t cell, int patch) const;
 
  private:
-  static constexpr int kCellsLong = 12;  ///< Along the two longest axes; half along the shortest.
   struct Cell {
     std::array<float, DomeTexture::kPatches + 1> cumulative{};
     float power = 0.0f;
@@ -73,27 +64,17 @@ class SkyGrid {
   /// By cell: which share of each patch can be seen.
   std::vector<Shares> look_around(const DomeTexture& dome, const Eigen::Matrix3f& world_from_dome,
                                   const Sees& sees, Host& host) const;
-  bool may_be_seen_in_part(const std::vector<Shares>& seen, int cell, int patch) const;
+  bool may_be_seen_in_part(const std::vector<Shares>& seen, std::size_t cell, int patch) const;
   /// By `counts` rays; `before`: how many the cell had.
   Shares seen_from(std::size_t cell, const DomeTexture& dome,
                    const Eigen::Matrix3f& world_from_dome, const Sees& sees,
                    const RayCounts& before, const RayCounts& counts) const;
-  Shares with_neighbours(const std::vector<Shares>& seen, int cell) const;
+  Shares with_neighbours(const std::vector<Shares>& seen, std::size_t cell) const;
 
-  Vec3f low_ = Vec3f::Zero();
-  Vec3f cells_per_metre_ = Vec3f::Zero();
-  std::array<int, 3> counts_{1, 1, 1};
+  CellGrid grid_;
   std::vector<Cell> cells_;
   std::vector<float> powers_;  ///< Of the cells, close together: read at every vertex.
 };
-
-inline std::uint32_t SkyGrid::cell(const Vec3f& position) const {
-  const auto along = [&](int k) {
-    const float x = (position[k] - low_[k]) * cells_per_metre_[k];
-    return int(std::max(0.0f, std::min(x, float(counts_[std::size_t(k)] - 1))));
-  };
-  return std::uint32_t((along(2) * counts_[1] + along(1)) * counts_[0] + along(0));
-}
 
 inline SkyGrid::Choice SkyGrid::choose(std::uint32_t index, float u) const {
   const auto& cumulative = cells_[index].cumulative;

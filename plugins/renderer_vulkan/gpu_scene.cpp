@@ -32,20 +32,28 @@ std::vector<std::uint32_t> words_of(const DomeTexture& dome) {
   return words;
 }
 
-/// See sky_cell() of lights.glsl.
-std::vector<std::uint32_t> words_of(const SkyGrid& grid) {
+/// See grid_cell() of lights.glsl.
+std::vector<std::uint32_t> words_of(const CellGrid& grid) {
   std::vector<std::uint32_t> words;
   add_floats(words, {grid.low().data(), 3});
   add_floats(words, {grid.cells_per_metre().data(), 3});
-  std::uint32_t cells = 1;
-  for (const int count : grid.counts()) {
-    words.push_back(std::uint32_t(count));
-    cells *= std::uint32_t(count);
-  }
+  for (const int count : grid.counts()) words.push_back(std::uint32_t(count));
+  return words;
+}
+
+std::vector<std::uint32_t> words_of(const SunGrid& sun) {
+  std::vector<std::uint32_t> words = words_of(sun.grid());
+  add_floats(words, sun.shares());
+  return words;
+}
+
+std::vector<std::uint32_t> words_of(const SkyGrid& sky) {
+  std::vector<std::uint32_t> words = words_of(sky.grid());
+  const auto cells = std::uint32_t(sky.grid().size());
   for (std::uint32_t cell = 0; cell < cells; ++cell) {
-    words.push_back(std::bit_cast<std::uint32_t>(grid.power(cell)));
-    add_floats(words, grid.borders(cell));
+    words.push_back(std::bit_cast<std::uint32_t>(sky.power(cell)));
   }
+  for (std::uint32_t cell = 0; cell < cells; ++cell) add_floats(words, sky.borders(cell));
   return words;
 }
 
@@ -196,7 +204,8 @@ void GpuScene::take_skies(const LightTable& lights) {
                    WordsOnDevice{source, assets_.upload(std::as_bytes(std::span(words)), "a sky")});
   };
   for (const LightTable::Record& light : lights.records()) {
-    if (light.shape != LightShape::Dome) continue;
+    if (light.sun) take(light.sun);
+    if (!light.sky) continue;
     take(light.texture);
     take(light.sky);
   }
@@ -302,7 +311,8 @@ gpu::Instance GpuScene::instance_of(const MeshInstance& instance, double window)
 
 gpu::Light GpuScene::light_of(const LightTable::Record& light) const {
   gpu::Light result{};
-  if (light.shape == LightShape::Dome) {
+  if (light.sun) result.grid = skies_.at(light.sun.get()).memory.address();
+  if (light.sky) {
     result.patches = skies_.at(light.texture.get()).memory.address();
     result.grid = skies_.at(light.sky.get()).memory.address();
   }

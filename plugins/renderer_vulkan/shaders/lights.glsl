@@ -42,12 +42,12 @@ float tree_score(uint block, uint lane, Receiver receiver) {
   return lane_number(block, 4u, lane) * at_receiver * at_light * scale * scale;
 }
 
-// Of a sky: low corner, cells per metre, counts, then per cell its power and 129 borders.
+// Of a sky: low corner, cells per metre, counts, the cells' powers, then 129 borders of each. Of a
+// distant light: the same with shares, and no borders.
 const uint kPatches = 128u;
-const uint kCellWords = kPatches + 2u;
 const uint kFirstCell = 9u;
 
-uint sky_cell(Uints grid, vec3 position) {
+uint grid_cell(Uints grid, vec3 position) {
   uvec3 place;
   for (int k = 0; k < 3; ++k) {
     const float x = (position[k] - uintBitsToFloat(grid.v[k])) * uintBitsToFloat(grid.v[3 + k]);
@@ -55,8 +55,13 @@ uint sky_cell(Uints grid, vec3 position) {
   }
   return (place.z * grid.v[7] + place.y) * grid.v[6] + place.x;
 }
-float sky_power(Uints grid, uint cell) {
-  return uintBitsToFloat(grid.v[kFirstCell + cell * kCellWords]);
+// Of a sky its power there, of a distant light the share of the cell that sees it.
+float seen_of(Uints grid, vec3 position) {
+  return uintBitsToFloat(grid.v[kFirstCell + grid_cell(grid, position)]);
+}
+uint first_border(Uints grid, vec3 position) {
+  return kFirstCell + grid.v[6] * grid.v[7] * grid.v[8] +
+         grid_cell(grid, position) * (kPatches + 1u);
 }
 float border(Uints words, uint first, uint i) { return uintBitsToFloat(words.v[first + i]); }
 
@@ -76,11 +81,9 @@ uint interval_of(Uints words, uint first, uint count, float u) {
 }
 
 float score_of_surroundings(uint light, Receiver receiver) {
-  const float power = world.lights.v[light].power;
-  if (world.lights.v[light].shape == kDome) {
-    Uints grid = world.lights.v[light].grid;
-    return power * sky_power(grid, sky_cell(grid, receiver.position));
-  }
+  Uints grid = world.lights.v[light].grid;
+  const float power = world.lights.v[light].power * seen_of(grid, receiver.position);
+  if (world.lights.v[light].shape == kDome) return power;
   const float kFloor = 0.1;
   const float size = world.lights.v[light].one_minus_cos;
   const float reach = sqrt(size * (2.0 - size)) + 1e-3;
@@ -276,7 +279,7 @@ void sample_triangles(uint light, vec3 from, vec2 u, inout LightSample s) {
 
 void sample_dome(uint light, vec3 from, vec2 u, inout LightSample s) {
   Uints grid = world.lights.v[light].grid;
-  const uint first = kFirstCell + sky_cell(grid, from) * kCellWords + 1u;
+  const uint first = first_border(grid, from);
   const uint sky_patch = interval_of(grid, first, kPatches, u.x);
   const float begin = border(grid, first, sky_patch);
   const float share = border(grid, first, sky_patch + 1u) - begin;
@@ -386,7 +389,7 @@ float intersect_light(uint light, vec3 from, vec3 direction, float t_min, float 
     const uint at = cell_of(within.y, patches.v[k + 1u]) * width + cell_of(within.x, width);
     const float density = uintBitsToFloat(patches.v[patches.v[k + 2u] + at]) * per_solid_angle(sine);
     Uints grid = world.lights.v[light].grid;
-    const uint first = kFirstCell + sky_cell(grid, from) * kCellWords + 1u;
+    const uint first = first_border(grid, from);
     radiance = dome_radiance(light, p);
     return density * (border(grid, first, sky_patch + 1u) - border(grid, first, sky_patch));
   }

@@ -129,7 +129,7 @@ const uint kLightVisible = 4u;
 struct Light {
   Vec4s triangles;  // three each: corner and number, edge and area up to its end, edge
   Uints patches;    // of a dome: see patch_sample()
-  Uints grid;       // of a dome: see sky_cell()
+  Uints grid;       // of a dome or distant light: see grid_cell()
   vec3 position;
   vec3 axis_x;
   vec3 axis_y;

@@ -2,10 +2,13 @@
 #include "renderer_support/light_samples.h"
 
 #include <cmath>
+#include <memory>
+#include <span>
 #include <vector>
 
 #include "diorama/rng.h"
 #include "support/catch.h"
+#include "support/render_host/render_host.h"
 
 namespace diorama {
 namespace {
@@ -217,6 +220,52 @@ TEST_CASE("lights are chosen as often as their probability says", "[lights]") {
     total += double(choice_probability(lights, i, receiver));
   }
   CHECK(total == Approx(1.0).epsilon(1e-4));
+}
+
+TEST_CASE("a distant light is chosen where it is seen", "[lights]") {
+  Light sun;
+  sun.kind = LightKind::Distant;
+  sun.angle_rad = 0.01;
+  sun.color = Vec3f::Constant(300.0f);
+  Light sky;
+  sky.kind = LightKind::Dome;
+  LightTable lights;
+  for (const Light& light : {sun, sky}) lights.add(light, pose(), white_sky());
+  lights.finish();
+  test::RenderHost host(2);
+  const Aabb bounds{Vec3(-3, -3, -1.5), Vec3(3, 3, 1.5)};
+  const auto sees = [](std::span<const SkyGrid::Ray> rays) {
+    std::uint32_t lit = 0;
+    for (std::size_t i = 0; i < rays.size(); ++i) lit |= std::uint32_t(rays[i].origin.x() > 0) << i;
+    return lit;
+  };
+  lights.learn_surroundings(
+      [](const std::shared_ptr<const DomeTexture>& dome, const Eigen::Matrix3f&) {
+        return std::make_shared<const SkyGrid>(*dome);
+      },
+      [&](const Vec3f& towards, float one_minus_cos) {
+        CHECK((towards + lights.records()[0].direction).norm() < 1e-6f);
+        return std::make_shared<const SunGrid>(towards, one_minus_cos, bounds, sees, host);
+      });
+  const Vec3f facing = -lights.records()[0].direction;
+  const auto probability = [&](float x) {
+    Receiver receiver{Vec3f(x, 0.4f, 0.2f), facing, false, 0.0f};
+    constexpr int kSamples = 20000;
+    int suns = 0;
+    for (int i = 0; i < kSamples; ++i) {
+      const Chosen chosen = choose(lights, receiver, (float(i) + 0.5f) / kSamples);
+      suns += chosen.light == 0 ? 1 : 0;
+      CHECK(chosen.probability ==
+            Approx(choice_probability(lights, chosen.light, receiver)).epsilon(1e-4));
+    }
+    const double told = double(choice_probability(lights, 0, receiver));
+    CHECK(double(suns) / kSamples == Approx(told).margin(1e-3));
+    return told;
+  };
+  // Of a white sky all around, 4 pi.
+  CHECK(probability(2.0f) == Approx(300.0 / (300.0 + 4.0 * kPi)).epsilon(0.02));
+  const double unseen = 300.0 * double(CellGrid::kUnseenShare);
+  CHECK(probability(-2.0f) == Approx(unseen / (unseen + 4.0 * kPi)).epsilon(0.02));
 }
 
 TEST_CASE("places that ask together get the lights that they get alone", "[lights]") {

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
+#include <cmath>
 #include <functional>
 #include <span>
 #include <tuple>
@@ -13,6 +15,7 @@
 #include "renderer_support/microfacet.h"
 #include "renderer_support/sky_grid.h"
 #include "renderer_support/sobol.h"
+#include "renderer_support/sun_grid.h"
 #include "support/catch.h"
 #include "support/render_host/render_host.h"
 
@@ -113,9 +116,10 @@ TEST_CASE("a dome is sampled as bright as it is", "[sampling]") {
     return lit;
   };
   const SkyGrid part(dome, Eigen::Matrix3f::Identity(), bounds, sees, host);
-  CHECK(part.power(part.cell(Vec3f(-1, 0, 0))) < 0.4f * part.power(part.cell(Vec3f(1, 0, 0))));
+  CHECK(part.power(part.grid().cell(Vec3f(-1, 0, 0))) <
+        0.4f * part.power(part.grid().cell(Vec3f(1, 0, 0))));
   for (const SkyGrid* grid : {&everything, &part}) {
-    const std::uint32_t cell = grid->cell(Vec3f(-1.0f, 0.5f, 1.0f));
+    const std::uint32_t cell = grid->grid().cell(Vec3f(-1.0f, 0.5f, 1.0f));
     const auto draw = [&](const Vec2f& u) {
       const SkyGrid::Choice choice = grid->choose(cell, u.x());
       const DomeTexture::Draw d = dome.sample(choice.patch, {choice.rest, u.y()});
@@ -171,7 +175,7 @@ TEST_CASE("a room's cells know what they see through its window", "[sampling]") 
   for (int i = 0; i < 400; ++i) {
     const Vec3f place(float(rng.uniform(0.0, 5.0)), float(rng.uniform(0.0, 4.0)),
                       float(rng.uniform(0.0, 3.0)));
-    const std::uint32_t cell = grid.cell(place);
+    const std::uint32_t cell = grid.grid().cell(place);
     std::array<double, DomeTexture::kPatches> light{};
     double sum = 0.0;
     for (int patch = 0; patch < DomeTexture::kPatches; ++patch) {
@@ -194,6 +198,35 @@ TEST_CASE("a room's cells know what they see through its window", "[sampling]") 
   }
   CHECK(all > 100.0);
   CHECK(unexpected < 0.02 * all);
+}
+
+TEST_CASE("a room's cells know from which share of them the sun is seen", "[sampling]") {
+  test::RenderHost host(2);
+  const Vec3f towards = Vec3f(0.3f, -0.2f, 0.9f).normalized();
+  // Twelve cells along x and y, six along z. The sun shines on what lies beyond x = 2.05.
+  const Aabb bounds{Vec3(0, 0, 0), Vec3(6, 4.8, 3)};
+  std::atomic<std::size_t> asked = 0;
+  std::atomic<bool> is_off = false;
+  const auto sees = [&](std::span<const SkyGrid::Ray> rays) {
+    std::uint32_t lit = 0;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      ++asked;
+      is_off = is_off || rays[i].direction.dot(towards) < std::cos(0.1f) - 1e-5f;
+      lit |= std::uint32_t(rays[i].origin.x() > 2.05f) << i;
+    }
+    return lit;
+  };
+  const SunGrid grid(towards, 1.0f - std::cos(0.1f), bounds, sees, host);
+  CHECK_FALSE(is_off);
+  CHECK(asked < 12u * 12u * 6u * 130u);  // most cells agree with those around
+  const auto share = [&](float x) { return grid.share(Vec3f(x, 2.0f, 1.0f)); };
+  CHECK(share(5.0f) == 1.0f);
+  CHECK(share(2.1f) == Approx(0.9f).margin(0.06));
+  CHECK(share(2.4f) == share(2.01f));                       // of one cell
+  CHECK(share(1.8f) == Approx(0.2f * 0.9f).margin(0.012));  // a neighbour sees it
+  CHECK(share(1.2f) == CellGrid::kUnseenShare);
+  CHECK(share(-7.0f) == share(0.1f));  // outside is as the nearest cell
+  CHECK(SunGrid().share(Vec3f(3, 4, 5)) == 1.0f);
 }
 
 TEST_CASE("points of a triangle are spread evenly", "[sampling]") {
