@@ -93,24 +93,50 @@ void average_chances(FilmPixel& pixel, const Image<SeenByChance>& before, int x,
   pixel.surface_share += share * (sum.surfaces / sum.share - pixel.surface_share);
 }
 
+/// By rows: 1 where a pixel or one beside it shows light directly.
+std::vector<std::uint8_t> beside_lights(const Film& film, Host& host) {
+  const auto width = std::size_t(film.width());
+  std::vector<std::uint8_t> shine(width * std::size_t(film.height()));
+  host.parallel_for(std::size_t(film.height()), [&](std::size_t y) {
+    for (std::size_t x = 0; x < width; ++x) {
+      shine[y * width + x] = luminance(film.at(int(x), int(y)).seen) != 0.0f ? 1 : 0;
+    }
+  });
+  std::vector<std::uint8_t> beside(shine.size());
+  host.parallel_for(std::size_t(film.height()), [&](std::size_t y) {
+    const std::size_t last = std::min(y + 2, std::size_t(film.height()));
+    for (std::size_t v = y > 0 ? y - 1 : 0; v < last; ++v) {
+      for (std::size_t x = 0; x < width; ++x) {
+        const std::size_t left = x > 0 ? x - 1 : x;
+        const std::size_t right = std::min(x + 1, width - 1);
+        beside[y * width + x] |=
+            shine[v * width + left] | shine[v * width + x] | shine[v * width + right];
+      }
+    }
+  });
+  return beside;
+}
+
 /// Gives the picture the mean that it had with its noise, as far as that noise lets it be known.
-/// What is seen directly stays.
+/// What is seen directly stays, and what is beside it says nothing: edges of lamps, which are
+/// thousands of times as bright, are smoothed.
 void rebalance(Image<Vec3f>& image, const Film& film, Host& host) {
   struct Sums {
     double before = 0.0;
     double after = 0.0;
     double variance = 0.0;
   };
+  const std::vector<std::uint8_t> is_beside_light = beside_lights(film, host);
   std::vector<Sums> rows(std::size_t(image.height()));
   host.parallel_for(rows.size(), [&](std::size_t row) {
     const int y = int(row);
     Sums sums;
     for (int x = 0; x < image.width(); ++x) {
+      if (is_beside_light[row * std::size_t(image.width()) + std::size_t(x)] != 0) continue;
       const FilmPixel& pixel = film.at(x, y);
-      const float light = finite(luminance(pixel.seen + pixel.scattered));
-      const float seen = luminance(finite(pixel.seen));
-      sums.before += double(light - seen);
-      sums.after += double(finite(luminance(image.at(x, y))) - seen);
+      const float light = finite(luminance(pixel.scattered));
+      sums.before += double(light);
+      sums.after += double(finite(luminance(image.at(x, y))));
       // Of a single path nobody knows.
       sums.variance += double(pixel.count > 1.5f ? std::max(0.0f, finite(pixel.variance))
                                                  : finite(light * light));

@@ -270,11 +270,14 @@ def denoised(film, logits):
 
 
 def rebalanced(picture, film, raw):
-    """With the mean of the undenoised picture, as far as its noise lets that be known."""
+    """With the mean of the undenoised picture, as far as its noise lets that be known. What is
+    beside light that is seen directly says nothing: its edges are smoothed."""
+    shines = (luminance(film.seen) != 0.0).float()
+    counts = 1.0 - F.max_pool2d(shines, 3, 1, 1)
     scattered = luminance(raw[:, 3:6])
-    before = scattered.mean((1, 2, 3))
-    after = luminance(picture - film.seen).mean((1, 2, 3)).clamp(min=1e-12)
-    variance = (raw[:, 13:14] ** 2).mean((1, 2, 3)) / scattered[0].numel()
+    before = (counts * scattered).sum((1, 2, 3))
+    after = (counts * luminance(picture)).sum((1, 2, 3)).clamp(min=1e-12)
+    variance = (counts * raw[:, 13:14] ** 2).sum((1, 2, 3))
     uncertain = variance / (before * before).clamp(min=1e-12)
     trust = PRIOR_BIAS**2 / (PRIOR_BIAS**2 + uncertain)
     gain = 1.0 + trust * ((before / after).clamp(0.5, 2.0) - 1.0)

@@ -116,6 +116,39 @@ TEST_CASE("pictures of few paths keep their light, however skewed its noise", "[
         Approx(before).epsilon(0.005));
 }
 
+TEST_CASE("smooth edges of a lamp do not make what is around brighter", "[denoiser]") {
+  // Every pixel of the lamp's rim has a share of it by chance, as few paths find it.
+  Rng rng(6);
+  Film film = wall(96, 96, 2, [&](int, int) { return float(rng.uniform(0.2, 1.8)); });
+  for (int y = 0; y < film.height(); ++y) {
+    for (int x = 0; x < film.width(); ++x) {
+      const double away = std::hypot(x - 48, y - 48);
+      const double share = std::clamp(5.5 - away, 0.0, 1.0);
+      if (share == 0.0) continue;
+      const float lamp =
+          share == 1.0 ? 1.0f : 0.5f * float((rng.uniform() < share) + (rng.uniform() < share));
+      FilmPixel& pixel = film.at(x, y);
+      pixel.seen = Vec3f::Constant(lamp * 800.0f);
+      pixel.scattered *= 1.0f - lamp;
+      pixel.variance *= (1.0f - lamp) * (1.0f - lamp);
+      pixel.albedo *= 1.0f - lamp;
+      pixel.surface_share *= 1.0f - lamp;
+    }
+  }
+  test::RenderHost host(2);
+  const Image<Vec3f> clean = denoised(std::move(film), {Vec3f(1.0f, 1.0f, 3.0f)}, Isa::Sse2, host);
+  double sum = 0.0;
+  int count = 0;
+  for (int y = 0; y < clean.height(); ++y) {
+    for (int x = 0; x < clean.width(); ++x) {
+      if (std::hypot(x - 48, y - 48) < 8.0) continue;
+      sum += double(clean.at(x, y).x());
+      ++count;
+    }
+  }
+  CHECK(sum / count == Approx(1.0).epsilon(0.01));
+}
+
 TEST_CASE("one chance find among quiet neighbours is tamed", "[denoiser]") {
   test::RenderHost host(1);
   // Planes know it by its neighbours, the network by the limit of a path.
