@@ -672,7 +672,7 @@ void PathTracer::light(std::span<const SurfaceParts::Point> places, std::uint32_
       light.flat_normal = places[numbers[i]].normal;
       light.normal = v.normal.at(i);
       light.to_light = v.lights.direction.at(i);
-      light.is_by_lamp = scene_.lights().records()[std::uint32_t(v.lights.light[i])].is_body();
+      light.is_by_small_light = scene_.lights().is_small_light(v.lights.place(i));
       light.bsdf = *v.bsdf[i];
     }
   }

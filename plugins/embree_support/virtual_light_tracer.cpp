@@ -76,7 +76,7 @@ std::vector<VirtualLightTracer::Trial> VirtualLightTracer::trials(RayCounts& cou
     if (!(light.irradiance.maxCoeff() > 0.0f)) return;
     const float brightness = luminance(light.mean_radiance());
     trials[i] = {light.position, light.flat_normal, brightness,
-                 light.is_by_lamp ? brightness : 0.0f};
+                 light.is_by_small_light ? brightness : 0.0f};
   });
   return trials;
 }
@@ -163,7 +163,7 @@ void VirtualLightTracer::find_shares(RayCounts& counts) {
   const std::size_t size = parts_.count();
   std::vector<double> power(size, 0.0);   // by brightness and area
   std::vector<double> useful(size, 0.0);  // ... and by who sees it
-  std::vector<double> of_lamps(size, 0.0);
+  std::vector<double> of_small_lights(size, 0.0);
   const std::size_t chunks = (size + kChunk - 1) / kChunk;
   host_.parallel_for(chunks, [&](std::size_t chunk) {
     const std::size_t end = std::min(size, (chunk + 1) * kChunk);
@@ -171,9 +171,9 @@ void VirtualLightTracer::find_shares(RayCounts& counts) {
       const Trial* own = &tried[side * kTrials];
       for (std::size_t k = 0; k < kTrials; ++k) {
         power[side] += double(own[k].brightness);
-        of_lamps[side] += double(own[k].by_lamps);
+        of_small_lights[side] += double(own[k].by_small_lights);
       }
-      of_lamps[side] /= std::max(power[side], 1e-30);
+      of_small_lights[side] /= std::max(power[side], 1e-30);
       power[side] *= parts_.area(side);
       if (!(power[side] > 0.0) || seen_from.empty()) continue;
       const double offset = double(unit_fraction(mix_bits(seed_ ^ mix_bits(side))));
@@ -192,11 +192,11 @@ void VirtualLightTracer::find_shares(RayCounts& counts) {
   for (std::size_t side = 0; side < size; ++side) {
     all_power += power[side];
     all_useful += useful[side];
-    lamps_share_ += useful[side] * of_lamps[side];
+    small_lights_share_ += useful[side] * of_small_lights[side];
   }
   shares_.assign(size, 0.0);
   if (!(all_useful > 0.0)) return;
-  lamps_share_ /= all_useful;
+  small_lights_share_ /= all_useful;
   for (std::size_t side = 0; side < size; ++side) {
     shares_[side] =
         (1.0 - kUnseenShare) * useful[side] / all_useful + kUnseenShare * power[side] / all_power;
@@ -218,9 +218,9 @@ double VirtualLightTracer::lit_share() const {
 }
 
 bool VirtualLightTracer::are_worth_it() const {
-  constexpr double kLeastOfLamps = 0.1;
+  constexpr double kLeastOfSmallLights = 0.1;
   constexpr double kMostLit = 0.01;
-  return lamps_share_ > kLeastOfLamps && lit_share() < kMostLit;
+  return small_lights_share_ > kLeastOfSmallLights && lit_share() < kMostLit;
 }
 
 VirtualLights VirtualLightTracer::lights(std::size_t count, std::uint64_t set,
@@ -265,7 +265,7 @@ std::unique_ptr<VirtualLightSets> VirtualLightSets::for_picture(const EmbreeScen
                                                                 Host& host, RayCounts& counts) {
   const std::uint64_t paths = plan.path_count();
   const bool is_possible = settings.has_virtual_lights && !view.has_shutter();
-  if (!is_possible || scene.lights().bodies().empty() || paths < kLeastPaths) return nullptr;
+  if (!is_possible || !scene.lights().has_small_lights() || paths < kLeastPaths) return nullptr;
   TraceSettings own;
   static_cast<PathSettings&>(own) = settings;
   own.host = &host;

@@ -21,8 +21,8 @@ class VirtualLightTracer {
   VirtualLightTracer(const EmbreeScene& scene, const View& view, const PathTracer& tracer,
                      const SurfaceParts& parts, std::uint64_t seed, Host& host, RayCounts& counts);
 
-  /// Whether they take away more noise than they take time: where lamps light a few places that
-  /// paths find seldom (measured).
+  /// Whether they take away more noise than they take time: where lamps or a sun light a few places
+  /// that paths find seldom (measured).
   bool are_worth_it() const;
   /// About so many, the dark ones among them left out; other ones for every `set`. Adds to
   /// `counts`.
@@ -38,7 +38,7 @@ class VirtualLightTracer {
     Vec3f position = Vec3f::Zero();
     Vec3f normal = Vec3f::UnitZ();
     float brightness = 0.0f;
-    float by_lamps = 0.0f;  ///< Of the brightness.
+    float by_small_lights = 0.0f;  ///< Of the brightness.
   };
   template <class Take>
   void light(const std::vector<std::uint32_t>& sides, std::uint64_t purpose, RayCounts& counts,
@@ -57,8 +57,8 @@ class VirtualLightTracer {
   const SurfaceParts& parts_;
   std::uint64_t seed_;
   Host& host_;
-  std::vector<double> shares_;  ///< Of the lights, by the parts' sides.
-  double lamps_share_ = 0.0;    ///< Of what they shine: the rest comes from the sky.
+  std::vector<double> shares_;       ///< Of the lights, by the parts' sides.
+  double small_lights_share_ = 0.0;  ///< Of what they shine: the rest comes from the sky.
 };
 
 /// The virtual lights of a picture's rounds.

@@ -137,7 +137,11 @@ DomeTexture::DomeTexture(const Texture& source) : image_(source, kColumns * kMos
     for (const float weight : weights) power += weight * cell;
     patches_.push_back(smallest_table(std::move(weights), per_patch_x, per_patch_y));
     patch_power_.push_back(power);
+    mean_luminance_ += power / (4.0f * kPiF);
   }
+  // Cells are larger than it.
+  constexpr float kInCell = 0.25f;
+  has_sun_ = *std::max_element(cells.begin(), cells.end()) > kInCell * kSun * mean_luminance_;
 }
 
 std::shared_ptr<DomeCache> DomeCache::shared() {

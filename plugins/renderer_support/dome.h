@@ -71,6 +71,12 @@ class DomeTexture {
   const std::vector<SquareDistribution>& patches() const { return patches_; }
   /// Luminance times solid angle of a patch.
   float patch_power(int patch) const { return patch_power_[std::size_t(patch)]; }
+  /// Whether a small part of it is far brighter than the whole, ...
+  bool has_sun() const { return has_sun_; }
+  /// ... and whether it is there.
+  bool is_sun(const Vec2f& place) const {
+    return luminance(radiance_at(place)) > kSun * mean_luminance_;
+  }
 
   struct Draw {
     Vec2f place;           ///< In the image.
@@ -101,6 +107,8 @@ class DomeTexture {
   }
 
  private:
+  /// Of its mean; clouds beside the sun have some 30 times as much.
+  static constexpr float kSun = 300.0f;
   /// See Towards; finite at the poles.
   static float per_solid_angle(float sine) {
     return float(kPatches) / (2.0f * kPiF * kPiF * std::max(1e-4f, sine));
@@ -109,6 +117,8 @@ class DomeTexture {
   MipTexture image_;
   std::vector<SquareDistribution> patches_;
   std::vector<float> patch_power_;
+  float mean_luminance_ = 0.0f;
+  bool has_sun_ = false;
 };
 
 /// Domes of images, for all renderers of the process: visits that go on side by side show the same

@@ -29,6 +29,12 @@ void LightTable::finish() {
   entry_lights_.insert(entry_lights_.end(), surroundings_.begin(), surroundings_.end());
 }
 
+bool LightTable::has_small_lights() const {
+  return std::any_of(records_.begin(), records_.end(), [](const Record& light) {
+    return light.shape != LightShape::Dome || light.texture->has_sun();
+  });
+}
+
 void LightTable::Columns::add(const Record& light) {
   shape.push_back(std::int32_t(light.shape));
   for (int k = 0; k < 3; ++k) {

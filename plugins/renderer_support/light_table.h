@@ -113,6 +113,12 @@ class LightTable {
   std::size_t count() const { return records_.size(); }
 
   const std::vector<Record>& records() const { return records_; }
+  /// Lamps and suns, also those in the picture of a sky.
+  bool has_small_lights() const;
+  bool is_small_light(const LightPlace& place) const {
+    const Record& light = records_[place.light];
+    return light.shape != LightShape::Dome || light.texture->is_sun(place.place);
+  }
   const Columns& columns() const { return columns_; }
   /// Over the bodies.
   const LightTree& tree() const { return tree_; }

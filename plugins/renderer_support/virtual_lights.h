@@ -27,7 +27,7 @@ class VirtualLights {
     Vec3f normal = Vec3f::UnitZ();       ///< The same for shading.
     Vec3f to_light = Vec3f::UnitZ();     ///< Where its own light comes from, unit.
     Vec3f irradiance = Vec3f::Zero();    ///< Of a surface that faces it.
-    bool is_by_lamp = false;             ///< Not by the sky, or another light without a place.
+    bool is_by_small_light = false;      ///< A lamp or a sun, not the sky around.
     SurfaceBsdf bsdf;
 
     /// What it scatters if all its lobes were diffuse.
