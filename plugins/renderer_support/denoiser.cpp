@@ -93,73 +93,103 @@ void average_chances(FilmPixel& pixel, const Image<SeenByChance>& before, int x,
   pixel.surface_share += share * (sum.surfaces / sum.share - pixel.surface_share);
 }
 
-/// By rows: 1 where a pixel or one beside it shows light directly.
-std::vector<std::uint8_t> beside_lights(const Film& film, Host& host) {
+/// Which light a pixel and those beside it show directly.
+enum class Lights : std::uint8_t { None, Even, Edge };
+
+std::vector<Lights> lights_seen(const Film& film, Host& host) {
   const auto width = std::size_t(film.width());
-  std::vector<std::uint8_t> shine(width * std::size_t(film.height()));
-  host.parallel_for(std::size_t(film.height()), [&](std::size_t y) {
+  const auto height = std::size_t(film.height());
+  std::vector<float> light(width * height);
+  host.parallel_for(height, [&](std::size_t y) {
     for (std::size_t x = 0; x < width; ++x) {
-      shine[y * width + x] = luminance(film.at(int(x), int(y)).seen) != 0.0f ? 1 : 0;
+      light[y * width + x] = finite(luminance(film.at(int(x), int(y)).seen));
     }
   });
-  std::vector<std::uint8_t> beside(shine.size());
-  host.parallel_for(std::size_t(film.height()), [&](std::size_t y) {
-    const std::size_t last = std::min(y + 2, std::size_t(film.height()));
-    for (std::size_t v = y > 0 ? y - 1 : 0; v < last; ++v) {
+  std::vector<Lights> seen(light.size());
+  host.parallel_for(height, [&](std::size_t y) {
+    const float* rows[] = {&light[(y > 0 ? y - 1 : y) * width], &light[y * width],
+                           &light[std::min(y + 1, height - 1) * width]};
+    std::vector<float> least(rows[1], rows[1] + width);
+    std::vector<float> most = least;
+    for (const float* row : {rows[0], rows[2]}) {
       for (std::size_t x = 0; x < width; ++x) {
-        const std::size_t left = x > 0 ? x - 1 : x;
-        const std::size_t right = std::min(x + 1, width - 1);
-        beside[y * width + x] |=
-            shine[v * width + left] | shine[v * width + x] | shine[v * width + right];
+        least[x] = std::min(least[x], row[x]);
+        most[x] = std::max(most[x], row[x]);
       }
     }
+    for (std::size_t x = 0; x < width; ++x) {
+      const std::size_t left = x > 0 ? x - 1 : x;
+      const std::size_t right = std::min(x + 1, width - 1);
+      const float low = std::min(least[x], std::min(least[left], least[right]));
+      const float high = std::max(most[x], std::max(most[left], most[right]));
+      seen[y * width + x] = high == 0.0f ? Lights::None : low == high ? Lights::Even : Lights::Edge;
+    }
   });
-  return beside;
+  return seen;
 }
 
-/// Gives the picture the mean that it had with its noise, as far as that noise lets it be known.
-/// What is seen directly stays, and what is beside it says nothing: edges of lamps, which are
-/// thousands of times as bright, are smoothed.
-void rebalance(Image<Vec3f>& image, const Film& film, Host& host) {
-  struct Sums {
-    double before = 0.0;
-    double after = 0.0;
-    double variance = 0.0;
-  };
-  const std::vector<std::uint8_t> is_beside_light = beside_lights(film, host);
-  std::vector<Sums> rows(std::size_t(image.height()));
-  host.parallel_for(rows.size(), [&](std::size_t row) {
-    const int y = int(row);
-    Sums sums;
-    for (int x = 0; x < image.width(); ++x) {
-      if (is_beside_light[row * std::size_t(image.width()) + std::size_t(x)] != 0) continue;
-      const FilmPixel& pixel = film.at(x, y);
-      const float light = finite(luminance(pixel.scattered));
-      sums.before += double(light);
-      sums.after += double(finite(luminance(image.at(x, y))));
-      // Of a single path nobody knows.
-      sums.variance += double(pixel.count > 1.5f ? std::max(0.0f, finite(pixel.variance))
-                                                 : finite(light * light));
-    }
-    rows[row] = sums;
-  });
-  Sums all;
-  for (const Sums& row : rows) {
-    all.before += row.before;
-    all.after += row.after;
-    all.variance += row.variance;
+/// Of pixels, with noise and without.
+struct Sums {
+  double before = 0.0;
+  double after = 0.0;
+  double variance = 0.0;
+
+  void add(const Sums& other) {
+    before += other.before;
+    after += other.after;
+    variance += other.variance;
   }
-  if (!(all.before > 0.0 && all.after > 0.0)) return;
-  const double uncertain = all.variance / (all.before * all.before);
-  const double trust = kPriorBias * kPriorBias / (kPriorBias * kPriorBias + uncertain);
-  const double wanted = std::clamp(all.before / all.after, 1.0 / kMostReturned, kMostReturned);
-  const auto gain = float(1.0 + trust * (wanted - 1.0));
-  host.parallel_for(rows.size(), [&](std::size_t row) {
-    const int y = int(row);
-    for (int x = 0; x < image.width(); ++x) {
-      Vec3f& color = image.at(x, y);
-      const Vec3f seen = finite(film.at(x, y).seen).cwiseMin(color);
-      color = seen + gain * (color - seen);
+  /// Which gives the mean back, as far as noise lets it be known.
+  float gain() const {
+    if (!(before > 0.0 && after > 0.0)) return 1.0f;
+    const double uncertain = variance / (before * before);
+    const double trust = kPriorBias * kPriorBias / (kPriorBias * kPriorBias + uncertain);
+    const double wanted = std::clamp(before / after, 1.0 / kMostReturned, kMostReturned);
+    return float(1.0 + trust * (wanted - 1.0));
+  }
+};
+
+/// Gives the picture the mean that it had with its noise, as far as that noise lets it be known.
+/// What is seen directly stays. Its edges, which are smoothed, have a mean of their own: lamps are
+/// thousands of times as bright as what is around.
+void rebalance(Image<Vec3f>& image, const Film& film, Host& host) {
+  const std::vector<Lights> seen = lights_seen(film, host);
+  const auto width = std::size_t(image.width());
+  struct Row {
+    Sums surfaces;
+    Sums edges;
+  };
+  std::vector<Row> rows(std::size_t(image.height()));
+  host.parallel_for(rows.size(), [&](std::size_t y) {
+    for (std::size_t x = 0; x < width; ++x) {
+      const Lights lights = seen[y * width + x];
+      if (lights == Lights::Even) continue;
+      const FilmPixel& pixel = film.at(int(x), int(y));
+      const float light = finite(luminance(pixel.seen + pixel.scattered));
+      // Of a single path nobody knows.
+      const float variance =
+          pixel.count > 1.5f ? std::max(0.0f, finite(pixel.variance)) : finite(light * light);
+      Sums& sums = lights == Lights::Edge ? rows[y].edges : rows[y].surfaces;
+      sums.add(
+          {double(light), double(finite(luminance(image.at(int(x), int(y))))), double(variance)});
+    }
+  });
+  Row all;
+  for (const Row& row : rows) {
+    all.surfaces.add(row.surfaces);
+    all.edges.add(row.edges);
+  }
+  const float of_surfaces = all.surfaces.gain();
+  const float of_edges = all.edges.gain();
+  host.parallel_for(rows.size(), [&](std::size_t y) {
+    for (std::size_t x = 0; x < width; ++x) {
+      Vec3f& color = image.at(int(x), int(y));
+      if (seen[y * width + x] == Lights::Edge) {
+        color *= of_edges;
+        continue;
+      }
+      const Vec3f shone = finite(film.at(int(x), int(y)).seen).cwiseMin(color);
+      color = shone + of_surfaces * (color - shone);
     }
   });
 }

@@ -270,19 +270,24 @@ def denoised(film, logits):
 
 
 def rebalanced(picture, film, raw):
-    """With the mean of the undenoised picture, as far as its noise lets that be known. What is
-    beside light that is seen directly says nothing: its edges are smoothed."""
-    shines = (luminance(film.seen) != 0.0).float()
-    counts = 1.0 - F.max_pool2d(shines, 3, 1, 1)
-    scattered = luminance(raw[:, 3:6])
-    before = (counts * scattered).sum((1, 2, 3))
-    after = (counts * luminance(picture)).sum((1, 2, 3)).clamp(min=1e-12)
-    variance = (counts * raw[:, 13:14] ** 2).sum((1, 2, 3))
-    uncertain = variance / (before * before).clamp(min=1e-12)
-    trust = PRIOR_BIAS**2 / (PRIOR_BIAS**2 + uncertain)
-    gain = 1.0 + trust * ((before / after).clamp(0.5, 2.0) - 1.0)
+    """With the mean of the undenoised picture, as far as its noise lets that be known. What is seen
+    directly stays; its edges, which are smoothed, have a mean of their own."""
+    shown = luminance(film.seen)
+    most, least = F.max_pool2d(shown, 3, 1, 1), -F.max_pool2d(-shown, 3, 1, 1)
+    light, after = luminance(raw[:, 3:6]) + shown, luminance(picture)
+    variance = raw[:, 13:14] ** 2
+
+    def gain(counts):
+        before = (counts * light).sum((1, 2, 3), keepdim=True)
+        uncertain = (counts * variance).sum((1, 2, 3), keepdim=True) / (before**2).clamp(min=1e-12)
+        trust = PRIOR_BIAS**2 / (PRIOR_BIAS**2 + uncertain)
+        wanted = before / (counts * after).sum((1, 2, 3), keepdim=True).clamp(min=1e-12)
+        return torch.where(before > 0.0, 1.0 + trust * (wanted.clamp(0.5, 2.0) - 1.0), 1.0)
+
+    is_edge = most != least
     seen = torch.minimum(film.seen, picture)
-    return seen + (picture - seen) * gain.view(-1, 1, 1, 1)
+    even = seen + gain((most == 0.0).float()) * (picture - seen)
+    return torch.where(is_edge, gain(is_edge.float()) * picture, even)
 
 
 def denoise(network, raw, paths, exposure):

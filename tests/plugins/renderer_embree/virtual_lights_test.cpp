@@ -201,6 +201,60 @@ TEST_CASE("pictures with virtual lights are the same for every number of threads
   CHECK(picture(true, 3, 4) != one);
 }
 
+TEST_CASE("virtual lights serve rooms that the sun shines into, as a light or in a sky's picture",
+          "[virtual_lights]") {
+  Light sun;
+  sun.kind = LightKind::Distant;
+  sun.angle_rad = 0.01;
+  sun.color = Vec3f::Constant(5000.0f);
+  Texture cloudless;
+  cloudless.width = 512;
+  cloudless.height = 256;
+  cloudless.channels = 3;
+  cloudless.floats.assign(512 * 256 * 3, 1.0f);
+  // A disk of four pixels is nearly overhead.
+  const Vec2f place(0.3f, 0.03f);
+  for (int k = 0; k < 12; ++k) {
+    const int x = int(place.x() * 512.0f) + k / 3 % 2;
+    const int y = int(place.y() * 256.0f) + k / 6;
+    cloudless.floats[std::size_t((y * 512 + x) * 3 + k % 3)] = 1e6f;
+  }
+  const DomeTexture with_sun(cloudless);
+  CHECK(with_sun.has_sun());
+  CHECK(with_sun.is_sun(place + Vec2f::Constant(1e-3f)));
+  CHECK_FALSE(with_sun.is_sun({0.8f, 0.03f}));
+  CHECK_FALSE(with_sun.is_sun({0.3f, 0.5f}));
+  Light sky = test::dome(1.0f);
+  Light sunny = sky;
+  sunny.texture = std::make_shared<const Texture>(std::move(cloudless));
+  const std::vector<std::pair<std::vector<Light>, bool>> skies{
+      {{sky, sun}, true}, {{sunny}, true}, {{sky}, false}};
+  for (const auto& [lights, are_wanted] : skies) {
+    TestWorld world;
+    world.add("floor", make_box(Vec3(4, 4, 0.1)), matte(0.6f), at(0, 0, -1.5));
+    for (int side = 0; side < 4; ++side) {
+      Affine turned(Eigen::AngleAxisd(0.5 * kPi * side, Vec3::UnitZ()));
+      world.add("wall_" + std::to_string(side), make_box(Vec3(4, 0.1, 3)), matte(0.6f),
+                turned * at(0, 2, 0));
+      // What they leave open is 0.5 m wide.
+      world.add("roof_" + std::to_string(side), make_box(Vec3(2.25, 1.75, 0.1)), matte(0.6f),
+                turned * at(-0.875, 1.125, 1.5));
+    }
+    for (const Light& light : lights) world.add(light);
+    const NodeId camera = camera_into(world);
+    RenderHost host(2);
+    EmbreeScene scene(host, {});
+    scene.take(world.scene);
+    CHECK(scene.lights().has_small_lights() == are_wanted);
+    const View view(world.scene, camera);
+    const PathTracer tracer(scene, view, {}, isa_by_name(EmbreeRenderer::Params().isa));
+    const SurfaceParts parts(scene.instances(), 3000);
+    RayCounts rays;
+    const VirtualLightTracer finder(scene, view, tracer, parts, 1, host, rays);
+    CHECK(finder.are_worth_it() == are_wanted);
+  }
+}
+
 TEST_CASE("a room without light has no virtual lights", "[virtual_lights]") {
   TestWorld world;
   world.add("room", inside_out(make_box(Vec3(4, 4, 3))), matte(0.6f));
