@@ -190,6 +190,7 @@ PathSettings PathRenderer::path_settings(const View& view) const {
   if (params_.mode == "real_time") settings.indirect_share = kRealTimeIndirectShare;
   settings.starts_at_centres = starts_at_centres(view);
   settings.ends_in_cache = ends_in_cache();
+  if (is_quick() || ends_in_cache()) settings.continuation = kShortContinuation;
   settings.has_virtual_lights = has_virtual_lights();
   return settings;
 }

@@ -540,8 +540,9 @@ inline void PathTracer::go_on(Batch& v, std::size_t i, const BsdfSample& next, c
   if (path.bounce == 0) path.left_by_first = left;
   // Mirrors seen directly keep all their paths.
   const float first = path.result.has_surface ? settings_.indirect_share : 1.0f;
-  const float survival =
-      path.bounce == 0 ? first : std::min(0.95f, kContinuation * left / path.left_by_first);
+  const float survival = path.bounce == 0
+                             ? first
+                             : std::min(0.95f, settings_.continuation * left / path.left_by_first);
   if (survival < 1.0f) {
     if (v.numbers[Vertices::kRoulette][i] >= survival) return;
     path.throughput *= 1.0f / survival;

@@ -3,6 +3,12 @@
 
 namespace diorama {
 
+// How likely paths go on that are as bright as behind their first surface, at most 0.95. At 1.5 the
+// same error takes 0.89 of the time that it takes at 0.7 (measured); pictures whose paths end soon
+// anyway have as little error in less time at 0.7.
+inline constexpr float kContinuation = 1.5f;
+inline constexpr float kShortContinuation = 0.7f;
+
 /// How the light paths of a picture go, whatever traces them.
 struct PathSettings {
   int max_bounces = 6;  ///< Surfaces after the first that may scatter light.
@@ -14,6 +20,9 @@ struct PathSettings {
   /// Share of the paths that go on behind their first scattering surface, with more weight: less
   /// time for a picture, more noise in its indirect light.
   float indirect_share = 1.0f;
+  /// Survival in Russian roulette is this times the light that is left of that behind the first
+  /// surface.
+  float continuation = kContinuation;
   /// Paths end at their second surface, with light that others found there: see RadianceCache. Far
   /// less noise for a little blur of indirect light.
   bool ends_in_cache = false;
@@ -24,10 +33,6 @@ struct PathSettings {
   /// more than a path per pixel.
   bool starts_at_centres = false;
 };
-
-// Of paths as bright as behind their first surface. Between 0.7 and 1.5 the error for equal time is
-// the same (measured); short paths leave more time for denoised pictures' pixels.
-inline constexpr float kContinuation = 0.7f;
 
 inline constexpr int kMaxStraightPasses = 64;  ///< Straight through cut-outs and panes.
 

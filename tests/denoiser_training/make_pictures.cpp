@@ -60,6 +60,7 @@ class Tracer {
       settings.indirect_share = 0.5f;
     }
     settings.ends_in_cache = pass.ends_in_cache && max_bounces > 1;
+    if (pass.is_real_time || settings.ends_in_cache) settings.continuation = kShortContinuation;
     settings.has_virtual_lights = pass.has_virtual_lights && !pass.is_real_time && max_bounces > 0;
     SamplePlan plan(view.camera().width, view.camera().height, {pass.samples}, seed);
     PictureCounts counts;

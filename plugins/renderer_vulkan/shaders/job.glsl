@@ -102,6 +102,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Job
   float clamp_to;
   uint has_caustics;
   float indirect_share;
+  float continuation;
   float pixel_angle;
   vec3 cache_eye;
   vec3 camera;

@@ -17,7 +17,6 @@ layout(local_size_x = 64) in;
 #include "radiance_cache.glsl"
 #include "append.glsl"
 
-const float kContinuation = 0.7;
 const uint kMostStraightPasses = 64u;
 
 struct Path {
@@ -326,7 +325,7 @@ bool go_on(inout Path path, vec3 weight, float density, float spread, float roul
   if (path.bounce == 0) path.left_by_first = left;
   const float first = has(path, kHasSurface) ? job.indirect_share : 1.0;
   const float survival =
-      path.bounce == 0 ? first : min(0.95, kContinuation * left / path.left_by_first);
+      path.bounce == 0 ? first : min(0.95, job.continuation * left / path.left_by_first);
   if (survival < 1.0) {
     if (roulette >= survival) return false;
     path.throughput *= 1.0 / survival;
