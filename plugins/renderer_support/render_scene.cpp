@@ -360,12 +360,12 @@ void RenderScene::add_emitters(std::uint32_t number, std::size_t slot,
 
 namespace {
 
-/// The one of `kept` that is alike, or a new one; it is added to `used`.
-template <class Cached, class IsAlike, class Make>
-auto grid_of(const std::vector<Cached>& kept, std::vector<Cached>& used, IsAlike&& is_alike,
+/// The one of `kept` with this key, or a new one; it is added to `used`.
+template <class Cached, class Key, class Make>
+auto grid_of(const std::vector<Cached>& kept, std::vector<Cached>& used, const Key& key,
              Make&& make) {
-  const auto it = std::find_if(kept.begin(), kept.end(), is_alike);
-  used.push_back(it != kept.end() ? *it : make());
+  const auto it = std::ranges::find(kept, key, &Cached::key);
+  used.push_back(it != kept.end() ? *it : Cached{key, make()});
   return used.back().grid;
 }
 
@@ -385,26 +385,14 @@ void RenderScene::learn_surroundings(const SkyGrid::Sees& sees) {
   std::vector<CachedSun> suns;
   lights_.learn_surroundings(
       [&](const std::shared_ptr<const DomeTexture>& dome, const Eigen::Matrix3f& world_from_dome) {
-        return grid_of(
-            sky_grids_, skies,
-            [&](const CachedSky& cached) {
-              return cached.dome == dome && cached.world_from_dome == world_from_dome;
-            },
-            [&]() -> CachedSky {
-              return {dome, world_from_dome,
-                      std::make_shared<const SkyGrid>(*dome, world_from_dome, bounds, sees, host_)};
-            });
+        return grid_of(sky_grids_, skies, std::pair(dome, world_from_dome), [&] {
+          return std::make_shared<const SkyGrid>(*dome, world_from_dome, bounds, sees, host_);
+        });
       },
       [&](const Vec3f& towards, float one_minus_cos) {
-        return grid_of(
-            sun_grids_, suns,
-            [&](const CachedSun& cached) {
-              return cached.towards == towards && cached.one_minus_cos == one_minus_cos;
-            },
-            [&]() -> CachedSun {
-              return {towards, one_minus_cos,
-                      std::make_shared<const SunGrid>(towards, one_minus_cos, bounds, sees, host_)};
-            });
+        return grid_of(sun_grids_, suns, std::pair(towards, one_minus_cos), [&] {
+          return std::make_shared<const SunGrid>(towards, one_minus_cos, bounds, sees, host_);
+        });
       });
   sky_grids_ = std::move(skies);
   sun_grids_ = std::move(suns);

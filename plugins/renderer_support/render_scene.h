@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "diorama/host.h"
@@ -91,16 +92,17 @@ class RenderScene {
              clear_materials == other.clear_materials;
     }
   };
-  struct CachedSky {
-    std::shared_ptr<const DomeTexture> dome;
-    Eigen::Matrix3f world_from_dome;
-    std::shared_ptr<const SkyGrid> grid;
+  /// By what it shows of a sky or a distant light.
+  template <class Key, class Grid>
+  struct CachedGrid {
+    Key key;
+    std::shared_ptr<const Grid> grid;
   };
-  struct CachedSun {
-    Vec3f towards;
-    float one_minus_cos = 0.0f;
-    std::shared_ptr<const SunGrid> grid;
-  };
+  /// The dome and world_from_dome.
+  using CachedSky =
+      CachedGrid<std::pair<std::shared_ptr<const DomeTexture>, Eigen::Matrix3f>, SkyGrid>;
+  /// The direction towards it and one_minus_cos.
+  using CachedSun = CachedGrid<std::pair<Vec3f, float>, SunGrid>;
 
   void collect(const Scene& scene, NodeId node, const Affine& world_from_parent, bool is_movable,
                std::vector<Placed>& meshes);

@@ -197,6 +197,17 @@ TextureInput input(std::shared_ptr<const Texture> texture) {
   return result;
 }
 
+/// A scene in Embree's trees, and on the device.
+struct SceneOnDevice {
+  explicit SceneOnDevice(const Scene& source) {
+    meshes.take(source);
+    scene.take(meshes.render_scene());
+  }
+  RenderHost host{2};
+  const PathDevice& device = *test::path_device();
+  EmbreeScene meshes{host, {"sse2", {}}};
+  GpuScene scene{device, host};
+};
 }  // namespace
 
 TEST_CASE("surfaces of every kind look as Embree's", "[vulkan]") {
@@ -324,12 +335,8 @@ TEST_CASE("few connected paths are traced alike after many others", "[vulkan]") 
   if (!test::has_vulkan_device()) return;
   TestWorld world = room_with_shade();
   const NodeId camera = world.add_camera(40, 24, 20.0, Vec3(-0.9, -1.8, 0.7), Vec3(0.1, 0.6, 0));
-  RenderHost host(2);
-  EmbreeScene meshes(host, {"sse2", {}});
-  meshes.take(world.scene);
-  const PathDevice& device = *test::path_device();
-  GpuScene scene(device, host);
-  scene.take(meshes.render_scene());
+  SceneOnDevice both(world.scene);
+  auto& [host, device, meshes, scene] = both;
   const View view(world.scene, camera);
   const PathSettings settings{.max_bounces = 4};
   const PathTracer alone(meshes, view, {settings}, Isa::Sse2);
@@ -971,12 +978,8 @@ TEST_CASE("sums do not depend on how many paths are under way", "[vulkan]") {
   if (!test::has_vulkan_device()) return;
   TestWorld world = room_with(matte(0.7f));
   const NodeId camera = camera_into(world);
-  RenderHost host(2);
-  EmbreeScene meshes(host, {"sse2", {}});
-  meshes.take(world.scene);
-  const PathDevice& device = *test::path_device();
-  GpuScene scene(device, host);
-  scene.take(meshes.render_scene());
+  SceneOnDevice both(world.scene);
+  auto& [host, device, meshes, scene] = both;
   const View view(world.scene, camera);
   const auto sums = [&](std::uint32_t most_slots) {
     GpuPathTracer tracer(device, host, most_slots);
@@ -1104,12 +1107,8 @@ TEST_CASE("caches learn the same and paths end in them alike on the device", "[v
   glass.roughness = 0.0f;
   world.add("glass", make_sphere(0.3, 32), glass, at(0.0, -0.2, -0.5));
   const NodeId camera = world.add_camera(67, 35, 28.0, Vec3(-0.6, -1.8, 0.3), Vec3(0.1, 0.5, -0.7));
-  RenderHost host(2);
-  EmbreeScene meshes(host, {"sse2", {}});
-  meshes.take(world.scene);
-  const PathDevice& device = *test::path_device();
-  GpuScene scene(device, host);
-  scene.take(meshes.render_scene());
+  SceneOnDevice both(world.scene);
+  auto& [host, device, meshes, scene] = both;
   const View view(world.scene, camera);
   SamplePlan plan(67, 35, {32}, 9);
   const std::vector<TraceJob> learning = plan.learning_jobs();
