@@ -37,7 +37,8 @@ constexpr std::array<float, Network::kFeatures> kLogScales{
 
 constexpr float kMinAlbedo = 0.02f;
 constexpr float kSmallest = 1e-6f;
-constexpr float kLargestLogit = 30.0f;
+constexpr float kLargestLogit = 30.0f;    // of shares
+constexpr float kLeastExponent = -80.0f;  // of a tap's weight beside the largest
 // Of the paths of one pixel: what so many may bring each, one of more may bring for all of them.
 constexpr float kLimitedPaths = 16.0f;
 // A path may be so many times as bright as the others around it, whatever the limit.
@@ -366,10 +367,11 @@ void TileFilter::weigh_quads(std::size_t level, int y) {
   for (int x = 0; x < width; ++x) {
     std::array<float, 4> weights;
     for (int k = 0; k < 4; ++k) {
-      const float value = level == 1 ? logit(x, Network::kPixelKeep + k, y)
-                                     : logit(2 * x + k % 2, Network::kKeep, 2 * y + k / 2);
-      weights[std::size_t(k)] = fast_exp(std::clamp(value, -kLargestLogit, kLargestLogit));
+      weights[std::size_t(k)] = level == 1 ? logit(x, Network::kPixelKeep + k, y)
+                                           : logit(2 * x + k % 2, Network::kKeep, 2 * y + k / 2);
     }
+    const float most = std::ranges::max(weights);
+    for (float& weight : weights) weight = fast_exp(std::max(weight - most, kLeastExponent));
     const float scale = 1.0f / ((weights[0] + weights[1]) + (weights[2] + weights[3]));
     for (int layer = 0; layer < kPair; ++layer) {
       float sum = 0.0f;
@@ -389,7 +391,25 @@ void TileFilter::weigh_quads(std::size_t level, int y) {
   }
 }
 
-/// exp() of logits in place.
+/// From logits to weights of `count` taps, whose rows lie `stride` apart. The largest becomes 1:
+/// networks learn logits far beyond what a sum of exponentials can hold.
+inline void weigh_taps(float* logits, std::size_t count, std::size_t stride) {
+  std::vector<float> most(logits, logits + stride);
+  for (std::size_t k = 1; k < count; ++k) {
+    const float* __restrict row = logits + k * stride;
+    float* __restrict to = most.data();
+    for (std::size_t x = 0; x < stride; ++x) to[x] = std::max(to[x], row[x]);
+  }
+  for (std::size_t k = 0; k < count; ++k) {
+    float* __restrict row = logits + k * stride;
+    const float* __restrict from = most.data();
+    for (std::size_t x = 0; x < stride; ++x) {
+      row[x] = fast_exp(std::max(row[x] - from[x], kLeastExponent));
+    }
+  }
+}
+
+/// exp() of shares' logits in place.
 inline void exponentiate(float* values, std::size_t count) {
   for (std::size_t i = 0; i < count; ++i) {
     values[i] = fast_exp(std::min(std::max(values[i], -kLargestLogit), kLargestLogit));
@@ -472,7 +492,7 @@ inline void TileFilter::filter(std::size_t level, int y) {
       for (int k = 0; k < count; ++k) weights[std::size_t(first + k) * stride + x] = from[k];
     }
   }
-  exponentiate(weights.data(), weights.size());
+  weigh_taps(weights.data(), std::size_t(taps), stride);
   std::vector<float> sums(kPair * stride);
   sum_taps<kWide>(level, y, weights.data(), stride, sums.data());
   const auto out = results_[level].row(y);
@@ -521,7 +541,14 @@ inline void TileFilter::finish(int block_row) {
       }
     }
   }
-  exponentiate(weights.data(), weights.size());
+  constexpr std::size_t kNext = Network::kFine + Network::kCoarse;
+  for (std::size_t first : {std::size_t(0), std::size_t(Network::kPixelLogits)}) {
+    float* const row = weights.data() + first * stride;
+    weigh_taps(row, kNext, stride);
+    weigh_taps(row + kNext * stride, Network::kOwn, stride);
+    exponentiate(row + Network::kKernels * stride,
+                 std::size_t(Network::kPixelLogits - Network::kKernels) * stride);
+  }
   std::vector<float> sums(kPair * stride);
   std::vector<float> own(kPair * stride);
   std::vector<float> totals(stride);

@@ -149,6 +149,45 @@ TEST_CASE("smooth edges of a lamp do not make what is around brighter", "[denois
   CHECK(sum / count == Approx(1.0).epsilon(0.01));
 }
 
+TEST_CASE("edges of pictures of many paths stay as sharp as they are", "[denoiser]") {
+  // Boxes side by side, dark beside bright, of all kinds: the network is as sure there as it can
+  // be.
+  constexpr int kBox = 6;
+  constexpr int kPaths = 256;
+  constexpr float kNoise = 0.02f;  // of the mean of a pixel's paths
+  Film film(96, 72, FilmPixel{});
+  Image<Vec3f> clean(film.width(), film.height(), Vec3f::Zero());
+  for (int y = 0; y < film.height(); ++y) {
+    for (int x = 0; x < film.width(); ++x) {
+      const int box = x / kBox + 100 * (y / kBox);
+      Rng own = Rng(5).fork(std::to_string(box));
+      Rng rng = Rng(6).fork(std::to_string(x + 1000 * y));
+      FilmPixel& pixel = film.at(x, y);
+      pixel.count = float(kPaths);
+      pixel.surface_share = 1.0f;
+      for (int k = 0; k < 3; ++k) pixel.albedo[k] = float(own.uniform(0.03, 0.8));
+      pixel.normal = own.uniform_rotation().cast<float>() * Vec3f::UnitZ();
+      pixel.position = Vec3f(0.01f * float(x), 0.01f * float(y), float(own.uniform(0.5, 2.0)));
+      const Vec3f light = float(std::exp(own.uniform(-4.0, 1.0))) * pixel.albedo;
+      clean.at(x, y) = light;
+      const float deviation = kNoise * luminance(light);
+      pixel.scattered = light * (1.0f + kNoise * float(rng.normal()));
+      pixel.variance = deviation * deviation;
+      pixel.brightest = 4.0f * luminance(light);
+    }
+  }
+  test::RenderHost host(2);
+  const Image<Vec3f> image = denoised(std::move(film), {kEye}, isa_by_name(best_isa_name()), host);
+  double squares = 0.0;
+  for (std::size_t i = 0; i < image.pixels().size(); ++i) {
+    const double wanted = double(luminance(clean.pixels()[i]));
+    squares += std::pow(double(luminance(image.pixels()[i])) / wanted - 1.0, 2);
+  }
+  const double relative = std::sqrt(squares / double(image.pixels().size()));
+  CAPTURE(relative);
+  CHECK(relative < 0.12);
+}
+
 TEST_CASE("one chance find among quiet neighbours is tamed", "[denoiser]") {
   test::RenderHost host(1);
   // Planes know it by its neighbours, the network by the limit of a path.
