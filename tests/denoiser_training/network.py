@@ -164,6 +164,17 @@ class Network(nn.Module):
         # Each kernel's weights side by side, wherever they came from.
         return [l.float().contiguous() for l in (finest, logits[0][:, :level], *logits[1:])]
 
+    def grown(self, widths, encoder, decoder):
+        """-> a network at least as wide that says the same: nothing listens to further channels."""
+        network = Network(widths, encoder, decoder)
+        with torch.no_grad():
+            for layer, old in zip(network.layers(), self.layers(), strict=True):
+                outputs, inputs = old.weight.shape[:2]
+                layer.weight[:outputs, inputs:] = 0.0
+                layer.weight[:outputs, :inputs] = old.weight
+                layer.bias[:outputs] = old.bias
+        return network
+
     def layers(self):
         """In the order of the file."""
         for convs in self.encoder:

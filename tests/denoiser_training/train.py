@@ -23,13 +23,14 @@ CROP = 192
 EPSILON = 0.1  # of the relative error; 0.18 is middle grey
 SLACK = 4.0  # relative errors beyond count less: chance finds in what is compared with
 POOLS = ((4, 1.0), (16, 1.0))  # blocks of pixels whose means are compared, too, and how much they count
-EDGES_COUNT = 2.0  # more than the other pixels
+EDGES_COUNT = 16.0  # by what is seen of errors
 REACH = 4  # pixels over which light of chance finds is spread
 KEPT = 0.9995  # of the average of weights, per step
 # How often which number of paths is drawn, where a view has it.
 SHARES = {1: 0.08, 2: 0.26, 4: 0.24, 16: 0.22, 64: 1.0, 256: 2.0}
 OTHER_SHARE = 0.12
-SIZE = dict(widths=(48, 64, 80, 80, 64), encoder=(2, 2, 2, 2, 2), decoder=(2, 2, 2, 2))
+FILMS_PER_VIEW = 5.3  # that are kept, on average
+SIZE = dict(widths=(64, 64, 80, 80, 64), encoder=(2, 2, 2, 2, 2), decoder=(2, 2, 2, 2))
 
 
 def read_films(path):
@@ -134,7 +135,7 @@ class Pictures:
 
     def look(self):
         for path in sorted(self.folder.glob("*.films")):
-            if path.name in self.names or len(self.views) >= self.most or self.is_done:
+            if path.name in self.names or self.is_full() or self.is_done:
                 continue
             if zlib.crc32(path.name.encode()) % self.group.size != self.group.rank:
                 continue
@@ -147,13 +148,22 @@ class Pictures:
             with self.lock:
                 self.add(values, paths, exposures)
 
+    def is_full(self):
+        if self.films is None:
+            return False
+        most_of_a_view = 6
+        return (
+            len(self.views) >= self.most
+            or self.film_count + most_of_a_view > self.films.shape[0]
+        )
+
     def add(self, values, paths, exposures):
         count, _, height, width = values.shape
         if self.films is None:
             self.height, self.width = height, width
             size = height * width
             self.films = torch.zeros(
-                (7 * self.most, CHANNELS, size), dtype=torch.float16, device=self.device
+                (int(FILMS_PER_VIEW * self.most) + 6, CHANNELS, size), dtype=torch.float16, device=self.device
             )
             self.targets = torch.zeros(
                 (self.most, 7, size), dtype=torch.float16, device=self.device
@@ -256,19 +266,33 @@ class Batch:
         return raw, floats[:, 0], floats[:, 1] * floats[:, 2], target, both[:, 6:7], floats[:, 2]
 
 
-def relative_error(output, target, brightness):
-    error = (output - target) / (brightness + EPSILON)
+def squared(error):
     size = error.abs()
     return torch.where(size < SLACK, error * error, SLACK * (2.0 * size - SLACK))
 
 
+def relative_error(output, target, brightness):
+    return squared((output - target) / (brightness + EPSILON))
+
+
+def seen_error(output, target, brightness):
+    """Of what the view transform (ACES by Narkowicz, gamma 2.2) shows, by its slope where the
+    brightness is: straight in the target, so noise in it leaves no bias."""
+    x = brightness + 0.01
+    over, under = x * (2.51 * x + 0.03), x * (2.43 * x + 0.59) + 0.14
+    slope = ((5.02 * x + 0.03) * under - over * (4.86 * x + 0.59)) / (under * under)
+    return squared((output - target) * slope * (over / under) ** (1.0 / 2.2 - 1.0) / 2.2)
+
+
 def loss_of(output, target, edges):
     """Relative squared error, by what the network itself thinks of the brightness: unbiased for
-    targets that have noise. Of pixels, and of blocks of them, whose targets have less."""
+    targets that have noise. Of pixels, and of blocks of them, whose targets have less; on edges
+    of what is seen, too."""
     with torch.no_grad():
         grey = F.avg_pool2d(output.mean(1, keepdim=True), 3, 1, 1, count_include_pad=False)
         brightness = (0.5 * (grey + output)).clamp(min=0.0)
-    loss = (relative_error(output, target, brightness) * (1.0 + EDGES_COUNT * edges)).mean()
+    loss = relative_error(output, target, brightness).mean()
+    loss = loss + EDGES_COUNT * (seen_error(output, target, brightness) * edges).mean()
     for side, share in POOLS:
         means, wanted = F.avg_pool2d(output, side), F.avg_pool2d(target, side)
         brightness = means.detach().mean(1, keepdim=True).clamp(min=0.0)
@@ -283,7 +307,8 @@ class Trainee:
         self.device = pictures.device
         self.group = group
         begin = options.begin_from
-        self.network = (Network.load(begin) if begin else Network(**SIZE)).to(self.device)
+        network = Network.load(begin).grown(**SIZE) if begin else Network(**SIZE)
+        self.network = network.to(self.device)
         if self.device.type == "cuda":
             self.network = self.network.to(memory_format=torch.channels_last)
         self.batch = Batch(pictures, options.batch, chance)
