@@ -16,13 +16,18 @@ namespace diorama {
 class Connections {
  public:
   BatchInts are_wanted;                       ///< To be set for each vertex ...
-  BatchVectors throughput;                    ///< ... and that of its path, up to it.
+  BatchVectors throughput;                    ///< ... and that of its path, up to it, ...
+  BatchFloats own_ways;                       ///< ... and as how many its own way on counts.
   std::array<std::uint8_t, kBatch> vertices;  ///< Those that have one; see find().
   std::size_t count = 0;
   BatchVectors origin;
   BatchVectors direction;
   BatchFloats reach;
   BatchVectors light;  ///< What it brings, if nothing is in the way.
+
+  /// The way to the light from a vertex that has one, local to it, and the albedo there.
+  Vec3f local(std::size_t i) const { return wi_.at(i); }
+  LayerAlbedo albedo(std::size_t i) const { return at_vertex_.at(i); }
 
   /// Fetches what find() will read of the candidates; the vertices' random numbers are known.
   static void prefetch(const Vertices& v, const VirtualLights& lights);
@@ -159,7 +164,7 @@ inline void Connections::evaluate(const Vertices& v) {
   for (std::size_t i = 0; i < whole_steps(v.count); ++i) {
     const Lobes lobes(v.lobes.at(i), v.albedo.at(i), v.to_viewer.at(i), kStacks);
     const BsdfValue value = lobes.evaluate(wi_.at(i), at_vertex_.at(i));
-    const float own = value.density * per_area_[i];
+    const float own = own_ways[i] * value.density * per_area_[i];
     const float share = per_area_[i] * rival_[i] / (own + rival_[i]);
     light.set(i, light.at(i).cwiseProduct(throughput.at(i)).cwiseProduct(value.f_cos) * share);
   }

@@ -25,16 +25,18 @@ ShadingMesh::Point hit_point(const RTCFilterFunctionNArguments* args, unsigned i
 /// The share of light along a straight line through one surface of this material; where it moves,
 /// the direction is what it is to the surface at the moment of the poses.
 Vec3f straight_share(const MeshInstance& instance, const ShadingMesh::Point& point,
-                     const Vec3f& direction, bool passes_glass) {
+                     const Vec3f& direction, Passage passage) {
   const ShadingMaterial& material = instance.material(point.triangle);
   if (!material.dims_shadows) return Vec3f::Zero();
+  if (passage == Passage::CutOuts && material.is_blended) return Vec3f::Zero();
   const Material& m = *material.source;
   const Vec2f uv = instance.uv(point.triangle, point.u, point.v);
   const float opacity = material.opacity_at(uv, 0.0f);
   const float present = m.opacity_threshold > 0.0f ? (opacity < m.opacity_threshold ? 0.0f : 1.0f)
                                                    : std::clamp(opacity, 0.0f, 1.0f);
   Vec3f share = Vec3f::Constant(1.0f - present);
-  const bool is_clear = m.transmission > 0.0f && (passes_glass || m.is_thin_walled);
+  const bool is_clear = m.transmission > 0.0f && (passage == Passage::Glass ||
+                                                  (passage == Passage::Panes && m.is_thin_walled));
   if (present <= 0.0f || !is_clear) return share;
 
   const auto corners = instance.shading->corners(point.triangle);
@@ -160,7 +162,7 @@ std::uint32_t EmbreeScene::sees(std::span<const SkyGrid::Ray> rays) const {
     packet.add(origin, direction, 0.0f, kInfinite, kMoment);
   }
   std::uint32_t lit = 0;
-  transmittance(tree_.get(), packet, true, kStaticMask, [&](int i, const Vec3f& share) {
+  transmittance(tree_.get(), packet, Passage::Glass, kStaticMask, [&](int i, const Vec3f& share) {
     lit |= std::uint32_t(share.maxCoeff() > 0.0f) << i;
   });
   return lit;
@@ -216,7 +218,7 @@ void EmbreeScene::attenuate_shadow_ray(const RTCFilterFunctionNArguments* args) 
       direction = instance.motion->turned_back(direction, RTCRayN_time(args->ray, count, i));
     }
     const Vec3f share =
-        straight_share(instance, hit_point(args, i), direction.normalized(), shadow.passes_glass);
+        straight_share(instance, hit_point(args, i), direction.normalized(), shadow.passage);
     const unsigned ray = RTCRayN_id(args->ray, count, i);
     shadow.attenuate(ray, share);
     if (shadow.transmittance[ray].maxCoeff() > 1e-4f) args->valid[i] = 0;

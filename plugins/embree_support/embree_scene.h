@@ -30,6 +30,14 @@ inline ShadingMesh::Point point_on_triangle(std::uint32_t primitive, float u, fl
           is_second ? 1.0f - v : v};
 }
 
+/// What lets rays through that ask what is in the way. Cut-outs do where their opacity is below
+/// their threshold; all else in part, by what it absorbs and mirrors.
+enum class Passage : std::uint8_t {
+  CutOuts,
+  Panes,  ///< Also what is partly transparent, and thin glass ...
+  Glass,  ///< ... and solid one, straight.
+};
+
 /// What the rays of a batch met.
 struct BatchHits {
   std::array<const MeshInstance*, kBatch> instance{};  ///< Null: nothing.
@@ -143,8 +151,8 @@ class EmbreeScene {
     return intersect(tree_over_time(), origin, direction, t_min, t_max, time);
   }
   /// The light left between two points: 0 behind anything opaque, tinted behind glass and what is
-  /// partly transparent. Solid glass counts as opaque unless `passes_glass`.
-  Vec3f transmittance(const Vec3f& origin, const Vec3f& direction, float t_max, bool passes_glass,
+  /// partly transparent.
+  Vec3f transmittance(const Vec3f& origin, const Vec3f& direction, float t_max, Passage passage,
                       float time) const;
   /// The hits of a batch's rays.
   void intersect(const BatchRays& rays, BatchHits& hits) const {
@@ -156,8 +164,8 @@ class EmbreeScene {
   }
   /// Calls lit(i, share) for every ray of which light is left; spends the packet.
   template <int kWidth, class Lit>
-  void transmittance(RayPacket<kWidth>& rays, bool passes_glass, Lit&& lit) const {
-    transmittance(tree_over_time(), rays, passes_glass, ~0u, lit);
+  void transmittance(RayPacket<kWidth>& rays, Passage passage, Lit&& lit) const {
+    transmittance(tree_over_time(), rays, passage, ~0u, lit);
   }
   /// Some instances of the scene with nothing else; valid until the next take().
   class SubScene {
@@ -207,7 +215,7 @@ class EmbreeScene {
     embree::Context context;
     std::array<Vec3f, 16> transmittance;  ///< By the rays' ids; set when is_attenuated.
     bool is_attenuated = false;
-    bool passes_glass = true;
+    Passage passage = Passage::Glass;
     void attenuate(unsigned ray, const Vec3f& share) {
       if (!is_attenuated) transmittance.fill(Vec3f::Ones());
       is_attenuated = true;
@@ -222,7 +230,7 @@ class EmbreeScene {
   RayHit intersect(RTCScene tree, const Vec3f& origin, const Vec3f& direction, float t_min,
                    float t_max, float time) const;
   template <int kWidth, class Lit>
-  static void transmittance(RTCScene tree, RayPacket<kWidth>& rays, bool passes_glass,
+  static void transmittance(RTCScene tree, RayPacket<kWidth>& rays, Passage passage,
                             std::uint32_t mask, Lit&& lit);
   RTCScene tree_over_time() const { return moving_tree_ ? moving_tree_.get() : tree_.get(); }
   /// What Embree tells of an instance's triangle is in the space of the mesh.
@@ -305,10 +313,10 @@ inline RayHit EmbreeScene::intersect(RTCScene tree, const Vec3f& origin, const V
 }
 
 inline Vec3f EmbreeScene::transmittance(const Vec3f& origin, const Vec3f& direction, float t_max,
-                                        bool passes_glass, float time) const {
+                                        Passage passage, float time) const {
   RTCRayHit ray = make_ray(origin, direction, 0.0f, t_max, time);
   ShadowContext shadow;
-  shadow.passes_glass = passes_glass;
+  shadow.passage = passage;
   embree::init(shadow.context);
   embree::occluded(tree_over_time(), shadow.context, ray.ray);
   if (ray.ray.tfar == -kInfinite) return Vec3f::Zero();
@@ -409,11 +417,11 @@ inline void EmbreeScene::intersect(RTCScene tree, const BatchRays& rays, BatchHi
 }
 
 template <int kWidth, class Lit>
-inline void EmbreeScene::transmittance(RTCScene tree, RayPacket<kWidth>& packet, bool passes_glass,
+inline void EmbreeScene::transmittance(RTCScene tree, RayPacket<kWidth>& packet, Passage passage,
                                        std::uint32_t mask, Lit&& lit) {
   packet.pad(mask);
   ShadowContext shadow;
-  shadow.passes_glass = passes_glass;
+  shadow.passage = passage;
   embree::init(shadow.context);
   embree::occluded(packet.valid_.data(), tree, shadow.context, packet.rays_.ray);
   for (int i = 0; i < packet.count_; ++i) {

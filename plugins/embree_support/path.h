@@ -3,9 +3,11 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 
 #include "connections.h"
+#include "path_reuse.h"
 #include "path_tracer.h"
 #include "vertices.h"
 
@@ -22,6 +24,13 @@ struct PathTracer::Path {
   float left_by_first = 1.0f;  ///< Largest throughput behind the first scattering surface.
   int bounce = 0;
   int straight_passes = 0;
+  std::uint8_t number = 0;  ///< In its batch.
+  // See PathReuse.
+  bool goes_on = true;            ///< Beyond a second surface that others see, too.
+  bool has_shared_first = false;  ///< Its first surface sees what others found; ...
+  bool may_share_next = false;    ///< ... they may see what it meets next, ...
+  bool is_shared = false;         ///< ... and what it finds from now on counts for all.
+  PathReuse::Found found;
   bool is_camera_ray = true;
   bool has_scattered = false;  ///< Over a surface that is no mirror.
   bool hides_lights = false;   ///< Their light was already counted, or is left out on purpose.
@@ -40,6 +49,10 @@ struct PathTracer::Path {
   /// Between ways to go on.
   void choose() {
     if (!result.has_surface) result.by_chance = true;
+  }
+  /// As what it finds a lamp that it meets.
+  auto lamp_slot() const {
+    return bounce == 2 ? &PathReuse::Found::by_lamp : &PathReuse::Found::by_way_on;
   }
   /// Whether what it meets next is softened, as only caustics would show the difference.
   bool is_soft(const TraceSettings& settings) const {
@@ -90,6 +103,7 @@ struct PathTracer::Batch : Vertices {
   std::size_t shadow_ray_count = 0;
 
   Connections connections;
+  std::unique_ptr<PathReuse> reuse;  ///< Null: paths are not reused.
 
   bool learns = false;  ///< For a RadianceCache.
   BatchRays next_rays;
@@ -122,7 +136,8 @@ inline void PathTracer::Batch::move(std::size_t from, std::size_t to) {
   is_mirrored[to] = is_mirrored[from];
 }
 
-inline void PathTracer::add(Path& path, int bounce, const Vec3f& radiance) const {
+inline void PathTracer::add(Path& path, int bounce, const Vec3f& radiance,
+                            Vec3f PathReuse::Found::*found) const {
   // Extreme densities may round to a value beyond all numbers, which would spoil its pixel.
   constexpr float kMost = 1e20f;
   if (!(radiance.sum() < kMost)) return;
@@ -134,6 +149,10 @@ inline void PathTracer::add(Path& path, int bounce, const Vec3f& radiance) const
   if (settings_.clamp > 0.0f && bounce > 1) {
     const float l = luminance(value);
     if (l > settings_.clamp) value *= settings_.clamp / l;
+  }
+  if (path.is_shared) {
+    path.found.*found += value;
+    return;
   }
   path.result.scattered += value;
 }

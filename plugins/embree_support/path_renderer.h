@@ -33,6 +33,7 @@ struct PictureParams {
   double clamp = 0.0;
   bool radiance_cache = true;
   bool virtual_lights = true;
+  bool path_reuse = false;
   double firefly_limit = 4.0;
   std::string exposure = "auto";
   double exposure_ev = 0.0;
@@ -73,6 +74,8 @@ class PathRenderer : public Renderer {
   /// Whether trace() leaves the processor idle and asks for no first hits: labels are then made
   /// while it runs on a thread of its own.
   virtual bool traces_elsewhere() const { return false; }
+  /// Whether trace() lets paths use others' surfaces; see PathSettings.
+  virtual bool can_reuse_paths() const { return false; }
   /// Whether trace_quickly() is to be called for quick modes.
   virtual bool filters_elsewhere() const { return false; }
   /// What the filter on planes (plane_filter.h) makes of a picture's light paths, where that is not

@@ -69,8 +69,11 @@ void PathTracer::collect_emission(Path& path, const Vec3f& direction, const RayH
                         scene_.lights().density_of_surface(light, path.since_last, cosine);
     weight = mis_weight(path.last_density, rival);
   }
-  if (light != MeshInstance::kNoLight) weight *= path.light_share;
-  add(path, path.bounce, path.throughput.cwiseProduct(radiance) * weight);
+  if (light == MeshInstance::kNoLight) {
+    return add(path, path.bounce, path.throughput.cwiseProduct(radiance) * weight);
+  }
+  weight *= path.light_share;
+  add(path, path.bounce, path.throughput.cwiseProduct(radiance) * weight, path.lamp_slot());
 }
 
 PathTracer::StraightPass PathTracer::pass_or_reflect(Path& path, const Vec3f& direction,

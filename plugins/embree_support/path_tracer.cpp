@@ -111,29 +111,41 @@ inline RayCounts PathTracer::trace_all(const TraceJob& job, const Output& output
   Batch batch;
   batch.own_bsdfs.reserve(kBatch);
   batch.learns = output.findings != nullptr;
+  if (settings_.reuses_paths) batch.reuse = std::make_unique<PathReuse>();
   std::array<PixelSum*, kBatch> pixels;
   BatchFloats columns{};
   BatchFloats rows{};
+  const SampleOrder::Place first = job.order.place(job.x_begin, job.y_begin, 0);
+  const std::uint32_t draw = hashed_bits(first.key ^ hashed_bits(first.index)) >> 16;
+  const std::uint32_t run = batch.reuse ? PathReuse::kSamples : kRun;
   const auto add_path = [&](int x, int y, std::uint32_t sample) {
     const std::size_t i = paths.size();
     const auto row = std::size_t(y - job.y_begin);
     if (output.sums) {
       pixels[i] = &output.sums[row * output.stride + std::size_t(x - job.x_begin)];
     }
-    paths.emplace_back(PathSampler(job.order.place(x, y, sample)));
+    Path& path = paths.emplace_back(PathSampler(job.order.place(x, y, sample)));
+    if (batch.reuse) {
+      path.number = std::uint8_t(i);
+      const auto pixel =
+          std::uint32_t((y - job.y_begin) * (job.x_end - job.x_begin) + x - job.x_begin);
+      path.goes_on = PathReuse::goes_on(pixel, sample, draw);
+    }
     columns[i] = float(x);
     rows[i] = float(y);
   };
   std::uint64_t left = job.path_count();
-  for (std::uint32_t begin = job.sample_begin; begin < job.sample_end; begin += kRun) {
-    const std::uint32_t end = std::min(begin + kRun, job.sample_end);
+  for (std::uint32_t begin = job.sample_begin; begin < job.sample_end; begin += run) {
+    const std::uint32_t end = std::min(begin + run, job.sample_end);
     for (int y = job.y_begin; y < job.y_end; ++y) {
       for (int x = job.x_begin; x < job.x_end; ++x) {
         for (std::uint32_t sample = begin; sample < end; ++sample) {
           add_path(x, y, sample);
           if (--left > 0 && paths.size() < kBatch) continue;
+          if (batch.reuse) batch.reuse->clear(paths.size(), end - begin);
           start_paths(paths, columns, rows, batch);
           trace_batch<kPacketSize>(batch);
+          if (batch.reuse) reuse_paths<kPacketSize>(paths, batch);
           for (std::size_t i = 0; i < paths.size(); ++i) {
             if (!output.findings) {
               pixels[i]->add(paths[i].result);
@@ -192,7 +204,7 @@ inline void PathTracer::trace_batch(Batch& v) const {
     v.find_surfaces();
     std::size_t scattered = 0;
     for (std::size_t i = 0; i < v.count; ++i) {
-      if (evaluate_material(v, i)) v.move(i, scattered++);
+      if (evaluate_material(v, i) && !ends_for_others(v, i)) v.move(i, scattered++);
     }
     v.count = scattered;
     v.find_bases();
@@ -251,7 +263,7 @@ inline void PathTracer::sort_by_light(Batch& v) {
 
 /// Calls `lit` with every vertex whose ray arrives, and what is left of its light.
 template <int kPacketSize, class Lit>
-inline void PathTracer::trace_packets(Batch& v, const RaysFromVertices& rays, bool passes_glass,
+inline void PathTracer::trace_packets(Batch& v, const RaysFromVertices& rays, Passage passage,
                                       Lit&& lit) const {
   RayPacket<kPacketSize> packet;
   for (std::size_t begin = 0; begin < rays.vertices.size(); begin += kPacketSize) {
@@ -261,10 +273,10 @@ inline void PathTracer::trace_packets(Batch& v, const RaysFromVertices& rays, bo
       const std::size_t i = rays.vertices[k];
       const Vec3f origin = rays.origin.at(i);
       const Vec3f direction = rays.direction.at(i);
-      packet.add(origin, direction, 0.0f, rays.reach[i], v.paths[i]->time);
+      packet.add(origin, direction, 0.0f, rays.reach[i], v.reuse ? kMoment : v.paths[i]->time);
       log({origin, direction, 0.0f, rays.reach[i], true});
     }
-    scene_.transmittance(packet, passes_glass, [&](int k, const Vec3f& transmittance) {
+    scene_.transmittance(packet, passage, [&](int k, const Vec3f& transmittance) {
       lit(std::size_t(rays.vertices[begin + std::size_t(k)]), transmittance);
     });
   }
@@ -278,7 +290,7 @@ inline void PathTracer::trace_shadow_rays(Batch& v) const {
                               v.lights.direction,
                               v.light_reach};
   trace_packets<kPacketSize>(
-      v, rays, !settings_.has_caustics,
+      v, rays, settings_.has_caustics ? Passage::Panes : Passage::Glass,
       [&](std::size_t i, const Vec3f& transmittance) { add_light_sample(v, i, transmittance); });
 }
 
@@ -294,8 +306,10 @@ inline void PathTracer::add_light_sample(const Batch& v, std::size_t i,
   } else {
     radiance = lights.radiance_of(place, v.lights.direction.at(i));
   }
+  using Found = PathReuse::Found;
   add(*v.paths[i], v.bounce[i],
-      v.light_share.at(i).cwiseProduct(transmittance).cwiseProduct(radiance));
+      v.light_share.at(i).cwiseProduct(transmittance).cwiseProduct(radiance),
+      v.bounce[i] == 1 ? &Found::by_light : &Found::by_way_on);
 }
 
 inline void PathTracer::process_hits(Batch& v) const {
@@ -340,6 +354,7 @@ inline bool PathTracer::evaluate_material(Batch& v, std::size_t i) const {
     v.normal.set(i, surface.normal);
   }
   if (!material.is_thin_glass && !material.is_blended) return true;
+  path.may_share_next = false;
   const StraightPass pass_through = pass_or_reflect(path, direction, hit, surface, material, bsdf);
   if (pass_through.goes_on) {
     v.go_on(path, pass_through.origin, pass_through.direction, pass_through.left);
@@ -410,7 +425,8 @@ inline void PathTracer::collect_lights(const Batch& v, std::size_t i) const {
             has_rival ? choice_probability(scene_.lights(), light, path.last) * density : 0.0f;
         add(path, path.bounce,
             path.throughput.cwiseProduct(radiance) * path.light_share *
-                (has_rival ? mis_weight(path.last_density, rival) : 1.0f));
+                (has_rival ? mis_weight(path.last_density, rival) : 1.0f),
+            path.lamp_slot());
       });
 }
 
@@ -444,8 +460,11 @@ inline void PathTracer::scatter(Batch& v, std::size_t i) const {
   }
   const bool asks_light = !v.learns || path.has_finding;
   if (!is_first) use_cache(v, i);
+  if (v.reuse) share_surface(v, i);
   take_light_samples(v, i);
-  path.light_share = path.is_connected ? share_beside_virtual_lights(v, i) : 1.0f;
+  path.light_share = path.is_connected && !(path.is_shared && path.bounce == 1)
+                         ? share_beside_virtual_lights(v, i)
+                         : 1.0f;
   if (asks_light) queue_shadow_ray(v, i);
   path.hides_lights = false;
   path.is_connected = settings_.virtual_lights && !path.ends && !s.is_mirror() &&
@@ -454,6 +473,7 @@ inline void PathTracer::scatter(Batch& v, std::size_t i) const {
   if (path.is_connected) {
     v.connections.are_wanted[i] = !v.learns || path.has_finding;
     v.connections.throughput.set(i, path.throughput);
+    v.connections.own_ways[i] = is_first_shared(v, path, s) ? PathReuse::kOwnWays : 1.0f;
   }
   if (path.ends || ends_at(path, s)) return;
   BsdfSample next;
@@ -554,16 +574,21 @@ inline void PathTracer::go_on(Batch& v, std::size_t i, const BsdfSample& next, c
   v.go_on(path, origin, direction, behind);
 }
 
+float PathTracer::rival_of_virtual_lights(const Batch& v, std::size_t i) const {
+  if (!v.paths[i]->is_connected) return 0.0f;
+  const bool is_back = (v.is_back[i] != 0) != (v.is_mirrored[i] != 0);
+  return settings_.virtual_lights->rival(std::uint32_t(v.hits.number[i]),
+                                         std::uint32_t(v.hits.triangle[i]), v.hits.u[i],
+                                         v.hits.v[i], is_back);
+}
+
 float PathTracer::share_beside_virtual_lights(const Batch& v, std::size_t i) const {
   const Path& path = *v.paths[i];
   const float cosine = std::abs(v.flat_normal.at(i).dot(v.rays.direction.at(i)));
   // Per square metre, here.
-  const float own = path.last_density * cosine / (path.since_last * path.since_last);
-  const bool is_back = (v.is_back[i] != 0) != (v.is_mirrored[i] != 0);
-  const float rival = settings_.virtual_lights->rival(std::uint32_t(v.hits.number[i]),
-                                                      std::uint32_t(v.hits.triangle[i]),
-                                                      v.hits.u[i], v.hits.v[i], is_back);
-  return own / (own + rival);
+  float own = path.last_density * cosine / (path.since_last * path.since_last);
+  if (path.has_shared_first && path.bounce == 1) own *= PathReuse::kOwnWays;
+  return own / (own + rival_of_virtual_lights(v, i));
 }
 
 template <int kPacketSize>
@@ -584,9 +609,73 @@ inline void PathTracer::connect(Batch& v) const {
                               connections.direction,
                               connections.reach};
   // Glass would bend them: paths find their own way through it.
-  trace_packets<kPacketSize>(v, rays, false, [&](std::size_t i, const Vec3f& transmittance) {
-    add(*v.paths[i], v.bounce[i] + 1, connections.light.at(i).cwiseProduct(transmittance));
-  });
+  trace_packets<kPacketSize>(
+      v, rays, Passage::Panes, [&](std::size_t i, const Vec3f& transmittance) {
+        Path& path = *v.paths[i];
+        const bool is_second = path.is_shared && v.bounce[i] == 1;
+        if (is_second)
+          v.reuse->set_connection(path.number, connections.local(i), connections.albedo(i));
+        using Found = PathReuse::Found;
+        add(path, v.bounce[i] + 1, connections.light.at(i).cwiseProduct(transmittance),
+            is_second ? &Found::by_connection : &Found::by_way_on);
+      });
+}
+
+inline bool PathTracer::is_first_shared(const Batch& v, const Path& path, const SurfaceBsdf& s) {
+  // Metal looks where others do not.
+  constexpr float kMostMetallic = 0.5f;
+  return v.reuse && path.bounce == 0 && s.metallic < kMostMetallic && s.lobes.glass <= 0.0f;
+}
+
+/// What is seen of it from elsewhere must not be far from what its own path saw.
+inline bool PathTracer::can_be_second(const SurfaceBsdf& s) {
+  constexpr float kLeastAlpha = 0.1f;
+  return s.lobes.glass <= 0.0f && s.alpha >= kLeastAlpha &&
+         (s.layers.coat <= 0.0f || s.layers.coat_alpha >= kLeastAlpha);
+}
+
+/// Of the second surfaces only some are looked at, which serve the others' paths, too.
+inline bool PathTracer::ends_for_others(const Batch& v, std::size_t i) {
+  const Path& path = *v.paths[i];
+  return path.may_share_next && !path.goes_on && can_be_second(*v.bsdf[i]);
+}
+
+inline void PathTracer::share_surface(Batch& v, std::size_t i) const {
+  Path& path = *v.paths[i];
+  const SurfaceBsdf& s = *v.bsdf[i];
+  if (is_first_shared(v, path, s)) {
+    v.reuse->set_first(path.number, v, i, path.throughput);
+    path.may_share_next = true;
+    path.has_shared_first = true;
+    return;
+  }
+  if (path.may_share_next && can_be_second(s)) {
+    v.reuse->set_second(path.number, v, i, path.throughput, rival_of_virtual_lights(v, i));
+    path.is_shared = true;
+  }
+  path.may_share_next = false;
+}
+
+template <int kPacketSize>
+inline void PathTracer::reuse_paths(std::vector<Path>& paths, Batch& v) const {
+  for (const Path& path : paths) v.reuse->set_found(path.number, path.found);
+  const auto trace = [&](const std::uint8_t* vertices, std::size_t count,
+                         const BatchVectors& origin, const BatchVectors& direction,
+                         const BatchFloats& reach, auto&& seen) {
+    const RaysFromVertices rays{{vertices, count}, origin, direction, reach};
+    // What is seen through a pane its own path alone finds.
+    trace_packets<kPacketSize>(v, rays, Passage::CutOuts,
+                               [&](std::size_t w, const Vec3f&) { seen(w); });
+  };
+  const auto give = [&](std::size_t i, const Vec3f& light) {
+    paths[i].is_shared = false;
+    add(paths[i], 1, light);
+  };
+  if (scene_.stacks_lobes()) {
+    v.reuse->connect<true>(trace, give);
+  } else {
+    v.reuse->connect<false>(trace, give);
+  }
 }
 
 /// Has paths arrive there straight from above, as if they had been scattered before.
@@ -673,7 +762,10 @@ void PathTracer::light(std::span<const SurfaceParts::Point> places, std::uint32_
       light.flat_normal = places[numbers[i]].normal;
       light.normal = v.normal.at(i);
       light.to_light = v.lights.direction.at(i);
-      light.is_by_small_light = scene_.lights().is_small_light(v.lights.place(i));
+      // Where the sun shines, paths that are reused are better alone.
+      const LightPlace place = v.lights.place(i);
+      light.is_by_small_light = settings_.reuses_paths ? scene_.lights().is_lamp(place)
+                                                       : scene_.lights().is_small_light(place);
       light.bsdf = *v.bsdf[i];
     }
   }

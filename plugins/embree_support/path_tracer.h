@@ -7,6 +7,7 @@
 
 #include "diorama/host.h"
 #include "embree_scene.h"
+#include "path_reuse.h"
 #include "renderer_support/batch.h"
 #include "renderer_support/film.h"
 #include "renderer_support/hit_image.h"
@@ -110,8 +111,16 @@ class PathTracer {
   bool ends_at(const Path& path, const SurfaceBsdf& s) const;
   /// Ends the path with light from the cache, or begins what it finds for one.
   void use_cache(Batch& v, std::size_t i) const;
+  static bool is_first_shared(const Batch& v, const Path& path, const SurfaceBsdf& s);
+  static bool can_be_second(const SurfaceBsdf& s);
+  static bool ends_for_others(const Batch& v, std::size_t i);
+  /// Keeps it, if paths can reuse it.
+  void share_surface(Batch& v, std::size_t i) const;
+  template <int kPacketSize>
+  void reuse_paths(std::vector<Path>& paths, Batch& v) const;
   void scatter(Batch& v, std::size_t i) const;
   /// What the light found at a vertex counts for, as virtual lights bring a part of it.
+  float rival_of_virtual_lights(const Batch& v, std::size_t i) const;
   float share_beside_virtual_lights(const Batch& v, std::size_t i) const;
   template <int kPacketSize>
   void connect(Batch& v) const;
@@ -127,7 +136,7 @@ class PathTracer {
   static void sort_by_light(Batch& v);
   struct RaysFromVertices;
   template <int kPacketSize, class Lit>
-  void trace_packets(Batch& v, const RaysFromVertices& rays, bool passes_glass, Lit&& lit) const;
+  void trace_packets(Batch& v, const RaysFromVertices& rays, Passage passage, Lit&& lit) const;
   template <int kPacketSize>
   void trace_shadow_rays(Batch& v) const;
   void add_light_sample(const Batch& v, std::size_t i, const Vec3f& transmittance) const;
@@ -141,7 +150,9 @@ class PathTracer {
   void read_textures(const Path& path, const Vec3f& direction, const RayHit& hit,
                      const SurfaceGeometry& surface, const ShadingMaterial& material, bool is_soft,
                      SurfaceBsdf& bsdf, Vec3f& normal) const;
-  void add(Path& path, int bounce, const Vec3f& radiance) const;
+  /// `found`: how a path whose second surface is shared found it.
+  void add(Path& path, int bounce, const Vec3f& radiance,
+           Vec3f PathReuse::Found::*found = &PathReuse::Found::by_way_on) const;
 
   const EmbreeScene& scene_;
   const View& view_;

@@ -153,7 +153,8 @@ double VirtualLightTracer::seen_share(const Trial& trial, const Eye& eye) const 
   const float there = -trial.normal.dot(direction);
   if (!(here > 0.0f) || !(there > 0.0f)) return 0.0;
   constexpr float kAlmost = 0.99999f;
-  const Vec3f left = scene_.transmittance(from, direction, kAlmost * distance, false, kMoment);
+  const Vec3f left =
+      scene_.transmittance(from, direction, kAlmost * distance, Passage::Panes, kMoment);
   return double(luminance(left) * here * there / std::max(distance2, kNearest * kNearest));
 }
 
@@ -265,7 +266,9 @@ std::unique_ptr<VirtualLightSets> VirtualLightSets::for_picture(const EmbreeScen
                                                                 Host& host, RayCounts& counts) {
   const std::uint64_t paths = plan.path_count();
   const bool is_possible = settings.has_virtual_lights && !view.has_shutter();
-  if (!is_possible || !scene.lights().has_small_lights() || paths < kLeastPaths) return nullptr;
+  const bool has_any =
+      settings.reuses_paths ? scene.lights().has_lamps() : scene.lights().has_small_lights();
+  if (!is_possible || !has_any || paths < kLeastPaths) return nullptr;
   TraceSettings own;
   static_cast<PathSettings&>(own) = settings;
   own.host = &host;

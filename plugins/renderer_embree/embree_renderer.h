@@ -17,6 +17,7 @@ class EmbreeRenderer final : public PathRenderer {
  private:
   Film trace(const View& view, const PathSettings& settings, SamplePlan& plan) override;
   std::size_t traced_bytes(std::size_t pixels) const override;
+  bool can_reuse_paths() const override { return true; }
 };
 
 }  // namespace diorama

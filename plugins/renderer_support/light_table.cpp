@@ -35,6 +35,11 @@ bool LightTable::has_small_lights() const {
   });
 }
 
+bool LightTable::has_lamps() const {
+  return std::any_of(records_.begin(), records_.end(),
+                     [](const Record& light) { return is_lamp(light); });
+}
+
 void LightTable::Columns::add(const Record& light) {
   shape.push_back(std::int32_t(light.shape));
   for (int k = 0; k < 3; ++k) {

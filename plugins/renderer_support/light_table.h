@@ -119,6 +119,8 @@ class LightTable {
     const Record& light = records_[place.light];
     return light.shape != LightShape::Dome || light.texture->is_sun(place.place);
   }
+  bool has_lamps() const;
+  bool is_lamp(const LightPlace& place) const { return is_lamp(records_[place.light]); }
   const Columns& columns() const { return columns_; }
   /// Over the bodies.
   const LightTree& tree() const { return tree_; }
@@ -161,6 +163,10 @@ class LightTable {
                  bool is_camera_ray, Found&& found) const;
 
  private:
+  static bool is_lamp(const Record& light) {
+    return light.shape != LightShape::Dome && light.shape != LightShape::Distant;
+  }
+
   /// Of triangles that shine on one side only, or nearly so, and face similar ways.
   static void find_direction(Record& light);
   static bool is_near(const Record& light, const Vec3f& from, const Vec3f& direction);

@@ -29,6 +29,9 @@ struct PathSettings {
   /// Paths are connected with what surfaces scatter: see VirtualLights. Where nothing moves while
   /// the shutter is open.
   bool has_virtual_lights = false;
+  /// Paths of neighbouring pixels use each other's second surfaces: see PathReuse. Not with a
+  /// clamp or a cache, nor where anything moves while the shutter is open.
+  bool reuses_paths = false;
   /// Every path starts through its pixel's centre. For views without aperture and shutter, and no
   /// more than a path per pixel.
   bool starts_at_centres = false;

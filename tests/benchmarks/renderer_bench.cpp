@@ -71,10 +71,11 @@ double share_of_raw_rays(const Scene& scene, NodeId camera, Host& host,
     const double paths = thread_seconds() - start;
     start = thread_seconds();
     for (const LoggedRay& ray : rays) {
-      hits += ray.is_shadow
-                  ? meshes.transmittance(ray.origin, ray.direction, ray.t_max, false, kMoment).x() >
-                        0.0f
-                  : bool(meshes.intersect(ray.origin, ray.direction, ray.t_min, ray.t_max));
+      hits +=
+          ray.is_shadow
+              ? meshes.transmittance(ray.origin, ray.direction, ray.t_max, Passage::Panes, kMoment)
+                        .x() > 0.0f
+              : bool(meshes.intersect(ray.origin, ray.direction, ray.t_min, ray.t_max));
     }
     shares.push_back((thread_seconds() - start) / paths);
   }
@@ -233,6 +234,7 @@ int main(int argc, char** argv) {
   app.add_option("--sphere-lights", options.params.sphere_lights);
   app.add_option("--principled", options.params.principled);
   app.add_flag("--denoise,!--no-denoise", options.params.denoise);
+  app.add_flag("--path-reuse,!--no-path-reuse", options.params.path_reuse);
   app.add_flag("--caustics,!--no-caustics", options.params.caustics);
   CLI11_PARSE(app, argc, argv);
   try {

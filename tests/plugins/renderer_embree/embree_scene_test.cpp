@@ -103,11 +103,12 @@ struct Sheet {
   /// One by one and in a packet, which must agree.
   Vec3f light_through(const Vec2& uv, const Vec3& direction) const {
     const Ray ray = ray_through(uv, direction);
-    const Vec3f alone = scene.transmittance(ray.origin, ray.direction, 2.0f, true, kMoment);
+    const Vec3f alone =
+        scene.transmittance(ray.origin, ray.direction, 2.0f, Passage::Glass, kMoment);
     RayPacket8 packet;
     packet.clear();
     for (int i = 0; i < 3; ++i) packet.add(ray.origin, ray.direction, 0.0f, 2.0f, kMoment);
-    scene.transmittance(packet, true,
+    scene.transmittance(packet, Passage::Glass,
                         [&](int, const Vec3f& share) { CHECK((share - alone).norm() < 1e-5f); });
     return alone;
   }
@@ -397,7 +398,7 @@ TEST_CASE("a mesh that is used several times is met like as many meshes", "[rays
     std::array<Vec3f, RayPacket8::kSize> passed;
     passed.fill(Vec3f::Zero());
     packet.load(rays, 0);
-    shared.transmittance(packet, true,
+    shared.transmittance(packet, Passage::Glass,
                          [&](int k, const Vec3f& share) { passed[std::size_t(k)] = share; });
     for (std::size_t k = 0; k < rays.count; ++k) {
       CAPTURE(i, k);
@@ -405,7 +406,8 @@ TEST_CASE("a mesh that is used several times is met like as many meshes", "[rays
       const Vec3f direction = rays.direction.at(k);
       const RayHit alone = shared.intersect(origin, direction, 0.0f, kInfinite, rays.time[k]);
       const RayHit hit = own.intersect(origin, direction, 0.0f, kInfinite, rays.time[k]);
-      const Vec3f through = own.transmittance(origin, direction, kInfinite, true, rays.time[k]);
+      const Vec3f through =
+          own.transmittance(origin, direction, kInfinite, Passage::Glass, rays.time[k]);
       // Rays along an edge may go either way.
       const RayHit together = hits.at(k);
       const bool is_same = alone.instance == together.instance && bool(alone) == bool(hit) &&
@@ -439,7 +441,9 @@ TEST_CASE("copies that become glass let light through, and block it again", "[in
       const Affine pose = world.scene.world_from_node(nodes[std::size_t(i)]);
       const Vec3 origin = pose * Vec3(0.3, 0.2, 1.0);
       const Vec3 direction = pose.linear() * Vec3(0.0, 0.0, -1.0);
-      return scene.transmittance(origin.cast<float>(), direction.cast<float>(), 2.0f, true, kMoment)
+      return scene
+          .transmittance(origin.cast<float>(), direction.cast<float>(), 2.0f, Passage::Glass,
+                         kMoment)
           .x();
     };
     const auto set_material = [&](int i, const Material& material) {

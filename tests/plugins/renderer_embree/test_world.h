@@ -4,8 +4,10 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "diorama/scene.h"
+#include "renderer_support/film.h"
 
 namespace diorama::test {
 
@@ -112,6 +114,40 @@ inline TestWorld room_with_shade() {
   lamp.color = Vec3f(900.0f, 800.0f, 600.0f);
   world.add(lamp, at(0.95, 0.9, 0.65));
   return world;
+}
+
+// No whole number of the groups that paths of neighbouring pixels form.
+inline constexpr int kShadeWidth = 44;
+inline constexpr int kShadeHeight = 36;
+
+inline NodeId camera_into_shade(TestWorld& world) {
+  return world.add_camera(kShadeWidth, kShadeHeight, 26.0, Vec3(-0.9, -1.8, 0.7),
+                          Vec3(0.1, 0.6, -0.2));
+}
+
+/// Of what is scattered, in 11 x 12 pixels each.
+inline std::vector<double> means_of_blocks(const Film& film) {
+  constexpr int kBlockWidth = 11;
+  constexpr int kBlockHeight = 12;
+  constexpr int kColumns = kShadeWidth / kBlockWidth;
+  std::vector<double> means(std::size_t(kColumns * (kShadeHeight / kBlockHeight)), 0.0);
+  for (int y = 0; y < kShadeHeight; ++y) {
+    for (int x = 0; x < kShadeWidth; ++x) {
+      means[std::size_t(y / kBlockHeight * kColumns + x / kBlockWidth)] +=
+          double(film.at(x, y).scattered.mean()) / double(kBlockWidth * kBlockHeight);
+    }
+  }
+  return means;
+}
+
+/// Mean square of the pixels' differences, each relative to what is seen there.
+inline double relative_error(const Film& film, const Film& truth) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < film.pixels().size(); ++i) {
+    const Vec3f& t = truth.pixels()[i].scattered;
+    sum += double((film.pixels()[i].scattered - t).squaredNorm() / (t.squaredNorm() + 1e-4f));
+  }
+  return sum / double(film.pixels().size());
 }
 
 }  // namespace diorama::test
