@@ -200,11 +200,6 @@ inline void PathReuse::find_ways() {
     direction_.set(w, line * (1.0f / length));
     reach_[w] = kAlmost * length;
   }
-  const auto albedo_at = [](const LayerTable::Row& row, float cosine) -> LayerAlbedo {
-    if (!row) return {};
-    const LayerTable::Node n = row.at(cosine);
-    return {n[0], n[1], n[2], n[3]};
-  };
   for (std::size_t w = 0; w < way_count_; ++w) {
     at_first_.set(w, albedo_at(firsts_.rows[std::size_t(first_[w])], wi_.z[w]));
     at_second_.set(w, albedo_at(seconds_.rows[std::size_t(second_[w])], back_.z[w]));

@@ -119,8 +119,9 @@ class PathTracer {
   template <int kPacketSize>
   void reuse_paths(std::vector<Path>& paths, Batch& v) const;
   void scatter(Batch& v, std::size_t i) const;
-  /// What the light found at a vertex counts for, as virtual lights bring a part of it.
+  /// How many virtual lights there are at a vertex, per square metre, if its path is connected.
   float rival_of_virtual_lights(const Batch& v, std::size_t i) const;
+  /// What the light found at a vertex counts for, as virtual lights bring a part of it.
   float share_beside_virtual_lights(const Batch& v, std::size_t i) const;
   template <int kPacketSize>
   void connect(Batch& v) const;

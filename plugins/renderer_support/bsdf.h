@@ -8,6 +8,13 @@
 
 namespace diorama {
 
+/// By a material's row, or of plain Lambert surfaces, which have none.
+inline LayerAlbedo albedo_at(const LayerTable::Row& row, float cos_theta) {
+  if (!row) return {};
+  const LayerTable::Node n = row.at(cos_theta);
+  return {n[0], n[1], n[2], n[3]};
+}
+
 /// A principled surface at one point. Local space: z along the shading normal, on the side of wo.
 /// Reciprocal; loses no energy, unless it `stacks_lobes`.
 struct SurfaceBsdf {
@@ -44,11 +51,7 @@ struct SurfaceBsdf {
     constexpr float kMirrorSpread = 0.05f;
     return metallic > 0.9f && alpha < kMirrorSpread * kMirrorSpread;
   }
-  LayerAlbedo albedo_at(float cos_theta) const {
-    if (!row) return {};
-    const LayerTable::Node n = row.at(cos_theta);
-    return {n[0], n[1], n[2], n[3]};
-  }
+  LayerAlbedo albedo_at(float cos_theta) const { return diorama::albedo_at(row, cos_theta); }
   /// Share of uniform light returned to a direction: guides the denoiser.
   Vec3f albedo(const LayerAlbedo& n) const {
     const Vec3f white = Vec3f::Constant((1.0f - lobes.glass) * n.coat + lobes.f90 * n.f90);

@@ -29,7 +29,8 @@ KEPT = 0.9995  # of the average of weights, per step
 # How often which number of paths is drawn, where a view has it.
 SHARES = {1: 0.08, 2: 0.26, 4: 0.24, 16: 0.22, 64: 1.0, 256: 2.0}
 OTHER_SHARE = 0.12
-FILMS_PER_VIEW = 5.3  # that are kept, on average
+FILMS_PER_VIEW = 5.3  # that are kept, on average ...
+MOST_FILMS = 6  # ... and at most
 SIZE = dict(widths=(64, 64, 80, 80, 64), encoder=(2, 2, 2, 2, 2), decoder=(2, 2, 2, 2))
 
 
@@ -151,19 +152,16 @@ class Pictures:
     def is_full(self):
         if self.films is None:
             return False
-        most_of_a_view = 6
-        return (
-            len(self.views) >= self.most
-            or self.film_count + most_of_a_view > self.films.shape[0]
-        )
+        return len(self.views) >= self.most or self.film_count + MOST_FILMS > self.films.shape[0]
 
     def add(self, values, paths, exposures):
         count, _, height, width = values.shape
         if self.films is None:
             self.height, self.width = height, width
             size = height * width
+            room = int(FILMS_PER_VIEW * self.most) + MOST_FILMS
             self.films = torch.zeros(
-                (int(FILMS_PER_VIEW * self.most) + 6, CHANNELS, size), dtype=torch.float16, device=self.device
+                (room, CHANNELS, size), dtype=torch.float16, device=self.device
             )
             self.targets = torch.zeros(
                 (self.most, 7, size), dtype=torch.float16, device=self.device
