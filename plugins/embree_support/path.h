@@ -15,9 +15,10 @@
 namespace diorama {
 
 struct PathTracer::Path {
-  explicit Path(PathSampler source) : sampler(source) {}
+  explicit Path(PathSampler source, const PathStart& from = {}) : sampler(source), start(from) {}
 
   PathSampler sampler;
+  PathStart start;
   const RayHit* first_hit = nullptr;  ///< Known from the start; see TraceSettings.
   PathSample result;
   Vec3f throughput = Vec3f::Ones();
@@ -26,7 +27,6 @@ struct PathTracer::Path {
   int straight_passes = 0;
   std::uint8_t number = 0;  ///< In its batch.
   // See PathReuse.
-  bool goes_on = true;            ///< Beyond a second surface that others see, too.
   bool has_shared_first = false;  ///< Its first surface sees what others found; ...
   bool may_share_next = false;    ///< ... they may see what it meets next, ...
   bool is_shared = false;         ///< ... and what it finds from now on counts for all.

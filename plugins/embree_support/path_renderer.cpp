@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "diorama/error.h"
+#include "path_starts.h"
 #include "renderer_support/oidn_denoiser.h"
 #include "renderer_support/radiance_cache.h"
 #include "renderer_support/sample_plan.h"
@@ -67,9 +68,9 @@ void PictureParams::visit(ParamVisitor& v) {
           {"Pictures of path_traced: connect paths with bright places on surfaces where lamps "
            "light few of them, so that light that is scattered several times has less noise."});
   v.param("path_reuse", path_reuse,
-          {"Pictures without denoiser: let paths of neighbouring pixels use each other's second "
-           "surfaces, so that fewer of them go on; half to a third of the time for the same noise "
-           "of pixels, which blocks of 8 x 8 of them share in part. By the processor."});
+          {"Pictures of path_traced without denoiser: let paths of pixels around use each other's "
+           "second surfaces, so that fewer of them go on; in rooms half of the time for the same "
+           "noise. By the processor."});
   v.param(
       "firefly_limit", firefly_limit,
       {"Denoised pictures: how bright one path may be, over a few times the other paths around, "
@@ -219,9 +220,14 @@ Image<Vec3f> PathRenderer::trace_quickly(const View&, const PathSettings&, Sampl
 
 /// What the camera sees, without noise where that is wanted.
 Image<Vec3f> PathRenderer::light(const View& view, std::uint64_t seed) {
-  SamplePlan plan(view.camera().width, view.camera().height,
-                  {params_.samples, params_.error_target, params_.time_budget_s}, seed);
   const PathSettings settings = path_settings(view);
+  SamplePlan::Limits limits{params_.samples, params_.error_target, params_.time_budget_s};
+  if (settings.reuses_paths) {
+    const PixelTiles tiles = PixelTiles::of_picture(view.camera().width, view.camera().height);
+    limits.block_width = tiles.width();
+    limits.block_height = tiles.height();
+  }
+  SamplePlan plan(view.camera().width, view.camera().height, limits, seed);
   if (filters_film_elsewhere()) return trace_quickly(view, settings, plan, params_.firefly_limit);
   Film film;
   {

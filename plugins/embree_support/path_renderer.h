@@ -33,7 +33,7 @@ struct PictureParams {
   double clamp = 0.0;
   bool radiance_cache = true;
   bool virtual_lights = true;
-  bool path_reuse = false;
+  bool path_reuse = true;
   double firefly_limit = 4.0;
   std::string exposure = "auto";
   double exposure_ev = 0.0;

@@ -57,6 +57,14 @@ RayCounts PathTracer::trace(const TraceJob& job, const Output& output) const {
   return trace_all<8>(job, output);
 }
 
+PixelPlaces PathTracer::places(const SampleOrder& order) const {
+  return {view_.camera().width, view_.camera().height, order};
+}
+
+Pixel PathTracer::place(const SampleOrder& order, int x, int y) const {
+  return settings_.reuses_paths ? places(order).of(x, y) : Pixel{x, y};
+}
+
 Film PathTracer::film(std::span<const TraceJob> jobs, Host& host, RayCounts& counts) const {
   // A picture of sums would be larger than what is left of them.
   Film film(view_.camera().width, view_.camera().height);
@@ -67,7 +75,10 @@ Film PathTracer::film(std::span<const TraceJob> jobs, Host& host, RayCounts& cou
     rays[i] = trace(job, sums.data(), std::size_t(job.x_end - job.x_begin));
     const PixelSum* sum = sums.data();
     for (int y = job.y_begin; y < job.y_end; ++y) {
-      for (int x = job.x_begin; x < job.x_end; ++x) film.at(x, y) = (sum++)->mean();
+      for (int x = job.x_begin; x < job.x_end; ++x) {
+        const Pixel pixel = place(job.order, x, y);
+        film.at(pixel.x, pixel.y) = (sum++)->mean();
+      }
     }
   });
   for (const RayCounts& own : rays) counts += own;
@@ -112,68 +123,52 @@ inline RayCounts PathTracer::trace_all(const TraceJob& job, const Output& output
   batch.own_bsdfs.reserve(kBatch);
   batch.learns = output.findings != nullptr;
   if (settings_.reuses_paths) batch.reuse = std::make_unique<PathReuse>();
-  std::array<PixelSum*, kBatch> pixels;
-  BatchFloats columns{};
-  BatchFloats rows{};
-  const SampleOrder::Place first = job.order.place(job.x_begin, job.y_begin, 0);
-  const std::uint32_t draw = hashed_bits(first.key ^ hashed_bits(first.index)) >> 16;
   const std::uint32_t run = batch.reuse ? PathReuse::kSamples : kRun;
-  const auto add_path = [&](int x, int y, std::uint32_t sample) {
-    const std::size_t i = paths.size();
-    const auto row = std::size_t(y - job.y_begin);
-    if (output.sums) {
-      pixels[i] = &output.sums[row * output.stride + std::size_t(x - job.x_begin)];
-    }
-    Path& path = paths.emplace_back(PathSampler(job.order.place(x, y, sample)));
-    if (batch.reuse) {
-      path.number = std::uint8_t(i);
-      const auto pixel =
-          std::uint32_t((y - job.y_begin) * (job.x_end - job.x_begin) + x - job.x_begin);
-      path.goes_on = PathReuse::goes_on(pixel, sample, draw);
-    }
-    columns[i] = float(x);
-    rows[i] = float(y);
-  };
-  std::uint64_t left = job.path_count();
   for (std::uint32_t begin = job.sample_begin; begin < job.sample_end; begin += run) {
     const std::uint32_t end = std::min(begin + run, job.sample_end);
-    for (int y = job.y_begin; y < job.y_end; ++y) {
-      for (int x = job.x_begin; x < job.x_end; ++x) {
-        for (std::uint32_t sample = begin; sample < end; ++sample) {
-          add_path(x, y, sample);
-          if (--left > 0 && paths.size() < kBatch) continue;
-          if (batch.reuse) batch.reuse->clear(paths.size(), end - begin);
-          start_paths(paths, columns, rows, batch);
-          trace_batch<kPacketSize>(batch);
-          if (batch.reuse) reuse_paths<kPacketSize>(paths, batch);
-          for (std::size_t i = 0; i < paths.size(); ++i) {
-            if (!output.findings) {
-              pixels[i]->add(paths[i].result);
-            } else if (paths[i].has_finding) {
-              paths[i].finding.light = paths[i].result.scattered;
-              output.findings->push_back(paths[i].finding);
-            }
-          }
-          paths.clear();
-          if (settings_.host) settings_.host->stop_if_asked();
+    for (const std::vector<PathStart>& starts :
+         batch.reuse ? starts_in_groups(job, places(job.order), begin, end, kBatch)
+                     : starts_in_order(job, begin, end, kBatch)) {
+      paths.clear();
+      for (const PathStart& start : starts) {
+        Path& path = paths.emplace_back(
+            PathSampler(job.order.place(start.pixel.x, start.pixel.y, start.sample)), start);
+        path.number = std::uint8_t(paths.size() - 1);
+        if (batch.reuse) batch.reuse->begin(path.number, start.group);
+      }
+      start_paths(paths, batch);
+      trace_batch<kPacketSize>(batch);
+      if (batch.reuse) reuse_paths<kPacketSize>(paths, batch);
+      for (Path& path : paths) {
+        if (!output.findings) {
+          const auto row = std::size_t(path.start.of_job.y - job.y_begin);
+          const auto column = std::size_t(path.start.of_job.x - job.x_begin);
+          output.sums[row * output.stride + column].add(path.result);
+        } else if (path.has_finding) {
+          path.finding.light = path.result.scattered;
+          output.findings->push_back(path.finding);
         }
       }
+      if (settings_.host) settings_.host->stop_if_asked();
     }
   }
   return batch.counts;
 }
 
-inline void PathTracer::start_paths(std::vector<Path>& paths, const BatchFloats& columns,
-                                    const BatchFloats& rows, Batch& v) const {
+inline void PathTracer::start_paths(std::vector<Path>& paths, Batch& v) const {
   const HitImage* hits = settings_.first_hits;
   BatchNumbers numbers;
   for (std::size_t i = 0; i < paths.size(); ++i) numbers.take(i, paths[i].sampler, 2);
-  BatchFloats x;
-  BatchFloats y;
+  BatchFloats x{};
+  BatchFloats y{};
+  for (std::size_t i = 0; i < paths.size(); ++i) {
+    x[i] = float(paths[i].start.pixel.x);
+    y[i] = float(paths[i].start.pixel.y);
+  }
   for (std::size_t i = 0; i < whole_steps(paths.size()); ++i) {
     const Vec2f u = numbers.pair(i, 0);
-    x[i] = columns[i] + (hits ? 0.5f : u.x());
-    y[i] = rows[i] + (hits ? 0.5f : u.y());
+    x[i] += hits ? 0.5f : u.x();
+    y[i] += hits ? 0.5f : u.y();
   }
   v.rays.count = 0;
   v.rays.is_coherent = !view_.has_aperture() && !view_.has_shutter();
@@ -182,10 +177,10 @@ inline void PathTracer::start_paths(std::vector<Path>& paths, const BatchFloats&
     const Vec2f aperture = view_.has_aperture() ? numbers.pair(i, 1) : Vec2f(Vec2f::Zero());
     CameraRay ray = view_.sample_ray({x[i], y[i]}, aperture);
     if (view_.has_shutter()) [[unlikely]]
-      open_shutter(path, int(rows[i]), ray);
+      open_shutter(path, path.start.pixel.y, ray);
     if (!(ray.t_max > 0.0f)) continue;
     path.spread = view_.pixel_angle();
-    if (hits) path.first_hit = &hits->at(int(columns[i]), int(rows[i]));
+    if (hits) path.first_hit = &hits->at(path.start.pixel.x, path.start.pixel.y);
     v.paths[v.rays.count] = &path;
     v.rays.add(ray.origin, ray.direction, ray.t_min, ray.t_max, path.time);
   }
@@ -637,7 +632,7 @@ inline bool PathTracer::can_be_second(const SurfaceBsdf& s) {
 /// Of the second surfaces only some are looked at, which serve the others' paths, too.
 inline bool PathTracer::ends_for_others(const Batch& v, std::size_t i) {
   const Path& path = *v.paths[i];
-  return path.may_share_next && !path.goes_on && can_be_second(*v.bsdf[i]);
+  return path.may_share_next && !path.start.goes_on && can_be_second(*v.bsdf[i]);
 }
 
 inline void PathTracer::share_surface(Batch& v, std::size_t i) const {

@@ -64,10 +64,14 @@ class PathTracer {
   PathTracer(const EmbreeScene& scene, const View& view, const TraceSettings& settings, Isa isa);
 
   /// Adds samples to the sums of the job's pixels, which lie row by row from its first on, `stride`
-  /// per row. Equal jobs give equal sums. Uses the kernel compiled for the instruction set.
+  /// per row, and have their place() in the picture. Equal jobs give equal sums. Uses the kernel
+  /// compiled for the instruction set.
   RayCounts trace(const TraceJob& job, PixelSum* sums, std::size_t stride) const {
     return trace(job, Output{sums, stride, nullptr});
   }
+  /// Where in the picture a pixel of its jobs lies: elsewhere than these say where paths are
+  /// reused. `order`: of the jobs.
+  Pixel place(const SampleOrder& order, int x, int y) const;
   /// The means of a picture that these jobs are all of. Adds to `counts`.
   Film film(std::span<const TraceJob> jobs, Host& host, RayCounts& counts) const;
   /// What the jobs' paths find for those of the picture. Adds to `counts`.
@@ -95,8 +99,8 @@ class PathTracer {
   RayCounts trace_sse42(const TraceJob& job, const Output& output) const;
   RayCounts trace_avx2(const TraceJob& job, const Output& output) const;
   RayCounts trace_avx512(const TraceJob& job, const Output& output) const;
-  void start_paths(std::vector<Path>& paths, const BatchFloats& columns, const BatchFloats& rows,
-                   Batch& v) const;
+  PixelPlaces places(const SampleOrder& order) const;
+  void start_paths(std::vector<Path>& paths, Batch& v) const;
   template <int kPacketSize>
   void trace_batch(Batch& v) const;
   void open_shutter(Path& path, int row, CameraRay& ray) const;

@@ -39,7 +39,10 @@ Film film_in_rounds(const PathTracer& tracer, const View& view, SamplePlan& plan
   }
   Film film(width, height);
   host.parallel_for(std::size_t(height), [&](std::size_t row) {
-    for (int x = 0; x < width; ++x) film.at(x, int(row)) = sums.at(x, int(row)).mean();
+    for (int x = 0; x < width; ++x) {
+      const Pixel pixel = tracer.place(plan.order(), x, int(row));
+      film.at(pixel.x, pixel.y) = sums.at(x, int(row)).mean();
+    }
   });
   return film;
 }

@@ -45,12 +45,11 @@ std::uint32_t learning_samples(std::uint64_t pixels, int samples) {
 
 SamplePlan::SamplePlan(int width, int height, const Limits& limits, std::uint64_t seed)
     : limits_(limits), seed_(seed) {
-  const SampleOrder order(seed, std::uint32_t(limits.samples));
-  for (int y = 0; y < height; y += kBlock) {
-    for (int x = 0; x < width; x += kBlock) {
-      const int x_end = std::min(width, x + kBlock);
-      const int y_end = std::min(height, y + kBlock);
-      blocks_.push_back({{x, y, x_end, y_end, 0, 0, order}, 0});
+  for (int y = 0; y < height; y += limits.block_height) {
+    for (int x = 0; x < width; x += limits.block_width) {
+      const int x_end = std::min(width, x + limits.block_width);
+      const int y_end = std::min(height, y + limits.block_height);
+      blocks_.push_back({{x, y, x_end, y_end, 0, 0, order()}, 0});
     }
   }
 }

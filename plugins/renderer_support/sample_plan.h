@@ -20,6 +20,8 @@ class SamplePlan {
     int samples = 1;             ///< Per pixel, at most.
     double error_target = 0.0;   ///< Wanted standard error of a pixel over its brightness; 0: none.
     double time_budget_s = 0.0;  ///< Wall time after which no further round begins; 0: none.
+    int block_width = 8;         ///< Pixels that get as many, and are traced together.
+    int block_height = 8;
   };
   SamplePlan(int width, int height, const Limits& limits, std::uint64_t seed);
 
@@ -29,6 +31,8 @@ class SamplePlan {
            most_per_round_ >= std::uint32_t(limits_.samples);
   }
   std::uint64_t seed() const { return seed_; }
+  /// Of all its jobs but those to learn from.
+  SampleOrder order() const { return {seed_, std::uint32_t(limits_.samples)}; }
   /// Paths of a sequence of their own for a RadianceCache to learn from: one for eight of
   /// the picture; one per pixel of small pictures, and less where the picture is large.
   std::vector<TraceJob> learning_jobs() const;
@@ -44,8 +48,7 @@ class SamplePlan {
   std::uint64_t path_count() const { return pixel_count() * std::uint64_t(limits_.samples); }
 
  private:
-  static constexpr int kBlock = 8;          // pixels
-  static constexpr int kFirstSamples = 16;  // before an error is believed
+  static constexpr int kFirstSamples = 16;  // Before an error is believed.
 
   struct Block {
     TraceJob job;  ///< sample_end: samples taken.

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "path_reuse.h"
 
-#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -23,6 +22,14 @@ using test::relative_error;
 using test::RenderHost;
 using test::room_with_shade;
 using test::TestWorld;
+
+SamplePlan plan_of_tiles(int width, int height, int samples, std::uint64_t seed) {
+  SamplePlan::Limits limits{samples};
+  const PixelTiles tiles = PixelTiles::of_picture(width, height);
+  limits.block_width = tiles.width();
+  limits.block_height = tiles.height();
+  return {width, height, limits, seed};
+}
 
 /// Lit by the sky over the middle.
 TestWorld room_with_skylight() {
@@ -61,22 +68,6 @@ TestWorld room_with_skylight() {
 
 }  // namespace
 
-TEST_CASE("one path of so many goes on, whatever the draw", "[path_reuse]") {
-  for (std::uint32_t draw = 0; draw < 20; ++draw) {
-    std::vector<int> of_pixels(PathReuse::kGroup, 0);
-    for (std::uint32_t sample = 0; sample < PathReuse::kSpacing; ++sample) {
-      int going = 0;
-      for (std::uint32_t pixel = 0; pixel < PathReuse::kGroup; ++pixel) {
-        const bool goes_on = PathReuse::goes_on(pixel, sample, draw);
-        going += goes_on;
-        of_pixels[pixel] += goes_on;
-      }
-      CHECK(going == int(PathReuse::kGroup / PathReuse::kSpacing));
-    }
-    CHECK(std::ranges::all_of(of_pixels, [](int count) { return count == 1; }));
-  }
-}
-
 TEST_CASE("paths that use those of others leave the light of a room as it is",
           "[path_reuse][long]") {
   const bool is_connected = GENERATE(false, true);
@@ -97,7 +88,7 @@ TEST_CASE("paths that use those of others leave the light of a room as it is",
   const VirtualLightTracer finder(scene, view, alone, parts, 9, host, rays);
   VirtualLights lights = finder.lights(1500, 0, rays);
   const auto film = [&](const PathTracer& tracer, int count, std::uint64_t seed) {
-    SamplePlan plan(kShadeWidth, kShadeHeight, {count}, seed);
+    SamplePlan plan = plan_of_tiles(kShadeWidth, kShadeHeight, count, seed);
     return tracer.film(plan.next_round({}, 0.0), host, rays);
   };
   const auto settings_with = [&](bool reuses_paths) {
@@ -146,7 +137,7 @@ TEST_CASE("paths that use those of others have less noise for their rays", "[pat
     const PathTracer tracer(scene, view, settings, isa_by_name(EmbreeRenderer::Params().isa));
     RayCounts rays;
     const auto film = [&](std::uint64_t seed) {
-      SamplePlan plan(kFineWidth, kFineHeight, {16}, seed);
+      SamplePlan plan = plan_of_tiles(kFineWidth, kFineHeight, 16, seed);
       return tracer.film(plan.next_round({}, 0.0), host, rays);
     };
     const Film first = film(5);

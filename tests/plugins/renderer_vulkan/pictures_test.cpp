@@ -93,6 +93,7 @@ PictureParams reference(int samples, int bounces = 4) {
   params.samples = samples;
   params.max_bounces = bounces;
   params.denoise = false;
+  params.path_reuse = false;  // Embree's alone.
   params.exposure = "fixed";
   return params;
 }
