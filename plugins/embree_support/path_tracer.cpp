@@ -334,6 +334,8 @@ inline bool PathTracer::evaluate_material(Batch& v, std::size_t i) const {
   v.bsdf[i] = is_soft ? &material.soft : &material.sharp;
   const bool has_colors = !v.hits.instance[i]->source().colors.empty();
   if (!material.is_special && !has_colors) return true;
+  // Where textures do not tell whether others see it, they need not be read.
+  if (material.has_constant_lobes && ends_for_others(v, i)) return false;
   const RayHit hit = v.hits.at(i);
   SurfaceGeometry surface = v.surface(i);
   if (material.reads_uv) add_uv(surface, hit);

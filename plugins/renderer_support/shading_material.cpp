@@ -122,6 +122,8 @@ std::unique_ptr<ShadingMaterial> MaterialLibrary::make(std::shared_ptr<const Mat
   material->is_thin_glass = m.is_thin_walled && m.transmission > 0.0f;
   material->dims_shadows = material->is_cut_out || m.transmission > 0.0f;
   material->emits = m.emission.maxCoeff() > 0.0f;
+  material->has_constant_lobes = !material->metallic && !material->roughness && !material->emits &&
+                                 !material->is_blended && !material->is_thin_glass;
   material->is_special = material->is_textured || material->is_blended || material->is_thin_glass ||
                          material->emits || material->sharp.glass;
   return material;

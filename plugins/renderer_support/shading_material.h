@@ -33,6 +33,8 @@ struct ShadingMaterial {
   bool is_cut_out = false;     ///< Rays may pass where the opacity says so.
   bool dims_shadows = false;   ///< Shadow rays may pass, weakened.
   bool emits = false;
+  /// Textures change only its colours and normals; no light comes from it or passes it straight.
+  bool has_constant_lobes = false;
   bool is_special = false;  ///< Any of the above but cut-outs, or solid glass.
 
   /// For roughness read from a texture.

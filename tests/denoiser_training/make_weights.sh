@@ -126,7 +126,7 @@ fi
 begin() {
   [ -e pid ] && kill -0 "$(<pid)" 2>/dev/null && return
   echo "begun at $(date -u +%T)" >>log
-  setsid nohup bash "$(readlink -f "$0")" --all >>log 2>&1 </dev/null &
+  setsid nohup bash "$here/make_weights.sh" --all >>log 2>&1 </dev/null &
   echo $! >pid
 }
 end=$("$PYTHON" -c "print(int($(seconds) + 60 * $MINUTES))")
