@@ -55,7 +55,7 @@ i=1
 while [ "$i" -le "$repetitions" ]; do
   for materials in diffuse pbr; do
     # As many as bring the error to that of 64 paths of the peer.
-    case $materials in diffuse) equal=14 ;; *) equal=15 ;; esac
+    case $materials in diffuse) equal=6 ;; *) equal=8 ;; esac
     cycles cycles_sync "$materials" 1 8 8
     cycles cycles_64 "$materials" 64 640 480
     ours ours_64 "$materials" --samples 64 --width 640 --height 480 --probes
