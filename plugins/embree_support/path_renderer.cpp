@@ -223,9 +223,7 @@ Image<Vec3f> PathRenderer::light(const View& view, std::uint64_t seed) {
   const PathSettings settings = path_settings(view);
   SamplePlan::Limits limits{params_.samples, params_.error_target, params_.time_budget_s};
   if (settings.reuses_paths) {
-    const PixelTiles tiles = PixelTiles::of_picture(view.camera().width, view.camera().height);
-    limits.block_width = tiles.width();
-    limits.block_height = tiles.height();
+    PixelTiles::of_picture(view.camera().width, view.camera().height).set_blocks(limits);
   }
   SamplePlan plan(view.camera().width, view.camera().height, limits, seed);
   if (filters_film_elsewhere()) return trace_quickly(view, settings, plan, params_.firefly_limit);

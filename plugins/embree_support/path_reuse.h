@@ -17,8 +17,8 @@ namespace diorama {
 /// one of these, the first surfaces of all paths of its group see, too, unless something is in the
 /// way. Each of the group's paths could have found it: the weights are those of the balance
 /// heuristic among them, so that nothing is counted twice and nothing is left out. As many share
-/// what one found, few have to go on beyond their second surface. Columns are by the numbers of a
-/// batch's paths. World space where nothing else is said.
+/// what one found, few have to go on beyond their second surface. World space where nothing else is
+/// said.
 class PathReuse {
  public:
   /// Of each pixel in a batch, at most.

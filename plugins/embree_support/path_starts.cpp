@@ -66,12 +66,10 @@ std::vector<std::vector<PathStart>> starts_in_groups(const TraceJob& job, const 
       const int x = left + in_tile.x;
       const int y = top + in_tile.y;
       if (x >= job.x_end || y >= job.y_end) continue;
+      const Pixel pixel = places.of(x, y);
       for (std::uint32_t sample = begin; sample < end; ++sample) {
-        paths.push_back({{x, y},
-                         places.of(x, y),
-                         sample,
-                         number + sample - begin,
-                         groups.goes_on(group, cell, sample)});
+        const bool goes_on = groups.goes_on(group, cell, sample);
+        paths.push_back({{x, y}, pixel, sample, number + sample - begin, goes_on});
       }
     }
     number += end - begin;

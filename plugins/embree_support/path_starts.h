@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "renderer_support/sample_plan.h"
 #include "renderer_support/trace_job.h"
 
 namespace diorama {
@@ -27,6 +28,11 @@ struct PixelTiles {
   }
   int width() const { return kColumns * cell; }
   int height() const { return kRows * cell; }
+  /// Has a plan decide for tiles: their groups are whole only where one job has all of a tile.
+  void set_blocks(SamplePlan::Limits& limits) const {
+    limits.block_width = width();
+    limits.block_height = height();
+  }
 };
 
 /// Which pixels' paths use each other's surfaces (see PathReuse). A group has one pixel of every

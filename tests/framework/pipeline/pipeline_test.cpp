@@ -549,6 +549,7 @@ TEST_CASE("Writers that want it get captures in their order", "[pipeline]") {
     run.options.encodes_in_order = true;
     run.go();
     CHECK(script.encoded.size() == 23);
+    if (threads == 1) CHECK(std::ranges::is_sorted(script.encoded));
     // A thread may be held up over its capture while the others go on, for as long as it takes, but
     // every capture that has been passed over is in the hands of a thread of its own.
     for (std::size_t i = 0; i < script.encoded.size(); ++i) {

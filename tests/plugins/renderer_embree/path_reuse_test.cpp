@@ -25,9 +25,7 @@ using test::TestWorld;
 
 SamplePlan plan_of_tiles(int width, int height, int samples, std::uint64_t seed) {
   SamplePlan::Limits limits{samples};
-  const PixelTiles tiles = PixelTiles::of_picture(width, height);
-  limits.block_width = tiles.width();
-  limits.block_height = tiles.height();
+  PixelTiles::of_picture(width, height).set_blocks(limits);
   return {width, height, limits, seed};
 }
 
